@@ -1,0 +1,231 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// tangible-fit: identifies parameters of a scene from observed positions.
+
+#include <gflags/gflags.h>
+
+#include <cmath>
+#include <cstdio>
+#include <iostream>
+#include <string>
+#include <vector>
+
+#include "tangible/app/program.h"
+#include "tangible/estimation/fit_json.h"
+#include "tangible/estimation/report.h"
+#include "tangible/scene/csv.h"
+
+DEFINE_string(out, "", "file of the result (JSON); empty: none is written");
+DEFINE_string(report, "", "file of the report (HTML); empty: none is written");
+DEFINE_bool(discretisation_check, false,
+            "fit at dt / 2 too and report the difference as the bias of the step");
+DEFINE_string(derivatives, "",
+              "tangent, adjoint, jet, jet_implicit or finite_difference, instead of the file's");
+DEFINE_string(initial, "", "other initial values: name=value, separated by commas");
+DEFINE_int32(max_iterations, 50, "of each start");
+
+namespace tangible {
+namespace {
+
+/// "chain mass=20,friction=0.1" into the parameters; returns what is wrong or empty.
+std::string OverrideInitial(const std::string& text, std::vector<FitParameter>* parameters) {
+  size_t begin = 0;
+  while (begin < text.size()) {
+    const size_t end = std::min(text.find(',', begin), text.size());
+    const std::string item = text.substr(begin, end - begin);
+    begin = end + 1;
+    const size_t equal = item.rfind('=');
+    double value = 0.0;
+    if (equal == std::string::npos || !ParseNumber(item.substr(equal + 1), &value)) {
+      return "expected name=value, got '" + item + "'";
+    }
+    bool known = false;
+    for (FitParameter& parameter : *parameters) {
+      if (parameter.name == item.substr(0, equal)) {
+        parameter.initial = value;
+        known = true;
+      }
+    }
+    if (!known) {
+      return "expected the name of a parameter, got '" + item.substr(0, equal) + "'";
+    }
+  }
+  return "";
+}
+
+std::string OverrideDerivatives(FitOptions* options) {
+  if (FLAGS_derivatives.empty()) {
+    return "";
+  }
+  for (const DerivativeMethod method :
+       {DerivativeMethod::kTangent, DerivativeMethod::kAdjoint, DerivativeMethod::kJet,
+        DerivativeMethod::kJetImplicit, DerivativeMethod::kFiniteDifference}) {
+    if (FLAGS_derivatives == NameOf(method) && IsAvailable(method)) {
+      options->derivatives = method;
+      return "";
+    }
+  }
+  return "expected tangent, adjoint, jet, jet_implicit or finite_difference (Jets if built with "
+         "them), got '" +
+         FLAGS_derivatives + "'";
+}
+
+std::string Cell(double value, int digits = 6) {
+  char text[40];
+  std::snprintf(text, sizeof text, "%.*g", digits, value);
+  return text;
+}
+
+void PrintIteration(const std::vector<ParameterizedScene::Entry>& entries, int start, int iteration,
+                    const FitIteration& values) {
+  constexpr size_t kMostColumns = 6;
+  if (iteration == 0) {
+    if (start > 0) {
+      std::printf("start %d\n", start + 1);
+    }
+    std::printf("%4s %13s %11s", "iter", "cost", "gradient");
+    for (size_t k = 0; k < entries.size() && k < kMostColumns; ++k) {
+      std::printf(" %14.14s", entries[k].name.c_str());
+    }
+    std::printf("%s %9s\n", entries.size() > kMostColumns ? " ..." : "", "seconds");
+  }
+  std::printf("%4d %13.6e %11.3e", iteration, values.cost, values.gradient_norm);
+  for (size_t k = 0; k < entries.size() && k < kMostColumns; ++k) {
+    std::printf(" %14.9g", values.parameters[k]);
+  }
+  std::printf("%s %9.3f\n", entries.size() > kMostColumns ? " ..." : "", values.seconds);
+  std::fflush(stdout);
+}
+
+void PrintEstimates(const std::vector<ParameterizedScene::Entry>& entries,
+                    const FitResult& result) {
+  const Uncertainty& uncertainty = result.uncertainty;
+  for (size_t k = 0; k < entries.size(); ++k) {
+    const auto& interval = uncertainty.confidence_95[k];
+    const double estimate = result.estimate[static_cast<Eigen::Index>(k)];
+    std::string line = entries[k].name + " = " + Cell(estimate, 10);
+    if (interval) {
+      line += " ± " + Cell(uncertainty.standard_deviation[static_cast<Eigen::Index>(k)], 3) +
+              " (95 %: " + Cell(interval->first, 8) + " to " + Cell(interval->second, 8) + ")";
+    } else {
+      line += " (" + uncertainty.messages[k] + ")";
+    }
+    if (k == 0) {
+      line += ", " + std::to_string(result.iterations.size() - 1) + " iterations, " +
+              Cell(result.seconds, 2) + " s";
+    }
+    std::cout << line << "\n";
+  }
+  std::cout << "cost " << Cell(result.initial_cost) << " -> " << Cell(result.final_cost)
+            << ", residual rms " << Cell(uncertainty.residual_rms, 4)
+            << " sigma, reduced chi-square " << Cell(uncertainty.reduced_chi_square, 4) << ", "
+            << result.rollouts << " rollouts\n";
+  for (const std::string& warning : uncertainty.warnings) {
+    std::cout << "warning: " << warning << "\n";
+  }
+}
+
+void PrintCheck(const std::vector<ParameterizedScene::Entry>& entries,
+                const DiscretisationCheck& check) {
+  for (Eigen::Index k = 0; k < check.bias.size(); ++k) {
+    std::cout << "bias of the step dt = " << Cell(check.dt) << " s on " << entries[k].name << ": "
+              << Cell(check.bias[k], 3)
+              << " to first order (difference to dt / 2: " << Cell(check.difference[k], 3)
+              << ", extrapolated to " << Cell(check.extrapolated[k], 8) << ")\n";
+  }
+}
+
+int WriteFiles(const FitFile& fit, const RolloutResiduals& residuals, const FitResult& result,
+               const DiscretisationCheck* check) {
+  if (!FLAGS_out.empty()) {
+    const std::string error =
+        WriteFileAtomically(FLAGS_out, JsonText(ResultToJson(residuals, result, check)));
+    if (!error.empty()) {
+      return ReportError(error);
+    }
+  }
+  if (!FLAGS_report.empty() && result.estimate.size() > 0) {
+    const std::string error =
+        WriteFileAtomically(FLAGS_report, FitReport(fit.path, residuals, result, check));
+    if (!error.empty()) {
+      return ReportError(error);
+    }
+  }
+  return kExitDone;
+}
+
+int Run(const std::string& file) {
+  FitFile fit;
+  std::string error;
+  if (!LoadFit(file, &fit, &error)) {
+    return ReportError(error);
+  }
+  FitProblem& problem = fit.problem;
+  problem.options.max_iterations = FLAGS_max_iterations;
+  error = OverrideInitial(FLAGS_initial, &problem.parameters);
+  if (!error.empty()) {
+    return ReportError("tangible-fit: --initial: " + error, kExitUsage);
+  }
+  error = OverrideDerivatives(&problem.options);
+  if (!error.empty()) {
+    return ReportError("tangible-fit: --derivatives: " + error, kExitUsage);
+  }
+  std::vector<RolloutResiduals> made;
+  if (!MakeResiduals(problem, file, &made, &error)) {
+    return ReportError(error);
+  }
+  RolloutResiduals& residuals = made.front();
+  const auto& entries = residuals.scene().entries();
+  const FitResult result =
+      Fit(problem.options, &residuals, [&](int start, int iteration, const FitIteration& values) {
+        PrintIteration(entries, start, iteration, values);
+      });
+  DiscretisationCheck check;
+  const bool checked = FLAGS_discretisation_check && result.status == FitStatus::kConverged;
+  if (result.estimate.size() > 0) {
+    PrintEstimates(entries, result);
+  }
+  if (checked) {
+    check = CheckDiscretisation(problem, result);
+    PrintCheck(entries, check);
+  }
+  const int written = WriteFiles(fit, residuals, result, checked ? &check : nullptr);
+  if (written != kExitDone) {
+    return written;
+  }
+  if (result.status == FitStatus::kNoEffect) {
+    return ReportError(file + ": /parameters/" + std::to_string(result.parameter) + ": " +
+                       result.message);
+  }
+  if (result.status != FitStatus::kConverged) {
+    return ReportError(file + ": " + NameOf(result.status) + ": " + result.message);
+  }
+  if (checked && check.status != FitStatus::kConverged) {
+    return ReportError(file + ": the fit at dt / 2: " + NameOf(check.status) + ": " +
+                       check.message);
+  }
+  return kExitDone;
+}
+
+}  // namespace
+}  // namespace tangible
+
+int main(int argc, char** argv) {
+  const tangible::CommandLine line = tangible::ParseCommandLine(
+      argc, argv,
+      {.name = "tangible-fit",
+       .synopsis = "FIT.json [--out=R.json] [--report=R.html] [--discretisation_check]",
+       .description =
+           "Identifies parameters of a scene from observed positions by nonlinear least squares.\n"
+           "Prints each iteration and, for each parameter, the estimate, its standard deviation\n"
+           "and 95 % interval.",
+       .version = TANGIBLE_VERSION,
+       .source_file = __FILE__});
+  if (line.exit_status) return *line.exit_status;
+  if (FLAGS_max_iterations < 1) {
+    return tangible::ReportError("tangible-fit: --max_iterations: expected a number >= 1, got " +
+                                     std::to_string(FLAGS_max_iterations),
+                                 tangible::kExitUsage);
+  }
+  return tangible::Run(line.positional[0]);
+}

@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// What the recordings of real pendulums (recording.h) say: the fit of data/fits/recording_*.json,
+// how its residuals compare with the noise, what it identifies, and, for the single pendulum, how
+// well it predicts what comes after the part that was fitted.
+
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tangible/estimation/discretisation.h"
+#include "tangible/estimation/experiments/derived.h"
+#include "tangible/estimation/experiments/recording.h"
+#include "tangible/scene/json_writer.h"
+
+namespace tangible {
+
+struct PendulumJob {
+  std::string name;            ///< "recording_double_pendulum_0": of the fit file, without .json
+  std::string recording;       ///< file
+  RecordingOptions window;     ///< what is fitted
+  double prediction_to = 0.0;  ///< s: end of what is predicted; 0: nothing is
+};
+
+/// The single pendulum and the double pendulums' two recordings, in a folder laid out as
+/// `multiarm_pendulum/`, `ibm_double_pendulum/`.
+std::vector<PendulumJob> PendulumJobs(const std::string& recordings);
+
+struct PredictionError {
+  double seconds = 0.0;  ///< after the part that was fitted
+  double error = 0.0;    ///< rad: largest within them
+};
+
+struct PendulumResult {
+  std::string name;
+  Recording recording;
+  std::vector<ParameterizedScene::Entry> parameters;
+  FitResult fit;
+  DiscretisationCheck check;
+  double residual_rms = 0.0;  ///< m or rad
+  std::vector<DerivedQuantity> derived;
+  std::vector<double> derived_bias;  ///< of the step, as DiscretisationCheck has it
+  std::vector<PredictionError> predictions;
+};
+
+/// Reads the recording, writes its observations to `out` (where the fit file looks for them), fits.
+/// False and one line where something fails.
+bool RunPendulum(const PendulumJob& job, const std::string& fits, const std::string& out,
+                 PendulumResult* result, std::string* error);
+
+OrderedJson PendulumToJson(const PendulumResult& result);
+
+}  // namespace tangible

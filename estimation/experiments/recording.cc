@@ -1,0 +1,193 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/estimation/experiments/recording.h"
+
+#include <array>
+#include <cmath>
+#include <fstream>
+#include <limits>
+#include <numbers>
+#include <sstream>
+
+#include "tangible/scene/csv.h"
+
+namespace tangible {
+namespace {
+
+constexpr double kFifthsOfPixel = 0.2;
+const std::vector<std::string> kMarkerColumns = {"pivot down",  "pivot right", "joint down",
+                                                 "joint right", "tip down",    "tip right"};
+// A row whose time is off by rounding still belongs to the window.
+constexpr double kTimeSlack = 1e-9;
+
+using MarkerRow = std::array<double, 6>;
+
+bool ReadMarkers(const std::string& text, const std::string& file, const RecordingOptions& options,
+                 std::vector<MarkerRow>* rows, Recording* recording, std::string* error) {
+  std::string header;
+  for (const std::string& column : kMarkerColumns) {
+    header += (header.empty() ? "" : ",") + column;
+  }
+  CsvTable table;
+  if (!ParseCsv(header + "\n" + text, file, kMarkerColumns, kMarkerColumns, &table, error)) {
+    return false;
+  }
+  for (int& line : table.lines) {
+    --line;  // the header is not in the file
+  }
+  for (int i = 0; i < static_cast<int>(table.rows.size()); ++i) {
+    const double time = i / options.rate;
+    if (time < options.from - kTimeSlack || time > options.to + kTimeSlack) {
+      continue;
+    }
+    MarkerRow row;
+    for (int c = 0; c < 6; ++c) {
+      if (!ReadCell(table, i, c, &row[c], error)) {
+        return false;
+      }
+    }
+    rows->push_back(row);
+    recording->times.push_back(time - options.from);
+  }
+  return true;
+}
+
+double MeanLength(const std::vector<MarkerRow>& rows, int from, int to) {
+  double sum = 0.0;
+  for (const MarkerRow& row : rows) {
+    sum += std::hypot(row[to] - row[from], row[to + 1] - row[from + 1]);
+  }
+  return sum / static_cast<double>(rows.size());
+}
+
+bool ParseMarkers(const std::string& text, const std::string& file, const RecordingOptions& options,
+                  Recording* recording, std::string* error) {
+  std::vector<MarkerRow> rows;
+  if (!ReadMarkers(text, file, options, &rows, recording, error)) {
+    return false;
+  }
+  if (rows.empty()) {
+    return true;
+  }
+  const double first = MeanLength(rows, 0, 2);
+  const double second = MeanLength(rows, 2, 4);
+  if (!(first > 0.0) || !(second > 0.0)) {
+    *error = file + ": expected markers apart from each other, got a distance of 0";
+    return false;
+  }
+  const double scale = options.first_length / first;
+  recording->target_column = "point";
+  recording->metres_per_pixel = scale / kFifthsOfPixel;
+  recording->length_ratio = first / second;
+  const auto add = [&](const char* point, const char* coordinate, int column, double sign) {
+    RecordedSeries series{point, coordinate, {}, 0.0};
+    for (const MarkerRow& row : rows) {
+      series.values.push_back(sign * scale * (row[column] - row[column % 2]));
+    }
+    recording->series.push_back(series);
+  };
+  add("joint", "x", 3, 1.0);
+  add("joint", "y", 2, -1.0);
+  add("tip", "x", 5, 1.0);
+  add("tip", "y", 4, -1.0);
+  return true;
+}
+
+bool ParseAngles(const std::string& text, const std::string& file, const RecordingOptions& options,
+                 Recording* recording, std::string* error) {
+  CsvTable table;
+  const std::vector<std::string> columns = {"t", "th1", "om1"};
+  if (!ParseCsv(text, file, columns, columns, &table, error)) {
+    return false;
+  }
+  recording->target_column = "body";
+  RecordedSeries series{"pendulum", "angle", {}, 0.0};
+  for (int i = 0; i < static_cast<int>(table.rows.size()); ++i) {
+    double time = 0.0;
+    double angle = 0.0;
+    if (!ReadCell(table, i, table.Column("t"), &time, error) ||
+        !ReadCell(table, i, table.Column("th1"), &angle, error)) {
+      return false;
+    }
+    if (time >= options.from - kTimeSlack && time <= options.to + kTimeSlack) {
+      recording->times.push_back(time - options.from);
+      series.values.push_back(angle - std::numbers::pi);
+    }
+  }
+  recording->series.push_back(series);
+  return true;
+}
+
+}  // namespace
+
+double NoiseFromFourthDifferences(const std::vector<double>& values) {
+  if (values.size() < 5) {
+    return std::numeric_limits<double>::quiet_NaN();
+  }
+  double sum = 0.0;
+  for (size_t k = 4; k < values.size(); ++k) {
+    const double d =
+        values[k] - 4.0 * values[k - 1] + 6.0 * values[k - 2] - 4.0 * values[k - 3] + values[k - 4];
+    sum += d * d;
+  }
+  return std::sqrt(sum / static_cast<double>(values.size() - 4) / 70.0);
+}
+
+bool ParseRecording(const std::string& text, const std::string& file,
+                    const RecordingOptions& options, Recording* recording, std::string* error) {
+  *recording = Recording();
+  const bool read = options.kind == RecordingKind::kIbmDoublePendulum
+                        ? ParseMarkers(text, file, options, recording, error)
+                        : ParseAngles(text, file, options, recording, error);
+  if (!read) {
+    return false;
+  }
+  if (recording->times.size() < 5) {
+    *error = file + ": expected at least 5 rows from " + std::to_string(options.from) + " to " +
+             std::to_string(options.to) + " s, got " + std::to_string(recording->times.size());
+    return false;
+  }
+  double sum = 0.0;
+  for (RecordedSeries& series : recording->series) {
+    series.noise = NoiseFromFourthDifferences(series.values);
+    sum += series.noise * series.noise;
+  }
+  recording->noise = std::sqrt(sum / static_cast<double>(recording->series.size()));
+  return true;
+}
+
+bool ReadRecording(const std::string& file, const RecordingOptions& options, Recording* recording,
+                   std::string* error) {
+  std::ifstream stream(file);
+  std::ostringstream text;
+  text << stream.rdbuf();
+  if (!stream) {
+    *error = file + ": expected a file that can be read";
+    return false;
+  }
+  return ParseRecording(text.str(), file, options, recording, error);
+}
+
+std::string ObservationCsv(const Recording& recording) {
+  std::ostringstream csv;
+  csv.precision(10);
+  csv << "time," << recording.target_column;
+  // The series of one target follow each other, and all targets have the same coordinates.
+  size_t coordinates = 0;
+  while (coordinates < recording.series.size() &&
+         recording.series[coordinates].target == recording.series.front().target) {
+    csv << "," << recording.series[coordinates++].coordinate;
+  }
+  csv << "\n";
+  for (size_t k = 0; k < recording.times.size(); ++k) {
+    for (size_t s = 0; s < recording.series.size(); s += coordinates) {
+      csv << recording.times[k] << "," << recording.series[s].target;
+      for (size_t c = 0; c < coordinates; ++c) {
+        csv << "," << recording.series[s + c].values[k];
+      }
+      csv << "\n";
+    }
+  }
+  return csv.str();
+}
+
+}  // namespace tangible

@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// One start of a fit: Levenberg-Marquardt by Ceres, then Gauss-Newton steps to the last digits.
+
+#include <ceres/ceres.h>
+
+#include <Eigen/Core>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "tangible/estimation/fit.h"
+
+namespace tangible {
+
+/// Where one start ended.
+struct Minimum {
+  FitStatus status = FitStatus::kFailed;
+  std::string message;
+  Eigen::VectorXd parameters;
+  double cost = 0.0;
+  Eigen::VectorXd residuals;
+  RowMatrixXd jacobian;  ///< dr/dp
+  std::vector<FitIteration> iterations;
+};
+
+/// Minimises from `start`. `elapsed` gives the seconds since the fit began.
+Minimum Minimise(const FitOptions& options, const Eigen::VectorXd& start,
+                 const std::function<double()>& elapsed,
+                 const std::function<void(int iteration, const FitIteration&)>& progress,
+                 RolloutResiduals* residuals);
+
+/// The parameters' bounds as those of the first entries of the problem's only block x, which is
+/// moved within them.
+void SetInternalBounds(const ParameterizedScene& scene, ceres::Problem* problem,
+                       Eigen::VectorXd* x);
+
+/// 1/2 Σ ρ(r²).
+double RobustCost(const Eigen::VectorXd& residuals, double huber);
+
+}  // namespace tangible

@@ -1,0 +1,13 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// The certificate of a derivative as JSON, as the results of the programs have it.
+
+#include "tangible/lcp/certificate.h"
+#include "tangible/scene/json_writer.h"
+
+namespace tangible {
+
+OrderedJson ToJson(const Certificate& certificate);
+
+}  // namespace tangible

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// Noisy observations of a run: positions of bodies, or of points fixed in them, at a rate of their
+// own.
+//
+//   observed = position + sigma g,   g standard normal, independent for x and y of every row
+//
+// Between steps poses, angles included, are linear in time, which is exact for the map of
+// semi-implicit Euler; a point is moved with the pose so found. The normal numbers are Box and
+// Muller's from std::mt19937_64, so that a seed gives the same file with every standard library.
+
+#include <random>
+#include <string>
+#include <vector>
+
+#include "tangible/dynamics/model.h"
+
+namespace tangible {
+
+/// What is observed: a point of a body (its frame, m).
+struct ObservedPoint {
+  std::string name;
+  int body = -1;
+  Vector2<double> at = Vector2<double>::Zero();
+};
+
+struct ObserveOptions {
+  std::vector<ObservedPoint> points;  ///< empty: the centre of mass of each moving body
+  double rate = 0.0;                  ///< Hz; 0: at every step
+  double noise = 0.0;                 ///< m, standard deviation
+  unsigned long seed = 0;
+};
+
+/// Reads {"tip": {"body": "link9", "at": [0, -0.5]}}; `at` may be absent. Returns an error (one
+/// line) or empty.
+std::string ReadPoints(const std::string& file, const ModelStructure& structure,
+                       std::vector<ObservedPoint>* points);
+
+/// Rows time,body,x,y, or time,point,x,y where points are given.
+class ObservationCsv {
+ public:
+  ObservationCsv(const ModelStructure& structure, ObserveOptions options);
+  /// Every state of the run, in order.
+  void Add(long k, double t, const State<double>& state);
+  std::string Finish() { return std::move(text_); }
+
+ private:
+  void Write(double time, const State<double>& before, double part, const State<double>& after);
+  double Normal();
+
+  ObserveOptions options_;
+  double duration_;
+  double dt_;
+  std::mt19937_64 random_;
+  std::string text_;
+  long next_ = 0;
+  double last_time_ = 0.0;
+  State<double> last_;
+};
+
+}  // namespace tangible

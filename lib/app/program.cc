@@ -1,0 +1,190 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/app/program.h"
+
+#include <gflags/gflags.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <exception>
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+#include <sstream>
+#include <system_error>
+
+#include "tangible/scene/json_reader.h"
+
+namespace tangible {
+namespace {
+
+using gflags::CommandLineFlagInfo;
+
+std::string Help(const ProgramInfo& info) {
+  std::ostringstream out;
+  out << "usage: " << info.name << " " << info.synopsis << "\n\n"
+      << info.description << "\n\nflags:\n";
+  std::vector<CommandLineFlagInfo> flags;
+  gflags::GetAllFlags(&flags);
+  for (const CommandLineFlagInfo& flag : flags) {
+    if (flag.filename != info.source_file) continue;
+    const char* quote = flag.type == "string" ? "\"" : "";
+    out << "  --" << flag.name << " (" << flag.type << ", default " << quote << flag.default_value
+        << quote << "): " << flag.description << "\n";
+  }
+  out << "  --help, --version\n\n"
+      << "Exit status: 0 done, 1 the job could not be done, 2 wrong usage of flags.\n";
+  return out.str();
+}
+
+CommandLine UsageError(const ProgramInfo& info, const std::string& what) {
+  CommandLine line;
+  line.exit_status =
+      ReportError(info.name + ": " + what + " (see " + info.name + " --help)", kExitUsage);
+  return line;
+}
+
+// A flag as typed, split at its "=".
+struct FlagText {
+  std::string name;
+  std::optional<std::string> value;
+};
+
+FlagText SplitFlag(std::string_view argument) {
+  argument.remove_prefix(argument.substr(0, 2) == "--" ? 2 : 1);
+  const std::size_t equal = argument.find('=');
+  if (equal == std::string_view::npos) return {std::string(argument), std::nullopt};
+  return {std::string(argument.substr(0, equal)), std::string(argument.substr(equal + 1))};
+}
+
+// Completes a flag without "=": a switch (--x, --nox), or a value in the next argument. Returns an
+// error or empty; `index` advances over a consumed value.
+std::string CompleteFlag(int argc, char** argv, FlagText& flag, int& index) {
+  CommandLineFlagInfo known;
+  if (!gflags::GetCommandLineFlagInfo(flag.name.c_str(), &known)) {
+    const bool negated = flag.name.rfind("no", 0) == 0 && !flag.value &&
+                         gflags::GetCommandLineFlagInfo(flag.name.substr(2).c_str(), &known) &&
+                         known.type == "bool";
+    if (!negated) return "unknown flag --" + flag.name;
+    flag = {flag.name.substr(2), "false"};
+  }
+  if (flag.value) return "";
+  if (known.type == "bool") {
+    flag.value = "true";
+  } else if (index + 1 < argc) {
+    flag.value = argv[++index];
+  } else {
+    return "flag --" + flag.name + " needs a value";
+  }
+  return "";
+}
+
+bool IsFlag(const char* argument) { return argument[0] == '-' && argument[1] != '\0'; }
+
+std::string Unwritable(const std::string& path, const std::string& reason) {
+  return OneLine(path + ": cannot be written: " + reason);
+}
+
+std::string WriteDirectly(const std::string& path, std::string_view text) {
+  errno = 0;
+  std::ofstream file(path, std::ios::binary);
+  file.write(text.data(), static_cast<std::streamsize>(text.size()));
+  file.close();
+  if (file) return "";
+  return errno != 0 ? std::strerror(errno) : "write failed";
+}
+
+}  // namespace
+
+CommandLine ParseCommandLine(int argc, char** argv, const ProgramInfo& info) {
+  CommandLine line;
+  bool only_positional = false;
+  for (int i = 1; i < argc; ++i) {
+    if (only_positional || !IsFlag(argv[i])) {
+      line.positional.emplace_back(argv[i]);
+      continue;
+    }
+    FlagText flag = SplitFlag(argv[i]);
+    if (std::strcmp(argv[i], "--") == 0) {
+      only_positional = true;
+    } else if (flag.name == "help" || flag.name == "h") {
+      std::cout << Help(info);
+      line.exit_status = kExitDone;
+      return line;
+    } else if (flag.name == "version") {
+      std::cout << info.name << " " << info.version << "\n";
+      line.exit_status = kExitDone;
+      return line;
+    } else {
+      const std::string error = CompleteFlag(argc, argv, flag, i);
+      if (!error.empty()) return UsageError(info, error);
+      if (gflags::SetCommandLineOption(flag.name.c_str(), flag.value->c_str()).empty()) {
+        CommandLineFlagInfo known;
+        gflags::GetCommandLineFlagInfo(flag.name.c_str(), &known);
+        return UsageError(
+            info, "--" + flag.name + ": expected " + known.type + ", got '" + *flag.value + "'");
+      }
+    }
+  }
+  if (static_cast<int>(line.positional.size()) != info.num_positional) {
+    return UsageError(info, "expected " + std::to_string(info.num_positional) +
+                                " argument(s), got " + std::to_string(line.positional.size()));
+  }
+  return line;
+}
+
+int RunMain(int (*body)(int, char**), int argc, char** argv) noexcept {
+  try {
+    return body(argc, argv);
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "%s: unexpected error: %s\n", argv[0], error.what());
+  } catch (...) {
+    std::fprintf(stderr, "%s: unexpected error\n", argv[0]);
+  }
+  return kExitFailed;
+}
+
+int ReportError(std::string_view message, int exit_status) {
+  std::cerr << OneLine(std::string(message)) << "\n";
+  return exit_status;
+}
+
+std::string FormatNumber(double value) {
+  std::array<char, 32> text{};
+  const int length = std::snprintf(text.data(), text.size(), "%.17g", value);
+  return {text.data(), static_cast<std::size_t>(length)};
+}
+
+std::string WriteFileAtomically(const std::string& path, std::string_view text) {
+  namespace fs = std::filesystem;
+  std::error_code error;
+  const fs::file_status status = fs::status(path, error);
+  if (fs::exists(status) && !fs::is_regular_file(status)) {
+    const std::string reason =
+        fs::is_directory(status) ? "it is a directory" : WriteDirectly(path, text);
+    return reason.empty() ? "" : Unwritable(path, reason);
+  }
+  // A link is followed, so that the file it names is replaced and not the link.
+  const fs::path target = fs::exists(status) ? fs::canonical(path, error) : fs::path(path);
+  const std::string temporary = target.string() + ".tmp" + std::to_string(::getpid());
+  const std::string reason = WriteDirectly(temporary, text);
+  if (!reason.empty()) {
+    fs::remove(temporary, error);
+    return Unwritable(path, reason);
+  }
+  fs::rename(temporary, target, error);
+  if (!error) return "";
+  const std::string why = error.message();
+  fs::remove(temporary, error);
+  return Unwritable(path, why);
+}
+
+std::string WriteResult(const std::string& out_path, std::string_view text) {
+  if (!out_path.empty()) return WriteFileAtomically(out_path, text);
+  std::cout << text << std::flush;
+  return std::cout ? "" : Unwritable("stdout", "write failed");
+}
+
+}  // namespace tangible

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// What every program shares: the command line, one-line errors, atomic output. Their JSON is read
+// and written by the scene room (json_reader.h, json_writer.h).
+//
+// Exit statuses: 0 done; 1 the job could not be done (bad input, an unsolved problem); 2 wrong
+// usage of flags. gflags itself exits 1 on an unknown flag, a malformed value and --help, so
+// arguments are checked here and handed to gflags one by one.
+//
+// A main reads
+//
+//   int Main(int argc, char** argv) {
+//     const CommandLine line = ParseCommandLine(argc, argv, {.name = ..., .source_file =
+//     __FILE__}); if (line.exit_status) return *line.exit_status;
+//     ...
+//   }
+//   int main(int argc, char** argv) { return tangible::RunMain(&Main, argc, argv); }
+
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace tangible {
+
+inline constexpr int kExitDone = 0;
+inline constexpr int kExitFailed = 1;
+inline constexpr int kExitUsage = 2;
+
+struct ProgramInfo {
+  std::string name;         ///< as typed: "tangible-lcp"
+  std::string synopsis;     ///< the arguments: "PROBLEM.json [--out=S.json]"
+  std::string description;  ///< what the program does, one paragraph
+  std::string version;      ///< "0.1.0"
+  std::string source_file;  ///< __FILE__ of the main: its flags are the ones that --help lists
+  int num_positional = 1;   ///< number of arguments that are not flags
+};
+
+struct CommandLine {
+  std::vector<std::string> positional;
+  /// Set when the program has nothing more to do (--help, --version, wrong usage); return it.
+  std::optional<int> exit_status;
+};
+
+/// Checks the arguments and sets the gflags they name. Prints help or the version on stdout, or one
+/// line about what is wrong on stderr.
+CommandLine ParseCommandLine(int argc, char** argv, const ProgramInfo& info);
+
+/// Runs `body`; an exception that nobody expected (no memory) is one line on stderr and status 1.
+int RunMain(int (*body)(int, char**), int argc, char** argv) noexcept;
+
+/// Prints `message` as exactly one line on stderr and returns `exit_status`.
+int ReportError(std::string_view message, int exit_status = kExitFailed);
+
+/// A number with 17 significant digits, which read back give the same double.
+std::string FormatNumber(double value);
+
+/// Writes a file so that it is either the old or the whole new one: a temporary in the same folder,
+/// then a rename. Devices and pipes are written directly. Returns an error (one line) or empty.
+std::string WriteFileAtomically(const std::string& path, std::string_view text);
+
+/// Writes a result to `out_path`, or to stdout if that is empty. Returns an error or empty.
+std::string WriteResult(const std::string& out_path, std::string_view text);
+
+}  // namespace tangible

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/app/progress.h"
+
+#include <unistd.h>
+
+#include <cstdio>
+#include <utility>
+
+namespace tangible {
+
+Progress::Progress(std::string what, long total)
+    : what_(std::move(what)),
+      total_(total),
+      terminal_(isatty(STDERR_FILENO) != 0),
+      next_(std::chrono::steady_clock::now() + std::chrono::seconds(1)) {}
+
+Progress::~Progress() {
+  if (shown_) {
+    std::fputs("\r\033[K", stderr);  // back to the start of the line, which is cleared
+  }
+}
+
+void Progress::Show(long done) {
+  if (!terminal_) {
+    return;
+  }
+  const auto now = std::chrono::steady_clock::now();
+  if (now < next_) {
+    return;
+  }
+  next_ = now + std::chrono::milliseconds(200);
+  shown_ = true;
+  std::fprintf(stderr, "\r%ld of %ld %s", done, total_, what_.c_str());
+  std::fflush(stderr);
+}
+
+}  // namespace tangible

@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// Progress of long work, in place on stderr, where that is a terminal.
+
+#include <chrono>
+#include <string>
+
+namespace tangible {
+
+class Progress {
+ public:
+  /// `what`: of what there are `total`, "steps".
+  Progress(std::string what, long total);
+  ~Progress();
+  Progress(const Progress&) = delete;
+  Progress& operator=(const Progress&) = delete;
+
+  /// Shows that `done` are done, at most five times a second and not in the first.
+  void Show(long done);
+
+ private:
+  std::string what_;
+  long total_;
+  bool terminal_;
+  bool shown_ = false;
+  std::chrono::steady_clock::time_point next_;
+};
+
+}  // namespace tangible

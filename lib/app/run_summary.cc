@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/app/run_summary.h"
+
+#include <algorithm>
+
+#include "tangible/simulation/invariants.h"
+
+namespace tangible {
+namespace {
+
+OrderedJson MomentumJson(const Model<double>& model, const State<double>& state) {
+  const Vector3<double> momentum = Momentum(model, state);
+  return {momentum[0], momentum[1], momentum[2]};
+}
+
+double Energy(const Model<double>& model, const State<double>& state) {
+  return KineticEnergy(model, state) + PotentialEnergy(model, state);
+}
+
+}  // namespace
+
+const char* ToString(StepStatus status) {
+  switch (status) {
+    case StepStatus::kDone:
+      return "done";
+    case StepStatus::kUnsolved:
+      return "unsolved";
+    case StepStatus::kDiverged:
+      return "diverged";
+  }
+  return "";
+}
+
+void RunSummary::Add(const Model<double>& model, const State<double>& state, Stepper* stepper) {
+  if (!started_) {
+    started_ = true;
+    first_ = state;
+  }
+  last_ = state;
+  if (!model.structure->joints.empty()) {
+    joint_drift_max_ = std::max(joint_drift_max_, JointDrift(model, state));
+  }
+  if (stepper != nullptr) {
+    islands_max_ = std::max(islands_max_, CountIslands(*model.structure, stepper->record()));
+  }
+}
+
+OrderedJson RunSummary::ToJson(const Model<double>& model, const RolloutReport& report,
+                               double seconds, double cpu_seconds) const {
+  const bool chosen = model.structure->settings.solver != SolverChoice::kAuto;
+  const long fallbacks = report.solved_by_interior_point + report.solved_by_lemke;
+  // The steps' reports give gaps at their starts; the end has no step.
+  const double penetration = std::max(report.penetration_max, -SmallestGap(model, last_));
+  return {{"status", ToString(report.status)},
+          {"message", report.message},
+          {"steps", report.steps},
+          {"seconds", seconds},
+          {"cpu_seconds", cpu_seconds},
+          {"bodies", model.structure->world()},
+          {"contacts_max", report.contacts_max},
+          {"lcp_rows_max", report.lcp_rows_max},
+          {"islands_max", islands_max_},
+          {"events", 0},
+          {"fallbacks", chosen ? 0 : fallbacks},
+          {"solver",
+           {{"guess", report.solved_by_guess},
+            {"interior_point", report.solved_by_interior_point},
+            {"lemke", report.solved_by_lemke}}},
+          {"residual_max", report.residual_max},
+          {"penetration_max", std::max(penetration, 0.0)},
+          {"joint_drift_max", joint_drift_max_},
+          {"impact_energy_gain_max", report.impact_energy_gain_max},
+          {"energy_start", Energy(model, first_)},
+          {"energy_end", Energy(model, last_)},
+          {"momentum_start", MomentumJson(model, first_)},
+          {"momentum_end", MomentumJson(model, last_)}};
+}
+
+}  // namespace tangible

@@ -1,0 +1,180 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// tangible-gradient: the final state of a scene, or a loss of it, differentiated with respect to
+// parameters.
+
+#include <gflags/gflags.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "tangible/app/certificate_json.h"
+#include "tangible/app/program.h"
+#include "tangible/scene/json_reader.h"
+#include "tangible/scene/json_writer.h"
+#include "tangible/scene/scene_json.h"
+#include "tangible/scene/scene_names.h"
+#include "tangible/simulation/gradient.h"
+
+DEFINE_string(parameters, "", "paths of the parameters, separated by commas");
+DEFINE_string(method, "adjoint", "adjoint, tangent, jet, jet_implicit or finite_difference");
+DEFINE_double(step, 0.0, "of finite differences, in the parameter's unit; 0: 6e-6 max(|p|, scale)");
+DEFINE_string(loss, "", "file of a scalar loss (JSON) to differentiate instead of the final state");
+DEFINE_int32(repeat, 1, "runs of which the best times are told");
+DEFINE_string(factorisations, "keep", "of the adjoint's steps: keep, or recompute to save memory");
+DEFINE_string(out, "", "file of the result; empty: stdout");
+
+namespace tangible {
+namespace {
+
+std::vector<std::string> SplitAtCommas(const std::string& text) {
+  std::vector<std::string> parts(1);
+  for (const char c : text) {
+    if (c == ',') {
+      parts.emplace_back();
+    } else {
+      parts.back() += c;
+    }
+  }
+  return parts;
+}
+
+bool FindMethod(const std::string& name, GradientMethod* method) {
+  for (const auto& [known, value] : kGradientMethodNames) {
+    if (name == known) {
+      *method = value;
+      return true;
+    }
+  }
+  return false;
+}
+
+// Empty, or one line about a flag's value.
+std::string CheckFlags(GradientOptions* options) {
+  if (!FindMethod(FLAGS_method, &options->method)) {
+    return "--method: expected adjoint, tangent, jet, jet_implicit or finite_difference, got '" +
+           FLAGS_method + "'";
+  }
+  if (FLAGS_factorisations != "keep" && FLAGS_factorisations != "recompute") {
+    return "--factorisations: expected keep or recompute, got '" + FLAGS_factorisations + "'";
+  }
+  if (!(FLAGS_step >= 0.0 && std::isfinite(FLAGS_step))) {
+    return "--step: expected a number >= 0, got " + FormatNumber(FLAGS_step);
+  }
+  if (FLAGS_repeat < 1) {
+    return "--repeat: expected a number >= 1, got " + std::to_string(FLAGS_repeat);
+  }
+  const std::vector<std::string> paths = SplitAtCommas(FLAGS_parameters);
+  if (std::find(paths.begin(), paths.end(), "") != paths.end()) {
+    return "--parameters: expected paths separated by commas, got '" + FLAGS_parameters + "'";
+  }
+  options->step = FLAGS_step;
+  options->repeat = FLAGS_repeat;
+  options->factorisations =
+      FLAGS_factorisations == "keep" ? Factorisations::kKeep : Factorisations::kRecompute;
+  return "";
+}
+
+LossTerm ReadTerm(const JsonReader& json, const std::vector<std::string>& outputs) {
+  json.ExpectKeys({"output", "target", "weight"}, " of a term");
+  LossTerm term;
+  const JsonReader output = json.At("output");
+  term.output = output.String();
+  if (std::find(outputs.begin(), outputs.end(), term.output) == outputs.end()) {
+    output.FailExpected("an output such as " + (outputs.empty() ? "ball/x" : outputs[0]));
+  }
+  if (json.Has("target")) term.target = json.At("target").Number();
+  if (json.Has("weight")) term.weight = json.At("weight").Number();
+  return term;
+}
+
+// Empty, or one line.
+std::string ReadLoss(const std::string& file, const std::vector<std::string>& outputs,
+                     std::vector<LossTerm>* terms) {
+  Json json;
+  std::string error;
+  if (!ParseJsonFile(file, &json, &error)) return error;
+  JsonErrors errors(file);
+  const JsonReader root(json, &errors);
+  root.ExpectKeys({"terms"});
+  const JsonReader list = root.At("terms");
+  const int count = list.ExpectArray("an array of terms");
+  if (count == 0) list.Fail("expected at least one term, got none");
+  for (int i = 0; i < count; ++i) terms->push_back(ReadTerm(list.At(i), outputs));
+  return errors.message();
+}
+
+OrderedJson ToJson(const VectorX<double>& values) {
+  return std::vector<double>(values.data(), values.data() + values.size());
+}
+
+OrderedJson Describe(const GradientResult& result) {
+  OrderedJson text = {{"method", FLAGS_method},
+                      {"parameters", SplitAtCommas(FLAGS_parameters)},
+                      {"outputs", result.outputs},
+                      {"values", ToJson(result.values)},
+                      {"certificate", ToJson(result.certificate)},
+                      {"notes", result.notes},
+                      {"seconds", result.seconds},
+                      {"rollout_seconds", result.rollout_seconds}};
+  if (!FLAGS_loss.empty()) {
+    text["loss"] = result.loss;
+    text["gradient"] = ToJson(result.gradient);
+    return text;
+  }
+  OrderedJson& rows = text["jacobian"] = OrderedJson::array();
+  for (Eigen::Index i = 0; i < result.jacobian.rows(); ++i) {
+    rows.push_back(ToJson(VectorX<double>(result.jacobian.row(i).transpose())));
+  }
+  return text;
+}
+
+int Run(const std::string& file, const GradientOptions& options) {
+  Scene scene;
+  std::string error;
+  if (!LoadScene(file, &scene, &error)) return ReportError(error);
+  std::vector<ParameterPath> parameters;
+  for (const std::string& path : SplitAtCommas(FLAGS_parameters)) {
+    if (!ResolveParameter(scene, path, &parameters.emplace_back(), &error)) {
+      return ReportError(error.insert(0, ": ").insert(0, file));
+    }
+  }
+  GradientResult result;
+  if (FLAGS_loss.empty()) {
+    result = FinalStateJacobian(scene, parameters, options);
+  } else {
+    std::vector<LossTerm> terms;
+    error = ReadLoss(FLAGS_loss, OutputNames(*BuildStructure(scene)), &terms);
+    if (!error.empty()) return ReportError(error);
+    result = LossGradient(scene, parameters, terms, options);
+  }
+  if (!result.done) return ReportError(result.message);
+  error = WriteResult(FLAGS_out, JsonText(Describe(result)));
+  return error.empty() ? kExitDone : ReportError(error);
+}
+
+}  // namespace
+}  // namespace tangible
+
+int main(int argc, char** argv) {
+  const tangible::CommandLine line = tangible::ParseCommandLine(
+      argc, argv,
+      {.name = "tangible-gradient",
+       .synopsis = "SCENE.json --parameters=P1,P2 "
+                   "--method=adjoint|tangent|jet|jet_implicit|finite_difference [--step=H] "
+                   "[--loss=L.json] [--out=G.json]",
+       .description = "Differentiates the final state of every moving body, or with --loss a "
+                      "scalar of it, with respect to\nparameters of the scene, and certifies the "
+                      "result.",
+       .version = TANGIBLE_VERSION,
+       .source_file = __FILE__});
+  if (line.exit_status) return *line.exit_status;
+  tangible::GradientOptions options;
+  const std::string wrong = tangible::CheckFlags(&options);
+  if (!wrong.empty()) {
+    return tangible::ReportError("tangible-gradient: " + wrong, tangible::kExitUsage);
+  }
+  return tangible::Run(line.positional[0], options);
+}

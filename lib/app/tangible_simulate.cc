@@ -1,0 +1,200 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// tangible-simulate: runs a scene and writes its trajectory, contacts, summary, observations and
+// view.
+
+#include <gflags/gflags.h>
+
+#include <chrono>
+#include <cmath>
+#include <ctime>
+#include <optional>
+#include <string>
+
+#include "tangible/app/observation_csv.h"
+#include "tangible/app/program.h"
+#include "tangible/app/progress.h"
+#include "tangible/app/run_summary.h"
+#include "tangible/app/trajectory_csv.h"
+#include "tangible/app/view_recorder.h"
+#include "tangible/scene/json_writer.h"
+#include "tangible/scene/scene_json.h"
+#include "tangible/simulation/settings.h"
+
+DEFINE_string(out, "",
+              "file of the trajectory (CSV); empty: stdout, unless another result is asked for");
+DEFINE_int64(every, 1, "write every so many steps; time 0 and the end always");
+DEFINE_string(contacts, "", "file of contacts and joint impulses (CSV)");
+DEFINE_string(initial, "", "trajectory (CSV) from whose last row a body the run starts");
+DEFINE_string(view, "", "file of the animated view (HTML)");
+DEFINE_string(summary, "", "file of the summary (JSON)");
+DEFINE_string(observe, "", "file of noisy observed positions (CSV)");
+DEFINE_double(noise, 0.0, "standard deviation of the observations' noise, m");
+DEFINE_uint64(seed, 0, "of the noise");
+DEFINE_double(rate, 0.0, "observations a second; 0: one a step");
+DEFINE_string(points, "", "points to observe instead of bodies (JSON)");
+
+namespace tangible {
+namespace {
+
+double WallSeconds() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+double CpuSeconds() {
+  timespec time{};
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &time);
+  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
+}
+
+// Empty, or one line about a flag's value.
+std::string CheckFlags() {
+  if (FLAGS_every < 1) {
+    return "--every: expected a number >= 1, got " + std::to_string(FLAGS_every);
+  }
+  if (!(FLAGS_noise >= 0.0 && std::isfinite(FLAGS_noise))) {
+    return "--noise: expected a number >= 0, got " + FormatNumber(FLAGS_noise);
+  }
+  if (!(FLAGS_rate >= 0.0 && std::isfinite(FLAGS_rate))) {
+    return "--rate: expected a number >= 0, got " + FormatNumber(FLAGS_rate);
+  }
+  if (FLAGS_observe.empty()) {
+    for (const char* name : {"noise", "seed", "rate", "points"}) {
+      if (!gflags::GetCommandLineFlagInfoOrDie(name).is_default) {
+        return std::string("--") + name + ": needs --observe";
+      }
+    }
+  }
+  return "";
+}
+
+/// What the run writes; each is there if it was asked for.
+struct Recorders {
+  std::optional<TrajectoryCsv> trajectory;
+  std::optional<ContactsCsv> contacts;
+  std::optional<ObservationCsv> observations;
+  std::optional<ViewRecorder> view;
+  std::optional<RunSummary> summary;
+
+  void Add(const Model<double>& model, long k, double t, const State<double>& state,
+           Stepper* stepper) {
+    if (trajectory) trajectory->Add(k, t, state);
+    if (contacts && stepper != nullptr) contacts->Add(*model.structure, t, stepper->record());
+    if (observations) observations->Add(k, t, state);
+    if (view) view->Add(model, t, state, stepper != nullptr ? &stepper->record() : nullptr);
+    if (summary) summary->Add(model, state, stepper);
+  }
+};
+
+/// The scene as it is to be run; `error` is one line or empty.
+struct Job {
+  Scene scene;
+  Model<double> model;
+  State<double> initial;
+  Recorders recorders;
+  std::string error;
+};
+
+constexpr double kMaxSamples = 1e9;
+
+void MakeRecorders(Job* job) {
+  const ModelStructure& structure = *job->model.structure;
+  Recorders& r = job->recorders;
+  const bool others = !FLAGS_view.empty() || !FLAGS_summary.empty() || !FLAGS_observe.empty();
+  if (!FLAGS_out.empty() || !others) r.trajectory.emplace(structure, FLAGS_every);
+  if (!FLAGS_contacts.empty()) r.contacts.emplace();
+  if (!FLAGS_view.empty()) r.view.emplace(job->scene, job->model);
+  if (!FLAGS_summary.empty()) r.summary.emplace();
+  if (FLAGS_observe.empty()) return;
+  const double samples = FLAGS_rate * structure.settings.duration;
+  if (samples > kMaxSamples) {
+    job->error = "--rate: expected at most 1e9 samples in the run, got " + FormatNumber(samples);
+    return;
+  }
+  ObserveOptions options{{}, FLAGS_rate, FLAGS_noise, FLAGS_seed};
+  if (!FLAGS_points.empty()) job->error = ReadPoints(FLAGS_points, structure, &options.points);
+  r.observations.emplace(structure, std::move(options));
+}
+
+void Prepare(const std::string& file, Job* job) {
+  if (!LoadScene(file, &job->scene, &job->error)) return;
+  std::string why;
+  if (!CheckSettings(job->scene.simulation, &why)) {
+    job->error = file + ": " + why;
+    return;
+  }
+  BuildModel(job->scene, &job->model, &job->initial);
+  if (!FLAGS_initial.empty() &&
+      !ReadInitialState(FLAGS_initial, *job->model.structure, &job->initial, &job->error)) {
+    return;
+  }
+  MakeRecorders(job);
+}
+
+std::string WriteResults(const Job& job, const RolloutReport& report, double seconds,
+                         double cpu_seconds, Recorders* r) {
+  std::string error;
+  const auto write = [&error](const std::string& path, const std::string& text) {
+    const std::string failed = WriteResult(path, text);
+    if (error.empty()) error = failed;
+  };
+  if (r->trajectory) write(FLAGS_out, r->trajectory->Finish());
+  if (r->contacts) write(FLAGS_contacts, r->contacts->Finish());
+  if (r->observations) write(FLAGS_observe, r->observations->Finish());
+  if (r->view) write(FLAGS_view, ViewHtml(r->view->data()));
+  if (r->summary) {
+    write(FLAGS_summary, JsonText(r->summary->ToJson(job.model, report, seconds, cpu_seconds)));
+  }
+  return error;
+}
+
+int Run(const std::string& file) {
+  Job job;
+  Prepare(file, &job);
+  if (!job.error.empty()) return ReportError(job.error);
+  RolloutReport report;
+  double recording = 0.0;
+  const double wall_start = WallSeconds();
+  const double cpu_start = CpuSeconds();
+  {
+    Progress progress("steps", NumSteps(job.scene.simulation));
+    State<double> final;
+    report = Rollout(
+        job.model, job.initial,
+        [&](long k, double t, const State<double>& state, Stepper* stepper) {
+          const double start = CpuSeconds();
+          job.recorders.Add(job.model, k, t, state, stepper);
+          progress.Show(k);
+          recording += CpuSeconds() - start;
+        },
+        &final);
+  }
+  const double cpu_seconds = CpuSeconds() - cpu_start - recording;
+  const std::string error =
+      WriteResults(job, report, WallSeconds() - wall_start, cpu_seconds, &job.recorders);
+  if (!error.empty()) return ReportError(error);
+  if (report.status == StepStatus::kDone) return kExitDone;
+  return ReportError(file + ": " + report.message);
+}
+
+}  // namespace
+}  // namespace tangible
+
+int main(int argc, char** argv) {
+  const tangible::CommandLine line = tangible::ParseCommandLine(
+      argc, argv,
+      {.name = "tangible-simulate",
+       .synopsis = "SCENE.json [--out=T.csv] [--every=K] [--contacts=C.csv] [--initial=T.csv] "
+                   "[--view=V.html] [--summary=S.json] [--observe=O.csv --noise=S --seed=N "
+                   "--rate=HZ --points=P.json]",
+       .description = "Runs a scene and writes the trajectory of its bodies as CSV; on request "
+                      "contacts, a summary,\nnoisy observations and an animated view.",
+       .version = TANGIBLE_VERSION,
+       .source_file = __FILE__});
+  if (line.exit_status) return *line.exit_status;
+  const std::string wrong = tangible::CheckFlags();
+  if (!wrong.empty()) {
+    return tangible::ReportError("tangible-simulate: " + wrong, tangible::kExitUsage);
+  }
+  return tangible::Run(line.positional[0]);
+}

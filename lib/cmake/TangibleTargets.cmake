@@ -1,0 +1,142 @@
+# Targets: one static library a room (a folder), programs, tests, benchmarks.
+include(GNUInstallDirs)
+
+# Headers are included as "tangible/<room>/<file>.h", in the tree as once installed: a folder of
+# links in the build tree gives each room its installed name.
+set(TANGIBLE_INCLUDE_DIR "${PROJECT_BINARY_DIR}/include")
+file(MAKE_DIRECTORY "${TANGIBLE_INCLUDE_DIR}/tangible/config")
+
+# The scalar list: a macro that applies X to each Jet width.
+set(TANGIBLE_JET_LIST "")
+foreach(width IN LISTS TANGIBLE_JET_WIDTHS)
+  string(APPEND TANGIBLE_JET_LIST " X(${width})")
+endforeach()
+# The local width: one contact, joint or force reads at most 16 numbers (two poses and 10 others).
+set(TANGIBLE_LOCAL_JET_WIDTH 16)
+set(TANGIBLE_JET_AND_LOCAL_LIST "")
+set(jet_and_local_widths ${TANGIBLE_JET_WIDTHS} ${TANGIBLE_LOCAL_JET_WIDTH})
+list(REMOVE_DUPLICATES jet_and_local_widths)
+foreach(width IN LISTS jet_and_local_widths)
+  string(APPEND TANGIBLE_JET_AND_LOCAL_LIST " X(${width})")
+endforeach()
+configure_file("${PROJECT_SOURCE_DIR}/lib/cmake/jet_widths.h.in"
+               "${TANGIBLE_INCLUDE_DIR}/tangible/config/jet_widths.h" @ONLY)
+
+add_library(tangible_flags INTERFACE)
+target_compile_options(tangible_flags INTERFACE -Wall -Wextra -Wpedantic -ffp-contract=off)
+if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND CMAKE_CXX_COMPILER_VERSION VERSION_LESS 13)
+  # False alarms of g++ 12 on `"literal" + std::string` (GCC bug 105651), which a precompiled header no longer hides as
+  # system headers'.
+  target_compile_options(tangible_flags INTERFACE -Wno-restrict -Wno-stringop-overflow
+                         -Wno-stringop-overread -Wno-array-bounds)
+endif()
+if(TANGIBLE_WARNINGS_AS_ERRORS)
+  target_compile_options(tangible_flags INTERFACE -Werror)
+endif()
+if(TANGIBLE_SANITIZE)
+  target_compile_options(tangible_flags INTERFACE -fsanitize=address,undefined
+                         -fno-sanitize-recover=all -fno-omit-frame-pointer)
+  target_link_options(tangible_flags INTERFACE -fsanitize=address,undefined)
+  # The sanitizer's allocator hands out other alignments than Debian's Ceres was built for.
+  target_compile_definitions(tangible_flags INTERFACE EIGEN_MALLOC_ALREADY_ALIGNED=1)
+endif()
+
+# One precompiled header for all targets: most files read Eigen and ceres/jet.h, two seconds each.
+if(TANGIBLE_PRECOMPILE_HEADERS)
+  file(WRITE "${PROJECT_BINARY_DIR}/precompiled.cc" "// Carries the precompiled header.\n")
+  add_library(tangible_precompiled OBJECT "${PROJECT_BINARY_DIR}/precompiled.cc")
+  target_compile_features(tangible_precompiled PRIVATE cxx_std_20)
+  target_link_libraries(tangible_precompiled PRIVATE tangible_flags Eigen3::Eigen)
+  target_precompile_headers(tangible_precompiled PRIVATE
+    <ceres/jet.h> <Eigen/Core> <Eigen/LU> <Eigen/QR> <algorithm> <cmath> <functional> <map> <memory>
+    <optional> <random> <sstream> <string> <utility> <vector>)
+endif()
+function(tangible_precompile target)
+  if(TANGIBLE_PRECOMPILE_HEADERS)
+    target_precompile_headers(${target} REUSE_FROM tangible_precompiled)
+  endif()
+endfunction()
+
+# Everything that the tests labelled unit or program need, and nothing else.
+add_custom_target(tangible_unit_and_program_tests)
+
+# tangible_room(<name> [INTERNAL] [SOURCES file...] [HEADERS file...] [DEPENDS room...] [LINK target...])
+# The library of the current folder; target tangible_<name>, alias tangible::<name>. A room without
+# sources is an INTERFACE library. DEPENDS is the only way to another room's headers' symbols.
+# INTERNAL rooms are not installed.
+function(tangible_room name)
+  cmake_parse_arguments(ROOM "INTERNAL" "" "SOURCES;HEADERS;DEPENDS;LINK;PRIVATE_LINK" ${ARGN})
+  file(CREATE_LINK "${CMAKE_CURRENT_SOURCE_DIR}" "${TANGIBLE_INCLUDE_DIR}/tangible/${name}" SYMBOLIC)
+  set(target tangible_${name})
+  if(ROOM_SOURCES)
+    add_library(${target} STATIC ${ROOM_SOURCES} ${ROOM_HEADERS})
+    set(scope PUBLIC)
+    target_link_libraries(${target} PRIVATE $<BUILD_INTERFACE:tangible_flags> ${ROOM_PRIVATE_LINK})
+    tangible_precompile(${target})
+    add_dependencies(tangible_unit_and_program_tests ${target})
+  else()
+    add_library(${target} INTERFACE)
+    set(scope INTERFACE)
+  endif()
+  add_library(tangible::${name} ALIAS ${target})
+  set_target_properties(${target} PROPERTIES EXPORT_NAME ${name})
+  target_compile_features(${target} ${scope} cxx_std_20)
+  target_include_directories(${target} ${scope} $<BUILD_INTERFACE:${TANGIBLE_INCLUDE_DIR}>
+                             $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
+  foreach(room IN LISTS ROOM_DEPENDS)
+    target_link_libraries(${target} ${scope} tangible_${room})
+  endforeach()
+  target_link_libraries(${target} ${scope} ${ROOM_LINK})
+  if(ROOM_INTERNAL)
+    return()
+  endif()
+  install(TARGETS ${target} EXPORT tangible_targets)
+  foreach(header IN LISTS ROOM_HEADERS)
+    get_filename_component(folder "${header}" DIRECTORY)  # estimation/experiments/chain.h keeps its folder
+    install(FILES "${header}" DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}/tangible/${name}/${folder}")
+  endforeach()
+endfunction()
+
+# tangible_program(<name> SOURCES file... LINK target...): an installed program.
+function(tangible_program name)
+  cmake_parse_arguments(PROGRAM "" "" "SOURCES;LINK" ${ARGN})
+  add_executable(${name} ${PROGRAM_SOURCES})
+  target_link_libraries(${name} PRIVATE tangible_flags ${PROGRAM_LINK})
+  tangible_precompile(${name})
+  add_dependencies(tangible_unit_and_program_tests ${name})
+  target_compile_definitions(${name} PRIVATE TANGIBLE_VERSION="${PROJECT_VERSION}")
+  set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY "${PROJECT_BINARY_DIR}/bin")
+  install(TARGETS ${name} RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
+endfunction()
+
+# tangible_test(<name> SOURCES file... LINK target... [LABELS label...] [TIMEOUT seconds]): one test
+# program, one ctest entry.
+function(tangible_test name)
+  cmake_parse_arguments(TEST "" "TIMEOUT" "SOURCES;LINK;LABELS" ${ARGN})
+  add_executable(${name} ${TEST_SOURCES})
+  target_link_libraries(${name} PRIVATE tangible_flags ${TEST_LINK} GTest::gtest_main)
+  tangible_precompile(${name})
+  if("unit" IN_LIST TEST_LABELS OR "program" IN_LIST TEST_LABELS)
+    add_dependencies(tangible_unit_and_program_tests ${name})
+  endif()
+  target_compile_definitions(${name} PRIVATE TANGIBLE_SOURCE_DIR="${PROJECT_SOURCE_DIR}"
+                             TANGIBLE_PROGRAM_DIR="${PROJECT_BINARY_DIR}/bin")
+  add_test(NAME ${name} COMMAND ${name})
+  if(NOT TEST_TIMEOUT)
+    set(TEST_TIMEOUT 300)
+  endif()
+  set_tests_properties(${name} PROPERTIES LABELS "${TEST_LABELS}" TIMEOUT ${TEST_TIMEOUT})
+endfunction()
+
+# tangible_benchmark(<name> SOURCES file... LINK target...): a Google Benchmark program, not a test.
+function(tangible_benchmark name)
+  cmake_parse_arguments(BENCHMARK "" "" "SOURCES;LINK" ${ARGN})
+  if(NOT TANGIBLE_BUILD_BENCHMARKS)
+    return()
+  endif()
+  find_package(benchmark REQUIRED)
+  add_executable(${name} ${BENCHMARK_SOURCES})
+  target_link_libraries(${name} PRIVATE tangible_flags ${BENCHMARK_LINK} benchmark::benchmark_main)
+  target_compile_definitions(${name} PRIVATE TANGIBLE_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
+  set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY "${PROJECT_BINARY_DIR}/benchmarks")
+endfunction()

@@ -1,0 +1,479 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/dynamics/local_jacobian.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace tangible {
+namespace {
+
+// The variables of one element, each a component of a LocalJet.
+class Locals {
+ public:
+  LocalJet Add(double value, int variable) {
+    variables_[count_] = variable;
+    return LocalJet(value, count_++);
+  }
+  int count() const { return count_; }
+  int variable(int i) const { return variables_[i]; }
+
+ private:
+  int variables_[kLocalJetWidth];
+  int count_ = 0;
+};
+
+// Rows of R1 that belong to a body; −1 where it does not move.
+int BodyRow(const ModelStructure& structure, int body) {
+  const int block = structure.bodies[body].block;
+  return block < 0 ? -1 : 3 * block;
+}
+
+template <typename Sink>
+class StepVisitor {
+ public:
+  StepVisitor(const Model<double>& model, const SolvedStep& step, LocalJacobianScratch* scratch,
+              const Sink& sink)
+      : model_(model),
+        s_(*model.structure),
+        x_(model.numbers),
+        step_(step),
+        scratch_(*scratch),
+        sink_(sink),
+        v_new_(step.new_twist->data()),
+        v_old_(step.before->twist.data()) {}
+
+  void Bodies() {
+    const double h = step_.h;
+    for (int k = 0; k < s_.num_blocks(); ++k) {
+      const int body = s_.moving[k];
+      const BodyIndex& index = s_.bodies[body];
+      const double mass = x_[index.mass];
+      for (int i = 0; i < 2; ++i) {
+        const double v = v_new_[3 * body + i];
+        const double old = v_old_[3 * body + i];
+        sink_(3 * k + i, s_.NumberVariable(index.mass), v - old - h * x_[kGravityX + i]);
+        sink_(3 * k + i, s_.NumberVariable(index.linear_damping), h * v);
+        sink_(3 * k + i, s_.NumberVariable(kGravityX + i), -h * mass);
+        sink_(3 * k + i, s_.TwistVariable(body, i), -mass);
+      }
+      const double omega = v_new_[3 * body + 2];
+      sink_(3 * k + 2, s_.NumberVariable(index.inertia), omega - v_old_[3 * body + 2]);
+      sink_(3 * k + 2, s_.NumberVariable(index.angular_damping), h * omega);
+      sink_(3 * k + 2, s_.TwistVariable(body, 2), -x_[index.inertia]);
+    }
+  }
+
+  void Springs() {
+    for (const SpringIndex& spring : s_.springs) {
+      Locals locals;
+      const Pose<LocalJet> pose_a = LocalPose(spring.a, &locals);
+      const Pose<LocalJet> pose_b = LocalPose(spring.b, &locals);
+      LocalJet numbers[7];
+      for (int i = 0; i < 7; ++i) {
+        numbers[i] = LocalNumber(spring.numbers + i, &locals);
+      }
+      SpringRow<LocalJet> row;
+      EvaluateSpring(pose_a, pose_b, numbers, &row);
+      const LocalJet speed = NewSpeed(spring.a, row.row_a, spring.b, row.row_b);
+      EmitMomentum(locals, spring.a, row.pull_a, spring.b, row.pull_b, LocalJet(step_.h));
+      EmitMomentum(locals, spring.a, row.row_a, spring.b, row.row_b, step_.h * numbers[5] * speed);
+      EmitPrescribedDamper(spring.a, row.row_a, spring.b, row.row_b, step_.h * numbers[5].a);
+    }
+  }
+
+  void Forces() {
+    for (const ForceIndex& force : s_.forces) {
+      const int row = BodyRow(s_, force.body);
+      if (row < 0) {
+        continue;
+      }
+      Locals locals;
+      const LocalJet angle =
+          locals.Add(step_.before->pose[3 * force.body + 2], s_.PoseVariable(force.body, 2));
+      LocalJet numbers[5];
+      for (int i = 0; i < 5; ++i) {
+        numbers[i] = LocalNumber(force.numbers + i, &locals);
+      }
+      LocalJet start, end;
+      if (force.start >= 0) {
+        start = LocalNumber(force.start, &locals);
+      }
+      if (force.end >= 0) {
+        end = LocalNumber(force.end, &locals);
+      }
+      LocalJet impulse[3];
+      ForceImpulse(s_, force, step_.time, step_.h, angle, numbers,
+                   force.start >= 0 ? &start : nullptr, force.end >= 0 ? &end : nullptr, impulse);
+      for (int i = 0; i < 3; ++i) {
+        Emit(locals, row + i, -impulse[i]);
+      }
+    }
+  }
+
+  void Joints(JointRoute route) {
+    for (size_t j = 0; j < s_.joints.size(); ++j) {
+      if (s_.joints[j].type == JointType::kRevolute && route == JointRoute::kByHand) {
+        RevoluteByHand(static_cast<int>(j));
+      } else {
+        GenericJoint(static_cast<int>(j));
+      }
+    }
+  }
+
+  void Contacts() {
+    for (size_t i = 0; i < step_.contacts->size(); ++i) {
+      if ((*step_.contact_block)[i] < 0) {
+        continue;
+      }
+      if ((*step_.contacts)[i].joint >= 0) {
+        Limit(static_cast<int>(i));
+      } else {
+        ShapeContact(static_cast<int>(i));
+      }
+    }
+  }
+
+ private:
+  LocalJet LocalNumber(int number, Locals* locals) {
+    return locals->Add(x_[number], s_.NumberVariable(number));
+  }
+
+  Pose<LocalJet> LocalPose(int body, Locals* locals) {
+    if (body == s_.world()) {
+      return Pose<LocalJet>();
+    }
+    const double* q = &step_.before->pose[3 * body];
+    const LocalJet x = locals->Add(q[0], s_.PoseVariable(body, 0));
+    const LocalJet y = locals->Add(q[1], s_.PoseVariable(body, 1));
+    return Pose<LocalJet>(Vector2<LocalJet>(x, y), locals->Add(q[2], s_.PoseVariable(body, 2)));
+  }
+
+  template <typename T>
+  T Speed(const double* twist, int a, const RowPart<T>& row_a, int b, const RowPart<T>& row_b) {
+    T sum(0.0);
+    for (int i = 0; i < 3; ++i) {
+      sum += row_a[i] * twist[3 * a + i] + row_b[i] * twist[3 * b + i];
+    }
+    return sum;
+  }
+  template <typename T>
+  T NewSpeed(int a, const RowPart<T>& row_a, int b, const RowPart<T>& row_b) {
+    return Speed(v_new_, a, row_a, b, row_b);
+  }
+
+  void Emit(const Locals& locals, int row, const LocalJet& value) {
+    for (int i = 0; i < locals.count(); ++i) {
+      if (value.v[i] != 0.0) {
+        sink_(row, locals.variable(i), value.v[i]);
+      }
+    }
+  }
+
+  // R1 += rowᵀ amount on both bodies.
+  void EmitMomentum(const Locals& locals, int a, const RowPart<LocalJet>& row_a, int b,
+                    const RowPart<LocalJet>& row_b, const LocalJet& amount) {
+    const int at_a = BodyRow(s_, a);
+    const int at_b = BodyRow(s_, b);
+    for (int i = 0; i < 3; ++i) {
+      if (at_a >= 0) {
+        Emit(locals, at_a + i, row_a[i] * amount);
+      }
+      if (at_b >= 0) {
+        Emit(locals, at_b + i, row_b[i] * amount);
+      }
+    }
+  }
+
+  // R1 += rowᵀ value, of a row known in double, times one variable.
+  template <typename Row>
+  void EmitRowTimesVariable(int a, const Row& row_a, int b, const Row& row_b, int variable,
+                            double value) {
+    const int at_a = BodyRow(s_, a);
+    const int at_b = BodyRow(s_, b);
+    for (int i = 0; i < 3; ++i) {
+      if (at_a >= 0) {
+        sink_(at_a + i, variable, ValueOf(row_a[i]) * value);
+      }
+      if (at_b >= 0) {
+        sink_(at_b + i, variable, ValueOf(row_b[i]) * value);
+      }
+    }
+  }
+
+  // A constraint row reads the twist of a body of prescribed motion.
+  template <typename Row>
+  void EmitPrescribed(int a, const Row& row_a, int b, const Row& row_b, int row, double factor) {
+    const auto emit = [&](int body, const Row& part) {
+      if (s_.bodies[body].motion == Motion::kKinematic) {
+        for (int i = 0; i < 3; ++i) {
+          sink_(row, s_.TwistVariable(body, i), factor * ValueOf(part[i]));
+        }
+      }
+    };
+    emit(a, row_a);
+    emit(b, row_b);
+  }
+
+  // A damper's impulse reads it too.
+  template <typename Row>
+  void EmitPrescribedDamper(int a, const Row& row_a, int b, const Row& row_b, double weight) {
+    const auto emit = [&](int body, const Row& part) {
+      if (s_.bodies[body].motion == Motion::kKinematic) {
+        for (int i = 0; i < 3; ++i) {
+          EmitRowTimesVariable(a, row_a, b, row_b, s_.TwistVariable(body, i),
+                               weight * ValueOf(part[i]));
+        }
+      }
+    };
+    emit(a, row_a);
+    emit(b, row_b);
+  }
+
+  int JointRow(int joint) const { return 3 * (s_.num_blocks() + joint); }
+
+  // Two rows p_a − p_b with arms r = R(θ) anchor: only the arms depend on variables, and
+  //   ∂r/∂θ = r⊥,  ∂r/∂anchor = R(θ).
+  void RevoluteByHand(int j) {
+    const JointIndex& joint = s_.joints[j];
+    const double* y = &step_.solution->joint_impulse[3 * j];
+    const bool corrects = s_.settings.joint_correction == JointCorrection::kBaumgarte;
+    const double drift = corrects ? s_.settings.baumgarte / step_.h : 0.0;
+    const auto side = [&](int body, int anchor, double sign) {
+      const double angle = step_.before->pose[3 * body + 2];
+      const double c = std::cos(angle);
+      const double s = std::sin(angle);
+      const double ax = x_[anchor];
+      const double ay = x_[anchor + 1];
+      // Columns: the arm's change with θ and with the anchor's two components.
+      const double dx[3] = {-s * ax - c * ay, c, -s};
+      const double dy[3] = {c * ax - s * ay, s, c};
+      const int variables[3] = {s_.PoseVariable(body, 2), s_.NumberVariable(anchor),
+                                s_.NumberVariable(anchor + 1)};
+      const double omega = v_new_[3 * body + 2];
+      const int row = BodyRow(s_, body);
+      for (int k = 0; k < 3; ++k) {
+        sink_(JointRow(j), variables[k], sign * (-dy[k] * omega + drift * dx[k]));
+        sink_(JointRow(j) + 1, variables[k], sign * (dx[k] * omega + drift * dy[k]));
+        if (row >= 0) {
+          sink_(row + 2, variables[k], -sign * (-dy[k] * y[0] + dx[k] * y[1]));
+        }
+      }
+      if (corrects) {
+        for (int i = 0; i < 2; ++i) {
+          sink_(JointRow(j) + i, s_.PoseVariable(body, i), sign * drift);
+        }
+      }
+      if (s_.bodies[body].motion == Motion::kKinematic) {
+        const double rx = c * ax - s * ay;
+        const double ry = s * ax + c * ay;
+        sink_(JointRow(j), s_.TwistVariable(body, 0), sign);
+        sink_(JointRow(j), s_.TwistVariable(body, 2), -sign * ry);
+        sink_(JointRow(j) + 1, s_.TwistVariable(body, 1), sign);
+        sink_(JointRow(j) + 1, s_.TwistVariable(body, 2), sign * rx);
+      }
+    };
+    side(joint.a, joint.geometry, 1.0);
+    side(joint.b, joint.geometry + 2, -1.0);
+    const RowPart<double> row_a = {0.0, 0.0, 1.0};
+    const RowPart<double> row_b = {0.0, 0.0, -1.0};
+    EmitDrive(joint, row_a, row_b);
+  }
+
+  // Damping and effort along a coordinate whose row is given: their own numbers, and prescribed
+  // twists.
+  template <typename Row>
+  void EmitDrive(const JointIndex& joint, const Row& row_a, const Row& row_b) {
+    const double speed = ValueOf(NewSpeed(joint.a, row_a, joint.b, row_b));
+    EmitRowTimesVariable(joint.a, row_a, joint.b, row_b, s_.NumberVariable(joint.damping),
+                         step_.h * speed);
+    if (joint.effort_signal < 0) {
+      EmitRowTimesVariable(joint.a, row_a, joint.b, row_b, s_.NumberVariable(joint.effort),
+                           -step_.h);
+    }
+    EmitPrescribedDamper(joint.a, row_a, joint.b, row_b, step_.h * x_[joint.damping]);
+  }
+
+  void LocalJointRows(const JointIndex& joint, Locals* locals, JointRows<LocalJet>* rows) {
+    const Pose<LocalJet> pose_a = LocalPose(joint.a, locals);
+    const Pose<LocalJet> pose_b = LocalPose(joint.b, locals);
+    LocalJet numbers[7];
+    for (int i = 0; i < joint.num_geometry; ++i) {
+      numbers[i] = LocalNumber(joint.geometry + i, locals);
+    }
+    EvaluateJoint(joint.type, pose_a, pose_b, numbers, rows);
+  }
+
+  void GenericJoint(int j) {
+    const JointIndex& joint = s_.joints[j];
+    Locals locals;
+    JointRows<LocalJet> rows;
+    LocalJointRows(joint, &locals, &rows);
+    const double* y = &step_.solution->joint_impulse[3 * j];
+    const bool corrects = s_.settings.joint_correction == JointCorrection::kBaumgarte;
+    for (int k = 0; k < rows.rows; ++k) {
+      LocalJet row = NewSpeed(joint.a, rows.row_a[k], joint.b, rows.row_b[k]);
+      if (corrects) {
+        row += (s_.settings.baumgarte / step_.h) * rows.error[k];
+      }
+      Emit(locals, JointRow(j) + k, row);
+      EmitMomentum(locals, joint.a, rows.row_a[k], joint.b, rows.row_b[k], LocalJet(-y[k]));
+      EmitPrescribed(joint.a, rows.row_a[k], joint.b, rows.row_b[k], JointRow(j) + k, 1.0);
+    }
+    if (joint.damping < 0) {
+      return;
+    }
+    const double effort =
+        joint.effort_signal >= 0 ? MeanEffort(s_, joint, step_.time, step_.h) : x_[joint.effort];
+    const LocalJet speed = NewSpeed(joint.a, rows.coordinate_a, joint.b, rows.coordinate_b);
+    EmitMomentum(locals, joint.a, rows.coordinate_a, joint.b, rows.coordinate_b,
+                 step_.h * (x_[joint.damping] * speed - effort));
+    EmitDrive(joint, rows.coordinate_a, rows.coordinate_b);
+  }
+
+  void Limit(int i) {
+    const ActiveContact& contact = (*step_.contacts)[i];
+    const JointIndex& joint = s_.joints[contact.joint];
+    Locals locals;
+    JointRows<LocalJet> rows;
+    LocalJointRows(joint, &locals, &rows);
+    const double impulse = step_.solution->normal_impulse[i];
+    const int row = 3 * (*step_.contact_block)[i];
+    EmitMomentum(locals, joint.a, rows.coordinate_a, joint.b, rows.coordinate_b,
+                 LocalJet(-contact.side * impulse));
+    LocalJet value =
+        contact.side * NewSpeed(joint.a, rows.coordinate_a, joint.b, rows.coordinate_b);
+    if (contact.law == ContactLaw::kGap) {
+      value += (contact.side / step_.h) * rows.coordinate;
+      sink_(row, s_.NumberVariable(contact.side > 0.0 ? joint.low : joint.high),
+            -contact.side / step_.h);
+    }
+    Emit(locals, row, value);
+    EmitPrescribed(joint.a, rows.coordinate_a, joint.b, rows.coordinate_b, row, contact.side);
+  }
+
+  // A shape's numbers that the feature reads, as LocalJets in their places.
+  ShapeView<LocalJet> LocalShape(int body, bool is_edge, int feature, Locals* locals,
+                                 std::vector<LocalJet>* numbers) {
+    const BodyIndex& index = s_.bodies[body];
+    if (static_cast<int>(numbers->size()) < index.num_shape_numbers) {
+      numbers->resize(index.num_shape_numbers);
+    }
+    int used[4];
+    const int count = FeatureNumbers(index.shape, index.num_shape_numbers, is_edge, feature, used);
+    for (int i = 0; i < count; ++i) {
+      (*numbers)[used[i]] = LocalNumber(index.shape_numbers + used[i], locals);
+    }
+    return {index.shape, numbers->data(), index.num_shape_numbers};
+  }
+
+  void ShapeContact(int i) {
+    const ActiveContact& contact = (*step_.contacts)[i];
+    const FeatureKind kind = contact.feature.kind;
+    Locals locals;
+    const Pose<LocalJet> pose_a = LocalPose(contact.a, &locals);
+    const Pose<LocalJet> pose_b = LocalPose(contact.b, &locals);
+    const ShapeView<LocalJet> shape_a = LocalShape(contact.a, kind == FeatureKind::kEdgeVertex,
+                                                   contact.feature.a, &locals, &scratch_.numbers_a);
+    const ShapeView<LocalJet> shape_b = LocalShape(contact.b, kind == FeatureKind::kVertexEdge,
+                                                   contact.feature.b, &locals, &scratch_.numbers_b);
+    ContactRows<LocalJet> rows;
+    rows.geometry = EvaluateContact(contact.feature, shape_a, pose_a, shape_b, pose_b);
+    RowsFromGeometry(pose_a.position, pose_b.position, &rows);
+    EmitContact(i, contact, locals, rows);
+  }
+
+  void EmitContact(int i, const ActiveContact& contact, const Locals& locals,
+                   const ContactRows<LocalJet>& rows) {
+    const int a = contact.a;
+    const int b = contact.b;
+    const ContactMode mode = step_.solution->modes[i];
+    const double normal = step_.solution->normal_impulse[i];
+    const int row = 3 * (*step_.contact_block)[i];
+    EmitMomentum(locals, a, rows.normal_a, b, rows.normal_b, LocalJet(-normal));
+    EmitMomentum(locals, a, rows.tangent_a, b, rows.tangent_b,
+                 LocalJet(-step_.solution->tangent_impulse[i]));
+    const double e = (*step_.restitution)[i].value;
+    LocalJet value = NewSpeed(a, rows.normal_a, b, rows.normal_b);
+    if (contact.law == ContactLaw::kGap) {
+      value += rows.geometry.gap / step_.h;
+    } else if (contact.law == ContactLaw::kRestitution) {
+      value += e * Speed(v_old_, a, rows.normal_a, b, rows.normal_b);
+      EmitRestitution(i, contact, rows, e, row);
+    }
+    Emit(locals, row, value);
+    EmitPrescribed(a, rows.normal_a, b, rows.normal_b, row, 1.0);
+    if (mode == ContactMode::kSticking) {
+      Emit(locals, row + 1, NewSpeed(a, rows.tangent_a, b, rows.tangent_b));
+      EmitPrescribed(a, rows.tangent_a, b, rows.tangent_b, row + 1, 1.0);
+      return;
+    }
+    // λt = −σ μ λn. Without friction σ is the sign of the sliding speed all the same: the one-sided
+    // derivative as μ leaves 0.
+    double sign = SlidingSign(mode);
+    if (mode == ContactMode::kClosed) {
+      sign = FrictionlessSlidingSign(*step_.problem, step_.problem->contacts[i],
+                                     step_.solution->v.data());
+    }
+    const CoefficientSource& friction = (*step_.friction)[i];
+    for (int k = 0; k < 2; ++k) {
+      if (friction.numbers[k] >= 0) {
+        EmitRowTimesVariable(a, rows.tangent_a, b, rows.tangent_b,
+                             s_.NumberVariable(friction.numbers[k]),
+                             sign * normal * friction.derivatives[k]);
+      }
+    }
+  }
+
+  void EmitRestitution(int i, const ActiveContact& contact, const ContactRows<LocalJet>& rows,
+                       double e, int row) {
+    const auto emit = [&](int body, const RowPart<LocalJet>& part) {
+      if (s_.bodies[body].motion != Motion::kStatic) {
+        for (int k = 0; k < 3; ++k) {
+          sink_(row, s_.TwistVariable(body, k), e * part[k].a);
+        }
+      }
+    };
+    emit(contact.a, rows.normal_a);
+    emit(contact.b, rows.normal_b);
+    const double approach = Speed(v_old_, contact.a, rows.normal_a, contact.b, rows.normal_b).a;
+    const CoefficientSource& restitution = (*step_.restitution)[i];
+    for (int k = 0; k < 2; ++k) {
+      if (restitution.numbers[k] >= 0) {
+        sink_(row, s_.NumberVariable(restitution.numbers[k]),
+              approach * restitution.derivatives[k]);
+      }
+    }
+  }
+
+  const Model<double>& model_;
+  const ModelStructure& s_;
+  const std::vector<double>& x_;
+  const SolvedStep& step_;
+  LocalJacobianScratch& scratch_;
+  const Sink& sink_;
+  const double* v_new_;
+  const double* v_old_;
+};
+
+}  // namespace
+
+template <typename Sink>
+void VisitStepJacobian(const Model<double>& model, const SolvedStep& step, JointRoute route,
+                       LocalJacobianScratch* scratch, const Sink& sink) {
+  StepVisitor<Sink> visitor(model, step, scratch, sink);
+  visitor.Bodies();
+  visitor.Springs();
+  visitor.Forces();
+  visitor.Joints(route);
+  visitor.Contacts();
+}
+
+#define TANGIBLE_INSTANTIATE(Sink)                                                           \
+  template void VisitStepJacobian<Sink>(const Model<double>&, const SolvedStep&, JointRoute, \
+                                        LocalJacobianScratch*, const Sink&);
+TANGIBLE_INSTANTIATE(TangentSink)
+TANGIBLE_INSTANTIATE(AdjointSink)
+TANGIBLE_INSTANTIATE(SingleAdjointSink)
+TANGIBLE_INSTANTIATE(EntryListSink)
+
+}  // namespace tangible

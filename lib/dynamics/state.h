@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// The state of a model: poses and twists of all its bodies, those that never move included.
+
+#include <vector>
+
+#include "tangible/math/planar.h"
+
+namespace tangible {
+
+/// Three numbers a body, in the model's order of bodies (the world is the last): (x, y, angle) in m
+/// and rad, (vx, vy, omega) in m/s and rad/s. A static body's pose is a state that nothing changes,
+/// so that derivatives with respect to it need no special case.
+template <typename T>
+struct State {
+  std::vector<T> pose;
+  std::vector<T> twist;
+
+  Pose<T> PoseOf(int body) const {
+    return Pose<T>(Vector2<T>(pose[3 * body], pose[3 * body + 1]), pose[3 * body + 2]);
+  }
+  friend bool operator==(const State&, const State&) = default;
+};
+
+/// The values of a state, without derivatives.
+template <typename T>
+State<double> ValuesOf(const State<T>& state) {
+  State<double> values;
+  for (const T& x : state.pose) {
+    values.pose.push_back(ValueOf(x));
+  }
+  for (const T& x : state.twist) {
+    values.twist.push_back(ValueOf(x));
+  }
+  return values;
+}
+
+}  // namespace tangible

@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/geometry/broad_phase.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+namespace tangible {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+/// Bounded only where its normal lies along an axis.
+Aabb HalfPlaneBox(const ShapeView<double>& shape, const Pose<double>& pose, double margin) {
+  Aabb box{-kInfinity, -kInfinity, kInfinity, kInfinity};
+  const Vector2<double> normal(shape.numbers[0], shape.numbers[1]);
+  const double norm = std::sqrt(normal.squaredNorm());
+  const Vector2<double> world = pose.rotation * normal;
+  const double height = shape.numbers[2] / norm + margin;
+  if (world.x() == 0.0 && world.y() > 0.0) {
+    box.max_y = pose.position.y() + height;
+  } else if (world.x() == 0.0 && world.y() < 0.0) {
+    box.min_y = pose.position.y() - height;
+  } else if (world.y() == 0.0 && world.x() > 0.0) {
+    box.max_x = pose.position.x() + height;
+  } else if (world.y() == 0.0 && world.x() < 0.0) {
+    box.min_x = pose.position.x() - height;
+  }
+  return box;
+}
+
+}  // namespace
+
+Aabb ComputeAabb(const ShapeView<double>& shape, const Pose<double>& pose, double margin) {
+  if (shape.type == ShapeType::kHalfPlane) {
+    return HalfPlaneBox(shape, pose, margin);
+  }
+  Aabb box{kInfinity, kInfinity, -kInfinity, -kInfinity};
+  const int num_vertices = NumVertices(shape.type, shape.num_numbers);
+  for (int i = 0; i < num_vertices; ++i) {
+    const Vector2<double> vertex = pose * Vertex(shape, i);
+    box.min_x = std::min(box.min_x, vertex.x());
+    box.min_y = std::min(box.min_y, vertex.y());
+    box.max_x = std::max(box.max_x, vertex.x());
+    box.max_y = std::max(box.max_y, vertex.y());
+  }
+  const double grow = CoreRadius(shape) + margin;
+  return {box.min_x - grow, box.min_y - grow, box.max_x + grow, box.max_y + grow};
+}
+
+void BroadPhase::Sort(const std::vector<Aabb>& boxes) {
+  const auto before = [](const Entry& p, const Entry& q) { return p.box.min_x < q.box.min_x; };
+  if (entries_.size() != boxes.size()) {
+    entries_.resize(boxes.size());
+    for (std::size_t i = 0; i < boxes.size(); ++i) {
+      entries_[i] = {boxes[i], static_cast<int>(i)};
+    }
+    std::sort(entries_.begin(), entries_.end(), before);
+    return;
+  }
+  for (Entry& entry : entries_) {
+    entry.box = boxes[entry.index];
+  }
+  // Insertion sort: linear on an order that has hardly changed.
+  for (std::size_t k = 1; k < entries_.size(); ++k) {
+    const Entry moving = entries_[k];
+    std::size_t place = k;
+    for (; place > 0 && before(moving, entries_[place - 1]); --place) {
+      entries_[place] = entries_[place - 1];
+    }
+    entries_[place] = moving;
+  }
+}
+
+void BroadPhase::SortOverlaps(int num_boxes) {
+  // By counting the pairs of each first body: linear, and the second bodies of one are few.
+  first_.assign(num_boxes + 1, 0);
+  for (const auto& pair : found_) {
+    ++first_[pair.first + 1];
+  }
+  std::partial_sum(first_.begin(), first_.end(), first_.begin());
+  overlaps_.resize(found_.size());
+  for (const auto& pair : found_) {
+    overlaps_[first_[pair.first]++] = pair;
+  }
+  // Each first_[i] has advanced to the end of its pairs.
+  int begin = 0;
+  for (int i = 0; i < num_boxes; ++i) {
+    std::sort(overlaps_.begin() + begin, overlaps_.begin() + first_[i]);
+    begin = first_[i];
+  }
+}
+
+void BroadPhase::SortAndSweep(const std::vector<Aabb>& boxes) {
+  Sort(boxes);
+  found_.clear();
+  for (std::size_t k = 0; k < entries_.size(); ++k) {
+    const Entry entry = entries_[k];
+    for (std::size_t l = k + 1; l < entries_.size(); ++l) {
+      const Entry& other = entries_[l];
+      if (!(other.box.min_x <= entry.box.max_x)) {
+        break;
+      }
+      // The last condition keeps empty boxes (min > max) out, which an infinite one would meet.
+      if (other.box.min_y <= entry.box.max_y && entry.box.min_y <= other.box.max_y &&
+          other.box.min_x <= other.box.max_x) {
+        found_.emplace_back(std::min(entry.index, other.index), std::max(entry.index, other.index));
+      }
+    }
+  }
+  // Ascending, so that what follows does not depend on how the bodies moved before.
+  SortOverlaps(static_cast<int>(boxes.size()));
+}
+
+}  // namespace tangible

@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// Which pairs of bodies may be near each other: axis-aligned boxes, sort and sweep along x.
+
+#include <utility>
+#include <vector>
+
+#include "tangible/geometry/shape.h"
+
+namespace tangible {
+
+/// Axis-aligned box, m; a half-plane's may be infinite; an empty one (no shape) has min > max and
+/// overlaps nothing.
+struct Aabb {
+  double min_x, min_y, max_x, max_y;
+};
+
+/// The box of a shape at a pose, grown by `margin` on each side.
+Aabb ComputeAabb(const ShapeView<double>& shape, const Pose<double>& pose, double margin);
+
+/// Finds overlapping pairs; keeps the sorted order of the last call, so that coherent motion costs
+/// little more than a pass. Allocates nothing once its vectors have grown. Pairs come as (i, j), i
+/// < j, in ascending order whatever the history, so that results do not depend on it.
+class BroadPhase {
+ public:
+  /// The pairs with overlapping boxes for which allowed(i, j) (i < j).
+  template <typename Allowed>
+  void FindPairs(const std::vector<Aabb>& boxes, Allowed&& allowed,
+                 std::vector<std::pair<int, int>>* pairs);
+
+ private:
+  struct Entry {
+    Aabb box;
+    int index;
+  };
+  void SortAndSweep(const std::vector<Aabb>& boxes);
+  void Sort(const std::vector<Aabb>& boxes);
+  void SortOverlaps(int num_boxes);
+
+  std::vector<Entry> entries_;  ///< by min_x, in the order of the last call
+  std::vector<std::pair<int, int>> found_;
+  std::vector<std::pair<int, int>> overlaps_;  ///< those found, in ascending order
+  std::vector<int> first_;                     ///< where the pairs of a first body start
+};
+
+template <typename Allowed>
+void BroadPhase::FindPairs(const std::vector<Aabb>& boxes, Allowed&& allowed,
+                           std::vector<std::pair<int, int>>* pairs) {
+  SortAndSweep(boxes);
+  pairs->clear();
+  for (const auto& pair : overlaps_) {
+    if (allowed(pair.first, pair.second)) {
+      pairs->push_back(pair);
+    }
+  }
+}
+
+}  // namespace tangible

@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// Contacts of a pair of shapes: which features meet (a discrete choice, made in double), and the
+// gap, normal and point as smooth functions of poses and shape numbers (templated).
+//
+// Signs: gap > 0 apart, < 0 in penetration; the normal is unit and points from the second body to
+// the first; the point is midway between the two surface points, so both bodies receive equal and
+// opposite impulses at one place and angular momentum is conserved.
+//
+// Every contact is of a vertex of one core against a vertex, an edge or the half-plane of the
+// other:
+//   vertex-vertex  n = (p_a − p_b)/|p_a − p_b|,  gap = |p_a − p_b| − r_a − r_b
+//   vertex-edge    n = outward normal of b's edge,  gap = n·(p_a − q_b) − r_a − r_b
+//   edge-vertex    the mirror image; vertex-plane and plane-vertex likewise
+// An edge i runs from vertex i to vertex i + 1. A capsule has two edges: 0 (its normal is −y in the
+// body frame) and 1 (+y).
+
+#include "tangible/geometry/shape.h"
+
+namespace tangible {
+
+enum class FeatureKind : unsigned char {
+  kVertexVertex,
+  kVertexEdge,
+  kEdgeVertex,
+  kVertexPlane,
+  kPlaneVertex
+};
+
+/// A discrete contact feature; equal features in successive steps are the same contact.
+struct ContactFeature {
+  FeatureKind kind = FeatureKind::kVertexVertex;
+  int a = 0;  ///< vertex or edge of the first shape
+  int b = 0;  ///< vertex or edge of the second shape
+  friend bool operator==(const ContactFeature&, const ContactFeature&) = default;
+};
+
+template <typename T>
+struct ContactGeometry {
+  Vector2<T> normal;  ///< unit, from the second body to the first
+  Vector2<T> point;   ///< world, midway between the surfaces
+  T gap;              ///< m
+};
+
+/// The features of up to two contacts of the pair whose gap is below max_gap, smallest gap first;
+/// returns how many. Faces that are (nearly) parallel give two, at the two ends of their overlap:
+/// each is a vertex of one shape against the face of the other. Two half-planes give none.
+int FindContactFeatures(const ShapeView<double>& shape_a, const Pose<double>& pose_a,
+                        const ShapeView<double>& shape_b, const Pose<double>& pose_b,
+                        double max_gap, ContactFeature features[2]);
+
+/// Gap, normal and point of a feature. Finite, with finite derivatives, at coincident points too
+/// (then the normal is (0, 1), its derivative zero).
+template <typename T>
+ContactGeometry<T> EvaluateContact(const ContactFeature& feature, const ShapeView<T>& shape_a,
+                                   const Pose<T>& pose_a, const ShapeView<T>& shape_b,
+                                   const Pose<T>& pose_b);
+
+/// Indices into a shape's numbers that EvaluateContact reads of it: at most 4. `is_edge`: the
+/// feature on this shape is an edge.
+int FeatureNumbers(ShapeType type, int num_numbers, bool is_edge, int feature, int numbers[4]);
+
+}  // namespace tangible

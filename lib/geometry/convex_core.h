@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// A shape's core at a pose, in double: what the choice of features walks over. Internal to the
+// room.
+//
+// A point is a polygon of one vertex and no edge, a segment one of two vertices and two edges, one
+// seen from either side: so all pairs share one code. Coordinates are relative to a common origin
+// near the pair, for which positions cancel before they are rounded.
+
+#include <cmath>
+
+#include "tangible/geometry/shape.h"
+
+namespace tangible::internal {
+
+/// Lengths below this fraction of the faces at hand are rounding.
+inline constexpr double kRounding = 1e-12;
+
+/// An edge from `start`, along the unit vector `tangent`; all zero where it has no length.
+struct CoreEdge {
+  Vector2<double> start{0.0, 0.0};
+  Vector2<double> tangent{0.0, 0.0};
+  double length = 0.0;
+
+  Vector2<double> Normal() const { return Vector2<double>(tangent.y(), -tangent.x()); }
+  /// How far a point is in front of the edge's line.
+  double Height(const Vector2<double>& p) const { return Normal().dot(p - start); }
+};
+
+class ConvexCore {
+ public:
+  ConvexCore(const ShapeView<double>& shape, const Pose<double>& pose,
+             const Vector2<double>& origin)
+      : shape_(shape),
+        rotation_(pose.rotation),
+        position_(pose.position - origin),
+        size_(NumVertices(shape.type, shape.num_numbers)),
+        radius_(CoreRadius(shape)) {
+    for (int i = 0; i < size_ && i < kNumCached; ++i) {
+      cached_[i] = Place(i);
+    }
+  }
+
+  int Size() const { return size_; }
+  double Radius() const { return radius_; }
+  /// Collinear vertices are possible: a polygon's face may consist of several edges.
+  bool IsPolygon() const { return shape_.type == ShapeType::kPolygon; }
+  int Next(int i) const { return i + 1 == size_ ? 0 : i + 1; }
+  int Previous(int i) const { return i == 0 ? size_ - 1 : i - 1; }
+  Vector2<double> VertexAt(int i) const { return i < kNumCached ? cached_[i] : Place(i); }
+
+  CoreEdge Edge(int i) const {
+    CoreEdge edge;
+    edge.start = VertexAt(i);
+    const Vector2<double> along = VertexAt(Next(i)) - edge.start;
+    edge.length = std::sqrt(along.squaredNorm());
+    if (edge.length > 0.0) {
+      edge.tangent = along / edge.length;
+    }
+    return edge;
+  }
+
+ private:
+  static constexpr int kNumCached =
+      8;  ///< vertices placed once; those beyond are placed at each use
+
+  Vector2<double> Place(int i) const { return position_ + rotation_ * Vertex(shape_, i); }
+
+  ShapeView<double> shape_;
+  Rotation<double> rotation_;
+  Vector2<double> position_;
+  int size_;
+  double radius_;
+  Vector2<double> cached_[kNumCached];
+};
+
+/// A face: an edge with the edges collinear to it.
+struct CoreFace {
+  int edge = -1;  ///< the one that stands for the face; −1: none
+  int first = 0;  ///< vertex where the face starts
+  int last = 0;   ///< vertex where it ends
+  CoreEdge line;  ///< from the first vertex to the last
+};
+
+/// The face of an edge, given as Edge(edge), that has a length.
+CoreFace FaceOfEdge(const ConvexCore& core, int edge, const CoreEdge& line);
+
+/// The face at a vertex whose outward normal is closest to −`direction`; edge −1 where the core has
+/// none.
+CoreFace FaceAgainst(const ConvexCore& core, int vertex, const Vector2<double>& direction);
+
+}  // namespace tangible::internal

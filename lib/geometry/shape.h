@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// Shapes in the body frame, as vertices with a radius.
+//
+// Every shape but the half-plane is a convex core (a point, a segment or a polygon,
+// counter-clockwise) grown by a radius: circle = point, capsule = segment, box and polygon have
+// radius 0. The half-plane is solid where n·r ≤ d, with n = normal / |normal|, d = offset /
+// |normal|.
+
+#include "tangible/math/planar.h"
+#include "tangible/math/scalar.h"
+#include "tangible/math/shape_type.h"
+
+namespace tangible {
+
+/// The numbers of a shape, by type as BasicShape has them; does not own them. Functions read only
+/// the numbers that they need, so unused ones may be uninitialised (local Jets rely on it).
+template <typename T>
+struct ShapeView {
+  ShapeType type = ShapeType::kNone;
+  const T* numbers = nullptr;
+  int num_numbers = 0;
+};
+
+/// Vertices of the core: circle 1, capsule 2, box 4, polygon n; 0 for a half-plane and no shape.
+inline int NumVertices(ShapeType type, int num_numbers) {
+  switch (type) {
+    case ShapeType::kCircle:
+      return 1;
+    case ShapeType::kCapsule:
+      return 2;
+    case ShapeType::kBox:
+      return 4;
+    case ShapeType::kPolygon:
+      return num_numbers / 2;
+    default:
+      return 0;
+  }
+}
+
+/// Vertex i of the core, body frame, counter-clockwise. Box: starts at the lower left corner;
+/// capsule: the cap centre at −x first.
+template <typename T>
+Vector2<T> Vertex(const ShapeView<T>& shape, int i) {
+  switch (shape.type) {
+    case ShapeType::kBox: {
+      const double sign_x = (i == 1 || i == 2) ? 0.5 : -0.5;
+      const double sign_y = (i >= 2) ? 0.5 : -0.5;
+      return Vector2<T>(sign_x * shape.numbers[0], sign_y * shape.numbers[1]);
+    }
+    case ShapeType::kCapsule:
+      return Vector2<T>((i == 0 ? -0.5 : 0.5) * shape.numbers[0], T(0.0));
+    case ShapeType::kPolygon:
+      return Vector2<T>(shape.numbers[2 * i], shape.numbers[2 * i + 1]);
+    default:
+      return Vector2<T>(T(0.0), T(0.0));
+  }
+}
+
+/// The radius by which the core is grown.
+template <typename T>
+T CoreRadius(const ShapeView<T>& shape) {
+  switch (shape.type) {
+    case ShapeType::kCircle:
+      return shape.numbers[0];
+    case ShapeType::kCapsule:
+      return shape.numbers[1];
+    default:
+      return T(0.0);
+  }
+}
+
+}  // namespace tangible

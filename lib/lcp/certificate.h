@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// The certificate of a derivative: what a user needs to know to trust it.
+//
+// The map from data to solution is smooth inside a set of contact modes and has kinks on its
+// border; where values themselves jump it is discontinuous. A derivative says how near those are,
+// how well its linear systems were solved, and what was done where it is not unique.
+
+#include <limits>
+#include <string>
+
+namespace tangible {
+
+/// Margins below this are reported as near a kink; dimensionless (problem.h, scaled).
+inline constexpr double kNearKinkMargin = 1e-6;
+/// Relative errors of a linear solve above this are not trustworthy.
+inline constexpr double kLinearResidualLimit = 1e-6;
+
+struct Certificate {
+  /// Smallest distance to a change of modes: zᵢ / ζᵢ of active, sᵢ / σᵢ of inactive rows.
+  /// Infinite if there are no rows.
+  double margin_min = std::numeric_limits<double>::infinity();
+  std::string margin_where{};    ///< the row, contact or step of margin_min
+  int degenerate_rows = 0;       ///< rows at a kink: z = s = 0, either mode possible
+  int redundant_rows = 0;        ///< rank deficiency: z or y are not unique, v is
+  double condition = 1.0;        ///< largest condition estimate of a linear system
+  double linear_residual = 0.0;  ///< largest relative residual of a linear solve
+  int mode_switches = 0;         ///< over a rollout: contacts that changed mode between steps
+  int events = 0;                ///< over a rollout: impacts and other events
+  int fallbacks = 0;             ///< over a rollout: steps not solved by the first solver
+  std::string one_sided{};       ///< why the derivative is one-sided or a mean of two; else empty
+  std::string discontinuous{};   ///< what makes the value itself jump nearby; else empty
+  std::string verdict{};         ///< SetVerdict's
+};
+
+/// Adds `other` (another step of a rollout): the worse margin, condition and residual, the sum of
+/// the counts, the first reasons. The verdict is cleared.
+void Merge(const Certificate& other, Certificate& certificate);
+
+/// Writes `verdict`: what applies of "discontinuous: …", "near a kink: …" (degenerate rows, a
+/// margin below kNearKinkMargin, or a linear system that was not solved) and "one-sided: …", the
+/// worst first, joined by "; "; if nothing does, "trustworthy".
+void SetVerdict(Certificate& certificate);
+
+}  // namespace tangible

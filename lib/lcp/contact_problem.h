@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// The mixed LCP of a step of planar bodies, in its own structure: blocks of three unknowns (a twist
+// each), joints of up to three rows, contacts with a normal and a tangent row.
+//
+//   M v − Aᵀ y − Σ_contacts (nᵀ λn + tᵀ λt) = p                 momentum; M block diagonal plus
+//   dampers A v = b                                                      joints s_n = n v + c_n ≥
+//   0,   λn ≥ 0,   s_n λn = 0                  each contact w = t v + c_t;  |λt| ≤ μ λn;  w > 0 ⇒
+//   λt = −μ λn,  w < 0 ⇒ λt = μ λn    Coulomb
+//
+// Each row touches at most two blocks. Units: v m/s and rad/s, impulses N s and N m s, M kg and kg
+// m².
+//
+// As a complementarity problem each contact with friction has three rows (the planar form of
+// Pfeiffer and Glocker, Multibody Dynamics with Unilateral Contacts, 1996, ch. 6), with λt = σ − μ
+// λn:
+//   s_n = n v + c_n        ⊥ λn
+//   w⁺  = t v + c_t + w⁻   ⊥ σ          w⁺, w⁻: the positive and negative parts of the sliding
+//   speed σ⁻  = 2 μ λn − σ       ⊥ w⁻         σ⁻ = μ λn − λt
+// It has a unique, strictly complementary solution at a disc at rest, where the one-sided form of
+// two friction rows has a continuum.
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <vector>
+
+#include "tangible/math/scalar.h"
+
+namespace tangible {
+
+/// One constraint row on up to two blocks; −1: that body does not move (its part is in the row's
+/// constant).
+template <typename T>
+using RowPart = std::array<T, 3>;
+
+/// What a contact does at a solution.
+enum class ContactMode : unsigned char {
+  kOpen,             ///< λn = λt = 0
+  kSticking,         ///< s_n = 0, w = 0
+  kSlidingPositive,  ///< s_n = 0, λt = −μ λn
+  kSlidingNegative,  ///< s_n = 0, λt = μ λn
+  kClosed,           ///< s_n = 0, frictionless: λt = 0
+};
+
+/// σ in λt = −σ μ λn: the sign of sliding, 0 where friction does not follow λn.
+inline double SlidingSign(ContactMode mode) {
+  return mode == ContactMode::kSlidingPositive   ? 1.0
+         : mode == ContactMode::kSlidingNegative ? -1.0
+                                                 : 0.0;
+}
+
+template <typename T>
+struct DamperBlock {
+  int a = -1, b = -1;       ///< moving blocks, or −1
+  RowPart<T> row_a, row_b;  ///< relative speed = row_a v_a + row_b v_b + known
+  T weight;  ///< impulse a unit of relative speed (h c), added to M as weight rowᵀ row
+};
+
+template <typename T>
+struct JointBlock {
+  int a = -1, b = -1;
+  int rows = 0;  ///< 1 to 3
+  RowPart<T> row_a[3], row_b[3];
+  T rhs[3];  ///< b, less what bodies of prescribed motion contribute
+};
+
+template <typename T>
+struct ContactBlock {
+  int a = -1, b = -1;
+  RowPart<T> normal_a, normal_b, tangent_a, tangent_b;
+  T c_n;              ///< m/s
+  T c_t;              ///< m/s, from bodies of prescribed motion
+  T friction;         ///< μ
+  bool has_friction;  ///< μ > 0: rows for it
+};
+
+template <typename T>
+struct ContactProblem {
+  int num_bodies = 0;
+  std::vector<T> mass;  ///< 3 num_bodies: diagonal of M
+  std::vector<DamperBlock<T>> dampers;
+  std::vector<T> momentum;  ///< p, 3 num_bodies
+  std::vector<JointBlock<T>> joints;
+  bool redundant_joints = false;  ///< joints form loops: their rows may be dependent
+  std::vector<ContactBlock<T>> contacts;
+};
+
+/// A solution; vectors are sized for the problem. Impulses of joints: 3 a joint, unused rows 0.
+template <typename T>
+struct ContactSolution {
+  std::vector<T> v;                ///< 3 num_bodies
+  std::vector<T> joint_impulse;    ///< 3 num_joints
+  std::vector<T> normal_impulse;   ///< a contact
+  std::vector<T> tangent_impulse;  ///< a contact, signed
+  std::vector<ContactMode> modes;  ///< a contact
+};
+
+/// row · v over the moving blocks.
+template <typename T, typename V>
+T RowDot(int a, const RowPart<T>& row_a, int b, const RowPart<T>& row_b, const V* v) {
+  T sum(0.0);
+  if (a >= 0) {
+    sum += row_a[0] * v[3 * a] + row_a[1] * v[3 * a + 1] + row_a[2] * v[3 * a + 2];
+  }
+  if (b >= 0) {
+    sum += row_b[0] * v[3 * b] + row_b[1] * v[3 * b + 1] + row_b[2] * v[3 * b + 2];
+  }
+  return sum;
+}
+
+/// x += rowᵀ factor over the moving blocks.
+template <typename T, typename F, typename X>
+void AddRowTransposed(int a, const RowPart<T>& row_a, int b, const RowPart<T>& row_b,
+                      const F& factor, X* x) {
+  for (int i = 0; i < 3 && a >= 0; ++i) {
+    x[3 * a + i] += row_a[i] * factor;
+  }
+  for (int i = 0; i < 3 && b >= 0; ++i) {
+    x[3 * b + i] += row_b[i] * factor;
+  }
+}
+
+/// The sign of the sliding speed of a contact without friction, along which friction would act as μ
+/// leaves 0; 0 where the speed is the rounding of its terms, at the solved or the free twist
+/// (bodies that rest side by side): there the contact would stick.
+inline double FrictionlessSlidingSign(const ContactProblem<double>& problem,
+                                      const ContactBlock<double>& c, const double* v) {
+  constexpr double kRounding = 1e-12;
+  const double slip = RowDot(c.a, c.tangent_a, c.b, c.tangent_b, v) + c.c_t;
+  double terms = std::abs(c.c_t);
+  const auto add = [&](int block, const RowPart<double>& row) {
+    for (int i = 0; i < 3 && block >= 0; ++i) {
+      const double free = problem.momentum[3 * block + i] / problem.mass[3 * block + i];
+      terms += std::abs(row[i]) * std::max(std::abs(v[3 * block + i]), std::abs(free));
+    }
+  };
+  add(c.a, c.tangent_a);
+  add(c.b, c.tangent_b);
+  return std::abs(slip) <= kRounding * terms ? 0.0 : slip > 0.0 ? 1.0 : -1.0;
+}
+
+}  // namespace tangible

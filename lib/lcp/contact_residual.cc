@@ -1,0 +1,212 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/lcp/contact_residual.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "tangible/lcp/contact_system.h"
+
+namespace tangible {
+namespace {
+
+// The speed scale of a body, m/s: of its solved twist or its free one M⁻¹ p, whichever is larger,
+// rotation at the radius of gyration. Where a body comes to rest the solved one is rounding and
+// says nothing of the speeds that cancelled.
+double BodySpeed(const ContactProblem<double>& problem, int block, double lever, const double* v) {
+  double speed = 0.0;
+  for (int i = 0; i < 3; ++i) {
+    const int k = 3 * block + i;
+    const double component =
+        std::max(std::abs(v[k]), std::abs(problem.momentum[k] / problem.mass[k]));
+    speed = std::max(speed, i < 2 ? component : lever * component);
+  }
+  return speed;
+}
+
+// Scale of a row's value: its largest term a body, at the body's speed scale.
+double RowSpeed(const ContactProblem<double>& problem, int a, const RowPart<double>& row_a, int b,
+                const RowPart<double>& row_b, const double* v) {
+  double sum = 0.0;
+  const auto add = [&](int block, const RowPart<double>& row) {
+    if (block >= 0) {
+      const double lever = std::sqrt(problem.mass[3 * block + 2] / problem.mass[3 * block]);
+      sum += BodySpeed(problem, block, lever, v) *
+             std::max({std::abs(row[0]), std::abs(row[1]), std::abs(row[2]) / lever});
+    }
+  };
+  add(a, row_a);
+  add(b, row_b);
+  return sum;
+}
+
+// |min(z/ζ, s/σ)|, with 0/0 = 0.
+double RowResidual(double z, double zeta, double s, double sigma) {
+  const double scaled_z = zeta > 0.0 ? z / zeta : 0.0;
+  const double scaled_s = sigma > 0.0 ? s / sigma : 0.0;
+  return std::abs(std::min(scaled_z, scaled_s));
+}
+
+double MomentumResidual(const ContactProblem<double>& problem,
+                        const ContactSolution<double>& solution) {
+  double worst = 0.0;
+  double scale = 0.0;
+  thread_local std::vector<double> left;
+  left.assign(problem.momentum.begin(), problem.momentum.end());
+  const double* v = solution.v.data();
+  for (size_t i = 0; i < left.size(); ++i) {
+    scale = std::max({scale, std::abs(left[i]), std::abs(problem.mass[i] * v[i])});
+    left[i] -= problem.mass[i] * v[i];
+  }
+  const auto add = [&](int a, const RowPart<double>& row_a, int b, const RowPart<double>& row_b,
+                       double impulse) {
+    AddRowTransposed(a, row_a, b, row_b, impulse, left.data());
+    for (int i = 0; i < 3; ++i) {
+      scale = std::max({scale, a >= 0 ? std::abs(row_a[i] * impulse) : 0.0,
+                        b >= 0 ? std::abs(row_b[i] * impulse) : 0.0});
+    }
+  };
+  for (const DamperBlock<double>& d : problem.dampers) {
+    add(d.a, d.row_a, d.b, d.row_b, -d.weight * RowDot(d.a, d.row_a, d.b, d.row_b, v));
+  }
+  for (size_t j = 0; j < problem.joints.size(); ++j) {
+    const JointBlock<double>& joint = problem.joints[j];
+    for (int k = 0; k < joint.rows; ++k) {
+      add(joint.a, joint.row_a[k], joint.b, joint.row_b[k], solution.joint_impulse[3 * j + k]);
+    }
+  }
+  for (size_t i = 0; i < problem.contacts.size(); ++i) {
+    const ContactBlock<double>& c = problem.contacts[i];
+    add(c.a, c.normal_a, c.b, c.normal_b, solution.normal_impulse[i]);
+    add(c.a, c.tangent_a, c.b, c.tangent_b, solution.tangent_impulse[i]);
+  }
+  for (const double x : left) {
+    worst = std::max(worst, std::abs(x));
+    if (std::isnan(x)) {
+      return HUGE_VAL;
+    }
+  }
+  return scale > 0.0 ? worst / scale : 0.0;
+}
+
+double JointResidual(const ContactProblem<double>& problem, const double* v) {
+  double worst = 0.0;
+  double scale = 0.0;
+  for (const JointBlock<double>& joint : problem.joints) {
+    for (int k = 0; k < joint.rows; ++k) {
+      const double value = RowDot(joint.a, joint.row_a[k], joint.b, joint.row_b[k], v);
+      scale = std::max(scale, std::abs(joint.rhs[k]) + RowSpeed(problem, joint.a, joint.row_a[k],
+                                                                joint.b, joint.row_b[k], v));
+      worst = std::max(worst, std::abs(value - joint.rhs[k]));
+    }
+  }
+  return scale > 0.0 ? worst / scale : 0.0;
+}
+
+}  // namespace
+
+ContactValues Evaluate(const ContactProblem<double>& problem, const ContactBlock<double>& c,
+                       const double* v) {
+  ContactValues values;
+  values.s_n = RowDot(c.a, c.normal_a, c.b, c.normal_b, v) + c.c_n;
+  values.sigma_n = RowSpeed(problem, c.a, c.normal_a, c.b, c.normal_b, v) + std::abs(c.c_n);
+  values.mobility_n = RowMobility(problem.mass, c.a, c.normal_a, c.b, c.normal_b);
+  values.slip = values.sigma_t = 0.0;
+  values.mobility_t = 1.0;
+  if (c.has_friction) {
+    values.slip = RowDot(c.a, c.tangent_a, c.b, c.tangent_b, v) + c.c_t;
+    values.sigma_t = RowSpeed(problem, c.a, c.tangent_a, c.b, c.tangent_b, v) + std::abs(c.c_t);
+    values.mobility_t = RowMobility(problem.mass, c.a, c.tangent_a, c.b, c.tangent_b);
+    // One contact, one scale of speed: an impulse along one row leaves rounding in the other.
+    values.sigma_n = values.sigma_t = std::max(values.sigma_n, values.sigma_t);
+  }
+  return values;
+}
+
+double ImpulseScale(const std::vector<double>& impulses) {
+  double scale = 0.0;
+  for (const double impulse : impulses) {
+    scale = std::max(scale, std::abs(impulse));
+  }
+  return scale;
+}
+
+double NaturalResidual(const ContactProblem<double>& problem,
+                       const ContactSolution<double>& solution, int* worst_contact) {
+  *worst_contact = -1;
+  double worst =
+      std::max(MomentumResidual(problem, solution), JointResidual(problem, solution.v.data()));
+  const double scale = ImpulseScale(solution.normal_impulse);
+  for (size_t i = 0; i < problem.contacts.size(); ++i) {
+    const ContactBlock<double>& c = problem.contacts[i];
+    const ContactValues values = Evaluate(problem, c, solution.v.data());
+    const double normal = solution.normal_impulse[i];
+    const double zeta = std::max(scale, values.sigma_n / values.mobility_n);
+    double residual = RowResidual(normal, zeta, values.s_n, values.sigma_n);
+    if (c.has_friction) {
+      const double limit = c.friction * normal;
+      const double tangent = solution.tangent_impulse[i];
+      const double zeta_t = std::max(zeta * c.friction, values.sigma_t / values.mobility_t);
+      // w⁺ against σ⁺ = μ λn + λt, w⁻ against σ⁻ = μ λn − λt.
+      residual = std::max(
+          {residual,
+           RowResidual(limit + tangent, zeta_t, std::max(0.0, values.slip), values.sigma_t),
+           RowResidual(limit - tangent, zeta_t, std::max(0.0, -values.slip), values.sigma_t)});
+    }
+    if (!(residual <= worst)) {
+      worst = std::isnan(residual) ? HUGE_VAL : residual;
+      *worst_contact = static_cast<int>(i);
+    }
+  }
+  return worst;
+}
+
+void FindDegenerateContacts(const ContactProblem<double>& problem,
+                            const ContactSolution<double>& solution, double tolerance,
+                            std::vector<int>* degenerate) {
+  degenerate->clear();
+  const double scale = ImpulseScale(solution.normal_impulse);
+  for (size_t i = 0; i < problem.contacts.size(); ++i) {
+    const ContactBlock<double>& c = problem.contacts[i];
+    const ContactValues values = Evaluate(problem, c, solution.v.data());
+    const double normal = solution.normal_impulse[i];
+    const double zeta = std::max(scale, values.sigma_n / values.mobility_n);
+    const bool grazes =
+        std::abs(values.s_n) <= tolerance * values.sigma_n && normal <= tolerance * zeta;
+    const double zeta_t = std::max(zeta * c.friction, values.sigma_t / values.mobility_t);
+    const bool at_limit =
+        c.has_friction && normal > tolerance * zeta &&
+        std::abs(values.slip) <= tolerance * values.sigma_t &&
+        c.friction * normal - std::abs(solution.tangent_impulse[i]) <= tolerance * zeta_t;
+    if (grazes || at_limit) {
+      degenerate->push_back(static_cast<int>(i));
+    }
+  }
+}
+
+ContactMargin MarginOfContact(const ContactProblem<double>& problem,
+                              const ContactSolution<double>& solution, int contact) {
+  using Kind = ContactMargin::Kind;
+  const ContactBlock<double>& c = problem.contacts[contact];
+  const ContactValues values = Evaluate(problem, c, solution.v.data());
+  const ContactMode mode = solution.modes[contact];
+  const double normal = solution.normal_impulse[contact];
+  // 0 / 0: nothing moves and nothing pushes.
+  const auto ratio = [](double x, double scale) { return scale > 0.0 ? x / scale : 0.0; };
+  if (mode == ContactMode::kOpen) {
+    return {ratio(values.s_n, values.sigma_n), Kind::kClosing};
+  }
+  const double zeta =
+      std::max(ImpulseScale(solution.normal_impulse), values.sigma_n / values.mobility_n);
+  const ContactMargin opening{ratio(normal, zeta), Kind::kOpening};
+  ContactMargin friction = opening;
+  if (mode == ContactMode::kSticking) {
+    const double zeta_t = std::max(zeta * c.friction, values.sigma_t / values.mobility_t);
+    const double left = c.friction * normal - std::abs(solution.tangent_impulse[contact]);
+    friction = {ratio(left, zeta_t), Kind::kFrictionLimit};
+  } else if (mode != ContactMode::kClosed) {
+    friction = {ratio(SlidingSign(mode) * values.slip, values.sigma_t), Kind::kSlidingSpeed};
+  }
+  return friction.value < opening.value ? friction : opening;
+}
+
+}  // namespace tangible

@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// How well a solution solves a contact problem, and how near it is to another mode: recomputed from
+// the data.
+
+#include <vector>
+
+#include "tangible/lcp/contact_problem.h"
+
+namespace tangible {
+
+/// What a contact's rows are at a solution, with the scales by which they are judged.
+struct ContactValues {
+  double s_n, slip;         // n v + c_n, t v + c_t
+  double sigma_n, sigma_t;  // sums of |terms|
+  double mobility_n, mobility_t;
+};
+
+/// Evaluates a contact at the solved speeds v.
+ContactValues Evaluate(const ContactProblem<double>& problem, const ContactBlock<double>& contact,
+                       const double* v);
+
+/// The largest magnitude of a list of impulses.
+double ImpulseScale(const std::vector<double>& impulses);
+
+/// Scaled natural residual: the largest over rows of |min(z/ζ, s/σ)|, with σ the sum of |terms| of
+/// s and ζ the largest z of its kind (or σ over the row's mobility if that is larger), and the
+/// equations' residuals scaled by their terms.
+double NaturalResidual(const ContactProblem<double>& problem,
+                       const ContactSolution<double>& solution, int* worst_contact);
+
+/// Which contacts of a solution are degenerate: impulse and slack both 0 to `tolerance` of their
+/// scales, in the normal direction or at the limit of friction.
+void FindDegenerateContacts(const ContactProblem<double>& problem,
+                            const ContactSolution<double>& solution, double tolerance,
+                            std::vector<int>* degenerate);
+
+/// How far a contact is from a change of its mode, in the scales of NaturalResidual: the smallest
+/// of
+///   open       s_n / σ_n
+///   closed     λ_n / ζ, and
+///     sticking   (μ λ_n − |λ_t|) / ζ_t
+///     sliding    |w| / σ_t
+/// At most about 1; 0 at a kink, and below 0 by no more than the residual.
+struct ContactMargin {
+  enum class Kind { kOpening, kClosing, kFrictionLimit, kSlidingSpeed };
+  double value = 0.0;
+  Kind kind =
+      Kind::kOpening;  ///< what changes: kClosing for an open contact, kOpening for a closed one
+};
+ContactMargin MarginOfContact(const ContactProblem<double>& problem,
+                              const ContactSolution<double>& solution, int contact);
+
+}  // namespace tangible

@@ -1,0 +1,376 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/lcp/contact_solver.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace tangible {
+namespace {
+
+// Violations below this fraction of a row's scale are rounding.
+constexpr double kModeTolerance = 1e-12;
+// Sticking contacts are solved to rounding, but for rows that are redundant and contradictory.
+constexpr double kSlipTolerance = 1e-11;
+constexpr int kMaxRounds = 20;
+// Complementarities after which the polish is tried; rounding may stop the iteration for one step
+// at the end, so the last is tried several times.
+constexpr double kInteriorPointGoals[] = {1e-10, 1e-14, 1e-18, 1e-22, 1e-26, 1e-26, 1e-26, 1e-26};
+// Fixed-point iteration on the friction bounds: rounds, and the least bound as a fraction of the
+// largest impulse.
+constexpr int kMaxBoundedRounds = 20;
+constexpr double kLeastBound = 1e-6;
+// A contact whose mode has been changed this often changes alone, the worst one first.
+constexpr int kMaxChangesTogether = 3;
+
+// The mode that a contact should have where its present one is contradicted, and by how much
+// (relative).
+struct ModeChange {
+  ContactMode mode;
+  double violation = 0.0;
+};
+
+ModeChange Contradiction(const ContactBlock<double>& contact, const ContactValues& values,
+                         ContactMode mode, double normal, double tangent, double impulse_scale) {
+  const double zeta = std::max(impulse_scale, values.sigma_n / values.mobility_n);
+  ModeChange change{mode};
+  if (mode == ContactMode::kOpen) {
+    if (values.s_n < -kModeTolerance * values.sigma_n) {
+      change.violation = -values.s_n / values.sigma_n;
+      // Would it stick if it met this contact alone?
+      const double needed = std::abs(values.slip) / values.mobility_t;
+      const double available = contact.friction * -values.s_n / values.mobility_n;
+      change.mode = !contact.has_friction ? ContactMode::kClosed
+                    : needed <= available ? ContactMode::kSticking
+                    : values.slip > 0.0   ? ContactMode::kSlidingPositive
+                                          : ContactMode::kSlidingNegative;
+    }
+    return change;
+  }
+  if (normal < -kModeTolerance * zeta) {
+    return {ContactMode::kOpen, -normal / zeta};
+  }
+  if (mode == ContactMode::kSticking) {
+    // Two points of a body that turns cannot both stick: their rows contradict each other, and the
+    // regularised system leaves them slipping.
+    if (std::abs(values.slip) > kSlipTolerance * values.sigma_t) {
+      return {values.slip > 0.0 ? ContactMode::kSlidingPositive : ContactMode::kSlidingNegative,
+              std::abs(values.slip) / values.sigma_t};
+    }
+    const double excess = std::abs(tangent) - contact.friction * normal;
+    const double scale = std::max(zeta * std::max(1.0, contact.friction), std::abs(tangent));
+    if (excess > kModeTolerance * scale) {
+      change.violation = excess / scale;
+      change.mode = tangent < 0.0 ? ContactMode::kSlidingPositive : ContactMode::kSlidingNegative;
+    }
+  } else if (mode != ContactMode::kClosed) {
+    const double along = SlidingSign(mode) * values.slip;
+    if (along < -kModeTolerance * values.sigma_t) {
+      change = {ContactMode::kSticking, -along / values.sigma_t};
+    }
+  }
+  return change;
+}
+
+}  // namespace
+
+void ContactSolver::Reserve(int num_bodies, int num_joints, int num_contacts) {
+  const int blocks = num_bodies + num_joints + num_contacts;
+  const int edges = 2 * (num_joints + num_contacts) + num_joints;
+  system_.Reserve(blocks, edges);
+  interior_point_.lu.Reserve(blocks, edges);
+  interior_point_.edges.reserve(edges);
+  for (std::vector<double>* x : {&interior_point_.v,
+                                 &interior_point_.y,
+                                 &interior_point_.z,
+                                 &interior_point_.s,
+                                 &interior_point_.step,
+                                 &interior_point_.affine,
+                                 &interior_point_.ds,
+                                 &interior_point_.ds_affine,
+                                 &interior_point_.target,
+                                 &interior_point_.residual,
+                                 &interior_point_.unit_z,
+                                 &interior_point_.unit_s,
+                                 &rhs_,
+                                 &correction_,
+                                 &guess_.v,
+                                 &guess_.joint_impulse,
+                                 &guess_.normal_impulse,
+                                 &guess_.tangent_impulse,
+                                 &trial_.v,
+                                 &trial_.joint_impulse,
+                                 &trial_.normal_impulse,
+                                 &trial_.tangent_impulse}) {
+    x->reserve(3 * blocks);
+  }
+  guess_.modes.reserve(num_contacts);
+  trial_.modes.reserve(num_contacts);
+  changes_.reserve(num_contacts);
+}
+
+bool ContactSolver::SolveWithModes(const ContactProblem<double>& problem,
+                                   ContactSolution<double>* solution, ContactSolverReport* report) {
+  ++report->factorisations;
+  if (!system_.Factor(problem, solution->modes)) {
+    return false;
+  }
+  const int nb = problem.num_bodies;
+  const int nj = static_cast<int>(problem.joints.size());
+  const std::vector<int>& block_of = system_.contact_block();
+  rhs_.assign(3 * system_.num_blocks(), 0.0);
+  std::copy(problem.momentum.begin(), problem.momentum.end(), rhs_.begin());
+  int closed = 0;
+  for (int j = 0; j < nj; ++j) {
+    for (int r = 0; r < problem.joints[j].rows; ++r) {
+      rhs_[3 * (nb + j) + r] = problem.joints[j].rhs[r];
+    }
+  }
+  for (size_t i = 0; i < problem.contacts.size(); ++i) {
+    if (block_of[i] >= 0) {
+      ++closed;
+      rhs_[3 * block_of[i]] = -problem.contacts[i].c_n;
+      rhs_[3 * block_of[i] + 1] =
+          solution->modes[i] == ContactMode::kSticking ? -problem.contacts[i].c_t : 0.0;
+    }
+  }
+  // Start from the last impulses where there may be a choice among them.
+  const bool choice = closed > 1 || (problem.redundant_joints && nj > 0);
+  correction_.assign(rhs_.size(), 0.0);
+  if (choice) {
+    for (int j = 0; j < 3 * nj; ++j) {
+      correction_[3 * nb + j] = solution->joint_impulse[j];
+    }
+    for (size_t i = 0; i < problem.contacts.size(); ++i) {
+      if (block_of[i] >= 0) {
+        correction_[3 * block_of[i]] = solution->normal_impulse[i];
+        correction_[3 * block_of[i] + 1] =
+            solution->modes[i] == ContactMode::kSticking ? solution->tangent_impulse[i] : 0.0;
+      }
+    }
+    // rhs := rhs − K x0; the solution is x0 + K⁻¹ rhs.
+    guess_.v = rhs_;
+    system_.Residual<false>(problem, solution->modes, guess_.v.data(), correction_.data(), 1,
+                            rhs_.data());
+  }
+  system_.Solve(problem, solution->modes, rhs_.data(), 1);
+  for (size_t i = 0; i < rhs_.size(); ++i) {
+    correction_[i] += rhs_[i];
+  }
+  solution->v.assign(correction_.begin(), correction_.begin() + 3 * nb);
+  solution->joint_impulse.assign(correction_.begin() + 3 * nb, correction_.begin() + 3 * (nb + nj));
+  for (size_t i = 0; i < problem.contacts.size(); ++i) {
+    solution->normal_impulse[i] = block_of[i] >= 0 ? correction_[3 * block_of[i]] : 0.0;
+    solution->tangent_impulse[i] = 0.0;
+    if (solution->modes[i] == ContactMode::kSticking) {
+      solution->tangent_impulse[i] = correction_[3 * block_of[i] + 1];
+    } else if (block_of[i] >= 0 && SlidingSign(solution->modes[i]) != 0.0) {
+      solution->tangent_impulse[i] = -SlidingSign(solution->modes[i]) *
+                                     problem.contacts[i].friction * solution->normal_impulse[i];
+    }
+  }
+  return true;
+}
+
+bool ContactSolver::SolveByModeChanges(const ContactProblem<double>& problem,
+                                       const ContactSolverOptions& options, ModeChanges together,
+                                       ContactSolution<double>* solution,
+                                       ContactSolverReport* report) {
+  const size_t num_contacts = problem.contacts.size();
+  const bool all = together == ModeChanges::kTogether;
+  changes_.assign(num_contacts, all ? 0 : kMaxChangesTogether);
+  const int max_rounds = all ? kMaxRounds : kMaxRounds + 2 * static_cast<int>(num_contacts);
+  for (int round = 0; round < max_rounds; ++round) {
+    if (!SolveWithModes(problem, solution, report)) {
+      return false;
+    }
+    const double scale = ImpulseScale(solution->normal_impulse);
+    bool contradicted = false;
+    int worst = -1;
+    ModeChange worst_change{ContactMode::kOpen};
+    for (size_t i = 0; i < num_contacts; ++i) {
+      const ContactValues values = Evaluate(problem, problem.contacts[i], solution->v.data());
+      const ModeChange change =
+          Contradiction(problem.contacts[i], values, solution->modes[i],
+                        solution->normal_impulse[i], solution->tangent_impulse[i], scale);
+      if (change.violation == 0.0) {
+        continue;
+      }
+      contradicted = true;
+      if (changes_[i] < kMaxChangesTogether) {
+        ++changes_[i];
+        solution->modes[i] = change.mode;
+      } else if (change.violation > worst_change.violation) {
+        worst = static_cast<int>(i);
+        worst_change = change;
+      }
+    }
+    if (worst >= 0) {
+      ++changes_[worst];
+      solution->modes[worst] = worst_change.mode;
+    }
+    if (!contradicted) {
+      report->residual = NaturalResidual(problem, *solution, &report->worst_contact);
+      return report->residual <= options.tolerance;
+    }
+  }
+  return false;
+}
+
+bool ContactSolver::Polish(const ContactProblem<double>& problem,
+                           const ContactSolverOptions& options, ContactSolution<double>* solution,
+                           ContactSolverReport* report) {
+  int worst = -1;
+  double before = NaturalResidual(problem, *solution, &worst);
+  // A round may show that a row near its limit was judged wrongly; two more put it right or give
+  // up.
+  for (int round = 0; round < 3; ++round) {
+    trial_ = *solution;
+    if (!SolveWithModes(problem, &trial_, report)) {
+      break;
+    }
+    int trial_worst = -1;
+    const double after = NaturalResidual(problem, trial_, &trial_worst);
+    if (after <= before || after <= 0.01 * options.tolerance) {
+      *solution = trial_;
+      before = after;
+      worst = trial_worst;
+      break;
+    }
+    const double scale = ImpulseScale(trial_.normal_impulse);
+    for (size_t i = 0; i < problem.contacts.size(); ++i) {
+      const ContactValues values = Evaluate(problem, problem.contacts[i], trial_.v.data());
+      solution->modes[i] = Contradiction(problem.contacts[i], values, trial_.modes[i],
+                                         trial_.normal_impulse[i], trial_.tangent_impulse[i], scale)
+                               .mode;
+    }
+  }
+  report->residual = before;
+  report->worst_contact = worst;
+  return before <= options.tolerance;
+}
+
+bool ContactSolver::SolveByInteriorPoint(const ContactProblem<double>& problem,
+                                         const ContactSolverOptions& options,
+                                         ContactSolution<double>* solution,
+                                         ContactSolverReport* report) {
+  ContactInteriorPointOptions interior_point;
+  interior_point.max_iterations = options.max_iterations;
+  if (options.smoothing > 0.0) {
+    // A smoothed solution is what was asked for; it is not exact, and no polish makes it so. The
+    // system of its modes is still factorised, for the derivative.
+    interior_point.complementarity = options.smoothing;
+    const InteriorPointOutcome outcome =
+        SolveContactsByInteriorPoint(problem, interior_point, &interior_point_, solution);
+    report->iterations += outcome.iterations;
+    report->residual = NaturalResidual(problem, *solution, &report->worst_contact);
+    return system_.Factor(problem, solution->modes) && outcome.converged;
+  }
+  // Most modes are clear early. Where margins are small they show later, if rounding lets the
+  // iteration go on.
+  for (const double goal : kInteriorPointGoals) {
+    interior_point.complementarity = goal;
+    // At the end the steps are small, and what the proximal term leaves of the equations must go.
+    interior_point.proximal = goal < 1e-15 ? 1e-10 : 1e-9;
+    const InteriorPointOutcome outcome =
+        SolveContactsByInteriorPoint(problem, interior_point, &interior_point_, solution);
+    report->iterations += outcome.iterations;
+    if (Polish(problem, options, solution, report)) {
+      return true;
+    }
+    if (outcome.complementarity > 1e-6) {
+      break;  // it has not arrived; going on from there would not help
+    }
+    interior_point.resume = true;
+  }
+  // Rows that are almost redundant leave modes that only the exact systems tell apart.
+  return SolveByModeChanges(problem, options, ModeChanges::kWorstFirst, solution, report) ||
+         SolveByBoundedFriction(problem, options, solution, report);
+}
+
+bool ContactSolver::SolveByBoundedFriction(const ContactProblem<double>& problem,
+                                           const ContactSolverOptions& options,
+                                           ContactSolution<double>* solution,
+                                           ContactSolverReport* report) {
+  const size_t num_contacts = problem.contacts.size();
+  bounds_.assign(num_contacts, 0.0);
+  ContactInteriorPointOptions interior_point;
+  interior_point.complementarity = 1e-10;
+  interior_point.friction_bounds = &bounds_;
+  interior_point.max_iterations = options.max_iterations;
+  for (int round = 0; round < kMaxBoundedRounds; ++round) {
+    const double scale = ImpulseScale(solution->normal_impulse);
+    for (size_t i = 0; i < num_contacts; ++i) {
+      // A bound of 0 would leave no interior.
+      bounds_[i] =
+          problem.contacts[i].friction * std::max(solution->normal_impulse[i], kLeastBound * scale);
+    }
+    const InteriorPointOutcome outcome =
+        SolveContactsByInteriorPoint(problem, interior_point, &interior_point_, &bounded_);
+    report->iterations += outcome.iterations;
+    if (!outcome.converged) {
+      return false;
+    }
+    solution->normal_impulse = bounded_.normal_impulse;
+    if (round % 2 == 1) {  // modes settle after a few rounds
+      *solution = bounded_;
+      if (SolveByModeChanges(problem, options, ModeChanges::kTogether, solution, report)) {
+        return true;
+      }
+      solution->normal_impulse = bounded_.normal_impulse;
+    }
+  }
+  return false;
+}
+
+bool ContactSolver::SolveByLemke(const ContactProblem<double>& problem,
+                                 const ContactSolverOptions& options,
+                                 ContactSolution<double>* solution, ContactSolverReport* report) {
+  int iterations = 0;
+  const bool by_lemke = SolveContactsByLemke(problem, solution, &iterations);
+  report->iterations += iterations;
+  if (by_lemke && Polish(problem, options, solution, report)) {
+    return true;
+  }
+  if (options.choice == ContactSolverChoice::kLemke) {
+    return false;
+  }
+  const bool dense = SolveContactsDense(problem, options.tolerance, solution, &iterations);
+  report->iterations += iterations;
+  return dense && Polish(problem, options, solution, report);
+}
+
+ContactSolverReport ContactSolver::Solve(const ContactProblem<double>& problem,
+                                         const ContactSolverOptions& options,
+                                         ContactSolution<double>* solution) {
+  ContactSolverReport report;
+  const auto done = [&](SolvedBy by) {
+    report.solved = true;
+    report.solved_by = by;
+    return report;
+  };
+  if (problem.contacts.empty()) {
+    if (SolveWithModes(problem, solution, &report)) {
+      report.residual = NaturalResidual(problem, *solution, &report.worst_contact);
+      if (report.residual <= options.tolerance) {
+        return done(SolvedBy::kDirect);
+      }
+    }
+    return report;
+  }
+  const bool exact = options.smoothing == 0.0;
+  if (options.choice == ContactSolverChoice::kAuto && exact &&
+      SolveByModeChanges(problem, options, ModeChanges::kTogether, solution, &report)) {
+    return done(SolvedBy::kGuess);
+  }
+  if (options.choice != ContactSolverChoice::kLemke &&
+      SolveByInteriorPoint(problem, options, solution, &report)) {
+    return done(SolvedBy::kInteriorPoint);
+  }
+  if (options.choice != ContactSolverChoice::kInteriorPoint && exact &&
+      SolveByLemke(problem, options, solution, &report)) {
+    return done(SolvedBy::kLemke);
+  }
+  return report;
+}
+
+}  // namespace tangible

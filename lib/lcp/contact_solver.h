@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// The portfolio for contact problems: guess by contact modes, then interior point, then Lemke.
+//
+// 1. With modes given the problem is one linear system (contact_system.h). Its solution is exact
+// where it
+//    satisfies every inequality. Modes that are contradicted are changed and the system is solved
+//    again, a bounded number of times. Where rows are redundant the solve starts from the last
+//    impulses, so that these change as little as the data require and stay admissible.
+// 2. Mehrotra's interior point (contact_interior_point.h); where it stalls, on problems with
+// bounded friction.
+// 3. Lemke's method on the dense one-sided form; for problems that are not large the dense
+// portfolio's other attempts. After 2 and 3 the modes are identified and the mode system is solved
+// once more: the polish. A solution counts only by its scaled natural residual, recomputed from the
+// data.
+
+#include <vector>
+
+#include "tangible/lcp/contact_interior_point.h"
+#include "tangible/lcp/contact_problem.h"
+#include "tangible/lcp/contact_residual.h"
+#include "tangible/lcp/contact_system.h"
+
+namespace tangible {
+
+enum class ContactSolverChoice { kAuto, kInteriorPoint, kLemke };
+enum class SolvedBy : unsigned char { kNothing, kDirect, kGuess, kInteriorPoint, kLemke };
+
+struct ContactSolverOptions {
+  ContactSolverChoice choice = ContactSolverChoice::kAuto;
+  double tolerance = 1e-10;  ///< of the scaled natural residual
+  int max_iterations = 100;  ///< of the interior point
+  double smoothing = 0.0;  ///< relative complementarity at which the interior point stops, without
+                           ///< polish; 0: exact
+};
+
+struct ContactSolverReport {
+  bool solved = false;
+  SolvedBy solved_by = SolvedBy::kNothing;
+  int factorisations = 0;  ///< of mode systems
+  int iterations = 0;      ///< of the interior point or Lemke
+  double residual = 0.0;   ///< scaled natural residual
+  int worst_contact = -1;  ///< where it is largest, −1: an equation
+};
+
+class ContactSolver {
+ public:
+  /// `solution` holds the guess on entry (modes and impulses, sized for the problem) and the
+  /// solution on return.
+  ContactSolverReport Solve(const ContactProblem<double>& problem,
+                            const ContactSolverOptions& options, ContactSolution<double>* solution);
+  /// The mode system of the last solution, factorised with its modes.
+  ContactSystem& system() { return system_; }
+  void Reserve(int num_bodies, int num_joints, int num_contacts);
+
+ private:
+  bool SolveWithModes(const ContactProblem<double>& problem, ContactSolution<double>* solution,
+                      ContactSolverReport* report);
+  enum class ModeChanges { kTogether, kWorstFirst };
+  bool SolveByModeChanges(const ContactProblem<double>& problem,
+                          const ContactSolverOptions& options, ModeChanges together,
+                          ContactSolution<double>* solution, ContactSolverReport* report);
+  bool SolveByInteriorPoint(const ContactProblem<double>& problem,
+                            const ContactSolverOptions& options, ContactSolution<double>* solution,
+                            ContactSolverReport* report);
+  // Friction impulses bounded by μ times the last round's normal impulses: monotone problems,
+  // iterated to Coulomb's law (Haslinger's fixed point), for piles in which Coulomb's central path
+  // does not lead through.
+  bool SolveByBoundedFriction(const ContactProblem<double>& problem,
+                              const ContactSolverOptions& options,
+                              ContactSolution<double>* solution, ContactSolverReport* report);
+  bool SolveByLemke(const ContactProblem<double>& problem, const ContactSolverOptions& options,
+                    ContactSolution<double>* solution, ContactSolverReport* report);
+  bool Polish(const ContactProblem<double>& problem, const ContactSolverOptions& options,
+              ContactSolution<double>* solution, ContactSolverReport* report);
+
+  ContactSystem system_;
+  InteriorPointWorkspace<double> interior_point_;
+  ContactSolution<double> guess_, trial_;
+  std::vector<double> rhs_, correction_;
+  std::vector<int> changes_;
+  std::vector<double> bounds_;
+  ContactSolution<double> bounded_;
+};
+
+/// The dense portfolio (solver.h) with its further attempts, on the one-sided form; false where it
+/// fails or the problem has more than 240 rows.
+bool SolveContactsDense(const ContactProblem<double>& problem, double tolerance,
+                        ContactSolution<double>* solution, int* iterations);
+
+/// Lemke's method on the dense one-sided form of the problem; false where it fails.
+bool SolveContactsByLemke(const ContactProblem<double>& problem, ContactSolution<double>* solution,
+                          int* iterations);
+
+}  // namespace tangible

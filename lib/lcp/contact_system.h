@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// The linear system that a contact problem is once the mode of each contact is known.
+//
+//   K [v; y; λ] = [p; b; −c],     K = [ M  −Aᵀ  −Bᵀ
+//                                       A   δ    0
+//                                       C   0    δ  ]
+//
+// C has the rows n (closed contacts) and t (sticking ones); B the directions in which impulses act:
+// n − σ μ t for a sliding contact, so that K is unsymmetric there and the adjoint needs Kᵀ. A step
+// is solved with this system, and differentiated with the same factorisation.
+//
+// δ regularises redundant rows (four legs on a floor, a closed loop of bars): 1e-10 of the row's
+// own r M⁻¹ rᵀ, on contacts and, where joints form loops, on joints. Solutions are refined against
+// the K without δ, so what remains of δ is only the choice among redundant impulses.
+
+#include <utility>
+#include <vector>
+
+#include "tangible/lcp/block_lu.h"
+#include "tangible/lcp/contact_problem.h"
+
+namespace tangible {
+
+/// Unknowns in blocks of three: bodies; joints; the closed contacts in order, each (λn, λt,
+/// unused).
+class ContactSystem {
+ public:
+  /// Assembles and factorises; false where singular.
+  bool Factor(const ContactProblem<double>& problem, const std::vector<ContactMode>& modes);
+  /// Block of contact i, −1 if open.
+  const std::vector<int>& contact_block() const { return contact_block_; }
+  int num_blocks() const { return lu_.num_blocks(); }
+  size_t bytes() const { return lu_.bytes(); }
+  void Reserve(int num_blocks, int num_edges);
+  /// Hands the factorisation over (a tape keeps it); this object must be factorised anew before it
+  /// solves.
+  void MoveFactorsTo(ContactSystem* other);
+
+  /// x := K⁻¹ x or K⁻ᵀ x; x row-major of shape (3 num_blocks, columns). Returns the largest
+  /// residual left, relative to the magnitude of its kind of row. Unused rows stay 0.
+  double Solve(const ContactProblem<double>& problem, const std::vector<ContactMode>& modes,
+               double* x, int columns);
+  double SolveTransposed(const ContactProblem<double>& problem,
+                         const std::vector<ContactMode>& modes, double* x, int columns);
+
+  /// residual := rhs − K x (Kᵀ x if transposed) without δ; returns as Solve does.
+  template <bool kTransposed>
+  double Residual(const ContactProblem<double>& problem, const std::vector<ContactMode>& modes,
+                  const double* rhs, const double* x, int columns, double* residual) const;
+
+ private:
+  void SetPattern(const ContactProblem<double>& problem, const std::vector<ContactMode>& modes);
+  void AddBodies(const ContactProblem<double>& problem);
+  void AddJoints(const ContactProblem<double>& problem);
+  void AddContacts(const ContactProblem<double>& problem, const std::vector<ContactMode>& modes);
+  template <bool kTransposed>
+  double RefinedSolve(const ContactProblem<double>& problem, const std::vector<ContactMode>& modes,
+                      double* x, int columns);
+
+  BlockLu<double> lu_;
+  std::vector<std::pair<int, int>> edges_;
+  std::vector<int> contact_block_;
+  bool regularised_ = false;
+  std::vector<double> rhs_, correction_;
+};
+
+/// r M⁻¹ rᵀ with the diagonal of M: what a unit impulse along the row changes its speed by, were
+/// its bodies free.
+template <typename T>
+double RowMobility(const std::vector<T>& mass, int a, const RowPart<T>& row_a, int b,
+                   const RowPart<T>& row_b) {
+  double sum = 0.0;
+  for (int i = 0; i < 3 && a >= 0; ++i) {
+    sum += ValueOf(row_a[i]) * ValueOf(row_a[i]) / ValueOf(mass[3 * a + i]);
+  }
+  for (int i = 0; i < 3 && b >= 0; ++i) {
+    sum += ValueOf(row_b[i]) * ValueOf(row_b[i]) / ValueOf(mass[3 * b + i]);
+  }
+  return sum;
+}
+
+}  // namespace tangible

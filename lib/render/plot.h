@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// Line and scatter plots as SVG, alone or within a page of HtmlPage (whose colours they then take).
+
+#include <string>
+#include <vector>
+
+namespace tangible {
+
+enum class PlotStyle { kLine, kPoints, kLineAndPoints };
+
+/// One curve. x and y have the same length; `error` is empty or has that length too, and is then
+/// drawn as bars y ± error (points) or as a band (lines). A point that is not finite, or not
+/// positive on a logarithmic axis, is left out; a line has a gap there.
+struct PlotSeries {
+  std::string label;  ///< for the legend; empty: not listed
+  std::vector<double> x;
+  std::vector<double> y;
+  PlotStyle style = PlotStyle::kLine;
+  std::vector<double> error;
+};
+
+enum class AxisScale { kLinear, kLogarithmic };
+
+struct PlotOptions {
+  std::string title;
+  std::string x_label;  ///< with unit: "time (s)"
+  std::string y_label;
+  AxisScale x_scale = AxisScale::kLinear;
+  AxisScale y_scale = AxisScale::kLinear;
+  int width = 720;   ///< px
+  int height = 360;  ///< px
+};
+
+/// Where the ticks of an axis stand: at most about `count` of them within [low, high], at multiples
+/// of 1, 2 or 5 times a power of ten, or (logarithmic) at powers of ten, and where these are fewer
+/// than three at 1, 2 and 5 times them. Wants low < high, and low > 0 if logarithmic.
+std::vector<double> PlotTicks(double low, double high, AxisScale scale, int count);
+
+/// The plot as one <svg> element. CHECKs nothing: vectors of different lengths are read to the
+/// shortest.
+std::string PlotSvg(const PlotOptions& options, const std::vector<PlotSeries>& series);
+
+}  // namespace tangible

@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// A simulated motion as one self-contained HTML page: no network, no other file.
+//
+// The page draws the bodies (with a radius mark, so that rotation is seen), joints, springs, and
+// the contacts with their impulses; it plays, pauses, steps and zooms, and plots kinetic, potential
+// and total energy. ViewData is plain data, so whoever steps a scene fills it and this room needs
+// no dynamics.
+
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "tangible/math/scalar.h"
+#include "tangible/scene/scene.h"
+
+namespace tangible {
+
+/// What is drawn of a body; its poses are in the frames.
+struct ViewBody {
+  std::string name;
+  Motion motion = Motion::kMoving;
+  BasicShape<double> shape;
+};
+
+/// A joint; an anchor is in the frame of its body, and in the world where the body is −1.
+struct ViewJoint {
+  std::string name;
+  JointType type = JointType::kRevolute;
+  int bodies[2] = {-1, -1};
+  Vector2<double> anchors[2] = {Vector2<double>::Zero(), Vector2<double>::Zero()};
+  Vector2<double> axis = Vector2<double>::UnitX();  ///< prismatic: in the frame of bodies[1]
+};
+
+/// A spring; anchors as ViewJoint has them.
+struct ViewSpring {
+  std::string name;
+  int bodies[2] = {-1, -1};
+  Vector2<double> anchors[2] = {Vector2<double>::Zero(), Vector2<double>::Zero()};
+};
+
+/// A contact of one step. Impulses (N s) are those on bodies[0], along the normal n (unit, from
+/// bodies[1] to bodies[0]) and along the tangent (n_y, −n_x).
+struct ViewContact {
+  int bodies[2] = {-1, -1};
+  Vector2<double> point = Vector2<double>::Zero();  ///< m, world
+  Vector2<double> normal = Vector2<double>::UnitY();
+  double normal_impulse = 0.0;
+  double tangential_impulse = 0.0;
+  std::string mode;  ///< open, sticking, sliding_left, ...: written as it is
+};
+
+/// The scene at one time.
+struct ViewFrame {
+  double time = 0.0;                   ///< s
+  std::vector<Vector3<double>> poses;  ///< (x, y, angle) of every body, static ones included
+  std::vector<ViewContact> contacts;   ///< of the step that ended here
+  double kinetic_energy = 0.0;         ///< J
+  double potential_energy = 0.0;       ///< J, of gravity and springs
+};
+
+struct ViewData {
+  std::string name;                        ///< of the scene
+  Vector2<double> gravity = {0.0, -9.81};  ///< m/s²
+  std::vector<ViewBody> bodies;
+  std::vector<ViewJoint> joints;
+  std::vector<ViewSpring> springs;
+  std::vector<ViewFrame> frames;  ///< times increasing
+};
+
+/// Bounds of the size of the page.
+struct ViewOptions {
+  std::size_t max_frames = 2000;
+  /// Poses and contacts written in all; fewer frames are kept where there are many bodies. About 25
+  /// bytes each.
+  std::size_t max_entries = 250000;
+};
+
+/// The frames that are kept so that the page stays within the options: every k-th one, the first
+/// and the last included. A kept frame shows, instead of its own contacts, those of the frame with
+/// the largest normal impulse since the kept frame before, so that no impact is lost.
+std::vector<ViewFrame> ThinFrames(const ViewData& data, const ViewOptions& options);
+
+/// The page. Numbers are written with 6 significant digits; one that is not finite becomes null,
+/// and what it belongs to is not drawn. CHECK-free: indices of bodies that do not exist are drawn
+/// as the world, and a frame with the wrong number of poses is left out.
+std::string ViewHtml(const ViewData& data, const ViewOptions& options = {});
+
+}  // namespace tangible

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// Tables in text files: a header line with the names of the columns, then one row a line, cells
+// separated by commas. No quoting; spaces around cells, blank lines and carriage returns are
+// ignored.
+
+#include <string>
+#include <vector>
+
+namespace tangible {
+
+struct CsvTable {
+  std::string file;  ///< for messages
+  std::vector<std::string> columns;
+  std::vector<std::vector<std::string>> rows;  ///< each has as many cells as there are columns
+  std::vector<int> lines;                      ///< line of each row in the file, from 1
+
+  /// Index of a column, −1 if there is none.
+  int Column(const std::string& name) const;
+};
+
+/// Reads a table whose columns are all among `allowed` and contain all of `required`, each at most
+/// once. On failure sets one line "file: line 3: what, expected, got".
+bool ReadCsv(const std::string& file, const std::vector<std::string>& required,
+             const std::vector<std::string>& allowed, CsvTable* table, std::string* error);
+
+/// The same from text.
+bool ParseCsv(const std::string& text, const std::string& file,
+              const std::vector<std::string>& required, const std::vector<std::string>& allowed,
+              CsvTable* table, std::string* error);
+
+/// A finite number that fills the whole text; decimal point whatever the locale.
+bool ParseNumber(const std::string& text, double* value);
+
+/// The number in a cell; false and "file: line 3: x: expected a number, got ..." if it is none.
+bool ReadCell(const CsvTable& table, int row, int column, double* value, std::string* error);
+
+}  // namespace tangible

@@ -1,0 +1,173 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// The scene: what the user wrote, as plain data. It knows no dynamics.
+//
+// Every number of a scene outside `simulation` is a possible parameter, so the structs are
+// templated on the number type: BasicScene<double> is what is read from a file, BasicScene<Jet<N>>
+// the same scene whose numbers carry derivatives with respect to parameters. SI units; x right, y
+// up; angles counter-clockwise in radians.
+
+#include <limits>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tangible/math/scalar.h"
+#include "tangible/math/shape_type.h"
+#include "tangible/math/solver_choice.h"
+
+namespace tangible {
+
+/// A shape in the body frame; `numbers` holds, by type:
+///   kCircle    radius
+///   kBox       width, height
+///   kCapsule   length between the cap centres (along body x), radius
+///   kPolygon   x0, y0, x1, y1, ...: convex, counter-clockwise
+///   kHalfPlane normal x, normal y, offset: solid where normal·r ≤ offset; not necessarily unit
+template <typename T>
+struct BasicShape {
+  ShapeType type = ShapeType::kNone;
+  std::vector<T> numbers;
+};
+
+enum class Motion { kMoving, kStatic, kKinematic };
+
+template <typename T>
+struct BasicBody {
+  std::string name;
+  Motion motion = Motion::kMoving;
+  BasicShape<T> shape;
+  T mass{0.0};               ///< kg, > 0; moving bodies only
+  std::optional<T> inertia;  ///< kg m² about the centre of mass; absent: follows mass and shape
+  Vector2<T> position{T(0.0), T(0.0)};  ///< m, centre of mass
+  T angle{0.0};
+  Vector2<T> velocity{T(0.0), T(0.0)};
+  T angular_velocity{0.0};
+  T friction{0.0};         ///< Coulomb coefficient, ≥ 0
+  T restitution{0.0};      ///< in [0, 1]
+  T linear_damping{0.0};   ///< N s/m, ≥ 0: force −c v
+  T angular_damping{0.0};  ///< N m s, ≥ 0
+};
+
+enum class JointType { kRevolute, kPrismatic, kWeld, kDistance, kFixedAngle };
+
+/// A series (time, value) read from a file; what a force, torque or effort follows instead of a
+/// number.
+struct Signal {
+  std::string file;  ///< as written in the scene
+  enum class Interpolation { kConstant, kLinear } interpolation = Interpolation::kConstant;
+  std::vector<double> time;   ///< s, increasing
+  std::vector<double> x;      ///< N; empty unless the file has that column
+  std::vector<double> y;      ///< N
+  std::vector<double> value;  ///< N m, or N for a prismatic effort
+};
+
+/// A joint of bodies[0] against bodies[1]; −1 is the world. Anchors are world points at time 0,
+/// before `angle` and `rate` are applied. Which fields a type has:
+///   kRevolute   anchors[0], angle, rate, damping (N m s), limits (rad), effort (N m)
+///   kPrismatic  anchors[0], axis (world at time 0, fixed in bodies[1]), angle = displacement (m),
+///               rate (m/s), damping (N s/m), limits (m), effort (N)
+///   kWeld       anchors[0]
+///   kDistance   anchors[0] on bodies[0], anchors[1] on bodies[1]
+///   kFixedAngle none
+template <typename T>
+struct BasicJoint {
+  std::string name;
+  JointType type = JointType::kRevolute;
+  int bodies[2] = {-1, -1};  ///< index into BasicScene::bodies, −1: world
+  Vector2<T> anchors[2] = {Vector2<T>(T(0.0), T(0.0)), Vector2<T>(T(0.0), T(0.0))};
+  Vector2<T> axis{T(1.0), T(0.0)};
+  T angle{0.0};
+  T rate{0.0};
+  T damping{0.0};
+  std::optional<std::pair<T, T>> limits;
+  T effort{0.0};
+  std::optional<Signal> effort_signal;  ///< replaces effort
+  bool contact = false;                 ///< whether the joined bodies collide
+};
+
+template <typename T>
+struct BasicSpring {
+  std::string name;
+  int bodies[2] = {-1, -1};
+  Vector2<T> anchors[2] = {Vector2<T>(T(0.0), T(0.0)),
+                           Vector2<T>(T(0.0), T(0.0))};  ///< world, time 0
+  T stiffness{0.0};                                      ///< N/m
+  T damping{0.0};                                        ///< N s/m, along the spring
+  T rest_length{0.0};
+};
+
+/// A force in the world's directions at a point of the body, within [start, end].
+template <typename T>
+struct BasicForce {
+  std::string name;
+  int body = -1;
+  Vector2<T> force{T(0.0), T(0.0)};
+  T torque{0.0};
+  std::optional<Signal> force_signal;   ///< replaces force
+  std::optional<Signal> torque_signal;  ///< replaces torque
+  Vector2<T> at{T(0.0), T(0.0)};        ///< body frame
+  std::optional<T> start;               ///< s; absent: the whole run
+  std::optional<T> end;                 ///< s; absent: the whole run
+};
+
+/// Friction and restitution of pairs of bodies; names may contain `*`, which matches within a name.
+template <typename T>
+struct BasicPair {
+  std::string bodies[2];
+  std::optional<T> friction;
+  std::optional<T> restitution;
+};
+
+enum class Stepping { kFixed, kEvent };
+enum class Integrator { kSemiImplicitEuler, kTrapezoidal, kRungeKutta4 };
+enum class JointCorrection { kNone, kBaumgarte, kProjection };
+enum class Mixing { kAverage, kGeometricMean, kMinimum, kMaximum };
+enum class ImpactLaw { kNewton, kPoisson };
+
+/// How the scene is simulated: no number of it is a parameter.
+struct SimulationSettings {
+  double dt = 0.01;       ///< s
+  double duration = 1.0;  ///< s
+  Stepping stepping = Stepping::kFixed;
+  Integrator integrator = Integrator::kSemiImplicitEuler;
+  JointCorrection joint_correction = JointCorrection::kNone;
+  double joint_tolerance = 1e-10;  ///< m or rad, of `projection`
+  double baumgarte = 0.2;          ///< fraction of the joint drift corrected a step
+  Mixing friction_mixing = Mixing::kAverage;
+  Mixing restitution_mixing = Mixing::kAverage;
+  ImpactLaw impact_law = ImpactLaw::kNewton;
+  double restitution_threshold = 1e-3;  ///< m/s, approach speed below which an impact is inelastic
+  double recovery_speed = 3.0;          ///< m/s, at most, out of penetration
+  double contact_margin = 1e-4;         ///< m
+  int max_events_per_step = 100;
+  SolverChoice solver = SolverChoice::kAuto;
+  double lcp_tolerance = 1e-10;  ///< scaled natural residual
+  int lcp_max_iterations = 100;
+  double smoothing = 0.0;  ///< complementarity κ at which the interior point stops; 0: exact
+};
+
+template <typename T>
+struct BasicScene {
+  std::string name;
+  std::string path;                      ///< of the file, for messages; empty when made in memory
+  Vector2<T> gravity{T(0.0), T(-9.81)};  ///< m/s²
+  std::vector<BasicBody<T>> bodies;
+  std::vector<BasicJoint<T>> joints;
+  std::vector<BasicSpring<T>> springs;
+  std::vector<BasicForce<T>> forces;
+  std::vector<BasicPair<T>> pairs;
+  std::vector<std::pair<std::string, std::string>> no_contact;
+  SimulationSettings simulation;
+};
+
+using Scene = BasicScene<double>;
+
+/// Whether `name` matches `pattern`, in which each `*` stands for any characters.
+bool MatchesPattern(const std::string& pattern, const std::string& name);
+
+/// The same for paths such as `bodies/link*/mass`: a `*` stands for any characters but `/`.
+bool MatchesPath(const std::string& pattern, const std::string& path);
+
+}  // namespace tangible

@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// The words of a scene file for the enumerations of scene.h, for reading and writing alike.
+
+#include <cstddef>
+#include <string>
+#include <utility>
+
+#include "tangible/scene/scene.h"
+
+namespace tangible {
+
+inline constexpr std::pair<const char*, JointType> kJointTypeNames[] = {
+    {"revolute", JointType::kRevolute},
+    {"prismatic", JointType::kPrismatic},
+    {"weld", JointType::kWeld},
+    {"distance", JointType::kDistance},
+    {"fixed_angle", JointType::kFixedAngle}};
+inline constexpr std::pair<const char*, ShapeType> kShapeTypeNames[] = {
+    {"circle", ShapeType::kCircle},
+    {"box", ShapeType::kBox},
+    {"capsule", ShapeType::kCapsule},
+    {"polygon", ShapeType::kPolygon},
+    {"half_plane", ShapeType::kHalfPlane}};
+inline constexpr std::pair<const char*, Signal::Interpolation> kInterpolationNames[] = {
+    {"constant", Signal::Interpolation::kConstant}, {"linear", Signal::Interpolation::kLinear}};
+inline constexpr std::pair<const char*, Stepping> kSteppingNames[] = {{"fixed", Stepping::kFixed},
+                                                                      {"event", Stepping::kEvent}};
+inline constexpr std::pair<const char*, Integrator> kIntegratorNames[] = {
+    {"semi_implicit_euler", Integrator::kSemiImplicitEuler},
+    {"trapezoidal", Integrator::kTrapezoidal},
+    {"runge_kutta_4", Integrator::kRungeKutta4}};
+inline constexpr std::pair<const char*, JointCorrection> kJointCorrectionNames[] = {
+    {"none", JointCorrection::kNone},
+    {"baumgarte", JointCorrection::kBaumgarte},
+    {"projection", JointCorrection::kProjection}};
+inline constexpr std::pair<const char*, Mixing> kMixingNames[] = {
+    {"average", Mixing::kAverage},
+    {"geometric_mean", Mixing::kGeometricMean},
+    {"minimum", Mixing::kMinimum},
+    {"maximum", Mixing::kMaximum}};
+inline constexpr std::pair<const char*, ImpactLaw> kImpactLawNames[] = {
+    {"newton", ImpactLaw::kNewton}, {"poisson", ImpactLaw::kPoisson}};
+inline constexpr std::pair<const char*, SolverChoice> kSolverNames[] = {
+    {"auto", SolverChoice::kAuto},
+    {"interior_point", SolverChoice::kInteriorPoint},
+    {"lemke", SolverChoice::kLemke}};
+
+/// The word of an enumerator; "" if the table lacks it.
+template <typename Enum, std::size_t N>
+std::string NameOf(Enum value, const std::pair<const char*, Enum> (&table)[N]) {
+  for (const auto& entry : table) {
+    if (entry.second == value) return entry.first;
+  }
+  return "";
+}
+
+}  // namespace tangible

@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// Reading and checking the shape of a body.
+
+#include "tangible/scene/json_reader.h"
+#include "tangible/scene/scene.h"
+
+namespace tangible {
+
+/// Reads {"circle": {...}} and so on into `shape`. Polygons must be strictly convex,
+/// counter-clockwise and go around once.
+void ReadShape(const JsonReader& reader, BasicShape<double>* shape);
+
+/// Whether the uniform shape's centre of mass is the origin of the body's frame, so that its
+/// inertia about the origin is known: always but for polygons, whose centroid may be off by 1e-9 of
+/// their size.
+bool IsCentred(const BasicShape<double>& shape);
+
+}  // namespace tangible

@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// The certificate of a rollout's derivative: how near its steps are to kinks and jumps.
+//
+//   margins        of every contact and limit of every step, by its mode (MarginOfContact);
+//   besides, of the choice between
+//                  the constants gap / h, −recovery_speed and e (n·v) where these are continuous
+//   jumps          the restitution decisions (contact.h): the smallest relative |approach speed −
+//   threshold| and
+//                  |gap + h n·v_free − margin| of contacts with e > 0; and a landing in the last
+//                  step, whose twist has derivatives of order 1/h that the next step would cancel
+//   one-sided      friction exactly 0, a tie of the mixing rule, an edge of a force's window on a
+//   step's boundary: only
+//                  where derivatives with respect to these numbers are wanted
+//   linear systems redundant rows, condition, residual (contact_conditioning.h), of every step
+
+#include <string>
+#include <vector>
+
+#include "tangible/lcp/certificate.h"
+#include "tangible/simulation/rollout.h"
+
+namespace tangible {
+
+/// Relative distances to a jump below this make the verdict `discontinuous`.
+inline constexpr double kNearJumpMargin = 1e-6;
+
+struct CertifyOptions {
+  /// Places in the model's numbers that derivatives are taken with respect to, ascending.
+  std::vector<int> numbers;
+};
+
+/// Collects the certificate step by step.
+class RolloutCertifier {
+ public:
+  explicit RolloutCertifier(CertifyOptions options = {}) : options_(std::move(options)) {}
+
+  /// The step that the stepper has just done; `step` counts from 0.
+  void AddStep(const Model<double>& model, long step, Stepper* stepper);
+  /// The certificate with its verdict, after the last step.
+  Certificate Finish(const Model<double>& model, const RolloutReport& report);
+  /// Smallest relative distance to a decision at which values jump; infinite if there was none.
+  double jump_margin() const { return jump_margin_; }
+
+ private:
+  struct Place;
+  void AddMargin(double margin, const Place& place, const std::string& what);
+  void AddJump(double margin, const Place& place, const std::string& what);
+  void AddContact(const Model<double>& model, const StepRecord& record, const Place& place);
+  void AddLaw(const Model<double>& model, const StepRecord& record, const Place& place);
+  void AddCoefficients(const StepRecord& record, const Place& place);
+  void AddLinearSystem(const StepRecord& record, ContactSystem* system);
+  void AddForceWindows(const Model<double>& model);
+  bool Wanted(int number) const;
+  void OneSided(const std::string& reason);
+
+  CertifyOptions options_;
+  Certificate certificate_;
+  double jump_margin_ = std::numeric_limits<double>::infinity();
+  std::string jump_where_;
+  std::string landing_;                ///< of the last step; empty if nothing landed in it
+  std::vector<ActiveContact> closed_;  ///< of the last step
+  std::vector<ContactMode> last_modes_;
+  int last_redundant_ = 0;
+};
+
+/// Runs the rollout and certifies it. A rollout that fails is certified as far as it came; `report`
+/// says so.
+Certificate CertifyRollout(const Model<double>& model, const State<double>& initial,
+                           const CertifyOptions& options, RolloutReport* report);
+Certificate CertifyRollout(const Model<double>& model, const State<double>& initial);
+
+/// "contact of ball and floor", "low limit of joint hinge".
+std::string ContactName(const ModelStructure& structure, const ActiveContact& contact);
+/// "open", "sticking", "sliding_right" (along the tangent), "sliding_left", "closed" (without
+/// friction).
+const char* ModeName(ContactMode mode);
+
+}  // namespace tangible

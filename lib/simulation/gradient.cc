@@ -1,0 +1,293 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/simulation/gradient.h"
+
+#include <algorithm>
+#include <chrono>
+#include <functional>
+
+#include "tangible/scene/scene_names.h"
+#include "tangible/simulation/certify.h"
+#include "tangible/simulation/gradient_methods.h"
+#include "tangible/simulation/rollout_tangent.h"
+#include "tangible/simulation/settings.h"
+
+namespace tangible {
+namespace internal {
+
+VectorX<double> GradientProblem::Outputs(const State<double>& state) const {
+  VectorX<double> outputs(static_cast<Eigen::Index>(output_variables.size()));
+  const int poses = 3 * structure->num_bodies();
+  for (size_t i = 0; i < output_variables.size(); ++i) {
+    const int variable = output_variables[i];
+    outputs[static_cast<Eigen::Index>(i)] =
+        variable < poses ? state.pose[variable] : state.twist[variable - poses];
+  }
+  return outputs;
+}
+
+std::string FailureOf(const GradientProblem& problem, const RolloutReport& report) {
+  if (report.status == StepStatus::kDone) {
+    return "";
+  }
+  return (problem.scene.path.empty() ? "" : problem.scene.path + ": ") + report.message;
+}
+
+}  // namespace internal
+
+namespace {
+
+using internal::FailureOf;
+using internal::GradientProblem;
+
+// Derivatives of the losses with respect to the outputs (outputs x losses), given the outputs.
+using OutputSeed = std::function<MatrixX<double>(const VectorX<double>& values)>;
+
+double Seconds() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+double Best(double best, double seconds) { return best < seconds ? best : seconds; }
+
+GradientProblem MakeProblem(const Scene& scene, const std::vector<ParameterPath>& parameters) {
+  GradientProblem problem{scene, parameters, {}, BuildStructure(scene), {}, {}, {}};
+  BuildModelWithStructure(scene, problem.structure, &problem.model, &problem.initial);
+  for (const ParameterPath& parameter : parameters) {
+    problem.directions.push_back(DirectionOf(parameter));
+  }
+  for (const int body : problem.structure->moving) {
+    for (int i = 0; i < 3; ++i) {
+      problem.output_variables.push_back(problem.structure->PoseVariable(body, i));
+    }
+    for (int i = 0; i < 3; ++i) {
+      problem.output_variables.push_back(problem.structure->TwistVariable(body, i));
+    }
+  }
+  return problem;
+}
+
+// Derivatives of the losses with respect to the parameters: losses x parameters.
+bool ByAdjoint(const GradientProblem& problem, Factorisations factorisations,
+               const OutputSeed& output_seed, RolloutTape* tape, GradientResult* result,
+               RowMatrixXd* derivative) {
+  const Eigen::SparseMatrix<double> map =
+      VariableJacobian(problem.scene, problem.structure, problem.directions);
+  State<double> final;
+  const RolloutReport report =
+      tape->Record(problem.model, problem.initial, factorisations, {}, &final);
+  result->message = FailureOf(problem, report);
+  if (!result->message.empty()) {
+    return false;
+  }
+  result->values = problem.Outputs(final);
+  const MatrixX<double> at_outputs = output_seed(result->values);
+  const long steps = tape->steps();
+  RowMatrixXd w_bar;
+  tape->Adjoint(
+      problem.model, static_cast<int>(at_outputs.cols()),
+      [&](long k, RowMatrixXd* bar) {
+        for (size_t i = 0; k == steps && i < problem.output_variables.size(); ++i) {
+          bar->row(problem.output_variables[i]) += at_outputs.row(static_cast<Eigen::Index>(i));
+        }
+      },
+      &w_bar);
+  *derivative = (map.transpose() * w_bar).transpose();
+  return true;
+}
+
+bool ByTangent(const GradientProblem& problem, GradientResult* result) {
+  RowMatrixXd w_dot =
+      VariableJacobian(problem.scene, problem.structure, problem.directions).toDense();
+  State<double> final;
+  const RolloutReport report = RolloutTangent(problem.model, problem.initial, {}, &w_dot, &final);
+  result->message = FailureOf(problem, report);
+  if (!result->message.empty()) {
+    return false;
+  }
+  result->values = problem.Outputs(final);
+  result->jacobian.resize(result->values.size(), w_dot.cols());
+  for (size_t i = 0; i < problem.output_variables.size(); ++i) {
+    result->jacobian.row(static_cast<Eigen::Index>(i)) = w_dot.row(problem.output_variables[i]);
+  }
+  return true;
+}
+
+// All methods but the adjoint: the whole Jacobian, which a loss is chained with.
+bool ByColumns(const GradientProblem& problem, const GradientOptions& options,
+               GradientResult* result) {
+  result->notes.clear();
+  result->fallbacks = 0;
+  switch (options.method) {
+    case GradientMethod::kTangent:
+      return ByTangent(problem, result);
+    case GradientMethod::kJet:
+      return internal::JacobianByJets(problem, JetRoute::kUnrolled, result);
+    case GradientMethod::kJetImplicit:
+      return internal::JacobianByJets(problem, JetRoute::kImplicit, result);
+    default:
+      return internal::JacobianByDifferences(problem, options.step, result);
+  }
+}
+
+bool RunMethod(const GradientProblem& problem, const GradientOptions& options,
+               const OutputSeed& output_seed, RolloutTape* tape, GradientResult* result,
+               RowMatrixXd* derivative) {
+  if (options.method == GradientMethod::kAdjoint) {
+    return ByAdjoint(problem, options.factorisations, output_seed, tape, result, derivative);
+  }
+  if (!ByColumns(problem, options, result)) {
+    return false;
+  }
+  *derivative = output_seed(result->values).transpose() * result->jacobian;
+  return true;
+}
+
+bool TimeRollout(const GradientProblem& problem, int repeat, GradientResult* result) {
+  Stepper stepper(problem.model);
+  for (int i = 0; i < repeat; ++i) {
+    State<double> final;
+    const double start = Seconds();
+    const RolloutReport report = Rollout(problem.model, problem.initial, {}, &stepper, &final);
+    result->rollout_seconds = Best(result->rollout_seconds, Seconds() - start);
+    result->message = FailureOf(problem, report);
+    if (!result->message.empty()) {
+      return false;
+    }
+  }
+  return true;
+}
+
+// Places of the model's numbers that the parameters change.
+std::vector<int> WantedNumbers(const GradientProblem& problem) {
+  const Eigen::SparseMatrix<double> map =
+      VariableJacobian(problem.scene, problem.structure, problem.directions);
+  const int first = problem.structure->NumberVariable(0);
+  std::vector<int> numbers;
+  for (int column = 0; column < map.outerSize(); ++column) {
+    for (Eigen::SparseMatrix<double>::InnerIterator it(map, column); it; ++it) {
+      if (it.row() >= first) {
+        numbers.push_back(static_cast<int>(it.row()) - first);
+      }
+    }
+  }
+  std::sort(numbers.begin(), numbers.end());
+  numbers.erase(std::unique(numbers.begin(), numbers.end()), numbers.end());
+  return numbers;
+}
+
+// Where rows are redundant (a box on a box), says so if a parameter's perturbation contradicts
+// them: one contact would open or slip and the other not, and no derivative exists.
+void CheckRedundantRows(const GradientProblem& problem, Certificate* certificate) {
+  constexpr double kContradiction = 1e6;
+  StepTangent tangent;
+  RowMatrixXd w_dot =
+      RowMatrixXd(VariableJacobian(problem.scene, problem.structure, problem.directions));
+  double worst = 0.0;
+  State<double> final;
+  Rollout(
+      problem.model, problem.initial,
+      [&](long, double, const State<double>&, Stepper* stepper) {
+        if (stepper != nullptr) {
+          worst = std::max(worst, tangent.ApplyAndMeasure(problem.model, stepper, &w_dot));
+        }
+      },
+      &final);
+  if (!(worst < kContradiction)) {
+    certificate->one_sided = "redundant contacts contradict the change of a parameter";
+    SetVerdict(*certificate);
+  }
+}
+
+GradientResult Differentiate(const GradientProblem& problem, const GradientOptions& options,
+                             const OutputSeed& output_seed, RowMatrixXd* derivative) {
+  GradientResult result;
+  result.outputs = OutputNames(*problem.structure);
+  std::string error;
+  if (!CheckSettings(problem.scene.simulation, &error)) {
+    result.message = (problem.scene.path.empty() ? "" : problem.scene.path + ": ") + error;
+    return result;
+  }
+  const int repeat = std::max(1, options.repeat);
+  if (!TimeRollout(problem, repeat, &result)) {
+    return result;
+  }
+  RolloutTape tape;
+  for (int i = 0; i < repeat; ++i) {
+    const double start = Seconds();
+    if (!RunMethod(problem, options, output_seed, &tape, &result, derivative)) {
+      return result;
+    }
+    result.seconds = Best(result.seconds, Seconds() - start);
+  }
+  if (options.certificate == CertificatePass::kRun) {
+    RolloutReport report;
+    result.certificate =
+        CertifyRollout(problem.model, problem.initial, {WantedNumbers(problem)}, &report);
+    if (result.certificate.redundant_rows > 0) {
+      CheckRedundantRows(problem, &result.certificate);
+    }
+  }
+  result.done = true;
+  return result;
+}
+
+}  // namespace
+
+std::vector<std::string> OutputNames(const ModelStructure& structure) {
+  std::vector<std::string> names;
+  for (const int body : structure.moving) {
+    for (const char* component : {"x", "y", "angle", "vx", "vy", "omega"}) {
+      names.push_back(structure.bodies[body].name + "/" + component);
+    }
+  }
+  return names;
+}
+
+GradientResult FinalStateJacobian(const Scene& scene, const std::vector<ParameterPath>& parameters,
+                                  const GradientOptions& options) {
+  const GradientProblem problem = MakeProblem(scene, parameters);
+  const auto all = [](const VectorX<double>& values) {
+    return MatrixX<double>(MatrixX<double>::Identity(values.size(), values.size()));
+  };
+  RowMatrixXd jacobian;
+  GradientResult result = Differentiate(problem, options, all, &jacobian);
+  result.jacobian = std::move(jacobian);
+  return result;
+}
+
+GradientResult LossGradient(const Scene& scene, const std::vector<ParameterPath>& parameters,
+                            const std::vector<LossTerm>& terms, const GradientOptions& options) {
+  const GradientProblem problem = MakeProblem(scene, parameters);
+  const std::vector<std::string> outputs = OutputNames(*problem.structure);
+  std::vector<Eigen::Index> places;
+  for (const LossTerm& term : terms) {
+    const auto found = std::find(outputs.begin(), outputs.end(), term.output);
+    if (found == outputs.end()) {
+      GradientResult result;
+      result.message = "output " + term.output + ": no such output of the scene";
+      return result;
+    }
+    places.push_back(found - outputs.begin());
+  }
+  const auto seed = [&](const VectorX<double>& values) {
+    MatrixX<double> bar = MatrixX<double>::Zero(values.size(), 1);
+    for (size_t i = 0; i < terms.size(); ++i) {
+      bar(places[i], 0) += 2.0 * terms[i].weight * (values[places[i]] - terms[i].target);
+    }
+    return bar;
+  };
+  RowMatrixXd derivative;
+  GradientResult result = Differentiate(problem, options, seed, &derivative);
+  if (!result.done) {
+    return result;
+  }
+  result.jacobian.resize(0, 0);
+  result.gradient = derivative.row(0).transpose();
+  result.loss = 0.0;
+  for (size_t i = 0; i < terms.size(); ++i) {
+    const double error = result.values[places[i]] - terms[i].target;
+    result.loss += terms[i].weight * error * error;
+  }
+  return result;
+}
+
+}  // namespace tangible

@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// The derivative of a rollout's final state, or of a loss of it, with respect to parameters of the
+// scene, by any of five methods that must agree:
+//
+//   adjoint            one reverse sweep with a column an output (one for a loss):
+//   rollout_adjoint.h tangent            one forward sweep with a column a parameter:
+//   rollout_tangent.h jet_implicit       Jets in passes of their width, through K⁻¹ of each step
+//   jet                Jets through every operation of the interior point: the independent
+//   reference finite_difference  central; (−3 f(p) + 4 f(p ± h) − f(p ± 2h)) / ±2h at the end of a
+//   parameter's range
+//
+// A path that matches several numbers is one parameter that sets all of them: its derivative is
+// their sum.
+
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "tangible/dynamics/parameter_map.h"
+#include "tangible/lcp/certificate.h"
+#include "tangible/simulation/rollout_adjoint.h"
+
+namespace tangible {
+
+enum class GradientMethod { kAdjoint, kTangent, kJet, kJetImplicit, kFiniteDifference };
+
+inline constexpr std::pair<const char*, GradientMethod> kGradientMethodNames[] = {
+    {"adjoint", GradientMethod::kAdjoint},
+    {"tangent", GradientMethod::kTangent},
+    {"jet", GradientMethod::kJet},
+    {"jet_implicit", GradientMethod::kJetImplicit},
+    {"finite_difference", GradientMethod::kFiniteDifference}};
+
+enum class CertificatePass { kRun, kSkip };
+
+struct GradientOptions {
+  GradientMethod method = GradientMethod::kAdjoint;
+  /// Of finite differences, in the parameter's unit; 0: 6e-6 max(|p|, the parameter's scale).
+  double step = 0.0;
+  Factorisations factorisations = Factorisations::kKeep;  ///< of the adjoint
+  int repeat = 1;                                         ///< the times are the best of so many
+  CertificatePass certificate = CertificatePass::kRun;    ///< one more rollout, not timed
+};
+
+/// A scalar Σ weight (output − target)².
+struct LossTerm {
+  std::string output;  ///< "ball/x"
+  double target = 0.0;
+  double weight = 1.0;
+};
+
+struct GradientResult {
+  bool done = false;
+  std::string message;               ///< empty, or one line: what failed
+  std::vector<std::string> outputs;  ///< body/x, y, angle, vx, vy, omega of each moving body
+  VectorX<double> values;            ///< of the outputs, at the end
+  RowMatrixXd jacobian;              ///< outputs x parameters; of FinalStateJacobian alone
+  double loss = std::numeric_limits<double>::quiet_NaN();
+  VectorX<double> gradient;  ///< a parameter; of LossGradient alone
+  double seconds =
+      std::numeric_limits<double>::quiet_NaN();  ///< the method's own forward pass included
+  double rollout_seconds = std::numeric_limits<double>::quiet_NaN();  ///< of a plain rollout
+  std::vector<std::string>
+      notes;           ///< one-sided differences, changes of modes between them, fallbacks
+  long fallbacks = 0;  ///< unrolled steps that took the implicit derivative
+  Certificate certificate;
+};
+
+/// Names of the outputs of a scene.
+std::vector<std::string> OutputNames(const ModelStructure& structure);
+
+/// The Jacobian of the final state. A rollout that is unsolved or diverges, settings that the
+/// engine lacks and Jets of which no width is built are told in `message`.
+GradientResult FinalStateJacobian(const Scene& scene, const std::vector<ParameterPath>& parameters,
+                                  const GradientOptions& options);
+
+/// The gradient of a loss; the adjoint then needs one column.
+GradientResult LossGradient(const Scene& scene, const std::vector<ParameterPath>& parameters,
+                            const std::vector<LossTerm>& terms, const GradientOptions& options);
+
+}  // namespace tangible

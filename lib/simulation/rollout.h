@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// Rollouts: many steps from an initial state.
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "tangible/simulation/step.h"
+
+namespace tangible {
+
+/// What happened in a run: sums and extremes of the steps' reports.
+struct RolloutReport {
+  StepStatus status = StepStatus::kDone;
+  std::string message;   ///< empty unless it failed: when, where, what
+  long steps = 0;        ///< done
+  double time = 0.0;     ///< s, reached
+  int contacts_max = 0;  ///< contacts with an impulse in a step
+  int lcp_rows_max = 0;
+  long solved_by_guess = 0;
+  long solved_by_interior_point = 0;
+  long solved_by_lemke = 0;
+  long mode_switches = 0;
+  long factorisations = 0;
+  double residual_max = 0.0;
+  double penetration_max = 0.0;         ///< m
+  double impact_energy_gain_max = 0.0;  ///< J
+
+  /// Adds a step's report.
+  void Add(const StepReport& step);
+};
+
+/// Called with the state at each recorded time: after k steps, at time t. The stepper holds the
+/// record of the step that led there; nullptr at k = 0.
+using StateObserver =
+    std::function<void(long k, double t, const State<double>& state, Stepper* stepper)>;
+
+/// Runs the scene's duration. `final` (may be the initial state itself) gets the last good state;
+/// the observer may be empty.
+RolloutReport Rollout(const Model<double>& model, const State<double>& initial,
+                      const StateObserver& observer, State<double>* final);
+
+/// The same with a stepper of the caller's, which keeps its memory from run to run; its guess is
+/// cleared first.
+RolloutReport Rollout(const Model<double>& model, const State<double>& initial,
+                      const StateObserver& observer, Stepper* stepper, State<double>* final);
+
+enum class JetRoute { kImplicit, kUnrolled };
+
+template <typename T>
+using JetObserver = std::function<void(long k, double t, const State<T>& state)>;
+
+/// A rollout in Jets beside one in double, which makes the discrete choices. `fallbacks` counts
+/// unrolled steps in which the interior point failed and the implicit derivative was taken; values
+/// that differ from the double step's by more than 1e-8 (a different branch) fail the rollout with
+/// a message.
+template <typename T>
+RolloutReport RolloutJets(const Model<T>& model, const State<T>& initial, JetRoute route,
+                          const JetObserver<T>& observer, State<T>* final, long* fallbacks);
+
+}  // namespace tangible

@@ -1,0 +1,342 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/simulation/step.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace tangible {
+namespace {
+
+// A body that turns out faster than its bound makes the search repeat; bounds grow by half each
+// time.
+constexpr int kMaxSearches = 12;
+
+bool SameContacts(const std::vector<ActiveContact>& x, const std::vector<ActiveContact>& y) {
+  return std::equal(x.begin(), x.end(), y.begin(), y.end(),
+                    [](const ActiveContact& a, const ActiveContact& b) { return a.SameAs(b); });
+}
+
+void FullTwist(const ModelStructure& structure, const State<double>& state,
+               const std::vector<double>& solved, std::vector<double>* twist) {
+  twist->assign(state.twist.begin(), state.twist.end());
+  for (int k = 0; k < structure.num_blocks(); ++k) {
+    std::copy_n(&solved[3 * k], 3, &(*twist)[3 * structure.moving[k]]);
+  }
+}
+
+// Work of the contacts' impulses, impulse · mean of the speeds before and after.
+double ImpulseWork(const StepRecord& r) {
+  double work = 0.0;
+  for (size_t i = 0; i < r.contacts.size(); ++i) {
+    if (r.solution.modes[i] == ContactMode::kOpen) {
+      continue;
+    }
+    const ContactBlock<double>& c = r.problem.contacts[i];
+    const auto speed = [&](const std::vector<double>& twist, const RowPart<double>& a,
+                           const RowPart<double>& b) {
+      double sum = 0.0;
+      for (int k = 0; k < 3; ++k) {
+        sum += a[k] * twist[3 * r.contacts[i].a + k] + b[k] * twist[3 * r.contacts[i].b + k];
+      }
+      return sum;
+    };
+    const double normal =
+        speed(r.before.twist, c.normal_a, c.normal_b) + speed(r.new_twist, c.normal_a, c.normal_b);
+    const double tangent = speed(r.before.twist, c.tangent_a, c.tangent_b) +
+                           speed(r.new_twist, c.tangent_a, c.tangent_b);
+    work += 0.5 * (r.solution.normal_impulse[i] * normal + r.solution.tangent_impulse[i] * tangent);
+  }
+  return work;
+}
+
+bool AllFinite(const std::vector<double>& values) {
+  return std::all_of(values.begin(), values.end(), [](double x) { return std::isfinite(x); });
+}
+
+}  // namespace
+
+long NumSteps(const SimulationSettings& settings) {
+  return std::max(0L, std::lround(std::ceil(settings.duration / settings.dt - 1e-9)));
+}
+
+double StepTime(const SimulationSettings& settings, long k) {
+  return std::min(k * settings.dt, settings.duration);
+}
+
+double StepLength(const SimulationSettings& settings, long k) {
+  if (k + 1 < NumSteps(settings)) {
+    return settings.dt;
+  }
+  const double last = settings.duration - k * settings.dt;
+  return std::abs(last - settings.dt) <= 1e-9 * settings.dt ? settings.dt : last;
+}
+
+SolvedStep StepRecord::View(const std::vector<int>& contact_block) const {
+  SolvedStep view;
+  view.time = time;
+  view.h = h;
+  view.before = &before;
+  view.new_twist = &new_twist;
+  view.contacts = &contacts;
+  view.friction = &friction;
+  view.restitution = &restitution;
+  view.problem = &problem;
+  view.solution = &solution;
+  view.contact_block = &contact_block;
+  return view;
+}
+
+Stepper::Stepper(const Model<double>& model) : search_(model) {
+  const ModelStructure& s = *model.structure;
+  int shaped = 0;
+  for (const BodyIndex& body : s.bodies) {
+    shaped += body.shape != ShapeType::kNone ? 1 : 0;
+  }
+  // Planar packings have at most about three neighbours a body, two points each.
+  const int contacts = 6 * shaped + 2 * static_cast<int>(s.joints.size());
+  solver_.Reserve(s.num_blocks(), static_cast<int>(s.joints.size()), contacts);
+  projection_.Reserve(s.num_blocks() + static_cast<int>(s.joints.size()),
+                      2 * static_cast<int>(s.joints.size()));
+  record_.contacts.reserve(contacts);
+  last_contacts_.reserve(contacts);
+  wider_contacts_.reserve(contacts);
+  wider_friction_.reserve(contacts);
+  wider_restitution_.reserve(contacts);
+  record_.friction.reserve(contacts);
+  record_.restitution.reserve(contacts);
+  record_.problem.contacts.reserve(contacts);
+  record_.problem.dampers.reserve(s.joints.size() + s.springs.size());
+  record_.problem.joints.reserve(s.joints.size());
+  for (ContactSolution<double>* solution : {&record_.solution, &last_solution_}) {
+    solution->v.reserve(3 * s.num_blocks());
+    solution->joint_impulse.reserve(3 * s.joints.size());
+    solution->normal_impulse.reserve(contacts);
+    solution->tangent_impulse.reserve(contacts);
+    solution->modes.reserve(contacts);
+  }
+}
+
+void Stepper::ClearGuess() {
+  last_contacts_.clear();
+  last_solution_ = ContactSolution<double>();
+}
+
+void Stepper::SetGuess(const StepRecord& record) {
+  last_contacts_ = record.contacts;
+  last_solution_ = record.solution;
+}
+
+ContactMode Stepper::InitialMode(const ContactBlock<double>& contact) const {
+  // Alone, would it touch in the free motion, and would it stick?
+  const ContactProblem<double>& p = record_.problem;
+  double normal = contact.c_n;
+  double tangent = contact.c_t;
+  const auto add = [&](int block, const RowPart<double>& n, const RowPart<double>& t) {
+    for (int i = 0; i < 3 && block >= 0; ++i) {
+      const double v = p.momentum[3 * block + i] / p.mass[3 * block + i];
+      normal += n[i] * v;
+      tangent += t[i] * v;
+    }
+  };
+  add(contact.a, contact.normal_a, contact.tangent_a);
+  add(contact.b, contact.normal_b, contact.tangent_b);
+  if (normal >= 0.0) {
+    return ContactMode::kOpen;
+  }
+  if (!contact.has_friction) {
+    return ContactMode::kClosed;
+  }
+  const double available =
+      -contact.friction * normal /
+      RowMobility(p.mass, contact.a, contact.normal_a, contact.b, contact.normal_b);
+  const double needed = std::abs(tangent) / RowMobility(p.mass, contact.a, contact.tangent_a,
+                                                        contact.b, contact.tangent_b);
+  if (needed <= available) {
+    return ContactMode::kSticking;
+  }
+  return tangent > 0.0 ? ContactMode::kSlidingPositive : ContactMode::kSlidingNegative;
+}
+
+void Stepper::CarryGuess(const Model<double>& model) {
+  ContactSolution<double>& guess = record_.solution;
+  const size_t n = record_.contacts.size();
+  guess.modes.resize(n);
+  guess.normal_impulse.assign(n, 0.0);
+  guess.tangent_impulse.assign(n, 0.0);
+  guess.joint_impulse.assign(3 * model.structure->joints.size(), 0.0);
+  if (last_solution_.joint_impulse.size() == guess.joint_impulse.size()) {
+    guess.joint_impulse.assign(last_solution_.joint_impulse.begin(),
+                               last_solution_.joint_impulse.end());
+  }
+  // Both lists are in the same order, so one pass finds the common ones; a list whose order differs
+  // (a limit) is searched from where the last one was found.
+  size_t from = 0;
+  for (size_t i = 0; i < n; ++i) {
+    const ContactBlock<double>& block = record_.problem.contacts[i];
+    size_t found = last_contacts_.size();
+    for (size_t step = 0; step < last_contacts_.size(); ++step) {
+      const size_t k = (from + step) % last_contacts_.size();
+      if (last_contacts_[k].SameAs(record_.contacts[i])) {
+        found = k;
+        break;
+      }
+      if (last_contacts_[k].a > record_.contacts[i].a && step > 0 && k > from) {
+        break;
+      }
+    }
+    if (found == last_contacts_.size()) {
+      guess.modes[i] = InitialMode(block);
+      continue;
+    }
+    from = found;
+    const ContactMode last = last_solution_.modes[found];
+    // Friction may have become 0 or more than 0 with other numbers.
+    const bool fits =
+        last == ContactMode::kOpen || (last == ContactMode::kClosed) == !block.has_friction;
+    guess.modes[i] = last == ContactMode::kOpen || !fits ? InitialMode(block) : last;
+    guess.normal_impulse[i] = last_solution_.normal_impulse[found];
+    guess.tangent_impulse[i] = last_solution_.tangent_impulse[found];
+  }
+}
+
+ContactSolverOptions Stepper::SolverOptions(const SimulationSettings& settings) const {
+  ContactSolverOptions options;
+  options.tolerance = settings.lcp_tolerance;
+  options.max_iterations = settings.lcp_max_iterations;
+  options.smoothing = settings.smoothing;
+  options.choice = settings.solver == SolverChoice::kInteriorPoint
+                       ? ContactSolverChoice::kInteriorPoint
+                   : settings.solver == SolverChoice::kLemke ? ContactSolverChoice::kLemke
+                                                             : ContactSolverChoice::kAuto;
+  return options;
+}
+
+void Stepper::Describe(const Model<double>& model, int contact, StepReport* report) const {
+  const ModelStructure& s = *model.structure;
+  if (contact < 0) {
+    report->message =
+        s.joints.empty() ? "momentum" : "the joints' equations (are they contradictory?)";
+  } else if (record_.contacts[contact].joint >= 0) {
+    report->message = "limit of joint " + s.joints[record_.contacts[contact].joint].name;
+  } else {
+    report->message = "contact of " + s.bodies[record_.contacts[contact].a].name + " and " +
+                      s.bodies[record_.contacts[contact].b].name;
+  }
+}
+
+void Stepper::FillReport(const Model<double>& model, const ContactSolverReport& solved,
+                         StepReport* report) {
+  report->solved_by = solved.solved_by;
+  report->factorisations = solved.factorisations;
+  report->iterations = solved.iterations;
+  report->residual = solved.residual;
+  report->contacts = static_cast<int>(record_.contacts.size());
+  if (!solved.solved) {
+    report->status = StepStatus::kUnsolved;
+    Describe(model, solved.worst_contact, report);
+    return;
+  }
+  bool impact = false;
+  size_t from = 0;
+  report->gap_min = HUGE_VAL;
+  for (size_t i = 0; i < record_.contacts.size(); ++i) {
+    const ContactBlock<double>& block = record_.problem.contacts[i];
+    report->lcp_rows += block.has_friction ? 3 : 1;
+    report->gap_min = std::min(report->gap_min, record_.contacts[i].gap);
+    report->closed += record_.solution.modes[i] != ContactMode::kOpen ? 1 : 0;
+    impact = impact || record_.contacts[i].law == ContactLaw::kRestitution;
+    ContactMode last = ContactMode::kOpen;
+    for (size_t k = from; k < last_contacts_.size(); ++k) {
+      if (last_contacts_[k].SameAs(record_.contacts[i])) {
+        last = last_solution_.modes[k];
+        from = k;
+        break;
+      }
+    }
+    report->mode_switches += last != record_.solution.modes[i] ? 1 : 0;
+  }
+  if (impact) {
+    report->impact_energy_gain = ImpulseWork(record_);
+  }
+}
+
+StepReport Stepper::Step(const Model<double>& model, double t, double h, State<double>* state) {
+  StepReport report;
+  const ModelStructure& structure = *model.structure;
+  const SimulationSettings& settings = structure.settings;
+  StepRecord& r = record_;
+  r.time = t;
+  r.h = h;
+  r.before.pose.assign(state->pose.begin(), state->pose.end());
+  r.before.twist.assign(state->twist.begin(), state->twist.end());
+  AssembleFree(model, *state, t, h, &r.problem, &scratch_);
+  if (!AllFinite(r.problem.momentum) || !AllFinite(r.problem.mass)) {
+    report.status = StepStatus::kDiverged;
+    report.message = "a force or momentum is not finite";
+    return report;
+  }
+  search_.SetBounds(model, *state, r.problem, scratch_);
+  ContactSolverReport solved;
+  search_.Find(model, *state, h, scratch_, &r.contacts, &r.friction, &r.restitution);
+  for (int search = 0; search < kMaxSearches; ++search) {
+    AssembleContacts(model, *state, h, r.contacts, r.friction, r.restitution, scratch_, &r.problem);
+    CarryGuess(model);
+    solved = solver_.Solve(r.problem, SolverOptions(settings), &r.solution);
+    if (!solved.solved) {
+      break;
+    }
+    FullTwist(structure, *state, r.solution.v, &r.new_twist);
+    if (!search_.CheckBounds(model, r.new_twist, scratch_)) {
+      break;
+    }
+    // A wider search that finds the same contacts changes nothing.
+    search_.Find(model, *state, h, scratch_, &wider_contacts_, &wider_friction_,
+                 &wider_restitution_);
+    if (SameContacts(r.contacts, wider_contacts_)) {
+      break;
+    }
+    r.contacts.swap(wider_contacts_);
+    r.friction.swap(wider_friction_);
+    r.restitution.swap(wider_restitution_);
+  }
+  FillReport(model, solved, &report);
+  if (report.status != StepStatus::kDone) {
+    return report;
+  }
+  for (int body = 0; body < structure.num_bodies(); ++body) {
+    for (int i = 0; i < 3 && structure.bodies[body].motion != Motion::kStatic; ++i) {
+      state->twist[3 * body + i] = r.new_twist[3 * body + i];
+      state->pose[3 * body + i] += h * r.new_twist[3 * body + i];
+    }
+  }
+  last_contacts_.assign(r.contacts.begin(), r.contacts.end());
+  last_solution_ = r.solution;
+  if (settings.joint_correction == JointCorrection::kProjection && !structure.joints.empty() &&
+      !projection_.Project(model, state)) {
+    report.status = StepStatus::kUnsolved;
+    report.message = "joint projection: error " + std::to_string(projection_.error());
+  }
+  if (!AllFinite(state->pose) || !AllFinite(state->twist)) {
+    report.status = StepStatus::kDiverged;
+    report.message = "a pose or twist is not finite";
+  }
+  return report;
+}
+
+void Stepper::TakeRecord(StepRecord* record, ContactSystem* system) {
+  std::swap(*record, record_);
+  if (system != nullptr) {
+    solver_.system().MoveFactorsTo(system);
+  } else {
+    std::swap(record->problem, record_.problem);
+  }
+}
+
+bool Stepper::Refactor(const Model<double>& model, StepRecord* record) {
+  AssembleFree(model, record->before, record->time, record->h, &record->problem, &scratch_);
+  AssembleContacts(model, record->before, record->h, record->contacts, record->friction,
+                   record->restitution, scratch_, &record->problem);
+  return solver_.system().Factor(record->problem, record->solution.modes);
+}
+
+}  // namespace tangible

@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// One fixed step: the contact problem of [t, t + h] is solved for the new twist, then poses move
+// with it.
+//
+//   v⁺ from the contact problem at q (assembly.h),   q⁺ = q + h v⁺      semi-implicit Euler
+//   with joint_correction "projection": q⁺ is then projected onto the joints
+//
+// The step in double keeps a record from which the derivative is taken: tangent and adjoint use the
+// factorisation that the solve ended with. Two ways for Jets:
+//   implicit   the double step's modes and solution, and K⁻¹ applied to the Jets' residual
+//   unrolled   every operation of the interior point in Jets, from the same contacts
+// After its first call a step in double allocates nothing but for more contacts than it has had
+// before.
+
+#include <string>
+#include <vector>
+
+#include "tangible/dynamics/contact_search.h"
+#include "tangible/lcp/contact_solver.h"
+#include "tangible/simulation/joint_projection.h"
+
+namespace tangible {
+
+enum class StepStatus { kDone, kUnsolved, kDiverged };
+
+/// What happened in a step; sums over the run are made by the caller.
+struct StepReport {
+  StepStatus status = StepStatus::kDone;
+  SolvedBy solved_by = SolvedBy::kNothing;
+  int contacts = 0;  ///< contacts and limits listed
+  int closed = 0;    ///< of these, with an impulse
+  int lcp_rows = 0;  ///< complementarity rows: 1 a frictionless contact or limit, 3 with friction
+  int factorisations = 0;
+  int iterations = 0;
+  int mode_switches = 0;  ///< contacts whose mode differs from the last step's
+  double residual = 0.0;  ///< scaled natural residual
+  double gap_min = 0.0;   ///< m, the smallest at the start; infinite where no contact is near
+  double impact_energy_gain =
+      0.0;              ///< J, what the impulses of a step with impacts did; > 0: energy was gained
+  std::string message;  ///< empty unless it failed: names the contact or joint
+};
+
+/// A solved step: all that its derivative needs.
+struct StepRecord {
+  double time = 0.0;
+  double h = 0.0;
+  State<double> before;
+  std::vector<double> new_twist;  ///< of all bodies
+  std::vector<ActiveContact> contacts;
+  std::vector<CoefficientSource> friction, restitution;
+  ContactProblem<double> problem;
+  ContactSolution<double> solution;
+
+  SolvedStep View(const std::vector<int>& contact_block) const;
+};
+
+class Stepper {
+ public:
+  explicit Stepper(const Model<double>& model);
+
+  /// Advances the state from t by h. The numbers of `model` may differ from call to call, its
+  /// structure may not.
+  StepReport Step(const Model<double>& model, double t, double h, State<double>* state);
+
+  /// Of the last step.
+  const StepRecord& record() const { return record_; }
+  ContactSystem& system() { return solver_.system(); }
+  JointProjection& projection() { return projection_; }
+  /// Hands the last step's record and, unless null, its factorisation over; for a tape, without
+  /// copies. Until the next step record() and system() are not that step's.
+  void TakeRecord(StepRecord* record, ContactSystem* system);
+  /// Assembles and factorises a recorded step anew, so that system() is that step's; its problem is
+  /// filled in.
+  bool Refactor(const Model<double>& model, StepRecord* record);
+
+  /// Forgets the last step's modes and impulses: the next step starts without a guess.
+  void ClearGuess();
+  /// Sets the guess to that of a recorded step, so that a run can be resumed with the same bits.
+  void SetGuess(const StepRecord& record);
+
+ private:
+  void CarryGuess(const Model<double>& model);
+  ContactMode InitialMode(const ContactBlock<double>& contact) const;
+  ContactSolverOptions SolverOptions(const SimulationSettings& settings) const;
+  void FillReport(const Model<double>& model, const ContactSolverReport& solved,
+                  StepReport* report);
+  void Describe(const Model<double>& model, int contact, StepReport* report) const;
+
+  ContactSearch search_;
+  ContactSolver solver_;
+  JointProjection projection_;
+  AssemblyScratch<double> scratch_;
+  StepRecord record_;
+  // The last step's contacts and impulses: the guess.
+  std::vector<ActiveContact> last_contacts_;
+  ContactSolution<double> last_solution_;
+  std::vector<ActiveContact> wider_contacts_;
+  std::vector<CoefficientSource> wider_friction_, wider_restitution_;
+};
+
+/// The implicit derivative part of a step in Jets: `stepper` has just done the same step in double;
+/// model and state are the Jets whose values that step had. Returns the state after.
+template <typename T>
+void StepImplicit(const Model<T>& model, Stepper* stepper, const State<double>& after,
+                  State<T>* state);
+
+/// The unrolled step in Jets, with the contacts of the double step; false where the interior point
+/// fails.
+template <typename T>
+bool StepUnrolled(const Model<T>& model, const StepRecord& record, State<T>* state);
+
+/// Number of steps: ceil(duration / dt − 1e-9).
+long NumSteps(const SimulationSettings& settings);
+/// Time of step k: min(k dt, duration), never accumulated.
+double StepTime(const SimulationSettings& settings, long k);
+/// Length of step k: dt, but for the last.
+double StepLength(const SimulationSettings& settings, long k);
+
+}  // namespace tangible

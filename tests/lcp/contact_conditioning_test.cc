@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/lcp/contact_conditioning.h"
+
+#include <gtest/gtest.h>
+
+#include "contact_problems.h"
+
+namespace tangible {
+namespace {
+
+using testing::FloorContact;
+
+/// A body on two corners, each listed `copies` times.
+ContactProblem<double> Box(int copies) {
+  ContactProblem<double> problem = testing::FreeBodies({0.0, -1.0, 0.0});
+  for (int i = 0; i < copies; ++i) {
+    problem.contacts.push_back(FloorContact(0, -0.5, -0.5, 0.3));
+    problem.contacts.push_back(FloorContact(0, 0.5, -0.5, 0.3));
+  }
+  return problem;
+}
+
+SystemQuality Measure(const ContactProblem<double>& problem, ContactMode mode) {
+  const std::vector<ContactMode> modes(problem.contacts.size(), mode);
+  ContactSystem system;
+  EXPECT_TRUE(system.Factor(problem, modes));
+  return MeasureSystem(problem, modes, &system);
+}
+
+TEST(ContactConditioningTest, RedundantRowsAreThoseBeyondTheRank) {
+  const auto count = [](int copies, ContactMode mode) {
+    const ContactProblem<double> problem = Box(copies);
+    return CountRedundantRows(problem, std::vector<ContactMode>(2 * copies, mode));
+  };
+  EXPECT_EQ(count(1, ContactMode::kClosed), 0);
+  EXPECT_EQ(count(1, ContactMode::kSlidingPositive), 0);
+  // Two normals and one tangent are independent; the tangents are the same row.
+  EXPECT_EQ(count(1, ContactMode::kSticking), 1);
+  EXPECT_EQ(count(2, ContactMode::kClosed), 2);
+  EXPECT_EQ(count(2, ContactMode::kSticking), 5);
+  EXPECT_EQ(count(2, ContactMode::kOpen), 0);
+}
+
+TEST(ContactConditioningTest, ConditionOfOneContactIsThatByHandWhateverTheMass) {
+  for (const double mass : {1.0, 1e-6, 1e6}) {
+    ContactProblem<double> problem = testing::FreeBodies({0.0, -1.0, 0.0});
+    problem.mass = {mass, mass, 0.1 * mass};
+    EXPECT_NEAR(Measure(problem, ContactMode::kOpen).condition, 1.0, 1e-14);
+    problem.contacts = {FloorContact(0, 0.0, -0.5, 0.0)};
+    const SystemQuality quality = Measure(problem, ContactMode::kClosed);
+    // ‖[1 −1; 1 0]‖₁ = 2, and its inverse's [0 1; −1 1] 2. Scales are rounded and K regularised.
+    EXPECT_NEAR(quality.condition, 4.0, 1e-6);
+    EXPECT_LT(quality.residual, 1e-13);
+  }
+}
+
+TEST(ContactConditioningTest, NearlyParallelRowsAreIllConditionedNotRedundant) {
+  ContactProblem<double> problem = testing::FreeBodies({0.0, -1.0, 0.0});
+  problem.contacts = {FloorContact(0, -1e-4, 0.0, 0.0), FloorContact(0, 1e-4, 0.0, 0.0)};
+  EXPECT_EQ(CountRedundantRows(problem, {ContactMode::kClosed, ContactMode::kClosed}), 0);
+  // The angle between the scaled rows is 2e-4 / sqrt(0.1); its square divides.
+  EXPECT_GT(Measure(problem, ContactMode::kClosed).condition, 1e6);
+}
+
+}  // namespace
+}  // namespace tangible

@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/lcp/contact_residual.h"
+
+#include <gtest/gtest.h>
+
+#include "contact_problems.h"
+
+namespace tangible {
+namespace {
+
+using testing::FloorContact;
+using Kind = ContactMargin::Kind;
+
+/// A body of mass 1 whose contact is below its centre, at its centre's height: normal and tangent
+/// impulses change v_y and v_x alone.
+struct Case {
+  ContactProblem<double> problem;
+  ContactSolution<double> solution;
+};
+
+Case MakeCase(double free_x, double free_y, double friction) {
+  Case result;
+  result.problem = testing::FreeBodies({free_x, free_y, 0.0});
+  result.problem.contacts = {FloorContact(0, 0.0, 0.0, friction)};
+  result.solution = testing::EmptySolution(result.problem);
+  return result;
+}
+
+/// The same with impulses that are applied.
+Case Solved(double free_x, double free_y, double friction, ContactMode mode, double normal,
+            double tangent) {
+  Case result = MakeCase(free_x, free_y, friction);
+  result.solution.v = {free_x + tangent, free_y + normal, 0.0};
+  result.solution.normal_impulse = {normal};
+  result.solution.tangent_impulse = {tangent};
+  result.solution.modes = {mode};
+  return result;
+}
+
+double ResidualOf(const Case& c, int* worst) {
+  return NaturalResidual(c.problem, c.solution, worst);
+}
+
+TEST(ContactResidualTest, ValuesOfAContactAreThoseByHand) {
+  ContactProblem<double> problem = testing::FreeBodies({0.0, 0.0, 0.0});
+  const ContactBlock<double> contact = FloorContact(0, 0.5, -0.2, 0.3, -0.25);
+  const double v[] = {1.0, 2.0, 3.0};
+  const ContactValues values = Evaluate(problem, contact, v);
+  EXPECT_DOUBLE_EQ(values.s_n, 2.0 + 0.5 * 3.0 - 0.25);
+  EXPECT_DOUBLE_EQ(values.slip, 1.0 + 0.2 * 3.0);
+  // Scales are no less than the largest term and the constant, and one for both rows of a contact.
+  EXPECT_GE(values.sigma_n, 2.0 + 0.25);
+  EXPECT_DOUBLE_EQ(values.sigma_t, values.sigma_n);
+  EXPECT_DOUBLE_EQ(values.mobility_n, 1.0 + 0.25 / 0.1);
+  EXPECT_DOUBLE_EQ(values.mobility_t, 1.0 + 0.04 / 0.1);
+  EXPECT_EQ(ImpulseScale({1.0, -3.0, 2.0}), 3.0);
+  EXPECT_EQ(ImpulseScale({}), 0.0);
+}
+
+TEST(ContactResidualTest, SolutionsHaveNoneAndFaultsHaveTheirSize) {
+  int worst = 7;
+  EXPECT_LT(ResidualOf(Solved(0.3, -1.0, 0.5, ContactMode::kSticking, 1.0, -0.3), &worst), 1e-15);
+  EXPECT_LT(ResidualOf(Solved(2.0, -1.0, 0.5, ContactMode::kSlidingPositive, 1.0, -0.5), &worst),
+            1e-15);
+  EXPECT_LT(ResidualOf(Solved(0.0, 1.0, 0.5, ContactMode::kOpen, 0.0, 0.0), &worst), 1e-15);
+  // No impulse against an approach at full speed: s / σ = −1.
+  EXPECT_DOUBLE_EQ(ResidualOf(Solved(0.0, -1.0, 0.5, ContactMode::kOpen, 0.0, 0.0), &worst), 1.0);
+  EXPECT_EQ(worst, 0);
+  // Friction 0.8 beyond its limit 0.5, of a scale of 1.
+  EXPECT_NEAR(ResidualOf(Solved(0.8, -1.0, 0.5, ContactMode::kSticking, 1.0, -0.8), &worst), 0.3,
+              1e-15);
+  Case unbalanced = Solved(0.0, -1.0, 0.5, ContactMode::kSticking, 1.0, 0.0);
+  unbalanced.solution.normal_impulse[0] = 1.25;
+  EXPECT_NEAR(ResidualOf(unbalanced, &worst), 0.25 / 1.25, 1e-15);
+  EXPECT_EQ(worst, -1);
+  unbalanced.solution.v[0] = std::nan("");
+  EXPECT_EQ(ResidualOf(unbalanced, &worst), HUGE_VAL);
+}
+
+TEST(ContactResidualTest, DegenerateAreThoseAtTheBorderOfTwoModes) {
+  const auto degenerate = [](const Case& c) {
+    std::vector<int> found;
+    FindDegenerateContacts(c.problem, c.solution, 1e-9, &found);
+    return found;
+  };
+  const std::vector<int> none;
+  const std::vector<int> first = {0};
+  EXPECT_EQ(degenerate(Solved(1.0, 0.0, 0.0, ContactMode::kOpen, 0.0, 0.0)), first);
+  EXPECT_EQ(degenerate(Solved(1.0, 0.1, 0.0, ContactMode::kOpen, 0.0, 0.0)), none);
+  EXPECT_EQ(degenerate(Solved(-0.5, -1.0, 0.5, ContactMode::kSticking, 1.0, 0.5)), first);
+  EXPECT_EQ(degenerate(Solved(-0.4, -1.0, 0.5, ContactMode::kSticking, 1.0, 0.4)), none);
+  EXPECT_EQ(degenerate(Solved(-0.6, -1.0, 0.5, ContactMode::kSlidingNegative, 1.0, 0.5)), none);
+}
+
+TEST(ContactResidualTest, MarginsAreThoseOfTheNearestMode) {
+  const auto expect = [](const Case& c, double value, Kind kind) {
+    const ContactMargin margin = MarginOfContact(c.problem, c.solution, 0);
+    EXPECT_NEAR(margin.value, value, 1e-15);
+    EXPECT_EQ(margin.kind, kind);
+  };
+  expect(Solved(1.0, 0.25, 0.5, ContactMode::kOpen, 0.0, 0.0), 0.25, Kind::kClosing);
+  expect(Solved(0.0, -1.0, 0.0, ContactMode::kClosed, 1.0, 0.0), 1.0, Kind::kOpening);
+  expect(Solved(0.3, -1.0, 0.5, ContactMode::kSticking, 1.0, -0.3), 0.2, Kind::kFrictionLimit);
+  expect(Solved(1.0, -1.0, 0.875, ContactMode::kSlidingPositive, 1.0, -0.875), 0.125,
+         Kind::kSlidingSpeed);
+  expect(Solved(-1.0, -1.0, 0.875, ContactMode::kSlidingNegative, 1.0, 0.875), 0.125,
+         Kind::kSlidingSpeed);
+  // Slides fast, hardly pressed: the impulse's scale is that of stopping the whole speed.
+  expect(Solved(8.0, -1.0, 0.5, ContactMode::kSlidingPositive, 1.0, -0.5), 0.125, Kind::kOpening);
+}
+
+}  // namespace
+}  // namespace tangible

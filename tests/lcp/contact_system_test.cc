@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/lcp/contact_system.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/LU>
+
+#include "contact_problems.h"
+
+namespace tangible {
+namespace {
+
+using testing::DenseSystem;
+
+std::vector<ContactMode> RandomModes(const ContactProblem<double>& problem,
+                                     std::mt19937_64* random) {
+  std::vector<ContactMode> modes;
+  for (const ContactBlock<double>& c : problem.contacts) {
+    const ContactMode with[] = {ContactMode::kOpen, ContactMode::kSticking,
+                                ContactMode::kSlidingPositive, ContactMode::kSlidingNegative};
+    modes.push_back(c.has_friction         ? with[(*random)() % 4]
+                    : (*random)() % 2 == 0 ? ContactMode::kClosed
+                                           : ContactMode::kOpen);
+  }
+  return modes;
+}
+
+// Right-hand sides are 0 in unused rows, as the engine's are.
+RowMatrixXd RightHandSide(const MatrixX<double>& K) {
+  RowMatrixXd rhs = RowMatrixXd::Random(K.rows(), 2);
+  for (int i = 0; i < K.rows(); ++i) {
+    VectorX<double> row = K.row(i);
+    row[i] -= 1.0;
+    if (row.norm() == 0.0) rhs.row(i).setZero();
+  }
+  return rhs;
+}
+
+TEST(ContactSystemTest, SolvesAsTheDenseMatrixForwardAndTransposed) {
+  std::mt19937_64 random(5);
+  double largest_difference = 0.0;
+  for (int trial = 0; trial < 60; ++trial) {
+    const ContactProblem<double> p = testing::RandomContactProblem(&random, 4 + trial % 3, 4);
+    const std::vector<ContactMode> modes = RandomModes(p, &random);
+    const MatrixX<double> K = DenseSystem(p, modes);
+    const Eigen::FullPivLU<MatrixX<double>> lu(K);
+    if (lu.rcond() < 1e-4) continue;  // random rows may be nearly dependent
+    ContactSystem system;
+    ASSERT_TRUE(system.Factor(p, modes));
+    ASSERT_EQ(3 * system.num_blocks(), K.rows());
+    const RowMatrixXd rhs = RightHandSide(K);
+    RowMatrixXd x = rhs;
+    const double left = system.Solve(p, modes, x.data(), 2);
+    EXPECT_LT(left, 1e-13);
+    // Rounding times the condition, at most 1e4.
+    EXPECT_LT((x - lu.solve(rhs)).norm(), 1e-11 * (1.0 + x.norm()));
+    RowMatrixXd y = rhs;
+    EXPECT_LT(system.SolveTransposed(p, modes, y.data(), 2), 1e-13);
+    EXPECT_LT((K.transpose() * y - rhs).norm(), 1e-11 * (1.0 + y.norm()));
+    largest_difference = std::max(largest_difference, (x - y).norm());
+  }
+  EXPECT_GT(largest_difference, 0.1);
+}
+
+TEST(ContactSystemTest, ResidualIsThatOfTheDenseMatrix) {
+  std::mt19937_64 random(6);
+  const ContactProblem<double> p = testing::RandomContactProblem(&random, 5, 6);
+  const std::vector<ContactMode> modes = RandomModes(p, &random);
+  const MatrixX<double> K = DenseSystem(p, modes);
+  ContactSystem system;
+  system.Factor(p, modes);
+  RowMatrixXd x = RightHandSide(K);
+  const RowMatrixXd rhs = RightHandSide(K);
+  RowMatrixXd residual(K.rows(), 2);
+  system.Residual<false>(p, modes, rhs.data(), x.data(), 2, residual.data());
+  EXPECT_LT((residual - (rhs - K * x)).norm(), 1e-13);
+  system.Residual<true>(p, modes, rhs.data(), x.data(), 2, residual.data());
+  EXPECT_LT((residual - (rhs - K.transpose() * x)).norm(), 1e-13);
+}
+
+TEST(ContactSystemTest, DuplicatedContactsOfABoxLeaveTheTwistRight) {
+  // Four times the same corner pair: rows are redundant, the twist is not.
+  ContactProblem<double> p = testing::FreeBodies({0.3, -1.0, 0.2});
+  for (int k = 0; k < 4; ++k) {
+    p.contacts.push_back(testing::FloorContact(0, k % 2 == 0 ? -0.5 : 0.5, -0.5, 0.8));
+  }
+  const std::vector<ContactMode> modes(4, ContactMode::kSticking);
+  ContactSystem system;
+  ASSERT_TRUE(system.Factor(p, modes));
+  VectorX<double> x = VectorX<double>::Zero(15);
+  for (int i = 0; i < 3; ++i) x[i] = p.momentum[i];
+  system.Solve(p, modes, x.data(), 1);
+  EXPECT_LT(x.head<3>().norm(), 1e-12);
+  EXPECT_NEAR(x[3] + x[6] + x[9] + x[12], 1.0, 1e-12);  // the normal impulses carry the momentum
+}
+
+TEST(ContactSystemTest, RowMobilityOfAnOffCentreRow) {
+  const ContactProblem<double> p = testing::FreeBodies({0, 0, 0, 0, 0, 0});
+  const RowPart<double> row = {0.0, 1.0, 0.5};
+  EXPECT_DOUBLE_EQ(RowMobility(p.mass, 0, row, -1, row), 1.0 + 0.25 / 0.1);
+  EXPECT_DOUBLE_EQ(RowMobility(p.mass, 0, row, 1, row), 2.0 * (1.0 + 0.25 / 0.1));
+}
+
+}  // namespace
+}  // namespace tangible

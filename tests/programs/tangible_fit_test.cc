@@ -1,0 +1,157 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "run_program.h"
+
+namespace tangible {
+namespace {
+
+using nlohmann::json;
+
+constexpr char kScene[] = R"({"bodies": [
+  {"name": "ball", "shape": {"circle": {"radius": 0.1}}, "mass": 1, "inertia": 0.005,
+   "position": [0, 1], "velocity": [2, 3]}],
+  "gravity": [0, -9.5], "simulation": {"dt": 0.01, "duration": 0.5}})";
+
+/// y of semi-implicit Euler's parabola at t = k dt: 1 + 3 t - g dt² k (k + 1) / 2, with g = 9.5.
+double Height(int k) { return 1.0 + 0.03 * k - 9.5 * 1e-4 * 0.5 * k * (k + 1); }
+
+std::string Observations() {
+  std::string text = "time,body,x,y\n";
+  for (int k = 0; k <= 50; k += 10) {
+    text += std::to_string(0.01 * k) + ",ball," + (k == 20 ? "" : std::to_string(0.02 * k)) + "," +
+            json(Height(k)).dump() + "\n";
+  }
+  return text;
+}
+
+class TangibleFitTest : public ProgramTest {
+ protected:
+  void SetUp() override {
+    ProgramTest::SetUp();
+    Write("scene.json", kScene);
+    Write("o.csv", Observations());
+  }
+
+  /// A fit of g and the initial speed; `changes` are merged into it.
+  static json Problem(const json& changes = json::object()) {
+    json fit =
+        json::parse(R"({"scene": "scene.json", "observations": [{"file": "o.csv", "sigma": 0.01}],
+      "parameters": [{"name": "g", "initial": 8, "lower": 1, "upper": 20,
+                      "sets": [{"path": "gravity/y", "scale": -1}]},
+                     {"name": "speed", "initial": 1, "sets": [{"path": "bodies/ball/velocity/x"}]}]})");
+    fit.merge_patch(changes);
+    return fit;
+  }
+
+  ProgramRun Fit(const json& fit, const std::string& flags = "") const {
+    return Run("tangible-fit", "'" + Write("fit.json", fit.dump()) + "' " + flags);
+  }
+};
+
+TEST_F(TangibleFitTest, FitsAndWritesResultAndReport) {
+  const ProgramRun run = Fit(Problem(), "--discretisation_check --out='" + Path("r.json") +
+                                            "' --report='" + Path("r.html") + "'");
+  ASSERT_EQ(run.exit_status, 0) << run.error;
+  EXPECT_EQ(run.error, "");
+  EXPECT_NE(run.out.find("g = 9.5 ± "), std::string::npos) << run.out;
+  EXPECT_NE(run.out.find("iterations, "), std::string::npos) << run.out;
+  const json result = json::parse(Read(Path("r.json")));
+  for (const char* key :
+       {"status", "parameters", "covariance", "initial_cost", "final_cost", "residual_rms",
+        "reduced_chi_square", "iterations", "rollouts", "seconds", "message"}) {
+    EXPECT_TRUE(result.contains(key)) << key;
+  }
+  EXPECT_EQ(result["status"], "converged");
+  const json& g = result["parameters"][0];
+  EXPECT_EQ(g["name"], "g");
+  EXPECT_NEAR(g["estimate"], 9.5, 1e-8 * 9.5);
+  // J = dt² k (k + 1) / 2 over sigma: the observations of y at k = 0, 10, .. 50 determine g alone.
+  double information = 0.0;
+  for (int k = 0; k <= 50; k += 10) {
+    information += std::pow(0.5e-4 * k * (k + 1) / 0.01, 2);
+  }
+  EXPECT_NEAR(g["standard_deviation"], 1.0 / std::sqrt(information), 1e-9);
+  EXPECT_NEAR(g["confidence_95"][1].get<double>() - 9.5, 1.959964 / std::sqrt(information), 1e-6);
+  EXPECT_EQ(result["covariance"].size(), 2u);
+  EXPECT_EQ(result["iterations"][0]["parameters"], json({8.0, 1.0}));
+  EXPECT_EQ(result["iterations"][0]["cost"], result["initial_cost"]);
+  // At dt / 2 the same drop takes g dt (t + dt / 2) = g' dt (t + dt / 4): the estimate grows.
+  EXPECT_LT(result["discretisation"]["parameters"][0]["bias"].get<double>(), 0.0);
+  const std::string report = Read(Path("r.html"));
+  EXPECT_NE(report.find("<svg"), std::string::npos);
+  EXPECT_NE(report.find("ball y"), std::string::npos);
+  for (const char* other : {"src=", "<link", "href=\"http"}) {
+    EXPECT_EQ(report.find(other), std::string::npos) << "self-contained: " << other;
+  }
+}
+
+TEST_F(TangibleFitTest, FlagsOverrideTheFile) {
+  const ProgramRun run = Fit(Problem({{"derivatives", "adjoint"}}),
+                             "--derivatives=finite_difference --initial='g=19,speed=-3'");
+  ASSERT_EQ(run.exit_status, 0) << run.error;
+  EXPECT_NE(run.out.find("19"), std::string::npos) << run.out;
+  EXPECT_NE(run.out.find("g = 9.5"), std::string::npos) << run.out;
+  EXPECT_EQ(Fit(Problem(), "--derivatives=guess").exit_status, 2);
+  EXPECT_EQ(Fit(Problem(), "--initial=mass=1").exit_status, 2);
+  EXPECT_EQ(Fit(Problem(), "--max_iterations=0").exit_status, 2);
+  EXPECT_EQ(Run("tangible-fit", "").exit_status, 2);
+  EXPECT_EQ(Run("tangible-fit", "--no_such_flag x.json").exit_status, 2);
+  EXPECT_EQ(Run("tangible-fit", "--help").exit_status, 0);
+}
+
+TEST_F(TangibleFitTest, MistakesAreOneLineWithTheirPlace) {
+  const json parameters = Problem()["parameters"];
+  const auto with = [&parameters](const json& more) {
+    json list = parameters;
+    list.push_back(more);
+    return json{{"parameters", list}};
+  };
+  const std::pair<json, std::string> cases[] = {
+      {{{"sene", 1}}, "fit.json: /sene: unknown key"},
+      {{{"scene", "no.json"}}, "no.json: cannot be read"},
+      {{{"observations", json::array()}}, "fit.json: /observations: expected at least one"},
+      {{{"observations", {{{"file", "o.csv"}, {"sigma", 0}}}}},
+       "fit.json: /observations/0/sigma: expected a number > 0, got 0"},
+      {{{"observations", {{{"file", "o.csv"}, {"sigma", {{"x", 1}}}}}}},
+       "fit.json: /observations/0/sigma: expected a sigma of y"},
+      {{{"points", {{"tip", {{"body", "bal"}, {"at", {0, 0}}}}}}},
+       "fit.json: /points/tip/body: expected the name of a body (ball), got \"bal\""},
+      {{{"derivatives", "guess"}}, "fit.json: /derivatives: expected one of tangent"},
+      {{{"loss", {{"huber", -1}}}}, "fit.json: /loss/huber: expected a number > 0, got -1"},
+      {{{"segments", 0}}, "fit.json: /segments: expected an integer"},
+      {{{"parameters", json::array()}}, "fit.json: /parameters: expected at least one parameter"},
+      {with({{"name", "g"}, {"path", "gravity/x"}}),
+       "fit.json: /parameters/2/name: expected names"},
+      {with({{"name", "m"}, {"path", "bodies/bal/mass"}}), "/parameters/2/sets/0/path: "},
+      {with({{"name", "v"}, {"path", "bodies/*/velocity/x"}}), "is set twice"},
+      {with({{"name", "m"}, {"path", "bodies/ball/mass"}, {"initial", 3}, {"upper", 2}}),
+       "fit.json: /parameters/2/initial: expected a number within the bounds"},
+      {with({{"name", "m"}, {"path", "bodies/ball/mass"}}),
+       "fit.json: /parameters/2: parameter \"m\" has no effect on any residual"},
+      {with({{"name", "m"}, {"paths", "bodies/ball/mass"}}), "/parameters/2/paths: unknown key"},
+      {with(3), "fit.json: /parameters/2: expected an object"}};
+  for (const auto& [changes, message] : cases) {
+    SCOPED_TRACE(message);
+    const ProgramRun run = Fit(Problem(changes));
+    ExpectOneLine(run, 1, message);
+  }
+}
+
+TEST_F(TangibleFitTest, BadObservationsAndFiles) {
+  Write("o.csv", "time,body,x\n0,ball,1\n0.1,box,1\n");
+  ExpectOneLine(Fit(Problem()), 1, "o.csv: line 3: body: expected the name of a body (ball)");
+  Write("o.csv", "time,body,x\n");
+  ExpectOneLine(Fit(Problem()), 1, "o.csv: expected at least one measured coordinate");
+  Write("o.csv", "time,body,x\n0.6,ball,1\n");
+  ExpectOneLine(Fit(Problem()), 1, "o.csv: line 2: time: expected a time within the run");
+  Write("o.csv", Observations());
+  ExpectOneLine(Fit(Problem(), "--out=/no/such/folder/r.json"), 1, "/no/such/folder/r.json");
+  ExpectOneLine(Run("tangible-fit", "'" + Write("half.json", R"({"scene": "scene.js)") + "'"), 1,
+                "half.json: line 1");
+  ExpectOneLine(Run("tangible-fit", "'" + Path("none.json") + "'"), 1, "none.json: cannot be read");
+}
+
+}  // namespace
+}  // namespace tangible

@@ -1,0 +1,139 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "../support/scenes.h"
+#include "run_program.h"
+
+namespace tangible {
+namespace {
+
+using nlohmann::json;
+
+class TangibleGradientTest : public ProgramTest {
+ protected:
+  ProgramRun Differentiate(const std::string& flags,
+                           const std::string& scene = test_scenes::Mixture()) const {
+    return Run("tangible-gradient", "'" + Write("scene.json", scene) + "' " + flags);
+  }
+};
+
+bool HaveJets() {
+  int widths = 0;
+#define TANGIBLE_COUNT(N) ++widths;
+  TANGIBLE_FOR_EACH_JET_WIDTH(TANGIBLE_COUNT)
+#undef TANGIBLE_COUNT
+  return widths > 0;
+}
+
+TEST_F(TangibleGradientTest, AllMethodsWriteTheSameJacobian) {
+  json reference;
+  for (const char* method : {"adjoint", "tangent", "jet_implicit", "jet", "finite_difference"}) {
+    const ProgramRun run = Differentiate(
+        std::string("--parameters='bodies/ball/mass,bodies/*/friction' --repeat=2 --method=") +
+        method);
+    if (!HaveJets() && std::string(method).find("jet") == 0) {
+      ExpectOneLine(run, 1, "TANGIBLE_JET_WIDTHS");
+      continue;
+    }
+    ASSERT_EQ(run.exit_status, 0) << run.error;
+    EXPECT_EQ(run.error, "");
+    const json result = json::parse(run.out);
+    EXPECT_EQ(result["method"], method);
+    EXPECT_EQ(result["parameters"], json::array({"bodies/ball/mass", "bodies/*/friction"}));
+    ASSERT_EQ(result["outputs"].size(), 18u);
+    EXPECT_EQ(result["outputs"][0], "ball/x");
+    EXPECT_EQ(result["outputs"][17], "rod/omega");
+    EXPECT_EQ(result["values"].size(), 18u);
+    EXPECT_GT(result["seconds"], 0.0);
+    EXPECT_GT(result["rollout_seconds"], 0.0);
+    EXPECT_EQ(result["certificate"]["verdict"], "trustworthy");
+    if (reference.is_null()) reference = result["jacobian"];
+    ASSERT_EQ(result["jacobian"].size(), 18u);
+    for (size_t i = 0; i < 18; ++i) {
+      for (size_t j = 0; j < 2; ++j) {
+        const double a = result["jacobian"][i][j];
+        const double b = reference[i][j];
+        EXPECT_NEAR(a, b, 1e-5 * std::abs(b) + 2e-8) << method << " " << i << " " << j;
+      }
+    }
+  }
+  double largest = 0.0;
+  for (const json& row : reference) largest = std::max(largest, std::abs(row[1].get<double>()));
+  EXPECT_GT(largest, 0.01);
+}
+
+TEST_F(TangibleGradientTest, WritesTheGradientOfALoss) {
+  const std::string loss =
+      Write("loss.json", R"({"terms": [{"output": "ball/x", "target": 1, "weight": 2},
+                                 {"output": "rod/angle"}]})");
+  const std::string parameters = "--parameters=bodies/ball/velocity/x,joints/pin/damping ";
+  const json jacobian = json::parse(Differentiate(parameters).out);
+  const ProgramRun run =
+      Differentiate(parameters + "--loss='" + loss + "' --out='" + Path("g.json") + "'");
+  ASSERT_EQ(run.exit_status, 0) << run.error;
+  EXPECT_EQ(run.out, "");
+  const json result = json::parse(Read(Path("g.json")));
+  EXPECT_FALSE(result.contains("jacobian"));
+  const double x = jacobian["values"][0];
+  const double angle = jacobian["values"][14];
+  EXPECT_NEAR(result["loss"], 2.0 * (x - 1.0) * (x - 1.0) + angle * angle, 1e-12);
+  for (size_t k = 0; k < 2; ++k) {
+    const double expected = 4.0 * (x - 1.0) * jacobian["jacobian"][0][k].get<double>() +
+                            2.0 * angle * jacobian["jacobian"][14][k].get<double>();
+    EXPECT_NE(expected, 0.0);
+    EXPECT_NEAR(result["gradient"][k], expected, 1e-9 * std::abs(expected));
+  }
+}
+
+TEST_F(TangibleGradientTest, SaysWhereADifferenceIsOneSided) {
+  const ProgramRun run = Differentiate(
+      "--parameters=bodies/ball/restitution --method=finite_difference --step=1e-5",
+      R"({"bodies": [
+        {"name": "ball", "shape": {"circle": {"radius": 0.1}}, "mass": 1, "position": [0, 0.2],
+         "restitution": 1}, )" +
+          std::string(test_scenes::kFloor) + R"(], "simulation": {"dt": 0.01, "duration": 0.3}})");
+  ASSERT_EQ(run.exit_status, 0) << run.error;
+  const json result = json::parse(run.out);
+  ASSERT_EQ(result["notes"].size(), 1u);
+  EXPECT_EQ(result["notes"][0].get<std::string>().find("one-sided difference below"), 0u);
+}
+
+TEST_F(TangibleGradientTest, BadInputIsOneLine) {
+  const std::string parameters = "--parameters=bodies/ball/mass ";
+  ExpectOneLine(Run("tangible-gradient", parameters + "/nonexistent.json"), 1, "/nonexistent.json");
+  ExpectOneLine(Differentiate("--parameters=bodies/bal/mass"), 1,
+                "scene.json: parameter bodies/bal/mass: ");
+  ExpectOneLine(Differentiate("--parameters=bodies/ball/inertia"), 1, "follows mass and shape");
+  ExpectOneLine(Differentiate(parameters + "--out=/nonexistent/g.json"), 1, "/nonexistent/g.json");
+  ExpectOneLine(Differentiate(parameters, R"({"bodies": [{"name": "ball", "mass": 1, "inertia": 1,
+      "position": [0, 0]}], "simulation": {"integrator": "trapezoidal"}})"),
+                1, "scene.json: /simulation/integrator: ");
+  const std::string loss = " --loss='" + Path("loss.json") + "'";
+  for (const auto& [text, what] : std::initializer_list<std::pair<const char*, const char*>>{
+           {R"({"terms": [{"output": "bal/x"}]})", "loss.json: /terms/0/output: "},
+           {R"({"terms": [{"output": "ball/x", "weight": "1"}]})", "loss.json: /terms/0/weight: "},
+           {R"({"terms": [{"output": "ball/x", "goal": 1}]})", "loss.json: /terms/0/goal: "},
+           {R"({"terms": [1]})", "loss.json: /terms/0: "},
+           {R"({"terms": []})", "loss.json: /terms: "},
+           {R"({"term": []})", "loss.json: /term: "},
+           {"3", "loss.json: expected an object"},
+           {R"({"terms": [)", "loss.json: "}}) {
+    Write("loss.json", text);
+    ExpectOneLine(Differentiate(parameters + loss), 1, what);
+  }
+}
+
+TEST_F(TangibleGradientTest, WrongFlagsAreUsage) {
+  const std::string parameters = "--parameters=bodies/ball/mass ";
+  ExpectOneLine(Differentiate(""), 2, "--parameters");
+  ExpectOneLine(Differentiate("--parameters=bodies/ball/mass,,gravity/y"), 2, "--parameters");
+  ExpectOneLine(Differentiate(parameters + "--method=newton"), 2, "--method");
+  ExpectOneLine(Differentiate(parameters + "--step=-1"), 2, "--step");
+  ExpectOneLine(Differentiate(parameters + "--step=nan"), 2, "--step");
+  ExpectOneLine(Differentiate(parameters + "--repeat=0"), 2, "--repeat");
+  ExpectOneLine(Differentiate(parameters + "--factorisations=some"), 2, "--factorisations");
+}
+
+}  // namespace
+}  // namespace tangible

@@ -1,0 +1,417 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Bad scenes, each a good one with one change, and the one line that each gives.
+
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include "scene_texts.h"
+#include "tangible/scene/json_reader.h"
+#include "tangible/scene/scene_json.h"
+
+namespace tangible {
+namespace {
+
+// Instead of a value: takes the key away.
+constexpr char kRemove[] = "";
+
+struct BadScene {
+  std::string pointer;  // what is changed ...
+  std::string value;    // ... to this JSON
+  std::string message;  // after "bad.json: "
+};
+
+std::string ErrorOf(const std::string& pointer, const std::string& value) {
+  Json json = Json::parse(kFullScene);
+  const Json::json_pointer place(pointer);
+  if (value == kRemove) {
+    json = json.patch(Json::array({{{"op", "remove"}, {"path", pointer}}}));
+  } else {
+    json[place] = Json::parse(value);
+  }
+  Scene scene;
+  std::string error;
+  EXPECT_FALSE(ParseScene(json.dump(), "bad.json", ::testing::TempDir(), &scene, &error))
+      << pointer << " " << value;
+  return error;
+}
+
+void Check(const std::vector<BadScene>& cases) {
+  for (const BadScene& c : cases) {
+    const std::string error = ErrorOf(c.pointer, c.value);
+    EXPECT_EQ(error, "bad.json: " + c.message);
+    EXPECT_EQ(error.find('\n'), std::string::npos);
+  }
+}
+
+const char kBodies[] = "bodies are ball, rod, hull, floor, paddle, mass";
+
+TEST(BadSceneTest, Document) {
+  Check({
+      {"", "[]", "expected an object, got an array of 0"},
+      {"/colour", "1",
+       "/colour: unknown key of a scene, expected one of name, gravity, bodies, joints, springs, "
+       "forces, pairs, no_contact, simulation, got \"colour\""},
+      {"/name", "1", "/name: expected a string, got 1"},
+      {"/gravity", "9.81", "/gravity: expected an array of 2 numbers [x, y], got 9.81"},
+      {"/gravity/1", "null", "/gravity/1: expected a number, got null"},
+      {"/bodies", kRemove, "/bodies: missing, expected an array of bodies"},
+      {"/bodies", "{}", "/bodies: expected an array of bodies, got an object"},
+      {"/joints", "true", "/joints: expected an array of joints, got true"},
+  });
+}
+
+TEST(BadSceneTest, Bodies) {
+  Check({
+      {"/bodies/0", "[]", "/bodies/0: expected an object, got an array of 0"},
+      {"/bodies/3/masss", "1",
+       "/bodies/3/masss: unknown key of a body, expected one of name, static, kinematic, shape, "
+       "mass, inertia, position, angle, velocity, angular_velocity, friction, restitution, "
+       "linear_damping, angular_damping, got \"masss\""},
+      {"/bodies/0/mass", "-1", "/bodies/0/mass: expected a number > 0, got -1"},
+      {"/bodies/0/mass", "0", "/bodies/0/mass: expected a number > 0, got 0"},
+      {"/bodies/0/mass", "\"1\"", "/bodies/0/mass: expected a number > 0, got \"1\""},
+      {"/bodies/0/mass", kRemove, "/bodies/0/mass: missing, expected a number > 0"},
+      {"/bodies/0/inertia", "0", "/bodies/0/inertia: expected a number > 0, got 0"},
+      {"/bodies/5/inertia", kRemove,
+       "/bodies/5/inertia: missing, expected a number > 0 for a body without a shape"},
+      {"/bodies/2/shape/polygon/vertices/0/0", "-1.5",
+       "/bodies/2/inertia: missing, expected a number > 0 for a polygon whose centroid is not the "
+       "origin"},
+      {"/bodies/0/position", kRemove,
+       "/bodies/0/position: missing, expected an array of 2 numbers [x, y]"},
+      {"/bodies/0/angle", "[0]", "/bodies/0/angle: expected a number, got an array of 1"},
+      {"/bodies/0/friction", "-0.1", "/bodies/0/friction: expected a number >= 0, got -0.1"},
+      {"/bodies/0/restitution", "1.5",
+       "/bodies/0/restitution: expected a number in [0, 1], got 1.5"},
+      {"/bodies/0/restitution", "-0.5",
+       "/bodies/0/restitution: expected a number in [0, 1], got -0.5"},
+      {"/bodies/0/linear_damping", "-1",
+       "/bodies/0/linear_damping: expected a number >= 0, got -1"},
+      {"/bodies/0/angular_damping", "-1",
+       "/bodies/0/angular_damping: expected a number >= 0, got -1"},
+      {"/bodies/3/static", "1", "/bodies/3/static: expected true or false, got 1"},
+      {"/bodies/3/kinematic", "true",
+       "/bodies/3/kinematic: expected a body that is static or kinematic, got both"},
+      {"/bodies/3/velocity", "[1, 0]",
+       "/bodies/3/velocity: expected [0, 0] of a static body, got a velocity (kinematic moves)"},
+      {"/bodies/3/angular_velocity", "1",
+       "/bodies/3/angular_velocity: expected 0 of a static body (kinematic moves), got 1"},
+  });
+}
+
+TEST(BadSceneTest, Names) {
+  Check({
+      {"/bodies/0/name", kRemove, "/bodies/0/name: missing, expected a string"},
+      {"/bodies/0/name", "\"\"",
+       "/bodies/0/name: expected a name of letters, digits, _ . -, got \"\""},
+      {"/bodies/0/name", "\"a b\"",
+       "/bodies/0/name: expected a name of letters, digits, _ . -, got \"a b\""},
+      {"/bodies/0/name", "\"a/b\"",
+       "/bodies/0/name: expected a name of letters, digits, _ . -, got \"a/b\""},
+      {"/bodies/0/name", "\"b*\"",
+       "/bodies/0/name: expected a name of letters, digits, _ . -, got \"b*\""},
+      {"/bodies/0/name", "\"a\\nb\"",
+       "/bodies/0/name: expected a name of letters, digits, _ . -, got \"a\\nb\""},
+      {"/bodies/0/name", "\"world\"",
+       "/bodies/0/name: expected another name, got \"world\", which is reserved"},
+      {"/bodies/1/name", "\"ball\"",
+       "/bodies/1/name: expected a name of its own, got \"ball\" a second time"},
+      {"/joints/1/name", "\"hinge\"",
+       "/joints/1/name: expected a name of its own, got \"hinge\" a second time"},
+      {"/springs/1/name", "\"s\"",
+       "/springs/1/name: expected a name of its own, got \"s\" a second time"},
+      {"/forces/1/name", "\"push\"",
+       "/forces/1/name: expected a name of its own, got \"push\" a second time"},
+  });
+}
+
+TEST(BadSceneTest, Shapes) {
+  const std::string shape = "/bodies/0/shape";
+  Check({
+      {shape, "\"circle\"", shape + ": expected an object, got \"circle\""},
+      {shape, "{}",
+       shape + ": expected one of circle, box, capsule, polygon, half_plane, got 0 of them"},
+      {shape, R"({"circle": {"radius": 1}, "box": {"size": [1, 1]}})",
+       shape + ": expected one of circle, box, capsule, polygon, half_plane, got 2 of them"},
+      {shape, R"({"disc": {}})",
+       shape + "/disc: unknown key of a shape, expected one of circle, box, capsule, polygon, "
+               "half_plane, got \"disc\""},
+      {shape, R"({"circle": {"radius": 0}})",
+       shape + "/circle/radius: expected a number > 0, got 0"},
+      {shape, R"({"circle": {"radius": 1, "size": 1}})",
+       shape + "/circle/size: unknown key of a circle, expected one of radius, got \"size\""},
+      {shape, R"({"circle": {}})", shape + "/circle/radius: missing, expected a number > 0"},
+      {shape, R"({"box": {"size": [1, -1]}})",
+       shape + "/box/size/1: expected a number > 0, got -1"},
+      {shape, R"({"box": {"size": 1}})",
+       shape + "/box/size: expected an array of 2 numbers > 0 [width, height], got 1"},
+      {shape, R"({"capsule": {"length": 0, "radius": 1}})",
+       shape + "/capsule/length: expected a number > 0, got 0"},
+      {shape, R"({"capsule": {"length": 1, "radius": -1}})",
+       shape + "/capsule/radius: expected a number > 0, got -1"},
+      {shape, R"({"polygon": {"vertices": [[0, 0], [1, 0]]}})",
+       shape + "/polygon/vertices: expected an array of at least 3 points, got an array of 2"},
+      {shape, R"({"polygon": {"vertices": [[0, 0], [0, 1], [1, 0]]}})",
+       shape + "/polygon/vertices: expected counter-clockwise vertices, got clockwise ones"},
+      {shape, R"({"polygon": {"vertices": [[0, 0], [2, 0], [0.5, 0.5], [0, 2]]}})",
+       shape + "/polygon/vertices/2: expected a convex polygon, got a corner that turns inward"},
+      {shape, R"({"half_plane": {"normal": [0, 1], "offset": 0}})",
+       shape + "/half_plane: expected a static or kinematic body, got a moving one"},
+      {"/bodies/3/shape/half_plane/normal", "[0, 0]",
+       "/bodies/3/shape/half_plane/normal: expected a direction, got the zero vector"},
+      {"/bodies/3/shape/half_plane/normal", kRemove,
+       "/bodies/3/shape/half_plane/normal: missing, expected an array of 2 numbers [x, y]"},
+  });
+}
+
+TEST(BadSceneTest, Joints) {
+  Check({
+      {"/joints/0/bodies/0", "\"bal\"",
+       "/joints/0/bodies/0: expected the name of a body (" + std::string(kBodies) +
+           "), got \"bal\""},
+      {"/joints/0/bodies", "[\"ball\"]",
+       "/joints/0/bodies: expected an array of 2 names of bodies or world, got an array of 1"},
+      {"/joints/0/bodies/1", "\"ball\"",
+       "/joints/0/bodies: expected two different bodies, got \"ball\" twice"},
+      {"/joints/0/bodies", "[\"world\", \"world\"]",
+       "/joints/0/bodies: expected two different bodies, got \"world\" twice"},
+      {"/joints/0/bodies/0", "\"paddle\"",
+       "/joints/0/bodies: expected at least one moving body, got two that are static, kinematic or "
+       "world"},
+      {"/joints/0/type", "\"hinge\"",
+       "/joints/0/type: expected one of revolute, prismatic, weld, distance, fixed_angle, got "
+       "\"hinge\""},
+      {"/joints/0/type", kRemove,
+       "/joints/0/type: missing, expected one of revolute, prismatic, weld, distance, fixed_angle"},
+      {"/joints/0/displacement", "0",
+       "/joints/0/displacement: unknown key of a revolute joint, expected one of name, type, "
+       "bodies, contact, anchor, angle, rate, damping, limits, effort, got \"displacement\""},
+      {"/joints/1/angle", "0",
+       "/joints/1/angle: unknown key of a prismatic joint, expected one of name, type, bodies, "
+       "contact, anchor, axis, displacement, rate, damping, limits, effort, got \"angle\""},
+      {"/joints/2/damping", "0",
+       "/joints/2/damping: unknown key of a weld joint, expected one of name, type, bodies, "
+       "contact, anchor, got \"damping\""},
+      {"/joints/3/anchor", "[0, 0]",
+       "/joints/3/anchor: unknown key of a distance joint, expected one of name, type, bodies, "
+       "contact, anchors, got \"anchor\""},
+      {"/joints/4/anchor", "[0, 0]",
+       "/joints/4/anchor: unknown key of a fixed_angle joint, expected one of name, type, bodies, "
+       "contact, got \"anchor\""},
+      {"/joints/0/anchor", kRemove,
+       "/joints/0/anchor: missing, expected an array of 2 numbers [x, y]"},
+      {"/joints/1/axis", "[0, 0]", "/joints/1/axis: expected a direction, got the zero vector"},
+      {"/joints/1/axis", kRemove, "/joints/1/axis: missing, expected an array of 2 numbers [x, y]"},
+      {"/joints/3/anchors", "[[1, 1], [1, 1]]",
+       "/joints/3/anchors: expected two points apart, got a distance of 0"},
+      {"/joints/0/limits", "[1, -1]",
+       "/joints/0/limits: expected [low, high] with low <= high, got [1.0, -1.0]"},
+      {"/joints/0/limits", "[1]",
+       "/joints/0/limits: expected an array of 2 numbers [low, high], got an array of 1"},
+      {"/joints/0/damping", "-1", "/joints/0/damping: expected a number >= 0, got -1"},
+      {"/joints/0/contact", "0", "/joints/0/contact: expected true or false, got 0"},
+      {"/joints/0/effort", "[1]",
+       "/joints/0/effort: expected a number or {\"file\": ...}, got an array of 1"},
+  });
+}
+
+TEST(BadSceneTest, InitialAnglesThatNothingCanTurn) {
+  const std::string fixed =
+      "expected 0 of a joint whose bodies[0] side is attached to the world or to a static or "
+      "kinematic body (swap the two bodies), got ";
+  const std::string loop =
+      "expected 0 of a joint in a closed loop (write the bodies' poses and twists), got ";
+  Check({
+      {"/joints/0/bodies", R"(["world", "ball"])", "/joints/0/angle: " + fixed + "0.1"},
+      {"/joints/1/bodies", R"(["ball", "rod"])", "/joints/1/displacement: " + fixed + "0.6"},
+      // hull and rod are welded, so this closes a loop over the slider, the hinge and the floor.
+      {"/joints/3/bodies", R"(["hull", "floor"])", "/joints/0/angle: " + loop + "0.1"},
+  });
+  Json json = Json::parse(kFullScene);
+  json["joints"][0]["bodies"] = {"world", "ball"};
+  json["joints"][0]["angle"] = 0;
+  json["joints"][1]["displacement"] = 0;
+  Scene scene;
+  std::string error;
+  EXPECT_FALSE(ParseScene(json.dump(), "bad.json", "", &scene, &error));
+  EXPECT_EQ(error, "bad.json: /joints/0/rate: " + fixed + "-0.2");
+  // With no angle and no rate there is nothing to turn.
+  json["joints"][0]["rate"] = 0;
+  json["joints"][1]["rate"] = 0;
+  EXPECT_TRUE(ParseScene(json.dump(), "bad.json", "", &scene, &error)) << error;
+}
+
+TEST(BadSceneTest, SpringsAndForces) {
+  Check({
+      {"/springs/0/length", "1",
+       "/springs/0/length: unknown key of a spring, expected one of name, bodies, anchors, "
+       "stiffness, damping, rest_length, got \"length\""},
+      {"/springs/0/stiffness", "-1", "/springs/0/stiffness: expected a number >= 0, got -1"},
+      {"/springs/0/stiffness", kRemove, "/springs/0/stiffness: missing, expected a number >= 0"},
+      {"/springs/0/damping", "-1", "/springs/0/damping: expected a number >= 0, got -1"},
+      {"/springs/0/rest_length", "-1", "/springs/0/rest_length: expected a number >= 0, got -1"},
+      {"/springs/0/anchors", "[[0, 0]]",
+       "/springs/0/anchors: expected an array of 2 points [[x, y], [x, y]], got an array of 1"},
+      {"/springs/0/anchors/1", "[0, 0, 0]",
+       "/springs/0/anchors/1: expected an array of 2 numbers [x, y], got an array of 3"},
+      {"/springs/1/bodies/1", "\"world\"",
+       "/springs/1/bodies: expected at least one moving body, got two that are static, kinematic "
+       "or world"},
+      {"/springs/0/bodies/0", "\"nobody\"",
+       "/springs/0/bodies/0: expected the name of a body (" + std::string(kBodies) +
+           "), got \"nobody\""},
+      {"/forces/0/body", "\"world\"",
+       "/forces/0/body: expected the name of a body (" + std::string(kBodies) + "), got \"world\""},
+      {"/forces/0/body", "\"floor\"", "/forces/0/body: expected a moving body, got \"floor\""},
+      {"/forces/0/end", "0.125",
+       "/forces/0/end: expected a number >= start, which is 0.25, got 0.125"},
+      {"/forces/0/force", "1", "/forces/0/force: expected [x, y] or {\"file\": ...}, got 1"},
+      {"/forces/0/torque", "[1, 2]",
+       "/forces/0/torque: expected a number or {\"file\": ...}, got an array of 2"},
+      {"/forces/0/when", "1",
+       "/forces/0/when: unknown key of a force, expected one of name, body, force, torque, at, "
+       "start, end, got \"when\""},
+  });
+}
+
+TEST(BadSceneTest, Signals) {
+  const std::string folder = ::testing::TempDir();
+  std::ofstream(folder + "tangible_bad.csv") << "time,x,value\n0,1,1\n0.5,1,1\n0.25,1,1\n";
+  Check({
+      {"/forces/0/force", R"({"file": "tangible_none.csv"})",
+       "/forces/0/force/file: " + folder +
+           "tangible_none.csv: cannot be read: No such file or directory"},
+      {"/forces/0/force", R"({"file": "tangible_bad.csv"})",
+       "/forces/0/force/file: " + folder +
+           "tangible_bad.csv: line 4: time: expected a number > 0.5 (the time before), got 0.25"},
+      {"/joints/0/effort", R"({"file": "tangible_bad.csv"})",
+       "/joints/0/effort/file: " + folder +
+           "tangible_bad.csv: line 4: time: expected a number > 0.5 (the time before), got 0.25"},
+      {"/forces/0/torque", R"({"file": "x.csv", "interpolation": "cubic"})",
+       "/forces/0/torque/interpolation: expected one of constant, linear, got \"cubic\""},
+      {"/forces/0/torque", R"({})", "/forces/0/torque/file: missing, expected a string"},
+      {"/forces/0/torque", R"({"file": "x.csv", "scale": 1})",
+       "/forces/0/torque/scale: unknown key, expected one of file, interpolation, got \"scale\""},
+  });
+}
+
+TEST(BadSceneTest, PairsAndNoContact) {
+  const std::string bodies = kBodies;
+  Check({
+      {"/pairs/0/bodies/1", "\"wall*\"",
+       "/pairs/0/bodies/1: expected a name or pattern of a body (" + bodies + "), got \"wall*\""},
+      {"/pairs/0/bodies/1", "\"ball\"",
+       "/pairs/0/bodies: expected two different bodies, got \"ball\" twice"},
+      {"/pairs/1/bodies", R"(["floor", "ball"])",
+       "/pairs/1/bodies: expected a pair of its own, got floor:ball a second time"},
+      {"/pairs/0/bodies/0", "\"b?\"",
+       "/pairs/0/bodies/0: expected a name of letters, digits, _ . - *, got \"b?\""},
+      {"/pairs/0/friction", "-1", "/pairs/0/friction: expected a number >= 0, got -1"},
+      {"/pairs/0/restitution", "2", "/pairs/0/restitution: expected a number in [0, 1], got 2"},
+      {"/pairs/0/name", "\"p\"",
+       "/pairs/0/name: unknown key of a pair, expected one of bodies, friction, restitution, got "
+       "\"name\""},
+      {"/no_contact/0", R"(["ball", "nobody"])",
+       "/no_contact/0/1: expected a name or pattern of a body (" + bodies + "), got \"nobody\""},
+      {"/no_contact/0", R"("ball")",
+       "/no_contact/0: expected an array of 2 names of bodies, got \"ball\""},
+      {"/no_contact/0", R"(["b*", "ball"])",
+       "/no_contact/0: expected two different bodies, got \"ball\" twice"},
+  });
+}
+
+TEST(BadSceneTest, Simulation) {
+  const std::string place = "/simulation/";
+  Check({
+      {place + "step", "1",
+       place + "step: unknown key of simulation, expected one of dt, duration, stepping, "
+               "integrator, joint_correction, joint_tolerance, baumgarte, friction_mixing, "
+               "restitution_mixing, impact_law, restitution_threshold, recovery_speed, "
+               "contact_margin, max_events_per_step, solver, lcp_tolerance, lcp_max_iterations, "
+               "smoothing, got \"step\""},
+      {place + "dt", "0", place + "dt: expected a number > 0, got 0"},
+      {place + "duration", "-1", place + "duration: expected a number >= 0, got -1"},
+      {place + "dt", "1e-10",
+       "/simulation: expected at most 1e9 steps, got duration / dt = 3.0 / 1e-10"},
+      {place + "dt", "5e-324",
+       "/simulation: expected at most 1e9 steps, got duration / dt = 3.0 / 5e-324"},
+      {place + "stepping", "\"events\"",
+       place + "stepping: expected one of fixed, event, got \"events\""},
+      {place + "integrator", "\"euler\"",
+       place + "integrator: expected one of semi_implicit_euler, trapezoidal, runge_kutta_4, got "
+               "\"euler\""},
+      {place + "joint_correction", "null",
+       place + "joint_correction: expected one of none, baumgarte, projection, got null"},
+      {place + "joint_tolerance", "0", place + "joint_tolerance: expected a number > 0, got 0"},
+      {place + "baumgarte", "1.5", place + "baumgarte: expected a number in [0, 1], got 1.5"},
+      {place + "friction_mixing", "\"mean\"",
+       place + "friction_mixing: expected one of average, geometric_mean, minimum, maximum, got "
+               "\"mean\""},
+      {place + "restitution_mixing", "\"mean\"",
+       place + "restitution_mixing: expected one of average, geometric_mean, minimum, maximum, "
+               "got \"mean\""},
+      {place + "impact_law", "\"huygens\"",
+       place + "impact_law: expected one of newton, poisson, got \"huygens\""},
+      {place + "restitution_threshold", "-1",
+       place + "restitution_threshold: expected a number >= 0, got -1"},
+      {place + "recovery_speed", "-1", place + "recovery_speed: expected a number >= 0, got -1"},
+      {place + "contact_margin", "-1", place + "contact_margin: expected a number >= 0, got -1"},
+      {place + "max_events_per_step", "1.5",
+       place + "max_events_per_step: expected an integer in [0, 1000000], got 1.5"},
+      {place + "solver", "\"simplex\"",
+       place + "solver: expected one of auto, interior_point, lemke, got \"simplex\""},
+      {place + "lcp_tolerance", "0", place + "lcp_tolerance: expected a number > 0, got 0"},
+      {place + "lcp_max_iterations", "0",
+       place + "lcp_max_iterations: expected an integer in [1, 1000000], got 0"},
+      {place + "smoothing", "-1", place + "smoothing: expected a number >= 0, got -1"},
+  });
+}
+
+TEST(BadSceneTest, MalformedText) {
+  const auto error_of = [](const std::string& text) {
+    Scene scene;
+    std::string error;
+    EXPECT_FALSE(ParseScene(text, "bad.json", "", &scene, &error));
+    EXPECT_EQ(error.find('\n'), std::string::npos);
+    return error;
+  };
+  EXPECT_EQ(error_of("{\"bodies\": [{\"mass\": 1e999}]}"),
+            "bad.json: line 1, column 26: malformed JSON: number overflow parsing '1e999'");
+  EXPECT_EQ(error_of("{\"bodies\": [\n{\"mass\": NaN}]}").rfind("bad.json: line 2, column 10: ", 0),
+            0u);
+  EXPECT_EQ(error_of("{\"bodies\": [],\n \"bodies\": []}"),
+            "bad.json: /bodies: key given twice in one object, expected once");
+}
+
+// Whatever replaces any value of a scene, reading ends with a scene or one line, never a crash.
+TEST(BadSceneTest, AnyValueAnywhere) {
+  const Json good = Json::parse(kFullScene);
+  const Json flat = good.flatten();
+  const std::vector<Json> values = {
+      nullptr, true, -1, 0, 1e308, "", "world", "*", Json::array(), Json::object(), -1e-308};
+  int refused = 0;
+  for (const auto& item : flat.items()) {
+    std::string pointer = item.key();
+    while (!pointer.empty()) {
+      for (const Json& value : values) {
+        Json json = good;
+        json[Json::json_pointer(pointer)] = value;
+        Scene scene;
+        std::string error;
+        if (ParseScene(json.dump(), "bad.json", "", &scene, &error)) continue;
+        ++refused;
+        ASSERT_EQ(error.rfind("bad.json: /", 0), 0u) << error;
+        ASSERT_EQ(error.find('\n'), std::string::npos) << error;
+      }
+      pointer.resize(pointer.rfind('/'));
+    }
+  }
+  EXPECT_GT(refused, 1000);
+}
+
+}  // namespace
+}  // namespace tangible

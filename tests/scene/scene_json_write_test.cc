@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+#include <fstream>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "scene_texts.h"
+#include "tangible/scene/json_reader.h"
+#include "tangible/scene/parameter.h"
+#include "tangible/scene/scene_json.h"
+
+namespace tangible {
+namespace {
+
+// The bits of every number, with its path.
+std::vector<std::pair<std::string, std::string>> Bits(Scene* scene) {
+  std::vector<std::pair<std::string, std::string>> bits;
+  for (const auto& number : EnumerateNumbers(scene)) {
+    bits.emplace_back(number.path,
+                      std::string(reinterpret_cast<const char*>(number.value), sizeof(double)));
+  }
+  return bits;
+}
+
+Scene Parsed(const std::string& text) {
+  Scene scene;
+  std::string error;
+  EXPECT_TRUE(ParseScene(text, "s.json", ::testing::TempDir(), &scene, &error)) << error;
+  return scene;
+}
+
+TEST(SceneToJsonTest, AllThatWasReadIsWritten) {
+  // The text that was read is contained in the text that is written, key by key; so nothing is lost
+  // that the reader's tests have seen arrive.
+  const Json before = Json::parse(kFullScene);
+  const Json after = Json::parse(SceneToJson(Parsed(kFullScene)));
+  const Json flat_before = before.flatten();
+  const Json flat_after = after.flatten();
+  for (const auto& item : flat_before.items()) {
+    ASSERT_TRUE(flat_after.contains(item.key())) << item.key();
+    EXPECT_EQ(flat_after[item.key()], item.value()) << item.key();
+  }
+}
+
+TEST(SceneToJsonTest, RoundTripBitForBit) {
+  Scene scene = Parsed(kFullScene);
+  std::mt19937_64 random(3);
+  std::uniform_real_distribution<double> uniform(0.1, 0.9);
+  for (const auto& number : EnumerateNumbers(&scene)) {
+    // The shape must stay convex and the limits in order.
+    if (number.path.find("vertices") != std::string::npos) continue;
+    if (number.path.find("limits/0") != std::string::npos) continue;
+    if (number.path.find("/start") != std::string::npos) continue;
+    *number.value = uniform(random) + (number.path.find("/end") != std::string::npos ? 1.0 : 0.0);
+  }
+  scene.bodies[0].velocity.x() = -0.0;
+  scene.bodies[0].velocity.y() = 5e-324;
+  scene.simulation.dt = 0.1 / 3.0;
+  Scene back = Parsed(SceneToJson(scene));
+  EXPECT_EQ(Bits(&scene), Bits(&back));
+  EXPECT_EQ(back.simulation.dt, scene.simulation.dt);
+  EXPECT_TRUE(std::signbit(back.bodies[0].velocity.x()));
+  EXPECT_EQ(SceneToJson(back), SceneToJson(scene));
+}
+
+TEST(SceneToJsonTest, SignalsAreWrittenAsTheirFile) {
+  std::ofstream(::testing::TempDir() + "tangible_signal.csv") << "time,x,value\n0,1,2\n";
+  const std::string text = R"({
+    "bodies": [{"name": "b", "mass": 1, "inertia": 1, "position": [0, 0]}],
+    "forces": [{"name": "f", "body": "b",
+                "force": {"file": "tangible_signal.csv", "interpolation": "linear"},
+                "torque": {"file": "tangible_signal.csv"}}]})";
+  const Scene back = Parsed(SceneToJson(Parsed(text)));
+  ASSERT_TRUE(back.forces[0].force_signal.has_value());
+  EXPECT_EQ(back.forces[0].force_signal->interpolation, Signal::Interpolation::kLinear);
+  EXPECT_EQ(back.forces[0].force_signal->x, std::vector<double>{1.0});
+  ASSERT_TRUE(back.forces[0].torque_signal.has_value());
+  EXPECT_EQ(back.forces[0].torque_signal->value, std::vector<double>{2.0});
+}
+
+}  // namespace
+}  // namespace tangible

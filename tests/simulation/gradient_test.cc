@@ -1,0 +1,268 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/simulation/gradient.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "../support/scenes.h"
+#include "tangible/scene/scene_names.h"
+
+namespace tangible {
+namespace {
+
+using test_scenes::SceneOf;
+
+std::vector<ParameterPath> Resolve(const Scene& scene, const std::vector<std::string>& paths) {
+  std::vector<ParameterPath> parameters;
+  for (const std::string& path : paths) {
+    std::string error;
+    EXPECT_TRUE(ResolveParameter(scene, path, &parameters.emplace_back(), &error)) << error;
+  }
+  return parameters;
+}
+
+GradientOptions Method(GradientMethod method) {
+  GradientOptions options;
+  options.method = method;
+  return options;
+}
+
+// Whether Jets are built at all.
+bool HaveJets() {
+  int widths = 0;
+#define TANGIBLE_COUNT(N) ++widths;
+  TANGIBLE_FOR_EACH_JET_WIDTH(TANGIBLE_COUNT)
+#undef TANGIBLE_COUNT
+  return widths > 0;
+}
+
+// |a − b| ≤ tolerance max(|b|, 1e-3 of the column's largest) + rounding: entries that cancel are
+// sums of larger ones.
+void ExpectClose(const RowMatrixXd& a, const RowMatrixXd& b, double tolerance, double rounding,
+                 const std::string& what) {
+  ASSERT_EQ(a.rows(), b.rows());
+  ASSERT_EQ(a.cols(), b.cols());
+  for (Eigen::Index c = 0; c < a.cols(); ++c) {
+    const double floor = 1e-3 * b.col(c).cwiseAbs().maxCoeff();
+    for (Eigen::Index r = 0; r < a.rows(); ++r) {
+      EXPECT_LE(std::abs(a(r, c) - b(r, c)),
+                tolerance * std::max(std::abs(b(r, c)), floor) + rounding)
+          << what << " output " << r << " parameter " << c << ": " << a(r, c) << " and " << b(r, c);
+    }
+  }
+}
+
+// Twists of up to 10 are found to 1e-15 and divided by steps of 6e-6 of a scale of at least 0.1.
+constexpr double kDifferenceRounding = 1e-15 * 10.0 / 6e-7;
+
+const std::vector<std::string> kMixtureParameters = {"gravity/y",
+                                                     "bodies/ball/mass",
+                                                     "bodies/crate/mass",
+                                                     "bodies/crate/inertia",
+                                                     "bodies/rod/mass",
+                                                     "bodies/ball/position/y",
+                                                     "bodies/ball/velocity/x",
+                                                     "bodies/ball/angular_velocity",
+                                                     "bodies/*/friction",
+                                                     "bodies/ball/restitution",
+                                                     "bodies/ball/linear_damping",
+                                                     "bodies/ball/angular_damping",
+                                                     "bodies/ball/shape/radius",
+                                                     "bodies/crate/shape/size/y",
+                                                     "bodies/floor/shape/offset",
+                                                     "joints/pin/anchor/x",
+                                                     "joints/pin/angle",
+                                                     "joints/pin/rate",
+                                                     "joints/pin/damping",
+                                                     "joints/pin/effort",
+                                                     "springs/s/stiffness",
+                                                     "springs/s/damping",
+                                                     "springs/s/rest_length",
+                                                     "springs/s/anchors/1/x",
+                                                     "forces/push/force/x",
+                                                     "forces/push/torque",
+                                                     "forces/push/at/y",
+                                                     "forces/push/start",
+                                                     "forces/push/end"};
+
+TEST(FinalStateJacobian, MethodsAgree) {
+  const Scene scene = SceneOf(test_scenes::Mixture());
+  const std::vector<ParameterPath> parameters = Resolve(scene, kMixtureParameters);
+  const GradientResult adjoint =
+      FinalStateJacobian(scene, parameters, Method(GradientMethod::kAdjoint));
+  ASSERT_TRUE(adjoint.done) << adjoint.message;
+  EXPECT_EQ(adjoint.certificate.verdict, "trustworthy");
+  EXPECT_GT(adjoint.certificate.mode_switches, 4);
+  for (Eigen::Index c = 0; c < adjoint.jacobian.cols(); ++c) {
+    EXPECT_GT(adjoint.jacobian.col(c).cwiseAbs().maxCoeff(), 1e-6) << kMixtureParameters[c];
+  }
+  const GradientResult tangent =
+      FinalStateJacobian(scene, parameters, Method(GradientMethod::kTangent));
+  ExpectClose(adjoint.jacobian, tangent.jacobian, 1e-9, 1e-13, "adjoint, tangent");
+  const GradientResult differences =
+      FinalStateJacobian(scene, parameters, Method(GradientMethod::kFiniteDifference));
+  ASSERT_TRUE(differences.done) << differences.message;
+  EXPECT_EQ(differences.notes.size(), 0u);
+  ExpectClose(adjoint.jacobian, differences.jacobian, 1e-5, kDifferenceRounding,
+              "adjoint, differences");
+  EXPECT_NE(adjoint.jacobian, differences.jacobian);
+  if (!HaveJets()) {
+    GTEST_SKIP() << "no width of Jets was built";
+  }
+  const GradientResult implicit =
+      FinalStateJacobian(scene, parameters, Method(GradientMethod::kJetImplicit));
+  ExpectClose(adjoint.jacobian, implicit.jacobian, 1e-9, 1e-13, "adjoint, implicit Jets");
+  const GradientResult unrolled =
+      FinalStateJacobian(scene, parameters, Method(GradientMethod::kJet));
+  EXPECT_EQ(unrolled.fallbacks, 0);
+  ExpectClose(adjoint.jacobian, unrolled.jacobian, 1e-6, 1e-11, "adjoint, unrolled Jets");
+}
+
+TEST(FinalStateJacobian, FreeFallHasTheClosedFormOfTheMap) {
+  // y_N = y0 + N h v0 + h² g N (N + 1) / 2, v_N = v0 + N h g.
+  const Scene scene = SceneOf(R"({"bodies": [{"name": "a", "mass": 2, "inertia": 1,
+      "position": [0, 5], "velocity": [0, 1]}], "simulation": {"dt": 0.125, "duration": 1}})");
+  const auto parameters =
+      Resolve(scene, {"gravity/y", "bodies/a/position/y", "bodies/a/velocity/y", "bodies/a/mass"});
+  for (const auto& [name, method] : kGradientMethodNames) {
+    const GradientResult result = FinalStateJacobian(scene, parameters, Method(method));
+    if (!result.done && !HaveJets()) {
+      continue;
+    }
+    ASSERT_TRUE(result.done) << result.message;
+    ASSERT_EQ(result.outputs[1], "a/y");
+    RowMatrixXd expected = RowMatrixXd::Zero(6, 4);
+    expected.row(1) << 36.0 / 64.0, 1.0, 1.0, 0.0;
+    expected.row(4) << 1.0, 0.0, 1.0, 0.0;
+    // The map is linear: differences of values of about 5 err by their rounding over the step.
+    EXPECT_LE((result.jacobian - expected).cwiseAbs().maxCoeff(), 1e-9) << name;
+    EXPECT_DOUBLE_EQ(result.values[4], 1.0 - 9.81) << name;
+  }
+}
+
+// A box that slides to the right the whole time: v = v0 − μ g t, μ the mean of both.
+constexpr char kSlider[] = R"({"bodies": [
+    {"name": "box", "shape": {"box": {"size": [2, 0.2]}}, "mass": 3, "position": [0, 0.1],
+     "velocity": [5, 0], "friction": 0.2},
+    {"name": "floor", "static": true, "friction": 0.2,
+     "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}}],
+  "simulation": {"dt": 0.01, "duration": 0.5}})";
+
+TEST(FinalStateJacobian, SlidingFrictionHasItsClosedForm) {
+  const Scene scene = SceneOf(kSlider);
+  const auto parameters =
+      Resolve(scene, {"bodies/box/friction", "bodies/*/friction", "bodies/box/mass"});
+  for (const auto& [name, method] : kGradientMethodNames) {
+    const GradientResult result = FinalStateJacobian(scene, parameters, Method(method));
+    if (!result.done && !HaveJets()) {
+      continue;
+    }
+    ASSERT_TRUE(result.done) << result.message;
+    EXPECT_NEAR(result.jacobian(3, 0), -0.5 * 9.81 * 0.5, 2e-8) << name;
+    EXPECT_NEAR(result.jacobian(3, 1), -9.81 * 0.5, 2e-8) << name;
+    EXPECT_NEAR(result.jacobian(3, 2), 0.0, 1e-8) << name;
+  }
+}
+
+TEST(FinalStateJacobian, DifferencesAtTheEndOfARangeAreOneSidedAndSaySo) {
+  Scene scene = SceneOf(kSlider);
+  scene.bodies[0].friction = 0.0;
+  const auto parameters = Resolve(scene, {"bodies/box/friction"});
+  const GradientResult result =
+      FinalStateJacobian(scene, parameters, Method(GradientMethod::kFiniteDifference));
+  ASSERT_TRUE(result.done) << result.message;
+  ASSERT_EQ(result.notes.size(), 1u);
+  EXPECT_EQ(result.notes[0].find("one-sided difference above bodies/box/friction"), 0u);
+  EXPECT_NEAR(result.jacobian(3, 0), -0.5 * 9.81 * 0.5, 2e-8);
+}
+
+TEST(FinalStateJacobian, DifferencesBelowOneAreOneSidedAndOfSecondOrder) {
+  // Two impacts: v is quadratic in e, for which the one-sided formula is exact.
+  const Scene scene = SceneOf(R"({"gravity": [0, 0], "bodies": [
+      {"name": "ball", "shape": {"circle": {"radius": 0.5}}, "mass": 1, "position": [0, 0.6],
+       "velocity": [0, -1.3]},
+      {"name": "floor", "static": true, "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}},
+      {"name": "lid", "static": true, "position": [0, 1.5],
+       "shape": {"half_plane": {"normal": [0, -1], "offset": 0}}}],
+    "pairs": [{"bodies": ["ball", "*"], "restitution": 1}],
+    "simulation": {"dt": 0.01, "duration": 0.7}})");
+  const auto parameters = Resolve(scene, {"pairs/ball:*/restitution"});
+  const GradientResult exact =
+      FinalStateJacobian(scene, parameters, Method(GradientMethod::kAdjoint));
+  const GradientResult result =
+      FinalStateJacobian(scene, parameters, Method(GradientMethod::kFiniteDifference));
+  ASSERT_TRUE(result.done) << result.message;
+  ASSERT_GE(result.notes.size(), 1u);
+  EXPECT_EQ(result.notes[0].find("one-sided difference below"), 0u);
+  EXPECT_NEAR(result.values[4], -1.3, 1e-12);
+  EXPECT_NEAR(exact.jacobian(4, 0), 2.0 * -1.3, 1e-12);
+  EXPECT_NEAR(result.jacobian(4, 0), exact.jacobian(4, 0), 1e-8);
+}
+
+TEST(FinalStateJacobian, DifferencesTellOfChangedModes) {
+  const Scene scene = SceneOf(test_scenes::FallingBall(0.05, R"({"dt": 0.01, "duration": 0.11})"));
+  GradientOptions options = Method(GradientMethod::kFiniteDifference);
+  options.step = 0.02;  // m: lands a step or two earlier or later
+  const GradientResult result =
+      FinalStateJacobian(scene, Resolve(scene, {"bodies/ball/position/y"}), options);
+  ASSERT_TRUE(result.done) << result.message;
+  ASSERT_EQ(result.notes.size(), 1u);
+  EXPECT_NE(result.notes[0].find("contacts or modes change"), std::string::npos);
+}
+
+TEST(FinalStateJacobian, RecomputedFactorisationsGiveTheSame) {
+  const Scene scene = SceneOf(test_scenes::Mixture());
+  const auto parameters = Resolve(scene, {"bodies/ball/mass", "bodies/*/friction"});
+  GradientOptions options;
+  const GradientResult kept = FinalStateJacobian(scene, parameters, options);
+  options.factorisations = Factorisations::kRecompute;
+  options.repeat = 2;  // a tape that is used again
+  const GradientResult recomputed = FinalStateJacobian(scene, parameters, options);
+  EXPECT_EQ(kept.jacobian, recomputed.jacobian);
+  EXPECT_GT(recomputed.seconds, 0.0);
+  EXPECT_GT(recomputed.rollout_seconds, 0.0);
+}
+
+TEST(LossGradient, IsTheJacobianTimesTheLossesDerivative) {
+  const Scene scene = SceneOf(test_scenes::Mixture());
+  const auto parameters = Resolve(scene, kMixtureParameters);
+  const std::vector<LossTerm> terms = {
+      {"ball/x", 1.0, 2.0}, {"rod/angle", 0.3, 1.0}, {"ball/x", 0.5, 1.0}};
+  const GradientResult full = FinalStateJacobian(scene, parameters, {});
+  VectorX<double> expected = VectorX<double>::Zero(full.jacobian.cols());
+  double loss = 0.0;
+  for (const LossTerm& term : terms) {
+    const Eigen::Index row = term.output == "ball/x" ? 0 : 14;
+    ASSERT_EQ(full.outputs[row], term.output);
+    const double error = full.values[row] - term.target;
+    loss += term.weight * error * error;
+    expected += 2.0 * term.weight * error * full.jacobian.row(row).transpose();
+  }
+  for (const GradientMethod method : {GradientMethod::kAdjoint, GradientMethod::kTangent}) {
+    const GradientResult result = LossGradient(scene, parameters, terms, Method(method));
+    ASSERT_TRUE(result.done) << result.message;
+    EXPECT_NEAR(result.loss, loss, 1e-13 * loss);
+    EXPECT_LE((result.gradient - expected).cwiseAbs().maxCoeff(),
+              1e-11 * expected.cwiseAbs().maxCoeff());
+  }
+}
+
+TEST(LossGradient, RefusesAnUnknownOutput) {
+  const Scene scene = SceneOf(kSlider);
+  const GradientResult result = LossGradient(scene, Resolve(scene, {"gravity/y"}), {{"bax/x"}}, {});
+  EXPECT_FALSE(result.done);
+  EXPECT_NE(result.message.find("bax/x"), std::string::npos);
+}
+
+TEST(FinalStateJacobian, RefusesSettingsThatTheEngineLacks) {
+  Scene scene = SceneOf(kSlider);
+  scene.simulation.stepping = Stepping::kEvent;
+  const GradientResult result = FinalStateJacobian(scene, Resolve(scene, {"gravity/y"}), {});
+  EXPECT_FALSE(result.done);
+  EXPECT_NE(result.message.find("test.json: /simulation/stepping: "), std::string::npos)
+      << result.message;
+}
+
+}  // namespace
+}  // namespace tangible

@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/simulation/joint_projection.h"
+
+#include <gtest/gtest.h>
+
+#include "../support/scenes.h"
+#include "tangible/simulation/rollout.h"
+#include "tangible/verification/support/random_scene.h"
+
+namespace tangible {
+namespace {
+
+// A scene's model and state, its poses pushed off the joints.
+void Disturbed(unsigned seed, double size, Model<double>* model, State<double>* state) {
+  BuildModel(RandomScene(seed), model, state);
+  RandomNumbers random(seed);
+  for (const int body : model->structure->moving) {
+    for (int i = 0; i < 3; ++i) {
+      state->pose[3 * body + i] += size * random.Uniform(-1.0, 1.0);
+    }
+  }
+}
+
+TEST(JointProjectionTest, ClosesJointsAndIsLeastInTheMassMetric) {
+  int projected = 0;
+  for (unsigned seed = 1; seed <= 40; ++seed) {
+    Model<double> model;
+    State<double> state;
+    Disturbed(seed, 1e-3, &model, &state);
+    if (model.structure->joints.empty()) continue;
+    const State<double> from = state;
+    JointProjection projection;
+    ASSERT_TRUE(projection.Project(model, &state)) << seed;
+    EXPECT_LE(JointDrift(model, state), 1e-10);
+    EXPECT_GT(JointDrift(model, from), 1e-5);
+    ++projected;
+    // Again: nothing moves.
+    const State<double> once = state;
+    ASSERT_TRUE(projection.Project(model, &state));
+    for (size_t i = 0; i < state.pose.size(); ++i) {
+      EXPECT_NEAR(state.pose[i], once.pose[i], 1e-10);
+    }
+  }
+  EXPECT_GT(projected, 10);
+}
+
+TEST(JointProjectionTest, TangentIsTheDifferenceAndAdjointItsTranspose) {
+  int compared = 0;
+  for (unsigned seed = 1; seed <= 40; ++seed) {
+    Model<double> model;
+    State<double> state;
+    Disturbed(seed, 1e-3, &model, &state);
+    const ModelStructure& s = *model.structure;
+    // In a loop a change of single numbers contradicts redundant rows.
+    if (s.joints.empty() || s.joint_loops) continue;
+    ++compared;
+    const int n = s.num_variables();
+    RowMatrixXd w_dot = RowMatrixXd::Random(n, 2);
+    const RowMatrixXd direction = w_dot;
+    State<double> projected = state;
+    JointProjection projection;
+    projection.Project(model, &projected);
+    projection.Tangent(model, w_dot.data(), 2);
+    RowMatrixXd w_bar = RowMatrixXd::Random(n, 2);
+    const RowMatrixXd seedling = w_bar;
+    projection.Adjoint(model, w_bar.data(), 2);
+    // ⟨w̄⁺, ẇ⁺⟩ = ⟨w̄, ẇ⟩
+    const MatrixX<double> after = seedling.transpose() * w_dot;
+    const MatrixX<double> before = w_bar.transpose() * direction;
+    EXPECT_LT((after - before).norm(), 1e-8 * (1.0 + after.norm())) << seed;
+    // Differences along the first direction.
+    const double h = 1e-6;
+    const auto at = [&](double step) {
+      Model<double> moved = model;
+      State<double> q = state;
+      for (size_t i = 0; i < q.pose.size(); ++i) q.pose[i] += step * direction(i, 0);
+      for (int i = 0; i < s.num_numbers; ++i) {
+        moved.numbers[i] += step * direction(s.NumberVariable(i), 0);
+      }
+      JointProjection other;
+      EXPECT_TRUE(other.Project(moved, &q));
+      return q;
+    };
+    const State<double> high = at(h);
+    const State<double> low = at(-h);
+    for (const int body : s.moving) {
+      for (int i = 0; i < 3; ++i) {
+        const int k = 3 * body + i;
+        const double difference = (high.pose[k] - low.pose[k]) / (2.0 * h);
+        // Tolerance of Newton's iteration over h, and curvature h².
+        EXPECT_NEAR(difference, w_dot(k, 0), 1e-6 * (1.0 + std::abs(difference))) << seed;
+      }
+    }
+  }
+  EXPECT_GT(compared, 10);
+}
+
+TEST(JointProjectionTest, ARolloutsJointsHold) {
+  Scene scene = test_scenes::SceneOf(R"({"bodies": [
+      {"name": "a", "shape": {"box": {"size": [0.1, 1]}}, "mass": 2, "position": [0, -0.5]},
+      {"name": "b", "shape": {"box": {"size": [0.1, 1]}}, "mass": 3, "position": [0, -1.5]}],
+    "joints": [{"name": "j", "type": "revolute", "bodies": ["a", "world"], "anchor": [0, 0],
+                "angle": 1, "rate": 3},
+               {"name": "k", "type": "revolute", "bodies": ["b", "a"], "anchor": [0, -1]}],
+    "simulation": {"dt": 0.01, "duration": 3}})");
+  double drift[2];
+  for (int k = 0; k < 2; ++k) {
+    scene.simulation.joint_correction =
+        k == 0 ? JointCorrection::kNone : JointCorrection::kProjection;
+    Model<double> model;
+    State<double> state;
+    BuildModel(scene, &model, &state);
+    double largest = 0.0;
+    const RolloutReport report = Rollout(
+        model, state,
+        [&](long, double, const State<double>& q, Stepper*) {
+          largest = std::max(largest, JointDrift(model, q));
+        },
+        &state);
+    EXPECT_EQ(report.status, StepStatus::kDone);
+    drift[k] = largest;
+  }
+  EXPECT_GT(drift[0], 1e-4);
+  EXPECT_LE(drift[1], 1e-10);
+}
+
+TEST(JointProjectionTest, JointsThatCannotHoldAreTold) {
+  Scene scene = test_scenes::SceneOf(R"({"bodies": [
+      {"name": "a", "mass": 2, "inertia": 1, "position": [0, 0]}],
+    "joints": [{"name": "j", "type": "distance", "bodies": ["a", "world"],
+                "anchors": [[0, 0], [1, 0]]},
+               {"name": "k", "type": "distance", "bodies": ["a", "world"],
+                "anchors": [[0, 0], [-1, 0]]}]})");
+  Model<double> model;
+  State<double> state;
+  BuildModel(scene, &model, &state);
+  model.numbers[model.structure->joints[0].geometry + 4] = 0.5;  // too short: 0.5 + 1 < 2
+  JointProjection projection;
+  EXPECT_FALSE(projection.Project(model, &state));
+  EXPECT_GT(projection.error(), 0.1);
+}
+
+}  // namespace
+}  // namespace tangible

@@ -1,0 +1,198 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "layout_rules.h"
+
+#include <algorithm>
+#include <cstddef>
+#include <map>
+#include <set>
+#include <sstream>
+
+namespace tangible {
+namespace {
+
+constexpr int kMaxLines = 500;
+constexpr char kSpdx[] = "// SPDX-License-Identifier: Apache-2.0";
+
+bool StartsWith(const std::string& text, const std::string& start) {
+  return text.rfind(start, 0) == 0;
+}
+
+bool EndsWith(const std::string& text, const std::string& end) {
+  return text.size() >= end.size() && text.compare(text.size() - end.size(), end.size(), end) == 0;
+}
+
+bool Contains(const std::string& text, const std::string& part) {
+  return text.find(part) != std::string::npos;
+}
+
+/// What each room sees directly or through others, itself aside. `config` is seen by all.
+const std::map<std::string, std::set<std::string>>& VisibleRooms() {
+  static const std::map<std::string, std::set<std::string>> rooms = [] {
+    std::map<std::string, std::set<std::string>> visible;
+    visible["math"] = {};
+    visible["lcp"] = visible["geometry"] = visible["scene"] = {"math"};
+    visible["dynamics"] = {"math", "lcp", "geometry", "scene"};
+    visible["simulation"] = visible["dynamics"];
+    visible["simulation"].insert("dynamics");
+    visible["render"] = visible["simulation"];
+    visible["render"].insert("simulation");
+    visible["control"] = visible["render"];
+    visible["estimation"] = visible["control"];
+    visible["estimation"].insert({"control", "render"});
+    visible["verification"] = visible["estimation"];
+    visible["verification"].insert("estimation");
+    return visible;
+  }();
+  return rooms;
+}
+
+/// Programs see what their folder sees, and what programs share (lib/app).
+bool IsMain(const std::string& path) {
+  return Contains(path, "/app/") || (StartsWith(path, "verification/") && EndsWith(path, ".cc"));
+}
+
+/// The room of a path: lib/<room>/..., estimation/..., verification/...; empty for tests.
+std::string RoomOf(const std::string& path) {
+  const std::size_t slash = path.find('/');
+  const std::string top = path.substr(0, slash);
+  if (top != "lib") {
+    return top == "tests" ? "" : top;
+  }
+  return path.substr(slash + 1, path.find('/', slash + 1) - slash - 1);
+}
+
+/// Empty if `file` may include a header of `room`.
+std::string WrongRoom(const std::string& path, const std::string& room) {
+  const std::string own = RoomOf(path);
+  if (own.empty() || room == own || room == "config") {
+    return "";
+  }
+  if (room == "app") {
+    return IsMain(path) ? "" : "only programs include tangible/app";
+  }
+  // lib/app sees all of lib: what estimation sees.
+  const auto visible = VisibleRooms().find(own == "app" ? "estimation" : own);
+  if (visible == VisibleRooms().end()) {
+    return "room " + own + " is not in the list of rooms";
+  }
+  return visible->second.count(room) > 0 ? "" : "room " + own + " may not include room " + room;
+}
+
+/// Empty if `path` may include the header `name` of another project.
+std::string WrongLibrary(const std::string& path, const std::string& name) {
+  if (StartsWith(name, "ceres/") && StartsWith(path, "lib/") &&
+      !(path == "lib/math/scalar.h" && name == "ceres/jet.h")) {
+    return "lib sees of Ceres only ceres/jet.h, in lib/math/scalar.h";
+  }
+  if (StartsWith(name, "gflags/") && !IsMain(path)) {
+    return "gflags belongs in programs";
+  }
+  if (StartsWith(name, "torch/") && !StartsWith(path, "estimation/vision/")) {
+    return "torch belongs in estimation/vision";
+  }
+  return "";
+}
+
+std::string WrongQuoted(const std::string& path, const std::string& name) {
+  if (StartsWith(name, "tangible/")) {
+    const std::size_t start = std::string("tangible/").size();
+    std::string problem = WrongRoom(path, name.substr(start, name.find('/', start) - start));
+    if (problem.empty() && EndsWith(name, "_inl.h") && EndsWith(path, ".h") &&
+        !EndsWith(path, "_inl.h")) {
+      return "a header may not include an _inl.h";
+    }
+    return problem;
+  }
+  if (StartsWith(path, "tests/") && (!Contains(name, "/") || StartsWith(name, "../support/"))) {
+    return "";
+  }
+  return "headers of the project are included as \"tangible/<room>/<file>.h\"";
+}
+
+/// Why `path` may not have this line; empty if it may, or if it is no include.
+std::string WrongInclude(const std::string& path, const std::string& line) {
+  std::istringstream words(line);
+  std::string directive;
+  std::string name;
+  words >> directive;
+  if (directive == "#") {
+    words >> name;
+    directive += name;
+  }
+  if (directive != "#include" || !(words >> name) || name.size() < 3) {
+    return "";
+  }
+  const std::string inside = name.substr(1, name.size() - 2);
+  std::string problem = WrongLibrary(path, inside);
+  if (problem.empty() && name.front() == '"') {
+    problem = WrongQuoted(path, inside);
+  } else if (problem.empty() && StartsWith(inside, "tangible/") && StartsWith(path, "lib/")) {
+    problem = "headers of the project are included in quotes";
+  }
+  return problem.empty() ? "" : inside + ": " + problem;
+}
+
+}  // namespace
+
+std::vector<std::string> CheckSource(const SourceFile& file) {
+  std::vector<std::string> problems;
+  std::istringstream lines(file.text);
+  std::string line;
+  int number = 0;
+  bool has_pragma = false;
+  const auto report = [&](int at, const std::string& what) {
+    problems.push_back(file.path + ":" + std::to_string(at) + ": " + what);
+  };
+  while (std::getline(lines, line)) {
+    ++number;
+    if (number == 1 && line != kSpdx) {
+      report(1, "expected " + std::string(kSpdx));
+    }
+    has_pragma = has_pragma || line == "#pragma once";
+    const std::string problem = WrongInclude(file.path, line);
+    if (!problem.empty()) {
+      report(number, problem);
+    }
+  }
+  if (number == 0) {
+    report(1, "empty file");
+  }
+  if (EndsWith(file.path, ".h") && !has_pragma) {
+    report(1, "expected #pragma once");
+  }
+  if (number > kMaxLines) {
+    report(number, "more than " + std::to_string(kMaxLines) + " lines");
+  }
+  return problems;
+}
+
+std::vector<std::string> UnlistedHeaders(const std::string& cmake_lists,
+                                         const std::vector<std::string>& headers) {
+  const std::size_t room = cmake_lists.find("tangible_room(");
+  if (room == std::string::npos) {
+    return {};
+  }
+  std::string arguments = cmake_lists.substr(room, cmake_lists.find(')', room) - room);
+  std::replace(arguments.begin(), arguments.end(), '(', ' ');
+  const std::set<std::string> keywords = {"SOURCES", "DEPENDS", "LINK", "PRIVATE_LINK"};
+  std::set<std::string> listed;
+  std::istringstream words(arguments);
+  std::string word;
+  bool in_headers = false;
+  while (words >> word) {
+    if (word == "HEADERS" || keywords.count(word) > 0) {
+      in_headers = word == "HEADERS";
+    } else if (in_headers) {
+      listed.insert(word);
+    }
+  }
+  std::vector<std::string> unlisted;
+  for (const std::string& header : headers) {
+    if (!EndsWith(header, "_inl.h") && listed.count(header) == 0) {
+      unlisted.push_back(header);
+    }
+  }
+  return unlisted;
+}
+
+}  // namespace tangible

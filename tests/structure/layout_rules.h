@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// The rules of the source tree: which room may include which, and what every file has.
+//
+// The checks work on texts, so that tests can plant violations.
+
+#include <string>
+#include <vector>
+
+namespace tangible {
+
+/// A file: path relative to the top of the tree, with forward slashes.
+struct SourceFile {
+  std::string path;
+  std::string text;
+};
+
+/// What a file breaks, one line each, "path:line: what"; empty if nothing:
+///  - an include of a room that its own room may not see;
+///  - ceres in lib other than ceres/jet.h in lib/math/scalar.h; gflags outside mains; torch outside
+///    estimation/vision;
+///  - a quoted include that is not "tangible/..." (within tests also a header of the same folder
+///    or of tests/support);
+///  - an `_inl.h` included by a header that is not one itself;
+///  - a first line that is not the SPDX tag; a header without `#pragma once`;
+///  - more than 500 lines.
+std::vector<std::string> CheckSource(const SourceFile& file);
+
+/// The headers (paths relative to the CMakeLists.txt's folder) that its tangible_room(...) does not
+/// list under HEADERS. Empty if there is no tangible_room. `_inl.h` need not be listed.
+std::vector<std::string> UnlistedHeaders(const std::string& cmake_lists,
+                                         const std::vector<std::string>& headers);
+
+}  // namespace tangible

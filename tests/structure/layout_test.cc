@@ -1,0 +1,163 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstddef>
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <set>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "layout_rules.h"
+
+namespace tangible {
+namespace {
+
+namespace fs = std::filesystem;
+
+const fs::path kTop = TANGIBLE_SOURCE_DIR;
+constexpr char kHead[] = "// SPDX-License-Identifier: Apache-2.0\n#pragma once\n";
+
+std::string ReadText(const fs::path& path) {
+  std::ifstream in(path, std::ios::binary);
+  std::ostringstream text;
+  text << in.rdbuf();
+  return text.str();
+}
+
+/// Every file of the source folders with one of the extensions, sorted.
+std::vector<fs::path> Files(const std::set<std::string>& extensions) {
+  std::vector<fs::path> files;
+  for (const char* folder : {"lib", "estimation", "verification", "tests"}) {
+    for (const fs::directory_entry& entry : fs::recursive_directory_iterator(kTop / folder)) {
+      if (entry.is_regular_file() && extensions.count(entry.path().extension().string()) > 0) {
+        files.push_back(entry.path());
+      }
+    }
+  }
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
+/// The number of problems of a file with these lines after its head.
+std::size_t NumProblems(const std::string& path, const std::string& lines) {
+  return CheckSource({path, kHead + lines}).size();
+}
+
+TEST(LayoutRules, RoomsSeeThoseBelow) {
+  EXPECT_EQ(NumProblems("lib/lcp/a.h", "#include \"tangible/math/scalar.h\"\n"), 0U);
+  EXPECT_EQ(NumProblems("lib/lcp/a.cc", "#include \"tangible/config/jet_widths.h\"\n"), 0U);
+  EXPECT_EQ(NumProblems("lib/simulation/a.h", "#include \"tangible/scene/scene.h\"\n"), 0U);
+  EXPECT_EQ(NumProblems("lib/app/a.cc", "#include \"tangible/render/view.h\"\n"), 0U);
+  EXPECT_EQ(NumProblems("estimation/a.cc", "#include \"tangible/control/ilqr.h\"\n"), 0U);
+  EXPECT_EQ(NumProblems("estimation/app/a.cc", "#include \"tangible/app/program.h\"\n"), 0U);
+  EXPECT_EQ(NumProblems("verification/a.cc", "#include \"tangible/estimation/fit.h\"\n"), 0U);
+  EXPECT_EQ(NumProblems("tests/app/a.cc", "#include \"tangible/verification/a.h\"\n"), 0U);
+}
+
+TEST(LayoutRules, RoomsDoNotSeeThoseAbove) {
+  EXPECT_EQ(NumProblems("lib/math/a.h", "#include \"tangible/lcp/problem.h\"\n"), 1U);
+  EXPECT_EQ(NumProblems("lib/lcp/a.h", "#include \"tangible/scene/scene.h\"\n"), 1U);
+  EXPECT_EQ(NumProblems("lib/scene/a.cc", "#  include \"tangible/geometry/shape.h\"\n"), 1U);
+  EXPECT_EQ(NumProblems("lib/geometry/a.cc", "# include \"tangible/scene/scene.h\"\n"), 1U);
+  EXPECT_EQ(NumProblems("lib/dynamics/a.h", "#include \"tangible/simulation/step.h\"\n"), 1U);
+  EXPECT_EQ(NumProblems("lib/simulation/a.cc", "#include \"tangible/render/view.h\"\n"), 1U);
+  EXPECT_EQ(NumProblems("lib/render/a.cc", "#include \"tangible/control/ilqr.h\"\n"), 1U);
+  EXPECT_EQ(NumProblems("lib/app/a.cc", "#include \"tangible/estimation/fit.h\"\n"), 1U);
+  EXPECT_EQ(NumProblems("estimation/a.cc", "#include \"tangible/verification/a.h\"\n"), 1U);
+  EXPECT_EQ(NumProblems("estimation/a.cc", "#include \"tangible/app/program.h\"\n"), 1U);
+  EXPECT_EQ(NumProblems("lib/attic/a.cc", "#include \"tangible/math/scalar.h\"\n"), 1U);
+}
+
+TEST(LayoutRules, OtherLibrariesHaveTheirPlaces) {
+  EXPECT_EQ(NumProblems("lib/math/scalar.h", "#include <ceres/jet.h>\n"), 0U);
+  EXPECT_EQ(NumProblems("lib/math/scalar.h", "#include <ceres/ceres.h>\n"), 1U);
+  EXPECT_EQ(NumProblems("lib/dynamics/a.h", "#include \"ceres/jet.h\"\n"), 1U);
+  EXPECT_EQ(NumProblems("lib/app/a.cc", "#include <ceres/ceres.h>\n"), 1U);
+  EXPECT_EQ(NumProblems("estimation/fit.cc", "#include <ceres/ceres.h>\n"), 0U);
+  EXPECT_EQ(NumProblems("lib/app/a.cc", "#include <gflags/gflags.h>\n"), 0U);
+  EXPECT_EQ(NumProblems("verification/a.cc", "#include <gflags/gflags.h>\n"), 0U);
+  EXPECT_EQ(NumProblems("lib/simulation/a.cc", "#include <gflags/gflags.h>\n"), 1U);
+  EXPECT_EQ(NumProblems("estimation/fit.cc", "#include <gflags/gflags.h>\n"), 1U);
+  EXPECT_EQ(NumProblems("estimation/vision/a.cc", "#include <torch/torch.h>\n"), 0U);
+  EXPECT_EQ(NumProblems("estimation/fit.cc", "#include <torch/torch.h>\n"), 1U);
+}
+
+TEST(LayoutRules, ProjectHeadersAreIncludedByTheirInstalledName) {
+  EXPECT_EQ(NumProblems("lib/lcp/a.cc", "#include \"problem.h\"\n"), 1U);
+  EXPECT_EQ(NumProblems("lib/lcp/a.cc", "#include \"../math/scalar.h\"\n"), 1U);
+  EXPECT_EQ(NumProblems("lib/lcp/a.cc", "#include <tangible/math/scalar.h>\n"), 1U);
+  EXPECT_EQ(NumProblems("tests/lcp/a.cc", "#include \"random_problem.h\"\n"), 0U);
+  EXPECT_EQ(NumProblems("tests/lcp/a.cc", "#include \"../support/counter.h\"\n"), 0U);
+  EXPECT_EQ(NumProblems("tests/lcp/a.cc", "#include \"../scene/helper.h\"\n"), 1U);
+  EXPECT_EQ(NumProblems("lib/lcp/a.cc", "#include \"tangible/lcp/a_inl.h\"\n"), 0U);
+  EXPECT_EQ(NumProblems("lib/lcp/b_inl.h", "#include \"tangible/lcp/a_inl.h\"\n"), 0U);
+  EXPECT_EQ(NumProblems("lib/lcp/b.h", "#include \"tangible/lcp/a_inl.h\"\n"), 1U);
+}
+
+TEST(LayoutRules, EveryFileHasItsHead) {
+  EXPECT_EQ(CheckSource({"lib/math/a.cc", "// SPDX-License-Identifier: Apache-2.0\n"}).size(), 0U);
+  EXPECT_EQ(CheckSource({"lib/math/a.cc", "int a;\n"}).size(), 1U);
+  EXPECT_EQ(CheckSource({"lib/math/a.cc", ""}).size(), 1U);
+  EXPECT_EQ(CheckSource({"lib/math/a.h", "// SPDX-License-Identifier: Apache-2.0\n"}).size(), 1U);
+  EXPECT_EQ(NumProblems("lib/math/a.h", std::string(498, '\n')), 0U);
+  EXPECT_EQ(NumProblems("lib/math/a.h", std::string(499, '\n')), 1U);
+}
+
+TEST(LayoutRules, EveryHeaderOfARoomIsInstalled) {
+  const std::string lists =
+      "tangible_room(lcp\n  SOURCES a.cc\n  HEADERS a.h sub/b.h\n  DEPENDS c.h)\nother(HEADERS "
+      "d.h)\n";
+  EXPECT_TRUE(UnlistedHeaders(lists, {"a.h", "sub/b.h", "a_inl.h"}).empty());
+  EXPECT_EQ(UnlistedHeaders(lists, {"a.h", "c.h", "d.h"}),
+            (std::vector<std::string>{"c.h", "d.h"}));
+  EXPECT_TRUE(UnlistedHeaders("add_library(app a.cc)", {"a.h"}).empty());
+  EXPECT_EQ(UnlistedHeaders("tangible_room(lcp)", {"a.h"}).size(), 1U);
+}
+
+TEST(Layout, EverySource) {
+  const std::vector<fs::path> files = Files({".h", ".cc"});
+  ASSERT_GT(files.size(), 10U);
+  for (const fs::path& path : files) {
+    const std::string relative = path.lexically_relative(kTop).generic_string();
+    for (const std::string& problem : CheckSource({relative, ReadText(path)})) {
+      ADD_FAILURE() << problem;
+    }
+  }
+}
+
+TEST(Layout, EveryHeaderIsInstalled) {
+  std::map<fs::path, std::vector<std::string>>
+      headers;  // by the folder of the CMakeLists.txt in charge
+  for (const fs::path& path : Files({".h"})) {
+    fs::path folder = path.parent_path();
+    while (folder != kTop && !fs::exists(folder / "CMakeLists.txt")) {
+      folder = folder.parent_path();
+    }
+    headers[folder].push_back(path.lexically_relative(folder).generic_string());
+  }
+  ASSERT_GE(headers.size(), 4U);
+  for (const auto& [folder, names] : headers) {
+    for (const std::string& name : UnlistedHeaders(ReadText(folder / "CMakeLists.txt"), names)) {
+      ADD_FAILURE() << (folder / name) << " is not in HEADERS of its tangible_room";
+    }
+  }
+}
+
+TEST(Layout, TopLevelHasWhatIsAgreed) {
+  const std::set<std::string> agreed = {
+      "CMakeLists.txt", "CMakePresets.json", "README.md", "LICENSE", "lib",
+      "estimation",     "verification",      "tests",     "data"};
+  for (const fs::directory_entry& entry : fs::directory_iterator(kTop)) {
+    const std::string name = entry.path().filename().string();
+    const bool is_output =
+        name.rfind("build", 0) == 0 || name == "out" || name == "compile_commands.json";
+    EXPECT_TRUE(name.front() == '.' || is_output || agreed.count(name) > 0) << name;
+  }
+}
+
+}  // namespace
+}  // namespace tangible

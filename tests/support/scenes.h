@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// Small scenes for tests of more than one room, as text.
+
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "tangible/scene/scene_json.h"
+
+namespace tangible::test_scenes {
+
+/// The scene of a text that is known to be good.
+inline Scene SceneOf(const std::string& text) {
+  Scene scene;
+  std::string error;
+  EXPECT_TRUE(ParseScene(text, "test.json", ".", &scene, &error)) << error;
+  return scene;
+}
+
+inline constexpr char kFloor[] =
+    R"({"name": "floor", "static": true, "friction": 0.3, "restitution": 0.5,
+        "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}})";
+
+/// A ball that falls from `height` above its rest, without restitution; `simulation` as in a scene
+/// file.
+inline std::string FallingBall(double height, const std::string& simulation) {
+  return R"({"bodies": [{"name": "ball", "shape": {"circle": {"radius": 0.1}}, "mass": 1,
+                         "position": [0, )" +
+         std::to_string(0.1 + height) + R"(]},
+                        {"name": "floor", "static": true, "friction": 0.3,
+                         "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}}],
+             "simulation": )" +
+         simulation + "}";
+}
+
+/// Every kind of thing: a ball that bounces with spin, a crate that lands on a
+/// corner and slides, a rod
+/// on a pin with a damper, a limit and a spring, a push in a time window.
+inline std::string Mixture() {
+  return R"({"name": "mixture", "bodies": [
+      {"name": "ball", "shape": {"circle": {"radius": 0.1}}, "mass": 1, "position": [0, 0.6],
+       "velocity": [1, 0.1], "angular_velocity": 2, "friction": 0.3, "restitution": 0.5,
+       "linear_damping": 0.02, "angular_damping": 0.001},
+      {"name": "crate", "shape": {"box": {"size": [0.4, 0.2]}}, "mass": 2, "inertia": 0.04,
+       "position": [-1.5, 0.9], "angle": 0.4, "velocity": [1.2, 0], "friction": 0.4},
+      {"name": "rod", "shape": {"capsule": {"length": 0.5, "radius": 0.05}}, "mass": 0.5,
+       "position": [1.3, 0.9], "friction": 0.2}, )" +
+         std::string(kFloor) + R"(],
+    "joints": [{"name": "pin", "type": "revolute", "bodies": ["rod", "world"], "anchor": [1.05, 0.9],
+                "damping": 0.01, "limits": [-1.5, 2], "angle": 0.1, "rate": -0.2, "effort": 0.05}],
+    "springs": [{"name": "s", "bodies": ["rod", "world"], "anchors": [[1.55, 0.9], [1.55, 1.6]],
+                 "stiffness": 5, "damping": 0.1, "rest_length": 0.5}],
+    "forces": [{"name": "push", "body": "crate", "force": [1, 0.2], "torque": 0.01, "at": [0.1, 0.02],
+                "start": 0.013, "end": 0.187}],
+    "pairs": [{"bodies": ["crate", "floor"], "restitution": 0}],
+    "simulation": {"dt": 0.01, "duration": 0.63, "joint_correction": "projection"}})";
+}
+
+}  // namespace tangible::test_scenes

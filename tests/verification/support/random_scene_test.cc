@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/verification/support/random_scene.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "tangible/scene/scene_json.h"
+
+namespace tangible {
+namespace {
+
+int NumMoving(const Scene& scene) {
+  return static_cast<int>(
+      std::count_if(scene.bodies.begin(), scene.bodies.end(),
+                    [](const auto& body) { return body.motion == Motion::kMoving; }));
+}
+
+TEST(RandomNumbersTest, AreTheSameEverywhere) {
+  // The 10000th number of std::mt19937_64 with its default seed is 9981545732273789042 (the C++
+  // standard, [rand.predef]).
+  RandomNumbers random(5489);
+  for (int i = 1; i < 10000; ++i) random.Uniform(0.0, 1.0);
+  EXPECT_EQ(random.Uniform(0.0, 1.0), static_cast<double>(9981545732273789042ULL >> 11) * 0x1p-53);
+}
+
+TEST(RandomNumbersTest, StayInTheirRange) {
+  RandomNumbers random(3);
+  int counts[4] = {0, 0, 0, 0};
+  int chances = 0;
+  constexpr int kDraws = 4000;
+  for (int i = 0; i < kDraws; ++i) {
+    const double x = random.Uniform(-2.0, 3.0);
+    EXPECT_GE(x, -2.0);
+    EXPECT_LT(x, 3.0);
+    const int k = random.Integer(-1, 2);
+    ASSERT_GE(k, -1);
+    ASSERT_LE(k, 2);
+    ++counts[k + 1];
+    chances += random.Chance(0.25) ? 1 : 0;
+  }
+  // Binomial: n p ± 5 sqrt(n p (1 − p)).
+  const double spread = 5.0 * std::sqrt(kDraws * 0.25 * 0.75);
+  for (const int count : counts) EXPECT_NEAR(count, 0.25 * kDraws, spread);
+  EXPECT_NEAR(chances, 0.25 * kDraws, spread);
+}
+
+TEST(RandomSceneTest, ASeedIsAScene) {
+  EXPECT_EQ(SceneToJson(RandomScene(5)), SceneToJson(RandomScene(5)));
+  Scene other = RandomScene(6);
+  other.name = RandomScene(5).name;
+  EXPECT_NE(SceneToJson(RandomScene(5)), SceneToJson(other));
+}
+
+TEST(RandomSceneTest, ScenesKeepTheirLimits) {
+  RandomSceneOptions options;
+  options.max_bodies = 3;
+  options.max_steps = 10;
+  for (unsigned seed = 0; seed < 100; ++seed) {
+    const Scene scene = RandomScene(seed, options);
+    EXPECT_GE(NumMoving(scene), 1) << seed;
+    EXPECT_LE(NumMoving(scene), 3) << seed;
+    EXPECT_LE(scene.simulation.duration, scene.simulation.dt * (10.0 + 1e-9)) << seed;
+    EXPECT_GT(scene.simulation.duration, 0.0) << seed;
+  }
+}
+
+TEST(RandomSceneTest, EveryKindOfThingTakesItsTurn) {
+  int joints = 0, springs = 0, forces = 0, signals = 0, pairs = 0, filters = 0, most_bodies = 0;
+  for (unsigned seed = 0; seed < 200; ++seed) {
+    const Scene scene = RandomScene(seed);
+    joints += scene.joints.empty() ? 0 : 1;
+    springs += scene.springs.empty() ? 0 : 1;
+    forces += scene.forces.empty() ? 0 : 1;
+    pairs += scene.pairs.empty() ? 0 : 1;
+    filters += scene.no_contact.empty() ? 0 : 1;
+    most_bodies = std::max(most_bodies, NumMoving(scene));
+    for (const auto& force : scene.forces) {
+      signals += force.force_signal ? 1 : 0;
+      // The derivative has a kink where an edge is on a step's.
+      for (const std::optional<double>& time : {force.start, force.end}) {
+        if (!time) continue;
+        const double steps = *time / scene.simulation.dt;
+        EXPECT_GT(std::abs(steps - std::round(steps)), 0.1) << seed;
+      }
+    }
+  }
+  for (const int count : {joints, springs, forces, signals, pairs, filters}) EXPECT_GE(count, 5);
+  EXPECT_EQ(most_bodies, 8);
+}
+
+}  // namespace
+}  // namespace tangible

@@ -1,0 +1,156 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// What steps and their derivatives cost: the chain that a ball hits (11 bodies, 10 joints, 1
+// contact at a time) and ten discs in a box. Times are CPU time; ratios to the plain rollout of the
+// same run are counters.
+#include <benchmark/benchmark.h>
+
+#include <cmath>
+#include <ctime>
+#include <string>
+
+#include "tangible/dynamics/parameter_map.h"
+#include "tangible/scene/scene_json.h"
+#include "tangible/simulation/rollout_adjoint.h"
+#include "tangible/simulation/rollout_tangent.h"
+
+namespace tangible {
+namespace {
+
+double CpuSeconds() {
+  timespec time;
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
+  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
+}
+
+Scene Chain() {
+  Scene scene;
+  std::string error;
+  if (!LoadScene(std::string(TANGIBLE_SOURCE_DIR) + "/data/scenes/chain.json", &scene, &error)) {
+    std::abort();
+  }
+  return scene;
+}
+
+// N discs that fall into a box and settle.
+Scene Discs(int n) {
+  Scene scene;
+  const int columns = static_cast<int>(std::ceil(std::sqrt(n)));
+  const double width = 0.25 * columns;
+  const auto wall = [&](const char* name, double x, double y, double offset) {
+    BasicBody<double> body;
+    body.name = name;
+    body.motion = Motion::kStatic;
+    body.shape = {ShapeType::kHalfPlane, {x, y, offset}};
+    body.friction = 0.5;
+    scene.bodies.push_back(body);
+  };
+  wall("floor", 0.0, 1.0, 0.0);
+  wall("left", 1.0, 0.0, -0.5 * width);
+  wall("right", -1.0, 0.0, -0.5 * width);
+  for (int i = 0; i < n; ++i) {
+    const int row = i / columns;
+    BasicBody<double> body;
+    body.name = "disc" + std::to_string(i);
+    body.shape = {ShapeType::kCircle, {0.1}};
+    body.mass = 1.0;
+    body.friction = 0.5;
+    body.position = {-0.5 * width + 0.125 + 0.25 * (i % columns) + 0.01 * std::sin(12.9898 * i),
+                     0.15 + 0.22 * row};
+    scene.bodies.push_back(body);
+  }
+  scene.simulation.dt = 0.002;
+  scene.simulation.duration = 1.0;
+  return scene;
+}
+
+struct Case {
+  explicit Case(const Scene& scene) : scene(scene) { BuildModel(scene, &model, &initial); }
+  // Minimum of repeats, against which the derivative's time is compared.
+  double RolloutSeconds() {
+    Stepper stepper(model);
+    State<double> final;
+    double best = HUGE_VAL;
+    for (int i = 0; i < 10; ++i) {
+      const double start = CpuSeconds();
+      Rollout(model, initial, StateObserver(), &stepper, &final);
+      best = std::min(best, CpuSeconds() - start);
+    }
+    return best;
+  }
+  Scene scene;
+  Model<double> model;
+  State<double> initial;
+};
+
+void BenchmarkRollout(benchmark::State& state, const Scene& scene) {
+  Case c(scene);
+  Stepper stepper(c.model);
+  State<double> final;
+  double best = HUGE_VAL;
+  for (auto _ : state) {
+    const double start = CpuSeconds();
+    benchmark::DoNotOptimize(Rollout(c.model, c.initial, StateObserver(), &stepper, &final));
+    best = std::min(best, CpuSeconds() - start);
+  }
+  state.counters["us_per_step"] = 1e6 * best / static_cast<double>(NumSteps(scene.simulation));
+}
+
+// The gradient of one coordinate of the final state with respect to all numbers and the initial
+// state.
+void BenchmarkAdjoint(benchmark::State& state, const Scene& scene, Factorisations factorisations) {
+  Case c(scene);
+  const double rollout = c.RolloutSeconds();
+  RolloutTape tape;
+  State<double> final;
+  RowMatrixXd w_bar;
+  const long last = NumSteps(scene.simulation);
+  const RolloutTape::Seed seed = [&](long k, RowMatrixXd* w) {
+    if (k == last) {
+      (*w)(0, 0) += 1.0;
+    }
+  };
+  double best = HUGE_VAL;
+  for (auto _ : state) {
+    const double start = CpuSeconds();
+    tape.Record(c.model, c.initial, factorisations, StateObserver(), &final);
+    tape.Adjoint(c.model, 1, seed, &w_bar);
+    best = std::min(best, CpuSeconds() - start);
+  }
+  state.counters["rollouts"] = best / rollout;
+  state.counters["tape_MB"] = 1e-6 * static_cast<double>(tape.bytes());
+}
+
+// Derivatives of all states with respect to `width` directions.
+void BenchmarkTangent(benchmark::State& state, const Scene& scene) {
+  Case c(scene);
+  const double rollout = c.RolloutSeconds();
+  const int width = static_cast<int>(state.range(0));
+  State<double> final;
+  double best = HUGE_VAL;
+  for (auto _ : state) {
+    RowMatrixXd w_dot = RowMatrixXd::Zero(c.model.structure->num_variables(), width);
+    w_dot.topRows(width).setIdentity();
+    const double start = CpuSeconds();
+    RolloutTangent(c.model, c.initial, TangentObserver(), &w_dot, &final);
+    best = std::min(best, CpuSeconds() - start);
+  }
+  state.counters["rollouts"] = best / rollout;
+}
+
+BENCHMARK_CAPTURE(BenchmarkRollout, chain, Chain())->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(BenchmarkAdjoint, chain_keep, Chain(), Factorisations::kKeep)
+    ->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(BenchmarkAdjoint, chain_recompute, Chain(), Factorisations::kRecompute)
+    ->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(BenchmarkTangent, chain, Chain())
+    ->Arg(1)
+    ->Arg(8)
+    ->Arg(32)
+    ->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(BenchmarkRollout, discs_10, Discs(10))->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(BenchmarkAdjoint, discs_10_keep, Discs(10), Factorisations::kKeep)
+    ->Unit(benchmark::kMillisecond);
+
+}  // namespace
+}  // namespace tangible
