@@ -58,7 +58,7 @@ bool RolloutResiduals::JetPass(int first, JetRoute route, RowMatrixXd* pose_deri
   return Accept(RolloutJets(model, initial, route, observer, &final, &fallbacks));
 }
 
-bool RolloutResiduals::Jets(JetRoute route, RowMatrixXd* jacobian) {
+bool RolloutResiduals::Jets([[maybe_unused]] JetRoute route, RowMatrixXd* jacobian) {
   const int width = ChooseWidth(num_parameters());
   if (width == 0) {
     message_ = "built without Jets: use tangent, adjoint or finite_difference";
