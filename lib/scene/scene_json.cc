@@ -86,7 +86,7 @@ class SceneReader {
   // A name that is new within its list.
   std::string ReadName(const JsonReader& item) {
     const JsonReader reader = item.At("name");
-    const std::string name = reader.String();
+    std::string name = reader.String();
     if (!reader.ok()) return name;
     if (!IsNameOf(name, "")) {
       reader.FailExpected("a name of letters, digits, _ . -");

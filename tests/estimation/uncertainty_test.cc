@@ -14,6 +14,7 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 std::vector<ParameterizedScene::Entry> Entries(int count) {
   std::vector<ParameterizedScene::Entry> entries;
+  entries.reserve(count);
   for (int k = 0; k < count; ++k) {
     entries.push_back({std::string(1, static_cast<char>('a' + k)), 1.0, -kInfinity, kInfinity});
   }
