@@ -90,6 +90,7 @@ TEST(ClassifyJointsTest, AgreesWithTheDefinitionOnRandomGraphs) {
   for (int trial = 0; trial < 500; ++trial) {
     const int bodies = 1 + static_cast<int>(random() % 8);
     std::vector<Motion> motions;
+    motions.reserve(bodies);
     for (int i = 0; i < bodies; ++i) motions.push_back(random() % 5 == 0 ? kS : kM);
     std::vector<std::array<int, 2>> joints;
     for (int i = static_cast<int>(random() % 9); i > 0; --i) {
@@ -110,6 +111,7 @@ TEST(ClassifyJointsTest, AgreesWithTheDefinitionOnRandomGraphs) {
 TEST(ClassifyJointsTest, ALongChainDoesNotOverflowTheStack) {
   constexpr int kLinks = 200000;
   std::vector<std::array<int, 2>> joints;
+  joints.reserve(kLinks);
   for (int i = 0; i < kLinks; ++i) joints.push_back({i, i - 1});
   const std::vector<P> places = ClassifyJoints(SceneOf(std::vector<Motion>(kLinks, kM), joints));
   for (const P place : places) ASSERT_EQ(place, P::kTree);

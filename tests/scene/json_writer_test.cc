@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <bit>
 #include <cstdint>
 #include <cstring>
 #include <limits>
@@ -35,7 +36,7 @@ TEST(JsonTextTest, NumbersReadBackBitForBit) {
   for (std::size_t i = 0; i < json.size(); ++i) {
     const double a = json[i].get<double>();
     const double b = back[i].get<double>();
-    EXPECT_EQ(std::memcmp(&a, &b, sizeof a), 0) << a;
+    EXPECT_EQ(std::bit_cast<std::uint64_t>(a), std::bit_cast<std::uint64_t>(b)) << a;
   }
 }
 

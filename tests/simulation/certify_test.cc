@@ -27,7 +27,7 @@ Certificate Certify(const std::string& text, const std::vector<std::string>& wan
                                                       : model.structure->forces[0].start);
   }
   RolloutReport report;
-  const Certificate certificate = CertifyRollout(model, initial, options, &report);
+  Certificate certificate = CertifyRollout(model, initial, options, &report);
   EXPECT_EQ(report.status, StepStatus::kDone) << report.message;
   return certificate;
 }
