@@ -62,7 +62,7 @@ class FreeAssembly {
     }
   }
 
-  void Joints(std::vector<JointRows<T>>* rows) {
+  void Joints(bool correct_drift, std::vector<JointRows<T>>* rows) {
     rows->resize(structure_.joints.size());
     for (size_t j = 0; j < rows->size(); ++j) {
       const JointIndex& joint = structure_.joints[j];
@@ -73,7 +73,8 @@ class FreeAssembly {
       block.a = structure_.bodies[joint.a].block;
       block.b = structure_.bodies[joint.b].block;
       block.rows = r.rows;
-      const bool correct = structure_.settings.joint_correction == JointCorrection::kBaumgarte;
+      const bool correct = correct_drift && h_ > 0.0 &&
+                           structure_.settings.joint_correction == JointCorrection::kBaumgarte;
       for (int k = 0; k < r.rows; ++k) {
         block.row_a[k] = r.row_a[k];
         block.row_b[k] = r.row_b[k];
@@ -90,7 +91,7 @@ class FreeAssembly {
  private:
   // Damping and effort along a joint's coordinate.
   void Drive(const JointIndex& joint, const JointRows<T>& r) {
-    if (joint.damping < 0) {
+    if (joint.damping < 0 || h_ == 0.0) {
       return;
     }
     if (joint.effort_signal >= 0) {
@@ -132,12 +133,14 @@ class FreeAssembly {
 
 template <typename T>
 void AssembleFree(const Model<T>& model, const State<T>& state, double t, double h,
-                  ContactProblem<T>* problem, AssemblyScratch<T>* scratch) {
+                  ContactProblem<T>* problem, AssemblyScratch<T>* scratch, bool correct_drift) {
   FreeAssembly<T> assembly(model, state, t, h, problem);
   assembly.Bodies();
-  assembly.Springs();
-  assembly.Forces();
-  assembly.Joints(&scratch->joints);
+  if (h > 0.0) {
+    assembly.Springs();
+    assembly.Forces();
+  }
+  assembly.Joints(correct_drift, &scratch->joints);
 }
 
 template <typename T>
@@ -177,7 +180,7 @@ void AssembleContacts(const Model<T>& model, const State<T>& state, double h,
 
 #define TANGIBLE_INSTANTIATE(T)                                                     \
   template void AssembleFree<T>(const Model<T>&, const State<T>&, double, double,   \
-                                ContactProblem<T>*, AssemblyScratch<T>*);           \
+                                ContactProblem<T>*, AssemblyScratch<T>*, bool);     \
   template void AssembleContacts<T>(                                                \
       const Model<T>&, const State<T>&, double, const std::vector<ActiveContact>&,  \
       const std::vector<CoefficientSource>&, const std::vector<CoefficientSource>&, \

@@ -23,11 +23,14 @@ struct AssemblyScratch {
   std::vector<JointRows<T>> joints;
 };
 
-/// Bodies, springs, forces, dampers and joints; leaves the problem without contacts. Allocates
+/// Bodies, springs, forces, dampers and joints; leaves the problem without contacts. With h = 0 it
+/// is that of an impact: an instant in which no force, spring or damper acts. Without
+/// `correct_drift` Baumgarte's term is left out. Allocates
 /// nothing once its vectors have grown.
 template <typename T>
 void AssembleFree(const Model<T>& model, const State<T>& state, double t, double h,
-                  ContactProblem<T>* problem, AssemblyScratch<T>* scratch);
+                  ContactProblem<T>* problem, AssemblyScratch<T>* scratch,
+                  bool correct_drift = true);
 
 /// The contacts' blocks, with the given coefficients (one source a contact).
 template <typename T>
@@ -44,6 +47,8 @@ T LawConstant(ContactLaw law, const T& gap, double h, const T& restitution, cons
   switch (law) {
     case ContactLaw::kRestitution:
       return restitution * approach;
+    case ContactLaw::kInelastic:
+      return T(0.0);
     case ContactLaw::kRecovery:
       return T(-settings.recovery_speed);
     default:

@@ -7,6 +7,7 @@
 //   kGap          c_n = gap / h: lands on the surface and rests there without drift
 //   kRecovery     c_n = −recovery_speed: where gap / h is below that, out of penetration no faster
 //   kRestitution  c_n = e (n·v): an impact
+//   kInelastic    c_n = 0: an impact without rebound (event stepping alone)
 //
 // An impact is e > 0, n·v < −threshold and gap + h n·v_free < margin; in penetration the smaller of
 // both constants holds. A joint limit is a row like a contact without friction or restitution, its
@@ -20,7 +21,7 @@
 
 namespace tangible {
 
-enum class ContactLaw : unsigned char { kGap, kRecovery, kRestitution };
+enum class ContactLaw : unsigned char { kGap, kRecovery, kRestitution, kInelastic };
 
 /// The discrete part of a contact of a step. A limit has joint ≥ 0 and no feature.
 struct ActiveContact {

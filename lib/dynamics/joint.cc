@@ -6,6 +6,7 @@
 #include "tangible/dynamics/joint_prismatic_inl.h"
 #include "tangible/dynamics/joint_revolute_inl.h"
 #include "tangible/dynamics/joint_weld_inl.h"
+#include "tangible/math/dual.h"
 
 namespace tangible {
 
@@ -35,8 +36,11 @@ void EvaluateJoint(JointType type, const Pose<T>& pose_a, const Pose<T>& pose_b,
 #define TANGIBLE_INSTANTIATE(T)                                                       \
   template void EvaluateJoint<T>(JointType, const Pose<T>&, const Pose<T>&, const T*, \
                                  JointRows<T>*);
-#define TANGIBLE_INSTANTIATE_JET(N) TANGIBLE_INSTANTIATE(Jet<N>)
+#define TANGIBLE_INSTANTIATE_JET(N) \
+  TANGIBLE_INSTANTIATE(Jet<N>)      \
+  TANGIBLE_INSTANTIATE(Dual<Jet<N>>)
 TANGIBLE_INSTANTIATE(double)
+TANGIBLE_INSTANTIATE(Dual<double>)
 TANGIBLE_FOR_EACH_JET_WIDTH_AND_LOCAL(TANGIBLE_INSTANTIATE_JET)
 
 }  // namespace tangible

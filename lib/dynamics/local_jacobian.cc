@@ -4,41 +4,21 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tangible/dynamics/local_entries_inl.h"
+
 namespace tangible {
 namespace {
 
-// The variables of one element, each a component of a LocalJet.
-class Locals {
- public:
-  LocalJet Add(double value, int variable) {
-    variables_[count_] = variable;
-    return LocalJet(value, count_++);
-  }
-  int count() const { return count_; }
-  int variable(int i) const { return variables_[i]; }
-
- private:
-  int variables_[kLocalJetWidth];
-  int count_ = 0;
-};
-
-// Rows of R1 that belong to a body; −1 where it does not move.
-int BodyRow(const ModelStructure& structure, int body) {
-  const int block = structure.bodies[body].block;
-  return block < 0 ? -1 : 3 * block;
-}
+using internal::BodyRow;
+using internal::Locals;
 
 template <typename Sink>
-class StepVisitor {
+class StepVisitor : private internal::LocalEntries<Sink> {
  public:
   StepVisitor(const Model<double>& model, const SolvedStep& step, LocalJacobianScratch* scratch,
               const Sink& sink)
-      : model_(model),
-        s_(*model.structure),
-        x_(model.numbers),
+      : internal::LocalEntries<Sink>(model, *step.before, scratch, sink),
         step_(step),
-        scratch_(*scratch),
-        sink_(sink),
         v_new_(step.new_twist->data()),
         v_old_(step.before->twist.data()) {}
 
@@ -134,20 +114,6 @@ class StepVisitor {
   }
 
  private:
-  LocalJet LocalNumber(int number, Locals* locals) {
-    return locals->Add(x_[number], s_.NumberVariable(number));
-  }
-
-  Pose<LocalJet> LocalPose(int body, Locals* locals) {
-    if (body == s_.world()) {
-      return Pose<LocalJet>();
-    }
-    const double* q = &step_.before->pose[3 * body];
-    const LocalJet x = locals->Add(q[0], s_.PoseVariable(body, 0));
-    const LocalJet y = locals->Add(q[1], s_.PoseVariable(body, 1));
-    return Pose<LocalJet>(Vector2<LocalJet>(x, y), locals->Add(q[2], s_.PoseVariable(body, 2)));
-  }
-
   template <typename T>
   T Speed(const double* twist, int a, const RowPart<T>& row_a, int b, const RowPart<T>& row_b) {
     T sum(0.0);
@@ -159,45 +125,6 @@ class StepVisitor {
   template <typename T>
   T NewSpeed(int a, const RowPart<T>& row_a, int b, const RowPart<T>& row_b) {
     return Speed(v_new_, a, row_a, b, row_b);
-  }
-
-  void Emit(const Locals& locals, int row, const LocalJet& value) {
-    for (int i = 0; i < locals.count(); ++i) {
-      if (value.v[i] != 0.0) {
-        sink_(row, locals.variable(i), value.v[i]);
-      }
-    }
-  }
-
-  // R1 += rowᵀ amount on both bodies.
-  void EmitMomentum(const Locals& locals, int a, const RowPart<LocalJet>& row_a, int b,
-                    const RowPart<LocalJet>& row_b, const LocalJet& amount) {
-    const int at_a = BodyRow(s_, a);
-    const int at_b = BodyRow(s_, b);
-    for (int i = 0; i < 3; ++i) {
-      if (at_a >= 0) {
-        Emit(locals, at_a + i, row_a[i] * amount);
-      }
-      if (at_b >= 0) {
-        Emit(locals, at_b + i, row_b[i] * amount);
-      }
-    }
-  }
-
-  // R1 += rowᵀ value, of a row known in double, times one variable.
-  template <typename Row>
-  void EmitRowTimesVariable(int a, const Row& row_a, int b, const Row& row_b, int variable,
-                            double value) {
-    const int at_a = BodyRow(s_, a);
-    const int at_b = BodyRow(s_, b);
-    for (int i = 0; i < 3; ++i) {
-      if (at_a >= 0) {
-        sink_(at_a + i, variable, ValueOf(row_a[i]) * value);
-      }
-      if (at_b >= 0) {
-        sink_(at_b + i, variable, ValueOf(row_b[i]) * value);
-      }
-    }
   }
 
   // A constraint row reads the twist of a body of prescribed motion.
@@ -229,14 +156,18 @@ class StepVisitor {
     emit(b, row_b);
   }
 
-  int JointRow(int joint) const { return 3 * (s_.num_blocks() + joint); }
+  // An impact (h = 0) corrects nothing, and no damping or effort acts in it.
+  bool Corrects() const {
+    return step_.corrects_drift && step_.h > 0.0 &&
+           s_.settings.joint_correction == JointCorrection::kBaumgarte;
+  }
 
   // Two rows p_a − p_b with arms r = R(θ) anchor: only the arms depend on variables, and
   //   ∂r/∂θ = r⊥,  ∂r/∂anchor = R(θ).
   void RevoluteByHand(int j) {
     const JointIndex& joint = s_.joints[j];
     const double* y = &step_.solution->joint_impulse[3 * j];
-    const bool corrects = s_.settings.joint_correction == JointCorrection::kBaumgarte;
+    const bool corrects = Corrects();
     const double drift = corrects ? s_.settings.baumgarte / step_.h : 0.0;
     const auto side = [&](int body, int anchor, double sign) {
       const double angle = step_.before->pose[3 * body + 2];
@@ -283,6 +214,9 @@ class StepVisitor {
   // twists.
   template <typename Row>
   void EmitDrive(const JointIndex& joint, const Row& row_a, const Row& row_b) {
+    if (step_.h == 0.0) {
+      return;
+    }
     const double speed = ValueOf(NewSpeed(joint.a, row_a, joint.b, row_b));
     EmitRowTimesVariable(joint.a, row_a, joint.b, row_b, s_.NumberVariable(joint.damping),
                          step_.h * speed);
@@ -293,23 +227,13 @@ class StepVisitor {
     EmitPrescribedDamper(joint.a, row_a, joint.b, row_b, step_.h * x_[joint.damping]);
   }
 
-  void LocalJointRows(const JointIndex& joint, Locals* locals, JointRows<LocalJet>* rows) {
-    const Pose<LocalJet> pose_a = LocalPose(joint.a, locals);
-    const Pose<LocalJet> pose_b = LocalPose(joint.b, locals);
-    LocalJet numbers[7];
-    for (int i = 0; i < joint.num_geometry; ++i) {
-      numbers[i] = LocalNumber(joint.geometry + i, locals);
-    }
-    EvaluateJoint(joint.type, pose_a, pose_b, numbers, rows);
-  }
-
   void GenericJoint(int j) {
     const JointIndex& joint = s_.joints[j];
     Locals locals;
     JointRows<LocalJet> rows;
     LocalJointRows(joint, &locals, &rows);
     const double* y = &step_.solution->joint_impulse[3 * j];
-    const bool corrects = s_.settings.joint_correction == JointCorrection::kBaumgarte;
+    const bool corrects = Corrects();
     for (int k = 0; k < rows.rows; ++k) {
       LocalJet row = NewSpeed(joint.a, rows.row_a[k], joint.b, rows.row_b[k]);
       if (corrects) {
@@ -319,7 +243,7 @@ class StepVisitor {
       EmitMomentum(locals, joint.a, rows.row_a[k], joint.b, rows.row_b[k], LocalJet(-y[k]));
       EmitPrescribed(joint.a, rows.row_a[k], joint.b, rows.row_b[k], JointRow(j) + k, 1.0);
     }
-    if (joint.damping < 0) {
+    if (joint.damping < 0 || step_.h == 0.0) {
       return;
     }
     const double effort =
@@ -351,31 +275,13 @@ class StepVisitor {
     EmitPrescribed(joint.a, rows.coordinate_a, joint.b, rows.coordinate_b, row, contact.side);
   }
 
-  // A shape's numbers that the feature reads, as LocalJets in their places.
-  ShapeView<LocalJet> LocalShape(int body, bool is_edge, int feature, Locals* locals,
-                                 std::vector<LocalJet>* numbers) {
-    const BodyIndex& index = s_.bodies[body];
-    if (static_cast<int>(numbers->size()) < index.num_shape_numbers) {
-      numbers->resize(index.num_shape_numbers);
-    }
-    int used[4];
-    const int count = FeatureNumbers(index.shape, index.num_shape_numbers, is_edge, feature, used);
-    for (int i = 0; i < count; ++i) {
-      (*numbers)[used[i]] = LocalNumber(index.shape_numbers + used[i], locals);
-    }
-    return {index.shape, numbers->data(), index.num_shape_numbers};
-  }
-
   void ShapeContact(int i) {
     const ActiveContact& contact = (*step_.contacts)[i];
-    const FeatureKind kind = contact.feature.kind;
     Locals locals;
     const Pose<LocalJet> pose_a = LocalPose(contact.a, &locals);
     const Pose<LocalJet> pose_b = LocalPose(contact.b, &locals);
-    const ShapeView<LocalJet> shape_a = LocalShape(contact.a, kind == FeatureKind::kEdgeVertex,
-                                                   contact.feature.a, &locals, &scratch_.numbers_a);
-    const ShapeView<LocalJet> shape_b = LocalShape(contact.b, kind == FeatureKind::kVertexEdge,
-                                                   contact.feature.b, &locals, &scratch_.numbers_b);
+    const ShapeView<LocalJet> shape_a = LocalShapeOfA(contact, &locals);
+    const ShapeView<LocalJet> shape_b = LocalShapeOfB(contact, &locals);
     ContactRows<LocalJet> rows;
     rows.geometry = EvaluateContact(contact.feature, shape_a, pose_a, shape_b, pose_b);
     RowsFromGeometry(pose_a.position, pose_b.position, &rows);
@@ -445,12 +351,21 @@ class StepVisitor {
     }
   }
 
-  const Model<double>& model_;
-  const ModelStructure& s_;
-  const std::vector<double>& x_;
+  using Base = internal::LocalEntries<Sink>;
+  using Base::Emit;
+  using Base::EmitMomentum;
+  using Base::EmitRowTimesVariable;
+  using Base::JointRow;
+  using Base::LocalJointRows;
+  using Base::LocalNumber;
+  using Base::LocalPose;
+  using Base::LocalShapeOfA;
+  using Base::LocalShapeOfB;
+  using Base::s_;
+  using Base::sink_;
+  using Base::x_;
+
   const SolvedStep& step_;
-  LocalJacobianScratch& scratch_;
-  const Sink& sink_;
   const double* v_new_;
   const double* v_old_;
 };
@@ -462,8 +377,10 @@ void VisitStepJacobian(const Model<double>& model, const SolvedStep& step, Joint
                        LocalJacobianScratch* scratch, const Sink& sink) {
   StepVisitor<Sink> visitor(model, step, scratch, sink);
   visitor.Bodies();
-  visitor.Springs();
-  visitor.Forces();
+  if (step.h > 0.0) {
+    visitor.Springs();
+    visitor.Forces();
+  }
   visitor.Joints(route);
   visitor.Contacts();
 }

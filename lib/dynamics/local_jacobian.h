@@ -72,6 +72,7 @@ struct EntryListSink {
 struct SolvedStep {
   double time = 0.0;
   double h = 0.0;
+  bool corrects_drift = true;  ///< whether Baumgarte's term, if the scene has it, is in it
   const State<double>* before = nullptr;
   const std::vector<double>* new_twist = nullptr;  ///< of all bodies
   const std::vector<ActiveContact>* contacts = nullptr;
@@ -89,7 +90,7 @@ struct LocalJacobianScratch {
 
 enum class JointRoute { kByHand, kGeneric };
 
-/// All entries of ∂R/∂w of a step.
+/// All entries of ∂R/∂w of a step; h = 0 is an impact: an instant in which no force acts.
 template <typename Sink>
 void VisitStepJacobian(const Model<double>& model, const SolvedStep& step, JointRoute route,
                        LocalJacobianScratch* scratch, const Sink& sink);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tangible/geometry/contact_geometry_inl.h"
+#include "tangible/math/dual.h"
 
 namespace tangible {
 namespace {
@@ -50,14 +51,17 @@ int FeatureNumbers(ShapeType type, int num_numbers, bool is_edge, int feature, i
   return 2;
 }
 
-template ContactGeometry<double> EvaluateContact(const ContactFeature&, const ShapeView<double>&,
-                                                 const Pose<double>&, const ShapeView<double>&,
-                                                 const Pose<double>&);
-#define TANGIBLE_INSTANTIATE(N)                                                 \
-  template ContactGeometry<Jet<(N)>> EvaluateContact(                           \
-      const ContactFeature&, const ShapeView<Jet<(N)>>&, const Pose<Jet<(N)>>&, \
-      const ShapeView<Jet<(N)>>&, const Pose<Jet<(N)>>&);
-TANGIBLE_FOR_EACH_JET_WIDTH_AND_LOCAL(TANGIBLE_INSTANTIATE)
+#define TANGIBLE_INSTANTIATE(T)                                                           \
+  template ContactGeometry<T> EvaluateContact(const ContactFeature&, const ShapeView<T>&, \
+                                              const Pose<T>&, const ShapeView<T>&,        \
+                                              const Pose<T>&);
+#define TANGIBLE_INSTANTIATE_JET(N) \
+  TANGIBLE_INSTANTIATE(Jet<(N)>)    \
+  TANGIBLE_INSTANTIATE(Dual<Jet<(N)>>)
+TANGIBLE_INSTANTIATE(double)
+TANGIBLE_INSTANTIATE(Dual<double>)
+TANGIBLE_FOR_EACH_JET_WIDTH_AND_LOCAL(TANGIBLE_INSTANTIATE_JET)
+#undef TANGIBLE_INSTANTIATE_JET
 #undef TANGIBLE_INSTANTIATE
 
 }  // namespace tangible

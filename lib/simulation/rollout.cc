@@ -53,6 +53,8 @@ void RolloutReport::Add(const StepReport& step) {
   solved_by_guess += step.solved_by == SolvedBy::kGuess ? 1 : 0;
   solved_by_interior_point += step.solved_by == SolvedBy::kInteriorPoint ? 1 : 0;
   solved_by_lemke += step.solved_by == SolvedBy::kLemke ? 1 : 0;
+  events += step.events;
+  fallbacks += step.fallbacks;
   mode_switches += step.mode_switches;
   factorisations += step.factorisations;
   residual_max = std::max(residual_max, step.residual);

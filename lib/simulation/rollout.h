@@ -22,6 +22,8 @@ struct RolloutReport {
   long solved_by_guess = 0;
   long solved_by_interior_point = 0;
   long solved_by_lemke = 0;
+  long events = 0;     ///< located within steps (event stepping)
+  long fallbacks = 0;  ///< of event stepping
   long mode_switches = 0;
   long factorisations = 0;
   double residual_max = 0.0;

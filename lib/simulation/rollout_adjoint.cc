@@ -33,6 +33,10 @@ RolloutReport RolloutTape::Record(const Model<double>& model, const State<double
         entries_.push_back(std::make_unique<Entry>());
       }
       Entry& entry = *entries_[used_++];
+      if (stepper->by_events()) {
+        std::swap(entry.events, stepper->events().mutable_record());
+        return;
+      }
       if (keep) {
         stepper->TakeRecord(&entry.record, &entry.system);
       } else {
@@ -93,6 +97,10 @@ void RolloutTape::AdjointFrom(const Model<double>& model, long last, int num_los
   for (long k = std::min(last, steps()); k > 0; --k) {
     seed(k, w_bar);
     Entry& entry = *entries_[k - 1];
+    if (stepper_->by_events()) {
+      stepper_->event_derivative().Adjoint(model, &entry.events, w_bar);
+      continue;
+    }
     if (factorisations_ == Factorisations::kKeep) {
       StepAdjoint(model, entry.record, &entry.system, &entry.projection, w_bar);
     } else {
@@ -109,7 +117,7 @@ size_t RolloutTape::bytes() const {
   size_t sum = 0;
   for (size_t i = 0; i < used_; ++i) {
     const Entry& e = *entries_[i];
-    sum += sizeof(Entry) + e.system.bytes() +
+    sum += sizeof(Entry) + e.system.bytes() + e.events.bytes() +
            sizeof(double) * (e.record.before.pose.size() + e.record.before.twist.size() +
                              e.record.new_twist.size() + e.record.problem.mass.size() +
                              e.record.problem.momentum.size()) +

@@ -51,6 +51,7 @@ class RolloutTape {
     StepRecord record;
     ContactSystem system;
     JointProjection projection;
+    EventRecord events;  ///< event stepping: the step, in the place of all above
   };
   void StepAdjoint(const Model<double>& model, const StepRecord& record, ContactSystem* system,
                    JointProjection* projection, RowMatrixXd* w_bar);

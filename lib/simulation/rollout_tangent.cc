@@ -16,12 +16,19 @@ void StepTangent::Assemble(const Model<double>& model, Stepper* stepper, const R
 }
 
 double StepTangent::Apply(const Model<double>& model, Stepper* stepper, RowMatrixXd* w_dot) {
+  if (stepper->by_events()) {
+    return stepper->event_derivative().Tangent(model, &stepper->events().mutable_record(), w_dot);
+  }
   Assemble(model, stepper, *w_dot);
   return Finish(model, stepper, w_dot);
 }
 
 double StepTangent::ApplyAndMeasure(const Model<double>& model, Stepper* stepper,
                                     RowMatrixXd* w_dot) {
+  if (stepper->by_events()) {
+    Apply(model, stepper, w_dot);
+    return 0.0;
+  }
   const ContactProblem<double>& problem = stepper->record().problem;
   const int columns = static_cast<int>(w_dot->cols());
   Assemble(model, stepper, *w_dot);

@@ -14,11 +14,12 @@ std::string Unavailable(const std::string& key, const std::string& have, const s
 }  // namespace
 
 bool CheckSettings(const SimulationSettings& settings, std::string* error) {
-  if (settings.stepping != Stepping::kFixed) {
-    *error = Unavailable("stepping", "fixed", NameOf(settings.stepping, kSteppingNames));
-  } else if (settings.integrator != Integrator::kSemiImplicitEuler) {
-    *error = Unavailable("integrator", "semi_implicit_euler",
-                         NameOf(settings.integrator, kIntegratorNames));
+  if (settings.stepping == Stepping::kFixed &&
+      settings.integrator != Integrator::kSemiImplicitEuler) {
+    *error =
+        "/simulation/integrator: expected \"semi_implicit_euler\" with fixed stepping (the "
+        "others need \"stepping\": \"event\"), got \"" +
+        std::string(NameOf(settings.integrator, kIntegratorNames)) + "\"";
   } else if (settings.impact_law != ImpactLaw::kNewton) {
     *error = Unavailable("impact_law", "newton", NameOf(settings.impact_law, kImpactLawNames));
   } else {

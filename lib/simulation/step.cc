@@ -88,6 +88,10 @@ SolvedStep StepRecord::View(const std::vector<int>& contact_block) const {
 
 Stepper::Stepper(const Model<double>& model) : search_(model) {
   const ModelStructure& s = *model.structure;
+  if (s.settings.stepping == Stepping::kEvent) {
+    events_ = std::make_unique<EventStepper>(model);
+    return;
+  }
   int shaped = 0;
   for (const BodyIndex& body : s.bodies) {
     shaped += body.shape != ShapeType::kNone ? 1 : 0;
@@ -117,6 +121,9 @@ Stepper::Stepper(const Model<double>& model) : search_(model) {
 }
 
 void Stepper::ClearGuess() {
+  if (events_) {
+    events_->ClearGuess();
+  }
   last_contacts_.clear();
   last_solution_ = ContactSolution<double>();
 }
@@ -261,6 +268,9 @@ void Stepper::FillReport(const Model<double>& model, const ContactSolverReport& 
 }
 
 StepReport Stepper::Step(const Model<double>& model, double t, double h, State<double>* state) {
+  if (events_) {
+    return StepByEvents(model, t, h, state);
+  }
   StepReport report;
   const ModelStructure& structure = *model.structure;
   const SimulationSettings& settings = structure.settings;

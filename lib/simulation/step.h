@@ -14,11 +14,14 @@
 // After its first call a step in double allocates nothing but for more contacts than it has had
 // before.
 
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "tangible/dynamics/contact_search.h"
 #include "tangible/lcp/contact_solver.h"
+#include "tangible/simulation/event_derivative.h"
+#include "tangible/simulation/event_step.h"
 #include "tangible/simulation/joint_projection.h"
 
 namespace tangible {
@@ -34,6 +37,8 @@ struct StepReport {
   int lcp_rows = 0;  ///< complementarity rows: 1 a frictionless contact or limit, 3 with friction
   int factorisations = 0;
   int iterations = 0;
+  int events = 0;         ///< located within the step (event stepping)
+  int fallbacks = 0;      ///< of event stepping: impulses for accelerations, rebounds given up
   int mode_switches = 0;  ///< contacts whose mode differs from the last step's
   double residual = 0.0;  ///< scaled natural residual
   double gap_min = 0.0;   ///< m, the smallest at the start; infinite where no contact is near
@@ -64,8 +69,14 @@ class Stepper {
   /// structure may not.
   StepReport Step(const Model<double>& model, double t, double h, State<double>* state);
 
-  /// Of the last step.
+  /// Of the last step. With event stepping: its contacts, with the impulses they had in all and the
+  /// modes they ended with.
   const StepRecord& record() const { return record_; }
+  /// Whether steps are event steps; then events() made the last one, and its record is the
+  /// derivative's.
+  bool by_events() const { return events_ != nullptr; }
+  EventStepper& events() { return *events_; }
+  EventDerivative& event_derivative() { return event_derivative_; }
   ContactSystem& system() { return solver_.system(); }
   JointProjection& projection() { return projection_; }
   /// Hands the last step's record and, unless null, its factorisation over; for a tape, without
@@ -81,6 +92,8 @@ class Stepper {
   void SetGuess(const StepRecord& record);
 
  private:
+  StepReport StepByEvents(const Model<double>& model, double t, double h, State<double>* state);
+  void SumImpulses(const Model<double>& model);
   void CarryGuess(const Model<double>& model);
   ContactMode InitialMode(const ContactBlock<double>& contact) const;
   ContactSolverOptions SolverOptions(const SimulationSettings& settings) const;
@@ -88,6 +101,8 @@ class Stepper {
                   StepReport* report);
   void Describe(const Model<double>& model, int contact, StepReport* report) const;
 
+  std::unique_ptr<EventStepper> events_;  ///< event stepping only
+  EventDerivative event_derivative_;
   ContactSearch search_;
   ContactSolver solver_;
   JointProjection projection_;

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// Tangent and adjoint of an event step.
+//
+// Each segment is a map x⁺ = S(x, w, t, τ) of its length τ. The event at its end, g(x⁺, w, t + τ) =
+// 0, makes τ a function of the rest (implicit function theorem):
+//   τ̇ = −(∇g · Ṡ|τ) / (∇g · S_τ),   ẋ⁺ = Ṡ|τ + S_τ τ̇
+// and the time t + τ at which the next segment starts moves with it, so that the one that ends the
+// step has τ̇ = −ṫ. In the limit of small segments this is the saltation matrix of hybrid systems
+// (Leine, Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical Systems, 2004, ch. 7). The
+// adjoint is its transpose.
+
+#include "tangible/math/scalar.h"
+#include "tangible/simulation/event_record.h"
+
+namespace tangible {
+
+class EventDerivative {
+ public:
+  /// w_dot: num_variables x columns, of the state before the step on entry, after it on return.
+  /// Returns the largest relative residual of the linear solves.
+  double Tangent(const Model<double>& model, EventRecord* record, RowMatrixXd* w_dot);
+  /// w_bar: num_variables x columns, of the state after the step on entry, before it on return.
+  void Adjoint(const Model<double>& model, EventRecord* record, RowMatrixXd* w_bar);
+
+  /// How fast the event's equation changes with the segment's length: ∇g · S_τ, and the sum of the
+  /// magnitudes of its terms. 0 where the segment ends at a given time.
+  double EventRate(const Model<double>& model, Segment* segment, double* terms);
+
+ private:
+  double SegmentTangent(const Model<double>& model, Segment* segment, RowMatrixXd* x,
+                        const Eigen::RowVectorXd& tau_dot);
+  double ImpulsesTangent(const Model<double>& model, Impulses* impulses, RowMatrixXd* x);
+  void SegmentAdjoint(const Model<double>& model, Segment* segment, RowMatrixXd* w_bar);
+  void StagesAdjoint(const Model<double>& model, Segment* segment, RowMatrixXd* w_bar);
+  void ImpulsesAdjoint(const Model<double>& model, Impulses* impulses, RowMatrixXd* w_bar);
+  void EventGradient(const Model<double>& model, Segment* segment, Eigen::VectorXd* gradient);
+  double NodeTangent(const Model<double>& model, const Segment& segment, SolvedNode* node,
+                     bool correction, const RowMatrixXd& x, RowMatrixXd* solved);
+  void NodeAdjoint(const Model<double>& model, const Segment& segment, SolvedNode* node,
+                   bool correction, RowMatrixXd* seed, RowMatrixXd* w_bar);
+
+  LocalJacobianScratch scratch_;
+  RowMatrixXd rhs_;
+};
+
+/// Whether an event's time is found from an equation (and not given).
+bool IsLocated(EventKind kind);
+
+}  // namespace tangible

@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// What an event step was made of, as its derivatives need it: segments of smooth motion, each up to
+// an event or to the step's end, and impacts between them.
+
+#include <memory>
+#include <vector>
+
+#include "tangible/dynamics/acceleration_jacobian.h"
+#include "tangible/lcp/contact_system.h"
+
+namespace tangible {
+
+/// A linear system of accelerations or of a correction, solved with given modes.
+struct SolvedNode {
+  State<double> state;  ///< where it was assembled
+  double time = 0.0;
+  ContactProblem<double> problem;
+  ContactSolution<double> solution;  ///< v holds accelerations (m/s²) or the correction (m)
+  ContactSystem system;
+};
+
+/// An instantaneous change of twists: an impact or a projection of twists, as a step with h = 0;
+/// or, where accelerations have no solution, impulses of a very short step.
+struct Impulses {
+  double time = 0.0;
+  double h = 0.0;
+  State<double> before;
+  std::vector<double> new_twist;  ///< of all bodies
+  std::vector<ActiveContact> contacts;
+  std::vector<CoefficientSource> friction, restitution;
+  ContactProblem<double> problem;
+  ContactSolution<double> solution;
+  ContactSystem system;
+
+  SolvedStep View() const;
+};
+
+enum class EventKind : unsigned char {
+  kStepEnd,     ///< none: the step's time is over
+  kEdge,        ///< a force's window opens or closes, or a signal has a corner
+  kTouch,       ///< a gap or the distance from a joint limit closes
+  kSlipEnds,    ///< a sliding speed reaches 0
+  kSlipBegins,  ///< friction reaches its limit
+  kLiftOff,     ///< a normal force reaches 0
+};
+
+/// Smooth motion over [time, time + length] with modes held, then the event that ended it.
+struct Segment {
+  double time = 0.0;
+  double length = 0.0;
+  double middle = 0.0;  ///< the time at which forces and pieces of signals are chosen
+  State<double> before, after;
+  std::vector<ActiveContact> contacts;  ///< those closed; law kRecovery: pushed out of penetration
+  std::vector<CoefficientSource> friction;
+  std::vector<ContactMode> modes;
+  std::vector<SolvedNode> stages;  ///< of the integrator
+  int num_stages = 0;
+  std::vector<SolvedNode> corrections;  ///< of poses, one after another
+  int num_corrections = 0;
+  bool projects_twists = false;
+  Impulses projection;
+
+  EventKind event = EventKind::kStepEnd;
+  ActiveContact event_contact;
+  CoefficientSource event_friction;  ///< of kSlipBegins
+  double event_sign = 0.0;           ///< kSlipBegins: sign of the tangential force
+  int event_number = -1;             ///< kEdge: the number that is the time; −1: a constant
+  SolvedNode end;                    ///< kSlipBegins, kLiftOff: accelerations after the motion
+  int event_index = -1;              ///< the same: which of `contacts`
+};
+
+/// One part of a step; of the two members the one that `is_impulses` says holds.
+struct EventPart {
+  bool is_impulses = false;
+  Segment segment;
+  Impulses impulses;
+};
+
+/// The parts in their order; kept from step to step for their memory.
+struct EventRecord {
+  std::vector<std::unique_ptr<EventPart>> parts;
+  int num_parts = 0;
+
+  void Clear() { num_parts = 0; }
+  EventPart* Add();
+  size_t bytes() const;
+};
+
+/// The view that VisitAccelerationJacobian takes.
+SolvedAcceleration ViewOf(const Segment& segment, const SolvedNode& node, bool correction);
+
+}  // namespace tangible

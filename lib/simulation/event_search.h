@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// Where the next event is: the smallest τ in (0, length] at which a segment's motion closes a gap,
+// ends a slip, reaches the limit of friction or lifts a contact off.
+//
+// Every candidate motion is the segment's own map at that length, so that the event's equation
+// holds for the state that the segment ends with. Gaps: an interval on which gap(a) + gap(b)
+// exceeds what the pair's speed bound can close is free of contact; others are halved, so that
+// grazing and rotating corners are not missed (Mirtich, Impulse-based Dynamic Simulation, 1996, ch.
+// 2, for the bound). Forces and sliding speeds are sampled at the segment's middle and end.
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "tangible/geometry/broad_phase.h"
+#include "tangible/simulation/segment_flow.h"
+
+namespace tangible {
+
+class EventSearch {
+ public:
+  explicit EventSearch(const Model<double>& model);
+
+  /// Shortens the segment to its first event and names it; the segment is run to there. `touching`:
+  /// contacts within the touching tolerance at its start, which are no events while they stay so.
+  bool Run(const Model<double>& model, const std::vector<ActiveContact>& touching, Segment* segment,
+           std::string* message);
+
+  /// Gap below which a pair touches, m: rounding of the poses and of the event's location.
+  double TouchTolerance(const State<double>& state, int a, int b) const;
+  /// Speed below which a touching contact neither approaches nor slides, m/s.
+  double SpeedTolerance(const Model<double>& model, const State<double>& state) const;
+  /// All contacts of a pair within `reach`; gap set.
+  void FindContacts(const Model<double>& model, const State<double>& state, double reach,
+                    std::vector<ActiveContact>* contacts);
+  double bounding_radius(int body) const { return radius_[body]; }
+
+ private:
+  struct Sample {
+    double length = 0.0;
+    Segment motion;
+    bool good = false;
+  };
+  struct Event {
+    double length = 0.0;
+    EventKind kind = EventKind::kStepEnd;
+    ActiveContact contact;
+    int index = -1;
+    double sign = 0.0;
+  };
+  Sample* At(const Model<double>& model, double length);
+  void FindPairs(const Model<double>& model);
+  void SearchPair(const Model<double>& model, int a, int b, Event* event);
+  void SearchLimit(const Model<double>& model, int joint, double side, Event* event);
+  template <typename Gap>
+  bool FirstRoot(const Model<double>& model, const Gap& gap, double from, double to, double rate,
+                 double tolerance, double* root);
+  void SearchClosed(const Model<double>& model, Event* event);
+  template <typename Function>
+  double Refine(const Model<double>& model, const Function& f, double a, double fa, double b,
+                double fb);
+  double ModeValue(const Model<double>& model, const Sample& sample, const Event& event);
+  double TouchStart(const Model<double>& model, double speed, double acceleration) const;
+
+  std::vector<double> radius_;
+  double scale_ = 0.0;
+  SegmentFlow flow_;
+  Segment* segment_ = nullptr;
+  const std::vector<ActiveContact>* touching_ = nullptr;
+  std::vector<double> closing_;  ///< a body: bound on its points' speed over the segment
+  std::vector<Sample> samples_;
+  int num_samples_ = 0;
+  std::vector<std::pair<int, int>> pairs_;
+  std::vector<Aabb> boxes_;
+  BroadPhase broad_phase_;
+  std::string message_;
+  SolvedNode node_;
+};
+
+}  // namespace tangible

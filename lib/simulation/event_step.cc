@@ -1,0 +1,493 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/simulation/event_step.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace tangible {
+namespace {
+
+// Accelerations without a solution (Painlevé) are replaced by impulses of this share of a step.
+constexpr double kShortStep = 1e-9;
+// How much further than the forces at work a contact that slides is held to its direction.
+constexpr double kForcedSlip = 1e4;
+// Beyond this many times max_events_per_step a step is given up.
+constexpr int kGiveUp = 20;
+
+ContactSolverOptions OptionsOf(const SimulationSettings& settings) {
+  ContactSolverOptions options;
+  options.tolerance = settings.lcp_tolerance;
+  options.max_iterations = settings.lcp_max_iterations;
+  options.choice = settings.solver == SolverChoice::kInteriorPoint
+                       ? ContactSolverChoice::kInteriorPoint
+                   : settings.solver == SolverChoice::kLemke ? ContactSolverChoice::kLemke
+                                                             : ContactSolverChoice::kAuto;
+  return options;
+}
+
+void Count(const ContactSolverReport& solved, EventOutcome* outcome) {
+  outcome->factorisations += solved.factorisations;
+  outcome->iterations += solved.iterations;
+  outcome->residual = std::max(outcome->residual, solved.solved ? solved.residual : 0.0);
+  outcome->by_guess = outcome->by_guess && solved.solved_by != SolvedBy::kInteriorPoint &&
+                      solved.solved_by != SolvedBy::kLemke;
+  outcome->by_lemke = outcome->by_lemke || solved.solved_by == SolvedBy::kLemke;
+}
+
+std::string NameOf(const ModelStructure& structure, const ActiveContact& contact) {
+  return contact.joint >= 0 ? "limit of joint " + structure.joints[contact.joint].name
+                            : "contact of " + structure.bodies[contact.a].name + " and " +
+                                  structure.bodies[contact.b].name;
+}
+
+double KineticEnergy(const Model<double>& model, const std::vector<double>& twist) {
+  double energy = 0.0;
+  for (const int body : model.structure->moving) {
+    const BodyIndex& index = model.structure->bodies[body];
+    const double* v = &twist[3 * body];
+    energy += 0.5 * model.numbers[index.mass] * (v[0] * v[0] + v[1] * v[1]) +
+              0.5 * model.numbers[index.inertia] * v[2] * v[2];
+  }
+  return energy;
+}
+
+void SizeGuess(const ContactProblem<double>& problem, ContactSolution<double>* guess) {
+  guess->modes.assign(problem.contacts.size(), ContactMode::kOpen);
+  guess->normal_impulse.assign(problem.contacts.size(), 0.0);
+  guess->tangent_impulse.assign(problem.contacts.size(), 0.0);
+  guess->joint_impulse.assign(3 * problem.joints.size(), 0.0);
+}
+
+// Times within (from, to) at which a force's window opens or closes or a signal has a corner.
+struct Edge {
+  double time;
+  int number;
+};
+std::vector<Edge> EdgesWithin(const Model<double>& model, double from, double to) {
+  std::vector<Edge> edges;
+  const double near = 1e-12 * (to - from);
+  const auto add = [&](double time, int number) {
+    if (time > from + near && time < to - near) {
+      edges.push_back({time, number});
+    }
+  };
+  const ModelStructure& structure = *model.structure;
+  const auto add_signal = [&](int index) {
+    if (index >= 0) {
+      for (const double time : structure.signals[index].time) {
+        add(time, -1);
+      }
+    }
+  };
+  for (const ForceIndex& force : structure.forces) {
+    for (const int number : {force.start, force.end}) {
+      if (number >= 0) {
+        add(model.numbers[number], number);
+      }
+    }
+    add_signal(force.force_signal);
+    add_signal(force.torque_signal);
+  }
+  for (const JointIndex& joint : structure.joints) {
+    add_signal(joint.effort_signal);
+  }
+  std::stable_sort(edges.begin(), edges.end(),
+                   [](const Edge& x, const Edge& y) { return x.time < y.time; });
+  return edges;
+}
+
+}  // namespace
+
+EventStepper::EventStepper(const Model<double>& model) : search_(model) {}
+
+void EventStepper::ClearGuess() {
+  last_contacts_.clear();
+  last_modes_.clear();
+}
+
+void EventStepper::FindTouching(const Model<double>& model, const State<double>& state) {
+  const ModelStructure& structure = *model.structure;
+  touching_ = Touching();
+  double reach = 0.0;
+  for (int body = 0; body < structure.num_bodies(); ++body) {
+    reach = std::max(reach, search_.TouchTolerance(state, body, body));
+  }
+  std::vector<ActiveContact> found;
+  search_.FindContacts(model, state, reach, &found);
+  for (const ActiveContact& contact : found) {
+    if (contact.gap > search_.TouchTolerance(state, contact.a, contact.b)) {
+      continue;
+    }
+    ContactRows<double> rows;
+    EvaluateContactRows(model, state, contact, &rows);
+    touching_.contacts.push_back(contact);
+    touching_.friction.push_back(MixedFriction(model, contact.a, contact.b));
+    touching_.restitution.push_back(MixedRestitution(model, contact.a, contact.b));
+    touching_.approach.push_back(
+        RelativeSpeed(state, contact.a, rows.normal_a, contact.b, rows.normal_b));
+    touching_.slip.push_back(
+        RelativeSpeed(state, contact.a, rows.tangent_a, contact.b, rows.tangent_b));
+  }
+  for (size_t j = 0; j < structure.joints.size(); ++j) {
+    const JointIndex& joint = structure.joints[j];
+    if (joint.low < 0) {
+      continue;
+    }
+    JointRows<double> joint_rows;
+    EvaluateJoint(joint.type, state.PoseOf(joint.a), state.PoseOf(joint.b),
+                  &model.numbers[joint.geometry], &joint_rows);
+    for (const double side : {1.0, -1.0}) {
+      ActiveContact limit;
+      limit.a = joint.a;
+      limit.b = joint.b;
+      limit.joint = static_cast<int>(j);
+      limit.side = side;
+      limit.law = ContactLaw::kInelastic;
+      ContactRows<double> rows;
+      EvaluateLimitRows(model, joint_rows, limit, &rows);
+      limit.gap = rows.geometry.gap;
+      constexpr double kLimitTolerance = 1e-10;  // rad or m
+      if (limit.gap <= kLimitTolerance) {
+        touching_.contacts.push_back(limit);
+        touching_.friction.emplace_back();
+        touching_.restitution.emplace_back();
+        touching_.approach.push_back(
+            RelativeSpeed(state, limit.a, rows.normal_a, limit.b, rows.normal_b));
+        touching_.slip.push_back(0.0);
+      }
+    }
+  }
+}
+
+ContactMode EventStepper::GuessOf(const ActiveContact& contact) const {
+  for (size_t i = 0; i < last_contacts_.size(); ++i) {
+    if (last_contacts_[i].SameAs(contact)) {
+      return last_modes_[i];
+    }
+  }
+  return ContactMode::kSticking;
+}
+
+bool EventStepper::SolveImpacts(const Model<double>& model, double t, State<double>* state,
+                                EventOutcome* outcome) {
+  const SimulationSettings& settings = model.structure->settings;
+  for (int repeat = 0;; ++repeat) {
+    FindTouching(model, *state);
+    const double slow = search_.SpeedTolerance(model, *state);
+    const bool any = std::any_of(touching_.approach.begin(), touching_.approach.end(),
+                                 [&](double speed) { return speed < -slow; });
+    if (!any) {
+      return true;
+    }
+    if (++outcome->events > settings.max_events_per_step && !inelastic_) {
+      inelastic_ = true;
+      ++outcome->fallbacks;
+    }
+    if (outcome->events > kGiveUp * settings.max_events_per_step + kGiveUp) {
+      outcome->message = "events do not end";
+      return false;
+    }
+    EventPart* part = record_.Add();
+    part->is_impulses = true;
+    Impulses& impact = part->impulses;
+    impact.time = t;
+    impact.h = 0.0;
+    impact.before = *state;
+    impact.contacts.clear();
+    impact.friction.clear();
+    impact.restitution.clear();
+    for (size_t i = 0; i < touching_.contacts.size(); ++i) {
+      if (touching_.approach[i] > slow) {
+        continue;
+      }
+      ActiveContact contact = touching_.contacts[i];
+      const bool rebounds = touching_.restitution[i].value > 0.0 && !inelastic_ &&
+                            touching_.approach[i] < -settings.restitution_threshold;
+      contact.law = rebounds ? ContactLaw::kRestitution : ContactLaw::kInelastic;
+      impact.contacts.push_back(contact);
+      impact.friction.push_back(touching_.friction[i]);
+      impact.restitution.push_back(touching_.restitution[i]);
+    }
+    AssembleImpulses(model, &assembly_, &impact);
+    SizeGuess(impact.problem, &impact.solution);
+    for (size_t i = 0; i < impact.contacts.size(); ++i) {
+      impact.solution.modes[i] =
+          impact.problem.contacts[i].has_friction ? ContactMode::kSticking : ContactMode::kClosed;
+    }
+    const ContactSolverReport solved =
+        solver_.Solve(impact.problem, OptionsOf(settings), &impact.solution);
+    Count(solved, outcome);
+    if (!solved.solved) {
+      outcome->residual = solved.residual;
+      outcome->message =
+          "impact: " + (solved.worst_contact >= 0
+                            ? NameOf(*model.structure, impact.contacts[solved.worst_contact])
+                            : std::string("joints"));
+      return false;
+    }
+    solver_.system().MoveFactorsTo(&impact.system);
+    impact.new_twist = state->twist;
+    const double before = KineticEnergy(model, state->twist);
+    SpreadTwists(*model.structure, impact.solution.v, &state->twist);
+    impact.new_twist = state->twist;
+    outcome->impact_energy_gain =
+        std::max(outcome->impact_energy_gain, KineticEnergy(model, state->twist) - before);
+  }
+}
+
+bool EventStepper::SolveByShortStep(const Model<double>& model, double t, double dt,
+                                    State<double>* state, EventOutcome* outcome) {
+  EventPart* part = record_.Add();
+  part->is_impulses = true;
+  Impulses& impulses = part->impulses;
+  impulses.time = t;
+  impulses.h = kShortStep * dt;
+  impulses.before = *state;
+  impulses.contacts = touching_.contacts;
+  impulses.friction = touching_.friction;
+  impulses.restitution.assign(touching_.contacts.size(), CoefficientSource());
+  AssembleImpulses(model, &assembly_, &impulses);
+  SizeGuess(impulses.problem, &impulses.solution);
+  const ContactSolverReport solved =
+      solver_.Solve(impulses.problem, OptionsOf(model.structure->settings), &impulses.solution);
+  Count(solved, outcome);
+  ++outcome->fallbacks;
+  ++outcome->events;
+  if (!solved.solved) {
+    outcome->residual = solved.residual;
+    outcome->message = "accelerations and impulses";
+    if (solved.worst_contact >= 0) {
+      outcome->message += ": " + NameOf(*model.structure, impulses.contacts[solved.worst_contact]);
+    }
+    return false;
+  }
+  solver_.system().MoveFactorsTo(&impulses.system);
+  SpreadTwists(*model.structure, impulses.solution.v, &state->twist);
+  impulses.new_twist = state->twist;
+  return true;
+}
+
+bool EventStepper::ChooseModes(const Model<double>& model, double t, double middle, double length,
+                               State<double>* state, EventOutcome* outcome, Segment* segment) {
+  const SimulationSettings& settings = model.structure->settings;
+  const double slow = search_.SpeedTolerance(model, *state);
+  segment->contacts.clear();
+  segment->friction.clear();
+  segment->modes.clear();
+  std::vector<double> slip;
+  for (size_t i = 0; i < touching_.contacts.size(); ++i) {
+    if (touching_.approach[i] <= slow) {
+      segment->contacts.push_back(touching_.contacts[i]);
+      segment->friction.push_back(touching_.friction[i]);
+      slip.push_back(touching_.slip[i]);
+    }
+  }
+  if (segment->contacts.empty()) {
+    last_contacts_.clear();
+    last_modes_.clear();
+    return true;
+  }
+  ContactProblem<double> problem;
+  AssembleAcceleration(model, *state, t, middle, segment->contacts, segment->friction,
+                       &acceleration_, &problem);
+  // Where a contact slides, friction opposes that whatever the accelerations.
+  double scale = 0.0;
+  for (size_t i = 0; i < problem.momentum.size(); ++i) {
+    scale = std::max(scale, std::abs(problem.momentum[i]) / problem.mass[i]);
+  }
+  for (const ContactBlock<double>& contact : problem.contacts) {
+    scale = std::max({scale, std::abs(contact.c_n), std::abs(contact.c_t)});
+  }
+  ContactSolution<double> solution;
+  SizeGuess(problem, &solution);
+  for (size_t i = 0; i < problem.contacts.size(); ++i) {
+    ContactBlock<double>& contact = problem.contacts[i];
+    ContactMode guess = GuessOf(segment->contacts[i]);
+    if (!contact.has_friction) {
+      guess = guess == ContactMode::kOpen ? guess : ContactMode::kClosed;
+    } else if (std::abs(slip[i]) > slow) {
+      contact.c_t += (slip[i] > 0.0 ? kForcedSlip : -kForcedSlip) * std::max(scale, 1e-300);
+      guess = guess == ContactMode::kOpen ? guess
+              : slip[i] > 0.0             ? ContactMode::kSlidingPositive
+                                          : ContactMode::kSlidingNegative;
+    } else if (guess == ContactMode::kClosed) {
+      guess = ContactMode::kSticking;
+    }
+    solution.modes[i] = guess;
+  }
+  const ContactSolverReport solved = solver_.Solve(problem, OptionsOf(settings), &solution);
+  Count(solved, outcome);
+  if (!solved.solved) {
+    return false;
+  }
+  last_contacts_ = segment->contacts;
+  last_modes_ = solution.modes;
+  size_t kept = 0;
+  for (size_t i = 0; i < segment->contacts.size(); ++i) {
+    if (solution.modes[i] == ContactMode::kOpen) {
+      continue;
+    }
+    segment->contacts[kept] = segment->contacts[i];
+    ActiveContact& contact = segment->contacts[kept];
+    contact.law = contact.gap < -settings.recovery_speed * length ? ContactLaw::kRecovery
+                                                                  : ContactLaw::kInelastic;
+    segment->friction[kept] = segment->friction[i];
+    segment->modes.push_back(solution.modes[i]);
+    ++kept;
+  }
+  segment->contacts.resize(kept);
+  segment->friction.resize(kept);
+  return true;
+}
+
+void EventStepper::SwitchMode(const Segment& segment) {
+  for (size_t i = 0; i < last_contacts_.size(); ++i) {
+    if (!last_contacts_[i].SameAs(segment.event_contact)) {
+      continue;
+    }
+    if (segment.event == EventKind::kLiftOff) {
+      last_modes_[i] = ContactMode::kOpen;
+    } else if (segment.event == EventKind::kSlipBegins) {
+      // It slides against the force that was at its limit.
+      last_modes_[i] =
+          segment.event_sign > 0.0 ? ContactMode::kSlidingNegative : ContactMode::kSlidingPositive;
+    } else if (segment.event == EventKind::kSlipEnds) {
+      last_modes_[i] = ContactMode::kSticking;
+    }
+  }
+}
+
+EventOutcome EventStepper::Step(const Model<double>& model, double t, double h,
+                                State<double>* state) {
+  EventOutcome outcome;
+  record_.Clear();
+  inelastic_ = false;
+  const std::vector<Edge> edges = EdgesWithin(model, t, t + h);
+  size_t next_edge = 0;
+  const double end = t + h;
+  const int most = kGiveUp * model.structure->settings.max_events_per_step + kGiveUp;
+  double now = t;
+  bool impulses_tried = false;
+  const auto fail = [&](const std::string& message) {
+    outcome.done = false;
+    outcome.message = message;
+    return outcome;
+  };
+  while (end - now > 1e-14 * h) {
+    if (!SolveImpacts(model, now, state, &outcome)) {
+      return fail(outcome.message);
+    }
+    while (next_edge < edges.size() && edges[next_edge].time <= now + 1e-14 * h) {
+      ++next_edge;
+    }
+    const bool to_edge = next_edge < edges.size();
+    const double until = to_edge ? edges[next_edge].time : end;
+    const double middle = 0.5 * (now + until);
+    const int parts = record_.num_parts;
+    EventPart* part = record_.Add();
+    part->is_impulses = false;
+    Segment& segment = part->segment;
+    segment.time = now;
+    segment.length = until - now;
+    segment.middle = middle;
+    segment.before = *state;
+    segment.event_number = -1;
+    if (!ChooseModes(model, now, middle, until - now, state, &outcome, &segment)) {
+      record_.num_parts = parts;
+      if (impulses_tried || !SolveByShortStep(model, now, h, state, &outcome)) {
+        return fail(outcome.message.empty() ? "accelerations" : outcome.message);
+      }
+      impulses_tried = true;
+      continue;
+    }
+    impulses_tried = false;
+    std::string message;
+    if (!search_.Run(model, touching_.contacts, &segment, &message)) {
+      return fail(message);
+    }
+    *state = segment.after;
+    if (segment.event == EventKind::kStepEnd) {
+      now = until;
+      if (to_edge) {
+        segment.event = EventKind::kEdge;
+        segment.event_number = edges[next_edge].number;
+        ++outcome.events;
+      }
+      continue;
+    }
+    now += segment.length;
+    SwitchMode(segment);
+    if (segment.event != EventKind::kTouch && ++outcome.events > most) {
+      return fail("events do not end");
+    }
+    if (segment.event == EventKind::kTouch && segment.length <= 1e-13 * h &&
+        ++outcome.events > most) {
+      return fail("events do not end");
+    }
+  }
+  return outcome;
+}
+
+EventPart* EventRecord::Add() {
+  if (num_parts == static_cast<int>(parts.size())) {
+    parts.push_back(std::make_unique<EventPart>());
+  }
+  return parts[num_parts++].get();
+}
+
+size_t EventRecord::bytes() const {
+  size_t sum = 0;
+  const auto states = [](const State<double>& s) {
+    return sizeof(double) * (s.pose.size() + s.twist.size());
+  };
+  const auto node = [&](const SolvedNode& n) {
+    return sizeof(SolvedNode) + states(n.state) + n.system.bytes() +
+           sizeof(ContactBlock<double>) * n.problem.contacts.size() +
+           sizeof(JointBlock<double>) * n.problem.joints.size();
+  };
+  for (int i = 0; i < num_parts; ++i) {
+    const EventPart& part = *parts[i];
+    const Segment& segment = part.segment;
+    sum += sizeof(EventPart) + states(segment.before) + states(segment.after) +
+           part.impulses.system.bytes() + segment.projection.system.bytes();
+    for (int k = 0; k < segment.num_stages; ++k) {
+      sum += node(segment.stages[k]);
+    }
+    for (int k = 0; k < segment.num_corrections; ++k) {
+      sum += node(segment.corrections[k]);
+    }
+  }
+  return sum;
+}
+
+SolvedStep Impulses::View() const {
+  SolvedStep view;
+  view.time = time;
+  view.h = h;
+  view.corrects_drift = false;
+  view.before = &before;
+  view.new_twist = &new_twist;
+  view.contacts = &contacts;
+  view.friction = &friction;
+  view.restitution = &restitution;
+  view.problem = &problem;
+  view.solution = &solution;
+  view.contact_block = &system.contact_block();
+  return view;
+}
+
+SolvedAcceleration ViewOf(const Segment& segment, const SolvedNode& node, bool correction) {
+  SolvedAcceleration view;
+  view.correction = correction;
+  view.time = node.time;
+  view.middle = segment.middle;
+  view.state = &node.state;
+  view.contacts = &segment.contacts;
+  view.friction = &segment.friction;
+  view.problem = &node.problem;
+  view.solution = &node.solution;
+  view.contact_block = &node.system.contact_block();
+  return view;
+}
+
+}  // namespace tangible

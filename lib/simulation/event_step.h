@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// Event stepping: a step of [t, t + h] as segments of smooth motion, ended by events that are
+// located in time, and impacts between them.
+//
+//   1. contacts that touch: where one approaches, an impact (Newton's law, no forces) is solved,
+//      until none does
+//   2. those that neither approach nor separate: accelerations as an LCP say which stay closed, and
+//      whether they stick; where it has no solution (Painlevé) impulses of a very short step
+//   3. with these modes held the motion is integrated up to the earliest event (event_search.h)
+//
+// The time of an event is a function of state and parameters, by its own equation: gap = 0, sliding
+// speed = 0, normal force = 0, friction at its limit. The derivatives (event_derivative.h) follow
+// it.
+
+#include <string>
+#include <vector>
+
+#include "tangible/dynamics/contact_search.h"
+#include "tangible/lcp/contact_solver.h"
+#include "tangible/simulation/event_search.h"
+
+namespace tangible {
+
+/// What an event step reports beside its record.
+struct EventOutcome {
+  bool done = true;
+  std::string message;  ///< empty unless it failed
+  int events = 0;
+  int fallbacks = 0;  ///< Painlevé impulses, and rebounds given up beyond max_events_per_step
+  int factorisations = 0;
+  int iterations = 0;
+  double residual = 0.0;
+  double impact_energy_gain = 0.0;  ///< J, the largest of an impact
+  bool by_guess = true;             ///< whether the modes of the last segment served everywhere
+  bool by_lemke = false;
+};
+
+class EventStepper {
+ public:
+  explicit EventStepper(const Model<double>& model);
+
+  EventOutcome Step(const Model<double>& model, double t, double h, State<double>* state);
+  /// Of the last step.
+  const EventRecord& record() const { return record_; }
+  EventRecord& mutable_record() { return record_; }
+  /// Forgets the contacts' modes.
+  void ClearGuess();
+
+ private:
+  struct Touching {
+    std::vector<ActiveContact> contacts;
+    std::vector<CoefficientSource> friction, restitution;
+    std::vector<double> approach, slip;  ///< n v and t v, m/s
+  };
+  void FindTouching(const Model<double>& model, const State<double>& state);
+  bool SolveImpacts(const Model<double>& model, double t, State<double>* state,
+                    EventOutcome* outcome);
+  bool ChooseModes(const Model<double>& model, double t, double middle, double length,
+                   State<double>* state, EventOutcome* outcome, Segment* segment);
+  bool SolveByShortStep(const Model<double>& model, double t, double dt, State<double>* state,
+                        EventOutcome* outcome);
+  ContactMode GuessOf(const ActiveContact& contact) const;
+  void SwitchMode(const Segment& segment);
+
+  EventSearch search_;
+  ContactSolver solver_;
+  EventRecord record_;
+  AssemblyScratch<double> assembly_;
+  AccelerationScratch<double> acceleration_;
+  Touching touching_;
+  // The last modes, which are the next guess.
+  std::vector<ActiveContact> last_contacts_;
+  std::vector<ContactMode> last_modes_;
+  bool inelastic_ = false;
+};
+
+}  // namespace tangible

@@ -1,0 +1,310 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/simulation/segment_flow.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace tangible {
+namespace {
+
+constexpr int kMostCorrections = 12;
+constexpr int kMostIterations = 100;
+constexpr double kIterated = 1e-14;  // relative change at which the implicit stage has converged
+
+NystromTableau SemiImplicitEuler() {
+  NystromTableau t;
+  t.stages = 1;
+  t.b[0] = 1.0;
+  t.b_hat[0] = 1.0;
+  return t;
+}
+
+NystromTableau Trapezoidal() {
+  NystromTableau t;
+  t.stages = 2;
+  t.c[1] = 1.0;
+  for (int j = 0; j < 2; ++j) {
+    t.a[1][j] = 0.5;
+    t.a_hat[1][j] = 0.25;
+    t.b[j] = 0.5;
+    t.b_hat[j] = 0.25;
+  }
+  t.last_is_implicit = true;
+  return t;
+}
+
+NystromTableau RungeKutta4() {
+  NystromTableau t;
+  t.stages = 4;
+  const double c[4] = {0.0, 0.5, 0.5, 1.0};
+  std::copy_n(c, 4, t.c);
+  t.a[1][0] = 0.5;
+  t.a[2][1] = 0.5;
+  t.a[3][2] = 1.0;
+  t.a_hat[2][0] = 0.25;
+  t.a_hat[3][1] = 0.5;
+  const double b[4] = {1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0};
+  std::copy_n(b, 4, t.b);
+  for (int j = 0; j < 3; ++j) {
+    t.b_hat[j] = 1.0 / 6.0;
+  }
+  return t;
+}
+
+bool AllFinite(const std::vector<double>& values) {
+  return std::all_of(values.begin(), values.end(), [](double x) { return std::isfinite(x); });
+}
+
+// x += factor · (a solution's bodies).
+void AddBodies(const ModelStructure& structure, double factor, const std::vector<double>& solved,
+               std::vector<double>* x) {
+  if (factor == 0.0) {
+    return;
+  }
+  for (int k = 0; k < structure.num_blocks(); ++k) {
+    for (int i = 0; i < 3; ++i) {
+      (*x)[3 * structure.moving[k] + i] += factor * solved[3 * k + i];
+    }
+  }
+}
+
+// Errors that a correction is to remove: joints, where they are corrected, and gaps.
+double CorrectedError(const ContactProblem<double>& problem) {
+  double error = 0.0;
+  for (const JointBlock<double>& joint : problem.joints) {
+    for (int k = 0; k < joint.rows; ++k) {
+      error = std::max(error, std::abs(joint.rhs[k]));
+    }
+  }
+  for (const ContactBlock<double>& contact : problem.contacts) {
+    error = std::max(error, std::abs(contact.c_n));
+  }
+  return error;
+}
+
+}  // namespace
+
+const NystromTableau& NystromTableau::Of(Integrator integrator) {
+  static const NystromTableau kEuler = SemiImplicitEuler();
+  static const NystromTableau kTrapezoidal = Trapezoidal();
+  static const NystromTableau kRungeKutta = RungeKutta4();
+  return integrator == Integrator::kSemiImplicitEuler ? kEuler
+         : integrator == Integrator::kTrapezoidal     ? kTrapezoidal
+                                                      : kRungeKutta;
+}
+
+bool SolveNode(const std::vector<ContactMode>& modes, SolvedNode* node) {
+  const ContactProblem<double>& p = node->problem;
+  ContactSolution<double>& s = node->solution;
+  s.modes = modes;
+  if (!node->system.Factor(p, modes)) {
+    return false;
+  }
+  std::vector<double> x(3 * static_cast<size_t>(node->system.num_blocks()), 0.0);
+  std::copy(p.momentum.begin(), p.momentum.end(), x.begin());
+  for (size_t j = 0; j < p.joints.size(); ++j) {
+    std::copy_n(p.joints[j].rhs, p.joints[j].rows, &x[3 * (p.num_bodies + j)]);
+  }
+  const std::vector<int>& block_of = node->system.contact_block();
+  for (size_t i = 0; i < p.contacts.size(); ++i) {
+    if (block_of[i] >= 0) {
+      x[3 * block_of[i]] = -p.contacts[i].c_n;
+      if (modes[i] == ContactMode::kSticking) {
+        x[3 * block_of[i] + 1] = -p.contacts[i].c_t;
+      }
+    }
+  }
+  node->system.Solve(p, modes, x.data(), 1);
+  s.v.assign(x.begin(), x.begin() + 3 * p.num_bodies);
+  s.joint_impulse.assign(3 * p.joints.size(), 0.0);
+  std::copy_n(x.begin() + 3 * p.num_bodies, s.joint_impulse.size(), s.joint_impulse.begin());
+  s.normal_impulse.assign(p.contacts.size(), 0.0);
+  s.tangent_impulse.assign(p.contacts.size(), 0.0);
+  for (size_t i = 0; i < p.contacts.size(); ++i) {
+    if (block_of[i] >= 0) {
+      s.normal_impulse[i] = x[3 * block_of[i]];
+      s.tangent_impulse[i] =
+          modes[i] == ContactMode::kSticking
+              ? x[3 * block_of[i] + 1]
+              : -SlidingSign(modes[i]) * p.contacts[i].friction * s.normal_impulse[i];
+    }
+  }
+  return AllFinite(x);
+}
+
+void SpreadTwists(const ModelStructure& structure, const std::vector<double>& solved,
+                  std::vector<double>* twist) {
+  for (int k = 0; k < structure.num_blocks(); ++k) {
+    std::copy_n(&solved[3 * k], 3, &(*twist)[3 * structure.moving[k]]);
+  }
+}
+
+void AssembleImpulses(const Model<double>& model, AssemblyScratch<double>* scratch,
+                      Impulses* impulses) {
+  AssembleFree(model, impulses->before, impulses->time, impulses->h, &impulses->problem, scratch,
+               false);
+  AssembleContacts(model, impulses->before, impulses->h, impulses->contacts, impulses->friction,
+                   impulses->restitution, *scratch, &impulses->problem);
+}
+
+bool SegmentFlow::Accelerate(const Model<double>& model, const Segment& segment,
+                             const State<double>& state, double time, SolvedNode* node) {
+  node->state = state;
+  node->time = time;
+  AssembleAcceleration(model, state, time, segment.middle, segment.contacts, segment.friction,
+                       &acceleration_, &node->problem);
+  return SolveNode(segment.modes, node);
+}
+
+bool SegmentFlow::Integrate(const Model<double>& model, Segment* segment, std::string* message) {
+  const ModelStructure& structure = *model.structure;
+  const NystromTableau& tableau = NystromTableau::Of(structure.settings.integrator);
+  const double tau = segment->length;
+  segment->num_stages = tableau.stages;
+  if (static_cast<int>(segment->stages.size()) < tableau.stages) {
+    segment->stages.resize(tableau.stages);
+  }
+  const auto place = [&](double c, const double* a, const double* a_hat, int terms,
+                         State<double>* state) {
+    *state = segment->before;
+    for (size_t i = 0; i < state->pose.size(); ++i) {
+      state->pose[i] += c * tau * segment->before.twist[i];
+    }
+    for (int j = 0; j < terms; ++j) {
+      const std::vector<double>& acceleration = segment->stages[j].solution.v;
+      AddBodies(structure, tau * tau * a_hat[j], acceleration, &state->pose);
+      AddBodies(structure, tau * a[j], acceleration, &state->twist);
+    }
+  };
+  State<double> state;
+  for (int i = 0; i < tableau.stages; ++i) {
+    const bool implicit = tableau.last_is_implicit && i + 1 == tableau.stages;
+    SolvedNode& stage = segment->stages[i];
+    if (implicit) {
+      stage.solution.v = segment->stages[i - 1].solution.v;  // a start for the iteration
+    }
+    for (int iteration = 0;; ++iteration) {
+      place(tableau.c[i], tableau.a[i], tableau.a_hat[i], implicit ? i + 1 : i, &state);
+      const std::vector<double> last = implicit ? stage.solution.v : std::vector<double>();
+      if (!AllFinite(state.pose) || !AllFinite(state.twist) ||
+          !Accelerate(model, *segment, state, segment->time + tableau.c[i] * tau, &stage)) {
+        *message = "accelerations with the contacts' modes held are singular";
+        return false;
+      }
+      if (!implicit) {
+        break;
+      }
+      double change = 0.0;
+      double size = 0.0;
+      for (size_t k = 0; k < last.size(); ++k) {
+        change = std::max(change, std::abs(stage.solution.v[k] - last[k]));
+        size = std::max(size, std::abs(last[k]));
+      }
+      // Rounding may keep it from the last digit: beyond a few iterations less is enough.
+      if (change <= (iteration < 20 ? kIterated : 1e3 * kIterated) * size) {
+        break;
+      }
+      if (iteration == kMostIterations) {
+        *message = "the trapezoidal rule's iteration does not converge: dt is too large";
+        return false;
+      }
+    }
+  }
+  place(1.0, tableau.b, tableau.b_hat, tableau.stages, &segment->after);
+  return true;
+}
+
+bool SegmentFlow::CorrectPoses(const Model<double>& model, Segment* segment, std::string* message) {
+  const ModelStructure& structure = *model.structure;
+  const SimulationSettings& settings = structure.settings;
+  segment->num_corrections = 0;
+  const bool joints =
+      !structure.joints.empty() && settings.joint_correction != JointCorrection::kNone;
+  if (segment->contacts.empty() && !joints) {
+    return true;
+  }
+  bool once = joints && settings.joint_correction == JointCorrection::kBaumgarte;
+  for (const ActiveContact& contact : segment->contacts) {
+    once = once || contact.law == ContactLaw::kRecovery;
+  }
+  const std::vector<ContactMode> modes(segment->contacts.size(), ContactMode::kClosed);
+  double last = HUGE_VAL;
+  for (int k = 0; k < kMostCorrections; ++k) {
+    if (static_cast<int>(segment->corrections.size()) <= k) {
+      segment->corrections.emplace_back();
+    }
+    SolvedNode& node = segment->corrections[k];
+    node.state = segment->after;
+    node.time = segment->time + segment->length;
+    AssembleCorrection(model, node.state, segment->contacts, segment->friction,
+                       settings.recovery_speed * segment->length, &acceleration_, &node.problem);
+    const double error = CorrectedError(node.problem);
+    // Newton's method squares the error; what does not shrink any more is rounding.
+    if (k > 0 && (once || error <= 1e-15 || error > 0.1 * last)) {
+      if (!once && error > std::max(settings.joint_tolerance, 1e-9) && error >= last) {
+        *message = "projection onto joints and contacts: error " + std::to_string(error);
+        return false;
+      }
+      break;
+    }
+    last = error;
+    if (!SolveNode(modes, &node)) {
+      *message = "projection onto joints and contacts is singular";
+      return false;
+    }
+    AddBodies(structure, 1.0, node.solution.v, &segment->after.pose);
+    segment->num_corrections = k + 1;
+  }
+  return true;
+}
+
+void SetUpProjection(const Segment& segment, const State<double>& state, Impulses* projection) {
+  projection->time = segment.time + segment.length;
+  projection->h = 0.0;
+  projection->before = state;
+  projection->contacts = segment.contacts;
+  projection->friction = segment.friction;
+  projection->restitution.assign(segment.contacts.size(), CoefficientSource());
+  projection->solution.modes = segment.modes;
+  for (size_t i = 0; i < segment.contacts.size(); ++i) {
+    projection->contacts[i].law = ContactLaw::kInelastic;
+    if (segment.modes[i] != ContactMode::kSticking) {
+      projection->friction[i] = CoefficientSource();
+      projection->solution.modes[i] = ContactMode::kClosed;
+    }
+  }
+}
+
+bool SegmentFlow::ProjectTwists(const Model<double>& model, Segment* segment,
+                                std::string* message) {
+  segment->projects_twists = !segment->contacts.empty() || !model.structure->joints.empty();
+  if (!segment->projects_twists) {
+    return true;
+  }
+  SetUpProjection(*segment, segment->after, &segment->projection);
+  Impulses& projection = segment->projection;
+  AssembleImpulses(model, &assembly_, &projection);
+  // The same solve as a node's; only its members are kept elsewhere.
+  SolvedNode node;
+  std::swap(node.problem, projection.problem);
+  std::swap(node.system, projection.system);
+  const std::vector<ContactMode> modes = projection.solution.modes;
+  const bool solved = SolveNode(modes, &node);
+  std::swap(node.problem, projection.problem);
+  std::swap(node.system, projection.system);
+  projection.solution = std::move(node.solution);
+  if (!solved) {
+    *message = "projection of twists is singular";
+    return false;
+  }
+  SpreadTwists(*model.structure, projection.solution.v, &segment->after.twist);
+  projection.new_twist = segment->after.twist;
+  return true;
+}
+
+bool SegmentFlow::Run(const Model<double>& model, Segment* segment, std::string* message) {
+  return Integrate(model, segment, message) && CorrectPoses(model, segment, message) &&
+         ProjectTwists(model, segment, message);
+}
+
+}  // namespace tangible
