@@ -180,6 +180,20 @@ TEST(StepTest, NoAllocationAfterTheFirstStep) {
   EXPECT_EQ(sliding, 18);
 }
 
+TEST(StepTest, NoAllocationInAChainThatWhips) {
+  Model<double> model;
+  State<double> state;
+  BuildModel(SceneOf(test_scenes::WhippingChain(2.0)), &model, &state);
+  Stepper stepper(model);
+  ASSERT_EQ(stepper.Step(model, 0.0, 0.01, &state).status, StepStatus::kDone);
+  const long before = testing::NumAllocations();
+  for (int k = 1; k < 200; ++k) {
+    const StepReport report = stepper.Step(model, 0.01 * k, 0.01, &state);
+    ASSERT_EQ(report.status, StepStatus::kDone) << k << " " << report.message;
+  }
+  EXPECT_EQ(testing::NumAllocations(), before);
+}
+
 TEST(StepTest, TimesAreNotAccumulated) {
   SimulationSettings settings;
   settings.dt = 0.1;
