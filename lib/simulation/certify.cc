@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "tangible/lcp/contact_conditioning.h"
+#include "tangible/simulation/feature_ties.h"
 
 namespace tangible {
 namespace {
@@ -211,6 +212,24 @@ void RolloutCertifier::AddLinearSystem(const StepRecord& record, ContactSystem* 
   certificate_.linear_residual = std::max(certificate_.linear_residual, quality.residual);
 }
 
+// Each pair of shapes once: its contacts stand together.
+void RolloutCertifier::AddFeatures(const Model<double>& model, const StepRecord& record, long step,
+                                   ContactSystem* system) {
+  const std::vector<ActiveContact>& contacts = record.contacts;
+  size_t last = 0;
+  for (size_t first = 0; first < contacts.size(); first = last) {
+    for (last = first + 1; last < contacts.size() && contacts[first].joint < 0 &&
+                           contacts[last].joint < 0 && contacts[last].a == contacts[first].a &&
+                           contacts[last].b == contacts[first].b;) {
+      ++last;
+    }
+    const Place place{model.structure.get(),       step, record.time, first, &contacts[first],
+                      record.solution.modes[first]};
+    AddMargin(FeatureChangeMargin(model, record, first, last, system), place,
+              "where another corner or edge takes over");
+  }
+}
+
 void RolloutCertifier::AddStep(const Model<double>& model, long step, Stepper* stepper) {
   const StepRecord& record = stepper->record();
   const ModelStructure& s = *model.structure;
@@ -237,6 +256,7 @@ void RolloutCertifier::AddStep(const Model<double>& model, long step, Stepper* s
   FindDegenerateContacts(record.problem, record.solution, kDegenerate, &degenerate);
   certificate_.degenerate_rows += static_cast<int>(degenerate.size());
   AddLinearSystem(record, &stepper->system());
+  AddFeatures(model, record, step, &stepper->system());
   last_modes_ = record.solution.modes;
 }
 

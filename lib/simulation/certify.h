@@ -4,15 +4,15 @@
 // The certificate of a rollout's derivative: how near its steps are to kinks and jumps.
 //
 //   margins        of every contact and limit of every step, by its mode (MarginOfContact);
-//   besides, of the choice between
-//                  the constants gap / h, −recovery_speed and e (n·v) where these are continuous
-//   jumps          the restitution decisions (contact.h): the smallest relative |approach speed −
-//   threshold| and
-//                  |gap + h n·v_free − margin| of contacts with e > 0; and a landing in the last
-//                  step, whose twist has derivatives of order 1/h that the next step would cancel
+//                  besides, of the choice between the constants gap / h, −recovery_speed and
+//                  e (n·v) where these are continuous, and of the choice of the corners and edges
+//                  that touch (feature_ties.h)
+//   jumps          the restitution decisions (contact.h): the smallest relative
+//                  |approach speed − threshold| and |gap + h n·v_free − margin| of contacts with
+//                  e > 0; and a landing in the last step, whose twist has derivatives of order 1/h
+//                  that the next step would cancel
 //   one-sided      friction exactly 0, a tie of the mixing rule, an edge of a force's window on a
-//   step's boundary: only
-//                  where derivatives with respect to these numbers are wanted
+//                  step's boundary: only where derivatives with respect to these numbers are wanted
 //   linear systems redundant rows, condition, residual (contact_conditioning.h), of every step
 
 #include <string>
@@ -50,6 +50,8 @@ class RolloutCertifier {
   void AddContact(const Model<double>& model, const StepRecord& record, const Place& place);
   void AddLaw(const Model<double>& model, const StepRecord& record, const Place& place);
   void AddCoefficients(const StepRecord& record, const Place& place);
+  void AddFeatures(const Model<double>& model, const StepRecord& record, long step,
+                   ContactSystem* system);
   void AddLinearSystem(const StepRecord& record, ContactSystem* system);
   void AddForceWindows(const Model<double>& model);
   bool Wanted(int number) const;
