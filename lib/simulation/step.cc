@@ -235,6 +235,9 @@ void Stepper::FillReport(const Model<double>& model, const ContactSolverReport& 
   if (!solved.solved) {
     report->status = StepStatus::kUnsolved;
     Describe(model, solved.worst_contact, report);
+    std::ostringstream residual;
+    residual << " (scaled residual " << solved.residual << ")";
+    report->message += residual.str();
     return;
   }
   bool impact = false;
