@@ -322,6 +322,22 @@ bool ContactSolver::SolveByBoundedFriction(const ContactProblem<double>& problem
   return false;
 }
 
+void ContactSolver::MeasureWithoutContacts(const ContactProblem<double>& problem,
+                                           ContactSolution<double>* solution,
+                                           ContactSolverReport* report) {
+  solution->modes.assign(problem.contacts.size(), ContactMode::kOpen);
+  solution->normal_impulse.assign(problem.contacts.size(), 0.0);
+  solution->tangent_impulse.assign(problem.contacts.size(), 0.0);
+  if (!SolveWithModes(problem, solution, report)) {
+    solution->v.resize(problem.momentum.size());
+    for (size_t i = 0; i < solution->v.size(); ++i) {
+      solution->v[i] = problem.momentum[i] / problem.mass[i];
+    }
+    solution->joint_impulse.assign(3 * problem.joints.size(), 0.0);
+  }
+  report->residual = NaturalResidual(problem, *solution, &report->worst_contact);
+}
+
 bool ContactSolver::SolveByLemke(const ContactProblem<double>& problem,
                                  const ContactSolverOptions& options,
                                  ContactSolution<double>* solution, ContactSolverReport* report) {
@@ -332,6 +348,9 @@ bool ContactSolver::SolveByLemke(const ContactProblem<double>& problem,
     return true;
   }
   if (options.choice == ContactSolverChoice::kLemke) {
+    if (!by_lemke) {
+      MeasureWithoutContacts(problem, solution, report);
+    }
     return false;
   }
   const bool dense = SolveContactsDense(problem, options.tolerance, solution, &iterations);
@@ -354,6 +373,8 @@ ContactSolverReport ContactSolver::Solve(const ContactProblem<double>& problem,
       if (report.residual <= options.tolerance) {
         return done(SolvedBy::kDirect);
       }
+    } else {
+      MeasureWithoutContacts(problem, solution, &report);
     }
     return report;
   }

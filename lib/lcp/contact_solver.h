@@ -72,6 +72,10 @@ class ContactSolver {
                               ContactSolution<double>* solution, ContactSolverReport* report);
   bool SolveByLemke(const ContactProblem<double>& problem, const ContactSolverOptions& options,
                     ContactSolution<double>* solution, ContactSolverReport* report);
+  // Where a method ends without any iterate: the motion without contact impulses stands in for it,
+  // so that the report names a contact that is violated and by how much.
+  void MeasureWithoutContacts(const ContactProblem<double>& problem,
+                              ContactSolution<double>* solution, ContactSolverReport* report);
   bool Polish(const ContactProblem<double>& problem, const ContactSolverOptions& options,
               ContactSolution<double>* solution, ContactSolverReport* report);
 

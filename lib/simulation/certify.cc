@@ -7,6 +7,8 @@
 #include <utility>
 
 #include "tangible/lcp/contact_conditioning.h"
+#include "tangible/simulation/certify_place_inl.h"
+#include "tangible/simulation/feature_ties.h"
 
 namespace tangible {
 namespace {
@@ -18,12 +20,6 @@ constexpr double kDegenerate = 1e-10;
 constexpr size_t kRankEachStep = 150;
 // s; edges of force windows nearer to a step's boundary than this are on it.
 constexpr double kSameTime = 1e-9;
-
-std::string Short(double x) {
-  char text[32];
-  std::snprintf(text, sizeof(text), "%.6g", x);
-  return text;
-}
 
 // The speed n·v before the step, and were there no contacts and joints.
 struct Approach {
@@ -51,20 +47,6 @@ Approach ApproachOf(const ModelStructure& s, const StepRecord& r, size_t i) {
 }
 
 }  // namespace
-
-struct RolloutCertifier::Place {
-  const ModelStructure* structure;
-  long step;
-  double time;
-  size_t contact;
-  const ActiveContact* active;
-  ContactMode mode;
-
-  std::string Text() const {
-    return "step " + std::to_string(step) + ", t = " + Short(time) +
-           " s: " + ContactName(*structure, *active);
-  }
-};
 
 std::string ContactName(const ModelStructure& structure, const ActiveContact& contact) {
   if (contact.joint >= 0) {
@@ -211,7 +193,29 @@ void RolloutCertifier::AddLinearSystem(const StepRecord& record, ContactSystem* 
   certificate_.linear_residual = std::max(certificate_.linear_residual, quality.residual);
 }
 
+// Each pair of shapes once: its contacts stand together.
+void RolloutCertifier::AddFeatures(const Model<double>& model, const StepRecord& record, long step,
+                                   ContactSystem* system) {
+  const std::vector<ActiveContact>& contacts = record.contacts;
+  size_t last = 0;
+  for (size_t first = 0; first < contacts.size(); first = last) {
+    for (last = first + 1; last < contacts.size() && contacts[first].joint < 0 &&
+                           contacts[last].joint < 0 && contacts[last].a == contacts[first].a &&
+                           contacts[last].b == contacts[first].b;) {
+      ++last;
+    }
+    const Place place{model.structure.get(),       step, record.time, first, &contacts[first],
+                      record.solution.modes[first]};
+    AddMargin(FeatureChangeMargin(model, record, first, last, system), place,
+              "where another corner or edge takes over");
+  }
+}
+
 void RolloutCertifier::AddStep(const Model<double>& model, long step, Stepper* stepper) {
+  if (stepper->by_events()) {
+    AddEventStep(model, step, stepper);
+    return;
+  }
   const StepRecord& record = stepper->record();
   const ModelStructure& s = *model.structure;
   landing_.clear();
@@ -237,6 +241,7 @@ void RolloutCertifier::AddStep(const Model<double>& model, long step, Stepper* s
   FindDegenerateContacts(record.problem, record.solution, kDegenerate, &degenerate);
   certificate_.degenerate_rows += static_cast<int>(degenerate.size());
   AddLinearSystem(record, &stepper->system());
+  AddFeatures(model, record, step, &stepper->system());
   last_modes_ = record.solution.modes;
 }
 
@@ -269,11 +274,13 @@ void RolloutCertifier::AddForceWindows(const Model<double>& model) {
 Certificate RolloutCertifier::Finish(const Model<double>& model, const RolloutReport& report) {
   AddForceWindows(model);
   certificate_.mode_switches = static_cast<int>(report.mode_switches);
+  certificate_.events = static_cast<int>(report.events);
   // A solver that the scene asks for is no fallback.
   certificate_.fallbacks =
-      model.structure->settings.solver == SolverChoice::kAuto
-          ? static_cast<int>(report.solved_by_interior_point + report.solved_by_lemke)
-          : 0;
+      static_cast<int>(report.fallbacks) +
+      (model.structure->settings.solver == SolverChoice::kAuto
+           ? static_cast<int>(report.solved_by_interior_point + report.solved_by_lemke)
+           : 0);
   if (jump_margin_ < kNearJumpMargin) {
     certificate_.discontinuous = jump_where_;
   } else {

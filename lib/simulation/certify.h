@@ -4,15 +4,15 @@
 // The certificate of a rollout's derivative: how near its steps are to kinks and jumps.
 //
 //   margins        of every contact and limit of every step, by its mode (MarginOfContact);
-//   besides, of the choice between
-//                  the constants gap / h, −recovery_speed and e (n·v) where these are continuous
-//   jumps          the restitution decisions (contact.h): the smallest relative |approach speed −
-//   threshold| and
-//                  |gap + h n·v_free − margin| of contacts with e > 0; and a landing in the last
-//                  step, whose twist has derivatives of order 1/h that the next step would cancel
+//                  besides, of the choice between the constants gap / h, −recovery_speed and
+//                  e (n·v) where these are continuous, and of the choice of the corners and edges
+//                  that touch (feature_ties.h)
+//   jumps          the restitution decisions (contact.h): the smallest relative
+//                  |approach speed − threshold| and |gap + h n·v_free − margin| of contacts with
+//                  e > 0; and a landing in the last step, whose twist has derivatives of order 1/h
+//                  that the next step would cancel
 //   one-sided      friction exactly 0, a tie of the mixing rule, an edge of a force's window on a
-//   step's boundary: only
-//                  where derivatives with respect to these numbers are wanted
+//                  step's boundary: only where derivatives with respect to these numbers are wanted
 //   linear systems redundant rows, condition, residual (contact_conditioning.h), of every step
 
 #include <string>
@@ -47,9 +47,18 @@ class RolloutCertifier {
   struct Place;
   void AddMargin(double margin, const Place& place, const std::string& what);
   void AddJump(double margin, const Place& place, const std::string& what);
+  void AddEventStep(const Model<double>& model, long step, Stepper* stepper);
+  void AddImpact(const Model<double>& model, long step, Impulses* impact);
+  void AddSegment(const Model<double>& model, long step, EventDerivative* derivative,
+                  Segment* segment);
+  void AddQuality(const ContactProblem<double>& problem, const std::vector<ContactMode>& modes,
+                  ContactSystem* system);
+  void AddSimultaneous(const Model<double>& model, long step, const Impulses& impact);
   void AddContact(const Model<double>& model, const StepRecord& record, const Place& place);
   void AddLaw(const Model<double>& model, const StepRecord& record, const Place& place);
   void AddCoefficients(const StepRecord& record, const Place& place);
+  void AddFeatures(const Model<double>& model, const StepRecord& record, long step,
+                   ContactSystem* system);
   void AddLinearSystem(const StepRecord& record, ContactSystem* system);
   void AddForceWindows(const Model<double>& model);
   bool Wanted(int number) const;
@@ -63,6 +72,9 @@ class RolloutCertifier {
   std::vector<ActiveContact> closed_;  ///< of the last step
   std::vector<ContactMode> last_modes_;
   int last_redundant_ = 0;
+  // Event stepping: the bodies that the last impact moved, and when.
+  std::vector<bool> struck_;
+  double struck_at_ = -std::numeric_limits<double>::infinity();
 };
 
 /// Runs the rollout and certifies it. A rollout that fails is certified as far as it came; `report`

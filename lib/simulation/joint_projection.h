@@ -1,19 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// Projection of poses onto the joints: after q̃ = q + h v⁺ finds q⁺ near q̃ with C(q⁺) = 0,
+// Projection of poses onto the joints: after q̃ = q + h v⁺ finds the nearest q⁺ with C(q⁺) = 0, in
+// the metric of M,
 //
-//   M (q⁺ − q̃) = A(q̃)ᵀ μ,   C(q⁺) = 0,
+//   M (q⁺ − q̃) = A(q⁺)ᵀ μ,   C(q⁺) = 0,   A = ∂C/∂q
 //
-// the correction along the joints' directions at q̃ that is least in the metric of M to first order.
-// Newton's method with the matrix [M −A(q̃)ᵀ; A(q) 0]; at the end the matrix with A(q⁺) is the
+// The directions A(q⁺) are those of the solution, not of q̃: with directions frozen at q̃ there is no
+// solution where the drift is large. The matrix of projection_newton.h's last iterate is the
 // derivative's.
 
-#include <string>
 #include <vector>
 
 #include "tangible/dynamics/local_jacobian.h"
-#include "tangible/lcp/block_lu.h"
+#include "tangible/simulation/projection_newton.h"
 
 namespace tangible {
 
@@ -23,7 +23,9 @@ class JointProjection {
   /// not met.
   bool Project(const Model<double>& model, State<double>* state);
   /// Largest |C| after the last projection, m or rad.
-  double error() const { return error_; }
+  double error() const { return iterate_.error; }
+  /// The joint of that error; −1 without joints.
+  int worst_joint() const;
 
   /// Tangent at the last projection: w_dot (poses of q̃, twists, numbers) has its poses of moving
   /// bodies replaced by those of q⁺. Row-major, `columns` columns.
@@ -32,25 +34,20 @@ class JointProjection {
   /// added to.
   void Adjoint(const Model<double>& model, double* w_bar, int columns);
 
-  /// The unrolled iteration in Jets: Newton steps in T until values and one more step have
-  /// converged.
+  /// The unrolled iteration in Jets: the same steps in T, and more until derivatives, which lag
+  /// behind values, have converged.
   template <typename T>
   static void ProjectUnrolled(const Model<T>& model, State<T>* state);
 
-  void Reserve(int num_blocks, int num_edges) { lu_.Reserve(num_blocks, num_edges); }
+  void Reserve(int num_blocks, int num_edges) { iterate_.lu.Reserve(num_blocks, num_edges); }
 
  private:
-  void Factor(const Model<double>& model);
   template <typename Sink>
   void Visit(const Model<double>& model, const Sink& sink);
+  void SolveRefined(const Model<double>& model, std::vector<double>* x, int columns);
 
-  State<double> from_, to_;          ///< q̃ and q⁺
-  std::vector<double> multipliers_;  ///< μ, three a joint
-  std::vector<JointRows<double>> rows_from_, rows_to_;
-  BlockLu<double> lu_;
-  std::vector<std::pair<int, int>> edges_;
-  std::vector<double> rhs_;
-  double error_ = 0.0;
+  ProjectionIterate<double> iterate_;
+  std::vector<double> rhs_, solution_;
 };
 
 /// Largest |C(q)| over all joints: m for anchors, rad for angles; 0 without joints.

@@ -13,9 +13,6 @@ std::string FailureMessage(const StepReport& step, double t, long k) {
   message << "step " << k << " at t = " << t
           << " s: " << (step.status == StepStatus::kDiverged ? "diverged: " : "unsolved: ")
           << step.message;
-  if (step.status == StepStatus::kUnsolved) {
-    message << " (scaled residual " << step.residual << ")";
-  }
   return message.str();
 }
 

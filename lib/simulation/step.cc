@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <sstream>
 
 namespace tangible {
 namespace {
@@ -100,7 +101,7 @@ Stepper::Stepper(const Model<double>& model) : search_(model) {
   const int contacts = 6 * shaped + 2 * static_cast<int>(s.joints.size());
   solver_.Reserve(s.num_blocks(), static_cast<int>(s.joints.size()), contacts);
   projection_.Reserve(s.num_blocks() + static_cast<int>(s.joints.size()),
-                      2 * static_cast<int>(s.joints.size()));
+                      3 * static_cast<int>(s.joints.size()));
   record_.contacts.reserve(contacts);
   last_contacts_.reserve(contacts);
   wider_contacts_.reserve(contacts);
@@ -241,6 +242,9 @@ void Stepper::FillReport(const Model<double>& model, const ContactSolverReport& 
   if (!solved.solved) {
     report->status = StepStatus::kUnsolved;
     Describe(model, solved.worst_contact, report);
+    std::ostringstream residual;
+    residual << " (scaled residual " << solved.residual << ")";
+    report->message += residual.str();
     return;
   }
   bool impact = false;
@@ -324,7 +328,10 @@ StepReport Stepper::Step(const Model<double>& model, double t, double h, State<d
   if (settings.joint_correction == JointCorrection::kProjection && !structure.joints.empty() &&
       !projection_.Project(model, state)) {
     report.status = StepStatus::kUnsolved;
-    report.message = "joint projection: error " + std::to_string(projection_.error());
+    std::ostringstream message;
+    message << "projection of joint " << structure.joints[projection_.worst_joint()].name
+            << ": error " << projection_.error();
+    report.message = message.str();
   }
   if (!AllFinite(state->pose) || !AllFinite(state->twist)) {
     report.status = StepStatus::kDiverged;

@@ -264,5 +264,34 @@ TEST(FinalStateJacobian, RefusesSettingsThatTheEngineLacks) {
       << result.message;
 }
 
+// Projections with a drift of millimetres a step, which multipliers of light links feel.
+TEST(GradientTest, AllMethodsAgreeThroughLargeProjections) {
+  const Scene scene = SceneOf(test_scenes::WhippingChain(0.5));
+  const std::vector<ParameterPath> parameters =
+      Resolve(scene, {"gravity/y", "bodies/a/mass", "bodies/c/mass", "joints/i/angle",
+                      "joints/j/anchor/x", "bodies/b/position/y"});
+  const GradientResult tangent =
+      FinalStateJacobian(scene, parameters, Method(GradientMethod::kTangent));
+  ASSERT_TRUE(tangent.done) << tangent.message;
+  const auto close = [&](GradientMethod method, double tolerance, const std::string& what) {
+    const GradientResult other = FinalStateJacobian(scene, parameters, Method(method));
+    ASSERT_TRUE(other.done) << other.message;
+    EXPECT_EQ(other.fallbacks, 0);
+    for (Eigen::Index c = 0; c < tangent.jacobian.cols(); ++c) {
+      const double scale = tangent.jacobian.col(c).cwiseAbs().maxCoeff();
+      EXPECT_GT(scale, 0.1);
+      EXPECT_LE((other.jacobian.col(c) - tangent.jacobian.col(c)).cwiseAbs().maxCoeff(),
+                tolerance * scale)
+          << what << " parameter " << c;
+    }
+  };
+  close(GradientMethod::kAdjoint, 1e-11, "adjoint");
+  close(GradientMethod::kFiniteDifference, 1e-6, "differences");
+  if (HaveJets()) {
+    close(GradientMethod::kJetImplicit, 1e-10, "implicit");
+    close(GradientMethod::kJet, 1e-9, "unrolled");
+  }
+}
+
 }  // namespace
 }  // namespace tangible

@@ -148,9 +148,17 @@ TEST(StepTest, AStuckWedgeIsUnsolvedAndNamed) {
   Model<double> model;
   State<double> state;
   BuildModel(scene, &model, &state);
-  const RolloutReport report = Rollout(model, state, {}, &state);
-  EXPECT_EQ(report.status, StepStatus::kUnsolved);
-  EXPECT_NE(report.message.find("ball"), std::string::npos) << report.message;
+  const State<double> initial = state;
+  for (const SolverChoice solver :
+       {SolverChoice::kAuto, SolverChoice::kInteriorPoint, SolverChoice::kLemke}) {
+    scene.simulation.solver = solver;
+    BuildModel(scene, &model, &state);
+    const RolloutReport report = Rollout(model, initial, {}, &state);
+    EXPECT_EQ(report.status, StepStatus::kUnsolved);
+    EXPECT_NE(report.message.find("contact of ball and "), std::string::npos) << report.message;
+    EXPECT_GT(report.residual_max, 1e-3);
+    EXPECT_EQ(report.message.find("(scaled residual 0)"), std::string::npos) << report.message;
+  }
 }
 
 TEST(StepTest, NoAllocationAfterTheFirstStep) {
@@ -178,6 +186,20 @@ TEST(StepTest, NoAllocationAfterTheFirstStep) {
   }
   EXPECT_EQ(testing::NumAllocations(), before);
   EXPECT_EQ(sliding, 18);
+}
+
+TEST(StepTest, NoAllocationInAChainThatWhips) {
+  Model<double> model;
+  State<double> state;
+  BuildModel(SceneOf(test_scenes::WhippingChain(2.0)), &model, &state);
+  Stepper stepper(model);
+  ASSERT_EQ(stepper.Step(model, 0.0, 0.01, &state).status, StepStatus::kDone);
+  const long before = testing::NumAllocations();
+  for (int k = 1; k < 200; ++k) {
+    const StepReport report = stepper.Step(model, 0.01 * k, 0.01, &state);
+    ASSERT_EQ(report.status, StepStatus::kDone) << k << " " << report.message;
+  }
+  EXPECT_EQ(testing::NumAllocations(), before);
 }
 
 TEST(StepTest, TimesAreNotAccumulated) {

@@ -1,0 +1,199 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Certificates of event steps. A mode that ends at an event has margin 0 there by construction:
+// what counts is how transversally the event is crossed, and how far modes are from a change where
+// they start.
+#include <algorithm>
+#include <cmath>
+
+#include "tangible/lcp/contact_conditioning.h"
+#include "tangible/simulation/certify_place_inl.h"
+#include "tangible/simulation/segment_flow.h"
+
+namespace tangible {
+namespace {
+
+const char* EventName(EventKind kind) {
+  switch (kind) {
+    case EventKind::kTouch:
+      return "touching";
+    case EventKind::kSlipEnds:
+      return "end of sliding";
+    case EventKind::kSlipBegins:
+      return "start of sliding";
+    case EventKind::kLiftOff:
+      return "lift-off";
+    default:
+      return "";
+  }
+}
+
+// Bodies that an impact's impulses move, with those joined to them: one by one until none is added.
+std::vector<bool> Struck(const ModelStructure& s, const Impulses& impact) {
+  std::vector<bool> struck(s.bodies.size(), false);
+  const auto moves = [&](int body) { return s.bodies[body].block >= 0; };
+  for (size_t i = 0; i < impact.contacts.size(); ++i) {
+    if (impact.solution.normal_impulse[i] > 0.0) {
+      for (const int body : {impact.contacts[i].a, impact.contacts[i].b}) {
+        struck[body] = struck[body] || moves(body);
+      }
+    }
+  }
+  for (bool more = true; more;) {
+    more = false;
+    for (const JointIndex& joint : s.joints) {
+      if (moves(joint.a) && moves(joint.b) && struck[joint.a] != struck[joint.b]) {
+        struck[joint.a] = struck[joint.b] = more = true;
+      }
+    }
+  }
+  return struck;
+}
+
+}  // namespace
+
+void RolloutCertifier::AddQuality(const ContactProblem<double>& problem,
+                                  const std::vector<ContactMode>& modes, ContactSystem* system) {
+  certificate_.redundant_rows += CountRedundantRows(problem, modes);
+  const SystemQuality quality = MeasureSystem(problem, modes, system);
+  certificate_.condition = std::max(certificate_.condition, quality.condition);
+  certificate_.linear_residual = std::max(certificate_.linear_residual, quality.residual);
+}
+
+// Impacts on the same bodies at (nearly) the same time: were their order another, so would be the
+// result.
+void RolloutCertifier::AddSimultaneous(const Model<double>& model, long step,
+                                       const Impulses& impact) {
+  const ModelStructure& s = *model.structure;
+  const std::vector<bool> struck = Struck(s, impact);
+  std::vector<size_t> approaching;
+  for (size_t i = 0; i < impact.contacts.size(); ++i) {
+    const ActiveContact& c = impact.contacts[i];
+    const ContactBlock<double>& block = impact.problem.contacts[i];
+    const double before = RelativeSpeed(impact.before, c.a, block.normal_a, c.b, block.normal_b);
+    const double scale =
+        s.settings.dt * std::hypot(model.numbers[kGravityX], model.numbers[kGravityY]);
+    if (before < -1e-9 * (scale + std::abs(before))) {
+      approaching.push_back(i);
+    }
+  }
+  const auto share = [&](size_t i, const std::vector<bool>& bodies) {
+    return bodies[impact.contacts[i].a] || bodies[impact.contacts[i].b];
+  };
+  if (approaching.empty()) {
+    return;
+  }
+  const ActiveContact& first = impact.contacts[approaching[0]];
+  const Place place{
+      &s, step, impact.time, approaching[0], &first, impact.solution.modes[approaching[0]]};
+  // Several that approach at once, where one moves bodies of another.
+  for (size_t k = 0; k < approaching.size(); ++k) {
+    for (size_t l = 0; l < k; ++l) {
+      const ActiveContact& x = impact.contacts[approaching[k]];
+      const ActiveContact& y = impact.contacts[approaching[l]];
+      for (const int body : {x.a, x.b}) {
+        if (s.bodies[body].block >= 0 && (body == y.a || body == y.b)) {
+          AddJump(0.0, place, "two contacts of " + s.bodies[body].name + " touch at once");
+        }
+      }
+    }
+  }
+  if (!struck_.empty()) {
+    for (const size_t i : approaching) {
+      if (share(i, struck_)) {
+        AddJump((impact.time - struck_at_) / s.settings.dt, place,
+                "impacts follow each other within " + Short(impact.time - struck_at_) + " s");
+      }
+    }
+  }
+  struck_ = struck;
+  struck_at_ = impact.time;
+}
+
+void RolloutCertifier::AddImpact(const Model<double>& model, long step, Impulses* impact) {
+  const ModelStructure& s = *model.structure;
+  const double threshold = s.settings.restitution_threshold;
+  for (size_t i = 0; i < impact->contacts.size(); ++i) {
+    const ActiveContact& contact = impact->contacts[i];
+    const Place place{&s, step, impact->time, i, &contact, impact->solution.modes[i]};
+    const ContactBlock<double>& block = impact->problem.contacts[i];
+    const double before =
+        RelativeSpeed(impact->before, contact.a, block.normal_a, contact.b, block.normal_b);
+    const ContactMargin margin =
+        MarginOfContact(impact->problem, impact->solution, static_cast<int>(i));
+    AddMargin(margin.value, place, std::string("impact, ") + ModeName(place.mode));
+    certificate_.degenerate_rows += margin.value < 1e-10 ? 1 : 0;
+    const CoefficientSource& friction = impact->friction[i];
+    if (place.mode != ContactMode::kOpen && friction.value == 0.0 &&
+        (Wanted(friction.numbers[0]) || Wanted(friction.numbers[1]))) {
+      OneSided("friction is 0, " + place.Text());
+    }
+    const CoefficientSource& restitution = impact->restitution[i];
+    const bool wanted = Wanted(restitution.numbers[0]) || Wanted(restitution.numbers[1]);
+    if (impact->h == 0.0 && (restitution.value > 0.0 || wanted)) {
+      AddJump(std::abs(-before - threshold) / std::max(threshold, std::abs(before)), place,
+              "approach speed " + Short(-before) + " m/s near the threshold " + Short(threshold) +
+                  " m/s");
+      if (wanted && (restitution.value == 0.0 || restitution.tie) && -before > threshold) {
+        OneSided(restitution.tie
+                     ? "mixed restitution is at a kink of the mixing rule, " + place.Text()
+                     : "restitution is 0, " + place.Text());
+      }
+    }
+  }
+  if (impact->h == 0.0) {
+    AddSimultaneous(model, step, *impact);
+  }
+  AddQuality(impact->problem, impact->solution.modes, &impact->system);
+}
+
+void RolloutCertifier::AddSegment(const Model<double>& model, long step,
+                                  EventDerivative* derivative, Segment* segment) {
+  const ModelStructure& s = *model.structure;
+  SolvedNode& start = segment->stages[0];
+  double largest = 0.0;
+  for (const double normal : start.solution.normal_impulse) {
+    largest = std::max(largest, normal);
+  }
+  for (size_t i = 0; i < segment->contacts.size(); ++i) {
+    const ActiveContact& contact = segment->contacts[i];
+    const Place place{&s, step, segment->time, i, &contact, segment->modes[i]};
+    const double normal = start.solution.normal_impulse[i];
+    const CoefficientSource& friction = segment->friction[i];
+    AddMargin(largest > 0.0 ? normal / largest : 0.0, place, "normal force");
+    if (place.mode == ContactMode::kSticking && normal > 0.0) {
+      const double limit = friction.value * normal;
+      AddMargin((limit - std::abs(start.solution.tangent_impulse[i])) / limit, place,
+                "friction limit");
+    }
+    const bool wanted = Wanted(friction.numbers[0]) || Wanted(friction.numbers[1]);
+    if (wanted && friction.tie && place.mode != ContactMode::kSticking) {
+      OneSided("mixed friction is at a kink of the mixing rule, " + place.Text());
+    } else if (wanted && friction.value == 0.0) {
+      OneSided("friction is 0, " + place.Text());
+    }
+  }
+  double terms;
+  const double rate = derivative->EventRate(model, segment, &terms);
+  if (IsLocated(segment->event) && terms > 0.0) {
+    const Place place{
+        &s, step, segment->time + segment->length, 0, &segment->event_contact, ContactMode::kOpen};
+    AddMargin(std::abs(rate) / terms, place,
+              std::string("grazing: rate of the ") + EventName(segment->event));
+  }
+  AddQuality(start.problem, segment->modes, &start.system);
+}
+
+void RolloutCertifier::AddEventStep(const Model<double>& model, long step, Stepper* stepper) {
+  EventRecord& record = stepper->events().mutable_record();
+  for (int p = 0; p < record.num_parts; ++p) {
+    EventPart& part = *record.parts[p];
+    if (part.is_impulses) {
+      AddImpact(model, step, &part.impulses);
+    } else {
+      AddSegment(model, step, &stepper->event_derivative(), &part.segment);
+    }
+  }
+}
+
+}  // namespace tangible
