@@ -13,7 +13,7 @@ namespace {
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 // A force counts as negative, and friction as exceeded, beyond this share of the forces at work.
 constexpr double kForceTolerance = 1e-10;
-constexpr int kMostHalvings = 2000;
+constexpr int kMostHalvings = 1000;
 constexpr int kMostRefinements = 200;
 
 double SpeedOf(const double* twist, double radius) {
@@ -171,9 +171,9 @@ double EventSearch::Refine(const Model<double>& model, const Function& f, double
   return b;
 }
 
-template <typename Gap>
-bool EventSearch::FirstRoot(const Model<double>& model, const Gap& gap, double from, double to,
-                            double rate, double tolerance, double* root) {
+template <typename Gap, typename Rate>
+bool EventSearch::FirstRoot(const Model<double>& model, const Gap& gap, const Rate& rate_over,
+                            double from, double to, double* root) {
   struct Interval {
     double a, fa, b, fb;
   };
@@ -184,20 +184,26 @@ bool EventSearch::FirstRoot(const Model<double>& model, const Gap& gap, double f
     return from > 0.0;
   }
   std::vector<Interval> open = {{from, first, to, gap(*At(model, to))}};
-  for (int k = 0; k < kMostHalvings && !open.empty(); ++k) {
+  Interval crossing = open.back();  // the shortest known to hold a crossing
+  for (int k = 0; !open.empty(); ++k) {
     const Interval i = open.back();
     open.pop_back();
+    if (i.fb <= 0.0) {
+      crossing = i;
+    }
+    if (k == kMostHalvings) {
+      break;
+    }
     if (std::isnan(i.fa) || std::isnan(i.fb)) {
       continue;
     }
-    if (i.fb > 0.0 && (i.fa + i.fb > rate * (i.b - i.a) || i.b - i.a <= smallest)) {
+    const double reach = i.b - i.a > smallest ? rate_over(i.a, i.b) * (i.b - i.a) : 0.0;
+    if (i.fb > 0.0 && (i.fa + i.fb > reach || i.b - i.a <= smallest)) {
       continue;
     }
-    // The bound says how soon the gap can close at all: once an interval cannot hold a contact that
-    // opens again by more than the tolerance, its crossing is the first.
-    const bool single = i.fb <= 0.0 && (rate * (i.b - i.a) <= tolerance || i.b - i.a <= smallest ||
-                                        i.fa - i.fb > 0.5 * rate * (i.b - i.a));
-    if (single) {
+    // Where the gap closes at more than half of what the bound allows it does not open in between:
+    // the crossing is the first.
+    if (i.fb <= 0.0 && (i.b - i.a <= smallest || i.fa - i.fb > 0.5 * reach)) {
       *root = Refine(model, gap, i.a, i.fa, i.b, i.fb);
       return true;
     }
@@ -207,6 +213,10 @@ bool EventSearch::FirstRoot(const Model<double>& model, const Gap& gap, double f
       open.push_back({m, fm, i.b, i.fb});
     }
     open.push_back({i.a, i.fa, m, fm});
+  }
+  if (crossing.fb <= 0.0) {
+    *root = Refine(model, gap, crossing.a, crossing.fa, crossing.b, crossing.fb);
+    return true;
   }
   return false;
 }
@@ -227,8 +237,9 @@ void EventSearch::SearchPair(const Model<double>& model, int a, int b, Event* ev
     closed = closed || OfPair(contact, a, b);
   }
   const double touch = TouchTolerance(segment_->before, a, b);
-  const double rate = closing_[a] + closing_[b];
   ActiveContact nearest;
+  Vector2<double> normal(0.0, 0.0);
+  bool on_face = false;  // the normal belongs to a body's face, not to the line between two points
   // The smallest gap of the pair's contacts that are not closed; those that touch and leave count
   // only if `all`.
   const auto gap = [&](const Sample& sample, bool all) {
@@ -253,15 +264,59 @@ void EventSearch::SearchPair(const Model<double>& model, int a, int b, Event* ev
         smallest = rows.geometry.gap;
         nearest = contact;
         nearest.gap = smallest;
+        normal = rows.geometry.normal;
+        on_face = contact.feature.kind != FeatureKind::kVertexVertex;
       }
     }
     return smallest;
   };
+  // Bound on how fast the gap closes over an interval: all points' speeds; where both ends have the
+  // same face, the speed along its normal and what rotation adds.
+  const auto rate_over = [&](double from, double to, bool all) {
+    const double any = closing_[a] + closing_[b];
+    const Sample& first = *At(model, from);
+    if (std::isinf(gap(first, all))) {
+      return any;
+    }
+    const ActiveContact start = nearest;
+    const Vector2<double> along = normal;
+    const bool face = on_face;
+    const State<double> before = first.motion.after;
+    const Sample& last = *At(model, to);
+    if (!face || std::isinf(gap(last, all)) || !(nearest.feature == start.feature)) {
+      return any;
+    }
+    const State<double>& after = last.motion.after;
+    double closing = 0.0;
+    double speed = 0.0;
+    double turning = 0.0;
+    for (const State<double>* state : {&before, &after}) {
+      const Vector2<double> relative(state->twist[3 * a] - state->twist[3 * b],
+                                     state->twist[3 * a + 1] - state->twist[3 * b + 1]);
+      closing = std::max(closing, std::abs(along.dot(relative)));
+      speed = std::max(speed, relative.norm());
+      double turn = 0.0;
+      double swept = 0.0;
+      for (const int body : {a, b}) {
+        const double omega = std::abs(state->twist[3 * body + 2]);
+        const bool is_circle = model.structure->bodies[body].shape == ShapeType::kCircle;
+        turn += is_circle ? 0.0 : omega;
+        swept += is_circle ? 0.0 : omega * radius_[body];
+      }
+      closing = std::max(closing, std::abs(along.dot(relative)) + swept);
+      turning = std::max(turning, turn);
+    }
+    return std::min(any, 1.05 * closing + 1.5 * turning * (to - from) * speed);
+  };
   const auto search = [&](double from, double allowed, bool all) {
+    if (from < event->length && gap(*At(model, from), all) > touch) {
+      allowed = 0.0;  // it has left
+    }
     const auto shifted = [&](const Sample& sample) { return gap(sample, all) + allowed; };
+    const auto rate = [&](double x, double y) { return rate_over(x, y, all); };
     double root;
-    if (from < event->length &&
-        FirstRoot(model, shifted, from, event->length, rate, touch, &root) && root > 0.0) {
+    if (from < event->length && FirstRoot(model, shifted, rate, from, event->length, &root) &&
+        root > 0.0) {
       event->kind = EventKind::kTouch;
       event->length = root;
       gap(*At(model, root), all);
@@ -271,6 +326,7 @@ void EventSearch::SearchPair(const Model<double>& model, int a, int b, Event* ev
   search(0.0, 0.0, false);
   // Contacts that touch and stay open leave first, and may return.
   double from = kInfinity;
+  double allowed = touch;
   for (const ActiveContact& contact : *touching_) {
     if (OfPair(contact, a, b) && !is_closed(contact)) {
       const Sample& end = *At(model, event->length);
@@ -278,9 +334,10 @@ void EventSearch::SearchPair(const Model<double>& model, int a, int b, Event* ev
       const double change =
           end.good ? std::abs(NormalSpeed(model, end.motion.after, contact) - speed) : 0.0;
       from = std::min(from, TouchStart(model, speed, 2.0 * change / event->length));
+      allowed = std::max(allowed, touch - contact.gap);
     }
   }
-  search(from, touch, true);
+  search(from, allowed, true);
   if (!closed) {
     return;
   }
@@ -357,8 +414,9 @@ void EventSearch::SearchLimit(const Model<double>& model, int joint, double side
     return sample.good ? evaluate(sample.motion.after, &unused) + allowed
                        : std::numeric_limits<double>::quiet_NaN();
   };
+  const auto rate_over = [&](double, double) { return rate; };
   double root;
-  if (from < event->length && FirstRoot(model, gap, from, event->length, rate, 1e-10, &root)) {
+  if (from < event->length && FirstRoot(model, gap, rate_over, from, event->length, &root)) {
     event->kind = EventKind::kTouch;
     event->length = root;
     event->contact = limit;

@@ -54,9 +54,11 @@ class EventSearch {
   void FindPairs(const Model<double>& model);
   void SearchPair(const Model<double>& model, int a, int b, Event* event);
   void SearchLimit(const Model<double>& model, int joint, double side, Event* event);
-  template <typename Gap>
-  bool FirstRoot(const Model<double>& model, const Gap& gap, double from, double to, double rate,
-                 double tolerance, double* root);
+  /// The first crossing of gap from above 0 within [from, to]; rate_over(a, b) bounds how fast it
+  /// closes between.
+  template <typename Gap, typename Rate>
+  bool FirstRoot(const Model<double>& model, const Gap& gap, const Rate& rate_over, double from,
+                 double to, double* root);
   void SearchClosed(const Model<double>& model, Event* event);
   template <typename Function>
   double Refine(const Model<double>& model, const Function& f, double a, double fa, double b,

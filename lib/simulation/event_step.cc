@@ -342,6 +342,10 @@ bool EventStepper::ChooseModes(const Model<double>& model, double t, double midd
 
 void EventStepper::SwitchMode(const Segment& segment) {
   for (size_t i = 0; i < last_contacts_.size(); ++i) {
+    // A body that stops stops at all its contacts; those that still slide are told by their speed.
+    if (segment.event == EventKind::kSlipEnds && SlidingSign(last_modes_[i]) != 0.0) {
+      last_modes_[i] = ContactMode::kSticking;
+    }
     if (!last_contacts_[i].SameAs(segment.event_contact)) {
       continue;
     }
@@ -351,8 +355,6 @@ void EventStepper::SwitchMode(const Segment& segment) {
       // It slides against the force that was at its limit.
       last_modes_[i] =
           segment.event_sign > 0.0 ? ContactMode::kSlidingNegative : ContactMode::kSlidingPositive;
-    } else if (segment.event == EventKind::kSlipEnds) {
-      last_modes_[i] = ContactMode::kSticking;
     }
   }
 }

@@ -136,6 +136,7 @@ class PairTies {
         return record_.restitution[i].value *
                RelativeSpeed(record_.before, a_, rows.normal_a, b_, rows.normal_b);
       case ContactLaw::kRecovery:
+      case ContactLaw::kInelastic:
         break;
     }
     return 0.0;

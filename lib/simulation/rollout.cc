@@ -5,6 +5,8 @@
 #include <cmath>
 #include <sstream>
 
+#include "tangible/simulation/event_jets.h"
+
 namespace tangible {
 namespace {
 
@@ -120,7 +122,10 @@ RolloutReport RolloutJets(const Model<T>& model, const State<T>& initial, JetRou
       break;
     }
     const State<T> before = jets;
-    if (route == JetRoute::kImplicit) {
+    if (stepper.by_events()) {
+      EventStepInJets(model, values, route, &stepper.events().mutable_record(),
+                      &stepper.event_derivative(), &jets);
+    } else if (route == JetRoute::kImplicit) {
       StepImplicit(model, &stepper, state, &jets);
     } else if (!StepUnrolled(model, stepper.record(), &jets)) {
       ++*fallbacks;

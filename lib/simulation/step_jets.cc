@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "tangible/lcp/contact_interior_point.h"
+#include "tangible/simulation/implicit_residual_inl.h"
 #include "tangible/simulation/step.h"
 
 namespace tangible {
@@ -20,84 +21,6 @@ void AssembleAll(const Model<T>& model, const StepRecord& record, const State<T>
   AssembleContacts(model, state, record.h, record.contacts, record.friction, record.restitution,
                    scratch, problem);
 }
-
-// Derivatives of −R at the double solution: the right-hand side, row-major (3 num_blocks, N).
-template <typename T>
-class ImplicitResidual {
- public:
-  ImplicitResidual(const ContactProblem<T>& problem, const StepRecord& record,
-                   const std::vector<int>& contact_block, std::vector<double>* rhs)
-      : p_(problem),
-        values_(record.problem),
-        s_(record.solution),
-        contact_block_(contact_block),
-        rhs_(*rhs) {}
-
-  void Fill() {
-    const int nb = p_.num_bodies;
-    std::vector<T> momentum(3 * nb);
-    const double* v = s_.v.data();
-    for (int i = 0; i < 3 * nb; ++i) {
-      momentum[i] = p_.momentum[i] - p_.mass[i] * v[i];
-    }
-    for (const DamperBlock<T>& d : p_.dampers) {
-      const T impulse = -d.weight * RowDot(d.a, d.row_a, d.b, d.row_b, v);
-      AddRowTransposed(d.a, d.row_a, d.b, d.row_b, impulse, momentum.data());
-    }
-    for (size_t j = 0; j < p_.joints.size(); ++j) {
-      const JointBlock<T>& joint = p_.joints[j];
-      for (int k = 0; k < joint.rows; ++k) {
-        AddRowTransposed(joint.a, joint.row_a[k], joint.b, joint.row_b[k],
-                         s_.joint_impulse[3 * j + k], momentum.data());
-        Set(3 * (nb + static_cast<int>(j)) + k,
-            joint.rhs[k] - RowDot(joint.a, joint.row_a[k], joint.b, joint.row_b[k], v));
-      }
-    }
-    for (size_t i = 0; i < p_.contacts.size(); ++i) {
-      if (contact_block_[i] >= 0) {
-        Contact(static_cast<int>(i), &momentum);
-      }
-    }
-    for (int i = 0; i < 3 * nb; ++i) {
-      Set(i, momentum[i]);
-    }
-  }
-
- private:
-  void Set(int row, const T& value) {
-    for (int k = 0; k < NumDerivatives<T>::value; ++k) {
-      rhs_[row * NumDerivatives<T>::value + k] = value.v[k];
-    }
-  }
-
-  void Contact(int i, std::vector<T>* momentum) {
-    const ContactBlock<T>& c = p_.contacts[i];
-    const double* v = s_.v.data();
-    const int row = 3 * contact_block_[i];
-    const double normal = s_.normal_impulse[i];
-    AddRowTransposed(c.a, c.normal_a, c.b, c.normal_b, normal, momentum->data());
-    Set(row, -c.c_n - RowDot(c.a, c.normal_a, c.b, c.normal_b, v));
-    const T slip = c.c_t + RowDot(c.a, c.tangent_a, c.b, c.tangent_b, v);
-    T tangent(s_.tangent_impulse[i]);
-    if (s_.modes[i] == ContactMode::kSticking) {
-      Set(row + 1, -slip);
-    } else {
-      // Without friction the sign of sliding counts all the same: the one-sided derivative in μ.
-      double sign = SlidingSign(s_.modes[i]);
-      if (s_.modes[i] == ContactMode::kClosed) {
-        sign = FrictionlessSlidingSign(values_, values_.contacts[i], v);
-      }
-      tangent = -sign * normal * c.friction;
-    }
-    AddRowTransposed(c.a, c.tangent_a, c.b, c.tangent_b, tangent, momentum->data());
-  }
-
-  const ContactProblem<T>& p_;
-  const ContactProblem<double>& values_;
-  const ContactSolution<double>& s_;
-  const std::vector<int>& contact_block_;
-  std::vector<double>& rhs_;
-};
 
 // q := q + h v, by derivative parts too.
 template <typename T>
@@ -148,7 +71,9 @@ void StepImplicit(const Model<T>& model, Stepper* stepper, const State<double>& 
   AssembleAll(model, record, *state, &problem);
   ContactSystem& system = stepper->system();
   std::vector<double> rhs(3 * static_cast<size_t>(system.num_blocks()) * kWidth, 0.0);
-  ImplicitResidual<T>(problem, record, system.contact_block(), &rhs).Fill();
+  ImplicitResidual<T>(problem, record.solution, SlidingSigns(record.problem, record.solution),
+                      system.contact_block(), &rhs)
+      .Fill();
   system.Solve(record.problem, record.solution.modes, rhs.data(), kWidth);
   for (int k = 0; k < s.num_blocks(); ++k) {
     for (int i = 0; i < 3; ++i) {
