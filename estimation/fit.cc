@@ -46,12 +46,15 @@ Eigen::VectorXd DrawStart(const std::vector<ParameterizedScene::Entry>& entries,
   return p;
 }
 
+bool HasEffect(const ParameterizedScene::Entry& entry, const Eigen::VectorXd& column) {
+  return column.cwiseAbs().maxCoeff() * entry.scale > kNoEffect;
+}
+
 /// The first parameter whose column of J is zero; −1 if none is.
 int FindNoEffect(const std::vector<ParameterizedScene::Entry>& entries,
                  const RowMatrixXd& jacobian) {
   for (size_t k = 0; k < entries.size(); ++k) {
-    const auto column = jacobian.col(static_cast<Eigen::Index>(k));
-    if (column.cwiseAbs().maxCoeff() * entries[k].scale <= kNoEffect) {
+    if (!HasEffect(entries[k], jacobian.col(static_cast<Eigen::Index>(k)))) {
       return static_cast<int>(k);
     }
   }
@@ -73,24 +76,63 @@ bool IsBetter(const Minimum& a, const Minimum& b) {
   return a.status != b.status ? a.status < b.status : a.cost < b.cost;
 }
 
-/// False, with the result saying why, where the initial point cannot be run or a parameter does
-/// nothing there.
-bool CheckInitial(const FitOptions& options, const Eigen::VectorXd& initial,
-                  RolloutResiduals* residuals, FitResult* result) {
+// Where a derivative is 0 at a bound (restitution 0) or by symmetry, these moves into the interior
+// tell whether the parameter does anything, as fractions of the way to the other bound, or of its
+// scale.
+constexpr double kNudges[] = {0.1, 0.01};
+
+/// `p` with this parameter moved inwards.
+Eigen::VectorXd Nudged(const ParameterizedScene::Entry& entry, int parameter, double fraction,
+                       Eigen::VectorXd p) {
+  const double value = p[parameter];
+  const double up = std::isfinite(entry.upper) ? entry.upper - value : HUGE_VAL;
+  const double down = std::isfinite(entry.lower) ? value - entry.lower : HUGE_VAL;
+  const double room = std::max(up, down);
+  // A bounded mass may be 10 000 times another one: it is moved by a part of itself.
+  const double span = entry.logarithmic ? value : std::isfinite(room) ? room : entry.scale;
+  const double move = std::min(fraction * span, room);
+  p[parameter] += up >= down ? move : -move;
+  return p;
+}
+
+/// A point near the initial one at which each parameter moves a residual: the initial one itself
+/// unless a parameter does nothing there. False, with the result saying why, where there is none.
+/// `gradient_norm` is that at the initial point.
+bool FindStart(const FitOptions& options, RolloutResiduals* residuals, Eigen::VectorXd* start,
+               double* gradient_norm, FitResult* result) {
   Eigen::VectorXd values;
   RowMatrixXd jacobian;
-  if (!residuals->Evaluate(initial, options.derivatives, &values, &jacobian)) {
+  if (!residuals->Evaluate(*start, options.derivatives, &values, &jacobian)) {
     result->message = "the run at the initial values fails: " + residuals->message();
     return options.starts > 1;
   }
   result->initial_cost = RobustCost(values, options.huber);
-  result->parameter = FindNoEffect(residuals->scene().entries(), jacobian);
-  if (result->parameter < 0) {
-    return true;
+  const ParameterizedScene& scene = residuals->scene();
+  const std::vector<ParameterizedScene::Entry>& entries = scene.entries();
+  jacobian *= scene.ParametersByInternal(scene.ToInternal(*start)).asDiagonal();
+  *gradient_norm = RobustGradient(values, jacobian, options.huber).norm();
+  for (size_t round = 0; round <= entries.size(); ++round) {
+    const int parameter = FindNoEffect(entries, jacobian);
+    if (parameter < 0) {
+      return true;
+    }
+    bool found = false;
+    for (size_t i = 0; i < std::size(kNudges) && !found && round < entries.size(); ++i) {
+      const Eigen::VectorXd nudged = Nudged(entries[parameter], parameter, kNudges[i], *start);
+      found = residuals->Evaluate(nudged, options.derivatives, &values, &jacobian) &&
+              HasEffect(entries[parameter], jacobian.col(parameter));
+      if (found) {
+        *start = nudged;
+      }
+    }
+    if (!found) {
+      result->parameter = parameter;
+      break;
+    }
   }
   result->status = FitStatus::kNoEffect;
-  result->message = "parameter \"" + residuals->scene().entries()[result->parameter].name +
-                    "\" has no effect on any residual";
+  result->message =
+      "parameter \"" + entries[result->parameter].name + "\" has no effect on any residual";
   return false;
 }
 
@@ -142,12 +184,14 @@ FitResult Fit(const FitOptions& options, RolloutResiduals* residuals, const FitP
   FitResult result;
   const long rollouts_before = residuals->rollouts();
   const Eigen::VectorXd initial = residuals->scene().Initial();
-  if (CheckInitial(options, initial, residuals, &result)) {
+  Eigen::VectorXd first = initial;
+  double gradient_norm = 0.0;
+  if (FindStart(options, residuals, &first, &gradient_norm, &result)) {
     std::mt19937 random(options.seed);
     Minimum best;
     for (int i = 0; i < options.starts; ++i) {
       const Eigen::VectorXd start =
-          i == 0 ? initial : DrawStart(residuals->scene().entries(), &random);
+          i == 0 ? first : DrawStart(residuals->scene().entries(), &random);
       const std::function<void(int, const FitIteration&)> report =
           [&progress, i](int iteration, const FitIteration& values) {
             if (progress) {
@@ -160,7 +204,13 @@ FitResult Fit(const FitOptions& options, RolloutResiduals* residuals, const FitP
         shot = Shoot(options, start, residuals);
       }
       Minimum minimum = Minimise(options, shot.parameters, elapsed, report, residuals);
-      result.starts.push_back(Describe(start, minimum));
+      if (i == 0 && first != initial && !minimum.iterations.empty()) {
+        minimum.iterations.insert(
+            minimum.iterations.begin(),
+            {result.initial_cost, gradient_norm,
+             std::vector<double>(initial.data(), initial.data() + initial.size()), 0.0});
+      }
+      result.starts.push_back(Describe(i == 0 ? initial : start, minimum));
       result.starts.back().shooting_iterations = shot.iterations;
       if (i == 0 || IsBetter(minimum, best)) {
         best = std::move(minimum);

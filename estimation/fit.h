@@ -8,7 +8,9 @@
 // by Levenberg-Marquardt (Ceres: trust region, dense QR) on q(p) (parameterized_scene.h), with one
 // residual block a measured coordinate, so that ρ acts on each alone; all blocks share one run an
 // evaluation. At the end Gauss-Newton steps polish the estimate to where it no longer depends on
-// the start: the cost is flat there to rounding long before p is known to as many digits. An
+// the start: the cost is flat there to rounding long before p is known to as many digits. With
+// Huber's loss plain squares lead to its neighbourhood and Newton's method to its minimum. A
+// parameter whose derivative is 0 at the initial values is nudged inwards first. An
 // evaluation that fails makes Ceres step back.
 
 #include <Eigen/Core>

@@ -2,6 +2,7 @@
 #include "tangible/estimation/minimise.h"
 
 #include <Eigen/QR>
+#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -15,6 +16,17 @@ namespace {
 // polish goes on from there.
 constexpr double kFunctionTolerance = 1e-10;
 constexpr double kParameterTolerance = 1e-9;
+// Far from the optimum Huber's loss is linear in nearly all residuals, and steps of Gauss-Newton
+// creep: where the median residual is beyond its bound, plain squares lead the way, until an
+// iteration gains less than this. Outliers then cost nothing, for the robust loss has the last
+// word.
+constexpr double kApproachTolerance = 1e-2;
+constexpr double kApproachFactor = 4.0;
+// With Huber's loss Ceres goes on to this; then Newton's method takes over, which unlike its steps
+// counts no curvature where the loss is linear (0.75 a step where half of the residuals are).
+constexpr double kRobustTolerance = 1e-4;
+constexpr int kMaxNewtonSteps = 15;
+constexpr int kMaxHalvings = 3;
 // Root mean square of residuals, in sigma, below which the observations are free of noise and met
 // to rounding.
 constexpr double kExactFit = 1e-8;
@@ -33,15 +45,6 @@ constexpr double kPolishRank = 1e-9;
 double RobustWeight(double residual, double huber) {
   const double size = std::abs(residual);
   return huber > 0.0 && size > huber ? huber / size : 1.0;
-}
-
-Eigen::VectorXd Gradient(const Eigen::VectorXd& residuals, const RowMatrixXd& jacobian,
-                         double huber) {
-  Eigen::VectorXd gradient = Eigen::VectorXd::Zero(jacobian.cols());
-  for (Eigen::Index i = 0; i < residuals.size(); ++i) {
-    gradient += RobustWeight(residuals[i], huber) * residuals[i] * jacobian.row(i).transpose();
-  }
-  return gradient;
 }
 
 /// Whether the cost falls beyond a bound that p stands on.
@@ -65,7 +68,8 @@ class Minimiser : public ceres::IterationCallback {
                        RowMatrixXd* jacobian) { return Evaluate(q, values, jacobian); },
                 &q_),
         held_(start.size(), false),
-        pushed_(start.size(), 0) {}
+        pushed_(start.size(), 0),
+        huber_(options.huber) {}
 
   Minimum Run() {
     shared_.PrepareForEvaluation(true, true);
@@ -73,12 +77,12 @@ class Minimiser : public ceres::IterationCallback {
       minimum_.message = "the run at the initial values fails: " + residuals_->message();
       return minimum_;
     }
-    for (int round = 0; round < kMaxRounds; ++round) {
-      Solve();
-      shared_.PrepareForEvaluation(true, true);
-      if (!ChangeHeld()) {
-        break;
-      }
+    ApproachRobustLoss();
+    if (options_.huber > 0.0) {
+      SolveWithinBounds(kRobustTolerance);
+    }
+    if (!(options_.huber > 0.0) || minimum_.status != FitStatus::kConverged || !Newton()) {
+      SolveWithinBounds(kFunctionTolerance);
     }
     if (minimum_.status == FitStatus::kConverged) {
       Polish();
@@ -94,7 +98,7 @@ class Minimiser : public ceres::IterationCallback {
   ceres::CallbackReturnType operator()(const ceres::IterationSummary& summary) override {
     const bool accepted = summary.iteration == 0 || summary.step_is_successful;
     if (summary.iteration > 0 || minimum_.iterations.empty()) {  // else the last round's end again
-      Record(summary.cost, accepted);
+      Record(accepted);
     }
     if (accepted && CountPushes()) {
       return ceres::SOLVER_TERMINATE_SUCCESSFULLY;
@@ -113,7 +117,7 @@ class Minimiser : public ceres::IterationCallback {
       return true;
     }
     *jacobian *= scene.ParametersByInternal(q).asDiagonal();
-    gradient_ = Gradient(*values, *jacobian, options_.huber);
+    gradient_ = RobustGradient(*values, *jacobian, huber_);
     for (size_t k = 0; k < held_.size(); ++k) {
       if (held_[k]) {
         jacobian->col(static_cast<Eigen::Index>(k)).setZero();
@@ -149,27 +153,71 @@ class Minimiser : public ceres::IterationCallback {
     return change && static_cast<int>(minimum_.iterations.size()) <= options_.max_iterations;
   }
 
-  void Record(double cost, bool accepted) {
+  /// Of the robust cost, whichever loss the iteration minimises.
+  void Record(bool accepted) {
     if (accepted) {
-      gradient_norm_ = Gradient(shared_.values(), shared_.jacobian(), options_.huber).norm();
+      cost_ = RobustCost(shared_.values(), options_.huber);
+      gradient_norm_ = RobustGradient(shared_.values(), shared_.jacobian(), options_.huber).norm();
     }
     const Eigen::VectorXd p = residuals_->scene().ToParameters(q_);
     minimum_.iterations.push_back(
-        {cost, gradient_norm_, std::vector<double>(p.data(), p.data() + p.size()), elapsed_()});
+        {cost_, gradient_norm_, std::vector<double>(p.data(), p.data() + p.size()), elapsed_()});
     if (progress_) {
       progress_(static_cast<int>(minimum_.iterations.size()) - 1, minimum_.iterations.back());
     }
   }
 
-  void Solve() {
+  void SolveWithinBounds(double function_tolerance) {
+    for (int round = 0; round < kMaxRounds; ++round) {
+      Solve(function_tolerance);
+      shared_.PrepareForEvaluation(true, true);
+      if (!ChangeHeld()) {
+        return;
+      }
+    }
+  }
+
+  double MedianSize() const {
+    Eigen::VectorXd sizes = shared_.values().cwiseAbs();
+    const auto middle = sizes.begin() + sizes.size() / 2;
+    std::nth_element(sizes.begin(), middle, sizes.end());
+    return *middle;
+  }
+
+  /// Minimises with `huber` in the loss's place; back where that does not lower the robust cost.
+  void Approach(double huber) {
+    const Eigen::VectorXd start = q_;
+    const double before = RobustCost(shared_.values(), options_.huber);
+    huber_ = huber;
+    Solve(kApproachTolerance);
+    huber_ = options_.huber;
+    shared_.PrepareForEvaluation(true, true);
+    if (!shared_.ok() || !(RobustCost(shared_.values(), options_.huber) < before)) {
+      q_ = start;
+      shared_.PrepareForEvaluation(true, true);
+    }
+    pushed_.assign(pushed_.size(), 0);
+  }
+
+  void ApproachRobustLoss() {
+    if (!(options_.huber > 0.0) || MedianSize() <= options_.huber) {
+      return;
+    }
+    Approach(0.0);
+    for (double huber = MedianSize() / kApproachFactor; huber > options_.huber;
+         huber /= kApproachFactor) {
+      Approach(huber);
+    }
+  }
+
+  void Solve(double function_tolerance) {
     ceres::Problem::Options problem_options;
     problem_options.evaluation_callback = &shared_;
     ceres::Problem problem(problem_options);
     const int num_parameters = residuals_->num_parameters();
     for (int i = 0; i < residuals_->num_residuals(); ++i) {
-      problem.AddResidualBlock(
-          new CoordinateCostFunction(&shared_, i, num_parameters),
-          options_.huber > 0.0 ? new ceres::HuberLoss(options_.huber) : nullptr, q_.data());
+      problem.AddResidualBlock(new CoordinateCostFunction(&shared_, i, num_parameters),
+                               huber_ > 0.0 ? new ceres::HuberLoss(huber_) : nullptr, q_.data());
     }
     SetInternalBounds(residuals_->scene(), &problem, &q_);
     ceres::Solver::Options solver;
@@ -177,7 +225,7 @@ class Minimiser : public ceres::IterationCallback {
     solver.linear_solver_type = ceres::DENSE_QR;
     solver.max_num_iterations = std::max(
         1, options_.max_iterations - std::max(0, static_cast<int>(minimum_.iterations.size()) - 1));
-    solver.function_tolerance = kFunctionTolerance;
+    solver.function_tolerance = function_tolerance;
     solver.parameter_tolerance = kParameterTolerance;
     solver.gradient_tolerance = 0.0;
     solver.max_num_consecutive_invalid_steps = 20;
@@ -217,6 +265,70 @@ class Minimiser : public ceres::IterationCallback {
     return -qr.solve(right);
   }
 
+  /// Newton's step of the robust cost: its Hessian has the rows of residuals within the bound
+  /// alone.
+  Eigen::VectorXd NewtonStep() const {
+    const auto& scene = residuals_->scene();
+    const Eigen::VectorXd p = scene.ToParameters(q_);
+    const Eigen::VectorXd& values = shared_.values();
+    RowMatrixXd jacobian = shared_.jacobian();
+    for (int k = 0; k < scene.size(); ++k) {
+      if (IsAtBound(scene.entries()[k], p[k])) {
+        jacobian.col(k).setZero();
+      }
+    }
+    const Eigen::VectorXd gradient = RobustGradient(values, jacobian, options_.huber);
+    for (Eigen::Index i = 0; i < values.size(); ++i) {
+      if (std::abs(values[i]) > options_.huber) {
+        jacobian.row(i).setZero();
+      }
+    }
+    // H = Jᵀ J = V S² Vᵀ.
+    Eigen::JacobiSVD<Eigen::MatrixXd, Eigen::ColPivHouseholderQRPreconditioner> svd(
+        jacobian, Eigen::ComputeThinU | Eigen::ComputeThinV);
+    svd.setThreshold(kPolishRank);
+    const Eigen::Index rank = svd.rank();
+    const auto v = svd.matrixV().leftCols(rank);
+    return -(v * svd.singularValues().head(rank).array().pow(-2).matrix().asDiagonal() *
+             (v.transpose() * gradient));
+  }
+
+  /// Newton's method from where Ceres left off; false where it does not converge.
+  bool Newton() {
+    double cost = RobustCost(shared_.values(), options_.huber);
+    double last = std::numeric_limits<double>::infinity();
+    for (int i = 0; i < kMaxNewtonSteps; ++i) {
+      Eigen::VectorXd step = NewtonStep();
+      double size = step.cwiseAbs().maxCoeff();
+      const Eigen::VectorXd before = q_;
+      double next = std::numeric_limits<double>::infinity();
+      for (int halving = 0; halving <= kMaxHalvings; ++halving) {
+        q_ = residuals_->scene().ToInternal(residuals_->scene().ToParameters(before + step));
+        shared_.PrepareForEvaluation(true, true);
+        if (shared_.ok()) {
+          next = RobustCost(shared_.values(), options_.huber);
+        }
+        if (next <= cost * (1.0 + kPolishedStep)) {
+          break;
+        }
+        step *= 0.5;
+        size *= 0.5;
+      }
+      if (!(next <= cost * (1.0 + kPolishedStep))) {
+        q_ = before;
+        shared_.PrepareForEvaluation(true, true);
+        return last <= kParameterTolerance;
+      }
+      cost = next;
+      Record(true);
+      if (size <= kPolishedStep || (size <= kParameterTolerance && size > 0.5 * last)) {
+        return true;
+      }
+      last = size;
+    }
+    return last <= kParameterTolerance;
+  }
+
   void Polish() {
     double last = std::numeric_limits<double>::infinity();
     double cost = RobustCost(shared_.values(), options_.huber);
@@ -243,7 +355,7 @@ class Minimiser : public ceres::IterationCallback {
       }
       cost = next;
       last = size;
-      Record(cost, true);
+      Record(true);
     }
   }
 
@@ -256,6 +368,8 @@ class Minimiser : public ceres::IterationCallback {
   std::vector<bool> held_;    ///< parameters at a bound, without a part in the steps
   std::vector<int> pushed_;   ///< iterations in a row that the cost falls beyond the bound
   Eigen::VectorXd gradient_;  ///< dcost/dq at the last evaluation with Jacobians, of held ones too
+  double huber_;              ///< of the loss that is minimised now
+  double cost_ = 0.0;         ///< robust, at the last accepted point
   double gradient_norm_ = 0.0;
   Minimum minimum_;
 };
@@ -284,6 +398,15 @@ double RobustCost(const Eigen::VectorXd& residuals, double huber) {
     sum += huber > 0.0 && size > huber ? 2.0 * huber * size - huber * huber : r * r;
   }
   return 0.5 * sum;
+}
+
+Eigen::VectorXd RobustGradient(const Eigen::VectorXd& residuals, const RowMatrixXd& jacobian,
+                               double huber) {
+  Eigen::VectorXd gradient = Eigen::VectorXd::Zero(jacobian.cols());
+  for (Eigen::Index i = 0; i < residuals.size(); ++i) {
+    gradient += RobustWeight(residuals[i], huber) * residuals[i] * jacobian.row(i).transpose();
+  }
+  return gradient;
 }
 
 Minimum Minimise(const FitOptions& options, const Eigen::VectorXd& start,

@@ -39,4 +39,8 @@ void SetInternalBounds(const ParameterizedScene& scene, ceres::Problem* problem,
 /// 1/2 Σ ρ(r²).
 double RobustCost(const Eigen::VectorXd& residuals, double huber);
 
+/// Its derivative Jᵀ ρ'(r²) r.
+Eigen::VectorXd RobustGradient(const Eigen::VectorXd& residuals, const RowMatrixXd& jacobian,
+                               double huber);
+
 }  // namespace tangible

@@ -148,6 +148,42 @@ TEST(FitTest, AParameterWithoutEffectIsNamed) {
   EXPECT_NE(fit.message.find("\"bodies/ball/friction\" has no effect"), std::string::npos);
 }
 
+// At restitution 0 an impact has another law, and the derivative is 0 by definition.
+TEST(FitTest, AParameterWhoseDerivativeVanishesAtItsBoundIsFitted) {
+  const Scene scene = MakeScene(R"({"bodies": [
+      {"name": "ball", "shape": {"circle": {"radius": 0.1}}, "mass": 1, "position": [0, 0.5]},
+      {"name": "floor", "static": true, "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}}],
+      "pairs": [{"bodies": ["ball", "floor"], "restitution": 0.6}],
+      "simulation": {"dt": 0.01, "duration": 0.6}})");
+  const FitResult fit =
+      FitTo(scene, {Parameter("pairs/ball:floor/restitution", 0.0)}, Observe(scene, 1, 0.0, 1));
+  ASSERT_EQ(fit.status, FitStatus::kConverged) << fit.message;
+  EXPECT_NEAR(fit.estimate[0], 0.6, 1e-6);
+  // The iterations begin with what the user wrote.
+  EXPECT_EQ(fit.iterations.front().parameters, std::vector<double>{0.0});
+  EXPECT_EQ(fit.iterations.front().cost, fit.initial_cost);
+  EXPECT_EQ(fit.starts.front().initial, std::vector<double>{0.0});
+}
+
+TEST(FitTest, HuberConvergesQuicklyFromFarAway) {
+  const Scene scene = MakeScene(kFallingBall);
+  std::vector<Observation> observations = Observe(scene, 2, 0.01, 5);
+  for (size_t i = 1; i < observations.size(); i += 15) {
+    observations[i].value += 2.0;
+  }
+  FitOptions options;
+  options.huber = 3.0;
+  const FitResult near = FitTo(scene, {Parameter("gravity/y", -9.8)}, observations, options);
+  for (const double start : {-0.1, -300.0}) {
+    const FitResult far = FitTo(scene, {Parameter("gravity/y", start)}, observations, options);
+    ASSERT_EQ(far.status, FitStatus::kConverged) << far.message;
+    EXPECT_NEAR(far.estimate[0], near.estimate[0], 1e-8);
+    EXPECT_NEAR(far.final_cost, near.final_cost, 1e-9 * near.final_cost);
+    EXPECT_LE(far.iterations.size(), 16u);
+    EXPECT_EQ(far.iterations.back().cost, far.final_cost);
+  }
+}
+
 TEST(FitTest, ACombinationThatIsNotDeterminedIsNamed) {
   // Only damping / mass enters the motion of a falling ball.
   const Scene scene = MakeScene(kFallingBall);
