@@ -311,6 +311,14 @@ bool ParameterizedScene::Set(const Eigen::VectorXd& p) {
 
 void ParameterizedScene::Shorten(double duration) {
   scene_.simulation.duration = duration;
+  std::vector<double>& times = scene_.simulation.step_times;
+  times.erase(std::upper_bound(times.begin(), times.end(), duration), times.end());
+  structure_ = BuildStructure(scene_);
+  BuildModelWithStructure(scene_, structure_, &model_, &state_);
+}
+
+void ParameterizedScene::SplitSteps(const std::vector<double>& times) {
+  AddStepTimes(times, &scene_.simulation);
   structure_ = BuildStructure(scene_);
   BuildModelWithStructure(scene_, structure_, &model_, &state_);
 }

@@ -86,6 +86,8 @@ class ParameterizedScene {
 
   /// Ends the run at `duration`, s.
   void Shorten(double duration);
+  /// Makes steps end at these times too.
+  void SplitSteps(const std::vector<double>& times);
 
   const Scene& scene() const { return scene_; }
   const std::vector<BodyPoint>& points() const { return points_; }

@@ -47,6 +47,13 @@ const char* NameOf(DerivativeMethod method) {
 
 RolloutResiduals::RolloutResiduals(ParameterizedScene scene, std::vector<Observation> observations)
     : scene_(std::move(scene)), observations_(std::move(observations)) {
+  if (scene_.scene().simulation.stepping == Stepping::kEvent) {
+    std::vector<double> times;
+    for (const Observation& observation : observations_) {
+      times.push_back(observation.time);
+    }
+    scene_.SplitSteps(times);
+  }
   plan_ = SamplePlan(observations_, scene_.scene().simulation);
   scene_.Shorten(StepTime(scene_.scene().simulation, plan_.last_step()));
 }

@@ -17,6 +17,10 @@ constexpr double kOnStep = 1e-9;
 void Locate(const SimulationSettings& settings, Sample* sample) {
   const long steps = NumSteps(settings);
   long k = std::clamp(static_cast<long>(sample->time / settings.dt), 0L, steps);
+  if (!settings.step_times.empty()) {
+    k = std::upper_bound(settings.step_times.begin(), settings.step_times.end(), sample->time) -
+        settings.step_times.begin() - 1;
+  }
   while (k > 0 && StepTime(settings, k) > sample->time) {
     --k;
   }

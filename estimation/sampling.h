@@ -9,7 +9,9 @@
 //
 //   q(t) = (1 − a) q_k + a q_{k+1},   a = (t − t_k) / (t_{k+1} − t_k)
 //
-// which is exact for the map of semi-implicit Euler. A point is moved with the pose so found:
+// which is exact for the map of semi-implicit Euler. With event stepping steps end at the
+// observations' times (AddStepTimes), so that nothing is interpolated, and never across an event. A
+// point is moved with the pose so found:
 // r = (x, y) + R(angle) at.
 
 #include <utility>

@@ -116,6 +116,20 @@ void MakeRecorders(Job* job) {
   r.observations.emplace(structure, std::move(options));
 }
 
+// Event stepping interpolates nothing: its steps end where it is observed.
+void EndStepsAtObservations(SimulationSettings* settings) {
+  const double samples = FLAGS_rate * settings->duration;
+  if (FLAGS_observe.empty() || settings->stepping != Stepping::kEvent ||
+      !(samples <= kMaxSamples)) {
+    return;
+  }
+  std::vector<double> times;
+  for (long k = 1; FLAGS_rate > 0.0 && static_cast<double>(k) <= samples; ++k) {
+    times.push_back(static_cast<double>(k) / FLAGS_rate);
+  }
+  AddStepTimes(times, settings);
+}
+
 void Prepare(const std::string& file, Job* job) {
   if (!LoadScene(file, &job->scene, &job->error)) return;
   std::string why;
@@ -123,6 +137,7 @@ void Prepare(const std::string& file, Job* job) {
     job->error = file + ": " + why;
     return;
   }
+  EndStepsAtObservations(&job->scene.simulation);
   BuildModel(job->scene, &job->model, &job->initial);
   if (!FLAGS_initial.empty() &&
       !ReadInitialState(FLAGS_initial, *job->model.structure, &job->initial, &job->error)) {

@@ -130,6 +130,9 @@ enum class ImpactLaw { kNewton, kPoisson };
 struct SimulationSettings {
   double dt = 0.01;       ///< s
   double duration = 1.0;  ///< s
+  /// Where not empty: the times of the steps' ends, 0 first, in the place of k dt. No key of the
+  /// scene file: observations between steps add their times (event stepping).
+  std::vector<double> step_times;
   Stepping stepping = Stepping::kFixed;
   Integrator integrator = Integrator::kSemiImplicitEuler;
   JointCorrection joint_correction = JointCorrection::kNone;

@@ -53,6 +53,7 @@ class RolloutCertifier {
                   Segment* segment);
   void AddQuality(const ContactProblem<double>& problem, const std::vector<ContactMode>& modes,
                   ContactSystem* system);
+  void AddUnloaded(const Model<double>& model, long step, const Impulses& impact);
   void AddSimultaneous(const Model<double>& model, long step, const Impulses& impact);
   void AddContact(const Model<double>& model, const StepRecord& record, const Place& place);
   void AddLaw(const Model<double>& model, const StepRecord& record, const Place& place);
@@ -72,7 +73,8 @@ class RolloutCertifier {
   std::vector<ActiveContact> closed_;  ///< of the last step
   std::vector<ContactMode> last_modes_;
   int last_redundant_ = 0;
-  // Event stepping: the bodies that the last impact moved, and when.
+  // Event stepping: contacts that bear a force, the bodies that the last impact moved, and when.
+  std::vector<ActiveContact> loaded_;
   std::vector<bool> struck_;
   double struck_at_ = -std::numeric_limits<double>::infinity();
 };

@@ -50,6 +50,20 @@ std::vector<bool> Struck(const ModelStructure& s, const Impulses& impact) {
   return struck;
 }
 
+// A speed that is rounding, m/s.
+double Negligible(const Model<double>& model, double speed) {
+  return 1e-9 *
+         (std::abs(speed) + model.structure->settings.dt *
+                                std::hypot(model.numbers[kGravityX], model.numbers[kGravityY]));
+}
+
+double SlipOf(const Model<double>& model, const State<double>& state,
+              const ActiveContact& contact) {
+  ContactRows<double> rows;
+  EvaluateContactRows(model, state, contact, &rows);
+  return std::abs(RelativeSpeed(state, contact.a, rows.tangent_a, contact.b, rows.tangent_b));
+}
+
 }  // namespace
 
 void RolloutCertifier::AddQuality(const ContactProblem<double>& problem,
@@ -71,9 +85,7 @@ void RolloutCertifier::AddSimultaneous(const Model<double>& model, long step,
     const ActiveContact& c = impact.contacts[i];
     const ContactBlock<double>& block = impact.problem.contacts[i];
     const double before = RelativeSpeed(impact.before, c.a, block.normal_a, c.b, block.normal_b);
-    const double scale =
-        s.settings.dt * std::hypot(model.numbers[kGravityX], model.numbers[kGravityY]);
-    if (before < -1e-9 * (scale + std::abs(before))) {
+    if (before < -Negligible(model, before)) {
       approaching.push_back(i);
     }
   }
@@ -110,6 +122,27 @@ void RolloutCertifier::AddSimultaneous(const Model<double>& model, long step,
   struck_at_ = impact.time;
 }
 
+// A contact that only touches, without force, takes part in an impact of another: were there a gap,
+// however small, it would have one of its own later.
+void RolloutCertifier::AddUnloaded(const Model<double>& model, long step, const Impulses& impact) {
+  double largest = 0.0;
+  for (const double normal : impact.solution.normal_impulse) {
+    largest = std::max(largest, normal);
+  }
+  for (size_t i = 0; i < impact.contacts.size(); ++i) {
+    const ActiveContact& c = impact.contacts[i];
+    const ContactBlock<double>& block = impact.problem.contacts[i];
+    const double before = RelativeSpeed(impact.before, c.a, block.normal_a, c.b, block.normal_b);
+    const bool loaded = std::any_of(loaded_.begin(), loaded_.end(),
+                                    [&](const ActiveContact& l) { return l.SameAs(c); });
+    if (!loaded && impact.solution.normal_impulse[i] > 1e-9 * largest &&
+        before >= -Negligible(model, before)) {
+      const Place place{model.structure.get(), step, impact.time, i, &c, impact.solution.modes[i]};
+      AddJump(0.0, place, "it only touches when another impact moves it");
+    }
+  }
+}
+
 void RolloutCertifier::AddImpact(const Model<double>& model, long step, Impulses* impact) {
   const ModelStructure& s = *model.structure;
   const double threshold = s.settings.restitution_threshold;
@@ -143,6 +176,7 @@ void RolloutCertifier::AddImpact(const Model<double>& model, long step, Impulses
   }
   if (impact->h == 0.0) {
     AddSimultaneous(model, step, *impact);
+    AddUnloaded(model, step, *impact);
   }
   AddQuality(impact->problem, impact->solution.modes, &impact->system);
 }
@@ -151,6 +185,7 @@ void RolloutCertifier::AddSegment(const Model<double>& model, long step,
                                   EventDerivative* derivative, Segment* segment) {
   const ModelStructure& s = *model.structure;
   SolvedNode& start = segment->stages[0];
+  loaded_.clear();
   double largest = 0.0;
   for (const double normal : start.solution.normal_impulse) {
     largest = std::max(largest, normal);
@@ -161,6 +196,23 @@ void RolloutCertifier::AddSegment(const Model<double>& model, long step,
     const double normal = start.solution.normal_impulse[i];
     const CoefficientSource& friction = segment->friction[i];
     AddMargin(largest > 0.0 ? normal / largest : 0.0, place, "normal force");
+    if (normal > 1e-9 * largest) {
+      loaded_.push_back(contact);
+    }
+    // Sliding at no speed: friction stays at its limit. Beside a contact of the same bodies that
+    // sticks this says only how they share the load.
+    const bool shared = std::any_of(
+        segment->contacts.begin(), segment->contacts.end(), [&](const ActiveContact& other) {
+          return &other != &contact && other.a == contact.a && other.b == contact.b &&
+                 segment->modes[&other - segment->contacts.data()] == ContactMode::kSticking;
+        });
+    if (SlidingSign(place.mode) != 0.0 && !shared) {
+      const double slip =
+          std::max(SlipOf(model, segment->before, contact), SlipOf(model, segment->after, contact));
+      if (slip <= Negligible(model, slip)) {
+        AddMargin(0.0, place, "friction limit");
+      }
+    }
     if (place.mode == ContactMode::kSticking && normal > 0.0) {
       const double limit = friction.value * normal;
       AddMargin((limit - std::abs(start.solution.tangent_impulse[i])) / limit, place,

@@ -237,6 +237,7 @@ void EventSearch::SearchPair(const Model<double>& model, int a, int b, Event* ev
     closed = closed || OfPair(contact, a, b);
   }
   const double touch = TouchTolerance(segment_->before, a, b);
+  const double slow = SpeedTolerance(model, segment_->before);
   ActiveContact nearest;
   Vector2<double> normal(0.0, 0.0);
   bool on_face = false;  // the normal belongs to a body's face, not to the line between two points
@@ -312,7 +313,14 @@ void EventSearch::SearchPair(const Model<double>& model, int a, int b, Event* ev
     if (from < event->length && gap(*At(model, from), all) > touch) {
       allowed = 0.0;  // it has left
     }
-    const auto shifted = [&](const Sample& sample) { return gap(sample, all) + allowed; };
+    // A contact that has touched all the time returns only by approaching: the first-order
+    // integrator's poses may cut a corner that its twists do not.
+    const auto shifted = [&](const Sample& sample) {
+      const double value = gap(sample, all) + allowed;
+      const bool approaches = value > 0.0 || !all || !Contains(*touching_, nearest) ||
+                              NormalSpeed(model, sample.motion.after, nearest) < -slow;
+      return approaches ? value : touch;
+    };
     const auto rate = [&](double x, double y) { return rate_over(x, y, all); };
     double root;
     if (from < event->length && FirstRoot(model, shifted, rate, from, event->length, &root) &&

@@ -57,19 +57,48 @@ bool AllFinite(const std::vector<double>& values) {
 }  // namespace
 
 long NumSteps(const SimulationSettings& settings) {
+  if (!settings.step_times.empty()) {
+    return static_cast<long>(settings.step_times.size()) - 1;
+  }
   return std::max(0L, std::lround(std::ceil(settings.duration / settings.dt - 1e-9)));
 }
 
 double StepTime(const SimulationSettings& settings, long k) {
-  return std::min(k * settings.dt, settings.duration);
+  return settings.step_times.empty() ? std::min(k * settings.dt, settings.duration)
+                                     : settings.step_times[k];
 }
 
 double StepLength(const SimulationSettings& settings, long k) {
+  if (!settings.step_times.empty()) {
+    return settings.step_times[k + 1] - settings.step_times[k];
+  }
   if (k + 1 < NumSteps(settings)) {
     return settings.dt;
   }
   const double last = settings.duration - k * settings.dt;
   return std::abs(last - settings.dt) <= 1e-9 * settings.dt ? settings.dt : last;
+}
+
+void AddStepTimes(const std::vector<double>& times, SimulationSettings* settings) {
+  std::vector<double> all;
+  for (long k = 0; k <= NumSteps(*settings); ++k) {
+    all.push_back(StepTime(*settings, k));
+  }
+  const double near = 1e-9 * settings->dt;
+  std::vector<double> merged = all;
+  for (const double time : times) {
+    const auto next = std::lower_bound(all.begin(), all.end(), time);
+    const bool known = (next != all.end() && *next - time <= near) ||
+                       (next != all.begin() && time - *(next - 1) <= near);
+    if (!known && time > 0.0 && time < all.back()) {
+      merged.push_back(time);
+    }
+  }
+  std::sort(merged.begin(), merged.end());
+  merged.erase(
+      std::unique(merged.begin(), merged.end(), [&](double x, double y) { return y - x <= near; }),
+      merged.end());
+  settings->step_times = std::move(merged);
 }
 
 SolvedStep StepRecord::View(const std::vector<int>& contact_block) const {

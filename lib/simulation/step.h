@@ -132,5 +132,7 @@ long NumSteps(const SimulationSettings& settings);
 double StepTime(const SimulationSettings& settings, long k);
 /// Length of step k: dt, but for the last.
 double StepLength(const SimulationSettings& settings, long k);
+/// Makes steps end at further times within the run; those within 1e-9 dt of another are that one.
+void AddStepTimes(const std::vector<double>& times, SimulationSettings* settings);
 
 }  // namespace tangible

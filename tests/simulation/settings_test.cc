@@ -12,17 +12,24 @@ TEST(CheckSettings, AcceptsTheDefaults) {
   EXPECT_EQ(error, "");
 }
 
-TEST(CheckSettings, NamesWhatIsMissing) {
+TEST(CheckSettings, AcceptsEventSteppingWithEachIntegrator) {
   std::string error;
   SimulationSettings settings;
   settings.stepping = Stepping::kEvent;
-  EXPECT_FALSE(CheckSettings(settings, &error));
-  EXPECT_EQ(error,
-            "/simulation/stepping: expected \"fixed\" (the only one available), got \"event\"");
-  settings = SimulationSettings();
+  for (const Integrator integrator :
+       {Integrator::kSemiImplicitEuler, Integrator::kTrapezoidal, Integrator::kRungeKutta4}) {
+    settings.integrator = integrator;
+    EXPECT_TRUE(CheckSettings(settings, &error)) << error;
+  }
+}
+
+TEST(CheckSettings, NamesWhatIsMissing) {
+  std::string error;
+  SimulationSettings settings;
   settings.integrator = Integrator::kTrapezoidal;
   EXPECT_FALSE(CheckSettings(settings, &error));
   EXPECT_EQ(error.find("/simulation/integrator: "), 0u) << error;
+  EXPECT_NE(error.find("\"stepping\": \"event\""), std::string::npos) << error;
   settings = SimulationSettings();
   settings.impact_law = ImpactLaw::kPoisson;
   EXPECT_FALSE(CheckSettings(settings, &error));

@@ -1,0 +1,207 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/simulation/event_step.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "../support/scenes.h"
+#include "tangible/simulation/invariants.h"
+#include "tangible/simulation/rollout.h"
+
+namespace tangible {
+namespace {
+
+using test_scenes::SceneOf;
+
+constexpr double kG = 9.81;
+
+struct Rolled {
+  RolloutReport report;
+  State<double> final;
+};
+
+Rolled Simulate(const std::string& text) {
+  Model<double> model;
+  State<double> state;
+  BuildModel(SceneOf(text), &model, &state);
+  Rolled run;
+  run.report = Rollout(model, state, nullptr, &run.final);
+  EXPECT_EQ(run.report.status, StepStatus::kDone) << run.report.message;
+  return run;
+}
+
+std::string Settings(const char* integrator, double duration, const std::string& more = "") {
+  return R"("simulation": {"stepping": "event", "dt": 0.01, "integrator": ")" +
+         std::string(integrator) + R"(", "duration": )" + std::to_string(duration) + more + "}";
+}
+
+std::string Ball(double height, double speed, double spin, double e, double mu) {
+  const auto text = [](double x) { return std::to_string(x); };
+  return R"("bodies": [{"name": "ball", "shape": {"circle": {"radius": 0.1}}, "mass": 1,
+      "position": [0, )" +
+         text(0.1 + height) + R"(], "velocity": [)" + text(speed) + R"(, 0],
+      "angular_velocity": )" +
+         text(spin) + R"(, "restitution": )" + text(e) + R"(, "friction": )" + text(mu) + R"(},
+    {"name": "floor", "static": true, "restitution": )" +
+         text(e) + R"(, "friction": )" + text(mu) + R"(,
+      "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}}], )";
+}
+
+TEST(EventStepTest, BouncesAsTheFormulaSays) {
+  const Rolled run = Simulate("{" + Ball(1.0, 0, 0, 0.8, 0) + Settings("trapezoidal", 1.5) + "}");
+  const double u = std::sqrt(2.0 * kG);
+  const double t1 = u / kG;
+  const double t2 = t1 + 2.0 * 0.8 * u / kG;
+  const double left = 1.5 - t2;
+  EXPECT_NEAR(run.final.pose[1], 0.1 + 0.64 * u * left - 0.5 * kG * left * left, 1e-12);
+  EXPECT_NEAR(run.final.twist[1], 0.64 * u - kG * left, 1e-12);
+  EXPECT_EQ(run.report.events, 2);
+  EXPECT_EQ(run.report.fallbacks, 0);
+}
+
+TEST(EventStepTest, ABouncingBallComesToRest) {
+  const Rolled run = Simulate("{" + Ball(0.5, 0, 0, 0.6, 0) + Settings("trapezoidal", 3) + "}");
+  EXPECT_NEAR(run.final.pose[1], 0.1, 1e-14);
+  EXPECT_NEAR(run.final.twist[1], 0.0, 1e-14);
+  EXPECT_GT(run.report.events, 10);
+  EXPECT_EQ(run.report.fallbacks, 0);
+}
+
+TEST(EventStepTest, AnEndlessSeriesOfBouncesIsCutShortAndCounted) {
+  // Without a threshold the series never ends: 100 events in one step are the limit.
+  const Rolled run = Simulate("{" + Ball(0.001, 0, 0, 0.99, 0) +
+                              Settings("trapezoidal", 0.1, R"(, "max_events_per_step": 5,
+                                    "restitution_threshold": 0)") +
+                              "}");
+  EXPECT_GE(run.report.fallbacks, 0);
+  const Rolled zeno = Simulate("{" + Ball(0.0001, 0, 0, 0.9, 0) +
+                               R"("simulation": {"stepping": "event", "integrator": "trapezoidal",
+                               "dt": 0.1, "duration": 0.2, "restitution_threshold": 0}})");
+  EXPECT_EQ(zeno.report.fallbacks, 1);
+  EXPECT_NEAR(zeno.final.pose[1], 0.1, 1e-12);
+}
+
+TEST(EventStepTest, ASlidingDiscRolls) {
+  // v = v0 − μ g t until v = r ω: t = v0 / (3 μ g), v = 2 v0 / 3.
+  const Rolled run = Simulate("{" + Ball(0, 2, 0, 0, 0.3) + Settings("trapezoidal", 0.8) + "}");
+  const double t = 2.0 / (3.0 * 0.3 * kG);
+  EXPECT_NEAR(run.final.twist[0], 4.0 / 3.0, 1e-13);
+  EXPECT_NEAR(run.final.twist[2], -40.0 / 3.0, 1e-12);
+  EXPECT_NEAR(run.final.pose[0], 2.0 * t - 0.5 * 0.3 * kG * t * t + 4.0 / 3.0 * (0.8 - t), 1e-13);
+  EXPECT_EQ(run.report.events, 1);
+}
+
+TEST(EventStepTest, ABlockStopsWhereItsEnergyIsSpent) {
+  const Rolled run = Simulate(R"({"bodies": [
+      {"name": "box", "shape": {"box": {"size": [0.4, 0.2]}}, "mass": 2, "position": [0, 0.1],
+       "velocity": [2, 0], "friction": 0.4},
+      {"name": "floor", "static": true, "friction": 0.4,
+       "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}}], )" +
+                              Settings("runge_kutta_4", 1.0) + "}");
+  EXPECT_NEAR(run.final.pose[0], 4.0 / (2.0 * 0.4 * kG), 1e-13);
+  EXPECT_NEAR(run.final.pose[1], 0.1, 1e-14);
+  EXPECT_NEAR(run.final.pose[2], 0.0, 1e-14);
+  EXPECT_NEAR(run.final.twist[0], 0.0, 1e-14);
+}
+
+TEST(EventStepTest, ARampOfForceStartsASlideWhereFrictionEnds) {
+  // F = 5 t against μ m g = 0.4 · 2 · 9.81: it sticks until t = 1.5696 s, then slides with
+  // a = (F − μ m g) / m.
+  Model<double> model;
+  Scene scene = SceneOf(R"({"bodies": [
+      {"name": "box", "shape": {"box": {"size": [0.4, 0.2]}}, "mass": 2, "position": [0, 0.1],
+       "friction": 0.4},
+      {"name": "floor", "static": true, "friction": 0.4,
+       "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}}],
+    "forces": [{"name": "push", "body": "box", "force": [0, 0], "at": [0, -0.1]}], )" +
+                        Settings("runge_kutta_4", 2.0) + "}");
+  Signal ramp;
+  ramp.interpolation = Signal::Interpolation::kLinear;
+  ramp.time = {0.0, 10.0};
+  ramp.x = {0.0, 50.0};
+  scene.forces[0].force_signal = ramp;
+  State<double> state;
+  BuildModel(scene, &model, &state);
+  const RolloutReport report = Rollout(model, state, nullptr, &state);
+  ASSERT_EQ(report.status, StepStatus::kDone) << report.message;
+  const double start = 0.4 * 2.0 * kG / 5.0;
+  const double left = 2.0 - start;
+  EXPECT_NEAR(state.twist[0], 5.0 * left * left / 4.0, 1e-12);
+  EXPECT_NEAR(state.pose[0], 5.0 * left * left * left / 12.0, 1e-12);
+}
+
+TEST(EventStepTest, ABlockLiftsOffAnAcceleratedTable) {
+  // A ball on a table that swings down faster than gravity pulls: it leaves, and lands again.
+  const Rolled run = Simulate(R"({"bodies": [
+      {"name": "ball", "shape": {"circle": {"radius": 0.1}}, "mass": 1, "position": [0, 1.15]},
+      {"name": "table", "shape": {"box": {"size": [1, 0.1]}}, "mass": 1, "position": [0, 1]}],
+    "joints": [{"name": "rail", "type": "prismatic", "bodies": ["table", "world"], "anchor": [0, 1],
+                "axis": [0, 1]}],
+    "springs": [{"name": "s", "bodies": ["table", "world"], "anchors": [[0, 1], [0, 0]],
+                 "stiffness": 100, "rest_length": 1.5}], )" +
+                              Settings("runge_kutta_4", 1.0) + "}");
+  // Up by a force of 50 N against 19.62 N; past the spring's rest length both would part.
+  EXPECT_GE(run.report.events, 2);
+  EXPECT_GT(run.final.pose[1], run.final.pose[4] + 0.15 - 1e-12);
+}
+
+TEST(EventStepTest, TouchingBallsPassTheBlowOn) {
+  const Rolled run = Simulate(R"({"gravity": [0, 0], "bodies": [
+      {"name": "a", "shape": {"circle": {"radius": 0.1}}, "mass": 1, "position": [-0.5, 0],
+       "velocity": [1, 0], "restitution": 1},
+      {"name": "b", "shape": {"circle": {"radius": 0.1}}, "mass": 1, "position": [0, 0],
+       "restitution": 1},
+      {"name": "c", "shape": {"circle": {"radius": 0.1}}, "mass": 1, "position": [0.3, 0],
+       "restitution": 1}], )" +
+                              Settings("trapezoidal", 1.0) + "}");
+  EXPECT_NEAR(run.final.twist[0], 0.0, 1e-14);
+  EXPECT_NEAR(run.final.twist[3], 0.0, 1e-14);
+  EXPECT_NEAR(run.final.twist[6], 1.0, 1e-14);
+  EXPECT_EQ(run.report.events, 2);
+}
+
+TEST(EventStepTest, AForceWindowsEdgesAreMet) {
+  // 2 N on 1 kg from 0.013 to 0.187 s.
+  const Rolled run = Simulate(R"({"gravity": [0, 0], "bodies": [
+      {"name": "a", "mass": 1, "inertia": 1, "position": [0, 0]}],
+    "forces": [{"name": "f", "body": "a", "force": [2, 0], "start": 0.013, "end": 0.187}], )" +
+                              Settings("trapezoidal", 0.5) + "}");
+  EXPECT_NEAR(run.final.twist[0], 2.0 * 0.174, 1e-15);
+  EXPECT_NEAR(run.final.pose[0], 0.174 * 0.174 + 2.0 * 0.174 * (0.5 - 0.187), 1e-15);
+  EXPECT_EQ(run.report.events, 2);
+}
+
+TEST(EventStepTest, PainlevesRodIsGivenAnImpulse) {
+  // A rod that slides on its tip at a steep angle under much friction: accelerations have no
+  // solution (I/m a² small, μ > 4/3). It goes on, and says that it took the way out.
+  const Rolled run = Simulate(R"({"bodies": [
+      {"name": "rod", "shape": {"capsule": {"length": 2, "radius": 1e-6}}, "mass": 1,
+       "inertia": 0.3333333333333333, "position": [-0.4539904997395468, 0.8910075241883679],
+       "angle": 2.0420352248333655, "velocity": [1, 0], "friction": 3},
+      {"name": "floor", "static": true, "friction": 3,
+       "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}}], )" +
+                              Settings("runge_kutta_4", 0.2) + "}");
+  EXPECT_TRUE(std::isfinite(run.final.pose[2]));
+  EXPECT_LE(run.report.penetration_max, 1e-6);
+}
+
+TEST(EventStepTest, AStackStaysWhereItIs) {
+  std::string bodies;
+  for (int i = 0; i < 4; ++i) {
+    bodies +=
+        R"({"name": "b)" + std::to_string(i) +
+        R"(", "shape": {"box": {"size": [1, 1]}}, "mass": 1, "friction": 0.5, "position": [0, )" +
+        std::to_string(i + 0.5) + "]}, ";
+  }
+  const Rolled run = Simulate(R"({"bodies": [)" + bodies + R"({"name": "floor", "static": true,
+      "friction": 0.5, "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}}], )" +
+                              Settings("trapezoidal", 0.5) + "}");
+  for (int i = 0; i < 4; ++i) {
+    EXPECT_NEAR(run.final.pose[3 * i], 0.0, 1e-12);
+    EXPECT_NEAR(run.final.pose[3 * i + 1], i + 0.5, 1e-12);
+  }
+}
+
+}  // namespace
+}  // namespace tangible
