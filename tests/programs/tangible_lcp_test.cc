@@ -151,6 +151,21 @@ TEST_F(TangibleLcpTest, FlagsInEveryForm) {
             0);
 }
 
+TEST_F(TangibleLcpTest, FlagsOfLibrariesAreUnknown) {
+  for (const char* flag : {"--flagfile=x", "--fromenv=out", "--tryfromenv=out", "--undefok=x",
+                           "--v=1", "--logtostderr", "--nologtostderr", "--helpfull"}) {
+    ExpectOneLine(Solve(kMixed, flag), 2, "unknown flag --");
+  }
+}
+
+TEST_F(TangibleLcpTest, TheInputIsNotOverwritten) {
+  const std::string path = Write("same.json", kMixed);
+  ExpectOneLine(Run("tangible-lcp", "'" + path + "' --out='" + path + "'"), 2,
+                "--out: expected a file of its own, got that of the input");
+  EXPECT_EQ(Read(path), kMixed);
+  EXPECT_EQ(Solve(kMixed, "--out=/dev/null").exit_status, 0);
+}
+
 TEST_F(TangibleLcpTest, HelpAndVersion) {
   const ProgramRun help = Run("tangible-lcp", "--help");
   EXPECT_EQ(help.exit_status, 0);
