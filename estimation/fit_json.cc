@@ -7,6 +7,7 @@
 
 #include "tangible/scene/json_reader.h"
 #include "tangible/scene/scene_json.h"
+#include "tangible/scene/scene_names.h"
 #include "tangible/simulation/settings.h"
 
 namespace tangible {
@@ -57,10 +58,13 @@ std::vector<BodyPoint> ReadPoints(const JsonReader& json, const Scene& scene) {
     if (point.body < 0) {
       entry.At("body").FailExpected("the name of a body (" + BodyNames(scene) + ")");
     }
-    if (name.find('/') != std::string::npos || name.find('*') != std::string::npos) {
-      entry.Fail("expected a name without / and *");
+    // The name stands in a path and in a cell of the observations.
+    if (!IsName(name)) {
+      entry.Fail("expected a name of letters, digits and _.- , got " + name);
     }
-    point.at = entry.At("at").Point();
+    if (entry.Has("at")) {
+      point.at = entry.At("at").Point();
+    }
     points.push_back(point);
   }
   return points;

@@ -220,7 +220,8 @@ int main(int argc, char** argv) {
            "Prints each iteration and, for each parameter, the estimate, its standard deviation\n"
            "and 95 % interval.",
        .version = TANGIBLE_VERSION,
-       .source_file = __FILE__});
+       .source_file = __FILE__,
+       .outputs = {"out", "report"}});
   if (line.exit_status) return *line.exit_status;
   if (FLAGS_max_iterations < 1) {
     return tangible::ReportError("tangible-fit: --max_iterations: expected a number >= 1, got " +

@@ -8,6 +8,7 @@
 
 #include "tangible/app/program.h"
 #include "tangible/scene/json_reader.h"
+#include "tangible/scene/scene_names.h"
 
 namespace tangible {
 namespace {
@@ -51,10 +52,7 @@ std::string ReadPoints(const std::string& file, const ModelStructure& structure,
   }
   for (const std::string& name : root.Keys()) {
     // The name stands in a cell of the observations.
-    if (name.find_first_not_of(
-            "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_.-") !=
-            std::string::npos ||
-        name.empty()) {
+    if (!IsName(name)) {
       root.At(name).Fail("expected a name of letters, digits and _.- , got " + name);
     }
     points->push_back(ReadPoint(root.At(name), name, structure));

@@ -59,14 +59,19 @@ FlagText SplitFlag(std::string_view argument) {
   return {std::string(argument.substr(0, equal)), std::string(argument.substr(equal + 1))};
 }
 
+// Finds a flag of the program's own; those of libraries could read files and change exit statuses.
+bool FindFlag(const ProgramInfo& info, const std::string& name, CommandLineFlagInfo* flag) {
+  return gflags::GetCommandLineFlagInfo(name.c_str(), flag) && flag->filename == info.source_file;
+}
+
 // Completes a flag without "=": a switch (--x, --nox), or a value in the next argument. Returns an
 // error or empty; `index` advances over a consumed value.
-std::string CompleteFlag(int argc, char** argv, FlagText& flag, int& index) {
+std::string CompleteFlag(int argc, char** argv, const ProgramInfo& info, FlagText& flag,
+                         int& index) {
   CommandLineFlagInfo known;
-  if (!gflags::GetCommandLineFlagInfo(flag.name.c_str(), &known)) {
+  if (!FindFlag(info, flag.name, &known)) {
     const bool negated = flag.name.rfind("no", 0) == 0 && !flag.value &&
-                         gflags::GetCommandLineFlagInfo(flag.name.substr(2).c_str(), &known) &&
-                         known.type == "bool";
+                         FindFlag(info, flag.name.substr(2), &known) && known.type == "bool";
     if (!negated) return "unknown flag --" + flag.name;
     flag = {flag.name.substr(2), "false"};
   }
@@ -77,6 +82,57 @@ std::string CompleteFlag(int argc, char** argv, FlagText& flag, int& index) {
     flag.value = argv[++index];
   } else {
     return "flag --" + flag.name + " needs a value";
+  }
+  return "";
+}
+
+// A file that the command line names, and by which word.
+struct NamedFile {
+  std::string word;
+  std::string path;
+};
+
+bool IsSameFile(const std::string& a, const std::string& b) {
+  namespace fs = std::filesystem;
+  std::error_code error;
+  const fs::file_status status = fs::status(a, error);
+  if (fs::exists(status) && !fs::is_regular_file(status) && !fs::is_directory(status)) {
+    return false;  // a device or a pipe may be written to twice
+  }
+  if (fs::equivalent(a, b, error) && !error) return true;
+  std::error_code error_a;
+  std::error_code error_b;
+  const fs::path canonical_a = fs::weakly_canonical(fs::absolute(a, error), error_a);
+  const fs::path canonical_b = fs::weakly_canonical(fs::absolute(b, error), error_b);
+  return !error_a && !error_b && canonical_a == canonical_b;
+}
+
+// An error, or empty where no output is another output or an input.
+std::string SharedFile(const ProgramInfo& info, const std::vector<std::string>& positional) {
+  std::vector<NamedFile> files;
+  for (const std::string& path : positional) {
+    files.push_back({"the input", path});
+  }
+  const auto add = [&](const std::string& name) {
+    std::string value;
+    if (gflags::GetCommandLineOption(name.c_str(), &value) && !value.empty()) {
+      files.push_back({"--" + name, value});
+    }
+  };
+  for (const std::string& name : info.inputs) {
+    add(name);
+  }
+  const std::size_t num_inputs = files.size();
+  for (const std::string& name : info.outputs) {
+    add(name);
+  }
+  for (std::size_t i = num_inputs; i < files.size(); ++i) {
+    for (std::size_t k = 0; k < i; ++k) {
+      if (IsSameFile(files[i].path, files[k].path)) {
+        return files[i].word + ": expected a file of its own, got that of " + files[k].word + ", " +
+               files[i].path;
+      }
+    }
   }
   return "";
 }
@@ -118,7 +174,7 @@ CommandLine ParseCommandLine(int argc, char** argv, const ProgramInfo& info) {
       line.exit_status = kExitDone;
       return line;
     } else {
-      const std::string error = CompleteFlag(argc, argv, flag, i);
+      const std::string error = CompleteFlag(argc, argv, info, flag, i);
       if (!error.empty()) return UsageError(info, error);
       if (gflags::SetCommandLineOption(flag.name.c_str(), flag.value->c_str()).empty()) {
         CommandLineFlagInfo known;
@@ -132,6 +188,8 @@ CommandLine ParseCommandLine(int argc, char** argv, const ProgramInfo& info) {
     return UsageError(info, "expected " + std::to_string(info.num_positional) +
                                 " argument(s), got " + std::to_string(line.positional.size()));
   }
+  const std::string shared = SharedFile(info, line.positional);
+  if (!shared.empty()) return UsageError(info, shared);
   return line;
 }
 

@@ -35,6 +35,10 @@ struct ProgramInfo {
   std::string version;      ///< "0.1.0"
   std::string source_file;  ///< __FILE__ of the main: its flags are the ones that --help lists
   int num_positional = 1;   ///< number of arguments that are not flags
+  /// Flags whose values are files that the program writes, and reads. No file is written twice, or
+  /// over an input.
+  std::vector<std::string> outputs = {"out"};
+  std::vector<std::string> inputs{};
 };
 
 struct CommandLine {
@@ -43,7 +47,9 @@ struct CommandLine {
   std::optional<int> exit_status;
 };
 
-/// Checks the arguments and sets the gflags they name. Prints help or the version on stdout, or one
+/// Checks the arguments and sets the gflags they name: those of the main's own file. The flags that
+/// gflags and glog bring (--flagfile, --fromenv, --v) are unknown; glog takes its settings from the
+/// environment (GLOG_v, GLOG_logtostderr). Prints help or the version on stdout, or one
 /// line about what is wrong on stderr.
 CommandLine ParseCommandLine(int argc, char** argv, const ProgramInfo& info);
 

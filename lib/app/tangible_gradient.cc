@@ -169,7 +169,8 @@ int main(int argc, char** argv) {
                       "scalar of it, with respect to\nparameters of the scene, and certifies the "
                       "result.",
        .version = TANGIBLE_VERSION,
-       .source_file = __FILE__});
+       .source_file = __FILE__,
+       .inputs = {"loss"}});
   if (line.exit_status) return *line.exit_status;
   tangible::GradientOptions options;
   const std::string wrong = tangible::CheckFlags(&options);

@@ -4,7 +4,10 @@
 
 #include <gflags/gflags.h>
 
+#include <Eigen/Eigenvalues>
+#include <Eigen/QR>
 #include <algorithm>
+#include <cmath>
 #include <string>
 
 #include "tangible/app/certificate_json.h"
@@ -76,6 +79,7 @@ class ProblemReader {
       root_.At("G").Fail("missing, expected " + Shape(nz, nv) + " beside M and p");
     }
     CheckSymmetric(problem.M);
+    if (root_.ok()) CheckDefinite(problem);
     input.has_loss = root_.Has("dl_dv") || root_.Has("dl_dz") || root_.Has("dl_dy");
     input.loss_gradient = {ReadVector("dl_dv", nv), ReadVector("dl_dy", ny),
                            ReadVector("dl_dz", nz)};
@@ -119,6 +123,33 @@ class ProblemReader {
         .At(static_cast<int>(col))
         .Fail("expected a symmetric matrix, got " + FormatNumber(M(row, col)) + " and " +
               FormatNumber(M(col, row)));
+  }
+
+  // M is positive definite where A v = 0: v is then unique given z, and (1) is the motion of least
+  // energy, not a saddle of it. Beyond A's null space any M will do. Each v is scaled by M's
+  // diagonal, so that masses of any ratio pass.
+  void CheckDefinite(const MixedLcp<double>& problem) const {
+    const Index n = problem.num_v();
+    if (n == 0) return;
+    const VectorXd scale = problem.M.diagonal().unaryExpr(
+        [](double m) { return m == 0.0 ? 1.0 : 1.0 / std::sqrt(std::abs(m)); });
+    MatrixXd basis = MatrixXd::Identity(n, n);
+    if (problem.A.rows() > 0) {
+      MatrixXd A = problem.A * scale.asDiagonal();
+      A.rowwise().normalize();  // a row of zeros stays
+      const Eigen::ColPivHouseholderQR<MatrixXd> qr(A.transpose());
+      const MatrixXd q = qr.householderQ();
+      basis = q.rightCols(n - qr.rank());
+    }
+    if (basis.cols() == 0) return;
+    basis = scale.asDiagonal() * basis;
+    const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(basis.transpose() * problem.M * basis);
+    const double rounding =
+        1e-15 * static_cast<double>(n) * eigen.eigenvalues().cwiseAbs().maxCoeff();
+    if (eigen.eigenvalues()[0] > rounding) return;
+    const VectorXd v = (basis * eigen.eigenvectors().col(0)).normalized();
+    root_.At("M").Fail("expected a matrix that is positive definite where A v = 0, got v' M v = " +
+                       FormatNumber(v.dot(problem.M * v)) + " for a unit v");
   }
 
   JsonReader root_;

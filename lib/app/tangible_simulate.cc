@@ -205,7 +205,9 @@ int main(int argc, char** argv) {
        .description = "Runs a scene and writes the trajectory of its bodies as CSV; on request "
                       "contacts, a summary,\nnoisy observations and an animated view.",
        .version = TANGIBLE_VERSION,
-       .source_file = __FILE__});
+       .source_file = __FILE__,
+       .outputs = {"out", "contacts", "view", "summary", "observe"},
+       .inputs = {"initial", "points"}});
   if (line.exit_status) return *line.exit_status;
   const std::string wrong = tangible::CheckFlags();
   if (!wrong.empty()) {

@@ -16,15 +16,6 @@
 namespace tangible {
 namespace {
 
-bool IsNameOf(const std::string& name, const std::string& extra) {
-  if (name.empty()) return false;
-  for (const char c : name) {
-    const bool letter = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9');
-    if (!letter && std::string("_.-" + extra).find(c) == std::string::npos) return false;
-  }
-  return true;
-}
-
 // Absent keys leave the default.
 void ReadNumber(const JsonReader& object, const char* key, NumberKind kind, double* value) {
   if (object.Has(key)) *value = object.At(key).Number(kind);
@@ -88,7 +79,7 @@ class SceneReader {
     const JsonReader reader = item.At("name");
     std::string name = reader.String();
     if (!reader.ok()) return name;
-    if (!IsNameOf(name, "")) {
+    if (!IsName(name, "")) {
       reader.FailExpected("a name of letters, digits, _ . -");
     } else if (name == "world") {
       reader.Fail("expected another name, got \"world\", which is reserved");
@@ -359,7 +350,7 @@ void SceneReader::ReadPatterns(const JsonReader& reader, std::string* first, std
     std::string& pattern = i == 0 ? *first : *second;
     pattern = name.String();
     if (!reader.ok()) return;
-    if (!IsNameOf(pattern, "*")) return name.FailExpected("a name of letters, digits, _ . - *");
+    if (!IsName(pattern, "*")) return name.FailExpected("a name of letters, digits, _ . - *");
     for (std::size_t b = 0; b < scene_->bodies.size(); ++b) {
       if (MatchesPattern(pattern, scene_->bodies[b].name)) {
         matching[i].push_back(static_cast<int>(b));

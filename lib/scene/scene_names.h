@@ -56,4 +56,15 @@ std::string NameOf(Enum value, const std::pair<const char*, Enum> (&table)[N]) {
   return "";
 }
 
+/// Whether this is a name: letters, digits, `_`, `.`, `-` and the characters of `extra`, one at
+/// least.
+inline bool IsName(const std::string& name, const std::string& extra = "") {
+  if (name.empty()) return false;
+  for (const char c : name) {
+    const bool letter = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9');
+    if (!letter && std::string("_.-" + extra).find(c) == std::string::npos) return false;
+  }
+  return true;
+}
+
 }  // namespace tangible

@@ -73,6 +73,17 @@ std::string With(const std::string& key, const std::string& value) {
   return json.dump();
 }
 
+TEST_F(FitJsonTest, APointIsAtTheCentreOfMassByDefault) {
+  FitFile fit;
+  std::string error;
+  ASSERT_TRUE(ParseFit(With("points", R"({"tip.1": {"body": "ball"}})"), folder_ + "fit.json", &fit,
+                       &error))
+      << error;
+  ASSERT_EQ(fit.problem.points.size(), 1u);
+  EXPECT_EQ(fit.problem.points[0].name, "tip.1");
+  EXPECT_EQ(fit.problem.points[0].at, Vector2<double>(0.0, 0.0));
+}
+
 TEST_F(FitJsonTest, BadInputsAreOneLine) {
   const struct {
     std::string text;
@@ -99,10 +110,12 @@ TEST_F(FitJsonTest, BadInputsAreOneLine) {
       {With("seed", "-1"), ": /seed: expected an integer in [0, 2147483647], got -1"},
       {With("points", R"({"tip": {"body": "bal", "at": [0, 0]}})"),
        ": /points/tip/body: expected the name of a body (ball), got \"bal\""},
-      {With("points", R"({"tip": {"body": "ball"}})"),
-       ": /points/tip/at: missing, expected an array of 2 numbers [x, y]"},
+      {With("points", R"({"tip": {"body": "ball", "at": [1]}})"),
+       ": /points/tip/at: expected an array of 2 numbers [x, y], got an array of 1"},
       {With("points", R"({"a*": {"body": "ball", "at": [0, 0]}})"),
-       ": /points/a*: expected a name without / and *"},
+       ": /points/a*: expected a name of letters, digits and _.- , got a*"},
+      {With("points", R"({"a,b": {"body": "ball"}})"),
+       ": /points/a,b: expected a name of letters, digits and _.- , got a,b"},
       {With("parameters", "{}"), ": /parameters: expected an array of parameters, got an object"},
       {With("parameters", R"([{"name": "m"}])"),
        ": /parameters/0/sets: missing, expected an array of {path, scale, offset}"},

@@ -139,6 +139,12 @@ TEST_F(TangibleFitTest, MistakesAreOneLineWithTheirPlace) {
   }
 }
 
+TEST_F(TangibleFitTest, NoFileIsWrittenTwice) {
+  ExpectOneLine(Fit(Problem(), "--out='" + Path("r") + "' --report='" + Path("r") + "'"), 2,
+                "--report: expected a file of its own, got that of --out");
+  ExpectOneLine(Fit(Problem(), "--fromenv=out"), 2, "unknown flag --fromenv");
+}
+
 TEST_F(TangibleFitTest, BadObservationsAndFiles) {
   Write("o.csv", "time,body,x\n0,ball,1\n0.1,box,1\n");
   ExpectOneLine(Fit(Problem()), 1, "o.csv: line 3: body: expected the name of a body (ball)");

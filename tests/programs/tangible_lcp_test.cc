@@ -151,6 +151,41 @@ TEST_F(TangibleLcpTest, FlagsInEveryForm) {
             0);
 }
 
+// v is unique given z where M is positive definite on the null space of A, and need not be
+// elsewhere.
+TEST_F(TangibleLcpTest, MIsPositiveDefiniteWhereTheJointsLetMove) {
+  const auto problem = [](const std::string& M, const std::string& A) {
+    return R"({"M": )" + M + R"(, "p": [1, 1], "G": [[1, 0]], "F": [[0]], "c": [-1])" +
+           (A.empty() ? "" : R"(, "A": )" + A + R"(, "b": [0])") + "}";
+  };
+  const std::string what = "problem.json: /M: expected a matrix that is positive definite";
+  ExpectOneLine(Solve(problem("[[-2, 0], [0, 1]]", "")), 1,
+                what + " where A v = 0, got v' M v = -2");
+  ExpectOneLine(Solve(problem("[[0, 0], [0, 0]]", "")), 1, what);
+  ExpectOneLine(Solve(problem("[[1, 2], [2, 1]]", "")), 1, what);
+  ExpectOneLine(Solve(problem("[[1, 1], [1, 1]]", "")), 1, what);
+  ExpectOneLine(Solve(problem("[[1, 0], [0, -1]]", "[[1, 0]]")), 1, what);
+  // The joint holds the second speed, or the difference of both.
+  EXPECT_EQ(Solve(problem("[[1, 0], [0, -1]]", "[[0, 1]]")).exit_status, 0);
+  EXPECT_EQ(Solve(problem("[[1, 0], [0, 0]]", "[[1e-6, -1e-6]]")).exit_status, 0);
+  EXPECT_EQ(Solve(problem("[[1e-9, 0], [0, 1e9]]", "")).exit_status, 0);
+}
+
+TEST_F(TangibleLcpTest, FlagsOfLibrariesAreUnknown) {
+  for (const char* flag : {"--flagfile=x", "--fromenv=out", "--tryfromenv=out", "--undefok=x",
+                           "--v=1", "--logtostderr", "--nologtostderr", "--helpfull"}) {
+    ExpectOneLine(Solve(kMixed, flag), 2, "unknown flag --");
+  }
+}
+
+TEST_F(TangibleLcpTest, TheInputIsNotOverwritten) {
+  const std::string path = Write("same.json", kMixed);
+  ExpectOneLine(Run("tangible-lcp", "'" + path + "' --out='" + path + "'"), 2,
+                "--out: expected a file of its own, got that of the input");
+  EXPECT_EQ(Read(path), kMixed);
+  EXPECT_EQ(Solve(kMixed, "--out=/dev/null").exit_status, 0);
+}
+
 TEST_F(TangibleLcpTest, HelpAndVersion) {
   const ProgramRun help = Run("tangible-lcp", "--help");
   EXPECT_EQ(help.exit_status, 0);

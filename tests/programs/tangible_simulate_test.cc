@@ -257,6 +257,23 @@ TEST_F(TangibleSimulateTest, BadInputIsOneLine) {
   }
 }
 
+TEST_F(TangibleSimulateTest, NoFileIsWrittenTwice) {
+  const std::string own = "expected a file of its own, got that of ";
+  ExpectOneLine(Simulate(kFall, Flag("out", "x") + Flag("summary", "x")), 2,
+                "--summary: " + own + "--out");
+  ExpectOneLine(Simulate(kFall, Flag("view", "./x") + Flag("contacts", "x")), 2,
+                "--view: " + own + "--contacts");
+  EXPECT_FALSE(std::filesystem::exists(Path("x")));
+  ExpectOneLine(Simulate(kFall, Flag("observe", "scene.json")), 2,
+                "--observe: " + own + "the input");
+  Write("i.csv", "time,body,x,y,angle,vx,vy,omega\n0,a,0,1,0,0,0,0\n");
+  std::filesystem::create_symlink("i.csv", Path("link.csv"));
+  ExpectOneLine(Simulate(kFall, Flag("initial", "i.csv") + Flag("out", "link.csv")), 2,
+                "--out: " + own + "--initial");
+  EXPECT_EQ(Simulate(kFall, "--out=/dev/null --summary=/dev/null").exit_status, 0);
+  ExpectOneLine(Simulate(kFall, "--flagfile=x"), 2, "unknown flag --flagfile");
+}
+
 TEST_F(TangibleSimulateTest, WrongFlagsAreUsage) {
   ExpectOneLine(Simulate(kFall, "--every=0"), 2, "--every");
   ExpectOneLine(Simulate(kFall, "--noise=1"), 2, "--observe");
