@@ -31,8 +31,8 @@ class Iteration : private InteriorPointSystem<T> {
  public:
   using Base = InteriorPointSystem<T>;
   using Base::Base;
-  using Base::bounds_, Base::nb_, Base::nc_, Base::nj_, Base::p_, Base::w_;
-  using Base::Coupling, Base::Shift, Base::Used;
+  using Base::nb_, Base::nc_, Base::nj_, Base::p_, Base::w_;
+  using Base::Used;
 
   void Start() {
     this->SetPattern();
@@ -130,7 +130,7 @@ class Iteration : private InteriorPointSystem<T> {
       const ContactBlock<T>& contact = p_.contacts[i];
       solution->normal_impulse[i] = w_.z[3 * i];
       if (contact.has_friction) {
-        solution->tangent_impulse[i] = w_.z[3 * i + 1] - Coupling(i) * w_.z[3 * i] - Shift(i);
+        solution->tangent_impulse[i] = w_.z[3 * i + 1] - contact.friction * w_.z[3 * i];
       }
       solution->modes[i] = Mode(i);
     }
@@ -227,10 +227,10 @@ class Iteration : private InteriorPointSystem<T> {
       AddRowTransposed(c.a, c.normal_a, c.b, c.normal_b, z[0], r);
       out[0] = s[0] - c.c_n - RowDot(c.a, c.normal_a, c.b, c.normal_b, v);
       if (c.has_friction) {
-        const T tangential = z[1] - Coupling(i) * z[0] - Shift(i);
+        const T tangential = z[1] - c.friction * z[0];
         AddRowTransposed(c.a, c.tangent_a, c.b, c.tangent_b, tangential, r);
         out[1] = s[1] - c.c_t - RowDot(c.a, c.tangent_a, c.b, c.tangent_b, v) - z[2];
-        out[2] = s[2] - 2.0 * Coupling(i) * z[0] + z[1] - 2.0 * Shift(i);
+        out[2] = s[2] - 2.0 * c.friction * z[0] + z[1];
       }
     }
   }

@@ -46,9 +46,6 @@ struct ContactInteriorPointOptions {
   /// Of the term on the change of impulses that keeps redundant contacts regular
   /// (contact_interior_point_inl.h).
   double proximal = 1e-9;
-  /// Bounds of the friction impulses, N s, one a contact: |λt| ≤ g instead of μ λn (Tresca's
-  /// friction). The problem is then monotone. nullptr: Coulomb's.
-  const std::vector<double>* friction_bounds = nullptr;
 };
 
 /// Solves from a neutral start until the mean of z s / κ is at most `complementarity` (1e-14 for

@@ -20,7 +20,6 @@ class InteriorPointSystem {
   InteriorPointSystem(const ContactProblem<T>& problem, const ContactInteriorPointOptions& options,
                       InteriorPointWorkspace<T>* w)
       : p_(problem),
-        bounds_(options.friction_bounds),
         proximal_(options.proximal),
         w_(*w),
         nb_(problem.num_bodies),
@@ -44,10 +43,6 @@ class InteriorPointSystem {
 
   // Whether a row of z, s exists: the normal one, or a contact with friction.
   bool Used(int row) const { return row % 3 == 0 || p_.contacts[row / 3].has_friction; }
-  // The bound of friction is Coupling λn + Shift.
-  T Coupling(int i) const { return bounds_ ? T(0.0) : p_.contacts[i].friction; }
-  double Shift(int i) const { return bounds_ ? (*bounds_)[i] : 0.0; }
-
   void SetPattern() {
     w_.edges.clear();
     for (const DamperBlock<T>& damper : p_.dampers) {
@@ -141,7 +136,7 @@ class InteriorPointSystem {
       }
       if (c.has_friction) {
         d[5] = T(1.0);
-        d[6] = 2.0 * Coupling(i);
+        d[6] = 2.0 * c.friction;
         d[7] = T(-1.0);
       }
       const auto add = [&](const RowPart<T>& normal, const RowPart<T>& tangent) {
@@ -152,7 +147,7 @@ class InteriorPointSystem {
           column[3 * k] = -normal[k];
           if (c.has_friction) {
             row[3 + k] = tangent[k];
-            column[3 * k] += Coupling(i) * tangent[k];
+            column[3 * k] += c.friction * tangent[k];
             column[3 * k + 1] = -tangent[k];
           }
         }
@@ -215,17 +210,16 @@ class InteriorPointSystem {
       AddRowTransposed(c.a, c.normal_a, c.b, c.normal_b, dz[0], r);
       r[at] -= RowDot(c.a, c.normal_a, c.b, c.normal_b, x) + ContactDiagonal(3 * i) * dz[0];
       if (c.has_friction) {
-        const T tangential = dz[1] - Coupling(i) * dz[0];
+        const T tangential = dz[1] - c.friction * dz[0];
         AddRowTransposed(c.a, c.tangent_a, c.b, c.tangent_b, tangential, r);
         r[at + 1] -= RowDot(c.a, c.tangent_a, c.b, c.tangent_b, x) + dz[2] +
                      ContactDiagonal(3 * i + 1) * dz[1];
-        r[at + 2] -= 2.0 * Coupling(i) * dz[0] - dz[1] + ContactDiagonal(3 * i + 2) * dz[2];
+        r[at + 2] -= 2.0 * c.friction * dz[0] - dz[1] + ContactDiagonal(3 * i + 2) * dz[2];
       }
     }
   }
 
   const ContactProblem<T>& p_;
-  const std::vector<double>* bounds_;
   const double proximal_;
   InteriorPointWorkspace<T>& w_;
   const int nb_, nj_, nc_;

@@ -9,16 +9,22 @@ namespace {
 
 // Violations below this fraction of a row's scale are rounding.
 constexpr double kModeTolerance = 1e-12;
-// Sticking contacts are solved to rounding, but for rows that are redundant and contradictory.
-constexpr double kSlipTolerance = 1e-11;
 constexpr int kMaxRounds = 20;
+// Pivots: from the guess (and half as many as there are contacts), and as multiples of the number
+// of contacts. An interior point costs about as much as 20 to 40.
+constexpr int kPivotsFromGuess = 40;
+constexpr int kPivotsFromInteriorPoint = 2;
+constexpr int kPivotsFromOpen = 20;
+// Proximal steps of pivoting: δ falls from step to step. Large at first, as what rounding leaves of
+// redundant impulses is its inverse; small at last, so that modes which differ by the tolerance are
+// told apart.
+constexpr int kMaxProximalRounds = 20;
+constexpr double kMaxExtrapolation = 1e6;
+constexpr double kFirstRegularisation = 1e-7;
+constexpr double kLeastRegularisation = 1e-10;
 // Complementarities after which the polish is tried; rounding may stop the iteration for one step
 // at the end, so the last is tried several times.
 constexpr double kInteriorPointGoals[] = {1e-10, 1e-14, 1e-18, 1e-22, 1e-26, 1e-26, 1e-26, 1e-26};
-// Fixed-point iteration on the friction bounds: rounds, and the least bound as a fraction of the
-// largest impulse.
-constexpr int kMaxBoundedRounds = 20;
-constexpr double kLeastBound = 1e-6;
 // A contact whose mode has been changed this often changes alone, the worst one first.
 constexpr int kMaxChangesTogether = 3;
 
@@ -50,12 +56,8 @@ ModeChange Contradiction(const ContactBlock<double>& contact, const ContactValue
     return {ContactMode::kOpen, -normal / zeta};
   }
   if (mode == ContactMode::kSticking) {
-    // Two points of a body that turns cannot both stick: their rows contradict each other, and the
-    // regularised system leaves them slipping.
-    if (std::abs(values.slip) > kSlipTolerance * values.sigma_t) {
-      return {values.slip > 0.0 ? ContactMode::kSlidingPositive : ContactMode::kSlidingNegative,
-              std::abs(values.slip) / values.sigma_t};
-    }
+    // Slip is what δ leaves of a sticking row; where it should be more (two points of a body that
+    // turns cannot both stick) the impulse outgrows friction.
     const double excess = std::abs(tangent) - contact.friction * normal;
     const double scale = std::max(zeta * std::max(1.0, contact.friction), std::abs(tangent));
     if (excess > kModeTolerance * scale) {
@@ -71,6 +73,40 @@ ModeChange Contradiction(const ContactBlock<double>& contact, const ContactValue
   return change;
 }
 
+// Moves the impulses on along their last change, from `before`, a little beyond where the first of
+// them meets its limit.
+void ExtrapolateImpulses(const ContactProblem<double>& problem,
+                         const ContactSolution<double>& before, ContactSolution<double>* solution) {
+  double factor = kMaxExtrapolation;
+  const auto limit = [&](double value, double last) {
+    if (value > 0.0 && value < last) {
+      factor = std::min(factor, value / (last - value));
+    }
+  };
+  for (size_t i = 0; i < problem.contacts.size(); ++i) {
+    const double normal = solution->normal_impulse[i];
+    const double last_normal = before.normal_impulse[i];
+    if (solution->modes[i] == ContactMode::kSticking) {
+      const double mu = problem.contacts[i].friction;
+      const double tangent = solution->tangent_impulse[i];
+      const double last_tangent = before.tangent_impulse[i];
+      limit(mu * normal - tangent, mu * last_normal - last_tangent);
+      limit(mu * normal + tangent, mu * last_normal + last_tangent);
+    } else if (solution->modes[i] != ContactMode::kOpen) {
+      limit(normal, last_normal);
+    }
+  }
+  factor *= 1.0 + 1e-6;
+  const auto move = [&](const std::vector<double>& from, std::vector<double>* to) {
+    for (size_t i = 0; i < to->size(); ++i) {
+      (*to)[i] += factor * ((*to)[i] - from[i]);
+    }
+  };
+  move(before.normal_impulse, &solution->normal_impulse);
+  move(before.tangent_impulse, &solution->tangent_impulse);
+  move(before.joint_impulse, &solution->joint_impulse);
+}
+
 }  // namespace
 
 void ContactSolver::Reserve(int num_bodies, int num_joints, int num_contacts) {
@@ -78,6 +114,7 @@ void ContactSolver::Reserve(int num_bodies, int num_joints, int num_contacts) {
   const int edges = 2 * (num_joints + num_contacts) + num_joints;
   system_.Reserve(blocks, edges);
   interior_point_.lu.Reserve(blocks, edges);
+  pivoting_.Reserve(blocks, num_contacts);
   interior_point_.edges.reserve(edges);
   for (std::vector<double>* x : {&interior_point_.v,
                                  &interior_point_.y,
@@ -100,12 +137,21 @@ void ContactSolver::Reserve(int num_bodies, int num_joints, int num_contacts) {
                                  &trial_.v,
                                  &trial_.joint_impulse,
                                  &trial_.normal_impulse,
-                                 &trial_.tangent_impulse}) {
+                                 &trial_.tangent_impulse,
+                                 &centre_joint_,
+                                 &centre_normal_,
+                                 &centre_tangent_}) {
     x->reserve(3 * blocks);
   }
   guess_.modes.reserve(num_contacts);
   trial_.modes.reserve(num_contacts);
   changes_.reserve(num_contacts);
+}
+
+void ContactSolver::SetCentre(const ContactSolution<double>& solution) {
+  centre_joint_ = solution.joint_impulse;
+  centre_normal_ = solution.normal_impulse;
+  centre_tangent_ = solution.tangent_impulse;
 }
 
 bool ContactSolver::SolveWithModes(const ContactProblem<double>& problem,
@@ -138,13 +184,13 @@ bool ContactSolver::SolveWithModes(const ContactProblem<double>& problem,
   correction_.assign(rhs_.size(), 0.0);
   if (choice) {
     for (int j = 0; j < 3 * nj; ++j) {
-      correction_[3 * nb + j] = solution->joint_impulse[j];
+      correction_[3 * nb + j] = centre_joint_[j];
     }
     for (size_t i = 0; i < problem.contacts.size(); ++i) {
       if (block_of[i] >= 0) {
-        correction_[3 * block_of[i]] = solution->normal_impulse[i];
+        correction_[3 * block_of[i]] = centre_normal_[i];
         correction_[3 * block_of[i] + 1] =
-            solution->modes[i] == ContactMode::kSticking ? solution->tangent_impulse[i] : 0.0;
+            solution->modes[i] == ContactMode::kSticking ? centre_tangent_[i] : 0.0;
       }
     }
     // rhs := rhs − K x0; the solution is x0 + K⁻¹ rhs.
@@ -152,7 +198,11 @@ bool ContactSolver::SolveWithModes(const ContactProblem<double>& problem,
     system_.Residual<false>(problem, solution->modes, guess_.v.data(), correction_.data(), 1,
                             rhs_.data());
   }
-  system_.Solve(problem, solution->modes, rhs_.data(), 1);
+  if (choice) {
+    system_.SolveProximal(problem, solution->modes, rhs_.data(), 1);
+  } else {
+    system_.Solve(problem, solution->modes, rhs_.data(), 1);
+  }
   for (size_t i = 0; i < rhs_.size(); ++i) {
     correction_[i] += rhs_[i];
   }
@@ -172,19 +222,20 @@ bool ContactSolver::SolveWithModes(const ContactProblem<double>& problem,
 }
 
 bool ContactSolver::SolveByModeChanges(const ContactProblem<double>& problem,
-                                       const ContactSolverOptions& options, ModeChanges together,
+                                       const ContactSolverOptions& options,
                                        ContactSolution<double>* solution,
                                        ContactSolverReport* report) {
   const size_t num_contacts = problem.contacts.size();
-  const bool all = together == ModeChanges::kTogether;
-  changes_.assign(num_contacts, all ? 0 : kMaxChangesTogether);
-  const int max_rounds = all ? kMaxRounds : kMaxRounds + 2 * static_cast<int>(num_contacts);
-  for (int round = 0; round < max_rounds; ++round) {
+  changes_.assign(num_contacts, 0);
+  SetCentre(*solution);
+  int last_contradicted = static_cast<int>(num_contacts);
+  double last_residual = HUGE_VAL;
+  for (int round = 0; round < kMaxRounds; ++round) {
     if (!SolveWithModes(problem, solution, report)) {
       return false;
     }
     const double scale = ImpulseScale(solution->normal_impulse);
-    bool contradicted = false;
+    int contradicted = 0;
     int worst = -1;
     ModeChange worst_change{ContactMode::kOpen};
     for (size_t i = 0; i < num_contacts; ++i) {
@@ -195,7 +246,7 @@ bool ContactSolver::SolveByModeChanges(const ContactProblem<double>& problem,
       if (change.violation == 0.0) {
         continue;
       }
-      contradicted = true;
+      ++contradicted;
       if (changes_[i] < kMaxChangesTogether) {
         ++changes_[i];
         solution->modes[i] = change.mode;
@@ -208,10 +259,58 @@ bool ContactSolver::SolveByModeChanges(const ContactProblem<double>& problem,
       ++changes_[worst];
       solution->modes[worst] = worst_change.mode;
     }
-    if (!contradicted) {
+    if (contradicted == 0) {
       report->residual = NaturalResidual(problem, *solution, &report->worst_contact);
-      return report->residual <= options.tolerance;
+      if (report->residual <= options.tolerance) {
+        return true;
+      }
+      if (report->residual > 0.5 * last_residual) {
+        return false;
+      }
+      last_residual = report->residual;
+      SetCentre(*solution);  // what δ leaves goes with another proximal step
+    } else if (contradicted > last_contradicted) {
+      return false;  // an avalanche: pivots go one by one
     }
+    last_contradicted = contradicted > 0 ? contradicted : static_cast<int>(num_contacts);
+  }
+  return false;
+}
+
+bool ContactSolver::SolveByPivoting(const ContactProblem<double>& problem,
+                                    const ContactSolverOptions& options, ContactPivoting::From from,
+                                    int max_pivots, ContactSolution<double>* solution,
+                                    ContactSolverReport* report) {
+  double regularisation = kFirstRegularisation;
+  double last_residual = HUGE_VAL;
+  for (int round = 0; round < kMaxProximalRounds; ++round) {
+    centre_ = *solution;
+    const auto follow = [&](ContactPivoting::From start) {
+      return pivoting_.Solve(problem, start, regularisation, max_pivots, &system_, solution,
+                             &report->factorisations);
+    };
+    // From the second round on the path starts where the last one ended.
+    if (!(round > 0 && follow(ContactPivoting::From::kModes)) && !follow(from)) {
+      return false;
+    }
+    trial_ = *solution;
+    if (SolveByModeChanges(problem, options, &trial_, report)) {
+      std::swap(*solution, trial_);
+      return true;
+    }
+    report->residual = NaturalResidual(problem, *solution, &report->worst_contact);
+    if (report->residual <= options.tolerance) {
+      ++report->factorisations;
+      return system_.Factor(problem, solution->modes);
+    }
+    // What δ leaves no longer falls: rows contradict each other by that much, and their impulses
+    // grow by as much a step until one meets its limit.
+    if (regularisation == kLeastRegularisation && solution->modes == centre_.modes &&
+        report->residual > 0.5 * last_residual) {
+      ExtrapolateImpulses(problem, centre_, solution);
+    }
+    last_residual = report->residual;
+    regularisation = std::max(kLeastRegularisation, 0.1 * regularisation);
   }
   return false;
 }
@@ -225,6 +324,7 @@ bool ContactSolver::Polish(const ContactProblem<double>& problem,
   // up.
   for (int round = 0; round < 3; ++round) {
     trial_ = *solution;
+    SetCentre(*solution);
     if (!SolveWithModes(problem, &trial_, report)) {
       break;
     }
@@ -282,44 +382,10 @@ bool ContactSolver::SolveByInteriorPoint(const ContactProblem<double>& problem,
     }
     interior_point.resume = true;
   }
-  // Rows that are almost redundant leave modes that only the exact systems tell apart.
-  return SolveByModeChanges(problem, options, ModeChanges::kWorstFirst, solution, report) ||
-         SolveByBoundedFriction(problem, options, solution, report);
-}
-
-bool ContactSolver::SolveByBoundedFriction(const ContactProblem<double>& problem,
-                                           const ContactSolverOptions& options,
-                                           ContactSolution<double>* solution,
-                                           ContactSolverReport* report) {
-  const size_t num_contacts = problem.contacts.size();
-  bounds_.assign(num_contacts, 0.0);
-  ContactInteriorPointOptions interior_point;
-  interior_point.complementarity = 1e-10;
-  interior_point.friction_bounds = &bounds_;
-  interior_point.max_iterations = options.max_iterations;
-  for (int round = 0; round < kMaxBoundedRounds; ++round) {
-    const double scale = ImpulseScale(solution->normal_impulse);
-    for (size_t i = 0; i < num_contacts; ++i) {
-      // A bound of 0 would leave no interior.
-      bounds_[i] =
-          problem.contacts[i].friction * std::max(solution->normal_impulse[i], kLeastBound * scale);
-    }
-    const InteriorPointOutcome outcome =
-        SolveContactsByInteriorPoint(problem, interior_point, &interior_point_, &bounded_);
-    report->iterations += outcome.iterations;
-    if (!outcome.converged) {
-      return false;
-    }
-    solution->normal_impulse = bounded_.normal_impulse;
-    if (round % 2 == 1) {  // modes settle after a few rounds
-      *solution = bounded_;
-      if (SolveByModeChanges(problem, options, ModeChanges::kTogether, solution, report)) {
-        return true;
-      }
-      solution->normal_impulse = bounded_.normal_impulse;
-    }
-  }
-  return false;
+  // Rows that are almost redundant leave modes that only pivots tell apart.
+  return SolveByPivoting(problem, options, ContactPivoting::From::kModes,
+                         kPivotsFromInteriorPoint * (1 + static_cast<int>(problem.contacts.size())),
+                         solution, report);
 }
 
 bool ContactSolver::SolveByLemke(const ContactProblem<double>& problem,
@@ -349,6 +415,7 @@ ContactSolverReport ContactSolver::Solve(const ContactProblem<double>& problem,
     return report;
   };
   if (problem.contacts.empty()) {
+    SetCentre(*solution);
     if (SolveWithModes(problem, solution, &report)) {
       report.residual = NaturalResidual(problem, *solution, &report.worst_contact);
       if (report.residual <= options.tolerance) {
@@ -358,13 +425,30 @@ ContactSolverReport ContactSolver::Solve(const ContactProblem<double>& problem,
     return report;
   }
   const bool exact = options.smoothing == 0.0;
+  entry_ = *solution;
   if (options.choice == ContactSolverChoice::kAuto && exact &&
-      SolveByModeChanges(problem, options, ModeChanges::kTogether, solution, &report)) {
+      SolveByModeChanges(problem, options, solution, &report)) {
     return done(SolvedBy::kGuess);
+  }
+  const int num_contacts = static_cast<int>(problem.contacts.size());
+  if (options.choice == ContactSolverChoice::kAuto && exact) {
+    *solution = entry_;
+    if (SolveByPivoting(problem, options, ContactPivoting::From::kModes,
+                        kPivotsFromGuess + num_contacts / 2, solution, &report)) {
+      return done(SolvedBy::kGuess);
+    }
+    *solution = entry_;
   }
   if (options.choice != ContactSolverChoice::kLemke &&
       SolveByInteriorPoint(problem, options, solution, &report)) {
     return done(SolvedBy::kInteriorPoint);
+  }
+  if (options.choice != ContactSolverChoice::kInteriorPoint && exact) {
+    *solution = entry_;
+    if (SolveByPivoting(problem, options, ContactPivoting::From::kOpen,
+                        kPivotsFromOpen * (1 + num_contacts), solution, &report)) {
+      return done(SolvedBy::kLemke);
+    }
   }
   if (options.choice != ContactSolverChoice::kInteriorPoint && exact &&
       SolveByLemke(problem, options, solution, &report)) {

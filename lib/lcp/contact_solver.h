@@ -4,20 +4,29 @@
 // The portfolio for contact problems: guess by contact modes, then interior point, then Lemke.
 //
 // 1. With modes given the problem is one linear system (contact_system.h). Its solution is exact
-// where it
-//    satisfies every inequality. Modes that are contradicted are changed and the system is solved
-//    again, a bounded number of times. Where rows are redundant the solve starts from the last
-//    impulses, so that these change as little as the data require and stay admissible.
-// 2. Mehrotra's interior point (contact_interior_point.h); where it stalls, on problems with
-// bounded friction.
-// 3. Lemke's method on the dense one-sided form; for problems that are not large the dense
-// portfolio's other attempts. After 2 and 3 the modes are identified and the mode system is solved
-// once more: the polish. A solution counts only by its scaled natural residual, recomputed from the
-// data.
+//    where it satisfies every inequality. Modes that are contradicted are changed and the system is
+//    solved again, as long as fewer are contradicted from round to round. Where rows are redundant
+//    each solve is a proximal step from the last impulses: these change as little as the data
+//    require.
+// 2. Pivoting from the guess (contact_pivoting.h), a bounded number of pivots: the search among the
+//    impulses of redundant rows, where the guess is nearly right. Counted as the guess's.
+// 3. Mehrotra's interior point (contact_interior_point.h), and pivoting from its modes where small
+//    margins hide them.
+// 4. Lemke's method: pivoting from all contacts open; then on the dense one-sided form; for
+// problems
+//    that are not large the dense portfolio's other attempts.
+//
+// After 3 and 4 the modes are identified and the mode system is solved once more: the polish. A
+// solution counts only by its scaled natural residual, recomputed from the data.
+//
+// Pivoting ends in proximal steps with δ falling from 1e-7 to 1e-10. What then still remains and no
+// longer falls is a contradiction of rows among which only the impulses' limits can choose: these
+// are approached along the impulses' last change.
 
 #include <vector>
 
 #include "tangible/lcp/contact_interior_point.h"
+#include "tangible/lcp/contact_pivoting.h"
 #include "tangible/lcp/contact_problem.h"
 #include "tangible/lcp/contact_residual.h"
 #include "tangible/lcp/contact_system.h"
@@ -55,33 +64,31 @@ class ContactSolver {
   void Reserve(int num_bodies, int num_joints, int num_contacts);
 
  private:
+  // The proximal step from the centre's impulses with the solution's modes.
   bool SolveWithModes(const ContactProblem<double>& problem, ContactSolution<double>* solution,
                       ContactSolverReport* report);
-  enum class ModeChanges { kTogether, kWorstFirst };
+  void SetCentre(const ContactSolution<double>& solution);
   bool SolveByModeChanges(const ContactProblem<double>& problem,
-                          const ContactSolverOptions& options, ModeChanges together,
-                          ContactSolution<double>* solution, ContactSolverReport* report);
+                          const ContactSolverOptions& options, ContactSolution<double>* solution,
+                          ContactSolverReport* report);
   bool SolveByInteriorPoint(const ContactProblem<double>& problem,
                             const ContactSolverOptions& options, ContactSolution<double>* solution,
                             ContactSolverReport* report);
-  // Friction impulses bounded by μ times the last round's normal impulses: monotone problems,
-  // iterated to Coulomb's law (Haslinger's fixed point), for piles in which Coulomb's central path
-  // does not lead through.
-  bool SolveByBoundedFriction(const ContactProblem<double>& problem,
-                              const ContactSolverOptions& options,
-                              ContactSolution<double>* solution, ContactSolverReport* report);
   bool SolveByLemke(const ContactProblem<double>& problem, const ContactSolverOptions& options,
                     ContactSolution<double>* solution, ContactSolverReport* report);
+  bool SolveByPivoting(const ContactProblem<double>& problem, const ContactSolverOptions& options,
+                       ContactPivoting::From from, int max_pivots,
+                       ContactSolution<double>* solution, ContactSolverReport* report);
   bool Polish(const ContactProblem<double>& problem, const ContactSolverOptions& options,
               ContactSolution<double>* solution, ContactSolverReport* report);
 
   ContactSystem system_;
+  ContactPivoting pivoting_;
   InteriorPointWorkspace<double> interior_point_;
-  ContactSolution<double> guess_, trial_;
+  ContactSolution<double> guess_, trial_, entry_, centre_;
   std::vector<double> rhs_, correction_;
+  std::vector<double> centre_joint_, centre_normal_, centre_tangent_;
   std::vector<int> changes_;
-  std::vector<double> bounds_;
-  ContactSolution<double> bounded_;
 };
 
 /// The dense portfolio (solver.h) with its further attempts, on the one-sided form; false where it

@@ -7,10 +7,11 @@
 namespace tangible {
 namespace {
 
-constexpr double kRegularisation = 1e-10;
 // Refinement ends where the residual is at rounding level, or no longer falls.
 constexpr double kResidualGoal = 1e-15;
 constexpr int kMaxRefinements = 8;
+// Rows that leave more than this contradict each other.
+constexpr double kConsistent = 1e-14;
 
 // Adds (left)ᵀ (right) weight to a 3 x 3 block.
 void AddOuter(const RowPart<double>& left, const RowPart<double>& right, double weight,
@@ -43,9 +44,15 @@ RowPart<double> Combine(const RowPart<double>& x, double factor, const RowPart<d
 // Largest magnitudes of a kind of row: of its terms and of what is left.
 struct RowScale {
   double terms = 0.0;
+  double parts = 0.0;  // of the products that a constraint's value sums: where it cancels to 0,
+                       // rounding is relative to these
   double left = 0.0;
   void Term(double x) { terms = std::max(terms, std::abs(x)); }
   double Relative() const { return terms > 0.0 ? left / terms : left > 0.0 ? HUGE_VAL : 0.0; }
+  double RelativeToParts() const {
+    const double scale = std::max(terms, parts);
+    return scale > 0.0 ? left / scale : left > 0.0 ? HUGE_VAL : 0.0;
+  }
 };
 
 // residual := rhs − K x for one column of strided vectors; sign −1 and exchanged directions for Kᵀ.
@@ -106,10 +113,13 @@ class ColumnResidual {
   static constexpr double kSign = kTransposed ? -1.0 : 1.0;
 
   double At(int block, int i) const { return x_[(3 * block + i) * columns_]; }
-  double Dot(int a, const RowPart<double>& row_a, int b, const RowPart<double>& row_b) const {
+  double Dot(int a, const RowPart<double>& row_a, int b, const RowPart<double>& row_b) {
     double sum = 0.0;
     for (int i = 0; i < 3; ++i) {
-      sum += (a >= 0 ? row_a[i] * At(a, i) : 0.0) + (b >= 0 ? row_b[i] * At(b, i) : 0.0);
+      const double part_a = a >= 0 ? row_a[i] * At(a, i) : 0.0;
+      const double part_b = b >= 0 ? row_b[i] * At(b, i) : 0.0;
+      sum += part_a + part_b;
+      constraint_.parts = std::max({constraint_.parts, std::abs(part_a), std::abs(part_b)});
     }
     return sum;
   }
@@ -148,8 +158,10 @@ void ContactSystem::Reserve(int num_blocks, int num_edges) {
   lu_.Reserve(num_blocks, num_edges);
   edges_.reserve(num_edges);
   contact_block_.reserve(num_blocks);
+  regularisation_.reserve(3 * num_blocks);
   rhs_.reserve(3 * num_blocks);
   correction_.reserve(3 * num_blocks);
+  last_.reserve(3 * num_blocks);
 }
 
 void ContactSystem::MoveFactorsTo(ContactSystem* other) {
@@ -214,7 +226,7 @@ void ContactSystem::AddBodies(const ContactProblem<double>& problem) {
   }
 }
 
-void ContactSystem::AddJoints(const ContactProblem<double>& problem) {
+void ContactSystem::AddJoints(const ContactProblem<double>& problem, double regularisation) {
   int edge = 0;
   for (const DamperBlock<double>& damper : problem.dampers) {
     edge += damper.a >= 0 && damper.b >= 0 ? 1 : 0;
@@ -226,8 +238,9 @@ void ContactSystem::AddJoints(const ContactProblem<double>& problem) {
       if (r >= joint.rows) {
         diagonal[4 * r] = 1.0;
       } else if (problem.redundant_joints) {
-        diagonal[4 * r] = kRegularisation * RowMobility(problem.mass, joint.a, joint.row_a[r],
-                                                        joint.b, joint.row_b[r]);
+        diagonal[4 * r] = regularisation * RowMobility(problem.mass, joint.a, joint.row_a[r],
+                                                       joint.b, joint.row_b[r]);
+        regularisation_[3 * (block - 1) + r] = diagonal[4 * r];
       }
     }
     const auto add = [&](const RowPart<double>* rows) {
@@ -247,7 +260,7 @@ void ContactSystem::AddJoints(const ContactProblem<double>& problem) {
 }
 
 void ContactSystem::AddContacts(const ContactProblem<double>& problem,
-                                const std::vector<ContactMode>& modes) {
+                                const std::vector<ContactMode>& modes, double regularisation) {
   // Edges of contacts come last: of a, then of b, where these move.
   int edge = static_cast<int>(edges_.size());
   for (size_t i = problem.contacts.size(); i-- > 0;) {
@@ -257,12 +270,14 @@ void ContactSystem::AddContacts(const ContactProblem<double>& problem,
     const ContactBlock<double>& contact = problem.contacts[i];
     const bool sticks = modes[i] == ContactMode::kSticking;
     double* diagonal = lu_.Diagonal(contact_block_[i]);
-    diagonal[0] = kRegularisation * RowMobility(problem.mass, contact.a, contact.normal_a,
-                                                contact.b, contact.normal_b);
-    diagonal[4] = sticks ? kRegularisation * RowMobility(problem.mass, contact.a, contact.tangent_a,
-                                                         contact.b, contact.tangent_b)
+    diagonal[0] = regularisation * RowMobility(problem.mass, contact.a, contact.normal_a, contact.b,
+                                               contact.normal_b);
+    diagonal[4] = sticks ? regularisation * RowMobility(problem.mass, contact.a, contact.tangent_a,
+                                                        contact.b, contact.tangent_b)
                          : 1.0;
     diagonal[8] = 1.0;
+    regularisation_[3 * contact_block_[i]] = diagonal[0];
+    regularisation_[3 * contact_block_[i] + 1] = sticks ? diagonal[4] : 0.0;
     const double along = -SlidingSign(modes[i]) * contact.friction;
     const auto add = [&](const RowPart<double>& normal, const RowPart<double>& tangent) {
       --edge;
@@ -283,12 +298,13 @@ void ContactSystem::AddContacts(const ContactProblem<double>& problem,
 }
 
 bool ContactSystem::Factor(const ContactProblem<double>& problem,
-                           const std::vector<ContactMode>& modes) {
+                           const std::vector<ContactMode>& modes, double regularisation) {
   SetPattern(problem, modes);
   lu_.SetZero();
+  regularisation_.assign(3 * static_cast<size_t>(lu_.num_blocks()), 0.0);
   AddBodies(problem);
-  AddJoints(problem);
-  AddContacts(problem, modes);
+  AddJoints(problem, regularisation);
+  AddContacts(problem, modes, regularisation);
   regularised_ = problem.redundant_joints && !problem.joints.empty();
   for (const int block : contact_block_) {
     regularised_ = regularised_ || block >= 0;
@@ -300,6 +316,17 @@ template <bool kTransposed>
 double ContactSystem::Residual(const ContactProblem<double>& problem,
                                const std::vector<ContactMode>& modes, const double* rhs,
                                const double* x, int columns, double* residual) const {
+  return ResidualWith<kTransposed>(problem, modes, Regularisation::kLeftOut, rhs, x, columns,
+                                   residual)
+      .to_terms;
+}
+
+template <bool kTransposed>
+ContactSystem::ResidualSize ContactSystem::ResidualWith(const ContactProblem<double>& problem,
+                                                        const std::vector<ContactMode>& modes,
+                                                        Regularisation regularisation,
+                                                        const double* rhs, const double* x,
+                                                        int columns, double* residual) const {
   const size_t size = 3 * static_cast<size_t>(num_blocks()) * columns;
   std::copy(rhs, rhs + size, residual);
   RowScale momentum, constraint;
@@ -316,11 +343,17 @@ double ContactSystem::Residual(const ContactProblem<double>& problem,
   }
   // Unused rows of constraints have a right-hand side of 0.
   const size_t momentum_size = 3 * static_cast<size_t>(problem.num_bodies) * columns;
+  if (regularisation == Regularisation::kKept) {
+    for (size_t i = momentum_size; i < size; ++i) {
+      residual[i] -= regularisation_[i / columns] * x[i];
+    }
+  }
   for (size_t i = 0; i < size; ++i) {
     RowScale& kind = i < momentum_size ? momentum : constraint;
     kind.left = std::max(kind.left, std::abs(residual[i]));
   }
-  return std::max(momentum.Relative(), constraint.Relative());
+  return {std::max(momentum.Relative(), constraint.Relative()),
+          std::max(momentum.Relative(), constraint.RelativeToParts())};
 }
 
 template <bool kTransposed>
@@ -369,6 +402,62 @@ double ContactSystem::SolveTransposed(const ContactProblem<double>& problem,
     return 0.0;
   }
   return RefinedSolve<true>(problem, modes, x, columns);
+}
+
+double ContactSystem::SolveRegularised(const ContactProblem<double>& problem,
+                                       const std::vector<ContactMode>& modes, double* x,
+                                       int columns) {
+  const size_t size = 3 * static_cast<size_t>(num_blocks()) * columns;
+  rhs_.assign(x, x + size);
+  lu_.Solve(x, columns);
+  return Refine(problem, modes, Regularisation::kKept, x, columns);
+}
+
+double ContactSystem::SolveProximal(const ContactProblem<double>& problem,
+                                    const std::vector<ContactMode>& modes, double* x, int columns) {
+  if (!regularised_) {
+    lu_.Solve(x, columns);
+    return 0.0;
+  }
+  const size_t size = 3 * static_cast<size_t>(num_blocks()) * columns;
+  rhs_.assign(x, x + size);
+  lu_.Solve(x, columns);
+  const double left = Refine(problem, modes, Regularisation::kLeftOut, x, columns);
+  if (left <= kConsistent) {
+    return left;
+  }
+  std::copy(rhs_.begin(), rhs_.end(), x);
+  lu_.Solve(x, columns);
+  Refine(problem, modes, Regularisation::kKept, x, columns);
+  return Refine(problem, modes, Regularisation::kLeftOut, x, columns);
+}
+
+// Refines x for the right-hand side rhs_ as long as a round halves what is left of it.
+double ContactSystem::Refine(const ContactProblem<double>& problem,
+                             const std::vector<ContactMode>& modes, Regularisation regularisation,
+                             double* x, int columns) {
+  const size_t size = rhs_.size();
+  correction_.resize(size);
+  const auto residual = [&]() {
+    return ResidualWith<false>(problem, modes, regularisation, rhs_.data(), x, columns,
+                               correction_.data())
+        .to_parts;
+  };
+  double left = residual();
+  for (int i = 0; i < kMaxRefinements && left > kResidualGoal; ++i) {
+    last_.assign(x, x + size);
+    lu_.Solve(correction_.data(), columns);
+    for (size_t k = 0; k < size; ++k) {
+      x[k] += correction_[k];
+    }
+    const double before = left;
+    left = residual();
+    if (!(left < 0.5 * before)) {
+      std::copy(last_.begin(), last_.end(), x);
+      return before;
+    }
+  }
+  return left;
 }
 
 template double ContactSystem::Residual<false>(const ContactProblem<double>&,

@@ -23,12 +23,17 @@
 
 namespace tangible {
 
+/// δ as a fraction of r M⁻¹ rᵀ.
+constexpr double kContactRegularisation = 1e-10;
+
 /// Unknowns in blocks of three: bodies; joints; the closed contacts in order, each (λn, λt,
 /// unused).
 class ContactSystem {
  public:
   /// Assembles and factorises; false where singular.
-  bool Factor(const ContactProblem<double>& problem, const std::vector<ContactMode>& modes);
+  /// `regularisation`: δ as a fraction of r M⁻¹ rᵀ.
+  bool Factor(const ContactProblem<double>& problem, const std::vector<ContactMode>& modes,
+              double regularisation = kContactRegularisation);
   /// Block of contact i, −1 if open.
   const std::vector<int>& contact_block() const { return contact_block_; }
   int num_blocks() const { return lu_.num_blocks(); }
@@ -45,16 +50,42 @@ class ContactSystem {
   double SolveTransposed(const ContactProblem<double>& problem,
                          const std::vector<ContactMode>& modes, double* x, int columns);
 
+  /// x := (K with δ)⁻¹ x, refined: the proximal step, which redundant rows that contradict each
+  /// other do not upset. Returns as Solve does.
+  double SolveRegularised(const ContactProblem<double>& problem,
+                          const std::vector<ContactMode>& modes, double* x, int columns);
+  /// The proximal step, and further ones as long as each lessens what δ left of the residual by
+  /// half: the solution of K without δ where there is one, the regularised one where redundant rows
+  /// contradict each other. Returns as Solve does.
+  double SolveProximal(const ContactProblem<double>& problem, const std::vector<ContactMode>& modes,
+                       double* x, int columns);
+  /// δ of every row, 3 num_blocks; 0 but on rows of closed contacts and of joints in loops.
+  const std::vector<double>& regularisation() const { return regularisation_; }
+
   /// residual := rhs − K x (Kᵀ x if transposed) without δ; returns as Solve does.
   template <bool kTransposed>
   double Residual(const ContactProblem<double>& problem, const std::vector<ContactMode>& modes,
                   const double* rhs, const double* x, int columns, double* residual) const;
 
  private:
+  enum class Regularisation { kLeftOut, kKept };
+  // A residual's largest entry, relative to the terms of its kind of row, and to the products that
+  // these sum.
+  struct ResidualSize {
+    double to_terms, to_parts;
+  };
+  template <bool kTransposed>
+  ResidualSize ResidualWith(const ContactProblem<double>& problem,
+                            const std::vector<ContactMode>& modes, Regularisation regularisation,
+                            const double* rhs, const double* x, int columns,
+                            double* residual) const;
+  double Refine(const ContactProblem<double>& problem, const std::vector<ContactMode>& modes,
+                Regularisation regularisation, double* x, int columns);
   void SetPattern(const ContactProblem<double>& problem, const std::vector<ContactMode>& modes);
   void AddBodies(const ContactProblem<double>& problem);
-  void AddJoints(const ContactProblem<double>& problem);
-  void AddContacts(const ContactProblem<double>& problem, const std::vector<ContactMode>& modes);
+  void AddJoints(const ContactProblem<double>& problem, double regularisation);
+  void AddContacts(const ContactProblem<double>& problem, const std::vector<ContactMode>& modes,
+                   double regularisation);
   template <bool kTransposed>
   double RefinedSolve(const ContactProblem<double>& problem, const std::vector<ContactMode>& modes,
                       double* x, int columns);
@@ -63,7 +94,8 @@ class ContactSystem {
   std::vector<std::pair<int, int>> edges_;
   std::vector<int> contact_block_;
   bool regularised_ = false;
-  std::vector<double> rhs_, correction_;
+  std::vector<double> regularisation_;
+  std::vector<double> rhs_, correction_, last_;
 };
 
 /// r M⁻¹ rᵀ with the diagonal of M: what a unit impulse along the row changes its speed by, were
