@@ -36,7 +36,7 @@ double Bound(const ContactProblem<double>& p, const ContactSolution<double>& sol
                       values.mobility_t * std::abs(solution.tangent_impulse[i]) /
                           std::max(values.sigma_t, values.sigma_n)});
   }
-  return 2.0 * kDelta * bound;
+  return 2.0 * kDelta * bound + 1e-14;
 }
 
 TEST(ContactPivotingTest, SolvesRandomProblemsFromAnyModes) {

@@ -108,7 +108,7 @@ Scene Boxes(int base, int rows, int shorter, double dt, long steps) {
   return scene;
 }
 
-RolloutReport Run(const Scene& scene, State<double>* final) {
+RolloutReport RunChecked(const Scene& scene, State<double>* final) {
   Model<double> model;
   State<double> initial;
   BuildModel(scene, &model, &initial);
@@ -129,7 +129,7 @@ RolloutReport Run(const Scene& scene, State<double>* final) {
 
 TEST(PileTest, HundredDiscsSettleWithinTheirBox) {
   State<double> final;
-  const RolloutReport report = Run(Discs(100, 2500), &final);
+  const RolloutReport report = RunChecked(Discs(100, 2500), &final);
   EXPECT_EQ(report.steps, 2500);
   EXPECT_GT(report.contacts_max, 140);
   EXPECT_GT(report.solved_by_guess, 2300);
@@ -142,8 +142,8 @@ TEST(PileTest, HundredDiscsSettleWithinTheirBox) {
 
 TEST(PileTest, FiftyDiscsHaveTheSameBitsTwice) {
   State<double> first, second;
-  Run(Discs(50, 700), &first);
-  Run(Discs(50, 700), &second);
+  RunChecked(Discs(50, 700), &first);
+  RunChecked(Discs(50, 700), &second);
   EXPECT_TRUE(first == second);
 }
 
@@ -154,7 +154,7 @@ TEST(PileTest, FrictionAndMassRatiosAtTheExtremes) {
         SCOPED_TRACE(std::to_string(seed) + " " + std::to_string(friction) + " " +
                      std::to_string(mass_ratio));
         State<double> final;
-        Run(Mixture(seed, 25, friction, mass_ratio), &final);
+        RunChecked(Mixture(seed, 25, friction, mass_ratio), &final);
       }
     }
   }
@@ -162,10 +162,10 @@ TEST(PileTest, FrictionAndMassRatiosAtTheExtremes) {
 
 TEST(PileTest, StacksAndPyramidsOfBoxes) {
   State<double> final;
-  Run(Boxes(1, 10, 0, 1.0 / 60.0, 150), &final);
-  Run(Boxes(1, 50, 0, 0.002, 600), &final);
-  Run(Boxes(10, 10, 1, 1.0 / 60.0, 120), &final);
-  Run(Boxes(10, 10, 1, 0.002, 600), &final);
+  RunChecked(Boxes(1, 10, 0, 1.0 / 60.0, 150), &final);
+  RunChecked(Boxes(1, 50, 0, 0.002, 600), &final);
+  RunChecked(Boxes(10, 10, 1, 1.0 / 60.0, 120), &final);
+  RunChecked(Boxes(10, 10, 1, 0.002, 600), &final);
 }
 
 }  // namespace
