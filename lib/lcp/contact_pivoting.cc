@@ -260,6 +260,74 @@ void ContactPivoting::Extract(ContactSolution<double>* solution) const {
   }
 }
 
+void ContactPivoting::SetCentre(const ContactSolution<double>& solution) {
+  const ContactProblem<double>& p = *problem_;
+  joint_centre_ = solution.joint_impulse;
+  shifts_.assign(modes_.size(), Shift());
+  const double shift = regularisation_ * kCentreShift * ImpulseScale(solution.normal_impulse);
+  for (size_t i = 0; i < modes_.size(); ++i) {
+    // What τ adds to the centre is written as a shift of the rows.
+    const ContactBlock<double>& c = p.contacts[i];
+    shifts_[i].centre_n = std::max(0.0, solution.normal_impulse[i]);
+    shifts_[i].a_n = shift * Scatter(i, 0) * RowMobility(p.mass, c.a, c.normal_a, c.b, c.normal_b);
+    if (c.has_friction) {
+      shifts_[i].centre_t = solution.tangent_impulse[i];
+      shifts_[i].a_t =
+          shift * Scatter(i, 1) * RowMobility(p.mass, c.a, c.tangent_a, c.b, c.tangent_b);
+    }
+  }
+}
+
+// The next inequality that becomes tight; of several at once the one that falls fastest.
+ContactPivoting::Event ContactPivoting::NextEvent(double tau, double direction) const {
+  Event event;
+  event.distance = direction < 0.0 ? tau : HUGE_VAL;
+  double steepest = 0.0;
+  for (size_t i = 0; i < modes_.size(); ++i) {
+    Test tests[2];
+    const int count = Tests(static_cast<int>(i), tests);
+    for (int k = 0; k < count; ++k) {
+      const double rate = tests[k].rate * direction;
+      if (!(rate < 0.0)) {
+        continue;
+      }
+      const double distance = std::max(0.0, tests[k].At(tau)) / -rate;
+      if (distance < event.distance ||
+          (distance == event.distance && event.contact >= 0 && rate < steepest)) {
+        event = {static_cast<int>(i), distance, tests[k].next};
+        steepest = rate;
+      }
+    }
+  }
+  return event;
+}
+
+// Changes a contact's mode at τ; returns the direction in which the path goes on, 0 where the
+// system has no solution.
+double ContactPivoting::Pivot(int contact, ContactMode next, double tau, double direction) {
+  const ContactMode before = modes_[contact];
+  if (before == ContactMode::kOpen && next == ContactMode::kSticking) {
+    // At λ' = 0 the sliding speed says which side of the cone is tight.
+    next = Sliding(contact).At(tau) > 0.0 ? ContactMode::kSlidingPositive
+                                          : ContactMode::kSlidingNegative;
+  }
+  modes_[contact] = next;
+  if (!SolveSystem()) {
+    return 0.0;
+  }
+  // The inequality that replaces the tight one grows along the path.
+  Test tests[2];
+  const int count = Tests(contact, tests);
+  int opposite = 0;
+  if (next == ContactMode::kSticking) {
+    opposite = before == ContactMode::kSlidingNegative ? 0 : 1;
+  } else if (before == ContactMode::kSticking) {
+    opposite = count - 1;  // sliding, at speed 0
+  }
+  const double rate = tests[opposite].rate;
+  return rate == 0.0 ? direction : rate > 0.0 ? 1.0 : -1.0;
+}
+
 bool ContactPivoting::Solve(const ContactProblem<double>& problem, From from, double regularisation,
                             int max_pivots, ContactSystem* system,
                             ContactSolution<double>* solution, int* factorisations) {
@@ -271,49 +339,15 @@ bool ContactPivoting::Solve(const ContactProblem<double>& problem, From from, do
   if (from == From::kOpen) {
     modes_.assign(modes_.size(), ContactMode::kOpen);
   }
-  joint_centre_ = solution->joint_impulse;
-  const size_t num_contacts = modes_.size();
-  shifts_.assign(num_contacts, Shift());
-  const double scale = ImpulseScale(solution->normal_impulse);
-  for (size_t i = 0; i < num_contacts; ++i) {
-    // The centre at τ = 0, and what the shift at τ = 1 adds to it as a shift of the rows.
-    const ContactBlock<double>& c = problem.contacts[i];
-    shifts_[i].centre_n = std::max(0.0, solution->normal_impulse[i]);
-    shifts_[i].centre_t = solution->tangent_impulse[i];
-    shifts_[i].a_n = regularisation_ * kCentreShift * scale * Scatter(i, 0) *
-                     RowMobility(problem.mass, c.a, c.normal_a, c.b, c.normal_b);
-    shifts_[i].a_t = regularisation_ * kCentreShift * scale * Scatter(i, 1) *
-                     RowMobility(problem.mass, c.a, c.tangent_a, c.b, c.tangent_b);
-  }
+  SetCentre(*solution);
   if (!Start(from)) {
     return false;
   }
   double tau = 1.0;
   double direction = -1.0;
-  for (int pivot = 0; pivot <= max_pivots; ++pivot) {
-    // The next inequality that becomes tight.
-    double nearest = direction < 0.0 ? tau : HUGE_VAL;
-    double steepest = 0.0;
-    int contact = -1;
-    ContactMode next = ContactMode::kOpen;
-    for (size_t i = 0; i < num_contacts; ++i) {
-      Test tests[2];
-      const int count = Tests(static_cast<int>(i), tests);
-      for (int k = 0; k < count; ++k) {
-        const double rate = tests[k].rate * direction;
-        if (!(rate < 0.0)) {
-          continue;
-        }
-        const double distance = std::max(0.0, tests[k].At(tau)) / -rate;
-        if (distance < nearest || (distance == nearest && contact >= 0 && rate < steepest)) {
-          nearest = distance;
-          steepest = rate;
-          contact = static_cast<int>(i);
-          next = tests[k].next;
-        }
-      }
-    }
-    if (contact < 0) {
+  for (int pivot = 0; pivot <= max_pivots && direction != 0.0; ++pivot) {
+    const Event event = NextEvent(tau, direction);
+    if (event.contact < 0) {
       if (direction > 0.0) {
         return false;  // a ray
       }
@@ -321,29 +355,8 @@ bool ContactPivoting::Solve(const ContactProblem<double>& problem, From from, do
       Extract(solution);
       return true;
     }
-    tau += direction * nearest;
-    const ContactMode before = modes_[contact];
-    if (before == ContactMode::kOpen && next == ContactMode::kSticking) {
-      // At λ' = 0 the sliding speed says which side of the cone is tight.
-      next = Sliding(contact).At(tau) > 0.0 ? ContactMode::kSlidingPositive
-                                            : ContactMode::kSlidingNegative;
-    }
-    modes_[contact] = next;
-    if (!SolveSystem()) {
-      return false;
-    }
-    // The inequality that replaces the tight one grows along the path.
-    Test tests[2];
-    const int count = Tests(contact, tests);
-    int opposite = 0;
-    if (next == ContactMode::kSticking) {
-      opposite = before == ContactMode::kSlidingNegative ? 0 : 1;
-    } else if (before == ContactMode::kSticking) {
-      opposite = count - 1;  // sliding, at speed 0
-    }
-    if (tests[opposite].rate != 0.0) {
-      direction = tests[opposite].rate > 0.0 ? 1.0 : -1.0;
-    }
+    tau += direction * event.distance;
+    direction = Pivot(event.contact, event.next, tau, direction);
   }
   return false;
 }

@@ -12,11 +12,11 @@
 //
 // While the modes hold, the solution is affine in τ: two right-hand sides of one system. Where an
 // inequality becomes tight, that contact changes its mode, and the path goes on in the direction
-// (which may turn back) in which the new mode's inequality becomes slack. Each τ has finitely many
-// pieces; the path ends at τ = 0, in a solution of the proximal problem, or runs to infinity. For
-// bounded or little friction the map is monotone and it arrives. Contacts that are redundant, or
-// nearly so (gaps of a lattice that differ by 1e-9 m), cost pivots but no accuracy: δ decides among
-// them.
+// (which may turn back) in which the new mode's inequality becomes slack. The
+// path has finitely many pieces and ends at τ = 0, in a solution of the proximal problem, or runs
+// to infinity. For bounded or little friction the map is monotone and it arrives. Contacts that are
+// redundant, or nearly so (gaps of a lattice that differ by 1e-9 m), cost pivots but no accuracy: δ
+// decides among them.
 //
 // Source: R. W. Cottle, J.-S. Pang, R. E. Stone, The Linear Complementarity Problem, 1992, section
 // 4.5 (parametric methods); B. C. Eaves, On the basic theorem of complementarity, 1971.
@@ -55,10 +55,19 @@ class ContactPivoting {
     double At(double tau) const { return value + rate * tau; }
   };
 
+  struct Event {
+    int contact = -1;  // −1: none
+    double distance = 0.0;
+    ContactMode next = ContactMode::kOpen;
+  };
+
+  void SetCentre(const ContactSolution<double>& solution);
   bool SolveSystem();
   bool Start(From from);
   void RaiseInequalities(From from);
   int Tests(int contact, Test* tests) const;
+  Event NextEvent(double tau, double direction) const;
+  double Pivot(int contact, ContactMode next, double tau, double direction);
   Test Normal(int contact) const;
   Test Sliding(int contact) const;
   Test Impulse(int contact) const;

@@ -10,18 +10,20 @@ namespace {
 // Violations below this fraction of a row's scale are rounding.
 constexpr double kModeTolerance = 1e-12;
 constexpr int kMaxRounds = 20;
+// Changed modes contradict others. Where these are more than in the round before, and more than a
+// few, they will not settle.
+constexpr int kFewContradicted = 2;
 // Pivots: from the guess (and half as many as there are contacts), and as multiples of the number
 // of contacts. An interior point costs about as much as 20 to 40.
 constexpr int kPivotsFromGuess = 40;
 constexpr int kPivotsFromInteriorPoint = 2;
 constexpr int kPivotsFromOpen = 20;
-// Proximal steps of pivoting: δ falls from step to step. Large at first, as what rounding leaves of
-// redundant impulses is its inverse; small at last, so that modes which differ by the tolerance are
-// told apart.
-constexpr int kMaxProximalRounds = 20;
-constexpr double kMaxExtrapolation = 1e6;
+// Proximal steps of pivoting: δ falls from step to step. What rounding leaves of redundant impulses
+// is its inverse: at 1e-10 one path in 400 of a pile of 100 discs was lost.
 constexpr double kFirstRegularisation = 1e-7;
-constexpr double kLeastRegularisation = 1e-10;
+constexpr double kLeastRegularisation = 1e-8;
+constexpr int kMaxProximalRounds = 40;
+constexpr double kMaxExtrapolation = 1e6;
 // Complementarities after which the polish is tried; rounding may stop the iteration for one step
 // at the end, so the last is tried several times.
 constexpr double kInteriorPointGoals[] = {1e-10, 1e-14, 1e-18, 1e-22, 1e-26, 1e-26, 1e-26, 1e-26};
@@ -129,22 +131,22 @@ void ContactSolver::Reserve(int num_bodies, int num_joints, int num_contacts) {
                                  &interior_point_.unit_z,
                                  &interior_point_.unit_s,
                                  &rhs_,
+                                 &interior_point_.rhs,
+                                 &interior_point_.correction,
                                  &correction_,
-                                 &guess_.v,
-                                 &guess_.joint_impulse,
-                                 &guess_.normal_impulse,
-                                 &guess_.tangent_impulse,
-                                 &trial_.v,
-                                 &trial_.joint_impulse,
-                                 &trial_.normal_impulse,
-                                 &trial_.tangent_impulse,
+                                 &start_,
                                  &centre_joint_,
                                  &centre_normal_,
                                  &centre_tangent_}) {
     x->reserve(3 * blocks);
   }
-  guess_.modes.reserve(num_contacts);
-  trial_.modes.reserve(num_contacts);
+  for (ContactSolution<double>* solution : {&trial_, &entry_, &last_}) {
+    solution->v.reserve(3 * num_bodies);
+    solution->joint_impulse.reserve(3 * num_joints);
+    solution->normal_impulse.reserve(num_contacts);
+    solution->tangent_impulse.reserve(num_contacts);
+    solution->modes.reserve(num_contacts);
+  }
   changes_.reserve(num_contacts);
 }
 
@@ -194,8 +196,8 @@ bool ContactSolver::SolveWithModes(const ContactProblem<double>& problem,
       }
     }
     // rhs := rhs − K x0; the solution is x0 + K⁻¹ rhs.
-    guess_.v = rhs_;
-    system_.Residual<false>(problem, solution->modes, guess_.v.data(), correction_.data(), 1,
+    start_ = rhs_;
+    system_.Residual<false>(problem, solution->modes, start_.data(), correction_.data(), 1,
                             rhs_.data());
   }
   if (choice) {
@@ -269,7 +271,7 @@ bool ContactSolver::SolveByModeChanges(const ContactProblem<double>& problem,
       }
       last_residual = report->residual;
       SetCentre(*solution);  // what δ leaves goes with another proximal step
-    } else if (contradicted > last_contradicted) {
+    } else if (contradicted > std::max(last_contradicted, kFewContradicted)) {
       return false;  // an avalanche: pivots go one by one
     }
     last_contradicted = contradicted > 0 ? contradicted : static_cast<int>(num_contacts);
@@ -284,7 +286,7 @@ bool ContactSolver::SolveByPivoting(const ContactProblem<double>& problem,
   double regularisation = kFirstRegularisation;
   double last_residual = HUGE_VAL;
   for (int round = 0; round < kMaxProximalRounds; ++round) {
-    centre_ = *solution;
+    last_ = *solution;
     const auto follow = [&](ContactPivoting::From start) {
       return pivoting_.Solve(problem, start, regularisation, max_pivots, &system_, solution,
                              &report->factorisations);
@@ -305,9 +307,9 @@ bool ContactSolver::SolveByPivoting(const ContactProblem<double>& problem,
     }
     // What δ leaves no longer falls: rows contradict each other by that much, and their impulses
     // grow by as much a step until one meets its limit.
-    if (regularisation == kLeastRegularisation && solution->modes == centre_.modes &&
+    if (regularisation == kLeastRegularisation && solution->modes == last_.modes &&
         report->residual > 0.5 * last_residual) {
-      ExtrapolateImpulses(problem, centre_, solution);
+      ExtrapolateImpulses(problem, last_, solution);
     }
     last_residual = report->residual;
     regularisation = std::max(kLeastRegularisation, 0.1 * regularisation);

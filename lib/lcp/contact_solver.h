@@ -19,7 +19,7 @@
 // After 3 and 4 the modes are identified and the mode system is solved once more: the polish. A
 // solution counts only by its scaled natural residual, recomputed from the data.
 //
-// Pivoting ends in proximal steps with δ falling from 1e-7 to 1e-10. What then still remains and no
+// Pivoting ends in proximal steps with δ falling from 1e-7 to 1e-8. What then still remains and no
 // longer falls is a contradiction of rows among which only the impulses' limits can choose: these
 // are approached along the impulses' last change.
 
@@ -89,8 +89,8 @@ class ContactSolver {
   ContactSystem system_;
   ContactPivoting pivoting_;
   InteriorPointWorkspace<double> interior_point_;
-  ContactSolution<double> guess_, trial_, entry_, centre_;
-  std::vector<double> rhs_, correction_;
+  ContactSolution<double> trial_, entry_, last_;
+  std::vector<double> rhs_, correction_, start_;
   std::vector<double> centre_joint_, centre_normal_, centre_tangent_;
   std::vector<int> changes_;
 };

@@ -44,8 +44,9 @@ RowPart<double> Combine(const RowPart<double>& x, double factor, const RowPart<d
 // Largest magnitudes of a kind of row: of its terms and of what is left.
 struct RowScale {
   double terms = 0.0;
-  double parts = 0.0;  // of the products that a constraint's value sums: where it cancels to 0,
-                       // rounding is relative to these
+  // Of the products that a constraint's value sums, and of the free motion: at rest all terms
+  // cancel to rounding, which is relative to these.
+  double parts = 0.0;
   double left = 0.0;
   void Term(double x) { terms = std::max(terms, std::abs(x)); }
   double Relative() const { return terms > 0.0 ? left / terms : left > 0.0 ? HUGE_VAL : 0.0; }
@@ -343,6 +344,13 @@ ContactSystem::ResidualSize ContactSystem::ResidualWith(const ContactProblem<dou
   }
   // Unused rows of constraints have a right-hand side of 0.
   const size_t momentum_size = 3 * static_cast<size_t>(problem.num_bodies) * columns;
+  for (int i = 0; i < 3 * problem.num_bodies; ++i) {
+    momentum.parts = std::max(momentum.parts, std::abs(problem.momentum[i]));
+    if (i % 3 != 2) {
+      constraint.parts =
+          std::max(constraint.parts, std::abs(problem.momentum[i]) / problem.mass[i]);
+    }
+  }
   if (regularisation == Regularisation::kKept) {
     for (size_t i = momentum_size; i < size; ++i) {
       residual[i] -= regularisation_[i / columns] * x[i];
@@ -353,7 +361,7 @@ ContactSystem::ResidualSize ContactSystem::ResidualWith(const ContactProblem<dou
     kind.left = std::max(kind.left, std::abs(residual[i]));
   }
   return {std::max(momentum.Relative(), constraint.Relative()),
-          std::max(momentum.Relative(), constraint.RelativeToParts())};
+          std::max(momentum.RelativeToParts(), constraint.RelativeToParts())};
 }
 
 template <bool kTransposed>
