@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "tangible/scene/parameter.h"
+#include "tangible/simulation/step.h"
 
 namespace tangible {
 namespace {

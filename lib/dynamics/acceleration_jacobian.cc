@@ -81,38 +81,13 @@ class AccelerationVisitor : private internal::LocalEntries<Sink> {
     }
   }
 
-  void Gap(const ActiveContact& contact) {
-    Locals locals;
-    if (contact.joint >= 0) {
-      const JointIndex& joint = s_.joints[contact.joint];
-      JointRows<LocalJet> rows;
-      LocalJointRows(joint, &locals, &rows);
-      Emit(locals, 0, contact.side * rows.coordinate);
-      sink_(0, s_.NumberVariable(contact.side > 0.0 ? joint.low : joint.high), -contact.side);
-      return;
-    }
-    ContactRows<LocalJet> rows;
-    LocalContactRows(contact, &locals, &rows);
-    Emit(locals, 0, rows.geometry.gap);
-  }
-
-  void Slip(const ActiveContact& contact) {
-    Locals locals;
-    ContactRows<LocalJet> rows;
-    LocalContactRows(contact, &locals, &rows);
-    Emit(locals, 0, RowTimes(v_, contact.a, rows.tangent_a, contact.b, rows.tangent_b));
-    for (int i = 0; i < 3; ++i) {
-      EmitTwist(0, contact.a, i, rows.tangent_a[i].a);
-      EmitTwist(0, contact.b, i, rows.tangent_b[i].a);
-    }
-  }
-
  private:
   using Base = internal::LocalEntries<Sink>;
   using Base::Emit;
   using Base::EmitMomentum;
   using Base::EmitRowTimesVariable;
   using Base::JointRow;
+  using Base::LocalContactRows;
   using Base::LocalGeometry;
   using Base::LocalJointRows;
   using Base::LocalNumber;
@@ -123,12 +98,6 @@ class AccelerationVisitor : private internal::LocalEntries<Sink> {
   using Base::sink_;
   using Base::state_;
   using Base::x_;
-
-  void EmitTwist(int row, int body, int i, double value) {
-    if (s_.bodies[body].motion != Motion::kStatic && value != 0.0) {
-      sink_(row, s_.TwistVariable(body, i), value);
-    }
-  }
 
   template <typename T>
   T RowTimes(const double* x, int a, const RowPart<T>& row_a, int b, const RowPart<T>& row_b) {
@@ -351,15 +320,6 @@ class AccelerationVisitor : private internal::LocalEntries<Sink> {
     Emit(twists, row, contact.side * rates.coordinate);
   }
 
-  void LocalContactRows(const ActiveContact& contact, Locals* locals, ContactRows<LocalJet>* rows) {
-    const Pose<LocalJet> pose_a = LocalPose(contact.a, locals);
-    const Pose<LocalJet> pose_b = LocalPose(contact.b, locals);
-    const ShapeView<LocalJet> shape_a = LocalShapeOfA(contact, locals);
-    const ShapeView<LocalJet> shape_b = LocalShapeOfB(contact, locals);
-    rows->geometry = EvaluateContact(contact.feature, shape_a, pose_a, shape_b, pose_b);
-    RowsFromGeometry(pose_a.position, pose_b.position, rows);
-  }
-
   void ShapeContact(int i) {
     const ActiveContact& contact = (*r_.contacts)[i];
     const int row = 3 * (*r_.contact_block)[i];
@@ -467,44 +427,9 @@ void VisitAccelerationJacobian(const Model<double>& model, const SolvedAccelerat
   visitor.Contacts();
 }
 
-namespace {
-
-// Gradients of a contact read no solution: only the state and the contact.
-template <typename Sink, typename Visit>
-void VisitAtState(const Model<double>& model, const State<double>& state,
-                  LocalJacobianScratch* scratch, const Sink& sink, const Visit& visit) {
-  ContactSolution<double> none;
-  none.v.assign(3 * static_cast<size_t>(model.structure->num_blocks()), 0.0);
-  SolvedAcceleration solved;
-  solved.state = &state;
-  solved.solution = &none;
-  AccelerationVisitor<Sink> visitor(model, solved, scratch, sink);
-  visit(&visitor);
-}
-
-}  // namespace
-
-template <typename Sink>
-void VisitGapGradient(const Model<double>& model, const State<double>& state,
-                      const ActiveContact& contact, LocalJacobianScratch* scratch,
-                      const Sink& sink) {
-  VisitAtState(model, state, scratch, sink, [&](auto* visitor) { visitor->Gap(contact); });
-}
-
-template <typename Sink>
-void VisitSlipGradient(const Model<double>& model, const State<double>& state,
-                       const ActiveContact& contact, LocalJacobianScratch* scratch,
-                       const Sink& sink) {
-  VisitAtState(model, state, scratch, sink, [&](auto* visitor) { visitor->Slip(contact); });
-}
-
-#define TANGIBLE_INSTANTIATE(Sink)                                                                \
-  template void VisitAccelerationJacobian<Sink>(const Model<double>&, const SolvedAcceleration&,  \
-                                                LocalJacobianScratch*, const Sink&);              \
-  template void VisitGapGradient<Sink>(const Model<double>&, const State<double>&,                \
-                                       const ActiveContact&, LocalJacobianScratch*, const Sink&); \
-  template void VisitSlipGradient<Sink>(const Model<double>&, const State<double>&,               \
-                                        const ActiveContact&, LocalJacobianScratch*, const Sink&);
+#define TANGIBLE_INSTANTIATE(Sink)                                                               \
+  template void VisitAccelerationJacobian<Sink>(const Model<double>&, const SolvedAcceleration&, \
+                                                LocalJacobianScratch*, const Sink&);
 TANGIBLE_INSTANTIATE(TangentSink)
 TANGIBLE_INSTANTIATE(AdjointSink)
 TANGIBLE_INSTANTIATE(EntryListSink)

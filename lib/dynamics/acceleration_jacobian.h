@@ -32,14 +32,4 @@ template <typename Sink>
 void VisitAccelerationJacobian(const Model<double>& model, const SolvedAcceleration& solved,
                                LocalJacobianScratch* scratch, const Sink& sink);
 
-/// Entries (0, variable, value) of a contact's gap and of its sliding speed t v at a state.
-template <typename Sink>
-void VisitGapGradient(const Model<double>& model, const State<double>& state,
-                      const ActiveContact& contact, LocalJacobianScratch* scratch,
-                      const Sink& sink);
-template <typename Sink>
-void VisitSlipGradient(const Model<double>& model, const State<double>& state,
-                       const ActiveContact& contact, LocalJacobianScratch* scratch,
-                       const Sink& sink);
-
 }  // namespace tangible

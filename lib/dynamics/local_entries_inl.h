@@ -96,6 +96,15 @@ class LocalEntries {
                       contact.feature.b, locals, &scratch_.numbers_b);
   }
 
+  void LocalContactRows(const ActiveContact& contact, Locals* locals, ContactRows<LocalJet>* rows) {
+    const Pose<LocalJet> pose_a = LocalPose(contact.a, locals);
+    const Pose<LocalJet> pose_b = LocalPose(contact.b, locals);
+    const ShapeView<LocalJet> shape_a = LocalShapeOfA(contact, locals);
+    const ShapeView<LocalJet> shape_b = LocalShapeOfB(contact, locals);
+    rows->geometry = EvaluateContact(contact.feature, shape_a, pose_a, shape_b, pose_b);
+    RowsFromGeometry(pose_a.position, pose_b.position, rows);
+  }
+
   void Emit(const Locals& locals, int row, const LocalJet& value) {
     for (int i = 0; i < locals.count(); ++i) {
       if (value.v[i] != 0.0) {

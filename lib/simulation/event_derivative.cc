@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tangible/dynamics/contact_gradient.h"
 #include "tangible/simulation/segment_flow.h"
 
 namespace tangible {
@@ -170,11 +171,9 @@ void EventDerivative::EventGradient(const Model<double>& model, Segment* segment
   gradient->setZero(s.num_variables() + 1);
   std::vector<JacobianEntry> entries;
   if (segment->event == EventKind::kTouch) {
-    VisitGapGradient(model, segment->after, segment->event_contact, &scratch_,
-                     EntryListSink{&entries});
+    AddGapGradient(model, segment->after, segment->event_contact, &scratch_, &entries);
   } else if (segment->event == EventKind::kSlipEnds) {
-    VisitSlipGradient(model, segment->after, segment->event_contact, &scratch_,
-                      EntryListSink{&entries});
+    AddSlipGradient(model, segment->after, segment->event_contact, &scratch_, &entries);
   } else {
     SolvedNode& node = segment->end;
     RowMatrixXd seed =

@@ -236,8 +236,10 @@ TEST_F(TangibleSimulateTest, BadInputIsOneLine) {
   ExpectOneLine(Simulate(R"({"bodies": [], "colour": 1})"), 1, "/colour");
   ExpectOneLine(Simulate(R"({"bodies": [{"name": "a", "mass": -1, "position": [0, 0]}]})"), 1,
                 "/bodies/0/mass");
-  ExpectOneLine(Simulate(R"({"bodies": [], "simulation": {"stepping": "event"}})"), 1,
-                "scene.json: /simulation/stepping: ");
+  ExpectOneLine(Simulate(R"({"bodies": [], "simulation": {"integrator": "runge_kutta_4"}})"), 1,
+                "scene.json: /simulation/integrator: ");
+  ExpectOneLine(Simulate(R"({"bodies": [], "simulation": {"impact_law": "poisson"}})"), 1,
+                "scene.json: /simulation/impact_law: ");
   ExpectOneLine(Simulate(kFall, "--out=/nonexistent/t.csv"), 1, "/nonexistent/t.csv");
   ExpectOneLine(Simulate(kFall, "--view=/nonexistent/v.html"), 1, "/nonexistent/v.html");
   Write("i.csv", "time,body,x,y,angle,vx,vy,omega\n0,wall,0,0,0,0,0,0\n");

@@ -102,7 +102,7 @@ TEST(EventDerivativeTest, ASpinningBallOnASlope) {
     "simulation": {"stepping": "event", "integrator": "trapezoidal", "dt": 0.01, "duration": 0.9}})",
       {"bodies/ball/position/y", "bodies/ball/velocity/x", "bodies/ball/angular_velocity",
        "bodies/*/friction", "bodies/floor/restitution", "bodies/ball/shape/radius", "gravity/y",
-       "bodies/floor/shape/normal/x", "bodies/ball/inertia"},
+       "bodies/floor/shape/normal/x", "bodies/ball/mass"},
       2);
 }
 

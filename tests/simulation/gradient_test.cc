@@ -257,10 +257,10 @@ TEST(LossGradient, RefusesAnUnknownOutput) {
 
 TEST(FinalStateJacobian, RefusesSettingsThatTheEngineLacks) {
   Scene scene = SceneOf(kSlider);
-  scene.simulation.stepping = Stepping::kEvent;
+  scene.simulation.integrator = Integrator::kTrapezoidal;
   const GradientResult result = FinalStateJacobian(scene, Resolve(scene, {"gravity/y"}), {});
   EXPECT_FALSE(result.done);
-  EXPECT_NE(result.message.find("test.json: /simulation/stepping: "), std::string::npos)
+  EXPECT_NE(result.message.find("test.json: /simulation/integrator: "), std::string::npos)
       << result.message;
 }
 

@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/dynamics/contact_gradient.h"
+
+#include "tangible/dynamics/local_entries_inl.h"
+
+namespace tangible {
+namespace {
+
+using internal::Locals;
+
+class GradientVisitor : private internal::LocalEntries<EntryListSink> {
+ public:
+  using LocalEntries::LocalEntries;
+
+  void Gap(const ActiveContact& contact) {
+    Locals locals;
+    if (contact.joint >= 0) {
+      const JointIndex& joint = s_.joints[contact.joint];
+      JointRows<LocalJet> rows;
+      LocalJointRows(joint, &locals, &rows);
+      Emit(locals, 0, contact.side * rows.coordinate);
+      sink_(0, s_.NumberVariable(contact.side > 0.0 ? joint.low : joint.high), -contact.side);
+      return;
+    }
+    ContactRows<LocalJet> rows;
+    LocalContactRows(contact, &locals, &rows);
+    Emit(locals, 0, rows.geometry.gap);
+  }
+
+  void Slip(const ActiveContact& contact) {
+    Locals locals;
+    ContactRows<LocalJet> rows;
+    LocalContactRows(contact, &locals, &rows);
+    LocalJet speed(0.0);
+    for (int i = 0; i < 3; ++i) {
+      speed += rows.tangent_a[i] * state_.twist[3 * contact.a + i] +
+               rows.tangent_b[i] * state_.twist[3 * contact.b + i];
+    }
+    Emit(locals, 0, speed);
+    for (int i = 0; i < 3; ++i) {
+      EmitTwist(contact.a, i, rows.tangent_a[i].a);
+      EmitTwist(contact.b, i, rows.tangent_b[i].a);
+    }
+  }
+
+ private:
+  void EmitTwist(int body, int i, double value) {
+    if (s_.bodies[body].motion != Motion::kStatic && value != 0.0) {
+      sink_(0, s_.TwistVariable(body, i), value);
+    }
+  }
+};
+
+}  // namespace
+
+void AddGapGradient(const Model<double>& model, const State<double>& state,
+                    const ActiveContact& contact, LocalJacobianScratch* scratch,
+                    std::vector<JacobianEntry>* entries) {
+  const EntryListSink sink{entries};
+  GradientVisitor(model, state, scratch, sink).Gap(contact);
+}
+
+void AddSlipGradient(const Model<double>& model, const State<double>& state,
+                     const ActiveContact& contact, LocalJacobianScratch* scratch,
+                     std::vector<JacobianEntry>* entries) {
+  const EntryListSink sink{entries};
+  GradientVisitor(model, state, scratch, sink).Slip(contact);
+}
+
+}  // namespace tangible

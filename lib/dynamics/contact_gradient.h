@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// Gradients of what event stepping finds events by: a contact's gap, and its sliding speed t v.
+
+#include "tangible/dynamics/local_jacobian.h"
+
+namespace tangible {
+
+/// Entries (row 0, variable, value) of the gap of a contact or limit, m or rad.
+void AddGapGradient(const Model<double>& model, const State<double>& state,
+                    const ActiveContact& contact, LocalJacobianScratch* scratch,
+                    std::vector<JacobianEntry>* entries);
+/// The same of the sliding speed of a contact of shapes, m/s.
+void AddSlipGradient(const Model<double>& model, const State<double>& state,
+                     const ActiveContact& contact, LocalJacobianScratch* scratch,
+                     std::vector<JacobianEntry>* entries);
+
+}  // namespace tangible

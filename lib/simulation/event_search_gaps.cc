@@ -1,0 +1,243 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The search for gaps that close: of pairs of bodies, and of joints to their limits.
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "tangible/simulation/event_search_inl.h"
+
+namespace tangible {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+bool OfPair(const ActiveContact& contact, int a, int b) {
+  return contact.joint < 0 && contact.a == a && contact.b == b;
+}
+
+bool Contains(const std::vector<ActiveContact>& contacts, const ActiveContact& contact) {
+  return std::any_of(contacts.begin(), contacts.end(),
+                     [&](const ActiveContact& c) { return c.SameAs(contact); });
+}
+
+double NormalSpeed(const Model<double>& model, const State<double>& state,
+                   const ActiveContact& contact) {
+  ContactRows<double> rows;
+  EvaluateContactRows(model, state, contact, &rows);
+  return RelativeSpeed(state, contact.a, rows.normal_a, contact.b, rows.normal_b);
+}
+
+}  // namespace
+
+// From a start at which a pair touches and separates with `speed`: a time by which it has left and
+// not yet returned.
+double EventSearch::TouchStart(const Model<double>& model, double speed,
+                               double acceleration) const {
+  const double start = speed > 0.0 && acceleration > 0.0 ? 0.5 * speed / acceleration : kInfinity;
+  const double sixteenth = segment_->length / 16.0;
+  return speed <= SpeedTolerance(model, segment_->before) ? sixteenth : std::min(start, 1e9);
+}
+
+void EventSearch::SearchPair(const Model<double>& model, int a, int b, Event* event) {
+  const auto is_closed = [&](const ActiveContact& c) { return Contains(segment_->contacts, c); };
+  bool closed = false;
+  for (const ActiveContact& contact : segment_->contacts) {
+    closed = closed || OfPair(contact, a, b);
+  }
+  const double touch = TouchTolerance(segment_->before, a, b);
+  const double slow = SpeedTolerance(model, segment_->before);
+  ActiveContact nearest;
+  Vector2<double> normal(0.0, 0.0);
+  bool on_face = false;  // the normal belongs to a body's face, not to the line between two points
+  // The smallest gap of the pair's contacts that are not closed; those that touch and leave count
+  // only if `all`.
+  const auto gap = [&](const Sample& sample, bool all) {
+    if (!sample.good) {
+      return std::numeric_limits<double>::quiet_NaN();
+    }
+    const State<double>& state = sample.motion.after;
+    ContactFeature features[2];
+    const int count = FindContactFeatures(model.Shape(a), state.PoseOf(a), model.Shape(b),
+                                          state.PoseOf(b), kInfinity, features);
+    double smallest = kInfinity;
+    for (int k = 0; k < count; ++k) {
+      ActiveContact contact;
+      contact.a = a;
+      contact.b = b;
+      contact.feature = features[k];
+      contact.law = ContactLaw::kInelastic;
+      ContactRows<double> rows;
+      EvaluateContactRows(model, state, contact, &rows);
+      if (rows.geometry.gap < smallest && !is_closed(contact) &&
+          (all || !Contains(*touching_, contact))) {
+        smallest = rows.geometry.gap;
+        nearest = contact;
+        nearest.gap = smallest;
+        normal = rows.geometry.normal;
+        on_face = contact.feature.kind != FeatureKind::kVertexVertex;
+      }
+    }
+    return smallest;
+  };
+  // Bound on how fast the gap closes over an interval: all points' speeds; where both ends have the
+  // same face, the speed along its normal and what rotation adds.
+  const auto rate_over = [&](double from, double to, bool all) {
+    const double any = closing_[a] + closing_[b];
+    const Sample& first = *At(model, from);
+    if (std::isinf(gap(first, all))) {
+      return any;
+    }
+    const ActiveContact start = nearest;
+    const Vector2<double> along = normal;
+    const bool face = on_face;
+    const State<double> before = first.motion.after;
+    const Sample& last = *At(model, to);
+    if (!face || std::isinf(gap(last, all)) || !(nearest.feature == start.feature)) {
+      return any;
+    }
+    const State<double>& after = last.motion.after;
+    double closing = 0.0;
+    double speed = 0.0;
+    double turning = 0.0;
+    for (const State<double>* state : {&before, &after}) {
+      const Vector2<double> relative(state->twist[3 * a] - state->twist[3 * b],
+                                     state->twist[3 * a + 1] - state->twist[3 * b + 1]);
+      closing = std::max(closing, std::abs(along.dot(relative)));
+      speed = std::max(speed, relative.norm());
+      double turn = 0.0;
+      double swept = 0.0;
+      for (const int body : {a, b}) {
+        const double omega = std::abs(state->twist[3 * body + 2]);
+        const bool is_circle = model.structure->bodies[body].shape == ShapeType::kCircle;
+        turn += is_circle ? 0.0 : omega;
+        swept += is_circle ? 0.0 : omega * radius_[body];
+      }
+      closing = std::max(closing, std::abs(along.dot(relative)) + swept);
+      turning = std::max(turning, turn);
+    }
+    return std::min(any, 1.05 * closing + 1.5 * turning * (to - from) * speed);
+  };
+  const auto search = [&](double from, double allowed, bool all) {
+    if (from < event->length && gap(*At(model, from), all) > touch) {
+      allowed = 0.0;  // it has left
+    }
+    // A contact that has touched all the time returns only by approaching: the first-order
+    // integrator's poses may cut a corner that its twists do not.
+    const auto shifted = [&](const Sample& sample) {
+      const double value = gap(sample, all) + allowed;
+      const bool approaches = value > 0.0 || !all || !Contains(*touching_, nearest) ||
+                              NormalSpeed(model, sample.motion.after, nearest) < -slow;
+      return approaches ? value : touch;
+    };
+    const auto rate = [&](double x, double y) { return rate_over(x, y, all); };
+    double root;
+    if (from < event->length && FirstRoot(model, shifted, rate, from, event->length, &root) &&
+        root > 0.0) {
+      event->kind = EventKind::kTouch;
+      event->length = root;
+      gap(*At(model, root), all);
+      event->contact = nearest;
+    }
+  };
+  search(0.0, 0.0, false);
+  // Contacts that touch and stay open leave first, and may return.
+  double from = kInfinity;
+  double allowed = touch;
+  for (const ActiveContact& contact : *touching_) {
+    if (OfPair(contact, a, b) && !is_closed(contact)) {
+      const Sample& end = *At(model, event->length);
+      const double speed = NormalSpeed(model, segment_->before, contact);
+      const double change =
+          end.good ? std::abs(NormalSpeed(model, end.motion.after, contact) - speed) : 0.0;
+      from = std::min(from, TouchStart(model, speed, 2.0 * change / event->length));
+      allowed = std::max(allowed, touch - contact.gap);
+    }
+  }
+  search(from, allowed, true);
+  if (!closed) {
+    return;
+  }
+  // A closed contact whose feature is no longer the pair's closest hands over to the next one.
+  const auto same = [&](const Sample& sample) {
+    const State<double>& state = sample.motion.after;
+    ContactFeature features[2];
+    const int count = FindContactFeatures(model.Shape(a), state.PoseOf(a), model.Shape(b),
+                                          state.PoseOf(b), kInfinity, features);
+    for (const ActiveContact& contact : segment_->contacts) {
+      bool found = !OfPair(contact, a, b);
+      for (int k = 0; k < count && !found; ++k) {
+        found = features[k] == contact.feature;
+      }
+      if (!found) {
+        return -1.0;
+      }
+    }
+    return 1.0;
+  };
+  if (same(*At(model, event->length)) < 0.0) {
+    double low = 0.0;
+    double high = event->length;
+    while (high - low > 1e-14 * event->length) {
+      const double m = 0.5 * (low + high);
+      (same(*At(model, m)) < 0.0 ? high : low) = m;
+    }
+    if (high < event->length) {
+      event->kind = EventKind::kTouch;
+      event->length = high;
+      gap(*At(model, high), true);
+      event->contact = nearest;
+    }
+  }
+}
+
+void EventSearch::SearchLimit(const Model<double>& model, int joint, double side, Event* event) {
+  ActiveContact limit;
+  limit.a = model.structure->joints[joint].a;
+  limit.b = model.structure->joints[joint].b;
+  limit.joint = joint;
+  limit.side = side;
+  limit.law = ContactLaw::kInelastic;
+  if (Contains(segment_->contacts, limit)) {
+    return;
+  }
+  const auto evaluate = [&](const State<double>& state, double* rate) {
+    const JointIndex& index = model.structure->joints[joint];
+    JointRows<double> joint_rows;
+    EvaluateJoint(index.type, state.PoseOf(index.a), state.PoseOf(index.b),
+                  &model.numbers[index.geometry], &joint_rows);
+    ContactRows<double> rows;
+    EvaluateLimitRows(model, joint_rows, limit, &rows);
+    *rate = RelativeSpeed(state, limit.a, rows.normal_a, limit.b, rows.normal_b);
+    return rows.geometry.gap;
+  };
+  double rate_before, rate_after;
+  evaluate(segment_->before, &rate_before);
+  const Sample& end = *At(model, event->length);
+  if (!end.good) {
+    return;
+  }
+  evaluate(end.motion.after, &rate_after);
+  double from = 0.0;
+  double allowed = 0.0;
+  if (Contains(*touching_, limit)) {
+    from = TouchStart(model, rate_before, 2.0 * std::abs(rate_after - rate_before) / event->length);
+    allowed = 1e-10;
+  }
+  const double rate = 1.1 * std::max(std::abs(rate_before), std::abs(rate_after)) +
+                      0.25 * std::abs(rate_after - rate_before);
+  const auto gap = [&](const Sample& sample) {
+    double unused;
+    return sample.good ? evaluate(sample.motion.after, &unused) + allowed
+                       : std::numeric_limits<double>::quiet_NaN();
+  };
+  const auto rate_over = [&](double, double) { return rate; };
+  double root;
+  if (from < event->length && FirstRoot(model, gap, rate_over, from, event->length, &root)) {
+    event->kind = EventKind::kTouch;
+    event->length = root;
+    event->contact = limit;
+  }
+}
+
+}  // namespace tangible

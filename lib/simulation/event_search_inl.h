@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// Roots of functions of a segment's length. Included by event_search*.cc alone.
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "tangible/simulation/event_search.h"
+
+namespace tangible {
+
+inline constexpr int kMostHalvings = 1000;
+inline constexpr int kMostRefinements = 200;
+
+// Illinois' variant of the secant method within a bracket, with halving where it stalls: to the
+// last bit that changes the value.
+template <typename Function>
+double EventSearch::Refine(const Model<double>& model, const Function& f, double a, double fa,
+                           double b, double fb) {
+  int same_side = 0;
+  for (int k = 0; k < kMostRefinements && fb != 0.0; ++k) {
+    const double width = b - a;
+    if (width <= 4.0 * std::numeric_limits<double>::epsilon() * b) {
+      break;
+    }
+    double m = k % 3 == 2 ? 0.5 * (a + b) : b - fb * width / (fb - fa);
+    if (!(m > a && m < b)) {
+      m = 0.5 * (a + b);
+    }
+    if (m == a || m == b) {
+      break;
+    }
+    const double fm = f(*At(model, m));
+    if (std::isnan(fm)) {
+      break;
+    }
+    if (fm > 0.0) {
+      a = m;
+      fa = fm;
+      if (++same_side > 1) fb *= 0.5;
+    } else {
+      b = m;
+      fb = fm;
+      same_side = 0;
+    }
+  }
+  return b;
+}
+
+template <typename Gap, typename Rate>
+bool EventSearch::FirstRoot(const Model<double>& model, const Gap& gap, const Rate& rate_over,
+                            double from, double to, double* root) {
+  struct Interval {
+    double a, fa, b, fb;
+  };
+  const double smallest = 1e-12 * to;
+  const double first = gap(*At(model, from));
+  if (first <= 0.0) {
+    *root = from;
+    return from > 0.0;
+  }
+  std::vector<Interval> open = {{from, first, to, gap(*At(model, to))}};
+  Interval crossing = open.back();  // the shortest known to hold a crossing
+  for (int k = 0; !open.empty(); ++k) {
+    const Interval i = open.back();
+    open.pop_back();
+    if (i.fb <= 0.0) {
+      crossing = i;
+    }
+    if (k == kMostHalvings) {
+      break;
+    }
+    if (std::isnan(i.fa) || std::isnan(i.fb)) {
+      continue;
+    }
+    const double reach = i.b - i.a > smallest ? rate_over(i.a, i.b) * (i.b - i.a) : 0.0;
+    if (i.fb > 0.0 && (i.fa + i.fb > reach || i.b - i.a <= smallest)) {
+      continue;
+    }
+    // Where the gap closes at more than half of what the bound allows it does not open in between:
+    // the crossing is the first.
+    if (i.fb <= 0.0 && (i.b - i.a <= smallest || i.fa - i.fb > 0.5 * reach)) {
+      *root = Refine(model, gap, i.a, i.fa, i.b, i.fb);
+      return true;
+    }
+    const double m = 0.5 * (i.a + i.b);
+    const double fm = gap(*At(model, m));
+    if (fm > 0.0) {
+      open.push_back({m, fm, i.b, i.fb});
+    }
+    open.push_back({i.a, i.fa, m, fm});
+  }
+  if (crossing.fb <= 0.0) {
+    *root = Refine(model, gap, crossing.a, crossing.fa, crossing.b, crossing.fb);
+    return true;
+  }
+  return false;
+}
+
+}  // namespace tangible
