@@ -110,6 +110,7 @@ bool IsSameFile(const std::string& a, const std::string& b) {
 // An error, or empty where no output is another output or an input.
 std::string SharedFile(const ProgramInfo& info, const std::vector<std::string>& positional) {
   std::vector<NamedFile> files;
+  files.reserve(positional.size());
   for (const std::string& path : positional) {
     files.push_back({"the input", path});
   }

@@ -89,7 +89,7 @@ void EventSearch::SearchPair(const Model<double>& model, int a, int b, Event* ev
       return any;
     }
     const ActiveContact start = nearest;
-    const Vector2<double> along = normal;
+    const Vector2<double> along(normal.x(), normal.y());  // the next call moves it
     const bool face = on_face;
     const State<double> before = first.motion.after;
     const Sample& last = *At(model, to);

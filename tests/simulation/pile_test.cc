@@ -53,10 +53,11 @@ Scene Discs(int n, long steps) {
   scene.bodies = {Wall("floor", 0.0, 1.0, 0.0, 0.5), Wall("left", 1.0, 0.0, -0.5 * width, 0.5),
                   Wall("right", -1.0, 0.0, -0.5 * width, 0.5)};
   for (int i = 0; i < n; ++i) {
+    const int row = i / columns;
     Add({{ShapeType::kCircle, {0.1}},
          1.0,
          {-0.5 * width + 0.125 + 0.25 * (i % columns) + 0.01 * std::sin(12.9898 * i),
-          0.15 + 0.22 * static_cast<double>(i / columns)}},
+          0.15 + 0.22 * row}},
         0.5, &scene);
   }
   scene.simulation.dt = 0.002;
@@ -82,8 +83,9 @@ Scene Mixture(unsigned seed, int n, double friction, double mass_ratio) {
                       ? BasicShape<double>{ShapeType::kCircle, {draw(0.1, 0.2)}}
                       : BasicShape<double>{ShapeType::kBox, {draw(0.15, 0.3), draw(0.15, 0.3)}};
     grain.mass = std::pow(mass_ratio, draw(0.0, 1.0));
+    const int row = i / columns;
     grain.position = {-0.5 * width + 0.35 + 0.5 * (i % columns) + draw(-0.03, 0.03),
-                      0.3 + 0.5 * static_cast<double>(i / columns)};
+                      0.3 + 0.5 * row};
     grain.angle = draw(0.0, 6.0);
     Add(grain, friction, &scene);
   }
@@ -112,7 +114,7 @@ RolloutReport RunChecked(const Scene& scene, State<double>* final) {
   Model<double> model;
   State<double> initial;
   BuildModel(scene, &model, &initial);
-  const RolloutReport report = Rollout(
+  RolloutReport report = Rollout(
       model, initial,
       [](long k, double, const State<double>&, Stepper* stepper) {
         if (stepper != nullptr) {
