@@ -4,6 +4,7 @@
 #include <gflags/gflags.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cstdio>
@@ -185,8 +186,11 @@ CommandLine ParseCommandLine(int argc, char** argv, const ProgramInfo& info) {
       }
     }
   }
-  if (static_cast<int>(line.positional.size()) != info.num_positional) {
+  const int given = static_cast<int>(line.positional.size());
+  const int most = std::max(info.num_positional, info.most_positional);
+  if (given < info.num_positional || given > most) {
     return UsageError(info, "expected " + std::to_string(info.num_positional) +
+                                (most > info.num_positional ? " to " + std::to_string(most) : "") +
                                 " argument(s), got " + std::to_string(line.positional.size()));
   }
   const std::string shared = SharedFile(info, line.positional);

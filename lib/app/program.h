@@ -35,6 +35,7 @@ struct ProgramInfo {
   std::string version;      ///< "0.1.0"
   std::string source_file;  ///< __FILE__ of the main: its flags are the ones that --help lists
   int num_positional = 1;   ///< number of arguments that are not flags
+  int most_positional = 0;  ///< where more of them are allowed: how many
   /// Flags whose values are files that the program writes, and reads. No file is written twice, or
   /// over an input.
   std::vector<std::string> outputs = {"out"};

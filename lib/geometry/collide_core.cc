@@ -76,7 +76,9 @@ struct FaceEnds {
 };
 
 /// One end of the overlap. `overhang`: how far the incident face ends inside of the reference face.
-/// Adds nothing where the reference's vertex has no foot on the incident face.
+/// Adds nothing where the reference's vertex has no foot on the incident face and the incident one
+/// is beyond the reference's end; by rounding alone it is not beyond, and may be the nearest there
+/// is.
 void AddEnd(const Sides& sides, const CoreFace& reference, const CoreFace& incident,
             int reference_vertex, int incident_vertex, double overhang, FaceEnds* ends) {
   const Vector2<double> on_reference = sides.reference.VertexAt(reference_vertex);
@@ -91,7 +93,7 @@ void AddEnd(const Sides& sides, const CoreFace& reference, const CoreFace& incid
       std::abs(of_incident.gap - of_reference.gap) <= tie) {
     // Vertex over vertex: the first body's stands, whichever rounding prefers.
     ends->candidates[ends->count++] = sides.reference_is_first ? of_reference : of_incident;
-  } else if (overhang >= 0.0) {
+  } else if (overhang >= (has_foot ? 0.0 : -tie)) {
     ends->candidates[ends->count++] = of_incident;
   } else if (has_foot) {
     ends->candidates[ends->count++] = of_reference;

@@ -46,6 +46,26 @@ TEST(CollideCoreRandom, GapIsTheSignedDistanceOfAllPairs) {
   EXPECT_GT(num_vertex_vertex, kNumSamples / 20);
 }
 
+// A triangle and a box that slide towards each other on a floor: the tip meets the end of a face,
+// by rounding beside it, and it is the only contact within reach.
+TEST(CollideCoreTies, ATipBeforeTheEndOfAFaceIsNotLost) {
+  const TestShape triangle =
+      Polygon({0.13700537136076896, -0.053678600659748596, -0.07712391176713448,
+               0.12531466867141383, -0.1288331979609946, -0.071090583438555});
+  const TestShape box = Box(0.2583188115705465, 0.18118329127363492);
+  const Pose<double> on_floor =
+      At(0.071506927629088946, 0.062518264768450557, -0.065404908703935768);
+  for (const double rise : {0.0, 1e-17, -1e-17, 1e-16, -1e-16, 1e-15, -1e-15, 1e-12, -1e-12}) {
+    const Pose<double> other =
+        At(0.33813951958763983, 0.090591645636817486 + rise, 1.0831962713870811e-16);
+    const Contacts contacts = Collide(triangle, on_floor, box, other, 0.0186);
+    ASSERT_GE(contacts.count, 1) << rise;
+    EXPECT_NEAR(contacts.geometry[0].gap, SignedDistance(triangle, on_floor, box, other), 1e-12)
+        << rise;
+    EXPECT_NEAR(contacts.geometry[0].gap, 0.004269, 1e-6) << rise;
+  }
+}
+
 TEST(CollideCoreRandom, PointIsMidwayBetweenTheSurfaces) {
   std::mt19937 random(20240102);
   const TestShape probe = Circle(0.0);

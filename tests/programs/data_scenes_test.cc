@@ -15,6 +15,7 @@
 #include "tangible/scene/scene_json.h"
 #include "tangible/simulation/gradient.h"
 #include "tangible/verification/support/compare.h"
+#include "tangible/verification/support/differences.h"
 
 namespace tangible {
 namespace {

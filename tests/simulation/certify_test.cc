@@ -45,6 +45,27 @@ TEST(CertifyRollout, FreeFallIsTrustworthy) {
   EXPECT_EQ(c.mode_switches, 0);
 }
 
+// Without forces a ball beside the floor touches it at a gap of rounding: whether it closes is
+// open.
+TEST(CertifyRollout, ATouchWithoutForceIsAKinkThoughItsTermsAreAllRounding) {
+  const auto ball = [](const std::string& y) {
+    return R"({"gravity": [0, 0], "bodies": [
+      {"name": "ball", "shape": {"circle": {"radius": 0.1}}, "mass": 1, "position": [0.3, )" +
+           y + R"(]},
+      {"name": "floor", "static": true,
+       "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}}],
+      "simulation": {"dt": 0.01, "duration": 0.02}})";
+  };
+  for (const char* y : {"0.1", "0.10000000000000002"}) {
+    const Certificate touches = Certify(ball(y));
+    EXPECT_TRUE(StartsWith(touches.verdict, "near a kink: kink of 2 rows")) << touches.verdict;
+    EXPECT_EQ(touches.margin_min, 0.0);
+  }
+  const Certificate apart = Certify(ball("0.1000001"));
+  EXPECT_EQ(apart.verdict, "trustworthy");
+  EXPECT_EQ(apart.degenerate_rows, 0);
+}
+
 TEST(CertifyRollout, LandingInTheLastStepIsFlaggedAndOneStepLaterNot) {
   const Certificate landing = Certify(FallingBall(0.05, R"({"dt": 0.01, "duration": 0.1})"));
   EXPECT_TRUE(StartsWith(landing.verdict, "discontinuous: landing in the last step"))

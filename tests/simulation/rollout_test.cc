@@ -6,7 +6,7 @@
 #include <algorithm>
 
 #include "../support/scenes.h"
-#include "tangible/verification/support/compare.h"
+#include "tangible/verification/support/trace.h"
 #include "tangible/verification/support/random_scene.h"
 
 namespace tangible {

@@ -9,6 +9,7 @@
 
 #include <cstdint>
 #include <random>
+#include <vector>
 
 #include "tangible/scene/scene.h"
 
@@ -33,7 +34,11 @@ class RandomNumbers {
 struct RandomSceneOptions {
   int max_bodies = 8;   ///< moving ones, at least 1
   int max_steps = 200;  ///< most scenes have at most 40
+  Stepping stepping = Stepping::kFixed;
 };
+
+/// The ways to step that the engine has (simulation/settings.h).
+std::vector<Stepping> AvailableSteppings();
 
 /// A valid scene. Bodies stand apart or touch at their start but for those meant to start in
 /// penetration; loops of joints have no contradiction; edges of force windows are off the steps'.

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/verification/gradients/coverage.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "../support/sliding_box.h"
+#include "tangible/verification/support/random_scene.h"
+
+namespace tangible {
+namespace {
+
+TEST(CoverageTest, ASceneCountsWhatItHas) {
+  const Scene scene = SlidingBox("0.3");
+  const Coverage coverage = CoverageOf(scene, TraceRun(scene));
+  for (const char* what :
+       {"contact box, half_plane", "friction sliding", "bodies 1", "steps 3 to 40",
+        "mixing of friction average", "joint correction none", "coefficients of a pair"}) {
+    EXPECT_EQ(coverage.count(what), 1u) << what;
+  }
+  EXPECT_EQ(coverage.count("friction sticking"), 0u);
+  Coverage sum;
+  Add(coverage, &sum);
+  Add(coverage, &sum);
+  EXPECT_EQ(sum["friction sliding"], 2);
+  const std::vector<std::string> missing = MissingCoverage(sum);
+  EXPECT_NE(std::find(missing.begin(), missing.end(), "joint weld"), missing.end());
+  EXPECT_EQ(std::find(missing.begin(), missing.end(), "friction sliding"), missing.end());
+}
+
+TEST(CoverageTest, RandomScenesHaveEverything) {
+  Coverage sum;
+  for (unsigned seed = 1; seed <= 150; ++seed) {
+    const Scene scene = RandomScene(seed);
+    Add(CoverageOf(scene, TraceRun(scene)), &sum);
+  }
+  for (const std::string& what : MissingCoverage(sum)) ADD_FAILURE() << what;
+  // Of two of five shapes, in either order, but for two half-planes.
+  const std::vector<std::string> expected = ExpectedCoverage();
+  EXPECT_EQ(std::count_if(expected.begin(), expected.end(),
+                          [](const std::string& what) { return what.rfind("contact ", 0) == 0; }),
+            14);
+}
+
+}  // namespace
+}  // namespace tangible

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/verification/support/differences.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "sliding_box.h"
+
+namespace tangible {
+namespace {
+
+TEST(DifferencesTest, DifferencesAreDerivativesOnBothKindsOfSides) {
+  for (const char* mu : {"0.3", "0"}) {  // at 0 from one side only
+    const Scene scene = SlidingBox(mu);
+    const RunTrace trace = TraceRun(scene);
+    const VectorX<double> noise = RoundingNoise(scene, trace);
+    EXPECT_GT(noise.minCoeff(), 0.0);
+    EXPECT_LT(noise.maxCoeff(), 1e-12);
+    const DifferenceColumn column =
+        FiniteDifferences(scene, trace, noise, PathTo(scene, "pairs/box:floor/friction"));
+    ASSERT_EQ(column.status, DifferenceStatus::kJudged) << mu;
+    // v_x = v_0 − μ g t, x the sum over steps of h v: g h² (1 + … + 10).
+    EXPECT_NEAR(column.values[3], -9.81 * 0.1, column.errors[3] + 1e-12) << mu;
+    EXPECT_NEAR(column.values[0], -9.81 * 1e-4 * 55.0, column.errors[0] + 1e-12) << mu;
+    EXPECT_LT(column.errors[3], 1e-8) << mu;
+  }
+}
+
+TEST(DifferencesTest, StepsOfOneSizeAreGivenWithTheirModes) {
+  const Scene scene = SlidingBox("0.3");
+  const RunTrace trace = TraceRun(scene);
+  const DifferenceColumn column = FiniteDifferences(scene, trace, RoundingNoise(scene, trace),
+                                                    PathTo(scene, "bodies/box/velocity/x"));
+  for (int k = 0; k < 2; ++k) {
+    EXPECT_EQ(column.plain[k].status, DifferenceStatus::kJudged);
+    EXPECT_DOUBLE_EQ(column.plain[k].step, kPlainSteps[k]);
+    EXPECT_NEAR(column.plain[k].values[0], 0.1, 1e-9);
+  }
+}
+
+TEST(DifferencesTest, AKinkAtTheValueIsToldAndItsContactNamed) {
+  // A box that neither slides nor is pushed sticks; with friction it slides at any speed.
+  Scene scene = SlidingBox("0.3");
+  scene.bodies[0].velocity.x() = 0.3 * 9.81 * 0.01;  // stops exactly at the end of its first step
+  scene.simulation.duration = scene.simulation.dt;
+  const RunTrace trace = TraceRun(scene);
+  const DifferenceColumn column = FiniteDifferences(scene, trace, RoundingNoise(scene, trace),
+                                                    PathTo(scene, "bodies/box/velocity/x"));
+  EXPECT_EQ(column.status, DifferenceStatus::kChoicesDiffer);
+  EXPECT_NE(column.where.find("contact of box and floor"), std::string::npos) << column.where;
+  EXPECT_EQ(column.plain[0].status, DifferenceStatus::kChoicesDiffer);
+  EXPECT_EQ(column.plain[0].values.size(), 6);
+}
+
+TEST(DifferencesTest, ATwistThatGapsSetIsAsUncertainAsThey) {
+  const Scene scene = SlidingBox("0.3");
+  const RunTrace trace = TraceRun(scene);
+  const VectorX<double> noise = RoundingNoise(scene, trace);
+  // ε x / h, x about 0.1 m and h = 0.01 s.
+  EXPECT_GE(noise[4], 2.2e-16 * 0.1 / 0.01);
+  EXPECT_LT(noise[0], noise[4]);
+}
+
+}  // namespace
+}  // namespace tangible

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/verification/support/trace.h"
+
+#include <gtest/gtest.h>
+
+#include "sliding_box.h"
+
+namespace tangible {
+namespace {
+
+TEST(TraceTest, ATraceCountsTheRunsChoices) {
+  const RunTrace trace = TraceRun(SlidingBox("0.3"));
+  ASSERT_TRUE(trace.done) << trace.message;
+  ASSERT_EQ(trace.steps.size(), 10u);
+  ASSERT_EQ(trace.values.size(), 6);
+  EXPECT_EQ(trace.closed, 20);  // two corners a step
+  EXPECT_EQ(trace.sliding, 20);
+  EXPECT_EQ(trace.sticking + trace.impacts + trace.limits + trace.recoveries, 0);
+  // Euler's sum of 10 steps of 0.01 s at 1 − 0.3 · 9.81 t.
+  EXPECT_NEAR(trace.values[3], 1.0 - 0.3 * 9.81 * 0.1, 1e-12);
+}
+
+TEST(TraceTest, RunsOfOtherModesAreOtherChoices) {
+  const RunTrace slides = TraceRun(SlidingBox("0.3"));
+  const RunTrace slower = TraceRun(SlidingBox("0.4"));
+  const RunTrace stops = TraceRun(SlidingBox("2.5"));
+  const RunTrace smooth = TraceRun(SlidingBox("0"));
+  EXPECT_TRUE(SameChoices(slides, slower, FrictionAtZero::kDistinct));
+  EXPECT_GT(stops.sticking, 0);
+  EXPECT_FALSE(SameChoices(slides, stops, FrictionAtZero::kDistinct));
+  EXPECT_FALSE(SameChoices(slides, smooth, FrictionAtZero::kDistinct));
+  EXPECT_TRUE(SameChoices(slides, smooth, FrictionAtZero::kMaySlide));
+  EXPECT_FALSE(SameChoices(stops, smooth, FrictionAtZero::kMaySlide));
+}
+
+TEST(TraceTest, TheFirstDifferenceNamesStepContactAndModes) {
+  const RunTrace slides = TraceRun(SlidingBox("0.3"));
+  const RunTrace smooth = TraceRun(SlidingBox("0"));
+  const std::string text = FirstDifference(slides, smooth, FrictionAtZero::kDistinct);
+  EXPECT_NE(text.find("contact of box and floor sliding_right"), std::string::npos) << text;
+  EXPECT_NE(text.find("became contact of box and floor closed"), std::string::npos) << text;
+  EXPECT_EQ(text.rfind("step 0: ", 0), 0u) << text;
+  EXPECT_EQ(FirstDifference(slides, slides, FrictionAtZero::kDistinct), "");
+}
+
+}  // namespace
+}  // namespace tangible

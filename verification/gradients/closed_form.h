@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// Derivatives that are known in closed form, as one more opinion beside the computed ones.
+//
+// Who knows such scenes registers a function; tangible-verify asks each in turn and compares with
+// the first that knows the scene. Without any the column is left out.
+
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tangible/scene/parameter.h"
+
+namespace tangible {
+
+/// The Jacobian of a scene's final state in closed form.
+struct ClosedFormJacobian {
+  /// Outputs (simulation/gradient.h) x parameters, SI units; NaN where it is not known.
+  MatrixX<double> jacobian;
+  /// What the computed derivative may be off by, relative: 1e-9 for the derivative of the discrete
+  /// map, more for that of the motion in continuous time.
+  double tolerance = 1e-9;
+};
+
+/// Nothing for a scene that it does not know.
+using ClosedForm = std::function<std::optional<ClosedFormJacobian>(
+    const Scene& scene, const std::vector<ParameterPath>& parameters)>;
+
+/// Adds a closed form under a name, or replaces the one of that name. Not while scenes are checked.
+void RegisterClosedForm(const std::string& name, ClosedForm form);
+/// Removes it; nothing where there is none.
+void RemoveClosedForm(const std::string& name);
+
+/// What the first registered function that knows the scene says, in the order of registration.
+std::optional<ClosedFormJacobian> FindClosedForm(const Scene& scene,
+                                                 const std::vector<ParameterPath>& parameters);
+
+}  // namespace tangible

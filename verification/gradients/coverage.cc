@@ -1,0 +1,164 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/verification/gradients/coverage.h"
+
+#include <utility>
+
+#include "tangible/scene/scene_names.h"
+#include "tangible/simulation/step.h"
+
+namespace tangible {
+namespace {
+
+std::string PairName(ShapeType a, ShapeType b) {
+  if (b < a) {
+    std::swap(a, b);
+  }
+  return "contact " + NameOf(a, kShapeTypeNames) + ", " + NameOf(b, kShapeTypeNames);
+}
+
+void CoverContacts(const Scene& scene, const RunTrace& run, Coverage* coverage) {
+  for (const std::vector<ContactTrace>& step : run.steps) {
+    for (const ContactTrace& trace : step) {
+      const ActiveContact& c = trace.contact;
+      if (c.joint >= 0) {
+        (*coverage)["limit of a " + NameOf(scene.joints[c.joint].type, kJointTypeNames)] = 1;
+      } else {
+        (*coverage)[PairName(scene.bodies[c.a].shape.type, scene.bodies[c.b].shape.type)] = 1;
+      }
+    }
+  }
+  const std::pair<const char*, int> regimes[] = {{"friction sliding", run.sliding},
+                                                 {"friction sticking", run.sticking},
+                                                 {"impact", run.impacts},
+                                                 {"recovery from penetration", run.recoveries},
+                                                 {"kink within 1e-7", run.degenerate}};
+  for (const auto& [name, count] : regimes) {
+    if (count > 0) {
+      (*coverage)[name] = 1;
+    }
+  }
+}
+
+void CoverForces(const Scene& scene, Coverage* coverage) {
+  const auto cover = [&](bool has, const char* what) {
+    if (has) {
+      (*coverage)[what] = 1;
+    }
+  };
+  for (const BasicForce<double>& force : scene.forces) {
+    cover(!force.force_signal, "force");
+    cover(force.torque != 0.0, "torque");
+    cover(force.start.has_value(), "start of a force's window");
+    cover(force.end.has_value(), "end of a force's window");
+    cover(force.force_signal.has_value(), "force from a series");
+    cover(force.torque_signal.has_value(), "torque from a series");
+  }
+  for (const BasicJoint<double>& joint : scene.joints) {
+    cover(joint.effort != 0.0, "effort");
+    cover(joint.effort_signal.has_value(), "effort from a series");
+    cover(joint.damping > 0.0, "damping of a joint");
+  }
+  cover(!scene.springs.empty(), "spring");
+  cover(scene.gravity.isZero(), "no gravity");
+}
+
+}  // namespace
+
+Coverage CoverageOf(const Scene& scene, const RunTrace& run) {
+  Coverage coverage;
+  int moving = 0;
+  for (const BasicBody<double>& body : scene.bodies) {
+    moving += body.motion == Motion::kMoving ? 1 : 0;
+    if (body.motion == Motion::kKinematic) {
+      coverage["kinematic body"] = 1;
+    }
+    if (body.linear_damping > 0.0 || body.angular_damping > 0.0) {
+      coverage["damping of a body"] = 1;
+    }
+  }
+  coverage["bodies " + std::to_string(moving)] = 1;
+  const SimulationSettings& settings = scene.simulation;
+  const long steps = NumSteps(settings);
+  coverage[steps <= 2 ? "steps 1 to 2" : steps <= 40 ? "steps 3 to 40" : "steps 41 to 200"] = 1;
+  coverage["joint correction " + NameOf(settings.joint_correction, kJointCorrectionNames)] = 1;
+  coverage["mixing of friction " + NameOf(settings.friction_mixing, kMixingNames)] = 1;
+  coverage["mixing of restitution " + NameOf(settings.restitution_mixing, kMixingNames)] = 1;
+  for (const BasicJoint<double>& joint : scene.joints) {
+    coverage["joint " + NameOf(joint.type, kJointTypeNames)] = 1;
+  }
+  if (!scene.pairs.empty()) {
+    coverage["coefficients of a pair"] = 1;
+  }
+  CoverContacts(scene, run, &coverage);
+  CoverForces(scene, &coverage);
+  return coverage;
+}
+
+void Add(const Coverage& one, Coverage* sum) {
+  for (const auto& [what, count] : one) {
+    (*sum)[what] += count;
+  }
+}
+
+std::vector<std::string> ExpectedCoverage() {
+  std::vector<std::string> expected;
+  for (const auto& [name_a, a] : kShapeTypeNames) {
+    for (const auto& [name_b, b] : kShapeTypeNames) {
+      // Of two half-planes neither moves.
+      if (a <= b && !(a == ShapeType::kHalfPlane && b == ShapeType::kHalfPlane)) {
+        expected.push_back(PairName(a, b));
+      }
+    }
+  }
+  for (const auto& [name, type] : kJointTypeNames) {
+    expected.push_back("joint " + std::string(name));
+  }
+  for (const auto& [name, mixing] : kMixingNames) {
+    expected.push_back("mixing of friction " + std::string(name));
+    expected.push_back("mixing of restitution " + std::string(name));
+  }
+  for (const auto& [name, correction] : kJointCorrectionNames) {
+    expected.push_back("joint correction " + std::string(name));
+  }
+  for (int bodies = 1; bodies <= 8; ++bodies) {
+    expected.push_back("bodies " + std::to_string(bodies));
+  }
+  for (const char* what : {"limit of a revolute",
+                           "limit of a prismatic",
+                           "friction sliding",
+                           "friction sticking",
+                           "impact",
+                           "recovery from penetration",
+                           "force",
+                           "torque",
+                           "start of a force's window",
+                           "end of a force's window",
+                           "force from a series",
+                           "torque from a series",
+                           "effort",
+                           "effort from a series",
+                           "damping of a joint",
+                           "damping of a body",
+                           "spring",
+                           "no gravity",
+                           "coefficients of a pair",
+                           "kinematic body",
+                           "steps 1 to 2",
+                           "steps 3 to 40",
+                           "steps 41 to 200"}) {
+    expected.emplace_back(what);
+  }
+  return expected;
+}
+
+std::vector<std::string> MissingCoverage(const Coverage& coverage) {
+  std::vector<std::string> missing;
+  for (std::string& what : ExpectedCoverage()) {
+    if (coverage.count(what) == 0) {
+      missing.push_back(std::move(what));
+    }
+  }
+  return missing;
+}
+
+}  // namespace tangible

@@ -1,0 +1,147 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/verification/gradients/methods.h"
+
+#include <limits>
+#include <utility>
+
+#include "tangible/verification/gradients/closed_form.h"
+
+namespace tangible {
+namespace {
+
+constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+const char* const kTrustworthy = "trustworthy";
+
+class MethodRun {
+ public:
+  MethodRun(const Scene& scene, const std::vector<ParameterPath>& parameters)
+      : scene_(scene), parameters_(parameters) {}
+
+  MethodJacobians Run() {
+    // The certificate comes with the first method, before anything is compared.
+    const GradientResult tangent = Differentiate(parameters_, GradientMethod::kTangent,
+                                                 Factorisations::kKeep, CertificatePass::kRun);
+    r_.outputs = tangent.outputs;
+    if (!tangent.done) {
+      r_.message = tangent.message;
+      return std::move(r_);
+    }
+    r_.done = true;
+    r_.certificate = tangent.certificate;
+    NameKinks();
+    r_.jacobian[kByTangent] = tangent.jacobian;
+    r_.trace = TraceRun(scene_);
+    r_.contributions = ContributionsOf(scene_, parameters_);
+    Add(kByAdjoint, GradientMethod::kAdjoint, Factorisations::kKeep);
+    Add(kByAdjointRecomputed, GradientMethod::kAdjoint, Factorisations::kRecompute);
+    Add(kByImplicitJets, GradientMethod::kJetImplicit, Factorisations::kKeep);
+    Add(kByUnrolledJets, GradientMethod::kJet, Factorisations::kKeep);
+    AddDifferences();
+    AddClosedForm();
+    return std::move(r_);
+  }
+
+ private:
+  GradientResult Differentiate(const std::vector<ParameterPath>& parameters, GradientMethod method,
+                               Factorisations factorisations, CertificatePass certificate) const {
+    GradientOptions options;
+    options.method = method;
+    options.factorisations = factorisations;
+    options.certificate = certificate;
+    return FinalStateJacobian(scene_, parameters, options);
+  }
+
+  // Some reasons (a tie of the mixing rule, friction 0) concern some parameters only.
+  void NameKinks() {
+    r_.named.resize(parameters_.size());
+    if (r_.certificate.verdict == kTrustworthy) {
+      return;
+    }
+    for (size_t k = 0; k < parameters_.size(); ++k) {
+      const GradientResult one = Differentiate({parameters_[k]}, GradientMethod::kTangent,
+                                               Factorisations::kKeep, CertificatePass::kRun);
+      r_.named[k] = one.certificate.verdict == kTrustworthy ? "" : one.certificate.verdict;
+    }
+  }
+
+  void Add(Method place, GradientMethod method, Factorisations factorisations) {
+    const GradientResult result =
+        Differentiate(parameters_, method, factorisations, CertificatePass::kSkip);
+    if (!result.done) {
+      r_.missing[place] = result.message;
+      return;
+    }
+    r_.jacobian[place] = result.jacobian;
+    if (method == GradientMethod::kJet) {
+      r_.unrolled_fallbacks = result.fallbacks;
+    }
+  }
+
+  void AddDifferences() {
+    const VectorX<double> noise = RoundingNoise(scene_, r_.trace);
+    const auto rows = static_cast<Eigen::Index>(r_.outputs.size());
+    const auto columns = static_cast<Eigen::Index>(parameters_.size());
+    for (const Method method : {kByCoarseDifference, kByFineDifference, kByRidders}) {
+      r_.jacobian[method].setConstant(rows, columns, kUnknown);
+    }
+    for (Eigen::Index k = 0; k < columns; ++k) {
+      DifferenceColumn column = FiniteDifferences(scene_, r_.trace, noise, parameters_[k]);
+      if (column.status == DifferenceStatus::kJudged) {
+        r_.jacobian[kByRidders].col(k) = column.values;
+      }
+      for (int i = 0; i < 2; ++i) {
+        if (column.plain[i].status == DifferenceStatus::kJudged) {
+          r_.jacobian[kByCoarseDifference + i].col(k) = column.plain[i].values;
+        }
+      }
+      r_.differences.push_back(std::move(column));
+    }
+  }
+
+  void AddClosedForm() {
+    std::optional<ClosedFormJacobian> known = FindClosedForm(scene_, parameters_);
+    if (known && known->jacobian.rows() == r_.contributions.sum.rows() &&
+        known->jacobian.cols() == r_.contributions.sum.cols()) {
+      r_.jacobian[kByClosedForm] = std::move(known->jacobian);
+      r_.closed_form_tolerance = known->tolerance;
+    }
+  }
+
+  const Scene& scene_;
+  const std::vector<ParameterPath>& parameters_;
+  MethodJacobians r_;
+};
+
+}  // namespace
+
+const char* NameOf(Method method) {
+  switch (method) {
+    case kByTangent:
+      return "tangent";
+    case kByAdjoint:
+      return "adjoint";
+    case kByAdjointRecomputed:
+      return "adjoint, recomputed";
+    case kByImplicitJets:
+      return "implicit Jets";
+    case kByUnrolledJets:
+      return "unrolled Jets";
+    case kByCoarseDifference:
+      return "difference 1e-4";
+    case kByFineDifference:
+      return "difference 6e-6";
+    case kByRidders:
+      return "Ridders";
+    case kByClosedForm:
+      return "closed form";
+    case kNumMethods:
+      break;
+  }
+  return "";
+}
+
+MethodJacobians RunMethods(const Scene& scene, const std::vector<ParameterPath>& parameters) {
+  return MethodRun(scene, parameters).Run();
+}
+
+}  // namespace tangible

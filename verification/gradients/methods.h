@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// The Jacobian of a scene's final state by every method there is, and what is needed to judge them:
+// the certificate (computed before any of them is compared), the discrete choices of the run, the
+// sum of contributions to each entry, the error estimate of the differences.
+
+#include <string>
+#include <vector>
+
+#include "tangible/simulation/gradient.h"
+#include "tangible/verification/support/compare.h"
+#include "tangible/verification/support/differences.h"
+
+namespace tangible {
+
+enum Method {
+  kByTangent,
+  kByAdjoint,
+  kByAdjointRecomputed,  ///< factorisations computed again, not kept
+  kByImplicitJets,
+  kByUnrolledJets,
+  kByCoarseDifference,  ///< central, of kPlainSteps[0] of the parameter's scale
+  kByFineDifference,    ///< central, of kPlainSteps[1]
+  kByRidders,           ///< extrapolated, with an error estimate of its own
+  kByClosedForm,
+  kNumMethods
+};
+
+/// "tangent", "adjoint", ...
+const char* NameOf(Method method);
+
+struct MethodJacobians {
+  bool done = false;    ///< the run at the scene's own values
+  std::string message;  ///< why not
+  std::vector<std::string> outputs;
+  /// A parameter: what the certificate says of it; empty where it says "trustworthy".
+  std::vector<std::string> named;
+  Certificate certificate;  ///< with respect to all parameters
+  RunTrace trace;
+  Contributions contributions;            ///< support/compare.h
+  MatrixX<double> jacobian[kNumMethods];  ///< outputs x parameters; empty where it was not run
+  std::string missing[kNumMethods];       ///< why it was not run
+  long unrolled_fallbacks = 0;            ///< steps in which the unrolled way took the implicit one
+  std::vector<DifferenceColumn> differences;  ///< a parameter
+  double closed_form_tolerance = 0.0;
+};
+
+/// Runs all of them.
+MethodJacobians RunMethods(const Scene& scene, const std::vector<ParameterPath>& parameters);
+
+}  // namespace tangible

@@ -1,0 +1,334 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/verification/gradients/scene_check.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <limits>
+#include <map>
+#include <utility>
+
+#include "tangible/simulation/step.h"
+
+namespace tangible {
+namespace {
+
+constexpr double kRounding = 1e-13;  // of the contributions
+constexpr double kShareOfColumn = 0.1;
+constexpr double kInteriorPointEnd = 1e-14;
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+
+std::string Short(double x) {
+  char text[32];
+  std::snprintf(text, sizeof(text), "%.9g", x);
+  return text;
+}
+
+// NaN is no error.
+double Larger(double a, double b) { return std::isnan(a) || b > a ? b : a; }
+
+class Judge {
+ public:
+  Judge(const MethodJacobians& run, const std::vector<ParameterPath>& parameters, SceneCheck* check)
+      : run_(run), parameters_(parameters), check_(*check) {}
+
+  void JudgeAll() {
+    std::map<std::string, KindRow> rows;
+    for (int p = 0; p < static_cast<int>(parameters_.size()); ++p) {
+      KindRow row;
+      row.kind = KindOf(parameters_[p].path);
+      row.parameters = 1;
+      row.entries = static_cast<long>(run_.outputs.size());
+      if ((run_.jacobian[kByTangent].col(p).array() == 0.0).all()) {
+        row.zero_columns.push_back(parameters_[p].path);
+      }
+      CountCoarse(p, &row);
+      for (int pair = 0; pair < kNumPairs; ++pair) {
+        JudgeColumn(p, pair, &row);
+      }
+      auto [found, is_new] = rows.try_emplace(row.kind, row);
+      if (!is_new) {
+        found->second.Add(row);
+      }
+    }
+    check_.total.kind = "all";
+    for (auto& [kind, row] : rows) {
+      check_.total.Add(row);
+      check_.rows.push_back(std::move(row));
+    }
+  }
+
+ private:
+  void CountCoarse(int p, KindRow* row) const {
+    if (run_.differences[p].status != DifferenceStatus::kJudged) {
+      return;
+    }
+    const double largest = run_.jacobian[kByTangent].col(p).cwiseAbs().maxCoeff();
+    for (Eigen::Index o = 0; o < run_.jacobian[kByRidders].rows(); ++o) {
+      row->coarse +=
+          IsCoarse(run_.jacobian[kByRidders](o, p), run_.differences[p].errors[o], largest) ? 1 : 0;
+    }
+  }
+
+  void JudgeColumn(int p, int pair, KindRow* row) {
+    const MethodPair& methods = kMethodPairs[pair];
+    if (run_.jacobian[methods.a].size() == 0 || run_.jacobian[methods.b].size() == 0) {
+      JudgeMissing(p, pair, row);
+      return;
+    }
+    if (methods.a == kByRidders && run_.differences[p].status != DifferenceStatus::kJudged) {
+      const bool failed = run_.differences[p].status == DifferenceStatus::kRunFailed;
+      Except(p, pair, row->entries, kInfinity,
+             (failed ? "a changed run fails: " : "choices differ at p +- h: ") +
+                 run_.differences[p].where,
+             row);
+      return;
+    }
+    CheckedException exception;
+    for (int o = 0; o < static_cast<int>(run_.outputs.size()); ++o) {
+      const CheckedEntry entry = Entry(o, p, pair);
+      if (!methods.bounded && std::isnan(entry.error)) {
+        continue;  // no quotient of this step, as choices differ
+      }
+      if (methods.a == kByClosedForm && std::isnan(run_.jacobian[kByClosedForm](o, p))) {
+        continue;
+      }
+      if (!methods.bounded || entry.ratio <= 1.0) {
+        row->error[pair] = Larger(row->error[pair], entry.error);
+        AddWorst(entry);
+        continue;
+      }
+      ++exception.entries;
+      if (entry.error > exception.error || exception.entries == 1) {
+        exception.error = entry.error;
+        exception.what =
+            entry.output + ": " + Short(entry.values[methods.a]) + " against " +
+            Short(entry.values[methods.b]) + ", contributions " + Short(entry.contributions) +
+            (methods.a == kByRidders ? ", estimated error " + Short(entry.ridders_error) : "");
+      }
+      if (Reason(p, pair).empty()) {
+        row->error[pair] = Larger(row->error[pair], entry.error);
+        AddWorst(entry);
+      }
+    }
+    if (exception.entries > 0) {
+      Except(p, pair, exception.entries, exception.error, exception.what, row);
+    }
+  }
+
+  // A width of Jets that is not built is no exception; a run that another solution ended is.
+  void JudgeMissing(int p, int pair, KindRow* row) {
+    const MethodPair& methods = kMethodPairs[pair];
+    const std::string& why = run_.missing[methods.a];
+    if (why.empty() || why.find("no width of Jets") != std::string::npos) {
+      return;
+    }
+    Except(p, pair, row->entries, kInfinity, why, row);
+  }
+
+  double Tolerance(int pair) const {
+    return kMethodPairs[pair].a == kByClosedForm ? run_.closed_form_tolerance
+                                                 : kMethodPairs[pair].tolerance;
+  }
+
+  CheckedEntry Entry(int o, int p, int pair) const {
+    CheckedEntry entry;
+    entry.output = run_.outputs[o];
+    entry.parameter = parameters_[p].path;
+    entry.pair = pair;
+    for (int m = 0; m < kNumMethods; ++m) {
+      entry.values[m] = run_.jacobian[m].size() == 0 ? kUnknown : run_.jacobian[m](o, p);
+    }
+    entry.contributions = std::max(run_.contributions.sum(o, p), kShareOfColumn * ScaleOfColumn(p));
+    entry.ridders_error = run_.differences[p].status == DifferenceStatus::kJudged
+                              ? run_.differences[p].errors[o]
+                              : kUnknown;
+    double estimate = kMethodPairs[pair].a == kByRidders ? entry.ridders_error : 0.0;
+    if (kMethodPairs[pair].a == kByUnrolledJets) {
+      entry.contributions = ScaleOfColumn(p);
+      const double error = InteriorPointError();
+      estimate = error <= Tolerance(pair)
+                     ? error * static_cast<double>(check_.steps) * entry.contributions
+                     : 0.0;
+    }
+    if (!kMethodPairs[pair].bounded) {
+      const double largest = std::max(run_.jacobian[kByTangent].col(p).cwiseAbs().maxCoeff(),
+                                      Tolerance(pair) * ScaleOfColumn(p));
+      entry.error =
+          std::abs(entry.values[kMethodPairs[pair].a] - entry.values[kMethodPairs[pair].b]) /
+          largest;
+      return entry;
+    }
+    entry.error = EntryError(entry.values[kMethodPairs[pair].a], entry.values[kMethodPairs[pair].b],
+                             Tolerance(pair), entry.contributions, estimate);
+    entry.ratio = entry.error / Tolerance(pair);
+    return entry;
+  }
+
+  // 10 κ / margin²: what is left of the influence of rows that are not active, relative.
+  double InteriorPointError() const {
+    const double margin = run_.certificate.margin_min;
+    return 10.0 * kInteriorPointEnd / (margin * margin);
+  }
+
+  // The largest derivative of the column at any step, and the outputs over the parameter's size.
+  double ScaleOfColumn(int p) const {
+    const double value = std::abs(parameters_[p].value);
+    const double size = value > 0.0 ? value : std::min(parameters_[p].scale, 1.0);
+    return std::max(run_.contributions.column[p], run_.trace.values.cwiseAbs().maxCoeff() / size);
+  }
+
+  // What the certificate had said that explains an exception; empty if nothing does.
+  std::string Reason(int p, int pair) const {
+    if (!run_.named[p].empty()) {
+      return run_.named[p];
+    }
+    if (kMethodPairs[pair].a == kByRidders && run_.certificate.redundant_rows > 0 &&
+        run_.differences[p].status == DifferenceStatus::kChoicesDiffer) {
+      return std::to_string(run_.certificate.redundant_rows) +
+             " redundant rows, whose modes are not unique";
+    }
+    if (kMethodPairs[pair].a == kByUnrolledJets && InteriorPointError() > Tolerance(pair)) {
+      return "margin " + Short(run_.certificate.margin_min) + " at " +
+             run_.certificate.margin_where;
+    }
+    return "";
+  }
+
+  void Except(int p, int pair, long entries, double error, const std::string& what, KindRow* row) {
+    CheckedException exception;
+    exception.parameter = parameters_[p].path;
+    exception.pair = pair;
+    exception.entries = entries;
+    exception.error = error;
+    exception.what = what;
+    exception.named = Reason(p, pair);
+    exception.other_solution =
+        exception.named.empty() && what.find("different branch") != std::string::npos;
+    (exception.unexplained()    ? row->unexplained
+     : exception.other_solution ? row->other_solution
+                                : row->named) += entries;
+    check_.exceptions.push_back(std::move(exception));
+  }
+
+  void AddWorst(const CheckedEntry& entry) {
+    if (!kMethodPairs[entry.pair].bounded) {
+      return;
+    }
+    std::vector<CheckedEntry>& worst = check_.worst;
+    const auto place = std::upper_bound(
+        worst.begin(), worst.end(), entry,
+        [](const CheckedEntry& x, const CheckedEntry& y) { return x.ratio > y.ratio; });
+    if (place - worst.begin() < kMostWorst) {
+      worst.insert(place, entry);
+      worst.resize(std::min<size_t>(worst.size(), kMostWorst));
+    }
+  }
+
+  const MethodJacobians& run_;
+  const std::vector<ParameterPath>& parameters_;
+  SceneCheck& check_;
+};
+
+void Keep(const std::vector<ParameterPath>& parameters, MethodJacobians* run, SceneCheck* check) {
+  check->outputs = run->outputs;
+  const auto rows = static_cast<Eigen::Index>(run->outputs.size());
+  check->ridders_error.setConstant(rows, static_cast<Eigen::Index>(parameters.size()), kUnknown);
+  for (size_t p = 0; p < parameters.size(); ++p) {
+    check->parameter_paths.push_back(parameters[p].path);
+    if (run->differences[p].status == DifferenceStatus::kJudged) {
+      check->ridders_error.col(static_cast<Eigen::Index>(p)) = run->differences[p].errors;
+    }
+  }
+  for (int m = 0; m < kNumMethods; ++m) {
+    check->jacobian[m] = std::move(run->jacobian[m]);
+  }
+  check->contributions = std::move(run->contributions.sum);
+}
+
+}  // namespace
+
+KindRow::KindRow() { std::fill(std::begin(error), std::end(error), kUnknown); }
+
+void KindRow::Add(const KindRow& other) {
+  parameters += other.parameters;
+  entries += other.entries;
+  for (int pair = 0; pair < kNumPairs; ++pair) {
+    if (!std::isnan(other.error[pair])) {
+      error[pair] = Larger(error[pair], other.error[pair]);
+    }
+  }
+  coarse += other.coarse;
+  named += other.named;
+  other_solution += other.other_solution;
+  unexplained += other.unexplained;
+  zero_columns.insert(zero_columns.end(), other.zero_columns.begin(), other.zero_columns.end());
+}
+
+std::string KindOf(const std::string& path) {
+  std::string kind;
+  size_t start = 0;
+  for (int segment = 0; start <= path.size(); ++segment) {
+    const size_t end = std::min(path.find('/', start), path.size());
+    const std::string word = path.substr(start, end - start);
+    start = end + 1;
+    const bool is_index = word.find_first_not_of("0123456789") == std::string::npos;
+    const bool is_name = segment == 1 && path.rfind("gravity/", 0) != 0;
+    if (!is_index && !is_name) {
+      kind += (kind.empty() ? "" : "/") + word;
+    }
+  }
+  return kind;
+}
+
+double EntryError(double a, double b, double tolerance, double contributions, double estimate) {
+  const double off = std::abs(a - b);
+  if (off == 0.0) {
+    return 0.0;
+  }
+  const double allowed = std::max(tolerance * std::abs(b), estimate) + kRounding * contributions;
+  const double error = tolerance * off / allowed;
+  return std::isnan(error) ? kInfinity : error;
+}
+
+bool IsCoarse(double value, double estimate, double largest_of_column) {
+  constexpr double kResolved = 1e-3;
+  return largest_of_column > 0.0 &&
+         estimate > kResolved * std::max(std::abs(value), kResolved * largest_of_column);
+}
+
+SceneCheck CheckScene(const Scene& scene, const std::vector<ParameterPath>& parameters,
+                      KeepJacobians keep) {
+  SceneCheck check;
+  check.name = scene.path.empty() ? scene.name : scene.path;
+  check.stepping = scene.simulation.stepping;
+  check.joints = static_cast<int>(scene.joints.size());
+  check.bodies = static_cast<int>(
+      std::count_if(scene.bodies.begin(), scene.bodies.end(),
+                    [](const auto& body) { return body.motion == Motion::kMoving; }));
+  check.parameters = static_cast<int>(parameters.size());
+  check.steps = NumSteps(scene.simulation);
+  MethodJacobians run = RunMethods(scene, parameters);
+  check.done = run.done;
+  check.message = run.message;
+  if (!run.done) {
+    return check;
+  }
+  check.certificate = run.certificate;
+  check.unrolled_fallbacks = run.unrolled_fallbacks;
+  std::copy(std::begin(run.missing), std::end(run.missing), std::begin(check.missing));
+  check.closed = run.trace.closed;
+  check.sliding = run.trace.sliding;
+  check.sticking = run.trace.sticking;
+  check.limits = run.trace.limits;
+  check.impacts = run.trace.impacts;
+  check.recoveries = run.trace.recoveries;
+  Judge(run, parameters, &check).JudgeAll();
+  if (keep == KeepJacobians::kYes) {
+    Keep(parameters, &run, &check);
+  }
+  return check;
+}
+
+}  // namespace tangible

@@ -1,0 +1,200 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// tangible-verify: derivatives of scenes by every method, compared.
+
+#include <gflags/gflags.h>
+
+#include <algorithm>
+#include <iostream>
+#include <string>
+#include <vector>
+
+#include "tangible/app/program.h"
+#include "tangible/app/progress.h"
+#include "tangible/scene/scene_json.h"
+#include "tangible/scene/scene_names.h"
+#include "tangible/verification/errata/errata.h"
+#include "tangible/verification/gradients/verify_html.h"
+#include "tangible/verification/gradients/verify_json.h"
+#include "tangible/verification/gradients/verify_text.h"
+#include "tangible/verification/support/provenance.h"
+#include "tangible/verification/support/random_scene.h"
+
+DEFINE_string(parameters, "",
+              "paths of the parameters of the given scenes, separated by commas; empty: all");
+DEFINE_int32(random, -1, "number of random scenes; -1: 100 if no scene is given, else 0");
+DEFINE_int32(seed, 1, "of the first random scene; the next have the next seeds");
+DEFINE_string(stepping, "", "of random scenes: fixed, event or both; empty: all that there is");
+DEFINE_int32(threads, 1, "how many scenes are checked at the same time");
+DEFINE_bool(jacobians, false, "write every method's whole Jacobian to --out");
+DEFINE_bool(errata, false, "instead: the mistakes of the method's published summary as printed");
+DEFINE_string(out, "", "file of all figures (JSON)");
+DEFINE_string(report, "", "file of a report for people (HTML)");
+
+namespace tangible {
+namespace {
+
+constexpr int kMostThreads = 256;
+constexpr int kMostRandom = 1000000;
+
+std::vector<std::string> SplitAtCommas(const std::string& text) {
+  std::vector<std::string> parts(1);
+  for (const char c : text) {
+    if (c == ',') {
+      parts.emplace_back();
+    } else {
+      parts.back() += c;
+    }
+  }
+  return parts;
+}
+
+// The steppings that --stepping asks for; empty with a line if the engine lacks one.
+std::vector<Stepping> Steppings(std::string* error) {
+  std::vector<Stepping> available = AvailableSteppings();
+  if (FLAGS_stepping.empty()) {
+    return available;
+  }
+  std::vector<Stepping> wanted;
+  for (const auto& [name, stepping] : kSteppingNames) {
+    if (FLAGS_stepping != "both" && FLAGS_stepping != name) {
+      continue;
+    }
+    if (std::find(available.begin(), available.end(), stepping) == available.end()) {
+      *error = std::string("--stepping: ") + name + " stepping is not available";
+      return {};
+    }
+    wanted.push_back(stepping);
+  }
+  if (wanted.empty()) {
+    *error = "--stepping: expected fixed, event or both, got '" + FLAGS_stepping + "'";
+  }
+  return wanted;
+}
+
+// Empty, or one line about a flag's value.
+std::string CheckFlags(const std::vector<std::string>& files) {
+  if (FLAGS_random < -1 || FLAGS_random > kMostRandom) {
+    return "--random: expected a number from 0 to " + std::to_string(kMostRandom) + ", got " +
+           std::to_string(FLAGS_random);
+  }
+  if (FLAGS_seed < 0) {
+    return "--seed: expected a number >= 0, got " + std::to_string(FLAGS_seed);
+  }
+  if (FLAGS_threads < 1 || FLAGS_threads > kMostThreads) {
+    return "--threads: expected a number from 1 to " + std::to_string(kMostThreads) + ", got " +
+           std::to_string(FLAGS_threads);
+  }
+  if (!FLAGS_parameters.empty() && files.empty()) {
+    return "--parameters: of given scenes; random scenes choose theirs by their seed";
+  }
+  if (FLAGS_random == -1) {
+    FLAGS_random = files.empty() ? 100 : 0;
+  }
+  if (FLAGS_random == 0 && files.empty() && !FLAGS_errata) {
+    return "expected scenes or --random > 0, got neither";
+  }
+  if (FLAGS_errata && (!files.empty() || !FLAGS_out.empty() || !FLAGS_report.empty())) {
+    return "--errata: takes no scenes and writes no files";
+  }
+  return "";
+}
+
+// Empty, or one line.
+std::string AddFile(const std::string& file, std::vector<VerifyJob>* jobs) {
+  VerifyJob job;
+  std::string error;
+  if (!LoadScene(file, &job.scene, &error)) return error;
+  job.stepping = job.scene.simulation.stepping;
+  if (job.stepping != Stepping::kFixed) {
+    return file +
+           ": /simulation/stepping: expected \"fixed\" (the only one verified here), got \"" +
+           NameOf(job.stepping, kSteppingNames) + "\"";
+  }
+  if (FLAGS_parameters.empty()) {
+    job.parameters = AllParameters(job.scene);
+  } else {
+    for (const std::string& path : SplitAtCommas(FLAGS_parameters)) {
+      if (!ResolveParameter(job.scene, path, &job.parameters.emplace_back(), &error)) {
+        return error.insert(0, ": ").insert(0, file);
+      }
+    }
+  }
+  jobs->push_back(std::move(job));
+  return "";
+}
+
+std::string Write(const VerifyResult& result, const std::string& verdict) {
+  if (!FLAGS_out.empty()) {
+    OrderedJson json = {{"provenance", OrderedJson::object()}, {"verdict", verdict}};
+    for (const auto& [what, value] : Provenance()) {
+      json["provenance"][what] = value;
+    }
+    json.update(ToJson(result));
+    std::string error = WriteResult(FLAGS_out, JsonText(json));
+    if (!error.empty()) return error;
+  }
+  if (!FLAGS_report.empty()) {
+    return WriteResult(FLAGS_report, VerifyReport(result, ProvenanceLine(), verdict));
+  }
+  return "";
+}
+
+int RunErrata() {
+  const ErrataTable table = ComputeErrata();
+  std::cout << ErrataText(table);
+  const std::string broken = BrokenErrata(table);
+  return broken.empty() ? kExitDone : ReportError(broken);
+}
+
+int Run(const std::vector<std::string>& files, const std::vector<Stepping>& steppings) {
+  std::vector<VerifyJob> jobs;
+  for (const std::string& file : files) {
+    const std::string error = AddFile(file, &jobs);
+    if (!error.empty()) return ReportError(error);
+  }
+  for (VerifyJob& job : RandomJobs(static_cast<unsigned>(FLAGS_seed), FLAGS_random, steppings)) {
+    jobs.push_back(std::move(job));
+  }
+  std::cout << ProvenanceLine() << "\n";
+  if (FLAGS_random > 0) {
+    std::cout << FLAGS_random << " random scenes from seed " << FLAGS_seed << "\n";
+  }
+  std::cout << std::endl;
+  Progress progress("scenes", static_cast<long>(jobs.size()));
+  const VerifyResult result = RunVerification(
+      jobs, FLAGS_threads, FLAGS_jacobians ? KeepJacobians::kYes : KeepJacobians::kNo,
+      [&](long done) { progress.Show(done); });
+  const std::string verdict = BrokenBound(jobs, result);
+  std::cout << TableText(result) << "\n" << SummaryText(result, FLAGS_random > 0);
+  const std::string error = Write(result, verdict);
+  if (!error.empty()) return ReportError(error);
+  return verdict.empty() ? kExitDone : ReportError("tangible-verify: " + verdict);
+}
+
+int Main(int argc, char** argv) {
+  const CommandLine line = ParseCommandLine(
+      argc, argv,
+      {.name = "tangible-verify",
+       .synopsis = "[SCENE.json ...] [--parameters=P1,P2] [--random=N --seed=S] [--threads=T] "
+                   "[--out=R.json] [--report=R.html]",
+       .description =
+           "Differentiates the final state of scenes by adjoint, tangent, Jets and differences, "
+           "and compares them\nentry by entry. Without scenes: 100 random ones. Exit status 1 "
+           "where a bound does not hold.",
+       .version = TANGIBLE_VERSION,
+       .source_file = __FILE__,
+       .num_positional = 0,
+       .most_positional = 1000});
+  if (line.exit_status) return *line.exit_status;
+  std::string wrong = CheckFlags(line.positional);
+  std::vector<Stepping> steppings;
+  if (wrong.empty()) steppings = Steppings(&wrong);
+  if (!wrong.empty()) return ReportError("tangible-verify: " + wrong, kExitUsage);
+  return FLAGS_errata ? RunErrata() : Run(line.positional, steppings);
+}
+
+}  // namespace
+}  // namespace tangible
+
+int main(int argc, char** argv) { return tangible::RunMain(&tangible::Main, argc, argv); }

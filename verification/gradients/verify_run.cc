@@ -1,0 +1,198 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/verification/gradients/verify_run.h"
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <map>
+#include <mutex>
+#include <sstream>
+#include <thread>
+#include <utility>
+
+#include "tangible/scene/scene_json.h"
+#include "tangible/scene/scene_names.h"
+#include "tangible/verification/support/random_scene.h"
+
+namespace tangible {
+namespace {
+
+constexpr int kMostRandomParameters = 24;
+
+struct Checked {
+  SceneCheck check;
+  Coverage coverage;
+};
+
+std::string Replay(const VerifyJob& job) {
+  if (job.seed) {
+    return "tangible-verify --random=1 --seed=" + std::to_string(*job.seed) +
+           " --stepping=" + NameOf(job.stepping, kSteppingNames);
+  }
+  return "tangible-verify " + job.scene.path;
+}
+
+Checked Check(const VerifyJob& job, KeepJacobians keep) {
+  Checked checked;
+  const Scene scene = SceneOf(job);
+  const std::vector<ParameterPath> parameters =
+      job.seed ? RandomParameters(scene, *job.seed) : job.parameters;
+  checked.check = CheckScene(scene, parameters, keep);
+  checked.check.replay = Replay(job);
+  if (checked.check.done) {
+    checked.coverage = CoverageOf(scene, TraceRun(scene));
+  }
+  return checked;
+}
+
+void AddWorst(const SceneCheck& check, int scene,
+              std::vector<std::pair<int, CheckedEntry>>* worst) {
+  for (const CheckedEntry& entry : check.worst) {
+    worst->emplace_back(scene, entry);
+  }
+  std::stable_sort(worst->begin(), worst->end(),
+                   [](const auto& x, const auto& y) { return x.second.ratio > y.second.ratio; });
+  if (worst->size() > kMostWorst) {
+    worst->erase(worst->begin() + kMostWorst, worst->end());
+  }
+}
+
+}  // namespace
+
+Scene SceneOf(const VerifyJob& job) {
+  if (!job.seed) {
+    return job.scene;
+  }
+  RandomSceneOptions options;
+  options.stepping = job.stepping;
+  return RandomScene(*job.seed, options);
+}
+
+std::vector<VerifyJob> RandomJobs(unsigned seed, int count,
+                                  const std::vector<Stepping>& steppings) {
+  std::vector<VerifyJob> jobs;
+  for (int i = 0; i < count; ++i) {
+    for (const Stepping stepping : steppings) {
+      VerifyJob job;
+      job.seed = seed + static_cast<unsigned>(i);
+      job.stepping = stepping;
+      jobs.push_back(std::move(job));
+    }
+  }
+  return jobs;
+}
+
+std::vector<ParameterPath> AllParameters(const Scene& scene) {
+  Scene copy = scene;
+  std::vector<ParameterPath> parameters;
+  for (const SceneNumber<double>& number : EnumerateNumbers(&copy)) {
+    std::string error;
+    ParameterPath path;
+    // A number that no path may set (the angle of a joint in a loop) is left out.
+    if (ResolveParameter(scene, number.path, &path, &error)) {
+      parameters.push_back(std::move(path));
+    }
+  }
+  return parameters;
+}
+
+std::vector<ParameterPath> RandomParameters(const Scene& scene, unsigned seed) {
+  std::vector<ParameterPath> chosen = AllParameters(scene);
+  RandomNumbers random(seed);
+  while (static_cast<int>(chosen.size()) > kMostRandomParameters) {
+    chosen.erase(chosen.begin() + random.Integer(0, static_cast<int>(chosen.size()) - 1));
+  }
+  for (const char* several : {"bodies/*/mass", "bodies/*/friction"}) {
+    std::string error;
+    ParameterPath path;
+    if (ResolveParameter(scene, several, &path, &error)) {
+      chosen.push_back(std::move(path));
+    }
+  }
+  return chosen;
+}
+
+VerifyResult RunVerification(const std::vector<VerifyJob>& jobs, int threads, KeepJacobians keep,
+                             const std::function<void(long)>& progress) {
+  std::vector<Checked> checked(jobs.size());
+  std::atomic<size_t> next{0};
+  std::mutex mutex;
+  long done = 0;
+  const auto work = [&] {
+    for (size_t i = next++; i < jobs.size(); i = next++) {
+      checked[i] = Check(jobs[i], keep);
+      const std::lock_guard<std::mutex> lock(mutex);
+      ++done;
+      if (progress) {
+        progress(done);
+      }
+    }
+  };
+  std::vector<std::thread> others;
+  for (int i = 1; i < threads; ++i) {
+    others.emplace_back(work);
+  }
+  work();
+  for (std::thread& other : others) {
+    other.join();
+  }
+  VerifyResult result;
+  result.total.kind = "all";
+  std::map<std::string, KindRow> kinds;
+  for (size_t i = 0; i < checked.size(); ++i) {
+    SceneCheck& check = checked[i].check;
+    Add(checked[i].coverage, &result.coverage);
+    result.not_run += check.done ? 0 : 1;
+    result.total.Add(check.total);
+    for (const KindRow& row : check.rows) {
+      KindRow& sum = kinds[row.kind];
+      sum.kind = row.kind;
+      sum.Add(row);
+      sum.zero_columns.clear();
+    }
+    AddWorst(check, static_cast<int>(i), &result.worst);
+    result.scenes.push_back(std::move(check));
+  }
+  for (auto& [kind, row] : kinds) {
+    result.kinds.push_back(std::move(row));
+  }
+  for (const auto& [scene, entry] : result.worst) {
+    result.worst_scenes[scene] = SceneToJson(SceneOf(jobs[scene]));
+  }
+  result.exceptions_named = result.total.named;
+  result.exceptions_other = result.total.other_solution;
+  result.exceptions_unexplained = result.total.unexplained;
+  return result;
+}
+
+std::string BrokenBound(const std::vector<VerifyJob>& jobs, const VerifyResult& result) {
+  std::ostringstream line;
+  for (const SceneCheck& scene : result.scenes) {
+    for (const CheckedException& exception : scene.exceptions) {
+      if (exception.unexplained()) {
+        line << result.exceptions_unexplained << " unexplained entries; first " << scene.name
+             << ", " << exception.parameter << ", " << kMethodPairs[exception.pair].name << ": "
+             << exception.what << " (" << scene.replay << ")";
+        return line.str();
+      }
+    }
+  }
+  int random_not_run = 0;
+  int random = 0;
+  for (size_t i = 0; i < jobs.size(); ++i) {
+    const SceneCheck& scene = result.scenes[i];
+    random += jobs[i].seed ? 1 : 0;
+    random_not_run += jobs[i].seed && !scene.done ? 1 : 0;
+    if (!jobs[i].seed && !scene.done) {
+      return scene.message;
+    }
+  }
+  // One of a few is no share.
+  if (random_not_run > std::max(1.0, std::ceil(kMostNotRun * random))) {
+    line << random_not_run << " of " << random << " random scenes do not run, expected at most "
+         << 100.0 * kMostNotRun << " %";
+  }
+  return line.str();
+}
+
+}  // namespace tangible

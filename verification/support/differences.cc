@@ -1,0 +1,275 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/verification/support/differences.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "tangible/verification/support/random_scene.h"
+
+namespace tangible {
+namespace {
+
+// Runs with one parameter changed by several steps, and the extrapolation of their differences.
+class Differences {
+ public:
+  Differences(const Scene& scene, const RunTrace& at, const VectorX<double>& noise,
+              const ParameterPath& parameter)
+      : scene_(scene), at_(at), noise_(noise), parameter_(parameter) {
+    // Scenes are of the size of 1 in SI units, which the scale of a large floor is not.
+    scale_ = std::max(std::abs(parameter.value), std::min(parameter.scale, 1.0));
+    Scene copy = scene;
+    const std::vector<SceneNumber<double>> numbers = EnumerateNumbers(&copy);
+    for (const int number : parameter.numbers) {
+      FindRoom(numbers[number].kind, *numbers[number].value);
+    }
+    side_ = low_end_ ? 1.0 : high_end_ ? -1.0 : 0.0;
+  }
+
+  DifferenceColumn Compute() {
+    DifferenceColumn column;
+    if (low_end_ && high_end_) {
+      column.where = "its numbers are at both ends of their range";
+      return column;
+    }
+    AddNoiseOfParameter();
+    const double first = Bounded(kLargest);
+    int tables = 0;
+    for (double h = first; h > kSmallest * first && tables < kMostTables; h *= 0.125) {
+      DifferenceColumn next;
+      next.step = h;
+      next.status = Table(h, &next);
+      if (next.status != DifferenceStatus::kJudged) {
+        if (tables == 0) {
+          column.status = next.status;
+          column.where = where_;
+        }
+        continue;
+      }
+      // A table that has not converged may not know how far it is off.
+      ++tables;
+      if (tables == 1 || next.errors.maxCoeff() < column.errors.maxCoeff()) {
+        column = std::move(next);
+      }
+      if (column.errors.maxCoeff() <= kConverged * column.values.cwiseAbs().maxCoeff()) {
+        break;
+      }
+    }
+    for (size_t k = 0; k < 2; ++k) {
+      column.plain[k] = Plain(Bounded(kPlainSteps[k]));
+    }
+    return column;
+  }
+
+ private:
+  static constexpr double kLargest = 1e-3;
+  static constexpr double kSmallest = 1e-8;  // of the largest
+  static constexpr int kSteps = 4;
+  static constexpr int kMostTables = 4;
+  static constexpr double kConverged = 1e-6;  // of the column's largest
+  static constexpr double kRatio = 2.0;
+
+  double Bounded(double relative) const { return std::min(relative * scale_, room_); }
+
+  void FindRoom(NumberKind kind, double value) {
+    if (kind == NumberKind::kFree) {
+      return;
+    }
+    low_end_ = low_end_ || value == 0.0;
+    if (value > 0.0) {
+      room_ = std::min(room_, 0.1 * value);
+    }
+    if (kind == NumberKind::kFraction) {
+      high_end_ = high_end_ || value == 1.0;
+      if (value < 1.0) {
+        room_ = std::min(room_, 0.1 * (1.0 - value));
+      }
+    }
+  }
+
+  DifferenceStatus RunAt(double change, VectorX<double>* values) {
+    Scene scene = scene_;
+    const std::vector<SceneNumber<double>> numbers = EnumerateNumbers(&scene);
+    for (const int number : parameter_.numbers) {
+      *numbers[number].value += change;
+    }
+    const RunTrace trace = TraceRun(scene);
+    if (!trace.done) {
+      where_ = trace.message;
+      return DifferenceStatus::kRunFailed;
+    }
+    const FrictionAtZero friction =
+        side_ != 0.0 ? FrictionAtZero::kMaySlide : FrictionAtZero::kDistinct;
+    *values = trace.values;
+    std::string difference = FirstDifference(at_, trace, friction);
+    if (difference.empty()) {
+      return DifferenceStatus::kJudged;
+    }
+    where_ = std::move(difference);
+    return DifferenceStatus::kChoicesDiffer;
+  }
+
+  DifferenceStatus Quotient(double h, VectorX<double>* quotient) {
+    VectorX<double> high = at_.values;
+    VectorX<double> low = at_.values;
+    if (side_ >= 0.0) {
+      const DifferenceStatus status = RunAt(h, &high);
+      if (status != DifferenceStatus::kJudged) {
+        return status;
+      }
+    }
+    if (side_ <= 0.0) {
+      const DifferenceStatus status = RunAt(-h, &low);
+      if (status != DifferenceStatus::kJudged) {
+        return status;
+      }
+    }
+    *quotient = (high - low) / (side_ == 0.0 ? 2.0 * h : h);
+    return DifferenceStatus::kJudged;
+  }
+
+  // Second differences of tiny steps are rounding alone. Runs from exact numbers (a box on a floor
+  // at 0) are rounded less than those beside them, so that changes of the initial state's last
+  // digits do not show it all.
+  void AddNoiseOfParameter() {
+    for (const double relative : {2.3e-9, 1.0e-9, 3.1e-10, 0.7e-10}) {
+      const double h = Bounded(relative);
+      VectorX<double> one, two;
+      if (RunAt(side_ == 0.0 ? h : side_ * h, &one) != DifferenceStatus::kJudged ||
+          RunAt(side_ == 0.0 ? -h : 2.0 * side_ * h, &two) != DifferenceStatus::kJudged) {
+        continue;
+      }
+      const VectorX<double> second = side_ == 0.0 ? VectorX<double>(one - 2.0 * at_.values + two)
+                                                  : VectorX<double>(two - 2.0 * one + at_.values);
+      noise_ = noise_.cwiseMax(second.cwiseAbs());
+    }
+  }
+
+  // (f(p + h) − f(p − h)) / 2h, or (−3 f(p) + 4 f(p ± h) − f(p ± 2h)) / ±2h. Where choices differ
+  // the quotient is still given.
+  PlainDifference Plain(double h) {
+    PlainDifference plain;
+    plain.step = h;
+    VectorX<double> first, second;
+    const DifferenceStatus one = RunAt(side_ == 0.0 ? h : side_ * h, &first);
+    const std::string where = one == DifferenceStatus::kJudged ? "" : where_;
+    const DifferenceStatus two = RunAt(side_ == 0.0 ? -h : 2.0 * side_ * h, &second);
+    plain.status = one != DifferenceStatus::kJudged ? one : two;
+    plain.where = one != DifferenceStatus::kJudged   ? where
+                  : two != DifferenceStatus::kJudged ? where_
+                                                     : "";
+    if (first.size() == 0 || second.size() == 0) {
+      plain.status = DifferenceStatus::kRunFailed;
+    } else if (side_ == 0.0) {
+      plain.values = (first - second) / (2.0 * h);
+    } else {
+      plain.values = (-3.0 * at_.values + 4.0 * first - second) / (2.0 * side_ * h);
+    }
+    return plain;
+  }
+
+  // Ridders' table; errors of central quotients are even in h, of one-sided ones of all orders.
+  DifferenceStatus Table(double h, DifferenceColumn* column) {
+    VectorX<double> table[kSteps][kSteps];
+    const double factor = side_ == 0.0 ? kRatio * kRatio : kRatio;
+    for (int k = 0; k < kSteps; ++k) {
+      const double step = h / std::pow(kRatio, k);
+      const DifferenceStatus status = Quotient(step, &table[0][k]);
+      if (status != DifferenceStatus::kJudged) {
+        return status;
+      }
+      // Extrapolation doubles the rounding of a quotient, noise / step, and a few samples may have
+      // shown a quarter of it; the table itself need not show it.
+      const VectorX<double> rounding = (8.0 / step) * noise_;
+      if (k == 0) {
+        column->values = table[0][0];
+        column->errors.setConstant(noise_.size(), HUGE_VAL);
+      }
+      double power = factor;
+      for (int j = 1; j <= k; ++j, power *= factor) {
+        table[j][k] = (power * table[j - 1][k] - table[j - 1][k - 1]) / (power - 1.0);
+        const VectorX<double> error =
+            (table[j][k] - table[j - 1][k])
+                .cwiseAbs()
+                .cwiseMax((table[j][k] - table[j - 1][k - 1]).cwiseAbs()) +
+            rounding;
+        for (Eigen::Index i = 0; i < error.size(); ++i) {
+          if (error[i] < column->errors[i]) {
+            column->errors[i] = error[i];
+            column->values[i] = table[j][k][i];
+          }
+        }
+      }
+    }
+    return DifferenceStatus::kJudged;
+  }
+
+  const Scene& scene_;
+  const RunTrace& at_;
+  VectorX<double> noise_;
+  const ParameterPath& parameter_;
+  double scale_ = 0.0;                       // of the parameter
+  double room_ = 1e300;                      // how far the parameter may be changed to both sides
+  bool low_end_ = false, high_end_ = false;  // at the end of its range
+  double side_ = 0.0;                        // 0: central; else the only side that is allowed
+  std::string where_;                        // the runs of the last pair that differed
+};
+
+}  // namespace
+
+namespace {
+
+// What a rounding of 1 in a coordinate L does to each output: a twist that a gap or a joint's drift
+// sets is L / h of it, of its angular part over the radius of gyration. It stays the same where the
+// initial state is changed a little.
+VectorX<double> GapNoise(const Scene& scene, const ModelStructure& structure) {
+  Model<double> model;
+  State<double> state;
+  BuildModel(scene, &model, &state);
+  double coordinate = 0.0;
+  for (const int body : structure.moving) {
+    coordinate =
+        std::max({coordinate, std::abs(state.pose[3 * body]), std::abs(state.pose[3 * body + 1])});
+  }
+  VectorX<double> noise = VectorX<double>::Zero(6 * structure.num_blocks());
+  for (int k = 0; k < structure.num_blocks(); ++k) {
+    const BodyIndex& body = structure.bodies[structure.moving[k]];
+    const double arm = std::sqrt(model.numbers[body.inertia] / model.numbers[body.mass]);
+    const double speed = coordinate / scene.simulation.dt;
+    noise.segment<3>(6 * k + 3) << speed, speed, speed / arm;
+  }
+  return noise;
+}
+
+}  // namespace
+
+VectorX<double> RoundingNoise(const Scene& scene, const RunTrace& at) {
+  // Of a body at rest most runs end with the same bits, and one in ten is off by an ε of a gap / h.
+  constexpr int kSamples = 32;
+  const double epsilon = std::numeric_limits<double>::epsilon();
+  VectorX<double> noise = (epsilon * at.values.cwiseAbs().cwiseMax(0.5))
+                              .cwiseMax(epsilon * GapNoise(scene, *at.structure));
+  RandomNumbers random(kSamples);
+  for (int sample = 0; sample < kSamples; ++sample) {
+    Scene changed = scene;
+    for (BasicBody<double>& body : changed.bodies) {
+      for (double* x : {&body.mass, &body.position.x(), &body.position.y(), &body.angle,
+                        &body.velocity.x(), &body.velocity.y(), &body.angular_velocity}) {
+        *x += epsilon * std::max(1.0, std::abs(*x)) * random.Integer(-2, 2);
+      }
+    }
+    const RunTrace trace = TraceRun(changed);
+    if (trace.done && SameChoices(at, trace, FrictionAtZero::kDistinct)) {
+      noise = noise.cwiseMax((trace.values - at.values).cwiseAbs());
+    }
+  }
+  return noise;
+}
+
+DifferenceColumn FiniteDifferences(const Scene& scene, const RunTrace& at,
+                                   const VectorX<double>& noise, const ParameterPath& parameter) {
+  return Differences(scene, at, noise, parameter).Compute();
+}
+
+}  // namespace tangible

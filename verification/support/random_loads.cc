@@ -1,0 +1,141 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Springs, forces and pairs of random scenes.
+#include <algorithm>
+#include <string>
+
+#include "tangible/verification/support/random_scene_maker.h"
+
+namespace tangible::internal {
+
+int SceneMaker::AnyMoving() {
+  int body = -1;
+  while (body < 0 || scene_.bodies[body].motion != Motion::kMoving) {
+    body = random_.Integer(0, static_cast<int>(scene_.bodies.size()) - 1);
+  }
+  return body;
+}
+
+void SceneMaker::Springs() {
+  for (int i = 0; i < 2; ++i) {
+    if (!random_.Chance(0.25)) {
+      continue;
+    }
+    BasicSpring<double> spring;
+    spring.name = "spring" + std::to_string(i);
+    spring.bodies[0] = AnyMoving();
+    const int other = AnyMoving();
+    spring.bodies[1] = other == spring.bodies[0] ? -1 : other;
+    const Vector2<double> offset(U(-0.05, 0.05), U(-0.05, 0.05));
+    spring.anchors[0] = scene_.bodies[spring.bodies[0]].position + offset;
+    spring.anchors[1] = spring.bodies[1] >= 0 ? scene_.bodies[spring.bodies[1]].position
+                                              : Vector2<double>(U(-1.0, 1.0), 1.5);
+    spring.stiffness = U(1.0, 40.0);
+    spring.damping = random_.Chance(0.5) ? U(0.1, 1.0) : 0.0;
+    spring.rest_length = U(0.1, 0.8);
+    scene_.springs.push_back(spring);
+  }
+}
+
+void SceneMaker::Forces() {
+  const double dt = scene_.simulation.dt;
+  for (int i = 0; i < 2; ++i) {
+    if (!random_.Chance(0.3)) {
+      continue;
+    }
+    BasicForce<double> force;
+    force.name = "force" + std::to_string(i);
+    force.body = AnyMoving();
+    force.force = Vector2<double>(U(-8.0, 8.0), U(-4.0, 8.0));
+    force.torque = random_.Chance(0.5) ? U(-0.3, 0.3) : 0.0;
+    force.at = Vector2<double>(U(-0.05, 0.05), U(-0.05, 0.05));
+    // Edges at fractions of a step: on its boundary the derivative has a kink.
+    if (random_.Chance(0.7)) {
+      force.start = dt * (random_.Integer(0, 3) + U(0.2, 0.8));
+    }
+    if (random_.Chance(0.7)) {
+      force.end = dt * (random_.Integer(4, 12) + U(0.2, 0.8));
+    }
+    if (random_.Chance(0.2)) {
+      force.force_signal = ForceSignal(dt);
+    }
+    scene_.forces.push_back(force);
+  }
+}
+
+Signal SceneMaker::ForceSignal(double dt) {
+  Signal signal;
+  signal.file = "force.csv";
+  signal.interpolation =
+      random_.Chance(0.5) ? Signal::Interpolation::kConstant : Signal::Interpolation::kLinear;
+  for (int k = 0; k < 5; ++k) {
+    signal.time.push_back(dt * (3.3 * k + U(0.0, 1.0)));
+    signal.x.push_back(U(-6.0, 6.0));
+    signal.y.push_back(U(-6.0, 6.0));
+  }
+  return signal;
+}
+
+Signal SceneMaker::ValueSignal(double dt, double largest) {
+  Signal signal;
+  signal.file = "value.csv";
+  signal.interpolation =
+      random_.Chance(0.5) ? Signal::Interpolation::kConstant : Signal::Interpolation::kLinear;
+  for (int k = 0; k < 5; ++k) {
+    signal.time.push_back(dt * (3.3 * k + U(0.0, 1.0)));
+    signal.value.push_back(U(-largest, largest));
+  }
+  return signal;
+}
+
+int SceneMaker::CountNamed(const std::string& start) const {
+  int count = 0;
+  for (const BasicBody<double>& body : scene_.bodies) {
+    count += body.name.rfind(start, 0) == 0 ? 1 : 0;
+  }
+  return count;
+}
+
+void SceneMaker::Pairs() {
+  if (random_.Chance(0.25)) {
+    BasicPair<double> pair;
+    pair.bodies[0] = "body*";
+    pair.bodies[1] = random_.Chance(0.5) ? "floor" : "body*";
+    if (random_.Chance(0.8)) {
+      pair.friction = Friction();
+    }
+    if (random_.Chance(0.5) || !pair.friction) {
+      pair.restitution = Restitution();
+    }
+    if (CountNamed("body") >= (pair.bodies[1] == "floor" ? 1 : 2)) {
+      scene_.pairs.push_back(pair);
+    }
+  }
+  if (random_.Chance(0.15) && CountNamed("link") > 0) {
+    scene_.no_contact.emplace_back("link*", "*");
+  }
+}
+
+void SceneMaker::Rarities() {
+  const double dt = scene_.simulation.dt;
+  for (BasicForce<double>& force : scene_.forces) {
+    if (random_.Chance(0.15)) {
+      force.torque_signal = ValueSignal(dt, 0.3);
+    }
+  }
+  for (BasicJoint<double>& joint : scene_.joints) {
+    if (joint.type == JointType::kPrismatic && random_.Chance(0.5)) {
+      // Its own weight takes it there.
+      joint.limits = {joint.angle - U(0.0005, 0.003), joint.angle + U(0.0005, 0.003)};
+    }
+    if (joint.effort != 0.0 && random_.Chance(0.25)) {
+      joint.effort = 0.0;
+      joint.effort_signal = ValueSignal(dt, 1.0);
+    }
+  }
+  if (random_.Chance(0.04)) {
+    scene_.gravity.setZero();
+  }
+}
+
+}  // namespace tangible::internal

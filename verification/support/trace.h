@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// Runs with the discrete choices that they made: two runs are parts of the same smooth map where
+// these are the same, contact by contact.
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "tangible/simulation/rollout.h"
+
+namespace tangible {
+
+/// A closed contact of a step, with all discrete choices that its equations depend on.
+struct ContactTrace {
+  ActiveContact contact;
+  ContactMode mode = ContactMode::kOpen;
+  bool friction_tie = false, restitution_tie = false;  ///< at a kink of the mixing rule
+};
+
+/// A run with its discrete choices.
+struct RunTrace {
+  bool done = false;
+  std::string message;
+  VectorX<double> values;  ///< outputs
+  std::vector<std::vector<ContactTrace>> steps;
+  std::shared_ptr<const ModelStructure> structure;
+  int closed = 0;      ///< closed contacts, over all steps
+  int sliding = 0;     ///< of these, sliding
+  int sticking = 0;    ///< of these, sticking
+  int limits = 0;      ///< of these, joint limits
+  int impacts = 0;     ///< of these, with restitution
+  int recoveries = 0;  ///< of these, in penetration at the recovery speed
+  int degenerate = 0;  ///< contacts within 1e-7 of a change of mode
+  /// A closed contact's coefficient is at a kink of its mixing rule.
+  bool friction_tie = false, restitution_tie = false;
+};
+
+RunTrace TraceRun(const Scene& scene);
+
+/// Whether two runs made the same choices at closed contacts. kMaySlide: contacts
+/// without friction are the same as sliding ones (one-sided differences from friction 0).
+enum class FrictionAtZero { kDistinct, kMaySlide };
+bool SameChoices(const RunTrace& x, const RunTrace& y, FrictionAtZero friction);
+/// The first step and contact in which they are not; empty if they are.
+std::string FirstDifference(const RunTrace& x, const RunTrace& y, FrictionAtZero friction);
+
+}  // namespace tangible
