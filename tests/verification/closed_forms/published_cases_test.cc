@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Independent values and derivatives, derived elsewhere with 45 digits:
+// ../shared/cases/closed_form, read at run time where it is present. The formulas and the engine
+// are compared with every variant.
+
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "bounds.h"
+
+namespace tangible::closed_forms {
+namespace {
+
+using Maker = ClosedForm (*)(const std::string&, const Inputs&);
+
+std::filesystem::path Folder() {
+  return std::filesystem::path(TANGIBLE_SOURCE_DIR) / ".." / "shared" / "cases" / "closed_form";
+}
+
+/// What a file says of a variant, in the rows and columns of `form`; NaN where it says nothing.
+Outcome Published(const ClosedForm& form, const nlohmann::json& variant) {
+  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+  Outcome outcome;
+  const auto rows = static_cast<Eigen::Index>(form.outputs.size());
+  const auto cols = static_cast<Eigen::Index>(form.parameters.size());
+  outcome.values.setConstant(rows, kNan);
+  outcome.jacobian.setConstant(rows, cols, kNan);
+  // Of a double pendulum's two Jacobians the one whose lengths and inertias are independent.
+  const char* name = variant.contains("gradients_primitive") ? "gradients_primitive" : "gradients";
+  const nlohmann::json gradients = variant.value(name, nlohmann::json::object());
+  for (Eigen::Index i = 0; i < rows; ++i) {
+    const std::string& output = form.outputs[i];
+    if (variant["outputs"].contains(output)) outcome.values[i] = variant["outputs"][output];
+    if (!gradients.contains(output)) continue;
+    for (Eigen::Index k = 0; k < cols; ++k) {
+      const std::string& parameter = form.parameters[k].first;
+      const nlohmann::json& row = gradients[output];
+      if (row.contains(parameter) && !row[parameter].is_null()) {
+        outcome.jacobian(i, k) = row[parameter];
+      }
+    }
+  }
+  return outcome;
+}
+
+/// Compares what was published; returns how many numbers that were.
+int ExpectPublished(const ClosedForm& form, const Outcome& published, const Outcome& got,
+                    double relative, const std::string& what) {
+  EXPECT_EQ(got.message, "") << what;
+  if (!got.message.empty()) return 0;
+  int compared = 0;
+  const auto expect = [&](double a, double b, double scale, const std::string& entry) {
+    if (std::isnan(b)) return;
+    ++compared;
+    EXPECT_LE(std::abs(a - b), relative * (std::abs(b) + 1e-4 * scale))
+        << what << ", " << entry << ": " << a << ", published " << b;
+  };
+  const auto largest = [](const Eigen::MatrixXd& numbers) {
+    return std::max(1e-2, numbers.array().isNaN().select(0.0, numbers).cwiseAbs().maxCoeff());
+  };
+  for (Eigen::Index i = 0; i < published.values.size(); ++i) {
+    expect(got.values[i], published.values[i], largest(published.values), form.outputs[i]);
+    for (Eigen::Index k = 0; k < published.jacobian.cols(); ++k) {
+      // Neither the engine nor a formula with a kink has all that a file may have.
+      if (std::isnan(got.jacobian(i, k))) continue;
+      expect(got.jacobian(i, k), published.jacobian(i, k), largest(published.jacobian),
+             "d " + form.outputs[i] + " / d " + form.parameters[k].first);
+    }
+  }
+  return compared;
+}
+
+void CompareFile(const std::string& file, Maker maker, int at_least) {
+  const std::filesystem::path path = Folder() / file;
+  if (!std::filesystem::exists(path)) {
+    GTEST_SKIP() << "../shared/cases/closed_form/" << file << " is not there";
+  }
+  std::ifstream stream(path);
+  const nlohmann::json data = nlohmann::json::parse(stream);
+  int compared = 0;
+  for (const nlohmann::json& variant : data["variants"]) {
+    Inputs inputs;
+    for (const auto& [key, value] : variant["inputs"].items()) inputs[key] = value;
+    const std::string name = file + ", " + variant["name"].get<std::string>();
+    const ClosedForm form = maker(name, inputs);
+    const Outcome published = Published(form, variant);
+    compared += ExpectPublished(form, published, Exact(form), 1e-11, name + ", formula");
+    // Without derivatives: on a kink, of which the file has the sides. The engine's value counts.
+    const bool smooth = form.kind == Kind::kSmooth;
+    const int steps = form.instant > 0.0 ? 1 : smooth ? 2000 : 40;
+    const Outcome got = Simulate(form, kRungeKutta, steps, Method::kAdjoint);
+    compared += ExpectPublished(form, published, got, smooth ? 1e-8 : 1e-9, name + ", engine");
+  }
+  EXPECT_GE(compared, at_least);
+}
+
+TEST(PublishedCases, Drop) { CompareFile("a_ball_drop.json", &Drop, 60); }
+TEST(PublishedCases, ObliqueWall) { CompareFile("b_oblique_wall.json", &ObliqueWall, 80); }
+TEST(PublishedCases, TwoDiscs) { CompareFile("c_two_discs.json", &TwoDiscs, 300); }
+TEST(PublishedCases, SlidingBlock) { CompareFile("d_block_stop.json", &SlidingBlock, 20); }
+TEST(PublishedCases, Incline) { CompareFile("e_incline.json", &Incline, 50); }
+TEST(PublishedCases, SlideToRoll) { CompareFile("f_disc_slide_to_roll.json", &SlideToRoll, 100); }
+TEST(PublishedCases, Rolling) { CompareFile("g_disc_incline.json", &Rolling, 100); }
+TEST(PublishedCases, PhysicalPendulum) {
+  CompareFile("h_physical_pendulum.json", &PhysicalPendulum, 40);
+}
+TEST(PublishedCases, DoublePendulum) {
+  CompareFile("i_double_pendulum.json", &DoublePendulum, 100);
+}
+TEST(PublishedCases, ThreeBalls) { CompareFile("j_three_ball_chain.json", &ThreeBalls, 200); }
+TEST(PublishedCases, FrictionalImpact) {
+  CompareFile("k_impact_friction.json", &FrictionalImpact, 300);
+}
+TEST(PublishedCases, BoxPush) { CompareFile("l_box_tip_slide.json", &BoxPush, 80); }
+TEST(PublishedCases, BoxTip) { CompareFile("l2_box_tip_motion.json", &BoxTip, 30); }
+
+}  // namespace
+}  // namespace tangible::closed_forms
