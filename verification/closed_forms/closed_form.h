@@ -87,10 +87,12 @@ ClosedForm Rolling(const std::string& name, const Inputs& inputs);
 /// slides, tips, or does both.
 ClosedForm BoxPush(const std::string& name, const Inputs& inputs);
 
-/// m, L, Ic, g, theta0, T: released at rest; Jacobi's elliptic functions.
+/// m, L, Ic, g, theta0, T: released at rest; Jacobi's elliptic functions. With Ic = 0 the scene has
+/// no derivative with respect to it.
 ClosedForm PhysicalPendulum(const std::string& name, const Inputs& inputs);
 /// m1, m2, l1, l2, c1, c2, I1, I2, g, th1_0, th2_0, w1_0, w2_0, T; angles from the downward
-/// vertical. Reference: extrapolation of order 16 of the two equations of motion.
+/// vertical. With I1 = I2 = 0 point masses (c = l): c1, c2, I1, I2 are then no parameters.
+/// Reference: extrapolation of order 16 of the two equations of motion.
 ClosedForm DoublePendulum(const std::string& name, const Inputs& inputs);
 /// w, h, m, mu, g, F, T: a box tips from rest about its front lower corner, pushed at its rear
 /// upper one. Reference: as for the double pendulum.

@@ -32,13 +32,35 @@ constexpr char kTippingBox[] = R"({"bodies": [
   "forces": [{"name": "push", "body": "box", "force": [1, 0], "at": [-0.5, 0.5]}],
   "pairs": [{"bodies": ["box", "plane"], "friction": 0.5}]})";
 
-// A body needs an inertia > 0; a point mass gets one that no figure here shows.
-constexpr double kPointInertia = 1e-12;
+// Point masses: bodies have an inertia > 0, so they hang by their centres on rods without mass, and
+// their own angles play no part.
+constexpr char kPointPendulum[] = R"({"bodies": [
+  {"name": "mass", "mass": 1, "inertia": 1, "position": [0, -1]}],
+  "joints": [{"name": "rod", "type": "distance", "bodies": ["mass", "world"],
+              "anchors": [[0, -1], [0, 0]]}],
+  "simulation": {"joint_correction": "projection"}})";
 
-Number BodyInertia(const Number& inertia) {
-  Number body = inertia;
-  if (body.a < kPointInertia) body.a = kPointInertia;
-  return body;
+constexpr char kPointDoublePendulum[] = R"({"bodies": [
+  {"name": "upper", "mass": 1, "inertia": 1, "position": [0, -1]},
+  {"name": "lower", "mass": 1, "inertia": 1, "position": [0, -2]}],
+  "joints": [
+    {"name": "rod", "type": "distance", "bodies": ["upper", "world"],
+     "anchors": [[0, -1], [0, 0]]},
+    {"name": "second_rod", "type": "distance", "bodies": ["lower", "upper"],
+     "anchors": [[0, -2], [0, -1]]}],
+  "simulation": {"joint_correction": "projection"}})";
+
+using SceneNumbers = std::vector<std::pair<std::string, Number>>;
+
+void AddPoint(const std::string& path, const Number& x, const Number& y, SceneNumbers* numbers) {
+  numbers->emplace_back(path + "/x", x);
+  numbers->emplace_back(path + "/y", y);
+}
+
+// Angle from the downward vertical, and its rate, of (x, y) with velocity (u, v).
+Number HangingAngle(const Number& x, const Number& y) { return atan2(x, -y); }
+Number HangingRate(const Number& x, const Number& y, const Number& u, const Number& v) {
+  return (x * v - y * u) / (x * x + y * y);
 }
 
 struct Jacobi {
@@ -129,6 +151,73 @@ std::vector<Number> ExactBoxTip(const NumberMap& p) {
   return y;
 }
 
+// The same with Ic = 0.
+void HangPointMass(ClosedForm* form) {
+  form->scene_json = kPointPendulum;
+  form->numbers = [](const NumberMap& p) {
+    SceneNumbers numbers = {{"bodies/mass/mass", p.at("m")}, {"gravity/y", -p.at("g")}};
+    const Number x = p.at("L") * sin(p.at("theta0")), y = -p.at("L") * cos(p.at("theta0"));
+    AddPoint("bodies/mass/position", x, y, &numbers);
+    AddPoint("joints/rod/anchors/0", x, y, &numbers);
+    return numbers;
+  };
+  form->read = [](const NumberMap& p, const FinalState& s) {
+    std::vector<Number> outputs = {HangingAngle(s[0], s[1]), HangingRate(s[0], s[1], s[3], s[4])};
+    DropDerivative(p.at("Ic"), &outputs);
+    return outputs;
+  };
+}
+
+// c1 = l1, c2 = l2, I1 = I2 = 0.
+ClosedForm PointDoublePendulum(const std::string& name, const Inputs& inputs) {
+  ClosedForm form{
+      name,
+      Kind::kSmooth,
+      Take(inputs, {"m1", "m2", "l1", "l2", "g", "th1_0", "th2_0", "w1_0", "w2_0", "T"}),
+      {"th1_T", "th2_T", "w1_T", "w2_T", "x1_T", "y1_T", "x2_T", "y2_T"},
+      {},
+      kPointDoublePendulum,
+      {},
+      {}};
+  form.exact = [](const NumberMap& p) {
+    NumberMap all = p;
+    all["c1"] = p.at("l1");
+    all["c2"] = p.at("l2");
+    all["I1"] = all["I2"] = Number(0.0);
+    return ExactDoublePendulum(all);
+  };
+  form.numbers = [](const NumberMap& p) {
+    const Number s1 = sin(p.at("th1_0")), c1 = cos(p.at("th1_0"));
+    const Number s2 = sin(p.at("th2_0")), c2 = cos(p.at("th2_0"));
+    const Number x1 = p.at("l1") * s1, y1 = -p.at("l1") * c1;
+    const Number x2 = x1 + p.at("l2") * s2, y2 = y1 - p.at("l2") * c2;
+    const Number v1 = p.at("l1") * p.at("w1_0"), v2 = p.at("l2") * p.at("w2_0");
+    SceneNumbers numbers = {{"bodies/upper/mass", p.at("m1")},
+                            {"bodies/lower/mass", p.at("m2")},
+                            {"gravity/y", -p.at("g")}};
+    AddPoint("bodies/upper/position", x1, y1, &numbers);
+    AddPoint("bodies/lower/position", x2, y2, &numbers);
+    AddPoint("joints/rod/anchors/0", x1, y1, &numbers);
+    AddPoint("joints/second_rod/anchors/0", x2, y2, &numbers);
+    AddPoint("joints/second_rod/anchors/1", x1, y1, &numbers);
+    AddPoint("bodies/upper/velocity", v1 * c1, v1 * s1, &numbers);
+    AddPoint("bodies/lower/velocity", v1 * c1 + v2 * c2, v1 * s1 + v2 * s2, &numbers);
+    return numbers;
+  };
+  form.read = [](const NumberMap&, const FinalState& s) {
+    const Number dx = s[6] - s[0], dy = s[7] - s[1];
+    return std::vector<Number>{HangingAngle(s[0], s[1]),
+                               HangingAngle(dx, dy),
+                               HangingRate(s[0], s[1], s[3], s[4]),
+                               HangingRate(dx, dy, s[9] - s[3], s[10] - s[4]),
+                               s[0],
+                               s[1],
+                               s[6],
+                               s[7]};
+  };
+  return form;
+}
+
 }  // namespace
 
 ClosedForm PhysicalPendulum(const std::string& name, const Inputs& inputs) {
@@ -141,18 +230,19 @@ ClosedForm PhysicalPendulum(const std::string& name, const Inputs& inputs) {
                   {},
                   {}};
   form.numbers = [](const NumberMap& p) {
-    return std::vector<std::pair<std::string, Number>>{
-        {"bodies/rod/mass", p.at("m")},
-        {"bodies/rod/inertia", BodyInertia(p.at("Ic"))},
-        {"bodies/rod/position/y", -p.at("L")},
-        {"joints/pin/angle", p.at("theta0")},
-        {"gravity/y", -p.at("g")}};
+    return std::vector<std::pair<std::string, Number>>{{"bodies/rod/mass", p.at("m")},
+                                                       {"bodies/rod/inertia", p.at("Ic")},
+                                                       {"bodies/rod/position/y", -p.at("L")},
+                                                       {"joints/pin/angle", p.at("theta0")},
+                                                       {"gravity/y", -p.at("g")}};
   };
   form.read = [](const NumberMap&, const FinalState& s) { return std::vector<Number>{s[2], s[5]}; };
+  if (inputs.at("Ic") == 0.0) HangPointMass(&form);
   return form;
 }
 
 ClosedForm DoublePendulum(const std::string& name, const Inputs& inputs) {
+  if (inputs.at("I1") == 0.0 && inputs.at("I2") == 0.0) return PointDoublePendulum(name, inputs);
   ClosedForm form{name,
                   Kind::kSmooth,
                   Take(inputs, {"m1", "m2", "l1", "l2", "c1", "c2", "I1", "I2", "g", "th1_0",
@@ -166,8 +256,8 @@ ClosedForm DoublePendulum(const std::string& name, const Inputs& inputs) {
     return std::vector<std::pair<std::string, Number>>{
         {"bodies/upper/mass", p.at("m1")},
         {"bodies/lower/mass", p.at("m2")},
-        {"bodies/upper/inertia", BodyInertia(p.at("I1"))},
-        {"bodies/lower/inertia", BodyInertia(p.at("I2"))},
+        {"bodies/upper/inertia", p.at("I1")},
+        {"bodies/lower/inertia", p.at("I2")},
         {"bodies/upper/position/y", -p.at("c1")},
         {"bodies/lower/position/y", -p.at("l1") - p.at("c2")},
         {"joints/elbow/anchor/y", -p.at("l1")},

@@ -4,6 +4,7 @@
 // ../shared/cases/closed_form, read at run time where it is present. The formulas and the engine
 // are compared with every variant.
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -27,8 +28,13 @@ Outcome Published(const ClosedForm& form, const nlohmann::json& variant) {
   const auto cols = static_cast<Eigen::Index>(form.parameters.size());
   outcome.values.setConstant(rows, kNan);
   outcome.jacobian.setConstant(rows, cols, kNan);
-  // Of a double pendulum's two Jacobians the one whose lengths and inertias are independent.
-  const char* name = variant.contains("gradients_primitive") ? "gradients_primitive" : "gradients";
+  // Of a double pendulum's two Jacobians that whose lengths are independent, if they are here.
+  bool independent = variant.contains("gradients_primitive");
+  if (independent) {
+    independent = std::any_of(form.parameters.begin(), form.parameters.end(),
+                              [](const auto& parameter) { return parameter.first == "c1"; });
+  }
+  const char* name = independent ? "gradients_primitive" : "gradients";
   const nlohmann::json gradients = variant.value(name, nlohmann::json::object());
   for (Eigen::Index i = 0; i < rows; ++i) {
     const std::string& output = form.outputs[i];
