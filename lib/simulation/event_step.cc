@@ -101,6 +101,7 @@ std::vector<Edge> EdgesWithin(const Model<double>& model, double from, double to
 EventStepper::EventStepper(const Model<double>& model) : search_(model) {}
 
 void EventStepper::ClearGuess() {
+  starts_ = true;
   last_contacts_.clear();
   last_modes_.clear();
 }
@@ -178,6 +179,9 @@ bool EventStepper::SolveImpacts(const Model<double>& model, double t, State<doub
                                  [&](double speed) { return speed < -slow; });
     if (!any) {
       return true;
+    }
+    if (repeat == 0 && !LocateTouch(model, t, slow, state, outcome)) {
+      return false;
     }
     if (++outcome->events > settings.max_events_per_step && !inelastic_) {
       inelastic_ = true;
@@ -375,9 +379,19 @@ EventOutcome EventStepper::Step(const Model<double>& model, double t, double h,
     outcome.message = message;
     return outcome;
   };
-  while (end - now > 1e-14 * h) {
+  bool at_given_time = true;
+  while (end - now > 1e-14 * h || !at_given_time) {
     if (!SolveImpacts(model, now, state, &outcome)) {
       return fail(outcome.message);
+    }
+    const bool at_end = end - now <= 1e-14 * h;
+    if ((starts_ || at_end) &&
+        !AddInstant(model, now, EventKind::kStepEnd, nullptr, state, &outcome)) {
+      return fail(outcome.message);
+    }
+    starts_ = false;
+    if (at_end) {
+      break;
     }
     while (next_edge < edges.size() && edges[next_edge].time <= now + 1e-14 * h) {
       ++next_edge;
@@ -408,7 +422,8 @@ EventOutcome EventStepper::Step(const Model<double>& model, double t, double h,
       return fail(message);
     }
     *state = segment.after;
-    if (segment.event == EventKind::kStepEnd) {
+    at_given_time = segment.event == EventKind::kStepEnd;
+    if (at_given_time) {
       now = until;
       if (to_edge) {
         segment.event = EventKind::kEdge;
@@ -428,68 +443,6 @@ EventOutcome EventStepper::Step(const Model<double>& model, double t, double h,
     }
   }
   return outcome;
-}
-
-EventPart* EventRecord::Add() {
-  if (num_parts == static_cast<int>(parts.size())) {
-    parts.push_back(std::make_unique<EventPart>());
-  }
-  return parts[num_parts++].get();
-}
-
-size_t EventRecord::bytes() const {
-  size_t sum = 0;
-  const auto states = [](const State<double>& s) {
-    return sizeof(double) * (s.pose.size() + s.twist.size());
-  };
-  const auto node = [&](const SolvedNode& n) {
-    return sizeof(SolvedNode) + states(n.state) + n.system.bytes() +
-           sizeof(ContactBlock<double>) * n.problem.contacts.size() +
-           sizeof(JointBlock<double>) * n.problem.joints.size();
-  };
-  for (int i = 0; i < num_parts; ++i) {
-    const EventPart& part = *parts[i];
-    const Segment& segment = part.segment;
-    sum += sizeof(EventPart) + states(segment.before) + states(segment.after) +
-           part.impulses.system.bytes() + segment.projection.system.bytes();
-    for (int k = 0; k < segment.num_stages; ++k) {
-      sum += node(segment.stages[k]);
-    }
-    for (int k = 0; k < segment.num_corrections; ++k) {
-      sum += node(segment.corrections[k]);
-    }
-  }
-  return sum;
-}
-
-SolvedStep Impulses::View() const {
-  SolvedStep view;
-  view.time = time;
-  view.h = h;
-  view.corrects_drift = false;
-  view.before = &before;
-  view.new_twist = &new_twist;
-  view.contacts = &contacts;
-  view.friction = &friction;
-  view.restitution = &restitution;
-  view.problem = &problem;
-  view.solution = &solution;
-  view.contact_block = &system.contact_block();
-  return view;
-}
-
-SolvedAcceleration ViewOf(const Segment& segment, const SolvedNode& node, bool correction) {
-  SolvedAcceleration view;
-  view.correction = correction;
-  view.time = node.time;
-  view.middle = segment.middle;
-  view.state = &node.state;
-  view.contacts = &segment.contacts;
-  view.friction = &segment.friction;
-  view.problem = &node.problem;
-  view.solution = &node.solution;
-  view.contact_block = &node.system.contact_block();
-  return view;
 }
 
 }  // namespace tangible

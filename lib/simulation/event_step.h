@@ -59,12 +59,18 @@ class EventStepper {
                     EventOutcome* outcome);
   bool ChooseModes(const Model<double>& model, double t, double middle, double length,
                    State<double>* state, EventOutcome* outcome, Segment* segment);
+  bool AddInstant(const Model<double>& model, double t, EventKind kind,
+                  const ActiveContact* contact, State<double>* state, EventOutcome* outcome);
+  bool LocateTouch(const Model<double>& model, double t, double slow, State<double>* state,
+                   EventOutcome* outcome);
   bool SolveByShortStep(const Model<double>& model, double t, double dt, State<double>* state,
                         EventOutcome* outcome);
   ContactMode GuessOf(const ActiveContact& contact) const;
   void SwitchMode(const Segment& segment);
 
   EventSearch search_;
+  SegmentFlow flow_;
+  bool starts_ = true;  ///< the next step is a run's first
   ContactSolver solver_;
   EventRecord record_;
   AssemblyScratch<double> assembly_;

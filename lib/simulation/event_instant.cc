@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Segments of no length. They move nothing, but derivatives need them at instants that a step's
+// ends give and no search finds:
+//
+//   a touch at the start of a step   the search of the step before ended on it. Its time depends on
+//                                    the state all the same: it is an event (kTouch) like others
+//   an event at the end of a step    what follows it starts at a given time, not at the event's
+//   the start of a run               a change of the initial twist that breaks a rolling contact or
+//                                    a joint acts as the impulse that restores it, at once and not
+//                                    after the first segment
+#include <cmath>
+
+#include "tangible/simulation/event_step.h"
+
+namespace tangible {
+
+bool EventStepper::AddInstant(const Model<double>& model, double t, EventKind kind,
+                              const ActiveContact* contact, State<double>* state,
+                              EventOutcome* outcome) {
+  const int parts = record_.num_parts;
+  EventPart* part = record_.Add();
+  part->is_impulses = false;
+  Segment& segment = part->segment;
+  segment.time = t;
+  segment.length = 0.0;
+  segment.middle = t;
+  segment.before = *state;
+  segment.event_number = -1;
+  // Contacts in penetration are those of a step's length: rounding is none.
+  if (!ChooseModes(model, t, t, model.structure->settings.dt, state, outcome, &segment)) {
+    record_.num_parts = parts;
+    return true;  // without accelerations there is nothing to say
+  }
+  segment.event = kind;
+  segment.event_index = -1;
+  if (contact != nullptr) {
+    segment.event_contact = *contact;
+  }
+  if (!flow_.Run(model, &segment, &outcome->message)) {
+    return false;
+  }
+  *state = segment.after;
+  return true;
+}
+
+bool EventStepper::LocateTouch(const Model<double>& model, double t, double slow,
+                               State<double>* state, EventOutcome* outcome) {
+  if (record_.num_parts > 0) {
+    const EventPart& last = *record_.parts[record_.num_parts - 1];
+    if (last.is_impulses ||
+        (last.segment.event != EventKind::kStepEnd && last.segment.event != EventKind::kEdge)) {
+      return true;
+    }
+  }
+  const auto was_closed = [&](const ActiveContact& contact) {
+    for (size_t i = 0; i < last_contacts_.size(); ++i) {
+      if (last_contacts_[i].SameAs(contact)) return last_modes_[i] != ContactMode::kOpen;
+    }
+    return false;
+  };
+  const ActiveContact* touch = nullptr;
+  for (size_t i = 0; i < touching_.contacts.size() && touch == nullptr; ++i) {
+    if (touching_.approach[i] < -slow && !was_closed(touching_.contacts[i])) {
+      touch = &touching_.contacts[i];
+    }
+  }
+  if (touch == nullptr) {
+    return true;
+  }
+  const ActiveContact contact = *touch;
+  // What touches acts by its impact alone: the motion up to here had only what rested before.
+  for (size_t i = 0; i < touching_.contacts.size(); ++i) {
+    if (touching_.approach[i] < -slow) touching_.approach[i] = HUGE_VAL;
+  }
+  const bool good = AddInstant(model, t, EventKind::kTouch, &contact, state, outcome);
+  FindTouching(model, *state);
+  return good;
+}
+
+}  // namespace tangible
