@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Jacobians by Jets: passes of the Jets' width, and builds without Jets.
+#include <gtest/gtest.h>
+
+#include "../support/scenes.h"
+#include "tangible/simulation/gradient.h"
+
+namespace tangible {
+namespace {
+
+constexpr int Widest() {
+  int widest = 0;
+#define TANGIBLE_WIDER(N) widest = N > widest ? N : widest;
+  TANGIBLE_FOR_EACH_JET_WIDTH(TANGIBLE_WIDER)
+#undef TANGIBLE_WIDER
+  return widest;
+}
+
+// Two more than a pass takes, whatever the widths: parameters of the balls in a row.
+Scene Balls(int count) {
+  std::string bodies;
+  for (int i = 0; i < count; ++i) {
+    const std::string n = std::to_string(i);
+    bodies += (i > 0 ? ", " : "") + (R"({"name": "b)" + n + R"(", "mass": 1, "inertia": 1,
+        "linear_damping": 0.5, "position": [)" +
+                                     n + R"(, 0], "velocity": [)" + n + ", 1]}");
+  }
+  return test_scenes::SceneOf(R"({"bodies": [)" + bodies +
+                              R"(], "simulation": {"dt": 0.01, "duration": 0.2}})");
+}
+
+GradientResult JacobianOf(const Scene& scene, const std::vector<std::string>& paths,
+                          GradientMethod method) {
+  std::vector<ParameterPath> parameters;
+  for (const std::string& path : paths) {
+    std::string error;
+    EXPECT_TRUE(ResolveParameter(scene, path, &parameters.emplace_back(), &error)) << error;
+  }
+  GradientOptions options;
+  options.method = method;
+  options.certificate = CertificatePass::kSkip;
+  return FinalStateJacobian(scene, parameters, options);
+}
+
+TEST(GradientJets, MoreParametersThanAPassTakes) {
+  if (Widest() == 0) {
+    GTEST_SKIP() << "built without Jets";
+  }
+  const int count = Widest() + 2;
+  const Scene scene = Balls(count);
+  std::vector<std::string> paths;
+  for (int i = 0; i < count; ++i) {
+    paths.push_back("bodies/b" + std::to_string(i) + "/mass");
+  }
+  for (const GradientMethod method : {GradientMethod::kJet, GradientMethod::kJetImplicit}) {
+    const GradientResult all = JacobianOf(scene, paths, method);
+    ASSERT_TRUE(all.done) << all.message;
+    EXPECT_EQ(all.fallbacks, 0);
+    ASSERT_EQ(all.jacobian.cols(), count);
+    for (int i = 0; i < count; ++i) {
+      const GradientResult one = JacobianOf(scene, {paths[i]}, method);
+      EXPECT_EQ(all.jacobian.col(i), one.jacobian.col(0)) << i;
+      EXPECT_EQ(all.values, one.values);
+      // A ball's mass moves that ball alone: rows of six a body.
+      EXPECT_GT(all.jacobian.col(i).segment(6 * i, 6).norm(), 1e-3);
+      EXPECT_NEAR(all.jacobian.col(i).norm(), all.jacobian.col(i).segment(6 * i, 6).norm(), 1e-15);
+    }
+  }
+}
+
+TEST(GradientJets, ValuesAreThoseOfTheRunInDouble) {
+  if (Widest() == 0) {
+    GTEST_SKIP() << "built without Jets";
+  }
+  const Scene scene = test_scenes::SceneOf(test_scenes::Mixture());
+  const GradientResult tangent = JacobianOf(scene, {"bodies/ball/mass"}, GradientMethod::kTangent);
+  const GradientResult implicit =
+      JacobianOf(scene, {"bodies/ball/mass"}, GradientMethod::kJetImplicit);
+  ASSERT_TRUE(tangent.done && implicit.done) << tangent.message << implicit.message;
+  EXPECT_EQ(tangent.values, implicit.values);
+}
+
+TEST(GradientJets, WithoutAWidthTheMessageSaysSo) {
+  if (Widest() > 0) {
+    GTEST_SKIP() << "built with Jets";
+  }
+  const GradientResult result = JacobianOf(Balls(1), {"bodies/b0/mass"}, GradientMethod::kJet);
+  EXPECT_FALSE(result.done);
+  EXPECT_NE(result.message.find("no width of Jets was built"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace tangible
