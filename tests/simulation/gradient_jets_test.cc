@@ -22,9 +22,9 @@ Scene Balls(int count) {
   std::string bodies;
   for (int i = 0; i < count; ++i) {
     const std::string n = std::to_string(i);
-    bodies += (i > 0 ? ", " : "") + (R"({"name": "b)" + n + R"(", "mass": 1, "inertia": 1,
-        "linear_damping": 0.5, "position": [)" +
-                                     n + R"(, 0], "velocity": [)" + n + ", 1]}");
+    bodies.append(i > 0 ? ", " : "").append(R"({"name": "b)").append(n);
+    bodies.append(R"(", "mass": 1, "inertia": 1, "linear_damping": 0.5, "position": [)").append(n);
+    bodies.append(R"(, 0], "velocity": [)").append(n).append(", 1]}");
   }
   return test_scenes::SceneOf(R"({"bodies": [)" + bodies +
                               R"(], "simulation": {"dt": 0.01, "duration": 0.2}})");
@@ -50,6 +50,7 @@ TEST(GradientJets, MoreParametersThanAPassTakes) {
   const int count = Widest() + 2;
   const Scene scene = Balls(count);
   std::vector<std::string> paths;
+  paths.reserve(count);
   for (int i = 0; i < count; ++i) {
     paths.push_back("bodies/b" + std::to_string(i) + "/mass");
   }
