@@ -12,7 +12,7 @@ constexpr double kModeTolerance = 1e-12;
 constexpr int kMaxRounds = 20;
 // Changed modes contradict others. Where these are more than in the round before, and more than a
 // few, they will not settle.
-constexpr int kFewContradicted = 2;
+constexpr int kFewContradicted = 5;
 // Pivots: from the guess (and half as many as there are contacts), and as multiples of the number
 // of contacts. An interior point costs about as much as 20 to 40.
 constexpr int kPivotsFromGuess = 40;
@@ -24,6 +24,7 @@ constexpr double kFirstRegularisation = 1e-7;
 constexpr double kLeastRegularisation = 1e-8;
 constexpr int kMaxProximalRounds = 40;
 constexpr double kMaxExtrapolation = 1e6;
+constexpr double kNegligibleImpulse = 1e-6;
 // Complementarities after which the polish is tried; rounding may stop the iteration for one step
 // at the end, so the last is tried several times.
 constexpr double kInteriorPointGoals[] = {1e-10, 1e-14, 1e-18, 1e-22, 1e-26, 1e-26, 1e-26, 1e-26};
@@ -80,8 +81,10 @@ ModeChange Contradiction(const ContactBlock<double>& contact, const ContactValue
 void ExtrapolateImpulses(const ContactProblem<double>& problem,
                          const ContactSolution<double>& before, ContactSolution<double>* solution) {
   double factor = kMaxExtrapolation;
+  // Contacts that are about to open, or that change to and fro, do not hold the others back.
+  const double negligible = kNegligibleImpulse * ImpulseScale(solution->normal_impulse);
   const auto limit = [&](double value, double last) {
-    if (value > 0.0 && value < last) {
+    if (value > negligible && value < last) {
       factor = std::min(factor, value / (last - value));
     }
   };
@@ -307,8 +310,7 @@ bool ContactSolver::SolveByPivoting(const ContactProblem<double>& problem,
     }
     // What δ leaves no longer falls: rows contradict each other by that much, and their impulses
     // grow by as much a step until one meets its limit.
-    if (regularisation == kLeastRegularisation && solution->modes == last_.modes &&
-        report->residual > 0.5 * last_residual) {
+    if (regularisation == kLeastRegularisation && report->residual > 0.5 * last_residual) {
       ExtrapolateImpulses(problem, last_, solution);
     }
     last_residual = report->residual;
