@@ -19,9 +19,11 @@ constexpr int kPivotsFromGuess = 40;
 constexpr int kPivotsFromInteriorPoint = 2;
 constexpr int kPivotsFromOpen = 20;
 // Proximal steps of pivoting: δ falls from step to step. What rounding leaves of redundant impulses
-// is its inverse: at 1e-10 one path in 400 of a pile of 100 discs was lost.
+// is its inverse: at 1e-10 some paths of a dense pile are lost, which shows as a residual kLost
+// times the best; then δ stays larger.
 constexpr double kFirstRegularisation = 1e-7;
-constexpr double kLeastRegularisation = 1e-8;
+constexpr double kLeastRegularisation = 1e-10;
+constexpr double kLost = 10.0;
 constexpr int kMaxProximalRounds = 40;
 constexpr double kMaxExtrapolation = 1e6;
 constexpr double kNegligibleImpulse = 1e-6;
@@ -143,7 +145,7 @@ void ContactSolver::Reserve(int num_bodies, int num_joints, int num_contacts) {
                                  &centre_tangent_}) {
     x->reserve(3 * blocks);
   }
-  for (ContactSolution<double>* solution : {&trial_, &entry_, &last_}) {
+  for (ContactSolution<double>* solution : {&trial_, &entry_, &last_, &best_}) {
     solution->v.reserve(3 * num_bodies);
     solution->joint_impulse.reserve(3 * num_joints);
     solution->normal_impulse.reserve(num_contacts);
@@ -287,34 +289,48 @@ bool ContactSolver::SolveByPivoting(const ContactProblem<double>& problem,
                                     int max_pivots, ContactSolution<double>* solution,
                                     ContactSolverReport* report) {
   double regularisation = kFirstRegularisation;
-  double last_residual = HUGE_VAL;
+  double least = kLeastRegularisation;
+  double best = HUGE_VAL;
   for (int round = 0; round < kMaxProximalRounds; ++round) {
     last_ = *solution;
     const auto follow = [&](ContactPivoting::From start) {
       return pivoting_.Solve(problem, start, regularisation, max_pivots, &system_, solution,
                              &report->factorisations);
     };
-    // From the second round on the path starts where the last one ended.
-    if (!(round > 0 && follow(ContactPivoting::From::kModes)) && !follow(from)) {
+    // From the second round on the path starts where the best one ended.
+    double residual = HUGE_VAL;
+    if ((round > 0 && follow(ContactPivoting::From::kModes)) || follow(from)) {
+      trial_ = *solution;
+      if (SolveByModeChanges(problem, options, &trial_, report)) {
+        std::swap(*solution, trial_);
+        return true;
+      }
+      residual = NaturalResidual(problem, *solution, &report->worst_contact);
+      report->residual = residual;
+      if (residual <= options.tolerance) {
+        ++report->factorisations;
+        return system_.Factor(problem, solution->modes);
+      }
+    } else if (round == 0) {
       return false;
     }
-    trial_ = *solution;
-    if (SolveByModeChanges(problem, options, &trial_, report)) {
-      std::swap(*solution, trial_);
-      return true;
+    const double before = best;
+    if (residual < best) {
+      best = residual;
+      best_ = *solution;
     }
-    report->residual = NaturalResidual(problem, *solution, &report->worst_contact);
-    if (report->residual <= options.tolerance) {
-      ++report->factorisations;
-      return system_.Factor(problem, solution->modes);
-    }
-    // What δ leaves no longer falls: rows contradict each other by that much, and their impulses
-    // grow by as much a step until one meets its limit.
-    if (regularisation == kLeastRegularisation && report->residual > 0.5 * last_residual) {
+    if (residual > kLost * before) {
+      // δ was too small for what rounding leaves: the path ended elsewhere, or nowhere.
+      *solution = best_;
+      least = std::min(10.0 * regularisation, kFirstRegularisation);
+      regularisation = least;
+    } else if (residual > 0.5 * before && regularisation <= least) {
+      // What δ leaves no longer falls: rows contradict each other by that much, and their impulses
+      // grow by as much a step until one meets its limit.
       ExtrapolateImpulses(problem, last_, solution);
+    } else {
+      regularisation = std::max(least, 0.1 * regularisation);
     }
-    last_residual = report->residual;
-    regularisation = std::max(kLeastRegularisation, 0.1 * regularisation);
   }
   return false;
 }
