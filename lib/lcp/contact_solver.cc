@@ -104,14 +104,14 @@ void ExtrapolateImpulses(const ContactProblem<double>& problem,
     }
   }
   factor *= 1.0 + 1e-6;
-  const auto move = [&](const std::vector<double>& from, std::vector<double>* to) {
-    for (size_t i = 0; i < to->size(); ++i) {
-      (*to)[i] += factor * ((*to)[i] - from[i]);
+  for (const auto impulses :
+       {&ContactSolution<double>::normal_impulse, &ContactSolution<double>::tangent_impulse,
+        &ContactSolution<double>::joint_impulse}) {
+    for (size_t i = 0; i < (before.*impulses).size(); ++i) {
+      double& impulse = (solution->*impulses)[i];
+      impulse += factor * (impulse - (before.*impulses)[i]);
     }
-  };
-  move(before.normal_impulse, &solution->normal_impulse);
-  move(before.tangent_impulse, &solution->tangent_impulse);
-  move(before.joint_impulse, &solution->joint_impulse);
+  }
 }
 
 }  // namespace
@@ -340,8 +340,7 @@ bool ContactSolver::Polish(const ContactProblem<double>& problem,
                            ContactSolverReport* report) {
   int worst = -1;
   double before = NaturalResidual(problem, *solution, &worst);
-  // A round may show that a row near its limit was judged wrongly; two more put it right or give
-  // up.
+  // A round may show that a row near its limit was judged wrongly; two more put it right or not.
   for (int round = 0; round < 3; ++round) {
     trial_ = *solution;
     SetCentre(*solution);
@@ -414,6 +413,7 @@ void ContactSolver::MeasureWithoutContacts(const ContactProblem<double>& problem
   solution->modes.assign(problem.contacts.size(), ContactMode::kOpen);
   solution->normal_impulse.assign(problem.contacts.size(), 0.0);
   solution->tangent_impulse.assign(problem.contacts.size(), 0.0);
+  SetCentre(*solution);
   if (!SolveWithModes(problem, solution, report)) {
     solution->v.resize(problem.momentum.size());
     for (size_t i = 0; i < solution->v.size(); ++i) {
