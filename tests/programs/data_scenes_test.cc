@@ -31,8 +31,8 @@ bool HaveJets() {
 
 // At most so many numbers through unrolled Jets, evenly spread: they take a hundred times longer.
 constexpr int kMaxUnrolled = 24;
-// Longer runs are cut here, after the chain's impact at a 20 times finer step: their derivatives
-// are summed from as many steps, but each number takes nine runs of differences.
+// Longer runs are cut here: their derivatives are summed from as many steps, but each number takes
+// nine runs of differences.
 constexpr double kMaxSteps = 2000;
 // An entry of differences whose own error estimate is above this fraction decides nothing.
 constexpr double kResolved = 1e-3;

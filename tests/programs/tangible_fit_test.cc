@@ -101,6 +101,20 @@ TEST_F(TangibleFitTest, FlagsOverrideTheFile) {
   EXPECT_EQ(Run("tangible-fit", "--help").exit_status, 0);
 }
 
+// The chain's fit by event stepping (data/README.md): no bias of the step, the interval holds the
+// mass that the observations were made with.
+TEST_F(TangibleFitTest, ChainByEventsCoversTheTrueMass) {
+  const ProgramRun run =
+      Run("tangible-fit",
+          TANGIBLE_SOURCE_DIR "/data/fits/chain_event.json --out='" + Path("r.json") + "'");
+  ASSERT_EQ(run.exit_status, 0) << run.error;
+  const json result = json::parse(Read(Path("r.json")));
+  const json& interval = result.at("parameters").at(0).at("confidence_95");
+  EXPECT_LE(interval.at(0).get<double>(), 7.0);
+  EXPECT_GE(interval.at(1).get<double>(), 7.0);
+  EXPECT_LT(interval.at(1).get<double>() - interval.at(0).get<double>(), 0.003);
+}
+
 TEST_F(TangibleFitTest, MistakesAreOneLineWithTheirPlace) {
   const json parameters = Problem()["parameters"];
   const auto with = [&parameters](const json& more) {
