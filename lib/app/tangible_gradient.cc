@@ -20,6 +20,9 @@
 
 DEFINE_string(parameters, "", "paths of the parameters, separated by commas");
 DEFINE_string(method, "adjoint", "adjoint, tangent, jet, jet_implicit or finite_difference");
+DEFINE_string(side, "both",
+              "at kinks: both (one element of the generalised Jacobian), or the one-sided "
+              "derivatives for growing (plus) or shrinking (minus) parameters; with tangent");
 DEFINE_double(step, 0.0, "of finite differences, in the parameter's unit; 0: 6e-6 max(|p|, scale)");
 DEFINE_string(loss, "", "file of a scalar loss (JSON) to differentiate instead of the final state");
 DEFINE_int32(repeat, 1, "runs of which the best times are told");
@@ -60,6 +63,12 @@ std::string CheckFlags(GradientOptions* options) {
   if (FLAGS_factorisations != "keep" && FLAGS_factorisations != "recompute") {
     return "--factorisations: expected keep or recompute, got '" + FLAGS_factorisations + "'";
   }
+  if (FLAGS_side != "both" && FLAGS_side != "plus" && FLAGS_side != "minus") {
+    return "--side: expected both, plus or minus, got '" + FLAGS_side + "'";
+  }
+  if (FLAGS_side != "both" && options->method != GradientMethod::kTangent) {
+    return "--side: expected --method=tangent with it, got '" + FLAGS_method + "'";
+  }
   if (!(FLAGS_step >= 0.0 && std::isfinite(FLAGS_step))) {
     return "--step: expected a number >= 0, got " + FormatNumber(FLAGS_step);
   }
@@ -71,6 +80,9 @@ std::string CheckFlags(GradientOptions* options) {
     return "--parameters: expected paths separated by commas, got '" + FLAGS_parameters + "'";
   }
   options->step = FLAGS_step;
+  options->side = FLAGS_side == "plus"    ? DerivativeSide::kPlus
+                  : FLAGS_side == "minus" ? DerivativeSide::kMinus
+                                          : DerivativeSide::kBoth;
   options->repeat = FLAGS_repeat;
   options->factorisations =
       FLAGS_factorisations == "keep" ? Factorisations::kKeep : Factorisations::kRecompute;
@@ -164,7 +176,7 @@ int main(int argc, char** argv) {
       {.name = "tangible-gradient",
        .synopsis = "SCENE.json --parameters=P1,P2 "
                    "--method=adjoint|tangent|jet|jet_implicit|finite_difference [--step=H] "
-                   "[--loss=L.json] [--out=G.json]",
+                   "[--side=plus|minus] [--loss=L.json] [--out=G.json]",
        .description = "Differentiates the final state of every moving body, or with --loss a "
                       "scalar of it, with respect to\nparameters of the scene, and certifies the "
                       "result.",

@@ -9,13 +9,11 @@
 #include "tangible/lcp/contact_conditioning.h"
 #include "tangible/simulation/certify_place_inl.h"
 #include "tangible/simulation/feature_ties.h"
+#include "tangible/simulation/rollout_directional.h"
 
 namespace tangible {
 namespace {
 
-// Impulses and slacks below this fraction of their scales are 0: two orders above what a solve
-// leaves.
-constexpr double kDegenerate = 1e-10;
 // Beyond this many unknowns the rank is determined anew only where modes change.
 constexpr size_t kRankEachStep = 150;
 // s; edges of force windows nearer to a step's boundary than this are on it.
@@ -44,25 +42,6 @@ Approach ApproachOf(const ModelStructure& s, const StepRecord& r, size_t i) {
   add(contact.a, block.normal_a);
   add(contact.b, block.normal_b);
   return approach;
-}
-
-// Whether an open contact's slack n·v⁺ + c is within the rounding of its gap over h: it touches at
-// no speed, and whether it closes is open.
-bool JustTouches(const StepRecord& record, size_t i) {
-  constexpr double kRoundings = 64.0;
-  const ActiveContact& contact = record.contacts[i];
-  const ContactBlock<double>& block = record.problem.contacts[i];
-  const double slack =
-      RowDot(block.a, block.normal_a, block.b, block.normal_b, record.solution.v.data()) +
-      block.c_n;
-  double coordinate = 0.0;
-  for (const int body : {contact.a, contact.b}) {
-    if (body >= 0) {
-      coordinate = std::max({coordinate, std::abs(record.before.pose[3 * body]),
-                             std::abs(record.before.pose[3 * body + 1])});
-    }
-  }
-  return slack <= kRoundings * std::numeric_limits<double>::epsilon() * coordinate / record.h;
 }
 
 }  // namespace
@@ -124,7 +103,7 @@ void RolloutCertifier::AddContact(const Model<double>& model, const StepRecord& 
   const bool slides = SlidingSign(place.mode) != 0.0;
   const bool touches = place.mode == ContactMode::kOpen && JustTouches(record, place.contact);
   // A scaled margin compares a slack with its own terms, which may all be rounding.
-  if (touches && !(margin.value < kDegenerate)) {
+  if (touches && !(margin.value < kDegenerateTolerance)) {
     ++certificate_.degenerate_rows;
   }
   AddMargin(touches ? 0.0 : margin.value, place, slides ? "sliding" : ModeName(place.mode));
@@ -262,7 +241,7 @@ void RolloutCertifier::AddStep(const Model<double>& model, long step, Stepper* s
   }
   closed_.swap(closed);
   std::vector<int> degenerate;
-  FindDegenerateContacts(record.problem, record.solution, kDegenerate, &degenerate);
+  FindDegenerateContacts(record.problem, record.solution, kDegenerateTolerance, &degenerate);
   certificate_.degenerate_rows += static_cast<int>(degenerate.size());
   AddLinearSystem(record, &stepper->system());
   AddFeatures(model, record, step, &stepper->system());

@@ -8,6 +8,7 @@
 #include "tangible/scene/scene_names.h"
 #include "tangible/simulation/certify.h"
 #include "tangible/simulation/gradient_methods.h"
+#include "tangible/simulation/rollout_directional.h"
 #include "tangible/simulation/rollout_tangent.h"
 #include "tangible/simulation/settings.h"
 
@@ -94,11 +95,19 @@ bool ByAdjoint(const GradientProblem& problem, Factorisations factorisations,
   return true;
 }
 
-bool ByTangent(const GradientProblem& problem, GradientResult* result) {
+bool ByTangent(const GradientProblem& problem, DerivativeSide side, GradientResult* result) {
   RowMatrixXd w_dot =
       VariableJacobian(problem.scene, problem.structure, problem.directions).toDense();
   State<double> final;
-  const RolloutReport report = RolloutTangent(problem.model, problem.initial, {}, &w_dot, &final);
+  RolloutReport report;
+  if (side == DerivativeSide::kBoth || problem.structure->settings.stepping == Stepping::kEvent) {
+    report = RolloutTangent(problem.model, problem.initial, {}, &w_dot, &final);
+  } else {
+    const double sign = side == DerivativeSide::kPlus ? 1.0 : -1.0;
+    w_dot *= sign;
+    report = RolloutDirectional(problem.model, problem.initial, &w_dot, &final);
+    w_dot *= sign;
+  }
   result->message = FailureOf(problem, report);
   if (!result->message.empty()) {
     return false;
@@ -118,7 +127,7 @@ bool ByColumns(const GradientProblem& problem, const GradientOptions& options,
   result->fallbacks = 0;
   switch (options.method) {
     case GradientMethod::kTangent:
-      return ByTangent(problem, result);
+      return ByTangent(problem, options.side, result);
     case GradientMethod::kJet:
       return internal::JacobianByJets(problem, JetRoute::kUnrolled, result);
     case GradientMethod::kJetImplicit:
@@ -197,6 +206,47 @@ void CheckRedundantRows(const GradientProblem& problem, Certificate* certificate
   }
 }
 
+// Empty, or one line: why the derivative has no such side.
+std::string CheckSide(const GradientProblem& problem, const GradientOptions& options) {
+  if (options.side == DerivativeSide::kBoth) {
+    return "";
+  }
+  if (options.method != GradientMethod::kTangent) {
+    return "one-sided derivatives: expected the method tangent";
+  }
+  Scene scene = problem.scene;
+  const std::vector<SceneNumber<double>> numbers = EnumerateNumbers(&scene);
+  const bool plus = options.side == DerivativeSide::kPlus;
+  const double towards = plus ? HUGE_VAL : -HUGE_VAL;
+  for (const ParameterPath& parameter : problem.parameters) {
+    for (const int number : parameter.numbers) {
+      if (!IsAllowed(numbers[number].kind, std::nextafter(*numbers[number].value, towards))) {
+        return "parameter " + parameter.path + ": it has no derivative from " +
+               (plus ? "above" : "below") + " at the end of its range, expected " +
+               Describe(parameter.kind);
+      }
+    }
+  }
+  return "";
+}
+
+// What one-sided derivatives do not resolve: a message that fails them, or a note.
+void JudgeSide(const GradientProblem& problem, const GradientOptions& options,
+               GradientResult* result) {
+  const Certificate& certificate = result->certificate;
+  if (options.side == DerivativeSide::kBoth || certificate.verdict == "trustworthy") {
+    return;
+  }
+  if (problem.structure->settings.stepping == Stepping::kEvent) {
+    result->message = "one-sided derivatives of event stepping: only where there is no kink, got " +
+                      certificate.verdict;
+  } else if (certificate.degenerate_rows == 0 || !certificate.discontinuous.empty() ||
+             !certificate.one_sided.empty()) {
+    result->notes.push_back("one-sided derivatives resolve contacts at a kink alone, not: " +
+                            certificate.verdict);
+  }
+}
+
 GradientResult Differentiate(const GradientProblem& problem, const GradientOptions& options,
                              const OutputSeed& output_seed, RowMatrixXd* derivative) {
   GradientResult result;
@@ -204,6 +254,10 @@ GradientResult Differentiate(const GradientProblem& problem, const GradientOptio
   std::string error;
   if (!CheckSettings(problem.scene.simulation, &error)) {
     result.message = (problem.scene.path.empty() ? "" : problem.scene.path + ": ") + error;
+    return result;
+  }
+  result.message = CheckSide(problem, options);
+  if (!result.message.empty()) {
     return result;
   }
   const int repeat = std::max(1, options.repeat);
@@ -218,15 +272,17 @@ GradientResult Differentiate(const GradientProblem& problem, const GradientOptio
     }
     result.seconds = Best(result.seconds, Seconds() - start);
   }
-  if (options.certificate == CertificatePass::kRun) {
+  // Event stepping needs the certificate to tell whether there are sides.
+  if (options.certificate == CertificatePass::kRun || options.side != DerivativeSide::kBoth) {
     RolloutReport report;
     result.certificate =
         CertifyRollout(problem.model, problem.initial, {WantedNumbers(problem)}, &report);
     if (result.certificate.redundant_rows > 0) {
       CheckRedundantRows(problem, &result.certificate);
     }
+    JudgeSide(problem, options, &result);
   }
-  result.done = true;
+  result.done = result.message.empty();
   return result;
 }
 

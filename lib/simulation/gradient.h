@@ -35,10 +35,17 @@ inline constexpr std::pair<const char*, GradientMethod> kGradientMethodNames[] =
 
 enum class CertificatePass { kRun, kSkip };
 
+/// At a kink: one element of the generalised Jacobian (that of the modes found); or the derivative
+/// for growing parameters (kPlus), or for shrinking ones (kMinus: lim (f(p) − f(p − h)) / h), each
+/// parameter alone. One-sided: fixed steps and the tangent (rollout_directional.h); with event
+/// stepping only where the certificate finds no kink.
+enum class DerivativeSide { kBoth, kPlus, kMinus };
+
 struct GradientOptions {
   GradientMethod method = GradientMethod::kAdjoint;
   /// Of finite differences, in the parameter's unit; 0: 6e-6 max(|p|, the parameter's scale).
   double step = 0.0;
+  DerivativeSide side = DerivativeSide::kBoth;
   Factorisations factorisations = Factorisations::kKeep;  ///< of the adjoint
   int repeat = 1;                                         ///< the times are the best of so many
   CertificatePass certificate = CertificatePass::kRun;    ///< one more rollout, not timed

@@ -6,6 +6,25 @@
 
 namespace tangible {
 
+void AdvanceTangent(const Model<double>& model, Stepper* stepper, const double* twists,
+                    RowMatrixXd* w_dot) {
+  const ModelStructure& s = *model.structure;
+  const int columns = static_cast<int>(w_dot->cols());
+  for (int k = 0; k < s.num_blocks(); ++k) {
+    std::copy_n(twists + 3 * static_cast<size_t>(k) * columns, 3 * columns,
+                w_dot->data() + static_cast<size_t>(s.TwistVariable(s.moving[k], 0)) * columns);
+  }
+  for (int body = 0; body < s.num_bodies(); ++body) {
+    for (int i = 0; i < 3 && s.bodies[body].motion != Motion::kStatic; ++i) {
+      w_dot->row(s.PoseVariable(body, i)) +=
+          stepper->record().h * w_dot->row(s.TwistVariable(body, i));
+    }
+  }
+  if (s.settings.joint_correction == JointCorrection::kProjection && !s.joints.empty()) {
+    stepper->projection().Tangent(model, w_dot->data(), columns);
+  }
+}
+
 void StepTangent::Assemble(const Model<double>& model, Stepper* stepper, const RowMatrixXd& w_dot) {
   const StepRecord& record = stepper->record();
   ContactSystem& system = stepper->system();
@@ -70,23 +89,10 @@ double StepTangent::ApplyAndMeasure(const Model<double>& model, Stepper* stepper
 }
 
 double StepTangent::Finish(const Model<double>& model, Stepper* stepper, RowMatrixXd* w_dot) {
-  const ModelStructure& s = *model.structure;
   const StepRecord& record = stepper->record();
-  ContactSystem& system = stepper->system();
-  const int columns = static_cast<int>(w_dot->cols());
-  const double left = system.Solve(record.problem, record.solution.modes, rhs_.data(), columns);
-  for (int k = 0; k < s.num_blocks(); ++k) {
-    std::copy_n(&rhs_[3 * static_cast<size_t>(k) * columns], 3 * columns,
-                w_dot->data() + static_cast<size_t>(s.TwistVariable(s.moving[k], 0)) * columns);
-  }
-  for (int body = 0; body < s.num_bodies(); ++body) {
-    for (int i = 0; i < 3 && s.bodies[body].motion != Motion::kStatic; ++i) {
-      w_dot->row(s.PoseVariable(body, i)) += record.h * w_dot->row(s.TwistVariable(body, i));
-    }
-  }
-  if (s.settings.joint_correction == JointCorrection::kProjection && !s.joints.empty()) {
-    stepper->projection().Tangent(model, w_dot->data(), columns);
-  }
+  const double left = stepper->system().Solve(record.problem, record.solution.modes, rhs_.data(),
+                                              static_cast<int>(w_dot->cols()));
+  AdvanceTangent(model, stepper, rhs_.data(), w_dot);
   return left;
 }
 

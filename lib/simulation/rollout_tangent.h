@@ -23,6 +23,11 @@ RolloutReport RolloutTangent(const Model<double>& model, const State<double>& in
                              const TangentObserver& observer, RowMatrixXd* w_dot,
                              State<double>* final);
 
+/// From the derivatives of the new twists of moving blocks (3 num_blocks x columns, row-major) to
+/// those of the state after the step: poses move with them, and are projected.
+void AdvanceTangent(const Model<double>& model, Stepper* stepper, const double* twists,
+                    RowMatrixXd* w_dot);
+
 /// The tangent of the step that the stepper has just done.
 class StepTangent {
  public:
