@@ -9,6 +9,11 @@
 // derivatives of piecewise smooth maps obey the chain rule, so that what comes out is
 // lim (x(w + τ ẇ) − x(w)) / τ for τ → 0 from above; it is positively homogeneous in ẇ, not linear.
 //
+// Where redundant contacts contradict a direction (one of three supports in a row is raised), the
+// impulses that they share are not those at hand, but those that the direction singles out: they
+// are found from the linearised step a small way along it, and only their modes are taken from
+// there.
+//
 // What is resolved: contacts and joint limits that touch without force, friction at its limit, and
 // friction that leaves 0. What is not: ties of corners and edges, of the mixing rule, of the law's
 // constants and of force windows with steps, and jumps.
@@ -38,15 +43,24 @@ class StepDirectional {
              std::string* message);
 
  private:
-  bool FindKinks(const Model<double>& model, const StepRecord& record, const RowMatrixXd& w_dot);
-  bool Solve(const Model<double>& model, const StepRecord& record, const RowMatrixXd& w_dot,
-             std::string* message);
+  using Status = ContactDirectional::Status;
+  bool FindKinks(const Model<double>& model, const StepRecord& record,
+                 const ContactSolution<double>& solution, const RowMatrixXd& w_dot);
+  Status SolveColumns(const Model<double>& model, const StepRecord& record,
+                      const ContactSolution<double>& solution, const RowMatrixXd& w_dot,
+                      RowMatrixXd* v_dot);
+  Status SolveOne(const Model<double>& model, const StepRecord& record, const RowMatrixXd& w_dot,
+                  RowMatrixXd* v_dot);
+  bool ChooseImpulses(const Model<double>& model, const StepRecord& record,
+                      const RowMatrixXd& w_dot, ContactSolution<double>* solution);
+  void MoveAlong(const Model<double>& model, const StepRecord& record, const RowMatrixXd& w_dot,
+                 ContactProblem<double>* problem);
 
   StepTangent tangent_;
   ContactDirectional directional_;
+  ContactSolver solver_;
   std::vector<ContactKink> kinks_;
   RowMatrixXd friction_;  // μ̇, contacts x columns
-  std::vector<double> rates_;
   LocalJacobianScratch scratch_;
 };
 
