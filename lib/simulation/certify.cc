@@ -314,4 +314,52 @@ Certificate CertifyRollout(const Model<double>& model, const State<double>& init
   return CertifyRollout(model, initial, {}, &report);
 }
 
+namespace {
+
+// Places of the model's numbers that the directions change.
+std::vector<int> NumbersOf(const ModelStructure& structure, const RowMatrixXd& directions) {
+  std::vector<int> numbers;
+  for (int i = 0; i < structure.num_numbers; ++i) {
+    if (!directions.row(structure.NumberVariable(i)).isZero(0.0)) {
+      numbers.push_back(i);
+    }
+  }
+  return numbers;
+}
+
+// How far the directions exceed what redundant rows allow (StepTangent::ApplyAndMeasure).
+double MeasureContradiction(const Model<double>& model, const State<double>& initial,
+                            RowMatrixXd directions) {
+  StepTangent tangent;
+  double worst = 0.0;
+  State<double> final;
+  Rollout(
+      model, initial,
+      [&](long, double, const State<double>&, Stepper* stepper) {
+        if (stepper != nullptr) {
+          const double measured = tangent.ApplyAndMeasure(model, stepper, &directions);
+          worst = measured <= worst ? worst : measured;
+        }
+      },
+      &final);
+  return worst;
+}
+
+}  // namespace
+
+Certificate CertifyDerivative(const Model<double>& model, const State<double>& initial,
+                              const RowMatrixXd& directions,
+                              const std::vector<std::string>& names) {
+  constexpr double kMostExceeded = 1e6;
+  RolloutReport report;
+  Certificate certificate = CertifyRollout(
+      model, initial, {NumbersOf(*model.structure, directions), directions, names}, &report);
+  if (certificate.redundant_rows > 0 && certificate.one_sided.empty() &&
+      !(MeasureContradiction(model, initial, directions) < kMostExceeded)) {
+    certificate.one_sided = kContradictingRows;
+    SetVerdict(certificate);
+  }
+  return certificate;
+}
+
 }  // namespace tangible

@@ -12,7 +12,10 @@
 //                  e > 0; and a landing in the last step, whose twist has derivatives of order 1/h
 //                  that the next step would cancel
 //   one-sided      friction exactly 0, a tie of the mixing rule, an edge of a force's window on a
-//                  step's boundary: only where derivatives with respect to these numbers are wanted
+//   step's
+//                  boundary: only where derivatives with respect to these numbers are wanted; and
+//                  with event stepping a contact that touches as the run starts, where a direction
+//                  opens or closes its gap: one side falls and lands, the other is pushed out
 //   linear systems redundant rows, condition, residual (contact_conditioning.h), of every step
 
 #include <string>
@@ -29,6 +32,10 @@ inline constexpr double kNearJumpMargin = 1e-6;
 struct CertifyOptions {
   /// Places in the model's numbers that derivatives are taken with respect to, ascending.
   std::vector<int> numbers;
+  /// The directions of [initial poses | initial twists | numbers] that derivatives are taken along,
+  /// a column each, and what they are called.
+  RowMatrixXd directions;
+  std::vector<std::string> names;
 };
 
 /// Collects the certificate step by step.
@@ -48,6 +55,7 @@ class RolloutCertifier {
   void AddMargin(double margin, const Place& place, const std::string& what);
   void AddJump(double margin, const Place& place, const std::string& what);
   void AddEventStep(const Model<double>& model, long step, Stepper* stepper);
+  void AddStart(const Model<double>& model, const EventRecord& record);
   void AddImpact(const Model<double>& model, long step, Impulses* impact);
   void AddSegment(const Model<double>& model, long step, EventDerivative* derivative,
                   Segment* segment);
@@ -84,6 +92,17 @@ class RolloutCertifier {
 Certificate CertifyRollout(const Model<double>& model, const State<double>& initial,
                            const CertifyOptions& options, RolloutReport* report);
 Certificate CertifyRollout(const Model<double>& model, const State<double>& initial);
+
+/// The reason of a verdict `one-sided` where the certificate finds that a direction contradicts
+/// redundant rows: one contact would open or slip and the others not.
+inline constexpr char kContradictingRows[] =
+    "redundant contacts contradict the change of a parameter";
+
+/// The certificate of the derivatives along `directions` (num_variables x columns, named): of the
+/// rollout, and where rows are redundant (a box on a box) of whether each direction agrees with
+/// them. Two rollouts where they are.
+Certificate CertifyDerivative(const Model<double>& model, const State<double>& initial,
+                              const RowMatrixXd& directions, const std::vector<std::string>& names);
 
 /// "contact of ball and floor", "low limit of joint hinge".
 std::string ContactName(const ModelStructure& structure, const ActiveContact& contact);

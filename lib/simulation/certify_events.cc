@@ -6,12 +6,16 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tangible/dynamics/contact_gradient.h"
 #include "tangible/lcp/contact_conditioning.h"
 #include "tangible/simulation/certify_place_inl.h"
 #include "tangible/simulation/segment_flow.h"
 
 namespace tangible {
 namespace {
+
+// m or rad; a gap of this size is more than rounding: the contact does not just touch.
+constexpr double kTouching = 1e-9;
 
 const char* EventName(EventKind kind) {
   switch (kind) {
@@ -236,8 +240,51 @@ void RolloutCertifier::AddSegment(const Model<double>& model, long step,
   AddQuality(start.problem, segment->modes, &start.system);
 }
 
+// Contacts that touch as the run starts: in the impacts of its first instant and in the first
+// segment.
+void RolloutCertifier::AddStart(const Model<double>& model, const EventRecord& record) {
+  constexpr double kUnmoved = 1e-12;  // of a gap, m for a unit of a parameter and of its terms
+  std::vector<const ActiveContact*> touching;
+  const State<double>* start = nullptr;
+  for (int p = 0; p < record.num_parts; ++p) {
+    const EventPart& part = *record.parts[p];
+    const std::vector<ActiveContact>& contacts =
+        part.is_impulses ? part.impulses.contacts : part.segment.contacts;
+    start = start != nullptr   ? start
+            : part.is_impulses ? &part.impulses.before
+                               : &part.segment.before;
+    for (const ActiveContact& contact : contacts) {
+      touching.push_back(&contact);
+    }
+    if (!part.is_impulses && part.segment.length > 0.0) {
+      break;
+    }
+  }
+  LocalJacobianScratch scratch;
+  for (const ActiveContact* contact : touching) {
+    std::vector<JacobianEntry> entries;
+    AddGapGradient(model, *start, *contact, &scratch, &entries);
+    for (Eigen::Index c = 0; c < options_.directions.cols(); ++c) {
+      double rate = 0.0;
+      double terms = 0.0;
+      for (const JacobianEntry& entry : entries) {
+        const double term = entry.value * options_.directions(entry.variable, c);
+        rate += term;
+        terms += std::abs(term);
+      }
+      if (std::abs(rate) > kUnmoved * terms && contact->gap > -kTouching) {
+        OneSided(ContactName(*model.structure, *contact) + " touches at the start, " +
+                 options_.names[static_cast<size_t>(c)] + " changes its gap");
+      }
+    }
+  }
+}
+
 void RolloutCertifier::AddEventStep(const Model<double>& model, long step, Stepper* stepper) {
   EventRecord& record = stepper->events().mutable_record();
+  if (step == 0 && options_.directions.cols() > 0) {
+    AddStart(model, record);
+  }
   for (int p = 0; p < record.num_parts; ++p) {
     EventPart& part = *record.parts[p];
     if (part.is_impulses) {

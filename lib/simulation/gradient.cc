@@ -165,47 +165,14 @@ bool TimeRollout(const GradientProblem& problem, int repeat, GradientResult* res
   return true;
 }
 
-// Places of the model's numbers that the parameters change.
-std::vector<int> WantedNumbers(const GradientProblem& problem) {
-  const Eigen::SparseMatrix<double> map =
-      VariableJacobian(problem.scene, problem.structure, problem.directions);
-  const int first = problem.structure->NumberVariable(0);
-  std::vector<int> numbers;
-  for (int column = 0; column < map.outerSize(); ++column) {
-    for (Eigen::SparseMatrix<double>::InnerIterator it(map, column); it; ++it) {
-      if (it.row() >= first) {
-        numbers.push_back(static_cast<int>(it.row()) - first);
-      }
-    }
+Certificate CertificateOf(const GradientProblem& problem) {
+  std::vector<std::string> names;
+  for (const ParameterPath& parameter : problem.parameters) {
+    names.push_back(parameter.path);
   }
-  std::sort(numbers.begin(), numbers.end());
-  numbers.erase(std::unique(numbers.begin(), numbers.end()), numbers.end());
-  return numbers;
-}
-
-constexpr char kContradiction[] = "redundant contacts contradict the change of a parameter";
-
-// Where rows are redundant (a box on a box), says so if a parameter's perturbation contradicts
-// them: one contact would open or slip and the other not, and no derivative exists.
-void CheckRedundantRows(const GradientProblem& problem, Certificate* certificate) {
-  constexpr double kMostExceeded = 1e6;
-  StepTangent tangent;
-  RowMatrixXd w_dot =
-      RowMatrixXd(VariableJacobian(problem.scene, problem.structure, problem.directions));
-  double worst = 0.0;
-  State<double> final;
-  Rollout(
+  return CertifyDerivative(
       problem.model, problem.initial,
-      [&](long, double, const State<double>&, Stepper* stepper) {
-        if (stepper != nullptr) {
-          worst = std::max(worst, tangent.ApplyAndMeasure(problem.model, stepper, &w_dot));
-        }
-      },
-      &final);
-  if (!(worst < kMostExceeded)) {
-    certificate->one_sided = kContradiction;
-    SetVerdict(*certificate);
-  }
+      RowMatrixXd(VariableJacobian(problem.scene, problem.structure, problem.directions)), names);
 }
 
 // Empty, or one line: why the derivative has no such side.
@@ -244,9 +211,10 @@ void JudgeSide(const GradientProblem& problem, const GradientOptions& options,
                       certificate.verdict;
     return;
   }
-  const bool resolved = certificate.degenerate_rows > 0 || certificate.one_sided == kContradiction;
+  const bool resolved =
+      certificate.degenerate_rows > 0 || certificate.one_sided == kContradictingRows;
   if (!resolved || !certificate.discontinuous.empty() ||
-      (!certificate.one_sided.empty() && certificate.one_sided != kContradiction)) {
+      (!certificate.one_sided.empty() && certificate.one_sided != kContradictingRows)) {
     result->notes.push_back("one-sided derivatives resolve contacts at a kink alone, not: " +
                             certificate.verdict);
   }
@@ -279,12 +247,7 @@ GradientResult Differentiate(const GradientProblem& problem, const GradientOptio
   }
   // Event stepping needs the certificate to tell whether there are sides.
   if (options.certificate == CertificatePass::kRun || options.side != DerivativeSide::kBoth) {
-    RolloutReport report;
-    result.certificate =
-        CertifyRollout(problem.model, problem.initial, {WantedNumbers(problem)}, &report);
-    if (result.certificate.redundant_rows > 0) {
-      CheckRedundantRows(problem, &result.certificate);
-    }
+    result.certificate = CertificateOf(problem);
     JudgeSide(problem, options, &result);
   }
   result.done = result.message.empty();
