@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tangible/lcp/joint_damping.h"
+
 namespace tangible {
 namespace {
 
@@ -298,15 +300,19 @@ void ContactSystem::AddContacts(const ContactProblem<double>& problem,
   }
 }
 
-bool ContactSystem::Factor(const ContactProblem<double>& problem,
+bool ContactSystem::Factor(const ContactProblem<double>& given,
                            const std::vector<ContactMode>& modes, double regularisation) {
+  const bool spread = HasSpreadJoints(given);
+  const ContactProblem<double> damped = spread ? WithJointDampers(given) : ContactProblem<double>();
+  const ContactProblem<double>& problem = spread ? damped : given;
   SetPattern(problem, modes);
   lu_.SetZero();
   regularisation_.assign(3 * static_cast<size_t>(lu_.num_blocks()), 0.0);
   AddBodies(problem);
   AddJoints(problem, regularisation);
   AddContacts(problem, modes, regularisation);
-  regularised_ = problem.redundant_joints && !problem.joints.empty();
+  // What is solved in another form is refined as what is regularised.
+  regularised_ = spread || (problem.redundant_joints && !problem.joints.empty());
   for (const int block : contact_block_) {
     regularised_ = regularised_ || block >= 0;
   }
@@ -370,17 +376,11 @@ double ContactSystem::RefinedSolve(const ContactProblem<double>& problem,
   const size_t size = 3 * static_cast<size_t>(num_blocks()) * columns;
   rhs_.assign(x, x + size);
   correction_.resize(size);
-  const auto solve = [&](double* r) {
-    if (kTransposed) {
-      lu_.SolveTransposed(r, columns);
-    } else {
-      lu_.Solve(r, columns);
-    }
-  };
-  solve(x);
+  const auto solve = kTransposed ? SolveTransposedByFactors : SolveByFactors;
+  solve(lu_, problem, x, columns);
   double left = Residual<kTransposed>(problem, modes, rhs_.data(), x, columns, correction_.data());
   for (int i = 0; i < kMaxRefinements && left > kResidualGoal; ++i) {
-    solve(correction_.data());
+    solve(lu_, problem, correction_.data(), columns);
     for (size_t k = 0; k < size; ++k) {
       x[k] += correction_[k];
     }
@@ -417,7 +417,7 @@ double ContactSystem::SolveRegularised(const ContactProblem<double>& problem,
                                        int columns) {
   const size_t size = 3 * static_cast<size_t>(num_blocks()) * columns;
   rhs_.assign(x, x + size);
-  lu_.Solve(x, columns);
+  SolveByFactors(lu_, problem, x, columns);
   return Refine(problem, modes, Regularisation::kKept, x, columns);
 }
 
@@ -429,13 +429,13 @@ double ContactSystem::SolveProximal(const ContactProblem<double>& problem,
   }
   const size_t size = 3 * static_cast<size_t>(num_blocks()) * columns;
   rhs_.assign(x, x + size);
-  lu_.Solve(x, columns);
+  SolveByFactors(lu_, problem, x, columns);
   const double left = Refine(problem, modes, Regularisation::kLeftOut, x, columns);
   if (left <= kConsistent) {
     return left;
   }
   std::copy(rhs_.begin(), rhs_.end(), x);
-  lu_.Solve(x, columns);
+  SolveByFactors(lu_, problem, x, columns);
   Refine(problem, modes, Regularisation::kKept, x, columns);
   return Refine(problem, modes, Regularisation::kLeftOut, x, columns);
 }
@@ -454,7 +454,7 @@ double ContactSystem::Refine(const ContactProblem<double>& problem,
   double left = residual();
   for (int i = 0; i < kMaxRefinements && left > kResidualGoal; ++i) {
     last_.assign(x, x + size);
-    lu_.Solve(correction_.data(), columns);
+    SolveByFactors(lu_, problem, correction_.data(), columns);
     for (size_t k = 0; k < size; ++k) {
       x[k] += correction_[k];
     }
