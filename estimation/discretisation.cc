@@ -10,6 +10,7 @@ DiscretisationCheck CheckDiscretisation(const FitProblem& problem, const FitResu
   half.scene.simulation.dt = 0.5 * check.dt;
   half.options.starts = 1;
   half.options.segments = 1;
+  half.options.certificate = CertificatePass::kSkip;
   for (size_t k = 0; k < half.parameters.size(); ++k) {
     half.parameters[k].initial = result.estimate[static_cast<Eigen::Index>(k)];
   }

@@ -9,6 +9,7 @@
 
 #include "tangible/estimation/minimise.h"
 #include "tangible/estimation/shooting.h"
+#include "tangible/simulation/certify.h"
 
 namespace tangible {
 namespace {
@@ -159,6 +160,27 @@ void Finish(const FitOptions& options, const RolloutResiduals& residuals, const 
                                             best.residuals, best.jacobian, uncertainty);
 }
 
+// At the estimate, along the parameters that set numbers of the scene.
+void Certify(RolloutResiduals* residuals, FitResult* result) {
+  if (!residuals->SetParameters(result->estimate)) {
+    return;
+  }
+  const ParameterizedScene& scene = residuals->scene();
+  std::vector<std::string> names;
+  for (const ParameterizedScene::Entry& entry : scene.entries()) {
+    names.push_back(entry.name);
+  }
+  result->certificate =
+      CertifyDerivative(scene.model(), scene.initial_state(), scene.VariableDerivatives(), names);
+  if (result->certificate.verdict != "trustworthy") {
+    const std::string warning =
+        "the derivatives at the estimate, and with them the intervals, are not trustworthy: " +
+        result->certificate.verdict;
+    result->uncertainty.warnings.push_back(warning);
+    result->message += (result->message.empty() ? "" : "; ") + warning;
+  }
+}
+
 }  // namespace
 
 const char* NameOf(FitStatus status) {
@@ -220,6 +242,9 @@ FitResult Fit(const FitOptions& options, RolloutResiduals* residuals, const FitP
   }
   result.rollouts = residuals->rollouts() - rollouts_before;
   result.seconds = elapsed();
+  if (result.estimate.size() > 0 && options.certificate == CertificatePass::kRun) {
+    Certify(residuals, &result);
+  }
   return result;
 }
 

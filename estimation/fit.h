@@ -22,6 +22,7 @@
 
 #include "tangible/estimation/residual.h"
 #include "tangible/estimation/uncertainty.h"
+#include "tangible/simulation/gradient.h"
 
 namespace tangible {
 
@@ -32,6 +33,8 @@ struct FitOptions {
   int starts = 1;           ///< further starts are drawn within the bounds
   unsigned seed = 0;        ///< of these draws
   int max_iterations = 50;  ///< of each start
+  /// Whether the derivatives at the estimate get a certificate: one more rollout.
+  CertificatePass certificate = CertificatePass::kRun;
 };
 
 /// What the user asks for, in memory.
@@ -80,8 +83,11 @@ struct FitResult {
   std::vector<FitIteration> iterations;  ///< of the best start; begins with the initial point
   std::vector<FitStart> starts;
   Eigen::VectorXd residuals;  ///< at the estimate, in multiples of sigma
-  long rollouts = 0;
-  double seconds = 0.0;
+  long rollouts = 0;          ///< without the certificate's
+  double seconds = 0.0;       ///< without the certificate's
+  /// Of the derivatives at the estimate; where its verdict is not `trustworthy`, the message and a
+  /// warning of `uncertainty` say so: the intervals rest on these derivatives.
+  Certificate certificate;
 };
 
 /// Called after each iteration of each start.

@@ -80,6 +80,7 @@ std::string SummaryTable(const FitResult& result) {
                     {"residual rms (sigma)", CompactNumber(uncertainty.residual_rms, 4)},
                     {"reduced chi-square", CompactNumber(uncertainty.reduced_chi_square, 4)},
                     {"condition of the Jacobian", CompactNumber(uncertainty.condition, 3)},
+                    {"derivatives at the estimate", result.certificate.verdict},
                     {"iterations", std::to_string(result.iterations.size() - 1)},
                     {"rollouts", std::to_string(result.rollouts)},
                     {"seconds", CompactNumber(result.seconds, 3)}});

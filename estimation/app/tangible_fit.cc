@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "tangible/app/certificate_json.h"
 #include "tangible/app/program.h"
 #include "tangible/estimation/fit_json.h"
 #include "tangible/estimation/report.h"
@@ -138,8 +139,10 @@ void PrintCheck(const std::vector<ParameterizedScene::Entry>& entries,
 int WriteFiles(const FitFile& fit, const RolloutResiduals& residuals, const FitResult& result,
                const DiscretisationCheck* check) {
   if (!FLAGS_out.empty()) {
-    const std::string error =
-        WriteFileAtomically(FLAGS_out, JsonText(ResultToJson(residuals, result, check)));
+    OrderedJson json = ResultToJson(residuals, result, check);
+    json["certificate"] =
+        result.estimate.size() > 0 ? ToJson(result.certificate) : OrderedJson(nullptr);
+    const std::string error = WriteFileAtomically(FLAGS_out, JsonText(json));
     if (!error.empty()) {
       return ReportError(error);
     }
@@ -184,6 +187,11 @@ int Run(const std::string& file) {
   const bool checked = FLAGS_discretisation_check && result.status == FitStatus::kConverged;
   if (result.estimate.size() > 0) {
     PrintEstimates(entries, result);
+    if (result.certificate.verdict != "trustworthy") {
+      std::cerr << file
+                << ": warning: not trustworthy at the estimate: " << result.certificate.verdict
+                << "\n";
+    }
   }
   if (checked) {
     check = CheckDiscretisation(problem, result);

@@ -9,6 +9,7 @@
 #include "tangible/dynamics/contact_gradient.h"
 #include "tangible/lcp/contact_conditioning.h"
 #include "tangible/simulation/certify_place_inl.h"
+#include "tangible/simulation/rollout_directional.h"
 #include "tangible/simulation/segment_flow.h"
 
 namespace tangible {
@@ -159,7 +160,7 @@ void RolloutCertifier::AddImpact(const Model<double>& model, long step, Impulses
     const ContactMargin margin =
         MarginOfContact(impact->problem, impact->solution, static_cast<int>(i));
     AddMargin(margin.value, place, std::string("impact, ") + ModeName(place.mode));
-    certificate_.degenerate_rows += margin.value < 1e-10 ? 1 : 0;
+    certificate_.degenerate_rows += margin.value < kDegenerateTolerance ? 1 : 0;
     const CoefficientSource& friction = impact->friction[i];
     if (place.mode != ContactMode::kOpen && friction.value == 0.0 &&
         (Wanted(friction.numbers[0]) || Wanted(friction.numbers[1]))) {
@@ -199,7 +200,11 @@ void RolloutCertifier::AddSegment(const Model<double>& model, long step,
     const Place place{&s, step, segment->time, i, &contact, segment->modes[i]};
     const double normal = start.solution.normal_impulse[i];
     const CoefficientSource& friction = segment->friction[i];
-    AddMargin(largest > 0.0 ? normal / largest : 0.0, place, "normal force");
+    const auto add_margin = [&](double margin, const char* what) {
+      AddMargin(margin, place, what);
+      certificate_.degenerate_rows += margin < kDegenerateTolerance ? 1 : 0;
+    };
+    add_margin(largest > 0.0 ? normal / largest : 0.0, "normal force");
     if (normal > 1e-9 * largest) {
       loaded_.push_back(contact);
     }
@@ -214,13 +219,12 @@ void RolloutCertifier::AddSegment(const Model<double>& model, long step,
       const double slip =
           std::max(SlipOf(model, segment->before, contact), SlipOf(model, segment->after, contact));
       if (slip <= Negligible(model, slip)) {
-        AddMargin(0.0, place, "friction limit");
+        add_margin(0.0, "friction limit");
       }
     }
     if (place.mode == ContactMode::kSticking && normal > 0.0) {
       const double limit = friction.value * normal;
-      AddMargin((limit - std::abs(start.solution.tangent_impulse[i])) / limit, place,
-                "friction limit");
+      add_margin((limit - std::abs(start.solution.tangent_impulse[i])) / limit, "friction limit");
     }
     const bool wanted = Wanted(friction.numbers[0]) || Wanted(friction.numbers[1]);
     if (wanted && friction.tie && place.mode != ContactMode::kSticking) {

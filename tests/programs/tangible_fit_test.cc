@@ -87,6 +87,49 @@ TEST_F(TangibleFitTest, FitsAndWritesResultAndReport) {
   }
 }
 
+// The ball lands in the last step, in which its twist has derivatives of order 1 / dt.
+TEST_F(TangibleFitTest, WarnsWhereDerivativesAreNotTrustworthy) {
+  const auto fit = [&](const std::string& duration) {
+    Write("scene.json", R"({"bodies": [
+        {"name": "ball", "shape": {"circle": {"radius": 0.1}}, "mass": 1, "position": [0, 0.15]},
+        {"name": "floor", "static": true,
+         "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}}],
+        "gravity": [0, -9.8], "simulation": {"dt": 0.01, "duration": )" +
+                            duration + "}}");
+    // 0.15 - g dt² k (k + 1) / 2 of the steps before the ball lands, in the tenth.
+    std::string text = "time,body,y\n";
+    for (const int k : {0, 3, 6, 9}) {
+      text += std::to_string(0.01 * k) + ",ball," + json(0.15 - 9.5e-4 * 0.5 * k * (k + 1)).dump() +
+              "\n";
+    }
+    Write("o.csv", text + duration + ",ball,0.1\n");
+    return Fit(json::parse(R"({"scene": "scene.json",
+        "observations": [{"file": "o.csv", "sigma": 0.01}],
+        "parameters": [{"name": "g", "initial": 9.8, "lower": 9.2, "upper": 20,
+                        "sets": [{"path": "gravity/y", "scale": -1}]}]})"),
+               "--out='" + Path("r.json") + "' --report='" + Path("r.html") + "'");
+  };
+  const ProgramRun landing = fit("0.1");
+  EXPECT_EQ(landing.exit_status, 0) << landing.error;
+  ExpectOneLine(landing, 0, "warning: not trustworthy at the estimate: discontinuous: landing");
+  json result = json::parse(Read(Path("r.json")));
+  EXPECT_NEAR(result["parameters"][0]["estimate"], 9.5, 1e-6);
+  const std::string verdict = result["certificate"]["verdict"];
+  EXPECT_EQ(verdict.find("discontinuous: landing in the last step"), 0u) << verdict;
+  EXPECT_NE(result["message"].get<std::string>().find("discontinuous: landing"), std::string::npos);
+  EXPECT_NE(Read(Path("r.html")).find("discontinuous: landing"), std::string::npos);
+
+  const ProgramRun later = fit("0.11");
+  EXPECT_EQ(later.exit_status, 0) << later.error;
+  EXPECT_EQ(later.error, "");
+  result = json::parse(Read(Path("r.json")));
+  EXPECT_EQ(result["certificate"]["verdict"], "trustworthy");
+  for (const char* key : {"margin_min", "margin_where", "degenerate_rows", "redundant_rows",
+                          "condition", "linear_residual", "mode_switches", "events"}) {
+    EXPECT_TRUE(result["certificate"].contains(key)) << key;
+  }
+}
+
 TEST_F(TangibleFitTest, FlagsOverrideTheFile) {
   const ProgramRun run = Fit(Problem({{"derivatives", "adjoint"}}),
                              "--derivatives=finite_difference --initial='g=19,speed=-3'");

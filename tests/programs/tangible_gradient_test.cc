@@ -99,6 +99,47 @@ TEST_F(TangibleGradientTest, SaysWhereADifferenceIsOneSided) {
   EXPECT_EQ(result["notes"][0].get<std::string>().find("one-sided difference below"), 0u);
 }
 
+// A box pushed with exactly its friction, μ m g = 4 N: more force slides it, less does not.
+TEST_F(TangibleGradientTest, OneSidedColumnsAtAKink) {
+  const auto scene = [](const std::string& stepping) {
+    return R"({"gravity": [0, -8], "bodies": [
+        {"name": "box", "shape": {"box": {"size": [1, 0.5]}}, "mass": 1, "position": [0, 0.25],
+         "friction": 0.5},
+        {"name": "floor", "static": true, "friction": 0.5,
+         "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}}],
+        "forces": [{"name": "push", "body": "box", "force": [4, 0]}],
+        "simulation": {"dt": 0.0078125, "duration": 0.0625)" +
+           stepping + "}}";
+  };
+  const std::string flags =
+      "--parameters=forces/push/force/x,bodies/*/friction --method=tangent --side=";
+  const auto of = [&](const std::string& side) {
+    const ProgramRun run = Differentiate(flags + side, scene(""));
+    EXPECT_EQ(run.exit_status, 0) << run.error;
+    return json::parse(run.out);
+  };
+  const json plus = of("plus");
+  EXPECT_EQ(plus["certificate"]["verdict"].get<std::string>().find("near a kink: kink of 16 rows"),
+            0u);
+  // v = t (ΔF − m g Δμ) / m at the end of the sliding, t = 0.0625 s.
+  EXPECT_NEAR(plus["jacobian"][3][0], 0.0625, 1e-14);
+  EXPECT_NEAR(plus["jacobian"][3][1], 0.0, 1e-14);
+  const json minus = of("minus");
+  EXPECT_NEAR(minus["jacobian"][3][0], 0.0, 1e-14);
+  EXPECT_NEAR(minus["jacobian"][3][1], -0.5, 1e-14);
+  const json both = of("both");
+  for (int k = 0; k < 2; ++k) {
+    const double x = both["jacobian"][3][k];
+    const double a = plus["jacobian"][3][k];
+    const double b = minus["jacobian"][3][k];
+    EXPECT_GE(x, std::min(a, b) - 1e-14);
+    EXPECT_LE(x, std::max(a, b) + 1e-14);
+  }
+  ExpectOneLine(
+      Differentiate(flags + "plus", scene(R"(, "stepping": "event", "integrator": "trapezoidal")")),
+      1, "near a kink");
+}
+
 TEST_F(TangibleGradientTest, BadInputIsOneLine) {
   const std::string parameters = "--parameters=bodies/ball/mass ";
   ExpectOneLine(Run("tangible-gradient", parameters + "/nonexistent.json"), 1, "/nonexistent.json");
@@ -130,6 +171,10 @@ TEST_F(TangibleGradientTest, WrongFlagsAreUsage) {
   ExpectOneLine(Differentiate("--parameters=bodies/ball/mass,,gravity/y"), 2, "--parameters");
   ExpectOneLine(Differentiate(parameters + "--method=newton"), 2, "--method");
   ExpectOneLine(Differentiate(parameters + "--step=-1"), 2, "--step");
+  ExpectOneLine(Differentiate(parameters + "--side=left --method=tangent"), 2, "--side");
+  for (const char* method : {"adjoint", "jet", "jet_implicit", "finite_difference"}) {
+    ExpectOneLine(Differentiate(parameters + "--side=plus --method=" + method), 2, "--side");
+  }
   ExpectOneLine(Differentiate(parameters + "--step=nan"), 2, "--step");
   ExpectOneLine(Differentiate(parameters + "--repeat=0"), 2, "--repeat");
   ExpectOneLine(Differentiate(parameters + "--factorisations=some"), 2, "--factorisations");

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "../support/scenes.h"
+#include "tangible/dynamics/parameter_map.h"
 #include "tangible/simulation/certify.h"
 
 namespace tangible {
@@ -63,6 +64,56 @@ TEST(CertifyEventsTest, AnApproachAtTheThresholdIsADiscontinuity) {
   EXPECT_NE(c.verdict.find("threshold"), std::string::npos) << c.verdict;
 }
 
+// Of the derivatives with respect to some paths.
+Certificate CertificateFor(const std::string& bodies, const std::vector<std::string>& paths) {
+  const Scene scene = SceneOf("{" + bodies + R"(, "simulation": {"stepping": "event",
+      "integrator": "trapezoidal", "dt": 0.01, "duration": 0.05}})");
+  Model<double> model;
+  State<double> state;
+  BuildModel(scene, &model, &state);
+  std::vector<ParameterDirection> directions;
+  for (const std::string& path : paths) {
+    ParameterPath parameter;
+    std::string error;
+    EXPECT_TRUE(ResolveParameter(scene, path, &parameter, &error)) << error;
+    directions.push_back(DirectionOf(parameter));
+  }
+  return CertifyDerivative(
+      model, state, RowMatrixXd(VariableJacobian(scene, model.structure, directions)), paths);
+}
+
+// The box stands on the floor: higher it falls first, deeper it is pushed out. What moves it along
+// the floor, or sets speeds and forces, has both sides.
+TEST(CertifyEventsTest, ATouchAtTheStartIsOneSidedForWhatChangesItsGap) {
+  const auto box = [](const std::string& y) {
+    return R"("bodies": [{"name": "box", "shape": {"box": {"size": [0.4, 0.2]}}, "mass": 1,
+        "position": [0.5, )" +
+           y + R"(], "friction": 0.3}, )" + Floor() + "]";
+  };
+  for (const char* path : {"bodies/box/position/y", "bodies/box/angle", "bodies/box/shape/size/y",
+                           "bodies/floor/shape/offset"}) {
+    const std::string verdict = CertificateFor(box("0.1"), {"bodies/box/mass", path}).verdict;
+    EXPECT_EQ(verdict.find("one-sided: contact of box and floor touches at the start, "), 0u)
+        << verdict;
+    EXPECT_NE(verdict.find(path), std::string::npos) << verdict;
+    EXPECT_EQ(CertificateFor(box("0.2"), {path}).verdict, "trustworthy") << path;
+  }
+  EXPECT_EQ(CertificateFor(box("0.1"), {"bodies/box/position/x", "bodies/box/velocity/x",
+                                        "bodies/box/velocity/y", "bodies/box/mass", "gravity/y",
+                                        "bodies/box/friction"})
+                .verdict,
+            "trustworthy");
+}
+
+TEST(CertifyEventsTest, ALimitAtTheStartIsOneSidedToo) {
+  const std::string arm = R"("bodies": [{"name": "arm", "shape": {"box": {"size": [0.4, 0.05]}},
+      "mass": 1, "position": [0.2, 0]}], "joints": [{"name": "pin", "type": "revolute",
+      "bodies": ["arm", "world"], "anchor": [0, 0], "limits": [0, 1]}])";
+  const std::string verdict = CertificateFor(arm, {"joints/pin/angle"}).verdict;
+  EXPECT_EQ(verdict.find("one-sided: low limit of joint pin touches at the start"), 0u) << verdict;
+  EXPECT_EQ(CertificateFor(arm, {"bodies/arm/mass"}).verdict, "trustworthy");
+}
+
 TEST(CertifyEventsTest, FrictionAtItsLimitIsAKink) {
   // tan of the slope = μ exactly.
   const Certificate c = CertificateOf(R"("gravity": [2.4, -8], "bodies": [{"name": "box",
@@ -70,6 +121,7 @@ TEST(CertifyEventsTest, FrictionAtItsLimitIsAKink) {
                                           Floor() + "]",
                                       0.1);
   EXPECT_EQ(c.verdict.find("near a kink: "), 0u) << c.verdict;
+  EXPECT_GT(c.degenerate_rows, 0);
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "../support/scenes.h"
+#include "tangible/dynamics/parameter_map.h"
 
 namespace tangible {
 namespace {
@@ -177,6 +178,31 @@ TEST(CertifyRollout, CountsRedundantRows) {
   EXPECT_EQ(c.verdict, "trustworthy");
   // The right-hand side is consistent, so the regularised and refined solve is exact.
   EXPECT_LT(c.linear_residual, 1e-12);
+}
+
+// Of two floors under one ball one cannot rise alone; both can.
+TEST(CertifyDerivativeTest, SaysThatADirectionContradictsRedundantRows) {
+  const Scene scene = SceneOf(R"({"bodies": [
+      {"name": "ball", "shape": {"circle": {"radius": 0.5}}, "mass": 1, "position": [0, 0.5]},
+      {"name": "floor", "static": true, "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}},
+      {"name": "again", "static": true, "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}}],
+      "simulation": {"dt": 0.01, "duration": 0.05}})");
+  Model<double> model;
+  State<double> initial;
+  BuildModel(scene, &model, &initial);
+  for (const auto& [path, reason] :
+       {std::pair{"bodies/floor/shape/offset", kContradictingRows},
+        std::pair{"bodies/*/shape/offset", ""}, std::pair{"bodies/ball/mass", ""}}) {
+    ParameterPath parameter;
+    std::string error;
+    ASSERT_TRUE(ResolveParameter(scene, path, &parameter, &error)) << error;
+    const Certificate c = CertifyDerivative(
+        model, initial,
+        RowMatrixXd(VariableJacobian(scene, model.structure, {DirectionOf(parameter)})), {path});
+    EXPECT_EQ(c.redundant_rows, 5) << path;
+    EXPECT_EQ(c.one_sided, reason) << path;
+    EXPECT_EQ(c.verdict == "trustworthy", c.one_sided.empty()) << c.verdict;
+  }
 }
 
 TEST(CertifyRollout, EdgesOfForceWindowsOnStepsCountOnlyWhereTheyAreWanted) {
