@@ -11,6 +11,7 @@
 #include <optional>
 #include <string>
 
+#include "tangible/app/certificate_json.h"
 #include "tangible/app/observation_csv.h"
 #include "tangible/app/program.h"
 #include "tangible/app/progress.h"
@@ -19,6 +20,7 @@
 #include "tangible/app/view_recorder.h"
 #include "tangible/scene/json_writer.h"
 #include "tangible/scene/scene_json.h"
+#include "tangible/simulation/certify.h"
 #include "tangible/simulation/settings.h"
 
 DEFINE_string(out, "",
@@ -28,6 +30,8 @@ DEFINE_string(contacts, "", "file of contacts and joint impulses (CSV)");
 DEFINE_string(initial, "", "trajectory (CSV) from whose last row a body the run starts");
 DEFINE_string(view, "", "file of the animated view (HTML)");
 DEFINE_string(summary, "", "file of the summary (JSON)");
+DEFINE_bool(certify, false,
+            "add to the summary how near the run is to kinks and jumps of its derivatives");
 DEFINE_string(observe, "", "file of noisy observed positions (CSV)");
 DEFINE_double(noise, 0.0, "standard deviation of the observations' noise, m");
 DEFINE_uint64(seed, 0, "of the noise");
@@ -58,6 +62,9 @@ std::string CheckFlags() {
   if (!(FLAGS_rate >= 0.0 && std::isfinite(FLAGS_rate))) {
     return "--rate: expected a number >= 0, got " + FormatNumber(FLAGS_rate);
   }
+  if (FLAGS_certify && FLAGS_summary.empty()) {
+    return "--certify: needs --summary";
+  }
   if (FLAGS_observe.empty()) {
     for (const char* name : {"noise", "seed", "rate", "points"}) {
       if (!gflags::GetCommandLineFlagInfoOrDie(name).is_default) {
@@ -75,6 +82,7 @@ struct Recorders {
   std::optional<ObservationCsv> observations;
   std::optional<ViewRecorder> view;
   std::optional<RunSummary> summary;
+  std::optional<RolloutCertifier> certifier;
 
   void Add(const Model<double>& model, long k, double t, const State<double>& state,
            Stepper* stepper) {
@@ -83,6 +91,7 @@ struct Recorders {
     if (observations) observations->Add(k, t, state);
     if (view) view->Add(model, t, state, stepper != nullptr ? &stepper->record() : nullptr);
     if (summary) summary->Add(model, state, stepper);
+    if (certifier && stepper != nullptr) certifier->AddStep(model, k - 1, stepper);
   }
 };
 
@@ -105,6 +114,7 @@ void MakeRecorders(Job* job) {
   if (!FLAGS_contacts.empty()) r.contacts.emplace();
   if (!FLAGS_view.empty()) r.view.emplace(job->scene, job->model);
   if (!FLAGS_summary.empty()) r.summary.emplace();
+  if (FLAGS_certify) r.certifier.emplace();
   if (FLAGS_observe.empty()) return;
   const double samples = FLAGS_rate * structure.settings.duration;
   if (samples > kMaxSamples) {
@@ -158,7 +168,11 @@ std::string WriteResults(const Job& job, const RolloutReport& report, double sec
   if (r->observations) write(FLAGS_observe, r->observations->Finish());
   if (r->view) write(FLAGS_view, ViewHtml(r->view->data()));
   if (r->summary) {
-    write(FLAGS_summary, JsonText(r->summary->ToJson(job.model, report, seconds, cpu_seconds)));
+    OrderedJson summary = r->summary->ToJson(job.model, report, seconds, cpu_seconds);
+    if (r->certifier) {
+      summary["certificate"] = ToJson(r->certifier->Finish(job.model, report));
+    }
+    write(FLAGS_summary, JsonText(summary));
   }
   return error;
 }
@@ -199,9 +213,10 @@ int main(int argc, char** argv) {
   const tangible::CommandLine line = tangible::ParseCommandLine(
       argc, argv,
       {.name = "tangible-simulate",
-       .synopsis = "SCENE.json [--out=T.csv] [--every=K] [--contacts=C.csv] [--initial=T.csv] "
-                   "[--view=V.html] [--summary=S.json] [--observe=O.csv --noise=S --seed=N "
-                   "--rate=HZ --points=P.json]",
+       .synopsis =
+           "SCENE.json [--out=T.csv] [--every=K] [--contacts=C.csv] [--initial=T.csv] "
+           "[--view=V.html] [--summary=S.json] [--certify] [--observe=O.csv --noise=S --seed=N "
+           "--rate=HZ --points=P.json]",
        .description = "Runs a scene and writes the trajectory of its bodies as CSV; on request "
                       "contacts, a summary,\nnoisy observations and an animated view.",
        .version = TANGIBLE_VERSION,

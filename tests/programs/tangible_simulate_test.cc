@@ -107,6 +107,31 @@ TEST_F(TangibleSimulateTest, SummaryHasItsKeysAndItsNumbersAreRight) {
   EXPECT_NEAR(s["momentum_start"][0], 3.4 + rod, 1e-12);
 }
 
+// The certificate needs solves of its own with the steps' factorisations: the motion stays the same
+// to the last bit.
+TEST_F(TangibleSimulateTest, CertifiesOnRequest) {
+  const auto run = [&](const std::string& scene, const std::string& flags) {
+    const ProgramRun done =
+        Simulate(scene, Flag("summary", "s.json") + Flag("out", "t.csv") + flags);
+    EXPECT_EQ(done.exit_status, 0) << done.error;
+    return json::parse(Read(Path("s.json")));
+  };
+  EXPECT_FALSE(run(test_scenes::Mixture(), "").contains("certificate"));
+  const std::string motion = Read(Path("t.csv"));
+  const json certificate = run(test_scenes::Mixture(), "--certify").at("certificate");
+  EXPECT_EQ(Read(Path("t.csv")), motion);
+  EXPECT_EQ(certificate.at("verdict"), "trustworthy");
+  EXPECT_GT(certificate.at("mode_switches"), 0);
+  const json landing =
+      run(test_scenes::FallingBall(0.05, R"({"dt": 0.01, "duration": 0.1})"), "--certify");
+  EXPECT_EQ(landing.at("certificate")
+                .at("verdict")
+                .get<std::string>()
+                .find("discontinuous: landing in the last step"),
+            0u);
+  ExpectOneLine(Simulate(test_scenes::Mixture(), "--certify"), 2, "--certify");
+}
+
 TEST_F(TangibleSimulateTest, ContactsCarryTheWeight) {
   const ProgramRun run = Simulate(R"({"gravity": [0, -10], "bodies": [
       {"name": "box", "shape": {"box": {"size": [1, 1]}}, "mass": 2, "position": [0, 0.5],
