@@ -37,6 +37,10 @@ void Print(const PendulumResult& result) {
     std::printf("  noise %.2g rad, residual rms %.2g rad\n", result.recording.noise,
                 result.residual_rms);
   }
+  if (result.fit.certificate.verdict != "trustworthy") {
+    std::printf("  warning: not trustworthy at the estimate: %s\n",
+                result.fit.certificate.verdict.c_str());
+  }
   for (Eigen::Index k = 0; k < result.fit.estimate.size(); ++k) {
     PrintQuantity(result.parameters[k].name, result.fit.estimate[k],
                   result.fit.uncertainty.standard_deviation[k], result.check.bias[k]);
