@@ -389,6 +389,17 @@ void BlockLu<T>::SolveTransposed(T* x, int columns) const {
   }
 }
 
+template <typename T>
+size_t BlockLu<T>::bytes() const {
+  size_t sum =
+      values_.capacity() * sizeof(T) + (state_.capacity() + merged_.capacity()) * sizeof(int) +
+      waiting_.capacity() * sizeof(waiting_[0]) + adjacency_.capacity() * sizeof(std::vector<int>);
+  for (const std::vector<int>& list : adjacency_) {
+    sum += list.capacity() * sizeof(int);
+  }
+  return sum;
+}
+
 template class BlockLu<double>;
 #define TANGIBLE_INSTANTIATE_BLOCK_LU(N) template class BlockLu<Jet<N>>;
 TANGIBLE_FOR_EACH_JET_WIDTH(TANGIBLE_INSTANTIATE_BLOCK_LU)

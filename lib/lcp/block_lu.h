@@ -74,8 +74,8 @@ class BlockLu {
   }
 
   int num_blocks() const { return pattern_ ? pattern_->num_blocks : 0; }
-  /// Memory of the numbers, bytes.
-  size_t bytes() const { return values_.size() * sizeof(T); }
+  /// Memory, bytes, but for the pattern, which copies share.
+  size_t bytes() const;
 
  private:
   T* Place(int edge, bool lower) {

@@ -65,15 +65,30 @@ GradientProblem MakeProblem(const Scene& scene, const std::vector<ParameterPath>
   return problem;
 }
 
+// What the tape took; false, with a message, where that is more than its budget.
+bool ReportTape(const Checkpointing& checkpointing, const RolloutTape& tape,
+                GradientResult* result) {
+  result->tape_bytes = tape.peak_bytes();
+  result->steps_again = tape.steps_again();
+  if (checkpointing.kind == Checkpointing::Kind::kBudget &&
+      result->tape_bytes > checkpointing.budget) {
+    result->message = "the adjoint of " + std::to_string(tape.steps()) +
+                      " steps needs more memory than its budget of " +
+                      std::to_string(checkpointing.budget) +
+                      " bytes: " + std::to_string(result->tape_bytes);
+    return false;
+  }
+  return true;
+}
+
 // Derivatives of the losses with respect to the parameters: losses x parameters.
-bool ByAdjoint(const GradientProblem& problem, Factorisations factorisations,
+bool ByAdjoint(const GradientProblem& problem, const TapeOptions& options,
                const OutputSeed& output_seed, RolloutTape* tape, GradientResult* result,
                RowMatrixXd* derivative) {
   const Eigen::SparseMatrix<double> map =
       VariableJacobian(problem.scene, problem.structure, problem.directions);
   State<double> final;
-  const RolloutReport report =
-      tape->Record(problem.model, problem.initial, factorisations, {}, &final);
+  const RolloutReport report = tape->Record(problem.model, problem.initial, options, {}, &final);
   result->message = FailureOf(problem, report);
   if (!result->message.empty()) {
     return false;
@@ -91,7 +106,7 @@ bool ByAdjoint(const GradientProblem& problem, Factorisations factorisations,
       },
       &w_bar);
   *derivative = (map.transpose() * w_bar).transpose();
-  return true;
+  return ReportTape(options.checkpointing, *tape, result);
 }
 
 bool ByTangent(const GradientProblem& problem, GradientResult* result) {
@@ -132,7 +147,8 @@ bool RunMethod(const GradientProblem& problem, const GradientOptions& options,
                const OutputSeed& output_seed, RolloutTape* tape, GradientResult* result,
                RowMatrixXd* derivative) {
   if (options.method == GradientMethod::kAdjoint) {
-    return ByAdjoint(problem, options.factorisations, output_seed, tape, result, derivative);
+    return ByAdjoint(problem, {options.factorisations, options.checkpointing}, output_seed, tape,
+                     result, derivative);
   }
   if (!ByColumns(problem, options, result)) {
     return false;

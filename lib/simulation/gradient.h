@@ -40,6 +40,7 @@ struct GradientOptions {
   /// Of finite differences, in the parameter's unit; 0: 6e-6 max(|p|, the parameter's scale).
   double step = 0.0;
   Factorisations factorisations = Factorisations::kKeep;  ///< of the adjoint
+  Checkpointing checkpointing{};                          ///< of the adjoint
   int repeat = 1;                                         ///< the times are the best of so many
   CertificatePass certificate = CertificatePass::kRun;    ///< one more rollout, not timed
 };
@@ -63,8 +64,10 @@ struct GradientResult {
       std::numeric_limits<double>::quiet_NaN();  ///< the method's own forward pass included
   double rollout_seconds = std::numeric_limits<double>::quiet_NaN();  ///< of a plain rollout
   std::vector<std::string>
-      notes;           ///< one-sided differences, changes of modes between them, fallbacks
-  long fallbacks = 0;  ///< unrolled steps that took the implicit derivative
+      notes;              ///< one-sided differences, changes of modes between them, fallbacks
+  long fallbacks = 0;     ///< unrolled steps that took the implicit derivative
+  size_t tape_bytes = 0;  ///< of the adjoint: the most memory that its records took
+  long steps_again = 0;   ///< of the adjoint: steps that were run again from checkpoints
   Certificate certificate;
 };
 

@@ -6,8 +6,8 @@
 #include <algorithm>
 
 #include "../support/scenes.h"
-#include "tangible/verification/support/trace.h"
 #include "tangible/verification/support/random_scene.h"
+#include "tangible/verification/support/trace.h"
 
 namespace tangible {
 namespace {
