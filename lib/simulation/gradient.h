@@ -41,7 +41,7 @@ struct GradientOptions {
   double step = 0.0;
   Factorisations factorisations = Factorisations::kKeep;  ///< of the adjoint
   Checkpointing checkpointing{};                          ///< of the adjoint
-  int repeat = 1;                                         ///< the times are the best of so many
+  int repeat = 1;                                         ///< CPU times are the best of so many
   CertificatePass certificate = CertificatePass::kRun;    ///< one more rollout, not timed
 };
 
@@ -63,6 +63,8 @@ struct GradientResult {
   double seconds =
       std::numeric_limits<double>::quiet_NaN();  ///< the method's own forward pass included
   double rollout_seconds = std::numeric_limits<double>::quiet_NaN();  ///< of a plain rollout
+  /// Both of each repeat, CPU time; a rollout is run before every repeat of the method.
+  std::vector<double> all_seconds, all_rollout_seconds;
   std::vector<std::string>
       notes;              ///< one-sided differences, changes of modes between them, fallbacks
   long fallbacks = 0;     ///< unrolled steps that took the implicit derivative
