@@ -45,6 +45,9 @@ class ContactSystem {
                              last_.capacity());
   }
   void Reserve(int num_blocks, int num_edges);
+  /// Whether solves need the problem: they are refined against K without δ. Else they read the
+  /// factors alone.
+  bool is_regularised() const { return regularised_; }
   /// Hands the factorisation over (a tape keeps it); this object must be factorised anew before it
   /// solves.
   void MoveFactorsTo(ContactSystem* other);

@@ -16,7 +16,8 @@ bool Projects(const ModelStructure& structure) {
 }  // namespace
 
 size_t RolloutTape::Entry::bytes() const {
-  return sizeof(Entry) + record.bytes() + system.bytes() + projection.bytes() + events.bytes();
+  return sizeof(Entry) + record.bytes() + system.bytes() + events.bytes() +
+         (projection ? sizeof(JointProjection) + projection->bytes() : 0);
 }
 
 void RolloutTape::Start(const Model<double>& model, const TapeOptions& options) {
@@ -28,6 +29,9 @@ void RolloutTape::Start(const Model<double>& model, const TapeOptions& options) 
   spacing_ = 0;
   checkpoints_.clear();
   checkpoint_bytes_ = entry_bytes_ = used_bytes_ = peak_bytes_ = 0;
+  for (const std::unique_ptr<Entry>& entry : entries_) {
+    entry->counted = 0;  // until it is counted anew
+  }
   last_record_bytes_ = last_factor_bytes_ = most_record_bytes_ = 0;
   if (!stepper_ || structure_ != model.structure.get()) {
     stepper_ = std::make_unique<Stepper>(model);
@@ -43,7 +47,6 @@ void RolloutTape::Start(const Model<double>& model, const TapeOptions& options) 
     ReleaseEntries(0);
   }
   for (const std::unique_ptr<Entry>& entry : entries_) {
-    entry->counted = 0;
     Count(entry.get());
   }
 }
@@ -168,7 +171,10 @@ void RolloutTape::Take(const Model<double>& model, long remaining) {
     }
   }
   if (Projects(*model.structure)) {
-    entry.projection = stepper_->projection();
+    if (!entry.projection) {
+      entry.projection = std::make_unique<JointProjection>();
+    }
+    *entry.projection = stepper_->projection();
   }
   Count(&entry);
 }
@@ -291,11 +297,11 @@ void RolloutTape::AdjointFrom(const Model<double>& model, long last, int num_los
       continue;
     }
     if (entry.has_factors) {
-      StepAdjoint(model, entry.record, &entry.system, &entry.projection, w_bar);
+      StepAdjoint(model, entry.record, &entry.system, entry.projection.get(), w_bar);
     } else {
       std::swap(entry.record.problem, refactored_);
       stepper_->Refactor(model, &entry.record);
-      StepAdjoint(model, entry.record, &stepper_->system(), &entry.projection, w_bar);
+      StepAdjoint(model, entry.record, &stepper_->system(), entry.projection.get(), w_bar);
       std::swap(entry.record.problem, refactored_);
     }
   }

@@ -69,7 +69,7 @@ class RolloutTape {
   struct Entry {
     StepRecord record;
     ContactSystem system;
-    JointProjection projection;
+    std::unique_ptr<JointProjection> projection;  ///< where the scene asks for it
     EventRecord events;  ///< event stepping: the step, in the place of all above
     bool has_factors = false;
     size_t counted = 0;  ///< bytes of it that the tape's sums hold

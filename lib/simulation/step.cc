@@ -407,7 +407,8 @@ void Stepper::TakeRecord(StepRecord* record, ContactSystem* system) {
   std::swap(*record, record_);
   if (system != nullptr) {
     solver_.system().MoveFactorsTo(system);
-  } else {
+  }
+  if (system == nullptr || !system->is_regularised()) {
     std::swap(record->problem, record_.problem);
   }
 }

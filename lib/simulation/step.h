@@ -91,7 +91,8 @@ class Stepper {
   ContactSystem& system() { return solver_.system(); }
   JointProjection& projection() { return projection_; }
   /// Hands the last step's record and, unless null, its factorisation over; for a tape, without
-  /// copies. Until the next step record() and system() are not that step's.
+  /// copies. Until the next step record() and system() are not that step's. The record's problem is
+  /// only handed over where the factorisation's solves need it.
   void TakeRecord(StepRecord* record, ContactSystem* system);
   /// Assembles and factorises a recorded step anew, so that system() is that step's; its problem is
   /// filled in.
