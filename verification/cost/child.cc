@@ -11,8 +11,10 @@
 #include <cerrno>
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
 #include <exception>
+#include <filesystem>
 #include <fstream>
 #include <new>
 
@@ -51,8 +53,10 @@ void SetLimits(const Budget& budget) {
     const rlimit limit{bytes, bytes};
     setrlimit(RLIMIT_AS, &limit);
   }
-  const rlimit no_core{0, 0};
-  setrlimit(RLIMIT_CORE, &no_core);
+  const rlimit nothing{0, 0};
+  setrlimit(RLIMIT_CORE, &nothing);
+  // What does not fit into memory may not go to files either.
+  setrlimit(RLIMIT_FSIZE, &nothing);
   SetTimer(ITIMER_PROF, budget.seconds);
   SetTimer(ITIMER_REAL, 10.0 * budget.seconds);
 }
@@ -100,6 +104,31 @@ int RunWork(const Budget& budget, const Work& work, int out) {
   return kChildDone;
 }
 
+// A folder that is removed with all that was left in it; empty if there is none.
+class TemporaryFolder {
+ public:
+  TemporaryFolder() {
+    std::error_code error;
+    std::string pattern =
+        (std::filesystem::temp_directory_path(error) / "tangible-XXXXXX").string();
+    if (!error && mkdtemp(pattern.data()) != nullptr) {
+      path_ = pattern;
+    }
+  }
+  ~TemporaryFolder() {
+    std::error_code error;
+    if (!path_.empty()) {
+      std::filesystem::remove_all(path_, error);
+    }
+  }
+  TemporaryFolder(const TemporaryFolder&) = delete;
+  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+  const std::string& path() const { return path_; }
+
+ private:
+  std::string path_;
+};
+
 ChildOutcome Describe(int status, const rusage& usage, const std::string& text,
                       const Budget& budget) {
   ChildOutcome outcome;
@@ -108,8 +137,8 @@ ChildOutcome Describe(int status, const rusage& usage, const std::string& text,
     const int signal = WTERMSIG(status);
     if (signal == SIGPROF || signal == SIGALRM) {
       outcome.status = ChildStatus::kOverSeconds;
-    } else if (signal == SIGKILL) {
-      outcome.status = ChildStatus::kOverBytes;  // the system's own limit
+    } else if (signal == SIGKILL || signal == SIGXFSZ) {
+      outcome.status = ChildStatus::kOverBytes;  // the system's own limit; a file instead of memory
     } else {
       outcome.message = "ended by signal " + std::to_string(signal);
     }
@@ -145,9 +174,14 @@ ChildOutcome RunInChild(const Budget& budget, const Work& work) {
     outcome.message = std::string("no pipe: ") + std::strerror(errno);
     return outcome;
   }
+  const TemporaryFolder folder;
   const pid_t child = fork();
   if (child == 0) {
     close(ends[0]);
+    // A tape opens files where it stands.
+    if (chdir(folder.path().c_str()) != 0) {
+      _exit(kChildFailed);
+    }
     _exit(RunWork(budget, work, ends[1]));
   }
   close(ends[1]);

@@ -32,6 +32,9 @@ std::string Attribute(const std::string& path) {
 
 // Numbers of one attribute stand together, the usual parameters first.
 int Rank(const std::string& path) {
+  if (path == "bodies/ball/velocity/x") {
+    return -1;  // alone of these it matters before the ball has hit the chain
+  }
   static const char* const kFirst[] = {"mass",       "friction",   "restitution", "velocity/x",
                                        "velocity/y", "position/x", "position/y",  "angle"};
   const std::string attribute = Attribute(path);

@@ -17,9 +17,9 @@ Scene ChainAndBall(long steps);
 /// How many numbers of the scene there are to differentiate by, each alone.
 int NumNumbers(const Scene& scene);
 
-/// The first `count` of: masses, coefficients of friction and restitution, initial velocities and
-/// positions, all other numbers, then patterns that set several of them (`bodies/*/mass`), then
-/// these again from the start.
+/// The first `count` of: the ball's speed, masses, coefficients of friction and restitution,
+/// initial velocities and positions, all other numbers, then patterns that set several of them
+/// (`bodies/*/mass`), then these again from the start.
 std::vector<ParameterPath> CostParameters(const Scene& scene, int count);
 
 }  // namespace tangible::cost
