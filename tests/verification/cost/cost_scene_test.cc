@@ -39,7 +39,7 @@ TEST(CostParametersTest, AreAsManyAsWanted) {
   EXPECT_EQ(all[0].path, "bodies/ball/velocity/x");
   EXPECT_EQ(all[1].path, "bodies/link0/mass");
   EXPECT_EQ(all[12].path, "bodies/link0/friction");
-  EXPECT_EQ(all[numbers].path, "bodies/*/mass");
+  EXPECT_EQ(all[numbers].path, "bodies/*/velocity/x");
   EXPECT_EQ(all[numbers].numbers.size(), 11U);
 }
 
