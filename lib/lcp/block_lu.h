@@ -78,6 +78,10 @@ class BlockLu {
   size_t bytes() const;
 
  private:
+  template <typename Columns>
+  void SolveColumns(T* x, Columns columns) const;
+  template <typename Columns>
+  void SolveTransposedColumns(T* x, Columns columns) const;
   T* Place(int edge, bool lower) {
     const size_t slot = pattern_->edge_slot[edge];
     const size_t slots = pattern_->neighbour.size();

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <type_traits>
 
 #include "tangible/lcp/block_lu.h"
 
@@ -17,6 +18,9 @@ namespace internal {
 void OrderBlocks(std::vector<std::vector<int>>* adjacency, std::vector<int>* state,
                  std::vector<int>* merged, std::vector<std::pair<int, int>>* waiting,
                  BlockLuPattern* pattern);
+
+// Of single right-hand sides, of which there are the most: its loops vanish.
+using OneColumn = std::integral_constant<int, 1>;
 
 // c −= a b, all 3 x 3 row-major.
 template <typename T>
@@ -44,7 +48,7 @@ inline void MultiplyInPlace(T* a, const T* b) {
 // Inverse of a 3 x 3 matrix by Gauss-Jordan elimination with partial pivoting (by value); false
 // where a pivot is 0 or not finite.
 template <typename T>
-bool InvertInPlace(T* a) {
+inline bool InvertInPlace(T* a) {
   using std::abs;
   int row_of[3] = {0, 1, 2};
   T m[3][6];
@@ -90,9 +94,9 @@ bool InvertInPlace(T* a) {
   return true;
 }
 
-// y −= a x for `columns` right-hand sides (row-major).
-template <typename T>
-inline void SubtractApply(const T* a, const T* x, T* y, int columns) {
+// y −= a x for `columns` right-hand sides (row-major), an int or, known when compiled, OneColumn.
+template <typename T, typename Columns>
+inline void SubtractApply(const T* a, const T* x, T* y, Columns columns) {
   for (int i = 0; i < 3; ++i) {
     for (int c = 0; c < columns; ++c) {
       y[i * columns + c] -=
@@ -101,8 +105,8 @@ inline void SubtractApply(const T* a, const T* x, T* y, int columns) {
   }
 }
 
-template <typename T>
-inline void SubtractApplyTransposed(const T* a, const T* x, T* y, int columns) {
+template <typename T, typename Columns>
+inline void SubtractApplyTransposed(const T* a, const T* x, T* y, Columns columns) {
   for (int i = 0; i < 3; ++i) {
     for (int c = 0; c < columns; ++c) {
       y[i * columns + c] -= a[i] * x[c] + a[3 + i] * x[columns + c] + a[6 + i] * x[2 * columns + c];
@@ -111,8 +115,8 @@ inline void SubtractApplyTransposed(const T* a, const T* x, T* y, int columns) {
 }
 
 // x := a x, or aᵀ x with strides (1, 3).
-template <typename T>
-inline void ApplyInPlace(const T* a, int row_stride, int column_stride, T* x, int columns) {
+template <typename T, typename Columns>
+inline void ApplyInPlace(const T* a, int row_stride, int column_stride, T* x, Columns columns) {
   for (int c = 0; c < columns; ++c) {
     const T x0 = x[c];
     const T x1 = x[columns + c];
@@ -198,6 +202,16 @@ bool BlockLu<T>::Factor() {
 
 template <typename T>
 void BlockLu<T>::Solve(T* x, int columns) const {
+  if (columns == 1) {
+    SolveColumns(x, internal::OneColumn());
+  } else {
+    SolveColumns(x, columns);
+  }
+}
+
+template <typename T>
+template <typename Columns>
+void BlockLu<T>::SolveColumns(T* x, Columns columns) const {
   const BlockLuPattern& p = *pattern_;
   const size_t n = p.num_blocks;
   const size_t slots = p.neighbour.size();
@@ -221,6 +235,16 @@ void BlockLu<T>::Solve(T* x, int columns) const {
 
 template <typename T>
 void BlockLu<T>::SolveTransposed(T* x, int columns) const {
+  if (columns == 1) {
+    SolveTransposedColumns(x, internal::OneColumn());
+  } else {
+    SolveTransposedColumns(x, columns);
+  }
+}
+
+template <typename T>
+template <typename Columns>
+void BlockLu<T>::SolveTransposedColumns(T* x, Columns columns) const {
   const BlockLuPattern& p = *pattern_;
   const size_t n = p.num_blocks;
   const size_t slots = p.neighbour.size();

@@ -84,6 +84,9 @@ GradientResult Differentiate(CostMethod method, const CostOptions& options, cons
   return LossGradient(scene, parameters, terms, gradient);
 }
 
+constexpr int kLeastRepeats = 3;
+constexpr double kLongRun = 1.0;  // s; longer ones are not repeated
+
 // What a child hands over: numbers in a row, each list after its length.
 void Put(const std::vector<double>& list, std::vector<double>* out) {
   out->push_back(static_cast<double>(list.size()));
@@ -203,9 +206,10 @@ CostCell MeasureCell(const CostOptions& options, CostMethod method, int paramete
       *error = text.str();
       return out;
     }
-    const int repeats = static_cast<int>(
-        std::min(static_cast<double>(options.most_repeats),
-                 options.repeat_seconds / (result.seconds + result.rollout_seconds)));
+    const double once = result.seconds + result.rollout_seconds;
+    const double wanted = std::min<double>(options.most_repeats, options.repeat_seconds / once);
+    // A single run's time is that of memory got from the system for the first time, too.
+    const int repeats = once < kLongRun ? std::max(kLeastRepeats, static_cast<int>(wanted)) : 1;
     const auto tape_bytes = static_cast<double>(result.tape_bytes);
     const auto again = static_cast<double>(result.steps_again) / static_cast<double>(steps);
     if (repeats > 1) {
