@@ -138,16 +138,21 @@ std::string TableText(const std::vector<CostCell>& cells) {
 }
 
 std::string CrossoverText(const std::vector<Crossover>& crossovers) {
-  std::string text;
-  for (const Crossover& c : crossovers) {
-    text += Format("%ld steps: %s takes less time than %s ", c.steps, NameOf(c.method),
-                   NameOf(c.other));
-    text += std::isnan(c.parameters) ? std::string("nowhere within what was measured")
-                                     : Format("from %.2g parameters on", c.parameters) +
-                                           (c.from_the_first ? " (the least measured)" : "");
-    text += "\n";
+  std::string text =
+      "from how many parameters on a method takes less time than another (-: nowhere measured)\n";
+  for (size_t i = 0; i < crossovers.size(); ++i) {
+    const Crossover& c = crossovers[i];
+    const bool new_line = i == 0 || crossovers[i - 1].steps != c.steps;
+    if (new_line || crossovers[i - 1].other != c.other) {
+      text += new_line ? Format("%s%ld steps, than ", i == 0 ? "" : "\n", c.steps) : "; than ";
+      text += std::string(NameOf(c.other)) + ":";
+    } else {
+      text += ",";
+    }
+    text += std::string(" ") + NameOf(c.method) + " " +
+            (std::isnan(c.parameters) ? "-" : Format("%.2g", c.parameters));
   }
-  return text;
+  return text + "\n";
 }
 
 std::string BoundsText(const std::vector<CheckedBound>& bounds) {
