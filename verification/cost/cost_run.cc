@@ -115,7 +115,7 @@ const char* NameOf(CostMethod method) {
     case CostMethod::kAdjoint:
       return "adjoint";
     case CostMethod::kAdjointWithCheckpoints:
-      return "adjoint, checkpoints";
+      return "checkpointed adjoint";
     case CostMethod::kTangent:
       return "tangent";
     case CostMethod::kImplicitJets:
@@ -125,7 +125,7 @@ const char* NameOf(CostMethod method) {
     case CostMethod::kDifferences:
       return "central differences";
     case CostMethod::kTape:
-      return "ADOL-C, unrolled";
+      return "unrolled ADOL-C";
   }
   return "";
 }

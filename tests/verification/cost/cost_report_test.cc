@@ -40,14 +40,13 @@ TEST(CostTextTest, ShowsTimesMemoryAndWhatIsOver) {
 
 TEST(CostTextTest, TellsCrossoversAndBounds) {
   const std::string crossovers =
-      CrossoverText({{100, CostMethod::kAdjoint, CostMethod::kTangent, 3.0, false},
-                     {100, CostMethod::kTangent, CostMethod::kDifferences, 1.0, true},
-                     {100, CostMethod::kTape, CostMethod::kDifferences, std::nan(""), false}});
-  EXPECT_NE(crossovers.find("adjoint takes less time than tangent from 3 parameters on\n"),
-            std::string::npos)
-      << crossovers;
-  EXPECT_NE(crossovers.find("(the least measured)"), std::string::npos);
-  EXPECT_NE(crossovers.find("nowhere within"), std::string::npos);
+      CrossoverText({{100, CostMethod::kAdjoint, CostMethod::kDifferences, 1.0, true},
+                     {100, CostMethod::kTape, CostMethod::kDifferences, std::nan(""), false},
+                     {100, CostMethod::kAdjoint, CostMethod::kTangent, 3.14, false},
+                     {1000, CostMethod::kTangent, CostMethod::kDifferences, 16.0, false}});
+  EXPECT_EQ(crossovers.substr(crossovers.find('\n') + 1),
+            "100 steps, than central differences: adjoint 1, unrolled ADOL-C -; than tangent: "
+            "adjoint 3.1\n1000 steps, than central differences: tangent 16\n");
   const std::string bounds = BoundsText(
       {{"adjoint", 2.0, 1.5, ""}, {"tangent", 3.0, 3.5, ""}, {"Jets", 4.0, std::nan(""), "none"}});
   EXPECT_EQ(bounds,
