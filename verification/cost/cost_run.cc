@@ -181,6 +181,7 @@ CostCell MeasureCell(const CostOptions& options, CostMethod method, int paramete
   const Scene scene = ChainAndBall(steps);
   const std::vector<ParameterPath> paths = CostParameters(scene, parameters);
   std::vector<double> scales;
+  scales.reserve(paths.size());
   for (const ParameterPath& path : paths) {
     scales.push_back(path.scale);
   }

@@ -124,8 +124,7 @@ int Run(const CostOptions& options, const CostBounds& bounds) {
   const std::vector<CostCell> cells =
       cost::RunCosts(options, [&](long done) { progress.Show(done); });
   std::vector<double> gradient;
-  CostOptions once = options;
-  const CostCell long_run = cost::MeasureCell(once, CostMethod::kAdjointWithCheckpoints, 8,
+  const CostCell long_run = cost::MeasureCell(options, CostMethod::kAdjointWithCheckpoints, 8,
                                               bounds.long_run, {}, &gradient);
   const std::vector<CheckedBound> checked = cost::CheckBounds(bounds, cells, long_run);
   const std::vector<Crossover> crossovers = cost::Crossovers(cells);

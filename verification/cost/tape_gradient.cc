@@ -22,15 +22,8 @@ struct Eigen::NumTraits<adouble> : Eigen::NumTraits<double> {
   using Real = adouble;
   using NonInteger = adouble;
   using Nested = adouble;
-  enum {
-    IsComplex = 0,
-    IsInteger = 0,
-    IsSigned = 1,
-    RequireInitialization = 1,
-    ReadCost = 1,
-    AddCost = 3,
-    MulCost = 3
-  };
+  // NOLINTNEXTLINE(readability-identifier-naming): Eigen's name
+  enum { RequireInitialization = 1 };
 };
 
 #include <algorithm>
@@ -195,6 +188,7 @@ GradientResult TapeLossGradient(const Scene& scene, const std::vector<ParameterP
     return result;
   }
   std::vector<ParameterDirection> directions;
+  directions.reserve(parameters.size());
   for (const ParameterPath& parameter : parameters) {
     directions.push_back(DirectionOf(parameter));
   }
