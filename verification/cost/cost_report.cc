@@ -109,7 +109,9 @@ OrderedJson CellJson(const CostCell& cell) {
 std::vector<PlotSeries> Series(const std::vector<CostCell>& cells, bool of_time, long steps,
                                int parameters) {
   std::vector<PlotSeries> all;
-  for (int m = of_time ? 1 : 0; m < kNumCostMethods; ++m) {
+  // The plain rollout last, so that methods have the same colours in both plots.
+  for (int k = 1; k <= (of_time ? kNumCostMethods - 1 : kNumCostMethods); ++k) {
+    const int m = k % kNumCostMethods;
     const auto method = static_cast<CostMethod>(m);
     PlotSeries series;
     series.label = NameOf(method);
