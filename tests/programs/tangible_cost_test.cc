@@ -36,7 +36,7 @@ TEST_F(TangibleCostTest, PrintsATableAndWritesJsonAndAPicture) {
 // The shortest bounded run, a thousand steps, and bounds that nothing holds.
 TEST_F(TangibleCostTest, ABrokenBoundIsExitStatusOne) {
   const std::string broken =
-      "--parameters=1 --steps=1000 --long_run=20 --repeat_seconds=0.005 --budget_seconds=0.5 "
+      "--parameters=1 --steps=1000 --long_run=20 --repeat_seconds=0.005 --budget_seconds=2 "
       "--adjoint_bound=0.1 ";
   const ProgramRun run = Cost(broken);
   EXPECT_EQ(run.exit_status, 1);
