@@ -27,6 +27,10 @@ DEFINE_double(step, 0.0, "of finite differences, in the parameter's unit; 0: 6e-
 DEFINE_string(loss, "", "file of a scalar loss (JSON) to differentiate instead of the final state");
 DEFINE_int32(repeat, 1, "runs of which the best times are told");
 DEFINE_string(factorisations, "keep", "of the adjoint's steps: keep, or recompute to save memory");
+DEFINE_string(
+    checkpoint, "all",
+    "records of the adjoint: all; every:K, a checkpoint every K steps, from which the steps "
+    "between are run again; budget:MIB, as fast as so much memory (2^20 bytes) lets it be");
 DEFINE_string(out, "", "file of the result; empty: stdout");
 
 namespace tangible {
@@ -74,6 +78,10 @@ std::string CheckFlags(GradientOptions* options) {
   }
   if (FLAGS_repeat < 1) {
     return "--repeat: expected a number >= 1, got " + std::to_string(FLAGS_repeat);
+  }
+  std::string wrong;
+  if (!ParseCheckpointing(FLAGS_checkpoint, &options->checkpointing, &wrong)) {
+    return "--checkpoint: " + wrong;
   }
   const std::vector<std::string> paths = SplitAtCommas(FLAGS_parameters);
   if (std::find(paths.begin(), paths.end(), "") != paths.end()) {
@@ -131,6 +139,10 @@ OrderedJson Describe(const GradientResult& result) {
                       {"notes", result.notes},
                       {"seconds", result.seconds},
                       {"rollout_seconds", result.rollout_seconds}};
+  if (FLAGS_method == "adjoint") {
+    text["tape_bytes"] = result.tape_bytes;
+    text["steps_again"] = result.steps_again;
+  }
   if (!FLAGS_loss.empty()) {
     text["loss"] = result.loss;
     text["gradient"] = ToJson(result.gradient);

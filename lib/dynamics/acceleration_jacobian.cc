@@ -224,7 +224,7 @@ class AccelerationVisitor : private internal::LocalEntries<Sink> {
       for (int k = 0; k < rows.rows; ++k) {
         Emit(locals, JointRow(j) + k,
              RowTimes(a_.data(), joint.a, rows.row_a[k], joint.b, rows.row_b[k]) + rates.row[k]);
-        EmitMomentum(locals, joint.a, rows.row_a[k], joint.b, rows.row_b[k], LocalJet(-y[k]));
+        EmitMomentum(locals, joint.a, rows.row_a[k], joint.b, rows.row_b[k], -y[k]);
       }
       Drive(joint, locals, rows);
     }
@@ -275,7 +275,7 @@ class AccelerationVisitor : private internal::LocalEntries<Sink> {
       Emit(locals, JointRow(j) + k,
            RowTimes(a_.data(), joint.a, rows.row_a[k], joint.b, rows.row_b[k]) +
                share * rows.error[k]);
-      EmitMomentum(locals, joint.a, rows.row_a[k], joint.b, rows.row_b[k], LocalJet(-y[k]));
+      EmitMomentum(locals, joint.a, rows.row_a[k], joint.b, rows.row_b[k], -y[k]);
     }
   }
 
@@ -304,7 +304,7 @@ class AccelerationVisitor : private internal::LocalEntries<Sink> {
     value += RowTimes(a_.data(), joint.a, rows.coordinate_a, joint.b, rows.coordinate_b);
     Emit(locals, row, contact.side * value);
     EmitMomentum(locals, joint.a, rows.coordinate_a, joint.b, rows.coordinate_b,
-                 LocalJet(-contact.side * r_.solution->normal_impulse[i]));
+                 -contact.side * r_.solution->normal_impulse[i]);
     if (r_.correction) {
       return;
     }
@@ -340,9 +340,9 @@ class AccelerationVisitor : private internal::LocalEntries<Sink> {
     Emit(locals, row,
          rates.normal + RowTimes(a_.data(), contact.a, rows.normal_a, contact.b, rows.normal_b));
     EmitMomentum(locals, contact.a, rows.normal_a, contact.b, rows.normal_b,
-                 LocalJet(-r_.solution->normal_impulse[i]));
+                 -r_.solution->normal_impulse[i]);
     EmitMomentum(locals, contact.a, rows.tangent_a, contact.b, rows.tangent_b,
-                 LocalJet(-r_.solution->tangent_impulse[i]));
+                 -r_.solution->tangent_impulse[i]);
     if (sticks) {
       Emit(locals, row + 1,
            rates.tangent +

@@ -4,6 +4,7 @@
 // What the visitors of local derivatives share (local_jacobian.cc, acceleration_jacobian.cc): the
 // variables of one element as LocalJets, and the entries that its equations have.
 
+#include <cmath>
 #include <vector>
 
 #include "tangible/dynamics/local_jacobian.h"
@@ -53,9 +54,19 @@ class LocalEntries {
       return Pose<LocalJet>();
     }
     const double* q = &state_.pose[3 * body];
-    const LocalJet x = locals->Add(q[0], s_.PoseVariable(body, 0));
-    const LocalJet y = locals->Add(q[1], s_.PoseVariable(body, 1));
-    return Pose<LocalJet>(Vector2<LocalJet>(x, y), locals->Add(q[2], s_.PoseVariable(body, 2)));
+    Pose<LocalJet> pose;
+    pose.position.x() = locals->Add(q[0], s_.PoseVariable(body, 0));
+    pose.position.y() = locals->Add(q[1], s_.PoseVariable(body, 1));
+    pose.angle = locals->Add(q[2], s_.PoseVariable(body, 2));
+    // The angle is a variable: its sine and cosine have one derivative each, and are computed once.
+    const int angle = locals->count() - 1;
+    const double cosine = std::cos(q[2]);
+    const double sine = std::sin(q[2]);
+    pose.rotation.cosine = LocalJet(cosine);
+    pose.rotation.cosine.v[angle] = -sine;
+    pose.rotation.sine = LocalJet(sine);
+    pose.rotation.sine.v[angle] = cosine;
+    return pose;
   }
 
   /// A joint's numbers, up to seven.
@@ -113,6 +124,15 @@ class LocalEntries {
     }
   }
 
+  /// The same of value · factor.
+  void Emit(const Locals& locals, int row, const LocalJet& value, double factor) {
+    for (int i = 0; i < locals.count(); ++i) {
+      if (value.v[i] != 0.0) {
+        sink_(row, locals.variable(i), value.v[i] * factor);
+      }
+    }
+  }
+
   /// Momentum rows += rowᵀ amount on both bodies.
   void EmitMomentum(const Locals& locals, int a, const RowPart<LocalJet>& row_a, int b,
                     const RowPart<LocalJet>& row_b, const LocalJet& amount) {
@@ -124,6 +144,24 @@ class LocalEntries {
       }
       if (at_b >= 0) {
         Emit(locals, at_b + i, row_b[i] * amount);
+      }
+    }
+  }
+
+  /// The same with an amount that no local variable changes.
+  void EmitMomentum(const Locals& locals, int a, const RowPart<LocalJet>& row_a, int b,
+                    const RowPart<LocalJet>& row_b, double amount) {
+    if (amount == 0.0) {
+      return;
+    }
+    const int at_a = BodyRow(s_, a);
+    const int at_b = BodyRow(s_, b);
+    for (int i = 0; i < 3; ++i) {
+      if (at_a >= 0) {
+        Emit(locals, at_a + i, row_a[i], amount);
+      }
+      if (at_b >= 0) {
+        Emit(locals, at_b + i, row_b[i], amount);
       }
     }
   }

@@ -240,7 +240,7 @@ class StepVisitor : private internal::LocalEntries<Sink> {
         row += (s_.settings.baumgarte / step_.h) * rows.error[k];
       }
       Emit(locals, JointRow(j) + k, row);
-      EmitMomentum(locals, joint.a, rows.row_a[k], joint.b, rows.row_b[k], LocalJet(-y[k]));
+      EmitMomentum(locals, joint.a, rows.row_a[k], joint.b, rows.row_b[k], -y[k]);
       EmitPrescribed(joint.a, rows.row_a[k], joint.b, rows.row_b[k], JointRow(j) + k, 1.0);
     }
     if (joint.damping < 0 || step_.h == 0.0) {
@@ -263,7 +263,7 @@ class StepVisitor : private internal::LocalEntries<Sink> {
     const double impulse = step_.solution->normal_impulse[i];
     const int row = 3 * (*step_.contact_block)[i];
     EmitMomentum(locals, joint.a, rows.coordinate_a, joint.b, rows.coordinate_b,
-                 LocalJet(-contact.side * impulse));
+                 -contact.side * impulse);
     LocalJet value =
         contact.side * NewSpeed(joint.a, rows.coordinate_a, joint.b, rows.coordinate_b);
     if (contact.law == ContactLaw::kGap) {
@@ -295,9 +295,8 @@ class StepVisitor : private internal::LocalEntries<Sink> {
     const ContactMode mode = step_.solution->modes[i];
     const double normal = step_.solution->normal_impulse[i];
     const int row = 3 * (*step_.contact_block)[i];
-    EmitMomentum(locals, a, rows.normal_a, b, rows.normal_b, LocalJet(-normal));
-    EmitMomentum(locals, a, rows.tangent_a, b, rows.tangent_b,
-                 LocalJet(-step_.solution->tangent_impulse[i]));
+    EmitMomentum(locals, a, rows.normal_a, b, rows.normal_b, -normal);
+    EmitMomentum(locals, a, rows.tangent_a, b, rows.tangent_b, -step_.solution->tangent_impulse[i]);
     const double e = (*step_.restitution)[i].value;
     LocalJet value = NewSpeed(a, rows.normal_a, b, rows.normal_b);
     if (contact.law == ContactLaw::kGap) {

@@ -13,17 +13,27 @@ ParameterDirection DirectionOf(const ParameterPath& path) {
   return direction;
 }
 
+namespace {
+
+// Adds `weight` to the derivatives k of the numbers that parameters[first + k] sets.
+template <typename T>
+void Seed(const std::vector<ParameterDirection>& parameters, int first, double weight,
+          const std::vector<SceneNumber<T>>& numbers) {
+  const int width = NumDerivatives<T>::value;
+  for (int k = 0; k < width && first + k < static_cast<int>(parameters.size()); ++k) {
+    for (const SetNumber& set : parameters[first + k]) {
+      numbers[set.number].value->v[k] += weight * set.scale;
+    }
+  }
+}
+
+}  // namespace
+
 template <typename T>
 BasicScene<T> SeededScene(const Scene& scene, const std::vector<ParameterDirection>& parameters,
                           int first) {
   BasicScene<T> seeded = CastScene<T>(scene);
-  const std::vector<SceneNumber<T>> numbers = EnumerateNumbers(&seeded);
-  const int width = NumDerivatives<T>::value;
-  for (int k = 0; k < width && first + k < static_cast<int>(parameters.size()); ++k) {
-    for (const SetNumber& set : parameters[first + k]) {
-      numbers[set.number].value->v[k] += set.scale;
-    }
-  }
+  Seed(parameters, first, 1.0, EnumerateNumbers(&seeded));
   return seeded;
 }
 
@@ -32,11 +42,15 @@ Eigen::SparseMatrix<double> VariableJacobian(const Scene& scene,
                                              const std::vector<ParameterDirection>& parameters) {
   std::vector<Eigen::Triplet<double>> entries;
   const int num_parameters = static_cast<int>(parameters.size());
+  // One copy of the scene, and of its paths, for all passes.
+  BasicScene<LocalJet> seeded = CastScene<LocalJet>(scene);
+  const std::vector<SceneNumber<LocalJet>> numbers = EnumerateNumbers(&seeded);
+  Model<LocalJet> model;
+  State<LocalJet> state;
   for (int first = 0; first < num_parameters; first += kLocalJetWidth) {
-    const BasicScene<LocalJet> seeded = SeededScene<LocalJet>(scene, parameters, first);
-    Model<LocalJet> model;
-    State<LocalJet> state;
+    Seed(parameters, first, 1.0, numbers);
     BuildModelWithStructure(seeded, structure, &model, &state);
+    Seed(parameters, first, -1.0, numbers);
     const auto collect = [&](const std::vector<LocalJet>& values, int offset) {
       for (size_t i = 0; i < values.size(); ++i) {
         for (int k = 0; k < kLocalJetWidth && first + k < num_parameters; ++k) {

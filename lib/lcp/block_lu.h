@@ -74,10 +74,14 @@ class BlockLu {
   }
 
   int num_blocks() const { return pattern_ ? pattern_->num_blocks : 0; }
-  /// Memory of the numbers, bytes.
-  size_t bytes() const { return values_.size() * sizeof(T); }
+  /// Memory, bytes, but for the pattern, which copies share.
+  size_t bytes() const;
 
  private:
+  template <typename Columns>
+  void SolveColumns(T* x, Columns columns) const;
+  template <typename Columns>
+  void SolveTransposedColumns(T* x, Columns columns) const;
   T* Place(int edge, bool lower) {
     const size_t slot = pattern_->edge_slot[edge];
     const size_t slots = pattern_->neighbour.size();

@@ -5,7 +5,7 @@
 //
 //   K = [ M  −Aᵀ  −Bᵀ;  A  0  0;  G  0  F + D(s/z) ],
 //
-// assembled, and solved with refinement. Included by contact_interior_point.cc alone.
+// assembled, and solved with refinement. Included by contact_interior_point_iteration_inl.h alone.
 
 #include <cmath>
 

@@ -85,6 +85,13 @@ struct ContactProblem {
   std::vector<JointBlock<T>> joints;
   bool redundant_joints = false;  ///< joints form loops: their rows may be dependent
   std::vector<ContactBlock<T>> contacts;
+
+  /// Memory of the vectors.
+  size_t bytes() const {
+    return sizeof(T) * (mass.capacity() + momentum.capacity()) +
+           sizeof(DamperBlock<T>) * dampers.capacity() + sizeof(JointBlock<T>) * joints.capacity() +
+           sizeof(ContactBlock<T>) * contacts.capacity();
+  }
 };
 
 /// A solution; vectors are sized for the problem. Impulses of joints: 3 a joint, unused rows 0.
@@ -95,6 +102,13 @@ struct ContactSolution {
   std::vector<T> normal_impulse;   ///< a contact
   std::vector<T> tangent_impulse;  ///< a contact, signed
   std::vector<ContactMode> modes;  ///< a contact
+
+  /// Memory of the vectors.
+  size_t bytes() const {
+    return sizeof(T) * (v.capacity() + joint_impulse.capacity() + normal_impulse.capacity() +
+                        tangent_impulse.capacity()) +
+           sizeof(ContactMode) * modes.capacity();
+  }
 };
 
 /// row · v over the moving blocks.

@@ -37,8 +37,17 @@ class ContactSystem {
   /// Block of contact i, −1 if open.
   const std::vector<int>& contact_block() const { return contact_block_; }
   int num_blocks() const { return lu_.num_blocks(); }
-  size_t bytes() const { return lu_.bytes(); }
+  /// Memory, bytes.
+  size_t bytes() const {
+    return lu_.bytes() + edges_.capacity() * sizeof(edges_[0]) +
+           contact_block_.capacity() * sizeof(int) +
+           sizeof(double) * (regularisation_.capacity() + rhs_.capacity() + correction_.capacity() +
+                             last_.capacity());
+  }
   void Reserve(int num_blocks, int num_edges);
+  /// Whether solves need the problem: they are refined against K without δ. Else they read the
+  /// factors alone.
+  bool is_regularised() const { return regularised_; }
   /// Hands the factorisation over (a tape keeps it); this object must be factorised anew before it
   /// solves.
   void MoveFactorsTo(ContactSystem* other);

@@ -2,6 +2,42 @@
 #include "tangible/simulation/event_record.h"
 
 namespace tangible {
+namespace {
+
+size_t BytesOf(const State<double>& state) {
+  return sizeof(double) * (state.pose.capacity() + state.twist.capacity());
+}
+
+// Without the node itself, which stands in a vector.
+size_t BytesOf(const SolvedNode& node) {
+  return BytesOf(node.state) + node.problem.bytes() + node.solution.bytes() + node.system.bytes();
+}
+
+size_t BytesOf(const std::vector<SolvedNode>& nodes) {
+  size_t sum = nodes.capacity() * sizeof(SolvedNode);
+  for (const SolvedNode& node : nodes) {
+    sum += BytesOf(node);
+  }
+  return sum;
+}
+
+size_t BytesOf(const Impulses& impulses) {
+  return BytesOf(impulses.before) + sizeof(double) * impulses.new_twist.capacity() +
+         sizeof(ActiveContact) * impulses.contacts.capacity() +
+         sizeof(CoefficientSource) *
+             (impulses.friction.capacity() + impulses.restitution.capacity()) +
+         impulses.problem.bytes() + impulses.solution.bytes() + impulses.system.bytes();
+}
+
+size_t BytesOf(const Segment& segment) {
+  return BytesOf(segment.before) + BytesOf(segment.after) +
+         sizeof(ActiveContact) * segment.contacts.capacity() +
+         sizeof(CoefficientSource) * segment.friction.capacity() +
+         sizeof(ContactMode) * segment.modes.capacity() + BytesOf(segment.stages) +
+         BytesOf(segment.corrections) + BytesOf(segment.projection) + BytesOf(segment.end);
+}
+
+}  // namespace
 
 EventPart* EventRecord::Add() {
   if (num_parts == static_cast<int>(parts.size())) {
@@ -11,26 +47,9 @@ EventPart* EventRecord::Add() {
 }
 
 size_t EventRecord::bytes() const {
-  size_t sum = 0;
-  const auto states = [](const State<double>& s) {
-    return sizeof(double) * (s.pose.size() + s.twist.size());
-  };
-  const auto node = [&](const SolvedNode& n) {
-    return sizeof(SolvedNode) + states(n.state) + n.system.bytes() +
-           sizeof(ContactBlock<double>) * n.problem.contacts.size() +
-           sizeof(JointBlock<double>) * n.problem.joints.size();
-  };
-  for (int i = 0; i < num_parts; ++i) {
-    const EventPart& part = *parts[i];
-    const Segment& segment = part.segment;
-    sum += sizeof(EventPart) + states(segment.before) + states(segment.after) +
-           part.impulses.system.bytes() + segment.projection.system.bytes();
-    for (int k = 0; k < segment.num_stages; ++k) {
-      sum += node(segment.stages[k]);
-    }
-    for (int k = 0; k < segment.num_corrections; ++k) {
-      sum += node(segment.corrections[k]);
-    }
+  size_t sum = parts.capacity() * sizeof(parts[0]);
+  for (const std::unique_ptr<EventPart>& part : parts) {
+    sum += sizeof(EventPart) + BytesOf(part->segment) + BytesOf(part->impulses);
   }
   return sum;
 }

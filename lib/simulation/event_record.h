@@ -85,6 +85,7 @@ struct EventRecord {
 
   void Clear() { num_parts = 0; }
   EventPart* Add();
+  /// Memory, bytes, with the parts that are kept for later steps.
   size_t bytes() const;
 };
 

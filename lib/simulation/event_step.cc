@@ -106,6 +106,12 @@ void EventStepper::ClearGuess() {
   last_modes_.clear();
 }
 
+void EventStepper::SetGuess(const EventGuess& guess) {
+  last_contacts_ = guess.contacts;
+  last_modes_ = guess.modes;
+  starts_ = guess.starts;
+}
+
 void EventStepper::FindTouching(const Model<double>& model, const State<double>& state) {
   const ModelStructure& structure = *model.structure;
   touching_ = Touching();

@@ -37,6 +37,13 @@ struct EventOutcome {
   bool by_lemke = false;
 };
 
+/// What an event step takes from the last one beside the state.
+struct EventGuess {
+  std::vector<ActiveContact> contacts;
+  std::vector<ContactMode> modes;
+  bool starts = true;  ///< the next step is a run's first
+};
+
 class EventStepper {
  public:
   explicit EventStepper(const Model<double>& model);
@@ -47,6 +54,8 @@ class EventStepper {
   EventRecord& mutable_record() { return record_; }
   /// Forgets the contacts' modes.
   void ClearGuess();
+  void SaveGuess(EventGuess* guess) const { *guess = {last_contacts_, last_modes_, starts_}; }
+  void SetGuess(const EventGuess& guess);
 
  private:
   struct Touching {

@@ -47,7 +47,8 @@ struct GradientOptions {
   double step = 0.0;
   DerivativeSide side = DerivativeSide::kBoth;
   Factorisations factorisations = Factorisations::kKeep;  ///< of the adjoint
-  int repeat = 1;                                         ///< the times are the best of so many
+  Checkpointing checkpointing{};                          ///< of the adjoint
+  int repeat = 1;                                         ///< CPU times are the best of so many
   CertificatePass certificate = CertificatePass::kRun;    ///< one more rollout, not timed
 };
 
@@ -69,9 +70,13 @@ struct GradientResult {
   double seconds =
       std::numeric_limits<double>::quiet_NaN();  ///< the method's own forward pass included
   double rollout_seconds = std::numeric_limits<double>::quiet_NaN();  ///< of a plain rollout
+  /// Both of each repeat, CPU time; a rollout is run before every repeat of the method.
+  std::vector<double> all_seconds, all_rollout_seconds;
   std::vector<std::string>
-      notes;           ///< one-sided differences, changes of modes between them, fallbacks
-  long fallbacks = 0;  ///< unrolled steps that took the implicit derivative
+      notes;              ///< one-sided differences, changes of modes between them, fallbacks
+  long fallbacks = 0;     ///< unrolled steps that took the implicit derivative
+  size_t tape_bytes = 0;  ///< of the adjoint: the most memory that its records took
+  long steps_again = 0;   ///< of the adjoint: steps that were run again from checkpoints
   Certificate certificate;
 };
 

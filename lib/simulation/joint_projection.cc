@@ -39,6 +39,18 @@ bool JointProjection::Project(const Model<double>& model, State<double>* state) 
   return met;
 }
 
+size_t JointProjection::bytes() const {
+  size_t numbers = iterate_.multipliers.capacity() + iterate_.rhs.capacity() + rhs_.capacity() +
+                   solution_.capacity();
+  for (const State<double>* state : {&iterate_.from, &iterate_.at, &iterate_.trial}) {
+    numbers += state->pose.capacity() + state->twist.capacity();
+  }
+  return sizeof(double) * numbers +
+         sizeof(JointRows<double>) * (iterate_.rows.capacity() + iterate_.trial_rows.capacity()) +
+         sizeof(JointCurvature<double>) * iterate_.curvature.capacity() +
+         sizeof(iterate_.edges[0]) * iterate_.edges.capacity() + iterate_.lu.bytes();
+}
+
 int JointProjection::worst_joint() const {
   const auto worst = std::max_element(iterate_.rows.begin(), iterate_.rows.end(),
                                       [](const JointRows<double>& x, const JointRows<double>& y) {

@@ -40,6 +40,8 @@ class JointProjection {
   static void ProjectUnrolled(const Model<T>& model, State<T>* state);
 
   void Reserve(int num_blocks, int num_edges) { iterate_.lu.Reserve(num_blocks, num_edges); }
+  /// Memory of the last projection, bytes.
+  size_t bytes() const;
 
  private:
   template <typename Sink>

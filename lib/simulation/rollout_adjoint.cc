@@ -2,6 +2,8 @@
 #include "tangible/simulation/rollout_adjoint.h"
 
 #include <algorithm>
+#include <cmath>
+#include <stdexcept>
 
 namespace tangible {
 namespace {
@@ -13,41 +15,230 @@ bool Projects(const ModelStructure& structure) {
 
 }  // namespace
 
-RolloutReport RolloutTape::Record(const Model<double>& model, const State<double>& initial,
-                                  Factorisations factorisations, const StateObserver& observer,
-                                  State<double>* final) {
-  factorisations_ = factorisations;
-  used_ = 0;
+size_t RolloutTape::Entry::bytes() const {
+  return sizeof(Entry) + record.bytes() + system.bytes() + events.bytes() +
+         (projection ? sizeof(JointProjection) + projection->bytes() : 0);
+}
+
+void RolloutTape::Start(const Model<double>& model, const TapeOptions& options) {
+  options_ = options;
+  total_ = NumSteps(model.structure->settings);
+  steps_ = steps_again_ = 0;
+  first_ = 0;
+  record_from_ = 0;
+  spacing_ = 0;
+  checkpoints_.clear();
+  checkpoint_bytes_ = entry_bytes_ = used_bytes_ = peak_bytes_ = 0;
+  for (const std::unique_ptr<Entry>& entry : entries_) {
+    entry->counted = 0;  // until it is counted anew
+  }
+  last_record_bytes_ = last_factor_bytes_ = most_record_bytes_ = 0;
   if (!stepper_ || structure_ != model.structure.get()) {
     stepper_ = std::make_unique<Stepper>(model);
     structure_ = model.structure.get();
     entries_.clear();
   }
-  const bool keep = factorisations == Factorisations::kKeep;
+  used_ = 0;
+  if (options.checkpointing.kind == Checkpointing::Kind::kEvery) {
+    spacing_ = std::max(1L, options.checkpointing.every);
+    record_from_ = total_ > 0 ? (total_ - 1) / spacing_ * spacing_ : 0;
+    ReleaseEntries(static_cast<size_t>(std::min(spacing_, total_)));
+  } else if (by_budget()) {
+    ReleaseEntries(0);
+  }
+  for (const std::unique_ptr<Entry>& entry : entries_) {
+    Count(entry.get());
+  }
+}
+
+RolloutReport RolloutTape::Record(const Model<double>& model, const State<double>& initial,
+                                  const TapeOptions& options, const StateObserver& observer,
+                                  State<double>* final) {
+  Start(model, options);
   const StateObserver record = [&](long k, double t, const State<double>& state, Stepper* stepper) {
     if (observer) {
       observer(k, t, state, stepper);
     }
-    if (stepper != nullptr) {
-      if (used_ == entries_.size()) {
-        entries_.push_back(std::make_unique<Entry>());
-      }
-      Entry& entry = *entries_[used_++];
-      if (stepper->by_events()) {
-        std::swap(entry.events, stepper->events().mutable_record());
-        return;
-      }
-      if (keep) {
-        stepper->TakeRecord(&entry.record, &entry.system);
-      } else {
-        stepper->TakeRecord(&entry.record, nullptr);
-      }
-      if (Projects(*model.structure)) {
-        entry.projection = stepper->projection();
-      }
-    }
+    RecordStep(model, k, state);
   };
   return Rollout(model, initial, record, stepper_.get(), final);
+}
+
+// After k steps of the first run, the last of which the stepper still holds.
+void RolloutTape::RecordStep(const Model<double>& model, long k, const State<double>& state) {
+  steps_ = k;
+  if (k > record_from_) {
+    if (used_ == 0) {
+      first_ = k - 1;
+    }
+    Take(model, total_ - k);
+    if (by_budget() && k == 1) {
+      PlanByBudget(state);
+    }
+  }
+  const bool bounded = options_.checkpointing.kind != Checkpointing::Kind::kAll;
+  if (bounded && k < total_ && (k == 0 || (spacing_ > 0 && k % spacing_ == 0))) {
+    AddCheckpoint(MakeCheckpoint(k, state), Origin::kRun);
+  }
+  if (by_budget()) {
+    MakeRoom();
+  }
+  peak_bytes_ = std::max(peak_bytes_, held_bytes());
+}
+
+// Keeps the first run within its budget.
+void RolloutTape::MakeRoom() {
+  if (held_bytes() > budget() && !entries_.empty()) {
+    // The sweep will run these steps again.
+    used_ = 0;
+    ReleaseEntries(0);
+    record_from_ = record_from_ == 0 ? (total_ - 1) / spacing_ * spacing_ : total_;
+  }
+  if (checkpoint_bytes_ > budget() / 2 && checkpoints_.size() > 2) {
+    // More than planned: every other one stays.
+    spacing_ *= 2;
+    RemoveCheckpoints([this](long step, Origin) { return step % spacing_ != 0; });
+    record_from_ =
+        record_from_ == 0 ? 0 : std::min(record_from_, (total_ - 1) / spacing_ * spacing_);
+  }
+}
+
+// After the first step, by what it took. Whether all records fit is seen when they do not.
+void RolloutTape::PlanByBudget(const State<double>& state) {
+  const size_t checkpoint = MakeCheckpoint(1, state).bytes();
+  const auto least_memory = [&](size_t record) {
+    return 2.0 * std::sqrt(static_cast<double>(total_) * static_cast<double>(checkpoint) *
+                           static_cast<double>(record));
+  };
+  const size_t with_factors = last_record_bytes_ + last_factor_bytes_;
+  const bool room = 2.0 * least_memory(with_factors) <= static_cast<double>(budget());
+  spacing_ = CheckpointSpacing(total_, checkpoint, room ? with_factors : last_record_bytes_);
+}
+
+Checkpoint RolloutTape::MakeCheckpoint(long step, const State<double>& state) const {
+  Checkpoint checkpoint;
+  checkpoint.step = step;
+  checkpoint.state = state;
+  stepper_->SaveGuess(&checkpoint.guess);
+  return checkpoint;
+}
+
+void RolloutTape::AddCheckpoint(Checkpoint checkpoint, Origin origin) {
+  checkpoint_bytes_ += checkpoint.bytes();
+  const auto place = std::upper_bound(
+      checkpoints_.begin(), checkpoints_.end(), checkpoint.step,
+      [](long step, const std::pair<Checkpoint, Origin>& c) { return step < c.first.step; });
+  checkpoints_.emplace(place, std::move(checkpoint), origin);
+}
+
+void RolloutTape::RemoveCheckpoints(const std::function<bool(long step, Origin origin)>& which) {
+  std::erase_if(checkpoints_, [&](const std::pair<Checkpoint, Origin>& c) {
+    if (!which(c.first.step, c.second)) {
+      return false;
+    }
+    checkpoint_bytes_ -= c.first.bytes();
+    return true;
+  });
+}
+
+// Whether the stepper's factors fit beside the records of `remaining` further steps.
+bool RolloutTape::HasRoomForFactors(long remaining) const {
+  return checkpoint_bytes_ + used_bytes_ + last_factor_bytes_ +
+             last_record_bytes_ * static_cast<size_t>(remaining + 1) <=
+         budget();
+}
+
+// The stepper's last step becomes the next entry; `remaining` are to follow it.
+void RolloutTape::Take(const Model<double>& model, long remaining) {
+  if (used_ == entries_.size()) {
+    entries_.push_back(std::make_unique<Entry>());
+  }
+  Entry& entry = *entries_[used_++];
+  if (stepper_->by_events()) {
+    std::swap(entry.events, stepper_->events().mutable_record());
+    Count(&entry);
+    return;
+  }
+  entry.has_factors = options_.factorisations == Factorisations::kKeep &&
+                      (!by_budget() || HasRoomForFactors(remaining));
+  if (entry.has_factors) {
+    stepper_->TakeRecord(&entry.record, &entry.system);
+  } else {
+    stepper_->TakeRecord(&entry.record, nullptr);
+    if (by_budget()) {
+      entry.system = ContactSystem();
+      entry.record.problem = ContactProblem<double>();
+    }
+  }
+  if (Projects(*model.structure)) {
+    if (!entry.projection) {
+      entry.projection = std::make_unique<JointProjection>();
+    }
+    *entry.projection = stepper_->projection();
+  }
+  Count(&entry);
+}
+
+// Puts an entry's memory into the sums; without checkpoints nobody reads them.
+void RolloutTape::Count(Entry* entry) {
+  if (options_.checkpointing.kind == Checkpointing::Kind::kAll) {
+    return;
+  }
+  const size_t bytes = entry->bytes();
+  entry_bytes_ += bytes - entry->counted;
+  entry->counted = bytes;
+  if (used_ > 0) {
+    used_bytes_ = used_ == 1 ? bytes : used_bytes_ + bytes;
+    if (entry->has_factors || last_factor_bytes_ == 0) {
+      last_factor_bytes_ = entry->factor_bytes();
+    }
+    last_record_bytes_ = bytes - entry->factor_bytes();
+    most_record_bytes_ = std::max(most_record_bytes_, last_record_bytes_);
+  }
+  if (by_budget() && held_bytes() > budget()) {
+    ReleaseEntries(used_);
+  }
+}
+
+// Gives back the memory of all entries but the first `keep`.
+void RolloutTape::ReleaseEntries(size_t keep) {
+  while (entries_.size() > keep) {
+    entry_bytes_ -= entries_.back()->counted;
+    entries_.pop_back();
+  }
+}
+
+// Makes the entries those of the steps up to `last`, from the checkpoint before it or, where these
+// are too many for the budget, from a new one in between.
+void RolloutTape::RunAgain(const Model<double>& model, long last) {
+  RemoveCheckpoints(
+      [last](long step, Origin origin) { return origin == Origin::kSplit && step >= last; });
+  const auto next = std::lower_bound(
+      checkpoints_.begin(), checkpoints_.end(), last,
+      [](const std::pair<Checkpoint, Origin>& c, long step) { return c.first.step < step; });
+  const Checkpoint& from = std::prev(next)->first;
+  stepper_->SetGuess(from.guess);
+  State<double> state = from.state;
+  const SimulationSettings& settings = model.structure->settings;
+  used_ = 0;
+  used_bytes_ = 0;
+  first_ = from.step;
+  for (long k = from.step; k < last; ++k) {
+    if (by_budget() && used_ > 0 &&
+        checkpoint_bytes_ + used_bytes_ + most_record_bytes_ > budget()) {
+      AddCheckpoint(MakeCheckpoint(k, state), Origin::kSplit);
+      used_ = 0;
+      used_bytes_ = 0;
+      first_ = k;
+    }
+    if (stepper_->Step(model, StepTime(settings, k), StepLength(settings, k), &state).status !=
+        StepStatus::kDone) {
+      throw std::logic_error("RolloutTape: the model is not that of the recorded run");
+    }
+    ++steps_again_;
+    Take(model, last - k - 1);
+    peak_bytes_ = std::max(peak_bytes_, held_bytes());
+  }
 }
 
 void RolloutTape::StepAdjoint(const Model<double>& model, const StepRecord& record,
@@ -96,17 +287,21 @@ void RolloutTape::AdjointFrom(const Model<double>& model, long last, int num_los
   w_bar->setZero(model.structure->num_variables(), num_losses);
   for (long k = std::min(last, steps()); k > 0; --k) {
     seed(k, w_bar);
-    Entry& entry = *entries_[k - 1];
+    const long step = k - 1;
+    if (step < first_ || step >= first_ + static_cast<long>(used_)) {
+      RunAgain(model, k);
+    }
+    Entry& entry = *entries_[static_cast<size_t>(step - first_)];
     if (stepper_->by_events()) {
       stepper_->event_derivative().Adjoint(model, &entry.events, w_bar);
       continue;
     }
-    if (factorisations_ == Factorisations::kKeep) {
-      StepAdjoint(model, entry.record, &entry.system, &entry.projection, w_bar);
+    if (entry.has_factors) {
+      StepAdjoint(model, entry.record, &entry.system, entry.projection.get(), w_bar);
     } else {
       std::swap(entry.record.problem, refactored_);
       stepper_->Refactor(model, &entry.record);
-      StepAdjoint(model, entry.record, &stepper_->system(), &entry.projection, w_bar);
+      StepAdjoint(model, entry.record, &stepper_->system(), entry.projection.get(), w_bar);
       std::swap(entry.record.problem, refactored_);
     }
   }
@@ -114,17 +309,9 @@ void RolloutTape::AdjointFrom(const Model<double>& model, long last, int num_los
 }
 
 size_t RolloutTape::bytes() const {
-  size_t sum = 0;
-  for (size_t i = 0; i < used_; ++i) {
-    const Entry& e = *entries_[i];
-    sum += sizeof(Entry) + e.system.bytes() + e.events.bytes() +
-           sizeof(double) * (e.record.before.pose.size() + e.record.before.twist.size() +
-                             e.record.new_twist.size() + e.record.problem.mass.size() +
-                             e.record.problem.momentum.size()) +
-           sizeof(ActiveContact) * e.record.contacts.size() +
-           sizeof(ContactBlock<double>) * e.record.problem.contacts.size() +
-           sizeof(JointBlock<double>) * e.record.problem.joints.size() +
-           sizeof(CoefficientSource) * 2 * e.record.friction.size();
+  size_t sum = checkpoint_bytes_;
+  for (const std::unique_ptr<Entry>& entry : entries_) {
+    sum += entry->bytes();
   }
   return sum;
 }

@@ -116,6 +116,14 @@ SolvedStep StepRecord::View(const std::vector<int>& contact_block) const {
   return view;
 }
 
+size_t StepRecord::bytes() const {
+  return sizeof(double) *
+             (before.pose.capacity() + before.twist.capacity() + new_twist.capacity()) +
+         sizeof(ActiveContact) * contacts.capacity() +
+         sizeof(CoefficientSource) * (friction.capacity() + restitution.capacity()) +
+         problem.bytes() + solution.bytes();
+}
+
 Stepper::Stepper(const Model<double>& model) : search_(model) {
   const ModelStructure& s = *model.structure;
   if (s.settings.stepping == Stepping::kEvent) {
@@ -161,6 +169,32 @@ void Stepper::ClearGuess() {
 void Stepper::SetGuess(const StepRecord& record) {
   last_contacts_ = record.contacts;
   last_solution_ = record.solution;
+}
+
+void Stepper::SaveGuess(StepperGuess* guess) const {
+  if (events_) {
+    events_->SaveGuess(&guess->events);
+    return;
+  }
+  guess->contacts = last_contacts_;
+  guess->solution.joint_impulse = last_solution_.joint_impulse;
+  guess->solution.normal_impulse = last_solution_.normal_impulse;
+  guess->solution.tangent_impulse = last_solution_.tangent_impulse;
+  guess->solution.modes = last_solution_.modes;
+}
+
+void Stepper::SetGuess(const StepperGuess& guess) {
+  if (events_) {
+    events_->SetGuess(guess.events);
+    return;
+  }
+  last_contacts_ = guess.contacts;
+  last_solution_ = guess.solution;
+}
+
+size_t StepperGuess::bytes() const {
+  return sizeof(ActiveContact) * (contacts.capacity() + events.contacts.capacity()) +
+         sizeof(ContactMode) * events.modes.capacity() + solution.bytes();
 }
 
 ContactMode Stepper::InitialMode(const ContactBlock<double>& contact) const {
@@ -373,7 +407,8 @@ void Stepper::TakeRecord(StepRecord* record, ContactSystem* system) {
   std::swap(*record, record_);
   if (system != nullptr) {
     solver_.system().MoveFactorsTo(system);
-  } else {
+  }
+  if (system == nullptr || !system->is_regularised()) {
     std::swap(record->problem, record_.problem);
   }
 }

@@ -59,6 +59,17 @@ struct StepRecord {
   ContactSolution<double> solution;
 
   SolvedStep View(const std::vector<int>& contact_block) const;
+  /// Memory of the vectors.
+  size_t bytes() const;
+};
+
+/// What a step takes from those before it beside the state: modes and impulses to start from.
+struct StepperGuess {
+  std::vector<ActiveContact> contacts;
+  ContactSolution<double> solution;  ///< without v
+  EventGuess events;                 ///< event stepping: the only one used
+
+  size_t bytes() const;
 };
 
 class Stepper {
@@ -80,7 +91,8 @@ class Stepper {
   ContactSystem& system() { return solver_.system(); }
   JointProjection& projection() { return projection_; }
   /// Hands the last step's record and, unless null, its factorisation over; for a tape, without
-  /// copies. Until the next step record() and system() are not that step's.
+  /// copies. Until the next step record() and system() are not that step's. The record's problem is
+  /// only handed over where the factorisation's solves need it.
   void TakeRecord(StepRecord* record, ContactSystem* system);
   /// Assembles and factorises a recorded step anew, so that system() is that step's; its problem is
   /// filled in.
@@ -90,6 +102,9 @@ class Stepper {
   void ClearGuess();
   /// Sets the guess to that of a recorded step, so that a run can be resumed with the same bits.
   void SetGuess(const StepRecord& record);
+  /// What the next step starts from, and back: from the same state it gives the same bits.
+  void SaveGuess(StepperGuess* guess) const;
+  void SetGuess(const StepperGuess& guess);
 
  private:
   StepReport StepByEvents(const Model<double>& model, double t, double h, State<double>* state);

@@ -3,34 +3,11 @@
 // Steps in Jets: implicit (through K of the double step) and unrolled (through every operation).
 #include <cmath>
 
-#include "tangible/lcp/contact_interior_point.h"
 #include "tangible/simulation/implicit_residual_inl.h"
-#include "tangible/simulation/step.h"
+#include "tangible/simulation/step_unrolled_inl.h"
 
 namespace tangible {
 namespace {
-
-// Complementarity to which the unrolled interior point runs: derivatives lag behind values.
-constexpr double kUnrolledComplementarity = 1e-17;
-
-template <typename T>
-void AssembleAll(const Model<T>& model, const StepRecord& record, const State<T>& state,
-                 ContactProblem<T>* problem) {
-  AssemblyScratch<T> scratch;
-  AssembleFree(model, state, record.time, record.h, problem, &scratch);
-  AssembleContacts(model, state, record.h, record.contacts, record.friction, record.restitution,
-                   scratch, problem);
-}
-
-// q := q + h v, by derivative parts too.
-template <typename T>
-void MovePoses(const ModelStructure& structure, double h, State<T>* state) {
-  for (int body = 0; body < structure.num_bodies(); ++body) {
-    for (int i = 0; i < 3 && structure.bodies[body].motion != Motion::kStatic; ++i) {
-      state->pose[3 * body + i] += h * state->twist[3 * body + i];
-    }
-  }
-}
 
 template <typename T>
 void ProjectImplicit(const Model<T>& model, JointProjection* projection, const State<double>& after,
@@ -68,7 +45,7 @@ void StepImplicit(const Model<T>& model, Stepper* stepper, const State<double>& 
   const StepRecord& record = stepper->record();
   const ModelStructure& s = *model.structure;
   ContactProblem<T> problem;
-  AssembleAll(model, record, *state, &problem);
+  internal::AssembleAll(model, record, *state, &problem);
   ContactSystem& system = stepper->system();
   std::vector<double> rhs(3 * static_cast<size_t>(system.num_blocks()) * kWidth, 0.0);
   ImplicitResidual<T>(problem, record.solution, SlidingSigns(record.problem, record.solution),
@@ -84,7 +61,7 @@ void StepImplicit(const Model<T>& model, Stepper* stepper, const State<double>& 
       }
     }
   }
-  MovePoses(s, record.h, state);
+  internal::MovePoses(s, record.h, state);
   if (s.settings.joint_correction == JointCorrection::kProjection && !s.joints.empty()) {
     ProjectImplicit(model, &stepper->projection(), after, state);
   }
@@ -93,25 +70,11 @@ void StepImplicit(const Model<T>& model, Stepper* stepper, const State<double>& 
 template <typename T>
 bool StepUnrolled(const Model<T>& model, const StepRecord& record, State<T>* state) {
   const ModelStructure& s = *model.structure;
-  ContactProblem<T> problem;
-  AssembleAll(model, record, *state, &problem);
-  InteriorPointWorkspace<T> workspace;
-  ContactSolution<T> solution;
-  ContactInteriorPointOptions options;
-  options.complementarity =
-      s.settings.smoothing > 0.0 ? s.settings.smoothing : kUnrolledComplementarity;
-  const InteriorPointOutcome outcome =
-      SolveContactsByInteriorPoint(problem, options, &workspace, &solution);
-  for (int k = 0; k < s.num_blocks(); ++k) {
-    for (int i = 0; i < 3; ++i) {
-      state->twist[3 * s.moving[k] + i] = solution.v[3 * k + i];
-    }
-  }
-  MovePoses(s, record.h, state);
+  const bool converged = SolveUnrolled(model, record, state);
   if (s.settings.joint_correction == JointCorrection::kProjection && !s.joints.empty()) {
     JointProjection::ProjectUnrolled(model, state);
   }
-  return outcome.converged;
+  return converged;
 }
 
 #define TANGIBLE_INSTANTIATE_JET(N)                                                        \

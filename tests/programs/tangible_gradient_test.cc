@@ -165,6 +165,21 @@ TEST_F(TangibleGradientTest, BadInputIsOneLine) {
   }
 }
 
+TEST_F(TangibleGradientTest, CheckpointsBoundTheMemoryAndChangeNothing) {
+  const std::string parameters = "--parameters=bodies/ball/mass,bodies/*/friction ";
+  const json all = json::parse(Differentiate(parameters + "--checkpoint=all").out);
+  EXPECT_EQ(all["steps_again"], 0);
+  for (const char* checkpoint : {"every:7", "budget:0.05"}) {
+    const ProgramRun run = Differentiate(parameters + "--checkpoint=" + checkpoint);
+    ASSERT_EQ(run.exit_status, 0) << run.error;
+    const json result = json::parse(run.out);
+    EXPECT_EQ(result["jacobian"], all["jacobian"]) << checkpoint;
+    EXPECT_GT(result["steps_again"], 0) << checkpoint;
+    EXPECT_LT(result["tape_bytes"], all["tape_bytes"]) << checkpoint;
+  }
+  ExpectOneLine(Differentiate(parameters + "--checkpoint=budget:0.001"), 1, "budget of 1049 bytes");
+}
+
 TEST_F(TangibleGradientTest, WrongFlagsAreUsage) {
   const std::string parameters = "--parameters=bodies/ball/mass ";
   ExpectOneLine(Differentiate(""), 2, "--parameters");
@@ -178,6 +193,11 @@ TEST_F(TangibleGradientTest, WrongFlagsAreUsage) {
   ExpectOneLine(Differentiate(parameters + "--step=nan"), 2, "--step");
   ExpectOneLine(Differentiate(parameters + "--repeat=0"), 2, "--repeat");
   ExpectOneLine(Differentiate(parameters + "--factorisations=some"), 2, "--factorisations");
+  for (const char* checkpoint : {"", "some", "every:0", "every:2.5", "every:", "every:-1",
+                                 "budget:0", "budget:nan", "budget:1e300", "budget:1MiB"}) {
+    ExpectOneLine(Differentiate(parameters + "--checkpoint='" + checkpoint + "'"), 2,
+                  "--checkpoint");
+  }
 }
 
 }  // namespace

@@ -14,8 +14,10 @@ TEST(EventRecordTest, KeepsItsPartsMemory) {
   EXPECT_NE(record.Add(), first);
   EXPECT_EQ(record.num_parts, 2);
   EXPECT_GE(record.bytes(), 2 * sizeof(EventPart) + 30 * sizeof(double));
+  const size_t bytes = record.bytes();
   record.Clear();
-  EXPECT_EQ(record.bytes(), 0U);
+  EXPECT_EQ(record.num_parts, 0);
+  EXPECT_EQ(record.bytes(), bytes);  // it is still held
   EXPECT_EQ(record.Add(), first);
   EXPECT_EQ(record.num_parts, 1);
 }

@@ -7,6 +7,7 @@
 
 #include "../support/scenes.h"
 #include "tangible/dynamics/parameter_map.h"
+#include "tangible/scene/scene_json.h"
 #include "tangible/simulation/rollout_tangent.h"
 #include "tangible/verification/support/random_scene.h"
 
@@ -88,6 +89,136 @@ TEST(RolloutAdjointTest, RecomputedFactorisationsGiveTheSame) {
   EXPECT_GT(w_bar[0].norm(), 1.0);
   EXPECT_LT((w_bar[0] - w_bar[1]).norm(), 1e-13 * w_bar[0].norm());
   EXPECT_LT(bytes[1], bytes[0]);
+}
+
+Scene LoadData(const std::string& name) {
+  Scene scene;
+  std::string error;
+  EXPECT_TRUE(LoadScene(std::string(TANGIBLE_SOURCE_DIR) + "/data/scenes/" + name, &scene, &error))
+      << error;
+  return scene;
+}
+
+struct SweptTape {
+  RowMatrixXd w_bar;
+  size_t peak = 0;
+  double runs_again = 0.0;
+};
+
+// Two losses, of the end and of a state on the way.
+SweptTape Sweep(const Scene& scene, const TapeOptions& options) {
+  Model<double> model;
+  State<double> initial, final;
+  BuildModel(scene, &model, &initial);
+  RolloutTape tape;
+  EXPECT_EQ(tape.Record(model, initial, options, {}, &final).status, StepStatus::kDone);
+  const long steps = NumSteps(scene.simulation);
+  EXPECT_EQ(tape.steps(), steps);
+  SweptTape swept;
+  tape.Adjoint(
+      model, 2,
+      [&](long k, RowMatrixXd* w) {
+        if (k == steps) (*w)(0, 0) += 1.0;
+        if (k == steps / 2) (*w)(4, 1) += 1.0;
+      },
+      &swept.w_bar);
+  swept.peak = tape.peak_bytes();
+  swept.runs_again = static_cast<double>(tape.steps_again()) / static_cast<double>(steps);
+  return swept;
+}
+
+Checkpointing Every(long steps) { return {Checkpointing::Kind::kEvery, steps, 0}; }
+Checkpointing Budget(size_t bytes) { return {Checkpointing::Kind::kBudget, 0, bytes}; }
+
+Scene MixtureByEvents() {
+  Scene scene = test_scenes::SceneOf(test_scenes::Mixture());
+  scene.simulation.stepping = Stepping::kEvent;
+  scene.simulation.integrator = Integrator::kTrapezoidal;
+  return scene;
+}
+
+Scene MixtureThatDrifts() {
+  Scene scene = test_scenes::SceneOf(test_scenes::Mixture());
+  scene.simulation.joint_correction = JointCorrection::kNone;
+  return scene;
+}
+
+// They land one after another.
+Scene FallingDiscs(int count) {
+  Scene scene = test_scenes::SceneOf(R"({"bodies": [)" + std::string(test_scenes::kFloor) + "]}");
+  for (int i = 0; i < count; ++i) {
+    BasicBody<double> disc;
+    disc.name = "disc" + std::to_string(i);
+    disc.motion = Motion::kMoving;
+    disc.shape = {ShapeType::kCircle, {0.1}};
+    disc.mass = 1.0;
+    disc.friction = 0.5;
+    disc.position = {0.21 * i, 0.15 + 0.1 * i};
+    scene.bodies.push_back(disc);
+  }
+  scene.simulation.dt = 0.01;
+  scene.simulation.duration = 1.0;
+  return scene;
+}
+
+TEST(RolloutAdjointTest, CheckpointsGiveTheSameBits) {
+  for (const Scene& scene : {test_scenes::SceneOf(test_scenes::Mixture()), MixtureThatDrifts(),
+                             MixtureByEvents(), LoadData("bouncing_ball.json")}) {
+    for (const Factorisations factorisations :
+         {Factorisations::kKeep, Factorisations::kRecompute}) {
+      const SweptTape all = Sweep(scene, {factorisations, {}});
+      EXPECT_EQ(all.runs_again, 0.0);
+      EXPECT_GT(all.w_bar.norm(), 1.0);
+      for (const long every : {1L, 2L, 7L, 62L, 63L, 1000L}) {
+        const SweptTape swept = Sweep(scene, {factorisations, Every(every)});
+        EXPECT_EQ(swept.w_bar, all.w_bar) << every;
+        EXPECT_LE(swept.runs_again, 1.0) << every;
+        if (every == 7) {
+          EXPECT_GT(swept.runs_again, 0.5);
+          EXPECT_LT(swept.peak, all.peak / 2);
+        }
+      }
+    }
+  }
+}
+
+TEST(RolloutAdjointTest, ABudgetIsKeptWithTheSameBits) {
+  for (const Scene& scene :
+       {test_scenes::SceneOf(test_scenes::Mixture()), MixtureThatDrifts(), MixtureByEvents()}) {
+    const SweptTape all = Sweep(scene, {});
+    for (const double share : {0.3, 0.45, 0.6, 0.8, 0.95, 1.5}) {
+      const auto budget = static_cast<size_t>(share * static_cast<double>(all.peak));
+      const SweptTape swept = Sweep(scene, {Factorisations::kKeep, Budget(budget)});
+      EXPECT_EQ(swept.w_bar, all.w_bar) << share;
+      EXPECT_LE(swept.peak, budget) << share;
+      EXPECT_LE(swept.runs_again, 2.0) << share;
+      EXPECT_EQ(swept.runs_again == 0.0, share > 1.0) << share;
+    }
+  }
+}
+
+// Contacts come after the first step, by which the checkpoints are planned.
+TEST(RolloutAdjointTest, ABudgetIsKeptWhereStepsGrow) {
+  const Scene scene = FallingDiscs(20);
+  const SweptTape all = Sweep(scene, {});
+  for (const double share : {0.2, 0.3, 0.5, 0.7}) {
+    const auto budget = static_cast<size_t>(share * static_cast<double>(all.peak));
+    const SweptTape swept = Sweep(scene, {Factorisations::kKeep, Budget(budget)});
+    EXPECT_EQ(swept.w_bar, all.w_bar) << share;
+    EXPECT_LE(swept.peak, budget) << share;
+    EXPECT_GT(swept.runs_again, 0.0) << share;
+    EXPECT_LE(swept.runs_again, 2.0) << share;
+  }
+}
+
+TEST(RolloutAdjointTest, ALongRunNeedsLittleMemory) {
+  constexpr size_t kBudget = 64 * 1048576;
+  Scene scene = LoadData("chain.json");
+  scene.simulation.duration = 10000 * scene.simulation.dt;
+  const SweptTape swept = Sweep(scene, {Factorisations::kKeep, Budget(kBudget)});
+  EXPECT_LE(swept.peak, kBudget);
+  EXPECT_LE(swept.runs_again, 2.0);
+  EXPECT_TRUE(swept.w_bar.allFinite());
 }
 
 TEST(RolloutAdjointTest, ATapeMayBeUsedAgain) {

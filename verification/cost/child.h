@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// Work in a process of its own, so that its peak memory is its own and its budget is kept: beyond
+// so many seconds of CPU time, or so many bytes of memory, the system ends it.
+
+#include <functional>
+#include <string>
+#include <vector>
+
+namespace tangible::cost {
+
+struct Budget {
+  double seconds = 5.0;       ///< of CPU time, up to ChildLimits::Lift
+  size_t bytes = 1ull << 30;  ///< of memory beyond that of this process when it starts
+};
+
+enum class ChildStatus { kDone, kOverSeconds, kOverBytes, kFailed };
+
+struct ChildOutcome {
+  ChildStatus status = ChildStatus::kFailed;
+  std::string message;         ///< of kFailed, one line
+  std::vector<double> values;  ///< of kDone: what the work returned
+  size_t peak_bytes = 0;       ///< resident, of the whole process
+};
+
+/// What the work gets.
+class ChildLimits {
+ public:
+  /// Ends the time limit: what follows may take longer.
+  void LiftSeconds() const;
+};
+
+/// Runs `work` in a child of this process. It returns numbers, and a message where it failed. Time
+/// that other processes take is not counted, but the child ends after ten times its seconds in any
+/// case.
+ChildOutcome RunInChild(
+    const Budget& budget,
+    const std::function<std::vector<double>(const ChildLimits& limits, std::string* error)>& work);
+
+}  // namespace tangible::cost

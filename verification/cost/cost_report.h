@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// Costs as a table, as JSON and as a picture.
+
+#include <string>
+#include <vector>
+
+#include "tangible/scene/json_writer.h"
+#include "tangible/verification/cost/cost_bounds.h"
+
+namespace tangible::cost {
+
+/// A block a number of steps: a line a method, a column a number of parameters, in each cell the
+/// time in rollouts and the peak memory.
+std::string TableText(const std::vector<CostCell>& cells);
+std::string CrossoverText(const std::vector<Crossover>& crossovers);
+std::string BoundsText(const std::vector<CheckedBound>& bounds);
+
+OrderedJson ToJson(const std::vector<CostCell>& cells, const CostCell& long_run,
+                   const std::vector<Crossover>& crossovers,
+                   const std::vector<CheckedBound>& bounds);
+
+/// SVG: time over the number of parameters, of runs of the most steps but one (or of those there
+/// are), and memory over the number of steps, of the least number of parameters.
+std::string Picture(const std::vector<CostCell>& cells);
+
+}  // namespace tangible::cost

@@ -1,0 +1,174 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// tangible-cost: what a gradient costs by each method, in time and memory.
+
+#include <gflags/gflags.h>
+
+#include <charconv>
+#include <cmath>
+#include <iostream>
+#include <string>
+#include <vector>
+
+#include "tangible/app/program.h"
+#include "tangible/app/progress.h"
+#include "tangible/verification/cost/cost_report.h"
+#include "tangible/verification/cost/cost_scene.h"
+#include "tangible/verification/support/provenance.h"
+
+DEFINE_string(parameters, "1,8,64", "numbers of parameters, ascending, separated by commas");
+DEFINE_string(steps, "10,100,1000", "numbers of steps, ascending, separated by commas");
+DEFINE_bool(full, false,
+            "instead of both: 1, 2, 4, ..., 256 parameters and 10, 100, 1000, 10000 steps");
+DEFINE_double(budget_seconds, 5.0, "CPU time of a cell, s");
+DEFINE_double(budget_mib, 1024.0, "memory of a cell, 2^20 bytes");
+DEFINE_double(repeat_seconds, 0.2, "CPU time of the repeats of a cell, s, about");
+DEFINE_int32(long_run, 10000, "steps of the run whose adjoint's memory is bounded");
+DEFINE_double(adjoint_bound, 2.0, "rollouts that the adjoint may take");
+DEFINE_double(tangent_bound, 3.0, "rollouts that the tangent of 8 parameters may take");
+DEFINE_double(jet_bound, 4.0, "rollouts that implicit Jets of 8 derivatives may take");
+DEFINE_bool(bounds, true, "exit with status 1 where a bound does not hold");
+DEFINE_string(out, "", "file of all figures (JSON)");
+DEFINE_string(picture, "", "file of a picture of time and memory (SVG)");
+
+namespace tangible {
+namespace {
+
+using cost::BoundsText;
+using cost::CheckedBound;
+using cost::CostBounds;
+using cost::CostCell;
+using cost::CostMethod;
+using cost::CostOptions;
+using cost::Crossover;
+
+constexpr double kMebibyte = 1048576.0;
+constexpr int kMostParameters = 4096;
+constexpr int kMostSteps = 1000000;
+
+// Whole numbers from 1 to `most`, ascending; false if it is none such.
+template <typename Number>
+bool ReadList(const std::string& text, Number most, std::vector<Number>* list) {
+  const char* at = text.data();
+  const char* const end = at + text.size();
+  for (;;) {
+    Number number = 0;
+    const auto [rest, error] = std::from_chars(at, end, number);
+    if (error != std::errc() || number < 1 || number > most ||
+        (!list->empty() && number <= list->back())) {
+      return false;
+    }
+    list->push_back(number);
+    if (rest == end) return true;
+    if (*rest != ',') return false;
+    at = rest + 1;
+  }
+}
+
+// Empty, or one line about a flag's value.
+std::string CheckFlags(CostOptions* options, CostBounds* bounds) {
+  if (FLAGS_full) {
+    FLAGS_parameters = "1,2,4,8,16,32,64,128,256";
+    FLAGS_steps = "10,100,1000,10000";
+  }
+  const auto expected = [](const char* flag, int most, const std::string& got) {
+    return std::string(flag) + ": expected ascending numbers from 1 to " + std::to_string(most) +
+           ", separated by commas, got '" + got + "'";
+  };
+  if (!ReadList(FLAGS_parameters, kMostParameters, &options->parameters)) {
+    return expected("--parameters", kMostParameters, FLAGS_parameters);
+  }
+  if (!ReadList<long>(FLAGS_steps, kMostSteps, &options->steps)) {
+    return expected("--steps", kMostSteps, FLAGS_steps);
+  }
+  if (FLAGS_long_run < 1 || FLAGS_long_run > kMostSteps) {
+    return "--long_run: expected a number from 1 to " + std::to_string(kMostSteps) + ", got " +
+           std::to_string(FLAGS_long_run);
+  }
+  const std::pair<const char*, double> positive[] = {
+      {"--budget_seconds", FLAGS_budget_seconds}, {"--budget_mib", FLAGS_budget_mib},
+      {"--repeat_seconds", FLAGS_repeat_seconds}, {"--adjoint_bound", FLAGS_adjoint_bound},
+      {"--tangent_bound", FLAGS_tangent_bound},   {"--jet_bound", FLAGS_jet_bound}};
+  for (const auto& [flag, value] : positive) {
+    // Beyond a million seconds or MiB a timer or a limit would overflow.
+    if (!(value > 0.0 && value <= 1e6)) {
+      return std::string(flag) + ": expected a number > 0 and <= 1e6, got " + FormatNumber(value);
+    }
+  }
+  options->budget = {FLAGS_budget_seconds, static_cast<size_t>(FLAGS_budget_mib * kMebibyte)};
+  options->repeat_seconds = FLAGS_repeat_seconds;
+  bounds->adjoint = FLAGS_adjoint_bound;
+  bounds->tangent = FLAGS_tangent_bound;
+  bounds->implicit_jet = FLAGS_jet_bound;
+  bounds->long_run = FLAGS_long_run;
+  return "";
+}
+
+std::string Header(const CostOptions& options) {
+  const Scene scene = cost::ChainAndBall(1);
+  const int numbers = cost::NumNumbers(scene);
+  std::string text =
+      ProvenanceLine() +
+      "\nchain of 10 links and a ball, dt 0.002 s; loss: the squares of two positions "
+      "at the end; parameters: its " +
+      std::to_string(numbers) + " numbers";
+  if (options.parameters.back() > numbers) {
+    text += ", then patterns that set several, then these again";
+  }
+  return text + "\nwidest Jet built: " + std::to_string(cost::WidestJetBuilt()) + "\n\n";
+}
+
+int Run(const CostOptions& options, const CostBounds& bounds) {
+  std::cout << Header(options) << std::flush;
+  Progress progress("cells", cost::NumCells(options) + 1);
+  const std::vector<CostCell> cells =
+      cost::RunCosts(options, [&](long done) { progress.Show(done); });
+  std::vector<double> gradient;
+  const CostCell long_run = cost::MeasureCell(options, CostMethod::kAdjointWithCheckpoints, 8,
+                                              bounds.long_run, {}, &gradient);
+  const std::vector<CheckedBound> checked = cost::CheckBounds(bounds, cells, long_run);
+  const std::vector<Crossover> crossovers = cost::Crossovers(cells);
+  std::cout << cost::TableText(cells) << "\n"
+            << cost::CrossoverText(crossovers) << "\n"
+            << BoundsText(checked) << std::flush;
+  const std::string broken = cost::BrokenBound(checked, cells);
+  std::string error;
+  if (!FLAGS_out.empty()) {
+    OrderedJson json = {{"provenance", OrderedJson::object()}, {"verdict", broken}};
+    for (const auto& [what, value] : Provenance()) json["provenance"][what] = value;
+    json.update(cost::ToJson(cells, long_run, crossovers, checked));
+    error = WriteResult(FLAGS_out, JsonText(json));
+  }
+  if (error.empty() && !FLAGS_picture.empty()) {
+    error = WriteResult(FLAGS_picture, cost::Picture(cells));
+  }
+  if (!error.empty()) return ReportError(error);
+  return broken.empty() || !FLAGS_bounds ? kExitDone : ReportError("tangible-cost: " + broken);
+}
+
+int Main(int argc, char** argv) {
+  const CommandLine line = ParseCommandLine(
+      argc, argv,
+      {.name = "tangible-cost",
+       .synopsis = "[--full | --parameters=N1,N2 --steps=N1,N2] [--out=R.json] [--picture=P.svg]",
+       .description =
+           "Time and peak memory of the gradient of a rollout by adjoint, tangent, Jets, "
+           "differences "
+           "and a tape, each cell in a\nprocess of its own. Exit status 1 where a bound does not "
+           "hold.",
+       .version = TANGIBLE_VERSION,
+       .source_file = __FILE__,
+       .num_positional = 0,
+       .outputs = {"out", "picture"}});
+  if (line.exit_status) return *line.exit_status;
+  CostOptions options;
+  CostBounds bounds;
+  const std::string wrong = CheckFlags(&options, &bounds);
+  if (!wrong.empty()) return ReportError("tangible-cost: " + wrong, kExitUsage);
+  return Run(options, bounds);
+}
+
+}  // namespace
+}  // namespace tangible
+
+int main(int argc, char** argv) { return tangible::RunMain(&tangible::Main, argc, argv); }
