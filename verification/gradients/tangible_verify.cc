@@ -106,11 +106,6 @@ std::string AddFile(const std::string& file, std::vector<VerifyJob>* jobs) {
   std::string error;
   if (!LoadScene(file, &job.scene, &error)) return error;
   job.stepping = job.scene.simulation.stepping;
-  if (job.stepping != Stepping::kFixed) {
-    return file +
-           ": /simulation/stepping: expected \"fixed\" (the only one verified here), got \"" +
-           NameOf(job.stepping, kSteppingNames) + "\"";
-  }
   if (FLAGS_parameters.empty()) {
     job.parameters = AllParameters(job.scene);
   } else {

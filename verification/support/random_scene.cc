@@ -256,9 +256,16 @@ void SceneMaker::Obstacles() {
 }  // namespace internal
 
 std::vector<Stepping> AvailableSteppings() {
-  // The sums of contributions by which entries are judged (compare.h) know the fixed step's
-  // equations alone.
-  return {Stepping::kFixed};
+  std::vector<Stepping> available;
+  for (const auto& [name, stepping] : kSteppingNames) {
+    SimulationSettings settings;
+    settings.stepping = stepping;
+    std::string error;
+    if (CheckSettings(settings, &error)) {
+      available.push_back(stepping);
+    }
+  }
+  return available;
 }
 
 Scene RandomScene(unsigned seed, const RandomSceneOptions& options) {
