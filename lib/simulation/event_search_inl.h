@@ -49,9 +49,30 @@ double EventSearch::Refine(const Model<double>& model, const Function& f, double
   return b;
 }
 
-template <typename Gap, typename Rate>
+// What the values and rates of change at both ends of an interval say of a function whose rate
+// changes monotonically between them. Without that: nothing.
+enum class Course { kUnknown, kNoRoot, kOneRoot };
+inline Course CourseOf(double length, double fa, double rate_a, double fb, double rate_b) {
+  constexpr double kSlack = 0.1;
+  const double mean = (fb - fa) / length;
+  const double most = kSlack * std::max(std::abs(rate_a), std::abs(rate_b));
+  if (!(mean >= std::min(rate_a, rate_b) - most && mean <= std::max(rate_a, rate_b) + most)) {
+    return Course::kUnknown;  // the rate is not monotonic
+  }
+  if (fb <= 0.0) {
+    return rate_b < 0.0 ? Course::kOneRoot : Course::kUnknown;
+  }
+  if (rate_a >= 0.0 || rate_b <= 0.0) {
+    return Course::kNoRoot;  // the smaller end is the minimum
+  }
+  // Above both ends' tangents.
+  const double at = (fb - fa - rate_b * length) / (rate_a - rate_b);
+  return fa + rate_a * at > kSlack * std::min(fa, fb) ? Course::kNoRoot : Course::kUnknown;
+}
+
+template <typename Gap, typename Rate, typename CourseOver>
 bool EventSearch::FirstRoot(const Model<double>& model, const Gap& gap, const Rate& rate_over,
-                            double from, double to, double* root) {
+                            const CourseOver& course_over, double from, double to, double* root) {
   struct Interval {
     double a, fa, b, fb;
   };
@@ -78,6 +99,14 @@ bool EventSearch::FirstRoot(const Model<double>& model, const Gap& gap, const Ra
     const double reach = i.b - i.a > smallest ? rate_over(i.a, i.b) * (i.b - i.a) : 0.0;
     if (i.fb > 0.0 && (i.fa + i.fb > reach || i.b - i.a <= smallest)) {
       continue;
+    }
+    const Course course = course_over(i.a, i.fa, i.b, i.fb);
+    if (course == Course::kNoRoot) {
+      continue;
+    }
+    if (course == Course::kOneRoot) {
+      *root = Refine(model, gap, i.a, i.fa, i.b, i.fb);
+      return true;
     }
     // Where the gap closes at more than half of what the bound allows it does not open in between:
     // the crossing is the first.

@@ -65,6 +65,11 @@ Scene SceneMaker::Make() {
   Forces();
   Pairs();
   Rarities();
+  if (options_.stepping == Stepping::kEvent) {
+    const Integrator integrators[] = {Integrator::kSemiImplicitEuler, Integrator::kTrapezoidal,
+                                      Integrator::kRungeKutta4};
+    scene_.simulation.integrator = integrators[random_.Integer(0, 2)];
+  }
   return scene_;
 }
 
