@@ -21,7 +21,7 @@ struct Minimum {
   Eigen::VectorXd parameters;
   double cost = 0.0;
   Eigen::VectorXd residuals;
-  RowMatrixXd jacobian;  ///< dr/dp
+  RowMatrixXd jacobian;  ///< dr/dp; 0 of a parameter held at its bound
   std::vector<FitIteration> iterations;
 };
 

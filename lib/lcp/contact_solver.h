@@ -19,9 +19,9 @@
 // After 3 and 4 the modes are identified and the mode system is solved once more: the polish. A
 // solution counts only by its scaled natural residual, recomputed from the data.
 //
-// Pivoting ends in proximal steps with δ falling from 1e-7, to 1e-10 where rounding lets it. What
-// then still remains and no longer falls is a contradiction of rows among which only the impulses'
-// limits can choose: these are approached along the impulses' last change.
+// Pivoting ends in proximal steps with δ falling from 1e-7 to 1e-8. What then still remains and no
+// longer falls is a contradiction of rows among which only the impulses' limits can choose: these
+// are approached along the impulses' last change.
 
 #include <vector>
 
@@ -89,7 +89,7 @@ class ContactSolver {
   ContactSystem system_;
   ContactPivoting pivoting_;
   InteriorPointWorkspace<double> interior_point_;
-  ContactSolution<double> trial_, entry_, last_, best_;
+  ContactSolution<double> trial_, entry_, last_;
   std::vector<double> rhs_, correction_, start_;
   std::vector<double> centre_joint_, centre_normal_, centre_tangent_;
   std::vector<int> changes_;

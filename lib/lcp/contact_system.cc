@@ -10,9 +10,8 @@ namespace {
 // Refinement ends where the residual is at rounding level, or no longer falls.
 constexpr double kResidualGoal = 1e-15;
 constexpr int kMaxRefinements = 8;
-// A proximal step with more left than this is solved anew: its redundant impulses are inaccurate by
-// this over δ.
-constexpr double kAccurate = 1e-14;
+// Rows that leave more than this contradict each other.
+constexpr double kConsistent = 1e-14;
 
 // Adds (left)ᵀ (right) weight to a 3 x 3 block.
 void AddOuter(const RowPart<double>& left, const RowPart<double>& right, double weight,
@@ -42,9 +41,6 @@ RowPart<double> Combine(const RowPart<double>& x, double factor, const RowPart<d
   return {x[0] + factor * y[0], x[1] + factor * y[1], x[2] + factor * y[2]};
 }
 
-// x / scale of magnitudes, with 0 / 0 = 0.
-double Ratio(double x, double scale) { return scale > 0.0 ? x / scale : x > 0.0 ? HUGE_VAL : 0.0; }
-
 // Largest magnitudes of a kind of row: of its terms and of what is left.
 struct RowScale {
   double terms = 0.0;
@@ -53,8 +49,11 @@ struct RowScale {
   double parts = 0.0;
   double left = 0.0;
   void Term(double x) { terms = std::max(terms, std::abs(x)); }
-  double Relative() const { return Ratio(left, terms); }
-  double Scale() const { return std::max(terms, parts); }
+  double Relative() const { return terms > 0.0 ? left / terms : left > 0.0 ? HUGE_VAL : 0.0; }
+  double RelativeToParts() const {
+    const double scale = std::max(terms, parts);
+    return scale > 0.0 ? left / scale : left > 0.0 ? HUGE_VAL : 0.0;
+  }
 };
 
 // residual := rhs − K x for one column of strided vectors; sign −1 and exchanged directions for Kᵀ.
@@ -361,10 +360,8 @@ ContactSystem::ResidualSize ContactSystem::ResidualWith(const ContactProblem<dou
     RowScale& kind = i < momentum_size ? momentum : constraint;
     kind.left = std::max(kind.left, std::abs(residual[i]));
   }
-  return {
-      std::max(momentum.Relative(), constraint.Relative()),
-      std::max(Ratio(momentum.left, momentum.Scale()), Ratio(constraint.left, constraint.Scale())),
-      Ratio(momentum.left, momentum.Scale()), constraint.Scale()};
+  return {std::max(momentum.Relative(), constraint.Relative()),
+          std::max(momentum.RelativeToParts(), constraint.RelativeToParts())};
 }
 
 template <bool kTransposed>
@@ -421,7 +418,7 @@ double ContactSystem::SolveRegularised(const ContactProblem<double>& problem,
   const size_t size = 3 * static_cast<size_t>(num_blocks()) * columns;
   rhs_.assign(x, x + size);
   lu_.Solve(x, columns);
-  return Refine(problem, modes, Regularisation::kKept, x, columns).left;
+  return Refine(problem, modes, Regularisation::kKept, x, columns);
 }
 
 double ContactSystem::SolveProximal(const ContactProblem<double>& problem,
@@ -433,50 +430,42 @@ double ContactSystem::SolveProximal(const ContactProblem<double>& problem,
   const size_t size = 3 * static_cast<size_t>(num_blocks()) * columns;
   rhs_.assign(x, x + size);
   lu_.Solve(x, columns);
-  const Refinement refined = Refine(problem, modes, Regularisation::kLeftOut, x, columns);
-  if (std::min(refined.left, refined.inaccuracy) <= kAccurate) {
-    return refined.left;
+  const double left = Refine(problem, modes, Regularisation::kLeftOut, x, columns);
+  if (left <= kConsistent) {
+    return left;
   }
   std::copy(rhs_.begin(), rhs_.end(), x);
   lu_.Solve(x, columns);
   Refine(problem, modes, Regularisation::kKept, x, columns);
-  return Refine(problem, modes, Regularisation::kLeftOut, x, columns).left;
+  return Refine(problem, modes, Regularisation::kLeftOut, x, columns);
 }
 
 // Refines x for the right-hand side rhs_ as long as a round halves what is left of it.
-ContactSystem::Refinement ContactSystem::Refine(const ContactProblem<double>& problem,
-                                                const std::vector<ContactMode>& modes,
-                                                Regularisation regularisation, double* x,
-                                                int columns) {
+double ContactSystem::Refine(const ContactProblem<double>& problem,
+                             const std::vector<ContactMode>& modes, Regularisation regularisation,
+                             double* x, int columns) {
   const size_t size = rhs_.size();
   correction_.resize(size);
-  last_.assign(size, 0.0);
   const auto residual = [&]() {
-    const ResidualSize left = ResidualWith<false>(problem, modes, regularisation, rhs_.data(), x,
-                                                  columns, correction_.data());
-    // Of the last proximal step: its residual without δ is δ times its length.
-    double worst = 0.0;
-    for (size_t i = 3 * static_cast<size_t>(problem.num_bodies) * columns; i < size; ++i) {
-      const double step = regularisation_[i / columns] * (x[i] - last_[i]);
-      worst = std::max(worst, std::abs(correction_[i] - step));
-    }
-    return Refinement{left.to_parts, std::max(left.momentum, Ratio(worst, left.constraint_scale))};
+    return ResidualWith<false>(problem, modes, regularisation, rhs_.data(), x, columns,
+                               correction_.data())
+        .to_parts;
   };
-  Refinement now = residual();
-  for (int i = 0; i < kMaxRefinements && now.left > kResidualGoal; ++i) {
+  double left = residual();
+  for (int i = 0; i < kMaxRefinements && left > kResidualGoal; ++i) {
     last_.assign(x, x + size);
     lu_.Solve(correction_.data(), columns);
     for (size_t k = 0; k < size; ++k) {
       x[k] += correction_[k];
     }
-    const Refinement before = now;
-    now = residual();
-    if (!(now.left < 0.5 * before.left)) {
+    const double before = left;
+    left = residual();
+    if (!(left < 0.5 * before)) {
       std::copy(last_.begin(), last_.end(), x);
       return before;
     }
   }
-  return now;
+  return left;
 }
 
 template double ContactSystem::Residual<false>(const ContactProblem<double>&,

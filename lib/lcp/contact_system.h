@@ -73,20 +73,14 @@ class ContactSystem {
   // these sum.
   struct ResidualSize {
     double to_terms, to_parts;
-    double momentum;  // of momentum rows, to their parts
-    double constraint_scale;
   };
   template <bool kTransposed>
   ResidualSize ResidualWith(const ContactProblem<double>& problem,
                             const std::vector<ContactMode>& modes, Regularisation regularisation,
                             const double* rhs, const double* x, int columns,
                             double* residual) const;
-  // What a refined solution leaves of the system, and of its last proximal step.
-  struct Refinement {
-    double left, inaccuracy;
-  };
-  Refinement Refine(const ContactProblem<double>& problem, const std::vector<ContactMode>& modes,
-                    Regularisation regularisation, double* x, int columns);
+  double Refine(const ContactProblem<double>& problem, const std::vector<ContactMode>& modes,
+                Regularisation regularisation, double* x, int columns);
   void SetPattern(const ContactProblem<double>& problem, const std::vector<ContactMode>& modes);
   void AddBodies(const ContactProblem<double>& problem);
   void AddJoints(const ContactProblem<double>& problem, double regularisation);

@@ -7,12 +7,13 @@
 namespace tangible {
 namespace {
 
-double SquaredNorm(const std::vector<double>& x) {
-  double sum = 0.0;
-  for (const double value : x) {
-    sum += value * value;
+// Of each column, x row-major.
+std::vector<double> SquaredNorms(const std::vector<double>& x, int columns) {
+  std::vector<double> sums(columns, 0.0);
+  for (size_t i = 0; i < x.size(); ++i) {
+    sums[i % columns] += x[i] * x[i];
   }
-  return sum;
+  return sums;
 }
 
 }  // namespace
@@ -106,19 +107,23 @@ void JointProjection::Visit(const Model<double>& model, const Sink& sink) {
   }
 }
 
-// x := K⁻¹ x; refined where the factorised matrix was shifted.
+// x := K⁻¹ x; refined where the factorised matrix was shifted or regularised, each column for as
+// long as its residual falls.
 void JointProjection::SolveRefined(const Model<double>& model, std::vector<double>* x,
                                    int columns) {
   FactorProjection(model, &iterate_);
-  if (!iterate_.shifted) {
+  if (!iterate_.shifted && !model.structure->joint_loops) {
     iterate_.lu.Solve(x->data(), columns);
     return;
   }
   const std::vector<double> rhs = *x;
   std::vector<double> residual = rhs;
-  solution_.assign(x->size(), 0.0);
-  double norm = SquaredNorm(residual);
-  while (norm > 0.0) {
+  iterate_.lu.Solve(x->data(), columns);
+  solution_ = *x;
+  SubtractProjectionMatrix(model, iterate_, x->data(), columns, residual.data());
+  std::vector<double> norms = SquaredNorms(residual, columns);
+  std::vector<bool> falls(columns, true);
+  for (bool any = true; any;) {
     iterate_.lu.Solve(residual.data(), columns);
     *x = solution_;
     for (size_t i = 0; i < x->size(); ++i) {
@@ -126,12 +131,19 @@ void JointProjection::SolveRefined(const Model<double>& model, std::vector<doubl
     }
     residual = rhs;
     SubtractProjectionMatrix(model, iterate_, x->data(), columns, residual.data());
-    const double lower = SquaredNorm(residual);
-    if (!(lower < 0.25 * norm)) {
-      break;
+    const std::vector<double> lower = SquaredNorms(residual, columns);
+    any = false;
+    for (int c = 0; c < columns; ++c) {
+      falls[c] = falls[c] && lower[c] < 0.25 * norms[c];
+      any = any || falls[c];
     }
-    norm = lower;
-    solution_ = *x;
+    for (size_t i = 0; i < x->size(); ++i) {
+      const size_t c = i % columns;
+      if (falls[c]) {
+        solution_[i] = (*x)[i];
+      }
+    }
+    norms = lower;
   }
   *x = solution_;
 }

@@ -6,8 +6,8 @@
 #include <algorithm>
 
 #include "../support/scenes.h"
-#include "tangible/verification/support/trace.h"
 #include "tangible/verification/support/random_scene.h"
+#include "tangible/verification/support/trace.h"
 
 namespace tangible {
 namespace {
@@ -97,8 +97,11 @@ TEST(RandomSceneTest, IsAValidFileAndReachesWhatItIsFor) {
   for (unsigned seed = 1; seed <= 100; ++seed) {
     const Scene scene = RandomScene(seed);
     EXPECT_EQ(SceneToJson(scene), SceneToJson(RandomScene(seed)));
-    const bool signals = std::any_of(scene.forces.begin(), scene.forces.end(),
-                                     [](const auto& f) { return f.force_signal.has_value(); });
+    const bool signals =
+        std::any_of(scene.forces.begin(), scene.forces.end(),
+                    [](const auto& f) { return f.force_signal || f.torque_signal; }) ||
+        std::any_of(scene.joints.begin(), scene.joints.end(),
+                    [](const auto& j) { return j.effort_signal.has_value(); });
     if (!signals) {  // a signal is a file, which is not there
       Scene read;
       std::string error;
