@@ -179,7 +179,8 @@ void EventSearch::SearchClosed(const Model<double>& model, Event* event) {
         }
         if (fb < -tolerance) {
           const auto f = [&](Sample& sample) { return ModeValue(model, &sample, trial); };
-          trial.length = Refine(model, f, a, fa, b, fb);
+          trial.length = Refine(model, f, 8.0 * std::numeric_limits<double>::epsilon() * at_start,
+                                a, fa, b, fb);
           *event = trial;
           return;
         }
@@ -204,16 +205,26 @@ void EventSearch::SearchClosed(const Model<double>& model, Event* event) {
     for (const double normal : start.normal_impulse) {
       scale = std::max(scale, std::abs(normal));
     }
+    // What changes no speed within a step but by its rounding is no force: where none acts (no
+    // gravity, bodies that coast side by side) all of them are rounding.
+    double mass = 0.0;
+    for (const int body : {segment_->contacts[i].a, segment_->contacts[i].b}) {
+      if (model.structure->bodies[body].block >= 0) {
+        mass = std::max(mass, model.numbers[model.structure->bodies[body].mass]);
+      }
+    }
+    const double tolerance =
+        std::max(kForceTolerance * scale, mass * slow / model.structure->settings.dt);
     const double normal = start.normal_impulse[i];
     const double tangent = start.tangent_impulse[i];
     trial.kind = EventKind::kLiftOff;
-    try_function(normal, kForceTolerance * scale);
+    try_function(normal, tolerance);
     if (mode == ContactMode::kSticking) {
       trial.kind = EventKind::kSlipBegins;
       const double limit = segment_->friction[i].value * normal;
       for (const double sign : {1.0, -1.0}) {
         trial.sign = sign;
-        try_function(limit - sign * tangent, kForceTolerance * scale);
+        try_function(limit - sign * tangent, tolerance);
       }
     }
   }

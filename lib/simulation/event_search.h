@@ -12,6 +12,7 @@
 // features are closest at both, the gap's rates of change there say whether it has a root. Forces
 // and sliding speeds are sampled at the segment's middle and end.
 
+#include <limits>
 #include <string>
 #include <utility>
 #include <vector>
@@ -38,6 +39,8 @@ class EventSearch {
   void FindContacts(const Model<double>& model, const State<double>& state, double reach,
                     std::vector<ActiveContact>* contacts);
   double bounding_radius(int body) const { return radius_[body]; }
+  /// To which gaps are located, m.
+  double GapTolerance() const { return 8.0 * std::numeric_limits<double>::epsilon() * scale_; }
 
  private:
   struct Sample {
@@ -60,14 +63,16 @@ class EventSearch {
   void SearchPair(const Model<double>& model, int a, int b, Event* event);
   void SearchLimit(const Model<double>& model, int joint, double side, Event* event);
   /// The first crossing of gap from above 0 within [from, to]; rate_over(a, b) bounds how fast it
-  /// closes between; course_over(a, gap(a), b, gap(b)) is what is known of it beyond that.
+  /// closes between; course_over(a, gap(a), b, gap(b)) is what is known of it beyond that. To
+  /// |gap| ≤ tolerance, or as near as doubles allow.
   template <typename Gap, typename Rate, typename CourseOver>
   bool FirstRoot(const Model<double>& model, const Gap& gap, const Rate& rate_over,
-                 const CourseOver& course_over, double from, double to, double* root);
+                 const CourseOver& course_over, double tolerance, double from, double to,
+                 double* root);
   void SearchClosed(const Model<double>& model, Event* event);
   template <typename Function>
-  double Refine(const Model<double>& model, const Function& f, double a, double fa, double b,
-                double fb);
+  double Refine(const Model<double>& model, const Function& f, double tolerance, double a,
+                double fa, double b, double fb);
   double ModeValue(const Model<double>& model, Sample* sample, const Event& event);
   bool MovesLittle(const Model<double>& model, const State<double>& before,
                    const State<double>& after, double length, int a, int b) const;

@@ -176,7 +176,8 @@ void EventSearch::SearchPair(const Model<double>& model, int a, int b, Event* ev
     };
     double root;
     if (from < event->length &&
-        FirstRoot(model, shifted, rate, course, from, event->length, &root) && root > 0.0) {
+        FirstRoot(model, shifted, rate, course, GapTolerance(), from, event->length, &root) &&
+        root > 0.0) {
       event->kind = EventKind::kTouch;
       event->length = root;
       gap(*At(model, root), all);
@@ -286,7 +287,7 @@ void EventSearch::SearchLimit(const Model<double>& model, int joint, double side
   };
   double root;
   if (from < event->length &&
-      FirstRoot(model, gap, rate_over, course_over, from, event->length, &root)) {
+      FirstRoot(model, gap, rate_over, course_over, 0.0, from, event->length, &root)) {
     event->kind = EventKind::kTouch;
     event->length = root;
     event->contact = limit;
