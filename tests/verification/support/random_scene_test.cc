@@ -91,6 +91,7 @@ TEST(RandomSceneTest, SteppingsAreThoseOfTheEngineAndTheirScenesAreTheSame) {
   EXPECT_EQ(event.simulation.stepping, Stepping::kEvent);
   event.simulation.stepping = Stepping::kFixed;
   event.simulation.integrator = Integrator::kSemiImplicitEuler;
+  event.simulation.duration = RandomScene(7).simulation.duration;
   EXPECT_EQ(SceneToJson(event), SceneToJson(RandomScene(7)));
 }
 
