@@ -115,30 +115,47 @@ EventSearch::Sample* EventSearch::At(const Model<double>& model, double length) 
   motion.contacts = segment_->contacts;
   motion.friction = segment_->friction;
   motion.modes = segment_->modes;
+  sample.has_end = false;
   sample.good = flow_.Run(model, &motion, &message_);
   return &sample;
 }
 
+// What the motion of a sample has found, for the segment that it is a motion of.
+void EventSearch::TakeMotion(Sample* sample, Segment* segment) {
+  Segment& motion = sample->motion;
+  std::swap(segment->after, motion.after);
+  std::swap(segment->stages, motion.stages);
+  segment->num_stages = motion.num_stages;
+  std::swap(segment->corrections, motion.corrections);
+  segment->num_corrections = motion.num_corrections;
+  segment->projects_twists = motion.projects_twists;
+  std::swap(segment->projection, motion.projection);
+  num_samples_ = 0;  // this one is spent
+}
+
 // The function of a closed contact whose sign tells that its mode ends.
-double EventSearch::ModeValue(const Model<double>& model, const Sample& sample,
-                              const Event& event) {
-  if (!sample.good) {
+double EventSearch::ModeValue(const Model<double>& model, Sample* sample, const Event& event) {
+  if (!sample->good) {
     return std::numeric_limits<double>::quiet_NaN();
   }
-  const Segment& motion = sample.motion;
+  const Segment& motion = sample->motion;
   if (event.kind == EventKind::kSlipEnds) {
     return SlidingSign(motion.modes[event.index]) *
            SlipSpeed(model, motion.after, motion.contacts[event.index]);
   }
-  if (!flow_.Accelerate(model, motion, motion.after, motion.time + motion.length, &node_)) {
-    return std::numeric_limits<double>::quiet_NaN();
+  if (!sample->has_end) {
+    if (!flow_.Accelerate(model, motion, motion.after, motion.time + motion.length, &sample->end)) {
+      return std::numeric_limits<double>::quiet_NaN();
+    }
+    sample->has_end = true;
   }
-  const double normal = node_.solution.normal_impulse[event.index];
+  const SolvedNode& node = sample->end;
+  const double normal = node.solution.normal_impulse[event.index];
   if (event.kind == EventKind::kLiftOff) {
     return normal;
   }
   return motion.friction[event.index].value * normal -
-         event.sign * node_.solution.tangent_impulse[event.index];
+         event.sign * node.solution.tangent_impulse[event.index];
 }
 
 void EventSearch::SearchClosed(const Model<double>& model, Event* event) {
@@ -156,13 +173,14 @@ void EventSearch::SearchClosed(const Model<double>& model, Event* event) {
       double fa = at_start;
       for (const double share : {0.5, 1.0}) {
         const double b = share * event->length;
-        const double fb = ModeValue(model, *At(model, b), trial);
+        const double fb = ModeValue(model, At(model, b), trial);
         if (std::isnan(fb)) {
           return;
         }
         if (fb < -tolerance) {
-          const auto f = [&](const Sample& sample) { return ModeValue(model, sample, trial); };
-          trial.length = Refine(model, f, a, fa, b, fb);
+          const auto f = [&](Sample& sample) { return ModeValue(model, &sample, trial); };
+          trial.length = Refine(model, f, 8.0 * std::numeric_limits<double>::epsilon() * at_start,
+                                a, fa, b, fb);
           *event = trial;
           return;
         }
@@ -187,16 +205,26 @@ void EventSearch::SearchClosed(const Model<double>& model, Event* event) {
     for (const double normal : start.normal_impulse) {
       scale = std::max(scale, std::abs(normal));
     }
+    // What changes no speed within a step but by its rounding is no force: where none acts (no
+    // gravity, bodies that coast side by side) all of them are rounding.
+    double mass = 0.0;
+    for (const int body : {segment_->contacts[i].a, segment_->contacts[i].b}) {
+      if (model.structure->bodies[body].block >= 0) {
+        mass = std::max(mass, model.numbers[model.structure->bodies[body].mass]);
+      }
+    }
+    const double tolerance =
+        std::max(kForceTolerance * scale, mass * slow / model.structure->settings.dt);
     const double normal = start.normal_impulse[i];
     const double tangent = start.tangent_impulse[i];
     trial.kind = EventKind::kLiftOff;
-    try_function(normal, kForceTolerance * scale);
+    try_function(normal, tolerance);
     if (mode == ContactMode::kSticking) {
       trial.kind = EventKind::kSlipBegins;
       const double limit = segment_->friction[i].value * normal;
       for (const double sign : {1.0, -1.0}) {
         trial.sign = sign;
-        try_function(limit - sign * tangent, kForceTolerance * scale);
+        try_function(limit - sign * tangent, tolerance);
       }
     }
   }
@@ -265,9 +293,11 @@ bool EventSearch::Run(const Model<double>& model, const std::vector<ActiveContac
   if (event.kind == EventKind::kSlipBegins) {
     segment->event_friction = segment->friction[event.index];
   }
-  if (!flow_.Run(model, segment, message)) {
+  if (!At(model, length)->good) {
+    *message = message_;
     return false;
   }
+  TakeMotion(At(model, length), segment);
   if (event.kind == EventKind::kSlipBegins || event.kind == EventKind::kLiftOff) {
     return flow_.Accelerate(model, *segment, segment->after, segment->time + length, &segment->end);
   }

@@ -8,8 +8,11 @@
 // holds for the state that the segment ends with. Gaps: an interval on which gap(a) + gap(b)
 // exceeds what the pair's speed bound can close is free of contact; others are halved, so that
 // grazing and rotating corners are not missed (Mirtich, Impulse-based Dynamic Simulation, 1996, ch.
-// 2, for the bound). Forces and sliding speeds are sampled at the segment's middle and end.
+// 2, for the bound). Where bodies turn and move little between an interval's ends and the same
+// features are closest at both, the gap's rates of change there say whether it has a root. Forces
+// and sliding speeds are sampled at the segment's middle and end.
 
+#include <limits>
 #include <string>
 #include <utility>
 #include <vector>
@@ -36,12 +39,16 @@ class EventSearch {
   void FindContacts(const Model<double>& model, const State<double>& state, double reach,
                     std::vector<ActiveContact>* contacts);
   double bounding_radius(int body) const { return radius_[body]; }
+  /// To which gaps are located, m.
+  double GapTolerance() const { return 8.0 * std::numeric_limits<double>::epsilon() * scale_; }
 
  private:
   struct Sample {
     double length = 0.0;
     Segment motion;
     bool good = false;
+    bool has_end = false;  ///< the accelerations after the motion are solved
+    SolvedNode end;
   };
   struct Event {
     double length = 0.0;
@@ -51,19 +58,24 @@ class EventSearch {
     double sign = 0.0;
   };
   Sample* At(const Model<double>& model, double length);
+  void TakeMotion(Sample* sample, Segment* segment);
   void FindPairs(const Model<double>& model);
   void SearchPair(const Model<double>& model, int a, int b, Event* event);
   void SearchLimit(const Model<double>& model, int joint, double side, Event* event);
   /// The first crossing of gap from above 0 within [from, to]; rate_over(a, b) bounds how fast it
-  /// closes between.
-  template <typename Gap, typename Rate>
-  bool FirstRoot(const Model<double>& model, const Gap& gap, const Rate& rate_over, double from,
-                 double to, double* root);
+  /// closes between; course_over(a, gap(a), b, gap(b)) is what is known of it beyond that. To
+  /// |gap| ≤ tolerance, or as near as doubles allow.
+  template <typename Gap, typename Rate, typename CourseOver>
+  bool FirstRoot(const Model<double>& model, const Gap& gap, const Rate& rate_over,
+                 const CourseOver& course_over, double tolerance, double from, double to,
+                 double* root);
   void SearchClosed(const Model<double>& model, Event* event);
   template <typename Function>
-  double Refine(const Model<double>& model, const Function& f, double a, double fa, double b,
-                double fb);
-  double ModeValue(const Model<double>& model, const Sample& sample, const Event& event);
+  double Refine(const Model<double>& model, const Function& f, double tolerance, double a,
+                double fa, double b, double fb);
+  double ModeValue(const Model<double>& model, Sample* sample, const Event& event);
+  bool MovesLittle(const Model<double>& model, const State<double>& before,
+                   const State<double>& after, double length, int a, int b) const;
   double TouchStart(const Model<double>& model, double speed, double acceleration) const;
 
   std::vector<double> radius_;
@@ -78,7 +90,6 @@ class EventSearch {
   std::vector<Aabb> boxes_;
   BroadPhase broad_phase_;
   std::string message_;
-  SolvedNode node_;
 };
 
 }  // namespace tangible

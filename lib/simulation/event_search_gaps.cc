@@ -30,6 +30,28 @@ double NormalSpeed(const Model<double>& model, const State<double>& state,
 
 }  // namespace
 
+// Between two states of a pair `length` apart in time: whether neither turns by more than a third
+// of a radian nor moves by more than the smaller one's size.
+bool EventSearch::MovesLittle(const Model<double>& model, const State<double>& before,
+                              const State<double>& after, double length, int a, int b) const {
+  constexpr double kLittle = 0.3;
+  for (const int body : {a, b}) {
+    const double omega =
+        std::max(std::abs(before.twist[3 * body + 2]), std::abs(after.twist[3 * body + 2]));
+    if (model.structure->bodies[body].shape != ShapeType::kCircle && omega * length > kLittle) {
+      return false;
+    }
+  }
+  double speed = 0.0;
+  for (const State<double>* state : {&before, &after}) {
+    speed = std::max(speed, std::hypot(state->twist[3 * a] - state->twist[3 * b],
+                                       state->twist[3 * a + 1] - state->twist[3 * b + 1]));
+  }
+  const double size = radius_[a] > 0.0 && radius_[b] > 0.0 ? std::min(radius_[a], radius_[b])
+                                                           : std::max(radius_[a], radius_[b]);
+  return size == 0.0 || speed * length < size;
+}
+
 // From a start at which a pair touches and separates with `speed`: a time by which it has left and
 // not yet returned.
 double EventSearch::TouchStart(const Model<double>& model, double speed,
@@ -118,6 +140,24 @@ void EventSearch::SearchPair(const Model<double>& model, int a, int b, Event* ev
     }
     return std::min(any, 1.05 * closing + 1.5 * turning * (to - from) * speed);
   };
+  // Where the same features are closest at both ends and the bodies turn and move little between
+  // them the gap's rate changes monotonically.
+  const auto course_over = [&](double from, double fa, double to, double fb, double allowed,
+                               bool all) {
+    Sample* const first = At(model, from);
+    if (gap(*first, all) + allowed != fa) {
+      return Course::kUnknown;
+    }
+    const ActiveContact start = nearest;
+    const double rate_a = NormalSpeed(model, first->motion.after, start);
+    const State<double> before = first->motion.after;
+    Sample* const last = At(model, to);
+    if (gap(*last, all) + allowed != fb || !(nearest.feature == start.feature) ||
+        !MovesLittle(model, before, last->motion.after, to - from, a, b)) {
+      return Course::kUnknown;
+    }
+    return CourseOf(to - from, fa, rate_a, fb, NormalSpeed(model, last->motion.after, nearest));
+  };
   const auto search = [&](double from, double allowed, bool all) {
     if (from < event->length && gap(*At(model, from), all) > touch) {
       allowed = 0.0;  // it has left
@@ -131,8 +171,12 @@ void EventSearch::SearchPair(const Model<double>& model, int a, int b, Event* ev
       return approaches ? value : touch;
     };
     const auto rate = [&](double x, double y) { return rate_over(x, y, all); };
+    const auto course = [&](double x, double fx, double y, double fy) {
+      return course_over(x, fx, y, fy, allowed, all);
+    };
     double root;
-    if (from < event->length && FirstRoot(model, shifted, rate, from, event->length, &root) &&
+    if (from < event->length &&
+        FirstRoot(model, shifted, rate, course, GapTolerance(), from, event->length, &root) &&
         root > 0.0) {
       event->kind = EventKind::kTouch;
       event->length = root;
@@ -217,7 +261,8 @@ void EventSearch::SearchLimit(const Model<double>& model, int joint, double side
   if (!end.good) {
     return;
   }
-  evaluate(end.motion.after, &rate_after);
+  const State<double> after = end.motion.after;
+  evaluate(after, &rate_after);
   double from = 0.0;
   double allowed = 0.0;
   if (Contains(*touching_, limit)) {
@@ -232,8 +277,17 @@ void EventSearch::SearchLimit(const Model<double>& model, int joint, double side
                        : std::numeric_limits<double>::quiet_NaN();
   };
   const auto rate_over = [&](double, double) { return rate; };
+  const auto course_over = [&](double x, double fx, double y, double fy) {
+    double rate_x, rate_y;
+    evaluate(At(model, x)->motion.after, &rate_x);
+    evaluate(At(model, y)->motion.after, &rate_y);
+    return MovesLittle(model, segment_->before, after, y - x, limit.a, limit.b)
+               ? CourseOf(y - x, fx, rate_x, fy, rate_y)
+               : Course::kUnknown;
+  };
   double root;
-  if (from < event->length && FirstRoot(model, gap, rate_over, from, event->length, &root)) {
+  if (from < event->length &&
+      FirstRoot(model, gap, rate_over, course_over, 0.0, from, event->length, &root)) {
     event->kind = EventKind::kTouch;
     event->length = root;
     event->contact = limit;

@@ -72,7 +72,7 @@ TEST_F(TangibleVerifyTest, ErrataAreATable) {
 }
 
 TEST_F(TangibleVerifyTest, WrongUsageAndBadInputAreOneLine) {
-  for (const char* flags : {"--random=-2", "--random=0", "--seed=-1", "--threads=0",
+  for (const char* flags : {"--random=-2", "--random=0", "--seed=-1", "--threads=-1",
                             "--threads=1000", "--stepping=leap", "--parameters=gravity/x",
                             "--errata --out=x.json", "--unknown", "--random=many"}) {
     SCOPED_TRACE(flags);

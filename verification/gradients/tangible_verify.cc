@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <iostream>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "tangible/app/program.h"
@@ -25,7 +26,7 @@ DEFINE_string(parameters, "",
 DEFINE_int32(random, -1, "number of random scenes; -1: 100 if no scene is given, else 0");
 DEFINE_int32(seed, 1, "of the first random scene; the next have the next seeds");
 DEFINE_string(stepping, "", "of random scenes: fixed, event or both; empty: all that there is");
-DEFINE_int32(threads, 1, "how many scenes are checked at the same time");
+DEFINE_int32(threads, 0, "how many scenes are checked at the same time; 0: one a core");
 DEFINE_bool(jacobians, false, "write every method's whole Jacobian to --out");
 DEFINE_bool(errata, false, "instead: the mistakes of the method's published summary as printed");
 DEFINE_string(out, "", "file of all figures (JSON)");
@@ -81,8 +82,8 @@ std::string CheckFlags(const std::vector<std::string>& files) {
   if (FLAGS_seed < 0) {
     return "--seed: expected a number >= 0, got " + std::to_string(FLAGS_seed);
   }
-  if (FLAGS_threads < 1 || FLAGS_threads > kMostThreads) {
-    return "--threads: expected a number from 1 to " + std::to_string(kMostThreads) + ", got " +
+  if (FLAGS_threads < 0 || FLAGS_threads > kMostThreads) {
+    return "--threads: expected a number from 0 to " + std::to_string(kMostThreads) + ", got " +
            std::to_string(FLAGS_threads);
   }
   if (!FLAGS_parameters.empty() && files.empty()) {
@@ -106,11 +107,6 @@ std::string AddFile(const std::string& file, std::vector<VerifyJob>* jobs) {
   std::string error;
   if (!LoadScene(file, &job.scene, &error)) return error;
   job.stepping = job.scene.simulation.stepping;
-  if (job.stepping != Stepping::kFixed) {
-    return file +
-           ": /simulation/stepping: expected \"fixed\" (the only one verified here), got \"" +
-           NameOf(job.stepping, kSteppingNames) + "\"";
-  }
   if (FLAGS_parameters.empty()) {
     job.parameters = AllParameters(job.scene);
   } else {
@@ -162,9 +158,11 @@ int Run(const std::vector<std::string>& files, const std::vector<Stepping>& step
   }
   std::cout << std::endl;
   Progress progress("scenes", static_cast<long>(jobs.size()));
-  const VerifyResult result = RunVerification(
-      jobs, FLAGS_threads, FLAGS_jacobians ? KeepJacobians::kYes : KeepJacobians::kNo,
-      [&](long done) { progress.Show(done); });
+  const int cores = std::clamp(static_cast<int>(std::thread::hardware_concurrency()), 1, 16);
+  const VerifyResult result =
+      RunVerification(jobs, FLAGS_threads > 0 ? FLAGS_threads : cores,
+                      FLAGS_jacobians ? KeepJacobians::kYes : KeepJacobians::kNo,
+                      [&](long done) { progress.Show(done); });
   const std::string verdict = BrokenBound(jobs, result);
   std::cout << TableText(result) << "\n" << SummaryText(result, FLAGS_random > 0);
   const std::string error = Write(result, verdict);

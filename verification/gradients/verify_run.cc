@@ -18,6 +18,7 @@ namespace tangible {
 namespace {
 
 constexpr int kMostRandomParameters = 24;
+constexpr int kMostOfEventRuns = 10;  // which take longer
 
 struct Checked {
   SceneCheck check;
@@ -99,7 +100,9 @@ std::vector<ParameterPath> AllParameters(const Scene& scene) {
 std::vector<ParameterPath> RandomParameters(const Scene& scene, unsigned seed) {
   std::vector<ParameterPath> chosen = AllParameters(scene);
   RandomNumbers random(seed);
-  while (static_cast<int>(chosen.size()) > kMostRandomParameters) {
+  const int most =
+      scene.simulation.stepping == Stepping::kEvent ? kMostOfEventRuns : kMostRandomParameters;
+  while (static_cast<int>(chosen.size()) > most) {
     chosen.erase(chosen.begin() + random.Integer(0, static_cast<int>(chosen.size()) - 1));
   }
   for (const char* several : {"bodies/*/mass", "bodies/*/friction"}) {

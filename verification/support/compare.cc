@@ -224,13 +224,19 @@ Contributions ContributionsOf(const Scene& scene, const std::vector<ParameterPat
   std::vector<std::unique_ptr<StepTerms>> steps;
   StepTangent tangent;
   const StateObserver observe = [&](long, double, const State<double>&, Stepper* stepper) {
-    if (stepper != nullptr) {
-      steps.push_back(std::make_unique<StepTerms>());
+    if (stepper == nullptr) {
+      return;
+    }
+    steps.push_back(std::make_unique<StepTerms>());
+    if (stepper->by_events()) {
+      tangent.Apply(model, stepper, &w_dot);
+      steps.back()->tangent = w_dot.cwiseAbs();
+    } else {
       TermsOfStep(model, stepper, steps.back().get()).Fill(w_dot);
-      largest = largest.cwiseMax(
-          steps.back()->tangent.topRows(num_state).colwise().maxCoeff().transpose());
       tangent.Apply(model, stepper, &w_dot);
     }
+    largest =
+        largest.cwiseMax(steps.back()->tangent.topRows(num_state).colwise().maxCoeff().transpose());
   };
   State<double> final;
   Rollout(model, start, observe, &final);
@@ -243,7 +249,7 @@ Contributions ContributionsOf(const Scene& scene, const std::vector<ParameterPat
       SeedOutputs(*model.structure, w_bar);
     }
     sum += w_bar->cwiseAbs().transpose() * (k == 0 ? initial : steps[k - 1]->tangent);
-    if (k > 0) {
+    if (k > 0 && steps[k - 1]->rows.size() > 0) {
       sum += AdjointOfStep(model, *w_bar, steps[k - 1].get()).transpose() * steps[k - 1]->rows;
     }
   };

@@ -18,6 +18,8 @@
 //   ⌈ẇₖ⌉ = |ẇₖ| but for  ⌈v̇⁺⌉ = M⁻¹ (the rows of (|∂R/∂w| |ẇ| + |K| |ẋ|) of momentum),
 //                        ⌈q̇⁺⌉ = |q̇| + h ⌈v̇⁺⌉.
 //
+// Of event steps the inside is not looked at: S = Σₖ |w̄ₖ|ᵀ |ẇₖ|.
+//
 // S is large where large terms cancel (a body at rest, whose impulses cancel all that acts on it; a
 // landing, which has ∂v/∂y of order 1/h). It is at least a tenth of the column's largest, ⌈ẇₖ⌉ at
 // any step included, as rounding inside of an element's derivatives, which is not seen here, is a

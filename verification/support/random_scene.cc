@@ -65,6 +65,11 @@ Scene SceneMaker::Make() {
   Forces();
   Pairs();
   Rarities();
+  if (options_.stepping == Stepping::kEvent) {
+    const Integrator integrators[] = {Integrator::kSemiImplicitEuler, Integrator::kTrapezoidal,
+                                      Integrator::kRungeKutta4};
+    scene_.simulation.integrator = integrators[random_.Integer(0, 2)];
+  }
   return scene_;
 }
 
@@ -74,10 +79,13 @@ void SceneMaker::Settings() {
   s.dt = steps[random_.Integer(0, 3)];
   s.stepping = options_.stepping;
   const double length = U(0.0, 1.0);
-  const int short_run = std::min(40, options_.max_steps);
-  const int count = length < 0.08   ? random_.Integer(1, 2)
-                    : length < 0.92 ? random_.Integer(std::min(5, short_run), short_run)
-                                    : random_.Integer(short_run, options_.max_steps);
+  // An event step costs ten fixed ones.
+  const bool by_events = options_.stepping == Stepping::kEvent;
+  const int short_run = std::min(by_events ? 12 : 40, options_.max_steps);
+  const int count = length < 0.08 ? random_.Integer(1, 2)
+                    : length < (by_events ? 0.98 : 0.92)
+                        ? random_.Integer(std::min(5, short_run), short_run)
+                        : random_.Integer(short_run, options_.max_steps);
   // Every fifth run ends within a step.
   s.duration = s.dt * (random_.Chance(0.2) ? count - 0.4 : count);
   const JointCorrection corrections[] = {JointCorrection::kNone, JointCorrection::kBaumgarte,
@@ -256,9 +264,16 @@ void SceneMaker::Obstacles() {
 }  // namespace internal
 
 std::vector<Stepping> AvailableSteppings() {
-  // The sums of contributions by which entries are judged (compare.h) know the fixed step's
-  // equations alone.
-  return {Stepping::kFixed};
+  std::vector<Stepping> available;
+  for (const auto& [name, stepping] : kSteppingNames) {
+    SimulationSettings settings;
+    settings.stepping = stepping;
+    std::string error;
+    if (CheckSettings(settings, &error)) {
+      available.push_back(stepping);
+    }
+  }
+  return available;
 }
 
 Scene RandomScene(unsigned seed, const RandomSceneOptions& options) {

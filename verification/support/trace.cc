@@ -38,7 +38,8 @@ VectorX<double> OutputsOf(const ModelStructure& structure, const State<double>& 
 
 auto KeyOf(const ContactTrace& trace) {
   const ActiveContact& c = trace.contact;
-  return std::tuple(c.a, c.b, c.joint, c.side, c.feature.kind, c.feature.a, c.feature.b);
+  return std::tuple(trace.event, c.a, c.b, c.joint, c.side, c.feature.kind, c.feature.a,
+                    c.feature.b);
 }
 
 bool SameChoice(const ContactTrace& x, const ContactTrace& y, FrictionAtZero friction) {
@@ -55,37 +56,109 @@ bool SameChoice(const ContactTrace& x, const ContactTrace& y, FrictionAtZero fri
          (friction == FrictionAtZero::kMaySlide && one_closed && slides(x.mode) && slides(y.mode));
 }
 
-void TraceStep(const StepRecord& record, RunTrace* trace) {
-  std::vector<ContactTrace>& step = trace->steps.emplace_back();
-  for (size_t i = 0; i < record.contacts.size(); ++i) {
-    const ContactMode mode = record.solution.modes[i];
-    if (mode == ContactMode::kOpen) {
-      continue;
-    }
-    const ContactLaw law = record.contacts[i].law;
-    // Of what the step's equations depend on.
-    const bool friction_tie = record.friction[i].tie && mode != ContactMode::kSticking;
-    const bool restitution_tie = record.restitution[i].tie && law == ContactLaw::kRestitution;
-    step.push_back({record.contacts[i], mode, friction_tie, restitution_tie});
-    ++trace->closed;
-    trace->sliding += SlidingSign(mode) != 0.0 ? 1 : 0;
-    trace->sticking += mode == ContactMode::kSticking ? 1 : 0;
-    trace->limits += record.contacts[i].joint >= 0 ? 1 : 0;
-    trace->impacts += law == ContactLaw::kRestitution ? 1 : 0;
-    trace->recoveries += law == ContactLaw::kRecovery ? 1 : 0;
-    trace->friction_tie = trace->friction_tie || friction_tie;
-    trace->restitution_tie = trace->restitution_tie || restitution_tie;
+// Closed contacts of a step, a segment or an impact, and the coefficients of each.
+class PartTrace {
+ public:
+  PartTrace(long step, RunTrace* trace) : trace_(*trace), part_(trace->steps.emplace_back()) {
+    trace->step_of.push_back(step);
   }
+
+  void Add(const ActiveContact& contact, ContactMode mode, bool friction_tie,
+           bool restitution_tie) {
+    if (mode == ContactMode::kOpen) {
+      return;
+    }
+    // Of what the equations depend on.
+    friction_tie = friction_tie && mode != ContactMode::kSticking;
+    restitution_tie = restitution_tie && contact.law == ContactLaw::kRestitution;
+    part_.push_back({contact, mode, friction_tie, restitution_tie});
+    ++trace_.closed;
+    trace_.sliding += SlidingSign(mode) != 0.0 ? 1 : 0;
+    trace_.sticking += mode == ContactMode::kSticking ? 1 : 0;
+    trace_.limits += contact.joint >= 0 ? 1 : 0;
+    trace_.impacts += contact.law == ContactLaw::kRestitution ? 1 : 0;
+    trace_.recoveries += contact.law == ContactLaw::kRecovery ? 1 : 0;
+    trace_.friction_tie = trace_.friction_tie || friction_tie;
+    trace_.restitution_tie = trace_.restitution_tie || restitution_tie;
+  }
+
+  void AddEvent(EventKind event, const ActiveContact& contact) {
+    ContactTrace& trace = part_.emplace_back();
+    trace.contact = contact;
+    trace.event = event;
+  }
+
   // The order in which contacts of a pair are listed depends on which gap is smaller.
-  std::sort(step.begin(), step.end(),
-            [](const ContactTrace& x, const ContactTrace& y) { return KeyOf(x) < KeyOf(y); });
+  void Finish() {
+    std::sort(part_.begin(), part_.end(),
+              [](const ContactTrace& x, const ContactTrace& y) { return KeyOf(x) < KeyOf(y); });
+  }
+
+ private:
+  RunTrace& trace_;
+  std::vector<ContactTrace>& part_;
+};
+
+void AddDegenerate(const ContactProblem<double>& problem, const ContactSolution<double>& solution,
+                   RunTrace* trace) {
   std::vector<int> degenerate;
-  FindDegenerateContacts(record.problem, record.solution, kDegenerate, &degenerate);
+  FindDegenerateContacts(problem, solution, kDegenerate, &degenerate);
   trace->degenerate += static_cast<int>(degenerate.size());
 }
 
+// A fixed step or an impact.
+template <typename Record>
+void TraceImpulses(const Record& record, long step, RunTrace* trace) {
+  PartTrace part(step, trace);
+  for (size_t i = 0; i < record.contacts.size(); ++i) {
+    part.Add(record.contacts[i], record.solution.modes[i], record.friction[i].tie,
+             record.restitution[i].tie);
+  }
+  part.Finish();
+  AddDegenerate(record.problem, record.solution, trace);
+}
+
+void TraceSegment(const Segment& segment, long step, RunTrace* trace) {
+  PartTrace part(step, trace);
+  for (size_t i = 0; i < segment.contacts.size(); ++i) {
+    part.Add(segment.contacts[i], segment.modes[i], segment.friction[i].tie, false);
+  }
+  if (segment.event != EventKind::kStepEnd) {
+    part.AddEvent(segment.event, segment.event_contact);
+  }
+  part.Finish();
+  for (int k = 0; k < segment.num_stages; ++k) {
+    AddDegenerate(segment.stages[k].problem, segment.stages[k].solution, trace);
+  }
+}
+
+void TraceStep(Stepper* stepper, long step, RunTrace* trace) {
+  if (!stepper->by_events()) {
+    TraceImpulses(stepper->record(), step, trace);
+    return;
+  }
+  const EventRecord& record = stepper->events().record();
+  for (int k = 0; k < record.num_parts; ++k) {
+    const EventPart& part = *record.parts[k];
+    if (part.is_impulses) {
+      TraceImpulses(part.impulses, step, trace);
+    } else {
+      TraceSegment(part.segment, step, trace);
+    }
+  }
+}
+
 std::string Describe(const RunTrace& run, const ContactTrace& trace) {
-  static const char* const kLaws[] = {"gap", "recovery", "restitution"};
+  static const char* const kLaws[] = {"gap", "recovery", "restitution", "inelastic"};
+  static const char* const kEvents[] = {"end of the step", "edge of a force's window", "touch",
+                                        "end of sliding",  "start of sliding",         "lift-off"};
+  if (trace.event == EventKind::kEdge) {
+    return kEvents[static_cast<int>(trace.event)];
+  }
+  if (trace.event != EventKind::kStepEnd) {
+    return std::string(kEvents[static_cast<int>(trace.event)]) + " of the " +
+           ContactName(*run.structure, trace.contact);
+  }
   std::string text = ContactName(*run.structure, trace.contact) + " " + ModeName(trace.mode);
   if (trace.contact.joint < 0) {
     text += " (law " + std::string(kLaws[static_cast<int>(trace.contact.law)]) + ", feature " +
@@ -111,7 +184,7 @@ std::string Difference(const RunTrace& x, const RunTrace& y, size_t step, Fricti
     if (i == a.size() && i == b.size()) {
       return "";
     }
-    return "step " + std::to_string(step) + ": " +
+    return "step " + std::to_string(x.step_of[step]) + ": " +
            (i < a.size() ? Describe(x, a[i]) : "nothing more") + " became " +
            (i < b.size() ? Describe(y, b[i]) : "nothing more");
   }
@@ -126,9 +199,9 @@ RunTrace TraceRun(const Scene& scene) {
   BuildModel(scene, &model, &state);
   RunTrace trace;
   trace.structure = model.structure;
-  const StateObserver observe = [&](long, double, const State<double>&, Stepper* stepper) {
+  const StateObserver observe = [&](long k, double, const State<double>&, Stepper* stepper) {
     if (stepper != nullptr) {
-      TraceStep(stepper->record(), &trace);
+      TraceStep(stepper, k - 1, &trace);
     }
   };
   const RolloutReport report = Rollout(model, state, observe, &state);
@@ -139,16 +212,16 @@ RunTrace TraceRun(const Scene& scene) {
 }
 
 std::string FirstDifference(const RunTrace& x, const RunTrace& y, FrictionAtZero friction) {
-  if (x.steps.size() != y.steps.size()) {
-    return "the number of steps";
-  }
-  for (size_t step = 0; step < x.steps.size(); ++step) {
+  for (size_t step = 0; step < std::min(x.steps.size(), y.steps.size()); ++step) {
     std::string difference = Difference(x, y, step, friction);
     if (!difference.empty()) {
       return difference;
     }
+    if (x.step_of[step] != y.step_of[step]) {
+      return "step " + std::to_string(x.step_of[step]) + ": its events became other ones";
+    }
   }
-  return "";
+  return x.steps.size() == y.steps.size() ? "" : "the number of steps or events";
 }
 
 bool SameChoices(const RunTrace& x, const RunTrace& y, FrictionAtZero friction) {

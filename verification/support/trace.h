@@ -17,6 +17,8 @@ struct ContactTrace {
   ActiveContact contact;
   ContactMode mode = ContactMode::kOpen;
   bool friction_tie = false, restitution_tie = false;  ///< at a kink of the mixing rule
+  /// Event stepping: not a closed contact but what ended a segment there.
+  EventKind event = EventKind::kStepEnd;
 };
 
 /// A run with its discrete choices.
@@ -24,7 +26,9 @@ struct RunTrace {
   bool done = false;
   std::string message;
   VectorX<double> values;  ///< outputs
+  /// A step each; with event stepping a segment or an impact each.
   std::vector<std::vector<ContactTrace>> steps;
+  std::vector<long> step_of;  ///< the step of each of these
   std::shared_ptr<const ModelStructure> structure;
   int closed = 0;      ///< closed contacts, over all steps
   int sliding = 0;     ///< of these, sliding
