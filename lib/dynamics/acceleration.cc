@@ -132,7 +132,7 @@ class AccelerationAssembly {
   }
 
   void CorrectContacts(const std::vector<ActiveContact>& contacts,
-                       const std::vector<CoefficientSource>& friction, double recovery) {
+                       const std::vector<CoefficientSource>& friction, const T& recovery) {
     for (size_t i = 0; i < contacts.size(); ++i) {
       ContactRows<T> rows;
       if (contacts[i].joint >= 0) {
@@ -141,7 +141,7 @@ class AccelerationAssembly {
         EvaluateContactRows(model_, state_, contacts[i], &rows);
       }
       ContactBlock<T>& block = AddContact(contacts[i], friction[i], rows);
-      block.c_n = contacts[i].law == ContactLaw::kRecovery ? T(-recovery) : rows.geometry.gap;
+      block.c_n = contacts[i].law == ContactLaw::kRecovery ? -recovery : rows.geometry.gap;
       block.c_t = T(0.0);
     }
   }
@@ -262,7 +262,7 @@ double JointCorrectionShare(const SimulationSettings& settings) {
 template <typename T>
 void AssembleCorrection(const Model<T>& model, const State<T>& state,
                         const std::vector<ActiveContact>& contacts,
-                        const std::vector<CoefficientSource>& friction, double recovery,
+                        const std::vector<CoefficientSource>& friction, const T& recovery,
                         AccelerationScratch<T>* scratch, ContactProblem<T>* problem) {
   AccelerationAssembly<T> assembly(model, state, scratch, problem);
   assembly.Masses();
@@ -277,9 +277,10 @@ void AssembleCorrection(const Model<T>& model, const State<T>& state,
   template void AssembleAcceleration<T>(                                                        \
       const Model<T>&, const State<T>&, const T&, double, const std::vector<ActiveContact>&,    \
       const std::vector<CoefficientSource>&, AccelerationScratch<T>*, ContactProblem<T>*);      \
-  template void AssembleCorrection<T>(                                                          \
-      const Model<T>&, const State<T>&, const std::vector<ActiveContact>&,                      \
-      const std::vector<CoefficientSource>&, double, AccelerationScratch<T>*, ContactProblem<T>*);
+  template void AssembleCorrection<T>(const Model<T>&, const State<T>&,                         \
+                                      const std::vector<ActiveContact>&,                        \
+                                      const std::vector<CoefficientSource>&, const T&,          \
+                                      AccelerationScratch<T>*, ContactProblem<T>*);
 #define TANGIBLE_INSTANTIATE_JET(N) TANGIBLE_INSTANTIATE(Jet<N>)
 TANGIBLE_INSTANTIATE(double)
 TANGIBLE_FOR_EACH_JET_WIDTH(TANGIBLE_INSTANTIATE_JET)

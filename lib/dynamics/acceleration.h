@@ -53,7 +53,7 @@ double JointCorrectionShare(const SimulationSettings& settings);
 template <typename T>
 void AssembleCorrection(const Model<T>& model, const State<T>& state,
                         const std::vector<ActiveContact>& contacts,
-                        const std::vector<CoefficientSource>& friction, double recovery,
+                        const std::vector<CoefficientSource>& friction, const T& recovery,
                         AccelerationScratch<T>* scratch, ContactProblem<T>* problem);
 
 }  // namespace tangible

@@ -72,11 +72,18 @@ bool IsLocated(EventKind kind) { return kind != EventKind::kStepEnd && kind != E
 
 double EventDerivative::NodeTangent(const Model<double>& model, const Segment& segment,
                                     SolvedNode* node, bool correction, const RowMatrixXd& x,
-                                    RowMatrixXd* solved) {
+                                    RowMatrixXd* solved, const Row* tau_dot) {
   const int columns = static_cast<int>(x.cols());
   solved->setZero(3 * static_cast<Eigen::Index>(node->system.num_blocks()), columns);
   VisitAccelerationJacobian(model, ViewOf(segment, *node, correction), &scratch_,
                             TangentSink{x.data(), solved->data(), columns});
+  // Out of penetration by recovery_speed times the segment's length.
+  for (size_t i = 0; tau_dot != nullptr && i < segment.contacts.size(); ++i) {
+    const int block = node->system.contact_block()[i];
+    if (segment.contacts[i].law == ContactLaw::kRecovery && block >= 0) {
+      solved->row(3 * block) += model.structure->settings.recovery_speed * *tau_dot;
+    }
+  }
   return node->system.Solve(node->problem, node->solution.modes, solved->data(), columns);
 }
 
@@ -152,8 +159,8 @@ double EventDerivative::SegmentTangent(const Model<double>& model, Segment* segm
   x->swap(place);
   for (int k = 0; k < segment->num_corrections; ++k) {
     RowMatrixXd correction;
-    left = std::max(left,
-                    NodeTangent(model, *segment, &segment->corrections[k], true, *x, &correction));
+    left = std::max(left, NodeTangent(model, *segment, &segment->corrections[k], true, *x,
+                                      &correction, &tau_dot));
     for (int block = 0; block < s.num_blocks(); ++block) {
       PoseRows(s, s.moving[block], *x) += BlockRows(block, correction);
     }

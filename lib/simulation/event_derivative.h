@@ -37,7 +37,8 @@ class EventDerivative {
   void ImpulsesAdjoint(const Model<double>& model, Impulses* impulses, RowMatrixXd* w_bar);
   void EventGradient(const Model<double>& model, Segment* segment, Eigen::VectorXd* gradient);
   double NodeTangent(const Model<double>& model, const Segment& segment, SolvedNode* node,
-                     bool correction, const RowMatrixXd& x, RowMatrixXd* solved);
+                     bool correction, const RowMatrixXd& x, RowMatrixXd* solved,
+                     const Eigen::RowVectorXd* tau_dot = nullptr);
   void NodeAdjoint(const Model<double>& model, const Segment& segment, SolvedNode* node,
                    bool correction, RowMatrixXd* seed, RowMatrixXd* w_bar);
 

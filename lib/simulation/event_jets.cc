@@ -341,19 +341,19 @@ class EventReplay {
       }
     }
     Place(before, tau, 1.0, tableau.b, tableau.b_hat, tableau.stages, stages, after);
-    Correct(segment, after);
+    Correct(segment, tau, after);
     if (segment->projects_twists) {
       RunImpulses(&segment->projection, after, false);
     }
   }
 
-  void Correct(Segment* segment, State<T>* after) {
+  void Correct(Segment* segment, const T& tau, State<T>* after) {
     for (int k = 0; k < segment->num_corrections; ++k) {
       SolvedNode& node = segment->corrections[k];
       ContactProblem<T> problem;
       AccelerationScratch<T> scratch;
       AssembleCorrection(model_, *after, segment->contacts, segment->friction,
-                         s_.settings.recovery_speed * segment->length, &scratch, &problem);
+                         T(s_.settings.recovery_speed * tau), &scratch, &problem);
       ContactSolution<T> correction;
       Solve(problem, node.problem, node.solution,
             std::vector<double>(segment->contacts.size(), 0.0), &node.system, &correction);
