@@ -141,10 +141,12 @@ void RolloutTape::RemoveCheckpoints(const std::function<bool(long step, Origin o
   });
 }
 
-// Whether the stepper's factors fit beside the records of `remaining` further steps.
+// Whether the stepper's factors fit beside the records of `remaining` further steps, with an eighth
+// to spare: where records do not fit in the end, all of them are run again.
 bool RolloutTape::HasRoomForFactors(long remaining) const {
+  const size_t record = last_record_bytes_ + last_record_bytes_ / 8;
   return checkpoint_bytes_ + used_bytes_ + last_factor_bytes_ +
-             last_record_bytes_ * static_cast<size_t>(remaining + 1) <=
+             record * static_cast<size_t>(remaining + 1) <=
          budget();
 }
 
