@@ -9,6 +9,9 @@
 //   the start of a run               a change of the initial twist that breaks a rolling contact or
 //                                    a joint acts as the impulse that restores it, at once and not
 //                                    after the first segment
+// A box that rocks from corner to corner comes to rest after infinitely many impacts in finite
+// time. Settle ends that.
+#include <algorithm>
 #include <cmath>
 
 #include "tangible/simulation/event_step.h"
@@ -41,6 +44,56 @@ bool EventStepper::AddInstant(const Model<double>& model, double t, EventKind ki
     return false;
   }
   *state = segment.after;
+  return true;
+}
+
+// After an impact: where a contact that had rested leaves so slowly that gravity would bring it
+// back before it has left the touching tolerance (or, beyond max_events_per_step, more slowly than
+// the restitution threshold), it stays: all that touch there are held.
+bool EventStepper::Settle(const Model<double>& model, const Impulses& impact, State<double>* state,
+                          EventOutcome* outcome) {
+  const SimulationSettings& settings = model.structure->settings;
+  const double gravity = std::hypot(model.numbers[kGravityX], model.numbers[kGravityY]);
+  const double slow = search_.SpeedTolerance(model, *state);
+  Segment held;
+  held.time = impact.time;
+  bool any = false;
+  for (size_t i = 0; i < impact.contacts.size(); ++i) {
+    const ActiveContact& contact = impact.contacts[i];
+    const ContactBlock<double>& block = impact.problem.contacts[i];
+    const auto speed = [&](const State<double>& at) {
+      return RelativeSpeed(at, contact.a, block.normal_a, contact.b, block.normal_b);
+    };
+    ContactMode mode = impact.solution.modes[i];
+    if (mode == ContactMode::kOpen) {
+      const double touch = search_.TouchTolerance(*state, contact.a, contact.b);
+      const double returns = std::max(std::sqrt(2.0 * gravity * touch),
+                                      inelastic_ ? settings.restitution_threshold : 0.0);
+      if (speed(*state) > returns) {
+        continue;
+      }
+      any = any || (speed(*state) > slow && speed(impact.before) >= -slow);
+      mode = ContactMode::kClosed;
+    } else if (contact.law == ContactLaw::kRestitution) {
+      continue;
+    }
+    held.contacts.push_back(contact);
+    held.friction.push_back(impact.friction[i]);
+    held.modes.push_back(mode);
+  }
+  if (!any) {
+    return true;
+  }
+  ++outcome->fallbacks;
+  EventPart* part = record_.Add();
+  part->is_impulses = true;
+  SetUpProjection(held, *state, &part->impulses);
+  if (!flow_.Project(model, &part->impulses)) {
+    outcome->message = "twists of contacts that come to rest";
+    return false;
+  }
+  SpreadTwists(*model.structure, part->impulses.solution.v, &state->twist);
+  part->impulses.new_twist = state->twist;
   return true;
 }
 

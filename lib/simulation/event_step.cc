@@ -242,6 +242,9 @@ bool EventStepper::SolveImpacts(const Model<double>& model, double t, State<doub
     impact.new_twist = state->twist;
     outcome->impact_energy_gain =
         std::max(outcome->impact_energy_gain, KineticEnergy(model, state->twist) - before);
+    if (!Settle(model, impact, state, outcome)) {
+      return false;
+    }
   }
 }
 

@@ -70,6 +70,8 @@ class EventStepper {
                    State<double>* state, EventOutcome* outcome, Segment* segment);
   bool AddInstant(const Model<double>& model, double t, EventKind kind,
                   const ActiveContact* contact, State<double>* state, EventOutcome* outcome);
+  bool Settle(const Model<double>& model, const Impulses& impact, State<double>* state,
+              EventOutcome* outcome);
   bool LocateTouch(const Model<double>& model, double t, double slow, State<double>* state,
                    EventOutcome* outcome);
   bool SolveByShortStep(const Model<double>& model, double t, double dt, State<double>* state,

@@ -282,7 +282,18 @@ bool SegmentFlow::ProjectTwists(const Model<double>& model, Segment* segment,
     return true;
   }
   SetUpProjection(*segment, segment->after, &segment->projection);
-  Impulses& projection = segment->projection;
+  if (!Project(model, &segment->projection)) {
+    *message = "projection of twists is singular";
+    return false;
+  }
+  const Impulses& projection = segment->projection;
+  SpreadTwists(*model.structure, projection.solution.v, &segment->after.twist);
+  segment->projection.new_twist = segment->after.twist;
+  return true;
+}
+
+bool SegmentFlow::Project(const Model<double>& model, Impulses* impulses) {
+  Impulses& projection = *impulses;
   AssembleImpulses(model, &assembly_, &projection);
   // The same solve as a node's; only its members are kept elsewhere.
   SolvedNode node;
@@ -293,13 +304,7 @@ bool SegmentFlow::ProjectTwists(const Model<double>& model, Segment* segment,
   std::swap(node.problem, projection.problem);
   std::swap(node.system, projection.system);
   projection.solution = std::move(node.solution);
-  if (!solved) {
-    *message = "projection of twists is singular";
-    return false;
-  }
-  SpreadTwists(*model.structure, projection.solution.v, &segment->after.twist);
-  projection.new_twist = segment->after.twist;
-  return true;
+  return solved;
 }
 
 bool SegmentFlow::Run(const Model<double>& model, Segment* segment, std::string* message) {

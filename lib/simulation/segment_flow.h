@@ -45,6 +45,9 @@ class SegmentFlow {
   bool Accelerate(const Model<double>& model, const Segment& segment, const State<double>& state,
                   double time, SolvedNode* node);
 
+  /// Twists onto the rows of an instant whose modes are given (SetUpProjection).
+  bool Project(const Model<double>& model, Impulses* projection);
+
  private:
   bool Integrate(const Model<double>& model, Segment* segment, std::string* message);
   bool CorrectPoses(const Model<double>& model, Segment* segment, std::string* message);
