@@ -256,25 +256,15 @@ GradientResult Differentiate(const GradientProblem& problem, const GradientOptio
     }
     result.all_seconds.push_back(Seconds() - start);
   }
-<<<<<<< HEAD
-  // Event stepping needs the certificate to tell whether there are sides.
-  if (options.certificate == CertificatePass::kRun || options.side != DerivativeSide::kBoth) {
-    result.certificate = CertificateOf(problem);
-    JudgeSide(problem, options, &result);
-=======
   const auto best = [](const std::vector<double>& times) {
     return *std::min_element(times.begin(), times.end());
   };
   result.seconds = best(result.all_seconds);
   result.rollout_seconds = best(result.all_rollout_seconds);
-  if (options.certificate == CertificatePass::kRun) {
-    RolloutReport report;
-    result.certificate =
-        CertifyRollout(problem.model, problem.initial, {WantedNumbers(problem)}, &report);
-    if (result.certificate.redundant_rows > 0) {
-      CheckRedundantRows(problem, &result.certificate);
-    }
->>>>>>> cost
+  // Event stepping needs the certificate to tell whether there are sides.
+  if (options.certificate == CertificatePass::kRun || options.side != DerivativeSide::kBoth) {
+    result.certificate = CertificateOf(problem);
+    JudgeSide(problem, options, &result);
   }
   result.done = result.message.empty();
   return result;
