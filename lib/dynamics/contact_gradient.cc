@@ -31,19 +31,37 @@ class GradientVisitor : private internal::LocalEntries<EntryListSink> {
     Locals locals;
     ContactRows<LocalJet> rows;
     LocalContactRows(contact, &locals, &rows);
-    LocalJet speed(0.0);
-    for (int i = 0; i < 3; ++i) {
-      speed += rows.tangent_a[i] * state_.twist[3 * contact.a + i] +
-               rows.tangent_b[i] * state_.twist[3 * contact.b + i];
+    Speed(contact, locals, rows.tangent_a, rows.tangent_b);
+  }
+
+  void Approach(const ActiveContact& contact) {
+    Locals locals;
+    if (contact.joint >= 0) {
+      JointRows<LocalJet> rows;
+      LocalJointRows(s_.joints[contact.joint], &locals, &rows);
+      Speed(contact, locals, rows.coordinate_a, rows.coordinate_b);
+      return;
     }
-    Emit(locals, 0, speed);
-    for (int i = 0; i < 3; ++i) {
-      EmitTwist(contact.a, i, rows.tangent_a[i].a);
-      EmitTwist(contact.b, i, rows.tangent_b[i].a);
-    }
+    ContactRows<LocalJet> rows;
+    LocalContactRows(contact, &locals, &rows);
+    Speed(contact, locals, rows.normal_a, rows.normal_b);
   }
 
  private:
+  void Speed(const ActiveContact& contact, const Locals& locals, const RowPart<LocalJet>& row_a,
+             const RowPart<LocalJet>& row_b) {
+    LocalJet speed(0.0);
+    for (int i = 0; i < 3; ++i) {
+      speed +=
+          row_a[i] * state_.twist[3 * contact.a + i] + row_b[i] * state_.twist[3 * contact.b + i];
+    }
+    Emit(locals, 0, speed);
+    for (int i = 0; i < 3; ++i) {
+      EmitTwist(contact.a, i, row_a[i].a);
+      EmitTwist(contact.b, i, row_b[i].a);
+    }
+  }
+
   void EmitTwist(int body, int i, double value) {
     if (s_.bodies[body].motion != Motion::kStatic && value != 0.0) {
       sink_(0, s_.TwistVariable(body, i), value);
@@ -65,6 +83,13 @@ void AddSlipGradient(const Model<double>& model, const State<double>& state,
                      std::vector<JacobianEntry>* entries) {
   const EntryListSink sink{entries};
   GradientVisitor(model, state, scratch, sink).Slip(contact);
+}
+
+void AddApproachGradient(const Model<double>& model, const State<double>& state,
+                         const ActiveContact& contact, LocalJacobianScratch* scratch,
+                         std::vector<JacobianEntry>* entries) {
+  const EntryListSink sink{entries};
+  GradientVisitor(model, state, scratch, sink).Approach(contact);
 }
 
 }  // namespace tangible

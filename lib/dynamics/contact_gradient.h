@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// Gradients of what event stepping finds events by: a contact's gap, and its sliding speed t v.
+// Gradients of what event stepping finds events by: a contact's gap, its sliding speed t v, and the
+// speed n v at which it opens.
 
 #include "tangible/dynamics/local_jacobian.h"
 
@@ -15,5 +16,9 @@ void AddGapGradient(const Model<double>& model, const State<double>& state,
 void AddSlipGradient(const Model<double>& model, const State<double>& state,
                      const ActiveContact& contact, LocalJacobianScratch* scratch,
                      std::vector<JacobianEntry>* entries);
+/// The same of the speed at which a contact opens, m/s; of a limit's coordinate, rad/s or m/s.
+void AddApproachGradient(const Model<double>& model, const State<double>& state,
+                         const ActiveContact& contact, LocalJacobianScratch* scratch,
+                         std::vector<JacobianEntry>* entries);
 
 }  // namespace tangible

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "tangible/dynamics/contact_gradient.h"
+#include "tangible/geometry/broad_phase.h"
 #include "tangible/lcp/contact_conditioning.h"
 #include "tangible/simulation/certify_place_inl.h"
 #include "tangible/simulation/rollout_directional.h"
@@ -60,6 +61,70 @@ double Negligible(const Model<double>& model, double speed) {
   return 1e-9 *
          (std::abs(speed) + model.structure->settings.dt *
                                 std::hypot(model.numbers[kGravityX], model.numbers[kGravityY]));
+}
+
+// Whether a direction changes what the entries are the gradient of.
+bool Moves(const std::vector<JacobianEntry>& gradient, const RowMatrixXd& directions,
+           Eigen::Index direction) {
+  constexpr double kUnmoved = 1e-12;  // of the terms
+  double rate = 0.0;
+  double terms = 0.0;
+  for (const JacobianEntry& entry : gradient) {
+    const double term = entry.value * directions(entry.variable, direction);
+    rate += term;
+    terms += std::abs(term);
+  }
+  return std::abs(rate) > kUnmoved * terms;
+}
+
+// Contacts that only touch: within rounding of a gap of 0.
+void FindTouching(const Model<double>& model, const State<double>& state,
+                  std::vector<ActiveContact>* contacts) {
+  constexpr double kReach = 1e-10;  // m
+  const ModelStructure& s = *model.structure;
+  std::vector<Aabb> boxes;
+  for (int body = 0; body < s.num_bodies(); ++body) {
+    boxes.push_back(ComputeAabb(model.Shape(body), state.PoseOf(body), kReach));
+  }
+  std::vector<std::pair<int, int>> pairs;
+  BroadPhase().FindPairs(
+      boxes, [&](int i, int j) { return s.MayCollide(i, j); }, &pairs);
+  for (const auto& [a, b] : pairs) {
+    ContactFeature features[2];
+    const int count = FindContactFeatures(model.Shape(a), state.PoseOf(a), model.Shape(b),
+                                          state.PoseOf(b), kReach, features);
+    for (int k = 0; k < count; ++k) {
+      ActiveContact contact;
+      contact.a = a;
+      contact.b = b;
+      contact.feature = features[k];
+      ContactRows<double> rows;
+      EvaluateContactRows(model, state, contact, &rows);
+      contact.gap = rows.geometry.gap;
+      if (std::abs(contact.gap) <= kReach) {
+        contacts->push_back(contact);
+      }
+    }
+  }
+}
+
+// Whether a contact neither opens nor approaches.
+bool Rests(const Model<double>& model, const State<double>& state, const ActiveContact& contact) {
+  double speed;
+  if (contact.joint >= 0) {
+    const JointIndex& joint = model.structure->joints[contact.joint];
+    JointRows<double> joint_rows;
+    EvaluateJoint(joint.type, state.PoseOf(joint.a), state.PoseOf(joint.b),
+                  &model.numbers[joint.geometry], &joint_rows);
+    ContactRows<double> rows;
+    EvaluateLimitRows(model, joint_rows, contact, &rows);
+    speed = RelativeSpeed(state, contact.a, rows.normal_a, contact.b, rows.normal_b);
+  } else {
+    ContactRows<double> rows;
+    EvaluateContactRows(model, state, contact, &rows);
+    speed = RelativeSpeed(state, contact.a, rows.normal_a, contact.b, rows.normal_b);
+  }
+  return std::abs(speed) <= Negligible(model, speed);
 }
 
 double SlipOf(const Model<double>& model, const State<double>& state,
@@ -247,7 +312,6 @@ void RolloutCertifier::AddSegment(const Model<double>& model, long step,
 // Contacts that touch as the run starts: in the impacts of its first instant and in the first
 // segment.
 void RolloutCertifier::AddStart(const Model<double>& model, const EventRecord& record) {
-  constexpr double kUnmoved = 1e-12;  // of a gap, m for a unit of a parameter and of its terms
   std::vector<const ActiveContact*> touching;
   const State<double>* start = nullptr;
   for (int p = 0; p < record.num_parts; ++p) {
@@ -264,21 +328,39 @@ void RolloutCertifier::AddStart(const Model<double>& model, const EventRecord& r
       break;
     }
   }
+  const size_t loaded = touching.size();
+  std::vector<ActiveContact> unloaded;
+  if (start != nullptr) {
+    FindTouching(model, *start, &unloaded);
+  }
+  for (const ActiveContact& contact : unloaded) {
+    if (std::none_of(touching.begin(), touching.begin() + static_cast<std::ptrdiff_t>(loaded),
+                     [&](const ActiveContact* other) { return other->SameAs(contact); })) {
+      touching.push_back(&contact);
+    }
+  }
   LocalJacobianScratch scratch;
-  for (const ActiveContact* contact : touching) {
-    std::vector<JacobianEntry> entries;
-    AddGapGradient(model, *start, *contact, &scratch, &entries);
+  for (size_t k = 0; k < touching.size(); ++k) {
+    const ActiveContact* contact = touching[k];
+    std::vector<JacobianEntry> gap, approach;
+    AddGapGradient(model, *start, *contact, &scratch, &gap);
+    AddApproachGradient(model, *start, *contact, &scratch, &approach);
+    // Out of penetration it is pushed only while it does not open by itself. One that rests on the
+    // surface has both sides: what it falls late it lands with; not so where no force presses.
+    const bool rests = Rests(model, *start, *contact);
+    const bool pushed = rests && (k >= loaded || contact->gap < -kTouching);
+    if (k >= loaded && !rests) {
+      continue;
+    }
     for (Eigen::Index c = 0; c < options_.directions.cols(); ++c) {
-      double rate = 0.0;
-      double terms = 0.0;
-      for (const JacobianEntry& entry : entries) {
-        const double term = entry.value * options_.directions(entry.variable, c);
-        rate += term;
-        terms += std::abs(term);
-      }
-      if (std::abs(rate) > kUnmoved * terms && contact->gap > -kTouching) {
+      const char* what = contact->gap > -kTouching && Moves(gap, options_.directions, c)
+                             ? " changes its gap"
+                         : pushed && Moves(approach, options_.directions, c)
+                             ? " changes the speed at which it opens"
+                             : nullptr;
+      if (what != nullptr) {
         OneSided(ContactName(*model.structure, *contact) + " touches at the start, " +
-                 options_.names[static_cast<size_t>(c)] + " changes its gap");
+                 options_.names[static_cast<size_t>(c)] + what);
       }
     }
   }

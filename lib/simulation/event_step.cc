@@ -12,7 +12,7 @@ constexpr double kShortStep = 1e-9;
 // How much further than the forces at work a contact that slides is held to its direction.
 constexpr double kForcedSlip = 1e4;
 // Beyond this many times max_events_per_step a step is given up.
-constexpr int kGiveUp = 20;
+constexpr int kGiveUp = 3;
 
 ContactSolverOptions OptionsOf(const SimulationSettings& settings) {
   ContactSolverOptions options;

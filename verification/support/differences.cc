@@ -246,12 +246,13 @@ VectorX<double> GapNoise(const Scene& scene, const ModelStructure& structure) {
 
 VectorX<double> RoundingNoise(const Scene& scene, const RunTrace& at) {
   // Of a body at rest most runs end with the same bits, and one in ten is off by an ε of a gap / h.
-  constexpr int kSamples = 32;
+  // Event steps take ten times longer.
+  const int samples = scene.simulation.stepping == Stepping::kEvent ? 12 : 32;
   const double epsilon = std::numeric_limits<double>::epsilon();
   VectorX<double> noise = (epsilon * at.values.cwiseAbs().cwiseMax(0.5))
                               .cwiseMax(epsilon * GapNoise(scene, *at.structure));
-  RandomNumbers random(kSamples);
-  for (int sample = 0; sample < kSamples; ++sample) {
+  RandomNumbers random(32);
+  for (int sample = 0; sample < samples; ++sample) {
     Scene changed = scene;
     for (BasicBody<double>& body : changed.bodies) {
       for (double* x : {&body.mass, &body.position.x(), &body.position.y(), &body.angle,

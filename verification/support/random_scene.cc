@@ -48,7 +48,11 @@ SceneMaker::SceneMaker(unsigned seed, const RandomSceneOptions& options)
 Scene SceneMaker::Make() {
   Settings();
   Floor();
-  const int bodies = random_.Integer(1, options_.max_bodies);
+  int bodies = random_.Integer(1, options_.max_bodies);
+  if (options_.stepping == Stepping::kEvent &&
+      scene_.simulation.duration > 40.0 * scene_.simulation.dt) {
+    bodies = std::min(bodies, 2);
+  }
   int left = bodies;
   if (left >= 3 && random_.Chance(0.15)) {
     left -= Loop();
