@@ -83,6 +83,7 @@ void FindTouching(const Model<double>& model, const State<double>& state,
   constexpr double kReach = 1e-10;  // m
   const ModelStructure& s = *model.structure;
   std::vector<Aabb> boxes;
+  boxes.reserve(s.bodies.size());
   for (int body = 0; body < s.num_bodies(); ++body) {
     boxes.push_back(ComputeAabb(model.Shape(body), state.PoseOf(body), kReach));
   }
