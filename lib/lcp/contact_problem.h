@@ -18,8 +18,10 @@
 //   s_n = n v + c_n        ⊥ λn
 //   w⁺  = t v + c_t + w⁻   ⊥ σ          w⁺, w⁻: the positive and negative parts of the sliding
 //   speed σ⁻  = 2 μ λn − σ       ⊥ w⁻         σ⁻ = μ λn − λt
-// It has a unique, strictly complementary solution at a disc at rest, where the one-sided form of
-// two friction rows has a continuum.
+// An impact's decompression (contact_decompression.h) adds a least impulse o to a contact:
+//   s_n = n v + c_n ≥ 0,   λn ≥ o,   s_n (λn − o) = 0
+// The planar form has a unique, strictly complementary solution at a disc at rest, where the
+// one-sided form of two friction rows has a continuum.
 
 #include <algorithm>
 #include <array>
@@ -74,6 +76,9 @@ struct ContactBlock {
   T c_t;              ///< m/s, from bodies of prescribed motion
   T friction;         ///< μ
   bool has_friction;  ///< μ > 0: rows for it
+  T offset = T(0.0);  ///< o ≥ 0, the least λn, N s
+  /// λn = o with s_n ≥ 0: in the mode system this equation stands in place of s_n = 0.
+  bool driven = false;
 };
 
 template <typename T>
