@@ -105,10 +105,13 @@ void ExpectSolution(const Solved& s) {
 
 TEST(DecompressionSolverTest, RandomProblemsAreSolvedAsByTheDenseForm) {
   std::mt19937_64 random(11);
+  int solved = 0;
+  int by_dense = 0;  // where changes of modes do not settle
   int driven = 0;
   int closed = 0;
-  for (int trial = 0; trial < 100; ++trial) {
-    ContactProblem<double> problem = testing::RandomContactProblem(&random, 4, 5);
+  for (int trial = 0; trial < 300; ++trial) {
+    ContactProblem<double> problem =
+        testing::RandomContactProblem(&random, 4 + trial % 3, 5 + trial % 4);
     for (ContactBlock<double>& contact : problem.contacts) {
       contact.offset = random() % 3 == 0 ? 0.0 : testing::Draw(&random, 0.0, 0.4);
     }
@@ -116,18 +119,23 @@ TEST(DecompressionSolverTest, RandomProblemsAreSolvedAsByTheDenseForm) {
     int iterations = 0;
     // Random rows with friction need not have a solution.
     if (!SolveContactsDense(problem, 1e-10, &dense, &iterations)) continue;
+    ++solved;
+    ExpectSolution({{}, problem, dense});
     const Solved s = Decompress(problem, ContactMode::kOpen);
     ExpectSolution(s);
+    by_dense += s.report.solved_by == SolvedBy::kLemke ? 1 : 0;
     double difference = 0.0;
     for (size_t i = 0; i < dense.v.size(); ++i) {
       difference = std::max(difference, std::abs(dense.v[i] - s.solution.v[i]));
     }
     EXPECT_LT(difference, 1e-8) << trial;
     for (size_t i = 0; i < problem.contacts.size(); ++i) {
-      driven += s.problem.contacts[i].driven ? 1 : 0;
+      driven += s.problem.contacts[i].driven && problem.contacts[i].has_friction ? 1 : 0;
       closed += !s.problem.contacts[i].driven && s.solution.modes[i] != ContactMode::kOpen ? 1 : 0;
     }
   }
+  EXPECT_GT(solved, 250);
+  EXPECT_GT(by_dense, 1);
   EXPECT_GT(driven, 100);
   EXPECT_GT(closed, 50);
 }
