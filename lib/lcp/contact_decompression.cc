@@ -141,8 +141,11 @@ ContactSolverReport DecompressionSolver::Solve(const ContactSolverOptions& optio
                                                ContactProblem<double>* problem,
                                                ContactSolution<double>* solution) {
   ContactSolverReport report;
+  problem->pushed_momentum = problem->momentum;
   for (size_t i = 0; i < problem->contacts.size(); ++i) {
     ContactBlock<double>& contact = problem->contacts[i];
+    AddRowTransposed(contact.a, contact.normal_a, contact.b, contact.normal_b, contact.offset,
+                     problem->pushed_momentum.data());
     contact.driven = contact.offset > 0.0;
     solution->normal_impulse[i] = contact.offset;
     solution->tangent_impulse[i] = 0.0;

@@ -23,9 +23,9 @@ namespace tangible {
 
 class DecompressionSolver {
  public:
-  /// The contacts' offsets are given; `driven` of each is found. `solution` holds a guess on entry
-  /// (the compression's modes, sized for the problem) and the solution on return, its normal
-  /// impulses with the offsets in them.
+  /// The contacts' offsets are given; `driven` of each is found, and the pushed momentum.
+  /// `solution` holds a guess on entry (the compression's modes, sized for the problem) and the
+  /// solution on return, its normal impulses with the offsets in them.
   ContactSolverReport Solve(const ContactSolverOptions& options, ContactProblem<double>* problem,
                             ContactSolution<double>* solution);
   /// The mode system of the last solution, factorised with its modes.

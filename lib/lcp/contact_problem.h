@@ -90,6 +90,13 @@ struct ContactProblem {
   std::vector<JointBlock<T>> joints;
   bool redundant_joints = false;  ///< joints form loops: their rows may be dependent
   std::vector<ContactBlock<T>> contacts;
+  /// p + Σ nᵀ o, empty where no contact has an offset: of what size speeds are. A body that the
+  /// compression stopped has p = 0 to rounding, and is pushed from both sides.
+  std::vector<T> pushed_momentum;
+
+  const std::vector<T>& scale_momentum() const {
+    return pushed_momentum.empty() ? momentum : pushed_momentum;
+  }
 };
 
 /// A solution; vectors are sized for the problem. Impulses of joints: 3 a joint, unused rows 0.
@@ -134,10 +141,11 @@ inline double FrictionlessSlidingSign(const ContactProblem<double>& problem,
                                       const ContactBlock<double>& c, const double* v) {
   constexpr double kRounding = 1e-12;
   const double slip = RowDot(c.a, c.tangent_a, c.b, c.tangent_b, v) + c.c_t;
+  const std::vector<double>& momentum = problem.scale_momentum();
   double terms = std::abs(c.c_t);
   const auto add = [&](int block, const RowPart<double>& row) {
     for (int i = 0; i < 3 && block >= 0; ++i) {
-      const double free = problem.momentum[3 * block + i] / problem.mass[3 * block + i];
+      const double free = momentum[3 * block + i] / problem.mass[3 * block + i];
       terms += std::abs(row[i]) * std::max(std::abs(v[3 * block + i]), std::abs(free));
     }
   };

@@ -13,11 +13,11 @@ namespace {
 // rotation at the radius of gyration. Where a body comes to rest the solved one is rounding and
 // says nothing of the speeds that cancelled.
 double BodySpeed(const ContactProblem<double>& problem, int block, double lever, const double* v) {
+  const std::vector<double>& momentum = problem.scale_momentum();
   double speed = 0.0;
   for (int i = 0; i < 3; ++i) {
     const int k = 3 * block + i;
-    const double component =
-        std::max(std::abs(v[k]), std::abs(problem.momentum[k] / problem.mass[k]));
+    const double component = std::max(std::abs(v[k]), std::abs(momentum[k] / problem.mass[k]));
     speed = std::max(speed, i < 2 ? component : lever * component);
   }
   return speed;

@@ -80,6 +80,21 @@ TEST(DecompressionSolverTest, AnOffsetThatDoesNotEndAnApproachIsExceeded) {
   EXPECT_NEAR(s.solution.v[1], 0.0, 1e-15);
 }
 
+TEST(DecompressionSolverTest, ABodyStoppedInCompressionIsPushedFromBothSides) {
+  // Body 1 stands on body 0, that on the floor, which does not rebound; rounding is left of body 0.
+  ContactProblem<double> problem = testing::FreeBodies({1e-30, -1e-31, 2e-30, 0.0, 0.0, 0.0});
+  problem.contacts = {FloorContact(0, -0.5, 0.0, 0.0), FloorContact(0, 0.5, 0.0, 0.0),
+                      FloorContact(1, 0.0, 0.0, 0.0)};
+  problem.contacts[2].b = 0;
+  problem.contacts[2].normal_b = {0.0, -1.0, 0.1};
+  problem.contacts[2].offset = 1.0;
+  const Solved s = Decompress(problem, ContactMode::kClosed);
+  EXPECT_TRUE(s.problem.contacts[2].driven);
+  EXPECT_NEAR(s.solution.normal_impulse[0], 0.6, 1e-15);
+  EXPECT_NEAR(s.solution.normal_impulse[1], 0.4, 1e-15);
+  EXPECT_NEAR(s.solution.v[4], 1.0, 1e-15);
+}
+
 // Complementarity recomputed from the data, row by row.
 void ExpectSolution(const Solved& s) {
   constexpr double kTolerance = 1e-9;
