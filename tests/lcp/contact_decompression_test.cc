@@ -81,18 +81,30 @@ TEST(DecompressionSolverTest, AnOffsetThatDoesNotEndAnApproachIsExceeded) {
 }
 
 TEST(DecompressionSolverTest, ABodyStoppedInCompressionIsPushedFromBothSides) {
-  // Body 1 stands on body 0, that on the floor, which does not rebound; rounding is left of body 0.
-  ContactProblem<double> problem = testing::FreeBodies({1e-30, -1e-31, 2e-30, 0.0, 0.0, 0.0});
-  problem.contacts = {FloorContact(0, -0.5, 0.0, 0.0), FloorContact(0, 0.5, 0.0, 0.0),
-                      FloorContact(1, 0.0, 0.0, 0.0)};
-  problem.contacts[2].b = 0;
-  problem.contacts[2].normal_b = {0.0, -1.0, 0.1};
-  problem.contacts[2].offset = 1.0;
-  const Solved s = Decompress(problem, ContactMode::kClosed);
-  EXPECT_TRUE(s.problem.contacts[2].driven);
-  EXPECT_NEAR(s.solution.normal_impulse[0], 0.6, 1e-15);
-  EXPECT_NEAR(s.solution.normal_impulse[1], 0.4, 1e-15);
-  EXPECT_NEAR(s.solution.v[4], 1.0, 1e-15);
+  // Body 1 pushes off body 0 at two points, that from the floor, which does not rebound. What
+  // rounding leaves of body 0 says nothing of the speeds.
+  std::mt19937_64 random(3);
+  for (int trial = 0; trial < 50; ++trial) {
+    ContactProblem<double> problem = testing::FreeBodies({0.0, 0.0, 0.0, 0.0, 0.0, 0.0});
+    problem.momentum[1] = testing::Draw(&random, -1e-32, 1e-32);
+    problem.momentum[2] = testing::Draw(&random, -1e-32, 1e-32);
+    problem.contacts = {FloorContact(0, -0.115488, 0.0, 0.0), FloorContact(0, 0.115488, 0.0, 0.0),
+                        FloorContact(1, -0.06, 0.0, 0.0), FloorContact(1, 0.05, 0.0, 0.0)};
+    const double arms[] = {testing::Draw(&random, -0.1, 0.0), testing::Draw(&random, 0.0, 0.1)};
+    double push = 0.0;
+    for (int k = 0; k < 2; ++k) {
+      ContactBlock<double>& contact = problem.contacts[2 + k];
+      contact.b = 0;
+      contact.normal_b = {0.0, -1.0, -arms[k]};
+      contact.offset = testing::Draw(&random, 1.0, 2.0);
+      push += contact.offset;
+    }
+    const Solved s = Decompress(problem, ContactMode::kClosed);
+    EXPECT_TRUE(s.problem.contacts[2].driven && s.problem.contacts[3].driven);
+    EXPECT_NEAR(s.solution.normal_impulse[0] + s.solution.normal_impulse[1], push, 1e-14);
+    EXPECT_NEAR(s.solution.v[1], 0.0, 1e-14);
+    EXPECT_NEAR(s.solution.v[4], push, 1e-14);
+  }
 }
 
 // Complementarity recomputed from the data, row by row.

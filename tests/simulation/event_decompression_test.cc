@@ -174,6 +174,21 @@ TEST(EventDecompressionTest, ADiscBouncesAsByNewtonsLaw) {
   }
 }
 
+TEST(EventDecompressionTest, AContactThatDidNotApproachDoesNotRebound) {
+  // A ball falls on a disc that rests: its floor is as rigid, and gives nothing back.
+  const Rolled run = Simulate(SceneOf(R"({"gravity": [0, 0], "bodies": [
+      {"name": "disc", "shape": {"circle": {"radius": 0.2}}, "mass": 2, "position": [0, 0.2]},
+      {"name": "ball", "shape": {"circle": {"radius": 0.1}}, "mass": 1, "position": [0, 0.8],
+       "velocity": [0, -1]},
+      {"name": "floor", "static": true, "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}}],
+    "pairs": [{"bodies": ["disc", "floor"], "restitution": 0.9},
+              {"bodies": ["disc", "ball"], "restitution": 0.3}], )" +
+                                      Settings("poisson", 0.5) + "}"));
+  EXPECT_NEAR(run.final.twist[1], 0.0, 1e-14);
+  EXPECT_NEAR(run.final.pose[1], 0.2, 1e-14);
+  EXPECT_NEAR(run.final.twist[4], 0.3, 1e-14);
+}
+
 GradientResult Jacobian(const Scene& scene, const std::vector<std::string>& paths,
                         GradientMethod method) {
   std::vector<ParameterPath> parameters;
