@@ -353,11 +353,11 @@ ContactSystem::ResidualSize ContactSystem::ResidualWith(const ContactProblem<dou
   }
   // Unused rows of constraints have a right-hand side of 0.
   const size_t momentum_size = 3 * static_cast<size_t>(problem.num_bodies) * columns;
+  const std::vector<double>& free = problem.scale_momentum();
   for (int i = 0; i < 3 * problem.num_bodies; ++i) {
-    momentum.parts = std::max(momentum.parts, std::abs(problem.momentum[i]));
+    momentum.parts = std::max(momentum.parts, std::abs(free[i]));
     if (i % 3 != 2) {
-      constraint.parts =
-          std::max(constraint.parts, std::abs(problem.momentum[i]) / problem.mass[i]);
+      constraint.parts = std::max(constraint.parts, std::abs(free[i]) / problem.mass[i]);
     }
   }
   if (regularisation == Regularisation::kKept) {
