@@ -189,6 +189,22 @@ TEST(EventDecompressionTest, AContactThatDidNotApproachDoesNotRebound) {
   EXPECT_NEAR(run.final.twist[4], 0.3, 1e-14);
 }
 
+TEST(EventDecompressionTest, ABoxThatRocksComesToRest) {
+  for (const double e : {0.0, 0.4}) {
+    const Rolled run = Simulate(SceneOf(R"({"bodies": [
+      {"name": "box", "shape": {"box": {"size": [0.4, 0.2]}}, "mass": 1.3, "position": [0, 0.16],
+       "angle": 0.05},
+      {"name": "floor", "static": true, "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}}],
+    "pairs": [{"bodies": ["box", "floor"], "friction": 0.4, "restitution": )" +
+                                        Number(e) + "}], " + Settings("poisson", 2.5) + "}"));
+    EXPECT_NEAR(run.final.pose[1], 0.1, 1e-10) << e;
+    EXPECT_NEAR(run.final.pose[2], 0.0, 1e-10) << e;
+    for (int i = 0; i < 3; ++i) {
+      EXPECT_NEAR(run.final.twist[i], 0.0, 1e-10) << e;
+    }
+  }
+}
+
 GradientResult Jacobian(const Scene& scene, const std::vector<std::string>& paths,
                         GradientMethod method) {
   std::vector<ParameterPath> parameters;
