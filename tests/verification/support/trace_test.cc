@@ -3,8 +3,8 @@
 
 #include <gtest/gtest.h>
 
-#include "../../support/scenes.h"
 #include "sliding_box.h"
+#include "tangible/scene/scene_json.h"
 
 namespace tangible {
 namespace {
@@ -48,7 +48,9 @@ TEST(TraceTest, ADrivenContactIsAnotherChoiceThanAClosedOne) {
   // A disc touches both walls of a groove at once; with little restitution the right one stays
   // closed.
   const auto trace = [](const char* right) {
-    return TraceRun(test_scenes::SceneOf(R"({"bodies": [
+    Scene scene;
+    std::string error;
+    EXPECT_TRUE(ParseScene(R"({"bodies": [
       {"name": "disc", "shape": {"circle": {"radius": 0.1}}, "mass": 1.3, "position": [0, 0.4]},
       {"name": "left", "static": true,
        "shape": {"half_plane": {"normal": [0.86602540378443865, 0.5], "offset": 0}}},
@@ -56,8 +58,11 @@ TEST(TraceTest, ADrivenContactIsAnotherChoiceThanAClosedOne) {
        "shape": {"half_plane": {"normal": [-0.86602540378443865, 0.5], "offset": 0}}}],
     "pairs": [{"bodies": ["disc", "left"], "restitution": 0.9},
               {"bodies": ["disc", "right"], "restitution": )" +
-                                         std::string(right) + R"(}],
-    "simulation": {"stepping": "event", "impact_law": "poisson", "duration": 0.23}})"));
+                               std::string(right) + R"(}],
+    "simulation": {"stepping": "event", "impact_law": "poisson", "duration": 0.23}})",
+                           "groove.json", ".", &scene, &error))
+        << error;
+    return TraceRun(scene);
   };
   const RunTrace closed = trace("0.1");
   const RunTrace both = trace("0.8");
