@@ -48,6 +48,7 @@ T LawConstant(ContactLaw law, const T& gap, double h, const T& restitution, cons
     case ContactLaw::kRestitution:
       return restitution * approach;
     case ContactLaw::kInelastic:
+    case ContactLaw::kPoisson:  // its offset is the caller's
       return T(0.0);
     case ContactLaw::kRecovery:
       return T(-settings.recovery_speed);

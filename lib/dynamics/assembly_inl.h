@@ -23,6 +23,7 @@ class FreeAssembly {
     p_.dampers.clear();
     p_.joints.clear();
     p_.contacts.clear();
+    p_.pushed_momentum.clear();
     p_.redundant_joints = structure_.joint_loops;
     const std::vector<T>& x = model_.numbers;
     for (int k = 0; k < p_.num_bodies; ++k) {

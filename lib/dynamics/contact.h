@@ -8,6 +8,8 @@
 //   kRecovery     c_n = −recovery_speed: where gap / h is below that, out of penetration no faster
 //   kRestitution  c_n = e (n·v): an impact
 //   kInelastic    c_n = 0: an impact without rebound (event stepping alone)
+//   kPoisson      c_n = 0, λn ≥ e λ¹n: the decompression that follows a compression with impulse
+//                 λ¹n (event stepping alone)
 //
 // An impact is e > 0, n·v < −threshold and gap + h n·v_free < margin; in penetration the smaller of
 // both constants holds. A joint limit is a row like a contact without friction or restitution, its
@@ -21,7 +23,7 @@
 
 namespace tangible {
 
-enum class ContactLaw : unsigned char { kGap, kRecovery, kRestitution, kInelastic };
+enum class ContactLaw : unsigned char { kGap, kRecovery, kRestitution, kInelastic, kPoisson };
 
 /// The discrete part of a contact of a step. A limit has joint ≥ 0 and no feature.
 struct ActiveContact {

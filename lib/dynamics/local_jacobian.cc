@@ -297,16 +297,11 @@ class StepVisitor : private internal::LocalEntries<Sink> {
     const int row = 3 * (*step_.contact_block)[i];
     EmitMomentum(locals, a, rows.normal_a, b, rows.normal_b, -normal);
     EmitMomentum(locals, a, rows.tangent_a, b, rows.tangent_b, -step_.solution->tangent_impulse[i]);
-    const double e = (*step_.restitution)[i].value;
-    LocalJet value = NewSpeed(a, rows.normal_a, b, rows.normal_b);
-    if (contact.law == ContactLaw::kGap) {
-      value += rows.geometry.gap / step_.h;
-    } else if (contact.law == ContactLaw::kRestitution) {
-      value += e * Speed(v_old_, a, rows.normal_a, b, rows.normal_b);
-      EmitRestitution(i, contact, rows, e, row);
+    if (contact.law == ContactLaw::kPoisson && step_.problem->contacts[i].driven) {
+      EmitDriven(i, row);
+    } else {
+      EmitNormal(i, contact, locals, rows);
     }
-    Emit(locals, row, value);
-    EmitPrescribed(a, rows.normal_a, b, rows.normal_b, row, 1.0);
     if (mode == ContactMode::kSticking) {
       Emit(locals, row + 1, NewSpeed(a, rows.tangent_a, b, rows.tangent_b));
       EmitPrescribed(a, rows.tangent_a, b, rows.tangent_b, row + 1, 1.0);
@@ -325,6 +320,35 @@ class StepVisitor : private internal::LocalEntries<Sink> {
         EmitRowTimesVariable(a, rows.tangent_a, b, rows.tangent_b,
                              s_.NumberVariable(friction.numbers[k]),
                              sign * normal * friction.derivatives[k]);
+      }
+    }
+  }
+
+  void EmitNormal(int i, const ActiveContact& contact, const Locals& locals,
+                  const ContactRows<LocalJet>& rows) {
+    const int a = contact.a;
+    const int b = contact.b;
+    const int row = 3 * (*step_.contact_block)[i];
+    const double e = (*step_.restitution)[i].value;
+    LocalJet value = NewSpeed(a, rows.normal_a, b, rows.normal_b);
+    if (contact.law == ContactLaw::kGap) {
+      value += rows.geometry.gap / step_.h;
+    } else if (contact.law == ContactLaw::kRestitution) {
+      value += e * Speed(v_old_, a, rows.normal_a, b, rows.normal_b);
+      EmitRestitution(i, contact, rows, e, row);
+    }
+    Emit(locals, row, value);
+    EmitPrescribed(a, rows.normal_a, b, rows.normal_b, row, 1.0);
+  }
+
+  // λn − e λ¹n, at a fixed impulse λ¹n of the compression.
+  void EmitDriven(int i, int row) {
+    const CoefficientSource& restitution = (*step_.restitution)[i];
+    const double compression = step_.problem->contacts[i].offset / restitution.value;
+    for (int k = 0; k < 2; ++k) {
+      if (restitution.numbers[k] >= 0) {
+        sink_(row, s_.NumberVariable(restitution.numbers[k]),
+              -compression * restitution.derivatives[k]);
       }
     }
   }

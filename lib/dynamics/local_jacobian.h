@@ -7,6 +7,7 @@
 //   R1 = (M + hC) v⁺ − M v − impulses − Aᵀ y − Σ (nᵀ λn + tᵀ λt)       rows of moving bodies
 //   R2 = A v⁺ − b                                                       rows of joints
 //   R3 = n v⁺ + c_n, and t v⁺ where sticking                            rows of closed contacts
+//        λn − e λ¹n where driven, at a fixed impulse λ¹n of the compression (law kPoisson)
 // K = ∂R/∂x is the step's own matrix. This file gives ∂R/∂w at fixed x: each body, spring, force,
 // joint and contact reads a few variables only, is evaluated in a LocalJet of these and handed on
 // as entries (row, variable, value). Tangent and adjoint use the same entries:

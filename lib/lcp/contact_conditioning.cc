@@ -43,12 +43,16 @@ std::vector<ActiveRow> ListActiveRows(const ContactProblem<double>& problem,
       continue;
     }
     const ContactBlock<double>& c = problem.contacts[i];
-    ActiveRow& normal = add(3 * block, c.a, c.b, c.normal_a, c.normal_b);
+    // The impulse of a driven contact is known beforehand: what remains are the other rows.
+    if (!c.driven) {
+      ActiveRow& normal = add(3 * block, c.a, c.b, c.normal_a, c.normal_b);
+      if (const double along = -SlidingSign(modes[i]) * c.friction; along != 0.0) {
+        normal.push_a = Slanted(c.normal_a, along, c.tangent_a);
+        normal.push_b = Slanted(c.normal_b, along, c.tangent_b);
+      }
+    }
     if (modes[i] == ContactMode::kSticking) {
       add(3 * block + 1, c.a, c.b, c.tangent_a, c.tangent_b);
-    } else if (const double along = -SlidingSign(modes[i]) * c.friction; along != 0.0) {
-      normal.push_a = Slanted(c.normal_a, along, c.tangent_a);
-      normal.push_b = Slanted(c.normal_b, along, c.tangent_b);
     }
     ++block;
   }

@@ -2,7 +2,8 @@
 //
 // Lemke's method for a contact problem, on the one-sided form that it is copositive in: a contact
 // with friction has λn, two one-sided tangential impulses and its sliding speed,
-//   G = [n; t; −t; 0],  F = [0 0 0 0; 0 0 0 1; 0 0 0 1; μ −1 −1 0]  on (λn, λ+, λ−, γ).
+//   G = [n; t; −t; 0],  F = [0 0 0 0; 0 0 0 1; 0 0 0 1; μ −1 −1 0]  on (λn − o, λ+, λ−, γ).
+// A least impulse o acts in p, and adds μ o to the constant of the last row.
 #include <cmath>
 
 #include "tangible/lcp/contact_solver.h"
@@ -64,7 +65,11 @@ MixedLcp<double> DenseProblem(const ContactProblem<double>& problem) {
   for (const ContactBlock<double>& c : problem.contacts) {
     SetRow(c.a, c.normal_a, c.b, c.normal_b, 1.0, &dense.G, row);
     dense.c(row) = c.c_n;
+    if (c.offset > 0.0) {
+      AddRowTransposed(c.a, c.normal_a, c.b, c.normal_b, c.offset, dense.p.data());
+    }
     if (c.has_friction) {
+      dense.c(row + 3) = c.friction * c.offset;
       SetRow(c.a, c.tangent_a, c.b, c.tangent_b, 1.0, &dense.G, row + 1);
       SetRow(c.a, c.tangent_a, c.b, c.tangent_b, -1.0, &dense.G, row + 2);
       dense.c(row + 1) = c.c_t;
@@ -109,10 +114,11 @@ void Extract(const ContactProblem<double>& problem, const VectorX<double>& v,
   for (size_t i = 0; i < problem.contacts.size(); ++i) {
     const ContactBlock<double>& contact = problem.contacts[i];
     const double* z = z_dense.data() + row;
-    solution->normal_impulse[i] = z[0];
+    const double normal = z[0] + contact.offset;
+    solution->normal_impulse[i] = normal;
     solution->tangent_impulse[i] = contact.has_friction ? z[1] - z[2] : 0.0;
-    solution->modes[i] = contact.has_friction ? ModeOf(contact, z[0], z[1], z[2], z[3])
-                                              : ModeOf(contact, z[0], 0.0, 0.0, 0.0);
+    solution->modes[i] = contact.has_friction ? ModeOf(contact, normal, z[1], z[2], z[3])
+                                              : ModeOf(contact, normal, 0.0, 0.0, 0.0);
     row += RowsOf(contact);
   }
 }

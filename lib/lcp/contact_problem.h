@@ -18,8 +18,10 @@
 //   s_n = n v + c_n        ⊥ λn
 //   w⁺  = t v + c_t + w⁻   ⊥ σ          w⁺, w⁻: the positive and negative parts of the sliding
 //   speed σ⁻  = 2 μ λn − σ       ⊥ w⁻         σ⁻ = μ λn − λt
-// It has a unique, strictly complementary solution at a disc at rest, where the one-sided form of
-// two friction rows has a continuum.
+// An impact's decompression (contact_decompression.h) adds a least impulse o to a contact:
+//   s_n = n v + c_n ≥ 0,   λn ≥ o,   s_n (λn − o) = 0
+// The planar form has a unique, strictly complementary solution at a disc at rest, where the
+// one-sided form of two friction rows has a continuum.
 
 #include <algorithm>
 #include <array>
@@ -74,6 +76,9 @@ struct ContactBlock {
   T c_t;              ///< m/s, from bodies of prescribed motion
   T friction;         ///< μ
   bool has_friction;  ///< μ > 0: rows for it
+  T offset = T(0.0);  ///< o ≥ 0, the least λn, N s
+  /// λn = o with s_n ≥ 0: in the mode system this equation stands in place of s_n = 0.
+  bool driven = false;
 };
 
 template <typename T>
@@ -85,10 +90,17 @@ struct ContactProblem {
   std::vector<JointBlock<T>> joints;
   bool redundant_joints = false;  ///< joints form loops: their rows may be dependent
   std::vector<ContactBlock<T>> contacts;
+  /// p + Σ nᵀ o, empty where no contact has an offset: of what size speeds are. A body that the
+  /// compression stopped has p = 0 to rounding, and is pushed from both sides.
+  std::vector<T> pushed_momentum;
+
+  const std::vector<T>& scale_momentum() const {
+    return pushed_momentum.empty() ? momentum : pushed_momentum;
+  }
 
   /// Memory of the vectors.
   size_t bytes() const {
-    return sizeof(T) * (mass.capacity() + momentum.capacity()) +
+    return sizeof(T) * (mass.capacity() + momentum.capacity() + pushed_momentum.capacity()) +
            sizeof(DamperBlock<T>) * dampers.capacity() + sizeof(JointBlock<T>) * joints.capacity() +
            sizeof(ContactBlock<T>) * contacts.capacity();
   }
@@ -143,10 +155,11 @@ inline double FrictionlessSlidingSign(const ContactProblem<double>& problem,
                                       const ContactBlock<double>& c, const double* v) {
   constexpr double kRounding = 1e-12;
   const double slip = RowDot(c.a, c.tangent_a, c.b, c.tangent_b, v) + c.c_t;
+  const std::vector<double>& momentum = problem.scale_momentum();
   double terms = std::abs(c.c_t);
   const auto add = [&](int block, const RowPart<double>& row) {
     for (int i = 0; i < 3 && block >= 0; ++i) {
-      const double free = problem.momentum[3 * block + i] / problem.mass[3 * block + i];
+      const double free = momentum[3 * block + i] / problem.mass[3 * block + i];
       terms += std::abs(row[i]) * std::max(std::abs(v[3 * block + i]), std::abs(free));
     }
   };

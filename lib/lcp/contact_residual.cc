@@ -13,11 +13,11 @@ namespace {
 // rotation at the radius of gyration. Where a body comes to rest the solved one is rounding and
 // says nothing of the speeds that cancelled.
 double BodySpeed(const ContactProblem<double>& problem, int block, double lever, const double* v) {
+  const std::vector<double>& momentum = problem.scale_momentum();
   double speed = 0.0;
   for (int i = 0; i < 3; ++i) {
     const int k = 3 * block + i;
-    const double component =
-        std::max(std::abs(v[k]), std::abs(problem.momentum[k] / problem.mass[k]));
+    const double component = std::max(std::abs(v[k]), std::abs(momentum[k] / problem.mass[k]));
     speed = std::max(speed, i < 2 ? component : lever * component);
   }
   return speed;
@@ -141,7 +141,7 @@ double NaturalResidual(const ContactProblem<double>& problem,
     const ContactValues values = Evaluate(problem, c, solution.v.data());
     const double normal = solution.normal_impulse[i];
     const double zeta = std::max(scale, values.sigma_n / values.mobility_n);
-    double residual = RowResidual(normal, zeta, values.s_n, values.sigma_n);
+    double residual = RowResidual(normal - c.offset, zeta, values.s_n, values.sigma_n);
     if (c.has_friction) {
       const double limit = c.friction * normal;
       const double tangent = solution.tangent_impulse[i];
@@ -171,7 +171,7 @@ void FindDegenerateContacts(const ContactProblem<double>& problem,
     const double normal = solution.normal_impulse[i];
     const double zeta = std::max(scale, values.sigma_n / values.mobility_n);
     const bool grazes =
-        std::abs(values.s_n) <= tolerance * values.sigma_n && normal <= tolerance * zeta;
+        std::abs(values.s_n) <= tolerance * values.sigma_n && normal - c.offset <= tolerance * zeta;
     const double zeta_t = std::max(zeta * c.friction, values.sigma_t / values.mobility_t);
     const bool at_limit =
         c.has_friction && normal > tolerance * zeta &&
@@ -197,7 +197,9 @@ ContactMargin MarginOfContact(const ContactProblem<double>& problem,
   }
   const double zeta =
       std::max(ImpulseScale(solution.normal_impulse), values.sigma_n / values.mobility_n);
-  const ContactMargin opening{ratio(normal, zeta), Kind::kOpening};
+  const ContactMargin opening =
+      c.driven ? ContactMargin{ratio(values.s_n, values.sigma_n), Kind::kClosing}
+               : ContactMargin{ratio(normal - c.offset, zeta), Kind::kOpening};
   ContactMargin friction = opening;
   if (mode == ContactMode::kSticking) {
     const double zeta_t = std::max(zeta * c.friction, values.sigma_t / values.mobility_t);

@@ -39,7 +39,7 @@ void FindDegenerateContacts(const ContactProblem<double>& problem,
 /// How far a contact is from a change of its mode, in the scales of NaturalResidual: the smallest
 /// of
 ///   open       s_n / σ_n
-///   closed     λ_n / ζ, and
+///   closed     (λ_n − o) / ζ, or where it is driven s_n / σ_n, and
 ///     sticking   (μ λ_n − |λ_t|) / ζ_t
 ///     sliding    |w| / σ_t
 /// At most about 1; 0 at a kink, and below 0 by no more than the residual.

@@ -97,8 +97,13 @@ class ColumnResidual {
   void Contact(const ContactBlock<double>& c, ContactMode mode, int block) {
     const double along = -SlidingSign(mode) * c.friction;  // the impulse's part on the tangent
     const double impulse = At(block, 0);
-    double row = Dot(c.a, c.normal_a, c.b, c.normal_b);
-    Push(c.a, c.normal_a, c.b, c.normal_b, kSign * impulse);
+    // A driven contact has a column as others, and of rows λn alone.
+    double row = c.driven && !kTransposed ? impulse : Dot(c.a, c.normal_a, c.b, c.normal_b);
+    if (c.driven && kTransposed) {
+      row -= impulse;
+    } else {
+      Push(c.a, c.normal_a, c.b, c.normal_b, kSign * impulse);
+    }
     if (mode == ContactMode::kSticking) {
       Constrain(block, 1, Dot(c.a, c.tangent_a, c.b, c.tangent_b));
       Push(c.a, c.tangent_a, c.b, c.tangent_b, kSign * At(block, 1));
@@ -273,18 +278,22 @@ void ContactSystem::AddContacts(const ContactProblem<double>& problem,
     const ContactBlock<double>& contact = problem.contacts[i];
     const bool sticks = modes[i] == ContactMode::kSticking;
     double* diagonal = lu_.Diagonal(contact_block_[i]);
-    diagonal[0] = regularisation * RowMobility(problem.mass, contact.a, contact.normal_a, contact.b,
-                                               contact.normal_b);
+    diagonal[0] = contact.driven
+                      ? 1.0
+                      : regularisation * RowMobility(problem.mass, contact.a, contact.normal_a,
+                                                     contact.b, contact.normal_b);
     diagonal[4] = sticks ? regularisation * RowMobility(problem.mass, contact.a, contact.tangent_a,
                                                         contact.b, contact.tangent_b)
                          : 1.0;
     diagonal[8] = 1.0;
-    regularisation_[3 * contact_block_[i]] = diagonal[0];
+    regularisation_[3 * contact_block_[i]] = contact.driven ? 0.0 : diagonal[0];
     regularisation_[3 * contact_block_[i] + 1] = sticks ? diagonal[4] : 0.0;
     const double along = -SlidingSign(modes[i]) * contact.friction;
     const auto add = [&](const RowPart<double>& normal, const RowPart<double>& tangent) {
       --edge;
-      AddToRow(normal, 0, lu_.SecondFirst(edge));
+      if (!contact.driven) {
+        AddToRow(normal, 0, lu_.SecondFirst(edge));
+      }
       SubtractFromColumn(Combine(normal, along, tangent), 0, lu_.FirstSecond(edge));
       if (sticks) {
         AddToRow(tangent, 1, lu_.SecondFirst(edge));
@@ -350,11 +359,11 @@ ContactSystem::ResidualSize ContactSystem::ResidualWith(const ContactProblem<dou
   }
   // Unused rows of constraints have a right-hand side of 0.
   const size_t momentum_size = 3 * static_cast<size_t>(problem.num_bodies) * columns;
+  const std::vector<double>& free = problem.scale_momentum();
   for (int i = 0; i < 3 * problem.num_bodies; ++i) {
-    momentum.parts = std::max(momentum.parts, std::abs(problem.momentum[i]));
+    momentum.parts = std::max(momentum.parts, std::abs(free[i]));
     if (i % 3 != 2) {
-      constraint.parts =
-          std::max(constraint.parts, std::abs(problem.momentum[i]) / problem.mass[i]);
+      constraint.parts = std::max(constraint.parts, std::abs(free[i]) / problem.mass[i]);
     }
   }
   if (regularisation == Regularisation::kKept) {

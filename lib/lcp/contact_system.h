@@ -9,7 +9,8 @@
 //
 // C has the rows n (closed contacts) and t (sticking ones); B the directions in which impulses act:
 // n − σ μ t for a sliding contact, so that K is unsymmetric there and the adjoint needs Kᵀ. A step
-// is solved with this system, and differentiated with the same factorisation.
+// is solved with this system, and differentiated with the same factorisation. A driven contact
+// (contact_problem.h) has λn = o in place of its row n; its impulse acts as others do.
 //
 // δ regularises redundant rows (four legs on a floor, a closed loop of bars): 1e-10 of the row's
 // own r M⁻¹ rᵀ, on contacts and, where joints form loops, on joints. Solutions are refined against

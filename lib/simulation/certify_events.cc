@@ -217,6 +217,8 @@ void RolloutCertifier::AddUnloaded(const Model<double>& model, long step, const 
 void RolloutCertifier::AddImpact(const Model<double>& model, long step, Impulses* impact) {
   const ModelStructure& s = *model.structure;
   const double threshold = s.settings.restitution_threshold;
+  // By Poisson's law the compression decides which contacts rebound.
+  const bool is_first = impact->h == 0.0 && !impact->decompression;
   for (size_t i = 0; i < impact->contacts.size(); ++i) {
     const ActiveContact& contact = impact->contacts[i];
     const Place place{&s, step, impact->time, i, &contact, impact->solution.modes[i]};
@@ -225,7 +227,9 @@ void RolloutCertifier::AddImpact(const Model<double>& model, long step, Impulses
         RelativeSpeed(impact->before, contact.a, block.normal_a, contact.b, block.normal_b);
     const ContactMargin margin =
         MarginOfContact(impact->problem, impact->solution, static_cast<int>(i));
-    AddMargin(margin.value, place, std::string("impact, ") + ModeName(place.mode));
+    AddMargin(margin.value, place,
+              std::string(impact->decompression ? "decompression, " : "impact, ") +
+                  (block.driven ? "driven and " : "") + ModeName(place.mode));
     certificate_.degenerate_rows += margin.value < kDegenerateTolerance ? 1 : 0;
     const CoefficientSource& friction = impact->friction[i];
     if (place.mode != ContactMode::kOpen && friction.value == 0.0 &&
@@ -234,7 +238,7 @@ void RolloutCertifier::AddImpact(const Model<double>& model, long step, Impulses
     }
     const CoefficientSource& restitution = impact->restitution[i];
     const bool wanted = Wanted(restitution.numbers[0]) || Wanted(restitution.numbers[1]);
-    if (impact->h == 0.0 && (restitution.value > 0.0 || wanted)) {
+    if (is_first && (restitution.value > 0.0 || wanted)) {
       AddJump(std::abs(-before - threshold) / std::max(threshold, std::abs(before)), place,
               "approach speed " + Short(-before) + " m/s near the threshold " + Short(threshold) +
                   " m/s");
@@ -245,7 +249,7 @@ void RolloutCertifier::AddImpact(const Model<double>& model, long step, Impulses
       }
     }
   }
-  if (impact->h == 0.0) {
+  if (is_first) {
     AddSimultaneous(model, step, *impact);
     AddUnloaded(model, step, *impact);
   }

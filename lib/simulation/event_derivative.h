@@ -34,6 +34,9 @@ class EventDerivative {
   double ImpulsesTangent(const Model<double>& model, Impulses* impulses, RowMatrixXd* x);
   void SegmentAdjoint(const Model<double>& model, Segment* segment, RowMatrixXd* w_bar);
   void StagesAdjoint(const Model<double>& model, Segment* segment, RowMatrixXd* w_bar);
+  void KeepCompression(const Impulses& impulses);
+  void AddOffsetsTangent(const Impulses& impulses);
+  void KeepOffsetsAdjoint(const Impulses& impulses);
   void ImpulsesAdjoint(const Model<double>& model, Impulses* impulses, RowMatrixXd* w_bar);
   void EventGradient(const Model<double>& model, Segment* segment, Eigen::VectorXd* gradient);
   double NodeTangent(const Model<double>& model, const Segment& segment, SolvedNode* node,
@@ -44,6 +47,9 @@ class EventDerivative {
 
   LocalJacobianScratch scratch_;
   RowMatrixXd rhs_;
+  // Poisson's law, between an impact's two parts: derivatives of the compression's normal impulses,
+  // and of the losses with respect to them; a row a contact of the compression.
+  RowMatrixXd compression_dot_, compression_bar_;
 };
 
 /// Whether an event's time is found from an equation (and not given).

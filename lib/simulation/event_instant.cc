@@ -65,7 +65,9 @@ bool EventStepper::Settle(const Model<double>& model, const Impulses& impact, St
       return RelativeSpeed(at, contact.a, block.normal_a, contact.b, block.normal_b);
     };
     ContactMode mode = impact.solution.modes[i];
-    if (mode == ContactMode::kOpen) {
+    // A decompression elsewhere may have opened what its compression had closed.
+    const bool opened = !rebounds_[i] && speed(*state) > slow;
+    if (mode == ContactMode::kOpen || opened) {
       const double touch = search_.TouchTolerance(*state, contact.a, contact.b);
       const double returns = std::max(std::sqrt(2.0 * gravity * touch),
                                       inelastic_ ? settings.restitution_threshold : 0.0);
@@ -74,7 +76,7 @@ bool EventStepper::Settle(const Model<double>& model, const Impulses& impact, St
       }
       any = any || (speed(*state) > slow && speed(impact.before) >= -slow);
       mode = ContactMode::kClosed;
-    } else if (contact.law == ContactLaw::kRestitution) {
+    } else if (rebounds_[i]) {
       continue;
     }
     held.contacts.push_back(contact);

@@ -132,7 +132,11 @@ class EventReplay {
       if (at < 0) {
         continue;
       }
-      add(at, c.a, c.normal_a, c.b, c.normal_b);
+      if (c.driven) {
+        k(at, at) = T(1.0);
+      } else {
+        add(at, c.a, c.normal_a, c.b, c.normal_b);
+      }
       add_force(at, c.a, c.normal_a, c.b, c.normal_b, T(1.0));
       if (modes[i] == ContactMode::kSticking) {
         add(at + 1, c.a, c.tangent_a, c.b, c.tangent_b);
@@ -184,7 +188,7 @@ class EventReplay {
     }
     for (size_t i = 0; i < p.contacts.size(); ++i) {
       if (row_of[i] >= 0) {
-        rhs[row_of[i]] = -p.contacts[i].c_n;
+        rhs[row_of[i]] = p.contacts[i].driven ? p.contacts[i].offset : -p.contacts[i].c_n;
         if (modes[i] == ContactMode::kSticking) {
           rhs[row_of[i] + 1] = -p.contacts[i].c_t;
         }
@@ -234,34 +238,53 @@ class EventReplay {
   }
 
   void RunImpulses(Impulses* impulses, State<T>* state, bool is_impact = true) {
+    ContactSolution<T> solution;
+    SolveImpulses(impulses, *state, is_impact, &solution);
+    SetTwists(solution.v, state);
+    compression_ = solution.normal_impulse;
+  }
+
+  // Of a decompression: e times the impulses of the part before.
+  void SetOffsets(const Impulses& impulses, ContactProblem<T>* problem) const {
+    for (size_t i = 0; i < impulses.contacts.size(); ++i) {
+      ContactBlock<T>& contact = problem->contacts[i];
+      contact.driven = impulses.problem.contacts[i].driven;
+      if (contact.driven) {
+        const T e = EvaluateCoefficient(impulses.restitution[i], model_.numbers);
+        contact.offset = e * compression_[impulses.compressed[i]];
+      }
+    }
+  }
+
+  void SolveImpulses(Impulses* impulses, const State<T>& state, bool is_impact,
+                     ContactSolution<T>* solution) {
     ContactProblem<T> problem;
     AssemblyScratch<T> scratch;
-    AssembleFree(model_, *state, impulses->time, impulses->h, &problem, &scratch, false);
-    AssembleContacts(model_, *state, impulses->h, impulses->contacts, impulses->friction,
+    AssembleFree(model_, state, impulses->time, impulses->h, &problem, &scratch, false);
+    AssembleContacts(model_, state, impulses->h, impulses->contacts, impulses->friction,
                      impulses->restitution, scratch, &problem);
-    ContactSolution<T> solution;
-    if (route_ == JetRoute::kUnrolled && is_impact) {
+    if (impulses->decompression) {
+      SetOffsets(*impulses, &problem);
+    } else if (route_ == JetRoute::kUnrolled && is_impact) {
       InteriorPointWorkspace<T> workspace;
       ContactInteriorPointOptions options;
       options.complementarity = kUnrolledComplementarity;
       const bool converged =
-          SolveContactsByInteriorPoint(problem, options, &workspace, &solution).converged;
+          SolveContactsByInteriorPoint(problem, options, &workspace, solution).converged;
       double difference = 0.0;
       double size = 0.0;
       for (size_t i = 0; i < impulses->solution.v.size(); ++i) {
         difference =
-            std::max(difference, std::abs(ValueOf(solution.v[i]) - impulses->solution.v[i]));
+            std::max(difference, std::abs(ValueOf(solution->v[i]) - impulses->solution.v[i]));
         size = std::max(size, std::abs(impulses->solution.v[i]));
       }
       // Where impulses are not unique, or it stalls, the modes that the step found are eliminated.
       if (converged && difference <= 1e-9 * size) {
-        SetTwists(solution.v, state);
         return;
       }
     }
     Solve(problem, impulses->problem, impulses->solution,
-          SlidingSigns(impulses->problem, impulses->solution), &impulses->system, &solution);
-    SetTwists(solution.v, state);
+          SlidingSigns(impulses->problem, impulses->solution), &impulses->system, solution);
   }
 
   // Accelerations at a state with the segment's modes.
@@ -424,6 +447,7 @@ class EventReplay {
   const ModelStructure& s_;
   const JetRoute route_;
   EventDerivative& derivative_;
+  std::vector<T> compression_;  // normal impulses of the last impact
 };
 
 }  // namespace

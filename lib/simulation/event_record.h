@@ -22,7 +22,8 @@ struct SolvedNode {
 };
 
 /// An instantaneous change of twists: an impact or a projection of twists, as a step with h = 0;
-/// or, where accelerations have no solution, impulses of a very short step.
+/// or, where accelerations have no solution, impulses of a very short step. By Poisson's law an
+/// impact is two parts of the record, its compression and then its decompression.
 struct Impulses {
   double time = 0.0;
   double h = 0.0;
@@ -33,6 +34,8 @@ struct Impulses {
   ContactProblem<double> problem;
   ContactSolution<double> solution;
   ContactSystem system;
+  bool decompression = false;   ///< of the impulses that the part before has found
+  std::vector<int> compressed;  ///< decompression: the place of each contact in that part
 
   SolvedStep View() const;
 };

@@ -14,32 +14,6 @@ constexpr double kForcedSlip = 1e4;
 // Beyond this many times max_events_per_step a step is given up.
 constexpr int kGiveUp = 3;
 
-ContactSolverOptions OptionsOf(const SimulationSettings& settings) {
-  ContactSolverOptions options;
-  options.tolerance = settings.lcp_tolerance;
-  options.max_iterations = settings.lcp_max_iterations;
-  options.choice = settings.solver == SolverChoice::kInteriorPoint
-                       ? ContactSolverChoice::kInteriorPoint
-                   : settings.solver == SolverChoice::kLemke ? ContactSolverChoice::kLemke
-                                                             : ContactSolverChoice::kAuto;
-  return options;
-}
-
-void Count(const ContactSolverReport& solved, EventOutcome* outcome) {
-  outcome->factorisations += solved.factorisations;
-  outcome->iterations += solved.iterations;
-  outcome->residual = std::max(outcome->residual, solved.solved ? solved.residual : 0.0);
-  outcome->by_guess = outcome->by_guess && solved.solved_by != SolvedBy::kInteriorPoint &&
-                      solved.solved_by != SolvedBy::kLemke;
-  outcome->by_lemke = outcome->by_lemke || solved.solved_by == SolvedBy::kLemke;
-}
-
-std::string NameOf(const ModelStructure& structure, const ActiveContact& contact) {
-  return contact.joint >= 0 ? "limit of joint " + structure.joints[contact.joint].name
-                            : "contact of " + structure.bodies[contact.a].name + " and " +
-                                  structure.bodies[contact.b].name;
-}
-
 double KineticEnergy(const Model<double>& model, const std::vector<double>& twist) {
   double energy = 0.0;
   for (const int body : model.structure->moving) {
@@ -97,6 +71,37 @@ std::vector<Edge> EdgesWithin(const Model<double>& model, double from, double to
 }
 
 }  // namespace
+
+ContactSolverOptions SolverOptionsOf(const SimulationSettings& settings) {
+  ContactSolverOptions options;
+  options.tolerance = settings.lcp_tolerance;
+  options.max_iterations = settings.lcp_max_iterations;
+  options.choice = settings.solver == SolverChoice::kInteriorPoint
+                       ? ContactSolverChoice::kInteriorPoint
+                   : settings.solver == SolverChoice::kLemke ? ContactSolverChoice::kLemke
+                                                             : ContactSolverChoice::kAuto;
+  return options;
+}
+
+void CountSolve(const ContactSolverReport& solved, EventOutcome* outcome) {
+  outcome->factorisations += solved.factorisations;
+  outcome->iterations += solved.iterations;
+  outcome->residual = std::max(outcome->residual, solved.solved ? solved.residual : 0.0);
+  outcome->by_guess = outcome->by_guess && solved.solved_by != SolvedBy::kInteriorPoint &&
+                      solved.solved_by != SolvedBy::kLemke;
+  outcome->by_lemke = outcome->by_lemke || solved.solved_by == SolvedBy::kLemke;
+}
+
+std::string NameOfContact(const ModelStructure& structure,
+                          const std::vector<ActiveContact>& contacts, int index) {
+  if (index < 0) {
+    return "joints";
+  }
+  const ActiveContact& contact = contacts[index];
+  return contact.joint >= 0 ? "limit of joint " + structure.joints[contact.joint].name
+                            : "contact of " + structure.bodies[contact.a].name + " and " +
+                                  structure.bodies[contact.b].name;
+}
 
 EventStepper::EventStepper(const Model<double>& model) : search_(model) {}
 
@@ -178,6 +183,7 @@ ContactMode EventStepper::GuessOf(const ActiveContact& contact) const {
 bool EventStepper::SolveImpacts(const Model<double>& model, double t, State<double>* state,
                                 EventOutcome* outcome) {
   const SimulationSettings& settings = model.structure->settings;
+  const bool newton = settings.impact_law == ImpactLaw::kNewton;
   for (int repeat = 0;; ++repeat) {
     FindTouching(model, *state);
     const double slow = search_.SpeedTolerance(model, *state);
@@ -202,10 +208,12 @@ bool EventStepper::SolveImpacts(const Model<double>& model, double t, State<doub
     Impulses& impact = part->impulses;
     impact.time = t;
     impact.h = 0.0;
+    impact.decompression = false;
     impact.before = *state;
     impact.contacts.clear();
     impact.friction.clear();
     impact.restitution.clear();
+    rebounds_.clear();
     for (size_t i = 0; i < touching_.contacts.size(); ++i) {
       if (touching_.approach[i] > slow) {
         continue;
@@ -213,7 +221,9 @@ bool EventStepper::SolveImpacts(const Model<double>& model, double t, State<doub
       ActiveContact contact = touching_.contacts[i];
       const bool rebounds = touching_.restitution[i].value > 0.0 && !inelastic_ &&
                             touching_.approach[i] < -settings.restitution_threshold;
-      contact.law = rebounds ? ContactLaw::kRestitution : ContactLaw::kInelastic;
+      // Poisson's law compresses all contacts inelastically first.
+      contact.law = rebounds && newton ? ContactLaw::kRestitution : ContactLaw::kInelastic;
+      rebounds_.push_back(rebounds);
       impact.contacts.push_back(contact);
       impact.friction.push_back(touching_.friction[i]);
       impact.restitution.push_back(touching_.restitution[i]);
@@ -225,21 +235,21 @@ bool EventStepper::SolveImpacts(const Model<double>& model, double t, State<doub
           impact.problem.contacts[i].has_friction ? ContactMode::kSticking : ContactMode::kClosed;
     }
     const ContactSolverReport solved =
-        solver_.Solve(impact.problem, OptionsOf(settings), &impact.solution);
-    Count(solved, outcome);
+        solver_.Solve(impact.problem, SolverOptionsOf(settings), &impact.solution);
+    CountSolve(solved, outcome);
     if (!solved.solved) {
       outcome->residual = solved.residual;
       outcome->message =
-          "impact: " + (solved.worst_contact >= 0
-                            ? NameOf(*model.structure, impact.contacts[solved.worst_contact])
-                            : std::string("joints"));
+          "impact: " + NameOfContact(*model.structure, impact.contacts, solved.worst_contact);
       return false;
     }
     solver_.system().MoveFactorsTo(&impact.system);
-    impact.new_twist = state->twist;
     const double before = KineticEnergy(model, state->twist);
     SpreadTwists(*model.structure, impact.solution.v, &state->twist);
     impact.new_twist = state->twist;
+    if (!newton && !Decompress(model, impact, state, outcome)) {
+      return false;
+    }
     outcome->impact_energy_gain =
         std::max(outcome->impact_energy_gain, KineticEnergy(model, state->twist) - before);
     if (!Settle(model, impact, state, outcome)) {
@@ -255,22 +265,24 @@ bool EventStepper::SolveByShortStep(const Model<double>& model, double t, double
   Impulses& impulses = part->impulses;
   impulses.time = t;
   impulses.h = kShortStep * dt;
+  impulses.decompression = false;
   impulses.before = *state;
   impulses.contacts = touching_.contacts;
   impulses.friction = touching_.friction;
   impulses.restitution.assign(touching_.contacts.size(), CoefficientSource());
   AssembleImpulses(model, &assembly_, &impulses);
   SizeGuess(impulses.problem, &impulses.solution);
-  const ContactSolverReport solved =
-      solver_.Solve(impulses.problem, OptionsOf(model.structure->settings), &impulses.solution);
-  Count(solved, outcome);
+  const ContactSolverReport solved = solver_.Solve(
+      impulses.problem, SolverOptionsOf(model.structure->settings), &impulses.solution);
+  CountSolve(solved, outcome);
   ++outcome->fallbacks;
   ++outcome->events;
   if (!solved.solved) {
     outcome->residual = solved.residual;
     outcome->message = "accelerations and impulses";
     if (solved.worst_contact >= 0) {
-      outcome->message += ": " + NameOf(*model.structure, impulses.contacts[solved.worst_contact]);
+      outcome->message +=
+          ": " + NameOfContact(*model.structure, impulses.contacts, solved.worst_contact);
     }
     return false;
   }
@@ -328,8 +340,8 @@ bool EventStepper::ChooseModes(const Model<double>& model, double t, double midd
     }
     solution.modes[i] = guess;
   }
-  const ContactSolverReport solved = solver_.Solve(problem, OptionsOf(settings), &solution);
-  Count(solved, outcome);
+  const ContactSolverReport solved = solver_.Solve(problem, SolverOptionsOf(settings), &solution);
+  CountSolve(solved, outcome);
   if (!solved.solved) {
     return false;
   }

@@ -4,8 +4,8 @@
 // Event stepping: a step of [t, t + h] as segments of smooth motion, ended by events that are
 // located in time, and impacts between them.
 //
-//   1. contacts that touch: where one approaches, an impact (Newton's law, no forces) is solved,
-//      until none does
+//   1. contacts that touch: where one approaches, an impact (Newton's law, or Poisson's in two
+//      phases; no forces) is solved, until none does
 //   2. those that neither approach nor separate: accelerations as an LCP say which stay closed, and
 //      whether they stick; where it has no solution (Painlevé) impulses of a very short step
 //   3. with these modes held the motion is integrated up to the earliest event (event_search.h)
@@ -18,6 +18,7 @@
 #include <vector>
 
 #include "tangible/dynamics/contact_search.h"
+#include "tangible/lcp/contact_decompression.h"
 #include "tangible/lcp/contact_solver.h"
 #include "tangible/simulation/event_search.h"
 
@@ -44,6 +45,14 @@ struct EventGuess {
   bool starts = true;  ///< the next step is a run's first
 };
 
+/// The solver's options by a scene's settings.
+ContactSolverOptions SolverOptionsOf(const SimulationSettings& settings);
+/// Adds a solve to what a step reports.
+void CountSolve(const ContactSolverReport& solved, EventOutcome* outcome);
+/// "contact of ball and floor", "limit of joint hinge"; index −1: "joints".
+std::string NameOfContact(const ModelStructure& structure,
+                          const std::vector<ActiveContact>& contacts, int index);
+
 class EventStepper {
  public:
   explicit EventStepper(const Model<double>& model);
@@ -66,6 +75,10 @@ class EventStepper {
   void FindTouching(const Model<double>& model, const State<double>& state);
   bool SolveImpacts(const Model<double>& model, double t, State<double>* state,
                     EventOutcome* outcome);
+  /// Poisson's law: after the compression each contact that rebounds pushes with at least e times
+  /// the impulse of its compression (event_decompression.cc).
+  bool Decompress(const Model<double>& model, const Impulses& compression, State<double>* state,
+                  EventOutcome* outcome);
   bool ChooseModes(const Model<double>& model, double t, double middle, double length,
                    State<double>* state, EventOutcome* outcome, Segment* segment);
   bool AddInstant(const Model<double>& model, double t, EventKind kind,
@@ -87,6 +100,8 @@ class EventStepper {
   AssemblyScratch<double> assembly_;
   AccelerationScratch<double> acceleration_;
   Touching touching_;
+  std::vector<bool> rebounds_;  ///< of the last impact's contacts
+  DecompressionSolver decompression_;
   // The last modes, which are the next guess.
   std::vector<ActiveContact> last_contacts_;
   std::vector<ContactMode> last_modes_;

@@ -137,6 +137,7 @@ class PairTies {
                RelativeSpeed(record_.before, a_, rows.normal_a, b_, rows.normal_b);
       case ContactLaw::kRecovery:
       case ContactLaw::kInelastic:
+      case ContactLaw::kPoisson:
         break;
     }
     return 0.0;

@@ -63,7 +63,8 @@ class ImplicitResidual {
     const int row = 3 * contact_block_[i];
     const double normal = s_.normal_impulse[i];
     AddRowTransposed(c.a, c.normal_a, c.b, c.normal_b, normal, momentum->data());
-    Set(row, -c.c_n - RowDot(c.a, c.normal_a, c.b, c.normal_b, v));
+    Set(row,
+        c.driven ? T(c.offset - normal) : T(-c.c_n - RowDot(c.a, c.normal_a, c.b, c.normal_b, v)));
     const T slip = c.c_t + RowDot(c.a, c.tangent_a, c.b, c.tangent_b, v);
     T tangent(s_.tangent_impulse[i]);
     if (s_.modes[i] == ContactMode::kSticking) {

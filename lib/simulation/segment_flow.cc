@@ -261,6 +261,7 @@ bool SegmentFlow::CorrectPoses(const Model<double>& model, Segment* segment, std
 void SetUpProjection(const Segment& segment, const State<double>& state, Impulses* projection) {
   projection->time = segment.time + segment.length;
   projection->h = 0.0;
+  projection->decompression = false;
   projection->before = state;
   projection->contacts = segment.contacts;
   projection->friction = segment.friction;

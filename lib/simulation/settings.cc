@@ -6,22 +6,23 @@
 namespace tangible {
 namespace {
 
-std::string Unavailable(const std::string& key, const std::string& have, const std::string& got) {
-  return "/simulation/" + key + ": expected \"" + have + "\" (the only one available), got \"" +
-         got + "\"";
+// What of fixed stepping goes with one choice only.
+std::string NeedsEvents(const std::string& key, const std::string& have, const std::string& others,
+                        const std::string& got) {
+  return "/simulation/" + key + ": expected \"" + have + "\" with fixed stepping (the " + others +
+         " \"stepping\": \"event\"), got \"" + got + "\"";
 }
 
 }  // namespace
 
 bool CheckSettings(const SimulationSettings& settings, std::string* error) {
-  if (settings.stepping == Stepping::kFixed &&
-      settings.integrator != Integrator::kSemiImplicitEuler) {
-    *error =
-        "/simulation/integrator: expected \"semi_implicit_euler\" with fixed stepping (the "
-        "others need \"stepping\": \"event\"), got \"" +
-        std::string(NameOf(settings.integrator, kIntegratorNames)) + "\"";
-  } else if (settings.impact_law != ImpactLaw::kNewton) {
-    *error = Unavailable("impact_law", "newton", NameOf(settings.impact_law, kImpactLawNames));
+  const bool fixed = settings.stepping == Stepping::kFixed;
+  if (fixed && settings.integrator != Integrator::kSemiImplicitEuler) {
+    *error = NeedsEvents("integrator", "semi_implicit_euler", "others need",
+                         NameOf(settings.integrator, kIntegratorNames));
+  } else if (fixed && settings.impact_law != ImpactLaw::kNewton) {
+    *error = NeedsEvents("impact_law", "newton", "other needs",
+                         NameOf(settings.impact_law, kImpactLawNames));
   } else {
     return true;
   }

@@ -54,6 +54,18 @@ TEST(ContactConditioningTest, ConditionOfOneContactIsThatByHandWhateverTheMass) 
   }
 }
 
+TEST(ContactConditioningTest, ADrivenContactHasOnlyItsTangentRow) {
+  ContactProblem<double> problem = Box(1);
+  for (ContactBlock<double>& contact : problem.contacts) contact.driven = true;
+  const auto count = [&](ContactMode mode) { return CountRedundantRows(problem, {mode, mode}); };
+  EXPECT_EQ(count(ContactMode::kClosed), 0);
+  EXPECT_EQ(count(ContactMode::kSticking), 1);
+  // Two equal normal rows are redundant, two impulses that are given are not.
+  problem.contacts[1] = problem.contacts[0];
+  EXPECT_EQ(count(ContactMode::kClosed), 0);
+  EXPECT_NEAR(Measure(problem, ContactMode::kClosed).condition, 1.0, 1e-14);
+}
+
 TEST(ContactConditioningTest, NearlyParallelRowsAreIllConditionedNotRedundant) {
   ContactProblem<double> problem = testing::FreeBodies({0.0, -1.0, 0.0});
   problem.contacts = {FloorContact(0, -1e-4, 0.0, 0.0), FloorContact(0, 1e-4, 0.0, 0.0)};

@@ -138,7 +138,11 @@ inline MatrixX<double> DenseSystem(const ContactProblem<double>& p,
     const ContactBlock<double>& c = p.contacts[i];
     const Eigen::RowVectorXd n = dense(c.a, c.normal_a, c.b, c.normal_b);
     const Eigen::RowVectorXd t = dense(c.a, c.tangent_a, c.b, c.tangent_b);
-    K.row(at) += n;
+    if (c.driven) {
+      K(at, at) = 1.0;
+    } else {
+      K.row(at) += n;
+    }
     K.col(at) -= (n - SlidingSign(modes[i]) * c.friction * t).transpose();
     if (modes[i] == ContactMode::kSticking) {
       K.row(at + 1) += t;

@@ -92,6 +92,37 @@ TEST(ContactResidualTest, DegenerateAreThoseAtTheBorderOfTwoModes) {
   EXPECT_EQ(degenerate(Solved(-0.6, -1.0, 0.5, ContactMode::kSlidingNegative, 1.0, 0.5)), none);
 }
 
+/// The same of a decompression with a least impulse.
+Case Offset(Case c, double offset, bool driven) {
+  c.problem.contacts[0].offset = offset;
+  c.problem.contacts[0].driven = driven;
+  return c;
+}
+
+TEST(ContactResidualTest, AnOffsetShiftsTheNormalImpulse) {
+  const Case driven = Offset(Solved(0.0, 0.25, 0.0, ContactMode::kClosed, 0.75, 0.0), 0.75, true);
+  const Case closed = Offset(Solved(0.0, -1.0, 0.0, ContactMode::kClosed, 1.0, 0.0), 0.75, false);
+  const Case between = Offset(Solved(0.0, -0.75, 0.0, ContactMode::kClosed, 0.75, 0.0), 0.75, true);
+  int worst;
+  std::vector<int> found;
+  for (const Case* c : {&driven, &closed, &between}) {
+    EXPECT_LT(ResidualOf(*c, &worst), 1e-15);
+    FindDegenerateContacts(c->problem, c->solution, 1e-9, &found);
+    EXPECT_EQ(found.size(), c == &between ? 1u : 0u);
+  }
+  // It pushes less than it must: 0.25 of an impulse of 1.
+  EXPECT_NEAR(
+      ResidualOf(Offset(Solved(0.0, -1.0, 0.0, ContactMode::kClosed, 1.0, 0.0), 1.25, false),
+                 &worst),
+      0.25, 1e-15);
+  const ContactMargin closing = MarginOfContact(driven.problem, driven.solution, 0);
+  EXPECT_NEAR(closing.value, 1.0, 1e-15);  // of its own speed
+  EXPECT_EQ(closing.kind, Kind::kClosing);
+  const ContactMargin opening = MarginOfContact(closed.problem, closed.solution, 0);
+  EXPECT_NEAR(opening.value, 0.25, 1e-15);
+  EXPECT_EQ(opening.kind, Kind::kOpening);
+}
+
 TEST(ContactResidualTest, MarginsAreThoseOfTheNearestMode) {
   const auto expect = [](const Case& c, double value, Kind kind) {
     const ContactMargin margin = MarginOfContact(c.problem, c.solution, 0);

@@ -30,8 +30,10 @@ RowMatrixXd RightHandSide(const MatrixX<double>& K) {
   RowMatrixXd rhs = RowMatrixXd::Random(K.rows(), 2);
   for (int i = 0; i < K.rows(); ++i) {
     VectorX<double> row = K.row(i);
+    VectorX<double> column = K.col(i);
     row[i] -= 1.0;
-    if (row.norm() == 0.0) rhs.row(i).setZero();
+    column[i] -= 1.0;
+    if (row.norm() == 0.0 && column.norm() == 0.0) rhs.row(i).setZero();
   }
   return rhs;
 }
@@ -40,7 +42,8 @@ TEST(ContactSystemTest, SolvesAsTheDenseMatrixForwardAndTransposed) {
   std::mt19937_64 random(5);
   double largest_difference = 0.0;
   for (int trial = 0; trial < 60; ++trial) {
-    const ContactProblem<double> p = testing::RandomContactProblem(&random, 4 + trial % 3, 4);
+    ContactProblem<double> p = testing::RandomContactProblem(&random, 4 + trial % 3, 4);
+    for (ContactBlock<double>& contact : p.contacts) contact.driven = random() % 3 == 0;
     const std::vector<ContactMode> modes = RandomModes(p, &random);
     const MatrixX<double> K = DenseSystem(p, modes);
     const Eigen::FullPivLU<MatrixX<double>> lu(K);
@@ -64,8 +67,12 @@ TEST(ContactSystemTest, SolvesAsTheDenseMatrixForwardAndTransposed) {
 
 TEST(ContactSystemTest, ResidualIsThatOfTheDenseMatrix) {
   std::mt19937_64 random(6);
-  const ContactProblem<double> p = testing::RandomContactProblem(&random, 5, 6);
-  const std::vector<ContactMode> modes = RandomModes(p, &random);
+  ContactProblem<double> p = testing::RandomContactProblem(&random, 5, 6);
+  std::vector<ContactMode> modes = RandomModes(p, &random);
+  // One that sticks and one that slides, driven.
+  p.contacts[1].driven = p.contacts[2].driven = true;
+  modes[1] = ContactMode::kSticking;
+  modes[2] = ContactMode::kSlidingNegative;
   const MatrixX<double> K = DenseSystem(p, modes);
   ContactSystem system;
   system.Factor(p, modes);

@@ -264,7 +264,11 @@ TEST_F(TangibleSimulateTest, BadInputIsOneLine) {
   ExpectOneLine(Simulate(R"({"bodies": [], "simulation": {"integrator": "runge_kutta_4"}})"), 1,
                 "scene.json: /simulation/integrator: ");
   ExpectOneLine(Simulate(R"({"bodies": [], "simulation": {"impact_law": "poisson"}})"), 1,
-                "scene.json: /simulation/impact_law: ");
+                "scene.json: /simulation/impact_law: expected \"newton\" with fixed stepping");
+  EXPECT_EQ(Simulate(R"({"bodies": [], "simulation": {"impact_law": "poisson",
+                         "stepping": "event", "duration": 0.02}})")
+                .exit_status,
+            0);
   ExpectOneLine(Simulate(kFall, "--out=/nonexistent/t.csv"), 1, "/nonexistent/t.csv");
   ExpectOneLine(Simulate(kFall, "--view=/nonexistent/v.html"), 1, "/nonexistent/v.html");
   Write("i.csv", "time,body,x,y,angle,vx,vy,omega\n0,wall,0,0,0,0,0,0\n");

@@ -44,7 +44,7 @@ auto KeyOf(const ContactTrace& trace) {
 
 bool SameChoice(const ContactTrace& x, const ContactTrace& y, FrictionAtZero friction) {
   if (KeyOf(x) != KeyOf(y) || x.contact.law != y.contact.law || x.friction_tie != y.friction_tie ||
-      x.restitution_tie != y.restitution_tie) {
+      x.restitution_tie != y.restitution_tie || x.driven != y.driven) {
     return false;
   }
   // From friction 0 a contact goes on sliding; one that would stick has a kink there.
@@ -63,20 +63,21 @@ class PartTrace {
     trace->step_of.push_back(step);
   }
 
-  void Add(const ActiveContact& contact, ContactMode mode, bool friction_tie,
-           bool restitution_tie) {
+  void Add(const ActiveContact& contact, ContactMode mode, bool friction_tie, bool restitution_tie,
+           bool driven = false) {
     if (mode == ContactMode::kOpen) {
       return;
     }
     // Of what the equations depend on.
     friction_tie = friction_tie && mode != ContactMode::kSticking;
-    restitution_tie = restitution_tie && contact.law == ContactLaw::kRestitution;
-    part_.push_back({contact, mode, friction_tie, restitution_tie});
+    const bool rebounds = contact.law == ContactLaw::kRestitution || driven;
+    restitution_tie = restitution_tie && rebounds;
+    part_.push_back({contact, mode, friction_tie, restitution_tie, driven});
     ++trace_.closed;
     trace_.sliding += SlidingSign(mode) != 0.0 ? 1 : 0;
     trace_.sticking += mode == ContactMode::kSticking ? 1 : 0;
     trace_.limits += contact.joint >= 0 ? 1 : 0;
-    trace_.impacts += contact.law == ContactLaw::kRestitution ? 1 : 0;
+    trace_.impacts += rebounds ? 1 : 0;
     trace_.recoveries += contact.law == ContactLaw::kRecovery ? 1 : 0;
     trace_.friction_tie = trace_.friction_tie || friction_tie;
     trace_.restitution_tie = trace_.restitution_tie || restitution_tie;
@@ -112,7 +113,7 @@ void TraceImpulses(const Record& record, long step, RunTrace* trace) {
   PartTrace part(step, trace);
   for (size_t i = 0; i < record.contacts.size(); ++i) {
     part.Add(record.contacts[i], record.solution.modes[i], record.friction[i].tie,
-             record.restitution[i].tie);
+             record.restitution[i].tie, record.problem.contacts[i].driven);
   }
   part.Finish();
   AddDegenerate(record.problem, record.solution, trace);
@@ -149,7 +150,7 @@ void TraceStep(Stepper* stepper, long step, RunTrace* trace) {
 }
 
 std::string Describe(const RunTrace& run, const ContactTrace& trace) {
-  static const char* const kLaws[] = {"gap", "recovery", "restitution", "inelastic"};
+  static const char* const kLaws[] = {"gap", "recovery", "restitution", "inelastic", "poisson"};
   static const char* const kEvents[] = {"end of the step", "edge of a force's window", "touch",
                                         "end of sliding",  "start of sliding",         "lift-off"};
   if (trace.event == EventKind::kEdge) {
@@ -166,6 +167,7 @@ std::string Describe(const RunTrace& run, const ContactTrace& trace) {
             std::to_string(trace.contact.feature.a) + ":" +
             std::to_string(trace.contact.feature.b) + ")";
   }
+  text += trace.driven ? " driven" : "";
   if (trace.friction_tie || trace.restitution_tie) {
     text += " at a tie of the mixing rule";
   }

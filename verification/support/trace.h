@@ -17,6 +17,7 @@ struct ContactTrace {
   ActiveContact contact;
   ContactMode mode = ContactMode::kOpen;
   bool friction_tie = false, restitution_tie = false;  ///< at a kink of the mixing rule
+  bool driven = false;  ///< by Poisson's law, in decompression: pushed by e times its compression
   /// Event stepping: not a closed contact but what ended a segment there.
   EventKind event = EventKind::kStepEnd;
 };

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "sliding_box.h"
+#include "tangible/scene/scene_json.h"
 
 namespace tangible {
 namespace {
@@ -41,6 +42,37 @@ TEST(TraceTest, TheFirstDifferenceNamesStepContactAndModes) {
   EXPECT_NE(text.find("became contact of box and floor closed"), std::string::npos) << text;
   EXPECT_EQ(text.rfind("step 0: ", 0), 0u) << text;
   EXPECT_EQ(FirstDifference(slides, slides, FrictionAtZero::kDistinct), "");
+}
+
+TEST(TraceTest, ADrivenContactIsAnotherChoiceThanAClosedOne) {
+  // A disc touches both walls of a groove at once; with little restitution the right one stays
+  // closed.
+  const auto trace = [](const char* right) {
+    Scene scene;
+    std::string error;
+    EXPECT_TRUE(ParseScene(R"({"bodies": [
+      {"name": "disc", "shape": {"circle": {"radius": 0.1}}, "mass": 1.3, "position": [0, 0.4]},
+      {"name": "left", "static": true,
+       "shape": {"half_plane": {"normal": [0.86602540378443865, 0.5], "offset": 0}}},
+      {"name": "right", "static": true,
+       "shape": {"half_plane": {"normal": [-0.86602540378443865, 0.5], "offset": 0}}}],
+    "pairs": [{"bodies": ["disc", "left"], "restitution": 0.9},
+              {"bodies": ["disc", "right"], "restitution": )" +
+                               std::string(right) + R"(}],
+    "simulation": {"stepping": "event", "impact_law": "poisson", "duration": 0.23}})",
+                           "groove.json", ".", &scene, &error))
+        << error;
+    return TraceRun(scene);
+  };
+  const RunTrace closed = trace("0.1");
+  const RunTrace both = trace("0.8");
+  EXPECT_EQ(closed.impacts, 1);
+  EXPECT_EQ(both.impacts, 2);
+  EXPECT_TRUE(SameChoices(both, trace("0.75"), FrictionAtZero::kDistinct));
+  const std::string text = FirstDifference(closed, both, FrictionAtZero::kDistinct);
+  EXPECT_NE(text.find("became contact of disc and right closed (law poisson"), std::string::npos)
+      << text;
+  EXPECT_NE(text.rfind(" driven"), std::string::npos) << text;
 }
 
 }  // namespace
