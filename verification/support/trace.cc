@@ -124,7 +124,9 @@ void TraceSegment(const Segment& segment, long step, RunTrace* trace) {
     part.Add(segment.contacts[i], segment.modes[i], segment.friction[i].tie, false);
   }
   if (segment.event != EventKind::kStepEnd) {
-    part.AddEvent(segment.event, segment.event_contact);
+    // The edge of a force's window has no contact: the record keeps that of an earlier segment.
+    const bool of_contact = segment.event != EventKind::kEdge;
+    part.AddEvent(segment.event, of_contact ? segment.event_contact : ActiveContact());
   }
   part.Finish();
   for (int k = 0; k < segment.num_stages; ++k) {
