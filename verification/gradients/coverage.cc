@@ -16,29 +16,11 @@ std::string PairName(ShapeType a, ShapeType b) {
   return "contact " + NameOf(a, kShapeTypeNames) + ", " + NameOf(b, kShapeTypeNames);
 }
 
-const char* EventName(EventKind event) {
-  switch (event) {
-    case EventKind::kEdge:
-      return "edge of a force's window";
-    case EventKind::kTouch:
-      return "touch";
-    case EventKind::kSlipEnds:
-      return "end of sliding";
-    case EventKind::kSlipBegins:
-      return "start of sliding";
-    case EventKind::kLiftOff:
-      return "lift-off";
-    case EventKind::kStepEnd:
-      break;
-  }
-  return "";
-}
-
 void CoverContacts(const Scene& scene, const RunTrace& run, Coverage* coverage) {
   for (const std::vector<ContactTrace>& step : run.steps) {
     for (const ContactTrace& trace : step) {
       if (trace.event != EventKind::kStepEnd) {
-        (*coverage)[std::string("event: ") + EventName(trace.event)] = 1;
+        (*coverage)[std::string("event: ") + NameOf(trace.event)] = 1;
         continue;
       }
       const ActiveContact& c = trace.contact;

@@ -152,13 +152,11 @@ void TraceStep(Stepper* stepper, long step, RunTrace* trace) {
 
 std::string Describe(const RunTrace& run, const ContactTrace& trace) {
   static const char* const kLaws[] = {"gap", "recovery", "restitution", "inelastic"};
-  static const char* const kEvents[] = {"end of the step", "edge of a force's window", "touch",
-                                        "end of sliding",  "start of sliding",         "lift-off"};
   if (trace.event == EventKind::kEdge) {
-    return kEvents[static_cast<int>(trace.event)];
+    return NameOf(trace.event);
   }
   if (trace.event != EventKind::kStepEnd) {
-    return std::string(kEvents[static_cast<int>(trace.event)]) + " of the " +
+    return std::string(NameOf(trace.event)) + " of the " +
            ContactName(*run.structure, trace.contact);
   }
   std::string text = ContactName(*run.structure, trace.contact) + " " + ModeName(trace.mode);
