@@ -4,7 +4,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <cstdio>
 
 #include "../support/scenes.h"
 #include "tangible/simulation/invariants.h"
@@ -97,30 +96,6 @@ TEST(EventStepTest, ABoxThatRocksComesToRest) {
     EXPECT_NEAR(run.final.pose[1], 0.15, 1e-10);
     EXPECT_NEAR(run.final.pose[2], 0.0, 1e-9);
     EXPECT_NEAR(run.final.twist[2], 0.0, 1e-9);
-  }
-}
-
-// Without gravity no force presses the box to the slope that it slides along: what is left of
-// forces is rounding, whose changes of sign are no events.
-TEST(EventStepTest, ABoxThatCoastsAlongASlopeHasNoEvents) {
-  for (const double depth : {0.0, 1e-9, 0.004}) {
-    const double c = std::cos(0.3);
-    const double s = std::sin(0.3);
-    const auto text = [](double x) {
-      char digits[40];
-      std::snprintf(digits, sizeof(digits), "%.17g", x);
-      return std::string(digits);
-    };
-    const double away = 0.1 - depth;
-    const Rolled run = Simulate(R"({"gravity": [0, 0], "bodies": [{"name": "box",
-        "shape": {"box": {"size": [0.4, 0.2]}}, "mass": 1, "angle": 0.3, "position": [)" +
-                                text(-s * away) + ", " + text(c * away) + R"(], "velocity": [)" +
-                                text(1.3 * c) + ", " + text(1.3 * s) + R"(]},
-      {"name": "floor", "static": true, "angle": 0.3,
-       "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}}], )" +
-                                Settings("trapezoidal", 0.2) + "}");
-    EXPECT_LE(run.report.events, 1) << depth;
-    EXPECT_NEAR(run.final.twist[0], 1.3 * c, 1e-12) << depth;
   }
 }
 

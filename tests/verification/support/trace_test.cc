@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "sliding_box.h"
+#include "tangible/verification/support/random_scene.h"
 
 namespace tangible {
 namespace {
@@ -41,6 +42,19 @@ TEST(TraceTest, TheFirstDifferenceNamesStepContactAndModes) {
   EXPECT_NE(text.find("became contact of box and floor closed"), std::string::npos) << text;
   EXPECT_EQ(text.rfind("step 0: ", 0), 0u) << text;
   EXPECT_EQ(FirstDifference(slides, slides, FrictionAtZero::kDistinct), "");
+}
+
+// Without gravity bodies coast along a slope: what is left of forces is rounding, whose changes of
+// sign once ended segments without end.
+TEST(TraceTest, ForcesThatAreRoundingAreNoEvents) {
+  RandomSceneOptions options;
+  options.stepping = Stepping::kEvent;
+  Scene scene = RandomScene(8, options);
+  ASSERT_TRUE(scene.gravity.isZero());
+  scene.bodies[0].position.y() -= 1e-9;
+  const RunTrace trace = TraceRun(scene);
+  EXPECT_TRUE(trace.done) << trace.message;
+  EXPECT_GT(trace.closed, 10);
 }
 
 }  // namespace
