@@ -39,7 +39,12 @@ class GradientVisitor : private internal::LocalEntries<EntryListSink> {
     if (contact.joint >= 0) {
       JointRows<LocalJet> rows;
       LocalJointRows(s_.joints[contact.joint], &locals, &rows);
-      Speed(contact, locals, rows.coordinate_a, rows.coordinate_b);
+      RowPart<LocalJet> opens_a, opens_b;
+      for (int i = 0; i < 3; ++i) {
+        opens_a[i] = contact.side * rows.coordinate_a[i];
+        opens_b[i] = contact.side * rows.coordinate_b[i];
+      }
+      Speed(contact, locals, opens_a, opens_b);
       return;
     }
     ContactRows<LocalJet> rows;

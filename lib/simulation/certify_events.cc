@@ -7,9 +7,9 @@
 #include <cmath>
 
 #include "tangible/dynamics/contact_gradient.h"
-#include "tangible/geometry/broad_phase.h"
 #include "tangible/lcp/contact_conditioning.h"
 #include "tangible/simulation/certify_place_inl.h"
+#include "tangible/simulation/event_search.h"
 #include "tangible/simulation/rollout_directional.h"
 #include "tangible/simulation/segment_flow.h"
 
@@ -18,21 +18,6 @@ namespace {
 
 // m or rad; a gap of this size is more than rounding: the contact does not just touch.
 constexpr double kTouching = 1e-9;
-
-const char* EventName(EventKind kind) {
-  switch (kind) {
-    case EventKind::kTouch:
-      return "touching";
-    case EventKind::kSlipEnds:
-      return "end of sliding";
-    case EventKind::kSlipBegins:
-      return "start of sliding";
-    case EventKind::kLiftOff:
-      return "lift-off";
-    default:
-      return "";
-  }
-}
 
 // Bodies that an impact's impulses move, with those joined to them: one by one until none is added.
 std::vector<bool> Struck(const ModelStructure& s, const Impulses& impact) {
@@ -75,38 +60,6 @@ bool Moves(const std::vector<JacobianEntry>& gradient, const RowMatrixXd& direct
     terms += std::abs(term);
   }
   return std::abs(rate) > kUnmoved * terms;
-}
-
-// Contacts that only touch: within rounding of a gap of 0.
-void FindTouching(const Model<double>& model, const State<double>& state,
-                  std::vector<ActiveContact>* contacts) {
-  constexpr double kReach = 1e-10;  // m
-  const ModelStructure& s = *model.structure;
-  std::vector<Aabb> boxes;
-  boxes.reserve(s.bodies.size());
-  for (int body = 0; body < s.num_bodies(); ++body) {
-    boxes.push_back(ComputeAabb(model.Shape(body), state.PoseOf(body), kReach));
-  }
-  std::vector<std::pair<int, int>> pairs;
-  BroadPhase().FindPairs(
-      boxes, [&](int i, int j) { return s.MayCollide(i, j); }, &pairs);
-  for (const auto& [a, b] : pairs) {
-    ContactFeature features[2];
-    const int count = FindContactFeatures(model.Shape(a), state.PoseOf(a), model.Shape(b),
-                                          state.PoseOf(b), kReach, features);
-    for (int k = 0; k < count; ++k) {
-      ActiveContact contact;
-      contact.a = a;
-      contact.b = b;
-      contact.feature = features[k];
-      ContactRows<double> rows;
-      EvaluateContactRows(model, state, contact, &rows);
-      contact.gap = rows.geometry.gap;
-      if (std::abs(contact.gap) <= kReach) {
-        contacts->push_back(contact);
-      }
-    }
-  }
 }
 
 // Whether a contact neither opens nor approaches.
@@ -309,7 +262,7 @@ void RolloutCertifier::AddSegment(const Model<double>& model, long step,
     const Place place{
         &s, step, segment->time + segment->length, 0, &segment->event_contact, ContactMode::kOpen};
     AddMargin(std::abs(rate) / terms, place,
-              std::string("grazing: rate of the ") + EventName(segment->event));
+              std::string("grazing: rate of the ") + NameOf(segment->event));
   }
   AddQuality(start.problem, segment->modes, &start.system);
 }
@@ -334,12 +287,14 @@ void RolloutCertifier::AddStart(const Model<double>& model, const EventRecord& r
     }
   }
   const size_t loaded = touching.size();
+  constexpr double kRounding = 1e-10;  // of a gap that is 0, m
   std::vector<ActiveContact> unloaded;
   if (start != nullptr) {
-    FindTouching(model, *start, &unloaded);
+    EventSearch(model).FindContacts(model, *start, kRounding, &unloaded);
   }
   for (const ActiveContact& contact : unloaded) {
-    if (std::none_of(touching.begin(), touching.begin() + static_cast<std::ptrdiff_t>(loaded),
+    if (std::abs(contact.gap) <= kRounding &&
+        std::none_of(touching.begin(), touching.begin() + static_cast<std::ptrdiff_t>(loaded),
                      [&](const ActiveContact* other) { return other->SameAs(contact); })) {
       touching.push_back(&contact);
     }

@@ -70,6 +70,24 @@ SolvedStep Impulses::View() const {
   return view;
 }
 
+const char* NameOf(EventKind event) {
+  switch (event) {
+    case EventKind::kStepEnd:
+      return "end of the step";
+    case EventKind::kEdge:
+      return "edge of a force's window";
+    case EventKind::kTouch:
+      return "touch";
+    case EventKind::kSlipEnds:
+      return "end of sliding";
+    case EventKind::kSlipBegins:
+      return "start of sliding";
+    case EventKind::kLiftOff:
+      return "lift-off";
+  }
+  return "";
+}
+
 SolvedAcceleration ViewOf(const Segment& segment, const SolvedNode& node, bool correction) {
   SolvedAcceleration view;
   view.correction = correction;

@@ -49,6 +49,9 @@ enum class EventKind : unsigned char {
   kLiftOff,     ///< a normal force reaches 0
 };
 
+/// "touch", "end of sliding", ...
+const char* NameOf(EventKind event);
+
 /// Smooth motion over [time, time + length] with modes held, then the event that ended it.
 struct Segment {
   double time = 0.0;

@@ -82,6 +82,23 @@ TEST(EventStepTest, AnEndlessSeriesOfBouncesIsCutShortAndCounted) {
   EXPECT_NEAR(zeno.final.pose[1], 0.1, 1e-12);
 }
 
+// It rocks from corner to corner, each time less: without end, were it not held.
+TEST(EventStepTest, ABoxThatRocksComesToRest) {
+  for (const char* integrator : {"trapezoidal", "runge_kutta_4"}) {
+    const Rolled run =
+        Simulate(R"({"bodies": [{"name": "box", "shape": {"box": {"size": [0.15, 0.3]}},
+        "mass": 1, "position": [0, 0.152], "angle": 0.01, "friction": 0.6},
+      {"name": "floor", "static": true, "friction": 0.6,
+       "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}}], )" +
+                 Settings(integrator, 1.0) + "}");
+    EXPECT_GT(run.report.fallbacks, 0);
+    EXPECT_LT(run.report.events, 60);
+    EXPECT_NEAR(run.final.pose[1], 0.15, 1e-10);
+    EXPECT_NEAR(run.final.pose[2], 0.0, 1e-9);
+    EXPECT_NEAR(run.final.twist[2], 0.0, 1e-9);
+  }
+}
+
 TEST(EventStepTest, ASlidingDiscRolls) {
   // v = v0 − μ g t until v = r ω: t = v0 / (3 μ g), v = 2 v0 / 3.
   const Rolled run = Simulate("{" + Ball(0, 2, 0, 0, 0.3) + Settings("trapezoidal", 0.8) + "}");

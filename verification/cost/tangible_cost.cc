@@ -165,6 +165,10 @@ int Main(int argc, char** argv) {
   CostBounds bounds;
   const std::string wrong = CheckFlags(&options, &bounds);
   if (!wrong.empty()) return ReportError("tangible-cost: " + wrong, kExitUsage);
+#if defined(__SANITIZE_ADDRESS__)
+  // The sanitizer's own memory: its shadow, what was freed, room around each block.
+  bounds.long_run_mib += 512.0;
+#endif
   return Run(options, bounds);
 }
 

@@ -19,6 +19,10 @@ std::string PairName(ShapeType a, ShapeType b) {
 void CoverContacts(const Scene& scene, const RunTrace& run, Coverage* coverage) {
   for (const std::vector<ContactTrace>& step : run.steps) {
     for (const ContactTrace& trace : step) {
+      if (trace.event != EventKind::kStepEnd) {
+        (*coverage)[std::string("event: ") + NameOf(trace.event)] = 1;
+        continue;
+      }
       const ActiveContact& c = trace.contact;
       if (c.joint >= 0) {
         (*coverage)["limit of a " + NameOf(scene.joints[c.joint].type, kJointTypeNames)] = 1;
@@ -80,6 +84,8 @@ Coverage CoverageOf(const Scene& scene, const RunTrace& run) {
   const SimulationSettings& settings = scene.simulation;
   const long steps = NumSteps(settings);
   coverage[steps <= 2 ? "steps 1 to 2" : steps <= 40 ? "steps 3 to 40" : "steps 41 to 200"] = 1;
+  coverage["stepping " + NameOf(settings.stepping, kSteppingNames)] = 1;
+  coverage["integrator " + NameOf(settings.integrator, kIntegratorNames)] = 1;
   coverage["joint correction " + NameOf(settings.joint_correction, kJointCorrectionNames)] = 1;
   coverage["mixing of friction " + NameOf(settings.friction_mixing, kMixingNames)] = 1;
   coverage["mixing of restitution " + NameOf(settings.restitution_mixing, kMixingNames)] = 1;

@@ -125,7 +125,9 @@ void TraceSegment(const Segment& segment, long step, RunTrace* trace) {
     part.Add(segment.contacts[i], segment.modes[i], segment.friction[i].tie, false);
   }
   if (segment.event != EventKind::kStepEnd) {
-    part.AddEvent(segment.event, segment.event_contact);
+    // The edge of a force's window has no contact: the record keeps that of an earlier segment.
+    const bool of_contact = segment.event != EventKind::kEdge;
+    part.AddEvent(segment.event, of_contact ? segment.event_contact : ActiveContact());
   }
   part.Finish();
   for (int k = 0; k < segment.num_stages; ++k) {
@@ -151,13 +153,11 @@ void TraceStep(Stepper* stepper, long step, RunTrace* trace) {
 
 std::string Describe(const RunTrace& run, const ContactTrace& trace) {
   static const char* const kLaws[] = {"gap", "recovery", "restitution", "inelastic", "poisson"};
-  static const char* const kEvents[] = {"end of the step", "edge of a force's window", "touch",
-                                        "end of sliding",  "start of sliding",         "lift-off"};
   if (trace.event == EventKind::kEdge) {
-    return kEvents[static_cast<int>(trace.event)];
+    return NameOf(trace.event);
   }
   if (trace.event != EventKind::kStepEnd) {
-    return std::string(kEvents[static_cast<int>(trace.event)]) + " of the " +
+    return std::string(NameOf(trace.event)) + " of the " +
            ContactName(*run.structure, trace.contact);
   }
   std::string text = ContactName(*run.structure, trace.contact) + " " + ModeName(trace.mode);

@@ -92,9 +92,12 @@ void CompareFile(const std::string& file, Maker maker, int at_least) {
     const std::string name = file + ", " + variant["name"].get<std::string>();
     const ClosedForm form = maker(name, inputs);
     const Outcome published = Published(form, variant);
-    compared += ExpectPublished(form, published, Exact(form), 1e-11, name + ", formula");
-    // Without derivatives: on a kink, of which the file has the sides. The engine's value counts.
     const bool smooth = form.kind == Kind::kSmooth;
+    // Smooth forms are integrated numerically, and a double pendulum amplifies how sin and cos
+    // round, which differs between machines (1e-10 of an entry was seen).
+    compared +=
+        ExpectPublished(form, published, Exact(form), smooth ? 1e-9 : 1e-11, name + ", formula");
+    // Without derivatives: on a kink, of which the file has the sides. The engine's value counts.
     const int steps = form.instant > 0.0 ? 1 : smooth ? 2000 : 40;
     const Outcome got = Simulate(form, kRungeKutta, steps, Method::kAdjoint);
     compared += ExpectPublished(form, published, got, smooth ? 1e-8 : 1e-9, name + ", engine");

@@ -29,6 +29,27 @@ TEST(CoverageTest, ASceneCountsWhatItHas) {
   EXPECT_EQ(std::find(missing.begin(), missing.end(), "friction sliding"), missing.end());
 }
 
+// The edge of a force's window is an event of no contact: what it covers is no pair of shapes.
+TEST(CoverageTest, EventsAreNoContacts) {
+  const std::vector<std::string> expected = ExpectedCoverage();
+  RandomSceneOptions options;
+  options.stepping = Stepping::kEvent;
+  options.max_bodies = 3;
+  Coverage sum;
+  for (unsigned seed = 1; seed <= 20; ++seed) {
+    const Scene scene = RandomScene(seed, options);
+    Add(CoverageOf(scene, TraceRun(scene)), &sum);
+  }
+  EXPECT_GT(sum["event: edge of a force's window"], 0);
+  EXPECT_GT(sum["event: touch"], 0);
+  EXPECT_EQ(sum["stepping event"], 20);
+  for (const auto& [what, count] : sum) {
+    if (what.rfind("contact ", 0) == 0) {
+      EXPECT_NE(std::find(expected.begin(), expected.end(), what), expected.end()) << what;
+    }
+  }
+}
+
 TEST(CoverageTest, RandomScenesHaveEverything) {
   Coverage sum;
   for (unsigned seed = 1; seed <= 150; ++seed) {

@@ -5,6 +5,7 @@
 
 #include "sliding_box.h"
 #include "tangible/scene/scene_json.h"
+#include "tangible/verification/support/random_scene.h"
 
 namespace tangible {
 namespace {
@@ -73,6 +74,19 @@ TEST(TraceTest, ADrivenContactIsAnotherChoiceThanAClosedOne) {
   EXPECT_NE(text.find("became contact of disc and right closed (law poisson"), std::string::npos)
       << text;
   EXPECT_NE(text.rfind(" driven"), std::string::npos) << text;
+}
+
+// Without gravity bodies coast along a slope: what is left of forces is rounding, whose changes of
+// sign once ended segments without end.
+TEST(TraceTest, ForcesThatAreRoundingAreNoEvents) {
+  RandomSceneOptions options;
+  options.stepping = Stepping::kEvent;
+  Scene scene = RandomScene(8, options);
+  ASSERT_TRUE(scene.gravity.isZero());
+  scene.bodies[0].position.y() -= 1e-9;
+  const RunTrace trace = TraceRun(scene);
+  EXPECT_TRUE(trace.done) << trace.message;
+  EXPECT_GT(trace.closed, 10);
 }
 
 }  // namespace
