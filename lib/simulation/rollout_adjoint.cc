@@ -168,8 +168,7 @@ void RolloutTape::Take(const Model<double>& model, long remaining) {
   } else {
     stepper_->TakeRecord(&entry.record, nullptr);
     if (by_budget()) {
-      entry.system = ContactSystem();
-      entry.record.problem = ContactProblem<double>();
+      DropFactors(&entry);
     }
   }
   if (Projects(*model.structure)) {
@@ -179,6 +178,34 @@ void RolloutTape::Take(const Model<double>& model, long remaining) {
     *entry.projection = stepper_->projection();
   }
   Count(&entry);
+  if (entry.has_factors) {
+    KeepWithinBudget(&entry);
+  }
+}
+
+// The sweep will factorise anew.
+void RolloutTape::DropFactors(Entry* entry) {
+  entry->has_factors = false;
+  entry->system = ContactSystem();
+  entry->record.problem = ContactProblem<double>();
+}
+
+// A step with more contacts than those before it, or whose factors took memory to solve with.
+void RolloutTape::KeepWithinBudget(Entry* entry) {
+  const auto recount = [&] {
+    const size_t bytes = entry->bytes();
+    used_bytes_ += bytes - entry->counted;
+    entry_bytes_ += bytes - entry->counted;
+    entry->counted = bytes;
+  };
+  if (!by_budget()) {
+    return;
+  }
+  recount();
+  if (held_bytes() > budget()) {
+    DropFactors(entry);
+    recount();
+  }
 }
 
 // Puts an entry's memory into the sums; without checkpoints nobody reads them.
@@ -300,6 +327,7 @@ void RolloutTape::AdjointFrom(const Model<double>& model, long last, int num_los
     }
     if (entry.has_factors) {
       StepAdjoint(model, entry.record, &entry.system, entry.projection.get(), w_bar);
+      KeepWithinBudget(&entry);
     } else {
       std::swap(entry.record.problem, refactored_);
       stepper_->Refactor(model, &entry.record);

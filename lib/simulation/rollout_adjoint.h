@@ -89,6 +89,8 @@ class RolloutTape {
   void RemoveCheckpoints(const std::function<bool(long step, Origin origin)>& which);
   void Take(const Model<double>& model, long remaining);
   bool HasRoomForFactors(long remaining) const;
+  static void DropFactors(Entry* entry);
+  void KeepWithinBudget(Entry* entry);
   void Count(Entry* entry);
   void ReleaseEntries(size_t keep);
   void RunAgain(const Model<double>& model, long last);

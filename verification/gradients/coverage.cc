@@ -86,6 +86,7 @@ Coverage CoverageOf(const Scene& scene, const RunTrace& run) {
   coverage[steps <= 2 ? "steps 1 to 2" : steps <= 40 ? "steps 3 to 40" : "steps 41 to 200"] = 1;
   coverage["stepping " + NameOf(settings.stepping, kSteppingNames)] = 1;
   coverage["integrator " + NameOf(settings.integrator, kIntegratorNames)] = 1;
+  coverage["impact law " + NameOf(settings.impact_law, kImpactLawNames)] = 1;
   coverage["joint correction " + NameOf(settings.joint_correction, kJointCorrectionNames)] = 1;
   coverage["mixing of friction " + NameOf(settings.friction_mixing, kMixingNames)] = 1;
   coverage["mixing of restitution " + NameOf(settings.restitution_mixing, kMixingNames)] = 1;
@@ -122,6 +123,9 @@ std::vector<std::string> ExpectedCoverage() {
   for (const auto& [name, mixing] : kMixingNames) {
     expected.push_back("mixing of friction " + std::string(name));
     expected.push_back("mixing of restitution " + std::string(name));
+  }
+  for (const auto& [name, law] : kImpactLawNames) {
+    expected.push_back("impact law " + std::string(name));
   }
   for (const auto& [name, correction] : kJointCorrectionNames) {
     expected.push_back("joint correction " + std::string(name));

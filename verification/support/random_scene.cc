@@ -73,6 +73,9 @@ Scene SceneMaker::Make() {
     const Integrator integrators[] = {Integrator::kSemiImplicitEuler, Integrator::kTrapezoidal,
                                       Integrator::kRungeKutta4};
     scene_.simulation.integrator = integrators[random_.Integer(0, 2)];
+    if (random_.Chance(0.25)) {
+      scene_.simulation.impact_law = ImpactLaw::kPoisson;
+    }
   }
   return scene_;
 }

@@ -56,6 +56,13 @@ TEST(CoverageTest, RandomScenesHaveEverything) {
     const Scene scene = RandomScene(seed);
     Add(CoverageOf(scene, TraceRun(scene)), &sum);
   }
+  RandomSceneOptions by_events;
+  by_events.stepping = Stepping::kEvent;
+  by_events.max_bodies = 3;
+  for (unsigned seed = 1; seed <= 10; ++seed) {
+    const Scene scene = RandomScene(seed, by_events);
+    Add(CoverageOf(scene, TraceRun(scene)), &sum);
+  }
   for (const std::string& what : MissingCoverage(sum)) ADD_FAILURE() << what;
   // Of two of five shapes, in either order, but for two half-planes.
   const std::vector<std::string> expected = ExpectedCoverage();
