@@ -119,13 +119,13 @@ bool DecompressionSolver::SolveByModeChanges(const ContactSolverOptions& options
     if (!SolveWithModes(*problem, solution, report)) {
       return false;
     }
-    const double scale = ImpulseScale(solution->normal_impulse);
+    scales_.Compute(*problem, *solution);
     bool changed = false;
     for (size_t i = 0; i < problem->contacts.size(); ++i) {
       ContactBlock<double>& contact = problem->contacts[i];
-      const ContactValues values = Evaluate(*problem, contact, solution->v.data());
-      changed = ChangeMode(values, solution->normal_impulse[i], solution->tangent_impulse[i], scale,
-                           &contact, &solution->modes[i]) ||
+      const ContactValues values = Evaluate(*problem, scales_, contact, solution->v.data());
+      changed = ChangeMode(values, solution->normal_impulse[i], solution->tangent_impulse[i],
+                           scales_.impulse, &contact, &solution->modes[i]) ||
                 changed;
     }
     if (!changed) {

@@ -40,6 +40,7 @@ class DecompressionSolver {
 
   ContactSystem system_;
   std::vector<double> start_, left_;
+  ContactScales scales_;
 };
 
 }  // namespace tangible

@@ -26,12 +26,12 @@ RowPart<double> Slanted(const RowPart<double>& n, double factor, const RowPart<d
 }
 
 ContactKink KinkOf(const ContactProblem<double>& problem, const ContactSolution<double>& solution,
-                   size_t i, bool touching, double impulse_scale, double tolerance) {
+                   const ContactScales& scales, size_t i, bool touching, double tolerance) {
   const ContactBlock<double>& c = problem.contacts[i];
   const double* v = solution.v.data();
-  const ContactValues values = Evaluate(problem, c, v);
+  const ContactValues values = Evaluate(problem, scales, c, v);
   const double normal = solution.normal_impulse[i];
-  const double zeta = std::max(impulse_scale, values.sigma_n / values.mobility_n);
+  const double zeta = std::max(scales.impulse, values.sigma_n / values.mobility_n);
   const bool loaded = normal > tolerance * zeta;
   const double along = values.slip > 0.0 ? 1.0 : -1.0;
   if (!loaded) {
@@ -70,10 +70,10 @@ double Mobility(const ContactProblem<double>& problem, const ContactBlock<double
 void FindKinks(const ContactProblem<double>& problem, const ContactSolution<double>& solution,
                const std::vector<bool>& touching, double tolerance,
                std::vector<ContactKink>* kinks) {
-  const double scale = ImpulseScale(solution.normal_impulse);
+  const ContactScales scales(problem, solution);
   kinks->clear();
   for (size_t i = 0; i < problem.contacts.size(); ++i) {
-    kinks->push_back(KinkOf(problem, solution, i, touching[i], scale, tolerance));
+    kinks->push_back(KinkOf(problem, solution, scales, i, touching[i], tolerance));
   }
 }
 

@@ -9,34 +9,20 @@
 namespace tangible {
 namespace {
 
-// The speed scale of a body, m/s: of its solved twist or its free one M⁻¹ p, whichever is larger,
-// rotation at the radius of gyration. Where a body comes to rest the solved one is rounding and
-// says nothing of the speeds that cancelled.
-double BodySpeed(const ContactProblem<double>& problem, int block, double lever, const double* v) {
-  const std::vector<double>& momentum = problem.scale_momentum();
-  double speed = 0.0;
-  for (int i = 0; i < 3; ++i) {
-    const int k = 3 * block + i;
-    const double component = std::max(std::abs(v[k]), std::abs(momentum[k] / problem.mass[k]));
-    speed = std::max(speed, i < 2 ? component : lever * component);
-  }
-  return speed;
+// The slowest scale of a body's speed, of the fastest one's: what is below it times the tolerance
+// that can be asked for, 1e-10, is the fastest one's rounding.
+constexpr double kSlowest = 1e-6;
+
+// The largest component of a row for a body, rotation at the radius of gyration.
+double RowSize(const RowPart<double>& row, double lever) {
+  return std::max({std::abs(row[0]), std::abs(row[1]), std::abs(row[2]) / lever});
 }
 
 // Scale of a row's value: its largest term a body, at the body's speed scale.
-double RowSpeed(const ContactProblem<double>& problem, int a, const RowPart<double>& row_a, int b,
-                const RowPart<double>& row_b, const double* v) {
-  double sum = 0.0;
-  const auto add = [&](int block, const RowPart<double>& row) {
-    if (block >= 0) {
-      const double lever = std::sqrt(problem.mass[3 * block + 2] / problem.mass[3 * block]);
-      sum += BodySpeed(problem, block, lever, v) *
-             std::max({std::abs(row[0]), std::abs(row[1]), std::abs(row[2]) / lever});
-    }
-  };
-  add(a, row_a);
-  add(b, row_b);
-  return sum;
+double RowSpeed(const ContactScales& scales, int a, const RowPart<double>& row_a, int b,
+                const RowPart<double>& row_b) {
+  return (a >= 0 ? scales.speed[a] * RowSize(row_a, scales.lever[a]) : 0.0) +
+         (b >= 0 ? scales.speed[b] * RowSize(row_b, scales.lever[b]) : 0.0);
 }
 
 // |min(z/ζ, s/σ)|, with 0/0 = 0.
@@ -88,14 +74,15 @@ double MomentumResidual(const ContactProblem<double>& problem,
   return scale > 0.0 ? worst / scale : 0.0;
 }
 
-double JointResidual(const ContactProblem<double>& problem, const double* v) {
+double JointResidual(const ContactProblem<double>& problem, const ContactScales& scales,
+                     const double* v) {
   double worst = 0.0;
   double scale = 0.0;
   for (const JointBlock<double>& joint : problem.joints) {
     for (int k = 0; k < joint.rows; ++k) {
       const double value = RowDot(joint.a, joint.row_a[k], joint.b, joint.row_b[k], v);
-      scale = std::max(scale, std::abs(joint.rhs[k]) + RowSpeed(problem, joint.a, joint.row_a[k],
-                                                                joint.b, joint.row_b[k], v));
+      scale = std::max(scale, std::abs(joint.rhs[k]) + RowSpeed(scales, joint.a, joint.row_a[k],
+                                                                joint.b, joint.row_b[k]));
       worst = std::max(worst, std::abs(value - joint.rhs[k]));
     }
   }
@@ -104,17 +91,61 @@ double JointResidual(const ContactProblem<double>& problem, const double* v) {
 
 }  // namespace
 
-ContactValues Evaluate(const ContactProblem<double>& problem, const ContactBlock<double>& c,
-                       const double* v) {
+void ContactScales::Compute(const ContactProblem<double>& problem,
+                            const ContactSolution<double>& solution) {
+  const std::vector<double>& momentum = problem.scale_momentum();
+  const std::vector<double>& mass = problem.mass;
+  speed.assign(problem.num_bodies, 0.0);
+  lever.assign(problem.num_bodies, 0.0);
+  double total = 0.0;
+  double fastest = 0.0;
+  for (int body = 0; body < problem.num_bodies; ++body) {
+    lever[body] = std::sqrt(mass[3 * body + 2] / mass[3 * body]);
+    for (int i = 0; i < 3; ++i) {
+      const int k = 3 * body + i;
+      const double component = std::max(std::abs(solution.v[k]), std::abs(momentum[k] / mass[k]));
+      speed[body] = std::max(speed[body], i < 2 ? component : lever[body] * component);
+    }
+    total += mass[3 * body] * speed[body];
+    fastest = std::max(fastest, speed[body]);
+  }
+  for (double& of_body : speed) {
+    of_body = std::max(of_body, kSlowest * fastest);
+  }
+  const auto push = [&](int body, const RowPart<double>& row, double z) {
+    if (body >= 0) {
+      const double change = std::min(std::abs(z) * RowSize(row, lever[body]), total);
+      speed[body] = std::max(speed[body], change / mass[3 * body]);
+    }
+  };
+  for (size_t j = 0; j < problem.joints.size(); ++j) {
+    const JointBlock<double>& joint = problem.joints[j];
+    for (int k = 0; k < joint.rows; ++k) {
+      push(joint.a, joint.row_a[k], solution.joint_impulse[3 * j + k]);
+      push(joint.b, joint.row_b[k], solution.joint_impulse[3 * j + k]);
+    }
+  }
+  for (size_t i = 0; i < problem.contacts.size(); ++i) {
+    const ContactBlock<double>& c = problem.contacts[i];
+    push(c.a, c.normal_a, solution.normal_impulse[i]);
+    push(c.b, c.normal_b, solution.normal_impulse[i]);
+    push(c.a, c.tangent_a, solution.tangent_impulse[i]);
+    push(c.b, c.tangent_b, solution.tangent_impulse[i]);
+  }
+  impulse = ImpulseScale(solution.normal_impulse);
+}
+
+ContactValues Evaluate(const ContactProblem<double>& problem, const ContactScales& scales,
+                       const ContactBlock<double>& c, const double* v) {
   ContactValues values;
   values.s_n = RowDot(c.a, c.normal_a, c.b, c.normal_b, v) + c.c_n;
-  values.sigma_n = RowSpeed(problem, c.a, c.normal_a, c.b, c.normal_b, v) + std::abs(c.c_n);
+  values.sigma_n = RowSpeed(scales, c.a, c.normal_a, c.b, c.normal_b) + std::abs(c.c_n);
   values.mobility_n = RowMobility(problem.mass, c.a, c.normal_a, c.b, c.normal_b);
   values.slip = values.sigma_t = 0.0;
   values.mobility_t = 1.0;
   if (c.has_friction) {
     values.slip = RowDot(c.a, c.tangent_a, c.b, c.tangent_b, v) + c.c_t;
-    values.sigma_t = RowSpeed(problem, c.a, c.tangent_a, c.b, c.tangent_b, v) + std::abs(c.c_t);
+    values.sigma_t = RowSpeed(scales, c.a, c.tangent_a, c.b, c.tangent_b) + std::abs(c.c_t);
     values.mobility_t = RowMobility(problem.mass, c.a, c.tangent_a, c.b, c.tangent_b);
     // One contact, one scale of speed: an impulse along one row leaves rounding in the other.
     values.sigma_n = values.sigma_t = std::max(values.sigma_n, values.sigma_t);
@@ -133,14 +164,15 @@ double ImpulseScale(const std::vector<double>& impulses) {
 double NaturalResidual(const ContactProblem<double>& problem,
                        const ContactSolution<double>& solution, int* worst_contact) {
   *worst_contact = -1;
-  double worst =
-      std::max(MomentumResidual(problem, solution), JointResidual(problem, solution.v.data()));
-  const double scale = ImpulseScale(solution.normal_impulse);
+  thread_local ContactScales scales;
+  scales.Compute(problem, solution);
+  double worst = std::max(MomentumResidual(problem, solution),
+                          JointResidual(problem, scales, solution.v.data()));
   for (size_t i = 0; i < problem.contacts.size(); ++i) {
     const ContactBlock<double>& c = problem.contacts[i];
-    const ContactValues values = Evaluate(problem, c, solution.v.data());
+    const ContactValues values = Evaluate(problem, scales, c, solution.v.data());
     const double normal = solution.normal_impulse[i];
-    const double zeta = std::max(scale, values.sigma_n / values.mobility_n);
+    const double zeta = std::max(scales.impulse, values.sigma_n / values.mobility_n);
     double residual = RowResidual(normal - c.offset, zeta, values.s_n, values.sigma_n);
     if (c.has_friction) {
       const double limit = c.friction * normal;
@@ -164,12 +196,12 @@ void FindDegenerateContacts(const ContactProblem<double>& problem,
                             const ContactSolution<double>& solution, double tolerance,
                             std::vector<int>* degenerate) {
   degenerate->clear();
-  const double scale = ImpulseScale(solution.normal_impulse);
+  const ContactScales scales(problem, solution);
   for (size_t i = 0; i < problem.contacts.size(); ++i) {
     const ContactBlock<double>& c = problem.contacts[i];
-    const ContactValues values = Evaluate(problem, c, solution.v.data());
+    const ContactValues values = Evaluate(problem, scales, c, solution.v.data());
     const double normal = solution.normal_impulse[i];
-    const double zeta = std::max(scale, values.sigma_n / values.mobility_n);
+    const double zeta = std::max(scales.impulse, values.sigma_n / values.mobility_n);
     const bool grazes =
         std::abs(values.s_n) <= tolerance * values.sigma_n && normal - c.offset <= tolerance * zeta;
     const double zeta_t = std::max(zeta * c.friction, values.sigma_t / values.mobility_t);
@@ -184,10 +216,11 @@ void FindDegenerateContacts(const ContactProblem<double>& problem,
 }
 
 ContactMargin MarginOfContact(const ContactProblem<double>& problem,
-                              const ContactSolution<double>& solution, int contact) {
+                              const ContactSolution<double>& solution, const ContactScales& scales,
+                              int contact) {
   using Kind = ContactMargin::Kind;
   const ContactBlock<double>& c = problem.contacts[contact];
-  const ContactValues values = Evaluate(problem, c, solution.v.data());
+  const ContactValues values = Evaluate(problem, scales, c, solution.v.data());
   const ContactMode mode = solution.modes[contact];
   const double normal = solution.normal_impulse[contact];
   // 0 / 0: nothing moves and nothing pushes.
@@ -195,8 +228,7 @@ ContactMargin MarginOfContact(const ContactProblem<double>& problem,
   if (mode == ContactMode::kOpen) {
     return {ratio(values.s_n, values.sigma_n), Kind::kClosing};
   }
-  const double zeta =
-      std::max(ImpulseScale(solution.normal_impulse), values.sigma_n / values.mobility_n);
+  const double zeta = std::max(scales.impulse, values.sigma_n / values.mobility_n);
   const ContactMargin opening =
       c.driven ? ContactMargin{ratio(values.s_n, values.sigma_n), Kind::kClosing}
                : ContactMargin{ratio(normal - c.offset, zeta), Kind::kOpening};

@@ -10,6 +10,25 @@
 
 namespace tangible {
 
+/// The scales by which a solution's rows are judged: of what size the terms are that cancel in
+/// them.
+struct ContactScales {
+  /// A body's speed, m/s, rotation at the radius of gyration: the largest of its solved twist, its
+  /// free one M⁻¹ p and what one impulse changes it by, M⁻¹ rᵀ λ. A body that is pushed from both
+  /// sides and stays at rest has rounding for the first two. Impulses count up to what the momenta
+  /// of all bodies could bring about: rows that contradict each other have any impulses. At least
+  /// 1e-6 of the fastest body's.
+  std::vector<double> speed;
+  std::vector<double> lever;  ///< a body's radius of gyration, m
+  double impulse = 0.0;       ///< the largest normal impulse, N s
+
+  ContactScales() = default;
+  ContactScales(const ContactProblem<double>& problem, const ContactSolution<double>& solution) {
+    Compute(problem, solution);
+  }
+  void Compute(const ContactProblem<double>& problem, const ContactSolution<double>& solution);
+};
+
 /// What a contact's rows are at a solution, with the scales by which they are judged.
 struct ContactValues {
   double s_n, slip;         // n v + c_n, t v + c_t
@@ -18,8 +37,8 @@ struct ContactValues {
 };
 
 /// Evaluates a contact at the solved speeds v.
-ContactValues Evaluate(const ContactProblem<double>& problem, const ContactBlock<double>& contact,
-                       const double* v);
+ContactValues Evaluate(const ContactProblem<double>& problem, const ContactScales& scales,
+                       const ContactBlock<double>& contact, const double* v);
 
 /// The largest magnitude of a list of impulses.
 double ImpulseScale(const std::vector<double>& impulses);
@@ -50,6 +69,7 @@ struct ContactMargin {
       Kind::kOpening;  ///< what changes: kClosing for an open contact, kOpening for a closed one
 };
 ContactMargin MarginOfContact(const ContactProblem<double>& problem,
-                              const ContactSolution<double>& solution, int contact);
+                              const ContactSolution<double>& solution, const ContactScales& scales,
+                              int contact);
 
 }  // namespace tangible

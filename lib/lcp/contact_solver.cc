@@ -148,6 +148,8 @@ void ContactSolver::Reserve(int num_bodies, int num_joints, int num_contacts) {
     solution->modes.reserve(num_contacts);
   }
   changes_.reserve(num_contacts);
+  scales_.speed.reserve(num_bodies);
+  scales_.lever.reserve(num_bodies);
 }
 
 void ContactSolver::SetCentre(const ContactSolution<double>& solution) {
@@ -236,15 +238,16 @@ bool ContactSolver::SolveByModeChanges(const ContactProblem<double>& problem,
     if (!SolveWithModes(problem, solution, report)) {
       return false;
     }
-    const double scale = ImpulseScale(solution->normal_impulse);
+    scales_.Compute(problem, *solution);
     int contradicted = 0;
     int worst = -1;
     ModeChange worst_change{ContactMode::kOpen};
     for (size_t i = 0; i < num_contacts; ++i) {
-      const ContactValues values = Evaluate(problem, problem.contacts[i], solution->v.data());
+      const ContactValues values =
+          Evaluate(problem, scales_, problem.contacts[i], solution->v.data());
       const ModeChange change =
           Contradiction(problem.contacts[i], values, solution->modes[i],
-                        solution->normal_impulse[i], solution->tangent_impulse[i], scale);
+                        solution->normal_impulse[i], solution->tangent_impulse[i], scales_.impulse);
       if (change.violation == 0.0) {
         continue;
       }
@@ -338,12 +341,13 @@ bool ContactSolver::Polish(const ContactProblem<double>& problem,
       worst = trial_worst;
       break;
     }
-    const double scale = ImpulseScale(trial_.normal_impulse);
+    scales_.Compute(problem, trial_);
     for (size_t i = 0; i < problem.contacts.size(); ++i) {
-      const ContactValues values = Evaluate(problem, problem.contacts[i], trial_.v.data());
-      solution->modes[i] = Contradiction(problem.contacts[i], values, trial_.modes[i],
-                                         trial_.normal_impulse[i], trial_.tangent_impulse[i], scale)
-                               .mode;
+      const ContactValues values = Evaluate(problem, scales_, problem.contacts[i], trial_.v.data());
+      solution->modes[i] =
+          Contradiction(problem.contacts[i], values, trial_.modes[i], trial_.normal_impulse[i],
+                        trial_.tangent_impulse[i], scales_.impulse)
+              .mode;
     }
   }
   report->residual = before;

@@ -93,6 +93,7 @@ class ContactSolver {
   std::vector<double> rhs_, correction_, start_;
   std::vector<double> centre_joint_, centre_normal_, centre_tangent_;
   std::vector<int> changes_;
+  ContactScales scales_;
 };
 
 /// The dense portfolio (solver.h) with its further attempts, on the one-sided form; false where it

@@ -97,9 +97,9 @@ void RolloutCertifier::AddJump(double margin, const Place& place, const std::str
 }
 
 void RolloutCertifier::AddContact(const Model<double>& model, const StepRecord& record,
-                                  const Place& place) {
+                                  const ContactScales& scales, const Place& place) {
   const ContactMargin margin =
-      MarginOfContact(record.problem, record.solution, static_cast<int>(place.contact));
+      MarginOfContact(record.problem, record.solution, scales, static_cast<int>(place.contact));
   const bool slides = SlidingSign(place.mode) != 0.0;
   const bool touches = place.mode == ContactMode::kOpen && JustTouches(record, place.contact);
   // A scaled margin compares a slack with its own terms, which may all be rounding.
@@ -222,11 +222,12 @@ void RolloutCertifier::AddStep(const Model<double>& model, long step, Stepper* s
   const StepRecord& record = stepper->record();
   const ModelStructure& s = *model.structure;
   landing_.clear();
+  const ContactScales scales(record.problem, record.solution);
   std::vector<ActiveContact> closed;
   for (size_t i = 0; i < record.contacts.size(); ++i) {
     const ActiveContact& contact = record.contacts[i];
     const Place place{&s, step, record.time, i, &contact, record.solution.modes[i]};
-    AddContact(model, record, place);
+    AddContact(model, record, scales, place);
     if (place.mode == ContactMode::kOpen) {
       continue;
     }

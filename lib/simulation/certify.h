@@ -63,7 +63,8 @@ class RolloutCertifier {
                   ContactSystem* system);
   void AddUnloaded(const Model<double>& model, long step, const Impulses& impact);
   void AddSimultaneous(const Model<double>& model, long step, const Impulses& impact);
-  void AddContact(const Model<double>& model, const StepRecord& record, const Place& place);
+  void AddContact(const Model<double>& model, const StepRecord& record, const ContactScales& scales,
+                  const Place& place);
   void AddLaw(const Model<double>& model, const StepRecord& record, const Place& place);
   void AddCoefficients(const StepRecord& record, const Place& place);
   void AddFeatures(const Model<double>& model, const StepRecord& record, long step,

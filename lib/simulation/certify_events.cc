@@ -172,6 +172,7 @@ void RolloutCertifier::AddImpact(const Model<double>& model, long step, Impulses
   const double threshold = s.settings.restitution_threshold;
   // By Poisson's law the compression decides which contacts rebound.
   const bool is_first = impact->h == 0.0 && !impact->decompression;
+  const ContactScales scales(impact->problem, impact->solution);
   for (size_t i = 0; i < impact->contacts.size(); ++i) {
     const ActiveContact& contact = impact->contacts[i];
     const Place place{&s, step, impact->time, i, &contact, impact->solution.modes[i]};
@@ -179,7 +180,7 @@ void RolloutCertifier::AddImpact(const Model<double>& model, long step, Impulses
     const double before =
         RelativeSpeed(impact->before, contact.a, block.normal_a, contact.b, block.normal_b);
     const ContactMargin margin =
-        MarginOfContact(impact->problem, impact->solution, static_cast<int>(i));
+        MarginOfContact(impact->problem, impact->solution, scales, static_cast<int>(i));
     AddMargin(margin.value, place,
               std::string(impact->decompression ? "decompression, " : "impact, ") +
                   (block.driven ? "driven and " : "") + ModeName(place.mode));

@@ -12,7 +12,6 @@ namespace {
 
 using Row = Eigen::RowVectorXd;
 
-constexpr int kMostIterations = 200;
 // Below this share of its terms an event's rate is rounding: two features hand a contact over, and
 // nothing depends on when.
 constexpr double kNoRate = 1e-9;
@@ -188,7 +187,7 @@ double EventDerivative::SegmentTangent(const Model<double>& model, Segment* segm
     if (implicit) {
       a_dot[i] = a_dot[i - 1];
     }
-    for (int iteration = 0; iteration < kMostIterations; ++iteration) {
+    for (FixedPoint iteration;;) {
       PlaceTangent(s, *segment, tableau.c[i], tableau.a[i], tableau.a_hat[i], implicit ? i + 1 : i,
                    tau_dot, *x, a_dot, &place);
       RowMatrixXd next;
@@ -198,7 +197,7 @@ double EventDerivative::SegmentTangent(const Model<double>& model, Segment* segm
           implicit ? (bodies - a_dot[i].topRows(3 * s.num_blocks())).cwiseAbs().maxCoeff() : 0.0;
       const double size = implicit ? bodies.cwiseAbs().maxCoeff() : 0.0;
       a_dot[i] = bodies;
-      if (!implicit || change <= 1e-15 * size || (iteration > 20 && change <= 1e-12 * size)) {
+      if (!implicit || iteration.Arrived(change, size)) {
         break;
       }
     }
@@ -350,7 +349,7 @@ void EventDerivative::StagesAdjoint(const Model<double>& model, Segment* segment
     };
     RowMatrixXd stage_bar;
     RowMatrixXd own = a_bar[i];
-    for (int iteration = 0; iteration < kMostIterations; ++iteration) {
+    for (FixedPoint iteration;;) {
       solve(own, &stage_bar);
       if (!implicit) {
         break;
@@ -365,7 +364,7 @@ void EventDerivative::StagesAdjoint(const Model<double>& model, Segment* segment
       const double change = (next - own).cwiseAbs().maxCoeff();
       const double size = next.cwiseAbs().maxCoeff();
       own = next;
-      if (change <= 1e-15 * size || (iteration > 20 && change <= 1e-12 * size)) {
+      if (iteration.Arrived(change, size)) {
         solve(own, &stage_bar);
         break;
       }

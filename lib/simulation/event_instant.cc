@@ -49,7 +49,8 @@ bool EventStepper::AddInstant(const Model<double>& model, double t, EventKind ki
 
 // After an impact: where a contact that had rested leaves so slowly that gravity would bring it
 // back before it has left the touching tolerance (or, beyond max_events_per_step, more slowly than
-// the restitution threshold), it stays: all that touch there are held.
+// the restitution threshold), it stays: all that touch there are held, along their tangents too
+// where they slide no faster.
 bool EventStepper::Settle(const Model<double>& model, const Impulses& impact, State<double>* state,
                           EventOutcome* outcome) {
   const SimulationSettings& settings = model.structure->settings;
@@ -67,10 +68,10 @@ bool EventStepper::Settle(const Model<double>& model, const Impulses& impact, St
     ContactMode mode = impact.solution.modes[i];
     // A decompression elsewhere may have opened what its compression had closed.
     const bool opened = !rebounds_[i] && speed(*state) > slow;
+    const double touch = search_.TouchTolerance(*state, contact.a, contact.b);
+    const double returns = std::max(std::sqrt(2.0 * gravity * touch),
+                                    inelastic_ ? settings.restitution_threshold : 0.0);
     if (mode == ContactMode::kOpen || opened) {
-      const double touch = search_.TouchTolerance(*state, contact.a, contact.b);
-      const double returns = std::max(std::sqrt(2.0 * gravity * touch),
-                                      inelastic_ ? settings.restitution_threshold : 0.0);
       if (speed(*state) > returns) {
         continue;
       }
@@ -78,6 +79,12 @@ bool EventStepper::Settle(const Model<double>& model, const Impulses& impact, St
       mode = ContactMode::kClosed;
     } else if (rebounds_[i]) {
       continue;
+    }
+    // What slides no faster sticks: while it slides it may push another contact open again.
+    const double slip =
+        RelativeSpeed(*state, contact.a, block.tangent_a, contact.b, block.tangent_b);
+    if (block.has_friction && std::abs(slip) <= returns) {
+      mode = ContactMode::kSticking;
     }
     held.contacts.push_back(contact);
     held.friction.push_back(impact.friction[i]);

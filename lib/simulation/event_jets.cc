@@ -12,7 +12,6 @@
 namespace tangible {
 namespace {
 
-constexpr int kMostIterations = 200;
 constexpr double kNoRate = 1e-9;  // as in event_derivative.cc
 // Pivots below this share of the largest: redundant rows, solved with δ and refined.
 constexpr double kSingular = 1e-13;
@@ -345,7 +344,7 @@ class EventReplay {
       if (implicit) {
         stages[i] = stages[i - 1];
       }
-      for (int iteration = 0; iteration < kMostIterations; ++iteration) {
+      for (FixedPoint iteration;;) {
         Place(before, tau, tableau.c[i], tableau.a[i], tableau.a_hat[i], implicit ? i + 1 : i,
               stages, &state);
         ContactSolution<T> next;
@@ -358,7 +357,7 @@ class EventReplay {
           size = std::max({size, DerivativeSize(next.v[k]), std::abs(ValueOf(next.v[k]))});
         }
         stages[i] = next;
-        if (!implicit || change <= 1e-15 * size || (iteration > 20 && change <= 1e-12 * size)) {
+        if (!implicit || iteration.Arrived(change, size)) {
           break;
         }
       }

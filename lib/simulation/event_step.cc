@@ -11,6 +11,8 @@ namespace {
 constexpr double kShortStep = 1e-9;
 // How much further than the forces at work a contact that slides is held to its direction.
 constexpr double kForcedSlip = 1e4;
+// How often a motion that cannot be integrated over what is left of a step is halved.
+constexpr int kMostHalvings = 10;
 // Beyond this many times max_events_per_step a step is given up.
 constexpr int kGiveUp = 3;
 
@@ -395,6 +397,7 @@ EventOutcome EventStepper::Step(const Model<double>& model, double t, double h,
   const int most = kGiveUp * model.structure->settings.max_events_per_step + kGiveUp;
   double now = t;
   bool impulses_tried = false;
+  int halvings = 0;
   const auto fail = [&](const std::string& message) {
     outcome.done = false;
     outcome.message = message;
@@ -418,7 +421,7 @@ EventOutcome EventStepper::Step(const Model<double>& model, double t, double h,
       ++next_edge;
     }
     const bool to_edge = next_edge < edges.size();
-    const double until = to_edge ? edges[next_edge].time : end;
+    const double until = now + std::ldexp((to_edge ? edges[next_edge].time : end) - now, -halvings);
     const double middle = 0.5 * (now + until);
     const int parts = record_.num_parts;
     EventPart* part = record_.Add();
@@ -440,19 +443,30 @@ EventOutcome EventStepper::Step(const Model<double>& model, double t, double h,
     impulses_tried = false;
     std::string message;
     if (!search_.Run(model, touching_.contacts, &segment, &message)) {
-      return fail(message);
+      // Where contacts nearly jam accelerations change so fast with poses that only a short motion
+      // can be integrated.
+      if (++halvings > kMostHalvings) {
+        return fail(message);
+      }
+      record_.num_parts = parts;
+      continue;
     }
     *state = segment.after;
     at_given_time = segment.event == EventKind::kStepEnd;
     if (at_given_time) {
       now = until;
-      if (to_edge) {
+      if (halvings > 0) {
+        // A given share of what was left: an instant like a signal's corner.
+        segment.event = EventKind::kEdge;
+        halvings = 0;
+      } else if (to_edge) {
         segment.event = EventKind::kEdge;
         segment.event_number = edges[next_edge].number;
         ++outcome.events;
       }
       continue;
     }
+    halvings = 0;
     now += segment.length;
     SwitchMode(segment);
     if (segment.event != EventKind::kTouch && ++outcome.events > most) {

@@ -198,7 +198,9 @@ bool SegmentFlow::Integrate(const Model<double>& model, Segment* segment, std::s
       double size = 0.0;
       for (size_t k = 0; k < last.size(); ++k) {
         change = std::max(change, std::abs(stage.solution.v[k] - last[k]));
-        size = std::max(size, std::abs(last[k]));
+        // Where bodies rest accelerations are rounding, of the forces that cancel.
+        const ContactProblem<double>& problem = stage.problem;
+        size = std::max({size, std::abs(last[k]), std::abs(problem.momentum[k] / problem.mass[k])});
       }
       // Rounding may keep it from the last digit: beyond a few iterations less is enough.
       if (change <= (iteration < 20 ? kIterated : 1e3 * kIterated) * size) {

@@ -13,6 +13,7 @@
 // The latter two are exact for constant accelerations. Hairer, Nørsett, Wanner, Solving Ordinary
 // Differential Equations I, II.1 and II.14.
 
+#include <cmath>
 #include <string>
 
 #include "tangible/simulation/event_record.h"
@@ -30,6 +31,25 @@ struct NystromTableau {
   bool last_is_implicit = false;  ///< a[last][last] ≠ 0
 
   static const NystromTableau& Of(Integrator integrator);
+};
+
+/// Whether the derivative of an implicit stage, a fixed point, has arrived: to rounding of its
+/// largest entry, or, where all entries are rounding (of bodies at rest), when it no longer changes
+/// less. That it converges the values have shown.
+class FixedPoint {
+ public:
+  bool Arrived(double change, double size) {
+    const bool falls = change < last_;
+    last_ = change;
+    ++iterations_;
+    return change <= 1e-15 * size || (!falls && change <= 1e-13 * size) ||
+           (iterations_ > 20 && (!falls || change <= 1e-12 * size)) || iterations_ == kMost;
+  }
+
+ private:
+  static constexpr int kMost = 200;
+  double last_ = HUGE_VAL;
+  int iterations_ = 0;
 };
 
 /// Solves a node's problem with modes; false where singular or not finite.

@@ -30,8 +30,9 @@ bool Follow(const ContactProblem<double>& p, From from, ContactSolution<double>*
 // What δ leaves of the rows, δ r M⁻¹ rᵀ |λ|, in the residual's scale; twice, for rounding.
 double Bound(const ContactProblem<double>& p, const ContactSolution<double>& solution) {
   double bound = 0.0;
+  const ContactScales scales(p, solution);
   for (size_t i = 0; i < p.contacts.size(); ++i) {
-    const ContactValues values = Evaluate(p, p.contacts[i], solution.v.data());
+    const ContactValues values = Evaluate(p, scales, p.contacts[i], solution.v.data());
     bound = std::max({bound, values.mobility_n * solution.normal_impulse[i] / values.sigma_n,
                       values.mobility_t * std::abs(solution.tangent_impulse[i]) /
                           std::max(values.sigma_t, values.sigma_n)});

@@ -37,6 +37,10 @@ Case Solved(double free_x, double free_y, double friction, ContactMode mode, dou
   return result;
 }
 
+ContactMargin MarginOf(const Case& c) {
+  return MarginOfContact(c.problem, c.solution, ContactScales(c.problem, c.solution), 0);
+}
+
 double ResidualOf(const Case& c, int* worst) {
   return NaturalResidual(c.problem, c.solution, worst);
 }
@@ -44,8 +48,10 @@ double ResidualOf(const Case& c, int* worst) {
 TEST(ContactResidualTest, ValuesOfAContactAreThoseByHand) {
   ContactProblem<double> problem = testing::FreeBodies({0.0, 0.0, 0.0});
   const ContactBlock<double> contact = FloorContact(0, 0.5, -0.2, 0.3, -0.25);
-  const double v[] = {1.0, 2.0, 3.0};
-  const ContactValues values = Evaluate(problem, contact, v);
+  ContactSolution<double> solution = testing::EmptySolution(problem);
+  solution.v = {1.0, 2.0, 3.0};
+  const double* v = solution.v.data();
+  const ContactValues values = Evaluate(problem, ContactScales(problem, solution), contact, v);
   EXPECT_DOUBLE_EQ(values.s_n, 2.0 + 0.5 * 3.0 - 0.25);
   EXPECT_DOUBLE_EQ(values.slip, 1.0 + 0.2 * 3.0);
   // Scales are no less than the largest term and the constant, and one for both rows of a contact.
@@ -115,17 +121,17 @@ TEST(ContactResidualTest, AnOffsetShiftsTheNormalImpulse) {
       ResidualOf(Offset(Solved(0.0, -1.0, 0.0, ContactMode::kClosed, 1.0, 0.0), 1.25, false),
                  &worst),
       0.25, 1e-15);
-  const ContactMargin closing = MarginOfContact(driven.problem, driven.solution, 0);
+  const ContactMargin closing = MarginOf(driven);
   EXPECT_NEAR(closing.value, 1.0, 1e-15);  // of its own speed
   EXPECT_EQ(closing.kind, Kind::kClosing);
-  const ContactMargin opening = MarginOfContact(closed.problem, closed.solution, 0);
+  const ContactMargin opening = MarginOf(closed);
   EXPECT_NEAR(opening.value, 0.25, 1e-15);
   EXPECT_EQ(opening.kind, Kind::kOpening);
 }
 
 TEST(ContactResidualTest, MarginsAreThoseOfTheNearestMode) {
   const auto expect = [](const Case& c, double value, Kind kind) {
-    const ContactMargin margin = MarginOfContact(c.problem, c.solution, 0);
+    const ContactMargin margin = MarginOf(c);
     EXPECT_NEAR(margin.value, value, 1e-15);
     EXPECT_EQ(margin.kind, kind);
   };
