@@ -17,6 +17,12 @@
 #include "tangible/simulation/event_step.h"
 
 namespace tangible {
+namespace {
+
+// The share of max_events_per_step after which slow impacts are a rattle.
+constexpr int kRattling = 4;
+
+}  // namespace
 
 bool EventStepper::AddInstant(const Model<double>& model, double t, EventKind kind,
                               const ActiveContact* contact, State<double>* state,
@@ -47,18 +53,42 @@ bool EventStepper::AddInstant(const Model<double>& model, double t, EventKind ki
   return true;
 }
 
+bool EventStepper::Rattles(const Model<double>& model, const EventOutcome& outcome) {
+  return outcome.events > model.structure->settings.max_events_per_step / kRattling;
+}
+
+double EventStepper::ReturnSpeed(const Model<double>& model, const State<double>& state,
+                                 const ActiveContact& contact) const {
+  const double gravity = std::hypot(model.numbers[kGravityX], model.numbers[kGravityY]);
+  return std::sqrt(2.0 * gravity * search_.TouchTolerance(state, contact.a, contact.b));
+}
+
+double EventStepper::SlowSpeed(const Model<double>& model, const State<double>& state,
+                               const EventOutcome& outcome) const {
+  double slow = search_.SpeedTolerance(model, state);
+  if (Rattles(model, outcome)) {
+    // What nearly dependent rows leave of the speeds that were to vanish.
+    for (const ActiveContact& contact : touching_.contacts) {
+      slow = std::max(slow, 1e-3 * ReturnSpeed(model, state, contact));
+    }
+  }
+  return slow;
+}
+
 // After an impact: where a contact that had rested leaves so slowly that gravity would bring it
 // back before it has left the touching tolerance (or, beyond max_events_per_step, more slowly than
 // the restitution threshold), it stays: all that touch there are held, along their tangents too
-// where they slide no faster.
+// where they slide no faster. So they are after a slow impact that only sets a contact sliding,
+// which opens another one that returns, where that has gone on for long.
 bool EventStepper::Settle(const Model<double>& model, const Impulses& impact, State<double>* state,
                           EventOutcome* outcome) {
   const SimulationSettings& settings = model.structure->settings;
-  const double gravity = std::hypot(model.numbers[kGravityX], model.numbers[kGravityY]);
   const double slow = search_.SpeedTolerance(model, *state);
   Segment held;
   held.time = impact.time;
   bool any = false;
+  bool all_slow = true;     // no contact approached faster than it would return
+  bool any_slides = false;  // a contact that is to stick
   for (size_t i = 0; i < impact.contacts.size(); ++i) {
     const ActiveContact& contact = impact.contacts[i];
     const ContactBlock<double>& block = impact.problem.contacts[i];
@@ -68,9 +98,9 @@ bool EventStepper::Settle(const Model<double>& model, const Impulses& impact, St
     ContactMode mode = impact.solution.modes[i];
     // A decompression elsewhere may have opened what its compression had closed.
     const bool opened = !rebounds_[i] && speed(*state) > slow;
-    const double touch = search_.TouchTolerance(*state, contact.a, contact.b);
-    const double returns = std::max(std::sqrt(2.0 * gravity * touch),
+    const double returns = std::max(ReturnSpeed(model, *state, contact),
                                     inelastic_ ? settings.restitution_threshold : 0.0);
+    all_slow = all_slow && speed(impact.before) >= -returns;
     if (mode == ContactMode::kOpen || opened) {
       if (speed(*state) > returns) {
         continue;
@@ -84,13 +114,14 @@ bool EventStepper::Settle(const Model<double>& model, const Impulses& impact, St
     const double slip =
         RelativeSpeed(*state, contact.a, block.tangent_a, contact.b, block.tangent_b);
     if (block.has_friction && std::abs(slip) <= returns) {
+      any_slides = any_slides || std::abs(slip) > slow;
       mode = ContactMode::kSticking;
     }
     held.contacts.push_back(contact);
     held.friction.push_back(impact.friction[i]);
     held.modes.push_back(mode);
   }
-  if (!any) {
+  if (!any && !(Rattles(model, *outcome) && all_slow && any_slides)) {
     return true;
   }
   ++outcome->fallbacks;

@@ -117,6 +117,10 @@ EventSearch::Sample* EventSearch::At(const Model<double>& model, double length) 
   motion.modes = segment_->modes;
   sample.has_end = false;
   sample.good = flow_.Run(model, &motion, &message_);
+  if (!sample.good) {
+    all_good_ = false;
+    motion.after = segment_->before;
+  }
   return &sample;
 }
 
@@ -254,6 +258,7 @@ bool EventSearch::Run(const Model<double>& model, const std::vector<ActiveContac
   segment_ = segment;
   touching_ = &touching;
   num_samples_ = 0;
+  all_good_ = true;
   Event event;
   event.length = segment->length;
   if (!At(model, event.length)->good) {
@@ -293,7 +298,9 @@ bool EventSearch::Run(const Model<double>& model, const std::vector<ActiveContac
   if (event.kind == EventKind::kSlipBegins) {
     segment->event_friction = segment->friction[event.index];
   }
-  if (!At(model, length)->good) {
+  At(model, length);
+  // What a motion that cannot be integrated would have met nobody knows.
+  if (!all_good_) {
     *message = message_;
     return false;
   }

@@ -86,6 +86,7 @@ class EventSearch {
   std::vector<double> closing_;  ///< a body: bound on its points' speed over the segment
   std::vector<Sample> samples_;
   int num_samples_ = 0;
+  bool all_good_ = true;  ///< all samples of this search could be integrated
   std::vector<std::pair<int, int>> pairs_;
   std::vector<Aabb> boxes_;
   BroadPhase broad_phase_;

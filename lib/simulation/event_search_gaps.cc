@@ -107,7 +107,7 @@ void EventSearch::SearchPair(const Model<double>& model, int a, int b, Event* ev
   const auto rate_over = [&](double from, double to, bool all) {
     const double any = closing_[a] + closing_[b];
     const Sample& first = *At(model, from);
-    if (std::isinf(gap(first, all))) {
+    if (!std::isfinite(gap(first, all))) {
       return any;
     }
     const ActiveContact start = nearest;
@@ -115,7 +115,7 @@ void EventSearch::SearchPair(const Model<double>& model, int a, int b, Event* ev
     const bool face = on_face;
     const State<double> before = first.motion.after;
     const Sample& last = *At(model, to);
-    if (!face || std::isinf(gap(last, all)) || !(nearest.feature == start.feature)) {
+    if (!face || !std::isfinite(gap(last, all)) || !(nearest.feature == start.feature)) {
       return any;
     }
     const State<double>& after = last.motion.after;
@@ -166,6 +166,9 @@ void EventSearch::SearchPair(const Model<double>& model, int a, int b, Event* ev
     // integrator's poses may cut a corner that its twists do not.
     const auto shifted = [&](const Sample& sample) {
       const double value = gap(sample, all) + allowed;
+      if (!std::isfinite(value)) {
+        return value;
+      }
       const bool approaches = value > 0.0 || !all || !Contains(*touching_, nearest) ||
                               NormalSpeed(model, sample.motion.after, nearest) < -slow;
       return approaches ? value : touch;
@@ -265,9 +268,12 @@ void EventSearch::SearchLimit(const Model<double>& model, int joint, double side
   evaluate(after, &rate_after);
   double from = 0.0;
   double allowed = 0.0;
-  if (Contains(*touching_, limit)) {
-    from = TouchStart(model, rate_before, 2.0 * std::abs(rate_after - rate_before) / event->length);
-    allowed = 1e-10;
+  for (const ActiveContact& contact : *touching_) {
+    if (contact.SameAs(limit)) {
+      from =
+          TouchStart(model, rate_before, 2.0 * std::abs(rate_after - rate_before) / event->length);
+      allowed = std::max(1e-10, 1e-10 - contact.gap);
+    }
   }
   const double rate = 1.1 * std::max(std::abs(rate_before), std::abs(rate_after)) +
                       0.25 * std::abs(rate_after - rate_before);

@@ -13,6 +13,8 @@ constexpr double kShortStep = 1e-9;
 constexpr double kForcedSlip = 1e4;
 // How often a motion that cannot be integrated over what is left of a step is halved.
 constexpr int kMostHalvings = 10;
+// An impact that leaves an approach of no more than this many times the least speed has solved it.
+constexpr double kSolvedApproach = 100.0;
 // Beyond this many times max_events_per_step a step is given up.
 constexpr int kGiveUp = 3;
 
@@ -186,14 +188,21 @@ bool EventStepper::SolveImpacts(const Model<double>& model, double t, State<doub
                                 EventOutcome* outcome) {
   const SimulationSettings& settings = model.structure->settings;
   const bool newton = settings.impact_law == ImpactLaw::kNewton;
+  double last_approach = 0.0;
   for (int repeat = 0;; ++repeat) {
     FindTouching(model, *state);
-    const double slow = search_.SpeedTolerance(model, *state);
-    const bool any = std::any_of(touching_.approach.begin(), touching_.approach.end(),
-                                 [&](double speed) { return speed < -slow; });
-    if (!any) {
+    const double slow = SlowSpeed(model, *state, *outcome);
+    const double approach =
+        touching_.approach.empty()
+            ? 0.0
+            : -*std::min_element(touching_.approach.begin(), touching_.approach.end());
+    // An impact is solved to a tolerance of its own: what it leaves there is none for another one.
+    const bool solved_already =
+        repeat > 0 && approach >= 0.5 * last_approach && approach <= kSolvedApproach * slow;
+    if (!(approach > slow) || solved_already) {
       return true;
     }
+    last_approach = approach;
     if (repeat == 0 && !LocateTouch(model, t, slow, state, outcome)) {
       return false;
     }
@@ -217,7 +226,11 @@ bool EventStepper::SolveImpacts(const Model<double>& model, double t, State<doub
     impact.restitution.clear();
     rebounds_.clear();
     for (size_t i = 0; i < touching_.contacts.size(); ++i) {
-      if (touching_.approach[i] > slow) {
+      // In a rattle what leaves slowly is to be held with the rest: it would be back at once.
+      const double leaves = Rattles(model, *outcome)
+                                ? std::max(slow, ReturnSpeed(model, *state, touching_.contacts[i]))
+                                : slow;
+      if (touching_.approach[i] > leaves) {
         continue;
       }
       ActiveContact contact = touching_.contacts[i];
@@ -297,7 +310,7 @@ bool EventStepper::SolveByShortStep(const Model<double>& model, double t, double
 bool EventStepper::ChooseModes(const Model<double>& model, double t, double middle, double length,
                                State<double>* state, EventOutcome* outcome, Segment* segment) {
   const SimulationSettings& settings = model.structure->settings;
-  const double slow = search_.SpeedTolerance(model, *state);
+  const double slow = SlowSpeed(model, *state, *outcome);
   segment->contacts.clear();
   segment->friction.clear();
   segment->modes.clear();

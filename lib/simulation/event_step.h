@@ -83,6 +83,15 @@ class EventStepper {
                    State<double>* state, EventOutcome* outcome, Segment* segment);
   bool AddInstant(const Model<double>& model, double t, EventKind kind,
                   const ActiveContact* contact, State<double>* state, EventOutcome* outcome);
+  /// Whether a step has had so many events that slow impacts are a rattle.
+  static bool Rattles(const Model<double>& model, const EventOutcome& outcome);
+  /// The speed below which gravity brings a contact back before it has left the touching
+  /// tolerance, m/s.
+  double ReturnSpeed(const Model<double>& model, const State<double>& state,
+                     const ActiveContact& contact) const;
+  /// The speed below which what touches neither approaches nor leaves nor slides, m/s.
+  double SlowSpeed(const Model<double>& model, const State<double>& state,
+                   const EventOutcome& outcome) const;
   bool Settle(const Model<double>& model, const Impulses& impact, State<double>* state,
               EventOutcome* outcome);
   bool LocateTouch(const Model<double>& model, double t, double slow, State<double>* state,
