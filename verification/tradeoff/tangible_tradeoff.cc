@@ -45,6 +45,7 @@ using tradeoff::TradeoffOptions;
 
 constexpr int kMostThreads = 256;
 constexpr int kMostScenes = 8;
+constexpr double kMostSteps = 1e6;
 constexpr double kLeastFactor = 1e-6;
 constexpr double kMostFactor = 1e6;
 
@@ -100,7 +101,8 @@ std::string CheckFlags(size_t scenes, TradeoffOptions* options, Target* target) 
 }
 
 // The scene and what it is differentiated by; a message or empty.
-std::string Load(const std::string& file, Scene* scene, std::vector<ParameterPath>* parameters) {
+std::string Load(const std::string& file, const TradeoffOptions& options, Scene* scene,
+                 std::vector<ParameterPath>* parameters) {
   std::string error;
   if (!LoadScene(file, scene, &error)) return error;
   const std::string place = file + ": ";
@@ -110,6 +112,13 @@ std::string Load(const std::string& file, Scene* scene, std::vector<ParameterPat
   if (std::none_of(scene->bodies.begin(), scene->bodies.end(),
                    [](const auto& body) { return body.motion == Motion::kMoving; })) {
     return place + "/bodies: expected a moving body, got none";
+  }
+  const double steps =
+      scene->simulation.duration /
+      tradeoff::StepLengths(scene->simulation, options.samples, options.dt_factors)[0];
+  if (steps > kMostSteps) {
+    return place + "/simulation/dt: expected at most 1e6 steps of the longest that is tried, got " +
+           FormatNumber(steps);
   }
   if (FLAGS_parameters.empty()) {
     *parameters = tradeoff::DefaultParameters(*scene);
@@ -143,7 +152,7 @@ int Run(const std::vector<std::string>& files, const TradeoffOptions& options, T
   std::vector<Scene> scenes(files.size());
   std::vector<std::vector<ParameterPath>> parameters(files.size());
   for (size_t i = 0; i < files.size(); ++i) {
-    const std::string error = Load(files[i], &scenes[i], &parameters[i]);
+    const std::string error = Load(files[i], options, &scenes[i], &parameters[i]);
     if (!error.empty()) return ReportError(error);
   }
   if (table) std::cout << ProvenanceLine() << "\n" << std::flush;

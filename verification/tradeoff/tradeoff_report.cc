@@ -289,11 +289,15 @@ std::string WhyNone(const Tradeoff& tradeoff, double error) {
     trajectory = std::min(trajectory, cell.trajectory_error);
     gradient = std::min(gradient, cell.gradient_error);
   }
-  return Format(
-      "expected settings with errors <= %g, got none: the least are %.2g (trajectory) and "
-      "%.2g (gradient), to which the reference's own are added, %.2g and %.2g",
-      error, trajectory, gradient, tradeoff.reference.trajectory_error,
-      tradeoff.reference.gradient_error);
+  const Reference& reference = tradeoff.reference;
+  std::string text =
+      Format("expected settings with errors <= %g, got none: the least of trajectories is %.2g",
+             error, trajectory);
+  text += std::isnan(reference.gradient_error) ? "" : Format(", of gradients %.2g", gradient);
+  text += Format(", to which the reference's own are added, %.2g", reference.trajectory_error);
+  return text + (std::isnan(reference.gradient_error)
+                     ? ""
+                     : Format(" and %.2g", reference.gradient_error));
 }
 
 }  // namespace tangible::tradeoff

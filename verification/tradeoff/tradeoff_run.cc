@@ -14,6 +14,8 @@ namespace {
 
 constexpr double kReferenceJointTolerance = 1e-12;
 constexpr double kMostReferenceSteps = 4e6;
+constexpr double kFirstReferenceFactor = 4.0;  // of the scene's dt
+constexpr int kMostFailedLevels = 6;
 // What is smaller is rounding, and no order of runs.
 constexpr double kRounding = 1e-13;
 // Cells that differ by a solver alone have the same errors but for rounding, and the same times but
@@ -24,43 +26,41 @@ double CostOf(const SampledRun& run) {
   return LowerMedian(run.run_seconds) + LowerMedian(run.both_seconds);
 }
 
-// Halves the step as the header says. False, with the first run's message, where nothing ran.
+// Halves the step as the header says. False, with the last run's message, where no two in a row
+// ran.
 bool Halve(const Scene& scene, const std::vector<ParameterPath>& parameters,
            const TradeoffOptions& options, Reference* best) {
   Scene copy = scene;
   SimulationSettings& settings = copy.simulation;
-  settings.dt = StepLengths(scene.simulation, options.samples, {1.0})[0];
-  SampledRun last = RunSampled(copy, parameters, GradientMethod::kTangent, {options.samples});
-  best->note = last.message;
-  if (!last.done()) return false;
+  settings.dt = StepLengths(scene.simulation, options.samples, {kFirstReferenceFactor})[0];
   bool found = false;
   double seconds = 0.0;
-  for (;;) {
-    seconds += CostOf(last);
-    // Half the step takes twice the time.
-    if (found && seconds + 2.0 * CostOf(last) > options.reference_seconds) break;
-    if (settings.duration / settings.dt > kMostReferenceSteps) break;
-    settings.dt *= 0.5;
+  SampledRun last;
+  last.message = "none";
+  for (int level = 0; level < 2 || settings.duration / settings.dt <= kMostReferenceSteps;
+       ++level) {
     SampledRun run = RunSampled(copy, parameters, GradientMethod::kTangent, {options.samples});
     if (!run.done()) {
       if (!found) best->note = run.message;
-      break;
+      if (found || level >= kMostFailedLevels) break;
+    } else if (last.done()) {
+      const ErrorScale scale = ScaleOf(scene, parameters, run);
+      const double trajectory = TrajectoryError(scale, last, run);
+      const double gradient = GradientError(scale, last, run);
+      // Where nothing depends on the parameters the gradient's error is NaN, and never the larger.
+      if (found && (trajectory > best->trajectory_error || gradient > best->gradient_error) &&
+          std::max(trajectory, gradient) > options.reference_error) {
+        break;
+      }
+      *best = {run, settings, trajectory, gradient, ""};
+      found = true;
+      if (trajectory <= options.reference_error && !(gradient > options.reference_error)) break;
     }
-    const ErrorScale scale = ScaleOf(scene, parameters, run);
-    const double trajectory = TrajectoryError(scale, last, run);
-    const double gradient = GradientError(scale, last, run);
-    // Where nothing depends on the parameters the gradient's error is NaN, and never the larger.
-    if (found && (trajectory > best->trajectory_error || gradient > best->gradient_error) &&
-        std::max(trajectory, gradient) > options.reference_error) {
-      break;
-    }
-    best->run = run;
-    best->settings = settings;
-    best->trajectory_error = trajectory;
-    best->gradient_error = gradient;
-    found = true;
-    if (trajectory <= options.reference_error && !(gradient > options.reference_error)) break;
+    if (run.done()) seconds += CostOf(run);
+    // Half the step takes twice the time.
+    if (found && seconds + 2.0 * CostOf(run) > options.reference_seconds) break;
     last = std::move(run);
+    settings.dt *= 0.5;
   }
   return found;
 }
@@ -86,9 +86,10 @@ std::string MakeReference(const Scene& scene, const std::vector<ParameterPath>& 
       return "no reference: " + reference->note;
     }
   }
-  if (note.empty() && (reference->trajectory_error > options.reference_error ||
-                       reference->gradient_error > options.reference_error)) {
-    note = "did not come within its bound";
+  if (reference->trajectory_error > options.reference_error ||
+      reference->gradient_error > options.reference_error) {
+    note += note.empty() ? "" : "; ";
+    note += "did not come within its bound";
   }
   reference->note = note;
   reference->trajectory_error = std::max(reference->trajectory_error, kRounding);

@@ -5,10 +5,10 @@
 // fronts; and the cheapest settings for a target.
 //
 // Reference: event stepping with runge_kutta_4, all joints projected to 1e-12, at a step that is
-// halved until a further halving changes it by less than a bound, or by more than it did before
-// (rounding, chaos), or until its time is up; where event stepping does not run, fixed stepping
-// alike. Its own error is what the last halving changed, at least 1e-13 (rounding). Its Jacobian is
-// the tangent's, those of the cells are the adjoint's.
+// four times the scene's at first and is halved until a further halving changes it by less than a
+// bound, or by more than it did before (rounding, chaos), or until its time is up; where event
+// stepping does not run, fixed stepping alike. Its own error is what the last halving changed, at
+// least 1e-13 (rounding). Its Jacobian is the tangent's, those of the cells are the adjoint's.
 
 #include <functional>
 #include <string>

@@ -106,9 +106,14 @@ TEST(SimulationBlockTest, ReadsBackAsTheSettings) {
 }
 
 TEST(WhyNoneTest, NamesTheLeastErrors) {
-  EXPECT_EQ(WhyNone(Example(), 1e-12),
-            "expected settings with errors <= 1e-12, got none: the least are 5e-10 (trajectory) "
-            "and 1e-06 (gradient), to which the reference's own are added, 1e-09 and 2e-09");
+  Tradeoff tradeoff = Example();
+  EXPECT_EQ(WhyNone(tradeoff, 1e-12),
+            "expected settings with errors <= 1e-12, got none: the least of trajectories is 5e-10, "
+            "of gradients 1e-06, to which the reference's own are added, 1e-09 and 2e-09");
+  tradeoff.reference.gradient_error = NAN;
+  EXPECT_EQ(WhyNone(tradeoff, 1e-12),
+            "expected settings with errors <= 1e-12, got none: the least of trajectories is 5e-10, "
+            "to which the reference's own are added, 1e-09");
 }
 
 }  // namespace

@@ -168,7 +168,8 @@ TEST(CheapestTest, MeetsTheTargetWithTheReferencesOwnErrorAdded) {
   EXPECT_EQ(cheapest(Target::kTrajectory, 5e-7), -1);
   // Without a gradient the trajectory decides.
   tradeoff.reference.gradient_error = NAN;
-  EXPECT_EQ(cheapest(Target::kGradient, 1e-2), 5);
+  EXPECT_EQ(cheapest(Target::kGradient, 1e-2), 2);
+  EXPECT_EQ(cheapest(Target::kBoth, 1e-3), 5);
 }
 
 }  // namespace
