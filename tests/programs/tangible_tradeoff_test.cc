@@ -92,7 +92,9 @@ TEST_F(TangibleTradeoffTest, ThePrintedBlockMeetsTheTarget) {
     EXPECT_EQ(run.out.rfind("\"simulation\": {", 0), 0u) << run.out;
     json scene = json::parse(kBall);
     scene["simulation"] = json::parse("{" + run.out + "}")["simulation"];
-    if (target < 1e-3) EXPECT_EQ(scene["simulation"]["stepping"], "event");
+    if (target < 1e-3) {
+      EXPECT_EQ(scene["simulation"]["stepping"], "event");
+    }
     const auto poses = Simulate(scene);
     // Samples are twenty equal times; the length is at most the ball's way, 0.6 m, by 0.2 m.
     double worst = 0.0;
