@@ -19,8 +19,9 @@ constexpr int kMostFailedLevels = 6;
 // What is smaller is rounding, and no order of runs.
 constexpr double kRounding = 1e-13;
 // Cells that differ by a solver alone have the same errors but for rounding, and the same times but
-// for chance: one of them is enough.
+// for chance: one of them is enough, the one whose settings are nearer to the scene's.
 constexpr double kBetter = 0.9;
+constexpr double kSameTime = 1.1;
 
 double CostOf(const SampledRun& run) {
   return LowerMedian(run.run_seconds) + LowerMedian(run.both_seconds);
@@ -169,8 +170,12 @@ void MarkFront(std::vector<Cell>* cells, double own_error, double Cell::*error,
   double least = HUGE_VAL;
   for (Cell* cell : order) {
     if (!(known(cell) < kBetter * least)) continue;
-    cell->*front = true;
     least = known(cell);
+    const double most = kSameTime * cell->*seconds;
+    const auto plainest = std::find_if(cells->begin(), cells->end(), [&](const Cell& other) {
+      return other.measured() && known(&other) <= least / kBetter && other.*seconds <= most;
+    });
+    *plainest.*front = true;
   }
 }
 
@@ -216,18 +221,21 @@ const Cell* Cheapest(const Tradeoff& tradeoff, Target target, double error) {
     return target == Target::kTrajectory ? cell.run_seconds : cell.both_seconds;
   };
   const bool no_gradient = std::isnan(reference.gradient_error);
-  const Cell* best = nullptr;
-  for (const Cell& cell : tradeoff.cells) {
-    if (!cell.measured()) continue;
+  const auto meets = [&](const Cell& cell) {
     const bool trajectory = (target == Target::kGradient && !no_gradient) ||
                             cell.trajectory_error + reference.trajectory_error <= error;
     const bool gradient = target == Target::kTrajectory || no_gradient ||
                           cell.gradient_error + reference.gradient_error <= error;
-    if (trajectory && gradient && (best == nullptr || seconds(cell) < seconds(*best))) {
-      best = &cell;
-    }
+    return cell.measured() && trajectory && gradient;
+  };
+  double least = HUGE_VAL;
+  for (const Cell& cell : tradeoff.cells) {
+    if (meets(cell)) least = std::min(least, seconds(cell));
   }
-  return best;
+  const auto plainest = std::find_if(
+      tradeoff.cells.begin(), tradeoff.cells.end(),
+      [&](const Cell& cell) { return meets(cell) && seconds(cell) <= kSameTime * least; });
+  return plainest == tradeoff.cells.end() ? nullptr : &*plainest;
 }
 
 }  // namespace tangible::tradeoff

@@ -77,15 +77,17 @@ Tradeoff RunTradeoff(const Scene& scene, const std::vector<ParameterPath>& param
                      const TradeoffOptions& options,
                      const std::function<void(long done, long total)>& progress);
 
-/// Sets the cells' front flags. An error counts as no less than the reference's own.
+/// Sets the cells' front flags. An error counts as no less than the reference's own. Of cells whose
+/// times and errors are the same to a tenth the first in the sweep, with the scene's own solver, is
+/// taken.
 void MarkFronts(Tradeoff* tradeoff);
 
 enum class Target { kTrajectory, kGradient, kBoth };
 
-/// The cheapest cell whose errors, those of the target, plus the reference's own are at most
-/// `error`; by the time of a rollout for the trajectory alone, else with its Jacobian. Where
-/// nothing depends on the parameters the trajectory's error is the only one. nullptr: there is
-/// none.
+/// The cheapest cell (to a tenth; of several the first in the sweep) whose errors, those of the
+/// target, plus the reference's own are at most `error`; by the time of a rollout for the
+/// trajectory alone, else with its Jacobian. Where nothing depends on the parameters the
+/// trajectory's error is the only one. nullptr: there is none.
 const Cell* Cheapest(const Tradeoff& tradeoff, Target target, double error);
 
 }  // namespace tangible::tradeoff

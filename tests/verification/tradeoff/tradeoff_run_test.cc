@@ -152,6 +152,20 @@ TEST(FrontTest, HoldsWhatNoCheaperCellIsAsRightAs) {
   EXPECT_FALSE(tradeoff.GradientBelowReference(tradeoff.cells[3]));
 }
 
+TEST(FrontTest, OfTheSameTimesAndErrorsTheFirstIsTaken) {
+  Tradeoff tradeoff;
+  tradeoff.reference.trajectory_error = 1e-6;
+  tradeoff.reference.gradient_error = 1e-6;
+  tradeoff.cells = {Made(1.05e-2, 1e-2, 1.08, 2.0), Made(1e-2, 1e-2, 1.0, 1.9),
+                    Made(1e-3, 1e-3, 2.3, 2.3), Made(1e-3, 1e-3, 2.0, 2.0)};
+  MarkFronts(&tradeoff);
+  const bool front[] = {true, false, false, true};
+  for (size_t i = 0; i < 4; ++i) EXPECT_EQ(tradeoff.cells[i].trajectory_front, front[i]) << i;
+  EXPECT_EQ(Cheapest(tradeoff, Target::kTrajectory, 0.1), tradeoff.cells.data());
+  EXPECT_EQ(Cheapest(tradeoff, Target::kTrajectory, 1.02e-2), &tradeoff.cells[1]);
+  EXPECT_EQ(Cheapest(tradeoff, Target::kTrajectory, 5e-3), &tradeoff.cells[3]);
+}
+
 TEST(CheapestTest, MeetsTheTargetWithTheReferencesOwnErrorAdded) {
   Tradeoff tradeoff = MadeTradeoff();
   const auto cheapest = [&](Target target, double error) -> int {
