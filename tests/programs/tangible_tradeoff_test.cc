@@ -109,6 +109,23 @@ TEST_F(TangibleTradeoffTest, ThePrintedBlockMeetsTheTarget) {
   }
 }
 
+// The scenes that the README shows, with one step length: each has a reference by event stepping,
+// and of several scenes there is one picture.
+TEST_F(TangibleTradeoffTest, ScenesOfTheReadmeRun) {
+  const std::string folder = TANGIBLE_SOURCE_DIR "/data/tradeoff_scenes/";
+  const ProgramRun run =
+      Run("tangible-tradeoff", "'" + folder + "stack.json' '" + folder + "billiards.json' '" +
+                                   folder + "pendulum.json' --dt_factors=0.5 " +
+                                   "--repeat_seconds=1e-6 " + Flag("picture", "p.svg"));
+  ASSERT_EQ(run.exit_status, 0) << run.error;
+  for (const char* expected : {"\nstack\n", "\nbilliards\n", "\npendulum\n"}) {
+    EXPECT_NE(run.out.find(expected), std::string::npos) << run.out;
+  }
+  EXPECT_EQ(run.out.find("reference: fixed"), std::string::npos) << run.out;
+  EXPECT_EQ(run.out.find("did not come within"), std::string::npos) << run.out;
+  EXPECT_NE(Read(Path("p.svg")).find("billiards"), std::string::npos);
+}
+
 TEST_F(TangibleTradeoffTest, BothErrorsCountUnlessToldOtherwise) {
   // At 0.05 the trajectory of a fixed step is right, its gradient never.
   const ProgramRun both = Tradeoff("--target_error=0.05");
