@@ -13,7 +13,7 @@ namespace tangible {
 struct CsvTable {
   std::string file;  ///< for messages
   std::vector<std::string> columns;
-  int header_line = 0;  ///< in the file, from 1
+  int header_line = 0;                         ///< in the file, from 1
   std::vector<std::vector<std::string>> rows;  ///< each has as many cells as there are columns
   std::vector<int> lines;                      ///< line of each row in the file, from 1
 
