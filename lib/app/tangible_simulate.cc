@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // tangible-simulate: runs a scene and writes its trajectory, contacts, summary, observations and
-// view.
+// view; or for many vectors of parameters, and writes the final states.
 
 #include <gflags/gflags.h>
 
@@ -11,6 +11,7 @@
 #include <optional>
 #include <string>
 
+#include "tangible/app/batch_csv.h"
 #include "tangible/app/certificate_json.h"
 #include "tangible/app/observation_csv.h"
 #include "tangible/app/program.h"
@@ -37,6 +38,10 @@ DEFINE_double(noise, 0.0, "standard deviation of the observations' noise, m");
 DEFINE_uint64(seed, 0, "of the noise");
 DEFINE_double(rate, 0.0, "observations a second; 0: one a step");
 DEFINE_string(points, "", "points to observe instead of bodies (JSON)");
+DEFINE_string(batch, "",
+              "parameters (CSV: a column a path, a row a rollout); writes final states instead of "
+              "a trajectory");
+DEFINE_int32(threads, 0, "of a batch; 0: one a core");
 
 namespace tangible {
 namespace {
@@ -49,6 +54,24 @@ double CpuSeconds() {
   timespec time{};
   clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &time);
   return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
+}
+
+constexpr int kMostThreads = 256;
+
+bool IsDefault(const char* flag) { return gflags::GetCommandLineFlagInfoOrDie(flag).is_default; }
+
+// The same of the flags of batches.
+std::string CheckBatchFlags() {
+  if (FLAGS_threads < 0 || FLAGS_threads > kMostThreads) {
+    return "--threads: expected a number from 0 to " + std::to_string(kMostThreads) + ", got " +
+           std::to_string(FLAGS_threads);
+  }
+  if (FLAGS_batch.empty()) return IsDefault("threads") ? "" : "--threads: needs --batch";
+  for (const char* name :
+       {"every", "contacts", "initial", "view", "summary", "certify", "observe"}) {
+    if (!IsDefault(name)) return std::string("--") + name + ": not with --batch";
+  }
+  return "";
 }
 
 // Empty, or one line about a flag's value.
@@ -67,12 +90,10 @@ std::string CheckFlags() {
   }
   if (FLAGS_observe.empty()) {
     for (const char* name : {"noise", "seed", "rate", "points"}) {
-      if (!gflags::GetCommandLineFlagInfoOrDie(name).is_default) {
-        return std::string("--") + name + ": needs --observe";
-      }
+      if (!IsDefault(name)) return std::string("--") + name + ": needs --observe";
     }
   }
-  return "";
+  return CheckBatchFlags();
 }
 
 /// What the run writes; each is there if it was asked for.
@@ -206,6 +227,32 @@ int Run(const std::string& file) {
   return ReportError(file + ": " + report.message);
 }
 
+// All rows of a table; those that fail are told, the others written.
+int RunRows(const std::string& file) {
+  Scene scene;
+  BatchTable table;
+  std::string error;
+  if (!LoadScene(file, &scene, &error)) return ReportError(error);
+  if (!CheckSettings(scene.simulation, &error)) return ReportError(error.insert(0, file + ": "));
+  if (!ReadBatch(FLAGS_batch, scene, &table, &error)) return ReportError(error);
+  BatchResult batch;
+  {
+    Progress progress("rollouts", table.values.rows());
+    batch = RunBatch(scene, table.parameters, table.values, {.threads = FLAGS_threads},
+                     [&progress](long done) { progress.Show(done); });
+  }
+  if (!batch.message.empty()) return ReportError(error.append(file + ": ").append(batch.message));
+  error = WriteResult(FLAGS_out, BatchCsv(*BuildStructure(scene), batch.rows));
+  if (!error.empty()) return ReportError(error);
+  int exit_status = kExitDone;
+  for (size_t r = 0; r < batch.rows.size(); ++r) {
+    if (batch.rows[r].status == BatchStatus::kDone) continue;
+    exit_status = ReportError(FLAGS_batch + ": line " + std::to_string(table.lines[r]) + ": " +
+                              batch.rows[r].message);
+  }
+  return exit_status;
+}
+
 }  // namespace
 }  // namespace tangible
 
@@ -216,17 +263,20 @@ int main(int argc, char** argv) {
        .synopsis =
            "SCENE.json [--out=T.csv] [--every=K] [--contacts=C.csv] [--initial=T.csv] "
            "[--view=V.html] [--summary=S.json] [--certify] [--observe=O.csv --noise=S --seed=N "
-           "--rate=HZ --points=P.json]",
+           "--rate=HZ --points=P.json] | --batch=PARAMETERS.csv [--threads=T] [--out=F.csv]",
        .description = "Runs a scene and writes the trajectory of its bodies as CSV; on request "
-                      "contacts, a summary,\nnoisy observations and an animated view.",
+                      "contacts, a summary,\nnoisy observations and an animated view. With "
+                      "--batch runs it for each row of a table of parameters and\nwrites the final "
+                      "states.",
        .version = TANGIBLE_VERSION,
        .source_file = __FILE__,
        .outputs = {"out", "contacts", "view", "summary", "observe"},
-       .inputs = {"initial", "points"}});
+       .inputs = {"initial", "points", "batch"}});
   if (line.exit_status) return *line.exit_status;
   const std::string wrong = tangible::CheckFlags();
   if (!wrong.empty()) {
     return tangible::ReportError("tangible-simulate: " + wrong, tangible::kExitUsage);
   }
-  return tangible::Run(line.positional[0]);
+  return FLAGS_batch.empty() ? tangible::Run(line.positional[0])
+                             : tangible::RunRows(line.positional[0]);
 }

@@ -52,7 +52,7 @@ std::string CheckHeader(const std::vector<std::string>& columns,
                         const std::vector<std::string>& required,
                         const std::vector<std::string>& allowed) {
   for (std::size_t i = 0; i < columns.size(); ++i) {
-    if (!Contains(allowed, columns[i])) {
+    if (!allowed.empty() && !Contains(allowed, columns[i])) {
       return "unknown column, expected one of " + List(allowed) + ", got " + Describe(columns[i]);
     }
     if (std::find(columns.begin() + i + 1, columns.end(), columns[i]) != columns.end()) {
@@ -91,6 +91,7 @@ bool ParseCsv(const std::string& text, const std::string& file,
     if (table->columns.empty()) {
       what = CheckHeader(cells, required, allowed);
       table->columns = std::move(cells);
+      table->header_line = line_number;
     } else if (cells.size() != table->columns.size()) {
       what = "expected " + std::to_string(table->columns.size()) + " cells, got " +
              std::to_string(cells.size());
@@ -104,7 +105,8 @@ bool ParseCsv(const std::string& text, const std::string& file,
     }
   }
   if (!table->columns.empty()) return true;
-  *error = OneLine(Place(file, 1) + "missing header, expected columns " + List(required));
+  *error = OneLine(Place(file, 1) + "missing header, expected " +
+                   (required.empty() ? "names of columns" : "columns " + List(required)));
   return false;
 }
 

@@ -13,6 +13,7 @@ namespace tangible {
 struct CsvTable {
   std::string file;  ///< for messages
   std::vector<std::string> columns;
+  int header_line = 0;                         ///< in the file, from 1
   std::vector<std::vector<std::string>> rows;  ///< each has as many cells as there are columns
   std::vector<int> lines;                      ///< line of each row in the file, from 1
 
@@ -20,8 +21,8 @@ struct CsvTable {
   int Column(const std::string& name) const;
 };
 
-/// Reads a table whose columns are all among `allowed` and contain all of `required`, each at most
-/// once. On failure sets one line "file: line 3: what, expected, got".
+/// Reads a table whose columns are all among `allowed` (empty: any name) and contain all of
+/// `required`, each at most once. On failure sets one line "file: line 3: what, expected, got".
 bool ReadCsv(const std::string& file, const std::vector<std::string>& required,
              const std::vector<std::string>& allowed, CsvTable* table, std::string* error);
 

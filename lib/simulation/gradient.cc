@@ -56,14 +56,7 @@ GradientProblem MakeProblem(const Scene& scene, const std::vector<ParameterPath>
   for (const ParameterPath& parameter : parameters) {
     problem.directions.push_back(DirectionOf(parameter));
   }
-  for (const int body : problem.structure->moving) {
-    for (int i = 0; i < 3; ++i) {
-      problem.output_variables.push_back(problem.structure->PoseVariable(body, i));
-    }
-    for (int i = 0; i < 3; ++i) {
-      problem.output_variables.push_back(problem.structure->TwistVariable(body, i));
-    }
-  }
+  problem.output_variables = OutputVariables(*problem.structure);
   return problem;
 }
 
@@ -280,6 +273,15 @@ std::vector<std::string> OutputNames(const ModelStructure& structure) {
     }
   }
   return names;
+}
+
+std::vector<int> OutputVariables(const ModelStructure& structure) {
+  std::vector<int> variables;
+  for (const int body : structure.moving) {
+    for (int i = 0; i < 3; ++i) variables.push_back(structure.PoseVariable(body, i));
+    for (int i = 0; i < 3; ++i) variables.push_back(structure.TwistVariable(body, i));
+  }
+  return variables;
 }
 
 GradientResult FinalStateJacobian(const Scene& scene, const std::vector<ParameterPath>& parameters,

@@ -82,6 +82,8 @@ struct GradientResult {
 
 /// Names of the outputs of a scene.
 std::vector<std::string> OutputNames(const ModelStructure& structure);
+/// Their places among the poses and twists of State, and so in [poses | twists | numbers].
+std::vector<int> OutputVariables(const ModelStructure& structure);
 
 /// The Jacobian of the final state. A rollout that is unsolved or diverges, settings that the
 /// engine lacks and Jets of which no width is built are told in `message`.

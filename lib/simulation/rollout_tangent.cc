@@ -97,18 +97,25 @@ double StepTangent::Finish(const Model<double>& model, Stepper* stepper, RowMatr
 }
 
 RolloutReport RolloutTangent(const Model<double>& model, const State<double>& initial,
-                             const TangentObserver& observer, RowMatrixXd* w_dot,
+                             const TangentObserver& observer, Stepper* stepper, RowMatrixXd* w_dot,
                              State<double>* final) {
   StepTangent tangent;
-  const StateObserver each = [&](long k, double t, const State<double>& state, Stepper* stepper) {
-    if (stepper != nullptr) {
-      tangent.Apply(model, stepper, w_dot);
+  const StateObserver each = [&](long k, double t, const State<double>& state, Stepper* done) {
+    if (done != nullptr) {
+      tangent.Apply(model, done, w_dot);
     }
     if (observer) {
       observer(k, t, state, *w_dot);
     }
   };
-  return Rollout(model, initial, each, final);
+  return Rollout(model, initial, each, stepper, final);
+}
+
+RolloutReport RolloutTangent(const Model<double>& model, const State<double>& initial,
+                             const TangentObserver& observer, RowMatrixXd* w_dot,
+                             State<double>* final) {
+  Stepper stepper(model);
+  return RolloutTangent(model, initial, observer, &stepper, w_dot, final);
 }
 
 }  // namespace tangible

@@ -22,6 +22,10 @@ using TangentObserver =
 RolloutReport RolloutTangent(const Model<double>& model, const State<double>& initial,
                              const TangentObserver& observer, RowMatrixXd* w_dot,
                              State<double>* final);
+/// The same with a stepper of the caller's, which keeps its memory from run to run.
+RolloutReport RolloutTangent(const Model<double>& model, const State<double>& initial,
+                             const TangentObserver& observer, Stepper* stepper, RowMatrixXd* w_dot,
+                             State<double>* final);
 
 /// From the derivatives of the new twists of moving blocks (3 num_blocks x columns, row-major) to
 /// those of the state after the step: poses move with them, and are projected.

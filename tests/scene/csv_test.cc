@@ -35,6 +35,18 @@ TEST(CsvTest, ReadsCellsAndTheirLines) {
   EXPECT_EQ(error, "t.csv: line 4: y: expected a number, got \"z\"");
 }
 
+TEST(CsvTest, TakesAnyColumnsWhereNoneAreNamed) {
+  CsvTable table;
+  std::string error;
+  ASSERT_TRUE(ParseCsv("\n a/b ,c\n1,2\n", "t.csv", {}, {}, &table, &error)) << error;
+  EXPECT_EQ(table.columns, (std::vector<std::string>{"a/b", "c"}));
+  EXPECT_EQ(table.header_line, 2);
+  EXPECT_FALSE(ParseCsv("c,c\n", "t.csv", {}, {}, &table, &error));
+  EXPECT_EQ(error, "t.csv: line 1: column c given twice, expected once");
+  EXPECT_FALSE(ParseCsv("\n", "t.csv", {}, {}, &table, &error));
+  EXPECT_EQ(error, "t.csv: line 1: missing header, expected names of columns");
+}
+
 TEST(CsvTest, MessagesNameTheLine) {
   EXPECT_EQ(CsvError(""), "t.csv: line 1: missing header, expected columns time, x");
   EXPECT_EQ(CsvError("time,x,z\n"),

@@ -92,6 +92,8 @@ TEST(LayoutRules, ProjectHeadersAreIncludedByTheirInstalledName) {
   EXPECT_EQ(NumProblems("lib/lcp/a.cc", "#include <tangible/math/scalar.h>\n"), 1U);
   EXPECT_EQ(NumProblems("tests/lcp/a.cc", "#include \"random_problem.h\"\n"), 0U);
   EXPECT_EQ(NumProblems("tests/lcp/a.cc", "#include \"../support/counter.h\"\n"), 0U);
+  EXPECT_EQ(NumProblems("tests/lcp/a.cc", "#include \"../../support/counter.h\"\n"), 1U);
+  EXPECT_EQ(NumProblems("tests/lcp/b/a.cc", "#include \"../../support/counter.h\"\n"), 0U);
   EXPECT_EQ(NumProblems("tests/lcp/a.cc", "#include \"../scene/helper.h\"\n"), 1U);
   EXPECT_EQ(NumProblems("lib/lcp/a.cc", "#include \"tangible/lcp/a_inl.h\"\n"), 0U);
   EXPECT_EQ(NumProblems("lib/lcp/b_inl.h", "#include \"tangible/lcp/a_inl.h\"\n"), 0U);

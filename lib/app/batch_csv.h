@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// Batches as tables: parameters in, final states out.
+
+#include <string>
+#include <vector>
+
+#include "tangible/simulation/batch.h"
+
+namespace tangible {
+
+/// A table of parameters: a column a path, a row a rollout.
+struct BatchTable {
+  std::vector<ParameterPath> parameters;
+  RowMatrixXd values;      ///< rows x parameters
+  std::vector<int> lines;  ///< of each row in the file, from 1
+};
+
+/// Reads the table of a scene. On failure, paths that match nothing and values that a number may
+/// not have included, sets one line "file: line 3: bodies/ball/mass: expected, got".
+bool ReadBatch(const std::string& file, const Scene& scene, BatchTable* table, std::string* error);
+
+/// Rows row,status, then x, y, angle, vx, vy, omega of each moving and kinematic body, in scene
+/// order, under names such as ball/x. Rows are counted from 1; one that failed has the last good
+/// state.
+std::string BatchCsv(const ModelStructure& structure, const std::vector<BatchRow>& rows);
+
+}  // namespace tangible
