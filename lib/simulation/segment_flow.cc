@@ -68,6 +68,39 @@ void AddBodies(const ModelStructure& structure, double factor, const std::vector
   }
 }
 
+// What the parts of each component of M a = p + Aᵀ y + Σ (nᵀ λn + tᵀ λt) amount to as
+// accelerations: they cancel in a body at rest, whose acceleration is the rounding of these.
+void SizesOfTerms(const SolvedNode& node, std::vector<double>* sizes) {
+  const ContactProblem<double>& p = node.problem;
+  const ContactSolution<double>& s = node.solution;
+  sizes->assign(p.momentum.size(), 0.0);
+  for (size_t i = 0; i < p.momentum.size(); ++i) {
+    (*sizes)[i] = std::abs(p.momentum[i]);
+  }
+  const auto add = [&](int block, const RowPart<double>& row, double impulse) {
+    for (int i = 0; block >= 0 && i < 3; ++i) {
+      (*sizes)[3 * block + i] += std::abs(row[i] * impulse);
+    }
+  };
+  for (size_t j = 0; j < p.joints.size(); ++j) {
+    const JointBlock<double>& joint = p.joints[j];
+    for (int k = 0; k < joint.rows; ++k) {
+      add(joint.a, joint.row_a[k], s.joint_impulse[3 * j + k]);
+      add(joint.b, joint.row_b[k], s.joint_impulse[3 * j + k]);
+    }
+  }
+  for (size_t c = 0; c < p.contacts.size(); ++c) {
+    const ContactBlock<double>& contact = p.contacts[c];
+    add(contact.a, contact.normal_a, s.normal_impulse[c]);
+    add(contact.b, contact.normal_b, s.normal_impulse[c]);
+    add(contact.a, contact.tangent_a, s.tangent_impulse[c]);
+    add(contact.b, contact.tangent_b, s.tangent_impulse[c]);
+  }
+  for (size_t i = 0; i < sizes->size(); ++i) {
+    (*sizes)[i] /= p.mass[i];
+  }
+}
+
 // Errors that a correction is to remove: joints, where they are corrected, and gaps.
 double CorrectedError(const ContactProblem<double>& problem) {
   double error = 0.0;
@@ -194,14 +227,23 @@ bool SegmentFlow::Integrate(const Model<double>& model, Segment* segment, std::s
       if (!implicit) {
         break;
       }
-      double change = 0.0;
       double size = 0.0;
-      for (size_t k = 0; k < last.size(); ++k) {
-        change = std::max(change, std::abs(stage.solution.v[k] - last[k]));
-        size = std::max(size, std::abs(last[k]));
+      for (const double acceleration : last) {
+        size = std::max(size, std::abs(acceleration));
       }
-      // Rounding may keep it from the last digit: beyond a few iterations less is enough.
-      if (change <= (iteration < 20 ? kIterated : 1e3 * kIterated) * size) {
+      // What rests does not get nearer to 0 than the terms that cancel in it round; and rounding
+      // may keep the iteration from the last digit: beyond some iterations less is enough.
+      const bool by_terms = iteration >= 3;
+      if (by_terms) {
+        SizesOfTerms(stage, &terms_);
+      }
+      const double tolerance = iteration < 20 ? kIterated : 1e3 * kIterated;
+      bool converged = true;
+      for (size_t k = 0; k < last.size() && converged; ++k) {
+        const double change = std::abs(stage.solution.v[k] - last[k]);
+        converged = change <= tolerance * (by_terms ? std::max(size, terms_[k]) : size);
+      }
+      if (converged) {
         break;
       }
       if (iteration == kMostIterations) {

@@ -55,6 +55,7 @@ class SegmentFlow {
 
   AccelerationScratch<double> acceleration_;
   AssemblyScratch<double> assembly_;
+  std::vector<double> terms_;
 };
 
 /// Sets a segment's twist projection up at a state: its contacts without rebound, those that slide

@@ -139,7 +139,7 @@ Finding AtLimit(const std::string& stepping, double effort) {
   finding.figures.push_back({"rate at the end", run.omega("arm"), 1e-9, "rad/s", "it rests"});
   finding.figures.push_back(
       {"penetration of the stop", run.penetration, 1e-4, "rad", "contact_margin"});
-  AddGradient(scene, 60, {"bodies/arm/mass", "joints/hinge/limits/low", "joints/hinge/effort"},
+  AddGradient(scene, 60, {"bodies/arm/mass", "joints/hinge/limits/0", "joints/hinge/effort"},
               Differences::kTake, &finding);
   return finding;
 }

@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include <cmath>
+#include <cstdio>
 #include <fstream>
 #include <string>
 
@@ -18,6 +19,12 @@ namespace tangible::extremes {
 namespace {
 
 constexpr char kGroup[] = "optimiser";
+
+std::string Format(const char* format, double value) {
+  char text[64];
+  std::snprintf(text, sizeof(text), format, value);
+  return text;
+}
 
 // A ball that hits a box on the floor, hinged to a bar: something of everything.
 Scene Everything(const std::string& stepping) {
@@ -81,13 +88,13 @@ Finding NotNumbers(const std::string& stepping) {
         silent += result.message.empty() ? 1 : 0;
       } else if (!result.values.allFinite() || !result.jacobian.allFinite()) {
         ++silent;
-        if (first.empty()) first = number.path + " = " + std::to_string(bad);
+        first += (first.empty() ? "" : "; ") + number.path + Format(" = %g", bad);
       }
     }
   }
   Finding finding;
   finding.note = std::to_string(refused) + " of " + std::to_string(tried) + " told" +
-                 (first.empty() ? "" : "; first silent: " + first);
+                 (first.empty() ? "" : "; silent: " + first);
   finding.figures.push_back({"results that are not numbers and not told",
                              static_cast<double>(silent), 0.0, "1", "never a silent NaN"});
   return finding;

@@ -43,15 +43,33 @@ double LargestMove(const State<double>& from, const State<double>& to) {
   return moved;
 }
 
+// S and C of scene_check.h.
+struct Sizes {
+  Contributions contributions;
+  VectorX<double> column;
+};
+
+Sizes SizesOf(const Scene& scene, const std::vector<ParameterPath>& parameters,
+              const VectorX<double>& outputs) {
+  Sizes sizes{ContributionsOf(scene, parameters), {}};
+  sizes.column = sizes.contributions.column;
+  for (size_t k = 0; k < parameters.size(); ++k) {
+    const double value = std::abs(parameters[k].value);
+    const double size = value > 0.0 ? value : std::min(parameters[k].scale, 1.0);
+    double& column = sizes.column[static_cast<Eigen::Index>(k)];
+    column = std::max(column, outputs.cwiseAbs().maxCoeff() / size);
+  }
+  return sizes;
+}
+
 // The largest error of (1) in scene_check.h over all entries; `estimates` may be empty.
-double LargestError(const MatrixX<double>& got, const MatrixX<double>& tangent,
-                    const Contributions& contributions, double tolerance,
-                    const std::vector<VectorX<double>>& estimates) {
+double LargestError(const MatrixX<double>& got, const MatrixX<double>& tangent, const Sizes& sizes,
+                    double tolerance, const std::vector<VectorX<double>>& estimates) {
   double largest = 0.0;
   for (Eigen::Index p = 0; p < got.cols(); ++p) {
     for (Eigen::Index o = 0; o < got.rows(); ++o) {
       if (std::isnan(got(o, p))) continue;
-      const double sum = std::max(contributions.sum(o, p), 0.1 * contributions.column[p]);
+      const double sum = std::max(sizes.contributions.sum(o, p), 0.1 * sizes.column[p]);
       const double estimate = estimates.empty() ? 0.0 : estimates[p][o];
       const double error = EntryError(got(o, p), tangent(o, p), tolerance, sum, estimate);
       largest = std::max(largest, std::isnan(error) ? kInfinity : error);
@@ -62,7 +80,7 @@ double LargestError(const MatrixX<double>& got, const MatrixX<double>& tangent,
 
 // Differences column by column; NaN where no step keeps the choices.
 double DifferenceError(const Scene& scene, const std::vector<ParameterPath>& parameters,
-                       const MatrixX<double>& tangent, const Contributions& contributions) {
+                       const MatrixX<double>& tangent, const Sizes& sizes) {
   const RunTrace trace = TraceRun(scene);
   const VectorX<double> noise = RoundingNoise(scene, trace);
   MatrixX<double> quotients(tangent.rows(), tangent.cols());
@@ -76,8 +94,7 @@ double DifferenceError(const Scene& scene, const std::vector<ParameterPath>& par
     if (judged) quotients.col(static_cast<Eigen::Index>(k)) = column.values;
     any = any || judged;
   }
-  return any ? LargestError(quotients, tangent, contributions, kDifferenceTolerance, errors)
-             : kNotMeasured;
+  return any ? LargestError(quotients, tangent, sizes, kDifferenceTolerance, errors) : kNotMeasured;
 }
 
 }  // namespace
@@ -250,12 +267,14 @@ void AddGradient(const Scene& scene, long steps, const std::vector<std::string>&
     return;
   }
   gradient.finite = tangent.jacobian.allFinite() && adjoint.jacobian.allFinite();
+  if (!gradient.finite) {
+    gradient.verdict += tangent.jacobian.allFinite() ? " (adjoint not finite)" : "";
+  }
   if (!gradient.finite) return;
-  const Contributions contributions = ContributionsOf(brief, paths);
-  gradient.adjoint =
-      LargestError(adjoint.jacobian, tangent.jacobian, contributions, kAdjointTolerance, {});
+  const Sizes sizes = SizesOf(brief, paths, tangent.values);
+  gradient.adjoint = LargestError(adjoint.jacobian, tangent.jacobian, sizes, kAdjointTolerance, {});
   if (differences == Differences::kTake) {
-    gradient.differences = DifferenceError(brief, paths, tangent.jacobian, contributions);
+    gradient.differences = DifferenceError(brief, paths, tangent.jacobian, sizes);
   }
 }
 
