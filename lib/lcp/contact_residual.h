@@ -52,4 +52,9 @@ struct ContactMargin {
 ContactMargin MarginOfContact(const ContactProblem<double>& problem,
                               const ContactSolution<double>& solution, int contact);
 
+/// The joint whose rows a v = b the speeds miss by the largest share of their terms, if by more
+/// than `share`; −1: none. `v` may lack the problem's size (nothing was solved): −1.
+int MostViolatedJoint(const ContactProblem<double>& problem, const std::vector<double>& v,
+                      double share);
+
 }  // namespace tangible

@@ -12,7 +12,7 @@ namespace {
 
 using Row = Eigen::RowVectorXd;
 
-constexpr int kMostIterations = 200;
+constexpr int kMostIterations = 60;
 // Below this share of its terms an event's rate is rounding: two features hand a contact over, and
 // nothing depends on when.
 constexpr double kNoRate = 1e-9;
@@ -197,10 +197,23 @@ double EventDerivative::SegmentTangent(const Model<double>& model, Segment* segm
       const double change =
           implicit ? (bodies - a_dot[i].topRows(3 * s.num_blocks())).cwiseAbs().maxCoeff() : 0.0;
       const double size = implicit ? bodies.cwiseAbs().maxCoeff() : 0.0;
-      a_dot[i] = bodies;
       if (!implicit || change <= 1e-15 * size || (iteration > 20 && change <= 1e-12 * size)) {
+        a_dot[i] = bodies;
         break;
       }
+      if (iteration < kMostFixedPoints) {
+        a_dot[i] = bodies;
+        continue;
+      }
+      if (iteration == kMostFixedPoints) {
+        implicit_.Factor(model, *segment, &segment->stages[i], segment->length * tableau.a[i][i],
+                         segment->length * segment->length * tableau.a_hat[i][i]);
+        a_dot[i].setZero();  // the iteration may have diverged
+        continue;
+      }
+      RowMatrixXd step = bodies - a_dot[i];
+      implicit_.Solve(&step);
+      a_dot[i] += step;
     }
   }
   PlaceTangent(s, *segment, 1.0, tableau.b, tableau.b_hat, tableau.stages, tau_dot, *x, a_dot,
@@ -364,11 +377,24 @@ void EventDerivative::StagesAdjoint(const Model<double>& model, Segment* segment
       }
       const double change = (next - own).cwiseAbs().maxCoeff();
       const double size = next.cwiseAbs().maxCoeff();
-      own = next;
       if (change <= 1e-15 * size || (iteration > 20 && change <= 1e-12 * size)) {
+        own = next;
         solve(own, &stage_bar);
         break;
       }
+      if (iteration < kMostFixedPoints) {
+        own = next;
+        continue;
+      }
+      if (iteration == kMostFixedPoints) {
+        implicit_.Factor(model, *segment, &stage, tau * tableau.a[i][i],
+                         tau * tau * tableau.a_hat[i][i]);
+        own.setZero();  // the iteration may have diverged
+        continue;
+      }
+      RowMatrixXd step = next - own;
+      implicit_.SolveTransposed(&step);
+      own += step;
     }
     for (int j = 0; j < i; ++j) {
       for (int k = 0; k < s.num_blocks(); ++k) {

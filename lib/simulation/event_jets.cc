@@ -12,7 +12,7 @@
 namespace tangible {
 namespace {
 
-constexpr int kMostIterations = 200;
+constexpr int kMostIterations = 60;
 constexpr double kNoRate = 1e-9;  // as in event_derivative.cc
 // Pivots below this share of the largest: redundant rows, solved with δ and refined.
 constexpr double kSingular = 1e-13;
@@ -336,6 +336,22 @@ class EventReplay {
     }
   }
 
+  // A ← A + (I − B)⁻¹ (N − A) of values and derivatives.
+  void NewtonStep(const ContactSolution<T>& next, ContactSolution<T>* stage) const {
+    RowMatrixXd step(static_cast<Eigen::Index>(next.v.size()), kWidth + 1);
+    for (size_t k = 0; k < next.v.size(); ++k) {
+      const T left = next.v[k] - stage->v[k];
+      step(static_cast<Eigen::Index>(k), 0) = ValueOf(left);
+      step.row(static_cast<Eigen::Index>(k)).tail(kWidth) = left.v.transpose();
+    }
+    implicit_.Solve(&step);
+    for (size_t k = 0; k < next.v.size(); ++k) {
+      T change(step(static_cast<Eigen::Index>(k), 0));
+      change.v = step.row(static_cast<Eigen::Index>(k)).tail(kWidth).transpose();
+      stage->v[k] += change;
+    }
+  }
+
   void Map(Segment* segment, const State<T>& before, const T& time, const T& tau, State<T>* after) {
     const NystromTableau& tableau = NystromTableau::Of(s_.settings.integrator);
     std::vector<ContactSolution<T>> stages(tableau.stages);
@@ -357,9 +373,19 @@ class EventReplay {
                              std::abs(ValueOf(next.v[k]) - ValueOf(stages[i].v[k]))});
           size = std::max({size, DerivativeSize(next.v[k]), std::abs(ValueOf(next.v[k]))});
         }
-        stages[i] = next;
         if (!implicit || change <= 1e-15 * size || (iteration > 20 && change <= 1e-12 * size)) {
+          stages[i] = next;
           break;
+        }
+        if (iteration < kMostFixedPoints) {
+          stages[i] = next;
+        } else if (iteration == kMostFixedPoints) {
+          const double length = ValueOf(tau);
+          implicit_.Factor(values_, *segment, &segment->stages[i], length * tableau.a[i][i],
+                           length * length * tableau.a_hat[i][i]);
+          stages[i] = stages[i - 1];  // the iteration may have diverged
+        } else {
+          NewtonStep(next, &stages[i]);
         }
       }
     }
@@ -447,6 +473,7 @@ class EventReplay {
   const ModelStructure& s_;
   const JetRoute route_;
   EventDerivative& derivative_;
+  ImplicitStage implicit_;
   std::vector<T> compression_;  // normal impulses of the last impact
 };
 

@@ -4,11 +4,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tangible/lcp/contact_residual.h"
+
 namespace tangible {
 namespace {
 
 constexpr int kMostCorrections = 12;
-constexpr int kMostIterations = 100;
+constexpr int kMostIterations = 60;
 constexpr double kIterated = 1e-14;  // relative change at which the implicit stage has converged
 
 NystromTableau SemiImplicitEuler() {
@@ -189,6 +191,78 @@ bool SegmentFlow::Accelerate(const Model<double>& model, const Segment& segment,
   return SolveNode(segment.modes, node);
 }
 
+// A stage that reads its own accelerations: iterated, and where that does not contract by Newton's
+// method from the start again (implicit_stage.h). `place` gives the state from the stages.
+bool SegmentFlow::SolveImplicitStage(const Model<double>& model, Segment* segment, int i,
+                                     const std::function<void(State<double>*)>& place,
+                                     std::string* message) {
+  const NystromTableau& tableau = NystromTableau::Of(model.structure->settings.integrator);
+  const double tau = segment->length;
+  SolvedNode& stage = segment->stages[i];
+  std::vector<double>& acceleration = stage.solution.v;
+  const std::vector<double> start = segment->stages[i - 1].solution.v;
+  acceleration = start;
+  State<double> state;
+  for (int iteration = 0; iteration <= kMostIterations; ++iteration) {
+    const bool newton = iteration >= kMostFixedPoints;
+    if (iteration == kMostFixedPoints) {
+      acceleration = start;
+    }
+    const std::vector<double> last = acceleration;
+    place(&state);
+    const bool solved =
+        AllFinite(state.pose) && AllFinite(state.twist) &&
+        Accelerate(model, *segment, state, segment->time + tableau.c[i] * tau, &stage);
+    if (!solved) {
+      if (newton) {
+        *message = "accelerations with the contacts' modes held are singular";
+        return false;
+      }
+      iteration = kMostFixedPoints - 1;  // it has diverged
+      continue;
+    }
+    if (HasConverged(stage, last, iteration)) {
+      return true;
+    }
+    if (newton) {
+      implicit_.Factor(model, *segment, &stage, tau * tableau.a[i][i],
+                       tau * tau * tableau.a_hat[i][i]);
+      RowMatrixXd step(static_cast<Eigen::Index>(last.size()), 1);
+      for (size_t k = 0; k < last.size(); ++k) {
+        step(static_cast<Eigen::Index>(k), 0) = acceleration[k] - last[k];
+      }
+      implicit_.Solve(&step);
+      for (size_t k = 0; k < last.size(); ++k) {
+        acceleration[k] = last[k] + step(static_cast<Eigen::Index>(k), 0);
+      }
+    }
+  }
+  *message = "the trapezoidal rule's iteration does not converge: dt is too large";
+  return false;
+}
+
+bool SegmentFlow::HasConverged(const SolvedNode& stage, const std::vector<double>& last,
+                               int iteration) {
+  double size = 0.0;
+  for (const double acceleration : last) {
+    size = std::max(size, std::abs(acceleration));
+  }
+  // What rests does not get nearer to 0 than the terms that cancel in it round; and rounding may
+  // keep the iteration from the last digit: beyond some iterations less is enough.
+  const bool by_terms = iteration >= 3;
+  if (by_terms) {
+    SizesOfTerms(stage, &terms_);
+  }
+  const double tolerance = iteration < kMostFixedPoints + 5 ? kIterated : 1e3 * kIterated;
+  for (size_t k = 0; k < last.size(); ++k) {
+    const double change = std::abs(stage.solution.v[k] - last[k]);
+    if (!(change <= tolerance * (by_terms ? std::max(size, terms_[k]) : size))) {
+      return false;
+    }
+  }
+  return true;
+}
+
 bool SegmentFlow::Integrate(const Model<double>& model, Segment* segment, std::string* message) {
   const ModelStructure& structure = *model.structure;
   const NystromTableau& tableau = NystromTableau::Of(structure.settings.integrator);
@@ -211,45 +285,22 @@ bool SegmentFlow::Integrate(const Model<double>& model, Segment* segment, std::s
   };
   State<double> state;
   for (int i = 0; i < tableau.stages; ++i) {
-    const bool implicit = tableau.last_is_implicit && i + 1 == tableau.stages;
-    SolvedNode& stage = segment->stages[i];
-    if (implicit) {
-      stage.solution.v = segment->stages[i - 1].solution.v;  // a start for the iteration
+    const auto place_stage = [&](int terms, State<double>* at) {
+      place(tableau.c[i], tableau.a[i], tableau.a_hat[i], terms, at);
+    };
+    if (tableau.last_is_implicit && i + 1 == tableau.stages) {
+      const auto place_implicit = [&](State<double>* at) { place_stage(i + 1, at); };
+      if (!SolveImplicitStage(model, segment, i, place_implicit, message)) {
+        return false;
+      }
+      continue;
     }
-    for (int iteration = 0;; ++iteration) {
-      place(tableau.c[i], tableau.a[i], tableau.a_hat[i], implicit ? i + 1 : i, &state);
-      const std::vector<double> last = implicit ? stage.solution.v : std::vector<double>();
-      if (!AllFinite(state.pose) || !AllFinite(state.twist) ||
-          !Accelerate(model, *segment, state, segment->time + tableau.c[i] * tau, &stage)) {
-        *message = "accelerations with the contacts' modes held are singular";
-        return false;
-      }
-      if (!implicit) {
-        break;
-      }
-      double size = 0.0;
-      for (const double acceleration : last) {
-        size = std::max(size, std::abs(acceleration));
-      }
-      // What rests does not get nearer to 0 than the terms that cancel in it round; and rounding
-      // may keep the iteration from the last digit: beyond some iterations less is enough.
-      const bool by_terms = iteration >= 3;
-      if (by_terms) {
-        SizesOfTerms(stage, &terms_);
-      }
-      const double tolerance = iteration < 20 ? kIterated : 1e3 * kIterated;
-      bool converged = true;
-      for (size_t k = 0; k < last.size() && converged; ++k) {
-        const double change = std::abs(stage.solution.v[k] - last[k]);
-        converged = change <= tolerance * (by_terms ? std::max(size, terms_[k]) : size);
-      }
-      if (converged) {
-        break;
-      }
-      if (iteration == kMostIterations) {
-        *message = "the trapezoidal rule's iteration does not converge: dt is too large";
-        return false;
-      }
+    place_stage(i, &state);
+    if (!AllFinite(state.pose) || !AllFinite(state.twist) ||
+        !Accelerate(model, *segment, state, segment->time + tableau.c[i] * tau,
+                    &segment->stages[i])) {
+      *message = "accelerations with the contacts' modes held are singular";
+      return false;
     }
   }
   place(1.0, tableau.b, tableau.b_hat, tableau.stages, &segment->after);
@@ -330,6 +381,14 @@ bool SegmentFlow::ProjectTwists(const Model<double>& model, Segment* segment,
     return false;
   }
   const Impulses& projection = segment->projection;
+  // Rounding of an ill-posed system leaves less than this share of a row's terms.
+  constexpr double kMissed = 1e-6;
+  const int joint = MostViolatedJoint(projection.problem, projection.solution.v, kMissed);
+  if (joint >= 0) {
+    *message = "joint " + model.structure->joints[joint].name +
+               " contradicts the others: no twist satisfies all";
+    return false;
+  }
   SpreadTwists(*model.structure, projection.solution.v, &segment->after.twist);
   segment->projection.new_twist = segment->after.twist;
   return true;

@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tangible/verification/extremes/extreme_case.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <nlohmann/json.hpp>
 
+#include "tangible/lcp/certificate.h"
 #include "tangible/verification/extremes/groups.h"
 
 namespace tangible::extremes {
@@ -24,11 +26,16 @@ double FromBits(const json& text) { return std::strtod(text.get<std::string>().c
 
 }  // namespace
 
+double GradientFinding::adjoint_bound() const {
+  return std::clamp(std::numeric_limits<double>::epsilon() * condition, kAdjointTolerance,
+                    kLinearResidualLimit);
+}
+
 bool GradientFinding::holds() const {
   if (!taken) return true;
   if (!message.empty() || !finite) return false;
   if (!trustworthy()) return true;
-  return adjoint <= kAdjointTolerance &&
+  return adjoint <= adjoint_bound() &&
          (std::isnan(differences) || differences <= kDifferenceTolerance);
 }
 
@@ -58,7 +65,7 @@ std::string Serialise(const Finding& finding) {
   return json{{"figures", figures},
               {"gradient",
                {gradient.taken, gradient.message, gradient.finite, Bits(gradient.adjoint),
-                Bits(gradient.differences), gradient.verdict}},
+                Bits(gradient.differences), gradient.verdict, Bits(gradient.condition)}},
               {"note", finding.note}}
       .dump();
 }
@@ -74,7 +81,8 @@ bool Deserialise(const std::string& text, Finding* finding) {
     }
     const json& gradient = all.at("gradient");
     finding->gradient = {gradient.at(0),           gradient.at(1),           gradient.at(2),
-                         FromBits(gradient.at(3)), FromBits(gradient.at(4)), gradient.at(5)};
+                         FromBits(gradient.at(3)), FromBits(gradient.at(4)), gradient.at(5),
+                         FromBits(gradient.at(6))};
     finding->note = all.at("note");
   } catch (const json::exception&) {
     return false;

@@ -7,7 +7,9 @@
 //   holds            |figure| ≤ bound for every figure; a figure that is not a number does not hold
 //   gradient holds   all entries are finite, and, where the certificate says "trustworthy",
 //                    adjoint and differences agree with the tangent (gradients/scene_check.h (1),
-//                    tolerances 1e-9 and 1e-5)
+//                    tolerances 1e-9 and 1e-5; of the adjoint eps times the condition of the linear
+//                    systems, which the certificate tells, where that is more, up to 1e-6: what it
+//                    allows a system that is said to be solved)
 //
 // A case runs in a process of its own (cost/child.h): a crash or an endless loop of one is a row
 // that failed.
@@ -40,8 +42,10 @@ struct GradientFinding {
   double adjoint = kNotMeasured;      ///< largest error against the tangent, see above
   double differences = kNotMeasured;  ///< the same; NaN where no choice-preserving step was found
   std::string verdict;                ///< the certificate's
+  double condition = 1.0;             ///< the certificate's
 
   bool trustworthy() const { return verdict == "trustworthy"; }
+  double adjoint_bound() const;
   bool holds() const;
 };
 

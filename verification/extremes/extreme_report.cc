@@ -155,6 +155,7 @@ OrderedJson ToJson(const std::vector<CaseResult>& results) {
                          {"adjoint", OrNull(gradient.adjoint)},
                          {"differences", OrNull(gradient.differences)},
                          {"certificate", gradient.verdict},
+                         {"condition", OrNull(gradient.condition)},
                          {"message", gradient.message},
                          {"holds", gradient.holds()}};
     } else {

@@ -262,6 +262,7 @@ void AddGradient(const Scene& scene, long steps, const std::vector<std::string>&
   options.certificate = CertificatePass::kSkip;
   const GradientResult adjoint = FinalStateJacobian(brief, paths, options);
   gradient.verdict = tangent.certificate.verdict;
+  gradient.condition = tangent.certificate.condition;
   if (!tangent.done || !adjoint.done) {
     gradient.message = tangent.done ? adjoint.message : tangent.message;
     return;
