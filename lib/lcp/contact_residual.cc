@@ -212,9 +212,10 @@ ContactMargin MarginOfContact(const ContactProblem<double>& problem,
 }
 
 int MostViolatedJoint(const ContactProblem<double>& problem, const std::vector<double>& v,
-                      double share) {
+                      const std::vector<double>& sizes, double share) {
   int worst = -1;
-  if (v.size() != 3 * static_cast<size_t>(problem.num_bodies)) {
+  const size_t size = 3 * static_cast<size_t>(problem.num_bodies);
+  if (v.size() != size || sizes.size() != size) {
     return worst;
   }
   for (size_t j = 0; j < problem.joints.size(); ++j) {
@@ -223,8 +224,8 @@ int MostViolatedJoint(const ContactProblem<double>& problem, const std::vector<d
       const double left = RowDot(joint.a, joint.row_a[k], joint.b, joint.row_b[k], v.data());
       double terms = std::abs(joint.rhs[k]);
       for (int i = 0; i < 3; ++i) {
-        terms += joint.a >= 0 ? std::abs(joint.row_a[k][i] * v[3 * joint.a + i]) : 0.0;
-        terms += joint.b >= 0 ? std::abs(joint.row_b[k][i] * v[3 * joint.b + i]) : 0.0;
+        terms += joint.a >= 0 ? std::abs(joint.row_a[k][i] * sizes[3 * joint.a + i]) : 0.0;
+        terms += joint.b >= 0 ? std::abs(joint.row_b[k][i] * sizes[3 * joint.b + i]) : 0.0;
       }
       const double missed = std::abs(left - joint.rhs[k]);
       if (missed > share * terms) {

@@ -52,9 +52,10 @@ struct ContactMargin {
 ContactMargin MarginOfContact(const ContactProblem<double>& problem,
                               const ContactSolution<double>& solution, int contact);
 
-/// The joint whose rows a v = b the speeds miss by the largest share of their terms, if by more
-/// than `share`; −1: none. `v` may lack the problem's size (nothing was solved): −1.
+/// The joint whose rows a v = b the speeds miss by the largest share of what their terms are at
+/// speeds of the size `sizes` (3 a body; of a body at rest those that cancel in it, as its own are
+/// rounding), if by more than `share`; −1: none, also where nothing was solved.
 int MostViolatedJoint(const ContactProblem<double>& problem, const std::vector<double>& v,
-                      double share);
+                      const std::vector<double>& sizes, double share);
 
 }  // namespace tangible

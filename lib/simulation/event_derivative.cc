@@ -211,6 +211,9 @@ double EventDerivative::SegmentTangent(const Model<double>& model, Segment* segm
         a_dot[i].setZero();  // the iteration may have diverged
         continue;
       }
+      if (iteration + 1 == kMostIterations) {
+        left = std::max(left, change / size);  // it has not converged: the certificate says so
+      }
       RowMatrixXd step = bodies - a_dot[i];
       implicit_.Solve(&step);
       a_dot[i] += step;

@@ -381,9 +381,17 @@ bool SegmentFlow::ProjectTwists(const Model<double>& model, Segment* segment,
     return false;
   }
   const Impulses& projection = segment->projection;
-  // Rounding of an ill-posed system leaves less than this share of a row's terms.
+  // Rounding of an ill-posed system leaves less than this share of a row's terms, at the speeds
+  // that the segment's forces would give.
   constexpr double kMissed = 1e-6;
-  const int joint = MostViolatedJoint(projection.problem, projection.solution.v, kMissed);
+  SizesOfTerms(segment->stages[segment->num_stages - 1], &terms_);
+  for (size_t k = 0; k < terms_.size(); ++k) {
+    terms_[k] = segment->length * terms_[k] + std::abs(projection.solution.v[k]);
+  }
+  const int joint =
+      segment->length > 0.0
+          ? MostViolatedJoint(projection.problem, projection.solution.v, terms_, kMissed)
+          : -1;
   if (joint >= 0) {
     *message = "joint " + model.structure->joints[joint].name +
                " contradicts the others: no twist satisfies all";

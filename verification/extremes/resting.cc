@@ -110,7 +110,7 @@ void AddResting(std::vector<ExtremeCase>* cases) {
     cases->push_back({kGroup, "pyramid, base 20", stepping,
                       [=](Length length) {
                         return AtRest(Pyramid(stepping, 20, 1.0), length,
-                                      stepping == "fixed" ? 0.2 : 0.03, 2, "box0_0");
+                                      stepping == "fixed" ? 0.2 : 0.02, 1, "box0_0");
                       },
                       60.0});
     cases->push_back(
