@@ -36,13 +36,7 @@ int CollideHalfPlane(const ConvexCore& core, const Vector2<double>& normal, doub
   }
   const Candidate next = candidate(core.Next(lowest));
   const Candidate previous = candidate(core.Previous(lowest));
-  // The edge that is more nearly parallel to the plane: of a needle's end both corners are lower
-  // than the other end, but they do not keep it from turning in.
-  const Vector2<double> low = core.VertexAt(lowest);
-  const double next_length = (core.VertexAt(core.Next(lowest)) - low).norm();
-  const double previous_length = (core.VertexAt(core.Previous(lowest)) - low).norm();
-  const bool is_next = (next.gap - candidates[0].gap) * previous_length <=
-                       (previous.gap - candidates[0].gap) * next_length;
+  const bool is_next = next.gap <= previous.gap;
   candidates[1] = is_next ? next : previous;
   // A capsule without length is a circle.
   const bool is_point =
