@@ -243,4 +243,30 @@ ContactMargin MarginOfContact(const ContactProblem<double>& problem,
   return friction.value < opening.value ? friction : opening;
 }
 
+int MostViolatedJoint(const ContactProblem<double>& problem, const std::vector<double>& v,
+                      const std::vector<double>& sizes, double share) {
+  int worst = -1;
+  const size_t size = 3 * static_cast<size_t>(problem.num_bodies);
+  if (v.size() != size || sizes.size() != size) {
+    return worst;
+  }
+  for (size_t j = 0; j < problem.joints.size(); ++j) {
+    const JointBlock<double>& joint = problem.joints[j];
+    for (int k = 0; k < joint.rows; ++k) {
+      const double left = RowDot(joint.a, joint.row_a[k], joint.b, joint.row_b[k], v.data());
+      double terms = std::abs(joint.rhs[k]);
+      for (int i = 0; i < 3; ++i) {
+        terms += joint.a >= 0 ? std::abs(joint.row_a[k][i] * sizes[3 * joint.a + i]) : 0.0;
+        terms += joint.b >= 0 ? std::abs(joint.row_b[k][i] * sizes[3 * joint.b + i]) : 0.0;
+      }
+      const double missed = std::abs(left - joint.rhs[k]);
+      if (missed > share * terms) {
+        share = missed / terms;
+        worst = static_cast<int>(j);
+      }
+    }
+  }
+  return worst;
+}
+
 }  // namespace tangible

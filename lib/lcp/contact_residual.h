@@ -72,4 +72,10 @@ ContactMargin MarginOfContact(const ContactProblem<double>& problem,
                               const ContactSolution<double>& solution, const ContactScales& scales,
                               int contact);
 
+/// The joint whose rows a v = b the speeds miss by the largest share of what their terms are at
+/// speeds of the size `sizes` (3 a body; of a body at rest those that cancel in it, as its own are
+/// rounding), if by more than `share`; −1: none, also where nothing was solved.
+int MostViolatedJoint(const ContactProblem<double>& problem, const std::vector<double>& v,
+                      const std::vector<double>& sizes, double share);
+
 }  // namespace tangible

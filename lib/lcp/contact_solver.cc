@@ -323,6 +323,8 @@ bool ContactSolver::SolveByPivoting(const ContactProblem<double>& problem,
 bool ContactSolver::Polish(const ContactProblem<double>& problem,
                            const ContactSolverOptions& options, ContactSolution<double>* solution,
                            ContactSolverReport* report) {
+  const std::vector<ContactMode> given = solution->modes;
+  bool polished = false;
   int worst = -1;
   double before = NaturalResidual(problem, *solution, &worst);
   // A round may show that a row near its limit was judged wrongly; two more put it right or give
@@ -339,6 +341,7 @@ bool ContactSolver::Polish(const ContactProblem<double>& problem,
       *solution = trial_;
       before = after;
       worst = trial_worst;
+      polished = true;
       break;
     }
     scales_.Compute(problem, trial_);
@@ -352,7 +355,14 @@ bool ContactSolver::Polish(const ContactProblem<double>& problem,
   }
   report->residual = before;
   report->worst_contact = worst;
-  return before <= options.tolerance;
+  if (polished || before > options.tolerance) {
+    return before <= options.tolerance;
+  }
+  // It was good enough as given. What was tried has left another system and other modes behind; the
+  // derivative needs those of the solution.
+  solution->modes = given;
+  ++report->factorisations;
+  return system_.Factor(problem, given);
 }
 
 bool ContactSolver::SolveByInteriorPoint(const ContactProblem<double>& problem,

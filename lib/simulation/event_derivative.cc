@@ -12,6 +12,7 @@ namespace {
 
 using Row = Eigen::RowVectorXd;
 
+constexpr int kMostIterations = 60;
 // Below this share of its terms an event's rate is rounding: two features hand a contact over, and
 // nothing depends on when.
 constexpr double kNoRate = 1e-9;
@@ -187,7 +188,8 @@ double EventDerivative::SegmentTangent(const Model<double>& model, Segment* segm
     if (implicit) {
       a_dot[i] = a_dot[i - 1];
     }
-    for (FixedPoint iteration;;) {
+    FixedPoint fixed_point;
+    for (int iteration = 0; iteration < kMostIterations; ++iteration) {
       PlaceTangent(s, *segment, tableau.c[i], tableau.a[i], tableau.a_hat[i], implicit ? i + 1 : i,
                    tau_dot, *x, a_dot, &place);
       RowMatrixXd next;
@@ -196,10 +198,26 @@ double EventDerivative::SegmentTangent(const Model<double>& model, Segment* segm
       const double change =
           implicit ? (bodies - a_dot[i].topRows(3 * s.num_blocks())).cwiseAbs().maxCoeff() : 0.0;
       const double size = implicit ? bodies.cwiseAbs().maxCoeff() : 0.0;
-      a_dot[i] = bodies;
-      if (!implicit || iteration.Arrived(change, size)) {
+      if (!implicit || fixed_point.Arrived(change, size)) {
+        a_dot[i] = bodies;
         break;
       }
+      if (iteration < kMostFixedPoints) {
+        a_dot[i] = bodies;
+        continue;
+      }
+      if (iteration == kMostFixedPoints) {
+        implicit_.Factor(model, *segment, &segment->stages[i], segment->length * tableau.a[i][i],
+                         segment->length * segment->length * tableau.a_hat[i][i]);
+        a_dot[i].setZero();  // the iteration may have diverged
+        continue;
+      }
+      if (iteration + 1 == kMostIterations) {
+        left = std::max(left, change / size);  // it has not converged: the certificate says so
+      }
+      RowMatrixXd step = bodies - a_dot[i];
+      implicit_.Solve(&step);
+      a_dot[i] += step;
     }
   }
   PlaceTangent(s, *segment, 1.0, tableau.b, tableau.b_hat, tableau.stages, tau_dot, *x, a_dot,
@@ -349,7 +367,8 @@ void EventDerivative::StagesAdjoint(const Model<double>& model, Segment* segment
     };
     RowMatrixXd stage_bar;
     RowMatrixXd own = a_bar[i];
-    for (FixedPoint iteration;;) {
+    FixedPoint fixed_point;
+    for (int iteration = 0; iteration < kMostIterations; ++iteration) {
       solve(own, &stage_bar);
       if (!implicit) {
         break;
@@ -363,11 +382,24 @@ void EventDerivative::StagesAdjoint(const Model<double>& model, Segment* segment
       }
       const double change = (next - own).cwiseAbs().maxCoeff();
       const double size = next.cwiseAbs().maxCoeff();
-      own = next;
-      if (iteration.Arrived(change, size)) {
+      if (fixed_point.Arrived(change, size)) {
+        own = next;
         solve(own, &stage_bar);
         break;
       }
+      if (iteration < kMostFixedPoints) {
+        own = next;
+        continue;
+      }
+      if (iteration == kMostFixedPoints) {
+        implicit_.Factor(model, *segment, &stage, tau * tableau.a[i][i],
+                         tau * tau * tableau.a_hat[i][i]);
+        own.setZero();  // the iteration may have diverged
+        continue;
+      }
+      RowMatrixXd step = next - own;
+      implicit_.SolveTransposed(&step);
+      own += step;
     }
     for (int j = 0; j < i; ++j) {
       for (int k = 0; k < s.num_blocks(); ++k) {

@@ -13,6 +13,7 @@
 
 #include "tangible/math/scalar.h"
 #include "tangible/simulation/event_record.h"
+#include "tangible/simulation/implicit_stage.h"
 
 namespace tangible {
 
@@ -46,6 +47,7 @@ class EventDerivative {
                    bool correction, RowMatrixXd* seed, RowMatrixXd* w_bar);
 
   LocalJacobianScratch scratch_;
+  ImplicitStage implicit_;
   RowMatrixXd rhs_;
   // Poisson's law, between an impact's two parts: derivatives of the compression's normal impulses,
   // and of the losses with respect to them; a row a contact of the compression.

@@ -12,6 +12,7 @@
 namespace tangible {
 namespace {
 
+constexpr int kMostIterations = 60;
 constexpr double kNoRate = 1e-9;  // as in event_derivative.cc
 // Pivots below this share of the largest: redundant rows, solved with δ and refined.
 constexpr double kSingular = 1e-13;
@@ -335,6 +336,22 @@ class EventReplay {
     }
   }
 
+  // A ← A + (I − B)⁻¹ (N − A) of values and derivatives.
+  void NewtonStep(const ContactSolution<T>& next, ContactSolution<T>* stage) const {
+    RowMatrixXd step(static_cast<Eigen::Index>(next.v.size()), kWidth + 1);
+    for (size_t k = 0; k < next.v.size(); ++k) {
+      const T left = next.v[k] - stage->v[k];
+      step(static_cast<Eigen::Index>(k), 0) = ValueOf(left);
+      step.row(static_cast<Eigen::Index>(k)).tail(kWidth) = left.v.transpose();
+    }
+    implicit_.Solve(&step);
+    for (size_t k = 0; k < next.v.size(); ++k) {
+      T change(step(static_cast<Eigen::Index>(k), 0));
+      change.v = step.row(static_cast<Eigen::Index>(k)).tail(kWidth).transpose();
+      stage->v[k] += change;
+    }
+  }
+
   void Map(Segment* segment, const State<T>& before, const T& time, const T& tau, State<T>* after) {
     const NystromTableau& tableau = NystromTableau::Of(s_.settings.integrator);
     std::vector<ContactSolution<T>> stages(tableau.stages);
@@ -344,7 +361,8 @@ class EventReplay {
       if (implicit) {
         stages[i] = stages[i - 1];
       }
-      for (FixedPoint iteration;;) {
+      FixedPoint fixed_point;
+      for (int iteration = 0; iteration < kMostIterations; ++iteration) {
         Place(before, tau, tableau.c[i], tableau.a[i], tableau.a_hat[i], implicit ? i + 1 : i,
               stages, &state);
         ContactSolution<T> next;
@@ -356,9 +374,19 @@ class EventReplay {
                              std::abs(ValueOf(next.v[k]) - ValueOf(stages[i].v[k]))});
           size = std::max({size, DerivativeSize(next.v[k]), std::abs(ValueOf(next.v[k]))});
         }
-        stages[i] = next;
-        if (!implicit || iteration.Arrived(change, size)) {
+        if (!implicit || fixed_point.Arrived(change, size)) {
+          stages[i] = next;
           break;
+        }
+        if (iteration < kMostFixedPoints) {
+          stages[i] = next;
+        } else if (iteration == kMostFixedPoints) {
+          const double length = ValueOf(tau);
+          implicit_.Factor(values_, *segment, &segment->stages[i], length * tableau.a[i][i],
+                           length * length * tableau.a_hat[i][i]);
+          stages[i] = stages[i - 1];  // the iteration may have diverged
+        } else {
+          NewtonStep(next, &stages[i]);
         }
       }
     }
@@ -446,6 +474,7 @@ class EventReplay {
   const ModelStructure& s_;
   const JetRoute route_;
   EventDerivative& derivative_;
+  ImplicitStage implicit_;
   std::vector<T> compression_;  // normal impulses of the last impact
 };
 

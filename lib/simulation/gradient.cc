@@ -2,6 +2,7 @@
 #include "tangible/simulation/gradient.h"
 
 #include <algorithm>
+#include <cmath>
 #include <ctime>
 #include <functional>
 
@@ -39,6 +40,19 @@ namespace {
 
 using internal::FailureOf;
 using internal::GradientProblem;
+
+// Empty, or one line: the first number of the scene that is not finite. What a file may not hold
+// can still be set by a program, an optimiser's step say.
+std::string CheckNumbers(const GradientProblem& problem) {
+  Scene scene = problem.scene;
+  for (const SceneNumber<double>& number : EnumerateNumbers(&scene)) {
+    if (!std::isfinite(*number.value)) {
+      return (scene.path.empty() ? "" : scene.path + ": ") + number.path +
+             ": expected a finite number, got " + std::to_string(*number.value);
+    }
+  }
+  return "";
+}
 
 // Derivatives of the losses with respect to the outputs (outputs x losses), given the outputs.
 using OutputSeed = std::function<MatrixX<double>(const VectorX<double>& values)>;
@@ -233,7 +247,10 @@ GradientResult Differentiate(const GradientProblem& problem, const GradientOptio
     result.message = (problem.scene.path.empty() ? "" : problem.scene.path + ": ") + error;
     return result;
   }
-  result.message = CheckSide(problem, options);
+  result.message = CheckNumbers(problem);
+  if (result.message.empty()) {
+    result.message = CheckSide(problem, options);
+  }
   if (!result.message.empty()) {
     return result;
   }
@@ -252,6 +269,11 @@ GradientResult Differentiate(const GradientProblem& problem, const GradientOptio
   const auto best = [](const std::vector<double>& times) {
     return *std::min_element(times.begin(), times.end());
   };
+  if (!result.values.allFinite() || !derivative->allFinite()) {
+    result.message = (problem.scene.path.empty() ? "" : problem.scene.path + ": ") +
+                     "the derivative is not finite: it overflows, or the scene is too badly scaled";
+    return result;
+  }
   result.seconds = best(result.all_seconds);
   result.rollout_seconds = best(result.all_rollout_seconds);
   // Event stepping needs the certificate to tell whether there are sides.

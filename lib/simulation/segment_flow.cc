@@ -4,11 +4,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tangible/lcp/contact_residual.h"
+
 namespace tangible {
 namespace {
 
 constexpr int kMostCorrections = 12;
-constexpr int kMostIterations = 100;
+constexpr int kMostIterations = 60;
 constexpr double kIterated = 1e-14;  // relative change at which the implicit stage has converged
 
 NystromTableau SemiImplicitEuler() {
@@ -65,6 +67,39 @@ void AddBodies(const ModelStructure& structure, double factor, const std::vector
     for (int i = 0; i < 3; ++i) {
       (*x)[3 * structure.moving[k] + i] += factor * solved[3 * k + i];
     }
+  }
+}
+
+// What the parts of each component of M a = p + Aᵀ y + Σ (nᵀ λn + tᵀ λt) amount to as
+// accelerations: they cancel in a body at rest, whose acceleration is the rounding of these.
+void SizesOfTerms(const SolvedNode& node, std::vector<double>* sizes) {
+  const ContactProblem<double>& p = node.problem;
+  const ContactSolution<double>& s = node.solution;
+  sizes->assign(p.momentum.size(), 0.0);
+  for (size_t i = 0; i < p.momentum.size(); ++i) {
+    (*sizes)[i] = std::abs(p.momentum[i]);
+  }
+  const auto add = [&](int block, const RowPart<double>& row, double impulse) {
+    for (int i = 0; block >= 0 && i < 3; ++i) {
+      (*sizes)[3 * block + i] += std::abs(row[i] * impulse);
+    }
+  };
+  for (size_t j = 0; j < p.joints.size(); ++j) {
+    const JointBlock<double>& joint = p.joints[j];
+    for (int k = 0; k < joint.rows; ++k) {
+      add(joint.a, joint.row_a[k], s.joint_impulse[3 * j + k]);
+      add(joint.b, joint.row_b[k], s.joint_impulse[3 * j + k]);
+    }
+  }
+  for (size_t c = 0; c < p.contacts.size(); ++c) {
+    const ContactBlock<double>& contact = p.contacts[c];
+    add(contact.a, contact.normal_a, s.normal_impulse[c]);
+    add(contact.b, contact.normal_b, s.normal_impulse[c]);
+    add(contact.a, contact.tangent_a, s.tangent_impulse[c]);
+    add(contact.b, contact.tangent_b, s.tangent_impulse[c]);
+  }
+  for (size_t i = 0; i < sizes->size(); ++i) {
+    (*sizes)[i] /= p.mass[i];
   }
 }
 
@@ -156,6 +191,78 @@ bool SegmentFlow::Accelerate(const Model<double>& model, const Segment& segment,
   return SolveNode(segment.modes, node);
 }
 
+// A stage that reads its own accelerations: iterated, and where that does not contract by Newton's
+// method from the start again (implicit_stage.h). `place` gives the state from the stages.
+bool SegmentFlow::SolveImplicitStage(const Model<double>& model, Segment* segment, int i,
+                                     const std::function<void(State<double>*)>& place,
+                                     std::string* message) {
+  const NystromTableau& tableau = NystromTableau::Of(model.structure->settings.integrator);
+  const double tau = segment->length;
+  SolvedNode& stage = segment->stages[i];
+  std::vector<double>& acceleration = stage.solution.v;
+  const std::vector<double> start = segment->stages[i - 1].solution.v;
+  acceleration = start;
+  State<double> state;
+  for (int iteration = 0; iteration <= kMostIterations; ++iteration) {
+    const bool newton = iteration >= kMostFixedPoints;
+    if (iteration == kMostFixedPoints) {
+      acceleration = start;
+    }
+    const std::vector<double> last = acceleration;
+    place(&state);
+    const bool solved =
+        AllFinite(state.pose) && AllFinite(state.twist) &&
+        Accelerate(model, *segment, state, segment->time + tableau.c[i] * tau, &stage);
+    if (!solved) {
+      if (newton) {
+        *message = "accelerations with the contacts' modes held are singular";
+        return false;
+      }
+      iteration = kMostFixedPoints - 1;  // it has diverged
+      continue;
+    }
+    if (HasConverged(stage, last, iteration)) {
+      return true;
+    }
+    if (newton) {
+      implicit_.Factor(model, *segment, &stage, tau * tableau.a[i][i],
+                       tau * tau * tableau.a_hat[i][i]);
+      RowMatrixXd step(static_cast<Eigen::Index>(last.size()), 1);
+      for (size_t k = 0; k < last.size(); ++k) {
+        step(static_cast<Eigen::Index>(k), 0) = acceleration[k] - last[k];
+      }
+      implicit_.Solve(&step);
+      for (size_t k = 0; k < last.size(); ++k) {
+        acceleration[k] = last[k] + step(static_cast<Eigen::Index>(k), 0);
+      }
+    }
+  }
+  *message = "the trapezoidal rule's iteration does not converge: dt is too large";
+  return false;
+}
+
+bool SegmentFlow::HasConverged(const SolvedNode& stage, const std::vector<double>& last,
+                               int iteration) {
+  double size = 0.0;
+  for (const double acceleration : last) {
+    size = std::max(size, std::abs(acceleration));
+  }
+  // What rests does not get nearer to 0 than the terms that cancel in it round; and rounding may
+  // keep the iteration from the last digit: beyond some iterations less is enough.
+  const bool by_terms = iteration >= 3;
+  if (by_terms) {
+    SizesOfTerms(stage, &terms_);
+  }
+  const double tolerance = iteration < kMostFixedPoints + 5 ? kIterated : 1e3 * kIterated;
+  for (size_t k = 0; k < last.size(); ++k) {
+    const double change = std::abs(stage.solution.v[k] - last[k]);
+    if (!(change <= tolerance * (by_terms ? std::max(size, terms_[k]) : size))) {
+      return false;
+    }
+  }
+  return true;
+}
+
 bool SegmentFlow::Integrate(const Model<double>& model, Segment* segment, std::string* message) {
   const ModelStructure& structure = *model.structure;
   const NystromTableau& tableau = NystromTableau::Of(structure.settings.integrator);
@@ -178,38 +285,22 @@ bool SegmentFlow::Integrate(const Model<double>& model, Segment* segment, std::s
   };
   State<double> state;
   for (int i = 0; i < tableau.stages; ++i) {
-    const bool implicit = tableau.last_is_implicit && i + 1 == tableau.stages;
-    SolvedNode& stage = segment->stages[i];
-    if (implicit) {
-      stage.solution.v = segment->stages[i - 1].solution.v;  // a start for the iteration
+    const auto place_stage = [&](int terms, State<double>* at) {
+      place(tableau.c[i], tableau.a[i], tableau.a_hat[i], terms, at);
+    };
+    if (tableau.last_is_implicit && i + 1 == tableau.stages) {
+      const auto place_implicit = [&](State<double>* at) { place_stage(i + 1, at); };
+      if (!SolveImplicitStage(model, segment, i, place_implicit, message)) {
+        return false;
+      }
+      continue;
     }
-    for (int iteration = 0;; ++iteration) {
-      place(tableau.c[i], tableau.a[i], tableau.a_hat[i], implicit ? i + 1 : i, &state);
-      const std::vector<double> last = implicit ? stage.solution.v : std::vector<double>();
-      if (!AllFinite(state.pose) || !AllFinite(state.twist) ||
-          !Accelerate(model, *segment, state, segment->time + tableau.c[i] * tau, &stage)) {
-        *message = "accelerations with the contacts' modes held are singular";
-        return false;
-      }
-      if (!implicit) {
-        break;
-      }
-      double change = 0.0;
-      double size = 0.0;
-      for (size_t k = 0; k < last.size(); ++k) {
-        change = std::max(change, std::abs(stage.solution.v[k] - last[k]));
-        // Where bodies rest accelerations are rounding, of the forces that cancel.
-        const ContactProblem<double>& problem = stage.problem;
-        size = std::max({size, std::abs(last[k]), std::abs(problem.momentum[k] / problem.mass[k])});
-      }
-      // Rounding may keep it from the last digit: beyond a few iterations less is enough.
-      if (change <= (iteration < 20 ? kIterated : 1e3 * kIterated) * size) {
-        break;
-      }
-      if (iteration == kMostIterations) {
-        *message = "the trapezoidal rule's iteration does not converge: dt is too large";
-        return false;
-      }
+    place_stage(i, &state);
+    if (!AllFinite(state.pose) || !AllFinite(state.twist) ||
+        !Accelerate(model, *segment, state, segment->time + tableau.c[i] * tau,
+                    &segment->stages[i])) {
+      *message = "accelerations with the contacts' modes held are singular";
+      return false;
     }
   }
   place(1.0, tableau.b, tableau.b_hat, tableau.stages, &segment->after);
@@ -290,6 +381,22 @@ bool SegmentFlow::ProjectTwists(const Model<double>& model, Segment* segment,
     return false;
   }
   const Impulses& projection = segment->projection;
+  // Rounding of an ill-posed system leaves less than this share of a row's terms, at the speeds
+  // that the segment's forces would give.
+  constexpr double kMissed = 1e-6;
+  SizesOfTerms(segment->stages[segment->num_stages - 1], &terms_);
+  for (size_t k = 0; k < terms_.size(); ++k) {
+    terms_[k] = segment->length * terms_[k] + std::abs(projection.solution.v[k]);
+  }
+  const int joint =
+      segment->length > 0.0
+          ? MostViolatedJoint(projection.problem, projection.solution.v, terms_, kMissed)
+          : -1;
+  if (joint >= 0) {
+    *message = "joint " + model.structure->joints[joint].name +
+               " contradicts the others: no twist satisfies all";
+    return false;
+  }
   SpreadTwists(*model.structure, projection.solution.v, &segment->after.twist);
   segment->projection.new_twist = segment->after.twist;
   return true;

@@ -8,15 +8,16 @@
 //   Q_i = q + c_i τ v + τ² Σ â_ij A_j,   V_i = v + τ Σ a_ij A_j
 //   q⁺ = q + τ v + τ² Σ b̂_j A_j,          v⁺ = v + τ Σ b_j A_j
 //   semi_implicit_euler   c = 0, b = 1, b̂ = 1:   q⁺ = q + τ v⁺
-//   trapezoidal           the implicit trapezoidal rule, iterated to 1e-14: second order
+//   trapezoidal           the implicit trapezoidal rule, solved to 1e-14: second order
 //   runge_kutta_4         the classical rule: fourth order
 // The latter two are exact for constant accelerations. Hairer, Nørsett, Wanner, Solving Ordinary
 // Differential Equations I, II.1 and II.14.
 
-#include <cmath>
+#include <functional>
 #include <string>
 
 #include "tangible/simulation/event_record.h"
+#include "tangible/simulation/implicit_stage.h"
 
 namespace tangible {
 
@@ -31,25 +32,6 @@ struct NystromTableau {
   bool last_is_implicit = false;  ///< a[last][last] ≠ 0
 
   static const NystromTableau& Of(Integrator integrator);
-};
-
-/// Whether the derivative of an implicit stage, a fixed point, has arrived: to rounding of its
-/// largest entry, or, where all entries are rounding (of bodies at rest), when it no longer changes
-/// less. That it converges the values have shown.
-class FixedPoint {
- public:
-  bool Arrived(double change, double size) {
-    const bool falls = change < last_;
-    last_ = change;
-    ++iterations_;
-    return change <= 1e-15 * size || (!falls && change <= 1e-13 * size) ||
-           (iterations_ > 20 && (!falls || change <= 1e-12 * size)) || iterations_ == kMost;
-  }
-
- private:
-  static constexpr int kMost = 200;
-  double last_ = HUGE_VAL;
-  int iterations_ = 0;
 };
 
 /// Solves a node's problem with modes; false where singular or not finite.
@@ -70,11 +52,16 @@ class SegmentFlow {
 
  private:
   bool Integrate(const Model<double>& model, Segment* segment, std::string* message);
+  bool SolveImplicitStage(const Model<double>& model, Segment* segment, int i,
+                          const std::function<void(State<double>*)>& place, std::string* message);
+  bool HasConverged(const SolvedNode& stage, const std::vector<double>& last, int iteration);
   bool CorrectPoses(const Model<double>& model, Segment* segment, std::string* message);
   bool ProjectTwists(const Model<double>& model, Segment* segment, std::string* message);
 
   AccelerationScratch<double> acceleration_;
   AssemblyScratch<double> assembly_;
+  std::vector<double> terms_;
+  ImplicitStage implicit_;
 };
 
 /// Sets a segment's twist projection up at a state: its contacts without rebound, those that slide

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <sstream>
 
+#include "tangible/lcp/contact_residual.h"
+
 namespace tangible {
 namespace {
 
@@ -285,8 +287,11 @@ ContactSolverOptions Stepper::SolverOptions(const SimulationSettings& settings) 
 void Stepper::Describe(const Model<double>& model, int contact, StepReport* report) const {
   const ModelStructure& s = *model.structure;
   if (contact < 0) {
-    report->message =
-        s.joints.empty() ? "momentum" : "the joints' equations (are they contradictory?)";
+    const int joint =
+        MostViolatedJoint(record_.problem, record_.solution.v, record_.solution.v, 0.0);
+    report->message = joint < 0 ? "momentum"
+                                : "the joints' equations, most of all of joint " +
+                                      s.joints[joint].name + " (are they contradictory?)";
   } else if (record_.contacts[contact].joint >= 0) {
     report->message = "limit of joint " + s.joints[record_.contacts[contact].joint].name;
   } else {

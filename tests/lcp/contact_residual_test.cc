@@ -146,5 +146,24 @@ TEST(ContactResidualTest, MarginsAreThoseOfTheNearestMode) {
   expect(Solved(8.0, -1.0, 0.5, ContactMode::kSlidingPositive, 1.0, -0.5), 0.125, Kind::kOpening);
 }
 
+TEST(MostViolatedJointTest, IsTheWorstOfThoseAboveTheShare) {
+  ContactProblem<double> problem = testing::FreeBodies({0.0, 0.0, 0.0});
+  for (const double rhs : {1.0, 1.5, 1.0}) {
+    JointBlock<double> joint;
+    joint.a = 0;
+    joint.rows = 1;
+    joint.row_a[0] = {1.0, 0.0, 0.0};
+    joint.rhs[0] = rhs;
+    problem.joints.push_back(joint);
+  }
+  const std::vector<double> v = {1.0, 0.0, 0.0};
+  // The second misses by 0.5 of 2.5.
+  EXPECT_EQ(MostViolatedJoint(problem, v, v, 0.1), 1);
+  EXPECT_EQ(MostViolatedJoint(problem, v, v, 0.3), -1);
+  // Beside speeds of 100 that is a share of 0.005.
+  EXPECT_EQ(MostViolatedJoint(problem, v, {100.0, 0.0, 0.0}, 0.01), -1);
+  EXPECT_EQ(MostViolatedJoint(problem, {}, {}, 0.0), -1);  // nothing was solved
+}
+
 }  // namespace
 }  // namespace tangible

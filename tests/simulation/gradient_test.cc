@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "../support/scenes.h"
+#include "tangible/scene/scene_json.h"
 #include "tangible/scene/scene_names.h"
 
 namespace tangible {
@@ -290,6 +291,63 @@ TEST(GradientTest, AllMethodsAgreeThroughLargeProjections) {
   if (HaveJets()) {
     close(GradientMethod::kJetImplicit, 1e-10, "implicit");
     close(GradientMethod::kJet, 1e-9, "unrolled");
+  }
+}
+
+// A program may set what a file may not hold.
+TEST(GradientTest, NumbersThatAreNotFiniteAreTold) {
+  Scene scene;
+  std::string error;
+  ASSERT_TRUE(ParseScene(R"({"bodies": [{"name": "ball", "shape": {"circle": {"radius": 0.1}},
+      "mass": 1, "position": [0, 0.1], "velocity": [1, 0], "friction": 0.3}, {"name": "floor",
+      "static": true, "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}}]})",
+                         "scene", ".", &scene, &error))
+      << error;
+  const std::vector<ParameterPath> mass = Resolve(scene, {"bodies/ball/mass"});
+  EXPECT_TRUE(FinalStateJacobian(scene, mass, {}).done);
+  for (const double bad : {std::nan(""), HUGE_VAL, -HUGE_VAL}) {
+    scene.bodies[0].friction = bad;
+    const GradientResult result = FinalStateJacobian(scene, mass, {});
+    EXPECT_FALSE(result.done);
+    EXPECT_NE(result.message.find("bodies/ball/friction: expected a finite number"),
+              std::string::npos)
+        << result.message;
+  }
+  // What overflows on the way.
+  scene.bodies[0].friction = 0.3;
+  scene.bodies[0].position = {1.7e308, 0.1};
+  scene.bodies[0].velocity = {1.7e308, 0.0};
+  const GradientResult result = FinalStateJacobian(scene, mass, {});
+  EXPECT_TRUE(!result.done || (result.values.allFinite() && result.jacobian.allFinite()));
+  EXPECT_EQ(result.done, result.message.empty());
+}
+
+// 1e-12 kg between a floor and a hinge: what the pivoting method solves well enough is not
+// improved by the solves that follow, whose modes must not be left behind.
+TEST(GradientTest, ASolutionThatNeedsNoPolishKeepsItsSystem) {
+  Scene scene;
+  std::string error;
+  ASSERT_TRUE(ParseScene(R"({"bodies": [
+      {"name": "box", "shape": {"box": {"size": [0.4, 0.4]}}, "mass": 1e-12, "position": [0, 0.2],
+       "friction": 0.4, "restitution": 0.3},
+      {"name": "bar", "shape": {"box": {"size": [0.6, 0.1]}}, "mass": 0.3, "position": [0.5, 0.45],
+       "friction": 0.4, "restitution": 0.3},
+      {"name": "floor", "static": true, "friction": 0.4, "restitution": 0.3,
+       "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}}],
+      "joints": [{"name": "hinge", "type": "revolute", "bodies": ["bar", "box"],
+                  "anchor": [0.2, 0.45], "damping": 0.01}],
+      "simulation": {"dt": 0.01, "duration": 0.2}})",
+                         "scene", ".", &scene, &error))
+      << error;
+  Model<double> model;
+  State<double> state;
+  BuildModel(scene, &model, &state);
+  Stepper stepper(model);
+  for (int k = 0; k < 20; ++k) {
+    const StepReport report = stepper.Step(model, 0.01 * k, 0.01, &state);
+    ASSERT_EQ(report.status, StepStatus::kDone) << report.message;
+    // Two bodies, a joint, and a block for each closed contact.
+    EXPECT_EQ(stepper.system().num_blocks(), 3 + report.closed) << "step " << k;
   }
 }
 

@@ -16,6 +16,7 @@
 #include <exception>
 #include <filesystem>
 #include <fstream>
+#include <mutex>
 #include <new>
 
 namespace tangible::cost {
@@ -84,13 +85,14 @@ std::string ReadAll(int file) {
 }
 
 using Work = std::function<std::vector<double>(const ChildLimits&, std::string*)>;
+using TextWork = std::function<std::string(const ChildLimits&, std::string*)>;
 
-int RunWork(const Budget& budget, const Work& work, int out) {
+int RunWork(const Budget& budget, const TextWork& work, int out) {
   SetLimits(budget);
   std::string error;
-  std::vector<double> values;
+  std::string result;
   try {
-    values = work(ChildLimits(), &error);
+    result = work(ChildLimits(), &error);
   } catch (const std::bad_alloc&) {
     return kChildOutOfMemory;
   } catch (const std::exception& exception) {
@@ -100,7 +102,7 @@ int RunWork(const Budget& budget, const Work& work, int out) {
     WriteAll(out, error.data(), error.size());
     return kChildFailed;
   }
-  WriteAll(out, values.data(), values.size() * sizeof(double));
+  WriteAll(out, result.data(), result.size());
   return kChildDone;
 }
 
@@ -153,8 +155,7 @@ ChildOutcome Describe(int status, const rusage& usage, const std::string& text,
     outcome.message = "ended with exit status " + std::to_string(code);
   } else {
     outcome.status = ChildStatus::kDone;
-    outcome.values.resize(text.size() / sizeof(double));
-    std::memcpy(outcome.values.data(), text.data(), outcome.values.size() * sizeof(double));
+    outcome.text = text;
   }
   return outcome;
 }
@@ -166,15 +167,19 @@ void ChildLimits::LiftSeconds() const {
   SetTimer(ITIMER_REAL, 0.0);
 }
 
-ChildOutcome RunInChild(const Budget& budget, const Work& work) {
+ChildOutcome RunTextInChild(const Budget& budget, const TextWork& work) {
   ChildOutcome outcome;
   int ends[2];
   std::fflush(nullptr);
+  const TemporaryFolder folder;
+  // A child of another thread's that is made while the pipe's end for writing is open here would
+  // keep it open, and the text would seem not to end before that child does.
+  static std::mutex mutex;
+  std::unique_lock<std::mutex> lock(mutex);
   if (pipe2(ends, O_CLOEXEC) != 0) {
     outcome.message = std::string("no pipe: ") + std::strerror(errno);
     return outcome;
   }
-  const TemporaryFolder folder;
   const pid_t child = fork();
   if (child == 0) {
     close(ends[0]);
@@ -185,6 +190,7 @@ ChildOutcome RunInChild(const Budget& budget, const Work& work) {
     _exit(RunWork(budget, work, ends[1]));
   }
   close(ends[1]);
+  lock.unlock();
   if (child < 0) {
     close(ends[0]);
     outcome.message = std::string("no process: ") + std::strerror(errno);
@@ -197,6 +203,20 @@ ChildOutcome RunInChild(const Budget& budget, const Work& work) {
   while (wait4(child, &status, 0, &usage) < 0 && errno == EINTR) {
   }
   return Describe(status, usage, text, budget);
+}
+
+ChildOutcome RunInChild(const Budget& budget, const Work& work) {
+  ChildOutcome outcome =
+      RunTextInChild(budget, [&work](const ChildLimits& limits, std::string* error) {
+        const std::vector<double> values = work(limits, error);
+        std::string bytes(values.size() * sizeof(double), '\0');
+        std::memcpy(bytes.data(), values.data(), bytes.size());
+        return bytes;
+      });
+  outcome.values.resize(outcome.text.size() / sizeof(double));
+  std::memcpy(outcome.values.data(), outcome.text.data(), outcome.values.size() * sizeof(double));
+  outcome.text.clear();
+  return outcome;
 }
 
 }  // namespace tangible::cost

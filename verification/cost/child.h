@@ -21,6 +21,7 @@ struct ChildOutcome {
   ChildStatus status = ChildStatus::kFailed;
   std::string message;         ///< of kFailed, one line
   std::vector<double> values;  ///< of kDone: what the work returned
+  std::string text;            ///< of kDone by RunTextInChild
   size_t peak_bytes = 0;       ///< resident, of the whole process
 };
 
@@ -37,5 +38,10 @@ class ChildLimits {
 ChildOutcome RunInChild(
     const Budget& budget,
     const std::function<std::vector<double>(const ChildLimits& limits, std::string* error)>& work);
+
+/// The same for work that returns a text. Threads may call it at the same time.
+ChildOutcome RunTextInChild(
+    const Budget& budget,
+    const std::function<std::string(const ChildLimits& limits, std::string* error)>& work);
 
 }  // namespace tangible::cost

@@ -4,10 +4,12 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <cmath>
 #include <cstdio>
 #include <ctime>
 #include <stdexcept>
+#include <thread>
 
 namespace tangible::cost {
 namespace {
@@ -42,6 +44,34 @@ TEST(RunInChildTest, HandsNumbersOver) {
       RunInChild({}, [&](const ChildLimits&, std::string*) { return many; });
   EXPECT_EQ(outcome.status, ChildStatus::kDone) << outcome.message;
   EXPECT_EQ(outcome.values, many);
+}
+
+TEST(RunInChildTest, HandsATextOver) {
+  const std::string many(100000, 'x');
+  const ChildOutcome outcome = RunTextInChild(
+      {}, [&](const ChildLimits&, std::string*) { return many + std::string("\0y", 2); });
+  EXPECT_EQ(outcome.status, ChildStatus::kDone) << outcome.message;
+  EXPECT_EQ(outcome.text, many + std::string("\0y", 2));
+  EXPECT_TRUE(outcome.values.empty());
+}
+
+// A child that another thread's is started beside ends by itself.
+TEST(RunInChildTest, ThreadsDoNotWaitForEachOthersChildren) {
+  std::vector<std::thread> threads;
+  std::atomic<int> good{0};
+  for (int i = 0; i < 4; ++i) {
+    threads.emplace_back([&, i] {
+      for (int k = 0; k < 20; ++k) {
+        const std::string text = std::to_string(100 * i + k);
+        good +=
+            RunTextInChild({}, [&](const ChildLimits&, std::string*) { return text; }).text == text
+                ? 1
+                : 0;
+      }
+    });
+  }
+  for (std::thread& thread : threads) thread.join();
+  EXPECT_EQ(good, 80);
 }
 
 TEST(RunInChildTest, MeasuresItsOwnPeakMemory) {
