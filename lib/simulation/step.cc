@@ -287,7 +287,8 @@ ContactSolverOptions Stepper::SolverOptions(const SimulationSettings& settings) 
 void Stepper::Describe(const Model<double>& model, int contact, StepReport* report) const {
   const ModelStructure& s = *model.structure;
   if (contact < 0) {
-    const int joint = MostViolatedJoint(record_.problem, record_.solution.v, record_.solution.v, 0.0);
+    const int joint =
+        MostViolatedJoint(record_.problem, record_.solution.v, record_.solution.v, 0.0);
     report->message = joint < 0 ? "momentum"
                                 : "the joints' equations, most of all of joint " +
                                       s.joints[joint].name + " (are they contradictory?)";
