@@ -160,6 +160,19 @@ class ColumnResidual {
   RowScale& constraint_;
 };
 
+// Masses that differ by more than this lose so many digits in a factorisation (a chain with an end
+// of 1e6 of its links' mass: residuals of 2e-10 without refinement).
+constexpr double kRefinedRatio = 1e4;
+
+bool MassesDiffer(const ContactProblem<double>& problem) {
+  double least = HUGE_VAL, most = 0.0;
+  for (size_t i = 0; i < problem.mass.size(); i += 3) {
+    least = std::min(least, problem.mass[i]);
+    most = std::max(most, problem.mass[i]);
+  }
+  return most > kRefinedRatio * least;
+}
+
 }  // namespace
 
 void ContactSystem::Reserve(int num_blocks, int num_edges) {
@@ -401,23 +414,6 @@ double ContactSystem::RefinedSolve(const ContactProblem<double>& problem,
   }
   return left;
 }
-
-namespace {
-
-// Masses that differ by more than this lose so many digits in a factorisation (a chain with an end
-// of 1e6 of its links' mass: residuals of 2e-10 without refinement).
-constexpr double kRefinedRatio = 1e4;
-
-bool MassesDiffer(const ContactProblem<double>& problem) {
-  double least = HUGE_VAL, most = 0.0;
-  for (size_t i = 0; i < problem.mass.size(); i += 3) {
-    least = std::min(least, problem.mass[i]);
-    most = std::max(most, problem.mass[i]);
-  }
-  return most > kRefinedRatio * least;
-}
-
-}  // namespace
 
 double ContactSystem::Solve(const ContactProblem<double>& problem,
                             const std::vector<ContactMode>& modes, double* x, int columns) {

@@ -17,8 +17,9 @@ constexpr char kTaut[] =
     "waves of the taut chain have 1e-4 of dt's period and less: the derivative's stage equation is "
     "solved to few digits, and the certificate does not say so";
 constexpr char kCrushed[] =
-    "four sticking contacts of the light box are redundant: their regularised solve leaves the "
-    "light box accelerations that the stage's iteration cannot get below; ends with a status";
+    "sticking contacts of the light box are redundant, and their solve leaves it accelerations "
+    "that "
+    "the stage's iteration cannot get below (without friction it does); ends with a status";
 constexpr char kLightest[] =
     "accelerations of a body of 1e-12 kg at a hinge and contacts are not resolved beside 1 kg; "
     "ends with a status";
