@@ -47,7 +47,7 @@ Scene TwoDiscs(const std::string& stepping, double x) {
 }
 
 // Upon the floor for a second; it should not move.
-Finding Rests(Scene scene, double bound, const std::string& reason,
+Finding Rests(const Scene& scene, double bound, const std::string& reason,
               const std::vector<std::string>& parameters) {
   const MeasuredRun run = RunScene(scene);
   Finding finding;

@@ -88,8 +88,9 @@ void AddSpeeds(std::vector<ExtremeCase>* cases) {
       const double speed = std::pow(10.0, exponent);
       const std::string at = " at 1e" + std::to_string(exponent) + " m/s";
       for (const double restitution : {0.0, 0.5}) {
-        const std::string e = restitution > 0.0 ? ", e 0.5" : ", e 0";
-        cases->push_back({kGroup, "disc" + at + e, stepping, [=](Length) {
+        std::string name = "disc" + at;
+        name += restitution > 0.0 ? ", e 0.5" : ", e 0";
+        cases->push_back({kGroup, name, stepping, [=](Length) {
                             return AgainstWall(stepping, Flyer::kDisc, speed, restitution);
                           }});
       }
