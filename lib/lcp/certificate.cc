@@ -29,6 +29,9 @@ std::string Kink(const Certificate& certificate) {
   if (!(certificate.linear_residual <= kLinearResidualLimit)) {
     return "linear systems solved to " + Short(certificate.linear_residual) + " only";
   }
+  if (!(certificate.condition <= kConditionLimit)) {
+    return "condition " + Short(certificate.condition) + " of a linear system";
+  }
   return "";
 }
 

@@ -16,6 +16,8 @@ namespace tangible {
 inline constexpr double kNearKinkMargin = 1e-6;
 /// Relative errors of a linear solve above this are not trustworthy.
 inline constexpr double kLinearResidualLimit = 1e-6;
+/// Beyond this condition no digit of a linear system's solution is certain.
+inline constexpr double kConditionLimit = 1e16;
 
 struct Certificate {
   /// Smallest distance to a change of modes: zᵢ / ζᵢ of active, sᵢ / σᵢ of inactive rows.
@@ -39,7 +41,8 @@ struct Certificate {
 void Merge(const Certificate& other, Certificate& certificate);
 
 /// Writes `verdict`: what applies of "discontinuous: …", "near a kink: …" (degenerate rows, a
-/// margin below kNearKinkMargin, or a linear system that was not solved) and "one-sided: …", the
+/// margin below kNearKinkMargin, or a linear system that was not solved or is of a condition beyond
+/// kConditionLimit) and "one-sided: …", the
 /// worst first, joined by "; "; if nothing does, "trustworthy".
 void SetVerdict(Certificate& certificate);
 

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tangible/simulation/settings.h"
 
+#include <sstream>
+
 #include "tangible/scene/scene_names.h"
 
 namespace tangible {
@@ -23,6 +25,14 @@ bool CheckSettings(const SimulationSettings& settings, std::string* error) {
   } else if (fixed && settings.impact_law != ImpactLaw::kNewton) {
     *error = NeedsEvents("impact_law", "newton", "other needs",
                          NameOf(settings.impact_law, kImpactLawNames));
+  } else if (!fixed && settings.smoothing != 0.0) {
+    std::ostringstream got;
+    got << settings.smoothing;
+    *error =
+        "/simulation/smoothing: expected 0 with event stepping (others need \"stepping\": "
+        "\"fixed\"), "
+        "got " +
+        got.str();
   } else {
     return true;
   }

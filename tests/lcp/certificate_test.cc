@@ -83,6 +83,8 @@ TEST(CertificateTest, ALinearSystemThatWasNotSolvedIsNotTrusted) {
   EXPECT_EQ(VerdictOf({.linear_residual = 2e-3}),
             "near a kink: linear systems solved to 2.0e-03 only");
   EXPECT_NE(VerdictOf({.linear_residual = NAN}), "trustworthy");
+  EXPECT_EQ(VerdictOf({.condition = kConditionLimit}), "trustworthy");
+  EXPECT_EQ(VerdictOf({.condition = 4e20}), "near a kink: condition 4.0e+20 of a linear system");
 }
 
 }  // namespace

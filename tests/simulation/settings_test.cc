@@ -46,6 +46,13 @@ TEST(CheckSettings, NamesWhatIsMissing) {
   EXPECT_EQ(error,
             "/simulation/impact_law: expected \"newton\" with fixed stepping (the other needs "
             "\"stepping\": \"event\"), got \"poisson\"");
+  settings = SimulationSettings();
+  settings.stepping = Stepping::kEvent;
+  settings.smoothing = 1e-4;
+  EXPECT_FALSE(CheckSettings(settings, &error));
+  EXPECT_EQ(error,
+            "/simulation/smoothing: expected 0 with event stepping (others need \"stepping\": "
+            "\"fixed\"), got 0.0001");
 }
 
 }  // namespace
