@@ -83,12 +83,12 @@ std::string Number(double value) {
 // Adds the settings, or says why not.
 void Add(const SimulationSettings& settings, Sweep* sweep) {
   std::string why;
-  if (!CheckSettings(settings, &why)) {
+  if (settings.stepping == Stepping::kEvent && settings.smoothing > 0.0) {
+    AddOnce("event stepping with smoothing: its impacts are solved exactly", &sweep->left_out);
+  } else if (!CheckSettings(settings, &why)) {
     AddOnce(NameOf(settings.stepping, kSteppingNames) + " stepping with " +
                 NameOf(settings.integrator, kIntegratorNames) + ": " + why,
             &sweep->left_out);
-  } else if (settings.stepping == Stepping::kEvent && settings.smoothing > 0.0) {
-    AddOnce("event stepping with smoothing: its impacts are solved exactly", &sweep->left_out);
   } else if (settings.smoothing > 0.0 && settings.solver == SolverChoice::kLemke) {
     AddOnce("lemke with smoothing: only the interior point stops early", &sweep->left_out);
   } else {
