@@ -210,11 +210,13 @@ ChildOutcome RunInChild(const Budget& budget, const Work& work) {
       RunTextInChild(budget, [&work](const ChildLimits& limits, std::string* error) {
         const std::vector<double> values = work(limits, error);
         std::string bytes(values.size() * sizeof(double), '\0');
-        std::memcpy(bytes.data(), values.data(), bytes.size());
+        if (!values.empty()) std::memcpy(bytes.data(), values.data(), bytes.size());
         return bytes;
       });
   outcome.values.resize(outcome.text.size() / sizeof(double));
-  std::memcpy(outcome.values.data(), outcome.text.data(), outcome.values.size() * sizeof(double));
+  if (!outcome.values.empty()) {
+    std::memcpy(outcome.values.data(), outcome.text.data(), outcome.values.size() * sizeof(double));
+  }
   outcome.text.clear();
   return outcome;
 }
