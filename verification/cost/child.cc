@@ -16,7 +16,6 @@
 #include <exception>
 #include <filesystem>
 #include <fstream>
-#include <mutex>
 #include <new>
 
 namespace tangible::cost {
@@ -135,6 +134,10 @@ ChildOutcome Describe(int status, const rusage& usage, const std::string& text,
                       const Budget& budget) {
   ChildOutcome outcome;
   outcome.peak_bytes = static_cast<size_t>(usage.ru_maxrss) * 1024;
+  for (const timeval& time : {usage.ru_utime, usage.ru_stime}) {
+    outcome.cpu_seconds +=
+        static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_usec);
+  }
   if (WIFSIGNALED(status)) {
     const int signal = WTERMSIG(status);
     if (signal == SIGPROF || signal == SIGALRM) {
@@ -167,52 +170,74 @@ void ChildLimits::LiftSeconds() const {
   SetTimer(ITIMER_REAL, 0.0);
 }
 
-ChildOutcome RunTextInChild(const Budget& budget, const TextWork& work) {
-  ChildOutcome outcome;
+struct TextChild::State {
+  Budget budget;
+  TemporaryFolder folder;
+  pid_t process = -1;
+  int end = -1;         // of the pipe, for reading
+  std::string message;  // why there is no process
+};
+
+TextChild::TextChild(const Budget& budget, const TextWork& work)
+    : state_(std::make_unique<State>()) {
+  state_->budget = budget;
   int ends[2];
   std::fflush(nullptr);
-  const TemporaryFolder folder;
-  // A child of another thread's that is made while the pipe's end for writing is open here would
-  // keep it open, and the text would seem not to end before that child does.
-  static std::mutex mutex;
-  std::unique_lock<std::mutex> lock(mutex);
   if (pipe2(ends, O_CLOEXEC) != 0) {
-    outcome.message = std::string("no pipe: ") + std::strerror(errno);
-    return outcome;
+    state_->message = std::string("no pipe: ") + std::strerror(errno);
+    return;
   }
-  const pid_t child = fork();
-  if (child == 0) {
+  state_->process = fork();
+  if (state_->process == 0) {
     close(ends[0]);
     // A tape opens files where it stands.
-    if (chdir(folder.path().c_str()) != 0) {
+    if (chdir(state_->folder.path().c_str()) != 0) {
       _exit(kChildFailed);
     }
     _exit(RunWork(budget, work, ends[1]));
   }
   close(ends[1]);
-  lock.unlock();
-  if (child < 0) {
-    close(ends[0]);
-    outcome.message = std::string("no process: ") + std::strerror(errno);
+  state_->end = ends[0];
+  if (state_->process < 0) {
+    state_->message = std::string("no process: ") + std::strerror(errno);
+  }
+}
+
+TextChild::TextChild(TextChild&&) noexcept = default;
+
+TextChild::~TextChild() {
+  if (state_ != nullptr && state_->end >= 0) {
+    Wait();
+  }
+}
+
+ChildOutcome TextChild::Wait() {
+  ChildOutcome outcome;
+  std::string text;
+  if (state_->end >= 0) {
+    text = ReadAll(state_->end);
+    close(state_->end);
+    state_->end = -1;
+  }
+  if (!state_->message.empty()) {
+    outcome.message = state_->message;
     return outcome;
   }
-  const std::string text = ReadAll(ends[0]);
-  close(ends[0]);
   int status = 0;
   rusage usage{};
-  while (wait4(child, &status, 0, &usage) < 0 && errno == EINTR) {
+  while (wait4(state_->process, &status, 0, &usage) < 0 && errno == EINTR) {
   }
-  return Describe(status, usage, text, budget);
+  return Describe(status, usage, text, state_->budget);
 }
 
 ChildOutcome RunInChild(const Budget& budget, const Work& work) {
-  ChildOutcome outcome =
-      RunTextInChild(budget, [&work](const ChildLimits& limits, std::string* error) {
-        const std::vector<double> values = work(limits, error);
-        std::string bytes(values.size() * sizeof(double), '\0');
-        if (!values.empty()) std::memcpy(bytes.data(), values.data(), bytes.size());
-        return bytes;
-      });
+  ChildOutcome outcome = TextChild(budget, [&work](const ChildLimits& limits, std::string* error) {
+                           const std::vector<double> values = work(limits, error);
+                           std::string bytes(values.size() * sizeof(double), '\0');
+                           if (!values.empty())
+                             std::memcpy(bytes.data(), values.data(), bytes.size());
+                           return bytes;
+                         }).Wait();
   outcome.values.resize(outcome.text.size() / sizeof(double));
   if (!outcome.values.empty()) {
     std::memcpy(outcome.values.data(), outcome.text.data(), outcome.values.size() * sizeof(double));

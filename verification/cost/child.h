@@ -5,6 +5,7 @@
 // so many seconds of CPU time, or so many bytes of memory, the system ends it.
 
 #include <functional>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -21,8 +22,9 @@ struct ChildOutcome {
   ChildStatus status = ChildStatus::kFailed;
   std::string message;         ///< of kFailed, one line
   std::vector<double> values;  ///< of kDone: what the work returned
-  std::string text;            ///< of kDone by RunTextInChild
+  std::string text;            ///< of kDone by TextChild
   size_t peak_bytes = 0;       ///< resident, of the whole process
+  double cpu_seconds = 0.0;    ///< of the whole process
 };
 
 /// What the work gets.
@@ -39,9 +41,22 @@ ChildOutcome RunInChild(
     const Budget& budget,
     const std::function<std::vector<double>(const ChildLimits& limits, std::string* error)>& work);
 
-/// The same for work that returns a text. Threads may call it at the same time.
-ChildOutcome RunTextInChild(
-    const Budget& budget,
-    const std::function<std::string(const ChildLimits& limits, std::string* error)>& work);
+/// Work that returns a text, in a child of this process from its construction on. Several may run
+/// at the same time. The process itself should have one thread: what another one has locked stays
+/// locked in the child.
+class TextChild {
+ public:
+  TextChild(const Budget& budget,
+            const std::function<std::string(const ChildLimits& limits, std::string* error)>& work);
+  ~TextChild();
+  TextChild(TextChild&&) noexcept;
+  TextChild& operator=(TextChild&&) = delete;
+  /// Waits for the end; once.
+  ChildOutcome Wait();
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
 
 }  // namespace tangible::cost

@@ -2,10 +2,7 @@
 #include "tangible/verification/extremes/extreme_run.h"
 
 #include <algorithm>
-#include <atomic>
-#include <chrono>
-#include <mutex>
-#include <thread>
+#include <deque>
 
 #include "tangible/verification/cost/child.h"
 
@@ -48,45 +45,61 @@ Verdict CaseResult::verdict() const {
   return known_reason.empty() ? Verdict::kFailed : Verdict::kKnown;
 }
 
-CaseResult RunCase(const ExtremeCase& extreme_case, Length length) {
+namespace {
+
+// A case that runs in a child.
+struct Running {
+  size_t place;
+  cost::Budget budget;
+  cost::TextChild child;
+};
+
+Running Start(const std::vector<ExtremeCase>& cases, size_t place, Length length) {
+  const ExtremeCase& extreme_case = cases[place];
+  cost::Budget budget;
+  budget.seconds = extreme_case.seconds * (length == Length::kLong ? kLongFactor : 1.0);
+  budget.bytes = kBytes;
+  return {place, budget, cost::TextChild(budget, [&](const cost::ChildLimits&, std::string*) {
+            return Serialise(extreme_case.run(length));
+          })};
+}
+
+CaseResult Finish(const ExtremeCase& extreme_case, Running* running) {
   CaseResult result;
   result.group = extreme_case.group;
   result.name = extreme_case.name;
   result.stepping = extreme_case.stepping;
   result.known_reason = extreme_case.known_reason;
-  cost::Budget budget;
-  budget.seconds = extreme_case.seconds * (length == Length::kLong ? kLongFactor : 1.0);
-  budget.bytes = kBytes;
-  const auto start = std::chrono::steady_clock::now();
-  const cost::ChildOutcome outcome = cost::RunTextInChild(
-      budget,
-      [&](const cost::ChildLimits&, std::string*) { return Serialise(extreme_case.run(length)); });
-  result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  result.message = WhyNot(outcome, budget);
+  const cost::ChildOutcome outcome = running->child.Wait();
+  result.seconds = outcome.cpu_seconds;
+  result.message = WhyNot(outcome, running->budget);
   if (result.message.empty() && !Deserialise(outcome.text, &result.finding)) {
     result.message = "ended without a result";
   }
   return result;
 }
 
+}  // namespace
+
+CaseResult RunCase(const ExtremeCase& extreme_case, Length length) {
+  return RunCases({extreme_case}, {.length = length, .threads = 1}, nullptr)[0];
+}
+
 std::vector<CaseResult> RunCases(const std::vector<ExtremeCase>& cases, const RunOptions& options,
                                  const std::function<void(long done)>& progress) {
   std::vector<CaseResult> results(cases.size());
-  std::atomic<size_t> next{0};
-  std::mutex mutex;
-  long done = 0;
-  const auto work = [&] {
-    for (size_t i = next++; i < cases.size(); i = next++) {
-      results[i] = RunCase(cases[i], options.length);
-      const std::lock_guard<std::mutex> lock(mutex);
-      ++done;
-      if (progress) progress(done);
+  std::deque<Running> running;
+  const size_t most = static_cast<size_t>(std::max(1, options.threads));
+  size_t next = 0;
+  for (size_t done = 0; done < cases.size(); ++done) {
+    while (next < cases.size() && running.size() < most) {
+      running.push_back(Start(cases, next++, options.length));
     }
-  };
-  std::vector<std::thread> others;
-  for (int i = 1; i < options.threads; ++i) others.emplace_back(work);
-  work();
-  for (std::thread& thread : others) thread.join();
+    Running& first = running.front();
+    results[first.place] = Finish(cases[first.place], &first);
+    running.pop_front();
+    if (progress) progress(static_cast<long>(done + 1));
+  }
   return results;
 }
 

@@ -22,7 +22,7 @@ struct CaseResult {
   std::string group, name, stepping, known_reason;
   Finding finding;
   std::string message;   ///< not empty: the case did not end
-  double seconds = 0.0;  ///< wall time
+  double seconds = 0.0;  ///< CPU time
   Verdict verdict() const;
 };
 
@@ -33,8 +33,8 @@ struct RunOptions {
 
 CaseResult RunCase(const ExtremeCase& extreme_case, Length length);
 
-/// All of them; results in the order of the cases. `progress` is called after each, by one thread
-/// at a time, with the number that is done.
+/// All of them; results in the order of the cases. `progress` is called after each, with the
+/// number that is done.
 std::vector<CaseResult> RunCases(const std::vector<ExtremeCase>& cases, const RunOptions& options,
                                  const std::function<void(long done)>& progress);
 

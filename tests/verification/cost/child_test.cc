@@ -4,12 +4,10 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
-#include <atomic>
 #include <cmath>
 #include <cstdio>
 #include <ctime>
 #include <stdexcept>
-#include <thread>
 
 namespace tangible::cost {
 namespace {
@@ -46,32 +44,30 @@ TEST(RunInChildTest, HandsNumbersOver) {
   EXPECT_EQ(outcome.values, many);
 }
 
-TEST(RunInChildTest, HandsATextOver) {
+TEST(TextChildTest, HandsATextOver) {
   const std::string many(100000, 'x');
-  const ChildOutcome outcome = RunTextInChild(
-      {}, [&](const ChildLimits&, std::string*) { return many + std::string("\0y", 2); });
+  const ChildOutcome outcome = TextChild({}, [&](const ChildLimits&, std::string*) {
+                                 return many + std::string("\0y", 2);
+                               }).Wait();
   EXPECT_EQ(outcome.status, ChildStatus::kDone) << outcome.message;
   EXPECT_EQ(outcome.text, many + std::string("\0y", 2));
   EXPECT_TRUE(outcome.values.empty());
+  EXPECT_TRUE(TextChild({}, [](const ChildLimits&, std::string*) { return std::string(); })
+                  .Wait()
+                  .text.empty());
 }
 
-// A child that another thread's is started beside ends by itself.
-TEST(RunInChildTest, ThreadsDoNotWaitForEachOthersChildren) {
-  std::vector<std::thread> threads;
-  std::atomic<int> good{0};
-  for (int i = 0; i < 4; ++i) {
-    threads.emplace_back([&, i] {
-      for (int k = 0; k < 20; ++k) {
-        const std::string text = std::to_string(100 * i + k);
-        good +=
-            RunTextInChild({}, [&](const ChildLimits&, std::string*) { return text; }).text == text
-                ? 1
-                : 0;
-      }
+TEST(TextChildTest, SeveralRunAtTheSameTime) {
+  std::vector<TextChild> children;
+  for (int i = 0; i < 8; ++i) {
+    children.emplace_back(Budget(), [i](const ChildLimits&, std::string*) {
+      return std::string(100000, static_cast<char>('a' + i));
     });
   }
-  for (std::thread& thread : threads) thread.join();
-  EXPECT_EQ(good, 80);
+  // In any order; one is not waited for.
+  for (const int i : {7, 0, 3, 1, 6, 2, 4}) {
+    EXPECT_EQ(children[i].Wait().text, std::string(100000, static_cast<char>('a' + i)));
+  }
 }
 
 TEST(RunInChildTest, MeasuresItsOwnPeakMemory) {
