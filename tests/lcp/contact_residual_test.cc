@@ -63,6 +63,21 @@ TEST(ContactResidualTest, ValuesOfAContactAreThoseByHand) {
   EXPECT_EQ(ImpulseScale({}), 0.0);
 }
 
+// A body at rest that is pushed from both sides: of its speeds 0 is what 0.75 − 0.75 leaves.
+TEST(ContactResidualTest, ScalesHoldWhatPassesThroughABodyAtRest) {
+  ContactProblem<double> problem = testing::FreeBodies({0.0, 0.0, 0.0, 0.0, -0.75, 0.0});
+  problem.contacts = {FloorContact(0, 0.0, 0.0, 0.0, 0.0)};
+  ContactSolution<double> solution = testing::EmptySolution(problem);
+  solution.v.assign(6, 0.0);
+  solution.normal_impulse = {0.75};
+  EXPECT_DOUBLE_EQ(ContactScales(problem, solution).speed[0], 0.75);
+  // Not more than all momenta could bring about; without an impulse next to nothing.
+  solution.normal_impulse = {1e6};
+  EXPECT_DOUBLE_EQ(ContactScales(problem, solution).speed[0], 0.75);
+  solution.normal_impulse = {0.0};
+  EXPECT_DOUBLE_EQ(ContactScales(problem, solution).speed[0], 0.75e-6);
+}
+
 TEST(ContactResidualTest, SolutionsHaveNoneAndFaultsHaveTheirSize) {
   int worst = 7;
   EXPECT_LT(ResidualOf(Solved(0.3, -1.0, 0.5, ContactMode::kSticking, 1.0, -0.3), &worst), 1e-15);
