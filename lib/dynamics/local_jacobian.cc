@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <type_traits>
 
+#include "tangible/dynamics/contact_rows_adjoint.h"
 #include "tangible/dynamics/local_entries_inl.h"
 
 namespace tangible {
@@ -277,6 +279,10 @@ class StepVisitor : private internal::LocalEntries<Sink> {
 
   void ShapeContact(int i) {
     const ActiveContact& contact = (*step_.contacts)[i];
+    if constexpr (std::is_same_v<Sink, SingleAdjointSink>) {
+      ShapeContactAdjoint(i, contact);
+      return;
+    }
     Locals locals;
     const Pose<LocalJet> pose_a = LocalPose(contact.a, &locals);
     const Pose<LocalJet> pose_b = LocalPose(contact.b, &locals);
@@ -292,18 +298,95 @@ class StepVisitor : private internal::LocalEntries<Sink> {
                    const ContactRows<LocalJet>& rows) {
     const int a = contact.a;
     const int b = contact.b;
-    const ContactMode mode = step_.solution->modes[i];
     const double normal = step_.solution->normal_impulse[i];
     const int row = 3 * (*step_.contact_block)[i];
     EmitMomentum(locals, a, rows.normal_a, b, rows.normal_b, -normal);
     EmitMomentum(locals, a, rows.tangent_a, b, rows.tangent_b, -step_.solution->tangent_impulse[i]);
-    if (contact.law == ContactLaw::kPoisson && step_.problem->contacts[i].driven) {
+    if (!IsDriven(i)) {
+      const double e = (*step_.restitution)[i].value;
+      LocalJet value = NewSpeed(a, rows.normal_a, b, rows.normal_b);
+      if (contact.law == ContactLaw::kGap) {
+        value += rows.geometry.gap / step_.h;
+      } else if (contact.law == ContactLaw::kRestitution) {
+        value += e * Speed(v_old_, a, rows.normal_a, b, rows.normal_b);
+      }
+      Emit(locals, row, value);
+    }
+    if (step_.solution->modes[i] == ContactMode::kSticking) {
+      Emit(locals, row + 1, NewSpeed(a, rows.tangent_a, b, rows.tangent_b));
+    }
+    EmitByRows(i, contact, rows);
+  }
+
+  // The same of one column u by the geometry's adjoint: the sum of u times the contact's rows is
+  //   α_a·n_a + α_b·n_b + β_a·t_a + β_b·t_b + γ gap.
+  void ShapeContactAdjoint(int i, const ActiveContact& contact) {
+    const Pose<double> pose_a = state_.PoseOf(contact.a);
+    const Pose<double> pose_b = state_.PoseOf(contact.b);
+    const ShapeView<double> shape_a = model_.Shape(contact.a);
+    const ShapeView<double> shape_b = model_.Shape(contact.b);
+    ContactRows<double> rows;
+    rows.geometry = EvaluateContact(contact.feature, shape_a, pose_a, shape_b, pose_b);
+    RowsFromGeometry(pose_a.position, pose_b.position, &rows);
+    const double* u_contact = sink_.u + 3 * static_cast<size_t>((*step_.contact_block)[i]);
+    const double u_n = IsDriven(i) ? 0.0 : u_contact[0];
+    const double u_t = step_.solution->modes[i] == ContactMode::kSticking ? u_contact[1] : 0.0;
+    const double e = contact.law == ContactLaw::kRestitution ? (*step_.restitution)[i].value : 0.0;
+    RowsAdjoint bar;
+    const auto weigh = [&](int body, double* alpha, double* beta) {
+      const int row = BodyRow(s_, body);
+      for (int k = 0; k < 3; ++k) {
+        const double u = row >= 0 ? sink_.u[row + k] : 0.0;
+        alpha[k] = u_n * (v_new_[3 * body + k] + e * v_old_[3 * body + k]) -
+                   step_.solution->normal_impulse[i] * u;
+        beta[k] = u_t * v_new_[3 * body + k] - step_.solution->tangent_impulse[i] * u;
+      }
+    };
+    weigh(contact.a, bar.normal_a, bar.tangent_a);
+    weigh(contact.b, bar.normal_b, bar.tangent_b);
+    bar.gap = contact.law == ContactLaw::kGap ? u_n / step_.h : 0.0;
+    ContactSideAdjoint a_bar;
+    ContactSideAdjoint b_bar;
+    ContactRowsAdjoint(contact.feature, shape_a, pose_a, shape_b, pose_b, rows, bar, &a_bar,
+                       &b_bar);
+    const auto add = [&](int body, bool is_edge, int feature, const ContactSideAdjoint& side) {
+      for (int k = 0; k < 3; ++k) {
+        sink_.w_bar[s_.PoseVariable(body, k)] -= side.pose[k];
+      }
+      const BodyIndex& index = s_.bodies[body];
+      int used[4];
+      const int count =
+          FeatureNumbers(index.shape, index.num_shape_numbers, is_edge, feature, used);
+      for (int k = 0; k < count; ++k) {
+        sink_.w_bar[s_.NumberVariable(index.shape_numbers + used[k])] -= side.numbers[k];
+      }
+    };
+    add(contact.a, contact.feature.kind == FeatureKind::kEdgeVertex, contact.feature.a, a_bar);
+    add(contact.b, contact.feature.kind == FeatureKind::kVertexEdge, contact.feature.b, b_bar);
+    EmitByRows(i, contact, rows);
+  }
+
+  bool IsDriven(int i) const {
+    return (*step_.contacts)[i].law == ContactLaw::kPoisson && step_.problem->contacts[i].driven;
+  }
+
+  // What depends on the rows' values alone: prescribed twists, restitution and friction.
+  template <typename T>
+  void EmitByRows(int i, const ActiveContact& contact, const ContactRows<T>& rows) {
+    const int a = contact.a;
+    const int b = contact.b;
+    const ContactMode mode = step_.solution->modes[i];
+    const double normal = step_.solution->normal_impulse[i];
+    const int row = 3 * (*step_.contact_block)[i];
+    if (IsDriven(i)) {
       EmitDriven(i, row);
     } else {
-      EmitNormal(i, contact, locals, rows);
+      if (contact.law == ContactLaw::kRestitution) {
+        EmitRestitution(i, contact, rows, (*step_.restitution)[i].value, row);
+      }
+      EmitPrescribed(a, rows.normal_a, b, rows.normal_b, row, 1.0);
     }
     if (mode == ContactMode::kSticking) {
-      Emit(locals, row + 1, NewSpeed(a, rows.tangent_a, b, rows.tangent_b));
       EmitPrescribed(a, rows.tangent_a, b, rows.tangent_b, row + 1, 1.0);
       return;
     }
@@ -324,23 +407,6 @@ class StepVisitor : private internal::LocalEntries<Sink> {
     }
   }
 
-  void EmitNormal(int i, const ActiveContact& contact, const Locals& locals,
-                  const ContactRows<LocalJet>& rows) {
-    const int a = contact.a;
-    const int b = contact.b;
-    const int row = 3 * (*step_.contact_block)[i];
-    const double e = (*step_.restitution)[i].value;
-    LocalJet value = NewSpeed(a, rows.normal_a, b, rows.normal_b);
-    if (contact.law == ContactLaw::kGap) {
-      value += rows.geometry.gap / step_.h;
-    } else if (contact.law == ContactLaw::kRestitution) {
-      value += e * Speed(v_old_, a, rows.normal_a, b, rows.normal_b);
-      EmitRestitution(i, contact, rows, e, row);
-    }
-    Emit(locals, row, value);
-    EmitPrescribed(a, rows.normal_a, b, rows.normal_b, row, 1.0);
-  }
-
   // λn − e λ¹n, at a fixed impulse λ¹n of the compression.
   void EmitDriven(int i, int row) {
     const CoefficientSource& restitution = (*step_.restitution)[i];
@@ -353,18 +419,20 @@ class StepVisitor : private internal::LocalEntries<Sink> {
     }
   }
 
-  void EmitRestitution(int i, const ActiveContact& contact, const ContactRows<LocalJet>& rows,
-                       double e, int row) {
-    const auto emit = [&](int body, const RowPart<LocalJet>& part) {
+  template <typename T>
+  void EmitRestitution(int i, const ActiveContact& contact, const ContactRows<T>& rows, double e,
+                       int row) {
+    const auto emit = [&](int body, const RowPart<T>& part) {
       if (s_.bodies[body].motion != Motion::kStatic) {
         for (int k = 0; k < 3; ++k) {
-          sink_(row, s_.TwistVariable(body, k), e * part[k].a);
+          sink_(row, s_.TwistVariable(body, k), e * ValueOf(part[k]));
         }
       }
     };
     emit(contact.a, rows.normal_a);
     emit(contact.b, rows.normal_b);
-    const double approach = Speed(v_old_, contact.a, rows.normal_a, contact.b, rows.normal_b).a;
+    const double approach =
+        ValueOf(Speed(v_old_, contact.a, rows.normal_a, contact.b, rows.normal_b));
     const CoefficientSource& restitution = (*step_.restitution)[i];
     for (int k = 0; k < 2; ++k) {
       if (restitution.numbers[k] >= 0) {
@@ -384,8 +452,10 @@ class StepVisitor : private internal::LocalEntries<Sink> {
   using Base::LocalPose;
   using Base::LocalShapeOfA;
   using Base::LocalShapeOfB;
+  using Base::model_;
   using Base::s_;
   using Base::sink_;
+  using Base::state_;
   using Base::x_;
 
   const SolvedStep& step_;

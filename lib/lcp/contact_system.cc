@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tangible/lcp/contact_condensation.h"
 #include "tangible/lcp/joint_damping.h"
 
 namespace tangible {
@@ -14,6 +15,8 @@ constexpr double kResidualGoal = 1e-15;
 constexpr int kMaxRefinements = 8;
 // Rows that leave more than this contradict each other.
 constexpr double kConsistent = 1e-14;
+// A condensed system that leaves more than this is factorised as a whole.
+constexpr double kStalled = 1e-12;
 
 // Adds (left)ᵀ (right) weight to a 3 x 3 block.
 void AddOuter(const RowPart<double>& left, const RowPart<double>& right, double weight,
@@ -43,123 +46,6 @@ RowPart<double> Combine(const RowPart<double>& x, double factor, const RowPart<d
   return {x[0] + factor * y[0], x[1] + factor * y[1], x[2] + factor * y[2]};
 }
 
-// Largest magnitudes of a kind of row: of its terms and of what is left.
-struct RowScale {
-  double terms = 0.0;
-  // Of the products that a constraint's value sums, and of the free motion: at rest all terms
-  // cancel to rounding, which is relative to these.
-  double parts = 0.0;
-  double left = 0.0;
-  void Term(double x) { terms = std::max(terms, std::abs(x)); }
-  double Relative() const { return terms > 0.0 ? left / terms : left > 0.0 ? HUGE_VAL : 0.0; }
-  double RelativeToParts() const {
-    const double scale = std::max(terms, parts);
-    return scale > 0.0 ? left / scale : left > 0.0 ? HUGE_VAL : 0.0;
-  }
-};
-
-// residual := rhs − K x for one column of strided vectors; sign −1 and exchanged directions for Kᵀ.
-template <bool kTransposed>
-class ColumnResidual {
- public:
-  ColumnResidual(const ContactProblem<double>& problem, const double* x, int columns,
-                 double* residual, RowScale* momentum, RowScale* constraint)
-      : p_(problem),
-        x_(x),
-        columns_(columns),
-        r_(residual),
-        momentum_(*momentum),
-        constraint_(*constraint) {}
-
-  void Bodies() {
-    for (int i = 0; i < 3 * p_.num_bodies; ++i) {
-      const double term = p_.mass[i] * x_[i * columns_];
-      momentum_.Term(r_[i * columns_]);
-      momentum_.Term(term);
-      r_[i * columns_] -= term;
-    }
-    for (const DamperBlock<double>& d : p_.dampers) {
-      Push(d.a, d.row_a, d.b, d.row_b, -d.weight * Dot(d.a, d.row_a, d.b, d.row_b));
-    }
-  }
-
-  void Joints() {
-    int block = p_.num_bodies;
-    for (const JointBlock<double>& j : p_.joints) {
-      for (int k = 0; k < j.rows; ++k) {
-        Constrain(block, k, Dot(j.a, j.row_a[k], j.b, j.row_b[k]));
-        Push(j.a, j.row_a[k], j.b, j.row_b[k], kSign * At(block, k));
-      }
-      ++block;
-    }
-  }
-
-  void Contact(const ContactBlock<double>& c, ContactMode mode, int block) {
-    const double along = -SlidingSign(mode) * c.friction;  // the impulse's part on the tangent
-    const double impulse = At(block, 0);
-    // A driven contact has a column as others, and of rows λn alone.
-    double row = c.driven && !kTransposed ? impulse : Dot(c.a, c.normal_a, c.b, c.normal_b);
-    if (c.driven && kTransposed) {
-      row -= impulse;
-    } else {
-      Push(c.a, c.normal_a, c.b, c.normal_b, kSign * impulse);
-    }
-    if (mode == ContactMode::kSticking) {
-      Constrain(block, 1, Dot(c.a, c.tangent_a, c.b, c.tangent_b));
-      Push(c.a, c.tangent_a, c.b, c.tangent_b, kSign * At(block, 1));
-    } else if (along != 0.0) {
-      if (kTransposed) {
-        row += along * Dot(c.a, c.tangent_a, c.b, c.tangent_b);
-      } else {
-        Push(c.a, c.tangent_a, c.b, c.tangent_b, along * impulse);
-      }
-    }
-    Constrain(block, 0, row);
-  }
-
- private:
-  static constexpr double kSign = kTransposed ? -1.0 : 1.0;
-
-  double At(int block, int i) const { return x_[(3 * block + i) * columns_]; }
-  double Dot(int a, const RowPart<double>& row_a, int b, const RowPart<double>& row_b) {
-    double sum = 0.0;
-    for (int i = 0; i < 3; ++i) {
-      const double part_a = a >= 0 ? row_a[i] * At(a, i) : 0.0;
-      const double part_b = b >= 0 ? row_b[i] * At(b, i) : 0.0;
-      sum += part_a + part_b;
-      constraint_.parts = std::max({constraint_.parts, std::abs(part_a), std::abs(part_b)});
-    }
-    return sum;
-  }
-  // Momentum rows: += rowᵀ impulse.
-  void Push(int a, const RowPart<double>& row_a, int b, const RowPart<double>& row_b,
-            double impulse) {
-    for (int i = 0; i < 3; ++i) {
-      if (a >= 0) {
-        r_[(3 * a + i) * columns_] += row_a[i] * impulse;
-        momentum_.Term(row_a[i] * impulse);
-      }
-      if (b >= 0) {
-        r_[(3 * b + i) * columns_] += row_b[i] * impulse;
-        momentum_.Term(row_b[i] * impulse);
-      }
-    }
-  }
-  void Constrain(int block, int i, double value) {
-    double& r = r_[(3 * block + i) * columns_];
-    constraint_.Term(r);
-    constraint_.Term(value);
-    r -= kSign * value;
-  }
-
-  const ContactProblem<double>& p_;
-  const double* x_;
-  const int columns_;
-  double* r_;
-  RowScale& momentum_;
-  RowScale& constraint_;
-};
-
 // Masses that differ by more than this lose so many digits in a factorisation (a chain with an end
 // of 1e6 of its links' mass: residuals of 2e-10 without refinement).
 constexpr double kRefinedRatio = 1e4;
@@ -188,7 +74,11 @@ void ContactSystem::Reserve(int num_blocks, int num_edges) {
 void ContactSystem::MoveFactorsTo(ContactSystem* other) {
   lu_.MoveFactorsTo(&other->lu_);
   contact_block_.swap(other->contact_block_);
+  regularisation_.swap(other->regularisation_);
+  other->num_blocks_ = num_blocks_;
   other->regularised_ = regularised_;
+  other->condensed_ = condensed_;
+  other->fraction_ = fraction_;
 }
 
 void ContactSystem::SetPattern(const ContactProblem<double>& problem,
@@ -218,8 +108,18 @@ void ContactSystem::SetPattern(const ContactProblem<double>& problem,
       contact_block_.push_back(-1);
     } else {
       contact_block_.push_back(block);
-      add(problem.contacts[i].a, problem.contacts[i].b);
+      if (condensed_) {
+        ++block;
+      } else {
+        add(problem.contacts[i].a, problem.contacts[i].b);
+      }
     }
+  }
+  num_blocks_ = block;
+  if (condensed_) {
+    first_contact_edge_ = static_cast<int>(edges_.size());
+    AddContactEdges(problem, &edges_);
+    block = problem.num_bodies + static_cast<int>(problem.joints.size());
   }
   lu_.SetPattern(block, problem.num_bodies, edges_);
 }
@@ -281,7 +181,7 @@ void ContactSystem::AddJoints(const ContactProblem<double>& problem, double regu
 }
 
 void ContactSystem::AddContacts(const ContactProblem<double>& problem,
-                                const std::vector<ContactMode>& modes, double regularisation) {
+                                const std::vector<ContactMode>& modes) {
   // Edges of contacts come last: of a, then of b, where these move.
   int edge = static_cast<int>(edges_.size());
   for (size_t i = problem.contacts.size(); i-- > 0;) {
@@ -291,16 +191,10 @@ void ContactSystem::AddContacts(const ContactProblem<double>& problem,
     const ContactBlock<double>& contact = problem.contacts[i];
     const bool sticks = modes[i] == ContactMode::kSticking;
     double* diagonal = lu_.Diagonal(contact_block_[i]);
-    diagonal[0] = contact.driven
-                      ? 1.0
-                      : regularisation * RowMobility(problem.mass, contact.a, contact.normal_a,
-                                                     contact.b, contact.normal_b);
-    diagonal[4] = sticks ? regularisation * RowMobility(problem.mass, contact.a, contact.tangent_a,
-                                                        contact.b, contact.tangent_b)
-                         : 1.0;
+    const double* delta = &regularisation_[3 * static_cast<size_t>(contact_block_[i])];
+    diagonal[0] = contact.driven ? 1.0 : delta[0];
+    diagonal[4] = sticks ? delta[1] : 1.0;
     diagonal[8] = 1.0;
-    regularisation_[3 * contact_block_[i]] = contact.driven ? 0.0 : diagonal[0];
-    regularisation_[3 * contact_block_[i] + 1] = sticks ? diagonal[4] : 0.0;
     const double along = -SlidingSign(modes[i]) * contact.friction;
     const auto add = [&](const RowPart<double>& normal, const RowPart<double>& tangent) {
       --edge;
@@ -322,17 +216,48 @@ void ContactSystem::AddContacts(const ContactProblem<double>& problem,
   }
 }
 
-bool ContactSystem::Factor(const ContactProblem<double>& given,
+void ContactSystem::RegulariseContacts(const ContactProblem<double>& problem,
+                                       const std::vector<ContactMode>& modes) {
+  for (size_t i = 0; i < problem.contacts.size(); ++i) {
+    if (contact_block_[i] < 0) {
+      continue;
+    }
+    const ContactBlock<double>& c = problem.contacts[i];
+    double* delta = &regularisation_[3 * static_cast<size_t>(contact_block_[i])];
+    if (!c.driven) {
+      delta[0] = fraction_ * RowMobility(problem.mass, c.a, c.normal_a, c.b, c.normal_b);
+    }
+    if (modes[i] == ContactMode::kSticking) {
+      delta[1] = fraction_ * RowMobility(problem.mass, c.a, c.tangent_a, c.b, c.tangent_b);
+    }
+  }
+}
+
+bool ContactSystem::Factor(const ContactProblem<double>& problem,
                            const std::vector<ContactMode>& modes, double regularisation) {
+  fraction_ = regularisation;
+  const bool condensed = WorthCondensing(problem, modes);
+  return FactorAs(condensed, problem, modes) || (condensed && FactorAs(false, problem, modes));
+}
+
+bool ContactSystem::FactorAs(bool condensed, const ContactProblem<double>& given,
+                             const std::vector<ContactMode>& modes) {
   const bool spread = HasSpreadJoints(given);
   const ContactProblem<double> damped = spread ? WithJointDampers(given) : ContactProblem<double>();
   const ContactProblem<double>& problem = spread ? damped : given;
+  condensed_ = condensed;
   SetPattern(problem, modes);
   lu_.SetZero();
-  regularisation_.assign(3 * static_cast<size_t>(lu_.num_blocks()), 0.0);
+  regularisation_.assign(3 * static_cast<size_t>(num_blocks_), 0.0);
+  RegulariseContacts(problem, modes);
   AddBodies(problem);
-  AddJoints(problem, regularisation);
-  AddContacts(problem, modes, regularisation);
+  AddJoints(problem, fraction_);
+  if (condensed) {
+    AddCondensedContacts({problem, modes, contact_block_, regularisation_}, first_contact_edge_,
+                         &lu_);
+  } else {
+    AddContacts(problem, modes);
+  }
   // What is solved in another form is refined as what is regularised.
   regularised_ = spread || (problem.redundant_joints && !problem.joints.empty());
   for (const int block : contact_block_) {
@@ -341,55 +266,31 @@ bool ContactSystem::Factor(const ContactProblem<double>& given,
   return lu_.Factor();
 }
 
-template <bool kTransposed>
-double ContactSystem::Residual(const ContactProblem<double>& problem,
-                               const std::vector<ContactMode>& modes, const double* rhs,
-                               const double* x, int columns, double* residual) const {
-  return ResidualWith<kTransposed>(problem, modes, Regularisation::kLeftOut, rhs, x, columns,
-                                   residual)
-      .to_terms;
+bool ContactSystem::Expand(double left, const ContactProblem<double>& problem,
+                           const std::vector<ContactMode>& modes) {
+  if (!condensed_ || left <= kStalled) {
+    return false;
+  }
+  ++expansions_;
+  if (FactorAs(false, problem, modes)) {
+    return true;
+  }
+  FactorAs(true, problem, modes);
+  return false;
 }
 
 template <bool kTransposed>
-ContactSystem::ResidualSize ContactSystem::ResidualWith(const ContactProblem<double>& problem,
-                                                        const std::vector<ContactMode>& modes,
-                                                        Regularisation regularisation,
-                                                        const double* rhs, const double* x,
-                                                        int columns, double* residual) const {
-  const size_t size = 3 * static_cast<size_t>(num_blocks()) * columns;
-  std::copy(rhs, rhs + size, residual);
-  RowScale momentum, constraint;
-  for (int c = 0; c < columns; ++c) {
-    ColumnResidual<kTransposed> column(problem, x + c, columns, residual + c, &momentum,
-                                       &constraint);
-    column.Bodies();
-    column.Joints();
-    for (size_t i = 0; i < problem.contacts.size(); ++i) {
-      if (contact_block_[i] >= 0) {
-        column.Contact(problem.contacts[i], modes[i], contact_block_[i]);
-      }
-    }
+void ContactSystem::SolveOnce(const ContactProblem<double>& problem,
+                              const std::vector<ContactMode>& modes, double* x, int columns) const {
+  const ClosedContacts contacts = {problem, modes, contact_block_, regularisation_};
+  if (condensed_) {
+    CondenseRightHandSide<kTransposed>(contacts, x, columns);
   }
-  // Unused rows of constraints have a right-hand side of 0.
-  const size_t momentum_size = 3 * static_cast<size_t>(problem.num_bodies) * columns;
-  const std::vector<double>& free = problem.scale_momentum();
-  for (int i = 0; i < 3 * problem.num_bodies; ++i) {
-    momentum.parts = std::max(momentum.parts, std::abs(free[i]));
-    if (i % 3 != 2) {
-      constraint.parts = std::max(constraint.parts, std::abs(free[i]) / problem.mass[i]);
-    }
+  const auto solve = kTransposed ? SolveTransposedByFactors : SolveByFactors;
+  solve(lu_, problem, x, columns);
+  if (condensed_) {
+    RecoverImpulses<kTransposed>(contacts, x, columns);
   }
-  if (regularisation == Regularisation::kKept) {
-    for (size_t i = momentum_size; i < size; ++i) {
-      residual[i] -= regularisation_[i / columns] * x[i];
-    }
-  }
-  for (size_t i = 0; i < size; ++i) {
-    RowScale& kind = i < momentum_size ? momentum : constraint;
-    kind.left = std::max(kind.left, std::abs(residual[i]));
-  }
-  return {std::max(momentum.Relative(), constraint.Relative()),
-          std::max(momentum.RelativeToParts(), constraint.RelativeToParts())};
 }
 
 template <bool kTransposed>
@@ -398,11 +299,10 @@ double ContactSystem::RefinedSolve(const ContactProblem<double>& problem,
   const size_t size = 3 * static_cast<size_t>(num_blocks()) * columns;
   rhs_.assign(x, x + size);
   correction_.resize(size);
-  const auto solve = kTransposed ? SolveTransposedByFactors : SolveByFactors;
-  solve(lu_, problem, x, columns);
+  SolveOnce<kTransposed>(problem, modes, x, columns);
   double left = Residual<kTransposed>(problem, modes, rhs_.data(), x, columns, correction_.data());
   for (int i = 0; i < kMaxRefinements && left > kResidualGoal; ++i) {
-    solve(lu_, problem, correction_.data(), columns);
+    SolveOnce<kTransposed>(problem, modes, correction_.data(), columns);
     for (size_t k = 0; k < size; ++k) {
       x[k] += correction_[k];
     }
@@ -411,6 +311,10 @@ double ContactSystem::RefinedSolve(const ContactProblem<double>& problem,
     if (!(left < 0.1 * before)) {
       break;
     }
+  }
+  if (Expand(left, problem, modes)) {
+    std::copy(rhs_.begin(), rhs_.end(), x);
+    return RefinedSolve<kTransposed>(problem, modes, x, columns);
   }
   return left;
 }
@@ -439,8 +343,14 @@ double ContactSystem::SolveRegularised(const ContactProblem<double>& problem,
                                        int columns) {
   const size_t size = 3 * static_cast<size_t>(num_blocks()) * columns;
   rhs_.assign(x, x + size);
-  SolveByFactors(lu_, problem, x, columns);
-  return Refine(problem, modes, Regularisation::kKept, x, columns);
+  SolveOnce<false>(problem, modes, x, columns);
+  double left = Refine(problem, modes, Regularisation::kKept, x, columns);
+  if (Expand(left, problem, modes)) {
+    std::copy(rhs_.begin(), rhs_.end(), x);
+    SolveOnce<false>(problem, modes, x, columns);
+    left = Refine(problem, modes, Regularisation::kKept, x, columns);
+  }
+  return left;
 }
 
 double ContactSystem::SolveProximal(const ContactProblem<double>& problem,
@@ -450,14 +360,18 @@ double ContactSystem::SolveProximal(const ContactProblem<double>& problem,
   }
   const size_t size = 3 * static_cast<size_t>(num_blocks()) * columns;
   rhs_.assign(x, x + size);
-  SolveByFactors(lu_, problem, x, columns);
+  SolveOnce<false>(problem, modes, x, columns);
   const double left = Refine(problem, modes, Regularisation::kLeftOut, x, columns);
   if (left <= kConsistent) {
     return left;
   }
   std::copy(rhs_.begin(), rhs_.end(), x);
-  SolveByFactors(lu_, problem, x, columns);
-  Refine(problem, modes, Regularisation::kKept, x, columns);
+  SolveOnce<false>(problem, modes, x, columns);
+  const double kept = Refine(problem, modes, Regularisation::kKept, x, columns);
+  if (Expand(kept, problem, modes)) {
+    std::copy(rhs_.begin(), rhs_.end(), x);
+    return SolveProximal(problem, modes, x, columns);
+  }
   return Refine(problem, modes, Regularisation::kLeftOut, x, columns);
 }
 
@@ -475,7 +389,7 @@ double ContactSystem::Refine(const ContactProblem<double>& problem,
   double left = residual();
   for (int i = 0; i < kMaxRefinements && left > kResidualGoal; ++i) {
     last_.assign(x, x + size);
-    SolveByFactors(lu_, problem, correction_.data(), columns);
+    SolveOnce<false>(problem, modes, correction_.data(), columns);
     for (size_t k = 0; k < size; ++k) {
       x[k] += correction_[k];
     }
@@ -488,12 +402,5 @@ double ContactSystem::Refine(const ContactProblem<double>& problem,
   }
   return left;
 }
-
-template double ContactSystem::Residual<false>(const ContactProblem<double>&,
-                                               const std::vector<ContactMode>&, const double*,
-                                               const double*, int, double*) const;
-template double ContactSystem::Residual<true>(const ContactProblem<double>&,
-                                              const std::vector<ContactMode>&, const double*,
-                                              const double*, int, double*) const;
 
 }  // namespace tangible

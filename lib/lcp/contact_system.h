@@ -15,6 +15,9 @@
 // δ regularises redundant rows (four legs on a floor, a closed loop of bars): 1e-10 of the row's
 // own r M⁻¹ rᵀ, on contacts and, where joints form loops, on joints. Solutions are refined against
 // the K without δ, so what remains of δ is only the choice among redundant impulses.
+//
+// Where several contacts are closed they are taken out before factorisation
+// (contact_condensation.h). Where refinement then stalls, the whole system is factorised instead.
 
 #include <utility>
 #include <vector>
@@ -37,7 +40,9 @@ class ContactSystem {
               double regularisation = kContactRegularisation);
   /// Block of contact i, −1 if open.
   const std::vector<int>& contact_block() const { return contact_block_; }
-  int num_blocks() const { return lu_.num_blocks(); }
+  int num_blocks() const { return num_blocks_; }
+  /// How often a condensed system did not refine and was factorised as a whole, since the start.
+  int expansions() const { return expansions_; }
   /// Memory, bytes.
   size_t bytes() const {
     return lu_.bytes() + edges_.capacity() * sizeof(edges_[0]) +
@@ -91,11 +96,21 @@ class ContactSystem {
                             double* residual) const;
   double Refine(const ContactProblem<double>& problem, const std::vector<ContactMode>& modes,
                 Regularisation regularisation, double* x, int columns);
+  bool FactorAs(bool condensed, const ContactProblem<double>& problem,
+                const std::vector<ContactMode>& modes);
+  // Whether the whole system could be factorised in place of the condensed one, where refinement
+  // with that left this much.
+  bool Expand(double left, const ContactProblem<double>& problem,
+              const std::vector<ContactMode>& modes);
+  template <bool kTransposed>
+  void SolveOnce(const ContactProblem<double>& problem, const std::vector<ContactMode>& modes,
+                 double* x, int columns) const;
   void SetPattern(const ContactProblem<double>& problem, const std::vector<ContactMode>& modes);
   void AddBodies(const ContactProblem<double>& problem);
   void AddJoints(const ContactProblem<double>& problem, double regularisation);
-  void AddContacts(const ContactProblem<double>& problem, const std::vector<ContactMode>& modes,
-                   double regularisation);
+  void RegulariseContacts(const ContactProblem<double>& problem,
+                          const std::vector<ContactMode>& modes);
+  void AddContacts(const ContactProblem<double>& problem, const std::vector<ContactMode>& modes);
   template <bool kTransposed>
   double RefinedSolve(const ContactProblem<double>& problem, const std::vector<ContactMode>& modes,
                       double* x, int columns);
@@ -103,7 +118,12 @@ class ContactSystem {
   BlockLu<double> lu_;
   std::vector<std::pair<int, int>> edges_;
   std::vector<int> contact_block_;
+  int num_blocks_ = 0;
+  int first_contact_edge_ = 0;
   bool regularised_ = false;
+  bool condensed_ = false;
+  int expansions_ = 0;
+  double fraction_ = kContactRegularisation;
   std::vector<double> regularisation_;
   std::vector<double> rhs_, correction_, last_;
 };

@@ -54,6 +54,42 @@ TEST(LocalJacobianTest, RevoluteByHandIsTheGenericRoute) {
   EXPECT_GT(revolutes, 30);
 }
 
+// One column takes contacts by their adjoint, several by Jets.
+TEST(LocalJacobianTest, OneColumnOfTheAdjointIsThatOfSeveral) {
+  int contacts = 0;
+  for (unsigned seed = 1; seed <= 60; ++seed) {
+    const Scene scene = RandomScene(seed);
+    Model<double> model;
+    State<double> state;
+    BuildModel(scene, &model, &state);
+    Stepper stepper(model);
+    for (int k = 0; k < 5; ++k) {
+      if (stepper.Step(model, k * 0.01, 0.01, &state).status != StepStatus::kDone) break;
+      const int rows = 3 * stepper.system().num_blocks();
+      const VectorX<double> u = VectorX<double>::Random(rows);
+      const SolvedStep step = stepper.record().View(stepper.system().contact_block());
+      LocalJacobianScratch scratch;
+      VectorX<double> one = VectorX<double>::Zero(model.structure->num_variables());
+      VisitStepJacobian(model, step, JointRoute::kByHand, &scratch,
+                        SingleAdjointSink{u.data(), one.data()});
+      VectorX<double> several = VectorX<double>::Zero(one.size());
+      VisitStepJacobian(model, step, JointRoute::kByHand, &scratch,
+                        AdjointSink{u.data(), several.data(), 1});
+      // Nothing changes the world's pose: a route may leave its derivatives out.
+      for (int i = 0; i < 3; ++i) {
+        one[model.structure->PoseVariable(model.structure->world(), i)] = 0.0;
+        several[model.structure->PoseVariable(model.structure->world(), i)] = 0.0;
+      }
+      EXPECT_LT((one - several).cwiseAbs().maxCoeff(),
+                1e-13 * (1.0 + several.cwiseAbs().maxCoeff()))
+          << seed;
+      contacts += stepper.system().num_blocks() - model.structure->num_blocks() -
+                  static_cast<int>(model.structure->joints.size());
+    }
+  }
+  EXPECT_GT(contacts, 100);
+}
+
 TEST(LocalJacobianTest, EntriesOfABallThatSlidesByHand) {
   Scene scene = test_scenes::SceneOf(test_scenes::FallingBall(0.0, R"({"dt": 0.01})"));
   scene.bodies[0].velocity.x() = 2.0;

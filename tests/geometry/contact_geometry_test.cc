@@ -11,6 +11,7 @@
 
 #include "random_shapes.h"
 #include "tangible/geometry/collide.h"
+#include "tangible/geometry/contact_geometry_adjoint.h"
 
 namespace tangible::testing {
 namespace {
@@ -140,6 +141,32 @@ void ExpectDerivatives(const Case& pair) {
   }
 }
 
+/// The adjoint of each output against the Jets, in all variables.
+void ExpectAdjointOfJets(const Case& pair) {
+  const std::array<LocalJet, 5> jets = EvaluateJets(pair);
+  const size_t numbers_a = NumbersRead(pair, 0).size();
+  const size_t numbers_b = NumbersRead(pair, 1).size();
+  for (int k = 0; k < 5; ++k) {
+    ContactGeometry<double> bar;
+    bar.gap = k == 0 ? 1.0 : 0.0;
+    bar.normal = Vector2<double>(k == 1 ? 1.0 : 0.0, k == 2 ? 1.0 : 0.0);
+    bar.point = Vector2<double>(k == 3 ? 1.0 : 0.0, k == 4 ? 1.0 : 0.0);
+    ContactSideAdjoint a, b;
+    EvaluateContactAdjoint(pair.feature, pair.a.View(), pair.pose_a, pair.b.View(), pair.pose_b,
+                           bar, &a, &b);
+    std::vector<double> all(a.pose, a.pose + 3);
+    all.insert(all.end(), b.pose, b.pose + 3);
+    all.insert(all.end(), a.numbers, a.numbers + numbers_a);
+    all.insert(all.end(), b.numbers, b.numbers + numbers_b);
+    for (size_t variable = 0; variable < all.size(); ++variable) {
+      // Sums of a few products of numbers up to about 10, and 1 / 0.3 for corners that are near.
+      EXPECT_NEAR(all[variable], jets[k].v[variable], 1e-13 * (1.0 + std::abs(all[variable])))
+          << "output " << k << ", variable " << variable << ", kind "
+          << static_cast<int>(pair.feature.kind);
+    }
+  }
+}
+
 TEST(ContactGeometry, JetsAgreeWithDifferencesOnRandomPairs) {
   std::mt19937 random(20240201);
   int num_of_kind[5] = {};
@@ -164,6 +191,7 @@ TEST(ContactGeometry, JetsAgreeWithDifferencesOnRandomPairs) {
         continue;
       }
       ExpectDerivatives(pair);
+      ExpectAdjointOfJets(pair);
       ++num_of_kind[static_cast<int>(pair.feature.kind)];
     }
   }
@@ -250,6 +278,7 @@ TEST(ContactGeometry, CoincidentPointsHaveFiniteDerivatives) {
   }
   EXPECT_EQ(jets[1].v.norm(), 0.0);
   EXPECT_EQ(jets[2].v.norm(), 0.0);
+  ExpectAdjointOfJets(pair);
   // Along the normal the gap opens at unit rate.
   EXPECT_EQ(jets[0].v[1], 1.0);
   EXPECT_EQ(jets[0].v[4], -1.0);
