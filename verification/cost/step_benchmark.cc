@@ -13,6 +13,7 @@
 #include "tangible/scene/scene_json.h"
 #include "tangible/simulation/rollout_adjoint.h"
 #include "tangible/simulation/rollout_tangent.h"
+#include "tangible/verification/cost/benchmark_scenes.h"
 
 namespace tangible {
 namespace {
@@ -29,38 +30,6 @@ Scene Chain() {
   if (!LoadScene(std::string(TANGIBLE_SOURCE_DIR) + "/data/scenes/chain.json", &scene, &error)) {
     std::abort();
   }
-  return scene;
-}
-
-// N discs that fall into a box and settle.
-Scene Discs(int n) {
-  Scene scene;
-  const int columns = static_cast<int>(std::ceil(std::sqrt(n)));
-  const double width = 0.25 * columns;
-  const auto wall = [&](const char* name, double x, double y, double offset) {
-    BasicBody<double> body;
-    body.name = name;
-    body.motion = Motion::kStatic;
-    body.shape = {ShapeType::kHalfPlane, {x, y, offset}};
-    body.friction = 0.5;
-    scene.bodies.push_back(body);
-  };
-  wall("floor", 0.0, 1.0, 0.0);
-  wall("left", 1.0, 0.0, -0.5 * width);
-  wall("right", -1.0, 0.0, -0.5 * width);
-  for (int i = 0; i < n; ++i) {
-    const int row = i / columns;
-    BasicBody<double> body;
-    body.name = "disc" + std::to_string(i);
-    body.shape = {ShapeType::kCircle, {0.1}};
-    body.mass = 1.0;
-    body.friction = 0.5;
-    body.position = {-0.5 * width + 0.125 + 0.25 * (i % columns) + 0.01 * std::sin(12.9898 * i),
-                     0.15 + 0.22 * row};
-    scene.bodies.push_back(body);
-  }
-  scene.simulation.dt = 0.002;
-  scene.simulation.duration = 1.0;
   return scene;
 }
 
@@ -148,8 +117,8 @@ BENCHMARK_CAPTURE(BenchmarkTangent, chain, Chain())
     ->Arg(8)
     ->Arg(32)
     ->Unit(benchmark::kMillisecond);
-BENCHMARK_CAPTURE(BenchmarkRollout, discs_10, Discs(10))->Unit(benchmark::kMillisecond);
-BENCHMARK_CAPTURE(BenchmarkAdjoint, discs_10_keep, Discs(10), Factorisations::kKeep)
+BENCHMARK_CAPTURE(BenchmarkRollout, discs_10, DiscsScene(10))->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(BenchmarkAdjoint, discs_10_keep, DiscsScene(10), Factorisations::kKeep)
     ->Unit(benchmark::kMillisecond);
 
 }  // namespace
