@@ -17,9 +17,11 @@
 
 namespace tangible {
 
-/// What is evaluated on the way and needed again: joint rows at the step's start.
+/// What is evaluated on the way and needed again: poses, with their sines and cosines, and joint
+/// rows at the step's start.
 template <typename T>
 struct AssemblyScratch {
+  std::vector<Pose<T>> poses;
   std::vector<JointRows<T>> joints;
 };
 
@@ -32,7 +34,8 @@ void AssembleFree(const Model<T>& model, const State<T>& state, double t, double
                   ContactProblem<T>* problem, AssemblyScratch<T>* scratch,
                   bool correct_drift = true);
 
-/// The contacts' blocks, with the given coefficients (one source a contact).
+/// The contacts' blocks, with the given coefficients (one source a contact). `scratch` is that of
+/// AssembleFree at the same state.
 template <typename T>
 void AssembleContacts(const Model<T>& model, const State<T>& state, double h,
                       const std::vector<ActiveContact>& contacts,

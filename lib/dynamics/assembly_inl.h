@@ -4,6 +4,10 @@
 // Definitions of the templates of assembly.h; included by assembly.cc, and by verification's file
 // for another scalar.
 
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
 #include "tangible/dynamics/assembly.h"
 
 namespace tangible {
@@ -13,8 +17,19 @@ template <typename T>
 class FreeAssembly {
  public:
   FreeAssembly(const Model<T>& model, const State<T>& state, double t, double h,
-               ContactProblem<T>* problem)
-      : model_(model), structure_(*model.structure), state_(state), t_(t), h_(h), p_(*problem) {}
+               ContactProblem<T>* problem, std::vector<Pose<T>>* poses)
+      : model_(model),
+        structure_(*model.structure),
+        state_(state),
+        t_(t),
+        h_(h),
+        p_(*problem),
+        poses_(*poses) {
+    poses_.clear();
+    for (int body = 0; body < structure_.num_bodies(); ++body) {
+      poses_.push_back(state.PoseOf(body));
+    }
+  }
 
   void Bodies() {
     p_.num_bodies = structure_.num_blocks();
@@ -43,8 +58,7 @@ class FreeAssembly {
   void Springs() {
     for (const SpringIndex& spring : structure_.springs) {
       SpringRow<T> row;
-      EvaluateSpring(state_.PoseOf(spring.a), state_.PoseOf(spring.b),
-                     &model_.numbers[spring.numbers], &row);
+      EvaluateSpring(poses_[spring.a], poses_[spring.b], &model_.numbers[spring.numbers], &row);
       AddImpulse(spring.a, row.pull_a, spring.b, row.pull_b, T(-h_));
       AddDamper(spring.a, row.row_a, spring.b, row.row_b,
                 T(h_ * model_.numbers[spring.numbers + 5]));
@@ -74,8 +88,8 @@ class FreeAssembly {
     for (size_t j = 0; j < rows->size(); ++j) {
       const JointIndex& joint = structure_.joints[j];
       JointRows<T>& r = (*rows)[j];
-      EvaluateJoint(joint.type, state_.PoseOf(joint.a), state_.PoseOf(joint.b),
-                    &model_.numbers[joint.geometry], &r);
+      EvaluateJoint(joint.type, poses_[joint.a], poses_[joint.b], &model_.numbers[joint.geometry],
+                    &r);
       JointBlock<T>& block = p_.joints.emplace_back();
       block.a = structure_.bodies[joint.a].block;
       block.b = structure_.bodies[joint.b].block;
@@ -134,14 +148,27 @@ class FreeAssembly {
   const State<T>& state_;
   const double t_, h_;
   ContactProblem<T>& p_;
+  std::vector<Pose<T>>& poses_;
 };
+
+// Rounding of a gap: a few units in the last place of the positions it is the difference of, m.
+template <typename T>
+double PositionRounding(const State<T>& state, int a, int b) {
+  constexpr double kUnits = 4.0 * std::numeric_limits<double>::epsilon();
+  double size = 0.0;
+  for (int i = 0; i < 2; ++i) {
+    size = std::max(
+        {size, std::abs(ValueOf(state.pose[3 * a + i])), std::abs(ValueOf(state.pose[3 * b + i]))});
+  }
+  return kUnits * size;
+}
 
 }  // namespace internal
 
 template <typename T>
 void AssembleFree(const Model<T>& model, const State<T>& state, double t, double h,
                   ContactProblem<T>* problem, AssemblyScratch<T>* scratch, bool correct_drift) {
-  internal::FreeAssembly<T> assembly(model, state, t, h, problem);
+  internal::FreeAssembly<T> assembly(model, state, t, h, problem, &scratch->poses);
   assembly.Bodies();
   if (h > 0.0) {
     assembly.Springs();
@@ -165,7 +192,7 @@ void AssembleContacts(const Model<T>& model, const State<T>& state, double h,
     if (contact.joint >= 0) {
       EvaluateLimitRows(model, scratch.joints[contact.joint], contact, &rows);
     } else {
-      EvaluateContactRows(model, state, contact, &rows);
+      EvaluateContactRows(model, scratch.poses, contact, &rows);
     }
     ContactBlock<T>& block = problem->contacts.emplace_back();
     block.a = structure.bodies[contact.a].block;
@@ -181,6 +208,9 @@ void AssembleContacts(const Model<T>& model, const State<T>& state, double h,
     block.c_n =
         LawConstant(contact.law, rows.geometry.gap, h, e, approach, structure.settings) +
         PrescribedSpeed(structure, state, contact.a, rows.normal_a, contact.b, rows.normal_b);
+    block.rounding = contact.law == ContactLaw::kGap && contact.joint < 0
+                         ? internal::PositionRounding(state, contact.a, contact.b) / h
+                         : 0.0;
     block.c_t =
         PrescribedSpeed(structure, state, contact.a, rows.tangent_a, contact.b, rows.tangent_b);
   }

@@ -99,15 +99,25 @@ T RelativeSpeed(const State<T>& state, int a, const RowPart<T>& row_a, int b,
   return speed;
 }
 
-/// Evaluates a contact of shapes.
+/// Evaluates a contact of shapes between bodies at given poses.
 template <typename T>
-void EvaluateContactRows(const Model<T>& model, const State<T>& state, const ActiveContact& contact,
-                         ContactRows<T>* rows) {
-  const Pose<T> pose_a = state.PoseOf(contact.a);
-  const Pose<T> pose_b = state.PoseOf(contact.b);
+void EvaluateContactRows(const Model<T>& model, const Pose<T>& pose_a, const Pose<T>& pose_b,
+                         const ActiveContact& contact, ContactRows<T>* rows) {
   rows->geometry = EvaluateContact(contact.feature, model.Shape(contact.a), pose_a,
                                    model.Shape(contact.b), pose_b);
   RowsFromGeometry(pose_a.position, pose_b.position, rows);
+}
+
+/// The same at a state, and with the poses of all bodies.
+template <typename T>
+void EvaluateContactRows(const Model<T>& model, const State<T>& state, const ActiveContact& contact,
+                         ContactRows<T>* rows) {
+  EvaluateContactRows(model, state.PoseOf(contact.a), state.PoseOf(contact.b), contact, rows);
+}
+template <typename T>
+void EvaluateContactRows(const Model<T>& model, const std::vector<Pose<T>>& poses,
+                         const ActiveContact& contact, ContactRows<T>* rows) {
+  EvaluateContactRows(model, poses[contact.a], poses[contact.b], contact, rows);
 }
 
 /// Evaluates a joint limit: the coordinate's row times its side, gap = side (coordinate − limit),

@@ -11,7 +11,7 @@ namespace tangible {
 namespace {
 
 double SpeedOf(const double* twist, double radius) {
-  return std::hypot(twist[0], twist[1]) + std::abs(twist[2]) * radius;
+  return std::sqrt(twist[0] * twist[0] + twist[1] * twist[1]) + std::abs(twist[2]) * radius;
 }
 
 // Rate of a joint's coordinate, rad/s or m/s.
@@ -133,7 +133,7 @@ void ContactSearch::Find(const Model<double>& model, const State<double>& state,
   restitution->clear();
   for (int body = 0; body < structure.num_bodies(); ++body) {
     const double reach = 0.5 * settings.contact_margin + h * bound_[body];
-    boxes_[body] = ComputeAabb(model.Shape(body), state.PoseOf(body), reach);
+    boxes_[body] = ComputeAabb(model.Shape(body), scratch.poses[body], reach);
     if (structure.bodies[body].shape == ShapeType::kHalfPlane && state.twist[3 * body + 2] != 0.0) {
       // A turning half-plane may reach any place.
       const double infinity = std::numeric_limits<double>::infinity();
@@ -144,17 +144,17 @@ void ContactSearch::Find(const Model<double>& model, const State<double>& state,
       boxes_, [&](int i, int j) { return structure.MayCollide(i, j); }, &pairs_);
   for (const auto& [a, b] : pairs_) {
     double reach = settings.contact_margin + h * (bound_[a] + bound_[b]);
-    const double distance = std::hypot(state.pose[3 * a] - state.pose[3 * b],
-                                       state.pose[3 * a + 1] - state.pose[3 * b + 1]);
     for (const int body : {a, b}) {
       if (structure.bodies[body].shape == ShapeType::kHalfPlane) {
+        const double distance = std::hypot(state.pose[3 * a] - state.pose[3 * b],
+                                           state.pose[3 * a + 1] - state.pose[3 * b + 1]);
         const int other = body == a ? b : a;
         reach += h * std::abs(state.twist[3 * body + 2]) * (distance + radius_[other]);
       }
     }
     ContactFeature features[2];
-    const int count = FindContactFeatures(model.Shape(a), state.PoseOf(a), model.Shape(b),
-                                          state.PoseOf(b), reach, features);
+    const int count = FindContactFeatures(model.Shape(a), scratch.poses[a], model.Shape(b),
+                                          scratch.poses[b], reach, features);
     if (count == 0) {
       continue;
     }
@@ -166,7 +166,7 @@ void ContactSearch::Find(const Model<double>& model, const State<double>& state,
       contact.b = b;
       contact.feature = features[k];
       ContactRows<double> rows;
-      EvaluateContactRows(model, state, contact, &rows);
+      EvaluateContactRows(model, scratch.poses, contact, &rows);
       const double gap = rows.geometry.gap;
       contact.gap = gap;
       contact.law = GapLaw(gap, h, settings);

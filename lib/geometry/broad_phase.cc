@@ -49,18 +49,46 @@ Aabb ComputeAabb(const ShapeView<double>& shape, const Pose<double>& pose, doubl
   return {box.min_x - grow, box.min_y - grow, box.max_x + grow, box.max_y + grow};
 }
 
+// Boxes are swept along the axis on which they are spread more: a stack or a hanging chain has all
+// of them above each other. The entries' x is that axis.
+bool BroadPhase::ChooseAxis(const std::vector<Aabb>& boxes) {
+  double sum[2] = {0.0, 0.0};
+  double squares[2] = {0.0, 0.0};
+  int count = 0;
+  for (const Aabb& box : boxes) {
+    const double centre[2] = {0.5 * (box.min_x + box.max_x), 0.5 * (box.min_y + box.max_y)};
+    if (std::isfinite(box.max_x - box.min_x) && std::isfinite(box.max_y - box.min_y)) {
+      ++count;
+      for (int k = 0; k < 2; ++k) {
+        sum[k] += centre[k];
+        squares[k] += centre[k] * centre[k];
+      }
+    }
+  }
+  // With room, so that a square pile does not change its axis from step to step.
+  const double x = squares[0] - sum[0] * sum[0] / std::max(1, count);
+  const double y = squares[1] - sum[1] * sum[1] / std::max(1, count);
+  const bool along_y = along_y_ ? 2.0 * y > x : y > 2.0 * x;
+  const bool changed = along_y != along_y_;
+  along_y_ = along_y;
+  return changed;
+}
+
 void BroadPhase::Sort(const std::vector<Aabb>& boxes) {
   const auto before = [](const Entry& p, const Entry& q) { return p.box.min_x < q.box.min_x; };
-  if (entries_.size() != boxes.size()) {
+  const auto turned = [this](const Aabb& box) {
+    return along_y_ ? Aabb{box.min_y, box.min_x, box.max_y, box.max_x} : box;
+  };
+  if (ChooseAxis(boxes) || entries_.size() != boxes.size()) {
     entries_.resize(boxes.size());
     for (std::size_t i = 0; i < boxes.size(); ++i) {
-      entries_[i] = {boxes[i], static_cast<int>(i)};
+      entries_[i] = {turned(boxes[i]), static_cast<int>(i)};
     }
     std::sort(entries_.begin(), entries_.end(), before);
     return;
   }
   for (Entry& entry : entries_) {
-    entry.box = boxes[entry.index];
+    entry.box = turned(boxes[entry.index]);
   }
   // Insertion sort: linear on an order that has hardly changed.
   for (std::size_t k = 1; k < entries_.size(); ++k) {

@@ -35,9 +35,11 @@ class BroadPhase {
     int index;
   };
   void SortAndSweep(const std::vector<Aabb>& boxes);
+  bool ChooseAxis(const std::vector<Aabb>& boxes);
   void Sort(const std::vector<Aabb>& boxes);
   void SortOverlaps(int num_boxes);
 
+  bool along_y_ = false;        ///< the axis that is swept; entries have their x along it
   std::vector<Entry> entries_;  ///< by min_x, in the order of the last call
   std::vector<std::pair<int, int>> found_;
   std::vector<std::pair<int, int>> overlaps_;  ///< those found, in ascending order

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <cstdint>
 #include <iterator>
+#include <limits>
 
 #include "tangible/lcp/block_lu_inl.h"
 
@@ -20,15 +22,47 @@ bool InsertSorted(std::vector<int>* list, int node) {
 constexpr int kReady = 0;
 constexpr int kEliminated = -1;
 
+// Least of a changing list of keys: a tournament, a change costs the logarithm of its size.
+class Tournament {
+ public:
+  static constexpr std::int64_t kOut = std::numeric_limits<std::int64_t>::max();
+
+  explicit Tournament(std::vector<std::int64_t>* keys) : keys_(*keys) {}
+  void Start(int size) {
+    leaves_ = 1;
+    while (leaves_ < size) {
+      leaves_ *= 2;
+    }
+    keys_.assign(2 * static_cast<size_t>(leaves_), kOut);
+  }
+  void Set(int leaf, std::int64_t key) {
+    size_t at = static_cast<size_t>(leaves_) + leaf;
+    keys_[at] = key;
+    for (at /= 2; at > 0; at /= 2) {
+      const std::int64_t least = std::min(keys_[2 * at], keys_[2 * at + 1]);
+      if (keys_[at] == least) {
+        break;
+      }
+      keys_[at] = least;
+    }
+  }
+  std::int64_t Least() const { return keys_[1]; }
+
+ private:
+  std::vector<std::int64_t>& keys_;
+  int leaves_ = 1;
+};
+
 class Ordering {
  public:
   Ordering(std::vector<std::vector<int>>* adjacency, std::vector<int>* state,
            std::vector<int>* merged, std::vector<std::pair<int, int>>* waiting,
-           BlockLuPattern* pattern)
+           std::vector<std::int64_t>* keys, BlockLuPattern* pattern)
       : adjacency_(*adjacency),
         state_(*state),
         merged_(*merged),
         waiting_(*waiting),
+        ready_(keys),
         pattern_(*pattern) {}
 
   // Eliminates all nodes; fills order, start and neighbour.
@@ -66,27 +100,22 @@ class Ordering {
       }
     }
     std::sort(waiting_.begin(), waiting_.end());
+    ready_.Start(n);
+    for (int i = 0; i < n; ++i) {
+      Update(i);
+    }
   }
 
-  // The ready node of least degree, the first of equals; a blocked one (isolated) only when no
-  // other is left.
-  int Choose() const {
-    int best = -1;
-    size_t best_degree = 0;
-    for (int i = 0; i < pattern_.num_blocks; ++i) {
-      if (state_[i] != kReady) {
-        continue;
-      }
-      if (best < 0 || adjacency_[i].size() < best_degree) {
-        best = i;
-        best_degree = adjacency_[i].size();
-        if (best_degree <= 1) {
-          break;
-        }
-      }
-    }
-    return best;
+  // The key of a node: its degree, where 0 is no better than 1, then its number.
+  void Update(int node) {
+    const size_t degree = std::max<size_t>(adjacency_[node].size(), 1);
+    ready_.Set(node, state_[node] == kReady ? static_cast<std::int64_t>(degree) << 32 | node
+                                            : Tournament::kOut);
   }
+
+  // The ready node of least degree, the first of equals. One is always ready: a body is from the
+  // start, a constraint once a body of its is gone.
+  int Choose() const { return static_cast<int>(ready_.Least() & 0x7fffffff); }
 
   void Eliminate(int node) {
     state_[node] = kEliminated;
@@ -97,6 +126,7 @@ class Ordering {
          w != waiting_.end() && w->first == node; ++w) {
       --state_[w->second];
     }
+    Update(node);
     pattern_.neighbour.insert(pattern_.neighbour.end(), front.begin(), front.end());
     for (const int i : front) {
       // adjacency[i] := adjacency[i] ∪ front \ {i, node}
@@ -109,6 +139,7 @@ class Ordering {
           adjacency_[i].push_back(j);
         }
       }
+      Update(i);
     }
   }
 
@@ -116,6 +147,7 @@ class Ordering {
   std::vector<int>& state_;
   std::vector<int>& merged_;
   std::vector<std::pair<int, int>>& waiting_;  // (body, constraint that waits for it), ascending
+  Tournament ready_;
   BlockLuPattern& pattern_;
 };
 
@@ -168,8 +200,8 @@ void FindPlaces(std::vector<int>* position_scratch, BlockLuPattern* pattern) {
 
 void internal::OrderBlocks(std::vector<std::vector<int>>* adjacency, std::vector<int>* state,
                            std::vector<int>* merged, std::vector<std::pair<int, int>>* waiting,
-                           BlockLuPattern* pattern) {
-  Ordering(adjacency, state, merged, waiting, pattern).Run();
+                           std::vector<std::int64_t>* keys, BlockLuPattern* pattern) {
+  Ordering(adjacency, state, merged, waiting, keys, pattern).Run();
   FindPlaces(state, pattern);
 }
 

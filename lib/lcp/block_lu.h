@@ -19,6 +19,7 @@
 // 4, 6.
 
 #include <array>
+#include <cstdint>
 #include <memory>
 #include <utility>
 #include <vector>
@@ -71,7 +72,12 @@ class BlockLu {
   void MoveFactorsTo(BlockLu* other) {
     other->pattern_ = pattern_;
     values_.swap(other->values_);
+    row_order_.swap(other->row_order_);
   }
+
+  /// Exchanges the pattern with one kept elsewhere: symbolic work stays with what it is of. Factors
+  /// are lost.
+  void SwapPattern(std::shared_ptr<BlockLuPattern>* pattern) { pattern_.swap(*pattern); }
 
   int num_blocks() const { return pattern_ ? pattern_->num_blocks : 0; }
   /// Memory, bytes, but for the pattern, which copies share.
@@ -90,11 +96,13 @@ class BlockLu {
 
   std::shared_ptr<BlockLuPattern> pattern_;
   std::vector<T> values_;  ///< diagonal blocks, lower blocks, upper blocks (9 numbers each)
+  std::vector<unsigned char> row_order_;  ///< of the rows of each diagonal block
   // Scratch of the symbolic phase.
   std::vector<std::vector<int>> adjacency_;
   std::vector<int> state_;
   std::vector<int> merged_;
   std::vector<std::pair<int, int>> waiting_;
+  std::vector<std::int64_t> keys_;
 };
 
 extern template class BlockLu<double>;

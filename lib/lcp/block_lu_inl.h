@@ -17,7 +17,7 @@ namespace internal {
 /// scratch.
 void OrderBlocks(std::vector<std::vector<int>>* adjacency, std::vector<int>* state,
                  std::vector<int>* merged, std::vector<std::pair<int, int>>* waiting,
-                 BlockLuPattern* pattern);
+                 std::vector<std::int64_t>* keys, BlockLuPattern* pattern);
 
 // Of single right-hand sides, of which there are the most: its loops vanish.
 using OneColumn = std::integral_constant<int, 1>;
@@ -32,66 +32,63 @@ inline void SubtractProduct(const T* a, const T* b, T* c) {
   }
 }
 
-// a := a b.
+// Pivot blocks are kept as triangles: P A = L U by Gauss elimination with partial pivoting (by
+// value), row i of the block being row order[i] of A, and 1 / U_ii in place of U_ii. An inverse
+// would lose what contacts with a small δ on their diagonal (contact_condensation.h) leave of the
+// other directions. False where a pivot is 0 or not finite.
 template <typename T>
-inline void MultiplyInPlace(T* a, const T* b) {
+inline bool FactorPivot(T* a, unsigned char* order) {
+  T m[3][3];
   for (int i = 0; i < 3; ++i) {
-    const T a0 = a[3 * i];
-    const T a1 = a[3 * i + 1];
-    const T a2 = a[3 * i + 2];
-    for (int j = 0; j < 3; ++j) {
-      a[3 * i + j] = a0 * b[j] + a1 * b[3 + j] + a2 * b[6 + j];
-    }
-  }
-}
-
-// Inverse of a 3 x 3 matrix by Gauss-Jordan elimination with partial pivoting (by value); false
-// where a pivot is 0 or not finite.
-template <typename T>
-inline bool InvertInPlace(T* a) {
-  using std::abs;
-  int row_of[3] = {0, 1, 2};
-  T m[3][6];
-  for (int i = 0; i < 3; ++i) {
+    order[i] = static_cast<unsigned char>(i);
     for (int j = 0; j < 3; ++j) {
       m[i][j] = a[3 * i + j];
-      m[i][j + 3] = T(i == j ? 1.0 : 0.0);
     }
   }
   for (int k = 0; k < 3; ++k) {
     int pivot = k;
     for (int i = k + 1; i < 3; ++i) {
-      if (std::abs(ValueOf(m[row_of[i]][k])) > std::abs(ValueOf(m[row_of[pivot]][k]))) {
+      if (std::abs(ValueOf(m[order[i]][k])) > std::abs(ValueOf(m[order[pivot]][k]))) {
         pivot = i;
       }
     }
-    std::swap(row_of[k], row_of[pivot]);
-    T* row = m[row_of[k]];
+    std::swap(order[k], order[pivot]);
+    T* row = m[order[k]];
     const double value = ValueOf(row[k]);
     if (value == 0.0 || !std::isfinite(value)) {
       return false;
     }
-    const T inverse = 1.0 / row[k];
-    for (int j = 0; j < 6; ++j) {
-      row[j] *= inverse;
-    }
-    for (int i = 0; i < 3; ++i) {
-      if (i == k) {
-        continue;
-      }
-      T* other = m[row_of[i]];
-      const T factor = other[k];
-      for (int j = 0; j < 6; ++j) {
-        other[j] -= factor * row[j];
+    row[k] = 1.0 / row[k];
+    for (int i = k + 1; i < 3; ++i) {
+      T* other = m[order[i]];
+      other[k] *= row[k];
+      for (int j = k + 1; j < 3; ++j) {
+        other[j] -= other[k] * row[j];
       }
     }
   }
   for (int i = 0; i < 3; ++i) {
     for (int j = 0; j < 3; ++j) {
-      a[3 * i + j] = m[row_of[i]][j + 3];
+      a[3 * i + j] = m[order[i]][j];
     }
   }
   return true;
+}
+
+// b := b A⁻¹ for a 3 x 3 block b.
+template <typename T>
+inline void DivideByPivot(const T* a, const unsigned char* order, T* b) {
+  for (int i = 0; i < 3; ++i) {
+    T* row = b + 3 * i;
+    const T u0 = row[0] * a[0];
+    const T u1 = (row[1] - u0 * a[1]) * a[4];
+    const T u2 = (row[2] - u0 * a[2] - u1 * a[5]) * a[8];
+    const T l1 = u1 - u2 * a[7];
+    const T l0 = u0 - l1 * a[3] - u2 * a[6];
+    row[order[0]] = l0;
+    row[order[1]] = l1;
+    row[order[2]] = u2;
+  }
 }
 
 // y −= a x for `columns` right-hand sides (row-major), an int or, known when compiled, OneColumn.
@@ -114,17 +111,33 @@ inline void SubtractApplyTransposed(const T* a, const T* x, T* y, Columns column
   }
 }
 
-// x := a x, or aᵀ x with strides (1, 3).
+// x := A⁻¹ x.
 template <typename T, typename Columns>
-inline void ApplyInPlace(const T* a, int row_stride, int column_stride, T* x, Columns columns) {
+inline void SolvePivot(const T* a, const unsigned char* order, T* x, Columns columns) {
   for (int c = 0; c < columns; ++c) {
-    const T x0 = x[c];
-    const T x1 = x[columns + c];
-    const T x2 = x[2 * columns + c];
-    for (int i = 0; i < 3; ++i) {
-      x[i * columns + c] = a[i * row_stride] * x0 + a[i * row_stride + column_stride] * x1 +
-                           a[i * row_stride + 2 * column_stride] * x2;
-    }
+    const T y0 = x[order[0] * columns + c];
+    const T y1 = x[order[1] * columns + c] - a[3] * y0;
+    const T y2 = x[order[2] * columns + c] - a[6] * y0 - a[7] * y1;
+    const T z2 = y2 * a[8];
+    const T z1 = (y1 - a[5] * z2) * a[4];
+    x[c] = (y0 - a[1] * z1 - a[2] * z2) * a[0];
+    x[columns + c] = z1;
+    x[2 * columns + c] = z2;
+  }
+}
+
+// x := A⁻ᵀ x.
+template <typename T, typename Columns>
+inline void SolvePivotTransposed(const T* a, const unsigned char* order, T* x, Columns columns) {
+  for (int c = 0; c < columns; ++c) {
+    const T y0 = x[c] * a[0];
+    const T y1 = (x[columns + c] - a[1] * y0) * a[4];
+    const T y2 = (x[2 * columns + c] - a[2] * y0 - a[5] * y1) * a[8];
+    const T z1 = y1 - a[7] * y2;
+    const T z0 = y0 - a[3] * z1 - a[6] * y2;
+    x[order[0] * columns + c] = z0;
+    x[order[1] * columns + c] = z1;
+    x[order[2] * columns + c] = y2;
   }
 }
 
@@ -151,6 +164,8 @@ void BlockLu<T>::Reserve(int num_blocks, int num_edges) {
   state_.reserve(num_blocks);
   merged_.reserve(num_blocks);
   waiting_.reserve(num_edges);
+  row_order_.reserve(3 * static_cast<size_t>(num_blocks));
+  keys_.reserve(4 * static_cast<size_t>(num_blocks));
 }
 
 template <typename T>
@@ -166,13 +181,14 @@ void BlockLu<T>::SetPattern(int num_blocks, int num_bodies,
   pattern_->num_blocks = num_blocks;
   pattern_->num_bodies = num_bodies;
   pattern_->edges = edges;
-  internal::OrderBlocks(&adjacency_, &state_, &merged_, &waiting_, pattern_.get());
+  internal::OrderBlocks(&adjacency_, &state_, &merged_, &waiting_, &keys_, pattern_.get());
 }
 
 template <typename T>
 void BlockLu<T>::SetZero() {
   const size_t blocks = pattern_->num_blocks + 2 * pattern_->neighbour.size();
   values_.assign(9 * blocks, T(0.0));
+  row_order_.resize(3 * static_cast<size_t>(pattern_->num_blocks));
 }
 
 template <typename T>
@@ -183,13 +199,14 @@ bool BlockLu<T>::Factor() {
   T* values = values_.data();
   for (size_t k = 0; k < n; ++k) {
     T* pivot = values + 9 * static_cast<size_t>(p.order[k]);
-    if (!internal::InvertInPlace(pivot)) {
+    unsigned char* pivot_order = &row_order_[3 * static_cast<size_t>(p.order[k])];
+    if (!internal::FactorPivot(pivot, pivot_order)) {
       return false;
     }
     const int* target = p.target.data() + p.target_start[k];
     for (int r = p.start[k]; r < p.start[k + 1]; ++r) {
       T* lower = values + 9 * (n + r);
-      internal::MultiplyInPlace(lower, pivot);
+      internal::DivideByPivot(pivot, pivot_order, lower);
       for (int s = p.start[k]; s < p.start[k + 1]; ++s) {
         internal::SubtractProduct(lower, values + 9 * (n + slots + s),
                                   values + 9 * static_cast<size_t>(*target));
@@ -229,7 +246,8 @@ void BlockLu<T>::SolveColumns(T* x, Columns columns) const {
       internal::SubtractApply(values + 9 * (n + slots + s), x + stride * p.neighbour[s], pivot_x,
                               columns);
     }
-    internal::ApplyInPlace(values + 9 * static_cast<size_t>(p.order[k]), 3, 1, pivot_x, columns);
+    internal::SolvePivot(values + 9 * static_cast<size_t>(p.order[k]),
+                         &row_order_[3 * static_cast<size_t>(p.order[k])], pivot_x, columns);
   }
 }
 
@@ -252,7 +270,9 @@ void BlockLu<T>::SolveTransposedColumns(T* x, Columns columns) const {
   const T* values = values_.data();
   for (size_t k = 0; k < n; ++k) {
     T* pivot_x = x + stride * p.order[k];
-    internal::ApplyInPlace(values + 9 * static_cast<size_t>(p.order[k]), 1, 3, pivot_x, columns);
+    internal::SolvePivotTransposed(values + 9 * static_cast<size_t>(p.order[k]),
+                                   &row_order_[3 * static_cast<size_t>(p.order[k])], pivot_x,
+                                   columns);
     for (int s = p.start[k]; s < p.start[k + 1]; ++s) {
       internal::SubtractApplyTransposed(values + 9 * (n + slots + s), pivot_x,
                                         x + stride * p.neighbour[s], columns);
@@ -269,9 +289,10 @@ void BlockLu<T>::SolveTransposedColumns(T* x, Columns columns) const {
 
 template <typename T>
 size_t BlockLu<T>::bytes() const {
-  size_t sum =
-      values_.capacity() * sizeof(T) + (state_.capacity() + merged_.capacity()) * sizeof(int) +
-      waiting_.capacity() * sizeof(waiting_[0]) + adjacency_.capacity() * sizeof(std::vector<int>);
+  size_t sum = values_.capacity() * sizeof(T) +
+               (state_.capacity() + merged_.capacity()) * sizeof(int) +
+               waiting_.capacity() * sizeof(waiting_[0]) + keys_.capacity() * sizeof(keys_[0]) +
+               adjacency_.capacity() * sizeof(std::vector<int>);
   for (const std::vector<int>& list : adjacency_) {
     sum += list.capacity() * sizeof(int);
   }

@@ -77,6 +77,9 @@ struct ContactBlock {
   T friction;         ///< μ
   bool has_friction;  ///< μ > 0: rows for it
   T offset = T(0.0);  ///< o ≥ 0, the least λn, N s
+  /// What c_n is uncertain by: rounding of the positions whose gap it is, m/s. Modes are not
+  /// changed for less.
+  double rounding = 0.0;
   /// λn = o with s_n ≥ 0: in the mode system this equation stands in place of s_n = 0.
   bool driven = false;
 };

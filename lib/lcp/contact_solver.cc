@@ -9,12 +9,13 @@ namespace {
 
 // Violations below this fraction of a row's scale are rounding.
 constexpr double kModeTolerance = 1e-12;
+// A contact that rests at the limit of friction slides at speeds of either sign, of the size of its
+// rounding: there it keeps its mode, within this fraction of the residual asked for.
+constexpr double kSlipOfTolerance = 0.3;
 constexpr int kMaxRounds = 20;
-// Changed modes contradict others. Where these are more than in the round before, and more than a
-// few, they will not settle.
+// Where more are contradicted than in the round before, and more than a few, they will not settle.
 constexpr int kFewContradicted = 2;
-// Pivots: from the guess (and half as many as there are contacts), and as multiples of the number
-// of contacts. An interior point costs about as much as 20 to 40.
+// Pivots: from the guess (and half as many as contacts), and as multiples of the number of contacts.
 constexpr int kPivotsFromGuess = 40;
 constexpr int kPivotsFromInteriorPoint = 2;
 constexpr int kPivotsFromOpen = 20;
@@ -24,8 +25,7 @@ constexpr double kFirstRegularisation = 1e-7;
 constexpr double kLeastRegularisation = 1e-8;
 constexpr int kMaxProximalRounds = 40;
 constexpr double kMaxExtrapolation = 1e6;
-// Complementarities after which the polish is tried; rounding may stop the iteration for one step
-// at the end, so the last is tried several times.
+// Complementarities after which the polish is tried; rounding may stop the iteration for one step.
 constexpr double kInteriorPointGoals[] = {1e-10, 1e-14, 1e-18, 1e-22, 1e-26, 1e-26, 1e-26, 1e-26};
 // A contact whose mode has been changed this often changes alone, the worst one first.
 constexpr int kMaxChangesTogether = 3;
@@ -38,7 +38,8 @@ struct ModeChange {
 };
 
 ModeChange Contradiction(const ContactBlock<double>& contact, const ContactValues& values,
-                         ContactMode mode, double normal, double tangent, double impulse_scale) {
+                         ContactMode mode, double normal, double tangent, double impulse_scale,
+                         double tolerance) {
   const double zeta = std::max(impulse_scale, values.sigma_n / values.mobility_n);
   ModeChange change{mode};
   if (mode == ContactMode::kOpen) {
@@ -68,7 +69,9 @@ ModeChange Contradiction(const ContactBlock<double>& contact, const ContactValue
     }
   } else if (mode != ContactMode::kClosed) {
     const double along = SlidingSign(mode) * values.slip;
-    if (along < -kModeTolerance * values.sigma_t) {
+    const double rounding =
+        std::min(contact.rounding, kSlipOfTolerance * tolerance * values.sigma_t);
+    if (along < -std::max(kModeTolerance * values.sigma_t, rounding)) {
       change = {ContactMode::kSticking, -along / values.sigma_t};
     }
   }
@@ -245,9 +248,9 @@ bool ContactSolver::SolveByModeChanges(const ContactProblem<double>& problem,
     for (size_t i = 0; i < num_contacts; ++i) {
       const ContactValues values =
           Evaluate(problem, scales_, problem.contacts[i], solution->v.data());
-      const ModeChange change =
-          Contradiction(problem.contacts[i], values, solution->modes[i],
-                        solution->normal_impulse[i], solution->tangent_impulse[i], scales_.impulse);
+      const ModeChange change = Contradiction(
+          problem.contacts[i], values, solution->modes[i], solution->normal_impulse[i],
+          solution->tangent_impulse[i], scales_.impulse, options.tolerance);
       if (change.violation == 0.0) {
         continue;
       }
@@ -349,7 +352,7 @@ bool ContactSolver::Polish(const ContactProblem<double>& problem,
       const ContactValues values = Evaluate(problem, scales_, problem.contacts[i], trial_.v.data());
       solution->modes[i] =
           Contradiction(problem.contacts[i], values, trial_.modes[i], trial_.normal_impulse[i],
-                        trial_.tangent_impulse[i], scales_.impulse)
+                        trial_.tangent_impulse[i], scales_.impulse, options.tolerance)
               .mode;
     }
   }

@@ -12,7 +12,7 @@ namespace {
 
 // Refinement ends where the residual is at rounding level, or no longer falls.
 constexpr double kResidualGoal = 1e-15;
-constexpr int kMaxRefinements = 8;
+constexpr int kMaxRefinements = 40;
 // Rows that leave more than this contradict each other.
 constexpr double kConsistent = 1e-14;
 // A condensed system that leaves more than this is factorised as a whole.
@@ -298,20 +298,11 @@ double ContactSystem::RefinedSolve(const ContactProblem<double>& problem,
                                    const std::vector<ContactMode>& modes, double* x, int columns) {
   const size_t size = 3 * static_cast<size_t>(num_blocks()) * columns;
   rhs_.assign(x, x + size);
-  correction_.resize(size);
   SolveOnce<kTransposed>(problem, modes, x, columns);
-  double left = Residual<kTransposed>(problem, modes, rhs_.data(), x, columns, correction_.data());
-  for (int i = 0; i < kMaxRefinements && left > kResidualGoal; ++i) {
-    SolveOnce<kTransposed>(problem, modes, correction_.data(), columns);
-    for (size_t k = 0; k < size; ++k) {
-      x[k] += correction_[k];
-    }
-    const double before = left;
-    left = Residual<kTransposed>(problem, modes, rhs_.data(), x, columns, correction_.data());
-    if (!(left < 0.1 * before)) {
-      break;
-    }
-  }
+  // Bodies that are held have speeds of rounding: what their rows leave is judged by the speeds
+  // they would have if they were free.
+  const double left = Refine<kTransposed>(problem, modes, Regularisation::kLeftOut,
+                                          {rhs_.data(), columns}, x, columns);
   if (Expand(left, problem, modes)) {
     std::copy(rhs_.begin(), rhs_.end(), x);
     return RefinedSolve<kTransposed>(problem, modes, x, columns);
@@ -344,11 +335,12 @@ double ContactSystem::SolveRegularised(const ContactProblem<double>& problem,
   const size_t size = 3 * static_cast<size_t>(num_blocks()) * columns;
   rhs_.assign(x, x + size);
   SolveOnce<false>(problem, modes, x, columns);
-  double left = Refine(problem, modes, Regularisation::kKept, x, columns);
+  const FreeMomenta free = {problem.scale_momentum().data(), 1};
+  double left = Refine<false>(problem, modes, Regularisation::kKept, free, x, columns);
   if (Expand(left, problem, modes)) {
     std::copy(rhs_.begin(), rhs_.end(), x);
     SolveOnce<false>(problem, modes, x, columns);
-    left = Refine(problem, modes, Regularisation::kKept, x, columns);
+    left = Refine<false>(problem, modes, Regularisation::kKept, free, x, columns);
   }
   return left;
 }
@@ -361,35 +353,37 @@ double ContactSystem::SolveProximal(const ContactProblem<double>& problem,
   const size_t size = 3 * static_cast<size_t>(num_blocks()) * columns;
   rhs_.assign(x, x + size);
   SolveOnce<false>(problem, modes, x, columns);
-  const double left = Refine(problem, modes, Regularisation::kLeftOut, x, columns);
+  const FreeMomenta free = {problem.scale_momentum().data(), 1};
+  const double left = Refine<false>(problem, modes, Regularisation::kLeftOut, free, x, columns);
   if (left <= kConsistent) {
     return left;
   }
   std::copy(rhs_.begin(), rhs_.end(), x);
   SolveOnce<false>(problem, modes, x, columns);
-  const double kept = Refine(problem, modes, Regularisation::kKept, x, columns);
+  const double kept = Refine<false>(problem, modes, Regularisation::kKept, free, x, columns);
   if (Expand(kept, problem, modes)) {
     std::copy(rhs_.begin(), rhs_.end(), x);
     return SolveProximal(problem, modes, x, columns);
   }
-  return Refine(problem, modes, Regularisation::kLeftOut, x, columns);
+  return Refine<false>(problem, modes, Regularisation::kLeftOut, free, x, columns);
 }
 
 // Refines x for the right-hand side rhs_ as long as a round halves what is left of it.
+template <bool kTransposed>
 double ContactSystem::Refine(const ContactProblem<double>& problem,
                              const std::vector<ContactMode>& modes, Regularisation regularisation,
-                             double* x, int columns) {
+                             const FreeMomenta& free, double* x, int columns) {
   const size_t size = rhs_.size();
   correction_.resize(size);
   const auto residual = [&]() {
-    return ResidualWith<false>(problem, modes, regularisation, rhs_.data(), x, columns,
-                               correction_.data())
+    return ResidualWith<kTransposed>(problem, modes, regularisation, free, rhs_.data(), x, columns,
+                                     correction_.data())
         .to_parts;
   };
   double left = residual();
   for (int i = 0; i < kMaxRefinements && left > kResidualGoal; ++i) {
     last_.assign(x, x + size);
-    SolveOnce<false>(problem, modes, correction_.data(), columns);
+    SolveOnce<kTransposed>(problem, modes, correction_.data(), columns);
     for (size_t k = 0; k < size; ++k) {
       x[k] += correction_[k];
     }

@@ -54,6 +54,9 @@ class ContactSystem {
   /// Whether solves need the problem: they are refined against K without δ. Else they read the
   /// factors alone.
   bool is_regularised() const { return regularised_; }
+  /// Exchanges what is known of the pattern of the system; it must be factorised anew before it
+  /// solves.
+  void SwapPattern(std::shared_ptr<BlockLuPattern>* pattern) { lu_.SwapPattern(pattern); }
   /// Hands the factorisation over (a tape keeps it); this object must be factorised anew before it
   /// solves.
   void MoveFactorsTo(ContactSystem* other);
@@ -89,13 +92,20 @@ class ContactSystem {
   struct ResidualSize {
     double to_terms, to_parts;
   };
+  // Momenta of the motion without constraints, whose speeds are of the size that rows cancel from:
+  // row-major, 3 num_bodies rows.
+  struct FreeMomenta {
+    const double* values;
+    int columns;
+  };
   template <bool kTransposed>
   ResidualSize ResidualWith(const ContactProblem<double>& problem,
                             const std::vector<ContactMode>& modes, Regularisation regularisation,
-                            const double* rhs, const double* x, int columns,
-                            double* residual) const;
+                            const FreeMomenta& free, const double* rhs, const double* x,
+                            int columns, double* residual) const;
+  template <bool kTransposed>
   double Refine(const ContactProblem<double>& problem, const std::vector<ContactMode>& modes,
-                Regularisation regularisation, double* x, int columns);
+                Regularisation regularisation, const FreeMomenta& free, double* x, int columns);
   bool FactorAs(bool condensed, const ContactProblem<double>& problem,
                 const std::vector<ContactMode>& modes);
   // Whether the whole system could be factorised in place of the condensed one, where refinement

@@ -132,8 +132,8 @@ template <bool kTransposed>
 double ContactSystem::Residual(const ContactProblem<double>& problem,
                                const std::vector<ContactMode>& modes, const double* rhs,
                                const double* x, int columns, double* residual) const {
-  return ResidualWith<kTransposed>(problem, modes, Regularisation::kLeftOut, rhs, x, columns,
-                                   residual)
+  return ResidualWith<kTransposed>(problem, modes, Regularisation::kLeftOut, {rhs, columns}, rhs, x,
+                                   columns, residual)
       .to_terms;
 }
 
@@ -141,8 +141,9 @@ template <bool kTransposed>
 ContactSystem::ResidualSize ContactSystem::ResidualWith(const ContactProblem<double>& problem,
                                                         const std::vector<ContactMode>& modes,
                                                         Regularisation regularisation,
-                                                        const double* rhs, const double* x,
-                                                        int columns, double* residual) const {
+                                                        const FreeMomenta& free, const double* rhs,
+                                                        const double* x, int columns,
+                                                        double* residual) const {
   const size_t size = 3 * static_cast<size_t>(num_blocks()) * columns;
   std::copy(rhs, rhs + size, residual);
   RowScale momentum, constraint;
@@ -159,11 +160,13 @@ ContactSystem::ResidualSize ContactSystem::ResidualWith(const ContactProblem<dou
   }
   // Unused rows of constraints have a right-hand side of 0.
   const size_t momentum_size = 3 * static_cast<size_t>(problem.num_bodies) * columns;
-  const std::vector<double>& free = problem.scale_momentum();
   for (int i = 0; i < 3 * problem.num_bodies; ++i) {
-    momentum.parts = std::max(momentum.parts, std::abs(free[i]));
-    if (i % 3 != 2) {
-      constraint.parts = std::max(constraint.parts, std::abs(free[i]) / problem.mass[i]);
+    for (int c = 0; c < free.columns; ++c) {
+      const double size = std::abs(free.values[static_cast<size_t>(i) * free.columns + c]);
+      momentum.parts = std::max(momentum.parts, size);
+      if (i % 3 != 2) {
+        constraint.parts = std::max(constraint.parts, size / problem.mass[i]);
+      }
     }
   }
   if (regularisation == Regularisation::kKept) {
@@ -189,7 +192,7 @@ template double ContactSystem::Residual<true>(const ContactProblem<double>&,
 #define TANGIBLE_INSTANTIATE(kTransposed)                                             \
   template ContactSystem::ResidualSize ContactSystem::ResidualWith<kTransposed>(      \
       const ContactProblem<double>&, const std::vector<ContactMode>&, Regularisation, \
-      const double*, const double*, int, double*) const;
+      const FreeMomenta&, const double*, const double*, int, double*) const;
 TANGIBLE_INSTANTIATE(false)
 TANGIBLE_INSTANTIATE(true)
 #undef TANGIBLE_INSTANTIATE
