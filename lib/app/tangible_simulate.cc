@@ -10,6 +10,7 @@
 #include <ctime>
 #include <optional>
 #include <string>
+#include <thread>
 
 #include "tangible/app/batch_csv.h"
 #include "tangible/app/certificate_json.h"
@@ -41,7 +42,7 @@ DEFINE_string(points, "", "points to observe instead of bodies (JSON)");
 DEFINE_string(batch, "",
               "parameters (CSV: a column a path, a row a rollout); writes final states instead of "
               "a trajectory");
-DEFINE_int32(threads, 0, "of a batch; 0: one a core");
+DEFINE_int32(threads, 0, "of a batch, or of a step's islands; 0: one a core");
 
 namespace tangible {
 namespace {
@@ -66,7 +67,7 @@ std::string CheckBatchFlags() {
     return "--threads: expected a number from 0 to " + std::to_string(kMostThreads) + ", got " +
            std::to_string(FLAGS_threads);
   }
-  if (FLAGS_batch.empty()) return IsDefault("threads") ? "" : "--threads: needs --batch";
+  if (FLAGS_batch.empty()) return "";
   for (const char* name :
        {"every", "contacts", "initial", "view", "summary", "certify", "observe"}) {
     if (!IsDefault(name)) return std::string("--") + name + ": not with --batch";
@@ -209,6 +210,8 @@ int Run(const std::string& file) {
   {
     Progress progress("steps", NumSteps(job.scene.simulation));
     State<double> final;
+    const int cores = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
+    Stepper stepper(job.model, FLAGS_threads > 0 ? FLAGS_threads : cores);
     report = Rollout(
         job.model, job.initial,
         [&](long k, double t, const State<double>& state, Stepper* stepper) {
@@ -217,7 +220,7 @@ int Run(const std::string& file) {
           progress.Show(k);
           recording += CpuSeconds() - start;
         },
-        &final);
+        &stepper, &final);
   }
   const double cpu_seconds = CpuSeconds() - cpu_start - recording;
   const std::string error =
@@ -263,7 +266,7 @@ int main(int argc, char** argv) {
        .synopsis =
            "SCENE.json [--out=T.csv] [--every=K] [--contacts=C.csv] [--initial=T.csv] "
            "[--view=V.html] [--summary=S.json] [--certify] [--observe=O.csv --noise=S --seed=N "
-           "--rate=HZ --points=P.json] | --batch=PARAMETERS.csv [--threads=T] [--out=F.csv]",
+           "--rate=HZ --points=P.json] | --batch=PARAMETERS.csv [--out=F.csv] [--threads=T]",
        .description = "Runs a scene and writes the trajectory of its bodies as CSV; on request "
                       "contacts, a summary,\nnoisy observations and an animated view. With "
                       "--batch runs it for each row of a table of parameters and\nwrites the final "

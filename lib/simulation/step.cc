@@ -13,6 +13,9 @@ namespace {
 // A body that turns out faster than its bound makes the search repeat; bounds grow by half each
 // time.
 constexpr int kMaxSearches = 12;
+// Fewer contacts, or islands, are solved together faster than apart.
+constexpr size_t kLeastContactsApart = 8;
+constexpr int kLeastIslands = 2;
 
 bool SameContacts(const std::vector<ActiveContact>& x, const std::vector<ActiveContact>& y) {
   return std::equal(x.begin(), x.end(), y.begin(), y.end(),
@@ -126,7 +129,8 @@ size_t StepRecord::bytes() const {
          problem.bytes() + solution.bytes();
 }
 
-Stepper::Stepper(const Model<double>& model) : search_(model) {
+Stepper::Stepper(const Model<double>& model, int threads)
+    : search_(model), islands_(std::make_unique<IslandSolver>(threads)) {
   const ModelStructure& s = *model.structure;
   if (s.settings.stepping == Stepping::kEvent) {
     events_ = std::make_unique<EventStepper>(model);
@@ -331,12 +335,38 @@ void Stepper::FillReport(const Model<double>& model, const ContactSolverReport& 
         from = k;
         break;
       }
+      if (k > from && last_contacts_[k].a > record_.contacts[i].a) {
+        break;
+      }
     }
     report->mode_switches += last != record_.solution.modes[i] ? 1 : 0;
   }
   if (impact) {
     report->impact_energy_gain = ImpulseWork(record_);
   }
+}
+
+ContactSolverReport Stepper::SolveContacts(const ContactSolverOptions& options, int* islands) {
+  ContactSolverReport report;
+  const bool apart = record_.problem.contacts.size() >= kLeastContactsApart &&
+                     options.smoothing == 0.0 &&
+                     islands_->Partition(record_.problem) >= kLeastIslands;
+  *islands = 0;
+  factored_ = true;
+  if (apart && islands_->Solve(record_.problem, options, &record_.solution, &report)) {
+    *islands = islands_->count();
+    factored_ = false;
+    return report;
+  }
+  return solver_.Solve(record_.problem, options, &record_.solution);
+}
+
+ContactSystem& Stepper::system() {
+  if (!factored_) {
+    solver_.system().Factor(record_.problem, record_.solution.modes);
+    factored_ = true;
+  }
+  return solver_.system();
 }
 
 StepReport Stepper::Step(const Model<double>& model, double t, double h, State<double>* state) {
@@ -363,7 +393,7 @@ StepReport Stepper::Step(const Model<double>& model, double t, double h, State<d
   for (int search = 0; search < kMaxSearches; ++search) {
     AssembleContacts(model, *state, h, r.contacts, r.friction, r.restitution, scratch_, &r.problem);
     CarryGuess(model);
-    solved = solver_.Solve(r.problem, SolverOptions(settings), &r.solution);
+    solved = SolveContacts(SolverOptions(settings), &report.islands);
     if (!solved.solved) {
       break;
     }
@@ -409,10 +439,11 @@ StepReport Stepper::Step(const Model<double>& model, double t, double h, State<d
 }
 
 void Stepper::TakeRecord(StepRecord* record, ContactSystem* system) {
-  std::swap(*record, record_);
   if (system != nullptr) {
-    solver_.system().MoveFactorsTo(system);
+    this->system().MoveFactorsTo(system);
   }
+  factored_ = true;
+  std::swap(*record, record_);
   if (system == nullptr || !system->is_regularised()) {
     std::swap(record->problem, record_.problem);
   }
@@ -422,6 +453,7 @@ bool Stepper::Refactor(const Model<double>& model, StepRecord* record) {
   AssembleFree(model, record->before, record->time, record->h, &record->problem, &scratch_);
   AssembleContacts(model, record->before, record->h, record->contacts, record->friction,
                    record->restitution, scratch_, &record->problem);
+  factored_ = true;
   return solver_.system().Factor(record->problem, record->solution.modes);
 }
 

@@ -19,6 +19,7 @@
 #include <vector>
 
 #include "tangible/dynamics/contact_search.h"
+#include "tangible/lcp/contact_islands.h"
 #include "tangible/lcp/contact_solver.h"
 #include "tangible/simulation/event_derivative.h"
 #include "tangible/simulation/event_step.h"
@@ -35,13 +36,14 @@ struct StepReport {
   int contacts = 0;  ///< contacts and limits listed
   int closed = 0;    ///< of these, with an impulse
   int lcp_rows = 0;  ///< complementarity rows: 1 a frictionless contact or limit, 3 with friction
-  int factorisations = 0;
-  int iterations = 0;
-  int events = 0;         ///< located within the step (event stepping)
-  int fallbacks = 0;      ///< of event stepping: impulses for accelerations, rebounds given up
-  int mode_switches = 0;  ///< contacts whose mode differs from the last step's
-  double residual = 0.0;  ///< scaled natural residual
-  double gap_min = 0.0;   ///< m, the smallest at the start; infinite where no contact is near
+  int islands = 0;   ///< with contacts, solved apart; 0: all that moves was solved together
+  int factorisations = 0;  ///< of the island that took the most
+  int iterations = 0;      ///< of the island that took the most
+  int events = 0;          ///< located within the step (event stepping)
+  int fallbacks = 0;       ///< of event stepping: impulses for accelerations, rebounds given up
+  int mode_switches = 0;   ///< contacts whose mode differs from the last step's
+  double residual = 0.0;   ///< scaled natural residual
+  double gap_min = 0.0;    ///< m, the smallest at the start; infinite where no contact is near
   double impact_energy_gain =
       0.0;              ///< J, what the impulses of a step with impacts did; > 0: energy was gained
   std::string message;  ///< empty unless it failed: names the contact or joint
@@ -74,7 +76,8 @@ struct StepperGuess {
 
 class Stepper {
  public:
-  explicit Stepper(const Model<double>& model);
+  /// `threads` solve a step's islands; the bits are the same for any number.
+  explicit Stepper(const Model<double>& model, int threads = 1);
 
   /// Advances the state from t by h. The numbers of `model` may differ from call to call, its
   /// structure may not.
@@ -88,7 +91,8 @@ class Stepper {
   bool by_events() const { return events_ != nullptr; }
   EventStepper& events() { return *events_; }
   EventDerivative& event_derivative() { return event_derivative_; }
-  ContactSystem& system() { return solver_.system(); }
+  /// Factorised with the last step's modes.
+  ContactSystem& system();
   JointProjection& projection() { return projection_; }
   /// Hands the last step's record and, unless null, its factorisation over; for a tape, without
   /// copies. Until the next step record() and system() are not that step's. The record's problem is
@@ -110,6 +114,7 @@ class Stepper {
   StepReport StepByEvents(const Model<double>& model, double t, double h, State<double>* state);
   void SumImpulses(const Model<double>& model);
   void CarryGuess(const Model<double>& model);
+  ContactSolverReport SolveContacts(const ContactSolverOptions& options, int* islands);
   ContactMode InitialMode(const ContactBlock<double>& contact) const;
   ContactSolverOptions SolverOptions(const SimulationSettings& settings) const;
   void FillReport(const Model<double>& model, const ContactSolverReport& solved,
@@ -120,6 +125,8 @@ class Stepper {
   EventDerivative event_derivative_;
   ContactSearch search_;
   ContactSolver solver_;
+  std::unique_ptr<IslandSolver> islands_;
+  bool factored_ = true;  ///< whether solver_.system() is that of record_
   JointProjection projection_;
   AssemblyScratch<double> scratch_;
   StepRecord record_;

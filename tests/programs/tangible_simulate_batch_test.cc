@@ -136,8 +136,6 @@ TEST_F(TangibleSimulateBatchTest, WrongFlagsAreUsage) {
        {"--every=2", "--contacts=x", "--initial=x", "--view=x", "--summary=x", "--observe=x"}) {
     ExpectOneLine(Batch(table, flag), 2, ": not with --batch");
   }
-  ExpectOneLine(Run("tangible-simulate", "'" + Write("scene.json", kThrow) + "' --threads=2"), 2,
-                "--threads: needs --batch");
   ExpectOneLine(Batch(table, "--out='" + Path("p.csv") + "'"), 2, "--out: expected a file of its");
 }
 
