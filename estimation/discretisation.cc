@@ -3,7 +3,8 @@
 
 namespace tangible {
 
-DiscretisationCheck CheckDiscretisation(const FitProblem& problem, const FitResult& result) {
+DiscretisationCheck CheckDiscretisation(const FitProblem& problem, const FitResult& result,
+                                        FitLog* log) {
   DiscretisationCheck check;
   check.dt = problem.scene.simulation.dt;
   FitProblem half = problem;
@@ -21,7 +22,7 @@ DiscretisationCheck CheckDiscretisation(const FitProblem& problem, const FitResu
     return check;
   }
   RolloutResiduals residuals(scene, half.observations);
-  const FitResult fine = Fit(half.options, &residuals, {});
+  const FitResult fine = Fit(half.options, &residuals, {}, log);
   check.status = fine.status;
   check.message = fine.message;
   check.rollouts = fine.rollouts;

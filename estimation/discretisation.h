@@ -27,7 +27,8 @@ struct DiscretisationCheck {
   double seconds = 0.0;
 };
 
-/// Fits the problem once more with half the step, from the estimate of `result`.
-DiscretisationCheck CheckDiscretisation(const FitProblem& problem, const FitResult& result);
+/// Fits the problem once more with half the step, from the estimate of `result`; `log` as in Fit.
+DiscretisationCheck CheckDiscretisation(const FitProblem& problem, const FitResult& result,
+                                        FitLog* log = nullptr);
 
 }  // namespace tangible

@@ -7,6 +7,7 @@
 #include <limits>
 #include <random>
 
+#include "tangible/estimation/fit_checkpoint.h"
 #include "tangible/estimation/minimise.h"
 #include "tangible/estimation/shooting.h"
 #include "tangible/simulation/certify.h"
@@ -160,6 +161,61 @@ void Finish(const FitOptions& options, const RolloutResiduals& residuals, const 
                                             best.residuals, best.jacobian, uncertainty);
 }
 
+/// One fit under way.
+struct FitRun {
+  const FitOptions& options;
+  const FitProgress& progress;
+  std::function<double()> elapsed;
+  RolloutResiduals* residuals;
+  FitLog* log;
+  long rollouts_before;
+
+  /// What the log has of the start under way has become a result of its own.
+  void EndPart() const {
+    log->start.Clear();
+    log->rollouts = residuals->rollouts() - rollouts_before;
+    if (log->on_end && log->mismatch() == 0) {
+      log->on_end();
+    }
+  }
+};
+
+/// The next start, from `start`; how it ended is kept in the log. The first one tells of the
+/// initial values too where it begins elsewhere.
+void RunStart(const Eigen::VectorXd& start, double gradient_norm, double initial_cost,
+              FitRun* run) {
+  FitLog* const log = run->log;
+  RolloutResiduals* const residuals = run->residuals;
+  const int i = static_cast<int>(log->starts.size());
+  const std::function<void(int, const FitIteration&)> report =
+      [run, i](int iteration, const FitIteration& values) {
+        if (run->progress) {
+          run->progress(i, iteration, values);
+        }
+      };
+  if (run->options.segments > 1 && !log->shot) {
+    const ShootingResult shot = Shoot(run->options, start, residuals);
+    log->shot = {shot.parameters, shot.iterations};
+    run->EndPart();
+  }
+  Minimum minimum = Minimise(run->options, log->shot ? log->shot->parameters : start, run->elapsed,
+                             report, residuals);
+  const Eigen::VectorXd initial = residuals->scene().Initial();
+  if (i == 0 && start != initial && !minimum.iterations.empty()) {
+    minimum.iterations.insert(
+        minimum.iterations.begin(),
+        {initial_cost, gradient_norm,
+         std::vector<double>(initial.data(), initial.data() + initial.size()), 0.0});
+  }
+  log->starts.push_back(Describe(i == 0 ? initial : start, minimum));
+  log->starts.back().shooting_iterations = log->shot ? log->shot->iterations : 0;
+  if (i == 0 || IsBetter(minimum, log->best)) {
+    log->best = std::move(minimum);
+  }
+  log->shot.reset();
+  run->EndPart();
+}
+
 // At the estimate, along the parameters that set numbers of the scene.
 void Certify(RolloutResiduals* residuals, FitResult* result) {
   if (!residuals->SetParameters(result->estimate)) {
@@ -197,51 +253,40 @@ const char* NameOf(FitStatus status) {
   return "";
 }
 
-FitResult Fit(const FitOptions& options, RolloutResiduals* residuals, const FitProgress& progress) {
+FitResult Fit(const FitOptions& options, RolloutResiduals* residuals, const FitProgress& progress,
+              FitLog* log) {
   using Clock = std::chrono::steady_clock;
   const Clock::time_point began = Clock::now();
-  const std::function<double()> elapsed = [began] {
-    return std::chrono::duration<double>(Clock::now() - began).count();
-  };
+  FitLog own;
+  FitRun run{options,
+             progress,
+             [began] { return std::chrono::duration<double>(Clock::now() - began).count(); },
+             residuals,
+             log == nullptr ? &own : log,
+             residuals->rollouts()};
   FitResult result;
-  const long rollouts_before = residuals->rollouts();
-  const Eigen::VectorXd initial = residuals->scene().Initial();
-  Eigen::VectorXd first = initial;
+  residuals->SetLog(log == nullptr ? nullptr : &log->search);
+  Eigen::VectorXd first = residuals->scene().Initial();
   double gradient_norm = 0.0;
   if (FindStart(options, residuals, &first, &gradient_norm, &result)) {
+    residuals->SetLog(log == nullptr ? nullptr : &log->start);
+    if (!run.log->starts.empty() || run.log->shot) {
+      residuals->SetRollouts(run.rollouts_before + run.log->rollouts);
+    }
     std::mt19937 random(options.seed);
-    Minimum best;
     for (int i = 0; i < options.starts; ++i) {
       const Eigen::VectorXd start =
           i == 0 ? first : DrawStart(residuals->scene().entries(), &random);
-      const std::function<void(int, const FitIteration&)> report =
-          [&progress, i](int iteration, const FitIteration& values) {
-            if (progress) {
-              progress(i, iteration, values);
-            }
-          };
-      ShootingResult shot;
-      shot.parameters = start;
-      if (options.segments > 1) {
-        shot = Shoot(options, start, residuals);
-      }
-      Minimum minimum = Minimise(options, shot.parameters, elapsed, report, residuals);
-      if (i == 0 && first != initial && !minimum.iterations.empty()) {
-        minimum.iterations.insert(
-            minimum.iterations.begin(),
-            {result.initial_cost, gradient_norm,
-             std::vector<double>(initial.data(), initial.data() + initial.size()), 0.0});
-      }
-      result.starts.push_back(Describe(i == 0 ? initial : start, minimum));
-      result.starts.back().shooting_iterations = shot.iterations;
-      if (i == 0 || IsBetter(minimum, best)) {
-        best = std::move(minimum);
+      if (i >= static_cast<int>(run.log->starts.size())) {  // else finished before an interruption
+        RunStart(start, gradient_norm, result.initial_cost, &run);
       }
     }
-    Finish(options, *residuals, best, &result);
+    result.starts = run.log->starts;
+    Finish(options, *residuals, run.log->best, &result);
   }
-  result.rollouts = residuals->rollouts() - rollouts_before;
-  result.seconds = elapsed();
+  residuals->SetLog(nullptr);
+  result.rollouts = residuals->rollouts() - run.rollouts_before;
+  result.seconds = run.elapsed();
   if (result.estimate.size() > 0 && options.certificate == CertificatePass::kRun) {
     Certify(residuals, &result);
   }

@@ -72,6 +72,17 @@ enum class FitStatus {
 /// "converged", "not_converged", "failed", "no_effect".
 const char* NameOf(FitStatus status);
 
+/// Where one start ended.
+struct Minimum {
+  FitStatus status = FitStatus::kFailed;
+  std::string message;
+  Eigen::VectorXd parameters;
+  double cost = 0.0;
+  Eigen::VectorXd residuals;
+  RowMatrixXd jacobian;  ///< dr/dp; 0 of a parameter held at its bound
+  std::vector<FitIteration> iterations;
+};
+
 struct FitResult {
   FitStatus status = FitStatus::kFailed;
   std::string message;  ///< why, one line; of a converged fit what Ceres said
@@ -93,7 +104,12 @@ struct FitResult {
 /// Called after each iteration of each start.
 using FitProgress = std::function<void(int start, int iteration, const FitIteration&)>;
 
-/// Runs the fit; `progress` may be empty.
-FitResult Fit(const FitOptions& options, RolloutResiduals* residuals, const FitProgress& progress);
+struct FitLog;  // fit_checkpoint.h
+
+/// Runs the fit; `progress` may be empty. With a log it goes on from what that has, keeps there
+/// what it does, and ends at the same bits; where that turns out to be of another fit the result is
+/// worth nothing (FitLog::mismatch).
+FitResult Fit(const FitOptions& options, RolloutResiduals* residuals, const FitProgress& progress,
+              FitLog* log = nullptr);
 
 }  // namespace tangible

@@ -7,23 +7,10 @@
 
 #include <Eigen/Core>
 #include <functional>
-#include <string>
-#include <vector>
 
 #include "tangible/estimation/fit.h"
 
 namespace tangible {
-
-/// Where one start ended.
-struct Minimum {
-  FitStatus status = FitStatus::kFailed;
-  std::string message;
-  Eigen::VectorXd parameters;
-  double cost = 0.0;
-  Eigen::VectorXd residuals;
-  RowMatrixXd jacobian;  ///< dr/dp; 0 of a parameter held at its bound
-  std::vector<FitIteration> iterations;
-};
 
 /// Minimises from `start`. `elapsed` gives the seconds since the fit began.
 Minimum Minimise(const FitOptions& options, const Eigen::VectorXd& start,

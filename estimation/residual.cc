@@ -60,6 +60,22 @@ RolloutResiduals::RolloutResiduals(ParameterizedScene scene, std::vector<Observa
 
 bool RolloutResiduals::Evaluate(const Eigen::VectorXd& p, DerivativeMethod method,
                                 Eigen::VectorXd* residuals, RowMatrixXd* jacobian) {
+  return Logged(
+      p,
+      [&](Eigen::VectorXd* computed, RowMatrixXd* derivatives) {
+        return Compute(p, method, computed, derivatives);
+      },
+      residuals, jacobian);
+}
+
+bool RolloutResiduals::Logged(const Eigen::VectorXd& at, const EvaluationLog::Function& function,
+                              Eigen::VectorXd* residuals, RowMatrixXd* jacobian) {
+  return log_ == nullptr ? function(residuals, jacobian)
+                         : log_->Evaluate(at, function, residuals, jacobian, &rollouts_, &message_);
+}
+
+bool RolloutResiduals::Compute(const Eigen::VectorXd& p, DerivativeMethod method,
+                               Eigen::VectorXd* residuals, RowMatrixXd* jacobian) {
   if (!SetParameters(p)) {
     return false;
   }

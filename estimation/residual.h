@@ -18,6 +18,7 @@
 #include <string>
 #include <vector>
 
+#include "tangible/estimation/evaluation_log.h"
 #include "tangible/estimation/parameterized_scene.h"
 #include "tangible/estimation/sampling.h"
 #include "tangible/simulation/rollout.h"
@@ -55,6 +56,15 @@ class RolloutResiduals {
   long rollouts() const { return rollouts_; }
   /// For runs that others do with this scene.
   void CountRollout() { ++rollouts_; }
+  /// For what a checkpoint spares.
+  void SetRollouts(long rollouts) { rollouts_ = rollouts; }
+
+  /// Evaluations, those of multiple shooting too, are looked up in this log and kept there; null:
+  /// they are not. The log outlives them.
+  void SetLog(EvaluationLog* log) { log_ = log; }
+  /// `function`, an evaluation at this point, by way of the log.
+  bool Logged(const Eigen::VectorXd& at, const EvaluationLog::Function& function,
+              Eigen::VectorXd* residuals, RowMatrixXd* jacobian);
 
   /// Sets the parameters without a run; false where they set a number to a value that it may not
   /// take.
@@ -69,6 +79,8 @@ class RolloutResiduals {
                                   const Eigen::VectorXd& p_by_q) const;
 
  private:
+  bool Compute(const Eigen::VectorXd& p, DerivativeMethod method, Eigen::VectorXd* residuals,
+               RowMatrixXd* jacobian);
   bool Accept(const RolloutReport& report);
   bool Plain();
   bool Tangent(RowMatrixXd* jacobian);
@@ -90,6 +102,7 @@ class RolloutResiduals {
   RolloutTape tape_;
   std::string message_;
   long rollouts_ = 0;
+  EvaluationLog* log_ = nullptr;
 };
 
 }  // namespace tangible

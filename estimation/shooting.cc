@@ -177,6 +177,16 @@ void ShootingResiduals::Meet(int segment, Run* run) const {
 
 bool ShootingResiduals::Evaluate(const Eigen::VectorXd& unknowns, Eigen::VectorXd* residuals,
                                  RowMatrixXd* jacobian) {
+  return residuals_->Logged(
+      unknowns,
+      [&](Eigen::VectorXd* computed, RowMatrixXd* derivatives) {
+        return Compute(unknowns, computed, derivatives);
+      },
+      residuals, jacobian);
+}
+
+bool ShootingResiduals::Compute(const Eigen::VectorXd& unknowns, Eigen::VectorXd* residuals,
+                                RowMatrixXd* jacobian) {
   const Eigen::VectorXd q = unknowns.head(num_parameters_);
   const ParameterizedScene& scene = residuals_->scene();
   if (!residuals_->SetParameters(scene.ToParameters(q))) {

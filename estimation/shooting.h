@@ -60,6 +60,7 @@ class ShootingResiduals {
 
  private:
   struct Run;
+  bool Compute(const Eigen::VectorXd& unknowns, Eigen::VectorXd* residuals, RowMatrixXd* jacobian);
   bool RunSegment(int segment, Run* run);
   void AddShares(int segment, long k, Run* run) const;
   void Meet(int segment, Run* run) const;

@@ -6,18 +6,26 @@
 
 #include <cmath>
 #include <cstdio>
+#include <filesystem>
 #include <iostream>
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "tangible/app/certificate_json.h"
 #include "tangible/app/program.h"
+#include "tangible/estimation/fit_checkpoint.h"
 #include "tangible/estimation/fit_json.h"
 #include "tangible/estimation/report.h"
 #include "tangible/scene/csv.h"
+#include "tangible/scene/json_reader.h"
 
 DEFINE_string(out, "", "file of the result (JSON); empty: none is written");
 DEFINE_string(report, "", "file of the report (HTML); empty: none is written");
+DEFINE_string(checkpoint, "",
+              "file that keeps what is done as the fit goes on; where it is there already the fit "
+              "goes on from it, and ends as if it had not been interrupted. It stays when the fit "
+              "is done");
 DEFINE_bool(discretisation_check, false,
             "fit at dt / 2 too and report the difference as the bias of the step");
 DEFINE_string(derivatives, "",
@@ -157,6 +165,39 @@ int WriteFiles(const FitFile& fit, const RolloutResiduals& residuals, const FitR
   return kExitDone;
 }
 
+/// A checkpoint in its file, with what that holds already; null without --checkpoint. Returns what
+/// is wrong or empty: a file that cannot be written is found before the work, not after it.
+std::string OpenCheckpoint(const FitProblem& problem, std::unique_ptr<FitCheckpoint>* checkpoint) {
+  if (FLAGS_checkpoint.empty()) {
+    return "";
+  }
+  *checkpoint = std::make_unique<FitCheckpoint>(
+      problem, [](const std::string& text) { return WriteFileAtomically(FLAGS_checkpoint, text); });
+  std::error_code none;
+  if (std::filesystem::exists(FLAGS_checkpoint, none)) {
+    std::string text;
+    std::string error;
+    if (!ReadTextFile(FLAGS_checkpoint, &text, &error)) {
+      return error;
+    }
+    error = (*checkpoint)->Restore(text, FLAGS_checkpoint);
+    if (!error.empty()) {
+      return error;
+    }
+  }
+  return (*checkpoint)->Write();
+}
+
+/// One line unless the log was of this very fit; empty without one.
+std::string Mismatch(const FitLog* log) {
+  if (log == nullptr || log->mismatch() == 0) {
+    return "";
+  }
+  return FLAGS_checkpoint + ": /fits: evaluation " + std::to_string(log->mismatch()) +
+         " is not the one that this program makes: written by another version or on another "
+         "machine; remove the file to begin anew";
+}
+
 int Run(const std::string& file) {
   FitFile fit;
   std::string error;
@@ -179,10 +220,22 @@ int Run(const std::string& file) {
   }
   RolloutResiduals& residuals = made.front();
   const auto& entries = residuals.scene().entries();
-  const FitResult result =
-      Fit(problem.options, &residuals, [&](int start, int iteration, const FitIteration& values) {
+  std::unique_ptr<FitCheckpoint> checkpoint;
+  error = OpenCheckpoint(problem, &checkpoint);
+  if (!error.empty()) {
+    return ReportError(error);
+  }
+  FitLog* const log = checkpoint ? &checkpoint->fit() : nullptr;
+  const FitResult result = Fit(
+      problem.options, &residuals,
+      [&](int start, int iteration, const FitIteration& values) {
         PrintIteration(entries, start, iteration, values);
-      });
+      },
+      log);
+  error = Mismatch(log);
+  if (!error.empty()) {
+    return ReportError(error);
+  }
   DiscretisationCheck check;
   const bool checked = FLAGS_discretisation_check && result.status == FitStatus::kConverged;
   if (result.estimate.size() > 0) {
@@ -194,8 +247,16 @@ int Run(const std::string& file) {
     }
   }
   if (checked) {
-    check = CheckDiscretisation(problem, result);
+    FitLog* const half = checkpoint ? &checkpoint->half_step() : nullptr;
+    check = CheckDiscretisation(problem, result, half);
+    error = Mismatch(half);
+    if (!error.empty()) {
+      return ReportError(error);
+    }
     PrintCheck(entries, check);
+  }
+  if (checkpoint && !checkpoint->error().empty()) {
+    std::cerr << checkpoint->error() << ": the fit went on without its checkpoint\n";
   }
   const int written = WriteFiles(fit, residuals, result, checked ? &check : nullptr);
   if (written != kExitDone) {
@@ -215,26 +276,29 @@ int Run(const std::string& file) {
   return kExitDone;
 }
 
-}  // namespace
-}  // namespace tangible
-
-int main(int argc, char** argv) {
-  const tangible::CommandLine line = tangible::ParseCommandLine(
+int Main(int argc, char** argv) {
+  const CommandLine line = ParseCommandLine(
       argc, argv,
       {.name = "tangible-fit",
-       .synopsis = "FIT.json [--out=R.json] [--report=R.html] [--discretisation_check]",
+       .synopsis = "FIT.json [--out=R.json] [--report=R.html] [--discretisation_check]\n"
+                   "                    [--checkpoint=C.json]",
        .description =
            "Identifies parameters of a scene from observed positions by nonlinear least squares.\n"
            "Prints each iteration and, for each parameter, the estimate, its standard deviation\n"
            "and 95 % interval.",
        .version = TANGIBLE_VERSION,
        .source_file = __FILE__,
-       .outputs = {"out", "report"}});
+       .outputs = {"out", "report", "checkpoint"}});
   if (line.exit_status) return *line.exit_status;
   if (FLAGS_max_iterations < 1) {
-    return tangible::ReportError("tangible-fit: --max_iterations: expected a number >= 1, got " +
-                                     std::to_string(FLAGS_max_iterations),
-                                 tangible::kExitUsage);
+    return ReportError("tangible-fit: --max_iterations: expected a number >= 1, got " +
+                           std::to_string(FLAGS_max_iterations),
+                       kExitUsage);
   }
-  return tangible::Run(line.positional[0]);
+  return Run(line.positional[0]);
 }
+
+}  // namespace
+}  // namespace tangible
+
+int main(int argc, char** argv) { return tangible::RunMain(&tangible::Main, argc, argv); }

@@ -19,11 +19,17 @@ constexpr double kPredictedSeconds = 3.0;
 bool WriteObservations(const Recording& recording, const std::string& file, std::string* error) {
   std::error_code failure;
   std::filesystem::create_directories(std::filesystem::path(file).parent_path(), failure);
-  std::ofstream stream(file);
+  // The old file or the whole new one.
+  const std::string temporary = file + ".tmp";
+  std::ofstream stream(temporary);
   stream << ObservationCsv(recording);
   stream.close();
-  if (!stream) {
+  if (stream) {
+    std::filesystem::rename(temporary, file, failure);
+  }
+  if (!stream || failure) {
     *error = file + ": cannot be written";
+    std::filesystem::remove(temporary, failure);
     return false;
   }
   return true;

@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tangible/app/program.h"
 
+#include <fcntl.h>
 #include <gflags/gflags.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <csignal>
 #include <cstdio>
 #include <cstring>
 #include <exception>
@@ -154,6 +156,38 @@ std::string WriteDirectly(const std::string& path, std::string_view text) {
   return errno != 0 ? std::strerror(errno) : "write failed";
 }
 
+// A pipe whose reader is gone and a file beyond the size that is allowed would end the program
+// between two outputs; as errors of the write they are reported, and the other outputs are written.
+void TakeFaultsAsErrors() {
+  std::signal(SIGPIPE, SIG_IGN);
+  std::signal(SIGXFSZ, SIG_IGN);
+  // Where stdin, stdout or stderr is closed, the next file opened would take its number, and what
+  // is meant for the one would end in the other. What holds the number instead can only fail.
+  for (int number = STDIN_FILENO; number <= STDERR_FILENO; ++number) {
+    if (::fcntl(number, F_GETFD) == -1 && errno == EBADF) {
+      static_cast<void>(::open("/dev/null", number == STDIN_FILENO ? O_WRONLY : O_RDONLY));
+    }
+  }
+}
+
+// An error where something that went to stdout did not arrive, or empty.
+std::string LostOutput() {
+  errno = 0;
+  const bool flushed = std::cout.flush() && std::fflush(stdout) == 0 && std::ferror(stdout) == 0;
+  return flushed ? "" : Unwritable("stdout", errno != 0 ? std::strerror(errno) : "write failed");
+}
+
+// What will keep a file from being written, found before the work that it is to hold; or empty.
+std::string WhyUnwritable(const std::string& path) {
+  namespace fs = std::filesystem;
+  std::error_code error;
+  if (fs::is_directory(path, error)) return Unwritable(path, "it is a directory");
+  if (fs::exists(path, error)) return "";
+  const fs::path folder = fs::absolute(path, error).parent_path();
+  if (fs::is_directory(folder, error)) return "";
+  return Unwritable(path, std::strerror(fs::exists(folder, error) && !error ? ENOTDIR : ENOENT));
+}
+
 }  // namespace
 
 CommandLine ParseCommandLine(int argc, char** argv, const ProgramInfo& info) {
@@ -195,12 +229,24 @@ CommandLine ParseCommandLine(int argc, char** argv, const ProgramInfo& info) {
   }
   const std::string shared = SharedFile(info, line.positional);
   if (!shared.empty()) return UsageError(info, shared);
+  for (const std::string& name : info.outputs) {
+    std::string path;
+    if (!gflags::GetCommandLineOption(name.c_str(), &path) || path.empty()) continue;
+    const std::string unwritable = WhyUnwritable(path);
+    if (!unwritable.empty()) {
+      line.exit_status = ReportError(unwritable);
+      return line;
+    }
+  }
   return line;
 }
 
 int RunMain(int (*body)(int, char**), int argc, char** argv) noexcept {
   try {
-    return body(argc, argv);
+    TakeFaultsAsErrors();
+    const int exit_status = body(argc, argv);
+    const std::string lost = LostOutput();
+    return exit_status == kExitDone && !lost.empty() ? ReportError(lost) : exit_status;
   } catch (const std::exception& error) {
     std::fprintf(stderr, "%s: unexpected error: %s\n", argv[0], error.what());
   } catch (...) {
@@ -246,8 +292,8 @@ std::string WriteFileAtomically(const std::string& path, std::string_view text) 
 
 std::string WriteResult(const std::string& out_path, std::string_view text) {
   if (!out_path.empty()) return WriteFileAtomically(out_path, text);
-  std::cout << text << std::flush;
-  return std::cout ? "" : Unwritable("stdout", "write failed");
+  std::cout << text;
+  return LostOutput();
 }
 
 }  // namespace tangible

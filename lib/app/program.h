@@ -37,7 +37,7 @@ struct ProgramInfo {
   int num_positional = 1;   ///< number of arguments that are not flags
   int most_positional = 0;  ///< where more of them are allowed: how many
   /// Flags whose values are files that the program writes, and reads. No file is written twice, or
-  /// over an input.
+  /// over an input; a folder that is not there is found before the work begins.
   std::vector<std::string> outputs = {"out"};
   std::vector<std::string> inputs{};
 };
@@ -54,7 +54,8 @@ struct CommandLine {
 /// line about what is wrong on stderr.
 CommandLine ParseCommandLine(int argc, char** argv, const ProgramInfo& info);
 
-/// Runs `body`; an exception that nobody expected (no memory) is one line on stderr and status 1.
+/// Runs `body`; an exception that nobody expected (no memory), and output that did not reach stdout
+/// (closed, a full disk, a pipe without a reader), is one line on stderr and status 1.
 int RunMain(int (*body)(int, char**), int argc, char** argv) noexcept;
 
 /// Prints `message` as exactly one line on stderr and returns `exit_status`.
@@ -64,7 +65,8 @@ int ReportError(std::string_view message, int exit_status = kExitFailed);
 std::string FormatNumber(double value);
 
 /// Writes a file so that it is either the old or the whole new one: a temporary in the same folder,
-/// then a rename. Devices and pipes are written directly. Returns an error (one line) or empty.
+/// then a rename. Devices and pipes are written directly. A program that is killed on the way may
+/// leave the temporary, PATH.tmp and its process's number. Returns an error (one line) or empty.
 std::string WriteFileAtomically(const std::string& path, std::string_view text);
 
 /// Writes a result to `out_path`, or to stdout if that is empty. Returns an error or empty.

@@ -179,11 +179,8 @@ int Run(const std::string& file, const GradientOptions& options) {
   return error.empty() ? kExitDone : ReportError(error);
 }
 
-}  // namespace
-}  // namespace tangible
-
-int main(int argc, char** argv) {
-  const tangible::CommandLine line = tangible::ParseCommandLine(
+int Main(int argc, char** argv) {
+  const CommandLine line = ParseCommandLine(
       argc, argv,
       {.name = "tangible-gradient",
        .synopsis = "SCENE.json --parameters=P1,P2 "
@@ -196,10 +193,15 @@ int main(int argc, char** argv) {
        .source_file = __FILE__,
        .inputs = {"loss"}});
   if (line.exit_status) return *line.exit_status;
-  tangible::GradientOptions options;
-  const std::string wrong = tangible::CheckFlags(&options);
+  GradientOptions options;
+  const std::string wrong = CheckFlags(&options);
   if (!wrong.empty()) {
-    return tangible::ReportError("tangible-gradient: " + wrong, tangible::kExitUsage);
+    return ReportError("tangible-gradient: " + wrong, kExitUsage);
   }
-  return tangible::Run(line.positional[0], options);
+  return Run(line.positional[0], options);
 }
+
+}  // namespace
+}  // namespace tangible
+
+int main(int argc, char** argv) { return tangible::RunMain(&tangible::Main, argc, argv); }

@@ -256,11 +256,8 @@ int RunRows(const std::string& file) {
   return exit_status;
 }
 
-}  // namespace
-}  // namespace tangible
-
-int main(int argc, char** argv) {
-  const tangible::CommandLine line = tangible::ParseCommandLine(
+int Main(int argc, char** argv) {
+  const CommandLine line = ParseCommandLine(
       argc, argv,
       {.name = "tangible-simulate",
        .synopsis =
@@ -276,10 +273,14 @@ int main(int argc, char** argv) {
        .outputs = {"out", "contacts", "view", "summary", "observe"},
        .inputs = {"initial", "points", "batch"}});
   if (line.exit_status) return *line.exit_status;
-  const std::string wrong = tangible::CheckFlags();
+  const std::string wrong = CheckFlags();
   if (!wrong.empty()) {
-    return tangible::ReportError("tangible-simulate: " + wrong, tangible::kExitUsage);
+    return ReportError("tangible-simulate: " + wrong, kExitUsage);
   }
-  return FLAGS_batch.empty() ? tangible::Run(line.positional[0])
-                             : tangible::RunRows(line.positional[0]);
+  return FLAGS_batch.empty() ? Run(line.positional[0]) : RunRows(line.positional[0]);
 }
+
+}  // namespace
+}  // namespace tangible
+
+int main(int argc, char** argv) { return tangible::RunMain(&tangible::Main, argc, argv); }

@@ -86,6 +86,8 @@ class DocumentBuilder : public nlohmann::json_sax<Json> {
   }
 
  private:
+  static constexpr std::size_t kMostReason = 200;
+
   // "[json.exception.x.101] parse error at line 1, column 2: reason" without what stands elsewhere.
   static std::string Reason(const std::string& what) {
     const std::string prefix = "parse error at ";
@@ -95,7 +97,11 @@ class DocumentBuilder : public nlohmann::json_sax<Json> {
       const std::size_t colon = what.find(": ", begin);
       if (colon != std::string::npos) begin = colon + 2;
     }
-    return what.substr(begin);
+    const std::string reason = what.substr(begin);
+    // It quotes the last token, which may be a string of any length.
+    return reason.size() <= kMostReason ? reason
+                                        : reason.substr(0, kMostReason / 2) + " ... " +
+                                              reason.substr(reason.size() - kMostReason / 2);
   }
 
   std::string Pointer() const {
