@@ -22,15 +22,11 @@ long NumNumbers(const Evaluation& evaluation) {
 bool EvaluationLog::Evaluate(const Eigen::VectorXd& at, const Function& function,
                              Eigen::VectorXd* residuals, RowMatrixXd* jacobian, long* rollouts,
                              std::string* message) {
-  if (mismatch_ > 0) {
-    return false;
-  }
   if (next_ < evaluations_.size()) {
     const Evaluation& known = evaluations_[next_++];
     if (known.with_jacobian != (jacobian != nullptr) || !SameBits(known.at, at)) {
       mismatch_ = static_cast<long>(next_);
-      *message = "the checkpoint is of another fit";
-      return false;
+      throw EvaluationMismatch();
     }
     *rollouts += known.rollouts;
     *message = known.message;

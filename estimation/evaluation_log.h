@@ -12,12 +12,19 @@
 
 #include <Eigen/Core>
 #include <functional>
+#include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "tangible/math/scalar.h"
 
 namespace tangible {
+
+/// Thrown through the minimiser, which would otherwise try other points: the log is of another fit.
+struct EvaluationMismatch : std::runtime_error {
+  EvaluationMismatch() : std::runtime_error("the checkpoint is of another fit") {}
+};
 
 /// What was asked for and what it gave.
 struct Evaluation {
@@ -39,11 +46,11 @@ class EvaluationLog {
 
   /// The next evaluation of the log, which must be at this point, or else that of `function`, which
   /// is kept. `jacobian` may be null; `rollouts` counts, `message` says why false is returned.
+  /// Throws EvaluationMismatch.
   bool Evaluate(const Eigen::VectorXd& at, const Function& function, Eigen::VectorXd* residuals,
                 RowMatrixXd* jacobian, long* rollouts, std::string* message);
 
-  /// Not 0: this evaluation, counted from 1, was at another point than the log's. From then on
-  /// every evaluation fails.
+  /// Not 0: this evaluation, counted from 1, was at another point than the log's.
   long mismatch() const { return mismatch_; }
 
   const std::vector<Evaluation>& evaluations() const { return evaluations_; }

@@ -216,6 +216,31 @@ void RunStart(const Eigen::VectorXd& start, double gradient_norm, double initial
   run->EndPart();
 }
 
+/// All starts, with the log's evaluations if there is one.
+void RunStarts(FitRun* run, bool logged, FitResult* result) {
+  RolloutResiduals* const residuals = run->residuals;
+  FitLog* const log = run->log;
+  residuals->SetLog(logged ? &log->search : nullptr);
+  Eigen::VectorXd first = residuals->scene().Initial();
+  double gradient_norm = 0.0;
+  if (FindStart(run->options, residuals, &first, &gradient_norm, result)) {
+    residuals->SetLog(logged ? &log->start : nullptr);
+    if (!log->starts.empty() || log->shot) {
+      residuals->SetRollouts(run->rollouts_before + log->rollouts);
+    }
+    std::mt19937 random(run->options.seed);
+    for (int i = 0; i < run->options.starts; ++i) {
+      const Eigen::VectorXd start =
+          i == 0 ? first : DrawStart(residuals->scene().entries(), &random);
+      if (i >= static_cast<int>(log->starts.size())) {  // else finished before an interruption
+        RunStart(start, gradient_norm, result->initial_cost, run);
+      }
+    }
+    result->starts = log->starts;
+    Finish(run->options, *residuals, log->best, result);
+  }
+}
+
 // At the estimate, along the parameters that set numbers of the scene.
 void Certify(RolloutResiduals* residuals, FitResult* result) {
   if (!residuals->SetParameters(result->estimate)) {
@@ -265,24 +290,10 @@ FitResult Fit(const FitOptions& options, RolloutResiduals* residuals, const FitP
              log == nullptr ? &own : log,
              residuals->rollouts()};
   FitResult result;
-  residuals->SetLog(log == nullptr ? nullptr : &log->search);
-  Eigen::VectorXd first = residuals->scene().Initial();
-  double gradient_norm = 0.0;
-  if (FindStart(options, residuals, &first, &gradient_norm, &result)) {
-    residuals->SetLog(log == nullptr ? nullptr : &log->start);
-    if (!run.log->starts.empty() || run.log->shot) {
-      residuals->SetRollouts(run.rollouts_before + run.log->rollouts);
-    }
-    std::mt19937 random(options.seed);
-    for (int i = 0; i < options.starts; ++i) {
-      const Eigen::VectorXd start =
-          i == 0 ? first : DrawStart(residuals->scene().entries(), &random);
-      if (i >= static_cast<int>(run.log->starts.size())) {  // else finished before an interruption
-        RunStart(start, gradient_norm, result.initial_cost, &run);
-      }
-    }
-    result.starts = run.log->starts;
-    Finish(options, *residuals, run.log->best, &result);
+  try {
+    RunStarts(&run, log != nullptr, &result);
+  } catch (const EvaluationMismatch& mismatch) {
+    result.message = mismatch.what();
   }
   residuals->SetLog(nullptr);
   result.rollouts = residuals->rollouts() - run.rollouts_before;

@@ -70,7 +70,7 @@ TEST(EvaluationLogTest, HandsOutWhatItHasAndThenComputes) {
   EXPECT_EQ(again.mismatch(), 0);
 }
 
-TEST(EvaluationLogTest, FailsForGoodAtAnotherPointOrRequest) {
+TEST(EvaluationLogTest, ThrowsAtAnotherPointOrRequest) {
   EvaluationLog log;
   Square square{&log};
   EXPECT_TRUE(square.At(0.0, true));
@@ -80,14 +80,14 @@ TEST(EvaluationLogTest, FailsForGoodAtAnotherPointOrRequest) {
     again.Restore(log.evaluations());
     Square second{&again};
     EXPECT_TRUE(second.At(0.0, true));
-    EXPECT_FALSE(second.At(other_point ? std::nextafter(2.0, 3.0) : 2.0, other_point));
+    EXPECT_THROW(second.At(other_point ? std::nextafter(2.0, 3.0) : 2.0, other_point),
+                 EvaluationMismatch);
     EXPECT_EQ(again.mismatch(), 2);
-    EXPECT_FALSE(second.At(2.0, true));
     EXPECT_EQ(second.calls, 0);
   }
   EvaluationLog again;
   again.Restore(log.evaluations());
-  EXPECT_FALSE(Square{&again}.At(-0.0, true)) << "equal, but not the same bits";
+  EXPECT_THROW(Square{&again}.At(-0.0, true), EvaluationMismatch) << "equal, but other bits";
 }
 
 TEST(EvaluationLogTest, KeepsNoMoreThanItsShare) {

@@ -1,0 +1,267 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// What the world does to programs: a disk that is full, files that are folders, a stdout that is
+// closed, a kill in the middle of a write. Each is exit status 1 and one line, and a file is the
+// old or the whole new one.
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "run_program.h"
+
+namespace tangible {
+namespace {
+
+using nlohmann::json;
+
+constexpr char kBall[] = R"({"bodies": [
+  {"name": "ball", "shape": {"circle": {"radius": 0.1}}, "mass": 1, "position": [0, 1],
+   "velocity": [2, 3]}], "simulation": {"dt": 0.01, "duration": 0.5}})";
+
+/// A program, its files in the test's folder, and what it writes.
+struct Job {
+  std::string program;
+  std::string arguments;             ///< without outputs
+  std::vector<std::string> outputs;  ///< flags
+  bool prints = true;                ///< to stdout, without outputs
+  bool quick = true;                 ///< else only what is found before the work
+};
+
+const std::vector<Job>& Jobs() {
+  static const std::vector<Job> jobs = {
+      {"tangible-simulate", "ball.json", {"out", "contacts", "view", "summary"}},
+      {"tangible-simulate", "ball.json --rate=20 --noise=0.1", {"observe"}, false},
+      {"tangible-simulate", "ball.json --batch=batch.csv", {"out"}},
+      {"tangible-gradient", "ball.json --parameters=bodies/ball/mass", {"out"}},
+      {"tangible-lcp", "lcp.json", {"out"}},
+      {"tangible-fit", "fit.json", {"out", "report", "checkpoint"}},
+      {"tangible-import-recording", "markers.csv --length=0.1 --to=0.01", {"out"}, false},
+      {"tangible-pendulums", "recordings", {"out"}, false, false},
+      {"tangible-closed-forms", "", {"out", "picture"}, true, false},
+      {"tangible-cost",
+       "--parameters=1 --steps=5 --long_run=20 --repeat_seconds=0.001 --nobounds",
+       {"out", "picture"},
+       true,
+       false},
+      {"tangible-extremes", "--list", {}},
+      {"tangible-extremes", "", {"out", "report"}, true, false},
+      {"tangible-tradeoff", "ball.json", {"out", "report", "picture"}, true, false},
+      {"tangible-verify", "ball.json", {"out", "report"}}};
+  return jobs;
+}
+
+class FaultsTest : public ProgramTest {
+ protected:
+  void SetUp() override {
+    ProgramTest::SetUp();
+    Write("ball.json", kBall);
+    Write("lcp.json", R"({"F": [[2]], "c": [-1]})");
+    Write("batch.csv", "bodies/ball/mass\n1\n2\n");
+    std::string text = "time,body,y\n";
+    for (int k = 0; k <= 50; k += 10) {
+      text += std::to_string(0.01 * k) + ",ball," +
+              json(1.0 + 0.03 * k - 9.5e-4 * 0.5 * k * (k + 1)).dump() + "\n";
+    }
+    Write("o.csv", text);
+    Write("fit.json", R"({"scene": "ball.json", "observations": [{"file": "o.csv", "sigma": 0.01}],
+        "parameters": [{"name": "g", "initial": 8, "lower": 1, "upper": 20,
+                        "sets": [{"path": "gravity/y", "scale": -1}]}]})");
+    std::string markers;
+    for (int k = 0; k < 10; ++k) {
+      markers += "1000,2000,1500,2000,1500,2300\n";
+    }
+    Write("markers.csv", markers);
+    std::filesystem::create_directory(Path("folder"));
+  }
+
+  /// In the test's folder, after `before`, with stdout as given: the program's status and stderr.
+  ProgramRun RunIn(const std::string& before, const Job& job, const std::string& arguments,
+                   const std::string& redirection) const {
+    const std::string command = "cd '" + Path("") + "' && ( ( " + before + " '" +
+                                std::string(TANGIBLE_PROGRAM_DIR) + "/" + job.program + "' " +
+                                job.arguments + " " + arguments + " 2>&3 " + redirection +
+                                " ); echo $? > status.txt ) 3>&1 | cat > stderr.txt";
+    EXPECT_EQ(std::system(command.c_str()), 0) << command;
+    const std::string status = Read(Path("status.txt"));
+    return {status.empty() ? -1 : std::stoi(status), "", Read(Path("stderr.txt"))};
+  }
+
+  /// Files in the folder that a program left behind under a name of its own.
+  std::vector<std::string> Temporaries() const {
+    std::vector<std::string> found;
+    for (const auto& entry : std::filesystem::directory_iterator(Path(""))) {
+      const std::string name = entry.path().filename().string();
+      if (name.find(".tmp") != std::string::npos) {
+        found.push_back(name);
+      }
+    }
+    return found;
+  }
+};
+
+TEST_F(FaultsTest, OutputsThatCannotBeWritten) {
+  for (const Job& job : Jobs()) {
+    for (const std::string& flag : job.outputs) {
+      SCOPED_TRACE(job.program + " " + job.arguments + " --" + flag);
+      const auto with = [&](const std::string& path) { return "--" + flag + "=" + path; };
+      ExpectOneLine(RunIn("", job, with("folder"), "> /dev/null"), 1, "folder: ");
+      ExpectOneLine(RunIn("", job, with("none/file"), "> /dev/null"), 1,
+                    "none/file: cannot be written: No such file or directory");
+      ExpectOneLine(RunIn("", job, with("ball.json/file"), "> /dev/null"), 1,
+                    "ball.json/file: cannot be written: Not a directory");
+      if (!job.quick) {
+        continue;
+      }
+      // A device that is always full, and a limit on the size of files.
+      const bool read_first = flag == "checkpoint";
+      ExpectOneLine(RunIn("", job, with("/dev/full"), "> /dev/null"), 1,
+                    read_first ? "/dev/full: " : "/dev/full: cannot be written: No space left");
+      Write("old", "old");
+      const bool refused = read_first && Read(Path("old")) == "old";
+      ExpectOneLine(RunIn("ulimit -f 0; exec", job, with("old"), "> /dev/null"), 1,
+                    refused ? "old: " : "old: cannot be written: File too large");
+      EXPECT_EQ(Read(Path("old")), "old");
+      EXPECT_EQ(Temporaries(), std::vector<std::string>());
+    }
+  }
+}
+
+TEST_F(FaultsTest, AStdoutThatTakesNothing) {
+  // A pipe whose reader is gone.
+  int ends[2];
+  ASSERT_EQ(::pipe(ends), 0);
+  constexpr int kPipe = 9;
+  ASSERT_EQ(::dup2(ends[1], kPipe), kPipe);
+  ::close(ends[0]);
+  ::close(ends[1]);
+  for (const Job& job : Jobs()) {
+    if (!job.prints || !job.quick) {
+      continue;
+    }
+    SCOPED_TRACE(job.program + " " + job.arguments);
+    const std::string lost = "stdout: cannot be written: ";
+    ExpectOneLine(RunIn("", job, "", "> /dev/full"), 1, lost);
+    ExpectOneLine(RunIn("", job, "", ">&-"), 1, lost);
+    ExpectOneLine(RunIn("", job, "", ">&9"), 1, lost);
+    ExpectOneLine(RunIn("", job, "--help", "> /dev/full"), 1, lost);
+    ExpectOneLine(RunIn("", job, "--version", ">&-"), 1, lost);
+  }
+  ::close(kPipe);
+}
+
+// The file that is opened next must not get the number of the stdout that is closed.
+TEST_F(FaultsTest, WithStdoutClosedFilesAreWhole) {
+  const Job fit{"tangible-fit", "fit.json", {}};
+  ExpectOneLine(RunIn("", fit, "--out=r.json", ">&-"), 1, "stdout: cannot be written");
+  EXPECT_EQ(json::parse(Read(Path("r.json")))["status"], "converged");
+  const Job simulate{"tangible-simulate", "ball.json", {}};
+  const ProgramRun quiet = RunIn("", simulate, "--out=t.csv", ">&- <&-");
+  EXPECT_EQ(quiet.exit_status, 0) << quiet.error;
+  EXPECT_EQ(Read(Path("t.csv")).rfind("time,body,x", 0), 0u);
+}
+
+TEST_F(FaultsTest, InputsThatAreFolders) {
+  const std::vector<Job> jobs = {
+      {"tangible-simulate", "folder", {}},
+      {"tangible-simulate", "ball.json --initial=folder", {}},
+      {"tangible-simulate", "ball.json --batch=folder", {}},
+      {"tangible-simulate", "ball.json --observe=x.csv --points=folder --rate=20", {}},
+      {"tangible-gradient", "folder --parameters=bodies/ball/mass", {}},
+      {"tangible-gradient", "ball.json --parameters=bodies/ball/mass --loss=folder", {}},
+      {"tangible-lcp", "folder", {}},
+      {"tangible-fit", "folder", {}},
+      {"tangible-fit", "fit.json --checkpoint=folder", {}},
+      {"tangible-import-recording", "folder --out=x.csv", {}},
+      {"tangible-pendulums", "folder", {}},
+      {"tangible-tradeoff", "folder", {}},
+      {"tangible-verify", "folder", {}}};
+  for (const Job& job : jobs) {
+    SCOPED_TRACE(job.program + " " + job.arguments);
+    ExpectOneLine(RunIn("", job, "", "> /dev/null"), 1, "folder");
+  }
+  // Files that a file names.
+  const std::string fit = Read(Path("fit.json"));
+  for (const std::string name : {"ball.json", "o.csv"}) {
+    std::string broken = fit;
+    broken.replace(broken.find(name), name.size(), "folder");
+    Write("broken.json", broken);
+    ExpectOneLine(RunIn("", {"tangible-fit", "broken.json", {}}, "", "> /dev/null"), 1, "folder");
+  }
+}
+
+TEST_F(FaultsTest, AKillLeavesTheOldOrTheWholeNewFile) {
+  json scene = json::parse(kBall);
+  scene["simulation"]["dt"] = 1e-5;
+  Write("long.json", scene.dump());
+  const Job job{"tangible-simulate", "long.json --summary=s.json", {}};
+  ASSERT_EQ(RunIn("", job, "--out=new.csv", "").exit_status, 0);
+  const std::string whole = Read(Path("new.csv"));
+  const double seconds = json::parse(Read(Path("s.json")))["seconds"];
+  int killed = 0;
+  constexpr int kKills = 8;
+  for (int i = 1; i <= kKills; ++i) {
+    Write("t.csv", "old");
+    const std::string after = std::to_string(1.2 * seconds * i / kKills + 0.005);
+    const Job kill{"tangible-simulate", "long.json", {}};
+    killed += RunIn("timeout -s KILL " + after, kill, "--out=t.csv", "").exit_status == 137 ? 1 : 0;
+    const std::string left = Read(Path("t.csv"));
+    EXPECT_TRUE(left == "old" || left == whole) << left.size() << " of " << whole.size();
+  }
+  EXPECT_GT(killed, 0);
+  for (const std::string& name : Temporaries()) {
+    EXPECT_EQ(name.rfind("t.csv.tmp", 0), 0u) << name;
+  }
+}
+
+/// All but the times.
+json WithoutSeconds(json value) {
+  if (value.is_object()) {
+    value.erase("seconds");
+  }
+  if (value.is_structured()) {
+    for (json& item : value) {
+      item = WithoutSeconds(item);
+    }
+  }
+  return value;
+}
+
+TEST_F(FaultsTest, AKilledFitGoesOnFromItsCheckpointToTheSameBits) {
+  const std::string file = std::string(TANGIBLE_SOURCE_DIR) + "/data/fits/chain.json";
+  const Job fit{"tangible-fit", "'" + file + "' --discretisation_check", {}};
+  ASSERT_EQ(RunIn("", fit, "--out=whole.json", "> /dev/null").exit_status, 0);
+  int kills = 0;
+  ProgramRun run;
+  do {
+    // Long enough to come further than the time before, as long as it takes.
+    const std::string after = std::to_string(0.05 + 0.02 * kills);
+    run = RunIn("timeout -s KILL " + after, fit, "--checkpoint=c.json --out=resumed.json",
+                "> /dev/null");
+  } while (run.exit_status == 137 && ++kills < 100);
+  EXPECT_EQ(run.exit_status, 0) << run.error;
+  EXPECT_GT(kills, 0);
+  EXPECT_EQ(WithoutSeconds(json::parse(Read(Path("resumed.json")))).dump(),
+            WithoutSeconds(json::parse(Read(Path("whole.json")))).dump());
+  // Damaged, cut, another fit's.
+  const std::string text = Read(Path("c.json"));
+  const auto expect_refused = [&](const std::string& damaged, const std::string& what) {
+    Write("damaged.json", damaged);
+    ExpectOneLine(RunIn("", fit, "--checkpoint=damaged.json --out=none.json", "> /dev/null"), 1,
+                  "damaged.json: " + what);
+    EXPECT_EQ(Read(Path("damaged.json")), damaged);
+    EXPECT_FALSE(std::filesystem::exists(Path("none.json")));
+  };
+  expect_refused("", "");
+  expect_refused(text.substr(0, text.size() / 2), "line ");
+  const size_t number = text.find("\"cost\"") + 10;
+  expect_refused(std::string(text).replace(number, 1, text[number] == '7' ? "6" : "7"),
+                 "/fits: damaged");
+  ExpectOneLine(RunIn("", {"tangible-fit", "fit.json", {}}, "--checkpoint=c.json", "> /dev/null"),
+                1, "c.json: /problem: a checkpoint of another fit");
+}
+
+}  // namespace
+}  // namespace tangible
