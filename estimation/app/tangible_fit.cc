@@ -175,6 +175,9 @@ std::string OpenCheckpoint(const FitProblem& problem, std::unique_ptr<FitCheckpo
       problem, [](const std::string& text) { return WriteFileAtomically(FLAGS_checkpoint, text); });
   std::error_code none;
   if (std::filesystem::exists(FLAGS_checkpoint, none)) {
+    if (!std::filesystem::is_regular_file(FLAGS_checkpoint, none)) {
+      return FLAGS_checkpoint + ": cannot be written: expected a file, got a device or pipe";
+    }
     std::string text;
     std::string error;
     if (!ReadTextFile(FLAGS_checkpoint, &text, &error)) {

@@ -9,6 +9,7 @@
 #include <limits>
 
 #include "tangible/dynamics/assembly.h"
+#include "tangible/math/scratch.h"
 
 namespace tangible {
 namespace internal {
@@ -33,8 +34,8 @@ class FreeAssembly {
 
   void Bodies() {
     p_.num_bodies = structure_.num_blocks();
-    p_.mass.resize(3 * p_.num_bodies);
-    p_.momentum.resize(3 * p_.num_bodies);
+    SizeScratch(3 * static_cast<size_t>(p_.num_bodies), &p_.mass);
+    SizeScratch(3 * static_cast<size_t>(p_.num_bodies), &p_.momentum);
     p_.dampers.clear();
     p_.joints.clear();
     p_.contacts.clear();

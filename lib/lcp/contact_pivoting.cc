@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "tangible/lcp/contact_residual.h"
+#include "tangible/math/scratch.h"
 
 namespace tangible {
 namespace {
@@ -351,7 +352,7 @@ bool ContactPivoting::Solve(const ContactProblem<double>& problem, From from, do
       if (direction > 0.0) {
         return false;  // a ray
       }
-      solution->v.resize(3 * static_cast<size_t>(problem.num_bodies));
+      SizeScratch(3 * static_cast<size_t>(problem.num_bodies), &solution->v);
       Extract(solution);
       return true;
     }

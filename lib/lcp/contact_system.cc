@@ -6,6 +6,7 @@
 
 #include "tangible/lcp/contact_condensation.h"
 #include "tangible/lcp/joint_damping.h"
+#include "tangible/math/scratch.h"
 
 namespace tangible {
 namespace {
@@ -374,7 +375,7 @@ double ContactSystem::Refine(const ContactProblem<double>& problem,
                              const std::vector<ContactMode>& modes, Regularisation regularisation,
                              const FreeMomenta& free, double* x, int columns) {
   const size_t size = rhs_.size();
-  correction_.resize(size);
+  SizeScratch(size, &correction_);
   const auto residual = [&]() {
     return ResidualWith<kTransposed>(problem, modes, regularisation, free, rhs_.data(), x, columns,
                                      correction_.data())

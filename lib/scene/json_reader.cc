@@ -8,7 +8,6 @@
 #include <cstring>
 #include <fstream>
 #include <limits>
-#include <sstream>
 
 namespace tangible {
 namespace {
@@ -159,17 +158,23 @@ class DocumentBuilder : public nlohmann::json_sax<Json> {
 bool ReadTextFile(const std::string& file, std::string* text, std::string* error) {
   errno = 0;
   std::ifstream stream(file, std::ios::binary);
-  std::ostringstream content;
-  if (stream.is_open() && stream.peek() != std::ifstream::traits_type::eof()) {
-    content << stream.rdbuf();
+  std::string content;
+  std::vector<char> part(std::size_t{1} << 16);
+  while (stream && content.size() <= kMaxFileSize) {
+    stream.read(part.data(), static_cast<std::streamsize>(part.size()));
+    content.append(part.data(), static_cast<std::size_t>(stream.gcount()));
   }
+  std::string reason;
   if (!stream.is_open() || stream.bad()) {
-    const std::string reason = errno != 0 ? std::strerror(errno) : "read error";
-    *error = OneLine(file + ": cannot be read: " + reason);
-    return false;
+    reason = errno != 0 ? std::strerror(errno) : "read error";
+  } else if (content.size() > kMaxFileSize) {  // a device may go on for ever
+    reason = "larger than " + std::to_string(kMaxFileSize >> 20) + " MiB";
+  } else {
+    *text = std::move(content);
+    return true;
   }
-  *text = content.str();
-  return true;
+  *error = OneLine(file + ": cannot be read: " + reason);
+  return false;
 }
 
 bool ParseJson(const std::string& text, const std::string& name_for_messages, Json* json,

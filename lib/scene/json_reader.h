@@ -32,6 +32,9 @@ using Json = nlohmann::json;
 /// Objects and arrays may be nested this deep; deeper ones are refused.
 inline constexpr int kMaxJsonDepth = 64;
 
+/// Larger files are refused.
+inline constexpr std::size_t kMaxFileSize = std::size_t{1} << 30;
+
 /// Reads a whole file; false and "file: cannot be read: why" if that fails.
 bool ReadTextFile(const std::string& file, std::string* text, std::string* error);
 

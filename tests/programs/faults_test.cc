@@ -118,12 +118,15 @@ TEST_F(FaultsTest, OutputsThatCannotBeWritten) {
       // A device that is always full, and a limit on the size of files.
       const bool read_first = flag == "checkpoint";
       ExpectOneLine(RunIn("", job, with("/dev/full"), "> /dev/null"), 1,
-                    read_first ? "/dev/full: " : "/dev/full: cannot be written: No space left");
+                    read_first ? "/dev/full: cannot be written: expected a file"
+                               : "/dev/full: cannot be written: No space left");
+      // A checkpoint that is there is read, and this is none.
+      const std::string old = read_first ? "new" : "old";
       Write("old", "old");
-      const bool refused = read_first && Read(Path("old")) == "old";
-      ExpectOneLine(RunIn("ulimit -f 0; exec", job, with("old"), "> /dev/null"), 1,
-                    refused ? "old: " : "old: cannot be written: File too large");
+      ExpectOneLine(RunIn("ulimit -f 0; exec", job, with(old), "> /dev/null"), 1,
+                    old + ": cannot be written: File too large");
       EXPECT_EQ(Read(Path("old")), "old");
+      EXPECT_FALSE(std::filesystem::exists(Path("new")));
       EXPECT_EQ(Temporaries(), std::vector<std::string>());
     }
   }
