@@ -27,7 +27,8 @@ int Main(int argc, char** argv) {
                       "order at which those of the derivatives fall.",
        .version = TANGIBLE_VERSION,
        .source_file = __FILE__,
-       .num_positional = 0});
+       .num_positional = 0,
+       .outputs = {"out", "picture"}});
   if (line.exit_status) return *line.exit_status;
   const std::vector<closed_forms::Study> studies = closed_forms::RunAllStudies();
   std::fputs(closed_forms::TableText(studies).c_str(), stdout);

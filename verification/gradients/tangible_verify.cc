@@ -183,7 +183,8 @@ int Main(int argc, char** argv) {
        .version = TANGIBLE_VERSION,
        .source_file = __FILE__,
        .num_positional = 0,
-       .most_positional = 1000});
+       .most_positional = 1000,
+       .outputs = {"out", "report"}});
   if (line.exit_status) return *line.exit_status;
   std::string wrong = CheckFlags(line.positional);
   std::vector<Stepping> steppings;
