@@ -330,7 +330,7 @@ std::string FitCheckpoint::Restore(const std::string& text, const std::string& f
 
 std::string FitCheckpoint::Write() {
   const auto began = std::chrono::steady_clock::now();
-  const std::string error = writer_(Text());
+  std::string error = writer_(Text());
   written_ = std::chrono::steady_clock::now();
   write_time_ = written_ - began;
   return error;

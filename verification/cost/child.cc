@@ -55,7 +55,9 @@ void SetLimits(const Budget& budget) {
   }
   const rlimit nothing{0, 0};
   setrlimit(RLIMIT_CORE, &nothing);
-  // What does not fit into memory may not go to files either.
+  // What does not fit into memory may not go to files either: that ends the child, whatever a
+  // program takes the signal for.
+  signal(SIGXFSZ, SIG_DFL);
   setrlimit(RLIMIT_FSIZE, &nothing);
   SetTimer(ITIMER_PROF, budget.seconds);
   SetTimer(ITIMER_REAL, 10.0 * budget.seconds);
