@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// Twenty scenes at the engine's limits, in few lines each: mass ratios, piles, scales, speeds,
+// Twenty-one scenes at the engine's limits, in few lines each: mass ratios, piles, scales, speeds,
 // friction, joints, paradoxes.
 
 #include <nlohmann/json.hpp>
