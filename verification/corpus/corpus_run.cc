@@ -1,0 +1,230 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/verification/corpus/corpus_run.h"
+
+#include <time.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <mutex>
+#include <random>
+#include <thread>
+#include <utility>
+
+#include "tangible/lcp/contact_solver.h"
+#include "tangible/lcp/solver.h"
+#include "tangible/verification/corpus/recomputed.h"
+
+namespace tangible::corpus {
+namespace {
+
+double CpuSeconds() {
+  timespec now{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+}
+
+const char* Name(SolvedBy solver) {
+  switch (solver) {
+    case SolvedBy::kDirect:
+      return "direct";
+    case SolvedBy::kGuess:
+      return "guess";
+    case SolvedBy::kInteriorPoint:
+      return "interior_point";
+    case SolvedBy::kLemke:
+      return "lemke";
+    case SolvedBy::kNothing:
+      break;
+  }
+  return "none";
+}
+
+void JudgeSolved(double residual, Answer* answer) {
+  answer->residual = residual;
+  answer->wrong = !(residual <= kResidualBound) || answer->known == Known::kInfeasible ||
+                  answer->known == Known::kUnsolvable;
+}
+
+Answer ByGeneral(const std::string& kind, const std::string& name, Known known,
+                 const MixedLcp<double>& problem) {
+  Answer answer{.kind = kind, .name = name, .known = known, .way = Way::kGeneral};
+  const double start = CpuSeconds();
+  const LcpSolution<double> solution = SolveLcp(problem);
+  answer.seconds = CpuSeconds() - start;
+  answer.solver = ToString(solution.solver);
+  answer.solved = solution.status == LcpStatus::kSolved;
+  answer.infeasible = solution.status == LcpStatus::kInfeasible;
+  if (answer.solved) {
+    JudgeSolved(RecomputedResidual(problem, solution.v, solution.y, solution.z), &answer);
+  }
+  if (answer.infeasible) {
+    answer.solver = "farkas";
+    answer.wrong = known == Known::kSolvable || known == Known::kHardlySolvable ||
+                   !ProvesInfeasible(problem, solution.farkas);
+  }
+  return answer;
+}
+
+ContactSolution<double> Guess(const ContactProblem<double>& problem, Way way, std::uint64_t seed) {
+  const size_t contacts = problem.contacts.size();
+  ContactSolution<double> guess;
+  guess.v.assign(problem.mass.size(), 0.0);
+  guess.joint_impulse.assign(3 * problem.joints.size(), 0.0);
+  guess.normal_impulse.assign(contacts, 0.0);
+  guess.tangent_impulse.assign(contacts, 0.0);
+  guess.modes.assign(contacts, ContactMode::kOpen);
+  if (way == Way::kContact) return guess;
+  std::mt19937_64 random(seed);
+  const auto draw = [&] { return 2.0 * static_cast<double>(random() >> 11) * 0x1p-53 - 1.0; };
+  for (size_t i = 0; i < contacts; ++i) {
+    constexpr ContactMode kModes[] = {ContactMode::kOpen, ContactMode::kSticking,
+                                      ContactMode::kSlidingPositive, ContactMode::kSlidingNegative};
+    guess.modes[i] = kModes[random() % 4];
+    if (guess.modes[i] == ContactMode::kOpen) continue;
+    if (!problem.contacts[i].has_friction) guess.modes[i] = ContactMode::kClosed;
+    guess.normal_impulse[i] = 100.0 * std::abs(draw());
+    if (problem.contacts[i].has_friction) guess.tangent_impulse[i] = 100.0 * draw();
+  }
+  return guess;
+}
+
+Answer ByContacts(const ContactCase& one, Way way, std::uint64_t seed) {
+  Answer answer{.kind = one.kind, .name = one.name, .known = one.known, .way = way};
+  ContactSolution<double> solution = Guess(one.problem, way, seed);
+  ContactSolver solver;
+  const double start = CpuSeconds();
+  const ContactSolverReport report = solver.Solve(one.problem, {}, &solution);
+  answer.seconds = CpuSeconds() - start;
+  answer.solver = Name(report.solved_by);
+  answer.solved = report.solved;
+  if (answer.solved) JudgeSolved(RecomputedResidual(one.problem, solution), &answer);
+  return answer;
+}
+
+std::vector<Answer> ByAll(const std::string& kind, int index, const RunOptions& options) {
+  const ContactCase one = MakeContactCase(kind, options.seed, index, options.most_contacts);
+  std::vector<Answer> answers = {ByContacts(one, Way::kContact, 0),
+                                 ByContacts(one, Way::kMisled, options.seed + index)};
+  if (static_cast<int>(one.problem.contacts.size()) <= options.most_dense) {
+    answers.push_back(ByGeneral(kind, one.name, one.known, OneSidedForm(one.problem)));
+  }
+  return answers;
+}
+
+void Add(const Answer& answer, Row* row) {
+  ++row->problems;
+  row->right += answer.right() ? 1 : 0;
+  row->wrong += answer.wrong ? 1 : 0;
+  if (answer.solved) row->residual_max = std::max(row->residual_max, answer.residual);
+  row->seconds_max = std::max(row->seconds_max, answer.seconds);
+  ++row->solvers[answer.solver];
+  if (!answer.right()) row->missed.push_back(answer.name);
+}
+
+double Median(std::vector<double> values) {
+  if (values.empty()) return 0.0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+// Rows in the order in which their kinds come, the ways of a kind together.
+std::vector<Row> Collect(const std::vector<std::vector<Answer>>& answers) {
+  std::vector<Row> rows;
+  std::vector<std::vector<double>> seconds;
+  for (const std::vector<Answer>& of_problem : answers) {
+    for (const Answer& answer : of_problem) {
+      size_t at = 0;
+      while (at < rows.size() && (rows[at].kind != answer.kind || rows[at].way != answer.way)) ++at;
+      if (at == rows.size()) {
+        rows.push_back({.kind = answer.kind, .known = answer.known, .way = answer.way});
+        seconds.emplace_back();
+      }
+      Add(answer, &rows[at]);
+      seconds[at].push_back(answer.seconds);
+    }
+  }
+  for (size_t i = 0; i < rows.size(); ++i) rows[i].seconds_median = Median(seconds[i]);
+  std::stable_sort(rows.begin(), rows.end(),
+                   [](const Row& a, const Row& b) { return a.kind == b.kind && a.way < b.way; });
+  return rows;
+}
+
+}  // namespace
+
+const char* ToString(Way way) {
+  return way == Way::kContact ? "contact" : way == Way::kMisled ? "misled" : "general";
+}
+
+bool Answer::right() const {
+  if (wrong) return false;
+  switch (known) {
+    case Known::kSolvable:
+    case Known::kHardlySolvable:
+      return solved;
+    case Known::kInfeasible:
+      return way == Way::kGeneral ? infeasible : !solved;
+    case Known::kUnsolvable:
+    case Known::kUnknown:
+      break;
+  }
+  return true;
+}
+
+CorpusResult RunCorpus(const std::vector<FileCase>& files, const RunOptions& options) {
+  const std::vector<std::string>& kinds = ContactKinds();
+  const size_t total = files.size() + kinds.size() * static_cast<size_t>(options.random);
+  std::vector<std::vector<Answer>> answers(total);
+  std::atomic<size_t> next{0};
+  std::mutex mutex;
+  long done = 0;
+  const auto work = [&] {
+    for (size_t i = next++; i < total; i = next++) {
+      if (i < files.size()) {
+        const FileCase& file = files[i];
+        answers[i] = {ByGeneral(file.kind, file.name, file.known, file.problem)};
+      } else {
+        const size_t k = i - files.size();
+        const size_t each = static_cast<size_t>(options.random);
+        answers[i] = ByAll(kinds[k / each], static_cast<int>(k % each), options);
+      }
+      const std::lock_guard<std::mutex> lock(mutex);
+      ++done;
+      if (options.progress) options.progress(done);
+    }
+  };
+  std::vector<std::thread> others;
+  for (int i = 1; i < options.threads; ++i) others.emplace_back(work);
+  work();
+  for (std::thread& other : others) other.join();
+  return {Collect(answers), static_cast<int>(total)};
+}
+
+std::string FirstFailure(const CorpusResult& result) {
+  std::map<Way, std::pair<int, int>> hard;  // solved, of how many
+  for (const Row& row : result.rows) {
+    const std::string what = row.kind + ", " + ToString(row.way) + ": ";
+    const std::string got = std::to_string(row.right) + " of " + std::to_string(row.problems);
+    if (row.wrong > 0) {
+      return what + "expected no wrong answer, got " + std::to_string(row.wrong) + ", first " +
+             row.missed[0];
+    }
+    if (row.known == Known::kHardlySolvable) {
+      hard[row.way].first += row.right;
+      hard[row.way].second += row.problems;
+    } else if (row.right < row.problems) {
+      return what + "expected all, got " + got + ", first without " + row.missed[0];
+    }
+  }
+  for (const auto& [way, counts] : hard) {
+    if (counts.first < kHardShare * counts.second) {
+      return std::string("other problems with a solution, ") + ToString(way) +
+             ": expected 95 % solved, got " + std::to_string(counts.first) + " of " +
+             std::to_string(counts.second);
+    }
+  }
+  return "";
+}
+
+}  // namespace tangible::corpus

@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// Every problem by every way to solve it, each answer judged from the data (recomputed.h).
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "tangible/verification/corpus/problem_folder.h"
+
+namespace tangible::corpus {
+
+/// Ways to solve a problem.
+enum class Way {
+  kContact,  ///< the solver of the engine's steps, from all contacts open
+  kMisled,   ///< the same, from modes and impulses that have nothing to do with the solution
+  kGeneral,  ///< the general solver, on the dense one-sided form
+};
+const char* ToString(Way way);
+
+/// The largest scaled residual of a solution.
+inline constexpr double kResidualBound = 1e-10;
+/// The share of solved problems that is asked for of those of Known::kHardlySolvable.
+inline constexpr double kHardShare = 0.95;
+
+struct RunOptions {
+  int random = 0;           ///< problems of each kind
+  std::uint64_t seed = 1;   ///< of their generator
+  int most_contacts = 100;  ///< in one problem
+  int most_dense = 30;      ///< contacts up to which the general solver takes part
+  int threads = 1;
+  std::function<void(long)> progress{};  ///< called with how many problems are done
+};
+
+struct Answer {
+  std::string kind, name;
+  Known known = Known::kUnknown;
+  Way way = Way::kGeneral;
+  bool solved = false;      ///< says so
+  bool infeasible = false;  ///< says so
+  bool wrong = false;       ///< says what the data contradict
+  double residual = 0.0;    ///< recomputed; of what is said to be solved
+  std::string solver{};     ///< which of the portfolio
+  double seconds = 0.0;     ///< of CPU time
+
+  /// Whether it is what is known: solved, proved infeasible by the general solver, not solved.
+  bool right() const;
+};
+
+/// A kind by a way.
+struct Row {
+  std::string kind;
+  Known known = Known::kUnknown;
+  Way way = Way::kGeneral;
+  int problems = 0, right = 0, wrong = 0;
+  double residual_max = 0.0;
+  double seconds_median = 0.0, seconds_max = 0.0;
+  std::map<std::string, int> solvers{};
+  std::vector<std::string> missed{};  ///< names of those not answered rightly
+};
+
+struct CorpusResult {
+  std::vector<Row> rows;
+  int problems = 0;
+};
+
+/// Problems of files, and random ones.
+CorpusResult RunCorpus(const std::vector<FileCase>& files, const RunOptions& options);
+
+/// The first bound that does not hold as one line, or empty: no wrong answer; all solved, or 95 %
+/// of those of Known::kHardlySolvable a way; all infeasible ones proved.
+std::string FirstFailure(const CorpusResult& result);
+
+}  // namespace tangible::corpus

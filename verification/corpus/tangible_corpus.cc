@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// tangible-corpus: the solvers on many problems of which the answer is known.
+
+#include <gflags/gflags.h>
+
+#include <algorithm>
+#include <iostream>
+#include <string>
+#include <thread>
+
+#include "tangible/app/program.h"
+#include "tangible/app/progress.h"
+#include "tangible/verification/corpus/corpus_report.h"
+#include "tangible/verification/support/provenance.h"
+
+DEFINE_string(problems, "", "folder of problem files, all of which are solved");
+DEFINE_int32(random, 20, "random problems of each kind");
+DEFINE_int32(seed, 1, "of the random problems");
+DEFINE_int32(contacts, 100, "largest number of contacts in a random problem");
+DEFINE_int32(dense_contacts, 30, "the general solver takes random problems of up to so many");
+DEFINE_int32(threads, 0, "how many problems are solved at the same time; 0: one a core");
+DEFINE_string(out, "", "file of all figures (JSON)");
+
+namespace tangible {
+namespace {
+
+constexpr int kMostThreads = 256;
+constexpr int kMostRandom = 1000000;
+constexpr int kMostContacts = 1000;
+
+// Empty, or one line about a flag's value.
+std::string CheckFlags() {
+  const auto outside = [](const char* flag, int value, int low, int high) -> std::string {
+    if (value >= low && value <= high) return "";
+    return std::string("--") + flag + ": expected a number from " + std::to_string(low) + " to " +
+           std::to_string(high) + ", got " + std::to_string(value);
+  };
+  for (const std::string& wrong :
+       {outside("random", FLAGS_random, 0, kMostRandom), outside("seed", FLAGS_seed, 0, 2147483647),
+        outside("contacts", FLAGS_contacts, 1, kMostContacts),
+        outside("dense_contacts", FLAGS_dense_contacts, 0, kMostContacts),
+        outside("threads", FLAGS_threads, 0, kMostThreads)}) {
+    if (!wrong.empty()) return wrong;
+  }
+  if (FLAGS_random == 0 && FLAGS_problems.empty()) {
+    return "--random: expected a number > 0 where there are no --problems, got 0";
+  }
+  return "";
+}
+
+int Run() {
+  std::vector<corpus::FileCase> files;
+  std::string error;
+  if (!FLAGS_problems.empty()) error = corpus::ReadProblemFolder(FLAGS_problems, &files);
+  if (!error.empty()) return ReportError(error);
+  const int cores = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+  const long total =
+      static_cast<long>(files.size()) +
+      static_cast<long>(FLAGS_random) * static_cast<long>(corpus::ContactKinds().size());
+  Progress progress("problems", total);
+  const corpus::CorpusResult result =
+      corpus::RunCorpus(files, {.random = FLAGS_random,
+                                .seed = static_cast<std::uint64_t>(FLAGS_seed),
+                                .most_contacts = FLAGS_contacts,
+                                .most_dense = FLAGS_dense_contacts,
+                                .threads = FLAGS_threads > 0 ? FLAGS_threads : cores,
+                                .progress = [&](long done) { progress.Show(done); }});
+  std::cout << ProvenanceLine() << "; seed " << FLAGS_seed << "\n\n"
+            << corpus::TableText(result) << std::flush;
+  if (!FLAGS_out.empty()) {
+    OrderedJson json = {{"provenance", OrderedJson::object()}, {"seed", FLAGS_seed}};
+    for (const auto& [what, value] : Provenance()) json["provenance"][what] = value;
+    json.update(corpus::ToJson(result));
+    error = WriteResult(FLAGS_out, JsonText(json));
+    if (!error.empty()) return ReportError(error);
+  }
+  const std::string failure = corpus::FirstFailure(result);
+  return failure.empty() ? kExitDone : ReportError("tangible-corpus: " + failure);
+}
+
+int Main(int argc, char** argv) {
+  const CommandLine line = ParseCommandLine(
+      argc, argv,
+      {.name = "tangible-corpus",
+       .synopsis = "[--problems=FOLDER] [--random=N] [--seed=S] [--out=R.json]",
+       .description =
+           "Solves problems of which the answer is known, files and random contact problems, by "
+           "every solver; judges each\nanswer from the data. Exit status 1 where an answer is "
+           "wrong, or fewer are solved than should be.",
+       .version = TANGIBLE_VERSION,
+       .source_file = __FILE__,
+       .num_positional = 0});
+  if (line.exit_status) return *line.exit_status;
+  const std::string wrong = CheckFlags();
+  if (!wrong.empty()) return ReportError("tangible-corpus: " + wrong, kExitUsage);
+  return Run();
+}
+
+}  // namespace
+}  // namespace tangible
+
+int main(int argc, char** argv) { return tangible::RunMain(&tangible::Main, argc, argv); }
