@@ -79,19 +79,41 @@ class Best {
     constexpr double kRounding = 1e-15;
     point_.z = point_.z.cwiseMax(0.0);
     residual_ = ScaledResidual(problem_, point_.v, point_.y, point_.z) + kRounding;
+    ConsiderWithoutCrumbs(point_);
   }
   void Offer(LcpVector point) {
     point.z = point.z.cwiseMax(0.0);
-    const double residual = ScaledResidual(problem_, point.v, point.y, point.z);
-    if (residual < residual_) {
-      residual_ = residual;
-      point_ = std::move(point);
-    }
+    Consider(point);
+    ConsiderWithoutCrumbs(std::move(point));
   }
   double Residual() const { return residual_; }
   const LcpVector& Point() const { return point_; }
 
  private:
+  void ConsiderWithoutCrumbs(LcpVector point) {
+    // What rounding left of an impulse, 1e-48, is of the same size as its cone's other terms: as a
+    // violation of that row it would count in full.
+    const LcpScales scales = ComputeScales(problem_, point.v, point.y, point.z);
+    for (const double crumb : {1e-15, 1e-13, 1e-11, 1e-9, 1e-7}) {
+      if (residual_ <= 2.0 * crumb) return;
+      bool cleaned = false;
+      for (Index i = 0; i < point.z.size(); ++i) {
+        if (point.z[i] == 0.0 || point.z[i] > crumb * scales.force[i]) continue;
+        point.z[i] = 0.0;
+        cleaned = true;
+      }
+      if (cleaned) Consider(point);
+    }
+  }
+
+  void Consider(const LcpVector& point) {
+    const double residual = ScaledResidual(problem_, point.v, point.y, point.z);
+    if (residual < residual_) {
+      residual_ = residual;
+      point_ = point;
+    }
+  }
+
   const MixedLcp<double>& problem_;
   LcpVector point_;
   double residual_ = std::numeric_limits<double>::infinity();
@@ -112,8 +134,13 @@ std::vector<RowMode> IdentifyModes(const MixedLcp<double>& problem, const LcpVec
 }
 
 LcpVector Polish(const MixedLcp<double>& problem, const LcpVector& point, int max_rounds) {
+  const LcpVector best = Best(problem, point).Point();
+  return Polish(problem, best, max_rounds, IdentifyModes(problem, best));
+}
+
+LcpVector Polish(const MixedLcp<double>& problem, const LcpVector& point, int max_rounds,
+                 std::vector<RowMode> modes) {
   Best best(problem, point);
-  std::vector<RowMode> modes = IdentifyModes(problem, best.Point());
   LcpVector current = best.Point();
   int fewest = std::numeric_limits<int>::max();
   int patience = 3;

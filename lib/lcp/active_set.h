@@ -22,6 +22,9 @@ std::vector<RowMode> IdentifyModes(const MixedLcp<double>& problem, const LcpVec
 /// The point of the least scaled residual among the given one (with negative z set to 0) and those
 /// visited. Cost: a factorisation a visited set of modes, at most `max_rounds`.
 LcpVector Polish(const MixedLcp<double>& problem, const LcpVector& point, int max_rounds = 30);
+/// The same, beginning with these modes: those of a basis, where the point is too near others.
+LcpVector Polish(const MixedLcp<double>& problem, const LcpVector& point, int max_rounds,
+                 std::vector<RowMode> modes);
 
 /// Solves the equality systems of all 2ⁿ sets of modes, nz ≤ kMaxEnumeratedRows, until one is a
 /// solution to `tolerance`; returns the best point.

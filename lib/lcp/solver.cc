@@ -1,15 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tangible/lcp/solver.h"
 
+#include <Eigen/LU>
+#include <algorithm>
 #include <cmath>
 #include <optional>
 #include <random>
 #include <utility>
+#include <vector>
 
 #include "tangible/lcp/active_set.h"
 #include "tangible/lcp/farkas.h"
 #include "tangible/lcp/interior_point.h"
 #include "tangible/lcp/lemke.h"
+#include "tangible/lcp/scaling.h"
 
 namespace tangible {
 namespace {
@@ -22,6 +26,44 @@ constexpr double kComplementarity = 1e-20;
 
 // Few, so that a wrong guess costs no more than a few iterations of the interior point.
 constexpr int kGuessRounds = 4;
+
+// Proximal steps: the share of equilibrated rows that is added to their diagonal.
+constexpr double kFirstShift = 1e-4;
+constexpr int kProximalRounds = 10;
+constexpr int kBasisRounds = 5;
+
+// The solution of W z + q = 0 on the rows where `basic` > 0, 0 elsewhere: without the rounding that
+// a path's pivots leave in a tableau. `basic` itself where that does not exist.
+VectorXd SolveBasis(const Eigen::MatrixXd& W, const VectorXd& q, const VectorXd& basic) {
+  std::vector<Index> rows;
+  for (Index i = 0; i < q.size(); ++i) {
+    if (basic[i] > 0.0) rows.push_back(i);
+  }
+  if (rows.empty()) return basic;
+  const Eigen::MatrixXd square = W(rows, rows);
+  const VectorXd rhs = -q(rows);
+  const Equilibration scaling = Equilibrate(square);
+  const Eigen::PartialPivLU<Eigen::MatrixXd> lu(scaling.row.asDiagonal() * square *
+                                                scaling.col.asDiagonal());
+  VectorXd x = VectorXd::Zero(rhs.size());
+  for (int pass = 0; pass < 2; ++pass) {
+    const VectorXd left = rhs - square * x;
+    x += scaling.col.cwiseProduct(lu.solve(scaling.row.cwiseProduct(left)));
+  }
+  if (!x.allFinite()) return basic;
+  VectorXd z = VectorXd::Zero(basic.size());
+  z(rows) = x.cwiseMax(0.0);
+  return z;
+}
+
+// How often `change` can be repeated until the first z is at 0; at most 1e6 times.
+double LimitedBy(const VectorXd& z, const VectorXd& change) {
+  double factor = 1e6;
+  for (Index i = 0; i < z.size(); ++i) {
+    if (z[i] > 0.0 && change[i] < 0.0) factor = std::min(factor, -z[i] / change[i]);
+  }
+  return factor;
+}
 
 // One run of the portfolio: the attempts so far and the best point.
 class Portfolio {
@@ -50,19 +92,45 @@ class Portfolio {
     return Offer({result.v, result.y, result.z}, LcpSolver::kInteriorPoint);
   }
 
-  // `shift` > 0 solves for F + shift diag(W) first, whose path is shorter, and polishes that.
-  bool TryLemke(const VectorXd& covering, double shift) {
-    if (!reduced_tried_) reduced_ = ReduceToPlain(problem_);
-    reduced_tried_ = true;
-    if (!reduced_) return false;
-    Eigen::MatrixXd W = reduced_->W;
-    const double size = W.size() > 0 ? W.cwiseAbs().maxCoeff() : 0.0;
-    W.diagonal().array() += shift * size;
-    const LemkeResult result = SolveLemke(W, reduced_->q, {.max_pivots = 0, .covering = covering});
+  bool TryLemke(const VectorXd& covering) {
+    if (!Reduce()) return false;
+    const LemkeResult result =
+        SolveLemke(reduced_->W, reduced_->q, {.max_pivots = 0, .covering = covering});
     solution_.iterations += result.pivots;
-    return Offer({reduced_->v0 + reduced_->v_z * result.z, reduced_->y0 + reduced_->y_z * result.z,
-                  result.z},
-                 LcpSolver::kLemke);
+    return Offer(PointOf(result.z), LcpSolver::kLemke);
+  }
+
+  // Proximal steps, each a regularised problem by Lemke around the last solution: where rows are
+  // redundant, what W is to rounding may have no solution while the problem has.
+  bool TryProximalLemke(const VectorXd& covering, double least_shift) {
+    if (!Reduce()) return false;
+    const Equilibration scaling = Equilibrate(reduced_->W);
+    const VectorXd unit = (scaling.row.cwiseProduct(scaling.col)).cwiseInverse();
+    VectorXd z = VectorXd::Zero(problem_.num_z());
+    VectorXd last_change = z;
+    double shift = kFirstShift;
+    for (int round = 0; round < kProximalRounds; ++round) {
+      Eigen::MatrixXd W = reduced_->W;
+      W.diagonal() += shift * unit;
+      const VectorXd q = reduced_->q - shift * unit.cwiseProduct(z);
+      const LemkeResult result = SolveLemke(W, q, {.max_pivots = 0, .covering = covering});
+      solution_.iterations += result.pivots;
+      if (result.status != LemkeStatus::kSolved) return false;
+      const VectorXd solved = SolveBasis(W, q, result.z);
+      const VectorXd last = z;
+      z = Residual(solved) <= Residual(result.z) ? solved : result.z;
+      const LcpVector point = PointOf(z);
+      if (Offer(point, LcpSolver::kLemke) || OfferBasis(point, LcpSolver::kLemke)) return true;
+      const VectorXd change = z - last;
+      // Rows that contradict each other by rounding: impulses grow by as much a round until one
+      // meets its limit.
+      if (round > 0 && (change - last_change).norm() <= 0.01 * change.norm()) {
+        z = (z + LimitedBy(z, change) * change).cwiseMax(0.0);
+      }
+      last_change = change;
+      shift = std::max(least_shift, 0.1 * shift);
+    }
+    return false;
   }
 
   bool TryEnumeration() {
@@ -90,9 +158,34 @@ class Portfolio {
   }
 
  private:
+  bool Reduce() {
+    if (!reduced_tried_) reduced_ = ReduceToPlain(problem_);
+    reduced_tried_ = true;
+    return reduced_.has_value();
+  }
+
+  // Of the reduced problem: with the v and y that z brings about.
+  LcpVector PointOf(const VectorXd& z) const {
+    return {reduced_->v0 + reduced_->v_z * z, reduced_->y0 + reduced_->y_z * z, z};
+  }
+  double Residual(const VectorXd& z) const {
+    const LcpVector point = PointOf(z);
+    return ScaledResidual(problem_, point.v, point.y, point.z);
+  }
+
   bool Offer(const LcpVector& point, LcpSolver solver, int max_rounds = 30) {
     if (!point.v.allFinite() || !point.y.allFinite() || !point.z.allFinite()) return false;
-    const LcpVector polished = Polish(problem_, point, max_rounds);
+    return Judge(Polish(problem_, point, max_rounds), solver);
+  }
+
+  // The same where the rows in the basis, z > 0, are the active ones.
+  bool OfferBasis(const LcpVector& point, LcpSolver solver) {
+    std::vector<RowMode> modes;
+    for (const double z : point.z) modes.push_back(z > 0.0 ? RowMode::kActive : RowMode::kInactive);
+    return Judge(Polish(problem_, point, kBasisRounds, modes), solver);
+  }
+
+  bool Judge(const LcpVector& polished, LcpSolver solver) {
     const double residual = ScaledResidual(problem_, polished.v, polished.y, polished.z);
     if (residual < solution_.residual || solution_.solver == LcpSolver::kNone) {
       solution_.v = polished.v;
@@ -122,19 +215,29 @@ bool TryInteriorPoints(Portfolio& portfolio) {
   return false;
 }
 
-// Covering vectors between 0.1 and 10, log-uniform, from a literal seed; then proximal shifts.
+// Covering vectors between 0.1 and 10, log-uniform, from a literal seed; then proximal steps.
 bool TryLemkes(Portfolio& portfolio, Index nz) {
   constexpr int kCoverings = 8;
   std::mt19937 generator(20240607);
-  for (int k = 0; k < kCoverings; ++k) {
+  const auto draw = [&] {
     VectorXd covering(nz);
     for (double& d : covering) {
       d = std::pow(10.0, 2.0 * (static_cast<double>(generator()) / 4294967296.0) - 1.0);
     }
-    if (portfolio.TryLemke(covering, 0.0)) return true;
+    return covering;
+  };
+  // What is redundant asks for a large shift, what is badly scaled for a small one.
+  constexpr double kLeastShifts[] = {1e-6, 1e-9};
+  for (const double least_shift : kLeastShifts) {
+    if (portfolio.TryProximalLemke(VectorXd(), least_shift)) return true;
   }
-  for (const double shift : {1e-8, 1e-6, 1e-4}) {
-    if (portfolio.TryLemke(VectorXd(), shift)) return true;
+  for (int k = 0; k < kCoverings; ++k) {
+    const VectorXd covering = draw();
+    if (portfolio.TryLemke(covering)) return true;
+  }
+  for (int k = 0; k < kCoverings; ++k) {
+    const VectorXd covering = draw();
+    if (portfolio.TryProximalLemke(covering, kLeastShifts[k % 2])) return true;
   }
   return false;
 }
@@ -144,7 +247,7 @@ bool RunPortfolio(Portfolio& portfolio, const LcpOptions& options, Index nz) {
   const bool lemke = options.solver != SolverChoice::kInteriorPoint;
   if (options.solver == SolverChoice::kAuto && portfolio.TryGuess()) return true;
   if (interior_point && portfolio.TryInteriorPoint(1.0, 0.0)) return true;
-  if (lemke && portfolio.TryLemke(VectorXd(), 0.0)) return true;
+  if (lemke && portfolio.TryLemke(VectorXd())) return true;
   if (portfolio.ProveInfeasible()) return false;
   if (interior_point && TryInteriorPoints(portfolio)) return true;
   if (lemke && TryLemkes(portfolio, nz)) return true;

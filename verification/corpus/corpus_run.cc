@@ -173,7 +173,8 @@ bool Answer::right() const {
 }
 
 CorpusResult RunCorpus(const std::vector<FileCase>& files, const RunOptions& options) {
-  const std::vector<std::string>& kinds = ContactKinds();
+  const std::vector<std::string> kinds =
+      options.only.empty() ? ContactKinds() : std::vector<std::string>{options.only};
   const size_t total = files.size() + kinds.size() * static_cast<size_t>(options.random);
   std::vector<std::vector<Answer>> answers(total);
   std::atomic<size_t> next{0};
@@ -187,7 +188,7 @@ CorpusResult RunCorpus(const std::vector<FileCase>& files, const RunOptions& opt
       } else {
         const size_t k = i - files.size();
         const size_t each = static_cast<size_t>(options.random);
-        answers[i] = ByAll(kinds[k / each], static_cast<int>(k % each), options);
+        answers[i] = ByAll(kinds[k / each], options.first + static_cast<int>(k % each), options);
       }
       const std::lock_guard<std::mutex> lock(mutex);
       ++done;

@@ -29,6 +29,8 @@ inline constexpr double kHardShare = 0.95;
 struct RunOptions {
   int random = 0;           ///< problems of each kind
   std::uint64_t seed = 1;   ///< of their generator
+  int first = 0;            ///< number of the first one
+  std::string only{};       ///< this kind alone; empty: all
   int most_contacts = 100;  ///< in one problem
   int most_dense = 30;      ///< contacts up to which the general solver takes part
   int threads = 1;

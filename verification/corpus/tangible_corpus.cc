@@ -17,6 +17,8 @@
 DEFINE_string(problems, "", "folder of problem files, all of which are solved");
 DEFINE_int32(random, 20, "random problems of each kind");
 DEFINE_int32(seed, 1, "of the random problems");
+DEFINE_int32(first, 0, "number of the first random problem of each kind");
+DEFINE_string(kind, "", "random problems of this kind only");
 DEFINE_int32(contacts, 100, "largest number of contacts in a random problem");
 DEFINE_int32(dense_contacts, 30, "the general solver takes random problems of up to so many");
 DEFINE_int32(threads, 0, "how many problems are solved at the same time; 0: one a core");
@@ -38,6 +40,7 @@ std::string CheckFlags() {
   };
   for (const std::string& wrong :
        {outside("random", FLAGS_random, 0, kMostRandom), outside("seed", FLAGS_seed, 0, 2147483647),
+        outside("first", FLAGS_first, 0, 2147483647 - kMostRandom),
         outside("contacts", FLAGS_contacts, 1, kMostContacts),
         outside("dense_contacts", FLAGS_dense_contacts, 0, kMostContacts),
         outside("threads", FLAGS_threads, 0, kMostThreads)}) {
@@ -46,7 +49,13 @@ std::string CheckFlags() {
   if (FLAGS_random == 0 && FLAGS_problems.empty()) {
     return "--random: expected a number > 0 where there are no --problems, got 0";
   }
-  return "";
+  const std::vector<std::string>& kinds = corpus::ContactKinds();
+  if (FLAGS_kind.empty() || std::find(kinds.begin(), kinds.end(), FLAGS_kind) != kinds.end()) {
+    return "";
+  }
+  std::string names;
+  for (const std::string& kind : kinds) names += (names.empty() ? "" : ", ") + kind;
+  return "--kind: expected one of " + names + ", got '" + FLAGS_kind + "'";
 }
 
 int Run() {
@@ -57,11 +66,14 @@ int Run() {
   const int cores = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
   const long total =
       static_cast<long>(files.size()) +
-      static_cast<long>(FLAGS_random) * static_cast<long>(corpus::ContactKinds().size());
+      static_cast<long>(FLAGS_random) *
+          (FLAGS_kind.empty() ? static_cast<long>(corpus::ContactKinds().size()) : 1);
   Progress progress("problems", total);
   const corpus::CorpusResult result =
       corpus::RunCorpus(files, {.random = FLAGS_random,
                                 .seed = static_cast<std::uint64_t>(FLAGS_seed),
+                                .first = FLAGS_first,
+                                .only = FLAGS_kind,
                                 .most_contacts = FLAGS_contacts,
                                 .most_dense = FLAGS_dense_contacts,
                                 .threads = FLAGS_threads > 0 ? FLAGS_threads : cores,
