@@ -122,10 +122,17 @@ LcpScales ComputeScales(const MixedLcp<double>& problem, const VectorXd& v, cons
   scales.momentum = problem.M.cwiseAbs() * v.cwiseAbs() + impulse;
   VectorXd speed = v.cwiseAbs();
   VectorXd inverse_mass = VectorXd::Zero(v.size());
+  double root_energy = 0.0;
   for (Index j = 0; j < v.size(); ++j) {
     if (problem.M(j, j) <= 0.0) continue;
     inverse_mass[j] = 1.0 / problem.M(j, j);
-    speed[j] = std::max(speed[j], impulse[j] * inverse_mass[j]);
+    root_energy += std::sqrt(problem.M(j, j)) *
+                   std::max(std::abs(v[j]), std::abs(problem.p[j]) * inverse_mass[j]);
+  }
+  for (Index j = 0; j < v.size(); ++j) {
+    const double pushed =
+        std::min(impulse[j] * inverse_mass[j], root_energy * std::sqrt(inverse_mass[j]));
+    speed[j] = std::max(speed[j], pushed);
   }
   scales.joint = problem.A.cwiseAbs() * speed + problem.b.cwiseAbs();
   scales.slack = G * speed + problem.F.cwiseAbs() * z.cwiseAbs() + problem.c.cwiseAbs();
@@ -186,7 +193,7 @@ bool DependsOnData(const MixedLcp<double>& problem, const VectorXd& v, const Vec
   homogeneous.p.setZero();
   homogeneous.b.setZero();
   homogeneous.c.setZero();
-  return residual <= 1e-4 * ScaledResidual(homogeneous, v, y, z);
+  return residual <= 1e-8 * ScaledResidual(homogeneous, v, y, z);
 }
 
 #define TANGIBLE_INSTANTIATE(T)                   \

@@ -85,11 +85,13 @@ struct LcpScales {
 };
 
 /// v̂ⱼ = max(|vⱼ|, (|p| + |A|ᵀ|y| + |G|ᵀ|z|)ⱼ / Mⱼⱼ): a v that is the small difference of large
-/// impulses is only as exact as those. Of y only the part outside the null space of Aᵀ counts, here
-/// and in `momentum`: what cancels there can grow without bound where joints contradict each other,
-/// and would hide that A v = b does not hold. Rows of a kind: those with G's row zero, and the
-/// others. W is the diagonal of F + G diag(M)⁻¹ Gᵀ; where Wᵢᵢ ≤ 0 (a sliding speed, which moves
-/// other slacks only) the largest σₖ / |Fₖᵢ| stands for σᵢ / Wᵢᵢ.
+/// impulses is only as exact as those; up to what the energy of all v and M⁻¹ p could bring about,
+/// for rows that contradict each other have any impulses, and would hide it. Of y only the part
+/// outside the null space of Aᵀ counts, here and in `momentum`: what cancels there can grow without
+/// bound where joints contradict each other, and would hide that A v = b does not hold. Rows of a
+/// kind: those with G's row zero, and the others. W is the diagonal of F + G diag(M)⁻¹ Gᵀ; where
+/// Wᵢᵢ ≤ 0 (a sliding speed, which moves other slacks only) the largest σₖ / |Fₖᵢ| stands for σᵢ /
+/// Wᵢᵢ.
 LcpScales ComputeScales(const MixedLcp<double>& problem, const VectorX<double>& v,
                         const VectorX<double>& y, const VectorX<double>& z);
 
@@ -110,7 +112,7 @@ double ScaledResidual(const MixedLcp<double>& problem, const VectorX<double>& v,
 
 /// Whether a point of residual `residual` is a solution, and not just large: z and v on a ray of
 /// the constraints satisfy s = G v + F z + c relative to |F||z| however wrong c is, but then they
-/// satisfy the problem with p = b = c = 0 as well. True if the residual is at most 1e-4 of that
+/// satisfy the problem with p = b = c = 0 as well. True if the residual is at most 1e-8 of that
 /// one's.
 bool DependsOnData(const MixedLcp<double>& problem, const VectorX<double>& v,
                    const VectorX<double>& y, const VectorX<double>& z, double residual);

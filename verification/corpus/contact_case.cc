@@ -305,4 +305,25 @@ MixedLcp<double> OneSidedForm(const ContactProblem<double>& problem) {
   return form;
 }
 
+ContactSolution<double> FromOneSided(const ContactProblem<double>& problem,
+                                     const LcpSolution<double>& solution) {
+  ContactSolution<double> result;
+  result.v.assign(solution.v.data(), solution.v.data() + solution.v.size());
+  result.joint_impulse.assign(3 * problem.joints.size(), 0.0);
+  Eigen::Index at = 0;
+  for (size_t j = 0; j < problem.joints.size(); ++j) {
+    for (int r = 0; r < problem.joints[j].rows; ++r) {
+      result.joint_impulse[3 * j + r] = solution.y[at++];
+    }
+  }
+  at = 0;
+  for (const ContactBlock<double>& c : problem.contacts) {
+    result.normal_impulse.push_back(solution.z[at]);
+    result.tangent_impulse.push_back(c.has_friction ? solution.z[at + 1] - solution.z[at + 2] : 0);
+    at += c.has_friction ? 4 : 1;
+  }
+  result.modes.assign(problem.contacts.size(), ContactMode::kOpen);
+  return result;
+}
+
 }  // namespace tangible::corpus

@@ -47,4 +47,8 @@ ContactCase MakeContactCase(const std::string& kind, std::uint64_t seed, int ind
 /// friction, λn alone of one without.
 MixedLcp<double> OneSidedForm(const ContactProblem<double>& problem);
 
+/// A solution of that form as one of the contact problem; the modes are left open.
+ContactSolution<double> FromOneSided(const ContactProblem<double>& problem,
+                                     const LcpSolution<double>& solution);
+
 }  // namespace tangible::corpus

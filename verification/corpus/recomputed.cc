@@ -219,11 +219,18 @@ double RecomputedResidual(const MixedLcp<double>& problem, const VectorX<double>
                         G.cwiseAbs().transpose() * z.cwiseAbs();
   const Vector left = M * v - A.transpose() * y - G.transpose() * z - p;
   const Vector terms = M.cwiseAbs() * v.cwiseAbs() + pushed;
+  // Impulses count up to what the energy of all could bring about.
+  Real root_energy = 0;
+  for (Index j = 0; j < nv; ++j) {
+    const Real mass = std::max<Real>(M(j, j), 0);
+    root_energy += std::sqrt(mass) * std::abs(v[j]);
+    if (mass > 0) root_energy += std::abs(p[j]) / std::sqrt(mass);
+  }
   Vector speed = v.cwiseAbs();
   Vector mobility = F.diagonal();
   for (Index j = 0; j < nv; ++j) {
     if (!(M(j, j) > 0)) continue;
-    speed[j] = std::max(speed[j], pushed[j] / M(j, j));
+    speed[j] = std::max(speed[j], std::min(pushed[j] / M(j, j), root_energy / std::sqrt(M(j, j))));
     mobility += G.col(j).cwiseAbs2() / M(j, j);
   }
   Real worst = 0;
