@@ -44,6 +44,16 @@ if(TANGIBLE_SANITIZE)
   target_compile_definitions(tangible_flags INTERFACE EIGEN_MALLOC_ALREADY_ALIGNED=1)
 endif()
 
+if(TANGIBLE_FUZZ)
+  if(NOT CMAKE_CXX_COMPILER_ID STREQUAL "Clang")
+    message(FATAL_ERROR "TANGIBLE_FUZZ: expected clang, got ${CMAKE_CXX_COMPILER_ID}")
+  endif()
+  target_compile_options(tangible_flags INTERFACE -fsanitize=fuzzer-no-link,address,undefined
+                         -fno-sanitize-recover=all -fno-omit-frame-pointer)
+  target_link_options(tangible_flags INTERFACE -fsanitize=address,undefined)
+  target_compile_definitions(tangible_flags INTERFACE EIGEN_MALLOC_ALREADY_ALIGNED=1)
+endif()
+
 # One precompiled header for all targets: most files read Eigen and ceres/jet.h, two seconds each.
 if(TANGIBLE_PRECOMPILE_HEADERS)
   file(WRITE "${PROJECT_BINARY_DIR}/precompiled.cc" "// Carries the precompiled header.\n")

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "run_scene.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <string>
+
+#include "tangible/dynamics/model.h"
+#include "tangible/simulation/rollout.h"
+#include "tangible/simulation/settings.h"
+
+namespace tangible::testing {
+namespace {
+
+constexpr size_t kMostBodies = 12;
+constexpr size_t kMostNumbers = 64;
+constexpr int kSteps = 4;
+
+void Expect(bool holds, const char* what, const std::string& message) {
+  if (holds) return;
+  std::fprintf(stderr, "expected %s: %s\n", what, message.c_str());
+  std::abort();
+}
+
+}  // namespace
+
+bool FitToRun(const Scene& scene) {
+  if (scene.bodies.size() > kMostBodies || scene.joints.size() > kMostBodies) return false;
+  if (scene.simulation.max_events_per_step > 1000 || scene.simulation.lcp_max_iterations > 1000) {
+    return false;
+  }
+  return std::all_of(scene.bodies.begin(), scene.bodies.end(),
+                     [](const auto& body) { return body.shape.numbers.size() <= kMostNumbers; });
+}
+
+void RunFewSteps(Scene scene, Stepping stepping) {
+  scene.simulation.stepping = stepping;
+  scene.simulation.duration = std::min(scene.simulation.duration, kSteps * scene.simulation.dt);
+  std::string why;
+  if (!CheckSettings(scene.simulation, &why)) {
+    Expect(!why.empty() && why.find('\n') == std::string::npos, "one line", why);
+    return;
+  }
+  Model<double> model;
+  State<double> state;
+  BuildModel(scene, &model, &state);
+  State<double> final = state;
+  const RolloutReport report = Rollout(model, state, {}, &final);
+  Expect(report.status == StepStatus::kDone || !report.message.empty(), "a message", "none");
+  Expect(report.message.find('\n') == std::string::npos, "one line", report.message);
+  for (const auto* values : {&final.pose, &final.twist}) {
+    for (const double x : *values) Expect(std::isfinite(x), "finite numbers", report.message);
+  }
+}
+
+}  // namespace tangible::testing
