@@ -38,6 +38,10 @@ class InteriorPoint {
     InteriorPointResult<T> result;
     Start();
     double best = std::numeric_limits<double>::infinity();
+    // Where numbers overflow from the start no iterate is ever stored.
+    result.v = VectorX<T>::Constant(nv_, T(0.0));
+    result.y = VectorX<T>::Constant(num_equations_ - nv_, T(0.0));
+    result.z = VectorX<T>::Constant(nz_, T(0.0));
     for (; result.iterations <= options_.max_iterations; ++result.iterations) {
       const VectorX<T> r = Residual();
       const T kappa = Complementarity(z_, s_);

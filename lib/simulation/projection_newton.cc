@@ -269,7 +269,7 @@ bool IterateProjection(const Model<T>& model, int extra, ProjectionIterate<T>* p
     bool factored = FactorMatrix(model, true, p);
     double step = factored ? SolveStep(model, p) : HUGE_VAL;
     double fraction = 1.0;
-    TryStep(model, fraction, p);
+    if (factored) TryStep(model, fraction, p);
     if (!factored || (step > kShortStep && !TrialImproves(model, p, &weight))) {
       if (!FactorMatrix(model, false, p)) {
         return false;

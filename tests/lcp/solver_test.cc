@@ -241,5 +241,20 @@ TEST(ActiveSetTest, EnumerationFindsWhatPathsMiss) {
   EXPECT_LE(ScaledResidual(problem, point.v, point.y, point.z), 1e-12);
 }
 
+// Numbers whose products overflow left the interior point without any iterate.
+TEST(SolverTest, NumbersThatOverflowAreUnsolved) {
+  MixedLcp<double> problem;
+  problem.F = MatrixX<double>{{-1e300, 1.0}, {1.0, -4.5e-9}};
+  problem.c = Eigen::Vector2d(-1.0, 1e308);
+  ConformEmptyBlocks(problem);
+  for (const SolverChoice choice :
+       {SolverChoice::kAuto, SolverChoice::kInteriorPoint, SolverChoice::kLemke}) {
+    const LcpSolution<double> solution = SolveLcp(problem, {.solver = choice});
+    EXPECT_NE(solution.status, LcpStatus::kSolved);
+    ASSERT_EQ(solution.z.size(), 2);
+    EXPECT_TRUE(solution.z.allFinite());
+  }
+}
+
 }  // namespace
 }  // namespace tangible

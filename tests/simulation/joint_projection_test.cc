@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "../support/scenes.h"
 #include "tangible/simulation/rollout.h"
 #include "tangible/verification/support/random_scene.h"
@@ -199,6 +201,26 @@ TEST(JointProjectionTest, JointsThatCannotHoldAreTold) {
   EXPECT_FALSE(projection.Project(model, &state));
   EXPECT_GT(projection.error(), 0.1);
   EXPECT_GE(projection.worst_joint(), 0);
+}
+
+// Anchors so far away that the first matrix cannot be factorised: no step was there to try.
+TEST(JointProjectionTest, ArmsBeyondAllMeasureAreTold) {
+  const Scene scene = test_scenes::SceneOf(R"({"bodies": [
+      {"name": "a", "mass": 0.8, "inertia": 0.01, "position": [0, -0.2], "angle": -1.57},
+      {"name": "b", "mass": 0.4, "inertia": 0.01, "position": [0, -0.55], "angle": -1.57}],
+    "joints": [{"name": "j", "type": "revolute", "bodies": ["a", "world"], "anchor": [1e20, 0],
+                "angle": 1.2, "rate": 0.5},
+               {"name": "k", "type": "revolute", "bodies": ["b", "a"], "anchor": [0, -0.4],
+                "angle": -0.4, "rate": 1}],
+    "simulation": {"dt": 0.002, "duration": 0.01, "joint_correction": "projection"}})");
+  Model<double> model;
+  State<double> state;
+  BuildModel(scene, &model, &state);
+  State<double> final;
+  const RolloutReport report = Rollout(model, state, {}, &final);
+  EXPECT_NE(report.status, StepStatus::kDone);
+  EXPECT_NE(report.message, "");
+  for (const double x : final.pose) EXPECT_TRUE(std::isfinite(x));
 }
 
 }  // namespace

@@ -15,7 +15,9 @@ TEST(CorpusRunTest, BoundsHoldOnAFewOfEachKind) {
   EXPECT_EQ(result.problems, 6 * static_cast<int>(ContactKinds().size()));
   for (const Row& row : result.rows) {
     EXPECT_GT(row.problems, 0) << row.kind;
-    if (row.known == Known::kSolvable) EXPECT_GT(row.residual_max, 0.0) << row.kind;
+    if (row.known == Known::kSolvable) {
+      EXPECT_GT(row.residual_max, 0.0) << row.kind;
+    }
   }
 }
 
