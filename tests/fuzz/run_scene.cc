@@ -24,6 +24,12 @@ void Expect(bool holds, const char* what, const std::string& message) {
   std::abort();
 }
 
+bool Finite(const State<double>& state) {
+  const auto finite = [](double x) { return std::isfinite(x); };
+  return std::all_of(state.pose.begin(), state.pose.end(), finite) &&
+         std::all_of(state.twist.begin(), state.twist.end(), finite);
+}
+
 }  // namespace
 
 bool FitToRun(const Scene& scene) {
@@ -38,6 +44,8 @@ bool FitToRun(const Scene& scene) {
 void RunFewSteps(Scene scene, Stepping stepping) {
   scene.simulation.stepping = stepping;
   scene.simulation.duration = std::min(scene.simulation.duration, kSteps * scene.simulation.dt);
+  // An event costs up to a thousand evaluations of the motion.
+  scene.simulation.max_events_per_step = std::min(scene.simulation.max_events_per_step, 5);
   std::string why;
   if (!CheckSettings(scene.simulation, &why)) {
     Expect(!why.empty() && why.find('\n') == std::string::npos, "one line", why);
@@ -46,13 +54,14 @@ void RunFewSteps(Scene scene, Stepping stepping) {
   Model<double> model;
   State<double> state;
   BuildModel(scene, &model, &state);
+  // Joint rates on arms of 1e308 m: said to have diverged before the first step.
+  const bool finite = Finite(state);
   State<double> final = state;
   const RolloutReport report = Rollout(model, state, {}, &final);
   Expect(report.status == StepStatus::kDone || !report.message.empty(), "a message", "none");
   Expect(report.message.find('\n') == std::string::npos, "one line", report.message);
-  for (const auto* values : {&final.pose, &final.twist}) {
-    for (const double x : *values) Expect(std::isfinite(x), "finite numbers", report.message);
-  }
+  Expect(finite ? Finite(final) : report.status != StepStatus::kDone, "finite numbers",
+         report.message);
 }
 
 }  // namespace tangible::testing

@@ -34,6 +34,9 @@ class Maker {
       friction_high_ = 1e6;
       case_.known = Known::kHardlySolvable;
     }
+    // Surfaces that move and rebound at any speed: theory says nothing, and pivots may end on a
+    // ray.
+    if (kind == "restitution") case_.known = Known::kHardlySolvable;
     if (kind == "frictionless") friction_low_ = friction_high_ = 0.0;
     if (kind == "mass ratio") mass_ratio_ = 1e9;
     const bool stacked = kind == "stack" || (kind != "scattered" && Draw(0, 1) < 0.3);

@@ -74,7 +74,9 @@ TEST(CorpusRunTest, FilesAreJudgedByWhatIsKnownOfThem) {
 }
 
 TEST(CorpusRunTest, ManyUnsolvedHardOnesAreAFailure) {
-  Row row{.kind = "hard", .known = Known::kHardlySolvable, .problems = 100, .right = 95};
+  Row row{.kind = "hard", .known = Known::kHardlySolvable};
+  row.problems = 100;
+  row.right = 95;
   EXPECT_EQ(FirstFailure({{row}, 100}), "");
   row.right = 94;
   EXPECT_NE(FirstFailure({{row}, 100}).find("94 of 100"), std::string::npos);
