@@ -23,17 +23,19 @@ struct Certificate {
   /// Smallest distance to a change of modes: zᵢ / ζᵢ of active, sᵢ / σᵢ of inactive rows.
   /// Infinite if there are no rows.
   double margin_min = std::numeric_limits<double>::infinity();
-  std::string margin_where{};    ///< the row, contact or step of margin_min
-  int degenerate_rows = 0;       ///< rows at a kink: z = s = 0, either mode possible
-  int redundant_rows = 0;        ///< rank deficiency: z or y are not unique, v is
-  double condition = 1.0;        ///< largest condition estimate of a linear system
-  double linear_residual = 0.0;  ///< largest relative residual of a linear solve
-  int mode_switches = 0;         ///< over a rollout: contacts that changed mode between steps
-  int events = 0;                ///< over a rollout: impacts and other events
-  int fallbacks = 0;             ///< over a rollout: steps not solved by the first solver
-  std::string one_sided{};       ///< why the derivative is one-sided or a mean of two; else empty
-  std::string discontinuous{};   ///< what makes the value itself jump nearby; else empty
-  std::string verdict{};         ///< SetVerdict's
+  std::string margin_where{};  ///< the row, contact or step of margin_min
+  int degenerate_rows = 0;     ///< rows at a kink: z = s = 0, either mode possible
+  int redundant_rows = 0;      ///< rank deficiency: z or y are not unique, v is
+  double condition = 1.0;      ///< largest condition estimate of a linear system
+  /// Largest relative residual of a linear solve; of a rollout whose masses are far apart, also
+  /// what its tangent and adjoint differ by.
+  double linear_residual = 0.0;
+  int mode_switches = 0;        ///< over a rollout: contacts that changed mode between steps
+  int events = 0;               ///< over a rollout: impacts and other events
+  int fallbacks = 0;            ///< over a rollout: steps not solved by the first solver
+  std::string one_sided{};      ///< why the derivative is one-sided or a mean of two; else empty
+  std::string discontinuous{};  ///< what makes the value itself jump nearby; else empty
+  std::string verdict{};        ///< SetVerdict's
 };
 
 /// Adds `other` (another step of a rollout): the worse margin, condition and residual, the sum of

@@ -11,8 +11,10 @@
 namespace tangible {
 namespace {
 
-// Refinement ends where the residual is at rounding level, or no longer falls.
+// Refinement ends where the residual is at rounding level, or no longer falls. Derivatives of many
+// steps sum what is left of each: those of condensed systems are refined as long as it helps.
 constexpr double kResidualGoal = 1e-15;
+constexpr double kCondensedGoal = 1e-18;
 constexpr int kMaxRefinements = 40;
 // Rows that leave more than this contradict each other.
 constexpr double kConsistent = 1e-14;
@@ -302,8 +304,9 @@ double ContactSystem::RefinedSolve(const ContactProblem<double>& problem,
   SolveOnce<kTransposed>(problem, modes, x, columns);
   // Bodies that are held have speeds of rounding: what their rows leave is judged by the speeds
   // they would have if they were free.
-  const double left = Refine<kTransposed>(problem, modes, Regularisation::kLeftOut,
-                                          {rhs_.data(), columns}, x, columns);
+  const double left =
+      Refine<kTransposed>(problem, modes, Regularisation::kLeftOut, {rhs_.data(), columns}, x,
+                          columns, condensed_ ? kCondensedGoal : kResidualGoal);
   if (Expand(left, problem, modes)) {
     std::copy(rhs_.begin(), rhs_.end(), x);
     return RefinedSolve<kTransposed>(problem, modes, x, columns);
@@ -337,11 +340,12 @@ double ContactSystem::SolveRegularised(const ContactProblem<double>& problem,
   rhs_.assign(x, x + size);
   SolveOnce<false>(problem, modes, x, columns);
   const FreeMomenta free = {problem.scale_momentum().data(), 1};
-  double left = Refine<false>(problem, modes, Regularisation::kKept, free, x, columns);
+  double left =
+      Refine<false>(problem, modes, Regularisation::kKept, free, x, columns, kResidualGoal);
   if (Expand(left, problem, modes)) {
     std::copy(rhs_.begin(), rhs_.end(), x);
     SolveOnce<false>(problem, modes, x, columns);
-    left = Refine<false>(problem, modes, Regularisation::kKept, free, x, columns);
+    left = Refine<false>(problem, modes, Regularisation::kKept, free, x, columns, kResidualGoal);
   }
   return left;
 }
@@ -355,25 +359,27 @@ double ContactSystem::SolveProximal(const ContactProblem<double>& problem,
   rhs_.assign(x, x + size);
   SolveOnce<false>(problem, modes, x, columns);
   const FreeMomenta free = {problem.scale_momentum().data(), 1};
-  const double left = Refine<false>(problem, modes, Regularisation::kLeftOut, free, x, columns);
+  const double left =
+      Refine<false>(problem, modes, Regularisation::kLeftOut, free, x, columns, kResidualGoal);
   if (left <= kConsistent) {
     return left;
   }
   std::copy(rhs_.begin(), rhs_.end(), x);
   SolveOnce<false>(problem, modes, x, columns);
-  const double kept = Refine<false>(problem, modes, Regularisation::kKept, free, x, columns);
+  const double kept =
+      Refine<false>(problem, modes, Regularisation::kKept, free, x, columns, kResidualGoal);
   if (Expand(kept, problem, modes)) {
     std::copy(rhs_.begin(), rhs_.end(), x);
     return SolveProximal(problem, modes, x, columns);
   }
-  return Refine<false>(problem, modes, Regularisation::kLeftOut, free, x, columns);
+  return Refine<false>(problem, modes, Regularisation::kLeftOut, free, x, columns, kResidualGoal);
 }
 
 // Refines x for the right-hand side rhs_ as long as a round halves what is left of it.
 template <bool kTransposed>
 double ContactSystem::Refine(const ContactProblem<double>& problem,
                              const std::vector<ContactMode>& modes, Regularisation regularisation,
-                             const FreeMomenta& free, double* x, int columns) {
+                             const FreeMomenta& free, double* x, int columns, double goal) {
   const size_t size = rhs_.size();
   SizeScratch(size, &correction_);
   const auto residual = [&]() {
@@ -382,7 +388,7 @@ double ContactSystem::Refine(const ContactProblem<double>& problem,
         .to_parts;
   };
   double left = residual();
-  for (int i = 0; i < kMaxRefinements && left > kResidualGoal; ++i) {
+  for (int i = 0; i < kMaxRefinements && left > goal; ++i) {
     last_.assign(x, x + size);
     SolveOnce<kTransposed>(problem, modes, correction_.data(), columns);
     for (size_t k = 0; k < size; ++k) {

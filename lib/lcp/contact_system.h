@@ -105,7 +105,8 @@ class ContactSystem {
                             int columns, double* residual) const;
   template <bool kTransposed>
   double Refine(const ContactProblem<double>& problem, const std::vector<ContactMode>& modes,
-                Regularisation regularisation, const FreeMomenta& free, double* x, int columns);
+                Regularisation regularisation, const FreeMomenta& free, double* x, int columns,
+                double goal);
   bool FactorAs(bool condensed, const ContactProblem<double>& problem,
                 const std::vector<ContactMode>& modes);
   // Whether the whole system could be factorised in place of the condensed one, where refinement

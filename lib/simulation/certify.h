@@ -101,7 +101,8 @@ inline constexpr char kContradictingRows[] =
 
 /// The certificate of the derivatives along `directions` (num_variables x columns, named): of the
 /// rollout, and where rows are redundant (a box on a box) of whether each direction agrees with
-/// them. Two rollouts where they are.
+/// them (two rollouts). Where masses are far apart `linear_residual` is at least the gap between
+/// tangent and adjoint (duality.h), both of which are run.
 Certificate CertifyDerivative(const Model<double>& model, const State<double>& initial,
                               const RowMatrixXd& directions, const std::vector<std::string>& names);
 

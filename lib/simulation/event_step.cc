@@ -13,6 +13,8 @@ constexpr double kShortStep = 1e-9;
 constexpr double kForcedSlip = 1e4;
 // How often a motion that cannot be integrated over what is left of a step is halved.
 constexpr int kMostHalvings = 10;
+// How many such shorter motions a step may have. A stiff body's would not end.
+constexpr int kMostShortened = 50;
 // An impact that leaves an approach of no more than this many times the least speed has solved it.
 constexpr double kSolvedApproach = 100.0;
 // Beyond this many times max_events_per_step a step is given up.
@@ -411,6 +413,7 @@ EventOutcome EventStepper::Step(const Model<double>& model, double t, double h,
   double now = t;
   bool impulses_tried = false;
   int halvings = 0;
+  int shortened = 0;
   const auto fail = [&](const std::string& message) {
     outcome.done = false;
     outcome.message = message;
@@ -458,7 +461,8 @@ EventOutcome EventStepper::Step(const Model<double>& model, double t, double h,
     if (!search_.Run(model, touching_.contacts, &segment, &message)) {
       // Where contacts nearly jam accelerations change so fast with poses that only a short motion
       // can be integrated.
-      if (++halvings > kMostHalvings) {
+      shortened += halvings == 0 ? 1 : 0;
+      if (++halvings > kMostHalvings || shortened > kMostShortened) {
         return fail(message);
       }
       record_.num_parts = parts;
