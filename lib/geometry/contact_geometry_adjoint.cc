@@ -155,11 +155,6 @@ void VertexAgainstVertexAdjoint(const ContactFeature& feature, const ShapeView<d
                 b_bar);
 }
 
-// The adjoint of the contact as the other body sees it.
-ContactGeometry<double> SwappedAdjoint(ContactGeometry<double> bar) {
-  return internal::Swapped(bar);
-}
-
 }  // namespace
 
 void EvaluateContactAdjoint(const ContactFeature& feature, const ShapeView<double>& shape_a,
@@ -179,7 +174,7 @@ void EvaluateContactAdjoint(const ContactFeature& feature, const ShapeView<doubl
       const Line line = internal::EdgeLine(shape_a, feature.a);
       EdgeLineAdjoint(shape_a, feature.a,
                       VertexAgainstLineAdjoint(shape_b, pose_b, feature.b, line, pose_a,
-                                               SwappedAdjoint(bar), b_bar, a_bar),
+                                               internal::Swapped(bar), b_bar, a_bar),
                       a_bar);
       break;
     }
@@ -195,7 +190,7 @@ void EvaluateContactAdjoint(const ContactFeature& feature, const ShapeView<doubl
       const Line line = internal::HalfPlaneLine(shape_a);
       HalfPlaneLineAdjoint(shape_a,
                            VertexAgainstLineAdjoint(shape_b, pose_b, feature.b, line, pose_a,
-                                                    SwappedAdjoint(bar), b_bar, a_bar),
+                                                    internal::Swapped(bar), b_bar, a_bar),
                            a_bar);
       break;
     }

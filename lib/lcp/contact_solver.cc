@@ -15,7 +15,7 @@ constexpr double kSlipOfTolerance = 0.3;
 constexpr int kMaxRounds = 20;
 // Where more are contradicted than in the round before, and more than a few, they will not settle.
 constexpr int kFewContradicted = 2;
-// Pivots: from the guess (and half as many as contacts), and as multiples of the number of contacts.
+// Pivots: from the guess (and half as many as contacts), and as multiples of that number.
 constexpr int kPivotsFromGuess = 40;
 constexpr int kPivotsFromInteriorPoint = 2;
 constexpr int kPivotsFromOpen = 20;

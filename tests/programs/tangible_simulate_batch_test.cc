@@ -80,6 +80,29 @@ TEST_F(TangibleSimulateBatchTest, ThreadsDoNotChangeABit) {
 }
 
 // A plate pressed onto a ball on the floor has no solution.
+// Piles that stand apart are islands, solved by as many threads as there are.
+TEST_F(TangibleSimulateBatchTest, ThreadsOfIslandsDoNotChangeABit) {
+  std::string bodies;
+  for (int pile = 0; pile < 24; ++pile) {
+    for (int level = 0; level < 4; ++level) {
+      bodies += R"({"name": "d)" + std::to_string(pile) + "_" + std::to_string(level) +
+                R"(", "shape": {"box": {"size": [0.2, 0.1]}}, "mass": 1, "friction": 0.4,
+                "position": [)" +
+                std::to_string(0.5 * pile + 0.01 * level) + ", " +
+                std::to_string(0.06 + 0.11 * level) + "]},";
+    }
+  }
+  const std::string scene = Write("piles.json", R"({"bodies": [)" + bodies +
+                                                    R"({"name": "floor", "static": true,
+      "friction": 0.4, "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}}],
+      "simulation": {"dt": 0.005, "duration": 0.2}})");
+  const std::string one = Run("tangible-simulate", "'" + scene + "' --threads=1").out;
+  EXPECT_GT(one.size(), 10000u);
+  for (const char* threads : {"2", "5", "0"}) {
+    EXPECT_EQ(one, Run("tangible-simulate", "'" + scene + "' --threads=" + threads).out);
+  }
+}
+
 TEST_F(TangibleSimulateBatchTest, RowsThatFailAreToldAndTheOthersWritten) {
   const std::string press = R"({"bodies": [
       {"name": "ball", "shape": {"circle": {"radius": 0.5}}, "mass": 1, "position": [0, 0.5]},

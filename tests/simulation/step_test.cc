@@ -202,6 +202,34 @@ TEST(StepTest, NoAllocationInAChainThatWhips) {
   EXPECT_EQ(testing::NumAllocations(), before);
 }
 
+// Six stacks of two discs: islands, each of which had its memory from its first step on.
+TEST(StepTest, NoAllocationWithIslandsThatRest) {
+  std::string bodies;
+  for (int i = 0; i < 12; ++i) {
+    bodies += R"({"name": "d)" + std::to_string(i) +
+              R"(", "shape": {"circle": {"radius": 0.1}}, "mass": 1, "friction": 0.5,
+                "position": [)" +
+              std::to_string(0.5 * (i / 2)) + ", " + (i % 2 == 0 ? "0.1" : "0.3") + "]},";
+  }
+  const Scene scene = SceneOf(R"({"bodies": [)" + bodies + R"({"name": "floor", "static": true,
+      "friction": 0.5, "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}}]})");
+  Model<double> model;
+  State<double> state;
+  BuildModel(scene, &model, &state);
+  Stepper stepper(model);
+  for (int k = 0; k < 2; ++k) {
+    const StepReport report = stepper.Step(model, 0.01 * k, 0.01, &state);
+    ASSERT_EQ(report.status, StepStatus::kDone);
+    EXPECT_EQ(report.islands, 6);
+    EXPECT_EQ(report.contacts, 12);
+  }
+  const long before = testing::NumAllocations();
+  for (int k = 2; k < 20; ++k) {
+    EXPECT_EQ(stepper.Step(model, 0.01 * k, 0.01, &state).factorisations, 1);
+  }
+  EXPECT_EQ(testing::NumAllocations(), before);
+}
+
 TEST(StepTest, TimesAreNotAccumulated) {
   SimulationSettings settings;
   settings.dt = 0.1;

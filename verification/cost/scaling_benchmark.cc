@@ -160,6 +160,7 @@ void TimeAdjoint(benchmark::State& state, const Family& family, int size) {
 // Prints as usual, and keeps the times of our steps.
 class Reporter : public benchmark::ConsoleReporter {
  public:
+  Reporter() : ConsoleReporter(OO_None) {}
   void ReportRuns(const std::vector<Run>& runs) override {
     for (const Run& run : runs) {
       times_[run.run_name.function_name] = run.GetAdjustedCPUTime();
