@@ -41,9 +41,10 @@ DiscPile PileOf(int discs) {
 }
 
 Vector2<double> DiscStart(const DiscPile& pile, int i) {
-  return Vector2<double>(
-      -0.5 * pile.width + 0.125 + 0.25 * (i % pile.columns) + 0.01 * std::sin(12.9898 * i),
-      0.15 + 0.22 * (i / pile.columns));
+  const int row = i / pile.columns;
+  const int column = i % pile.columns;
+  return Vector2<double>(-0.5 * pile.width + 0.125 + 0.25 * column + 0.01 * std::sin(12.9898 * i),
+                         0.15 + 0.22 * row);
 }
 
 Scene DiscsScene(int discs) {

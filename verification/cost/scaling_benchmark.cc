@@ -68,7 +68,7 @@ struct Settled {
     settled = MeanPosition(scene, [this](int body) { return state.PoseOf(body).position; });
   }
   StepReport Step() {
-    const StepReport report = stepper->Step(model, time, scene.simulation.dt, &state);
+    StepReport report = stepper->Step(model, time, scene.simulation.dt, &state);
     solved = solved && report.status == StepStatus::kDone;
     time += scene.simulation.dt;
     return report;
