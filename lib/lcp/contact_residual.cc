@@ -12,10 +12,6 @@ namespace {
 // The slowest scale of a body's speed, of the fastest one's: what is below it times the tolerance
 // that can be asked for, 1e-10, is the fastest one's rounding.
 constexpr double kSlowest = 1e-6;
-// Of what an impulse alone would change a body's speed by, rounding stays where others hold it:
-// this share of it, times the tolerance, is a hundred units in the last place. The whole of it
-// would let 1 kg sink into 1e-12 kg.
-constexpr double kPassing = 1e-4;
 
 // The largest component of a row for a body, rotation at the radius of gyration.
 double RowSize(const RowPart<double>& row, double lever) {
@@ -118,7 +114,7 @@ void ContactScales::Compute(const ContactProblem<double>& problem,
   }
   const auto push = [&](int body, const RowPart<double>& row, double z) {
     if (body >= 0) {
-      const double change = kPassing * std::min(std::abs(z) * RowSize(row, lever[body]), total);
+      const double change = std::min(std::abs(z) * RowSize(row, lever[body]), total);
       speed[body] = std::max(speed[body], change / mass[3 * body]);
     }
   };

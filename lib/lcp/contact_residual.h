@@ -14,10 +14,10 @@ namespace tangible {
 /// them.
 struct ContactScales {
   /// A body's speed, m/s, rotation at the radius of gyration: the largest of its solved twist, its
-  /// free one M⁻¹ p and 1e-4 of what one impulse changes it by, M⁻¹ rᵀ λ. A body that is pushed
-  /// from both sides and stays at rest has rounding for the first two. Impulses count up to what
-  /// the momenta of all bodies could bring about: rows that contradict each other have any
-  /// impulses. At least 1e-6 of the fastest body's.
+  /// free one M⁻¹ p and what one impulse changes it by, M⁻¹ rᵀ λ. A body that is pushed from both
+  /// sides and stays at rest has rounding for the first two. Impulses count up to what the momenta
+  /// of all bodies could bring about: rows that contradict each other have any impulses. At least
+  /// 1e-6 of the fastest body's.
   std::vector<double> speed;
   std::vector<double> lever;  ///< a body's radius of gyration, m
   double impulse = 0.0;       ///< the largest normal impulse, N s
