@@ -116,13 +116,16 @@ function(tangible_program name)
   add_executable(${name} ${PROGRAM_SOURCES})
   target_link_libraries(${name} PRIVATE tangible_flags ${PROGRAM_LINK})
   tangible_precompile(${name})
-  # Those of verification come with the tests that run them.
+  # Those of verification come with the tests that run them; under the sanitizers others are not built.
+  set(optional)
   if(NOT CMAKE_CURRENT_SOURCE_DIR MATCHES "/verification/")
     add_dependencies(tangible_unit_and_program_tests ${name})
+  elseif(TANGIBLE_SANITIZE)
+    set(optional OPTIONAL)
   endif()
   target_compile_definitions(${name} PRIVATE TANGIBLE_VERSION="${PROJECT_VERSION}")
   set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY "${PROJECT_BINARY_DIR}/bin")
-  install(TARGETS ${name} RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
+  install(TARGETS ${name} RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} ${optional})
 endfunction()
 
 # tangible_test(<name> SOURCES file... LINK target... [LABELS label...] [TIMEOUT seconds]): one test
