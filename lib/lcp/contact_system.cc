@@ -12,9 +12,9 @@ namespace tangible {
 namespace {
 
 // Refinement ends where the residual is at rounding level, or no longer falls. Derivatives of many
-// steps sum what is left of each: those of condensed systems are refined as long as it helps.
+// steps sum what is left of each, and their columns differ in size: they go on as long as it helps.
 constexpr double kResidualGoal = 1e-15;
-constexpr double kCondensedGoal = 1e-18;
+constexpr double kDerivativeGoal = 1e-18;
 constexpr int kMaxRefinements = 40;
 // Rows that leave more than this contradict each other.
 constexpr double kConsistent = 1e-14;
@@ -304,9 +304,8 @@ double ContactSystem::RefinedSolve(const ContactProblem<double>& problem,
   SolveOnce<kTransposed>(problem, modes, x, columns);
   // Bodies that are held have speeds of rounding: what their rows leave is judged by the speeds
   // they would have if they were free.
-  const double left =
-      Refine<kTransposed>(problem, modes, Regularisation::kLeftOut, {rhs_.data(), columns}, x,
-                          columns, condensed_ ? kCondensedGoal : kResidualGoal);
+  const double left = Refine<kTransposed>(problem, modes, Regularisation::kLeftOut,
+                                          {rhs_.data(), columns}, x, columns, kDerivativeGoal);
   if (Expand(left, problem, modes)) {
     std::copy(rhs_.begin(), rhs_.end(), x);
     return RefinedSolve<kTransposed>(problem, modes, x, columns);
@@ -396,7 +395,10 @@ double ContactSystem::Refine(const ContactProblem<double>& problem,
     }
     const double before = left;
     left = residual();
-    if (!(left < 0.5 * before)) {
+    // What contradicts redundant rows does not fall, and must not keep the rest of a derivative
+    // from its first correction.
+    const bool first = i == 0 && goal < kResidualGoal && std::isfinite(left);
+    if (!(left < 0.5 * before) && !first) {
       std::copy(last_.begin(), last_.end(), x);
       return before;
     }
