@@ -245,6 +245,8 @@ void EventDerivative::EventGradient(const Model<double>& model, Segment* segment
   std::vector<JacobianEntry> entries;
   if (segment->event == EventKind::kTouch) {
     AddGapGradient(model, segment->after, segment->event_contact, &scratch_, &entries);
+  } else if (segment->event == EventKind::kReturn) {
+    AddApproachGradient(model, segment->after, segment->event_contact, &scratch_, &entries);
   } else if (segment->event == EventKind::kSlipEnds) {
     AddSlipGradient(model, segment->after, segment->event_contact, &scratch_, &entries);
   } else {

@@ -8,7 +8,8 @@
 //   an event at the end of a step    what follows it starts at a given time, not at the event's
 //   the start of a run               a change of the initial twist that breaks a rolling contact or
 //                                    a joint acts as the impulse that restores it, at once and not
-//                                    after the first segment
+//                                    after the first segment; one that lifts a contact or makes
+//                                    it land carries what it would else: the same, with friction
 // A box that rocks from corner to corner comes to rest after infinitely many impacts in finite
 // time. Settle ends that.
 #include <algorithm>
@@ -33,6 +34,7 @@ bool EventStepper::AddInstant(const Model<double>& model, double t, EventKind ki
   Segment& segment = part->segment;
   segment.time = t;
   segment.length = 0.0;
+  segment.starts = starts_;
   segment.middle = t;
   segment.before = *state;
   segment.event_number = -1;
@@ -154,7 +156,13 @@ bool EventStepper::LocateTouch(const Model<double>& model, double t, double slow
   };
   const ActiveContact* touch = nullptr;
   for (size_t i = 0; i < touching_.contacts.size() && touch == nullptr; ++i) {
-    if (touching_.approach[i] < -slow && !was_closed(touching_.contacts[i])) {
+    // In penetration it does not matter by how much: a gap that changes moves no time.
+    const ActiveContact& candidate = touching_.contacts[i];
+    const bool on_surface =
+        candidate.gap >= (candidate.joint >= 0
+                              ? -kLimitTolerance
+                              : -search_.TouchTolerance(*state, candidate.a, candidate.b));
+    if (touching_.approach[i] < -slow && on_surface && !was_closed(candidate)) {
       touch = &touching_.contacts[i];
     }
   }

@@ -436,11 +436,12 @@ class EventReplay {
       EvaluateJoint(joint.type, after.PoseOf(joint.a), after.PoseOf(joint.b),
                     &model_.numbers[joint.geometry], &joint_rows);
       EvaluateLimitRows(model_, joint_rows, contact, &rows);
-      return rows.geometry.gap;
+    } else {
+      EvaluateContactRows(model_, after, contact, &rows);
     }
-    EvaluateContactRows(model_, after, contact, &rows);
-    return segment->event == EventKind::kTouch
-               ? rows.geometry.gap
+    return segment->event == EventKind::kTouch ? rows.geometry.gap
+           : segment->event == EventKind::kReturn
+               ? RelativeSpeed(after, contact.a, rows.normal_a, contact.b, rows.normal_b)
                : RelativeSpeed(after, contact.a, rows.tangent_a, contact.b, rows.tangent_b);
   }
 

@@ -84,6 +84,8 @@ const char* NameOf(EventKind event) {
       return "start of sliding";
     case EventKind::kLiftOff:
       return "lift-off";
+    case EventKind::kReturn:
+      return "return into penetration";
   }
   return "";
 }

@@ -47,6 +47,7 @@ enum class EventKind : unsigned char {
   kSlipEnds,    ///< a sliding speed reaches 0
   kSlipBegins,  ///< friction reaches its limit
   kLiftOff,     ///< a normal force reaches 0
+  kReturn,      ///< the speed at which an open contact leaves penetration reaches 0
 };
 
 /// "touch", "end of sliding", ...
@@ -56,6 +57,8 @@ const char* NameOf(EventKind event);
 struct Segment {
   double time = 0.0;
   double length = 0.0;
+  /// The instant at which a run starts: what its initial twists approach acts with friction.
+  bool starts = false;
   double middle = 0.0;  ///< the time at which forces and pieces of signals are chosen
   State<double> before, after;
   std::vector<ActiveContact> contacts;  ///< those closed; law kRecovery: pushed out of penetration

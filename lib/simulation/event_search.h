@@ -22,6 +22,9 @@
 
 namespace tangible {
 
+/// A joint within this of its limit is at it, rad or m.
+inline constexpr double kLimitTolerance = 1e-10;
+
 class EventSearch {
  public:
   explicit EventSearch(const Model<double>& model);
@@ -61,6 +64,9 @@ class EventSearch {
   void TakeMotion(Sample* sample, Segment* segment);
   void FindPairs(const Model<double>& model);
   void SearchPair(const Model<double>& model, int a, int b, Event* event);
+  // When a contact that opens out of penetration approaches again, if it has not left by then.
+  void SearchReturn(const Model<double>& model, const ActiveContact& contact, double touch,
+                    Event* event);
   void SearchLimit(const Model<double>& model, int joint, double side, Event* event);
   /// The first crossing of gap from above 0 within [from, to]; rate_over(a, b) bounds how fast it
   /// closes between; course_over(a, gap(a), b, gap(b)) is what is known of it beyond that. To

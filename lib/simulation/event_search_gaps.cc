@@ -10,6 +10,9 @@
 namespace tangible {
 namespace {
 
+// Of the tolerance within which a contact touches: one that lies deeper is in penetration. Bounces
+// that do not leave the tolerance sink by it, each time.
+constexpr double kDeep = 1000.0;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 bool OfPair(const ActiveContact& contact, int a, int b) {
@@ -21,11 +24,28 @@ bool Contains(const std::vector<ActiveContact>& contacts, const ActiveContact& c
                      [&](const ActiveContact& c) { return c.SameAs(contact); });
 }
 
+// The gap of a contact or limit, and the speed at which it grows.
+double GapAndSpeed(const Model<double>& model, const State<double>& state,
+                   const ActiveContact& contact, double* speed) {
+  ContactRows<double> rows;
+  if (contact.joint >= 0) {
+    const JointIndex& joint = model.structure->joints[contact.joint];
+    JointRows<double> joint_rows;
+    EvaluateJoint(joint.type, state.PoseOf(joint.a), state.PoseOf(joint.b),
+                  &model.numbers[joint.geometry], &joint_rows);
+    EvaluateLimitRows(model, joint_rows, contact, &rows);
+  } else {
+    EvaluateContactRows(model, state, contact, &rows);
+  }
+  *speed = RelativeSpeed(state, contact.a, rows.normal_a, contact.b, rows.normal_b);
+  return rows.geometry.gap;
+}
+
 double NormalSpeed(const Model<double>& model, const State<double>& state,
                    const ActiveContact& contact) {
-  ContactRows<double> rows;
-  EvaluateContactRows(model, state, contact, &rows);
-  return RelativeSpeed(state, contact.a, rows.normal_a, contact.b, rows.normal_b);
+  double speed;
+  GapAndSpeed(model, state, contact, &speed);
+  return speed;
 }
 
 }  // namespace
@@ -68,12 +88,17 @@ void EventSearch::SearchPair(const Model<double>& model, int a, int b, Event* ev
     closed = closed || OfPair(contact, a, b);
   }
   const double touch = TouchTolerance(segment_->before, a, b);
+  const auto is_deep = [&](const ActiveContact& c) {
+    return std::any_of(touching_->begin(), touching_->end(), [&](const ActiveContact& other) {
+      return other.gap < -kDeep * touch && other.SameAs(c);
+    });
+  };
   const double slow = SpeedTolerance(model, segment_->before);
   ActiveContact nearest;
   Vector2<double> normal(0.0, 0.0);
   bool on_face = false;  // the normal belongs to a body's face, not to the line between two points
   // The smallest gap of the pair's contacts that are not closed; those that touch and leave count
-  // only if `all`.
+  // only if `all`, and never where they are in penetration: they return by their speed.
   const auto gap = [&](const Sample& sample, bool all) {
     if (!sample.good) {
       return std::numeric_limits<double>::quiet_NaN();
@@ -92,7 +117,7 @@ void EventSearch::SearchPair(const Model<double>& model, int a, int b, Event* ev
       ContactRows<double> rows;
       EvaluateContactRows(model, state, contact, &rows);
       if (rows.geometry.gap < smallest && !is_closed(contact) &&
-          (all || !Contains(*touching_, contact))) {
+          (all ? !is_deep(contact) : !Contains(*touching_, contact))) {
         smallest = rows.geometry.gap;
         nearest = contact;
         nearest.gap = smallest;
@@ -193,6 +218,9 @@ void EventSearch::SearchPair(const Model<double>& model, int a, int b, Event* ev
   double allowed = touch;
   for (const ActiveContact& contact : *touching_) {
     if (OfPair(contact, a, b) && !is_closed(contact)) {
+      if (contact.gap < -kDeep * touch) {
+        SearchReturn(model, contact, touch, event);
+      }
       const Sample& end = *At(model, event->length);
       const double speed = NormalSpeed(model, segment_->before, contact);
       const double change =
@@ -238,6 +266,43 @@ void EventSearch::SearchPair(const Model<double>& model, int a, int b, Event* ev
   }
 }
 
+void EventSearch::SearchReturn(const Model<double>& model, const ActiveContact& contact,
+                               double touch, Event* event) {
+  const double length = event->length;
+  // Above 0 while it separates or has left: a length, with the speed times that of the segment.
+  const auto apart = [&](const Sample& sample) {
+    if (!sample.good) {
+      return std::numeric_limits<double>::quiet_NaN();
+    }
+    double speed;
+    const double gap = GapAndSpeed(model, sample.motion.after, contact, &speed);
+    return std::max(gap, length * speed);
+  };
+  const double tolerance = length * SpeedTolerance(model, segment_->before);
+  double a = 0.0;
+  double fa = length * NormalSpeed(model, segment_->before, contact);
+  for (const double share : {0.125, 0.25, 0.5, 1.0}) {
+    const double b = share * length;
+    const double fb = apart(*At(model, b));
+    if (std::isnan(fb)) {
+      return;
+    }
+    if (fa > tolerance && fb < -tolerance) {
+      const double root = Refine(
+          model, apart, std::min(8.0 * std::numeric_limits<double>::epsilon() * fa, GapTolerance()),
+          a, fa, b, fb);
+      double speed;
+      const double gap = GapAndSpeed(model, At(model, root)->motion.after, contact, &speed);
+      event->kind = gap < -touch ? EventKind::kReturn : EventKind::kTouch;
+      event->length = root;
+      event->contact = contact;
+      return;
+    }
+    a = b;
+    fa = std::max(fb, 0.0);
+  }
+}
+
 void EventSearch::SearchLimit(const Model<double>& model, int joint, double side, Event* event) {
   ActiveContact limit;
   limit.a = model.structure->joints[joint].a;
@@ -249,14 +314,7 @@ void EventSearch::SearchLimit(const Model<double>& model, int joint, double side
     return;
   }
   const auto evaluate = [&](const State<double>& state, double* rate) {
-    const JointIndex& index = model.structure->joints[joint];
-    JointRows<double> joint_rows;
-    EvaluateJoint(index.type, state.PoseOf(index.a), state.PoseOf(index.b),
-                  &model.numbers[index.geometry], &joint_rows);
-    ContactRows<double> rows;
-    EvaluateLimitRows(model, joint_rows, limit, &rows);
-    *rate = RelativeSpeed(state, limit.a, rows.normal_a, limit.b, rows.normal_b);
-    return rows.geometry.gap;
+    return GapAndSpeed(model, state, limit, rate);
   };
   double rate_before, rate_after;
   evaluate(segment_->before, &rate_before);
@@ -269,11 +327,15 @@ void EventSearch::SearchLimit(const Model<double>& model, int joint, double side
   double from = 0.0;
   double allowed = 0.0;
   for (const ActiveContact& contact : *touching_) {
-    if (contact.SameAs(limit)) {
-      from =
-          TouchStart(model, rate_before, 2.0 * std::abs(rate_after - rate_before) / event->length);
-      allowed = std::max(1e-10, 1e-10 - contact.gap);
+    if (!contact.SameAs(limit)) {
+      continue;
     }
+    if (contact.gap < -kDeep * kLimitTolerance) {
+      SearchReturn(model, limit, kLimitTolerance, event);
+      return;
+    }
+    from = TouchStart(model, rate_before, 2.0 * std::abs(rate_after - rate_before) / event->length);
+    allowed = std::max(kLimitTolerance, kLimitTolerance - contact.gap);
   }
   const double rate = 1.1 * std::max(std::abs(rate_before), std::abs(rate_after)) +
                       0.25 * std::abs(rate_after - rate_before);

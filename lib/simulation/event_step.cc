@@ -164,7 +164,6 @@ void EventStepper::FindTouching(const Model<double>& model, const State<double>&
       ContactRows<double> rows;
       EvaluateLimitRows(model, joint_rows, limit, &rows);
       limit.gap = rows.geometry.gap;
-      constexpr double kLimitTolerance = 1e-10;  // rad or m
       if (limit.gap <= kLimitTolerance) {
         touching_.contacts.push_back(limit);
         touching_.friction.emplace_back();
@@ -445,6 +444,7 @@ EventOutcome EventStepper::Step(const Model<double>& model, double t, double h,
     Segment& segment = part->segment;
     segment.time = now;
     segment.length = until - now;
+    segment.starts = false;
     segment.middle = middle;
     segment.before = *state;
     segment.event_number = -1;

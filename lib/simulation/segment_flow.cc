@@ -362,7 +362,8 @@ void SetUpProjection(const Segment& segment, const State<double>& state, Impulse
   projection->solution.modes = segment.modes;
   for (size_t i = 0; i < segment.contacts.size(); ++i) {
     projection->contacts[i].law = ContactLaw::kInelastic;
-    if (segment.modes[i] != ContactMode::kSticking) {
+    const bool slides = SlidingSign(segment.modes[i]) != 0.0;
+    if (segment.modes[i] != ContactMode::kSticking && !(slides && segment.starts)) {
       projection->friction[i] = CoefficientSource();
       projection->solution.modes[i] = ContactMode::kClosed;
     }
@@ -385,8 +386,19 @@ bool SegmentFlow::ProjectTwists(const Model<double>& model, Segment* segment,
   // that the segment's forces would give.
   constexpr double kMissed = 1e-6;
   SizesOfTerms(segment->stages[segment->num_stages - 1], &terms_);
+  // Where no force acts a body's angular velocity may be the rounding of its speed.
+  constexpr double kRounding = 1e-6;  // of the terms of which kMissed is too much
+  const std::vector<double>& mass = projection.problem.mass;
+  const std::vector<double>& v = projection.solution.v;
+  const auto lever = [&](size_t block) { return std::sqrt(mass[3 * block + 2] / mass[3 * block]); };
+  double fastest = 0.0;
+  for (size_t block = 0; 3 * block < v.size(); ++block) {
+    fastest = std::max({fastest, std::abs(v[3 * block]), std::abs(v[3 * block + 1]),
+                        std::abs(v[3 * block + 2]) * lever(block)});
+  }
   for (size_t k = 0; k < terms_.size(); ++k) {
-    terms_[k] = segment->length * terms_[k] + std::abs(projection.solution.v[k]);
+    const double speed = k % 3 == 2 ? fastest / lever(k / 3) : fastest;
+    terms_[k] = segment->length * terms_[k] + std::abs(v[k]) + kRounding * speed;
   }
   const int joint =
       segment->length > 0.0

@@ -65,7 +65,7 @@ class SegmentFlow {
 };
 
 /// Sets a segment's twist projection up at a state: its contacts without rebound, those that slide
-/// without friction.
+/// without friction (with it as a run starts: a twist that approaches there lands).
 void SetUpProjection(const Segment& segment, const State<double>& state, Impulses* projection);
 
 /// Assembles impulses at their state, of length h (0: an impact).

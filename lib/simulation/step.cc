@@ -234,45 +234,46 @@ ContactMode Stepper::InitialMode(const ContactBlock<double>& contact) const {
   return tangent > 0.0 ? ContactMode::kSlidingPositive : ContactMode::kSlidingNegative;
 }
 
-void Stepper::CarryGuess(const Model<double>& model) {
+void Stepper::CarryGuess(const Model<double>& model, const std::vector<ActiveContact>& contacts,
+                         const ContactSolution<double>& solution, Guess from_where) {
   ContactSolution<double>& guess = record_.solution;
   const size_t n = record_.contacts.size();
   guess.modes.resize(n);
   guess.normal_impulse.assign(n, 0.0);
   guess.tangent_impulse.assign(n, 0.0);
   guess.joint_impulse.assign(3 * model.structure->joints.size(), 0.0);
-  if (last_solution_.joint_impulse.size() == guess.joint_impulse.size()) {
-    guess.joint_impulse.assign(last_solution_.joint_impulse.begin(),
-                               last_solution_.joint_impulse.end());
+  if (solution.joint_impulse.size() == guess.joint_impulse.size()) {
+    guess.joint_impulse.assign(solution.joint_impulse.begin(), solution.joint_impulse.end());
   }
   // Both lists are in the same order, so one pass finds the common ones; a list whose order differs
   // (a limit) is searched from where the last one was found.
   size_t from = 0;
   for (size_t i = 0; i < n; ++i) {
     const ContactBlock<double>& block = record_.problem.contacts[i];
-    size_t found = last_contacts_.size();
-    for (size_t step = 0; step < last_contacts_.size(); ++step) {
-      const size_t k = (from + step) % last_contacts_.size();
-      if (last_contacts_[k].SameAs(record_.contacts[i])) {
+    size_t found = contacts.size();
+    for (size_t step = 0; step < contacts.size(); ++step) {
+      const size_t k = (from + step) % contacts.size();
+      if (contacts[k].SameAs(record_.contacts[i])) {
         found = k;
         break;
       }
-      if (last_contacts_[k].a > record_.contacts[i].a && step > 0 && k > from) {
+      if (contacts[k].a > record_.contacts[i].a && step > 0 && k > from) {
         break;
       }
     }
-    if (found == last_contacts_.size()) {
-      guess.modes[i] = InitialMode(block);
+    if (found == contacts.size()) {
+      guess.modes[i] = from_where == Guess::kSameStep ? ContactMode::kOpen : InitialMode(block);
       continue;
     }
     from = found;
-    const ContactMode last = last_solution_.modes[found];
+    const ContactMode last = solution.modes[found];
     // Friction may have become 0 or more than 0 with other numbers.
     const bool fits =
         last == ContactMode::kOpen || (last == ContactMode::kClosed) == !block.has_friction;
-    guess.modes[i] = last == ContactMode::kOpen || !fits ? InitialMode(block) : last;
-    guess.normal_impulse[i] = last_solution_.normal_impulse[found];
-    guess.tangent_impulse[i] = last_solution_.tangent_impulse[found];
+    const bool keeps = from_where == Guess::kSameStep || (last != ContactMode::kOpen && fits);
+    guess.modes[i] = keeps ? last : InitialMode(block);
+    guess.normal_impulse[i] = solution.normal_impulse[found];
+    guess.tangent_impulse[i] = solution.tangent_impulse[found];
   }
 }
 
@@ -392,8 +393,16 @@ StepReport Stepper::Step(const Model<double>& model, double t, double h, State<d
   search_.Find(model, *state, h, scratch_, &r.contacts, &r.friction, &r.restitution);
   for (int search = 0; search < kMaxSearches; ++search) {
     AssembleContacts(model, *state, h, r.contacts, r.friction, r.restitution, scratch_, &r.problem);
-    CarryGuess(model);
+    if (search == 0) {
+      CarryGuess(model, last_contacts_, last_solution_, Guess::kLastStep);
+    } else {
+      // What was found with fewer contacts, and the further ones open: often that is the solution.
+      CarryGuess(model, wider_contacts_, narrow_solution_, Guess::kSameStep);
+    }
+    const ContactSolverReport before = solved;
     solved = SolveContacts(SolverOptions(settings), &report.islands);
+    solved.factorisations += before.factorisations;
+    solved.iterations += before.iterations;
     if (!solved.solved) {
       break;
     }
@@ -407,6 +416,7 @@ StepReport Stepper::Step(const Model<double>& model, double t, double h, State<d
     if (SameContacts(r.contacts, wider_contacts_)) {
       break;
     }
+    narrow_solution_ = r.solution;
     r.contacts.swap(wider_contacts_);
     r.friction.swap(wider_friction_);
     r.restitution.swap(wider_restitution_);

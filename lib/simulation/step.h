@@ -113,7 +113,11 @@ class Stepper {
  private:
   StepReport StepByEvents(const Model<double>& model, double t, double h, State<double>* state);
   void SumImpulses(const Model<double>& model);
-  void CarryGuess(const Model<double>& model);
+  enum class Guess { kLastStep, kSameStep };
+  // The modes and impulses from which this problem's solution is sought: those of `solution` for
+  // the contacts that it has too.
+  void CarryGuess(const Model<double>& model, const std::vector<ActiveContact>& contacts,
+                  const ContactSolution<double>& solution, Guess from_where);
   ContactSolverReport SolveContacts(const ContactSolverOptions& options, int* islands);
   ContactMode InitialMode(const ContactBlock<double>& contact) const;
   ContactSolverOptions SolverOptions(const SimulationSettings& settings) const;
@@ -133,7 +137,8 @@ class Stepper {
   // The last step's contacts and impulses: the guess.
   std::vector<ActiveContact> last_contacts_;
   ContactSolution<double> last_solution_;
-  std::vector<ActiveContact> wider_contacts_;
+  std::vector<ActiveContact> wider_contacts_;  // of a wider search, or (swapped) a narrower one
+  ContactSolution<double> narrow_solution_;
   std::vector<CoefficientSource> wider_friction_, wider_restitution_;
 };
 

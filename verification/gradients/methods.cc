@@ -85,7 +85,11 @@ class MethodRun {
       r_.jacobian[method].setConstant(rows, columns, kUnknown);
     }
     for (Eigen::Index k = 0; k < columns; ++k) {
-      DifferenceColumn column = FiniteDifferences(scene_, r_.trace, noise, parameters_[k]);
+      // What the certificate has named need not be told apart from what is smooth.
+      DifferenceColumn column =
+          FiniteDifferences(scene_, r_.trace, noise, parameters_[k],
+                            r_.named[static_cast<size_t>(k)].empty() ? ChoicesDiffer::kCompareSides
+                                                                     : ChoicesDiffer::kGiveUp);
       if (column.status == DifferenceStatus::kJudged) {
         r_.jacobian[kByRidders].col(k) = column.values;
       }

@@ -16,7 +16,7 @@ class Differences {
  public:
   Differences(const Scene& scene, const RunTrace& at, const VectorX<double>& noise,
               const ParameterPath& parameter)
-      : scene_(scene), at_(at), noise_(noise), parameter_(parameter) {
+      : scene_(scene), at_(at), noise_(noise), parameter_(parameter), choices_(&at) {
     // Scenes are of the size of 1 in SI units, which the scale of a large floor is not.
     scale_ = std::max(std::abs(parameter.value), std::min(parameter.scale, 1.0));
     Scene copy = scene;
@@ -27,18 +27,41 @@ class Differences {
     side_ = low_end_ ? 1.0 : high_end_ ? -1.0 : 0.0;
   }
 
-  DifferenceColumn Compute() {
+  DifferenceColumn Compute(ChoicesDiffer choices_differ) {
     DifferenceColumn column;
     if (low_end_ && high_end_) {
       column.where = "its numbers are at both ends of their range";
       return column;
     }
     AddNoiseOfParameter();
+    BestTable(&column);
+    if (column.status == DifferenceStatus::kChoicesDiffer && side_ == 0.0 &&
+        choices_differ == ChoicesDiffer::kCompareSides) {
+      CompareSides(&column);
+    }
+    for (size_t k = 0; k < 2; ++k) {
+      column.plain[k] = Plain(Bounded(kPlainSteps[k]));
+    }
+    return column;
+  }
+
+ private:
+  static constexpr double kLargest = 1e-3;
+  static constexpr double kSmallest = 1e-8;  // of the largest
+  static constexpr int kSteps = 4;
+  static constexpr int kMostTables = 4;
+  static constexpr double kConverged = 1e-6;  // of the column's largest
+  static constexpr double kRatio = 2.0;
+  static constexpr double kSidesAgree = 1e-5;
+
+  void BestTable(DifferenceColumn* best) {
+    DifferenceColumn& column = *best;
     const double first = Bounded(kLargest);
     int tables = 0;
     for (double h = first; h > kSmallest * first && tables < kMostTables; h *= 0.125) {
       DifferenceColumn next;
       next.step = h;
+      ForgetSide();
       next.status = Table(h, &next);
       if (next.status != DifferenceStatus::kJudged) {
         if (tables == 0) {
@@ -56,19 +79,35 @@ class Differences {
         break;
       }
     }
-    for (size_t k = 0; k < 2; ++k) {
-      column.plain[k] = Plain(Bounded(kPlainSteps[k]));
-    }
-    return column;
   }
 
- private:
-  static constexpr double kLargest = 1e-3;
-  static constexpr double kSmallest = 1e-8;  // of the largest
-  static constexpr int kSteps = 4;
-  static constexpr int kMostTables = 4;
-  static constexpr double kConverged = 1e-6;  // of the column's largest
-  static constexpr double kRatio = 2.0;
+  // On each side runs are compared with each other, and their values with that at the parameter.
+  void CompareSides(DifferenceColumn* column) {
+    DifferenceColumn sides[2];
+    apart_ = true;
+    for (const int k : {0, 1}) {
+      side_ = k == 0 ? 1.0 : -1.0;
+      BestTable(&sides[k]);
+    }
+    side_ = 0.0;
+    apart_ = false;
+    choices_ = &at_;
+    if (sides[0].status != DifferenceStatus::kJudged ||
+        sides[1].status != DifferenceStatus::kJudged) {
+      return;
+    }
+    const VectorX<double> apart = (sides[0].values - sides[1].values).cwiseAbs();
+    const VectorX<double> size = sides[0].values.cwiseAbs().cwiseMax(sides[1].values.cwiseAbs());
+    const VectorX<double> errors = sides[0].errors + sides[1].errors;
+    if (((apart - errors).array() > kSidesAgree * size.maxCoeff()).any()) {
+      return;
+    }
+    *column = std::move(sides[0]);
+    column->values = 0.5 * (column->values + sides[1].values);
+    column->errors = errors + apart;
+  }
+
+  void ForgetSide() { choices_ = apart_ ? nullptr : &at_; }
 
   double Bounded(double relative) const { return std::min(relative * scale_, room_); }
 
@@ -94,15 +133,21 @@ class Differences {
     for (const int number : parameter_.numbers) {
       *numbers[number].value += change;
     }
-    const RunTrace trace = TraceRun(scene);
+    RunTrace trace = TraceRun(scene);
     if (!trace.done) {
       where_ = trace.message;
       return DifferenceStatus::kRunFailed;
     }
+    if (choices_ == nullptr) {
+      *values = trace.values;
+      of_side_ = std::move(trace);
+      choices_ = &of_side_;
+      return DifferenceStatus::kJudged;
+    }
     const FrictionAtZero friction =
         side_ != 0.0 ? FrictionAtZero::kMaySlide : FrictionAtZero::kDistinct;
     *values = trace.values;
-    std::string difference = FirstDifference(at_, trace, friction);
+    std::string difference = FirstDifference(*choices_, trace, friction);
     if (difference.empty()) {
       return DifferenceStatus::kJudged;
     }
@@ -214,6 +259,9 @@ class Differences {
   bool low_end_ = false, high_end_ = false;  // at the end of its range
   double side_ = 0.0;                        // 0: central; else the only side that is allowed
   std::string where_;                        // the runs of the last pair that differed
+  const RunTrace* choices_;                  // those that runs must make; null: of the next run
+  bool apart_ = false;                       // each side is a function of its own
+  RunTrace of_side_;
 };
 
 }  // namespace
@@ -269,8 +317,9 @@ VectorX<double> RoundingNoise(const Scene& scene, const RunTrace& at) {
 }
 
 DifferenceColumn FiniteDifferences(const Scene& scene, const RunTrace& at,
-                                   const VectorX<double>& noise, const ParameterPath& parameter) {
-  return Differences(scene, at, noise, parameter).Compute();
+                                   const VectorX<double>& noise, const ParameterPath& parameter,
+                                   ChoicesDiffer choices_differ) {
+  return Differences(scene, at, noise, parameter).Compute(choices_differ);
 }
 
 }  // namespace tangible

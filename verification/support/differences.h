@@ -40,12 +40,22 @@ struct DifferenceColumn {
   PlainDifference plain[2];
 };
 
+/// What to do where runs on both sides never make the same choices.
+enum class ChoicesDiffer {
+  kGiveUp,
+  /// Differences of each side alone (a body at rest that is thrown up falls down again, and lands
+  /// with what it would else have carried): judged where both sides agree to
+  /// 1e-5 of the largest.
+  kCompareSides,
+};
+
 /// Differences with respect to one parameter, extrapolated over four steps from the largest (at
 /// most 1e-3 of its scale, down to 1e-11 of it) at which the runs on both sides make the choices of
 /// the run at its value (Ridders: C. J. F. Ridders, Adv. Eng. Software 4 (1982) 75); one-sided at 0
 /// of friction, restitution, damping and the like, and at restitution 1. `noise` as RoundingNoise
 /// has it is part of the estimated error.
 DifferenceColumn FiniteDifferences(const Scene& scene, const RunTrace& at,
-                                   const VectorX<double>& noise, const ParameterPath& parameter);
+                                   const VectorX<double>& noise, const ParameterPath& parameter,
+                                   ChoicesDiffer choices_differ = ChoicesDiffer::kGiveUp);
 
 }  // namespace tangible
