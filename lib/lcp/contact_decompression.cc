@@ -4,24 +4,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tangible/lcp/contact_mode_change.h"
+
 namespace tangible {
 namespace {
 
 constexpr int kMaxRounds = 20;
-// Violations below this fraction of a row's scale are rounding.
-constexpr double kModeTolerance = 1e-12;
-
-// The mode of a contact that begins to push: as if it met this contact alone.
-ContactMode ModeOfClosing(const ContactBlock<double>& contact, const ContactValues& values) {
-  if (!contact.has_friction) {
-    return ContactMode::kClosed;
-  }
-  const double needed = std::abs(values.slip) / values.mobility_t;
-  const double available = contact.friction * -values.s_n / values.mobility_n;
-  return needed <= available ? ContactMode::kSticking
-         : values.slip > 0.0 ? ContactMode::kSlidingPositive
-                             : ContactMode::kSlidingNegative;
-}
 
 // Changes a mode that the solution contradicts; whether it did.
 bool ChangeMode(const ContactValues& values, double normal, double tangent, double impulse_scale,

@@ -4,14 +4,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tangible/lcp/contact_mode_change.h"
+
 namespace tangible {
 namespace {
 
-// Violations below this fraction of a row's scale are rounding.
-constexpr double kModeTolerance = 1e-12;
-// A contact that rests at the limit of friction slides at speeds of either sign, of the size of its
-// rounding: there it keeps its mode, within this fraction of the residual asked for.
-constexpr double kSlipOfTolerance = 0.3;
 constexpr int kMaxRounds = 20;
 // Where more are contradicted than in the round before, and more than a few, they will not settle.
 constexpr int kFewContradicted = 2;
@@ -24,93 +21,10 @@ constexpr int kPivotsFromOpen = 20;
 constexpr double kFirstRegularisation = 1e-7;
 constexpr double kLeastRegularisation = 1e-8;
 constexpr int kMaxProximalRounds = 40;
-constexpr double kMaxExtrapolation = 1e6;
 // Complementarities after which the polish is tried; rounding may stop the iteration for one step.
 constexpr double kInteriorPointGoals[] = {1e-10, 1e-14, 1e-18, 1e-22, 1e-26, 1e-26, 1e-26, 1e-26};
 // A contact whose mode has been changed this often changes alone, the worst one first.
 constexpr int kMaxChangesTogether = 3;
-
-// The mode that a contact should have where its present one is contradicted, and by how much
-// (relative).
-struct ModeChange {
-  ContactMode mode;
-  double violation = 0.0;
-};
-
-ModeChange Contradiction(const ContactBlock<double>& contact, const ContactValues& values,
-                         ContactMode mode, double normal, double tangent, double impulse_scale,
-                         double tolerance) {
-  const double zeta = std::max(impulse_scale, values.sigma_n / values.mobility_n);
-  ModeChange change{mode};
-  if (mode == ContactMode::kOpen) {
-    if (values.s_n < -kModeTolerance * values.sigma_n) {
-      change.violation = -values.s_n / values.sigma_n;
-      // Would it stick if it met this contact alone?
-      const double needed = std::abs(values.slip) / values.mobility_t;
-      const double available = contact.friction * -values.s_n / values.mobility_n;
-      change.mode = !contact.has_friction ? ContactMode::kClosed
-                    : needed <= available ? ContactMode::kSticking
-                    : values.slip > 0.0   ? ContactMode::kSlidingPositive
-                                          : ContactMode::kSlidingNegative;
-    }
-    return change;
-  }
-  if (normal < -kModeTolerance * zeta) {
-    return {ContactMode::kOpen, -normal / zeta};
-  }
-  if (mode == ContactMode::kSticking) {
-    // Slip is what δ leaves of a sticking row; where it should be more (two points of a body that
-    // turns cannot both stick) the impulse outgrows friction.
-    const double excess = std::abs(tangent) - contact.friction * normal;
-    const double scale = std::max(zeta * std::max(1.0, contact.friction), std::abs(tangent));
-    if (excess > kModeTolerance * scale) {
-      change.violation = excess / scale;
-      change.mode = tangent < 0.0 ? ContactMode::kSlidingPositive : ContactMode::kSlidingNegative;
-    }
-  } else if (mode != ContactMode::kClosed) {
-    const double along = SlidingSign(mode) * values.slip;
-    const double rounding =
-        std::min(contact.rounding, kSlipOfTolerance * tolerance * values.sigma_t);
-    if (along < -std::max(kModeTolerance * values.sigma_t, rounding)) {
-      change = {ContactMode::kSticking, -along / values.sigma_t};
-    }
-  }
-  return change;
-}
-
-// Moves the impulses on along their last change, from `before`, a little beyond where the first of
-// them meets its limit.
-void ExtrapolateImpulses(const ContactProblem<double>& problem,
-                         const ContactSolution<double>& before, ContactSolution<double>* solution) {
-  double factor = kMaxExtrapolation;
-  const auto limit = [&](double value, double last) {
-    if (value > 0.0 && value < last) {
-      factor = std::min(factor, value / (last - value));
-    }
-  };
-  for (size_t i = 0; i < problem.contacts.size(); ++i) {
-    const double normal = solution->normal_impulse[i];
-    const double last_normal = before.normal_impulse[i];
-    if (solution->modes[i] == ContactMode::kSticking) {
-      const double mu = problem.contacts[i].friction;
-      const double tangent = solution->tangent_impulse[i];
-      const double last_tangent = before.tangent_impulse[i];
-      limit(mu * normal - tangent, mu * last_normal - last_tangent);
-      limit(mu * normal + tangent, mu * last_normal + last_tangent);
-    } else if (solution->modes[i] != ContactMode::kOpen) {
-      limit(normal, last_normal);
-    }
-  }
-  factor *= 1.0 + 1e-6;
-  const auto move = [&](const std::vector<double>& from, std::vector<double>* to) {
-    for (size_t i = 0; i < to->size(); ++i) {
-      (*to)[i] += factor * ((*to)[i] - from[i]);
-    }
-  };
-  move(before.normal_impulse, &solution->normal_impulse);
-  move(before.tangent_impulse, &solution->tangent_impulse);
-  move(before.joint_impulse, &solution->joint_impulse);
-}
 
 }  // namespace
 
