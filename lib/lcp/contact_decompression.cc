@@ -129,6 +129,13 @@ ContactSolverReport DecompressionSolver::Solve(const ContactSolverOptions& optio
                                                ContactProblem<double>* problem,
                                                ContactSolution<double>* solution) {
   ContactSolverReport report;
+  const int expansions = system_.expansions();
+  const int regularised = system_.regularised_steps();
+  const auto finish = [&] {
+    report.fallbacks.whole_system = system_.expansions() - expansions;
+    report.fallbacks.regularised = system_.regularised_steps() - regularised;
+    return report;
+  };
   problem->pushed_momentum = problem->momentum;
   for (size_t i = 0; i < problem->contacts.size(); ++i) {
     ContactBlock<double>& contact = problem->contacts[i];
@@ -144,8 +151,9 @@ ContactSolverReport DecompressionSolver::Solve(const ContactSolverOptions& optio
   if (SolveByModeChanges(options, problem, solution, &report)) {
     report.solved = true;
     report.solved_by = SolvedBy::kGuess;
-    return report;
+    return finish();
   }
+  ++report.fallbacks.dense;
   if (SolveContactsDense(*problem, options.tolerance, solution, &report.iterations)) {
     for (size_t i = 0; i < problem->contacts.size(); ++i) {
       ContactBlock<double>& contact = problem->contacts[i];
@@ -156,7 +164,7 @@ ContactSolverReport DecompressionSolver::Solve(const ContactSolverOptions& optio
       report.solved_by = SolvedBy::kLemke;
     }
   }
-  return report;
+  return finish();
 }
 
 }  // namespace tangible

@@ -28,6 +28,17 @@ constexpr int kMaxChangesTogether = 3;
 
 }  // namespace
 
+void ContactFallbacks::Add(const ContactFallbacks& other) {
+  pivoting += other.pivoting;
+  interior_point += other.interior_point;
+  lemke += other.lemke;
+  dense += other.dense;
+  extrapolation += other.extrapolation;
+  regularised += other.regularised;
+  whole_system += other.whole_system;
+  islands_together += other.islands_together;
+}
+
 void ContactSolver::Reserve(int num_bodies, int num_joints, int num_contacts) {
   const int blocks = num_bodies + num_joints + num_contacts;
   const int edges = 2 * (num_joints + num_contacts) + num_joints;
@@ -230,6 +241,7 @@ bool ContactSolver::SolveByPivoting(const ContactProblem<double>& problem,
     if (regularisation == kLeastRegularisation && solution->modes == last_.modes &&
         report->residual > 0.5 * last_residual) {
       ExtrapolateImpulses(problem, last_, solution);
+      ++report->fallbacks.extrapolation;
     }
     last_residual = report->residual;
     regularisation = std::max(kLeastRegularisation, 0.1 * regularisation);
@@ -316,6 +328,7 @@ bool ContactSolver::SolveByInteriorPoint(const ContactProblem<double>& problem,
     interior_point.resume = true;
   }
   // Rows that are almost redundant leave modes that only pivots tell apart.
+  ++report->fallbacks.pivoting;
   return SolveByPivoting(problem, options, ContactPivoting::From::kModes,
                          kPivotsFromInteriorPoint * (1 + static_cast<int>(problem.contacts.size())),
                          solution, report);
@@ -352,6 +365,7 @@ bool ContactSolver::SolveByLemke(const ContactProblem<double>& problem,
     }
     return false;
   }
+  ++report->fallbacks.dense;
   const bool dense = SolveContactsDense(problem, options.tolerance, solution, &iterations);
   report->iterations += iterations;
   return dense && Polish(problem, options, solution, report);
@@ -360,6 +374,17 @@ bool ContactSolver::SolveByLemke(const ContactProblem<double>& problem,
 ContactSolverReport ContactSolver::Solve(const ContactProblem<double>& problem,
                                          const ContactSolverOptions& options,
                                          ContactSolution<double>* solution) {
+  const int expansions = system_.expansions();
+  const int regularised = system_.regularised_steps();
+  ContactSolverReport report = RunPortfolio(problem, options, solution);
+  report.fallbacks.whole_system = system_.expansions() - expansions;
+  report.fallbacks.regularised = system_.regularised_steps() - regularised;
+  return report;
+}
+
+ContactSolverReport ContactSolver::RunPortfolio(const ContactProblem<double>& problem,
+                                                const ContactSolverOptions& options,
+                                                ContactSolution<double>* solution) {
   ContactSolverReport report;
   const auto done = [&](SolvedBy by) {
     report.solved = true;
@@ -380,18 +405,20 @@ ContactSolverReport ContactSolver::Solve(const ContactProblem<double>& problem,
   }
   const bool exact = options.smoothing == 0.0;
   entry_ = *solution;
-  if (options.choice == ContactSolverChoice::kAuto && exact &&
-      SolveByModeChanges(problem, options, solution, &report)) {
+  const bool any = options.choice == ContactSolverChoice::kAuto && exact;
+  if (any && SolveByModeChanges(problem, options, solution, &report)) {
     return done(SolvedBy::kGuess);
   }
   const int num_contacts = static_cast<int>(problem.contacts.size());
-  if (options.choice == ContactSolverChoice::kAuto && exact) {
+  if (any) {
     *solution = entry_;
+    ++report.fallbacks.pivoting;
     if (SolveByPivoting(problem, options, ContactPivoting::From::kModes,
                         kPivotsFromGuess + num_contacts / 2, solution, &report)) {
       return done(SolvedBy::kGuess);
     }
     *solution = entry_;
+    ++report.fallbacks.interior_point;
   }
   if (options.choice != ContactSolverChoice::kLemke &&
       SolveByInteriorPoint(problem, options, solution, &report)) {
@@ -399,6 +426,7 @@ ContactSolverReport ContactSolver::Solve(const ContactProblem<double>& problem,
   }
   if (options.choice != ContactSolverChoice::kInteriorPoint && exact) {
     *solution = entry_;
+    report.fallbacks.lemke += any ? 1 : 0;
     if (SolveByPivoting(problem, options, ContactPivoting::From::kOpen,
                         kPivotsFromOpen * (1 + num_contacts), solution, &report)) {
       return done(SolvedBy::kLemke);
