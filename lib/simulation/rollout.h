@@ -25,6 +25,7 @@ struct RolloutReport {
   long pairs_compared = 0;   ///< pairs of boxes that the broad phase compared
   long pairs_near = 0;       ///< pairs whose boxes overlap
   long beyond_reach = 0;     ///< of these, without rows (fixed stepping)
+  int fixed_numbers = 0;     ///< of the model: with a tangent, those that no column varies
   long solved_directly = 0;  ///< steps without an inequality, so without an LCP
   long solved_by_guess = 0;
   long solved_by_interior_point = 0;
