@@ -17,6 +17,32 @@ double Energy(const Model<double>& model, const State<double>& state) {
   return KineticEnergy(model, state) + PotentialEnergy(model, state);
 }
 
+// What the model left out, in all steps.
+OrderedJson ReductionsJson(const RolloutReport& report) {
+  return {{"pairs_compared", report.pairs_compared},
+          {"pairs_near", report.pairs_near},
+          {"beyond_reach", report.beyond_reach},
+          {"contacts", report.contacts},
+          {"lcp_rows", report.lcp_rows},
+          {"single_rows", report.single_rows},
+          {"steps_without_lcp", report.solved_directly}};
+}
+
+OrderedJson FallbacksJson(const RolloutReport& report) {
+  const ContactFallbacks& solver = report.solver;
+  return {{"pivoting", solver.pivoting},
+          {"interior_point", solver.interior_point},
+          {"lemke", solver.lemke},
+          {"dense", solver.dense},
+          {"extrapolation", solver.extrapolation},
+          {"regularised", solver.regularised},
+          {"whole_system", solver.whole_system},
+          {"islands_together", solver.islands_together},
+          {"newton_stages", report.newton_stages},
+          {"halved_motions", report.halved_motions},
+          {"damped_projections", report.damped_projections}};
+}
+
 }  // namespace
 
 const char* ToString(StepStatus status) {
@@ -66,6 +92,8 @@ OrderedJson RunSummary::ToJson(const Model<double>& model, const RolloutReport& 
            {{"guess", report.solved_by_guess},
             {"interior_point", report.solved_by_interior_point},
             {"lemke", report.solved_by_lemke}}},
+          {"fallback_kinds", FallbacksJson(report)},
+          {"reductions", ReductionsJson(report)},
           {"residual_max", report.residual_max},
           {"penetration_max", std::max(penetration, 0.0)},
           {"joint_drift_max", joint_drift_max_},

@@ -142,6 +142,7 @@ void ContactSearch::Find(const Model<double>& model, const State<double>& state,
   }
   broad_phase_.FindPairs(
       boxes_, [&](int i, int j) { return structure.MayCollide(i, j); }, &pairs_);
+  beyond_reach_ = 0;
   for (const auto& [a, b] : pairs_) {
     double reach = settings.contact_margin + h * (bound_[a] + bound_[b]);
     for (const int body : {a, b}) {
@@ -156,6 +157,7 @@ void ContactSearch::Find(const Model<double>& model, const State<double>& state,
     const int count = FindContactFeatures(model.Shape(a), scratch.poses[a], model.Shape(b),
                                           scratch.poses[b], reach, features);
     if (count == 0) {
+      ++beyond_reach_;
       continue;
     }
     const CoefficientSource pair_friction = MixedFriction(model, a, b);

@@ -30,8 +30,11 @@ class ContactSearch {
   void Find(const Model<double>& model, const State<double>& state, double h,
             const AssemblyScratch<double>& scratch, std::vector<ActiveContact>* contacts,
             std::vector<CoefficientSource>* friction, std::vector<CoefficientSource>* restitution);
-  /// How many pairs passed the broad phase in the last search.
+  /// Of the last search: how many pairs of boxes the broad phase compared, how many pairs it let
+  /// pass, and how many of these have no row as they are beyond reach.
+  int num_compared() const { return broad_phase_.num_compared(); }
   int num_pairs() const { return static_cast<int>(pairs_.size()); }
+  int num_beyond_reach() const { return beyond_reach_; }
 
  private:
   void FindLimits(const Model<double>& model, double h, const AssemblyScratch<double>& scratch,
@@ -44,6 +47,7 @@ class ContactSearch {
   std::vector<std::pair<int, int>> pairs_;
   std::vector<double> free_twist_;
   BroadPhase broad_phase_;
+  int beyond_reach_ = 0;
 };
 
 }  // namespace tangible

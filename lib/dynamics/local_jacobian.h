@@ -22,12 +22,16 @@
 namespace tangible {
 
 /// Accumulates rhs(row, :) −= value w_dot(variable, :); both row-major with the same number of
-/// columns.
+/// columns. Variables that are known not to vary may be marked in `fixed`.
 struct TangentSink {
   const double* w_dot;
   double* rhs;
   int columns;
+  const char* fixed = nullptr;
   void operator()(int row, int variable, double value) const {
+    if (fixed != nullptr && fixed[variable] != 0) {
+      return;
+    }
     const double* from = w_dot + static_cast<size_t>(variable) * columns;
     double* to = rhs + static_cast<size_t>(row) * columns;
     for (int c = 0; c < columns; ++c) {

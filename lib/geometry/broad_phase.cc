@@ -123,9 +123,11 @@ void BroadPhase::SortOverlaps(int num_boxes) {
 void BroadPhase::SortAndSweep(const std::vector<Aabb>& boxes) {
   Sort(boxes);
   found_.clear();
+  num_compared_ = 0;
   for (std::size_t k = 0; k < entries_.size(); ++k) {
     const Entry entry = entries_[k];
-    for (std::size_t l = k + 1; l < entries_.size(); ++l) {
+    std::size_t l = k + 1;
+    for (; l < entries_.size(); ++l) {
       const Entry& other = entries_[l];
       if (!(other.box.min_x <= entry.box.max_x)) {
         break;
@@ -136,6 +138,7 @@ void BroadPhase::SortAndSweep(const std::vector<Aabb>& boxes) {
         found_.emplace_back(std::min(entry.index, other.index), std::max(entry.index, other.index));
       }
     }
+    num_compared_ += static_cast<int>(l - k - 1);
   }
   // Ascending, so that what follows does not depend on how the bodies moved before.
   SortOverlaps(static_cast<int>(boxes.size()));

@@ -28,6 +28,8 @@ class BroadPhase {
   template <typename Allowed>
   void FindPairs(const std::vector<Aabb>& boxes, Allowed&& allowed,
                  std::vector<std::pair<int, int>>* pairs);
+  /// How many pairs of boxes the last sweep compared; all pairs of n are n (n − 1) / 2.
+  int num_compared() const { return num_compared_; }
 
  private:
   struct Entry {
@@ -39,6 +41,7 @@ class BroadPhase {
   void Sort(const std::vector<Aabb>& boxes);
   void SortOverlaps(int num_boxes);
 
+  int num_compared_ = 0;
   bool along_y_ = false;        ///< the axis that is swept; entries have their x along it
   std::vector<Entry> entries_;  ///< by min_x, in the order of the last call
   std::vector<std::pair<int, int>> found_;

@@ -4,24 +4,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tangible/lcp/contact_mode_change.h"
+
 namespace tangible {
 namespace {
 
 constexpr int kMaxRounds = 20;
-// Violations below this fraction of a row's scale are rounding.
-constexpr double kModeTolerance = 1e-12;
-
-// The mode of a contact that begins to push: as if it met this contact alone.
-ContactMode ModeOfClosing(const ContactBlock<double>& contact, const ContactValues& values) {
-  if (!contact.has_friction) {
-    return ContactMode::kClosed;
-  }
-  const double needed = std::abs(values.slip) / values.mobility_t;
-  const double available = contact.friction * -values.s_n / values.mobility_n;
-  return needed <= available ? ContactMode::kSticking
-         : values.slip > 0.0 ? ContactMode::kSlidingPositive
-                             : ContactMode::kSlidingNegative;
-}
 
 // Changes a mode that the solution contradicts; whether it did.
 bool ChangeMode(const ContactValues& values, double normal, double tangent, double impulse_scale,
@@ -141,6 +129,13 @@ ContactSolverReport DecompressionSolver::Solve(const ContactSolverOptions& optio
                                                ContactProblem<double>* problem,
                                                ContactSolution<double>* solution) {
   ContactSolverReport report;
+  const int expansions = system_.expansions();
+  const int regularised = system_.regularised_steps();
+  const auto finish = [&] {
+    report.fallbacks.whole_system = system_.expansions() - expansions;
+    report.fallbacks.regularised = system_.regularised_steps() - regularised;
+    return report;
+  };
   problem->pushed_momentum = problem->momentum;
   for (size_t i = 0; i < problem->contacts.size(); ++i) {
     ContactBlock<double>& contact = problem->contacts[i];
@@ -156,8 +151,9 @@ ContactSolverReport DecompressionSolver::Solve(const ContactSolverOptions& optio
   if (SolveByModeChanges(options, problem, solution, &report)) {
     report.solved = true;
     report.solved_by = SolvedBy::kGuess;
-    return report;
+    return finish();
   }
+  ++report.fallbacks.dense;
   if (SolveContactsDense(*problem, options.tolerance, solution, &report.iterations)) {
     for (size_t i = 0; i < problem->contacts.size(); ++i) {
       ContactBlock<double>& contact = problem->contacts[i];
@@ -168,7 +164,7 @@ ContactSolverReport DecompressionSolver::Solve(const ContactSolverOptions& optio
       report.solved_by = SolvedBy::kLemke;
     }
   }
-  return report;
+  return finish();
 }
 
 }  // namespace tangible

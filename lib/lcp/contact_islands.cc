@@ -202,6 +202,7 @@ bool IslandSolver::Solve(const ContactProblem<double>& problem, const ContactSol
     report->solved_by = std::max(report->solved_by, of.solved_by);
     report->factorisations = std::max(report->factorisations, of.factorisations);
     report->iterations = std::max(report->iterations, of.iterations);
+    report->fallbacks.Add(of.fallbacks);
     if (of.residual > report->residual) {
       report->residual = of.residual;
       report->worst_contact = of.worst_contact < 0 ? -1 : island->contacts[of.worst_contact];

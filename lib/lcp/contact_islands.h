@@ -25,8 +25,8 @@ class IslandSolver {
   int Partition(const ContactProblem<double>& problem);
   int count() const { return count_; }
   /// Of the last partition: solves every island. `solution` holds the guess on entry. The report's
-  /// factorisations and iterations are those of the island that took the most. False where an
-  /// island is not solved; `solution` is then what it was.
+  /// factorisations and iterations are those of the island that took the most, its fallbacks those
+  /// of all. False where an island is not solved; `solution` is then what it was.
   bool Solve(const ContactProblem<double>& problem, const ContactSolverOptions& options,
              ContactSolution<double>* solution, ContactSolverReport* report);
 

@@ -4,14 +4,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tangible/lcp/contact_mode_change.h"
+
 namespace tangible {
 namespace {
 
-// Violations below this fraction of a row's scale are rounding.
-constexpr double kModeTolerance = 1e-12;
-// A contact that rests at the limit of friction slides at speeds of either sign, of the size of its
-// rounding: there it keeps its mode, within this fraction of the residual asked for.
-constexpr double kSlipOfTolerance = 0.3;
 constexpr int kMaxRounds = 20;
 // Where more are contradicted than in the round before, and more than a few, they will not settle.
 constexpr int kFewContradicted = 2;
@@ -24,95 +21,23 @@ constexpr int kPivotsFromOpen = 20;
 constexpr double kFirstRegularisation = 1e-7;
 constexpr double kLeastRegularisation = 1e-8;
 constexpr int kMaxProximalRounds = 40;
-constexpr double kMaxExtrapolation = 1e6;
 // Complementarities after which the polish is tried; rounding may stop the iteration for one step.
 constexpr double kInteriorPointGoals[] = {1e-10, 1e-14, 1e-18, 1e-22, 1e-26, 1e-26, 1e-26, 1e-26};
 // A contact whose mode has been changed this often changes alone, the worst one first.
 constexpr int kMaxChangesTogether = 3;
 
-// The mode that a contact should have where its present one is contradicted, and by how much
-// (relative).
-struct ModeChange {
-  ContactMode mode;
-  double violation = 0.0;
-};
-
-ModeChange Contradiction(const ContactBlock<double>& contact, const ContactValues& values,
-                         ContactMode mode, double normal, double tangent, double impulse_scale,
-                         double tolerance) {
-  const double zeta = std::max(impulse_scale, values.sigma_n / values.mobility_n);
-  ModeChange change{mode};
-  if (mode == ContactMode::kOpen) {
-    if (values.s_n < -kModeTolerance * values.sigma_n) {
-      change.violation = -values.s_n / values.sigma_n;
-      // Would it stick if it met this contact alone?
-      const double needed = std::abs(values.slip) / values.mobility_t;
-      const double available = contact.friction * -values.s_n / values.mobility_n;
-      change.mode = !contact.has_friction ? ContactMode::kClosed
-                    : needed <= available ? ContactMode::kSticking
-                    : values.slip > 0.0   ? ContactMode::kSlidingPositive
-                                          : ContactMode::kSlidingNegative;
-    }
-    return change;
-  }
-  if (normal < -kModeTolerance * zeta) {
-    return {ContactMode::kOpen, -normal / zeta};
-  }
-  if (mode == ContactMode::kSticking) {
-    // Slip is what δ leaves of a sticking row; where it should be more (two points of a body that
-    // turns cannot both stick) the impulse outgrows friction.
-    const double excess = std::abs(tangent) - contact.friction * normal;
-    const double scale = std::max(zeta * std::max(1.0, contact.friction), std::abs(tangent));
-    if (excess > kModeTolerance * scale) {
-      change.violation = excess / scale;
-      change.mode = tangent < 0.0 ? ContactMode::kSlidingPositive : ContactMode::kSlidingNegative;
-    }
-  } else if (mode != ContactMode::kClosed) {
-    const double along = SlidingSign(mode) * values.slip;
-    const double rounding =
-        std::min(contact.rounding, kSlipOfTolerance * tolerance * values.sigma_t);
-    if (along < -std::max(kModeTolerance * values.sigma_t, rounding)) {
-      change = {ContactMode::kSticking, -along / values.sigma_t};
-    }
-  }
-  return change;
-}
-
-// Moves the impulses on along their last change, from `before`, a little beyond where the first of
-// them meets its limit.
-void ExtrapolateImpulses(const ContactProblem<double>& problem,
-                         const ContactSolution<double>& before, ContactSolution<double>* solution) {
-  double factor = kMaxExtrapolation;
-  const auto limit = [&](double value, double last) {
-    if (value > 0.0 && value < last) {
-      factor = std::min(factor, value / (last - value));
-    }
-  };
-  for (size_t i = 0; i < problem.contacts.size(); ++i) {
-    const double normal = solution->normal_impulse[i];
-    const double last_normal = before.normal_impulse[i];
-    if (solution->modes[i] == ContactMode::kSticking) {
-      const double mu = problem.contacts[i].friction;
-      const double tangent = solution->tangent_impulse[i];
-      const double last_tangent = before.tangent_impulse[i];
-      limit(mu * normal - tangent, mu * last_normal - last_tangent);
-      limit(mu * normal + tangent, mu * last_normal + last_tangent);
-    } else if (solution->modes[i] != ContactMode::kOpen) {
-      limit(normal, last_normal);
-    }
-  }
-  factor *= 1.0 + 1e-6;
-  const auto move = [&](const std::vector<double>& from, std::vector<double>* to) {
-    for (size_t i = 0; i < to->size(); ++i) {
-      (*to)[i] += factor * ((*to)[i] - from[i]);
-    }
-  };
-  move(before.normal_impulse, &solution->normal_impulse);
-  move(before.tangent_impulse, &solution->tangent_impulse);
-  move(before.joint_impulse, &solution->joint_impulse);
-}
-
 }  // namespace
+
+void ContactFallbacks::Add(const ContactFallbacks& other) {
+  pivoting += other.pivoting;
+  interior_point += other.interior_point;
+  lemke += other.lemke;
+  dense += other.dense;
+  extrapolation += other.extrapolation;
+  regularised += other.regularised;
+  whole_system += other.whole_system;
+  islands_together += other.islands_together;
+}
 
 void ContactSolver::Reserve(int num_bodies, int num_joints, int num_contacts) {
   const int blocks = num_bodies + num_joints + num_contacts;
@@ -316,6 +241,7 @@ bool ContactSolver::SolveByPivoting(const ContactProblem<double>& problem,
     if (regularisation == kLeastRegularisation && solution->modes == last_.modes &&
         report->residual > 0.5 * last_residual) {
       ExtrapolateImpulses(problem, last_, solution);
+      ++report->fallbacks.extrapolation;
     }
     last_residual = report->residual;
     regularisation = std::max(kLeastRegularisation, 0.1 * regularisation);
@@ -402,6 +328,7 @@ bool ContactSolver::SolveByInteriorPoint(const ContactProblem<double>& problem,
     interior_point.resume = true;
   }
   // Rows that are almost redundant leave modes that only pivots tell apart.
+  ++report->fallbacks.pivoting;
   return SolveByPivoting(problem, options, ContactPivoting::From::kModes,
                          kPivotsFromInteriorPoint * (1 + static_cast<int>(problem.contacts.size())),
                          solution, report);
@@ -438,6 +365,7 @@ bool ContactSolver::SolveByLemke(const ContactProblem<double>& problem,
     }
     return false;
   }
+  ++report->fallbacks.dense;
   const bool dense = SolveContactsDense(problem, options.tolerance, solution, &iterations);
   report->iterations += iterations;
   return dense && Polish(problem, options, solution, report);
@@ -446,6 +374,17 @@ bool ContactSolver::SolveByLemke(const ContactProblem<double>& problem,
 ContactSolverReport ContactSolver::Solve(const ContactProblem<double>& problem,
                                          const ContactSolverOptions& options,
                                          ContactSolution<double>* solution) {
+  const int expansions = system_.expansions();
+  const int regularised = system_.regularised_steps();
+  ContactSolverReport report = RunPortfolio(problem, options, solution);
+  report.fallbacks.whole_system = system_.expansions() - expansions;
+  report.fallbacks.regularised = system_.regularised_steps() - regularised;
+  return report;
+}
+
+ContactSolverReport ContactSolver::RunPortfolio(const ContactProblem<double>& problem,
+                                                const ContactSolverOptions& options,
+                                                ContactSolution<double>* solution) {
   ContactSolverReport report;
   const auto done = [&](SolvedBy by) {
     report.solved = true;
@@ -466,18 +405,20 @@ ContactSolverReport ContactSolver::Solve(const ContactProblem<double>& problem,
   }
   const bool exact = options.smoothing == 0.0;
   entry_ = *solution;
-  if (options.choice == ContactSolverChoice::kAuto && exact &&
-      SolveByModeChanges(problem, options, solution, &report)) {
+  const bool any = options.choice == ContactSolverChoice::kAuto && exact;
+  if (any && SolveByModeChanges(problem, options, solution, &report)) {
     return done(SolvedBy::kGuess);
   }
   const int num_contacts = static_cast<int>(problem.contacts.size());
-  if (options.choice == ContactSolverChoice::kAuto && exact) {
+  if (any) {
     *solution = entry_;
+    ++report.fallbacks.pivoting;
     if (SolveByPivoting(problem, options, ContactPivoting::From::kModes,
                         kPivotsFromGuess + num_contacts / 2, solution, &report)) {
       return done(SolvedBy::kGuess);
     }
     *solution = entry_;
+    ++report.fallbacks.interior_point;
   }
   if (options.choice != ContactSolverChoice::kLemke &&
       SolveByInteriorPoint(problem, options, solution, &report)) {
@@ -485,6 +426,7 @@ ContactSolverReport ContactSolver::Solve(const ContactProblem<double>& problem,
   }
   if (options.choice != ContactSolverChoice::kInteriorPoint && exact) {
     *solution = entry_;
+    report.fallbacks.lemke += any ? 1 : 0;
     if (SolveByPivoting(problem, options, ContactPivoting::From::kOpen,
                         kPivotsFromOpen * (1 + num_contacts), solution, &report)) {
       return done(SolvedBy::kLemke);

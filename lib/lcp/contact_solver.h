@@ -44,6 +44,21 @@ struct ContactSolverOptions {
                            ///< polish; 0: exact
 };
 
+/// What solves leaned on beyond changes of the guess's modes. A method that the options ask for is
+/// none.
+struct ContactFallbacks {
+  long pivoting = 0;          ///< paths of pivots from the guess or from the interior point's modes
+  long interior_point = 0;    ///< runs of the interior point
+  long lemke = 0;             ///< paths of pivots from all contacts open, Lemke's method
+  long dense = 0;             ///< the dense portfolio
+  long extrapolation = 0;     ///< impulses of rows that contradict each other moved on
+  long regularised = 0;       ///< proximal steps in which δ stands for redundant rows
+  long whole_system = 0;      ///< condensed systems that were factorised as a whole instead
+  long islands_together = 0;  ///< islands that could not be solved apart
+
+  void Add(const ContactFallbacks& other);
+};
+
 struct ContactSolverReport {
   bool solved = false;
   SolvedBy solved_by = SolvedBy::kNothing;
@@ -51,6 +66,7 @@ struct ContactSolverReport {
   int iterations = 0;      ///< of the interior point or Lemke
   double residual = 0.0;   ///< scaled natural residual
   int worst_contact = -1;  ///< where it is largest, −1: an equation
+  ContactFallbacks fallbacks;
 };
 
 class ContactSolver {
@@ -64,6 +80,9 @@ class ContactSolver {
   void Reserve(int num_bodies, int num_joints, int num_contacts);
 
  private:
+  ContactSolverReport RunPortfolio(const ContactProblem<double>& problem,
+                                   const ContactSolverOptions& options,
+                                   ContactSolution<double>* solution);
   // The proximal step from the centre's impulses with the solution's modes.
   bool SolveWithModes(const ContactProblem<double>& problem, ContactSolution<double>* solution,
                       ContactSolverReport* report);

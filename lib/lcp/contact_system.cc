@@ -240,7 +240,11 @@ bool ContactSystem::Factor(const ContactProblem<double>& problem,
                            const std::vector<ContactMode>& modes, double regularisation) {
   fraction_ = regularisation;
   const bool condensed = WorthCondensing(problem, modes);
-  return FactorAs(condensed, problem, modes) || (condensed && FactorAs(false, problem, modes));
+  if (FactorAs(condensed, problem, modes)) {
+    return true;
+  }
+  expansions_ += condensed ? 1 : 0;
+  return condensed && FactorAs(false, problem, modes);
 }
 
 bool ContactSystem::FactorAs(bool condensed, const ContactProblem<double>& given,
@@ -363,6 +367,7 @@ double ContactSystem::SolveProximal(const ContactProblem<double>& problem,
   if (left <= kConsistent) {
     return left;
   }
+  ++regularised_steps_;
   std::copy(rhs_.begin(), rhs_.end(), x);
   SolveOnce<false>(problem, modes, x, columns);
   const double kept =

@@ -41,8 +41,12 @@ class ContactSystem {
   /// Block of contact i, −1 if open.
   const std::vector<int>& contact_block() const { return contact_block_; }
   int num_blocks() const { return num_blocks_; }
-  /// How often a condensed system did not refine and was factorised as a whole, since the start.
+  /// How often a condensed system did not refine, or was singular, and was factorised as a whole,
+  /// since the start.
   int expansions() const { return expansions_; }
+  /// In how many proximal steps redundant rows contradicted each other, to rounding or more, so
+  /// that δ stood for them, since the start.
+  int regularised_steps() const { return regularised_steps_; }
   /// Memory, bytes.
   size_t bytes() const {
     return lu_.bytes() + edges_.capacity() * sizeof(edges_[0]) +
@@ -134,6 +138,7 @@ class ContactSystem {
   bool regularised_ = false;
   bool condensed_ = false;
   int expansions_ = 0;
+  int regularised_steps_ = 0;
   double fraction_ = kContactRegularisation;
   std::vector<double> regularisation_;
   std::vector<double> rhs_, correction_, last_;

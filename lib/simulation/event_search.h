@@ -42,6 +42,11 @@ class EventSearch {
   void FindContacts(const Model<double>& model, const State<double>& state, double reach,
                     std::vector<ActiveContact>* contacts);
   double bounding_radius(int body) const { return radius_[body]; }
+  /// What all motions that it ran leaned on.
+  const FlowCounts& flow_counts() const { return flow_.counts(); }
+  /// Of the last search for contacts: boxes compared, pairs whose boxes overlap.
+  int num_compared() const { return broad_phase_.num_compared(); }
+  int num_pairs() const { return static_cast<int>(pairs_.size()); }
   /// To which gaps are located, m.
   double GapTolerance() const { return 8.0 * std::numeric_limits<double>::epsilon() * scale_; }
 

@@ -78,37 +78,6 @@ std::vector<Edge> EdgesWithin(const Model<double>& model, double from, double to
 
 }  // namespace
 
-ContactSolverOptions SolverOptionsOf(const SimulationSettings& settings) {
-  ContactSolverOptions options;
-  options.tolerance = settings.lcp_tolerance;
-  options.max_iterations = settings.lcp_max_iterations;
-  options.choice = settings.solver == SolverChoice::kInteriorPoint
-                       ? ContactSolverChoice::kInteriorPoint
-                   : settings.solver == SolverChoice::kLemke ? ContactSolverChoice::kLemke
-                                                             : ContactSolverChoice::kAuto;
-  return options;
-}
-
-void CountSolve(const ContactSolverReport& solved, EventOutcome* outcome) {
-  outcome->factorisations += solved.factorisations;
-  outcome->iterations += solved.iterations;
-  outcome->residual = std::max(outcome->residual, solved.solved ? solved.residual : 0.0);
-  outcome->by_guess = outcome->by_guess && solved.solved_by != SolvedBy::kInteriorPoint &&
-                      solved.solved_by != SolvedBy::kLemke;
-  outcome->by_lemke = outcome->by_lemke || solved.solved_by == SolvedBy::kLemke;
-}
-
-std::string NameOfContact(const ModelStructure& structure,
-                          const std::vector<ActiveContact>& contacts, int index) {
-  if (index < 0) {
-    return "joints";
-  }
-  const ActiveContact& contact = contacts[index];
-  return contact.joint >= 0 ? "limit of joint " + structure.joints[contact.joint].name
-                            : "contact of " + structure.bodies[contact.a].name + " and " +
-                                  structure.bodies[contact.b].name;
-}
-
 EventStepper::EventStepper(const Model<double>& model) : search_(model) {}
 
 void EventStepper::ClearGuess() {
@@ -402,6 +371,18 @@ void EventStepper::SwitchMode(const Segment& segment) {
 
 EventOutcome EventStepper::Step(const Model<double>& model, double t, double h,
                                 State<double>* state) {
+  const FlowCounts own = flow_.counts();
+  const FlowCounts searched = search_.flow_counts();
+  EventOutcome outcome = Advance(model, t, h, state);
+  outcome.solver.whole_system += flow_.counts().whole_system - own.whole_system +
+                                 search_.flow_counts().whole_system - searched.whole_system;
+  outcome.newton_stages =
+      static_cast<int>(search_.flow_counts().newton_stages - searched.newton_stages);
+  return outcome;
+}
+
+EventOutcome EventStepper::Advance(const Model<double>& model, double t, double h,
+                                   State<double>* state) {
   EventOutcome outcome;
   record_.Clear();
   inelastic_ = false;
@@ -458,10 +439,14 @@ EventOutcome EventStepper::Step(const Model<double>& model, double t, double h,
     }
     impulses_tried = false;
     std::string message;
-    if (!search_.Run(model, touching_.contacts, &segment, &message)) {
+    const bool moved = search_.Run(model, touching_.contacts, &segment, &message);
+    outcome.pairs_compared = search_.num_compared();
+    outcome.pairs_near = search_.num_pairs();
+    if (!moved) {
       // Where contacts nearly jam accelerations change so fast with poses that only a short motion
       // can be integrated.
       shortened += halvings == 0 ? 1 : 0;
+      ++outcome.halved_motions;
       if (++halvings > kMostHalvings || shortened > kMostShortened) {
         return fail(message);
       }

@@ -21,6 +21,7 @@
 #include "tangible/lcp/contact_decompression.h"
 #include "tangible/lcp/contact_solver.h"
 #include "tangible/simulation/event_search.h"
+#include "tangible/simulation/settings.h"
 
 namespace tangible {
 
@@ -36,6 +37,11 @@ struct EventOutcome {
   double impact_energy_gain = 0.0;  ///< J, the largest of an impact
   bool by_guess = true;             ///< whether the modes of the last segment served everywhere
   bool by_lemke = false;
+  ContactFallbacks solver;  ///< what its solves and motions leaned on
+  int newton_stages = 0;    ///< implicit stages whose iteration does not contract
+  int halved_motions = 0;   ///< that could not be integrated over what was left of the step
+  int pairs_compared = 0;   ///< boxes compared by the broad phase of its last search for events
+  int pairs_near = 0;       ///< pairs whose boxes overlap, in that search
 };
 
 /// What an event step takes from the last one beside the state.
@@ -45,8 +51,6 @@ struct EventGuess {
   bool starts = true;  ///< the next step is a run's first
 };
 
-/// The solver's options by a scene's settings.
-ContactSolverOptions SolverOptionsOf(const SimulationSettings& settings);
 /// Adds a solve to what a step reports.
 void CountSolve(const ContactSolverReport& solved, EventOutcome* outcome);
 /// "contact of ball and floor", "limit of joint hinge"; index −1: "joints".
@@ -67,6 +71,7 @@ class EventStepper {
   void SetGuess(const EventGuess& guess);
 
  private:
+  EventOutcome Advance(const Model<double>& model, double t, double h, State<double>* state);
   struct Touching {
     std::vector<ActiveContact> contacts;
     std::vector<CoefficientSource> friction, restitution;

@@ -24,6 +24,8 @@ class JointProjection {
   bool Project(const Model<double>& model, State<double>* state);
   /// Largest |C| after the last projection, m or rad.
   double error() const { return iterate_.error; }
+  /// How many steps of it were not Newton's.
+  int damped_steps() const { return iterate_.damped_steps; }
   /// The joint of that error; −1 without joints.
   int worst_joint() const;
 

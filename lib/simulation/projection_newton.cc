@@ -261,6 +261,7 @@ bool IterateProjection(const Model<T>& model, int extra, ProjectionIterate<T>* p
   JointEdges(s, &p->edges);
   EvaluateAll(model, p->at, &p->rows);
   p->error = LargestError(p->rows);
+  p->damped_steps = 0;
   double weight = 0.0;
   double before = HUGE_VAL;
   int done = 0;
@@ -271,6 +272,7 @@ bool IterateProjection(const Model<T>& model, int extra, ProjectionIterate<T>* p
     double fraction = 1.0;
     if (factored) TryStep(model, fraction, p);
     if (!factored || (step > kShortStep && !TrialImproves(model, p, &weight))) {
+      ++p->damped_steps;
       if (!FactorMatrix(model, false, p)) {
         return false;
       }

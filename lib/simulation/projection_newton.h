@@ -36,6 +36,7 @@ struct ProjectionIterate {
   std::vector<T> rhs;
   bool shifted = false;  ///< the factorised matrix is not K itself
   double error = 0.0;    ///< largest |C| at q
+  int damped_steps = 0;  ///< with W = M, as Newton's did not lower the merit
 };
 
 /// Newton from `at`, which equals `from` on entry; then `extra` more steps, for the derivatives of

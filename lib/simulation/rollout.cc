@@ -49,11 +49,22 @@ void SetValues(const State<double>& values, State<T>* state) {
 void RolloutReport::Add(const StepReport& step) {
   contacts_max = std::max(contacts_max, step.closed);
   lcp_rows_max = std::max(lcp_rows_max, step.lcp_rows);
+  contacts += step.contacts;
+  lcp_rows += step.lcp_rows;
+  single_rows += step.single_rows;
+  pairs_compared += step.pairs_compared;
+  pairs_near += step.pairs_near;
+  beyond_reach += step.beyond_reach;
+  solved_directly += step.solved_by == SolvedBy::kDirect ? 1 : 0;
   solved_by_guess += step.solved_by == SolvedBy::kGuess ? 1 : 0;
   solved_by_interior_point += step.solved_by == SolvedBy::kInteriorPoint ? 1 : 0;
   solved_by_lemke += step.solved_by == SolvedBy::kLemke ? 1 : 0;
   events += step.events;
   fallbacks += step.fallbacks;
+  solver.Add(step.solver);
+  newton_stages += step.newton_stages;
+  halved_motions += step.halved_motions;
+  damped_projections += step.damped_projections;
   mode_switches += step.mode_switches;
   factorisations += step.factorisations;
   residual_max = std::max(residual_max, step.residual);

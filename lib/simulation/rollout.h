@@ -19,11 +19,23 @@ struct RolloutReport {
   double time = 0.0;     ///< s, reached
   int contacts_max = 0;  ///< contacts with an impulse in a step
   int lcp_rows_max = 0;
+  long contacts = 0;  ///< listed, over all steps; the following counts too
+  long lcp_rows = 0;
+  long single_rows = 0;      ///< contacts and limits that have one row in place of three
+  long pairs_compared = 0;   ///< pairs of boxes that the broad phase compared
+  long pairs_near = 0;       ///< pairs whose boxes overlap
+  long beyond_reach = 0;     ///< of these, without rows (fixed stepping)
+  int fixed_numbers = 0;     ///< of the model: with a tangent, those that no column varies
+  long solved_directly = 0;  ///< steps without an inequality, so without an LCP
   long solved_by_guess = 0;
   long solved_by_interior_point = 0;
   long solved_by_lemke = 0;
-  long events = 0;     ///< located within steps (event stepping)
-  long fallbacks = 0;  ///< of event stepping
+  long events = 0;          ///< located within steps (event stepping)
+  long fallbacks = 0;       ///< of event stepping
+  ContactFallbacks solver;  ///< what solves leaned on beyond the guess
+  long newton_stages = 0;   ///< event stepping: implicit stages whose iteration does not contract
+  long halved_motions = 0;  ///< event stepping: that could not be integrated as a whole
+  long damped_projections = 0;  ///< steps of the joint projection that Newton's method could not do
   long mode_switches = 0;
   long factorisations = 0;
   double residual_max = 0.0;

@@ -25,13 +25,26 @@ void AdvanceTangent(const Model<double>& model, Stepper* stepper, const double* 
   }
 }
 
+int StepTangent::FixNumbers(const Model<double>& model, const RowMatrixXd& w_dot) {
+  const ModelStructure& s = *model.structure;
+  fixed_.assign(s.num_variables(), 0);
+  int count = 0;
+  for (int variable = s.NumberVariable(0); variable < s.num_variables(); ++variable) {
+    const bool fixed = (w_dot.row(variable).array() == 0.0).all();
+    fixed_[variable] = fixed ? 1 : 0;
+    count += fixed ? 1 : 0;
+  }
+  return count;
+}
+
 void StepTangent::Assemble(const Model<double>& model, Stepper* stepper, const RowMatrixXd& w_dot) {
   const StepRecord& record = stepper->record();
   ContactSystem& system = stepper->system();
   const int columns = static_cast<int>(w_dot.cols());
   rhs_.assign(3 * static_cast<size_t>(system.num_blocks()) * columns, 0.0);
-  VisitStepJacobian(model, record.View(system.contact_block()), JointRoute::kByHand, &scratch_,
-                    TangentSink{w_dot.data(), rhs_.data(), columns});
+  VisitStepJacobian(
+      model, record.View(system.contact_block()), JointRoute::kByHand, &scratch_,
+      TangentSink{w_dot.data(), rhs_.data(), columns, fixed_.empty() ? nullptr : fixed_.data()});
 }
 
 double StepTangent::Apply(const Model<double>& model, Stepper* stepper, RowMatrixXd* w_dot) {
@@ -100,6 +113,7 @@ RolloutReport RolloutTangent(const Model<double>& model, const State<double>& in
                              const TangentObserver& observer, Stepper* stepper, RowMatrixXd* w_dot,
                              State<double>* final) {
   StepTangent tangent;
+  const int fixed_numbers = tangent.FixNumbers(model, *w_dot);
   const StateObserver each = [&](long k, double t, const State<double>& state, Stepper* done) {
     if (done != nullptr) {
       tangent.Apply(model, done, w_dot);
@@ -108,7 +122,9 @@ RolloutReport RolloutTangent(const Model<double>& model, const State<double>& in
       observer(k, t, state, *w_dot);
     }
   };
-  return Rollout(model, initial, each, stepper, final);
+  RolloutReport report = Rollout(model, initial, each, stepper, final);
+  report.fixed_numbers = fixed_numbers;
+  return report;
 }
 
 RolloutReport RolloutTangent(const Model<double>& model, const State<double>& initial,

@@ -35,6 +35,9 @@ void AdvanceTangent(const Model<double>& model, Stepper* stepper, const double* 
 /// The tangent of the step that the stepper has just done.
 class StepTangent {
  public:
+  /// For steps from `w_dot` on, with this object alone: the model's numbers that no column varies,
+  /// which stay so, are left out of fixed steps. Returns how many.
+  int FixNumbers(const Model<double>& model, const RowMatrixXd& w_dot);
   /// Returns the largest relative residual of the linear solve.
   double Apply(const Model<double>& model, Stepper* stepper, RowMatrixXd* w_dot);
   /// The same, and how far the derivatives of the contacts' impulses exceed what the perturbation
@@ -48,6 +51,7 @@ class StepTangent {
   double Finish(const Model<double>& model, Stepper* stepper, RowMatrixXd* w_dot);
 
   std::vector<double> rhs_;
+  std::vector<char> fixed_;  ///< 1 a variable that no column varies; empty: not known
   LocalJacobianScratch scratch_;
 };
 

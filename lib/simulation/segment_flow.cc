@@ -117,17 +117,7 @@ double CorrectedError(const ContactProblem<double>& problem) {
   return error;
 }
 
-}  // namespace
-
-const NystromTableau& NystromTableau::Of(Integrator integrator) {
-  static const NystromTableau kEuler = SemiImplicitEuler();
-  static const NystromTableau kTrapezoidal = Trapezoidal();
-  static const NystromTableau kRungeKutta = RungeKutta4();
-  return integrator == Integrator::kSemiImplicitEuler ? kEuler
-         : integrator == Integrator::kTrapezoidal     ? kTrapezoidal
-                                                      : kRungeKutta;
-}
-
+// Solves a node's problem with modes; false where singular or not finite.
 bool SolveNode(const std::vector<ContactMode>& modes, SolvedNode* node) {
   const ContactProblem<double>& p = node->problem;
   ContactSolution<double>& s = node->solution;
@@ -167,6 +157,17 @@ bool SolveNode(const std::vector<ContactMode>& modes, SolvedNode* node) {
   return AllFinite(x);
 }
 
+}  // namespace
+
+const NystromTableau& NystromTableau::Of(Integrator integrator) {
+  static const NystromTableau kEuler = SemiImplicitEuler();
+  static const NystromTableau kTrapezoidal = Trapezoidal();
+  static const NystromTableau kRungeKutta = RungeKutta4();
+  return integrator == Integrator::kSemiImplicitEuler ? kEuler
+         : integrator == Integrator::kTrapezoidal     ? kTrapezoidal
+                                                      : kRungeKutta;
+}
+
 void SpreadTwists(const ModelStructure& structure, const std::vector<double>& solved,
                   std::vector<double>* twist) {
   for (int k = 0; k < structure.num_blocks(); ++k) {
@@ -182,13 +183,20 @@ void AssembleImpulses(const Model<double>& model, AssemblyScratch<double>* scrat
                    impulses->restitution, *scratch, &impulses->problem);
 }
 
+bool SegmentFlow::Solve(const std::vector<ContactMode>& modes, SolvedNode* node) {
+  const int before = node->system.expansions();
+  const bool solved = SolveNode(modes, node);
+  counts_.whole_system += node->system.expansions() - before;
+  return solved;
+}
+
 bool SegmentFlow::Accelerate(const Model<double>& model, const Segment& segment,
                              const State<double>& state, double time, SolvedNode* node) {
   node->state = state;
   node->time = time;
   AssembleAcceleration(model, state, time, segment.middle, segment.contacts, segment.friction,
                        &acceleration_, &node->problem);
-  return SolveNode(segment.modes, node);
+  return Solve(segment.modes, node);
 }
 
 // A stage that reads its own accelerations: iterated, and where that does not contract by Newton's
@@ -206,6 +214,7 @@ bool SegmentFlow::SolveImplicitStage(const Model<double>& model, Segment* segmen
   for (int iteration = 0; iteration <= kMostIterations; ++iteration) {
     const bool newton = iteration >= kMostFixedPoints;
     if (iteration == kMostFixedPoints) {
+      ++counts_.newton_stages;
       acceleration = start;
     }
     const std::vector<double> last = acceleration;
@@ -341,7 +350,7 @@ bool SegmentFlow::CorrectPoses(const Model<double>& model, Segment* segment, std
       break;
     }
     last = error;
-    if (!SolveNode(modes, &node)) {
+    if (!Solve(modes, &node)) {
       *message = "projection onto joints and contacts is singular";
       return false;
     }
@@ -422,7 +431,7 @@ bool SegmentFlow::Project(const Model<double>& model, Impulses* impulses) {
   std::swap(node.problem, projection.problem);
   std::swap(node.system, projection.system);
   const std::vector<ContactMode> modes = projection.solution.modes;
-  const bool solved = SolveNode(modes, &node);
+  const bool solved = Solve(modes, &node);
   std::swap(node.problem, projection.problem);
   std::swap(node.system, projection.system);
   projection.solution = std::move(node.solution);

@@ -34,8 +34,11 @@ struct NystromTableau {
   static const NystromTableau& Of(Integrator integrator);
 };
 
-/// Solves a node's problem with modes; false where singular or not finite.
-bool SolveNode(const std::vector<ContactMode>& modes, SolvedNode* node);
+/// What motions leaned on, since the start.
+struct FlowCounts {
+  long whole_system = 0;   ///< condensed systems that were factorised as a whole instead
+  long newton_stages = 0;  ///< implicit stages whose iteration does not contract
+};
 
 class SegmentFlow {
  public:
@@ -50,7 +53,10 @@ class SegmentFlow {
   /// Twists onto the rows of an instant whose modes are given (SetUpProjection).
   bool Project(const Model<double>& model, Impulses* projection);
 
+  const FlowCounts& counts() const { return counts_; }
+
  private:
+  bool Solve(const std::vector<ContactMode>& modes, SolvedNode* node);
   bool Integrate(const Model<double>& model, Segment* segment, std::string* message);
   bool SolveImplicitStage(const Model<double>& model, Segment* segment, int i,
                           const std::function<void(State<double>*)>& place, std::string* message);
@@ -62,6 +68,7 @@ class SegmentFlow {
   AssemblyScratch<double> assembly_;
   std::vector<double> terms_;
   ImplicitStage implicit_;
+  FlowCounts counts_;
 };
 
 /// Sets a segment's twist projection up at a state: its contacts without rebound, those that slide

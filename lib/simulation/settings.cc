@@ -39,4 +39,16 @@ bool CheckSettings(const SimulationSettings& settings, std::string* error) {
   return false;
 }
 
+ContactSolverOptions SolverOptionsOf(const SimulationSettings& settings) {
+  ContactSolverOptions options;
+  options.tolerance = settings.lcp_tolerance;
+  options.max_iterations = settings.lcp_max_iterations;
+  options.smoothing = settings.smoothing;
+  options.choice = settings.solver == SolverChoice::kInteriorPoint
+                       ? ContactSolverChoice::kInteriorPoint
+                   : settings.solver == SolverChoice::kLemke ? ContactSolverChoice::kLemke
+                                                             : ContactSolverChoice::kAuto;
+  return options;
+}
+
 }  // namespace tangible

@@ -5,6 +5,7 @@
 
 #include <string>
 
+#include "tangible/lcp/contact_solver.h"
 #include "tangible/scene/scene.h"
 
 namespace tangible {
@@ -13,5 +14,8 @@ namespace tangible {
 /// file's name:
 /// "/simulation/stepping: expected \"fixed\", got \"event\"".
 bool CheckSettings(const SimulationSettings& settings, std::string* error);
+
+/// The contact solver's options by a scene's settings.
+ContactSolverOptions SolverOptionsOf(const SimulationSettings& settings);
 
 }  // namespace tangible

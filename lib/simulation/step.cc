@@ -277,31 +277,15 @@ void Stepper::CarryGuess(const Model<double>& model, const std::vector<ActiveCon
   }
 }
 
-ContactSolverOptions Stepper::SolverOptions(const SimulationSettings& settings) const {
-  ContactSolverOptions options;
-  options.tolerance = settings.lcp_tolerance;
-  options.max_iterations = settings.lcp_max_iterations;
-  options.smoothing = settings.smoothing;
-  options.choice = settings.solver == SolverChoice::kInteriorPoint
-                       ? ContactSolverChoice::kInteriorPoint
-                   : settings.solver == SolverChoice::kLemke ? ContactSolverChoice::kLemke
-                                                             : ContactSolverChoice::kAuto;
-  return options;
-}
-
 void Stepper::Describe(const Model<double>& model, int contact, StepReport* report) const {
   const ModelStructure& s = *model.structure;
+  report->message = NameOfContact(s, record_.contacts, contact);
   if (contact < 0) {
     const int joint =
         MostViolatedJoint(record_.problem, record_.solution.v, record_.solution.v, 0.0);
     report->message = joint < 0 ? "momentum"
                                 : "the joints' equations, most of all of joint " +
                                       s.joints[joint].name + " (are they contradictory?)";
-  } else if (record_.contacts[contact].joint >= 0) {
-    report->message = "limit of joint " + s.joints[record_.contacts[contact].joint].name;
-  } else {
-    report->message = "contact of " + s.bodies[record_.contacts[contact].a].name + " and " +
-                      s.bodies[record_.contacts[contact].b].name;
   }
 }
 
@@ -312,6 +296,9 @@ void Stepper::FillReport(const Model<double>& model, const ContactSolverReport& 
   report->iterations = solved.iterations;
   report->residual = solved.residual;
   report->contacts = static_cast<int>(record_.contacts.size());
+  report->pairs_compared = search_.num_compared();
+  report->pairs_near = search_.num_pairs();
+  report->beyond_reach = search_.num_beyond_reach();
   if (!solved.solved) {
     report->status = StepStatus::kUnsolved;
     Describe(model, solved.worst_contact, report);
@@ -326,6 +313,7 @@ void Stepper::FillReport(const Model<double>& model, const ContactSolverReport& 
   for (size_t i = 0; i < record_.contacts.size(); ++i) {
     const ContactBlock<double>& block = record_.problem.contacts[i];
     report->lcp_rows += block.has_friction ? 3 : 1;
+    report->single_rows += block.has_friction ? 0 : 1;
     report->gap_min = std::min(report->gap_min, record_.contacts[i].gap);
     report->closed += record_.solution.modes[i] != ContactMode::kOpen ? 1 : 0;
     impact = impact || record_.contacts[i].law == ContactLaw::kRestitution;
@@ -359,7 +347,12 @@ ContactSolverReport Stepper::SolveContacts(const ContactSolverOptions& options, 
     factored_ = false;
     return report;
   }
-  return solver_.Solve(record_.problem, options, &record_.solution);
+  // What the islands leaned on counts too.
+  ContactFallbacks fallbacks = report.fallbacks;
+  fallbacks.islands_together += apart ? 1 : 0;
+  report = solver_.Solve(record_.problem, options, &record_.solution);
+  report.fallbacks.Add(fallbacks);
+  return report;
 }
 
 ContactSystem& Stepper::system() {
@@ -400,9 +393,10 @@ StepReport Stepper::Step(const Model<double>& model, double t, double h, State<d
       CarryGuess(model, wider_contacts_, narrow_solution_, Guess::kSameStep);
     }
     const ContactSolverReport before = solved;
-    solved = SolveContacts(SolverOptions(settings), &report.islands);
+    solved = SolveContacts(SolverOptionsOf(settings), &report.islands);
     solved.factorisations += before.factorisations;
     solved.iterations += before.iterations;
+    report.solver.Add(solved.fallbacks);
     if (!solved.solved) {
       break;
     }
@@ -433,8 +427,11 @@ StepReport Stepper::Step(const Model<double>& model, double t, double h, State<d
   }
   last_contacts_.assign(r.contacts.begin(), r.contacts.end());
   last_solution_ = r.solution;
-  if (settings.joint_correction == JointCorrection::kProjection && !structure.joints.empty() &&
-      !projection_.Project(model, state)) {
+  const bool projects =
+      settings.joint_correction == JointCorrection::kProjection && !structure.joints.empty();
+  const bool met = !projects || projection_.Project(model, state);
+  report.damped_projections = projects ? projection_.damped_steps() : 0;
+  if (!met) {
     report.status = StepStatus::kUnsolved;
     std::ostringstream message;
     message << "projection of joint " << structure.joints[projection_.worst_joint()].name

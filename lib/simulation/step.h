@@ -36,14 +36,23 @@ struct StepReport {
   int contacts = 0;  ///< contacts and limits listed
   int closed = 0;    ///< of these, with an impulse
   int lcp_rows = 0;  ///< complementarity rows: 1 a frictionless contact or limit, 3 with friction
-  int islands = 0;   ///< with contacts, solved apart; 0: all that moves was solved together
-  int factorisations = 0;  ///< of the island that took the most
-  int iterations = 0;      ///< of the island that took the most
-  int events = 0;          ///< located within the step (event stepping)
-  int fallbacks = 0;       ///< of event stepping: impulses for accelerations, rebounds given up
-  int mode_switches = 0;   ///< contacts whose mode differs from the last step's
-  double residual = 0.0;   ///< scaled natural residual
-  double gap_min = 0.0;    ///< m, the smallest at the start; infinite where no contact is near
+  // What the model leaves out, in the last search for contacts.
+  int pairs_compared = 0;   ///< pairs of boxes that the broad phase compared
+  int pairs_near = 0;       ///< pairs whose boxes overlap
+  int beyond_reach = 0;     ///< of these, without rows: out of reach in this step (fixed stepping)
+  int single_rows = 0;      ///< contacts and limits that have one row in place of three
+  int islands = 0;          ///< with contacts, solved apart; 0: all that moves was solved together
+  int factorisations = 0;   ///< of the island that took the most
+  int iterations = 0;       ///< of the island that took the most
+  int events = 0;           ///< located within the step (event stepping)
+  int fallbacks = 0;        ///< of event stepping: impulses for accelerations, rebounds given up
+  ContactFallbacks solver;  ///< what its solves leaned on beyond the guess
+  int newton_stages = 0;    ///< event stepping: implicit stages whose iteration does not contract
+  int halved_motions = 0;   ///< event stepping: that could not be integrated as a whole
+  int damped_projections = 0;  ///< steps of the joint projection that Newton's method could not do
+  int mode_switches = 0;       ///< contacts whose mode differs from the last step's
+  double residual = 0.0;       ///< scaled natural residual
+  double gap_min = 0.0;        ///< m, the smallest at the start; infinite where no contact is near
   double impact_energy_gain =
       0.0;              ///< J, what the impulses of a step with impacts did; > 0: energy was gained
   std::string message;  ///< empty unless it failed: names the contact or joint
@@ -120,7 +129,6 @@ class Stepper {
                   const ContactSolution<double>& solution, Guess from_where);
   ContactSolverReport SolveContacts(const ContactSolverOptions& options, int* islands);
   ContactMode InitialMode(const ContactBlock<double>& contact) const;
-  ContactSolverOptions SolverOptions(const SimulationSettings& settings) const;
   void FillReport(const Model<double>& model, const ContactSolverReport& solved,
                   StepReport* report);
   void Describe(const Model<double>& model, int contact, StepReport* report) const;

@@ -28,6 +28,27 @@ size_t PlaceOf(const ActiveContact& contact, const CoefficientSource& friction,
 
 }  // namespace
 
+void CountSolve(const ContactSolverReport& solved, EventOutcome* outcome) {
+  outcome->factorisations += solved.factorisations;
+  outcome->iterations += solved.iterations;
+  outcome->solver.Add(solved.fallbacks);
+  outcome->residual = std::max(outcome->residual, solved.solved ? solved.residual : 0.0);
+  outcome->by_guess = outcome->by_guess && solved.solved_by != SolvedBy::kInteriorPoint &&
+                      solved.solved_by != SolvedBy::kLemke;
+  outcome->by_lemke = outcome->by_lemke || solved.solved_by == SolvedBy::kLemke;
+}
+
+std::string NameOfContact(const ModelStructure& structure,
+                          const std::vector<ActiveContact>& contacts, int index) {
+  if (index < 0) {
+    return "joints";
+  }
+  const ActiveContact& contact = contacts[index];
+  return contact.joint >= 0 ? "limit of joint " + structure.joints[contact.joint].name
+                            : "contact of " + structure.bodies[contact.a].name + " and " +
+                                  structure.bodies[contact.b].name;
+}
+
 // Forces integrate to impulses with the integrator's own weights.
 void Stepper::SumImpulses(const Model<double>& model) {
   StepRecord& r = record_;
@@ -85,6 +106,11 @@ StepReport Stepper::StepByEvents(const Model<double>& model, double t, double h,
   const EventOutcome outcome = events_->Step(model, t, h, state);
   report.events = outcome.events;
   report.fallbacks = outcome.fallbacks;
+  report.solver = outcome.solver;
+  report.newton_stages = outcome.newton_stages;
+  report.halved_motions = outcome.halved_motions;
+  report.pairs_compared = outcome.pairs_compared;
+  report.pairs_near = outcome.pairs_near;
   report.factorisations = outcome.factorisations;
   report.iterations = outcome.iterations;
   report.residual = outcome.residual;
@@ -112,6 +138,7 @@ StepReport Stepper::StepByEvents(const Model<double>& model, double t, double h,
     report.gap_min = std::min(report.gap_min, r.contacts[i].gap);
     report.closed += r.solution.modes[i] != ContactMode::kOpen ? 1 : 0;
     report.lcp_rows += r.friction[i].value > 0.0 ? 3 : 1;
+    report.single_rows += r.friction[i].value > 0.0 ? 0 : 1;
     ContactMode last = ContactMode::kOpen;
     for (size_t k = 0; k < last_contacts_.size(); ++k) {
       if (last_contacts_[k].SameAs(r.contacts[i])) {

@@ -3,22 +3,17 @@
 // Jacobians of residuals by Jets: passes of the chosen width.
 #include <gtest/gtest.h>
 
+#include "../support/jets.h"
 #include "fit_scenes.h"
 
 namespace tangible {
 namespace {
 
-constexpr int Widest() {
-  int widest = 0;
-#define TANGIBLE_WIDER(N) widest = N > widest ? N : widest;
-  TANGIBLE_FOR_EACH_JET_WIDTH(TANGIBLE_WIDER)
-#undef TANGIBLE_WIDER
-  return widest;
-}
+using testing::WidestJet;
 
 TEST(ResidualJets, AreAvailableWhereAWidthIsBuilt) {
-  EXPECT_EQ(IsAvailable(DerivativeMethod::kJet), Widest() > 0);
-  EXPECT_EQ(IsAvailable(DerivativeMethod::kJetImplicit), Widest() > 0);
+  EXPECT_EQ(IsAvailable(DerivativeMethod::kJet), WidestJet() > 0);
+  EXPECT_EQ(IsAvailable(DerivativeMethod::kJetImplicit), WidestJet() > 0);
   EXPECT_TRUE(IsAvailable(DerivativeMethod::kTangent));
 }
 
@@ -37,7 +32,7 @@ RowMatrixXd Jacobian(const std::vector<FitParameter>& parameters, DerivativeMeth
 
 // A column does not depend on the pass that it is in.
 TEST(ResidualJets, EveryPassFillsItsColumns) {
-  if (Widest() == 0) {
+  if (WidestJet() == 0) {
     GTEST_SKIP() << "built without Jets";
   }
   std::vector<FitParameter> parameters;
@@ -61,8 +56,8 @@ TEST(ResidualJets, EveryPassFillsItsColumns) {
     }
     // A run in double and one a pass.
     EXPECT_EQ(of_one, 2);
-    if (Widest() < static_cast<int>(parameters.size())) {
-      const int passes = (static_cast<int>(parameters.size()) + Widest() - 1) / Widest();
+    if (WidestJet() < static_cast<int>(parameters.size())) {
+      const int passes = (static_cast<int>(parameters.size()) + WidestJet() - 1) / WidestJet();
       EXPECT_EQ(rollouts, 1 + passes);
     }
   }

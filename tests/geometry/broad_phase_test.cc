@@ -76,6 +76,31 @@ TEST(BroadPhase, FindsThePairsThatAllPairsFind) {
   EXPECT_GT(num_pairs, 10000u);
 }
 
+// Unit boxes scattered over a square so that each meets about one other, or in a row or a stack.
+TEST(BroadPhase, ComparesLessThanAllPairsFrom32BodiesOn) {
+  std::mt19937 random(20240404);
+  for (int n = 32; n <= 1024; n *= 2) {
+    for (const bool wide : {false, true}) {
+      for (const bool tall : {false, true}) {
+        std::vector<Aabb> boxes(n);
+        for (Aabb& box : boxes) {
+          const double x = Uniform(&random, 0.0, wide ? n : std::sqrt(2.0 * n));
+          const double y = Uniform(&random, 0.0, tall ? n : std::sqrt(2.0 * n));
+          box = {x, y, x + 1.0, y + 1.0};
+        }
+        BroadPhase broad_phase;
+        Pairs pairs;
+        broad_phase.FindPairs(boxes, kAll, &pairs);
+        ASSERT_EQ(pairs, AllPairs(boxes));
+        EXPECT_GE(broad_phase.num_compared(), static_cast<int>(pairs.size()));
+        // On an axis of extent E a box meets 2 n / E others, each pair once: n² / E, E = √(2 n).
+        EXPECT_LT(broad_phase.num_compared(), 1.5 * n * std::sqrt(0.5 * n));
+        EXPECT_LT(broad_phase.num_compared(), n * (n - 1) / 4);
+      }
+    }
+  }
+}
+
 TEST(BroadPhase, OnlyAllowedPairs) {
   const std::vector<Aabb> boxes(4, Aabb{0, 0, 1, 1});
   BroadPhase broad_phase;

@@ -102,6 +102,8 @@ TEST(IslandSolverTest, AnIslandWithoutSolutionLeavesTheGuess) {
   EXPECT_FALSE(islands.Solve(p, ContactSolverOptions(), &solution, &report));
   EXPECT_EQ(solution.v, testing::EmptySolution(p).v);
   EXPECT_TRUE(report.worst_contact == 1 || report.worst_contact == 3) << report.worst_contact;
+  EXPECT_EQ(report.fallbacks.interior_point, 1);  // of the island that leaned on it
+  EXPECT_EQ(report.fallbacks.dense, 1);
 }
 
 }  // namespace

@@ -90,6 +90,44 @@ TEST(ContactSolverTest, AllChoicesFindTheSameTwistOfRandomProblems) {
   EXPECT_GT(compared, 60);
 }
 
+// Redundant rows and much friction lead through the whole portfolio.
+TEST(ContactSolverTest, WhatASolveLeansOnIsCounted) {
+  std::mt19937_64 random(7);
+  ContactFallbacks sum;
+  for (int trial = 0; trial < 30; ++trial) {
+    ContactProblem<double> p = testing::RandomContactProblem(&random, 6, 16);
+    for (ContactBlock<double>& contact : p.contacts) contact.friction *= 15.0;
+    ContactSolution<double> solution;
+    const ContactSolverReport report = Solve(p, ContactSolverChoice::kAuto, &solution);
+    const ContactFallbacks& f = report.fallbacks;
+    // One method after the other, and the one that ended it is the last.
+    EXPECT_GE(f.pivoting, f.interior_point) << trial;
+    EXPECT_GE(f.interior_point, f.lemke) << trial;
+    EXPECT_GE(f.lemke, f.dense) << trial;
+    if (report.solved) {
+      EXPECT_EQ(report.solved_by, f.lemke > 0            ? SolvedBy::kLemke
+                                  : f.interior_point > 0 ? SolvedBy::kInteriorPoint
+                                                         : SolvedBy::kGuess)
+          << trial;
+    }
+    sum.Add(f);
+    // What is asked for is no fall-back.
+    EXPECT_EQ(Solve(p, ContactSolverChoice::kInteriorPoint, &solution).fallbacks.interior_point, 0);
+    EXPECT_EQ(Solve(p, ContactSolverChoice::kLemke, &solution).fallbacks.lemke, 0);
+  }
+  EXPECT_LT(sum.pivoting, 60);
+  EXPECT_LT(sum.interior_point, sum.pivoting);
+  EXPECT_GT(sum.dense, 0);
+  EXPECT_GT(sum.extrapolation, 0);
+  EXPECT_GT(sum.regularised, 0);
+  ContactSolution<double> solution;
+  const ContactFallbacks none =
+      Solve(Box(0.9, 0.3, 1), ContactSolverChoice::kAuto, &solution).fallbacks;
+  EXPECT_EQ(none.pivoting + none.interior_point + none.lemke + none.dense + none.extrapolation +
+                none.regularised + none.whole_system,
+            0);
+}
+
 TEST(ContactSolverTest, AWrongGuessIsPutRightInOneChange) {
   for (const double vx : {1.0, -1.0}) {
     ContactProblem<double> p = FreeBodies({vx, -1.0, 0.0});

@@ -89,7 +89,8 @@ TEST_F(TangibleSimulateTest, SummaryHasItsKeysAndItsNumbersAreRight) {
         "cpu_seconds",  "bodies",          "contacts_max",    "lcp_rows_max",
         "islands_max",  "events",          "fallbacks",       "solver",
         "residual_max", "penetration_max", "joint_drift_max", "impact_energy_gain_max",
-        "energy_start", "energy_end",      "momentum_start",  "momentum_end"}) {
+        "energy_start", "energy_end",      "momentum_start",  "momentum_end",
+        "reductions",   "fallback_kinds"}) {
     EXPECT_TRUE(s.contains(key)) << key;
   }
   EXPECT_EQ(s["status"], "done");
@@ -102,9 +103,27 @@ TEST_F(TangibleSimulateTest, SummaryHasItsKeysAndItsNumbersAreRight) {
   EXPECT_LE(s["penetration_max"], 1e-4);
   EXPECT_LT(s["energy_end"], s["energy_start"]);
   EXPECT_GT(s["cpu_seconds"], 0.0);
+  const json& reductions = s["reductions"];
+  EXPECT_EQ(s["solver"]["guess"].get<int>() + reductions["steps_without_lcp"].get<int>(), 63);
+  EXPECT_EQ(reductions["lcp_rows"],
+            3 * reductions["contacts"].get<int>() - 2 * reductions["single_rows"].get<int>());
+  EXPECT_LE(reductions["pairs_near"], reductions["pairs_compared"]);
+  for (const char* kind : {"pivoting", "interior_point", "lemke", "dense", "extrapolation",
+                           "regularised", "whole_system", "islands_together", "newton_stages",
+                           "halved_motions", "damped_projections"}) {
+    EXPECT_EQ(s["fallback_kinds"].count(kind), 1u) << kind;
+  }
+  EXPECT_EQ(s["fallback_kinds"]["interior_point"], 0);
   // The ball's 1 · 1 and the crate's 2 · 1.2 m/s, and the rod's 0.5 · 0.25 m · 0.2 rad/s sin(0.1).
   const double rod = 0.5 * 0.25 * 0.2 * std::sin(0.1);
   EXPECT_NEAR(s["momentum_start"][0], 3.4 + rod, 1e-12);
+}
+
+TEST_F(TangibleSimulateTest, AChainThatTurnsTooFarInAStepShowsInItsSummary) {
+  json scene = json::parse(test_scenes::WhippingChain(2.0));
+  scene["simulation"]["dt"] = 0.05;
+  ASSERT_EQ(Simulate(scene.dump(), Flag("summary", "s.json")).exit_status, 0);
+  EXPECT_GT(json::parse(Read(Path("s.json")))["fallback_kinds"]["damped_projections"], 0);
 }
 
 // The certificate needs solves of its own with the steps' factorisations: the motion stays the same

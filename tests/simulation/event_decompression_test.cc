@@ -5,8 +5,8 @@
 
 #include <cmath>
 
+#include "../support/gradients.h"
 #include "../support/scenes.h"
-#include "tangible/simulation/gradient.h"
 #include "tangible/simulation/invariants.h"
 #include "tangible/simulation/rollout.h"
 
@@ -14,14 +14,7 @@ namespace tangible {
 namespace {
 
 using test_scenes::SceneOf;
-
-bool HaveJets() {
-  int widths = 0;
-#define TANGIBLE_COUNT(N) ++widths;
-  TANGIBLE_FOR_EACH_JET_WIDTH(TANGIBLE_COUNT)
-#undef TANGIBLE_COUNT
-  return widths > 0;
-}
+using testing::Jacobian;
 
 struct Rolled {
   RolloutReport report;
@@ -205,20 +198,6 @@ TEST(EventDecompressionTest, ABoxThatRocksComesToRest) {
   }
 }
 
-GradientResult Jacobian(const Scene& scene, const std::vector<std::string>& paths,
-                        GradientMethod method) {
-  std::vector<ParameterPath> parameters;
-  for (const std::string& path : paths) {
-    std::string error;
-    EXPECT_TRUE(ResolveParameter(scene, path, &parameters.emplace_back(), &error)) << error;
-  }
-  GradientOptions options;
-  options.method = method;
-  GradientResult result = FinalStateJacobian(scene, parameters, options);
-  EXPECT_TRUE(result.done) << result.message;
-  return result;
-}
-
 TEST(EventDecompressionTest, TwoEqualElasticBallsSwap) {
   const Scene scene = SceneOf(R"({"gravity": [0, 0], "bodies": [
       {"name": "a", "shape": {"circle": {"radius": 0.1}}, "mass": 1, "position": [0, 0],
@@ -236,34 +215,17 @@ TEST(EventDecompressionTest, TwoEqualElasticBallsSwap) {
   }
 }
 
-// The five methods on a scene: among each other to 1e-9 of a column's largest, differences to 1e-5.
+// The five methods on a scene.
 void ExpectAllAgree(const std::string& text, const std::vector<std::string>& paths,
                     const std::string& verdict = "trustworthy") {
   const Scene scene = SceneOf(text);
   const GradientResult adjoint = Jacobian(scene, paths, GradientMethod::kAdjoint);
   EXPECT_EQ(adjoint.certificate.verdict.substr(0, verdict.size()), verdict)
       << adjoint.certificate.verdict;
-  std::vector<std::pair<GradientMethod, double>> others = {
-      {GradientMethod::kTangent, 1e-9}, {GradientMethod::kFiniteDifference, 1e-5}};
-  if (HaveJets()) {
-    others.emplace_back(GradientMethod::kJetImplicit, 1e-9);
-    others.emplace_back(GradientMethod::kJet, 1e-6);
-  }
   for (Eigen::Index c = 0; c < adjoint.jacobian.cols(); ++c) {
     EXPECT_GT(adjoint.jacobian.col(c).cwiseAbs().maxCoeff(), 1e-3) << paths[c];
   }
-  for (const auto& [method, tolerance] : others) {
-    const GradientResult other = Jacobian(scene, paths, method);
-    ASSERT_EQ(other.jacobian.rows(), adjoint.jacobian.rows());
-    for (Eigen::Index c = 0; c < adjoint.jacobian.cols(); ++c) {
-      const double size = adjoint.jacobian.col(c).cwiseAbs().maxCoeff();
-      for (Eigen::Index r = 0; r < adjoint.jacobian.rows(); ++r) {
-        EXPECT_NEAR(other.jacobian(r, c), adjoint.jacobian(r, c), tolerance * size + 1e-9)
-            << "method " << static_cast<int>(method) << ", " << adjoint.outputs[r] << " by "
-            << paths[c];
-      }
-    }
-  }
+  testing::ExpectOthersAgree(scene, paths, adjoint);
 }
 
 TEST(EventDecompressionTest, DrivenAndSliding) {

@@ -5,60 +5,22 @@
 
 #include <cmath>
 
+#include "../support/gradients.h"
 #include "../support/scenes.h"
-#include "tangible/simulation/gradient.h"
 
 namespace tangible {
 namespace {
 
 using test_scenes::SceneOf;
+using testing::Jacobian;
 
-bool HaveJets() {
-  int widths = 0;
-#define TANGIBLE_COUNT(N) ++widths;
-  TANGIBLE_FOR_EACH_JET_WIDTH(TANGIBLE_COUNT)
-#undef TANGIBLE_COUNT
-  return widths > 0;
-}
-
-GradientResult Jacobian(const Scene& scene, const std::vector<std::string>& paths,
-                        GradientMethod method) {
-  std::vector<ParameterPath> parameters;
-  for (const std::string& path : paths) {
-    std::string error;
-    EXPECT_TRUE(ResolveParameter(scene, path, &parameters.emplace_back(), &error)) << error;
-  }
-  GradientOptions options;
-  options.method = method;
-  GradientResult result = FinalStateJacobian(scene, parameters, options);
-  EXPECT_TRUE(result.done) << result.message;
-  return result;
-}
-
-// The five methods on a scene: among each other to 1e-9 of a column's largest, differences to 1e-5.
+// The five methods on a scene.
 void ExpectAllAgree(const std::string& text, const std::vector<std::string>& paths, int events) {
   const Scene scene = SceneOf(text);
   const GradientResult adjoint = Jacobian(scene, paths, GradientMethod::kAdjoint);
   EXPECT_EQ(adjoint.certificate.verdict, "trustworthy");
   EXPECT_GE(adjoint.certificate.events, events);
-  std::vector<std::pair<GradientMethod, double>> others = {
-      {GradientMethod::kTangent, 1e-9}, {GradientMethod::kFiniteDifference, 1e-5}};
-  if (HaveJets()) {
-    others.emplace_back(GradientMethod::kJetImplicit, 1e-9);
-    others.emplace_back(GradientMethod::kJet, 1e-6);
-  }
-  for (const auto& [method, tolerance] : others) {
-    const GradientResult other = Jacobian(scene, paths, method);
-    ASSERT_EQ(other.jacobian.rows(), adjoint.jacobian.rows());
-    for (Eigen::Index c = 0; c < adjoint.jacobian.cols(); ++c) {
-      const double size = adjoint.jacobian.col(c).cwiseAbs().maxCoeff();
-      for (Eigen::Index r = 0; r < adjoint.jacobian.rows(); ++r) {
-        EXPECT_NEAR(other.jacobian(r, c), adjoint.jacobian(r, c), tolerance * size + 1e-9)
-            << "method " << static_cast<int>(method) << ", " << adjoint.outputs[r] << " by "
-            << paths[c];
-      }
-    }
-  }
+  testing::ExpectOthersAgree(scene, paths, adjoint);
 }
 
 TEST(EventDerivativeTest, ABouncingBallHasThePhysicsDerivative) {

@@ -6,37 +6,26 @@
 
 #include <cmath>
 
+#include "../support/gradients.h"
 #include "../support/scenes.h"
-#include "tangible/simulation/gradient.h"
 
 namespace tangible {
 namespace {
 
 using test_scenes::SceneOf;
 
-std::vector<GradientMethod> Methods() {
-  std::vector<GradientMethod> methods = {GradientMethod::kAdjoint, GradientMethod::kTangent};
-#define TANGIBLE_ADD_JETS(N)                       \
-  methods.push_back(GradientMethod::kJetImplicit); \
-  methods.push_back(GradientMethod::kJet);
-  TANGIBLE_FOR_EACH_JET_WIDTH(TANGIBLE_ADD_JETS)
-#undef TANGIBLE_ADD_JETS
-  return methods;
-}
-
 RowMatrixXd Jacobian(const Scene& scene, const std::vector<std::string>& paths,
                      GradientMethod method) {
-  std::vector<ParameterPath> parameters;
-  for (const std::string& path : paths) {
-    std::string error;
-    EXPECT_TRUE(ResolveParameter(scene, path, &parameters.emplace_back(), &error)) << error;
+  return testing::Jacobian(scene, paths, method, CertificatePass::kSkip).jacobian;
+}
+
+std::vector<GradientMethod> Methods() {
+  std::vector<GradientMethod> methods = {GradientMethod::kAdjoint, GradientMethod::kTangent};
+  if (testing::HaveJets()) {
+    methods.push_back(GradientMethod::kJetImplicit);
+    methods.push_back(GradientMethod::kJet);
   }
-  GradientOptions options;
-  options.method = method;
-  options.certificate = CertificatePass::kSkip;
-  const GradientResult result = FinalStateJacobian(scene, parameters, options);
-  EXPECT_TRUE(result.done) << result.message;
-  return result.jacobian;
+  return methods;
 }
 
 // Equal elastic discs meet after 0.3 s, the end of a step; and so near to it that rounding says on

@@ -3,19 +3,13 @@
 // Jacobians by Jets: passes of the Jets' width, and builds without Jets.
 #include <gtest/gtest.h>
 
+#include "../support/gradients.h"
 #include "../support/scenes.h"
-#include "tangible/simulation/gradient.h"
 
 namespace tangible {
 namespace {
 
-constexpr int Widest() {
-  int widest = 0;
-#define TANGIBLE_WIDER(N) widest = N > widest ? N : widest;
-  TANGIBLE_FOR_EACH_JET_WIDTH(TANGIBLE_WIDER)
-#undef TANGIBLE_WIDER
-  return widest;
-}
+using testing::WidestJet;
 
 // Two more than a pass takes, whatever the widths: parameters of the balls in a row.
 Scene Balls(int count) {
@@ -32,22 +26,14 @@ Scene Balls(int count) {
 
 GradientResult JacobianOf(const Scene& scene, const std::vector<std::string>& paths,
                           GradientMethod method) {
-  std::vector<ParameterPath> parameters;
-  for (const std::string& path : paths) {
-    std::string error;
-    EXPECT_TRUE(ResolveParameter(scene, path, &parameters.emplace_back(), &error)) << error;
-  }
-  GradientOptions options;
-  options.method = method;
-  options.certificate = CertificatePass::kSkip;
-  return FinalStateJacobian(scene, parameters, options);
+  return testing::JacobianOf(scene, paths, method, CertificatePass::kSkip);
 }
 
 TEST(GradientJets, MoreParametersThanAPassTakes) {
-  if (Widest() == 0) {
+  if (WidestJet() == 0) {
     GTEST_SKIP() << "built without Jets";
   }
-  const int count = Widest() + 2;
+  const int count = WidestJet() + 2;
   const Scene scene = Balls(count);
   std::vector<std::string> paths;
   paths.reserve(count);
@@ -71,7 +57,7 @@ TEST(GradientJets, MoreParametersThanAPassTakes) {
 }
 
 TEST(GradientJets, ValuesAreThoseOfTheRunInDouble) {
-  if (Widest() == 0) {
+  if (WidestJet() == 0) {
     GTEST_SKIP() << "built without Jets";
   }
   const Scene scene = test_scenes::SceneOf(test_scenes::Mixture());
@@ -83,7 +69,7 @@ TEST(GradientJets, ValuesAreThoseOfTheRunInDouble) {
 }
 
 TEST(GradientJets, WithoutAWidthTheMessageSaysSo) {
-  if (Widest() > 0) {
+  if (WidestJet() > 0) {
     GTEST_SKIP() << "built with Jets";
   }
   const GradientResult result = JacobianOf(Balls(1), {"bodies/b0/mass"}, GradientMethod::kJet);

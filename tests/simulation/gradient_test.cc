@@ -5,6 +5,7 @@
 
 #include <cmath>
 
+#include "../support/gradients.h"
 #include "../support/scenes.h"
 #include "tangible/scene/scene_json.h"
 #include "tangible/scene/scene_names.h"
@@ -13,29 +14,13 @@ namespace tangible {
 namespace {
 
 using test_scenes::SceneOf;
-
-std::vector<ParameterPath> Resolve(const Scene& scene, const std::vector<std::string>& paths) {
-  std::vector<ParameterPath> parameters;
-  for (const std::string& path : paths) {
-    std::string error;
-    EXPECT_TRUE(ResolveParameter(scene, path, &parameters.emplace_back(), &error)) << error;
-  }
-  return parameters;
-}
+using testing::HaveJets;
+using testing::Resolve;
 
 GradientOptions Method(GradientMethod method) {
   GradientOptions options;
   options.method = method;
   return options;
-}
-
-// Whether Jets are built at all.
-bool HaveJets() {
-  int widths = 0;
-#define TANGIBLE_COUNT(N) ++widths;
-  TANGIBLE_FOR_EACH_JET_WIDTH(TANGIBLE_COUNT)
-#undef TANGIBLE_COUNT
-  return widths > 0;
 }
 
 // |a − b| ≤ tolerance max(|b|, 1e-3 of the column's largest) + rounding: entries that cancel are

@@ -73,6 +73,35 @@ TEST(RolloutTangentTest, ARestingBodyFollowsTheFloor) {
   EXPECT_NEAR(Differentiate(scene, "gravity/x").w_dot(0, 0), 2.0 / 3.0 * 1e-4 * 465.0, 1e-12);
 }
 
+TEST(RolloutTangentTest, NumbersThatNoColumnVariesAreLeftOut) {
+  const Scene scene = test_scenes::SceneOf(test_scenes::Mixture());
+  Model<double> model;
+  State<double> initial, final;
+  BuildModel(scene, &model, &initial);
+  std::vector<ParameterDirection> parameters;
+  for (const char* path : {"bodies/crate/friction", "bodies/rod/mass", "bodies/ball/velocity/x"}) {
+    ParameterPath parameter;
+    std::string error;
+    ASSERT_TRUE(ResolveParameter(scene, path, &parameter, &error)) << error;
+    parameters.push_back(DirectionOf(parameter));
+  }
+  RowMatrixXd reduced = VariableJacobian(scene, model.structure, parameters);
+  RowMatrixXd full = reduced;
+  const RolloutReport report = RolloutTangent(model, initial, {}, &reduced, &final);
+  ASSERT_EQ(report.status, StepStatus::kDone);
+  // Friction, the rod's mass and inertia; the rest of the model's numbers is fixed.
+  EXPECT_EQ(report.fixed_numbers, model.structure->num_numbers - 3);
+  StepTangent tangent;
+  Rollout(
+      model, initial,
+      [&](long, double, const State<double>&, Stepper* stepper) {
+        if (stepper != nullptr) tangent.Apply(model, stepper, &full);
+      },
+      &final);
+  EXPECT_EQ(reduced, full);  // to the last bit
+  EXPECT_GT(reduced.col(1).head(6 * model.structure->num_bodies()).norm(), 1e-3);
+}
+
 TEST(RolloutTangentTest, ObserverSeesTheTangentOfEachState) {
   const Scene scene =
       test_scenes::SceneOf(test_scenes::FallingBall(10.0, R"({"dt": 0.01, "duration": 0.1})"));

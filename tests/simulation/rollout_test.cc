@@ -80,6 +80,8 @@ TEST(RolloutTest, ReportsAddUp) {
   step.gap_min = -0.2;
   step.mode_switches = 2;
   step.residual = 1e-12;
+  step.solver.whole_system = 5;
+  step.pairs_compared = 2000000000;
   report.Add(step);
   step.solved_by = SolvedBy::kLemke;
   step.closed = 1;
@@ -90,6 +92,8 @@ TEST(RolloutTest, ReportsAddUp) {
   EXPECT_EQ(report.contacts_max, 3);
   EXPECT_EQ(report.mode_switches, 4);
   EXPECT_EQ(report.penetration_max, 0.2);
+  EXPECT_EQ(report.solver.whole_system, 10);
+  EXPECT_EQ(report.pairs_compared, 4000000000);
 }
 
 TEST(RandomSceneTest, IsAValidFileAndReachesWhatItIsFor) {
