@@ -19,12 +19,8 @@ constexpr int kFewContradicted = 2;
 constexpr int kPivotsFromGuess = 40;
 constexpr int kPivotsFromInteriorPoint = 2;
 constexpr int kPivotsFromOpen = 20;
-// Proximal steps of pivoting: δ falls from step to step. What rounding leaves of redundant impulses
-// is its inverse: at 1e-10 one path in 400 of a pile of 100 discs was lost.
-constexpr double kFirstRegularisation = 1e-7;
-constexpr double kLeastRegularisation = 1e-8;
+// Proximal steps at a path's end.
 constexpr int kMaxProximalRounds = 40;
-constexpr double kMaxExtrapolation = 1e6;
 // Complementarities after which the polish is tried; rounding may stop the iteration for one step.
 constexpr double kInteriorPointGoals[] = {1e-10, 1e-14, 1e-18, 1e-22, 1e-26, 1e-26, 1e-26, 1e-26};
 // A contact whose mode has been changed this often changes alone, the worst one first.
@@ -76,40 +72,6 @@ ModeChange Contradiction(const ContactBlock<double>& contact, const ContactValue
     }
   }
   return change;
-}
-
-// Moves the impulses on along their last change, from `before`, a little beyond where the first of
-// them meets its limit.
-void ExtrapolateImpulses(const ContactProblem<double>& problem,
-                         const ContactSolution<double>& before, ContactSolution<double>* solution) {
-  double factor = kMaxExtrapolation;
-  const auto limit = [&](double value, double last) {
-    if (value > 0.0 && value < last) {
-      factor = std::min(factor, value / (last - value));
-    }
-  };
-  for (size_t i = 0; i < problem.contacts.size(); ++i) {
-    const double normal = solution->normal_impulse[i];
-    const double last_normal = before.normal_impulse[i];
-    if (solution->modes[i] == ContactMode::kSticking) {
-      const double mu = problem.contacts[i].friction;
-      const double tangent = solution->tangent_impulse[i];
-      const double last_tangent = before.tangent_impulse[i];
-      limit(mu * normal - tangent, mu * last_normal - last_tangent);
-      limit(mu * normal + tangent, mu * last_normal + last_tangent);
-    } else if (solution->modes[i] != ContactMode::kOpen) {
-      limit(normal, last_normal);
-    }
-  }
-  factor *= 1.0 + 1e-6;
-  const auto move = [&](const std::vector<double>& from, std::vector<double>* to) {
-    for (size_t i = 0; i < to->size(); ++i) {
-      (*to)[i] += factor * ((*to)[i] - from[i]);
-    }
-  };
-  move(before.normal_impulse, &solution->normal_impulse);
-  move(before.tangent_impulse, &solution->tangent_impulse);
-  move(before.joint_impulse, &solution->joint_impulse);
 }
 
 }  // namespace
@@ -285,44 +247,6 @@ bool ContactSolver::SolveByModeChanges(const ContactProblem<double>& problem,
   return false;
 }
 
-bool ContactSolver::SolveByPivoting(const ContactProblem<double>& problem,
-                                    const ContactSolverOptions& options, ContactPivoting::From from,
-                                    int max_pivots, ContactSolution<double>* solution,
-                                    ContactSolverReport* report) {
-  double regularisation = kFirstRegularisation;
-  double last_residual = HUGE_VAL;
-  for (int round = 0; round < kMaxProximalRounds; ++round) {
-    last_ = *solution;
-    const auto follow = [&](ContactPivoting::From start) {
-      return pivoting_.Solve(problem, start, regularisation, max_pivots, &system_, solution,
-                             &report->factorisations);
-    };
-    // From the second round on the path starts where the last one ended.
-    if (!(round > 0 && follow(ContactPivoting::From::kModes)) && !follow(from)) {
-      return false;
-    }
-    trial_ = *solution;
-    if (SolveByModeChanges(problem, options, &trial_, report)) {
-      std::swap(*solution, trial_);
-      return true;
-    }
-    report->residual = NaturalResidual(problem, *solution, &report->worst_contact);
-    if (report->residual <= options.tolerance) {
-      ++report->factorisations;
-      return system_.Factor(problem, solution->modes);
-    }
-    // What δ leaves no longer falls: rows contradict each other by that much, and their impulses
-    // grow by as much a step until one meets its limit.
-    if (regularisation == kLeastRegularisation && solution->modes == last_.modes &&
-        report->residual > 0.5 * last_residual) {
-      ExtrapolateImpulses(problem, last_, solution);
-    }
-    last_residual = report->residual;
-    regularisation = std::max(kLeastRegularisation, 0.1 * regularisation);
-  }
-  return false;
-}
-
 bool ContactSolver::Polish(const ContactProblem<double>& problem,
                            const ContactSolverOptions& options, ContactSolution<double>* solution,
                            ContactSolverReport* report) {
@@ -404,7 +328,7 @@ bool ContactSolver::SolveByInteriorPoint(const ContactProblem<double>& problem,
   // Rows that are almost redundant leave modes that only pivots tell apart.
   return SolveByPivoting(problem, options, ContactPivoting::From::kModes,
                          kPivotsFromInteriorPoint * (1 + static_cast<int>(problem.contacts.size())),
-                         solution, report);
+                         kMaxProximalRounds, solution, report);
 }
 
 void ContactSolver::MeasureWithoutContacts(const ContactProblem<double>& problem,
@@ -437,6 +361,9 @@ bool ContactSolver::SolveByLemke(const ContactProblem<double>& problem,
       MeasureWithoutContacts(problem, solution, report);
     }
     return false;
+  }
+  if (SolveByRestarts(problem, options, solution, report)) {
+    return true;
   }
   const bool dense = SolveContactsDense(problem, options.tolerance, solution, &iterations);
   report->iterations += iterations;
@@ -474,7 +401,8 @@ ContactSolverReport ContactSolver::Solve(const ContactProblem<double>& problem,
   if (options.choice == ContactSolverChoice::kAuto && exact) {
     *solution = entry_;
     if (SolveByPivoting(problem, options, ContactPivoting::From::kModes,
-                        kPivotsFromGuess + num_contacts / 2, solution, &report)) {
+                        kPivotsFromGuess + num_contacts / 2, kMaxProximalRounds, solution,
+                        &report)) {
       return done(SolvedBy::kGuess);
     }
     *solution = entry_;
@@ -486,7 +414,8 @@ ContactSolverReport ContactSolver::Solve(const ContactProblem<double>& problem,
   if (options.choice != ContactSolverChoice::kInteriorPoint && exact) {
     *solution = entry_;
     if (SolveByPivoting(problem, options, ContactPivoting::From::kOpen,
-                        kPivotsFromOpen * (1 + num_contacts), solution, &report)) {
+                        kPivotsFromOpen * (1 + num_contacts), kMaxProximalRounds, solution,
+                        &report)) {
       return done(SolvedBy::kLemke);
     }
   }
