@@ -21,20 +21,18 @@ namespace {
 constexpr double kFirstRegularisation = 1e-7;
 constexpr double kLeastRegularisation = 1e-8;
 constexpr double kMaxExtrapolation = 1e6;
-// Extrapolations in a row on which no impulse meets its limit: a jam.
-constexpr int kMaxJammed = 2;
 // Restarts: proximal steps of each (what arrives needs up to 4), pivots as a multiple of the
 // contacts, one multiple more after every few, and the factorisations of all together: a number,
 // and less where one is dear.
-constexpr int kRestartRounds = 8;
+constexpr int kRestartRounds = 5;
 constexpr int kPivotsOfRestart = 20;
 constexpr int kRestartsOfMultiple = 4;
 constexpr int kMaxRestartFactorisations = 80000;
 constexpr int kMaxRestartWork = 8000000;
 
 // Moves the impulses on along their last change, from `before`, a little beyond where the first of
-// them meets its limit; whether one does.
-bool ExtrapolateImpulses(const ContactProblem<double>& problem,
+// them meets its limit.
+void ExtrapolateImpulses(const ContactProblem<double>& problem,
                          const ContactSolution<double>& before, ContactSolution<double>* solution) {
   double factor = kMaxExtrapolation;
   const auto limit = [&](double value, double last) {
@@ -55,7 +53,6 @@ bool ExtrapolateImpulses(const ContactProblem<double>& problem,
       limit(normal, last_normal);
     }
   }
-  const bool limited = factor < kMaxExtrapolation;
   factor *= 1.0 + 1e-6;
   const auto move = [&](const std::vector<double>& from, std::vector<double>* to) {
     for (size_t i = 0; i < to->size(); ++i) {
@@ -65,7 +62,6 @@ bool ExtrapolateImpulses(const ContactProblem<double>& problem,
   move(before.normal_impulse, &solution->normal_impulse);
   move(before.tangent_impulse, &solution->tangent_impulse);
   move(before.joint_impulse, &solution->joint_impulse);
-  return limited;
 }
 
 // No contact acts.
@@ -109,7 +105,6 @@ bool ContactSolver::SolveByPivoting(const ContactProblem<double>& problem,
                                     ContactSolverReport* report) {
   double regularisation = kFirstRegularisation;
   double last_residual = HUGE_VAL;
-  int jammed = 0;
   for (int round = 0; round < max_rounds; ++round) {
     last_ = *solution;
     const auto follow = [&](ContactPivoting::From start) {
@@ -134,10 +129,7 @@ bool ContactSolver::SolveByPivoting(const ContactProblem<double>& problem,
     // grow by as much a step until one meets its limit.
     if (regularisation == kLeastRegularisation && solution->modes == last_.modes &&
         report->residual > 0.5 * last_residual) {
-      jammed = ExtrapolateImpulses(problem, last_, solution) ? 0 : jammed + 1;
-      if (jammed == kMaxJammed) {
-        return false;
-      }
+      ExtrapolateImpulses(problem, last_, solution);
     }
     last_residual = report->residual;
     regularisation = std::max(kLeastRegularisation, 0.1 * regularisation);

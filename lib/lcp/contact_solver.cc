@@ -19,6 +19,8 @@ constexpr int kFewContradicted = 2;
 constexpr int kPivotsFromGuess = 40;
 constexpr int kPivotsFromInteriorPoint = 2;
 constexpr int kPivotsFromOpen = 20;
+// Up to so many contacts the dense portfolio takes milliseconds.
+constexpr size_t kFewContacts = 8;
 // Proximal steps at a path's end.
 constexpr int kMaxProximalRounds = 40;
 // Complementarities after which the polish is tried; rounding may stop the iteration for one step.
@@ -362,12 +364,15 @@ bool ContactSolver::SolveByLemke(const ContactProblem<double>& problem,
     }
     return false;
   }
-  if (SolveByRestarts(problem, options, solution, report)) {
-    return true;
-  }
-  const bool dense = SolveContactsDense(problem, options.tolerance, solution, &iterations);
-  report->iterations += iterations;
-  return dense && Polish(problem, options, solution, report);
+  const auto by_dense = [&] {
+    const bool dense = SolveContactsDense(problem, options.tolerance, solution, &iterations);
+    report->iterations += iterations;
+    return dense && Polish(problem, options, solution, report);
+  };
+  const auto by_restarts = [&] { return SolveByRestarts(problem, options, solution, report); };
+  // What is cheaper comes first.
+  return problem.contacts.size() <= kFewContacts ? by_dense() || by_restarts()
+                                                 : by_restarts() || by_dense();
 }
 
 ContactSolverReport ContactSolver::Solve(const ContactProblem<double>& problem,
