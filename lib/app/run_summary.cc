@@ -34,6 +34,7 @@ OrderedJson FallbacksJson(const RolloutReport& report) {
           {"interior_point", solver.interior_point},
           {"lemke", solver.lemke},
           {"dense", solver.dense},
+          {"restarts", solver.restarts},
           {"extrapolation", solver.extrapolation},
           {"regularised", solver.regularised},
           {"whole_system", solver.whole_system},

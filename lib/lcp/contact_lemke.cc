@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "tangible/lcp/contact_solver.h"
+#include "tangible/lcp/farkas.h"
 #include "tangible/lcp/lemke.h"
 #include "tangible/lcp/solver.h"
 
@@ -27,6 +28,8 @@ void SetRow(int a, const RowPart<double>& row_a, int b, const RowPart<double>& r
 
 // Attempts of the dense portfolio cost (rows)³ each.
 constexpr int kMaxDenseRows = 240;
+// A proof that nothing is feasible costs less.
+constexpr int kMaxProvedRows = 400;
 
 int RowsOf(const ContactBlock<double>& contact) { return contact.has_friction ? 4 : 1; }
 
@@ -141,6 +144,11 @@ bool SolveContactsByLemke(const ContactProblem<double>& problem, ContactSolution
   Extract(problem, reduced->v0 + reduced->v_z * result.z, reduced->y0 + reduced->y_z * result.z,
           result.z, solution);
   return true;
+}
+
+bool ContactsProvedInfeasible(const ContactProblem<double>& problem) {
+  const MixedLcp<double> dense = DenseProblem(problem);
+  return dense.num_z() <= kMaxProvedRows && FindFarkas(dense).size() > 0;
 }
 
 bool SolveContactsDense(const ContactProblem<double>& problem, double tolerance,

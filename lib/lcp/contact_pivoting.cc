@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <random>
 
 #include "tangible/lcp/contact_residual.h"
 #include "tangible/math/scratch.h"
@@ -19,12 +20,6 @@ constexpr double kCentreShift = 1e-4;
 // Rounds in which sliding contacts that would pull are opened before the start.
 constexpr int kMaxStartRounds = 30;
 
-// Numbers in [0.5, 1) that no symmetry of a scene shares: the golden ratio's sequence.
-double Scatter(size_t i, int kind) {
-  const double x = 0.6180339887498949 * static_cast<double>(3 * i + kind + 1);
-  return 0.5 + 0.5 * (x - std::floor(x));
-}
-
 bool Slides(ContactMode mode) {
   return mode == ContactMode::kSlidingPositive || mode == ContactMode::kSlidingNegative;
 }
@@ -36,6 +31,18 @@ void ContactPivoting::Reserve(int num_blocks, int num_contacts) {
   shifts_.reserve(num_contacts);
   x_.reserve(6 * static_cast<size_t>(num_blocks));
   joint_centre_.reserve(3 * static_cast<size_t>(num_blocks));
+}
+
+// Numbers in [0.5, 1) that no symmetry of a scene shares, the golden ratio's sequence; with a seed
+// in [0.1, 10), log-uniform.
+double ContactPivoting::Scatter(size_t contact, int kind) const {
+  const size_t at = 3 * contact + static_cast<size_t>(kind);
+  if (scatter_ != 0) {
+    std::mt19937_64 random(scatter_ + at);
+    return std::pow(10.0, static_cast<double>(random() >> 11) * 0x1p-52 - 1.0);
+  }
+  const double x = 0.6180339887498949 * static_cast<double>(at + 1);
+  return 0.5 + 0.5 * (x - std::floor(x));
 }
 
 // Solves for the value and the rate of all unknowns with the present modes.

@@ -21,6 +21,7 @@
 // Source: R. W. Cottle, J.-S. Pang, R. E. Stone, The Linear Complementarity Problem, 1992, section
 // 4.5 (parametric methods); B. C. Eaves, On the basic theorem of complementarity, 1971.
 
+#include <cstdint>
 #include <vector>
 
 #include "tangible/lcp/contact_problem.h"
@@ -41,6 +42,8 @@ class ContactPivoting {
              int max_pivots, ContactSystem* system, ContactSolution<double>* solution,
              int* factorisations);
   void Reserve(int num_blocks, int num_contacts);
+  /// Other shifts, over two powers of ten, for another path; 0: the usual ones.
+  void SetScatter(std::uint64_t seed) { scatter_ = seed; }
 
  private:
   // Shifts of a contact, and the centre of its impulses.
@@ -61,6 +64,8 @@ class ContactPivoting {
     ContactMode next = ContactMode::kOpen;
   };
 
+  // What breaks ties: a factor for one of a contact's shifts.
+  double Scatter(size_t contact, int kind) const;
   void SetCentre(const ContactSolution<double>& solution);
   bool SolveSystem();
   bool Start(From from);
@@ -78,6 +83,7 @@ class ContactPivoting {
   ContactSystem* system_ = nullptr;
   int* factorisations_ = nullptr;
   double regularisation_ = 0.0;
+  std::uint64_t scatter_ = 0;
   std::vector<ContactMode> modes_;
   std::vector<Shift> shifts_;
   std::vector<double> x_;  // (value, rate) of the system's unknowns

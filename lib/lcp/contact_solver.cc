@@ -16,10 +16,9 @@ constexpr int kFewContradicted = 2;
 constexpr int kPivotsFromGuess = 40;
 constexpr int kPivotsFromInteriorPoint = 2;
 constexpr int kPivotsFromOpen = 20;
-// Proximal steps of pivoting: δ falls from step to step. What rounding leaves of redundant impulses
-// is its inverse: at 1e-10 one path in 400 of a pile of 100 discs was lost.
-constexpr double kFirstRegularisation = 1e-7;
-constexpr double kLeastRegularisation = 1e-8;
+// Up to so many contacts the dense portfolio takes milliseconds.
+constexpr size_t kFewContacts = 8;
+// Proximal steps at a path's end.
 constexpr int kMaxProximalRounds = 40;
 // Complementarities after which the polish is tried; rounding may stop the iteration for one step.
 constexpr double kInteriorPointGoals[] = {1e-10, 1e-14, 1e-18, 1e-22, 1e-26, 1e-26, 1e-26, 1e-26};
@@ -33,6 +32,7 @@ void ContactFallbacks::Add(const ContactFallbacks& other) {
   interior_point += other.interior_point;
   lemke += other.lemke;
   dense += other.dense;
+  restarts += other.restarts;
   extrapolation += other.extrapolation;
   regularised += other.regularised;
   whole_system += other.whole_system;
@@ -210,45 +210,6 @@ bool ContactSolver::SolveByModeChanges(const ContactProblem<double>& problem,
   return false;
 }
 
-bool ContactSolver::SolveByPivoting(const ContactProblem<double>& problem,
-                                    const ContactSolverOptions& options, ContactPivoting::From from,
-                                    int max_pivots, ContactSolution<double>* solution,
-                                    ContactSolverReport* report) {
-  double regularisation = kFirstRegularisation;
-  double last_residual = HUGE_VAL;
-  for (int round = 0; round < kMaxProximalRounds; ++round) {
-    last_ = *solution;
-    const auto follow = [&](ContactPivoting::From start) {
-      return pivoting_.Solve(problem, start, regularisation, max_pivots, &system_, solution,
-                             &report->factorisations);
-    };
-    // From the second round on the path starts where the last one ended.
-    if (!(round > 0 && follow(ContactPivoting::From::kModes)) && !follow(from)) {
-      return false;
-    }
-    trial_ = *solution;
-    if (SolveByModeChanges(problem, options, &trial_, report)) {
-      std::swap(*solution, trial_);
-      return true;
-    }
-    report->residual = NaturalResidual(problem, *solution, &report->worst_contact);
-    if (report->residual <= options.tolerance) {
-      ++report->factorisations;
-      return system_.Factor(problem, solution->modes);
-    }
-    // What δ leaves no longer falls: rows contradict each other by that much, and their impulses
-    // grow by as much a step until one meets its limit.
-    if (regularisation == kLeastRegularisation && solution->modes == last_.modes &&
-        report->residual > 0.5 * last_residual) {
-      ExtrapolateImpulses(problem, last_, solution);
-      ++report->fallbacks.extrapolation;
-    }
-    last_residual = report->residual;
-    regularisation = std::max(kLeastRegularisation, 0.1 * regularisation);
-  }
-  return false;
-}
-
 bool ContactSolver::Polish(const ContactProblem<double>& problem,
                            const ContactSolverOptions& options, ContactSolution<double>* solution,
                            ContactSolverReport* report) {
@@ -331,7 +292,7 @@ bool ContactSolver::SolveByInteriorPoint(const ContactProblem<double>& problem,
   ++report->fallbacks.pivoting;
   return SolveByPivoting(problem, options, ContactPivoting::From::kModes,
                          kPivotsFromInteriorPoint * (1 + static_cast<int>(problem.contacts.size())),
-                         solution, report);
+                         kMaxProximalRounds, solution, report);
 }
 
 void ContactSolver::MeasureWithoutContacts(const ContactProblem<double>& problem,
@@ -365,10 +326,19 @@ bool ContactSolver::SolveByLemke(const ContactProblem<double>& problem,
     }
     return false;
   }
-  ++report->fallbacks.dense;
-  const bool dense = SolveContactsDense(problem, options.tolerance, solution, &iterations);
-  report->iterations += iterations;
-  return dense && Polish(problem, options, solution, report);
+  const auto by_dense = [&] {
+    ++report->fallbacks.dense;
+    const bool dense = SolveContactsDense(problem, options.tolerance, solution, &iterations);
+    report->iterations += iterations;
+    return dense && Polish(problem, options, solution, report);
+  };
+  const auto by_restarts = [&] {
+    ++report->fallbacks.restarts;
+    return SolveByRestarts(problem, options, solution, report);
+  };
+  // What is cheaper comes first.
+  return problem.contacts.size() <= kFewContacts ? by_dense() || by_restarts()
+                                                 : by_restarts() || by_dense();
 }
 
 ContactSolverReport ContactSolver::Solve(const ContactProblem<double>& problem,
@@ -414,7 +384,8 @@ ContactSolverReport ContactSolver::RunPortfolio(const ContactProblem<double>& pr
     *solution = entry_;
     ++report.fallbacks.pivoting;
     if (SolveByPivoting(problem, options, ContactPivoting::From::kModes,
-                        kPivotsFromGuess + num_contacts / 2, solution, &report)) {
+                        kPivotsFromGuess + num_contacts / 2, kMaxProximalRounds, solution,
+                        &report)) {
       return done(SolvedBy::kGuess);
     }
     *solution = entry_;
@@ -428,7 +399,8 @@ ContactSolverReport ContactSolver::RunPortfolio(const ContactProblem<double>& pr
     *solution = entry_;
     report.fallbacks.lemke += any ? 1 : 0;
     if (SolveByPivoting(problem, options, ContactPivoting::From::kOpen,
-                        kPivotsFromOpen * (1 + num_contacts), solution, &report)) {
+                        kPivotsFromOpen * (1 + num_contacts), kMaxProximalRounds, solution,
+                        &report)) {
       return done(SolvedBy::kLemke);
     }
   }

@@ -14,6 +14,7 @@
 //    margins hide them.
 // 4. Lemke's method: pivoting from all contacts open; then on the dense one-sided form; for
 // problems
+//    that are not proved infeasible pivoting from random starts (contact_restarts.cc); for those
 //    that are not large the dense portfolio's other attempts.
 //
 // After 3 and 4 the modes are identified and the mode system is solved once more: the polish. A
@@ -51,6 +52,7 @@ struct ContactFallbacks {
   long interior_point = 0;    ///< runs of the interior point
   long lemke = 0;             ///< paths of pivots from all contacts open, Lemke's method
   long dense = 0;             ///< the dense portfolio
+  long restarts = 0;          ///< paths of pivots from many random starts
   long extrapolation = 0;     ///< impulses of rows that contradict each other moved on
   long regularised = 0;       ///< proximal steps in which δ stands for redundant rows
   long whole_system = 0;      ///< condensed systems that were factorised as a whole instead
@@ -100,7 +102,11 @@ class ContactSolver {
   void MeasureWithoutContacts(const ContactProblem<double>& problem,
                               ContactSolution<double>* solution, ContactSolverReport* report);
   bool SolveByPivoting(const ContactProblem<double>& problem, const ContactSolverOptions& options,
-                       ContactPivoting::From from, int max_pivots,
+                       ContactPivoting::From from, int max_pivots, int max_rounds,
+                       ContactSolution<double>* solution, ContactSolverReport* report);
+  // Pivoting from random modes and over random shifts (contact_restarts.cc), unless the problem is
+  // proved to have no solution.
+  bool SolveByRestarts(const ContactProblem<double>& problem, const ContactSolverOptions& options,
                        ContactSolution<double>* solution, ContactSolverReport* report);
   bool Polish(const ContactProblem<double>& problem, const ContactSolverOptions& options,
               ContactSolution<double>* solution, ContactSolverReport* report);
@@ -119,6 +125,10 @@ class ContactSolver {
 /// fails or the problem has more than 240 rows.
 bool SolveContactsDense(const ContactProblem<double>& problem, double tolerance,
                         ContactSolution<double>* solution, int* iterations);
+
+/// Whether a checked Farkas vector says that no impulses satisfy the contacts' inequalities; false
+/// too where the problem has more than 400 rows.
+bool ContactsProvedInfeasible(const ContactProblem<double>& problem);
 
 /// Lemke's method on the dense one-sided form of the problem; false where it fails.
 bool SolveContactsByLemke(const ContactProblem<double>& problem, ContactSolution<double>* solution,

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 
 #include "contact_problems.h"
 #include "tangible/lcp/contact_residual.h"
@@ -119,6 +120,33 @@ TEST(ContactPivotingTest, NoSolutionIsARay) {
   if (Follow(p, From::kOpen, &solution, &factorisations)) {
     EXPECT_GT(NaturalResidual(p, solution, &worst), 0.1);
   }
+}
+
+TEST(ContactPivotingTest, ScatterMakesAnotherPathAndIsTakenBack) {
+  std::mt19937_64 random(7);
+  const ContactProblem<double> p = testing::RandomContactProblem(&random, 8, 12);
+  ContactPivoting pivoting;
+  ContactSystem system;
+  int factorisations = 0;
+  const auto follow = [&](std::uint64_t seed) {
+    pivoting.SetScatter(seed);
+    ContactSolution<double> solution = EmptySolution(p);
+    factorisations = 0;
+    EXPECT_TRUE(pivoting.Solve(p, From::kOpen, kDelta, 500, &system, &solution, &factorisations));
+    int worst = 0;
+    EXPECT_LE(NaturalResidual(p, solution, &worst), 1e-6);
+    return solution;
+  };
+  const ContactSolution<double> usual = follow(0);
+  const int usual_length = factorisations;
+  int others = 0;
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    follow(seed);
+    others += factorisations == usual_length ? 0 : 1;
+  }
+  EXPECT_GT(others, 0);
+  EXPECT_EQ(follow(0).v, usual.v);
+  EXPECT_EQ(factorisations, usual_length);
 }
 
 }  // namespace

@@ -108,9 +108,9 @@ TEST_F(TangibleSimulateTest, SummaryHasItsKeysAndItsNumbersAreRight) {
   EXPECT_EQ(reductions["lcp_rows"],
             3 * reductions["contacts"].get<int>() - 2 * reductions["single_rows"].get<int>());
   EXPECT_LE(reductions["pairs_near"], reductions["pairs_compared"]);
-  for (const char* kind : {"pivoting", "interior_point", "lemke", "dense", "extrapolation",
-                           "regularised", "whole_system", "islands_together", "newton_stages",
-                           "halved_motions", "damped_projections"}) {
+  for (const char* kind : {"pivoting", "interior_point", "lemke", "dense", "restarts",
+                           "extrapolation", "regularised", "whole_system", "islands_together",
+                           "newton_stages", "halved_motions", "damped_projections"}) {
     EXPECT_EQ(s["fallback_kinds"].count(kind), 1u) << kind;
   }
   EXPECT_EQ(s["fallback_kinds"]["interior_point"], 0);
