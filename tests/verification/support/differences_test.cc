@@ -53,6 +53,27 @@ TEST(DifferencesTest, AKinkAtTheValueIsToldAndItsContactNamed) {
   EXPECT_EQ(column.plain[0].values.size(), 6);
 }
 
+TEST(DifferencesTest, SidesWithChoicesOfTheirOwnMayAgree) {
+  // Pushed up it flies and lands, pushed down it strikes: friction loses or gains as much.
+  Scene scene = SlidingBox("0.3");
+  scene.simulation.stepping = Stepping::kEvent;
+  scene.simulation.integrator = Integrator::kRungeKutta4;
+  const RunTrace trace = TraceRun(scene);
+  const VectorX<double> noise = RoundingNoise(scene, trace);
+  const ParameterPath up = PathTo(scene, "bodies/box/velocity/y");
+  EXPECT_EQ(FiniteDifferences(scene, trace, noise, up).status, DifferenceStatus::kChoicesDiffer);
+  const DifferenceColumn column =
+      FiniteDifferences(scene, trace, noise, up, ChoicesDiffer::kCompareSides);
+  ASSERT_EQ(column.status, DifferenceStatus::kJudged);
+  EXPECT_NEAR(column.values[3], 0.3, column.errors[3] + 1e-9);
+  EXPECT_LT(column.errors[3], 1e-6);
+  // Higher it falls at first, deeper it is pushed out: those do not agree.
+  EXPECT_EQ(FiniteDifferences(scene, trace, noise, PathTo(scene, "bodies/box/position/y"),
+                              ChoicesDiffer::kCompareSides)
+                .status,
+            DifferenceStatus::kChoicesDiffer);
+}
+
 TEST(DifferencesTest, ATwistThatGapsSetIsAsUncertainAsThey) {
   const Scene scene = SlidingBox("0.3");
   const RunTrace trace = TraceRun(scene);

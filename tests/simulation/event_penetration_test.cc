@@ -1,0 +1,174 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Derivatives of event steps where bodies lie in each other, or rest, as the run starts.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "../support/gradients.h"
+#include "../support/scenes.h"
+#include "tangible/simulation/event_step.h"
+#include "tangible/simulation/rollout.h"
+
+namespace tangible {
+namespace {
+
+using test_scenes::SceneOf;
+using testing::ExpectOthersAgree;
+using testing::Jacobian;
+
+constexpr double kG = 9.81;
+
+// A ball of radius 0.1 m, 4 mm deep in a floor that pushes it out at 0.05 m/s.
+Scene DeepBall(double vy, const std::string& integrator, const std::string& duration) {
+  return SceneOf(R"({"bodies": [
+      {"name": "ball", "shape": {"circle": {"radius": 0.1}}, "mass": 1.5, "position": [0, 0.096],
+       "velocity": [0.3, )" +
+                 std::to_string(vy) + R"(], "friction": 0.2},
+      {"name": "floor", "static": true, "friction": 0.2,
+       "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}}],
+    "simulation": {"stepping": "event", "dt": 0.005, "recovery_speed": 0.05, "integrator": ")" +
+                 integrator + R"(", "duration": )" + duration + "}}");
+}
+
+// Thrown up at v it turns after v / g, still within the floor, which holds it from there on and
+// pushes it out: y = y0 + v² / 2g + 0.05 (t − v / g).
+TEST(EventPenetrationTest, WhatOpensWithinAnotherReturnsWhereItTurns) {
+  for (const char* integrator : {"trapezoidal", "runge_kutta_4"}) {
+    const double v = 0.03;
+    const Scene scene = DeepBall(v, integrator, "0.02");
+    const std::vector<std::string> paths = {"bodies/ball/velocity/y", "bodies/ball/position/y",
+                                            "gravity/y", "bodies/ball/mass", "bodies/*/friction"};
+    const GradientResult r = Jacobian(scene, paths, GradientMethod::kAdjoint);
+    EXPECT_EQ(r.certificate.verdict, "trustworthy");
+    EXPECT_NEAR(r.values[1], 0.096 + 0.5 * v * v / kG + 0.05 * (0.02 - v / kG), 1e-13);
+    EXPECT_NEAR(r.jacobian(1, 0), (v - 0.05) / kG, 1e-12);
+    EXPECT_NEAR(r.jacobian(1, 1), 1.0, 1e-12);
+    EXPECT_NEAR(r.jacobian(1, 2), v * (0.5 * v - 0.05) / (kG * kG), 1e-12);
+    ExpectOthersAgree(scene, paths, r);
+  }
+}
+
+TEST(EventPenetrationTest, TheReturnIsAnEventOfItsOwn) {
+  const Scene scene = DeepBall(0.03, "runge_kutta_4", "0.005");
+  Model<double> model;
+  State<double> state;
+  BuildModel(scene, &model, &state);
+  Stepper stepper(model);
+  ASSERT_EQ(stepper.Step(model, 0.0, 0.005, &state).status, StepStatus::kDone);
+  const EventRecord& record = stepper.events().record();
+  int returns = 0;
+  for (int p = 0; p < record.num_parts; ++p) {
+    const EventPart& part = *record.parts[p];
+    if (!part.is_impulses && part.segment.event == EventKind::kReturn) {
+      ++returns;
+      EXPECT_NEAR(part.segment.time + part.segment.length, 0.03 / kG, 1e-14);
+      EXPECT_LT(part.segment.event_contact.joint, 0);
+    }
+  }
+  EXPECT_EQ(returns, 1);
+}
+
+// The impact is at once, however deep it lies: no time changes with its place.
+TEST(EventPenetrationTest, AnImpactWithinAnotherHasNoTimeThatItsPlaceMoves) {
+  const Scene scene = DeepBall(-1.0, "runge_kutta_4", "0.02");
+  const std::vector<std::string> paths = {"bodies/ball/position/y", "bodies/ball/velocity/y",
+                                          "bodies/*/friction"};
+  const GradientResult r = Jacobian(scene, paths, GradientMethod::kAdjoint);
+  EXPECT_EQ(r.certificate.verdict, "trustworthy");
+  EXPECT_NEAR(r.jacobian(1, 0), 1.0, 1e-12);
+  EXPECT_NEAR(r.jacobian(1, 1), 0.0, 1e-12);
+  ExpectOthersAgree(scene, paths, r);
+}
+
+// A joint beyond its limit turns back in the same way.
+TEST(EventPenetrationTest, AJointBeyondItsLimitReturnsWhereItTurns) {
+  const Scene scene = SceneOf(R"({"bodies": [
+      {"name": "arm", "shape": {"box": {"size": [0.4, 0.05]}}, "mass": 1, "position": [0.2, 0],
+       "velocity": [0, 0.04], "angular_velocity": 0.2}],
+    "joints": [{"name": "pin", "type": "revolute", "bodies": ["arm", "world"], "anchor": [0, 0],
+       "limits": [0.01, 1]}],
+    "simulation": {"stepping": "event", "integrator": "runge_kutta_4", "dt": 0.005,
+                   "duration": 0.02, "recovery_speed": 0.05}})");
+  const std::vector<std::string> paths = {"bodies/arm/mass", "gravity/y"};
+  const GradientResult r = Jacobian(scene, paths, GradientMethod::kAdjoint);
+  ExpectOthersAgree(scene, paths, r);
+}
+
+// It slides at 1 m/s. A push down lands and a push up is missed by what presses: both change the
+// impulse of friction, so that ∂vx/∂vy = μ on either side.
+TEST(EventPenetrationTest, AFirstTwistThatLandsActsWithFriction) {
+  for (const double mu : {0.3, 0.7}) {
+    const Scene scene = SceneOf(R"({"bodies": [
+        {"name": "box", "shape": {"box": {"size": [0.4, 0.2]}}, "mass": 1, "position": [0, 0.1],
+         "velocity": [1, 0], "friction": )" +
+                                std::to_string(mu) + R"(},
+        {"name": "floor", "static": true, "friction": )" +
+                                std::to_string(mu) + R"(,
+         "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}}],
+      "simulation": {"stepping": "event", "integrator": "runge_kutta_4", "dt": 0.01,
+                     "duration": 0.1}})");
+    const GradientResult r = Jacobian(scene, {"bodies/box/velocity/y"}, GradientMethod::kAdjoint);
+    EXPECT_EQ(r.certificate.verdict, "trustworthy");
+    EXPECT_NEAR(r.jacobian(3, 0), mu, 1e-12);
+    EXPECT_NEAR(r.jacobian(0, 0), 0.1 * mu, 1e-12);
+    for (const double side : {1e-6, -1e-6}) {
+      Scene pushed = scene;
+      pushed.bodies[0].velocity.y() = side;
+      Model<double> model;
+      State<double> initial, before, after;
+      BuildModel(scene, &model, &initial);
+      ASSERT_EQ(Rollout(model, initial, {}, &before).status, StepStatus::kDone);
+      BuildModel(pushed, &model, &initial);
+      ASSERT_EQ(Rollout(model, initial, {}, &after).status, StepStatus::kDone);
+      EXPECT_NEAR((after.twist[0] - before.twist[0]) / side, mu, 1e-5);
+    }
+  }
+}
+
+// The ball beside the box is stepped in two parts once the box hops: its spring feels the error of
+// the integrator, which the certificate names; without that error nothing is to be named.
+TEST(EventPenetrationTest, AnEventThatSplitsTheFirstStepIsNamed) {
+  const auto verdict = [](const std::string& integrator) {
+    const Scene scene = SceneOf(R"({"bodies": [
+        {"name": "box", "shape": {"box": {"size": [0.4, 0.2]}}, "mass": 1, "position": [0, 0.1],
+         "friction": 0.3},
+        {"name": "ball", "shape": {"circle": {"radius": 0.1}}, "mass": 1, "position": [2, 2]},
+        {"name": "floor", "static": true, "friction": 0.3,
+         "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}}],
+      "simulation": {"stepping": "event", "dt": 0.01, "duration": 0.03, "integrator": ")" +
+                                integrator + R"("}})");
+    return Jacobian(scene, {"bodies/box/velocity/y"}, GradientMethod::kTangent).certificate.verdict;
+  };
+  EXPECT_NE(verdict("semi_implicit_euler").find("lets an event split the first step"),
+            std::string::npos);
+  EXPECT_EQ(verdict("trapezoidal"), "trustworthy");
+  EXPECT_EQ(verdict("runge_kutta_4"), "trustworthy");
+}
+
+// No force acts on the slider: what rounding leaves of its angular velocity is no contradiction.
+TEST(EventPenetrationTest, ASliderWithoutForcesIsNotContradicted) {
+  for (int k = -20; k <= 20; ++k) {
+    Scene scene = SceneOf(R"({"gravity": [0, 0], "bodies": [
+        {"name": "link", "shape": {"circle": {"radius": 0.07}}, "mass": 0.6466,
+         "position": [-1.23579, 0.7601646], "angle": -0.561062},
+        {"name": "ball", "shape": {"capsule": {"length": 0.1426437, "radius": 0.09374449}},
+         "mass": 1.1903257, "position": [0.0414882504, 0.1884663], "angle": 0.1869086,
+         "velocity": [-1.767214, -2.337236], "angular_velocity": 2.54116},
+        {"name": "floor", "static": true, "shape": {"half_plane": {"normal": [0.2, 1],
+         "offset": 0}}}],
+      "joints": [{"name": "slide", "type": "prismatic", "bodies": ["link", "world"],
+         "anchor": [-1.17194, 0.8617674], "axis": [0.98555, 0.41889], "rate": 0.172987}],
+      "simulation": {"stepping": "event", "integrator": "runge_kutta_4", "dt": 0.005,
+                     "duration": 0.05, "joint_correction": "none"}})");
+    scene.bodies[1].angular_velocity *= 1.0 + 1e-5 * k;
+    Model<double> model;
+    State<double> initial, final;
+    BuildModel(scene, &model, &initial);
+    const RolloutReport report = Rollout(model, initial, {}, &final);
+    EXPECT_EQ(report.status, StepStatus::kDone) << report.message;
+  }
+}
+
+}  // namespace
+}  // namespace tangible
