@@ -406,6 +406,7 @@ EventOutcome EventStepper::Step(const Model<double>& model, double t, double h,
   EventOutcome outcome;
   record_.Clear();
   inelastic_ = false;
+  search_.StartStep();
   const std::vector<Edge> edges = EdgesWithin(model, t, t + h);
   size_t next_edge = 0;
   const double end = t + h;
@@ -486,11 +487,8 @@ EventOutcome EventStepper::Step(const Model<double>& model, double t, double h,
     halvings = 0;
     now += segment.length;
     SwitchMode(segment);
-    if (segment.event != EventKind::kTouch && ++outcome.events > most) {
-      return fail("events do not end");
-    }
-    if (segment.event == EventKind::kTouch && segment.length <= 1e-13 * h &&
-        ++outcome.events > most) {
+    const bool counts = segment.event != EventKind::kTouch || segment.length <= 1e-13 * h;
+    if (counts && ++outcome.events > most) {
       return fail("events do not end");
     }
   }
