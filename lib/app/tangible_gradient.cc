@@ -155,6 +155,14 @@ OrderedJson Describe(const GradientResult& result) {
   return text;
 }
 
+// Empty, or one line: derivatives of numbers near 1e308 or 1e-308 may be beyond what numbers hold.
+std::string CheckFinite(const std::string& file, const GradientResult& result) {
+  const bool finite = result.values.allFinite() && result.jacobian.allFinite() &&
+                      result.gradient.allFinite() &&
+                      (FLAGS_loss.empty() || std::isfinite(result.loss));
+  return finite ? "" : file + ": expected finite derivatives, got one beyond what numbers hold";
+}
+
 int Run(const std::string& file, const GradientOptions& options) {
   Scene scene;
   std::string error;
@@ -175,6 +183,8 @@ int Run(const std::string& file, const GradientOptions& options) {
     result = LossGradient(scene, parameters, terms, options);
   }
   if (!result.done) return ReportError(result.message);
+  error = CheckFinite(file, result);
+  if (!error.empty()) return ReportError(error);
   error = WriteResult(FLAGS_out, JsonText(Describe(result)));
   return error.empty() ? kExitDone : ReportError(error);
 }

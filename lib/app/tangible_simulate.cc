@@ -175,6 +175,11 @@ void Prepare(const std::string& file, Job* job) {
       !ReadInitialState(FLAGS_initial, *job->model.structure, &job->initial, &job->error)) {
     return;
   }
+  job->error = CheckInitialState(*job->model.structure, job->initial);
+  if (!job->error.empty()) {
+    job->error.insert(0, file + ": ");
+    return;
+  }
   MakeRecorders(job);
 }
 

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tangible/app/trajectory_csv.h"
 
+#include <cmath>
+
 #include "tangible/app/program.h"
 #include "tangible/scene/csv.h"
 #include "tangible/simulation/certify.h"
@@ -110,6 +112,19 @@ bool ReadInitialState(const std::string& file, const ModelStructure& structure,
     }
   }
   return true;
+}
+
+std::string CheckInitialState(const ModelStructure& structure, const State<double>& state) {
+  for (int body = 0; body < structure.num_bodies(); ++body) {
+    for (int i = 0; i < 3; ++i) {
+      if (!std::isfinite(state.pose[3 * body + i]) || !std::isfinite(state.twist[3 * body + i])) {
+        return "body " + structure.bodies[body].name +
+               ": expected a finite pose and twist at time 0, got joints' or its own numbers that "
+               "are too large";
+      }
+    }
+  }
+  return "";
 }
 
 }  // namespace tangible

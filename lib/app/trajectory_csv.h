@@ -46,4 +46,7 @@ class ContactsCsv {
 bool ReadInitialState(const std::string& file, const ModelStructure& structure,
                       State<double>* state, std::string* error);
 
+/// Empty, or what of the first state is not finite: joints' rates on arms of 1e308 m, say.
+std::string CheckInitialState(const ModelStructure& structure, const State<double>& state);
+
 }  // namespace tangible

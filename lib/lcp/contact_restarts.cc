@@ -21,13 +21,14 @@ namespace {
 // is its inverse: at 1e-10 one path in 400 of a pile of 100 discs was lost.
 constexpr double kFirstRegularisation = 1e-7;
 constexpr double kLeastRegularisation = 1e-8;
-// Restarts: proximal steps of each (what arrives needs up to 4), pivots as a multiple of the
-// contacts, one multiple more after every few, and the factorisations of all together: a number,
-// and less where one is dear.
+// Restarts, and proximal steps of each (what arrives needs up to 4). Pivots as a multiple of the
+// contacts, one multiple more after every few; the factorisations of all together: a multiple of
+// the contacts, and less where one is dear.
+constexpr int kMaxRestarts = 100;
 constexpr int kRestartRounds = 5;
 constexpr int kPivotsOfRestart = 20;
 constexpr int kRestartsOfMultiple = 4;
-constexpr int kMaxRestartFactorisations = 80000;
+constexpr int kFactorisationsOfContact = 1000;
 constexpr int kMaxRestartWork = 8000000;
 
 // No contact acts.
@@ -114,9 +115,13 @@ bool ContactSolver::SolveByRestarts(const ContactProblem<double>& problem,
   const ContactSolverReport before = *report;
   const ContactSolution<double> last = *solution;
   const int num_contacts = static_cast<int>(problem.contacts.size());
-  const int most = std::min(kMaxRestartFactorisations, kMaxRestartWork / (1 + num_contacts));
+  const int most =
+      std::min(kFactorisationsOfContact * (1 + num_contacts), kMaxRestartWork / (1 + num_contacts));
   bool solved = false;
-  for (int k = 0; !solved && report->factorisations - before.factorisations < most; ++k) {
+  for (int k = 0; k < kMaxRestarts && !solved; ++k) {
+    if (report->factorisations - before.factorisations >= most) {
+      break;
+    }
     *solution = entry_;
     std::mt19937_64 random(static_cast<std::uint64_t>(k));
     pivoting_.SetScatter(random());

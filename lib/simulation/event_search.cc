@@ -4,12 +4,17 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <string>
 
 #include "tangible/geometry/mass_properties.h"
 #include "tangible/simulation/event_search_inl.h"
 
 namespace tangible {
 namespace {
+
+// How often the motion may be evaluated in a step, as a multiple of max_events_per_step: an event
+// takes some ten; one search over a motion whose rates are of no use a thousand.
+constexpr long kEvaluationsOfEvent = 1000;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 // A force counts as negative, and friction as exceeded, beyond this share of the forces at work.
@@ -116,6 +121,7 @@ EventSearch::Sample* EventSearch::At(const Model<double>& model, double length) 
   motion.friction = segment_->friction;
   motion.modes = segment_->modes;
   sample.has_end = false;
+  ++evaluations_;
   sample.good = flow_.Run(model, &motion, &message_);
   if (!sample.good) {
     all_good_ = false;
@@ -259,6 +265,12 @@ bool EventSearch::Run(const Model<double>& model, const std::vector<ActiveContac
   touching_ = &touching;
   num_samples_ = 0;
   all_good_ = true;
+  const long most = kEvaluationsOfEvent * (1L + model.structure->settings.max_events_per_step);
+  if (evaluations_ > most) {
+    *message = "events are not found in " + std::to_string(most) +
+               " evaluations of the motion: a body is too stiff for dt, or events do not end";
+    return false;
+  }
   Event event;
   event.length = segment->length;
   if (!At(model, event.length)->good) {

@@ -29,6 +29,8 @@ class EventSearch {
  public:
   explicit EventSearch(const Model<double>& model);
 
+  /// The searches that follow are of one step, whose evaluations of the motion are bounded.
+  void StartStep() { evaluations_ = 0; }
   /// Shortens the segment to its first event and names it; the segment is run to there. `touching`:
   /// contacts within the touching tolerance at its start, which are no events while they stay so.
   bool Run(const Model<double>& model, const std::vector<ActiveContact>& touching, Segment* segment,
@@ -97,6 +99,7 @@ class EventSearch {
   std::vector<double> closing_;  ///< a body: bound on its points' speed over the segment
   std::vector<Sample> samples_;
   int num_samples_ = 0;
+  long evaluations_ = 0;  ///< of the motion, in this step
   bool all_good_ = true;  ///< all samples of this search could be integrated
   std::vector<std::pair<int, int>> pairs_;
   std::vector<Aabb> boxes_;

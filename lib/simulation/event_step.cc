@@ -386,6 +386,7 @@ EventOutcome EventStepper::Advance(const Model<double>& model, double t, double 
   EventOutcome outcome;
   record_.Clear();
   inelastic_ = false;
+  search_.StartStep();
   const std::vector<Edge> edges = EdgesWithin(model, t, t + h);
   size_t next_edge = 0;
   const double end = t + h;
@@ -471,11 +472,8 @@ EventOutcome EventStepper::Advance(const Model<double>& model, double t, double 
     halvings = 0;
     now += segment.length;
     SwitchMode(segment);
-    if (segment.event != EventKind::kTouch && ++outcome.events > most) {
-      return fail("events do not end");
-    }
-    if (segment.event == EventKind::kTouch && segment.length <= 1e-13 * h &&
-        ++outcome.events > most) {
+    const bool counts = segment.event != EventKind::kTouch || segment.length <= 1e-13 * h;
+    if (counts && ++outcome.events > most) {
       return fail("events do not end");
     }
   }

@@ -303,7 +303,11 @@ void Stepper::FillReport(const Model<double>& model, const ContactSolverReport& 
     report->status = StepStatus::kUnsolved;
     Describe(model, solved.worst_contact, report);
     std::ostringstream residual;
-    residual << " (scaled residual " << solved.residual << ")";
+    if (std::isfinite(solved.residual)) {
+      residual << " (scaled residual " << solved.residual << ")";
+    } else {
+      residual << " (speeds or impulses beyond what numbers hold)";
+    }
     report->message += residual.str();
     return;
   }

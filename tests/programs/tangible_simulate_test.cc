@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cmath>
+#include <filesystem>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <vector>
@@ -272,6 +273,16 @@ TEST_F(TangibleSimulateTest, ADivergingRunKeepsWhatItHas) {
   ASSERT_EQ(table.rows.size(), 2u);
   EXPECT_EQ(Cell(table, 1, "time"), 1.0);
   EXPECT_EQ(Cell(table, 1, "x"), 1e308);
+}
+
+TEST_F(TangibleSimulateTest, AFirstStateThatIsNotFiniteIsRefused) {
+  // A rate of 10 / s on an arm of 1e308 m.
+  const ProgramRun run = Simulate(R"({"bodies": [{"name": "a", "mass": 1, "inertia": 1,
+      "position": [0, 0]}], "joints": [{"name": "pin", "type": "revolute", "bodies": ["a", "world"],
+      "anchor": [1e308, 0], "angle": 1, "rate": 10}]})",
+                                  Flag("out", "far.csv"));
+  ExpectOneLine(run, 1, "scene.json: body a: expected a finite pose and twist at time 0");
+  EXPECT_FALSE(std::filesystem::exists(Path("far.csv")));
 }
 
 TEST_F(TangibleSimulateTest, BadInputIsOneLine) {

@@ -265,5 +265,19 @@ TEST(EventStepTest, ContradictoryJointsAreTold) {
   EXPECT_NE(report.message.find("contradicts"), std::string::npos) << report.message;
 }
 
+// 1e-9 kg in a slide with damping of 3e8 / s, which the integrator amplifies: searches for its
+// stops would take millions of evaluations.
+TEST(EventStepTest, ABodyTooStiffForItsStepIsRefusedSoon) {
+  const Rolled run = Try(R"({"bodies": [{"name": "bead", "shape": {"circle": {"radius": 0.07}},
+      "mass": 1.39e-9, "position": [-1.12, 0.429], "angle": 0.711, "linear_damping": 0.353}],
+    "joints": [{"name": "slide", "type": "prismatic", "bodies": ["bead", "world"],
+      "anchor": [-1.2, 0.52], "axis": [0.99, 0.286], "displacement": 0.0082, "rate": -1.49,
+      "limits": [0.00534, 0.01]}],
+    "simulation": {"duration": 0.0012, "stepping": "event", "integrator": "runge_kutta_4",
+      "max_events_per_step": 5}})");
+  EXPECT_EQ(run.report.status, StepStatus::kUnsolved);
+  EXPECT_NE(run.report.message.find("6000 evaluations"), std::string::npos) << run.report.message;
+}
+
 }  // namespace
 }  // namespace tangible
