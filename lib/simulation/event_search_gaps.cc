@@ -21,13 +21,6 @@ bool Contains(const std::vector<ActiveContact>& contacts, const ActiveContact& c
                      [&](const ActiveContact& c) { return c.SameAs(contact); });
 }
 
-double NormalSpeed(const Model<double>& model, const State<double>& state,
-                   const ActiveContact& contact) {
-  ContactRows<double> rows;
-  EvaluateContactRows(model, state, contact, &rows);
-  return RelativeSpeed(state, contact.a, rows.normal_a, contact.b, rows.normal_b);
-}
-
 }  // namespace
 
 // Between two states of a pair `length` apart in time: whether neither turns by more than a third
@@ -149,14 +142,14 @@ void EventSearch::SearchPair(const Model<double>& model, int a, int b, Event* ev
       return Course::kUnknown;
     }
     const ActiveContact start = nearest;
-    const double rate_a = NormalSpeed(model, first->motion.after, start);
+    const double rate_a = SpeedsOf(model, first->motion.after, start).normal;
     const State<double> before = first->motion.after;
     Sample* const last = At(model, to);
     if (gap(*last, all) + allowed != fb || !(nearest.feature == start.feature) ||
         !MovesLittle(model, before, last->motion.after, to - from, a, b)) {
       return Course::kUnknown;
     }
-    return CourseOf(to - from, fa, rate_a, fb, NormalSpeed(model, last->motion.after, nearest));
+    return CourseOf(to - from, fa, rate_a, fb, SpeedsOf(model, last->motion.after, nearest).normal);
   };
   const auto search = [&](double from, double allowed, bool all) {
     if (from < event->length && gap(*At(model, from), all) > touch) {
@@ -170,7 +163,7 @@ void EventSearch::SearchPair(const Model<double>& model, int a, int b, Event* ev
         return value;
       }
       const bool approaches = value > 0.0 || !all || !Contains(*touching_, nearest) ||
-                              NormalSpeed(model, sample.motion.after, nearest) < -slow;
+                              SpeedsOf(model, sample.motion.after, nearest).normal < -slow;
       return approaches ? value : touch;
     };
     const auto rate = [&](double x, double y) { return rate_over(x, y, all); };
@@ -194,9 +187,9 @@ void EventSearch::SearchPair(const Model<double>& model, int a, int b, Event* ev
   for (const ActiveContact& contact : *touching_) {
     if (OfPair(contact, a, b) && !is_closed(contact)) {
       const Sample& end = *At(model, event->length);
-      const double speed = NormalSpeed(model, segment_->before, contact);
+      const double speed = SpeedsOf(model, segment_->before, contact).normal;
       const double change =
-          end.good ? std::abs(NormalSpeed(model, end.motion.after, contact) - speed) : 0.0;
+          end.good ? std::abs(SpeedsOf(model, end.motion.after, contact).normal - speed) : 0.0;
       from = std::min(from, TouchStart(model, speed, 2.0 * change / event->length));
       allowed = std::max(allowed, touch - contact.gap);
     }
