@@ -61,6 +61,9 @@ int RunMain(int (*body)(int, char**), int argc, char** argv) noexcept;
 /// Prints `message` as exactly one line on stderr and returns `exit_status`.
 int ReportError(std::string_view message, int exit_status = kExitFailed);
 
+/// The values of a flag that takes several: "a,b" is {"a", "b"}, "" one empty value.
+std::vector<std::string> SplitAtCommas(const std::string& text);
+
 /// A number with 17 significant digits, which read back give the same double.
 std::string FormatNumber(double value);
 

@@ -36,18 +36,6 @@ DEFINE_string(out, "", "file of the result; empty: stdout");
 namespace tangible {
 namespace {
 
-std::vector<std::string> SplitAtCommas(const std::string& text) {
-  std::vector<std::string> parts(1);
-  for (const char c : text) {
-    if (c == ',') {
-      parts.emplace_back();
-    } else {
-      parts.back() += c;
-    }
-  }
-  return parts;
-}
-
 bool FindMethod(const std::string& name, GradientMethod* method) {
   for (const auto& [known, value] : kGradientMethodNames) {
     if (name == known) {

@@ -84,10 +84,8 @@ class BlockLu {
   size_t bytes() const;
 
  private:
-  template <typename Columns>
+  template <bool kTransposed, typename Columns>
   void SolveColumns(T* x, Columns columns) const;
-  template <typename Columns>
-  void SolveTransposedColumns(T* x, Columns columns) const;
   T* Place(int edge, bool lower) {
     const size_t slot = pattern_->edge_slot[edge];
     const size_t slots = pattern_->neighbour.size();

@@ -220,69 +220,58 @@ bool BlockLu<T>::Factor() {
 template <typename T>
 void BlockLu<T>::Solve(T* x, int columns) const {
   if (columns == 1) {
-    SolveColumns(x, internal::OneColumn());
+    SolveColumns<false>(x, internal::OneColumn());
   } else {
-    SolveColumns(x, columns);
-  }
-}
-
-template <typename T>
-template <typename Columns>
-void BlockLu<T>::SolveColumns(T* x, Columns columns) const {
-  const BlockLuPattern& p = *pattern_;
-  const size_t n = p.num_blocks;
-  const size_t slots = p.neighbour.size();
-  const size_t stride = 3 * static_cast<size_t>(columns);
-  const T* values = values_.data();
-  for (size_t k = 0; k < n; ++k) {
-    const T* pivot_x = x + stride * p.order[k];
-    for (int r = p.start[k]; r < p.start[k + 1]; ++r) {
-      internal::SubtractApply(values + 9 * (n + r), pivot_x, x + stride * p.neighbour[r], columns);
-    }
-  }
-  for (size_t k = n; k-- > 0;) {
-    T* pivot_x = x + stride * p.order[k];
-    for (int s = p.start[k]; s < p.start[k + 1]; ++s) {
-      internal::SubtractApply(values + 9 * (n + slots + s), x + stride * p.neighbour[s], pivot_x,
-                              columns);
-    }
-    internal::SolvePivot(values + 9 * static_cast<size_t>(p.order[k]),
-                         &row_order_[3 * static_cast<size_t>(p.order[k])], pivot_x, columns);
+    SolveColumns<false>(x, columns);
   }
 }
 
 template <typename T>
 void BlockLu<T>::SolveTransposed(T* x, int columns) const {
   if (columns == 1) {
-    SolveTransposedColumns(x, internal::OneColumn());
+    SolveColumns<true>(x, internal::OneColumn());
   } else {
-    SolveTransposedColumns(x, columns);
+    SolveColumns<true>(x, columns);
   }
 }
 
+// L, then U with its pivot blocks; transposed Uᵀ with them, then Lᵀ.
 template <typename T>
-template <typename Columns>
-void BlockLu<T>::SolveTransposedColumns(T* x, Columns columns) const {
+template <bool kTransposed, typename Columns>
+void BlockLu<T>::SolveColumns(T* x, Columns columns) const {
   const BlockLuPattern& p = *pattern_;
   const size_t n = p.num_blocks;
   const size_t slots = p.neighbour.size();
   const size_t stride = 3 * static_cast<size_t>(columns);
   const T* values = values_.data();
+  const T* first = values + 9 * (kTransposed ? n + slots : n);
+  const T* second = values + 9 * (kTransposed ? n : n + slots);
+  const auto subtract = [columns](const T* block, const T* from, T* to) {
+    if constexpr (kTransposed) {
+      internal::SubtractApplyTransposed(block, from, to, columns);
+    } else {
+      internal::SubtractApply(block, from, to, columns);
+    }
+  };
   for (size_t k = 0; k < n; ++k) {
     T* pivot_x = x + stride * p.order[k];
-    internal::SolvePivotTransposed(values + 9 * static_cast<size_t>(p.order[k]),
-                                   &row_order_[3 * static_cast<size_t>(p.order[k])], pivot_x,
-                                   columns);
-    for (int s = p.start[k]; s < p.start[k + 1]; ++s) {
-      internal::SubtractApplyTransposed(values + 9 * (n + slots + s), pivot_x,
-                                        x + stride * p.neighbour[s], columns);
+    if constexpr (kTransposed) {
+      internal::SolvePivotTransposed(values + 9 * static_cast<size_t>(p.order[k]),
+                                     &row_order_[3 * static_cast<size_t>(p.order[k])], pivot_x,
+                                     columns);
+    }
+    for (int slot = p.start[k]; slot < p.start[k + 1]; ++slot) {
+      subtract(first + 9 * static_cast<size_t>(slot), pivot_x, x + stride * p.neighbour[slot]);
     }
   }
   for (size_t k = n; k-- > 0;) {
     T* pivot_x = x + stride * p.order[k];
-    for (int r = p.start[k]; r < p.start[k + 1]; ++r) {
-      internal::SubtractApplyTransposed(values + 9 * (n + r), x + stride * p.neighbour[r], pivot_x,
-                                        columns);
+    for (int slot = p.start[k]; slot < p.start[k + 1]; ++slot) {
+      subtract(second + 9 * static_cast<size_t>(slot), x + stride * p.neighbour[slot], pivot_x);
+    }
+    if constexpr (!kTransposed) {
+      internal::SolvePivot(values + 9 * static_cast<size_t>(p.order[k]),
+                           &row_order_[3 * static_cast<size_t>(p.order[k])], pivot_x, columns);
     }
   }
 }

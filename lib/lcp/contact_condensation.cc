@@ -83,42 +83,45 @@ void AddProduct(int body, const RowPart<double>& row, double weight, const doubl
   }
 }
 
-template <bool kTransposed, typename Columns>
-void Condense(const ClosedContacts& contacts, double* x, Columns columns) {
+// visit(contact, row, its unknown, its entry of D), of all closed contacts.
+template <typename Visit>
+void ForEachClosedRow(const ClosedContacts& contacts, const Visit& visit) {
   for (size_t i = 0; i < contacts.problem.contacts.size(); ++i) {
     if (contacts.block[i] < 0) {
       continue;
     }
     const ContactBlock<double>& contact = contacts.problem.contacts[i];
     ForEachRow(contact, contacts.modes[i], [&](int k, const CondensedRow& row) {
-      const size_t at = 3 * static_cast<size_t>(contacts.block[i]) + k;
-      const double weight = (kTransposed ? -1.0 : 1.0) / DiagonalOf(contacts, i, k);
-      const double* z = x + at * columns;
-      AddScaled(contact.a, kTransposed ? row.constraint_a : row.impulse_a, weight, z, x, columns);
-      AddScaled(contact.b, kTransposed ? row.constraint_b : row.impulse_b, weight, z, x, columns);
+      visit(contact, row, 3 * static_cast<size_t>(contacts.block[i]) + k,
+            DiagonalOf(contacts, i, k));
     });
   }
 }
 
 template <bool kTransposed, typename Columns>
+void Condense(const ClosedContacts& contacts, double* x, Columns columns) {
+  ForEachClosedRow(contacts, [&](const ContactBlock<double>& contact, const CondensedRow& row,
+                                 size_t at, double diagonal) {
+    const double weight = (kTransposed ? -1.0 : 1.0) / diagonal;
+    const double* z = x + at * columns;
+    AddScaled(contact.a, kTransposed ? row.constraint_a : row.impulse_a, weight, z, x, columns);
+    AddScaled(contact.b, kTransposed ? row.constraint_b : row.impulse_b, weight, z, x, columns);
+  });
+}
+
+template <bool kTransposed, typename Columns>
 void Recover(const ClosedContacts& contacts, double* x, Columns columns) {
-  for (size_t i = 0; i < contacts.problem.contacts.size(); ++i) {
-    if (contacts.block[i] < 0) {
-      continue;
+  ForEachClosedRow(contacts, [&](const ContactBlock<double>& contact, const CondensedRow& row,
+                                 size_t at, double diagonal) {
+    const double sign = kTransposed ? 1.0 : -1.0;
+    double* z = x + at * columns;
+    AddProduct(contact.a, kTransposed ? row.impulse_a : row.constraint_a, sign, x, z, columns);
+    AddProduct(contact.b, kTransposed ? row.impulse_b : row.constraint_b, sign, x, z, columns);
+    const double inverse = 1.0 / diagonal;
+    for (int c = 0; c < columns; ++c) {
+      z[c] *= inverse;
     }
-    const ContactBlock<double>& contact = contacts.problem.contacts[i];
-    ForEachRow(contact, contacts.modes[i], [&](int k, const CondensedRow& row) {
-      const size_t at = 3 * static_cast<size_t>(contacts.block[i]) + k;
-      const double sign = kTransposed ? 1.0 : -1.0;
-      double* z = x + at * columns;
-      AddProduct(contact.a, kTransposed ? row.impulse_a : row.constraint_a, sign, x, z, columns);
-      AddProduct(contact.b, kTransposed ? row.impulse_b : row.constraint_b, sign, x, z, columns);
-      const double inverse = 1.0 / DiagonalOf(contacts, i, k);
-      for (int c = 0; c < columns; ++c) {
-        z[c] *= inverse;
-      }
-    });
-  }
+  });
 }
 
 }  // namespace

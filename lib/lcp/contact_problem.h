@@ -151,6 +151,27 @@ void AddRowTransposed(int a, const RowPart<T>& row_a, int b, const RowPart<T>& r
   }
 }
 
+/// visit(body, row, impulse) for every row of joints and contacts and each of its two bodies (−1:
+/// not a moving one); tangent rows of contacts without friction too.
+template <typename Visit>
+void ForEachImpulse(const ContactProblem<double>& problem, const ContactSolution<double>& solution,
+                    const Visit& visit) {
+  for (size_t j = 0; j < problem.joints.size(); ++j) {
+    const JointBlock<double>& joint = problem.joints[j];
+    for (int k = 0; k < joint.rows; ++k) {
+      visit(joint.a, joint.row_a[k], solution.joint_impulse[3 * j + k]);
+      visit(joint.b, joint.row_b[k], solution.joint_impulse[3 * j + k]);
+    }
+  }
+  for (size_t i = 0; i < problem.contacts.size(); ++i) {
+    const ContactBlock<double>& contact = problem.contacts[i];
+    visit(contact.a, contact.normal_a, solution.normal_impulse[i]);
+    visit(contact.b, contact.normal_b, solution.normal_impulse[i]);
+    visit(contact.a, contact.tangent_a, solution.tangent_impulse[i]);
+    visit(contact.b, contact.tangent_b, solution.tangent_impulse[i]);
+  }
+}
+
 /// The sign of the sliding speed of a contact without friction, along which friction would act as μ
 /// leaves 0; 0 where the speed is the rounding of its terms, at the solved or the free twist
 /// (bodies that rest side by side): there the contact would stick.

@@ -118,20 +118,7 @@ void ContactScales::Compute(const ContactProblem<double>& problem,
       speed[body] = std::max(speed[body], change / mass[3 * body]);
     }
   };
-  for (size_t j = 0; j < problem.joints.size(); ++j) {
-    const JointBlock<double>& joint = problem.joints[j];
-    for (int k = 0; k < joint.rows; ++k) {
-      push(joint.a, joint.row_a[k], solution.joint_impulse[3 * j + k]);
-      push(joint.b, joint.row_b[k], solution.joint_impulse[3 * j + k]);
-    }
-  }
-  for (size_t i = 0; i < problem.contacts.size(); ++i) {
-    const ContactBlock<double>& c = problem.contacts[i];
-    push(c.a, c.normal_a, solution.normal_impulse[i]);
-    push(c.b, c.normal_b, solution.normal_impulse[i]);
-    push(c.a, c.tangent_a, solution.tangent_impulse[i]);
-    push(c.b, c.tangent_b, solution.tangent_impulse[i]);
-  }
+  ForEachImpulse(problem, solution, push);
   impulse = ImpulseScale(solution.normal_impulse);
 }
 

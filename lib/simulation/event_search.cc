@@ -24,13 +24,6 @@ double SpeedOf(const double* twist, double radius) {
   return std::hypot(twist[0], twist[1]) + std::abs(twist[2]) * radius;
 }
 
-double SlipSpeed(const Model<double>& model, const State<double>& state,
-                 const ActiveContact& contact) {
-  ContactRows<double> rows;
-  EvaluateContactRows(model, state, contact, &rows);
-  return RelativeSpeed(state, contact.a, rows.tangent_a, contact.b, rows.tangent_b);
-}
-
 }  // namespace
 
 EventSearch::EventSearch(const Model<double>& model) {
@@ -151,7 +144,7 @@ double EventSearch::ModeValue(const Model<double>& model, Sample* sample, const 
   const Segment& motion = sample->motion;
   if (event.kind == EventKind::kSlipEnds) {
     return SlidingSign(motion.modes[event.index]) *
-           SlipSpeed(model, motion.after, motion.contacts[event.index]);
+           SpeedsOf(model, motion.after, motion.contacts[event.index]).slip;
   }
   if (!sample->has_end) {
     if (!flow_.Accelerate(model, motion, motion.after, motion.time + motion.length, &sample->end)) {
@@ -200,8 +193,8 @@ void EventSearch::SearchClosed(const Model<double>& model, Event* event) {
     };
     if (SlidingSign(mode) != 0.0) {
       trial.kind = EventKind::kSlipEnds;
-      try_function(SlidingSign(mode) * SlipSpeed(model, segment_->before, segment_->contacts[i]),
-                   slow);
+      try_function(
+          SlidingSign(mode) * SpeedsOf(model, segment_->before, segment_->contacts[i]).slip, slow);
     }
     const Sample& end = *At(model, event->length);
     if (!end.good) {

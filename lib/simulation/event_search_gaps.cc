@@ -41,13 +41,6 @@ double GapAndSpeed(const Model<double>& model, const State<double>& state,
   return rows.geometry.gap;
 }
 
-double NormalSpeed(const Model<double>& model, const State<double>& state,
-                   const ActiveContact& contact) {
-  double speed;
-  GapAndSpeed(model, state, contact, &speed);
-  return speed;
-}
-
 }  // namespace
 
 // Between two states of a pair `length` apart in time: whether neither turns by more than a third
@@ -174,14 +167,14 @@ void EventSearch::SearchPair(const Model<double>& model, int a, int b, Event* ev
       return Course::kUnknown;
     }
     const ActiveContact start = nearest;
-    const double rate_a = NormalSpeed(model, first->motion.after, start);
+    const double rate_a = SpeedsOf(model, first->motion.after, start).normal;
     const State<double> before = first->motion.after;
     Sample* const last = At(model, to);
     if (gap(*last, all) + allowed != fb || !(nearest.feature == start.feature) ||
         !MovesLittle(model, before, last->motion.after, to - from, a, b)) {
       return Course::kUnknown;
     }
-    return CourseOf(to - from, fa, rate_a, fb, NormalSpeed(model, last->motion.after, nearest));
+    return CourseOf(to - from, fa, rate_a, fb, SpeedsOf(model, last->motion.after, nearest).normal);
   };
   const auto search = [&](double from, double allowed, bool all) {
     if (from < event->length && gap(*At(model, from), all) > touch) {
@@ -195,7 +188,7 @@ void EventSearch::SearchPair(const Model<double>& model, int a, int b, Event* ev
         return value;
       }
       const bool approaches = value > 0.0 || !all || !Contains(*touching_, nearest) ||
-                              NormalSpeed(model, sample.motion.after, nearest) < -slow;
+                              SpeedsOf(model, sample.motion.after, nearest).normal < -slow;
       return approaches ? value : touch;
     };
     const auto rate = [&](double x, double y) { return rate_over(x, y, all); };
@@ -222,9 +215,9 @@ void EventSearch::SearchPair(const Model<double>& model, int a, int b, Event* ev
         SearchReturn(model, contact, touch, event);
       }
       const Sample& end = *At(model, event->length);
-      const double speed = NormalSpeed(model, segment_->before, contact);
+      const double speed = SpeedsOf(model, segment_->before, contact).normal;
       const double change =
-          end.good ? std::abs(NormalSpeed(model, end.motion.after, contact) - speed) : 0.0;
+          end.good ? std::abs(SpeedsOf(model, end.motion.after, contact).normal - speed) : 0.0;
       from = std::min(from, TouchStart(model, speed, 2.0 * change / event->length));
       allowed = std::max(allowed, touch - contact.gap);
     }
@@ -280,7 +273,9 @@ void EventSearch::SearchReturn(const Model<double>& model, const ActiveContact& 
   };
   const double tolerance = length * SpeedTolerance(model, segment_->before);
   double a = 0.0;
-  double fa = length * NormalSpeed(model, segment_->before, contact);
+  double speed;
+  GapAndSpeed(model, segment_->before, contact, &speed);
+  double fa = length * speed;
   for (const double share : {0.125, 0.25, 0.5, 1.0}) {
     const double b = share * length;
     const double fb = apart(*At(model, b));

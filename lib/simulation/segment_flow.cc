@@ -74,7 +74,6 @@ void AddBodies(const ModelStructure& structure, double factor, const std::vector
 // accelerations: they cancel in a body at rest, whose acceleration is the rounding of these.
 void SizesOfTerms(const SolvedNode& node, std::vector<double>* sizes) {
   const ContactProblem<double>& p = node.problem;
-  const ContactSolution<double>& s = node.solution;
   sizes->assign(p.momentum.size(), 0.0);
   for (size_t i = 0; i < p.momentum.size(); ++i) {
     (*sizes)[i] = std::abs(p.momentum[i]);
@@ -84,20 +83,7 @@ void SizesOfTerms(const SolvedNode& node, std::vector<double>* sizes) {
       (*sizes)[3 * block + i] += std::abs(row[i] * impulse);
     }
   };
-  for (size_t j = 0; j < p.joints.size(); ++j) {
-    const JointBlock<double>& joint = p.joints[j];
-    for (int k = 0; k < joint.rows; ++k) {
-      add(joint.a, joint.row_a[k], s.joint_impulse[3 * j + k]);
-      add(joint.b, joint.row_b[k], s.joint_impulse[3 * j + k]);
-    }
-  }
-  for (size_t c = 0; c < p.contacts.size(); ++c) {
-    const ContactBlock<double>& contact = p.contacts[c];
-    add(contact.a, contact.normal_a, s.normal_impulse[c]);
-    add(contact.b, contact.normal_b, s.normal_impulse[c]);
-    add(contact.a, contact.tangent_a, s.tangent_impulse[c]);
-    add(contact.b, contact.tangent_b, s.tangent_impulse[c]);
-  }
+  ForEachImpulse(p, node.solution, add);
   for (size_t i = 0; i < sizes->size(); ++i) {
     (*sizes)[i] /= p.mass[i];
   }

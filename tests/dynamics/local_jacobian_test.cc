@@ -30,63 +30,62 @@ MatrixX<double> Dense(const Model<double>& model, Stepper* stepper, JointRoute r
   return dense;
 }
 
-TEST(LocalJacobianTest, RevoluteByHandIsTheGenericRoute) {
-  int revolutes = 0;
+// visit(seed, model, stepper) after each of the first steps of random scenes.
+template <typename Visit>
+void ForEachStep(int steps, const Visit& visit) {
   for (unsigned seed = 1; seed <= 60; ++seed) {
     const Scene scene = RandomScene(seed);
     Model<double> model;
     State<double> state;
     BuildModel(scene, &model, &state);
     Stepper stepper(model);
-    for (int k = 0; k < 3; ++k) {
+    for (int k = 0; k < steps; ++k) {
       if (stepper.Step(model, k * 0.01, 0.01, &state).status != StepStatus::kDone) break;
-      const MatrixX<double> by_hand = Dense(model, &stepper, JointRoute::kByHand);
-      const MatrixX<double> generic = Dense(model, &stepper, JointRoute::kGeneric);
-      // Sums of a few products: rounding of the largest.
-      EXPECT_LT((by_hand - generic).cwiseAbs().maxCoeff(),
-                1e-13 * (1.0 + generic.cwiseAbs().maxCoeff()))
-          << seed;
+      visit(seed, model, &stepper);
     }
+  }
+}
+
+TEST(LocalJacobianTest, RevoluteByHandIsTheGenericRoute) {
+  int revolutes = 0;
+  ForEachStep(3, [&](unsigned seed, const Model<double>& model, Stepper* stepper) {
+    const MatrixX<double> by_hand = Dense(model, stepper, JointRoute::kByHand);
+    const MatrixX<double> generic = Dense(model, stepper, JointRoute::kGeneric);
+    // Sums of a few products: rounding of the largest.
+    EXPECT_LT((by_hand - generic).cwiseAbs().maxCoeff(),
+              1e-13 * (1.0 + generic.cwiseAbs().maxCoeff()))
+        << seed;
     for (const JointIndex& joint : model.structure->joints) {
       revolutes += joint.type == JointType::kRevolute ? 1 : 0;
     }
-  }
-  EXPECT_GT(revolutes, 30);
+  });
+  EXPECT_GT(revolutes, 90);
 }
 
 // One column takes contacts by their adjoint, several by Jets.
 TEST(LocalJacobianTest, OneColumnOfTheAdjointIsThatOfSeveral) {
   int contacts = 0;
-  for (unsigned seed = 1; seed <= 60; ++seed) {
-    const Scene scene = RandomScene(seed);
-    Model<double> model;
-    State<double> state;
-    BuildModel(scene, &model, &state);
-    Stepper stepper(model);
-    for (int k = 0; k < 5; ++k) {
-      if (stepper.Step(model, k * 0.01, 0.01, &state).status != StepStatus::kDone) break;
-      const int rows = 3 * stepper.system().num_blocks();
-      const VectorX<double> u = VectorX<double>::Random(rows);
-      const SolvedStep step = stepper.record().View(stepper.system().contact_block());
-      LocalJacobianScratch scratch;
-      VectorX<double> one = VectorX<double>::Zero(model.structure->num_variables());
-      VisitStepJacobian(model, step, JointRoute::kByHand, &scratch,
-                        SingleAdjointSink{u.data(), one.data()});
-      VectorX<double> several = VectorX<double>::Zero(one.size());
-      VisitStepJacobian(model, step, JointRoute::kByHand, &scratch,
-                        AdjointSink{u.data(), several.data(), 1});
-      // Nothing changes the world's pose: a route may leave its derivatives out.
-      for (int i = 0; i < 3; ++i) {
-        one[model.structure->PoseVariable(model.structure->world(), i)] = 0.0;
-        several[model.structure->PoseVariable(model.structure->world(), i)] = 0.0;
-      }
-      EXPECT_LT((one - several).cwiseAbs().maxCoeff(),
-                1e-13 * (1.0 + several.cwiseAbs().maxCoeff()))
-          << seed;
-      contacts += stepper.system().num_blocks() - model.structure->num_blocks() -
-                  static_cast<int>(model.structure->joints.size());
+  ForEachStep(5, [&](unsigned seed, const Model<double>& model, Stepper* stepper) {
+    const int rows = 3 * stepper->system().num_blocks();
+    const VectorX<double> u = VectorX<double>::Random(rows);
+    const SolvedStep step = stepper->record().View(stepper->system().contact_block());
+    LocalJacobianScratch scratch;
+    VectorX<double> one = VectorX<double>::Zero(model.structure->num_variables());
+    VisitStepJacobian(model, step, JointRoute::kByHand, &scratch,
+                      SingleAdjointSink{u.data(), one.data()});
+    VectorX<double> several = VectorX<double>::Zero(one.size());
+    VisitStepJacobian(model, step, JointRoute::kByHand, &scratch,
+                      AdjointSink{u.data(), several.data(), 1});
+    // Nothing changes the world's pose: a route may leave its derivatives out.
+    for (int i = 0; i < 3; ++i) {
+      one[model.structure->PoseVariable(model.structure->world(), i)] = 0.0;
+      several[model.structure->PoseVariable(model.structure->world(), i)] = 0.0;
     }
-  }
+    EXPECT_LT((one - several).cwiseAbs().maxCoeff(), 1e-13 * (1.0 + several.cwiseAbs().maxCoeff()))
+        << seed;
+    contacts += stepper->system().num_blocks() - model.structure->num_blocks() -
+                static_cast<int>(model.structure->joints.size());
+  });
   EXPECT_GT(contacts, 100);
 }
 

@@ -156,4 +156,31 @@ inline MatrixX<double> DenseSystem(const ContactProblem<double>& p,
   return K;
 }
 
+/// Any that the contacts may have.
+inline std::vector<ContactMode> RandomModes(const ContactProblem<double>& problem,
+                                            std::mt19937_64* random) {
+  std::vector<ContactMode> modes;
+  for (const ContactBlock<double>& c : problem.contacts) {
+    const ContactMode with[] = {ContactMode::kOpen, ContactMode::kSticking,
+                                ContactMode::kSlidingPositive, ContactMode::kSlidingNegative};
+    modes.push_back(c.has_friction         ? with[(*random)() % 4]
+                    : (*random)() % 2 == 0 ? ContactMode::kClosed
+                                           : ContactMode::kOpen);
+  }
+  return modes;
+}
+
+/// Right-hand sides of a DenseSystem, 0 in unused rows, as the engine's are.
+inline RowMatrixXd RightHandSide(const MatrixX<double>& K) {
+  RowMatrixXd rhs = RowMatrixXd::Random(K.rows(), 2);
+  for (int i = 0; i < K.rows(); ++i) {
+    VectorX<double> row = K.row(i);
+    VectorX<double> column = K.col(i);
+    row[i] -= 1.0;
+    column[i] -= 1.0;
+    if (row.norm() == 0.0 && column.norm() == 0.0) rhs.row(i).setZero();
+  }
+  return rhs;
+}
+
 }  // namespace tangible::testing

@@ -11,32 +11,8 @@ namespace tangible {
 namespace {
 
 using testing::DenseSystem;
-
-std::vector<ContactMode> RandomModes(const ContactProblem<double>& problem,
-                                     std::mt19937_64* random) {
-  std::vector<ContactMode> modes;
-  for (const ContactBlock<double>& c : problem.contacts) {
-    const ContactMode with[] = {ContactMode::kOpen, ContactMode::kSticking,
-                                ContactMode::kSlidingPositive, ContactMode::kSlidingNegative};
-    modes.push_back(c.has_friction         ? with[(*random)() % 4]
-                    : (*random)() % 2 == 0 ? ContactMode::kClosed
-                                           : ContactMode::kOpen);
-  }
-  return modes;
-}
-
-// Right-hand sides are 0 in unused rows, as the engine's are.
-RowMatrixXd RightHandSide(const MatrixX<double>& K) {
-  RowMatrixXd rhs = RowMatrixXd::Random(K.rows(), 2);
-  for (int i = 0; i < K.rows(); ++i) {
-    VectorX<double> row = K.row(i);
-    VectorX<double> column = K.col(i);
-    row[i] -= 1.0;
-    column[i] -= 1.0;
-    if (row.norm() == 0.0 && column.norm() == 0.0) rhs.row(i).setZero();
-  }
-  return rhs;
-}
+using testing::RandomModes;
+using testing::RightHandSide;
 
 TEST(ContactSystemTest, SolvesAsTheDenseMatrixForwardAndTransposed) {
   std::mt19937_64 random(5);
@@ -63,26 +39,6 @@ TEST(ContactSystemTest, SolvesAsTheDenseMatrixForwardAndTransposed) {
     largest_difference = std::max(largest_difference, (x - y).norm());
   }
   EXPECT_GT(largest_difference, 0.1);
-}
-
-TEST(ContactSystemTest, ResidualIsThatOfTheDenseMatrix) {
-  std::mt19937_64 random(6);
-  ContactProblem<double> p = testing::RandomContactProblem(&random, 5, 6);
-  std::vector<ContactMode> modes = RandomModes(p, &random);
-  // One that sticks and one that slides, driven.
-  p.contacts[1].driven = p.contacts[2].driven = true;
-  modes[1] = ContactMode::kSticking;
-  modes[2] = ContactMode::kSlidingNegative;
-  const MatrixX<double> K = DenseSystem(p, modes);
-  ContactSystem system;
-  system.Factor(p, modes);
-  RowMatrixXd x = RightHandSide(K);
-  const RowMatrixXd rhs = RightHandSide(K);
-  RowMatrixXd residual(K.rows(), 2);
-  system.Residual<false>(p, modes, rhs.data(), x.data(), 2, residual.data());
-  EXPECT_LT((residual - (rhs - K * x)).norm(), 1e-13);
-  system.Residual<true>(p, modes, rhs.data(), x.data(), 2, residual.data());
-  EXPECT_LT((residual - (rhs - K.transpose() * x)).norm(), 1e-13);
 }
 
 TEST(ContactSystemTest, DuplicatedContactsOfABoxLeaveTheTwistRight) {

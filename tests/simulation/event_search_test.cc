@@ -5,31 +5,13 @@
 
 #include <cmath>
 
-#include "../support/scenes.h"
+#include "first_segment.h"
 
 namespace tangible {
 namespace {
 
-using test_scenes::SceneOf;
-
-Segment FirstSegment(const std::string& text, double length, bool* found) {
-  Model<double> model;
-  State<double> state;
-  BuildModel(SceneOf(text), &model, &state);
-  EventSearch search(model);
-  Segment segment;
-  segment.length = length;
-  segment.middle = 0.5 * length;
-  segment.before = state;
-  std::string message;
-  *found = search.Run(model, {}, &segment, &message);
-  EXPECT_TRUE(*found) << message;
-  return segment;
-}
-
-std::string Simulation() {
-  return R"("simulation": {"stepping": "event", "integrator": "trapezoidal", "dt": 1})";
-}
+using testing::FirstSegment;
+using testing::Simulation;
 
 TEST(EventSearchTest, ADropTouchesAtSqrtOfTwoHOverG) {
   bool found;
@@ -53,48 +35,35 @@ TEST(EventSearchTest, AFastBallDoesNotTunnelThroughAThinWall) {
   EXPECT_NEAR(s.after.pose[0], -0.0105, 1e-12);
 }
 
-TEST(EventSearchTest, ARotatingCornerAndAGrazingOneAreNotMissed) {
-  // A spinning bar above the floor: its end sweeps below it in the middle of the step, and is up
-  // again at its end. At height z the end, 0.5 from the middle, touches if z < 0.5.
-  for (const double height : {0.3, 0.499, 0.49999}) {
-    bool found;
-    const Segment s = FirstSegment(
-        R"({"gravity": [0, 0], "bodies": [
-        {"name": "bar", "shape": {"capsule": {"length": 0.9, "radius": 0.05}}, "mass": 1,
-         "position": [0, )" +
-            std::to_string(height) +
-            R"(], "angular_velocity": 3.141592653589793},
-        {"name": "floor", "static": true,
-         "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}}], )" +
-            Simulation() + "}",
-        1.0, &found);
-    EXPECT_EQ(s.event, EventKind::kTouch) << height;
-    // 0.45 sin θ + 0.05 = z.
-    EXPECT_NEAR(std::sin(3.141592653589793 * s.length), (height - 0.05) / 0.45, 1e-9) << height;
-    EXPECT_LT(s.length, 0.5);
+TEST(EventSearchTest, ASlipEndsWhereFrictionHasStoppedIt) {
+  // v0 = μ g t, from a closed contact that slides.
+  Model<double> model;
+  State<double> state;
+  Scene scene = test_scenes::SceneOf(R"({"bodies": [
+      {"name": "box", "shape": {"box": {"size": [1, 0.2]}}, "mass": 1, "position": [0, 0.1],
+       "velocity": [0.981, 0], "friction": 0.5},
+      {"name": "floor", "static": true, "friction": 0.5,
+       "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}}], )" +
+                                     Simulation() + "}");
+  BuildModel(scene, &model, &state);
+  EventSearch search(model);
+  Segment segment;
+  segment.length = 1.0;
+  segment.middle = 0.5;
+  segment.before = state;
+  search.FindContacts(model, state, 1e-6, &segment.contacts);
+  ASSERT_EQ(segment.contacts.size(), 2u);
+  EXPECT_EQ(search.num_pairs(), 1);
+  for (const ActiveContact& contact : segment.contacts) {
+    segment.friction.push_back(MixedFriction(model, contact.a, contact.b));
+    // The first body of a pair is that before in the scene: the tangent is to the right on it.
+    segment.modes.push_back(ContactMode::kSlidingPositive);
   }
-  bool found;
-  const Segment s = FirstSegment(R"({"gravity": [0, 0], "bodies": [
-      {"name": "bar", "shape": {"capsule": {"length": 0.9, "radius": 0.05}}, "mass": 1,
-       "position": [0, 0.500001], "angular_velocity": 3.141592653589793},
-      {"name": "floor", "static": true, "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}}], )" +
-                                     Simulation() + "}",
-                                 1.0, &found);
-  EXPECT_EQ(s.event, EventKind::kStepEnd);
-}
-
-TEST(EventSearchTest, AJointReachesItsLimit) {
-  bool found;
-  const Segment s = FirstSegment(R"({"gravity": [0, 0], "bodies": [
-      {"name": "a", "mass": 1, "inertia": 0.1, "position": [0.5, 0]}],
-    "joints": [{"name": "pin", "type": "revolute", "bodies": ["a", "world"], "anchor": [0, 0],
-                "rate": 2, "limits": [-1, 0.5]}],
-    "simulation": {"stepping": "event", "integrator": "runge_kutta_4", "dt": 0.01}})",
-                                 0.4, &found);
-  EXPECT_EQ(s.event, EventKind::kTouch);
-  EXPECT_EQ(s.event_contact.joint, 0);
-  EXPECT_EQ(s.event_contact.side, -1.0);
-  EXPECT_NEAR(s.length, 0.25, 1e-13);
+  std::string message;
+  ASSERT_TRUE(search.Run(model, segment.contacts, &segment, &message)) << message;
+  EXPECT_EQ(segment.event, EventKind::kSlipEnds);
+  EXPECT_NEAR(segment.length, 0.2, 1e-12);
+  EXPECT_NEAR(segment.after.twist[0], 0.0, 1e-12);
 }
 
 }  // namespace

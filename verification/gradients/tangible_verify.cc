@@ -38,18 +38,6 @@ namespace {
 constexpr int kMostThreads = 256;
 constexpr int kMostRandom = 1000000;
 
-std::vector<std::string> SplitAtCommas(const std::string& text) {
-  std::vector<std::string> parts(1);
-  for (const char c : text) {
-    if (c == ',') {
-      parts.emplace_back();
-    } else {
-      parts.back() += c;
-    }
-  }
-  return parts;
-}
-
 // The steppings that --stepping asks for; empty with a line if the engine lacks one.
 std::vector<Stepping> Steppings(std::string* error) {
   std::vector<Stepping> available = AvailableSteppings();

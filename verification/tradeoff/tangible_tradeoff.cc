@@ -49,13 +49,6 @@ constexpr double kMostSteps = 1e6;
 constexpr double kLeastFactor = 1e-6;
 constexpr double kMostFactor = 1e6;
 
-std::vector<std::string> SplitAtCommas(const std::string& text) {
-  std::vector<std::string> parts;
-  std::istringstream in(text + ",");
-  for (std::string part; std::getline(in, part, ',');) parts.push_back(part);
-  return parts;
-}
-
 // Empty, or one line about a flag's value.
 std::string CheckFlags(size_t scenes, TradeoffOptions* options, Target* target) {
   for (const std::string& text : SplitAtCommas(FLAGS_dt_factors)) {
