@@ -286,7 +286,6 @@ void EventSearch::SearchReturn(const Model<double>& model, const ActiveContact& 
       const double root = Refine(
           model, apart, std::min(8.0 * std::numeric_limits<double>::epsilon() * fa, GapTolerance()),
           a, fa, b, fb);
-      double speed;
       const double gap = GapAndSpeed(model, At(model, root)->motion.after, contact, &speed);
       event->kind = gap < -touch ? EventKind::kReturn : EventKind::kTouch;
       event->length = root;
