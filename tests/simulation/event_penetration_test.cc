@@ -150,18 +150,24 @@ TEST(EventPenetrationTest, AnEventThatSplitsTheFirstStepIsNamed) {
 TEST(EventPenetrationTest, ASliderWithoutForcesIsNotContradicted) {
   for (int k = -20; k <= 20; ++k) {
     Scene scene = SceneOf(R"({"gravity": [0, 0], "bodies": [
-        {"name": "link", "shape": {"circle": {"radius": 0.07}}, "mass": 0.6466,
-         "position": [-1.23579, 0.7601646], "angle": -0.561062},
-        {"name": "ball", "shape": {"capsule": {"length": 0.1426437, "radius": 0.09374449}},
-         "mass": 1.1903257, "position": [0.0414882504, 0.1884663], "angle": 0.1869086,
-         "velocity": [-1.767214, -2.337236], "angular_velocity": 2.54116},
-        {"name": "floor", "static": true, "shape": {"half_plane": {"normal": [0.2, 1],
-         "offset": 0}}}],
+        {"name": "link", "shape": {"circle": {"radius": 0.07}}, "mass": 0.646604552873041,
+         "position": [-1.2357901557629765, 0.7601646036030093], "angle": -0.5610622993153734},
+        {"name": "bean", "shape": {"capsule": {"length": 0.14264370234888912,
+         "radius": 0.0937444870942197}}, "mass": 1.1903256079623872,
+         "inertia": 0.01663395049921654, "position": [0.04148825039651283, 0.1884662370927706],
+         "angle": 0.1869086232219425, "velocity": [-1.7672139804179983, -2.337235998348077],
+         "angular_velocity": 2.541160185408355, "friction": 0.36, "restitution": 0.3},
+        {"name": "floor", "static": true, "friction": 0.5, "restitution": 0.64,
+         "angle": -0.2166802597376691, "position": [-0.0537471751148157, -0.24415413403663133],
+         "shape": {"polygon": {"vertices": [[-9, -0.3], [9, -0.3], [10, 0.25], [-10, 0.25]]}}}],
       "joints": [{"name": "slide", "type": "prismatic", "bodies": ["link", "world"],
-         "anchor": [-1.17194, 0.8617674], "axis": [0.98555, 0.41889], "rate": 0.172987}],
+         "anchor": [-1.1719398433758303, 0.8617674461226152],
+         "axis": [0.9855509407645158, 0.4188902796314434], "displacement": 0.01725439006392028,
+         "rate": 0.17298749201192543}],
       "simulation": {"stepping": "event", "integrator": "runge_kutta_4", "dt": 0.005,
-                     "duration": 0.05, "joint_correction": "none"}})");
-    scene.bodies[1].angular_velocity *= 1.0 + 1e-5 * k;
+                     "duration": 0.05, "joint_correction": "none",
+                     "friction_mixing": "minimum", "restitution_mixing": "maximum"}})");
+    scene.bodies[1].angular_velocity *= 1.0 + 1e-4 * k;
     Model<double> model;
     State<double> initial, final;
     BuildModel(scene, &model, &initial);
