@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdio>
 
 namespace tangible {
@@ -27,10 +28,14 @@ std::string Kink(const Certificate& certificate) {
     return "margin " + Short(certificate.margin_min) + At(certificate);
   }
   if (!(certificate.linear_residual <= kLinearResidualLimit)) {
-    return "linear systems solved to " + Short(certificate.linear_residual) + " only";
+    return std::isfinite(certificate.linear_residual)
+               ? "linear systems solved to " + Short(certificate.linear_residual) + " only"
+               : "linear systems that were not solved";
   }
   if (!(certificate.condition <= kConditionLimit)) {
-    return "condition " + Short(certificate.condition) + " of a linear system";
+    return std::isfinite(certificate.condition)
+               ? "condition " + Short(certificate.condition) + " of a linear system"
+               : "a singular linear system";
   }
   return "";
 }

@@ -199,9 +199,11 @@ void EventSearch::SearchPair(const Model<double>& model, int a, int b, Event* ev
     if (from < event->length &&
         FirstRoot(model, shifted, rate, course, GapTolerance(), from, event->length, &root) &&
         root > 0.0) {
-      event->kind = EventKind::kTouch;
       event->length = root;
-      gap(*At(model, root), all);
+      const bool cut_in = gap(*At(model, root), all) < -kDeep * touch;
+      // Poses that cut a corner have passed the gap: it is the speed that turns.
+      event->kind =
+          cut_in && all && Contains(*touching_, nearest) ? EventKind::kReturn : EventKind::kTouch;
       event->contact = nearest;
     }
   };

@@ -85,6 +85,9 @@ TEST(CertificateTest, ALinearSystemThatWasNotSolvedIsNotTrusted) {
   EXPECT_NE(VerdictOf({.linear_residual = NAN}), "trustworthy");
   EXPECT_EQ(VerdictOf({.condition = kConditionLimit}), "trustworthy");
   EXPECT_EQ(VerdictOf({.condition = 4e20}), "near a kink: condition 4.0e+20 of a linear system");
+  EXPECT_EQ(VerdictOf({.condition = HUGE_VAL}), "near a kink: a singular linear system");
+  EXPECT_EQ(VerdictOf({.linear_residual = std::nan("")}),
+            "near a kink: linear systems that were not solved");
 }
 
 }  // namespace
