@@ -155,7 +155,8 @@ Stepper::Stepper(const Model<double>& model, int threads)
   record_.problem.contacts.reserve(contacts);
   record_.problem.dampers.reserve(s.joints.size() + s.springs.size());
   record_.problem.joints.reserve(s.joints.size());
-  for (ContactSolution<double>* solution : {&record_.solution, &last_solution_}) {
+  for (ContactSolution<double>* solution :
+       {&record_.solution, &last_solution_, &narrow_solution_}) {
     solution->v.reserve(3 * s.num_blocks());
     solution->joint_impulse.reserve(3 * s.joints.size());
     solution->normal_impulse.reserve(contacts);
