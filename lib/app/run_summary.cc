@@ -25,6 +25,7 @@ OrderedJson ReductionsJson(const RolloutReport& report) {
           {"contacts", report.contacts},
           {"lcp_rows", report.lcp_rows},
           {"single_rows", report.single_rows},
+          {"angles_left_out", report.angles_left_out},
           {"steps_without_lcp", report.solved_directly}};
 }
 

@@ -74,16 +74,23 @@ struct ContactRows {
   RowPart<T> normal_a, normal_b, tangent_a, tangent_b;
 };
 
-/// Rows of a contact from its geometry. Tangent t = (n_y, −n_x).
+/// Rows of a contact of two shapes from its geometry. Tangent t = (n_y, −n_x). A normal passes
+/// through a disc's centre: its row has no angle, to the bit.
 template <typename T>
-void RowsFromGeometry(const Vector2<T>& position_a, const Vector2<T>& position_b,
-                      ContactRows<T>* rows) {
+void RowsFromGeometry(ShapeType shape_a, const Vector2<T>& position_a, ShapeType shape_b,
+                      const Vector2<T>& position_b, ContactRows<T>* rows) {
   const Vector2<T>& n = rows->geometry.normal;
   const Vector2<T> t(n.y(), -n.x());
   const Vector2<T> arm_a = rows->geometry.point - position_a;
   const Vector2<T> arm_b = rows->geometry.point - position_b;
   rows->normal_a = PointRow(n, arm_a);
   rows->normal_b = Negative(PointRow(n, arm_b));
+  if (shape_a == ShapeType::kCircle) {
+    rows->normal_a[2] = T(0.0);
+  }
+  if (shape_b == ShapeType::kCircle) {
+    rows->normal_b[2] = T(0.0);
+  }
   rows->tangent_a = PointRow(t, arm_a);
   rows->tangent_b = Negative(PointRow(t, arm_b));
 }
@@ -103,9 +110,10 @@ T RelativeSpeed(const State<T>& state, int a, const RowPart<T>& row_a, int b,
 template <typename T>
 void EvaluateContactRows(const Model<T>& model, const Pose<T>& pose_a, const Pose<T>& pose_b,
                          const ActiveContact& contact, ContactRows<T>* rows) {
-  rows->geometry = EvaluateContact(contact.feature, model.Shape(contact.a), pose_a,
-                                   model.Shape(contact.b), pose_b);
-  RowsFromGeometry(pose_a.position, pose_b.position, rows);
+  const ShapeView<T> shape_a = model.Shape(contact.a);
+  const ShapeView<T> shape_b = model.Shape(contact.b);
+  rows->geometry = EvaluateContact(contact.feature, shape_a, pose_a, shape_b, pose_b);
+  RowsFromGeometry(shape_a.type, pose_a.position, shape_b.type, pose_b.position, rows);
 }
 
 /// The same at a state, and with the poses of all bodies.

@@ -29,8 +29,13 @@ void ContactRowsAdjoint(const ContactFeature& feature, const ShapeView<double>& 
   Vector2<double> tangent_bar(0.0, 0.0);
   Vector2<double> arm_a_bar(0.0, 0.0);
   Vector2<double> arm_b_bar(0.0, 0.0);
-  PointRowAdjoint(normal, arm_a, bar.normal_a, 1.0, &normal_bar, &arm_a_bar);
-  PointRowAdjoint(normal, arm_b, bar.normal_b, -1.0, &normal_bar, &arm_b_bar);
+  // A disc's normal row has no angle.
+  const double turn_a = shape_a.type == ShapeType::kCircle ? 0.0 : bar.normal_a[2];
+  const double turn_b = shape_b.type == ShapeType::kCircle ? 0.0 : bar.normal_b[2];
+  const double normal_a_bar[3] = {bar.normal_a[0], bar.normal_a[1], turn_a};
+  const double normal_b_bar[3] = {bar.normal_b[0], bar.normal_b[1], turn_b};
+  PointRowAdjoint(normal, arm_a, normal_a_bar, 1.0, &normal_bar, &arm_a_bar);
+  PointRowAdjoint(normal, arm_b, normal_b_bar, -1.0, &normal_bar, &arm_b_bar);
   PointRowAdjoint(tangent, arm_a, bar.tangent_a, 1.0, &tangent_bar, &arm_a_bar);
   PointRowAdjoint(tangent, arm_b, bar.tangent_b, -1.0, &tangent_bar, &arm_b_bar);
   ContactGeometry<double> geometry_bar;

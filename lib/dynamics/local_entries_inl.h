@@ -113,7 +113,7 @@ class LocalEntries {
     const ShapeView<LocalJet> shape_a = LocalShapeOfA(contact, locals);
     const ShapeView<LocalJet> shape_b = LocalShapeOfB(contact, locals);
     rows->geometry = EvaluateContact(contact.feature, shape_a, pose_a, shape_b, pose_b);
-    RowsFromGeometry(pose_a.position, pose_b.position, rows);
+    RowsFromGeometry(shape_a.type, pose_a.position, shape_b.type, pose_b.position, rows);
   }
 
   void Emit(const Locals& locals, int row, const LocalJet& value) {

@@ -290,7 +290,7 @@ class StepVisitor : private internal::LocalEntries<Sink> {
     const ShapeView<LocalJet> shape_b = LocalShapeOfB(contact, &locals);
     ContactRows<LocalJet> rows;
     rows.geometry = EvaluateContact(contact.feature, shape_a, pose_a, shape_b, pose_b);
-    RowsFromGeometry(pose_a.position, pose_b.position, &rows);
+    RowsFromGeometry(shape_a.type, pose_a.position, shape_b.type, pose_b.position, &rows);
     EmitContact(i, contact, locals, rows);
   }
 
@@ -327,7 +327,7 @@ class StepVisitor : private internal::LocalEntries<Sink> {
     const ShapeView<double> shape_b = model_.Shape(contact.b);
     ContactRows<double> rows;
     rows.geometry = EvaluateContact(contact.feature, shape_a, pose_a, shape_b, pose_b);
-    RowsFromGeometry(pose_a.position, pose_b.position, &rows);
+    RowsFromGeometry(shape_a.type, pose_a.position, shape_b.type, pose_b.position, &rows);
     const double* u_contact = sink_.u + 3 * static_cast<size_t>((*step_.contact_block)[i]);
     const double u_n = IsDriven(i) ? 0.0 : u_contact[0];
     const double u_t = step_.solution->modes[i] == ContactMode::kSticking ? u_contact[1] : 0.0;

@@ -75,7 +75,7 @@ void EvaluateContactRates(const ContactFeature& feature, const ShapeView<T>& sha
   const Pose<Dual<T>> pose_b = DualPose(b);
   ContactRows<Dual<T>> dual;
   dual.geometry = EvaluateContact(feature, dual_a, pose_a, dual_b, pose_b);
-  RowsFromGeometry(pose_a.position, pose_b.position, &dual);
+  RowsFromGeometry(shape_a.type, pose_a.position, shape_b.type, pose_b.position, &dual);
   rates->normal = SplitRow(dual.normal_a, a.twist, &rows->normal_a) +
                   SplitRow(dual.normal_b, b.twist, &rows->normal_b);
   rates->tangent = SplitRow(dual.tangent_a, a.twist, &rows->tangent_a) +

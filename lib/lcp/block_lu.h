@@ -10,9 +10,10 @@
 // (joints, contacts), whose diagonal block may be zero before a neighbour is eliminated. The order
 // is of minimum degree, with a constraint only after one of its bodies; a chain of bodies and
 // joints then has no fill and costs O(number of links). Blocks smaller than 3 are padded with the
-// identity. There is no pivoting between blocks (within a block there is): the systems of mechanics
-// [M −Jᵀ; J δ] are quasi-definite, for which any order is stable; sliding friction makes them
-// slightly unsymmetric, so the solution is refined by the caller against the true residual.
+// identity; of those said to be narrow the third unknown is left out of all products. There is no
+// pivoting between blocks (within a block there is): the systems of mechanics [M −Jᵀ; J δ] are
+// quasi-definite, for which any order is stable; sliding friction makes them slightly unsymmetric,
+// so the solution is refined by the caller against the true residual.
 //
 // The symbolic part (order, fill, places) is kept while the pattern stays; numeric factorisation
 // and solves allocate nothing. Derivation: Davis, Direct Methods for Sparse Linear Systems, ch.
@@ -55,6 +56,10 @@ class BlockLu {
   void SetZero();
   /// 3 x 3 row-major diagonal block, to be added to after SetZero and before Factor.
   T* Diagonal(int block) { return &values_[9 * static_cast<size_t>(block)]; }
+  /// Promises that the third unknown of a block is coupled to no other, of its own block or of
+  /// another (a hinge has two rows; on a disc without friction nothing exerts a torque). After
+  /// SetZero and before Factor.
+  void SetNarrow(int block) { width_[block] = 2; }
   /// Block (row = first node of the edge, column = second).
   T* FirstSecond(int edge) { return Place(edge, pattern_->edge_flipped[edge] != 0); }
   /// Block (row = second node, column = first).
@@ -73,6 +78,8 @@ class BlockLu {
     other->pattern_ = pattern_;
     values_.swap(other->values_);
     row_order_.swap(other->row_order_);
+    width_.swap(other->width_);
+    other->all_narrow_ = all_narrow_;
   }
 
   /// Exchanges the pattern with one kept elsewhere: symbolic work stays with what it is of. Factors
@@ -86,6 +93,10 @@ class BlockLu {
  private:
   template <bool kTransposed, typename Columns>
   void SolveColumns(T* x, Columns columns) const;
+  template <bool kTransposed, int kRows, typename Columns>
+  void SolveRows(T* x, Columns columns) const;
+  template <int kWidth, int kRows>
+  bool Eliminate(int k);
   T* Place(int edge, bool lower) {
     const size_t slot = pattern_->edge_slot[edge];
     const size_t slots = pattern_->neighbour.size();
@@ -95,6 +106,8 @@ class BlockLu {
   std::shared_ptr<BlockLuPattern> pattern_;
   std::vector<T> values_;  ///< diagonal blocks, lower blocks, upper blocks (9 numbers each)
   std::vector<unsigned char> row_order_;  ///< of the rows of each diagonal block
+  std::vector<unsigned char> width_;      ///< of each block: 3, or 2 where it is narrow
+  bool all_narrow_ = false;
   // Scratch of the symbolic phase.
   std::vector<std::vector<int>> adjacency_;
   std::vector<int> state_;

@@ -6,6 +6,7 @@
 
 #include "tangible/lcp/contact_condensation.h"
 #include "tangible/lcp/joint_damping.h"
+#include "tangible/lcp/torque_free.h"
 #include "tangible/math/scratch.h"
 
 namespace tangible {
@@ -72,6 +73,7 @@ void ContactSystem::Reserve(int num_blocks, int num_edges) {
   rhs_.reserve(3 * num_blocks);
   correction_.reserve(3 * num_blocks);
   last_.reserve(3 * num_blocks);
+  turning_.reserve(num_blocks);
 }
 
 void ContactSystem::MoveFactorsTo(ContactSystem* other) {
@@ -147,6 +149,27 @@ void ContactSystem::AddBodies(const ContactProblem<double>& problem) {
       AddOuter(damper.row_b, damper.row_a, damper.weight, lu_.SecondFirst(edge));
       ++edge;
     }
+  }
+}
+
+// Hinges and bars have less than three rows, contacts two.
+void ContactSystem::NarrowBlocks(const ContactProblem<double>& problem) {
+  FindTurning(problem, &turning_);
+  int block = 0;
+  for (const Turning turning : turning_) {
+    if (turning != Turning::kTurned) {
+      lu_.SetNarrow(block);
+    }
+    ++block;
+  }
+  for (const JointBlock<double>& joint : problem.joints) {
+    if (joint.rows < 3) {
+      lu_.SetNarrow(block);
+    }
+    ++block;
+  }
+  for (; block < lu_.num_blocks(); ++block) {
+    lu_.SetNarrow(block);
   }
 }
 
@@ -255,6 +278,7 @@ bool ContactSystem::FactorAs(bool condensed, const ContactProblem<double>& given
   condensed_ = condensed;
   SetPattern(problem, modes);
   lu_.SetZero();
+  NarrowBlocks(problem);
   regularisation_.assign(3 * static_cast<size_t>(num_blocks_), 0.0);
   RegulariseContacts(problem, modes);
   AddBodies(problem);

@@ -24,6 +24,7 @@
 
 #include "tangible/lcp/block_lu.h"
 #include "tangible/lcp/contact_problem.h"
+#include "tangible/lcp/torque_free.h"
 
 namespace tangible {
 
@@ -121,6 +122,7 @@ class ContactSystem {
   void SolveOnce(const ContactProblem<double>& problem, const std::vector<ContactMode>& modes,
                  double* x, int columns) const;
   void SetPattern(const ContactProblem<double>& problem, const std::vector<ContactMode>& modes);
+  void NarrowBlocks(const ContactProblem<double>& problem);
   void AddBodies(const ContactProblem<double>& problem);
   void AddJoints(const ContactProblem<double>& problem, double regularisation);
   void RegulariseContacts(const ContactProblem<double>& problem,
@@ -142,6 +144,7 @@ class ContactSystem {
   double fraction_ = kContactRegularisation;
   std::vector<double> regularisation_;
   std::vector<double> rhs_, correction_, last_;
+  std::vector<Turning> turning_;
 };
 
 /// r M⁻¹ rᵀ with the diagonal of M: what a unit impulse along the row changes its speed by, were

@@ -52,6 +52,7 @@ void RolloutReport::Add(const StepReport& step) {
   contacts += step.contacts;
   lcp_rows += step.lcp_rows;
   single_rows += step.single_rows;
+  angles_left_out += step.angles_left_out;
   pairs_compared += step.pairs_compared;
   pairs_near += step.pairs_near;
   beyond_reach += step.beyond_reach;

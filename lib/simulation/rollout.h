@@ -22,6 +22,7 @@ struct RolloutReport {
   long contacts = 0;  ///< listed, over all steps; the following counts too
   long lcp_rows = 0;
   long single_rows = 0;      ///< contacts and limits that have one row in place of three
+  long angles_left_out = 0;  ///< bodies that have rows, but none that turns them
   long pairs_compared = 0;   ///< pairs of boxes that the broad phase compared
   long pairs_near = 0;       ///< pairs whose boxes overlap
   long beyond_reach = 0;     ///< of these, without rows (fixed stepping)

@@ -153,6 +153,7 @@ Stepper::Stepper(const Model<double>& model, int threads)
   record_.friction.reserve(contacts);
   record_.restitution.reserve(contacts);
   record_.problem.contacts.reserve(contacts);
+  turning_.reserve(s.num_blocks());
   record_.problem.dampers.reserve(s.joints.size() + s.springs.size());
   record_.problem.joints.reserve(s.joints.size());
   for (ContactSolution<double>* solution :
@@ -300,6 +301,8 @@ void Stepper::FillReport(const Model<double>& model, const ContactSolverReport& 
   report->pairs_compared = search_.num_compared();
   report->pairs_near = search_.num_pairs();
   report->beyond_reach = search_.num_beyond_reach();
+  FindTurning(record_.problem, &turning_);
+  report->angles_left_out = CountAnglesLeftOut(turning_);
   if (!solved.solved) {
     report->status = StepStatus::kUnsolved;
     Describe(model, solved.worst_contact, report);

@@ -41,6 +41,7 @@ struct StepReport {
   int pairs_near = 0;       ///< pairs whose boxes overlap
   int beyond_reach = 0;     ///< of these, without rows: out of reach in this step (fixed stepping)
   int single_rows = 0;      ///< contacts and limits that have one row in place of three
+  int angles_left_out = 0;  ///< bodies that have rows, but none that turns them
   int islands = 0;          ///< with contacts, solved apart; 0: all that moves was solved together
   int factorisations = 0;   ///< of the island that took the most
   int iterations = 0;       ///< of the island that took the most
@@ -148,6 +149,7 @@ class Stepper {
   std::vector<ActiveContact> wider_contacts_;  // of a wider search, or (swapped) a narrower one
   ContactSolution<double> narrow_solution_;
   std::vector<CoefficientSource> wider_friction_, wider_restitution_;
+  std::vector<Turning> turning_;  // scratch
 };
 
 /// The implicit derivative part of a step in Jets: `stepper` has just done the same step in double;

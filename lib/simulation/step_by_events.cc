@@ -26,6 +26,20 @@ size_t PlaceOf(const ActiveContact& contact, const CoefficientSource& friction,
   return record->contacts.size() - 1;
 }
 
+// Bodies that rows of some part push and those of none turn.
+int AnglesLeftOut(const EventRecord& record, std::vector<Turning>* scratch) {
+  scratch->clear();
+  for (int p = 0; p < record.num_parts; ++p) {
+    const EventPart& part = *record.parts[p];
+    if (part.is_impulses) {
+      AddTurning(part.impulses.problem, scratch);
+    } else if (part.segment.num_stages > 0) {
+      AddTurning(part.segment.stages[0].problem, scratch);
+    }
+  }
+  return CountAnglesLeftOut(*scratch);
+}
+
 }  // namespace
 
 void CountSolve(const ContactSolverReport& solved, EventOutcome* outcome) {
@@ -129,6 +143,7 @@ StepReport Stepper::StepByEvents(const Model<double>& model, double t, double h,
   }
   SumImpulses(model);
   r.new_twist = state->twist;
+  report.angles_left_out = AnglesLeftOut(events_->record(), &turning_);
   report.solved_by = r.contacts.empty() ? SolvedBy::kDirect
                      : outcome.by_lemke ? SolvedBy::kLemke
                      : outcome.by_guess ? SolvedBy::kGuess

@@ -23,7 +23,7 @@ struct Contact {
   ContactRows<double> Rows() const {
     ContactRows<double> rows;
     rows.geometry = EvaluateContact(feature, A(), PoseOf(pose_a), B(), PoseOf(pose_b));
-    RowsFromGeometry(PoseOf(pose_a).position, PoseOf(pose_b).position, &rows);
+    RowsFromGeometry(type_a, PoseOf(pose_a).position, type_b, PoseOf(pose_b).position, &rows);
     return rows;
   }
 };

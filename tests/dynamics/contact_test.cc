@@ -85,7 +85,8 @@ TEST(ContactTest, RowsAreTheSpeedsOfTheContactPoint) {
   ContactRows<double> rows;
   rows.geometry.normal = Vector2<double>(0.6, 0.8);
   rows.geometry.point = Vector2<double>(1.0, 2.0);
-  RowsFromGeometry(Vector2<double>(0.5, 1.0), Vector2<double>(3.0, 2.5), &rows);
+  RowsFromGeometry(ShapeType::kBox, Vector2<double>(0.5, 1.0), ShapeType::kBox,
+                   Vector2<double>(3.0, 2.5), &rows);
   // Velocity of a's point at twist (0, 0, 1) is (−1, 0.5), of b's (0.5, −2).
   EXPECT_DOUBLE_EQ(rows.normal_a[2], -0.6 + 0.4);
   EXPECT_DOUBLE_EQ(rows.normal_b[2], -(0.3 - 1.6));
@@ -94,6 +95,25 @@ TEST(ContactTest, RowsAreTheSpeedsOfTheContactPoint) {
   EXPECT_DOUBLE_EQ(rows.tangent_a[1], -0.6);
   EXPECT_DOUBLE_EQ(rows.tangent_a[2], -0.8 - 0.3);
   EXPECT_DOUBLE_EQ(rows.tangent_b[0], -0.8);
+}
+
+TEST(ContactTest, NormalsDoNotTurnDiscs) {
+  const double radius[] = {0.3, 0.2};
+  const ShapeView<double> a = {ShapeType::kCircle, &radius[0], 1};
+  const ShapeView<double> b = {ShapeType::kCircle, &radius[1], 1};
+  const Pose<double> pose_a(Vector2<double>(0.1, 0.7), 0.4);
+  const Pose<double> pose_b(Vector2<double>(0.3, 0.3), -0.2);
+  ContactRows<double> rows;
+  rows.geometry = EvaluateContact({}, a, pose_a, b, pose_b);
+  RowsFromGeometry(a.type, pose_a.position, b.type, pose_b.position, &rows);
+  EXPECT_EQ(rows.normal_a[2], 0.0);
+  EXPECT_EQ(rows.normal_b[2], 0.0);
+  // Of boxes at the same places the arms and normals are multiplied, which is 0 but for rounding.
+  RowsFromGeometry(ShapeType::kBox, pose_a.position, ShapeType::kBox, pose_b.position, &rows);
+  EXPECT_NEAR(rows.normal_a[2], 0.0, 1e-15);
+  EXPECT_NEAR(rows.normal_b[2], 0.0, 1e-15);
+  // Friction does: n points up from b to a, t = (n_y, −n_x).
+  EXPECT_NEAR(rows.tangent_a[2], rows.geometry.gap / 2.0 + radius[0], 1e-15);
 }
 
 TEST(ContactTest, LimitsAreContactsOfTheCoordinate) {

@@ -97,7 +97,8 @@ TEST(ContactRatesTest, AreTheChangeOfNormalAndSlidingSpeedAtConstantTwists) {
         const auto at = [&](double time, ContactRows<double>* out) {
           out->geometry =
               EvaluateContact(features[k], shapes[i], After(a, time), shapes[j], After(b, time));
-          RowsFromGeometry(After(a, time).position, After(b, time).position, out);
+          RowsFromGeometry(shapes[i].type, After(a, time).position, shapes[j].type,
+                           After(b, time).position, out);
         };
         at(kTime, &plus);
         at(-kTime, &minus);

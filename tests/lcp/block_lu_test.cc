@@ -113,6 +113,68 @@ TEST(BlockLuTest, ConstraintsWithoutDiagonalAreEliminatedAfterABody) {
   EXPECT_LT((dense * x - rhs).norm(), 1e-11 * x.norm());
 }
 
+// Keeps the third unknown of the blocks from `first` on to itself.
+void Uncouple(const Case& c, int first, BlockLu<double>* lu, MatrixX<double>* dense) {
+  for (int k = first; k < c.blocks; ++k) {
+    const int third = 3 * k + 2;
+    const double own = (*dense)(third, third) + 3.0;
+    dense->row(third).setZero();
+    dense->col(third).setZero();
+    (*dense)(third, third) = own;
+    double* block = lu->Diagonal(k);
+    block[2] = block[5] = block[6] = block[7] = 0.0;
+    block[8] = own;
+  }
+  const auto clear = [&](double* block, int row, int column) {
+    for (int i = 0; i < 3; ++i) {
+      if (row >= first) block[6 + i] = 0.0;
+      if (column >= first) block[3 * i + 2] = 0.0;
+    }
+  };
+  for (size_t e = 0; e < c.edges.size(); ++e) {
+    const auto [i, j] = c.edges[e];
+    clear(lu->FirstSecond(static_cast<int>(e)), i, j);
+    clear(lu->SecondFirst(static_cast<int>(e)), j, i);
+  }
+}
+
+TEST(BlockLuTest, NarrowBlocksAreSolvedAsFullOnes) {
+  for (int trial = 0; trial < 20; ++trial) {
+    std::mt19937_64 random(trial);
+    const Case c = RandomCase(&random, 2 + trial % 7, trial % 5);
+    // None, some or all blocks.
+    const int first = trial % 3 == 0 ? 0 : c.blocks / 2;
+    BlockLu<double> full, narrow;
+    std::mt19937_64 again = random;
+    MatrixX<double> dense = Fill(c, &random, &full);
+    Uncouple(c, first, &full, &dense);
+    dense = Fill(c, &again, &narrow);
+    Uncouple(c, first, &narrow, &dense);
+    for (int k = first; k < c.blocks; ++k) narrow.SetNarrow(k);
+    ASSERT_TRUE(full.Factor());
+    ASSERT_TRUE(narrow.Factor());
+    for (const int columns : {1, 3}) {
+      const RowMatrixXd rhs = RowMatrixXd::Random(3 * c.blocks, columns);
+      RowMatrixXd x = rhs, y = rhs, x_full = rhs, y_full = rhs;
+      narrow.Solve(x.data(), columns);
+      narrow.SolveTransposed(y.data(), columns);
+      full.Solve(x_full.data(), columns);
+      full.SolveTransposed(y_full.data(), columns);
+      EXPECT_EQ(x, x_full);  // what is left out are zeros
+      EXPECT_EQ(y, y_full);
+      EXPECT_LT((dense * x - rhs).norm(), 1e-11 * (1.0 + x.norm()));
+      EXPECT_LT((dense.transpose() * y - rhs).norm(), 1e-11 * (1.0 + y.norm()));
+    }
+    BlockLu<double> other;
+    narrow.MoveFactorsTo(&other);
+    RowMatrixXd x = RowMatrixXd::Ones(3 * c.blocks, 1);
+    RowMatrixXd x_full = x;
+    other.Solve(x.data(), 1);
+    full.Solve(x_full.data(), 1);
+    EXPECT_EQ(x, x_full);
+  }
+}
+
 TEST(BlockLuTest, SingularBlockIsToldAndNaNToo) {
   BlockLu<double> lu;
   lu.SetPattern(1, 1, {});
@@ -121,6 +183,13 @@ TEST(BlockLuTest, SingularBlockIsToldAndNaNToo) {
   lu.SetZero();
   for (int i = 0; i < 3; ++i) lu.Diagonal(0)[4 * i] = std::nan("");
   EXPECT_FALSE(lu.Factor());
+  for (const double third : {0.0, std::nan("")}) {
+    lu.SetZero();
+    lu.SetNarrow(0);
+    lu.Diagonal(0)[0] = lu.Diagonal(0)[4] = 1.0;
+    lu.Diagonal(0)[8] = third;
+    EXPECT_FALSE(lu.Factor());
+  }
 }
 
 TEST(BlockLuTest, RefactorisationWithTheSamePatternAllocatesNothing) {

@@ -78,6 +78,45 @@ TEST(StepReportTest, AContactWithoutFrictionHasOneRow) {
   EXPECT_LT(Apart(reduced.final, full.final), 1e-9);
 }
 
+TEST(StepReportTest, ADiscOnWhichNothingExertsATorqueHasNoAngle) {
+  for (const Stepping stepping : {Stepping::kFixed, Stepping::kEvent}) {
+    // By events only discs that do not meet: rebounds without end are given up at instants that
+    // rounding chooses.
+    const int discs = stepping == Stepping::kFixed ? 8 : 4;
+    Scene scene = FallingDiscs(discs, 0.0);
+    scene.simulation.stepping = stepping;
+    const Ran reduced(scene);
+    // Friction that is nothing, but is there: all angles are unknowns.
+    Scene with_friction = FallingDiscs(discs, 1e-200);
+    with_friction.simulation.stepping = stepping;
+    const Ran full(with_friction);
+    ASSERT_EQ(reduced.report.status, StepStatus::kDone);
+    ASSERT_EQ(full.report.status, StepStatus::kDone);
+    EXPECT_GT(reduced.report.angles_left_out, reduced.report.steps);
+    EXPECT_LE(reduced.report.angles_left_out, discs * reduced.report.steps);
+    EXPECT_EQ(full.report.angles_left_out, 0);
+    EXPECT_LT(Apart(reduced.final, full.final), 1e-9);
+    // Nothing turns them: 2 rad/s, to the bit.
+    int turning = 0;
+    for (size_t i = 2; i < reduced.final.twist.size(); i += 3) {
+      turning += reduced.final.twist[i] == 2.0 ? 1 : 0;
+    }
+    EXPECT_EQ(turning, discs);
+  }
+  // A box has an angle without friction too; discs beside it have none.
+  Scene mixed = FallingDiscs(4, 0.0);
+  for (BasicBody<double>& body : mixed.bodies) {
+    if (body.name == "d0") {
+      body.shape = {ShapeType::kBox, {0.2, 0.2}};
+    }
+  }
+  mixed.simulation.duration = 0.05;
+  mixed.simulation.dt = 0.05;
+  const Ran ran(mixed);
+  EXPECT_GE(ran.report.contacts, 5);
+  EXPECT_EQ(ran.report.angles_left_out, 3);
+}
+
 TEST(StepReportTest, WithoutAnInequalityThereIsNoLcp) {
   Scene scene = test_scenes::SceneOf(test_scenes::WhippingChain(0.3));
   scene.no_contact.clear();

@@ -5,9 +5,11 @@
 // same run are counters.
 #include <benchmark/benchmark.h>
 
+#include <algorithm>
 #include <cmath>
 #include <ctime>
 #include <string>
+#include <vector>
 
 #include "tangible/dynamics/parameter_map.h"
 #include "tangible/scene/scene_json.h"
@@ -107,10 +109,9 @@ void BenchmarkTangent(benchmark::State& state, const Scene& scene) {
   state.counters["rollouts"] = best / rollout;
 }
 
-// Discs in a box without friction: no contact exerts a torque, and their angles could be left out
-// of what is factorised. What that is of a settled step, by its CPU time, bounds what could be
-// gained.
-void BenchmarkFrictionlessDiscs(benchmark::State& state) {
+// The linear system of a step of `discs` settled discs without friction, factorised and solved;
+// with angles that are coupled by nothing that counts, or without.
+void BenchmarkDiscSystem(benchmark::State& state, double arm) {
   Scene scene = DiscsScene(static_cast<int>(state.range(0)));
   for (BasicBody<double>& body : scene.bodies) {
     body.friction = 0.0;
@@ -122,21 +123,23 @@ void BenchmarkFrictionlessDiscs(benchmark::State& state) {
   for (int k = 0; k < 1000; ++k) {
     stepper.Step(c.model, k * h, h, &at);
   }
-  double step = 0.0;
-  double factors = 0.0;
-  for (auto _ : state) {
-    double start = CpuSeconds();
-    const int factorisations = stepper.Step(c.model, 0.0, h, &at).factorisations;
-    step += CpuSeconds() - start;
-    ContactSystem& system = stepper.system();
-    const StepRecord& record = stepper.record();
-    start = CpuSeconds();
-    for (int k = 0; k < factorisations; ++k) {
-      system.Factor(record.problem, record.solution.modes);
-    }
-    factors += CpuSeconds() - start;
+  ContactProblem<double> problem = stepper.record().problem;
+  const std::vector<ContactMode> modes = stepper.record().solution.modes;
+  for (ContactBlock<double>& contact : problem.contacts) {
+    contact.normal_a[2] = arm;
+    contact.normal_b[2] = -arm;
   }
-  state.counters["factorisation_of_step"] = factors / step;
+  ContactSystem system;
+  std::vector<double> x;
+  for (auto _ : state) {
+    system.Factor(problem, modes);
+    x.assign(3 * static_cast<size_t>(system.num_blocks()), 0.0);
+    std::copy(problem.momentum.begin(), problem.momentum.end(), x.begin());
+    benchmark::DoNotOptimize(system.SolveProximal(problem, modes, x.data(), 1));
+  }
+  std::vector<Turning> turning;
+  FindTurning(problem, &turning);
+  state.counters["angles_left_out"] = CountAnglesLeftOut(turning);
 }
 
 BENCHMARK_CAPTURE(BenchmarkRollout, chain, Chain())->Unit(benchmark::kMillisecond);
@@ -150,7 +153,12 @@ BENCHMARK_CAPTURE(BenchmarkTangent, chain, Chain())
     ->Arg(32)
     ->Unit(benchmark::kMillisecond);
 BENCHMARK_CAPTURE(BenchmarkRollout, discs_10, DiscsScene(10))->Unit(benchmark::kMillisecond);
-BENCHMARK(BenchmarkFrictionlessDiscs)->Arg(100)->Unit(benchmark::kMillisecond)->Iterations(500);
+BENCHMARK_CAPTURE(BenchmarkDiscSystem, without_angles, 0.0)
+    ->Arg(100)
+    ->Unit(benchmark::kMicrosecond);
+BENCHMARK_CAPTURE(BenchmarkDiscSystem, with_angles, 1e-200)
+    ->Arg(100)
+    ->Unit(benchmark::kMicrosecond);
 BENCHMARK_CAPTURE(BenchmarkAdjoint, discs_10_keep, DiscsScene(10), Factorisations::kKeep)
     ->Unit(benchmark::kMillisecond);
 
