@@ -8,6 +8,7 @@
 
 #include "tangible/dynamics/contact_gradient.h"
 #include "tangible/lcp/contact_conditioning.h"
+#include "tangible/simulation/certify_grazing.h"
 #include "tangible/simulation/certify_place_inl.h"
 #include "tangible/simulation/event_search.h"
 #include "tangible/simulation/rollout_directional.h"
@@ -404,6 +405,13 @@ void RolloutCertifier::AddEventStep(const Model<double>& model, long step, Stepp
     } else {
       AddSegment(model, step, &stepper->event_derivative(), &part.segment);
     }
+  }
+  std::vector<Graze> grazes;
+  FindGrazes(model, record, kNearKinkMargin, &grazes);
+  for (const Graze& graze : grazes) {
+    const Place place{model.structure.get(), step, graze.time, 0, &graze.contact,
+                      ContactMode::kOpen};
+    AddMargin(graze.margin, place, graze.touches ? "grazing touch" : "grazing, no touch");
   }
 }
 

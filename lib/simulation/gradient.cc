@@ -119,11 +119,15 @@ bool ByAdjoint(const GradientProblem& problem, const TapeOptions& options,
 }
 
 bool ByTangent(const GradientProblem& problem, DerivativeSide side, GradientResult* result) {
+  const bool by_events = problem.structure->settings.stepping == Stepping::kEvent;
+  if (by_events && side != DerivativeSide::kBoth && result->certificate.verdict != "trustworthy") {
+    return internal::JacobianBySides(problem, side, result);
+  }
   RowMatrixXd w_dot =
       VariableJacobian(problem.scene, problem.structure, problem.directions).toDense();
   State<double> final;
   RolloutReport report;
-  if (side == DerivativeSide::kBoth || problem.structure->settings.stepping == Stepping::kEvent) {
+  if (side == DerivativeSide::kBoth || by_events) {
     report = RolloutTangent(problem.model, problem.initial, {}, &w_dot, &final);
   } else {
     const double sign = side == DerivativeSide::kPlus ? 1.0 : -1.0;
@@ -217,16 +221,12 @@ std::string CheckSide(const GradientProblem& problem, const GradientOptions& opt
   return "";
 }
 
-// What one-sided derivatives do not resolve: a message that fails them, or a note.
+// Notes what one-sided derivatives of fixed steps do not resolve.
 void JudgeSide(const GradientProblem& problem, const GradientOptions& options,
                GradientResult* result) {
   const Certificate& certificate = result->certificate;
-  if (options.side == DerivativeSide::kBoth || certificate.verdict == "trustworthy") {
-    return;
-  }
-  if (problem.structure->settings.stepping == Stepping::kEvent) {
-    result->message = "one-sided derivatives of event stepping: only where there is no kink, got " +
-                      certificate.verdict;
+  if (options.side == DerivativeSide::kBoth || certificate.verdict == "trustworthy" ||
+      problem.structure->settings.stepping == Stepping::kEvent) {
     return;
   }
   const bool resolved =
@@ -254,6 +254,11 @@ GradientResult Differentiate(const GradientProblem& problem, const GradientOptio
   if (!result.message.empty()) {
     return result;
   }
+  // Event stepping needs the certificate to tell whether there are sides.
+  const bool sides = options.side != DerivativeSide::kBoth;
+  if (sides) {
+    result.certificate = CertificateOf(problem);
+  }
   RolloutTape tape;
   Stepper stepper(problem.model);
   for (int i = 0; i < std::max(1, options.repeat); ++i) {
@@ -276,12 +281,11 @@ GradientResult Differentiate(const GradientProblem& problem, const GradientOptio
   }
   result.seconds = best(result.all_seconds);
   result.rollout_seconds = best(result.all_rollout_seconds);
-  // Event stepping needs the certificate to tell whether there are sides.
-  if (options.certificate == CertificatePass::kRun || options.side != DerivativeSide::kBoth) {
+  if (!sides && options.certificate == CertificatePass::kRun) {
     result.certificate = CertificateOf(problem);
-    JudgeSide(problem, options, &result);
   }
-  result.done = result.message.empty();
+  JudgeSide(problem, options, &result);
+  result.done = true;
   return result;
 }
 

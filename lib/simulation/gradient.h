@@ -37,8 +37,9 @@ enum class CertificatePass { kRun, kSkip };
 
 /// At a kink: one element of the generalised Jacobian (that of the modes found); or the derivative
 /// for growing parameters (kPlus), or for shrinking ones (kMinus: lim (f(p) − f(p − h)) / h), each
-/// parameter alone. One-sided: fixed steps and the tangent (rollout_directional.h); with event
-/// stepping only where the certificate finds no kink.
+/// parameter alone. One-sided: of the tangent alone; with fixed steps exact
+/// (rollout_directional.h), with event stepping, at a kink, extrapolated from tangents beside it
+/// (gradient_sides.cc).
 enum class DerivativeSide { kBoth, kPlus, kMinus };
 
 struct GradientOptions {

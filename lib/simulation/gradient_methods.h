@@ -28,6 +28,8 @@ std::string FailureOf(const GradientProblem& problem, const RolloutReport& repor
 
 /// Fills values and jacobian; false with a message where a rollout fails.
 bool JacobianByDifferences(const GradientProblem& problem, double step, GradientResult* result);
+/// By tangents beside the scene's parameters: event stepping, at a kink. Reads the certificate.
+bool JacobianBySides(const GradientProblem& problem, DerivativeSide side, GradientResult* result);
 bool JacobianByJets(const GradientProblem& problem, JetRoute route, GradientResult* result);
 
 }  // namespace tangible::internal

@@ -255,7 +255,7 @@ TEST(OneSidedTest, IsNotLinearInItsDirection) {
   }
 }
 
-// The verdict and a line: no sides with event stepping at a kink, nor with other methods.
+// One line: no sides with other methods.
 TEST(OneSidedTest, SaysWhereItIsNotAvailable) {
   Scene scene = SceneOf(PushedDisc(Floor("floor")));
   std::vector<ParameterPath> push(1);
@@ -265,11 +265,6 @@ TEST(OneSidedTest, SaysWhereItIsNotAvailable) {
       scene, push, {.method = GradientMethod::kAdjoint, .side = DerivativeSide::kPlus});
   EXPECT_FALSE(adjoint.done);
   EXPECT_NE(adjoint.message.find("expected the method tangent"), std::string::npos);
-  scene.simulation.stepping = Stepping::kEvent;
-  scene.simulation.integrator = Integrator::kTrapezoidal;
-  const GradientResult events = Jacobian(scene, push, DerivativeSide::kPlus);
-  EXPECT_FALSE(events.done);
-  EXPECT_NE(events.message.find("near a kink"), std::string::npos) << events.message;
 }
 
 }  // namespace
