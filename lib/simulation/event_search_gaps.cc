@@ -41,6 +41,38 @@ double GapAndSpeed(const Model<double>& model, const State<double>& state,
   return rows.geometry.gap;
 }
 
+// A vertex that leaves an edge by its end is handed over when it meets the vertex there, and not at
+// the gap of what takes over, whose edge has another end: that pair of vertices. `next` where the
+// pair has none, or where rounded corners take over smoothly.
+ActiveContact HandOver(const Model<double>& model, const State<double>& state,
+                       const ActiveContact& lost, const ActiveContact& next) {
+  constexpr double kAtEnd = 1e-6;  // of the edge
+  const bool of_first = lost.feature.kind == FeatureKind::kVertexEdge;
+  if (!of_first && lost.feature.kind != FeatureKind::kEdgeVertex) {
+    return next;
+  }
+  const ShapeView<double> shapes[2] = {model.Shape(lost.a), model.Shape(lost.b)};
+  if (CoreRadius(shapes[0]) > 0.0 || CoreRadius(shapes[1]) > 0.0) {
+    return next;
+  }
+  const int edge = of_first ? lost.feature.b : lost.feature.a;
+  const ShapeView<double>& with_edge = shapes[of_first ? 1 : 0];
+  const int ends[2] = {edge, (edge + 1) % NumVertices(with_edge.type, with_edge.num_numbers)};
+  const double length = (Vertex(with_edge, ends[0]) - Vertex(with_edge, ends[1])).norm();
+  for (const int end : ends) {
+    ActiveContact corners = next;
+    corners.feature = {FeatureKind::kVertexVertex, of_first ? lost.feature.a : end,
+                       of_first ? end : lost.feature.b};
+    ContactRows<double> rows;
+    EvaluateContactRows(model, state, corners, &rows);
+    corners.gap = rows.geometry.gap;
+    if (corners.gap <= kAtEnd * length) {
+      return corners;
+    }
+  }
+  return next;
+}
+
 }  // namespace
 
 // Between two states of a pair `length` apart in time: whether neither turns by more than a third
@@ -229,6 +261,7 @@ void EventSearch::SearchPair(const Model<double>& model, int a, int b, Event* ev
     return;
   }
   // A closed contact whose feature is no longer the pair's closest hands over to the next one.
+  const ActiveContact* lost = nullptr;
   const auto same = [&](const Sample& sample) {
     const State<double>& state = sample.motion.after;
     ContactFeature features[2];
@@ -240,6 +273,7 @@ void EventSearch::SearchPair(const Model<double>& model, int a, int b, Event* ev
         found = features[k] == contact.feature;
       }
       if (!found) {
+        lost = &contact;
         return -1.0;
       }
     }
@@ -256,7 +290,8 @@ void EventSearch::SearchPair(const Model<double>& model, int a, int b, Event* ev
       event->kind = EventKind::kTouch;
       event->length = high;
       gap(*At(model, high), true);
-      event->contact = nearest;
+      same(*At(model, high));
+      event->contact = HandOver(model, At(model, high)->motion.after, *lost, nearest);
     }
   }
 }
