@@ -370,24 +370,33 @@ void EventSearch::SearchLimit(const Model<double>& model, int joint, double side
   }
   const double rate = 1.1 * std::max(std::abs(rate_before), std::abs(rate_after)) +
                       0.25 * std::abs(rate_after - rate_before);
+  // As of a pair's contacts: a limit that has touched all the time returns only by approaching.
+  const bool touches = allowed > 0.0;
+  const double slow = SpeedTolerance(model, segment_->before);
   const auto gap = [&](const Sample& sample) {
-    double unused;
-    return sample.good ? evaluate(sample.motion.after, &unused) + allowed
-                       : std::numeric_limits<double>::quiet_NaN();
+    if (!sample.good) {
+      return std::numeric_limits<double>::quiet_NaN();
+    }
+    double speed;
+    const double value = evaluate(sample.motion.after, &speed) + allowed;
+    return touches && value <= 0.0 && speed >= -slow ? kLimitTolerance : value;
   };
   const auto rate_over = [&](double, double) { return rate; };
   const auto course_over = [&](double x, double fx, double y, double fy) {
     double rate_x, rate_y;
-    evaluate(At(model, x)->motion.after, &rate_x);
-    evaluate(At(model, y)->motion.after, &rate_y);
-    return MovesLittle(model, segment_->before, after, y - x, limit.a, limit.b)
+    const bool is_gap = evaluate(At(model, x)->motion.after, &rate_x) + allowed == fx &&
+                        evaluate(At(model, y)->motion.after, &rate_y) + allowed == fy;
+    return is_gap && MovesLittle(model, segment_->before, after, y - x, limit.a, limit.b)
                ? CourseOf(y - x, fx, rate_x, fy, rate_y)
                : Course::kUnknown;
   };
   double root;
   if (from < event->length &&
       FirstRoot(model, gap, rate_over, course_over, 0.0, from, event->length, &root)) {
-    event->kind = EventKind::kTouch;
+    double unused;
+    const double depth = -evaluate(At(model, root)->motion.after, &unused);
+    event->kind =
+        touches && depth > kDeep * kLimitTolerance ? EventKind::kReturn : EventKind::kTouch;
     event->length = root;
     event->contact = limit;
   }

@@ -8,6 +8,7 @@
 #include "../support/gradients.h"
 #include "../support/scenes.h"
 #include "first_segment.h"
+#include "tangible/simulation/step.h"
 
 namespace tangible {
 namespace {
@@ -88,6 +89,37 @@ TEST(EventSearchGapsTest, ATipThatLeavesAnEdgeMeetsItsEnd) {
       EXPECT_NEAR(r.jacobian(4, 3), -0.01 * 9.81 * v, 1e-5);
     }
   }
+}
+
+// A slider on a spinning guide, pulled to its lower limit until it spins fast enough. It leaves
+// without speed, and the Euler step's poses cut the corner: no touch.
+TEST(EventSearchGapsTest, ALimitThatIsLeftIsTouchedOnlyByApproaching) {
+  const Scene scene = test_scenes::SceneOf(R"({"gravity": [0, 0], "bodies": [
+      {"name": "a", "mass": 1, "inertia": 0.1, "position": [0, 0], "velocity": [0, -0.9],
+       "angular_velocity": 6},
+      {"name": "b", "mass": 1, "inertia": 0.1, "position": [0.3, 0], "velocity": [0, 0.9],
+       "angular_velocity": 6}],
+    "joints": [{"name": "slide", "type": "prismatic", "bodies": ["b", "a"], "anchor": [0.3, 0],
+                "axis": [1, 0], "displacement": 0, "limits": [0, 0.1], "effort": -5.5}],
+    "forces": [{"name": "spin", "body": "a", "torque": 0.5}],
+    "simulation": {"stepping": "event", "integrator": "semi_implicit_euler", "dt": 0.005,
+                   "duration": 0.2, "joint_correction": "none"}})");
+  Model<double> model;
+  State<double> state;
+  BuildModel(scene, &model, &state);
+  Stepper stepper(model);
+  int left = 0;
+  for (int k = 0; k < 40; ++k) {
+    ASSERT_EQ(stepper.Step(model, 0.005 * k, 0.005, &state).status, StepStatus::kDone);
+    const EventRecord& record = stepper.events().record();
+    for (int p = 0; p < record.num_parts; ++p) {
+      if (!record.parts[p]->is_impulses) {
+        left += record.parts[p]->segment.event == EventKind::kLiftOff ? 1 : 0;
+        EXPECT_NE(record.parts[p]->segment.event, EventKind::kTouch) << k;
+      }
+    }
+  }
+  EXPECT_EQ(left, 1);
 }
 
 }  // namespace
