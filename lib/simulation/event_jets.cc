@@ -461,7 +461,7 @@ class EventReplay {
       }
     } else if (segment->event_number >= 0) {
       tau = model_.numbers[segment->event_number] - *now;
-    } else {
+    } else if (segment->event != EventKind::kAtOnce) {
       tau = end - *now;
     }
     tau.a = segment->length;

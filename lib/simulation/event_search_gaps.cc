@@ -247,6 +247,9 @@ void EventSearch::SearchPair(const Model<double>& model, int a, int b, Event* ev
     if (OfPair(contact, a, b) && !is_closed(contact)) {
       if (contact.gap < -kDeep * touch) {
         SearchReturn(model, contact, touch, event);
+        if (event->kind == EventKind::kAtOnce) {
+          return;
+        }
       }
       const Sample& end = *At(model, event->length);
       const double speed = SpeedsOf(model, segment_->before, contact).normal;
@@ -313,6 +316,13 @@ void EventSearch::SearchReturn(const Model<double>& model, const ActiveContact& 
   double speed;
   GapAndSpeed(model, segment_->before, contact, &speed);
   double fa = length * speed;
+  // A correction of poses or twists may turn it: it returns at once, whatever moves the start.
+  if (fa > tolerance && apart(*At(model, 0.0)) < -tolerance) {
+    event->kind = EventKind::kAtOnce;
+    event->length = 0.0;
+    event->contact = contact;
+    return;
+  }
   for (const double share : {0.125, 0.25, 0.5, 1.0}) {
     const double b = share * length;
     const double fb = apart(*At(model, b));
