@@ -381,6 +381,27 @@ void EventSearch::SearchLimit(const Model<double>& model, int joint, double side
   const double rate = 1.1 * std::max(std::abs(rate_before), std::abs(rate_after)) +
                       0.25 * std::abs(rate_after - rate_before);
   // As of a pair's contacts: a limit that has touched all the time returns only by approaching.
+  // What poses cut off as the bodies turn by an angle is of its second order; corrections move them
+  // too.
+  const auto cut = [&](const Sample& sample) {
+    const State<double>& at = sample.motion.after;
+    const auto apart = [&](const std::vector<double>& of) {
+      return std::hypot(of[3 * limit.a] - of[3 * limit.b],
+                        of[3 * limit.a + 1] - of[3 * limit.b + 1]);
+    };
+    const double turn = sample.length * std::max(std::abs(at.twist[3 * limit.a + 2]),
+                                                 std::abs(at.twist[3 * limit.b + 2]));
+    double moved = turn * (turn * apart(at.pose) + sample.length * apart(at.twist));
+    for (int k = 0; k < sample.motion.num_corrections; ++k) {
+      for (const int body : {limit.a, limit.b}) {
+        if (const int block = model.structure->bodies[body].block; block >= 0) {
+          const double* by = &sample.motion.corrections[k].solution.v[3 * block];
+          moved += std::hypot(by[0], by[1]) + std::abs(by[2]) * std::max(1.0, apart(at.pose));
+        }
+      }
+    }
+    return moved;
+  };
   const bool touches = allowed > 0.0;
   const double slow = SpeedTolerance(model, segment_->before);
   const auto gap = [&](const Sample& sample) {
@@ -389,7 +410,8 @@ void EventSearch::SearchLimit(const Model<double>& model, int joint, double side
     }
     double speed;
     const double value = evaluate(sample.motion.after, &speed) + allowed;
-    return touches && value <= 0.0 && speed >= -slow ? kLimitTolerance : value;
+    return touches && value <= 0.0 && speed >= -slow && -value <= cut(sample) ? kLimitTolerance
+                                                                              : value;
   };
   const auto rate_over = [&](double, double) { return rate; };
   const auto course_over = [&](double x, double fx, double y, double fy) {
