@@ -292,8 +292,8 @@ double EventDerivative::EventRate(const Model<double>& model, Segment* segment, 
   return gradient.dot(by_length.col(0));
 }
 
-double EventDerivative::Tangent(const Model<double>& model, EventRecord* record, RowMatrixXd* w_dot,
-                                const Observer& observe) {
+double EventDerivative::Tangent(const Model<double>& model, EventRecord* record,
+                                RowMatrixXd* w_dot) {
   const ModelStructure& s = *model.structure;
   const Eigen::Index columns = w_dot->cols();
   const int time = TimeVariable(s);
@@ -307,9 +307,6 @@ double EventDerivative::Tangent(const Model<double>& model, EventRecord* record,
     EventPart& part = *record->parts[p];
     if (part.is_impulses) {
       left = std::max(left, ImpulsesTangent(model, &part.impulses, &x));
-      if (observe) {
-        observe(p, x.leftCols(columns).cwiseAbs());
-      }
       continue;
     }
     Segment& segment = part.segment;
@@ -317,7 +314,6 @@ double EventDerivative::Tangent(const Model<double>& model, EventRecord* record,
     const Row start = x.row(time);
     left = std::max(left, SegmentTangent(model, &segment, &x, tau_dot));
     Row moved = Row::Zero(columns + 1);
-    Row moved_terms = Row::Zero(columns + 1);
     if (IsLocated(segment.event)) {
       Eigen::VectorXd gradient;
       EventGradient(model, &segment, &gradient);
@@ -325,9 +321,6 @@ double EventDerivative::Tangent(const Model<double>& model, EventRecord* record,
       const double terms = gradient.cwiseAbs().dot(x.col(columns).cwiseAbs());
       if (std::abs(change(columns)) > kNoRate * terms) {
         moved = -change / change(columns);
-        if (observe) {
-          moved_terms = gradient.cwiseAbs().transpose() * x.cwiseAbs() / std::abs(change(columns));
-        }
       }
     } else if (segment.event != EventKind::kAtOnce) {
       moved = -start;
@@ -336,10 +329,6 @@ double EventDerivative::Tangent(const Model<double>& model, EventRecord* record,
       }
     }
     moved(columns) = 0.0;
-    if (observe) {
-      observe(p, (x.cwiseAbs() + x.col(columns).cwiseAbs() * moved_terms.cwiseMax(moved.cwiseAbs()))
-                     .leftCols(columns));
-    }
     x += (x.col(columns) * moved).eval();
   }
   *w_dot = x.topLeftCorner(s.num_variables(), columns);
@@ -464,17 +453,13 @@ void EventDerivative::SegmentAdjoint(const Model<double>& model, Segment* segmen
   StagesAdjoint(model, segment, w_bar);
 }
 
-void EventDerivative::Adjoint(const Model<double>& model, EventRecord* record, RowMatrixXd* w_bar,
-                              const Observer& observe) {
+void EventDerivative::Adjoint(const Model<double>& model, EventRecord* record, RowMatrixXd* w_bar) {
   const ModelStructure& s = *model.structure;
   RowMatrixXd bar = RowMatrixXd::Zero(s.num_variables() + 1, w_bar->cols());
   bar.topRows(s.num_variables()) = *w_bar;
   compression_bar_.resize(0, 0);
   for (int p = record->num_parts - 1; p >= 0; --p) {
     EventPart& part = *record->parts[p];
-    if (observe) {
-      observe(p, bar);
-    }
     if (part.is_impulses) {
       ImpulsesAdjoint(model, &part.impulses, &bar);
     } else {

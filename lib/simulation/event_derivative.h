@@ -11,8 +11,6 @@
 // (Leine, Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical Systems, 2004, ch. 7). The
 // adjoint is its transpose.
 
-#include <functional>
-
 #include "tangible/math/scalar.h"
 #include "tangible/simulation/event_record.h"
 #include "tangible/simulation/implicit_stage.h"
@@ -21,18 +19,11 @@ namespace tangible {
 
 class EventDerivative {
  public:
-  /// Called with the place of a part in the record and rows of all variables and the time. Tangent:
-  /// magnitudes of the terms that the derivatives after the part sum, those of the event's time
-  /// included. Adjoint: the adjoint after the part.
-  using Observer = std::function<void(int part, const RowMatrixXd& x)>;
-
   /// w_dot: num_variables x columns, of the state before the step on entry, after it on return.
   /// Returns the largest relative residual of the linear solves.
-  double Tangent(const Model<double>& model, EventRecord* record, RowMatrixXd* w_dot,
-                 const Observer& observe = {});
+  double Tangent(const Model<double>& model, EventRecord* record, RowMatrixXd* w_dot);
   /// w_bar: num_variables x columns, of the state after the step on entry, before it on return.
-  void Adjoint(const Model<double>& model, EventRecord* record, RowMatrixXd* w_bar,
-               const Observer& observe = {});
+  void Adjoint(const Model<double>& model, EventRecord* record, RowMatrixXd* w_bar);
 
   /// How fast the event's equation changes with the segment's length: ∇g · S_τ, and the sum of the
   /// magnitudes of its terms. 0 where the segment ends at a given time.
@@ -63,8 +54,7 @@ class EventDerivative {
   RowMatrixXd compression_dot_, compression_bar_;
 };
 
-/// Whether an event's time is found from an equation: not given, and not that of the segment's
-/// start.
+/// Whether an event's time is found from an equation (and not given).
 bool IsLocated(EventKind kind);
 
 }  // namespace tangible

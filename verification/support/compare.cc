@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "tangible/dynamics/parameter_map.h"
-#include "tangible/simulation/event_derivative.h"
 #include "tangible/simulation/rollout_adjoint.h"
 #include "tangible/simulation/rollout_tangent.h"
 
@@ -32,10 +31,8 @@ void SeedOutputs(const ModelStructure& structure, RowMatrixXd* w_bar) {
 
 // One step of the sum S: its terms by rows of the step's system, and what the adjoint needs.
 struct StepTerms {
-  RowMatrixXd rows;                // |∂R/∂w| |ẇ| + |K| |ẋ|
-  RowMatrixXd tangent;             // ⌈ẇ⌉ after the step
-  std::vector<RowMatrixXd> parts;  // of an event step, after each part
-  EventRecord events;
+  RowMatrixXd rows;     // |∂R/∂w| |ẇ| + |K| |ẋ|
+  RowMatrixXd tangent;  // ⌈ẇ⌉ after the step
   StepRecord record;
   ContactSystem system;
   JointProjection projection;
@@ -208,25 +205,6 @@ RowMatrixXd AdjointOfStep(const Model<double>& model, RowMatrixXd w_bar, StepTer
   return u.cwiseAbs();
 }
 
-// What the adjoint of an event step needs, and the terms after each of its parts.
-void KeepParts(const Model<double>& model, const EventRecord& record, RowMatrixXd w_dot,
-               StepTerms* terms) {
-  for (int p = 0; p < record.num_parts; ++p) {
-    *terms->events.Add() = *record.parts[p];
-  }
-  EventDerivative().Tangent(model, &terms->events, &w_dot,
-                            [&](int, const RowMatrixXd& x) { terms->parts.push_back(x); });
-}
-
-// S of an event step, from the adjoint of the state after it.
-MatrixX<double> SumOfParts(const Model<double>& model, RowMatrixXd w_bar, StepTerms* terms) {
-  MatrixX<double> sum = MatrixX<double>::Zero(w_bar.cols(), terms->tangent.cols());
-  EventDerivative().Adjoint(model, &terms->events, &w_bar, [&](int p, const RowMatrixXd& x) {
-    sum += x.cwiseAbs().transpose() * terms->parts[p];
-  });
-  return sum;
-}
-
 }  // namespace
 
 Contributions ContributionsOf(const Scene& scene, const std::vector<ParameterPath>& parameters) {
@@ -251,7 +229,6 @@ Contributions ContributionsOf(const Scene& scene, const std::vector<ParameterPat
     }
     steps.push_back(std::make_unique<StepTerms>());
     if (stepper->by_events()) {
-      KeepParts(model, stepper->events().record(), w_dot, steps.back().get());
       tangent.Apply(model, stepper, &w_dot);
       steps.back()->tangent = w_dot.cwiseAbs();
     } else {
@@ -267,15 +244,11 @@ Contributions ContributionsOf(const Scene& scene, const std::vector<ParameterPat
   tape.Record(model, start, Factorisations::kKeep, {}, &final);
   const int num_outputs = 6 * model.structure->num_blocks();
   MatrixX<double> sum = MatrixX<double>::Zero(num_outputs, w_dot.cols());
-  MatrixX<double> of_parts = sum;
   const auto seed = [&](long k, RowMatrixXd* w_bar) {
     if (k == tape.steps()) {
       SeedOutputs(*model.structure, w_bar);
     }
     sum += w_bar->cwiseAbs().transpose() * (k == 0 ? initial : steps[k - 1]->tangent);
-    if (k > 0 && steps[k - 1]->events.num_parts > 0) {
-      of_parts += SumOfParts(model, *w_bar, steps[k - 1].get());
-    }
     if (k > 0 && steps[k - 1]->rows.size() > 0) {
       sum += AdjointOfStep(model, *w_bar, steps[k - 1].get()).transpose() * steps[k - 1]->rows;
     }
@@ -285,7 +258,6 @@ Contributions ContributionsOf(const Scene& scene, const std::vector<ParameterPat
   constexpr double kShareOfColumn = 0.1;
   largest = largest.cwiseMax(sum.colwise().maxCoeff().transpose());
   sum = sum.cwiseMax((kShareOfColumn * largest.transpose()).replicate(num_outputs, 1)).eval();
-  sum += of_parts;
   return {std::move(sum), std::move(largest)};
 }
 

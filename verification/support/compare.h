@@ -18,14 +18,12 @@
 //   ⌈ẇₖ⌉ = |ẇₖ| but for  ⌈v̇⁺⌉ = M⁻¹ (the rows of (|∂R/∂w| |ẇ| + |K| |ẋ|) of momentum),
 //                        ⌈q̇⁺⌉ = |q̇| + h ⌈v̇⁺⌉.
 //
-// Of event steps the same after each part, a segment or an impact: S = Σₖ |w̄ₖ|ᵀ ⌈ẇₖ⌉, over the
-// state and the time, where a part that ends at an event has the terms of the event's time too: ⌈ẇ⌉
-// = |ẇ| + |S_τ| |∇g|ᵀ |ẇ| / |∇g · S_τ| (event_derivative.h).
+// Of event steps the inside is not looked at: S = Σₖ |w̄ₖ|ᵀ |ẇₖ|.
 //
 // S is large where large terms cancel (a body at rest, whose impulses cancel all that acts on it; a
-// landing, which has ∂v/∂y of order 1/h). It is at least a tenth of the column's largest, ⌈ẇₖ⌉
-// after any step included, as rounding inside of an element's derivatives, which is not seen here,
-// is a fraction of those, and as what a landing cancels is cancelled again in each step at rest: an
+// landing, which has ∂v/∂y of order 1/h). It is at least a tenth of the column's largest, ⌈ẇₖ⌉ at
+// any step included, as rounding inside of an element's derivatives, which is not seen here, is a
+// fraction of those, and as what a landing cancels is cancelled again in each step at rest: an
 // entry below 1e-14 of its column is rounding. 1e-13 is 450 ε: roundings of some steps.
 
 #include <string>
@@ -38,9 +36,7 @@ namespace tangible {
 
 struct Contributions {
   MatrixX<double> sum;     ///< S above, outputs x parameters
-  /// A parameter: the largest of its column, and of ⌈ẇₖ⌉ after any step, without what is inside of
-  /// event steps.
-  VectorX<double> column;
+  VectorX<double> column;  ///< a parameter: the largest of its column, and of ⌈ẇₖ⌉ at any step
 };
 Contributions ContributionsOf(const Scene& scene, const std::vector<ParameterPath>& parameters);
 

@@ -6,7 +6,6 @@
 #include <cmath>
 
 #include "sliding_box.h"
-#include "tangible/scene/scene_json.h"
 
 namespace tangible {
 namespace {
@@ -46,23 +45,6 @@ TEST(CompareTest, ContributionsRememberWhatIsCancelled) {
   EXPECT_GE(contributions.column[0], 1.0);
   EXPECT_GE(contributions.sum.minCoeff(), 0.1);
   EXPECT_EQ((contributions.sum - ContributionMagnitudes(scene, parameters)).norm(), 0.0);
-}
-
-TEST(CompareTest, ContributionsOfEventStepsRememberTheInside) {
-  // Dropped from 1 m at 4 m/s it bounces within the only step. A height greater by dz is fallen
-  // through dz / |v| later: 1 + |v| / |v| is cancelled at the impact, after which 0.01 v⁺ is left.
-  Scene scene;
-  std::string error;
-  ASSERT_TRUE(ParseScene(R"({"gravity": [0, 0], "bodies": [
-    {"name": "ball", "shape": {"circle": {"radius": 0.1}}, "mass": 1, "position": [0, 1.1],
-     "velocity": [0, -4], "restitution": 0.01},
-    {"name": "floor", "static": true, "restitution": 0.01,
-     "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}}],
-    "simulation": {"stepping": "event", "integrator": "trapezoidal", "dt": 0.3, "duration": 0.3}})",
-                         "ball.json", "", &scene, &error))
-      << error;
-  const std::vector<ParameterPath> parameters = {PathTo(scene, "bodies/ball/position/y")};
-  EXPECT_GE(ContributionMagnitudes(scene, parameters)(1, 0), 2.0);
 }
 
 }  // namespace
