@@ -147,14 +147,9 @@ double NormOfInverse(const ContactProblem<double>& problem, const std::vector<Co
   return norm;
 }
 
-}  // namespace
-
-int CountRedundantRows(const ContactProblem<double>& problem,
-                       const std::vector<ContactMode>& modes) {
-  const std::vector<ActiveRow> rows = ListActiveRows(problem, modes);
-  if (rows.size() < 2) {
-    return 0;
-  }
+// Of the scaled rows, or of the directions in which their impulses act.
+enum class Side { kRows, kPushes };
+int RankOf(const ContactProblem<double>& problem, const std::vector<ActiveRow>& rows, Side side) {
   Eigen::MatrixXd scaled =
       Eigen::MatrixXd::Zero(3 * problem.num_bodies, static_cast<Eigen::Index>(rows.size()));
   for (size_t k = 0; k < rows.size(); ++k) {
@@ -165,14 +160,38 @@ int CountRedundantRows(const ContactProblem<double>& problem,
               rows[k].scale * part[i] / std::sqrt(problem.mass[3 * body + i]);
         }
       };
-      set(rows[k].a, rows[k].row_a);
-      set(rows[k].b, rows[k].row_b);
+      set(rows[k].a, side == Side::kRows ? rows[k].row_a : rows[k].push_a);
+      set(rows[k].b, side == Side::kRows ? rows[k].row_b : rows[k].push_b);
     }
   }
   Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(scaled);
-  // Columns have norm 1; poses are known to about 1e-12 of their size.
-  qr.setThreshold(1e-10);
-  return static_cast<int>(rows.size() - qr.rank());
+  // Columns have norm 1; poses are known to about 1e-12 of their size. What tells pushes apart has
+  // to be more than that.
+  qr.setThreshold(side == Side::kRows ? 1e-10 : 1e-7);
+  return static_cast<int>(qr.rank());
+}
+
+}  // namespace
+
+int CountRedundantRows(const ContactProblem<double>& problem,
+                       const std::vector<ContactMode>& modes) {
+  const std::vector<ActiveRow> rows = ListActiveRows(problem, modes);
+  return rows.size() < 2 ? 0 : static_cast<int>(rows.size()) - RankOf(problem, rows, Side::kRows);
+}
+
+int CountUndeterminedMotions(const ContactProblem<double>& problem,
+                             const std::vector<ContactMode>& modes) {
+  const std::vector<ActiveRow> rows = ListActiveRows(problem, modes);
+  const bool slide = std::any_of(rows.begin(), rows.end(), [](const ActiveRow& row) {
+    return row.push_a != row.row_a || row.push_b != row.row_b;
+  });
+  if (!slide || rows.size() < 2) {
+    return 0;
+  }
+  const int rank = RankOf(problem, rows, Side::kRows);
+  return rank == static_cast<int>(rows.size())
+             ? 0
+             : std::max(RankOf(problem, rows, Side::kPushes) - rank, 0);
 }
 
 SystemQuality MeasureSystem(const ContactProblem<double>& problem,

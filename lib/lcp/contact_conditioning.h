@@ -17,6 +17,13 @@ namespace tangible {
 int CountRedundantRows(const ContactProblem<double>& problem,
                        const std::vector<ContactMode>& modes);
 
+/// By how much the rank of the directions in which impulses act exceeds that of the active rows.
+/// Not 0 where redundant contacts slide with different friction (two feet of a body that cannot
+/// turn): their normal impulses are not determined, and here neither is the friction that they sum
+/// to.
+int CountUndeterminedMotions(const ContactProblem<double>& problem,
+                             const std::vector<ContactMode>& modes);
+
 struct SystemQuality {
   double condition =
       1.0;  ///< estimate of ‖K̃‖₁ ‖K̃⁻¹‖₁ (Hager's, a lower bound, mostly within a factor of 3)

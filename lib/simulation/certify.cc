@@ -190,6 +190,9 @@ void RolloutCertifier::AddLinearSystem(const StepRecord& record, ContactSystem* 
   const size_t unknowns = 3 * static_cast<size_t>(system->num_blocks());
   if (unknowns <= kRankEachStep || modes != last_modes_) {
     last_redundant_ = CountRedundantRows(record.problem, modes);
+    if (last_redundant_ > 0 && CountUndeterminedMotions(record.problem, modes) > 0) {
+      OneSided(kUndeterminedMotion);
+    }
   }
   certificate_.redundant_rows += last_redundant_;
   const SystemQuality quality = MeasureSystem(record.problem, modes, system);

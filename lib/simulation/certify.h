@@ -99,6 +99,10 @@ Certificate CertifyRollout(const Model<double>& model, const State<double>& init
 inline constexpr char kContradictingRows[] =
     "redundant contacts contradict the change of a parameter";
 
+/// The same of a motion that redundant contacts leave undetermined (contact_conditioning.h).
+inline constexpr char kUndeterminedMotion[] =
+    "redundant contacts that slide with different friction leave the motion undetermined";
+
 /// The certificate of the derivatives along `directions` (num_variables x columns, named): of the
 /// rollout, and where rows are redundant (a box on a box) of whether each direction agrees with
 /// them (two rollouts). Where masses are far apart `linear_residual` is at least the gap between

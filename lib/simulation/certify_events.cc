@@ -146,7 +146,11 @@ double SlipOf(const Model<double>& model, const State<double>& state,
 
 void RolloutCertifier::AddQuality(const ContactProblem<double>& problem,
                                   const std::vector<ContactMode>& modes, ContactSystem* system) {
-  certificate_.redundant_rows += CountRedundantRows(problem, modes);
+  const int redundant = CountRedundantRows(problem, modes);
+  certificate_.redundant_rows += redundant;
+  if (redundant > 0 && CountUndeterminedMotions(problem, modes) > 0) {
+    OneSided(kUndeterminedMotion);
+  }
   const SystemQuality quality = MeasureSystem(problem, modes, system);
   certificate_.condition = std::max(certificate_.condition, quality.condition);
   certificate_.linear_residual = std::max(certificate_.linear_residual, quality.residual);

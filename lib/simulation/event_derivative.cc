@@ -68,7 +68,9 @@ void PlaceTangent(const ModelStructure& s, const Segment& segment, double c, con
 
 }  // namespace
 
-bool IsLocated(EventKind kind) { return kind != EventKind::kStepEnd && kind != EventKind::kEdge; }
+bool IsLocated(EventKind kind) {
+  return kind != EventKind::kStepEnd && kind != EventKind::kEdge && kind != EventKind::kAtOnce;
+}
 
 double EventDerivative::NodeTangent(const Model<double>& model, const Segment& segment,
                                     SolvedNode* node, bool correction, const RowMatrixXd& x,
@@ -320,7 +322,7 @@ double EventDerivative::Tangent(const Model<double>& model, EventRecord* record,
       if (std::abs(change(columns)) > kNoRate * terms) {
         moved = -change / change(columns);
       }
-    } else {
+    } else if (segment.event != EventKind::kAtOnce) {
       moved = -start;
       if (segment.event_number >= 0) {
         moved += x.row(s.NumberVariable(segment.event_number));
@@ -430,7 +432,7 @@ void EventDerivative::SegmentAdjoint(const Model<double>& model, Segment* segmen
     if (std::abs(rate) > kNoRate * terms) {
       *w_bar -= gradient * (alpha / rate);
     }
-  } else {
+  } else if (segment->event != EventKind::kAtOnce) {
     w_bar->row(TimeVariable(s)) -= alpha;
     if (segment->event_number >= 0) {
       w_bar->row(s.NumberVariable(segment->event_number)) += alpha;

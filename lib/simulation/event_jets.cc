@@ -14,8 +14,9 @@ namespace {
 
 constexpr int kMostIterations = 60;
 constexpr double kNoRate = 1e-9;  // as in event_derivative.cc
-// Pivots below this share of the largest: redundant rows, solved with δ and refined.
-constexpr double kSingular = 1e-13;
+// Pivots below this share of the largest: redundant rows, solved with δ and refined. Elimination
+// leaves them at some thousand ε, and rounding over them is no derivative.
+constexpr double kSingular = 1e-11;
 constexpr double kRegularised = 1e-10;
 constexpr int kRefinements = 4;
 constexpr double kUnrolledComplementarity = 1e-17;
@@ -460,7 +461,7 @@ class EventReplay {
       }
     } else if (segment->event_number >= 0) {
       tau = model_.numbers[segment->event_number] - *now;
-    } else {
+    } else if (segment->event != EventKind::kAtOnce) {
       tau = end - *now;
     }
     tau.a = segment->length;

@@ -86,6 +86,8 @@ const char* NameOf(EventKind event) {
       return "lift-off";
     case EventKind::kReturn:
       return "return into penetration";
+    case EventKind::kAtOnce:
+      return "return into penetration at once";
   }
   return "";
 }

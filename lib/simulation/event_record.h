@@ -48,6 +48,7 @@ enum class EventKind : unsigned char {
   kSlipBegins,  ///< friction reaches its limit
   kLiftOff,     ///< a normal force reaches 0
   kReturn,      ///< the speed at which an open contact leaves penetration reaches 0
+  kAtOnce,      ///< the same at the segment's start, where poses and twists are corrected
 };
 
 /// "touch", "end of sliding", ...

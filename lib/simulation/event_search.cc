@@ -286,14 +286,21 @@ bool EventSearch::Run(const Model<double>& model, const std::vector<ActiveContac
       }
     }
     SearchPair(model, a, b, &event);
-  }
-  for (size_t j = 0; j < model.structure->joints.size(); ++j) {
-    if (model.structure->joints[j].low >= 0) {
-      SearchLimit(model, static_cast<int>(j), 1.0, &event);
-      SearchLimit(model, static_cast<int>(j), -1.0, &event);
+    if (event.kind == EventKind::kAtOnce) {
+      break;
     }
   }
-  SearchClosed(model, &event);
+  for (size_t j = 0; j < model.structure->joints.size(); ++j) {
+    if (model.structure->joints[j].low >= 0 && event.kind != EventKind::kAtOnce) {
+      SearchLimit(model, static_cast<int>(j), 1.0, &event);
+      if (event.kind != EventKind::kAtOnce) {
+        SearchLimit(model, static_cast<int>(j), -1.0, &event);
+      }
+    }
+  }
+  if (event.kind != EventKind::kAtOnce) {
+    SearchClosed(model, &event);
+  }
   const double length = event.length;
   segment->length = length;
   segment->event = event.kind;

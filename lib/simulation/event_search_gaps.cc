@@ -41,6 +41,38 @@ double GapAndSpeed(const Model<double>& model, const State<double>& state,
   return rows.geometry.gap;
 }
 
+// A vertex that leaves an edge by its end is handed over when it meets the vertex there, and not at
+// the gap of what takes over, whose edge has another end: that pair of vertices. `next` where the
+// pair has none, or where rounded corners take over smoothly.
+ActiveContact HandOver(const Model<double>& model, const State<double>& state,
+                       const ActiveContact& lost, const ActiveContact& next) {
+  constexpr double kAtEnd = 1e-6;  // of the edge
+  const bool of_first = lost.feature.kind == FeatureKind::kVertexEdge;
+  if (!of_first && lost.feature.kind != FeatureKind::kEdgeVertex) {
+    return next;
+  }
+  const ShapeView<double> shapes[2] = {model.Shape(lost.a), model.Shape(lost.b)};
+  if (CoreRadius(shapes[0]) > 0.0 || CoreRadius(shapes[1]) > 0.0) {
+    return next;
+  }
+  const int edge = of_first ? lost.feature.b : lost.feature.a;
+  const ShapeView<double>& with_edge = shapes[of_first ? 1 : 0];
+  const int ends[2] = {edge, (edge + 1) % NumVertices(with_edge.type, with_edge.num_numbers)};
+  const double length = (Vertex(with_edge, ends[0]) - Vertex(with_edge, ends[1])).norm();
+  for (const int end : ends) {
+    ActiveContact corners = next;
+    corners.feature = {FeatureKind::kVertexVertex, of_first ? lost.feature.a : end,
+                       of_first ? end : lost.feature.b};
+    ContactRows<double> rows;
+    EvaluateContactRows(model, state, corners, &rows);
+    corners.gap = rows.geometry.gap;
+    if (corners.gap <= kAtEnd * length) {
+      return corners;
+    }
+  }
+  return next;
+}
+
 }  // namespace
 
 // Between two states of a pair `length` apart in time: whether neither turns by more than a third
@@ -215,6 +247,9 @@ void EventSearch::SearchPair(const Model<double>& model, int a, int b, Event* ev
     if (OfPair(contact, a, b) && !is_closed(contact)) {
       if (contact.gap < -kDeep * touch) {
         SearchReturn(model, contact, touch, event);
+        if (event->kind == EventKind::kAtOnce) {
+          return;
+        }
       }
       const Sample& end = *At(model, event->length);
       const double speed = SpeedsOf(model, segment_->before, contact).normal;
@@ -229,6 +264,7 @@ void EventSearch::SearchPair(const Model<double>& model, int a, int b, Event* ev
     return;
   }
   // A closed contact whose feature is no longer the pair's closest hands over to the next one.
+  const ActiveContact* lost = nullptr;
   const auto same = [&](const Sample& sample) {
     const State<double>& state = sample.motion.after;
     ContactFeature features[2];
@@ -240,6 +276,7 @@ void EventSearch::SearchPair(const Model<double>& model, int a, int b, Event* ev
         found = features[k] == contact.feature;
       }
       if (!found) {
+        lost = &contact;
         return -1.0;
       }
     }
@@ -256,7 +293,8 @@ void EventSearch::SearchPair(const Model<double>& model, int a, int b, Event* ev
       event->kind = EventKind::kTouch;
       event->length = high;
       gap(*At(model, high), true);
-      event->contact = nearest;
+      same(*At(model, high));
+      event->contact = HandOver(model, At(model, high)->motion.after, *lost, nearest);
     }
   }
 }
@@ -278,6 +316,13 @@ void EventSearch::SearchReturn(const Model<double>& model, const ActiveContact& 
   double speed;
   GapAndSpeed(model, segment_->before, contact, &speed);
   double fa = length * speed;
+  // A correction of poses or twists may turn it: it returns at once, whatever moves the start.
+  if (fa > tolerance && apart(*At(model, 0.0)) < -tolerance) {
+    event->kind = EventKind::kAtOnce;
+    event->length = 0.0;
+    event->contact = contact;
+    return;
+  }
   for (const double share : {0.125, 0.25, 0.5, 1.0}) {
     const double b = share * length;
     const double fb = apart(*At(model, b));
@@ -335,24 +380,55 @@ void EventSearch::SearchLimit(const Model<double>& model, int joint, double side
   }
   const double rate = 1.1 * std::max(std::abs(rate_before), std::abs(rate_after)) +
                       0.25 * std::abs(rate_after - rate_before);
+  // As of a pair's contacts: a limit that has touched all the time returns only by approaching.
+  // What poses cut off as the bodies turn by an angle is of its second order; corrections move them
+  // too.
+  const auto cut = [&](const Sample& sample) {
+    const State<double>& at = sample.motion.after;
+    const auto apart = [&](const std::vector<double>& of) {
+      return std::hypot(of[3 * limit.a] - of[3 * limit.b],
+                        of[3 * limit.a + 1] - of[3 * limit.b + 1]);
+    };
+    const double turn = sample.length * std::max(std::abs(at.twist[3 * limit.a + 2]),
+                                                 std::abs(at.twist[3 * limit.b + 2]));
+    double moved = turn * (turn * apart(at.pose) + sample.length * apart(at.twist));
+    for (int k = 0; k < sample.motion.num_corrections; ++k) {
+      for (const int body : {limit.a, limit.b}) {
+        if (const int block = model.structure->bodies[body].block; block >= 0) {
+          const double* by = &sample.motion.corrections[k].solution.v[3 * block];
+          moved += std::hypot(by[0], by[1]) + std::abs(by[2]) * std::max(1.0, apart(at.pose));
+        }
+      }
+    }
+    return moved;
+  };
+  const bool touches = allowed > 0.0;
+  const double slow = SpeedTolerance(model, segment_->before);
   const auto gap = [&](const Sample& sample) {
-    double unused;
-    return sample.good ? evaluate(sample.motion.after, &unused) + allowed
-                       : std::numeric_limits<double>::quiet_NaN();
+    if (!sample.good) {
+      return std::numeric_limits<double>::quiet_NaN();
+    }
+    double speed;
+    const double value = evaluate(sample.motion.after, &speed) + allowed;
+    return touches && value <= 0.0 && speed >= -slow && -value <= cut(sample) ? kLimitTolerance
+                                                                              : value;
   };
   const auto rate_over = [&](double, double) { return rate; };
   const auto course_over = [&](double x, double fx, double y, double fy) {
     double rate_x, rate_y;
-    evaluate(At(model, x)->motion.after, &rate_x);
-    evaluate(At(model, y)->motion.after, &rate_y);
-    return MovesLittle(model, segment_->before, after, y - x, limit.a, limit.b)
+    const bool is_gap = evaluate(At(model, x)->motion.after, &rate_x) + allowed == fx &&
+                        evaluate(At(model, y)->motion.after, &rate_y) + allowed == fy;
+    return is_gap && MovesLittle(model, segment_->before, after, y - x, limit.a, limit.b)
                ? CourseOf(y - x, fx, rate_x, fy, rate_y)
                : Course::kUnknown;
   };
   double root;
   if (from < event->length &&
       FirstRoot(model, gap, rate_over, course_over, 0.0, from, event->length, &root)) {
-    event->kind = EventKind::kTouch;
+    double unused;
+    const double depth = -evaluate(At(model, root)->motion.after, &unused);
+    event->kind =
+        touches && depth > kDeep * kLimitTolerance ? EventKind::kReturn : EventKind::kTouch;
     event->length = root;
     event->contact = limit;
   }

@@ -41,6 +41,23 @@ TEST(ContactConditioningTest, RedundantRowsAreThoseBeyondTheRank) {
   EXPECT_EQ(count(2, ContactMode::kOpen), 0);
 }
 
+TEST(ContactConditioningTest, FeetOfDifferentFrictionLeaveTheMotionOpenWhereOneWouldDo) {
+  ContactProblem<double> problem = Box(1);
+  const std::vector<ContactMode> slide(2, ContactMode::kSlidingPositive);
+  const auto count = [&] { return CountUndeterminedMotions(problem, slide); };
+  problem.contacts[1].friction = 0.5;
+  EXPECT_EQ(count(), 0);  // what tips it tells the normal impulses
+  for (ContactBlock<double>& contact : problem.contacts) {
+    contact.normal_a[2] = 0.0;  // as for a body that cannot turn
+    contact.tangent_a[2] = 0.0;
+  }
+  EXPECT_EQ(count(), 1);
+  EXPECT_EQ(CountUndeterminedMotions(problem, {ContactMode::kSticking, ContactMode::kSticking}), 0);
+  problem.contacts[1].friction = problem.contacts[0].friction;
+  EXPECT_EQ(CountRedundantRows(problem, slide), 1);
+  EXPECT_EQ(count(), 0);
+}
+
 TEST(ContactConditioningTest, ConditionOfOneContactIsThatByHandWhateverTheMass) {
   for (const double mass : {1.0, 1e-6, 1e6}) {
     ContactProblem<double> problem = testing::FreeBodies({0.0, -1.0, 0.0});

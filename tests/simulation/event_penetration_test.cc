@@ -176,5 +176,60 @@ TEST(EventPenetrationTest, ASliderWithoutForcesIsNotContradicted) {
   }
 }
 
+// Links that begin deep in the floor: as a second one is held, the correction of poses turns a
+// corner of the first, which was opening. It returns at that instant, whatever moves it.
+TEST(EventPenetrationTest, WhatACorrectionTurnsReturnsAtOnce) {
+  const Scene scene = SceneOf(R"({"bodies": [
+      {"name": "floor", "static": true, "friction": 3.0,
+       "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}},
+      {"name": "link1", "mass": 1.5180135844599023, "inertia": 0.02142647142616927,
+       "position": [-1.276643958133873, 0.3576652628661721], "angle": -0.6928071194198266},
+      {"name": "link2", "shape": {"circle": {"radius": 0.07}}, "mass": 1.5964576253570066,
+       "position": [-1.4299318744016196, 0.1729957885985164], "angle": -0.6928071194198266,
+       "friction": 3.3803224916240975},
+      {"name": "link3", "shape": {"box": {"size": [0.05, 0.24]}}, "mass": 1.1065977677170387,
+       "position": [-1.583219790669366, -0.011673685669139358], "angle": -0.6928071194198266,
+       "friction": 2.5582886356572043},
+      {"name": "link4", "shape": {"circle": {"radius": 0.07}}, "mass": 2.4884297124655803,
+       "position": [-1.7365077069371122, -0.19634315993679513], "angle": -0.6928071194198266,
+       "friction": 2.1365141008914548}],
+    "joints": [
+      {"name": "joint0", "type": "weld", "bodies": ["link2", "link1"],
+       "anchor": [-1.3532879162677465, 0.2653305257323443]},
+      {"name": "joint1", "type": "revolute", "bodies": ["link3", "link2"],
+       "anchor": [-1.5065758325354928, 0.08066105146468852], "angle": 0.2987637057028575,
+       "rate": -1.3018785716434484},
+      {"name": "joint2", "type": "revolute", "bodies": ["link4", "link3"],
+       "anchor": [-1.659863748803239, -0.10400842280296724], "angle": 0.20867814861149922,
+       "rate": 0.09078131896474728}],
+    "springs": [{"name": "spring", "bodies": ["link1", "world"], "stiffness": 6.446353217541619,
+       "anchors": [[-1.267336100552214, 0.4048550187148136], [0.9281602192882826, 1.5]],
+       "rest_length": 0.6101018997672449}],
+    "no_contact": [["link*", "link*"]],
+    "simulation": {"dt": 0.01, "duration": 0.02, "stepping": "event",
+                   "integrator": "runge_kutta_4", "joint_correction": "baumgarte",
+                   "recovery_speed": 3.0, "friction_mixing": "geometric_mean"}})");
+  const std::vector<std::string> paths = {"gravity/x", "bodies/link2/mass", "joints/joint1/angle"};
+  const GradientResult r = Jacobian(scene, paths, GradientMethod::kAdjoint);
+  ExpectOthersAgree(scene, paths, r);
+  Model<double> model;
+  State<double> state;
+  BuildModel(scene, &model, &state);
+  Stepper stepper(model);
+  int at_once = 0;
+  for (int k = 0; k < 2; ++k) {
+    ASSERT_EQ(stepper.Step(model, 0.01 * k, 0.01, &state).status, StepStatus::kDone);
+    const EventRecord& record = stepper.events().record();
+    for (int p = 0; p < record.num_parts; ++p) {
+      const EventPart& part = *record.parts[p];
+      if (!part.is_impulses && part.segment.event == EventKind::kAtOnce) {
+        ++at_once;
+        EXPECT_EQ(part.segment.length, 0.0);
+      }
+    }
+  }
+  EXPECT_EQ(at_once, 1);
+}
+
 }  // namespace
 }  // namespace tangible

@@ -119,7 +119,36 @@ void TraceImpulses(const Record& record, long step, RunTrace* trace) {
   AddDegenerate(record.problem, record.solution, trace);
 }
 
-void TraceSegment(const Segment& segment, long step, RunTrace* trace) {
+// The contact that a touch is told by. Where a face lands flat both its corners take part in the
+// same impact, and which of them is found first is rounding: it is told by the first in their
+// order.
+ActiveContact TouchOf(const Segment& segment, const EventPart* next) {
+  const ActiveContact& touch = segment.event_contact;
+  const auto has = [](const std::vector<ActiveContact>& contacts, const ActiveContact& contact) {
+    return std::any_of(contacts.begin(), contacts.end(),
+                       [&](const ActiveContact& c) { return c.SameAs(contact); });
+  };
+  if (segment.event != EventKind::kTouch || touch.joint >= 0 || next == nullptr ||
+      !next->is_impulses || !has(next->impulses.contacts, touch)) {
+    return touch;
+  }
+  const auto key = [](const ActiveContact& c) {
+    return std::tuple(c.feature.kind, c.feature.a, c.feature.b);
+  };
+  const Impulses& impact = next->impulses;
+  ActiveContact first = touch;
+  for (size_t i = 0; i < impact.contacts.size(); ++i) {
+    const ActiveContact& other = impact.contacts[i];
+    if (other.joint < 0 && other.a == touch.a && other.b == touch.b &&
+        impact.solution.modes[i] != ContactMode::kOpen && !has(segment.contacts, other) &&
+        key(other) < key(first)) {
+      first = other;
+    }
+  }
+  return first;
+}
+
+void TraceSegment(const Segment& segment, const EventPart* next, long step, RunTrace* trace) {
   PartTrace part(step, trace);
   for (size_t i = 0; i < segment.contacts.size(); ++i) {
     part.Add(segment.contacts[i], segment.modes[i], segment.friction[i].tie, false);
@@ -127,7 +156,7 @@ void TraceSegment(const Segment& segment, long step, RunTrace* trace) {
   if (segment.event != EventKind::kStepEnd) {
     // The edge of a force's window has no contact: the record keeps that of an earlier segment.
     const bool of_contact = segment.event != EventKind::kEdge;
-    part.AddEvent(segment.event, of_contact ? segment.event_contact : ActiveContact());
+    part.AddEvent(segment.event, of_contact ? TouchOf(segment, next) : ActiveContact());
   }
   part.Finish();
   for (int k = 0; k < segment.num_stages; ++k) {
@@ -146,7 +175,8 @@ void TraceStep(Stepper* stepper, long step, RunTrace* trace) {
     if (part.is_impulses) {
       TraceImpulses(part.impulses, step, trace);
     } else {
-      TraceSegment(part.segment, step, trace);
+      TraceSegment(part.segment, k + 1 < record.num_parts ? record.parts[k + 1].get() : nullptr,
+                   step, trace);
     }
   }
 }
