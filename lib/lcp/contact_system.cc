@@ -420,14 +420,19 @@ double ContactSystem::Refine(const ContactProblem<double>& problem,
     // Of a derivative the first round is not judged.
     const bool derivative = goal < kResidualGoal;
     lessens = derivative && i == 0;
+    double worst_before = 0.0;
+    double worst_left = 0.0;
     for (int c = 0; c < columns; ++c) {
       const double before = sizes_[c].ToParts();
       const double left = next_sizes_[c].ToParts();
       const bool halves = refined_[c] == 0 && left < 0.5 * before;
       lessens = lessens || (halves && before > kResidualGoal);
+      worst_before = std::max(worst_before, before);
+      worst_left = std::max(worst_left, left);
       // What contradicts redundant rows does not fall, nor does rounding; neither must keep the
       // rest of its column from what a round does.
-      const bool stays = derivative && left <= std::max(kStays * before, kResidualGoal);
+      const bool stays =
+          derivative && (i == 0 || columns > 1) && left <= std::max(kStays * before, kResidualGoal);
       if (refined_[c] != 0 || halves || stays) {
         sizes_[c] = next_sizes_[c];
         continue;
@@ -437,6 +442,8 @@ double ContactSystem::Refine(const ContactProblem<double>& problem,
         x[k] = last_[k];
       }
     }
+    // Of many columns one of rounding's size may halve by chance, all do not.
+    lessens = lessens || worst_left < 0.5 * worst_before;
   }
   ResidualSize all;
   const bool slow = MassesDiffer(problem);
