@@ -13,10 +13,12 @@ namespace tangible {
 namespace {
 
 // Refinement ends where the residual is at rounding level, or no longer falls. Derivatives of many
-// steps sum what is left of each, and their columns differ in size: they go on as long as it helps.
+// steps sum what is left of each: they take two rounds and more, as long as it helps a column.
 constexpr double kResidualGoal = 1e-15;
 constexpr double kDerivativeGoal = 1e-18;
 constexpr int kMaxRefinements = 40;
+// What contradicts redundant rows stays; a correction that leaves more than this of it is none.
+constexpr double kStays = 2.0;
 // Rows that leave more than this contradict each other.
 constexpr double kConsistent = 1e-14;
 // A condensed system that leaves more than this is factorised as a whole.
@@ -74,6 +76,9 @@ void ContactSystem::Reserve(int num_blocks, int num_edges) {
   correction_.reserve(3 * num_blocks);
   last_.reserve(3 * num_blocks);
   turning_.reserve(num_blocks);
+  sizes_.reserve(1);
+  next_sizes_.reserve(1);
+  refined_.reserve(1);
 }
 
 void ContactSystem::MoveFactorsTo(ContactSystem* other) {
@@ -403,36 +408,81 @@ double ContactSystem::SolveProximal(const ContactProblem<double>& problem,
   return Refine<false>(problem, modes, Regularisation::kLeftOut, free, x, columns, kResidualGoal);
 }
 
-// Refines x for the right-hand side rhs_ as long as a round halves what is left of it.
+// Refines x for the right-hand side rhs_ as long as a round halves what is left of a column.
 template <bool kTransposed>
 double ContactSystem::Refine(const ContactProblem<double>& problem,
                              const std::vector<ContactMode>& modes, Regularisation regularisation,
                              const FreeMomenta& free, double* x, int columns, double goal) {
   const size_t size = rhs_.size();
   SizeScratch(size, &correction_);
-  const auto residual = [&]() {
-    return ResidualWith<kTransposed>(problem, modes, regularisation, free, rhs_.data(), x, columns,
-                                     correction_.data())
-        .to_parts;
+  sizes_.resize(columns);
+  next_sizes_.resize(columns);
+  refined_.assign(columns, 0);
+  const auto residual = [&](std::vector<ResidualSize>* sizes) {
+    ResidualWith<kTransposed>(problem, modes, regularisation, free, rhs_.data(), x, columns,
+                              correction_.data(), sizes->data());
   };
-  double left = residual();
-  for (int i = 0; i < kMaxRefinements && left > goal; ++i) {
+  residual(&sizes_);
+  bool lessens = true;
+  for (int i = 0; i < kMaxRefinements && lessens; ++i) {
+    bool all_refined = true;
+    for (int c = 0; c < columns; ++c) {
+      refined_[c] = refined_[c] != 0 || !(sizes_[c].ToParts() > goal) ? 1 : 0;
+      all_refined = all_refined && refined_[c] != 0;
+    }
+    if (all_refined) {
+      break;
+    }
     last_.assign(x, x + size);
     SolveOnce<kTransposed>(problem, modes, correction_.data(), columns);
-    for (size_t k = 0; k < size; ++k) {
-      x[k] += correction_[k];
+    for (size_t k = 0; k < size; k += columns) {
+      for (int c = 0; c < columns; ++c) {
+        x[k + c] += refined_[c] != 0 ? 0.0 : correction_[k + c];
+      }
     }
-    const double before = left;
-    left = residual();
-    // What contradicts redundant rows does not fall, and must not keep the rest of a derivative
-    // from its first correction.
-    const bool first = i == 0 && goal < kResidualGoal && std::isfinite(left);
-    if (!(left < 0.5 * before) && !first) {
-      std::copy(last_.begin(), last_.end(), x);
-      return before;
+    residual(&next_sizes_);
+    // Of a derivative the first round is not judged.
+    const bool derivative = goal < kResidualGoal;
+    lessens = derivative && i == 0;
+    double worst_before = 0.0;
+    double worst_left = 0.0;
+    for (int c = 0; c < columns; ++c) {
+      const double before = sizes_[c].ToParts();
+      const double left = next_sizes_[c].ToParts();
+      const bool halves = refined_[c] == 0 && left < 0.5 * before;
+      lessens = lessens || (halves && before > kResidualGoal);
+      worst_before = std::max(worst_before, before);
+      worst_left = std::max(worst_left, left);
+      // What contradicts redundant rows does not fall, nor does rounding; neither must keep the
+      // rest of its column from what a round does.
+      const bool stays =
+          derivative && (i == 0 || columns > 1) && left <= std::max(kStays * before, kResidualGoal);
+      if (refined_[c] != 0 || halves || stays) {
+        sizes_[c] = next_sizes_[c];
+        continue;
+      }
+      refined_[c] = 1;
+      for (size_t k = c; k < size; k += columns) {
+        x[k] = last_[k];
+      }
     }
+    // Of many columns one of rounding's size may halve by chance, all do not.
+    lessens = lessens || worst_left < 0.5 * worst_before;
   }
-  return left;
+  ResidualSize all;
+  const bool slow = MassesDiffer(problem);
+  for (int c = 0; c < columns; ++c) {
+    if (slow && sizes_[c].ToParts() > kConsistent) {
+      RefineConjugate<kTransposed>(problem, modes, regularisation, free, x, columns, c);
+    }
+    all.Include(sizes_[c]);
+  }
+  return all.ToParts();
 }
+
+template void ContactSystem::SolveOnce<false>(const ContactProblem<double>&,
+                                              const std::vector<ContactMode>&, double*, int) const;
+template void ContactSystem::SolveOnce<true>(const ContactProblem<double>&,
+                                             const std::vector<ContactMode>&, double*, int) const;
 
 }  // namespace tangible

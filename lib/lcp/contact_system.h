@@ -18,7 +18,14 @@
 //
 // Where several contacts are closed they are taken out before factorisation
 // (contact_condensation.h). Where refinement then stalls, the whole system is factorised instead.
+//
+// Beside a mass far greater δ is none of little: a body of 1 kg between the floor and 1e12 kg moves
+// as if it were free by 1 / kg, but with both held by 1e-12 / kg, of which δ is the hundredfold. A
+// round of refinement then takes 1 % of what is left in that direction, and all of the others;
+// directions so slow are as few as such bodies, and conjugate residuals take one a round.
 
+#include <algorithm>
+#include <cmath>
 #include <utility>
 #include <vector>
 
@@ -53,7 +60,9 @@ class ContactSystem {
     return lu_.bytes() + edges_.capacity() * sizeof(edges_[0]) +
            contact_block_.capacity() * sizeof(int) +
            sizeof(double) * (regularisation_.capacity() + rhs_.capacity() + correction_.capacity() +
-                             last_.capacity());
+                             last_.capacity() + conjugate_.capacity()) +
+           sizeof(ResidualSize) * (sizes_.capacity() + next_sizes_.capacity()) +
+           refined_.capacity();
   }
   void Reserve(int num_blocks, int num_edges);
   /// Whether solves need the problem: they are refined against K without δ. Else they read the
@@ -92,26 +101,56 @@ class ContactSystem {
 
  private:
   enum class Regularisation { kLeftOut, kKept };
-  // A residual's largest entry, relative to the terms of its kind of row, and to the products that
-  // these sum.
-  struct ResidualSize {
-    double to_terms, to_parts;
+  // Largest magnitudes of a kind of row: of its terms and of what is left.
+  struct RowScale {
+    double terms = 0.0;
+    // Of the products that a constraint's value sums, and of the free motion: at rest all terms
+    // cancel to rounding, which is relative to these.
+    double parts = 0.0;
+    double left = 0.0;
+    void Term(double x) { terms = std::max(terms, std::abs(x)); }
+    void Include(const RowScale& other);
+    double Relative() const { return Ratio(terms); }
+    double RelativeToParts() const { return Ratio(std::max(terms, parts)); }
+
+   private:
+    double Ratio(double scale) const {
+      return scale > 0.0 ? left / scale : left > 0.0 ? HUGE_VAL : 0.0;
+    }
   };
+  // Of a column, or of all. Its largest entry is relative to the terms of its kind of row, or to
+  // the products that these sum.
+  struct ResidualSize {
+    RowScale momentum, constraint;
+    void Include(const ResidualSize& other);
+    double ToTerms() const { return std::max(momentum.Relative(), constraint.Relative()); }
+    double ToParts() const {
+      return std::max(momentum.RelativeToParts(), constraint.RelativeToParts());
+    }
+  };
+  template <bool kTransposed>
+  class ColumnResidual;
   // Momenta of the motion without constraints, whose speeds are of the size that rows cancel from:
-  // row-major, 3 num_bodies rows.
+  // row-major, 3 num_bodies rows; of each column, or one for all.
   struct FreeMomenta {
     const double* values;
     int columns;
   };
+  // Writes the size of each column's residual where `sizes` is given; returns that of all.
   template <bool kTransposed>
   ResidualSize ResidualWith(const ContactProblem<double>& problem,
                             const std::vector<ContactMode>& modes, Regularisation regularisation,
                             const FreeMomenta& free, const double* rhs, const double* x,
-                            int columns, double* residual) const;
+                            int columns, double* residual, ResidualSize* sizes) const;
   template <bool kTransposed>
   double Refine(const ContactProblem<double>& problem, const std::vector<ContactMode>& modes,
                 Regularisation regularisation, const FreeMomenta& free, double* x, int columns,
                 double goal);
+  // Refines a column further by conjugate residuals; sizes_ has its residual.
+  template <bool kTransposed>
+  void RefineConjugate(const ContactProblem<double>& problem, const std::vector<ContactMode>& modes,
+                       Regularisation regularisation, const FreeMomenta& free, double* x,
+                       int columns, int column);
   bool FactorAs(bool condensed, const ContactProblem<double>& problem,
                 const std::vector<ContactMode>& modes);
   // Whether the whole system could be factorised in place of the condensed one, where refinement
@@ -145,6 +184,9 @@ class ContactSystem {
   std::vector<double> regularisation_;
   std::vector<double> rhs_, correction_, last_;
   std::vector<Turning> turning_;
+  std::vector<double> conjugate_;
+  std::vector<ResidualSize> sizes_, next_sizes_;  // of columns
+  std::vector<char> refined_;                     // whether a column is done
 };
 
 /// r M⁻¹ rᵀ with the diagonal of M: what a unit impulse along the row changes its speed by, were

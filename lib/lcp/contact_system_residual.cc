@@ -7,35 +7,24 @@
 #include "tangible/lcp/contact_system.h"
 
 namespace tangible {
-namespace {
+void ContactSystem::RowScale::Include(const RowScale& other) {
+  terms = std::max(terms, other.terms);
+  parts = std::max(parts, other.parts);
+  left = std::max(left, other.left);
+}
 
-// Largest magnitudes of a kind of row: of its terms and of what is left.
-struct RowScale {
-  double terms = 0.0;
-  // Of the products that a constraint's value sums, and of the free motion: at rest all terms
-  // cancel to rounding, which is relative to these.
-  double parts = 0.0;
-  double left = 0.0;
-  void Term(double x) { terms = std::max(terms, std::abs(x)); }
-  double Relative() const { return terms > 0.0 ? left / terms : left > 0.0 ? HUGE_VAL : 0.0; }
-  double RelativeToParts() const {
-    const double scale = std::max(terms, parts);
-    return scale > 0.0 ? left / scale : left > 0.0 ? HUGE_VAL : 0.0;
-  }
-};
+void ContactSystem::ResidualSize::Include(const ResidualSize& other) {
+  momentum.Include(other.momentum);
+  constraint.Include(other.constraint);
+}
 
 // residual := rhs − K x for one column of strided vectors; sign −1 and exchanged directions for Kᵀ.
 template <bool kTransposed>
-class ColumnResidual {
+class ContactSystem::ColumnResidual {
  public:
   ColumnResidual(const ContactProblem<double>& problem, const double* x, int columns,
-                 double* residual, RowScale* momentum, RowScale* constraint)
-      : p_(problem),
-        x_(x),
-        columns_(columns),
-        r_(residual),
-        momentum_(*momentum),
-        constraint_(*constraint) {}
+                 double* residual)
+      : p_(problem), x_(x), columns_(columns), r_(residual) {}
 
   void Bodies() {
     for (int i = 0; i < 3 * p_.num_bodies; ++i) {
@@ -83,6 +72,26 @@ class ColumnResidual {
     Constrain(block, 0, row);
   }
 
+  // The free motion's momenta, as strided as the column or one for all.
+  void FreeMotion(const double* momenta, int columns) {
+    for (int i = 0; i < 3 * p_.num_bodies; ++i) {
+      const double size = std::abs(momenta[static_cast<size_t>(i) * columns]);
+      momentum_.parts = std::max(momentum_.parts, size);
+      if (i % 3 != 2) {
+        constraint_.parts = std::max(constraint_.parts, size / p_.mass[i]);
+      }
+    }
+  }
+
+  // After all rows. Unused ones of constraints have a right-hand side of 0.
+  ResidualSize Size(int rows) {
+    for (int i = 0; i < rows; ++i) {
+      RowScale& kind = i < 3 * p_.num_bodies ? momentum_ : constraint_;
+      kind.left = std::max(kind.left, std::abs(r_[static_cast<size_t>(i) * columns_]));
+    }
+    return {momentum_, constraint_};
+  }
+
  private:
   static constexpr double kSign = kTransposed ? -1.0 : 1.0;
 
@@ -122,34 +131,28 @@ class ColumnResidual {
   const double* x_;
   const int columns_;
   double* r_;
-  RowScale& momentum_;
-  RowScale& constraint_;
+  RowScale momentum_, constraint_;
 };
-
-}  // namespace
 
 template <bool kTransposed>
 double ContactSystem::Residual(const ContactProblem<double>& problem,
                                const std::vector<ContactMode>& modes, const double* rhs,
                                const double* x, int columns, double* residual) const {
   return ResidualWith<kTransposed>(problem, modes, Regularisation::kLeftOut, {rhs, columns}, rhs, x,
-                                   columns, residual)
-      .to_terms;
+                                   columns, residual, nullptr)
+      .ToTerms();
 }
 
 template <bool kTransposed>
-ContactSystem::ResidualSize ContactSystem::ResidualWith(const ContactProblem<double>& problem,
-                                                        const std::vector<ContactMode>& modes,
-                                                        Regularisation regularisation,
-                                                        const FreeMomenta& free, const double* rhs,
-                                                        const double* x, int columns,
-                                                        double* residual) const {
-  const size_t size = 3 * static_cast<size_t>(num_blocks()) * columns;
-  std::copy(rhs, rhs + size, residual);
-  RowScale momentum, constraint;
+ContactSystem::ResidualSize ContactSystem::ResidualWith(
+    const ContactProblem<double>& problem, const std::vector<ContactMode>& modes,
+    Regularisation regularisation, const FreeMomenta& free, const double* rhs, const double* x,
+    int columns, double* residual, ResidualSize* sizes) const {
+  const int rows = 3 * num_blocks();
+  std::copy(rhs, rhs + static_cast<size_t>(rows) * columns, residual);
+  ResidualSize all;
   for (int c = 0; c < columns; ++c) {
-    ColumnResidual<kTransposed> column(problem, x + c, columns, residual + c, &momentum,
-                                       &constraint);
+    ColumnResidual<kTransposed> column(problem, x + c, columns, residual + c);
     column.Bodies();
     column.Joints();
     for (size_t i = 0; i < problem.contacts.size(); ++i) {
@@ -157,29 +160,18 @@ ContactSystem::ResidualSize ContactSystem::ResidualWith(const ContactProblem<dou
         column.Contact(problem.contacts[i], modes[i], contact_block_[i]);
       }
     }
-  }
-  // Unused rows of constraints have a right-hand side of 0.
-  const size_t momentum_size = 3 * static_cast<size_t>(problem.num_bodies) * columns;
-  for (int i = 0; i < 3 * problem.num_bodies; ++i) {
-    for (int c = 0; c < free.columns; ++c) {
-      const double size = std::abs(free.values[static_cast<size_t>(i) * free.columns + c]);
-      momentum.parts = std::max(momentum.parts, size);
-      if (i % 3 != 2) {
-        constraint.parts = std::max(constraint.parts, size / problem.mass[i]);
-      }
+    column.FreeMotion(free.values + std::min(c, free.columns - 1), free.columns);
+    for (int i = 3 * problem.num_bodies; regularisation == Regularisation::kKept && i < rows; ++i) {
+      residual[static_cast<size_t>(i) * columns + c] -=
+          regularisation_[i] * x[static_cast<size_t>(i) * columns + c];
+    }
+    const ResidualSize size = column.Size(rows);
+    all.Include(size);
+    if (sizes != nullptr) {
+      sizes[c] = size;
     }
   }
-  if (regularisation == Regularisation::kKept) {
-    for (size_t i = momentum_size; i < size; ++i) {
-      residual[i] -= regularisation_[i / columns] * x[i];
-    }
-  }
-  for (size_t i = 0; i < size; ++i) {
-    RowScale& kind = i < momentum_size ? momentum : constraint;
-    kind.left = std::max(kind.left, std::abs(residual[i]));
-  }
-  return {std::max(momentum.Relative(), constraint.Relative()),
-          std::max(momentum.RelativeToParts(), constraint.RelativeToParts())};
+  return all;
 }
 
 template double ContactSystem::Residual<false>(const ContactProblem<double>&,
@@ -192,7 +184,7 @@ template double ContactSystem::Residual<true>(const ContactProblem<double>&,
 #define TANGIBLE_INSTANTIATE(kTransposed)                                             \
   template ContactSystem::ResidualSize ContactSystem::ResidualWith<kTransposed>(      \
       const ContactProblem<double>&, const std::vector<ContactMode>&, Regularisation, \
-      const FreeMomenta&, const double*, const double*, int, double*) const;
+      const FreeMomenta&, const double*, const double*, int, double*, ResidualSize*) const;
 TANGIBLE_INSTANTIATE(false)
 TANGIBLE_INSTANTIATE(true)
 #undef TANGIBLE_INSTANTIATE

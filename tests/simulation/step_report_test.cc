@@ -173,7 +173,11 @@ TEST(StepReportTest, SystemsThatDoNotRefineCondensedAreSeen) {
   const Ran equal(HeavyOnLight(1.0, "event"));
   EXPECT_EQ(equal.report.status, StepStatus::kDone);
   EXPECT_EQ(equal.report.solver.whole_system, 0);
-  const Ran spread(HeavyOnLight(1e9, "event"));
+  const Ran refined(HeavyOnLight(1e12, "event"));
+  EXPECT_EQ(refined.report.status, StepStatus::kDone);
+  EXPECT_EQ(refined.report.solver.whole_system, 0);
+  // Beyond what a double adds: 1 kg is nothing to it.
+  const Ran spread(HeavyOnLight(1e16, "event"));
   EXPECT_EQ(spread.report.status, StepStatus::kDone);
   EXPECT_GT(spread.report.solver.whole_system, 0);
 }

@@ -11,17 +11,9 @@ constexpr char kProjection[] =
     "a fixed step of 0.01 s leaves anchors so far apart that the projection, weighted by masses "
     "1e6 apart, does not converge; the run ends with a status";
 constexpr char kLightest[] =
-    "accelerations of a body of 1e-12 kg at a hinge and contacts are not resolved beside 1 kg; "
-    "ends with a status";
-constexpr char kHeaviest[] =
-    "1e12 kg hinged to a box of 1 kg on the floor: the bar sinks in by a fifth of the ball; speeds "
-    "of the box are judged by what the impulses would give it if it were free";
-constexpr char kHeaviestStage[] =
-    "beside 1e12 kg Newton's method for the implicit stage does not converge: its columns are "
-    "refined too little; ends with a status";
-constexpr char kLightBetween[] =
-    "1 kg presses a box of 1e-12 kg to the floor and sinks in: speeds of the box are judged by "
-    "what the impulses would give it if it were free, 1e11 m/s";
+    "a hinge's damping of 0.01 N m s on the inertia of 1e-12 kg is a rate of 1e12 1/s, to be "
+    "resolved by a step of 0.01 s: the implicit stage's iteration ends in rounding of 1e-7 of its "
+    "terms; ends with a status";
 constexpr char kNeedleEnd[] =
     "a fixed step has rows for the two lowest corners alone: those of one end of the needle, 1e-9 "
     "m "
@@ -32,12 +24,9 @@ constexpr char kNeedleEnd[] =
 const std::vector<KnownCase>& KnownCases() {
   static const std::vector<KnownCase> kKnown = {{"20 links swing, end 1e6", "fixed", kProjection},
                                                 {"20 links swing, end 1e9", "fixed", kProjection},
-                                                {"bar of 1e+12 kg", "fixed", kHeaviest},
-                                                {"box of 1e-12 kg", "fixed", kLightBetween},
                                                 {"needle of 1e-09 m falls", "fixed", kNeedleEnd},
                                                 {"box of 1e-12 kg", "event", kLightest},
-                                                {"bar of 1e-12 kg", "event", kLightest},
-                                                {"bar of 1e+12 kg", "event", kHeaviestStage}};
+                                                {"bar of 1e-12 kg", "event", kLightest}};
   return kKnown;
 }
 
