@@ -76,9 +76,6 @@ void ContactSystem::Reserve(int num_blocks, int num_edges) {
   correction_.reserve(3 * num_blocks);
   last_.reserve(3 * num_blocks);
   turning_.reserve(num_blocks);
-  sizes_.reserve(1);
-  next_sizes_.reserve(1);
-  refined_.reserve(1);
 }
 
 void ContactSystem::MoveFactorsTo(ContactSystem* other) {
@@ -408,6 +405,11 @@ double ContactSystem::SolveProximal(const ContactProblem<double>& problem,
   return Refine<false>(problem, modes, Regularisation::kLeftOut, free, x, columns, kResidualGoal);
 }
 
+ContactSystem::RefinementScratch& ContactSystem::Scratch() {
+  static thread_local RefinementScratch scratch;
+  return scratch;
+}
+
 // Refines x for the right-hand side rhs_ as long as a round halves what is left of a column.
 template <bool kTransposed>
 double ContactSystem::Refine(const ContactProblem<double>& problem,
@@ -415,20 +417,24 @@ double ContactSystem::Refine(const ContactProblem<double>& problem,
                              const FreeMomenta& free, double* x, int columns, double goal) {
   const size_t size = rhs_.size();
   SizeScratch(size, &correction_);
-  sizes_.resize(columns);
-  next_sizes_.resize(columns);
-  refined_.assign(columns, 0);
-  const auto residual = [&](std::vector<ResidualSize>* sizes) {
+  RefinementScratch& scratch = Scratch();
+  std::vector<ResidualSize>& sizes = scratch.sizes;
+  std::vector<ResidualSize>& next_sizes = scratch.next_sizes;
+  std::vector<char>& refined = scratch.refined;
+  sizes.resize(columns);
+  next_sizes.resize(columns);
+  refined.assign(columns, 0);
+  const auto residual = [&](std::vector<ResidualSize>* of_columns) {
     ResidualWith<kTransposed>(problem, modes, regularisation, free, rhs_.data(), x, columns,
-                              correction_.data(), sizes->data());
+                              correction_.data(), of_columns->data());
   };
-  residual(&sizes_);
+  residual(&sizes);
   bool lessens = true;
   for (int i = 0; i < kMaxRefinements && lessens; ++i) {
     bool all_refined = true;
     for (int c = 0; c < columns; ++c) {
-      refined_[c] = refined_[c] != 0 || !(sizes_[c].ToParts() > goal) ? 1 : 0;
-      all_refined = all_refined && refined_[c] != 0;
+      refined[c] = refined[c] != 0 || !(sizes[c].ToParts() > goal) ? 1 : 0;
+      all_refined = all_refined && refined[c] != 0;
     }
     if (all_refined) {
       break;
@@ -437,45 +443,38 @@ double ContactSystem::Refine(const ContactProblem<double>& problem,
     SolveOnce<kTransposed>(problem, modes, correction_.data(), columns);
     for (size_t k = 0; k < size; k += columns) {
       for (int c = 0; c < columns; ++c) {
-        x[k + c] += refined_[c] != 0 ? 0.0 : correction_[k + c];
+        x[k + c] += refined[c] != 0 ? 0.0 : correction_[k + c];
       }
     }
-    residual(&next_sizes_);
+    residual(&next_sizes);
     // Of a derivative the first round is not judged.
     const bool derivative = goal < kResidualGoal;
     lessens = derivative && i == 0;
-    double worst_before = 0.0;
-    double worst_left = 0.0;
     for (int c = 0; c < columns; ++c) {
-      const double before = sizes_[c].ToParts();
-      const double left = next_sizes_[c].ToParts();
-      const bool halves = refined_[c] == 0 && left < 0.5 * before;
+      const double before = sizes[c].ToParts();
+      const double left = next_sizes[c].ToParts();
+      const bool halves = refined[c] == 0 && left < 0.5 * before;
       lessens = lessens || (halves && before > kResidualGoal);
-      worst_before = std::max(worst_before, before);
-      worst_left = std::max(worst_left, left);
       // What contradicts redundant rows does not fall, nor does rounding; neither must keep the
       // rest of its column from what a round does.
-      const bool stays =
-          derivative && (i == 0 || columns > 1) && left <= std::max(kStays * before, kResidualGoal);
-      if (refined_[c] != 0 || halves || stays) {
-        sizes_[c] = next_sizes_[c];
+      const bool stays = derivative && left <= std::max(kStays * before, kResidualGoal);
+      if (refined[c] != 0 || halves || stays) {
+        sizes[c] = next_sizes[c];
         continue;
       }
-      refined_[c] = 1;
+      refined[c] = 1;
       for (size_t k = c; k < size; k += columns) {
         x[k] = last_[k];
       }
     }
-    // Of many columns one of rounding's size may halve by chance, all do not.
-    lessens = lessens || worst_left < 0.5 * worst_before;
   }
   ResidualSize all;
   const bool slow = MassesDiffer(problem);
   for (int c = 0; c < columns; ++c) {
-    if (slow && sizes_[c].ToParts() > kConsistent) {
+    if (slow && sizes[c].ToParts() > kConsistent) {
       RefineConjugate<kTransposed>(problem, modes, regularisation, free, x, columns, c);
     }
-    all.Include(sizes_[c]);
+    all.Include(sizes[c]);
   }
   return all.ToParts();
 }

@@ -60,9 +60,8 @@ class ContactSystem {
     return lu_.bytes() + edges_.capacity() * sizeof(edges_[0]) +
            contact_block_.capacity() * sizeof(int) +
            sizeof(double) * (regularisation_.capacity() + rhs_.capacity() + correction_.capacity() +
-                             last_.capacity() + conjugate_.capacity()) +
-           sizeof(ResidualSize) * (sizes_.capacity() + next_sizes_.capacity()) +
-           refined_.capacity();
+                             last_.capacity()) +
+           sizeof(Turning) * turning_.capacity();
   }
   void Reserve(int num_blocks, int num_edges);
   /// Whether solves need the problem: they are refined against K without δ. Else they read the
@@ -146,7 +145,7 @@ class ContactSystem {
   double Refine(const ContactProblem<double>& problem, const std::vector<ContactMode>& modes,
                 Regularisation regularisation, const FreeMomenta& free, double* x, int columns,
                 double goal);
-  // Refines a column further by conjugate residuals; sizes_ has its residual.
+  // Refines a column further by conjugate residuals; Scratch() has its residual.
   template <bool kTransposed>
   void RefineConjugate(const ContactProblem<double>& problem, const std::vector<ContactMode>& modes,
                        Regularisation regularisation, const FreeMomenta& free, double* x,
@@ -171,6 +170,14 @@ class ContactSystem {
   double RefinedSolve(const ContactProblem<double>& problem, const std::vector<ContactMode>& modes,
                       double* x, int columns);
 
+  // Of refinement, one a thread: systems that a tape keeps are many.
+  struct RefinementScratch {
+    std::vector<ResidualSize> sizes, next_sizes;  // of columns
+    std::vector<char> refined;                    // whether a column is done
+    std::vector<double> conjugate;
+  };
+  static RefinementScratch& Scratch();
+
   BlockLu<double> lu_;
   std::vector<std::pair<int, int>> edges_;
   std::vector<int> contact_block_;
@@ -184,9 +191,6 @@ class ContactSystem {
   std::vector<double> regularisation_;
   std::vector<double> rhs_, correction_, last_;
   std::vector<Turning> turning_;
-  std::vector<double> conjugate_;
-  std::vector<ResidualSize> sizes_, next_sizes_;  // of columns
-  std::vector<char> refined_;                     // whether a column is done
 };
 
 /// r M⁻¹ rᵀ with the diagonal of M: what a unit impulse along the row changes its speed by, were

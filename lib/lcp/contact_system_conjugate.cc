@@ -29,15 +29,16 @@ void ContactSystem::RefineConjugate(const ContactProblem<double>& problem,
                                     Regularisation regularisation, const FreeMomenta& free,
                                     double* x, int columns, int column) {
   const size_t rows = rhs_.size() / columns;
-  SizeScratch(rows * (5 + 2 * kMostDirections), &conjugate_);
-  double* zero = conjugate_.data();
+  RefinementScratch& scratch = Scratch();
+  SizeScratch(rows * (5 + 2 * kMostDirections), &scratch.conjugate);
+  double* zero = scratch.conjugate.data();
   double* rhs = zero + rows;
   double* at = rhs + rows;
   double* left = at + rows;
   double* weight = left + rows;
   double* corrections = weight + rows;
   double* changes = corrections + rows * kMostDirections;  // K times these, orthonormal
-  ResidualSize* size = &sizes_[column];
+  ResidualSize* size = &scratch.sizes[column];
   for (size_t i = 0; i < rows; ++i) {
     const RowScale& kind =
         i < 3 * static_cast<size_t>(problem.num_bodies) ? size->momentum : size->constraint;

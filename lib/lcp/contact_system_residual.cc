@@ -72,14 +72,14 @@ class ContactSystem::ColumnResidual {
     Constrain(block, 0, row);
   }
 
-  // The free motion's momenta, as strided as the column or one for all.
+  // The free motion's momenta, as strided as the column or one for all; rotation at the radius of
+  // gyration.
   void FreeMotion(const double* momenta, int columns) {
     for (int i = 0; i < 3 * p_.num_bodies; ++i) {
       const double size = std::abs(momenta[static_cast<size_t>(i) * columns]);
+      const double mass = i % 3 != 2 ? p_.mass[i] : std::sqrt(p_.mass[i] * p_.mass[i - 1]);
       momentum_.parts = std::max(momentum_.parts, size);
-      if (i % 3 != 2) {
-        constraint_.parts = std::max(constraint_.parts, size / p_.mass[i]);
-      }
+      constraint_.parts = std::max(constraint_.parts, size / mass);
     }
   }
 
