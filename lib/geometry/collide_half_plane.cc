@@ -36,7 +36,13 @@ int CollideHalfPlane(const ConvexCore& core, const Vector2<double>& normal, doub
   }
   const Candidate next = candidate(core.Next(lowest));
   const Candidate previous = candidate(core.Previous(lowest));
-  const bool is_next = next.gap <= previous.gap;
+  // The end of the edge that looks down, not the lower end: a needle's corners at its tip are near
+  // each other, and it is the other end that lands.
+  const auto slope = [&](const Candidate& end, int vertex) {
+    const double length = (core.VertexAt(vertex) - core.VertexAt(lowest)).norm();
+    return length > 0.0 ? (end.gap - candidates[0].gap) / length : 0.0;
+  };
+  const bool is_next = slope(next, core.Next(lowest)) <= slope(previous, core.Previous(lowest));
   candidates[1] = is_next ? next : previous;
   // A capsule without length is a circle.
   const bool is_point =

@@ -62,6 +62,20 @@ TEST(CollideHalfPlane, SecondContactOnlyWithinTheGap) {
   EXPECT_EQ(Collide(Box(2, 2), At(0, 2, 0.1), plane, At(0, 0), lowest + 0.1997).count, 2);
 }
 
+// Not the next lowest vertex, which is at the same tip.
+TEST(CollideHalfPlane, TheOtherEndOfANeedleIsTheSecondContact) {
+  const double thickness = 1e-9;
+  const Contacts contacts =
+      Collide(Box(1, thickness), At(0, 0.4, 0.3), HalfPlane(0, 1, 0), At(0, 0), 10.0);
+  ASSERT_EQ(contacts.count, 2);
+  EXPECT_NEAR(contacts.geometry[1].gap - contacts.geometry[0].gap, std::sin(0.3), 1e-15);
+  // On its tip that is the face.
+  const Contacts upright =
+      Collide(Box(1, thickness), At(0, 0.6, 1.5), HalfPlane(0, 1, 0), At(0, 0), 10.0);
+  ASSERT_EQ(upright.count, 2);
+  EXPECT_NEAR(upright.geometry[1].gap - upright.geometry[0].gap, thickness * std::cos(1.5), 1e-15);
+}
+
 TEST(CollideHalfPlane, WhatHasNoLengthIsAPoint) {
   const TestShape plane = HalfPlane(0, 1, 0);
   EXPECT_EQ(Collide(Capsule(0, 0.5), At(0, 2, 0.3), plane, At(0, 0)).count, 1);
