@@ -304,9 +304,12 @@ void RolloutCertifier::AddSegment(const Model<double>& model, long step,
         add_margin(0.0, "friction limit");
       }
     }
-    if (place.mode == ContactMode::kSticking && normal > 0.0) {
-      const double limit = friction.value * normal;
-      add_margin((limit - std::abs(start.solution.tangent_impulse[i])) / limit, "friction limit");
+    if (place.mode == ContactMode::kSticking && !segment->SticksWithEarlier(i)) {
+      const double above = segment->FrictionLeft(i, friction.value, 1.0, start.solution);
+      const double below = segment->FrictionLeft(i, friction.value, -1.0, start.solution);
+      if (above + below > 0.0) {
+        add_margin(2.0 * std::min(above, below) / (above + below), "friction limit");
+      }
     }
     const bool wanted = Wanted(friction.numbers[0]) || Wanted(friction.numbers[1]);
     if (wanted && friction.tie && place.mode != ContactMode::kSticking) {

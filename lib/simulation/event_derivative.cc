@@ -255,18 +255,22 @@ void EventDerivative::EventGradient(const Model<double>& model, Segment* segment
     SolvedNode& node = segment->end;
     RowMatrixXd seed =
         RowMatrixXd::Zero(3 * static_cast<Eigen::Index>(node.system.num_blocks()), 1);
-    const int row = 3 * node.system.contact_block()[segment->event_index];
+    const std::vector<int>& block_of = node.system.contact_block();
     if (segment->event == EventKind::kLiftOff) {
-      seed(row, 0) = 1.0;
-    } else {
+      seed(3 * block_of[segment->event_index], 0) = 1.0;
+    }
+    for (size_t i = 0; i < segment->contacts.size(); ++i) {
+      if (segment->event != EventKind::kSlipBegins ||
+          !segment->SticksWith(i, segment->event_index)) {
+        continue;
+      }
       const CoefficientSource& friction = segment->event_friction;
-      seed(row, 0) = friction.value;
-      seed(row + 1, 0) = -segment->event_sign;
+      seed(3 * block_of[i], 0) = friction.value;
+      seed(3 * block_of[i] + 1, 0) = -segment->event_sign;
       for (int k = 0; k < 2; ++k) {
         if (friction.numbers[k] >= 0) {
-          entries.push_back(
-              {0, s.NumberVariable(friction.numbers[k]),
-               friction.derivatives[k] * node.solution.normal_impulse[segment->event_index]});
+          entries.push_back({0, s.NumberVariable(friction.numbers[k]),
+                             friction.derivatives[k] * node.solution.normal_impulse[i]});
         }
       }
     }

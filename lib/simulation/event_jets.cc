@@ -422,13 +422,12 @@ class EventReplay {
     if (segment->event == EventKind::kLiftOff || segment->event == EventKind::kSlipBegins) {
       ContactSolution<T> solution;
       Accelerate(*segment, after, time, &segment->end, &solution);
-      const T& normal = solution.normal_impulse[segment->event_index];
       if (segment->event == EventKind::kLiftOff) {
-        return normal;
+        return solution.normal_impulse[segment->event_index];
       }
-      const T friction = EvaluateCoefficient(segment->event_friction, model_.numbers);
-      return friction * normal -
-             segment->event_sign * solution.tangent_impulse[segment->event_index];
+      return segment->FrictionLeft<T>(segment->event_index,
+                                      EvaluateCoefficient(segment->event_friction, model_.numbers),
+                                      segment->event_sign, solution);
     }
     ContactRows<T> rows;
     if (contact.joint >= 0) {

@@ -45,7 +45,7 @@ enum class EventKind : unsigned char {
   kEdge,        ///< a force's window opens or closes, or a signal has a corner
   kTouch,       ///< a gap or the distance from a joint limit closes
   kSlipEnds,    ///< a sliding speed reaches 0
-  kSlipBegins,  ///< friction reaches its limit
+  kSlipBegins,  ///< friction reaches its limit (Segment::SticksWith)
   kLiftOff,     ///< a normal force reaches 0
   kReturn,      ///< the speed at which an open contact leaves penetration reaches 0
   kAtOnce,      ///< the same at the segment's start, where poses and twists are corrected
@@ -79,6 +79,33 @@ struct Segment {
   int event_number = -1;             ///< kEdge: the number that is the time; −1: a constant
   SolvedNode end;                    ///< kSlipBegins, kLiftOff: accelerations after the motion
   int event_index = -1;              ///< the same: which of `contacts`
+
+  /// Whether contact i sticks between the bodies of contact k, as k does. Such contacts, the two
+  /// ends of a face, begin to slide as one, when the sum of their friction reaches the sum of its
+  /// limits: how they share it is not determined, and nothing moves before.
+  bool SticksWith(size_t i, size_t k) const {
+    return modes[i] == ContactMode::kSticking && contacts[i].joint < 0 &&
+           contacts[i].a == contacts[k].a && contacts[i].b == contacts[k].b;
+  }
+  /// Whether a contact before it in `contacts` sticks with contact k.
+  bool SticksWithEarlier(size_t k) const {
+    for (size_t i = 0; i < k; ++i) {
+      if (SticksWith(i, k)) return true;
+    }
+    return false;
+  }
+  /// Σ (friction · normal force − sign · tangential force) over the contacts that stick with k, N.
+  template <typename T>
+  T FrictionLeft(size_t k, const T& coefficient, double sign,
+                 const ContactSolution<T>& solution) const {
+    T left(0.0);
+    for (size_t i = 0; i < contacts.size(); ++i) {
+      if (SticksWith(i, k)) {
+        left += coefficient * solution.normal_impulse[i] - sign * solution.tangent_impulse[i];
+      }
+    }
+    return left;
+  }
 };
 
 /// One part of a step; of the two members the one that `is_impulses` says holds.

@@ -157,8 +157,8 @@ double EventSearch::ModeValue(const Model<double>& model, Sample* sample, const 
   if (event.kind == EventKind::kLiftOff) {
     return normal;
   }
-  return motion.friction[event.index].value * normal -
-         event.sign * node.solution.tangent_impulse[event.index];
+  return motion.FrictionLeft(event.index, motion.friction[event.index].value, event.sign,
+                             node.solution);
 }
 
 void EventSearch::SearchClosed(const Model<double>& model, Event* event) {
@@ -219,15 +219,14 @@ void EventSearch::SearchClosed(const Model<double>& model, Event* event) {
     const double tolerance =
         std::max(kForceTolerance * scale, mass * slow / model.structure->settings.dt);
     const double normal = start.normal_impulse[i];
-    const double tangent = start.tangent_impulse[i];
     trial.kind = EventKind::kLiftOff;
     try_function(normal, tolerance);
-    if (mode == ContactMode::kSticking) {
+    if (mode == ContactMode::kSticking && !segment_->SticksWithEarlier(i)) {
       trial.kind = EventKind::kSlipBegins;
-      const double limit = segment_->friction[i].value * normal;
       for (const double sign : {1.0, -1.0}) {
         trial.sign = sign;
-        try_function(limit - sign * tangent, tolerance);
+        try_function(segment_->FrictionLeft(i, segment_->friction[i].value, sign, start),
+                     tolerance);
       }
     }
   }

@@ -342,11 +342,22 @@ bool EventStepper::ChooseModes(const Model<double>& model, double t, double midd
     contact.law = contact.gap < -settings.recovery_speed * length ? ContactLaw::kRecovery
                                                                   : ContactLaw::kInelastic;
     segment->friction[kept] = segment->friction[i];
+    slip[kept] = slip[i];
     segment->modes.push_back(solution.modes[i]);
     ++kept;
   }
   segment->contacts.resize(kept);
   segment->friction.resize(kept);
+  // Beside one that sticks the other end of a face does not slide: that its share of the friction
+  // is at the limit says nothing.
+  for (size_t k = 0; k < kept; ++k) {
+    const bool slides = SlidingSign(segment->modes[k]) != 0.0 && std::abs(slip[k]) <= slow;
+    for (size_t i = 0; i < kept; ++i) {
+      if (slides && segment->SticksWith(i, k)) {
+        segment->modes[k] = ContactMode::kSticking;
+      }
+    }
+  }
   return true;
 }
 
@@ -356,13 +367,12 @@ void EventStepper::SwitchMode(const Segment& segment) {
     if (segment.event == EventKind::kSlipEnds && SlidingSign(last_modes_[i]) != 0.0) {
       last_modes_[i] = ContactMode::kSticking;
     }
-    if (!last_contacts_[i].SameAs(segment.event_contact)) {
-      continue;
-    }
-    if (segment.event == EventKind::kLiftOff) {
+    if (segment.event == EventKind::kLiftOff && last_contacts_[i].SameAs(segment.event_contact)) {
       last_modes_[i] = ContactMode::kOpen;
-    } else if (segment.event == EventKind::kSlipBegins) {
-      // It slides against the force that was at its limit.
+    } else if (segment.event == EventKind::kSlipBegins && last_modes_[i] != ContactMode::kOpen &&
+               last_contacts_[i].joint < 0 && last_contacts_[i].a == segment.event_contact.a &&
+               last_contacts_[i].b == segment.event_contact.b) {
+      // Both ends of a face slide against the force that was at its limit.
       last_modes_[i] =
           segment.event_sign > 0.0 ? ContactMode::kSlidingNegative : ContactMode::kSlidingPositive;
     }

@@ -122,5 +122,35 @@ TEST(EventDerivativeTest, JointsWithALimitASpringAndAJerkedPin) {
   }
 }
 
+// F = 6 t, pushed above the middle: the front carries more than the back. What the two corners
+// share of the friction is not determined; that the box slides is, at t = μ m g / 6. A pendulum
+// beside it, whose steps an event within them would split.
+TEST(EventDerivativeTest, BothEndsOfAFaceBeginToSlideAsOne) {
+  Scene scene = SceneOf(R"({"bodies": [
+      {"name": "box", "shape": {"box": {"size": [0.4, 0.2]}}, "mass": 2, "position": [0, 0.1],
+       "friction": 0.4},
+      {"name": "rod", "mass": 1, "inertia": 0.02, "position": [2.3, 1]},
+      {"name": "floor", "static": true, "friction": 0.4,
+       "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}}],
+    "joints": [{"name": "pin", "type": "revolute", "bodies": ["rod", "world"], "anchor": [2, 1]}],
+    "forces": [{"name": "push", "body": "box", "force": [0, 0], "at": [0, 0.06]}],
+    "simulation": {"stepping": "event", "integrator": "trapezoidal", "dt": 0.01,
+                   "duration": 1.5}})");
+  Signal ramp;
+  ramp.interpolation = Signal::Interpolation::kLinear;
+  ramp.time = {0.0, 10.0};
+  ramp.x = {0.0, 60.0};
+  scene.forces[0].force_signal = ramp;
+  const std::vector<std::string> paths = {"bodies/*/friction", "bodies/box/mass", "gravity/y"};
+  const GradientResult adjoint = Jacobian(scene, paths, GradientMethod::kAdjoint);
+  EXPECT_EQ(adjoint.certificate.verdict, "trustworthy");
+  EXPECT_EQ(adjoint.certificate.events, 1);
+  // v = 6 (T − s)² / (2 m), s = μ m g / 6.
+  const double left = 1.5 - 0.4 * 2.0 * 9.81 / 6.0;
+  EXPECT_NEAR(adjoint.values[3], 6.0 * left * left / 4.0, 1e-12);
+  EXPECT_NEAR(adjoint.jacobian(3, 0), -9.81 * left, 1e-11);
+  testing::ExpectOthersAgree(scene, paths, adjoint);
+}
+
 }  // namespace
 }  // namespace tangible
