@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tangible/simulation/projection_descent.h"
+
 namespace tangible {
 namespace {
 
@@ -31,10 +33,12 @@ double JointDrift(const Model<double>& model, const State<double>& state) {
   return largest;
 }
 
-bool JointProjection::Project(const Model<double>& model, State<double>* state) {
+bool JointProjection::Project(const Model<double>& model, const std::vector<double>& start,
+                              State<double>* state) {
   iterate_.from = *state;
   iterate_.at = *state;
-  const bool met = IterateProjection(model, 0, &iterate_);
+  const bool met =
+      IterateProjection(model, 0, &iterate_) || DescendToProjection(model, start, &iterate_);
   state->pose = iterate_.at.pose;
   return met;
 }
@@ -189,17 +193,40 @@ void JointProjection::Adjoint(const Model<double>& model, double* w_bar, int col
 }
 
 template <typename T>
-void JointProjection::ProjectUnrolled(const Model<T>& model, State<T>* state) {
+void JointProjection::ProjectUnrolled(const Model<T>& model, const std::vector<double>& start,
+                                      State<T>* state) {
   ProjectionIterate<T> iterate;
   iterate.from = *state;
   iterate.at = *state;
   // Derivatives converge one step behind values: two more steps after these have.
-  IterateProjection(model, 2, &iterate);
+  constexpr int kExtra = 2;
+  if (!IterateProjection(model, kExtra, &iterate)) {
+    // The way to the minimum has no part in its derivatives: it ends where Newton's method holds.
+    Model<double> values{model.structure, {}};
+    for (const T& number : model.numbers) {
+      values.numbers.push_back(number.a);
+    }
+    ProjectionIterate<double> descent;
+    descent.from = ValuesOf(*state);
+    descent.at = descent.from;
+    IterateProjection(values, 0, &descent);
+    DescendToProjection(values, start, &descent);
+    for (const int body : model.structure->moving) {
+      for (int i = 3 * body; i < 3 * body + 3; ++i) {
+        iterate.at.pose[i] = T(descent.at.pose[i]);
+      }
+    }
+    for (size_t i = 0; i < descent.multipliers.size(); ++i) {
+      iterate.multipliers[i] = T(descent.multipliers[i]);
+    }
+    ResumeProjection(model, kMostOfDescent, kExtra, &iterate);
+  }
   state->pose = iterate.at.pose;
 }
 
-#define TANGIBLE_INSTANTIATE_JET(N) \
-  template void JointProjection::ProjectUnrolled<Jet<N>>(const Model<Jet<N>>&, State<Jet<N>>*);
+#define TANGIBLE_INSTANTIATE_JET(N)                       \
+  template void JointProjection::ProjectUnrolled<Jet<N>>( \
+      const Model<Jet<N>>&, const std::vector<double>&, State<Jet<N>>*);
 TANGIBLE_FOR_EACH_JET_WIDTH(TANGIBLE_INSTANTIATE_JET)
 
 }  // namespace tangible

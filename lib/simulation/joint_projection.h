@@ -20,8 +20,9 @@ namespace tangible {
 class JointProjection {
  public:
   /// Projects the poses of the state; false (with the state's last iterate) where the tolerance is
-  /// not met.
-  bool Project(const Model<double>& model, State<double>* state);
+  /// not met. `start`: poses near the joints, those before the step, from which a minimum is sought
+  /// where Newton's method does not converge.
+  bool Project(const Model<double>& model, const std::vector<double>& start, State<double>* state);
   /// Largest |C| after the last projection, m or rad.
   double error() const { return iterate_.error; }
   /// How many steps of it were not Newton's.
@@ -39,7 +40,8 @@ class JointProjection {
   /// The unrolled iteration in Jets: the same steps in T, and more until derivatives, which lag
   /// behind values, have converged.
   template <typename T>
-  static void ProjectUnrolled(const Model<T>& model, State<T>* state);
+  static void ProjectUnrolled(const Model<T>& model, const std::vector<double>& start,
+                              State<T>* state);
 
   void Reserve(int num_blocks, int num_edges) { iterate_.lu.Reserve(num_blocks, num_edges); }
   /// Memory of the last projection, bytes.

@@ -42,6 +42,11 @@ double LargestError(const std::vector<JointRows<T>>& rows) {
   return largest;
 }
 
+double Determinant(const double* w) {
+  return w[0] * (w[4] * w[8] - w[5] * w[7]) - w[1] * (w[3] * w[8] - w[5] * w[6]) +
+         w[2] * (w[3] * w[7] - w[4] * w[6]);
+}
+
 // Each joint with its moving bodies, and these with each other where its curvature couples them.
 void JointEdges(const ModelStructure& structure, std::vector<std::pair<int, int>>* edges) {
   edges->clear();
@@ -67,9 +72,15 @@ const T& MassOf(const Model<T>& model, int body, int i) {
   return model.numbers[i < 2 ? index.mass : index.inertia];
 }
 
-// M, or W with the curvatures, on the matrix's diagonal and between bodies.
+// Of a matrix of 3 x 3: by Sylvester's criterion, its determinant above a bound.
+bool IsPositive(const double* w, double least) {
+  const double minor = w[0] * w[4] - w[1] * w[3];
+  return w[0] > 0.0 && minor > 0.0 && Determinant(w) > least;
+}
+
+// The weight on the matrix's diagonal; that of W between bodies comes with their joint.
 template <typename T>
-void AddBodies(const Model<T>& model, bool curved, ProjectionIterate<T>* p) {
+void AddBodies(const Model<T>& model, ProjectionWeight weight, ProjectionIterate<T>* p) {
   const ModelStructure& s = *model.structure;
   for (int k = 0; k < s.num_blocks(); ++k) {
     for (int i = 0; i < 3; ++i) {
@@ -77,7 +88,7 @@ void AddBodies(const Model<T>& model, bool curved, ProjectionIterate<T>* p) {
     }
   }
   p->shifted = false;
-  if (!curved) {
+  if (weight == ProjectionWeight::kMass) {
     return;
   }
   for (size_t j = 0; j < s.joints.size(); ++j) {
@@ -101,10 +112,11 @@ void AddBodies(const Model<T>& model, bool curved, ProjectionIterate<T>* p) {
     for (int i = 0; i < 3; ++i) {
       scale *= ValueOf(MassOf(model, s.moving[k], i));
     }
-    const double determinant = w[0] * (w[4] * w[8] - w[5] * w[7]) -
-                               w[1] * (w[3] * w[8] - w[5] * w[6]) +
-                               w[2] * (w[3] * w[7] - w[4] * w[6]);
-    if (std::abs(determinant) < kSingularBlock * scale) {
+    if (weight == ProjectionWeight::kConvex) {
+      for (int i = 0; i < 9 && !IsPositive(w, kSingularBlock * scale); ++i) {
+        p->lu.Diagonal(k)[i] = i % 4 == 0 ? MassOf(model, s.moving[k], i / 4) : T(0.0);
+      }
+    } else if (std::abs(Determinant(w)) < kSingularBlock * scale) {
       p->shifted = true;
       for (int i = 0; i < 3; ++i) {
         p->lu.Diagonal(k)[4 * i] += 2.0 * kSingularBlock * MassOf(model, s.moving[k], i);
@@ -113,15 +125,15 @@ void AddBodies(const Model<T>& model, bool curved, ProjectionIterate<T>* p) {
   }
 }
 
-// K, or with W = M where not curved, factorised.
+// The matrix (2) with a weight, factorised; but for that of the masses after EvaluateCurvatures.
 template <typename T>
-bool FactorMatrix(const Model<T>& model, bool curved, ProjectionIterate<T>* p) {
+bool FactorMatrix(const Model<T>& model, ProjectionWeight weight, ProjectionIterate<T>* p) {
   const ModelStructure& s = *model.structure;
   const int nb = s.num_blocks();
   BlockLu<T>& lu = p->lu;
   lu.SetPattern(nb + static_cast<int>(s.joints.size()), nb, p->edges);
   lu.SetZero();
-  AddBodies(model, curved, p);
+  AddBodies(model, weight, p);
   int edge = 0;
   for (size_t j = 0; j < s.joints.size(); ++j) {
     const JointRows<T>& rows = p->rows[j];
@@ -148,7 +160,7 @@ bool FactorMatrix(const Model<T>& model, bool curved, ProjectionIterate<T>* p) {
     add(joint.a, rows.row_a);
     add(joint.b, rows.row_b);
     if (CouplesBodies(joint.type) && s.bodies[joint.a].block >= 0 && s.bodies[joint.b].block >= 0) {
-      for (int i = 0; i < 9 && curved; ++i) {
+      for (int i = 0; i < 9 && weight == ProjectionWeight::kExact; ++i) {
         lu.FirstSecond(edge)[i] -= p->curvature[j].ab[i];
         lu.SecondFirst(edge)[3 * (i % 3) + i / 3] -= p->curvature[j].ab[i];
       }
@@ -248,32 +260,49 @@ bool TrialImproves(const Model<T>& model, ProjectionIterate<T>* p, double* weigh
 
 }  // namespace
 
-bool FactorProjection(const Model<double>& model, ProjectionIterate<double>* iterate) {
-  EvaluateCurvatures(model, iterate);
-  return FactorMatrix(model, true, iterate);
+bool FactorProjection(const Model<double>& model, ProjectionIterate<double>* iterate,
+                      ProjectionWeight weight) {
+  if (weight != ProjectionWeight::kMass) {
+    EvaluateCurvatures(model, iterate);
+  }
+  return FactorMatrix(model, weight, iterate);
+}
+
+void EvaluateProjection(const Model<double>& model, ProjectionIterate<double>* iterate) {
+  EvaluateAll(model, iterate->at, &iterate->rows);
+  iterate->error = LargestError(iterate->rows);
+}
+
+double SolveProjectionStep(const Model<double>& model, ProjectionIterate<double>* iterate) {
+  return SolveStep(model, iterate);
 }
 
 template <typename T>
 bool IterateProjection(const Model<T>& model, int extra, ProjectionIterate<T>* p) {
+  p->multipliers.assign(3 * model.structure->joints.size(), T(0.0));
+  p->damped_steps = 0;
+  JointEdges(*model.structure, &p->edges);
+  return ResumeProjection(model, kMaxIterations, extra, p);
+}
+
+template <typename T>
+bool ResumeProjection(const Model<T>& model, int most, int extra, ProjectionIterate<T>* p) {
   const ModelStructure& s = *model.structure;
   const double tolerance = s.settings.joint_tolerance;
-  p->multipliers.assign(3 * s.joints.size(), T(0.0));
-  JointEdges(s, &p->edges);
   EvaluateAll(model, p->at, &p->rows);
   p->error = LargestError(p->rows);
-  p->damped_steps = 0;
   double weight = 0.0;
   double before = HUGE_VAL;
   int done = 0;
-  for (int i = 0; i < kMaxIterations && std::isfinite(p->error); ++i) {
+  for (int i = 0; i < most && std::isfinite(p->error); ++i) {
     EvaluateCurvatures(model, p);
-    bool factored = FactorMatrix(model, true, p);
+    bool factored = FactorMatrix(model, ProjectionWeight::kExact, p);
     double step = factored ? SolveStep(model, p) : HUGE_VAL;
     double fraction = 1.0;
     if (factored) TryStep(model, fraction, p);
     if (!factored || (step > kShortStep && !TrialImproves(model, p, &weight))) {
       ++p->damped_steps;
-      if (!FactorMatrix(model, false, p)) {
+      if (!FactorMatrix(model, ProjectionWeight::kMass, p)) {
         return false;
       }
       step = SolveStep(model, p);
@@ -356,8 +385,9 @@ void SubtractProjectionMatrix(const Model<double>& model, const ProjectionIterat
   }
 }
 
-#define TANGIBLE_INSTANTIATE(T) \
-  template bool IterateProjection<T>(const Model<T>&, int, ProjectionIterate<T>*);
+#define TANGIBLE_INSTANTIATE(T)                                                    \
+  template bool IterateProjection<T>(const Model<T>&, int, ProjectionIterate<T>*); \
+  template bool ResumeProjection<T>(const Model<T>&, int, int, ProjectionIterate<T>*);
 #define TANGIBLE_INSTANTIATE_JET(N) TANGIBLE_INSTANTIATE(Jet<N>)
 TANGIBLE_INSTANTIATE(double)
 TANGIBLE_FOR_EACH_JET_WIDTH(TANGIBLE_INSTANTIATE_JET)

@@ -45,9 +45,25 @@ struct ProjectionIterate {
 template <typename T>
 bool IterateProjection(const Model<T>& model, int extra, ProjectionIterate<T>* iterate);
 
-/// Factorises K at the iterate, or where `shifted` becomes true a matrix near it; false where it is
-/// singular.
-bool FactorProjection(const Model<double>& model, ProjectionIterate<double>* iterate);
+/// The same from `at` and the multipliers as they are after one, with at most `most` steps.
+template <typename T>
+bool ResumeProjection(const Model<T>& model, int most, int extra, ProjectionIterate<T>* iterate);
+
+/// What stands for W in (2): itself; M; or W without what couples bodies, and M where a body's
+/// block of that is not positive definite.
+enum class ProjectionWeight { kExact, kMass, kConvex };
+
+/// Factorises (2) at the iterate, or where `shifted` becomes true a matrix near it; false where it
+/// is singular.
+bool FactorProjection(const Model<double>& model, ProjectionIterate<double>* iterate,
+                      ProjectionWeight weight = ProjectionWeight::kExact);
+
+/// Sets rows and error of the iterate's poses.
+void EvaluateProjection(const Model<double>& model, ProjectionIterate<double>* iterate);
+
+/// After both of these: rhs becomes the step of poses (three a moving body) and multipliers;
+/// returns its size in radii of gyration.
+double SolveProjectionStep(const Model<double>& model, ProjectionIterate<double>* iterate);
 
 /// y −= K x, row-major with `columns` columns, after FactorProjection.
 void SubtractProjectionMatrix(const Model<double>& model, const ProjectionIterate<double>& iterate,

@@ -437,7 +437,7 @@ StepReport Stepper::Step(const Model<double>& model, double t, double h, State<d
   last_solution_ = r.solution;
   const bool projects =
       settings.joint_correction == JointCorrection::kProjection && !structure.joints.empty();
-  const bool met = !projects || projection_.Project(model, state);
+  const bool met = !projects || projection_.Project(model, r.before.pose, state);
   report.damped_projections = projects ? projection_.damped_steps() : 0;
   if (!met) {
     report.status = StepStatus::kUnsolved;

@@ -72,7 +72,7 @@ bool StepUnrolled(const Model<T>& model, const StepRecord& record, State<T>* sta
   const ModelStructure& s = *model.structure;
   const bool converged = SolveUnrolled(model, record, state);
   if (s.settings.joint_correction == JointCorrection::kProjection && !s.joints.empty()) {
-    JointProjection::ProjectUnrolled(model, state);
+    JointProjection::ProjectUnrolled(model, record.before.pose, state);
   }
   return converged;
 }

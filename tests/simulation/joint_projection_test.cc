@@ -32,13 +32,13 @@ TEST(JointProjectionTest, ClosesJointsAndIsLeastInTheMassMetric) {
     if (model.structure->joints.empty()) continue;
     const State<double> from = state;
     JointProjection projection;
-    ASSERT_TRUE(projection.Project(model, &state)) << seed;
+    ASSERT_TRUE(projection.Project(model, state.pose, &state)) << seed;
     EXPECT_LE(JointDrift(model, state), 1e-10);
     EXPECT_GT(JointDrift(model, from), 1e-5);
     ++projected;
     // Again: nothing moves.
     const State<double> once = state;
-    ASSERT_TRUE(projection.Project(model, &state));
+    ASSERT_TRUE(projection.Project(model, state.pose, &state));
     for (size_t i = 0; i < state.pose.size(); ++i) {
       EXPECT_NEAR(state.pose[i], once.pose[i], 1e-10);
     }
@@ -61,7 +61,7 @@ TEST(JointProjectionTest, TangentIsTheDifferenceAndAdjointItsTranspose) {
     const RowMatrixXd direction = w_dot;
     State<double> projected = state;
     JointProjection projection;
-    projection.Project(model, &projected);
+    projection.Project(model, projected.pose, &projected);
     projection.Tangent(model, w_dot.data(), 2);
     RowMatrixXd w_bar = RowMatrixXd::Random(n, 2);
     const RowMatrixXd seedling = w_bar;
@@ -80,7 +80,7 @@ TEST(JointProjectionTest, TangentIsTheDifferenceAndAdjointItsTranspose) {
         moved.numbers[i] += step * direction(s.NumberVariable(i), 0);
       }
       JointProjection other;
-      EXPECT_TRUE(other.Project(moved, &q));
+      EXPECT_TRUE(other.Project(moved, q.pose, &q));
       return q;
     };
     const State<double> high = at(h);
@@ -120,7 +120,7 @@ TEST(JointProjectionTest, InLoopsTheAdjointIsTheTransposeToRounding) {
     const RowMatrixXd direction = w_dot;
     const RowMatrixXd seedling = w_bar;
     JointProjection projection;
-    ASSERT_TRUE(projection.Project(model, &state)) << seed;
+    ASSERT_TRUE(projection.Project(model, state.pose, &state)) << seed;
     projection.Tangent(model, w_dot.data(), 2);
     projection.Adjoint(model, w_bar.data(), 2);
     const MatrixX<double> after = seedling.transpose() * w_dot;
@@ -198,7 +198,7 @@ TEST(JointProjectionTest, JointsThatCannotHoldAreTold) {
   BuildModel(scene, &model, &state);
   model.numbers[model.structure->joints[0].geometry + 4] = 0.5;  // too short: 0.5 + 1 < 2
   JointProjection projection;
-  EXPECT_FALSE(projection.Project(model, &state));
+  EXPECT_FALSE(projection.Project(model, state.pose, &state));
   EXPECT_GT(projection.error(), 0.1);
   EXPECT_GE(projection.worst_joint(), 0);
 }
