@@ -128,13 +128,19 @@ function(tangible_program name)
   install(TARGETS ${name} RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} ${optional})
 endfunction()
 
+# Tests assert more than they compute: with -O1 they compile in two thirds of the time.
+set(TANGIBLE_TEST_OPTIONS $<$<CONFIG:Release>:-O1>)
+
 # tangible_test(<name> SOURCES file... LINK target... [LABELS label...] [TIMEOUT seconds]): one test
 # program, one ctest entry.
 function(tangible_test name)
   cmake_parse_arguments(TEST "" "TIMEOUT" "SOURCES;LINK;LABELS" ${ARGN})
   add_executable(${name} ${TEST_SOURCES})
   target_link_libraries(${name} PRIVATE tangible_flags ${TEST_LINK} GTest::gtest_main)
-  tangible_precompile(${name})
+  target_compile_options(${name} PRIVATE ${TANGIBLE_TEST_OPTIONS})
+  if(TANGIBLE_PRECOMPILE_HEADERS)
+    target_precompile_headers(${name} REUSE_FROM tangible_precompiled_tests)
+  endif()
   if("unit" IN_LIST TEST_LABELS OR "program" IN_LIST TEST_LABELS)
     add_dependencies(tangible_unit_and_program_tests ${name})
   endif()
