@@ -2,6 +2,12 @@
 #include "tangible/geometry/collide_core.h"
 
 namespace tangible::internal {
+namespace {
+
+/// An edge shorter than this share of its neighbour is a tip.
+constexpr double kTip = 1e-3;
+
+}  // namespace
 
 int CollideHalfPlane(const ConvexCore& core, const Vector2<double>& normal, double offset,
                      PlaneSide side, double max_gap, ContactFeature features[2]) {
@@ -36,13 +42,17 @@ int CollideHalfPlane(const ConvexCore& core, const Vector2<double>& normal, doub
   }
   const Candidate next = candidate(core.Next(lowest));
   const Candidate previous = candidate(core.Previous(lowest));
-  // The end of the edge that looks down, not the lower end: a needle's corners at its tip are near
-  // each other, and it is the other end that lands.
-  const auto slope = [&](const Candidate& end, int vertex) {
-    const double length = (core.VertexAt(vertex) - core.VertexAt(lowest)).norm();
-    return length > 0.0 ? (end.gap - candidates[0].gap) / length : 0.0;
+  // The lower one: where the other takes its place both have the same gap. But a needle's two
+  // corners at its tip are one place, and it is its other end that lands.
+  const auto length = [&](int vertex) {
+    return (core.VertexAt(vertex) - core.VertexAt(lowest)).norm();
   };
-  const bool is_next = slope(next, core.Next(lowest)) <= slope(previous, core.Previous(lowest));
+  bool is_next = next.gap <= previous.gap;
+  const double shorter = length(is_next ? core.Next(lowest) : core.Previous(lowest));
+  const double longer = length(is_next ? core.Previous(lowest) : core.Next(lowest));
+  if (shorter < kTip * longer && (is_next ? previous : next).gap < max_gap) {
+    is_next = !is_next;
+  }
   candidates[1] = is_next ? next : previous;
   // A capsule without length is a circle.
   const bool is_point =

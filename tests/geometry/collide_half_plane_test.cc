@@ -69,9 +69,9 @@ TEST(CollideHalfPlane, TheOtherEndOfANeedleIsTheSecondContact) {
       Collide(Box(1, thickness), At(0, 0.4, 0.3), HalfPlane(0, 1, 0), At(0, 0), 10.0);
   ASSERT_EQ(contacts.count, 2);
   EXPECT_NEAR(contacts.geometry[1].gap - contacts.geometry[0].gap, std::sin(0.3), 1e-15);
-  // On its tip that is the face.
+  // Upright, the other end out of reach: the tip is the face.
   const Contacts upright =
-      Collide(Box(1, thickness), At(0, 0.6, 1.5), HalfPlane(0, 1, 0), At(0, 0), 10.0);
+      Collide(Box(1, thickness), At(0, 0.6, 1.5), HalfPlane(0, 1, 0), At(0, 0), 0.5);
   ASSERT_EQ(upright.count, 2);
   EXPECT_NEAR(upright.geometry[1].gap - upright.geometry[0].gap, thickness * std::cos(1.5), 1e-15);
 }
