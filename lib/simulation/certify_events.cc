@@ -405,13 +405,26 @@ void RolloutCertifier::AddEventStep(const Model<double>& model, long step, Stepp
   if (step == 0 && options_.directions.cols() > 0) {
     AddStart(model, record);
   }
+  const Segment* last = nullptr;  // that an event ended
+  int located = 0;
   for (int p = 0; p < record.num_parts; ++p) {
     EventPart& part = *record.parts[p];
     if (part.is_impulses) {
       AddImpact(model, step, &part.impulses);
-    } else {
-      AddSegment(model, step, &stepper->event_derivative(), &part.segment);
+      continue;
     }
+    AddSegment(model, step, &stepper->event_derivative(), &part.segment);
+    if (IsLocated(part.segment.event)) {
+      last = &part.segment;
+      ++located;
+    }
+  }
+  // Impacts without end in a finite time (Zeno): of as many, rounding decides how many there are.
+  if (2 * located > model.structure->settings.max_events_per_step) {
+    const Place place{model.structure.get(),     step,
+                      last->time + last->length, 0,
+                      &last->event_contact,      ContactMode::kOpen};
+    AddMargin(0.0, place, "one of " + std::to_string(located) + " events in a step");
   }
   std::vector<Graze> grazes;
   FindGrazes(model, record, kNearKinkMargin, &grazes);

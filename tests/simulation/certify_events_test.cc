@@ -35,6 +35,20 @@ TEST(CertifyEventsTest, ABounceIsTrustworthy) {
   EXPECT_EQ(c.events, 1);
 }
 
+// A ball on a floor whose bounces follow each other ever faster: most of them within one step.
+TEST(CertifyEventsTest, ASeriesThatRoundingEndsIsNamed) {
+  const auto of = [](const char* more) {
+    return CertificateOf(R"("bodies": [{"name": "ball", "shape": {"circle": {"radius": 0.1}},
+      "mass": 1, "position": [0, 0.1], "velocity": [0, 0.01], "restitution": 0.5}, )" +
+                             Floor() + "]",
+                         0.01, more);
+  };
+  const Certificate series = of(R"(, "restitution_threshold": 1e-16)");
+  EXPECT_EQ(series.verdict.find("near a kink: "), 0u) << series.verdict;
+  EXPECT_NE(series.verdict.find("events in a step"), std::string::npos) << series.verdict;
+  EXPECT_EQ(of("").verdict.find("events in a step"), std::string::npos);
+}
+
 TEST(CertifyEventsTest, AFlatLandingIsADiscontinuity) {
   const Certificate c = CertificateOf(R"("bodies": [{"name": "box",
       "shape": {"box": {"size": [0.4, 0.2]}}, "mass": 1, "position": [0, 1]}, )" +
