@@ -60,7 +60,9 @@ class AccelerationVisitor : private internal::LocalEntries<Sink> {
 
   void Joints() {
     for (size_t j = 0; j < s_.joints.size(); ++j) {
-      if (r_.correction) {
+      if (s_.joints[j].type == JointType::kRevolute) {
+        RevoluteByHand(static_cast<int>(j));
+      } else if (r_.correction) {
         CorrectedJoint(static_cast<int>(j));
       } else {
         Joint(static_cast<int>(j));
@@ -109,14 +111,14 @@ class AccelerationVisitor : private internal::LocalEntries<Sink> {
   }
 
   // A damper of coefficient c along a row: momentum rows += c rowᵀ (row v), by the twists.
-  void EmitDamperByTwist(int a, const RowPart<LocalJet>& row_a, int b,
-                         const RowPart<LocalJet>& row_b, double c) {
+  template <typename Row>
+  void EmitDamperByTwist(int a, const Row& row_a, int b, const Row& row_b, double c) {
     if (c == 0.0) {
       return;
     }
-    const auto by = [&](int body, const RowPart<LocalJet>& part) {
+    const auto by = [&](int body, const Row& part) {
       for (int i = 0; i < 3 && s_.bodies[body].motion != Motion::kStatic; ++i) {
-        EmitRowTimesVariable(a, row_a, b, row_b, s_.TwistVariable(body, i), c * part[i].a);
+        EmitRowTimesVariable(a, row_a, b, row_b, s_.TwistVariable(body, i), c * ValueOf(part[i]));
       }
     };
     by(a, row_a);
@@ -209,6 +211,51 @@ class AccelerationVisitor : private internal::LocalEntries<Sink> {
     return moving;
   }
 
+  // Two rows of points with arms r = R(θ) anchor, only which depend on poses and numbers:
+  //   row = ± (a + α r⊥ − ω² r),  of a correction ± (Δ + δ r⊥) + share · C;   ∂r/∂θ = r⊥
+  void RevoluteByHand(int j) {
+    const JointIndex& joint = s_.joints[j];
+    const double* y = &r_.solution->joint_impulse[3 * j];
+    const double share = r_.correction ? JointCorrectionShare(s_.settings) : 0.0;
+    const auto side = [&](int body, int anchor, double sign) {
+      const double c = std::cos(state_.pose[3 * body + 2]);
+      const double s = std::sin(state_.pose[3 * body + 2]);
+      const double ax = x_[anchor];
+      const double ay = x_[anchor + 1];
+      const double arm[2] = {c * ax - s * ay, s * ax + c * ay};
+      // Columns: the arm's change with θ and with the anchor's two components.
+      const double dx[3] = {-arm[1], c, -s};
+      const double dy[3] = {arm[0], s, c};
+      const int variables[3] = {s_.PoseVariable(body, 2), s_.NumberVariable(anchor),
+                                s_.NumberVariable(anchor + 1)};
+      const double alpha = a_[3 * body + 2];
+      const double omega = r_.correction ? 0.0 : v_[3 * body + 2];
+      const double along = share - omega * omega;
+      const int row = BodyRow(s_, body);
+      for (int k = 0; k < 3; ++k) {
+        sink_(JointRow(j), variables[k], sign * (along * dx[k] - alpha * dy[k]));
+        sink_(JointRow(j) + 1, variables[k], sign * (along * dy[k] + alpha * dx[k]));
+        if (row >= 0) {
+          sink_(row + 2, variables[k], -sign * (-dy[k] * y[0] + dx[k] * y[1]));
+        }
+      }
+      for (int i = 0; i < 2; ++i) {
+        if (r_.correction) {
+          sink_(JointRow(j) + i, s_.PoseVariable(body, i), sign * share);
+        } else if (s_.bodies[body].motion != Motion::kStatic) {
+          sink_(JointRow(j) + i, s_.TwistVariable(body, 2), -2.0 * sign * omega * arm[i]);
+        }
+      }
+    };
+    side(joint.a, joint.geometry, 1.0);
+    side(joint.b, joint.geometry + 2, -1.0);
+    if (!r_.correction) {
+      const RowPart<double> row_a = {0.0, 0.0, 1.0};
+      const RowPart<double> row_b = {0.0, 0.0, -1.0};
+      EmitDrive(joint, row_a, row_b);
+    }
+  }
+
   void Joint(int j) {
     const JointIndex& joint = s_.joints[j];
     const double* y = &r_.solution->joint_impulse[3 * j];
@@ -250,6 +297,13 @@ class AccelerationVisitor : private internal::LocalEntries<Sink> {
     const RowPart<LocalJet>& a = rows.coordinate_a;
     const RowPart<LocalJet>& b = rows.coordinate_b;
     const LocalJet speed = RowTimes(v_, joint.a, a, joint.b, b);
+    const double effort = EmitDrive(joint, a, b);
+    EmitMomentum(locals, joint.a, a, joint.b, b, x_[joint.damping] * speed - effort);
+  }
+
+  // The same along a row, but for what changes the row itself; returns the effort.
+  template <typename Row>
+  double EmitDrive(const JointIndex& joint, const Row& a, const Row& b) {
     double effort = x_[joint.effort];
     if (joint.effort_signal >= 0) {
       const Signal& signal = s_.signals[joint.effort_signal];
@@ -259,9 +313,10 @@ class AccelerationVisitor : private internal::LocalEntries<Sink> {
     } else {
       EmitRowTimesVariable(joint.a, a, joint.b, b, s_.NumberVariable(joint.effort), -1.0);
     }
-    EmitMomentum(locals, joint.a, a, joint.b, b, x_[joint.damping] * speed - effort);
-    EmitRowTimesVariable(joint.a, a, joint.b, b, s_.NumberVariable(joint.damping), speed.a);
+    EmitRowTimesVariable(joint.a, a, joint.b, b, s_.NumberVariable(joint.damping),
+                         ValueOf(RowTimes(v_, joint.a, a, joint.b, b)));
     EmitDamperByTwist(joint.a, a, joint.b, b, x_[joint.damping]);
+    return effort;
   }
 
   void CorrectedJoint(int j) {
@@ -432,6 +487,7 @@ void VisitAccelerationJacobian(const Model<double>& model, const SolvedAccelerat
                                                 LocalJacobianScratch*, const Sink&);
 TANGIBLE_INSTANTIATE(TangentSink)
 TANGIBLE_INSTANTIATE(AdjointSink)
+TANGIBLE_INSTANTIATE(SingleAdjointSink)
 TANGIBLE_INSTANTIATE(EntryListSink)
 
 }  // namespace tangible

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "tangible/dynamics/contact_gradient.h"
+#include "tangible/simulation/event_rows_inl.h"
 #include "tangible/simulation/segment_flow.h"
 
 namespace tangible {
@@ -17,19 +18,6 @@ constexpr int kMostIterations = 60;
 // nothing depends on when.
 constexpr double kNoRate = 1e-9;
 
-// The rows of a body in a matrix of all variables, and of a moving body in a solution.
-template <typename Matrix>
-auto PoseRows(const ModelStructure& s, int body, Matrix& x) {
-  return x.middleRows(s.PoseVariable(body, 0), 3);
-}
-template <typename Matrix>
-auto TwistRows(const ModelStructure& s, int body, Matrix& x) {
-  return x.middleRows(s.TwistVariable(body, 0), 3);
-}
-template <typename Matrix>
-auto BlockRows(int block, Matrix& x) {
-  return x.middleRows(3 * block, 3);
-}
 Eigen::Vector3d BlockOf(const std::vector<double>& values, int block) {
   return Eigen::Vector3d(values[3 * block], values[3 * block + 1], values[3 * block + 2]);
 }
@@ -72,13 +60,34 @@ bool IsLocated(EventKind kind) {
   return kind != EventKind::kStepEnd && kind != EventKind::kEdge && kind != EventKind::kAtOnce;
 }
 
+template <typename Sink>
+void EventDerivative::Visit(const Model<double>& model, const Segment& segment,
+                            const SolvedNode& node, bool correction, const Sink& sink) {
+  if (listed_ != &node) {
+    VisitAccelerationJacobian(model, ViewOf(segment, node, correction), &scratch_, sink);
+    return;
+  }
+  for (const JacobianEntry& entry : entries_) {
+    sink(entry.row, entry.variable, entry.value);
+  }
+}
+
+void EventDerivative::List(const Model<double>& model, const Segment& segment,
+                           const SolvedNode* node) {
+  listed_ = node;
+  entries_.clear();
+  if (node != nullptr) {
+    VisitAccelerationJacobian(model, ViewOf(segment, *node, false), &scratch_,
+                              EntryListSink{&entries_});
+  }
+}
+
 double EventDerivative::NodeTangent(const Model<double>& model, const Segment& segment,
                                     SolvedNode* node, bool correction, const RowMatrixXd& x,
                                     RowMatrixXd* solved, const Row* tau_dot) {
   const int columns = static_cast<int>(x.cols());
   solved->setZero(3 * static_cast<Eigen::Index>(node->system.num_blocks()), columns);
-  VisitAccelerationJacobian(model, ViewOf(segment, *node, correction), &scratch_,
-                            TangentSink{x.data(), solved->data(), columns});
+  Visit(model, segment, *node, correction, TangentSink{x.data(), solved->data(), columns});
   // Out of penetration by recovery_speed times the segment's length.
   for (size_t i = 0; tau_dot != nullptr && i < segment.contacts.size(); ++i) {
     const int block = node->system.contact_block()[i];
@@ -94,86 +103,10 @@ void EventDerivative::NodeAdjoint(const Model<double>& model, const Segment& seg
                                   RowMatrixXd* w_bar) {
   const int columns = static_cast<int>(w_bar->cols());
   node->system.SolveTransposed(node->problem, node->solution.modes, seed->data(), columns);
-  VisitAccelerationJacobian(model, ViewOf(segment, *node, correction), &scratch_,
-                            AdjointSink{seed->data(), w_bar->data(), columns});
-}
-
-double EventDerivative::ImpulsesTangent(const Model<double>& model, Impulses* impulses,
-                                        RowMatrixXd* x) {
-  const ModelStructure& s = *model.structure;
-  const int columns = static_cast<int>(x->cols());
-  rhs_.setZero(3 * static_cast<Eigen::Index>(impulses->system.num_blocks()), columns);
-  VisitStepJacobian(model, impulses->View(), JointRoute::kByHand, &scratch_,
-                    TangentSink{x->data(), rhs_.data(), columns});
-  if (impulses->decompression) {
-    AddOffsetsTangent(*impulses);
-  }
-  const double left =
-      impulses->system.Solve(impulses->problem, impulses->solution.modes, rhs_.data(), columns);
-  KeepCompression(*impulses);
-  for (int k = 0; k < s.num_blocks(); ++k) {
-    TwistRows(s, s.moving[k], *x) = BlockRows(k, rhs_);
-  }
-  return left;
-}
-
-void EventDerivative::ImpulsesAdjoint(const Model<double>& model, Impulses* impulses,
-                                      RowMatrixXd* w_bar) {
-  const ModelStructure& s = *model.structure;
-  const int columns = static_cast<int>(w_bar->cols());
-  rhs_.setZero(3 * static_cast<Eigen::Index>(impulses->system.num_blocks()), columns);
-  for (int k = 0; k < s.num_blocks(); ++k) {
-    BlockRows(k, rhs_) = TwistRows(s, s.moving[k], *w_bar);
-    TwistRows(s, s.moving[k], *w_bar).setZero();
-  }
-  // Of the decompression that follows, if one does.
-  for (Eigen::Index i = 0; i < compression_bar_.rows(); ++i) {
-    const int block = impulses->system.contact_block()[i];
-    if (block >= 0) {
-      rhs_.row(3 * static_cast<Eigen::Index>(block)) += compression_bar_.row(i);
-    }
-  }
-  impulses->system.SolveTransposed(impulses->problem, impulses->solution.modes, rhs_.data(),
-                                   columns);
-  VisitStepJacobian(model, impulses->View(), JointRoute::kByHand, &scratch_,
-                    AdjointSink{rhs_.data(), w_bar->data(), columns});
-  KeepOffsetsAdjoint(*impulses);
-}
-
-void EventDerivative::KeepCompression(const Impulses& impulses) {
-  compression_dot_.setZero(static_cast<Eigen::Index>(impulses.contacts.size()), rhs_.cols());
-  for (size_t i = 0; i < impulses.contacts.size(); ++i) {
-    const int block = impulses.system.contact_block()[i];
-    if (block >= 0) {
-      compression_dot_.row(static_cast<Eigen::Index>(i)) =
-          rhs_.row(3 * static_cast<Eigen::Index>(block));
-    }
-  }
-}
-
-// λn = e λ¹n: e̊ λ¹n is among the entries of the step's Jacobian, e λ̊¹n is added here.
-void EventDerivative::AddOffsetsTangent(const Impulses& impulses) {
-  for (size_t i = 0; i < impulses.contacts.size(); ++i) {
-    if (impulses.problem.contacts[i].driven) {
-      rhs_.row(3 * static_cast<Eigen::Index>(impulses.system.contact_block()[i])) +=
-          impulses.restitution[i].value * compression_dot_.row(impulses.compressed[i]);
-    }
-  }
-}
-
-void EventDerivative::KeepOffsetsAdjoint(const Impulses& impulses) {
-  compression_bar_.resize(0, rhs_.cols());
-  if (!impulses.decompression) {
-    return;
-  }
-  const int count = 1 + *std::max_element(impulses.compressed.begin(), impulses.compressed.end());
-  compression_bar_.setZero(count, rhs_.cols());
-  for (size_t i = 0; i < impulses.contacts.size(); ++i) {
-    if (impulses.problem.contacts[i].driven) {
-      compression_bar_.row(impulses.compressed[i]) =
-          impulses.restitution[i].value *
-          rhs_.row(3 * static_cast<Eigen::Index>(impulses.system.contact_block()[i]));
-    }
+  if (columns == 1) {
+    Visit(model, segment, *node, correction, SingleAdjointSink{seed->data(), w_bar->data()});
+  } else {
+    Visit(model, segment, *node, correction, AdjointSink{seed->data(), w_bar->data(), columns});
   }
 }
 
@@ -189,6 +122,7 @@ double EventDerivative::SegmentTangent(const Model<double>& model, Segment* segm
     const bool implicit = tableau.last_is_implicit && i + 1 == tableau.stages;
     if (implicit) {
       a_dot[i] = a_dot[i - 1];
+      List(model, *segment, &segment->stages[i]);
     }
     FixedPoint fixed_point;
     for (int iteration = 0; iteration < kMostIterations; ++iteration) {
@@ -222,6 +156,7 @@ double EventDerivative::SegmentTangent(const Model<double>& model, Segment* segm
       a_dot[i] += step;
     }
   }
+  List(model, *segment, nullptr);
   PlaceTangent(s, *segment, 1.0, tableau.b, tableau.b_hat, tableau.stages, tau_dot, *x, a_dot,
                &place);
   x->swap(place);
@@ -375,6 +310,7 @@ void EventDerivative::StagesAdjoint(const Model<double>& model, Segment* segment
     };
     RowMatrixXd stage_bar;
     RowMatrixXd own = a_bar[i];
+    List(model, *segment, implicit ? &stage : nullptr);
     FixedPoint fixed_point;
     for (int iteration = 0; iteration < kMostIterations; ++iteration) {
       solve(own, &stage_bar);
@@ -419,16 +355,21 @@ void EventDerivative::StagesAdjoint(const Model<double>& model, Segment* segment
     add_to_twist(tableau.c[i] * tau, stage_bar);
     *w_bar += stage_bar;
   }
+  List(model, *segment, nullptr);
 }
 
 void EventDerivative::SegmentAdjoint(const Model<double>& model, Segment* segment,
-                                     RowMatrixXd* w_bar) {
+                                     bool starts_anywhere, RowMatrixXd* w_bar) {
   const ModelStructure& s = *model.structure;
   const Eigen::Index columns = w_bar->cols();
+  const bool located = IsLocated(segment->event);
   RowMatrixXd by_length = RowMatrixXd::Zero(s.num_variables() + 1, 1);
-  SegmentTangent(model, segment, &by_length, Row::Ones(1));
-  const Row alpha = by_length.col(0).transpose() * *w_bar;
-  if (IsLocated(segment->event)) {
+  Row alpha = Row::Zero(columns);
+  if (located || segment->event_number >= 0 || starts_anywhere) {
+    SegmentTangent(model, segment, &by_length, Row::Ones(1));
+    alpha = by_length.col(0).transpose() * *w_bar;
+  }
+  if (located) {
     Eigen::VectorXd gradient;
     EventGradient(model, segment, &gradient);
     const double rate = gradient.dot(by_length.col(0));
@@ -462,12 +403,19 @@ void EventDerivative::Adjoint(const Model<double>& model, EventRecord* record, R
   RowMatrixXd bar = RowMatrixXd::Zero(s.num_variables() + 1, w_bar->cols());
   bar.topRows(s.num_variables()) = *w_bar;
   compression_bar_.resize(0, 0);
+  int first_moving = record->num_parts;  // the first segment whose end's time is not given
+  for (int p = record->num_parts - 1; p >= 0; --p) {
+    const EventPart& part = *record->parts[p];
+    if (!part.is_impulses && (IsLocated(part.segment.event) || part.segment.event_number >= 0)) {
+      first_moving = p;
+    }
+  }
   for (int p = record->num_parts - 1; p >= 0; --p) {
     EventPart& part = *record->parts[p];
     if (part.is_impulses) {
       ImpulsesAdjoint(model, &part.impulses, &bar);
     } else {
-      SegmentAdjoint(model, &part.segment, &bar);
+      SegmentAdjoint(model, &part.segment, p > first_moving, &bar);
     }
   }
   *w_bar = bar.topRows(s.num_variables());

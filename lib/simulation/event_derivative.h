@@ -33,7 +33,9 @@ class EventDerivative {
   double SegmentTangent(const Model<double>& model, Segment* segment, RowMatrixXd* x,
                         const Eigen::RowVectorXd& tau_dot);
   double ImpulsesTangent(const Model<double>& model, Impulses* impulses, RowMatrixXd* x);
-  void SegmentAdjoint(const Model<double>& model, Segment* segment, RowMatrixXd* w_bar);
+  /// `starts_anywhere`: an event before it in the step has a time that moves.
+  void SegmentAdjoint(const Model<double>& model, Segment* segment, bool starts_anywhere,
+                      RowMatrixXd* w_bar);
   void StagesAdjoint(const Model<double>& model, Segment* segment, RowMatrixXd* w_bar);
   void KeepCompression(const Impulses& impulses);
   void AddOffsetsTangent(const Impulses& impulses);
@@ -46,7 +48,16 @@ class EventDerivative {
   void NodeAdjoint(const Model<double>& model, const Segment& segment, SolvedNode* node,
                    bool correction, RowMatrixXd* seed, RowMatrixXd* w_bar);
 
+  /// ∂R/∂w of a node into a sink; while `listed_` is that node from its list.
+  template <typename Sink>
+  void Visit(const Model<double>& model, const Segment& segment, const SolvedNode& node,
+             bool correction, const Sink& sink);
+  /// Lists the entries of a node that an iteration reads again and again; null: of none.
+  void List(const Model<double>& model, const Segment& segment, const SolvedNode* node);
+
   LocalJacobianScratch scratch_;
+  const SolvedNode* listed_ = nullptr;
+  std::vector<JacobianEntry> entries_;
   ImplicitStage implicit_;
   RowMatrixXd rhs_;
   // Poisson's law, between an impact's two parts: derivatives of the compression's normal impulses,

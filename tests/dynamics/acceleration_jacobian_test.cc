@@ -21,21 +21,31 @@ std::string Everything() {
       {"name": "tri", "shape": {"polygon": {"vertices": [[-0.2, -0.1], [0.2, -0.1], [0, 0.2]]}},
        "mass": 0.7, "position": [-1.4, 0.5], "angle": 0.3, "velocity": [0.1, 0.2],
        "angular_velocity": 0.4, "friction": 0.2},
-      {"name": "rod", "mass": 0.5, "inertia": 0.02, "position": [1.3, 0.9]},
+      {"name": "rod", "mass": 0.5, "inertia": 0.02, "position": [1.3, 0.9], "velocity": [0, -0.05],
+       "angular_velocity": -0.2},
       {"name": "slider", "mass": 0.4, "inertia": 0.01, "position": [2, 1], "velocity": [0.2, 0.1]},
       {"name": "tip", "mass": 0.3, "inertia": 0.01, "position": [1.6, 0.9], "velocity": [0, 0.3],
        "angular_velocity": 0.2},
       {"name": "floor", "static": true, "friction": 0.3,
-       "shape": {"half_plane": {"normal": [0.1, 1], "offset": 0}}}],
+       "shape": {"half_plane": {"normal": [0.1, 1], "offset": 0}}},
+      {"name": "hand", "mass": 0.2, "inertia": 0.02, "position": [1.9, 1.2], "angle": 0.4,
+       "velocity": [0.1, -0.3], "angular_velocity": 1.2},
+      {"name": "crank", "kinematic": true, "position": [2.4, 1.3], "angle": 0.1,
+       "velocity": [0.2, 0.1], "angular_velocity": -0.9}],
     "joints": [
       {"name": "pin", "type": "revolute", "bodies": ["rod", "world"], "anchor": [1.05, 0.9],
-       "damping": 0.1, "limits": [-1.5, 2], "effort": 0.05, "rate": -0.2},
+       "damping": 0.1, "limits": [-1.5, 2], "effort": 0.05},
       {"name": "rail", "type": "prismatic", "bodies": ["slider", "rod"], "anchor": [1.8, 1],
        "axis": [1, 0.3], "damping": 0.2, "effort": 0.1},
+      {"name": "elbow", "type": "revolute", "bodies": ["hand", "tip"], "anchor": [1.7, 1.1],
+       "damping": 0.3, "effort": -0.2},
+      {"name": "wrist", "type": "revolute", "bodies": ["crank", "hand"], "anchor": [2.2, 1.25],
+       "damping": 0.2},
       {"name": "wire", "type": "distance", "bodies": ["tip", "rod"], "anchors": [[1.6, 0.9], [1.4, 0.8]]}],
     "springs": [{"name": "s", "bodies": ["rod", "tip"], "anchors": [[1.5, 0.9], [1.6, 1.1]],
                  "stiffness": 5, "damping": 0.3, "rest_length": 0.1}],
-    "forces": [{"name": "push", "body": "crate", "force": [1, 0.2], "torque": 0.01, "at": [0.1, 0.02]}]})";
+    "forces": [{"name": "push", "body": "crate", "force": [1, 0.2], "torque": 0.01, "at": [0.1, 0.02]}],
+    "simulation": {"joint_correction": "baumgarte"}})";
 }
 
 class AccelerationJacobianTest : public testing::TestWithParam<bool> {
