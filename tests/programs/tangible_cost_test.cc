@@ -33,6 +33,18 @@ TEST_F(TangibleCostTest, PrintsATableAndWritesJsonAndAPicture) {
   EXPECT_EQ(Read(Path("p.svg")).rfind("<svg", 0), 0u);
 }
 
+// By events: all but the tape.
+TEST_F(TangibleCostTest, StepsByEvents) {
+  const ProgramRun run =
+      Cost(std::string(kQuick) + "--stepping=event --out='" + Path("r.json") + "'");
+  ASSERT_EQ(run.exit_status, 0) << run.error;
+  EXPECT_NE(run.out.find("by events with runge_kutta_4"), std::string::npos) << run.out;
+  EXPECT_NE(run.out.find("fixed alone"), std::string::npos);
+  for (const json& cell : json::parse(Read(Path("r.json")))["cells"]) {
+    EXPECT_EQ(cell.contains("ratio"), cell["method"] != "unrolled ADOL-C") << cell;
+  }
+}
+
 // The shortest bounded run, a thousand steps, and bounds that nothing holds.
 TEST_F(TangibleCostTest, ABrokenBoundIsExitStatusOne) {
   const std::string broken =
@@ -53,7 +65,7 @@ TEST_F(TangibleCostTest, WrongFlagsAreUsage) {
         "--parameters=1x", "--parameters=1e9", "--steps=", "--steps=-1", "--steps=10,10",
         "--steps=99999999999999999999", "--long_run=0", "--budget_seconds=0", "--budget_mib=nan",
         "--budget_mib=inf", "--repeat_seconds=-1", "--adjoint_bound=0", "--tangent_bound=nan",
-        "--jet_bound=-2"}) {
+        "--jet_bound=-2", "--stepping=both"}) {
     const std::string name(flag, std::string(flag).find('='));
     ExpectOneLine(Cost(std::string(flag)), 2, name);
   }

@@ -178,7 +178,11 @@ CostCell MeasureCell(const CostOptions& options, CostMethod method, int paramete
     cell.instead = "not built";
     return cell;
   }
-  const Scene scene = ChainAndBall(steps);
+  if (method == CostMethod::kTape && options.stepping == Stepping::kEvent) {
+    cell.instead = "fixed alone";
+    return cell;
+  }
+  const Scene scene = ChainAndBall(steps, options.stepping);
   const std::vector<ParameterPath> paths = CostParameters(scene, parameters);
   std::vector<double> scales;
   scales.reserve(paths.size());

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "tangible/scene/scene.h"
 #include "tangible/verification/cost/child.h"
 
 namespace tangible::cost {
@@ -30,6 +31,7 @@ inline constexpr int kNumCostMethods = 8;
 const char* NameOf(CostMethod method);
 
 struct CostOptions {
+  Stepping stepping = Stepping::kFixed;
   std::vector<int> parameters;  ///< ascending
   std::vector<long> steps;      ///< ascending
   Budget budget;

@@ -79,7 +79,7 @@ std::vector<std::string> Patterns(const std::vector<std::string>& paths) {
 
 }  // namespace
 
-Scene ChainAndBall(long steps) {
+Scene ChainAndBall(long steps, Stepping stepping) {
   Scene scene;
   scene.name = "chain and ball";
   for (int i = 0; i < kLinks; ++i) {
@@ -102,6 +102,10 @@ Scene ChainAndBall(long steps) {
   scene.no_contact.emplace_back("link*", "link*");
   scene.simulation.dt = kStep;
   scene.simulation.duration = kStep * static_cast<double>(steps);
+  if (stepping == Stepping::kEvent) {
+    scene.simulation.stepping = stepping;
+    scene.simulation.integrator = Integrator::kRungeKutta4;
+  }
   return scene;
 }
 

@@ -11,8 +11,8 @@
 
 namespace tangible::cost {
 
-/// Steps of 0.002 s.
-Scene ChainAndBall(long steps);
+/// Steps of 0.002 s; by events with runge_kutta_4.
+Scene ChainAndBall(long steps, Stepping stepping = Stepping::kFixed);
 
 /// How many numbers of the scene there are to differentiate by, each alone.
 int NumNumbers(const Scene& scene);
