@@ -108,6 +108,7 @@ std::string CheckFlags(CostOptions* options, CostBounds* bounds) {
   bounds->adjoint = share * FLAGS_adjoint_bound;
   bounds->tangent = share * FLAGS_tangent_bound;
   bounds->implicit_jet = share * FLAGS_jet_bound;
+  bounds->long_run_mib *= share;
   bounds->long_run = FLAGS_long_run;
   return "";
 }
