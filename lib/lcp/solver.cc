@@ -150,7 +150,9 @@ class Portfolio {
     solution_.s = Slack(problem_, solution_.v, solution_.z);
     if (solution_.status == LcpStatus::kUnsolved) {
       solution_.solver = LcpSolver::kNone;
-      solution_.message = "no attempt reached the tolerance";
+      solution_.message = solution_.residual <= options_.tolerance
+                              ? "what meets the tolerance does so without the constants p, b, c too"
+                              : "no attempt reached the tolerance";
     } else if (solution_.status == LcpStatus::kInfeasible) {
       solution_.solver = LcpSolver::kNone;
     }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cmath>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 
 #include "../support/scenes.h"
@@ -83,6 +84,20 @@ TEST_F(TangibleGradientTest, WritesTheGradientOfALoss) {
                             2.0 * angle * jacobian["jacobian"][14][k].get<double>();
     EXPECT_NE(expected, 0.0);
     EXPECT_NEAR(result["gradient"][k], expected, 1e-9 * std::abs(expected));
+  }
+}
+
+// v = t F / m of 1e-200 kg: the derivative is −1e399.
+TEST_F(TangibleGradientTest, SaysThatADerivativeOverflows) {
+  for (const char* method : {"adjoint", "tangent", "finite_difference"}) {
+    const ProgramRun run = Differentiate(
+        std::string("--parameters=bodies/a/mass --out='") + Path("g.json") + "' --method=" + method,
+        R"({"gravity": [0, 0], "bodies": [
+          {"name": "a", "mass": 1e-200, "inertia": 1, "position": [0, 0]}],
+          "forces": [{"name": "f", "body": "a", "force": [1, 0]}],
+          "simulation": {"dt": 0.01, "duration": 0.1}})");
+    ExpectOneLine(run, 1, "the derivative is not finite");
+    EXPECT_FALSE(std::filesystem::exists(Path("g.json")));
   }
 }
 

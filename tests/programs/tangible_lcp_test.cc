@@ -36,6 +36,16 @@ TEST_F(TangibleLcpTest, SolvesAPlainProblem) {
   }
 }
 
+// Numbers 400 orders of magnitude apart: beside z = 1e108 the constants are rounding of others.
+TEST_F(TangibleLcpTest, WhatDoesNotDependOnTheConstantsIsNoSolution) {
+  const ProgramRun run =
+      Solve(R"({"F": [[1e-200, 1e200], [-1e200, 1e-200]], "c": [-1e308, 1e-308]})");
+  EXPECT_EQ(run.exit_status, 1);
+  EXPECT_NE(run.error.find("unsolved: what meets the tolerance does so without the constants"),
+            std::string::npos)
+      << run.error;
+}
+
 TEST_F(TangibleLcpTest, WritesTheGradientOfAMixedProblem) {
   for (const char* solver : {"auto", "interior_point", "lemke"}) {
     const ProgramRun run = Solve(kMixed, std::string("--solver=") + solver);
