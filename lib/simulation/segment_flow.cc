@@ -103,6 +103,27 @@ double CorrectedError(const ContactProblem<double>& problem) {
   return error;
 }
 
+// A hinge whose points have come apart by more than this share of its arms, by a motion that starts
+// on it, in a correction's problem.
+bool DriftsFar(const Model<double>& model, const ContactProblem<double>& correction) {
+  constexpr double kShareOfArms = 0.1;
+  for (size_t j = 0; j < correction.joints.size(); ++j) {
+    const JointIndex& joint = model.structure->joints[j];
+    const double* anchors = &model.numbers[joint.geometry];
+    if (joint.type != JointType::kRevolute) {
+      continue;
+    }
+    const double arms =
+        std::hypot(anchors[0], anchors[1]) +
+        (joint.b == model.structure->world() ? 0.0 : std::hypot(anchors[2], anchors[3]));
+    const double* error = correction.joints[j].rhs;
+    if (arms > 0.0 && std::hypot(error[0], error[1]) > kShareOfArms * arms) {
+      return true;
+    }
+  }
+  return false;
+}
+
 // Solves a node's problem with modes; false where singular or not finite.
 bool SolveNode(const std::vector<ContactMode>& modes, SolvedNode* node) {
   const ContactProblem<double>& p = node->problem;
@@ -326,6 +347,13 @@ bool SegmentFlow::CorrectPoses(const Model<double>& model, Segment* segment, std
     node.time = segment->time + segment->length;
     AssembleCorrection(model, node.state, segment->contacts, segment->friction,
                        settings.recovery_speed * segment->length, &acceleration_, &node.problem);
+    if (k == 0 && settings.joint_correction == JointCorrection::kProjection &&
+        DriftsFar(model, node.problem)) {
+      // So they do where links whip faster than dt resolves, and where the implicit stage has found
+      // another of its solutions than the one that the motion continues with.
+      *message = "joints drift by more than a tenth of their arms in one motion: dt is too large";
+      return false;
+    }
     const double error = CorrectedError(node.problem);
     // Newton's method squares the error; what does not shrink any more is rounding.
     if (k > 0 && (once || error <= 1e-15 || error > 0.1 * last)) {

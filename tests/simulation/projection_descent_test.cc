@@ -13,28 +13,6 @@
 namespace tangible {
 namespace {
 
-constexpr double kLink = 0.1;
-
-// Ten links of 1 kg, but the last, at an angle of 0.5.
-Scene HeavyEnd(const std::string& end, double duration) {
-  std::string bodies, joints;
-  for (int i = 0; i < 10; ++i) {
-    const std::string comma = i > 0 ? "," : "";
-    const std::string name = "link" + std::to_string(i);
-    bodies += comma + R"({"name": ")" + name +
-              R"(", "shape": {"box": {"size": [0.02, 0.1]}}, "mass": )" + (i < 9 ? "1" : end) +
-              R"(, "position": [0, )" + std::to_string(-(i + 0.5) * kLink) + "]}";
-    joints += comma + R"({"name": "pin)" + std::to_string(i) +
-              R"(", "type": "revolute", "bodies": [")" + name + R"(", ")" +
-              (i > 0 ? "link" + std::to_string(i - 1) : "world") + R"("], "anchor": [0, )" +
-              std::to_string(-i * kLink) + "]" + (i > 0 ? "" : R"(, "angle": 0.5)") + "}";
-  }
-  return test_scenes::SceneOf(R"({"bodies": [)" + bodies + R"(], "joints": [)" + joints +
-                              R"(], "no_contact": [["link*", "link*"]],
-      "simulation": {"dt": 0.01, "joint_correction": "projection", "duration": )" +
-                              std::to_string(duration) + "}}");
-}
-
 // What is left of M (q − q̃) along directions in which the joints let the bodies move: those that
 // K [d; ·] = [r; 0] has, per size of both in the metric of M.
 double AlongJoints(const Model<double>& model, ProjectionIterate<double>* p) {
@@ -72,7 +50,7 @@ double AlongJoints(const Model<double>& model, ProjectionIterate<double>* p) {
 TEST(ProjectionDescentTest, ReachesAMinimumWhereNewtonsMethodDoesNot) {
   Model<double> model;
   State<double> initial;
-  BuildModel(HeavyEnd("1e9", 0.1), &model, &initial);
+  BuildModel(test_scenes::SceneOf(test_scenes::HeavyEnd("1e9")), &model, &initial);
   RandomNumbers random(11);
   int failed = 0;
   for (int trial = 0; trial < 40; ++trial) {
@@ -101,7 +79,7 @@ TEST(ProjectionDescentTest, ReachesAMinimumWhereNewtonsMethodDoesNot) {
 TEST(ProjectionDescentTest, DerivativesAreThoseOfTheMinimum) {
   Model<double> model;
   State<double> initial;
-  BuildModel(HeavyEnd("1e4", 0.1), &model, &initial);
+  BuildModel(test_scenes::SceneOf(test_scenes::HeavyEnd("1e4")), &model, &initial);
   const ModelStructure& s = *model.structure;
   RandomNumbers random(11);
   int compared = 0;
@@ -177,7 +155,7 @@ TEST(ProjectionDescentTest, DerivativesAreThoseOfTheMinimum) {
 TEST(ProjectionDescentTest, AStepThatSwingsAHeavyEndIsDone) {
   Model<double> model;
   State<double> state;
-  BuildModel(HeavyEnd("1e9", 1.0), &model, &state);
+  BuildModel(test_scenes::SceneOf(test_scenes::HeavyEnd("1e9")), &model, &state);
   double largest = 0.0;
   const RolloutReport report = Rollout(
       model, state,

@@ -19,6 +19,28 @@ inline Scene SceneOf(const std::string& text) {
   return scene;
 }
 
+/// Ten links of 0.1 m and 1 kg, but the last, that swing from an angle of 0.5; `more` as in a
+/// scene's simulation.
+inline std::string HeavyEnd(const std::string& end,
+                            const std::string& more = R"("dt": 0.01, "duration": 1)") {
+  std::string bodies, joints;
+  for (int i = 0; i < 10; ++i) {
+    const std::string comma = i > 0 ? "," : "";
+    const std::string name = "link" + std::to_string(i);
+    bodies += comma + R"({"name": ")" + name +
+              R"(", "shape": {"box": {"size": [0.02, 0.1]}}, "mass": )" + (i < 9 ? "1" : end) +
+              R"(, "position": [0, )" + std::to_string(-0.1 * (i + 0.5)) + "]}";
+    joints += comma + R"({"name": "pin)" + std::to_string(i) +
+              R"(", "type": "revolute", "bodies": [")" + name + R"(", ")" +
+              (i > 0 ? "link" + std::to_string(i - 1) : "world") + R"("], "anchor": [0, )" +
+              std::to_string(-0.1 * i) + "]" + (i > 0 ? "" : R"(, "angle": 0.5)") + "}";
+  }
+  return R"({"bodies": [)" + bodies + R"(], "joints": [)" + joints +
+         R"(], "no_contact": [["link*", "link*"]],
+      "simulation": {"joint_correction": "projection", )" +
+         more + "}}";
+}
+
 inline constexpr char kFloor[] =
     R"({"name": "floor", "static": true, "friction": 0.3, "restitution": 0.5,
         "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}})";
