@@ -14,8 +14,9 @@ namespace tangible {
 
 /// Margins below this are reported as near a kink; dimensionless (problem.h, scaled).
 inline constexpr double kNearKinkMargin = 1e-6;
-/// Relative errors of a linear solve above this are not trustworthy.
-inline constexpr double kLinearResidualLimit = 1e-6;
+/// Relative errors of a linear solve above this are not trustworthy: an entry may be off by ten
+/// times what the whole shows, and is to be right to 1e-9.
+inline constexpr double kLinearResidualLimit = 1e-10;
 /// Beyond this condition no digit of a linear system's solution is certain.
 inline constexpr double kConditionLimit = 1e16;
 

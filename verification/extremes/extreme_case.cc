@@ -28,8 +28,9 @@ double FromBits(const json& text) { return std::strtod(text.get<std::string>().c
 }  // namespace
 
 double GradientFinding::adjoint_bound() const {
+  constexpr double kMostByCondition = 1e-6;
   return std::clamp(std::numeric_limits<double>::epsilon() * condition, kAdjointTolerance,
-                    kLinearResidualLimit);
+                    kMostByCondition);
 }
 
 bool GradientFinding::holds() const {
