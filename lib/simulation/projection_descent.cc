@@ -67,6 +67,9 @@ bool GoOntoJoints(const Model<double>& model, ProjectionIterate<double>* p) {
 
 bool DescendToProjection(const Model<double>& model, const std::vector<double>& start,
                          ProjectionIterate<double>* p) {
+  if (!std::isfinite(Distance(model, *p))) {
+    return false;  // the run has diverged
+  }
   const ModelStructure& s = *model.structure;
   p->at.pose = p->from.pose;
   for (const int body : s.moving) {
