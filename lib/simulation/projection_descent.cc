@@ -67,11 +67,11 @@ bool GoOntoJoints(const Model<double>& model, ProjectionIterate<double>* p) {
 
 bool DescendToProjection(const Model<double>& model, const std::vector<double>& start,
                          ProjectionIterate<double>* p) {
-  if (!std::isfinite(Distance(model, *p))) {
-    return false;  // the run has diverged
-  }
   const ModelStructure& s = *model.structure;
   p->at.pose = p->from.pose;
+  if (!std::isfinite(Distance(model, *p))) {
+    return false;  // the run has diverged: q̃ − q̃ is not a number
+  }
   for (const int body : s.moving) {
     std::copy_n(&start[3 * body], 3, &p->at.pose[3 * body]);
   }
