@@ -87,8 +87,10 @@ void AddEnd(const Sides& sides, const CoreFace& reference, const CoreFace& incid
       reference.line.Height(sides.incident.VertexAt(incident_vertex)) - sides.Radii()};
   const Candidate of_reference = {sides.VertexOnIncident(reference_vertex, incident.edge),
                                   incident.line.Height(on_reference) - sides.Radii()};
-  const bool has_foot = IsOver(incident.line, on_reference, kAligned);
   const double tie = kAligned * (reference.line.length + incident.line.length);
+  // As far beyond the end as vertices count as one above the other: what is found must not depend
+  // on which face rounding made the reference.
+  const bool has_foot = IsOver(incident.line, on_reference, tie / incident.line.length);
   if (std::abs(overhang) <= tie && has_foot &&
       std::abs(of_incident.gap - of_reference.gap) <= tie) {
     // Vertex over vertex: the first body's stands, whichever rounding prefers.

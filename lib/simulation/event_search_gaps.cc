@@ -24,6 +24,10 @@ bool Contains(const std::vector<ActiveContact>& contacts, const ActiveContact& c
                      [&](const ActiveContact& c) { return c.SameAs(contact); });
 }
 
+bool IsAmong(const ContactFeature* features, int count, const ContactFeature& feature) {
+  return std::find(features, features + count, feature) != features + count;
+}
+
 // The gap of a contact or limit, and the speed at which it grows.
 double GapAndSpeed(const Model<double>& model, const State<double>& state,
                    const ActiveContact& contact, double* speed) {
@@ -124,7 +128,7 @@ void EventSearch::SearchPair(const Model<double>& model, int a, int b, Event* ev
   bool on_face = false;  // the normal belongs to a body's face, not to the line between two points
   // The smallest gap of the pair's contacts that are not closed; those that touch and leave count
   // only if `all`, and never where they are in penetration: they return by their speed.
-  const auto gap = [&](const Sample& sample, bool all) {
+  const auto gap = [&](const Sample& sample, bool all, bool handed_over = false) {
     if (!sample.good) {
       return std::numeric_limits<double>::quiet_NaN();
     }
@@ -132,6 +136,13 @@ void EventSearch::SearchPair(const Model<double>& model, int a, int b, Event* ev
     ContactFeature features[2];
     const int count = FindContactFeatures(model.Shape(a), state.PoseOf(a), model.Shape(b),
                                           state.PoseOf(b), kInfinity, features);
+    // What takes over from a closed contact whose feature is the closest no longer: the search for
+    // that finds it, whose gap is rounding.
+    const bool hands_over =
+        closed && !handed_over &&
+        std::any_of(segment_->contacts.begin(), segment_->contacts.end(), [&](const auto& c) {
+          return OfPair(c, a, b) && !IsAmong(features, count, c.feature);
+        });
     double smallest = kInfinity;
     for (int k = 0; k < count; ++k) {
       ActiveContact contact;
@@ -142,7 +153,8 @@ void EventSearch::SearchPair(const Model<double>& model, int a, int b, Event* ev
       ContactRows<double> rows;
       EvaluateContactRows(model, state, contact, &rows);
       if (rows.geometry.gap < smallest && !is_closed(contact) &&
-          (all ? !is_deep(contact) : !Contains(*touching_, contact))) {
+          (all ? !is_deep(contact) : !Contains(*touching_, contact)) &&
+          !(hands_over && std::abs(rows.geometry.gap) <= touch && !Contains(*touching_, contact))) {
         smallest = rows.geometry.gap;
         nearest = contact;
         nearest.gap = smallest;
@@ -271,11 +283,7 @@ void EventSearch::SearchPair(const Model<double>& model, int a, int b, Event* ev
     const int count = FindContactFeatures(model.Shape(a), state.PoseOf(a), model.Shape(b),
                                           state.PoseOf(b), kInfinity, features);
     for (const ActiveContact& contact : segment_->contacts) {
-      bool found = !OfPair(contact, a, b);
-      for (int k = 0; k < count && !found; ++k) {
-        found = features[k] == contact.feature;
-      }
-      if (!found) {
+      if (OfPair(contact, a, b) && !IsAmong(features, count, contact.feature)) {
         lost = &contact;
         return -1.0;
       }
@@ -292,7 +300,7 @@ void EventSearch::SearchPair(const Model<double>& model, int a, int b, Event* ev
     if (high < event->length) {
       event->kind = EventKind::kTouch;
       event->length = high;
-      gap(*At(model, high), true);
+      gap(*At(model, high), true, true);
       same(*At(model, high));
       event->contact = HandOver(model, At(model, high)->motion.after, *lost, nearest);
     }

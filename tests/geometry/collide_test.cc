@@ -193,6 +193,29 @@ TEST(Collide, EqualBoxesStackedExactly) {
   }
 }
 
+TEST(Collide, NearlyAlignedFacesHaveTheSameEndsWhicheverIsTheReference) {
+  // Faces of 1 m whose ends are up to some 2e-9 m beside each other, at which vertices stop
+  // counting as one above the other. A tilt of rounding makes either face the reference; what is
+  // found does not flicker with it.
+  for (const double shift : {2e-10, 0.6e-9, 1.1e-9, 1.5e-9, 1.9e-9, 2.1e-9, 5e-9}) {
+    for (const double side : {1.0, -1.0}) {
+      const Contacts level = Collide(Box(1, 1), At(side * shift, 1.0), Box(1, 1), At(0, 0));
+      ASSERT_EQ(level.count, 2);
+      for (const double turn : {1e-16, -1e-16, 3e-16, -3e-16, 1e-15, -1e-15}) {
+        for (const double height : {1.0, 1.0 + 2.3e-16, 1.0 - 2.3e-16}) {
+          const Contacts tilted =
+              Collide(Box(1, 1), At(side * shift, height, turn), Box(1, 1), At(0, 0));
+          ASSERT_EQ(tilted.count, 2);
+          for (const ContactFeature& feature : tilted.features) {
+            EXPECT_TRUE(feature == level.features[0] || feature == level.features[1])
+                << "shift " << side * shift << ", turn " << turn << ", height " << height;
+          }
+        }
+      }
+    }
+  }
+}
+
 TEST(Collide, BoxCornerOnAFace) {
   // Turned by 45°: the lowest corner sqrt(2) below the centre; the next ones within reach only for
   // a large gap.
