@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "tangible/dynamics/assembly.h"
+#include "tangible/lcp/contact_conditioning.h"
 #include "tangible/simulation/invariants.h"
 
 namespace tangible {
@@ -45,6 +47,31 @@ OrderedJson FallbacksJson(const RolloutReport& report) {
           {"damped_projections", report.damped_projections}};
 }
 
+// What the last step's equations leave open (redundant supports, joints and sticking contacts), and
+// which of the solutions its impulses are.
+OrderedJson UndeterminedJson(const Model<double>& model, const State<double>& at,
+                             const StepRecord& step) {
+  ContactProblem<double> problem;
+  AssemblyScratch<double> scratch;
+  AssembleFree(model, at, step.time, step.h, &problem, &scratch);
+  AssembleContacts(model, at, step.h, step.contacts, step.friction, step.restitution, scratch,
+                   &problem);
+  const int impulses = CountRedundantRows(problem, step.solution.modes);
+  const int motions = impulses > 0 ? CountUndeterminedMotions(problem, step.solution.modes) : 0;
+  std::string chosen;
+  if (impulses > 0) {
+    chosen =
+        "of many impulses with the same motion those nearest to the step before's, from 0 "
+        "where a contact begins, that signs and friction allow";
+  }
+  if (motions > 0) {
+    chosen =
+        "contacts slide with different friction, so that the motion depends on how they share "
+        "the load: as nearest to the step before, from 0 where a contact begins";
+  }
+  return {{"impulses", impulses}, {"motions", motions}, {"chosen", chosen}};
+}
+
 }  // namespace
 
 const char* ToString(StepStatus status) {
@@ -69,7 +96,17 @@ void RunSummary::Add(const Model<double>& model, const State<double>& state, Ste
     joint_drift_max_ = std::max(joint_drift_max_, JointDrift(model, state));
   }
   if (stepper != nullptr) {
-    islands_max_ = std::max(islands_max_, CountIslands(*model.structure, stepper->record()));
+    const StepRecord& record = stepper->record();
+    islands_max_ = std::max(islands_max_, CountIslands(*model.structure, record));
+    stepped_ = true;
+    by_events_ = stepper->by_events();
+    last_step_.time = record.time;
+    last_step_.h = record.h;
+    last_step_.before = record.before;
+    last_step_.contacts = record.contacts;
+    last_step_.friction = record.friction;
+    last_step_.restitution = record.restitution;
+    last_step_.solution.modes = record.solution.modes;
   }
 }
 
@@ -79,6 +116,11 @@ OrderedJson RunSummary::ToJson(const Model<double>& model, const RolloutReport& 
   const long fallbacks = report.solved_by_interior_point + report.solved_by_lemke;
   // The steps' reports give gaps at their starts; the end has no step.
   const double penetration = std::max(report.penetration_max, -SmallestGap(model, last_));
+  OrderedJson undetermined = nullptr;
+  if (stepped_) {
+    // The rows of a fixed step are those of its start; event stepping's last are those of its end.
+    undetermined = UndeterminedJson(model, by_events_ ? last_ : last_step_.before, last_step_);
+  }
   return {{"status", ToString(report.status)},
           {"message", report.message},
           {"steps", report.steps},
@@ -96,6 +138,7 @@ OrderedJson RunSummary::ToJson(const Model<double>& model, const RolloutReport& 
             {"lemke", report.solved_by_lemke}}},
           {"fallback_kinds", FallbacksJson(report)},
           {"reductions", ReductionsJson(report)},
+          {"undetermined_end", undetermined},
           {"residual_max", report.residual_max},
           {"penetration_max", std::max(penetration, 0.0)},
           {"joint_drift_max", joint_drift_max_},

@@ -21,6 +21,10 @@ class RunSummary {
   State<double> first_, last_;
   int islands_max_ = 0;
   double joint_drift_max_ = 0.0;
+  // The last step, without its problem.
+  StepRecord last_step_;
+  bool stepped_ = false;
+  bool by_events_ = false;
 };
 
 /// "done", "unsolved" or "diverged".

@@ -91,7 +91,7 @@ TEST_F(TangibleSimulateTest, SummaryHasItsKeysAndItsNumbersAreRight) {
         "islands_max",  "events",          "fallbacks",       "solver",
         "residual_max", "penetration_max", "joint_drift_max", "impact_energy_gain_max",
         "energy_start", "energy_end",      "momentum_start",  "momentum_end",
-        "reductions",   "fallback_kinds"}) {
+        "reductions",   "fallback_kinds",  "undetermined_end"}) {
     EXPECT_TRUE(s.contains(key)) << key;
   }
   EXPECT_EQ(s["status"], "done");
@@ -118,6 +118,52 @@ TEST_F(TangibleSimulateTest, SummaryHasItsKeysAndItsNumbersAreRight) {
   // The ball's 1 · 1 and the crate's 2 · 1.2 m/s, and the rod's 0.5 · 0.25 m · 0.2 rad/s sin(0.1).
   const double rod = 0.5 * 0.25 * 0.2 * std::sin(0.1);
   EXPECT_NEAR(s["momentum_start"][0], 3.4 + rod, 1e-12);
+}
+
+// Which of many solutions a run ends with is told: a disc's impulses are unique; a box's two
+// corners may share its friction as they like; four corners its weight, and as they slide with
+// different friction the motion itself.
+TEST_F(TangibleSimulateTest, SummarySaysWhereImpulsesAreNotUnique) {
+  const std::string floor = R"({"name": "floor", "static": true,
+      "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}, "friction": 0.3})";
+  const auto box = [](const std::string& name, double x, double speed, double friction) {
+    return json{{"name", name},
+                {"shape", {{"box", {{"size", {1, 1}}}}}},
+                {"mass", 1},
+                {"position", {x, 0.5}},
+                {"velocity", {speed, 0}},
+                {"friction", friction}};
+  };
+  const json disc = {{"name", "a"},
+                     {"shape", {{"circle", {{"radius", 0.5}}}}},
+                     {"mass", 1},
+                     {"position", {0, 0.5}},
+                     {"friction", 0.3}};
+  const json weld = {
+      {"name", "w"}, {"type", "weld"}, {"bodies", {"a", "b"}}, {"anchor", {0.5, 0.5}}};
+  struct {
+    std::vector<json> bodies;
+    bool welded;
+    int impulses, motions;
+  } const cases[] = {{{disc}, false, 0, 0},
+                     {{box("a", 0, 0, 0.3)}, false, 1, 0},
+                     {{box("a", 0, 2, 0.3)}, false, 0, 0},
+                     {{box("a", 0, 2, 0.3), box("b", 1, 2, 0.3)}, true, 2, 0},
+                     {{box("a", 0, 2, 0.1), box("b", 1, 2, 0.6)}, true, 2, 1}};
+  for (const char* stepping : {"fixed", "event"}) {
+    for (const auto& c : cases) {
+      json scene = {{"bodies", c.bodies},
+                    {"simulation", {{"dt", 0.01}, {"duration", 0.05}, {"stepping", stepping}}}};
+      scene["bodies"].push_back(json::parse(floor));
+      if (c.welded) scene["joints"] = {weld};
+      const ProgramRun run = Simulate(scene.dump(), Flag("summary", "s.json"));
+      ASSERT_EQ(run.exit_status, 0) << run.error;
+      const json end = json::parse(Read(Path("s.json")))["undetermined_end"];
+      EXPECT_EQ(end["impulses"], c.impulses) << scene;
+      EXPECT_EQ(end["motions"], c.motions) << scene;
+      EXPECT_EQ(end["chosen"].get<std::string>().empty(), c.impulses == 0) << scene;
+    }
+  }
 }
 
 TEST_F(TangibleSimulateTest, AChainThatTurnsTooFarInAStepShowsInItsSummary) {
