@@ -5,6 +5,7 @@
 
 #include <cmath>
 
+#include "../support/drift.h"
 #include "../support/scenes.h"
 #include "tangible/simulation/rollout.h"
 #include "tangible/verification/support/random_scene.h"
@@ -142,18 +143,9 @@ TEST(JointProjectionTest, ARolloutsJointsHold) {
   for (int k = 0; k < 2; ++k) {
     scene.simulation.joint_correction =
         k == 0 ? JointCorrection::kNone : JointCorrection::kProjection;
-    Model<double> model;
-    State<double> state;
-    BuildModel(scene, &model, &state);
-    double largest = 0.0;
-    const RolloutReport report = Rollout(
-        model, state,
-        [&](long, double, const State<double>& q, Stepper*) {
-          largest = std::max(largest, JointDrift(model, q));
-        },
-        &state);
-    EXPECT_EQ(report.status, StepStatus::kDone);
-    drift[k] = largest;
+    const testing::DriftOfRun run = testing::RunForDrift(scene);
+    EXPECT_EQ(run.report.status, StepStatus::kDone);
+    drift[k] = run.largest;
   }
   EXPECT_GT(drift[0], 1e-4);
   EXPECT_LE(drift[1], 1e-10);

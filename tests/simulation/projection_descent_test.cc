@@ -5,6 +5,7 @@
 
 #include <cmath>
 
+#include "../support/drift.h"
 #include "../support/scenes.h"
 #include "tangible/simulation/joint_projection.h"
 #include "tangible/simulation/rollout.h"
@@ -153,19 +154,31 @@ TEST(ProjectionDescentTest, DerivativesAreThoseOfTheMinimum) {
 }
 
 TEST(ProjectionDescentTest, AStepThatSwingsAHeavyEndIsDone) {
+  const testing::DriftOfRun run =
+      testing::RunForDrift(test_scenes::SceneOf(test_scenes::HeavyEnd("1e9")));
+  EXPECT_EQ(run.report.status, StepStatus::kDone) << run.report.message;
+  EXPECT_LE(run.largest, 1e-10);
+  EXPECT_GT(run.report.damped_projections, 0);
+}
+
+// A run that has diverged has no nearest poses: it fails at once and leaves the poses alone.
+TEST(ProjectionDescentTest, FromPosesThatAreNotFiniteThereIsNone) {
   Model<double> model;
-  State<double> state;
-  BuildModel(test_scenes::SceneOf(test_scenes::HeavyEnd("1e9")), &model, &state);
-  double largest = 0.0;
-  const RolloutReport report = Rollout(
-      model, state,
-      [&](long, double, const State<double>& q, Stepper*) {
-        largest = std::max(largest, JointDrift(model, q));
-      },
-      &state);
-  EXPECT_EQ(report.status, StepStatus::kDone) << report.message;
-  EXPECT_LE(largest, 1e-10);
-  EXPECT_GT(report.damped_projections, 0);
+  State<double> initial;
+  BuildModel(test_scenes::SceneOf(test_scenes::HeavyEnd("1e4")), &model, &initial);
+  for (const double bad : {std::nan(""), HUGE_VAL, -HUGE_VAL}) {
+    ProjectionIterate<double> p;
+    p.from = initial;
+    p.from.pose[3 * model.structure->moving[1] + 1] = bad;
+    p.at = p.from;
+    EXPECT_FALSE(IterateProjection(model, 0, &p));
+    EXPECT_FALSE(DescendToProjection(model, initial.pose, &p));
+    State<double> state = initial;
+    state.pose[3 * model.structure->moving[1] + 1] = bad;
+    JointProjection projection;
+    EXPECT_FALSE(projection.Project(model, initial.pose, &state));
+    EXPECT_FALSE(std::isfinite(state.pose[3 * model.structure->moving[1] + 1]));
+  }
 }
 
 }  // namespace
