@@ -90,6 +90,7 @@ std::string Row(const CaseResult& result) {
   row += Format(" %-6s %5.1f ", NameOf(result.verdict()), result.seconds) +
          GradientColumns(result.finding.gradient) + "\n";
   for (const std::string& line : Broken(result)) row += "      " + line + "\n";
+  if (!result.finding.note.empty()) row += "      " + result.finding.note + "\n";
   if (result.verdict() == Verdict::kKnown) row += "      known: " + result.known_reason + "\n";
   return row;
 }

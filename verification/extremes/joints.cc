@@ -164,7 +164,7 @@ void AddJoints(std::vector<ExtremeCase>* cases) {
     const auto add = [&](const std::string& name, const std::function<Finding(Length)>& run) {
       cases->push_back({kGroup, name, stepping, run});
     };
-    for (const double dt : {0.05, 0.01, 0.005}) {
+    for (const double dt : {0.1, 0.05, 0.01, 0.005}) {
       char text[32];
       std::snprintf(text, sizeof(text), "four-bar loop, h %g", dt);
       add(text, [=](Length length) { return FourBarSwings(stepping, dt, length); });

@@ -53,8 +53,7 @@ Finding HangingChain(const std::string& stepping, double end_mass, Length length
   const MeasuredRun run = RunScene(scene);
   Finding finding;
   AddDone(run, &finding);
-  // Event steps tell no impulses of joints.
-  if (stepping == "fixed" && !run.last_step.solution.joint_impulse.empty()) {
+  if (!run.last_step.solution.joint_impulse.empty()) {
     const double tension = std::hypot(run.last_step.solution.joint_impulse[0],
                                       run.last_step.solution.joint_impulse[1]);
     finding.figures.push_back({"error of the top's tension",

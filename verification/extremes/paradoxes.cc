@@ -186,8 +186,10 @@ Finding Groove(const std::string& stepping, double friction) {
   const double impulse = run.NormalImpulse("disc", "left");
   finding.figures.push_back({"impulse of a side over m g h", impulse / (kGravity * h), 1e3, "1",
                              "hyperstatic with friction: bounded, any of many"});
-  finding.note = "impulse of a side " + std::to_string(impulse / (kGravity * h)) +
-                 " m g h; without friction it would be 0.707107";
+  finding.note = "impulse of a side " + std::to_string(impulse / (kGravity * h)) + " m g h; " +
+                 (friction > 0.0 ? "any n with n + t = 0.707107, |t| <= mu n balances: taken are "
+                                   "the impulses nearest to the step before's, from 0 in the first"
+                                 : "the only one without friction");
   AddGradient(scene, 10, {"bodies/disc/mass", "gravity/x", "bodies/disc/velocity/y"},
               Differences::kTake, &finding);
   return finding;
