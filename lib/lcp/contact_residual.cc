@@ -32,23 +32,24 @@ double RowResidual(double z, double zeta, double s, double sigma) {
   return std::abs(std::min(scaled_z, scaled_s));
 }
 
-double MomentumResidual(const ContactProblem<double>& problem,
+// Of each body by itself: a heavy one's terms say nothing of what a light one lacks.
+double MomentumResidual(const ContactProblem<double>& problem, const ContactScales& scales,
                         const ContactSolution<double>& solution) {
-  double worst = 0.0;
-  double scale = 0.0;
   thread_local std::vector<double> left;
+  thread_local std::vector<double> terms;  // the largest
   left.assign(problem.momentum.begin(), problem.momentum.end());
+  terms.resize(left.size());
   const double* v = solution.v.data();
   for (size_t i = 0; i < left.size(); ++i) {
-    scale = std::max({scale, std::abs(left[i]), std::abs(problem.mass[i] * v[i])});
+    terms[i] = std::max(std::abs(left[i]), std::abs(problem.mass[i] * v[i]));
     left[i] -= problem.mass[i] * v[i];
   }
   const auto add = [&](int a, const RowPart<double>& row_a, int b, const RowPart<double>& row_b,
                        double impulse) {
     AddRowTransposed(a, row_a, b, row_b, impulse, left.data());
     for (int i = 0; i < 3; ++i) {
-      scale = std::max({scale, a >= 0 ? std::abs(row_a[i] * impulse) : 0.0,
-                        b >= 0 ? std::abs(row_b[i] * impulse) : 0.0});
+      if (a >= 0) terms[3 * a + i] = std::max(terms[3 * a + i], std::abs(row_a[i] * impulse));
+      if (b >= 0) terms[3 * b + i] = std::max(terms[3 * b + i], std::abs(row_b[i] * impulse));
     }
   };
   for (const DamperBlock<double>& d : problem.dampers) {
@@ -65,28 +66,31 @@ double MomentumResidual(const ContactProblem<double>& problem,
     add(c.a, c.normal_a, c.b, c.normal_b, solution.normal_impulse[i]);
     add(c.a, c.tangent_a, c.b, c.tangent_b, solution.tangent_impulse[i]);
   }
-  for (const double x : left) {
-    worst = std::max(worst, std::abs(x));
-    if (std::isnan(x)) {
-      return HUGE_VAL;
-    }
+  double worst = 0.0;
+  for (int body = 0; body < problem.num_bodies; ++body) {
+    const double lever = scales.lever[body];
+    const double* x = &left[3 * body];
+    const double* of = &terms[3 * body];
+    const double missing = std::max({std::abs(x[0]), std::abs(x[1]), std::abs(x[2]) / lever});
+    const double scale = std::max({of[0], of[1], of[2] / lever});
+    if (std::isnan(x[0]) || std::isnan(x[1]) || std::isnan(x[2])) return HUGE_VAL;
+    worst = std::max(worst, scale > 0.0 ? missing / scale : 0.0);
   }
-  return scale > 0.0 ? worst / scale : 0.0;
+  return worst;
 }
 
 double JointResidual(const ContactProblem<double>& problem, const ContactScales& scales,
                      const double* v) {
   double worst = 0.0;
-  double scale = 0.0;
   for (const JointBlock<double>& joint : problem.joints) {
     for (int k = 0; k < joint.rows; ++k) {
       const double value = RowDot(joint.a, joint.row_a[k], joint.b, joint.row_b[k], v);
-      scale = std::max(scale, std::abs(joint.rhs[k]) + RowSpeed(scales, joint.a, joint.row_a[k],
-                                                                joint.b, joint.row_b[k]));
-      worst = std::max(worst, std::abs(value - joint.rhs[k]));
+      const double scale = std::abs(joint.rhs[k]) +
+                           RowSpeed(scales, joint.a, joint.row_a[k], joint.b, joint.row_b[k]);
+      worst = std::max(worst, scale > 0.0 ? std::abs(value - joint.rhs[k]) / scale : 0.0);
     }
   }
-  return scale > 0.0 ? worst / scale : 0.0;
+  return worst;
 }
 
 }  // namespace
@@ -153,7 +157,7 @@ double NaturalResidual(const ContactProblem<double>& problem,
   *worst_contact = -1;
   thread_local ContactScales scales;
   scales.Compute(problem, solution);
-  double worst = std::max(MomentumResidual(problem, solution),
+  double worst = std::max(MomentumResidual(problem, scales, solution),
                           JointResidual(problem, scales, solution.v.data()));
   for (size_t i = 0; i < problem.contacts.size(); ++i) {
     const ContactBlock<double>& c = problem.contacts[i];

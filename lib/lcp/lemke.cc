@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tangible/lcp/lemke.h"
 
+#include <Eigen/LU>
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
@@ -139,6 +140,45 @@ LemkeResult SolveLemke(const MatrixXd& W, const VectorXd& q, const LemkeOptions&
     result.status = LemkeStatus::kPivotLimit;
     result.z.setZero();
   }
+  return result;
+}
+
+LemkeResult SolveLemkeFrom(const VectorXd& start, const MatrixXd& W, const VectorXd& q,
+                           const LemkeOptions& options) {
+  std::vector<Index> basis, others;
+  for (Index i = 0; i < q.size(); ++i) (start[i] > 0.0 ? basis : others).push_back(i);
+  if (basis.empty()) return SolveLemke(W, q, options);
+  const Index size = static_cast<Index>(basis.size());
+  const MatrixXd square = W(basis, basis);
+  const Equilibration scaling = Equilibrate(square);
+  const Eigen::PartialPivLU<MatrixXd> lu(scaling.row.asDiagonal() * square *
+                                         scaling.col.asDiagonal());
+  const auto solve = [&](const MatrixXd& rhs) -> MatrixXd {
+    const auto once = [&](const MatrixXd& of) -> MatrixXd {
+      return scaling.col.asDiagonal() * lu.solve(scaling.row.asDiagonal() * of);
+    };
+    const MatrixXd x = once(rhs);
+    return x + once(rhs - square * x);
+  };
+  // Of w and z changing places in the basis, rows in their old places.
+  const MatrixXd inverse = solve(MatrixXd::Identity(size, size));
+  const MatrixXd by_others = solve(W(basis, others));
+  const VectorXd at = solve(-q(basis));
+  const MatrixXd below = W(others, basis);
+  MatrixXd pivoted(q.size(), q.size());
+  VectorXd constants(q.size());
+  pivoted(basis, basis) = inverse;
+  pivoted(basis, others) = -by_others;
+  pivoted(others, basis) = below * inverse;
+  pivoted(others, others) = W(others, others) - below * by_others;
+  constants(basis) = at;
+  constants(others) = q(others) + below * at;
+  LemkeResult result;
+  result.z = start;
+  if (!pivoted.allFinite() || !constants.allFinite()) return result;
+  result = SolveLemke(pivoted, constants, options);
+  const VectorXd of_basis = at + inverse * result.z(basis) - by_others * result.z(others);
+  result.z(basis) = of_basis.cwiseMax(0.0);
   return result;
 }
 

@@ -36,6 +36,13 @@ struct LemkeResult {
 LemkeResult SolveLemke(const MatrixX<double>& W, const VectorX<double>& q,
                        const LemkeOptions& options = {});
 
+/// The path from a start whose basis, the z > 0, is nearly that of a solution: the problem is
+/// pivoted to it by a factorisation (principal pivotal transform, section 2.3 there), which regains
+/// what the many pivots of a long path have lost to rounding, and leaves a short path to go.
+/// kPivotLimit where that basis is singular.
+LemkeResult SolveLemkeFrom(const VectorX<double>& start, const MatrixX<double>& W,
+                           const VectorX<double>& q, const LemkeOptions& options = {});
+
 /// The plain LCP that is left when (1) and (2) are solved for v and y:
 ///   v = v0 + v_z z,  y = y0 + y_z z,  W = F + G v_z,  q = c + G v0.
 struct ReducedLcp {

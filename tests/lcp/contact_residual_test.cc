@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "contact_problems.h"
 
 namespace tangible {
@@ -96,6 +98,22 @@ TEST(ContactResidualTest, SolutionsHaveNoneAndFaultsHaveTheirSize) {
   EXPECT_EQ(worst, -1);
   unbalanced.solution.v[0] = std::nan("");
   EXPECT_EQ(ResidualOf(unbalanced, &worst), HUGE_VAL);
+}
+
+// A light body that moves as nothing has pushed it, beside one 1e9 times as heavy.
+TEST(ContactResidualTest, ALightBodysMomentumIsNotHiddenByAHeavyOnes) {
+  ContactProblem<double> problem;
+  problem.num_bodies = 2;
+  problem.mass = {1e9, 1e9, 1e8, 1.0, 1.0, 0.1};
+  problem.momentum = {1e9, -1e9, 0.0, 1.0, 0.0, 0.0};
+  ContactSolution<double> solution = testing::EmptySolution(problem);
+  solution.v = {1.0, -1.0, 0.0, 1.0, 0.0, 0.0};
+  int worst = -1;
+  EXPECT_LE(NaturalResidual(problem, solution, &worst), 1e-15);
+  solution.v[3] = 1.0 + 1e-6;
+  EXPECT_NEAR(NaturalResidual(problem, solution, &worst), 1e-6, 1e-9);
+  solution.v = {1.0, -1.0, 0.0, 1.0, 0.0, 1e-6};  // rotation at the radius of gyration
+  EXPECT_NEAR(NaturalResidual(problem, solution, &worst), 1e-6 * 0.1 / std::sqrt(0.1), 1e-9);
 }
 
 TEST(ContactResidualTest, DegenerateAreThoseAtTheBorderOfTwoModes) {

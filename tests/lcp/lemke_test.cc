@@ -33,6 +33,41 @@ TEST(LemkeTest, SolvesRandomMonotoneProblems) {
   }
 }
 
+TEST(LemkeTest, FromABasisItEndsAtTheSameSolutionByAShortPath) {
+  RandomProblem random(5);
+  int shorter = 0;
+  for (int k = 0; k < 50; ++k) {
+    const MixedLcp<double> problem = random.Make(12, 3, 16);
+    const auto reduced = ReduceToPlain(problem);
+    ASSERT_TRUE(reduced.has_value());
+    const MatrixX<double>& W = reduced->W;
+    const VectorX<double>& q = reduced->q;
+    const LemkeResult cold = SolveLemke(W, q);
+    ASSERT_EQ(cold.status, LemkeStatus::kSolved);
+    // From the solution's own basis there is nothing to go, and rounding is regained.
+    const LemkeResult same = SolveLemkeFrom(cold.z, W, q);
+    ASSERT_EQ(same.status, LemkeStatus::kSolved);
+    EXPECT_LE(Residual(W, q, same.z), 1e-12);
+    EXPECT_LE((same.z - cold.z).norm(), 1e-8 * (1.0 + cold.z.norm()));
+    // From another basis: one row too many, one too few.
+    VectorX<double> start = cold.z;
+    start[k % 16] = start[k % 16] > 0.0 ? 0.0 : 1.0;
+    const LemkeResult near = SolveLemkeFrom(start, W, q);
+    ASSERT_EQ(near.status, LemkeStatus::kSolved) << k;
+    EXPECT_LE((near.z - same.z).norm(), 1e-8 * (1.0 + same.z.norm())) << k;
+    shorter += near.pivots < cold.pivots ? 1 : 0;
+  }
+  EXPECT_GT(shorter, 40);
+}
+
+TEST(LemkeTest, ASingularBasisIsTold) {
+  const MatrixX<double> W = MatrixX<double>::Zero(2, 2);
+  const LemkeResult result =
+      SolveLemkeFrom(VectorX<double>{{1.0, 1.0}}, W, VectorX<double>{{-1.0, 1.0}});
+  EXPECT_NE(result.status, LemkeStatus::kSolved);
+  EXPECT_TRUE(result.z.allFinite());
+}
+
 TEST(LemkeTest, DoesNotCycleOnTies) {
   // All of q ties at the first pivot.
   const MatrixX<double> W{{1.0, 2.0, 0.0}, {0.0, 1.0, 2.0}, {2.0, 0.0, 1.0}};

@@ -56,7 +56,6 @@ Answer ByGeneral(const std::string& kind, const std::string& name, Known known,
   answer.solver = ToString(solution.solver);
   answer.solved = solution.status == LcpStatus::kSolved;
   answer.infeasible = solution.status == LcpStatus::kInfeasible;
-  answer.random = contacts != nullptr;
   if (answer.solved) {
     double residual = RecomputedResidual(problem, solution.v, solution.y, solution.z);
     if (contacts != nullptr) {
@@ -98,7 +97,6 @@ ContactSolution<double> Guess(const ContactProblem<double>& problem, Way way, st
 
 Answer ByContacts(const ContactCase& one, Way way, std::uint64_t seed) {
   Answer answer{.kind = one.kind, .name = one.name, .known = one.known, .way = way};
-  answer.random = true;
   ContactSolution<double> solution = Guess(one.problem, way, seed);
   ContactSolver solver;
   const double start = CpuSeconds();
@@ -147,10 +145,7 @@ std::vector<Row> Collect(const std::vector<std::vector<Answer>>& answers) {
       size_t at = 0;
       while (at < rows.size() && (rows[at].kind != answer.kind || rows[at].way != answer.way)) ++at;
       if (at == rows.size()) {
-        rows.push_back({.kind = answer.kind,
-                        .known = answer.known,
-                        .way = answer.way,
-                        .random = answer.random});
+        rows.push_back({.kind = answer.kind, .known = answer.known, .way = answer.way});
         seconds.emplace_back();
       }
       Add(answer, &rows[at]);
@@ -226,10 +221,7 @@ std::string FirstFailure(const CorpusResult& result) {
       return what + "expected no wrong answer, got " + std::to_string(row.wrong) + ", first " +
              row.missed[0];
     }
-    const double asked = row.known == Known::kHardlySolvable ? kHardShare
-                         : row.known == Known::kSolvable && row.way == Way::kGeneral && row.random
-                             ? kGeneralShare
-                             : 1.0;
+    const double asked = row.known == Known::kHardlySolvable ? kHardShare : 1.0;
     if (asked == 1.0 && row.right < row.problems) {
       return what + "expected all, got " + std::to_string(row.right) + " of " +
              std::to_string(row.problems) + ", first without " + row.missed[0];

@@ -25,9 +25,6 @@ const char* ToString(Way way);
 inline constexpr double kResidualBound = 1e-10;
 /// The share of solved problems that is asked for of those of Known::kHardlySolvable.
 inline constexpr double kHardShare = 0.95;
-/// The same of random problems of Known::kSolvable by the general solver, which does not know that
-/// they are contacts.
-inline constexpr double kGeneralShare = 0.99;
 
 struct RunOptions {
   int random = 0;           ///< problems of each kind
@@ -44,7 +41,6 @@ struct Answer {
   std::string kind, name;
   Known known = Known::kUnknown;
   Way way = Way::kGeneral;
-  bool random = false;      ///< not of a file
   bool solved = false;      ///< says so
   bool infeasible = false;  ///< says so
   bool wrong = false;       ///< says what the data contradict
@@ -61,7 +57,6 @@ struct Row {
   std::string kind;
   Known known = Known::kUnknown;
   Way way = Way::kGeneral;
-  bool random = false;
   int problems = 0, right = 0, wrong = 0;
   double residual_max = 0.0;
   double seconds_median = 0.0, seconds_max = 0.0;
