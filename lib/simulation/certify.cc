@@ -294,6 +294,11 @@ Certificate RolloutCertifier::Finish(const Model<double>& model, const RolloutRe
   } else {
     certificate_.discontinuous = landing_;
   }
+  if (certificate_.discontinuous.empty() && report.halved_motions > 0) {
+    certificate_.discontinuous =
+        "motions were halved, as they could not be integrated over a step: how often may be chosen "
+        "by rounding; dt is too large";
+  }
   Certificate finished = certificate_;
   SetVerdict(finished);
   return finished;
@@ -364,8 +369,15 @@ Certificate CertifyDerivative(const Model<double>& model, const State<double>& i
     certificate.one_sided = kContradictingRows;
     SetVerdict(certificate);
   }
-  // Residuals of single solves do not show what a stiff chain of them loses.
-  if (HasWideMasses(model) && report.status == StepStatus::kDone) {
+  // Residuals of single solves do not show what a stiff chain of them loses, nor how impact after
+  // impact multiplies rounding.
+  constexpr double kIllConditioned = 1e8;
+  constexpr long kManyEvents = 10;
+  // The condition of redundant rows is that of δ.
+  const bool ill_conditioned =
+      certificate.redundant_rows == 0 && certificate.condition > kIllConditioned;
+  if ((HasWideMasses(model) || ill_conditioned || certificate.events >= kManyEvents) &&
+      report.status == StepStatus::kDone) {
     certificate.linear_residual =
         std::max(certificate.linear_residual, DualityGap(model, initial, directions));
     SetVerdict(certificate);

@@ -206,8 +206,9 @@ void EventSearch::SearchPair(const Model<double>& model, int a, int b, Event* ev
   // them the gap's rate changes monotonically.
   const auto course_over = [&](double from, double fa, double to, double fb, double allowed,
                                bool all) {
+    // Without a gap at both ends there is no contact whose rate it would be.
     Sample* const first = At(model, from);
-    if (gap(*first, all) + allowed != fa) {
+    if (!std::isfinite(fa) || !std::isfinite(fb) || gap(*first, all) + allowed != fa) {
       return Course::kUnknown;
     }
     const ActiveContact start = nearest;
@@ -300,9 +301,10 @@ void EventSearch::SearchPair(const Model<double>& model, int a, int b, Event* ev
     if (high < event->length) {
       event->kind = EventKind::kTouch;
       event->length = high;
-      gap(*At(model, high), true, true);
+      const bool next = std::isfinite(gap(*At(model, high), true, true));
       same(*At(model, high));
-      event->contact = HandOver(model, At(model, high)->motion.after, *lost, nearest);
+      event->contact =
+          HandOver(model, At(model, high)->motion.after, *lost, next ? nearest : *lost);
     }
   }
 }

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tangible/lcp/contact_residual.h"
+
 namespace tangible {
 namespace {
 
@@ -169,11 +171,12 @@ bool EventStepper::SolveImpacts(const Model<double>& model, double t, State<doub
     // An impact is solved to a tolerance of its own: what it leaves there is none for another one.
     const bool solved_already =
         repeat > 0 && approach >= 0.5 * last_approach && approach <= kSolvedApproach * slow;
-    if (!(approach > slow) || solved_already) {
+    const bool approaches = approach > slow && !solved_already;
+    if (!approaches && !(repeat == 0 && starts_ && JointsDisagree(model, t, *state, slow))) {
       return true;
     }
     last_approach = approach;
-    if (repeat == 0 && !LocateTouch(model, t, slow, state, outcome)) {
+    if (repeat == 0 && approaches && !LocateTouch(model, t, slow, state, outcome)) {
       return false;
     }
     if (++outcome->events > settings.max_events_per_step && !inelastic_) {
@@ -224,8 +227,12 @@ bool EventStepper::SolveImpacts(const Model<double>& model, double t, State<doub
     CountSolve(solved, outcome);
     if (!solved.solved) {
       outcome->residual = solved.residual;
-      outcome->message =
-          "impact: " + NameOfContact(*model.structure, impact.contacts, solved.worst_contact);
+      const std::vector<double>& v = impact.solution.v;
+      const int joint =
+          solved.worst_contact < 0 ? MostViolatedJoint(impact.problem, v, v, 0.0) : -1;
+      outcome->message = "impact: " + (joint < 0 ? NameOfContact(*model.structure, impact.contacts,
+                                                                 solved.worst_contact)
+                                                 : NameOfContradicted(*model.structure, joint));
       return false;
     }
     solver_.system().MoveFactorsTo(&impact.system);

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 
 #include "tangible/lcp/contact_residual.h"
 
@@ -182,6 +183,11 @@ void SpreadTwists(const ModelStructure& structure, const std::vector<double>& so
   }
 }
 
+std::string NameOfContradicted(const ModelStructure& structure, int joint) {
+  return "joint " + structure.joints[joint].name +
+         " contradicts the others: no twist satisfies all";
+}
+
 void AssembleImpulses(const Model<double>& model, AssemblyScratch<double>* scratch,
                       Impulses* impulses) {
   AssembleFree(model, impulses->before, impulses->time, impulses->h, &impulses->problem, scratch,
@@ -355,13 +361,19 @@ bool SegmentFlow::CorrectPoses(const Model<double>& model, Segment* segment, std
       return false;
     }
     const double error = CorrectedError(node.problem);
-    // Newton's method squares the error; what does not shrink any more is rounding.
-    if (k > 0 && (once || error <= 1e-15 || error > 0.1 * last)) {
-      if (!once && error > std::max(settings.joint_tolerance, 1e-9) && error >= last) {
-        *message = "projection onto joints and contacts: error " + std::to_string(error);
-        return false;
-      }
+    // Newton's method squares the error; what is small and does not shrink any more is rounding.
+    const double allowed = std::max(settings.joint_tolerance, 1e-9);
+    if (k > 0 && (once || error <= 1e-15 || (error > 0.1 * last && error <= allowed))) {
       break;
+    }
+    if (k + 1 == kMostCorrections || (k > 0 && error >= last)) {
+      char text[160];
+      std::snprintf(text, sizeof(text),
+                    "projection onto joints and contacts: expected an error of at most %.3g, got "
+                    "%.3g: dt is too large",
+                    allowed, error);
+      *message = text;
+      return false;
     }
     last = error;
     if (!Solve(modes, &node)) {
@@ -428,8 +440,7 @@ bool SegmentFlow::ProjectTwists(const Model<double>& model, Segment* segment,
           ? MostViolatedJoint(projection.problem, projection.solution.v, terms_, kMissed)
           : -1;
   if (joint >= 0) {
-    *message = "joint " + model.structure->joints[joint].name +
-               " contradicts the others: no twist satisfies all";
+    *message = NameOfContradicted(*model.structure, joint);
     return false;
   }
   SpreadTwists(*model.structure, projection.solution.v, &segment->after.twist);

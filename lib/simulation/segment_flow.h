@@ -75,6 +75,9 @@ class SegmentFlow {
 /// without friction (with it as a run starts: a twist that approaches there lands).
 void SetUpProjection(const Segment& segment, const State<double>& state, Impulses* projection);
 
+/// "joint crank contradicts the others: no twist satisfies all".
+std::string NameOfContradicted(const ModelStructure& structure, int joint);
+
 /// Assembles impulses at their state, of length h (0: an impact).
 void AssembleImpulses(const Model<double>& model, AssemblyScratch<double>* scratch,
                       Impulses* impulses);

@@ -69,7 +69,7 @@ TEST(DualityTest, TheCertificateKnowsWhatATautChainLoses) {
   const Certificate certificate =
       CertifyDerivative(b.model, b.initial, b.directions, {"mass", "position"});
   EXPECT_GE(certificate.linear_residual, gap);
-  EXPECT_EQ(certificate.verdict == "trustworthy", gap <= kLinearResidualLimit) << gap;
+  EXPECT_TRUE(certificate.verdict != "trustworthy" || gap <= kLinearResidualLimit) << gap;
 }
 
 }  // namespace
