@@ -240,6 +240,11 @@ class Minimiser : public ceres::IterationCallback {
     const bool converged = summary.termination_type == ceres::CONVERGENCE ||
                            summary.termination_type == ceres::USER_SUCCESS;
     minimum_.status = converged ? FitStatus::kConverged : FitStatus::kNotConverged;
+    if (!std::isfinite(summary.final_cost)) {
+      // Of which Ceres says that it does not change any more.
+      minimum_.status = FitStatus::kNotConverged;
+      minimum_.message = "the cost is not finite: an observation or its sigma is beyond all bounds";
+    }
   }
 
   /// The Gauss-Newton step of the free parameters with Huber's weights, which has the cost's own

@@ -146,23 +146,17 @@ void PrintCheck(const std::vector<ParameterizedScene::Entry>& entries,
 
 int WriteFiles(const FitFile& fit, const RolloutResiduals& residuals, const FitResult& result,
                const DiscretisationCheck* check) {
-  if (!FLAGS_out.empty()) {
+  ResultWriter writer;
+  writer.Write(FLAGS_out, [&] {
     OrderedJson json = ResultToJson(residuals, result, check);
     json["certificate"] =
         result.estimate.size() > 0 ? ToJson(result.certificate) : OrderedJson(nullptr);
-    const std::string error = WriteFileAtomically(FLAGS_out, JsonText(json));
-    if (!error.empty()) {
-      return ReportError(error);
-    }
+    return JsonText(json);
+  });
+  if (result.estimate.size() > 0) {
+    writer.Write(FLAGS_report, [&] { return FitReport(fit.path, residuals, result, check); });
   }
-  if (!FLAGS_report.empty() && result.estimate.size() > 0) {
-    const std::string error =
-        WriteFileAtomically(FLAGS_report, FitReport(fit.path, residuals, result, check));
-    if (!error.empty()) {
-      return ReportError(error);
-    }
-  }
-  return kExitDone;
+  return writer.error().empty() ? kExitDone : ReportError(writer.error());
 }
 
 /// A checkpoint in its file, with what that holds already; null without --checkpoint. Returns what
@@ -171,8 +165,9 @@ std::string OpenCheckpoint(const FitProblem& problem, std::unique_ptr<FitCheckpo
   if (FLAGS_checkpoint.empty()) {
     return "";
   }
-  *checkpoint = std::make_unique<FitCheckpoint>(
-      problem, [](const std::string& text) { return WriteFileAtomically(FLAGS_checkpoint, text); });
+  *checkpoint = std::make_unique<FitCheckpoint>(problem, [](const std::string& text) {
+    return WriteFileAtomically(FLAGS_checkpoint, text, Over::kOwnInput);
+  });
   std::error_code none;
   if (std::filesystem::exists(FLAGS_checkpoint, none)) {
     if (!std::filesystem::is_regular_file(FLAGS_checkpoint, none)) {
@@ -183,10 +178,9 @@ std::string OpenCheckpoint(const FitProblem& problem, std::unique_ptr<FitCheckpo
     if (!ReadTextFile(FLAGS_checkpoint, &text, &error)) {
       return error;
     }
-    error = (*checkpoint)->Restore(text, FLAGS_checkpoint);
-    if (!error.empty()) {
-      return error;
-    }
+    // It is not written again before there is something new: with what a restart takes the fit
+    // would not get on where it is often ended.
+    return (*checkpoint)->Restore(text, FLAGS_checkpoint);
   }
   return (*checkpoint)->Write();
 }
@@ -220,6 +214,10 @@ int Run(const std::string& file) {
   std::vector<RolloutResiduals> made;
   if (!MakeResiduals(problem, file, &made, &error)) {
     return ReportError(error);
+  }
+  error = OutputOverInput({"out", "report", "checkpoint"});
+  if (!error.empty()) {
+    return ReportError("tangible-fit: " + error, kExitUsage);
   }
   RolloutResiduals& residuals = made.front();
   const auto& entries = residuals.scene().entries();
@@ -276,7 +274,8 @@ int Run(const std::string& file) {
     return ReportError(file + ": the fit at dt / 2: " + NameOf(check.status) + ": " +
                        check.message);
   }
-  return kExitDone;
+  // Said above: what was asked for is not there.
+  return checkpoint && !checkpoint->error().empty() ? kExitFailed : kExitDone;
 }
 
 int Main(int argc, char** argv) {

@@ -278,8 +278,27 @@ std::string FormatNumber(double value) {
   return {text.data(), static_cast<std::size_t>(length)};
 }
 
-std::string WriteFileAtomically(const std::string& path, std::string_view text) {
+std::string OutputOverInput(const std::vector<std::string>& flags) {
+  const std::vector<std::string> inputs = FilesRead();
+  for (const std::string& flag : flags) {
+    std::string path;
+    if (!gflags::GetCommandLineOption(flag.c_str(), &path) || path.empty()) continue;
+    for (const std::string& input : inputs) {
+      if (IsSameFile(path, input)) {
+        return "--" + flag + ": expected a file of its own, got that of an input, " + path;
+      }
+    }
+  }
+  return "";
+}
+
+std::string WriteFileAtomically(const std::string& path, std::string_view text, Over over) {
   namespace fs = std::filesystem;
+  if (over == Over::kNoInput) {
+    for (const std::string& input : FilesRead()) {
+      if (IsSameFile(path, input)) return Unwritable(path, "it was read as an input");
+    }
+  }
   std::error_code error;
   const fs::file_status status = fs::status(path, error);
   if (fs::exists(status) && !fs::is_regular_file(status)) {

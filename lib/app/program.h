@@ -17,6 +17,7 @@
 //   }
 //   int main(int argc, char** argv) { return tangible::RunMain(&Main, argc, argv); }
 
+#include <functional>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -70,9 +71,33 @@ std::string FormatNumber(double value);
 /// Writes a file so that it is either the old or the whole new one: a temporary in the same folder,
 /// then a rename. Devices and pipes are written directly. A program that is killed on the way may
 /// leave the temporary, PATH.tmp and its process's number. Returns an error (one line) or empty.
-std::string WriteFileAtomically(const std::string& path, std::string_view text);
+/// A file that was read as an input (json_reader.h) is not written over, unless it is the program's
+/// own to go on with.
+enum class Over { kNoInput, kOwnInput };
+std::string WriteFileAtomically(const std::string& path, std::string_view text,
+                                Over over = Over::kNoInput);
+
+/// "--report: expected a file of its own, got that of an input, PATH" where a flag names a file
+/// that was read; empty where none does. Before the work, once all inputs are read.
+std::string OutputOverInput(const std::vector<std::string>& flags);
 
 /// Writes a result to `out_path`, or to stdout if that is empty. Returns an error or empty.
 std::string WriteResult(const std::string& out_path, std::string_view text);
+
+/// Several results one after the other: what fails does not keep the others from being written.
+class ResultWriter {
+ public:
+  /// Nothing without a path.
+  void Write(const std::string& path, const std::function<std::string()>& text) {
+    if (path.empty()) return;
+    const std::string failed = WriteFileAtomically(path, text());
+    if (error_.empty()) error_ = failed;
+  }
+  /// The first, or empty.
+  const std::string& error() const { return error_; }
+
+ private:
+  std::string error_;
+};
 
 }  // namespace tangible

@@ -43,7 +43,14 @@ OrderedJson ToJson(const MixedLcp<double>& gradient) {
           {"b", ToJson(gradient.b)}};
 }
 
-OrderedJson Describe(const LcpFile& input, const LcpSolution<double>& solution) {
+bool IsFinite(const MixedLcp<double>& gradient) {
+  return gradient.p.allFinite() && gradient.M.allFinite() && gradient.G.allFinite() &&
+         gradient.c.allFinite() && gradient.F.allFinite() && gradient.A.allFinite() &&
+         gradient.b.allFinite();
+}
+
+// `overflows`: whether the gradient does; there is none then.
+OrderedJson Describe(const LcpFile& input, const LcpSolution<double>& solution, bool* overflows) {
   OrderedJson result = {{"status", ToString(solution.status)},
                         {"v", ToJson(solution.v)},
                         {"y", ToJson(solution.y)},
@@ -57,11 +64,16 @@ OrderedJson Describe(const LcpFile& input, const LcpSolution<double>& solution) 
   if (solution.status == LcpStatus::kInfeasible) result["farkas"] = ToJson(solution.farkas);
   if (solution.status != LcpStatus::kSolved) return result;
   const LcpDerivative derivative(input.problem, {solution.v, solution.y, solution.z});
-  if (input.has_loss) result["gradient"] = ToJson(derivative.Adjoint(input.loss_gradient));
+  if (input.has_loss) {
+    const MixedLcp<double> gradient = derivative.Adjoint(input.loss_gradient);
+    *overflows = !IsFinite(gradient);
+    result["gradient"] = *overflows ? OrderedJson(nullptr) : ToJson(gradient);
+  }
   Certificate certificate = derivative.certificate();
   const bool planned =
       solution.solver == LcpSolver::kGuess || solution.solver == LcpSolver::kInteriorPoint;
   certificate.fallbacks = planned || FLAGS_solver != "auto" ? 0 : 1;
+  if (*overflows) certificate.verdict = "near a kink: the gradient is not finite";
   result["certificate"] = tangible::ToJson(certificate);
   return result;
 }
@@ -77,8 +89,14 @@ int Run(const std::string& file) {
   std::string error = ReadLcpFile(file, &input);
   if (!error.empty()) return ReportError(error);
   const LcpSolution<double> solution = SolveLcp(input.problem, options);
-  error = WriteResult(FLAGS_out, JsonText(Describe(input, solution)));
+  bool overflows = false;
+  error = WriteResult(FLAGS_out, JsonText(Describe(input, solution, &overflows)));
   if (!error.empty()) return ReportError(error);
+  if (overflows) {
+    return ReportError(file +
+                       ": the gradient is not finite: it overflows, or the problem is too "
+                       "badly scaled");
+  }
   if (solution.status == LcpStatus::kSolved) return kExitDone;
   return ReportError(file + ": " + ToString(solution.status) + ": " + solution.message +
                      ", scaled residual " + FormatNumber(solution.residual));

@@ -208,6 +208,8 @@ int Run(const std::string& file) {
   Job job;
   Prepare(file, &job);
   if (!job.error.empty()) return ReportError(job.error);
+  const std::string over = OutputOverInput({"out", "contacts", "view", "summary", "observe"});
+  if (!over.empty()) return ReportError("tangible-simulate: " + over, kExitUsage);
   RolloutReport report;
   double recording = 0.0;
   const double wall_start = WallSeconds();

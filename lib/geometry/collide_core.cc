@@ -144,6 +144,7 @@ void NearestOverEdges(const Sides& sides, double* distance, FaceQuery* nearest) 
 
 Candidate NearestVertices(const ConvexCore& a, const ConvexCore& b) {
   Candidate nearest;
+  nearest.feature = {FeatureKind::kVertexVertex, 0, 0};
   double best = kInfinity;
   for (int i = 0; i < a.Size(); ++i) {
     const Vector2<double> vertex = a.VertexAt(i);
@@ -182,7 +183,9 @@ int CollideNearest(const ConvexCore& a, const ConvexCore& b, double max_gap,
   NearestOverEdges({a, b, true}, &distance, &query_a);
   NearestOverEdges({b, a, false}, &distance, &query_b);
   const double vertex_distance = vertices.gap + a.Radius() + b.Radius();
-  if (!(distance <= vertex_distance * (1.0 + kRounding))) {
+  // No edge at all: distances that overflow.
+  const bool has_edge = query_a.edge >= 0 || query_b.edge >= 0;
+  if (!has_edge || !(distance <= vertex_distance * (1.0 + kRounding))) {
     return WriteCandidates(&vertices, 1, max_gap, features);
   }
   const Sides sides = query_b.edge >= 0 ? Sides{b, a, false} : Sides{a, b, true};

@@ -44,16 +44,27 @@ double MomentumResidual(const ContactProblem<double>& problem, const ContactScal
     terms[i] = std::max(std::abs(left[i]), std::abs(problem.mass[i] * v[i]));
     left[i] -= problem.mass[i] * v[i];
   }
-  const auto add = [&](int a, const RowPart<double>& row_a, int b, const RowPart<double>& row_b,
-                       double impulse) {
+  // `size`: of the terms that cancel in the impulse.
+  const auto add_sized = [&](int a, const RowPart<double>& row_a, int b,
+                             const RowPart<double>& row_b, double impulse, double size) {
     AddRowTransposed(a, row_a, b, row_b, impulse, left.data());
     for (int i = 0; i < 3; ++i) {
-      if (a >= 0) terms[3 * a + i] = std::max(terms[3 * a + i], std::abs(row_a[i] * impulse));
-      if (b >= 0) terms[3 * b + i] = std::max(terms[3 * b + i], std::abs(row_b[i] * impulse));
+      if (a >= 0) terms[3 * a + i] = std::max(terms[3 * a + i], std::abs(row_a[i]) * size);
+      if (b >= 0) terms[3 * b + i] = std::max(terms[3 * b + i], std::abs(row_b[i]) * size);
     }
   };
+  const auto add = [&](int a, const RowPart<double>& row_a, int b, const RowPart<double>& row_b,
+                       double impulse) {
+    add_sized(a, row_a, b, row_b, impulse, std::abs(impulse));
+  };
   for (const DamperBlock<double>& d : problem.dampers) {
-    add(d.a, d.row_a, d.b, d.row_b, -d.weight * RowDot(d.a, d.row_a, d.b, d.row_b, v));
+    double size = 0.0;
+    for (int i = 0; i < 3; ++i) {
+      size = std::max({size, d.a >= 0 ? std::abs(d.row_a[i] * v[3 * d.a + i]) : 0.0,
+                       d.b >= 0 ? std::abs(d.row_b[i] * v[3 * d.b + i]) : 0.0});
+    }
+    add_sized(d.a, d.row_a, d.b, d.row_b, -d.weight * RowDot(d.a, d.row_a, d.b, d.row_b, v),
+              std::abs(d.weight) * size);
   }
   for (size_t j = 0; j < problem.joints.size(); ++j) {
     const JointBlock<double>& joint = problem.joints[j];

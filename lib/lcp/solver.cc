@@ -289,6 +289,30 @@ bool RunPortfolio(Portfolio& portfolio, const LcpOptions& options, Index nz) {
   return options.solver == SolverChoice::kAuto && portfolio.TryEnumeration();
 }
 
+// A plain problem whose z span many decades: in one whose F is equilibrated the largest z says what
+// is small beside it. Empty where it need not be, or what it would be overflows.
+std::optional<LcpSolution<double>> SolveEquilibrated(const MixedLcp<double>& problem,
+                                                     const LcpOptions& options) {
+  constexpr double kWide = 1e6;
+  if (problem.num_v() > 0 || problem.num_z() == 0) return std::nullopt;
+  const Equilibration scaling = Equilibrate(problem.F);
+  if (scaling.col.maxCoeff() <= kWide * scaling.col.minCoeff()) return std::nullopt;
+  MixedLcp<double> scaled = problem;
+  scaled.F = scaling.row.asDiagonal() * problem.F * scaling.col.asDiagonal();
+  scaled.c = scaling.row.cwiseProduct(problem.c);
+  if (!scaled.F.allFinite() || !scaled.c.allFinite()) return std::nullopt;
+  Portfolio portfolio(scaled, options);
+  RunPortfolio(portfolio, options, scaled.num_z());
+  LcpSolution<double> solution = portfolio.Finish();
+  solution.z = scaling.col.cwiseProduct(solution.z);
+  solution.s = Slack(problem, solution.v, solution.z);
+  if (solution.farkas.size() > 0) solution.farkas = scaling.row.cwiseProduct(solution.farkas);
+  if (!solution.z.allFinite() || !solution.s.allFinite() || !solution.farkas.allFinite()) {
+    return std::nullopt;
+  }
+  return solution;
+}
+
 }  // namespace
 
 LcpSolution<double> SolveLcp(const MixedLcp<double>& problem, const LcpOptions& options) {
@@ -297,6 +321,9 @@ LcpSolution<double> SolveLcp(const MixedLcp<double>& problem, const LcpOptions& 
   if (!refused.message.empty()) return refused;
   MixedLcp<double> conformed = problem;
   ConformEmptyBlocks(conformed);
+  if (std::optional<LcpSolution<double>> solution = SolveEquilibrated(conformed, options)) {
+    return *std::move(solution);
+  }
   Portfolio portfolio(conformed, options);
   RunPortfolio(portfolio, options, conformed.num_z());
   return portfolio.Finish();

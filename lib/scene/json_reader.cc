@@ -8,6 +8,8 @@
 #include <cstring>
 #include <fstream>
 #include <limits>
+#include <mutex>
+#include <set>
 
 namespace tangible {
 namespace {
@@ -153,7 +155,18 @@ class DocumentBuilder : public nlohmann::json_sax<Json> {
   std::vector<std::string> keys_;  // of each open object, the key being read
 };
 
+std::mutex files_read_mutex;
+std::set<std::string>& FilesReadSet() {
+  static std::set<std::string> files;
+  return files;
+}
+
 }  // namespace
+
+std::vector<std::string> FilesRead() {
+  const std::lock_guard<std::mutex> lock(files_read_mutex);
+  return {FilesReadSet().begin(), FilesReadSet().end()};
+}
 
 bool ReadTextFile(const std::string& file, std::string* text, std::string* error) {
   errno = 0;
@@ -171,6 +184,8 @@ bool ReadTextFile(const std::string& file, std::string* text, std::string* error
     reason = "larger than " + std::to_string(kMaxFileSize >> 20) + " MiB";
   } else {
     *text = std::move(content);
+    const std::lock_guard<std::mutex> lock(files_read_mutex);
+    FilesReadSet().insert(file);
     return true;
   }
   *error = OneLine(file + ": cannot be read: " + reason);

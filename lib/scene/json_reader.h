@@ -38,6 +38,10 @@ inline constexpr std::size_t kMaxFileSize = std::size_t{1} << 30;
 /// Reads a whole file; false and "file: cannot be read: why" if that fails.
 bool ReadTextFile(const std::string& file, std::string* text, std::string* error);
 
+/// The files that ReadTextFile has read, each once: a program does not write over its inputs, also
+/// those that another file names.
+std::vector<std::string> FilesRead();
+
 /// Parses text. Refused: malformed text (line and column), numbers that a double cannot hold
 /// (1e999), NaN and Infinity, a key twice in one object, nesting beyond kMaxJsonDepth, text after
 /// the value.

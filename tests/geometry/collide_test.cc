@@ -274,5 +274,23 @@ TEST(Collide, FarFromTheOriginPositionsCancelFirst) {
   EXPECT_NEAR(contacts.geometry[0].gap, 0.05, kTolerance);
 }
 
+// Beyond 1e154 m squares of distances overflow: there is no nearest pair of vertices, and no edge
+// below any. Whatever is found exists.
+TEST(Collide, DistancesThatOverflow) {
+  const TestShape triangle = Polygon({-1, 0, 1, 0, 0, 1});
+  for (const double far : {1e150, 1e156, 1e200, 1e307}) {
+    for (const bool swapped : {false, true}) {
+      const Contacts contacts = swapped ? Collide(Box(2, 2), At(far, 0), triangle, At(0, 0))
+                                        : Collide(triangle, At(0, 0), Box(2, 2), At(far, 0));
+      for (int i = 0; i < contacts.count; ++i) {
+        EXPECT_GE(contacts.features[i].a, 0);
+        EXPECT_GE(contacts.features[i].b, 0);
+        EXPECT_LT(contacts.features[i].a, 4);
+        EXPECT_LT(contacts.features[i].b, 4);
+      }
+    }
+  }
+}
+
 }  // namespace
 }  // namespace tangible::testing

@@ -241,6 +241,27 @@ TEST(ActiveSetTest, EnumerationFindsWhatPathsMiss) {
   EXPECT_LE(ScaledResidual(problem, point.v, point.y, point.z), 1e-12);
 }
 
+// z from 1e87 to 1e109 at once: the small ones were taken for rounding of the largest, and s1 = 54
+// % of its terms beside z1 > 0 for a solution. The only one is z = (0, 0.519, 0).
+TEST(SolverTest, VariablesThatSpanManyDecadesAreNotRounding) {
+  MixedLcp<double> problem;
+  problem.F =
+      MatrixX<double>{{2.5913934256595162e-167, -1.0281187030288061e-83, -20565600.36431228},
+                      {-1.0281187030288061e-83, 4.279301235598721, 8.49537365077939e+90},
+                      {-20565600.36431228, 8.49537365077939e+90, 2.218101024741997e+181}};
+  problem.c = Eigen::Vector3d(382840579789047.1, -2.2204842880442612, -2.864631048892953e+28);
+  ConformEmptyBlocks(problem);
+  for (const SolverChoice choice :
+       {SolverChoice::kAuto, SolverChoice::kInteriorPoint, SolverChoice::kLemke}) {
+    const LcpSolution<double> solution = SolveLcp(problem, {.solver = choice});
+    if (solution.status != LcpStatus::kSolved) continue;
+    EXPECT_EQ(solution.z[0], 0.0);
+    EXPECT_NEAR(solution.z[1], 2.2204842880442612 / 4.279301235598721, 1e-15);
+    EXPECT_EQ(solution.z[2], 0.0);
+  }
+  EXPECT_EQ(SolveLcp(problem, {}).status, LcpStatus::kSolved);
+}
+
 // Numbers whose products overflow left the interior point without any iterate.
 TEST(SolverTest, NumbersThatOverflowAreUnsolved) {
   MixedLcp<double> problem;

@@ -137,6 +137,34 @@ TEST_F(FaultsTest, OutputsThatCannotBeWritten) {
   }
 }
 
+// Files that the fit names, and a scene: not on the command line, and inputs all the same.
+TEST_F(FaultsTest, OutputsOverInputsThatAFileNames) {
+  for (const std::string flag : {"out", "report", "checkpoint"}) {
+    for (const std::string file : {"ball.json", "o.csv", "./folder/../o.csv"}) {
+      const std::string before = Read(Path(file));
+      ExpectOneLine(
+          RunIn("", {"tangible-fit", "fit.json", {}}, "--" + flag + "=" + file, "> /dev/null"), 2,
+          "expected a file of its own, got that of an input");
+      EXPECT_EQ(Read(Path(file)), before);
+    }
+  }
+}
+
+TEST_F(FaultsTest, OneOutputThatFailsDoesNotKeepTheOthers) {
+  ExpectOneLine(
+      RunIn("", {"tangible-fit", "fit.json", {}}, "--out=/dev/full --report=r.html", "> /dev/null"),
+      1, "/dev/full: cannot be written: No space left");
+  EXPECT_NE(Read(Path("r.html")).find("</html>"), std::string::npos);
+}
+
+TEST_F(FaultsTest, ACostThatIsNotFiniteHasNotConverged) {
+  Write("o.csv", "time,body,y\n0.1,ball,1e300\n0.2,ball,1\n");
+  const ProgramRun run = RunIn("", {"tangible-fit", "fit.json", {}}, "--out=r.json", "> /dev/null");
+  EXPECT_EQ(run.exit_status, 1);
+  EXPECT_NE(run.error.find("the cost is not finite"), std::string::npos) << run.error;
+  EXPECT_NE(json::parse(Read(Path("r.json")))["status"], "converged");
+}
+
 TEST_F(FaultsTest, AStdoutThatTakesNothing) {
   // A pipe whose reader is gone.
   int ends[2];

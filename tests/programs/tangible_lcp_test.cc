@@ -135,6 +135,15 @@ TEST_F(TangibleLcpTest, BadInputIsRefusedWithOneLine) {
   }
 }
 
+TEST_F(TangibleLcpTest, AGradientThatOverflowsIsNoGradient) {
+  const ProgramRun run = Solve(R"({"F": [[1e-200]], "c": [-1e-200], "dl_dz": [1e200]})");
+  ExpectOneLine(run, 1, "the gradient is not finite");
+  const json result = json::parse(run.out);
+  EXPECT_EQ(result["status"], "solved");
+  EXPECT_TRUE(result["gradient"].is_null());
+  EXPECT_NE(result["certificate"]["verdict"], "trustworthy");
+}
+
 TEST_F(TangibleLcpTest, UnreadableAndUnwritableFiles) {
   ExpectOneLine(Run("tangible-lcp", "/nowhere/p.json"), 1, "/nowhere/p.json: cannot be read");
   ExpectOneLine(Run("tangible-lcp", Path("")), 1, "Is a directory");

@@ -32,14 +32,10 @@ int Main(int argc, char** argv) {
   if (line.exit_status) return *line.exit_status;
   const std::vector<closed_forms::Study> studies = closed_forms::RunAllStudies();
   std::fputs(closed_forms::TableText(studies).c_str(), stdout);
-  std::string error;
-  if (!FLAGS_out.empty()) {
-    error = WriteResult(FLAGS_out, JsonText(closed_forms::ToJson(studies)));
-  }
-  if (error.empty() && !FLAGS_picture.empty()) {
-    error = WriteResult(FLAGS_picture, closed_forms::Picture(studies));
-  }
-  if (!error.empty()) return ReportError(error);
+  ResultWriter writer;
+  writer.Write(FLAGS_out, [&] { return JsonText(closed_forms::ToJson(studies)); });
+  writer.Write(FLAGS_picture, [&] { return closed_forms::Picture(studies); });
+  if (!writer.error().empty()) return ReportError(writer.error());
   const std::vector<std::string> broken = closed_forms::BrokenBounds(studies);
   return broken.empty() ? kExitDone : ReportError(broken[0]);
 }

@@ -142,17 +142,15 @@ int Run(const CostOptions& options, const CostBounds& bounds) {
             << cost::CrossoverText(crossovers) << "\n"
             << BoundsText(checked) << std::flush;
   const std::string broken = cost::BrokenBound(checked, cells);
-  std::string error;
-  if (!FLAGS_out.empty()) {
+  ResultWriter writer;
+  writer.Write(FLAGS_out, [&] {
     OrderedJson json = {{"provenance", OrderedJson::object()}, {"verdict", broken}};
     for (const auto& [what, value] : Provenance()) json["provenance"][what] = value;
     json.update(cost::ToJson(cells, long_run, crossovers, checked));
-    error = WriteResult(FLAGS_out, JsonText(json));
-  }
-  if (error.empty() && !FLAGS_picture.empty()) {
-    error = WriteResult(FLAGS_picture, cost::Picture(cells));
-  }
-  if (!error.empty()) return ReportError(error);
+    return JsonText(json);
+  });
+  writer.Write(FLAGS_picture, [&] { return cost::Picture(cells); });
+  if (!writer.error().empty()) return ReportError(writer.error());
   return broken.empty() || !FLAGS_bounds ? kExitDone : ReportError("tangible-cost: " + broken);
 }
 

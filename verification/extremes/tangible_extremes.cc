@@ -79,17 +79,15 @@ int Run(const std::vector<ExtremeCase>& cases) {
   const std::vector<CaseResult> results =
       extremes::RunCases(cases, options, [&](long done) { progress.Show(done); });
   std::cout << ProvenanceLine() << "\n\n" << extremes::TableText(results) << std::flush;
-  std::string error;
-  if (!FLAGS_out.empty()) {
+  ResultWriter writer;
+  writer.Write(FLAGS_out, [&] {
     OrderedJson json = {{"provenance", OrderedJson::object()}, {"long", FLAGS_long}};
     for (const auto& [what, value] : Provenance()) json["provenance"][what] = value;
     json.update(extremes::ToJson(results));
-    error = WriteResult(FLAGS_out, JsonText(json));
-  }
-  if (error.empty() && !FLAGS_report.empty()) {
-    error = WriteResult(FLAGS_report, extremes::Page(results, ProvenanceLine()));
-  }
-  if (!error.empty()) return ReportError(error);
+    return JsonText(json);
+  });
+  writer.Write(FLAGS_report, [&] { return extremes::Page(results, ProvenanceLine()); });
+  if (!writer.error().empty()) return ReportError(writer.error());
   const std::string failure = extremes::FirstFailure(results);
   return failure.empty() ? kExitDone : ReportError("tangible-extremes: " + failure);
 }

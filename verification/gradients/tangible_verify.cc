@@ -109,19 +109,17 @@ std::string AddFile(const std::string& file, std::vector<VerifyJob>* jobs) {
 }
 
 std::string Write(const VerifyResult& result, const std::string& verdict) {
-  if (!FLAGS_out.empty()) {
+  ResultWriter writer;
+  writer.Write(FLAGS_out, [&] {
     OrderedJson json = {{"provenance", OrderedJson::object()}, {"verdict", verdict}};
     for (const auto& [what, value] : Provenance()) {
       json["provenance"][what] = value;
     }
     json.update(ToJson(result));
-    std::string error = WriteResult(FLAGS_out, JsonText(json));
-    if (!error.empty()) return error;
-  }
-  if (!FLAGS_report.empty()) {
-    return WriteResult(FLAGS_report, VerifyReport(result, ProvenanceLine(), verdict));
-  }
-  return "";
+    return JsonText(json);
+  });
+  writer.Write(FLAGS_report, [&] { return VerifyReport(result, ProvenanceLine(), verdict); });
+  return writer.error();
 }
 
 int RunErrata() {

@@ -124,20 +124,16 @@ std::string Load(const std::string& file, const TradeoffOptions& options, Scene*
 }
 
 std::string WriteFiles(const std::vector<Tradeoff>& tradeoffs) {
-  std::string error;
-  if (!FLAGS_out.empty()) {
+  ResultWriter writer;
+  writer.Write(FLAGS_out, [&] {
     OrderedJson json = {{"provenance", OrderedJson::object()}, {"scenes", OrderedJson::array()}};
     for (const auto& [what, value] : Provenance()) json["provenance"][what] = value;
     for (const Tradeoff& one : tradeoffs) json["scenes"].push_back(tradeoff::ToJson(one));
-    error = WriteResult(FLAGS_out, JsonText(json));
-  }
-  if (error.empty() && !FLAGS_report.empty()) {
-    error = WriteResult(FLAGS_report, tradeoff::Page(tradeoffs, ProvenanceLine()));
-  }
-  if (error.empty() && !FLAGS_picture.empty()) {
-    error = WriteResult(FLAGS_picture, tradeoff::Picture(tradeoffs));
-  }
-  return error;
+    return JsonText(json);
+  });
+  writer.Write(FLAGS_report, [&] { return tradeoff::Page(tradeoffs, ProvenanceLine()); });
+  writer.Write(FLAGS_picture, [&] { return tradeoff::Picture(tradeoffs); });
+  return writer.error();
 }
 
 int Run(const std::vector<std::string>& files, const TradeoffOptions& options, Target target) {
