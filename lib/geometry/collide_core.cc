@@ -12,6 +12,8 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 /// Ends of two faces closer than this fraction of the faces count as one above the other. A stack
 /// of equal boxes is thus not at the mercy of rounding: the same features come step after step.
 constexpr double kAligned = 1e-9;
+/// The same of a face whose neighbour is longer, as a share of its own length.
+constexpr double kBeyondEnd = 1e3 * kAligned;
 
 /// A pair seen from the body whose face is the reference.
 struct Sides {
@@ -215,11 +217,17 @@ int CollideCores(const ConvexCore& a, const ConvexCore& b, double max_gap,
                  ContactFeature features[2]) {
   const double max_separation = max_gap + a.Radius() + b.Radius();
   const FaceQuery query_a = QueryFaces(a, b);
-  if (query_a.separation >= max_separation) {
+  // A vertex that counts as above the end of a face may be as far beyond it, and so further away
+  // than its gap says.
+  const auto is_far = [&](const FaceQuery& query) {
+    return query.separation >= max_separation &&
+           query.separation >= max_separation + kBeyondEnd * query.line.length;
+  };
+  if (is_far(query_a)) {
     return 0;
   }
   const FaceQuery query_b = QueryFaces(b, a);
-  if (query_b.separation >= max_separation) {
+  if (is_far(query_b)) {
     return 0;
   }
   if (query_a.edge < 0 && query_b.edge < 0) {

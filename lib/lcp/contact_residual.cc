@@ -194,6 +194,39 @@ double NaturalResidual(const ContactProblem<double>& problem,
   return worst;
 }
 
+double BalancedResidual(const ContactProblem<double>& problem, double tolerance,
+                        ContactSolution<double>* solution, int* worst_contact) {
+  const double residual = NaturalResidual(problem, *solution, worst_contact);
+  if (residual <= tolerance || *worst_contact >= 0) {
+    return residual;
+  }
+  std::vector<double> v(problem.momentum.begin(), problem.momentum.end());
+  ForEachImpulse(problem, *solution, [&](int body, const RowPart<double>& row, double impulse) {
+    for (int i = 0; body >= 0 && i < 3; ++i) {
+      v[3 * body + i] += row[i] * impulse;
+    }
+  });
+  for (size_t i = 0; i < v.size(); ++i) {
+    v[i] /= problem.mass[i];
+  }
+  for (const DamperBlock<double>& d : problem.dampers) {
+    for (const int body : {d.a, d.b}) {
+      for (int i = 3 * body; body >= 0 && i < 3 * body + 3; ++i) {
+        v[i] = solution->v[i];
+      }
+    }
+  }
+  std::swap(v, solution->v);
+  int worst = -1;
+  const double balanced = NaturalResidual(problem, *solution, &worst);
+  if (!(balanced < residual)) {
+    std::swap(v, solution->v);
+    return residual;
+  }
+  *worst_contact = worst;
+  return balanced;
+}
+
 void FindDegenerateContacts(const ContactProblem<double>& problem,
                             const ContactSolution<double>& solution, double tolerance,
                             std::vector<int>* degenerate) {

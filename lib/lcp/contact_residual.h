@@ -49,6 +49,13 @@ double ImpulseScale(const std::vector<double>& impulses);
 double NaturalResidual(const ContactProblem<double>& problem,
                        const ContactSolution<double>& solution, int* worst_contact);
 
+/// The same; but where it is equations that exceed `tolerance`, v is made what the impulses say,
+/// M v = p + Σ rᵀ λ, if that leaves less: what rounding leaves of a light body's momentum in a
+/// system with far heavier ones belongs to the rows whose impulses are as large. Not for bodies at
+/// dampers.
+double BalancedResidual(const ContactProblem<double>& problem, double tolerance,
+                        ContactSolution<double>* solution, int* worst_contact);
+
 /// Which contacts of a solution are degenerate: impulse and slack both 0 to `tolerance` of their
 /// scales, in the normal direction or at the limit of friction.
 void FindDegenerateContacts(const ContactProblem<double>& problem,

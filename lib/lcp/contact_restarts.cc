@@ -91,7 +91,8 @@ bool ContactSolver::SolveByPivoting(const ContactProblem<double>& problem,
       std::swap(*solution, trial_);
       return true;
     }
-    report->residual = NaturalResidual(problem, *solution, &report->worst_contact);
+    report->residual =
+        BalancedResidual(problem, options.tolerance, solution, &report->worst_contact);
     if (report->residual <= options.tolerance) {
       ++report->factorisations;
       return system_.Factor(problem, solution->modes);

@@ -193,7 +193,8 @@ bool ContactSolver::SolveByModeChanges(const ContactProblem<double>& problem,
       solution->modes[worst] = worst_change.mode;
     }
     if (contradicted == 0) {
-      report->residual = NaturalResidual(problem, *solution, &report->worst_contact);
+      report->residual =
+          BalancedResidual(problem, options.tolerance, solution, &report->worst_contact);
       if (report->residual <= options.tolerance) {
         return true;
       }
@@ -226,7 +227,7 @@ bool ContactSolver::Polish(const ContactProblem<double>& problem,
       break;
     }
     int trial_worst = -1;
-    const double after = NaturalResidual(problem, trial_, &trial_worst);
+    const double after = BalancedResidual(problem, options.tolerance, &trial_, &trial_worst);
     if (after <= before || after <= 0.01 * options.tolerance) {
       *solution = trial_;
       before = after;

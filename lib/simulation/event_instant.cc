@@ -15,6 +15,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tangible/lcp/contact_residual.h"
 #include "tangible/simulation/event_step.h"
 
 namespace tangible {
@@ -63,6 +64,16 @@ double EventStepper::ReturnSpeed(const Model<double>& model, const State<double>
                                  const ActiveContact& contact) const {
   const double gravity = std::hypot(model.numbers[kGravityX], model.numbers[kGravityY]);
   return std::sqrt(2.0 * gravity * search_.TouchTolerance(state, contact.a, contact.b));
+}
+
+std::string WhatIsUnsolved(const ModelStructure& structure, const Impulses& impulses,
+                           const ContactSolverReport& solved) {
+  if (solved.worst_contact >= 0) {
+    return NameOfContact(structure, impulses.contacts, solved.worst_contact);
+  }
+  const std::vector<double>& v = impulses.solution.v;
+  const int joint = MostViolatedJoint(impulses.problem, v, v, 1e-9);
+  return joint < 0 ? "momentum" : NameOfContradicted(structure, joint);
 }
 
 bool EventStepper::JointsDisagree(const Model<double>& model, double t, const State<double>& state,

@@ -13,6 +13,8 @@ namespace tangible {
 
 inline constexpr int kMostHalvings = 1000;
 inline constexpr int kMostRefinements = 200;
+// The share of a motion after which what starts at the change of a feature has left that.
+inline constexpr double kLeft = 1e-9;
 
 // Of a contact's points: how fast they part, and slide.
 struct ContactSpeeds {
@@ -101,10 +103,18 @@ bool EventSearch::FirstRoot(const Model<double>& model, const Gap& gap, const Ra
     double a, fa, b, fb;
   };
   const double smallest = 1e-12 * to;
-  const double first = gap(*At(model, from));
-  if (first <= 0.0) {
+  double first = gap(*At(model, from));
+  if (first <= 0.0 && from == 0.0) {
+    // What does not touch as it starts and has no gap is where features change: a corner at the end
+    // of an edge, which it leaves.
+    from = kLeft * to;
+    first = gap(*At(model, from));
+    if (!(first > 0.0)) {
+      return false;
+    }
+  } else if (first <= 0.0) {
     *root = from;
-    return from > 0.0;
+    return true;
   }
   std::vector<Interval> open = {{from, first, to, gap(*At(model, to))}};
   Interval crossing = open.back();  // the shortest known to hold a crossing

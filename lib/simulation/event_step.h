@@ -57,6 +57,10 @@ void CountSolve(const ContactSolverReport& solved, EventOutcome* outcome);
 std::string NameOfContact(const ModelStructure& structure,
                           const std::vector<ActiveContact>& contacts, int index);
 
+/// What of impulses their solve has left: a contact, a joint that contradicts others, or momentum.
+std::string WhatIsUnsolved(const ModelStructure& structure, const Impulses& impulses,
+                           const ContactSolverReport& solved);
+
 class EventStepper {
  public:
   explicit EventStepper(const Model<double>& model);
