@@ -285,7 +285,8 @@ std::string OutputOverInput(const std::vector<std::string>& flags) {
     if (!gflags::GetCommandLineOption(flag.c_str(), &path) || path.empty()) continue;
     for (const std::string& input : inputs) {
       if (IsSameFile(path, input)) {
-        return "--" + flag + ": expected a file of its own, got that of an input, " + path;
+        return "--" + flag +
+               std::string(": expected a file of its own, got that of an input, ").append(path);
       }
     }
   }
