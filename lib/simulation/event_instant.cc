@@ -76,31 +76,6 @@ std::string WhatIsUnsolved(const ModelStructure& structure, const Impulses& impu
   return joint < 0 ? "momentum" : NameOfContradicted(structure, joint);
 }
 
-bool EventStepper::JointsDisagree(const Model<double>& model, double t, const State<double>& state,
-                                  double slow) {
-  if (model.structure->joints.empty()) {
-    return false;
-  }
-  Impulses none;
-  none.time = t;
-  none.h = 0.0;
-  none.before = state;
-  AssembleImpulses(model, &assembly_, &none);
-  std::vector<double> v(none.problem.momentum.size());
-  for (size_t i = 0; i < v.size(); ++i) {
-    v[i] = none.problem.momentum[i] / none.problem.mass[i];
-  }
-  for (const JointBlock<double>& joint : none.problem.joints) {
-    for (int k = 0; k < joint.rows; ++k) {
-      const double speed = RowDot(joint.a, joint.row_a[k], joint.b, joint.row_b[k], v.data());
-      if (std::abs(speed - joint.rhs[k]) > slow) {
-        return true;
-      }
-    }
-  }
-  return false;
-}
-
 double EventStepper::SlowSpeed(const Model<double>& model, const State<double>& state,
                                const EventOutcome& outcome) const {
   double slow = search_.SpeedTolerance(model, state);

@@ -169,12 +169,11 @@ bool EventStepper::SolveImpacts(const Model<double>& model, double t, State<doub
     // An impact is solved to a tolerance of its own: what it leaves there is none for another one.
     const bool solved_already =
         repeat > 0 && approach >= 0.5 * last_approach && approach <= kSolvedApproach * slow;
-    const bool approaches = approach > slow && !solved_already;
-    if (!approaches && !(repeat == 0 && starts_ && JointsDisagree(model, t, *state, slow))) {
+    if (!(approach > slow) || solved_already) {
       return true;
     }
     last_approach = approach;
-    if (repeat == 0 && approaches && !LocateTouch(model, t, slow, state, outcome)) {
+    if (repeat == 0 && !LocateTouch(model, t, slow, state, outcome)) {
       return false;
     }
     if (++outcome->events > settings.max_events_per_step && !inelastic_) {
@@ -223,11 +222,6 @@ bool EventStepper::SolveImpacts(const Model<double>& model, double t, State<doub
     const ContactSolverReport solved =
         solver_.Solve(impact.problem, SolverOptionsOf(settings), &impact.solution);
     CountSolve(solved, outcome);
-    if (!solved.solved && !approaches) {
-      // Joints that contradict each other by little; by more the first motion tells.
-      --record_.num_parts;
-      return true;
-    }
     if (!solved.solved) {
       outcome->residual = solved.residual;
       outcome->message = "impact: " + WhatIsUnsolved(*model.structure, impact, solved);
@@ -424,6 +418,11 @@ EventOutcome EventStepper::Advance(const Model<double>& model, double t, double 
     if ((starts_ || at_end) &&
         !AddInstant(model, now, EventKind::kStepEnd, nullptr, state, &outcome)) {
       return fail(outcome.message);
+    }
+    if (starts_ && !at_end) {
+      // It has put twists back that the joints do not allow: what slides now, and where to, is
+      // another.
+      FindTouching(model, *state);
     }
     starts_ = false;
     if (at_end) {

@@ -82,10 +82,6 @@ class EventStepper {
     std::vector<double> approach, slip;  ///< n v and t v, m/s
   };
   void FindTouching(const Model<double>& model, const State<double>& state);
-  /// Whether joints allow other twists than these by more than `slow`: a run may start so, and what
-  /// slides, and where to, shows only once they are satisfied.
-  bool JointsDisagree(const Model<double>& model, double t, const State<double>& state,
-                      double slow);
   bool SolveImpacts(const Model<double>& model, double t, State<double>* state,
                     EventOutcome* outcome);
   /// Poisson's law: after the compression each contact that rebounds pushes with at least e times

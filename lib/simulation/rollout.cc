@@ -5,6 +5,7 @@
 #include <cmath>
 #include <sstream>
 
+#include "tangible/simulation/energy_watch.h"
 #include "tangible/simulation/event_jets.h"
 
 namespace tangible {
@@ -16,6 +17,17 @@ std::string FailureMessage(const StepReport& step, double t, long k) {
           << " s: " << (step.status == StepStatus::kDiverged ? "diverged: " : "unsolved: ")
           << step.message;
   return message.str();
+}
+
+// A step that was done, and whether the run has exploded by it. Not every one is looked at.
+StepReport Watched(const EnergyWatch& watch, const Model<double>& model, const State<double>& state,
+                   long k, long steps, StepReport step) {
+  constexpr long kEvery = 8;
+  if (step.status == StepStatus::kDone && (k % kEvery == 0 || k + 1 == steps)) {
+    step.message = watch.Exploded(model, state);
+    step.status = step.message.empty() ? StepStatus::kDone : StepStatus::kDiverged;
+  }
+  return step;
 }
 
 // The largest difference between two states, relative to the larger of 1 and the values.
@@ -80,12 +92,14 @@ RolloutReport Rollout(const Model<double>& model, const State<double>& initial,
   State<double> state = initial;
   stepper->ClearGuess();
   const long steps = NumSteps(settings);
+  const EnergyWatch watch(model, initial);
   if (observer) {
     observer(0, 0.0, state, nullptr);
   }
   for (long k = 0; k < steps; ++k) {
     const double t = StepTime(settings, k);
-    const StepReport step = stepper->Step(model, t, StepLength(settings, k), &state);
+    const StepReport step = Watched(watch, model, state, k, steps,
+                                    stepper->Step(model, t, StepLength(settings, k), &state));
     report.Add(step);
     if (step.status != StepStatus::kDone) {
       report.status = step.status;
