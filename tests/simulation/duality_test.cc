@@ -70,6 +70,9 @@ TEST(DualityTest, TheCertificateKnowsWhatATautChainLoses) {
       CertifyDerivative(b.model, b.initial, b.directions, {"mass", "position"});
   EXPECT_GE(certificate.linear_residual, gap);
   EXPECT_TRUE(certificate.verdict != "trustworthy" || gap <= kLinearResidualLimit) << gap;
+  // Its links' motion is halved in some steps, how often rounding may choose.
+  EXPECT_NE(certificate.verdict.find("motions were halved"), std::string::npos)
+      << certificate.verdict;
 }
 
 }  // namespace

@@ -3,8 +3,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
+#include "../support/drift.h"
 #include "../support/scenes.h"
 #include "tangible/simulation/invariants.h"
 #include "tangible/simulation/rollout.h"
@@ -243,6 +245,62 @@ TEST(EventStepTest, StacksStayWhereTheyAre) {
       EXPECT_NEAR(run.final.pose[3 * i + 1], i + 0.5, 1e-12);
     }
   }
+}
+
+// A corner of the upper block turns about the end of the lower one's edge: it counts as above it as
+// far as 1e-9 of the faces beyond, where the nearest points are farther apart than what touches.
+// The contact was lost for a step, 0.33 mm deep.
+TEST(EventStepTest, ACornerBesideTheEndOfAnEdgeStaysInContact) {
+  const Scene scene = test_scenes::SceneOf(R"({"bodies": [
+      {"name": "upper", "shape": {"polygon": {"vertices": [
+         [0.2172722523731747, 0.11134611783597859], [0.09257429200142808, 0.2677124143295845],
+         [-0.24040058725099456, -0.14982487769098152], [-0.06020681367051084, -0.2366016255144931]]}},
+       "mass": 1, "position": [-0.7945584979125818, 0.6536154470935059], "friction": 1e6,
+       "angle": -0.20181138962694448, "velocity": [0.4231411696624664, -0.2049162925496712],
+       "angular_velocity": -1.925717382830912},
+      {"name": "lower", "shape": {"polygon": {"vertices": [
+         [0.1474442653043695, 0.1945902829981777], [-0.032749508276114225, 0.2813670308216893],
+         [-0.15158686679321143, -0.23929345611938038], [0.04841313320678853, -0.2392934561193804]]}},
+       "mass": 1, "position": [-1.0484131298101453, 0.2392934561193804], "friction": 1e6},
+      {"name": "floor", "static": true, "friction": 1e6,
+       "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}}],
+      "simulation": {"dt": 0.01, "duration": 0.03, "stepping": "event",
+                     "integrator": "runge_kutta_4"}})");
+  Model<double> model;
+  State<double> first, last;
+  BuildModel(scene, &model, &first);
+  double deepest = 0.0;
+  const RolloutReport report = Rollout(
+      model, first,
+      [&](long, double, const State<double>& state, Stepper*) {
+        deepest = std::max(deepest, -SmallestGap(model, state));
+      },
+      &last);
+  EXPECT_EQ(report.status, StepStatus::kDone) << report.message;
+  EXPECT_LE(deepest, 1e-9);
+}
+
+// Three links under 100 kg whip faster than dt resolves: the projection's error shrank by a third a
+// round, and what was left of it, 2 mm, was taken for rounding.
+TEST(EventStepTest, JointsHoldAlsoWhereTheirProjectionConvergesSlowly) {
+  const testing::DriftOfRun run = testing::RunForDrift(test_scenes::SceneOf(R"({"bodies": [
+      {"name": "l0", "shape": {"capsule": {"length": 0.3, "radius": 0.02}}, "mass": 1,
+       "position": [0.15, 2]},
+      {"name": "l1", "shape": {"capsule": {"length": 0.3, "radius": 0.02}}, "mass": 1,
+       "position": [0.45, 2]},
+      {"name": "l2", "shape": {"capsule": {"length": 0.3, "radius": 0.02}}, "mass": 100,
+       "position": [0.75, 2]}],
+      "joints": [
+      {"name": "j0", "type": "revolute", "bodies": ["l0", "world"], "anchor": [0, 2]},
+      {"name": "j1", "type": "revolute", "bodies": ["l1", "l0"], "anchor": [0.3, 2]},
+      {"name": "j2", "type": "revolute", "bodies": ["l2", "l1"], "anchor": [0.6, 2]}],
+      "no_contact": [["l*", "l*"]],
+      "simulation": {"dt": 0.02, "duration": 1.5, "stepping": "event",
+                     "integrator": "runge_kutta_4", "joint_correction": "projection"}})"));
+  EXPECT_LE(run.largest, 1e-9);
+  EXPECT_TRUE(run.report.status == StepStatus::kDone ||
+              run.report.message.find("dt is too large") != std::string::npos)
+      << run.report.message;
 }
 
 // A wheel's speed misses its axle's by 1e-6 m/s as the run starts. Until the joint is satisfied
