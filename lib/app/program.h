@@ -68,12 +68,13 @@ std::vector<std::string> SplitAtCommas(const std::string& text);
 /// A number with 17 significant digits, which read back give the same double.
 std::string FormatNumber(double value);
 
+/// What a write may replace: any file but one that was read as an input (json_reader.h), or also an
+/// input that is the program's own to go on with.
+enum class Over { kNoInput, kOwnInput };
+
 /// Writes a file so that it is either the old or the whole new one: a temporary in the same folder,
 /// then a rename. Devices and pipes are written directly. A program that is killed on the way may
 /// leave the temporary, PATH.tmp and its process's number. Returns an error (one line) or empty.
-/// A file that was read as an input (json_reader.h) is not written over, unless it is the program's
-/// own to go on with.
-enum class Over { kNoInput, kOwnInput };
 std::string WriteFileAtomically(const std::string& path, std::string_view text,
                                 Over over = Over::kNoInput);
 

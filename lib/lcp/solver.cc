@@ -35,6 +35,7 @@ constexpr int kStubbornRound = 9;
 constexpr double kStubbornShares[] = {0.1, 0.01, 1.0};
 constexpr int kBasisRounds = 5;
 
+// Proximal steps go on, so many rounds at most, until this share of the tolerance is left.
 constexpr double kRoom = 0.01;
 constexpr int kRoundsForRoom = 4;
 
@@ -178,10 +179,6 @@ class Portfolio {
   // Of the reduced problem: with the v and y that z brings about.
   LcpVector PointOf(const VectorXd& z) const {
     return {reduced_->v0 + reduced_->v_z * z, reduced_->y0 + reduced_->y_z * z, z};
-  }
-  double Residual(const VectorXd& z) const {
-    const LcpVector point = PointOf(z);
-    return ScaledResidual(problem_, point.v, point.y, point.z);
   }
 
   bool Offer(const LcpVector& point, LcpSolver solver, int max_rounds = 30) {
