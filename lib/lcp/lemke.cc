@@ -155,6 +155,7 @@ LemkeResult SolveLemkeFrom(const VectorXd& start, const MatrixXd& W, const Vecto
                                          scaling.col.asDiagonal());
   const auto solve = [&](const MatrixXd& rhs) -> MatrixXd {
     const auto once = [&](const MatrixXd& of) -> MatrixXd {
+      if (of.cols() == 0) return of;  // Eigen's triangular solve would form a null reference
       return scaling.col.asDiagonal() * lu.solve(scaling.row.asDiagonal() * of);
     };
     const MatrixXd x = once(rhs);
