@@ -128,6 +128,18 @@ void EvaluateContactRows(const Model<T>& model, const std::vector<Pose<T>>& pose
   EvaluateContactRows(model, poses[contact.a], poses[contact.b], contact, rows);
 }
 
+/// How fast a contact's points part (n v), and slide (t v), m/s.
+struct ContactSpeeds {
+  double normal, slip;
+};
+inline ContactSpeeds SpeedsOf(const Model<double>& model, const State<double>& state,
+                              const ActiveContact& contact) {
+  ContactRows<double> rows;
+  EvaluateContactRows(model, state, contact, &rows);
+  return {RelativeSpeed(state, contact.a, rows.normal_a, contact.b, rows.normal_b),
+          RelativeSpeed(state, contact.a, rows.tangent_a, contact.b, rows.tangent_b)};
+}
+
 /// Evaluates a joint limit: the coordinate's row times its side, gap = side (coordinate − limit),
 /// no tangent.
 template <typename T>

@@ -121,6 +121,26 @@ void ContactSearch::FindLimits(const Model<double>& model, double h,
   }
 }
 
+// The contacts of bodies that pass by each other, as a box over flush tiles, in the place of one
+// that a corner ahead would have.
+ContactsAhead ContactSearch::FindPassed(const Model<double>& model, const State<double>& state,
+                                        const ActiveContact& contact, double approach) const {
+  constexpr double kNone = 1e-9;  // of the bodies' speeds, and of the smaller one's size
+  const double slow = kNone * (bound_[contact.a] + bound_[contact.b]);
+  const double size = std::min(radius_[contact.a], radius_[contact.b]);
+  if (!(approach < -slow) || size == 0.0 || contact.gap < -kNone * size) {
+    return ContactsAhead();
+  }
+  const ContactsAhead ahead =
+      FindContactsAhead(model, state, contact, approach, size, kNone * size, slow);
+  for (int k = 0; k < ahead.count; ++k) {
+    if (ahead.speed[k] < -slow) {
+      return ContactsAhead();
+    }
+  }
+  return ahead;
+}
+
 void ContactSearch::Find(const Model<double>& model, const State<double>& state, double h,
                          const AssemblyScratch<double>& scratch,
                          std::vector<ActiveContact>* contacts,
@@ -154,14 +174,15 @@ void ContactSearch::Find(const Model<double>& model, const State<double>& state,
       }
     }
     ContactFeature features[2];
-    const int count = FindContactFeatures(model.Shape(a), scratch.poses[a], model.Shape(b),
-                                          scratch.poses[b], reach, features);
+    int count = FindContactFeatures(model.Shape(a), scratch.poses[a], model.Shape(b),
+                                    scratch.poses[b], reach, features);
     if (count == 0) {
       ++beyond_reach_;
       continue;
     }
     const CoefficientSource pair_friction = MixedFriction(model, a, b);
     const CoefficientSource pair_restitution = MixedRestitution(model, a, b);
+    bool passes_by = false;
     for (int k = 0; k < count; ++k) {
       ActiveContact contact;
       contact.a = a;
@@ -173,6 +194,17 @@ void ContactSearch::Find(const Model<double>& model, const State<double>& state,
       contact.gap = gap;
       contact.law = GapLaw(gap, h, settings);
       const double approach = RelativeSpeed(state, a, rows.normal_a, b, rows.normal_b);
+      if (!passes_by && gap + h * approach < 0.0) {
+        const ContactsAhead ahead = FindPassed(model, state, contact, approach);
+        if (ahead.count > 0) {
+          passes_by = true;
+          count = ahead.count;
+          features[0] = ahead.contacts[0].feature;
+          features[1] = ahead.contacts[1].feature;
+          k = -1;
+          continue;
+        }
+      }
       double free_approach = 0.0;
       for (int i = 0; i < 3; ++i) {
         free_approach +=

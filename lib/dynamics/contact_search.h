@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "tangible/dynamics/assembly.h"
+#include "tangible/dynamics/contacts_ahead.h"
 #include "tangible/geometry/broad_phase.h"
 
 namespace tangible {
@@ -37,6 +38,8 @@ class ContactSearch {
   int num_beyond_reach() const { return beyond_reach_; }
 
  private:
+  ContactsAhead FindPassed(const Model<double>& model, const State<double>& state,
+                           const ActiveContact& contact, double approach) const;
   void FindLimits(const Model<double>& model, double h, const AssemblyScratch<double>& scratch,
                   std::vector<ActiveContact>* contacts);
 

@@ -15,6 +15,13 @@ constexpr double kAligned = 1e-9;
 /// The same of a face whose neighbour is longer, as a share of its own length.
 constexpr double kBeyondEnd = 1e3 * kAligned;
 
+/// How far apart two faces' ends may be along them, m. A power of two: where features change, and
+/// what a run makes of it, must not depend on the faces' lengths, whose derivative would be
+/// missing.
+double AlignedWithin(const CoreEdge& a, const CoreEdge& b) {
+  return std::ldexp(kAligned, std::ilogb(a.length + b.length));
+}
+
 /// A pair seen from the body whose face is the reference.
 struct Sides {
   const ConvexCore& reference;
@@ -77,34 +84,49 @@ struct FaceEnds {
   int count = 0;
 };
 
+/// A vertex of each face, one over the other, seen from either face.
+struct VertexOverVertex {
+  Candidate of_incident, of_reference;
+
+  VertexOverVertex(const Sides& sides, const CoreFace& reference, const CoreFace& incident,
+                   int reference_vertex, int incident_vertex)
+      : of_incident{sides.VertexOnReference(incident_vertex, reference.edge),
+                    reference.line.Height(sides.incident.VertexAt(incident_vertex)) -
+                        sides.Radii()},
+        of_reference{
+            sides.VertexOnIncident(reference_vertex, incident.edge),
+            incident.line.Height(sides.reference.VertexAt(reference_vertex)) - sides.Radii()} {}
+
+  bool IsTie(double tie) const { return std::abs(of_incident.gap - of_reference.gap) <= tie; }
+  /// The first body's vertex stands, whichever rounding prefers.
+  const Candidate& Chosen(const Sides& sides) const {
+    return sides.reference_is_first ? of_reference : of_incident;
+  }
+};
+
 /// One end of the overlap. `overhang`: how far the incident face ends inside of the reference face.
 /// Adds nothing where the reference's vertex has no foot on the incident face and the incident one
 /// is beyond the reference's end; by rounding alone it is not beyond, and may be the nearest there
 /// is.
 void AddEnd(const Sides& sides, const CoreFace& reference, const CoreFace& incident,
             int reference_vertex, int incident_vertex, double overhang, FaceEnds* ends) {
-  const Vector2<double> on_reference = sides.reference.VertexAt(reference_vertex);
-  const Candidate of_incident = {
-      sides.VertexOnReference(incident_vertex, reference.edge),
-      reference.line.Height(sides.incident.VertexAt(incident_vertex)) - sides.Radii()};
-  const Candidate of_reference = {sides.VertexOnIncident(reference_vertex, incident.edge),
-                                  incident.line.Height(on_reference) - sides.Radii()};
-  const double tie = kAligned * (reference.line.length + incident.line.length);
+  const VertexOverVertex vertices(sides, reference, incident, reference_vertex, incident_vertex);
+  const double tie = AlignedWithin(reference.line, incident.line);
   // As far beyond the end as vertices count as one above the other: what is found must not depend
   // on which face rounding made the reference.
-  const bool has_foot = IsOver(incident.line, on_reference, tie / incident.line.length);
-  if (std::abs(overhang) <= tie && has_foot &&
-      std::abs(of_incident.gap - of_reference.gap) <= tie) {
-    // Vertex over vertex: the first body's stands, whichever rounding prefers.
-    ends->candidates[ends->count++] = sides.reference_is_first ? of_reference : of_incident;
+  const bool has_foot =
+      IsOver(incident.line, sides.reference.VertexAt(reference_vertex), tie / incident.line.length);
+  if (std::abs(overhang) <= tie && has_foot && vertices.IsTie(tie)) {
+    ends->candidates[ends->count++] = vertices.Chosen(sides);
   } else if (overhang >= (has_foot ? 0.0 : -tie)) {
-    ends->candidates[ends->count++] = of_incident;
+    ends->candidates[ends->count++] = vertices.of_incident;
   } else if (has_foot) {
-    ends->candidates[ends->count++] = of_reference;
+    ends->candidates[ends->count++] = vertices.of_reference;
   }
 }
 
-/// None where the faces do not oppose each other or overlap in no more than a point.
+/// One where they overlap in no more than a point, and are parallel; none where they do not oppose
+/// each other.
 FaceEnds FindFaceEnds(const Sides& sides, const CoreFace& reference, const CoreFace& incident) {
   FaceEnds ends;
   if (incident.edge < 0 || reference.line.tangent.dot(incident.line.tangent) >= 0.0) {
@@ -118,7 +140,15 @@ FaceEnds FindFaceEnds(const Sides& sides, const CoreFace& reference, const CoreF
   const double high = along(incident.first);
   const double length = reference.line.length;
   const double overlap = (high < length ? high : length) - (low > 0.0 ? low : 0.0);
-  if (overlap <= kAligned * (length + incident.line.length)) {
+  const double tie = AlignedWithin(reference.line, incident.line);
+  if (overlap <= tie) {
+    const bool at_last = high > length;
+    const VertexOverVertex vertices(sides, reference, incident,
+                                    at_last ? reference.last : reference.first,
+                                    at_last ? incident.last : incident.first);
+    if (overlap >= -tie && vertices.IsTie(tie)) {
+      ends.candidates[ends.count++] = vertices.Chosen(sides);
+    }
     return ends;
   }
   AddEnd(sides, reference, incident, reference.first, incident.last, low, &ends);

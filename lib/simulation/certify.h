@@ -79,7 +79,7 @@ class RolloutCertifier {
   double jump_margin_ = std::numeric_limits<double>::infinity();
   std::string jump_where_;
   std::string landing_;                ///< of the last step; empty if nothing landed in it
-  std::vector<ActiveContact> closed_;  ///< of the last step
+  std::vector<ActiveContact> closed_;  ///< of the last step, or segment
   std::vector<ContactMode> last_modes_;
   int last_redundant_ = 0;
   // Event stepping: contacts that bear a force, the bodies that the last impact moved, and when.

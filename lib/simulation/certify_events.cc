@@ -11,6 +11,7 @@
 #include "tangible/simulation/certify_grazing.h"
 #include "tangible/simulation/certify_place_inl.h"
 #include "tangible/simulation/event_search.h"
+#include "tangible/simulation/feature_ties.h"
 #include "tangible/simulation/rollout_directional.h"
 #include "tangible/simulation/segment_flow.h"
 
@@ -128,18 +129,31 @@ bool Rests(const Model<double>& model, const State<double>& state, const ActiveC
     EvaluateLimitRows(model, joint_rows, contact, &rows);
     speed = RelativeSpeed(state, contact.a, rows.normal_a, contact.b, rows.normal_b);
   } else {
-    ContactRows<double> rows;
-    EvaluateContactRows(model, state, contact, &rows);
-    speed = RelativeSpeed(state, contact.a, rows.normal_a, contact.b, rows.normal_b);
+    speed = SpeedsOf(model, state, contact).normal;
   }
   return std::abs(speed) <= Negligible(model, speed);
 }
 
+bool HasPair(const std::vector<ActiveContact>& contacts, const ActiveContact& contact) {
+  return std::any_of(contacts.begin(), contacts.end(), [&](const ActiveContact& other) {
+    return other.joint < 0 && other.a == contact.a && other.b == contact.b;
+  });
+}
+
+// Whether a segment ends as two bodies that were apart touch.
+bool EndsInMeeting(const Model<double>& model, const Segment& segment) {
+  const ActiveContact& contact = segment.event_contact;
+  if (segment.event != EventKind::kTouch || contact.joint >= 0 ||
+      HasPair(segment.contacts, contact)) {
+    return false;
+  }
+  const double speed = SpeedsOf(model, segment.after, contact).normal;
+  return speed < -Negligible(model, speed);
+}
+
 double SlipOf(const Model<double>& model, const State<double>& state,
               const ActiveContact& contact) {
-  ContactRows<double> rows;
-  EvaluateContactRows(model, state, contact, &rows);
-  return std::abs(RelativeSpeed(state, contact.a, rows.tangent_a, contact.b, rows.tangent_b));
+  return std::abs(SpeedsOf(model, state, contact).slip);
 }
 
 }  // namespace
@@ -290,6 +304,10 @@ void RolloutCertifier::AddSegment(const Model<double>& model, long step,
     if (normal > 1e-9 * largest) {
       loaded_.push_back(contact);
     }
+    if (contact.joint < 0 && !HasPair(closed_, contact) &&
+        MeetsACorner(model, segment->before, contact)) {
+      AddJump(0.0, place, "a corner meets a corner");
+    }
     // Sliding at no speed: friction stays at its limit. Beside a contact of the same bodies that
     // sticks this says only how they share the load.
     const bool shared = std::any_of(
@@ -318,6 +336,7 @@ void RolloutCertifier::AddSegment(const Model<double>& model, long step,
       OneSided("friction is 0, " + place.Text());
     }
   }
+  closed_ = segment->contacts;
   double terms;
   const double rate = derivative->EventRate(model, segment, &terms);
   if (IsLocated(segment->event) && terms > 0.0) {
@@ -325,6 +344,10 @@ void RolloutCertifier::AddSegment(const Model<double>& model, long step,
         &s, step, segment->time + segment->length, 0, &segment->event_contact, ContactMode::kOpen};
     AddMargin(std::abs(rate) / terms, place,
               std::string("grazing: rate of the ") + NameOf(segment->event));
+    if (EndsInMeeting(model, *segment) &&
+        MeetsACorner(model, segment->after, segment->event_contact)) {
+      AddJump(0.0, place, "a corner meets a corner");
+    }
   }
   AddQuality(start.problem, segment->modes, &start.system);
 }

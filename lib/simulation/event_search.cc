@@ -47,9 +47,7 @@ double EventSearch::TouchTolerance(const State<double>& state, int a, int b) con
   for (const int body : {a, b}) {
     place = std::max({place, std::abs(state.pose[3 * body]), std::abs(state.pose[3 * body + 1])});
   }
-  const double radius = radius_[a] > 0.0 && radius_[b] > 0.0 ? std::min(radius_[a], radius_[b])
-                                                             : std::max(radius_[a], radius_[b]);
-  return 1e-10 * radius + 64.0 * std::numeric_limits<double>::epsilon() * place;
+  return 1e-10 * SmallerRadius(a, b) + 64.0 * std::numeric_limits<double>::epsilon() * place;
 }
 
 double EventSearch::SpeedTolerance(const Model<double>& model, const State<double>& state) const {

@@ -12,6 +12,7 @@
 // features are closest at both, the gap's rates of change there say whether it has a root. Forces
 // and sliding speeds are sampled at the segment's middle and end.
 
+#include <algorithm>
 #include <limits>
 #include <string>
 #include <utility>
@@ -87,6 +88,12 @@ class EventSearch {
   double Refine(const Model<double>& model, const Function& f, double tolerance, double a,
                 double fa, double b, double fb);
   double ModeValue(const Model<double>& model, Sample* sample, const Event& event);
+  /// Of what is bounded; 0: neither is.
+  double SmallerRadius(int a, int b) const {
+    return radius_[a] > 0.0 && radius_[b] > 0.0 ? std::min(radius_[a], radius_[b])
+                                                : std::max(radius_[a], radius_[b]);
+  }
+  bool HasPassed(const State<double>& state, int a, int b) const;
   bool MovesLittle(const Model<double>& model, const State<double>& before,
                    const State<double>& after, double length, int a, int b) const;
   double TouchStart(const Model<double>& model, double speed, double acceleration) const;

@@ -96,9 +96,21 @@ bool EventSearch::MovesLittle(const Model<double>& model, const State<double>& b
     speed = std::max(speed, std::hypot(state->twist[3 * a] - state->twist[3 * b],
                                        state->twist[3 * a + 1] - state->twist[3 * b + 1]));
   }
-  const double size = radius_[a] > 0.0 && radius_[b] > 0.0 ? std::min(radius_[a], radius_[b])
-                                                           : std::max(radius_[a], radius_[b]);
+  const double size = SmallerRadius(a, b);
   return size == 0.0 || speed * length < size;
+}
+
+// Whether a pair has moved since the segment's start by more than what the ends of faces that count
+// as aligned are apart.
+bool EventSearch::HasPassed(const State<double>& state, int a, int b) const {
+  constexpr double kPassed = 1e-7;  // of the smaller body
+  const std::vector<double>& before = segment_->before.pose;
+  const auto moved = [&](int k) {
+    return std::abs(state.pose[3 * a + k] - before[3 * a + k] - state.pose[3 * b + k] +
+                    before[3 * b + k]);
+  };
+  const double size = SmallerRadius(a, b);
+  return moved(0) + moved(1) + moved(2) * size > kPassed * size;
 }
 
 // From a start at which a pair touches and separates with `speed`: a time by which it has left and
@@ -277,14 +289,22 @@ void EventSearch::SearchPair(const Model<double>& model, int a, int b, Event* ev
     return;
   }
   // A closed contact whose feature is no longer the pair's closest hands over to the next one.
+  // Where corners meet it may not have been the closest as the segment starts: it is once they have
+  // passed.
+  ContactFeature at_start[2];
+  const int num_at_start =
+      FindContactFeatures(model.Shape(a), segment_->before.PoseOf(a), model.Shape(b),
+                          segment_->before.PoseOf(b), kInfinity, at_start);
   const ActiveContact* lost = nullptr;
   const auto same = [&](const Sample& sample) {
     const State<double>& state = sample.motion.after;
     ContactFeature features[2];
     const int count = FindContactFeatures(model.Shape(a), state.PoseOf(a), model.Shape(b),
                                           state.PoseOf(b), kInfinity, features);
+    const bool has_passed = HasPassed(state, a, b);
     for (const ActiveContact& contact : segment_->contacts) {
-      if (OfPair(contact, a, b) && !IsAmong(features, count, contact.feature)) {
+      if (OfPair(contact, a, b) && !IsAmong(features, count, contact.feature) &&
+          (has_passed || IsAmong(at_start, num_at_start, contact.feature))) {
         lost = &contact;
         return -1.0;
       }

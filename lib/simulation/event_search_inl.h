@@ -16,18 +16,6 @@ inline constexpr int kMostRefinements = 200;
 // The share of a motion after which what starts at the change of a feature has left that.
 inline constexpr double kLeft = 1e-9;
 
-// Of a contact's points: how fast they part, and slide.
-struct ContactSpeeds {
-  double normal, slip;
-};
-inline ContactSpeeds SpeedsOf(const Model<double>& model, const State<double>& state,
-                              const ActiveContact& contact) {
-  ContactRows<double> rows;
-  EvaluateContactRows(model, state, contact, &rows);
-  return {RelativeSpeed(state, contact.a, rows.normal_a, contact.b, rows.normal_b),
-          RelativeSpeed(state, contact.a, rows.tangent_a, contact.b, rows.tangent_b)};
-}
-
 // Illinois' variant of the secant method within a bracket, with halving where three steps have not
 // halved it: until |f| ≤ tolerance, or to the last bit that changes the value.
 template <typename Function>

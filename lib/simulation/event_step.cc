@@ -92,59 +92,6 @@ void EventStepper::SetGuess(const EventGuess& guess) {
   starts_ = guess.starts;
 }
 
-void EventStepper::FindTouching(const Model<double>& model, const State<double>& state) {
-  const ModelStructure& structure = *model.structure;
-  touching_ = Touching();
-  double reach = 0.0;
-  for (int body = 0; body < structure.num_bodies(); ++body) {
-    reach = std::max(reach, search_.TouchTolerance(state, body, body));
-  }
-  std::vector<ActiveContact> found;
-  search_.FindContacts(model, state, reach, &found);
-  for (const ActiveContact& contact : found) {
-    if (contact.gap > search_.TouchTolerance(state, contact.a, contact.b)) {
-      continue;
-    }
-    ContactRows<double> rows;
-    EvaluateContactRows(model, state, contact, &rows);
-    touching_.contacts.push_back(contact);
-    touching_.friction.push_back(MixedFriction(model, contact.a, contact.b));
-    touching_.restitution.push_back(MixedRestitution(model, contact.a, contact.b));
-    touching_.approach.push_back(
-        RelativeSpeed(state, contact.a, rows.normal_a, contact.b, rows.normal_b));
-    touching_.slip.push_back(
-        RelativeSpeed(state, contact.a, rows.tangent_a, contact.b, rows.tangent_b));
-  }
-  for (size_t j = 0; j < structure.joints.size(); ++j) {
-    const JointIndex& joint = structure.joints[j];
-    if (joint.low < 0) {
-      continue;
-    }
-    JointRows<double> joint_rows;
-    EvaluateJoint(joint.type, state.PoseOf(joint.a), state.PoseOf(joint.b),
-                  &model.numbers[joint.geometry], &joint_rows);
-    for (const double side : {1.0, -1.0}) {
-      ActiveContact limit;
-      limit.a = joint.a;
-      limit.b = joint.b;
-      limit.joint = static_cast<int>(j);
-      limit.side = side;
-      limit.law = ContactLaw::kInelastic;
-      ContactRows<double> rows;
-      EvaluateLimitRows(model, joint_rows, limit, &rows);
-      limit.gap = rows.geometry.gap;
-      if (limit.gap <= kLimitTolerance) {
-        touching_.contacts.push_back(limit);
-        touching_.friction.emplace_back();
-        touching_.restitution.emplace_back();
-        touching_.approach.push_back(
-            RelativeSpeed(state, limit.a, rows.normal_a, limit.b, rows.normal_b));
-        touching_.slip.push_back(0.0);
-      }
-    }
-  }
-}
-
 ContactMode EventStepper::GuessOf(const ActiveContact& contact) const {
   for (size_t i = 0; i < last_contacts_.size(); ++i) {
     if (last_contacts_[i].SameAs(contact)) {

@@ -82,6 +82,8 @@ class EventStepper {
     std::vector<double> approach, slip;  ///< n v and t v, m/s
   };
   void FindTouching(const Model<double>& model, const State<double>& state);
+  void AddTouching(const Model<double>& model, const State<double>& state,
+                   const ActiveContact& contact);
   bool SolveImpacts(const Model<double>& model, double t, State<double>* state,
                     EventOutcome* outcome);
   /// Poisson's law: after the compression each contact that rebounds pushes with at least e times

@@ -254,4 +254,36 @@ double FeatureChangeMargin(const Model<double>& model, const StepRecord& record,
   return PairTies(model, record, first, last, system).Margin();
 }
 
+bool MeetsACorner(const Model<double>& model, const State<double>& state,
+                  const ActiveContact& contact) {
+  const int a = contact.a;
+  const int b = contact.b;
+  double size = kInfinity;
+  for (const int body : {a, b}) {
+    if (model.structure->bodies[body].shape == ShapeType::kHalfPlane) {
+      return false;
+    }
+    size = std::min(size, BoundingRadius(model.Shape(body)));
+  }
+  const auto normal = [&](const Pose<double>& pose_a, const ContactFeature& feature) {
+    return EvaluateContact(feature, model.Shape(a), pose_a, model.Shape(b), state.PoseOf(b)).normal;
+  };
+  const Vector2<double> n = normal(state.PoseOf(a), contact.feature);
+  const Vector2<double> along(n.y(), -n.x());
+  for (const Vector2<double>& direction : {along, Vector2<double>(-along), Vector2<double>(-n)}) {
+    Pose<double> moved = state.PoseOf(a);
+    moved.position += kFeatureMargin * size * direction;
+    ContactFeature features[2];
+    const int count = FindContactFeatures(model.Shape(a), moved, model.Shape(b), state.PoseOf(b),
+                                          kInfinity, features);
+    const bool continues = std::any_of(features, features + count, [&](const auto& feature) {
+      return (normal(moved, feature) - n).norm() <= kTurned;
+    });
+    if (!continues) {
+      return true;
+    }
+  }
+  return false;
+}
+
 }  // namespace tangible

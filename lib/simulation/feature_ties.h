@@ -29,4 +29,11 @@ inline constexpr double kFeatureMargin = 1e-7;
 double FeatureChangeMargin(const Model<double>& model, const StepRecord& record, size_t first,
                            size_t last, ContactSystem* system);
 
+/// Whether two corners meet where two shapes touch at `state`: beside the contact, by
+/// kFeatureMargin of the smaller body's size to either side along its tangent, none of the pair's
+/// contacts has its normal. On one side of that the bodies collide, on the other they pass or
+/// collide otherwise.
+bool MeetsACorner(const Model<double>& model, const State<double>& state,
+                  const ActiveContact& contact);
+
 }  // namespace tangible

@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// What touches at an instant, with its speeds.
+#include <algorithm>
+
+#include "tangible/dynamics/contacts_ahead.h"
+#include "tangible/simulation/event_step.h"
+
+namespace tangible {
+
+void EventStepper::AddTouching(const Model<double>& model, const State<double>& state,
+                               const ActiveContact& contact) {
+  for (const ActiveContact& other : touching_.contacts) {
+    if (other.SameAs(contact)) {
+      return;
+    }
+  }
+  const ContactSpeeds speeds = SpeedsOf(model, state, contact);
+  touching_.contacts.push_back(contact);
+  touching_.friction.push_back(MixedFriction(model, contact.a, contact.b));
+  touching_.restitution.push_back(MixedRestitution(model, contact.a, contact.b));
+  touching_.approach.push_back(speeds.normal);
+  touching_.slip.push_back(speeds.slip);
+}
+
+void EventStepper::FindTouching(const Model<double>& model, const State<double>& state) {
+  const ModelStructure& structure = *model.structure;
+  touching_ = Touching();
+  double reach = 0.0;
+  for (int body = 0; body < structure.num_bodies(); ++body) {
+    reach = std::max(reach, search_.TouchTolerance(state, body, body));
+  }
+  std::vector<ActiveContact> found;
+  search_.FindContacts(model, state, reach, &found);
+  const double slow = search_.SpeedTolerance(model, state);
+  for (const ActiveContact& contact : found) {
+    const double touch = search_.TouchTolerance(state, contact.a, contact.b);
+    if (contact.gap > touch) {
+      continue;
+    }
+    const double approach = SpeedsOf(model, state, contact).normal;
+    const double size =
+        std::min(search_.bounding_radius(contact.a), search_.bounding_radius(contact.b));
+    ContactsAhead ahead;
+    if (approach < -slow && size > 0.0) {
+      ahead = FindContactsAhead(model, state, contact, approach, size, touch, slow);
+    }
+    if (ahead.count == 0) {
+      AddTouching(model, state, contact);
+    }
+    for (int k = 0; k < ahead.count; ++k) {
+      AddTouching(model, state, ahead.contacts[k]);
+    }
+  }
+  for (size_t j = 0; j < structure.joints.size(); ++j) {
+    const JointIndex& joint = structure.joints[j];
+    if (joint.low < 0) {
+      continue;
+    }
+    JointRows<double> joint_rows;
+    EvaluateJoint(joint.type, state.PoseOf(joint.a), state.PoseOf(joint.b),
+                  &model.numbers[joint.geometry], &joint_rows);
+    for (const double side : {1.0, -1.0}) {
+      ActiveContact limit;
+      limit.a = joint.a;
+      limit.b = joint.b;
+      limit.joint = static_cast<int>(j);
+      limit.side = side;
+      limit.law = ContactLaw::kInelastic;
+      ContactRows<double> rows;
+      EvaluateLimitRows(model, joint_rows, limit, &rows);
+      limit.gap = rows.geometry.gap;
+      if (limit.gap <= kLimitTolerance) {
+        touching_.contacts.push_back(limit);
+        touching_.friction.emplace_back();
+        touching_.restitution.emplace_back();
+        touching_.approach.push_back(
+            RelativeSpeed(state, limit.a, rows.normal_a, limit.b, rows.normal_b));
+        touching_.slip.push_back(0.0);
+      }
+    }
+  }
+}
+
+}  // namespace tangible
