@@ -366,6 +366,9 @@ EventOutcome EventStepper::Advance(const Model<double>& model, double t, double 
         !AddInstant(model, now, EventKind::kStepEnd, nullptr, state, &outcome)) {
       return fail(outcome.message);
     }
+    if (now == t) {
+      KeepBrokenLimits();
+    }
     if (starts_ && !at_end) {
       // It has put twists back that the joints do not allow: what slides now, and where to, is
       // another.
@@ -436,6 +439,13 @@ EventOutcome EventStepper::Advance(const Model<double>& model, double t, double 
     const bool counts = segment.event != EventKind::kTouch || segment.length <= 1e-13 * h;
     if (counts && ++outcome.events > most) {
       return fail("events do not end");
+    }
+  }
+  if (!broken_limits_.empty()) {
+    FindTouching(model, *state);
+    if (const int limit = LimitBrokenFurther(); limit >= 0) {
+      return fail(NameOfContact(*model.structure, touching_.contacts, limit) +
+                  ": another one breaks it further");
     }
   }
   return outcome;

@@ -84,6 +84,11 @@ class EventStepper {
   void FindTouching(const Model<double>& model, const State<double>& state);
   void AddTouching(const Model<double>& model, const State<double>& state,
                    const ActiveContact& contact);
+  /// Of joints' limits that are broken as a step starts: one that is broken further as it ends,
+  /// among what touches; −1: none. What is held moves back or stays, but for another one that
+  /// pushes it.
+  void KeepBrokenLimits();
+  int LimitBrokenFurther() const;
   bool SolveImpacts(const Model<double>& model, double t, State<double>* state,
                     EventOutcome* outcome);
   /// Poisson's law: after the compression each contact that rebounds pushes with at least e times
@@ -120,6 +125,7 @@ class EventStepper {
   AssemblyScratch<double> assembly_;
   AccelerationScratch<double> acceleration_;
   Touching touching_;
+  std::vector<ActiveContact> broken_limits_;
   std::vector<bool> rebounds_;  ///< of the last impact's contacts
   DecompressionSolver decompression_;
   // The last modes, which are the next guess.

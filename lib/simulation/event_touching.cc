@@ -82,4 +82,27 @@ void EventStepper::FindTouching(const Model<double>& model, const State<double>&
   }
 }
 
+void EventStepper::KeepBrokenLimits() {
+  constexpr double kBroken = 1e-6;  // rad or m
+  broken_limits_.clear();
+  for (const ActiveContact& contact : touching_.contacts) {
+    if (contact.joint >= 0 && contact.gap < -kBroken) {
+      broken_limits_.push_back(contact);
+    }
+  }
+}
+
+int EventStepper::LimitBrokenFurther() const {
+  constexpr double kFurther = 1e-9;  // rad or m
+  for (const ActiveContact& broken : broken_limits_) {
+    for (size_t i = 0; i < touching_.contacts.size(); ++i) {
+      const ActiveContact& now = touching_.contacts[i];
+      if (now.SameAs(broken) && now.gap < broken.gap - kFurther) {
+        return static_cast<int>(i);
+      }
+    }
+  }
+  return -1;
+}
+
 }  // namespace tangible

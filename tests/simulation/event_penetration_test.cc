@@ -231,5 +231,32 @@ TEST(EventPenetrationTest, WhatACorrectionTurnsReturnsAtOnce) {
   EXPECT_EQ(at_once, 1);
 }
 
+// Two hinges of the same bodies whose limits leave no angle: to move one out of its limit breaks
+// the other's further.
+TEST(EventPenetrationTest, LimitsThatContradictEachOtherAreTold) {
+  const auto status_of =
+      [](const char* low, const char* high, std::string* message) {
+        Model<double> model;
+        State<double> initial, final;
+        BuildModel(test_scenes::SceneOf(std::string(R"({"bodies": [
+        {"name": "bar", "shape": {"box": {"size": [1, 0.1]}}, "mass": 1, "position": [0.5, 0]}],
+      "joints": [{"name": "first", "type": "revolute", "bodies": ["bar", "world"], "anchor": [0, 0],
+                  "limits": )") + low + R"(}, {"name": "second", "type": "revolute",
+                  "bodies": ["bar", "world"], "anchor": [0, 0], "limits": )" +
+                                        high + R"(}],
+      "simulation": {"dt": 0.01, "duration": 0.3, "stepping": "event",
+                     "integrator": "trapezoidal"}})"),
+                   &model, &initial);
+        const RolloutReport report = Rollout(model, initial, nullptr, &final);
+        *message = report.message;
+        return report.status;
+      };
+  std::string message;
+  EXPECT_EQ(status_of("[0.1, 1]", "[-1, -0.1]", &message), StepStatus::kUnsolved);
+  EXPECT_NE(message.find("another one breaks it further"), std::string::npos) << message;
+  EXPECT_EQ(status_of("[0.1, 1]", "[-1, 0.2]", &message), StepStatus::kDone) << message;
+  EXPECT_EQ(status_of("[0.1, 1]", "[0.2, 0.5]", &message), StepStatus::kDone) << message;
+}
+
 }  // namespace
 }  // namespace tangible
