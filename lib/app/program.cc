@@ -293,6 +293,21 @@ std::string OutputOverInput(const std::vector<std::string>& flags) {
   return "";
 }
 
+namespace {
+
+// The file that links name, which may not be there yet: it is to be replaced and not the link.
+std::filesystem::path FollowLinks(std::filesystem::path path) {
+  constexpr int kMostLinks = 40;
+  std::error_code error;
+  for (int k = 0; k < kMostLinks && std::filesystem::is_symlink(path, error); ++k) {
+    const std::filesystem::path next = std::filesystem::read_symlink(path, error);
+    path = next.is_absolute() ? next : path.parent_path() / next;
+  }
+  return path;
+}
+
+}  // namespace
+
 std::string WriteFileAtomically(const std::string& path, std::string_view text, Over over) {
   namespace fs = std::filesystem;
   if (over == Over::kNoInput) {
@@ -307,8 +322,8 @@ std::string WriteFileAtomically(const std::string& path, std::string_view text, 
         fs::is_directory(status) ? "it is a directory" : WriteDirectly(path, text);
     return reason.empty() ? "" : Unwritable(path, reason);
   }
-  // A link is followed, so that the file it names is replaced and not the link.
-  const fs::path target = fs::exists(status) ? fs::canonical(path, error) : fs::path(path);
+  const fs::path target = FollowLinks(path);
+  if (fs::is_symlink(target, error)) return Unwritable(path, "its links lead round");
   const std::string temporary = target.string() + ".tmp" + std::to_string(::getpid());
   const std::string reason = WriteDirectly(temporary, text);
   if (!reason.empty()) {

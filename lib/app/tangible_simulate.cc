@@ -5,6 +5,7 @@
 
 #include <gflags/gflags.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <ctime>
@@ -75,13 +76,16 @@ std::string CheckBatchFlags() {
   return "";
 }
 
+// m; what it adds to a position is finite.
+constexpr double kMaxNoise = 1e150;
+
 // Empty, or one line about a flag's value.
 std::string CheckFlags() {
   if (FLAGS_every < 1) {
     return "--every: expected a number >= 1, got " + std::to_string(FLAGS_every);
   }
-  if (!(FLAGS_noise >= 0.0 && std::isfinite(FLAGS_noise))) {
-    return "--noise: expected a number >= 0, got " + FormatNumber(FLAGS_noise);
+  if (!(FLAGS_noise >= 0.0 && FLAGS_noise <= kMaxNoise)) {
+    return "--noise: expected a number from 0 to 1e150, got " + FormatNumber(FLAGS_noise);
   }
   if (!(FLAGS_rate >= 0.0 && std::isfinite(FLAGS_rate))) {
     return "--rate: expected a number >= 0, got " + FormatNumber(FLAGS_rate);
@@ -126,7 +130,8 @@ struct Job {
   std::string error;
 };
 
-constexpr double kMaxSamples = 1e9;
+// Lines of observations, which are written at once as the run ends.
+constexpr double kMaxSamples = 1e7;
 
 void MakeRecorders(Job* job) {
   const ModelStructure& structure = *job->model.structure;
@@ -138,13 +143,16 @@ void MakeRecorders(Job* job) {
   if (!FLAGS_summary.empty()) r.summary.emplace();
   if (FLAGS_certify) r.certifier.emplace();
   if (FLAGS_observe.empty()) return;
-  const double samples = FLAGS_rate * structure.settings.duration;
-  if (samples > kMaxSamples) {
-    job->error = "--rate: expected at most 1e9 samples in the run, got " + FormatNumber(samples);
-    return;
-  }
   ObserveOptions options{{}, FLAGS_rate, FLAGS_noise, FLAGS_seed};
   if (!FLAGS_points.empty()) job->error = ReadPoints(FLAGS_points, structure, &options.points);
+  const std::size_t points =
+      options.points.empty() ? structure.moving.size() : options.points.size();
+  const double samples =
+      FLAGS_rate * structure.settings.duration * static_cast<double>(std::max<size_t>(points, 1));
+  if (samples > kMaxSamples) {
+    job->error = "--rate: expected at most 1e7 samples in the run, got " + FormatNumber(samples);
+    return;
+  }
   r.observations.emplace(structure, std::move(options));
 }
 

@@ -4,6 +4,7 @@
 // closed, a kill in the middle of a write. Each is exit status 1 and one line, and a file is the
 // old or the whole new one.
 #include <fcntl.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cmath>
@@ -263,6 +264,42 @@ json WithoutSeconds(json value) {
     }
   }
   return value;
+}
+
+// The first checkpoint holds little; what follows it is above the limit of sixteen blocks.
+TEST_F(FaultsTest, ACheckpointThatCannotBeWrittenOnTheWayIsAFailure) {
+  const std::string file = std::string(TANGIBLE_SOURCE_DIR) + "/data/fits/chain.json";
+  const Job fit{"tangible-fit", "'" + file + "' --checkpoint=c.json", {}};
+  ExpectOneLine(
+      RunIn("ulimit -f 16; exec", fit, "", "> result.json"), 1,
+      "c.json: cannot be written: File too large: the fit went on without its checkpoint");
+  EXPECT_TRUE(std::filesystem::exists(Path("c.json")));
+  EXPECT_EQ(Temporaries(), std::vector<std::string>());
+}
+
+TEST_F(FaultsTest, AFitThatIsDoneLeavesItsCheckpointAsItIs) {
+  const Job fit{"tangible-fit", "fit.json --checkpoint=c.json", {}};
+  ASSERT_EQ(RunIn("", fit, "", "> first.json").exit_status, 0);
+  struct stat written;
+  ASSERT_EQ(::stat(Path("c.json").c_str(), &written), 0);
+  ASSERT_EQ(RunIn("", fit, "", "> second.json").exit_status, 0);
+  struct stat left;
+  ASSERT_EQ(::stat(Path("c.json").c_str(), &left), 0);
+  EXPECT_EQ(left.st_ino, written.st_ino);  // a file written anew is another one
+  EXPECT_EQ(left.st_size, written.st_size);
+}
+
+TEST_F(FaultsTest, LinksAreFollowedToFilesThatAreNotThereYet) {
+  namespace fs = std::filesystem;
+  fs::create_symlink("../new.csv", Path("folder/second"));
+  fs::create_symlink("folder/second", Path("first"));
+  const Job simulate{"tangible-simulate", "ball.json", {}};
+  EXPECT_EQ(RunIn("", simulate, "--out=first", "").exit_status, 0);
+  EXPECT_TRUE(fs::is_symlink(Path("first")));
+  EXPECT_TRUE(fs::is_symlink(Path("folder/second")));
+  EXPECT_EQ(Read(Path("new.csv")).rfind("time,body,x", 0), 0u);
+  fs::create_symlink("round", Path("round"));
+  ExpectOneLine(RunIn("", simulate, "--out=round", ""), 1, "round: cannot be written: ");
 }
 
 TEST_F(FaultsTest, AKilledFitGoesOnFromItsCheckpointToTheSameBits) {

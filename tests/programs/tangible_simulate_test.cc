@@ -386,7 +386,9 @@ TEST_F(TangibleSimulateTest, WrongFlagsAreUsage) {
   ExpectOneLine(Simulate(kFall, "--noise=1"), 2, "--observe");
   ExpectOneLine(Simulate(kFall, "--observe=o.csv --noise=-1"), 2, "--noise");
   ExpectOneLine(Simulate(kFall, "--observe=o.csv --noise=nan"), 2, "--noise");
+  ExpectOneLine(Simulate(kFall, "--observe=o.csv --noise=1e308"), 2, "--noise: expected a number");
   ExpectOneLine(Simulate(kFall, "--observe=o.csv --rate=-1"), 2, "--rate");
+  ExpectOneLine(Simulate(kFall, "--observe=o.csv --rate=1e9"), 1, "--rate: expected at most");
   ExpectOneLine(Simulate(kFall, "--speed=3"), 2, "speed");
   ExpectOneLine(Run("tangible-simulate", ""), 2, "tangible-simulate");
   EXPECT_EQ(Run("tangible-simulate", "--help").exit_status, 0);
