@@ -59,6 +59,7 @@ class RolloutCertifier {
   void AddImpact(const Model<double>& model, long step, Impulses* impact);
   void AddSegment(const Model<double>& model, long step, EventDerivative* derivative,
                   Segment* segment);
+  void AddClosedAtOnce(const ModelStructure& s, long step, const Segment& segment);
   void AddQuality(const ContactProblem<double>& problem, const std::vector<ContactMode>& modes,
                   ContactSystem* system);
   void AddUnloaded(const Model<double>& model, long step, const Impulses& impact);

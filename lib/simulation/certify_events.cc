@@ -282,6 +282,32 @@ void RolloutCertifier::AddImpact(const Model<double>& model, long step, Impulses
   AddQuality(impact->problem, impact->solution.modes, &impact->system);
 }
 
+// Contacts of different pairs that begin to bear a body at the same time: were one the first, it
+// would bear it alone for as long.
+void RolloutCertifier::AddClosedAtOnce(const ModelStructure& s, long step, const Segment& segment) {
+  std::vector<size_t> begun;
+  for (size_t i = 0; i < segment.contacts.size(); ++i) {
+    const ActiveContact& contact = segment.contacts[i];
+    const bool is_loaded = std::any_of(loaded_.begin(), loaded_.end(),
+                                       [&](const auto& l) { return l.SameAs(contact); });
+    if (contact.joint >= 0 || !is_loaded || HasPair(closed_, contact)) {
+      continue;
+    }
+    for (const size_t k : begun) {
+      const ActiveContact& other = segment.contacts[k];
+      for (const int body : {contact.a, contact.b}) {
+        const bool shares = body == other.a || body == other.b;
+        if (shares && s.bodies[body].block >= 0 &&
+            !(contact.a == other.a && contact.b == other.b)) {
+          AddMargin(0.0, {&s, step, segment.time, i, &contact, segment.modes[i]},
+                    "two contacts of " + s.bodies[body].name + " close at once");
+        }
+      }
+    }
+    begun.push_back(i);
+  }
+}
+
 void RolloutCertifier::AddSegment(const Model<double>& model, long step,
                                   EventDerivative* derivative, Segment* segment) {
   const ModelStructure& s = *model.structure;
@@ -335,6 +361,9 @@ void RolloutCertifier::AddSegment(const Model<double>& model, long step,
     } else if (wanted && friction.value == 0.0) {
       OneSided("friction is 0, " + place.Text());
     }
+  }
+  if (!segment->starts && (step > 0 || segment->time > 0.0)) {
+    AddClosedAtOnce(s, step, *segment);
   }
   closed_ = segment->contacts;
   double terms;

@@ -88,7 +88,7 @@ double EventDerivative::NodeTangent(const Model<double>& model, const Segment& s
   const int columns = static_cast<int>(x.cols());
   solved->setZero(3 * static_cast<Eigen::Index>(node->system.num_blocks()), columns);
   Visit(model, segment, *node, correction, TangentSink{x.data(), solved->data(), columns});
-  // Out of penetration by recovery_speed times the segment's length.
+  // Out of penetration by recovery_speed times the segment's length, in the first correction.
   for (size_t i = 0; tau_dot != nullptr && i < segment.contacts.size(); ++i) {
     const int block = node->system.contact_block()[i];
     if (segment.contacts[i].law == ContactLaw::kRecovery && block >= 0) {
@@ -163,7 +163,7 @@ double EventDerivative::SegmentTangent(const Model<double>& model, Segment* segm
   for (int k = 0; k < segment->num_corrections; ++k) {
     RowMatrixXd correction;
     left = std::max(left, NodeTangent(model, *segment, &segment->corrections[k], true, *x,
-                                      &correction, &tau_dot));
+                                      &correction, k == 0 ? &tau_dot : nullptr));
     for (int block = 0; block < s.num_blocks(); ++block) {
       PoseRows(s, s.moving[block], *x) += BlockRows(block, correction);
     }

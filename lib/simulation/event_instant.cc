@@ -42,6 +42,7 @@ bool EventStepper::AddInstant(const Model<double>& model, double t, EventKind ki
   // Contacts in penetration are those of a step's length: rounding is none.
   if (!ChooseModes(model, t, t, model.structure->settings.dt, state, outcome, &segment)) {
     record_.num_parts = parts;
+    outcome->message.clear();
     return true;  // without accelerations there is nothing to say
   }
   segment.event = kind;

@@ -404,7 +404,7 @@ class EventReplay {
       ContactProblem<T> problem;
       AccelerationScratch<T> scratch;
       AssembleCorrection(model_, *after, segment->contacts, segment->friction,
-                         T(s_.settings.recovery_speed * tau), &scratch, &problem);
+                         k == 0 ? T(s_.settings.recovery_speed * tau) : T(0.0), &scratch, &problem);
       ContactSolution<T> correction;
       Solve(problem, node.problem, node.solution,
             std::vector<double>(segment->contacts.size(), 0.0), &node.system, &correction);

@@ -128,7 +128,10 @@ bool EventStepper::SolveImpacts(const Model<double>& model, double t, State<doub
       ++outcome->fallbacks;
     }
     if (outcome->events > kGiveUp * settings.max_events_per_step + kGiveUp) {
-      outcome->message = "events do not end";
+      const auto fastest = std::min_element(touching_.approach.begin(), touching_.approach.end());
+      outcome->message = "impacts do not end: " +
+                         NameOfContact(*model.structure, touching_.contacts,
+                                       static_cast<int>(fastest - touching_.approach.begin()));
       return false;
     }
     EventPart* part = record_.Add();
@@ -274,6 +277,11 @@ bool EventStepper::ChooseModes(const Model<double>& model, double t, double midd
   const ContactSolverReport solved = solver_.Solve(problem, SolverOptionsOf(settings), &solution);
   CountSolve(solved, outcome);
   if (!solved.solved) {
+    outcome->message = "accelerations";
+    if (solved.worst_contact >= 0) {
+      outcome->message +=
+          ": " + NameOfContact(*model.structure, segment->contacts, solved.worst_contact);
+    }
     return false;
   }
   last_contacts_ = segment->contacts;
@@ -397,9 +405,10 @@ EventOutcome EventStepper::Advance(const Model<double>& model, double t, double 
     if (!ChooseModes(model, now, middle, until - now, state, &outcome, &segment)) {
       record_.num_parts = parts;
       if (impulses_tried || !SolveByShortStep(model, now, h, state, &outcome)) {
-        return fail(outcome.message.empty() ? "accelerations" : outcome.message);
+        return fail(outcome.message);
       }
       impulses_tried = true;
+      outcome.message.clear();
       continue;
     }
     impulses_tried = false;
@@ -438,12 +447,14 @@ EventOutcome EventStepper::Advance(const Model<double>& model, double t, double 
     SwitchMode(segment);
     const bool counts = segment.event != EventKind::kTouch || segment.length <= 1e-13 * h;
     if (counts && ++outcome.events > most) {
-      return fail("events do not end");
+      return fail("events do not end: " +
+                  NameOfContact(*model.structure, {segment.event_contact}, 0));
     }
   }
   if (!broken_limits_.empty()) {
     FindTouching(model, *state);
-    if (const int limit = LimitBrokenFurther(); limit >= 0) {
+    if (const int limit = LimitBrokenFurther(model.structure->settings.recovery_speed * h);
+        limit >= 0) {
       return fail(NameOfContact(*model.structure, touching_.contacts, limit) +
                   ": another one breaks it further");
     }

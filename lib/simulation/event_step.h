@@ -86,9 +86,9 @@ class EventStepper {
                    const ActiveContact& contact);
   /// Of joints' limits that are broken as a step starts: one that is broken further as it ends,
   /// among what touches; −1: none. What is held moves back or stays, but for another one that
-  /// pushes it.
+  /// recovers, which has `moved` in the step.
   void KeepBrokenLimits();
-  int LimitBrokenFurther() const;
+  int LimitBrokenFurther(double moved) const;
   bool SolveImpacts(const Model<double>& model, double t, State<double>* state,
                     EventOutcome* outcome);
   /// Poisson's law: after the compression each contact that rebounds pushes with at least e times

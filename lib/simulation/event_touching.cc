@@ -92,12 +92,12 @@ void EventStepper::KeepBrokenLimits() {
   }
 }
 
-int EventStepper::LimitBrokenFurther() const {
-  constexpr double kFurther = 1e-9;  // rad or m
+int EventStepper::LimitBrokenFurther(double moved) const {
+  constexpr double kFurther = 0.1;  // less may be the integrator's error
   for (const ActiveContact& broken : broken_limits_) {
     for (size_t i = 0; i < touching_.contacts.size(); ++i) {
       const ActiveContact& now = touching_.contacts[i];
-      if (now.SameAs(broken) && now.gap < broken.gap - kFurther) {
+      if (now.SameAs(broken) && now.gap < broken.gap - kFurther * moved) {
         return static_cast<int>(i);
       }
     }

@@ -259,7 +259,15 @@ bool SegmentFlow::SolveImplicitStage(const Model<double>& model, Segment* segmen
       }
     }
   }
-  *message = "the trapezoidal rule's iteration does not converge: dt is too large";
+  size_t worst = 0;
+  for (size_t k = 1; k < start.size(); ++k) {
+    worst = std::abs(acceleration[k] - start[k]) > std::abs(acceleration[worst] - start[worst])
+                ? k
+                : worst;
+  }
+  *message = "the trapezoidal rule's iteration does not converge (body " +
+             model.structure->bodies[model.structure->moving[worst / 3]].name +
+             "): dt is too large";
   return false;
 }
 
@@ -338,9 +346,11 @@ bool SegmentFlow::CorrectPoses(const Model<double>& model, Segment* segment, std
   if (segment->contacts.empty() && !joints) {
     return true;
   }
-  bool once = joints && settings.joint_correction == JointCorrection::kBaumgarte;
+  const bool once = joints && settings.joint_correction == JointCorrection::kBaumgarte;
+  // What recovers may move another contact off its surface: then there is an error that stays.
+  bool recovers = false;
   for (const ActiveContact& contact : segment->contacts) {
-    once = once || contact.law == ContactLaw::kRecovery;
+    recovers = recovers || contact.law == ContactLaw::kRecovery;
   }
   const std::vector<ContactMode> modes(segment->contacts.size(), ContactMode::kClosed);
   double last = HUGE_VAL;
@@ -351,8 +361,10 @@ bool SegmentFlow::CorrectPoses(const Model<double>& model, Segment* segment, std
     SolvedNode& node = segment->corrections[k];
     node.state = segment->after;
     node.time = segment->time + segment->length;
+    // What recovers from penetration does so by the first correction, and is held by the others.
     AssembleCorrection(model, node.state, segment->contacts, segment->friction,
-                       settings.recovery_speed * segment->length, &acceleration_, &node.problem);
+                       k == 0 ? settings.recovery_speed * segment->length : 0.0, &acceleration_,
+                       &node.problem);
     if (k == 0 && settings.joint_correction == JointCorrection::kProjection &&
         DriftsFar(model, node.problem)) {
       // So they do where links whip faster than dt resolves, and where the implicit stage has found
@@ -363,7 +375,8 @@ bool SegmentFlow::CorrectPoses(const Model<double>& model, Segment* segment, std
     const double error = CorrectedError(node.problem);
     // Newton's method squares the error; what is small and does not shrink any more is rounding.
     const double allowed = std::max(settings.joint_tolerance, 1e-9);
-    if (k > 0 && (once || error <= 1e-15 || (error > 0.1 * last && error <= allowed))) {
+    const bool shrinks = error <= 0.1 * last;
+    if (k > 0 && (once || error <= 1e-15 || (!shrinks && (recovers || error <= allowed)))) {
       break;
     }
     if (k + 1 == kMostCorrections || (k > 0 && error >= last)) {
