@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 #include <sys/wait.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cstdlib>
@@ -26,7 +27,9 @@ class ProgramTest : public testing::Test {
  protected:
   void SetUp() override {
     const auto* info = testing::UnitTest::GetInstance()->current_test_info();
-    std::string name = std::string(info->test_suite_name()) + "." + info->name();
+    // With the process in it: another build's tests may run at the same time.
+    std::string name = std::string(info->test_suite_name()) + "." + info->name() + "." +
+                       std::to_string(::getpid());
     std::replace(name.begin(), name.end(), '/', '_');
     folder_ = std::filesystem::temp_directory_path() / name;
     std::filesystem::remove_all(folder_);

@@ -140,6 +140,41 @@ Finding CornerOnCorner(const std::string& stepping) {
   return finding;
 }
 
+// A box slides over forty tiles that lie flush, in a frame that is turned by `tilt`: corner meets
+// corner at every seam, up to rounding.
+Finding FlushTiles(const std::string& stepping, double tilt) {
+  constexpr double kSpeed = 2.0;
+  constexpr double kTile = 0.1;
+  constexpr int kTiles = 40;
+  const double c = std::cos(tilt);
+  const double s = std::sin(tilt);
+  Scene scene = NewScene("tiles", stepping, 0.01, 1.0);
+  scene.gravity = {9.81 * s, -9.81 * c};
+  const auto place = [&](BasicBody<double>* body, double x, double y) {
+    body->position = {c * x - s * y, s * x + c * y};
+    body->angle = tilt;
+  };
+  BasicBody<double>& box = AddBox(&scene, "box", 0.3, 0.2, 1.0, 0.0, 0.0);
+  place(&box, 0.5, 0.1);
+  box.velocity = {c * kSpeed, s * kSpeed};
+  for (int i = 0; i < kTiles; ++i) {
+    BasicBody<double>& tile = AddBox(&scene, "tile" + std::to_string(i), kTile, 0.1, 0.0, 0.0, 0.0);
+    tile.motion = Motion::kStatic;
+    place(&tile, (i + 0.5) * kTile, -0.05);
+  }
+  const MeasuredRun run = RunScene(scene);
+  Finding finding;
+  AddDone(run, &finding);
+  finding.figures.push_back({"speed lost, of that along the tiles",
+                             1.0 - (c * run.vx("box") + s * run.vy("box")) / kSpeed, 1e-9, "1",
+                             "no friction, and no edge in the way"});
+  finding.figures.push_back({"height above the tiles", c * run.y("box") - s * run.x("box") - 0.1,
+                             1e-9, "m", "it stays on them"});
+  AddGradient(scene, 40, {"bodies/box/mass", "bodies/box/velocity/x", "gravity/y"},
+              Differences::kTake, &finding);
+  return finding;
+}
+
 }  // namespace
 
 void AddGeometry(std::vector<ExtremeCase>* cases) {
@@ -155,6 +190,8 @@ void AddGeometry(std::vector<ExtremeCase>* cases) {
     add("discs with one centre", [=] { return Part(TwoDiscs(stepping, 0.0), pair); });
     add("discs, centres 1e-12 m apart", [=] { return Part(TwoDiscs(stepping, 1e-12), pair); });
     add("corner on corner", [=] { return CornerOnCorner(stepping); });
+    add("box slides over flush tiles", [=] { return FlushTiles(stepping, 0.0); });
+    add("box slides over flush tiles, turned", [=] { return FlushTiles(stepping, 0.3); });
     for (const double thickness : {1e-3, 1e-6, 1e-9}) {
       char text[32];
       std::snprintf(text, sizeof(text), "%g m", thickness);

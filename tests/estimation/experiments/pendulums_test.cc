@@ -5,6 +5,7 @@
 #include "tangible/estimation/experiments/pendulums.h"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <cmath>
 #include <filesystem>
@@ -22,7 +23,8 @@ class PendulumsTest : public testing::Test {
     }
     // The fit files look for scenes and observations beside their own folder.
     const auto* info = testing::UnitTest::GetInstance()->current_test_info();
-    folder_ = std::filesystem::temp_directory_path() / (std::string("pendulums_") + info->name());
+    folder_ = std::filesystem::temp_directory_path() /
+              (std::string("pendulums_") + info->name() + "." + std::to_string(::getpid()));
     std::filesystem::remove_all(folder_);
     std::filesystem::create_directories(folder_);
     std::filesystem::copy(TANGIBLE_SOURCE_DIR "/data", folder_ / "data",

@@ -2,6 +2,7 @@
 #include "tangible/verification/corpus/problem_folder.h"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <filesystem>
 #include <fstream>
@@ -25,7 +26,8 @@ class ProblemFolderTest : public ::testing::Test {
 
   std::filesystem::path folder_ =
       std::filesystem::temp_directory_path() /
-      (std::string("tangible_") + ::testing::UnitTest::GetInstance()->current_test_info()->name());
+      (std::string("tangible_") + ::testing::UnitTest::GetInstance()->current_test_info()->name() +
+       "." + std::to_string(::getpid()));
   std::vector<FileCase> cases_;
 };
 
