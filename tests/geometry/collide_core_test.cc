@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <optional>
 #include <random>
 
 #include "random_shapes.h"
@@ -64,6 +65,53 @@ TEST(CollideCoreTies, ATipBeforeTheEndOfAFaceIsNotLost) {
         << rise;
     EXPECT_NEAR(contacts.geometry[0].gap, 0.004269, 1e-6) << rise;
   }
+}
+
+// A box that slides off the end of a table. Where it has only one contact left, and then another
+// one, must not depend on how long the table is: a derivative with respect to that would be
+// missing.
+TEST(CollideCoreTies, WhereFeaturesChangeDoesNotDependOnTheFacesLength) {
+  const auto place_of_change = [](double width, int count) {
+    const TestShape table = Box(width, 0.5);
+    const TestShape box = Box(0.5, 0.25);
+    double low = -1e-6;
+    double high = 1e-6;
+    while (high - low > 1e-16) {
+      const double middle = 0.5 * (low + high);
+      // The table ends at x = 0, and the box begins at `middle`.
+      const Contacts found =
+          Collide(table, At(-0.5 * width, -0.25, 0.0), box, At(0.25 + middle, 0.125, 0.0));
+      const bool on_table = found.count >= count && std::abs(found.geometry[0].normal.y()) > 0.9;
+      (on_table ? low : high) = middle;
+    }
+    return low;
+  };
+  for (const int count : {1, 2}) {
+    const double place = place_of_change(1.0, count);
+    EXPECT_NEAR(place, 0.0, 1e-8);
+    EXPECT_NEAR(place_of_change(1.25, count), place, 1e-14) << count;
+    EXPECT_NEAR(place_of_change(1.4375, count), place, 1e-14) << count;
+  }
+}
+
+// At a point of overlap, by rounding more or less, there is one contact and always the same one.
+TEST(CollideCoreTies, FacesThatOverlapInAPointHaveOneContact) {
+  const TestShape table = Box(1.0, 0.5);
+  const TestShape box = Box(0.5, 0.25);
+  std::optional<ContactFeature> first;
+  for (const double rise : {0.0, 1e-17, -1e-17, 1e-16, -1e-16, 1e-12, -1e-12}) {
+    for (const double over : {0.0, 1e-16, -1e-16, 1e-12, -1e-12, 1e-10, -1e-10}) {
+      const Contacts found =
+          Collide(table, At(-0.5, -0.25, 0.0), box, At(0.25 + over, 0.125 + rise, 1e-17));
+      ASSERT_EQ(found.count, 1) << rise << " " << over;
+      // Of the two faces' normals either is as good: so deep is it behind neither.
+      if (std::abs(found.geometry[0].normal.y()) > 0.9) {
+        first = first.value_or(found.features[0]);
+        EXPECT_TRUE(found.features[0] == *first) << rise << " " << over;
+      }
+    }
+  }
+  EXPECT_TRUE(first.has_value());
 }
 
 TEST(CollideCoreRandom, PointIsMidwayBetweenTheSurfaces) {
