@@ -183,15 +183,19 @@ OrderedJson ToJson(const std::vector<CaseResult>& results) {
 std::string Page(const std::vector<CaseResult>& results, const std::string& origin) {
   std::string body =
       "<h1>At the extremes</h1>\n<p>" + HtmlEscape(SummaryText(Count(results))) + "</p>\n";
-  std::vector<std::vector<std::string>> rows, not_holding;
+  std::vector<std::vector<std::string>> rows, gradients, not_holding;
   const auto flush = [&](const std::string& group) {
     if (rows.empty()) return;
     body += "<h2>" + HtmlEscape(group) + "</h2>\n" +
             HtmlTable({"case", "stepping", "figure", "measured", "bound", "unit", "why this bound",
-                       "verdict", "s", "gradient finite", "adjoint off", "differences off",
+                       "verdict", "s"},
+                      rows) +
+            "<h3>" + HtmlEscape(group) + ": gradients, and what was chosen</h3>\n" +
+            HtmlTable({"case", "stepping", "finite", "adjoint off", "differences off",
                        "certificate", "note"},
-                      rows);
+                      gradients);
     rows.clear();
+    gradients.clear();
   };
   std::string group;
   for (const CaseResult& result : results) {
@@ -203,28 +207,26 @@ std::string Page(const std::vector<CaseResult>& results, const std::string& orig
       flush(group);
       group = result.group;
     }
-    const GradientFinding& gradient = result.finding.gradient;
-    std::vector<std::string> row = {result.name, result.stepping};
     if (result.finding.figures.empty()) {
       rows.push_back({result.name, result.stepping, result.message, "", "", "", "",
                       NameOf(result.verdict()), Format("%.2f", result.seconds)});
     }
     for (const Figure& figure : result.finding.figures) {
-      row.insert(row.end(), {figure.what, Format("%.3g", figure.value), Bound(figure), figure.unit,
-                             figure.reason, figure.holds() ? "holds" : "does not hold"});
-      if (&figure == &result.finding.figures[0]) {
-        row.push_back(Format("%.2f", result.seconds));
-        if (gradient.taken) {
-          row.insert(row.end(), {gradient.finite ? "yes" : "no", Error(gradient.adjoint),
-                                 Error(gradient.differences),
-                                 gradient.message.empty() ? gradient.verdict : gradient.message});
-        } else {
-          row.insert(row.end(), {"", "", "", "not taken"});
-        }
-        row.push_back(result.finding.note);
-      }
-      rows.push_back(std::move(row));
-      row = {"", ""};
+      const bool first = &figure == &result.finding.figures[0];
+      rows.push_back({first ? result.name : "", first ? result.stepping : "", figure.what,
+                      Format("%.3g", figure.value), Bound(figure), figure.unit, figure.reason,
+                      figure.holds() ? "holds" : "does not hold",
+                      first ? Format("%.2f", result.seconds) : ""});
+    }
+    const GradientFinding& gradient = result.finding.gradient;
+    if (gradient.taken) {
+      gradients.push_back({result.name, result.stepping, gradient.finite ? "yes" : "no",
+                           Error(gradient.adjoint), Error(gradient.differences),
+                           gradient.message.empty() ? gradient.verdict : gradient.message,
+                           result.finding.note});
+    } else {
+      gradients.push_back(
+          {result.name, result.stepping, "", "", "", "not taken", result.finding.note});
     }
   }
   flush(group);
