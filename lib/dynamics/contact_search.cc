@@ -128,11 +128,18 @@ ContactsAhead ContactSearch::FindPassed(const Model<double>& model, const State<
   constexpr double kNone = 1e-9;  // of the bodies' speeds, and of the smaller one's size
   const double slow = kNone * (bound_[contact.a] + bound_[contact.b]);
   const double size = std::min(radius_[contact.a], radius_[contact.b]);
-  if (!(approach < -slow) || size == 0.0 || contact.gap < -kNone * size) {
+  if (!(approach < -slow) || size == 0.0) {
     return ContactsAhead();
   }
-  const ContactsAhead ahead =
-      FindContactsAhead(model, state, contact, approach, size, kNone * size, slow);
+  double place = 0.0;  // m, whose rounding counts far from the origin
+  for (const int body : {contact.a, contact.b}) {
+    place = std::max({place, std::abs(state.pose[3 * body]), std::abs(state.pose[3 * body + 1])});
+  }
+  const double none = kNone * size + 64.0 * std::numeric_limits<double>::epsilon() * place;
+  if (contact.gap < -none) {
+    return ContactsAhead();
+  }
+  const ContactsAhead ahead = FindContactsAhead(model, state, contact, approach, size, none, slow);
   for (int k = 0; k < ahead.count; ++k) {
     if (ahead.speed[k] < -slow) {
       return ContactsAhead();
@@ -194,7 +201,7 @@ void ContactSearch::Find(const Model<double>& model, const State<double>& state,
       contact.gap = gap;
       contact.law = GapLaw(gap, h, settings);
       const double approach = RelativeSpeed(state, a, rows.normal_a, b, rows.normal_b);
-      if (!passes_by && gap + h * approach < 0.0) {
+      if (!passes_by && gap + h * approach < settings.contact_margin) {
         const ContactsAhead ahead = FindPassed(model, state, contact, approach);
         if (ahead.count > 0) {
           passes_by = true;

@@ -93,7 +93,10 @@ class EventSearch {
     return radius_[a] > 0.0 && radius_[b] > 0.0 ? std::min(radius_[a], radius_[b])
                                                 : std::max(radius_[a], radius_[b]);
   }
+  double AlignedWithin(int a, int b) const;
   bool HasPassed(const State<double>& state, int a, int b) const;
+  bool Continues(const Model<double>& model, const State<double>& state,
+                 const ActiveContact& contact, const ContactFeature* features, int count) const;
   bool MovesLittle(const Model<double>& model, const State<double>& before,
                    const State<double>& after, double length, int a, int b) const;
   double TouchStart(const Model<double>& model, double speed, double acceleration) const;

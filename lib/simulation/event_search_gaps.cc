@@ -100,8 +100,14 @@ bool EventSearch::MovesLittle(const Model<double>& model, const State<double>& b
   return size == 0.0 || speed * length < size;
 }
 
-// Whether a pair has moved since the segment's start by more than what the ends of faces that count
-// as aligned are apart.
+// How far apart the ends of two bodies' faces may be along them and count as one above the other,
+// at least, m. A power of two as there (collide_core.cc).
+double EventSearch::AlignedWithin(int a, int b) const {
+  constexpr double kAligned = 8e-9;  // of the sum of the radii, which is at least half the faces'
+  return std::ldexp(kAligned, std::ilogb(radius_[a] + radius_[b]));
+}
+
+// Whether a pair has moved since the segment's start by more than that.
 bool EventSearch::HasPassed(const State<double>& state, int a, int b) const {
   constexpr double kPassed = 1e-7;  // of the smaller body
   const std::vector<double>& before = segment_->before.pose;
@@ -110,7 +116,26 @@ bool EventSearch::HasPassed(const State<double>& state, int a, int b) const {
                     before[3 * b + k]);
   };
   const double size = SmallerRadius(a, b);
-  return moved(0) + moved(1) + moved(2) * size > kPassed * size;
+  return moved(0) + moved(1) + moved(2) * size > kPassed * size + 2.0 * AlignedWithin(a, b);
+}
+
+// Whether one of the features found is another name of a closed contact: a vertex over a vertex,
+// where rounding changes which of the two is told. It is handed over when they have parted.
+bool EventSearch::Continues(const Model<double>& model, const State<double>& state,
+                            const ActiveContact& contact, const ContactFeature* features,
+                            int count) const {
+  constexpr double kParallel = 1e-7;
+  ContactRows<double> rows;
+  EvaluateContactRows(model, state, contact, &rows);
+  const ContactGeometry<double> of_closed = rows.geometry;
+  const double within = AlignedWithin(contact.a, contact.b);
+  return std::any_of(features, features + count, [&](const ContactFeature& feature) {
+    ActiveContact other = contact;
+    other.feature = feature;
+    EvaluateContactRows(model, state, other, &rows);
+    return (rows.geometry.point - of_closed.point).norm() <= within &&
+           (rows.geometry.normal - of_closed.normal).norm() <= kParallel;
+  });
 }
 
 // From a start at which a pair touches and separates with `speed`: a time by which it has left and
@@ -304,7 +329,8 @@ void EventSearch::SearchPair(const Model<double>& model, int a, int b, Event* ev
     const bool has_passed = HasPassed(state, a, b);
     for (const ActiveContact& contact : segment_->contacts) {
       if (OfPair(contact, a, b) && !IsAmong(features, count, contact.feature) &&
-          (has_passed || IsAmong(at_start, num_at_start, contact.feature))) {
+          (has_passed || IsAmong(at_start, num_at_start, contact.feature)) &&
+          !Continues(model, state, contact, features, count)) {
         lost = &contact;
         return -1.0;
       }
