@@ -127,6 +127,28 @@ TEST(SeamsTest, WhateverTheTiltAndTheSizes) {
   }
 }
 
+// Rounding names one of two vertices that lie over each other, now this and now that one.
+TEST(SeamsTest, NamesThatRoundingChangesAreNoEvents) {
+  const Scene scene = test_scenes::SceneOf(R"({"gravity": [2.899053227347741, -9.371850958322195],
+    "bodies": [
+      {"name": "box", "mass": 1, "shape": {"box": {"size": [0.5, 0.1]}}, "angle": 0.3,
+       "position": [-0.014776010333066978, 0.047766824456280305],
+       "velocity": [2.866009467376818, 0.8865606199840186]},
+      {"name": "t2", "static": true, "shape": {"box": {"size": [0.33, 0.5]}},
+       "position": [-0.09330383393164611, -0.2905501584471359], "angle": 0.3},
+      {"name": "t3", "static": true, "shape": {"box": {"size": [0.33, 0.5]}},
+       "position": [0.22195720747980385, -0.19302849024889385], "angle": 0.3},
+      {"name": "t4", "static": true, "shape": {"box": {"size": [0.33, 0.5]}},
+       "position": [0.5372182488912539, -0.09550682205065178], "angle": 0.3},
+      {"name": "t5", "static": true, "shape": {"box": {"size": [0.33, 0.5]}},
+       "position": [0.8524792903027039, 0.002014846147590288], "angle": 0.3}],
+    "simulation": {"dt": 0.01, "duration": 0.3, "stepping": "event", "integrator": "trapezoidal"}})");
+  RolloutReport report;
+  const State<double> final = EndOf(scene, &report);
+  ASSERT_EQ(report.status, StepStatus::kDone) << report.message;
+  EXPECT_NEAR(std::hypot(final.twist[0], final.twist[1]), 3.0, 1e-9);
+}
+
 // A tile that is higher by more than any tolerance does stop it.
 TEST(SeamsTest, AStepInTheFloorStopsTheBox) {
   for (const Stepping stepping : {Stepping::kFixed, Stepping::kEvent}) {
