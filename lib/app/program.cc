@@ -95,6 +95,17 @@ struct NamedFile {
   std::string path;
 };
 
+// The file that links name, which may not be there yet: it is to be replaced and not the link.
+std::filesystem::path FollowLinks(std::filesystem::path path) {
+  constexpr int kMostLinks = 40;
+  std::error_code error;
+  for (int k = 0; k < kMostLinks && std::filesystem::is_symlink(path, error); ++k) {
+    const std::filesystem::path next = std::filesystem::read_symlink(path, error);
+    path = next.is_absolute() ? next : path.parent_path() / next;
+  }
+  return path;
+}
+
 bool IsSameFile(const std::string& a, const std::string& b) {
   namespace fs = std::filesystem;
   std::error_code error;
@@ -105,8 +116,8 @@ bool IsSameFile(const std::string& a, const std::string& b) {
   if (fs::equivalent(a, b, error) && !error) return true;
   std::error_code error_a;
   std::error_code error_b;
-  const fs::path canonical_a = fs::weakly_canonical(fs::absolute(a, error), error_a);
-  const fs::path canonical_b = fs::weakly_canonical(fs::absolute(b, error), error_b);
+  const fs::path canonical_a = fs::weakly_canonical(FollowLinks(fs::absolute(a, error)), error_a);
+  const fs::path canonical_b = fs::weakly_canonical(FollowLinks(fs::absolute(b, error)), error_b);
   return !error_a && !error_b && canonical_a == canonical_b;
 }
 
@@ -293,21 +304,6 @@ std::string OutputOverInput(const std::vector<std::string>& flags) {
   return "";
 }
 
-namespace {
-
-// The file that links name, which may not be there yet: it is to be replaced and not the link.
-std::filesystem::path FollowLinks(std::filesystem::path path) {
-  constexpr int kMostLinks = 40;
-  std::error_code error;
-  for (int k = 0; k < kMostLinks && std::filesystem::is_symlink(path, error); ++k) {
-    const std::filesystem::path next = std::filesystem::read_symlink(path, error);
-    path = next.is_absolute() ? next : path.parent_path() / next;
-  }
-  return path;
-}
-
-}  // namespace
-
 std::string WriteFileAtomically(const std::string& path, std::string_view text, Over over) {
   namespace fs = std::filesystem;
   if (over == Over::kNoInput) {
@@ -330,6 +326,8 @@ std::string WriteFileAtomically(const std::string& path, std::string_view text, 
     fs::remove(temporary, error);
     return Unwritable(path, reason);
   }
+  // What is replaced keeps its permissions.
+  if (fs::exists(status)) fs::permissions(temporary, status.permissions(), error);
   fs::rename(temporary, target, error);
   if (!error) return "";
   const std::string why = error.message();

@@ -225,10 +225,19 @@ void RolloutCertifier::AddUnloaded(const Model<double>& model, long step, const 
   for (const double normal : impact.solution.normal_impulse) {
     largest = std::max(largest, normal);
   }
-  for (size_t i = 0; i < impact.contacts.size(); ++i) {
+  // The impact of another: what approaches by rounding alone is none.
+  const auto speed = [&](size_t i) {
     const ActiveContact& c = impact.contacts[i];
     const ContactBlock<double>& block = impact.problem.contacts[i];
-    const double before = RelativeSpeed(impact.before, c.a, block.normal_a, c.b, block.normal_b);
+    return RelativeSpeed(impact.before, c.a, block.normal_a, c.b, block.normal_b);
+  };
+  bool any = false;
+  for (size_t i = 0; i < impact.contacts.size(); ++i) {
+    any = any || speed(i) < -Negligible(model, speed(i));
+  }
+  for (size_t i = 0; any && i < impact.contacts.size(); ++i) {
+    const ActiveContact& c = impact.contacts[i];
+    const double before = speed(i);
     const bool loaded = std::any_of(loaded_.begin(), loaded_.end(),
                                     [&](const ActiveContact& l) { return l.SameAs(c); });
     if (!loaded && impact.solution.normal_impulse[i] > 1e-9 * largest &&

@@ -95,8 +95,10 @@ bool EventStepper::Decompress(const Model<double>& model, const Impulses& compre
   CountSolve(solved, outcome);
   if (!solved.solved) {
     outcome->residual = solved.residual;
-    outcome->message =
-        "decompression of the impact: " + NameOfContact(s, impact.contacts, solved.worst_contact);
+    outcome->message = "decompression of the impact: " +
+                       (solved.worst_contact < 0 && s.joints.empty()
+                            ? std::string("momentum")
+                            : NameOfContact(s, impact.contacts, solved.worst_contact));
     return false;
   }
   decompression_.system().MoveFactorsTo(&impact.system);

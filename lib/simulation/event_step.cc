@@ -375,7 +375,11 @@ EventOutcome EventStepper::Advance(const Model<double>& model, double t, double 
       return fail(outcome.message);
     }
     if (now == t) {
-      KeepBrokenLimits();
+      const int limit = StuckLimit(model.structure->settings.recovery_speed * h);
+      if (limit >= 0) {
+        return fail(NameOfContact(*model.structure, touching_.contacts, limit) +
+                    " stays broken: another one contradicts it");
+      }
     }
     if (starts_ && !at_end) {
       // It has put twists back that the joints do not allow: what slides now, and where to, is
@@ -449,14 +453,6 @@ EventOutcome EventStepper::Advance(const Model<double>& model, double t, double 
     if (counts && ++outcome.events > most) {
       return fail("events do not end: " +
                   NameOfContact(*model.structure, {segment.event_contact}, 0));
-    }
-  }
-  if (!broken_limits_.empty()) {
-    FindTouching(model, *state);
-    if (const int limit = LimitBrokenFurther(model.structure->settings.recovery_speed * h);
-        limit >= 0) {
-      return fail(NameOfContact(*model.structure, touching_.contacts, limit) +
-                  ": another one breaks it further");
     }
   }
   return outcome;

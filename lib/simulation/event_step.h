@@ -84,11 +84,13 @@ class EventStepper {
   void FindTouching(const Model<double>& model, const State<double>& state);
   void AddTouching(const Model<double>& model, const State<double>& state,
                    const ActiveContact& contact);
-  /// Of joints' limits that are broken as a step starts: one that is broken further as it ends,
-  /// among what touches; −1: none. What is held moves back or stays, but for another one that
-  /// recovers, which has `moved` in the step.
-  void KeepBrokenLimits();
-  int LimitBrokenFurther(double moved) const;
+  struct BrokenLimit {
+    ActiveContact limit;
+    int steps = 0;  ///< for which it has stayed as it is
+  };
+  /// As a step starts: a joint's limit, among what touches, that is broken and has been so for some
+  /// steps without moving, where recovery moves what it can by `moved` in each; −1: none.
+  int StuckLimit(double moved);
   bool SolveImpacts(const Model<double>& model, double t, State<double>* state,
                     EventOutcome* outcome);
   /// Poisson's law: after the compression each contact that rebounds pushes with at least e times
@@ -125,7 +127,7 @@ class EventStepper {
   AssemblyScratch<double> assembly_;
   AccelerationScratch<double> acceleration_;
   Touching touching_;
-  std::vector<ActiveContact> broken_limits_;
+  std::vector<BrokenLimit> broken_limits_;
   std::vector<bool> rebounds_;  ///< of the last impact's contacts
   DecompressionSolver decompression_;
   // The last modes, which are the next guess.

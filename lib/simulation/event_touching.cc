@@ -2,6 +2,7 @@
 //
 // What touches at an instant, with its speeds.
 #include <algorithm>
+#include <cmath>
 
 #include "tangible/dynamics/contacts_ahead.h"
 #include "tangible/simulation/event_step.h"
@@ -82,27 +83,28 @@ void EventStepper::FindTouching(const Model<double>& model, const State<double>&
   }
 }
 
-void EventStepper::KeepBrokenLimits() {
+int EventStepper::StuckLimit(double moved) {
   constexpr double kBroken = 1e-6;  // rad or m
-  broken_limits_.clear();
-  for (const ActiveContact& contact : touching_.contacts) {
-    if (contact.joint >= 0 && contact.gap < -kBroken) {
-      broken_limits_.push_back(contact);
+  constexpr double kStays = 1e-3;   // of what recovers in a step
+  constexpr int kMostSteps = 10;
+  std::vector<BrokenLimit> broken;
+  int stuck = -1;
+  for (size_t i = 0; i < touching_.contacts.size(); ++i) {
+    const ActiveContact& limit = touching_.contacts[i];
+    if (limit.joint < 0 || !(limit.gap < -kBroken)) {
+      continue;
     }
-  }
-}
-
-int EventStepper::LimitBrokenFurther(double moved) const {
-  constexpr double kFurther = 0.1;  // less may be the integrator's error
-  for (const ActiveContact& broken : broken_limits_) {
-    for (size_t i = 0; i < touching_.contacts.size(); ++i) {
-      const ActiveContact& now = touching_.contacts[i];
-      if (now.SameAs(broken) && now.gap < broken.gap - kFurther * moved) {
-        return static_cast<int>(i);
+    int steps = 0;
+    for (const BrokenLimit& last : broken_limits_) {
+      if (last.limit.SameAs(limit) && std::abs(last.limit.gap - limit.gap) <= kStays * moved) {
+        steps = last.steps + 1;
       }
     }
+    stuck = steps > kMostSteps ? static_cast<int>(i) : stuck;
+    broken.push_back({limit, steps});
   }
-  return -1;
+  broken_limits_.swap(broken);
+  return stuck;
 }
 
 }  // namespace tangible

@@ -298,6 +298,14 @@ TEST_F(FaultsTest, LinksAreFollowedToFilesThatAreNotThereYet) {
   EXPECT_TRUE(fs::is_symlink(Path("first")));
   EXPECT_TRUE(fs::is_symlink(Path("folder/second")));
   EXPECT_EQ(Read(Path("new.csv")).rfind("time,body,x", 0), 0u);
+  fs::create_symlink("unborn", Path("alias"));
+  ExpectOneLine(RunIn("", simulate, "--out=unborn --summary=alias", ""), 2,
+                "expected a file of its own");
+  Write("private", "old");
+  const fs::perms owner = fs::perms::owner_read | fs::perms::owner_write;
+  fs::permissions(Path("private"), owner);
+  EXPECT_EQ(RunIn("", simulate, "--out=private", "").exit_status, 0);
+  EXPECT_EQ(fs::status(Path("private")).permissions(), owner);
   fs::create_symlink("round", Path("round"));
   ExpectOneLine(RunIn("", simulate, "--out=round", ""), 1, "round: cannot be written: ");
 }

@@ -10,13 +10,14 @@ namespace {
 
 using test_scenes::SceneOf;
 
-Certificate CertificateOf(const std::string& bodies, double duration,
-                          const std::string& more = "") {
+Certificate CertificateOf(const std::string& bodies, double duration, const std::string& more = "",
+                          const std::string& integrator = "trapezoidal") {
   Model<double> model;
   State<double> state;
   BuildModel(SceneOf("{" + bodies + R"(, "simulation": {"stepping": "event",
-      "integrator": "trapezoidal", "dt": 0.01, "duration": )" +
-                     std::to_string(duration) + more + "}}"),
+      "integrator": ")" +
+                     integrator + R"(", "dt": 0.01, "duration": )" + std::to_string(duration) +
+                     more + "}}"),
              &model, &state);
   return CertifyRollout(model, state);
 }
@@ -47,6 +48,17 @@ TEST(CertifyEventsTest, ASeriesThatRoundingEndsIsNamed) {
   EXPECT_EQ(series.verdict.find("near a kink: "), 0u) << series.verdict;
   EXPECT_NE(series.verdict.find("events in a step"), std::string::npos) << series.verdict;
   EXPECT_EQ(of("").verdict.find("events in a step"), std::string::npos);
+}
+
+// Without another body nothing only touches when another impact moves it.
+TEST(CertifyEventsTest, ABallThatComesToRestAloneIsNoDiscontinuity) {
+  const Certificate c = CertificateOf(R"("bodies": [
+      {"name": "floor", "static": true, "restitution": 0.3,
+       "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}},
+      {"name": "ball", "shape": {"circle": {"radius": 0.1}}, "mass": 1, "position": [0, 0.15],
+       "velocity": [1, 0], "restitution": 0.3}])",
+                                      1.0, "", "semi_implicit_euler");
+  EXPECT_EQ(c.verdict.find("discontinuous"), std::string::npos) << c.verdict;
 }
 
 TEST(CertifyEventsTest, AFlatLandingIsADiscontinuity) {

@@ -231,8 +231,8 @@ TEST(EventPenetrationTest, WhatACorrectionTurnsReturnsAtOnce) {
   EXPECT_EQ(at_once, 1);
 }
 
-// Two hinges of the same bodies whose limits leave no angle: to move one out of its limit breaks
-// the other's further.
+// Two hinges of the same bodies whose limits leave no angle: what moves one out of its limit holds
+// the other one beyond its own.
 TEST(EventPenetrationTest, LimitsThatContradictEachOtherAreTold) {
   const auto status_of =
       [](const char* low, const char* high, std::string* message) {
@@ -253,9 +253,29 @@ TEST(EventPenetrationTest, LimitsThatContradictEachOtherAreTold) {
       };
   std::string message;
   EXPECT_EQ(status_of("[0.1, 1]", "[-1, -0.1]", &message), StepStatus::kUnsolved);
-  EXPECT_NE(message.find("another one breaks it further"), std::string::npos) << message;
+  EXPECT_NE(message.find("stays broken: another one contradicts it"), std::string::npos) << message;
   EXPECT_EQ(status_of("[0.1, 1]", "[-1, 0.2]", &message), StepStatus::kDone) << message;
   EXPECT_EQ(status_of("[0.1, 1]", "[0.2, 0.5]", &message), StepStatus::kDone) << message;
+}
+
+// One limit's recovery may break the next joint's further for a while.
+TEST(EventPenetrationTest, TwoJointsBeyondTheirLimitsReturnToThem) {
+  Model<double> model;
+  State<double> initial, final;
+  BuildModel(test_scenes::SceneOf(R"({"bodies": [
+      {"name": "a", "shape": {"box": {"size": [0.5, 0.05]}}, "position": [0.25, 0], "mass": 1},
+      {"name": "b", "shape": {"box": {"size": [0.5, 0.05]}}, "position": [0.75, 0], "mass": 1}],
+    "joints": [
+      {"name": "first", "type": "revolute", "bodies": ["a", "world"], "anchor": [0, 0],
+       "limits": [-0.2, 0.2], "angle": 0.5},
+      {"name": "second", "type": "revolute", "bodies": ["b", "a"], "anchor": [0.5, 0],
+       "limits": [-0.2, 0.2], "angle": 0.5}],
+    "simulation": {"dt": 0.01, "duration": 0.5, "stepping": "event"}})"),
+             &model, &initial);
+  const RolloutReport report = Rollout(model, initial, nullptr, &final);
+  ASSERT_EQ(report.status, StepStatus::kDone) << report.message;
+  EXPECT_LE(final.pose[2], 0.2 + 1e-6);
+  EXPECT_LE(final.pose[5] - final.pose[2], 0.2 + 1e-6);
 }
 
 }  // namespace
