@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace tangible {
 namespace {
@@ -82,11 +83,13 @@ EventStepper::EventStepper(const Model<double>& model) : search_(model) {}
 
 void EventStepper::ClearGuess() {
   starts_ = true;
+  broken_limits_.clear();
   last_contacts_.clear();
   last_modes_.clear();
 }
 
 void EventStepper::SetGuess(const EventGuess& guess) {
+  broken_limits_.clear();
   last_contacts_ = guess.contacts;
   last_modes_ = guess.modes;
   starts_ = guess.starts;
@@ -365,6 +368,7 @@ EventOutcome EventStepper::Advance(const Model<double>& model, double t, double 
     return outcome;
   };
   bool at_given_time = true;
+  bool begins = true;
   while (end - now > 1e-14 * h || !at_given_time) {
     if (!SolveImpacts(model, now, state, &outcome)) {
       return fail(outcome.message);
@@ -374,7 +378,7 @@ EventOutcome EventStepper::Advance(const Model<double>& model, double t, double 
         !AddInstant(model, now, EventKind::kStepEnd, nullptr, state, &outcome)) {
       return fail(outcome.message);
     }
-    if (now == t) {
+    if (std::exchange(begins, false)) {
       const int limit = StuckLimit(model.structure->settings.recovery_speed * h);
       if (limit >= 0) {
         return fail(NameOfContact(*model.structure, touching_.contacts, limit) +

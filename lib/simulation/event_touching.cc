@@ -100,7 +100,7 @@ int EventStepper::StuckLimit(double moved) {
         steps = last.steps + 1;
       }
     }
-    stuck = steps > kMostSteps ? static_cast<int>(i) : stuck;
+    stuck = moved > 0.0 && steps > kMostSteps ? static_cast<int>(i) : stuck;
     broken.push_back({limit, steps});
   }
   broken_limits_.swap(broken);
