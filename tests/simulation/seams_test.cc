@@ -6,7 +6,9 @@
 
 #include <cmath>
 #include <random>
+#include <sstream>
 #include <string>
+#include <vector>
 
 #include "../support/scenes.h"
 #include "tangible/simulation/certify.h"
@@ -15,19 +17,14 @@
 namespace tangible {
 namespace {
 
-std::string Pair(double x, double y) {
-  std::ostringstream text;
-  text.precision(17);
-  text << "[" << x << ", " << y << "]";
-  return text.str();
-}
-
 std::string Number(double x) {
   std::ostringstream text;
   text.precision(17);
   text << x;
   return text.str();
 }
+
+std::string Pair(double x, double y) { return "[" + Number(x) + ", " + Number(y) + "]"; }
 
 struct Slide {
   double tilt = 0.0;
