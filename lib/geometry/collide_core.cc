@@ -104,14 +104,15 @@ struct VertexOverVertex {
   }
 };
 
-/// One end of the overlap. `overhang`: how far the incident face ends inside of the reference face.
+/// One end of the overlap. `overhang`: how far the incident face ends inside of the reference face;
+/// `tie`: how far apart ends may be that count as one above the other.
 /// Adds nothing where the reference's vertex has no foot on the incident face and the incident one
 /// is beyond the reference's end; by rounding alone it is not beyond, and may be the nearest there
 /// is.
 void AddEnd(const Sides& sides, const CoreFace& reference, const CoreFace& incident,
-            int reference_vertex, int incident_vertex, double overhang, FaceEnds* ends) {
+            int reference_vertex, int incident_vertex, double overhang, double tie,
+            FaceEnds* ends) {
   const VertexOverVertex vertices(sides, reference, incident, reference_vertex, incident_vertex);
-  const double tie = AlignedWithin(reference.line, incident.line);
   // As far beyond the end as vertices count as one above the other: what is found must not depend
   // on which face rounding made the reference.
   const bool has_foot =
@@ -151,8 +152,8 @@ FaceEnds FindFaceEnds(const Sides& sides, const CoreFace& reference, const CoreF
     }
     return ends;
   }
-  AddEnd(sides, reference, incident, reference.first, incident.last, low, &ends);
-  AddEnd(sides, reference, incident, reference.last, incident.first, length - high, &ends);
+  AddEnd(sides, reference, incident, reference.first, incident.last, low, tie, &ends);
+  AddEnd(sides, reference, incident, reference.last, incident.first, length - high, tie, &ends);
   return ends;
 }
 
