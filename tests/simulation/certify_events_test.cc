@@ -61,6 +61,26 @@ TEST(CertifyEventsTest, ABallThatComesToRestAloneIsNoDiscontinuity) {
   EXPECT_EQ(c.verdict.find("discontinuous"), std::string::npos) << c.verdict;
 }
 
+// A disc sunk between two boxes that part, as deep in the one as in the other: which one it would
+// leave first is either side's choice.
+TEST(CertifyEventsTest, ContactsThatCloseAtOnceAreAKink) {
+  const auto verdict = [](const char* x) {
+    return CertificateOf(std::string(R"("bodies": [
+        {"name": "disc", "shape": {"circle": {"radius": 0.5}}, "mass": 1, "friction": 0.3,
+         "position": [)") + x +
+                             R"(, 0.1]},
+        {"name": "left", "kinematic": true, "shape": {"box": {"size": [1, 1]}}, "friction": 0.3,
+         "position": [-0.55, -0.5], "velocity": [-0.5, 0]},
+        {"name": "right", "kinematic": true, "shape": {"box": {"size": [1, 1]}}, "friction": 0.3,
+         "position": [0.55, -0.5], "velocity": [0.5, 0]}])",
+                         0.1)
+        .verdict;
+  };
+  EXPECT_NE(verdict("0").find("two contacts of disc close at once"), std::string::npos)
+      << verdict("0");
+  EXPECT_EQ(verdict("0.01").find("close at once"), std::string::npos) << verdict("0.01");
+}
+
 TEST(CertifyEventsTest, AFlatLandingIsADiscontinuity) {
   const Certificate c = CertificateOf(R"("bodies": [{"name": "box",
       "shape": {"box": {"size": [0.4, 0.2]}}, "mass": 1, "position": [0, 1]}, )" +
