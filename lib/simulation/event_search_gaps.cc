@@ -316,20 +316,22 @@ void EventSearch::SearchPair(const Model<double>& model, int a, int b, Event* ev
   // A closed contact whose feature is no longer the pair's closest hands over to the next one.
   // Where corners meet it may not have been the closest as the segment starts: it is once they have
   // passed.
-  ContactFeature at_start[2];
-  const int num_at_start =
-      FindContactFeatures(model.Shape(a), segment_->before.PoseOf(a), model.Shape(b),
-                          segment_->before.PoseOf(b), kInfinity, at_start);
+  const auto began_with = [&](const ContactFeature& feature) {
+    ContactFeature at_start[2];
+    const int count =
+        FindContactFeatures(model.Shape(a), segment_->before.PoseOf(a), model.Shape(b),
+                            segment_->before.PoseOf(b), kInfinity, at_start);
+    return IsAmong(at_start, count, feature);
+  };
   const ActiveContact* lost = nullptr;
   const auto same = [&](const Sample& sample) {
     const State<double>& state = sample.motion.after;
     ContactFeature features[2];
     const int count = FindContactFeatures(model.Shape(a), state.PoseOf(a), model.Shape(b),
                                           state.PoseOf(b), kInfinity, features);
-    const bool has_passed = HasPassed(state, a, b);
     for (const ActiveContact& contact : segment_->contacts) {
       if (OfPair(contact, a, b) && !IsAmong(features, count, contact.feature) &&
-          (has_passed || IsAmong(at_start, num_at_start, contact.feature)) &&
+          (HasPassed(state, a, b) || began_with(contact.feature)) &&
           !Continues(model, state, contact, features, count)) {
         lost = &contact;
         return -1.0;
