@@ -3,8 +3,8 @@
 //
 // What the step does to an estimate: the same fit at dt and at dt / 2.
 //
-//   p(dt) = p* + c dt + O(dt²)   ⇒   p(dt) − p(dt/2) = c dt / 2,   bias = p(dt) − p* ≈ 2 (p(dt) −
-//   p(dt/2))
+//   p(dt) = p* + c dt + O(dt²)   ⇒   p(dt) − p(dt/2) = c dt / 2
+//   bias = p(dt) − p* ≈ 2 (p(dt) − p(dt/2))
 //
 // for a first-order step, as semi-implicit Euler with impacts at step boundaries is.
 

@@ -3,15 +3,14 @@
 //
 // The map from a vector of parameters to a scene.
 //
-//   number_i = scale_i p_k + offset_i        each parameter k sets one or several numbers i of the
-//   scene
+//   number_i = scale_i p_k + offset_i        each parameter k sets one or several numbers i
 //
-// or of the observed points (`points/tip/at/x`); no number is set by two. Further parameters may
-// add to a number: it is then what the one sets, or else the scene's own value, plus the sum of
-// scale p + offset of those that add (a pivot moves all that hangs from it, a length what hangs
-// below). From the numbers the model and the initial state are rebuilt with an unchanged structure.
-// The derivative of that is taken where p stands: initial joint angles and inertias that follow
-// their mass make it nonlinear.
+// of the scene or of the observed points (`points/tip/at/x`); no number is set by two. Further
+// parameters may add to a number: it is then what the one sets, or else the scene's own value, plus
+// the sum of scale p + offset of those that add (a pivot moves all that hangs from it, a length
+// what hangs below). From the numbers the model and the initial state are rebuilt with an unchanged
+// structure. The derivative of that is taken where p stands: initial joint angles and inertias that
+// follow their mass make it nonlinear.
 //
 // Inside the minimiser a parameter that is positive by its bounds runs as q = ln(p / initial), any
 // other as q = p / s with a typical magnitude s. A mass that starts ten times off is then as far

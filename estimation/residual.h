@@ -8,10 +8,10 @@
 //
 // with J by any of five methods, which must agree (tests/estimation/residual_test.cc):
 //
-//   tangent            forward mode with the step's own factorisation: one run with P columns
-//   adjoint            reverse mode: one recorded run, then sweeps back with 64 residuals each
-//   jet_implicit       Jets pushed through each step's factorisation, in passes of the Jets' width
-//   jet                Jets through every operation of the interior point (slow; the reference)
+//   tangent            forward mode with the step's own factorisation: one run, P columns
+//   adjoint            reverse mode: one recorded run, sweeps of 64 residuals back
+//   jet_implicit       Jets pushed through each step's factorisation, in passes
+//   jet                Jets through every operation of the interior point: slow
 //   finite_difference  central, step 6e-6 max(|p|, scale); one-sided of second order at a bound
 
 #include <Eigen/Core>

@@ -7,8 +7,9 @@
 // The run is cut at S − 1 steps. The states x_j of the moving bodies there are unknowns beside the
 // parameters q; every segment runs from its own x_j, and its end must meet the next one:
 //
-//   minimise  1/2 Σ ρ(r_i(q, x)²) + 1/2 Σ_j ‖W (end_j(q, x_j) − x_{j+1})‖²,    j = 0 .. S − 2, x_0
-//   = x_0(q)
+//   minimise  1/2 Σ ρ(r_i(q, x)²) + 1/2 Σ_j ‖W (end_j(q, x_j) − x_{j+1})‖²
+//
+//   j = 0 .. S − 2,   x_0 = x_0(q)
 //
 // Over a short segment the predictions are nearly linear in the unknowns, so that a wrong period or
 // a chaotic end does not trap the minimiser. W grows in stages, from jumps that cost little, when

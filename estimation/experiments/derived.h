@@ -35,11 +35,11 @@ std::vector<DerivedQuantity> Derive(const std::vector<DerivedFunction>& function
 
 /// What the motion of a double pendulum determines of its inertia. Bodies link1 and link2 are drawn
 /// hanging straight below the joints `pivot` and `elbow`. With a_i from joint to centre of mass and
-/// L1 from pivot to elbow
+/// L1 from pivot to elbow, and
 ///
-///   p1 = m1 a1² + I1 + m2 L1²,  p2 = m2 a2² + I2,  p3 = m2 L1 a2,  p4 = m1 a1 + m2 L1:
+///   p1 = m1 a1² + I1 + m2 L1²,  p2 = m2 a2² + I2,  p3 = m2 L1 a2,  p4 = m1 a1 + m2 L1,
 ///
-/// p1/p3, p2/p3, p4/p3 (1/m), and g / L1 (1/s²).
+/// the quantities are p1/p3, p2/p3, p4/p3 (1/m), and g / L1 (1/s²).
 std::vector<DerivedFunction> DoublePendulumQuantities();
 
 /// Of body `pendulum` on joint `pivot`, with a from pivot to centre of mass: the effective length

@@ -4,13 +4,12 @@
 // Recordings of real pendulums, made into observations (observation.h).
 //
 //   ibm_double_pendulum  no header, a row a frame: pivot, joint and tip marker, of each the
-//   vertical
-//                        (down positive) and the horizontal coordinate in fifths of a pixel. Points
-//                        `joint` and `tip` come out, x right, y up, in m, relative to the pivot's
-//                        marker in the same frame: the camera shakes by several pixels, and what
-//                        all markers share is not motion of the pendulum. (Were it the pivot that
-//                        moves, its acceleration would drive the links; with that force the fit is
-//                        worse.)
+//                        vertical (down positive) and the horizontal coordinate in fifths of a
+//                        pixel. Points `joint` and `tip` come out, x right, y up, in m, relative
+//                        to the pivot's marker in the same frame: the camera shakes by several
+//                        pixels, and what all markers share is not motion of the pendulum. (Were
+//                        it the pivot that moves, its acceleration would drive the links; with
+//                        that force the fit is worse.)
 //   multiarm_single      columns t, th1, om1: time, absolute angle (0 upright, pi hanging), rate.
 //                        Body `pendulum` comes out, its angle measured from hanging.
 //

@@ -11,8 +11,9 @@
 // A main reads
 //
 //   int Main(int argc, char** argv) {
-//     const CommandLine line = ParseCommandLine(argc, argv, {.name = ..., .source_file =
-//     __FILE__}); if (line.exit_status) return *line.exit_status;
+//     const CommandLine line =
+//         ParseCommandLine(argc, argv, {.name = ..., .source_file = __FILE__});
+//     if (line.exit_status) return *line.exit_status;
 //     ...
 //   }
 //   int main(int argc, char** argv) { return tangible::RunMain(&Main, argc, argv); }

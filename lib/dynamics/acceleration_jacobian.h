@@ -2,7 +2,7 @@
 #pragma once
 //
 // The derivatives of accelerations' and corrections' equations (acceleration.h) with respect to
-// their variables, entry by entry, as local_jacobian.h does for a step. The variables are
+// their variables, entry by entry, as local_jacobian.h does for a step. The variables are:
 //   w = [poses | twists | numbers | t]
 // with the time t as one more row after the model's variables: signals change with it.
 

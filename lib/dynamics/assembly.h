@@ -4,7 +4,7 @@
 // From scene physics to the contact problem of a step of length h at time t.
 //
 //   M = diag(m, m, I) + h diag(c, c, c_θ) + h Σ dampers        damping is implicit
-//   p = diag(m, m, I) v + h m g + spring, force and effort impulses (poses of the step's start)
+//   p = diag(m, m, I) v + h m g + impulses of springs, forces, efforts at the step's start
 //   joints: A v = b, b = 0, or −(β/h) C(q) with Baumgarte's correction
 //   contacts: rows of contact.h, only those in the given list
 //

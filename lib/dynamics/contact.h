@@ -5,7 +5,8 @@
 //
 //   s_n = n·v⁺ + c_n ≥ 0
 //   kGap          c_n = gap / h: lands on the surface and rests there without drift
-//   kRecovery     c_n = −recovery_speed: where gap / h is below that, out of penetration no faster
+//   kRecovery     c_n = −recovery_speed: where gap / h is below that, so that a body leaves
+//                 penetration no faster
 //   kRestitution  c_n = e (n·v): an impact
 //   kInelastic    c_n = 0: an impact without rebound (event stepping alone)
 //   kPoisson      c_n = 0, λn ≥ e λ¹n: the decompression that follows a compression with impulse

@@ -4,11 +4,10 @@
 // Forces and springs: the impulse that a step of [t, t + h] receives from each.
 //
 //   force    within [start, end] a constant F gives F · |[t, t+h] ∩ [start, end]|; a signal from a
-//   file gives
-//            its integral over the overlap, so a window that ends inside a step is exact
+//            file gives its integral over the overlap, so that a window that ends inside a step is
+//            exact
 //   spring   −h k (ℓ − L0) u on a's anchor, u = (p_a − p_b)/ℓ, at the poses of the step's start;
-//   its damping
-//            is implicit: a damper with the row of u and weight h c
+//            its damping is implicit: a damper with the row of u and weight h c
 
 #include "tangible/dynamics/joint.h"
 

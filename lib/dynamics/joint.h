@@ -5,7 +5,7 @@
 //
 //   kRevolute    C = p_a − p_b                                  (m, 2 rows)
 //   kWeld        the same and θ_a − θ_b − θ0                    (3 rows)
-//   kPrismatic   C = (n·(p_a − p_b), θ_a − θ_b − θ0), n = u⊥, u the axis fixed in b   (2 rows)
+//   kPrismatic   C = (n·(p_a − p_b), θ_a − θ_b − θ0), n = u⊥, u fixed in b   (2 rows)
 //   kDistance    C = |p_a − p_b| − L                            (1 row)
 //   kFixedAngle  C = θ_a − θ_b − θ0                             (1 row)
 //

@@ -7,7 +7,7 @@
 //
 // With arms r = R(θ) l, d = p_a − p_b (anchor to anchor), and joint.h's errors:
 //
-//   revolute, weld   θaθa: −μ·r_a            θbθb: μ·r_b              (angle rows are linear)
+//   revolute, weld   θaθa: −μ·r_a            θbθb: μ·r_b              angle rows: none
 //   distance         (J t)(J t)ᵀ μ / |d|,  t = n⊥, n = d/|d|, J t the row of t on both bodies;
 //                    θaθa: −μ n·r_a          θbθb: μ n·r_b
 //   prismatic        θaθa: −μ w·r_a          θbθb: −μ w·(p_a − x_b)   w = u⊥, fixed in b

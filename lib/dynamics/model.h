@@ -5,7 +5,7 @@
 // what each is.
 //
 // The structure (who is joined to whom, which shapes, where each number stands) is made once and
-// does not depend on T. The variables of a step are numbered
+// does not depend on T. The variables of a step are numbered:
 //   [ poses (3 a body) | twists (3 a body) | numbers ]
 // and each contact, joint, spring, force and body reads only a few of them (local_jacobian.h).
 
@@ -33,11 +33,12 @@ struct BodyIndex {
   int num_shape_numbers = 0;
 };
 
-/// Places of a joint's numbers. Geometry, by type, from `geometry` on:
-///   kRevolute, kWeld  anchor in a's frame (2), anchor in b's frame (2), angle_a − angle_b as drawn
-///   kPrismatic        anchor in a's frame (2), in b's frame (2), unit axis in b's frame (2), angle
-///   as drawn kDistance         anchor in a's frame (2), in b's frame (2), length kFixedAngle angle
-///   as drawn
+/// Places of a joint's parameters. Geometry, by type, from `geometry` on:
+///   kRevolute, kWeld  anchor in a's frame (2), in b's frame (2), angle as drawn
+///   kPrismatic        anchor in a's frame (2), in b's (2), unit axis in b's (2), angle
+///   kDistance         anchor in a's frame (2), in b's frame (2), length
+///   kFixedAngle       angle as drawn
+/// The angle as drawn is angle_a − angle_b at time 0, before the joint's initial angle is applied.
 struct JointIndex {
   std::string name;
   JointType type = JointType::kRevolute;

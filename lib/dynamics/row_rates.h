@@ -4,7 +4,7 @@
 // Constraint rows with their rates along a motion, for accelerations.
 //
 // A row of joints or contacts, r(q), is the gradient of a position C(q) or gives a sliding speed;
-// along a motion q̇ = v its speed r v changes as
+// along a motion q̇ = v its speed r v changes as follows:
 //   d/dt (r v) = r a + ṙ v,    ṙ = (∂r/∂q) v,
 // so that accelerations obey r a = −ṙ v where the speed is held. The rates ṙ v come from the same
 // templates as the rows, evaluated in dual numbers whose rates are the twists (dual.h).

@@ -5,9 +5,10 @@
 // over a polygon's edges c_i = v_i × v_{i+1}:
 //   circle   A = π r²                 I/m = r²/2
 //   box      A = w h                  I/m = (w² + h²)/12
-//   capsule  A = r (2 L + π r)        I/m = (L (L² + 4 r²)/6 + π r³/2 + 4 L r²/3 + π r L²/4) / (2 L
-//   + π r) polygon  A = Σ c_i / 2            I/m = Σ c_i (v_i·v_i + v_i·v_{i+1} + v_{i+1}·v_{i+1})
-//   / (6 Σ c_i)
+//   capsule  A = r (2 L + π r)        I/m = (L (L² + 4 r²)/6 + π r³/2 + 4 L r²/3 + π r L²/4)
+//                                           / (2 L + π r)
+//   polygon  A = Σ c_i / 2            I/m = Σ c_i (v_i·v_i + v_i·v_{i+1} + v_{i+1}·v_{i+1})
+//                                           / (6 Σ c_i)
 // The capsule is a rectangle and two half discs, whose first moment about their diameter is 2 r³/3
 // each; divided by r it holds for a thin rod too.
 

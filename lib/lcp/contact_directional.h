@@ -11,7 +11,8 @@
 //   touches              s = λn = 0, sliding at w ≠ 0 or without friction:
 //                        0 ≤ λ̇n ⊥ ṡ ≥ 0,  λ̇t = −σ μ λ̇n,  σ = sign w
 //   touches at rest      s = λn = w = 0: Coulomb's law in the rates, |λ̇t| ≤ μ λ̇n
-//   friction limit       λn > 0, w = 0, λt = −σ μ λn:  λ̇t = −σ (μ λn)˙ + σ ζ,  0 ≤ ζ ⊥ σ ẇ ≥ 0
+//   friction limit       λn > 0, w = 0, λt = −σ μ λn:
+//                        λ̇t = −σ (μ λn)˙ + σ ζ,  0 ≤ ζ ⊥ σ ẇ ≥ 0
 //   friction from zero   λn > 0, w = 0, μ = 0: |λ̇t| ≤ μ̇ λn, against ẇ
 //
 // With the system K of the other modes (contact_system.h), factorised once, a direction has

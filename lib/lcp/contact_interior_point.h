@@ -9,7 +9,7 @@
 //   per contact   G = [n; t; 0],  B = [n − μ t; t; 0],  F = [0 0 0; 0 0 1; 2μ −1 0]
 //
 // κ is the natural unit of z s: V² / (r M⁻¹ rᵀ) with V the largest speed of the data. Each
-// iteration solves
+// iteration solves this system:
 //   [M −Aᵀ −Bᵀ; A 0 0; G 0 F + D(s/z)] twice with one block LU.
 // Source: S. Mehrotra, SIAM J. Optim. 2 (1992) 575; Nocedal & Wright, Numerical Optimization, 14.2.
 

@@ -7,7 +7,8 @@
 // inequalities that shrink with τ from 1 to 0. With δ and the centre λ⁰ of the proximal step
 // (contact_system.h), per contact
 //
-//   λ' = λn + τ b,   s' = n v + c_n + δ (λn − λn⁰) + τ a_n,   w' = t v + c_t + δ (λt − λt⁰) + τ a_t
+//   λ' = λn + τ b
+//   s' = n v + c_n + δ (λn − λn⁰) + τ a_n,   w' = t v + c_t + δ (λt − λt⁰) + τ a_t
 //   s' ≥ 0,  λ' ≥ 0,  s' λ' = 0;   |λt| ≤ μ λ',   w' > 0 ⇒ λt = −μ λ',   w' < 0 ⇒ λt = μ λ'
 //
 // While the modes hold, the solution is affine in τ: two right-hand sides of one system. Where an

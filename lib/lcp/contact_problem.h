@@ -4,20 +4,21 @@
 // The mixed LCP of a step of planar bodies, in its own structure: blocks of three unknowns (a twist
 // each), joints of up to three rows, contacts with a normal and a tangent row.
 //
-//   M v − Aᵀ y − Σ_contacts (nᵀ λn + tᵀ λt) = p                 momentum; M block diagonal plus
-//   dampers A v = b                                                      joints s_n = n v + c_n ≥
-//   0,   λn ≥ 0,   s_n λn = 0                  each contact w = t v + c_t;  |λt| ≤ μ λn;  w > 0 ⇒
-//   λt = −μ λn,  w < 0 ⇒ λt = μ λn    Coulomb
+//   M v − Aᵀ y − Σ_contacts (nᵀ λn + tᵀ λt) = p         momentum; M block diagonal plus dampers
+//   A v = b                                             joints
+//   s_n = n v + c_n ≥ 0,   λn ≥ 0,   s_n λn = 0         each contact
+//   w = t v + c_t,   |λt| ≤ μ λn                        Coulomb
+//   w > 0 ⇒ λt = −μ λn,   w < 0 ⇒ λt = μ λn
 //
-// Each row touches at most two blocks. Units: v m/s and rad/s, impulses N s and N m s, M kg and kg
-// m².
+// Each row touches at most two blocks. Units: v m/s and rad/s, impulses N s and N m s, M kg and
+// kg m².
 //
 // As a complementarity problem each contact with friction has three rows (the planar form of
-// Pfeiffer and Glocker, Multibody Dynamics with Unilateral Contacts, 1996, ch. 6), with λt = σ − μ
-// λn:
+// Pfeiffer and Glocker, Multibody Dynamics with Unilateral Contacts, 1996, ch. 6). The sliding
+// speed is w = w⁺ − w⁻, its positive and negative parts, and λt = σ − μ λn:
 //   s_n = n v + c_n        ⊥ λn
-//   w⁺  = t v + c_t + w⁻   ⊥ σ          w⁺, w⁻: the positive and negative parts of the sliding
-//   speed σ⁻  = 2 μ λn − σ       ⊥ w⁻         σ⁻ = μ λn − λt
+//   w⁺  = t v + c_t + w⁻   ⊥ σ
+//   σ⁻  = 2 μ λn − σ       ⊥ w⁻         σ⁻ = μ λn − λt
 // An impact's decompression (contact_decompression.h) adds a least impulse o to a contact:
 //   s_n = n v + c_n ≥ 0,   λn ≥ o,   s_n (λn − o) = 0
 // The planar form has a unique, strictly complementary solution at a disc at rest, where the

@@ -63,7 +63,7 @@ void FindDegenerateContacts(const ContactProblem<double>& problem,
                             std::vector<int>* degenerate);
 
 /// How far a contact is from a change of its mode, in the scales of NaturalResidual: the smallest
-/// of
+/// of the following:
 ///   open       s_n / σ_n
 ///   closed     (λ_n − o) / ζ, or where it is driven s_n / σ_n, and
 ///     sticking   (μ λ_n − |λ_t|) / ζ_t

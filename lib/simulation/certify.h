@@ -12,10 +12,10 @@
 //                  e > 0; and a landing in the last step, whose twist has derivatives of order 1/h
 //                  that the next step would cancel
 //   one-sided      friction exactly 0, a tie of the mixing rule, an edge of a force's window on a
-//   step's
-//                  boundary: only where derivatives with respect to these numbers are wanted; and
-//                  with event stepping a contact that touches as the run starts, where a direction
-//                  opens or closes its gap: one side falls and lands, the other is pushed out
+//                  step's boundary: only where derivatives with respect to these numbers are
+//                  wanted; and with event stepping a contact that touches as the run starts, where
+//                  a direction opens or closes its gap: one side falls and lands, the other is
+//                  pushed out
 //   linear systems redundant rows, condition, residual (contact_conditioning.h), of every step
 
 #include <string>

@@ -4,12 +4,13 @@
 // The derivative of a rollout's final state, or of a loss of it, with respect to parameters of the
 // scene, by any of five methods that must agree:
 //
-//   adjoint            one reverse sweep with a column an output (one for a loss):
-//   rollout_adjoint.h tangent            one forward sweep with a column a parameter:
-//   rollout_tangent.h jet_implicit       Jets in passes of their width, through K⁻¹ of each step
-//   jet                Jets through every operation of the interior point: the independent
-//   reference finite_difference  central; (−3 f(p) + 4 f(p ± h) − f(p ± 2h)) / ±2h at the end of a
-//   parameter's range
+//   adjoint            one reverse sweep, a column an output (rollout_adjoint.h)
+//   tangent            one forward sweep, a column a parameter (rollout_tangent.h)
+//   jet_implicit       Jets in passes of their width, through K⁻¹ of each step
+//   jet                Jets through every operation of the interior point:
+//                      the independent reference
+//   finite_difference  central; at the end of a parameter's range one-sided,
+//                      (−3 f(p) + 4 f(p ± h) − f(p ± 2h)) / ±2h
 //
 // A path that matches several numbers is one parameter that sets all of them: its derivative is
 // their sum.

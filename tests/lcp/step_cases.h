@@ -4,8 +4,9 @@
 // The time steps of cases/lcp_step_cases.json as mixed LCPs, and their data's derivatives with
 // respect to the physical parameters, from the formulas the file states:
 //
-//   p = M v + h f,  c = (e ∘ (Jc v); 0; 0),  row of Jc: the normal n acting on body b at r_b and −n
-//   on body a at r_a,  rows of Jf: ± the same with t = (n_y, −n_x).
+//   p = M v + h f,  c = (e ∘ (Jc v); 0; 0)
+//   row of Jc: the normal n acting on body b at r_b and −n on body a at r_a
+//   rows of Jf: ± the same with t = (n_y, −n_x).
 
 #include <string>
 #include <tuple>

@@ -11,6 +11,7 @@ namespace tangible {
 namespace {
 
 constexpr int kMaxLines = 500;
+constexpr std::size_t kMaxCommentWidth = 100;
 constexpr char kSpdx[] = "// SPDX-License-Identifier: Apache-2.0";
 
 bool StartsWith(const std::string& text, const std::string& start) {
@@ -135,6 +136,70 @@ std::string WrongInclude(const std::string& path, const std::string& line) {
   return problem.empty() ? "" : inside + ": " + problem;
 }
 
+/// A comment that has a line to itself: how far its text is indented behind the slashes, the text,
+/// and the width of the whole line. No text: not such a comment, or an empty one.
+struct CommentLine {
+  std::size_t indent = 0;
+  std::size_t width = 0;
+  std::string text;
+};
+
+/// Characters, without the combining ones (U+0300 to U+036F), of a text in UTF-8.
+std::size_t Width(const std::string& text) {
+  std::size_t width = 0;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const auto byte = static_cast<unsigned char>(text[i]);
+    const bool continues = (byte & 0xC0) == 0x80;
+    const bool combines = byte == 0xCC || (byte == 0xCD && i + 1 < text.size() &&
+                                           static_cast<unsigned char>(text[i + 1]) < 0xB0);
+    width += continues || combines ? 0 : 1;
+  }
+  return width;
+}
+
+CommentLine ReadComment(const std::string& line) {
+  CommentLine comment;
+  const std::size_t slashes = line.find_first_not_of(' ');
+  if (slashes == std::string::npos || line.compare(slashes, 2, "//") != 0) {
+    return comment;
+  }
+  const std::size_t behind = line.find_first_not_of('/', slashes);
+  const std::size_t text =
+      behind == std::string::npos ? behind : line.find_first_not_of(' ', behind);
+  if (text != std::string::npos) {
+    comment = {text - behind, Width(line), line.substr(text)};
+  }
+  return comment;
+}
+
+/// Whether `line` may be the rest of a line that a formatter found too long: its first word has no
+/// room on the line before.
+bool TakesUp(const CommentLine& before, const CommentLine& line) {
+  const std::string word = line.text.substr(0, line.text.find(' '));
+  return !before.text.empty() && !line.text.empty() &&
+         before.width + 1 + Width(word) > kMaxCommentWidth;
+}
+
+/// What is wrong with `line` between its neighbours; empty if nothing.
+std::string WrongComment(const CommentLine& before, const CommentLine& line,
+                         const CommentLine& after) {
+  constexpr std::size_t kDisplayIndent = 3;
+  if (line.width > kMaxCommentWidth) {
+    return "a comment of more than " + std::to_string(kMaxCommentWidth) + " characters";
+  }
+  if (!TakesUp(before, line)) {
+    return "";
+  }
+  if (before.indent == kDisplayIndent && line.indent == kDisplayIndent) {
+    return "a displayed line that takes up the one before it: indent it, or shorten that one";
+  }
+  const bool ends = std::string(".,:;").find(line.text.back()) != std::string::npos;
+  if (!ends && !after.text.empty() && after.indent > line.indent) {
+    return "a wrapped line without punctuation before an indented one";
+  }
+  return "";
+}
+
 }  // namespace
 
 std::vector<std::string> CheckSource(const SourceFile& file) {
@@ -143,6 +208,7 @@ std::vector<std::string> CheckSource(const SourceFile& file) {
   std::string line;
   int number = 0;
   bool has_pragma = false;
+  CommentLine before_last, last;
   const auto report = [&](int at, const std::string& what) {
     problems.push_back(file.path + ":" + std::to_string(at) + ": " + what);
   };
@@ -156,6 +222,17 @@ std::vector<std::string> CheckSource(const SourceFile& file) {
     if (!problem.empty()) {
       report(number, problem);
     }
+    const CommentLine comment = ReadComment(line);
+    const std::string wrong = WrongComment(before_last, last, comment);
+    if (!wrong.empty()) {
+      report(number - 1, wrong);
+    }
+    before_last = last;
+    last = comment;
+  }
+  const std::string wrong = WrongComment(before_last, last, {});
+  if (!wrong.empty()) {
+    report(number, wrong);
   }
   if (number == 0) {
     report(1, "empty file");

@@ -24,6 +24,10 @@ struct SourceFile {
 ///    or of tests/support);
 ///  - an `_inl.h` included by a header that is not one itself;
 ///  - a first line that is not the SPDX tag; a header without `#pragma once`;
+///  - a comment line of more than 100 characters;
+///  - an equation or a table in a comment that a formatter has wrapped like running text: a line
+///    indented by three spaces that begins with a word for which the line before it had no room, or
+///    a wrapped line without punctuation before a line that is indented further;
 ///  - more than 500 lines.
 std::vector<std::string> CheckSource(const SourceFile& file);
 

@@ -109,6 +109,32 @@ TEST(LayoutRules, EveryFileHasItsHead) {
   EXPECT_EQ(NumProblems("lib/math/a.h", std::string(499, '\n')), 1U);
 }
 
+TEST(LayoutRules, EquationsInCommentsAreNotWrapped) {
+  const auto problems = [](const std::string& lines) { return NumProblems("lib/math/a.h", lines); };
+  // Equations that clang-format had reflowed into one another.
+  EXPECT_EQ(
+      problems("//   M v − Aᵀ y − Σ_contacts (nᵀ λn + tᵀ λt) = p                 momentum; M "
+               "block diagonal plus\n"
+               "//   dampers A v = b                                                  "
+               "    joints s_n = n v + c_n ≥\n"
+               "//   0,   λn ≥ 0,   s_n λn = 0                  each contact w = t v + c_t\n"),
+      2U);
+  EXPECT_EQ(problems("//   M v = p                momentum; M block diagonal plus dampers\n"
+                     "//   A v = b                joints\n"),
+            0U);
+  // The rest of a row of a table is indented further.
+  const std::string row = "//   spring  " + std::string(86, 'x') + "\n";
+  EXPECT_EQ(problems(row + "//   its damping is implicit\n"), 1U);
+  EXPECT_EQ(problems(row + "//           its damping is implicit\n"), 0U);
+  // A word that a formatter has put between two lines of a list.
+  const std::string item = "// 4. Lemke's method " + std::string(76, 'x') + "\n";
+  EXPECT_EQ(problems(item + "// problems\n//    that are not proved infeasible\n"), 1U);
+  EXPECT_EQ(problems(item + "// problems:\n//    that are not proved infeasible\n"), 0U);
+  EXPECT_EQ(problems("// " + std::string(98, 'x') + "\n"), 1U);
+  EXPECT_EQ(problems("// " + std::string(97, 'x') + "\n"), 0U);
+  EXPECT_EQ(problems("// λ̇" + std::string(96, 'x') + "\n"), 0U);
+}
+
 TEST(LayoutRules, EveryHeaderOfARoomIsInstalled) {
   const std::string lists =
       "tangible_room(lcp\n  SOURCES a.cc\n  HEADERS a.h sub/b.h\n  DEPENDS c.h)\nother(HEADERS "

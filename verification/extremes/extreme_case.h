@@ -4,7 +4,7 @@
 // A case at the engine's limits: what is measured, the bound that physics or arithmetic puts on it,
 // and the gradient of the same scene by several methods.
 //
-//   holds            |figure| ≤ bound for every figure; a figure that is not a number does not hold
+//   holds            |figure| ≤ bound for every figure, and each is a number
 //   gradient holds   all entries are finite, and, where the certificate says "trustworthy",
 //                    adjoint and differences agree with the tangent (gradients/scene_check.h (1),
 //                    tolerances 1e-9 and 1e-5; of the adjoint eps times the condition of the linear

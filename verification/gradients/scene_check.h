@@ -14,7 +14,7 @@
 //
 // e is the method's own estimate of its error: 0 but for
 //
-//   Ridders        what the table of differences and rounding say of it (support/differences.h)
+//   Ridders        from the table of differences (support/differences.h), with rounding
 //   unrolled Jets  (10 κ / margin²) N C after N steps, or 0 if that factor is above the tolerance;
 //                  κ = 1e-14 is the complementarity at which the interior point ends, margin the
 //                  certificate's smallest. Here S = C, as all bodies are solved at once.
