@@ -102,6 +102,17 @@ struct ContactProblem {
     return pushed_momentum.empty() ? momentum : pushed_momentum;
   }
 
+  /// Empties it; memory stays.
+  void Clear() {
+    num_bodies = 0;
+    mass.clear();
+    dampers.clear();
+    momentum.clear();
+    joints.clear();
+    redundant_joints = false;
+    contacts.clear();
+    pushed_momentum.clear();
+  }
   /// Memory of the vectors.
   size_t bytes() const {
     return sizeof(T) * (mass.capacity() + momentum.capacity() + pushed_momentum.capacity()) +

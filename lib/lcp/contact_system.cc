@@ -84,6 +84,7 @@ void ContactSystem::MoveFactorsTo(ContactSystem* other) {
   regularisation_.swap(other->regularisation_);
   other->num_blocks_ = num_blocks_;
   other->regularised_ = regularised_;
+  other->masses_differ_ = masses_differ_;
   other->condensed_ = condensed_;
   other->fraction_ = fraction_;
 }
@@ -296,6 +297,7 @@ bool ContactSystem::FactorAs(bool condensed, const ContactProblem<double>& given
   for (const int block : contact_block_) {
     regularised_ = regularised_ || block >= 0;
   }
+  masses_differ_ = MassesDiffer(problem);
   return lu_.Factor();
 }
 
@@ -345,7 +347,7 @@ double ContactSystem::RefinedSolve(const ContactProblem<double>& problem,
 
 double ContactSystem::Solve(const ContactProblem<double>& problem,
                             const std::vector<ContactMode>& modes, double* x, int columns) {
-  if (!regularised_ && !MassesDiffer(problem)) {
+  if (!needs_problem()) {
     lu_.Solve(x, columns);
     return 0.0;
   }
@@ -355,7 +357,7 @@ double ContactSystem::Solve(const ContactProblem<double>& problem,
 double ContactSystem::SolveTransposed(const ContactProblem<double>& problem,
                                       const std::vector<ContactMode>& modes, double* x,
                                       int columns) {
-  if (!regularised_ && !MassesDiffer(problem)) {
+  if (!needs_problem()) {
     lu_.SolveTransposed(x, columns);
     return 0.0;
   }
@@ -469,9 +471,8 @@ double ContactSystem::Refine(const ContactProblem<double>& problem,
     }
   }
   ResidualSize all;
-  const bool slow = MassesDiffer(problem);
   for (int c = 0; c < columns; ++c) {
-    if (slow && sizes[c].ToParts() > kConsistent) {
+    if (masses_differ_ && sizes[c].ToParts() > kConsistent) {
       RefineConjugate<kTransposed>(problem, modes, regularisation, free, x, columns, c);
     }
     all.Include(sizes[c]);

@@ -64,9 +64,9 @@ class ContactSystem {
            sizeof(Turning) * turning_.capacity();
   }
   void Reserve(int num_blocks, int num_edges);
-  /// Whether solves need the problem: they are refined against K without δ. Else they read the
-  /// factors alone.
-  bool is_regularised() const { return regularised_; }
+  /// Whether solves need the problem: they are refined against K without δ, as the factorisation
+  /// found when it was made. Else they read the factors alone, and the problem may be any.
+  bool needs_problem() const { return regularised_ || masses_differ_; }
   /// Exchanges what is known of the pattern of the system; it must be factorised anew before it
   /// solves.
   void SwapPattern(std::shared_ptr<BlockLuPattern>* pattern) { lu_.SwapPattern(pattern); }
@@ -184,6 +184,7 @@ class ContactSystem {
   int num_blocks_ = 0;
   int first_contact_edge_ = 0;
   bool regularised_ = false;
+  bool masses_differ_ = false;  // so much that solves are refined
   bool condensed_ = false;
   int expansions_ = 0;
   int regularised_steps_ = 0;

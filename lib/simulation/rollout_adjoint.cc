@@ -33,9 +33,9 @@ void RolloutTape::Start(const Model<double>& model, const TapeOptions& options) 
     entry->counted = 0;  // until it is counted anew
   }
   last_record_bytes_ = last_factor_bytes_ = most_record_bytes_ = 0;
-  if (!stepper_ || structure_ != model.structure.get()) {
+  if (!stepper_ || structure_ != model.structure) {
     stepper_ = std::make_unique<Stepper>(model);
-    structure_ = model.structure.get();
+    structure_ = model.structure;
     entries_.clear();
   }
   used_ = 0;

@@ -110,7 +110,7 @@ class RolloutTape {
   size_t entry_bytes_ = 0, used_bytes_ = 0, checkpoint_bytes_ = 0, peak_bytes_ = 0;
   size_t last_record_bytes_ = 0, last_factor_bytes_ = 0, most_record_bytes_ = 0;
   std::unique_ptr<Stepper> stepper_;
-  const ModelStructure* structure_ = nullptr;
+  std::shared_ptr<const ModelStructure> structure_;  ///< of stepper_ and the entries
   ContactProblem<double> refactored_;  ///< memory of the problem that is assembled anew
   std::vector<double> u_;
   LocalJacobianScratch scratch_;

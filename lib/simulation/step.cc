@@ -459,8 +459,9 @@ void Stepper::TakeRecord(StepRecord* record, ContactSystem* system) {
   }
   factored_ = true;
   std::swap(*record, record_);
-  if (system == nullptr || !system->is_regularised()) {
+  if (system == nullptr || !system->needs_problem()) {
     std::swap(record->problem, record_.problem);
+    record->problem.Clear();  // what is left there is of another step
   }
 }
 

@@ -244,6 +244,140 @@ TEST(RolloutAdjointTest, ATapeMayBeUsedAgain) {
   EXPECT_EQ((first - again).norm(), 0.0);
 }
 
+// Links of 0.3 m on hinges, laid out level, of 1e7 kg and 1 kg in turn. The first hangs on the
+// world.
+std::string LinksOfWideMasses(int count) {
+  std::string bodies, joints, no_contact;
+  for (int i = 0; i < count; ++i) {
+    const std::string comma = i > 0 ? ", " : "";
+    const std::string name = "l" + std::to_string(i);
+    bodies += comma + R"({"name": ")" + name + R"(", "shape": {"box": {"size": [0.3, 0.05]}},)" +
+              R"("mass": )" + (i % 2 == 0 ? "1e7" : "1") + R"(, "position": [)" +
+              std::to_string(0.3 * i + 0.15) + ", 0]}";
+    joints += comma + R"({"name": "p)" + std::to_string(i) +
+              R"(", "type": "revolute", "bodies": [")" + name + R"(", ")" +
+              (i > 0 ? "l" + std::to_string(i - 1) : "world") + R"("], "anchor": [)" +
+              std::to_string(0.3 * i) + ", 0]}";
+  }
+  return R"({"bodies": [)" + bodies + R"(], "joints": [)" + joints +
+         R"(], "no_contact": [["l*", "l*"]],
+          "simulation": {"dt": 0.002, "duration": 0.3}})";
+}
+
+// What a factorisation needs goes with it onto the tape: here refinement, as masses differ by 1e7,
+// though no contact closes.
+TEST(RolloutAdjointTest, KeptFactorisationsOfWideMassesAreRefined) {
+  const Scene scene = test_scenes::SceneOf(LinksOfWideMasses(12));
+  Model<double> model;
+  State<double> initial, final;
+  BuildModel(scene, &model, &initial);
+  const ModelStructure& s = *model.structure;
+  const int outputs = 6 * s.num_bodies();
+  RowMatrixXd w_bar[2];
+  for (int k = 0; k < 2; ++k) {
+    RolloutTape tape;
+    ASSERT_EQ(tape.Record(model, initial,
+                          k == 0 ? Factorisations::kKeep : Factorisations::kRecompute, {}, &final)
+                  .status,
+              StepStatus::kDone);
+    const long last = tape.steps();
+    tape.Adjoint(
+        model, outputs,
+        [&](long step, RowMatrixXd* w) {
+          if (step == last) w->topLeftCorner(outputs, outputs).diagonal().array() += 1.0;
+        },
+        &w_bar[k]);
+  }
+  EXPECT_EQ(w_bar[0], w_bar[1]);
+  RowMatrixXd w_dot = RowMatrixXd::Zero(s.num_variables(), 1);
+  const int mass = s.NumberVariable(s.bodies[3].mass);
+  w_dot(mass, 0) = 1.0;
+  ASSERT_EQ(RolloutTangent(model, initial, {}, &w_dot, &final).status, StepStatus::kDone);
+  const double size = w_dot.col(0).head(outputs).cwiseAbs().maxCoeff();
+  EXPECT_GT(size, 1e-9);
+  for (int i = 0; i < outputs; ++i) {
+    EXPECT_NEAR(w_bar[0](mass, i), w_dot(i, 0), 1e-10 * std::abs(w_dot(i, 0)) + 1e-13 * size) << i;
+  }
+}
+
+// Two bodies of wide masses on a hinge, above a floor: 0.3 m above it the run touches nothing, on
+// it their corners and ends make several contacts.
+std::string HingedAboveFloor() {
+  return R"({"bodies": [
+      {"name": "heavy", "shape": {"box": {"size": [0.4, 0.2]}}, "mass": 1e6, "position": [0, 0.1]},
+      {"name": "light", "shape": {"box": {"size": [0.4, 0.2]}}, "mass": 1, "position": [0.5, 0.1]},
+      )" +
+         std::string(test_scenes::kFloor) +
+         R"(], "joints": [{"name": "pin", "type": "revolute", "bodies": ["heavy", "light"],
+                           "anchor": [0.25, 0.1]}],
+      "no_contact": [["heavy", "light"]], "simulation": {"dt": 0.01, "duration": 0.1}})";
+}
+
+// A used tape holds problems of the run before, whose masses and contacts are not those of this
+// one.
+TEST(RolloutAdjointTest, AUsedTapeForgetsTheContactsOfItsLastRun) {
+  const Scene scene = test_scenes::SceneOf(HingedAboveFloor());
+  Model<double> wide, equal;
+  State<double> on_floor, above, final;
+  BuildModel(scene, &wide, &on_floor);
+  const ModelStructure& s = *wide.structure;
+  equal = wide;
+  equal.numbers[s.bodies[0].mass] = 1.0;
+  equal.numbers[s.bodies[0].inertia] = equal.numbers[s.bodies[1].inertia];
+  above = on_floor;
+  for (int body = 0; body < 2; ++body) {
+    above.pose[3 * body + 1] += 0.3;
+    above.twist[3 * body + 2] = 0.3 * (body + 1);
+  }
+  const auto sweep = [&](const Model<double>& model, const State<double>& from, RolloutTape* tape) {
+    RowMatrixXd w_bar;
+    EXPECT_EQ(tape->Record(model, from, Factorisations::kKeep, {}, &final).status,
+              StepStatus::kDone);
+    tape->Adjoint(
+        model, 1,
+        [](long k, RowMatrixXd* w) {
+          if (k == 10) w->col(0).head(6).setOnes();
+        },
+        &w_bar);
+    return w_bar;
+  };
+  const std::pair<const Model<double>*, const State<double>*> runs[] = {
+      {&wide, &on_floor}, {&wide, &above},  {&equal, &above},    {&wide, &above}, {&equal, &above},
+      {&wide, &on_floor}, {&equal, &above}, {&equal, &on_floor}, {&wide, &above}};
+  RolloutTape used;
+  for (const auto& [model, from] : runs) {
+    RolloutTape fresh;
+    const RowMatrixXd expected = sweep(*model, *from, &fresh);
+    EXPECT_GT(expected.norm(), 1.0);
+    EXPECT_EQ(sweep(*model, *from, &used), expected) << &from - &runs[0].second;
+  }
+}
+
+// The structure of a scene that is gone may have had the address of another's.
+TEST(RolloutAdjointTest, AUsedTapeIsTakenToAnotherScene) {
+  RolloutTape used;
+  for (int links = 2; links < 12; ++links) {
+    Model<double> model;
+    State<double> initial, final;
+    BuildModel(test_scenes::SceneOf(LinksOfWideMasses(links)), &model, &initial);
+    RolloutTape fresh;
+    RowMatrixXd w_bar[2];
+    RolloutTape* tapes[] = {&used, &fresh};
+    for (int k = 0; k < 2; ++k) {
+      ASSERT_EQ(tapes[k]->Record(model, initial, Factorisations::kKeep, {}, &final).status,
+                StepStatus::kDone);
+      const long last = tapes[k]->steps();
+      tapes[k]->Adjoint(
+          model, 1,
+          [&](long step, RowMatrixXd* w) {
+            if (step == last) (*w)(0, 0) += 1.0;
+          },
+          &w_bar[k]);
+    }
+    EXPECT_EQ(w_bar[0], w_bar[1]) << links;
+  }
+}
+
 TEST(RolloutAdjointTest, NothingIsSeededNothingComes) {
   const Scene scene = test_scenes::SceneOf(test_scenes::Mixture());
   Model<double> model;
