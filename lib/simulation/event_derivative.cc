@@ -14,9 +14,6 @@ namespace {
 using Row = Eigen::RowVectorXd;
 
 constexpr int kMostIterations = 60;
-// Below this share of its terms an event's rate is rounding: two features hand a contact over, and
-// nothing depends on when.
-constexpr double kNoRate = 1e-9;
 
 Eigen::Vector3d BlockOf(const std::vector<double>& values, int block) {
   return Eigen::Vector3d(values[3 * block], values[3 * block + 1], values[3 * block + 2]);
@@ -55,10 +52,6 @@ void PlaceTangent(const ModelStructure& s, const Segment& segment, double c, con
 }
 
 }  // namespace
-
-bool IsLocated(EventKind kind) {
-  return kind != EventKind::kStepEnd && kind != EventKind::kEdge && kind != EventKind::kAtOnce;
-}
 
 template <typename Sink>
 void EventDerivative::Visit(const Model<double>& model, const Segment& segment,

@@ -65,7 +65,4 @@ class EventDerivative {
   RowMatrixXd compression_dot_, compression_bar_;
 };
 
-/// Whether an event's time is found from an equation (and not given).
-bool IsLocated(EventKind kind);
-
 }  // namespace tangible

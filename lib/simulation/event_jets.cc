@@ -5,21 +5,19 @@
 #include <cmath>
 
 #include "tangible/lcp/contact_interior_point.h"
-#include "tangible/lcp/dense_lu.h"
 #include "tangible/simulation/implicit_residual_inl.h"
+#include "tangible/simulation/implicit_stage.h"
+#include "tangible/simulation/mode_elimination_inl.h"
 #include "tangible/simulation/segment_flow.h"
 
 namespace tangible {
 namespace {
 
 constexpr int kMostIterations = 60;
-constexpr double kNoRate = 1e-9;  // as in event_derivative.cc
-// Pivots below this share of the largest: redundant rows, solved with δ and refined. Elimination
-// leaves them at some thousand ε, and rounding over them is no derivative.
-constexpr double kSingular = 1e-11;
-constexpr double kRegularised = 1e-10;
-constexpr int kRefinements = 4;
 constexpr double kUnrolledComplementarity = 1e-17;
+// Newton's iteration for an event's time ends where it changes derivatives by less than this share.
+constexpr double kLocated = 1e-12;
+constexpr int kMostLocations = 8;
 
 template <typename T>
 double DerivativeSize(const T& x) {
@@ -31,13 +29,8 @@ class EventReplay {
   static constexpr int kWidth = NumDerivatives<T>::value;
 
  public:
-  EventReplay(const Model<T>& model, const Model<double>& values, JetRoute route,
-              EventDerivative* derivative)
-      : model_(model),
-        values_(values),
-        s_(*model.structure),
-        route_(route),
-        derivative_(*derivative) {}
+  EventReplay(const Model<T>& model, const Model<double>& values, JetRoute route)
+      : model_(model), values_(values), s_(*model.structure), route_(route) {}
 
   void Run(EventRecord* record, State<T>* state) {
     bool started = false;
@@ -62,7 +55,7 @@ class EventReplay {
              const ContactSolution<double>& solution, const std::vector<double>& signs,
              ContactSystem* system, ContactSolution<T>* out) {
     if (route_ == JetRoute::kUnrolled) {
-      SolveByElimination(problem, solution.modes, out);
+      ModeElimination<T>::Solve(problem, solution.modes, out);
       return;
     }
     std::vector<double> rhs(3 * static_cast<size_t>(system->num_blocks()) * kWidth, 0.0);
@@ -89,142 +82,6 @@ class EventReplay {
         out->normal_impulse[i] = jet(solution.normal_impulse[i], row);
         if (solution.modes[i] == ContactMode::kSticking) {
           out->tangent_impulse[i] = jet(solution.tangent_impulse[i], row + 1);
-        }
-      }
-    }
-  }
-
-  // The mode system as a dense matrix in Jets; δ > 0 on its constraints' diagonal.
-  MatrixX<T> DenseSystem(const ContactProblem<T>& p, const std::vector<ContactMode>& modes,
-                         double delta, const std::vector<int>& row_of, int size) const {
-    MatrixX<T> k = MatrixX<T>::Constant(size, size, T(0.0));
-    const int bodies = 3 * p.num_bodies;
-    for (int i = 0; i < bodies; ++i) {
-      k(i, i) = p.mass[i];
-    }
-    for (const DamperBlock<T>& d : p.dampers) {
-      AddProduct(d.a, d.row_a, d.b, d.row_b, d.weight, &k);
-    }
-    const auto add = [&](int row, int a, const RowPart<T>& row_a, int b, const RowPart<T>& row_b) {
-      const double mobility = RowMobility(p.mass, a, row_a, b, row_b);
-      k(row, row) += T(delta * mobility);
-      for (int i = 0; i < 3; ++i) {
-        if (a >= 0) k(row, 3 * a + i) += row_a[i];
-        if (b >= 0) k(row, 3 * b + i) += row_b[i];
-      }
-    };
-    const auto add_force = [&](int column, int a, const RowPart<T>& row_a, int b,
-                               const RowPart<T>& row_b, const T& factor) {
-      for (int i = 0; i < 3; ++i) {
-        if (a >= 0) k(3 * a + i, column) -= factor * row_a[i];
-        if (b >= 0) k(3 * b + i, column) -= factor * row_b[i];
-      }
-    };
-    int row = bodies;
-    for (const JointBlock<T>& joint : p.joints) {
-      for (int r = 0; r < joint.rows; ++r, ++row) {
-        add(row, joint.a, joint.row_a[r], joint.b, joint.row_b[r]);
-        add_force(row, joint.a, joint.row_a[r], joint.b, joint.row_b[r], T(1.0));
-      }
-    }
-    for (size_t i = 0; i < p.contacts.size(); ++i) {
-      const ContactBlock<T>& c = p.contacts[i];
-      const int at = row_of[i];
-      if (at < 0) {
-        continue;
-      }
-      if (c.driven) {
-        k(at, at) = T(1.0);
-      } else {
-        add(at, c.a, c.normal_a, c.b, c.normal_b);
-      }
-      add_force(at, c.a, c.normal_a, c.b, c.normal_b, T(1.0));
-      if (modes[i] == ContactMode::kSticking) {
-        add(at + 1, c.a, c.tangent_a, c.b, c.tangent_b);
-        add_force(at + 1, c.a, c.tangent_a, c.b, c.tangent_b, T(1.0));
-      } else {
-        add_force(at, c.a, c.tangent_a, c.b, c.tangent_b, T(-SlidingSign(modes[i]) * c.friction));
-      }
-    }
-    return k;
-  }
-
-  static void AddProduct(int a, const RowPart<T>& row_a, int b, const RowPart<T>& row_b,
-                         const T& weight, MatrixX<T>* k) {
-    const int blocks[2] = {a, b};
-    const RowPart<T>* rows[2] = {&row_a, &row_b};
-    for (int x = 0; x < 2; ++x) {
-      for (int y = 0; y < 2; ++y) {
-        for (int i = 0; i < 3 && blocks[x] >= 0; ++i) {
-          for (int j = 0; j < 3 && blocks[y] >= 0; ++j) {
-            (*k)(3 * blocks[x] + i, 3 * blocks[y] + j) += weight * (*rows[x])[i] * (*rows[y])[j];
-          }
-        }
-      }
-    }
-  }
-
-  void SolveByElimination(const ContactProblem<T>& p, const std::vector<ContactMode>& modes,
-                          ContactSolution<T>* out) {
-    int size = 3 * p.num_bodies;
-    for (const JointBlock<T>& joint : p.joints) {
-      size += joint.rows;
-    }
-    std::vector<int> row_of(p.contacts.size(), -1);
-    for (size_t i = 0; i < p.contacts.size(); ++i) {
-      if (modes[i] != ContactMode::kOpen) {
-        row_of[i] = size;
-        size += modes[i] == ContactMode::kSticking ? 2 : 1;
-      }
-    }
-    VectorX<T> rhs(size);
-    for (int i = 0; i < 3 * p.num_bodies; ++i) {
-      rhs[i] = p.momentum[i];
-    }
-    int row = 3 * p.num_bodies;
-    for (const JointBlock<T>& joint : p.joints) {
-      for (int r = 0; r < joint.rows; ++r, ++row) {
-        rhs[row] = joint.rhs[r];
-      }
-    }
-    for (size_t i = 0; i < p.contacts.size(); ++i) {
-      if (row_of[i] >= 0) {
-        rhs[row_of[i]] = p.contacts[i].driven ? p.contacts[i].offset : -p.contacts[i].c_n;
-        if (modes[i] == ContactMode::kSticking) {
-          rhs[row_of[i] + 1] = -p.contacts[i].c_t;
-        }
-      }
-    }
-    const MatrixX<T> exact = DenseSystem(p, modes, 0.0, row_of, size);
-    DenseLu<T> lu;
-    VectorX<T> x;
-    if (lu.Compute(exact) && lu.pivot_ratio() > kSingular) {
-      x = lu.Solve(rhs);
-    } else {
-      lu.Compute(DenseSystem(p, modes, kRegularised, row_of, size));
-      x = lu.Solve(rhs);
-      for (int k = 0; k < kRefinements; ++k) {
-        VectorX<T> left(size);
-        for (int i = 0; i < size; ++i) {
-          left[i] = rhs[i];
-          for (int j = 0; j < size; ++j) {
-            left[i] -= exact(i, j) * x[j];
-          }
-        }
-        x += lu.Solve(left);
-      }
-    }
-    out->v.resize(3 * p.num_bodies);
-    for (int i = 0; i < 3 * p.num_bodies; ++i) {
-      out->v[i] = x[i];
-    }
-    out->normal_impulse.assign(p.contacts.size(), T(0.0));
-    out->tangent_impulse.assign(p.contacts.size(), T(0.0));
-    for (size_t i = 0; i < p.contacts.size(); ++i) {
-      if (row_of[i] >= 0) {
-        out->normal_impulse[i] = x[row_of[i]];
-        if (modes[i] == ContactMode::kSticking) {
-          out->tangent_impulse[i] = x[row_of[i] + 1];
         }
       }
     }
@@ -445,36 +302,114 @@ class EventReplay {
                : RelativeSpeed(after, contact.a, rows.tangent_a, contact.b, rows.tangent_b);
   }
 
+  // How fast the event's equation changes with the segment's length, and the sum of the magnitudes
+  // of the terms of which that is made.
+  struct Rate {
+    double value = 0.0;
+    double terms = 0.0;
+  };
+
+  // Of the map and the equation themselves: with the length as the only variable of the map, and
+  // then each part of the state that the length moves, and the time, as one of the equation.
+  Rate RateOf(Segment* segment) const {
+    const Model<T> constant{model_.structure, JetsOf(values_.numbers)};
+    EventReplay replay(constant, values_, route_);
+    State<T> by_length;
+    T tau(segment->length);
+    tau.v[0] = 1.0;
+    replay.Map(segment, JetsOf(segment->before), T(segment->time), tau, &by_length);
+    State<T> after = JetsOf(segment->after);
+    T time(segment->time + segment->length);
+    std::vector<std::pair<T*, double>> moving = {{&time, 1.0}};
+    for (size_t i = 0; i < after.pose.size(); ++i) {
+      if (ReadsBody(*segment, static_cast<int>(i / 3))) {
+        moving.emplace_back(&after.pose[i], by_length.pose[i].v[0]);
+        moving.emplace_back(&after.twist[i], by_length.twist[i].v[0]);
+      }
+    }
+    Rate rate;
+    for (size_t first = 0; first < moving.size(); first += kWidth) {
+      const size_t last = std::min(first + kWidth, moving.size());
+      for (size_t i = first; i < last; ++i) {
+        moving[i].first->v[static_cast<int>(i - first)] = moving[i].second;
+      }
+      const T equation = replay.Equation(segment, after, time);
+      rate.value += equation.v.sum();
+      rate.terms += equation.v.cwiseAbs().sum();
+      for (size_t i = first; i < last; ++i) {
+        moving[i].first->v.setZero();
+      }
+    }
+    return rate;
+  }
+
+  // Whether the equation of a segment's event depends on a body's pose and twist: accelerations
+  // depend on all.
+  static bool ReadsBody(const Segment& segment, int body) {
+    return segment.event == EventKind::kLiftOff || segment.event == EventKind::kSlipBegins ||
+           body == segment.event_contact.a || body == segment.event_contact.b;
+  }
+
+  static std::vector<T> JetsOf(const std::vector<double>& values) {
+    return std::vector<T>(values.begin(), values.end());
+  }
+  static State<T> JetsOf(const State<double>& state) {
+    State<T> jets;
+    jets.pose = JetsOf(state.pose);
+    jets.twist = JetsOf(state.twist);
+    return jets;
+  }
+
+  // The length at whose end the event's equation holds, and the state there: Newton's iteration for
+  // the derivatives of `tau`, whose value the step in double has found.
+  void LocateEvent(Segment* segment, const State<T>& before, const T& now, T* tau,
+                   State<T>* after) {
+    const Rate rate = RateOf(segment);
+    Map(segment, before, now, *tau, after);
+    if (!(std::abs(rate.value) > kNoRate * rate.terms)) {
+      return;
+    }
+    using Derivatives = Eigen::Array<double, kWidth, 1>;
+    Derivatives first;
+    double last = HUGE_VAL;
+    for (int k = 0; k < kMostLocations; ++k) {
+      const Derivatives change = Equation(segment, *after, T(now + *tau)).v.array() / rate.value;
+      first = k == 0 ? Derivatives(change.abs()) : first;
+      const double share = (first > 0.0).select(change.abs() / first, 0.0).maxCoeff();
+      // What does not fall any more is rounding.
+      if (share <= kLocated || share > 0.5 * last) {
+        return;
+      }
+      last = share;
+      tau->v -= change.matrix();
+      Map(segment, before, now, *tau, after);
+    }
+  }
+
   void RunSegment(Segment* segment, T* now, State<T>* state) {
     const double end = segment->time + segment->length;
     T tau(segment->length);
     State<T> after;
     if (IsLocated(segment->event)) {
-      double terms;
-      const double rate = derivative_.EventRate(values_, segment, &terms);
-      if (std::abs(rate) > kNoRate * terms) {
-        Map(segment, *state, *now, tau, &after);
-        tau -= (Equation(segment, after, T(*now + tau)) -
-                ValueOf(Equation(segment, after, T(*now + tau)))) /
-               rate;
+      LocateEvent(segment, *state, *now, &tau, &after);
+    } else {
+      if (segment->event_number >= 0) {
+        tau = model_.numbers[segment->event_number] - *now;
+      } else if (segment->event != EventKind::kAtOnce) {
+        tau = end - *now;
       }
-    } else if (segment->event_number >= 0) {
-      tau = model_.numbers[segment->event_number] - *now;
-    } else if (segment->event != EventKind::kAtOnce) {
-      tau = end - *now;
+      tau.a = segment->length;
+      Map(segment, *state, *now, tau, &after);
     }
-    tau.a = segment->length;
-    Map(segment, *state, *now, tau, &after);
     *now += tau;
     now->a = end;
-    *state = after;
+    *state = std::move(after);
   }
 
   const Model<T>& model_;
   const Model<double>& values_;
   const ModelStructure& s_;
   const JetRoute route_;
-  EventDerivative& derivative_;
   ImplicitStage implicit_;
   std::vector<T> compression_;  // normal impulses of the last impact
 };
@@ -483,13 +418,13 @@ class EventReplay {
 
 template <typename T>
 void EventStepInJets(const Model<T>& model, const Model<double>& values, JetRoute route,
-                     EventRecord* record, EventDerivative* derivative, State<T>* state) {
-  EventReplay<T>(model, values, route, derivative).Run(record, state);
+                     EventRecord* record, State<T>* state) {
+  EventReplay<T>(model, values, route).Run(record, state);
 }
 
 #define TANGIBLE_INSTANTIATE_JET(N)                                                           \
   template void EventStepInJets<Jet<N>>(const Model<Jet<N>>&, const Model<double>&, JetRoute, \
-                                        EventRecord*, EventDerivative*, State<Jet<N>>*);
+                                        EventRecord*, State<Jet<N>>*);
 TANGIBLE_FOR_EACH_JET_WIDTH(TANGIBLE_INSTANTIATE_JET)
 
 }  // namespace tangible

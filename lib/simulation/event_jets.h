@@ -7,17 +7,21 @@
 //   implicit   each linear system by K⁻¹ of the double step applied to the Jets' residual
 //   unrolled   impacts by the interior point in Jets, systems of given modes by elimination in Jets
 //
-// The length of a segment that an event ends is τ − g / (dg/dτ) in Jets: one Newton step from the
-// time that the double step found, exact in the derivatives.
+// The length τ of a segment that an event ends is where the event's equation holds in Jets:
+//
+//   g(S(τ), t + τ) = 0,   τ ← τ − g / (dg/dτ)
+//
+// by Newton's iteration from the length that the double step found, with the map S and the equation
+// g (gap, speed or force) evaluated in Jets at each. So is dg/dτ, with τ as the only variable:
+// nothing of the tangent's derivatives (event_derivative.h) enters.
 
 #include "tangible/simulation/rollout.h"
 
 namespace tangible {
 
-/// `record` is that of the double step from the state's values; `derivative` tells the events'
-/// rates.
+/// `record` is that of the double step from the state's values.
 template <typename T>
 void EventStepInJets(const Model<T>& model, const Model<double>& values, JetRoute route,
-                     EventRecord* record, EventDerivative* derivative, State<T>* state);
+                     EventRecord* record, State<T>* state);
 
 }  // namespace tangible

@@ -92,6 +92,10 @@ const char* NameOf(EventKind event) {
   return "";
 }
 
+bool IsLocated(EventKind kind) {
+  return kind != EventKind::kStepEnd && kind != EventKind::kEdge && kind != EventKind::kAtOnce;
+}
+
 SolvedAcceleration ViewOf(const Segment& segment, const SolvedNode& node, bool correction) {
   SolvedAcceleration view;
   view.correction = correction;

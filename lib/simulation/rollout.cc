@@ -149,8 +149,7 @@ RolloutReport RolloutJets(const Model<T>& model, const State<T>& initial, JetRou
     }
     const State<T> before = jets;
     if (stepper.by_events()) {
-      EventStepInJets(model, values, route, &stepper.events().mutable_record(),
-                      &stepper.event_derivative(), &jets);
+      EventStepInJets(model, values, route, &stepper.events().mutable_record(), &jets);
     } else if (route == JetRoute::kImplicit) {
       StepImplicit(model, &stepper, state, &jets);
     } else if (!StepUnrolled(model, stepper.record(), &jets)) {
