@@ -174,7 +174,9 @@ int Run(const std::string& file, const GradientOptions& options) {
   error = CheckFinite(file, result);
   if (!error.empty()) return ReportError(error);
   error = WriteResult(FLAGS_out, JsonText(Describe(result)));
-  return error.empty() ? kExitDone : ReportError(error);
+  if (!error.empty()) return ReportError(error);
+  if (!result.open_joint.empty()) ReportError(file + ": warning: " + result.open_joint);
+  return kExitDone;
 }
 
 int Main(int argc, char** argv) {

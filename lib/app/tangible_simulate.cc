@@ -19,6 +19,7 @@
 #include "tangible/app/program.h"
 #include "tangible/app/progress.h"
 #include "tangible/app/run_summary.h"
+#include "tangible/app/run_warnings.h"
 #include "tangible/app/trajectory_csv.h"
 #include "tangible/app/view_recorder.h"
 #include "tangible/scene/json_writer.h"
@@ -191,7 +192,8 @@ void Prepare(const std::string& file, Job* job) {
   MakeRecorders(job);
 }
 
-std::string WriteResults(const Job& job, const RolloutReport& report, double seconds,
+std::string WriteResults(const Job& job, const RolloutReport& report,
+                         const std::vector<std::string>& warnings, double seconds,
                          double cpu_seconds, Recorders* r) {
   std::string error;
   const auto write = [&error](const std::string& path, const std::string& text) {
@@ -204,6 +206,7 @@ std::string WriteResults(const Job& job, const RolloutReport& report, double sec
   if (r->view) write(FLAGS_view, ViewHtml(r->view->data()));
   if (r->summary) {
     OrderedJson summary = r->summary->ToJson(job.model, report, seconds, cpu_seconds);
+    summary["warnings"] = warnings;
     if (r->certifier) {
       summary["certificate"] = ToJson(r->certifier->Finish(job.model, report));
     }
@@ -219,12 +222,13 @@ int Run(const std::string& file) {
   const std::string over = OutputOverInput({"out", "contacts", "view", "summary", "observe"});
   if (!over.empty()) return ReportError("tangible-simulate: " + over, kExitUsage);
   RolloutReport report;
+  RunWarnings warnings(job.model, job.initial);
+  State<double> final;
   double recording = 0.0;
   const double wall_start = WallSeconds();
   const double cpu_start = CpuSeconds();
   {
     Progress progress("steps", NumSteps(job.scene.simulation));
-    State<double> final;
     const int cores = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
     Stepper stepper(job.model, FLAGS_threads > 0 ? FLAGS_threads : cores);
     report = Rollout(
@@ -232,17 +236,38 @@ int Run(const std::string& file) {
         [&](long k, double t, const State<double>& state, Stepper* stepper) {
           const double start = CpuSeconds();
           job.recorders.Add(job.model, k, t, state, stepper);
+          warnings.Add(job.model, k, t, state);
           progress.Show(k);
           recording += CpuSeconds() - start;
         },
         &stepper, &final);
   }
   const double cpu_seconds = CpuSeconds() - cpu_start - recording;
+  const std::vector<std::string> lines = warnings.Finish(job.model, report, final);
   const std::string error =
-      WriteResults(job, report, WallSeconds() - wall_start, cpu_seconds, &job.recorders);
+      WriteResults(job, report, lines, WallSeconds() - wall_start, cpu_seconds, &job.recorders);
   if (!error.empty()) return ReportError(error);
-  if (report.status == StepStatus::kDone) return kExitDone;
-  return ReportError(file + ": " + report.message);
+  // Of a run that failed its one line says why.
+  if (report.status != StepStatus::kDone) return ReportError(file + ": " + report.message);
+  for (const std::string& line : lines) ReportError(file + ": warning: " + line);
+  return kExitDone;
+}
+
+// One line on the first row whose joints are open at its end, with how many others there are.
+void ReportOpenJoints(const BatchTable& table, const std::vector<BatchRow>& rows) {
+  std::string first;
+  int others = -1;
+  for (size_t r = 0; r < rows.size(); ++r) {
+    if (rows[r].open_joint.empty()) continue;
+    if (++others == 0) {
+      first = FLAGS_batch + ": line " + std::to_string(table.lines[r]) +
+              ": warning: " + rows[r].open_joint;
+    }
+  }
+  if (others > 0) {
+    first += " (and " + std::to_string(others) + (others == 1 ? " more row)" : " more rows)");
+  }
+  if (others >= 0) ReportError(first);
 }
 
 // All rows of a table; those that fail are told, the others written.
@@ -268,6 +293,7 @@ int RunRows(const std::string& file) {
     exit_status = ReportError(FLAGS_batch + ": line " + std::to_string(table.lines[r]) + ": " +
                               batch.rows[r].message);
   }
+  ReportOpenJoints(table, batch.rows);
   return exit_status;
 }
 

@@ -254,9 +254,9 @@ void AssembleAcceleration(const Model<T>& model, const State<T>& state, const T&
 }
 
 double JointCorrectionShare(const SimulationSettings& settings) {
-  return settings.joint_correction == JointCorrection::kNone        ? 0.0
-         : settings.joint_correction == JointCorrection::kBaumgarte ? settings.baumgarte
-                                                                    : 1.0;
+  return JointCorrectionOf(settings) == JointCorrection::kNone        ? 0.0
+         : JointCorrectionOf(settings) == JointCorrection::kBaumgarte ? settings.baumgarte
+                                                                      : 1.0;
 }
 
 template <typename T>

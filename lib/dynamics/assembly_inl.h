@@ -96,7 +96,7 @@ class FreeAssembly {
       block.b = structure_.bodies[joint.b].block;
       block.rows = r.rows;
       const bool correct = correct_drift && h_ > 0.0 &&
-                           structure_.settings.joint_correction == JointCorrection::kBaumgarte;
+                           JointCorrectionOf(structure_.settings) == JointCorrection::kBaumgarte;
       for (int k = 0; k < r.rows; ++k) {
         block.row_a[k] = r.row_a[k];
         block.row_b[k] = r.row_b[k];

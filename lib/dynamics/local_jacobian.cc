@@ -161,7 +161,7 @@ class StepVisitor : private internal::LocalEntries<Sink> {
   // An impact (h = 0) corrects nothing, and no damping or effort acts in it.
   bool Corrects() const {
     return step_.corrects_drift && step_.h > 0.0 &&
-           s_.settings.joint_correction == JointCorrection::kBaumgarte;
+           JointCorrectionOf(s_.settings) == JointCorrection::kBaumgarte;
   }
 
   // Two rows p_a − p_b with arms r = R(θ) anchor: only the arms depend on variables, and

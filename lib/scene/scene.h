@@ -134,8 +134,11 @@ struct SimulationSettings {
   /// scene file: observations between steps add their times (event stepping).
   std::vector<double> step_times;
   Stepping stepping = Stepping::kFixed;
-  Integrator integrator = Integrator::kSemiImplicitEuler;
-  JointCorrection joint_correction = JointCorrection::kNone;
+  /// These two follow the stepping as long as they are not set, whenever and wherever `stepping`
+  /// is: a program that sets `stepping = Stepping::kEvent` alone gets what a file with that one key
+  /// gets. What a run then uses, and what there is to read, say IntegratorOf and JointCorrectionOf.
+  std::optional<Integrator> integrator;
+  std::optional<JointCorrection> joint_correction;
   double joint_tolerance = 1e-10;  ///< m or rad, of `projection`
   double baumgarte = 0.2;          ///< fraction of the joint drift corrected a step
   Mixing friction_mixing = Mixing::kAverage;
@@ -150,6 +153,22 @@ struct SimulationSettings {
   int lcp_max_iterations = 100;
   double smoothing = 0.0;  ///< complementarity κ at which the interior point stops; 0: exact
 };
+
+/// The integrator of a run: the one that is set, else `semi_implicit_euler` with fixed stepping and
+/// `runge_kutta_4` with event stepping (by events the former gains energy without bound).
+inline Integrator IntegratorOf(const SimulationSettings& settings) {
+  return settings.integrator.value_or(settings.stepping == Stepping::kEvent
+                                          ? Integrator::kRungeKutta4
+                                          : Integrator::kSemiImplicitEuler);
+}
+
+/// The correction of joints of a run: the one that is set, else `none` with fixed stepping and
+/// `projection` with event stepping.
+inline JointCorrection JointCorrectionOf(const SimulationSettings& settings) {
+  return settings.joint_correction.value_or(settings.stepping == Stepping::kEvent
+                                                ? JointCorrection::kProjection
+                                                : JointCorrection::kNone);
+}
 
 template <typename T>
 struct BasicScene {

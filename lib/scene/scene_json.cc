@@ -25,9 +25,10 @@ void ReadPoint(const JsonReader& object, const char* key, Vector2<double>* value
   if (object.Has(key)) *value = object.At(key).Point();
 }
 
-template <typename Enum, std::size_t N>
+// `Value` is the enumeration, or an optional of it, which an absent key leaves empty.
+template <typename Enum, std::size_t N, typename Value>
 void ReadChoice(const JsonReader& object, const char* key,
-                const std::pair<const char*, Enum> (&table)[N], Enum* value) {
+                const std::pair<const char*, Enum> (&table)[N], Value* value) {
   if (object.Has(key)) *value = object.At(key).Choice(table);
 }
 

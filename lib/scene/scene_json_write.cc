@@ -151,24 +151,28 @@ class SceneWriter {
 
   OrderedJson SimulationJson() const {
     const SimulationSettings& settings = scene_.simulation;
-    return {{"dt", settings.dt},
-            {"duration", settings.duration},
-            {"stepping", NameOf(settings.stepping, kSteppingNames)},
-            {"integrator", NameOf(settings.integrator, kIntegratorNames)},
-            {"joint_correction", NameOf(settings.joint_correction, kJointCorrectionNames)},
-            {"joint_tolerance", settings.joint_tolerance},
-            {"baumgarte", settings.baumgarte},
-            {"friction_mixing", NameOf(settings.friction_mixing, kMixingNames)},
-            {"restitution_mixing", NameOf(settings.restitution_mixing, kMixingNames)},
-            {"impact_law", NameOf(settings.impact_law, kImpactLawNames)},
-            {"restitution_threshold", settings.restitution_threshold},
-            {"recovery_speed", settings.recovery_speed},
-            {"contact_margin", settings.contact_margin},
-            {"max_events_per_step", settings.max_events_per_step},
-            {"solver", NameOf(settings.solver, kSolverNames)},
-            {"lcp_tolerance", settings.lcp_tolerance},
-            {"lcp_max_iterations", settings.lcp_max_iterations},
-            {"smoothing", settings.smoothing}};
+    OrderedJson json = {{"dt", settings.dt},
+                        {"duration", settings.duration},
+                        {"stepping", NameOf(settings.stepping, kSteppingNames)}};
+    // What is not set stays so: read back it follows the stepping as before.
+    if (settings.integrator) json["integrator"] = NameOf(*settings.integrator, kIntegratorNames);
+    if (settings.joint_correction) {
+      json["joint_correction"] = NameOf(*settings.joint_correction, kJointCorrectionNames);
+    }
+    json["joint_tolerance"] = settings.joint_tolerance;
+    json["baumgarte"] = settings.baumgarte;
+    json["friction_mixing"] = NameOf(settings.friction_mixing, kMixingNames);
+    json["restitution_mixing"] = NameOf(settings.restitution_mixing, kMixingNames);
+    json["impact_law"] = NameOf(settings.impact_law, kImpactLawNames);
+    json["restitution_threshold"] = settings.restitution_threshold;
+    json["recovery_speed"] = settings.recovery_speed;
+    json["contact_margin"] = settings.contact_margin;
+    json["max_events_per_step"] = settings.max_events_per_step;
+    json["solver"] = NameOf(settings.solver, kSolverNames);
+    json["lcp_tolerance"] = settings.lcp_tolerance;
+    json["lcp_max_iterations"] = settings.lcp_max_iterations;
+    json["smoothing"] = settings.smoothing;
+    return json;
   }
 
   const Scene& scene_;

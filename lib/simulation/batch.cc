@@ -9,6 +9,7 @@
 #include <thread>
 
 #include "tangible/scene/set_parameters.h"
+#include "tangible/simulation/joint_opening.h"
 #include "tangible/simulation/rollout_tangent.h"
 #include "tangible/simulation/settings.h"
 
@@ -69,9 +70,9 @@ class Worker {
     }
     result->status = StatusOf(result->report.status);
     result->message = result->report.message;
-    if (result->status == BatchStatus::kDone && !batch_.loss_outputs.empty()) {
-      result->loss = Loss(result->final);
-    }
+    if (result->status != BatchStatus::kDone) return;
+    result->open_joint = OpenJointOf(model_, result->final, result->report.time);
+    if (!batch_.loss_outputs.empty()) result->loss = Loss(result->final);
   }
 
  private:

@@ -107,7 +107,7 @@ void EventDerivative::NodeAdjoint(const Model<double>& model, const Segment& seg
 double EventDerivative::SegmentTangent(const Model<double>& model, Segment* segment, RowMatrixXd* x,
                                        const Row& tau_dot) {
   const ModelStructure& s = *model.structure;
-  const NystromTableau& tableau = NystromTableau::Of(s.settings.integrator);
+  const NystromTableau& tableau = NystromTableau::Of(IntegratorOf(s.settings));
   RowMatrixXd a_dot[NystromTableau::kMost];
   RowMatrixXd place;
   double left = 0.0;
@@ -271,7 +271,7 @@ double EventDerivative::Tangent(const Model<double>& model, EventRecord* record,
 void EventDerivative::StagesAdjoint(const Model<double>& model, Segment* segment,
                                     RowMatrixXd* w_bar) {
   const ModelStructure& s = *model.structure;
-  const NystromTableau& tableau = NystromTableau::Of(s.settings.integrator);
+  const NystromTableau& tableau = NystromTableau::Of(IntegratorOf(s.settings));
   const Eigen::Index columns = w_bar->cols();
   const double tau = segment->length;
   RowMatrixXd a_bar[NystromTableau::kMost];

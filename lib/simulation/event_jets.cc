@@ -211,7 +211,7 @@ class EventReplay {
   }
 
   void Map(Segment* segment, const State<T>& before, const T& time, const T& tau, State<T>* after) {
-    const NystromTableau& tableau = NystromTableau::Of(s_.settings.integrator);
+    const NystromTableau& tableau = NystromTableau::Of(IntegratorOf(s_.settings));
     std::vector<ContactSolution<T>> stages(tableau.stages);
     State<T> state;
     for (int i = 0; i < tableau.stages; ++i) {

@@ -9,6 +9,7 @@
 #include "tangible/scene/scene_names.h"
 #include "tangible/simulation/certify.h"
 #include "tangible/simulation/gradient_methods.h"
+#include "tangible/simulation/joint_opening.h"
 #include "tangible/simulation/rollout_directional.h"
 #include "tangible/simulation/rollout_tangent.h"
 #include "tangible/simulation/settings.h"
@@ -184,6 +185,7 @@ bool TimeRollout(const GradientProblem& problem, Stepper* stepper, GradientResul
   const RolloutReport report = Rollout(problem.model, problem.initial, {}, stepper, &final);
   result->all_rollout_seconds.push_back(Seconds() - start);
   result->message = FailureOf(problem, report);
+  result->open_joint = OpenJointOf(problem.model, final, report.time);
   return result->message.empty();
 }
 
@@ -285,6 +287,7 @@ GradientResult Differentiate(const GradientProblem& problem, const GradientOptio
     result.certificate = CertificateOf(problem);
   }
   JudgeSide(problem, options, &result);
+  if (!result.open_joint.empty()) result.notes.push_back(result.open_joint);
   result.done = true;
   return result;
 }

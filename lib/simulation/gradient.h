@@ -74,8 +74,10 @@ struct GradientResult {
   double rollout_seconds = std::numeric_limits<double>::quiet_NaN();  ///< of a plain rollout
   /// Both of each repeat, CPU time; a rollout is run before every repeat of the method.
   std::vector<double> all_seconds, all_rollout_seconds;
-  std::vector<std::string>
-      notes;              ///< one-sided differences, changes of modes between them, fallbacks
+  /// One-sided differences, changes of modes between them, fallbacks, and open_joint.
+  std::vector<std::string> notes;
+  /// Empty, or a line on the joint that is widest open at the end (joint_opening.h).
+  std::string open_joint;
   long fallbacks = 0;     ///< unrolled steps that took the implicit derivative
   size_t tape_bytes = 0;  ///< of the adjoint: the most memory that its records took
   long steps_again = 0;   ///< of the adjoint: steps that were run again from checkpoints

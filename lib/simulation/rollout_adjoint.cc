@@ -9,7 +9,7 @@ namespace tangible {
 namespace {
 
 bool Projects(const ModelStructure& structure) {
-  return structure.settings.joint_correction == JointCorrection::kProjection &&
+  return JointCorrectionOf(structure.settings) == JointCorrection::kProjection &&
          !structure.joints.empty();
 }
 

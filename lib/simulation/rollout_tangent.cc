@@ -20,7 +20,7 @@ void AdvanceTangent(const Model<double>& model, Stepper* stepper, const double* 
           stepper->record().h * w_dot->row(s.TwistVariable(body, i));
     }
   }
-  if (s.settings.joint_correction == JointCorrection::kProjection && !s.joints.empty()) {
+  if (JointCorrectionOf(s.settings) == JointCorrection::kProjection && !s.joints.empty()) {
     stepper->projection().Tangent(model, w_dot->data(), columns);
   }
 }

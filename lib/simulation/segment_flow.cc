@@ -217,7 +217,7 @@ bool SegmentFlow::Accelerate(const Model<double>& model, const Segment& segment,
 bool SegmentFlow::SolveImplicitStage(const Model<double>& model, Segment* segment, int i,
                                      const std::function<void(State<double>*)>& place,
                                      std::string* message) {
-  const NystromTableau& tableau = NystromTableau::Of(model.structure->settings.integrator);
+  const NystromTableau& tableau = NystromTableau::Of(IntegratorOf(model.structure->settings));
   const double tau = segment->length;
   SolvedNode& stage = segment->stages[i];
   std::vector<double>& acceleration = stage.solution.v;
@@ -295,7 +295,7 @@ bool SegmentFlow::HasConverged(const SolvedNode& stage, const std::vector<double
 
 bool SegmentFlow::Integrate(const Model<double>& model, Segment* segment, std::string* message) {
   const ModelStructure& structure = *model.structure;
-  const NystromTableau& tableau = NystromTableau::Of(structure.settings.integrator);
+  const NystromTableau& tableau = NystromTableau::Of(IntegratorOf(structure.settings));
   const double tau = segment->length;
   segment->num_stages = tableau.stages;
   if (static_cast<int>(segment->stages.size()) < tableau.stages) {
@@ -342,11 +342,11 @@ bool SegmentFlow::CorrectPoses(const Model<double>& model, Segment* segment, std
   const SimulationSettings& settings = structure.settings;
   segment->num_corrections = 0;
   const bool joints =
-      !structure.joints.empty() && settings.joint_correction != JointCorrection::kNone;
+      !structure.joints.empty() && JointCorrectionOf(settings) != JointCorrection::kNone;
   if (segment->contacts.empty() && !joints) {
     return true;
   }
-  const bool once = joints && settings.joint_correction == JointCorrection::kBaumgarte;
+  const bool once = joints && JointCorrectionOf(settings) == JointCorrection::kBaumgarte;
   // What recovers may move another contact off its surface: then there is an error that stays.
   bool recovers = false;
   for (const ActiveContact& contact : segment->contacts) {
@@ -365,7 +365,7 @@ bool SegmentFlow::CorrectPoses(const Model<double>& model, Segment* segment, std
     AssembleCorrection(model, node.state, segment->contacts, segment->friction,
                        k == 0 ? settings.recovery_speed * segment->length : 0.0, &acceleration_,
                        &node.problem);
-    if (k == 0 && settings.joint_correction == JointCorrection::kProjection &&
+    if (k == 0 && JointCorrectionOf(settings) == JointCorrection::kProjection &&
         DriftsFar(model, node.problem)) {
       // So they do where links whip faster than dt resolves, and where the implicit stage has found
       // another of its solutions than the one that the motion continues with.
@@ -477,8 +477,12 @@ bool SegmentFlow::Project(const Model<double>& model, Impulses* impulses) {
 }
 
 bool SegmentFlow::Run(const Model<double>& model, Segment* segment, std::string* message) {
-  return Integrate(model, segment, message) && CorrectPoses(model, segment, message) &&
-         ProjectTwists(model, segment, message);
+  if (!Integrate(model, segment, message)) return false;
+  if (CorrectPoses(model, segment, message)) return ProjectTwists(model, segment, message);
+  // Joints that no twist satisfies leave no poses either, and are what there is to say.
+  std::string why;
+  if (!ProjectTwists(model, segment, &why)) *message = why;
+  return false;
 }
 
 }  // namespace tangible

@@ -19,9 +19,9 @@ std::string NeedsEvents(const std::string& key, const std::string& have, const s
 
 bool CheckSettings(const SimulationSettings& settings, std::string* error) {
   const bool fixed = settings.stepping == Stepping::kFixed;
-  if (fixed && settings.integrator != Integrator::kSemiImplicitEuler) {
+  if (fixed && IntegratorOf(settings) != Integrator::kSemiImplicitEuler) {
     *error = NeedsEvents("integrator", "semi_implicit_euler", "others need",
-                         NameOf(settings.integrator, kIntegratorNames));
+                         NameOf(IntegratorOf(settings), kIntegratorNames));
   } else if (fixed && settings.impact_law != ImpactLaw::kNewton) {
     *error = NeedsEvents("impact_law", "newton", "other needs",
                          NameOf(settings.impact_law, kImpactLawNames));

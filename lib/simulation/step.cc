@@ -436,7 +436,7 @@ StepReport Stepper::Step(const Model<double>& model, double t, double h, State<d
   last_contacts_.assign(r.contacts.begin(), r.contacts.end());
   last_solution_ = r.solution;
   const bool projects =
-      settings.joint_correction == JointCorrection::kProjection && !structure.joints.empty();
+      JointCorrectionOf(settings) == JointCorrection::kProjection && !structure.joints.empty();
   const bool met = !projects || projection_.Project(model, r.before.pose, state);
   report.damped_projections = projects ? projection_.damped_steps() : 0;
   if (!met) {

@@ -72,7 +72,7 @@ void Stepper::SumImpulses(const Model<double>& model) {
   r.solution = ContactSolution<double>();
   r.solution.joint_impulse.assign(3 * model.structure->joints.size(), 0.0);
   const EventRecord& events = events_->record();
-  const NystromTableau& tableau = NystromTableau::Of(model.structure->settings.integrator);
+  const NystromTableau& tableau = NystromTableau::Of(IntegratorOf(model.structure->settings));
   const auto add_joints = [&](double weight, const std::vector<double>& impulses) {
     for (size_t k = 0; k < impulses.size(); ++k) {
       r.solution.joint_impulse[k] += weight * impulses[k];

@@ -62,7 +62,7 @@ void StepImplicit(const Model<T>& model, Stepper* stepper, const State<double>& 
     }
   }
   internal::MovePoses(s, record.h, state);
-  if (s.settings.joint_correction == JointCorrection::kProjection && !s.joints.empty()) {
+  if (JointCorrectionOf(s.settings) == JointCorrection::kProjection && !s.joints.empty()) {
     ProjectImplicit(model, &stepper->projection(), after, state);
   }
 }
@@ -71,7 +71,7 @@ template <typename T>
 bool StepUnrolled(const Model<T>& model, const StepRecord& record, State<T>* state) {
   const ModelStructure& s = *model.structure;
   const bool converged = SolveUnrolled(model, record, state);
-  if (s.settings.joint_correction == JointCorrection::kProjection && !s.joints.empty()) {
+  if (JointCorrectionOf(s.settings) == JointCorrection::kProjection && !s.joints.empty()) {
     JointProjection::ProjectUnrolled(model, record.before.pose, state);
   }
   return converged;

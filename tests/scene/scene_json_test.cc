@@ -158,6 +158,41 @@ TEST(ParseSceneTest, DefaultsOfWhatIsLeftOut) {
   EXPECT_EQ(scene.simulation.max_events_per_step, 100);
 }
 
+SimulationSettings SettingsOf(const std::string& simulation) {
+  Scene scene;
+  std::string error;
+  EXPECT_TRUE(ParseScene(R"({"bodies": [], "simulation": )" + simulation + "}", "s.json", "",
+                         &scene, &error))
+      << error;
+  return scene.simulation;
+}
+
+TEST(ParseSceneTest, IntegratorAndCorrectionOfJointsFollowTheSteppingUnlessWritten) {
+  const SimulationSettings fixed = SettingsOf("{}");
+  EXPECT_EQ(IntegratorOf(fixed), Integrator::kSemiImplicitEuler);
+  EXPECT_EQ(JointCorrectionOf(fixed), JointCorrection::kNone);
+  const SimulationSettings event = SettingsOf(R"({"stepping": "event"})");
+  EXPECT_EQ(IntegratorOf(event), Integrator::kRungeKutta4);
+  EXPECT_EQ(JointCorrectionOf(event), JointCorrection::kProjection);
+}
+
+TEST(ParseSceneTest, WhatIsWrittenHoldsWhateverTheOrderOfKeys) {
+  for (const char* text :
+       {R"({"stepping": "event", "integrator": "semi_implicit_euler", "joint_correction": "none"})",
+        R"({"joint_correction": "none", "integrator": "semi_implicit_euler", "stepping": "event"})",
+        R"({"integrator": "semi_implicit_euler", "stepping": "event",
+            "joint_correction": "none"})"}) {
+    const SimulationSettings settings = SettingsOf(text);
+    EXPECT_EQ(settings.stepping, Stepping::kEvent);
+    EXPECT_EQ(IntegratorOf(settings), Integrator::kSemiImplicitEuler) << text;
+    EXPECT_EQ(JointCorrectionOf(settings), JointCorrection::kNone) << text;
+  }
+  for (const char* text : {R"({"stepping": "event", "joint_correction": "none"})",
+                           R"({"joint_correction": "none", "stepping": "event"})"}) {
+    EXPECT_EQ(IntegratorOf(SettingsOf(text)), Integrator::kRungeKutta4) << text;
+  }
+}
+
 TEST(LoadSceneTest, SignalFilesAreRelativeToTheScene) {
   const std::string folder = ::testing::TempDir();
   std::ofstream(folder + "tangible_push.csv") << "time,x,y\n0,1,2\n1,3,4\n";

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstring>
 #include <fstream>
+#include <optional>
 #include <random>
 #include <string>
 #include <vector>
@@ -65,6 +66,28 @@ TEST(SceneToJsonTest, RoundTripBitForBit) {
   EXPECT_EQ(back.simulation.dt, scene.simulation.dt);
   EXPECT_TRUE(std::signbit(back.bodies[0].velocity.x()));
   EXPECT_EQ(SceneToJson(back), SceneToJson(scene));
+}
+
+// Every combination, of what is set and what follows the stepping, reads back as it was.
+TEST(SceneToJsonTest, IntegratorAndCorrectionOfJointsReadBackTheSame) {
+  Scene scene = Parsed(kFullScene);
+  const std::optional<Integrator> integrators[] = {std::nullopt, Integrator::kSemiImplicitEuler,
+                                                   Integrator::kRungeKutta4};
+  const std::optional<JointCorrection> corrections[] = {std::nullopt, JointCorrection::kNone,
+                                                        JointCorrection::kProjection};
+  for (const Stepping stepping : {Stepping::kFixed, Stepping::kEvent}) {
+    for (const auto& integrator : integrators) {
+      for (const auto& correction : corrections) {
+        scene.simulation.stepping = stepping;
+        scene.simulation.integrator = integrator;
+        scene.simulation.joint_correction = correction;
+        const SimulationSettings back = Parsed(SceneToJson(scene)).simulation;
+        EXPECT_EQ(back.stepping, stepping);
+        EXPECT_EQ(back.integrator, integrator);
+        EXPECT_EQ(back.joint_correction, correction);
+      }
+    }
+  }
 }
 
 TEST(SceneToJsonTest, SignalsAreWrittenAsTheirFile) {

@@ -76,5 +76,18 @@ TEST(MatchesPathTest, AgreesWithTheDefinitionOnRandomTexts) {
   EXPECT_GT(matches, 100);
 }
 
+TEST(SimulationSettingsTest, WhatIsNotSetFollowsTheSteppingWheneverThatIsSet) {
+  SimulationSettings settings;
+  EXPECT_EQ(IntegratorOf(settings), Integrator::kSemiImplicitEuler);
+  EXPECT_EQ(JointCorrectionOf(settings), JointCorrection::kNone);
+  settings.stepping = Stepping::kEvent;
+  EXPECT_EQ(IntegratorOf(settings), Integrator::kRungeKutta4);
+  EXPECT_EQ(JointCorrectionOf(settings), JointCorrection::kProjection);
+  settings.integrator = Integrator::kSemiImplicitEuler;
+  settings.joint_correction = JointCorrection::kNone;
+  EXPECT_EQ(IntegratorOf(settings), Integrator::kSemiImplicitEuler);
+  EXPECT_EQ(JointCorrectionOf(settings), JointCorrection::kNone);
+}
+
 }  // namespace
 }  // namespace tangible

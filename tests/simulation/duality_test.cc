@@ -61,8 +61,9 @@ TEST(DualityTest, NoDirectionHasNoGap) {
 
 // The certificate's linear residual is at least the gap: what it calls trustworthy agrees.
 TEST(DualityTest, TheCertificateKnowsWhatATautChainLoses) {
-  const char* settings =
-      R"({"dt": 0.002, "duration": 0.02, "stepping": "event", "integrator": "trapezoidal"})";
+  // With projection its joints do not hold at this step: the run ends.
+  const char* settings = R"({"dt": 0.002, "duration": 0.02, "stepping": "event",
+                             "integrator": "trapezoidal", "joint_correction": "none"})";
   const Built b(Hanging(30, 1e9, settings));
   ASSERT_TRUE(HasWideMasses(b.model));
   const double gap = DualityGap(b.model, b.initial, b.directions);

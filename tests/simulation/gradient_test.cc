@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "../support/gradients.h"
@@ -232,6 +233,18 @@ TEST(LossGradient, IsTheJacobianTimesTheLossesDerivative) {
     EXPECT_LE((result.gradient - expected).cwiseAbs().maxCoeff(),
               1e-11 * expected.cwiseAbs().maxCoeff());
   }
+}
+
+TEST(FinalStateJacobian, NotesJointsThatAreOpenAtTheEnd) {
+  Scene scene = SceneOf(test_scenes::WhippingChain(0.5));
+  const auto parameters = Resolve(scene, {"bodies/a/mass"});
+  const GradientResult closed = FinalStateJacobian(scene, parameters, {});
+  EXPECT_EQ(closed.open_joint, "");
+  scene.simulation.joint_correction = JointCorrection::kNone;
+  const GradientResult open = FinalStateJacobian(scene, parameters, {});
+  ASSERT_TRUE(open.done) << open.message;
+  EXPECT_NE(open.open_joint.find("is open by"), std::string::npos);
+  EXPECT_EQ(std::count(open.notes.begin(), open.notes.end(), open.open_joint), 1);
 }
 
 TEST(LossGradient, RefusesAnUnknownOutput) {

@@ -41,6 +41,25 @@ inline std::string HeavyEnd(const std::string& end,
          more + "}}";
 }
 
+/// A square loop of three unit rods of 1 kg on the ground, which swings through; `simulation` as in a
+/// scene file.
+inline std::string FourBar(const std::string& simulation) {
+  return R"({"bodies": [
+      {"name": "left", "mass": 1, "inertia": 0.08333333333333333, "position": [0, 0.5],
+       "velocity": [0.5, 0], "angular_velocity": -1},
+      {"name": "top", "mass": 1, "inertia": 0.08333333333333333, "position": [0.5, 1],
+       "velocity": [1, 0]},
+      {"name": "right", "mass": 1, "inertia": 0.08333333333333333, "position": [1, 0.5],
+       "velocity": [0.5, 0], "angular_velocity": -1}],
+    "joints": [
+      {"name": "pin0", "type": "revolute", "bodies": ["left", "world"], "anchor": [0, 0]},
+      {"name": "pin1", "type": "revolute", "bodies": ["left", "top"], "anchor": [0, 1]},
+      {"name": "pin2", "type": "revolute", "bodies": ["top", "right"], "anchor": [1, 1]},
+      {"name": "pin3", "type": "revolute", "bodies": ["right", "world"], "anchor": [1, 0]}],
+    "simulation": )" +
+         simulation + "}";
+}
+
 inline constexpr char kFloor[] =
     R"({"name": "floor", "static": true, "friction": 0.3, "restitution": 0.5,
         "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}})";

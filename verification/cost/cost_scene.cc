@@ -102,10 +102,11 @@ Scene ChainAndBall(long steps, Stepping stepping) {
   scene.no_contact.emplace_back("link*", "link*");
   scene.simulation.dt = kStep;
   scene.simulation.duration = kStep * static_cast<double>(steps);
-  if (stepping == Stepping::kEvent) {
-    scene.simulation.stepping = stepping;
-    scene.simulation.integrator = Integrator::kRungeKutta4;
-  }
+  // Written out: what is timed does not follow defaults.
+  scene.simulation.stepping = stepping;
+  scene.simulation.integrator =
+      stepping == Stepping::kEvent ? Integrator::kRungeKutta4 : Integrator::kSemiImplicitEuler;
+  scene.simulation.joint_correction = JointCorrection::kNone;
   return scene;
 }
 

@@ -175,7 +175,7 @@ GradientResult TapeLossGradient(const Scene& scene, const std::vector<ParameterP
   GradientResult result;
   const SimulationSettings& settings = scene.simulation;
   if (settings.stepping != Stepping::kFixed ||
-      settings.joint_correction == JointCorrection::kProjection) {
+      JointCorrectionOf(settings) == JointCorrection::kProjection) {
     result.message = "the tape records fixed steps without projection, and no others";
     return result;
   }

@@ -85,9 +85,9 @@ Coverage CoverageOf(const Scene& scene, const RunTrace& run) {
   const long steps = NumSteps(settings);
   coverage[steps <= 2 ? "steps 1 to 2" : steps <= 40 ? "steps 3 to 40" : "steps 41 to 200"] = 1;
   coverage["stepping " + NameOf(settings.stepping, kSteppingNames)] = 1;
-  coverage["integrator " + NameOf(settings.integrator, kIntegratorNames)] = 1;
+  coverage["integrator " + NameOf(IntegratorOf(settings), kIntegratorNames)] = 1;
   coverage["impact law " + NameOf(settings.impact_law, kImpactLawNames)] = 1;
-  coverage["joint correction " + NameOf(settings.joint_correction, kJointCorrectionNames)] = 1;
+  coverage["joint correction " + NameOf(JointCorrectionOf(settings), kJointCorrectionNames)] = 1;
   coverage["mixing of friction " + NameOf(settings.friction_mixing, kMixingNames)] = 1;
   coverage["mixing of restitution " + NameOf(settings.restitution_mixing, kMixingNames)] = 1;
   for (const BasicJoint<double>& joint : scene.joints) {

@@ -190,7 +190,7 @@ class TermsOfStep {
 RowMatrixXd AdjointOfStep(const Model<double>& model, RowMatrixXd w_bar, StepTerms* terms) {
   const ModelStructure& s = *model.structure;
   const int columns = static_cast<int>(w_bar.cols());
-  if (s.settings.joint_correction == JointCorrection::kProjection && !s.joints.empty()) {
+  if (JointCorrectionOf(s.settings) == JointCorrection::kProjection && !s.joints.empty()) {
     terms->projection.Adjoint(model, w_bar.data(), columns);
   }
   RowMatrixXd u = RowMatrixXd::Zero(3 * terms->system.num_blocks(), columns);

@@ -87,7 +87,7 @@ void Add(const SimulationSettings& settings, Sweep* sweep) {
     AddOnce("event stepping with smoothing: its impacts are solved exactly", &sweep->left_out);
   } else if (!CheckSettings(settings, &why)) {
     AddOnce(NameOf(settings.stepping, kSteppingNames) + " stepping with " +
-                NameOf(settings.integrator, kIntegratorNames) + ": " + why,
+                NameOf(IntegratorOf(settings), kIntegratorNames) + ": " + why,
             &sweep->left_out);
   } else if (settings.smoothing > 0.0 && settings.solver == SolverChoice::kLemke) {
     AddOnce("lemke with smoothing: only the interior point stops early", &sweep->left_out);
@@ -105,7 +105,7 @@ Sweep MakeSweep(const Scene& scene, SweepKind kind) {
   for (const auto& stepping : kSteppingNames) {
     for (const auto& integrator : kIntegratorNames) {
       for (const auto& correction : kJointCorrectionNames) {
-        const bool own_correction = correction.second == own.joint_correction;
+        const bool own_correction = correction.second == JointCorrectionOf(own);
         if (scene.joints.empty() && !own_correction) continue;
         const std::vector<Solving> solvings = SolvingsOf(own, touches, kind);
         for (size_t i = 0; i < solvings.size(); ++i) {
@@ -145,8 +145,8 @@ std::vector<double> StepLengths(const SimulationSettings& settings, int samples,
 
 std::string NameOf(const SimulationSettings& settings, const SimulationSettings& of_scene) {
   std::string name = NameOf(settings.stepping, kSteppingNames) + " " +
-                     NameOf(settings.integrator, kIntegratorNames) + ", " +
-                     NameOf(settings.joint_correction, kJointCorrectionNames);
+                     NameOf(IntegratorOf(settings), kIntegratorNames) + ", " +
+                     NameOf(JointCorrectionOf(settings), kJointCorrectionNames);
   if (settings.solver != of_scene.solver) name += ", " + NameOf(settings.solver, kSolverNames);
   if (settings.lcp_tolerance != of_scene.lcp_tolerance) {
     name += ", tolerance " + Number(settings.lcp_tolerance);

@@ -62,7 +62,7 @@ std::string HeadText(const Tradeoff& tradeoff) {
   for (const std::string& path : tradeoff.parameters) text += " " + path;
   text += Format("\nlength scale %.3g m; reference: ", tradeoff.scale.length) +
           NameOf(reference.settings.stepping, kSteppingNames) + " " +
-          NameOf(reference.settings.integrator, kIntegratorNames) +
+          NameOf(IntegratorOf(reference.settings), kIntegratorNames) +
           Format(", dt %.4g s, its own errors: trajectory ", reference.settings.dt) +
           ErrorText(reference.trajectory_error, false) + ", gradient " +
           ErrorText(reference.gradient_error, false) + "\n";
@@ -90,8 +90,8 @@ OrderedJson OrNull(double value) {
 OrderedJson SettingsJson(const SimulationSettings& settings) {
   return {{"dt", settings.dt},
           {"stepping", NameOf(settings.stepping, kSteppingNames)},
-          {"integrator", NameOf(settings.integrator, kIntegratorNames)},
-          {"joint_correction", NameOf(settings.joint_correction, kJointCorrectionNames)},
+          {"integrator", NameOf(IntegratorOf(settings), kIntegratorNames)},
+          {"joint_correction", NameOf(JointCorrectionOf(settings), kJointCorrectionNames)},
           {"solver", NameOf(settings.solver, kSolverNames)},
           {"lcp_tolerance", settings.lcp_tolerance},
           {"smoothing", settings.smoothing}};
@@ -167,7 +167,7 @@ std::vector<PlotSeries> SeriesOf(const std::vector<Tradeoff>& tradeoffs, bool of
     if (!cell.measured()) continue;
     const bool fixed = cell.settings.stepping == Stepping::kFixed;
     const std::string name =
-        fixed ? "fixed" : "event " + NameOf(cell.settings.integrator, kIntegratorNames);
+        fixed ? "fixed" : "event " + NameOf(IntegratorOf(cell.settings), kIntegratorNames);
     PlotSeries& series = kinds[name];
     series.label = name;
     series.style = PlotStyle::kPoints;

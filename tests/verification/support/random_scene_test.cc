@@ -90,7 +90,7 @@ TEST(RandomSceneTest, SteppingsAreThoseOfTheEngineAndTheirScenesAreTheSame) {
   Scene event = RandomScene(7, options);
   EXPECT_EQ(event.simulation.stepping, Stepping::kEvent);
   event.simulation.stepping = Stepping::kFixed;
-  event.simulation.integrator = Integrator::kSemiImplicitEuler;
+  event.simulation.integrator.reset();
   event.simulation.duration = RandomScene(7).simulation.duration;
   EXPECT_EQ(SceneToJson(event), SceneToJson(RandomScene(7)));
 }

@@ -48,7 +48,8 @@ TEST(TradeoffTableTest, ShowsTheFrontsAndWhatIsMissing) {
   const std::string text = TableText(Example());
   for (const char* expected :
        {"2 cells measured, 1 over their budget, 1 failed", "its own errors: trajectory 1.0e-09",
-        "reference: did not come within its bound", "failed 1: event runge_kutta_4, none, lemke",
+        "reference: did not come within its bound",
+        "failed 1: event runge_kutta_4, projection, lemke",
         "left out: fixed stepping with trapezoidal: why", "TG fixed semi_implicit_euler, none ",
         "0.02   1.0e-02   3.0e-02          1    1.00",
         "0.02  5.0e-10*   1.0e-06          3    3.00          8    4.00"}) {

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/app/run_warnings.h"
+
+#include <cstdio>
+
+#include "tangible/simulation/invariants.h"
+
+namespace tangible {
+namespace {
+
+double Energy(const Model<double>& model, const State<double>& state) {
+  return KineticEnergy(model, state) + PotentialEnergy(model, state);
+}
+
+}  // namespace
+
+std::string FirstOrderByEvents(const Model<double>& model, const State<double>& initial,
+                               const State<double>& final) {
+  const SimulationSettings& settings = model.structure->settings;
+  if (settings.stepping != Stepping::kEvent ||
+      IntegratorOf(settings) != Integrator::kSemiImplicitEuler) {
+    return "";
+  }
+  char text[320];
+  std::snprintf(text, sizeof text,
+                "semi_implicit_euler with event stepping is of first order, and its error of the "
+                "energy grows with the run (here from %.4g J to %.4g J): expected \"integrator\": "
+                "\"runge_kutta_4\" in \"simulation\", the default, which is of fourth order",
+                Energy(model, initial), Energy(model, final));
+  return text;
+}
+
+std::vector<std::string> RunWarnings::Finish(const Model<double>& model,
+                                             const RolloutReport& report,
+                                             const State<double>& final) {
+  if (joints_.watches()) joints_.Look(model, final, report.time);
+  std::vector<std::string> lines;
+  for (std::string line : {joints_.Message(model), FirstOrderByEvents(model, initial_, final)}) {
+    if (!line.empty()) lines.push_back(std::move(line));
+  }
+  return lines;
+}
+
+}  // namespace tangible

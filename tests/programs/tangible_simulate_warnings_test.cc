@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// What programs say of a run that is done: what the defaults of each stepping keep, and one line on
+// what they do not.
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "../support/scenes.h"
+#include "run_program.h"
+
+namespace tangible {
+namespace {
+
+using nlohmann::json;
+
+constexpr char kRemedy[] = R"("joint_correction": "projection")";
+
+// Ten links by fixed steps of the defaults: their joints are open by a quarter of a link after 8 s.
+std::string Chain(const std::string& duration) {
+  std::string text = test_scenes::HeavyEnd("1", R"("dt": 0.01, "duration": )" + duration);
+  const std::string projection = std::string(kRemedy) + ", ";
+  text.erase(text.find(projection), projection.size());
+  return text;
+}
+
+class WarningsTest : public ProgramTest {
+ protected:
+  /// Runs a scene; its summary is in summary_.
+  ProgramRun Simulate(const std::string& scene, const std::string& flags = "") {
+    const ProgramRun run =
+        Run("tangible-simulate",
+            "'" + Write("scene.json", scene) + "' --summary='" + Path("s.json") + "' " + flags);
+    summary_ = json::parse(Read(Path("s.json")));
+    return run;
+  }
+  double EnergyGain() const {
+    return summary_["energy_end"].get<double>() - summary_["energy_start"].get<double>();
+  }
+
+  json summary_;
+};
+
+// 5 s in which the loop turns over and over: it keeps 20.45 J and its hinges.
+TEST_F(WarningsTest, EventSteppingKeepsALoopsEnergyAndJointsByDefault) {
+  const ProgramRun run =
+      Simulate(test_scenes::FourBar(R"({"dt": 0.005, "duration": 5, "stepping": "event"})"));
+  EXPECT_EQ(run.exit_status, 0);
+  EXPECT_EQ(run.error, "");
+  EXPECT_NEAR(EnergyGain(), 0.0, 1e-6);
+  EXPECT_LE(summary_["joint_drift_max"].get<double>(), 1e-10);
+  EXPECT_EQ(summary_["warnings"], json::array());
+}
+
+TEST_F(WarningsTest, SemiImplicitEulerByEventsSaysWhatItCosts) {
+  const ProgramRun run = Simulate(test_scenes::FourBar(
+      R"({"integrator": "semi_implicit_euler", "dt": 0.005, "duration": 5, "stepping": "event"})"));
+  ExpectOneLine(run, 0, "runge_kutta_4");
+  EXPECT_GT(EnergyGain(), 10.0);
+  ASSERT_EQ(summary_["warnings"].size(), 1u);
+  const std::string warning = summary_["warnings"][0];
+  EXPECT_NE(warning.find("semi_implicit_euler"), std::string::npos) << warning;
+  EXPECT_NE(warning.find("from 20.45 J to 42.44 J"), std::string::npos) << warning;
+  EXPECT_NE(run.error.find(warning), std::string::npos) << run.error;
+}
+
+TEST_F(WarningsTest, OpenJointsAreOneLineWithTheRemedy) {
+  const ProgramRun run = Simulate(Chain("8"));
+  ExpectOneLine(run, 0, kRemedy);
+  EXPECT_NE(run.error.find("scene.json: warning: joint pin"), std::string::npos) << run.error;
+  ASSERT_EQ(summary_["warnings"].size(), 1u);
+  EXPECT_NE(run.error.find(summary_["warnings"][0].get<std::string>()), std::string::npos);
+  // Also without a summary, and the trajectory is written all the same.
+  const ProgramRun plain = Run("tangible-simulate", "'" + Path("scene.json") + "' --every=100");
+  EXPECT_EQ(plain.error, run.error);
+  EXPECT_EQ(std::count(plain.out.begin(), plain.out.end(), '\n'), 1 + 10 * 9);
+}
+
+TEST_F(WarningsTest, JointsThatHoldAreNotWorthALine) {
+  EXPECT_EQ(Simulate(Chain("0.1")).error, "");
+  EXPECT_EQ(summary_["warnings"], json::array());
+  EXPECT_EQ(Simulate(test_scenes::HeavyEnd("1", R"("dt": 0.01, "duration": 8)")).error, "");
+  EXPECT_EQ(summary_["warnings"], json::array());
+}
+
+TEST_F(WarningsTest, ARunThatFailsHasOneLineAlone) {
+  const ProgramRun run = Simulate(R"({"bodies": [
+          {"name": "a", "mass": 1, "inertia": 1, "position": [1, 0]}],
+        "joints": [{"name": "pin", "type": "revolute", "bodies": ["a", "world"], "anchor": [0, 0]}],
+        "springs": [{"name": "s", "bodies": ["a", "world"], "anchors": [[1, 1], [3, 1]],
+                     "stiffness": 1e9, "rest_length": 1}],
+        "simulation": {"dt": 0.01, "duration": 10}})");
+  ExpectOneLine(run, 1, "dt is too large");
+}
+
+TEST_F(WarningsTest, ABatchSaysItOnce) {
+  Write("scene.json", Chain("8"));
+  Write("rows.csv", "gravity/y\n0\n-9.81\n-9.8\n-9.7\n");
+  const ProgramRun run =
+      Run("tangible-simulate", "'" + Path("scene.json") + "' --batch='" + Path("rows.csv") + "'");
+  ExpectOneLine(run, 0, kRemedy);
+  EXPECT_NE(run.error.find("rows.csv: line 3: warning: joint pin"), std::string::npos) << run.error;
+  EXPECT_NE(run.error.find("2 more rows"), std::string::npos) << run.error;
+}
+
+TEST_F(WarningsTest, AGradientSaysItToo) {
+  const ProgramRun run =
+      Run("tangible-gradient", "'" + Write("scene.json", Chain("8")) +
+                                   "' --parameters=gravity/y --out='" + Path("g.json") + "'");
+  ExpectOneLine(run, 0, kRemedy);
+  const std::string note = json::parse(Read(Path("g.json")))["notes"].back();
+  EXPECT_NE(run.error.find(note), std::string::npos) << note;
+}
+
+}  // namespace
+}  // namespace tangible
