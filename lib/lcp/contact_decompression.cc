@@ -153,7 +153,7 @@ ContactSolverReport DecompressionSolver::Solve(const ContactSolverOptions& optio
     report.solved_by = SolvedBy::kGuess;
     return finish();
   }
-  ++report.fallbacks.dense;
+  report.fallbacks.dense += FitsDensePortfolio(*problem) ? 1 : 0;
   if (SolveContactsDense(*problem, options.tolerance, solution, &report.iterations)) {
     for (size_t i = 0; i < problem->contacts.size(); ++i) {
       ContactBlock<double>& contact = problem->contacts[i];

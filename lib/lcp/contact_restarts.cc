@@ -118,6 +118,7 @@ bool ContactSolver::SolveByRestarts(const ContactProblem<double>& problem,
   if (ContactsProvedInfeasible(problem)) {
     return false;
   }
+  ++report->fallbacks.restarts;
   const ContactSolverReport before = *report;
   const ContactSolution<double> last = *solution;
   const int num_contacts = static_cast<int>(problem.contacts.size());

@@ -328,15 +328,15 @@ bool ContactSolver::SolveByLemke(const ContactProblem<double>& problem,
     return false;
   }
   const auto by_dense = [&] {
+    if (!FitsDensePortfolio(problem)) {
+      return false;
+    }
     ++report->fallbacks.dense;
     const bool dense = SolveContactsDense(problem, options.tolerance, solution, &iterations);
     report->iterations += iterations;
     return dense && Polish(problem, options, solution, report);
   };
-  const auto by_restarts = [&] {
-    ++report->fallbacks.restarts;
-    return SolveByRestarts(problem, options, solution, report);
-  };
+  const auto by_restarts = [&] { return SolveByRestarts(problem, options, solution, report); };
   // What is cheaper comes first.
   return problem.contacts.size() <= kFewContacts ? by_dense() || by_restarts()
                                                  : by_restarts() || by_dense();

@@ -120,16 +120,21 @@ class ContactSolver {
   ContactScales scales_;
 };
 
+/// Whether the problem is small enough for the dense portfolio: up to 240 rows of the one-sided form
+/// (4 a contact with friction, else 1), and 1000 unknowns of bodies and joints.
+bool FitsDensePortfolio(const ContactProblem<double>& problem);
+
 /// The dense portfolio (solver.h) with its further attempts, on the one-sided form; false where it
-/// fails or the problem has more than 240 rows.
+/// fails or does not fit.
 bool SolveContactsDense(const ContactProblem<double>& problem, double tolerance,
                         ContactSolution<double>* solution, int* iterations);
 
 /// Whether a checked Farkas vector says that no impulses satisfy the contacts' inequalities; false
-/// too where the problem has more than 400 rows.
+/// too where the problem has more than 400 rows or 1000 unknowns.
 bool ContactsProvedInfeasible(const ContactProblem<double>& problem);
 
-/// Lemke's method on the dense one-sided form of the problem; false where it fails.
+/// Lemke's method on the dense one-sided form of the problem; false where it fails, or the problem
+/// has more than 400 rows or 1000 unknowns.
 bool SolveContactsByLemke(const ContactProblem<double>& problem, ContactSolution<double>* solution,
                           int* iterations);
 
