@@ -104,6 +104,15 @@ ParameterSet ReadSet(const JsonReader& json) {
   return set;
 }
 
+// It is printed as it is, on a line with others.
+std::string ReadName(const JsonReader& json) {
+  std::string name = json.String();
+  if (json.IsString() && (name.empty() || OneLine(name) != name)) {
+    json.FailExpected(name.empty() ? "a name" : "a name without control characters");
+  }
+  return name;
+}
+
 FitParameter ReadParameter(const JsonReader& json) {
   FitParameter parameter;
   if (json.IsString()) {
@@ -125,13 +134,10 @@ FitParameter ReadParameter(const JsonReader& json) {
       json.At("sets").Fail("expected sets or path, got both");
     }
     parameter.sets.push_back({json.At("path").String()});
-    parameter.name = json.Has("name") ? json.At("name").String() : parameter.sets[0].path;
+    parameter.name = json.Has("name") ? ReadName(json.At("name")) : parameter.sets[0].path;
     return parameter;
   }
-  parameter.name = json.At("name").String();
-  if (parameter.name.empty() && json.Has("name")) {
-    json.At("name").FailExpected("a name");
-  }
+  parameter.name = ReadName(json.At("name"));
   const JsonReader sets = json.At("sets");
   const int count = sets.ExpectArray("an array of {path, scale, offset}");
   for (int i = 0; i < count; ++i) {

@@ -242,9 +242,8 @@ int Run(const std::string& file) {
   if (result.estimate.size() > 0) {
     PrintEstimates(entries, result);
     if (result.certificate.verdict != "trustworthy") {
-      std::cerr << file
-                << ": warning: not trustworthy at the estimate: " << result.certificate.verdict
-                << "\n";
+      ReportError(file +
+                  ": warning: not trustworthy at the estimate: " + result.certificate.verdict);
     }
   }
   if (checked) {
@@ -257,7 +256,7 @@ int Run(const std::string& file) {
     PrintCheck(entries, check);
   }
   if (checkpoint && !checkpoint->error().empty()) {
-    std::cerr << checkpoint->error() << ": the fit went on without its checkpoint\n";
+    ReportError(checkpoint->error() + ": the fit went on without its checkpoint");
   }
   const int written = WriteFiles(fit, residuals, result, checked ? &check : nullptr);
   if (written != kExitDone) {

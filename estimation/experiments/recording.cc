@@ -3,12 +3,12 @@
 
 #include <array>
 #include <cmath>
-#include <fstream>
 #include <limits>
 #include <numbers>
 #include <sstream>
 
 #include "tangible/scene/csv.h"
+#include "tangible/scene/text_file.h"
 
 namespace tangible {
 namespace {
@@ -28,7 +28,9 @@ bool ReadMarkers(const std::string& text, const std::string& file, const Recordi
     header += (header.empty() ? "" : ",") + column;
   }
   CsvTable table;
-  if (!ParseCsv(header + "\n" + text, file, kMarkerColumns, kMarkerColumns, &table, error)) {
+  const std::string rows_of_file(WithoutByteOrderMark(text));
+  if (!ParseCsv(header + "\n" + rows_of_file, file, kMarkerColumns, kMarkerColumns, &table,
+                error)) {
     return false;
   }
   for (int& line : table.lines) {
@@ -157,14 +159,8 @@ bool ParseRecording(const std::string& text, const std::string& file,
 
 bool ReadRecording(const std::string& file, const RecordingOptions& options, Recording* recording,
                    std::string* error) {
-  std::ifstream stream(file);
-  std::ostringstream text;
-  text << stream.rdbuf();
-  if (!stream) {
-    *error = file + ": expected a file that can be read";
-    return false;
-  }
-  return ParseRecording(text.str(), file, options, recording, error);
+  std::string text;
+  return ReadTextFile(file, &text, error) && ParseRecording(text, file, options, recording, error);
 }
 
 std::string ObservationCsv(const Recording& recording) {

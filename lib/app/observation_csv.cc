@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <unordered_map>
 #include <utility>
 
 #include "tangible/app/program.h"
@@ -14,19 +15,16 @@ namespace tangible {
 namespace {
 
 ObservedPoint ReadPoint(const JsonReader& json, const std::string& name,
-                        const ModelStructure& structure) {
+                        const std::unordered_map<std::string, int>& bodies) {
   json.ExpectKeys({"body", "at"}, " of a point");
   ObservedPoint point;
   point.name = name;
   const JsonReader body = json.At("body");
-  const std::string body_name = body.String();
-  for (int i = 0; i < structure.world(); ++i) {
-    if (structure.bodies[i].name == body_name) {
-      point.body = i;
-    }
-  }
-  if (point.body < 0) {
+  const auto found = bodies.find(body.String());
+  if (found == bodies.end()) {
     body.FailExpected("a body of the scene");
+  } else {
+    point.body = found->second;
   }
   if (json.Has("at")) {
     point.at = json.At("at").Point();
@@ -50,12 +48,16 @@ std::string ReadPoints(const std::string& file, const ModelStructure& structure,
   } else if (root.Keys().empty()) {
     root.Fail("expected at least one point, got none");
   }
+  std::unordered_map<std::string, int> bodies;
+  for (int body = 0; body < structure.world(); ++body) {
+    bodies.emplace(structure.bodies[body].name, body);
+  }
   for (const std::string& name : root.Keys()) {
     // The name stands in a cell of the observations.
     if (!IsName(name)) {
       root.At(name).Fail("expected a name of letters, digits and _.- , got " + name);
     }
-    points->push_back(ReadPoint(root.At(name), name, structure));
+    points->push_back(ReadPoint(root.At(name), name, bodies));
   }
   return errors.message();
 }
@@ -78,14 +80,9 @@ void ObservationCsv::Add(long k, double t, const State<double>& state) {
     Write(t, state, 0.0, state);
     return;
   }
-  // A sample this near to a step is that step's: decimal times miss it by rounding.
-  const double near = 1e-9 * dt_;
-  while (true) {
+  while (Writes(t)) {
     const double time = std::min(static_cast<double>(next_) / options_.rate, duration_);
-    if (static_cast<double>(next_) / options_.rate > duration_ + near || time > t + near) {
-      break;
-    }
-    if (k == 0 || time >= t - near) {
+    if (k == 0 || time >= t - Near()) {
       Write(time, state, 0.0, state);
     } else {
       Write(time, last_, (time - last_time_) / (t - last_time_), state);
@@ -94,6 +91,12 @@ void ObservationCsv::Add(long k, double t, const State<double>& state) {
   }
   last_time_ = t;
   last_ = state;
+}
+
+bool ObservationCsv::Writes(double t) const {
+  const double next = static_cast<double>(next_) / options_.rate;
+  return options_.rate == 0.0 ||
+         (next <= duration_ + Near() && std::min(next, duration_) <= t + Near());
 }
 
 void ObservationCsv::Write(double time, const State<double>& before, double part,
@@ -109,8 +112,14 @@ void ObservationCsv::Write(double time, const State<double>& before, double part
     // bit.
     const double dx = options_.noise > 0.0 ? options_.noise * Normal() : 0.0;
     const double dy = options_.noise > 0.0 ? options_.noise * Normal() : 0.0;
-    text_ += FormatNumber(time) + "," + point.name + "," + FormatNumber(r.x() + dx) + "," +
-             FormatNumber(r.y() + dy) + "\n";
+    AppendNumber(time, &text_);
+    text_ += ',';
+    text_ += point.name;
+    text_ += ',';
+    AppendNumber(r.x() + dx, &text_);
+    text_ += ',';
+    AppendNumber(r.y() + dy, &text_);
+    text_ += '\n';
   }
 }
 

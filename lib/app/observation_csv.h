@@ -43,11 +43,15 @@ class ObservationCsv {
   ObservationCsv(const ModelStructure& structure, ObserveOptions options);
   /// Every state of the run, in order.
   void Add(long k, double t, const State<double>& state);
+  /// Whether the state at time t, which is to be added next, brings rows.
+  bool Writes(double t) const;
   std::string Finish() { return std::move(text_); }
 
  private:
   void Write(double time, const State<double>& before, double part, const State<double>& after);
   double Normal();
+  /// A sample this near to a step is that step's: decimal times miss it by rounding.
+  double Near() const { return 1e-9 * dt_; }
 
   ObserveOptions options_;
   double duration_;

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <charconv>
 #include <csignal>
 #include <cstdio>
 #include <cstring>
@@ -15,10 +16,11 @@
 #include <filesystem>
 #include <fstream>
 #include <iostream>
+#include <new>
 #include <sstream>
 #include <system_error>
 
-#include "tangible/scene/json_reader.h"
+#include "tangible/scene/text_file.h"
 
 namespace tangible {
 namespace {
@@ -181,6 +183,13 @@ void TakeFaultsAsErrors() {
   }
 }
 
+// Without its folder, whose name may be anything.
+const char* ProgramName(char** argv) {
+  if (argv == nullptr || argv[0] == nullptr) return "tangible";
+  const char* const slash = std::strrchr(argv[0], '/');
+  return slash == nullptr ? argv[0] : slash + 1;
+}
+
 // An error where something that went to stdout did not arrive, or empty.
 std::string LostOutput() {
   errno = 0;
@@ -258,16 +267,20 @@ int RunMain(int (*body)(int, char**), int argc, char** argv) noexcept {
     const int exit_status = body(argc, argv);
     const std::string lost = LostOutput();
     return exit_status == kExitDone && !lost.empty() ? ReportError(lost) : exit_status;
+  } catch (const std::bad_alloc&) {
+    // What the work held has been given back, so that there is room for a message again; but
+    // nothing here relies on it.
+    std::fprintf(stderr, "%s: not enough memory for this job\n", ProgramName(argv));
   } catch (const std::exception& error) {
-    std::fprintf(stderr, "%s: unexpected error: %s\n", argv[0], error.what());
+    std::fprintf(stderr, "%s: unexpected error: %s\n", ProgramName(argv), error.what());
   } catch (...) {
-    std::fprintf(stderr, "%s: unexpected error\n", argv[0]);
+    std::fprintf(stderr, "%s: unexpected error\n", ProgramName(argv));
   }
   return kExitFailed;
 }
 
 int ReportError(std::string_view message, int exit_status) {
-  std::cerr << OneLine(std::string(message)) << "\n";
+  std::cerr << OneLine(message) << "\n";
   return exit_status;
 }
 
@@ -283,10 +296,18 @@ std::vector<std::string> SplitAtCommas(const std::string& text) {
   return parts;
 }
 
+void AppendNumber(double value, std::string* text) {
+  // The digits of "%.17g", in a third of printf's time.
+  std::array<char, 32> digits{};
+  const std::to_chars_result end = std::to_chars(digits.data(), digits.data() + digits.size(),
+                                                 value, std::chars_format::general, 17);
+  text->append(digits.data(), end.ptr);
+}
+
 std::string FormatNumber(double value) {
-  std::array<char, 32> text{};
-  const int length = std::snprintf(text.data(), text.size(), "%.17g", value);
-  return {text.data(), static_cast<std::size_t>(length)};
+  std::string text;
+  AppendNumber(value, &text);
+  return text;
 }
 
 std::string OutputOverInput(const std::vector<std::string>& flags) {

@@ -56,8 +56,8 @@ struct CommandLine {
 /// line about what is wrong on stderr.
 CommandLine ParseCommandLine(int argc, char** argv, const ProgramInfo& info);
 
-/// Runs `body`; an exception that nobody expected (no memory), and output that did not reach stdout
-/// (closed, a full disk, a pipe without a reader), is one line on stderr and status 1.
+/// Runs `body`; memory that ran out, an exception that nobody expected, and output that did not
+/// reach stdout (closed, a full disk, a pipe without a reader), is one line on stderr and status 1.
 int RunMain(int (*body)(int, char**), int argc, char** argv) noexcept;
 
 /// Prints `message` as exactly one line on stderr and returns `exit_status`.
@@ -68,6 +68,8 @@ std::vector<std::string> SplitAtCommas(const std::string& text);
 
 /// A number with 17 significant digits, which read back give the same double.
 std::string FormatNumber(double value);
+/// The same at the end of a text.
+void AppendNumber(double value, std::string* text);
 
 /// What a write may replace: any file but one that was read as an input (json_reader.h), or also an
 /// input that is the program's own to go on with.

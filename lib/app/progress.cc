@@ -3,6 +3,7 @@
 
 #include <unistd.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <utility>
 
@@ -21,10 +22,20 @@ Progress::~Progress() {
 }
 
 void Progress::Show(long done) {
-  if (!terminal_) {
+  if (!terminal_ || done < look_) {
     return;
   }
+  // Where much is done between two looks at the clock, it is read less often.
+  constexpr long kMostStride = 1024;
   const auto now = std::chrono::steady_clock::now();
+  const auto since = now - looked_;
+  if (since < std::chrono::milliseconds(10)) {
+    stride_ = std::min(2 * stride_, kMostStride);
+  } else if (since > std::chrono::milliseconds(50)) {
+    stride_ = 1;
+  }
+  looked_ = now;
+  look_ = done + stride_;
   if (now < next_) {
     return;
   }

@@ -25,6 +25,9 @@ class Progress {
   bool terminal_;
   bool shown_ = false;
   std::chrono::steady_clock::time_point next_;
+  std::chrono::steady_clock::time_point looked_;  ///< when the clock was read last
+  long stride_ = 1;
+  long look_ = 0;  ///< when so many are done it is read again
 };
 
 }  // namespace tangible

@@ -86,18 +86,19 @@ const char* ToString(StepStatus status) {
   return "";
 }
 
-void RunSummary::Add(const Model<double>& model, const State<double>& state, Stepper* stepper) {
+void RunSummary::Keep(const Model<double>& model, const State<double>& state,
+                      const Stepper* stepper) {
   if (!started_) {
     started_ = true;
     first_ = state;
   }
-  last_ = state;
   if (!model.structure->joints.empty()) {
-    joint_drift_max_ = std::max(joint_drift_max_, JointDrift(model, state));
+    poses_.insert(poses_.end(), state.pose.begin(), state.pose.end());
   }
   if (stepper != nullptr) {
     const StepRecord& record = stepper->record();
-    islands_max_ = std::max(islands_max_, CountIslands(*model.structure, record));
+    AddClosedContacts(record, &closed_);
+    closed_ends_.push_back(closed_.size());
     stepped_ = true;
     by_events_ = stepper->by_events();
     last_step_.time = record.time;
@@ -110,22 +111,49 @@ void RunSummary::Add(const Model<double>& model, const State<double>& state, Ste
   }
 }
 
+bool RunSummary::IsFull() const {
+  // What stays in a processor's cache. A step of a scene that fills it by itself takes far longer
+  // than a look at the clock.
+  constexpr size_t kMostNumbers = 8192;
+  constexpr size_t kMostSteps = 256;
+  return poses_.size() + closed_.size() >= kMostNumbers || closed_ends_.size() >= kMostSteps;
+}
+
+void RunSummary::EvaluateKept(const Model<double>& model) {
+  const ModelStructure& structure = *model.structure;
+  const auto size = static_cast<std::ptrdiff_t>(first_.pose.size());
+  for (auto pose = poses_.cbegin(); pose != poses_.cend(); pose += size) {
+    at_.pose.assign(pose, pose + size);
+    joint_drift_max_ = std::max(joint_drift_max_, JointDrift(model, at_));
+  }
+  size_t begin = 0;
+  for (const size_t end : closed_ends_) {
+    const int islands = CountIslands(structure, closed_.data() + begin, end - begin);
+    islands_max_ = std::max(islands_max_, islands);
+    begin = end;
+  }
+  poses_.clear();
+  closed_.clear();
+  closed_ends_.clear();
+}
+
 OrderedJson RunSummary::ToJson(const Model<double>& model, const RolloutReport& report,
-                               double seconds, double cpu_seconds) const {
+                               const State<double>& last) {
+  EvaluateKept(model);
   const bool chosen = model.structure->settings.solver != SolverChoice::kAuto;
   const long fallbacks = report.solved_by_interior_point + report.solved_by_lemke;
   // The steps' reports give gaps at their starts; the end has no step.
-  const double penetration = std::max(report.penetration_max, -SmallestGap(model, last_));
+  const double penetration = std::max(report.penetration_max, DeepestPenetration(model, last));
   OrderedJson undetermined = nullptr;
   if (stepped_) {
     // The rows of a fixed step are those of its start; event stepping's last are those of its end.
-    undetermined = UndeterminedJson(model, by_events_ ? last_ : last_step_.before, last_step_);
+    undetermined = UndeterminedJson(model, by_events_ ? last : last_step_.before, last_step_);
   }
   return {{"status", ToString(report.status)},
           {"message", report.message},
           {"steps", report.steps},
-          {"seconds", seconds},
-          {"cpu_seconds", cpu_seconds},
+          {"seconds", nullptr},
+          {"cpu_seconds", nullptr},
           {"bodies", model.structure->world()},
           {"contacts_max", report.contacts_max},
           {"lcp_rows_max", report.lcp_rows_max},
@@ -140,13 +168,13 @@ OrderedJson RunSummary::ToJson(const Model<double>& model, const RolloutReport& 
           {"reductions", ReductionsJson(report)},
           {"undetermined_end", undetermined},
           {"residual_max", report.residual_max},
-          {"penetration_max", std::max(penetration, 0.0)},
+          {"penetration_max", penetration},
           {"joint_drift_max", joint_drift_max_},
           {"impact_energy_gain_max", report.impact_energy_gain_max},
           {"energy_start", Energy(model, first_)},
-          {"energy_end", Energy(model, last_)},
+          {"energy_end", Energy(model, last)},
           {"momentum_start", MomentumJson(model, first_)},
-          {"momentum_end", MomentumJson(model, last_)}};
+          {"momentum_end", MomentumJson(model, last)}};
 }
 
 }  // namespace tangible

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <new>
 #include <string>
 #include <vector>
 
@@ -198,7 +199,14 @@ int Main(int argc, char** argv) {
   if (!wrong.empty()) {
     return ReportError("tangible-gradient: " + wrong, kExitUsage);
   }
-  return Run(line.positional[0], options);
+  try {
+    return Run(line.positional[0], options);
+  } catch (const std::bad_alloc&) {
+    return ReportError(line.positional[0] +
+                       ": not enough memory: the adjoint keeps the records of "
+                       "all steps, and needs less with --checkpoint=budget:MIB; a tangent needs "
+                       "less with fewer --parameters at once");
+  }
 }
 
 }  // namespace

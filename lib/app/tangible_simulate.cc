@@ -8,23 +8,18 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <ctime>
 #include <optional>
 #include <string>
 #include <thread>
 
 #include "tangible/app/batch_csv.h"
 #include "tangible/app/certificate_json.h"
-#include "tangible/app/observation_csv.h"
 #include "tangible/app/program.h"
 #include "tangible/app/progress.h"
-#include "tangible/app/run_summary.h"
+#include "tangible/app/run_recorders.h"
 #include "tangible/app/run_warnings.h"
-#include "tangible/app/trajectory_csv.h"
-#include "tangible/app/view_recorder.h"
 #include "tangible/scene/json_writer.h"
 #include "tangible/scene/scene_json.h"
-#include "tangible/simulation/certify.h"
 #include "tangible/simulation/settings.h"
 
 DEFINE_string(out, "",
@@ -51,12 +46,6 @@ namespace {
 
 double WallSeconds() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
-
-double CpuSeconds() {
-  timespec time{};
-  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &time);
-  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
 }
 
 constexpr int kMostThreads = 256;
@@ -102,32 +91,12 @@ std::string CheckFlags() {
   return CheckBatchFlags();
 }
 
-/// What the run writes; each is there if it was asked for.
-struct Recorders {
-  std::optional<TrajectoryCsv> trajectory;
-  std::optional<ContactsCsv> contacts;
-  std::optional<ObservationCsv> observations;
-  std::optional<ViewRecorder> view;
-  std::optional<RunSummary> summary;
-  std::optional<RolloutCertifier> certifier;
-
-  void Add(const Model<double>& model, long k, double t, const State<double>& state,
-           Stepper* stepper) {
-    if (trajectory) trajectory->Add(k, t, state);
-    if (contacts && stepper != nullptr) contacts->Add(*model.structure, t, stepper->record());
-    if (observations) observations->Add(k, t, state);
-    if (view) view->Add(model, t, state, stepper != nullptr ? &stepper->record() : nullptr);
-    if (summary) summary->Add(model, state, stepper);
-    if (certifier && stepper != nullptr) certifier->AddStep(model, k - 1, stepper);
-  }
-};
-
 /// The scene as it is to be run; `error` is one line or empty.
 struct Job {
   Scene scene;
   Model<double> model;
   State<double> initial;
-  Recorders recorders;
+  RunRecorders recorders;
   std::string error;
 };
 
@@ -136,7 +105,7 @@ constexpr double kMaxSamples = 1e7;
 
 void MakeRecorders(Job* job) {
   const ModelStructure& structure = *job->model.structure;
-  Recorders& r = job->recorders;
+  RunRecorders& r = job->recorders;
   const bool others = !FLAGS_view.empty() || !FLAGS_summary.empty() || !FLAGS_observe.empty();
   if (!FLAGS_out.empty() || !others) r.trajectory.emplace(structure, FLAGS_every);
   if (!FLAGS_contacts.empty()) r.contacts.emplace();
@@ -192,9 +161,16 @@ void Prepare(const std::string& file, Job* job) {
   MakeRecorders(job);
 }
 
-std::string WriteResults(const Job& job, const RolloutReport& report,
-                         const std::vector<std::string>& warnings, double seconds,
-                         double cpu_seconds, Recorders* r) {
+/// A run that has ended.
+struct Done {
+  RolloutReport report;
+  State<double> last;
+  double start = 0.0;        ///< s, on the wall's clock
+  double cpu_seconds = 0.0;  ///< of the steps
+};
+
+std::string WriteResults(const Job& job, const Done& run, const std::vector<std::string>& warnings,
+                         RunRecorders* r) {
   std::string error;
   const auto write = [&error](const std::string& path, const std::string& text) {
     const std::string failed = WriteResult(path, text);
@@ -205,11 +181,13 @@ std::string WriteResults(const Job& job, const RolloutReport& report,
   if (r->observations) write(FLAGS_observe, r->observations->Finish());
   if (r->view) write(FLAGS_view, ViewHtml(r->view->data()));
   if (r->summary) {
-    OrderedJson summary = r->summary->ToJson(job.model, report, seconds, cpu_seconds);
+    OrderedJson summary = r->summary->ToJson(job.model, run.report, run.last);
     summary["warnings"] = warnings;
     if (r->certifier) {
-      summary["certificate"] = ToJson(r->certifier->Finish(job.model, report));
+      summary["certificate"] = ToJson(r->certifier->Finish(job.model, run.report));
     }
+    summary["cpu_seconds"] = run.cpu_seconds;
+    summary["seconds"] = WallSeconds() - run.start;
     write(FLAGS_summary, JsonText(summary));
   }
   return error;
@@ -221,34 +199,29 @@ int Run(const std::string& file) {
   if (!job.error.empty()) return ReportError(job.error);
   const std::string over = OutputOverInput({"out", "contacts", "view", "summary", "observe"});
   if (!over.empty()) return ReportError("tangible-simulate: " + over, kExitUsage);
-  RolloutReport report;
+  Done run;
   RunWarnings warnings(job.model, job.initial);
-  State<double> final;
-  double recording = 0.0;
-  const double wall_start = WallSeconds();
+  run.start = WallSeconds();
   const double cpu_start = CpuSeconds();
   {
     Progress progress("steps", NumSteps(job.scene.simulation));
     const int cores = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
     Stepper stepper(job.model, FLAGS_threads > 0 ? FLAGS_threads : cores);
-    report = Rollout(
+    run.report = Rollout(
         job.model, job.initial,
         [&](long k, double t, const State<double>& state, Stepper* stepper) {
-          const double start = CpuSeconds();
           job.recorders.Add(job.model, k, t, state, stepper);
           warnings.Add(job.model, k, t, state);
           progress.Show(k);
-          recording += CpuSeconds() - start;
         },
-        &stepper, &final);
+        &stepper, &run.last);
   }
-  const double cpu_seconds = CpuSeconds() - cpu_start - recording;
-  const std::vector<std::string> lines = warnings.Finish(job.model, report, final);
-  const std::string error =
-      WriteResults(job, report, lines, WallSeconds() - wall_start, cpu_seconds, &job.recorders);
+  run.cpu_seconds = CpuSeconds() - cpu_start - job.recorders.seconds;
+  const std::vector<std::string> lines = warnings.Finish(job.model, run.report, run.last);
+  const std::string error = WriteResults(job, run, lines, &job.recorders);
   if (!error.empty()) return ReportError(error);
   // Of a run that failed its one line says why.
-  if (report.status != StepStatus::kDone) return ReportError(file + ": " + report.message);
+  if (run.report.status != StepStatus::kDone) return ReportError(file + ": " + run.report.message);
   for (const std::string& line : lines) ReportError(file + ": warning: " + line);
   return kExitDone;
 }

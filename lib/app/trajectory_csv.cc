@@ -2,9 +2,11 @@
 #include "tangible/app/trajectory_csv.h"
 
 #include <cmath>
+#include <unordered_map>
 
 #include "tangible/app/program.h"
 #include "tangible/scene/csv.h"
+#include "tangible/scene/json_reader.h"
 #include "tangible/simulation/certify.h"
 
 namespace tangible {
@@ -13,7 +15,7 @@ TrajectoryCsv::TrajectoryCsv(const ModelStructure& structure, long every)
     : structure_(structure), every_(every), text_("time,body,x,y,angle,vx,vy,omega\n") {}
 
 void TrajectoryCsv::Add(long k, double t, const State<double>& state) {
-  pending_ = k % every_ != 0;
+  pending_ = !Writes(k);
   if (!pending_) {
     Write(t, state);
     return;
@@ -28,13 +30,16 @@ void TrajectoryCsv::Write(double t, const State<double>& state) {
     if (structure_.bodies[body].motion == Motion::kStatic) {
       continue;
     }
-    text_ += time + "," + structure_.bodies[body].name;
+    text_ += time;
+    text_ += ',';
+    text_ += structure_.bodies[body].name;
     for (const std::vector<double>* numbers : {&state.pose, &state.twist}) {
       for (int i = 0; i < 3; ++i) {
-        text_ += "," + FormatNumber((*numbers)[3 * body + i]);
+        text_ += ',';
+        AppendNumber((*numbers)[3 * body + i], &text_);
       }
     }
-    text_ += "\n";
+    text_ += '\n';
   }
 }
 
@@ -86,19 +91,21 @@ bool ReadInitialState(const std::string& file, const ModelStructure& structure,
     *error = file + ": expected at least one row, got none";
     return false;
   }
+  std::unordered_map<std::string, int> bodies;
+  for (int body = 0; body < structure.world(); ++body) {
+    if (structure.bodies[body].motion != Motion::kStatic) {
+      bodies.emplace(structure.bodies[body].name, body);
+    }
+  }
   for (int row = 0; row < static_cast<int>(table.rows.size()); ++row) {
     const std::string& name = table.rows[row][table.Column("body")];
-    int body = 0;
-    while (body < structure.world() && (structure.bodies[body].name != name ||
-                                        structure.bodies[body].motion == Motion::kStatic)) {
-      ++body;
-    }
-    if (body == structure.world()) {
-      *error = file + ": line " + std::to_string(table.lines[row]);
-      *error += ": body: expected a moving or kinematic body of the scene, got ";
-      *error += name;
+    const auto found = bodies.find(name);
+    if (found == bodies.end()) {
+      *error = file + ": line " + std::to_string(table.lines[row]) +
+               ": body: expected a moving or kinematic body of the scene, got " + Describe(name);
       return false;
     }
+    const int body = found->second;
     double time = 0.0;
     bool good = ReadCell(table, row, table.Column("time"), &time, error);
     for (int i = 0; i < 3; ++i) {

@@ -15,6 +15,8 @@ class TrajectoryCsv {
  public:
   TrajectoryCsv(const ModelStructure& structure, long every);
   void Add(long k, double t, const State<double>& state);
+  /// Whether the state after k steps is written, as it comes; the last one is at the end.
+  bool Writes(long k) const { return k % every_ == 0; }
   /// The table, up to the last state that was added.
   std::string Finish();
 

@@ -13,7 +13,14 @@ namespace {
 // that can be asked for, 1e-10, is the fastest one's rounding.
 constexpr double kSlowest = 1e-6;
 
-// The largest component of a row for a body, rotation at the radius of gyration.
+// The fastest scale of what impulses alone would do to a body, of the fastest one's speed. Between
+// masses 1e20 times as large it would be beyond all speeds that there are, and any row small.
+constexpr double kMostPushed = 1e6;
+
+// The least lever of a body's rotation, of the longest arm of its rows.
+constexpr double kLeastLever = 1e-3;
+
+// The largest component of a row for a body, rotation at the body's lever.
 double RowSize(const RowPart<double>& row, double lever) {
   return std::max({std::abs(row[0]), std::abs(row[1]), std::abs(row[2]) / lever});
 }
@@ -25,8 +32,9 @@ double RowSpeed(const ContactScales& scales, int a, const RowPart<double>& row_a
          (b >= 0 ? scales.speed[b] * RowSize(row_b, scales.lever[b]) : 0.0);
 }
 
-// |min(z/ζ, s/σ)|, with 0/0 = 0.
+// |min(z/ζ, s/σ)|, with 0/0 = 0. Beside a scale beyond what numbers hold anything would be small.
 double RowResidual(double z, double zeta, double s, double sigma) {
+  if (!std::isfinite(sigma)) return HUGE_VAL;
   const double scaled_z = zeta > 0.0 ? z / zeta : 0.0;
   const double scaled_s = sigma > 0.0 ? s / sigma : 0.0;
   return std::abs(std::min(scaled_z, scaled_s));
@@ -84,7 +92,8 @@ double MomentumResidual(const ContactProblem<double>& problem, const ContactScal
     const double* of = &terms[3 * body];
     const double missing = std::max({std::abs(x[0]), std::abs(x[1]), std::abs(x[2]) / lever});
     const double scale = std::max({of[0], of[1], of[2] / lever});
-    if (std::isnan(x[0]) || std::isnan(x[1]) || std::isnan(x[2])) return HUGE_VAL;
+    // Terms beyond what numbers hold would make anything small beside them.
+    if (!std::isfinite(scale) || std::isnan(x[0] + x[1] + x[2])) return HUGE_VAL;
     worst = std::max(worst, scale > 0.0 ? missing / scale : 0.0);
   }
   return worst;
@@ -98,6 +107,7 @@ double JointResidual(const ContactProblem<double>& problem, const ContactScales&
       const double value = RowDot(joint.a, joint.row_a[k], joint.b, joint.row_b[k], v);
       const double scale = std::abs(joint.rhs[k]) +
                            RowSpeed(scales, joint.a, joint.row_a[k], joint.b, joint.row_b[k]);
+      if (!std::isfinite(scale)) return HUGE_VAL;
       worst = std::max(worst, scale > 0.0 ? std::abs(value - joint.rhs[k]) / scale : 0.0);
     }
   }
@@ -108,12 +118,23 @@ double JointResidual(const ContactProblem<double>& problem, const ContactScales&
 
 void ContactScales::Compute(const ContactProblem<double>& problem,
                             const ContactSolution<double>& solution) {
+  ComputeSpeeds(problem, solution);
+  if (!AddPushes(problem, solution)) {
+    ComputeSpeeds(problem, solution);
+    RaiseLevers(problem, solution);
+    AddPushes(problem, solution);
+  }
+  impulse = ImpulseScale(solution.normal_impulse);
+}
+
+void ContactScales::ComputeSpeeds(const ContactProblem<double>& problem,
+                                  const ContactSolution<double>& solution) {
   const std::vector<double>& momentum = problem.scale_momentum();
   const std::vector<double>& mass = problem.mass;
   speed.assign(problem.num_bodies, 0.0);
   lever.assign(problem.num_bodies, 0.0);
-  double total = 0.0;
-  double fastest = 0.0;
+  total_ = 0.0;
+  fastest_ = 0.0;
   for (int body = 0; body < problem.num_bodies; ++body) {
     lever[body] = std::sqrt(mass[3 * body + 2] / mass[3 * body]);
     for (int i = 0; i < 3; ++i) {
@@ -121,20 +142,37 @@ void ContactScales::Compute(const ContactProblem<double>& problem,
       const double component = std::max(std::abs(solution.v[k]), std::abs(momentum[k] / mass[k]));
       speed[body] = std::max(speed[body], i < 2 ? component : lever[body] * component);
     }
-    total += mass[3 * body] * speed[body];
-    fastest = std::max(fastest, speed[body]);
+    total_ += mass[3 * body] * speed[body];
+    fastest_ = std::max(fastest_, speed[body]);
   }
   for (double& of_body : speed) {
-    of_body = std::max(of_body, kSlowest * fastest);
+    of_body = std::max(of_body, kSlowest * fastest_);
   }
-  const auto push = [&](int body, const RowPart<double>& row, double z) {
-    if (body >= 0) {
-      const double change = std::min(std::abs(z) * RowSize(row, lever[body]), total);
-      speed[body] = std::max(speed[body], change / mass[3 * body]);
+}
+
+void ContactScales::RaiseLevers(const ContactProblem<double>& problem,
+                                const ContactSolution<double>& solution) {
+  ForEachImpulse(problem, solution, [this](int body, const RowPart<double>& row, double /*z*/) {
+    const double straight = std::max(std::abs(row[0]), std::abs(row[1]));
+    if (body >= 0 && straight > 0.0) {
+      lever[body] = std::max(lever[body], kLeastLever * std::abs(row[2]) / straight);
     }
-  };
-  ForEachImpulse(problem, solution, push);
-  impulse = ImpulseScale(solution.normal_impulse);
+  });
+}
+
+bool ContactScales::AddPushes(const ContactProblem<double>& problem,
+                              const ContactSolution<double>& solution) {
+  bool levers_are_long = true;
+  ForEachImpulse(problem, solution, [&](int body, const RowPart<double>& row, double z) {
+    if (body < 0) return;
+    const double straight = std::max(std::abs(row[0]), std::abs(row[1]));
+    const double turning = std::abs(row[2]) / lever[body];
+    levers_are_long = levers_are_long && !(straight > 0.0 && kLeastLever * turning > straight);
+    const double change = std::min(std::abs(z) * std::max(straight, turning), total_);
+    const double pushed = std::min(change / problem.mass[3 * body], kMostPushed * fastest_);
+    speed[body] = std::max(speed[body], pushed);
+  });
+  return levers_are_long;
 }
 
 ContactValues Evaluate(const ContactProblem<double>& problem, const ContactScales& scales,

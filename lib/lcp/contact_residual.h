@@ -16,17 +16,32 @@ struct ContactScales {
   /// A body's speed, m/s, rotation at the radius of gyration: the largest of its solved twist, its
   /// free one M⁻¹ p and what one impulse changes it by, M⁻¹ rᵀ λ. A body that is pushed from both
   /// sides and stays at rest has rounding for the first two. Impulses count up to what the momenta
-  /// of all bodies could bring about: rows that contradict each other have any impulses. At least
-  /// 1e-6 of the fastest body's.
+  /// of all bodies could bring about: rows that contradict each other have any impulses; and what
+  /// they change a light body by up to 1e6 times the fastest twist's. At least 1e-6 of that.
   std::vector<double> speed;
-  std::vector<double> lever;  ///< a body's radius of gyration, m
-  double impulse = 0.0;       ///< the largest normal impulse, N s
+  /// The arm, m, at which a body's speed scale is one of rotation: its radius of gyration, but at
+  /// least a thousandth of the longest arm of its rows. A body of next to no inertia could turn at
+  /// any speed at no cost, and beside that speed any row is met, whatever its other terms are: a
+  /// box would fall through the floor with a small residual.
+  std::vector<double> lever;
+  double impulse = 0.0;  ///< the largest normal impulse, N s
 
   ContactScales() = default;
   ContactScales(const ContactProblem<double>& problem, const ContactSolution<double>& solution) {
     Compute(problem, solution);
   }
   void Compute(const ContactProblem<double>& problem, const ContactSolution<double>& solution);
+
+ private:
+  /// Speeds of the solved and the free twists; levers are radii of gyration.
+  void ComputeSpeeds(const ContactProblem<double>& problem,
+                     const ContactSolution<double>& solution);
+  /// Speeds that impulses bring about; false where a lever is too short.
+  bool AddPushes(const ContactProblem<double>& problem, const ContactSolution<double>& solution);
+  void RaiseLevers(const ContactProblem<double>& problem, const ContactSolution<double>& solution);
+
+  double total_ = 0.0;    ///< momentum of all bodies, N s
+  double fastest_ = 0.0;  ///< speed of a solved or free twist, m/s
 };
 
 /// What a contact's rows are at a solution, with the scales by which they are judged.

@@ -276,7 +276,8 @@ constexpr char kControls[] = R"html(
 <button id="zoom_in" title="Zoom in (+)">+</button>
 <button id="fit" title="Show the whole motion (f)">Fit</button>
 </div>
-<div class="energy"><canvas id="energy"></canvas></div>
+<div class="energy"><div class="key" id="energy-key"><span>energy (J)</span></div>
+<div class="curves"><canvas id="energy"></canvas></div></div>
 <div class="side">
 <section class="legend"><h2>Legend</h2><div id="legend" style="display:block"></div>
 <small id="impulse-scale"></small></section>

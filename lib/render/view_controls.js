@@ -3,7 +3,15 @@ const energy = $("energy"), energyContext = energy.getContext("2d");
 const total = view.kinetic.map((t, k) => t === null || view.potential[k] === null ? null : t + view.potential[k]);
 const curves = [["kinetic", view.kinetic, 0], ["potential", view.potential, 1], ["total", total, 2]];
 const start = view.time[0] ?? 0, end = view.time[view.time.length - 1] ?? 0;
-const margin = {left: 64, right: 14, top: 24, bottom: 34};
+const margin = {left: 64, right: 14, top: 7, bottom: 34};
+// Text of the page and not of the canvas: it wraps where the screen is narrow.
+const readings = curves.map(([name, , colour]) => {
+  const entry = document.createElement("span"), mark = document.createElement("i"), text = document.createElement("b");
+  mark.style.borderColor = `var(--series-${colour})`;
+  entry.append(mark, text);
+  $("energy-key").append(entry);
+  return text;
+});
 let frame = 0, clock = start, playing = false, hovered = -1, before = 0, fitted = true;
 
 function energyMap() {
@@ -37,8 +45,6 @@ function drawEnergy() {
   }
   g.textBaseline = "alphabetic";
   g.fillText("time (s)", margin.left + map.w / 2, energy.clientHeight - 4);
-  g.textAlign = "left"; g.fillText("energy (J)", 8, 15);
-  let at = margin.left + 24;
   for (const [name, values, colour] of curves) {
     g.strokeStyle = colours.series[colour]; g.lineWidth = 1.8; g.lineJoin = "round";
     g.beginPath();
@@ -49,10 +55,8 @@ function drawEnergy() {
       open = true;
     });
     g.stroke();
-    const text = values.length && values[frame] !== null ? `${name} ${values[frame].toPrecision(5)} J` : name;
-    line(g, [at, 11], [at + 18, 11]);
-    g.fillStyle = colours.text; g.fillText(text, at + 24, 15);
-    at += 168;
+    readings[colour].textContent =
+        values.length && values[frame] !== null ? `${name} ${values[frame].toPrecision(5)} J` : name;
   }
   if (!view.time.length) return;
   const x = map.x(view.time[frame]);
@@ -251,7 +255,8 @@ document.addEventListener("keydown", (event) => {
 
 Object.assign($("slider"), {min: start, max: end, step: "any"});
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { readColours(); legend(); render(); });
-new ResizeObserver(resize).observe(stage);
+const resized = new ResizeObserver(resize);
+for (const canvas of [stage, energy]) resized.observe(canvas);
 readColours();
 legend();
 // page.html#t=0.5 opens at that time.

@@ -5,27 +5,29 @@
 #include <charconv>
 #include <cmath>
 #include <cstddef>
+#include <string_view>
 #include <system_error>
+#include <unordered_set>
 
 #include "tangible/scene/json_reader.h"
 
 namespace tangible {
 namespace {
 
-std::string Trim(const std::string& text) {
+std::string_view Trim(std::string_view text) {
   const char* const blanks = " \t\r";
   const std::size_t begin = text.find_first_not_of(blanks);
-  if (begin == std::string::npos) return "";
+  if (begin == std::string_view::npos) return "";
   return text.substr(begin, text.find_last_not_of(blanks) - begin + 1);
 }
 
-std::vector<std::string> Split(const std::string& line) {
+std::vector<std::string> Split(std::string_view line) {
   std::vector<std::string> cells;
   std::size_t begin = 0;
   while (true) {
     const std::size_t comma = line.find(',', begin);
-    cells.push_back(Trim(line.substr(begin, comma - begin)));
-    if (comma == std::string::npos) return cells;
+    cells.emplace_back(Trim(line.substr(begin, comma - begin)));
+    if (comma == std::string_view::npos) return cells;
     begin = comma + 1;
   }
 }
@@ -34,13 +36,22 @@ bool Contains(const std::vector<std::string>& names, const std::string& name) {
   return std::find(names.begin(), names.end(), name) != names.end();
 }
 
+// A name for a message: as it is where it is plain and not too long, else quoted and cut.
+std::string Shown(const std::string& name) {
+  constexpr std::size_t kLongest = 200;
+  const bool plain =
+      std::all_of(name.begin(), name.end(), [](char c) { return c > ' ' && c < 127; });
+  return plain && name.size() <= kLongest ? name : Describe(name);
+}
+
 std::string List(const std::vector<std::string>& names) {
+  constexpr std::size_t kMost = 20;
   std::string list;
-  for (const std::string& name : names) {
+  for (std::size_t i = 0; i < std::min(names.size(), kMost); ++i) {
     if (!list.empty()) list += ", ";
-    list += name;
+    list += Shown(names[i]);
   }
-  return list;
+  return names.size() > kMost ? list + ", ... (" + std::to_string(names.size()) + ")" : list;
 }
 
 std::string Place(const std::string& file, int line) {
@@ -51,12 +62,13 @@ std::string Place(const std::string& file, int line) {
 std::string CheckHeader(const std::vector<std::string>& columns,
                         const std::vector<std::string>& required,
                         const std::vector<std::string>& allowed) {
-  for (std::size_t i = 0; i < columns.size(); ++i) {
-    if (!allowed.empty() && !Contains(allowed, columns[i])) {
-      return "unknown column, expected one of " + List(allowed) + ", got " + Describe(columns[i]);
+  std::unordered_set<std::string> given;
+  for (const std::string& column : columns) {
+    if (!allowed.empty() && !Contains(allowed, column)) {
+      return "unknown column, expected one of " + List(allowed) + ", got " + Describe(column);
     }
-    if (std::find(columns.begin() + i + 1, columns.end(), columns[i]) != columns.end()) {
-      return "column " + columns[i] + " given twice, expected once";
+    if (!given.insert(column).second) {
+      return "column " + Shown(column) + " given twice, expected once";
     }
   }
   for (const std::string& name : required) {
@@ -74,15 +86,16 @@ int CsvTable::Column(const std::string& name) const {
   return place == columns.end() ? -1 : static_cast<int>(place - columns.begin());
 }
 
-bool ParseCsv(const std::string& text, const std::string& file,
+bool ParseCsv(const std::string& text_of_file, const std::string& file,
               const std::vector<std::string>& required, const std::vector<std::string>& allowed,
               CsvTable* table, std::string* error) {
+  const std::string_view text = WithoutByteOrderMark(text_of_file);
   *table = CsvTable();
   table->file = file;
   int line_number = 0;
   for (std::size_t begin = 0; begin < text.size();) {
     const std::size_t end = std::min(text.find('\n', begin), text.size());
-    const std::string line = Trim(text.substr(begin, end - begin));
+    const std::string_view line = Trim(text.substr(begin, end - begin));
     begin = end + 1;
     ++line_number;
     if (line.empty()) continue;
@@ -130,7 +143,7 @@ bool ParseNumber(const std::string& text, double* value) {
 bool ReadCell(const CsvTable& table, int row, int column, double* value, std::string* error) {
   const std::string& cell = table.rows[row][column];
   if (ParseNumber(cell, value)) return true;
-  *error = OneLine(Place(table.file, table.lines[row]) + table.columns[column] +
+  *error = OneLine(Place(table.file, table.lines[row]) + Shown(table.columns[column]) +
                    ": expected a number, got " + Describe(cell));
   return false;
 }

@@ -2,8 +2,8 @@
 #pragma once
 //
 // Tables in text files: a header line with the names of the columns, then one row a line, cells
-// separated by commas. No quoting; spaces around cells, blank lines and carriage returns are
-// ignored.
+// separated by commas. No quoting; spaces around cells, blank lines, carriage returns and a
+// byte-order mark (UTF-8) before the header are ignored.
 
 #include <string>
 #include <vector>

@@ -2,14 +2,9 @@
 #include "tangible/scene/json_reader.h"
 
 #include <algorithm>
-#include <cerrno>
 #include <cmath>
 #include <cstdint>
-#include <cstring>
-#include <fstream>
 #include <limits>
-#include <mutex>
-#include <set>
 
 namespace tangible {
 namespace {
@@ -155,42 +150,7 @@ class DocumentBuilder : public nlohmann::json_sax<Json> {
   std::vector<std::string> keys_;  // of each open object, the key being read
 };
 
-std::mutex files_read_mutex;
-std::set<std::string>& FilesReadSet() {
-  static std::set<std::string> files;
-  return files;
-}
-
 }  // namespace
-
-std::vector<std::string> FilesRead() {
-  const std::lock_guard<std::mutex> lock(files_read_mutex);
-  return {FilesReadSet().begin(), FilesReadSet().end()};
-}
-
-bool ReadTextFile(const std::string& file, std::string* text, std::string* error) {
-  errno = 0;
-  std::ifstream stream(file, std::ios::binary);
-  std::string content;
-  std::vector<char> part(std::size_t{1} << 16);
-  while (stream && content.size() <= kMaxFileSize) {
-    stream.read(part.data(), static_cast<std::streamsize>(part.size()));
-    content.append(part.data(), static_cast<std::size_t>(stream.gcount()));
-  }
-  std::string reason;
-  if (!stream.is_open() || stream.bad()) {
-    reason = errno != 0 ? std::strerror(errno) : "read error";
-  } else if (content.size() > kMaxFileSize) {  // a device may go on for ever
-    reason = "larger than " + std::to_string(kMaxFileSize >> 20) + " MiB";
-  } else {
-    *text = std::move(content);
-    const std::lock_guard<std::mutex> lock(files_read_mutex);
-    FilesReadSet().insert(file);
-    return true;
-  }
-  *error = OneLine(file + ": cannot be read: " + reason);
-  return false;
-}
 
 bool ParseJson(const std::string& text, const std::string& name_for_messages, Json* json,
                std::string* error) {
@@ -206,24 +166,6 @@ bool ParseJson(const std::string& text, const std::string& name_for_messages, Js
 bool ParseJsonFile(const std::string& file, Json* json, std::string* error) {
   std::string text;
   return ReadTextFile(file, &text, error) && ParseJson(text, file, json, error);
-}
-
-std::string FolderOf(const std::string& file) {
-  const std::size_t slash = file.rfind('/');
-  return slash == std::string::npos ? "" : file.substr(0, slash + 1);
-}
-
-std::string JoinPath(const std::string& folder, const std::string& path) {
-  if (folder.empty() || (!path.empty() && path[0] == '/')) return path;
-  return folder.back() == '/' ? folder + path : folder + "/" + path;
-}
-
-std::string OneLine(const std::string& text) {
-  std::string line = text;
-  for (char& c : line) {
-    if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) c = ' ';
-  }
-  return line;
 }
 
 std::string Describe(const Json& value) {

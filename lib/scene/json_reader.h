@@ -24,6 +24,7 @@
 
 #include "tangible/math/scalar.h"
 #include "tangible/scene/number_kind.h"
+#include "tangible/scene/text_file.h"
 
 namespace tangible {
 
@@ -31,16 +32,6 @@ using Json = nlohmann::json;
 
 /// Objects and arrays may be nested this deep; deeper ones are refused.
 inline constexpr int kMaxJsonDepth = 64;
-
-/// Larger files are refused.
-inline constexpr std::size_t kMaxFileSize = std::size_t{1} << 30;
-
-/// Reads a whole file; false and "file: cannot be read: why" if that fails.
-bool ReadTextFile(const std::string& file, std::string* text, std::string* error);
-
-/// The files that ReadTextFile has read, each once: a program does not write over its inputs, also
-/// those that another file names.
-std::vector<std::string> FilesRead();
 
 /// Parses text. Refused: malformed text (line and column), numbers that a double cannot hold
 /// (1e999), NaN and Infinity, a key twice in one object, nesting beyond kMaxJsonDepth, text after
@@ -50,15 +41,6 @@ bool ParseJson(const std::string& text, const std::string& name_for_messages, Js
 
 /// ReadTextFile, then ParseJson.
 bool ParseJsonFile(const std::string& file, Json* json, std::string* error);
-
-/// The folder of a file as a prefix of relative paths: "a/b.json" gives "a/", "b.json" gives "".
-std::string FolderOf(const std::string& file);
-
-/// `path` itself when absolute or when folder is empty, else folder + path.
-std::string JoinPath(const std::string& folder, const std::string& path);
-
-/// The text without line breaks and other control characters, so that a message stays on one line.
-std::string OneLine(const std::string& text);
 
 /// A value for a message, at most about 60 characters: a number, a string in quotes, "an array of
 /// 3".

@@ -9,6 +9,9 @@
 //
 // Sums over the bodies that move by forces. Joint drift is JointDrift of joint_projection.h.
 
+#include <utility>
+#include <vector>
+
 #include "tangible/simulation/step.h"
 
 namespace tangible {
@@ -20,12 +23,17 @@ double PotentialEnergy(const Model<double>& model, const State<double>& state);
 /// N s, N s, N m s.
 Vector3<double> Momentum(const Model<double>& model, const State<double>& state);
 
-/// The smallest gap (m, negative in penetration) over all pairs of bodies that may collide;
-/// infinite if there are none. Looks at every pair: quadratic in the number of bodies.
-double SmallestGap(const Model<double>& model, const State<double>& state);
+/// How deep bodies that may collide are in each other: the largest −gap of all pairs, m; 0 where no
+/// pair overlaps. Pairs that are apart contribute nothing, so only those are looked at whose boxes
+/// meet: O(n log n) for n bodies that each touch a few.
+double DeepestPenetration(const Model<double>& model, const State<double>& state);
 
-/// Groups of moving bodies that the step's joints, springs, dampers and closed contacts connect; a
-/// body by itself is a group of one.
-int CountIslands(const ModelStructure& structure, const StepRecord& record);
+/// Adds the pairs of bodies that a step's closed contacts and joint limits hold together.
+void AddClosedContacts(const StepRecord& record, std::vector<std::pair<int, int>>* pairs);
+
+/// Groups of moving bodies that joints, springs, dampers and the closed contacts connect; a body by
+/// itself is a group of one.
+int CountIslands(const ModelStructure& structure, const std::pair<int, int>* closed,
+                 size_t num_closed);
 
 }  // namespace tangible

@@ -123,6 +123,8 @@ TEST_F(FitJsonTest, BadInputsAreOneLine) {
        ": /parameters/0/sets: expected sets or path, got both"},
       {With("parameters", R"([{"name": "", "sets": []}])"),
        ": /parameters/0/name: expected a name, got \"\""},
+      {With("parameters", R"([{"name": "m\u001b[31m", "sets": []}])"),
+       ": /parameters/0/name: expected a name without control characters, got \"m\\u001b[31m\""},
       {With("parameters", R"([{"name": "m", "sets": [{"path": "gravity/y", "add": 1}]}])"),
        ": /parameters/0/sets/0/add: expected true or false, got 1"},
   };

@@ -9,10 +9,13 @@
 
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <random>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "run_program.h"
+#include "tangible/scene/text_file.h"
 
 namespace tangible {
 namespace {
@@ -90,6 +93,8 @@ class FaultsTest : public ProgramTest {
     const std::string status = Read(Path("status.txt"));
     return {status.empty() ? -1 : std::stoi(status), "", Read(Path("stderr.txt"))};
   }
+
+  void WriteFilesThatName(const std::string& input) const;
 
   /// Files in the folder that a program left behind under a name of its own.
   std::vector<std::string> Temporaries() const {
@@ -200,33 +205,148 @@ TEST_F(FaultsTest, WithStdoutClosedFilesAreWhole) {
   EXPECT_EQ(Read(Path("t.csv")).rfind("time,body,x", 0), 0u);
 }
 
-TEST_F(FaultsTest, InputsThatAreFolders) {
-  const std::vector<Job> jobs = {
-      {"tangible-simulate", "folder", {}},
-      {"tangible-simulate", "ball.json --initial=folder", {}},
-      {"tangible-simulate", "ball.json --batch=folder", {}},
-      {"tangible-simulate", "ball.json --observe=x.csv --points=folder --rate=20", {}},
-      {"tangible-gradient", "folder --parameters=bodies/ball/mass", {}},
-      {"tangible-gradient", "ball.json --parameters=bodies/ball/mass --loss=folder", {}},
-      {"tangible-lcp", "folder", {}},
-      {"tangible-fit", "folder", {}},
-      {"tangible-fit", "fit.json --checkpoint=folder", {}},
-      {"tangible-import-recording", "folder --out=x.csv", {}},
-      {"tangible-pendulums", "folder", {}},
-      {"tangible-tradeoff", "folder", {}},
-      {"tangible-verify", "folder", {}}};
-  for (const Job& job : jobs) {
-    SCOPED_TRACE(job.program + " " + job.arguments);
-    ExpectOneLine(RunIn("", job, "", "> /dev/null"), 1, "folder");
+/// Each program with each of its inputs, of which the test decides what it is.
+std::vector<Job> JobsThatRead(const std::string& input) {
+  return {{"tangible-simulate", input, {}},
+          {"tangible-simulate", "ball.json --initial=" + input, {}},
+          {"tangible-simulate", "ball.json --batch=" + input, {}},
+          {"tangible-simulate", "ball.json --observe=x.csv --rate=20 --points=" + input, {}},
+          {"tangible-gradient", input + " --parameters=bodies/ball/mass", {}},
+          {"tangible-gradient", "ball.json --parameters=bodies/ball/mass --loss=" + input, {}},
+          {"tangible-lcp", input, {}},
+          {"tangible-fit", input, {}},
+          {"tangible-fit", "fit.json --checkpoint=" + input, {}},
+          {"tangible-import-recording", input + " --out=x.csv", {}},
+          {"tangible-import-recording", input + " --kind=multiarm_single --out=x.csv", {}},
+          {"tangible-pendulums", input, {}},
+          {"tangible-tradeoff", input, {}},
+          {"tangible-verify", input, {}},
+          // Files that a file names.
+          {"tangible-fit", "names_scene.json", {}},
+          {"tangible-fit", "names_observations.json", {}},
+          {"tangible-simulate", "names_signal.json", {}},
+          {"tangible-gradient", "names_signal.json --parameters=bodies/ball/mass", {}}};
+}
+
+/// The same files, which name `input` in the place of another.
+void FaultsTest::WriteFilesThatName(const std::string& input) const {
+  for (const auto& [name, file] : {std::pair<std::string, std::string>("scene", "ball.json"),
+                                   std::pair<std::string, std::string>("observations", "o.csv")}) {
+    std::string fit = Read(Path("fit.json"));
+    fit.replace(fit.find(file), file.size(), input);
+    Write("names_" + name + ".json", fit);
   }
-  // Files that a file names.
-  const std::string fit = Read(Path("fit.json"));
-  for (const std::string name : {"ball.json", "o.csv"}) {
-    std::string broken = fit;
-    broken.replace(broken.find(name), name.size(), "folder");
-    Write("broken.json", broken);
-    ExpectOneLine(RunIn("", {"tangible-fit", "broken.json", {}}, "", "> /dev/null"), 1, "folder");
+  json scene = json::parse(kBall);
+  scene["forces"] = {{{"name", "push"}, {"body", "ball"}, {"force", {{"file", input}}}}};
+  Write("names_signal.json", scene.dump());
+}
+
+// None is waited for, and none read without end.
+TEST_F(FaultsTest, InputsThatAreNotRegularFiles) {
+  ASSERT_EQ(::mkfifo(Path("pipe").c_str(), 0600), 0);
+  for (const std::string input : {"folder", "pipe", "/dev/zero", "/dev/null"}) {
+    WriteFilesThatName(input);
+    for (const Job& job : JobsThatRead(input)) {
+      SCOPED_TRACE(job.program + " " + job.arguments);
+      const ProgramRun run = RunIn("timeout 20", job, "", "> /dev/null");
+      ExpectOneLine(run, 1, input);
+      const bool reads = job.program != "tangible-pendulums" && input != "folder" &&
+                         job.arguments.find("--checkpoint") == std::string::npos;
+      EXPECT_EQ(
+          run.error.find("cannot be read: expected a regular file, got a ") != std::string::npos,
+          reads)
+          << run.error;
+    }
   }
+  std::filesystem::create_directory(Path("problems"));
+  ASSERT_EQ(::mkfifo(Path("problems/p.json").c_str(), 0600), 0);
+  ExpectOneLine(RunIn("timeout 20", {"tangible-corpus", "--problems=problems", {}}, "", ""), 1,
+                "problems/p.json: cannot be read: expected a regular file, got a pipe");
+  // What a shell opens: a pipe is refused, a file taken.
+  const Job standard{"tangible-simulate", "/dev/stdin", {}};
+  ExpectOneLine(RunIn("cat ball.json | timeout 20", standard, "", "> /dev/null"), 1,
+                "/dev/stdin: cannot be read: expected a regular file, got a pipe");
+  EXPECT_EQ(RunIn("timeout 20", standard, "", "> /dev/null < ball.json").exit_status, 0);
+}
+
+// Bytes that a terminal would obey, and more than anyone would read.
+TEST_F(FaultsTest, WhatFilesHoldDoesNotReachTheTerminalRaw) {
+  std::mt19937 random(11);
+  std::vector<std::string> garbage;
+  for (const std::string& start :
+       {std::string(), std::string("{\"a\": "), std::string("{\""), std::string("time,body,"),
+        std::string("1,2,3,4,5,"), std::string("{\"format\": \"")}) {
+    for (const size_t size : {40u, 100000u}) {
+      std::string& bytes = garbage.emplace_back(start);
+      for (size_t i = 0; i < size; ++i) bytes += static_cast<char>(random() % 256);
+    }
+  }
+  garbage.emplace_back("{\"\x1b]0;owned\x07\": 1}");
+  garbage.emplace_back("{\"\\u001b[31m\": 1, \"\\u009b2J\": 2}");
+  garbage.emplace_back("time,body,x\x1b[31m\n0,ball,1\n");
+  garbage.emplace_back(
+      "time,body,x\n0,\xc2\x9b"
+      "31m,\x1b[2J\n");
+  garbage.emplace_back("time,body,x,y,angle,vx,vy,omega\n0,\x1b[31mball,0,0,0,0,0,0\n");
+  garbage.emplace_back("bodies/\x1b[31mball/mass\n1\n");
+  WriteFilesThatName("garbage");
+  for (const std::string& bytes : garbage) {
+    Write("garbage", bytes);
+    for (const Job& job : JobsThatRead("garbage")) {
+      if (job.program == "tangible-pendulums") continue;
+      SCOPED_TRACE(job.program + " " + job.arguments + ": " + OneLine(bytes.substr(0, 60)));
+      const ProgramRun run = RunIn("timeout 20", job, "", "> out.txt");
+      ExpectOneLine(run, 1, "garbage");
+      const std::string line = run.error.substr(0, run.error.find('\n'));
+      EXPECT_EQ(line, OneLine(line));
+      EXPECT_LT(line.size(), 2000u);
+      EXPECT_EQ(Read(Path("out.txt")), "");
+    }
+  }
+}
+
+// Names on the command line are another's text too, where a script has them from elsewhere.
+TEST_F(FaultsTest, NorDoesTheCommandLine) {
+  const std::string name = "\x1b[31m\xff.json";
+  for (const std::string& arguments :
+       {std::string("'" + name + "'"), "ball.json --out='" + name + "/x'",
+        "ball.json '--" + name + "'", "ball.json --every='" + name + "'"}) {
+    const ProgramRun run = RunIn("", {"tangible-simulate", arguments, {}}, "", "> /dev/null");
+    EXPECT_NE(run.exit_status, 0);
+    const std::string line = run.error.substr(0, run.error.find('\n'));
+    EXPECT_EQ(line.size() + 1, run.error.size());
+    EXPECT_EQ(line, OneLine(line));
+    EXPECT_NE(line.find("\\x1b[31m\\xff"), std::string::npos) << line;
+  }
+}
+
+// Without memory every program ends with a line; what a gradient can do about it is in the line.
+TEST_F(FaultsTest, NoMemoryIsOneLine) {
+  std::string zeros = "[0";
+  for (int i = 0; i < 15'000'000; ++i) zeros += ",0";
+  Write("large.json", zeros + "]");
+  for (const Job& job : std::vector<Job>{{"tangible-simulate", "large.json", {}},
+                                         {"tangible-lcp", "large.json", {}},
+                                         {"tangible-fit", "large.json", {}},
+                                         {"tangible-tradeoff", "large.json", {}},
+                                         {"tangible-verify", "large.json", {}}}) {
+    SCOPED_TRACE(job.program);
+    ExpectOneLine(RunIn("ulimit -v 200000; exec", job, "", "> /dev/null"), 1,
+                  job.program + ": not enough memory");
+  }
+  json scene = json::parse(kBall);
+  scene["simulation"]["dt"] = 1e-6;
+  Write("long.json", scene.dump());
+  const Job gradient{
+      "tangible-gradient", "long.json --parameters=bodies/ball/mass --method=adjoint", {}};
+  ExpectOneLine(RunIn("ulimit -v 200000; exec", gradient, "", "> /dev/null"), 1,
+                "long.json: not enough memory");
+  ExpectOneLine(RunIn("ulimit -v 200000; exec", gradient, "", "> /dev/null"), 1,
+                "--checkpoint=budget:MIB");
+  // And it helps.
+  EXPECT_EQ(RunIn("ulimit -v 200000; exec", gradient, "--checkpoint=budget:50", "> /dev/null")
+                .exit_status,
+            0);
 }
 
 TEST_F(FaultsTest, AKillLeavesTheOldOrTheWholeNewFile) {

@@ -120,6 +120,20 @@ TEST(ViewHtml, EveryIdThatTheScriptLooksUpExists) {
   EXPECT_GT(num_ids, 8);
 }
 
+// On a canvas of 330 pixels the third entry, and the second one's number, lay beyond the edge.
+TEST(ViewHtml, TheEnergyPlotsLegendWrapsOnANarrowScreen) {
+  const std::string html = ViewHtml(MakeView(2, -1));
+  EXPECT_NE(html.find("<div class=\"key\" id=\"energy-key\">"), std::string::npos);
+  const std::size_t key = html.find(".view .key {");
+  ASSERT_NE(key, std::string::npos);
+  EXPECT_LT(html.find("flex-wrap: wrap", key), html.find('}', key));
+  // The curves' names are text of the page: nothing writes them at a fixed place of the canvas.
+  const std::size_t draws = html.find("function drawEnergy()");
+  const std::string body = html.substr(draws, html.find("\n}\n", draws) - draws);
+  EXPECT_NE(body.find(".textContent ="), std::string::npos);
+  EXPECT_EQ(body.find("fillText(text"), std::string::npos);
+}
+
 TEST(ViewHtml, IsSelfContainedAndSafe) {
   ViewData data = MakeView(2, -1);
   data.name = "</script><script>alert(1)</script>";

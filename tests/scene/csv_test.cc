@@ -47,6 +47,45 @@ TEST(CsvTest, TakesAnyColumnsWhereNoneAreNamed) {
   EXPECT_EQ(error, "t.csv: line 1: missing header, expected names of columns");
 }
 
+TEST(CsvTest, TakesAByteOrderMarkAsJsonDoes) {
+  CsvTable table;
+  std::string error;
+  ASSERT_TRUE(
+      ParseCsv("\xef\xbb\xbftime,x\n1,2\n", "t.csv", {"time", "x"}, {"time", "x"}, &table, &error))
+      << error;
+  EXPECT_EQ(table.columns[0], "time");
+  EXPECT_EQ(table.lines, (std::vector<int>{2}));
+  // It stands at the beginning and nowhere else.
+  EXPECT_EQ(CsvError("time,\xef\xbb\xbfx\n"),
+            "t.csv: line 1: unknown column, expected one of time, x, y, got \"\\ufeffx\"");
+}
+
+TEST(CsvTest, MessagesShowNothingThatATerminalWouldObey) {
+  for (const std::string& text : {std::string("time,y\x1b[31m\n"),
+                                  std::string("time,y\x9b"
+                                              "2J\n"),
+                                  std::string("time,y,y\xc2\x9b"
+                                              "2J,\x07\n"),
+                                  std::string("time,x\n0,\x1b]0;owned\x07\n")}) {
+    CsvTable table;
+    std::string error;
+    const std::vector<std::string> any;
+    if (ParseCsv(text, "t.csv", {"time", "x"}, any, &table, &error)) {
+      double value = 0.0;
+      ASSERT_FALSE(ReadCell(table, 0, 1, &value, &error)) << text;
+    }
+    for (const char c : error) EXPECT_TRUE(c >= ' ' && c < 127) << error;
+  }
+  // Nor a header without end.
+  EXPECT_LT(CsvError(std::string(1000000, 'x')).size(), 300u);
+  std::string many = "y";
+  for (int i = 0; i < 100000; ++i) many += ",c" + std::to_string(i);
+  CsvTable table;
+  std::string error;
+  EXPECT_FALSE(ParseCsv(many, "t.csv", {"time"}, {}, &table, &error));
+  EXPECT_LT(error.size(), 300u);
+}
+
 TEST(CsvTest, MessagesNameTheLine) {
   EXPECT_EQ(CsvError(""), "t.csv: line 1: missing header, expected columns time, x");
   EXPECT_EQ(CsvError("time,x,z\n"),

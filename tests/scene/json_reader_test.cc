@@ -74,24 +74,6 @@ TEST(ParseJsonTest, DeepNestingIsRefusedWithoutOverflow) {
   EXPECT_FALSE(ParseJson("[" + deepest + "]", "f.json", &json, &error));
 }
 
-TEST(ReadTextFileTest, SaysWhyAFileCannotBeRead) {
-  std::string text;
-  std::string error;
-  EXPECT_FALSE(ReadTextFile("/nowhere/at/all.json", &text, &error));
-  EXPECT_EQ(error, "/nowhere/at/all.json: cannot be read: No such file or directory");
-  EXPECT_FALSE(ReadTextFile("/", &text, &error));
-  EXPECT_EQ(error, "/: cannot be read: Is a directory");
-}
-
-TEST(PathTest, FoldersAndRelativePaths) {
-  EXPECT_EQ(FolderOf("a/b/c.json"), "a/b/");
-  EXPECT_EQ(FolderOf("c.json"), "");
-  EXPECT_EQ(JoinPath("a/b/", "c.csv"), "a/b/c.csv");
-  EXPECT_EQ(JoinPath("a", "c.csv"), "a/c.csv");
-  EXPECT_EQ(JoinPath("", "c.csv"), "c.csv");
-  EXPECT_EQ(JoinPath("a/", "/c.csv"), "/c.csv");
-}
-
 TEST(JsonReaderTest, ReadsWhatIsThere) {
   const std::string text =
       R"({"n": -2.5, "i": 7, "b": true, "s": "x", "p": [1, 2], "v": [1, 2, 3], "m": [[1, 2], [3, 4]]})";

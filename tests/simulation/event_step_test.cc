@@ -273,7 +273,7 @@ TEST(EventStepTest, ACornerBesideTheEndOfAnEdgeStaysInContact) {
   const RolloutReport report = Rollout(
       model, first,
       [&](long, double, const State<double>& state, Stepper*) {
-        deepest = std::max(deepest, -SmallestGap(model, state));
+        deepest = std::max(deepest, DeepestPenetration(model, state));
       },
       &last);
   EXPECT_EQ(report.status, StepStatus::kDone) << report.message;

@@ -52,7 +52,7 @@ Scene Empty(Integrator integrator, double duration) {
 
 struct Fallen {
   RolloutReport report;
-  double deepest = 0.0;  // smallest gap of any step, m
+  double deepest = 0.0;  // penetration of any step, m
   double energy = 0.0;   // kinetic, at the end, J
   State<double> final;
 };
@@ -65,7 +65,7 @@ Fallen RunOf(const Scene& scene) {
   run.report = Rollout(
       model, initial,
       [&](long, double, const State<double>& state, Stepper*) {
-        run.deepest = std::min(run.deepest, SmallestGap(model, state));
+        run.deepest = std::max(run.deepest, DeepestPenetration(model, state));
       },
       &run.final);
   for (size_t body = 0; body < scene.bodies.size(); ++body) {
@@ -86,7 +86,7 @@ TEST(PilesByEventsTest, BoxesThatFallOnEachOtherComeToRest) {
     }
     const Fallen run = RunOf(scene);
     ASSERT_EQ(run.report.status, StepStatus::kDone) << run.report.message;
-    EXPECT_GE(run.deepest, -1e-10);
+    EXPECT_LE(run.deepest, 1e-10);
     EXPECT_LE(run.energy, 1e-20);
     for (int i = 0; i < 5; ++i) {
       EXPECT_NEAR(run.final.pose[3 * (i + 1) + 1], 0.15 + 0.3 * i, 1e-10);
@@ -110,7 +110,7 @@ TEST(PilesByEventsTest, BoxesBetweenWallsRun) {
   }
   const Fallen run = RunOf(scene);
   ASSERT_EQ(run.report.status, StepStatus::kDone) << run.report.message;
-  EXPECT_GE(run.deepest, -1e-9);
+  EXPECT_LE(run.deepest, 1e-9);
 }
 
 // Bodies of every shape with little or much friction and restitution, by either law of impact.
@@ -144,7 +144,7 @@ TEST(PilesByEventsTest, ShapesThatFallInHeapsRun) {
     const Fallen run = RunOf(scene);
     ASSERT_EQ(run.report.status, StepStatus::kDone) << trial << ": " << run.report.message;
     // Euler's rule cuts corners that turn by O(h²).
-    EXPECT_GE(run.deepest, trial % 3 == 0 ? -1e-3 : -1e-9) << trial;
+    EXPECT_LE(run.deepest, trial % 3 == 0 ? 1e-3 : 1e-9) << trial;
   }
 }
 
@@ -171,7 +171,7 @@ TEST(PilesByEventsTest, AMotionThatJamsIsIntegratedInParts) {
   scene.bodies.back().velocity = {-0.9855773313511866, 0.0};
   const Fallen run = RunOf(scene);
   ASSERT_EQ(run.report.status, StepStatus::kDone) << run.report.message;
-  EXPECT_GE(run.deepest, -1e-10);
+  EXPECT_LE(run.deepest, 1e-10);
 }
 
 // Limits of joints and the floor hold each other in turns: a slow impact at one sets a contact
@@ -214,7 +214,7 @@ TEST(PilesByEventsTest, ABodyWithLimbsComesToRestOnItsLimits) {
                        "joint_correction": "projection", "duration": 1.2}})"));
   ASSERT_EQ(run.report.status, StepStatus::kDone) << run.report.message;
   EXPECT_GT(run.report.fallbacks, 0);
-  EXPECT_GE(run.deepest, -1e-9);
+  EXPECT_LE(run.deepest, 1e-9);
 }
 
 }  // namespace

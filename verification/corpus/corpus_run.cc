@@ -4,15 +4,14 @@
 #include <time.h>
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <mutex>
 #include <random>
-#include <thread>
 #include <utility>
 
 #include "tangible/lcp/contact_solver.h"
 #include "tangible/lcp/solver.h"
+#include "tangible/lcp/worker_pool.h"
 #include "tangible/verification/corpus/recomputed.h"
 
 namespace tangible::corpus {
@@ -184,28 +183,22 @@ CorpusResult RunCorpus(const std::vector<FileCase>& files, const RunOptions& opt
       options.only.empty() ? ContactKinds() : std::vector<std::string>{options.only};
   const size_t total = files.size() + kinds.size() * static_cast<size_t>(options.random);
   std::vector<std::vector<Answer>> answers(total);
-  std::atomic<size_t> next{0};
   std::mutex mutex;
   long done = 0;
-  const auto work = [&] {
-    for (size_t i = next++; i < total; i = next++) {
-      if (i < files.size()) {
-        const FileCase& file = files[i];
-        answers[i] = {ByGeneral(file.kind, file.name, file.known, file.problem, nullptr)};
-      } else {
-        const size_t k = i - files.size();
-        const size_t each = static_cast<size_t>(options.random);
-        answers[i] = ByAll(kinds[k / each], options.first + static_cast<int>(k % each), options);
-      }
-      const std::lock_guard<std::mutex> lock(mutex);
-      ++done;
-      if (options.progress) options.progress(done);
+  WorkerPool pool(options.threads);
+  pool.Run(total, options.threads, [&](size_t i, int /*thread*/) {
+    if (i < files.size()) {
+      const FileCase& file = files[i];
+      answers[i] = {ByGeneral(file.kind, file.name, file.known, file.problem, nullptr)};
+    } else {
+      const size_t k = i - files.size();
+      const size_t each = static_cast<size_t>(options.random);
+      answers[i] = ByAll(kinds[k / each], options.first + static_cast<int>(k % each), options);
     }
-  };
-  std::vector<std::thread> others;
-  for (int i = 1; i < options.threads; ++i) others.emplace_back(work);
-  work();
-  for (std::thread& other : others) other.join();
+    const std::lock_guard<std::mutex> lock(mutex);
+    ++done;
+    if (options.progress) options.progress(done);
+  });
   return {Collect(answers), static_cast<int>(total)};
 }
 

@@ -22,8 +22,8 @@ Finding Part(Scene scene, const std::vector<std::string>& parameters) {
   const MeasuredRun run = RunScene(scene);
   Finding finding;
   AddDone(run, &finding);
-  finding.figures.push_back({"overlap at the end", std::max(0.0, -SmallestGap(run.model, run.last)),
-                             1e-6, "m", "recovery_speed parts them within the run"});
+  finding.figures.push_back({"overlap at the end", DeepestPenetration(run.model, run.last), 1e-6,
+                             "m", "recovery_speed parts them within the run"});
   finding.figures.push_back({"largest speed over recovery_speed", run.speed_max / 3.0, 1.0 + 1e-9,
                              "1", "recovery_speed bounds how fast"});
   AddGradient(scene, 20, parameters, Differences::kTake, &finding);

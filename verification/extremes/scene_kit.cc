@@ -232,7 +232,7 @@ MeasuredRun RunScene(const Scene& scene, const StateObserver& observer) {
       },
       &run.last);
   run.energy_end = Energy(run.model, run.last);
-  run.penetration = std::max({0.0, run.report.penetration_max, -SmallestGap(run.model, run.last)});
+  run.penetration = std::max(run.report.penetration_max, DeepestPenetration(run.model, run.last));
   run.speed_end = LargestSpeed(run.last);
   return run;
 }

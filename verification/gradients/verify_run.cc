@@ -2,14 +2,13 @@
 #include "tangible/verification/gradients/verify_run.h"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <map>
 #include <mutex>
 #include <sstream>
-#include <thread>
 #include <utility>
 
+#include "tangible/lcp/worker_pool.h"
 #include "tangible/scene/scene_json.h"
 #include "tangible/scene/scene_names.h"
 #include "tangible/verification/support/random_scene.h"
@@ -118,27 +117,17 @@ std::vector<ParameterPath> RandomParameters(const Scene& scene, unsigned seed) {
 VerifyResult RunVerification(const std::vector<VerifyJob>& jobs, int threads, KeepJacobians keep,
                              const std::function<void(long)>& progress) {
   std::vector<Checked> checked(jobs.size());
-  std::atomic<size_t> next{0};
   std::mutex mutex;
   long done = 0;
-  const auto work = [&] {
-    for (size_t i = next++; i < jobs.size(); i = next++) {
-      checked[i] = Check(jobs[i], keep);
-      const std::lock_guard<std::mutex> lock(mutex);
-      ++done;
-      if (progress) {
-        progress(done);
-      }
+  WorkerPool pool(threads);
+  pool.Run(jobs.size(), threads, [&](size_t i, int /*thread*/) {
+    checked[i] = Check(jobs[i], keep);
+    const std::lock_guard<std::mutex> lock(mutex);
+    ++done;
+    if (progress) {
+      progress(done);
     }
-  };
-  std::vector<std::thread> others;
-  for (int i = 1; i < threads; ++i) {
-    others.emplace_back(work);
-  }
-  work();
-  for (std::thread& other : others) {
-    other.join();
-  }
+  });
   VerifyResult result;
   result.total.kind = "all";
   std::map<std::string, KindRow> kinds;

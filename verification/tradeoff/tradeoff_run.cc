@@ -2,12 +2,12 @@
 #include "tangible/verification/tradeoff/tradeoff_run.h"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <cstdio>
 #include <mutex>
-#include <thread>
 #include <utility>
+
+#include "tangible/lcp/worker_pool.h"
 
 namespace tangible::tradeoff {
 namespace {
@@ -135,7 +135,6 @@ void RunGroup(const Scene& scene, const std::vector<ParameterPath>& parameters,
 void RunCells(const Scene& scene, const std::vector<ParameterPath>& parameters,
               const TradeoffOptions& options, size_t group,
               const std::function<void(long done, long total)>& progress, Tradeoff* tradeoff) {
-  std::atomic<size_t> next{0};
   std::mutex mutex;
   long done = 0;
   const auto total = static_cast<long>(tradeoff->cells.size());
@@ -145,14 +144,10 @@ void RunCells(const Scene& scene, const std::vector<ParameterPath>& parameters,
     if (progress) progress(done, total);
   };
   const size_t groups = group > 0 ? tradeoff->cells.size() / group : 0;
-  const auto work = [&] {
-    for (size_t i = next++; i < groups; i = next++) {
-      RunGroup(scene, parameters, options, *tradeoff, &tradeoff->cells[i * group], group, one_more);
-    }
-  };
-  std::vector<std::jthread> others;
-  for (int i = 1; i < options.threads; ++i) others.emplace_back(work);
-  work();
+  WorkerPool pool(options.threads);
+  pool.Run(groups, options.threads, [&](size_t i, int /*thread*/) {
+    RunGroup(scene, parameters, options, *tradeoff, &tradeoff->cells[i * group], group, one_more);
+  });
 }
 
 // Marks the cells that are better than all cheaper ones by more than what two runs' times vary.

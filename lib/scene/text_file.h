@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// Reading whole text files, and text that goes into messages.
+
+#include <cstddef>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace tangible {
+
+/// Larger files are refused: 1 GiB.
+inline constexpr std::size_t kMaxFileSize = std::size_t{1} << 30;
+
+/// Longer messages are cut in the middle.
+inline constexpr std::size_t kMaxMessage = 8192;
+
+/// Reads a whole file; false and "file: cannot be read: why" if that fails. All inputs of all
+/// programs are read here. Only regular files of at most kMaxFileSize are read: a pipe, a device, a
+/// socket or a terminal could keep the program waiting or never end, and is refused before anything
+/// is read from it (/dev/stdin is taken where it is redirected from a regular file).
+bool ReadTextFile(const std::string& file, std::string* text, std::string* error);
+
+/// The files that ReadTextFile has read, each once: a program does not write over its inputs, also
+/// those that another file names.
+std::vector<std::string> FilesRead();
+
+/// The text after the byte-order mark of UTF-8 that some editors and spreadsheets begin a file with.
+std::string_view WithoutByteOrderMark(std::string_view text);
+
+/// The folder of a file as a prefix of relative paths: "a/b.json" gives "a/", "b.json" gives "".
+std::string FolderOf(const std::string& file);
+
+/// `path` itself when absolute or when folder is empty, else folder + path.
+std::string JoinPath(const std::string& folder, const std::string& path);
+
+/// The text as a terminal can show it on one line. Line breaks and tabs become spaces; other control
+/// characters, characters that change the direction of writing, and bytes that are not UTF-8 are
+/// written as \x1b, \u202e and \xff. Beyond kMaxMessage bytes it is cut in the middle.
+std::string OneLine(std::string_view text);
+
+}  // namespace tangible

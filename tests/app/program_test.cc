@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/app/program.h"
+
+#include <gtest/gtest.h>
+
+#include <bit>
+#include <cstdint>
+#include <cstdio>
+#include <limits>
+#include <random>
+
+namespace tangible {
+namespace {
+
+std::string ByPrintf(double value) {
+  char text[40];
+  std::snprintf(text, sizeof text, "%.17g", value);
+  return text;
+}
+
+TEST(FormatNumberTest, IsPrintfsToTheByte) {
+  using Limits = std::numeric_limits<double>;
+  for (const double value : {0.0, -0.0, 1.0, 0.1, -1.5, 100000.0, 1e16, 1e17, 123456789012345678.0,
+                             1e22, 1e23, 1e-4, 1e-5, 0.00012345, Limits::max(), Limits::min(),
+                             Limits::denorm_min(), Limits::infinity(), -Limits::infinity()}) {
+    EXPECT_EQ(FormatNumber(value), ByPrintf(value));
+  }
+  std::mt19937_64 random(5);
+  std::uniform_real_distribution<double> near_one(-10.0, 10.0);
+  for (int i = 0; i < 20000; ++i) {
+    const double any = std::bit_cast<double>(random());
+    EXPECT_EQ(FormatNumber(any), ByPrintf(any));
+    const double usual = near_one(random);
+    EXPECT_EQ(FormatNumber(usual), ByPrintf(usual));
+  }
+  std::string text = "x=";
+  AppendNumber(2.5, &text);
+  EXPECT_EQ(text, "x=2.5");
+}
+
+}  // namespace
+}  // namespace tangible
