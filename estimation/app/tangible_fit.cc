@@ -14,9 +14,9 @@
 
 #include "tangible/app/certificate_json.h"
 #include "tangible/app/program.h"
-#include "tangible/estimation/fit_checkpoint.h"
-#include "tangible/estimation/fit_json.h"
-#include "tangible/estimation/report.h"
+#include "tangible/estimation/fit/fit_checkpoint.h"
+#include "tangible/estimation/results/fit_json.h"
+#include "tangible/estimation/results/report.h"
 #include "tangible/scene/csv.h"
 #include "tangible/scene/json_reader.h"
 

@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "tangible/estimation/fit.h"
+#include "tangible/estimation/fit/fit.h"
 
 namespace tangible {
 

@@ -6,7 +6,7 @@
 #include <filesystem>
 #include <fstream>
 
-#include "tangible/estimation/fit_json.h"
+#include "tangible/estimation/results/fit_json.h"
 #include "tangible/scene/scene_json.h"
 
 namespace tangible {

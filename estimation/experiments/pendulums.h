@@ -10,9 +10,9 @@
 #include <string>
 #include <vector>
 
-#include "tangible/estimation/discretisation.h"
 #include "tangible/estimation/experiments/derived.h"
 #include "tangible/estimation/experiments/recording.h"
+#include "tangible/estimation/fit/discretisation.h"
 #include "tangible/scene/json_writer.h"
 
 namespace tangible {

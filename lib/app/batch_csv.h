@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "tangible/simulation/batch.h"
+#include "tangible/simulation/gradient/batch.h"
 
 namespace tangible {
 

@@ -3,7 +3,7 @@
 //
 // The certificate of a derivative as JSON, as the results of the programs have it.
 
-#include "tangible/lcp/certificate.h"
+#include "tangible/lcp/dense/certificate.h"
 #include "tangible/scene/json_writer.h"
 
 namespace tangible {

@@ -5,8 +5,8 @@
 
 #include <string>
 
-#include "tangible/lcp/mode_system.h"
-#include "tangible/lcp/problem.h"
+#include "tangible/lcp/dense/mode_system.h"
+#include "tangible/lcp/dense/problem.h"
 #include "tangible/scene/json_reader.h"
 
 namespace tangible {

@@ -14,7 +14,7 @@
 #include <string>
 #include <vector>
 
-#include "tangible/dynamics/model.h"
+#include "tangible/dynamics/model/model.h"
 
 namespace tangible {
 

@@ -2,7 +2,7 @@
 #pragma once
 //
 // What every program shares: the command line, one-line errors, atomic output. Their JSON is read
-// and written by the scene room (json_reader.h, json_writer.h).
+// and written by the scene module (json_reader.h, json_writer.h).
 //
 // Exit statuses: 0 done; 1 the job could not be done (bad input, an unsolved problem); 2 wrong
 // usage of flags. gflags itself exits 1 on an unknown flag, a malformed value and --help, so

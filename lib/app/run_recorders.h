@@ -14,7 +14,7 @@
 #include "tangible/app/run_summary.h"
 #include "tangible/app/trajectory_csv.h"
 #include "tangible/app/view_recorder.h"
-#include "tangible/simulation/certify.h"
+#include "tangible/simulation/certificate/certify.h"
 
 namespace tangible {
 

@@ -3,9 +3,9 @@
 
 #include <algorithm>
 
-#include "tangible/dynamics/assembly.h"
-#include "tangible/lcp/contact_conditioning.h"
-#include "tangible/simulation/invariants.h"
+#include "tangible/dynamics/assembly/assembly.h"
+#include "tangible/lcp/system/contact_conditioning.h"
+#include "tangible/simulation/stepping/invariants.h"
 
 namespace tangible {
 namespace {

@@ -4,7 +4,7 @@
 // The summary of a run that tangible-simulate writes as JSON.
 
 #include "tangible/scene/json_writer.h"
-#include "tangible/simulation/rollout.h"
+#include "tangible/simulation/stepping/rollout.h"
 
 namespace tangible {
 

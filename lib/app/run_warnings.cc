@@ -3,7 +3,7 @@
 
 #include <cstdio>
 
-#include "tangible/simulation/invariants.h"
+#include "tangible/simulation/stepping/invariants.h"
 
 namespace tangible {
 namespace {

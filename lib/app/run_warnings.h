@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "tangible/simulation/joint_opening.h"
-#include "tangible/simulation/rollout.h"
+#include "tangible/simulation/stepping/joint_opening.h"
+#include "tangible/simulation/stepping/rollout.h"
 
 namespace tangible {
 

@@ -17,13 +17,15 @@
 #include "tangible/scene/json_writer.h"
 #include "tangible/scene/scene_json.h"
 #include "tangible/scene/scene_names.h"
-#include "tangible/simulation/gradient.h"
+#include "tangible/simulation/gradient/gradient.h"
 
 DEFINE_string(parameters, "", "paths of the parameters, separated by commas");
-DEFINE_string(method, "adjoint", "adjoint, tangent, jet, jet_implicit or finite_difference");
+DEFINE_string(method, "auto",
+              "auto (adjoint for a loss or more parameters than outputs, else tangent), adjoint, "
+              "tangent, jet, jet_implicit or finite_difference");
 DEFINE_string(side, "both",
               "at kinks: both (one element of the generalised Jacobian), or the one-sided "
-              "derivatives for growing (plus) or shrinking (minus) parameters; with tangent");
+              "derivatives for growing (plus) or shrinking (minus) parameters; by the tangent");
 DEFINE_double(step, 0.0, "of finite differences, in the parameter's unit; 0: 6e-6 max(|p|, scale)");
 DEFINE_string(loss, "", "file of a scalar loss (JSON) to differentiate instead of the final state");
 DEFINE_int32(repeat, 1, "runs of which the best times are told");
@@ -37,6 +39,8 @@ DEFINE_string(out, "", "file of the result; empty: stdout");
 namespace tangible {
 namespace {
 
+std::string NameOfMethod(GradientMethod method) { return NameOf(method, kGradientMethodNames); }
+
 bool FindMethod(const std::string& name, GradientMethod* method) {
   for (const auto& [known, value] : kGradientMethodNames) {
     if (name == known) {
@@ -47,10 +51,19 @@ bool FindMethod(const std::string& name, GradientMethod* method) {
   return false;
 }
 
+// Whether a flag is written that only the adjoint heeds, whatever its value.
+bool AsksForTheAdjoint() {
+  const auto written = [](const char* flag) {
+    return !gflags::GetCommandLineFlagInfoOrDie(flag).is_default;
+  };
+  return written("checkpoint") || written("factorisations");
+}
+
 // Empty, or one line about a flag's value.
 std::string CheckFlags(GradientOptions* options) {
   if (!FindMethod(FLAGS_method, &options->method)) {
-    return "--method: expected adjoint, tangent, jet, jet_implicit or finite_difference, got '" +
+    return "--method: expected auto, adjoint, tangent, jet, jet_implicit or finite_difference, "
+           "got '" +
            FLAGS_method + "'";
   }
   if (FLAGS_factorisations != "keep" && FLAGS_factorisations != "recompute") {
@@ -59,8 +72,9 @@ std::string CheckFlags(GradientOptions* options) {
   if (FLAGS_side != "both" && FLAGS_side != "plus" && FLAGS_side != "minus") {
     return "--side: expected both, plus or minus, got '" + FLAGS_side + "'";
   }
-  if (FLAGS_side != "both" && options->method != GradientMethod::kTangent) {
-    return "--side: expected --method=tangent with it, got '" + FLAGS_method + "'";
+  if (FLAGS_side != "both" && options->method != GradientMethod::kTangent &&
+      options->method != GradientMethod::kAuto) {
+    return "--side: expected --method=tangent or auto with it, got '" + FLAGS_method + "'";
   }
   if (!(FLAGS_step >= 0.0 && std::isfinite(FLAGS_step))) {
     return "--step: expected a number >= 0, got " + FormatNumber(FLAGS_step);
@@ -75,6 +89,9 @@ std::string CheckFlags(GradientOptions* options) {
   const std::vector<std::string> paths = SplitAtCommas(FLAGS_parameters);
   if (std::find(paths.begin(), paths.end(), "") != paths.end()) {
     return "--parameters: expected paths separated by commas, got '" + FLAGS_parameters + "'";
+  }
+  if (options->method == GradientMethod::kAuto && FLAGS_side == "both" && AsksForTheAdjoint()) {
+    options->method = GradientMethod::kAdjoint;
   }
   options->step = FLAGS_step;
   options->side = FLAGS_side == "plus"    ? DerivativeSide::kPlus
@@ -120,7 +137,8 @@ OrderedJson ToJson(const VectorX<double>& values) {
 }
 
 OrderedJson Describe(const GradientResult& result) {
-  OrderedJson text = {{"method", FLAGS_method},
+  OrderedJson text = {{"method", NameOfMethod(result.method)},
+                      {"requested_method", FLAGS_method},
                       {"parameters", SplitAtCommas(FLAGS_parameters)},
                       {"outputs", result.outputs},
                       {"values", ToJson(result.values)},
@@ -128,7 +146,7 @@ OrderedJson Describe(const GradientResult& result) {
                       {"notes", result.notes},
                       {"seconds", result.seconds},
                       {"rollout_seconds", result.rollout_seconds}};
-  if (FLAGS_method == "adjoint") {
+  if (result.method == GradientMethod::kAdjoint) {
     text["tape_bytes"] = result.tape_bytes;
     text["steps_again"] = result.steps_again;
   }
@@ -185,7 +203,7 @@ int Main(int argc, char** argv) {
       argc, argv,
       {.name = "tangible-gradient",
        .synopsis = "SCENE.json --parameters=P1,P2 "
-                   "--method=adjoint|tangent|jet|jet_implicit|finite_difference [--step=H] "
+                   "[--method=auto|adjoint|tangent|jet|jet_implicit|finite_difference] [--step=H] "
                    "[--side=plus|minus] [--loss=L.json] [--out=G.json]",
        .description = "Differentiates the final state of every moving body, or with --loss a "
                       "scalar of it, with respect to\nparameters of the scene, and certifies the "

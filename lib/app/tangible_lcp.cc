@@ -9,8 +9,8 @@
 #include "tangible/app/certificate_json.h"
 #include "tangible/app/lcp_file.h"
 #include "tangible/app/program.h"
-#include "tangible/lcp/derivative.h"
-#include "tangible/lcp/solver.h"
+#include "tangible/lcp/dense/derivative.h"
+#include "tangible/lcp/dense/solver.h"
 #include "tangible/scene/json_writer.h"
 
 DEFINE_string(solver, "auto", "auto, interior_point or lemke");

@@ -18,9 +18,9 @@
 #include "tangible/app/progress.h"
 #include "tangible/app/run_recorders.h"
 #include "tangible/app/run_warnings.h"
+#include "tangible/dynamics/model/settings.h"
 #include "tangible/scene/json_writer.h"
 #include "tangible/scene/scene_json.h"
-#include "tangible/simulation/settings.h"
 
 DEFINE_string(out, "",
               "file of the trajectory (CSV); empty: stdout, unless another result is asked for");

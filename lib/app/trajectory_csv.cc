@@ -7,7 +7,7 @@
 #include "tangible/app/program.h"
 #include "tangible/scene/csv.h"
 #include "tangible/scene/json_reader.h"
-#include "tangible/simulation/certify.h"
+#include "tangible/simulation/certificate/certify.h"
 
 namespace tangible {
 

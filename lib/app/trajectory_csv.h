@@ -5,7 +5,7 @@
 
 #include <string>
 
-#include "tangible/simulation/step.h"
+#include "tangible/simulation/stepping/step.h"
 
 namespace tangible {
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tangible/app/view_recorder.h"
 
-#include "tangible/simulation/certify.h"
-#include "tangible/simulation/invariants.h"
+#include "tangible/simulation/certificate/certify.h"
+#include "tangible/simulation/stepping/invariants.h"
 
 namespace tangible {
 namespace {

@@ -4,7 +4,7 @@
 // Fills the data of the HTML view (tangible/render/view.h) from a run.
 
 #include "tangible/render/view.h"
-#include "tangible/simulation/step.h"
+#include "tangible/simulation/stepping/step.h"
 
 namespace tangible {
 

@@ -1,8 +1,8 @@
-# Targets: one static library a room (a folder), programs, tests, benchmarks.
+# Targets: one static library a module (a folder), programs, tests, benchmarks.
 include(GNUInstallDirs)
 
-# Headers are included as "tangible/<room>/<file>.h", in the tree as once installed: a folder of
-# links in the build tree gives each room its installed name.
+# Headers are included as "tangible/<module>/<file>.h", in the tree as once installed: a folder of
+# links in the build tree gives each module its installed name.
 set(TANGIBLE_INCLUDE_DIR "${PROJECT_BINARY_DIR}/include")
 file(MAKE_DIRECTORY "${TANGIBLE_INCLUDE_DIR}/tangible/config")
 
@@ -73,41 +73,66 @@ endfunction()
 # Everything that the tests labelled unit or program need, and nothing else.
 add_custom_target(tangible_unit_and_program_tests)
 
-# tangible_room(<name> [INTERNAL] [SOURCES file...] [HEADERS file...] [DEPENDS room...] [LINK target...])
-# The library of the current folder; target tangible_<name>, alias tangible::<name>. A room without
-# sources is an INTERFACE library. DEPENDS is the only way to another room's headers' symbols.
-# INTERNAL rooms are not installed.
-function(tangible_room name)
-  cmake_parse_arguments(ROOM "INTERNAL" "" "SOURCES;HEADERS;DEPENDS;LINK;PRIVATE_LINK" ${ARGN})
+# A name of a target from that of a module: lcp/dense becomes lcp_dense.
+function(tangible_target_name name result)
+  string(REPLACE "/" "_" target "${name}")
+  set(${result} ${target} PARENT_SCOPE)
+endfunction()
+
+# tangible_module_folder(<name>): headers of the current folder are included as "tangible/<name>/...".
+function(tangible_module_folder name)
   file(CREATE_LINK "${CMAKE_CURRENT_SOURCE_DIR}" "${TANGIBLE_INCLUDE_DIR}/tangible/${name}" SYMBOLIC)
-  set(target tangible_${name})
-  if(ROOM_SOURCES)
-    add_library(${target} STATIC ${ROOM_SOURCES} ${ROOM_HEADERS})
+endfunction()
+
+# tangible_module(<name> [INTERNAL] [SOURCES file...] [HEADERS file...] [DEPENDS module...] [LINK target...])
+# The library of the current folder. A name is `scene` or, for a sub-folder, `lcp/dense`: target
+# tangible_lcp_dense, alias tangible::lcp_dense. A module without sources is an INTERFACE library.
+# DEPENDS is the only way to the symbols of another module's headers. INTERNAL modules are not installed.
+function(tangible_module name)
+  cmake_parse_arguments(MODULE "INTERNAL" "" "SOURCES;HEADERS;DEPENDS;LINK;PRIVATE_LINK" ${ARGN})
+  tangible_target_name(${name} short_name)
+  if(NOT name MATCHES "/")
+    tangible_module_folder(${name})
+  endif()
+  set(target tangible_${short_name})
+  if(MODULE_SOURCES)
+    add_library(${target} STATIC ${MODULE_SOURCES} ${MODULE_HEADERS})
     set(scope PUBLIC)
-    target_link_libraries(${target} PRIVATE $<BUILD_INTERFACE:tangible_flags> ${ROOM_PRIVATE_LINK})
+    target_link_libraries(${target} PRIVATE $<BUILD_INTERFACE:tangible_flags> ${MODULE_PRIVATE_LINK})
     tangible_precompile(${target})
     add_dependencies(tangible_unit_and_program_tests ${target})
   else()
     add_library(${target} INTERFACE)
     set(scope INTERFACE)
   endif()
-  add_library(tangible::${name} ALIAS ${target})
-  set_target_properties(${target} PROPERTIES EXPORT_NAME ${name})
+  add_library(tangible::${short_name} ALIAS ${target})
+  set_target_properties(${target} PROPERTIES EXPORT_NAME ${short_name})
   target_compile_features(${target} ${scope} cxx_std_20)
   target_include_directories(${target} ${scope} $<BUILD_INTERFACE:${TANGIBLE_INCLUDE_DIR}>
                              $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
-  foreach(room IN LISTS ROOM_DEPENDS)
-    target_link_libraries(${target} ${scope} tangible_${room})
+  foreach(module IN LISTS MODULE_DEPENDS)
+    tangible_target_name(${module} dependency)
+    target_link_libraries(${target} ${scope} tangible_${dependency})
   endforeach()
-  target_link_libraries(${target} ${scope} ${ROOM_LINK})
-  if(ROOM_INTERNAL)
+  target_link_libraries(${target} ${scope} ${MODULE_LINK})
+  if(MODULE_INTERNAL)
     return()
   endif()
   install(TARGETS ${target} EXPORT tangible_targets)
-  foreach(header IN LISTS ROOM_HEADERS)
-    get_filename_component(folder "${header}" DIRECTORY)  # estimation/experiments/chain.h keeps its folder
-    install(FILES "${header}" DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}/tangible/${name}/${folder}")
+  foreach(header IN LISTS MODULE_HEADERS)
+    install(FILES "${header}" DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}/tangible/${name}")
   endforeach()
+endfunction()
+
+# tangible_module_group(<name> sub-folder...): tangible_<name> stands for all of its sub-folders' modules.
+function(tangible_module_group name)
+  add_library(tangible_${name} INTERFACE)
+  add_library(tangible::${name} ALIAS tangible_${name})
+  set_target_properties(tangible_${name} PROPERTIES EXPORT_NAME ${name})
+  foreach(folder IN LISTS ARGN)
+    target_link_libraries(tangible_${name} INTERFACE tangible_${name}_${folder})
+  endforeach()
+  install(TARGETS tangible_${name} EXPORT tangible_targets)
 endfunction()
 
 # tangible_program(<name> SOURCES file... LINK target...): an installed program.

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// The choice of features, by kind of pair. Internal to the room; see collide.h for what is chosen.
+// The choice of features, by kind of pair. Internal to the module; collide.h says what is chosen.
 
 #include "tangible/geometry/collide.h"
 #include "tangible/geometry/convex_core.h"

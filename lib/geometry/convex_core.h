@@ -2,7 +2,7 @@
 #pragma once
 //
 // A shape's core at a pose, in double: what the choice of features walks over. Internal to the
-// room.
+// module.
 //
 // A point is a polygon of one vertex and no edge, a segment one of two vertices and two edges, one
 // seen from either side: so all pairs share one code. Coordinates are relative to a common origin

@@ -5,7 +5,7 @@
 //
 // The page draws the bodies (with a radius mark, so that rotation is seen), joints, springs, and
 // the contacts with their impulses; it plays, pauses, steps and zooms, and plots kinetic, potential
-// and total energy. ViewData is plain data, so whoever steps a scene fills it and this room needs
+// and total energy. ViewData is plain data, so whoever steps a scene fills it and this module needs
 // no dynamics.
 
 #include <cstddef>

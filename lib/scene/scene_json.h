@@ -25,9 +25,9 @@ bool LoadScene(const std::string& file, Scene* scene, std::string* error);
 bool ParseScene(const std::string& text, const std::string& name_for_messages,
                 const std::string& folder_for_relative_files, Scene* scene, std::string* error);
 
-/// The scene as text that ParseScene reads back bit for bit (every key but those that are absent, so
-/// also an integrator and a correction of joints that follow the stepping); signals as the name of
-/// their file.
+/// The scene as text that ParseScene reads back bit for bit (every key but those that are absent,
+/// so also an integrator and a correction of joints that follow the stepping); signals as the name
+/// of their file.
 std::string SceneToJson(const Scene& scene);
 
 }  // namespace tangible

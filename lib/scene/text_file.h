@@ -26,7 +26,7 @@ bool ReadTextFile(const std::string& file, std::string* text, std::string* error
 /// those that another file names.
 std::vector<std::string> FilesRead();
 
-/// The text after the byte-order mark of UTF-8 that some editors and spreadsheets begin a file with.
+/// The text after the byte-order mark of UTF-8, which some editors and spreadsheets write first.
 std::string_view WithoutByteOrderMark(std::string_view text);
 
 /// The folder of a file as a prefix of relative paths: "a/b.json" gives "a/", "b.json" gives "".
@@ -35,9 +35,9 @@ std::string FolderOf(const std::string& file);
 /// `path` itself when absolute or when folder is empty, else folder + path.
 std::string JoinPath(const std::string& folder, const std::string& path);
 
-/// The text as a terminal can show it on one line. Line breaks and tabs become spaces; other control
-/// characters, characters that change the direction of writing, and bytes that are not UTF-8 are
-/// written as \x1b, \u202e and \xff. Beyond kMaxMessage bytes it is cut in the middle.
+/// The text as a terminal can show it on one line. Line breaks and tabs become spaces; other
+/// control characters, characters that change the direction of writing, and bytes that are not
+/// UTF-8 are written as \x1b, \u202e and \xff. Beyond kMaxMessage bytes it is cut in the middle.
 std::string OneLine(std::string_view text);
 
 }  // namespace tangible

@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "../support/scenes.h"
-#include "tangible/simulation/invariants.h"
-#include "tangible/simulation/joint_projection.h"
+#include "tangible/simulation/stepping/invariants.h"
+#include "tangible/simulation/stepping/joint_projection.h"
 
 namespace tangible {
 namespace {

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "tangible/estimation/fit_json.h"
+#include "tangible/estimation/results/fit_json.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const std::string file = TANGIBLE_SOURCE_DIR "/data/fits/fuzzed.json";

@@ -7,8 +7,8 @@
 #include <string>
 
 #include "tangible/app/lcp_file.h"
-#include "tangible/lcp/derivative.h"
-#include "tangible/lcp/solver.h"
+#include "tangible/lcp/dense/derivative.h"
+#include "tangible/lcp/dense/solver.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   constexpr Eigen::Index kMostRows = 16;

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "tangible/estimation/observation.h"
+#include "tangible/estimation/problem/observation.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   tangible::Scene scene;

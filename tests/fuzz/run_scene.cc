@@ -7,9 +7,9 @@
 #include <cstdlib>
 #include <string>
 
-#include "tangible/dynamics/model.h"
-#include "tangible/simulation/rollout.h"
-#include "tangible/simulation/settings.h"
+#include "tangible/dynamics/model/model.h"
+#include "tangible/dynamics/model/settings.h"
+#include "tangible/simulation/stepping/rollout.h"
 
 namespace tangible::testing {
 namespace {

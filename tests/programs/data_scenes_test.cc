@@ -13,7 +13,7 @@
 
 #include "tangible/config/jet_widths.h"
 #include "tangible/scene/scene_json.h"
-#include "tangible/simulation/gradient.h"
+#include "tangible/simulation/gradient/gradient.h"
 #include "tangible/verification/support/compare.h"
 #include "tangible/verification/support/differences.h"
 

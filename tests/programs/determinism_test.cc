@@ -19,10 +19,10 @@
 
 #include "extreme_scenes.h"
 #include "run_program.h"
+#include "tangible/dynamics/model/settings.h"
 #include "tangible/math/bit_hash.h"
 #include "tangible/scene/scene_json.h"
-#include "tangible/simulation/batch.h"
-#include "tangible/simulation/settings.h"
+#include "tangible/simulation/gradient/batch.h"
 
 namespace tangible {
 namespace {

@@ -64,6 +64,45 @@ TEST_F(TangibleGradientTest, AllMethodsWriteTheSameJacobian) {
   EXPECT_GT(largest, 0.01);
 }
 
+// The rules of --method=auto, the default; the result says what was asked and what was used.
+TEST_F(TangibleGradientTest, TheMethodIsChosenUnlessItIsAskedFor) {
+  const std::string loss = Write("loss.json", R"({"terms": [{"output": "ball/x"}]})");
+  const std::string of_loss = " --loss='" + loss + "'";
+  const std::string few = "--parameters=bodies/ball/mass";
+  std::string many = few;  // than the 18 outputs
+  for (const char* body : {"ball", "crate", "rod"}) {
+    for (const char* number : {"position/x", "position/y", "velocity/x", "velocity/y", "friction",
+                               "restitution", "linear_damping", "angular_damping"}) {
+      if (std::string(body) != "rod" || std::string(number).find("position") != 0) {
+        many += std::string(",bodies/") + body + "/" + number;
+      }
+    }
+  }
+  struct Case {
+    std::string flags, requested, used;
+  };
+  for (const Case& c :
+       std::initializer_list<Case>{{few, "auto", "tangent"},
+                                   {few + " --method=auto", "auto", "tangent"},
+                                   {many, "auto", "adjoint"},
+                                   {few + of_loss, "auto", "adjoint"},
+                                   {many + of_loss, "auto", "adjoint"},
+                                   {few + " --side=plus", "auto", "tangent"},
+                                   {few + of_loss + " --side=minus", "auto", "tangent"},
+                                   {few + " --side=plus --checkpoint=every:3", "auto", "tangent"},
+                                   {few + " --checkpoint=all", "auto", "adjoint"},
+                                   {few + " --factorisations=recompute", "auto", "adjoint"},
+                                   {few + " --method=adjoint", "adjoint", "adjoint"},
+                                   {few + of_loss + " --method=tangent", "tangent", "tangent"}}) {
+    const ProgramRun run = Differentiate(c.flags);
+    ASSERT_EQ(run.exit_status, 0) << c.flags << run.error;
+    const json result = json::parse(run.out);
+    EXPECT_EQ(result["requested_method"], c.requested) << c.flags;
+    EXPECT_EQ(result["method"], c.used) << c.flags;
+    EXPECT_EQ(result.contains("tape_bytes"), c.used == "adjoint") << c.flags;
+  }
+}
+
 TEST_F(TangibleGradientTest, WritesTheGradientOfALoss) {
   const std::string loss =
       Write("loss.json", R"({"terms": [{"output": "ball/x", "target": 1, "weight": 2},

@@ -10,7 +10,7 @@
 namespace tangible {
 namespace {
 
-constexpr int kMaxLines = 500;
+constexpr int kMaxLines = 800;
 constexpr std::size_t kMaxCommentWidth = 100;
 constexpr char kSpdx[] = "// SPDX-License-Identifier: Apache-2.0";
 
@@ -26,25 +26,52 @@ bool Contains(const std::string& text, const std::string& part) {
   return text.find(part) != std::string::npos;
 }
 
-/// What each room sees directly or through others, itself aside. `config` is seen by all.
-const std::map<std::string, std::set<std::string>>& VisibleRooms() {
-  static const std::map<std::string, std::set<std::string>> rooms = [] {
-    std::map<std::string, std::set<std::string>> visible;
-    visible["math"] = {};
-    visible["lcp"] = visible["geometry"] = visible["scene"] = {"math"};
-    visible["dynamics"] = {"math", "lcp", "geometry", "scene"};
-    visible["simulation"] = visible["dynamics"];
-    visible["simulation"].insert("dynamics");
-    visible["render"] = visible["simulation"];
-    visible["render"].insert("simulation");
-    visible["control"] = visible["render"];
-    visible["estimation"] = visible["control"];
-    visible["estimation"].insert({"control", "render"});
-    visible["verification"] = visible["estimation"];
-    visible["verification"].insert("estimation");
+/// What each module includes directly. `config` is seen by all, and a module sees what those see
+/// that it includes. A folder of lib that is not listed is an error.
+const std::map<std::string, std::set<std::string>>& DirectDependencies() {
+  static const std::map<std::string, std::set<std::string>> direct = {
+      {"math", {}},
+      {"lcp/dense", {"math"}},
+      {"lcp/system", {"math"}},
+      {"lcp/contact", {"lcp/dense", "lcp/system"}},
+      {"geometry", {"math"}},
+      {"scene", {"math"}},
+      {"dynamics/model", {"lcp/contact", "geometry", "scene"}},
+      {"dynamics/elements", {"dynamics/model"}},
+      {"dynamics/assembly", {"dynamics/elements"}},
+      {"dynamics/jacobian", {"dynamics/assembly"}},
+      {"simulation/events", {"dynamics/jacobian"}},
+      {"simulation/stepping", {"simulation/events"}},
+      {"simulation/derivatives", {"simulation/stepping"}},
+      {"simulation/certificate", {"simulation/derivatives"}},
+      {"simulation/gradient", {"simulation/certificate"}},
+      {"render", {"simulation/gradient"}},
+      {"estimation/problem", {"render"}},
+      {"estimation/fit", {"estimation/problem"}},
+      {"estimation/results", {"estimation/fit"}},
+      {"estimation/experiments", {"estimation/results"}},
+      {"estimation/app", {"estimation/experiments"}},
+      {"verification", {"estimation/experiments"}}};
+  return direct;
+}
+
+/// What each module sees directly or through others, itself aside.
+const std::map<std::string, std::set<std::string>>& VisibleModules() {
+  static const std::map<std::string, std::set<std::string>> all = [] {
+    std::map<std::string, std::set<std::string>> visible = DirectDependencies();
+    for (bool grows = true; grows;) {
+      grows = false;
+      for (auto& [module, seen] : visible) {
+        for (const std::string& next : std::set<std::string>(seen)) {
+          for (const std::string& further : visible[next]) {
+            grows = seen.insert(further).second || grows;
+          }
+        }
+      }
+    }
     return visible;
   }();
-  return rooms;
+  return all;
 }
 
 /// Programs see what their folder sees, and what programs share (lib/app).
@@ -52,31 +79,32 @@ bool IsMain(const std::string& path) {
   return Contains(path, "/app/") || (StartsWith(path, "verification/") && EndsWith(path, ".cc"));
 }
 
-/// The room of a path: lib/<room>/..., estimation/..., verification/...; empty for tests.
-std::string RoomOf(const std::string& path) {
-  const std::size_t slash = path.find('/');
-  const std::string top = path.substr(0, slash);
-  if (top != "lib") {
-    return top == "tests" ? "" : top;
-  }
-  return path.substr(slash + 1, path.find('/', slash + 1) - slash - 1);
+/// The module of a header by its name behind "tangible/", or of a file of lib by its path behind
+/// "lib/": its folder, or the first two where they are listed as a module, as lcp/dense is.
+std::string ModuleOf(const std::string& file) {
+  const std::size_t slash = file.find('/');
+  const std::size_t second = slash == std::string::npos ? slash : file.find('/', slash + 1);
+  const std::string two = second == std::string::npos ? "" : file.substr(0, second);
+  return DirectDependencies().count(two) > 0 ? two : file.substr(0, slash);
 }
 
-/// Empty if `file` may include a header of `room`.
-std::string WrongRoom(const std::string& path, const std::string& room) {
-  const std::string own = RoomOf(path);
-  if (own.empty() || room == own || room == "config") {
+/// Empty if the source `path` may include the header `name`, tangible/...
+std::string WrongModule(const std::string& path, const std::string& name) {
+  const std::string own = ModuleOf(StartsWith(path, "lib/") ? path.substr(4) : path);
+  const std::string module = ModuleOf(name.substr(std::string("tangible/").size()));
+  if (own == "tests" || module == own || module == "config") {
     return "";
   }
-  if (room == "app") {
+  if (module == "app") {
     return IsMain(path) ? "" : "only programs include tangible/app";
   }
-  // lib/app sees all of lib: what estimation sees.
-  const auto visible = VisibleRooms().find(own == "app" ? "estimation" : own);
-  if (visible == VisibleRooms().end()) {
-    return "room " + own + " is not in the list of rooms";
+  // The programs of lib see all of lib.
+  const auto visible = VisibleModules().find(own == "app" ? "estimation/problem" : own);
+  if (visible == VisibleModules().end()) {
+    return "module " + own + " is not in the list of modules";
   }
-  return visible->second.count(room) > 0 ? "" : "room " + own + " may not include room " + room;
+  return visible->second.count(module) > 0 ? ""
+                                           : "module " + own + " may not include module " + module;
 }
 
 /// Empty if `path` may include the header `name` of another project.
@@ -96,21 +124,20 @@ std::string WrongLibrary(const std::string& path, const std::string& name) {
 
 std::string WrongQuoted(const std::string& path, const std::string& name) {
   if (StartsWith(name, "tangible/")) {
-    const std::size_t start = std::string("tangible/").size();
-    std::string problem = WrongRoom(path, name.substr(start, name.find('/', start) - start));
+    std::string problem = WrongModule(path, name);
     if (problem.empty() && EndsWith(name, "_inl.h") && EndsWith(path, ".h") &&
         !EndsWith(path, "_inl.h")) {
       return "a header may not include an _inl.h";
     }
     return problem;
   }
-  // tests/support, from a folder of a room or from one below it.
+  // tests/support, from the folder of a module or from one below it.
   const bool deep = std::count(path.begin(), path.end(), '/') > 2;
   if (StartsWith(path, "tests/") && (!Contains(name, "/") || StartsWith(name, "../support/") ||
                                      (deep && StartsWith(name, "../../support/")))) {
     return "";
   }
-  return "headers of the project are included as \"tangible/<room>/<file>.h\"";
+  return "headers of the project are included as \"tangible/<module>/<file>.h\"";
 }
 
 /// Why `path` may not have this line; empty if it may, or if it is no include.
@@ -248,11 +275,11 @@ std::vector<std::string> CheckSource(const SourceFile& file) {
 
 std::vector<std::string> UnlistedHeaders(const std::string& cmake_lists,
                                          const std::vector<std::string>& headers) {
-  const std::size_t room = cmake_lists.find("tangible_room(");
-  if (room == std::string::npos) {
+  const std::size_t module = cmake_lists.find("tangible_module(");
+  if (module == std::string::npos) {
     return {};
   }
-  std::string arguments = cmake_lists.substr(room, cmake_lists.find(')', room) - room);
+  std::string arguments = cmake_lists.substr(module, cmake_lists.find(')', module) - module);
   std::replace(arguments.begin(), arguments.end(), '(', ' ');
   const std::set<std::string> keywords = {"SOURCES", "DEPENDS", "LINK", "PRIVATE_LINK"};
   std::set<std::string> listed;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// The rules of the source tree: which room may include which, and what every file has.
+// The rules of the source tree: which module may include which, and what every file has.
 //
 // The checks work on texts, so that tests can plant violations.
 
@@ -17,7 +17,7 @@ struct SourceFile {
 };
 
 /// What a file breaks, one line each, "path:line: what"; empty if nothing:
-///  - an include of a room that its own room may not see;
+///  - an include of a module that its own module may not see;
 ///  - ceres in lib other than ceres/jet.h in lib/math/scalar.h; gflags outside mains; torch outside
 ///    estimation/vision;
 ///  - a quoted include that is not "tangible/..." (within tests also a header of the same folder
@@ -28,11 +28,11 @@ struct SourceFile {
 ///  - an equation or a table in a comment that a formatter has wrapped like running text: a line
 ///    indented by three spaces that begins with a word for which the line before it had no room, or
 ///    a wrapped line without punctuation before a line that is indented further;
-///  - more than 500 lines.
+///  - more than 800 lines.
 std::vector<std::string> CheckSource(const SourceFile& file);
 
-/// The headers (paths relative to the CMakeLists.txt's folder) that its tangible_room(...) does not
-/// list under HEADERS. Empty if there is no tangible_room. `_inl.h` need not be listed.
+/// The headers (paths relative to the folder of the CMakeLists.txt) that tangible_module(...) does
+/// not list under HEADERS. Empty if there is no tangible_module. `_inl.h` need not be listed.
 std::vector<std::string> UnlistedHeaders(const std::string& cmake_lists,
                                          const std::vector<std::string>& headers);
 

@@ -47,57 +47,80 @@ std::size_t NumProblems(const std::string& path, const std::string& lines) {
   return CheckSource({path, kHead + lines}).size();
 }
 
-TEST(LayoutRules, RoomsSeeThoseBelow) {
-  EXPECT_EQ(NumProblems("lib/lcp/a.h", "#include \"tangible/math/scalar.h\"\n"), 0U);
-  EXPECT_EQ(NumProblems("lib/lcp/a.cc", "#include \"tangible/config/jet_widths.h\"\n"), 0U);
-  EXPECT_EQ(NumProblems("lib/simulation/a.h", "#include \"tangible/scene/scene.h\"\n"), 0U);
+TEST(LayoutRules, ModulesSeeThoseBelow) {
+  EXPECT_EQ(NumProblems("lib/lcp/dense/a.h", "#include \"tangible/math/scalar.h\"\n"), 0U);
+  EXPECT_EQ(NumProblems("lib/lcp/system/a.cc", "#include \"tangible/config/jet_widths.h\"\n"), 0U);
+  EXPECT_EQ(NumProblems("lib/lcp/contact/a.cc", "#include \"tangible/lcp/dense/lemke.h\"\n"), 0U);
+  EXPECT_EQ(NumProblems("lib/dynamics/model/a.h", "#include \"tangible/scene/scene.h\"\n"), 0U);
+  EXPECT_EQ(NumProblems("lib/simulation/events/a.h", "#include \"tangible/scene/scene.h\"\n"), 0U);
+  EXPECT_EQ(NumProblems("lib/simulation/stepping/a.h",
+                        "#include \"tangible/simulation/events/event_step.h\"\n"),
+            0U);
   EXPECT_EQ(NumProblems("lib/app/a.cc", "#include \"tangible/render/view.h\"\n"), 0U);
-  EXPECT_EQ(NumProblems("estimation/a.cc", "#include \"tangible/control/ilqr.h\"\n"), 0U);
+  EXPECT_EQ(NumProblems("lib/app/a.cc", "#include \"tangible/simulation/gradient/batch.h\"\n"), 0U);
+  EXPECT_EQ(
+      NumProblems("estimation/fit/a.cc", "#include \"tangible/estimation/problem/residual.h\"\n"),
+      0U);
   EXPECT_EQ(NumProblems("estimation/app/a.cc", "#include \"tangible/app/program.h\"\n"), 0U);
-  EXPECT_EQ(NumProblems("verification/a.cc", "#include \"tangible/estimation/fit.h\"\n"), 0U);
+  EXPECT_EQ(NumProblems("estimation/app/a.cc", "#include \"tangible/estimation/fit/fit.h\"\n"), 0U);
+  EXPECT_EQ(NumProblems("verification/a.cc", "#include \"tangible/estimation/fit/fit.h\"\n"), 0U);
   EXPECT_EQ(NumProblems("tests/app/a.cc", "#include \"tangible/verification/a.h\"\n"), 0U);
 }
 
-TEST(LayoutRules, RoomsDoNotSeeThoseAbove) {
-  EXPECT_EQ(NumProblems("lib/math/a.h", "#include \"tangible/lcp/problem.h\"\n"), 1U);
-  EXPECT_EQ(NumProblems("lib/lcp/a.h", "#include \"tangible/scene/scene.h\"\n"), 1U);
+TEST(LayoutRules, ModulesDoNotSeeThoseAbove) {
+  EXPECT_EQ(NumProblems("lib/math/a.h", "#include \"tangible/lcp/dense/problem.h\"\n"), 1U);
+  EXPECT_EQ(NumProblems("lib/lcp/dense/a.h", "#include \"tangible/scene/scene.h\"\n"), 1U);
+  EXPECT_EQ(NumProblems("lib/lcp/dense/a.h", "#include \"tangible/lcp/system/block_lu.h\"\n"), 1U);
+  EXPECT_EQ(
+      NumProblems("lib/lcp/system/a.h", "#include \"tangible/lcp/contact/contact_solver.h\"\n"),
+      1U);
   EXPECT_EQ(NumProblems("lib/scene/a.cc", "#  include \"tangible/geometry/shape.h\"\n"), 1U);
   EXPECT_EQ(NumProblems("lib/geometry/a.cc", "# include \"tangible/scene/scene.h\"\n"), 1U);
-  EXPECT_EQ(NumProblems("lib/dynamics/a.h", "#include \"tangible/simulation/step.h\"\n"), 1U);
-  EXPECT_EQ(NumProblems("lib/simulation/a.cc", "#include \"tangible/render/view.h\"\n"), 1U);
-  EXPECT_EQ(NumProblems("lib/render/a.cc", "#include \"tangible/control/ilqr.h\"\n"), 1U);
-  EXPECT_EQ(NumProblems("lib/app/a.cc", "#include \"tangible/estimation/fit.h\"\n"), 1U);
-  EXPECT_EQ(NumProblems("estimation/a.cc", "#include \"tangible/verification/a.h\"\n"), 1U);
-  EXPECT_EQ(NumProblems("estimation/a.cc", "#include \"tangible/app/program.h\"\n"), 1U);
+  EXPECT_EQ(
+      NumProblems("lib/dynamics/model/a.h", "#include \"tangible/simulation/stepping/step.h\"\n"),
+      1U);
+  EXPECT_EQ(NumProblems("lib/dynamics/elements/a.h",
+                        "#include \"tangible/dynamics/assembly/assembly.h\"\n"),
+            1U);
+  EXPECT_EQ(NumProblems("lib/simulation/events/a.h",
+                        "#include \"tangible/simulation/stepping/step.h\"\n"),
+            1U);
+  EXPECT_EQ(NumProblems("lib/simulation/stepping/a.cc", "#include \"tangible/render/view.h\"\n"),
+            1U);
+  EXPECT_EQ(NumProblems("lib/app/a.cc", "#include \"tangible/estimation/fit/fit.h\"\n"), 1U);
+  EXPECT_EQ(NumProblems("estimation/fit/a.cc", "#include \"tangible/verification/a.h\"\n"), 1U);
+  EXPECT_EQ(NumProblems("estimation/problem/a.cc", "#include \"tangible/estimation/fit/fit.h\"\n"),
+            1U);
+  EXPECT_EQ(NumProblems("estimation/fit/a.cc", "#include \"tangible/app/program.h\"\n"), 1U);
   EXPECT_EQ(NumProblems("lib/attic/a.cc", "#include \"tangible/math/scalar.h\"\n"), 1U);
 }
 
 TEST(LayoutRules, OtherLibrariesHaveTheirPlaces) {
   EXPECT_EQ(NumProblems("lib/math/scalar.h", "#include <ceres/jet.h>\n"), 0U);
   EXPECT_EQ(NumProblems("lib/math/scalar.h", "#include <ceres/ceres.h>\n"), 1U);
-  EXPECT_EQ(NumProblems("lib/dynamics/a.h", "#include \"ceres/jet.h\"\n"), 1U);
+  EXPECT_EQ(NumProblems("lib/dynamics/model/a.h", "#include \"ceres/jet.h\"\n"), 1U);
   EXPECT_EQ(NumProblems("lib/app/a.cc", "#include <ceres/ceres.h>\n"), 1U);
-  EXPECT_EQ(NumProblems("estimation/fit.cc", "#include <ceres/ceres.h>\n"), 0U);
+  EXPECT_EQ(NumProblems("estimation/fit/fit.cc", "#include <ceres/ceres.h>\n"), 0U);
   EXPECT_EQ(NumProblems("lib/app/a.cc", "#include <gflags/gflags.h>\n"), 0U);
   EXPECT_EQ(NumProblems("verification/a.cc", "#include <gflags/gflags.h>\n"), 0U);
-  EXPECT_EQ(NumProblems("lib/simulation/a.cc", "#include <gflags/gflags.h>\n"), 1U);
-  EXPECT_EQ(NumProblems("estimation/fit.cc", "#include <gflags/gflags.h>\n"), 1U);
+  EXPECT_EQ(NumProblems("lib/simulation/stepping/a.cc", "#include <gflags/gflags.h>\n"), 1U);
+  EXPECT_EQ(NumProblems("estimation/fit/fit.cc", "#include <gflags/gflags.h>\n"), 1U);
   EXPECT_EQ(NumProblems("estimation/vision/a.cc", "#include <torch/torch.h>\n"), 0U);
-  EXPECT_EQ(NumProblems("estimation/fit.cc", "#include <torch/torch.h>\n"), 1U);
+  EXPECT_EQ(NumProblems("estimation/fit/fit.cc", "#include <torch/torch.h>\n"), 1U);
 }
 
 TEST(LayoutRules, ProjectHeadersAreIncludedByTheirInstalledName) {
-  EXPECT_EQ(NumProblems("lib/lcp/a.cc", "#include \"problem.h\"\n"), 1U);
-  EXPECT_EQ(NumProblems("lib/lcp/a.cc", "#include \"../math/scalar.h\"\n"), 1U);
-  EXPECT_EQ(NumProblems("lib/lcp/a.cc", "#include <tangible/math/scalar.h>\n"), 1U);
+  EXPECT_EQ(NumProblems("lib/lcp/dense/a.cc", "#include \"problem.h\"\n"), 1U);
+  EXPECT_EQ(NumProblems("lib/lcp/dense/a.cc", "#include \"../math/scalar.h\"\n"), 1U);
+  EXPECT_EQ(NumProblems("lib/lcp/dense/a.cc", "#include <tangible/math/scalar.h>\n"), 1U);
   EXPECT_EQ(NumProblems("tests/lcp/a.cc", "#include \"random_problem.h\"\n"), 0U);
   EXPECT_EQ(NumProblems("tests/lcp/a.cc", "#include \"../support/counter.h\"\n"), 0U);
   EXPECT_EQ(NumProblems("tests/lcp/a.cc", "#include \"../../support/counter.h\"\n"), 1U);
   EXPECT_EQ(NumProblems("tests/lcp/b/a.cc", "#include \"../../support/counter.h\"\n"), 0U);
   EXPECT_EQ(NumProblems("tests/lcp/a.cc", "#include \"../scene/helper.h\"\n"), 1U);
-  EXPECT_EQ(NumProblems("lib/lcp/a.cc", "#include \"tangible/lcp/a_inl.h\"\n"), 0U);
-  EXPECT_EQ(NumProblems("lib/lcp/b_inl.h", "#include \"tangible/lcp/a_inl.h\"\n"), 0U);
-  EXPECT_EQ(NumProblems("lib/lcp/b.h", "#include \"tangible/lcp/a_inl.h\"\n"), 1U);
+  EXPECT_EQ(NumProblems("lib/lcp/dense/a.cc", "#include \"tangible/lcp/dense/a_inl.h\"\n"), 0U);
+  EXPECT_EQ(NumProblems("lib/lcp/dense/b_inl.h", "#include \"tangible/lcp/dense/a_inl.h\"\n"), 0U);
+  EXPECT_EQ(NumProblems("lib/lcp/dense/b.h", "#include \"tangible/lcp/dense/a_inl.h\"\n"), 1U);
 }
 
 TEST(LayoutRules, EveryFileHasItsHead) {
@@ -105,8 +128,8 @@ TEST(LayoutRules, EveryFileHasItsHead) {
   EXPECT_EQ(CheckSource({"lib/math/a.cc", "int a;\n"}).size(), 1U);
   EXPECT_EQ(CheckSource({"lib/math/a.cc", ""}).size(), 1U);
   EXPECT_EQ(CheckSource({"lib/math/a.h", "// SPDX-License-Identifier: Apache-2.0\n"}).size(), 1U);
-  EXPECT_EQ(NumProblems("lib/math/a.h", std::string(498, '\n')), 0U);
-  EXPECT_EQ(NumProblems("lib/math/a.h", std::string(499, '\n')), 1U);
+  EXPECT_EQ(NumProblems("lib/math/a.h", std::string(798, '\n')), 0U);
+  EXPECT_EQ(NumProblems("lib/math/a.h", std::string(799, '\n')), 1U);
 }
 
 TEST(LayoutRules, EquationsInCommentsAreNotWrapped) {
@@ -135,15 +158,15 @@ TEST(LayoutRules, EquationsInCommentsAreNotWrapped) {
   EXPECT_EQ(problems("// λ̇" + std::string(96, 'x') + "\n"), 0U);
 }
 
-TEST(LayoutRules, EveryHeaderOfARoomIsInstalled) {
+TEST(LayoutRules, EveryHeaderOfAModuleIsInstalled) {
   const std::string lists =
-      "tangible_room(lcp\n  SOURCES a.cc\n  HEADERS a.h sub/b.h\n  DEPENDS c.h)\nother(HEADERS "
+      "tangible_module(lcp\n  SOURCES a.cc\n  HEADERS a.h sub/b.h\n  DEPENDS c.h)\nother(HEADERS "
       "d.h)\n";
   EXPECT_TRUE(UnlistedHeaders(lists, {"a.h", "sub/b.h", "a_inl.h"}).empty());
   EXPECT_EQ(UnlistedHeaders(lists, {"a.h", "c.h", "d.h"}),
             (std::vector<std::string>{"c.h", "d.h"}));
   EXPECT_TRUE(UnlistedHeaders("add_library(app a.cc)", {"a.h"}).empty());
-  EXPECT_EQ(UnlistedHeaders("tangible_room(lcp)", {"a.h"}).size(), 1U);
+  EXPECT_EQ(UnlistedHeaders("tangible_module(lcp)", {"a.h"}).size(), 1U);
 }
 
 TEST(Layout, EverySource) {
@@ -170,7 +193,7 @@ TEST(Layout, EveryHeaderIsInstalled) {
   ASSERT_GE(headers.size(), 4U);
   for (const auto& [folder, names] : headers) {
     for (const std::string& name : UnlistedHeaders(ReadText(folder / "CMakeLists.txt"), names)) {
-      ADD_FAILURE() << (folder / name) << " is not in HEADERS of its tangible_room";
+      ADD_FAILURE() << (folder / name) << " is not in HEADERS of its tangible_module";
     }
   }
 }

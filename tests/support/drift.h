@@ -5,7 +5,7 @@
 
 #include <algorithm>
 
-#include "tangible/simulation/rollout.h"
+#include "tangible/simulation/stepping/rollout.h"
 
 namespace tangible::testing {
 

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "jets.h"
-#include "tangible/simulation/gradient.h"
+#include "tangible/simulation/gradient/gradient.h"
 
 namespace tangible::testing {
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// Small scenes for tests of more than one room, as text.
+// Small scenes for tests of more than one module, as text.
 
 #include <gtest/gtest.h>
 
@@ -41,8 +41,8 @@ inline std::string HeavyEnd(const std::string& end,
          more + "}}";
 }
 
-/// A square loop of three unit rods of 1 kg on the ground, which swings through; `simulation` as in a
-/// scene file.
+/// A square loop of three unit rods of 1 kg on the ground, which swings through; `simulation` as in
+/// a scene file.
 inline std::string FourBar(const std::string& simulation) {
   return R"({"bodies": [
       {"name": "left", "mass": 1, "inertia": 0.08333333333333333, "position": [0, 0.5],

@@ -14,8 +14,8 @@
 #include <string>
 #include <vector>
 
-#include "tangible/lcp/contact_problem.h"
-#include "tangible/lcp/problem.h"
+#include "tangible/lcp/dense/problem.h"
+#include "tangible/lcp/system/contact_problem.h"
 
 namespace tangible::corpus {
 

@@ -9,9 +9,9 @@
 #include <random>
 #include <utility>
 
-#include "tangible/lcp/contact_solver.h"
-#include "tangible/lcp/solver.h"
-#include "tangible/lcp/worker_pool.h"
+#include "tangible/lcp/contact/contact_solver.h"
+#include "tangible/lcp/contact/worker_pool.h"
+#include "tangible/lcp/dense/solver.h"
 #include "tangible/verification/corpus/recomputed.h"
 
 namespace tangible::corpus {

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "tangible/lcp/problem.h"
+#include "tangible/lcp/dense/problem.h"
 #include "tangible/verification/corpus/contact_case.h"
 
 namespace tangible::corpus {

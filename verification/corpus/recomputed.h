@@ -8,8 +8,8 @@
 // cancel in them, an impulse by the largest of its kind or by what the slack's scale would bring
 // about, equations by their terms.
 
-#include "tangible/lcp/contact_problem.h"
-#include "tangible/lcp/problem.h"
+#include "tangible/lcp/dense/problem.h"
+#include "tangible/lcp/system/contact_problem.h"
 
 namespace tangible::corpus {
 

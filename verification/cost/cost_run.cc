@@ -5,7 +5,7 @@
 #include <cmath>
 #include <sstream>
 
-#include "tangible/simulation/gradient.h"
+#include "tangible/simulation/gradient/gradient.h"
 #include "tangible/verification/cost/cost_scene.h"
 #include "tangible/verification/cost/tape_gradient.h"
 
@@ -33,6 +33,7 @@ double Tolerance(CostMethod method) {
 
 GradientOptions OptionsOf(CostMethod method, const CostOptions& options) {
   GradientOptions gradient;
+  gradient.method = GradientMethod::kAdjoint;
   gradient.certificate = CertificatePass::kSkip;
   switch (method) {
     case CostMethod::kTangent:

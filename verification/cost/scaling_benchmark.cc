@@ -18,7 +18,7 @@
 #include <string>
 #include <vector>
 
-#include "tangible/simulation/rollout_adjoint.h"
+#include "tangible/simulation/derivatives/rollout_adjoint.h"
 #include "tangible/verification/cost/benchmark_scenes.h"
 #include "tangible/verification/cost/peers.h"
 

@@ -11,10 +11,10 @@
 #include <string>
 #include <vector>
 
-#include "tangible/dynamics/parameter_map.h"
+#include "tangible/dynamics/model/parameter_map.h"
 #include "tangible/scene/scene_json.h"
-#include "tangible/simulation/rollout_adjoint.h"
-#include "tangible/simulation/rollout_tangent.h"
+#include "tangible/simulation/derivatives/rollout_adjoint.h"
+#include "tangible/simulation/derivatives/rollout_tangent.h"
 #include "tangible/verification/cost/benchmark_scenes.h"
 
 namespace tangible {

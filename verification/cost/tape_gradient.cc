@@ -30,13 +30,13 @@ struct Eigen::NumTraits<adouble> : Eigen::NumTraits<double> {
 #include <ctime>
 #include <new>
 
-#include "tangible/dynamics/assembly_inl.h"
-#include "tangible/dynamics/force_inl.h"
-#include "tangible/dynamics/joint_inl.h"
+#include "tangible/dynamics/assembly/assembly_inl.h"
+#include "tangible/dynamics/elements/force_inl.h"
+#include "tangible/dynamics/elements/joint_inl.h"
 #include "tangible/geometry/contact_geometry_inl.h"
-#include "tangible/lcp/block_lu_inl.h"
-#include "tangible/lcp/contact_interior_point_iteration_inl.h"
-#include "tangible/simulation/step_unrolled_inl.h"
+#include "tangible/lcp/contact/contact_interior_point_iteration_inl.h"
+#include "tangible/lcp/system/block_lu_inl.h"
+#include "tangible/simulation/stepping/step_unrolled_inl.h"
 
 namespace tangible::cost {
 namespace {

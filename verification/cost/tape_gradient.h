@@ -9,7 +9,7 @@
 
 #include <vector>
 
-#include "tangible/simulation/gradient.h"
+#include "tangible/simulation/gradient/gradient.h"
 
 namespace tangible::cost {
 

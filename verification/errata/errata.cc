@@ -8,7 +8,7 @@
 #include <limits>
 #include <random>
 
-#include "tangible/lcp/solver.h"
+#include "tangible/lcp/dense/solver.h"
 
 namespace tangible {
 namespace {

@@ -30,7 +30,7 @@
 #include <string>
 #include <vector>
 
-#include "tangible/lcp/problem.h"
+#include "tangible/lcp/dense/problem.h"
 
 namespace tangible {
 

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <string>
 
-#include "tangible/simulation/invariants.h"
+#include "tangible/simulation/stepping/invariants.h"
 #include "tangible/verification/extremes/groups.h"
 #include "tangible/verification/extremes/scene_kit.h"
 

@@ -11,7 +11,7 @@
 #include <string>
 
 #include "tangible/scene/parameter.h"
-#include "tangible/simulation/gradient.h"
+#include "tangible/simulation/gradient/gradient.h"
 #include "tangible/verification/extremes/groups.h"
 #include "tangible/verification/extremes/scene_kit.h"
 
@@ -91,6 +91,7 @@ Finding NotNumbers(const std::string& stepping) {
         continue;
       }
       GradientOptions options;
+      options.method = GradientMethod::kAdjoint;
       options.certificate = CertificatePass::kSkip;
       const GradientResult result = FinalStateJacobian(changed, {path}, options);
       if (!result.done) {
@@ -126,6 +127,7 @@ Finding ManyRollouts(const std::string& stepping, Length length) {
   std::string error;
   ResolveParameter(scene, "bodies/ball/mass", &path, &error);
   GradientOptions options;
+  options.method = GradientMethod::kAdjoint;
   options.certificate = CertificatePass::kSkip;
   double early = 0.0;
   long failed = 0, different = 0;

@@ -7,8 +7,8 @@
 
 #include "tangible/scene/parameter.h"
 #include "tangible/scene/scene_json.h"
-#include "tangible/simulation/gradient.h"
-#include "tangible/simulation/invariants.h"
+#include "tangible/simulation/gradient/gradient.h"
+#include "tangible/simulation/stepping/invariants.h"
 #include "tangible/verification/gradients/scene_check.h"
 #include "tangible/verification/support/compare.h"
 #include "tangible/verification/support/differences.h"

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "tangible/scene/scene.h"
-#include "tangible/simulation/rollout.h"
+#include "tangible/simulation/stepping/rollout.h"
 #include "tangible/verification/extremes/extreme_case.h"
 
 namespace tangible::extremes {

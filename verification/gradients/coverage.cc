@@ -4,7 +4,7 @@
 #include <utility>
 
 #include "tangible/scene/scene_names.h"
-#include "tangible/simulation/step.h"
+#include "tangible/simulation/stepping/step.h"
 
 namespace tangible {
 namespace {

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "tangible/simulation/gradient.h"
+#include "tangible/simulation/gradient/gradient.h"
 #include "tangible/verification/support/compare.h"
 #include "tangible/verification/support/differences.h"
 

@@ -8,7 +8,7 @@
 #include <map>
 #include <utility>
 
-#include "tangible/simulation/step.h"
+#include "tangible/simulation/stepping/step.h"
 
 namespace tangible {
 namespace {

@@ -8,7 +8,7 @@
 #include <sstream>
 #include <utility>
 
-#include "tangible/lcp/worker_pool.h"
+#include "tangible/lcp/contact/worker_pool.h"
 #include "tangible/scene/scene_json.h"
 #include "tangible/scene/scene_names.h"
 #include "tangible/verification/support/random_scene.h"

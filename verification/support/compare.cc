@@ -5,9 +5,9 @@
 #include <memory>
 #include <utility>
 
-#include "tangible/dynamics/parameter_map.h"
-#include "tangible/simulation/rollout_adjoint.h"
-#include "tangible/simulation/rollout_tangent.h"
+#include "tangible/dynamics/model/parameter_map.h"
+#include "tangible/simulation/derivatives/rollout_adjoint.h"
+#include "tangible/simulation/derivatives/rollout_tangent.h"
 
 namespace tangible {
 namespace {

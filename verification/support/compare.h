@@ -30,7 +30,7 @@
 #include <vector>
 
 #include "tangible/scene/parameter.h"
-#include "tangible/simulation/rollout.h"
+#include "tangible/simulation/stepping/rollout.h"
 
 namespace tangible {
 

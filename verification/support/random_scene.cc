@@ -6,8 +6,8 @@
 #include <numbers>
 #include <string>
 
+#include "tangible/dynamics/model/settings.h"
 #include "tangible/scene/scene_names.h"
-#include "tangible/simulation/settings.h"
 #include "tangible/verification/support/random_scene_maker.h"
 
 namespace tangible {

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <tuple>
 
-#include "tangible/simulation/certify.h"
+#include "tangible/simulation/certificate/certify.h"
 
 namespace tangible {
 namespace {

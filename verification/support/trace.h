@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "tangible/simulation/rollout.h"
+#include "tangible/simulation/stepping/rollout.h"
 
 namespace tangible {
 

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include "tangible/simulation/settings.h"
+#include "tangible/dynamics/model/settings.h"
 
 namespace tangible::tradeoff {
 namespace {

@@ -16,7 +16,7 @@
 #include <string>
 #include <vector>
 
-#include "tangible/simulation/gradient.h"
+#include "tangible/simulation/gradient/gradient.h"
 
 namespace tangible::tradeoff {
 

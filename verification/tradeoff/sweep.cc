@@ -5,9 +5,9 @@
 #include <cmath>
 #include <cstdio>
 
-#include "tangible/dynamics/model.h"
+#include "tangible/dynamics/model/model.h"
+#include "tangible/dynamics/model/settings.h"
 #include "tangible/scene/scene_names.h"
-#include "tangible/simulation/settings.h"
 
 namespace tangible::tradeoff {
 namespace {

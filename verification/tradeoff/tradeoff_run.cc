@@ -7,7 +7,7 @@
 #include <mutex>
 #include <utility>
 
-#include "tangible/lcp/worker_pool.h"
+#include "tangible/lcp/contact/worker_pool.h"
 
 namespace tangible::tradeoff {
 namespace {

@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "tangible/lcp/solver.h"
+#include "tangible/lcp/dense/solver.h"
 #include "tangible/verification/corpus/recomputed.h"
 
 namespace tangible::corpus {

@@ -5,7 +5,7 @@
 
 #include <limits>
 
-#include "tangible/lcp/problem.h"
+#include "tangible/lcp/dense/problem.h"
 #include "tangible/verification/corpus/contact_case.h"
 
 namespace tangible::corpus {

@@ -5,7 +5,7 @@
 
 #include <set>
 
-#include "tangible/simulation/rollout.h"
+#include "tangible/simulation/stepping/rollout.h"
 
 namespace tangible::cost {
 namespace {

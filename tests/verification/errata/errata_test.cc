@@ -5,8 +5,8 @@
 
 #include <cmath>
 
-#include "tangible/lcp/derivative.h"
-#include "tangible/lcp/solver.h"
+#include "tangible/lcp/dense/derivative.h"
+#include "tangible/lcp/dense/solver.h"
 
 namespace tangible {
 namespace {

@@ -7,9 +7,9 @@
 #include <set>
 
 #include "../../support/scenes.h"
+#include "tangible/dynamics/model/settings.h"
 #include "tangible/scene/scene_json.h"
-#include "tangible/simulation/settings.h"
-#include "tangible/simulation/step.h"
+#include "tangible/simulation/stepping/step.h"
 
 namespace tangible::tradeoff {
 namespace {

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/estimation/fit/discretisation.h"
+
+namespace tangible {
+
+DiscretisationCheck CheckDiscretisation(const FitProblem& problem, const FitResult& result,
+                                        FitLog* log) {
+  DiscretisationCheck check;
+  check.dt = problem.scene.simulation.dt;
+  FitProblem half = problem;
+  half.scene.simulation.dt = 0.5 * check.dt;
+  half.options.starts = 1;
+  half.options.segments = 1;
+  half.options.certificate = CertificatePass::kSkip;
+  for (size_t k = 0; k < half.parameters.size(); ++k) {
+    half.parameters[k].initial = result.estimate[static_cast<Eigen::Index>(k)];
+  }
+  ParameterizedScene scene;
+  ParameterError error;
+  if (!scene.Create(half.scene, half.points, half.parameters, &error)) {
+    check.message = error.what;
+    return check;
+  }
+  RolloutResiduals residuals(scene, half.observations);
+  const FitResult fine = Fit(half.options, &residuals, {}, log);
+  check.status = fine.status;
+  check.message = fine.message;
+  check.rollouts = fine.rollouts;
+  check.seconds = fine.seconds;
+  if (fine.status == FitStatus::kConverged) {
+    check.estimate_half_step = fine.estimate;
+    check.difference = result.estimate - fine.estimate;
+    check.bias = 2.0 * check.difference;
+    check.extrapolated = result.estimate - check.bias;
+  }
+  return check;
+}
+
+}  // namespace tangible

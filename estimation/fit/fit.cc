@@ -1,0 +1,307 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/estimation/fit/fit.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <limits>
+#include <random>
+
+#include "tangible/estimation/fit/fit_checkpoint.h"
+#include "tangible/estimation/fit/minimise.h"
+#include "tangible/estimation/fit/shooting.h"
+#include "tangible/simulation/certificate/certify.h"
+
+namespace tangible {
+namespace {
+
+// A parameter that moves no residual by more than this many sigma, changed by its own magnitude,
+// has no effect.
+constexpr double kNoEffect = 1e-12;
+
+// Differences carry an error of about 1e-9, the other methods one of about 1e-12.
+constexpr double kRankTolerance = 1e-9;
+constexpr double kRankToleranceOfDifferences = 1e-6;
+
+/// A start drawn within the bounds, evenly in the minimiser's coordinates; where there is no bound,
+/// within a factor of ten, or a typical magnitude, of the initial value.
+Eigen::VectorXd DrawStart(const std::vector<ParameterizedScene::Entry>& entries,
+                          std::mt19937* random) {
+  Eigen::VectorXd p(static_cast<Eigen::Index>(entries.size()));
+  for (size_t k = 0; k < entries.size(); ++k) {
+    const ParameterizedScene::Entry& entry = entries[k];
+    // mt19937 is the same everywhere; the library's distributions are not.
+    const double part = ((*random)() + 0.5) / 4294967296.0;
+    double low = entry.lower;
+    double high = entry.upper;
+    if (entry.logarithmic) {
+      low = std::log(low > 0.0 ? low : std::min(0.1 * entry.initial, high));
+      high = std::log(std::isfinite(high) ? high : std::max(10.0 * entry.initial, entry.lower));
+    } else {
+      low = std::isfinite(low) ? low : std::min(entry.initial - entry.scale, high);
+      high = std::isfinite(high) ? high : std::max(entry.initial + entry.scale, low);
+    }
+    const double drawn = low + part * (high - low);
+    p[static_cast<Eigen::Index>(k)] =
+        std::clamp(entry.logarithmic ? std::exp(drawn) : drawn, entry.lower, entry.upper);
+  }
+  return p;
+}
+
+bool HasEffect(const ParameterizedScene::Entry& entry, const Eigen::VectorXd& column) {
+  return column.cwiseAbs().maxCoeff() * entry.scale > kNoEffect;
+}
+
+/// The first parameter whose column of J is zero; −1 if none is.
+int FindNoEffect(const std::vector<ParameterizedScene::Entry>& entries,
+                 const RowMatrixXd& jacobian) {
+  for (size_t k = 0; k < entries.size(); ++k) {
+    if (!HasEffect(entries[k], jacobian.col(static_cast<Eigen::Index>(k)))) {
+      return static_cast<int>(k);
+    }
+  }
+  return -1;
+}
+
+FitStart Describe(const Eigen::VectorXd& initial, const Minimum& minimum) {
+  FitStart start;
+  start.initial.assign(initial.data(), initial.data() + initial.size());
+  start.status = NameOf(minimum.status);
+  start.iterations = std::max(0, static_cast<int>(minimum.iterations.size()) - 1);
+  start.cost = minimum.status == FitStatus::kFailed ? std::numeric_limits<double>::quiet_NaN()
+                                                    : minimum.cost;
+  return start;
+}
+
+/// Converged before not converged before failed, then the smaller cost.
+bool IsBetter(const Minimum& a, const Minimum& b) {
+  return a.status != b.status ? a.status < b.status : a.cost < b.cost;
+}
+
+// Where a derivative is 0 at a bound (restitution 0) or by symmetry, these moves into the interior
+// tell whether the parameter does anything, as fractions of the way to the other bound, or of its
+// scale.
+constexpr double kNudges[] = {0.1, 0.01};
+
+/// `p` with this parameter moved inwards.
+Eigen::VectorXd Nudged(const ParameterizedScene::Entry& entry, int parameter, double fraction,
+                       Eigen::VectorXd p) {
+  const double value = p[parameter];
+  const double up = std::isfinite(entry.upper) ? entry.upper - value : HUGE_VAL;
+  const double down = std::isfinite(entry.lower) ? value - entry.lower : HUGE_VAL;
+  const double room = std::max(up, down);
+  // A bounded mass may be 10 000 times another one: it is moved by a part of itself.
+  const double span = entry.logarithmic ? value : std::isfinite(room) ? room : entry.scale;
+  const double move = std::min(fraction * span, room);
+  p[parameter] += up >= down ? move : -move;
+  return p;
+}
+
+/// A point near the initial one at which each parameter moves a residual: the initial one itself
+/// unless a parameter does nothing there. False, with the result saying why, where there is none.
+/// `gradient_norm` is that at the initial point.
+bool FindStart(const FitOptions& options, RolloutResiduals* residuals, Eigen::VectorXd* start,
+               double* gradient_norm, FitResult* result) {
+  Eigen::VectorXd values;
+  RowMatrixXd jacobian;
+  if (!residuals->Evaluate(*start, options.derivatives, &values, &jacobian)) {
+    result->message = "the run at the initial values fails: " + residuals->message();
+    return options.starts > 1;
+  }
+  result->initial_cost = RobustCost(values, options.huber);
+  const ParameterizedScene& scene = residuals->scene();
+  const std::vector<ParameterizedScene::Entry>& entries = scene.entries();
+  jacobian *= scene.ParametersByInternal(scene.ToInternal(*start)).asDiagonal();
+  *gradient_norm = RobustGradient(values, jacobian, options.huber).norm();
+  for (size_t round = 0; round <= entries.size(); ++round) {
+    const int parameter = FindNoEffect(entries, jacobian);
+    if (parameter < 0) {
+      return true;
+    }
+    bool found = false;
+    for (size_t i = 0; i < std::size(kNudges) && !found && round < entries.size(); ++i) {
+      const Eigen::VectorXd nudged = Nudged(entries[parameter], parameter, kNudges[i], *start);
+      found = residuals->Evaluate(nudged, options.derivatives, &values, &jacobian) &&
+              HasEffect(entries[parameter], jacobian.col(parameter));
+      if (found) {
+        *start = nudged;
+      }
+    }
+    if (!found) {
+      result->parameter = parameter;
+      break;
+    }
+  }
+  result->status = FitStatus::kNoEffect;
+  result->message =
+      "parameter \"" + entries[result->parameter].name + "\" has no effect on any residual";
+  return false;
+}
+
+void Finish(const FitOptions& options, const RolloutResiduals& residuals, const Minimum& best,
+            FitResult* result) {
+  result->status = best.status;
+  result->message = best.message;
+  if (best.status == FitStatus::kFailed) {
+    return;
+  }
+  result->estimate = best.parameters;
+  result->iterations = best.iterations;
+  result->residuals = best.residuals;
+  if (!std::isfinite(result->initial_cost)) {
+    result->initial_cost = best.iterations.front().cost;
+  }
+  result->final_cost = best.cost;
+  UncertaintyOptions uncertainty;
+  uncertainty.huber = options.huber;
+  uncertainty.rank_tolerance = options.derivatives == DerivativeMethod::kFiniteDifference
+                                   ? kRankToleranceOfDifferences
+                                   : kRankTolerance;
+  result->uncertainty = EstimateUncertainty(residuals.scene().entries(), best.parameters,
+                                            best.residuals, best.jacobian, uncertainty);
+}
+
+/// One fit under way.
+struct FitRun {
+  const FitOptions& options;
+  const FitProgress& progress;
+  std::function<double()> elapsed;
+  RolloutResiduals* residuals;
+  FitLog* log;
+  long rollouts_before;
+
+  /// What the log has of the start under way has become a result of its own.
+  void EndPart() const {
+    log->start.Clear();
+    log->rollouts = residuals->rollouts() - rollouts_before;
+    if (log->on_end && log->mismatch() == 0) {
+      log->on_end();
+    }
+  }
+};
+
+/// The next start, from `start`; how it ended is kept in the log. The first one tells of the
+/// initial values too where it begins elsewhere.
+void RunStart(const Eigen::VectorXd& start, double gradient_norm, double initial_cost,
+              FitRun* run) {
+  FitLog* const log = run->log;
+  RolloutResiduals* const residuals = run->residuals;
+  const int i = static_cast<int>(log->starts.size());
+  const std::function<void(int, const FitIteration&)> report =
+      [run, i](int iteration, const FitIteration& values) {
+        if (run->progress) {
+          run->progress(i, iteration, values);
+        }
+      };
+  if (run->options.segments > 1 && !log->shot) {
+    const ShootingResult shot = Shoot(run->options, start, residuals);
+    log->shot = {shot.parameters, shot.iterations};
+    run->EndPart();
+  }
+  Minimum minimum = Minimise(run->options, log->shot ? log->shot->parameters : start, run->elapsed,
+                             report, residuals);
+  const Eigen::VectorXd initial = residuals->scene().Initial();
+  if (i == 0 && start != initial && !minimum.iterations.empty()) {
+    minimum.iterations.insert(
+        minimum.iterations.begin(),
+        {initial_cost, gradient_norm,
+         std::vector<double>(initial.data(), initial.data() + initial.size()), 0.0});
+  }
+  log->starts.push_back(Describe(i == 0 ? initial : start, minimum));
+  log->starts.back().shooting_iterations = log->shot ? log->shot->iterations : 0;
+  if (i == 0 || IsBetter(minimum, log->best)) {
+    log->best = std::move(minimum);
+  }
+  log->shot.reset();
+  run->EndPart();
+}
+
+/// All starts, with the log's evaluations if there is one.
+void RunStarts(FitRun* run, bool logged, FitResult* result) {
+  RolloutResiduals* const residuals = run->residuals;
+  FitLog* const log = run->log;
+  residuals->SetLog(logged ? &log->search : nullptr);
+  Eigen::VectorXd first = residuals->scene().Initial();
+  double gradient_norm = 0.0;
+  if (FindStart(run->options, residuals, &first, &gradient_norm, result)) {
+    residuals->SetLog(logged ? &log->start : nullptr);
+    if (!log->starts.empty() || log->shot) {
+      residuals->SetRollouts(run->rollouts_before + log->rollouts);
+    }
+    std::mt19937 random(run->options.seed);
+    for (int i = 0; i < run->options.starts; ++i) {
+      const Eigen::VectorXd start =
+          i == 0 ? first : DrawStart(residuals->scene().entries(), &random);
+      if (i >= static_cast<int>(log->starts.size())) {  // else finished before an interruption
+        RunStart(start, gradient_norm, result->initial_cost, run);
+      }
+    }
+    result->starts = log->starts;
+    Finish(run->options, *residuals, log->best, result);
+  }
+}
+
+// At the estimate, along the parameters that set numbers of the scene.
+void Certify(RolloutResiduals* residuals, FitResult* result) {
+  if (!residuals->SetParameters(result->estimate)) {
+    return;
+  }
+  const ParameterizedScene& scene = residuals->scene();
+  std::vector<std::string> names;
+  for (const ParameterizedScene::Entry& entry : scene.entries()) {
+    names.push_back(entry.name);
+  }
+  result->certificate =
+      CertifyDerivative(scene.model(), scene.initial_state(), scene.VariableDerivatives(), names);
+  if (result->certificate.verdict != "trustworthy") {
+    const std::string warning =
+        "the derivatives at the estimate, and with them the intervals, are not trustworthy: " +
+        result->certificate.verdict;
+    result->uncertainty.warnings.push_back(warning);
+    result->message += (result->message.empty() ? "" : "; ") + warning;
+  }
+}
+
+}  // namespace
+
+const char* NameOf(FitStatus status) {
+  switch (status) {
+    case FitStatus::kConverged:
+      return "converged";
+    case FitStatus::kNotConverged:
+      return "not_converged";
+    case FitStatus::kFailed:
+      return "failed";
+    case FitStatus::kNoEffect:
+      return "no_effect";
+  }
+  return "";
+}
+
+FitResult Fit(const FitOptions& options, RolloutResiduals* residuals, const FitProgress& progress,
+              FitLog* log) {
+  using Clock = std::chrono::steady_clock;
+  const Clock::time_point began = Clock::now();
+  FitLog own;
+  FitRun run{options,
+             progress,
+             [began] { return std::chrono::duration<double>(Clock::now() - began).count(); },
+             residuals,
+             log == nullptr ? &own : log,
+             residuals->rollouts()};
+  FitResult result;
+  try {
+    RunStarts(&run, log != nullptr, &result);
+  } catch (const EvaluationMismatch& mismatch) {
+    result.message = mismatch.what();
+  }
+  residuals->SetLog(nullptr);
+  result.rollouts = residuals->rollouts() - run.rollouts_before;
+  result.seconds = run.elapsed();
+  if (result.estimate.size() > 0 && options.certificate == CertificatePass::kRun) {
+    Certify(residuals, &result);
+  }
+  return result;
+}
+
+}  // namespace tangible

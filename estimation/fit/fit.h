@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// The fit: parameters that minimise the sum of squared residuals (residual.h) within their bounds,
+//
+//   cost(p) = 1/2 Σ ρ(r_i(p)²),     ρ(s) = s, or Huber's 2 b sqrt(s) − b² where |r| > b
+//
+// by Levenberg-Marquardt (Ceres: trust region, dense QR) on q(p) (parameterized_scene.h), with one
+// residual block a measured coordinate, so that ρ acts on each alone; all blocks share one run an
+// evaluation. At the end Gauss-Newton steps polish the estimate to where it no longer depends on
+// the start: the cost is flat there to rounding long before p is known to as many digits. With
+// Huber's loss plain squares lead to its neighbourhood and Newton's method to its minimum. A
+// parameter whose derivative is 0 at the initial values is nudged inwards first. An
+// evaluation that fails makes Ceres step back.
+
+#include <Eigen/Core>
+#include <cmath>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tangible/estimation/fit/uncertainty.h"
+#include "tangible/estimation/problem/residual.h"
+#include "tangible/simulation/gradient/gradient.h"
+
+namespace tangible {
+
+struct FitOptions {
+  DerivativeMethod derivatives = DerivativeMethod::kTangent;
+  double huber = 0.0;       ///< b, in multiples of sigma; 0: plain squares
+  int segments = 1;         ///< > 1: multiple shooting first (shooting.h)
+  int starts = 1;           ///< further starts are drawn within the bounds
+  unsigned seed = 0;        ///< of these draws
+  int max_iterations = 50;  ///< of each start
+  /// Whether the derivatives at the estimate get a certificate: one more rollout.
+  CertificatePass certificate = CertificatePass::kRun;
+};
+
+/// What the user asks for, in memory.
+struct FitProblem {
+  Scene scene;
+  std::vector<BodyPoint> points;
+  std::vector<FitParameter> parameters;
+  std::vector<Observation> observations;
+  FitOptions options;
+};
+
+struct FitIteration {
+  double cost = 0.0;
+  double gradient_norm = 0.0;      ///< ‖dcost/dq‖, dimensionless: relative changes of p
+  std::vector<double> parameters;  ///< p
+  double seconds = 0.0;            ///< since the fit began
+};
+
+/// The end of one start.
+struct FitStart {
+  std::vector<double> initial;
+  double cost = 0.0;  ///< NaN where it failed
+  int iterations = 0;
+  int shooting_iterations = 0;  ///< of multiple shooting, before
+  std::string status;
+};
+
+enum class FitStatus {
+  kConverged,
+  kNotConverged,  ///< max_iterations; estimates are those of the last iteration
+  kFailed,        ///< no run at the initial point; nothing is estimated
+  kNoEffect,      ///< a parameter changes no residual
+};
+
+/// "converged", "not_converged", "failed", "no_effect".
+const char* NameOf(FitStatus status);
+
+/// Where one start ended.
+struct Minimum {
+  FitStatus status = FitStatus::kFailed;
+  std::string message;
+  Eigen::VectorXd parameters;
+  double cost = 0.0;
+  Eigen::VectorXd residuals;
+  RowMatrixXd jacobian;  ///< dr/dp; 0 of a parameter held at its bound
+  std::vector<FitIteration> iterations;
+};
+
+struct FitResult {
+  FitStatus status = FitStatus::kFailed;
+  std::string message;  ///< why, one line; of a converged fit what Ceres said
+  int parameter = -1;   ///< the culprit of kNoEffect
+  Eigen::VectorXd estimate;
+  Uncertainty uncertainty;
+  double initial_cost = NAN;  ///< at the initial values
+  double final_cost = 0.0;
+  std::vector<FitIteration> iterations;  ///< of the best start; begins with the initial point
+  std::vector<FitStart> starts;
+  Eigen::VectorXd residuals;  ///< at the estimate, in multiples of sigma
+  long rollouts = 0;          ///< without the certificate's
+  double seconds = 0.0;       ///< without the certificate's
+  /// Of the derivatives at the estimate; where its verdict is not `trustworthy`, the message and a
+  /// warning of `uncertainty` say so: the intervals rest on these derivatives.
+  Certificate certificate;
+};
+
+/// Called after each iteration of each start.
+using FitProgress = std::function<void(int start, int iteration, const FitIteration&)>;
+
+struct FitLog;  // fit_checkpoint.h
+
+/// Runs the fit; `progress` may be empty. With a log it goes on from what that has, keeps there
+/// what it does, and ends at the same bits; where that turns out to be of another fit the result is
+/// worth nothing (FitLog::mismatch).
+FitResult Fit(const FitOptions& options, RolloutResiduals* residuals, const FitProgress& progress,
+              FitLog* log = nullptr);
+
+}  // namespace tangible

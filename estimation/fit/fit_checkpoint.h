@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// A checkpoint of a fit: what is needed to go on after an interruption and end at the same bits.
+//
+//   {"format": "tangible-fit checkpoint 1", "problem": hash, "content": hash of fits,
+//    "fits": [the fit, the fit at dt / 2]}
+//
+// Of each fit it keeps the starts that are finished (how they ended, and all of the best one), the
+// point at which multiple shooting arrived, and the evaluations (evaluation_log.h) of the start
+// under way: those of the search for the first point, then residuals and Jacobians, up to
+// EvaluationLog::kMaxNumbers. Numbers stand as their 64 bits in hexadecimal, zeros as a point. A
+// checkpoint whose content is damaged, or that belongs to another problem (scene, parameters,
+// observations, options), is refused.
+
+#include <Eigen/Core>
+#include <array>
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tangible/estimation/fit/fit.h"
+#include "tangible/estimation/problem/evaluation_log.h"
+
+namespace tangible {
+
+/// Where multiple shooting ended.
+struct ShootingEnd {
+  Eigen::VectorXd parameters;
+  int iterations = 0;
+};
+
+/// What is kept of one fit.
+struct FitLog {
+  EvaluationLog search;             ///< of a first point where every parameter does something
+  std::vector<FitStart> starts;     ///< finished
+  Minimum best;                     ///< of these
+  std::optional<ShootingEnd> shot;  ///< of the start under way
+  EvaluationLog start;              ///< of the start under way, since the end of multiple shooting
+  long rollouts = 0;                ///< when the last start, or multiple shooting, ended
+  std::function<void()> on_end;     ///< called at the end of a start and of multiple shooting
+
+  /// Not 0: the number of an evaluation that was not where the log has it.
+  long mismatch() const { return search.mismatch() > 0 ? search.mismatch() : start.mismatch(); }
+};
+
+/// Of everything that determines a fit's result.
+std::uint64_t Fingerprint(const FitProblem& problem);
+
+class FitCheckpoint {
+ public:
+  /// Puts the text of a checkpoint into its file; returns an error or empty.
+  using Writer = std::function<std::string(const std::string& text)>;
+
+  FitCheckpoint(const FitProblem& problem, Writer writer);
+  FitCheckpoint(const FitCheckpoint&) = delete;
+  FitCheckpoint& operator=(const FitCheckpoint&) = delete;
+
+  /// Takes over what a file holds. Returns one line "file: what, expected, got", or empty.
+  std::string Restore(const std::string& text, const std::string& file);
+
+  FitLog& fit() { return fits_[0]; }
+  FitLog& half_step() { return fits_[1]; }
+
+  std::string Text() const;
+
+  /// Writes the file now; returns an error or empty.
+  std::string Write();
+  /// What the first write that failed on the way said; empty: none did.
+  const std::string& error() const { return error_; }
+
+ private:
+  /// Unless a write failed before.
+  void WriteOnTheWay();
+  /// And unless writing would take more than a tenth of the time.
+  void WriteNowAndThen();
+
+  std::uint64_t problem_ = 0;
+  Writer writer_;
+  std::array<FitLog, 2> fits_;
+  std::string error_;
+  std::chrono::steady_clock::time_point written_{};
+  std::chrono::steady_clock::duration write_time_{};
+};
+
+}  // namespace tangible

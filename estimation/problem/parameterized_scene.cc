@@ -1,0 +1,373 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/estimation/problem/parameterized_scene.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <sstream>
+
+#include "tangible/scene/parameter.h"
+#include "tangible/simulation/stepping/step.h"
+
+namespace tangible {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+std::string Text(double x) {
+  std::ostringstream text;
+  text.precision(10);
+  text << x;
+  return text.str();
+}
+
+/// The values that a number of a kind may take.
+struct Range {
+  double low = -kInfinity;
+  double high = kInfinity;
+  bool low_excluded = false;
+  bool high_excluded = false;
+};
+
+Range RangeOf(NumberKind kind) {
+  switch (kind) {
+    case NumberKind::kFree:
+      return {};
+    case NumberKind::kPositive:
+      return {.low = 0.0, .low_excluded = true};
+    case NumberKind::kNonNegative:
+      return {.low = 0.0};
+    case NumberKind::kFraction:
+      return {.low = 0.0, .high = 1.0};
+  }
+  return {};
+}
+
+/// The values of p for which scale · p + offset is in the range.
+Range Preimage(const Range& range, double scale, double offset) {
+  Range p{(range.low - offset) / scale, (range.high - offset) / scale, range.low_excluded,
+          range.high_excluded};
+  if (scale < 0.0) {
+    std::swap(p.low, p.high);
+    std::swap(p.low_excluded, p.high_excluded);
+  }
+  return p;
+}
+
+void Intersect(const Range& other, Range* range) {
+  if (other.low > range->low || (other.low == range->low && other.low_excluded)) {
+    range->low = other.low;
+    range->low_excluded = other.low_excluded;
+  }
+  if (other.high < range->high || (other.high == range->high && other.high_excluded)) {
+    range->high = other.high;
+    range->high_excluded = other.high_excluded;
+  }
+}
+
+std::string Describe(const Range& range) {
+  return (range.low_excluded || range.low == -kInfinity ? "(" : "[") + Text(range.low) + ", " +
+         Text(range.high) + (range.high_excluded || range.high == kInfinity ? ")" : "]");
+}
+
+bool Contains(const Range& range, double x) {
+  return (range.low_excluded ? x > range.low : x >= range.low) &&
+         (range.high_excluded ? x < range.high : x <= range.high);
+}
+
+constexpr const char* kAtNames[2] = {"/at/x", "/at/y"};
+
+}  // namespace
+
+bool ParameterizedScene::Create(const Scene& scene, const std::vector<BodyPoint>& points,
+                                const std::vector<FitParameter>& parameters,
+                                ParameterError* error) {
+  scene_ = scene;
+  points_ = points;
+  num_scene_numbers_ = static_cast<int>(EnumerateNumbers(&scene_).size());
+  entries_.clear();
+  numbers_.clear();
+  for (const FitParameter& parameter : parameters) {
+    if (!AddParameter(parameter, error)) {
+      return false;
+    }
+  }
+  if (entries_.empty()) {
+    *error = {-1, -1, "", "expected at least one parameter, got none"};
+    return false;
+  }
+  CollectTargets();
+  directions_.assign(entries_.size(), {});
+  point_derivatives_ = RowMatrixXd::Zero(2 * static_cast<Eigen::Index>(points_.size()), size());
+  for (const NumberSet& set : numbers_) {
+    if (set.number < num_scene_numbers_) {
+      directions_[set.parameter].push_back({set.number, set.scale});
+    } else {
+      point_derivatives_(set.number - num_scene_numbers_, set.parameter) = set.scale;
+    }
+  }
+  structure_ = BuildStructure(scene_);
+  if (!Set(Initial())) {
+    *error = {-1, -1, "", "the initial values give a number that is not allowed"};
+    return false;
+  }
+  return true;
+}
+
+bool ParameterizedScene::AddParameter(const FitParameter& parameter, ParameterError* error) {
+  *error = {static_cast<int>(entries_.size()), -1, "", ""};
+  for (const Entry& entry : entries_) {
+    if (entry.name == parameter.name) {
+      error->key = "name";
+      error->what = "expected names that differ, got \"" + parameter.name + "\" twice";
+      return false;
+    }
+  }
+  if (parameter.sets.empty()) {
+    error->key = "sets";
+    error->what = "expected at least one path, got none";
+    return false;
+  }
+  Entry entry;
+  entry.name = parameter.name;
+  double value = 0.0;
+  for (size_t i = 0; i < parameter.sets.size(); ++i) {
+    error->set = static_cast<int>(i);
+    const ParameterSet& set = parameter.sets[i];
+    double set_value = 0.0;
+    double set_scale = 1.0;
+    if (!AddSet(set, &set_value, &set_scale, error)) {
+      return false;
+    }
+    if (i == 0) {
+      value = set.mode == SetMode::kAdd ? 0.0 : (set_value - set.offset) / set.scale;
+      entry.scale = set_scale / std::abs(set.scale);
+    }
+  }
+  error->set = -1;
+  entry.initial = parameter.initial.value_or(value);
+  if (!SetBounds(parameter, &entry, error)) {
+    return false;
+  }
+  entry.scale = std::max(std::abs(entry.initial), entry.scale);
+  entries_.push_back(entry);
+  return true;
+}
+
+bool ParameterizedScene::AddSet(const ParameterSet& set, double* value, double* scale,
+                                ParameterError* error) {
+  if (!std::isfinite(set.scale) || set.scale == 0.0) {
+    error->key = "scale";
+    error->what = "expected a number other than 0, got " + Text(set.scale);
+    return false;
+  }
+  error->key = "path";
+  if (set.path.rfind("points/", 0) != 0) {
+    ParameterPath path;
+    if (!ResolveParameter(scene_, set.path, &path, &error->what)) {
+      return false;
+    }
+    *value = path.value;
+    *scale = path.scale;
+    const auto numbers = EnumerateNumbers(&scene_);
+    for (const int number : path.numbers) {
+      if (!AddNumber(number, numbers[number].kind, numbers[number].path, set, error)) {
+        return false;
+      }
+    }
+    return true;
+  }
+  bool matched = false;
+  std::string names;
+  for (size_t i = 0; i < points_.size(); ++i) {
+    names += (i == 0 ? "" : ", ") + points_[i].name;
+    for (int axis = 0; axis < 2; ++axis) {
+      const std::string path = "points/" + points_[i].name + kAtNames[axis];
+      if (!MatchesPath(set.path, path)) {
+        continue;
+      }
+      *value = matched ? *value : points_[i].at[axis];
+      matched = true;
+      const int number = num_scene_numbers_ + 2 * static_cast<int>(i) + axis;
+      if (!AddNumber(number, NumberKind::kFree, path, set, error)) {
+        return false;
+      }
+    }
+  }
+  error->what =
+      "parameter " + set.path +
+      ": matches no number, expected points/<name>/at/x or points/<name>/at/y; points are: " +
+      (names.empty() ? "none" : names);
+  return matched;
+}
+
+bool ParameterizedScene::AddNumber(int number, NumberKind kind, const std::string& path,
+                                   const ParameterSet& set, ParameterError* error) {
+  for (const NumberSet& other : numbers_) {
+    if (other.number != number) {
+      continue;
+    }
+    const bool same = other.parameter == error->parameter;
+    if (!same && (set.mode == SetMode::kAdd || other.mode == SetMode::kAdd)) {
+      continue;
+    }
+    error->what = path + " is set twice, expected one parameter a number, also set by " +
+                  (same ? "this parameter" : "\"" + entries_[other.parameter].name + "\"");
+    return false;
+  }
+  numbers_.push_back({error->parameter, number, kind, set.scale, set.offset, set.mode});
+  return true;
+}
+
+bool ParameterizedScene::SetBounds(const FitParameter& parameter, Entry* entry,
+                                   ParameterError* error) const {
+  const auto fail = [error](const char* key, const std::string& what) {
+    error->key = key;
+    error->what = what;
+    return false;
+  };
+  Range allowed;
+  for (const NumberSet& set : numbers_) {
+    // What is added may have any sign; Set refuses a sum that is not allowed.
+    if (set.parameter == error->parameter && set.mode == SetMode::kAssign) {
+      Intersect(Preimage(RangeOf(set.kind), set.scale, set.offset), &allowed);
+    }
+  }
+  // An excluded bound at 0 is never reached by a logarithm; elsewhere the user must say how near is
+  // near enough.
+  const bool open_at_zero = allowed.low_excluded && allowed.low == 0.0;
+  entry->lower = parameter.lower.value_or(allowed.low);
+  entry->upper = parameter.upper.value_or(allowed.high);
+  if (parameter.lower ? !Contains(allowed, *parameter.lower)
+                      : allowed.low_excluded && !open_at_zero) {
+    return fail("lower", "expected a number in " + Describe(allowed) +
+                             ", where what it sets is allowed, got " +
+                             (parameter.lower ? Text(*parameter.lower) : "none"));
+  }
+  if (parameter.upper ? !Contains(allowed, *parameter.upper) : allowed.high_excluded) {
+    return fail("upper", "expected a number in " + Describe(allowed) +
+                             ", where what it sets is allowed, got " +
+                             (parameter.upper ? Text(*parameter.upper) : "none"));
+  }
+  if (!(entry->lower < entry->upper)) {
+    return fail("lower",
+                "expected lower < upper, got " + Text(entry->lower) + " and " + Text(entry->upper));
+  }
+  const Range bounds{entry->lower, entry->upper, !parameter.lower && open_at_zero, false};
+  if (!Contains(bounds, entry->initial)) {
+    return fail("initial", "expected a number within the bounds " + Describe(bounds) + ", got " +
+                               Text(entry->initial));
+  }
+  entry->logarithmic = entry->lower > 0.0 || bounds.low_excluded;
+  return true;
+}
+
+Eigen::VectorXd ParameterizedScene::Initial() const {
+  Eigen::VectorXd p(size());
+  for (int k = 0; k < size(); ++k) {
+    p[k] = entries_[k].initial;
+  }
+  return p;
+}
+
+void ParameterizedScene::CollectTargets() {
+  const auto numbers = EnumerateNumbers(&scene_);
+  targets_.clear();
+  for (size_t i = 0; i < numbers_.size(); ++i) {
+    const NumberSet& set = numbers_[i];
+    auto target = std::find_if(targets_.begin(), targets_.end(),
+                               [&](const Target& other) { return other.number == set.number; });
+    if (target == targets_.end()) {
+      const int point = set.number - num_scene_numbers_;
+      const double own = point < 0 ? *numbers[set.number].value : points_[point / 2].at[point % 2];
+      target = targets_.insert(target, {set.number, set.kind, own, {}});
+    }
+    target->sets.push_back(static_cast<int>(i));
+    if (set.mode == SetMode::kAssign) {
+      target->base = 0.0;
+    }
+  }
+}
+
+bool ParameterizedScene::Set(const Eigen::VectorXd& p) {
+  const auto numbers = EnumerateNumbers(&scene_);
+  for (const Target& target : targets_) {
+    double value = target.base;
+    for (const int i : target.sets) {
+      value += numbers_[i].scale * p[numbers_[i].parameter] + numbers_[i].offset;
+    }
+    if (!IsAllowed(target.kind, value)) {
+      return false;
+    }
+    if (target.number < num_scene_numbers_) {
+      *numbers[target.number].value = value;
+    } else {
+      const int i = target.number - num_scene_numbers_;
+      points_[i / 2].at[i % 2] = value;
+    }
+  }
+  BuildModelWithStructure(scene_, structure_, &model_, &state_);
+  return true;
+}
+
+void ParameterizedScene::Shorten(double duration) {
+  scene_.simulation.duration = duration;
+  std::vector<double>& times = scene_.simulation.step_times;
+  times.erase(std::upper_bound(times.begin(), times.end(), duration), times.end());
+  structure_ = BuildStructure(scene_);
+  BuildModelWithStructure(scene_, structure_, &model_, &state_);
+}
+
+void ParameterizedScene::SplitSteps(const std::vector<double>& times) {
+  AddStepTimes(times, &scene_.simulation);
+  structure_ = BuildStructure(scene_);
+  BuildModelWithStructure(scene_, structure_, &model_, &state_);
+}
+
+RowMatrixXd ParameterizedScene::VariableDerivatives() const {
+  return RowMatrixXd(VariableJacobian(scene_, structure_, directions_));
+}
+
+template <typename T>
+void ParameterizedScene::SeededModel(int first, Model<T>* model, State<T>* state) const {
+  BuildModelWithStructure(SeededScene<T>(scene_, directions_, first), structure_, model, state);
+}
+
+double ParameterizedScene::ToInternal(int k, double p) const {
+  const Entry& entry = entries_[k];
+  return entry.logarithmic ? std::log(p / entry.initial) : p / entry.scale;
+}
+
+Eigen::VectorXd ParameterizedScene::ToInternal(const Eigen::VectorXd& p) const {
+  Eigen::VectorXd q(size());
+  for (int k = 0; k < size(); ++k) {
+    q[k] = ToInternal(k, p[k]);
+  }
+  return q;
+}
+
+Eigen::VectorXd ParameterizedScene::ToParameters(const Eigen::VectorXd& q) const {
+  Eigen::VectorXd p(size());
+  for (int k = 0; k < size(); ++k) {
+    const double value =
+        entries_[k].logarithmic ? entries_[k].initial * std::exp(q[k]) : q[k] * entries_[k].scale;
+    // exp(ln(upper / p_0)) p_0 may pass the bound by a rounding.
+    p[k] = std::clamp(value, entries_[k].lower, entries_[k].upper);
+  }
+  return p;
+}
+
+Eigen::VectorXd ParameterizedScene::ParametersByInternal(const Eigen::VectorXd& q) const {
+  const Eigen::VectorXd p = ToParameters(q);
+  Eigen::VectorXd derivative(size());
+  for (int k = 0; k < size(); ++k) {
+    derivative[k] = entries_[k].logarithmic ? p[k] : entries_[k].scale;
+  }
+  return derivative;
+}
+
+#define TANGIBLE_INSTANTIATE_JET(N) \
+  template void ParameterizedScene::SeededModel<Jet<N>>(int, Model<Jet<N>>*, State<Jet<N>>*) const;
+TANGIBLE_FOR_EACH_JET_WIDTH(TANGIBLE_INSTANTIATE_JET)
+
+}  // namespace tangible

@@ -1,0 +1,146 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// The map from a vector of parameters to a scene.
+//
+//   number_i = scale_i p_k + offset_i        each parameter k sets one or several numbers i
+//
+// of the scene or of the observed points (`points/tip/at/x`); no number is set by two. Further
+// parameters may add to a number: it is then what the one sets, or else the scene's own value, plus
+// the sum of scale p + offset of those that add (a pivot moves all that hangs from it, a length
+// what hangs below). From the numbers the model and the initial state are rebuilt with an unchanged
+// structure. The derivative of that is taken where p stands: initial joint angles and inertias that
+// follow their mass make it nonlinear.
+//
+// Inside the minimiser a parameter that is positive by its bounds runs as q = ln(p / initial), any
+// other as q = p / s with a typical magnitude s. A mass that starts ten times off is then as far
+// from its value below as above, and steps of several parameters compare. The optimum and the
+// covariance, which is stated for p, do not depend on this choice.
+
+#include <Eigen/Core>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tangible/dynamics/model/parameter_map.h"
+#include "tangible/estimation/problem/observation.h"
+
+namespace tangible {
+
+enum class SetMode { kAssign, kAdd };
+
+/// Numbers that a parameter sets, or adds to, as scale · p + offset; `*` in the path matches within
+/// a name.
+struct ParameterSet {
+  std::string path;
+  double scale = 1.0;  ///< not 0
+  double offset = 0.0;
+  SetMode mode = SetMode::kAssign;
+};
+
+/// A named number to be estimated, as the user wrote it.
+struct FitParameter {
+  std::string name;
+  std::optional<double> initial;  ///< default: what the scene has for the first number set; 0 if
+                                  ///< the first is added to
+  std::optional<double> lower;    ///< default: the smallest value that its numbers may take
+  std::optional<double> upper;
+  std::vector<ParameterSet> sets;
+};
+
+/// What is wrong with a list of parameters, and where.
+struct ParameterError {
+  int parameter = -1;
+  int set = -1;     ///< −1: the parameter itself
+  std::string key;  ///< of the parameter or set; empty: the whole
+  std::string what;
+};
+
+class ParameterizedScene {
+ public:
+  /// What is known of a parameter once its paths are resolved.
+  struct Entry {
+    std::string name;
+    double initial = 0.0;
+    double lower = 0.0;  ///< −inf: not bounded
+    double upper = 0.0;
+    bool logarithmic = false;  ///< runs as ln(p / initial)
+    double scale = 1.0;        ///< typical magnitude, > 0
+  };
+
+  /// Resolves the parameters. False and `error` where a path matches nothing, a number is set
+  /// twice, a name is used twice, bounds are crossed or allow values that a number may not take, or
+  /// the initial value is outside them.
+  bool Create(const Scene& scene, const std::vector<BodyPoint>& points,
+              const std::vector<FitParameter>& parameters, ParameterError* error);
+
+  int size() const { return static_cast<int>(entries_.size()); }
+  const std::vector<Entry>& entries() const { return entries_; }
+  Eigen::VectorXd Initial() const;
+
+  /// Sets the parameters and rebuilds the model; false where a number would take a value that it
+  /// may not.
+  bool Set(const Eigen::VectorXd& p);
+
+  /// Ends the run at `duration`, s.
+  void Shorten(double duration);
+  /// Makes steps end at these times too.
+  void SplitSteps(const std::vector<double>& times);
+
+  const Scene& scene() const { return scene_; }
+  const std::vector<BodyPoint>& points() const { return points_; }
+  const Model<double>& model() const { return model_; }
+  const State<double>& initial_state() const { return state_; }
+
+  /// d [poses | twists | numbers] / d p where Set left off: num_variables x size().
+  RowMatrixXd VariableDerivatives() const;
+  /// d [at x, at y of each point] / d p: 2 points x size(), constant.
+  const RowMatrixXd& point_derivatives() const { return point_derivatives_; }
+
+  /// The model in Jets, derivative k of which is that of parameter first + k.
+  template <typename T>
+  void SeededModel(int first, Model<T>* model, State<T>* state) const;
+
+  /// q of p and back, and dp/dq; `ToParameters` stays within the bounds.
+  Eigen::VectorXd ToInternal(const Eigen::VectorXd& p) const;
+  double ToInternal(int k, double p) const;
+  Eigen::VectorXd ToParameters(const Eigen::VectorXd& q) const;
+  Eigen::VectorXd ParametersByInternal(const Eigen::VectorXd& q) const;
+
+ private:
+  struct NumberSet {
+    int parameter, number;  ///< number: into the scene's, then two a point
+    NumberKind kind;
+    double scale, offset;
+    SetMode mode;
+  };
+  /// A number that some parameter sets or adds to; base: what those that add to it start from,
+  /// unless a parameter sets it.
+  struct Target {
+    int number;
+    NumberKind kind;
+    double base;
+    std::vector<int> sets;  ///< indices into numbers_
+  };
+  bool AddParameter(const FitParameter& parameter, ParameterError* error);
+  bool AddSet(const ParameterSet& set, double* value, double* scale, ParameterError* error);
+  bool AddNumber(int number, NumberKind kind, const std::string& path, const ParameterSet& set,
+                 ParameterError* error);
+  bool SetBounds(const FitParameter& parameter, Entry* entry, ParameterError* error) const;
+  void CollectTargets();
+
+  Scene scene_;
+  std::vector<BodyPoint> points_;
+  std::vector<Entry> entries_;
+  std::vector<NumberSet> numbers_;
+  std::vector<Target> targets_;
+  std::vector<ParameterDirection> directions_;  ///< of the scene's numbers
+  RowMatrixXd point_derivatives_;
+  int num_scene_numbers_ = 0;
+  std::shared_ptr<const ModelStructure> structure_;
+  Model<double> model_;
+  State<double> state_;
+};
+
+}  // namespace tangible

@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// The residuals of a run against observations: one a measured coordinate, never one for a
+// trajectory,
+//
+//   r_i(p) = (predicted_i(p) − observed_i) / σ_i,        J = ∂r / ∂p   (observations x parameters)
+//
+// with J by any of five methods, which must agree (tests/estimation/problem/residual_test.cc):
+//
+//   tangent            forward mode with the step's own factorisation: one run, P columns
+//   adjoint            reverse mode: one recorded run, sweeps of 64 residuals back
+//   jet_implicit       Jets pushed through each step's factorisation, in passes
+//   jet                Jets through every operation of the interior point: slow
+//   finite_difference  central, step 6e-6 max(|p|, scale); one-sided of second order at a bound
+
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "tangible/estimation/problem/evaluation_log.h"
+#include "tangible/estimation/problem/parameterized_scene.h"
+#include "tangible/estimation/problem/sampling.h"
+#include "tangible/simulation/derivatives/rollout_adjoint.h"
+#include "tangible/simulation/stepping/rollout.h"
+
+namespace tangible {
+
+enum class DerivativeMethod { kTangent, kAdjoint, kJet, kJetImplicit, kFiniteDifference };
+
+/// "tangent", "adjoint", "jet", "jet_implicit", "finite_difference".
+const char* NameOf(DerivativeMethod method);
+
+/// Whether this build has the method: Jets need a width in TANGIBLE_JET_WIDTHS.
+bool IsAvailable(DerivativeMethod method);
+
+class RolloutResiduals {
+ public:
+  /// `scene` holds the run, which goes on until the last observation only.
+  RolloutResiduals(ParameterizedScene scene, std::vector<Observation> observations);
+
+  int num_residuals() const { return static_cast<int>(observations_.size()); }
+  int num_parameters() const { return scene_.size(); }
+  const ParameterizedScene& scene() const { return scene_; }
+  const std::vector<Observation>& observations() const { return observations_; }
+  const SamplePlan& plan() const { return plan_; }
+
+  /// The residuals at p and, unless `jacobian` is null, their derivatives by `method`. False where
+  /// the run fails or p sets a number to a value that it may not take; message() says which.
+  /// Deterministic: the same p gives the same bits.
+  bool Evaluate(const Eigen::VectorXd& p, DerivativeMethod method, Eigen::VectorXd* residuals,
+                RowMatrixXd* jacobian);
+  const std::string& message() const { return message_; }
+
+  /// Runs done so far, in double or Jets; a sweep back of the adjoint is none.
+  long rollouts() const { return rollouts_; }
+  /// For runs that others do with this scene.
+  void CountRollout() { ++rollouts_; }
+  /// For what a checkpoint spares.
+  void SetRollouts(long rollouts) { rollouts_ = rollouts; }
+
+  /// Evaluations, those of multiple shooting too, are looked up in this log and kept there; null:
+  /// they are not. The log outlives them.
+  void SetLog(EvaluationLog* log) { log_ = log; }
+  /// `function`, an evaluation at this point, by way of the log.
+  bool Logged(const Eigen::VectorXd& at, const EvaluationLog::Function& function,
+              Eigen::VectorXd* residuals, RowMatrixXd* jacobian);
+
+  /// Sets the parameters without a run; false where they set a number to a value that it may not
+  /// take.
+  bool SetParameters(const Eigen::VectorXd& p);
+
+  /// Residuals from the poses of the samples (3 a sample).
+  Eigen::VectorXd FromPoses(const std::vector<double>& poses) const;
+  /// Their derivatives from those of the poses: 3 a sample x any number of columns, the first P of
+  /// which belong to unknowns q with dp/dq = `p_by_q`.
+  RowMatrixXd FromPoseDerivatives(const std::vector<double>& poses,
+                                  const RowMatrixXd& pose_derivatives,
+                                  const Eigen::VectorXd& p_by_q) const;
+
+ private:
+  bool Compute(const Eigen::VectorXd& p, DerivativeMethod method, Eigen::VectorXd* residuals,
+               RowMatrixXd* jacobian);
+  bool Accept(const RolloutReport& report);
+  bool Plain();
+  bool Tangent(RowMatrixXd* jacobian);
+  bool Adjoint(RowMatrixXd* jacobian);
+  void AdjointBlock(int first, int count, const RowMatrixXd& variables, RowMatrixXd* jacobian);
+  bool FiniteDifferences(const Eigen::VectorXd& p, RowMatrixXd* jacobian);
+  bool Jets(JetRoute route, RowMatrixXd* jacobian);
+  template <typename T>
+  bool JetPass(int first, JetRoute route, RowMatrixXd* pose_derivatives);
+  bool ResidualsAt(const Eigen::VectorXd& p, Eigen::VectorXd* residuals);
+  Prediction PredictionOf(int i, const std::vector<double>& poses) const;
+  /// What a row of J owes to parameters that move the point in its body.
+  Eigen::RowVectorXd PointTerm(const Observation& observation, const Prediction& prediction) const;
+
+  ParameterizedScene scene_;
+  std::vector<Observation> observations_;
+  SamplePlan plan_;
+  std::vector<double> poses_;  ///< of the samples, 3 each
+  RolloutTape tape_;
+  std::string message_;
+  long rollouts_ = 0;
+  EvaluationLog* log_ = nullptr;
+};
+
+}  // namespace tangible

@@ -1,0 +1,295 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/estimation/results/fit_json.h"
+
+#include <algorithm>
+#include <limits>
+#include <utility>
+
+#include "tangible/dynamics/model/settings.h"
+#include "tangible/scene/json_reader.h"
+#include "tangible/scene/scene_json.h"
+#include "tangible/scene/scene_names.h"
+
+namespace tangible {
+namespace {
+
+constexpr int kMaxSegments = 1000;
+constexpr int kMaxStarts = 10000;
+
+constexpr std::pair<const char*, DerivativeMethod> kMethods[] = {
+    {"tangent", DerivativeMethod::kTangent},
+    {"adjoint", DerivativeMethod::kAdjoint},
+    {"jet", DerivativeMethod::kJet},
+    {"jet_implicit", DerivativeMethod::kJetImplicit},
+    {"finite_difference", DerivativeMethod::kFiniteDifference}};
+
+int FindBody(const Scene& scene, const std::string& name) {
+  for (size_t i = 0; i < scene.bodies.size(); ++i) {
+    if (scene.bodies[i].name == name) {
+      return static_cast<int>(i);
+    }
+  }
+  return -1;
+}
+
+std::string BodyNames(const Scene& scene) {
+  std::string names;
+  for (const auto& body : scene.bodies) {
+    names += (names.empty() ? "" : ", ") + body.name;
+  }
+  return names;
+}
+
+std::vector<BodyPoint> ReadPoints(const JsonReader& json, const Scene& scene) {
+  std::vector<BodyPoint> points;
+  if (!json.exists()) {
+    return points;
+  }
+  if (!json.IsObject()) {
+    json.FailExpected("an object of points by name");
+  }
+  for (const std::string& name : json.Keys()) {
+    const JsonReader entry = json.At(name);
+    entry.ExpectKeys({"body", "at"}, " of a point");
+    BodyPoint point;
+    point.name = name;
+    const std::string body = entry.At("body").String();
+    point.body = FindBody(scene, body);
+    if (point.body < 0) {
+      entry.At("body").FailExpected("the name of a body (" + BodyNames(scene) + ")");
+    }
+    // The name stands in a path and in a cell of the observations.
+    if (!IsName(name)) {
+      entry.Fail("expected a name of letters, digits and _.- , got " + name);
+    }
+    if (entry.Has("at")) {
+      point.at = entry.At("at").Point();
+    }
+    points.push_back(point);
+  }
+  return points;
+}
+
+ObservationSigma ReadSigma(const JsonReader& json) {
+  ObservationSigma sigma;
+  if (!json.IsObject()) {
+    sigma.x = sigma.y = sigma.angle = json.Number(NumberKind::kPositive);
+    return sigma;
+  }
+  json.ExpectKeys({"x", "y", "angle"}, " of sigma");
+  const auto read = [&json](const char* key, double* value) {
+    // A coordinate without a sigma must not be measured: NaN shows it.
+    *value = json.Has(key) ? json.At(key).Number(NumberKind::kPositive)
+                           : std::numeric_limits<double>::quiet_NaN();
+  };
+  read("x", &sigma.x);
+  read("y", &sigma.y);
+  read("angle", &sigma.angle);
+  return sigma;
+}
+
+ParameterSet ReadSet(const JsonReader& json) {
+  json.ExpectKeys({"path", "scale", "offset", "add"}, " of a set");
+  ParameterSet set;
+  set.path = json.At("path").String();
+  if (json.Has("scale")) {
+    set.scale = json.At("scale").Number();
+  }
+  if (json.Has("offset")) {
+    set.offset = json.At("offset").Number();
+  }
+  if (json.Has("add") && json.At("add").Boolean()) {
+    set.mode = SetMode::kAdd;
+  }
+  return set;
+}
+
+// It is printed as it is, on a line with others.
+std::string ReadName(const JsonReader& json) {
+  std::string name = json.String();
+  if (json.IsString() && (name.empty() || OneLine(name) != name)) {
+    json.FailExpected(name.empty() ? "a name" : "a name without control characters");
+  }
+  return name;
+}
+
+FitParameter ReadParameter(const JsonReader& json) {
+  FitParameter parameter;
+  if (json.IsString()) {
+    parameter.name = json.String();
+    parameter.sets.push_back({parameter.name});
+    return parameter;
+  }
+  json.ExpectKeys({"name", "initial", "lower", "upper", "sets", "path"}, " of a parameter");
+  const auto read = [&json](const char* key, std::optional<double>* value) {
+    if (json.Has(key)) {
+      *value = json.At(key).Number();
+    }
+  };
+  read("initial", &parameter.initial);
+  read("lower", &parameter.lower);
+  read("upper", &parameter.upper);
+  if (json.Has("path")) {
+    if (json.Has("sets")) {
+      json.At("sets").Fail("expected sets or path, got both");
+    }
+    parameter.sets.push_back({json.At("path").String()});
+    parameter.name = json.Has("name") ? ReadName(json.At("name")) : parameter.sets[0].path;
+    return parameter;
+  }
+  parameter.name = ReadName(json.At("name"));
+  const JsonReader sets = json.At("sets");
+  const int count = sets.ExpectArray("an array of {path, scale, offset}");
+  for (int i = 0; i < count; ++i) {
+    parameter.sets.push_back(ReadSet(sets.At(i)));
+  }
+  return parameter;
+}
+
+FitOptions ReadOptions(const JsonReader& root) {
+  FitOptions options;
+  if (root.Has("derivatives")) {
+    options.derivatives = root.At("derivatives").Choice(kMethods);
+    if (!IsAvailable(options.derivatives)) {
+      root.At("derivatives")
+          .Fail("this build has no Jets, expected tangent, adjoint or finite_difference");
+    }
+  }
+  if (root.Has("loss")) {
+    root.At("loss").ExpectKeys({"huber"}, " of loss");
+    options.huber = root.At("loss").At("huber").Number(NumberKind::kPositive);
+  }
+  if (root.Has("segments")) {
+    options.segments = root.At("segments").Integer(1, kMaxSegments);
+  }
+  if (root.Has("starts")) {
+    options.starts = root.At("starts").Integer(1, kMaxStarts);
+  }
+  if (root.Has("seed")) {
+    options.seed =
+        static_cast<unsigned>(root.At("seed").Integer(0, std::numeric_limits<int>::max()));
+  }
+  return options;
+}
+
+/// Where a parameter's fault stands.
+std::string PointerOf(const ParameterError& error) {
+  std::string pointer = "/parameters";
+  if (error.parameter >= 0) {
+    pointer += "/" + std::to_string(error.parameter);
+  }
+  if (error.set >= 0) {
+    pointer += "/sets/" + std::to_string(error.set);
+  }
+  return error.key.empty() ? pointer : pointer + "/" + error.key;
+}
+
+/// Reads one fit file after another part: the scene is needed to check the rest.
+class FitReader {
+ public:
+  FitReader(const JsonReader& root, std::string folder, FitFile* fit, std::string* error)
+      : root_(root), folder_(std::move(folder)), problem_(&fit->problem), error_(error) {}
+
+  /// False with the error of the scene or an observation file; errors of the fit file itself are
+  /// the reader's.
+  bool Read() {
+    root_.ExpectKeys({"scene", "observations", "points", "parameters", "derivatives", "loss",
+                      "segments", "starts", "seed"});
+    const std::string scene_file = JoinPath(folder_, root_.At("scene").String());
+    if (!root_.ok()) {
+      return true;
+    }
+    if (!LoadScene(scene_file, &problem_->scene, error_)) {
+      return false;
+    }
+    if (!CheckSettings(problem_->scene.simulation, error_)) {
+      *error_ = scene_file + ": " + *error_;
+      return false;
+    }
+    problem_->points = ReadPoints(root_.At("points"), problem_->scene);
+    const JsonReader parameters = root_.At("parameters");
+    const int count = parameters.ExpectArray("an array of parameters");
+    for (int i = 0; i < count; ++i) {
+      problem_->parameters.push_back(ReadParameter(parameters.At(i)));
+    }
+    problem_->options = ReadOptions(root_);
+    return ReadObservationFiles();
+  }
+
+ private:
+  bool ReadObservationFiles() {
+    const JsonReader list = root_.At("observations");
+    const int count = list.ExpectArray("an array of {file, sigma}");
+    if (count == 0) {
+      list.Fail("expected at least one {file, sigma}, got none");
+    }
+    for (int i = 0; i < count && root_.ok(); ++i) {
+      const JsonReader entry = list.At(i);
+      entry.ExpectKeys({"file", "sigma"}, " of observations");
+      const std::string file = entry.At("file").String();
+      const ObservationSigma sigma = ReadSigma(entry.At("sigma"));
+      if (!root_.ok()) {
+        return true;
+      }
+      const size_t before = problem_->observations.size();
+      if (!ReadObservations(JoinPath(folder_, file), problem_->scene, problem_->points, sigma,
+                            &problem_->observations, error_)) {
+        return false;
+      }
+      for (size_t k = before; k < problem_->observations.size(); ++k) {
+        const Observation& observation = problem_->observations[k];
+        if (!(observation.sigma > 0.0)) {
+          entry.At("sigma").Fail(std::string("expected a sigma of ") +
+                                 NameOf(observation.coordinate) + ", which " + file + " has");
+          return true;
+        }
+      }
+    }
+    return true;
+  }
+
+  JsonReader root_;
+  std::string folder_;
+  FitProblem* problem_;
+  std::string* error_;
+};
+
+bool FromJson(const Json& json, const std::string& file, FitFile* fit, std::string* error) {
+  *fit = FitFile();
+  fit->path = file;
+  JsonErrors errors(file);
+  FitReader reader(JsonReader(json, &errors), FolderOf(file), fit, error);
+  const bool read = reader.Read();
+  if (!errors.ok()) {
+    *error = errors.message();
+    return false;
+  }
+  std::vector<RolloutResiduals> residuals;
+  return read && MakeResiduals(fit->problem, file, &residuals, error);
+}
+
+}  // namespace
+
+bool LoadFit(const std::string& file, FitFile* fit, std::string* error) {
+  Json json;
+  return ParseJsonFile(file, &json, error) && FromJson(json, file, fit, error);
+}
+
+bool ParseFit(const std::string& text, const std::string& file, FitFile* fit, std::string* error) {
+  Json json;
+  return ParseJson(text, file, &json, error) && FromJson(json, file, fit, error);
+}
+
+bool MakeResiduals(const FitProblem& problem, const std::string& file,
+                   std::vector<RolloutResiduals>* residuals, std::string* error) {
+  ParameterizedScene scene;
+  ParameterError fault;
+  if (!scene.Create(problem.scene, problem.points, problem.parameters, &fault)) {
+    *error = OneLine(file + ": " + PointerOf(fault) + ": " + fault.what);
+    return false;
+  }
+  residuals->emplace_back(std::move(scene), problem.observations);
+  return true;
+}
+
+}  // namespace tangible

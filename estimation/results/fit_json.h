@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// Fit files, and the result of a fit as JSON (README.md of this folder has every key).
+//
+// Every mistake in a file is one line "file: /json/pointer: what, expected, got", the first one
+// found.
+
+#include <string>
+#include <vector>
+
+#include "tangible/estimation/fit/discretisation.h"
+#include "tangible/estimation/fit/fit.h"
+#include "tangible/scene/json_writer.h"
+
+namespace tangible {
+
+/// A fit file, read and checked.
+struct FitFile {
+  std::string path;
+  FitProblem problem;
+};
+
+/// Reads a fit file, its scene and its observations; their paths are relative to the fit file's
+/// folder.
+bool LoadFit(const std::string& file, FitFile* fit, std::string* error);
+
+/// The same from text.
+bool ParseFit(const std::string& text, const std::string& file, FitFile* fit, std::string* error);
+
+/// The residuals of a problem. On failure sets one line with the JSON pointer of what is wrong with
+/// a parameter.
+bool MakeResiduals(const FitProblem& problem, const std::string& file,
+                   std::vector<RolloutResiduals>* residuals, std::string* error);
+
+/// The result as the program writes it; `check` may be null.
+OrderedJson ResultToJson(const RolloutResiduals& residuals, const FitResult& result,
+                         const DiscretisationCheck* check);
+
+}  // namespace tangible

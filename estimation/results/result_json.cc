@@ -1,0 +1,136 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The result of a fit as JSON.
+#include <cmath>
+#include <map>
+
+#include "tangible/estimation/results/fit_json.h"
+
+namespace tangible {
+namespace {
+
+OrderedJson Number(double x) { return std::isfinite(x) ? OrderedJson(x) : OrderedJson(nullptr); }
+
+OrderedJson Numbers(const Eigen::VectorXd& values) {
+  OrderedJson array = OrderedJson::array();
+  for (const double x : values) {
+    array.push_back(Number(x));
+  }
+  return array;
+}
+
+OrderedJson ParametersToJson(const RolloutResiduals& residuals, const FitResult& result) {
+  OrderedJson parameters = OrderedJson::array();
+  const auto& entries = residuals.scene().entries();
+  for (Eigen::Index k = 0; k < result.estimate.size(); ++k) {
+    const auto& interval = result.uncertainty.confidence_95[k];
+    OrderedJson parameter = {
+        {"name", entries[k].name},
+        {"estimate", Number(result.estimate[k])},
+        {"standard_deviation", Number(result.uncertainty.standard_deviation[k])},
+        {"confidence_95", nullptr}};
+    if (interval) {
+      parameter["confidence_95"] = {Number(interval->first), Number(interval->second)};
+    }
+    if (!result.uncertainty.messages[k].empty()) {
+      parameter["message"] = result.uncertainty.messages[k];
+    }
+    parameters.push_back(parameter);
+  }
+  return parameters;
+}
+
+OrderedJson CovarianceToJson(const RowMatrixXd& covariance) {
+  OrderedJson rows = OrderedJson::array();
+  for (Eigen::Index i = 0; i < covariance.rows(); ++i) {
+    rows.push_back(Numbers(covariance.row(i)));
+  }
+  return rows;
+}
+
+OrderedJson IterationsToJson(const FitResult& result) {
+  OrderedJson iterations = OrderedJson::array();
+  for (const FitIteration& iteration : result.iterations) {
+    iterations.push_back({{"cost", Number(iteration.cost)},
+                          {"gradient_norm", Number(iteration.gradient_norm)},
+                          {"parameters", iteration.parameters},
+                          {"seconds", iteration.seconds}});
+  }
+  return iterations;
+}
+
+OrderedJson StartsToJson(const FitResult& result) {
+  OrderedJson starts = OrderedJson::array();
+  for (const FitStart& start : result.starts) {
+    starts.push_back({{"initial", start.initial},
+                      {"status", start.status},
+                      {"cost", Number(start.cost)},
+                      {"iterations", start.iterations},
+                      {"shooting_iterations", start.shooting_iterations}});
+  }
+  return starts;
+}
+
+/// Root mean squares in m and rad.
+OrderedJson RmsByCoordinate(const RolloutResiduals& residuals, const FitResult& result) {
+  std::map<std::string, std::pair<double, int>> sums;
+  for (Eigen::Index i = 0; i < result.residuals.size(); ++i) {
+    const Observation& observation = residuals.observations()[i];
+    const double difference = result.residuals[i] * observation.sigma;
+    auto& [sum, count] = sums[NameOf(observation.coordinate)];
+    sum += difference * difference;
+    ++count;
+  }
+  OrderedJson json = OrderedJson::object();
+  for (const auto& [name, sum] : sums) {
+    json[name] = std::sqrt(sum.first / sum.second);
+  }
+  return json;
+}
+
+OrderedJson CheckToJson(const RolloutResiduals& residuals, const DiscretisationCheck& check) {
+  OrderedJson parameters = OrderedJson::array();
+  for (Eigen::Index k = 0; k < check.bias.size(); ++k) {
+    parameters.push_back({{"name", residuals.scene().entries()[k].name},
+                          {"estimate_half_step", Number(check.estimate_half_step[k])},
+                          {"difference", Number(check.difference[k])},
+                          {"bias", Number(check.bias[k])},
+                          {"extrapolated", Number(check.extrapolated[k])}});
+  }
+  return {{"dt", check.dt},
+          {"status", NameOf(check.status)},
+          {"parameters", parameters},
+          {"rollouts", check.rollouts},
+          {"seconds", check.seconds}};
+}
+
+}  // namespace
+
+OrderedJson ResultToJson(const RolloutResiduals& residuals, const FitResult& result,
+                         const DiscretisationCheck* check) {
+  const Uncertainty& uncertainty = result.uncertainty;
+  const bool estimated = result.estimate.size() > 0;
+  const auto when = [estimated](double x) { return estimated ? Number(x) : OrderedJson(nullptr); };
+  OrderedJson json = {{"status", NameOf(result.status)},
+                      {"parameters", ParametersToJson(residuals, result)},
+                      {"covariance", CovarianceToJson(uncertainty.covariance)},
+                      {"initial_cost", when(result.initial_cost)},
+                      {"final_cost", when(result.final_cost)},
+                      {"residual_rms", when(uncertainty.residual_rms)},
+                      {"residual_rms_by_coordinate", RmsByCoordinate(residuals, result)},
+                      {"reduced_chi_square", when(uncertainty.reduced_chi_square)},
+                      {"residuals", residuals.num_residuals()},
+                      {"condition", when(uncertainty.condition)},
+                      {"iterations", IterationsToJson(result)},
+                      {"starts", StartsToJson(result)},
+                      {"rollouts", result.rollouts},
+                      {"seconds", result.seconds},
+                      {"warnings", uncertainty.warnings},
+                      {"message", result.message}};
+  if (check != nullptr) {
+    json["discretisation"] = CheckToJson(residuals, *check);
+  }
+  return json;
+}
+
+}  // namespace tangible

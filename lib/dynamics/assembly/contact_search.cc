@@ -1,0 +1,237 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/dynamics/assembly/contact_search.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "tangible/geometry/mass_properties.h"
+
+namespace tangible {
+namespace {
+
+double SpeedOf(const double* twist, double radius) {
+  return std::sqrt(twist[0] * twist[0] + twist[1] * twist[1]) + std::abs(twist[2]) * radius;
+}
+
+// Rate of a joint's coordinate, rad/s or m/s.
+double CoordinateRate(const JointIndex& joint, const JointRows<double>& rows, const double* twist) {
+  double rate = 0.0;
+  for (int i = 0; i < 3; ++i) {
+    rate += rows.coordinate_a[i] * twist[3 * joint.a + i] +
+            rows.coordinate_b[i] * twist[3 * joint.b + i];
+  }
+  return std::abs(rate);
+}
+
+// Whether the gap constant is held back by the recovery speed.
+ContactLaw GapLaw(double gap, double h, const SimulationSettings& settings) {
+  return gap / h < -settings.recovery_speed ? ContactLaw::kRecovery : ContactLaw::kGap;
+}
+
+}  // namespace
+
+ContactSearch::ContactSearch(const Model<double>& model) {
+  const ModelStructure& structure = *model.structure;
+  const size_t n = structure.bodies.size();
+  for (int body = 0; body < structure.num_bodies(); ++body) {
+    const ShapeType type = structure.bodies[body].shape;
+    const bool bounded = type != ShapeType::kNone && type != ShapeType::kHalfPlane;
+    radius_.push_back(bounded ? BoundingRadius(model.Shape(body)) : 0.0);
+  }
+  bound_.assign(n, 0.0);
+  limit_bound_.assign(structure.joints.size(), 0.0);
+  boxes_.resize(n);
+  free_twist_.assign(3 * n, 0.0);
+  pairs_.reserve(8 * n);
+}
+
+void ContactSearch::SetBounds(const Model<double>& model, const State<double>& state,
+                              const ContactProblem<double>& problem,
+                              const AssemblyScratch<double>& scratch) {
+  const ModelStructure& structure = *model.structure;
+  for (int body = 0; body < structure.num_bodies(); ++body) {
+    const int block = structure.bodies[body].block;
+    const double* twist = &state.twist[3 * body];
+    double* free = &free_twist_[3 * body];
+    for (int i = 0; i < 3; ++i) {
+      free[i] =
+          block < 0 ? twist[i] : problem.momentum[3 * block + i] / problem.mass[3 * block + i];
+    }
+    bound_[body] = std::max(SpeedOf(twist, radius_[body]), SpeedOf(free, radius_[body]));
+  }
+  for (size_t j = 0; j < structure.joints.size(); ++j) {
+    const JointIndex& joint = structure.joints[j];
+    if (joint.low >= 0) {
+      limit_bound_[j] = std::max(CoordinateRate(joint, scratch.joints[j], state.twist.data()),
+                                 CoordinateRate(joint, scratch.joints[j], free_twist_.data()));
+    }
+  }
+}
+
+bool ContactSearch::CheckBounds(const Model<double>& model, const std::vector<double>& twist,
+                                const AssemblyScratch<double>& scratch) {
+  bool exceeded = false;
+  for (size_t j = 0; j < model.structure->joints.size(); ++j) {
+    const JointIndex& joint = model.structure->joints[j];
+    if (joint.low < 0) {
+      continue;
+    }
+    const double rate = CoordinateRate(joint, scratch.joints[j], twist.data());
+    if (rate > limit_bound_[j] * (1.0 + 1e-12)) {
+      exceeded = true;
+      limit_bound_[j] = 1.5 * rate;
+    }
+  }
+  for (const int body : model.structure->moving) {
+    const double speed = SpeedOf(&twist[3 * body], radius_[body]);
+    if (speed > bound_[body] * (1.0 + 1e-12) &&
+        model.structure->bodies[body].shape != ShapeType::kNone) {
+      exceeded = true;
+      bound_[body] = 1.5 * speed;  // with room, so that few searches are repeated
+    }
+  }
+  return exceeded;
+}
+
+void ContactSearch::FindLimits(const Model<double>& model, double h,
+                               const AssemblyScratch<double>& scratch,
+                               std::vector<ActiveContact>* contacts) {
+  const ModelStructure& structure = *model.structure;
+  for (size_t j = 0; j < structure.joints.size(); ++j) {
+    const JointIndex& joint = structure.joints[j];
+    if (joint.low < 0) {
+      continue;
+    }
+    for (const double side : {1.0, -1.0}) {
+      ActiveContact limit;
+      limit.a = joint.a;
+      limit.b = joint.b;
+      limit.joint = static_cast<int>(j);
+      limit.side = side;
+      ContactRows<double> rows;
+      EvaluateLimitRows(model, scratch.joints[j], limit, &rows);
+      limit.gap = rows.geometry.gap;
+      if (limit.gap > structure.settings.contact_margin + h * limit_bound_[j]) {
+        continue;
+      }
+      limit.law = GapLaw(rows.geometry.gap, h, structure.settings);
+      contacts->push_back(limit);
+    }
+  }
+}
+
+// The contacts of bodies that pass by each other, as a box over flush tiles, in the place of one
+// that a corner ahead would have.
+ContactsAhead ContactSearch::FindPassed(const Model<double>& model, const State<double>& state,
+                                        const ActiveContact& contact, double approach) const {
+  constexpr double kNone = 1e-9;  // of the bodies' speeds, and of the smaller one's size
+  const double slow = kNone * (bound_[contact.a] + bound_[contact.b]);
+  const double size = std::min(radius_[contact.a], radius_[contact.b]);
+  if (!(approach < -slow) || size == 0.0) {
+    return ContactsAhead();
+  }
+  double place = 0.0;  // m, whose rounding counts far from the origin
+  for (const int body : {contact.a, contact.b}) {
+    place = std::max({place, std::abs(state.pose[3 * body]), std::abs(state.pose[3 * body + 1])});
+  }
+  const double none = kNone * size + 64.0 * std::numeric_limits<double>::epsilon() * place;
+  if (contact.gap < -none) {
+    return ContactsAhead();
+  }
+  const ContactsAhead ahead = FindContactsAhead(model, state, contact, approach, size, none, slow);
+  for (int k = 0; k < ahead.count; ++k) {
+    if (ahead.speed[k] < -slow) {
+      return ContactsAhead();
+    }
+  }
+  return ahead;
+}
+
+void ContactSearch::Find(const Model<double>& model, const State<double>& state, double h,
+                         const AssemblyScratch<double>& scratch,
+                         std::vector<ActiveContact>* contacts,
+                         std::vector<CoefficientSource>* friction,
+                         std::vector<CoefficientSource>* restitution) {
+  const ModelStructure& structure = *model.structure;
+  const SimulationSettings& settings = structure.settings;
+  contacts->clear();
+  friction->clear();
+  restitution->clear();
+  for (int body = 0; body < structure.num_bodies(); ++body) {
+    const double reach = 0.5 * settings.contact_margin + h * bound_[body];
+    boxes_[body] = ComputeAabb(model.Shape(body), scratch.poses[body], reach);
+    if (structure.bodies[body].shape == ShapeType::kHalfPlane && state.twist[3 * body + 2] != 0.0) {
+      // A turning half-plane may reach any place.
+      const double infinity = std::numeric_limits<double>::infinity();
+      boxes_[body] = {-infinity, -infinity, infinity, infinity};
+    }
+  }
+  broad_phase_.FindPairs(
+      boxes_, [&](int i, int j) { return structure.MayCollide(i, j); }, &pairs_);
+  beyond_reach_ = 0;
+  for (const auto& [a, b] : pairs_) {
+    double reach = settings.contact_margin + h * (bound_[a] + bound_[b]);
+    for (const int body : {a, b}) {
+      if (structure.bodies[body].shape == ShapeType::kHalfPlane) {
+        const double distance = std::hypot(state.pose[3 * a] - state.pose[3 * b],
+                                           state.pose[3 * a + 1] - state.pose[3 * b + 1]);
+        const int other = body == a ? b : a;
+        reach += h * std::abs(state.twist[3 * body + 2]) * (distance + radius_[other]);
+      }
+    }
+    ContactFeature features[2];
+    int count = FindContactFeatures(model.Shape(a), scratch.poses[a], model.Shape(b),
+                                    scratch.poses[b], reach, features);
+    if (count == 0) {
+      ++beyond_reach_;
+      continue;
+    }
+    const CoefficientSource pair_friction = MixedFriction(model, a, b);
+    const CoefficientSource pair_restitution = MixedRestitution(model, a, b);
+    bool passes_by = false;
+    for (int k = 0; k < count; ++k) {
+      ActiveContact contact;
+      contact.a = a;
+      contact.b = b;
+      contact.feature = features[k];
+      ContactRows<double> rows;
+      EvaluateContactRows(model, scratch.poses, contact, &rows);
+      const double gap = rows.geometry.gap;
+      contact.gap = gap;
+      contact.law = GapLaw(gap, h, settings);
+      const double approach = RelativeSpeed(state, a, rows.normal_a, b, rows.normal_b);
+      if (!passes_by && gap + h * approach < settings.contact_margin) {
+        const ContactsAhead ahead = FindPassed(model, state, contact, approach);
+        if (ahead.count > 0) {
+          passes_by = true;
+          count = ahead.count;
+          features[0] = ahead.contacts[0].feature;
+          features[1] = ahead.contacts[1].feature;
+          k = -1;
+          continue;
+        }
+      }
+      double free_approach = 0.0;
+      for (int i = 0; i < 3; ++i) {
+        free_approach +=
+            rows.normal_a[i] * free_twist_[3 * a + i] + rows.normal_b[i] * free_twist_[3 * b + i];
+      }
+      const double e = pair_restitution.value;
+      // In penetration the constant that drives apart faster holds.
+      if (e > 0.0 && approach < -settings.restitution_threshold &&
+          gap + h * free_approach < settings.contact_margin &&
+          (gap >= 0.0 || e * approach < std::max(gap / h, -settings.recovery_speed))) {
+        contact.law = ContactLaw::kRestitution;
+      }
+      contacts->push_back(contact);
+      friction->push_back(pair_friction);
+      restitution->push_back(pair_restitution);
+    }
+  }
+  FindLimits(model, h, scratch, contacts);
+  friction->resize(contacts->size());
+  restitution->resize(contacts->size());
+}
+
+}  // namespace tangible

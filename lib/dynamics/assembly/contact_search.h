@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// Which contacts and joint limits a step has rows for.
+//
+// Every pair whose gap is below margin + h (speed bound of a + speed bound of b) is listed, whether
+// or not the free motion reaches it: another impact may drive it there. Which open contacts are
+// listed does not change the result. A bound is the larger of the speeds before and after the step
+// without contacts; after the solve CheckBounds tells whether a body turned out faster, and the
+// search is repeated.
+
+#include <vector>
+
+#include "tangible/dynamics/assembly/assembly.h"
+#include "tangible/dynamics/elements/contacts_ahead.h"
+#include "tangible/geometry/broad_phase.h"
+
+namespace tangible {
+
+class ContactSearch {
+ public:
+  explicit ContactSearch(const Model<double>& model);
+
+  /// Starts a step: bounds from the state and the free twists p / M of the assembled problem.
+  void SetBounds(const Model<double>& model, const State<double>& state,
+                 const ContactProblem<double>& problem, const AssemblyScratch<double>& scratch);
+  /// Raises the bounds to the solved twists; true if any body is faster than its bound.
+  bool CheckBounds(const Model<double>& model, const std::vector<double>& twist,
+                   const AssemblyScratch<double>& scratch);
+  /// The contacts, in ascending order of bodies, then the limits; with their laws and coefficients.
+  void Find(const Model<double>& model, const State<double>& state, double h,
+            const AssemblyScratch<double>& scratch, std::vector<ActiveContact>* contacts,
+            std::vector<CoefficientSource>* friction, std::vector<CoefficientSource>* restitution);
+  /// Of the last search: how many pairs of boxes the broad phase compared, how many pairs it let
+  /// pass, and how many of these have no row as they are beyond reach.
+  int num_compared() const { return broad_phase_.num_compared(); }
+  int num_pairs() const { return static_cast<int>(pairs_.size()); }
+  int num_beyond_reach() const { return beyond_reach_; }
+
+ private:
+  ContactsAhead FindPassed(const Model<double>& model, const State<double>& state,
+                           const ActiveContact& contact, double approach) const;
+  void FindLimits(const Model<double>& model, double h, const AssemblyScratch<double>& scratch,
+                  std::vector<ActiveContact>* contacts);
+
+  std::vector<double> radius_;       ///< bounding radius a body, 0 for half-planes and no shape
+  std::vector<double> bound_;        ///< m/s a body
+  std::vector<double> limit_bound_;  ///< a joint: bound on its coordinate's rate, rad/s or m/s
+  std::vector<Aabb> boxes_;
+  std::vector<std::pair<int, int>> pairs_;
+  std::vector<double> free_twist_;
+  BroadPhase broad_phase_;
+  int beyond_reach_ = 0;
+};
+
+}  // namespace tangible

@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/dynamics/elements/contact.h"
+
+#include <cmath>
+
+namespace tangible {
+namespace {
+
+CoefficientSource Own(const Model<double>& model, int number) {
+  CoefficientSource source;
+  source.numbers[0] = number;
+  source.derivatives[0] = 1.0;
+  source.value = model.numbers[number];
+  return source;
+}
+
+CoefficientSource Mix(const Model<double>& model, int first, int second, Mixing mixing) {
+  CoefficientSource source;
+  source.numbers[0] = first;
+  source.numbers[1] = second;
+  const double x = model.numbers[first];
+  const double y = model.numbers[second];
+  double* d = source.derivatives;
+  switch (mixing) {
+    case Mixing::kAverage:
+      source.value = 0.5 * (x + y);
+      d[0] = d[1] = 0.5;
+      break;
+    case Mixing::kGeometricMean:
+      source.value = std::sqrt(x * y);
+      // The derivative is infinite where one coefficient is 0 and the other is not.
+      source.tie = source.value == 0.0;
+      d[0] = source.tie ? 0.0 : 0.5 * y / source.value;
+      d[1] = source.tie ? 0.0 : 0.5 * x / source.value;
+      break;
+    case Mixing::kMinimum:
+    case Mixing::kMaximum: {
+      const bool first_counts = mixing == Mixing::kMinimum ? x < y : x > y;
+      source.tie = x == y;
+      source.value = first_counts ? x : y;
+      d[0] = source.tie ? 0.5 : first_counts ? 1.0 : 0.0;
+      d[1] = 1.0 - d[0];
+      break;
+    }
+  }
+  return source;
+}
+
+}  // namespace
+
+CoefficientSource MixedFriction(const Model<double>& model, int a, int b) {
+  const ModelStructure& structure = *model.structure;
+  const PairIndex* pair = structure.FindPair(a, b);
+  if (pair != nullptr && pair->friction >= 0) {
+    return Own(model, pair->friction);
+  }
+  return Mix(model, structure.bodies[a].friction, structure.bodies[b].friction,
+             structure.settings.friction_mixing);
+}
+
+CoefficientSource MixedRestitution(const Model<double>& model, int a, int b) {
+  const ModelStructure& structure = *model.structure;
+  const PairIndex* pair = structure.FindPair(a, b);
+  if (pair != nullptr && pair->restitution >= 0) {
+    return Own(model, pair->restitution);
+  }
+  return Mix(model, structure.bodies[a].restitution, structure.bodies[b].restitution,
+             structure.settings.restitution_mixing);
+}
+
+}  // namespace tangible

@@ -1,0 +1,162 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// Contacts and joint limits of a step: which rows it has, and the constant c_n of each.
+//
+//   s_n = n·v⁺ + c_n ≥ 0
+//   kGap          c_n = gap / h: lands on the surface and rests there without drift
+//   kRecovery     c_n = −recovery_speed: where gap / h is below that, so that a body leaves
+//                 penetration no faster
+//   kRestitution  c_n = e (n·v): an impact
+//   kInelastic    c_n = 0: an impact without rebound (event stepping alone)
+//   kPoisson      c_n = 0, λn ≥ e λ¹n: the decompression that follows a compression with impulse
+//                 λ¹n (event stepping alone)
+//
+// An impact is e > 0, n·v < −threshold and gap + h n·v_free < margin; in penetration the smaller of
+// both constants holds. A joint limit is a row like a contact without friction or restitution, its
+// gap the coordinate's distance from the limit.
+//
+// The law is a discrete choice made in double; on either side of a choice the derivative is that of
+// the chosen law. Between kGap and kRestitution the map jumps: the margins say how near that is.
+
+#include "tangible/dynamics/elements/joint.h"
+#include "tangible/geometry/collide.h"
+
+namespace tangible {
+
+enum class ContactLaw : unsigned char { kGap, kRecovery, kRestitution, kInelastic, kPoisson };
+
+/// The discrete part of a contact of a step. A limit has joint ≥ 0 and no feature.
+struct ActiveContact {
+  int a = -1, b = -1;  ///< bodies; a < b for contacts of shapes
+  ContactFeature feature;
+  int joint = -1;     ///< of a limit
+  double side = 0.0;  ///< of a limit: +1 low, −1 high
+  ContactLaw law = ContactLaw::kGap;
+  double gap = 0.0;  ///< m (rad for the limit of an angle), at the step's start
+  /// Whether two steps' contacts are the same one.
+  bool SameAs(const ActiveContact& other) const {
+    return a == other.a && b == other.b && feature == other.feature && joint == other.joint &&
+           side == other.side;
+  }
+};
+
+/// The coefficients of a contact and their derivatives with respect to the numbers they come from.
+struct CoefficientSource {
+  int numbers[2] = {-1, -1};  ///< places in the model's numbers, −1: none
+  double derivatives[2] = {0, 0};
+  double value = 0.0;
+  bool tie = false;  ///< a kink of the mixing rule: min/max of equal values, geometric mean at 0
+};
+
+/// Friction (or restitution) of two bodies by their pair's entry or the mixing rule. average,
+/// minimum, maximum (at a tie the mean of both derivatives), geometric mean (at 0 derivative 0).
+CoefficientSource MixedFriction(const Model<double>& model, int a, int b);
+CoefficientSource MixedRestitution(const Model<double>& model, int a, int b);
+
+/// The coefficient in T: value and chain rule of the source.
+template <typename T>
+T EvaluateCoefficient(const CoefficientSource& source, const std::vector<T>& numbers) {
+  T value(source.value);
+  for (int k = 0; k < 2; ++k) {
+    if (source.numbers[k] >= 0) {
+      const T& number = numbers[source.numbers[k]];
+      value += source.derivatives[k] * (number - ValueOf(number));
+    }
+  }
+  return value;
+}
+
+/// Geometry and rows of a contact at a state, with c_n and c_t; `h` the step. The twists of bodies
+/// that do not move by the step's forces enter c.
+template <typename T>
+struct ContactRows {
+  ContactGeometry<T> geometry;
+  RowPart<T> normal_a, normal_b, tangent_a, tangent_b;
+};
+
+/// Rows of a contact of two shapes from its geometry. Tangent t = (n_y, −n_x). A normal passes
+/// through a disc's centre: its row has no angle, to the bit.
+template <typename T>
+void RowsFromGeometry(ShapeType shape_a, const Vector2<T>& position_a, ShapeType shape_b,
+                      const Vector2<T>& position_b, ContactRows<T>* rows) {
+  const Vector2<T>& n = rows->geometry.normal;
+  const Vector2<T> t(n.y(), -n.x());
+  const Vector2<T> arm_a = rows->geometry.point - position_a;
+  const Vector2<T> arm_b = rows->geometry.point - position_b;
+  rows->normal_a = PointRow(n, arm_a);
+  rows->normal_b = Negative(PointRow(n, arm_b));
+  if (shape_a == ShapeType::kCircle) {
+    rows->normal_a[2] = T(0.0);
+  }
+  if (shape_b == ShapeType::kCircle) {
+    rows->normal_b[2] = T(0.0);
+  }
+  rows->tangent_a = PointRow(t, arm_a);
+  rows->tangent_b = Negative(PointRow(t, arm_b));
+}
+
+/// row_a · twist_a + row_b · twist_b over all bodies (those of prescribed motion too).
+template <typename T>
+T RelativeSpeed(const State<T>& state, int a, const RowPart<T>& row_a, int b,
+                const RowPart<T>& row_b) {
+  T speed(0.0);
+  for (int i = 0; i < 3; ++i) {
+    speed += row_a[i] * state.twist[3 * a + i] + row_b[i] * state.twist[3 * b + i];
+  }
+  return speed;
+}
+
+/// Evaluates a contact of shapes between bodies at given poses.
+template <typename T>
+void EvaluateContactRows(const Model<T>& model, const Pose<T>& pose_a, const Pose<T>& pose_b,
+                         const ActiveContact& contact, ContactRows<T>* rows) {
+  const ShapeView<T> shape_a = model.Shape(contact.a);
+  const ShapeView<T> shape_b = model.Shape(contact.b);
+  rows->geometry = EvaluateContact(contact.feature, shape_a, pose_a, shape_b, pose_b);
+  RowsFromGeometry(shape_a.type, pose_a.position, shape_b.type, pose_b.position, rows);
+}
+
+/// The same at a state, and with the poses of all bodies.
+template <typename T>
+void EvaluateContactRows(const Model<T>& model, const State<T>& state, const ActiveContact& contact,
+                         ContactRows<T>* rows) {
+  EvaluateContactRows(model, state.PoseOf(contact.a), state.PoseOf(contact.b), contact, rows);
+}
+template <typename T>
+void EvaluateContactRows(const Model<T>& model, const std::vector<Pose<T>>& poses,
+                         const ActiveContact& contact, ContactRows<T>* rows) {
+  EvaluateContactRows(model, poses[contact.a], poses[contact.b], contact, rows);
+}
+
+/// How fast a contact's points part (n v), and slide (t v), m/s.
+struct ContactSpeeds {
+  double normal, slip;
+};
+inline ContactSpeeds SpeedsOf(const Model<double>& model, const State<double>& state,
+                              const ActiveContact& contact) {
+  ContactRows<double> rows;
+  EvaluateContactRows(model, state, contact, &rows);
+  return {RelativeSpeed(state, contact.a, rows.normal_a, contact.b, rows.normal_b),
+          RelativeSpeed(state, contact.a, rows.tangent_a, contact.b, rows.tangent_b)};
+}
+
+/// Evaluates a joint limit: the coordinate's row times its side, gap = side (coordinate − limit),
+/// no tangent.
+template <typename T>
+void EvaluateLimitRows(const Model<T>& model, const JointRows<T>& joint_rows,
+                       const ActiveContact& contact, ContactRows<T>* rows) {
+  const JointIndex& joint = model.structure->joints[contact.joint];
+  const T& limit = model.numbers[contact.side > 0.0 ? joint.low : joint.high];
+  rows->geometry.gap = contact.side * (joint_rows.coordinate - limit);
+  rows->geometry.normal = Vector2<T>(T(0.0), T(0.0));
+  rows->geometry.point = Vector2<T>(T(0.0), T(0.0));
+  for (int i = 0; i < 3; ++i) {
+    rows->normal_a[i] = contact.side * joint_rows.coordinate_a[i];
+    rows->normal_b[i] = contact.side * joint_rows.coordinate_b[i];
+    rows->tangent_a[i] = T(0.0);
+    rows->tangent_b[i] = T(0.0);
+  }
+}
+
+}  // namespace tangible

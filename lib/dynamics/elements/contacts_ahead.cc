@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/dynamics/elements/contacts_ahead.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace tangible {
+namespace {
+
+// How far beyond the meeting of two corners the features are those of what follows, as a share of
+// the smaller body: above what ends of faces may be apart, below what anything else is.
+constexpr double kBeyond = 1e-6;
+
+Pose<double> Moved(const State<double>& state, int body, double time) {
+  const double* pose = &state.pose[3 * body];
+  const double* twist = &state.twist[3 * body];
+  return Pose<double>(Vector2<double>(pose[0] + time * twist[0], pose[1] + time * twist[1]),
+                      pose[2] + time * twist[2]);
+}
+
+}  // namespace
+
+ContactsAhead FindContactsAhead(const Model<double>& model, const State<double>& state,
+                                const ActiveContact& contact, double approach, double size,
+                                double tolerance, double slow) {
+  ContactsAhead ahead;
+  const double time = (std::max(contact.gap, 0.0) + kBeyond * size) / -approach;
+  const int a = contact.a;
+  const int b = contact.b;
+  ContactFeature features[2];
+  const int count =
+      FindContactFeatures(model.Shape(a), Moved(state, a, time), model.Shape(b),
+                          Moved(state, b, time), std::numeric_limits<double>::infinity(), features);
+  for (int k = 0; k < count; ++k) {
+    ActiveContact& next = ahead.contacts[k];
+    next = contact;
+    next.feature = features[k];
+    ContactRows<double> rows;
+    EvaluateContactRows(model, state, next, &rows);
+    next.gap = rows.geometry.gap;
+    ahead.speed[k] = RelativeSpeed(state, a, rows.normal_a, b, rows.normal_b);
+    if (!(std::abs(next.gap) <= tolerance && ahead.speed[k] > approach + slow)) {
+      return ContactsAhead();
+    }
+  }
+  ahead.count = count;
+  return ahead;
+}
+
+}  // namespace tangible

@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/dynamics/elements/force_inl.h"
+
+namespace tangible {
+namespace internal {
+
+double SignalValue(const Signal& signal, const std::vector<double>& column, double time) {
+  const auto& times = signal.time;
+  const auto next = std::upper_bound(times.begin(), times.end(), time);
+  if (next == times.begin()) {
+    return column.front();
+  }
+  const size_t k = next - times.begin() - 1;
+  if (next == times.end() || signal.interpolation == Signal::Interpolation::kConstant) {
+    return column[k];
+  }
+  const double fraction = (time - times[k]) / (times[k + 1] - times[k]);
+  return column[k] + fraction * (column[k + 1] - column[k]);
+}
+
+double Inside(double x, double low, double high) {
+  const double near = 1e-9 * (high - low);
+  return x < low - near || x > high + near ? 0.0 : x < low + near || x > high - near ? 0.5 : 1.0;
+}
+
+}  // namespace internal
+
+double IntegrateSignal(const Signal& signal, const std::vector<double>& column, double from,
+                       double to) {
+  if (column.empty() || !(from < to)) {
+    return 0.0;
+  }
+  double integral = 0.0;
+  double left = from;
+  while (left < to) {
+    const auto next = std::upper_bound(signal.time.begin(), signal.time.end(), left);
+    const double right = next == signal.time.end() ? to : std::min(to, *next);
+    // Both kinds are exact at the midpoint of a piece: linear or constant within it.
+    integral += (right - left) * internal::SignalValue(signal, column, 0.5 * (left + right));
+    left = right;
+  }
+  return integral;
+}
+
+double MeanEffort(const ModelStructure& structure, const JointIndex& joint, double t, double h) {
+  const Signal& signal = structure.signals[joint.effort_signal];
+  return IntegrateSignal(signal, signal.value, t, t + h) / h;
+}
+
+#define TANGIBLE_INSTANTIATE(T)                                                           \
+  template T WindowOverlap<T>(double, double, const T*, const T*);                        \
+  template void ForceImpulse<T>(const ModelStructure&, const ForceIndex&, double, double, \
+                                const T&, const T*, const T*, const T*, T[3]);            \
+  template void EvaluateSpring<T>(const Pose<T>&, const Pose<T>&, const T*, SpringRow<T>*);
+#define TANGIBLE_INSTANTIATE_JET(N) TANGIBLE_INSTANTIATE(Jet<N>)
+TANGIBLE_INSTANTIATE(double)
+TANGIBLE_FOR_EACH_JET_WIDTH_AND_LOCAL(TANGIBLE_INSTANTIATE_JET)
+
+}  // namespace tangible

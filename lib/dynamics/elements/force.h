@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// Forces and springs: the impulse that a step of [t, t + h] receives from each.
+//
+//   force    within [start, end] a constant F gives F · |[t, t+h] ∩ [start, end]|; a signal from a
+//            file gives its integral over the overlap, so that a window that ends inside a step is
+//            exact
+//   spring   −h k (ℓ − L0) u on a's anchor, u = (p_a − p_b)/ℓ, at the poses of the step's start;
+//            its damping is implicit: a damper with the row of u and weight h c
+
+#include "tangible/dynamics/elements/joint.h"
+
+namespace tangible {
+
+/// ∫ of a column of a signal over [from, to] (0 where from ≥ to). Before its first and after its
+/// last time a signal keeps the first and last value; between times it is constant or linear. An
+/// empty column is 0.
+double IntegrateSignal(const Signal& signal, const std::vector<double>& column, double from,
+                       double to);
+
+/// Length of [t, t + h] ∩ [start, end]; null pointers: unbounded. Where an end of the window
+/// coincides with an end of the step its derivative is the mean of both sides'.
+template <typename T>
+T WindowOverlap(double t, double h, const T* start, const T* end);
+
+/// Impulse (N s, N s, N m s) on the body of a force in a step. `numbers` as ForceIndex has them;
+/// start and end may be null.
+template <typename T>
+void ForceImpulse(const ModelStructure& structure, const ForceIndex& force, double t, double h,
+                  const T& angle, const T* numbers, const T* start, const T* end, T impulse[3]);
+
+/// Mean effort (N m, N) of a joint's signal over a step.
+double MeanEffort(const ModelStructure& structure, const JointIndex& joint, double t, double h);
+
+template <typename T>
+struct SpringRow {
+  RowPart<T> row_a, row_b;  ///< of the rate of ℓ
+  T tension;                ///< k (ℓ − L0), N: pulls the anchors together if > 0
+  T length;                 ///< m
+  RowPart<T> pull_a,
+      pull_b;  ///< generalised force against which the spring pulls: k (d − L0 u) at the anchors
+};
+
+/// A spring at two poses; `numbers` as SpringIndex has them, d = p_a − p_b. At coincident anchors
+/// the direction u is 0: no damping, and of the force only k d is left, which is smooth for L0 = 0.
+template <typename T>
+void EvaluateSpring(const Pose<T>& pose_a, const Pose<T>& pose_b, const T* numbers,
+                    SpringRow<T>* out);
+
+}  // namespace tangible

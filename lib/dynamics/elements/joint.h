@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// Joints: position errors C(q) and their rows A(q) = ∂C/∂q on the twists of the two bodies.
+//
+//   kRevolute    C = p_a − p_b                                  (m, 2 rows)
+//   kWeld        the same and θ_a − θ_b − θ0                    (3 rows)
+//   kPrismatic   C = (n·(p_a − p_b), θ_a − θ_b − θ0), n = u⊥, u fixed in b   (2 rows)
+//   kDistance    C = |p_a − p_b| − L                            (1 row)
+//   kFixedAngle  C = θ_a − θ_b − θ0                             (1 row)
+//
+// p: the anchors of each body. The coordinate of a revolute joint is θ_a − θ_b − θ0, of a prismatic
+// one u·(p_a − p_b); efforts, damping and limits act along its row. One file a type: joint_*_inl.h.
+
+#include "tangible/dynamics/model/model.h"
+#include "tangible/lcp/system/contact_problem.h"
+
+namespace tangible {
+
+template <typename T>
+struct JointRows {
+  int rows = 0;
+  RowPart<T> row_a[3], row_b[3];
+  T error[3];
+  RowPart<T> coordinate_a, coordinate_b;  ///< revolute and prismatic only
+  T coordinate;                           ///< rad or m, 0 as drawn
+};
+
+/// Evaluates a joint at two poses; `numbers` as JointIndex describes its geometry. A distance joint
+/// whose anchors coincide has the row (1, 0), its derivative 0.
+template <typename T>
+void EvaluateJoint(JointType type, const Pose<T>& pose_a, const Pose<T>& pose_b, const T* numbers,
+                   JointRows<T>* out);
+
+/// The row of a body on the velocity along `direction` of a world point with `arm` from its centre
+/// of mass.
+template <typename T>
+RowPart<T> PointRow(const Vector2<T>& direction, const Vector2<T>& arm) {
+  return {direction.x(), direction.y(), Cross(arm, direction)};
+}
+
+template <typename T>
+RowPart<T> Negative(const RowPart<T>& row) {
+  return {-row[0], -row[1], -row[2]};
+}
+
+}  // namespace tangible

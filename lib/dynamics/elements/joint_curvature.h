@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// Second derivatives of the joints' position errors C(q_a, q_b), contracted with multipliers μ:
+//
+//   Σ_r μ_r ∇²C_r = [aa  ab; abᵀ  bb],   each 3 x 3 over (x, y, θ)
+//
+// With arms r = R(θ) l, d = p_a − p_b (anchor to anchor), and joint.h's errors:
+//
+//   revolute, weld   θaθa: −μ·r_a            θbθb: μ·r_b              angle rows: none
+//   distance         (J t)(J t)ᵀ μ / |d|,  t = n⊥, n = d/|d|, J t the row of t on both bodies;
+//                    θaθa: −μ n·r_a          θbθb: μ n·r_b
+//   prismatic        θaθa: −μ w·r_a          θbθb: −μ w·(p_a − x_b)   w = u⊥, fixed in b
+//                    xaθb: μ w⊥              xbθb: −μ w⊥              θaθb: μ w·r_a
+//
+// These are the exact second derivatives; the projection onto the joints needs them, for at its
+// solution the constraint's force turns with the bodies.
+
+#include "tangible/dynamics/elements/joint.h"
+
+namespace tangible {
+
+/// 3 x 3 row-major blocks; rows of `ab` belong to body a.
+template <typename T>
+struct JointCurvature {
+  T aa[9], ab[9], bb[9];
+};
+
+/// Whether `ab` may differ from 0.
+inline bool CouplesBodies(JointType type) {
+  return type == JointType::kPrismatic || type == JointType::kDistance;
+}
+
+/// `multipliers`: one a row of the joint. A distance joint whose anchors coincide counts as
+/// straight (t-part 0).
+template <typename T>
+void EvaluateJointCurvature(JointType type, const Pose<T>& pose_a, const Pose<T>& pose_b,
+                            const T* numbers, const T* multipliers, JointCurvature<T>* out);
+
+}  // namespace tangible

@@ -1,0 +1,195 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// What the visitors of local derivatives share (local_jacobian.cc, acceleration_jacobian.cc): the
+// variables of one element as LocalJets, and the entries that its equations have.
+
+#include <cmath>
+#include <vector>
+
+#include "tangible/dynamics/jacobian/local_jacobian.h"
+
+namespace tangible::internal {
+
+/// The variables of one element, each a component of a LocalJet.
+class Locals {
+ public:
+  LocalJet Add(double value, int variable) {
+    variables_[count_] = variable;
+    return LocalJet(value, count_++);
+  }
+  int count() const { return count_; }
+  int variable(int i) const { return variables_[i]; }
+
+ private:
+  int variables_[kLocalJetWidth];
+  int count_ = 0;
+};
+
+/// Rows of the momentum equation that belong to a body; −1 where it does not move.
+inline int BodyRow(const ModelStructure& structure, int body) {
+  const int block = structure.bodies[body].block;
+  return block < 0 ? -1 : 3 * block;
+}
+
+template <typename Sink>
+class LocalEntries {
+ public:
+  LocalEntries(const Model<double>& model, const State<double>& state,
+               LocalJacobianScratch* scratch, const Sink& sink)
+      : model_(model),
+        s_(*model.structure),
+        x_(model.numbers),
+        state_(state),
+        scratch_(*scratch),
+        sink_(sink) {}
+
+ protected:
+  LocalJet LocalNumber(int number, Locals* locals) {
+    return locals->Add(x_[number], s_.NumberVariable(number));
+  }
+
+  Pose<LocalJet> LocalPose(int body, Locals* locals) {
+    if (body == s_.world()) {
+      return Pose<LocalJet>();
+    }
+    const double* q = &state_.pose[3 * body];
+    Pose<LocalJet> pose;
+    pose.position.x() = locals->Add(q[0], s_.PoseVariable(body, 0));
+    pose.position.y() = locals->Add(q[1], s_.PoseVariable(body, 1));
+    pose.angle = locals->Add(q[2], s_.PoseVariable(body, 2));
+    // The angle is a variable: its sine and cosine have one derivative each, and are computed once.
+    const int angle = locals->count() - 1;
+    const double cosine = std::cos(q[2]);
+    const double sine = std::sin(q[2]);
+    pose.rotation.cosine = LocalJet(cosine);
+    pose.rotation.cosine.v[angle] = -sine;
+    pose.rotation.sine = LocalJet(sine);
+    pose.rotation.sine.v[angle] = cosine;
+    return pose;
+  }
+
+  /// A joint's numbers, up to seven.
+  void LocalGeometry(const JointIndex& joint, Locals* locals, LocalJet numbers[7]) {
+    for (int i = 0; i < joint.num_geometry; ++i) {
+      numbers[i] = LocalNumber(joint.geometry + i, locals);
+    }
+  }
+
+  void LocalJointRows(const JointIndex& joint, Locals* locals, JointRows<LocalJet>* rows) {
+    const Pose<LocalJet> pose_a = LocalPose(joint.a, locals);
+    const Pose<LocalJet> pose_b = LocalPose(joint.b, locals);
+    LocalJet numbers[7];
+    LocalGeometry(joint, locals, numbers);
+    EvaluateJoint(joint.type, pose_a, pose_b, numbers, rows);
+  }
+
+  /// A shape's numbers that the feature reads, as LocalJets in their places.
+  ShapeView<LocalJet> LocalShape(int body, bool is_edge, int feature, Locals* locals,
+                                 std::vector<LocalJet>* numbers) {
+    const BodyIndex& index = s_.bodies[body];
+    if (static_cast<int>(numbers->size()) < index.num_shape_numbers) {
+      numbers->resize(index.num_shape_numbers);
+    }
+    int used[4];
+    const int count = FeatureNumbers(index.shape, index.num_shape_numbers, is_edge, feature, used);
+    for (int i = 0; i < count; ++i) {
+      (*numbers)[used[i]] = LocalNumber(index.shape_numbers + used[i], locals);
+    }
+    return {index.shape, numbers->data(), index.num_shape_numbers};
+  }
+  ShapeView<LocalJet> LocalShapeOfA(const ActiveContact& contact, Locals* locals) {
+    return LocalShape(contact.a, contact.feature.kind == FeatureKind::kEdgeVertex,
+                      contact.feature.a, locals, &scratch_.numbers_a);
+  }
+  ShapeView<LocalJet> LocalShapeOfB(const ActiveContact& contact, Locals* locals) {
+    return LocalShape(contact.b, contact.feature.kind == FeatureKind::kVertexEdge,
+                      contact.feature.b, locals, &scratch_.numbers_b);
+  }
+
+  void LocalContactRows(const ActiveContact& contact, Locals* locals, ContactRows<LocalJet>* rows) {
+    const Pose<LocalJet> pose_a = LocalPose(contact.a, locals);
+    const Pose<LocalJet> pose_b = LocalPose(contact.b, locals);
+    const ShapeView<LocalJet> shape_a = LocalShapeOfA(contact, locals);
+    const ShapeView<LocalJet> shape_b = LocalShapeOfB(contact, locals);
+    rows->geometry = EvaluateContact(contact.feature, shape_a, pose_a, shape_b, pose_b);
+    RowsFromGeometry(shape_a.type, pose_a.position, shape_b.type, pose_b.position, rows);
+  }
+
+  void Emit(const Locals& locals, int row, const LocalJet& value) {
+    for (int i = 0; i < locals.count(); ++i) {
+      if (value.v[i] != 0.0) {
+        sink_(row, locals.variable(i), value.v[i]);
+      }
+    }
+  }
+
+  /// The same of value · factor.
+  void Emit(const Locals& locals, int row, const LocalJet& value, double factor) {
+    for (int i = 0; i < locals.count(); ++i) {
+      if (value.v[i] != 0.0) {
+        sink_(row, locals.variable(i), value.v[i] * factor);
+      }
+    }
+  }
+
+  /// Momentum rows += rowᵀ amount on both bodies.
+  void EmitMomentum(const Locals& locals, int a, const RowPart<LocalJet>& row_a, int b,
+                    const RowPart<LocalJet>& row_b, const LocalJet& amount) {
+    const int at_a = BodyRow(s_, a);
+    const int at_b = BodyRow(s_, b);
+    for (int i = 0; i < 3; ++i) {
+      if (at_a >= 0) {
+        Emit(locals, at_a + i, row_a[i] * amount);
+      }
+      if (at_b >= 0) {
+        Emit(locals, at_b + i, row_b[i] * amount);
+      }
+    }
+  }
+
+  /// The same with an amount that no local variable changes.
+  void EmitMomentum(const Locals& locals, int a, const RowPart<LocalJet>& row_a, int b,
+                    const RowPart<LocalJet>& row_b, double amount) {
+    if (amount == 0.0) {
+      return;
+    }
+    const int at_a = BodyRow(s_, a);
+    const int at_b = BodyRow(s_, b);
+    for (int i = 0; i < 3; ++i) {
+      if (at_a >= 0) {
+        Emit(locals, at_a + i, row_a[i], amount);
+      }
+      if (at_b >= 0) {
+        Emit(locals, at_b + i, row_b[i], amount);
+      }
+    }
+  }
+
+  /// Momentum rows += rowᵀ value, of a row known in double, times one variable.
+  template <typename Row>
+  void EmitRowTimesVariable(int a, const Row& row_a, int b, const Row& row_b, int variable,
+                            double value) {
+    const int at_a = BodyRow(s_, a);
+    const int at_b = BodyRow(s_, b);
+    for (int i = 0; i < 3; ++i) {
+      if (at_a >= 0) {
+        sink_(at_a + i, variable, ValueOf(row_a[i]) * value);
+      }
+      if (at_b >= 0) {
+        sink_(at_b + i, variable, ValueOf(row_b[i]) * value);
+      }
+    }
+  }
+
+  int JointRow(int joint) const { return 3 * (s_.num_blocks() + joint); }
+
+  const Model<double>& model_;
+  const ModelStructure& s_;
+  const std::vector<double>& x_;
+  const State<double>& state_;
+  LocalJacobianScratch& scratch_;
+  const Sink& sink_;
+};
+
+}  // namespace tangible::internal

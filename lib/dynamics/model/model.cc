@@ -1,0 +1,357 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/dynamics/model/model.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "tangible/dynamics/model/initial_state_inl.h"
+#include "tangible/geometry/mass_properties.h"
+
+namespace tangible {
+namespace {
+
+int NumGeometryNumbers(JointType type) {
+  switch (type) {
+    case JointType::kPrismatic:
+      return 7;
+    case JointType::kFixedAngle:
+      return 1;
+    default:
+      return 5;
+  }
+}
+
+int NumRows(JointType type) {
+  switch (type) {
+    case JointType::kWeld:
+      return 3;
+    case JointType::kDistance:
+    case JointType::kFixedAngle:
+      return 1;
+    default:
+      return 2;
+  }
+}
+
+std::vector<bool> Matches(const std::vector<BodyIndex>& bodies, const std::string& pattern) {
+  std::vector<bool> matches;
+  matches.reserve(bodies.size());
+  for (const BodyIndex& body : bodies) {
+    matches.push_back(MatchesPattern(pattern, body.name));
+  }
+  return matches;
+}
+
+// Gives out places in the flat index, in the order in which FillNumbers appends.
+class Places {
+ public:
+  int Take(int count) {
+    const int place = next_;
+    next_ += count;
+    return place;
+  }
+  int next() const { return next_; }
+
+ private:
+  int next_ = 0;
+};
+
+template <typename T>
+void AddBodies(const BasicScene<T>& scene, Places* places, ModelStructure* structure) {
+  for (const BasicBody<T>& body : scene.bodies) {
+    BodyIndex index;
+    index.name = body.name;
+    index.motion = body.motion;
+    index.shape = body.shape.type;
+    index.num_shape_numbers = static_cast<int>(body.shape.numbers.size());
+    index.shape_numbers = places->Take(index.num_shape_numbers);
+    index.friction = places->Take(1);
+    index.restitution = places->Take(1);
+    if (body.motion == Motion::kMoving) {
+      index.block = structure->num_blocks();
+      structure->moving.push_back(static_cast<int>(structure->bodies.size()));
+      index.mass = places->Take(1);
+      index.inertia = places->Take(1);
+      index.linear_damping = places->Take(1);
+      index.angular_damping = places->Take(1);
+    }
+    structure->bodies.push_back(index);
+  }
+  BodyIndex world;
+  world.name = "world";
+  structure->bodies.push_back(world);
+}
+
+template <typename T>
+void AddJoints(const BasicScene<T>& scene, Places* places, ModelStructure* structure) {
+  const int world = structure->world();
+  for (const BasicJoint<T>& joint : scene.joints) {
+    JointIndex index;
+    index.name = joint.name;
+    index.type = joint.type;
+    index.a = joint.bodies[0] < 0 ? world : joint.bodies[0];
+    index.b = joint.bodies[1] < 0 ? world : joint.bodies[1];
+    index.rows = NumRows(joint.type);
+    index.num_geometry = NumGeometryNumbers(joint.type);
+    index.geometry = places->Take(index.num_geometry);
+    if (joint.type == JointType::kRevolute || joint.type == JointType::kPrismatic) {
+      index.damping = places->Take(1);
+      index.effort = places->Take(1);
+      if (joint.limits) {
+        index.low = places->Take(1);
+        index.high = places->Take(1);
+      }
+    }
+    if (joint.effort_signal) {
+      index.effort_signal = static_cast<int>(structure->signals.size());
+      structure->signals.push_back(*joint.effort_signal);
+    }
+    structure->joints.push_back(index);
+    if (!joint.contact) {
+      structure->joined.emplace_back(std::min(index.a, index.b), std::max(index.a, index.b));
+    }
+  }
+  std::sort(structure->joined.begin(), structure->joined.end());
+  // One node for all that is fixed; a joint that closes a cycle may have dependent rows.
+  std::vector<int> root(structure->num_bodies());
+  for (int i = 0; i < structure->num_bodies(); ++i) {
+    root[i] = structure->bodies[i].block >= 0 ? i : world;
+  }
+  const auto find = [&](int i) {
+    while (root[i] != i) {
+      i = root[i];
+    }
+    return i;
+  };
+  for (const JointIndex& joint : structure->joints) {
+    const int a = find(joint.a);
+    const int b = find(joint.b);
+    structure->joint_loops = structure->joint_loops || a == b;
+    root[a] = b;
+  }
+}
+
+template <typename T>
+void AddForcesAndPairs(const BasicScene<T>& scene, Places* places, ModelStructure* structure) {
+  const int world = structure->world();
+  for (const BasicSpring<T>& spring : scene.springs) {
+    const auto body = [&](int i) { return i < 0 ? world : i; };
+    structure->springs.push_back(
+        {spring.name, body(spring.bodies[0]), body(spring.bodies[1]), places->Take(7)});
+  }
+  for (const BasicForce<T>& force : scene.forces) {
+    ForceIndex index;
+    index.name = force.name;
+    index.body = force.body;
+    index.numbers = places->Take(5);
+    index.start = force.start ? places->Take(1) : -1;
+    index.end = force.end ? places->Take(1) : -1;
+    const auto add_signal = [&](const std::optional<Signal>& signal) {
+      if (!signal) {
+        return -1;
+      }
+      structure->signals.push_back(*signal);
+      return static_cast<int>(structure->signals.size()) - 1;
+    };
+    index.force_signal = add_signal(force.force_signal);
+    index.torque_signal = add_signal(force.torque_signal);
+    structure->forces.push_back(index);
+  }
+  for (const BasicPair<T>& pair : scene.pairs) {
+    PairIndex index;
+    index.first = Matches(structure->bodies, pair.bodies[0]);
+    index.second = Matches(structure->bodies, pair.bodies[1]);
+    index.friction = pair.friction ? places->Take(1) : -1;
+    index.restitution = pair.restitution ? places->Take(1) : -1;
+    structure->pairs.push_back(index);
+  }
+  for (const auto& [first, second] : scene.no_contact) {
+    structure->no_contact.emplace_back(Matches(structure->bodies, first),
+                                       Matches(structure->bodies, second));
+  }
+}
+
+template <typename T>
+ShapeView<T> ViewOf(const BasicShape<T>& shape) {
+  return {shape.type, shape.numbers.data(), static_cast<int>(shape.numbers.size())};
+}
+
+// Appends the bodies' numbers, in the order of AddBodies.
+template <typename T>
+void FillBodies(const BasicScene<T>& scene, std::vector<T>* numbers) {
+  for (const BasicBody<T>& body : scene.bodies) {
+    numbers->insert(numbers->end(), body.shape.numbers.begin(), body.shape.numbers.end());
+    numbers->push_back(body.friction);
+    numbers->push_back(body.restitution);
+    if (body.motion == Motion::kMoving) {
+      numbers->push_back(body.mass);
+      numbers->push_back(body.inertia ? *body.inertia
+                                      : UniformInertia(ViewOf(body.shape), body.mass));
+      numbers->push_back(body.linear_damping);
+      numbers->push_back(body.angular_damping);
+    }
+  }
+}
+
+template <typename T>
+void Append(const Vector2<T>& v, std::vector<T>* numbers) {
+  numbers->push_back(v.x());
+  numbers->push_back(v.y());
+}
+
+template <typename T>
+void FillJoints(const BasicScene<T>& scene, const State<T>& drawn, int world,
+                std::vector<T>* numbers) {
+  using std::sqrt;
+  for (const BasicJoint<T>& joint : scene.joints) {
+    const int a = joint.bodies[0] < 0 ? world : joint.bodies[0];
+    const int b = joint.bodies[1] < 0 ? world : joint.bodies[1];
+    const Pose<T> pose_a = drawn.PoseOf(a);
+    const Pose<T> pose_b = drawn.PoseOf(b);
+    if (joint.type != JointType::kFixedAngle) {
+      Append(pose_a.Inverse(joint.anchors[0]), numbers);
+      Append(pose_b.Inverse(joint.anchors[joint.type == JointType::kDistance ? 1 : 0]), numbers);
+    }
+    if (joint.type == JointType::kPrismatic) {
+      const T length = sqrt(joint.axis.squaredNorm());
+      Append(Vector2<T>(pose_b.rotation.Inverse(joint.axis) / length), numbers);
+    }
+    if (joint.type == JointType::kDistance) {
+      numbers->push_back(sqrt((joint.anchors[0] - joint.anchors[1]).squaredNorm()));
+    } else {
+      numbers->push_back(pose_a.angle - pose_b.angle);
+    }
+    if (joint.type == JointType::kRevolute || joint.type == JointType::kPrismatic) {
+      numbers->push_back(joint.damping);
+      numbers->push_back(joint.effort);
+      if (joint.limits) {
+        numbers->push_back(joint.limits->first);
+        numbers->push_back(joint.limits->second);
+      }
+    }
+  }
+}
+
+template <typename T>
+void FillForcesAndPairs(const BasicScene<T>& scene, const State<T>& drawn, int world,
+                        std::vector<T>* numbers) {
+  for (const BasicSpring<T>& spring : scene.springs) {
+    for (int k = 0; k < 2; ++k) {
+      const int body = spring.bodies[k] < 0 ? world : spring.bodies[k];
+      Append(drawn.PoseOf(body).Inverse(spring.anchors[k]), numbers);
+    }
+    numbers->push_back(spring.stiffness);
+    numbers->push_back(spring.damping);
+    numbers->push_back(spring.rest_length);
+  }
+  for (const BasicForce<T>& force : scene.forces) {
+    Append(force.at, numbers);
+    Append(force.force, numbers);
+    numbers->push_back(force.torque);
+    for (const std::optional<T>& time : {force.start, force.end}) {
+      if (time) {
+        numbers->push_back(*time);
+      }
+    }
+  }
+  for (const BasicPair<T>& pair : scene.pairs) {
+    for (const std::optional<T>& coefficient : {pair.friction, pair.restitution}) {
+      if (coefficient) {
+        numbers->push_back(*coefficient);
+      }
+    }
+  }
+}
+
+template <typename T>
+State<T> DrawnState(const BasicScene<T>& scene) {
+  State<T> state;
+  for (const BasicBody<T>& body : scene.bodies) {
+    Append(body.position, &state.pose);
+    state.pose.push_back(body.angle);
+    Append(body.velocity, &state.twist);
+    state.twist.push_back(body.angular_velocity);
+  }
+  state.pose.insert(state.pose.end(), 3, T(0.0));
+  state.twist.insert(state.twist.end(), 3, T(0.0));
+  return state;
+}
+
+bool MatchesEither(const std::vector<bool>& first, const std::vector<bool>& second, int i, int j) {
+  return (first[i] && second[j]) || (first[j] && second[i]);
+}
+
+}  // namespace
+
+bool ModelStructure::MayCollide(int i, int j) const {
+  const BodyIndex& a = bodies[i];
+  const BodyIndex& b = bodies[j];
+  if ((a.block < 0 && b.block < 0) || a.shape == ShapeType::kNone || b.shape == ShapeType::kNone) {
+    return false;
+  }
+  if (std::binary_search(joined.begin(), joined.end(),
+                         std::make_pair(std::min(i, j), std::max(i, j)))) {
+    return false;
+  }
+  for (const auto& [first, second] : no_contact) {
+    if (MatchesEither(first, second, i, j)) {
+      return false;
+    }
+  }
+  return true;
+}
+
+const PairIndex* ModelStructure::FindPair(int i, int j) const {
+  for (size_t k = pairs.size(); k-- > 0;) {
+    if (MatchesEither(pairs[k].first, pairs[k].second, i, j)) {
+      return &pairs[k];
+    }
+  }
+  return nullptr;
+}
+
+template <typename T>
+std::shared_ptr<const ModelStructure> BuildStructure(const BasicScene<T>& scene) {
+  auto structure = std::make_shared<ModelStructure>();
+  structure->scene_name = scene.name;
+  structure->settings = scene.simulation;
+  Places places;
+  places.Take(2);  // gravity
+  AddBodies(scene, &places, structure.get());
+  AddJoints(scene, &places, structure.get());
+  AddForcesAndPairs(scene, &places, structure.get());
+  structure->num_numbers = places.next();
+  return structure;
+}
+
+template <typename T>
+void BuildModelWithStructure(const BasicScene<T>& scene,
+                             const std::shared_ptr<const ModelStructure>& structure,
+                             Model<T>* model, State<T>* state) {
+  model->structure = structure;
+  const int world = model->structure->world();
+  *state = DrawnState(scene);
+  model->numbers.clear();
+  model->numbers.reserve(model->structure->num_numbers);
+  Append(scene.gravity, &model->numbers);
+  FillBodies(scene, &model->numbers);
+  FillJoints(scene, *state, world, &model->numbers);
+  FillForcesAndPairs(scene, *state, world, &model->numbers);
+  ApplyInitialJoints(scene, state);
+}
+
+template <typename T>
+void BuildModel(const BasicScene<T>& scene, Model<T>* model, State<T>* state) {
+  BuildModelWithStructure(scene, BuildStructure(scene), model, state);
+}
+
+#define TANGIBLE_INSTANTIATE(T)                                                                  \
+  template std::shared_ptr<const ModelStructure> BuildStructure<T>(const BasicScene<T>&);        \
+  template void BuildModelWithStructure<T>(                                                      \
+      const BasicScene<T>&, const std::shared_ptr<const ModelStructure>&, Model<T>*, State<T>*); \
+  template void BuildModel<T>(const BasicScene<T>&, Model<T>*, State<T>*);
+#define TANGIBLE_INSTANTIATE_JET(N) TANGIBLE_INSTANTIATE(Jet<N>)
+TANGIBLE_INSTANTIATE(double)
+TANGIBLE_FOR_EACH_JET_WIDTH_AND_LOCAL(TANGIBLE_INSTANTIATE_JET)
+
+}  // namespace tangible

@@ -1,0 +1,136 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// The model: numbers of type T made from a scene, in one flat index, and the structure that says
+// what each is.
+//
+// The structure (who is joined to whom, which shapes, where each number stands) is made once and
+// does not depend on T. The variables of a step are numbered:
+//   [ poses (3 a body) | twists (3 a body) | numbers ]
+// and each contact, joint, spring, force and body reads only a few of them (local_jacobian.h).
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "tangible/dynamics/model/state.h"
+#include "tangible/geometry/shape.h"
+#include "tangible/scene/scene.h"
+
+namespace tangible {
+
+/// Places of a body's numbers; −1 where it has none.
+struct BodyIndex {
+  std::string name;
+  Motion motion = Motion::kStatic;
+  int block = -1;  ///< among the moving bodies: its three unknowns in a step; −1: not moving
+  int mass = -1, inertia = -1, linear_damping = -1, angular_damping = -1;
+  int friction = -1, restitution = -1;
+  ShapeType shape = ShapeType::kNone;
+  int shape_numbers = -1;
+  int num_shape_numbers = 0;
+};
+
+/// Places of a joint's parameters. Geometry, by type, from `geometry` on:
+///   kRevolute, kWeld  anchor in a's frame (2), in b's frame (2), angle as drawn
+///   kPrismatic        anchor in a's frame (2), in b's (2), unit axis in b's (2), angle
+///   kDistance         anchor in a's frame (2), in b's frame (2), length
+///   kFixedAngle       angle as drawn
+/// The angle as drawn is angle_a − angle_b at time 0, before the joint's initial angle is applied.
+struct JointIndex {
+  std::string name;
+  JointType type = JointType::kRevolute;
+  int a = -1, b = -1;  ///< bodies; the world has an index too
+  int rows = 0;
+  int geometry = -1;
+  int num_geometry = 0;
+  int damping = -1, effort = -1, low = -1, high = -1;  ///< −1: none of this type, or no limits
+  int effort_signal = -1;                              ///< into signals; replaces effort
+};
+
+/// Local anchors (2 + 2), stiffness, damping, rest length: seven numbers from `numbers` on.
+struct SpringIndex {
+  std::string name;
+  int a = -1, b = -1;
+  int numbers = -1;
+};
+
+/// at (2), force (2), torque: five numbers from `numbers` on.
+struct ForceIndex {
+  std::string name;
+  int body = -1;
+  int numbers = -1;
+  int start = -1, end = -1;                   ///< −1: not bounded
+  int force_signal = -1, torque_signal = -1;  ///< into signals; replace force, torque
+};
+
+/// A pair's own coefficients, for bodies that match the two patterns.
+struct PairIndex {
+  std::vector<bool> first, second;      ///< a body: matches the pattern
+  int friction = -1, restitution = -1;  ///< −1: mixed as usual
+};
+
+struct ModelStructure {
+  std::string scene_name;
+  SimulationSettings settings;
+  std::vector<BodyIndex> bodies;  ///< in scene order, then the world
+  std::vector<JointIndex> joints;
+  std::vector<SpringIndex> springs;
+  std::vector<ForceIndex> forces;
+  std::vector<PairIndex> pairs;
+  std::vector<Signal> signals;
+  std::vector<std::pair<std::vector<bool>, std::vector<bool>>> no_contact;
+  std::vector<std::pair<int, int>> joined;  ///< bodies with a joint without contact, ascending
+  std::vector<int> moving;                  ///< body of each block
+  bool joint_loops = false;
+  int num_numbers = 0;
+
+  int num_bodies() const { return static_cast<int>(bodies.size()); }
+  int world() const { return num_bodies() - 1; }
+  int num_blocks() const { return static_cast<int>(moving.size()); }
+  /// Index of a variable: component i of body's pose or twist, a number.
+  int PoseVariable(int body, int i) const { return 3 * body + i; }
+  int TwistVariable(int body, int i) const { return 3 * num_bodies() + 3 * body + i; }
+  int NumberVariable(int number) const { return 6 * num_bodies() + number; }
+  int num_variables() const { return 6 * num_bodies() + num_numbers; }
+  /// Whether contacts between two bodies are looked for.
+  bool MayCollide(int i, int j) const;
+  /// The pair entry that holds for two bodies, or nullptr; of several the last one written.
+  const PairIndex* FindPair(int i, int j) const;
+};
+
+/// Places of gravity in the numbers.
+inline constexpr int kGravityX = 0;
+inline constexpr int kGravityY = 1;
+
+template <typename T>
+struct Model {
+  std::shared_ptr<const ModelStructure> structure;
+  std::vector<T> numbers;
+
+  ShapeView<T> Shape(int body) const {
+    const BodyIndex& index = structure->bodies[body];
+    return {index.shape, numbers.data() + (index.num_shape_numbers > 0 ? index.shape_numbers : 0),
+            index.num_shape_numbers};
+  }
+};
+
+/// The model and the initial state of a valid scene. Derivatives of the scene's numbers flow
+/// through anchors, inertias that follow mass and shape, and initial joint angles and rates.
+template <typename T>
+void BuildModel(const BasicScene<T>& scene, Model<T>* model, State<T>* state);
+
+/// The same structure with other numbers: as BuildModel, but reuses `structure`, which was built
+/// from the same scene.
+template <typename T>
+void BuildModelWithStructure(const BasicScene<T>& scene,
+                             const std::shared_ptr<const ModelStructure>& structure,
+                             Model<T>* model, State<T>* state);
+
+/// The discrete part alone.
+template <typename T>
+std::shared_ptr<const ModelStructure> BuildStructure(const BasicScene<T>& scene);
+
+}  // namespace tangible

@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/dynamics/model/parameter_map.h"
+
+#include <algorithm>
+
+namespace tangible {
+
+ParameterDirection DirectionOf(const ParameterPath& path) {
+  ParameterDirection direction;
+  for (const int number : path.numbers) {
+    direction.push_back({number, 1.0});
+  }
+  return direction;
+}
+
+namespace {
+
+// Adds `weight` to the derivatives k of the numbers that parameters[first + k] sets.
+template <typename T>
+void Seed(const std::vector<ParameterDirection>& parameters, int first, double weight,
+          const std::vector<SceneNumber<T>>& numbers) {
+  const int width = NumDerivatives<T>::value;
+  for (int k = 0; k < width && first + k < static_cast<int>(parameters.size()); ++k) {
+    for (const SetNumber& set : parameters[first + k]) {
+      numbers[set.number].value->v[k] += weight * set.scale;
+    }
+  }
+}
+
+}  // namespace
+
+template <typename T>
+BasicScene<T> SeededScene(const Scene& scene, const std::vector<ParameterDirection>& parameters,
+                          int first) {
+  BasicScene<T> seeded = CastScene<T>(scene);
+  Seed(parameters, first, 1.0, EnumerateNumbers(&seeded));
+  return seeded;
+}
+
+Eigen::SparseMatrix<double> VariableJacobian(const Scene& scene,
+                                             const std::shared_ptr<const ModelStructure>& structure,
+                                             const std::vector<ParameterDirection>& parameters) {
+  std::vector<Eigen::Triplet<double>> entries;
+  const int num_parameters = static_cast<int>(parameters.size());
+  // One copy of the scene, and of its paths, for all passes.
+  BasicScene<LocalJet> seeded = CastScene<LocalJet>(scene);
+  const std::vector<SceneNumber<LocalJet>> numbers = EnumerateNumbers(&seeded);
+  Model<LocalJet> model;
+  State<LocalJet> state;
+  for (int first = 0; first < num_parameters; first += kLocalJetWidth) {
+    Seed(parameters, first, 1.0, numbers);
+    BuildModelWithStructure(seeded, structure, &model, &state);
+    Seed(parameters, first, -1.0, numbers);
+    const auto collect = [&](const std::vector<LocalJet>& values, int offset) {
+      for (size_t i = 0; i < values.size(); ++i) {
+        for (int k = 0; k < kLocalJetWidth && first + k < num_parameters; ++k) {
+          if (values[i].v[k] != 0.0) {
+            entries.emplace_back(offset + static_cast<int>(i), first + k, values[i].v[k]);
+          }
+        }
+      }
+    };
+    collect(state.pose, 0);
+    collect(state.twist, 3 * structure->num_bodies());
+    collect(model.numbers, 6 * structure->num_bodies());
+  }
+  Eigen::SparseMatrix<double> jacobian(structure->num_variables(), num_parameters);
+  jacobian.setFromTriplets(entries.begin(), entries.end());
+  return jacobian;
+}
+
+#define TANGIBLE_INSTANTIATE_JET(N)                             \
+  template BasicScene<Jet<N>> SeededScene<Jet<N>>(const Scene&, \
+                                                  const std::vector<ParameterDirection>&, int);
+TANGIBLE_FOR_EACH_JET_WIDTH_AND_LOCAL(TANGIBLE_INSTANTIATE_JET)
+
+}  // namespace tangible

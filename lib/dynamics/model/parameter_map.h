@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// From user parameters to the variables of a model: the initial poses and twists and the flat
+// numbers.
+//
+// A parameter sets several numbers of the scene, each as scale · p + offset. The map from scene to
+// model is smooth but not linear (an inertia follows mass and shape, joint angles turn subtrees),
+// so its Jacobian, sparse, is taken where the scene stands.
+
+#include <Eigen/SparseCore>
+#include <string>
+#include <vector>
+
+#include "tangible/dynamics/model/model.h"
+#include "tangible/scene/parameter.h"
+
+namespace tangible {
+
+/// One number of a scene that a parameter sets.
+struct SetNumber {
+  int number = 0;  ///< index into EnumerateNumbers
+  double scale = 1.0;
+};
+
+/// What one parameter changes, to first order.
+using ParameterDirection = std::vector<SetNumber>;
+
+/// The direction of a resolved path: each of its numbers with scale 1.
+ParameterDirection DirectionOf(const ParameterPath& path);
+
+/// d [poses | twists | numbers] / d parameters: num_variables x num_parameters, column-major.
+Eigen::SparseMatrix<double> VariableJacobian(const Scene& scene,
+                                             const std::shared_ptr<const ModelStructure>& structure,
+                                             const std::vector<ParameterDirection>& parameters);
+
+/// The scene in Jets, with derivative k that of parameters[first + k].
+template <typename T>
+BasicScene<T> SeededScene(const Scene& scene, const std::vector<ParameterDirection>& parameters,
+                          int first);
+
+}  // namespace tangible

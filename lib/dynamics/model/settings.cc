@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/dynamics/model/settings.h"
+
+#include <sstream>
+
+#include "tangible/scene/scene_names.h"
+
+namespace tangible {
+namespace {
+
+// What of fixed stepping goes with one choice only.
+std::string NeedsEvents(const std::string& key, const std::string& have, const std::string& others,
+                        const std::string& got) {
+  return "/simulation/" + key + ": expected \"" + have + "\" with fixed stepping (the " + others +
+         " \"stepping\": \"event\"), got \"" + got + "\"";
+}
+
+}  // namespace
+
+bool CheckSettings(const SimulationSettings& settings, std::string* error) {
+  const bool fixed = settings.stepping == Stepping::kFixed;
+  if (fixed && IntegratorOf(settings) != Integrator::kSemiImplicitEuler) {
+    *error = NeedsEvents("integrator", "semi_implicit_euler", "others need",
+                         NameOf(IntegratorOf(settings), kIntegratorNames));
+  } else if (fixed && settings.impact_law != ImpactLaw::kNewton) {
+    *error = NeedsEvents("impact_law", "newton", "other needs",
+                         NameOf(settings.impact_law, kImpactLawNames));
+  } else if (!fixed && settings.smoothing != 0.0) {
+    std::ostringstream got;
+    got << settings.smoothing;
+    *error =
+        "/simulation/smoothing: expected 0 with event stepping (others need \"stepping\": "
+        "\"fixed\"), "
+        "got " +
+        got.str();
+  } else {
+    return true;
+  }
+  return false;
+}
+
+ContactSolverOptions SolverOptionsOf(const SimulationSettings& settings) {
+  ContactSolverOptions options;
+  options.tolerance = settings.lcp_tolerance;
+  options.max_iterations = settings.lcp_max_iterations;
+  options.smoothing = settings.smoothing;
+  options.choice = settings.solver == SolverChoice::kInteriorPoint
+                       ? ContactSolverChoice::kInteriorPoint
+                   : settings.solver == SolverChoice::kLemke ? ContactSolverChoice::kLemke
+                                                             : ContactSolverChoice::kAuto;
+  return options;
+}
+
+}  // namespace tangible

@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// Islands of a contact problem: the bodies that joints, dampers and contacts connect. What moves
+// apart is solved apart, so that a pile which takes many pivots costs what it has, not what all
+// piles have, and on several threads. Bodies of islands without contacts are one linear system
+// together.
+//
+// An island is solved alone, from its own guess: its bits depend neither on the other islands nor
+// on the number of threads.
+
+#include <memory>
+#include <vector>
+
+#include "tangible/lcp/contact/contact_solver.h"
+#include "tangible/lcp/contact/worker_pool.h"
+
+namespace tangible {
+
+class IslandSolver {
+ public:
+  explicit IslandSolver(int threads = 1);
+
+  /// Finds the islands; returns how many of them have contacts.
+  int Partition(const ContactProblem<double>& problem);
+  int count() const { return count_; }
+  /// Of the last partition: solves every island. `solution` holds the guess on entry. The report's
+  /// factorisations and iterations are those of the island that took the most, its fallbacks those
+  /// of all. False where an island is not solved; `solution` is then what it was.
+  bool Solve(const ContactProblem<double>& problem, const ContactSolverOptions& options,
+             ContactSolution<double>* solution, ContactSolverReport* report);
+
+ private:
+  // An island by its first body; its symbolic factorisation stays as long as it does.
+  struct Island {
+    std::vector<int> bodies, dampers, joints, contacts;
+    std::shared_ptr<BlockLuPattern> pattern;
+    ContactSolverReport report;
+  };
+  // A thread's memory, which goes from island to island and stays near.
+  struct Worker {
+    ContactProblem<double> problem;
+    ContactSolution<double> solution;
+    ContactSolver solver;
+  };
+
+  int Root(int body);
+  void Join(int a, int b);
+  Island* IslandOf(int a, int b);
+  static void Clear(Island* island);
+  void ListIslands(const ContactProblem<double>& problem);
+  void Gather(const ContactProblem<double>& problem, const ContactSolution<double>& guess,
+              const Island& island, Worker* worker) const;
+  void Scatter(const Island& island, const ContactSolution<double>& solved);
+
+  WorkerPool pool_;
+  std::vector<std::unique_ptr<Worker>> workers_;
+  int count_ = 0;
+  std::vector<int> parent_;
+  std::vector<char> has_contact_;  // of a root
+  std::vector<int> place_;         // of a body within its island
+  std::vector<std::unique_ptr<Island>> island_of_first_;
+  Island rest_;
+  std::vector<Island*> islands_;  // with contacts, in the order of their first bodies; the rest
+  ContactSolution<double> result_;
+};
+
+}  // namespace tangible

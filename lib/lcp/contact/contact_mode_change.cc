@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/lcp/contact/contact_mode_change.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace tangible {
+namespace {
+
+// A contact that rests at the limit of friction slides at speeds of either sign, of the size of its
+// rounding: there it keeps its mode, within this fraction of the residual asked for.
+constexpr double kSlipOfTolerance = 0.3;
+constexpr double kMaxExtrapolation = 1e6;
+
+}  // namespace
+
+ContactMode ModeOfClosing(const ContactBlock<double>& contact, const ContactValues& values) {
+  if (!contact.has_friction) {
+    return ContactMode::kClosed;
+  }
+  const double needed = std::abs(values.slip) / values.mobility_t;
+  const double available = contact.friction * -values.s_n / values.mobility_n;
+  return needed <= available ? ContactMode::kSticking
+         : values.slip > 0.0 ? ContactMode::kSlidingPositive
+                             : ContactMode::kSlidingNegative;
+}
+
+ModeChange Contradiction(const ContactBlock<double>& contact, const ContactValues& values,
+                         ContactMode mode, double normal, double tangent, double impulse_scale,
+                         double tolerance) {
+  const double zeta = std::max(impulse_scale, values.sigma_n / values.mobility_n);
+  ModeChange change{mode};
+  if (mode == ContactMode::kOpen) {
+    if (values.s_n < -kModeTolerance * values.sigma_n) {
+      change.violation = -values.s_n / values.sigma_n;
+      change.mode = ModeOfClosing(contact, values);
+    }
+    return change;
+  }
+  if (normal < -kModeTolerance * zeta) {
+    return {ContactMode::kOpen, -normal / zeta};
+  }
+  if (mode == ContactMode::kSticking) {
+    // Slip is what δ leaves of a sticking row; where it should be more (two points of a body that
+    // turns cannot both stick) the impulse outgrows friction.
+    const double excess = std::abs(tangent) - contact.friction * normal;
+    const double scale = std::max(zeta * std::max(1.0, contact.friction), std::abs(tangent));
+    if (excess > kModeTolerance * scale) {
+      change.violation = excess / scale;
+      change.mode = tangent < 0.0 ? ContactMode::kSlidingPositive : ContactMode::kSlidingNegative;
+    }
+  } else if (mode != ContactMode::kClosed) {
+    const double along = SlidingSign(mode) * values.slip;
+    const double rounding =
+        std::min(contact.rounding, kSlipOfTolerance * tolerance * values.sigma_t);
+    if (along < -std::max(kModeTolerance * values.sigma_t, rounding)) {
+      change = {ContactMode::kSticking, -along / values.sigma_t};
+    }
+  }
+  return change;
+}
+
+void ExtrapolateImpulses(const ContactProblem<double>& problem,
+                         const ContactSolution<double>& before, ContactSolution<double>* solution) {
+  double factor = kMaxExtrapolation;
+  const auto limit = [&](double value, double last) {
+    if (value > 0.0 && value < last) {
+      factor = std::min(factor, value / (last - value));
+    }
+  };
+  for (size_t i = 0; i < problem.contacts.size(); ++i) {
+    const double normal = solution->normal_impulse[i];
+    const double last_normal = before.normal_impulse[i];
+    if (solution->modes[i] == ContactMode::kSticking) {
+      const double mu = problem.contacts[i].friction;
+      const double tangent = solution->tangent_impulse[i];
+      const double last_tangent = before.tangent_impulse[i];
+      limit(mu * normal - tangent, mu * last_normal - last_tangent);
+      limit(mu * normal + tangent, mu * last_normal + last_tangent);
+    } else if (solution->modes[i] != ContactMode::kOpen) {
+      limit(normal, last_normal);
+    }
+  }
+  factor *= 1.0 + 1e-6;
+  const auto move = [&](const std::vector<double>& from, std::vector<double>* to) {
+    for (size_t i = 0; i < to->size(); ++i) {
+      (*to)[i] += factor * ((*to)[i] - from[i]);
+    }
+  };
+  move(before.normal_impulse, &solution->normal_impulse);
+  move(before.tangent_impulse, &solution->tangent_impulse);
+  move(before.joint_impulse, &solution->joint_impulse);
+}
+
+}  // namespace tangible

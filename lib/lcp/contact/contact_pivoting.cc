@@ -1,0 +1,372 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/lcp/contact/contact_pivoting.h"
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+
+#include "tangible/lcp/system/contact_residual.h"
+#include "tangible/math/scratch.h"
+
+namespace tangible {
+namespace {
+
+// Inequalities that hold by less than this fraction of their scale at the start are raised to about
+// it, those that do not hold to about what they lack: the first ties of a degenerate start.
+constexpr double kLeastSlack = 1e-6;
+// The centre is moved by this fraction of the largest impulse, differently for each contact, at τ =
+// 1: ties that symmetry makes (a stack without side load) are broken on the way.
+constexpr double kCentreShift = 1e-4;
+// Rounds in which sliding contacts that would pull are opened before the start.
+constexpr int kMaxStartRounds = 30;
+
+bool Slides(ContactMode mode) {
+  return mode == ContactMode::kSlidingPositive || mode == ContactMode::kSlidingNegative;
+}
+
+}  // namespace
+
+void ContactPivoting::Reserve(int num_blocks, int num_contacts) {
+  modes_.reserve(num_contacts);
+  shifts_.reserve(num_contacts);
+  x_.reserve(6 * static_cast<size_t>(num_blocks));
+  joint_centre_.reserve(3 * static_cast<size_t>(num_blocks));
+}
+
+// Numbers in [0.5, 1) that no symmetry of a scene shares, the golden ratio's sequence; with a seed
+// in [0.1, 10), log-uniform.
+double ContactPivoting::Scatter(size_t contact, int kind) const {
+  const size_t at = 3 * contact + static_cast<size_t>(kind);
+  if (scatter_ != 0) {
+    std::mt19937_64 random(scatter_ + at);
+    return std::pow(10.0, static_cast<double>(random() >> 11) * 0x1p-52 - 1.0);
+  }
+  const double x = 0.6180339887498949 * static_cast<double>(at + 1);
+  return 0.5 + 0.5 * (x - std::floor(x));
+}
+
+// Solves for the value and the rate of all unknowns with the present modes.
+bool ContactPivoting::SolveSystem() {
+  const ContactProblem<double>& p = *problem_;
+  ++*factorisations_;
+  if (!system_->Factor(p, modes_, regularisation_)) {
+    return false;
+  }
+  const std::vector<int>& block_of = system_->contact_block();
+  const std::vector<double>& delta = system_->regularisation();
+  const int nb = p.num_bodies;
+  x_.assign(6 * static_cast<size_t>(system_->num_blocks()), 0.0);
+  for (int i = 0; i < 3 * nb; ++i) {
+    x_[2 * i] = p.momentum[i];
+  }
+  for (size_t j = 0; j < p.joints.size(); ++j) {
+    for (int r = 0; r < p.joints[j].rows; ++r) {
+      const size_t row = 3 * (nb + j) + r;
+      x_[2 * row] = p.joints[j].rhs[r] + delta[row] * joint_centre_[3 * j + r];
+    }
+  }
+  // Known impulses of a contact push its bodies.
+  const auto push = [&](int a, const RowPart<double>& row_a, int b, const RowPart<double>& row_b,
+                        double rate) {
+    for (int i = 0; i < 3; ++i) {
+      if (a >= 0) {
+        x_[2 * (3 * a + i) + 1] += row_a[i] * rate;
+      }
+      if (b >= 0) {
+        x_[2 * (3 * b + i) + 1] += row_b[i] * rate;
+      }
+    }
+  };
+  for (size_t i = 0; i < p.contacts.size(); ++i) {
+    const ContactBlock<double>& c = p.contacts[i];
+    const Shift& shift = shifts_[i];
+    const ContactMode mode = modes_[i];
+    if (mode == ContactMode::kOpen) {
+      push(c.a, c.normal_a, c.b, c.normal_b, -shift.b);
+      continue;
+    }
+    if (Slides(mode)) {
+      push(c.a, c.tangent_a, c.b, c.tangent_b, -SlidingSign(mode) * c.friction * shift.b);
+    }
+    const size_t row = 3 * static_cast<size_t>(block_of[i]);
+    x_[2 * row] = delta[row] * shift.centre_n - c.c_n;
+    x_[2 * row + 1] = -shift.a_n;
+    if (mode == ContactMode::kSticking) {
+      x_[2 * row + 2] = delta[row + 1] * shift.centre_t - c.c_t;
+      x_[2 * row + 3] = -shift.a_t;
+    }
+  }
+  system_->SolveRegularised(p, modes_, x_.data(), 2);
+  return std::all_of(x_.begin(), x_.end(), [](double x) { return std::isfinite(x); });
+}
+
+// s'.
+ContactPivoting::Test ContactPivoting::Normal(int contact) const {
+  const ContactBlock<double>& c = problem_->contacts[contact];
+  const Shift& shift = shifts_[contact];
+  const double delta =
+      regularisation_ * RowMobility(problem_->mass, c.a, c.normal_a, c.b, c.normal_b);
+  Test test{c.c_n - delta * shift.centre_n, shift.a_n - delta * shift.b};
+  const auto add = [&](int block, const RowPart<double>& row) {
+    for (int i = 0; i < 3 && block >= 0; ++i) {
+      test.value += row[i] * x_[2 * (3 * block + i)];
+      test.rate += row[i] * x_[2 * (3 * block + i) + 1];
+    }
+  };
+  add(c.a, c.normal_a);
+  add(c.b, c.normal_b);
+  return test;
+}
+
+// w'.
+ContactPivoting::Test ContactPivoting::Sliding(int contact) const {
+  const ContactBlock<double>& c = problem_->contacts[contact];
+  const Shift& shift = shifts_[contact];
+  const double delta =
+      regularisation_ * RowMobility(problem_->mass, c.a, c.tangent_a, c.b, c.tangent_b);
+  Test test{c.c_t - delta * shift.centre_t, shift.a_t};
+  const auto add = [&](int block, const RowPart<double>& row) {
+    for (int i = 0; i < 3 && block >= 0; ++i) {
+      test.value += row[i] * x_[2 * (3 * block + i)];
+      test.rate += row[i] * x_[2 * (3 * block + i) + 1];
+    }
+  };
+  add(c.a, c.tangent_a);
+  add(c.b, c.tangent_b);
+  const Test friction = Friction(contact);
+  test.value += delta * friction.value;
+  test.rate += delta * friction.rate;
+  return test;
+}
+
+// λ'; 0 for open contacts.
+ContactPivoting::Test ContactPivoting::Impulse(int contact) const {
+  const int block = system_->contact_block()[contact];
+  if (block < 0) {
+    return {};
+  }
+  return {x_[6 * static_cast<size_t>(block)],
+          x_[6 * static_cast<size_t>(block) + 1] + shifts_[contact].b};
+}
+
+// λt.
+ContactPivoting::Test ContactPivoting::Friction(int contact) const {
+  const ContactMode mode = modes_[contact];
+  if (mode == ContactMode::kSticking) {
+    const size_t at = 6 * static_cast<size_t>(system_->contact_block()[contact]) + 2;
+    return {x_[at], x_[at + 1]};
+  }
+  const double along = -SlidingSign(mode) * problem_->contacts[contact].friction;
+  const Test impulse = Impulse(contact);
+  return {along * impulse.value, along * impulse.rate};
+}
+
+// The inequalities of a contact's mode, at most two.
+int ContactPivoting::Tests(int contact, Test* tests) const {
+  const ContactMode mode = modes_[contact];
+  if (mode == ContactMode::kOpen) {
+    tests[0] = Normal(contact);
+    tests[0].next =
+        problem_->contacts[contact].has_friction ? ContactMode::kSticking : ContactMode::kClosed;
+    return 1;
+  }
+  if (mode == ContactMode::kSticking) {
+    const double mu = problem_->contacts[contact].friction;
+    const Test impulse = Impulse(contact);
+    const Test friction = Friction(contact);
+    tests[0] = {mu * impulse.value - friction.value, mu * impulse.rate - friction.rate,
+                ContactMode::kSlidingNegative};
+    tests[1] = {mu * impulse.value + friction.value, mu * impulse.rate + friction.rate,
+                ContactMode::kSlidingPositive};
+    return 2;
+  }
+  tests[0] = Impulse(contact);
+  tests[0].next = ContactMode::kOpen;
+  if (mode == ContactMode::kClosed) {
+    return 1;
+  }
+  const Test sliding = Sliding(contact);
+  const double sign = SlidingSign(mode);
+  tests[1] = {sign * sliding.value, sign * sliding.rate, ContactMode::kSticking};
+  return 2;
+}
+
+// Shifts under which the present modes solve the problem at τ = 1.
+bool ContactPivoting::Start(From from) {
+  for (int round = 0; round < kMaxStartRounds; ++round) {
+    if (!SolveSystem()) {
+      return false;
+    }
+    // A sliding contact's friction follows its impulse, so a shift of a negative one would change
+    // the solution: it opens instead.
+    bool opened = false;
+    for (size_t i = 0; i < modes_.size(); ++i) {
+      if (Slides(modes_[i]) && Impulse(static_cast<int>(i)).At(1.0) <= 0.0) {
+        modes_[i] = ContactMode::kOpen;
+        opened = true;
+      }
+    }
+    if (!opened) {
+      RaiseInequalities(from);
+      return true;
+    }
+  }
+  return false;
+}
+
+void ContactPivoting::RaiseInequalities(From from) {
+  const ContactProblem<double>& p = *problem_;
+  double speed = 0.0;
+  double impulse_scale = 0.0;
+  for (int i = 0; i < 3 * p.num_bodies; ++i) {
+    speed = std::max(speed, i % 3 == 2 ? 0.0 : std::abs(x_[2 * i] + x_[2 * i + 1]));
+    speed = std::max(speed, i % 3 == 2 ? 0.0 : std::abs(p.momentum[i] / p.mass[i]));
+  }
+  for (size_t i = 0; i < modes_.size(); ++i) {
+    impulse_scale = std::max(impulse_scale, std::abs(Impulse(static_cast<int>(i)).At(1.0)));
+  }
+  const auto needed = [](double have, double scale, double scatter) {
+    const double slack = scatter * std::max(-have, kLeastSlack * scale);
+    return std::max(0.0, slack - have);
+  };
+  for (size_t k = 0; k < modes_.size(); ++k) {
+    const int i = static_cast<int>(k);
+    Shift& shift = shifts_[k];
+    const ContactMode mode = modes_[k];
+    if (mode == ContactMode::kOpen) {
+      const double s = Normal(i).At(1.0);
+      shift.a_n += from == From::kOpen ? std::max(0.0, -s) + speed * Scatter(k, 0)
+                                       : needed(s, speed, Scatter(k, 0));
+      continue;
+    }
+    const double impulse = Impulse(i).At(1.0);
+    if (Slides(mode)) {
+      const double sign = SlidingSign(mode);
+      shift.a_t += sign * needed(sign * Sliding(i).At(1.0), speed, Scatter(k, 1));
+    } else if (mode == ContactMode::kSticking) {
+      const double friction = std::abs(Friction(i).At(1.0)) / p.contacts[k].friction;
+      shift.b = needed(impulse - friction, impulse_scale, Scatter(k, 2));
+    } else {
+      shift.b = needed(impulse, impulse_scale, Scatter(k, 2));
+    }
+  }
+}
+
+void ContactPivoting::Extract(ContactSolution<double>* solution) const {
+  const ContactProblem<double>& p = *problem_;
+  const size_t nb = p.num_bodies;
+  solution->modes = modes_;
+  for (size_t i = 0; i < 3 * nb; ++i) {
+    solution->v[i] = x_[2 * i];
+  }
+  for (size_t j = 0; j < 3 * p.joints.size(); ++j) {
+    solution->joint_impulse[j] = x_[2 * (3 * nb + j)];
+  }
+  for (size_t i = 0; i < modes_.size(); ++i) {
+    solution->normal_impulse[i] = Impulse(static_cast<int>(i)).value;
+    solution->tangent_impulse[i] = Friction(static_cast<int>(i)).value;
+  }
+}
+
+void ContactPivoting::SetCentre(const ContactSolution<double>& solution) {
+  const ContactProblem<double>& p = *problem_;
+  joint_centre_ = solution.joint_impulse;
+  shifts_.assign(modes_.size(), Shift());
+  const double shift = regularisation_ * kCentreShift * ImpulseScale(solution.normal_impulse);
+  for (size_t i = 0; i < modes_.size(); ++i) {
+    // What τ adds to the centre is written as a shift of the rows.
+    const ContactBlock<double>& c = p.contacts[i];
+    shifts_[i].centre_n = std::max(0.0, solution.normal_impulse[i]);
+    shifts_[i].a_n = shift * Scatter(i, 0) * RowMobility(p.mass, c.a, c.normal_a, c.b, c.normal_b);
+    if (c.has_friction) {
+      shifts_[i].centre_t = solution.tangent_impulse[i];
+      shifts_[i].a_t =
+          shift * Scatter(i, 1) * RowMobility(p.mass, c.a, c.tangent_a, c.b, c.tangent_b);
+    }
+  }
+}
+
+// The next inequality that becomes tight; of several at once the one that falls fastest.
+ContactPivoting::Event ContactPivoting::NextEvent(double tau, double direction) const {
+  Event event;
+  event.distance = direction < 0.0 ? tau : HUGE_VAL;
+  double steepest = 0.0;
+  for (size_t i = 0; i < modes_.size(); ++i) {
+    Test tests[2];
+    const int count = Tests(static_cast<int>(i), tests);
+    for (int k = 0; k < count; ++k) {
+      const double rate = tests[k].rate * direction;
+      if (!(rate < 0.0)) {
+        continue;
+      }
+      const double distance = std::max(0.0, tests[k].At(tau)) / -rate;
+      if (distance < event.distance ||
+          (distance == event.distance && event.contact >= 0 && rate < steepest)) {
+        event = {static_cast<int>(i), distance, tests[k].next};
+        steepest = rate;
+      }
+    }
+  }
+  return event;
+}
+
+// Changes a contact's mode at τ; returns the direction in which the path goes on, 0 where the
+// system has no solution.
+double ContactPivoting::Pivot(int contact, ContactMode next, double tau, double direction) {
+  const ContactMode before = modes_[contact];
+  if (before == ContactMode::kOpen && next == ContactMode::kSticking) {
+    // At λ' = 0 the sliding speed says which side of the cone is tight.
+    next = Sliding(contact).At(tau) > 0.0 ? ContactMode::kSlidingPositive
+                                          : ContactMode::kSlidingNegative;
+  }
+  modes_[contact] = next;
+  if (!SolveSystem()) {
+    return 0.0;
+  }
+  // The inequality that replaces the tight one grows along the path.
+  Test tests[2];
+  const int count = Tests(contact, tests);
+  int opposite = 0;
+  if (next == ContactMode::kSticking) {
+    opposite = before == ContactMode::kSlidingNegative ? 0 : 1;
+  } else if (before == ContactMode::kSticking) {
+    opposite = count - 1;  // sliding, at speed 0
+  }
+  const double rate = tests[opposite].rate;
+  return rate == 0.0 ? direction : rate > 0.0 ? 1.0 : -1.0;
+}
+
+bool ContactPivoting::Solve(const ContactProblem<double>& problem, From from, double regularisation,
+                            int max_pivots, ContactSystem* system,
+                            ContactSolution<double>* solution, int* factorisations) {
+  problem_ = &problem;
+  regularisation_ = regularisation;
+  system_ = system;
+  factorisations_ = factorisations;
+  modes_ = solution->modes;
+  if (from == From::kOpen) {
+    modes_.assign(modes_.size(), ContactMode::kOpen);
+  }
+  SetCentre(*solution);
+  if (!Start(from)) {
+    return false;
+  }
+  double tau = 1.0;
+  double direction = -1.0;
+  for (int pivot = 0; pivot <= max_pivots && direction != 0.0; ++pivot) {
+    const Event event = NextEvent(tau, direction);
+    if (event.contact < 0) {
+      if (direction > 0.0) {
+        return false;  // a ray
+      }
+      SizeScratch(3 * static_cast<size_t>(problem.num_bodies), &solution->v);
+      Extract(solution);
+      return true;
+    }
+    tau += direction * event.distance;
+    direction = Pivot(event.contact, event.next, tau, direction);
+  }
+  return false;
+}
+
+}  // namespace tangible

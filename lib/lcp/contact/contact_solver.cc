@@ -1,0 +1,415 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/lcp/contact/contact_solver.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "tangible/lcp/contact/contact_mode_change.h"
+
+namespace tangible {
+namespace {
+
+constexpr int kMaxRounds = 20;
+// Where more are contradicted than in the round before, and more than a few, they will not settle.
+constexpr int kFewContradicted = 2;
+// Pivots: from the guess (and half as many as contacts), and as multiples of that number.
+constexpr int kPivotsFromGuess = 40;
+constexpr int kPivotsFromInteriorPoint = 2;
+constexpr int kPivotsFromOpen = 20;
+// Up to so many contacts the dense portfolio takes milliseconds.
+constexpr size_t kFewContacts = 8;
+// Proximal steps at a path's end.
+constexpr int kMaxProximalRounds = 40;
+// Complementarities after which the polish is tried; rounding may stop the iteration for one step.
+constexpr double kInteriorPointGoals[] = {1e-10, 1e-14, 1e-18, 1e-22, 1e-26, 1e-26, 1e-26, 1e-26};
+// A contact whose mode has been changed this often changes alone, the worst one first.
+constexpr int kMaxChangesTogether = 3;
+
+}  // namespace
+
+void ContactFallbacks::Add(const ContactFallbacks& other) {
+  pivoting += other.pivoting;
+  interior_point += other.interior_point;
+  lemke += other.lemke;
+  dense += other.dense;
+  restarts += other.restarts;
+  extrapolation += other.extrapolation;
+  regularised += other.regularised;
+  whole_system += other.whole_system;
+  islands_together += other.islands_together;
+}
+
+void ContactSolver::Reserve(int num_bodies, int num_joints, int num_contacts) {
+  const int blocks = num_bodies + num_joints + num_contacts;
+  const int edges = 2 * (num_joints + num_contacts) + num_joints;
+  system_.Reserve(blocks, edges);
+  interior_point_.lu.Reserve(blocks, edges);
+  pivoting_.Reserve(blocks, num_contacts);
+  interior_point_.edges.reserve(edges);
+  for (std::vector<double>* x : {&interior_point_.v,
+                                 &interior_point_.y,
+                                 &interior_point_.z,
+                                 &interior_point_.s,
+                                 &interior_point_.step,
+                                 &interior_point_.affine,
+                                 &interior_point_.ds,
+                                 &interior_point_.ds_affine,
+                                 &interior_point_.target,
+                                 &interior_point_.residual,
+                                 &interior_point_.unit_z,
+                                 &interior_point_.unit_s,
+                                 &rhs_,
+                                 &interior_point_.rhs,
+                                 &interior_point_.correction,
+                                 &correction_,
+                                 &start_,
+                                 &centre_joint_,
+                                 &centre_normal_,
+                                 &centre_tangent_}) {
+    x->reserve(3 * blocks);
+  }
+  for (ContactSolution<double>* solution : {&trial_, &entry_, &last_}) {
+    solution->v.reserve(3 * num_bodies);
+    solution->joint_impulse.reserve(3 * num_joints);
+    solution->normal_impulse.reserve(num_contacts);
+    solution->tangent_impulse.reserve(num_contacts);
+    solution->modes.reserve(num_contacts);
+  }
+  changes_.reserve(num_contacts);
+  scales_.speed.reserve(num_bodies);
+  scales_.lever.reserve(num_bodies);
+}
+
+void ContactSolver::SetCentre(const ContactSolution<double>& solution) {
+  centre_joint_ = solution.joint_impulse;
+  centre_normal_ = solution.normal_impulse;
+  centre_tangent_ = solution.tangent_impulse;
+}
+
+bool ContactSolver::SolveWithModes(const ContactProblem<double>& problem,
+                                   ContactSolution<double>* solution, ContactSolverReport* report) {
+  ++report->factorisations;
+  if (!system_.Factor(problem, solution->modes)) {
+    return false;
+  }
+  const int nb = problem.num_bodies;
+  const int nj = static_cast<int>(problem.joints.size());
+  const std::vector<int>& block_of = system_.contact_block();
+  rhs_.assign(3 * system_.num_blocks(), 0.0);
+  std::copy(problem.momentum.begin(), problem.momentum.end(), rhs_.begin());
+  int closed = 0;
+  for (int j = 0; j < nj; ++j) {
+    for (int r = 0; r < problem.joints[j].rows; ++r) {
+      rhs_[3 * (nb + j) + r] = problem.joints[j].rhs[r];
+    }
+  }
+  for (size_t i = 0; i < problem.contacts.size(); ++i) {
+    if (block_of[i] >= 0) {
+      ++closed;
+      rhs_[3 * block_of[i]] = -problem.contacts[i].c_n;
+      rhs_[3 * block_of[i] + 1] =
+          solution->modes[i] == ContactMode::kSticking ? -problem.contacts[i].c_t : 0.0;
+    }
+  }
+  // Start from the last impulses where there may be a choice among them.
+  const bool choice = closed > 1 || (problem.redundant_joints && nj > 0);
+  correction_.assign(rhs_.size(), 0.0);
+  if (choice) {
+    for (int j = 0; j < 3 * nj; ++j) {
+      correction_[3 * nb + j] = centre_joint_[j];
+    }
+    for (size_t i = 0; i < problem.contacts.size(); ++i) {
+      if (block_of[i] >= 0) {
+        correction_[3 * block_of[i]] = centre_normal_[i];
+        correction_[3 * block_of[i] + 1] =
+            solution->modes[i] == ContactMode::kSticking ? centre_tangent_[i] : 0.0;
+      }
+    }
+    // rhs := rhs − K x0; the solution is x0 + K⁻¹ rhs.
+    start_ = rhs_;
+    system_.Residual<false>(problem, solution->modes, start_.data(), correction_.data(), 1,
+                            rhs_.data());
+  }
+  if (choice) {
+    system_.SolveProximal(problem, solution->modes, rhs_.data(), 1);
+  } else {
+    system_.Solve(problem, solution->modes, rhs_.data(), 1);
+  }
+  for (size_t i = 0; i < rhs_.size(); ++i) {
+    correction_[i] += rhs_[i];
+  }
+  solution->v.assign(correction_.begin(), correction_.begin() + 3 * nb);
+  solution->joint_impulse.assign(correction_.begin() + 3 * nb, correction_.begin() + 3 * (nb + nj));
+  for (size_t i = 0; i < problem.contacts.size(); ++i) {
+    solution->normal_impulse[i] = block_of[i] >= 0 ? correction_[3 * block_of[i]] : 0.0;
+    solution->tangent_impulse[i] = 0.0;
+    if (solution->modes[i] == ContactMode::kSticking) {
+      solution->tangent_impulse[i] = correction_[3 * block_of[i] + 1];
+    } else if (block_of[i] >= 0 && SlidingSign(solution->modes[i]) != 0.0) {
+      solution->tangent_impulse[i] = -SlidingSign(solution->modes[i]) *
+                                     problem.contacts[i].friction * solution->normal_impulse[i];
+    }
+  }
+  return true;
+}
+
+bool ContactSolver::SolveByModeChanges(const ContactProblem<double>& problem,
+                                       const ContactSolverOptions& options,
+                                       ContactSolution<double>* solution,
+                                       ContactSolverReport* report) {
+  const size_t num_contacts = problem.contacts.size();
+  changes_.assign(num_contacts, 0);
+  SetCentre(*solution);
+  int last_contradicted = static_cast<int>(num_contacts);
+  double last_residual = HUGE_VAL;
+  for (int round = 0; round < kMaxRounds; ++round) {
+    if (!SolveWithModes(problem, solution, report)) {
+      return false;
+    }
+    scales_.Compute(problem, *solution);
+    int contradicted = 0;
+    int worst = -1;
+    ModeChange worst_change{ContactMode::kOpen};
+    for (size_t i = 0; i < num_contacts; ++i) {
+      const ContactValues values =
+          Evaluate(problem, scales_, problem.contacts[i], solution->v.data());
+      const ModeChange change = Contradiction(
+          problem.contacts[i], values, solution->modes[i], solution->normal_impulse[i],
+          solution->tangent_impulse[i], scales_.impulse, options.tolerance);
+      if (change.violation == 0.0) {
+        continue;
+      }
+      ++contradicted;
+      if (changes_[i] < kMaxChangesTogether) {
+        ++changes_[i];
+        solution->modes[i] = change.mode;
+      } else if (change.violation > worst_change.violation) {
+        worst = static_cast<int>(i);
+        worst_change = change;
+      }
+    }
+    if (worst >= 0) {
+      ++changes_[worst];
+      solution->modes[worst] = worst_change.mode;
+    }
+    if (contradicted == 0) {
+      report->residual =
+          BalancedResidual(problem, options.tolerance, solution, &report->worst_contact);
+      if (report->residual <= options.tolerance) {
+        return true;
+      }
+      if (report->residual > 0.5 * last_residual) {
+        return false;
+      }
+      last_residual = report->residual;
+      SetCentre(*solution);  // what δ leaves goes with another proximal step
+    } else if (contradicted > std::max(last_contradicted, kFewContradicted)) {
+      return false;  // an avalanche: pivots go one by one
+    }
+    last_contradicted = contradicted > 0 ? contradicted : static_cast<int>(num_contacts);
+  }
+  return false;
+}
+
+bool ContactSolver::Polish(const ContactProblem<double>& problem,
+                           const ContactSolverOptions& options, ContactSolution<double>* solution,
+                           ContactSolverReport* report) {
+  const std::vector<ContactMode> given = solution->modes;
+  bool polished = false;
+  int worst = -1;
+  double before = NaturalResidual(problem, *solution, &worst);
+  // A round may show that a row near its limit was judged wrongly; two more put it right or give
+  // up.
+  for (int round = 0; round < 3; ++round) {
+    trial_ = *solution;
+    SetCentre(*solution);
+    if (!SolveWithModes(problem, &trial_, report)) {
+      break;
+    }
+    int trial_worst = -1;
+    const double after = BalancedResidual(problem, options.tolerance, &trial_, &trial_worst);
+    if (after <= before || after <= 0.01 * options.tolerance) {
+      *solution = trial_;
+      before = after;
+      worst = trial_worst;
+      polished = true;
+      break;
+    }
+    scales_.Compute(problem, trial_);
+    for (size_t i = 0; i < problem.contacts.size(); ++i) {
+      const ContactValues values = Evaluate(problem, scales_, problem.contacts[i], trial_.v.data());
+      solution->modes[i] =
+          Contradiction(problem.contacts[i], values, trial_.modes[i], trial_.normal_impulse[i],
+                        trial_.tangent_impulse[i], scales_.impulse, options.tolerance)
+              .mode;
+    }
+  }
+  report->residual = before;
+  report->worst_contact = worst;
+  if (polished || before > options.tolerance) {
+    return before <= options.tolerance;
+  }
+  // It was good enough as given. What was tried has left another system and other modes behind; the
+  // derivative needs those of the solution.
+  solution->modes = given;
+  ++report->factorisations;
+  return system_.Factor(problem, given);
+}
+
+bool ContactSolver::SolveByInteriorPoint(const ContactProblem<double>& problem,
+                                         const ContactSolverOptions& options,
+                                         ContactSolution<double>* solution,
+                                         ContactSolverReport* report) {
+  ContactInteriorPointOptions interior_point;
+  interior_point.max_iterations = options.max_iterations;
+  if (options.smoothing > 0.0) {
+    // A smoothed solution is what was asked for; it is not exact, and no polish makes it so. The
+    // system of its modes is still factorised, for the derivative.
+    interior_point.complementarity = options.smoothing;
+    const InteriorPointOutcome outcome =
+        SolveContactsByInteriorPoint(problem, interior_point, &interior_point_, solution);
+    report->iterations += outcome.iterations;
+    report->residual = NaturalResidual(problem, *solution, &report->worst_contact);
+    return system_.Factor(problem, solution->modes) && outcome.converged;
+  }
+  // Most modes are clear early. Where margins are small they show later, if rounding lets the
+  // iteration go on.
+  for (const double goal : kInteriorPointGoals) {
+    interior_point.complementarity = goal;
+    // At the end the steps are small, and what the proximal term leaves of the equations must go.
+    interior_point.proximal = goal < 1e-15 ? 1e-10 : 1e-9;
+    const InteriorPointOutcome outcome =
+        SolveContactsByInteriorPoint(problem, interior_point, &interior_point_, solution);
+    report->iterations += outcome.iterations;
+    if (Polish(problem, options, solution, report)) {
+      return true;
+    }
+    if (outcome.complementarity > 1e-6) {
+      break;  // it has not arrived; going on from there would not help
+    }
+    interior_point.resume = true;
+  }
+  // Rows that are almost redundant leave modes that only pivots tell apart.
+  ++report->fallbacks.pivoting;
+  return SolveByPivoting(problem, options, ContactPivoting::From::kModes,
+                         kPivotsFromInteriorPoint * (1 + static_cast<int>(problem.contacts.size())),
+                         kMaxProximalRounds, solution, report);
+}
+
+void ContactSolver::MeasureWithoutContacts(const ContactProblem<double>& problem,
+                                           ContactSolution<double>* solution,
+                                           ContactSolverReport* report) {
+  solution->modes.assign(problem.contacts.size(), ContactMode::kOpen);
+  solution->normal_impulse.assign(problem.contacts.size(), 0.0);
+  solution->tangent_impulse.assign(problem.contacts.size(), 0.0);
+  if (!SolveWithModes(problem, solution, report)) {
+    solution->v.resize(problem.momentum.size());
+    for (size_t i = 0; i < solution->v.size(); ++i) {
+      solution->v[i] = problem.momentum[i] / problem.mass[i];
+    }
+    solution->joint_impulse.assign(3 * problem.joints.size(), 0.0);
+  }
+  report->residual = NaturalResidual(problem, *solution, &report->worst_contact);
+}
+
+bool ContactSolver::SolveByLemke(const ContactProblem<double>& problem,
+                                 const ContactSolverOptions& options,
+                                 ContactSolution<double>* solution, ContactSolverReport* report) {
+  int iterations = 0;
+  const bool by_lemke = SolveContactsByLemke(problem, solution, &iterations);
+  report->iterations += iterations;
+  if (by_lemke && Polish(problem, options, solution, report)) {
+    return true;
+  }
+  if (options.choice == ContactSolverChoice::kLemke) {
+    if (!by_lemke) {
+      MeasureWithoutContacts(problem, solution, report);
+    }
+    return false;
+  }
+  const auto by_dense = [&] {
+    if (!FitsDensePortfolio(problem)) {
+      return false;
+    }
+    ++report->fallbacks.dense;
+    const bool dense = SolveContactsDense(problem, options.tolerance, solution, &iterations);
+    report->iterations += iterations;
+    return dense && Polish(problem, options, solution, report);
+  };
+  const auto by_restarts = [&] { return SolveByRestarts(problem, options, solution, report); };
+  // What is cheaper comes first.
+  return problem.contacts.size() <= kFewContacts ? by_dense() || by_restarts()
+                                                 : by_restarts() || by_dense();
+}
+
+ContactSolverReport ContactSolver::Solve(const ContactProblem<double>& problem,
+                                         const ContactSolverOptions& options,
+                                         ContactSolution<double>* solution) {
+  const int expansions = system_.expansions();
+  const int regularised = system_.regularised_steps();
+  ContactSolverReport report = RunPortfolio(problem, options, solution);
+  report.fallbacks.whole_system = system_.expansions() - expansions;
+  report.fallbacks.regularised = system_.regularised_steps() - regularised;
+  return report;
+}
+
+ContactSolverReport ContactSolver::RunPortfolio(const ContactProblem<double>& problem,
+                                                const ContactSolverOptions& options,
+                                                ContactSolution<double>* solution) {
+  ContactSolverReport report;
+  const auto done = [&](SolvedBy by) {
+    report.solved = true;
+    report.solved_by = by;
+    return report;
+  };
+  if (problem.contacts.empty()) {
+    SetCentre(*solution);
+    if (SolveWithModes(problem, solution, &report)) {
+      report.residual = NaturalResidual(problem, *solution, &report.worst_contact);
+      if (report.residual <= options.tolerance) {
+        return done(SolvedBy::kDirect);
+      }
+    } else {
+      MeasureWithoutContacts(problem, solution, &report);
+    }
+    return report;
+  }
+  const bool exact = options.smoothing == 0.0;
+  entry_ = *solution;
+  const bool any = options.choice == ContactSolverChoice::kAuto && exact;
+  if (any && SolveByModeChanges(problem, options, solution, &report)) {
+    return done(SolvedBy::kGuess);
+  }
+  const int num_contacts = static_cast<int>(problem.contacts.size());
+  if (any) {
+    *solution = entry_;
+    ++report.fallbacks.pivoting;
+    if (SolveByPivoting(problem, options, ContactPivoting::From::kModes,
+                        kPivotsFromGuess + num_contacts / 2, kMaxProximalRounds, solution,
+                        &report)) {
+      return done(SolvedBy::kGuess);
+    }
+    *solution = entry_;
+    ++report.fallbacks.interior_point;
+  }
+  if (options.choice != ContactSolverChoice::kLemke &&
+      SolveByInteriorPoint(problem, options, solution, &report)) {
+    return done(SolvedBy::kInteriorPoint);
+  }
+  if (options.choice != ContactSolverChoice::kInteriorPoint && exact) {
+    *solution = entry_;
+    report.fallbacks.lemke += any ? 1 : 0;
+    if (SolveByPivoting(problem, options, ContactPivoting::From::kOpen,
+                        kPivotsFromOpen * (1 + num_contacts), kMaxProximalRounds, solution,
+                        &report)) {
+      return done(SolvedBy::kLemke);
+    }
+  }
+  if (options.choice != ContactSolverChoice::kInteriorPoint && exact &&
+      SolveByLemke(problem, options, solution, &report)) {
+    return done(SolvedBy::kLemke);
+  }
+  return report;
+}
+
+}  // namespace tangible

@@ -1,0 +1,141 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// The portfolio for contact problems: guess by contact modes, then interior point, then Lemke.
+//
+// 1. With modes given the problem is one linear system (contact_system.h). Its solution is exact
+//    where it satisfies every inequality. Modes that are contradicted are changed and the system is
+//    solved again, as long as fewer are contradicted from round to round. Where rows are redundant
+//    each solve is a proximal step from the last impulses: these change as little as the data
+//    require.
+// 2. Pivoting from the guess (contact_pivoting.h), a bounded number of pivots: the search among the
+//    impulses of redundant rows, where the guess is nearly right. Counted as the guess's.
+// 3. Mehrotra's interior point (contact_interior_point.h), and pivoting from its modes where small
+//    margins hide them.
+// 4. Lemke's method: pivoting from all contacts open; then on the dense one-sided form;
+//    for problems that are not proved infeasible pivoting from random starts
+//    (contact_restarts.cc); for those that are not large the dense portfolio's other attempts.
+//
+// After 3 and 4 the modes are identified and the mode system is solved once more: the polish. A
+// solution counts only by its scaled natural residual, recomputed from the data.
+//
+// Pivoting ends in proximal steps with δ falling from 1e-7 to 1e-8. What then still remains and no
+// longer falls is a contradiction of rows among which only the impulses' limits can choose: these
+// are approached along the impulses' last change.
+
+#include <vector>
+
+#include "tangible/lcp/contact/contact_interior_point.h"
+#include "tangible/lcp/contact/contact_pivoting.h"
+#include "tangible/lcp/system/contact_problem.h"
+#include "tangible/lcp/system/contact_residual.h"
+#include "tangible/lcp/system/contact_system.h"
+
+namespace tangible {
+
+enum class ContactSolverChoice { kAuto, kInteriorPoint, kLemke };
+enum class SolvedBy : unsigned char { kNothing, kDirect, kGuess, kInteriorPoint, kLemke };
+
+struct ContactSolverOptions {
+  ContactSolverChoice choice = ContactSolverChoice::kAuto;
+  double tolerance = 1e-10;  ///< of the scaled natural residual
+  int max_iterations = 100;  ///< of the interior point
+  double smoothing = 0.0;  ///< relative complementarity at which the interior point stops, without
+                           ///< polish; 0: exact
+};
+
+/// What solves leaned on beyond changes of the guess's modes. A method that the options ask for is
+/// none.
+struct ContactFallbacks {
+  long pivoting = 0;          ///< paths of pivots from the guess or from the interior point's modes
+  long interior_point = 0;    ///< runs of the interior point
+  long lemke = 0;             ///< paths of pivots from all contacts open, Lemke's method
+  long dense = 0;             ///< the dense portfolio
+  long restarts = 0;          ///< paths of pivots from many random starts
+  long extrapolation = 0;     ///< impulses of rows that contradict each other moved on
+  long regularised = 0;       ///< proximal steps in which δ stands for redundant rows
+  long whole_system = 0;      ///< condensed systems that were factorised as a whole instead
+  long islands_together = 0;  ///< islands that could not be solved apart
+
+  void Add(const ContactFallbacks& other);
+};
+
+struct ContactSolverReport {
+  bool solved = false;
+  SolvedBy solved_by = SolvedBy::kNothing;
+  int factorisations = 0;  ///< of mode systems
+  int iterations = 0;      ///< of the interior point or Lemke
+  double residual = 0.0;   ///< scaled natural residual
+  int worst_contact = -1;  ///< where it is largest, −1: an equation
+  ContactFallbacks fallbacks;
+};
+
+class ContactSolver {
+ public:
+  /// `solution` holds the guess on entry (modes and impulses, sized for the problem) and the
+  /// solution on return.
+  ContactSolverReport Solve(const ContactProblem<double>& problem,
+                            const ContactSolverOptions& options, ContactSolution<double>* solution);
+  /// The mode system of the last solution, factorised with its modes.
+  ContactSystem& system() { return system_; }
+  void Reserve(int num_bodies, int num_joints, int num_contacts);
+
+ private:
+  ContactSolverReport RunPortfolio(const ContactProblem<double>& problem,
+                                   const ContactSolverOptions& options,
+                                   ContactSolution<double>* solution);
+  // The proximal step from the centre's impulses with the solution's modes.
+  bool SolveWithModes(const ContactProblem<double>& problem, ContactSolution<double>* solution,
+                      ContactSolverReport* report);
+  void SetCentre(const ContactSolution<double>& solution);
+  bool SolveByModeChanges(const ContactProblem<double>& problem,
+                          const ContactSolverOptions& options, ContactSolution<double>* solution,
+                          ContactSolverReport* report);
+  bool SolveByInteriorPoint(const ContactProblem<double>& problem,
+                            const ContactSolverOptions& options, ContactSolution<double>* solution,
+                            ContactSolverReport* report);
+  bool SolveByLemke(const ContactProblem<double>& problem, const ContactSolverOptions& options,
+                    ContactSolution<double>* solution, ContactSolverReport* report);
+  // Where a method ends without any iterate: the motion without contact impulses stands in for it,
+  // so that the report names a contact that is violated and by how much.
+  void MeasureWithoutContacts(const ContactProblem<double>& problem,
+                              ContactSolution<double>* solution, ContactSolverReport* report);
+  bool SolveByPivoting(const ContactProblem<double>& problem, const ContactSolverOptions& options,
+                       ContactPivoting::From from, int max_pivots, int max_rounds,
+                       ContactSolution<double>* solution, ContactSolverReport* report);
+  // Pivoting from random modes and over random shifts (contact_restarts.cc), unless the problem is
+  // proved to have no solution.
+  bool SolveByRestarts(const ContactProblem<double>& problem, const ContactSolverOptions& options,
+                       ContactSolution<double>* solution, ContactSolverReport* report);
+  bool Polish(const ContactProblem<double>& problem, const ContactSolverOptions& options,
+              ContactSolution<double>* solution, ContactSolverReport* report);
+
+  ContactSystem system_;
+  ContactPivoting pivoting_;
+  InteriorPointWorkspace<double> interior_point_;
+  ContactSolution<double> trial_, entry_, last_;
+  std::vector<double> rhs_, correction_, start_;
+  std::vector<double> centre_joint_, centre_normal_, centre_tangent_;
+  std::vector<int> changes_;
+  ContactScales scales_;
+};
+
+/// Whether the problem is small enough for the dense portfolio: up to 240 rows of the one-sided
+/// form (4 a contact with friction, else 1), and 1000 unknowns of bodies and joints.
+bool FitsDensePortfolio(const ContactProblem<double>& problem);
+
+/// The dense portfolio (solver.h) with its further attempts, on the one-sided form; false where it
+/// fails or does not fit.
+bool SolveContactsDense(const ContactProblem<double>& problem, double tolerance,
+                        ContactSolution<double>* solution, int* iterations);
+
+/// Whether a checked Farkas vector says that no impulses satisfy the contacts' inequalities; false
+/// too where the problem has more than 400 rows or 1000 unknowns.
+bool ContactsProvedInfeasible(const ContactProblem<double>& problem);
+
+/// Lemke's method on the dense one-sided form of the problem; false where it fails, or the problem
+/// has more than 400 rows or 1000 unknowns.
+bool SolveContactsByLemke(const ContactProblem<double>& problem, ContactSolution<double>* solution,
+                          int* iterations);
+
+}  // namespace tangible

@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/lcp/contact/worker_pool.h"
+
+namespace tangible {
+
+WorkerPool::~WorkerPool() {
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    ends_ = true;
+  }
+  work_.notify_all();
+  for (std::thread& thread : threads_) {
+    thread.join();
+  }
+}
+
+void WorkerPool::TakeTasks(int thread) {
+  try {
+    for (size_t k = next_++; k < count_; k = next_++) {
+      (*task_)(k, thread);
+    }
+  } catch (...) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    error_ = error_ ? error_ : std::current_exception();
+  }
+}
+
+void WorkerPool::Wait(int thread) {
+  std::uint64_t seen = 0;
+  for (;;) {
+    {
+      std::unique_lock<std::mutex> lock(mutex_);
+      work_.wait(lock, [&] { return ends_ || round_ != seen; });
+      if (ends_) {
+        return;
+      }
+      seen = round_;
+    }
+    TakeTasks(thread);
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (--busy_ == 0) {
+      done_.notify_one();
+    }
+  }
+}
+
+void WorkerPool::Start() {
+  while (static_cast<int>(threads_.size()) < threads_wanted_ - 1) {
+    threads_.emplace_back([this, thread = static_cast<int>(threads_.size()) + 1] { Wait(thread); });
+  }
+}
+
+void WorkerPool::Run(size_t count, int threads, const std::function<void(size_t, int)>& task) {
+  if (std::min(threads, threads_wanted_) == 1 || count <= 1) {
+    for (size_t k = 0; k < count; ++k) {
+      task(k, 0);
+    }
+    return;
+  }
+  Start();
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    task_ = &task;
+    count_ = count;
+    next_ = 0;
+    error_ = nullptr;
+    busy_ = static_cast<int>(threads_.size());
+    ++round_;
+  }
+  work_.notify_all();
+  TakeTasks(0);
+  std::unique_lock<std::mutex> lock(mutex_);
+  done_.wait(lock, [&] { return busy_ == 0; });
+  if (error_) {
+    std::rethrow_exception(error_);
+  }
+}
+
+}  // namespace tangible

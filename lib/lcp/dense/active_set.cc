@@ -1,0 +1,182 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/lcp/dense/active_set.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+namespace tangible {
+namespace {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+
+double Ratio(double value, double scale) { return value == 0.0 ? 0.0 : value / scale; }
+
+// The point plus the correction that puts it on the equations of `modes`.
+LcpVector SolveModes(const MixedLcp<double>& problem, const std::vector<RowMode>& modes,
+                     const LcpVector& from) {
+  LcpVector point = from;
+  for (Index i = 0; i < point.z.size(); ++i) {
+    if (modes[i] == RowMode::kInactive) point.z[i] = 0.0;
+  }
+  const ModeSystem system(problem, modes, VectorXd::Zero(point.z.size()));
+  // The second pass corrects what rounding left of the first.
+  for (int pass = 0; pass < 2; ++pass) {
+    const LcpVector missing{problem.p - problem.M * point.v + problem.A.transpose() * point.y +
+                                problem.G.transpose() * point.z,
+                            problem.b - problem.A * point.v, -Slack(problem, point.v, point.z)};
+    const LcpVector correction = system.Solve(missing);
+    point.v += correction.v;
+    point.y += correction.y;
+    point.z += correction.z;
+  }
+  return point;
+}
+
+struct SignCheck {
+  int violations = 0;
+  Index worst = -1;
+};
+
+// Rows of the wrong sign, beyond rounding; flips their modes (only the worst one if `only_worst`).
+enum class Flip { kAll, kWorst };
+SignCheck FlipWrongSigns(const MixedLcp<double>& problem, const LcpVector& point, Flip flip,
+                         std::vector<RowMode>& modes) {
+  constexpr double kRounding = 1e-14;
+  const LcpScales scales = ComputeScales(problem, point.v, point.y, point.z);
+  const VectorXd s = Slack(problem, point.v, point.z);
+  SignCheck check;
+  double worst = kRounding;
+  std::vector<RowMode> flipped = modes;
+  for (Index i = 0; i < s.size(); ++i) {
+    const bool active = modes[i] == RowMode::kActive;
+    const double violation =
+        active ? -Ratio(point.z[i], scales.force[i]) : -Ratio(s[i], scales.slack[i]);
+    if (!(violation > kRounding)) continue;
+    ++check.violations;
+    flipped[i] = active ? RowMode::kInactive : RowMode::kActive;
+    if (violation > worst) {
+      worst = violation;
+      check.worst = i;
+    }
+  }
+  if (flip == Flip::kAll) {
+    modes = flipped;
+  } else if (check.worst >= 0) {
+    modes[check.worst] = flipped[check.worst];
+  }
+  return check;
+}
+
+// Keeps the better of two points. The one that was solved for on its modes' equations, with exact
+// zeros, wins over a residual that is lower only by rounding.
+class Best {
+ public:
+  Best(const MixedLcp<double>& problem, LcpVector point)
+      : problem_(problem), point_(std::move(point)) {
+    constexpr double kRounding = 1e-15;
+    point_.z = point_.z.cwiseMax(0.0);
+    residual_ = ScaledResidual(problem_, point_.v, point_.y, point_.z) + kRounding;
+    ConsiderWithoutCrumbs(point_);
+  }
+  void Offer(LcpVector point) {
+    point.z = point.z.cwiseMax(0.0);
+    Consider(point);
+    ConsiderWithoutCrumbs(std::move(point));
+  }
+  double Residual() const { return residual_; }
+  const LcpVector& Point() const { return point_; }
+
+ private:
+  void ConsiderWithoutCrumbs(LcpVector point) {
+    // What rounding left of an impulse, 1e-48, is of the same size as its cone's other terms: as a
+    // violation of that row it would count in full.
+    const LcpScales scales = ComputeScales(problem_, point.v, point.y, point.z);
+    for (const double crumb : {1e-15, 1e-13, 1e-11, 1e-9, 1e-7}) {
+      if (residual_ <= 2.0 * crumb) return;
+      bool cleaned = false;
+      for (Index i = 0; i < point.z.size(); ++i) {
+        if (point.z[i] == 0.0 || point.z[i] > crumb * scales.force[i]) continue;
+        point.z[i] = 0.0;
+        cleaned = true;
+      }
+      if (cleaned) Consider(point);
+    }
+  }
+
+  void Consider(const LcpVector& point) {
+    const double residual = ScaledResidual(problem_, point.v, point.y, point.z);
+    if (residual < residual_) {
+      residual_ = residual;
+      point_ = point;
+    }
+  }
+
+  const MixedLcp<double>& problem_;
+  LcpVector point_;
+  double residual_ = std::numeric_limits<double>::infinity();
+};
+
+}  // namespace
+
+std::vector<RowMode> IdentifyModes(const MixedLcp<double>& problem, const LcpVector& point) {
+  const LcpScales scales = ComputeScales(problem, point.v, point.y, point.z);
+  const VectorXd s = Slack(problem, point.v, point.z);
+  std::vector<RowMode> modes(s.size(), RowMode::kInactive);
+  for (Index i = 0; i < s.size(); ++i) {
+    if (Ratio(point.z[i], scales.force[i]) > Ratio(s[i], scales.slack[i])) {
+      modes[i] = RowMode::kActive;
+    }
+  }
+  return modes;
+}
+
+LcpVector Polish(const MixedLcp<double>& problem, const LcpVector& point, int max_rounds) {
+  const LcpVector best = Best(problem, point).Point();
+  return Polish(problem, best, max_rounds, IdentifyModes(problem, best));
+}
+
+LcpVector Polish(const MixedLcp<double>& problem, const LcpVector& point, int max_rounds,
+                 std::vector<RowMode> modes) {
+  Best best(problem, point);
+  LcpVector current = best.Point();
+  int fewest = std::numeric_limits<int>::max();
+  int patience = 3;
+  for (int round = 0; round < max_rounds; ++round) {
+    current = SolveModes(problem, modes, current);
+    if (!current.v.allFinite() || !current.y.allFinite() || !current.z.allFinite()) break;
+    best.Offer(current);
+    // All wrong rows at once while that makes progress, then one by one (both may be needed: the
+    // first is fast, the second cycles less).
+    const SignCheck check =
+        FlipWrongSigns(problem, current, patience > 0 ? Flip::kAll : Flip::kWorst, modes);
+    if (check.violations == 0) break;
+    if (check.violations < fewest) {
+      fewest = check.violations;
+    } else {
+      --patience;
+    }
+    current.z = current.z.cwiseMax(0.0);
+  }
+  return best.Point();
+}
+
+LcpVector EnumerateModes(const MixedLcp<double>& problem, double tolerance) {
+  const Index nz = problem.num_z();
+  const LcpVector zero{VectorXd::Zero(problem.num_v()), VectorXd::Zero(problem.num_y()),
+                       VectorXd::Zero(nz)};
+  Best best(problem, zero);
+  std::vector<RowMode> modes(nz);
+  for (unsigned set = 0; set < (1U << nz) && best.Residual() > tolerance; ++set) {
+    for (Index i = 0; i < nz; ++i) {
+      modes[i] = ((set >> i) & 1U) != 0 ? RowMode::kActive : RowMode::kInactive;
+    }
+    const LcpVector point = SolveModes(problem, modes, zero);
+    if (point.z.allFinite() && point.v.allFinite()) best.Offer(point);
+  }
+  return best.Point();
+}
+
+}  // namespace tangible

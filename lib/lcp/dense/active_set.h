@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// The active-set polish: from a nearly solved LCP to machine precision.
+//
+// Row i is active (sᵢ = 0) where zᵢ / ζᵢ > sᵢ / σᵢ (problem.h), else inactive (zᵢ = 0). The
+// equality system of these modes is solved for the *correction* of the given point, of least norm
+// where rows are redundant, so that impulses which are not unique stay where they are: near the
+// given, non-negative ones (the minimum-norm impulses of right modes can be negative). Rows with a
+// wrong sign change their mode, a bounded number of times.
+
+#include <vector>
+
+#include "tangible/lcp/dense/mode_system.h"
+#include "tangible/lcp/dense/problem.h"
+
+namespace tangible {
+
+/// The modes read from a point, none of them a kink.
+std::vector<RowMode> IdentifyModes(const MixedLcp<double>& problem, const LcpVector& point);
+
+/// The point of the least scaled residual among the given one (with negative z set to 0) and those
+/// visited. Cost: a factorisation a visited set of modes, at most `max_rounds`.
+LcpVector Polish(const MixedLcp<double>& problem, const LcpVector& point, int max_rounds = 30);
+/// The same, beginning with these modes: those of a basis, where the point is too near others.
+LcpVector Polish(const MixedLcp<double>& problem, const LcpVector& point, int max_rounds,
+                 std::vector<RowMode> modes);
+
+/// Solves the equality systems of all 2ⁿ sets of modes, nz ≤ kMaxEnumeratedRows, until one is a
+/// solution to `tolerance`; returns the best point.
+inline constexpr int kMaxEnumeratedRows = 12;
+LcpVector EnumerateModes(const MixedLcp<double>& problem, double tolerance);
+
+}  // namespace tangible

@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/lcp/dense/certificate.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+
+namespace tangible {
+namespace {
+
+std::string Short(double x) {
+  std::array<char, 32> text{};
+  std::snprintf(text.data(), text.size(), "%.1e", x);
+  return text.data();
+}
+
+std::string At(const Certificate& certificate) {
+  return certificate.margin_where.empty() ? "" : " at " + certificate.margin_where;
+}
+
+// Why the derivative may change nearby, or empty.
+std::string Kink(const Certificate& certificate) {
+  if (certificate.degenerate_rows > 0) {
+    return "kink of " + std::to_string(certificate.degenerate_rows) + " rows" + At(certificate);
+  }
+  if (certificate.margin_min < kNearKinkMargin) {
+    return "margin " + Short(certificate.margin_min) + At(certificate);
+  }
+  if (!(certificate.linear_residual <= kLinearResidualLimit)) {
+    return std::isfinite(certificate.linear_residual)
+               ? "linear systems solved to " + Short(certificate.linear_residual) + " only"
+               : "linear systems that were not solved";
+  }
+  if (!(certificate.condition <= kConditionLimit)) {
+    return std::isfinite(certificate.condition)
+               ? "condition " + Short(certificate.condition) + " of a linear system"
+               : "a singular linear system";
+  }
+  return "";
+}
+
+}  // namespace
+
+void Merge(const Certificate& other, Certificate& certificate) {
+  if (other.margin_min < certificate.margin_min) {
+    certificate.margin_min = other.margin_min;
+    certificate.margin_where = other.margin_where;
+  }
+  certificate.degenerate_rows += other.degenerate_rows;
+  certificate.redundant_rows += other.redundant_rows;
+  certificate.condition = std::max(certificate.condition, other.condition);
+  certificate.linear_residual = std::max(certificate.linear_residual, other.linear_residual);
+  certificate.mode_switches += other.mode_switches;
+  certificate.events += other.events;
+  certificate.fallbacks += other.fallbacks;
+  if (certificate.one_sided.empty()) certificate.one_sided = other.one_sided;
+  if (certificate.discontinuous.empty()) certificate.discontinuous = other.discontinuous;
+  certificate.verdict.clear();
+}
+
+void SetVerdict(Certificate& certificate) {
+  const std::string kink = Kink(certificate);
+  certificate.verdict.clear();
+  const auto add = [&certificate](const char* kind, const std::string& reason) {
+    if (reason.empty()) return;
+    certificate.verdict += (certificate.verdict.empty() ? "" : "; ") + (kind + reason);
+  };
+  add("discontinuous: ", certificate.discontinuous);
+  add("near a kink: ", kink);
+  add("one-sided: ", certificate.one_sided);
+  if (certificate.verdict.empty()) certificate.verdict = "trustworthy";
+}
+
+}  // namespace tangible

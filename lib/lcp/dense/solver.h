@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// The portfolio: a few changes of modes starting from z = 0 (a step without impulses: where
+// friction leaves the outcome open, as for a box between two walls, the one without squeeze is
+// chosen); then interior point, then Lemke, each followed by the active-set polish; then a checked
+// proof of infeasibility; then a few deterministic further attempts (other starts and centring,
+// other covering vectors, proximal steps, enumeration of small problems). What solved it is in
+// the result. Success is decided only by the scaled residual recomputed from the data (problem.h).
+
+#include "tangible/lcp/dense/problem.h"
+#include "tangible/math/solver_choice.h"
+
+namespace tangible {
+
+struct LcpOptions {
+  SolverChoice solver = SolverChoice::kAuto;
+  double tolerance = 1e-10;  ///< largest scaled residual of a solution
+  int max_iterations = 100;  ///< of each interior-point run
+};
+
+/// Solves the problem, or says why not. Data that does not fit or is not finite is refused: status
+/// kUnsolved with a message and empty vectors. Never returns NaN.
+LcpSolution<double> SolveLcp(const MixedLcp<double>& problem, const LcpOptions& options = {});
+
+/// Implicit: solves in double, then pushes the derivatives through the factorised equations at the
+/// solution (derivative.h). Exact to rounding; at a kink one element of the generalised Jacobian.
+template <typename T>
+LcpSolution<T> SolveImplicit(const MixedLcp<T>& problem, const LcpOptions& options = {});
+
+/// Unrolled: every operation of the interior-point solver in Jets; where that fails, the modes
+/// found by the portfolio, solved in Jets. Independent of the formulas of derivative.h.
+template <typename T>
+LcpSolution<T> SolveUnrolled(const MixedLcp<T>& problem, const LcpOptions& options = {});
+
+}  // namespace tangible

@@ -1,0 +1,345 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/lcp/system/contact_residual.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "tangible/lcp/system/contact_system.h"
+
+namespace tangible {
+namespace {
+
+// The slowest scale of a body's speed, of the fastest one's: what is below it times the tolerance
+// that can be asked for, 1e-10, is the fastest one's rounding.
+constexpr double kSlowest = 1e-6;
+
+// The fastest scale of what impulses alone would do to a body, of the fastest one's speed. Between
+// masses 1e20 times as large it would be beyond all speeds that there are, and any row small.
+constexpr double kMostPushed = 1e6;
+
+// The least lever of a body's rotation, of the longest arm of its rows.
+constexpr double kLeastLever = 1e-3;
+
+// The largest component of a row for a body, rotation at the body's lever.
+double RowSize(const RowPart<double>& row, double lever) {
+  return std::max({std::abs(row[0]), std::abs(row[1]), std::abs(row[2]) / lever});
+}
+
+// Scale of a row's value: its largest term a body, at the body's speed scale.
+double RowSpeed(const ContactScales& scales, int a, const RowPart<double>& row_a, int b,
+                const RowPart<double>& row_b) {
+  return (a >= 0 ? scales.speed[a] * RowSize(row_a, scales.lever[a]) : 0.0) +
+         (b >= 0 ? scales.speed[b] * RowSize(row_b, scales.lever[b]) : 0.0);
+}
+
+// |min(z/ζ, s/σ)|, with 0/0 = 0. Beside a scale beyond what numbers hold anything would be small.
+double RowResidual(double z, double zeta, double s, double sigma) {
+  if (!std::isfinite(sigma)) return HUGE_VAL;
+  const double scaled_z = zeta > 0.0 ? z / zeta : 0.0;
+  const double scaled_s = sigma > 0.0 ? s / sigma : 0.0;
+  return std::abs(std::min(scaled_z, scaled_s));
+}
+
+// Of each body by itself: a heavy one's terms say nothing of what a light one lacks.
+double MomentumResidual(const ContactProblem<double>& problem, const ContactScales& scales,
+                        const ContactSolution<double>& solution) {
+  thread_local std::vector<double> left;
+  thread_local std::vector<double> terms;  // the largest
+  left.assign(problem.momentum.begin(), problem.momentum.end());
+  terms.resize(left.size());
+  const double* v = solution.v.data();
+  for (size_t i = 0; i < left.size(); ++i) {
+    terms[i] = std::max(std::abs(left[i]), std::abs(problem.mass[i] * v[i]));
+    left[i] -= problem.mass[i] * v[i];
+  }
+  // `size`: of the terms that cancel in the impulse.
+  const auto add_sized = [&](int a, const RowPart<double>& row_a, int b,
+                             const RowPart<double>& row_b, double impulse, double size) {
+    AddRowTransposed(a, row_a, b, row_b, impulse, left.data());
+    for (int i = 0; i < 3; ++i) {
+      if (a >= 0) terms[3 * a + i] = std::max(terms[3 * a + i], std::abs(row_a[i]) * size);
+      if (b >= 0) terms[3 * b + i] = std::max(terms[3 * b + i], std::abs(row_b[i]) * size);
+    }
+  };
+  const auto add = [&](int a, const RowPart<double>& row_a, int b, const RowPart<double>& row_b,
+                       double impulse) {
+    add_sized(a, row_a, b, row_b, impulse, std::abs(impulse));
+  };
+  for (const DamperBlock<double>& d : problem.dampers) {
+    double size = 0.0;
+    for (int i = 0; i < 3; ++i) {
+      size = std::max({size, d.a >= 0 ? std::abs(d.row_a[i] * v[3 * d.a + i]) : 0.0,
+                       d.b >= 0 ? std::abs(d.row_b[i] * v[3 * d.b + i]) : 0.0});
+    }
+    add_sized(d.a, d.row_a, d.b, d.row_b, -d.weight * RowDot(d.a, d.row_a, d.b, d.row_b, v),
+              std::abs(d.weight) * size);
+  }
+  for (size_t j = 0; j < problem.joints.size(); ++j) {
+    const JointBlock<double>& joint = problem.joints[j];
+    for (int k = 0; k < joint.rows; ++k) {
+      add(joint.a, joint.row_a[k], joint.b, joint.row_b[k], solution.joint_impulse[3 * j + k]);
+    }
+  }
+  for (size_t i = 0; i < problem.contacts.size(); ++i) {
+    const ContactBlock<double>& c = problem.contacts[i];
+    add(c.a, c.normal_a, c.b, c.normal_b, solution.normal_impulse[i]);
+    add(c.a, c.tangent_a, c.b, c.tangent_b, solution.tangent_impulse[i]);
+  }
+  double worst = 0.0;
+  for (int body = 0; body < problem.num_bodies; ++body) {
+    const double lever = scales.lever[body];
+    const double* x = &left[3 * body];
+    const double* of = &terms[3 * body];
+    const double missing = std::max({std::abs(x[0]), std::abs(x[1]), std::abs(x[2]) / lever});
+    const double scale = std::max({of[0], of[1], of[2] / lever});
+    // Terms beyond what numbers hold would make anything small beside them.
+    if (!std::isfinite(scale) || std::isnan(x[0] + x[1] + x[2])) return HUGE_VAL;
+    worst = std::max(worst, scale > 0.0 ? missing / scale : 0.0);
+  }
+  return worst;
+}
+
+double JointResidual(const ContactProblem<double>& problem, const ContactScales& scales,
+                     const double* v) {
+  double worst = 0.0;
+  for (const JointBlock<double>& joint : problem.joints) {
+    for (int k = 0; k < joint.rows; ++k) {
+      const double value = RowDot(joint.a, joint.row_a[k], joint.b, joint.row_b[k], v);
+      const double scale = std::abs(joint.rhs[k]) +
+                           RowSpeed(scales, joint.a, joint.row_a[k], joint.b, joint.row_b[k]);
+      if (!std::isfinite(scale)) return HUGE_VAL;
+      worst = std::max(worst, scale > 0.0 ? std::abs(value - joint.rhs[k]) / scale : 0.0);
+    }
+  }
+  return worst;
+}
+
+}  // namespace
+
+void ContactScales::Compute(const ContactProblem<double>& problem,
+                            const ContactSolution<double>& solution) {
+  ComputeSpeeds(problem, solution);
+  if (!AddPushes(problem, solution)) {
+    ComputeSpeeds(problem, solution);
+    RaiseLevers(problem, solution);
+    AddPushes(problem, solution);
+  }
+  impulse = ImpulseScale(solution.normal_impulse);
+}
+
+void ContactScales::ComputeSpeeds(const ContactProblem<double>& problem,
+                                  const ContactSolution<double>& solution) {
+  const std::vector<double>& momentum = problem.scale_momentum();
+  const std::vector<double>& mass = problem.mass;
+  speed.assign(problem.num_bodies, 0.0);
+  lever.assign(problem.num_bodies, 0.0);
+  total_ = 0.0;
+  fastest_ = 0.0;
+  for (int body = 0; body < problem.num_bodies; ++body) {
+    lever[body] = std::sqrt(mass[3 * body + 2] / mass[3 * body]);
+    for (int i = 0; i < 3; ++i) {
+      const int k = 3 * body + i;
+      const double component = std::max(std::abs(solution.v[k]), std::abs(momentum[k] / mass[k]));
+      speed[body] = std::max(speed[body], i < 2 ? component : lever[body] * component);
+    }
+    total_ += mass[3 * body] * speed[body];
+    fastest_ = std::max(fastest_, speed[body]);
+  }
+  for (double& of_body : speed) {
+    of_body = std::max(of_body, kSlowest * fastest_);
+  }
+}
+
+void ContactScales::RaiseLevers(const ContactProblem<double>& problem,
+                                const ContactSolution<double>& solution) {
+  ForEachImpulse(problem, solution, [this](int body, const RowPart<double>& row, double /*z*/) {
+    const double straight = std::max(std::abs(row[0]), std::abs(row[1]));
+    if (body >= 0 && straight > 0.0) {
+      lever[body] = std::max(lever[body], kLeastLever * std::abs(row[2]) / straight);
+    }
+  });
+}
+
+bool ContactScales::AddPushes(const ContactProblem<double>& problem,
+                              const ContactSolution<double>& solution) {
+  bool levers_are_long = true;
+  ForEachImpulse(problem, solution, [&](int body, const RowPart<double>& row, double z) {
+    if (body < 0) return;
+    const double straight = std::max(std::abs(row[0]), std::abs(row[1]));
+    const double turning = std::abs(row[2]) / lever[body];
+    levers_are_long = levers_are_long && !(straight > 0.0 && kLeastLever * turning > straight);
+    const double change = std::min(std::abs(z) * std::max(straight, turning), total_);
+    const double pushed = std::min(change / problem.mass[3 * body], kMostPushed * fastest_);
+    speed[body] = std::max(speed[body], pushed);
+  });
+  return levers_are_long;
+}
+
+ContactValues Evaluate(const ContactProblem<double>& problem, const ContactScales& scales,
+                       const ContactBlock<double>& c, const double* v) {
+  ContactValues values;
+  values.s_n = RowDot(c.a, c.normal_a, c.b, c.normal_b, v) + c.c_n;
+  values.sigma_n = RowSpeed(scales, c.a, c.normal_a, c.b, c.normal_b) + std::abs(c.c_n);
+  values.mobility_n = RowMobility(problem.mass, c.a, c.normal_a, c.b, c.normal_b);
+  values.slip = values.sigma_t = 0.0;
+  values.mobility_t = 1.0;
+  if (c.has_friction) {
+    values.slip = RowDot(c.a, c.tangent_a, c.b, c.tangent_b, v) + c.c_t;
+    values.sigma_t = RowSpeed(scales, c.a, c.tangent_a, c.b, c.tangent_b) + std::abs(c.c_t);
+    values.mobility_t = RowMobility(problem.mass, c.a, c.tangent_a, c.b, c.tangent_b);
+    // One contact, one scale of speed: an impulse along one row leaves rounding in the other.
+    values.sigma_n = values.sigma_t = std::max(values.sigma_n, values.sigma_t);
+  }
+  return values;
+}
+
+double ImpulseScale(const std::vector<double>& impulses) {
+  double scale = 0.0;
+  for (const double impulse : impulses) {
+    scale = std::max(scale, std::abs(impulse));
+  }
+  return scale;
+}
+
+double NaturalResidual(const ContactProblem<double>& problem,
+                       const ContactSolution<double>& solution, int* worst_contact) {
+  *worst_contact = -1;
+  thread_local ContactScales scales;
+  scales.Compute(problem, solution);
+  double worst = std::max(MomentumResidual(problem, scales, solution),
+                          JointResidual(problem, scales, solution.v.data()));
+  for (size_t i = 0; i < problem.contacts.size(); ++i) {
+    const ContactBlock<double>& c = problem.contacts[i];
+    const ContactValues values = Evaluate(problem, scales, c, solution.v.data());
+    const double normal = solution.normal_impulse[i];
+    const double zeta = std::max(scales.impulse, values.sigma_n / values.mobility_n);
+    double residual = RowResidual(normal - c.offset, zeta, values.s_n, values.sigma_n);
+    if (c.has_friction) {
+      const double limit = c.friction * normal;
+      const double tangent = solution.tangent_impulse[i];
+      const double zeta_t = std::max(zeta * c.friction, values.sigma_t / values.mobility_t);
+      // w⁺ against σ⁺ = μ λn + λt, w⁻ against σ⁻ = μ λn − λt.
+      residual = std::max(
+          {residual,
+           RowResidual(limit + tangent, zeta_t, std::max(0.0, values.slip), values.sigma_t),
+           RowResidual(limit - tangent, zeta_t, std::max(0.0, -values.slip), values.sigma_t)});
+    }
+    if (!(residual <= worst)) {
+      worst = std::isnan(residual) ? HUGE_VAL : residual;
+      *worst_contact = static_cast<int>(i);
+    }
+  }
+  return worst;
+}
+
+double BalancedResidual(const ContactProblem<double>& problem, double tolerance,
+                        ContactSolution<double>* solution, int* worst_contact) {
+  const double residual = NaturalResidual(problem, *solution, worst_contact);
+  if (residual <= tolerance || *worst_contact >= 0) {
+    return residual;
+  }
+  std::vector<double> v(problem.momentum.begin(), problem.momentum.end());
+  ForEachImpulse(problem, *solution, [&](int body, const RowPart<double>& row, double impulse) {
+    for (int i = 0; body >= 0 && i < 3; ++i) {
+      v[3 * body + i] += row[i] * impulse;
+    }
+  });
+  for (size_t i = 0; i < v.size(); ++i) {
+    v[i] /= problem.mass[i];
+  }
+  for (const DamperBlock<double>& d : problem.dampers) {
+    for (const int body : {d.a, d.b}) {
+      for (int i = 3 * body; body >= 0 && i < 3 * body + 3; ++i) {
+        v[i] = solution->v[i];
+      }
+    }
+  }
+  std::swap(v, solution->v);
+  int worst = -1;
+  const double balanced = NaturalResidual(problem, *solution, &worst);
+  if (!(balanced < residual)) {
+    std::swap(v, solution->v);
+    return residual;
+  }
+  *worst_contact = worst;
+  return balanced;
+}
+
+void FindDegenerateContacts(const ContactProblem<double>& problem,
+                            const ContactSolution<double>& solution, double tolerance,
+                            std::vector<int>* degenerate) {
+  degenerate->clear();
+  const ContactScales scales(problem, solution);
+  for (size_t i = 0; i < problem.contacts.size(); ++i) {
+    const ContactBlock<double>& c = problem.contacts[i];
+    const ContactValues values = Evaluate(problem, scales, c, solution.v.data());
+    const double normal = solution.normal_impulse[i];
+    const double zeta = std::max(scales.impulse, values.sigma_n / values.mobility_n);
+    const bool grazes =
+        std::abs(values.s_n) <= tolerance * values.sigma_n && normal - c.offset <= tolerance * zeta;
+    const double zeta_t = std::max(zeta * c.friction, values.sigma_t / values.mobility_t);
+    const bool at_limit =
+        c.has_friction && normal > tolerance * zeta &&
+        std::abs(values.slip) <= tolerance * values.sigma_t &&
+        c.friction * normal - std::abs(solution.tangent_impulse[i]) <= tolerance * zeta_t;
+    if (grazes || at_limit) {
+      degenerate->push_back(static_cast<int>(i));
+    }
+  }
+}
+
+ContactMargin MarginOfContact(const ContactProblem<double>& problem,
+                              const ContactSolution<double>& solution, const ContactScales& scales,
+                              int contact) {
+  using Kind = ContactMargin::Kind;
+  const ContactBlock<double>& c = problem.contacts[contact];
+  const ContactValues values = Evaluate(problem, scales, c, solution.v.data());
+  const ContactMode mode = solution.modes[contact];
+  const double normal = solution.normal_impulse[contact];
+  // 0 / 0: nothing moves and nothing pushes.
+  const auto ratio = [](double x, double scale) { return scale > 0.0 ? x / scale : 0.0; };
+  if (mode == ContactMode::kOpen) {
+    return {ratio(values.s_n, values.sigma_n), Kind::kClosing};
+  }
+  const double zeta = std::max(scales.impulse, values.sigma_n / values.mobility_n);
+  const ContactMargin opening =
+      c.driven ? ContactMargin{ratio(values.s_n, values.sigma_n), Kind::kClosing}
+               : ContactMargin{ratio(normal - c.offset, zeta), Kind::kOpening};
+  ContactMargin friction = opening;
+  if (mode == ContactMode::kSticking) {
+    const double zeta_t = std::max(zeta * c.friction, values.sigma_t / values.mobility_t);
+    const double left = c.friction * normal - std::abs(solution.tangent_impulse[contact]);
+    friction = {ratio(left, zeta_t), Kind::kFrictionLimit};
+  } else if (mode != ContactMode::kClosed) {
+    friction = {ratio(SlidingSign(mode) * values.slip, values.sigma_t), Kind::kSlidingSpeed};
+  }
+  return friction.value < opening.value ? friction : opening;
+}
+
+int MostViolatedJoint(const ContactProblem<double>& problem, const std::vector<double>& v,
+                      const std::vector<double>& sizes, double share) {
+  int worst = -1;
+  const size_t size = 3 * static_cast<size_t>(problem.num_bodies);
+  if (v.size() != size || sizes.size() != size) {
+    return worst;
+  }
+  for (size_t j = 0; j < problem.joints.size(); ++j) {
+    const JointBlock<double>& joint = problem.joints[j];
+    for (int k = 0; k < joint.rows; ++k) {
+      const double left = RowDot(joint.a, joint.row_a[k], joint.b, joint.row_b[k], v.data());
+      double terms = std::abs(joint.rhs[k]);
+      for (int i = 0; i < 3; ++i) {
+        terms += joint.a >= 0 ? std::abs(joint.row_a[k][i] * sizes[3 * joint.a + i]) : 0.0;
+        terms += joint.b >= 0 ? std::abs(joint.row_b[k][i] * sizes[3 * joint.b + i]) : 0.0;
+      }
+      const double missed = std::abs(left - joint.rhs[k]);
+      if (missed > share * terms) {
+        share = missed / terms;
+        worst = static_cast<int>(j);
+      }
+    }
+  }
+  return worst;
+}
+
+}  // namespace tangible

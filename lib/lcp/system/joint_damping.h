@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// An equivalent form of a mode system for bodies of little inertia far from their joints.
+//
+// Elimination of such a body leaves A M⁻¹ Aᵀ with entries r²/I, beside which 1/m is lost, though
+// the system is well conditioned: the joint holds what inertia does not. Multiples of the joints'
+// rows A v = b added to the rows of momentum,
+//
+//   E K x = E r,   E = [1  Aᵀ w; 0  1],   (E K)₁₁ = M + Aᵀ w A
+//
+// change nothing in exact arithmetic and give each body the inertia w r² that the joint makes it
+// feel; w = 1 / (the row's mobility by translation). The transposed system has Kᵀ u = c with u = Eᵀ
+// ũ, (E K)ᵀ ũ = c.
+
+#include "tangible/lcp/system/block_lu.h"
+#include "tangible/lcp/system/contact_problem.h"
+
+namespace tangible {
+
+/// Whether at some joint r²/I of a body exceeds 1/m by more than elimination bears: 1e3, so that at
+/// most 1e-13 is lost.
+bool HasSpreadJoints(const ContactProblem<double>& problem);
+
+/// The problem with Aᵀ w A as dampers of every joint's rows.
+ContactProblem<double> WithJointDampers(const ContactProblem<double>& problem);
+
+/// x := K⁻¹ x or K⁻ᵀ x (row-major of `columns`, in the order of ContactSystem's unknowns) by the
+/// factors of K, or of E K where joints are spread.
+void SolveByFactors(const BlockLu<double>& lu, const ContactProblem<double>& problem, double* x,
+                    int columns);
+void SolveTransposedByFactors(const BlockLu<double>& lu, const ContactProblem<double>& problem,
+                              double* x, int columns);
+
+}  // namespace tangible

@@ -1,0 +1,388 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/simulation/certificate/certify.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <utility>
+
+#include "tangible/lcp/system/contact_conditioning.h"
+#include "tangible/simulation/certificate/certify_place_inl.h"
+#include "tangible/simulation/certificate/duality.h"
+#include "tangible/simulation/certificate/feature_ties.h"
+#include "tangible/simulation/derivatives/rollout_directional.h"
+
+namespace tangible {
+namespace {
+
+// Beyond this many unknowns the rank is determined anew only where modes change.
+constexpr size_t kRankEachStep = 150;
+// s; edges of force windows nearer to a step's boundary than this are on it.
+constexpr double kSameTime = 1e-9;
+
+// The speed n·v before the step, and were there no contacts and joints.
+struct Approach {
+  double before = 0.0;
+  double free = 0.0;
+};
+
+Approach ApproachOf(const ModelStructure& s, const StepRecord& r, size_t i) {
+  const ActiveContact& contact = r.contacts[i];
+  const ContactBlock<double>& block = r.problem.contacts[i];
+  Approach approach;
+  const auto add = [&](int body, const RowPart<double>& row) {
+    const int moving = s.bodies[body].block;
+    for (int k = 0; k < 3; ++k) {
+      const double twist = r.before.twist[3 * body + k];
+      approach.before += row[k] * twist;
+      approach.free += row[k] * (moving < 0 ? twist
+                                            : r.problem.momentum[3 * moving + k] /
+                                                  r.problem.mass[3 * moving + k]);
+    }
+  };
+  add(contact.a, block.normal_a);
+  add(contact.b, block.normal_b);
+  return approach;
+}
+
+}  // namespace
+
+std::string ContactName(const ModelStructure& structure, const ActiveContact& contact) {
+  if (contact.joint >= 0) {
+    return std::string(contact.side > 0.0 ? "low" : "high") + " limit of joint " +
+           structure.joints[contact.joint].name;
+  }
+  return "contact of " + structure.bodies[contact.a].name + " and " +
+         structure.bodies[contact.b].name;
+}
+
+const char* ModeName(ContactMode mode) {
+  switch (mode) {
+    case ContactMode::kOpen:
+      return "open";
+    case ContactMode::kSticking:
+      return "sticking";
+    case ContactMode::kSlidingPositive:
+      return "sliding_right";
+    case ContactMode::kSlidingNegative:
+      return "sliding_left";
+    case ContactMode::kClosed:
+      return "closed";
+  }
+  return "";
+}
+
+bool RolloutCertifier::Wanted(int number) const {
+  return number >= 0 &&
+         std::binary_search(options_.numbers.begin(), options_.numbers.end(), number);
+}
+
+void RolloutCertifier::OneSided(const std::string& reason) {
+  if (certificate_.one_sided.empty()) {
+    certificate_.one_sided = reason;
+  }
+}
+
+void RolloutCertifier::AddMargin(double margin, const Place& place, const std::string& what) {
+  if (margin < certificate_.margin_min) {
+    certificate_.margin_min = std::max(margin, 0.0);
+    certificate_.margin_where = place.Text() + ", " + what;
+  }
+}
+
+void RolloutCertifier::AddJump(double margin, const Place& place, const std::string& what) {
+  if (margin < jump_margin_) {
+    jump_margin_ = margin;
+    jump_where_ = place.Text() + ": " + what;
+  }
+}
+
+void RolloutCertifier::AddContact(const Model<double>& model, const StepRecord& record,
+                                  const ContactScales& scales, const Place& place) {
+  const ContactMargin margin =
+      MarginOfContact(record.problem, record.solution, scales, static_cast<int>(place.contact));
+  const bool slides = SlidingSign(place.mode) != 0.0;
+  const bool touches = place.mode == ContactMode::kOpen && JustTouches(record, place.contact);
+  // A scaled margin compares a slack with its own terms, which may all be rounding.
+  if (touches && !(margin.value < kDegenerateTolerance)) {
+    ++certificate_.degenerate_rows;
+  }
+  AddMargin(touches ? 0.0 : margin.value, place, slides ? "sliding" : ModeName(place.mode));
+  AddLaw(model, record, place);
+  if (place.mode != ContactMode::kOpen) {
+    AddCoefficients(record, place);
+  }
+}
+
+// The choices of the law's constant: kinks where it is continuous, jumps at the conditions of an
+// impact.
+void RolloutCertifier::AddLaw(const Model<double>& model, const StepRecord& record,
+                              const Place& place) {
+  const SimulationSettings& settings = model.structure->settings;
+  const size_t i = place.contact;
+  const double gap = place.active->gap;
+  const double gap_speed = gap / record.h;
+  const double recovery = settings.recovery_speed;
+  if (place.mode != ContactMode::kOpen && gap < 0.0 && recovery > 0.0 &&
+      place.active->law != ContactLaw::kRestitution) {
+    AddMargin(std::abs(gap_speed + recovery) / std::max(recovery, -gap_speed), place,
+              "limit of the recovery speed");
+  }
+  const double e = record.restitution[i].value;
+  const bool at_zero = e == 0.0 && (Wanted(record.restitution[i].numbers[0]) ||
+                                    Wanted(record.restitution[i].numbers[1]));
+  if (place.active->joint >= 0 || !(e > 0.0 || at_zero)) {
+    return;
+  }
+  const Approach approach = ApproachOf(*model.structure, record, i);
+  const double threshold = settings.restitution_threshold;
+  const double fast =
+      (-approach.before - threshold) / std::max({threshold, std::abs(approach.before), 1e-300});
+  const double reach = record.h * approach.free;
+  const double near = (settings.contact_margin - gap - reach) /
+                      (settings.contact_margin + std::abs(gap) + std::abs(reach));
+  if (at_zero) {
+    if (fast > 0.0 && near > 0.0 && gap > 0.0) {
+      AddJump(0.0, place, "its restitution is 0, above which an impact has another law");
+    }
+    return;
+  }
+  if (gap < 0.0 && fast > 0.0 && near > 0.0) {
+    // In penetration the smaller constant holds; the choice is continuous.
+    const double other = std::max(gap_speed, -recovery);
+    const double bounce = e * approach.before;
+    AddMargin(std::abs(bounce - other) / std::max(std::abs(bounce), std::abs(other)), place,
+              "restitution against recovery");
+    if (bounce >= other) {
+      return;
+    }
+  }
+  const bool impact = fast > 0.0 && near > 0.0;
+  // To flip an impact one condition must change; to make one, each that does not hold.
+  const double distance =
+      impact ? std::min(fast, near) : std::max(std::max(-fast, 0.0), std::max(-near, 0.0));
+  const bool by_speed = impact ? fast < near : -fast > -near;
+  AddJump(distance, place,
+          by_speed
+              ? "approach speed " + Short(-approach.before) + " m/s near the threshold " +
+                    Short(threshold) + " m/s"
+              : "free motion ends " + Short(gap + reach) + " m from the surface, near the margin " +
+                    Short(settings.contact_margin) + " m");
+}
+
+void RolloutCertifier::AddCoefficients(const StepRecord& record, const Place& place) {
+  const CoefficientSource& friction = record.friction[place.contact];
+  const bool wanted = Wanted(friction.numbers[0]) || Wanted(friction.numbers[1]);
+  if (wanted && friction.tie && place.mode != ContactMode::kSticking) {
+    OneSided("mixed friction is at a kink of the mixing rule, " + place.Text());
+  } else if (wanted && friction.value == 0.0) {
+    OneSided("friction is 0, " + place.Text());
+  }
+  const CoefficientSource& restitution = record.restitution[place.contact];
+  if (restitution.tie && place.active->law == ContactLaw::kRestitution &&
+      (Wanted(restitution.numbers[0]) || Wanted(restitution.numbers[1]))) {
+    OneSided("mixed restitution is at a kink of the mixing rule, " + place.Text());
+  }
+}
+
+void RolloutCertifier::AddLinearSystem(const StepRecord& record, ContactSystem* system) {
+  const std::vector<ContactMode>& modes = record.solution.modes;
+  const size_t unknowns = 3 * static_cast<size_t>(system->num_blocks());
+  if (unknowns <= kRankEachStep || modes != last_modes_) {
+    last_redundant_ = CountRedundantRows(record.problem, modes);
+    if (last_redundant_ > 0 && CountUndeterminedMotions(record.problem, modes) > 0) {
+      OneSided(kUndeterminedMotion);
+    }
+  }
+  certificate_.redundant_rows += last_redundant_;
+  const SystemQuality quality = MeasureSystem(record.problem, modes, system);
+  certificate_.condition = std::max(certificate_.condition, quality.condition);
+  certificate_.linear_residual = std::max(certificate_.linear_residual, quality.residual);
+}
+
+// Each pair of shapes once: its contacts stand together.
+void RolloutCertifier::AddFeatures(const Model<double>& model, const StepRecord& record, long step,
+                                   ContactSystem* system) {
+  const std::vector<ActiveContact>& contacts = record.contacts;
+  size_t last = 0;
+  for (size_t first = 0; first < contacts.size(); first = last) {
+    for (last = first + 1; last < contacts.size() && contacts[first].joint < 0 &&
+                           contacts[last].joint < 0 && contacts[last].a == contacts[first].a &&
+                           contacts[last].b == contacts[first].b;) {
+      ++last;
+    }
+    const Place place{model.structure.get(),       step, record.time, first, &contacts[first],
+                      record.solution.modes[first]};
+    AddMargin(FeatureChangeMargin(model, record, first, last, system), place,
+              "where another corner or edge takes over");
+  }
+}
+
+void RolloutCertifier::AddStep(const Model<double>& model, long step, Stepper* stepper) {
+  if (stepper->by_events()) {
+    AddEventStep(model, step, stepper);
+    return;
+  }
+  const StepRecord& record = stepper->record();
+  const ModelStructure& s = *model.structure;
+  landing_.clear();
+  const ContactScales scales(record.problem, record.solution);
+  std::vector<ActiveContact> closed;
+  for (size_t i = 0; i < record.contacts.size(); ++i) {
+    const ActiveContact& contact = record.contacts[i];
+    const Place place{&s, step, record.time, i, &contact, record.solution.modes[i]};
+    AddContact(model, record, scales, place);
+    if (place.mode == ContactMode::kOpen) {
+      continue;
+    }
+    closed.push_back(contact);
+    const bool held = std::any_of(closed_.begin(), closed_.end(),
+                                  [&](const ActiveContact& last) { return last.SameAs(contact); });
+    if (!held && contact.law == ContactLaw::kGap && contact.gap > 0.0 &&
+        ApproachOf(s, record, i).before < -s.settings.restitution_threshold) {
+      landing_ =
+          "landing in the last step, whose twist has derivatives of order 1/dt: " + place.Text();
+    }
+  }
+  closed_.swap(closed);
+  std::vector<int> degenerate;
+  FindDegenerateContacts(record.problem, record.solution, kDegenerateTolerance, &degenerate);
+  certificate_.degenerate_rows += static_cast<int>(degenerate.size());
+  AddLinearSystem(record, &stepper->system());
+  AddFeatures(model, record, step, &stepper->system());
+  last_modes_ = record.solution.modes;
+}
+
+void RolloutCertifier::AddForceWindows(const Model<double>& model) {
+  const SimulationSettings& settings = model.structure->settings;
+  for (const ForceIndex& force : model.structure->forces) {
+    const auto check = [&](int number, const char* edge) {
+      if (!Wanted(number)) {
+        return;
+      }
+      const double time = model.numbers[number];
+      const double k =
+          std::clamp(std::round(time / settings.dt), 0.0, static_cast<double>(NumSteps(settings)));
+      const double boundary = StepTime(settings, static_cast<long>(k));
+      if (std::abs(time - boundary) <= kSameTime ||
+          std::abs(time - settings.duration) <= kSameTime) {
+        OneSided(std::string(edge) + " of force " + force.name + " at " + Short(time) +
+                 " s is on a step's boundary");
+      }
+    };
+    check(force.start, "start");
+    check(force.end, "end");
+    if (force.start >= 0 && force.end >= 0 && (Wanted(force.start) || Wanted(force.end)) &&
+        std::abs(model.numbers[force.start] - model.numbers[force.end]) <= kSameTime) {
+      OneSided("the window of force " + force.name + " is empty");
+    }
+  }
+}
+
+Certificate RolloutCertifier::Finish(const Model<double>& model, const RolloutReport& report) {
+  AddForceWindows(model);
+  certificate_.mode_switches = static_cast<int>(report.mode_switches);
+  certificate_.events = static_cast<int>(report.events);
+  // A solver that the scene asks for is no fallback.
+  certificate_.fallbacks =
+      static_cast<int>(report.fallbacks) +
+      (model.structure->settings.solver == SolverChoice::kAuto
+           ? static_cast<int>(report.solved_by_interior_point + report.solved_by_lemke)
+           : 0);
+  if (jump_margin_ < kNearJumpMargin) {
+    certificate_.discontinuous = jump_where_;
+  } else {
+    certificate_.discontinuous = landing_;
+  }
+  if (certificate_.discontinuous.empty() && report.halved_motions > 0) {
+    certificate_.discontinuous =
+        "motions were halved, as they could not be integrated over a step: how often may be chosen "
+        "by rounding; dt is too large";
+  }
+  Certificate finished = certificate_;
+  SetVerdict(finished);
+  return finished;
+}
+
+Certificate CertifyRollout(const Model<double>& model, const State<double>& initial,
+                           const CertifyOptions& options, RolloutReport* report) {
+  RolloutCertifier certifier(options);
+  State<double> final;
+  *report = Rollout(
+      model, initial,
+      [&](long k, double, const State<double>&, Stepper* stepper) {
+        if (stepper != nullptr) {
+          certifier.AddStep(model, k - 1, stepper);
+        }
+      },
+      &final);
+  return certifier.Finish(model, *report);
+}
+
+Certificate CertifyRollout(const Model<double>& model, const State<double>& initial) {
+  RolloutReport report;
+  return CertifyRollout(model, initial, {}, &report);
+}
+
+namespace {
+
+// Places of the model's numbers that the directions change.
+std::vector<int> NumbersOf(const ModelStructure& structure, const RowMatrixXd& directions) {
+  std::vector<int> numbers;
+  for (int i = 0; i < structure.num_numbers; ++i) {
+    if (!directions.row(structure.NumberVariable(i)).isZero(0.0)) {
+      numbers.push_back(i);
+    }
+  }
+  return numbers;
+}
+
+// How far the directions exceed what redundant rows allow (StepTangent::ApplyAndMeasure).
+double MeasureContradiction(const Model<double>& model, const State<double>& initial,
+                            RowMatrixXd directions) {
+  StepTangent tangent;
+  double worst = 0.0;
+  State<double> final;
+  Rollout(
+      model, initial,
+      [&](long, double, const State<double>&, Stepper* stepper) {
+        if (stepper != nullptr) {
+          const double measured = tangent.ApplyAndMeasure(model, stepper, &directions);
+          worst = measured <= worst ? worst : measured;
+        }
+      },
+      &final);
+  return worst;
+}
+
+}  // namespace
+
+Certificate CertifyDerivative(const Model<double>& model, const State<double>& initial,
+                              const RowMatrixXd& directions,
+                              const std::vector<std::string>& names) {
+  constexpr double kMostExceeded = 1e6;
+  RolloutReport report;
+  Certificate certificate = CertifyRollout(
+      model, initial, {NumbersOf(*model.structure, directions), directions, names}, &report);
+  if (certificate.redundant_rows > 0 && certificate.one_sided.empty() &&
+      !(MeasureContradiction(model, initial, directions) < kMostExceeded)) {
+    certificate.one_sided = kContradictingRows;
+    SetVerdict(certificate);
+  }
+  // Residuals of single solves do not show what a stiff chain of them loses, nor how impact after
+  // impact multiplies rounding.
+  constexpr double kIllConditioned = 1e8;
+  constexpr long kManyEvents = 10;
+  // The condition of redundant rows is that of δ.
+  const bool ill_conditioned =
+      certificate.redundant_rows == 0 && certificate.condition > kIllConditioned;
+  if ((HasWideMasses(model) || ill_conditioned || certificate.events >= kManyEvents) &&
+      report.status == StepStatus::kDone) {
+    certificate.linear_residual =
+        std::max(certificate.linear_residual, DualityGap(model, initial, directions));
+    SetVerdict(certificate);
+  }
+  return certificate;
+}
+
+}  // namespace tangible

@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// The certificate of a rollout's derivative: how near its steps are to kinks and jumps.
+//
+//   margins        of every contact and limit of every step, by its mode (MarginOfContact);
+//                  besides, of the choice between the constants gap / h, −recovery_speed and
+//                  e (n·v) where these are continuous, and of the choice of the corners and edges
+//                  that touch (feature_ties.h)
+//   jumps          the restitution decisions (contact.h): the smallest relative
+//                  |approach speed − threshold| and |gap + h n·v_free − margin| of contacts with
+//                  e > 0; and a landing in the last step, whose twist has derivatives of order 1/h
+//                  that the next step would cancel
+//   one-sided      friction exactly 0, a tie of the mixing rule, an edge of a force's window on a
+//                  step's boundary: only where derivatives with respect to these numbers are
+//                  wanted; and with event stepping a contact that touches as the run starts, where
+//                  a direction opens or closes its gap: one side falls and lands, the other is
+//                  pushed out
+//   linear systems redundant rows, condition, residual (contact_conditioning.h), of every step
+
+#include <string>
+#include <vector>
+
+#include "tangible/lcp/dense/certificate.h"
+#include "tangible/simulation/stepping/rollout.h"
+
+namespace tangible {
+
+/// Relative distances to a jump below this make the verdict `discontinuous`.
+inline constexpr double kNearJumpMargin = 1e-6;
+
+struct CertifyOptions {
+  /// Places in the model's numbers that derivatives are taken with respect to, ascending.
+  std::vector<int> numbers;
+  /// The directions of [initial poses | initial twists | numbers] that derivatives are taken along,
+  /// a column each, and what they are called.
+  RowMatrixXd directions;
+  std::vector<std::string> names;
+};
+
+/// Collects the certificate step by step.
+class RolloutCertifier {
+ public:
+  explicit RolloutCertifier(CertifyOptions options = {}) : options_(std::move(options)) {}
+
+  /// The step that the stepper has just done; `step` counts from 0.
+  void AddStep(const Model<double>& model, long step, Stepper* stepper);
+  /// The certificate with its verdict, after the last step.
+  Certificate Finish(const Model<double>& model, const RolloutReport& report);
+  /// Smallest relative distance to a decision at which values jump; infinite if there was none.
+  double jump_margin() const { return jump_margin_; }
+
+ private:
+  struct Place;
+  void AddMargin(double margin, const Place& place, const std::string& what);
+  void AddJump(double margin, const Place& place, const std::string& what);
+  void AddEventStep(const Model<double>& model, long step, Stepper* stepper);
+  void AddStart(const Model<double>& model, const EventRecord& record);
+  void AddImpact(const Model<double>& model, long step, Impulses* impact);
+  void AddSegment(const Model<double>& model, long step, EventDerivative* derivative,
+                  Segment* segment);
+  void AddClosedAtOnce(const ModelStructure& s, long step, const Segment& segment);
+  void AddQuality(const ContactProblem<double>& problem, const std::vector<ContactMode>& modes,
+                  ContactSystem* system);
+  void AddUnloaded(const Model<double>& model, long step, const Impulses& impact);
+  void AddSimultaneous(const Model<double>& model, long step, const Impulses& impact);
+  void AddContact(const Model<double>& model, const StepRecord& record, const ContactScales& scales,
+                  const Place& place);
+  void AddLaw(const Model<double>& model, const StepRecord& record, const Place& place);
+  void AddCoefficients(const StepRecord& record, const Place& place);
+  void AddFeatures(const Model<double>& model, const StepRecord& record, long step,
+                   ContactSystem* system);
+  void AddLinearSystem(const StepRecord& record, ContactSystem* system);
+  void AddForceWindows(const Model<double>& model);
+  bool Wanted(int number) const;
+  void OneSided(const std::string& reason);
+
+  CertifyOptions options_;
+  Certificate certificate_;
+  double jump_margin_ = std::numeric_limits<double>::infinity();
+  std::string jump_where_;
+  std::string landing_;                ///< of the last step; empty if nothing landed in it
+  std::vector<ActiveContact> closed_;  ///< of the last step, or segment
+  std::vector<ContactMode> last_modes_;
+  int last_redundant_ = 0;
+  // Event stepping: contacts that bear a force, the bodies that the last impact moved, and when.
+  std::vector<ActiveContact> loaded_;
+  std::vector<bool> struck_;
+  double struck_at_ = -std::numeric_limits<double>::infinity();
+};
+
+/// Runs the rollout and certifies it. A rollout that fails is certified as far as it came; `report`
+/// says so.
+Certificate CertifyRollout(const Model<double>& model, const State<double>& initial,
+                           const CertifyOptions& options, RolloutReport* report);
+Certificate CertifyRollout(const Model<double>& model, const State<double>& initial);
+
+/// The reason of a verdict `one-sided` where the certificate finds that a direction contradicts
+/// redundant rows: one contact would open or slip and the others not.
+inline constexpr char kContradictingRows[] =
+    "redundant contacts contradict the change of a parameter";
+
+/// The same of a motion that redundant contacts leave undetermined (contact_conditioning.h).
+inline constexpr char kUndeterminedMotion[] =
+    "redundant contacts that slide with different friction leave the motion undetermined";
+
+/// The certificate of the derivatives along `directions` (num_variables x columns, named): of the
+/// rollout, and where rows are redundant (a box on a box) of whether each direction agrees with
+/// them (two rollouts). Where masses are far apart `linear_residual` is at least the gap between
+/// tangent and adjoint (duality.h), both of which are run.
+Certificate CertifyDerivative(const Model<double>& model, const State<double>& initial,
+                              const RowMatrixXd& directions, const std::vector<std::string>& names);
+
+/// "contact of ball and floor", "low limit of joint hinge".
+std::string ContactName(const ModelStructure& structure, const ActiveContact& contact);
+/// "open", "sticking", "sliding_right" (along the tangent), "sliding_left", "closed" (without
+/// friction).
+const char* ModeName(ContactMode mode);
+
+}  // namespace tangible

@@ -1,0 +1,499 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Certificates of event steps. A mode that ends at an event has margin 0 there by construction:
+// what counts is how transversally the event is crossed, and how far modes are from a change where
+// they start.
+#include <algorithm>
+#include <cmath>
+
+#include "tangible/dynamics/jacobian/contact_gradient.h"
+#include "tangible/lcp/system/contact_conditioning.h"
+#include "tangible/simulation/certificate/certify_grazing.h"
+#include "tangible/simulation/certificate/certify_place_inl.h"
+#include "tangible/simulation/certificate/feature_ties.h"
+#include "tangible/simulation/derivatives/rollout_directional.h"
+#include "tangible/simulation/events/event_search.h"
+#include "tangible/simulation/events/segment_flow.h"
+
+namespace tangible {
+namespace {
+
+// m or rad; a gap of this size is more than rounding: the contact does not just touch.
+constexpr double kTouching = 1e-9;
+// Of a motion: an integrator's error that is more than rounding.
+constexpr double kSplitMatters = 1e-7;
+
+// What a motion differs by where an event ends a part of it early, as a share of the motion: the
+// integrator's error, which a step in two parts makes twice.
+double SplitError(const Model<double>& model, const Segment& segment) {
+  SegmentFlow flow;
+  std::string message;
+  Segment whole;
+  whole.time = segment.time;
+  whole.middle = segment.middle;
+  whole.before = segment.before;
+  whole.contacts = segment.contacts;
+  whole.friction = segment.friction;
+  whole.modes = segment.modes;
+  whole.length = 0.5 * segment.length;
+  Segment half = whole;
+  whole.length = segment.length;
+  if (!flow.Run(model, &whole, &message) || !flow.Run(model, &half, &message)) {
+    return 0.0;
+  }
+  Segment rest = half;
+  rest.time += half.length;
+  rest.before = half.after;
+  if (!flow.Run(model, &rest, &message)) {
+    return 0.0;
+  }
+  // Of a scene at rest both are rounding.
+  constexpr double kRest = 1e-6;
+  const auto share = [&](const std::vector<double>& before, const std::vector<double>& one,
+                         const std::vector<double>& two) {
+    double apart = 0.0;
+    double moved = 0.0;
+    for (size_t i = 0; i < one.size(); ++i) {
+      apart = std::max(apart, std::abs(one[i] - two[i]));
+      moved = std::max({moved, std::abs(one[i] - before[i]), kRest * std::abs(one[i])});
+    }
+    const double gravity = std::hypot(model.numbers[kGravityX], model.numbers[kGravityY]);
+    return apart > 0.0 ? apart / (moved + kRest * gravity * segment.length) : 0.0;
+  };
+  return std::max(share(segment.before.pose, whole.after.pose, rest.after.pose),
+                  share(segment.before.twist, whole.after.twist, rest.after.twist));
+}
+
+// Bodies that an impact's impulses move, with those joined to them: one by one until none is added.
+std::vector<bool> Struck(const ModelStructure& s, const Impulses& impact) {
+  std::vector<bool> struck(s.bodies.size(), false);
+  const auto moves = [&](int body) { return s.bodies[body].block >= 0; };
+  for (size_t i = 0; i < impact.contacts.size(); ++i) {
+    if (impact.solution.normal_impulse[i] > 0.0) {
+      for (const int body : {impact.contacts[i].a, impact.contacts[i].b}) {
+        struck[body] = struck[body] || moves(body);
+      }
+    }
+  }
+  for (bool more = true; more;) {
+    more = false;
+    for (const JointIndex& joint : s.joints) {
+      if (moves(joint.a) && moves(joint.b) && struck[joint.a] != struck[joint.b]) {
+        struck[joint.a] = struck[joint.b] = more = true;
+      }
+    }
+  }
+  return struck;
+}
+
+// A speed that is rounding, m/s.
+double Negligible(const Model<double>& model, double speed) {
+  return 1e-9 *
+         (std::abs(speed) + model.structure->settings.dt *
+                                std::hypot(model.numbers[kGravityX], model.numbers[kGravityY]));
+}
+
+// Whether a contact of two bodies sticks over a segment, if there is one.
+bool Sticks(const Segment* segment, const ActiveContact& contact) {
+  for (size_t i = 0; segment != nullptr && i < segment->contacts.size(); ++i) {
+    if (segment->contacts[i].SameAs(contact)) {
+      return contact.joint < 0 && segment->modes[i] == ContactMode::kSticking;
+    }
+  }
+  return false;
+}
+
+// Whether a direction changes what the entries are the gradient of.
+bool Moves(const std::vector<JacobianEntry>& gradient, const RowMatrixXd& directions,
+           Eigen::Index direction) {
+  constexpr double kUnmoved = 1e-12;  // of the terms
+  double rate = 0.0;
+  double terms = 0.0;
+  for (const JacobianEntry& entry : gradient) {
+    const double term = entry.value * directions(entry.variable, direction);
+    rate += term;
+    terms += std::abs(term);
+  }
+  return std::abs(rate) > kUnmoved * terms;
+}
+
+// Whether a contact neither opens nor approaches.
+bool Rests(const Model<double>& model, const State<double>& state, const ActiveContact& contact) {
+  double speed;
+  if (contact.joint >= 0) {
+    const JointIndex& joint = model.structure->joints[contact.joint];
+    JointRows<double> joint_rows;
+    EvaluateJoint(joint.type, state.PoseOf(joint.a), state.PoseOf(joint.b),
+                  &model.numbers[joint.geometry], &joint_rows);
+    ContactRows<double> rows;
+    EvaluateLimitRows(model, joint_rows, contact, &rows);
+    speed = RelativeSpeed(state, contact.a, rows.normal_a, contact.b, rows.normal_b);
+  } else {
+    speed = SpeedsOf(model, state, contact).normal;
+  }
+  return std::abs(speed) <= Negligible(model, speed);
+}
+
+bool HasPair(const std::vector<ActiveContact>& contacts, const ActiveContact& contact) {
+  return std::any_of(contacts.begin(), contacts.end(), [&](const ActiveContact& other) {
+    return other.joint < 0 && other.a == contact.a && other.b == contact.b;
+  });
+}
+
+// Whether a segment ends as two bodies that were apart touch.
+bool EndsInMeeting(const Model<double>& model, const Segment& segment) {
+  const ActiveContact& contact = segment.event_contact;
+  if (segment.event != EventKind::kTouch || contact.joint >= 0 ||
+      HasPair(segment.contacts, contact)) {
+    return false;
+  }
+  const double speed = SpeedsOf(model, segment.after, contact).normal;
+  return speed < -Negligible(model, speed);
+}
+
+double SlipOf(const Model<double>& model, const State<double>& state,
+              const ActiveContact& contact) {
+  return std::abs(SpeedsOf(model, state, contact).slip);
+}
+
+}  // namespace
+
+void RolloutCertifier::AddQuality(const ContactProblem<double>& problem,
+                                  const std::vector<ContactMode>& modes, ContactSystem* system) {
+  const int redundant = CountRedundantRows(problem, modes);
+  certificate_.redundant_rows += redundant;
+  if (redundant > 0 && CountUndeterminedMotions(problem, modes) > 0) {
+    OneSided(kUndeterminedMotion);
+  }
+  const SystemQuality quality = MeasureSystem(problem, modes, system);
+  certificate_.condition = std::max(certificate_.condition, quality.condition);
+  certificate_.linear_residual = std::max(certificate_.linear_residual, quality.residual);
+}
+
+// Impacts on the same bodies at (nearly) the same time: were their order another, so would be the
+// result.
+void RolloutCertifier::AddSimultaneous(const Model<double>& model, long step,
+                                       const Impulses& impact) {
+  const ModelStructure& s = *model.structure;
+  const std::vector<bool> struck = Struck(s, impact);
+  std::vector<size_t> approaching;
+  for (size_t i = 0; i < impact.contacts.size(); ++i) {
+    const ActiveContact& c = impact.contacts[i];
+    const ContactBlock<double>& block = impact.problem.contacts[i];
+    const double before = RelativeSpeed(impact.before, c.a, block.normal_a, c.b, block.normal_b);
+    if (before < -Negligible(model, before)) {
+      approaching.push_back(i);
+    }
+  }
+  const auto share = [&](size_t i, const std::vector<bool>& bodies) {
+    return bodies[impact.contacts[i].a] || bodies[impact.contacts[i].b];
+  };
+  if (approaching.empty()) {
+    return;
+  }
+  const ActiveContact& first = impact.contacts[approaching[0]];
+  const Place place{
+      &s, step, impact.time, approaching[0], &first, impact.solution.modes[approaching[0]]};
+  // Several that approach at once, where one moves bodies of another.
+  for (size_t k = 0; k < approaching.size(); ++k) {
+    for (size_t l = 0; l < k; ++l) {
+      const ActiveContact& x = impact.contacts[approaching[k]];
+      const ActiveContact& y = impact.contacts[approaching[l]];
+      for (const int body : {x.a, x.b}) {
+        if (s.bodies[body].block >= 0 && (body == y.a || body == y.b)) {
+          AddJump(0.0, place, "two contacts of " + s.bodies[body].name + " touch at once");
+        }
+      }
+    }
+  }
+  if (!struck_.empty()) {
+    for (const size_t i : approaching) {
+      if (share(i, struck_)) {
+        AddJump((impact.time - struck_at_) / s.settings.dt, place,
+                "impacts follow each other within " + Short(impact.time - struck_at_) + " s");
+      }
+    }
+  }
+  struck_ = struck;
+  struck_at_ = impact.time;
+}
+
+// A contact that only touches, without force, takes part in an impact of another: were there a gap,
+// however small, it would have one of its own later.
+void RolloutCertifier::AddUnloaded(const Model<double>& model, long step, const Impulses& impact) {
+  double largest = 0.0;
+  for (const double normal : impact.solution.normal_impulse) {
+    largest = std::max(largest, normal);
+  }
+  // The impact of another: what approaches by rounding alone is none.
+  const auto speed = [&](size_t i) {
+    const ActiveContact& c = impact.contacts[i];
+    const ContactBlock<double>& block = impact.problem.contacts[i];
+    return RelativeSpeed(impact.before, c.a, block.normal_a, c.b, block.normal_b);
+  };
+  bool any = false;
+  for (size_t i = 0; i < impact.contacts.size(); ++i) {
+    any = any || speed(i) < -Negligible(model, speed(i));
+  }
+  for (size_t i = 0; any && i < impact.contacts.size(); ++i) {
+    const ActiveContact& c = impact.contacts[i];
+    const double before = speed(i);
+    const bool loaded = std::any_of(loaded_.begin(), loaded_.end(),
+                                    [&](const ActiveContact& l) { return l.SameAs(c); });
+    if (!loaded && impact.solution.normal_impulse[i] > 1e-9 * largest &&
+        before >= -Negligible(model, before)) {
+      const Place place{model.structure.get(), step, impact.time, i, &c, impact.solution.modes[i]};
+      AddJump(0.0, place, "it only touches when another impact moves it");
+    }
+  }
+}
+
+void RolloutCertifier::AddImpact(const Model<double>& model, long step, Impulses* impact) {
+  const ModelStructure& s = *model.structure;
+  const double threshold = s.settings.restitution_threshold;
+  // By Poisson's law the compression decides which contacts rebound.
+  const bool is_first = impact->h == 0.0 && !impact->decompression;
+  const ContactScales scales(impact->problem, impact->solution);
+  for (size_t i = 0; i < impact->contacts.size(); ++i) {
+    const ActiveContact& contact = impact->contacts[i];
+    const Place place{&s, step, impact->time, i, &contact, impact->solution.modes[i]};
+    const ContactBlock<double>& block = impact->problem.contacts[i];
+    const double before =
+        RelativeSpeed(impact->before, contact.a, block.normal_a, contact.b, block.normal_b);
+    const ContactMargin margin =
+        MarginOfContact(impact->problem, impact->solution, scales, static_cast<int>(i));
+    AddMargin(margin.value, place,
+              std::string(impact->decompression ? "decompression, " : "impact, ") +
+                  (block.driven ? "driven and " : "") + ModeName(place.mode));
+    certificate_.degenerate_rows += margin.value < kDegenerateTolerance ? 1 : 0;
+    const CoefficientSource& friction = impact->friction[i];
+    if (place.mode != ContactMode::kOpen && friction.value == 0.0 &&
+        (Wanted(friction.numbers[0]) || Wanted(friction.numbers[1]))) {
+      OneSided("friction is 0, " + place.Text());
+    }
+    const CoefficientSource& restitution = impact->restitution[i];
+    const bool wanted = Wanted(restitution.numbers[0]) || Wanted(restitution.numbers[1]);
+    if (is_first && (restitution.value > 0.0 || wanted)) {
+      AddJump(std::abs(-before - threshold) / std::max(threshold, std::abs(before)), place,
+              "approach speed " + Short(-before) + " m/s near the threshold " + Short(threshold) +
+                  " m/s");
+      if (wanted && (restitution.value == 0.0 || restitution.tie) && -before > threshold) {
+        OneSided(restitution.tie
+                     ? "mixed restitution is at a kink of the mixing rule, " + place.Text()
+                     : "restitution is 0, " + place.Text());
+      }
+    }
+  }
+  if (is_first) {
+    AddSimultaneous(model, step, *impact);
+    AddUnloaded(model, step, *impact);
+  }
+  AddQuality(impact->problem, impact->solution.modes, &impact->system);
+}
+
+// Contacts of different pairs that begin to bear a body at the same time: were one the first, it
+// would bear it alone for as long.
+void RolloutCertifier::AddClosedAtOnce(const ModelStructure& s, long step, const Segment& segment) {
+  std::vector<size_t> begun;
+  for (size_t i = 0; i < segment.contacts.size(); ++i) {
+    const ActiveContact& contact = segment.contacts[i];
+    const bool is_loaded = std::any_of(loaded_.begin(), loaded_.end(),
+                                       [&](const auto& l) { return l.SameAs(contact); });
+    if (contact.joint >= 0 || !is_loaded || HasPair(closed_, contact)) {
+      continue;
+    }
+    for (const size_t k : begun) {
+      const ActiveContact& other = segment.contacts[k];
+      for (const int body : {contact.a, contact.b}) {
+        const bool shares = body == other.a || body == other.b;
+        if (shares && s.bodies[body].block >= 0 &&
+            !(contact.a == other.a && contact.b == other.b)) {
+          AddMargin(0.0, {&s, step, segment.time, i, &contact, segment.modes[i]},
+                    "two contacts of " + s.bodies[body].name + " close at once");
+        }
+      }
+    }
+    begun.push_back(i);
+  }
+}
+
+void RolloutCertifier::AddSegment(const Model<double>& model, long step,
+                                  EventDerivative* derivative, Segment* segment) {
+  const ModelStructure& s = *model.structure;
+  SolvedNode& start = segment->stages[0];
+  loaded_.clear();
+  double largest = 0.0;
+  for (const double normal : start.solution.normal_impulse) {
+    largest = std::max(largest, normal);
+  }
+  for (size_t i = 0; i < segment->contacts.size(); ++i) {
+    const ActiveContact& contact = segment->contacts[i];
+    const Place place{&s, step, segment->time, i, &contact, segment->modes[i]};
+    const double normal = start.solution.normal_impulse[i];
+    const CoefficientSource& friction = segment->friction[i];
+    const auto add_margin = [&](double margin, const char* what) {
+      AddMargin(margin, place, what);
+      certificate_.degenerate_rows += margin < kDegenerateTolerance ? 1 : 0;
+    };
+    add_margin(largest > 0.0 ? normal / largest : 0.0, "normal force");
+    if (normal > 1e-9 * largest) {
+      loaded_.push_back(contact);
+    }
+    if (contact.joint < 0 && !HasPair(closed_, contact) &&
+        MeetsACorner(model, segment->before, contact)) {
+      AddJump(0.0, place, "a corner meets a corner");
+    }
+    // Sliding at no speed: friction stays at its limit. Beside a contact of the same bodies that
+    // sticks this says only how they share the load.
+    const bool shared = std::any_of(
+        segment->contacts.begin(), segment->contacts.end(), [&](const ActiveContact& other) {
+          return &other != &contact && other.a == contact.a && other.b == contact.b &&
+                 segment->modes[&other - segment->contacts.data()] == ContactMode::kSticking;
+        });
+    if (SlidingSign(place.mode) != 0.0 && !shared) {
+      const double slip =
+          std::max(SlipOf(model, segment->before, contact), SlipOf(model, segment->after, contact));
+      if (slip <= Negligible(model, slip)) {
+        add_margin(0.0, "friction limit");
+      }
+    }
+    if (place.mode == ContactMode::kSticking && !segment->SticksWithEarlier(i)) {
+      const double above = segment->FrictionLeft(i, friction.value, 1.0, start.solution);
+      const double below = segment->FrictionLeft(i, friction.value, -1.0, start.solution);
+      if (above + below > 0.0) {
+        add_margin(2.0 * std::min(above, below) / (above + below), "friction limit");
+      }
+    }
+    const bool wanted = Wanted(friction.numbers[0]) || Wanted(friction.numbers[1]);
+    if (wanted && friction.tie && place.mode != ContactMode::kSticking) {
+      OneSided("mixed friction is at a kink of the mixing rule, " + place.Text());
+    } else if (wanted && friction.value == 0.0) {
+      OneSided("friction is 0, " + place.Text());
+    }
+  }
+  if (!segment->starts && (step > 0 || segment->time > 0.0)) {
+    AddClosedAtOnce(s, step, *segment);
+  }
+  closed_ = segment->contacts;
+  double terms;
+  const double rate = derivative->EventRate(model, segment, &terms);
+  if (IsLocated(segment->event) && terms > 0.0) {
+    const Place place{
+        &s, step, segment->time + segment->length, 0, &segment->event_contact, ContactMode::kOpen};
+    AddMargin(std::abs(rate) / terms, place,
+              std::string("grazing: rate of the ") + NameOf(segment->event));
+    if (EndsInMeeting(model, *segment) &&
+        MeetsACorner(model, segment->after, segment->event_contact)) {
+      AddJump(0.0, place, "a corner meets a corner");
+    }
+  }
+  AddQuality(start.problem, segment->modes, &start.system);
+}
+
+// Contacts that touch as the run starts: in the impacts of its first instant and in the first
+// segment.
+void RolloutCertifier::AddStart(const Model<double>& model, const EventRecord& record) {
+  std::vector<const ActiveContact*> touching;
+  const State<double>* start = nullptr;
+  const Segment* first = nullptr;  // of some length
+  for (int p = 0; p < record.num_parts; ++p) {
+    const EventPart& part = *record.parts[p];
+    const std::vector<ActiveContact>& contacts =
+        part.is_impulses ? part.impulses.contacts : part.segment.contacts;
+    start = start != nullptr   ? start
+            : part.is_impulses ? &part.impulses.before
+                               : &part.segment.before;
+    for (const ActiveContact& contact : contacts) {
+      touching.push_back(&contact);
+    }
+    if (!part.is_impulses && part.segment.length > 0.0) {
+      first = &part.segment;
+      break;
+    }
+  }
+  const bool splits = first != nullptr && SplitError(model, *first) > kSplitMatters;
+  const size_t loaded = touching.size();
+  constexpr double kRounding = 1e-10;  // of a gap that is 0, m
+  std::vector<ActiveContact> unloaded;
+  if (start != nullptr) {
+    EventSearch(model).FindContacts(model, *start, kRounding, &unloaded);
+  }
+  for (const ActiveContact& contact : unloaded) {
+    if (contact.gap <= kRounding &&
+        std::none_of(touching.begin(), touching.begin() + static_cast<std::ptrdiff_t>(loaded),
+                     [&](const ActiveContact* other) { return other->SameAs(contact); })) {
+      touching.push_back(&contact);
+    }
+  }
+  LocalJacobianScratch scratch;
+  for (size_t k = 0; k < touching.size(); ++k) {
+    const ActiveContact* contact = touching[k];
+    std::vector<JacobianEntry> gap, approach, slip;
+    AddGapGradient(model, *start, *contact, &scratch, &gap);
+    AddApproachGradient(model, *start, *contact, &scratch, &approach);
+    if (Sticks(first, *contact)) {
+      AddSlipGradient(model, *start, *contact, &scratch, &slip);
+    }
+    // Out of penetration it is pushed only while it does not open by itself. One that rests on the
+    // surface has both sides: what it falls late it lands with; not so where no force presses.
+    const bool rests = Rests(model, *start, *contact);
+    const bool pushed = rests && (k >= loaded || contact->gap < -kTouching);
+    if (k >= loaded && !rests) {
+      continue;
+    }
+    for (Eigen::Index c = 0; c < options_.directions.cols(); ++c) {
+      // An event soon after the start, on one side or on both: a twist that lifts lands, one that
+      // slides stops. It is none for the physics, but ends a part of the step for all bodies.
+      const bool splits_here = splits && rests && k < loaded;
+      const char* what =
+          contact->gap > -kTouching && Moves(gap, options_.directions, c) ? " changes its gap"
+          : pushed && Moves(approach, options_.directions, c)
+              ? " changes the speed at which it opens"
+          : splits_here &&
+                  (Moves(approach, options_.directions, c) || Moves(slip, options_.directions, c))
+              ? " lets an event split the first step"
+              : nullptr;
+      if (what != nullptr) {
+        OneSided(ContactName(*model.structure, *contact) + " touches at the start, " +
+                 options_.names[static_cast<size_t>(c)] + what);
+      }
+    }
+  }
+}
+
+void RolloutCertifier::AddEventStep(const Model<double>& model, long step, Stepper* stepper) {
+  EventRecord& record = stepper->events().mutable_record();
+  if (step == 0 && options_.directions.cols() > 0) {
+    AddStart(model, record);
+  }
+  const Segment* last = nullptr;  // that an event ended
+  int located = 0;
+  for (int p = 0; p < record.num_parts; ++p) {
+    EventPart& part = *record.parts[p];
+    if (part.is_impulses) {
+      AddImpact(model, step, &part.impulses);
+      continue;
+    }
+    AddSegment(model, step, &stepper->event_derivative(), &part.segment);
+    if (IsLocated(part.segment.event)) {
+      last = &part.segment;
+      ++located;
+    }
+  }
+  // Impacts without end in a finite time (Zeno): of as many, rounding decides how many there are.
+  if (2 * located > model.structure->settings.max_events_per_step) {
+    const Place place{model.structure.get(),     step,
+                      last->time + last->length, 0,
+                      &last->event_contact,      ContactMode::kOpen};
+    AddMargin(0.0, place, "one of " + std::to_string(located) + " events in a step");
+  }
+  std::vector<Graze> grazes;
+  FindGrazes(model, record, kNearKinkMargin, &grazes);
+  for (const Graze& graze : grazes) {
+    const Place place{model.structure.get(), step, graze.time, 0, &graze.contact,
+                      ContactMode::kOpen};
+    AddMargin(graze.margin, place, graze.touches ? "grazing touch" : "grazing, no touch");
+  }
+}
+
+}  // namespace tangible

@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/simulation/certificate/certify_grazing.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace tangible {
+namespace {
+
+struct GapCourse {
+  double gap = 0.0;
+  double speed = 0.0;
+};
+
+GapCourse CourseAt(const Model<double>& model, const State<double>& state,
+                   const ActiveContact& contact) {
+  ContactRows<double> rows;
+  EvaluateContactRows(model, state, contact, &rows);
+  return {rows.geometry.gap,
+          RelativeSpeed(state, contact.a, rows.normal_a, contact.b, rows.normal_b)};
+}
+
+// The smallest value on [0, length] of the cubic with these ends, one of which approaches and the
+// other leaves.
+double Least(const GapCourse& start, const GapCourse& end, double length) {
+  // ġ(s) = ġ0 + b s + c s², s in [0, 1], per length.
+  const double v0 = start.speed * length;
+  const double v1 = end.speed * length;
+  const double rise = end.gap - start.gap;
+  const double b = 6.0 * rise - 4.0 * v0 - 2.0 * v1;
+  const double c = 3.0 * (v0 + v1) - 6.0 * rise;
+  double low = 0.0;
+  double high = 1.0;
+  for (int i = 0; i < 60; ++i) {
+    const double middle = 0.5 * (low + high);
+    (v0 + middle * (b + middle * c) < 0.0 ? low : high) = middle;
+  }
+  const double s = 0.5 * (low + high);
+  return start.gap + s * (v0 + s * (0.5 * b + s * c / 3.0));
+}
+
+bool Closed(const Segment& segment, const ActiveContact& contact) {
+  return std::any_of(segment.contacts.begin(), segment.contacts.end(),
+                     [&](const ActiveContact& other) {
+                       return other.joint < 0 && other.a == contact.a && other.b == contact.b;
+                     });
+}
+
+class GrazeFinder {
+ public:
+  GrazeFinder(const Model<double>& model, double most, std::vector<Graze>* grazes)
+      : model_(model), search_(model), most_(most), grazes_(*grazes) {}
+
+  void Add(const Segment& segment) {
+    if (segment.event == EventKind::kTouch && segment.event_contact.joint < 0) {
+      AddTouch(segment);
+    }
+    const double reach = segment.length * FastestApproach(segment);
+    if (!(reach > 0.0) || !std::isfinite(reach)) {
+      return;
+    }
+    search_.FindContacts(model_, segment.after, reach, &near_);
+    for (const ActiveContact& contact : near_) {
+      const bool touches =
+          segment.event == EventKind::kTouch && contact.SameAs(segment.event_contact);
+      if (contact.joint < 0 && !touches && !Closed(segment, contact)) {
+        AddMiss(segment, contact);
+      }
+    }
+  }
+
+ private:
+  // Of any two points, m/s.
+  double FastestApproach(const Segment& segment) const {
+    double fastest = 0.0;
+    for (const State<double>* state : {&segment.before, &segment.after}) {
+      for (int body = 0; body < model_.structure->num_bodies(); ++body) {
+        const double* twist = &state->twist[3 * static_cast<size_t>(body)];
+        fastest = std::max(fastest, std::hypot(twist[0], twist[1]) +
+                                        std::abs(twist[2]) * search_.bounding_radius(body));
+      }
+    }
+    return 2.0 * fastest;
+  }
+
+  void AddTouch(const Segment& segment) {
+    const GapCourse start = CourseAt(model_, segment.before, segment.event_contact);
+    const GapCourse end = CourseAt(model_, segment.after, segment.event_contact);
+    // The last rebounds of a body that comes to rest are slow, and no grazes.
+    const bool from_above =
+        start.gap >
+        search_.TouchTolerance(segment.before, segment.event_contact.a, segment.event_contact.b);
+    const double gained =
+        from_above && segment.length > 0.0
+            ? std::abs(end.speed - start.speed) / segment.length * model_.structure->settings.dt
+            : 0.0;
+    const double scale = std::max(std::abs(start.speed) + std::abs(end.speed), gained);
+    const double ratio = scale > 0.0 ? end.speed / scale : 0.0;
+    List(ratio * ratio, segment, segment.event_contact, true);
+  }
+
+  void AddMiss(const Segment& segment, const ActiveContact& contact) {
+    const GapCourse start = CourseAt(model_, segment.before, contact);
+    const GapCourse end = CourseAt(model_, segment.after, contact);
+    // What starts at rest on the surface is a contact that opens.
+    const double rest = search_.SpeedTolerance(model_, segment.before);
+    if (!(start.speed < -rest && end.speed >= -rest)) {
+      return;
+    }
+    const double acceleration = (end.speed - start.speed) / segment.length;
+    const double dt = model_.structure->settings.dt;
+    const double height =
+        std::max(0.5 * start.speed * start.speed / acceleration, 0.5 * acceleration * dt * dt);
+    // Just below 0 it is rounding: it did not touch.
+    List(std::abs(Least(start, end, segment.length)) / height, segment, contact, false);
+  }
+
+  void List(double margin, const Segment& segment, const ActiveContact& contact, bool touches) {
+    if (margin < most_) {
+      grazes_.push_back({margin, segment.time + segment.length, contact, touches});
+    }
+  }
+
+  const Model<double>& model_;
+  EventSearch search_;
+  double most_;
+  std::vector<ActiveContact> near_;
+  std::vector<Graze>& grazes_;
+};
+
+}  // namespace
+
+void FindGrazes(const Model<double>& model, const EventRecord& record, double most,
+                std::vector<Graze>* grazes) {
+  grazes->clear();
+  GrazeFinder finder(model, most, grazes);
+  for (int p = 0; p < record.num_parts; ++p) {
+    if (!record.parts[p]->is_impulses) {
+      finder.Add(record.parts[p]->segment);
+    }
+  }
+}
+
+}  // namespace tangible

@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// How near the motion of an event step is to a grazing touch: a gap that turns around just above 0,
+// or that closes at hardly any speed. On the other side of the kink the derivative is of order
+// 1 / √distance.
+
+#include <vector>
+
+#include "tangible/simulation/events/event_record.h"
+#include "tangible/simulation/events/event_search.h"
+
+namespace tangible {
+
+/// A contact of shapes that nearly grazes.
+struct Graze {
+  double margin = 0.0;  ///< relative, as other margins: what of its data has to change
+  double time = 0.0;    ///< s
+  ActiveContact contact;
+  bool touches = false;
+};
+
+/// A touch at the end of a segment with ġ1 < 0, after ġ0 at its start: margin (ġ1 / v)², as depth
+/// goes with the speed's square, v = max(|ġ0| + |ġ1|, |a| dt) with the relative acceleration a
+/// (from above: the rebounds of a body that comes to rest are slow). A gap g* at which an approach
+/// turns around: margin g* / h, h = max(ġ0² / 2a, a dt² / 2) the height that it falls from, or
+/// falls in a step. Only those below `most` are listed.
+void FindGrazes(const Model<double>& model, const EventRecord& record, double most,
+                std::vector<Graze>* grazes);
+
+}  // namespace tangible

@@ -1,0 +1,289 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/simulation/certificate/feature_ties.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "tangible/geometry/mass_properties.h"
+
+namespace tangible {
+namespace {
+
+// Jumps of the derivative count above this fraction of the pair's speed over its size, and of 1/h:
+// what remains of rounding (1e-16 over kDifference) and, after extrapolation, of curvature
+// (kDifference²), with two orders of room.
+constexpr double kJump = 1e-6;
+constexpr double kJumpOfRate = 1e-8;
+// The moves, of the size, between which the choices' equations are compared.
+constexpr double kDifference = 1e-5;
+// Contacts this many moves apart, and normals turned by less than this angle, are one contact's.
+constexpr double kContinues = 10.0;
+constexpr double kTurned = 1e-3;
+// Contacts are searched to this fraction of the size beyond the closed ones' gaps.
+constexpr double kReach = 1e-3;
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+class PairTies {
+ public:
+  PairTies(const Model<double>& model, const StepRecord& record, size_t first, size_t last,
+           ContactSystem* system)
+      : model_(model),
+        record_(record),
+        first_(first),
+        last_(last),
+        system_(*system),
+        a_(record.contacts[first].a),
+        b_(record.contacts[first].b),
+        moved_(record.before) {
+    size_ = kInfinity;
+    for (const int body : {a_, b_}) {
+      if (model.structure->bodies[body].shape != ShapeType::kHalfPlane) {
+        size_ = std::min(size_, BoundingRadius(model.Shape(body)));
+      }
+    }
+    reach_ = 0.0;
+    for (size_t i = first; i < last; ++i) {
+      reach_ = std::max(reach_, record.contacts[i].gap);
+    }
+    reach_ += kReach * size_;
+  }
+
+  double Margin() {
+    double margin = kInfinity;
+    if (!(size_ > 0.0) || !std::isfinite(size_)) {
+      return margin;
+    }
+    for (int direction = 0; direction < 3; ++direction) {
+      for (const double sign : {1.0, -1.0}) {
+        const double length = sign * kFeatureMargin;
+        Move(direction, length);
+        if (Changes() && Jumps(direction, sign)) {
+          margin = std::min(margin, DistanceOfChange(direction, length));
+        }
+      }
+    }
+    return margin;
+  }
+
+ private:
+  void MovePose(int direction, double length) {
+    moved_.pose = record_.before.pose;
+    moved_.pose[3 * a_ + direction] += direction < 2 ? length * size_ : length;
+  }
+
+  // Moves the first body relative to the second, and searches the features there.
+  void Move(int direction, double length) {
+    MovePose(direction, length);
+    count_ = FindContactFeatures(model_.Shape(a_), moved_.PoseOf(a_), model_.Shape(b_),
+                                 moved_.PoseOf(b_), reach_, features_);
+  }
+
+  bool Closed(size_t i) const { return record_.solution.modes[i] != ContactMode::kOpen; }
+
+  bool Found(const ContactFeature& feature) const {
+    return std::find(features_, features_ + count_, feature) != features_ + count_;
+  }
+
+  ContactRows<double> Rows(const State<double>& state, const ContactFeature& feature) const {
+    ActiveContact contact;
+    contact.a = a_;
+    contact.b = b_;
+    contact.feature = feature;
+    ContactRows<double> rows;
+    EvaluateContactRows(model_, state, contact, &rows);
+    return rows;
+  }
+
+  // A normal that turns within the move, as that of two vertices that all but coincide.
+  bool Turns(const ContactFeature& feature) const {
+    return (Rows(moved_, feature).geometry.normal - Rows(record_.before, feature).geometry.normal)
+               .norm() > kTurned;
+  }
+
+  // Whether a closed contact has other features, or is not smooth, at the moved pose.
+  bool Changes() const {
+    for (size_t i = first_; i < last_; ++i) {
+      const ContactFeature& feature = record_.contacts[i].feature;
+      if (Closed(i) && (!Found(feature) || Turns(feature))) {
+        return true;
+      }
+    }
+    return false;
+  }
+
+  // The feature found that continues a contact; false where none does.
+  bool Continuation(const ContactFeature& feature, ContactFeature* now) const {
+    const ContactGeometry<double> from = Rows(record_.before, feature).geometry;
+    const double near = kContinues * kFeatureMargin * size_;
+    for (int k = 0; k < count_; ++k) {
+      const ContactGeometry<double> to = Rows(moved_, features_[k]).geometry;
+      if ((to.point - from.point).norm() <= near && std::abs(to.gap - from.gap) <= near &&
+          (to.normal - from.normal).norm() <= kTurned) {
+        *now = features_[k];
+        return true;
+      }
+    }
+    return false;
+  }
+
+  double Constant(size_t i, const ContactRows<double>& rows) const {
+    switch (record_.contacts[i].law) {
+      case ContactLaw::kGap:
+        return rows.geometry.gap / record_.h;
+      case ContactLaw::kRestitution:
+        return record_.restitution[i].value *
+               RelativeSpeed(record_.before, a_, rows.normal_a, b_, rows.normal_b);
+      case ContactLaw::kRecovery:
+      case ContactLaw::kInelastic:
+      case ContactLaw::kPoisson:
+        break;
+    }
+    return 0.0;
+  }
+
+  // rhs += weight (R − R') of a contact and its continuation, at the moved pose.
+  void AddDifference(size_t i, const ContactFeature& continuation, double weight) {
+    const ContactRows<double> old = Rows(moved_, record_.contacts[i].feature);
+    const ContactRows<double> now = Rows(moved_, continuation);
+    const double normal = record_.solution.normal_impulse[i];
+    const double tangent = record_.solution.tangent_impulse[i];
+    double speed = Constant(i, old) - Constant(i, now);
+    double slip = 0.0;
+    const auto add = [&](int body, const RowPart<double>& n, const RowPart<double>& n_new,
+                         const RowPart<double>& t, const RowPart<double>& t_new) {
+      const int block = model_.structure->bodies[body].block;
+      for (int k = 0; k < 3; ++k) {
+        speed += (n[k] - n_new[k]) * record_.new_twist[3 * body + k];
+        slip += (t[k] - t_new[k]) * record_.new_twist[3 * body + k];
+        if (block >= 0) {
+          rhs_[3 * block + k] -=
+              weight * ((n[k] - n_new[k]) * normal + (t[k] - t_new[k]) * tangent);
+        }
+      }
+    };
+    add(a_, old.normal_a, now.normal_a, old.tangent_a, now.tangent_a);
+    add(b_, old.normal_b, now.normal_b, old.tangent_b, now.tangent_b);
+    const int row = 3 * system_.contact_block()[i];
+    rhs_[row] += weight * speed;
+    if (record_.solution.modes[i] == ContactMode::kSticking) {
+      rhs_[row + 1] += weight * slip;
+    }
+  }
+
+  // Whether the derivative of the new twist differs between the choices: with J(x) the difference
+  // after a move by x, (4 J(x / 2) − J(x)) / x has no term of second order.
+  bool Jumps(int direction, double sign) {
+    std::vector<std::pair<size_t, ContactFeature>> changed;
+    for (size_t i = first_; i < last_; ++i) {
+      const ContactFeature& feature = record_.contacts[i].feature;
+      if (!Closed(i) || (Found(feature) && !Turns(feature))) {
+        continue;
+      }
+      ContactFeature now;
+      if (Turns(feature) || !Continuation(feature, &now)) {
+        return true;
+      }
+      changed.emplace_back(i, now);
+    }
+    rhs_.assign(3 * static_cast<size_t>(system_.num_blocks()), 0.0);
+    for (const auto& [length, weight] : {std::pair{kDifference, -1.0}, {0.5 * kDifference, 4.0}}) {
+      MovePose(direction, sign * length);
+      for (const auto& [i, now] : changed) {
+        AddDifference(i, now, weight);
+      }
+    }
+    system_.Solve(record_.problem, record_.solution.modes, rhs_.data(), 1);
+    const ModelStructure& s = *model_.structure;
+    const ContactProblem<double>& p = record_.problem;
+    double jump = 0.0;
+    for (int k = 0; k < 3 * s.num_blocks(); ++k) {
+      jump += p.mass[k] * rhs_[k] * rhs_[k];
+    }
+    double momentum = 0.0;
+    double mass = 0.0;
+    for (const int body : {a_, b_}) {
+      const int block = s.bodies[body].block;
+      if (block >= 0) {
+        mass += p.mass[3 * block];
+      }
+      for (int k = 3 * block; k < 3 * block + 3 && block >= 0; ++k) {
+        momentum += p.momentum[k] * p.momentum[k] / p.mass[k];
+      }
+    }
+    return std::sqrt(jump) > kDifference * (kJump * std::sqrt(momentum) +
+                                            kJumpOfRate * std::sqrt(mass) * size_ / record_.h);
+  }
+
+  // The smallest move that changes the choice, to a thousandth of `length`.
+  double DistanceOfChange(int direction, double length) {
+    double low = 0.0;
+    double high = length;
+    for (int i = 0; i < 10; ++i) {
+      const double middle = 0.5 * (low + high);
+      Move(direction, middle);
+      (Changes() ? high : low) = middle;
+    }
+    return std::abs(low);
+  }
+
+  const Model<double>& model_;
+  const StepRecord& record_;
+  size_t first_, last_;
+  ContactSystem& system_;
+  int a_, b_;
+  State<double> moved_;
+  double size_ = 0.0;   ///< m, of the smaller shape
+  double reach_ = 0.0;  ///< m
+  ContactFeature features_[2];
+  int count_ = 0;
+  std::vector<double> rhs_;
+};
+
+}  // namespace
+
+double FeatureChangeMargin(const Model<double>& model, const StepRecord& record, size_t first,
+                           size_t last, ContactSystem* system) {
+  const bool closed = std::any_of(record.solution.modes.begin() + static_cast<long>(first),
+                                  record.solution.modes.begin() + static_cast<long>(last),
+                                  [](ContactMode mode) { return mode != ContactMode::kOpen; });
+  if (!closed || record.contacts[first].joint >= 0) {
+    return kInfinity;
+  }
+  return PairTies(model, record, first, last, system).Margin();
+}
+
+bool MeetsACorner(const Model<double>& model, const State<double>& state,
+                  const ActiveContact& contact) {
+  const int a = contact.a;
+  const int b = contact.b;
+  double size = kInfinity;
+  for (const int body : {a, b}) {
+    if (model.structure->bodies[body].shape == ShapeType::kHalfPlane) {
+      return false;
+    }
+    size = std::min(size, BoundingRadius(model.Shape(body)));
+  }
+  const auto normal = [&](const Pose<double>& pose_a, const ContactFeature& feature) {
+    return EvaluateContact(feature, model.Shape(a), pose_a, model.Shape(b), state.PoseOf(b)).normal;
+  };
+  const Vector2<double> n = normal(state.PoseOf(a), contact.feature);
+  const Vector2<double> along(n.y(), -n.x());
+  for (const Vector2<double>& direction : {along, Vector2<double>(-along), Vector2<double>(-n)}) {
+    Pose<double> moved = state.PoseOf(a);
+    moved.position += kFeatureMargin * size * direction;
+    ContactFeature features[2];
+    const int count = FindContactFeatures(model.Shape(a), moved, model.Shape(b), state.PoseOf(b),
+                                          kInfinity, features);
+    const bool continues = std::any_of(features, features + count, [&](const auto& feature) {
+      return (normal(moved, feature) - n).norm() <= kTurned;
+    });
+    if (!continues) {
+      return true;
+    }
+  }
+  return false;
+}
+
+}  // namespace tangible

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// How near a pair's closed contacts are to a change of features that a derivative feels.
+//
+// Which vertex, edge or plane a contact is of is a discrete choice (collide.h). On its border the
+// gap is continuous, but its derivatives need not be: a ball above a box's corner has a turning
+// normal on one side and a fixed one on the other. The pair's relative pose is moved by
+// ±kFeatureMargin along x, y and angle. Where a closed contact then has other features, the two
+// choices' equations R and R' differ by (∂R'/∂q − ∂R/∂q) dq, and with the step's matrix K
+//
+//   δv⁺ = K⁻¹ (R − R') / |dq|
+//
+// is the jump of the derivative of the new twist. Ties without such a jump (equal boxes at rest on
+// each other) do not count. Where no contact of the new choice continues a closed one, or the
+// normal turns within the move, the geometry itself is not smooth: that counts in any case.
+
+#include "tangible/simulation/stepping/step.h"
+
+namespace tangible {
+
+/// Of a shape's bounding radius, and in rad.
+inline constexpr double kFeatureMargin = 1e-7;
+
+/// The relative distance, at most kFeatureMargin, at which the pair of the contacts [first, last)
+/// of the record changes features with a jump of the derivative; infinite where it does not.
+/// `system` holds the step's factorisation. Cost: six searches of the pair, and a solve where
+/// features change.
+double FeatureChangeMargin(const Model<double>& model, const StepRecord& record, size_t first,
+                           size_t last, ContactSystem* system);
+
+/// Whether two corners meet where two shapes touch at `state`: beside the contact, by
+/// kFeatureMargin of the smaller body's size to either side along its tangent, none of the pair's
+/// contacts has its normal. On one side of that the bodies collide, on the other they pass or
+/// collide otherwise.
+bool MeetsACorner(const Model<double>& model, const State<double>& state,
+                  const ActiveContact& contact);
+
+}  // namespace tangible

@@ -1,0 +1,349 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/simulation/derivatives/rollout_adjoint.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+namespace tangible {
+namespace {
+
+bool Projects(const ModelStructure& structure) {
+  return JointCorrectionOf(structure.settings) == JointCorrection::kProjection &&
+         !structure.joints.empty();
+}
+
+}  // namespace
+
+size_t RolloutTape::Entry::bytes() const {
+  return sizeof(Entry) + record.bytes() + system.bytes() + events.bytes() +
+         (projection ? sizeof(JointProjection) + projection->bytes() : 0);
+}
+
+void RolloutTape::Start(const Model<double>& model, const TapeOptions& options) {
+  options_ = options;
+  total_ = NumSteps(model.structure->settings);
+  steps_ = steps_again_ = 0;
+  first_ = 0;
+  record_from_ = 0;
+  spacing_ = 0;
+  checkpoints_.clear();
+  checkpoint_bytes_ = entry_bytes_ = used_bytes_ = peak_bytes_ = 0;
+  for (const std::unique_ptr<Entry>& entry : entries_) {
+    entry->counted = 0;  // until it is counted anew
+  }
+  last_record_bytes_ = last_factor_bytes_ = most_record_bytes_ = 0;
+  if (!stepper_ || structure_ != model.structure) {
+    stepper_ = std::make_unique<Stepper>(model);
+    structure_ = model.structure;
+    entries_.clear();
+  }
+  used_ = 0;
+  if (options.checkpointing.kind == Checkpointing::Kind::kEvery) {
+    spacing_ = std::max(1L, options.checkpointing.every);
+    record_from_ = total_ > 0 ? (total_ - 1) / spacing_ * spacing_ : 0;
+    ReleaseEntries(static_cast<size_t>(std::min(spacing_, total_)));
+  } else if (by_budget()) {
+    ReleaseEntries(0);
+  }
+  for (const std::unique_ptr<Entry>& entry : entries_) {
+    Count(entry.get());
+  }
+}
+
+RolloutReport RolloutTape::Record(const Model<double>& model, const State<double>& initial,
+                                  const TapeOptions& options, const StateObserver& observer,
+                                  State<double>* final) {
+  Start(model, options);
+  const StateObserver record = [&](long k, double t, const State<double>& state, Stepper* stepper) {
+    if (observer) {
+      observer(k, t, state, stepper);
+    }
+    RecordStep(model, k, state);
+  };
+  return Rollout(model, initial, record, stepper_.get(), final);
+}
+
+// After k steps of the first run, the last of which the stepper still holds.
+void RolloutTape::RecordStep(const Model<double>& model, long k, const State<double>& state) {
+  steps_ = k;
+  if (k > record_from_) {
+    if (used_ == 0) {
+      first_ = k - 1;
+    }
+    Take(model, total_ - k);
+    if (by_budget() && k == 1) {
+      PlanByBudget(state);
+    }
+  }
+  const bool bounded = options_.checkpointing.kind != Checkpointing::Kind::kAll;
+  if (bounded && k < total_ && (k == 0 || (spacing_ > 0 && k % spacing_ == 0))) {
+    AddCheckpoint(MakeCheckpoint(k, state), Origin::kRun);
+  }
+  if (by_budget()) {
+    MakeRoom();
+  }
+  peak_bytes_ = std::max(peak_bytes_, held_bytes());
+}
+
+// Keeps the first run within its budget.
+void RolloutTape::MakeRoom() {
+  if (held_bytes() > budget() && !entries_.empty()) {
+    // The sweep will run these steps again.
+    used_ = 0;
+    ReleaseEntries(0);
+    record_from_ = record_from_ == 0 ? (total_ - 1) / spacing_ * spacing_ : total_;
+  }
+  if (checkpoint_bytes_ > budget() / 2 && checkpoints_.size() > 2) {
+    // More than planned: every other one stays.
+    spacing_ *= 2;
+    RemoveCheckpoints([this](long step, Origin) { return step % spacing_ != 0; });
+    record_from_ =
+        record_from_ == 0 ? 0 : std::min(record_from_, (total_ - 1) / spacing_ * spacing_);
+  }
+}
+
+// After the first step, by what it took. Whether all records fit is seen when they do not.
+void RolloutTape::PlanByBudget(const State<double>& state) {
+  const size_t checkpoint = MakeCheckpoint(1, state).bytes();
+  const auto least_memory = [&](size_t record) {
+    return 2.0 * std::sqrt(static_cast<double>(total_) * static_cast<double>(checkpoint) *
+                           static_cast<double>(record));
+  };
+  const size_t with_factors = last_record_bytes_ + last_factor_bytes_;
+  const bool room = 2.0 * least_memory(with_factors) <= static_cast<double>(budget());
+  spacing_ = CheckpointSpacing(total_, checkpoint, room ? with_factors : last_record_bytes_);
+}
+
+Checkpoint RolloutTape::MakeCheckpoint(long step, const State<double>& state) const {
+  Checkpoint checkpoint;
+  checkpoint.step = step;
+  checkpoint.state = state;
+  stepper_->SaveGuess(&checkpoint.guess);
+  return checkpoint;
+}
+
+void RolloutTape::AddCheckpoint(Checkpoint checkpoint, Origin origin) {
+  checkpoint_bytes_ += checkpoint.bytes();
+  const auto place = std::upper_bound(
+      checkpoints_.begin(), checkpoints_.end(), checkpoint.step,
+      [](long step, const std::pair<Checkpoint, Origin>& c) { return step < c.first.step; });
+  checkpoints_.emplace(place, std::move(checkpoint), origin);
+}
+
+void RolloutTape::RemoveCheckpoints(const std::function<bool(long step, Origin origin)>& which) {
+  std::erase_if(checkpoints_, [&](const std::pair<Checkpoint, Origin>& c) {
+    if (!which(c.first.step, c.second)) {
+      return false;
+    }
+    checkpoint_bytes_ -= c.first.bytes();
+    return true;
+  });
+}
+
+// Whether the stepper's factors fit beside the records of `remaining` further steps, with an eighth
+// to spare: where records do not fit in the end, all of them are run again.
+bool RolloutTape::HasRoomForFactors(long remaining) const {
+  const size_t record = last_record_bytes_ + last_record_bytes_ / 8;
+  return checkpoint_bytes_ + used_bytes_ + last_factor_bytes_ +
+             record * static_cast<size_t>(remaining + 1) <=
+         budget();
+}
+
+// The stepper's last step becomes the next entry; `remaining` are to follow it.
+void RolloutTape::Take(const Model<double>& model, long remaining) {
+  if (used_ == entries_.size()) {
+    entries_.push_back(std::make_unique<Entry>());
+  }
+  Entry& entry = *entries_[used_++];
+  if (stepper_->by_events()) {
+    std::swap(entry.events, stepper_->events().mutable_record());
+    Count(&entry);
+    return;
+  }
+  entry.has_factors = options_.factorisations == Factorisations::kKeep &&
+                      (!by_budget() || HasRoomForFactors(remaining));
+  if (entry.has_factors) {
+    stepper_->TakeRecord(&entry.record, &entry.system);
+  } else {
+    stepper_->TakeRecord(&entry.record, nullptr);
+    if (by_budget()) {
+      DropFactors(&entry);
+    }
+  }
+  if (Projects(*model.structure)) {
+    if (!entry.projection) {
+      entry.projection = std::make_unique<JointProjection>();
+    }
+    *entry.projection = stepper_->projection();
+  }
+  Count(&entry);
+  if (entry.has_factors) {
+    KeepWithinBudget(&entry);
+  }
+}
+
+// The sweep will factorise anew.
+void RolloutTape::DropFactors(Entry* entry) {
+  entry->has_factors = false;
+  entry->system = ContactSystem();
+  entry->record.problem = ContactProblem<double>();
+}
+
+// A step with more contacts than those before it, or whose factors took memory to solve with.
+void RolloutTape::KeepWithinBudget(Entry* entry) {
+  const auto recount = [&] {
+    const size_t bytes = entry->bytes();
+    used_bytes_ += bytes - entry->counted;
+    entry_bytes_ += bytes - entry->counted;
+    entry->counted = bytes;
+  };
+  if (!by_budget()) {
+    return;
+  }
+  recount();
+  if (held_bytes() > budget()) {
+    DropFactors(entry);
+    recount();
+  }
+}
+
+// Puts an entry's memory into the sums; without checkpoints nobody reads them.
+void RolloutTape::Count(Entry* entry) {
+  if (options_.checkpointing.kind == Checkpointing::Kind::kAll) {
+    return;
+  }
+  const size_t bytes = entry->bytes();
+  entry_bytes_ += bytes - entry->counted;
+  entry->counted = bytes;
+  if (used_ > 0) {
+    used_bytes_ = used_ == 1 ? bytes : used_bytes_ + bytes;
+    if (entry->has_factors || last_factor_bytes_ == 0) {
+      last_factor_bytes_ = entry->factor_bytes();
+    }
+    last_record_bytes_ = bytes - entry->factor_bytes();
+    most_record_bytes_ = std::max(most_record_bytes_, last_record_bytes_);
+  }
+  if (by_budget() && held_bytes() > budget()) {
+    ReleaseEntries(used_);
+  }
+}
+
+// Gives back the memory of all entries but the first `keep`.
+void RolloutTape::ReleaseEntries(size_t keep) {
+  while (entries_.size() > keep) {
+    entry_bytes_ -= entries_.back()->counted;
+    entries_.pop_back();
+  }
+}
+
+// Makes the entries those of the steps up to `last`, from the checkpoint before it or, where these
+// are too many for the budget, from a new one in between.
+void RolloutTape::RunAgain(const Model<double>& model, long last) {
+  RemoveCheckpoints(
+      [last](long step, Origin origin) { return origin == Origin::kSplit && step >= last; });
+  const auto next = std::lower_bound(
+      checkpoints_.begin(), checkpoints_.end(), last,
+      [](const std::pair<Checkpoint, Origin>& c, long step) { return c.first.step < step; });
+  const Checkpoint& from = std::prev(next)->first;
+  stepper_->SetGuess(from.guess);
+  State<double> state = from.state;
+  const SimulationSettings& settings = model.structure->settings;
+  used_ = 0;
+  used_bytes_ = 0;
+  first_ = from.step;
+  for (long k = from.step; k < last; ++k) {
+    if (by_budget() && used_ > 0 &&
+        checkpoint_bytes_ + used_bytes_ + most_record_bytes_ > budget()) {
+      AddCheckpoint(MakeCheckpoint(k, state), Origin::kSplit);
+      used_ = 0;
+      used_bytes_ = 0;
+      first_ = k;
+    }
+    if (stepper_->Step(model, StepTime(settings, k), StepLength(settings, k), &state).status !=
+        StepStatus::kDone) {
+      throw std::logic_error("RolloutTape: the model is not that of the recorded run");
+    }
+    ++steps_again_;
+    Take(model, last - k - 1);
+    peak_bytes_ = std::max(peak_bytes_, held_bytes());
+  }
+}
+
+void RolloutTape::StepAdjoint(const Model<double>& model, const StepRecord& record,
+                              ContactSystem* system, JointProjection* projection,
+                              RowMatrixXd* w_bar) {
+  const ModelStructure& s = *model.structure;
+  const int columns = static_cast<int>(w_bar->cols());
+  if (Projects(s)) {
+    projection->Adjoint(model, w_bar->data(), columns);
+  }
+  double* w = w_bar->data();
+  for (int body = 0; body < s.num_bodies(); ++body) {
+    if (s.bodies[body].motion == Motion::kStatic) {
+      continue;
+    }
+    const double* pose = w + static_cast<size_t>(s.PoseVariable(body, 0)) * columns;
+    double* twist = w + static_cast<size_t>(s.TwistVariable(body, 0)) * columns;
+    for (int i = 0; i < 3 * columns; ++i) {
+      twist[i] += record.h * pose[i];
+    }
+  }
+  u_.assign(3 * static_cast<size_t>(system->num_blocks()) * columns, 0.0);
+  for (int k = 0; k < s.num_blocks(); ++k) {
+    double* twist = w_bar->data() + static_cast<size_t>(s.TwistVariable(s.moving[k], 0)) * columns;
+    std::copy_n(twist, 3 * columns, &u_[3 * static_cast<size_t>(k) * columns]);
+    std::fill_n(twist, 3 * columns, 0.0);
+  }
+  system->SolveTransposed(record.problem, record.solution.modes, u_.data(), columns);
+  const SolvedStep step = record.View(system->contact_block());
+  if (columns == 1) {
+    VisitStepJacobian(model, step, JointRoute::kByHand, &scratch_,
+                      SingleAdjointSink{u_.data(), w_bar->data()});
+  } else {
+    VisitStepJacobian(model, step, JointRoute::kByHand, &scratch_,
+                      AdjointSink{u_.data(), w_bar->data(), columns});
+  }
+}
+
+void RolloutTape::Adjoint(const Model<double>& model, int num_losses, const Seed& seed,
+                          RowMatrixXd* w_bar) {
+  AdjointFrom(model, steps(), num_losses, seed, w_bar);
+}
+
+void RolloutTape::AdjointFrom(const Model<double>& model, long last, int num_losses,
+                              const Seed& seed, RowMatrixXd* w_bar) {
+  w_bar->setZero(model.structure->num_variables(), num_losses);
+  for (long k = std::min(last, steps()); k > 0; --k) {
+    seed(k, w_bar);
+    const long step = k - 1;
+    if (step < first_ || step >= first_ + static_cast<long>(used_)) {
+      RunAgain(model, k);
+    }
+    Entry& entry = *entries_[static_cast<size_t>(step - first_)];
+    if (stepper_->by_events()) {
+      stepper_->event_derivative().Adjoint(model, &entry.events, w_bar);
+      continue;
+    }
+    if (entry.has_factors) {
+      StepAdjoint(model, entry.record, &entry.system, entry.projection.get(), w_bar);
+      KeepWithinBudget(&entry);
+    } else {
+      std::swap(entry.record.problem, refactored_);
+      stepper_->Refactor(model, &entry.record);
+      StepAdjoint(model, entry.record, &stepper_->system(), entry.projection.get(), w_bar);
+      std::swap(entry.record.problem, refactored_);
+    }
+  }
+  seed(0, w_bar);
+}
+
+size_t RolloutTape::bytes() const {
+  size_t sum = checkpoint_bytes_;
+  for (const std::unique_ptr<Entry>& entry : entries_) {
+    sum += entry->bytes();
+  }
+  return sum;
+}
+
+}  // namespace tangible

@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// The adjoint of a rollout (reverse mode): from the derivatives of one or several losses with
+// respect to states along the run to those with respect to all variables w = [initial poses |
+// initial twists | numbers].
+//
+//   each step, backwards   x̄ = v̄⁺ + h q̄⁺,   Kᵀ u = x̄,   w̄ −= (∂R/∂w)ᵀ u      (local_jacobian.h)
+//
+// The forward run is recorded on a tape: per step the state, contacts, modes and impulses, and, if
+// kept, the factorisation; otherwise it is recomputed on the way back. With checkpoints the tape
+// holds the records of one segment of the run at a time (checkpoint.h), which is run again with the
+// same bits.
+
+#include <algorithm>
+#include <memory>
+#include <vector>
+
+#include "tangible/math/scalar.h"
+#include "tangible/simulation/derivatives/checkpoint.h"
+#include "tangible/simulation/stepping/rollout.h"
+
+namespace tangible {
+
+enum class Factorisations {
+  kKeep,       ///< fastest; about ten times the memory of the states
+  kRecompute,  ///< one assembly and factorisation more a step
+};
+
+struct TapeOptions {
+  Factorisations factorisations = Factorisations::kKeep;
+  /// With a budget factorisations are kept as long as there is room for them.
+  Checkpointing checkpointing = {};
+};
+
+class RolloutTape {
+ public:
+  /// Runs and records. The observer sees the states as Rollout's does.
+  RolloutReport Record(const Model<double>& model, const State<double>& initial,
+                       const TapeOptions& options, const StateObserver& observer,
+                       State<double>* final);
+  /// The same without checkpoints.
+  RolloutReport Record(const Model<double>& model, const State<double>& initial,
+                       Factorisations factorisations, const StateObserver& observer,
+                       State<double>* final) {
+    return Record(model, initial, TapeOptions{factorisations, {}}, observer, final);
+  }
+
+  /// Adds to w_bar the derivatives of the losses with respect to the state after k steps; called
+  /// from the last k to 0. Rows of poses and twists are those of that state.
+  using Seed = std::function<void(long k, RowMatrixXd* w_bar)>;
+
+  /// The reverse sweep: w_bar, num_variables x num_losses, gets the derivatives with respect to the
+  /// initial poses, twists and the numbers. Chain with VariableJacobian(...)ᵀ w_bar for user
+  /// parameters. `model` has the numbers of the recorded run.
+  void Adjoint(const Model<double>& model, int num_losses, const Seed& seed, RowMatrixXd* w_bar);
+  /// The same from the state after `last` steps on, for losses that read no later one.
+  void AdjointFrom(const Model<double>& model, long last, int num_losses, const Seed& seed,
+                   RowMatrixXd* w_bar);
+
+  /// Memory of the tape now, and the most it was since Record began, bytes.
+  size_t bytes() const;
+  size_t peak_bytes() const { return std::max(peak_bytes_, bytes()); }
+  long steps() const { return steps_; }
+  /// How many steps were run again since Record.
+  long steps_again() const { return steps_again_; }
+
+ private:
+  struct Entry {
+    StepRecord record;
+    ContactSystem system;
+    std::unique_ptr<JointProjection> projection;  ///< where the scene asks for it
+    EventRecord events;  ///< event stepping: the step, in the place of all above
+    bool has_factors = false;
+    size_t counted = 0;  ///< bytes of it that the tape's sums hold
+    size_t bytes() const;
+    size_t factor_bytes() const { return system.bytes() + record.problem.bytes(); }
+  };
+  enum class Origin : unsigned char { kRun, kSplit };
+  bool by_budget() const { return options_.checkpointing.kind == Checkpointing::Kind::kBudget; }
+  size_t budget() const { return options_.checkpointing.budget; }
+  size_t held_bytes() const { return entry_bytes_ + checkpoint_bytes_; }
+  void Start(const Model<double>& model, const TapeOptions& options);
+  void RecordStep(const Model<double>& model, long k, const State<double>& state);
+  void PlanByBudget(const State<double>& state);
+  void MakeRoom();
+  Checkpoint MakeCheckpoint(long step, const State<double>& state) const;
+  void AddCheckpoint(Checkpoint checkpoint, Origin origin);
+  void RemoveCheckpoints(const std::function<bool(long step, Origin origin)>& which);
+  void Take(const Model<double>& model, long remaining);
+  bool HasRoomForFactors(long remaining) const;
+  static void DropFactors(Entry* entry);
+  void KeepWithinBudget(Entry* entry);
+  void Count(Entry* entry);
+  void ReleaseEntries(size_t keep);
+  void RunAgain(const Model<double>& model, long last);
+  void StepAdjoint(const Model<double>& model, const StepRecord& record, ContactSystem* system,
+                   JointProjection* projection, RowMatrixXd* w_bar);
+
+  TapeOptions options_;
+  long total_ = 0;                               ///< steps of a whole run
+  long steps_ = 0, steps_again_ = 0;             ///< done
+  std::vector<std::unique_ptr<Entry>> entries_;  ///< reused from run to run
+  size_t used_ = 0;
+  long first_ = 0;  ///< the used entries are those of steps first_, first_ + 1, ...
+  std::vector<std::pair<Checkpoint, Origin>> checkpoints_;  ///< ascending
+  long spacing_ = 0;                                        ///< of checkpoints, steps; 0: none
+  long record_from_ = 0;  ///< the first run records steps from here on
+  // With checkpoints: sums of bytes; what the last entry took, its factors apart, and the most.
+  size_t entry_bytes_ = 0, used_bytes_ = 0, checkpoint_bytes_ = 0, peak_bytes_ = 0;
+  size_t last_record_bytes_ = 0, last_factor_bytes_ = 0, most_record_bytes_ = 0;
+  std::unique_ptr<Stepper> stepper_;
+  std::shared_ptr<const ModelStructure> structure_;  ///< of stepper_ and the entries
+  ContactProblem<double> refactored_;  ///< memory of the problem that is assembled anew
+  std::vector<double> u_;
+  LocalJacobianScratch scratch_;
+};
+
+}  // namespace tangible

@@ -1,0 +1,245 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/simulation/derivatives/rollout_directional.h"
+
+#include <algorithm>
+#include <cmath>
+#include <sstream>
+
+#include "tangible/lcp/system/contact_residual.h"
+
+namespace tangible {
+
+bool JustTouches(const StepRecord& record, size_t i) {
+  constexpr double kRoundings = 64.0;
+  const ActiveContact& contact = record.contacts[i];
+  const ContactBlock<double>& block = record.problem.contacts[i];
+  const double slack =
+      RowDot(block.a, block.normal_a, block.b, block.normal_b, record.solution.v.data()) +
+      block.c_n;
+  double coordinate = 0.0;
+  for (const int body : {contact.a, contact.b}) {
+    if (body >= 0) {
+      coordinate = std::max({coordinate, std::abs(record.before.pose[3 * body]),
+                             std::abs(record.before.pose[3 * body + 1])});
+    }
+  }
+  return slack <= kRoundings * std::numeric_limits<double>::epsilon() * coordinate / record.h;
+}
+
+// Whether there are any.
+bool StepDirectional::FindKinks(const Model<double>& model, const StepRecord& record,
+                                const ContactSolution<double>& solution, const RowMatrixXd& w_dot) {
+  const size_t count = record.contacts.size();
+  std::vector<bool> touching(count);
+  friction_.setZero(static_cast<Eigen::Index>(count), w_dot.cols());
+  for (size_t i = 0; i < count; ++i) {
+    touching[i] = solution.modes[i] == ContactMode::kOpen && JustTouches(record, i);
+    for (int k = 0; k < 2 && record.contacts[i].joint < 0; ++k) {
+      if (const int number = record.friction[i].numbers[k]; number >= 0) {
+        friction_.row(static_cast<Eigen::Index>(i)) +=
+            record.friction[i].derivatives[k] * w_dot.row(model.structure->NumberVariable(number));
+      }
+    }
+  }
+  tangible::FindKinks(record.problem, solution, touching, kDegenerateTolerance, &kinks_);
+  bool any = false;
+  for (size_t i = 0; i < count; ++i) {
+    if (kinks_[i].kind == ContactKink::Kind::kFrictionFromZero &&
+        friction_.row(static_cast<Eigen::Index>(i)).isZero(0.0)) {
+      kinks_[i].kind = ContactKink::Kind::kNone;
+    }
+    any = any || kinks_[i].kind != ContactKink::Kind::kNone;
+  }
+  return any;
+}
+
+// v̇ of every column, with the kinks found at `solution`.
+StepDirectional::Status StepDirectional::SolveColumns(const Model<double>& model,
+                                                      const StepRecord& record,
+                                                      const ContactSolution<double>& solution,
+                                                      const RowMatrixXd& w_dot,
+                                                      RowMatrixXd* v_dot) {
+  if (!directional_.Factor(record.problem, solution, kinks_)) {
+    return Status::kUnsolved;
+  }
+  // The equations of all rows that the directions may need.
+  ContactSolution<double> with_rows = solution;
+  with_rows.modes = directional_.modes();
+  SolvedStep view = record.View(directional_.blocks());
+  view.solution = &with_rows;
+  const int columns = static_cast<int>(w_dot.cols());
+  RowMatrixXd rhs = RowMatrixXd::Zero(3 * directional_.num_blocks(), columns);
+  VisitStepJacobian(model, view, JointRoute::kByHand, &scratch_,
+                    TangentSink{w_dot.data(), rhs.data(), columns});
+  v_dot->resize(3 * record.problem.num_bodies, columns);
+  std::vector<double> found;
+  for (int c = 0; c < columns; ++c) {
+    const VectorX<double> r = rhs.col(c);
+    const VectorX<double> friction = friction_.col(c);
+    const Status status = directional_.Solve(std::vector<double>(r.begin(), r.end()),
+                                             {friction.begin(), friction.end()}, &found);
+    if (status != Status::kSolved) {
+      return status;
+    }
+    v_dot->col(c) = Eigen::Map<const VectorX<double>>(found.data(), v_dot->rows());
+  }
+  return Status::kSolved;
+}
+
+// The step's problem, linearised, a small way along a direction.
+void StepDirectional::MoveAlong(const Model<double>& model, const StepRecord& record,
+                                const RowMatrixXd& w_dot, ContactProblem<double>* problem) {
+  constexpr double kWay = 1e-6;  // of the speeds that the step changes
+  ContactSolution<double> with_rows = record.solution;
+  std::vector<int> blocks(record.contacts.size(), -1);
+  int num_blocks = problem->num_bodies + static_cast<int>(problem->joints.size());
+  for (size_t i = 0; i < blocks.size(); ++i) {
+    const ContactBlock<double>& c = problem->contacts[i];
+    with_rows.modes[i] = c.has_friction ? ContactMode::kSticking : ContactMode::kClosed;
+    blocks[i] = num_blocks++;
+  }
+  SolvedStep view = record.View(blocks);
+  view.solution = &with_rows;
+  VectorX<double> r = VectorX<double>::Zero(3 * num_blocks);
+  VisitStepJacobian(model, view, JointRoute::kByHand, &scratch_,
+                    TangentSink{w_dot.data(), r.data(), 1});
+  double speed = 0.0;
+  double rate = 0.0;
+  for (Eigen::Index i = 0; i < r.size(); ++i) {
+    const bool body = i < static_cast<Eigen::Index>(problem->mass.size());
+    const double mass = body ? problem->mass[i] : 1.0;
+    rate = std::max(rate, std::abs(r[i]) / mass);
+    speed = body ? std::max(speed, std::abs(problem->momentum[i]) / mass) : speed;
+  }
+  const double way = rate > 0.0 ? kWay * (speed > 0.0 ? speed : 1.0) / rate : 0.0;
+  for (size_t i = 0; i < problem->momentum.size(); ++i) {
+    problem->momentum[i] += way * r[static_cast<Eigen::Index>(i)];
+  }
+  int block = problem->num_bodies;
+  for (JointBlock<double>& joint : problem->joints) {
+    for (int k = 0; k < joint.rows; ++k) {
+      joint.rhs[k] += way * r[3 * block + k];
+    }
+    ++block;
+  }
+  for (size_t i = 0; i < blocks.size(); ++i) {
+    ContactBlock<double>& c = problem->contacts[i];
+    c.c_n -= way * r[3 * blocks[i]];
+    c.c_t -= way * r[3 * blocks[i] + 1];
+    c.friction += c.has_friction ? way * friction_(static_cast<Eigen::Index>(i), 0) : 0.0;
+  }
+}
+
+// Impulses with which the step holds as well, in the modes that the direction leads into; false
+// where there are none.
+bool StepDirectional::ChooseImpulses(const Model<double>& model, const StepRecord& record,
+                                     const RowMatrixXd& w_dot, ContactSolution<double>* solution) {
+  constexpr double kAsGood = 1e-9;  // scaled natural residual
+  ContactProblem<double> moved = record.problem;
+  MoveAlong(model, record, w_dot, &moved);
+  ContactSolution<double> along = record.solution;
+  if (!solver_.Solve(moved, ContactSolverOptions(), &along).solved) {
+    return false;
+  }
+  const ContactProblem<double>& problem = record.problem;
+  ContactSystem& system = solver_.system();
+  if (!system.Factor(problem, along.modes)) {
+    return false;
+  }
+  std::vector<double> x(3 * static_cast<size_t>(system.num_blocks()), 0.0);
+  std::copy(problem.momentum.begin(), problem.momentum.end(), x.begin());
+  const size_t joints = problem.mass.size();
+  for (size_t j = 0; j < problem.joints.size(); ++j) {
+    std::copy_n(problem.joints[j].rhs, problem.joints[j].rows, &x[joints + 3 * j]);
+  }
+  for (size_t i = 0; i < problem.contacts.size(); ++i) {
+    if (const int block = system.contact_block()[i]; block >= 0) {
+      x[3 * block] = -problem.contacts[i].c_n;
+      x[3 * block + 1] = along.modes[i] == ContactMode::kSticking ? -problem.contacts[i].c_t : 0.0;
+    }
+  }
+  system.Solve(problem, along.modes, x.data(), 1);
+  *solution = record.solution;
+  solution->modes = along.modes;
+  std::copy_n(x.begin() + static_cast<std::ptrdiff_t>(joints), solution->joint_impulse.size(),
+              solution->joint_impulse.begin());
+  for (size_t i = 0; i < problem.contacts.size(); ++i) {
+    const int block = system.contact_block()[i];
+    const double sign = SlidingSign(along.modes[i]);
+    solution->normal_impulse[i] = block < 0 ? 0.0 : x[3 * block];
+    solution->tangent_impulse[i] = block < 0 ? 0.0
+                                   : sign != 0.0
+                                       ? -sign * problem.contacts[i].friction * x[3 * block]
+                                       : x[3 * block + 1];
+  }
+  int worst;
+  return NaturalResidual(problem, *solution, &worst) <= kAsGood;
+}
+
+// A single direction that contradicts the impulses at hand.
+StepDirectional::Status StepDirectional::SolveOne(const Model<double>& model,
+                                                  const StepRecord& record,
+                                                  const RowMatrixXd& w_dot, RowMatrixXd* v_dot) {
+  FindKinks(model, record, record.solution, w_dot);
+  const Status status = SolveColumns(model, record, record.solution, w_dot, v_dot);
+  ContactSolution<double> chosen;
+  if (status != Status::kContradiction || !ChooseImpulses(model, record, w_dot, &chosen)) {
+    return status;
+  }
+  FindKinks(model, record, chosen, w_dot);
+  return SolveColumns(model, record, chosen, w_dot, v_dot);
+}
+
+bool StepDirectional::Apply(const Model<double>& model, Stepper* stepper, RowMatrixXd* w_dot,
+                            std::string* message) {
+  constexpr double kContradiction = 1e6;  // ApplyAndMeasure
+  const StepRecord& record = stepper->record();
+  if (!FindKinks(model, record, record.solution, *w_dot)) {
+    RowMatrixXd smooth = *w_dot;
+    if (tangent_.ApplyAndMeasure(model, stepper, &smooth) < kContradiction) {
+      *w_dot = smooth;
+      return true;
+    }
+  }
+  RowMatrixXd v_dot;
+  Status status = SolveColumns(model, record, record.solution, *w_dot, &v_dot);
+  if (status == Status::kContradiction) {
+    for (Eigen::Index c = 0; c < w_dot->cols(); ++c) {
+      RowMatrixXd one;
+      status = SolveOne(model, record, w_dot->col(c), &one);
+      if (status != Status::kSolved) {
+        break;
+      }
+      v_dot.col(c) = one;
+    }
+  }
+  if (status != Status::kSolved) {
+    *message = status == Status::kContradiction
+                   ? "the direction contradicts redundant contacts"
+                   : "the contacts at a kink have no rates along the direction";
+    return false;
+  }
+  AdvanceTangent(model, stepper, v_dot.data(), w_dot);
+  return true;
+}
+
+RolloutReport RolloutDirectional(const Model<double>& model, const State<double>& initial,
+                                 RowMatrixXd* w_dot, State<double>* final) {
+  StepDirectional directional;
+  std::ostringstream failure;
+  const StateObserver each = [&](long, double t, const State<double>&, Stepper* stepper) {
+    std::string message;
+    if (stepper != nullptr && failure.str().empty() &&
+        !directional.Apply(model, stepper, w_dot, &message)) {
+      failure << "t = " << t << " s: no one-sided derivative: " << message;
+    }
+  };
+  RolloutReport report = Rollout(model, initial, each, final);
+  if (report.status == StepStatus::kDone && !failure.str().empty()) {
+    report.status = StepStatus::kUnsolved;
+    report.message = failure.str();
+  }
+  return report;
+}
+
+}  // namespace tangible

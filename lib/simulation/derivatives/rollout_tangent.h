@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// The tangent of a rollout (forward mode): derivatives of the state with respect to any directions
+// in the variables w = [initial poses | initial twists | numbers].
+//
+//   each step   K ẋ = −(∂R/∂w) ẇ   (local_jacobian.h),   q̇⁺ = q̇ + h v̇⁺
+//
+// with the factorisation that the step's solve ended with, for all directions at once.
+
+#include "tangible/math/scalar.h"
+#include "tangible/simulation/stepping/rollout.h"
+
+namespace tangible {
+
+/// w_dot: num_variables x num_directions; rows of poses and twists are those of the current state.
+using TangentObserver =
+    std::function<void(long k, double t, const State<double>& state, const RowMatrixXd& w_dot)>;
+
+/// Runs the rollout with its tangent. `w_dot` holds the directions on entry (VariableJacobian of
+/// parameter_map.h, dense) and the final state's derivatives on return.
+RolloutReport RolloutTangent(const Model<double>& model, const State<double>& initial,
+                             const TangentObserver& observer, RowMatrixXd* w_dot,
+                             State<double>* final);
+/// The same with a stepper of the caller's, which keeps its memory from run to run.
+RolloutReport RolloutTangent(const Model<double>& model, const State<double>& initial,
+                             const TangentObserver& observer, Stepper* stepper, RowMatrixXd* w_dot,
+                             State<double>* final);
+
+/// From the derivatives of the new twists of moving blocks (3 num_blocks x columns, row-major) to
+/// those of the state after the step: poses move with them, and are projected.
+void AdvanceTangent(const Model<double>& model, Stepper* stepper, const double* twists,
+                    RowMatrixXd* w_dot);
+
+/// The tangent of the step that the stepper has just done.
+class StepTangent {
+ public:
+  /// For steps from `w_dot` on, with this object alone: the model's numbers that no column varies,
+  /// which stay so, are left out of fixed steps. Returns how many.
+  int FixNumbers(const Model<double>& model, const RowMatrixXd& w_dot);
+  /// Returns the largest relative residual of the linear solve.
+  double Apply(const Model<double>& model, Stepper* stepper, RowMatrixXd* w_dot);
+  /// The same, and how far the derivatives of the contacts' impulses exceed what the perturbation
+  /// drives: the largest over columns of |λ̇| mobility / max(|ṗ| / m, |ċ|, |v̇|). About 1 to 1e3;
+  /// above 1e6 the perturbation contradicts redundant rows (it breaks one contact and not the
+  /// other), and no derivative exists.
+  double ApplyAndMeasure(const Model<double>& model, Stepper* stepper, RowMatrixXd* w_dot);
+
+ private:
+  void Assemble(const Model<double>& model, Stepper* stepper, const RowMatrixXd& w_dot);
+  double Finish(const Model<double>& model, Stepper* stepper, RowMatrixXd* w_dot);
+
+  std::vector<double> rhs_;
+  std::vector<char> fixed_;  ///< 1 a variable that no column varies; empty: not known
+  LocalJacobianScratch scratch_;
+};
+
+}  // namespace tangible

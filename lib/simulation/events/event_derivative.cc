@@ -1,0 +1,417 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/simulation/events/event_derivative.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "tangible/dynamics/jacobian/contact_gradient.h"
+#include "tangible/simulation/events/event_rows_inl.h"
+#include "tangible/simulation/events/segment_flow.h"
+
+namespace tangible {
+namespace {
+
+using Row = Eigen::RowVectorXd;
+
+constexpr int kMostIterations = 60;
+
+Eigen::Vector3d BlockOf(const std::vector<double>& values, int block) {
+  return Eigen::Vector3d(values[3 * block], values[3 * block + 1], values[3 * block + 2]);
+}
+
+// The state's rows of stage i: x + c τ v + τ² Σ â A and so on, differentiated. `a_dot[j]` are the
+// stages' derivatives, one for each of `terms`.
+void PlaceTangent(const ModelStructure& s, const Segment& segment, double c, const double* a,
+                  const double* a_hat, int terms, const Row& tau_dot, const RowMatrixXd& x,
+                  const RowMatrixXd* a_dot, RowMatrixXd* out) {
+  const double tau = segment.length;
+  *out = x;
+  out->row(TimeVariable(s)) += c * tau_dot;
+  for (int body = 0; body < s.num_bodies(); ++body) {
+    if (s.bodies[body].motion == Motion::kStatic) {
+      continue;
+    }
+    auto pose = PoseRows(s, body, *out);
+    const Eigen::Vector3d v = BlockOf(segment.before.twist, body);
+    pose += c * tau * TwistRows(s, body, x) + c * v * tau_dot;
+    const int block = s.bodies[body].block;
+    if (block < 0) {
+      continue;
+    }
+    auto twist = TwistRows(s, body, *out);
+    for (int j = 0; j < terms; ++j) {
+      const Eigen::Vector3d value = BlockOf(segment.stages[j].solution.v, block);
+      if (a[j] != 0.0) {
+        twist += a[j] * (tau * BlockRows(block, a_dot[j]) + value * tau_dot);
+      }
+      if (a_hat[j] != 0.0) {
+        pose += a_hat[j] * (tau * tau * BlockRows(block, a_dot[j]) + 2.0 * tau * value * tau_dot);
+      }
+    }
+  }
+}
+
+}  // namespace
+
+template <typename Sink>
+void EventDerivative::Visit(const Model<double>& model, const Segment& segment,
+                            const SolvedNode& node, bool correction, const Sink& sink) {
+  if (listed_ != &node) {
+    VisitAccelerationJacobian(model, ViewOf(segment, node, correction), &scratch_, sink);
+    return;
+  }
+  for (const JacobianEntry& entry : entries_) {
+    sink(entry.row, entry.variable, entry.value);
+  }
+}
+
+void EventDerivative::List(const Model<double>& model, const Segment& segment,
+                           const SolvedNode* node) {
+  listed_ = node;
+  entries_.clear();
+  if (node != nullptr) {
+    VisitAccelerationJacobian(model, ViewOf(segment, *node, false), &scratch_,
+                              EntryListSink{&entries_});
+  }
+}
+
+double EventDerivative::NodeTangent(const Model<double>& model, const Segment& segment,
+                                    SolvedNode* node, bool correction, const RowMatrixXd& x,
+                                    RowMatrixXd* solved, const Row* tau_dot) {
+  const int columns = static_cast<int>(x.cols());
+  solved->setZero(3 * static_cast<Eigen::Index>(node->system.num_blocks()), columns);
+  Visit(model, segment, *node, correction, TangentSink{x.data(), solved->data(), columns});
+  // Out of penetration by recovery_speed times the segment's length, in the first correction.
+  for (size_t i = 0; tau_dot != nullptr && i < segment.contacts.size(); ++i) {
+    const int block = node->system.contact_block()[i];
+    if (segment.contacts[i].law == ContactLaw::kRecovery && block >= 0) {
+      solved->row(3 * block) += model.structure->settings.recovery_speed * *tau_dot;
+    }
+  }
+  return node->system.Solve(node->problem, node->solution.modes, solved->data(), columns);
+}
+
+void EventDerivative::NodeAdjoint(const Model<double>& model, const Segment& segment,
+                                  SolvedNode* node, bool correction, RowMatrixXd* seed,
+                                  RowMatrixXd* w_bar) {
+  const int columns = static_cast<int>(w_bar->cols());
+  node->system.SolveTransposed(node->problem, node->solution.modes, seed->data(), columns);
+  if (columns == 1) {
+    Visit(model, segment, *node, correction, SingleAdjointSink{seed->data(), w_bar->data()});
+  } else {
+    Visit(model, segment, *node, correction, AdjointSink{seed->data(), w_bar->data(), columns});
+  }
+}
+
+// The map of a given length: x of the state before on entry, after on return; tau_dot a column.
+double EventDerivative::SegmentTangent(const Model<double>& model, Segment* segment, RowMatrixXd* x,
+                                       const Row& tau_dot) {
+  const ModelStructure& s = *model.structure;
+  const NystromTableau& tableau = NystromTableau::Of(IntegratorOf(s.settings));
+  RowMatrixXd a_dot[NystromTableau::kMost];
+  RowMatrixXd place;
+  double left = 0.0;
+  for (int i = 0; i < tableau.stages; ++i) {
+    const bool implicit = tableau.last_is_implicit && i + 1 == tableau.stages;
+    if (implicit) {
+      a_dot[i] = a_dot[i - 1];
+      List(model, *segment, &segment->stages[i]);
+    }
+    FixedPoint fixed_point;
+    for (int iteration = 0; iteration < kMostIterations; ++iteration) {
+      PlaceTangent(s, *segment, tableau.c[i], tableau.a[i], tableau.a_hat[i], implicit ? i + 1 : i,
+                   tau_dot, *x, a_dot, &place);
+      RowMatrixXd next;
+      left = std::max(left, NodeTangent(model, *segment, &segment->stages[i], false, place, &next));
+      const RowMatrixXd bodies = next.topRows(3 * s.num_blocks());
+      const double change =
+          implicit ? (bodies - a_dot[i].topRows(3 * s.num_blocks())).cwiseAbs().maxCoeff() : 0.0;
+      const double size = implicit ? bodies.cwiseAbs().maxCoeff() : 0.0;
+      if (!implicit || fixed_point.Arrived(change, size)) {
+        a_dot[i] = bodies;
+        break;
+      }
+      if (iteration < kMostFixedPoints) {
+        a_dot[i] = bodies;
+        continue;
+      }
+      if (iteration == kMostFixedPoints) {
+        implicit_.Factor(model, *segment, &segment->stages[i], segment->length * tableau.a[i][i],
+                         segment->length * segment->length * tableau.a_hat[i][i]);
+        a_dot[i].setZero();  // the iteration may have diverged
+        continue;
+      }
+      if (iteration + 1 == kMostIterations) {
+        left = std::max(left, change / size);  // it has not converged: the certificate says so
+      }
+      RowMatrixXd step = bodies - a_dot[i];
+      implicit_.Solve(&step);
+      a_dot[i] += step;
+    }
+  }
+  List(model, *segment, nullptr);
+  PlaceTangent(s, *segment, 1.0, tableau.b, tableau.b_hat, tableau.stages, tau_dot, *x, a_dot,
+               &place);
+  x->swap(place);
+  for (int k = 0; k < segment->num_corrections; ++k) {
+    RowMatrixXd correction;
+    left = std::max(left, NodeTangent(model, *segment, &segment->corrections[k], true, *x,
+                                      &correction, k == 0 ? &tau_dot : nullptr));
+    for (int block = 0; block < s.num_blocks(); ++block) {
+      PoseRows(s, s.moving[block], *x) += BlockRows(block, correction);
+    }
+  }
+  if (segment->projects_twists) {
+    left = std::max(left, ImpulsesTangent(model, &segment->projection, x));
+  }
+  return left;
+}
+
+// ∇g over all variables and the time, of the event that ends the segment.
+void EventDerivative::EventGradient(const Model<double>& model, Segment* segment,
+                                    Eigen::VectorXd* gradient) {
+  const ModelStructure& s = *model.structure;
+  gradient->setZero(s.num_variables() + 1);
+  std::vector<JacobianEntry> entries;
+  if (segment->event == EventKind::kTouch) {
+    AddGapGradient(model, segment->after, segment->event_contact, &scratch_, &entries);
+  } else if (segment->event == EventKind::kReturn) {
+    AddApproachGradient(model, segment->after, segment->event_contact, &scratch_, &entries);
+  } else if (segment->event == EventKind::kSlipEnds) {
+    AddSlipGradient(model, segment->after, segment->event_contact, &scratch_, &entries);
+  } else {
+    SolvedNode& node = segment->end;
+    RowMatrixXd seed =
+        RowMatrixXd::Zero(3 * static_cast<Eigen::Index>(node.system.num_blocks()), 1);
+    const std::vector<int>& block_of = node.system.contact_block();
+    if (segment->event == EventKind::kLiftOff) {
+      seed(3 * block_of[segment->event_index], 0) = 1.0;
+    }
+    for (size_t i = 0; i < segment->contacts.size(); ++i) {
+      if (segment->event != EventKind::kSlipBegins ||
+          !segment->SticksWith(i, segment->event_index)) {
+        continue;
+      }
+      const CoefficientSource& friction = segment->event_friction;
+      seed(3 * block_of[i], 0) = friction.value;
+      seed(3 * block_of[i] + 1, 0) = -segment->event_sign;
+      for (int k = 0; k < 2; ++k) {
+        if (friction.numbers[k] >= 0) {
+          entries.push_back({0, s.NumberVariable(friction.numbers[k]),
+                             friction.derivatives[k] * node.solution.normal_impulse[i]});
+        }
+      }
+    }
+    RowMatrixXd w_bar = RowMatrixXd::Zero(s.num_variables() + 1, 1);
+    NodeAdjoint(model, *segment, &node, false, &seed, &w_bar);
+    *gradient += w_bar.col(0);
+  }
+  for (const JacobianEntry& entry : entries) {
+    (*gradient)(entry.variable) += entry.value;
+  }
+}
+
+double EventDerivative::EventRate(const Model<double>& model, Segment* segment, double* terms) {
+  *terms = 0.0;
+  if (!IsLocated(segment->event)) {
+    return 0.0;
+  }
+  RowMatrixXd by_length = RowMatrixXd::Zero(model.structure->num_variables() + 1, 1);
+  SegmentTangent(model, segment, &by_length, Row::Ones(1));
+  Eigen::VectorXd gradient;
+  EventGradient(model, segment, &gradient);
+  *terms = gradient.cwiseAbs().dot(by_length.col(0).cwiseAbs());
+  return gradient.dot(by_length.col(0));
+}
+
+double EventDerivative::Tangent(const Model<double>& model, EventRecord* record,
+                                RowMatrixXd* w_dot) {
+  const ModelStructure& s = *model.structure;
+  const Eigen::Index columns = w_dot->cols();
+  const int time = TimeVariable(s);
+  // One column more: the derivative by the segment's length.
+  RowMatrixXd x = RowMatrixXd::Zero(s.num_variables() + 1, columns + 1);
+  x.topLeftCorner(s.num_variables(), columns) = *w_dot;
+  Row tau_dot = Row::Zero(columns + 1);
+  tau_dot(columns) = 1.0;
+  double left = 0.0;
+  for (int p = 0; p < record->num_parts; ++p) {
+    EventPart& part = *record->parts[p];
+    if (part.is_impulses) {
+      left = std::max(left, ImpulsesTangent(model, &part.impulses, &x));
+      continue;
+    }
+    Segment& segment = part.segment;
+    x.col(columns).setZero();
+    const Row start = x.row(time);
+    left = std::max(left, SegmentTangent(model, &segment, &x, tau_dot));
+    Row moved = Row::Zero(columns + 1);
+    if (IsLocated(segment.event)) {
+      Eigen::VectorXd gradient;
+      EventGradient(model, &segment, &gradient);
+      const Row change = gradient.transpose() * x;
+      const double terms = gradient.cwiseAbs().dot(x.col(columns).cwiseAbs());
+      if (std::abs(change(columns)) > kNoRate * terms) {
+        moved = -change / change(columns);
+      }
+    } else if (segment.event != EventKind::kAtOnce) {
+      moved = -start;
+      if (segment.event_number >= 0) {
+        moved += x.row(s.NumberVariable(segment.event_number));
+      }
+    }
+    moved(columns) = 0.0;
+    x += (x.col(columns) * moved).eval();
+  }
+  *w_dot = x.topLeftCorner(s.num_variables(), columns);
+  return left;
+}
+
+// Back through the stages: w_bar of the integrated state on entry, of the state before on return.
+void EventDerivative::StagesAdjoint(const Model<double>& model, Segment* segment,
+                                    RowMatrixXd* w_bar) {
+  const ModelStructure& s = *model.structure;
+  const NystromTableau& tableau = NystromTableau::Of(IntegratorOf(s.settings));
+  const Eigen::Index columns = w_bar->cols();
+  const double tau = segment->length;
+  RowMatrixXd a_bar[NystromTableau::kMost];
+  for (int j = 0; j < tableau.stages; ++j) {
+    a_bar[j].setZero(3 * s.num_blocks(), columns);
+    for (int k = 0; k < s.num_blocks(); ++k) {
+      BlockRows(k, a_bar[j]) = tau * tau * tableau.b_hat[j] * PoseRows(s, s.moving[k], *w_bar) +
+                               tau * tableau.b[j] * TwistRows(s, s.moving[k], *w_bar);
+    }
+  }
+  // v̄ = v̄⁺ + c τ q̄, for all that move.
+  const auto add_to_twist = [&](double factor, const RowMatrixXd& from) {
+    for (int body = 0; body < s.num_bodies(); ++body) {
+      if (s.bodies[body].motion != Motion::kStatic) {
+        TwistRows(s, body, *w_bar) += factor * PoseRows(s, body, from);
+      }
+    }
+  };
+  add_to_twist(tau, RowMatrixXd(*w_bar));
+  for (int i = tableau.stages - 1; i >= 0; --i) {
+    SolvedNode& stage = segment->stages[i];
+    const bool implicit = tableau.last_is_implicit && i + 1 == tableau.stages;
+    const auto solve = [&](const RowMatrixXd& of_bodies, RowMatrixXd* stage_bar) {
+      RowMatrixXd seed =
+          RowMatrixXd::Zero(3 * static_cast<Eigen::Index>(stage.system.num_blocks()), columns);
+      seed.topRows(3 * s.num_blocks()) = of_bodies;
+      stage_bar->setZero(s.num_variables() + 1, columns);
+      NodeAdjoint(model, *segment, &stage, false, &seed, stage_bar);
+    };
+    RowMatrixXd stage_bar;
+    RowMatrixXd own = a_bar[i];
+    List(model, *segment, implicit ? &stage : nullptr);
+    FixedPoint fixed_point;
+    for (int iteration = 0; iteration < kMostIterations; ++iteration) {
+      solve(own, &stage_bar);
+      if (!implicit) {
+        break;
+      }
+      // The stage reads its own acceleration: ā = ā₀ + (τ² â q̄ + τ a v̄)(ā), a fixed point.
+      RowMatrixXd next = a_bar[i];
+      for (int k = 0; k < s.num_blocks(); ++k) {
+        BlockRows(k, next) +=
+            tau * tau * tableau.a_hat[i][i] * PoseRows(s, s.moving[k], stage_bar) +
+            tau * tableau.a[i][i] * TwistRows(s, s.moving[k], stage_bar);
+      }
+      const double change = (next - own).cwiseAbs().maxCoeff();
+      const double size = next.cwiseAbs().maxCoeff();
+      if (fixed_point.Arrived(change, size)) {
+        own = next;
+        solve(own, &stage_bar);
+        break;
+      }
+      if (iteration < kMostFixedPoints) {
+        own = next;
+        continue;
+      }
+      if (iteration == kMostFixedPoints) {
+        implicit_.Factor(model, *segment, &stage, tau * tableau.a[i][i],
+                         tau * tau * tableau.a_hat[i][i]);
+        own.setZero();  // the iteration may have diverged
+        continue;
+      }
+      RowMatrixXd step = next - own;
+      implicit_.SolveTransposed(&step);
+      own += step;
+    }
+    for (int j = 0; j < i; ++j) {
+      for (int k = 0; k < s.num_blocks(); ++k) {
+        BlockRows(k, a_bar[j]) +=
+            tau * tau * tableau.a_hat[i][j] * PoseRows(s, s.moving[k], stage_bar) +
+            tau * tableau.a[i][j] * TwistRows(s, s.moving[k], stage_bar);
+      }
+    }
+    add_to_twist(tableau.c[i] * tau, stage_bar);
+    *w_bar += stage_bar;
+  }
+  List(model, *segment, nullptr);
+}
+
+void EventDerivative::SegmentAdjoint(const Model<double>& model, Segment* segment,
+                                     bool starts_anywhere, RowMatrixXd* w_bar) {
+  const ModelStructure& s = *model.structure;
+  const Eigen::Index columns = w_bar->cols();
+  const bool located = IsLocated(segment->event);
+  RowMatrixXd by_length = RowMatrixXd::Zero(s.num_variables() + 1, 1);
+  Row alpha = Row::Zero(columns);
+  if (located || segment->event_number >= 0 || starts_anywhere) {
+    SegmentTangent(model, segment, &by_length, Row::Ones(1));
+    alpha = by_length.col(0).transpose() * *w_bar;
+  }
+  if (located) {
+    Eigen::VectorXd gradient;
+    EventGradient(model, segment, &gradient);
+    const double rate = gradient.dot(by_length.col(0));
+    const double terms = gradient.cwiseAbs().dot(by_length.col(0).cwiseAbs());
+    if (std::abs(rate) > kNoRate * terms) {
+      *w_bar -= gradient * (alpha / rate);
+    }
+  } else if (segment->event != EventKind::kAtOnce) {
+    w_bar->row(TimeVariable(s)) -= alpha;
+    if (segment->event_number >= 0) {
+      w_bar->row(s.NumberVariable(segment->event_number)) += alpha;
+    }
+  }
+  if (segment->projects_twists) {
+    ImpulsesAdjoint(model, &segment->projection, w_bar);
+  }
+  for (int k = segment->num_corrections - 1; k >= 0; --k) {
+    SolvedNode& node = segment->corrections[k];
+    RowMatrixXd seed =
+        RowMatrixXd::Zero(3 * static_cast<Eigen::Index>(node.system.num_blocks()), columns);
+    for (int block = 0; block < s.num_blocks(); ++block) {
+      BlockRows(block, seed) = PoseRows(s, s.moving[block], *w_bar);
+    }
+    NodeAdjoint(model, *segment, &node, true, &seed, w_bar);
+  }
+  StagesAdjoint(model, segment, w_bar);
+}
+
+void EventDerivative::Adjoint(const Model<double>& model, EventRecord* record, RowMatrixXd* w_bar) {
+  const ModelStructure& s = *model.structure;
+  RowMatrixXd bar = RowMatrixXd::Zero(s.num_variables() + 1, w_bar->cols());
+  bar.topRows(s.num_variables()) = *w_bar;
+  compression_bar_.resize(0, 0);
+  int first_moving = record->num_parts;  // the first segment whose end's time is not given
+  for (int p = record->num_parts - 1; p >= 0; --p) {
+    const EventPart& part = *record->parts[p];
+    if (!part.is_impulses && (IsLocated(part.segment.event) || part.segment.event_number >= 0)) {
+      first_moving = p;
+    }
+  }
+  for (int p = record->num_parts - 1; p >= 0; --p) {
+    EventPart& part = *record->parts[p];
+    if (part.is_impulses) {
+      ImpulsesAdjoint(model, &part.impulses, &bar);
+    } else {
+      SegmentAdjoint(model, &part.segment, p > first_moving, &bar);
+    }
+  }
+  *w_bar = bar.topRows(s.num_variables());
+}
+
+}  // namespace tangible

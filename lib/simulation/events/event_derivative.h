@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// Tangent and adjoint of an event step.
+//
+// Each segment is a map x⁺ = S(x, w, t, τ) of its length τ. The event at its end, g(x⁺, w, t + τ) =
+// 0, makes τ a function of the rest (implicit function theorem):
+//   τ̇ = −(∇g · Ṡ|τ) / (∇g · S_τ),   ẋ⁺ = Ṡ|τ + S_τ τ̇
+// and the time t + τ at which the next segment starts moves with it, so that the one that ends the
+// step has τ̇ = −ṫ. In the limit of small segments this is the saltation matrix of hybrid systems
+// (Leine, Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical Systems, 2004, ch. 7). The
+// adjoint is its transpose.
+
+#include "tangible/math/scalar.h"
+#include "tangible/simulation/events/event_record.h"
+#include "tangible/simulation/events/implicit_stage.h"
+
+namespace tangible {
+
+class EventDerivative {
+ public:
+  /// w_dot: num_variables x columns, of the state before the step on entry, after it on return.
+  /// Returns the largest relative residual of the linear solves.
+  double Tangent(const Model<double>& model, EventRecord* record, RowMatrixXd* w_dot);
+  /// w_bar: num_variables x columns, of the state after the step on entry, before it on return.
+  void Adjoint(const Model<double>& model, EventRecord* record, RowMatrixXd* w_bar);
+
+  /// How fast the event's equation changes with the segment's length: ∇g · S_τ, and the sum of the
+  /// magnitudes of its terms. 0 where the segment ends at a given time.
+  double EventRate(const Model<double>& model, Segment* segment, double* terms);
+
+ private:
+  double SegmentTangent(const Model<double>& model, Segment* segment, RowMatrixXd* x,
+                        const Eigen::RowVectorXd& tau_dot);
+  double ImpulsesTangent(const Model<double>& model, Impulses* impulses, RowMatrixXd* x);
+  /// `starts_anywhere`: an event before it in the step has a time that moves.
+  void SegmentAdjoint(const Model<double>& model, Segment* segment, bool starts_anywhere,
+                      RowMatrixXd* w_bar);
+  void StagesAdjoint(const Model<double>& model, Segment* segment, RowMatrixXd* w_bar);
+  void KeepCompression(const Impulses& impulses);
+  void AddOffsetsTangent(const Impulses& impulses);
+  void KeepOffsetsAdjoint(const Impulses& impulses);
+  void ImpulsesAdjoint(const Model<double>& model, Impulses* impulses, RowMatrixXd* w_bar);
+  void EventGradient(const Model<double>& model, Segment* segment, Eigen::VectorXd* gradient);
+  double NodeTangent(const Model<double>& model, const Segment& segment, SolvedNode* node,
+                     bool correction, const RowMatrixXd& x, RowMatrixXd* solved,
+                     const Eigen::RowVectorXd* tau_dot = nullptr);
+  void NodeAdjoint(const Model<double>& model, const Segment& segment, SolvedNode* node,
+                   bool correction, RowMatrixXd* seed, RowMatrixXd* w_bar);
+
+  /// ∂R/∂w of a node into a sink; while `listed_` is that node from its list.
+  template <typename Sink>
+  void Visit(const Model<double>& model, const Segment& segment, const SolvedNode& node,
+             bool correction, const Sink& sink);
+  /// Lists the entries of a node that an iteration reads again and again; null: of none.
+  void List(const Model<double>& model, const Segment& segment, const SolvedNode* node);
+
+  LocalJacobianScratch scratch_;
+  const SolvedNode* listed_ = nullptr;
+  std::vector<JacobianEntry> entries_;
+  ImplicitStage implicit_;
+  RowMatrixXd rhs_;
+  // Poisson's law, between an impact's two parts: derivatives of the compression's normal impulses,
+  // and of the losses with respect to them; a row a contact of the compression.
+  RowMatrixXd compression_dot_, compression_bar_;
+};
+
+}  // namespace tangible

@@ -1,0 +1,194 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Segments of no length. They move nothing, but derivatives need them at instants that a step's
+// ends give and no search finds:
+//
+//   a touch at the start of a step   the search of the step before ended on it. Its time depends on
+//                                    the state all the same: it is an event (kTouch) like others
+//   an event at the end of a step    what follows it starts at a given time, not at the event's
+//   the start of a run               a change of the initial twist that breaks a rolling contact or
+//                                    a joint acts as the impulse that restores it, at once and not
+//                                    after the first segment; one that lifts a contact or makes
+//                                    it land carries what it would else: the same, with friction
+// A box that rocks from corner to corner comes to rest after infinitely many impacts in finite
+// time. Settle ends that.
+#include <algorithm>
+#include <cmath>
+
+#include "tangible/lcp/system/contact_residual.h"
+#include "tangible/simulation/events/event_step.h"
+
+namespace tangible {
+namespace {
+
+// The share of max_events_per_step after which slow impacts are a rattle.
+constexpr int kRattling = 4;
+
+}  // namespace
+
+bool EventStepper::AddInstant(const Model<double>& model, double t, EventKind kind,
+                              const ActiveContact* contact, State<double>* state,
+                              EventOutcome* outcome) {
+  const int parts = record_.num_parts;
+  EventPart* part = record_.Add();
+  part->is_impulses = false;
+  Segment& segment = part->segment;
+  segment.time = t;
+  segment.length = 0.0;
+  segment.starts = starts_;
+  segment.middle = t;
+  segment.before = *state;
+  segment.event_number = -1;
+  // Contacts in penetration are those of a step's length: rounding is none.
+  if (!ChooseModes(model, t, t, model.structure->settings.dt, state, outcome, &segment)) {
+    record_.num_parts = parts;
+    outcome->message.clear();
+    return true;  // without accelerations there is nothing to say
+  }
+  segment.event = kind;
+  segment.event_index = -1;
+  if (contact != nullptr) {
+    segment.event_contact = *contact;
+  }
+  if (!flow_.Run(model, &segment, &outcome->message)) {
+    return false;
+  }
+  *state = segment.after;
+  return true;
+}
+
+bool EventStepper::Rattles(const Model<double>& model, const EventOutcome& outcome) {
+  return outcome.events > model.structure->settings.max_events_per_step / kRattling;
+}
+
+double EventStepper::ReturnSpeed(const Model<double>& model, const State<double>& state,
+                                 const ActiveContact& contact) const {
+  const double gravity = std::hypot(model.numbers[kGravityX], model.numbers[kGravityY]);
+  return std::sqrt(2.0 * gravity * search_.TouchTolerance(state, contact.a, contact.b));
+}
+
+std::string WhatIsUnsolved(const ModelStructure& structure, const Impulses& impulses,
+                           const ContactSolverReport& solved) {
+  if (solved.worst_contact >= 0) {
+    return NameOfContact(structure, impulses.contacts, solved.worst_contact);
+  }
+  const std::vector<double>& v = impulses.solution.v;
+  const int joint = MostViolatedJoint(impulses.problem, v, v, 1e-9);
+  return joint < 0 ? "momentum" : NameOfContradicted(structure, joint);
+}
+
+double EventStepper::SlowSpeed(const Model<double>& model, const State<double>& state,
+                               const EventOutcome& outcome) const {
+  double slow = search_.SpeedTolerance(model, state);
+  if (Rattles(model, outcome)) {
+    // What nearly dependent rows leave of the speeds that were to vanish.
+    for (const ActiveContact& contact : touching_.contacts) {
+      slow = std::max(slow, 1e-3 * ReturnSpeed(model, state, contact));
+    }
+  }
+  return slow;
+}
+
+// After an impact: where a contact that had rested leaves so slowly that gravity would bring it
+// back before it has left the touching tolerance (or, beyond max_events_per_step, more slowly than
+// the restitution threshold), it stays: all that touch there are held, along their tangents too
+// where they slide no faster. So they are after a slow impact that only sets a contact sliding,
+// which opens another one that returns, where that has gone on for long.
+bool EventStepper::Settle(const Model<double>& model, const Impulses& impact, State<double>* state,
+                          EventOutcome* outcome) {
+  const SimulationSettings& settings = model.structure->settings;
+  const double slow = search_.SpeedTolerance(model, *state);
+  Segment held;
+  held.time = impact.time;
+  bool any = false;
+  bool all_slow = true;     // no contact approached faster than it would return
+  bool any_slides = false;  // a contact that is to stick
+  for (size_t i = 0; i < impact.contacts.size(); ++i) {
+    const ActiveContact& contact = impact.contacts[i];
+    const ContactBlock<double>& block = impact.problem.contacts[i];
+    const auto speed = [&](const State<double>& at) {
+      return RelativeSpeed(at, contact.a, block.normal_a, contact.b, block.normal_b);
+    };
+    ContactMode mode = impact.solution.modes[i];
+    // A decompression elsewhere may have opened what its compression had closed.
+    const bool opened = !rebounds_[i] && speed(*state) > slow;
+    const double returns = std::max(ReturnSpeed(model, *state, contact),
+                                    inelastic_ ? settings.restitution_threshold : 0.0);
+    all_slow = all_slow && speed(impact.before) >= -returns;
+    if (mode == ContactMode::kOpen || opened) {
+      if (speed(*state) > returns) {
+        continue;
+      }
+      any = any || (speed(*state) > slow && speed(impact.before) >= -slow);
+      mode = ContactMode::kClosed;
+    } else if (rebounds_[i]) {
+      continue;
+    }
+    // What slides no faster sticks: while it slides it may push another contact open again.
+    const double slip =
+        RelativeSpeed(*state, contact.a, block.tangent_a, contact.b, block.tangent_b);
+    if (block.has_friction && std::abs(slip) <= returns) {
+      any_slides = any_slides || std::abs(slip) > slow;
+      mode = ContactMode::kSticking;
+    }
+    held.contacts.push_back(contact);
+    held.friction.push_back(impact.friction[i]);
+    held.modes.push_back(mode);
+  }
+  if (!any && !(Rattles(model, *outcome) && all_slow && any_slides)) {
+    return true;
+  }
+  ++outcome->fallbacks;
+  EventPart* part = record_.Add();
+  part->is_impulses = true;
+  SetUpProjection(held, *state, &part->impulses);
+  if (!flow_.Project(model, &part->impulses)) {
+    outcome->message = "twists of contacts that come to rest";
+    return false;
+  }
+  SpreadTwists(*model.structure, part->impulses.solution.v, &state->twist);
+  part->impulses.new_twist = state->twist;
+  return true;
+}
+
+bool EventStepper::LocateTouch(const Model<double>& model, double t, double slow,
+                               State<double>* state, EventOutcome* outcome) {
+  if (record_.num_parts > 0) {
+    const EventPart& last = *record_.parts[record_.num_parts - 1];
+    if (last.is_impulses ||
+        (last.segment.event != EventKind::kStepEnd && last.segment.event != EventKind::kEdge)) {
+      return true;
+    }
+  }
+  const auto was_closed = [&](const ActiveContact& contact) {
+    for (size_t i = 0; i < last_contacts_.size(); ++i) {
+      if (last_contacts_[i].SameAs(contact)) return last_modes_[i] != ContactMode::kOpen;
+    }
+    return false;
+  };
+  const ActiveContact* touch = nullptr;
+  for (size_t i = 0; i < touching_.contacts.size() && touch == nullptr; ++i) {
+    // In penetration it does not matter by how much: a gap that changes moves no time.
+    const ActiveContact& candidate = touching_.contacts[i];
+    const bool on_surface =
+        candidate.gap >= (candidate.joint >= 0
+                              ? -kLimitTolerance
+                              : -search_.TouchTolerance(*state, candidate.a, candidate.b));
+    if (touching_.approach[i] < -slow && on_surface && !was_closed(candidate)) {
+      touch = &touching_.contacts[i];
+    }
+  }
+  if (touch == nullptr) {
+    return true;
+  }
+  const ActiveContact contact = *touch;
+  // What touches acts by its impact alone: the motion up to here had only what rested before.
+  for (size_t i = 0; i < touching_.contacts.size(); ++i) {
+    if (touching_.approach[i] < -slow) touching_.approach[i] = HUGE_VAL;
+  }
+  const bool good = AddInstant(model, t, EventKind::kTouch, &contact, state, outcome);
+  FindTouching(model, *state);
+  return good;
+}
+
+}  // namespace tangible

@@ -1,0 +1,430 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/simulation/events/event_jets.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "tangible/lcp/contact/contact_interior_point.h"
+#include "tangible/simulation/events/implicit_residual_inl.h"
+#include "tangible/simulation/events/implicit_stage.h"
+#include "tangible/simulation/events/mode_elimination_inl.h"
+#include "tangible/simulation/events/segment_flow.h"
+
+namespace tangible {
+namespace {
+
+constexpr int kMostIterations = 60;
+constexpr double kUnrolledComplementarity = 1e-17;
+// Newton's iteration for an event's time ends where it changes derivatives by less than this share.
+constexpr double kLocated = 1e-12;
+constexpr int kMostLocations = 8;
+
+template <typename T>
+double DerivativeSize(const T& x) {
+  return x.v.cwiseAbs().maxCoeff();
+}
+
+template <typename T>
+class EventReplay {
+  static constexpr int kWidth = NumDerivatives<T>::value;
+
+ public:
+  EventReplay(const Model<T>& model, const Model<double>& values, JetRoute route)
+      : model_(model), values_(values), s_(*model.structure), route_(route) {}
+
+  void Run(EventRecord* record, State<T>* state) {
+    bool started = false;
+    T now(0.0);
+    for (int p = 0; p < record->num_parts; ++p) {
+      EventPart& part = *record->parts[p];
+      if (!started) {
+        now = T(part.is_impulses ? part.impulses.time : part.segment.time);
+        started = true;
+      }
+      if (part.is_impulses) {
+        RunImpulses(&part.impulses, state);
+      } else {
+        RunSegment(&part.segment, &now, state);
+      }
+    }
+  }
+
+ private:
+  // Solves a problem whose solution in double is known; of bodies, joints and contacts.
+  void Solve(const ContactProblem<T>& problem, const ContactProblem<double>& in_double,
+             const ContactSolution<double>& solution, const std::vector<double>& signs,
+             ContactSystem* system, ContactSolution<T>* out) {
+    if (route_ == JetRoute::kUnrolled) {
+      ModeElimination<T>::Solve(problem, solution.modes, out);
+      return;
+    }
+    std::vector<double> rhs(3 * static_cast<size_t>(system->num_blocks()) * kWidth, 0.0);
+    const std::vector<int>& block_of = system->contact_block();
+    ImplicitResidual<T>(problem, solution, signs, block_of, &rhs).Fill();
+    system->Solve(in_double, solution.modes, rhs.data(), kWidth);
+    const auto jet = [&](double value, size_t row) {
+      T x(value);
+      for (int d = 0; d < kWidth; ++d) {
+        x.v[d] = rhs[row * kWidth + d];
+      }
+      return x;
+    };
+    const size_t bodies = solution.v.size();
+    out->v.resize(bodies);
+    for (size_t i = 0; i < bodies; ++i) {
+      out->v[i] = jet(solution.v[i], i);
+    }
+    out->normal_impulse.assign(problem.contacts.size(), T(0.0));
+    out->tangent_impulse.assign(problem.contacts.size(), T(0.0));
+    for (size_t i = 0; i < problem.contacts.size(); ++i) {
+      if (block_of[i] >= 0) {
+        const size_t row = 3 * static_cast<size_t>(block_of[i]);
+        out->normal_impulse[i] = jet(solution.normal_impulse[i], row);
+        if (solution.modes[i] == ContactMode::kSticking) {
+          out->tangent_impulse[i] = jet(solution.tangent_impulse[i], row + 1);
+        }
+      }
+    }
+  }
+
+  void SetTwists(const std::vector<T>& solved, State<T>* state) const {
+    for (int k = 0; k < s_.num_blocks(); ++k) {
+      for (int i = 0; i < 3; ++i) {
+        state->twist[3 * s_.moving[k] + i] = solved[3 * k + i];
+      }
+    }
+  }
+
+  void RunImpulses(Impulses* impulses, State<T>* state, bool is_impact = true) {
+    ContactSolution<T> solution;
+    SolveImpulses(impulses, *state, is_impact, &solution);
+    SetTwists(solution.v, state);
+    compression_ = solution.normal_impulse;
+  }
+
+  // Of a decompression: e times the impulses of the part before.
+  void SetOffsets(const Impulses& impulses, ContactProblem<T>* problem) const {
+    for (size_t i = 0; i < impulses.contacts.size(); ++i) {
+      ContactBlock<T>& contact = problem->contacts[i];
+      contact.driven = impulses.problem.contacts[i].driven;
+      if (contact.driven) {
+        const T e = EvaluateCoefficient(impulses.restitution[i], model_.numbers);
+        contact.offset = e * compression_[impulses.compressed[i]];
+      }
+    }
+  }
+
+  void SolveImpulses(Impulses* impulses, const State<T>& state, bool is_impact,
+                     ContactSolution<T>* solution) {
+    ContactProblem<T> problem;
+    AssemblyScratch<T> scratch;
+    AssembleFree(model_, state, impulses->time, impulses->h, &problem, &scratch, false);
+    AssembleContacts(model_, state, impulses->h, impulses->contacts, impulses->friction,
+                     impulses->restitution, scratch, &problem);
+    if (impulses->decompression) {
+      SetOffsets(*impulses, &problem);
+    } else if (route_ == JetRoute::kUnrolled && is_impact) {
+      InteriorPointWorkspace<T> workspace;
+      ContactInteriorPointOptions options;
+      options.complementarity = kUnrolledComplementarity;
+      const bool converged =
+          SolveContactsByInteriorPoint(problem, options, &workspace, solution).converged;
+      double difference = 0.0;
+      double size = 0.0;
+      for (size_t i = 0; i < impulses->solution.v.size(); ++i) {
+        difference =
+            std::max(difference, std::abs(ValueOf(solution->v[i]) - impulses->solution.v[i]));
+        size = std::max(size, std::abs(impulses->solution.v[i]));
+      }
+      // Where impulses are not unique, or it stalls, the modes that the step found are eliminated.
+      if (converged && difference <= 1e-9 * size) {
+        return;
+      }
+    }
+    Solve(problem, impulses->problem, impulses->solution,
+          SlidingSigns(impulses->problem, impulses->solution), &impulses->system, solution);
+  }
+
+  // Accelerations at a state with the segment's modes.
+  void Accelerate(const Segment& segment, const State<T>& state, const T& time, SolvedNode* node,
+                  ContactSolution<T>* out) {
+    ContactProblem<T> problem;
+    AccelerationScratch<T> scratch;
+    AssembleAcceleration(model_, state, time, segment.middle, segment.contacts, segment.friction,
+                         &scratch, &problem);
+    std::vector<double> signs(segment.contacts.size(), 0.0);
+    for (size_t i = 0; i < signs.size(); ++i) {
+      signs[i] = SlidingSign(segment.modes[i]);
+      if (segment.modes[i] == ContactMode::kClosed && segment.contacts[i].joint < 0) {
+        signs[i] = SlipSign(segment.contacts[i], node->state);
+      }
+    }
+    Solve(problem, node->problem, node->solution, signs, &node->system, out);
+  }
+
+  double SlipSign(const ActiveContact& contact, const State<double>& state) const {
+    constexpr double kRounding = 1e-12;
+    ContactRows<double> rows;
+    EvaluateContactRows(values_, state, contact, &rows);
+    double slip = 0.0;
+    double terms = 0.0;
+    for (int i = 0; i < 3; ++i) {
+      const double on_a = rows.tangent_a[i] * state.twist[3 * contact.a + i];
+      const double on_b = rows.tangent_b[i] * state.twist[3 * contact.b + i];
+      slip += on_a + on_b;
+      terms += std::abs(on_a) + std::abs(on_b);
+    }
+    return std::abs(slip) <= kRounding * terms ? 0.0 : slip > 0.0 ? 1.0 : -1.0;
+  }
+
+  void Place(const State<T>& before, const T& tau, double c, const double* a, const double* a_hat,
+             int terms, const std::vector<ContactSolution<T>>& stages, State<T>* out) const {
+    *out = before;
+    for (size_t i = 0; i < out->pose.size(); ++i) {
+      out->pose[i] += c * tau * before.twist[i];
+    }
+    for (int j = 0; j < terms; ++j) {
+      for (int k = 0; k < s_.num_blocks(); ++k) {
+        for (int i = 0; i < 3; ++i) {
+          const int at = 3 * s_.moving[k] + i;
+          out->pose[at] += a_hat[j] * tau * tau * stages[j].v[3 * k + i];
+          out->twist[at] += a[j] * tau * stages[j].v[3 * k + i];
+        }
+      }
+    }
+  }
+
+  // A ← A + (I − B)⁻¹ (N − A) of values and derivatives.
+  void NewtonStep(const ContactSolution<T>& next, ContactSolution<T>* stage) const {
+    RowMatrixXd step(static_cast<Eigen::Index>(next.v.size()), kWidth + 1);
+    for (size_t k = 0; k < next.v.size(); ++k) {
+      const T left = next.v[k] - stage->v[k];
+      step(static_cast<Eigen::Index>(k), 0) = ValueOf(left);
+      step.row(static_cast<Eigen::Index>(k)).tail(kWidth) = left.v.transpose();
+    }
+    implicit_.Solve(&step);
+    for (size_t k = 0; k < next.v.size(); ++k) {
+      T change(step(static_cast<Eigen::Index>(k), 0));
+      change.v = step.row(static_cast<Eigen::Index>(k)).tail(kWidth).transpose();
+      stage->v[k] += change;
+    }
+  }
+
+  void Map(Segment* segment, const State<T>& before, const T& time, const T& tau, State<T>* after) {
+    const NystromTableau& tableau = NystromTableau::Of(IntegratorOf(s_.settings));
+    std::vector<ContactSolution<T>> stages(tableau.stages);
+    State<T> state;
+    for (int i = 0; i < tableau.stages; ++i) {
+      const bool implicit = tableau.last_is_implicit && i + 1 == tableau.stages;
+      if (implicit) {
+        stages[i] = stages[i - 1];
+      }
+      FixedPoint fixed_point;
+      for (int iteration = 0; iteration < kMostIterations; ++iteration) {
+        Place(before, tau, tableau.c[i], tableau.a[i], tableau.a_hat[i], implicit ? i + 1 : i,
+              stages, &state);
+        ContactSolution<T> next;
+        Accelerate(*segment, state, T(time + tableau.c[i] * tau), &segment->stages[i], &next);
+        double change = 0.0;
+        double size = 0.0;
+        for (size_t k = 0; implicit && k < next.v.size(); ++k) {
+          change = std::max({change, DerivativeSize(T(next.v[k] - stages[i].v[k])),
+                             std::abs(ValueOf(next.v[k]) - ValueOf(stages[i].v[k]))});
+          size = std::max({size, DerivativeSize(next.v[k]), std::abs(ValueOf(next.v[k]))});
+        }
+        if (!implicit || fixed_point.Arrived(change, size)) {
+          stages[i] = next;
+          break;
+        }
+        if (iteration < kMostFixedPoints) {
+          stages[i] = next;
+        } else if (iteration == kMostFixedPoints) {
+          const double length = ValueOf(tau);
+          implicit_.Factor(values_, *segment, &segment->stages[i], length * tableau.a[i][i],
+                           length * length * tableau.a_hat[i][i]);
+          stages[i] = stages[i - 1];  // the iteration may have diverged
+        } else {
+          NewtonStep(next, &stages[i]);
+        }
+      }
+    }
+    Place(before, tau, 1.0, tableau.b, tableau.b_hat, tableau.stages, stages, after);
+    Correct(segment, tau, after);
+    if (segment->projects_twists) {
+      RunImpulses(&segment->projection, after, false);
+    }
+  }
+
+  void Correct(Segment* segment, const T& tau, State<T>* after) {
+    for (int k = 0; k < segment->num_corrections; ++k) {
+      SolvedNode& node = segment->corrections[k];
+      ContactProblem<T> problem;
+      AccelerationScratch<T> scratch;
+      AssembleCorrection(model_, *after, segment->contacts, segment->friction,
+                         k == 0 ? T(s_.settings.recovery_speed * tau) : T(0.0), &scratch, &problem);
+      ContactSolution<T> correction;
+      Solve(problem, node.problem, node.solution,
+            std::vector<double>(segment->contacts.size(), 0.0), &node.system, &correction);
+      for (int b = 0; b < s_.num_blocks(); ++b) {
+        for (int i = 0; i < 3; ++i) {
+          after->pose[3 * s_.moving[b] + i] += correction.v[3 * b + i];
+        }
+      }
+    }
+  }
+
+  // The event's equation at the state after.
+  T Equation(Segment* segment, const State<T>& after, const T& time) {
+    const ActiveContact& contact = segment->event_contact;
+    if (segment->event == EventKind::kLiftOff || segment->event == EventKind::kSlipBegins) {
+      ContactSolution<T> solution;
+      Accelerate(*segment, after, time, &segment->end, &solution);
+      if (segment->event == EventKind::kLiftOff) {
+        return solution.normal_impulse[segment->event_index];
+      }
+      return segment->FrictionLeft<T>(segment->event_index,
+                                      EvaluateCoefficient(segment->event_friction, model_.numbers),
+                                      segment->event_sign, solution);
+    }
+    ContactRows<T> rows;
+    if (contact.joint >= 0) {
+      const JointIndex& joint = s_.joints[contact.joint];
+      JointRows<T> joint_rows;
+      EvaluateJoint(joint.type, after.PoseOf(joint.a), after.PoseOf(joint.b),
+                    &model_.numbers[joint.geometry], &joint_rows);
+      EvaluateLimitRows(model_, joint_rows, contact, &rows);
+    } else {
+      EvaluateContactRows(model_, after, contact, &rows);
+    }
+    return segment->event == EventKind::kTouch ? rows.geometry.gap
+           : segment->event == EventKind::kReturn
+               ? RelativeSpeed(after, contact.a, rows.normal_a, contact.b, rows.normal_b)
+               : RelativeSpeed(after, contact.a, rows.tangent_a, contact.b, rows.tangent_b);
+  }
+
+  // How fast the event's equation changes with the segment's length, and the sum of the magnitudes
+  // of the terms of which that is made.
+  struct Rate {
+    double value = 0.0;
+    double terms = 0.0;
+  };
+
+  // Of the map and the equation themselves: with the length as the only variable of the map, and
+  // then each part of the state that the length moves, and the time, as one of the equation.
+  Rate RateOf(Segment* segment) const {
+    const Model<T> constant{model_.structure, JetsOf(values_.numbers)};
+    EventReplay replay(constant, values_, route_);
+    State<T> by_length;
+    T tau(segment->length);
+    tau.v[0] = 1.0;
+    replay.Map(segment, JetsOf(segment->before), T(segment->time), tau, &by_length);
+    State<T> after = JetsOf(segment->after);
+    T time(segment->time + segment->length);
+    std::vector<std::pair<T*, double>> moving = {{&time, 1.0}};
+    for (size_t i = 0; i < after.pose.size(); ++i) {
+      if (ReadsBody(*segment, static_cast<int>(i / 3))) {
+        moving.emplace_back(&after.pose[i], by_length.pose[i].v[0]);
+        moving.emplace_back(&after.twist[i], by_length.twist[i].v[0]);
+      }
+    }
+    Rate rate;
+    for (size_t first = 0; first < moving.size(); first += kWidth) {
+      const size_t last = std::min(first + kWidth, moving.size());
+      for (size_t i = first; i < last; ++i) {
+        moving[i].first->v[static_cast<int>(i - first)] = moving[i].second;
+      }
+      const T equation = replay.Equation(segment, after, time);
+      rate.value += equation.v.sum();
+      rate.terms += equation.v.cwiseAbs().sum();
+      for (size_t i = first; i < last; ++i) {
+        moving[i].first->v.setZero();
+      }
+    }
+    return rate;
+  }
+
+  // Whether the equation of a segment's event depends on a body's pose and twist: accelerations
+  // depend on all.
+  static bool ReadsBody(const Segment& segment, int body) {
+    return segment.event == EventKind::kLiftOff || segment.event == EventKind::kSlipBegins ||
+           body == segment.event_contact.a || body == segment.event_contact.b;
+  }
+
+  static std::vector<T> JetsOf(const std::vector<double>& values) {
+    return std::vector<T>(values.begin(), values.end());
+  }
+  static State<T> JetsOf(const State<double>& state) {
+    State<T> jets;
+    jets.pose = JetsOf(state.pose);
+    jets.twist = JetsOf(state.twist);
+    return jets;
+  }
+
+  // The length at whose end the event's equation holds, and the state there: Newton's iteration for
+  // the derivatives of `tau`, whose value the step in double has found.
+  void LocateEvent(Segment* segment, const State<T>& before, const T& now, T* tau,
+                   State<T>* after) {
+    const Rate rate = RateOf(segment);
+    Map(segment, before, now, *tau, after);
+    if (!(std::abs(rate.value) > kNoRate * rate.terms)) {
+      return;
+    }
+    using Derivatives = Eigen::Array<double, kWidth, 1>;
+    Derivatives first;
+    double last = HUGE_VAL;
+    for (int k = 0; k < kMostLocations; ++k) {
+      const Derivatives change = Equation(segment, *after, T(now + *tau)).v.array() / rate.value;
+      first = k == 0 ? Derivatives(change.abs()) : first;
+      const double share = (first > 0.0).select(change.abs() / first, 0.0).maxCoeff();
+      // What does not fall any more is rounding.
+      if (share <= kLocated || share > 0.5 * last) {
+        return;
+      }
+      last = share;
+      tau->v -= change.matrix();
+      Map(segment, before, now, *tau, after);
+    }
+  }
+
+  void RunSegment(Segment* segment, T* now, State<T>* state) {
+    const double end = segment->time + segment->length;
+    T tau(segment->length);
+    State<T> after;
+    if (IsLocated(segment->event)) {
+      LocateEvent(segment, *state, *now, &tau, &after);
+    } else {
+      if (segment->event_number >= 0) {
+        tau = model_.numbers[segment->event_number] - *now;
+      } else if (segment->event != EventKind::kAtOnce) {
+        tau = end - *now;
+      }
+      tau.a = segment->length;
+      Map(segment, *state, *now, tau, &after);
+    }
+    *now += tau;
+    now->a = end;
+    *state = std::move(after);
+  }
+
+  const Model<T>& model_;
+  const Model<double>& values_;
+  const ModelStructure& s_;
+  const JetRoute route_;
+  ImplicitStage implicit_;
+  std::vector<T> compression_;  // normal impulses of the last impact
+};
+
+}  // namespace
+
+template <typename T>
+void EventStepInJets(const Model<T>& model, const Model<double>& values, JetRoute route,
+                     EventRecord* record, State<T>* state) {
+  EventReplay<T>(model, values, route).Run(record, state);
+}
+
+#define TANGIBLE_INSTANTIATE_JET(N)                                                           \
+  template void EventStepInJets<Jet<N>>(const Model<Jet<N>>&, const Model<double>&, JetRoute, \
+                                        EventRecord*, State<Jet<N>>*);
+TANGIBLE_FOR_EACH_JET_WIDTH(TANGIBLE_INSTANTIATE_JET)
+
+}  // namespace tangible

@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/simulation/events/event_record.h"
+
+namespace tangible {
+namespace {
+
+size_t BytesOf(const State<double>& state) {
+  return sizeof(double) * (state.pose.capacity() + state.twist.capacity());
+}
+
+// Without the node itself, which stands in a vector.
+size_t BytesOf(const SolvedNode& node) {
+  return BytesOf(node.state) + node.problem.bytes() + node.solution.bytes() + node.system.bytes();
+}
+
+size_t BytesOf(const std::vector<SolvedNode>& nodes) {
+  size_t sum = nodes.capacity() * sizeof(SolvedNode);
+  for (const SolvedNode& node : nodes) {
+    sum += BytesOf(node);
+  }
+  return sum;
+}
+
+size_t BytesOf(const Impulses& impulses) {
+  return BytesOf(impulses.before) + sizeof(double) * impulses.new_twist.capacity() +
+         sizeof(ActiveContact) * impulses.contacts.capacity() +
+         sizeof(CoefficientSource) *
+             (impulses.friction.capacity() + impulses.restitution.capacity()) +
+         impulses.problem.bytes() + impulses.solution.bytes() + impulses.system.bytes();
+}
+
+size_t BytesOf(const Segment& segment) {
+  return BytesOf(segment.before) + BytesOf(segment.after) +
+         sizeof(ActiveContact) * segment.contacts.capacity() +
+         sizeof(CoefficientSource) * segment.friction.capacity() +
+         sizeof(ContactMode) * segment.modes.capacity() + BytesOf(segment.stages) +
+         BytesOf(segment.corrections) + BytesOf(segment.projection) + BytesOf(segment.end);
+}
+
+}  // namespace
+
+EventPart* EventRecord::Add() {
+  if (num_parts == static_cast<int>(parts.size())) {
+    parts.push_back(std::make_unique<EventPart>());
+  }
+  return parts[num_parts++].get();
+}
+
+size_t EventRecord::bytes() const {
+  size_t sum = parts.capacity() * sizeof(parts[0]);
+  for (const std::unique_ptr<EventPart>& part : parts) {
+    sum += sizeof(EventPart) + BytesOf(part->segment) + BytesOf(part->impulses);
+  }
+  return sum;
+}
+
+SolvedStep Impulses::View() const {
+  SolvedStep view;
+  view.time = time;
+  view.h = h;
+  view.corrects_drift = false;
+  view.before = &before;
+  view.new_twist = &new_twist;
+  view.contacts = &contacts;
+  view.friction = &friction;
+  view.restitution = &restitution;
+  view.problem = &problem;
+  view.solution = &solution;
+  view.contact_block = &system.contact_block();
+  return view;
+}
+
+const char* NameOf(EventKind event) {
+  switch (event) {
+    case EventKind::kStepEnd:
+      return "end of the step";
+    case EventKind::kEdge:
+      return "edge of a force's window";
+    case EventKind::kTouch:
+      return "touch";
+    case EventKind::kSlipEnds:
+      return "end of sliding";
+    case EventKind::kSlipBegins:
+      return "start of sliding";
+    case EventKind::kLiftOff:
+      return "lift-off";
+    case EventKind::kReturn:
+      return "return into penetration";
+    case EventKind::kAtOnce:
+      return "return into penetration at once";
+  }
+  return "";
+}
+
+bool IsLocated(EventKind kind) {
+  return kind != EventKind::kStepEnd && kind != EventKind::kEdge && kind != EventKind::kAtOnce;
+}
+
+SolvedAcceleration ViewOf(const Segment& segment, const SolvedNode& node, bool correction) {
+  SolvedAcceleration view;
+  view.correction = correction;
+  view.time = node.time;
+  view.middle = segment.middle;
+  view.state = &node.state;
+  view.contacts = &segment.contacts;
+  view.friction = &segment.friction;
+  view.problem = &node.problem;
+  view.solution = &node.solution;
+  view.contact_block = &node.system.contact_block();
+  return view;
+}
+
+}  // namespace tangible

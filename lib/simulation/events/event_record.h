@@ -1,0 +1,139 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// What an event step was made of, as its derivatives need it: segments of smooth motion, each up to
+// an event or to the step's end, and impacts between them.
+
+#include <memory>
+#include <vector>
+
+#include "tangible/dynamics/jacobian/acceleration_jacobian.h"
+#include "tangible/lcp/system/contact_system.h"
+
+namespace tangible {
+
+/// A linear system of accelerations or of a correction, solved with given modes.
+struct SolvedNode {
+  State<double> state;  ///< where it was assembled
+  double time = 0.0;
+  ContactProblem<double> problem;
+  ContactSolution<double> solution;  ///< v holds accelerations (m/s²) or the correction (m)
+  ContactSystem system;
+};
+
+/// An instantaneous change of twists: an impact or a projection of twists, as a step with h = 0;
+/// or, where accelerations have no solution, impulses of a very short step. By Poisson's law an
+/// impact is two parts of the record, its compression and then its decompression.
+struct Impulses {
+  double time = 0.0;
+  double h = 0.0;
+  State<double> before;
+  std::vector<double> new_twist;  ///< of all bodies
+  std::vector<ActiveContact> contacts;
+  std::vector<CoefficientSource> friction, restitution;
+  ContactProblem<double> problem;
+  ContactSolution<double> solution;
+  ContactSystem system;
+  bool decompression = false;   ///< of the impulses that the part before has found
+  std::vector<int> compressed;  ///< decompression: the place of each contact in that part
+
+  SolvedStep View() const;
+};
+
+enum class EventKind : unsigned char {
+  kStepEnd,     ///< none: the step's time is over
+  kEdge,        ///< a force's window opens or closes, or a signal has a corner
+  kTouch,       ///< a gap or the distance from a joint limit closes
+  kSlipEnds,    ///< a sliding speed reaches 0
+  kSlipBegins,  ///< friction reaches its limit (Segment::SticksWith)
+  kLiftOff,     ///< a normal force reaches 0
+  kReturn,      ///< the speed at which an open contact leaves penetration reaches 0
+  kAtOnce,      ///< the same at the segment's start, where poses and twists are corrected
+};
+
+/// "touch", "end of sliding", ...
+const char* NameOf(EventKind event);
+
+/// Whether an event's time is found from an equation (and not given).
+bool IsLocated(EventKind kind);
+
+/// Below this share of its terms the rate at which an event's equation changes with the segment's
+/// length is rounding: two features hand a contact over, and nothing depends on when.
+inline constexpr double kNoRate = 1e-9;
+
+/// Smooth motion over [time, time + length] with modes held, then the event that ended it.
+struct Segment {
+  double time = 0.0;
+  double length = 0.0;
+  /// The instant at which a run starts: what its initial twists approach acts with friction.
+  bool starts = false;
+  double middle = 0.0;  ///< the time at which forces and pieces of signals are chosen
+  State<double> before, after;
+  std::vector<ActiveContact> contacts;  ///< those closed; law kRecovery: pushed out of penetration
+  std::vector<CoefficientSource> friction;
+  std::vector<ContactMode> modes;
+  std::vector<SolvedNode> stages;  ///< of the integrator
+  int num_stages = 0;
+  std::vector<SolvedNode> corrections;  ///< of poses, one after another
+  int num_corrections = 0;
+  bool projects_twists = false;
+  Impulses projection;
+
+  EventKind event = EventKind::kStepEnd;
+  ActiveContact event_contact;
+  CoefficientSource event_friction;  ///< of kSlipBegins
+  double event_sign = 0.0;           ///< kSlipBegins: sign of the tangential force
+  int event_number = -1;             ///< kEdge: the number that is the time; −1: a constant
+  SolvedNode end;                    ///< kSlipBegins, kLiftOff: accelerations after the motion
+  int event_index = -1;              ///< the same: which of `contacts`
+
+  /// Whether contact i sticks between the bodies of contact k, as k does. Such contacts, the two
+  /// ends of a face, begin to slide as one, when the sum of their friction reaches the sum of its
+  /// limits: how they share it is not determined, and nothing moves before.
+  bool SticksWith(size_t i, size_t k) const {
+    return modes[i] == ContactMode::kSticking && contacts[i].joint < 0 &&
+           contacts[i].a == contacts[k].a && contacts[i].b == contacts[k].b;
+  }
+  /// Whether a contact before it in `contacts` sticks with contact k.
+  bool SticksWithEarlier(size_t k) const {
+    for (size_t i = 0; i < k; ++i) {
+      if (SticksWith(i, k)) return true;
+    }
+    return false;
+  }
+  /// Σ (friction · normal force − sign · tangential force) over the contacts that stick with k, N.
+  template <typename T>
+  T FrictionLeft(size_t k, const T& coefficient, double sign,
+                 const ContactSolution<T>& solution) const {
+    T left(0.0);
+    for (size_t i = 0; i < contacts.size(); ++i) {
+      if (SticksWith(i, k)) {
+        left += coefficient * solution.normal_impulse[i] - sign * solution.tangent_impulse[i];
+      }
+    }
+    return left;
+  }
+};
+
+/// One part of a step; of the two members the one that `is_impulses` says holds.
+struct EventPart {
+  bool is_impulses = false;
+  Segment segment;
+  Impulses impulses;
+};
+
+/// The parts in their order; kept from step to step for their memory.
+struct EventRecord {
+  std::vector<std::unique_ptr<EventPart>> parts;
+  int num_parts = 0;
+
+  void Clear() { num_parts = 0; }
+  EventPart* Add();
+  /// Memory, bytes, with the parts that are kept for later steps.
+  size_t bytes() const;
+};
+
+/// The view that VisitAccelerationJacobian takes.
+SolvedAcceleration ViewOf(const Segment& segment, const SolvedNode& node, bool correction);
+
+}  // namespace tangible

@@ -1,0 +1,323 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/simulation/events/event_search.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <string>
+
+#include "tangible/geometry/mass_properties.h"
+#include "tangible/simulation/events/event_search_inl.h"
+
+namespace tangible {
+namespace {
+
+// How often the motion may be evaluated in a step, as a multiple of max_events_per_step: an event
+// takes some ten; one search over a motion whose rates are of no use a thousand.
+constexpr long kEvaluationsOfEvent = 1000;
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+// A force counts as negative, and friction as exceeded, beyond this share of the forces at work.
+constexpr double kForceTolerance = 1e-10;
+
+double SpeedOf(const double* twist, double radius) {
+  return std::hypot(twist[0], twist[1]) + std::abs(twist[2]) * radius;
+}
+
+}  // namespace
+
+EventSearch::EventSearch(const Model<double>& model) {
+  const ModelStructure& structure = *model.structure;
+  double smallest = kInfinity;
+  for (int body = 0; body < structure.num_bodies(); ++body) {
+    const ShapeType type = structure.bodies[body].shape;
+    const bool bounded = type != ShapeType::kNone && type != ShapeType::kHalfPlane;
+    radius_.push_back(bounded ? BoundingRadius(model.Shape(body)) : 0.0);
+    if (bounded) {
+      smallest = std::min(smallest, radius_.back());
+    }
+  }
+  scale_ = std::isfinite(smallest) ? smallest : 1.0;
+  closing_.resize(structure.bodies.size());
+  boxes_.resize(structure.bodies.size());
+}
+
+double EventSearch::TouchTolerance(const State<double>& state, int a, int b) const {
+  double place = 0.0;
+  for (const int body : {a, b}) {
+    place = std::max({place, std::abs(state.pose[3 * body]), std::abs(state.pose[3 * body + 1])});
+  }
+  return 1e-10 * SmallerRadius(a, b) + 64.0 * std::numeric_limits<double>::epsilon() * place;
+}
+
+double EventSearch::SpeedTolerance(const Model<double>& model, const State<double>& state) const {
+  double speed =
+      std::hypot(model.numbers[kGravityX], model.numbers[kGravityY]) * model.structure->settings.dt;
+  for (int body = 0; body < model.structure->num_bodies(); ++body) {
+    speed = std::max(speed, SpeedOf(&state.twist[3 * body], radius_[body]));
+  }
+  return 1e-11 * speed + 1e-200;
+}
+
+void EventSearch::FindContacts(const Model<double>& model, const State<double>& state, double reach,
+                               std::vector<ActiveContact>* contacts) {
+  const ModelStructure& structure = *model.structure;
+  contacts->clear();
+  for (int body = 0; body < structure.num_bodies(); ++body) {
+    boxes_[body] = ComputeAabb(model.Shape(body), state.PoseOf(body), 0.5 * reach);
+  }
+  broad_phase_.FindPairs(
+      boxes_, [&](int i, int j) { return structure.MayCollide(i, j); }, &pairs_);
+  for (const auto& [a, b] : pairs_) {
+    ContactFeature features[2];
+    const int count = FindContactFeatures(model.Shape(a), state.PoseOf(a), model.Shape(b),
+                                          state.PoseOf(b), reach, features);
+    for (int k = 0; k < count; ++k) {
+      ActiveContact contact;
+      contact.a = a;
+      contact.b = b;
+      contact.feature = features[k];
+      contact.law = ContactLaw::kInelastic;
+      ContactRows<double> rows;
+      EvaluateContactRows(model, state, contact, &rows);
+      contact.gap = rows.geometry.gap;
+      contacts->push_back(contact);
+    }
+  }
+}
+
+EventSearch::Sample* EventSearch::At(const Model<double>& model, double length) {
+  for (int i = 0; i < num_samples_; ++i) {
+    if (samples_[i].length == length) {
+      return &samples_[i];
+    }
+  }
+  // A bracket's ends are asked for again; older samples are not.
+  constexpr int kMostSamples = 64;
+  if (num_samples_ == kMostSamples) {
+    std::rotate(samples_.begin(), samples_.begin() + kMostSamples / 2, samples_.end());
+    num_samples_ = kMostSamples / 2;
+  }
+  if (samples_.empty()) {
+    samples_.resize(kMostSamples);
+  }
+  Sample& sample = samples_[num_samples_++];
+  sample.length = length;
+  Segment& motion = sample.motion;
+  motion.time = segment_->time;
+  motion.length = length;
+  motion.middle = segment_->middle;
+  motion.before = segment_->before;
+  motion.contacts = segment_->contacts;
+  motion.friction = segment_->friction;
+  motion.modes = segment_->modes;
+  sample.has_end = false;
+  ++evaluations_;
+  sample.good = flow_.Run(model, &motion, &message_);
+  if (!sample.good) {
+    all_good_ = false;
+    motion.after = segment_->before;
+  }
+  return &sample;
+}
+
+// What the motion of a sample has found, for the segment that it is a motion of.
+void EventSearch::TakeMotion(Sample* sample, Segment* segment) {
+  Segment& motion = sample->motion;
+  std::swap(segment->after, motion.after);
+  std::swap(segment->stages, motion.stages);
+  segment->num_stages = motion.num_stages;
+  std::swap(segment->corrections, motion.corrections);
+  segment->num_corrections = motion.num_corrections;
+  segment->projects_twists = motion.projects_twists;
+  std::swap(segment->projection, motion.projection);
+  num_samples_ = 0;  // this one is spent
+}
+
+// The function of a closed contact whose sign tells that its mode ends.
+double EventSearch::ModeValue(const Model<double>& model, Sample* sample, const Event& event) {
+  if (!sample->good) {
+    return std::numeric_limits<double>::quiet_NaN();
+  }
+  const Segment& motion = sample->motion;
+  if (event.kind == EventKind::kSlipEnds) {
+    return SlidingSign(motion.modes[event.index]) *
+           SpeedsOf(model, motion.after, motion.contacts[event.index]).slip;
+  }
+  if (!sample->has_end) {
+    if (!flow_.Accelerate(model, motion, motion.after, motion.time + motion.length, &sample->end)) {
+      return std::numeric_limits<double>::quiet_NaN();
+    }
+    sample->has_end = true;
+  }
+  const SolvedNode& node = sample->end;
+  const double normal = node.solution.normal_impulse[event.index];
+  if (event.kind == EventKind::kLiftOff) {
+    return normal;
+  }
+  return motion.FrictionLeft(event.index, motion.friction[event.index].value, event.sign,
+                             node.solution);
+}
+
+void EventSearch::SearchClosed(const Model<double>& model, Event* event) {
+  const double slow = SpeedTolerance(model, segment_->before);
+  for (size_t i = 0; i < segment_->contacts.size(); ++i) {
+    const ContactMode mode = segment_->modes[i];
+    Event trial;
+    trial.index = static_cast<int>(i);
+    trial.contact = segment_->contacts[i];
+    const auto try_function = [&](double at_start, double tolerance) {
+      if (at_start <= tolerance) {
+        return;
+      }
+      double a = 0.0;
+      double fa = at_start;
+      for (const double share : {0.5, 1.0}) {
+        const double b = share * event->length;
+        const double fb = ModeValue(model, At(model, b), trial);
+        if (std::isnan(fb)) {
+          return;
+        }
+        if (fb < -tolerance) {
+          const auto f = [&](Sample& sample) { return ModeValue(model, &sample, trial); };
+          trial.length = Refine(model, f, 8.0 * std::numeric_limits<double>::epsilon() * at_start,
+                                a, fa, b, fb);
+          *event = trial;
+          return;
+        }
+        a = b;
+        fa = std::max(fb, 0.0);
+      }
+    };
+    if (SlidingSign(mode) != 0.0) {
+      trial.kind = EventKind::kSlipEnds;
+      try_function(
+          SlidingSign(mode) * SpeedsOf(model, segment_->before, segment_->contacts[i]).slip, slow);
+    }
+    const Sample& end = *At(model, event->length);
+    if (!end.good) {
+      return;
+    }
+    const ContactSolution<double>& start = end.motion.stages[0].solution;
+    double scale = 0.0;
+    for (const double momentum : end.motion.stages[0].problem.momentum) {
+      scale = std::max(scale, std::abs(momentum));
+    }
+    for (const double normal : start.normal_impulse) {
+      scale = std::max(scale, std::abs(normal));
+    }
+    // What changes no speed within a step but by its rounding is no force: where none acts (no
+    // gravity, bodies that coast side by side) all of them are rounding.
+    double mass = 0.0;
+    for (const int body : {segment_->contacts[i].a, segment_->contacts[i].b}) {
+      if (model.structure->bodies[body].block >= 0) {
+        mass = std::max(mass, model.numbers[model.structure->bodies[body].mass]);
+      }
+    }
+    const double tolerance =
+        std::max(kForceTolerance * scale, mass * slow / model.structure->settings.dt);
+    const double normal = start.normal_impulse[i];
+    trial.kind = EventKind::kLiftOff;
+    try_function(normal, tolerance);
+    if (mode == ContactMode::kSticking && !segment_->SticksWithEarlier(i)) {
+      trial.kind = EventKind::kSlipBegins;
+      for (const double sign : {1.0, -1.0}) {
+        trial.sign = sign;
+        try_function(segment_->FrictionLeft(i, segment_->friction[i].value, sign, start),
+                     tolerance);
+      }
+    }
+  }
+}
+
+void EventSearch::FindPairs(const Model<double>& model) {
+  const ModelStructure& structure = *model.structure;
+  const Sample& end = *At(model, segment_->length);
+  for (int body = 0; body < structure.num_bodies(); ++body) {
+    const double before = SpeedOf(&segment_->before.twist[3 * body], radius_[body]);
+    const double after =
+        end.good ? SpeedOf(&end.motion.after.twist[3 * body], radius_[body]) : before;
+    closing_[body] = 1.02 * std::max(before, after) + 0.25 * std::abs(after - before);
+    const double reach = closing_[body] * segment_->length + 1e-9 * scale_;
+    boxes_[body] = ComputeAabb(model.Shape(body), segment_->before.PoseOf(body), reach);
+    if (structure.bodies[body].shape == ShapeType::kHalfPlane &&
+        segment_->before.twist[3 * body + 2] != 0.0) {
+      boxes_[body] = {-kInfinity, -kInfinity, kInfinity, kInfinity};
+    }
+  }
+  broad_phase_.FindPairs(
+      boxes_, [&](int i, int j) { return structure.MayCollide(i, j); }, &pairs_);
+}
+
+bool EventSearch::Run(const Model<double>& model, const std::vector<ActiveContact>& touching,
+                      Segment* segment, std::string* message) {
+  segment_ = segment;
+  touching_ = &touching;
+  num_samples_ = 0;
+  all_good_ = true;
+  const long most = kEvaluationsOfEvent * (1L + model.structure->settings.max_events_per_step);
+  if (evaluations_ > most) {
+    *message = "events are not found in " + std::to_string(most) +
+               " evaluations of the motion: a body is too stiff for dt, or events do not end";
+    return false;
+  }
+  Event event;
+  event.length = segment->length;
+  if (!At(model, event.length)->good) {
+    *message = message_;
+    return false;
+  }
+  FindPairs(model);
+  for (const auto& [a, b] : pairs_) {
+    double turning = 0.0;  // a turning half-plane sweeps by its distance
+    for (const int body : {a, b}) {
+      if (model.structure->bodies[body].shape == ShapeType::kHalfPlane) {
+        const int other = body == a ? b : a;
+        turning = std::abs(segment->before.twist[3 * body + 2]) *
+                  (std::hypot(segment->before.pose[3 * a] - segment->before.pose[3 * b],
+                              segment->before.pose[3 * a + 1] - segment->before.pose[3 * b + 1]) +
+                   radius_[other]);
+        closing_[body] =
+            std::hypot(segment->before.twist[3 * body], segment->before.twist[3 * body + 1]) +
+            turning;
+      }
+    }
+    SearchPair(model, a, b, &event);
+    if (event.kind == EventKind::kAtOnce) {
+      break;
+    }
+  }
+  for (size_t j = 0; j < model.structure->joints.size(); ++j) {
+    if (model.structure->joints[j].low >= 0 && event.kind != EventKind::kAtOnce) {
+      SearchLimit(model, static_cast<int>(j), 1.0, &event);
+      if (event.kind != EventKind::kAtOnce) {
+        SearchLimit(model, static_cast<int>(j), -1.0, &event);
+      }
+    }
+  }
+  if (event.kind != EventKind::kAtOnce) {
+    SearchClosed(model, &event);
+  }
+  const double length = event.length;
+  segment->length = length;
+  segment->event = event.kind;
+  segment->event_contact = event.contact;
+  segment->event_index = event.index;
+  segment->event_sign = event.sign;
+  if (event.kind == EventKind::kSlipBegins) {
+    segment->event_friction = segment->friction[event.index];
+  }
+  At(model, length);
+  // What a motion that cannot be integrated would have met nobody knows.
+  if (!all_good_) {
+    *message = message_;
+    return false;
+  }
+  TakeMotion(At(model, length), segment);
+  if (event.kind == EventKind::kSlipBegins || event.kind == EventKind::kLiftOff) {
+    return flow_.Accelerate(model, *segment, segment->after, segment->time + length, &segment->end);
+  }
+  return true;
+}
+
+}  // namespace tangible

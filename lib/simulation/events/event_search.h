@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// Where the next event is: the smallest τ in (0, length] at which a segment's motion closes a gap,
+// ends a slip, reaches the limit of friction or lifts a contact off.
+//
+// Every candidate motion is the segment's own map at that length, so that the event's equation
+// holds for the state that the segment ends with. Gaps: an interval on which gap(a) + gap(b)
+// exceeds what the pair's speed bound can close is free of contact; others are halved, so that
+// grazing and rotating corners are not missed (Mirtich, Impulse-based Dynamic Simulation, 1996, ch.
+// 2, for the bound). Where bodies turn and move little between an interval's ends and the same
+// features are closest at both, the gap's rates of change there say whether it has a root. Forces
+// and sliding speeds are sampled at the segment's middle and end.
+
+#include <algorithm>
+#include <limits>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "tangible/geometry/broad_phase.h"
+#include "tangible/simulation/events/segment_flow.h"
+
+namespace tangible {
+
+/// A joint within this of its limit is at it, rad or m.
+inline constexpr double kLimitTolerance = 1e-10;
+
+class EventSearch {
+ public:
+  explicit EventSearch(const Model<double>& model);
+
+  /// The searches that follow are of one step, whose evaluations of the motion are bounded.
+  void StartStep() { evaluations_ = 0; }
+  /// Shortens the segment to its first event and names it; the segment is run to there. `touching`:
+  /// contacts within the touching tolerance at its start, which are no events while they stay so.
+  bool Run(const Model<double>& model, const std::vector<ActiveContact>& touching, Segment* segment,
+           std::string* message);
+
+  /// Gap below which a pair touches, m: rounding of the poses and of the event's location.
+  double TouchTolerance(const State<double>& state, int a, int b) const;
+  /// Speed below which a touching contact neither approaches nor slides, m/s.
+  double SpeedTolerance(const Model<double>& model, const State<double>& state) const;
+  /// All contacts of a pair within `reach`; gap set.
+  void FindContacts(const Model<double>& model, const State<double>& state, double reach,
+                    std::vector<ActiveContact>* contacts);
+  double bounding_radius(int body) const { return radius_[body]; }
+  /// What all motions that it ran leaned on.
+  const FlowCounts& flow_counts() const { return flow_.counts(); }
+  /// Of the last search for contacts: boxes compared, pairs whose boxes overlap.
+  int num_compared() const { return broad_phase_.num_compared(); }
+  int num_pairs() const { return static_cast<int>(pairs_.size()); }
+  /// To which gaps are located, m.
+  double GapTolerance() const { return 8.0 * std::numeric_limits<double>::epsilon() * scale_; }
+
+ private:
+  struct Sample {
+    double length = 0.0;
+    Segment motion;
+    bool good = false;
+    bool has_end = false;  ///< the accelerations after the motion are solved
+    SolvedNode end;
+  };
+  struct Event {
+    double length = 0.0;
+    EventKind kind = EventKind::kStepEnd;
+    ActiveContact contact;
+    int index = -1;
+    double sign = 0.0;
+  };
+  Sample* At(const Model<double>& model, double length);
+  void TakeMotion(Sample* sample, Segment* segment);
+  void FindPairs(const Model<double>& model);
+  void SearchPair(const Model<double>& model, int a, int b, Event* event);
+  // When a contact that opens out of penetration approaches again, if it has not left by then.
+  void SearchReturn(const Model<double>& model, const ActiveContact& contact, double touch,
+                    Event* event);
+  void SearchLimit(const Model<double>& model, int joint, double side, Event* event);
+  /// The first crossing of gap from above 0 within [from, to]; rate_over(a, b) bounds how fast it
+  /// closes between; course_over(a, gap(a), b, gap(b)) is what is known of it beyond that. To
+  /// |gap| ≤ tolerance, or as near as doubles allow.
+  template <typename Gap, typename Rate, typename CourseOver>
+  bool FirstRoot(const Model<double>& model, const Gap& gap, const Rate& rate_over,
+                 const CourseOver& course_over, double tolerance, double from, double to,
+                 double* root);
+  void SearchClosed(const Model<double>& model, Event* event);
+  template <typename Function>
+  double Refine(const Model<double>& model, const Function& f, double tolerance, double a,
+                double fa, double b, double fb);
+  double ModeValue(const Model<double>& model, Sample* sample, const Event& event);
+  /// Of what is bounded; 0: neither is.
+  double SmallerRadius(int a, int b) const {
+    return radius_[a] > 0.0 && radius_[b] > 0.0 ? std::min(radius_[a], radius_[b])
+                                                : std::max(radius_[a], radius_[b]);
+  }
+  double AlignedWithin(int a, int b) const;
+  bool HasPassed(const State<double>& state, int a, int b) const;
+  bool Continues(const Model<double>& model, const State<double>& state,
+                 const ActiveContact& contact, const ContactFeature* features, int count) const;
+  bool MovesLittle(const Model<double>& model, const State<double>& before,
+                   const State<double>& after, double length, int a, int b) const;
+  double TouchStart(const Model<double>& model, double speed, double acceleration) const;
+
+  std::vector<double> radius_;
+  double scale_ = 0.0;
+  SegmentFlow flow_;
+  Segment* segment_ = nullptr;
+  const std::vector<ActiveContact>* touching_ = nullptr;
+  std::vector<double> closing_;  ///< a body: bound on its points' speed over the segment
+  std::vector<Sample> samples_;
+  int num_samples_ = 0;
+  long evaluations_ = 0;  ///< of the motion, in this step
+  bool all_good_ = true;  ///< all samples of this search could be integrated
+  std::vector<std::pair<int, int>> pairs_;
+  std::vector<Aabb> boxes_;
+  BroadPhase broad_phase_;
+  std::string message_;
+};
+
+}  // namespace tangible

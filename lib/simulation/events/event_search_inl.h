@@ -1,0 +1,153 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// Roots of functions of a segment's length. Included by event_search*.cc alone.
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "tangible/simulation/events/event_search.h"
+
+namespace tangible {
+
+inline constexpr int kMostHalvings = 1000;
+inline constexpr int kMostRefinements = 200;
+// The share of a motion after which what starts at the change of a feature has left that.
+inline constexpr double kLeft = 1e-9;
+
+// Illinois' variant of the secant method within a bracket, with halving where three steps have not
+// halved it: until |f| ≤ tolerance, or to the last bit that changes the value.
+template <typename Function>
+double EventSearch::Refine(const Model<double>& model, const Function& f, double tolerance,
+                           double a, double fa, double b, double fb) {
+  int same_side = 0;  // > 0: a was moved last, < 0: b
+  double last_width = b - a;
+  for (int k = 1; k <= kMostRefinements && fb != 0.0; ++k) {
+    const double width = b - a;
+    if (width <= 4.0 * std::numeric_limits<double>::epsilon() * b) {
+      break;
+    }
+    bool halve = false;
+    if (k % 3 == 0) {
+      halve = width > 0.5 * last_width;
+      last_width = width;
+    }
+    double m = halve ? 0.5 * (a + b) : b - fb * width / (fb - fa);
+    if (!(m > a && m < b)) {
+      m = 0.5 * (a + b);
+    }
+    if (m == a || m == b) {
+      break;
+    }
+    const double fm = f(*At(model, m));
+    if (std::isnan(fm)) {
+      break;
+    }
+    if (std::abs(fm) <= tolerance) {
+      return m;
+    }
+    if (fm > 0.0) {
+      a = m;
+      fa = fm;
+      if (same_side > 0) fb *= 0.5;
+      same_side = 1;
+    } else {
+      b = m;
+      fb = fm;
+      if (same_side < 0) fa *= 0.5;
+      same_side = -1;
+    }
+  }
+  return b;
+}
+
+// What the values and rates of change at both ends of an interval say of a function whose rate
+// changes monotonically between them. Without that: nothing.
+enum class Course { kUnknown, kNoRoot, kOneRoot };
+inline Course CourseOf(double length, double fa, double rate_a, double fb, double rate_b) {
+  constexpr double kSlack = 0.1;
+  const double mean = (fb - fa) / length;
+  const double most = kSlack * std::max(std::abs(rate_a), std::abs(rate_b));
+  if (!(mean >= std::min(rate_a, rate_b) - most && mean <= std::max(rate_a, rate_b) + most)) {
+    return Course::kUnknown;  // the rate is not monotonic
+  }
+  if (fb <= 0.0) {
+    return rate_b < 0.0 ? Course::kOneRoot : Course::kUnknown;
+  }
+  if (rate_a >= 0.0 || rate_b <= 0.0) {
+    return Course::kNoRoot;  // the smaller end is the minimum
+  }
+  // Above both ends' tangents.
+  const double at = (fb - fa - rate_b * length) / (rate_a - rate_b);
+  return fa + rate_a * at > kSlack * std::min(fa, fb) ? Course::kNoRoot : Course::kUnknown;
+}
+
+template <typename Gap, typename Rate, typename CourseOver>
+bool EventSearch::FirstRoot(const Model<double>& model, const Gap& gap, const Rate& rate_over,
+                            const CourseOver& course_over, double tolerance, double from, double to,
+                            double* root) {
+  struct Interval {
+    double a, fa, b, fb;
+  };
+  const double smallest = 1e-12 * to;
+  double first = gap(*At(model, from));
+  if (first <= 0.0 && from == 0.0) {
+    // What does not touch as it starts and has no gap is where features change: a corner at the end
+    // of an edge, which it leaves.
+    from = kLeft * to;
+    first = gap(*At(model, from));
+    if (!(first > 0.0)) {
+      return false;
+    }
+  } else if (first <= 0.0) {
+    *root = from;
+    return true;
+  }
+  std::vector<Interval> open = {{from, first, to, gap(*At(model, to))}};
+  Interval crossing = open.back();  // the shortest known to hold a crossing
+  for (int k = 0; !open.empty(); ++k) {
+    const Interval i = open.back();
+    open.pop_back();
+    if (i.fb <= 0.0) {
+      crossing = i;
+    }
+    if (k == kMostHalvings) {
+      break;
+    }
+    if (std::isnan(i.fa) || std::isnan(i.fb)) {
+      continue;
+    }
+    const double reach = i.b - i.a > smallest ? rate_over(i.a, i.b) * (i.b - i.a) : 0.0;
+    if (i.fb > 0.0 && (i.fa + i.fb > reach || i.b - i.a <= smallest)) {
+      continue;
+    }
+    const Course course = course_over(i.a, i.fa, i.b, i.fb);
+    if (course == Course::kNoRoot) {
+      continue;
+    }
+    if (course == Course::kOneRoot) {
+      *root = Refine(model, gap, tolerance, i.a, i.fa, i.b, i.fb);
+      return true;
+    }
+    // Where the gap closes at more than half of what the bound allows it does not open in between:
+    // the crossing is the first.
+    if (i.fb <= 0.0 && (i.b - i.a <= smallest || i.fa - i.fb > 0.5 * reach)) {
+      *root = Refine(model, gap, tolerance, i.a, i.fa, i.b, i.fb);
+      return true;
+    }
+    const double m = 0.5 * (i.a + i.b);
+    const double fm = gap(*At(model, m));
+    if (fm > 0.0) {
+      open.push_back({m, fm, i.b, i.fb});
+    }
+    open.push_back({i.a, i.fa, m, fm});
+  }
+  if (crossing.fb <= 0.0) {
+    *root = Refine(model, gap, tolerance, crossing.a, crossing.fa, crossing.b, crossing.fb);
+    return true;
+  }
+  return false;
+}
+
+}  // namespace tangible

@@ -1,0 +1,465 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/simulation/events/event_step.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace tangible {
+namespace {
+
+// Accelerations without a solution (Painlevé) are replaced by impulses of this share of a step.
+constexpr double kShortStep = 1e-9;
+// How much further than the forces at work a contact that slides is held to its direction.
+constexpr double kForcedSlip = 1e4;
+// How often a motion that cannot be integrated over what is left of a step is halved.
+constexpr int kMostHalvings = 10;
+// How many such shorter motions a step may have. A stiff body's would not end.
+constexpr int kMostShortened = 50;
+// An impact that leaves an approach of no more than this many times the least speed has solved it.
+constexpr double kSolvedApproach = 100.0;
+// Beyond this many times max_events_per_step a step is given up.
+constexpr int kGiveUp = 3;
+
+double KineticEnergy(const Model<double>& model, const std::vector<double>& twist) {
+  double energy = 0.0;
+  for (const int body : model.structure->moving) {
+    const BodyIndex& index = model.structure->bodies[body];
+    const double* v = &twist[3 * body];
+    energy += 0.5 * model.numbers[index.mass] * (v[0] * v[0] + v[1] * v[1]) +
+              0.5 * model.numbers[index.inertia] * v[2] * v[2];
+  }
+  return energy;
+}
+
+void SizeGuess(const ContactProblem<double>& problem, ContactSolution<double>* guess) {
+  guess->modes.assign(problem.contacts.size(), ContactMode::kOpen);
+  guess->normal_impulse.assign(problem.contacts.size(), 0.0);
+  guess->tangent_impulse.assign(problem.contacts.size(), 0.0);
+  guess->joint_impulse.assign(3 * problem.joints.size(), 0.0);
+}
+
+// Times within (from, to) at which a force's window opens or closes or a signal has a corner.
+struct Edge {
+  double time;
+  int number;
+};
+std::vector<Edge> EdgesWithin(const Model<double>& model, double from, double to) {
+  std::vector<Edge> edges;
+  const double near = 1e-12 * (to - from);
+  const auto add = [&](double time, int number) {
+    if (time > from + near && time < to - near) {
+      edges.push_back({time, number});
+    }
+  };
+  const ModelStructure& structure = *model.structure;
+  const auto add_signal = [&](int index) {
+    if (index >= 0) {
+      for (const double time : structure.signals[index].time) {
+        add(time, -1);
+      }
+    }
+  };
+  for (const ForceIndex& force : structure.forces) {
+    for (const int number : {force.start, force.end}) {
+      if (number >= 0) {
+        add(model.numbers[number], number);
+      }
+    }
+    add_signal(force.force_signal);
+    add_signal(force.torque_signal);
+  }
+  for (const JointIndex& joint : structure.joints) {
+    add_signal(joint.effort_signal);
+  }
+  std::stable_sort(edges.begin(), edges.end(),
+                   [](const Edge& x, const Edge& y) { return x.time < y.time; });
+  return edges;
+}
+
+}  // namespace
+
+EventStepper::EventStepper(const Model<double>& model) : search_(model) {}
+
+void EventStepper::ClearGuess() {
+  starts_ = true;
+  broken_limits_.clear();
+  last_contacts_.clear();
+  last_modes_.clear();
+}
+
+void EventStepper::SetGuess(const EventGuess& guess) {
+  broken_limits_.clear();
+  last_contacts_ = guess.contacts;
+  last_modes_ = guess.modes;
+  starts_ = guess.starts;
+}
+
+ContactMode EventStepper::GuessOf(const ActiveContact& contact) const {
+  for (size_t i = 0; i < last_contacts_.size(); ++i) {
+    if (last_contacts_[i].SameAs(contact)) {
+      return last_modes_[i];
+    }
+  }
+  return ContactMode::kSticking;
+}
+
+bool EventStepper::SolveImpacts(const Model<double>& model, double t, State<double>* state,
+                                EventOutcome* outcome) {
+  const SimulationSettings& settings = model.structure->settings;
+  const bool newton = settings.impact_law == ImpactLaw::kNewton;
+  double last_approach = 0.0;
+  for (int repeat = 0;; ++repeat) {
+    FindTouching(model, *state);
+    const double slow = SlowSpeed(model, *state, *outcome);
+    const double approach =
+        touching_.approach.empty()
+            ? 0.0
+            : -*std::min_element(touching_.approach.begin(), touching_.approach.end());
+    // An impact is solved to a tolerance of its own: what it leaves there is none for another one.
+    const bool solved_already =
+        repeat > 0 && approach >= 0.5 * last_approach && approach <= kSolvedApproach * slow;
+    if (!(approach > slow) || solved_already) {
+      return true;
+    }
+    last_approach = approach;
+    if (repeat == 0 && !LocateTouch(model, t, slow, state, outcome)) {
+      return false;
+    }
+    if (++outcome->events > settings.max_events_per_step && !inelastic_) {
+      inelastic_ = true;
+      ++outcome->fallbacks;
+    }
+    if (outcome->events > kGiveUp * settings.max_events_per_step + kGiveUp) {
+      const auto fastest = std::min_element(touching_.approach.begin(), touching_.approach.end());
+      outcome->message = "impacts do not end: " +
+                         NameOfContact(*model.structure, touching_.contacts,
+                                       static_cast<int>(fastest - touching_.approach.begin()));
+      return false;
+    }
+    EventPart* part = record_.Add();
+    part->is_impulses = true;
+    Impulses& impact = part->impulses;
+    impact.time = t;
+    impact.h = 0.0;
+    impact.decompression = false;
+    impact.before = *state;
+    impact.contacts.clear();
+    impact.friction.clear();
+    impact.restitution.clear();
+    rebounds_.clear();
+    for (size_t i = 0; i < touching_.contacts.size(); ++i) {
+      // In a rattle what leaves slowly is to be held with the rest: it would be back at once.
+      const double leaves = Rattles(model, *outcome)
+                                ? std::max(slow, ReturnSpeed(model, *state, touching_.contacts[i]))
+                                : slow;
+      if (touching_.approach[i] > leaves) {
+        continue;
+      }
+      ActiveContact contact = touching_.contacts[i];
+      const bool rebounds = touching_.restitution[i].value > 0.0 && !inelastic_ &&
+                            touching_.approach[i] < -settings.restitution_threshold;
+      // Poisson's law compresses all contacts inelastically first.
+      contact.law = rebounds && newton ? ContactLaw::kRestitution : ContactLaw::kInelastic;
+      rebounds_.push_back(rebounds);
+      impact.contacts.push_back(contact);
+      impact.friction.push_back(touching_.friction[i]);
+      impact.restitution.push_back(touching_.restitution[i]);
+    }
+    AssembleImpulses(model, &assembly_, &impact);
+    SizeGuess(impact.problem, &impact.solution);
+    for (size_t i = 0; i < impact.contacts.size(); ++i) {
+      impact.solution.modes[i] =
+          impact.problem.contacts[i].has_friction ? ContactMode::kSticking : ContactMode::kClosed;
+    }
+    const ContactSolverReport solved =
+        solver_.Solve(impact.problem, SolverOptionsOf(settings), &impact.solution);
+    CountSolve(solved, outcome);
+    if (!solved.solved) {
+      outcome->residual = solved.residual;
+      outcome->message = "impact: " + WhatIsUnsolved(*model.structure, impact, solved);
+      return false;
+    }
+    solver_.system().MoveFactorsTo(&impact.system);
+    const double before = KineticEnergy(model, state->twist);
+    SpreadTwists(*model.structure, impact.solution.v, &state->twist);
+    impact.new_twist = state->twist;
+    if (!newton && !Decompress(model, impact, state, outcome)) {
+      return false;
+    }
+    outcome->impact_energy_gain =
+        std::max(outcome->impact_energy_gain, KineticEnergy(model, state->twist) - before);
+    if (!Settle(model, impact, state, outcome)) {
+      return false;
+    }
+  }
+}
+
+bool EventStepper::SolveByShortStep(const Model<double>& model, double t, double dt,
+                                    State<double>* state, EventOutcome* outcome) {
+  EventPart* part = record_.Add();
+  part->is_impulses = true;
+  Impulses& impulses = part->impulses;
+  impulses.time = t;
+  impulses.h = kShortStep * dt;
+  impulses.decompression = false;
+  impulses.before = *state;
+  impulses.contacts = touching_.contacts;
+  impulses.friction = touching_.friction;
+  impulses.restitution.assign(touching_.contacts.size(), CoefficientSource());
+  AssembleImpulses(model, &assembly_, &impulses);
+  SizeGuess(impulses.problem, &impulses.solution);
+  const ContactSolverReport solved = solver_.Solve(
+      impulses.problem, SolverOptionsOf(model.structure->settings), &impulses.solution);
+  CountSolve(solved, outcome);
+  ++outcome->fallbacks;
+  ++outcome->events;
+  if (!solved.solved) {
+    outcome->residual = solved.residual;
+    outcome->message = "accelerations and impulses";
+    if (solved.worst_contact >= 0) {
+      outcome->message +=
+          ": " + NameOfContact(*model.structure, impulses.contacts, solved.worst_contact);
+    }
+    return false;
+  }
+  solver_.system().MoveFactorsTo(&impulses.system);
+  SpreadTwists(*model.structure, impulses.solution.v, &state->twist);
+  impulses.new_twist = state->twist;
+  return true;
+}
+
+bool EventStepper::ChooseModes(const Model<double>& model, double t, double middle, double length,
+                               State<double>* state, EventOutcome* outcome, Segment* segment) {
+  const SimulationSettings& settings = model.structure->settings;
+  const double slow = SlowSpeed(model, *state, *outcome);
+  segment->contacts.clear();
+  segment->friction.clear();
+  segment->modes.clear();
+  std::vector<double> slip;
+  for (size_t i = 0; i < touching_.contacts.size(); ++i) {
+    if (touching_.approach[i] <= slow) {
+      segment->contacts.push_back(touching_.contacts[i]);
+      segment->friction.push_back(touching_.friction[i]);
+      slip.push_back(touching_.slip[i]);
+    }
+  }
+  if (segment->contacts.empty()) {
+    last_contacts_.clear();
+    last_modes_.clear();
+    return true;
+  }
+  ContactProblem<double> problem;
+  AssembleAcceleration(model, *state, t, middle, segment->contacts, segment->friction,
+                       &acceleration_, &problem);
+  // Where a contact slides, friction opposes that whatever the accelerations.
+  double scale = 0.0;
+  for (size_t i = 0; i < problem.momentum.size(); ++i) {
+    scale = std::max(scale, std::abs(problem.momentum[i]) / problem.mass[i]);
+  }
+  for (const ContactBlock<double>& contact : problem.contacts) {
+    scale = std::max({scale, std::abs(contact.c_n), std::abs(contact.c_t)});
+  }
+  ContactSolution<double> solution;
+  SizeGuess(problem, &solution);
+  for (size_t i = 0; i < problem.contacts.size(); ++i) {
+    ContactBlock<double>& contact = problem.contacts[i];
+    ContactMode guess = GuessOf(segment->contacts[i]);
+    if (!contact.has_friction) {
+      guess = guess == ContactMode::kOpen ? guess : ContactMode::kClosed;
+    } else if (std::abs(slip[i]) > slow) {
+      contact.c_t += (slip[i] > 0.0 ? kForcedSlip : -kForcedSlip) * std::max(scale, 1e-300);
+      guess = guess == ContactMode::kOpen ? guess
+              : slip[i] > 0.0             ? ContactMode::kSlidingPositive
+                                          : ContactMode::kSlidingNegative;
+    } else if (guess == ContactMode::kClosed) {
+      guess = ContactMode::kSticking;
+    }
+    solution.modes[i] = guess;
+  }
+  const ContactSolverReport solved = solver_.Solve(problem, SolverOptionsOf(settings), &solution);
+  CountSolve(solved, outcome);
+  if (!solved.solved) {
+    outcome->message = "accelerations";
+    if (solved.worst_contact >= 0) {
+      outcome->message +=
+          ": " + NameOfContact(*model.structure, segment->contacts, solved.worst_contact);
+    }
+    return false;
+  }
+  last_contacts_ = segment->contacts;
+  last_modes_ = solution.modes;
+  size_t kept = 0;
+  for (size_t i = 0; i < segment->contacts.size(); ++i) {
+    if (solution.modes[i] == ContactMode::kOpen) {
+      continue;
+    }
+    segment->contacts[kept] = segment->contacts[i];
+    ActiveContact& contact = segment->contacts[kept];
+    contact.law = contact.gap < -settings.recovery_speed * length ? ContactLaw::kRecovery
+                                                                  : ContactLaw::kInelastic;
+    segment->friction[kept] = segment->friction[i];
+    slip[kept] = slip[i];
+    segment->modes.push_back(solution.modes[i]);
+    ++kept;
+  }
+  segment->contacts.resize(kept);
+  segment->friction.resize(kept);
+  // Beside one that sticks the other end of a face does not slide: that its share of the friction
+  // is at the limit says nothing.
+  for (size_t k = 0; k < kept; ++k) {
+    const bool slides = SlidingSign(segment->modes[k]) != 0.0 && std::abs(slip[k]) <= slow;
+    for (size_t i = 0; i < kept; ++i) {
+      if (slides && segment->SticksWith(i, k)) {
+        segment->modes[k] = ContactMode::kSticking;
+      }
+    }
+  }
+  return true;
+}
+
+void EventStepper::SwitchMode(const Segment& segment) {
+  for (size_t i = 0; i < last_contacts_.size(); ++i) {
+    // A body that stops stops at all its contacts; those that still slide are told by their speed.
+    if (segment.event == EventKind::kSlipEnds && SlidingSign(last_modes_[i]) != 0.0) {
+      last_modes_[i] = ContactMode::kSticking;
+    }
+    if (segment.event == EventKind::kLiftOff && last_contacts_[i].SameAs(segment.event_contact)) {
+      last_modes_[i] = ContactMode::kOpen;
+    } else if (segment.event == EventKind::kSlipBegins && last_modes_[i] != ContactMode::kOpen &&
+               last_contacts_[i].joint < 0 && last_contacts_[i].a == segment.event_contact.a &&
+               last_contacts_[i].b == segment.event_contact.b) {
+      // Both ends of a face slide against the force that was at its limit.
+      last_modes_[i] =
+          segment.event_sign > 0.0 ? ContactMode::kSlidingNegative : ContactMode::kSlidingPositive;
+    }
+  }
+}
+
+EventOutcome EventStepper::Step(const Model<double>& model, double t, double h,
+                                State<double>* state) {
+  const FlowCounts own = flow_.counts();
+  const FlowCounts searched = search_.flow_counts();
+  EventOutcome outcome = Advance(model, t, h, state);
+  outcome.solver.whole_system += flow_.counts().whole_system - own.whole_system +
+                                 search_.flow_counts().whole_system - searched.whole_system;
+  outcome.newton_stages =
+      static_cast<int>(search_.flow_counts().newton_stages - searched.newton_stages);
+  return outcome;
+}
+
+EventOutcome EventStepper::Advance(const Model<double>& model, double t, double h,
+                                   State<double>* state) {
+  EventOutcome outcome;
+  record_.Clear();
+  inelastic_ = false;
+  search_.StartStep();
+  const std::vector<Edge> edges = EdgesWithin(model, t, t + h);
+  size_t next_edge = 0;
+  const double end = t + h;
+  const int most = kGiveUp * model.structure->settings.max_events_per_step + kGiveUp;
+  double now = t;
+  bool impulses_tried = false;
+  int halvings = 0;
+  int shortened = 0;
+  const auto fail = [&](const std::string& message) {
+    outcome.done = false;
+    outcome.message = message;
+    return outcome;
+  };
+  bool at_given_time = true;
+  bool begins = true;
+  while (end - now > 1e-14 * h || !at_given_time) {
+    if (!SolveImpacts(model, now, state, &outcome)) {
+      return fail(outcome.message);
+    }
+    const bool at_end = end - now <= 1e-14 * h;
+    if ((starts_ || at_end) &&
+        !AddInstant(model, now, EventKind::kStepEnd, nullptr, state, &outcome)) {
+      return fail(outcome.message);
+    }
+    if (std::exchange(begins, false)) {
+      const int limit = StuckLimit(model.structure->settings.recovery_speed * h);
+      if (limit >= 0) {
+        return fail(NameOfContact(*model.structure, touching_.contacts, limit) +
+                    " stays broken: another one contradicts it");
+      }
+    }
+    if (starts_ && !at_end) {
+      // It has put twists back that the joints do not allow: what slides now, and where to, is
+      // another.
+      FindTouching(model, *state);
+    }
+    starts_ = false;
+    if (at_end) {
+      break;
+    }
+    while (next_edge < edges.size() && edges[next_edge].time <= now + 1e-14 * h) {
+      ++next_edge;
+    }
+    const bool to_edge = next_edge < edges.size();
+    const double until = now + std::ldexp((to_edge ? edges[next_edge].time : end) - now, -halvings);
+    const double middle = 0.5 * (now + until);
+    const int parts = record_.num_parts;
+    EventPart* part = record_.Add();
+    part->is_impulses = false;
+    Segment& segment = part->segment;
+    segment.time = now;
+    segment.length = until - now;
+    segment.starts = false;
+    segment.middle = middle;
+    segment.before = *state;
+    segment.event_number = -1;
+    if (!ChooseModes(model, now, middle, until - now, state, &outcome, &segment)) {
+      record_.num_parts = parts;
+      if (impulses_tried || !SolveByShortStep(model, now, h, state, &outcome)) {
+        return fail(outcome.message);
+      }
+      impulses_tried = true;
+      outcome.message.clear();
+      continue;
+    }
+    impulses_tried = false;
+    std::string message;
+    const bool moved = search_.Run(model, touching_.contacts, &segment, &message);
+    outcome.pairs_compared = search_.num_compared();
+    outcome.pairs_near = search_.num_pairs();
+    if (!moved) {
+      // Where contacts nearly jam accelerations change so fast with poses that only a short motion
+      // can be integrated.
+      shortened += halvings == 0 ? 1 : 0;
+      ++outcome.halved_motions;
+      if (++halvings > kMostHalvings || shortened > kMostShortened) {
+        return fail(message);
+      }
+      record_.num_parts = parts;
+      continue;
+    }
+    *state = segment.after;
+    at_given_time = segment.event == EventKind::kStepEnd;
+    if (at_given_time) {
+      now = until;
+      if (halvings > 0) {
+        // A given share of what was left: an instant like a signal's corner.
+        segment.event = EventKind::kEdge;
+        halvings = 0;
+      } else if (to_edge) {
+        segment.event = EventKind::kEdge;
+        segment.event_number = edges[next_edge].number;
+        ++outcome.events;
+      }
+      continue;
+    }
+    halvings = 0;
+    now += segment.length;
+    SwitchMode(segment);
+    const bool counts = segment.event != EventKind::kTouch || segment.length <= 1e-13 * h;
+    if (counts && ++outcome.events > most) {
+      return fail("events do not end: " +
+                  NameOfContact(*model.structure, {segment.event_contact}, 0));
+    }
+  }
+  return outcome;
+}
+
+}  // namespace tangible

@@ -1,0 +1,139 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// Event stepping: a step of [t, t + h] as segments of smooth motion, ended by events that are
+// located in time, and impacts between them.
+//
+//   1. contacts that touch: where one approaches, an impact (Newton's law, or Poisson's in two
+//      phases; no forces) is solved, until none does
+//   2. those that neither approach nor separate: accelerations as an LCP say which stay closed, and
+//      whether they stick; where it has no solution (Painlevé) impulses of a very short step
+//   3. with these modes held the motion is integrated up to the earliest event (event_search.h)
+//
+// The time of an event is a function of state and parameters, by its own equation: gap = 0, sliding
+// speed = 0, normal force = 0, friction at its limit. The derivatives (event_derivative.h) follow
+// it.
+
+#include <string>
+#include <vector>
+
+#include "tangible/dynamics/assembly/contact_search.h"
+#include "tangible/dynamics/model/settings.h"
+#include "tangible/lcp/contact/contact_decompression.h"
+#include "tangible/lcp/contact/contact_solver.h"
+#include "tangible/simulation/events/event_search.h"
+
+namespace tangible {
+
+/// What an event step reports beside its record.
+struct EventOutcome {
+  bool done = true;
+  std::string message;  ///< empty unless it failed
+  int events = 0;
+  int fallbacks = 0;  ///< Painlevé impulses, and rebounds given up beyond max_events_per_step
+  int factorisations = 0;
+  int iterations = 0;
+  double residual = 0.0;
+  double impact_energy_gain = 0.0;  ///< J, the largest of an impact
+  bool by_guess = true;             ///< whether the modes of the last segment served everywhere
+  bool by_lemke = false;
+  ContactFallbacks solver;  ///< what its solves and motions leaned on
+  int newton_stages = 0;    ///< implicit stages whose iteration does not contract
+  int halved_motions = 0;   ///< that could not be integrated over what was left of the step
+  int pairs_compared = 0;   ///< boxes compared by the broad phase of its last search for events
+  int pairs_near = 0;       ///< pairs whose boxes overlap, in that search
+};
+
+/// What an event step takes from the last one beside the state.
+struct EventGuess {
+  std::vector<ActiveContact> contacts;
+  std::vector<ContactMode> modes;
+  bool starts = true;  ///< the next step is a run's first
+};
+
+/// Adds a solve to what a step reports.
+void CountSolve(const ContactSolverReport& solved, EventOutcome* outcome);
+/// "contact of ball and floor", "limit of joint hinge"; index −1: "joints".
+std::string NameOfContact(const ModelStructure& structure,
+                          const std::vector<ActiveContact>& contacts, int index);
+
+/// What of impulses their solve has left: a contact, a joint that contradicts others, or momentum.
+std::string WhatIsUnsolved(const ModelStructure& structure, const Impulses& impulses,
+                           const ContactSolverReport& solved);
+
+class EventStepper {
+ public:
+  explicit EventStepper(const Model<double>& model);
+
+  EventOutcome Step(const Model<double>& model, double t, double h, State<double>* state);
+  /// Of the last step.
+  const EventRecord& record() const { return record_; }
+  EventRecord& mutable_record() { return record_; }
+  /// Forgets the contacts' modes.
+  void ClearGuess();
+  void SaveGuess(EventGuess* guess) const { *guess = {last_contacts_, last_modes_, starts_}; }
+  void SetGuess(const EventGuess& guess);
+
+ private:
+  EventOutcome Advance(const Model<double>& model, double t, double h, State<double>* state);
+  struct Touching {
+    std::vector<ActiveContact> contacts;
+    std::vector<CoefficientSource> friction, restitution;
+    std::vector<double> approach, slip;  ///< n v and t v, m/s
+  };
+  void FindTouching(const Model<double>& model, const State<double>& state);
+  void AddTouching(const Model<double>& model, const State<double>& state,
+                   const ActiveContact& contact);
+  struct BrokenLimit {
+    ActiveContact limit;
+    int steps = 0;  ///< for which it has stayed as it is
+  };
+  /// As a step starts: a joint's limit, among what touches, that is broken and has been so for some
+  /// steps without moving, where recovery moves what it can by `moved` in each; −1: none.
+  int StuckLimit(double moved);
+  bool SolveImpacts(const Model<double>& model, double t, State<double>* state,
+                    EventOutcome* outcome);
+  /// Poisson's law: after the compression each contact that rebounds pushes with at least e times
+  /// the impulse of its compression (event_decompression.cc).
+  bool Decompress(const Model<double>& model, const Impulses& compression, State<double>* state,
+                  EventOutcome* outcome);
+  bool ChooseModes(const Model<double>& model, double t, double middle, double length,
+                   State<double>* state, EventOutcome* outcome, Segment* segment);
+  bool AddInstant(const Model<double>& model, double t, EventKind kind,
+                  const ActiveContact* contact, State<double>* state, EventOutcome* outcome);
+  /// Whether a step has had so many events that slow impacts are a rattle.
+  static bool Rattles(const Model<double>& model, const EventOutcome& outcome);
+  /// The speed below which gravity brings a contact back before it has left the touching
+  /// tolerance, m/s.
+  double ReturnSpeed(const Model<double>& model, const State<double>& state,
+                     const ActiveContact& contact) const;
+  /// The speed below which what touches neither approaches nor leaves nor slides, m/s.
+  double SlowSpeed(const Model<double>& model, const State<double>& state,
+                   const EventOutcome& outcome) const;
+  bool Settle(const Model<double>& model, const Impulses& impact, State<double>* state,
+              EventOutcome* outcome);
+  bool LocateTouch(const Model<double>& model, double t, double slow, State<double>* state,
+                   EventOutcome* outcome);
+  bool SolveByShortStep(const Model<double>& model, double t, double dt, State<double>* state,
+                        EventOutcome* outcome);
+  ContactMode GuessOf(const ActiveContact& contact) const;
+  void SwitchMode(const Segment& segment);
+
+  EventSearch search_;
+  SegmentFlow flow_;
+  bool starts_ = true;  ///< the next step is a run's first
+  ContactSolver solver_;
+  EventRecord record_;
+  AssemblyScratch<double> assembly_;
+  AccelerationScratch<double> acceleration_;
+  Touching touching_;
+  std::vector<BrokenLimit> broken_limits_;
+  std::vector<bool> rebounds_;  ///< of the last impact's contacts
+  DecompressionSolver decompression_;
+  // The last modes, which are the next guess.
+  std::vector<ActiveContact> last_contacts_;
+  std::vector<ContactMode> last_modes_;
+  bool inelastic_ = false;
+};
+
+}  // namespace tangible

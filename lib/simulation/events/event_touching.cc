@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// What touches at an instant, with its speeds.
+#include <algorithm>
+#include <cmath>
+
+#include "tangible/dynamics/elements/contacts_ahead.h"
+#include "tangible/simulation/events/event_step.h"
+
+namespace tangible {
+
+void EventStepper::AddTouching(const Model<double>& model, const State<double>& state,
+                               const ActiveContact& contact) {
+  for (const ActiveContact& other : touching_.contacts) {
+    if (other.SameAs(contact)) {
+      return;
+    }
+  }
+  const ContactSpeeds speeds = SpeedsOf(model, state, contact);
+  touching_.contacts.push_back(contact);
+  touching_.friction.push_back(MixedFriction(model, contact.a, contact.b));
+  touching_.restitution.push_back(MixedRestitution(model, contact.a, contact.b));
+  touching_.approach.push_back(speeds.normal);
+  touching_.slip.push_back(speeds.slip);
+}
+
+void EventStepper::FindTouching(const Model<double>& model, const State<double>& state) {
+  const ModelStructure& structure = *model.structure;
+  touching_ = Touching();
+  double reach = 0.0;
+  for (int body = 0; body < structure.num_bodies(); ++body) {
+    reach = std::max(reach, search_.TouchTolerance(state, body, body));
+  }
+  std::vector<ActiveContact> found;
+  search_.FindContacts(model, state, reach, &found);
+  const double slow = search_.SpeedTolerance(model, state);
+  for (const ActiveContact& contact : found) {
+    const double touch = search_.TouchTolerance(state, contact.a, contact.b);
+    if (contact.gap > touch) {
+      continue;
+    }
+    const double approach = SpeedsOf(model, state, contact).normal;
+    const double size =
+        std::min(search_.bounding_radius(contact.a), search_.bounding_radius(contact.b));
+    ContactsAhead ahead;
+    if (approach < -slow && size > 0.0) {
+      ahead = FindContactsAhead(model, state, contact, approach, size, touch, slow);
+    }
+    if (ahead.count == 0) {
+      AddTouching(model, state, contact);
+    }
+    for (int k = 0; k < ahead.count; ++k) {
+      AddTouching(model, state, ahead.contacts[k]);
+    }
+  }
+  for (size_t j = 0; j < structure.joints.size(); ++j) {
+    const JointIndex& joint = structure.joints[j];
+    if (joint.low < 0) {
+      continue;
+    }
+    JointRows<double> joint_rows;
+    EvaluateJoint(joint.type, state.PoseOf(joint.a), state.PoseOf(joint.b),
+                  &model.numbers[joint.geometry], &joint_rows);
+    for (const double side : {1.0, -1.0}) {
+      ActiveContact limit;
+      limit.a = joint.a;
+      limit.b = joint.b;
+      limit.joint = static_cast<int>(j);
+      limit.side = side;
+      limit.law = ContactLaw::kInelastic;
+      ContactRows<double> rows;
+      EvaluateLimitRows(model, joint_rows, limit, &rows);
+      limit.gap = rows.geometry.gap;
+      if (limit.gap <= kLimitTolerance) {
+        touching_.contacts.push_back(limit);
+        touching_.friction.emplace_back();
+        touching_.restitution.emplace_back();
+        touching_.approach.push_back(
+            RelativeSpeed(state, limit.a, rows.normal_a, limit.b, rows.normal_b));
+        touching_.slip.push_back(0.0);
+      }
+    }
+  }
+}
+
+int EventStepper::StuckLimit(double moved) {
+  constexpr double kBroken = 1e-6;  // rad or m
+  constexpr double kStays = 1e-3;   // of what recovers in a step
+  constexpr int kMostSteps = 10;
+  std::vector<BrokenLimit> broken;
+  int stuck = -1;
+  for (size_t i = 0; i < touching_.contacts.size(); ++i) {
+    const ActiveContact& limit = touching_.contacts[i];
+    if (limit.joint < 0 || !(limit.gap < -kBroken)) {
+      continue;
+    }
+    int steps = 0;
+    for (const BrokenLimit& last : broken_limits_) {
+      if (last.limit.SameAs(limit) && std::abs(last.limit.gap - limit.gap) <= kStays * moved) {
+        steps = last.steps + 1;
+      }
+    }
+    stuck = moved > 0.0 && steps > kMostSteps ? static_cast<int>(i) : stuck;
+    broken.push_back({limit, steps});
+  }
+  broken_limits_.swap(broken);
+  return stuck;
+}
+
+}  // namespace tangible

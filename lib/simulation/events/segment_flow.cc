@@ -1,0 +1,488 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/simulation/events/segment_flow.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "tangible/lcp/system/contact_residual.h"
+
+namespace tangible {
+namespace {
+
+constexpr int kMostCorrections = 12;
+constexpr int kMostIterations = 60;
+constexpr double kIterated = 1e-14;  // relative change at which the implicit stage has converged
+
+NystromTableau SemiImplicitEuler() {
+  NystromTableau t;
+  t.stages = 1;
+  t.b[0] = 1.0;
+  t.b_hat[0] = 1.0;
+  return t;
+}
+
+NystromTableau Trapezoidal() {
+  NystromTableau t;
+  t.stages = 2;
+  t.c[1] = 1.0;
+  for (int j = 0; j < 2; ++j) {
+    t.a[1][j] = 0.5;
+    t.a_hat[1][j] = 0.25;
+    t.b[j] = 0.5;
+    t.b_hat[j] = 0.25;
+  }
+  t.last_is_implicit = true;
+  return t;
+}
+
+NystromTableau RungeKutta4() {
+  NystromTableau t;
+  t.stages = 4;
+  const double c[4] = {0.0, 0.5, 0.5, 1.0};
+  std::copy_n(c, 4, t.c);
+  t.a[1][0] = 0.5;
+  t.a[2][1] = 0.5;
+  t.a[3][2] = 1.0;
+  t.a_hat[2][0] = 0.25;
+  t.a_hat[3][1] = 0.5;
+  const double b[4] = {1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0};
+  std::copy_n(b, 4, t.b);
+  for (int j = 0; j < 3; ++j) {
+    t.b_hat[j] = 1.0 / 6.0;
+  }
+  return t;
+}
+
+bool AllFinite(const std::vector<double>& values) {
+  return std::all_of(values.begin(), values.end(), [](double x) { return std::isfinite(x); });
+}
+
+// x += factor · (a solution's bodies).
+void AddBodies(const ModelStructure& structure, double factor, const std::vector<double>& solved,
+               std::vector<double>* x) {
+  if (factor == 0.0) {
+    return;
+  }
+  for (int k = 0; k < structure.num_blocks(); ++k) {
+    for (int i = 0; i < 3; ++i) {
+      (*x)[3 * structure.moving[k] + i] += factor * solved[3 * k + i];
+    }
+  }
+}
+
+// What the parts of each component of M a = p + Aᵀ y + Σ (nᵀ λn + tᵀ λt) amount to as
+// accelerations: they cancel in a body at rest, whose acceleration is the rounding of these.
+void SizesOfTerms(const SolvedNode& node, std::vector<double>* sizes) {
+  const ContactProblem<double>& p = node.problem;
+  sizes->assign(p.momentum.size(), 0.0);
+  for (size_t i = 0; i < p.momentum.size(); ++i) {
+    (*sizes)[i] = std::abs(p.momentum[i]);
+  }
+  const auto add = [&](int block, const RowPart<double>& row, double impulse) {
+    for (int i = 0; block >= 0 && i < 3; ++i) {
+      (*sizes)[3 * block + i] += std::abs(row[i] * impulse);
+    }
+  };
+  ForEachImpulse(p, node.solution, add);
+  for (size_t i = 0; i < sizes->size(); ++i) {
+    (*sizes)[i] /= p.mass[i];
+  }
+}
+
+// Errors that a correction is to remove: joints, where they are corrected, and gaps.
+double CorrectedError(const ContactProblem<double>& problem) {
+  double error = 0.0;
+  for (const JointBlock<double>& joint : problem.joints) {
+    for (int k = 0; k < joint.rows; ++k) {
+      error = std::max(error, std::abs(joint.rhs[k]));
+    }
+  }
+  for (const ContactBlock<double>& contact : problem.contacts) {
+    error = std::max(error, std::abs(contact.c_n));
+  }
+  return error;
+}
+
+// A hinge whose points have come apart by more than this share of its arms, by a motion that starts
+// on it, in a correction's problem.
+bool DriftsFar(const Model<double>& model, const ContactProblem<double>& correction) {
+  constexpr double kShareOfArms = 0.1;
+  for (size_t j = 0; j < correction.joints.size(); ++j) {
+    const JointIndex& joint = model.structure->joints[j];
+    const double* anchors = &model.numbers[joint.geometry];
+    if (joint.type != JointType::kRevolute) {
+      continue;
+    }
+    const double arms =
+        std::hypot(anchors[0], anchors[1]) +
+        (joint.b == model.structure->world() ? 0.0 : std::hypot(anchors[2], anchors[3]));
+    const double* error = correction.joints[j].rhs;
+    if (arms > 0.0 && std::hypot(error[0], error[1]) > kShareOfArms * arms) {
+      return true;
+    }
+  }
+  return false;
+}
+
+// Solves a node's problem with modes; false where singular or not finite.
+bool SolveNode(const std::vector<ContactMode>& modes, SolvedNode* node) {
+  const ContactProblem<double>& p = node->problem;
+  ContactSolution<double>& s = node->solution;
+  s.modes = modes;
+  if (!node->system.Factor(p, modes)) {
+    return false;
+  }
+  std::vector<double> x(3 * static_cast<size_t>(node->system.num_blocks()), 0.0);
+  std::copy(p.momentum.begin(), p.momentum.end(), x.begin());
+  for (size_t j = 0; j < p.joints.size(); ++j) {
+    std::copy_n(p.joints[j].rhs, p.joints[j].rows, &x[3 * (p.num_bodies + j)]);
+  }
+  const std::vector<int>& block_of = node->system.contact_block();
+  for (size_t i = 0; i < p.contacts.size(); ++i) {
+    if (block_of[i] >= 0) {
+      x[3 * block_of[i]] = -p.contacts[i].c_n;
+      if (modes[i] == ContactMode::kSticking) {
+        x[3 * block_of[i] + 1] = -p.contacts[i].c_t;
+      }
+    }
+  }
+  node->system.Solve(p, modes, x.data(), 1);
+  s.v.assign(x.begin(), x.begin() + 3 * p.num_bodies);
+  s.joint_impulse.assign(3 * p.joints.size(), 0.0);
+  std::copy_n(x.begin() + 3 * p.num_bodies, s.joint_impulse.size(), s.joint_impulse.begin());
+  s.normal_impulse.assign(p.contacts.size(), 0.0);
+  s.tangent_impulse.assign(p.contacts.size(), 0.0);
+  for (size_t i = 0; i < p.contacts.size(); ++i) {
+    if (block_of[i] >= 0) {
+      s.normal_impulse[i] = x[3 * block_of[i]];
+      s.tangent_impulse[i] =
+          modes[i] == ContactMode::kSticking
+              ? x[3 * block_of[i] + 1]
+              : -SlidingSign(modes[i]) * p.contacts[i].friction * s.normal_impulse[i];
+    }
+  }
+  return AllFinite(x);
+}
+
+}  // namespace
+
+const NystromTableau& NystromTableau::Of(Integrator integrator) {
+  static const NystromTableau kEuler = SemiImplicitEuler();
+  static const NystromTableau kTrapezoidal = Trapezoidal();
+  static const NystromTableau kRungeKutta = RungeKutta4();
+  return integrator == Integrator::kSemiImplicitEuler ? kEuler
+         : integrator == Integrator::kTrapezoidal     ? kTrapezoidal
+                                                      : kRungeKutta;
+}
+
+void SpreadTwists(const ModelStructure& structure, const std::vector<double>& solved,
+                  std::vector<double>* twist) {
+  for (int k = 0; k < structure.num_blocks(); ++k) {
+    std::copy_n(&solved[3 * k], 3, &(*twist)[3 * structure.moving[k]]);
+  }
+}
+
+std::string NameOfContradicted(const ModelStructure& structure, int joint) {
+  return "joint " + structure.joints[joint].name +
+         " contradicts the others: no twist satisfies all";
+}
+
+void AssembleImpulses(const Model<double>& model, AssemblyScratch<double>* scratch,
+                      Impulses* impulses) {
+  AssembleFree(model, impulses->before, impulses->time, impulses->h, &impulses->problem, scratch,
+               false);
+  AssembleContacts(model, impulses->before, impulses->h, impulses->contacts, impulses->friction,
+                   impulses->restitution, *scratch, &impulses->problem);
+}
+
+bool SegmentFlow::Solve(const std::vector<ContactMode>& modes, SolvedNode* node) {
+  const int before = node->system.expansions();
+  const bool solved = SolveNode(modes, node);
+  counts_.whole_system += node->system.expansions() - before;
+  return solved;
+}
+
+bool SegmentFlow::Accelerate(const Model<double>& model, const Segment& segment,
+                             const State<double>& state, double time, SolvedNode* node) {
+  node->state = state;
+  node->time = time;
+  AssembleAcceleration(model, state, time, segment.middle, segment.contacts, segment.friction,
+                       &acceleration_, &node->problem);
+  return Solve(segment.modes, node);
+}
+
+// A stage that reads its own accelerations: iterated, and where that does not contract by Newton's
+// method from the start again (implicit_stage.h). `place` gives the state from the stages.
+bool SegmentFlow::SolveImplicitStage(const Model<double>& model, Segment* segment, int i,
+                                     const std::function<void(State<double>*)>& place,
+                                     std::string* message) {
+  const NystromTableau& tableau = NystromTableau::Of(IntegratorOf(model.structure->settings));
+  const double tau = segment->length;
+  SolvedNode& stage = segment->stages[i];
+  std::vector<double>& acceleration = stage.solution.v;
+  const std::vector<double> start = segment->stages[i - 1].solution.v;
+  acceleration = start;
+  State<double> state;
+  for (int iteration = 0; iteration <= kMostIterations; ++iteration) {
+    const bool newton = iteration >= kMostFixedPoints;
+    if (iteration == kMostFixedPoints) {
+      ++counts_.newton_stages;
+      acceleration = start;
+    }
+    const std::vector<double> last = acceleration;
+    place(&state);
+    const bool solved =
+        AllFinite(state.pose) && AllFinite(state.twist) &&
+        Accelerate(model, *segment, state, segment->time + tableau.c[i] * tau, &stage);
+    if (!solved) {
+      if (newton) {
+        *message = "accelerations with the contacts' modes held are singular";
+        return false;
+      }
+      iteration = kMostFixedPoints - 1;  // it has diverged
+      continue;
+    }
+    if (HasConverged(stage, last, iteration)) {
+      return true;
+    }
+    if (newton) {
+      implicit_.Factor(model, *segment, &stage, tau * tableau.a[i][i],
+                       tau * tau * tableau.a_hat[i][i]);
+      RowMatrixXd step(static_cast<Eigen::Index>(last.size()), 1);
+      for (size_t k = 0; k < last.size(); ++k) {
+        step(static_cast<Eigen::Index>(k), 0) = acceleration[k] - last[k];
+      }
+      implicit_.Solve(&step);
+      for (size_t k = 0; k < last.size(); ++k) {
+        acceleration[k] = last[k] + step(static_cast<Eigen::Index>(k), 0);
+      }
+    }
+  }
+  size_t worst = 0;
+  for (size_t k = 1; k < start.size(); ++k) {
+    worst = std::abs(acceleration[k] - start[k]) > std::abs(acceleration[worst] - start[worst])
+                ? k
+                : worst;
+  }
+  *message = "the trapezoidal rule's iteration does not converge (body " +
+             model.structure->bodies[model.structure->moving[worst / 3]].name +
+             "): dt is too large";
+  return false;
+}
+
+bool SegmentFlow::HasConverged(const SolvedNode& stage, const std::vector<double>& last,
+                               int iteration) {
+  double size = 0.0;
+  for (const double acceleration : last) {
+    size = std::max(size, std::abs(acceleration));
+  }
+  // What rests does not get nearer to 0 than the terms that cancel in it round; and rounding may
+  // keep the iteration from the last digit: beyond some iterations less is enough.
+  const bool by_terms = iteration >= 3;
+  if (by_terms) {
+    SizesOfTerms(stage, &terms_);
+  }
+  const double tolerance = iteration < kMostFixedPoints + 5 ? kIterated : 1e3 * kIterated;
+  for (size_t k = 0; k < last.size(); ++k) {
+    const double change = std::abs(stage.solution.v[k] - last[k]);
+    if (!(change <= tolerance * (by_terms ? std::max(size, terms_[k]) : size))) {
+      return false;
+    }
+  }
+  return true;
+}
+
+bool SegmentFlow::Integrate(const Model<double>& model, Segment* segment, std::string* message) {
+  const ModelStructure& structure = *model.structure;
+  const NystromTableau& tableau = NystromTableau::Of(IntegratorOf(structure.settings));
+  const double tau = segment->length;
+  segment->num_stages = tableau.stages;
+  if (static_cast<int>(segment->stages.size()) < tableau.stages) {
+    segment->stages.resize(tableau.stages);
+  }
+  const auto place = [&](double c, const double* a, const double* a_hat, int terms,
+                         State<double>* state) {
+    *state = segment->before;
+    for (size_t i = 0; i < state->pose.size(); ++i) {
+      state->pose[i] += c * tau * segment->before.twist[i];
+    }
+    for (int j = 0; j < terms; ++j) {
+      const std::vector<double>& acceleration = segment->stages[j].solution.v;
+      AddBodies(structure, tau * tau * a_hat[j], acceleration, &state->pose);
+      AddBodies(structure, tau * a[j], acceleration, &state->twist);
+    }
+  };
+  State<double> state;
+  for (int i = 0; i < tableau.stages; ++i) {
+    const auto place_stage = [&](int terms, State<double>* at) {
+      place(tableau.c[i], tableau.a[i], tableau.a_hat[i], terms, at);
+    };
+    if (tableau.last_is_implicit && i + 1 == tableau.stages) {
+      const auto place_implicit = [&](State<double>* at) { place_stage(i + 1, at); };
+      if (!SolveImplicitStage(model, segment, i, place_implicit, message)) {
+        return false;
+      }
+      continue;
+    }
+    place_stage(i, &state);
+    if (!AllFinite(state.pose) || !AllFinite(state.twist) ||
+        !Accelerate(model, *segment, state, segment->time + tableau.c[i] * tau,
+                    &segment->stages[i])) {
+      *message = "accelerations with the contacts' modes held are singular";
+      return false;
+    }
+  }
+  place(1.0, tableau.b, tableau.b_hat, tableau.stages, &segment->after);
+  return true;
+}
+
+bool SegmentFlow::CorrectPoses(const Model<double>& model, Segment* segment, std::string* message) {
+  const ModelStructure& structure = *model.structure;
+  const SimulationSettings& settings = structure.settings;
+  segment->num_corrections = 0;
+  const bool joints =
+      !structure.joints.empty() && JointCorrectionOf(settings) != JointCorrection::kNone;
+  if (segment->contacts.empty() && !joints) {
+    return true;
+  }
+  const bool once = joints && JointCorrectionOf(settings) == JointCorrection::kBaumgarte;
+  // What recovers may move another contact off its surface: then there is an error that stays.
+  bool recovers = false;
+  for (const ActiveContact& contact : segment->contacts) {
+    recovers = recovers || contact.law == ContactLaw::kRecovery;
+  }
+  const std::vector<ContactMode> modes(segment->contacts.size(), ContactMode::kClosed);
+  double last = HUGE_VAL;
+  for (int k = 0; k < kMostCorrections; ++k) {
+    if (static_cast<int>(segment->corrections.size()) <= k) {
+      segment->corrections.emplace_back();
+    }
+    SolvedNode& node = segment->corrections[k];
+    node.state = segment->after;
+    node.time = segment->time + segment->length;
+    // What recovers from penetration does so by the first correction, and is held by the others.
+    AssembleCorrection(model, node.state, segment->contacts, segment->friction,
+                       k == 0 ? settings.recovery_speed * segment->length : 0.0, &acceleration_,
+                       &node.problem);
+    if (k == 0 && JointCorrectionOf(settings) == JointCorrection::kProjection &&
+        DriftsFar(model, node.problem)) {
+      // So they do where links whip faster than dt resolves, and where the implicit stage has found
+      // another of its solutions than the one that the motion continues with.
+      *message = "joints drift by more than a tenth of their arms in one motion: dt is too large";
+      return false;
+    }
+    const double error = CorrectedError(node.problem);
+    // Newton's method squares the error; what is small and does not shrink any more is rounding.
+    const double allowed = std::max(settings.joint_tolerance, 1e-9);
+    const bool shrinks = error <= 0.1 * last;
+    if (k > 0 && (once || error <= 1e-15 || (!shrinks && (recovers || error <= allowed)))) {
+      break;
+    }
+    if (k + 1 == kMostCorrections || (k > 0 && error >= last)) {
+      char text[160];
+      std::snprintf(text, sizeof(text),
+                    "projection onto joints and contacts: expected an error of at most %.3g, got "
+                    "%.3g: dt is too large",
+                    allowed, error);
+      *message = text;
+      return false;
+    }
+    last = error;
+    if (!Solve(modes, &node)) {
+      *message = "projection onto joints and contacts is singular";
+      return false;
+    }
+    AddBodies(structure, 1.0, node.solution.v, &segment->after.pose);
+    segment->num_corrections = k + 1;
+  }
+  return true;
+}
+
+void SetUpProjection(const Segment& segment, const State<double>& state, Impulses* projection) {
+  projection->time = segment.time + segment.length;
+  projection->h = 0.0;
+  projection->decompression = false;
+  projection->before = state;
+  projection->contacts = segment.contacts;
+  projection->friction = segment.friction;
+  projection->restitution.assign(segment.contacts.size(), CoefficientSource());
+  projection->solution.modes = segment.modes;
+  for (size_t i = 0; i < segment.contacts.size(); ++i) {
+    projection->contacts[i].law = ContactLaw::kInelastic;
+    const bool slides = SlidingSign(segment.modes[i]) != 0.0;
+    if (segment.modes[i] != ContactMode::kSticking && !(slides && segment.starts)) {
+      projection->friction[i] = CoefficientSource();
+      projection->solution.modes[i] = ContactMode::kClosed;
+    }
+  }
+}
+
+bool SegmentFlow::ProjectTwists(const Model<double>& model, Segment* segment,
+                                std::string* message) {
+  segment->projects_twists = !segment->contacts.empty() || !model.structure->joints.empty();
+  if (!segment->projects_twists) {
+    return true;
+  }
+  SetUpProjection(*segment, segment->after, &segment->projection);
+  if (!Project(model, &segment->projection)) {
+    *message = "projection of twists is singular";
+    return false;
+  }
+  const Impulses& projection = segment->projection;
+  // Rounding of an ill-posed system leaves less than this share of a row's terms, at the speeds
+  // that the segment's forces would give.
+  constexpr double kMissed = 1e-6;
+  SizesOfTerms(segment->stages[segment->num_stages - 1], &terms_);
+  // Where no force acts a body's angular velocity may be the rounding of its speed.
+  constexpr double kRounding = 1e-6;  // of the terms of which kMissed is too much
+  const std::vector<double>& mass = projection.problem.mass;
+  const std::vector<double>& v = projection.solution.v;
+  const auto lever = [&](size_t block) { return std::sqrt(mass[3 * block + 2] / mass[3 * block]); };
+  double fastest = 0.0;
+  for (size_t block = 0; 3 * block < v.size(); ++block) {
+    fastest = std::max({fastest, std::abs(v[3 * block]), std::abs(v[3 * block + 1]),
+                        std::abs(v[3 * block + 2]) * lever(block)});
+  }
+  for (size_t k = 0; k < terms_.size(); ++k) {
+    const double speed = k % 3 == 2 ? fastest / lever(k / 3) : fastest;
+    terms_[k] = segment->length * terms_[k] + std::abs(v[k]) + kRounding * speed;
+  }
+  const int joint =
+      segment->length > 0.0
+          ? MostViolatedJoint(projection.problem, projection.solution.v, terms_, kMissed)
+          : -1;
+  if (joint >= 0) {
+    *message = NameOfContradicted(*model.structure, joint);
+    return false;
+  }
+  SpreadTwists(*model.structure, projection.solution.v, &segment->after.twist);
+  segment->projection.new_twist = segment->after.twist;
+  return true;
+}
+
+bool SegmentFlow::Project(const Model<double>& model, Impulses* impulses) {
+  Impulses& projection = *impulses;
+  AssembleImpulses(model, &assembly_, &projection);
+  // The same solve as a node's; only its members are kept elsewhere.
+  SolvedNode node;
+  std::swap(node.problem, projection.problem);
+  std::swap(node.system, projection.system);
+  const std::vector<ContactMode> modes = projection.solution.modes;
+  const bool solved = Solve(modes, &node);
+  std::swap(node.problem, projection.problem);
+  std::swap(node.system, projection.system);
+  projection.solution = std::move(node.solution);
+  return solved;
+}
+
+bool SegmentFlow::Run(const Model<double>& model, Segment* segment, std::string* message) {
+  if (!Integrate(model, segment, message)) return false;
+  if (CorrectPoses(model, segment, message)) return ProjectTwists(model, segment, message);
+  // Joints that no twist satisfies leave no poses either, and are what there is to say.
+  std::string why;
+  if (!ProjectTwists(model, segment, &why)) *message = why;
+  return false;
+}
+
+}  // namespace tangible

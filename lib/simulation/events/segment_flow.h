@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// Smooth motion between events: accelerations with the contacts' modes held, integrated over a
+// segment, then poses and twists put back onto the constraints.
+//
+// Integrators are Nyström tableaux: with stages A_i = a(Q_i, V_i, t + c_i τ),
+//   Q_i = q + c_i τ v + τ² Σ â_ij A_j,   V_i = v + τ Σ a_ij A_j
+//   q⁺ = q + τ v + τ² Σ b̂_j A_j,          v⁺ = v + τ Σ b_j A_j
+//   semi_implicit_euler   c = 0, b = 1, b̂ = 1:   q⁺ = q + τ v⁺
+//   trapezoidal           the implicit trapezoidal rule, solved to 1e-14: order 2
+//   runge_kutta_4         the classical rule: order 4
+// The latter two are exact for constant accelerations. Hairer, Nørsett, Wanner, Solving Ordinary
+// Differential Equations I, II.1 and II.14.
+
+#include <functional>
+#include <string>
+
+#include "tangible/simulation/events/event_record.h"
+#include "tangible/simulation/events/implicit_stage.h"
+
+namespace tangible {
+
+struct NystromTableau {
+  static constexpr int kMost = 4;
+  int stages = 0;
+  double c[kMost] = {};
+  double a[kMost][kMost] = {};
+  double a_hat[kMost][kMost] = {};
+  double b[kMost] = {};
+  double b_hat[kMost] = {};
+  bool last_is_implicit = false;  ///< a[last][last] ≠ 0
+
+  static const NystromTableau& Of(Integrator integrator);
+};
+
+/// What motions leaned on, since the start.
+struct FlowCounts {
+  long whole_system = 0;   ///< condensed systems that were factorised as a whole instead
+  long newton_stages = 0;  ///< implicit stages whose iteration does not contract
+};
+
+class SegmentFlow {
+ public:
+  /// Fills stages, corrections, projection and `after` of a segment whose time, length, middle,
+  /// before, contacts, friction and modes are set. False with a message where it fails.
+  bool Run(const Model<double>& model, Segment* segment, std::string* message);
+
+  /// The accelerations at a state of the segment, with its modes.
+  bool Accelerate(const Model<double>& model, const Segment& segment, const State<double>& state,
+                  double time, SolvedNode* node);
+
+  /// Twists onto the rows of an instant whose modes are given (SetUpProjection).
+  bool Project(const Model<double>& model, Impulses* projection);
+
+  const FlowCounts& counts() const { return counts_; }
+
+ private:
+  bool Solve(const std::vector<ContactMode>& modes, SolvedNode* node);
+  bool Integrate(const Model<double>& model, Segment* segment, std::string* message);
+  bool SolveImplicitStage(const Model<double>& model, Segment* segment, int i,
+                          const std::function<void(State<double>*)>& place, std::string* message);
+  bool HasConverged(const SolvedNode& stage, const std::vector<double>& last, int iteration);
+  bool CorrectPoses(const Model<double>& model, Segment* segment, std::string* message);
+  bool ProjectTwists(const Model<double>& model, Segment* segment, std::string* message);
+
+  AccelerationScratch<double> acceleration_;
+  AssemblyScratch<double> assembly_;
+  std::vector<double> terms_;
+  ImplicitStage implicit_;
+  FlowCounts counts_;
+};
+
+/// Sets a segment's twist projection up at a state: its contacts without rebound, those that slide
+/// without friction (with it as a run starts: a twist that approaches there lands).
+void SetUpProjection(const Segment& segment, const State<double>& state, Impulses* projection);
+
+/// "joint crank contradicts the others: no twist satisfies all".
+std::string NameOfContradicted(const ModelStructure& structure, int joint);
+
+/// Assembles impulses at their state, of length h (0: an impact).
+void AssembleImpulses(const Model<double>& model, AssemblyScratch<double>* scratch,
+                      Impulses* impulses);
+
+/// The twists of all bodies from those solved for.
+void SpreadTwists(const ModelStructure& structure, const std::vector<double>& solved,
+                  std::vector<double>* twist);
+
+}  // namespace tangible

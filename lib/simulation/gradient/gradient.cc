@@ -1,0 +1,386 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/simulation/gradient/gradient.h"
+
+#include <algorithm>
+#include <cmath>
+#include <ctime>
+#include <functional>
+
+#include "tangible/dynamics/model/settings.h"
+#include "tangible/scene/scene_names.h"
+#include "tangible/simulation/certificate/certify.h"
+#include "tangible/simulation/derivatives/rollout_directional.h"
+#include "tangible/simulation/derivatives/rollout_tangent.h"
+#include "tangible/simulation/gradient/gradient_methods.h"
+#include "tangible/simulation/stepping/joint_opening.h"
+
+namespace tangible {
+namespace internal {
+
+VectorX<double> GradientProblem::Outputs(const State<double>& state) const {
+  VectorX<double> outputs(static_cast<Eigen::Index>(output_variables.size()));
+  const int poses = 3 * structure->num_bodies();
+  for (size_t i = 0; i < output_variables.size(); ++i) {
+    const int variable = output_variables[i];
+    outputs[static_cast<Eigen::Index>(i)] =
+        variable < poses ? state.pose[variable] : state.twist[variable - poses];
+  }
+  return outputs;
+}
+
+std::string FailureOf(const GradientProblem& problem, const RolloutReport& report) {
+  if (report.status == StepStatus::kDone) {
+    return "";
+  }
+  return (problem.scene.path.empty() ? "" : problem.scene.path + ": ") + report.message;
+}
+
+}  // namespace internal
+
+namespace {
+
+using internal::FailureOf;
+using internal::GradientProblem;
+
+// Empty, or one line: the first number of the scene that is not finite. What a file may not hold
+// can still be set by a program, an optimiser's step say.
+std::string CheckNumbers(const GradientProblem& problem) {
+  Scene scene = problem.scene;
+  for (const SceneNumber<double>& number : EnumerateNumbers(&scene)) {
+    if (!std::isfinite(*number.value)) {
+      return (scene.path.empty() ? "" : scene.path + ": ") + number.path +
+             ": expected a finite number, got " + std::to_string(*number.value);
+    }
+  }
+  return "";
+}
+
+// Derivatives of the losses with respect to the outputs (outputs x losses), given the outputs.
+using OutputSeed = std::function<MatrixX<double>(const VectorX<double>& values)>;
+
+// CPU time of this thread: others' work on the machine is not counted.
+double Seconds() {
+  timespec time{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
+  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
+}
+
+GradientProblem MakeProblem(const Scene& scene, const std::vector<ParameterPath>& parameters) {
+  GradientProblem problem{scene, parameters, {}, BuildStructure(scene), {}, {}, {}};
+  BuildModelWithStructure(scene, problem.structure, &problem.model, &problem.initial);
+  for (const ParameterPath& parameter : parameters) {
+    problem.directions.push_back(DirectionOf(parameter));
+  }
+  problem.output_variables = OutputVariables(*problem.structure);
+  return problem;
+}
+
+// What the tape took; false, with a message, where that is more than its budget.
+bool ReportTape(const Checkpointing& checkpointing, const RolloutTape& tape,
+                GradientResult* result) {
+  result->tape_bytes = tape.peak_bytes();
+  result->steps_again = tape.steps_again();
+  if (checkpointing.kind == Checkpointing::Kind::kBudget &&
+      result->tape_bytes > checkpointing.budget) {
+    result->message = "the adjoint of " + std::to_string(tape.steps()) +
+                      " steps needs more memory than its budget of " +
+                      std::to_string(checkpointing.budget) +
+                      " bytes: " + std::to_string(result->tape_bytes);
+    return false;
+  }
+  return true;
+}
+
+// Derivatives of the losses with respect to the parameters: losses x parameters.
+bool ByAdjoint(const GradientProblem& problem, const TapeOptions& options,
+               const OutputSeed& output_seed, RolloutTape* tape, GradientResult* result,
+               RowMatrixXd* derivative) {
+  const Eigen::SparseMatrix<double> map =
+      VariableJacobian(problem.scene, problem.structure, problem.directions);
+  State<double> final;
+  const RolloutReport report = tape->Record(problem.model, problem.initial, options, {}, &final);
+  result->message = FailureOf(problem, report);
+  if (!result->message.empty()) {
+    return false;
+  }
+  result->values = problem.Outputs(final);
+  const MatrixX<double> at_outputs = output_seed(result->values);
+  const long steps = tape->steps();
+  RowMatrixXd w_bar;
+  tape->Adjoint(
+      problem.model, static_cast<int>(at_outputs.cols()),
+      [&](long k, RowMatrixXd* bar) {
+        for (size_t i = 0; k == steps && i < problem.output_variables.size(); ++i) {
+          bar->row(problem.output_variables[i]) += at_outputs.row(static_cast<Eigen::Index>(i));
+        }
+      },
+      &w_bar);
+  *derivative = (map.transpose() * w_bar).transpose();
+  return ReportTape(options.checkpointing, *tape, result);
+}
+
+bool ByTangent(const GradientProblem& problem, DerivativeSide side, GradientResult* result) {
+  const bool by_events = problem.structure->settings.stepping == Stepping::kEvent;
+  if (by_events && side != DerivativeSide::kBoth && result->certificate.verdict != "trustworthy") {
+    return internal::JacobianBySides(problem, side, result);
+  }
+  RowMatrixXd w_dot =
+      VariableJacobian(problem.scene, problem.structure, problem.directions).toDense();
+  State<double> final;
+  RolloutReport report;
+  if (side == DerivativeSide::kBoth || by_events) {
+    report = RolloutTangent(problem.model, problem.initial, {}, &w_dot, &final);
+  } else {
+    const double sign = side == DerivativeSide::kPlus ? 1.0 : -1.0;
+    w_dot *= sign;
+    report = RolloutDirectional(problem.model, problem.initial, &w_dot, &final);
+    w_dot = (sign * w_dot).array() + 0.0;  // no −0
+  }
+  result->message = FailureOf(problem, report);
+  if (!result->message.empty()) {
+    return false;
+  }
+  result->values = problem.Outputs(final);
+  result->jacobian.resize(result->values.size(), w_dot.cols());
+  for (size_t i = 0; i < problem.output_variables.size(); ++i) {
+    result->jacobian.row(static_cast<Eigen::Index>(i)) = w_dot.row(problem.output_variables[i]);
+  }
+  return true;
+}
+
+// All methods but the adjoint: the whole Jacobian, which a loss is chained with.
+bool ByColumns(const GradientProblem& problem, const GradientOptions& options,
+               GradientResult* result) {
+  result->notes.clear();
+  result->fallbacks = 0;
+  switch (options.method) {
+    case GradientMethod::kTangent:
+      return ByTangent(problem, options.side, result);
+    case GradientMethod::kJet:
+      return internal::JacobianByJets(problem, JetRoute::kUnrolled, result);
+    case GradientMethod::kJetImplicit:
+      return internal::JacobianByJets(problem, JetRoute::kImplicit, result);
+    default:
+      return internal::JacobianByDifferences(problem, options.step, result);
+  }
+}
+
+bool RunMethod(const GradientProblem& problem, const GradientOptions& options,
+               const OutputSeed& output_seed, RolloutTape* tape, GradientResult* result,
+               RowMatrixXd* derivative) {
+  if (options.method == GradientMethod::kAdjoint) {
+    return ByAdjoint(problem, {options.factorisations, options.checkpointing}, output_seed, tape,
+                     result, derivative);
+  }
+  if (!ByColumns(problem, options, result)) {
+    return false;
+  }
+  *derivative = output_seed(result->values).transpose() * result->jacobian;
+  return true;
+}
+
+bool TimeRollout(const GradientProblem& problem, Stepper* stepper, GradientResult* result) {
+  State<double> final;
+  const double start = Seconds();
+  const RolloutReport report = Rollout(problem.model, problem.initial, {}, stepper, &final);
+  result->all_rollout_seconds.push_back(Seconds() - start);
+  result->message = FailureOf(problem, report);
+  result->open_joint = OpenJointOf(problem.model, final, report.time);
+  return result->message.empty();
+}
+
+Certificate CertificateOf(const GradientProblem& problem) {
+  std::vector<std::string> names;
+  for (const ParameterPath& parameter : problem.parameters) {
+    names.push_back(parameter.path);
+  }
+  return CertifyDerivative(
+      problem.model, problem.initial,
+      RowMatrixXd(VariableJacobian(problem.scene, problem.structure, problem.directions)), names);
+}
+
+// Empty, or one line: why the derivative has no such side.
+std::string CheckSide(const GradientProblem& problem, const GradientOptions& options) {
+  if (options.side == DerivativeSide::kBoth) {
+    return "";
+  }
+  if (options.method != GradientMethod::kTangent) {
+    return "one-sided derivatives: expected the method tangent";
+  }
+  Scene scene = problem.scene;
+  const std::vector<SceneNumber<double>> numbers = EnumerateNumbers(&scene);
+  const bool plus = options.side == DerivativeSide::kPlus;
+  const double towards = plus ? HUGE_VAL : -HUGE_VAL;
+  for (const ParameterPath& parameter : problem.parameters) {
+    for (const int number : parameter.numbers) {
+      if (!IsAllowed(numbers[number].kind, std::nextafter(*numbers[number].value, towards))) {
+        return "parameter " + parameter.path + ": it has no derivative from " +
+               (plus ? "above" : "below") + " at the end of its range, expected " +
+               Describe(parameter.kind);
+      }
+    }
+  }
+  return "";
+}
+
+// Notes what one-sided derivatives of fixed steps do not resolve.
+void JudgeSide(const GradientProblem& problem, const GradientOptions& options,
+               GradientResult* result) {
+  const Certificate& certificate = result->certificate;
+  if (options.side == DerivativeSide::kBoth || certificate.verdict == "trustworthy" ||
+      problem.structure->settings.stepping == Stepping::kEvent) {
+    return;
+  }
+  const bool resolved =
+      certificate.degenerate_rows > 0 || certificate.one_sided == kContradictingRows;
+  if (!resolved || !certificate.discontinuous.empty() ||
+      (!certificate.one_sided.empty() && certificate.one_sided != kContradictingRows)) {
+    result->notes.push_back("one-sided derivatives resolve contacts at a kink alone, not: " +
+                            certificate.verdict);
+  }
+}
+
+GradientResult Differentiate(const GradientProblem& problem, const GradientOptions& asked,
+                             Differentiated what, const OutputSeed& output_seed,
+                             RowMatrixXd* derivative) {
+  GradientOptions options = asked;
+  options.method = MethodOf(asked, what, static_cast<long>(problem.parameters.size()),
+                            static_cast<long>(problem.output_variables.size()));
+  GradientResult result;
+  result.outputs = OutputNames(*problem.structure);
+  result.method = options.method;
+  std::string error;
+  if (!CheckSettings(problem.scene.simulation, &error)) {
+    result.message = (problem.scene.path.empty() ? "" : problem.scene.path + ": ") + error;
+    return result;
+  }
+  result.message = CheckNumbers(problem);
+  if (result.message.empty()) {
+    result.message = CheckSide(problem, options);
+  }
+  if (!result.message.empty()) {
+    return result;
+  }
+  // Event stepping needs the certificate to tell whether there are sides.
+  const bool sides = options.side != DerivativeSide::kBoth;
+  if (sides) {
+    result.certificate = CertificateOf(problem);
+  }
+  RolloutTape tape;
+  Stepper stepper(problem.model);
+  for (int i = 0; i < std::max(1, options.repeat); ++i) {
+    if (!TimeRollout(problem, &stepper, &result)) {
+      return result;
+    }
+    const double start = Seconds();
+    if (!RunMethod(problem, options, output_seed, &tape, &result, derivative)) {
+      return result;
+    }
+    result.all_seconds.push_back(Seconds() - start);
+  }
+  const auto best = [](const std::vector<double>& times) {
+    return *std::min_element(times.begin(), times.end());
+  };
+  if (!result.values.allFinite() || !derivative->allFinite()) {
+    result.message = (problem.scene.path.empty() ? "" : problem.scene.path + ": ") +
+                     "the derivative is not finite: it overflows, or the scene is too badly scaled";
+    return result;
+  }
+  result.seconds = best(result.all_seconds);
+  result.rollout_seconds = best(result.all_rollout_seconds);
+  if (!sides && options.certificate == CertificatePass::kRun) {
+    result.certificate = CertificateOf(problem);
+  }
+  JudgeSide(problem, options, &result);
+  if (!result.open_joint.empty()) result.notes.push_back(result.open_joint);
+  result.done = true;
+  return result;
+}
+
+}  // namespace
+
+std::vector<std::string> OutputNames(const ModelStructure& structure) {
+  std::vector<std::string> names;
+  for (const int body : structure.moving) {
+    for (const char* component : {"x", "y", "angle", "vx", "vy", "omega"}) {
+      names.push_back(structure.bodies[body].name + "/" + component);
+    }
+  }
+  return names;
+}
+
+std::vector<int> OutputVariables(const ModelStructure& structure) {
+  std::vector<int> variables;
+  for (const int body : structure.moving) {
+    for (int i = 0; i < 3; ++i) variables.push_back(structure.PoseVariable(body, i));
+    for (int i = 0; i < 3; ++i) variables.push_back(structure.TwistVariable(body, i));
+  }
+  return variables;
+}
+
+GradientMethod MethodOf(const GradientOptions& options, Differentiated what, long parameters,
+                        long outputs) {
+  if (options.method != GradientMethod::kAuto) {
+    return options.method;
+  }
+  if (options.side != DerivativeSide::kBoth) {
+    return GradientMethod::kTangent;
+  }
+  const bool limits_memory = options.factorisations != Factorisations::kKeep ||
+                             options.checkpointing.kind != Checkpointing::Kind::kAll;
+  if (limits_memory || what == Differentiated::kLoss || parameters > outputs) {
+    return GradientMethod::kAdjoint;
+  }
+  return GradientMethod::kTangent;
+}
+
+GradientResult FinalStateJacobian(const Scene& scene, const std::vector<ParameterPath>& parameters,
+                                  const GradientOptions& options) {
+  const GradientProblem problem = MakeProblem(scene, parameters);
+  const auto all = [](const VectorX<double>& values) {
+    return MatrixX<double>(MatrixX<double>::Identity(values.size(), values.size()));
+  };
+  RowMatrixXd jacobian;
+  GradientResult result =
+      Differentiate(problem, options, Differentiated::kFinalState, all, &jacobian);
+  result.jacobian = std::move(jacobian);
+  return result;
+}
+
+GradientResult LossGradient(const Scene& scene, const std::vector<ParameterPath>& parameters,
+                            const std::vector<LossTerm>& terms, const GradientOptions& options) {
+  const GradientProblem problem = MakeProblem(scene, parameters);
+  const std::vector<std::string> outputs = OutputNames(*problem.structure);
+  std::vector<Eigen::Index> places;
+  for (const LossTerm& term : terms) {
+    const auto found = std::find(outputs.begin(), outputs.end(), term.output);
+    if (found == outputs.end()) {
+      GradientResult result;
+      result.message = "output " + term.output + ": no such output of the scene";
+      return result;
+    }
+    places.push_back(found - outputs.begin());
+  }
+  const auto seed = [&](const VectorX<double>& values) {
+    MatrixX<double> bar = MatrixX<double>::Zero(values.size(), 1);
+    for (size_t i = 0; i < terms.size(); ++i) {
+      bar(places[i], 0) += 2.0 * terms[i].weight * (values[places[i]] - terms[i].target);
+    }
+    return bar;
+  };
+  RowMatrixXd derivative;
+  GradientResult result = Differentiate(problem, options, Differentiated::kLoss, seed, &derivative);
+  if (!result.done) {
+    return result;
+  }
+  result.jacobian.resize(0, 0);
+  result.gradient = derivative.row(0).transpose();
+  result.loss = 0.0;
+  for (size_t i = 0; i < terms.size(); ++i) {
+    const double error = result.values[places[i]] - terms[i].target;
+    result.loss += terms[i].weight * error * error;
+  }
+  return result;
+}
+
+}  // namespace tangible

@@ -1,0 +1,158 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// One-sided derivatives of event stepping at a kink: limits of the derivative on one side,
+//
+//   lim D(p + τ) for τ → 0 from one side,     D(p + τ): the tangent at p + τ, exact there
+//
+// from three τ, extrapolated by a parabola. Where the map is continuous at p and smooth beside it,
+// that is the one-sided derivative (by the mean value theorem). Both are checked: the
+// extrapolations of first and second order must agree, and the values at p + τ must be those at p
+// and the integral of the derivative between. A square root (a gap that just closes) fails the
+// first, a jump (a flat landing) the second.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <sstream>
+
+#include "tangible/simulation/derivatives/rollout_tangent.h"
+#include "tangible/simulation/gradient/gradient_methods.h"
+
+namespace tangible::internal {
+namespace {
+
+// Of the parameter's size: beyond what contacts hold to, and small against the next kink.
+constexpr double kWay = 1e-5;
+constexpr double kConverged = 1e-6;  // what both orders of extrapolation may differ by
+// Of the change over τ, what the integral may miss: a touch at no speed is located to 1e-7 m/s.
+constexpr double kContinuous = 0.05;
+constexpr double kRounding = 1e-11;  // of the values
+// Derivatives below this, of the values over the parameter's size, are 0.
+constexpr double kNothing = 1e-9;
+
+struct Beside {
+  VectorX<double> values;
+  VectorX<double> derivative;
+};
+
+class OneSided {
+ public:
+  OneSided(const GradientProblem& problem, double sign, GradientResult* result)
+      : problem_(problem), sign_(sign), result_(*result) {}
+
+  // The derivative by a parameter; false with a message where it has none from this side.
+  bool Column(size_t k, VectorX<double>* column) {
+    const ParameterPath& parameter = problem_.parameters[k];
+    const double way = sign_ * kWay * std::max(std::abs(parameter.value), parameter.scale);
+    std::array<Beside, 3> at;  // τ, τ / 2, τ / 4
+    for (int i = 0; i < 3; ++i) {
+      if (!Evaluate(k, way / (1 << i), &at[i])) {
+        return false;
+      }
+    }
+    const VectorX<double> first = 2.0 * at[2].derivative - at[1].derivative;
+    *column = (at[0].derivative - 6.0 * at[1].derivative + 8.0 * at[2].derivative) / 3.0;
+    const double values = result_.values.cwiseAbs().maxCoeff();
+    const double size =
+        std::max(column->cwiseAbs().maxCoeff(), kNothing * kWay * values / std::abs(way));
+    const double apart = (first - *column).cwiseAbs().maxCoeff();
+    if (!(apart <= kConverged * size)) {
+      return Fail(parameter, "derivatives beside it do not converge: its largest is " + Text(size) +
+                                 " or differs by " + Text(apart));
+    }
+    // Simpson's rule.
+    const VectorX<double> expected =
+        result_.values + way / 6.0 * (*column + 4.0 * at[1].derivative + at[0].derivative);
+    for (Eigen::Index i = 0; i < expected.size(); ++i) {
+      const double missed = std::abs(at[0].values[i] - expected[i]);
+      const double bound = kContinuous * std::abs(way) * size + kRounding * values;
+      if (!(missed <= bound)) {
+        return Fail(parameter, result_.outputs[i] + " jumps by " + Text(missed));
+      }
+    }
+    apart_ = std::max(apart_, size > 0.0 ? apart / size : 0.0);
+    return true;
+  }
+
+  // What two orders of extrapolation differ by, of a column's largest entry.
+  double apart() const { return apart_; }
+
+ private:
+  static std::string Text(double x) {
+    std::ostringstream text;
+    text << x;
+    return text.str();
+  }
+
+  bool Fail(const ParameterPath& parameter, const std::string& reason) {
+    result_.message = "parameter " + parameter.path + ": no derivative from " +
+                      (sign_ > 0.0 ? "above: " : "below: ") + reason +
+                      "; the certificate: " + result_.certificate.verdict;
+    return false;
+  }
+
+  bool Evaluate(size_t k, double shift, Beside* beside) {
+    const ParameterPath& parameter = problem_.parameters[k];
+    Scene scene = problem_.scene;
+    const std::vector<SceneNumber<double>> numbers = EnumerateNumbers(&scene);
+    for (const int number : parameter.numbers) {
+      if (!IsAllowed(numbers[number].kind, *numbers[number].value + shift)) {
+        return Fail(parameter, "its range ends within " + Text(std::abs(shift)) + ", expected " +
+                                   Describe(parameter.kind));
+      }
+      *numbers[number].value += shift;
+    }
+    Model<double> model;
+    State<double> initial;
+    BuildModelWithStructure(scene, problem_.structure, &model, &initial);
+    RowMatrixXd w_dot =
+        VariableJacobian(scene, problem_.structure, {problem_.directions[k]}).toDense();
+    State<double> final;
+    const RolloutReport report = RolloutTangent(model, initial, {}, &w_dot, &final);
+    result_.message = FailureOf(problem_, report);
+    if (!result_.message.empty()) {
+      result_.message += ", with " + parameter.path + " changed by " + Text(shift);
+      return false;
+    }
+    beside->values = problem_.Outputs(final);
+    beside->derivative.resize(beside->values.size());
+    for (size_t i = 0; i < problem_.output_variables.size(); ++i) {
+      beside->derivative[static_cast<Eigen::Index>(i)] = w_dot(problem_.output_variables[i], 0);
+    }
+    return true;
+  }
+
+  const GradientProblem& problem_;
+  double sign_;
+  GradientResult& result_;
+  double apart_ = 0.0;
+};
+
+}  // namespace
+
+bool JacobianBySides(const GradientProblem& problem, DerivativeSide side, GradientResult* result) {
+  State<double> final;
+  const RolloutReport report = Rollout(problem.model, problem.initial, {}, &final);
+  result->message = FailureOf(problem, report);
+  if (!result->message.empty()) {
+    return false;
+  }
+  result->values = problem.Outputs(final);
+  result->jacobian.resize(result->values.size(),
+                          static_cast<Eigen::Index>(problem.parameters.size()));
+  OneSided sides(problem, side == DerivativeSide::kPlus ? 1.0 : -1.0, result);
+  for (size_t k = 0; k < problem.parameters.size(); ++k) {
+    VectorX<double> column;
+    if (!sides.Column(k, &column)) {
+      return false;
+    }
+    result->jacobian.col(static_cast<Eigen::Index>(k)) = column;
+  }
+  std::ostringstream note;
+  note << "one-sided derivatives are limits of those beside the kink, extrapolated; orders of "
+          "extrapolation differ by "
+       << sides.apart() << " of a column";
+  result->notes.push_back(note.str());
+  return true;
+}
+
+}  // namespace tangible::internal

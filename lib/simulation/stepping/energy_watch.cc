@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/simulation/stepping/energy_watch.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "tangible/simulation/stepping/invariants.h"
+
+namespace tangible {
+namespace {
+
+// Far beyond what impacts by Newton's law with friction, corrections of drift and coarse steps add.
+constexpr double kExploded = 1e4;
+
+bool IsDriven(const Model<double>& model, const State<double>& state) {
+  const ModelStructure& s = *model.structure;
+  if (!s.forces.empty()) {
+    return true;
+  }
+  for (const JointIndex& joint : s.joints) {
+    if (joint.effort_signal >= 0 || (joint.effort >= 0 && model.numbers[joint.effort] != 0.0)) {
+      return true;
+    }
+  }
+  for (int body = 0; body < s.num_bodies(); ++body) {
+    const double* v = &state.twist[3 * body];
+    if (s.bodies[body].block < 0 && (v[0] != 0.0 || v[1] != 0.0 || v[2] != 0.0)) {
+      return true;
+    }
+  }
+  return false;
+}
+
+}  // namespace
+
+EnergyWatch::EnergyWatch(const Model<double>& model, const State<double>& initial) {
+  const ModelStructure& s = *model.structure;
+  if (IsDriven(model, initial)) {
+    return;
+  }
+  const double kinetic = KineticEnergy(model, initial);
+  start_ = kinetic + PotentialEnergy(model, initial);
+  // What is at hand: motion, springs, the fall over the places of bodies, recovery from
+  // penetration.
+  const double g = std::hypot(model.numbers[kGravityX], model.numbers[kGravityY]);
+  double scale = kinetic;
+  for (const int body : s.moving) {
+    const double mass = model.numbers[s.bodies[body].mass];
+    const double place = std::hypot(initial.pose[3 * body], initial.pose[3 * body + 1]);
+    const double fall = g * s.settings.duration * s.settings.duration;
+    scale += mass * (g * (place + fall) + s.settings.recovery_speed * s.settings.recovery_speed);
+  }
+  scale += std::abs(start_);
+  allowed_ = kExploded * scale;
+  watches_ = std::isfinite(start_) && std::isfinite(allowed_);
+}
+
+std::string EnergyWatch::Exploded(const Model<double>& model, const State<double>& state) const {
+  if (!watches_) {
+    return "";
+  }
+  const double energy = KineticEnergy(model, state) + PotentialEnergy(model, state);
+  if (energy - start_ <= allowed_) {
+    return "";
+  }
+  char text[160];
+  std::snprintf(text, sizeof(text),
+                "the energy grew from %.3g J to %.3g J, though nothing drives the scene: dt is too "
+                "large",
+                start_, energy);
+  return text;
+}
+
+}  // namespace tangible

@@ -1,0 +1,146 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/simulation/stepping/invariants.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+#include "tangible/dynamics/elements/force.h"
+#include "tangible/geometry/broad_phase.h"
+#include "tangible/geometry/collide.h"
+
+namespace tangible {
+namespace {
+
+// The gap to a face that a corner stands beyond the end of, by 1e-6 of the face's length at most,
+// counts too, and is negative a little before the boxes meet (kBeyondEnd of collide_core.cc).
+constexpr double kBeyondEnd = 1e-5;  // of a box's longer side
+constexpr double kRounding = 16.0 * std::numeric_limits<double>::epsilon();  // of its coordinates
+
+// A box that meets those of all bodies to which the body in it has a negative gap.
+Aabb BoxOfTouching(const Aabb& box) {
+  double grow = 0.0;
+  for (const double length : {box.max_x - box.min_x, box.max_y - box.min_y}) {
+    if (std::isfinite(length)) grow = std::max(grow, kBeyondEnd * length);
+  }
+  double place = 0.0;
+  for (const double x : {box.min_x, box.min_y, box.max_x, box.max_y}) {
+    if (std::isfinite(x)) place = std::max(place, std::abs(x));
+  }
+  grow += kRounding * place;
+  return {box.min_x - grow, box.min_y - grow, box.max_x + grow, box.max_y + grow};
+}
+
+}  // namespace
+
+double KineticEnergy(const Model<double>& model, const State<double>& state) {
+  const ModelStructure& s = *model.structure;
+  double energy = 0.0;
+  for (const int body : s.moving) {
+    const double* v = &state.twist[3 * body];
+    energy += 0.5 * model.numbers[s.bodies[body].mass] * (v[0] * v[0] + v[1] * v[1]) +
+              0.5 * model.numbers[s.bodies[body].inertia] * v[2] * v[2];
+  }
+  return energy;
+}
+
+double PotentialEnergy(const Model<double>& model, const State<double>& state) {
+  const ModelStructure& s = *model.structure;
+  double energy = 0.0;
+  for (const int body : s.moving) {
+    energy -=
+        model.numbers[s.bodies[body].mass] * (model.numbers[kGravityX] * state.pose[3 * body] +
+                                              model.numbers[kGravityY] * state.pose[3 * body + 1]);
+  }
+  for (const SpringIndex& spring : s.springs) {
+    SpringRow<double> row;
+    EvaluateSpring(state.PoseOf(spring.a), state.PoseOf(spring.b), &model.numbers[spring.numbers],
+                   &row);
+    energy += 0.5 * row.tension * (row.length - model.numbers[spring.numbers + 6]);
+  }
+  return energy;
+}
+
+Vector3<double> Momentum(const Model<double>& model, const State<double>& state) {
+  const ModelStructure& s = *model.structure;
+  Vector3<double> sum = Vector3<double>::Zero();
+  for (const int body : s.moving) {
+    const double* x = &state.pose[3 * body];
+    const double* v = &state.twist[3 * body];
+    const double mass = model.numbers[s.bodies[body].mass];
+    sum += Vector3<double>(
+        mass * v[0], mass * v[1],
+        mass * (x[0] * v[1] - x[1] * v[0]) + model.numbers[s.bodies[body].inertia] * v[2]);
+  }
+  return sum;
+}
+
+double DeepestPenetration(const Model<double>& model, const State<double>& state) {
+  const ModelStructure& s = *model.structure;
+  std::vector<Aabb> boxes;
+  for (int body = 0; body < s.num_bodies(); ++body) {
+    boxes.push_back(BoxOfTouching(ComputeAabb(model.Shape(body), state.PoseOf(body), 0.0)));
+  }
+  BroadPhase broad_phase;
+  std::vector<std::pair<int, int>> pairs;
+  broad_phase.FindPairs(
+      boxes, [&s](int a, int b) { return s.MayCollide(a, b); }, &pairs);
+  double deepest = 0.0;
+  for (const auto& [a, b] : pairs) {
+    ContactFeature features[2];
+    const ShapeView<double> shape_a = model.Shape(a);
+    const ShapeView<double> shape_b = model.Shape(b);
+    const Pose<double> pose_a = state.PoseOf(a);
+    const Pose<double> pose_b = state.PoseOf(b);
+    const int count = FindContactFeatures(shape_a, pose_a, shape_b, pose_b,
+                                          std::numeric_limits<double>::infinity(), features);
+    for (int k = 0; k < count; ++k) {
+      const double gap = EvaluateContact(features[k], shape_a, pose_a, shape_b, pose_b).gap;
+      deepest = std::max(deepest, -gap);
+    }
+  }
+  return deepest;
+}
+
+void AddClosedContacts(const StepRecord& record, std::vector<std::pair<int, int>>* pairs) {
+  for (size_t i = 0; i < record.contacts.size(); ++i) {
+    if (record.solution.modes[i] != ContactMode::kOpen) {
+      pairs->emplace_back(record.contacts[i].a, record.contacts[i].b);
+    }
+  }
+}
+
+int CountIslands(const ModelStructure& structure, const std::pair<int, int>* closed,
+                 size_t num_closed) {
+  std::vector<int> parent(structure.num_blocks());
+  std::iota(parent.begin(), parent.end(), 0);
+  const auto root = [&](int i) {
+    while (parent[i] != i) {
+      parent[i] = parent[parent[i]];
+      i = parent[i];
+    }
+    return i;
+  };
+  const auto join = [&](int a, int b) {
+    if (a >= 0 && b >= 0) {
+      parent[root(a)] = root(b);
+    }
+  };
+  for (const SpringIndex& spring : structure.springs) {
+    join(structure.bodies[spring.a].block, structure.bodies[spring.b].block);
+  }
+  for (const JointIndex& joint : structure.joints) {
+    join(structure.bodies[joint.a].block, structure.bodies[joint.b].block);
+  }
+  for (size_t i = 0; i < num_closed; ++i) {
+    join(structure.bodies[closed[i].first].block, structure.bodies[closed[i].second].block);
+  }
+  int islands = 0;
+  for (int i = 0; i < structure.num_blocks(); ++i) {
+    islands += parent[i] == i ? 1 : 0;
+  }
+  return islands;
+}
+
+}  // namespace tangible

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// What a motion should keep: energy, momentum, gaps, groups of bodies.
+//
+//   kinetic     T = Σ ½ m (vx² + vy²) + ½ I ω²
+//   potential   U = −Σ m g·x + Σ_springs ½ k (ℓ − L0)²
+//   momentum    (Σ m vx, Σ m vy, Σ m (x vy − y vx) + I ω), angular about the world's origin
+//
+// Sums over the bodies that move by forces. Joint drift is JointDrift of joint_projection.h.
+
+#include <utility>
+#include <vector>
+
+#include "tangible/simulation/stepping/step.h"
+
+namespace tangible {
+
+/// J.
+double KineticEnergy(const Model<double>& model, const State<double>& state);
+/// J, of gravity (0 at the origin) and springs.
+double PotentialEnergy(const Model<double>& model, const State<double>& state);
+/// N s, N s, N m s.
+Vector3<double> Momentum(const Model<double>& model, const State<double>& state);
+
+/// How deep bodies that may collide are in each other: the largest −gap of all pairs, m; 0 where no
+/// pair overlaps. Pairs that are apart contribute nothing, so only those are looked at whose boxes
+/// meet: O(n log n) for n bodies that each touch a few.
+double DeepestPenetration(const Model<double>& model, const State<double>& state);
+
+/// Adds the pairs of bodies that a step's closed contacts and joint limits hold together.
+void AddClosedContacts(const StepRecord& record, std::vector<std::pair<int, int>>* pairs);
+
+/// Groups of moving bodies that joints, springs, dampers and the closed contacts connect; a body by
+/// itself is a group of one.
+int CountIslands(const ModelStructure& structure, const std::pair<int, int>* closed,
+                 size_t num_closed);
+
+}  // namespace tangible

@@ -1,0 +1,183 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/simulation/stepping/rollout.h"
+
+#include <algorithm>
+#include <cmath>
+#include <sstream>
+
+#include "tangible/simulation/events/event_jets.h"
+#include "tangible/simulation/stepping/energy_watch.h"
+
+namespace tangible {
+namespace {
+
+std::string FailureMessage(const StepReport& step, double t, long k) {
+  std::ostringstream message;
+  message << "step " << k << " at t = " << t
+          << " s: " << (step.status == StepStatus::kDiverged ? "diverged: " : "unsolved: ")
+          << step.message;
+  return message.str();
+}
+
+// A step that was done, and whether the run has exploded by it. Not every one is looked at.
+StepReport Watched(const EnergyWatch& watch, const Model<double>& model, const State<double>& state,
+                   long k, long steps, StepReport step) {
+  constexpr long kEvery = 8;
+  if (step.status == StepStatus::kDone && (k % kEvery == 0 || k + 1 == steps)) {
+    step.message = watch.Exploded(model, state);
+    step.status = step.message.empty() ? StepStatus::kDone : StepStatus::kDiverged;
+  }
+  return step;
+}
+
+// The largest difference between two states, relative to the larger of 1 and the values.
+template <typename T>
+double ValueDifference(const State<T>& jets, const State<double>& state) {
+  double worst = 0.0;
+  const auto compare = [&](const std::vector<T>& x, const std::vector<double>& y) {
+    for (size_t i = 0; i < y.size(); ++i) {
+      const double difference = std::abs(ValueOf(x[i]) - y[i]) / std::max(1.0, std::abs(y[i]));
+      worst = std::isnan(difference) ? HUGE_VAL : std::max(worst, difference);
+    }
+  };
+  compare(jets.pose, state.pose);
+  compare(jets.twist, state.twist);
+  return worst;
+}
+
+// Unrolled steps are compared with the double ones; beyond this they are on another branch.
+constexpr double kBranchTolerance = 1e-8;
+
+template <typename T>
+void SetValues(const State<double>& values, State<T>* state) {
+  for (size_t i = 0; i < values.pose.size(); ++i) {
+    state->pose[i].a = values.pose[i];
+    state->twist[i].a = values.twist[i];
+  }
+}
+
+}  // namespace
+
+void RolloutReport::Add(const StepReport& step) {
+  contacts_max = std::max(contacts_max, step.closed);
+  lcp_rows_max = std::max(lcp_rows_max, step.lcp_rows);
+  contacts += step.contacts;
+  lcp_rows += step.lcp_rows;
+  single_rows += step.single_rows;
+  angles_left_out += step.angles_left_out;
+  pairs_compared += step.pairs_compared;
+  pairs_near += step.pairs_near;
+  beyond_reach += step.beyond_reach;
+  solved_directly += step.solved_by == SolvedBy::kDirect ? 1 : 0;
+  solved_by_guess += step.solved_by == SolvedBy::kGuess ? 1 : 0;
+  solved_by_interior_point += step.solved_by == SolvedBy::kInteriorPoint ? 1 : 0;
+  solved_by_lemke += step.solved_by == SolvedBy::kLemke ? 1 : 0;
+  events += step.events;
+  fallbacks += step.fallbacks;
+  solver.Add(step.solver);
+  newton_stages += step.newton_stages;
+  halved_motions += step.halved_motions;
+  damped_projections += step.damped_projections;
+  mode_switches += step.mode_switches;
+  factorisations += step.factorisations;
+  residual_max = std::max(residual_max, step.residual);
+  penetration_max = std::max(penetration_max, -step.gap_min);
+  impact_energy_gain_max = std::max(impact_energy_gain_max, step.impact_energy_gain);
+}
+
+RolloutReport Rollout(const Model<double>& model, const State<double>& initial,
+                      const StateObserver& observer, Stepper* stepper, State<double>* final) {
+  const SimulationSettings& settings = model.structure->settings;
+  RolloutReport report;
+  State<double> state = initial;
+  stepper->ClearGuess();
+  const long steps = NumSteps(settings);
+  const EnergyWatch watch(model, initial);
+  if (observer) {
+    observer(0, 0.0, state, nullptr);
+  }
+  for (long k = 0; k < steps; ++k) {
+    const double t = StepTime(settings, k);
+    const StepReport step = Watched(watch, model, state, k, steps,
+                                    stepper->Step(model, t, StepLength(settings, k), &state));
+    report.Add(step);
+    if (step.status != StepStatus::kDone) {
+      report.status = step.status;
+      report.message = FailureMessage(step, t, k);
+      break;
+    }
+    ++report.steps;
+    report.time = StepTime(settings, k + 1);
+    if (observer) {
+      observer(k + 1, report.time, state, stepper);
+    }
+  }
+  *final = std::move(state);
+  return report;
+}
+
+RolloutReport Rollout(const Model<double>& model, const State<double>& initial,
+                      const StateObserver& observer, State<double>* final) {
+  Stepper stepper(model);
+  return Rollout(model, initial, observer, &stepper, final);
+}
+
+template <typename T>
+RolloutReport RolloutJets(const Model<T>& model, const State<T>& initial, JetRoute route,
+                          const JetObserver<T>& observer, State<T>* final, long* fallbacks) {
+  *fallbacks = 0;
+  Model<double> values{model.structure, {}};
+  for (const T& number : model.numbers) {
+    values.numbers.push_back(ValueOf(number));
+  }
+  State<T> jets = initial;
+  if (observer) {
+    observer(0, 0.0, jets);
+  }
+  const SimulationSettings& settings = model.structure->settings;
+  Stepper stepper(values);
+  State<double> state = ValuesOf(initial);
+  RolloutReport report;
+  for (long k = 0; k < NumSteps(settings); ++k) {
+    const double t = StepTime(settings, k);
+    StepReport step = stepper.Step(values, t, StepLength(settings, k), &state);
+    report.Add(step);
+    if (step.status != StepStatus::kDone) {
+      report.status = step.status;
+      report.message = FailureMessage(step, t, k);
+      break;
+    }
+    const State<T> before = jets;
+    if (stepper.by_events()) {
+      EventStepInJets(model, values, route, &stepper.events().mutable_record(), &jets);
+    } else if (route == JetRoute::kImplicit) {
+      StepImplicit(model, &stepper, state, &jets);
+    } else if (!StepUnrolled(model, stepper.record(), &jets)) {
+      ++*fallbacks;
+      jets = before;
+      StepImplicit(model, &stepper, state, &jets);
+    }
+    if (ValueDifference(jets, state) > kBranchTolerance && settings.smoothing == 0.0) {
+      report.status = StepStatus::kUnsolved;
+      report.message = "step " + std::to_string(k) +
+                       ": different branch: the unrolled solver found another solution";
+      break;
+    }
+    // Rounding must not accumulate into other modes than the double run's.
+    SetValues(state, &jets);
+    ++report.steps;
+    report.time = StepTime(settings, k + 1);
+    if (observer) {
+      observer(k + 1, report.time, jets);
+    }
+  }
+  *final = std::move(jets);
+  return report;
+}
+
+#define TANGIBLE_INSTANTIATE_JET(N)                                                                \
+  template RolloutReport RolloutJets<Jet<N>>(const Model<Jet<N>>&, const State<Jet<N>>&, JetRoute, \
+                                             const JetObserver<Jet<N>>&, State<Jet<N>>*, long*);
+TANGIBLE_FOR_EACH_JET_WIDTH(TANGIBLE_INSTANTIATE_JET)
+
+}  // namespace tangible

@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// Rollouts: many steps from an initial state.
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "tangible/simulation/events/event_jets.h"
+#include "tangible/simulation/stepping/step.h"
+
+namespace tangible {
+
+/// What happened in a run: sums and extremes of the steps' reports.
+struct RolloutReport {
+  StepStatus status = StepStatus::kDone;
+  std::string message;   ///< empty unless it failed: when, where, what
+  long steps = 0;        ///< done
+  double time = 0.0;     ///< s, reached
+  int contacts_max = 0;  ///< contacts with an impulse in a step
+  int lcp_rows_max = 0;
+  long contacts = 0;  ///< listed, over all steps; the following counts too
+  long lcp_rows = 0;
+  long single_rows = 0;      ///< contacts and limits that have one row in place of three
+  long angles_left_out = 0;  ///< bodies that have rows, but none that turns them
+  long pairs_compared = 0;   ///< pairs of boxes that the broad phase compared
+  long pairs_near = 0;       ///< pairs whose boxes overlap
+  long beyond_reach = 0;     ///< of these, without rows (fixed stepping)
+  int fixed_numbers = 0;     ///< of the model: with a tangent, those that no column varies
+  long solved_directly = 0;  ///< steps without an inequality, so without an LCP
+  long solved_by_guess = 0;
+  long solved_by_interior_point = 0;
+  long solved_by_lemke = 0;
+  long events = 0;          ///< located within steps (event stepping)
+  long fallbacks = 0;       ///< of event stepping
+  ContactFallbacks solver;  ///< what solves leaned on beyond the guess
+  long newton_stages = 0;   ///< event stepping: implicit stages whose iteration does not contract
+  long halved_motions = 0;  ///< event stepping: that could not be integrated as a whole
+  long damped_projections = 0;  ///< steps of the joint projection that Newton's method could not do
+  long mode_switches = 0;
+  long factorisations = 0;
+  double residual_max = 0.0;
+  double penetration_max = 0.0;         ///< m
+  double impact_energy_gain_max = 0.0;  ///< J
+
+  /// Adds a step's report.
+  void Add(const StepReport& step);
+};
+
+/// Called with the state at each recorded time: after k steps, at time t. The stepper holds the
+/// record of the step that led there; nullptr at k = 0.
+using StateObserver =
+    std::function<void(long k, double t, const State<double>& state, Stepper* stepper)>;
+
+/// Runs the scene's duration. `final` (may be the initial state itself) gets the last good state;
+/// the observer may be empty.
+RolloutReport Rollout(const Model<double>& model, const State<double>& initial,
+                      const StateObserver& observer, State<double>* final);
+
+/// The same with a stepper of the caller's, which keeps its memory from run to run; its guess is
+/// cleared first.
+RolloutReport Rollout(const Model<double>& model, const State<double>& initial,
+                      const StateObserver& observer, Stepper* stepper, State<double>* final);
+
+template <typename T>
+using JetObserver = std::function<void(long k, double t, const State<T>& state)>;
+
+/// A rollout in Jets beside one in double, which makes the discrete choices. `fallbacks` counts
+/// unrolled steps in which the interior point failed and the implicit derivative was taken; values
+/// that differ from the double step's by more than 1e-8 (a different branch) fail the rollout with
+/// a message.
+template <typename T>
+RolloutReport RolloutJets(const Model<T>& model, const State<T>& initial, JetRoute route,
+                          const JetObserver<T>& observer, State<T>* final, long* fallbacks);
+
+}  // namespace tangible

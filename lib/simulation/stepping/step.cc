@@ -1,0 +1,476 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/simulation/stepping/step.h"
+
+#include <algorithm>
+#include <cmath>
+#include <sstream>
+
+#include "tangible/lcp/system/contact_residual.h"
+
+namespace tangible {
+namespace {
+
+// A body that turns out faster than its bound makes the search repeat; bounds grow by half each
+// time.
+constexpr int kMaxSearches = 12;
+// Fewer contacts, or islands, are solved together faster than apart.
+constexpr size_t kLeastContactsApart = 8;
+constexpr int kLeastIslands = 2;
+
+bool SameContacts(const std::vector<ActiveContact>& x, const std::vector<ActiveContact>& y) {
+  return std::equal(x.begin(), x.end(), y.begin(), y.end(),
+                    [](const ActiveContact& a, const ActiveContact& b) { return a.SameAs(b); });
+}
+
+void FullTwist(const ModelStructure& structure, const State<double>& state,
+               const std::vector<double>& solved, std::vector<double>* twist) {
+  twist->assign(state.twist.begin(), state.twist.end());
+  for (int k = 0; k < structure.num_blocks(); ++k) {
+    std::copy_n(&solved[3 * k], 3, &(*twist)[3 * structure.moving[k]]);
+  }
+}
+
+// Work of the contacts' impulses, impulse · mean of the speeds before and after.
+double ImpulseWork(const StepRecord& r) {
+  double work = 0.0;
+  for (size_t i = 0; i < r.contacts.size(); ++i) {
+    if (r.solution.modes[i] == ContactMode::kOpen) {
+      continue;
+    }
+    const ContactBlock<double>& c = r.problem.contacts[i];
+    const auto speed = [&](const std::vector<double>& twist, const RowPart<double>& a,
+                           const RowPart<double>& b) {
+      double sum = 0.0;
+      for (int k = 0; k < 3; ++k) {
+        sum += a[k] * twist[3 * r.contacts[i].a + k] + b[k] * twist[3 * r.contacts[i].b + k];
+      }
+      return sum;
+    };
+    const double normal =
+        speed(r.before.twist, c.normal_a, c.normal_b) + speed(r.new_twist, c.normal_a, c.normal_b);
+    const double tangent = speed(r.before.twist, c.tangent_a, c.tangent_b) +
+                           speed(r.new_twist, c.tangent_a, c.tangent_b);
+    work += 0.5 * (r.solution.normal_impulse[i] * normal + r.solution.tangent_impulse[i] * tangent);
+  }
+  return work;
+}
+
+bool AllFinite(const std::vector<double>& values) {
+  return std::all_of(values.begin(), values.end(), [](double x) { return std::isfinite(x); });
+}
+
+}  // namespace
+
+long NumSteps(const SimulationSettings& settings) {
+  if (!settings.step_times.empty()) {
+    return static_cast<long>(settings.step_times.size()) - 1;
+  }
+  return std::max(0L, std::lround(std::ceil(settings.duration / settings.dt - 1e-9)));
+}
+
+double StepTime(const SimulationSettings& settings, long k) {
+  return settings.step_times.empty() ? std::min(k * settings.dt, settings.duration)
+                                     : settings.step_times[k];
+}
+
+double StepLength(const SimulationSettings& settings, long k) {
+  if (!settings.step_times.empty()) {
+    return settings.step_times[k + 1] - settings.step_times[k];
+  }
+  if (k + 1 < NumSteps(settings)) {
+    return settings.dt;
+  }
+  const double last = settings.duration - k * settings.dt;
+  return std::abs(last - settings.dt) <= 1e-9 * settings.dt ? settings.dt : last;
+}
+
+void AddStepTimes(const std::vector<double>& times, SimulationSettings* settings) {
+  std::vector<double> all;
+  for (long k = 0; k <= NumSteps(*settings); ++k) {
+    all.push_back(StepTime(*settings, k));
+  }
+  const double near = 1e-9 * settings->dt;
+  std::vector<double> merged = all;
+  for (const double time : times) {
+    const auto next = std::lower_bound(all.begin(), all.end(), time);
+    const bool known = (next != all.end() && *next - time <= near) ||
+                       (next != all.begin() && time - *(next - 1) <= near);
+    if (!known && time > 0.0 && time < all.back()) {
+      merged.push_back(time);
+    }
+  }
+  std::sort(merged.begin(), merged.end());
+  merged.erase(
+      std::unique(merged.begin(), merged.end(), [&](double x, double y) { return y - x <= near; }),
+      merged.end());
+  settings->step_times = std::move(merged);
+}
+
+SolvedStep StepRecord::View(const std::vector<int>& contact_block) const {
+  SolvedStep view;
+  view.time = time;
+  view.h = h;
+  view.before = &before;
+  view.new_twist = &new_twist;
+  view.contacts = &contacts;
+  view.friction = &friction;
+  view.restitution = &restitution;
+  view.problem = &problem;
+  view.solution = &solution;
+  view.contact_block = &contact_block;
+  return view;
+}
+
+size_t StepRecord::bytes() const {
+  return sizeof(double) *
+             (before.pose.capacity() + before.twist.capacity() + new_twist.capacity()) +
+         sizeof(ActiveContact) * contacts.capacity() +
+         sizeof(CoefficientSource) * (friction.capacity() + restitution.capacity()) +
+         problem.bytes() + solution.bytes();
+}
+
+Stepper::Stepper(const Model<double>& model, int threads)
+    : search_(model), islands_(std::make_unique<IslandSolver>(threads)) {
+  const ModelStructure& s = *model.structure;
+  if (s.settings.stepping == Stepping::kEvent) {
+    events_ = std::make_unique<EventStepper>(model);
+    return;
+  }
+  int shaped = 0;
+  for (const BodyIndex& body : s.bodies) {
+    shaped += body.shape != ShapeType::kNone ? 1 : 0;
+  }
+  // Planar packings have at most about three neighbours a body, two points each.
+  const int contacts = 6 * shaped + 2 * static_cast<int>(s.joints.size());
+  solver_.Reserve(s.num_blocks(), static_cast<int>(s.joints.size()), contacts);
+  projection_.Reserve(s.num_blocks() + static_cast<int>(s.joints.size()),
+                      3 * static_cast<int>(s.joints.size()));
+  record_.contacts.reserve(contacts);
+  last_contacts_.reserve(contacts);
+  wider_contacts_.reserve(contacts);
+  wider_friction_.reserve(contacts);
+  wider_restitution_.reserve(contacts);
+  record_.friction.reserve(contacts);
+  record_.restitution.reserve(contacts);
+  record_.problem.contacts.reserve(contacts);
+  turning_.reserve(s.num_blocks());
+  record_.problem.dampers.reserve(s.joints.size() + s.springs.size());
+  record_.problem.joints.reserve(s.joints.size());
+  for (ContactSolution<double>* solution :
+       {&record_.solution, &last_solution_, &narrow_solution_}) {
+    solution->v.reserve(3 * s.num_blocks());
+    solution->joint_impulse.reserve(3 * s.joints.size());
+    solution->normal_impulse.reserve(contacts);
+    solution->tangent_impulse.reserve(contacts);
+    solution->modes.reserve(contacts);
+  }
+}
+
+void Stepper::ClearGuess() {
+  if (events_) {
+    events_->ClearGuess();
+  }
+  last_contacts_.clear();
+  last_solution_ = ContactSolution<double>();
+}
+
+void Stepper::SetGuess(const StepRecord& record) {
+  last_contacts_ = record.contacts;
+  last_solution_ = record.solution;
+}
+
+void Stepper::SaveGuess(StepperGuess* guess) const {
+  if (events_) {
+    events_->SaveGuess(&guess->events);
+    return;
+  }
+  guess->contacts = last_contacts_;
+  guess->solution.joint_impulse = last_solution_.joint_impulse;
+  guess->solution.normal_impulse = last_solution_.normal_impulse;
+  guess->solution.tangent_impulse = last_solution_.tangent_impulse;
+  guess->solution.modes = last_solution_.modes;
+}
+
+void Stepper::SetGuess(const StepperGuess& guess) {
+  if (events_) {
+    events_->SetGuess(guess.events);
+    return;
+  }
+  last_contacts_ = guess.contacts;
+  last_solution_ = guess.solution;
+}
+
+size_t StepperGuess::bytes() const {
+  return sizeof(ActiveContact) * (contacts.capacity() + events.contacts.capacity()) +
+         sizeof(ContactMode) * events.modes.capacity() + solution.bytes();
+}
+
+ContactMode Stepper::InitialMode(const ContactBlock<double>& contact) const {
+  // Alone, would it touch in the free motion, and would it stick?
+  const ContactProblem<double>& p = record_.problem;
+  double normal = contact.c_n;
+  double tangent = contact.c_t;
+  const auto add = [&](int block, const RowPart<double>& n, const RowPart<double>& t) {
+    for (int i = 0; i < 3 && block >= 0; ++i) {
+      const double v = p.momentum[3 * block + i] / p.mass[3 * block + i];
+      normal += n[i] * v;
+      tangent += t[i] * v;
+    }
+  };
+  add(contact.a, contact.normal_a, contact.tangent_a);
+  add(contact.b, contact.normal_b, contact.tangent_b);
+  if (normal >= 0.0) {
+    return ContactMode::kOpen;
+  }
+  if (!contact.has_friction) {
+    return ContactMode::kClosed;
+  }
+  const double available =
+      -contact.friction * normal /
+      RowMobility(p.mass, contact.a, contact.normal_a, contact.b, contact.normal_b);
+  const double needed = std::abs(tangent) / RowMobility(p.mass, contact.a, contact.tangent_a,
+                                                        contact.b, contact.tangent_b);
+  if (needed <= available) {
+    return ContactMode::kSticking;
+  }
+  return tangent > 0.0 ? ContactMode::kSlidingPositive : ContactMode::kSlidingNegative;
+}
+
+void Stepper::CarryGuess(const Model<double>& model, const std::vector<ActiveContact>& contacts,
+                         const ContactSolution<double>& solution, Guess from_where) {
+  ContactSolution<double>& guess = record_.solution;
+  const size_t n = record_.contacts.size();
+  guess.modes.resize(n);
+  guess.normal_impulse.assign(n, 0.0);
+  guess.tangent_impulse.assign(n, 0.0);
+  guess.joint_impulse.assign(3 * model.structure->joints.size(), 0.0);
+  if (solution.joint_impulse.size() == guess.joint_impulse.size()) {
+    guess.joint_impulse.assign(solution.joint_impulse.begin(), solution.joint_impulse.end());
+  }
+  // Both lists are in the same order, so one pass finds the common ones; a list whose order differs
+  // (a limit) is searched from where the last one was found.
+  size_t from = 0;
+  for (size_t i = 0; i < n; ++i) {
+    const ContactBlock<double>& block = record_.problem.contacts[i];
+    size_t found = contacts.size();
+    for (size_t step = 0; step < contacts.size(); ++step) {
+      const size_t k = (from + step) % contacts.size();
+      if (contacts[k].SameAs(record_.contacts[i])) {
+        found = k;
+        break;
+      }
+      if (contacts[k].a > record_.contacts[i].a && step > 0 && k > from) {
+        break;
+      }
+    }
+    if (found == contacts.size()) {
+      guess.modes[i] = from_where == Guess::kSameStep ? ContactMode::kOpen : InitialMode(block);
+      continue;
+    }
+    from = found;
+    const ContactMode last = solution.modes[found];
+    // Friction may have become 0 or more than 0 with other numbers.
+    const bool fits =
+        last == ContactMode::kOpen || (last == ContactMode::kClosed) == !block.has_friction;
+    const bool keeps = from_where == Guess::kSameStep || (last != ContactMode::kOpen && fits);
+    guess.modes[i] = keeps ? last : InitialMode(block);
+    guess.normal_impulse[i] = solution.normal_impulse[found];
+    guess.tangent_impulse[i] = solution.tangent_impulse[found];
+  }
+}
+
+void Stepper::Describe(const Model<double>& model, int contact, StepReport* report) const {
+  const ModelStructure& s = *model.structure;
+  report->message = NameOfContact(s, record_.contacts, contact);
+  if (contact < 0) {
+    const int joint =
+        MostViolatedJoint(record_.problem, record_.solution.v, record_.solution.v, 0.0);
+    report->message = joint < 0 ? "momentum"
+                                : "the joints' equations, most of all of joint " +
+                                      s.joints[joint].name + " (are they contradictory?)";
+  }
+}
+
+void Stepper::FillReport(const Model<double>& model, const ContactSolverReport& solved,
+                         StepReport* report) {
+  report->solved_by = solved.solved_by;
+  report->factorisations = solved.factorisations;
+  report->iterations = solved.iterations;
+  report->residual = solved.residual;
+  report->contacts = static_cast<int>(record_.contacts.size());
+  report->pairs_compared = search_.num_compared();
+  report->pairs_near = search_.num_pairs();
+  report->beyond_reach = search_.num_beyond_reach();
+  FindTurning(record_.problem, &turning_);
+  report->angles_left_out = CountAnglesLeftOut(turning_);
+  if (!solved.solved) {
+    report->status = StepStatus::kUnsolved;
+    Describe(model, solved.worst_contact, report);
+    std::ostringstream residual;
+    if (std::isfinite(solved.residual)) {
+      residual << " (scaled residual " << solved.residual << ")";
+    } else {
+      residual << " (speeds or impulses beyond what numbers hold)";
+    }
+    report->message += residual.str();
+    return;
+  }
+  bool impact = false;
+  size_t from = 0;
+  report->gap_min = HUGE_VAL;
+  for (size_t i = 0; i < record_.contacts.size(); ++i) {
+    const ContactBlock<double>& block = record_.problem.contacts[i];
+    report->lcp_rows += block.has_friction ? 3 : 1;
+    report->single_rows += block.has_friction ? 0 : 1;
+    report->gap_min = std::min(report->gap_min, record_.contacts[i].gap);
+    report->closed += record_.solution.modes[i] != ContactMode::kOpen ? 1 : 0;
+    impact = impact || record_.contacts[i].law == ContactLaw::kRestitution;
+    ContactMode last = ContactMode::kOpen;
+    for (size_t k = from; k < last_contacts_.size(); ++k) {
+      if (last_contacts_[k].SameAs(record_.contacts[i])) {
+        last = last_solution_.modes[k];
+        from = k;
+        break;
+      }
+      if (k > from && last_contacts_[k].a > record_.contacts[i].a) {
+        break;
+      }
+    }
+    report->mode_switches += last != record_.solution.modes[i] ? 1 : 0;
+  }
+  if (impact) {
+    report->impact_energy_gain = ImpulseWork(record_);
+  }
+}
+
+ContactSolverReport Stepper::SolveContacts(const ContactSolverOptions& options, int* islands) {
+  ContactSolverReport report;
+  const bool apart = record_.problem.contacts.size() >= kLeastContactsApart &&
+                     options.smoothing == 0.0 &&
+                     islands_->Partition(record_.problem) >= kLeastIslands;
+  *islands = 0;
+  factored_ = true;
+  if (apart && islands_->Solve(record_.problem, options, &record_.solution, &report)) {
+    *islands = islands_->count();
+    factored_ = false;
+    return report;
+  }
+  // What the islands leaned on counts too.
+  ContactFallbacks fallbacks = report.fallbacks;
+  fallbacks.islands_together += apart ? 1 : 0;
+  report = solver_.Solve(record_.problem, options, &record_.solution);
+  report.fallbacks.Add(fallbacks);
+  return report;
+}
+
+ContactSystem& Stepper::system() {
+  if (!factored_) {
+    solver_.system().Factor(record_.problem, record_.solution.modes);
+    factored_ = true;
+  }
+  return solver_.system();
+}
+
+StepReport Stepper::Step(const Model<double>& model, double t, double h, State<double>* state) {
+  if (events_) {
+    return StepByEvents(model, t, h, state);
+  }
+  StepReport report;
+  const ModelStructure& structure = *model.structure;
+  const SimulationSettings& settings = structure.settings;
+  StepRecord& r = record_;
+  r.time = t;
+  r.h = h;
+  r.before.pose.assign(state->pose.begin(), state->pose.end());
+  r.before.twist.assign(state->twist.begin(), state->twist.end());
+  AssembleFree(model, *state, t, h, &r.problem, &scratch_);
+  if (!AllFinite(r.problem.momentum) || !AllFinite(r.problem.mass)) {
+    report.status = StepStatus::kDiverged;
+    report.message = "a force or momentum is not finite";
+    return report;
+  }
+  search_.SetBounds(model, *state, r.problem, scratch_);
+  ContactSolverReport solved;
+  search_.Find(model, *state, h, scratch_, &r.contacts, &r.friction, &r.restitution);
+  for (int search = 0; search < kMaxSearches; ++search) {
+    AssembleContacts(model, *state, h, r.contacts, r.friction, r.restitution, scratch_, &r.problem);
+    if (search == 0) {
+      CarryGuess(model, last_contacts_, last_solution_, Guess::kLastStep);
+    } else {
+      // What was found with fewer contacts, and the further ones open: often that is the solution.
+      CarryGuess(model, wider_contacts_, narrow_solution_, Guess::kSameStep);
+    }
+    const ContactSolverReport before = solved;
+    solved = SolveContacts(SolverOptionsOf(settings), &report.islands);
+    solved.factorisations += before.factorisations;
+    solved.iterations += before.iterations;
+    report.solver.Add(solved.fallbacks);
+    if (!solved.solved) {
+      break;
+    }
+    FullTwist(structure, *state, r.solution.v, &r.new_twist);
+    if (!search_.CheckBounds(model, r.new_twist, scratch_)) {
+      break;
+    }
+    // A wider search that finds the same contacts changes nothing.
+    search_.Find(model, *state, h, scratch_, &wider_contacts_, &wider_friction_,
+                 &wider_restitution_);
+    if (SameContacts(r.contacts, wider_contacts_)) {
+      break;
+    }
+    narrow_solution_ = r.solution;
+    r.contacts.swap(wider_contacts_);
+    r.friction.swap(wider_friction_);
+    r.restitution.swap(wider_restitution_);
+  }
+  FillReport(model, solved, &report);
+  if (report.status != StepStatus::kDone) {
+    return report;
+  }
+  for (int body = 0; body < structure.num_bodies(); ++body) {
+    for (int i = 0; i < 3 && structure.bodies[body].motion != Motion::kStatic; ++i) {
+      state->twist[3 * body + i] = r.new_twist[3 * body + i];
+      state->pose[3 * body + i] += h * r.new_twist[3 * body + i];
+    }
+  }
+  last_contacts_.assign(r.contacts.begin(), r.contacts.end());
+  last_solution_ = r.solution;
+  const bool projects =
+      JointCorrectionOf(settings) == JointCorrection::kProjection && !structure.joints.empty();
+  const bool met = !projects || projection_.Project(model, r.before.pose, state);
+  report.damped_projections = projects ? projection_.damped_steps() : 0;
+  if (!met) {
+    report.status = StepStatus::kUnsolved;
+    std::ostringstream message;
+    message << "projection of joint " << structure.joints[projection_.worst_joint()].name
+            << ": error " << projection_.error();
+    report.message = message.str();
+  }
+  if (!AllFinite(state->pose) || !AllFinite(state->twist)) {
+    report.status = StepStatus::kDiverged;
+    report.message = "a pose or twist is not finite";
+  }
+  return report;
+}
+
+void Stepper::TakeRecord(StepRecord* record, ContactSystem* system) {
+  if (system != nullptr) {
+    this->system().MoveFactorsTo(system);
+  }
+  factored_ = true;
+  std::swap(*record, record_);
+  if (system == nullptr || !system->needs_problem()) {
+    std::swap(record->problem, record_.problem);
+    record->problem.Clear();  // what is left there is of another step
+  }
+}
+
+bool Stepper::Refactor(const Model<double>& model, StepRecord* record) {
+  AssembleFree(model, record->before, record->time, record->h, &record->problem, &scratch_);
+  AssembleContacts(model, record->before, record->h, record->contacts, record->friction,
+                   record->restitution, scratch_, &record->problem);
+  factored_ = true;
+  return solver_.system().Factor(record->problem, record->solution.modes);
+}
+
+}  // namespace tangible

@@ -1,0 +1,175 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// One fixed step: the contact problem of [t, t + h] is solved for the new twist, then poses move
+// with it.
+//
+//   v⁺ from the contact problem at q (assembly.h),   q⁺ = q + h v⁺      semi-implicit Euler
+//   with joint_correction "projection": q⁺ is then projected onto the joints
+//
+// The step in double keeps a record from which the derivative is taken: tangent and adjoint use the
+// factorisation that the solve ended with. Two ways for Jets:
+//   implicit   the double step's modes and solution, and K⁻¹ applied to the Jets' residual
+//   unrolled   every operation of the interior point in Jets, from the same contacts
+// After its first call a step in double allocates nothing but for more contacts than it has had
+// before.
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "tangible/dynamics/assembly/contact_search.h"
+#include "tangible/lcp/contact/contact_islands.h"
+#include "tangible/lcp/contact/contact_solver.h"
+#include "tangible/simulation/events/event_derivative.h"
+#include "tangible/simulation/events/event_step.h"
+#include "tangible/simulation/stepping/joint_projection.h"
+
+namespace tangible {
+
+enum class StepStatus { kDone, kUnsolved, kDiverged };
+
+/// What happened in a step; sums over the run are made by the caller.
+struct StepReport {
+  StepStatus status = StepStatus::kDone;
+  SolvedBy solved_by = SolvedBy::kNothing;
+  int contacts = 0;  ///< contacts and limits listed
+  int closed = 0;    ///< of these, with an impulse
+  int lcp_rows = 0;  ///< complementarity rows: 1 a frictionless contact or limit, 3 with friction
+  // What the model leaves out, in the last search for contacts.
+  int pairs_compared = 0;   ///< pairs of boxes that the broad phase compared
+  int pairs_near = 0;       ///< pairs whose boxes overlap
+  int beyond_reach = 0;     ///< of these, without rows: out of reach in this step (fixed stepping)
+  int single_rows = 0;      ///< contacts and limits that have one row in place of three
+  int angles_left_out = 0;  ///< bodies that have rows, but none that turns them
+  int islands = 0;          ///< with contacts, solved apart; 0: all that moves was solved together
+  int factorisations = 0;   ///< of the island that took the most
+  int iterations = 0;       ///< of the island that took the most
+  int events = 0;           ///< located within the step (event stepping)
+  int fallbacks = 0;        ///< of event stepping: impulses for accelerations, rebounds given up
+  ContactFallbacks solver;  ///< what its solves leaned on beyond the guess
+  int newton_stages = 0;    ///< event stepping: implicit stages whose iteration does not contract
+  int halved_motions = 0;   ///< event stepping: that could not be integrated as a whole
+  int damped_projections = 0;  ///< steps of the joint projection that Newton's method could not do
+  int mode_switches = 0;       ///< contacts whose mode differs from the last step's
+  double residual = 0.0;       ///< scaled natural residual
+  double gap_min = 0.0;        ///< m, the smallest at the start; infinite where no contact is near
+  double impact_energy_gain =
+      0.0;              ///< J, what the impulses of a step with impacts did; > 0: energy was gained
+  std::string message;  ///< empty unless it failed: names the contact or joint
+};
+
+/// A solved step: all that its derivative needs.
+struct StepRecord {
+  double time = 0.0;
+  double h = 0.0;
+  State<double> before;
+  std::vector<double> new_twist;  ///< of all bodies
+  std::vector<ActiveContact> contacts;
+  std::vector<CoefficientSource> friction, restitution;
+  ContactProblem<double> problem;
+  ContactSolution<double> solution;
+
+  SolvedStep View(const std::vector<int>& contact_block) const;
+  /// Memory of the vectors.
+  size_t bytes() const;
+};
+
+/// What a step takes from those before it beside the state: modes and impulses to start from.
+struct StepperGuess {
+  std::vector<ActiveContact> contacts;
+  ContactSolution<double> solution;  ///< without v
+  EventGuess events;                 ///< event stepping: the only one used
+
+  size_t bytes() const;
+};
+
+class Stepper {
+ public:
+  /// `threads` solve a step's islands; the bits are the same for any number.
+  explicit Stepper(const Model<double>& model, int threads = 1);
+
+  /// Advances the state from t by h. The numbers of `model` may differ from call to call, its
+  /// structure may not.
+  StepReport Step(const Model<double>& model, double t, double h, State<double>* state);
+
+  /// Of the last step. With event stepping: its contacts, with the impulses they had in all and the
+  /// modes they ended with.
+  const StepRecord& record() const { return record_; }
+  /// Whether steps are event steps; then events() made the last one, and its record is the
+  /// derivative's.
+  bool by_events() const { return events_ != nullptr; }
+  EventStepper& events() { return *events_; }
+  EventDerivative& event_derivative() { return event_derivative_; }
+  /// Factorised with the last step's modes.
+  ContactSystem& system();
+  JointProjection& projection() { return projection_; }
+  /// Hands the last step's record and, unless null, its factorisation over; for a tape, without
+  /// copies. Until the next step record() and system() are not that step's. The record's problem is
+  /// only handed over where the factorisation's solves need it.
+  void TakeRecord(StepRecord* record, ContactSystem* system);
+  /// Assembles and factorises a recorded step anew, so that system() is that step's; its problem is
+  /// filled in.
+  bool Refactor(const Model<double>& model, StepRecord* record);
+
+  /// Forgets the last step's modes and impulses: the next step starts without a guess.
+  void ClearGuess();
+  /// Sets the guess to that of a recorded step, so that a run can be resumed with the same bits.
+  void SetGuess(const StepRecord& record);
+  /// What the next step starts from, and back: from the same state it gives the same bits.
+  void SaveGuess(StepperGuess* guess) const;
+  void SetGuess(const StepperGuess& guess);
+
+ private:
+  StepReport StepByEvents(const Model<double>& model, double t, double h, State<double>* state);
+  void SumImpulses(const Model<double>& model);
+  enum class Guess { kLastStep, kSameStep };
+  // The modes and impulses from which this problem's solution is sought: those of `solution` for
+  // the contacts that it has too.
+  void CarryGuess(const Model<double>& model, const std::vector<ActiveContact>& contacts,
+                  const ContactSolution<double>& solution, Guess from_where);
+  ContactSolverReport SolveContacts(const ContactSolverOptions& options, int* islands);
+  ContactMode InitialMode(const ContactBlock<double>& contact) const;
+  void FillReport(const Model<double>& model, const ContactSolverReport& solved,
+                  StepReport* report);
+  void Describe(const Model<double>& model, int contact, StepReport* report) const;
+
+  std::unique_ptr<EventStepper> events_;  ///< event stepping only
+  EventDerivative event_derivative_;
+  ContactSearch search_;
+  ContactSolver solver_;
+  std::unique_ptr<IslandSolver> islands_;
+  bool factored_ = true;  ///< whether solver_.system() is that of record_
+  JointProjection projection_;
+  AssemblyScratch<double> scratch_;
+  StepRecord record_;
+  // The last step's contacts and impulses: the guess.
+  std::vector<ActiveContact> last_contacts_;
+  ContactSolution<double> last_solution_;
+  std::vector<ActiveContact> wider_contacts_;  // of a wider search, or (swapped) a narrower one
+  ContactSolution<double> narrow_solution_;
+  std::vector<CoefficientSource> wider_friction_, wider_restitution_;
+  std::vector<Turning> turning_;  // scratch
+};
+
+/// The implicit derivative part of a step in Jets: `stepper` has just done the same step in double;
+/// model and state are the Jets whose values that step had. Returns the state after.
+template <typename T>
+void StepImplicit(const Model<T>& model, Stepper* stepper, const State<double>& after,
+                  State<T>* state);
+
+/// The unrolled step in Jets, with the contacts of the double step; false where the interior point
+/// fails.
+template <typename T>
+bool StepUnrolled(const Model<T>& model, const StepRecord& record, State<T>* state);
+
+/// Number of steps: ceil(duration / dt − 1e-9).
+long NumSteps(const SimulationSettings& settings);
+/// Time of step k: min(k dt, duration), never accumulated.
+double StepTime(const SimulationSettings& settings, long k);
+/// Length of step k: dt, but for the last.
+double StepLength(const SimulationSettings& settings, long k);
+/// Makes steps end at further times within the run; those within 1e-9 dt of another are that one.
+void AddStepTimes(const std::vector<double>& times, SimulationSettings* settings);
+
+}  // namespace tangible

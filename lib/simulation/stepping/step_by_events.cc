@@ -1,0 +1,172 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The stepper's event step: what event_step.h does, reported as any step.
+#include <algorithm>
+#include <cmath>
+
+#include "tangible/simulation/stepping/step.h"
+
+namespace tangible {
+namespace {
+
+// The place of a contact in the record of the whole step.
+size_t PlaceOf(const ActiveContact& contact, const CoefficientSource& friction,
+               const CoefficientSource& restitution, StepRecord* record) {
+  for (size_t i = 0; i < record->contacts.size(); ++i) {
+    if (record->contacts[i].SameAs(contact)) {
+      return i;
+    }
+  }
+  record->contacts.push_back(contact);
+  record->friction.push_back(friction);
+  record->restitution.push_back(restitution);
+  record->solution.normal_impulse.push_back(0.0);
+  record->solution.tangent_impulse.push_back(0.0);
+  record->solution.modes.push_back(ContactMode::kOpen);
+  return record->contacts.size() - 1;
+}
+
+// Bodies that rows of some part push and those of none turn.
+int AnglesLeftOut(const EventRecord& record, std::vector<Turning>* scratch) {
+  scratch->clear();
+  for (int p = 0; p < record.num_parts; ++p) {
+    const EventPart& part = *record.parts[p];
+    if (part.is_impulses) {
+      AddTurning(part.impulses.problem, scratch);
+    } else if (part.segment.num_stages > 0) {
+      AddTurning(part.segment.stages[0].problem, scratch);
+    }
+  }
+  return CountAnglesLeftOut(*scratch);
+}
+
+}  // namespace
+
+void CountSolve(const ContactSolverReport& solved, EventOutcome* outcome) {
+  outcome->factorisations += solved.factorisations;
+  outcome->iterations += solved.iterations;
+  outcome->solver.Add(solved.fallbacks);
+  outcome->residual = std::max(outcome->residual, solved.solved ? solved.residual : 0.0);
+  outcome->by_guess = outcome->by_guess && solved.solved_by != SolvedBy::kInteriorPoint &&
+                      solved.solved_by != SolvedBy::kLemke;
+  outcome->by_lemke = outcome->by_lemke || solved.solved_by == SolvedBy::kLemke;
+}
+
+std::string NameOfContact(const ModelStructure& structure,
+                          const std::vector<ActiveContact>& contacts, int index) {
+  if (index < 0) {
+    return "joints";
+  }
+  const ActiveContact& contact = contacts[index];
+  return contact.joint >= 0 ? "limit of joint " + structure.joints[contact.joint].name
+                            : "contact of " + structure.bodies[contact.a].name + " and " +
+                                  structure.bodies[contact.b].name;
+}
+
+// Forces integrate to impulses with the integrator's own weights.
+void Stepper::SumImpulses(const Model<double>& model) {
+  StepRecord& r = record_;
+  r.contacts.clear();
+  r.friction.clear();
+  r.restitution.clear();
+  r.solution = ContactSolution<double>();
+  r.solution.joint_impulse.assign(3 * model.structure->joints.size(), 0.0);
+  const EventRecord& events = events_->record();
+  const NystromTableau& tableau = NystromTableau::Of(IntegratorOf(model.structure->settings));
+  const auto add_joints = [&](double weight, const std::vector<double>& impulses) {
+    for (size_t k = 0; k < impulses.size(); ++k) {
+      r.solution.joint_impulse[k] += weight * impulses[k];
+    }
+  };
+  for (int p = 0; p < events.num_parts; ++p) {
+    const EventPart& part = *events.parts[p];
+    if (part.is_impulses) {
+      const Impulses& impulses = part.impulses;
+      for (size_t i = 0; i < impulses.contacts.size(); ++i) {
+        const size_t at =
+            PlaceOf(impulses.contacts[i], impulses.friction[i], impulses.restitution[i], &r);
+        r.solution.normal_impulse[at] += impulses.solution.normal_impulse[i];
+        r.solution.tangent_impulse[at] += impulses.solution.tangent_impulse[i];
+        r.solution.modes[at] = impulses.solution.modes[i];
+      }
+      add_joints(1.0, impulses.solution.joint_impulse);
+      continue;
+    }
+    const Segment& segment = part.segment;
+    for (size_t i = 0; i < segment.contacts.size(); ++i) {
+      const size_t at = PlaceOf(segment.contacts[i], segment.friction[i], CoefficientSource(), &r);
+      for (int k = 0; k < segment.num_stages; ++k) {
+        const double weight = segment.length * tableau.b[k];
+        r.solution.normal_impulse[at] += weight * segment.stages[k].solution.normal_impulse[i];
+        r.solution.tangent_impulse[at] += weight * segment.stages[k].solution.tangent_impulse[i];
+      }
+      r.solution.modes[at] = segment.modes[i];
+    }
+    for (int k = 0; k < segment.num_stages; ++k) {
+      add_joints(segment.length * tableau.b[k], segment.stages[k].solution.joint_impulse);
+    }
+  }
+}
+
+StepReport Stepper::StepByEvents(const Model<double>& model, double t, double h,
+                                 State<double>* state) {
+  StepReport report;
+  StepRecord& r = record_;
+  r.time = t;
+  r.h = h;
+  r.before = *state;
+  last_contacts_ = r.contacts;
+  last_solution_.modes = r.solution.modes;
+  const EventOutcome outcome = events_->Step(model, t, h, state);
+  report.events = outcome.events;
+  report.fallbacks = outcome.fallbacks;
+  report.solver = outcome.solver;
+  report.newton_stages = outcome.newton_stages;
+  report.halved_motions = outcome.halved_motions;
+  report.pairs_compared = outcome.pairs_compared;
+  report.pairs_near = outcome.pairs_near;
+  report.factorisations = outcome.factorisations;
+  report.iterations = outcome.iterations;
+  report.residual = outcome.residual;
+  report.impact_energy_gain = outcome.impact_energy_gain;
+  report.gap_min = HUGE_VAL;
+  const auto finite = [](const std::vector<double>& x) {
+    return std::all_of(x.begin(), x.end(), [](double y) { return std::isfinite(y); });
+  };
+  if (!outcome.done) {
+    report.status = StepStatus::kUnsolved;
+    report.message = outcome.message;
+    if (!finite(state->pose) || !finite(state->twist)) {
+      *state = r.before;
+    }
+    return report;
+  }
+  SumImpulses(model);
+  r.new_twist = state->twist;
+  report.angles_left_out = AnglesLeftOut(events_->record(), &turning_);
+  report.solved_by = r.contacts.empty() ? SolvedBy::kDirect
+                     : outcome.by_lemke ? SolvedBy::kLemke
+                     : outcome.by_guess ? SolvedBy::kGuess
+                                        : SolvedBy::kInteriorPoint;
+  report.contacts = static_cast<int>(r.contacts.size());
+  for (size_t i = 0; i < r.contacts.size(); ++i) {
+    report.gap_min = std::min(report.gap_min, r.contacts[i].gap);
+    report.closed += r.solution.modes[i] != ContactMode::kOpen ? 1 : 0;
+    report.lcp_rows += r.friction[i].value > 0.0 ? 3 : 1;
+    report.single_rows += r.friction[i].value > 0.0 ? 0 : 1;
+    ContactMode last = ContactMode::kOpen;
+    for (size_t k = 0; k < last_contacts_.size(); ++k) {
+      if (last_contacts_[k].SameAs(r.contacts[i])) {
+        last = last_solution_.modes[k];
+      }
+    }
+    report.mode_switches += last != r.solution.modes[i] ? 1 : 0;
+  }
+  if (!finite(state->pose) || !finite(state->twist)) {
+    report.status = StepStatus::kDiverged;
+    report.message = "a pose or twist is not finite";
+  }
+  return report;
+}
+
+}  // namespace tangible

@@ -1,0 +1,199 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/estimation/fit/fit_checkpoint.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "../../support/fit_scenes.h"
+#include "tangible/estimation/fit/discretisation.h"
+#include "tangible/math/bit_hash.h"
+
+namespace tangible {
+namespace {
+
+/// Three starts, multiple shooting, Huber's loss.
+FitProblem PendulumProblem() {
+  FitProblem problem;
+  problem.scene = MakeScene(kPendulum);
+  problem.parameters = {Parameter("joints/pin/angle", 0.8), Parameter("joints/pin/damping", 0.01)};
+  problem.observations = Observe(problem.scene, 20, 0.01, 1);
+  problem.options.starts = 3;
+  problem.options.segments = 2;
+  problem.options.huber = 1.5;
+  problem.options.seed = 7;
+  return problem;
+}
+
+RolloutResiduals ResidualsOf(const FitProblem& problem) {
+  return MakeResiduals(problem.scene, problem.points, problem.parameters, problem.observations);
+}
+
+/// All of a result but its seconds.
+std::string HashOf(const FitResult& fit) {
+  BitHash hash;
+  hash.Add(static_cast<int>(fit.status));
+  hash.Add(fit.message);
+  hash.AddAll(fit.estimate);
+  hash.AddAll(fit.uncertainty.covariance);
+  hash.AddAll(std::array<double, 2>{fit.initial_cost, fit.final_cost});
+  for (const FitIteration& iteration : fit.iterations) {
+    hash.AddAll(std::array<double, 2>{iteration.cost, iteration.gradient_norm});
+    hash.AddAll(iteration.parameters);
+  }
+  for (const FitStart& start : fit.starts) {
+    hash.AddAll(start.initial);
+    hash.Add(start.cost);
+    hash.Add(start.iterations);
+    hash.Add(start.shooting_iterations);
+    hash.Add(start.status);
+  }
+  hash.AddAll(fit.residuals);
+  hash.Add(static_cast<int>(fit.rollouts));
+  hash.Add(fit.certificate.verdict);
+  return hash.Text();
+}
+
+// An interruption after every third iteration that was accepted or part that ended.
+TEST(FitCheckpointTest, EndsAtTheSameBitsWhereverItWasInterrupted) {
+  const FitProblem problem = PendulumProblem();
+  RolloutResiduals residuals = ResidualsOf(problem);
+  const FitResult whole = Fit(problem.options, &residuals, {});
+  ASSERT_EQ(whole.status, FitStatus::kConverged) << whole.message;
+
+  std::vector<FitLog> interruptions;
+  FitLog log;
+  const auto keep = [&] { interruptions.push_back(log); };
+  log.on_end = keep;
+  log.search.OnIteration(keep);
+  log.start.OnIteration(keep);
+  RolloutResiduals logged = ResidualsOf(problem);
+  EXPECT_EQ(HashOf(Fit(problem.options, &logged, {}, &log)), HashOf(whole));
+  ASSERT_GT(interruptions.size(), 40u);
+
+  for (size_t i = 0; i < interruptions.size(); i += 3) {
+    FitCheckpoint written(problem, {});
+    written.fit() = interruptions[i];
+    FitCheckpoint read(problem, [](const std::string&) { return ""; });
+    ASSERT_EQ(read.Restore(written.Text(), "c.json"), "");
+    EXPECT_EQ(read.Text(), written.Text());
+    RolloutResiduals again = ResidualsOf(problem);
+    ASSERT_EQ(HashOf(Fit(problem.options, &again, {}, &read.fit())), HashOf(whole)) << i;
+    ASSERT_EQ(read.fit().mismatch(), 0);
+  }
+}
+
+// What a finished fit has left needs no run but those of the search for its first point, which are
+// in the log too: with residuals that fail it ends the same.
+TEST(FitCheckpointTest, WhatIsDoneIsNotDoneAgain) {
+  FitProblem problem = PendulumProblem();
+  problem.options.certificate = CertificatePass::kSkip;
+  FitLog log;
+  RolloutResiduals residuals = ResidualsOf(problem);
+  const FitResult whole = Fit(problem.options, &residuals, {}, &log);
+  log.search.Restore(log.search.evaluations());
+  log.start.Restore(log.start.evaluations());
+  int progress = 0;
+  RolloutResiduals others =
+      MakeResiduals(problem.scene, {}, problem.parameters, Observe(problem.scene, 50, 0.01, 2));
+  const FitResult again = Fit(
+      problem.options, &others, [&](int, int, const FitIteration&) { ++progress; }, &log);
+  EXPECT_EQ(HashOf(again), HashOf(whole));
+  EXPECT_EQ(progress, 0);
+}
+
+TEST(FitCheckpointTest, TheCheckAtHalfTheStepGoesOnToo) {
+  FitProblem problem = PendulumProblem();
+  problem.options.starts = 1;
+  RolloutResiduals residuals = ResidualsOf(problem);
+  const FitResult fit = Fit(problem.options, &residuals, {});
+  const DiscretisationCheck whole = CheckDiscretisation(problem, fit);
+  ASSERT_EQ(whole.status, FitStatus::kConverged) << whole.message;
+  std::vector<std::string> texts;
+  FitCheckpoint checkpoint(problem, [&](const std::string& text) {
+    texts.push_back(text);
+    return "";
+  });
+  CheckDiscretisation(problem, fit, &checkpoint.half_step());
+  ASSERT_GT(texts.size(), 1u);
+  for (const std::string& text : texts) {
+    FitCheckpoint read(problem, [](const std::string&) { return ""; });
+    ASSERT_EQ(read.Restore(text, "c.json"), "");
+    const DiscretisationCheck again = CheckDiscretisation(problem, fit, &read.half_step());
+    EXPECT_EQ(again.estimate_half_step, whole.estimate_half_step);
+    EXPECT_EQ(again.rollouts, whole.rollouts);
+  }
+}
+
+TEST(FitCheckpointTest, AnotherFitsEvaluationsAreNoticed) {
+  const FitProblem problem = PendulumProblem();
+  FitLog log;
+  FitLog kept;
+  log.start.OnIteration([&] { kept = log; });
+  RolloutResiduals residuals = ResidualsOf(problem);
+  Fit(problem.options, &residuals, {}, &log);
+  std::vector<Evaluation> evaluations = kept.start.evaluations();
+  ASSERT_GT(evaluations.size(), 2u);
+  evaluations[0].residuals *= 1.5;
+  kept.start.Restore(evaluations);
+  kept.search.Restore(kept.search.evaluations());
+  int ends = 0;
+  kept.on_end = [&] { ++ends; };
+  RolloutResiduals again = ResidualsOf(problem);
+  EXPECT_EQ(Fit(problem.options, &again, {}, &kept).status, FitStatus::kFailed);
+  EXPECT_GT(kept.mismatch(), 1);
+  EXPECT_EQ(ends, 0) << "nothing of it is written";
+}
+
+TEST(FitCheckpointTest, RefusesWhatIsDamagedOrOfAnotherFit) {
+  const FitProblem problem = PendulumProblem();
+  FitCheckpoint checkpoint(problem, [](const std::string&) { return ""; });
+  RolloutResiduals residuals = ResidualsOf(problem);
+  Fit(problem.options, &residuals, {}, &checkpoint.fit());
+  const std::string text = checkpoint.Text();
+  const auto refused = [&](const std::string& damaged, const FitProblem& of) {
+    FitCheckpoint other(of, {});
+    return other.Restore(damaged, "c.json");
+  };
+  EXPECT_EQ(refused(text, problem), "");
+  for (size_t length : {size_t{0}, text.size() / 3, text.size() / 2, text.size() - 3}) {
+    EXPECT_NE(refused(text.substr(0, length), problem).find("c.json: "), std::string::npos);
+  }
+  std::string flipped = text;
+  const size_t digit = text.find("\"residuals\"") + 20;
+  flipped[digit] = text[digit] == '7' ? '6' : '7';
+  EXPECT_NE(refused(flipped, problem).find("c.json: /fits: damaged"), std::string::npos);
+  EXPECT_NE(refused("{}", problem).find("/format: missing"), std::string::npos);
+  EXPECT_NE(refused("[]", problem).find("expected"), std::string::npos);
+
+  std::vector<FitProblem> others(7, problem);
+  others[0].scene.bodies[0].mass = 0.51;
+  others[1].parameters[0].initial = 0.81;
+  others[2].parameters[1].lower = 0.001;
+  others[3].observations[3].value += 1e-15;
+  others[4].observations.pop_back();
+  others[5].options.starts = 4;
+  others[6].options.derivatives = DerivativeMethod::kAdjoint;
+  for (const FitProblem& other : others) {
+    const std::string error = refused(text, other);
+    EXPECT_NE(error.find("c.json: /problem: a checkpoint of another fit"), std::string::npos)
+        << error;
+    EXPECT_EQ(std::count(error.begin(), error.end(), '\n'), 0);
+  }
+}
+
+// A disk that is full after a while: the fit goes on, and says so in the end.
+TEST(FitCheckpointTest, AFileThatCannotBeWrittenStopsNothing) {
+  const FitProblem problem = PendulumProblem();
+  int writes = 0;
+  FitCheckpoint checkpoint(problem, [&](const std::string&) {
+    return ++writes < 3 ? std::string() : std::string("c.json: no space");
+  });
+  RolloutResiduals residuals = ResidualsOf(problem);
+  EXPECT_EQ(Fit(problem.options, &residuals, {}, &checkpoint.fit()).status, FitStatus::kConverged);
+  EXPECT_EQ(checkpoint.error(), "c.json: no space");
+  EXPECT_EQ(writes, 3);
+}
+
+}  // namespace
+}  // namespace tangible

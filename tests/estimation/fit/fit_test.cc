@@ -1,0 +1,225 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/estimation/fit/fit.h"
+
+#include <gtest/gtest.h>
+
+#include "../../support/fit_scenes.h"
+
+namespace tangible {
+namespace {
+
+FitResult FitTo(const Scene& scene, const std::vector<FitParameter>& parameters,
+                const std::vector<Observation>& observations, const FitOptions& options = {}) {
+  RolloutResiduals residuals = MakeResiduals(scene, {}, parameters, observations);
+  return Fit(options, &residuals, {});
+}
+
+TEST(FitTest, RecoversGravityAndDampingOfAFallingBall) {
+  const Scene scene = MakeScene(kFallingBall);
+  const FitResult fit =
+      FitTo(scene, {Parameter("gravity/y", -5.0), Parameter("bodies/ball/linear_damping", 0.0)},
+            Observe(scene, 5, 0.0, 1));
+  ASSERT_EQ(fit.status, FitStatus::kConverged) << fit.message;
+  EXPECT_NEAR(fit.estimate[0], -9.81, 1e-8 * 9.81);
+  EXPECT_NEAR(fit.estimate[1], 0.3, 1e-8 * 0.3);
+  EXPECT_LE(fit.iterations.size(), 16u);
+  EXPECT_EQ(fit.iterations.front().parameters, (std::vector<double>{-5.0, 0.0}));
+  EXPECT_EQ(fit.iterations.front().cost, fit.initial_cost);
+  EXPECT_GT(fit.rollouts, 0);
+}
+
+TEST(FitTest, RecoversFrictionByEveryMethod) {
+  const Scene scene = MakeScene(kSlidingBox);
+  const std::vector<Observation> observations = Observe(scene, 5, 0.0, 1);
+  for (const DerivativeMethod method :
+       {DerivativeMethod::kTangent, DerivativeMethod::kAdjoint, DerivativeMethod::kJet,
+        DerivativeMethod::kJetImplicit, DerivativeMethod::kFiniteDifference}) {
+    if (!IsAvailable(method)) {
+      continue;
+    }
+    FitOptions options;
+    options.derivatives = method;
+    const FitResult fit =
+        FitTo(scene, {Parameter("bodies/box/friction", 0.1)}, observations, options);
+    ASSERT_EQ(fit.status, FitStatus::kConverged) << NameOf(method) << ": " << fit.message;
+    EXPECT_NEAR(fit.estimate[0], 0.4, 1e-8 * 0.4) << NameOf(method);
+  }
+}
+
+TEST(FitTest, RecoversAPendulumsStartAndDamping) {
+  const Scene scene = MakeScene(kPendulum);
+  const FitResult fit =
+      FitTo(scene,
+            {Parameter("joints/pin/angle", 0.8), Parameter("joints/pin/rate", 0.0),
+             Parameter("joints/pin/damping", 0.01), Parameter("gravity/y", -9.0)},
+            Observe(scene, 5, 0.0, 1));
+  ASSERT_EQ(fit.status, FitStatus::kConverged) << fit.message;
+  const Eigen::Vector4d truth(1.0, 0.3, 0.05, -9.81);
+  EXPECT_LT((fit.estimate - truth).cwiseQuotient(truth).cwiseAbs().maxCoeff(), 1e-8);
+}
+
+TEST(FitTest, AMassThroughContactFromAnyStart) {
+  const Scene scene = MakeScene(kSmallChain);
+  const std::vector<Observation> noisy = Observe(scene, 5, 0.001, 7);
+  std::optional<double> first;
+  for (const double start : {0.05, 0.3, 1.0, 7.0, 20.0}) {
+    FitParameter mass = Parameter("bodies/link*/mass", start);
+    mass.sets[0].scale = 1.0 / 3.0;
+    mass.lower = 0.01;
+    mass.upper = 100.0;
+    const FitResult exact = FitTo(scene, {mass}, Observe(scene, 5, 0.0, 1));
+    ASSERT_EQ(exact.status, FitStatus::kConverged) << exact.message;
+    EXPECT_NEAR(exact.estimate[0], 2.1, 1e-8 * 2.1) << start;
+    const FitResult fit = FitTo(scene, {mass}, noisy);
+    ASSERT_EQ(fit.status, FitStatus::kConverged) << fit.message;
+    EXPECT_LE(fit.iterations.size(), 16u) << start;
+    first = first.value_or(fit.estimate[0]);
+    EXPECT_NEAR(fit.estimate[0], *first, 1e-9 * *first) << start;
+  }
+}
+
+TEST(FitTest, IntervalsCoverTheTruthAsOftenAsTheySay) {
+  const Scene scene = MakeScene(kFallingBall);
+  constexpr int kSeeds = 400;
+  int covered = 0;
+  double squares = 0.0;
+  double chi_squares = 0.0;
+  for (unsigned seed = 0; seed < kSeeds; ++seed) {
+    const FitResult fit =
+        FitTo(scene, {Parameter("gravity/y", -9.0), Parameter("bodies/ball/velocity/y", 2.5)},
+              Observe(scene, 10, 0.02, 100 + seed));
+    ASSERT_EQ(fit.status, FitStatus::kConverged);
+    const auto interval = fit.uncertainty.confidence_95[0];
+    ASSERT_TRUE(interval);
+    covered += interval->first <= -9.81 && -9.81 <= interval->second ? 1 : 0;
+    const double score = (fit.estimate[1] - 3.0) / fit.uncertainty.standard_deviation[1];
+    squares += score * score;
+    chi_squares += fit.uncertainty.reduced_chi_square;
+  }
+  // Binomial: 0.95 ± 4 sqrt(0.95 0.05 / 400); squares of standard normals: 1 ± 4 sqrt(2 / 400); 33
+  // measured coordinates and 2 parameters: 1 ± 4 sqrt(2 / (31 400)).
+  EXPECT_NEAR(covered / double{kSeeds}, 0.95, 0.044);
+  EXPECT_NEAR(squares / kSeeds, 1.0, 0.283);
+  EXPECT_NEAR(chi_squares / kSeeds, 1.0, 0.051);
+}
+
+TEST(FitTest, ABoundHoldsAndHasNoInterval) {
+  const Scene scene = MakeScene(kSlidingBox);
+  FitParameter friction = Parameter("bodies/box/friction", 0.6);
+  friction.lower = 0.5;
+  friction.upper = 0.9;
+  const FitResult fit =
+      FitTo(scene, {friction, Parameter("forces/push/force/x", 1.0)}, Observe(scene, 5, 0.0, 1));
+  ASSERT_EQ(fit.status, FitStatus::kConverged) << fit.message;
+  EXPECT_NEAR(fit.estimate[0], 0.5, 1e-12);
+  EXPECT_FALSE(fit.uncertainty.confidence_95[0]);
+  EXPECT_TRUE(fit.uncertainty.confidence_95[1]);
+  EXPECT_NE(fit.uncertainty.messages[0].find("lower bound"), std::string::npos);
+}
+
+TEST(FitTest, HuberIsNotMovedByOutliers) {
+  const Scene scene = MakeScene(kFallingBall);
+  std::vector<Observation> observations = Observe(scene, 2, 0.01, 5);
+  for (size_t i = 1; i < observations.size(); i += 15) {
+    observations[i].value += 2.0;
+  }
+  const FitResult squares = FitTo(scene, {Parameter("gravity/y", -8.0)}, observations);
+  FitOptions options;
+  options.huber = 2.0;
+  const FitResult robust = FitTo(scene, {Parameter("gravity/y", -8.0)}, observations, options);
+  ASSERT_EQ(robust.status, FitStatus::kConverged) << robust.message;
+  // One outlier in five of y pulls by at most the bound, 2 sigma each: half a standard deviation a
+  // coordinate on average.
+  const double deviation = robust.uncertainty.standard_deviation[0];
+  EXPECT_LT(std::abs(robust.estimate[0] + 9.81), 8.0 * deviation);
+  EXPECT_GT(std::abs(squares.estimate[0] + 9.81), 50.0 * deviation);
+  // At the minimum of the robust cost its derivative vanishes: a weight for each coordinate, not
+  // one for all.
+  EXPECT_LT(robust.iterations.back().gradient_norm, 1e-6 * robust.iterations.front().gradient_norm);
+}
+
+TEST(FitTest, AParameterWithoutEffectIsNamed) {
+  const Scene scene = MakeScene(kFallingBall);
+  const FitResult fit =
+      FitTo(scene, {Parameter("gravity/y", -9.0), Parameter("bodies/ball/friction", 0.5)},
+            Observe(scene, 10, 0.0, 1));
+  EXPECT_EQ(fit.status, FitStatus::kNoEffect);
+  EXPECT_EQ(fit.parameter, 1);
+  EXPECT_NE(fit.message.find("\"bodies/ball/friction\" has no effect"), std::string::npos);
+}
+
+// At restitution 0 an impact has another law, and the derivative is 0 by definition.
+TEST(FitTest, AParameterWhoseDerivativeVanishesAtItsBoundIsFitted) {
+  const Scene scene = MakeScene(R"({"bodies": [
+      {"name": "ball", "shape": {"circle": {"radius": 0.1}}, "mass": 1, "position": [0, 0.5]},
+      {"name": "floor", "static": true, "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}}],
+      "pairs": [{"bodies": ["ball", "floor"], "restitution": 0.6}],
+      "simulation": {"dt": 0.01, "duration": 0.6}})");
+  const FitResult fit =
+      FitTo(scene, {Parameter("pairs/ball:floor/restitution", 0.0)}, Observe(scene, 1, 0.0, 1));
+  ASSERT_EQ(fit.status, FitStatus::kConverged) << fit.message;
+  EXPECT_NEAR(fit.estimate[0], 0.6, 1e-6);
+  // The iterations begin with what the user wrote.
+  EXPECT_EQ(fit.iterations.front().parameters, std::vector<double>{0.0});
+  EXPECT_EQ(fit.iterations.front().cost, fit.initial_cost);
+  EXPECT_EQ(fit.starts.front().initial, std::vector<double>{0.0});
+}
+
+TEST(FitTest, HuberConvergesQuicklyFromFarAway) {
+  const Scene scene = MakeScene(kFallingBall);
+  std::vector<Observation> observations = Observe(scene, 2, 0.01, 5);
+  for (size_t i = 1; i < observations.size(); i += 15) {
+    observations[i].value += 2.0;
+  }
+  FitOptions options;
+  options.huber = 3.0;
+  const FitResult near = FitTo(scene, {Parameter("gravity/y", -9.8)}, observations, options);
+  for (const double start : {-0.1, -300.0}) {
+    const FitResult far = FitTo(scene, {Parameter("gravity/y", start)}, observations, options);
+    ASSERT_EQ(far.status, FitStatus::kConverged) << far.message;
+    EXPECT_NEAR(far.estimate[0], near.estimate[0], 1e-8);
+    EXPECT_NEAR(far.final_cost, near.final_cost, 1e-9 * near.final_cost);
+    EXPECT_LE(far.iterations.size(), 16u);
+    EXPECT_EQ(far.iterations.back().cost, far.final_cost);
+  }
+}
+
+TEST(FitTest, ACombinationThatIsNotDeterminedIsNamed) {
+  // Only damping / mass enters the motion of a falling ball.
+  const Scene scene = MakeScene(kFallingBall);
+  const FitResult fit = FitTo(
+      scene, {Parameter("bodies/ball/mass", 2.5), Parameter("bodies/ball/linear_damping", 0.2)},
+      Observe(scene, 5, 0.0, 1));
+  ASSERT_EQ(fit.status, FitStatus::kConverged) << fit.message;
+  EXPECT_NEAR(fit.estimate[1] / fit.estimate[0], 0.15, 1e-8);
+  EXPECT_FALSE(fit.uncertainty.confidence_95[0]);
+  EXPECT_FALSE(fit.uncertainty.confidence_95[1]);
+  ASSERT_FALSE(fit.uncertainty.warnings.empty());
+  EXPECT_NE(
+      fit.uncertainty.warnings[0].find("1 'bodies/ball/mass' + 1 'bodies/ball/linear_damping'"),
+      std::string::npos)
+      << fit.uncertainty.warnings[0];
+}
+
+TEST(FitTest, StartsAreDrawnBySeed) {
+  const Scene scene = MakeScene(kSlidingBox);
+  FitParameter friction = Parameter("bodies/box/friction", 0.6);
+  friction.upper = 2.0;
+  FitOptions options;
+  options.starts = 3;
+  options.seed = 11;
+  const std::vector<Observation> observations = Observe(scene, 5, 0.0, 1);
+  const FitResult fit = FitTo(scene, {friction}, observations, options);
+  ASSERT_EQ(fit.starts.size(), 3u);
+  EXPECT_EQ(fit.starts[0].initial[0], 0.6);
+  EXPECT_NE(fit.starts[1].initial[0], fit.starts[2].initial[0]);
+  EXPECT_EQ(fit.starts[1].initial,
+            FitTo(scene, {friction}, observations, options).starts[1].initial);
+  EXPECT_NEAR(fit.estimate[0], 0.4, 1e-8);
+  options.seed = 12;
+  EXPECT_NE(fit.starts[1].initial,
+            FitTo(scene, {friction}, observations, options).starts[1].initial);
+}
+
+}  // namespace
+}  // namespace tangible

@@ -1,0 +1,168 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/estimation/problem/residual.h"
+
+#include <gtest/gtest.h>
+
+#include "../../support/fit_scenes.h"
+
+namespace tangible {
+namespace {
+
+/// Largest error of a Jacobian, each column against its largest entry.
+double ColumnError(const RowMatrixXd& a, const RowMatrixXd& b) {
+  double worst = 0.0;
+  for (Eigen::Index k = 0; k < b.cols(); ++k) {
+    worst = std::max(worst,
+                     (a.col(k) - b.col(k)).cwiseAbs().maxCoeff() / b.col(k).cwiseAbs().maxCoeff());
+  }
+  return worst;
+}
+
+/// All methods at the parameters' initial values against the tangent.
+void ExpectMethodsAgree(RolloutResiduals residuals) {
+  const Eigen::VectorXd p = residuals.scene().Initial();
+  Eigen::VectorXd r;
+  RowMatrixXd tangent;
+  ASSERT_TRUE(residuals.Evaluate(p, DerivativeMethod::kTangent, &r, &tangent))
+      << residuals.message();
+  for (Eigen::Index k = 0; k < tangent.cols(); ++k) {
+    EXPECT_GT(tangent.col(k).norm(), 1e-3) << residuals.scene().entries()[k].name;
+  }
+  // Tolerances of the methods as README states them.
+  const std::pair<DerivativeMethod, double> methods[] = {
+      {DerivativeMethod::kAdjoint, 1e-9},
+      {DerivativeMethod::kJetImplicit, 1e-9},
+      {DerivativeMethod::kJet, 1e-6},
+      {DerivativeMethod::kFiniteDifference, 1e-5}};
+  for (const auto& [method, tolerance] : methods) {
+    if (!IsAvailable(method)) {
+      continue;
+    }
+    Eigen::VectorXd other;
+    RowMatrixXd jacobian;
+    ASSERT_TRUE(residuals.Evaluate(p, method, &other, &jacobian))
+        << NameOf(method) << ": " << residuals.message();
+    EXPECT_EQ(r, other) << NameOf(method);
+    EXPECT_LT(ColumnError(jacobian, tangent), tolerance) << NameOf(method);
+    if (method == DerivativeMethod::kFiniteDifference) {
+      EXPECT_GT(ColumnError(jacobian, tangent), 0.0);
+    }
+  }
+}
+
+/// Adds points and times between steps to the observations.
+std::vector<Observation> WithPoints(std::vector<Observation> observations, double dt) {
+  const size_t count = observations.size();
+  for (size_t i = 0; i < count; ++i) {
+    if (observations[i].time < 0.3) {
+      Observation moved = observations[i];
+      moved.time += 0.37 * dt;
+      moved.point = moved.body == 0 ? 0 : -1;
+      moved.sigma *= 1.0 + 0.5 * static_cast<double>(i % 3);
+      observations.push_back(moved);
+    }
+  }
+  return observations;
+}
+
+TEST(ResidualTest, IsTheDifferenceInSigmas) {
+  const Scene scene = MakeScene(kFallingBall);
+  std::vector<Observation> observations = Observe(scene, 10, 0.0, 1);
+  for (Observation& observation : observations) {
+    observation.value -= 3.0;
+    observation.sigma = 0.5;
+  }
+  RolloutResiduals residuals =
+      MakeResiduals(scene, {}, {Parameter("gravity/y", -9.81)}, observations);
+  Eigen::VectorXd r;
+  ASSERT_TRUE(
+      residuals.Evaluate(residuals.scene().Initial(), DerivativeMethod::kTangent, &r, nullptr));
+  ASSERT_EQ(r.size(), static_cast<Eigen::Index>(observations.size()));
+  for (const double x : r) {
+    EXPECT_NEAR(x, 6.0, 1e-12);
+  }
+  EXPECT_EQ(residuals.rollouts(), 1);
+}
+
+TEST(ResidualTest, BetweenStepsPositionsAreLinear) {
+  const Scene scene = MakeScene(kPendulum);
+  const std::vector<Observation> on_steps = Observe(scene, 1, 0.0, 1);
+  std::vector<Observation> between;
+  for (size_t i = 0; i + 3 < on_steps.size(); ++i) {
+    Observation observation = on_steps[i];
+    observation.time = 0.75 * on_steps[i].time + 0.25 * on_steps[i + 3].time;
+    observation.value = 0.75 * on_steps[i].value + 0.25 * on_steps[i + 3].value;
+    between.push_back(observation);
+  }
+  RolloutResiduals residuals = MakeResiduals(scene, {}, {Parameter("gravity/y", -9.81)}, between);
+  Eigen::VectorXd r;
+  ASSERT_TRUE(
+      residuals.Evaluate(residuals.scene().Initial(), DerivativeMethod::kTangent, &r, nullptr));
+  // Rounding of positions of order 1 in sigmas of 1e-3.
+  EXPECT_LT(r.cwiseAbs().maxCoeff(), 1e-11);
+}
+
+TEST(ResidualTest, MethodsAgreeOnABallInAir) {
+  const Scene scene = MakeScene(kFallingBall);
+  ExpectMethodsAgree(
+      MakeResiduals(scene, {},
+                    {Parameter("gravity/y", -9.0), Parameter("bodies/ball/linear_damping", 0.4),
+                     Parameter("bodies/ball/velocity/x", 1.5)},
+                    Observe(scene, 3, 0.01, 2)));
+}
+
+TEST(ResidualTest, MethodsAgreeOnASlidingBox) {
+  const Scene scene = MakeScene(kSlidingBox);
+  ExpectMethodsAgree(
+      MakeResiduals(scene, {{"corner", 0, {0.2, 0.1}}},
+                    {Parameter("bodies/box/friction", 0.35), Parameter("bodies/box/mass", 2.2),
+                     Parameter("forces/push/force/x", 1.2), Parameter("points/corner/at/x", 0.21)},
+                    WithPoints(Observe(scene, 4, 0.01, 3), scene.simulation.dt)));
+}
+
+TEST(ResidualTest, MethodsAgreeOnAChainThatIsHit) {
+  const Scene scene = MakeScene(kSmallChain);
+  FitParameter mass = Parameter("bodies/link*/mass", 2.0);
+  mass.sets[0].scale = 0.3;
+  ExpectMethodsAgree(MakeResiduals(
+      scene, {{"tip", 0, {0.1, -0.02}}},
+      {mass, Parameter("bodies/ball/velocity/y", 1.9), Parameter("joints/j1/angle", 0.12),
+       Parameter("joints/j*/damping", 0.02), Parameter("bodies/ball/friction", 0.04),
+       Parameter("points/tip/at/y", 0.0), Parameter("bodies/ball/shape/radius", 0.1)},
+      WithPoints(Observe(scene, 5, 0.001, 4), scene.simulation.dt)));
+}
+
+TEST(ResidualTest, DifferencesStayWithinTheBounds) {
+  // A friction of 0 has no central difference; the one-sided one is of second order.
+  const Scene scene = MakeScene(kSlidingBox);
+  FitParameter friction = Parameter("bodies/box/friction", 0.0);
+  friction.lower = 0.0;
+  ExpectMethodsAgree(MakeResiduals(scene, {}, {friction}, Observe(scene, 4, 0.01, 3)));
+}
+
+TEST(ResidualTest, TheRunEndsWithTheLastObservation) {
+  Scene scene = MakeScene(kFallingBall);
+  scene.simulation.duration = 1e6;
+  Observation observation;
+  observation.time = 0.02;
+  observation.body = 0;
+  RolloutResiduals residuals =
+      MakeResiduals(scene, {}, {Parameter("gravity/y", -9.81)}, {observation});
+  Eigen::VectorXd r;
+  ASSERT_TRUE(
+      residuals.Evaluate(residuals.scene().Initial(), DerivativeMethod::kTangent, &r, nullptr));
+  EXPECT_EQ(residuals.scene().scene().simulation.duration, 0.02);
+}
+
+TEST(ResidualTest, AValueThatANumberMayNotTakeIsAFailure) {
+  const Scene scene = MakeScene(kFallingBall);
+  RolloutResiduals residuals =
+      MakeResiduals(scene, {}, {Parameter("bodies/ball/mass", 1.0)}, Observe(scene, 10, 0.0, 1));
+  Eigen::VectorXd r;
+  EXPECT_FALSE(residuals.Evaluate(Eigen::VectorXd::Constant(1, -1.0), DerivativeMethod::kTangent,
+                                  &r, nullptr));
+  EXPECT_FALSE(residuals.message().empty());
+}
+
+}  // namespace
+}  // namespace tangible

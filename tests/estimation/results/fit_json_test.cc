@@ -1,0 +1,169 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/estimation/results/fit_json.h"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "../../support/fit_scenes.h"
+
+namespace tangible {
+namespace {
+
+class FitJsonTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    const auto* info = testing::UnitTest::GetInstance()->current_test_info();
+    folder_ = testing::TempDir() + "fit_json_" + info->name() + "/";
+    std::filesystem::create_directories(folder_);
+    std::ofstream(folder_ + "scene.json") << kFallingBall;
+    std::ofstream(folder_ + "seen.csv") << "time,body,x,y\n0.5,ball,0.5,10.3\n1,ball,,8\n";
+  }
+  void TearDown() override { std::filesystem::remove_all(folder_); }
+
+  std::string folder_;
+};
+
+TEST_F(FitJsonTest, ReadsWhatIsWritten) {
+  FitFile fit;
+  std::string error;
+  ASSERT_TRUE(ParseFit(R"({"scene": "scene.json",
+      "observations": [{"file": "seen.csv", "sigma": {"x": 0.1, "y": 0.2}}],
+      "points": {"rim": {"body": "ball", "at": [0.1, 0]}},
+      "parameters": ["gravity/y", {"name": "m", "initial": 3, "lower": 1, "upper": 5,
+          "sets": [{"path": "bodies/ball/mass", "scale": 0.5, "offset": 0.25},
+                   {"path": "bodies/ball/velocity/x", "add": true}]},
+          {"path": "points/rim/at/x"}],
+      "derivatives": "adjoint", "loss": {"huber": 1.5}, "segments": 4, "starts": 3, "seed": 9})",
+                       folder_ + "fit.json", &fit, &error))
+      << error;
+  EXPECT_EQ(fit.path, folder_ + "fit.json");
+  const FitProblem& problem = fit.problem;
+  EXPECT_EQ(problem.scene.name, "falling ball");
+  ASSERT_EQ(problem.observations.size(), 3u);
+  EXPECT_EQ(problem.observations[0].sigma, 0.1);
+  EXPECT_EQ(problem.observations[2].sigma, 0.2);
+  EXPECT_EQ(problem.observations[2].value, 8.0);
+  ASSERT_EQ(problem.points.size(), 1u);
+  EXPECT_EQ(problem.points[0].at.x(), 0.1);
+  ASSERT_EQ(problem.parameters.size(), 3u);
+  EXPECT_EQ(problem.parameters[0].sets[0].path, "gravity/y");
+  EXPECT_FALSE(problem.parameters[0].initial);
+  EXPECT_EQ(problem.parameters[1].initial, 3.0);
+  EXPECT_EQ(problem.parameters[1].lower, 1.0);
+  EXPECT_EQ(problem.parameters[1].upper, 5.0);
+  EXPECT_EQ(problem.parameters[1].sets[0].scale, 0.5);
+  EXPECT_EQ(problem.parameters[1].sets[0].offset, 0.25);
+  EXPECT_EQ(problem.parameters[1].sets[0].mode, SetMode::kAssign);
+  EXPECT_EQ(problem.parameters[1].sets[1].mode, SetMode::kAdd);
+  EXPECT_EQ(problem.parameters[2].name, "points/rim/at/x");
+  EXPECT_EQ(problem.options.derivatives, DerivativeMethod::kAdjoint);
+  EXPECT_EQ(problem.options.huber, 1.5);
+  EXPECT_EQ(problem.options.segments, 4);
+  EXPECT_EQ(problem.options.starts, 3);
+  EXPECT_EQ(problem.options.seed, 9u);
+}
+
+/// A right file but for one key.
+std::string With(const std::string& key, const std::string& value) {
+  OrderedJson json = OrderedJson::parse(R"({"scene": "scene.json",
+      "observations": [{"file": "seen.csv", "sigma": 0.01}], "parameters": ["gravity/y"]})");
+  json[key] = OrderedJson::parse(value);
+  return json.dump();
+}
+
+TEST_F(FitJsonTest, APointIsAtTheCentreOfMassByDefault) {
+  FitFile fit;
+  std::string error;
+  ASSERT_TRUE(ParseFit(With("points", R"({"tip.1": {"body": "ball"}})"), folder_ + "fit.json", &fit,
+                       &error))
+      << error;
+  ASSERT_EQ(fit.problem.points.size(), 1u);
+  EXPECT_EQ(fit.problem.points[0].name, "tip.1");
+  EXPECT_EQ(fit.problem.points[0].at, Vector2<double>(0.0, 0.0));
+}
+
+TEST_F(FitJsonTest, BadInputsAreOneLine) {
+  const struct {
+    std::string text;
+    std::string message;
+  } kCases[] = {
+      {"[]", ": expected an object, got an array of 0"},
+      {"{}", ": /scene: missing, expected a string"},
+      {With("scene", "3"), ": /scene: expected a string, got 3"},
+      {With("step", "1"),
+       ": /step: unknown key, expected one of scene, observations, points, parameters, "
+       "derivatives, loss, segments, starts, seed, got \"step\""},
+      {With("observations", "[]"),
+       ": /observations: expected at least one {file, sigma}, got none"},
+      {With("observations", R"([{"file": "seen.csv", "sigma": -1}])"),
+       ": /observations/0/sigma: expected a number > 0, got -1"},
+      {With("observations", R"([{"file": "seen.csv", "sigma": {"x": 0.1}}])"),
+       ": /observations/0/sigma: expected a sigma of y, which seen.csv has"},
+      {With("derivatives", R"("magic")"),
+       ": /derivatives: expected one of tangent, adjoint, jet, jet_implicit, finite_difference, "
+       "got \"magic\""},
+      {With("loss", R"({"huber": 0})"), ": /loss/huber: expected a number > 0, got 0"},
+      {With("starts", "0"), ": /starts: expected an integer in [1, 10000], got 0"},
+      {With("segments", "1.5"), ": /segments: expected an integer in [1, 1000], got 1.5"},
+      {With("seed", "-1"), ": /seed: expected an integer in [0, 2147483647], got -1"},
+      {With("points", R"({"tip": {"body": "bal", "at": [0, 0]}})"),
+       ": /points/tip/body: expected the name of a body (ball), got \"bal\""},
+      {With("points", R"({"tip": {"body": "ball", "at": [1]}})"),
+       ": /points/tip/at: expected an array of 2 numbers [x, y], got an array of 1"},
+      {With("points", R"({"a*": {"body": "ball", "at": [0, 0]}})"),
+       ": /points/a*: expected a name of letters, digits and _.- , got a*"},
+      {With("points", R"({"a,b": {"body": "ball"}})"),
+       ": /points/a,b: expected a name of letters, digits and _.- , got a,b"},
+      {With("parameters", "{}"), ": /parameters: expected an array of parameters, got an object"},
+      {With("parameters", R"([{"name": "m"}])"),
+       ": /parameters/0/sets: missing, expected an array of {path, scale, offset}"},
+      {With("parameters", R"([{"path": "gravity/y", "sets": []}])"),
+       ": /parameters/0/sets: expected sets or path, got both"},
+      {With("parameters", R"([{"name": "", "sets": []}])"),
+       ": /parameters/0/name: expected a name, got \"\""},
+      {With("parameters", R"([{"name": "m\u001b[31m", "sets": []}])"),
+       ": /parameters/0/name: expected a name without control characters, got \"m\\u001b[31m\""},
+      {With("parameters", R"([{"name": "m", "sets": [{"path": "gravity/y", "add": 1}]}])"),
+       ": /parameters/0/sets/0/add: expected true or false, got 1"},
+  };
+  for (const auto& bad : kCases) {
+    FitFile fit;
+    std::string error;
+    EXPECT_FALSE(ParseFit(bad.text, folder_ + "fit.json", &fit, &error)) << bad.text;
+    EXPECT_EQ(error, folder_ + "fit.json" + bad.message);
+  }
+}
+
+TEST_F(FitJsonTest, FaultsOfParametersAndOfOtherFilesNameTheirPlace) {
+  const struct {
+    std::string text;
+    std::string start;
+  } kCases[] = {
+      {With("scene", R"("no.json")"), "no.json: cannot be read: "},
+      {With("observations", R"([{"file": "no.csv", "sigma": 1}])"), "no.csv: cannot be read: "},
+      {With("parameters", R"(["gravity/y", "gravity/z"])"), "fit.json: /parameters/1"},
+      {With("parameters", R"(["gravity/y", "gravity/y"])"), "fit.json: /parameters/1"},
+      {With("parameters", R"([{"path": "gravity/y", "lower": 2, "upper": 1}])"),
+       "fit.json: /parameters/0/"},
+      {"{", "fit.json: line 1, column 2: malformed JSON"},
+  };
+  for (const auto& bad : kCases) {
+    FitFile fit;
+    std::string error;
+    EXPECT_FALSE(ParseFit(bad.text, folder_ + "fit.json", &fit, &error)) << bad.text;
+    EXPECT_EQ(error.rfind(folder_ + bad.start, 0), 0u) << error;
+    EXPECT_EQ(error.find('\n'), std::string::npos);
+  }
+}
+
+TEST_F(FitJsonTest, AFileThatIsNotThereIsSaid) {
+  FitFile fit;
+  std::string error;
+  EXPECT_FALSE(LoadFit(folder_ + "fit.json", &fit, &error));
+  EXPECT_EQ(error, folder_ + "fit.json: cannot be read: No such file or directory");
+}
+
+}  // namespace
+}  // namespace tangible

@@ -1,0 +1,174 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include "../../support/scenes.h"
+#include "tangible/dynamics/model/parameter_map.h"
+#include "tangible/simulation/certificate/certify.h"
+
+namespace tangible {
+namespace {
+
+using test_scenes::SceneOf;
+
+Certificate CertificateOf(const std::string& bodies, double duration, const std::string& more = "",
+                          const std::string& integrator = "trapezoidal") {
+  Model<double> model;
+  State<double> state;
+  BuildModel(SceneOf("{" + bodies + R"(, "simulation": {"stepping": "event",
+      "integrator": ")" +
+                     integrator + R"(", "dt": 0.01, "duration": )" + std::to_string(duration) +
+                     more + "}}"),
+             &model, &state);
+  return CertifyRollout(model, state);
+}
+
+std::string Floor() {
+  return R"({"name": "floor", "static": true, "friction": 0.3, "restitution": 0.5,
+      "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}})";
+}
+
+TEST(CertifyEventsTest, ABounceIsTrustworthy) {
+  const Certificate c = CertificateOf(R"("bodies": [{"name": "ball",
+      "shape": {"circle": {"radius": 0.1}}, "mass": 1, "position": [0, 1], "restitution": 0.5}, )" +
+                                          Floor() + "]",
+                                      0.6);
+  EXPECT_EQ(c.verdict, "trustworthy");
+  EXPECT_EQ(c.events, 1);
+}
+
+// A ball on a floor whose bounces follow each other ever faster: most of them within one step.
+TEST(CertifyEventsTest, ASeriesThatRoundingEndsIsNamed) {
+  const auto of = [](const char* more) {
+    return CertificateOf(R"("bodies": [{"name": "ball", "shape": {"circle": {"radius": 0.1}},
+      "mass": 1, "position": [0, 0.1], "velocity": [0, 0.01], "restitution": 0.5}, )" +
+                             Floor() + "]",
+                         0.01, more);
+  };
+  const Certificate series = of(R"(, "restitution_threshold": 1e-16)");
+  EXPECT_EQ(series.verdict.find("near a kink: "), 0u) << series.verdict;
+  EXPECT_NE(series.verdict.find("events in a step"), std::string::npos) << series.verdict;
+  EXPECT_EQ(of("").verdict.find("events in a step"), std::string::npos);
+}
+
+// Without another body nothing only touches when another impact moves it.
+TEST(CertifyEventsTest, ABallThatComesToRestAloneIsNoDiscontinuity) {
+  const Certificate c = CertificateOf(R"("bodies": [
+      {"name": "floor", "static": true, "restitution": 0.3,
+       "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}},
+      {"name": "ball", "shape": {"circle": {"radius": 0.1}}, "mass": 1, "position": [0, 0.15],
+       "velocity": [1, 0], "restitution": 0.3}])",
+                                      1.0, "", "semi_implicit_euler");
+  EXPECT_EQ(c.verdict.find("discontinuous"), std::string::npos) << c.verdict;
+}
+
+// A disc sunk between two boxes that part, as deep in the one as in the other: which one it would
+// leave first is either side's choice.
+TEST(CertifyEventsTest, ContactsThatCloseAtOnceAreAKink) {
+  const auto verdict = [](const char* x) {
+    return CertificateOf(std::string(R"("bodies": [
+        {"name": "disc", "shape": {"circle": {"radius": 0.5}}, "mass": 1, "friction": 0.3,
+         "position": [)") + x +
+                             R"(, 0.1]},
+        {"name": "left", "kinematic": true, "shape": {"box": {"size": [1, 1]}}, "friction": 0.3,
+         "position": [-0.55, -0.5], "velocity": [-0.5, 0]},
+        {"name": "right", "kinematic": true, "shape": {"box": {"size": [1, 1]}}, "friction": 0.3,
+         "position": [0.55, -0.5], "velocity": [0.5, 0]}])",
+                         0.1)
+        .verdict;
+  };
+  EXPECT_NE(verdict("0").find("two contacts of disc close at once"), std::string::npos)
+      << verdict("0");
+  EXPECT_EQ(verdict("0.01").find("close at once"), std::string::npos) << verdict("0.01");
+}
+
+TEST(CertifyEventsTest, AFlatLandingIsADiscontinuity) {
+  const Certificate c = CertificateOf(R"("bodies": [{"name": "box",
+      "shape": {"box": {"size": [0.4, 0.2]}}, "mass": 1, "position": [0, 1]}, )" +
+                                          Floor() + "]",
+                                      0.6);
+  EXPECT_EQ(c.verdict.find("discontinuous: "), 0u) << c.verdict;
+  EXPECT_NE(c.verdict.find("box touch at once"), std::string::npos) << c.verdict;
+}
+
+TEST(CertifyEventsTest, ATouchingCradleIsADiscontinuity) {
+  const Certificate c = CertificateOf(R"("gravity": [0, 0], "bodies": [
+      {"name": "a", "shape": {"circle": {"radius": 0.1}}, "mass": 1, "position": [-0.5, 0],
+       "velocity": [1, 0], "restitution": 1},
+      {"name": "b", "shape": {"circle": {"radius": 0.1}}, "mass": 1, "position": [0, 0], "restitution": 1},
+      {"name": "c", "shape": {"circle": {"radius": 0.1}}, "mass": 1, "position": [0.2, 0],
+       "restitution": 1}])",
+                                      1.0);
+  EXPECT_EQ(c.verdict.find("discontinuous: "), 0u) << c.verdict;
+}
+
+TEST(CertifyEventsTest, AnApproachAtTheThresholdIsADiscontinuity) {
+  const Certificate c = CertificateOf(R"("gravity": [0, 0], "bodies": [{"name": "ball",
+      "shape": {"circle": {"radius": 0.1}}, "mass": 1, "position": [0, 0.1005], "velocity": [0, -1e-3],
+      "restitution": 0.5}, )" + Floor() + "]",
+                                      0.8);
+  EXPECT_EQ(c.verdict.find("discontinuous: "), 0u) << c.verdict;
+  EXPECT_NE(c.verdict.find("threshold"), std::string::npos) << c.verdict;
+}
+
+// Of the derivatives with respect to some paths.
+Certificate CertificateFor(const std::string& bodies, const std::vector<std::string>& paths) {
+  const Scene scene = SceneOf("{" + bodies + R"(, "simulation": {"stepping": "event",
+      "integrator": "trapezoidal", "dt": 0.01, "duration": 0.05}})");
+  Model<double> model;
+  State<double> state;
+  BuildModel(scene, &model, &state);
+  std::vector<ParameterDirection> directions;
+  for (const std::string& path : paths) {
+    ParameterPath parameter;
+    std::string error;
+    EXPECT_TRUE(ResolveParameter(scene, path, &parameter, &error)) << error;
+    directions.push_back(DirectionOf(parameter));
+  }
+  return CertifyDerivative(
+      model, state, RowMatrixXd(VariableJacobian(scene, model.structure, directions)), paths);
+}
+
+// The box stands on the floor: higher it falls first, deeper it is pushed out. What moves it along
+// the floor, or sets speeds and forces, has both sides.
+TEST(CertifyEventsTest, ATouchAtTheStartIsOneSidedForWhatChangesItsGap) {
+  const auto box = [](const std::string& y) {
+    return R"("bodies": [{"name": "box", "shape": {"box": {"size": [0.4, 0.2]}}, "mass": 1,
+        "position": [0.5, )" +
+           y + R"(], "friction": 0.3}, )" + Floor() + "]";
+  };
+  for (const char* path : {"bodies/box/position/y", "bodies/box/angle", "bodies/box/shape/size/y",
+                           "bodies/floor/shape/offset"}) {
+    const std::string verdict = CertificateFor(box("0.1"), {"bodies/box/mass", path}).verdict;
+    EXPECT_EQ(verdict.find("one-sided: contact of box and floor touches at the start, "), 0u)
+        << verdict;
+    EXPECT_NE(verdict.find(path), std::string::npos) << verdict;
+    EXPECT_EQ(CertificateFor(box("0.2"), {path}).verdict, "trustworthy") << path;
+  }
+  EXPECT_EQ(CertificateFor(box("0.1"), {"bodies/box/position/x", "bodies/box/velocity/x",
+                                        "bodies/box/velocity/y", "bodies/box/mass", "gravity/y",
+                                        "bodies/box/friction"})
+                .verdict,
+            "trustworthy");
+}
+
+TEST(CertifyEventsTest, ALimitAtTheStartIsOneSidedToo) {
+  const std::string arm = R"("bodies": [{"name": "arm", "shape": {"box": {"size": [0.4, 0.05]}},
+      "mass": 1, "position": [0.2, 0]}], "joints": [{"name": "pin", "type": "revolute",
+      "bodies": ["arm", "world"], "anchor": [0, 0], "limits": [0, 1]}])";
+  const std::string verdict = CertificateFor(arm, {"joints/pin/angle"}).verdict;
+  EXPECT_EQ(verdict.find("one-sided: low limit of joint pin touches at the start"), 0u) << verdict;
+  EXPECT_EQ(CertificateFor(arm, {"bodies/arm/mass"}).verdict, "trustworthy");
+}
+
+TEST(CertifyEventsTest, FrictionAtItsLimitIsAKink) {
+  // tan of the slope = μ exactly.
+  const Certificate c = CertificateOf(R"("gravity": [2.4, -8], "bodies": [{"name": "box",
+      "shape": {"box": {"size": [0.4, 0.2]}}, "mass": 1, "position": [0, 0.1], "friction": 0.3}, )" +
+                                          Floor() + "]",
+                                      0.1);
+  EXPECT_EQ(c.verdict.find("near a kink: "), 0u) << c.verdict;
+  EXPECT_GT(c.degenerate_rows, 0);
+}
+
+}  // namespace
+}  // namespace tangible

@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Segments of no length: what derivatives need at instants that no search finds.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "../../support/gradients.h"
+#include "../../support/scenes.h"
+
+namespace tangible {
+namespace {
+
+using test_scenes::SceneOf;
+
+RowMatrixXd Jacobian(const Scene& scene, const std::vector<std::string>& paths,
+                     GradientMethod method) {
+  return testing::Jacobian(scene, paths, method, CertificatePass::kSkip).jacobian;
+}
+
+std::vector<GradientMethod> Methods() {
+  std::vector<GradientMethod> methods = {GradientMethod::kAdjoint, GradientMethod::kTangent};
+  if (testing::HaveJets()) {
+    methods.push_back(GradientMethod::kJetImplicit);
+    methods.push_back(GradientMethod::kJet);
+  }
+  return methods;
+}
+
+// Equal elastic discs meet after 0.3 s, the end of a step; and so near to it that rounding says on
+// which side: x_b = x_a + v_a T + 2 r.
+TEST(EventInstantTest, AnImpactOnAStepsBoundaryIsAnEventInTime) {
+  for (const int ulps : {0, -40, -12, -5, -3, -2, -1, 1, 2, 3, 5, 12, 40}) {
+    for (const double dt : {0.025, 0.3}) {
+      Scene scene = SceneOf(R"({"gravity": [0, 0], "bodies": [
+          {"name": "a", "shape": {"circle": {"radius": 0.2}}, "mass": 1, "position": [0, 0],
+           "velocity": [2, 0], "restitution": 1},
+          {"name": "b", "shape": {"circle": {"radius": 0.2}}, "mass": 1, "position": [1, 0],
+           "restitution": 1}],
+        "simulation": {"stepping": "event", "integrator": "trapezoidal", "duration": 0.9}})");
+      scene.bodies[1].position[0] += ulps * 1.1102230246251565e-16;
+      scene.simulation.dt = dt;
+      for (const GradientMethod method : Methods()) {
+        const RowMatrixXd jacobian = Jacobian(scene,
+                                              {"bodies/a/position/x", "bodies/b/position/x",
+                                               "bodies/a/velocity/x", "bodies/b/velocity/x"},
+                                              method);
+        const double expected[] = {1.0, 0.0, 0.9, 0.0};
+        for (int k = 0; k < 4; ++k) {
+          EXPECT_NEAR(jacobian(6, k), expected[k], 1e-7)
+              << "parameter " << k << ", method " << static_cast<int>(method) << ", dt " << dt
+              << ", " << ulps << " ulps";
+        }
+      }
+    }
+  }
+}
+
+// A disc that rolls down. Spin added at the start slips for an instant and is shared, with k = I /
+// m r²: v = (v0 − k r w0) / (1 + k), w = −v / r.
+TEST(EventInstantTest, SpinAddedToARollingDiscIsSharedAtOnce) {
+  const Scene scene = SceneOf(R"({"gravity": [3, -9], "bodies": [
+      {"name": "disc", "shape": {"circle": {"radius": 0.2}}, "mass": 1, "inertia": 0.03,
+       "position": [0, 0.2], "friction": 0.8},
+      {"name": "floor", "static": true, "friction": 0.8,
+       "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}}],
+    "simulation": {"stepping": "event", "integrator": "trapezoidal", "dt": 0.1, "duration": 0.7}})");
+  const double k = 0.03 / 0.04;
+  const double slower = -k * 0.2 / (1.0 + k);
+  for (const GradientMethod method : Methods()) {
+    const RowMatrixXd jacobian = Jacobian(scene, {"bodies/disc/angular_velocity"}, method);
+    EXPECT_NEAR(jacobian(0, 0), 0.7 * slower, 1e-7) << static_cast<int>(method);
+    EXPECT_NEAR(jacobian(2, 0), -0.7 * slower / 0.2, 1e-7) << static_cast<int>(method);
+    EXPECT_NEAR(jacobian(3, 0), slower, 1e-7) << static_cast<int>(method);
+  }
+}
+
+}  // namespace
+}  // namespace tangible

@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: Apache-2.0
+// One-sided derivatives of event stepping, against closed forms, and where there are none.
+#include <gtest/gtest.h>
+
+#include "../../support/gradients.h"
+#include "../../support/scenes.h"
+#include "tangible/simulation/gradient/gradient.h"
+
+namespace tangible {
+namespace {
+
+using test_scenes::SceneOf;
+
+constexpr double kTime = 0.0625;
+constexpr char kFloor[] = R"({"name": "floor", "static": true, "friction": 0.5,
+    "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}})";
+
+Scene Of(const std::string& bodies, const std::string& more = "") {
+  return SceneOf(R"({"gravity": [0, -8], "bodies": [)" + bodies + ", " + kFloor + "]" + more +
+                 R"(, "simulation": {"dt": 0.0078125, "duration": 0.0625, "stepping": "event",
+                     "integrator": "trapezoidal"}})");
+}
+
+GradientResult Sided(const Scene& scene, const std::string& path, DerivativeSide side) {
+  return FinalStateJacobian(scene, testing::Resolve(scene, {path}),
+                            {.method = GradientMethod::kTangent, .side = side});
+}
+
+double Plus(const Scene& scene, const std::string& path, int row) {
+  const GradientResult result = Sided(scene, path, DerivativeSide::kPlus);
+  EXPECT_TRUE(result.done) << result.message;
+  EXPECT_FALSE(result.notes.empty());
+  return result.done ? result.jacobian(row, 0) : NAN;
+}
+
+double Minus(const Scene& scene, const std::string& path, int row) {
+  const GradientResult result = Sided(scene, path, DerivativeSide::kMinus);
+  EXPECT_TRUE(result.done) << result.message;
+  EXPECT_FALSE(result.notes.empty());
+  return result.done ? result.jacobian(row, 0) : NAN;
+}
+
+TEST(GradientSidesTest, ABoxPushedWithItsFriction) {
+  const Scene scene = Of(R"({"name": "box", "shape": {"box": {"size": [1, 0.5]}}, "mass": 1,
+      "position": [0, 0.25], "friction": 0.5})",
+                         R"(, "forces": [{"name": "push", "body": "box", "force": [4, 0]}])");
+  // vx = t (ΔF − m g Δμ) / m where that is positive.
+  EXPECT_NEAR(Plus(scene, "forces/push/force/x", 3), kTime, 1e-10);
+  EXPECT_NEAR(Minus(scene, "forces/push/force/x", 3), 0.0, 1e-10);
+  EXPECT_NEAR(Plus(scene, "bodies/*/friction", 3), 0.0, 1e-10);
+  EXPECT_NEAR(Minus(scene, "bodies/*/friction", 3), -8.0 * kTime, 1e-10);
+  EXPECT_NEAR(Plus(scene, "forces/push/force/x", 0), 0.5 * kTime * kTime, 1e-10);
+}
+
+TEST(GradientSidesTest, ADiscPulledUpWithItsWeight) {
+  const Scene scene = Of(R"({"name": "disc", "shape": {"circle": {"radius": 0.5}}, "mass": 2,
+      "position": [0, 0.5], "friction": 0.5})",
+                         R"(, "forces": [{"name": "pull", "body": "disc", "force": [0, 16]}])");
+  EXPECT_NEAR(Plus(scene, "forces/pull/force/y", 4), kTime / 2.0, 1e-10);
+  EXPECT_NEAR(Minus(scene, "forces/pull/force/y", 4), 0.0, 1e-10);
+  // Heavier it stays, lighter it rises: v = t (F / m − g).
+  EXPECT_NEAR(Plus(scene, "bodies/disc/mass", 4), 0.0, 1e-10);
+  EXPECT_NEAR(Minus(scene, "bodies/disc/mass", 4), -kTime * 16.0 / 4.0, 1e-9);
+}
+
+TEST(GradientSidesTest, BesideAJumpThereIsNone) {
+  // Turned by whatever angle, a box that lands flat lands on one corner first.
+  const Scene scene = Of(R"({"name": "box", "shape": {"box": {"size": [1, 0.5]}}, "mass": 1,
+      "position": [0, 0.30], "velocity": [0, -2], "friction": 0.5, "restitution": 0.5})");
+  for (const DerivativeSide side : {DerivativeSide::kPlus, DerivativeSide::kMinus}) {
+    const GradientResult result = Sided(scene, "bodies/box/angle", side);
+    EXPECT_FALSE(result.done);
+    EXPECT_NE(result.message.find("parameter bodies/box/angle: no derivative from "),
+              std::string::npos)
+        << result.message;
+    EXPECT_NE(result.message.find("jumps by"), std::string::npos) << result.message;
+  }
+}
+
+TEST(GradientSidesTest, WhereAGapJustClosesThereIsNoneOnTheSideOfTheImpact) {
+  // Thrown up with 0.25 m/s the disc rises by 0.25² / 16 m, just to the ceiling: faster it strikes
+  // that at a speed of √(2 · 0.25 τ).
+  const Scene scene = Of(R"({"name": "disc", "shape": {"circle": {"radius": 0.5}}, "mass": 1,
+      "position": [0, 1], "velocity": [0, 0.25], "restitution": 1},
+    {"name": "ceiling", "static": true, "restitution": 1,
+     "shape": {"half_plane": {"normal": [0, -1], "offset": -1.50390625}}})");
+  const GradientResult faster = Sided(scene, "bodies/disc/velocity/y", DerivativeSide::kPlus);
+  EXPECT_FALSE(faster.done);
+  EXPECT_NE(faster.message.find("no derivative from above"), std::string::npos) << faster.message;
+  EXPECT_NEAR(Minus(scene, "bodies/disc/velocity/y", 1), kTime, 1e-10);
+}
+
+TEST(GradientSidesTest, AParametersRangeMayEndBeforeTheSideBegins) {
+  Scene scene = Of(R"({"name": "box", "shape": {"box": {"size": [1, 0.5]}}, "mass": 1,
+      "position": [0, 0.25], "friction": 0.5})",
+                   R"(, "forces": [{"name": "push", "body": "box", "force": [0, 0]}])");
+  for (BasicBody<double>& body : scene.bodies) {
+    body.friction = 1e-9;
+  }
+  const GradientResult result = Sided(scene, "bodies/*/friction", DerivativeSide::kMinus);
+  EXPECT_FALSE(result.done);
+  EXPECT_NE(result.message.find("its range ends within"), std::string::npos) << result.message;
+}
+
+}  // namespace
+}  // namespace tangible

@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/simulation/stepping/energy_watch.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "../../support/scenes.h"
+#include "tangible/simulation/stepping/rollout.h"
+
+namespace tangible {
+namespace {
+
+RolloutReport RunBody(const std::string& parts, const std::string& settings) {
+  const Scene scene = test_scenes::SceneOf(R"({"bodies": [{"name": "a", "mass": 1, "inertia": 1,
+      "position": [1.1, 0], "velocity": [1, 0])" +
+                                           parts + R"(, "simulation": )" + settings + "}");
+  Model<double> model;
+  State<double> first, last;
+  BuildModel(scene, &model, &first);
+  return Rollout(model, first, {}, &last);
+}
+
+constexpr char kSpring[] = R"(}], "springs": [{"name": "s", "bodies": ["a", "world"],
+    "anchors": [[1.1, 0], [0, 0]], "stiffness": 5e4, "rest_length": 1}])";
+constexpr char kByEvents[] =
+    R"({"dt": 0.01, "duration": 2, "stepping": "event", "integrator": "runge_kutta_4"})";
+
+// ω h = 2.2 in a symplectic step, λ h = 8 in an explicit one, ω h = 7 by Runge and Kutta: each
+// amplifies by a factor a step.
+TEST(EnergyWatchTest, StepsBeyondStabilityAreToldAsDiverged) {
+  for (const RolloutReport& report : {RunBody(kSpring, R"({"dt": 0.01, "duration": 2})"),
+                                      RunBody(R"(, "linear_damping": 800}])", kByEvents),
+                                      RunBody(kSpring, R"({"dt": 0.03, "duration": 2,
+            "stepping": "event", "integrator": "runge_kutta_4"})")}) {
+    EXPECT_EQ(report.status, StepStatus::kDiverged);
+    EXPECT_NE(report.message.find("though nothing drives the scene: dt is too large"),
+              std::string::npos)
+        << report.message;
+    EXPECT_GT(report.steps, 1);
+  }
+}
+
+TEST(EnergyWatchTest, StepsThatResolveTheSpringAreDone) {
+  for (const char* settings :
+       {R"({"dt": 0.005, "duration": 2})",
+        R"({"dt": 0.005, "duration": 2, "stepping": "event", "integrator": "trapezoidal"})",
+        R"({"dt": 0.005, "duration": 2, "stepping": "event", "integrator": "runge_kutta_4"})"}) {
+    EXPECT_EQ(RunBody(kSpring, settings).status, StepStatus::kDone) << settings;
+  }
+}
+
+// A force may bring in any energy.
+TEST(EnergyWatchTest, WhatDrivesAndWhatRestsIsNotWatched) {
+  const std::string force = R"(}], "forces": [{"name": "f", "body": "a", "force": [1e9, 0]}])";
+  EXPECT_EQ(RunBody(force, R"({"dt": 0.01, "duration": 2})").status, StepStatus::kDone);
+  EXPECT_EQ(RunBody("}]", R"({"dt": 0.01, "duration": 1000})").status, StepStatus::kDone);
+}
+
+}  // namespace
+}  // namespace tangible

@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/simulation/stepping/rollout.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "../../support/scenes.h"
+#include "tangible/verification/support/random_scene.h"
+#include "tangible/verification/support/trace.h"
+
+namespace tangible {
+namespace {
+
+TEST(RolloutTest, TwoRunsHaveTheSameBits) {
+  for (unsigned seed = 1; seed <= 30; ++seed) {
+    Model<double> model;
+    State<double> initial, first, second;
+    BuildModel(RandomScene(seed), &model, &initial);
+    Stepper stepper(model);
+    Rollout(model, initial, {}, &stepper, &first);
+    Rollout(model, initial, {}, &stepper, &second);  // the stepper's memory is used again
+    EXPECT_TRUE(first == second) << seed;
+    Rollout(model, initial, {}, &second);
+    EXPECT_TRUE(first == second) << seed;
+    EXPECT_FALSE(first == initial);
+  }
+}
+
+TEST(RolloutTest, ObserverSeesEveryStateWithItsRecord) {
+  const Scene scene = test_scenes::SceneOf(test_scenes::Mixture());
+  Model<double> model;
+  State<double> initial, final;
+  BuildModel(scene, &model, &initial);
+  long next = 0;
+  const RolloutReport report = Rollout(
+      model, initial,
+      [&](long k, double t, const State<double>& state, Stepper* stepper) {
+        EXPECT_EQ(k, next++);
+        EXPECT_EQ(t, StepTime(scene.simulation, k));
+        EXPECT_EQ(stepper == nullptr, k == 0);
+        if (stepper != nullptr) {
+          EXPECT_EQ(stepper->record().time, StepTime(scene.simulation, k - 1));
+          EXPECT_EQ(stepper->record().new_twist, state.twist);
+        }
+        final = state;
+      },
+      &initial);  // the final state may be the initial one
+  EXPECT_EQ(next, 64);
+  EXPECT_EQ(report.steps, 63);
+  EXPECT_NEAR(report.time, 0.63, 1e-15);
+  EXPECT_TRUE(final == initial);
+  EXPECT_GT(report.contacts_max, 0);
+  EXPECT_LE(report.residual_max, 1e-10);
+}
+
+TEST(RolloutTest, AResumedRunHasTheSameBits) {
+  // Modes and impulses are part of the state: with them the second half is the same.
+  const Scene scene = test_scenes::SceneOf(test_scenes::Mixture());
+  Model<double> model;
+  State<double> state;
+  BuildModel(scene, &model, &state);
+  Stepper whole(model), half(model);
+  for (int k = 0; k < 60; ++k) {
+    if (k == 30) half.SetGuess(whole.record());
+    State<double> copy = state;
+    ASSERT_EQ(whole.Step(model, 0.01 * k, 0.01, &state).status, StepStatus::kDone);
+    if (k >= 30) {
+      ASSERT_EQ(half.Step(model, 0.01 * k, 0.01, &copy).status, StepStatus::kDone);
+      EXPECT_TRUE(copy == state) << k;
+    }
+  }
+}
+
+TEST(RolloutTest, ReportsAddUp) {
+  RolloutReport report;
+  StepReport step;
+  step.solved_by = SolvedBy::kGuess;
+  step.closed = 3;
+  step.gap_min = -0.2;
+  step.mode_switches = 2;
+  step.residual = 1e-12;
+  step.solver.whole_system = 5;
+  step.pairs_compared = 2000000000;
+  report.Add(step);
+  step.solved_by = SolvedBy::kLemke;
+  step.closed = 1;
+  step.gap_min = 0.1;
+  report.Add(step);
+  EXPECT_EQ(report.solved_by_guess, 1);
+  EXPECT_EQ(report.solved_by_lemke, 1);
+  EXPECT_EQ(report.contacts_max, 3);
+  EXPECT_EQ(report.mode_switches, 4);
+  EXPECT_EQ(report.penetration_max, 0.2);
+  EXPECT_EQ(report.solver.whole_system, 10);
+  EXPECT_EQ(report.pairs_compared, 4000000000);
+}
+
+TEST(RandomSceneTest, IsAValidFileAndReachesWhatItIsFor) {
+  int closed = 0;
+  for (unsigned seed = 1; seed <= 100; ++seed) {
+    const Scene scene = RandomScene(seed);
+    EXPECT_EQ(SceneToJson(scene), SceneToJson(RandomScene(seed)));
+    const bool signals =
+        std::any_of(scene.forces.begin(), scene.forces.end(),
+                    [](const auto& f) { return f.force_signal || f.torque_signal; }) ||
+        std::any_of(scene.joints.begin(), scene.joints.end(),
+                    [](const auto& j) { return j.effort_signal.has_value(); });
+    if (!signals) {  // a signal is a file, which is not there
+      Scene read;
+      std::string error;
+      EXPECT_TRUE(ParseScene(SceneToJson(scene), "random.json", ".", &read, &error)) << error;
+    }
+    closed += seed <= 20 ? TraceRun(scene).closed : 0;
+  }
+  EXPECT_GT(closed, 100);
+}
+
+}  // namespace
+}  // namespace tangible
