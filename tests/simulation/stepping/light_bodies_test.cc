@@ -103,7 +103,7 @@ TEST(LightBodies, OneBoxOfAnyMassStands) {
 }
 
 TEST(LightBodies, HeavyBoxesDoNotFallThroughALightOne) {
-  for (const int decade : Decades()) {
+  for (const int decade : {6, 10, 12, 15, 16, 20, 24, 30}) {
     SCOPED_TRACE("mass 1e-" + std::to_string(decade));
     const double light = std::pow(10.0, -decade);
     const auto below = [&] {
