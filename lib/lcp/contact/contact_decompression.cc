@@ -50,61 +50,14 @@ bool ChangeMode(const ContactValues& values, double normal, double tangent, doub
 
 }  // namespace
 
-bool DecompressionSolver::SolveWithModes(const ContactProblem<double>& problem,
-                                         ContactSolution<double>* solution,
-                                         ContactSolverReport* report) {
-  ++report->factorisations;
-  if (!system_.Factor(problem, solution->modes)) {
-    return false;
-  }
-  const int nb = problem.num_bodies;
-  const int nj = static_cast<int>(problem.joints.size());
-  const std::vector<int>& block_of = system_.contact_block();
-  const auto is_closed = [&](size_t i) { return block_of[i] >= 0; };
-  const auto sticks = [&](size_t i) { return solution->modes[i] == ContactMode::kSticking; };
-  left_.assign(3 * static_cast<size_t>(system_.num_blocks()), 0.0);
-  start_ = left_;
-  std::copy(problem.momentum.begin(), problem.momentum.end(), left_.begin());
-  for (int j = 0; j < nj; ++j) {
-    std::copy_n(problem.joints[j].rhs, problem.joints[j].rows, &left_[3 * (nb + j)]);
-    std::copy_n(&solution->joint_impulse[3 * j], problem.joints[j].rows, &start_[3 * (nb + j)]);
-  }
-  for (size_t i = 0; i < problem.contacts.size(); ++i) {
-    if (is_closed(i)) {
-      const ContactBlock<double>& contact = problem.contacts[i];
-      const size_t row = 3 * static_cast<size_t>(block_of[i]);
-      left_[row] = contact.driven ? contact.offset : -contact.c_n;
-      left_[row + 1] = sticks(i) ? -contact.c_t : 0.0;
-      start_[row] = contact.driven ? contact.offset : solution->normal_impulse[i];
-      start_[row + 1] = sticks(i) ? solution->tangent_impulse[i] : 0.0;
-    }
-  }
-  // rhs := rhs − K x0; the solution is x0 + K⁻¹ rhs.
-  const std::vector<double> rhs = left_;
-  system_.Residual<false>(problem, solution->modes, rhs.data(), start_.data(), 1, left_.data());
-  system_.SolveProximal(problem, solution->modes, left_.data(), 1);
-  for (size_t i = 0; i < left_.size(); ++i) {
-    left_[i] += start_[i];
-  }
-  solution->v.assign(left_.begin(), left_.begin() + 3 * nb);
-  solution->joint_impulse.assign(left_.begin() + 3 * nb, left_.begin() + 3 * (nb + nj));
-  for (size_t i = 0; i < problem.contacts.size(); ++i) {
-    const size_t row = is_closed(i) ? 3 * static_cast<size_t>(block_of[i]) : 0;
-    solution->normal_impulse[i] = is_closed(i) ? left_[row] : 0.0;
-    solution->tangent_impulse[i] = sticks(i) ? left_[row + 1]
-                                             : -SlidingSign(solution->modes[i]) *
-                                                   problem.contacts[i].friction *
-                                                   solution->normal_impulse[i];
-  }
-  return true;
-}
-
 bool DecompressionSolver::SolveByModeChanges(const ContactSolverOptions& options,
                                              ContactProblem<double>* problem,
                                              ContactSolution<double>* solution,
                                              ContactSolverReport* report) {
   for (int round = 0; round < kMaxRounds; ++round) {
-    if (!SolveWithModes(*problem, solution, report)) {
+    ++report->factorisations;
+    // Among redundant impulses those nearest to the solution's.
+    if (!mode_solve_.Solve(*problem, solution, &system_, solution)) {
       return false;
     }
     scales_.Compute(*problem, *solution);

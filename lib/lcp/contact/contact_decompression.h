@@ -32,14 +32,11 @@ class DecompressionSolver {
   ContactSystem& system() { return system_; }
 
  private:
-  // The linear system of the modes; among redundant impulses those nearest to the solution's.
-  bool SolveWithModes(const ContactProblem<double>& problem, ContactSolution<double>* solution,
-                      ContactSolverReport* report);
   bool SolveByModeChanges(const ContactSolverOptions& options, ContactProblem<double>* problem,
                           ContactSolution<double>* solution, ContactSolverReport* report);
 
   ContactSystem system_;
-  std::vector<double> start_, left_;
+  ModeSolve mode_solve_;
   ContactScales scales_;
 };
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tangible/lcp/contact/tolerances.h"
 #include "tangible/lcp/dense/solver.h"
 #include "tangible/lcp/system/contact_residual.h"
 
@@ -14,8 +15,6 @@ using Kind = ContactKink::Kind;
 
 // Impulses' rates that exceed what drives them by more than this are δ's answer to a contradiction.
 constexpr double kContradiction = 1e6;
-// Of their terms; constants and entries of the LCP below this are rounding.
-constexpr double kRounding = 1e-13;
 
 RowPart<double> Scaled(double factor, const RowPart<double>& row) {
   return {factor * row[0], factor * row[1], factor * row[2]};
@@ -186,7 +185,7 @@ void ContactDirectional::MakeMatrix() {
       const ContactBlock<double>& c = problem_->contacts[rows_[k].contact];
       const double value = RowDot(c.a, rows_[k].row_a, c.b, rows_[k].row_b, v.data());
       const double scale = std::sqrt(mobility_l * Mobility(*problem_, c));
-      W_(k, l) = std::abs(value) <= kRounding * scale ? 0.0 : value;
+      W_(k, l) = std::abs(value) <= kDirectionRounding * scale ? 0.0 : value;
     }
   }
   for (int k = 1; k < columns; ++k) {
@@ -266,7 +265,7 @@ VectorX<double> ContactDirectional::Constants(const std::vector<double>& r,
       value = RowDot(c.a, row.row_a, c.b, row.row_b, x.data()) - given;
       scale = speed + std::abs(given);
     }
-    q[static_cast<Eigen::Index>(k)] = std::abs(value) <= kRounding * scale ? 0.0 : value;
+    q[static_cast<Eigen::Index>(k)] = std::abs(value) <= kDirectionRounding * scale ? 0.0 : value;
   }
   return q;
 }

@@ -15,6 +15,7 @@
 
 #include <vector>
 
+#include "tangible/lcp/contact/tolerances.h"
 #include "tangible/lcp/system/block_lu.h"
 #include "tangible/lcp/system/contact_problem.h"
 
@@ -40,12 +41,12 @@ struct InteriorPointOutcome {
 };
 
 struct ContactInteriorPointOptions {
-  double complementarity = 1e-14;  ///< goal: mean of z s / κ
+  double complementarity = kContactComplementarity;  ///< goal: mean of z s / κ
   int max_iterations = 100;
   bool resume = false;  ///< goes on from where the workspace's last call on the same problem ended
   /// Of the term on the change of impulses that keeps redundant contacts regular
   /// (contact_interior_point_inl.h).
-  double proximal = 1e-9;
+  double proximal = kProximal;
 };
 
 /// Solves from a neutral start until the mean of z s / κ is at most `complementarity` (1e-14 for

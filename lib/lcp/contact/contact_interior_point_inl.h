@@ -10,6 +10,7 @@
 #include <cmath>
 
 #include "tangible/lcp/contact/contact_interior_point.h"
+#include "tangible/lcp/contact/tolerances.h"
 #include "tangible/lcp/system/contact_system.h"
 
 namespace tangible {
@@ -31,7 +32,6 @@ class InteriorPointSystem {
   static constexpr int kMaxRefinements = 3;
   // Where joints form loops their rows may be dependent; a proximal term keeps K regular and does
   // not change the solution, as it acts on the change of y only.
-  static constexpr double kProximal = 1e-9;
 
   // s / z, and a proximal term on the impulses' rows.
   T ContactDiagonal(int row) const {

@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "tangible/lcp/contact/contact_interior_point_inl.h"
+#include "tangible/lcp/contact/tolerances.h"
 #include "tangible/lcp/system/contact_system.h"
 
 namespace tangible {
@@ -15,19 +16,13 @@ namespace internal {
 
 // Fraction of the way to the boundary; near 1 at the end, so that convergence stays fast.
 inline constexpr double kStepToBoundary = 0.995;
-// Products z s stay above this fraction of their mean, if shortening the step can keep them there.
-inline constexpr double kNeighbourhood = 1e-4;
 inline constexpr double kShortening = 0.8;
 inline constexpr int kMaxShortenings = 20;
 // After a shorter step the next one goes back to the central path, without the second-order term.
 inline constexpr double kRecentreBelow = 0.2;
 inline constexpr double kRecentring = 0.5;
-// Steps shorter than this, so many in a row, mean that rounding has stopped the iteration.
-inline constexpr double kShortStep = 1e-3;
+// So many short steps in a row mean that rounding has stopped the iteration.
 inline constexpr int kMaxShortSteps = 20;
-// Complementarity below which an iteration that no longer halves it has arrived: with redundant
-// contacts the linear systems are as ill-conditioned as its inverse.
-inline constexpr double kRoundingLevel = 1e-12;
 
 template <typename T>
 class ContactIteration : private InteriorPointSystem<T> {
@@ -362,14 +357,15 @@ InteriorPointOutcome SolveContactsByInteriorPoint(const ContactProblem<T>& probl
     ++outcome.iterations;
     const double before = outcome.complementarity;
     outcome.complementarity = iteration.Complementarity();
-    if (before <= internal::kRoundingLevel && outcome.complementarity > 0.5 * before &&
-        iteration.Violation() <= 1e-9) {
+    if (before <= kArrived && outcome.complementarity > 0.5 * before &&
+        iteration.Violation() <= kEquationsHold) {
       outcome.converged = true;  // as far as rounding lets it
       break;
     }
-    short_steps = iteration.LastStep() < internal::kShortStep ? short_steps + 1 : 0;
+    short_steps = iteration.LastStep() < kShortInteriorStep ? short_steps + 1 : 0;
     if ((outcome.iterations >= 2 || options.resume) &&
-        outcome.complementarity <= options.complementarity && iteration.Violation() <= 1e-9) {
+        outcome.complementarity <= options.complementarity &&
+        iteration.Violation() <= kEquationsHold) {
       outcome.converged = true;
       break;
     }

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tangible/lcp/contact/tolerances.h"
+
 namespace tangible {
 namespace {
 
@@ -81,7 +83,7 @@ void ExtrapolateImpulses(const ContactProblem<double>& problem,
       limit(normal, last_normal);
     }
   }
-  factor *= 1.0 + 1e-6;
+  factor *= 1.0 + kBeyondLimit;
   const auto move = [&](const std::vector<double>& from, std::vector<double>* to) {
     for (size_t i = 0; i < to->size(); ++i) {
       (*to)[i] += factor * ((*to)[i] - from[i]);

@@ -3,12 +3,10 @@
 //
 // What a solution with given modes says against them, one contact at a time.
 
+#include "tangible/lcp/contact/tolerances.h"
 #include "tangible/lcp/system/contact_residual.h"
 
 namespace tangible {
-
-/// Violations below this fraction of a row's scale are rounding.
-constexpr double kModeTolerance = 1e-12;
 
 /// The mode of a contact that begins to push: as if it met this contact alone.
 ContactMode ModeOfClosing(const ContactBlock<double>& contact, const ContactValues& values);

@@ -5,18 +5,13 @@
 #include <cmath>
 #include <random>
 
+#include "tangible/lcp/contact/tolerances.h"
 #include "tangible/lcp/system/contact_residual.h"
 #include "tangible/math/scratch.h"
 
 namespace tangible {
 namespace {
 
-// Inequalities that hold by less than this fraction of their scale at the start are raised to about
-// it, those that do not hold to about what they lack: the first ties of a degenerate start.
-constexpr double kLeastSlack = 1e-6;
-// The centre is moved by this fraction of the largest impulse, differently for each contact, at τ =
-// 1: ties that symmetry makes (a stack without side load) are broken on the way.
-constexpr double kCentreShift = 1e-4;
 // Rounds in which sliding contacts that would pull are opened before the start.
 constexpr int kMaxStartRounds = 30;
 

@@ -13,18 +13,14 @@
 
 #include "tangible/lcp/contact/contact_mode_change.h"
 #include "tangible/lcp/contact/contact_solver.h"
+#include "tangible/lcp/contact/tolerances.h"
 
 namespace tangible {
 namespace {
 
-// Proximal steps of pivoting: δ falls from step to step. What rounding leaves of redundant impulses
-// is its inverse: at 1e-10 one path in 400 of a pile of 100 discs was lost.
-constexpr double kFirstRegularisation = 1e-7;
-constexpr double kLeastRegularisation = 1e-8;
-// What has not arrived after so many rounds is tried with these in turn: where masses are 1e9 apart
-// modes that flicker with one δ do not with another.
+// What has not arrived after so many rounds is tried with the values of
+// kStubbornRegularisation in turn.
 constexpr int kStubbornRound = 8;
-constexpr double kStubbornRegularisation[] = {1e-9, 1e-10, kLeastRegularisation};
 // Restarts, and proximal steps of each (what arrives needs up to 4). Pivots as a multiple of the
 // contacts, one multiple more after every few; the factorisations of all together: a multiple of
 // the contacts, and less where one is dear.

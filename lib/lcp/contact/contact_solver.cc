@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "tangible/lcp/contact/contact_mode_change.h"
+#include "tangible/lcp/contact/tolerances.h"
 
 namespace tangible {
 namespace {
@@ -20,8 +21,6 @@ constexpr int kPivotsFromOpen = 20;
 constexpr size_t kFewContacts = 8;
 // Proximal steps at a path's end.
 constexpr int kMaxProximalRounds = 40;
-// Complementarities after which the polish is tried; rounding may stop the iteration for one step.
-constexpr double kInteriorPointGoals[] = {1e-10, 1e-14, 1e-18, 1e-22, 1e-26, 1e-26, 1e-26, 1e-26};
 // A contact whose mode has been changed this often changes alone, the worst one first.
 constexpr int kMaxChangesTogether = 3;
 
@@ -46,29 +45,16 @@ void ContactSolver::Reserve(int num_bodies, int num_joints, int num_contacts) {
   interior_point_.lu.Reserve(blocks, edges);
   pivoting_.Reserve(blocks, num_contacts);
   interior_point_.edges.reserve(edges);
-  for (std::vector<double>* x : {&interior_point_.v,
-                                 &interior_point_.y,
-                                 &interior_point_.z,
-                                 &interior_point_.s,
-                                 &interior_point_.step,
-                                 &interior_point_.affine,
-                                 &interior_point_.ds,
-                                 &interior_point_.ds_affine,
-                                 &interior_point_.target,
-                                 &interior_point_.residual,
-                                 &interior_point_.unit_z,
-                                 &interior_point_.unit_s,
-                                 &rhs_,
-                                 &interior_point_.rhs,
-                                 &interior_point_.correction,
-                                 &correction_,
-                                 &start_,
-                                 &centre_joint_,
-                                 &centre_normal_,
-                                 &centre_tangent_}) {
+  for (std::vector<double>* x :
+       {&interior_point_.v, &interior_point_.y, &interior_point_.z, &interior_point_.s,
+        &interior_point_.step, &interior_point_.affine, &interior_point_.ds,
+        &interior_point_.ds_affine, &interior_point_.target, &interior_point_.residual,
+        &interior_point_.unit_z, &interior_point_.unit_s, &interior_point_.rhs,
+        &interior_point_.correction}) {
     x->reserve(3 * blocks);
   }
-  for (ContactSolution<double>* solution : {&trial_, &entry_, &last_}) {
+  mode_solve_.Reserve(3 * static_cast<size_t>(blocks));
+  for (ContactSolution<double>* solution : {&trial_, &entry_, &last_, &centre_}) {
     solution->v.reserve(3 * num_bodies);
     solution->joint_impulse.reserve(3 * num_joints);
     solution->normal_impulse.reserve(num_contacts);
@@ -81,76 +67,19 @@ void ContactSolver::Reserve(int num_bodies, int num_joints, int num_contacts) {
 }
 
 void ContactSolver::SetCentre(const ContactSolution<double>& solution) {
-  centre_joint_ = solution.joint_impulse;
-  centre_normal_ = solution.normal_impulse;
-  centre_tangent_ = solution.tangent_impulse;
+  centre_.joint_impulse = solution.joint_impulse;
+  centre_.normal_impulse = solution.normal_impulse;
+  centre_.tangent_impulse = solution.tangent_impulse;
 }
 
 bool ContactSolver::SolveWithModes(const ContactProblem<double>& problem,
                                    ContactSolution<double>* solution, ContactSolverReport* report) {
   ++report->factorisations;
-  if (!system_.Factor(problem, solution->modes)) {
-    return false;
-  }
-  const int nb = problem.num_bodies;
-  const int nj = static_cast<int>(problem.joints.size());
-  const std::vector<int>& block_of = system_.contact_block();
-  rhs_.assign(3 * system_.num_blocks(), 0.0);
-  std::copy(problem.momentum.begin(), problem.momentum.end(), rhs_.begin());
-  int closed = 0;
-  for (int j = 0; j < nj; ++j) {
-    for (int r = 0; r < problem.joints[j].rows; ++r) {
-      rhs_[3 * (nb + j) + r] = problem.joints[j].rhs[r];
-    }
-  }
-  for (size_t i = 0; i < problem.contacts.size(); ++i) {
-    if (block_of[i] >= 0) {
-      ++closed;
-      rhs_[3 * block_of[i]] = -problem.contacts[i].c_n;
-      rhs_[3 * block_of[i] + 1] =
-          solution->modes[i] == ContactMode::kSticking ? -problem.contacts[i].c_t : 0.0;
-    }
-  }
-  // Start from the last impulses where there may be a choice among them.
-  const bool choice = closed > 1 || (problem.redundant_joints && nj > 0);
-  correction_.assign(rhs_.size(), 0.0);
-  if (choice) {
-    for (int j = 0; j < 3 * nj; ++j) {
-      correction_[3 * nb + j] = centre_joint_[j];
-    }
-    for (size_t i = 0; i < problem.contacts.size(); ++i) {
-      if (block_of[i] >= 0) {
-        correction_[3 * block_of[i]] = centre_normal_[i];
-        correction_[3 * block_of[i] + 1] =
-            solution->modes[i] == ContactMode::kSticking ? centre_tangent_[i] : 0.0;
-      }
-    }
-    // rhs := rhs − K x0; the solution is x0 + K⁻¹ rhs.
-    start_ = rhs_;
-    system_.Residual<false>(problem, solution->modes, start_.data(), correction_.data(), 1,
-                            rhs_.data());
-  }
-  if (choice) {
-    system_.SolveProximal(problem, solution->modes, rhs_.data(), 1);
-  } else {
-    system_.Solve(problem, solution->modes, rhs_.data(), 1);
-  }
-  for (size_t i = 0; i < rhs_.size(); ++i) {
-    correction_[i] += rhs_[i];
-  }
-  solution->v.assign(correction_.begin(), correction_.begin() + 3 * nb);
-  solution->joint_impulse.assign(correction_.begin() + 3 * nb, correction_.begin() + 3 * (nb + nj));
-  for (size_t i = 0; i < problem.contacts.size(); ++i) {
-    solution->normal_impulse[i] = block_of[i] >= 0 ? correction_[3 * block_of[i]] : 0.0;
-    solution->tangent_impulse[i] = 0.0;
-    if (solution->modes[i] == ContactMode::kSticking) {
-      solution->tangent_impulse[i] = correction_[3 * block_of[i] + 1];
-    } else if (block_of[i] >= 0 && SlidingSign(solution->modes[i]) != 0.0) {
-      solution->tangent_impulse[i] = -SlidingSign(solution->modes[i]) *
-                                     problem.contacts[i].friction * solution->normal_impulse[i];
-    }
-  }
-  return true;
+  // From the last impulses where there may be a choice among them.
+  const auto open = std::count(solution->modes.begin(), solution->modes.end(), ContactMode::kOpen);
+  const bool choice = static_cast<long>(solution->modes.size()) - open > 1 ||
+                      (problem.redundant_joints && !problem.joints.empty());
+  return mode_solve_.Solve(problem, choice ? &centre_ : nullptr, &system_, solution);
 }
 
 bool ContactSolver::SolveByModeChanges(const ContactProblem<double>& problem,
@@ -277,14 +206,14 @@ bool ContactSolver::SolveByInteriorPoint(const ContactProblem<double>& problem,
   for (const double goal : kInteriorPointGoals) {
     interior_point.complementarity = goal;
     // At the end the steps are small, and what the proximal term leaves of the equations must go.
-    interior_point.proximal = goal < 1e-15 ? 1e-10 : 1e-9;
+    interior_point.proximal = goal < kContactComplementarity ? kLastProximal : kProximal;
     const InteriorPointOutcome outcome =
         SolveContactsByInteriorPoint(problem, interior_point, &interior_point_, solution);
     report->iterations += outcome.iterations;
     if (Polish(problem, options, solution, report)) {
       return true;
     }
-    if (outcome.complementarity > 1e-6) {
+    if (outcome.complementarity > kNotArrived) {
       break;  // it has not arrived; going on from there would not help
     }
     interior_point.resume = true;

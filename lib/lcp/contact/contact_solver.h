@@ -27,9 +27,12 @@
 
 #include "tangible/lcp/contact/contact_interior_point.h"
 #include "tangible/lcp/contact/contact_pivoting.h"
+#include "tangible/lcp/contact/tolerances.h"
+#include "tangible/lcp/dense/tolerances.h"
 #include "tangible/lcp/system/contact_problem.h"
 #include "tangible/lcp/system/contact_residual.h"
 #include "tangible/lcp/system/contact_system.h"
+#include "tangible/lcp/system/mode_solve.h"
 
 namespace tangible {
 
@@ -38,8 +41,8 @@ enum class SolvedBy : unsigned char { kNothing, kDirect, kGuess, kInteriorPoint,
 
 struct ContactSolverOptions {
   ContactSolverChoice choice = ContactSolverChoice::kAuto;
-  double tolerance = 1e-10;  ///< of the scaled natural residual
-  int max_iterations = 100;  ///< of the interior point
+  double tolerance = kLcpTolerance;  ///< of the scaled natural residual
+  int max_iterations = 100;          ///< of the interior point
   double smoothing = 0.0;  ///< relative complementarity at which the interior point stops, without
                            ///< polish; 0: exact
 };
@@ -113,9 +116,9 @@ class ContactSolver {
   ContactSystem system_;
   ContactPivoting pivoting_;
   InteriorPointWorkspace<double> interior_point_;
+  ModeSolve mode_solve_;
   ContactSolution<double> trial_, entry_, last_;
-  std::vector<double> rhs_, correction_, start_;
-  std::vector<double> centre_joint_, centre_normal_, centre_tangent_;
+  ContactSolution<double> centre_;  ///< impulses alone
   std::vector<int> changes_;
   ContactScales scales_;
 };

@@ -6,6 +6,8 @@
 #include <limits>
 #include <utility>
 
+#include "tangible/lcp/dense/tolerances.h"
+
 namespace tangible {
 namespace {
 
@@ -44,17 +46,16 @@ struct SignCheck {
 enum class Flip { kAll, kWorst };
 SignCheck FlipWrongSigns(const MixedLcp<double>& problem, const LcpVector& point, Flip flip,
                          std::vector<RowMode>& modes) {
-  constexpr double kRounding = 1e-14;
   const LcpScales scales = ComputeScales(problem, point.v, point.y, point.z);
   const VectorXd s = Slack(problem, point.v, point.z);
   SignCheck check;
-  double worst = kRounding;
+  double worst = kLcpRounding;
   std::vector<RowMode> flipped = modes;
   for (Index i = 0; i < s.size(); ++i) {
     const bool active = modes[i] == RowMode::kActive;
     const double violation =
         active ? -Ratio(point.z[i], scales.force[i]) : -Ratio(s[i], scales.slack[i]);
-    if (!(violation > kRounding)) continue;
+    if (!(violation > kLcpRounding)) continue;
     ++check.violations;
     flipped[i] = active ? RowMode::kInactive : RowMode::kActive;
     if (violation > worst) {
@@ -76,9 +77,8 @@ class Best {
  public:
   Best(const MixedLcp<double>& problem, LcpVector point)
       : problem_(problem), point_(std::move(point)) {
-    constexpr double kRounding = 1e-15;
     point_.z = point_.z.cwiseMax(0.0);
-    residual_ = ScaledResidual(problem_, point_.v, point_.y, point_.z) + kRounding;
+    residual_ = ScaledResidual(problem_, point_.v, point_.y, point_.z) + kPolishPreference;
     ConsiderWithoutCrumbs(point_);
   }
   void Offer(LcpVector point) {
@@ -94,7 +94,7 @@ class Best {
     // What rounding left of an impulse, 1e-48, is of the same size as its cone's other terms: as a
     // violation of that row it would count in full.
     const LcpScales scales = ComputeScales(problem_, point.v, point.y, point.z);
-    for (const double crumb : {1e-15, 1e-13, 1e-11, 1e-9, 1e-7}) {
+    for (const double crumb : kCrumbs) {
       if (residual_ <= 2.0 * crumb) return;
       bool cleaned = false;
       for (Index i = 0; i < point.z.size(); ++i) {

@@ -6,6 +6,7 @@
 
 #include "tangible/lcp/dense/nnls.h"
 #include "tangible/lcp/dense/scaling.h"
+#include "tangible/lcp/dense/tolerances.h"
 
 namespace tangible {
 namespace {
@@ -14,12 +15,9 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr double kConditionTolerance = 1e-10;
-constexpr double kProofMargin = 1e-6;
-
 // Whether each value is at most the rounding of its terms.
 bool Small(const VectorXd& value, const VectorXd& terms) {
-  return (value.array() <= kConditionTolerance * terms.array()).all();
+  return (value.array() <= kFarkasCondition * terms.array()).all();
 }
 
 }  // namespace
@@ -75,8 +73,8 @@ VectorXd FindFarkas(const MixedLcp<double>& problem) {
   const double largest = n > 0 ? farkas.cwiseAbs().maxCoeff() : 0.0;
   if (!(largest > 0.0)) return VectorXd();
   // The residual is a difference of numbers of f's size: what is below their rounding is zero.
-  const double rounding = 1e-14 * scaling.row.maxCoeff() * f.cwiseAbs().maxCoeff();
-  const double threshold = std::max(1e-12, std::min(1e-3, rounding / largest));
+  const double rounding = kLcpRounding * scaling.row.maxCoeff() * f.cwiseAbs().maxCoeff();
+  const double threshold = std::clamp(rounding / largest, kLeastFarkasEntry, kMostFarkasEntry);
   farkas = farkas.unaryExpr(
       [=](double x) { return std::abs(x) < threshold * largest ? 0.0 : x / largest; });
   return CheckFarkas(problem, farkas) ? farkas : VectorXd();

@@ -24,6 +24,7 @@
 // (1997).
 
 #include "tangible/lcp/dense/problem.h"
+#include "tangible/lcp/dense/tolerances.h"
 
 namespace tangible {
 
@@ -31,9 +32,9 @@ struct InteriorPointOptions {
   int max_iterations = 100;
   /// Stop when κ is below this, dimensionless. Modes with a margin m are told apart at κ < m²; the
   /// default is that of derivatives by unrolled Jets.
-  double complementarity = 1e-14;
+  double complementarity = kUnpolishedGoal;
   /// ... and the largest residual of the scaled equations, whose data have size 1, below this.
-  double residual = 1e-13;
+  double residual = kEquationGoal;
   /// Starting value of the scaled z and s, whose data have size 1.
   double start = 1.0;
   /// Least centring σ; 0 is Mehrotra's rule, 0.1 to 0.5 stays near the path: slower, hardier.

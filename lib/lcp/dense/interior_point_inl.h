@@ -8,6 +8,7 @@
 #include "tangible/lcp/dense/dense_lu.h"
 #include "tangible/lcp/dense/interior_point.h"
 #include "tangible/lcp/dense/scaling.h"
+#include "tangible/lcp/dense/tolerances.h"
 
 namespace tangible {
 namespace internal {
@@ -112,9 +113,8 @@ class InteriorPoint {
   }
 
   bool Factorise() {
-    constexpr double kRegularisation = 1e-12;
     MatrixX<T> newton = K_;
-    for (Eigen::Index i = 0; i < num_equations_; ++i) newton(i, i) += kRegularisation;
+    for (Eigen::Index i = 0; i < num_equations_; ++i) newton(i, i) += kNewtonShift;
     for (Eigen::Index i = 0; i < nz_; ++i) {
       const Eigen::Index row = num_equations_ + i;
       const T weight = 1.0 / (z_[i] + s_[i]);
@@ -192,7 +192,7 @@ class InteriorPoint {
     const double fraction = std::max(0.99, 1.0 - ValueOf(kappa));
     step = LargestStep(direction) * fraction;
     if (ValueOf(step) > 1.0) step = one;
-    if (!(ValueOf(step) > 1e-12)) return false;
+    if (!(ValueOf(step) > kLeastStep)) return false;
     Move(direction, step);
     return true;
   }

@@ -7,6 +7,7 @@
 #include "tangible/lcp/dense/derivative.h"
 #include "tangible/lcp/dense/interior_point.h"
 #include "tangible/lcp/dense/solver.h"
+#include "tangible/lcp/dense/tolerances.h"
 
 namespace tangible {
 namespace internal {
@@ -61,7 +62,6 @@ LcpSolution<T> WithoutDerivatives(const LcpSolution<double>& values) {
 /// consistent part.
 template <typename T>
 void SolveModesIn(const MixedLcp<T>& problem, const RowModes& row_modes, LcpSolution<T>& solution) {
-  constexpr double kRegularisation = 1e-9;
   const Eigen::Index nv = problem.num_v();
   const Eigen::Index ny = problem.num_y();
   std::vector<Eigen::Index> rows;
@@ -82,7 +82,7 @@ void SolveModesIn(const MixedLcp<T>& problem, const RowModes& row_modes, LcpSolu
     K(at, at) += row_modes.kink_weight[rows[k]];
   }
   const MatrixX<T> exact = K;
-  for (Eigen::Index i = 0; i < n; ++i) K(i, i) += kRegularisation;
+  for (Eigen::Index i = 0; i < n; ++i) K(i, i) += kJetShift;
   DenseLu<T> lu;
   if (!lu.Compute(K)) return;
   VectorX<T> rhs(n);

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "tangible/lcp/dense/scaling.h"
+#include "tangible/lcp/dense/tolerances.h"
 
 namespace tangible {
 namespace {
@@ -46,7 +47,7 @@ class Tableau {
   // The row that limits `entering`, or -1: a ray. z₀ leaves if it can (that ends the path).
   Index LeavingRow(Index entering) const {
     const auto column = rows_.col(entering);
-    const double tolerance = 1e-11 * std::max(1.0, column.cwiseAbs().maxCoeff());
+    const double tolerance = kLeastPivot * std::max(1.0, column.cwiseAbs().maxCoeff());
     Index best = -1;
     Index artificial_row = -1;
     for (Index i = 0; i < n_; ++i) {
@@ -57,7 +58,7 @@ class Tableau {
     if (artificial_row < 0) return best;
     const double ratio = Rhs(artificial_row) / column[artificial_row];
     const double least = Rhs(best) / column[best];
-    return ratio <= least + 1e-14 * std::abs(least) ? artificial_row : best;
+    return ratio <= least + kLcpRounding * std::abs(least) ? artificial_row : best;
   }
 
   // Returns the variable that leaves.
@@ -82,11 +83,10 @@ class Tableau {
   double Rhs(Index row) const { return rows_(row, 2 * n_ + 1); }
 
   bool LexicographicallyLess(Index i, double divide_i, Index k, double divide_k) const {
-    constexpr double kTie = 1e-13;
     const auto compare = [&](Index column) {
       const double a = rows_(i, column) / divide_i;
       const double b = rows_(k, column) / divide_k;
-      if (std::abs(a - b) <= kTie * (std::abs(a) + std::abs(b))) return 0;
+      if (std::abs(a - b) <= kRatioTie * (std::abs(a) + std::abs(b))) return 0;
       return a < b ? -1 : 1;
     };
     int order = compare(2 * n_ + 1);
@@ -200,13 +200,13 @@ std::optional<ReducedLcp> ReduceToPlain(const MixedLcp<double>& problem) {
     const Equilibration scaling = Equilibrate(K);
     const MatrixXd scaled = scaling.row.asDiagonal() * K * scaling.col.asDiagonal();
     Eigen::CompleteOrthogonalDecomposition<MatrixXd> decomposition;
-    decomposition.setThreshold(1e-13);
+    decomposition.setThreshold(kReducedRank);
     decomposition.compute(scaled);
     const MatrixXd scaled_rhs = scaling.row.asDiagonal() * rhs;
     MatrixXd x = decomposition.solve(scaled_rhs);
     x += decomposition.solve(scaled_rhs - scaled * x);
     const double error = (scaled_rhs - scaled * x).cwiseAbs().maxCoeff();
-    if (!(error <= 1e-9 * scaled_rhs.cwiseAbs().maxCoeff())) return std::nullopt;
+    if (!(error <= kConsistent * scaled_rhs.cwiseAbs().maxCoeff())) return std::nullopt;
     solution = scaling.col.asDiagonal() * x;
   }
   ReducedLcp reduced;

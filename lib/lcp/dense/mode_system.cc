@@ -3,18 +3,14 @@
 
 #include <cmath>
 
+#include "tangible/lcp/dense/tolerances.h"
+
 namespace tangible {
 namespace {
 
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-
-// Below this reciprocal condition the equilibrated matrix counts as singular. Exact redundancies
-// give 1e-17; mass ratios of 1e6 in a stack 1e-9.
-constexpr double kSingular = 1e-14;
-// Pivots below this part of the largest are zero in the orthogonal decomposition.
-constexpr double kRankTolerance = 1e-12;
 
 void StoreError(const VectorXd& residual, const VectorXd& rhs, double* relative_error) {
   if (relative_error == nullptr) return;
@@ -49,9 +45,9 @@ ModeSystem::ModeSystem(const MixedLcp<double>& problem, const std::vector<RowMod
   lu_.compute(K_);
   // The estimate of rcond() means nothing where a pivot is zero or nearly.
   const auto pivots = lu_.matrixLU().diagonal().cwiseAbs();
-  const bool vanishing = !(pivots.minCoeff() > kSingular * pivots.maxCoeff());
+  const bool vanishing = !(pivots.minCoeff() > kSingularMatrix * pivots.maxCoeff());
   const double reciprocal = vanishing ? 0.0 : lu_.rcond();
-  singular_ = !(reciprocal > kSingular);
+  singular_ = !(reciprocal > kSingularMatrix);
   condition_ = 1.0 / reciprocal;
   if (!singular_) return;
   orthogonal_.setThreshold(kRankTolerance);

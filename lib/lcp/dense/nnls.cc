@@ -4,6 +4,8 @@
 #include <Eigen/QR>
 #include <vector>
 
+#include "tangible/lcp/dense/tolerances.h"
+
 namespace tangible {
 namespace {
 
@@ -28,7 +30,7 @@ VectorXd SolvePassive(const MatrixXd& E, const VectorXd& f, const std::vector<ch
 
 NnlsResult SolveNnls(const MatrixXd& E, const VectorXd& f, Index num_free) {
   const Index n = E.cols();
-  const double tolerance = 1e-12 * (E.norm() * f.norm());
+  const double tolerance = kNnlsGradient * (E.norm() * f.norm());
   std::vector<char> passive(n, 0);
   for (Index j = 0; j < num_free; ++j) passive[j] = 1;
   NnlsResult result;

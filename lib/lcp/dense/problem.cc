@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tangible/lcp/dense/tolerances.h"
+
 namespace tangible {
 namespace {
 
@@ -193,7 +195,7 @@ bool DependsOnData(const MixedLcp<double>& problem, const VectorXd& v, const Vec
   homogeneous.p.setZero();
   homogeneous.b.setZero();
   homogeneous.c.setZero();
-  return residual <= 1e-8 * ScaledResidual(homogeneous, v, y, z);
+  return residual <= kDependsOnData * ScaledResidual(homogeneous, v, y, z);
 }
 
 #define TANGIBLE_INSTANTIATE(T)                   \

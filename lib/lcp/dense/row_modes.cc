@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "tangible/lcp/dense/nnls.h"
+#include "tangible/lcp/dense/tolerances.h"
 
 namespace tangible {
 namespace {
@@ -14,10 +15,6 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-
-// A z or s below this part of its scale is zero: above what a polished solution's rounding leaves
-// (about 1e-15), below the margins that a user may ask about (1e-9).
-constexpr double kZero = 1e-12;
 
 double Ratio(double value, double scale) { return value == 0.0 ? 0.0 : value / scale; }
 
@@ -49,9 +46,9 @@ LcpVector LowerFreeRows(const MixedLcp<double>& problem, const LcpVector& soluti
     for (Index k = 0; k < s.size() && is_free; ++k) {
       const double effect = problem.F(k, i);
       if (effect == 0.0) continue;
-      is_free = effect > 0.0 && ratios.z[k] <= kZero;
+      is_free = effect > 0.0 && ratios.z[k] <= kLcpZero;
       // The slack closes at this z; a slack of rounding size is closed already.
-      const double slack = ratios.s[k] <= kZero ? 0.0 : s[k];
+      const double slack = ratios.s[k] <= kLcpZero ? 0.0 : s[k];
       least = std::max(least, point.z[i] - slack / effect);
     }
     if (is_free) point.z[i] = least;
@@ -83,7 +80,7 @@ MatrixXd ConeFunctionals(const MixedLcp<double>& problem, const std::vector<Inde
     const MatrixXd scaled = scaling.row.asDiagonal() * equations * scaling.col.asDiagonal();
     // Of the transpose, the last columns of Q are orthogonal to all rows.
     Eigen::ColPivHouseholderQR<MatrixXd> qr;
-    qr.setThreshold(1e-12);
+    qr.setThreshold(kRankTolerance);
     qr.compute(scaled.transpose());
     const MatrixXd q = qr.householderQ();
     null_space = scaling.col.asDiagonal() * q.rightCols(equations.cols() - qr.rank());
@@ -99,11 +96,10 @@ MatrixXd ConeFunctionals(const MixedLcp<double>& problem, const std::vector<Inde
 // residual t of min ‖bᵢ + Bᵀ λ‖, λ ≥ 0, is zero (then bᵢ is part of a vanishing combination) or a
 // direction with B t ≥ 0, bᵢ t > 0.
 std::vector<char> ImplicitZeros(MatrixXd B) {
-  constexpr double kNoDirection = 1e-8;
   const double size = B.size() > 0 ? B.cwiseAbs().maxCoeff() : 0.0;
   for (Index i = 0; i < B.rows(); ++i) {
     const double norm = RowOf(B, i).norm();
-    if (norm > 1e-11 * size && norm > 0.0) {
+    if (norm > kVanishingRow * size && norm > 0.0) {
       B.row(i) /= norm;
     } else if (norm > 0.0) {
       B.row(i).setZero();
@@ -182,8 +178,8 @@ void WeighKinks(const MixedLcp<double>& problem, RowModes& result) {
     const double held_weight =
         RowOf(problem.G, i).dot(response.v) + problem.F.row(i).dot(response.z) + problem.F(i, i);
     const double size = alone + problem.F.row(i).cwiseAbs().dot(response.z.cwiseAbs());
-    const bool consistent = error < 1e-9;
-    if (consistent && std::abs(held_weight) <= 1e-10 * size) {
+    const bool consistent = error < kConsistent;
+    if (consistent && std::abs(held_weight) <= kNoWeight * size) {
       result.modes[i] = RowMode::kInactive;
     } else {
       result.kink_weight[i] = consistent ? std::abs(held_weight) : alone;
@@ -210,13 +206,12 @@ Ratios ComputeMargins(const MixedLcp<double>& problem, const LcpVector& point) {
 
 // The smallest margin of rows whose change of mode would change the derivative.
 void FindMargin(const MixedLcp<double>& problem, RowModes& result) {
-  constexpr double kSuspect = 1e-3;
   const Ratios ratios = ComputeMargins(problem, result.point);
   // A small margin does not count if the row is bound to stay on its side (λ₊ of a sticking contact
   // with hardly any side load): treated as degenerate, it is resolved.
   std::vector<RowMode> suspects = result.modes;
   for (Index i = 0; i < ratios.z.size(); ++i) {
-    if (std::max(ratios.z[i], ratios.s[i]) < kSuspect) suspects[i] = RowMode::kKink;
+    if (std::max(ratios.z[i], ratios.s[i]) < kSuspectMargin) suspects[i] = RowMode::kKink;
   }
   std::vector<RowMode> resolved = suspects;
   ResolveDegenerate(problem, resolved);
@@ -225,7 +220,7 @@ void FindMargin(const MixedLcp<double>& problem, RowModes& result) {
     if (suspects[i] == RowMode::kKink && resolved[i] != RowMode::kKink) continue;
     // Degenerate, but bound to its side by other rows, whose margins count instead.
     const bool bound = result.modes[i] != RowMode::kKink;
-    if (bound && std::max(ratios.z[i], ratios.s[i]) <= kZero) continue;
+    if (bound && std::max(ratios.z[i], ratios.s[i]) <= kLcpZero) continue;
     const double margin =
         result.modes[i] == RowMode::kKink ? 0.0 : std::max(ratios.z[i], ratios.s[i]);
     if (margin < result.margin_min) {
@@ -245,9 +240,9 @@ RowModes ClassifyRows(const MixedLcp<double>& problem, const LcpVector& solution
   result.kink_weight = VectorXd::Zero(nz);
   result.modes.assign(nz, RowMode::kInactive);
   for (Index i = 0; i < nz; ++i) {
-    if (ratios.z[i] > kZero) {
+    if (ratios.z[i] > kLcpZero) {
       result.modes[i] = RowMode::kActive;
-    } else if (!(ratios.s[i] > kZero)) {
+    } else if (!(ratios.s[i] > kLcpZero)) {
       result.modes[i] = RowMode::kKink;
     }
   }

@@ -13,6 +13,7 @@
 #include "tangible/lcp/dense/interior_point.h"
 #include "tangible/lcp/dense/lemke.h"
 #include "tangible/lcp/dense/scaling.h"
+#include "tangible/lcp/dense/tolerances.h"
 
 namespace tangible {
 namespace {
@@ -20,14 +21,10 @@ namespace {
 using Eigen::Index;
 using Eigen::VectorXd;
 
-// Tells modes apart down to scaled margins of 1e-10.
-constexpr double kComplementarity = 1e-20;
-
 // Few, so that a wrong guess costs no more than a few iterations of the interior point.
 constexpr int kGuessRounds = 4;
 
-// Proximal steps: the share of equilibrated rows that is added to their diagonal.
-constexpr double kFirstShift = 1e-4;
+// Proximal steps.
 constexpr int kProximalRounds = 24;
 // After so many rounds shares of the least shift take turns: what flickers with one does not with
 // another.
@@ -38,9 +35,6 @@ constexpr int kBasisRounds = 5;
 // Proximal steps go on, so many rounds at most, until this share of the tolerance is left.
 constexpr double kRoom = 0.01;
 constexpr int kRoundsForRoom = 4;
-
-// Of the largest z of its kind: what is less may be set to 0.
-constexpr double kRounding = 1e-14;
 
 // How often `change` can be repeated until the first z is at 0; at most 1e6 times.
 double LimitedBy(const VectorXd& z, const VectorXd& change) {
@@ -70,7 +64,7 @@ class Portfolio {
 
   bool TryInteriorPoint(double start, double min_centring) {
     const InteriorPointOptions settings{.max_iterations = options_.max_iterations,
-                                        .complementarity = kComplementarity,
+                                        .complementarity = kComplementarityGoal,
                                         .start = start,
                                         .min_centring = min_centring};
     const auto result = SolveInteriorPoint(problem_, settings);
@@ -203,16 +197,16 @@ class Portfolio {
   LcpVector WithoutRounding(LcpVector point) const {
     const LcpScales scales = ComputeScales(problem_, point.v, point.y, point.z);
     for (Index i = 0; i < point.z.size(); ++i) {
-      if (std::abs(point.z[i]) <= kRounding * scales.force[i]) point.z[i] = 0.0;
+      if (std::abs(point.z[i]) <= kLcpRounding * scales.force[i]) point.z[i] = 0.0;
     }
     const VectorXd root_mass = problem_.M.diagonal().cwiseMax(0.0).cwiseSqrt();
     const double root_energy = point.v.cwiseAbs().dot(root_mass);
     for (Index j = 0; j < point.v.size(); ++j) {
-      if (std::abs(point.v[j]) * root_mass[j] <= kRounding * root_energy) point.v[j] = 0.0;
+      if (std::abs(point.v[j]) * root_mass[j] <= kLcpRounding * root_energy) point.v[j] = 0.0;
     }
     const double largest = point.y.size() > 0 ? point.y.cwiseAbs().maxCoeff() : 0.0;
     for (double& y : point.y) {
-      if (std::abs(y) <= kRounding * largest) y = 0.0;
+      if (std::abs(y) <= kLcpRounding * largest) y = 0.0;
     }
     return point;
   }
@@ -258,8 +252,6 @@ bool TryLemkes(Portfolio& portfolio, Index nz) {
     }
     return covering;
   };
-  // What is redundant asks for a large shift, what is badly scaled for a small one.
-  constexpr double kLeastShifts[] = {1e-6, 1e-9};
   for (const double least_shift : kLeastShifts) {
     if (portfolio.TryProximalLemke(VectorXd(), least_shift)) return true;
   }

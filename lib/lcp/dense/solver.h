@@ -9,14 +9,15 @@
 // the result. Success is decided only by the scaled residual recomputed from the data (problem.h).
 
 #include "tangible/lcp/dense/problem.h"
+#include "tangible/lcp/dense/tolerances.h"
 #include "tangible/math/solver_choice.h"
 
 namespace tangible {
 
 struct LcpOptions {
   SolverChoice solver = SolverChoice::kAuto;
-  double tolerance = 1e-10;  ///< largest scaled residual of a solution
-  int max_iterations = 100;  ///< of each interior-point run
+  double tolerance = kLcpTolerance;  ///< largest scaled residual of a solution
+  int max_iterations = 100;          ///< of each interior-point run
 };
 
 /// Solves the problem, or says why not. Data that does not fit or is not finite is refused: status

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <random>
 
+#include "tangible/lcp/system/tolerances.h"
+
 namespace tangible {
 namespace {
 
@@ -167,7 +169,7 @@ int RankOf(const ContactProblem<double>& problem, const std::vector<ActiveRow>& 
   Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(scaled);
   // Columns have norm 1; poses are known to about 1e-12 of their size. What tells pushes apart has
   // to be more than that.
-  qr.setThreshold(side == Side::kRows ? 1e-10 : 1e-7);
+  qr.setThreshold(side == Side::kRows ? kRowRank : kPushRank);
   return static_cast<int>(qr.rank());
 }
 

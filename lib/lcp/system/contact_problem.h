@@ -29,6 +29,7 @@
 #include <cmath>
 #include <vector>
 
+#include "tangible/lcp/system/tolerances.h"
 #include "tangible/math/scalar.h"
 
 namespace tangible {
@@ -189,7 +190,6 @@ void ForEachImpulse(const ContactProblem<double>& problem, const ContactSolution
 /// (bodies that rest side by side): there the contact would stick.
 inline double FrictionlessSlidingSign(const ContactProblem<double>& problem,
                                       const ContactBlock<double>& c, const double* v) {
-  constexpr double kRounding = 1e-12;
   const double slip = RowDot(c.a, c.tangent_a, c.b, c.tangent_b, v) + c.c_t;
   const std::vector<double>& momentum = problem.scale_momentum();
   double terms = std::abs(c.c_t);
@@ -201,7 +201,7 @@ inline double FrictionlessSlidingSign(const ContactProblem<double>& problem,
   };
   add(c.a, c.tangent_a);
   add(c.b, c.tangent_b);
-  return std::abs(slip) <= kRounding * terms ? 0.0 : slip > 0.0 ? 1.0 : -1.0;
+  return std::abs(slip) <= kSlipRounding * terms ? 0.0 : slip > 0.0 ? 1.0 : -1.0;
 }
 
 }  // namespace tangible

@@ -5,20 +5,14 @@
 #include <cmath>
 
 #include "tangible/lcp/system/contact_system.h"
+#include "tangible/lcp/system/tolerances.h"
 
 namespace tangible {
 namespace {
 
-// The slowest scale of a body's speed, of the fastest one's: what is below it times the tolerance
-// that can be asked for, 1e-10, is the fastest one's rounding.
-constexpr double kSlowest = 1e-6;
-
 // The fastest scale of what impulses alone would do to a body, of the fastest one's speed. Between
 // masses 1e20 times as large it would be beyond all speeds that there are, and any row small.
 constexpr double kMostPushed = 1e6;
-
-// The least lever of a body's rotation, of the longest arm of its rows.
-constexpr double kLeastLever = 1e-3;
 
 // The largest component of a row for a body, rotation at the body's lever.
 double RowSize(const RowPart<double>& row, double lever) {

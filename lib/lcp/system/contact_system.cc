@@ -6,6 +6,7 @@
 
 #include "tangible/lcp/system/contact_condensation.h"
 #include "tangible/lcp/system/joint_damping.h"
+#include "tangible/lcp/system/tolerances.h"
 #include "tangible/lcp/system/torque_free.h"
 #include "tangible/math/scratch.h"
 
@@ -14,15 +15,9 @@ namespace {
 
 // Refinement ends where the residual is at rounding level, or no longer falls. Derivatives of many
 // steps sum what is left of each: they take two rounds and more, as long as it helps a column.
-constexpr double kResidualGoal = 1e-15;
-constexpr double kDerivativeGoal = 1e-18;
 constexpr int kMaxRefinements = 40;
 // What contradicts redundant rows stays; a correction that leaves more than this of it is none.
 constexpr double kStays = 2.0;
-// Rows that leave more than this contradict each other.
-constexpr double kConsistent = 1e-14;
-// A condensed system that leaves more than this is factorised as a whole.
-constexpr double kStalled = 1e-12;
 
 // Adds (left)ᵀ (right) weight to a 3 x 3 block.
 void AddOuter(const RowPart<double>& left, const RowPart<double>& right, double weight,
@@ -392,7 +387,7 @@ double ContactSystem::SolveProximal(const ContactProblem<double>& problem,
   const FreeMomenta free = {problem.scale_momentum().data(), 1};
   const double left =
       Refine<false>(problem, modes, Regularisation::kLeftOut, free, x, columns, kResidualGoal);
-  if (left <= kConsistent) {
+  if (left <= kContradictory) {
     return left;
   }
   ++regularised_steps_;
@@ -472,7 +467,7 @@ double ContactSystem::Refine(const ContactProblem<double>& problem,
   }
   ResidualSize all;
   for (int c = 0; c < columns; ++c) {
-    if (masses_differ_ && sizes[c].ToParts() > kConsistent) {
+    if (masses_differ_ && sizes[c].ToParts() > kContradictory) {
       RefineConjugate<kTransposed>(problem, modes, regularisation, free, x, columns, c);
     }
     all.Include(sizes[c]);

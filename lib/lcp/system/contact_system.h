@@ -31,12 +31,10 @@
 
 #include "tangible/lcp/system/block_lu.h"
 #include "tangible/lcp/system/contact_problem.h"
+#include "tangible/lcp/system/tolerances.h"
 #include "tangible/lcp/system/torque_free.h"
 
 namespace tangible {
-
-/// δ as a fraction of r M⁻¹ rᵀ.
-constexpr double kContactRegularisation = 1e-10;
 
 /// Unknowns in blocks of three: bodies; joints; the closed contacts in order, each (λn, λt,
 /// unused).

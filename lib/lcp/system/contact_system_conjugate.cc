@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "tangible/lcp/system/contact_system.h"
+#include "tangible/lcp/system/tolerances.h"
 #include "tangible/math/scratch.h"
 
 namespace tangible {
@@ -17,9 +18,6 @@ constexpr int kMostDirections = 12;
 // other, or what is left is rounding.
 constexpr int kMostIdle = 3;
 constexpr double kLessened = 0.9;
-constexpr double kGoal = 1e-16;
-// A direction that others span but for this fraction is one of rounding.
-constexpr double kSpanned = 1e-10;
 
 }  // namespace
 
@@ -67,7 +65,8 @@ void ContactSystem::RefineConjugate(const ContactProblem<double>& problem,
   };
   residual(rhs, at, left);
   int idle = 0;
-  for (int k = 0; k < kMostDirections && idle < kMostIdle && size->ToParts() > kGoal; ++k) {
+  for (int k = 0; k < kMostDirections && idle < kMostIdle && size->ToParts() > kDirectionGoal;
+       ++k) {
     double* correction = corrections + rows * k;
     double* change = changes + rows * k;
     std::copy(left, left + rows, correction);

@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/lcp/system/mode_solve.h"
+
+#include <algorithm>
+
+namespace tangible {
+
+void ModeSolve::Reserve(size_t rows) {
+  for (std::vector<double>* x : {&rhs_, &start_, &x_}) {
+    x->reserve(rows);
+  }
+}
+
+bool ModeSolve::Solve(const ContactProblem<double>& problem, const ContactSolution<double>* centre,
+                      ContactSystem* system, ContactSolution<double>* solution) {
+  const std::vector<ContactMode>& modes = solution->modes;
+  if (!system->Factor(problem, modes)) {
+    return false;
+  }
+  const size_t first_joint = 3 * static_cast<size_t>(problem.num_bodies);
+  const size_t num_joint_rows = 3 * problem.joints.size();
+  const std::vector<int>& block_of = system->contact_block();
+  const auto sticks = [&](size_t i) { return modes[i] == ContactMode::kSticking; };
+  rhs_.assign(3 * static_cast<size_t>(system->num_blocks()), 0.0);
+  start_.assign(rhs_.size(), 0.0);
+  std::copy(problem.momentum.begin(), problem.momentum.end(), rhs_.begin());
+  for (size_t j = 0; j < problem.joints.size(); ++j) {
+    const size_t row = first_joint + 3 * j;
+    std::copy_n(problem.joints[j].rhs, problem.joints[j].rows, &rhs_[row]);
+    if (centre != nullptr) {
+      std::copy_n(&centre->joint_impulse[3 * j], 3, &start_[row]);
+    }
+  }
+  for (size_t i = 0; i < problem.contacts.size(); ++i) {
+    if (block_of[i] < 0) {
+      continue;
+    }
+    const ContactBlock<double>& contact = problem.contacts[i];
+    const size_t row = 3 * static_cast<size_t>(block_of[i]);
+    rhs_[row] = contact.driven ? contact.offset : -contact.c_n;
+    rhs_[row + 1] = sticks(i) ? -contact.c_t : 0.0;
+    if (centre != nullptr) {
+      start_[row] = contact.driven ? contact.offset : centre->normal_impulse[i];
+      start_[row + 1] = sticks(i) ? centre->tangent_impulse[i] : 0.0;
+    }
+  }
+  if (centre != nullptr) {
+    // The solution is x0 + K⁻¹ (rhs − K x0).
+    x_.resize(rhs_.size());
+    system->Residual<false>(problem, modes, rhs_.data(), start_.data(), 1, x_.data());
+    system->SolveProximal(problem, modes, x_.data(), 1);
+  } else {
+    x_ = rhs_;
+    system->Solve(problem, modes, x_.data(), 1);
+  }
+  for (size_t i = 0; i < x_.size(); ++i) {
+    x_[i] += start_[i];
+  }
+  const auto joints = x_.begin() + static_cast<std::ptrdiff_t>(first_joint);
+  solution->v.assign(x_.begin(), joints);
+  solution->joint_impulse.assign(joints, joints + static_cast<std::ptrdiff_t>(num_joint_rows));
+  solution->normal_impulse.assign(problem.contacts.size(), 0.0);
+  solution->tangent_impulse.assign(problem.contacts.size(), 0.0);
+  for (size_t i = 0; i < problem.contacts.size(); ++i) {
+    if (block_of[i] < 0) {
+      continue;
+    }
+    const size_t row = 3 * static_cast<size_t>(block_of[i]);
+    solution->normal_impulse[i] = x_[row];
+    if (sticks(i)) {
+      solution->tangent_impulse[i] = x_[row + 1];
+    } else if (SlidingSign(modes[i]) != 0.0) {
+      solution->tangent_impulse[i] =
+          -SlidingSign(modes[i]) * problem.contacts[i].friction * x_[row];
+    }
+  }
+  return true;
+}
+
+}  // namespace tangible

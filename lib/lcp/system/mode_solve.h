@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// The solution of a contact problem whose modes are given: one linear system,
+//   K x = (p, b, −c),   x = (v, y, λ),
+// with λt = −σ μ λn where a contact slides, and λn = o where it is driven. Whether the solution
+// satisfies the inequalities that the modes assume is for the caller to look at.
+
+#include <vector>
+
+#include "tangible/lcp/system/contact_system.h"
+
+namespace tangible {
+
+class ModeSolve {
+ public:
+  /// Factorises `system` with the modes of `solution` and fills in the rest of it; false where the
+  /// system is singular. With `centre`, whose impulses are given, the solve is a proximal step from
+  /// these: of many impulses with the same motion those near to them. `centre` may be `solution`.
+  bool Solve(const ContactProblem<double>& problem, const ContactSolution<double>* centre,
+             ContactSystem* system, ContactSolution<double>* solution);
+  /// Memory for so many rows.
+  void Reserve(size_t rows);
+
+ private:
+  std::vector<double> rhs_, start_, x_;
+};
+
+}  // namespace tangible
