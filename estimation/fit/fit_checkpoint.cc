@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tangible/estimation/fit/fit_checkpoint.h"
 
-#include <charconv>
-#include <cstring>
 #include <utility>
 
 #include "tangible/math/bit_hash.h"
@@ -12,164 +10,94 @@
 namespace tangible {
 namespace {
 
-constexpr char kFormat[] = "tangible-fit checkpoint 1";
-constexpr int kDigits = 16;  // hexadecimal, of a number
-constexpr char kZero = '.';  // Jacobians of multiple shooting are full of them
+constexpr char kFormat[] = "tangible-fit checkpoint 2";
 // A write waits until so many times the last one's time has gone by.
 constexpr int kWait = 10;
 
-// ---- numbers as their bits
-
-template <typename Numbers>
-std::string Bits(const Numbers& numbers) {
-  static constexpr char kHexadecimal[] = "0123456789abcdef";
-  std::string text;
-  for (size_t i = 0; i < static_cast<size_t>(numbers.size()); ++i) {
-    std::uint64_t bits = 0;
-    std::memcpy(&bits, numbers.data() + i, sizeof bits);
-    if (bits == 0) {
-      text += kZero;
-      continue;
-    }
-    for (int digit = kDigits - 1; digit >= 0; --digit) {
-      text += kHexadecimal[(bits >> (4 * digit)) & 15U];
-    }
-  }
-  return text;
+// CBOR holds doubles as they are, infinite ones too.
+template <typename Values>
+Json Array(const Values& values) {
+  return std::vector<double>(values.data(), values.data() + values.size());
 }
 
-std::string Bits(double x) { return Bits(std::array<double, 1>{x}); }
-
-std::vector<double> Numbers(const JsonReader& json) {
-  const std::string text = json.String();
-  const char* const end = text.data() + text.size();
-  std::vector<double> numbers;
-  for (const char* at = text.data(); at != end;) {
-    std::uint64_t bits = 0;
-    if (*at == kZero) {
-      ++at;
-    } else {
-      const char* const next = end - at < kDigits ? end : at + kDigits;
-      if (next - at < kDigits || std::from_chars(at, next, bits, 16).ptr != next) {
-        json.Fail("expected numbers of 16 hexadecimal digits each");
-        return {};
-      }
-      at = next;
-    }
-    double number = 0.0;
-    std::memcpy(&number, &bits, sizeof number);
-    numbers.push_back(number);
-  }
-  return numbers;
-}
-
-Eigen::VectorXd ReadVector(const JsonReader& json) {
-  const std::vector<double> numbers = Numbers(json);
-  return Eigen::Map<const Eigen::VectorXd>(numbers.data(),
-                                           static_cast<Eigen::Index>(numbers.size()));
-}
-
-double ReadNumber(const JsonReader& json) {
-  const std::vector<double> numbers = Numbers(json);
-  return numbers.size() == 1 ? numbers[0] : 0.0;
+Eigen::VectorXd ReadVector(const Json& json) {
+  const auto values = json.get<std::vector<double>>();
+  return Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<Eigen::Index>(values.size()));
 }
 
 /// `rows` rows of any length.
-RowMatrixXd ReadMatrix(const JsonReader& json, Eigen::Index rows) {
-  const std::vector<double> numbers = Numbers(json);
-  const auto size = static_cast<Eigen::Index>(numbers.size());
-  if (rows == 0 ? size > 0 : size % rows != 0) {
-    json.Fail("expected a multiple of " + std::to_string(rows) + " numbers, got " +
-              std::to_string(size));
-    return {};
-  }
-  return Eigen::Map<const RowMatrixXd>(numbers.data(), rows, rows == 0 ? 0 : size / rows);
+RowMatrixXd ReadMatrix(const Json& json, Eigen::Index rows) {
+  const auto values = json.get<std::vector<double>>();
+  const auto size = static_cast<Eigen::Index>(values.size());
+  return Eigen::Map<const RowMatrixXd>(values.data(), rows, rows == 0 ? 0 : size / rows);
 }
-
-// ---- what is kept
-
-constexpr int kMostCount = 2'000'000'000;
 
 Json ToJson(const EvaluationLog& log) {
   Json array = Json::array();
   for (const Evaluation& e : log.evaluations()) {
-    array.push_back({{"at", Bits(e.at)},
+    array.push_back({{"at", Array(e.at)},
                      {"with_jacobian", e.with_jacobian},
                      {"done", e.done},
                      {"message", e.message},
                      {"rollouts", e.rollouts},
-                     {"residuals", Bits(e.residuals)},
-                     {"jacobian", Bits(e.jacobian)}});
+                     {"residuals", Array(e.residuals)},
+                     {"jacobian", Array(e.jacobian)}});
   }
   return array;
 }
 
-void Read(const JsonReader& json, EvaluationLog* log) {
-  std::vector<Evaluation> evaluations(static_cast<size_t>(json.ExpectArray("evaluations")));
-  for (size_t i = 0; i < evaluations.size(); ++i) {
-    const JsonReader entry = json.At(static_cast<int>(i));
-    Evaluation& e = evaluations[i];
-    e.at = ReadVector(entry.At("at"));
-    e.with_jacobian = entry.At("with_jacobian").Boolean();
-    e.done = entry.At("done").Boolean();
-    e.message = entry.At("message").String();
-    e.rollouts = entry.At("rollouts").Integer(0, kMostCount);
-    e.residuals = ReadVector(entry.At("residuals"));
-    e.jacobian = ReadMatrix(entry.At("jacobian"), e.residuals.size());
+void Read(const Json& json, EvaluationLog* log) {
+  std::vector<Evaluation> evaluations;
+  for (const Json& entry : json) {
+    Evaluation& e = evaluations.emplace_back();
+    e.at = ReadVector(entry.at("at"));
+    e.with_jacobian = entry.at("with_jacobian");
+    e.done = entry.at("done");
+    e.message = entry.at("message");
+    e.rollouts = entry.at("rollouts");
+    e.residuals = ReadVector(entry.at("residuals"));
+    e.jacobian = ReadMatrix(entry.at("jacobian"), e.residuals.size());
   }
   log->Restore(std::move(evaluations));
 }
 
 Json ToJson(const FitStart& start) {
-  return {{"initial", Bits(start.initial)},
-          {"cost", Bits(start.cost)},
+  return {{"initial", start.initial},
+          {"cost", start.cost},
           {"iterations", start.iterations},
           {"shooting_iterations", start.shooting_iterations},
           {"status", start.status}};
 }
 
-FitStart ReadStart(const JsonReader& json) {
-  FitStart start;
-  start.initial = Numbers(json.At("initial"));
-  start.cost = ReadNumber(json.At("cost"));
-  start.iterations = json.At("iterations").Integer(0, kMostCount);
-  start.shooting_iterations = json.At("shooting_iterations").Integer(0, kMostCount);
-  start.status = json.At("status").String();
-  return start;
+FitStart ReadStart(const Json& json) {
+  return {json.at("initial"), json.at("cost"), json.at("iterations"),
+          json.at("shooting_iterations"), json.at("status")};
 }
 
 Json ToJson(const Minimum& minimum) {
   Json iterations = Json::array();
   for (const FitIteration& i : minimum.iterations) {
-    iterations.push_back({{"cost", Bits(i.cost)},
-                          {"gradient_norm", Bits(i.gradient_norm)},
-                          {"parameters", Bits(i.parameters)},
-                          {"seconds", Bits(i.seconds)}});
+    iterations.push_back({i.cost, i.gradient_norm, i.parameters, i.seconds});
   }
   return {{"status", static_cast<int>(minimum.status)},
           {"message", minimum.message},
-          {"parameters", Bits(minimum.parameters)},
-          {"cost", Bits(minimum.cost)},
-          {"residuals", Bits(minimum.residuals)},
-          {"jacobian", Bits(minimum.jacobian)},
+          {"parameters", Array(minimum.parameters)},
+          {"cost", minimum.cost},
+          {"residuals", Array(minimum.residuals)},
+          {"jacobian", Array(minimum.jacobian)},
           {"iterations", iterations}};
 }
 
-Minimum ReadMinimum(const JsonReader& json) {
+Minimum ReadMinimum(const Json& json) {
   Minimum minimum;
-  minimum.status =
-      static_cast<FitStatus>(json.At("status").Integer(0, static_cast<int>(FitStatus::kNoEffect)));
-  minimum.message = json.At("message").String();
-  minimum.parameters = ReadVector(json.At("parameters"));
-  minimum.cost = ReadNumber(json.At("cost"));
-  minimum.residuals = ReadVector(json.At("residuals"));
-  minimum.jacobian = ReadMatrix(json.At("jacobian"), minimum.residuals.size());
-  const JsonReader iterations = json.At("iterations");
-  for (int i = 0; i < iterations.ExpectArray("iterations"); ++i) {
-    const JsonReader entry = iterations.At(i);
-    minimum.iterations.push_back(
-        {ReadNumber(entry.At("cost")), ReadNumber(entry.At("gradient_norm")),
-         Numbers(entry.At("parameters")), ReadNumber(entry.At("seconds"))});
+  minimum.status = static_cast<FitStatus>(json.at("status").get<int>());
+  minimum.message = json.at("message");
+  minimum.parameters = ReadVector(json.at("parameters"));
+  minimum.cost = json.at("cost");
+  minimum.residuals = ReadVector(json.at("residuals"));
+  minimum.jacobian = ReadMatrix(json.at("jacobian"), minimum.residuals.size());
+  for (const Json& i : json.at("iterations")) {
+    minimum.iterations.push_back({i.at(0), i.at(1), i.at(2), i.at(3)});
   }
   return minimum;
 }
@@ -187,27 +115,30 @@ Json ToJson(const FitLog& log) {
     json["best"] = ToJson(log.best);
   }
   if (log.shot) {
-    json["shot"] = {{"parameters", Bits(log.shot->parameters)},
-                    {"iterations", log.shot->iterations}};
+    json["shot"] = {Array(log.shot->parameters), log.shot->iterations};
   }
   return json;
 }
 
-void Read(const JsonReader& json, FitLog* log) {
-  Read(json.At("search"), &log->search);
-  Read(json.At("start"), &log->start);
-  log->rollouts = json.At("rollouts").Integer(0, kMostCount);
-  const JsonReader starts = json.At("starts");
-  for (int i = 0; i < starts.ExpectArray("starts"); ++i) {
-    log->starts.push_back(ReadStart(starts.At(i)));
+void Read(const Json& json, FitLog* log) {
+  Read(json.at("search"), &log->search);
+  Read(json.at("start"), &log->start);
+  log->rollouts = json.at("rollouts");
+  for (const Json& start : json.at("starts")) {
+    log->starts.push_back(ReadStart(start));
   }
   if (!log->starts.empty()) {
-    log->best = ReadMinimum(json.At("best"));
+    log->best = ReadMinimum(json.at("best"));
   }
-  if (json.Has("shot")) {
-    log->shot = {ReadVector(json.At("shot").At("parameters")),
-                 json.At("shot").At("iterations").Integer(0, kMostCount)};
+  if (json.contains("shot")) {
+    log->shot = {ReadVector(json.at("shot").at(0)), json.at("shot").at(1)};
   }
+}
+
+std::string Encode(const Json& json) {
+  std::string text;
+  Json::to_cbor(json, text);
+  return text;
 }
 
 std::string HashOf(const std::string& text) {
@@ -285,47 +216,37 @@ FitCheckpoint::FitCheckpoint(const FitProblem& problem, Writer writer)
 
 std::string FitCheckpoint::Text() const {
   const Json fits = {ToJson(fits_[0]), ToJson(fits_[1])};
-  BitHash problem;
-  problem.Add(problem_);
-  const Json json = {{"format", kFormat},
-                     {"problem", problem.Text()},
-                     {"content", HashOf(fits.dump())},
-                     {"fits", fits}};
-  return json.dump(0) + "\n";
+  return Encode({{"format", kFormat},
+                 {"problem", problem_},
+                 {"content", HashOf(Encode(fits))},
+                 {"fits", fits}});
 }
 
 std::string FitCheckpoint::Restore(const std::string& text, const std::string& file) {
-  Json json;
-  std::string error;
-  if (!ParseJson(text, file, &json, &error)) {
-    return error;
+  const Json json = Json::from_cbor(text, true, false);
+  if (!json.is_object() || json.value("format", Json()) != kFormat) {
+    return file + ": expected a \"" + kFormat +
+           "\", got another or a damaged file; remove it to begin anew";
   }
-  JsonErrors errors(file);
-  const JsonReader root(json, &errors);
-  root.ExpectKeys({"format", "problem", "content", "fits"});
-  const std::string format = root.At("format").String();
-  if (root.ok() && format != kFormat) {
-    root.At("format").FailExpected(std::string("\"") + kFormat + "\"");
+  if (json.value("problem", Json()) != problem_) {
+    return file +
+           ": /problem: a checkpoint of another fit: scene, parameters, observations or options "
+           "differ; name another file, or remove this one to begin anew";
   }
-  const std::string content = root.At("content").String();
-  if (root.ok() && (!json.contains("fits") || content != HashOf(json["fits"].dump()))) {
-    root.At("fits").Fail(
-        "damaged: its content is not what was written; remove the file to begin anew");
+  const std::string damaged =
+      file + ": /fits: damaged: its content is not what was written; remove the file to begin anew";
+  const Json fits = json.value("fits", Json());
+  if (json.value("content", Json()) != HashOf(Encode(fits))) {
+    return damaged;
   }
-  BitHash problem;
-  problem.Add(problem_);
-  if (root.ok() && root.At("problem").String() != problem.Text()) {
-    root.At("problem").Fail(
-        "a checkpoint of another fit: scene, parameters, observations or options differ; name "
-        "another file, or remove this one to begin anew");
-  }
-  const JsonReader fits = root.At("fits");
-  if (fits.ExpectArray("two fits") == 2) {
-    for (int i = 0; i < 2; ++i) {
-      Read(fits.At(i), &fits_[static_cast<size_t>(i)]);
+  try {
+    for (size_t i = 0; i < fits_.size(); ++i) {
+      Read(fits.at(i), &fits_[i]);
     }
+  } catch (const Json::exception&) {
+    return damaged;
   }
-  return errors.message();
+  return "";
 }
 
 std::string FitCheckpoint::Write() {
