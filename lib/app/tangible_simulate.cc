@@ -222,7 +222,8 @@ int Run(const std::string& file) {
   if (!error.empty()) return ReportError(error);
   // Of a run that failed its one line says why.
   if (run.report.status != StepStatus::kDone) return ReportError(file + ": " + run.report.message);
-  for (const std::string& line : lines) ReportError(file + ": warning: " + line);
+  const std::string warning = file + ": warning: ";
+  for (const std::string& line : lines) ReportError(warning + line);
   return kExitDone;
 }
 

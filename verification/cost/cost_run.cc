@@ -107,6 +107,25 @@ std::string Budgeted(double amount, const char* unit) {
   return text.str();
 }
 
+// What stands in the place of a time that there is none of; true where there is one.
+bool SetInstead(const Budget& budget, const ChildOutcome& outcome, CostCell* cell) {
+  switch (outcome.status) {
+    case ChildStatus::kOverSeconds:
+      cell->instead = Budgeted(budget.seconds, "s");
+      return false;
+    case ChildStatus::kOverBytes:
+      cell->instead = Budgeted(static_cast<double>(budget.bytes) / (1 << 30), "GiB");
+      return false;
+    case ChildStatus::kFailed:
+      cell->instead = outcome.message;
+      cell->failed = true;
+      return false;
+    case ChildStatus::kDone:
+      return true;
+  }
+  return false;
+}
+
 }  // namespace
 
 const char* NameOf(CostMethod method) {
@@ -229,19 +248,8 @@ CostCell MeasureCell(const CostOptions& options, CostMethod method, int paramete
   };
   const ChildOutcome outcome = RunInChild(options.budget, work);
   cell.peak_bytes = outcome.peak_bytes;
-  switch (outcome.status) {
-    case ChildStatus::kOverSeconds:
-      cell.instead = Budgeted(options.budget.seconds, "s");
-      return cell;
-    case ChildStatus::kOverBytes:
-      cell.instead = Budgeted(static_cast<double>(options.budget.bytes) / (1 << 30), "GiB");
-      return cell;
-    case ChildStatus::kFailed:
-      cell.instead = outcome.message;
-      cell.failed = true;
-      return cell;
-    case ChildStatus::kDone:
-      break;
+  if (!SetInstead(options.budget, outcome, &cell)) {
+    return cell;
   }
   size_t at = 0;
   *gradient = Get(outcome.values, &at);

@@ -79,6 +79,7 @@ Vector3<double> Momentum(const Model<double>& model, const State<double>& state)
 double DeepestPenetration(const Model<double>& model, const State<double>& state) {
   const ModelStructure& s = *model.structure;
   std::vector<Aabb> boxes;
+  boxes.reserve(s.num_bodies());
   for (int body = 0; body < s.num_bodies(); ++body) {
     boxes.push_back(BoxOfTouching(ComputeAabb(model.Shape(body), state.PoseOf(body), 0.0)));
   }
