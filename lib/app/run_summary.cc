@@ -54,7 +54,7 @@ OrderedJson UndeterminedJson(const Model<double>& model, const State<double>& at
   ContactProblem<double> problem;
   AssemblyScratch<double> scratch;
   AssembleFree(model, at, step.time, step.h, &problem, &scratch);
-  AssembleContacts(model, at, step.h, step.contacts, step.friction, step.restitution, scratch,
+  AssembleContacts(model, at, step.h, step.contacts, step.friction, step.restitution, &scratch,
                    &problem);
   const int impulses = CountRedundantRows(problem, step.solution.modes);
   const int motions = impulses > 0 ? CountUndeterminedMotions(problem, step.solution.modes) : 0;

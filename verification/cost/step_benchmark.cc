@@ -109,6 +109,26 @@ void BenchmarkTangent(benchmark::State& state, const Scene& scene) {
   state.counters["rollouts"] = best / rollout;
 }
 
+// The entries of ∂R/∂w of one step, times one column of the adjoint: bodies, hinges and contacts by
+// hand, or all elements by their templates in Jets.
+void BenchmarkJacobian(benchmark::State& state, const Scene& scene, JacobianRoute route) {
+  Case c(scene);
+  Stepper stepper(c.model);
+  State<double> at = c.initial;
+  const double h = scene.simulation.dt;
+  for (int k = 0; k < 300; ++k) {
+    stepper.Step(c.model, k * h, h, &at);
+  }
+  const SolvedEquations step = stepper.record().View(stepper.system().contact_block());
+  const std::vector<double> u(3 * static_cast<size_t>(stepper.system().num_blocks()), 1.0);
+  std::vector<double> w_bar(static_cast<size_t>(c.model.structure->num_variables()), 0.0);
+  LocalJacobianScratch scratch;
+  for (auto _ : state) {
+    VisitJacobian(c.model, step, route, &scratch, SingleAdjointSink{u.data(), w_bar.data()});
+    benchmark::DoNotOptimize(w_bar.data());
+  }
+}
+
 // The linear system of a step of `discs` settled discs without friction, factorised and solved;
 // with angles that are coupled by nothing that counts, or without.
 void BenchmarkDiscSystem(benchmark::State& state, double arm) {
@@ -147,6 +167,11 @@ BENCHMARK_CAPTURE(BenchmarkAdjoint, chain_keep, Chain(), Factorisations::kKeep)
     ->Unit(benchmark::kMillisecond);
 BENCHMARK_CAPTURE(BenchmarkAdjoint, chain_recompute, Chain(), Factorisations::kRecompute)
     ->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(BenchmarkJacobian, chain_by_hand, Chain(), JacobianRoute::kByHand);
+BENCHMARK_CAPTURE(BenchmarkJacobian, chain_by_templates, Chain(), JacobianRoute::kGeneric);
+BENCHMARK_CAPTURE(BenchmarkJacobian, discs_10_by_hand, DiscsScene(10), JacobianRoute::kByHand);
+BENCHMARK_CAPTURE(BenchmarkJacobian, discs_10_by_templates, DiscsScene(10),
+                  JacobianRoute::kGeneric);
 BENCHMARK_CAPTURE(BenchmarkTangent, chain, Chain())
     ->Arg(1)
     ->Arg(8)

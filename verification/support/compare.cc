@@ -51,7 +51,7 @@ class TermsOfStep {
     const ContactProblem<double>& problem = t_.record.problem;
     std::vector<JacobianEntry> entries;
     LocalJacobianScratch scratch;
-    VisitStepJacobian(model_, t_.record.View(t_.system.contact_block()), JointRoute::kByHand,
+    VisitJacobian(model_, t_.record.View(t_.system.contact_block()), JacobianRoute::kByHand,
                       &scratch, EntryListSink{&entries});
     x_.setZero(3 * t_.system.num_blocks(), w_dot.cols());
     t_.rows.setZero(x_.rows(), x_.cols());

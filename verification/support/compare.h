@@ -10,7 +10,7 @@
 //
 // with S the sum of the magnitudes of the contributions to the entry, o an output and p a
 // parameter. After any number k of steps ∂o/∂p = Σᵢ w̄ₖ(i, o) ẇₖ(i, p) over all variables i, and the
-// step after it passes on uᵀ (∂R/∂w) ẇ, with Kᵀ u = x̄ and K ẋ = −(∂R/∂w) ẇ (local_jacobian.h).
+// step after it passes on uᵀ (∂R/∂w) ẇ, with Kᵀ u = x̄ and K ẋ = −(∂R/∂w) ẇ (equation_jacobian.h).
 // Rounding in step k changes the entry by some ε of the magnitudes of the terms of these products,
 // those of the linear solve included:
 //

@@ -9,148 +9,27 @@
 #include <limits>
 
 #include "tangible/dynamics/assembly/assembly.h"
+#include "tangible/dynamics/assembly/equations_inl.h"
 #include "tangible/math/scratch.h"
 
 namespace tangible {
 namespace internal {
 
+/// row · twist over the bodies of the row that do not move by forces (block < 0).
 template <typename T>
-class FreeAssembly {
- public:
-  FreeAssembly(const Model<T>& model, const State<T>& state, double t, double h,
-               ContactProblem<T>* problem, std::vector<Pose<T>>* poses)
-      : model_(model),
-        structure_(*model.structure),
-        state_(state),
-        t_(t),
-        h_(h),
-        p_(*problem),
-        poses_(*poses) {
-    poses_.clear();
-    for (int body = 0; body < structure_.num_bodies(); ++body) {
-      poses_.push_back(state.PoseOf(body));
+T PrescribedSpeed(const ModelStructure& structure, const State<T>& state, int a,
+                  const RowPart<T>& row_a, int b, const RowPart<T>& row_b) {
+  T speed(0.0);
+  for (int i = 0; i < 3; ++i) {
+    if (structure.bodies[a].block < 0) {
+      speed += row_a[i] * state.twist[3 * a + i];
+    }
+    if (structure.bodies[b].block < 0) {
+      speed += row_b[i] * state.twist[3 * b + i];
     }
   }
-
-  void Bodies() {
-    p_.num_bodies = structure_.num_blocks();
-    SizeScratch(3 * static_cast<size_t>(p_.num_bodies), &p_.mass);
-    SizeScratch(3 * static_cast<size_t>(p_.num_bodies), &p_.momentum);
-    p_.dampers.clear();
-    p_.joints.clear();
-    p_.contacts.clear();
-    p_.pushed_momentum.clear();
-    p_.redundant_joints = structure_.joint_loops;
-    const std::vector<T>& x = model_.numbers;
-    for (int k = 0; k < p_.num_bodies; ++k) {
-      const int body = structure_.moving[k];
-      const BodyIndex& index = structure_.bodies[body];
-      const T& mass = x[index.mass];
-      const T damped = mass + h_ * x[index.linear_damping];
-      p_.mass[3 * k] = damped;
-      p_.mass[3 * k + 1] = damped;
-      p_.mass[3 * k + 2] = x[index.inertia] + h_ * x[index.angular_damping];
-      p_.momentum[3 * k] = mass * (state_.twist[3 * body] + h_ * x[kGravityX]);
-      p_.momentum[3 * k + 1] = mass * (state_.twist[3 * body + 1] + h_ * x[kGravityY]);
-      p_.momentum[3 * k + 2] = x[index.inertia] * state_.twist[3 * body + 2];
-    }
-  }
-
-  void Springs() {
-    for (const SpringIndex& spring : structure_.springs) {
-      SpringRow<T> row;
-      EvaluateSpring(poses_[spring.a], poses_[spring.b], &model_.numbers[spring.numbers], &row);
-      AddImpulse(spring.a, row.pull_a, spring.b, row.pull_b, T(-h_));
-      AddDamper(spring.a, row.row_a, spring.b, row.row_b,
-                T(h_ * model_.numbers[spring.numbers + 5]));
-    }
-  }
-
-  void Forces() {
-    for (const ForceIndex& force : structure_.forces) {
-      const int block = structure_.bodies[force.body].block;
-      if (block < 0) {
-        continue;
-      }
-      const std::vector<T>& x = model_.numbers;
-      T impulse[3];
-      ForceImpulse(structure_, force, t_, h_, state_.pose[3 * force.body + 2], &x[force.numbers],
-                   force.start >= 0 ? &x[force.start] : nullptr,
-                   force.end >= 0 ? &x[force.end] : nullptr, impulse);
-      for (int i = 0; i < 3; ++i) {
-        p_.momentum[3 * block + i] += impulse[i];
-      }
-    }
-  }
-
-  void Joints(bool correct_drift, std::vector<JointRows<T>>* rows) {
-    rows->resize(structure_.joints.size());
-    p_.joints.reserve(structure_.joints.size());
-    for (size_t j = 0; j < rows->size(); ++j) {
-      const JointIndex& joint = structure_.joints[j];
-      JointRows<T>& r = (*rows)[j];
-      EvaluateJoint(joint.type, poses_[joint.a], poses_[joint.b], &model_.numbers[joint.geometry],
-                    &r);
-      JointBlock<T>& block = p_.joints.emplace_back();
-      block.a = structure_.bodies[joint.a].block;
-      block.b = structure_.bodies[joint.b].block;
-      block.rows = r.rows;
-      const bool correct = correct_drift && h_ > 0.0 &&
-                           JointCorrectionOf(structure_.settings) == JointCorrection::kBaumgarte;
-      for (int k = 0; k < r.rows; ++k) {
-        block.row_a[k] = r.row_a[k];
-        block.row_b[k] = r.row_b[k];
-        block.rhs[k] =
-            -PrescribedSpeed(structure_, state_, joint.a, r.row_a[k], joint.b, r.row_b[k]);
-        if (correct) {
-          block.rhs[k] -= (structure_.settings.baumgarte / h_) * r.error[k];
-        }
-      }
-      Drive(joint, r);
-    }
-  }
-
- private:
-  // Damping and effort along a joint's coordinate.
-  void Drive(const JointIndex& joint, const JointRows<T>& r) {
-    if (joint.damping < 0 || h_ == 0.0) {
-      return;
-    }
-    if (joint.effort_signal >= 0) {
-      const double effort = MeanEffort(structure_, joint, t_, h_);
-      AddImpulse(joint.a, r.coordinate_a, joint.b, r.coordinate_b, T(h_ * effort));
-    } else if (model_.numbers[joint.effort] != T(0.0) || NumDerivatives<T>::value > 0) {
-      AddImpulse(joint.a, r.coordinate_a, joint.b, r.coordinate_b,
-                 T(h_ * model_.numbers[joint.effort]));
-    }
-    AddDamper(joint.a, r.coordinate_a, joint.b, r.coordinate_b,
-              T(h_ * model_.numbers[joint.damping]));
-  }
-
-  void AddImpulse(int a, const RowPart<T>& row_a, int b, const RowPart<T>& row_b,
-                  const T& impulse) {
-    AddRowTransposed(structure_.bodies[a].block, row_a, structure_.bodies[b].block, row_b, impulse,
-                     p_.momentum.data());
-  }
-
-  void AddDamper(int a, const RowPart<T>& row_a, int b, const RowPart<T>& row_b, const T& weight) {
-    // Without derivatives a damper of weight 0 is nothing; with them its derivative counts.
-    if (ValueOf(weight) == 0.0 && NumDerivatives<T>::value == 0) {
-      return;
-    }
-    const T prescribed = PrescribedSpeed(structure_, state_, a, row_a, b, row_b);
-    AddImpulse(a, row_a, b, row_b, T(-weight * prescribed));
-    p_.dampers.push_back(
-        {structure_.bodies[a].block, structure_.bodies[b].block, row_a, row_b, weight});
-  }
-
-  const Model<T>& model_;
-  const ModelStructure& structure_;
-  const State<T>& state_;
-  const double t_, h_;
-  ContactProblem<T>& p_;
-  std::vector<Pose<T>>& poses_;
-};
+  return speed;
+}
 
 // Rounding of a gap: a few units in the last place of the positions it is the difference of, m.
 template <typename T>
@@ -164,18 +43,187 @@ double PositionRounding(const State<T>& state, int a, int b) {
   return kUnits * size;
 }
 
+/// The builder of equations_inl.h that stores the elements in a contact problem.
+template <Level kLevel, typename T>
+class ProblemBuilder {
+ public:
+  using Scalar = T;
+  static constexpr bool kKeepsJoints = true;
+
+  ProblemBuilder(const Model<T>& model, const State<T>& state, const Instant<T>& instant,
+                 AssemblyScratch<T>* scratch, ContactProblem<T>* problem)
+      : model_(model),
+        s_(*model.structure),
+        state_(state),
+        at_(instant),
+        scratch_(*scratch),
+        p_(*problem),
+        equations_(s_, at_, this) {}
+
+  /// All but the contacts. An impact has no forces.
+  void AssembleElements() {
+    p_.num_bodies = s_.num_blocks();
+    SizeScratch(3 * static_cast<size_t>(p_.num_bodies), &p_.mass);
+    SizeScratch(3 * static_cast<size_t>(p_.num_bodies), &p_.momentum);
+    p_.dampers.clear();
+    p_.joints.clear();
+    p_.contacts.clear();
+    p_.pushed_momentum.clear();
+    p_.redundant_joints = s_.joint_loops;
+    scratch_.poses.clear();
+    for (int body = 0; body < s_.num_bodies(); ++body) {
+      scratch_.poses.push_back(state_.PoseOf(body));
+    }
+    for (int k = 0; k < p_.num_bodies; ++k) {
+      equations_.Body(k);
+    }
+    if (kLevel != Level::kCorrection && equations_.Weight() > 0.0) {
+      for (const SpringIndex& spring : s_.springs) {
+        equations_.Spring(spring);
+      }
+      for (const ForceIndex& force : s_.forces) {
+        equations_.Force(force);
+      }
+    }
+    scratch_.joints.resize(s_.joints.size());
+    scratch_.rates.resize(kLevel == Level::kAcceleration ? s_.joints.size() : 1);
+    p_.joints.reserve(s_.joints.size());
+    for (size_t j = 0; j < s_.joints.size(); ++j) {
+      equations_.Joint(static_cast<int>(j));
+    }
+  }
+
+  /// `restitution` may be null where no contact rebounds.
+  void AssembleContacts(const std::vector<ActiveContact>& contacts,
+                        const std::vector<CoefficientSource>& friction,
+                        const std::vector<CoefficientSource>* restitution) {
+    friction_ = &friction;
+    restitution_ = restitution;
+    p_.contacts.clear();
+    p_.contacts.reserve(contacts.size());
+    for (size_t i = 0; i < contacts.size(); ++i) {
+      equations_.Contact(static_cast<int>(i), contacts[i]);
+    }
+  }
+
+  void Begin() {}
+  const T& Number(int i) const { return model_.numbers[i]; }
+  const T* Numbers(int first, int, T*) const { return &model_.numbers[first]; }
+  const Pose<T>& PoseOf(int body) const { return scratch_.poses[body]; }
+  const T& Angle(int body) const { return state_.pose[3 * body + 2]; }
+  const T* TwistOf(int body, T*) const { return &state_.twist[3 * body]; }
+  MovingPose<T> Moving(int body) const {
+    return {PoseOf(body),
+            {state_.twist[3 * body], state_.twist[3 * body + 1], state_.twist[3 * body + 2]}};
+  }
+  ShapeView<T> ShapeOfA(const ActiveContact& contact) const { return model_.Shape(contact.a); }
+  ShapeView<T> ShapeOfB(const ActiveContact& contact) const { return model_.Shape(contact.b); }
+  JointRows<T>& RowsOf(int j) { return scratch_.joints[j]; }
+  JointRates<T>& RatesOf(int j) { return scratch_.rates[kLevel == Level::kAcceleration ? j : 0]; }
+  ContactRateScratch<T>* RateScratch() { return &scratch_.contact; }
+  T Restitution(int i) const { return EvaluateCoefficient((*restitution_)[i], model_.numbers); }
+  T Approach(const ActiveContact& contact, const ContactRows<T>& rows) const {
+    return RelativeSpeed(state_, contact.a, rows.normal_a, contact.b, rows.normal_b);
+  }
+  const T& Time() const { return at_.time; }
+
+  void Body(int k, const T mass[3], const T momentum[3]) {
+    std::copy_n(mass, 3, &p_.mass[3 * static_cast<size_t>(k)]);
+    std::copy_n(momentum, 3, &p_.momentum[3 * static_cast<size_t>(k)]);
+  }
+
+  void Push(int a, const RowPart<T>& row_a, int b, const RowPart<T>& row_b, const T& amount) {
+    AddRowTransposed(s_.bodies[a].block, row_a, s_.bodies[b].block, row_b, amount,
+                     p_.momentum.data());
+  }
+
+  void AddForce(int body, const T value[3]) {
+    for (int i = 0; i < 3; ++i) {
+      p_.momentum[3 * s_.bodies[body].block + i] += value[i];
+    }
+  }
+
+  void Along(int a, const RowPart<T>& row_a, int b, const RowPart<T>& row_b, const T& push,
+             const T& damping) {
+    if constexpr (kLevel == Level::kVelocity) {
+      // Without derivatives 0 is nothing; with them its derivative counts.
+      const bool has_derivatives = NumDerivatives<T>::value > 0;
+      if (has_derivatives || push != T(0.0)) {
+        Push(a, row_a, b, row_b, push);
+      }
+      if (has_derivatives || ValueOf(damping) != 0.0) {
+        const T prescribed = PrescribedSpeed(s_, state_, a, row_a, b, row_b);
+        Push(a, row_a, b, row_b, T(-damping * prescribed));
+        p_.dampers.push_back({s_.bodies[a].block, s_.bodies[b].block, row_a, row_b, damping});
+      }
+    } else {
+      const T speed = RelativeSpeed(state_, a, row_a, b, row_b);
+      Push(a, row_a, b, row_b, T(push - damping * speed));
+    }
+  }
+
+  void Joint(int j, const JointRows<T>& rows, const T rhs[3]) {
+    const JointIndex& joint = s_.joints[j];
+    JointBlock<T>& block = p_.joints.emplace_back();
+    block.a = s_.bodies[joint.a].block;
+    block.b = s_.bodies[joint.b].block;
+    block.rows = rows.rows;
+    for (int k = 0; k < rows.rows; ++k) {
+      block.row_a[k] = rows.row_a[k];
+      block.row_b[k] = rows.row_b[k];
+      block.rhs[k] = rhs[k];
+      if constexpr (kLevel == Level::kVelocity) {
+        block.rhs[k] -= PrescribedSpeed(s_, state_, joint.a, rows.row_a[k], joint.b, rows.row_b[k]);
+      }
+    }
+  }
+
+  void Contact(int i, const ActiveContact& contact, const ContactRows<T>& rows, const T& c_n,
+               const T& c_t) {
+    ContactBlock<T>& block = p_.contacts.emplace_back();
+    block.a = s_.bodies[contact.a].block;
+    block.b = s_.bodies[contact.b].block;
+    block.normal_a = rows.normal_a;
+    block.normal_b = rows.normal_b;
+    block.tangent_a = rows.tangent_a;
+    block.tangent_b = rows.tangent_b;
+    block.friction = EvaluateCoefficient((*friction_)[i], model_.numbers);
+    block.has_friction = (*friction_)[i].value > 0.0;
+    block.c_n = c_n;
+    block.c_t = c_t;
+    if constexpr (kLevel == Level::kVelocity) {
+      block.c_n += PrescribedSpeed(s_, state_, contact.a, rows.normal_a, contact.b, rows.normal_b);
+      block.c_t +=
+          PrescribedSpeed(s_, state_, contact.a, rows.tangent_a, contact.b, rows.tangent_b);
+      if (contact.law == ContactLaw::kGap && contact.joint < 0) {
+        block.rounding = PositionRounding(state_, contact.a, contact.b) / at_.h;
+      }
+    }
+  }
+
+ private:
+  const Model<T>& model_;
+  const ModelStructure& s_;
+  const State<T>& state_;
+  const Instant<T>& at_;
+  AssemblyScratch<T>& scratch_;
+  ContactProblem<T>& p_;
+  const std::vector<CoefficientSource>* friction_ = nullptr;
+  const std::vector<CoefficientSource>* restitution_ = nullptr;
+  Equations<kLevel, ProblemBuilder> equations_;
+};
+
 }  // namespace internal
 
 template <typename T>
 void AssembleFree(const Model<T>& model, const State<T>& state, double t, double h,
                   ContactProblem<T>* problem, AssemblyScratch<T>* scratch, bool correct_drift) {
-  internal::FreeAssembly<T> assembly(model, state, t, h, problem, &scratch->poses);
-  assembly.Bodies();
-  if (h > 0.0) {
-    assembly.Springs();
-    assembly.Forces();
-  }
-  assembly.Joints(correct_drift, &scratch->joints);
+  Instant<T> instant;
+  instant.t = t;
+  instant.h = h;
+  instant.corrects_drift = correct_drift;
+  internal::ProblemBuilder<Level::kVelocity, T>(model, state, instant, scratch, problem)
+      .AssembleElements();
 }
 
 template <typename T>
@@ -183,38 +231,11 @@ void AssembleContacts(const Model<T>& model, const State<T>& state, double h,
                       const std::vector<ActiveContact>& contacts,
                       const std::vector<CoefficientSource>& friction,
                       const std::vector<CoefficientSource>& restitution,
-                      const AssemblyScratch<T>& scratch, ContactProblem<T>* problem) {
-  const ModelStructure& structure = *model.structure;
-  problem->contacts.clear();
-  problem->contacts.reserve(contacts.size());
-  for (size_t i = 0; i < contacts.size(); ++i) {
-    const ActiveContact& contact = contacts[i];
-    ContactRows<T> rows;
-    if (contact.joint >= 0) {
-      EvaluateLimitRows(model, scratch.joints[contact.joint], contact, &rows);
-    } else {
-      EvaluateContactRows(model, scratch.poses, contact, &rows);
-    }
-    ContactBlock<T>& block = problem->contacts.emplace_back();
-    block.a = structure.bodies[contact.a].block;
-    block.b = structure.bodies[contact.b].block;
-    block.normal_a = rows.normal_a;
-    block.normal_b = rows.normal_b;
-    block.tangent_a = rows.tangent_a;
-    block.tangent_b = rows.tangent_b;
-    block.friction = EvaluateCoefficient(friction[i], model.numbers);
-    block.has_friction = friction[i].value > 0.0;
-    const T approach = RelativeSpeed(state, contact.a, rows.normal_a, contact.b, rows.normal_b);
-    const T e = EvaluateCoefficient(restitution[i], model.numbers);
-    block.c_n =
-        LawConstant(contact.law, rows.geometry.gap, h, e, approach, structure.settings) +
-        PrescribedSpeed(structure, state, contact.a, rows.normal_a, contact.b, rows.normal_b);
-    block.rounding = contact.law == ContactLaw::kGap && contact.joint < 0
-                         ? internal::PositionRounding(state, contact.a, contact.b) / h
-                         : 0.0;
-    block.c_t =
-        PrescribedSpeed(structure, state, contact.a, rows.tangent_a, contact.b, rows.tangent_b);
-  }
+                      AssemblyScratch<T>* scratch, ContactProblem<T>* problem) {
+  Instant<T> instant;
+  instant.h = h;
+  internal::ProblemBuilder<Level::kVelocity, T>(model, state, instant, scratch, problem)
+      .AssembleContacts(contacts, friction, &restitution);
 }
 
 }  // namespace tangible

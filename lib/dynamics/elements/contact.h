@@ -19,6 +19,8 @@
 // The law is a discrete choice made in double; on either side of a choice the derivative is that of
 // the chosen law. Between kGap and kRestitution the map jumps: the margins say how near that is.
 
+#include <cmath>
+
 #include "tangible/dynamics/elements/joint.h"
 #include "tangible/geometry/collide.h"
 
@@ -107,6 +109,21 @@ T RelativeSpeed(const State<T>& state, int a, const RowPart<T>& row_a, int b,
   return speed;
 }
 
+/// The sign of the sliding speed of a contact, 0 where that is rounding of its terms.
+template <typename T>
+double SlipSign(const State<double>& state, const ActiveContact& contact,
+                const ContactRows<T>& rows) {
+  double slip = 0.0;
+  double terms = 0.0;
+  for (int i = 0; i < 3; ++i) {
+    const double on_a = ValueOf(rows.tangent_a[i]) * state.twist[3 * contact.a + i];
+    const double on_b = ValueOf(rows.tangent_b[i]) * state.twist[3 * contact.b + i];
+    slip += on_a + on_b;
+    terms += std::abs(on_a) + std::abs(on_b);
+  }
+  return std::abs(slip) <= kSlipRounding * terms ? 0.0 : slip > 0.0 ? 1.0 : -1.0;
+}
+
 /// Evaluates a contact of shapes between bodies at given poses.
 template <typename T>
 void EvaluateContactRows(const Model<T>& model, const Pose<T>& pose_a, const Pose<T>& pose_b,
@@ -144,10 +161,8 @@ inline ContactSpeeds SpeedsOf(const Model<double>& model, const State<double>& s
 /// Evaluates a joint limit: the coordinate's row times its side, gap = side (coordinate − limit),
 /// no tangent.
 template <typename T>
-void EvaluateLimitRows(const Model<T>& model, const JointRows<T>& joint_rows,
-                       const ActiveContact& contact, ContactRows<T>* rows) {
-  const JointIndex& joint = model.structure->joints[contact.joint];
-  const T& limit = model.numbers[contact.side > 0.0 ? joint.low : joint.high];
+void EvaluateLimitRows(const T& limit, const JointRows<T>& joint_rows, const ActiveContact& contact,
+                       ContactRows<T>* rows) {
   rows->geometry.gap = contact.side * (joint_rows.coordinate - limit);
   rows->geometry.normal = Vector2<T>(T(0.0), T(0.0));
   rows->geometry.point = Vector2<T>(T(0.0), T(0.0));
@@ -157,6 +172,13 @@ void EvaluateLimitRows(const Model<T>& model, const JointRows<T>& joint_rows,
     rows->tangent_a[i] = T(0.0);
     rows->tangent_b[i] = T(0.0);
   }
+}
+template <typename T>
+void EvaluateLimitRows(const Model<T>& model, const JointRows<T>& joint_rows,
+                       const ActiveContact& contact, ContactRows<T>* rows) {
+  const JointIndex& joint = model.structure->joints[contact.joint];
+  EvaluateLimitRows(model.numbers[contact.side > 0.0 ? joint.low : joint.high], joint_rows, contact,
+                    rows);
 }
 
 }  // namespace tangible

@@ -47,10 +47,56 @@ double MeanEffort(const ModelStructure& structure, const JointIndex& joint, doub
   return IntegrateSignal(signal, signal.value, t, t + h) / h;
 }
 
-#define TANGIBLE_INSTANTIATE(T)                                                           \
-  template T WindowOverlap<T>(double, double, const T*, const T*);                        \
-  template void ForceImpulse<T>(const ModelStructure&, const ForceIndex&, double, double, \
-                                const T&, const T*, const T*, const T*, T[3]);            \
+template <typename T>
+T SignalAt(const Signal& signal, const std::vector<double>& column, const T& t, double middle) {
+  if (column.empty()) {
+    return T(0.0);
+  }
+  const auto next = std::upper_bound(signal.time.begin(), signal.time.end(), middle);
+  if (next == signal.time.begin()) {
+    return T(column.front());
+  }
+  const size_t k = next - signal.time.begin() - 1;
+  if (next == signal.time.end() || signal.interpolation == Signal::Interpolation::kConstant) {
+    return T(column[k]);
+  }
+  const double rate = (column[k + 1] - column[k]) / (signal.time[k + 1] - signal.time[k]);
+  return column[k] + rate * (t - signal.time[k]);
+}
+
+template <typename T>
+void ForceAt(const ModelStructure& structure, const ForceIndex& force, const T& angle,
+             const T* numbers, const T* start, const T* end, const T& t, double middle, T out[3]) {
+  if ((start != nullptr && ValueOf(*start) > middle) ||
+      (end != nullptr && middle > ValueOf(*end))) {
+    out[0] = out[1] = out[2] = T(0.0);
+    return;
+  }
+  if (force.force_signal >= 0) {
+    const Signal& signal = structure.signals[force.force_signal];
+    out[0] = SignalAt(signal, signal.x, t, middle);
+    out[1] = SignalAt(signal, signal.y, t, middle);
+  } else {
+    out[0] = numbers[2];
+    out[1] = numbers[3];
+  }
+  const Vector2<T> arm = Rotation<T>(angle) * Vector2<T>(numbers[0], numbers[1]);
+  out[2] = Cross(arm, Vector2<T>(out[0], out[1]));
+  if (force.torque_signal >= 0) {
+    const Signal& signal = structure.signals[force.torque_signal];
+    out[2] += SignalAt(signal, signal.value, t, middle);
+  } else {
+    out[2] += numbers[4];
+  }
+}
+
+#define TANGIBLE_INSTANTIATE(T)                                                                    \
+  template T WindowOverlap<T>(double, double, const T*, const T*);                                 \
+  template void ForceImpulse<T>(const ModelStructure&, const ForceIndex&, double, double,          \
+                                const T&, const T*, const T*, const T*, T[3]);                     \
+  template T SignalAt<T>(const Signal&, const std::vector<double>&, const T&, double);             \
+  template void ForceAt<T>(const ModelStructure&, const ForceIndex&, const T&, const T*, const T*, \
+                           const T*, const T&, double, T[3]);                                      \
   template void EvaluateSpring<T>(const Pose<T>&, const Pose<T>&, const T*, SpringRow<T>*);
 #define TANGIBLE_INSTANTIATE_JET(N) TANGIBLE_INSTANTIATE(Jet<N>)
 TANGIBLE_INSTANTIATE(double)

@@ -30,6 +30,17 @@ template <typename T>
 void ForceImpulse(const ModelStructure& structure, const ForceIndex& force, double t, double h,
                   const T& angle, const T* numbers, const T* start, const T* end, T impulse[3]);
 
+/// A signal's column at t, on the piece that holds at `middle`; of Jets the rate is that of the
+/// piece.
+template <typename T>
+T SignalAt(const Signal& signal, const std::vector<double>& column, const T& t, double middle);
+
+/// Force and torque (N, N, N m) on the body of a force at t; 0 where its window excludes `middle`.
+/// `numbers`, start and end as for ForceImpulse.
+template <typename T>
+void ForceAt(const ModelStructure& structure, const ForceIndex& force, const T& angle,
+             const T* numbers, const T* start, const T* end, const T& t, double middle, T out[3]);
+
 /// Mean effort (N m, N) of a joint's signal over a step.
 double MeanEffort(const ModelStructure& structure, const JointIndex& joint, double t, double h);
 

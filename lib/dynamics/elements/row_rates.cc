@@ -6,9 +6,16 @@ namespace {
 
 template <typename T>
 Pose<Dual<T>> DualPose(const MovingPose<T>& moving) {
-  return Pose<Dual<T>>(Vector2<Dual<T>>(Dual<T>(moving.pose[0], moving.twist[0]),
-                                        Dual<T>(moving.pose[1], moving.twist[1])),
-                       Dual<T>(moving.pose[2], moving.twist[2]));
+  const Rotation<T>& rotation = moving.pose.rotation;
+  const T& omega = moving.twist[2];
+  Pose<Dual<T>> dual;
+  for (int i = 0; i < 2; ++i) {
+    dual.position[i] = Dual<T>(moving.pose.position[i], moving.twist[i]);
+  }
+  dual.angle = Dual<T>(moving.pose.angle, omega);
+  dual.rotation.cosine = Dual<T>(rotation.cosine, -rotation.sine * omega);
+  dual.rotation.sine = Dual<T>(rotation.sine, rotation.cosine * omega);
+  return dual;
 }
 
 // The row, and what its rate adds to the acceleration of the row's speed.

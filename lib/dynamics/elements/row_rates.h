@@ -19,19 +19,9 @@ namespace tangible {
 /// A pose and its rate.
 template <typename T>
 struct MovingPose {
-  T pose[3] = {T(0.0), T(0.0), T(0.0)};
+  Pose<T> pose;
   T twist[3] = {T(0.0), T(0.0), T(0.0)};
 };
-
-template <typename T>
-MovingPose<T> MovingPoseOf(const State<T>& state, int body) {
-  MovingPose<T> moving;
-  for (int i = 0; i < 3; ++i) {
-    moving.pose[i] = state.pose[3 * body + i];
-    moving.twist[i] = state.twist[3 * body + i];
-  }
-  return moving;
-}
 
 /// ṙ v of a joint's rows and of its coordinate: m/s² and rad/s².
 template <typename T>

@@ -4,7 +4,7 @@
 // Gradients of what event stepping finds events by: a contact's gap, its sliding speed t v, and the
 // speed n v at which it opens.
 
-#include "tangible/dynamics/jacobian/local_jacobian.h"
+#include "tangible/dynamics/jacobian/equation_jacobian.h"
 
 namespace tangible {
 

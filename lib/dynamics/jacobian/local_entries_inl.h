@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// What the visitors of local derivatives share (local_jacobian.cc, acceleration_jacobian.cc): the
+// What the visitors of local derivatives share (equation_jacobian.cc, contact_gradient.cc): the
 // variables of one element as LocalJets, and the entries that its equations have.
 
 #include <cmath>
 #include <vector>
 
-#include "tangible/dynamics/jacobian/local_jacobian.h"
+#include "tangible/dynamics/jacobian/equation_jacobian.h"
 
 namespace tangible::internal {
 

@@ -7,7 +7,7 @@
 // The structure (who is joined to whom, which shapes, where each number stands) is made once and
 // does not depend on T. The variables of a step are numbered:
 //   [ poses (3 a body) | twists (3 a body) | numbers ]
-// and each contact, joint, spring, force and body reads only a few of them (local_jacobian.h).
+// and each contact, joint, spring, force and body reads only a few of them (equation_jacobian.h).
 
 #include <cstdint>
 #include <memory>

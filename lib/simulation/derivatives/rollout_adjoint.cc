@@ -296,13 +296,13 @@ void RolloutTape::StepAdjoint(const Model<double>& model, const StepRecord& reco
     std::fill_n(twist, 3 * columns, 0.0);
   }
   system->SolveTransposed(record.problem, record.solution.modes, u_.data(), columns);
-  const SolvedStep step = record.View(system->contact_block());
+  const SolvedEquations step = record.View(system->contact_block());
   if (columns == 1) {
-    VisitStepJacobian(model, step, JointRoute::kByHand, &scratch_,
-                      SingleAdjointSink{u_.data(), w_bar->data()});
+    VisitJacobian(model, step, JacobianRoute::kByHand, &scratch_,
+                  SingleAdjointSink{u_.data(), w_bar->data()});
   } else {
-    VisitStepJacobian(model, step, JointRoute::kByHand, &scratch_,
-                      AdjointSink{u_.data(), w_bar->data(), columns});
+    VisitJacobian(model, step, JacobianRoute::kByHand, &scratch_,
+                  AdjointSink{u_.data(), w_bar->data(), columns});
   }
 }
 

@@ -5,7 +5,7 @@
 // respect to states along the run to those with respect to all variables w = [initial poses |
 // initial twists | numbers].
 //
-//   each step, backwards   x̄ = v̄⁺ + h q̄⁺,   Kᵀ u = x̄,   w̄ −= (∂R/∂w)ᵀ u      (local_jacobian.h)
+//   each step, backwards   x̄ = v̄⁺ + h q̄⁺,   Kᵀ u = x̄,   w̄ −= (∂R/∂w)ᵀ u      (equation_jacobian.h)
 //
 // The forward run is recorded on a tape: per step the state, contacts, modes and impulses, and, if
 // kept, the factorisation; otherwise it is recomputed on the way back. With checkpoints the tape

@@ -65,12 +65,12 @@ StepDirectional::Status StepDirectional::SolveColumns(const Model<double>& model
   // The equations of all rows that the directions may need.
   ContactSolution<double> with_rows = solution;
   with_rows.modes = directional_.modes();
-  SolvedStep view = record.View(directional_.blocks());
+  SolvedEquations view = record.View(directional_.blocks());
   view.solution = &with_rows;
   const int columns = static_cast<int>(w_dot.cols());
   RowMatrixXd rhs = RowMatrixXd::Zero(3 * directional_.num_blocks(), columns);
-  VisitStepJacobian(model, view, JointRoute::kByHand, &scratch_,
-                    TangentSink{w_dot.data(), rhs.data(), columns});
+  VisitJacobian(model, view, JacobianRoute::kByHand, &scratch_,
+                TangentSink{w_dot.data(), rhs.data(), columns});
   v_dot->resize(3 * record.problem.num_bodies, columns);
   std::vector<double> found;
   for (int c = 0; c < columns; ++c) {
@@ -98,11 +98,11 @@ void StepDirectional::MoveAlong(const Model<double>& model, const StepRecord& re
     with_rows.modes[i] = c.has_friction ? ContactMode::kSticking : ContactMode::kClosed;
     blocks[i] = num_blocks++;
   }
-  SolvedStep view = record.View(blocks);
+  SolvedEquations view = record.View(blocks);
   view.solution = &with_rows;
   VectorX<double> r = VectorX<double>::Zero(3 * num_blocks);
-  VisitStepJacobian(model, view, JointRoute::kByHand, &scratch_,
-                    TangentSink{w_dot.data(), r.data(), 1});
+  VisitJacobian(model, view, JacobianRoute::kByHand, &scratch_,
+                TangentSink{w_dot.data(), r.data(), 1});
   double speed = 0.0;
   double rate = 0.0;
   for (Eigen::Index i = 0; i < r.size(); ++i) {

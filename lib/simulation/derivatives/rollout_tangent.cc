@@ -42,8 +42,8 @@ void StepTangent::Assemble(const Model<double>& model, Stepper* stepper, const R
   ContactSystem& system = stepper->system();
   const int columns = static_cast<int>(w_dot.cols());
   rhs_.assign(3 * static_cast<size_t>(system.num_blocks()) * columns, 0.0);
-  VisitStepJacobian(
-      model, record.View(system.contact_block()), JointRoute::kByHand, &scratch_,
+  VisitJacobian(
+      model, record.View(system.contact_block()), JacobianRoute::kByHand, &scratch_,
       TangentSink{w_dot.data(), rhs_.data(), columns, fixed_.empty() ? nullptr : fixed_.data()});
 }
 

@@ -4,7 +4,7 @@
 // The tangent of a rollout (forward mode): derivatives of the state with respect to any directions
 // in the variables w = [initial poses | initial twists | numbers].
 //
-//   each step   K ẋ = −(∂R/∂w) ẇ   (local_jacobian.h),   q̇⁺ = q̇ + h v̇⁺
+//   each step   K ẋ = −(∂R/∂w) ẇ   (equation_jacobian.h),   q̇⁺ = q̇ + h v̇⁺
 //
 // with the factorisation that the step's solve ended with, for all directions at once.
 

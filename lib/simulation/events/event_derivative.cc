@@ -57,7 +57,8 @@ template <typename Sink>
 void EventDerivative::Visit(const Model<double>& model, const Segment& segment,
                             const SolvedNode& node, bool correction, const Sink& sink) {
   if (listed_ != &node) {
-    VisitAccelerationJacobian(model, ViewOf(segment, node, correction), &scratch_, sink);
+    VisitJacobian(model, ViewOf(segment, node, correction), JacobianRoute::kByHand, &scratch_,
+                  sink);
     return;
   }
   for (const JacobianEntry& entry : entries_) {
@@ -70,8 +71,8 @@ void EventDerivative::List(const Model<double>& model, const Segment& segment,
   listed_ = node;
   entries_.clear();
   if (node != nullptr) {
-    VisitAccelerationJacobian(model, ViewOf(segment, *node, false), &scratch_,
-                              EntryListSink{&entries_});
+    VisitJacobian(model, ViewOf(segment, *node, false), JacobianRoute::kByHand, &scratch_,
+                  EntryListSink{&entries_});
   }
 }
 

@@ -13,8 +13,8 @@ double EventDerivative::ImpulsesTangent(const Model<double>& model, Impulses* im
   const ModelStructure& s = *model.structure;
   const int columns = static_cast<int>(x->cols());
   rhs_.setZero(3 * static_cast<Eigen::Index>(impulses->system.num_blocks()), columns);
-  VisitStepJacobian(model, impulses->View(), JointRoute::kByHand, &scratch_,
-                    TangentSink{x->data(), rhs_.data(), columns});
+  VisitJacobian(model, impulses->View(), JacobianRoute::kByHand, &scratch_,
+                TangentSink{x->data(), rhs_.data(), columns});
   if (impulses->decompression) {
     AddOffsetsTangent(*impulses);
   }
@@ -46,11 +46,11 @@ void EventDerivative::ImpulsesAdjoint(const Model<double>& model, Impulses* impu
   impulses->system.SolveTransposed(impulses->problem, impulses->solution.modes, rhs_.data(),
                                    columns);
   if (columns == 1) {
-    VisitStepJacobian(model, impulses->View(), JointRoute::kByHand, &scratch_,
-                      SingleAdjointSink{rhs_.data(), w_bar->data()});
+    VisitJacobian(model, impulses->View(), JacobianRoute::kByHand, &scratch_,
+                  SingleAdjointSink{rhs_.data(), w_bar->data()});
   } else {
-    VisitStepJacobian(model, impulses->View(), JointRoute::kByHand, &scratch_,
-                      AdjointSink{rhs_.data(), w_bar->data(), columns});
+    VisitJacobian(model, impulses->View(), JacobianRoute::kByHand, &scratch_,
+                  AdjointSink{rhs_.data(), w_bar->data(), columns});
   }
   KeepOffsetsAdjoint(*impulses);
 }

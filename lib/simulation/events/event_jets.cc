@@ -120,7 +120,7 @@ class EventReplay {
     AssemblyScratch<T> scratch;
     AssembleFree(model_, state, impulses->time, impulses->h, &problem, &scratch, false);
     AssembleContacts(model_, state, impulses->h, impulses->contacts, impulses->friction,
-                     impulses->restitution, scratch, &problem);
+                     impulses->restitution, &scratch, &problem);
     if (impulses->decompression) {
       SetOffsets(*impulses, &problem);
     } else if (route_ == JetRoute::kUnrolled && is_impact) {
@@ -149,32 +149,19 @@ class EventReplay {
   void Accelerate(const Segment& segment, const State<T>& state, const T& time, SolvedNode* node,
                   ContactSolution<T>* out) {
     ContactProblem<T> problem;
-    AccelerationScratch<T> scratch;
+    AssemblyScratch<T> scratch;
     AssembleAcceleration(model_, state, time, segment.middle, segment.contacts, segment.friction,
                          &scratch, &problem);
     std::vector<double> signs(segment.contacts.size(), 0.0);
     for (size_t i = 0; i < signs.size(); ++i) {
       signs[i] = SlidingSign(segment.modes[i]);
       if (segment.modes[i] == ContactMode::kClosed && segment.contacts[i].joint < 0) {
-        signs[i] = SlipSign(segment.contacts[i], node->state);
+        ContactRows<double> rows;
+        EvaluateContactRows(values_, node->state, segment.contacts[i], &rows);
+        signs[i] = SlipSign(node->state, segment.contacts[i], rows);
       }
     }
     Solve(problem, node->problem, node->solution, signs, &node->system, out);
-  }
-
-  double SlipSign(const ActiveContact& contact, const State<double>& state) const {
-    constexpr double kRounding = 1e-12;
-    ContactRows<double> rows;
-    EvaluateContactRows(values_, state, contact, &rows);
-    double slip = 0.0;
-    double terms = 0.0;
-    for (int i = 0; i < 3; ++i) {
-      const double on_a = rows.tangent_a[i] * state.twist[3 * contact.a + i];
-      const double on_b = rows.tangent_b[i] * state.twist[3 * contact.b + i];
-      slip += on_a + on_b;
-      terms += std::abs(on_a) + std::abs(on_b);
-    }
-    return std::abs(slip) <= kRounding * terms ? 0.0 : slip > 0.0 ? 1.0 : -1.0;
   }
 
   void Place(const State<T>& before, const T& tau, double c, const double* a, const double* a_hat,
@@ -259,7 +246,7 @@ class EventReplay {
     for (int k = 0; k < segment->num_corrections; ++k) {
       SolvedNode& node = segment->corrections[k];
       ContactProblem<T> problem;
-      AccelerationScratch<T> scratch;
+      AssemblyScratch<T> scratch;
       AssembleCorrection(model_, *after, segment->contacts, segment->friction,
                          k == 0 ? T(s_.settings.recovery_speed * tau) : T(0.0), &scratch, &problem);
       ContactSolution<T> correction;

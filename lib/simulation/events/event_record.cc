@@ -21,13 +21,7 @@ size_t BytesOf(const std::vector<SolvedNode>& nodes) {
   return sum;
 }
 
-size_t BytesOf(const Impulses& impulses) {
-  return BytesOf(impulses.before) + sizeof(double) * impulses.new_twist.capacity() +
-         sizeof(ActiveContact) * impulses.contacts.capacity() +
-         sizeof(CoefficientSource) *
-             (impulses.friction.capacity() + impulses.restitution.capacity()) +
-         impulses.problem.bytes() + impulses.solution.bytes() + impulses.system.bytes();
-}
+size_t BytesOf(const Impulses& impulses) { return impulses.bytes() + impulses.system.bytes(); }
 
 size_t BytesOf(const Segment& segment) {
   return BytesOf(segment.before) + BytesOf(segment.after) +
@@ -54,19 +48,31 @@ size_t EventRecord::bytes() const {
   return sum;
 }
 
-SolvedStep Impulses::View() const {
-  SolvedStep view;
-  view.time = time;
-  view.h = h;
-  view.corrects_drift = false;
-  view.before = &before;
+SolvedEquations StepRecord::View(const std::vector<int>& contact_block) const {
+  SolvedEquations view;
+  view.instant.t = time;
+  view.instant.h = h;
+  view.state = &before;
   view.new_twist = &new_twist;
   view.contacts = &contacts;
   view.friction = &friction;
   view.restitution = &restitution;
   view.problem = &problem;
   view.solution = &solution;
-  view.contact_block = &system.contact_block();
+  view.contact_block = &contact_block;
+  return view;
+}
+
+size_t StepRecord::bytes() const {
+  return BytesOf(before) + sizeof(double) * new_twist.capacity() +
+         sizeof(ActiveContact) * contacts.capacity() +
+         sizeof(CoefficientSource) * (friction.capacity() + restitution.capacity()) +
+         problem.bytes() + solution.bytes();
+}
+
+SolvedEquations Impulses::View() const {
+  SolvedEquations view = StepRecord::View(system.contact_block());
+  view.instant.corrects_drift = false;
   return view;
 }
 
@@ -96,11 +102,11 @@ bool IsLocated(EventKind kind) {
   return kind != EventKind::kStepEnd && kind != EventKind::kEdge && kind != EventKind::kAtOnce;
 }
 
-SolvedAcceleration ViewOf(const Segment& segment, const SolvedNode& node, bool correction) {
-  SolvedAcceleration view;
-  view.correction = correction;
-  view.time = node.time;
-  view.middle = segment.middle;
+SolvedEquations ViewOf(const Segment& segment, const SolvedNode& node, bool correction) {
+  SolvedEquations view;
+  view.level = correction ? Level::kCorrection : Level::kAcceleration;
+  view.instant.time = node.time;
+  view.instant.middle = segment.middle;
   view.state = &node.state;
   view.contacts = &segment.contacts;
   view.friction = &segment.friction;

@@ -7,7 +7,7 @@
 #include <memory>
 #include <vector>
 
-#include "tangible/dynamics/jacobian/acceleration_jacobian.h"
+#include "tangible/dynamics/jacobian/equation_jacobian.h"
 #include "tangible/lcp/system/contact_system.h"
 
 namespace tangible {
@@ -21,10 +21,8 @@ struct SolvedNode {
   ContactSystem system;
 };
 
-/// An instantaneous change of twists: an impact or a projection of twists, as a step with h = 0;
-/// or, where accelerations have no solution, impulses of a very short step. By Poisson's law an
-/// impact is two parts of the record, its compression and then its decompression.
-struct Impulses {
+/// A solved step, fixed or of impulses: all that its derivative needs.
+struct StepRecord {
   double time = 0.0;
   double h = 0.0;
   State<double> before;
@@ -33,11 +31,21 @@ struct Impulses {
   std::vector<CoefficientSource> friction, restitution;
   ContactProblem<double> problem;
   ContactSolution<double> solution;
+
+  SolvedEquations View(const std::vector<int>& contact_block) const;
+  /// Memory of the vectors.
+  size_t bytes() const;
+};
+
+/// An instantaneous change of twists: an impact or a projection of twists, as a step with h = 0;
+/// or, where accelerations have no solution, impulses of a very short step. By Poisson's law an
+/// impact is two parts of the record, its compression and then its decompression.
+struct Impulses : StepRecord {
   ContactSystem system;
   bool decompression = false;   ///< of the impulses that the part before has found
   std::vector<int> compressed;  ///< decompression: the place of each contact in that part
 
-  SolvedStep View() const;
+  SolvedEquations View() const;
 };
 
 enum class EventKind : unsigned char {
@@ -133,7 +141,7 @@ struct EventRecord {
   size_t bytes() const;
 };
 
-/// The view that VisitAccelerationJacobian takes.
-SolvedAcceleration ViewOf(const Segment& segment, const SolvedNode& node, bool correction);
+/// The view that VisitJacobian takes.
+SolvedEquations ViewOf(const Segment& segment, const SolvedNode& node, bool correction);
 
 }  // namespace tangible

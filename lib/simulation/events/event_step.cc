@@ -250,8 +250,8 @@ bool EventStepper::ChooseModes(const Model<double>& model, double t, double midd
     return true;
   }
   ContactProblem<double> problem;
-  AssembleAcceleration(model, *state, t, middle, segment->contacts, segment->friction,
-                       &acceleration_, &problem);
+  AssembleAcceleration(model, *state, t, middle, segment->contacts, segment->friction, &assembly_,
+                       &problem);
   // Where a contact slides, friction opposes that whatever the accelerations.
   double scale = 0.0;
   for (size_t i = 0; i < problem.momentum.size(); ++i) {

@@ -125,7 +125,6 @@ class EventStepper {
   ContactSolver solver_;
   EventRecord record_;
   AssemblyScratch<double> assembly_;
-  AccelerationScratch<double> acceleration_;
   Touching touching_;
   std::vector<BrokenLimit> broken_limits_;
   std::vector<bool> rebounds_;  ///< of the last impact's contacts

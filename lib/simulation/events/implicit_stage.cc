@@ -15,8 +15,8 @@ void ImplicitStage::Factor(const Model<double>& model, const Segment& segment, S
     }
   }
   solved_.setZero(3 * static_cast<Eigen::Index>(node->system.num_blocks()), size);
-  VisitAccelerationJacobian(model, ViewOf(segment, *node, false), &scratch_,
-                            TangentSink{place_.data(), solved_.data(), size});
+  VisitJacobian(model, ViewOf(segment, *node, false), JacobianRoute::kByHand, &scratch_,
+                TangentSink{place_.data(), solved_.data(), size});
   node->system.Solve(node->problem, node->solution.modes, solved_.data(), size);
   lu_.compute(Eigen::MatrixXd::Identity(size, size) - solved_.topRows(size));
 }

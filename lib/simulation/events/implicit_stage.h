@@ -16,7 +16,7 @@
 #include <Eigen/LU>
 #include <cmath>
 
-#include "tangible/dynamics/jacobian/acceleration_jacobian.h"
+#include "tangible/dynamics/jacobian/equation_jacobian.h"
 #include "tangible/simulation/events/event_record.h"
 
 namespace tangible {

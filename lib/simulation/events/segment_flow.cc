@@ -125,46 +125,6 @@ bool DriftsFar(const Model<double>& model, const ContactProblem<double>& correct
   return false;
 }
 
-// Solves a node's problem with modes; false where singular or not finite.
-bool SolveNode(const std::vector<ContactMode>& modes, SolvedNode* node) {
-  const ContactProblem<double>& p = node->problem;
-  ContactSolution<double>& s = node->solution;
-  s.modes = modes;
-  if (!node->system.Factor(p, modes)) {
-    return false;
-  }
-  std::vector<double> x(3 * static_cast<size_t>(node->system.num_blocks()), 0.0);
-  std::copy(p.momentum.begin(), p.momentum.end(), x.begin());
-  for (size_t j = 0; j < p.joints.size(); ++j) {
-    std::copy_n(p.joints[j].rhs, p.joints[j].rows, &x[3 * (p.num_bodies + j)]);
-  }
-  const std::vector<int>& block_of = node->system.contact_block();
-  for (size_t i = 0; i < p.contacts.size(); ++i) {
-    if (block_of[i] >= 0) {
-      x[3 * block_of[i]] = -p.contacts[i].c_n;
-      if (modes[i] == ContactMode::kSticking) {
-        x[3 * block_of[i] + 1] = -p.contacts[i].c_t;
-      }
-    }
-  }
-  node->system.Solve(p, modes, x.data(), 1);
-  s.v.assign(x.begin(), x.begin() + 3 * p.num_bodies);
-  s.joint_impulse.assign(3 * p.joints.size(), 0.0);
-  std::copy_n(x.begin() + 3 * p.num_bodies, s.joint_impulse.size(), s.joint_impulse.begin());
-  s.normal_impulse.assign(p.contacts.size(), 0.0);
-  s.tangent_impulse.assign(p.contacts.size(), 0.0);
-  for (size_t i = 0; i < p.contacts.size(); ++i) {
-    if (block_of[i] >= 0) {
-      s.normal_impulse[i] = x[3 * block_of[i]];
-      s.tangent_impulse[i] =
-          modes[i] == ContactMode::kSticking
-              ? x[3 * block_of[i] + 1]
-              : -SlidingSign(modes[i]) * p.contacts[i].friction * s.normal_impulse[i];
-    }
-  }
-  return AllFinite(x);
-}
-
 }  // namespace
 
 const NystromTableau& NystromTableau::Of(Integrator integrator) {
@@ -193,14 +153,16 @@ void AssembleImpulses(const Model<double>& model, AssemblyScratch<double>* scrat
   AssembleFree(model, impulses->before, impulses->time, impulses->h, &impulses->problem, scratch,
                false);
   AssembleContacts(model, impulses->before, impulses->h, impulses->contacts, impulses->friction,
-                   impulses->restitution, *scratch, &impulses->problem);
+                   impulses->restitution, scratch, &impulses->problem);
 }
 
 bool SegmentFlow::Solve(const std::vector<ContactMode>& modes, SolvedNode* node) {
   const int before = node->system.expansions();
-  const bool solved = SolveNode(modes, node);
+  node->solution.modes = modes;
+  const bool solved = mode_solve_.Solve(node->problem, nullptr, &node->system, &node->solution);
   counts_.whole_system += node->system.expansions() - before;
-  return solved;
+  return solved && AllFinite(node->solution.v) && AllFinite(node->solution.joint_impulse) &&
+         AllFinite(node->solution.normal_impulse) && AllFinite(node->solution.tangent_impulse);
 }
 
 bool SegmentFlow::Accelerate(const Model<double>& model, const Segment& segment,
@@ -208,7 +170,7 @@ bool SegmentFlow::Accelerate(const Model<double>& model, const Segment& segment,
   node->state = state;
   node->time = time;
   AssembleAcceleration(model, state, time, segment.middle, segment.contacts, segment.friction,
-                       &acceleration_, &node->problem);
+                       &assembly_, &node->problem);
   return Solve(segment.modes, node);
 }
 
@@ -363,7 +325,7 @@ bool SegmentFlow::CorrectPoses(const Model<double>& model, Segment* segment, std
     node.time = segment->time + segment->length;
     // What recovers from penetration does so by the first correction, and is held by the others.
     AssembleCorrection(model, node.state, segment->contacts, segment->friction,
-                       k == 0 ? settings.recovery_speed * segment->length : 0.0, &acceleration_,
+                       k == 0 ? settings.recovery_speed * segment->length : 0.0, &assembly_,
                        &node.problem);
     if (k == 0 && JointCorrectionOf(settings) == JointCorrection::kProjection &&
         DriftsFar(model, node.problem)) {

@@ -16,6 +16,7 @@
 #include <functional>
 #include <string>
 
+#include "tangible/lcp/system/mode_solve.h"
 #include "tangible/simulation/events/event_record.h"
 #include "tangible/simulation/events/implicit_stage.h"
 
@@ -64,7 +65,7 @@ class SegmentFlow {
   bool CorrectPoses(const Model<double>& model, Segment* segment, std::string* message);
   bool ProjectTwists(const Model<double>& model, Segment* segment, std::string* message);
 
-  AccelerationScratch<double> acceleration_;
+  ModeSolve mode_solve_;
   AssemblyScratch<double> assembly_;
   std::vector<double> terms_;
   ImplicitStage implicit_;

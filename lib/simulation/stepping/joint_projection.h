@@ -12,7 +12,7 @@
 
 #include <vector>
 
-#include "tangible/dynamics/jacobian/local_jacobian.h"
+#include "tangible/dynamics/jacobian/equation_jacobian.h"
 #include "tangible/simulation/stepping/projection_newton.h"
 
 namespace tangible {

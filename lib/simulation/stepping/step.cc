@@ -106,29 +106,6 @@ void AddStepTimes(const std::vector<double>& times, SimulationSettings* settings
   settings->step_times = std::move(merged);
 }
 
-SolvedStep StepRecord::View(const std::vector<int>& contact_block) const {
-  SolvedStep view;
-  view.time = time;
-  view.h = h;
-  view.before = &before;
-  view.new_twist = &new_twist;
-  view.contacts = &contacts;
-  view.friction = &friction;
-  view.restitution = &restitution;
-  view.problem = &problem;
-  view.solution = &solution;
-  view.contact_block = &contact_block;
-  return view;
-}
-
-size_t StepRecord::bytes() const {
-  return sizeof(double) *
-             (before.pose.capacity() + before.twist.capacity() + new_twist.capacity()) +
-         sizeof(ActiveContact) * contacts.capacity() +
-         sizeof(CoefficientSource) * (friction.capacity() + restitution.capacity()) +
-         problem.bytes() + solution.bytes();
-}
-
 Stepper::Stepper(const Model<double>& model, int threads)
     : search_(model), islands_(std::make_unique<IslandSolver>(threads)) {
   const ModelStructure& s = *model.structure;
@@ -393,7 +370,8 @@ StepReport Stepper::Step(const Model<double>& model, double t, double h, State<d
   ContactSolverReport solved;
   search_.Find(model, *state, h, scratch_, &r.contacts, &r.friction, &r.restitution);
   for (int search = 0; search < kMaxSearches; ++search) {
-    AssembleContacts(model, *state, h, r.contacts, r.friction, r.restitution, scratch_, &r.problem);
+    AssembleContacts(model, *state, h, r.contacts, r.friction, r.restitution, &scratch_,
+                     &r.problem);
     if (search == 0) {
       CarryGuess(model, last_contacts_, last_solution_, Guess::kLastStep);
     } else {
@@ -468,7 +446,7 @@ void Stepper::TakeRecord(StepRecord* record, ContactSystem* system) {
 bool Stepper::Refactor(const Model<double>& model, StepRecord* record) {
   AssembleFree(model, record->before, record->time, record->h, &record->problem, &scratch_);
   AssembleContacts(model, record->before, record->h, record->contacts, record->friction,
-                   record->restitution, scratch_, &record->problem);
+                   record->restitution, &scratch_, &record->problem);
   factored_ = true;
   return solver_.system().Factor(record->problem, record->solution.modes);
 }

@@ -59,22 +59,6 @@ struct StepReport {
   std::string message;  ///< empty unless it failed: names the contact or joint
 };
 
-/// A solved step: all that its derivative needs.
-struct StepRecord {
-  double time = 0.0;
-  double h = 0.0;
-  State<double> before;
-  std::vector<double> new_twist;  ///< of all bodies
-  std::vector<ActiveContact> contacts;
-  std::vector<CoefficientSource> friction, restitution;
-  ContactProblem<double> problem;
-  ContactSolution<double> solution;
-
-  SolvedStep View(const std::vector<int>& contact_block) const;
-  /// Memory of the vectors.
-  size_t bytes() const;
-};
-
 /// What a step takes from those before it beside the state: modes and impulses to start from.
 struct StepperGuess {
   std::vector<ActiveContact> contacts;

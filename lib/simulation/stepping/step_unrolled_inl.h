@@ -19,7 +19,7 @@ void AssembleAll(const Model<T>& model, const StepRecord& record, const State<T>
   AssemblyScratch<T> scratch;
   AssembleFree(model, state, record.time, record.h, problem, &scratch);
   AssembleContacts(model, state, record.h, record.contacts, record.friction, record.restitution,
-                   scratch, problem);
+                   &scratch, problem);
 }
 
 // q := q + h v, by derivative parts too.

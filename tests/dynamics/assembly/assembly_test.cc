@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "../../support/scenes.h"
+#include "tangible/lcp/system/contact_system.h"
 
 namespace tangible {
 namespace {
@@ -94,7 +95,7 @@ TEST(AssemblyTest, ContactsHaveOnlyTheRowsTheyNeed) {
     for (const double mu : {0.0, 0.3}) {
       contact.law = law;
       friction.value = mu;
-      AssembleContacts(a.model, a.state, 0.1, {contact}, {friction}, {restitution}, a.scratch,
+      AssembleContacts(a.model, a.state, 0.1, {contact}, {friction}, {restitution}, &a.scratch,
                        &a.problem);
       const ContactBlock<double>& block = a.problem.contacts[0];
       EXPECT_EQ(block.has_friction, mu > 0.0);
@@ -104,6 +105,79 @@ TEST(AssemblyTest, ContactsHaveOnlyTheRowsTheyNeed) {
       EXPECT_NEAR(block.c_t, -0.3, 1e-15);
     }
   }
+}
+
+// The problem of accelerations at t = 0.
+ContactProblem<double> AssembleAccelerations(const std::string& text) {
+  Model<double> model;
+  State<double> state;
+  BuildModel(SceneOf(text), &model, &state);
+  AssemblyScratch<double> scratch;
+  ContactProblem<double> problem;
+  AssembleAcceleration(model, state, 0.0, 0.005, {}, {}, &scratch, &problem);
+  return problem;
+}
+
+// K x = (f, −rates), by the mode system.
+std::vector<double> Accelerations(const ContactProblem<double>& p) {
+  ContactSystem system;
+  EXPECT_TRUE(system.Factor(p, {}));
+  std::vector<double> x(3 * system.num_blocks(), 0.0);
+  std::copy(p.momentum.begin(), p.momentum.end(), x.begin());
+  for (size_t j = 0; j < p.joints.size(); ++j) {
+    std::copy_n(p.joints[j].rhs, p.joints[j].rows, &x[3 * (p.num_bodies + j)]);
+  }
+  system.Solve(p, {}, x.data(), 1);
+  return x;
+}
+
+TEST(AssembleAccelerationTest, ForcesOfAFreeBody) {
+  const ContactProblem<double> p = AssembleAccelerations(R"({"gravity": [1, -9], "bodies": [
+      {"name": "a", "mass": 2, "inertia": 0.5, "position": [0, 0], "angle": 0.5, "velocity": [3, -1],
+       "angular_velocity": 2, "linear_damping": 0.1, "angular_damping": 0.2}],
+    "springs": [{"name": "s", "bodies": ["a", "world"], "anchors": [[0, 0], [2, 0]], "stiffness": 4,
+                 "damping": 0.5, "rest_length": 1.5}],
+    "forces": [{"name": "on", "body": "a", "force": [0, 6], "torque": 0.3, "at": [0.5, 0]},
+               {"name": "off", "body": "a", "force": [100, 0], "start": 0.1}]})");
+  // m g − c v + k (ℓ − L0) − c_s (d·v) + F; the spring shortens at 3 m/s.
+  EXPECT_NEAR(p.momentum[0], 2 * 1 - 0.1 * 3 + 4 * 0.5 - 0.5 * 3, 1e-14);
+  EXPECT_NEAR(p.momentum[1], 2 * -9 + 0.1 + 6, 1e-14);
+  EXPECT_NEAR(p.momentum[2], -0.2 * 2 + 0.3 + 0.5 * std::cos(0.5) * 6, 1e-14);
+}
+
+TEST(AssembleAccelerationTest, APendulumsAngularAcceleration) {
+  // θ'' = −m g ℓ sin θ / (I + m ℓ²) − c θ' / (I + m ℓ²) + effort / (I + m ℓ²).
+  const ContactProblem<double> p =
+      AssembleAccelerations(R"({"bodies": [{"name": "a", "mass": 2, "inertia": 0.3,
+      "position": [0.8, 0]}],
+    "joints": [{"name": "pin", "type": "revolute", "bodies": ["a", "world"], "anchor": [0, 0],
+                "damping": 0.1, "effort": 0.7, "rate": 1.5}]})");
+  const double about_pin = 0.3 + 2 * 0.64;
+  const double alpha = (-2 * 9.81 * 0.8 - 0.1 * 1.5 + 0.7) / about_pin;
+  const std::vector<double> x = Accelerations(p);
+  EXPECT_NEAR(x[2], alpha, 1e-12);
+  EXPECT_NEAR(x[1], 0.8 * alpha, 1e-12);
+  EXPECT_NEAR(x[0], -0.8 * 1.5 * 1.5, 1e-12);  // towards the pin
+}
+
+TEST(AssembleCorrectionTest, ANewtonStepOntoTheSurface) {
+  Model<double> model;
+  State<double> state;
+  BuildModel(SceneOf(test_scenes::FallingBall(0.0, R"({"dt": 0.01})")), &model, &state);
+  state.pose[1] -= 1e-3;
+  ActiveContact contact;
+  contact.a = 0;
+  contact.b = 1;
+  contact.feature = {FeatureKind::kVertexPlane, 0, 0};
+  contact.law = ContactLaw::kInelastic;
+  AssemblyScratch<double> scratch;
+  ContactProblem<double> problem;
+  AssembleCorrection(model, state, {contact}, {CoefficientSource()}, 1.0, &scratch, &problem);
+  EXPECT_NEAR(problem.contacts[0].c_n, -1e-3, 1e-15);
+  // Out of deep penetration no faster than allowed.
+  contact.law = ContactLaw::kRecovery;
+  AssembleCorrection(model, state, {contact}, {CoefficientSource()}, 1e-4, &scratch, &problem);
+  EXPECT_DOUBLE_EQ(problem.contacts[0].c_n, -1e-4);
 }
 
 }  // namespace

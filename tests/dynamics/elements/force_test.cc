@@ -119,5 +119,23 @@ TEST(ForceTest, SpringRowIsTheDerivativeOfItsLengthAndFiniteAtZero) {
   EXPECT_TRUE(row.row_a[0].v.allFinite());
 }
 
+TEST(SignalAtTest, KeepsThePieceThatWasChosen) {
+  Signal signal;
+  signal.time = {0.0, 1.0, 2.0};
+  signal.value = {1.0, 3.0, 0.0};
+  const auto at = [&](double t, double middle) {
+    return SignalAt(signal, signal.value, LocalJet(t, 0), middle);
+  };
+  EXPECT_EQ(at(1.0, 0.5).a, 1.0);
+  EXPECT_EQ(at(1.0, 0.5).v[0], 0.0);
+  signal.interpolation = Signal::Interpolation::kLinear;
+  EXPECT_EQ(at(1.0, 0.5).a, 3.0);
+  EXPECT_EQ(at(1.0, 0.5).v[0], 2.0);
+  EXPECT_EQ(at(1.5, 1.2).a, 1.5);
+  EXPECT_EQ(at(1.5, 1.2).v[0], -3.0);
+  EXPECT_EQ(at(2.5, 2.5).a, 0.0);
+  EXPECT_EQ(at(2.5, 2.5).v[0], 0.0);
+}
+
 }  // namespace
 }  // namespace tangible

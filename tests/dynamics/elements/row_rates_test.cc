@@ -7,17 +7,13 @@ namespace tangible {
 namespace {
 
 MovingPose<double> Moving(double x, double y, double angle, double vx, double vy, double omega) {
-  MovingPose<double> m;
-  const double pose[3] = {x, y, angle};
-  const double twist[3] = {vx, vy, omega};
-  std::copy_n(pose, 3, m.pose);
-  std::copy_n(twist, 3, m.twist);
+  MovingPose<double> m{Pose<double>(Vector2<double>(x, y), angle), {vx, vy, omega}};
   return m;
 }
 
 Pose<double> After(const MovingPose<double>& m, double time) {
-  return Pose<double>(Vector2<double>(m.pose[0] + time * m.twist[0], m.pose[1] + time * m.twist[1]),
-                      m.pose[2] + time * m.twist[2]);
+  return Pose<double>(m.pose.position + time * Vector2<double>(m.twist[0], m.twist[1]),
+                      m.pose.angle + time * m.twist[2]);
 }
 
 double Speed(const RowPart<double>& a, const MovingPose<double>& of_a, const RowPart<double>& b,

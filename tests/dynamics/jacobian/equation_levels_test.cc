@@ -1,15 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "tangible/dynamics/jacobian/acceleration_jacobian.h"
-
+//
+// The entries of ∂R/∂w at each level, by both routes, against differences of the assembled residual.
 #include <gtest/gtest.h>
 
 #include <cmath>
 
 #include "../../support/scenes.h"
+#include "tangible/dynamics/jacobian/equation_jacobian.h"
 #include "tangible/lcp/system/contact_system.h"
 
 namespace tangible {
 namespace {
+
+constexpr double kStep = 0.01;
 
 // Bodies in every joint type, a spring, forces, a limit, contacts of boxes, discs and planes.
 std::string Everything() {
@@ -48,7 +51,12 @@ std::string Everything() {
     "simulation": {"joint_correction": "baumgarte"}})";
 }
 
-class AccelerationJacobianTest : public testing::TestWithParam<bool> {
+struct Case {
+  Level level;
+  JacobianRoute route;
+};
+
+class EquationLevelsTest : public testing::TestWithParam<Case> {
  protected:
   void SetUp() override {
     BuildModel(test_scenes::SceneOf(Everything()), &model_, &state_);
@@ -64,6 +72,7 @@ class AccelerationJacobianTest : public testing::TestWithParam<bool> {
       contact.law = ContactLaw::kInelastic;
       contacts_.push_back(contact);
       friction_.push_back(MixedFriction(model_, a, b));
+      restitution_.push_back(MixedRestitution(model_, a, b));
       modes_.push_back(mode);
     };
     add(0, 6, ContactMode::kSticking);
@@ -77,6 +86,7 @@ class AccelerationJacobianTest : public testing::TestWithParam<bool> {
     limit.law = ContactLaw::kInelastic;
     contacts_.push_back(limit);
     friction_.emplace_back();
+    restitution_.emplace_back();
     modes_.push_back(ContactMode::kClosed);
   }
 
@@ -88,8 +98,11 @@ class AccelerationJacobianTest : public testing::TestWithParam<bool> {
     state.pose.assign(w.begin(), w.begin() + n);
     state.twist.assign(w.begin() + n, w.begin() + 2 * n);
     model.numbers.assign(w.begin() + 2 * n, w.end() - 1);
-    AccelerationScratch<double> scratch;
-    if (GetParam()) {
+    AssemblyScratch<double> scratch;
+    if (GetParam().level == Level::kVelocity) {
+      AssembleFree(model, state, 0.5, kStep, problem, &scratch);
+      AssembleContacts(model, state, kStep, contacts_, friction_, restitution_, &scratch, problem);
+    } else if (GetParam().level == Level::kCorrection) {
       AssembleCorrection(model, state, contacts_, friction_, 1.0, &scratch, problem);
     } else {
       AssembleAcceleration(model, state, w.back(), 0.5, contacts_, friction_, &scratch, problem);
@@ -114,6 +127,10 @@ class AccelerationJacobianTest : public testing::TestWithParam<bool> {
     std::vector<double> r(3 * (p.num_bodies + p.joints.size() + p.contacts.size()), 0.0);
     for (int i = 0; i < 3 * p.num_bodies; ++i) {
       r[i] = p.mass[i] * s.v[i] - p.momentum[i];
+    }
+    for (const DamperBlock<double>& d : p.dampers) {
+      AddRowTransposed(d.a, d.row_a, d.b, d.row_b,
+                       d.weight * RowDot(d.a, d.row_a, d.b, d.row_b, s.v.data()), r.data());
     }
     for (size_t j = 0; j < p.joints.size(); ++j) {
       const JointBlock<double>& joint = p.joints[j];
@@ -144,11 +161,11 @@ class AccelerationJacobianTest : public testing::TestWithParam<bool> {
   Model<double> model_;
   State<double> state_;
   std::vector<ActiveContact> contacts_;
-  std::vector<CoefficientSource> friction_;
+  std::vector<CoefficientSource> friction_, restitution_;
   std::vector<ContactMode> modes_;
 };
 
-TEST_P(AccelerationJacobianTest, EntriesAreTheDifferencesOfTheResidual) {
+TEST_P(EquationLevelsTest, EntriesAreTheDifferencesOfTheResidual) {
   const ModelStructure& s = *model_.structure;
   std::vector<double> w = state_.pose;
   w.insert(w.end(), state_.twist.begin(), state_.twist.end());
@@ -173,10 +190,19 @@ TEST_P(AccelerationJacobianTest, EntriesAreTheDifferencesOfTheResidual) {
   }
   ContactSystem system;
   ASSERT_TRUE(system.Factor(problem, modes_));
-  SolvedAcceleration view;
-  view.correction = GetParam();
-  view.time = 0.5;
-  view.middle = 0.5;
+  SolvedEquations view;
+  view.level = GetParam().level;
+  view.instant.t = 0.5;
+  view.instant.h = kStep;
+  view.instant.time = 0.5;
+  view.instant.middle = 0.5;
+  view.restitution = &restitution_;
+  // Of all bodies: of a step the new twists, those of prescribed motion too.
+  std::vector<double> new_twist = state_.twist;
+  for (int k = 0; k < s.num_blocks(); ++k) {
+    std::copy_n(&solution.v[3 * k], 3, &new_twist[3 * s.moving[k]]);
+  }
+  view.new_twist = &new_twist;
   view.state = &state_;
   view.contacts = &contacts_;
   view.friction = &friction_;
@@ -185,7 +211,7 @@ TEST_P(AccelerationJacobianTest, EntriesAreTheDifferencesOfTheResidual) {
   view.contact_block = &system.contact_block();
   LocalJacobianScratch scratch;
   std::vector<JacobianEntry> entries;
-  VisitAccelerationJacobian(model_, view, &scratch, EntryListSink{&entries});
+  VisitJacobian(model_, view, GetParam().route, &scratch, EntryListSink{&entries});
   const int rows = 3 * system.num_blocks();
   Eigen::MatrixXd jacobian = Eigen::MatrixXd::Zero(rows, w.size());
   for (const JacobianEntry& entry : entries) {
@@ -216,12 +242,24 @@ TEST_P(AccelerationJacobianTest, EntriesAreTheDifferencesOfTheResidual) {
       checked += std::abs(difference) > 1e-6 ? 1 : 0;
     }
   }
-  EXPECT_GT(checked, GetParam() ? 80 : 200);
+  EXPECT_GT(checked, GetParam().level == Level::kCorrection ? 80 : 200);
 }
 
-INSTANTIATE_TEST_SUITE_P(Kinds, AccelerationJacobianTest, testing::Bool(), [](const auto& kind) {
-  return kind.param ? "correction" : "acceleration";
-});
+INSTANTIATE_TEST_SUITE_P(Levels, EquationLevelsTest,
+                         testing::Values(Case{Level::kVelocity, JacobianRoute::kByHand},
+                                         Case{Level::kVelocity, JacobianRoute::kGeneric},
+                                         Case{Level::kAcceleration, JacobianRoute::kByHand},
+                                         Case{Level::kAcceleration, JacobianRoute::kGeneric},
+                                         Case{Level::kCorrection, JacobianRoute::kByHand},
+                                         Case{Level::kCorrection, JacobianRoute::kGeneric}),
+                         [](const auto& kind) {
+                           const Level level = kind.param.level;
+                           const std::string name = level == Level::kVelocity       ? "velocity"
+                                                    : level == Level::kAcceleration ? "acceleration"
+                                                                                    : "correction";
+                           return name + (kind.param.route == JacobianRoute::kByHand ? "_by_hand"
+                                                                                     : "_generic");
+                         });
 
 }  // namespace
 }  // namespace tangible

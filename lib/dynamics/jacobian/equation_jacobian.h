@@ -1,19 +1,25 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// The derivatives of a step's equations with respect to its variables, entry by entry.
+// The derivatives of the equations of an instant (assembly.h) with respect to its variables, entry
+// by entry.
 //
-// A step solves R(x; w) = 0 for x = (v⁺, y, λ), with the variables w = [poses | twists | numbers]:
-//   R1 = (M + hC) v⁺ − M v − impulses − Aᵀ y − Σ (nᵀ λn + tᵀ λt)       rows of moving bodies
-//   R2 = A v⁺ − b                                                       rows of joints
-//   R3 = n v⁺ + c_n, and t v⁺ where sticking                            rows of closed contacts
+// The equations R(x; w) = 0 determine x = (v⁺, y, λ), or (a, y, λ), or (δ, y, λ), and have the
+// variables w = [poses | twists | numbers | t]; the time is one of accelerations alone.
+//   R1 = M x − p − Aᵀ y − Σ (nᵀ λn + tᵀ λt)              rows of moving bodies
+//   R2 = A x − b                                         rows of joints
+//   R3 = n x + c_n, and t x + c_t where sticking         rows of closed contacts
 //        λn − e λ¹n where driven, at a fixed impulse λ¹n of the compression (law kPoisson)
-// K = ∂R/∂x is the step's own matrix. This file gives ∂R/∂w at fixed x: each body, spring, force,
-// joint and contact reads a few variables only, is evaluated in a LocalJet of these and handed on
-// as entries (row, variable, value). Tangent and adjoint use the same entries:
+// K = ∂R/∂x is the matrix of the solved system. This file gives ∂R/∂w at fixed x: each body,
+// spring, force, joint and contact reads a few variables only, is evaluated in a LocalJet of these
+// by the equations that assemble it (equations_inl.h), and handed on as entries (row, variable,
+// value). Tangent and adjoint use the same entries:
 //   tangent   K ẋ = −(∂R/∂w) ẇ            adjoint   Kᵀ u = x̄,  w̄ −= (∂R/∂w)ᵀ u
-// Open contacts have no rows and no entries. Revolute joints, which chains are made of, have their
-// entries written by hand; a test compares them with the generic route.
+// Open contacts have no rows and no entries.
+//
+// Written by hand are the entries of bodies, of revolute joints, which chains are made of, and of a
+// contact for a single column of the adjoint; a test compares them with the generic route. What
+// they save: jacobian/README.md.
 
 #include <vector>
 
@@ -73,13 +79,13 @@ struct EntryListSink {
   }
 };
 
-/// A solved step, as far as its derivative needs it.
-struct SolvedStep {
-  double time = 0.0;
-  double h = 0.0;
-  bool corrects_drift = true;  ///< whether Baumgarte's term, if the scene has it, is in it
-  const State<double>* before = nullptr;
-  const std::vector<double>* new_twist = nullptr;  ///< of all bodies
+/// The solved equations of an instant, as far as their derivatives need them. Of accelerations and
+/// corrections `restitution` is null.
+struct SolvedEquations {
+  Level level = Level::kVelocity;
+  Instant<double> instant;
+  const State<double>* state = nullptr;
+  const std::vector<double>* new_twist = nullptr;  ///< velocity: of all bodies
   const std::vector<ActiveContact>* contacts = nullptr;
   const std::vector<CoefficientSource>* friction = nullptr;
   const std::vector<CoefficientSource>* restitution = nullptr;
@@ -88,16 +94,21 @@ struct SolvedStep {
   const std::vector<int>* contact_block = nullptr;  ///< −1: open
 };
 
-/// Scratch: numbers of a polygon as LocalJets.
+/// Index of the time among the variables of accelerations.
+inline int TimeVariable(const ModelStructure& structure) { return structure.num_variables(); }
+
+/// Memory: shapes as LocalJets, the accelerations of all bodies.
 struct LocalJacobianScratch {
   std::vector<LocalJet> numbers_a, numbers_b;
+  ContactRateScratch<LocalJet> rates;
+  std::vector<double> unknowns;
 };
 
-enum class JointRoute { kByHand, kGeneric };
+enum class JacobianRoute { kByHand, kGeneric };
 
-/// All entries of ∂R/∂w of a step; h = 0 is an impact: an instant in which no force acts.
+/// All entries of ∂R/∂w; a velocity with h = 0 is an impact: an instant in which no force acts.
 template <typename Sink>
-void VisitStepJacobian(const Model<double>& model, const SolvedStep& step, JointRoute route,
-                       LocalJacobianScratch* scratch, const Sink& sink);
+void VisitJacobian(const Model<double>& model, const SolvedEquations& solved, JacobianRoute route,
+                   LocalJacobianScratch* scratch, const Sink& sink);
 
 }  // namespace tangible

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // The entries of ∂R/∂w; that they are right as a whole is what the random gradient check shows.
-#include "tangible/dynamics/jacobian/local_jacobian.h"
+#include "tangible/dynamics/jacobian/equation_jacobian.h"
 
 #include <gtest/gtest.h>
 
@@ -13,11 +13,11 @@ namespace tangible {
 namespace {
 
 // ∂R/∂w of the step that the stepper has just done, dense.
-MatrixX<double> Dense(const Model<double>& model, Stepper* stepper, JointRoute route) {
+MatrixX<double> Dense(const Model<double>& model, Stepper* stepper, JacobianRoute route) {
   std::vector<JacobianEntry> entries;
   LocalJacobianScratch scratch;
-  VisitStepJacobian(model, stepper->record().View(stepper->system().contact_block()), route,
-                    &scratch, EntryListSink{&entries});
+  VisitJacobian(model, stepper->record().View(stepper->system().contact_block()), route, &scratch,
+                EntryListSink{&entries});
   MatrixX<double> dense =
       MatrixX<double>::Zero(3 * stepper->system().num_blocks(), model.structure->num_variables());
   for (const JacobianEntry& e : entries) {
@@ -49,8 +49,8 @@ void ForEachStep(int steps, const Visit& visit) {
 TEST(LocalJacobianTest, RevoluteByHandIsTheGenericRoute) {
   int revolutes = 0;
   ForEachStep(3, [&](unsigned seed, const Model<double>& model, Stepper* stepper) {
-    const MatrixX<double> by_hand = Dense(model, stepper, JointRoute::kByHand);
-    const MatrixX<double> generic = Dense(model, stepper, JointRoute::kGeneric);
+    const MatrixX<double> by_hand = Dense(model, stepper, JacobianRoute::kByHand);
+    const MatrixX<double> generic = Dense(model, stepper, JacobianRoute::kGeneric);
     // Sums of a few products: rounding of the largest.
     EXPECT_LT((by_hand - generic).cwiseAbs().maxCoeff(),
               1e-13 * (1.0 + generic.cwiseAbs().maxCoeff()))
@@ -68,14 +68,14 @@ TEST(LocalJacobianTest, OneColumnOfTheAdjointIsThatOfSeveral) {
   ForEachStep(5, [&](unsigned seed, const Model<double>& model, Stepper* stepper) {
     const int rows = 3 * stepper->system().num_blocks();
     const VectorX<double> u = VectorX<double>::Random(rows);
-    const SolvedStep step = stepper->record().View(stepper->system().contact_block());
+    const SolvedEquations step = stepper->record().View(stepper->system().contact_block());
     LocalJacobianScratch scratch;
     VectorX<double> one = VectorX<double>::Zero(model.structure->num_variables());
-    VisitStepJacobian(model, step, JointRoute::kByHand, &scratch,
-                      SingleAdjointSink{u.data(), one.data()});
+    VisitJacobian(model, step, JacobianRoute::kByHand, &scratch,
+                  SingleAdjointSink{u.data(), one.data()});
     VectorX<double> several = VectorX<double>::Zero(one.size());
-    VisitStepJacobian(model, step, JointRoute::kByHand, &scratch,
-                      AdjointSink{u.data(), several.data(), 1});
+    VisitJacobian(model, step, JacobianRoute::kByHand, &scratch,
+                  AdjointSink{u.data(), several.data(), 1});
     // Nothing changes the world's pose: a route may leave its derivatives out.
     for (int i = 0; i < 3; ++i) {
       one[model.structure->PoseVariable(model.structure->world(), i)] = 0.0;
@@ -98,7 +98,7 @@ TEST(LocalJacobianTest, EntriesOfABallThatSlidesByHand) {
   Stepper stepper(model);
   ASSERT_EQ(stepper.Step(model, 0.0, 0.01, &state).status, StepStatus::kDone);
   ASSERT_EQ(stepper.record().solution.modes[0], ContactMode::kSlidingPositive);
-  const MatrixX<double> J = Dense(model, &stepper, JointRoute::kByHand);
+  const MatrixX<double> J = Dense(model, &stepper, JacobianRoute::kByHand);
   const ModelStructure& s = *model.structure;
   const double impulse = 0.01 * 9.81;
   // R1: m v⁺ − m v − … + μ λ in x: ∂/∂m = v⁺ − v, ∂/∂μ_ball = λ / 2, ∂/∂v = −m, ∂/∂g_x = −h m.

@@ -1,0 +1,218 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// The equations of each element, once for all levels and all uses. Included by the assembly of
+// problems (assembly_inl.h) and by their derivatives (jacobian/equation_jacobian.cc).
+//
+// A builder decides what becomes of an element: the assembly stores its blocks in a contact
+// problem; the Jacobian evaluates it in Jets of the few variables that it reads, and hands on the
+// derivatives of its residual. A builder has
+//
+//   Scalar; kKeepsJoints                      whether RowsOf and RatesOf keep what was evaluated
+//   Begin()                                   before each element
+//   Number(i), Numbers(first, count, buffer)  parameters of the model
+//   PoseOf, Angle, TwistOf, Moving (body)     where a body is, and how it moves
+//   ShapeOfA, ShapeOfB (contact)              its shapes
+//   RowsOf, RatesOf (joint), RateScratch      memory
+//   Restitution(i), Approach(contact, rows)   of contact i: e, and n·v before the step
+//   Time()                                    of accelerations
+//
+// and takes
+//
+//   Body(k, mass, momentum)                   M x = momentum
+//   Push(a, row_a, b, row_b, amount)          momentum += rowᵀ amount
+//   AddForce(body, value)                     the same of a force or impulse on one body
+//   Along(a, row_a, b, row_b, push, damping)  momentum += rowᵀ (push − damping · speed along it)
+//   Joint(j, rows, rhs)                       row · x = rhs, less what prescribed motion adds
+//   Contact(i, contact, rows, c_n, c_t)       n · x + c_n, t · x + c_t
+
+#include "tangible/dynamics/assembly/assembly.h"
+
+namespace tangible::internal {
+
+template <Level kLevel, typename Builder>
+class Equations {
+ public:
+  using T = typename Builder::Scalar;
+
+  Equations(const ModelStructure& structure, const Instant<T>& instant, Builder* builder)
+      : s_(structure), at_(instant), b_(*builder) {}
+
+  /// Mass, momentum and damping of the body of block k.
+  void Body(int k) {
+    b_.Begin();
+    const BodyIndex& index = s_.bodies[s_.moving[k]];
+    T buffer[3];
+    const T* twist = b_.TwistOf(s_.moving[k], buffer);
+    const T mass = b_.Number(index.mass);
+    const T inertia = b_.Number(index.inertia);
+    T diagonal[3] = {mass, mass, inertia};
+    T momentum[3] = {T(0.0), T(0.0), T(0.0)};
+    if constexpr (kLevel == Level::kVelocity) {
+      const T linear = b_.Number(index.linear_damping);
+      diagonal[0] = diagonal[1] = mass + at_.h * linear;
+      diagonal[2] = inertia + at_.h * b_.Number(index.angular_damping);
+      momentum[0] = mass * (twist[0] + at_.h * b_.Number(kGravityX));
+      momentum[1] = mass * (twist[1] + at_.h * b_.Number(kGravityY));
+      momentum[2] = inertia * twist[2];
+    } else if constexpr (kLevel == Level::kAcceleration) {
+      const T linear = b_.Number(index.linear_damping);
+      momentum[0] = mass * b_.Number(kGravityX) - linear * twist[0];
+      momentum[1] = mass * b_.Number(kGravityY) - linear * twist[1];
+      momentum[2] = -b_.Number(index.angular_damping) * twist[2];
+    }
+    b_.Body(k, diagonal, momentum);
+  }
+
+  void Spring(const SpringIndex& spring) {
+    b_.Begin();
+    T buffer[7];
+    const T* x = b_.Numbers(spring.numbers, 7, buffer);
+    SpringRow<T> row;
+    EvaluateSpring<T>(b_.PoseOf(spring.a), b_.PoseOf(spring.b), x, &row);
+    b_.Push(spring.a, row.pull_a, spring.b, row.pull_b, T(-Weight()));
+    b_.Along(spring.a, row.row_a, spring.b, row.row_b, T(0.0), T(Weight() * x[5]));
+  }
+
+  void Force(const ForceIndex& force) {
+    if (s_.bodies[force.body].block < 0) {
+      return;
+    }
+    b_.Begin();
+    const T angle = b_.Angle(force.body);
+    T buffer[5];
+    const T* x = b_.Numbers(force.numbers, 5, buffer);
+    T start, end;
+    const T* from = force.start >= 0 ? b_.Numbers(force.start, 1, &start) : nullptr;
+    const T* to = force.end >= 0 ? b_.Numbers(force.end, 1, &end) : nullptr;
+    T value[3];
+    if constexpr (kLevel == Level::kVelocity) {
+      ForceImpulse(s_, force, at_.t, at_.h, angle, x, from, to, value);
+    } else {
+      ForceAt(s_, force, angle, x, from, to, b_.Time(), at_.middle, value);
+    }
+    b_.AddForce(force.body, value);
+  }
+
+  void Joint(int j) {
+    b_.Begin();
+    const JointIndex& joint = s_.joints[j];
+    JointRows<T>& rows = b_.RowsOf(j);
+    JointRates<T>& rates = b_.RatesOf(j);
+    EvaluateRows(joint, &rows, &rates);
+    T rhs[3] = {T(0.0), T(0.0), T(0.0)};
+    const double share = DriftShare();
+    for (int k = 0; k < rows.rows; ++k) {
+      if constexpr (kLevel == Level::kAcceleration) {
+        rhs[k] = -rates.row[k];
+      } else if (share != 0.0) {
+        rhs[k] = -share * rows.error[k];
+      }
+    }
+    b_.Joint(j, rows, rhs);
+    Drive(joint, rows.coordinate_a, rows.coordinate_b);
+  }
+
+  /// Effort and damping along a joint's coordinate.
+  template <typename Row>
+  void Drive(const JointIndex& joint, const Row& row_a, const Row& row_b) {
+    if constexpr (kLevel != Level::kCorrection) {
+      if (joint.damping < 0 || Weight() == 0.0) {
+        return;
+      }
+      T effort;
+      if (joint.effort_signal < 0) {
+        effort = b_.Number(joint.effort);
+      } else if constexpr (kLevel == Level::kVelocity) {
+        effort = T(MeanEffort(s_, joint, at_.t, at_.h));
+      } else {
+        const Signal& signal = s_.signals[joint.effort_signal];
+        effort = SignalAt(signal, signal.value, b_.Time(), at_.middle);
+      }
+      b_.Along(joint.a, row_a, joint.b, row_b, T(Weight() * effort),
+               T(Weight() * b_.Number(joint.damping)));
+    }
+  }
+
+  void Contact(int i, const ActiveContact& contact) {
+    b_.Begin();
+    ContactRows<T> rows;
+    ContactRates<T> rates;
+    if (contact.joint >= 0) {
+      Limit(contact, &rows, &rates);
+    } else if constexpr (kLevel == Level::kAcceleration) {
+      const MovingPose<T> a = b_.Moving(contact.a);
+      const MovingPose<T> b = b_.Moving(contact.b);
+      const ShapeView<T> shape_a = b_.ShapeOfA(contact);
+      const ShapeView<T> shape_b = b_.ShapeOfB(contact);
+      EvaluateContactRates(contact.feature, shape_a, a, shape_b, b, b_.RateScratch(), &rows,
+                           &rates);
+    } else {
+      const auto& pose_a = b_.PoseOf(contact.a);
+      const auto& pose_b = b_.PoseOf(contact.b);
+      const ShapeView<T> shape_a = b_.ShapeOfA(contact);
+      const ShapeView<T> shape_b = b_.ShapeOfB(contact);
+      rows.geometry = EvaluateContact(contact.feature, shape_a, pose_a, shape_b, pose_b);
+      RowsFromGeometry(shape_a.type, pose_a.position, shape_b.type, pose_b.position, &rows);
+    }
+    if constexpr (kLevel == Level::kVelocity) {
+      rates.normal = LawConstant(contact.law, rows.geometry.gap, at_.h, b_.Restitution(i),
+                                 b_.Approach(contact, rows), s_.settings);
+    } else if constexpr (kLevel == Level::kCorrection) {
+      rates.normal = contact.law == ContactLaw::kRecovery ? T(-at_.recovery) : rows.geometry.gap;
+    }
+    b_.Contact(i, contact, rows, rates.normal, rates.tangent);
+  }
+
+  /// What forces are multiplied by: the step's length, or 1.
+  double Weight() const { return kLevel == Level::kVelocity ? at_.h : 1.0; }
+
+  /// The factor of the joints' position errors: their correction acts in steps, not in impacts.
+  double DriftShare() const {
+    if constexpr (kLevel == Level::kCorrection) {
+      return JointCorrectionShare(s_.settings);
+    } else if constexpr (kLevel == Level::kVelocity) {
+      const bool corrects = at_.corrects_drift && at_.h > 0.0 &&
+                            JointCorrectionOf(s_.settings) == JointCorrection::kBaumgarte;
+      return corrects ? s_.settings.baumgarte / at_.h : 0.0;
+    } else {
+      return 0.0;
+    }
+  }
+
+ private:
+  void EvaluateRows(const JointIndex& joint, JointRows<T>* rows, JointRates<T>* rates) {
+    T buffer[7];
+    if constexpr (kLevel == Level::kAcceleration) {
+      const MovingPose<T> a = b_.Moving(joint.a);
+      const MovingPose<T> b = b_.Moving(joint.b);
+      EvaluateJointRates(joint.type, a, b, b_.Numbers(joint.geometry, joint.num_geometry, buffer),
+                         joint.num_geometry, rows, rates);
+    } else {
+      const auto& a = b_.PoseOf(joint.a);
+      const auto& b = b_.PoseOf(joint.b);
+      EvaluateJoint<T>(joint.type, a, b, b_.Numbers(joint.geometry, joint.num_geometry, buffer),
+                       rows);
+    }
+  }
+
+  void Limit(const ActiveContact& contact, ContactRows<T>* rows, ContactRates<T>* rates) {
+    const JointIndex& joint = s_.joints[contact.joint];
+    JointRows<T>& of_joint = b_.RowsOf(contact.joint);
+    JointRates<T>& rates_of_joint = b_.RatesOf(contact.joint);
+    if constexpr (!Builder::kKeepsJoints) {
+      EvaluateRows(joint, &of_joint, &rates_of_joint);
+    }
+    EvaluateLimitRows(b_.Number(contact.side > 0.0 ? joint.low : joint.high), of_joint, contact,
+                      rows);
+    if constexpr (kLevel == Level::kAcceleration) {
+      rates->normal = contact.side * rates_of_joint.coordinate;
+    }
+  }
+
+  const ModelStructure& s_;
+  const Instant<T>& at_;
+  Builder& b_;
+};
+
+}  // namespace tangible::internal

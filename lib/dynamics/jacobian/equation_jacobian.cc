@@ -1,0 +1,578 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/dynamics/jacobian/equation_jacobian.h"
+
+#include <algorithm>
+#include <cmath>
+#include <type_traits>
+
+#include "tangible/dynamics/assembly/equations_inl.h"
+#include "tangible/dynamics/elements/contact_rows_adjoint.h"
+#include "tangible/dynamics/jacobian/local_entries_inl.h"
+
+namespace tangible {
+namespace {
+
+using internal::BodyRow;
+
+// The builder of equations_inl.h that hands on the derivatives of an element's residual.
+template <Level kLevel, typename Sink>
+class EntryBuilder : private internal::LocalEntries<Sink> {
+ public:
+  using Scalar = LocalJet;
+  static constexpr bool kKeepsJoints = false;
+
+  EntryBuilder(const Model<double>& model, const SolvedEquations& solved, JacobianRoute route,
+               LocalJacobianScratch* scratch, const Sink& sink)
+      : internal::LocalEntries<Sink>(model, *solved.state, scratch, sink),
+        solved_(solved),
+        by_hand_(route == JacobianRoute::kByHand),
+        before_(solved.state->twist.data()),
+        equations_(s_, at_, this) {
+    at_.t = solved.instant.t;
+    at_.h = solved.instant.h;
+    at_.corrects_drift = solved.instant.corrects_drift;
+    at_.middle = solved.instant.middle;
+    if constexpr (kLevel == Level::kVelocity) {
+      unknown_ = solved.new_twist->data();
+    } else {
+      std::vector<double>& all = scratch->unknowns;
+      all.assign(3 * static_cast<size_t>(s_.num_bodies()), 0.0);
+      for (int k = 0; k < s_.num_blocks(); ++k) {
+        std::copy_n(&solved.solution->v[3 * static_cast<size_t>(k)], 3, &all[3 * s_.moving[k]]);
+      }
+      unknown_ = all.data();
+    }
+    damped_ = kLevel == Level::kAcceleration ? before_ : unknown_;
+  }
+
+  void Visit() {
+    for (int k = 0; k < s_.num_blocks(); ++k) {
+      if (by_hand_) {
+        BodyByHand(k);
+      } else {
+        equations_.Body(k);
+      }
+    }
+    if (kLevel != Level::kCorrection && equations_.Weight() > 0.0) {
+      for (const SpringIndex& spring : s_.springs) {
+        equations_.Spring(spring);
+      }
+      for (const ForceIndex& force : s_.forces) {
+        equations_.Force(force);
+      }
+    }
+    for (int j = 0; j < static_cast<int>(s_.joints.size()); ++j) {
+      if (s_.joints[j].type == JointType::kRevolute && by_hand_) {
+        RevoluteByHand(j);
+      } else {
+        equations_.Joint(j);
+      }
+    }
+    for (size_t i = 0; i < solved_.contacts->size(); ++i) {
+      const ActiveContact& contact = (*solved_.contacts)[i];
+      if ((*solved_.contact_block)[i] < 0) {
+        continue;
+      }
+      if constexpr (kLevel == Level::kVelocity && std::is_same_v<Sink, SingleAdjointSink>) {
+        if (contact.joint < 0 && by_hand_) {
+          ContactAdjointByHand(static_cast<int>(i), contact);
+          continue;
+        }
+      }
+      equations_.Contact(static_cast<int>(i), contact);
+    }
+  }
+
+  void Begin() { locals_ = internal::Locals(); }
+  LocalJet Number(int i) { return LocalNumber(i, &locals_); }
+  const LocalJet* Numbers(int first, int count, LocalJet* buffer) {
+    for (int i = 0; i < count; ++i) {
+      buffer[i] = LocalNumber(first + i, &locals_);
+    }
+    return buffer;
+  }
+  Pose<LocalJet> PoseOf(int body) { return LocalPose(body, &locals_); }
+  LocalJet Angle(int body) {
+    return locals_.Add(state_.pose[3 * body + 2], s_.PoseVariable(body, 2));
+  }
+  const LocalJet* TwistOf(int body, LocalJet* buffer) {
+    for (int i = 0; i < 3; ++i) {
+      buffer[i] = locals_.Add(before_[3 * body + i], s_.TwistVariable(body, i));
+    }
+    return buffer;
+  }
+  MovingPose<LocalJet> Moving(int body) {
+    return {LocalPose(body, &locals_),
+            {LocalJet(before_[3 * body]), LocalJet(before_[3 * body + 1]),
+             LocalJet(before_[3 * body + 2])}};
+  }
+  ShapeView<LocalJet> ShapeOfA(const ActiveContact& contact) {
+    return LocalShapeOfA(contact, &locals_);
+  }
+  ShapeView<LocalJet> ShapeOfB(const ActiveContact& contact) {
+    return LocalShapeOfB(contact, &locals_);
+  }
+  JointRows<LocalJet>& RowsOf(int) { return joint_rows_; }
+  JointRates<LocalJet>& RatesOf(int) { return joint_rates_; }
+  ContactRateScratch<LocalJet>* RateScratch() { return &scratch_.rates; }
+  // A number of its own: EntriesOfCoefficients has its derivative.
+  LocalJet Restitution(int i) const { return LocalJet((*solved_.restitution)[i].value); }
+  LocalJet Approach(const ActiveContact& contact, const ContactRows<LocalJet>& rows) const {
+    return RowTimes(before_, contact.a, rows.normal_a, contact.b, rows.normal_b);
+  }
+  LocalJet Time() { return locals_.Add(solved_.instant.time, TimeVariable(s_)); }
+
+  void Body(int k, const LocalJet mass[3], const LocalJet momentum[3]) {
+    for (int i = 0; i < 3; ++i) {
+      Emit(locals_, 3 * k + i, mass[i] * unknown_[3 * s_.moving[k] + i] - momentum[i]);
+    }
+  }
+
+  void Push(int a, const RowPart<LocalJet>& row_a, int b, const RowPart<LocalJet>& row_b,
+            const LocalJet& amount) {
+    EmitMomentum(locals_, a, row_a, b, row_b, -amount);
+  }
+
+  void AddForce(int body, const LocalJet value[3]) {
+    for (int i = 0; i < 3; ++i) {
+      Emit(locals_, BodyRow(s_, body) + i, -value[i]);
+    }
+  }
+
+  void Along(int a, const RowPart<LocalJet>& row_a, int b, const RowPart<LocalJet>& row_b,
+             const LocalJet& push, const LocalJet& damping) {
+    const LocalJet speed = RowTimes(damped_, a, row_a, b, row_b);
+    EmitMomentum(locals_, a, row_a, b, row_b, damping * speed - push);
+    const auto by_twist = [&](int body, const RowPart<LocalJet>& part) {
+      for (int i = 0; i < 3 && SpeedsReadTwist(body); ++i) {
+        EmitRowTimesVariable(a, row_a, b, row_b, s_.TwistVariable(body, i), damping.a * part[i].a);
+      }
+    };
+    by_twist(a, row_a);
+    by_twist(b, row_b);
+  }
+
+  void Joint(int j, const JointRows<LocalJet>& rows, const LocalJet rhs[3]) {
+    const JointIndex& joint = s_.joints[j];
+    const double* y = &solved_.solution->joint_impulse[3 * static_cast<size_t>(j)];
+    for (int k = 0; k < rows.rows; ++k) {
+      const int row = JointRow(j) + k;
+      Emit(locals_, row,
+           RowTimes(unknown_, joint.a, rows.row_a[k], joint.b, rows.row_b[k]) - rhs[k]);
+      EmitMomentum(locals_, joint.a, rows.row_a[k], joint.b, rows.row_b[k], -y[k]);
+      EmitPrescribed(joint.a, rows.row_a[k], joint.b, rows.row_b[k], row);
+    }
+    if constexpr (kLevel == Level::kAcceleration) {
+      internal::Locals twists;
+      JointRates<LocalJet> rates;
+      RatesByTwist(joint, &twists, &rates);
+      for (int k = 0; k < rows.rows; ++k) {
+        Emit(twists, JointRow(j) + k, rates.row[k]);
+      }
+    }
+  }
+
+  void Contact(int i, const ActiveContact& contact, const ContactRows<LocalJet>& rows,
+               const LocalJet& c_n, const LocalJet& c_t) {
+    const int a = contact.a;
+    const int b = contact.b;
+    const int row = 3 * (*solved_.contact_block)[i];
+    const bool sticks = solved_.solution->modes[i] == ContactMode::kSticking;
+    EmitMomentum(locals_, a, rows.normal_a, b, rows.normal_b, -solved_.solution->normal_impulse[i]);
+    EmitMomentum(locals_, a, rows.tangent_a, b, rows.tangent_b,
+                 -solved_.solution->tangent_impulse[i]);
+    if (!IsDriven(i)) {
+      Emit(locals_, row, RowTimes(unknown_, a, rows.normal_a, b, rows.normal_b) + c_n);
+    }
+    if (sticks) {
+      Emit(locals_, row + 1, RowTimes(unknown_, a, rows.tangent_a, b, rows.tangent_b) + c_t);
+    }
+    EmitByRows(i, contact, rows);
+    if constexpr (kLevel == Level::kAcceleration) {
+      internal::Locals twists;
+      ContactRates<LocalJet> rates;
+      RatesByTwist(contact, &twists, &rates);
+      Emit(twists, row, rates.normal);
+      if (sticks) {
+        Emit(twists, row + 1, rates.tangent);
+      }
+    }
+  }
+
+ private:
+  using Base = internal::LocalEntries<Sink>;
+  using Base::Emit;
+  using Base::EmitMomentum;
+  using Base::EmitRowTimesVariable;
+  using Base::JointRow;
+  using Base::LocalNumber;
+  using Base::LocalPose;
+  using Base::LocalShapeOfA;
+  using Base::LocalShapeOfB;
+  using Base::model_;
+  using Base::s_;
+  using Base::scratch_;
+  using Base::sink_;
+  using Base::state_;
+  using Base::x_;
+
+  template <typename T>
+  static T RowTimes(const double* x, int a, const RowPart<T>& row_a, int b,
+                    const RowPart<T>& row_b) {
+    T sum(0.0);
+    for (int i = 0; i < 3; ++i) {
+      sum += row_a[i] * x[3 * a + i] + row_b[i] * x[3 * b + i];
+    }
+    return sum;
+  }
+
+  // Whether the speeds that dampers act against are variables: of a step the new ones, which are
+  // unknowns but for prescribed motion, of accelerations those of the state.
+  bool SpeedsReadTwist(int body) const {
+    const Motion motion = s_.bodies[body].motion;
+    return kLevel == Level::kAcceleration ? motion != Motion::kStatic
+                                          : motion == Motion::kKinematic;
+  }
+
+  // A constraint row of velocities reads the twist of a body of prescribed motion.
+  template <typename T>
+  void EmitPrescribed(int a, const RowPart<T>& row_a, int b, const RowPart<T>& row_b, int row) {
+    const auto emit = [&](int body, const RowPart<T>& part) {
+      for (int i = 0; i < 3 && s_.bodies[body].motion == Motion::kKinematic; ++i) {
+        sink_(row, s_.TwistVariable(body, i), ValueOf(part[i]));
+      }
+    };
+    if constexpr (kLevel == Level::kVelocity) {
+      emit(a, row_a);
+      emit(b, row_b);
+    }
+  }
+
+  // R1 = m (x − v − h g) + h c x of a step, m (a − g) + c v of accelerations, m δ of a correction.
+  void BodyByHand(int k) {
+    const int body = s_.moving[k];
+    const BodyIndex& index = s_.bodies[body];
+    const double weight = kLevel == Level::kCorrection ? 0.0 : equations_.Weight();
+    for (int i = 0; i < 3; ++i) {
+      const int inertial = i < 2 ? index.mass : index.inertia;
+      const int damping = i < 2 ? index.linear_damping : index.angular_damping;
+      double change = unknown_[3 * body + i];
+      if constexpr (kLevel == Level::kVelocity) {
+        change -= before_[3 * body + i];
+      }
+      sink_(3 * k + i, s_.NumberVariable(inertial),
+            i < 2 ? change - weight * x_[kGravityX + i] : change);
+      if constexpr (kLevel == Level::kCorrection) {
+        continue;
+      }
+      sink_(3 * k + i, s_.NumberVariable(damping), weight * damped_[3 * body + i]);
+      if (i < 2) {
+        sink_(3 * k + i, s_.NumberVariable(kGravityX + i), -weight * x_[inertial]);
+      }
+      sink_(3 * k + i, s_.TwistVariable(body, i),
+            kLevel == Level::kVelocity ? -x_[inertial] : x_[damping]);
+    }
+  }
+
+  // Two rows p_a − p_b with arms r = R(θ) anchor; only the arms depend on variables,
+  //   ∂r/∂θ = r⊥,  ∂r/∂anchor = R(θ),
+  // and a side's rows are ±(ẋ + turn r⊥ + along r) with ẋ the unknown of the position, turn that of
+  // the angle, and along = β/h, −ω² or the correction's share.
+  void RevoluteByHand(int j) {
+    const JointIndex& joint = s_.joints[j];
+    const double* y = &solved_.solution->joint_impulse[3 * static_cast<size_t>(j)];
+    const double share = equations_.DriftShare();
+    const auto side = [&](int body, int anchor, double sign) {
+      const double angle = state_.pose[3 * body + 2];
+      const double c = std::cos(angle);
+      const double s = std::sin(angle);
+      const double ax = x_[anchor];
+      const double ay = x_[anchor + 1];
+      const double arm[2] = {c * ax - s * ay, s * ax + c * ay};
+      // Columns: the arm's change with θ and with the anchor's two components.
+      const double dx[3] = {-s * ax - c * ay, c, -s};
+      const double dy[3] = {arm[0], s, c};
+      const int variables[3] = {s_.PoseVariable(body, 2), s_.NumberVariable(anchor),
+                                s_.NumberVariable(anchor + 1)};
+      const double turn = unknown_[3 * body + 2];
+      const double omega = before_[3 * body + 2];
+      const double along = kLevel == Level::kAcceleration ? -omega * omega : share;
+      const int row = BodyRow(s_, body);
+      for (int k = 0; k < 3; ++k) {
+        sink_(JointRow(j), variables[k], sign * (along * dx[k] - turn * dy[k]));
+        sink_(JointRow(j) + 1, variables[k], sign * (along * dy[k] + turn * dx[k]));
+        if (row >= 0) {
+          sink_(row + 2, variables[k], -sign * (-dy[k] * y[0] + dx[k] * y[1]));
+        }
+      }
+      for (int i = 0; i < 2; ++i) {
+        if (share != 0.0) {
+          sink_(JointRow(j) + i, s_.PoseVariable(body, i), sign * share);
+        }
+        if (kLevel == Level::kAcceleration && s_.bodies[body].motion != Motion::kStatic) {
+          sink_(JointRow(j) + i, s_.TwistVariable(body, 2), -2.0 * sign * omega * arm[i]);
+        }
+        if (kLevel == Level::kVelocity && s_.bodies[body].motion == Motion::kKinematic) {
+          sink_(JointRow(j) + i, s_.TwistVariable(body, i), sign);
+          sink_(JointRow(j) + i, s_.TwistVariable(body, 2),
+                i == 0 ? -sign * arm[1] : sign * arm[0]);
+        }
+      }
+    };
+    side(joint.a, joint.geometry, 1.0);
+    side(joint.b, joint.geometry + 2, -1.0);
+    DriveByHand(joint);
+  }
+
+  // Effort and damping along θ_a − θ_b.
+  void DriveByHand(const JointIndex& joint) {
+    const double weight = equations_.Weight();
+    if (kLevel == Level::kCorrection || weight == 0.0) {
+      return;
+    }
+    double slope = 0.0;
+    if (kLevel == Level::kAcceleration && joint.effort_signal >= 0) {
+      const Signal& signal = s_.signals[joint.effort_signal];
+      slope = SignalAt(signal, signal.value, LocalJet(solved_.instant.time, 0), at_.middle).v[0];
+    }
+    const int bodies[2] = {joint.a, joint.b};
+    const double speed = damped_[3 * joint.a + 2] - damped_[3 * joint.b + 2];
+    for (int i = 0; i < 2; ++i) {
+      const int row = BodyRow(s_, bodies[i]) + 2;
+      const double sign = i == 0 ? 1.0 : -1.0;
+      if (row < 2) {
+        continue;
+      }
+      sink_(row, s_.NumberVariable(joint.damping), sign * weight * speed);
+      if (joint.effort_signal < 0) {
+        sink_(row, s_.NumberVariable(joint.effort), -sign * weight);
+      } else if (slope != 0.0) {
+        sink_(row, TimeVariable(s_), -sign * slope);
+      }
+      for (int k = 0; k < 2; ++k) {
+        if (SpeedsReadTwist(bodies[k])) {
+          sink_(row, s_.TwistVariable(bodies[k], 2),
+                (i == k ? weight : -weight) * x_[joint.damping]);
+        }
+      }
+    }
+  }
+
+  // A contact's entries times one column u, by the geometry's adjoint: the sum of u times the
+  // contact's rows is
+  //   α_a·n_a + α_b·n_b + β_a·t_a + β_b·t_b + γ gap.
+  void ContactAdjointByHand(int i, const ActiveContact& contact) {
+    const Pose<double> pose_a = state_.PoseOf(contact.a);
+    const Pose<double> pose_b = state_.PoseOf(contact.b);
+    const ShapeView<double> shape_a = model_.Shape(contact.a);
+    const ShapeView<double> shape_b = model_.Shape(contact.b);
+    ContactRows<double> rows;
+    rows.geometry = EvaluateContact(contact.feature, shape_a, pose_a, shape_b, pose_b);
+    RowsFromGeometry(shape_a.type, pose_a.position, shape_b.type, pose_b.position, &rows);
+    const double* u_contact = sink_.u + 3 * static_cast<size_t>((*solved_.contact_block)[i]);
+    const double u_n = IsDriven(i) ? 0.0 : u_contact[0];
+    const double u_t = solved_.solution->modes[i] == ContactMode::kSticking ? u_contact[1] : 0.0;
+    const double e =
+        contact.law == ContactLaw::kRestitution ? (*solved_.restitution)[i].value : 0.0;
+    RowsAdjoint bar;
+    const auto weigh = [&](int body, double* alpha, double* beta) {
+      const int row = BodyRow(s_, body);
+      for (int k = 0; k < 3; ++k) {
+        const double u = row >= 0 ? sink_.u[row + k] : 0.0;
+        alpha[k] = u_n * (unknown_[3 * body + k] + e * before_[3 * body + k]) -
+                   solved_.solution->normal_impulse[i] * u;
+        beta[k] = u_t * unknown_[3 * body + k] - solved_.solution->tangent_impulse[i] * u;
+      }
+    };
+    weigh(contact.a, bar.normal_a, bar.tangent_a);
+    weigh(contact.b, bar.normal_b, bar.tangent_b);
+    bar.gap = contact.law == ContactLaw::kGap ? u_n / at_.h : 0.0;
+    ContactSideAdjoint a_bar;
+    ContactSideAdjoint b_bar;
+    ContactRowsAdjoint(contact.feature, shape_a, pose_a, shape_b, pose_b, rows, bar, &a_bar,
+                       &b_bar);
+    const auto add = [&](int body, bool is_edge, int feature, const ContactSideAdjoint& side) {
+      for (int k = 0; k < 3; ++k) {
+        sink_.w_bar[s_.PoseVariable(body, k)] -= side.pose[k];
+      }
+      const BodyIndex& index = s_.bodies[body];
+      int used[4];
+      const int count =
+          FeatureNumbers(index.shape, index.num_shape_numbers, is_edge, feature, used);
+      for (int k = 0; k < count; ++k) {
+        sink_.w_bar[s_.NumberVariable(index.shape_numbers + used[k])] -= side.numbers[k];
+      }
+    };
+    add(contact.a, contact.feature.kind == FeatureKind::kEdgeVertex, contact.feature.a, a_bar);
+    add(contact.b, contact.feature.kind == FeatureKind::kVertexEdge, contact.feature.b, b_bar);
+    EmitByRows(i, contact, rows);
+  }
+
+  bool IsDriven(int i) const {
+    return (*solved_.contacts)[i].law == ContactLaw::kPoisson &&
+           solved_.problem->contacts[i].driven;
+  }
+
+  // What depends on the rows' values alone: prescribed twists, restitution and friction.
+  template <typename T>
+  void EmitByRows(int i, const ActiveContact& contact, const ContactRows<T>& rows) {
+    const int row = 3 * (*solved_.contact_block)[i];
+    if constexpr (kLevel == Level::kVelocity) {
+      if (IsDriven(i)) {
+        // λn − e λ¹n, at a fixed impulse λ¹n of the compression.
+        EmitCoefficient((*solved_.restitution)[i], row,
+                        -solved_.problem->contacts[i].offset / (*solved_.restitution)[i].value);
+      } else {
+        if (contact.law == ContactLaw::kRestitution) {
+          EmitRestitution((*solved_.restitution)[i], contact, rows, row);
+        }
+        EmitPrescribed(contact.a, rows.normal_a, contact.b, rows.normal_b, row);
+      }
+    }
+    if (solved_.solution->modes[i] == ContactMode::kSticking) {
+      EmitPrescribed(contact.a, rows.tangent_a, contact.b, rows.tangent_b, row + 1);
+      return;
+    }
+    // λt = −σ μ λn.
+    const double sign = SignOfSliding(i, contact, rows);
+    const CoefficientSource& friction = (*solved_.friction)[i];
+    for (int k = 0; k < 2 && sign != 0.0; ++k) {
+      if (friction.numbers[k] >= 0) {
+        EmitRowTimesVariable(contact.a, rows.tangent_a, contact.b, rows.tangent_b,
+                             s_.NumberVariable(friction.numbers[k]),
+                             sign * solved_.solution->normal_impulse[i] * friction.derivatives[k]);
+      }
+    }
+  }
+
+  void EmitCoefficient(const CoefficientSource& source, int row, double factor) {
+    for (int k = 0; k < 2; ++k) {
+      if (source.numbers[k] >= 0) {
+        sink_(row, s_.NumberVariable(source.numbers[k]), factor * source.derivatives[k]);
+      }
+    }
+  }
+
+  // e n·v, by e and by the twists before the impact.
+  template <typename T>
+  void EmitRestitution(const CoefficientSource& restitution, const ActiveContact& contact,
+                       const ContactRows<T>& rows, int row) {
+    const auto emit = [&](int body, const RowPart<T>& part) {
+      for (int k = 0; k < 3 && s_.bodies[body].motion != Motion::kStatic; ++k) {
+        sink_(row, s_.TwistVariable(body, k), restitution.value * ValueOf(part[k]));
+      }
+    };
+    emit(contact.a, rows.normal_a);
+    emit(contact.b, rows.normal_b);
+    EmitCoefficient(restitution, row,
+                    ValueOf(RowTimes(before_, contact.a, rows.normal_a, contact.b, rows.normal_b)));
+  }
+
+  // Without friction σ is the sign of the sliding speed all the same: the one-sided derivative as μ
+  // leaves 0. A correction of poses has none.
+  template <typename T>
+  double SignOfSliding(int i, const ActiveContact& contact, const ContactRows<T>& rows) const {
+    if (solved_.solution->modes[i] != ContactMode::kClosed) {
+      return SlidingSign(solved_.solution->modes[i]);
+    }
+    if constexpr (kLevel == Level::kVelocity) {
+      return FrictionlessSlidingSign(*solved_.problem, solved_.problem->contacts[i],
+                                     solved_.solution->v.data());
+    }
+    if constexpr (kLevel == Level::kCorrection) {
+      return 0.0;
+    }
+    return SlipSign(state_, contact, rows);
+  }
+
+  // A pose as it is, with its twist as variables.
+  MovingPose<LocalJet> ByTwist(int body, internal::Locals* twists) {
+    internal::Locals constants;
+    MovingPose<LocalJet> moving{LocalPose(body, &constants), {}};
+    moving.pose.rotation.cosine.v.setZero();
+    moving.pose.rotation.sine.v.setZero();
+    moving.pose.position.x().v.setZero();
+    moving.pose.position.y().v.setZero();
+    moving.pose.angle.v.setZero();
+    for (int i = 0; i < 3; ++i) {
+      const double speed = before_[3 * body + i];
+      moving.twist[i] = s_.bodies[body].motion == Motion::kStatic
+                            ? LocalJet(speed)
+                            : twists->Add(speed, s_.TwistVariable(body, i));
+    }
+    return moving;
+  }
+
+  void RatesByTwist(const JointIndex& joint, internal::Locals* twists,
+                    JointRates<LocalJet>* rates) {
+    const MovingPose<LocalJet> a = ByTwist(joint.a, twists);
+    const MovingPose<LocalJet> b = ByTwist(joint.b, twists);
+    LocalJet numbers[7];
+    for (int i = 0; i < joint.num_geometry; ++i) {
+      numbers[i] = LocalJet(x_[joint.geometry + i]);
+    }
+    JointRows<LocalJet> rows;
+    EvaluateJointRates(joint.type, a, b, numbers, joint.num_geometry, &rows, rates);
+  }
+
+  void RatesByTwist(const ActiveContact& contact, internal::Locals* twists,
+                    ContactRates<LocalJet>* rates) {
+    if (contact.joint >= 0) {
+      JointRates<LocalJet> of_joint;
+      RatesByTwist(s_.joints[contact.joint], twists, &of_joint);
+      rates->normal = contact.side * of_joint.coordinate;
+      return;
+    }
+    const MovingPose<LocalJet> a = ByTwist(contact.a, twists);
+    const MovingPose<LocalJet> b = ByTwist(contact.b, twists);
+    internal::Locals numbers;  // not read: rates by shapes' numbers are emitted with the poses
+    const ShapeView<LocalJet> shape_a = LocalShapeOfA(contact, &numbers);
+    const ShapeView<LocalJet> shape_b = LocalShapeOfB(contact, &numbers);
+    for (std::vector<LocalJet>* values : {&scratch_.numbers_a, &scratch_.numbers_b}) {
+      for (LocalJet& x : *values) {
+        x.v.setZero();
+      }
+    }
+    ContactRows<LocalJet> rows;
+    EvaluateContactRates(contact.feature, shape_a, a, shape_b, b, &scratch_.rates, &rows, rates);
+  }
+
+  const SolvedEquations& solved_;
+  const bool by_hand_;
+  Instant<LocalJet> at_;
+  const double* before_;   ///< twists of the state
+  const double* unknown_;  ///< v⁺, a or δ of all bodies
+  const double* damped_;   ///< the twists that dampers act against
+  internal::Locals locals_;
+  JointRows<LocalJet> joint_rows_;
+  JointRates<LocalJet> joint_rates_;
+  internal::Equations<kLevel, EntryBuilder> equations_;
+};
+
+}  // namespace
+
+template <typename Sink>
+void VisitJacobian(const Model<double>& model, const SolvedEquations& solved, JacobianRoute route,
+                   LocalJacobianScratch* scratch, const Sink& sink) {
+  switch (solved.level) {
+    case Level::kVelocity:
+      EntryBuilder<Level::kVelocity, Sink>(model, solved, route, scratch, sink).Visit();
+      break;
+    case Level::kAcceleration:
+      EntryBuilder<Level::kAcceleration, Sink>(model, solved, route, scratch, sink).Visit();
+      break;
+    case Level::kCorrection:
+      EntryBuilder<Level::kCorrection, Sink>(model, solved, route, scratch, sink).Visit();
+      break;
+  }
+}
+
+#define TANGIBLE_INSTANTIATE(Sink)                                                               \
+  template void VisitJacobian<Sink>(const Model<double>&, const SolvedEquations&, JacobianRoute, \
+                                    LocalJacobianScratch*, const Sink&);
+TANGIBLE_INSTANTIATE(TangentSink)
+TANGIBLE_INSTANTIATE(AdjointSink)
+TANGIBLE_INSTANTIATE(SingleAdjointSink)
+TANGIBLE_INSTANTIATE(EntryListSink)
+
+}  // namespace tangible
