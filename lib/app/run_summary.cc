@@ -2,6 +2,9 @@
 #include "tangible/app/run_summary.h"
 
 #include <algorithm>
+#include <array>
+#include <cstdio>
+#include <string>
 
 #include "tangible/dynamics/assembly/assembly.h"
 #include "tangible/lcp/system/contact_conditioning.h"
@@ -47,6 +50,18 @@ OrderedJson FallbacksJson(const RolloutReport& report) {
           {"damped_projections", report.damped_projections}};
 }
 
+// Of the ranks that tell what is undetermined, all groups of bodies together: a few seconds.
+constexpr double kMostRankOperations = 1e10;
+
+std::string NotCounted(const UndeterminedCounts& counts) {
+  std::array<char, 256> text{};
+  std::snprintf(text.data(), text.size(),
+                "not counted: a rank takes %.1e operations, more than %.0e; the largest group of "
+                "bodies that joints and contacts connect has %d bodies and %d rows",
+                counts.operations, kMostRankOperations, counts.largest.bodies, counts.largest.rows);
+  return text.data();
+}
+
 // What the last step's equations leave open (redundant supports, joints and sticking contacts), and
 // which of the solutions its impulses are.
 OrderedJson UndeterminedJson(const Model<double>& model, const State<double>& at,
@@ -56,20 +71,29 @@ OrderedJson UndeterminedJson(const Model<double>& model, const State<double>& at
   AssembleFree(model, at, step.time, step.h, &problem, &scratch);
   AssembleContacts(model, at, step.h, step.contacts, step.friction, step.restitution, &scratch,
                    &problem);
-  const int impulses = CountRedundantRows(problem, step.solution.modes);
-  const int motions = impulses > 0 ? CountUndeterminedMotions(problem, step.solution.modes) : 0;
+  const UndeterminedCounts counts =
+      CountUndetermined(problem, step.solution.modes, kMostRankOperations);
+  if (!counts.counted) {
+    return {{"impulses", nullptr},
+            {"motions", nullptr},
+            {"chosen", ""},
+            {"reason", NotCounted(counts)}};
+  }
   std::string chosen;
-  if (impulses > 0) {
+  if (counts.impulses > 0) {
     chosen =
         "of many impulses with the same motion those nearest to the step before's, from 0 "
         "where a contact begins, that signs and friction allow";
   }
-  if (motions > 0) {
+  if (counts.motions > 0) {
     chosen =
         "contacts slide with different friction, so that the motion depends on how they share "
         "the load: as nearest to the step before, from 0 where a contact begins";
   }
-  return {{"impulses", impulses}, {"motions", motions}, {"chosen", chosen}};
+  return {{"impulses", counts.impulses},
+          {"motions", counts.motions},
+          {"chosen", chosen},
+          {"reason", ""}};
 }
 
 }  // namespace

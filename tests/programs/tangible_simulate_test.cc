@@ -109,9 +109,10 @@ TEST_F(TangibleSimulateTest, SummaryHasItsKeysAndItsNumbersAreRight) {
   EXPECT_EQ(reductions["lcp_rows"],
             3 * reductions["contacts"].get<int>() - 2 * reductions["single_rows"].get<int>());
   EXPECT_LE(reductions["pairs_near"], reductions["pairs_compared"]);
-  for (const char* kind : {"pivoting", "interior_point", "lemke", "dense", "restarts",
-                           "extrapolation", "regularised", "whole_system", "islands_together",
-                           "newton_stages", "halved_motions", "damped_projections"}) {
+  for (const char* kind :
+       {"pivoting", "interior_point", "lemke", "dense", "restarts", "extrapolation", "regularised",
+        "whole_system", "islands_together", "newton_stages", "halved_motions", "damped_projections",
+        "short_steps", "rebounds_given_up", "held_contacts"}) {
     EXPECT_EQ(s["fallback_kinds"].count(kind), 1u) << kind;
   }
   EXPECT_EQ(s["fallback_kinds"]["interior_point"], 0);
@@ -164,6 +165,33 @@ TEST_F(TangibleSimulateTest, SummarySaysWhereImpulsesAreNotUnique) {
       EXPECT_EQ(end["chosen"].get<std::string>().empty(), c.impulses == 0) << scene;
     }
   }
+}
+
+// A rank of more operations than a stated bound is not taken, and the summary says so: a ring of
+// 900 hinged links.
+TEST_F(TangibleSimulateTest, SummarySaysWhereARankWouldTakeTooLong) {
+  constexpr int kLinks = 900;
+  json bodies = json::array(), joints = json::array();
+  for (int i = 0; i < kLinks; ++i) {
+    const std::string name = "l" + std::to_string(i);
+    const double angle = 2.0 * M_PI * i / kLinks;
+    const double between = angle - M_PI / kLinks;
+    bodies.push_back({{"name", name},
+                      {"mass", 1},
+                      {"inertia", 1},
+                      {"position", {100 * std::cos(angle), 100 * std::sin(angle)}}});
+    joints.push_back({{"name", "j" + std::to_string(i)},
+                      {"type", "revolute"},
+                      {"bodies", {name, "l" + std::to_string((i + kLinks - 1) % kLinks)}},
+                      {"anchor", {100 * std::cos(between), 100 * std::sin(between)}}});
+  }
+  const json scene = {
+      {"bodies", bodies}, {"joints", joints}, {"simulation", {{"dt", 0.01}, {"duration", 0.01}}}};
+  ASSERT_EQ(Simulate(scene.dump(), Flag("summary", "s.json")).exit_status, 0);
+  const json end = json::parse(Read(Path("s.json")))["undetermined_end"];
+  EXPECT_TRUE(end["impulses"].is_null());
+  EXPECT_TRUE(end["motions"].is_null());
+  EXPECT_EQ(end["reason"].get<std::string>().find("not counted: "), 0u) << end;
 }
 
 TEST_F(TangibleSimulateTest, AChainThatTurnsTooFarInAStepShowsInItsSummary) {

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <random>
+#include <utility>
 
 #include "tangible/lcp/system/tolerances.h"
 
@@ -151,49 +152,277 @@ double NormOfInverse(const ContactProblem<double>& problem, const std::vector<Co
 
 // Of the scaled rows, or of the directions in which their impulses act.
 enum class Side { kRows, kPushes };
-int RankOf(const ContactProblem<double>& problem, const std::vector<ActiveRow>& rows, Side side) {
-  Eigen::MatrixXd scaled =
-      Eigen::MatrixXd::Zero(3 * problem.num_bodies, static_cast<Eigen::Index>(rows.size()));
-  for (size_t k = 0; k < rows.size(); ++k) {
-    for (int i = 0; i < 3; ++i) {
-      const auto set = [&](int body, const RowPart<double>& part) {
-        if (body >= 0) {
-          scaled(3 * body + i, static_cast<Eigen::Index>(k)) =
-              rows[k].scale * part[i] / std::sqrt(problem.mass[3 * body + i]);
+
+// Columns have norm 1; poses are known to about 1e-12 of their size. What tells pushes apart has to
+// be more than that.
+double RankThreshold(Side side) { return side == Side::kRows ? kRowRank : kPushRank; }
+
+// What a row has on one of its bodies, in units in which it has norm 1.
+Eigen::Vector3d ScaledPart(const ContactProblem<double>& problem, const ActiveRow& row, int body,
+                           Side side) {
+  const bool rows = side == Side::kRows;
+  const RowPart<double>& part =
+      row.a == body ? (rows ? row.row_a : row.push_a) : (rows ? row.row_b : row.push_b);
+  Eigen::Vector3d scaled;
+  for (int i = 0; i < 3; ++i) {
+    scaled[i] = row.scale * part[i] / std::sqrt(problem.mass[3 * body + i]);
+  }
+  return scaled;
+}
+
+// Whether up to three columns are independent, by Gram and Schmidt with pivots.
+bool AreIndependent(Eigen::Matrix3d columns, int count, double threshold) {
+  for (int k = 0; k < count; ++k) {
+    Eigen::Index largest = 0;
+    const double norm = columns.middleCols(k, count - k).colwise().norm().maxCoeff(&largest);
+    if (!(norm > threshold)) {
+      return false;
+    }
+    columns.col(k).swap(columns.col(k + largest));
+    const Eigen::Vector3d unit = columns.col(k) / norm;
+    for (int other = k + 1; other < count; ++other) {
+      columns.col(other) -= unit * unit.dot(columns.col(other));
+    }
+  }
+  return true;
+}
+
+// The ranks of the active rows and of their pushes, by groups of bodies that rows connect; the
+// ground and what is static connect none. Before groups are formed joint trees and the like are
+// taken off body by body: where all that is left of a body's rows connects it to one other, and
+// they are independent by their parts on this body alone, they are independent of all other rows.
+class RowGroups {
+ public:
+  RowGroups(const ContactProblem<double>& problem, std::vector<ActiveRow> rows)
+      : problem_(problem), rows_(std::move(rows)) {
+    Connect();
+    TakeOffLeaves();
+    FormGroups();
+  }
+  // Operations of a rank by dense factorisations, of all groups.
+  double operations() const;
+  // Rows in the group of the most operations, and its bodies.
+  RowGroupSize largest() const;
+  int num_rows() const { return static_cast<int>(rows_.size()); }
+  int RankOf(Side side) const;
+
+ private:
+  // All rows between the same two bodies, or between one and the ground (b = −1).
+  struct Connection {
+    int a, b;
+    size_t begin, end;  // in rows_
+    bool left = true;
+  };
+  struct Group {
+    std::vector<int> bodies;
+    std::vector<size_t> rows;
+    double operations() const {
+      const auto columns = static_cast<double>(rows.size());
+      const auto height = static_cast<double>(3 * bodies.size());
+      return 2.0 * columns * height * std::min(columns, height);
+    }
+  };
+  void Connect();
+  void TakeOffLeaves();
+  void FormGroups();
+  bool IsIndependentOn(const Connection& connection, int body) const;
+  int RankOf(const Group& group, Side side, std::vector<int>* place) const;
+
+  const ContactProblem<double>& problem_;
+  std::vector<ActiveRow> rows_;  // by connection
+  std::vector<Connection> connections_;
+  std::vector<std::vector<int>> of_body_;  // connections
+  int rank_of_leaves_ = 0;
+  std::vector<Group> groups_;
+};
+
+void RowGroups::Connect() {
+  const auto pair = [](const ActiveRow& row) {
+    return std::make_pair(std::max(row.a, row.b), std::min(row.a, row.b));
+  };
+  std::stable_sort(rows_.begin(), rows_.end(),
+                   [&](const ActiveRow& p, const ActiveRow& q) { return pair(p) < pair(q); });
+  of_body_.resize(problem_.num_bodies);
+  for (size_t k = 0; k < rows_.size(); ++k) {
+    if (k == 0 || pair(rows_[k]) != pair(rows_[k - 1])) {
+      const auto [a, b] = pair(rows_[k]);
+      for (const int body : {a, b}) {
+        if (body >= 0) of_body_[body].push_back(static_cast<int>(connections_.size()));
+      }
+      connections_.push_back({a, b, k, k});
+    }
+    connections_.back().end = k + 1;
+  }
+}
+
+bool RowGroups::IsIndependentOn(const Connection& connection, int body) const {
+  const size_t count = connection.end - connection.begin;
+  if (count > 3) {
+    return false;
+  }
+  for (const Side side : {Side::kRows, Side::kPushes}) {
+    Eigen::Matrix3d parts = Eigen::Matrix3d::Zero();
+    for (size_t k = 0; k < count; ++k) {
+      parts.col(static_cast<Eigen::Index>(k)) =
+          ScaledPart(problem_, rows_[connection.begin + k], body, side);
+    }
+    if (!AreIndependent(parts, static_cast<int>(count), RankThreshold(side))) {
+      return false;
+    }
+  }
+  return true;
+}
+
+void RowGroups::TakeOffLeaves() {
+  std::vector<size_t> left(of_body_.size());
+  std::vector<int> leaves;
+  for (size_t body = 0; body < of_body_.size(); ++body) {
+    left[body] = of_body_[body].size();
+    if (left[body] == 1) leaves.push_back(static_cast<int>(body));
+  }
+  while (!leaves.empty()) {
+    const int body = leaves.back();
+    leaves.pop_back();
+    if (left[body] != 1) {
+      continue;  // the other end has been taken off
+    }
+    Connection& connection = connections_[*std::find_if(
+        of_body_[body].begin(), of_body_[body].end(), [&](int c) { return connections_[c].left; })];
+    if (!IsIndependentOn(connection, body)) {
+      continue;
+    }
+    rank_of_leaves_ += static_cast<int>(connection.end - connection.begin);
+    connection.left = false;
+    for (const int end : {connection.a, connection.b}) {
+      if (end >= 0 && --left[end] == 1) leaves.push_back(end);
+    }
+  }
+}
+
+void RowGroups::FormGroups() {
+  std::vector<char> seen(of_body_.size(), 0);
+  std::vector<int> open;
+  for (size_t first = 0; first < of_body_.size(); ++first) {
+    if (seen[first] != 0) {
+      continue;
+    }
+    Group group;
+    open.assign(1, static_cast<int>(first));
+    seen[first] = 1;
+    while (!open.empty()) {
+      const int body = open.back();
+      open.pop_back();
+      group.bodies.push_back(body);
+      for (const int c : of_body_[body]) {
+        const Connection& connection = connections_[c];
+        if (!connection.left) {
+          continue;
         }
-      };
-      set(rows[k].a, side == Side::kRows ? rows[k].row_a : rows[k].push_a);
-      set(rows[k].b, side == Side::kRows ? rows[k].row_b : rows[k].push_b);
+        // Each connection is listed once, at its first body.
+        for (size_t k = connection.begin; k < connection.end && connection.a == body; ++k) {
+          group.rows.push_back(k);
+        }
+        for (const int end : {connection.a, connection.b}) {
+          if (end >= 0 && seen[end] == 0) {
+            seen[end] = 1;
+            open.push_back(end);
+          }
+        }
+      }
+    }
+    if (!group.rows.empty()) groups_.push_back(std::move(group));
+  }
+}
+
+double RowGroups::operations() const {
+  double sum = 0.0;
+  for (const Group& group : groups_) {
+    sum += group.operations();
+  }
+  return sum;
+}
+
+RowGroupSize RowGroups::largest() const {
+  const auto most = std::max_element(
+      groups_.begin(), groups_.end(),
+      [](const Group& p, const Group& q) { return p.operations() < q.operations(); });
+  return most == groups_.end() ? RowGroupSize()
+                               : RowGroupSize{static_cast<int>(most->bodies.size()),
+                                              static_cast<int>(most->rows.size())};
+}
+
+int RowGroups::RankOf(const Group& group, Side side, std::vector<int>* place) const {
+  for (size_t k = 0; k < group.bodies.size(); ++k) {
+    (*place)[group.bodies[k]] = static_cast<int>(k);
+  }
+  Eigen::MatrixXd scaled = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(3 * group.bodies.size()),
+                                                 static_cast<Eigen::Index>(group.rows.size()));
+  for (size_t k = 0; k < group.rows.size(); ++k) {
+    const ActiveRow& row = rows_[group.rows[k]];
+    for (const int body : {row.a, row.b}) {
+      if (body >= 0) {
+        scaled.block<3, 1>(3 * (*place)[body], static_cast<Eigen::Index>(k)) =
+            ScaledPart(problem_, row, body, side);
+      }
     }
   }
   Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(scaled);
-  // Columns have norm 1; poses are known to about 1e-12 of their size. What tells pushes apart has
-  // to be more than that.
-  qr.setThreshold(side == Side::kRows ? kRowRank : kPushRank);
+  qr.setThreshold(RankThreshold(side));
   return static_cast<int>(qr.rank());
+}
+
+int RowGroups::RankOf(Side side) const {
+  std::vector<int> place(problem_.num_bodies, -1);
+  int rank = rank_of_leaves_;
+  for (const Group& group : groups_) {
+    rank += RankOf(group, side, &place);
+  }
+  return rank;
+}
+
+bool AnySlides(const std::vector<ActiveRow>& rows) {
+  return std::any_of(rows.begin(), rows.end(), [](const ActiveRow& row) {
+    return row.push_a != row.row_a || row.push_b != row.row_b;
+  });
 }
 
 }  // namespace
 
 int CountRedundantRows(const ContactProblem<double>& problem,
                        const std::vector<ContactMode>& modes) {
-  const std::vector<ActiveRow> rows = ListActiveRows(problem, modes);
-  return rows.size() < 2 ? 0 : static_cast<int>(rows.size()) - RankOf(problem, rows, Side::kRows);
+  const RowGroups groups(problem, ListActiveRows(problem, modes));
+  return groups.num_rows() - groups.RankOf(Side::kRows);
 }
 
 int CountUndeterminedMotions(const ContactProblem<double>& problem,
                              const std::vector<ContactMode>& modes) {
   const std::vector<ActiveRow> rows = ListActiveRows(problem, modes);
-  const bool slide = std::any_of(rows.begin(), rows.end(), [](const ActiveRow& row) {
-    return row.push_a != row.row_a || row.push_b != row.row_b;
-  });
-  if (!slide || rows.size() < 2) {
+  if (!AnySlides(rows)) {
     return 0;
   }
-  const int rank = RankOf(problem, rows, Side::kRows);
-  return rank == static_cast<int>(rows.size())
-             ? 0
-             : std::max(RankOf(problem, rows, Side::kPushes) - rank, 0);
+  const RowGroups groups(problem, rows);
+  const int rank = groups.RankOf(Side::kRows);
+  return rank == groups.num_rows() ? 0 : std::max(groups.RankOf(Side::kPushes) - rank, 0);
+}
+
+UndeterminedCounts CountUndetermined(const ContactProblem<double>& problem,
+                                     const std::vector<ContactMode>& modes,
+                                     double most_operations) {
+  const std::vector<ActiveRow> rows = ListActiveRows(problem, modes);
+  const RowGroups groups(problem, rows);
+  UndeterminedCounts counts;
+  counts.largest = groups.largest();
+  counts.operations = groups.operations();
+  counts.counted = counts.operations <= most_operations;
+  if (!counts.counted) {
+    return counts;
+  }
+  const int rank = groups.RankOf(Side::kRows);
+  counts.impulses = groups.num_rows() - rank;
+  if (counts.impulses > 0 && AnySlides(rows)) {
+    counts.motions = std::max(groups.RankOf(Side::kPushes) - rank, 0);
+  }
+  return counts;
 }
 
 SystemQuality MeasureSystem(const ContactProblem<double>& problem,

@@ -12,8 +12,9 @@
 namespace tangible {
 
 /// Rank deficiency of the active rows (joints, normals of closed contacts, tangents of sticking
-/// ones): how many impulses are not determined. Column-pivoted QR of the scaled rows, dense:
-/// O(rows² 3 bodies).
+/// ones): how many impulses are not determined. Joint trees and what else hangs on one body by
+/// independent rows are taken off body by body; of each group of bodies that the other rows connect
+/// a column-pivoted QR of the scaled rows, dense: O(rows · 3 bodies · the smaller of both).
 int CountRedundantRows(const ContactProblem<double>& problem,
                        const std::vector<ContactMode>& modes);
 
@@ -23,6 +24,24 @@ int CountRedundantRows(const ContactProblem<double>& problem,
 /// to.
 int CountUndeterminedMotions(const ContactProblem<double>& problem,
                              const std::vector<ContactMode>& modes);
+
+struct RowGroupSize {
+  int bodies = 0;
+  int rows = 0;
+};
+
+struct UndeterminedCounts {
+  bool counted = false;     ///< else the counts are 0
+  int impulses = 0;         ///< CountRedundantRows
+  int motions = 0;          ///< CountUndeterminedMotions
+  double operations = 0.0;  ///< of dense ranks: 2 · rows · 3 bodies · the smaller of both, summed
+  RowGroupSize largest;     ///< the group of the most operations
+};
+
+/// Both counts, unless a rank takes more operations than that; what is then done is linear in
+/// bodies and rows.
+UndeterminedCounts CountUndetermined(const ContactProblem<double>& problem,
+                                     const std::vector<ContactMode>& modes, double most_operations);
 
 struct SystemQuality {
   double condition =
