@@ -47,7 +47,18 @@ OrderedJson FallbacksJson(const RolloutReport& report) {
           {"islands_together", solver.islands_together},
           {"newton_stages", report.newton_stages},
           {"halved_motions", report.halved_motions},
-          {"damped_projections", report.damped_projections}};
+          {"damped_projections", report.damped_projections},
+          {"short_steps", report.given_up.short_steps},
+          {"rebounds_given_up", report.given_up.rebounds_given_up},
+          {"held_contacts", report.given_up.held_contacts}};
+}
+
+long SumOf(const OrderedJson& counts) {
+  long sum = 0;
+  for (const auto& count : counts) {
+    sum += count.get<long>();
+  }
+  return sum;
 }
 
 // Of the ranks that tell what is undetermined, all groups of bodies together: a few seconds.
@@ -164,8 +175,7 @@ void RunSummary::EvaluateKept(const Model<double>& model) {
 OrderedJson RunSummary::ToJson(const Model<double>& model, const RolloutReport& report,
                                const State<double>& last) {
   EvaluateKept(model);
-  const bool chosen = model.structure->settings.solver != SolverChoice::kAuto;
-  const long fallbacks = report.solved_by_interior_point + report.solved_by_lemke;
+  const OrderedJson fallbacks = FallbacksJson(report);
   // The steps' reports give gaps at their starts; the end has no step.
   const double penetration = std::max(report.penetration_max, DeepestPenetration(model, last));
   OrderedJson undetermined = nullptr;
@@ -183,12 +193,12 @@ OrderedJson RunSummary::ToJson(const Model<double>& model, const RolloutReport& 
           {"lcp_rows_max", report.lcp_rows_max},
           {"islands_max", islands_max_},
           {"events", report.events},
-          {"fallbacks", report.fallbacks + (chosen ? 0 : fallbacks)},
+          {"fallbacks", SumOf(fallbacks)},
           {"solver",
            {{"guess", report.solved_by_guess},
             {"interior_point", report.solved_by_interior_point},
             {"lemke", report.solved_by_lemke}}},
-          {"fallback_kinds", FallbacksJson(report)},
+          {"fallback_kinds", fallbacks},
           {"reductions", ReductionsJson(report)},
           {"undetermined_end", undetermined},
           {"residual_max", report.residual_max},

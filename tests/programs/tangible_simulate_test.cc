@@ -167,6 +167,44 @@ TEST_F(TangibleSimulateTest, SummarySaysWhereImpulsesAreNotUnique) {
   }
 }
 
+// Whatever is counted as a fallback has its kind: a box that rocks is held, a ball whose bounces do
+// not end gives them up, a rod that catches needs pivots (Painlevé), and a solver that the scene asks
+// for is none.
+TEST_F(TangibleSimulateTest, FallbacksAreTheSumOfTheirKinds) {
+  const auto run = [&](const std::string& bodies, const std::string& floor,
+                       const std::string& settings) {
+    const ProgramRun done = Simulate(R"({"bodies": [)" + bodies +
+                                         R"({"name": "floor", "static": true, "shape":
+            {"half_plane": {"normal": [0, 1], "offset": 0}}, )" +
+                                         floor + R"(}], "simulation": {)" + settings + "}}",
+                                     Flag("summary", "s.json"));
+    EXPECT_EQ(done.exit_status, 0) << done.error;
+    const json summary = json::parse(Read(Path("s.json")));
+    long sum = 0;
+    for (const json& count : summary["fallback_kinds"]) sum += count.get<long>();
+    EXPECT_EQ(summary["fallbacks"], sum) << summary;
+    return summary["fallback_kinds"];
+  };
+  const std::string box = R"({"name": "box", "shape": {"box": {"size": [0.15, 0.3]}}, "mass": 1,
+      "position": [3, 0.152], "angle": 0.01, "friction": 0.6},)";
+  const std::string ball = R"({"name": "ball", "shape": {"circle": {"radius": 0.1}}, "mass": 1,
+      "position": [0, 0.1001], "restitution": 0.9},)";
+  const std::string rod = R"({"name": "rod", "shape": {"capsule": {"length": 1, "radius": 0.001}},
+      "mass": 1, "inertia": 0.08333333333333333, "position": [0.3213938048432697,
+      0.384022221559489], "angle": 0.8726646259971648, "velocity": [-2, 0], "friction": 3},)";
+  const std::string event = R"("stepping": "event", )";
+  EXPECT_GT(run(box, R"("friction": 0.6)", event + R"("dt": 0.01, "duration": 1)")["held_contacts"],
+            0);
+  EXPECT_EQ(run(ball, R"("restitution": 0.9)", event + R"("dt": 0.1, "duration": 0.1,
+                                       "restitution_threshold": 0)")["rebounds_given_up"],
+            1);
+  EXPECT_GT(run(rod, R"("friction": 3)", event + R"("dt": 0.001, "duration": 0.05)")["pivoting"],
+            0);
+  const std::string mixed = R"("friction": 0.5, "restitution": 0.9)";
+  EXPECT_EQ(run(box + rod, mixed, R"("dt": 0.01, "duration": 0.5, "solver": "lemke")")["lemke"], 0);
+  run(box + ball + rod, mixed, R"("dt": 0.01, "duration": 0.5)");
+}
+
 // A rank of more operations than a stated bound is not taken, and the summary says so: a ring of
 // 900 hinged links.
 TEST_F(TangibleSimulateTest, SummarySaysWhereARankWouldTakeTooLong) {

@@ -285,7 +285,7 @@ Certificate RolloutCertifier::Finish(const Model<double>& model, const RolloutRe
   certificate_.events = static_cast<int>(report.events);
   // A solver that the scene asks for is no fallback.
   certificate_.fallbacks =
-      static_cast<int>(report.fallbacks) +
+      static_cast<int>(report.given_up.total()) +
       (model.structure->settings.solver == SolverChoice::kAuto
            ? static_cast<int>(report.solved_by_interior_point + report.solved_by_lemke)
            : 0);

@@ -138,7 +138,7 @@ bool EventStepper::Settle(const Model<double>& model, const Impulses& impact, St
   if (!any && !(Rattles(model, *outcome) && all_slow && any_slides)) {
     return true;
   }
-  ++outcome->fallbacks;
+  ++outcome->given_up.held_contacts;
   EventPart* part = record_.Add();
   part->is_impulses = true;
   SetUpProjection(held, *state, &part->impulses);

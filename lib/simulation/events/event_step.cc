@@ -128,7 +128,7 @@ bool EventStepper::SolveImpacts(const Model<double>& model, double t, State<doub
     }
     if (++outcome->events > settings.max_events_per_step && !inelastic_) {
       inelastic_ = true;
-      ++outcome->fallbacks;
+      ++outcome->given_up.rebounds_given_up;
     }
     if (outcome->events > kGiveUp * settings.max_events_per_step + kGiveUp) {
       const auto fastest = std::min_element(touching_.approach.begin(), touching_.approach.end());
@@ -212,7 +212,7 @@ bool EventStepper::SolveByShortStep(const Model<double>& model, double t, double
   const ContactSolverReport solved = solver_.Solve(
       impulses.problem, SolverOptionsOf(model.structure->settings), &impulses.solution);
   CountSolve(solved, outcome);
-  ++outcome->fallbacks;
+  ++outcome->given_up.short_steps;
   ++outcome->events;
   if (!solved.solved) {
     outcome->residual = solved.residual;

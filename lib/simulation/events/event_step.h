@@ -25,12 +25,29 @@
 
 namespace tangible {
 
+/// What event stepping gives up of its own rules, and how often.
+struct EventFallbacks {
+  /// Accelerations that do not exist (Painlevé), for which impulses of a very short step stand.
+  long short_steps = 0;
+  /// Steps beyond max_events_per_step, whose further impacts are inelastic.
+  long rebounds_given_up = 0;
+  /// Impacts after which contacts that leave so slowly that they are back at once are held.
+  long held_contacts = 0;
+
+  void Add(const EventFallbacks& other) {
+    short_steps += other.short_steps;
+    rebounds_given_up += other.rebounds_given_up;
+    held_contacts += other.held_contacts;
+  }
+  long total() const { return short_steps + rebounds_given_up + held_contacts; }
+};
+
 /// What an event step reports beside its record.
 struct EventOutcome {
   bool done = true;
   std::string message;  ///< empty unless it failed
   int events = 0;
-  int fallbacks = 0;  ///< Painlevé impulses, and rebounds given up beyond max_events_per_step
+  EventFallbacks given_up;
   int factorisations = 0;
   int iterations = 0;
   double residual = 0.0;

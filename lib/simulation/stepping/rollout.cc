@@ -73,7 +73,7 @@ void RolloutReport::Add(const StepReport& step) {
   solved_by_interior_point += step.solved_by == SolvedBy::kInteriorPoint ? 1 : 0;
   solved_by_lemke += step.solved_by == SolvedBy::kLemke ? 1 : 0;
   events += step.events;
-  fallbacks += step.fallbacks;
+  given_up.Add(step.given_up);
   solver.Add(step.solver);
   newton_stages += step.newton_stages;
   halved_motions += step.halved_motions;

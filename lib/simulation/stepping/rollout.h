@@ -33,7 +33,7 @@ struct RolloutReport {
   long solved_by_interior_point = 0;
   long solved_by_lemke = 0;
   long events = 0;          ///< located within steps (event stepping)
-  long fallbacks = 0;       ///< of event stepping
+  EventFallbacks given_up;  ///< event stepping: what it gave up of its own rules
   ContactFallbacks solver;  ///< what solves leaned on beyond the guess
   long newton_stages = 0;   ///< event stepping: implicit stages whose iteration does not contract
   long halved_motions = 0;  ///< event stepping: that could not be integrated as a whole

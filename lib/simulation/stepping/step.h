@@ -46,7 +46,7 @@ struct StepReport {
   int factorisations = 0;   ///< of the island that took the most
   int iterations = 0;       ///< of the island that took the most
   int events = 0;           ///< located within the step (event stepping)
-  int fallbacks = 0;        ///< of event stepping: impulses for accelerations, rebounds given up
+  EventFallbacks given_up;  ///< event stepping: what it gave up of its own rules
   ContactFallbacks solver;  ///< what its solves leaned on beyond the guess
   int newton_stages = 0;    ///< event stepping: implicit stages whose iteration does not contract
   int halved_motions = 0;   ///< event stepping: that could not be integrated as a whole

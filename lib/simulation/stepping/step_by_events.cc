@@ -119,7 +119,7 @@ StepReport Stepper::StepByEvents(const Model<double>& model, double t, double h,
   last_solution_.modes = r.solution.modes;
   const EventOutcome outcome = events_->Step(model, t, h, state);
   report.events = outcome.events;
-  report.fallbacks = outcome.fallbacks;
+  report.given_up = outcome.given_up;
   report.solver = outcome.solver;
   report.newton_stages = outcome.newton_stages;
   report.halved_motions = outcome.halved_motions;
