@@ -8,6 +8,7 @@
 #include <iostream>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "tangible/app/program.h"
@@ -23,8 +24,12 @@
 
 DEFINE_string(parameters, "",
               "paths of the parameters of the given scenes, separated by commas; empty: all");
-DEFINE_int32(random, -1, "number of random scenes; -1: 100 if no scene is given, else 0");
-DEFINE_int32(seed, 1, "of the first random scene; the next have the next seeds");
+DEFINE_int32(random, -1,
+             "number of random scenes; -1: 100 if neither scenes nor --starts are given, else 0");
+DEFINE_int32(starts, -1,
+             "number of random scenes that start in contact, near what contacts can do; -1: 20 if "
+             "neither scenes nor --random are given, else 0");
+DEFINE_int32(seed, 1, "of the first random scene of each kind; the next have the next seeds");
 DEFINE_string(stepping, "", "of random scenes: fixed, event or both; empty: all that there is");
 DEFINE_int32(threads, 0, "how many scenes are checked at the same time; 0: one a core");
 DEFINE_bool(jacobians, false, "write every method's whole Jacobian to --out");
@@ -37,6 +42,8 @@ namespace {
 
 constexpr int kMostThreads = 256;
 constexpr int kMostRandom = 1000000;
+constexpr int kDefaultRandom = 100;
+constexpr int kDefaultStarts = 20;
 
 // The steppings that --stepping asks for; empty with a line if the engine lacks one.
 std::vector<Stepping> Steppings(std::string* error) {
@@ -67,6 +74,10 @@ std::string CheckFlags(const std::vector<std::string>& files) {
     return "--random: expected a number from 0 to " + std::to_string(kMostRandom) + ", got " +
            std::to_string(FLAGS_random);
   }
+  if (FLAGS_starts < -1 || FLAGS_starts > kMostRandom) {
+    return "--starts: expected a number from 0 to " + std::to_string(kMostRandom) + ", got " +
+           std::to_string(FLAGS_starts);
+  }
   if (FLAGS_seed < 0) {
     return "--seed: expected a number >= 0, got " + std::to_string(FLAGS_seed);
   }
@@ -77,11 +88,15 @@ std::string CheckFlags(const std::vector<std::string>& files) {
   if (!FLAGS_parameters.empty() && files.empty()) {
     return "--parameters: of given scenes; random scenes choose theirs by their seed";
   }
+  const bool is_asked = !files.empty() || FLAGS_random != -1 || FLAGS_starts != -1;
   if (FLAGS_random == -1) {
-    FLAGS_random = files.empty() ? 100 : 0;
+    FLAGS_random = is_asked ? 0 : kDefaultRandom;
   }
-  if (FLAGS_random == 0 && files.empty() && !FLAGS_errata) {
-    return "expected scenes or --random > 0, got neither";
+  if (FLAGS_starts == -1) {
+    FLAGS_starts = is_asked ? 0 : kDefaultStarts;
+  }
+  if (FLAGS_random == 0 && FLAGS_starts == 0 && files.empty() && !FLAGS_errata) {
+    return "expected scenes, --random > 0 or --starts > 0, got none";
   }
   if (FLAGS_errata && (!files.empty() || !FLAGS_out.empty() || !FLAGS_report.empty())) {
     return "--errata: takes no scenes and writes no files";
@@ -135,12 +150,18 @@ int Run(const std::vector<std::string>& files, const std::vector<Stepping>& step
     const std::string error = AddFile(file, &jobs);
     if (!error.empty()) return ReportError(error);
   }
-  for (VerifyJob& job : RandomJobs(static_cast<unsigned>(FLAGS_seed), FLAGS_random, steppings)) {
-    jobs.push_back(std::move(job));
+  for (const auto& [list, count] : {std::pair(RandomList::kScenes, FLAGS_random),
+                                    std::pair(RandomList::kStarts, FLAGS_starts)}) {
+    for (VerifyJob& job : RandomJobs(list, static_cast<unsigned>(FLAGS_seed), count, steppings)) {
+      jobs.push_back(std::move(job));
+    }
   }
   std::cout << ProvenanceLine() << "\n";
   if (FLAGS_random > 0) {
     std::cout << FLAGS_random << " random scenes from seed " << FLAGS_seed << "\n";
+  }
+  if (FLAGS_starts > 0) {
+    std::cout << FLAGS_starts << " random starts from seed " << FLAGS_seed << "\n";
   }
   std::cout << std::endl;
   Progress progress("scenes", static_cast<long>(jobs.size()));
@@ -160,11 +181,13 @@ int Main(int argc, char** argv) {
   const CommandLine line = ParseCommandLine(
       argc, argv,
       {.name = "tangible-verify",
-       .synopsis = "[SCENE.json ...] [--parameters=P1,P2] [--random=N --seed=S] [--threads=T] "
+       .synopsis = "[SCENE.json ...] [--parameters=P1,P2] [--random=N] [--starts=N] [--seed=S] "
+                   "[--threads=T] "
                    "[--out=R.json] [--report=R.html]",
        .description =
            "Differentiates the final state of scenes by adjoint, tangent, Jets and differences, "
-           "and compares them\nentry by entry. Without scenes: 100 random ones. Exit status 1 "
+           "and compares them\nentry by entry. Without scenes: 100 random ones and 20 starts. Exit "
+           "status 1 "
            "where a bound does not hold.",
        .version = TANGIBLE_VERSION,
        .source_file = __FILE__,

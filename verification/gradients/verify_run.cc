@@ -12,6 +12,7 @@
 #include "tangible/scene/scene_json.h"
 #include "tangible/scene/scene_names.h"
 #include "tangible/verification/support/random_scene.h"
+#include "tangible/verification/support/random_starts.h"
 
 namespace tangible {
 namespace {
@@ -26,7 +27,9 @@ struct Checked {
 
 std::string Replay(const VerifyJob& job) {
   if (job.seed) {
-    return "tangible-verify --random=1 --seed=" + std::to_string(*job.seed) +
+    return std::string("tangible-verify ") +
+           (job.list == RandomList::kStarts ? "--starts=1" : "--random=1") +
+           " --seed=" + std::to_string(*job.seed) +
            " --stepping=" + NameOf(job.stepping, kSteppingNames);
   }
   return "tangible-verify " + job.scene.path;
@@ -35,8 +38,10 @@ std::string Replay(const VerifyJob& job) {
 Checked Check(const VerifyJob& job, KeepJacobians keep) {
   Checked checked;
   const Scene scene = SceneOf(job);
-  const std::vector<ParameterPath> parameters =
-      job.seed ? RandomParameters(scene, *job.seed) : job.parameters;
+  const std::vector<ParameterPath> parameters = !job.seed ? job.parameters
+                                                : job.list == RandomList::kStarts
+                                                    ? StartParameters(scene)
+                                                    : RandomParameters(scene, *job.seed);
   checked.check = CheckScene(scene, parameters, keep);
   checked.check.replay = Replay(job);
   if (checked.check.done) {
@@ -63,18 +68,22 @@ Scene SceneOf(const VerifyJob& job) {
   if (!job.seed) {
     return job.scene;
   }
+  if (job.list == RandomList::kStarts) {
+    return RandomStart(*job.seed, job.stepping);
+  }
   RandomSceneOptions options;
   options.stepping = job.stepping;
   return RandomScene(*job.seed, options);
 }
 
-std::vector<VerifyJob> RandomJobs(unsigned seed, int count,
+std::vector<VerifyJob> RandomJobs(RandomList list, unsigned seed, int count,
                                   const std::vector<Stepping>& steppings) {
   std::vector<VerifyJob> jobs;
   for (int i = 0; i < count; ++i) {
     for (const Stepping stepping : steppings) {
       VerifyJob job;
       job.seed = seed + static_cast<unsigned>(i);
+      job.list = list;
       job.stepping = stepping;
       jobs.push_back(std::move(job));
     }

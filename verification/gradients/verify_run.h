@@ -15,9 +15,13 @@
 
 namespace tangible {
 
+/// Of which list a random scene is: random_scene.h, or random_starts.h.
+enum class RandomList { kScenes, kStarts };
+
 /// A scene to be checked: a random one by its seed, or one of the user's.
 struct VerifyJob {
   std::optional<unsigned> seed;
+  RandomList list = RandomList::kScenes;
   Stepping stepping = Stepping::kFixed;  ///< of a random scene
   Scene scene;                           ///< of the user; with its path
   std::vector<ParameterPath> parameters;
@@ -27,7 +31,8 @@ struct VerifyJob {
 Scene SceneOf(const VerifyJob& job);
 
 /// Jobs for `count` random scenes from `seed` on, each in every stepping of the list.
-std::vector<VerifyJob> RandomJobs(unsigned seed, int count, const std::vector<Stepping>& steppings);
+std::vector<VerifyJob> RandomJobs(RandomList list, unsigned seed, int count,
+                                  const std::vector<Stepping>& steppings);
 
 /// All numbers of a scene, a path each.
 std::vector<ParameterPath> AllParameters(const Scene& scene);

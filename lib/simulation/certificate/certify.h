@@ -56,6 +56,8 @@ class RolloutCertifier {
   void AddJump(double margin, const Place& place, const std::string& what);
   void AddEventStep(const Model<double>& model, long step, Stepper* stepper);
   void AddStart(const Model<double>& model, const EventRecord& record);
+  void ProbeStarts(const Model<double>& model, const State<double>& start,
+                   const std::vector<const ActiveContact*>& touching, const Segment* first);
   void AddImpact(const Model<double>& model, long step, Impulses* impact);
   void AddSegment(const Model<double>& model, long step, EventDerivative* derivative,
                   Segment* segment);

@@ -18,52 +18,6 @@
 namespace tangible {
 namespace {
 
-// m or rad; a gap of this size is more than rounding: the contact does not just touch.
-constexpr double kTouching = 1e-9;
-// Of a motion: an integrator's error that is more than rounding.
-constexpr double kSplitMatters = 1e-7;
-
-// What a motion differs by where an event ends a part of it early, as a share of the motion: the
-// integrator's error, which a step in two parts makes twice.
-double SplitError(const Model<double>& model, const Segment& segment) {
-  SegmentFlow flow;
-  std::string message;
-  Segment whole;
-  whole.time = segment.time;
-  whole.middle = segment.middle;
-  whole.before = segment.before;
-  whole.contacts = segment.contacts;
-  whole.friction = segment.friction;
-  whole.modes = segment.modes;
-  whole.length = 0.5 * segment.length;
-  Segment half = whole;
-  whole.length = segment.length;
-  if (!flow.Run(model, &whole, &message) || !flow.Run(model, &half, &message)) {
-    return 0.0;
-  }
-  Segment rest = half;
-  rest.time += half.length;
-  rest.before = half.after;
-  if (!flow.Run(model, &rest, &message)) {
-    return 0.0;
-  }
-  // Of a scene at rest both are rounding.
-  constexpr double kRest = 1e-6;
-  const auto share = [&](const std::vector<double>& before, const std::vector<double>& one,
-                         const std::vector<double>& two) {
-    double apart = 0.0;
-    double moved = 0.0;
-    for (size_t i = 0; i < one.size(); ++i) {
-      apart = std::max(apart, std::abs(one[i] - two[i]));
-      moved = std::max({moved, std::abs(one[i] - before[i]), kRest * std::abs(one[i])});
-    }
-    const double gravity = std::hypot(model.numbers[kGravityX], model.numbers[kGravityY]);
-    return apart > 0.0 ? apart / (moved + kRest * gravity * segment.length) : 0.0;
-  };
-  return std::max(share(segment.before.pose, whole.after.pose, rest.after.pose),
-                  share(segment.before.twist, whole.after.twist, rest.after.twist));
-}
-
 // Bodies that an impact's impulses move, with those joined to them: one by one until none is added.
 std::vector<bool> Struck(const ModelStructure& s, const Impulses& impact) {
   std::vector<bool> struck(s.bodies.size(), false);
@@ -84,54 +38,6 @@ std::vector<bool> Struck(const ModelStructure& s, const Impulses& impact) {
     }
   }
   return struck;
-}
-
-// A speed that is rounding, m/s.
-double Negligible(const Model<double>& model, double speed) {
-  return 1e-9 *
-         (std::abs(speed) + model.structure->settings.dt *
-                                std::hypot(model.numbers[kGravityX], model.numbers[kGravityY]));
-}
-
-// Whether a contact of two bodies sticks over a segment, if there is one.
-bool Sticks(const Segment* segment, const ActiveContact& contact) {
-  for (size_t i = 0; segment != nullptr && i < segment->contacts.size(); ++i) {
-    if (segment->contacts[i].SameAs(contact)) {
-      return contact.joint < 0 && segment->modes[i] == ContactMode::kSticking;
-    }
-  }
-  return false;
-}
-
-// Whether a direction changes what the entries are the gradient of.
-bool Moves(const std::vector<JacobianEntry>& gradient, const RowMatrixXd& directions,
-           Eigen::Index direction) {
-  constexpr double kUnmoved = 1e-12;  // of the terms
-  double rate = 0.0;
-  double terms = 0.0;
-  for (const JacobianEntry& entry : gradient) {
-    const double term = entry.value * directions(entry.variable, direction);
-    rate += term;
-    terms += std::abs(term);
-  }
-  return std::abs(rate) > kUnmoved * terms;
-}
-
-// Whether a contact neither opens nor approaches.
-bool Rests(const Model<double>& model, const State<double>& state, const ActiveContact& contact) {
-  double speed;
-  if (contact.joint >= 0) {
-    const JointIndex& joint = model.structure->joints[contact.joint];
-    JointRows<double> joint_rows;
-    EvaluateJoint(joint.type, state.PoseOf(joint.a), state.PoseOf(joint.b),
-                  &model.numbers[joint.geometry], &joint_rows);
-    ContactRows<double> rows;
-    EvaluateLimitRows(model, joint_rows, contact, &rows);
-    speed = RelativeSpeed(state, contact.a, rows.normal_a, contact.b, rows.normal_b);
-  } else {
-    speed = SpeedsOf(model, state, contact).normal;
-  }
-  return std::abs(speed) <= Negligible(model, speed);
 }
 
 bool HasPair(const std::vector<ActiveContact>& contacts, const ActiveContact& contact) {
@@ -388,77 +294,6 @@ void RolloutCertifier::AddSegment(const Model<double>& model, long step,
     }
   }
   AddQuality(start.problem, segment->modes, &start.system);
-}
-
-// Contacts that touch as the run starts: in the impacts of its first instant and in the first
-// segment.
-void RolloutCertifier::AddStart(const Model<double>& model, const EventRecord& record) {
-  std::vector<const ActiveContact*> touching;
-  const State<double>* start = nullptr;
-  const Segment* first = nullptr;  // of some length
-  for (int p = 0; p < record.num_parts; ++p) {
-    const EventPart& part = *record.parts[p];
-    const std::vector<ActiveContact>& contacts =
-        part.is_impulses ? part.impulses.contacts : part.segment.contacts;
-    start = start != nullptr   ? start
-            : part.is_impulses ? &part.impulses.before
-                               : &part.segment.before;
-    for (const ActiveContact& contact : contacts) {
-      touching.push_back(&contact);
-    }
-    if (!part.is_impulses && part.segment.length > 0.0) {
-      first = &part.segment;
-      break;
-    }
-  }
-  const bool splits = first != nullptr && SplitError(model, *first) > kSplitMatters;
-  const size_t loaded = touching.size();
-  constexpr double kRounding = 1e-10;  // of a gap that is 0, m
-  std::vector<ActiveContact> unloaded;
-  if (start != nullptr) {
-    EventSearch(model).FindContacts(model, *start, kRounding, &unloaded);
-  }
-  for (const ActiveContact& contact : unloaded) {
-    if (contact.gap <= kRounding &&
-        std::none_of(touching.begin(), touching.begin() + static_cast<std::ptrdiff_t>(loaded),
-                     [&](const ActiveContact* other) { return other->SameAs(contact); })) {
-      touching.push_back(&contact);
-    }
-  }
-  LocalJacobianScratch scratch;
-  for (size_t k = 0; k < touching.size(); ++k) {
-    const ActiveContact* contact = touching[k];
-    std::vector<JacobianEntry> gap, approach, slip;
-    AddGapGradient(model, *start, *contact, &scratch, &gap);
-    AddApproachGradient(model, *start, *contact, &scratch, &approach);
-    if (Sticks(first, *contact)) {
-      AddSlipGradient(model, *start, *contact, &scratch, &slip);
-    }
-    // Out of penetration it is pushed only while it does not open by itself. One that rests on the
-    // surface has both sides: what it falls late it lands with; not so where no force presses.
-    const bool rests = Rests(model, *start, *contact);
-    const bool pushed = rests && (k >= loaded || contact->gap < -kTouching);
-    if (k >= loaded && !rests) {
-      continue;
-    }
-    for (Eigen::Index c = 0; c < options_.directions.cols(); ++c) {
-      // An event soon after the start, on one side or on both: a twist that lifts lands, one that
-      // slides stops. It is none for the physics, but ends a part of the step for all bodies.
-      const bool splits_here = splits && rests && k < loaded;
-      const char* what =
-          contact->gap > -kTouching && Moves(gap, options_.directions, c) ? " changes its gap"
-          : pushed && Moves(approach, options_.directions, c)
-              ? " changes the speed at which it opens"
-          : splits_here &&
-                  (Moves(approach, options_.directions, c) || Moves(slip, options_.directions, c))
-              ? " lets an event split the first step"
-              : nullptr;
-      if (what != nullptr) {
-        OneSided(ContactName(*model.structure, *contact) + " touches at the start, " +
-                 options_.names[static_cast<size_t>(c)] + what);
-      }
-    }
-  }
 }
 
 void RolloutCertifier::AddEventStep(const Model<double>& model, long step, Stepper* stepper) {

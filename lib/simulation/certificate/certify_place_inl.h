@@ -2,6 +2,7 @@
 #pragma once
 // Where in a rollout a certificate's figure was taken. Included by certify*.cc alone.
 
+#include <cmath>
 #include <cstdio>
 #include <string>
 
@@ -13,6 +14,13 @@ inline std::string Short(double x) {
   char text[32];
   std::snprintf(text, sizeof(text), "%.6g", x);
   return text;
+}
+
+// A speed that is rounding, m/s.
+inline double Negligible(const Model<double>& model, double speed) {
+  return 1e-9 *
+         (std::abs(speed) + model.structure->settings.dt *
+                                std::hypot(model.numbers[kGravityX], model.numbers[kGravityY]));
 }
 
 struct RolloutCertifier::Place {

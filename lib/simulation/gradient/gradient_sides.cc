@@ -8,7 +8,9 @@
 // that is the one-sided derivative (by the mean value theorem). Both are checked: the
 // extrapolations of first and second order must agree, and the values at p + τ must be those at p
 // and the integral of the derivative between. A square root (a gap that just closes) fails the
-// first, a jump (a flat landing) the second.
+// first, a jump (a flat landing) the second. Where they fail close to p they are tried again
+// farther away: what is thrown up by less than the touching tolerance is found to land late, by
+// √(2 tolerance / g), which counts where it then jams.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -22,8 +24,11 @@ namespace {
 
 // Of the parameter's size: beyond what contacts hold to, and small against the next kink.
 constexpr double kWay = 1e-5;
+constexpr double kFarther = 8.0;  // each time, beyond the touching tolerance
+constexpr int kMostWays = 3;
 constexpr double kConverged = 1e-6;  // what both orders of extrapolation may differ by
-// Of the change over τ, what the integral may miss: a touch at no speed is located to 1e-7 m/s.
+// Of the change over the first τ, what the integral may miss: a touch at no speed is located to
+// 1e-7 m/s.
 constexpr double kContinuous = 0.05;
 constexpr double kRounding = 1e-11;  // of the values
 // Derivatives below this, of the values over the parameter's size, are 0.
@@ -42,8 +47,29 @@ class OneSided {
   // The derivative by a parameter; false with a message where it has none from this side.
   bool Column(size_t k, VectorX<double>* column) {
     const ParameterPath& parameter = problem_.parameters[k];
-    const double way = sign_ * kWay * std::max(std::abs(parameter.value), parameter.scale);
-    std::array<Beside, 3> at;  // τ, τ / 2, τ / 4
+    const double first = kWay * std::max(std::abs(parameter.value), parameter.scale);
+    std::string message;
+    for (int i = 0; i < kMostWays; ++i) {
+      if (Extrapolate(k, first, std::pow(kFarther, i), column)) {
+        result_.message.clear();
+        return true;
+      }
+      // What there is to say is said of the nearest.
+      message = i == 0 ? result_.message : message;
+    }
+    result_.message = message;
+    return false;
+  }
+
+  // What two orders of extrapolation differ by, of a column's largest entry.
+  double apart() const { return apart_; }
+
+ private:
+  // From p + τ, p + τ / 2, p + τ / 4 with τ = `times` the first way.
+  bool Extrapolate(size_t k, double first_way, double times, VectorX<double>* column) {
+    const ParameterPath& parameter = problem_.parameters[k];
+    const double way = sign_ * times * first_way;
+    std::array<Beside, 3> at;
     for (int i = 0; i < 3; ++i) {
       if (!Evaluate(k, way / (1 << i), &at[i])) {
         return false;
@@ -53,7 +79,7 @@ class OneSided {
     *column = (at[0].derivative - 6.0 * at[1].derivative + 8.0 * at[2].derivative) / 3.0;
     const double values = result_.values.cwiseAbs().maxCoeff();
     const double size =
-        std::max(column->cwiseAbs().maxCoeff(), kNothing * kWay * values / std::abs(way));
+        std::max(column->cwiseAbs().maxCoeff(), kNothing * kWay * values / first_way);
     const double apart = (first - *column).cwiseAbs().maxCoeff();
     if (!(apart <= kConverged * size)) {
       return Fail(parameter, "derivatives beside it do not converge: its largest is " + Text(size) +
@@ -64,7 +90,7 @@ class OneSided {
         result_.values + way / 6.0 * (*column + 4.0 * at[1].derivative + at[0].derivative);
     for (Eigen::Index i = 0; i < expected.size(); ++i) {
       const double missed = std::abs(at[0].values[i] - expected[i]);
-      const double bound = kContinuous * std::abs(way) * size + kRounding * values;
+      const double bound = kContinuous * first_way * size + kRounding * values;
       if (!(missed <= bound)) {
         return Fail(parameter, result_.outputs[i] + " jumps by " + Text(missed));
       }
@@ -73,10 +99,6 @@ class OneSided {
     return true;
   }
 
-  // What two orders of extrapolation differ by, of a column's largest entry.
-  double apart() const { return apart_; }
-
- private:
   static std::string Text(double x) {
     std::ostringstream text;
     text << x;

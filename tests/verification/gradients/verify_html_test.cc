@@ -20,7 +20,7 @@ TEST(VerifyHtmlTest, HeatIsLogarithmicInTheBound) {
 }
 
 TEST(VerifyHtmlTest, ThePageHasACellASceneAndPairAndNoOtherFile) {
-  const std::vector<VerifyJob> jobs = RandomJobs(1, 3, {Stepping::kFixed});
+  const std::vector<VerifyJob> jobs = RandomJobs(RandomList::kScenes, 1, 3, {Stepping::kFixed});
   VerifyResult result = RunVerification(jobs, 1, KeepJacobians::kNo, {});
   const auto cells = [](const std::string& page) {
     size_t count = 0;

@@ -20,7 +20,8 @@ VerifyJob BoxJob() {
 }
 
 TEST(VerifyRunTest, RandomJobsAreSeedsInEachStepping) {
-  const std::vector<VerifyJob> jobs = RandomJobs(5, 2, {Stepping::kFixed, Stepping::kEvent});
+  const std::vector<VerifyJob> jobs =
+      RandomJobs(RandomList::kScenes, 5, 2, {Stepping::kFixed, Stepping::kEvent});
   ASSERT_EQ(jobs.size(), 4u);
   EXPECT_EQ(*jobs[0].seed, 5u);
   EXPECT_EQ(jobs[1].stepping, Stepping::kEvent);
@@ -41,7 +42,7 @@ TEST(VerifyRunTest, ParametersAreAllNumbersOrAChoiceThatTheSeedMakes) {
 }
 
 TEST(VerifyRunTest, ThreadsDoNotChangeABit) {
-  std::vector<VerifyJob> jobs = RandomJobs(20, 6, {Stepping::kFixed});
+  std::vector<VerifyJob> jobs = RandomJobs(RandomList::kScenes, 20, 6, {Stepping::kFixed});
   jobs.push_back(BoxJob());
   long last = 0;
   const VerifyResult one = RunVerification(jobs, 1, KeepJacobians::kYes, {});
@@ -69,7 +70,7 @@ TEST(VerifyRunTest, ScenesAreSummedUp) {
 }
 
 TEST(VerifyRunTest, WhatIsBrokenIsOneLineWithTheCommandThatShowsIt) {
-  std::vector<VerifyJob> jobs = RandomJobs(3, 100, {Stepping::kFixed});
+  std::vector<VerifyJob> jobs = RandomJobs(RandomList::kScenes, 3, 100, {Stepping::kFixed});
   VerifyResult result;
   result.scenes.resize(jobs.size());
   for (SceneCheck& scene : result.scenes) scene.done = true;

@@ -1,0 +1,241 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Certificates of event steps: contacts that touch as the run starts, and what a direction does to
+// them.
+#include <algorithm>
+#include <cmath>
+
+#include "tangible/dynamics/jacobian/contact_gradient.h"
+#include "tangible/simulation/certificate/certify_place_inl.h"
+#include "tangible/simulation/certificate/start_probe.h"
+#include "tangible/simulation/events/event_search.h"
+#include "tangible/simulation/events/segment_flow.h"
+
+namespace tangible {
+namespace {
+
+// m or rad; a gap of this size is more than rounding: the contact does not just touch.
+constexpr double kTouching = 1e-9;
+// Of a motion: an integrator's error that is more than rounding.
+constexpr double kSplitMatters = 1e-7;
+
+// What a motion differs by where an event ends a part of it early, as a share of the motion: the
+// integrator's error, which a step in two parts makes twice.
+double SplitError(const Model<double>& model, const Segment& segment) {
+  SegmentFlow flow;
+  std::string message;
+  Segment whole;
+  whole.time = segment.time;
+  whole.middle = segment.middle;
+  whole.before = segment.before;
+  whole.contacts = segment.contacts;
+  whole.friction = segment.friction;
+  whole.modes = segment.modes;
+  whole.length = 0.5 * segment.length;
+  Segment half = whole;
+  whole.length = segment.length;
+  if (!flow.Run(model, &whole, &message) || !flow.Run(model, &half, &message)) {
+    return 0.0;
+  }
+  Segment rest = half;
+  rest.time += half.length;
+  rest.before = half.after;
+  if (!flow.Run(model, &rest, &message)) {
+    return 0.0;
+  }
+  // Of a scene at rest both are rounding.
+  constexpr double kRest = 1e-6;
+  const auto share = [&](const std::vector<double>& before, const std::vector<double>& one,
+                         const std::vector<double>& two) {
+    double apart = 0.0;
+    double moved = 0.0;
+    for (size_t i = 0; i < one.size(); ++i) {
+      apart = std::max(apart, std::abs(one[i] - two[i]));
+      moved = std::max({moved, std::abs(one[i] - before[i]), kRest * std::abs(one[i])});
+    }
+    const double gravity = std::hypot(model.numbers[kGravityX], model.numbers[kGravityY]);
+    return apart > 0.0 ? apart / (moved + kRest * gravity * segment.length) : 0.0;
+  };
+  return std::max(share(segment.before.pose, whole.after.pose, rest.after.pose),
+                  share(segment.before.twist, whole.after.twist, rest.after.twist));
+}
+
+// Whether a contact of two bodies sticks over a segment, if there is one.
+bool Sticks(const Segment* segment, const ActiveContact& contact) {
+  for (size_t i = 0; segment != nullptr && i < segment->contacts.size(); ++i) {
+    if (segment->contacts[i].SameAs(contact)) {
+      return contact.joint < 0 && segment->modes[i] == ContactMode::kSticking;
+    }
+  }
+  return false;
+}
+
+// Whether a direction changes what the entries are the gradient of.
+bool Moves(const std::vector<JacobianEntry>& gradient, const RowMatrixXd& directions,
+           Eigen::Index direction) {
+  constexpr double kUnmoved = 1e-12;  // of the terms
+  double rate = 0.0;
+  double terms = 0.0;
+  for (const JacobianEntry& entry : gradient) {
+    const double term = entry.value * directions(entry.variable, direction);
+    rate += term;
+    terms += std::abs(term);
+  }
+  return std::abs(rate) > kUnmoved * terms;
+}
+
+// Whether a contact neither opens nor approaches.
+bool Rests(const Model<double>& model, const State<double>& state, const ActiveContact& contact) {
+  double speed;
+  if (contact.joint >= 0) {
+    const JointIndex& joint = model.structure->joints[contact.joint];
+    JointRows<double> joint_rows;
+    EvaluateJoint(joint.type, state.PoseOf(joint.a), state.PoseOf(joint.b),
+                  &model.numbers[joint.geometry], &joint_rows);
+    ContactRows<double> rows;
+    EvaluateLimitRows(model, joint_rows, contact, &rows);
+    speed = RelativeSpeed(state, contact.a, rows.normal_a, contact.b, rows.normal_b);
+  } else {
+    speed = SpeedsOf(model, state, contact).normal;
+  }
+  return std::abs(speed) <= Negligible(model, speed);
+}
+
+// What forces give bodies as a segment starts, m/s².
+double Acceleration(const Model<double>& model, const Segment* segment) {
+  double largest = std::hypot(model.numbers[kGravityX], model.numbers[kGravityY]);
+  if (segment != nullptr && segment->num_stages > 0) {
+    const ContactProblem<double>& problem = segment->stages[0].problem;
+    for (size_t i = 0; i < problem.momentum.size(); ++i) {
+      if (i % 3 < 2) largest = std::max(largest, std::abs(problem.momentum[i]) / problem.mass[i]);
+    }
+  }
+  return largest;
+}
+
+}  // namespace
+
+// Contacts that touch as the run starts: in the impacts of its first instant and in the first
+// segment.
+void RolloutCertifier::AddStart(const Model<double>& model, const EventRecord& record) {
+  std::vector<const ActiveContact*> touching;
+  const State<double>* start = nullptr;
+  const Segment* first = nullptr;  // of some length
+  for (int p = 0; p < record.num_parts; ++p) {
+    const EventPart& part = *record.parts[p];
+    const std::vector<ActiveContact>& contacts =
+        part.is_impulses ? part.impulses.contacts : part.segment.contacts;
+    start = start != nullptr   ? start
+            : part.is_impulses ? &part.impulses.before
+                               : &part.segment.before;
+    for (const ActiveContact& contact : contacts) {
+      touching.push_back(&contact);
+    }
+    if (!part.is_impulses && part.segment.length > 0.0) {
+      first = &part.segment;
+      break;
+    }
+  }
+  const bool splits = first != nullptr && SplitError(model, *first) > kSplitMatters;
+  const size_t loaded = touching.size();
+  constexpr double kRounding = 1e-10;  // of a gap that is 0, m
+  std::vector<ActiveContact> unloaded;
+  if (start != nullptr) {
+    EventSearch(model).FindContacts(model, *start, kRounding, &unloaded);
+  }
+  for (const ActiveContact& contact : unloaded) {
+    if (contact.gap <= kRounding &&
+        std::none_of(touching.begin(), touching.begin() + static_cast<std::ptrdiff_t>(loaded),
+                     [&](const ActiveContact* other) { return other->SameAs(contact); })) {
+      touching.push_back(&contact);
+    }
+  }
+  LocalJacobianScratch scratch;
+  for (size_t k = 0; k < touching.size(); ++k) {
+    const ActiveContact* contact = touching[k];
+    std::vector<JacobianEntry> gap, approach, slip;
+    AddGapGradient(model, *start, *contact, &scratch, &gap);
+    AddApproachGradient(model, *start, *contact, &scratch, &approach);
+    if (Sticks(first, *contact)) {
+      AddSlipGradient(model, *start, *contact, &scratch, &slip);
+    }
+    // Out of penetration it is pushed only while it does not open by itself. One that rests on the
+    // surface has both sides: what it falls late it lands with; not so where no force presses.
+    const bool rests = Rests(model, *start, *contact);
+    const bool pushed = rests && (k >= loaded || contact->gap < -kTouching);
+    if (k >= loaded && !rests) {
+      continue;
+    }
+    for (Eigen::Index c = 0; c < options_.directions.cols(); ++c) {
+      // An event soon after the start, on one side or on both: a twist that lifts lands, one that
+      // slides stops. It is none for the physics, but ends a part of the step for all bodies.
+      const bool splits_here = splits && rests && k < loaded;
+      const char* what =
+          contact->gap > -kTouching && Moves(gap, options_.directions, c) ? " changes its gap"
+          : pushed && Moves(approach, options_.directions, c)
+              ? " changes the speed at which it opens"
+          : splits_here &&
+                  (Moves(approach, options_.directions, c) || Moves(slip, options_.directions, c))
+              ? " lets an event split the first step"
+              : nullptr;
+      if (what != nullptr) {
+        OneSided(ContactName(*model.structure, *contact) + " touches at the start, " +
+                 options_.names[static_cast<size_t>(c)] + what);
+      }
+    }
+  }
+  if (start != nullptr && certificate_.one_sided.empty()) {
+    ProbeStarts(model, *start, touching, first);
+  }
+}
+
+// Beside contacts with friction that may jam, runs.
+void RolloutCertifier::ProbeStarts(const Model<double>& model, const State<double>& start,
+                                   const std::vector<const ActiveContact*>& touching,
+                                   const Segment* first) {
+  std::vector<ActiveContact> resting;
+  for (const ActiveContact* contact : touching) {
+    const bool is_new = std::none_of(resting.begin(), resting.end(),
+                                     [&](const auto& other) { return other.SameAs(*contact); });
+    if (contact->joint < 0 && is_new && Rests(model, start, *contact)) {
+      resting.push_back(*contact);
+    }
+  }
+  std::vector<ActiveContact> may_jam;
+  for (const ActiveContact& contact : resting) {
+    if (MayJam(model, start, resting, contact)) {
+      may_jam.push_back(contact);
+    }
+  }
+  if (may_jam.empty()) {
+    return;
+  }
+  const double acceleration = Acceleration(model, first);
+  LocalJacobianScratch scratch;
+  for (Eigen::Index c = 0; c < options_.directions.cols(); ++c) {
+    std::vector<ActiveContact> moved;
+    for (const ActiveContact& contact : may_jam) {
+      std::vector<JacobianEntry> approach, slip;
+      AddApproachGradient(model, start, contact, &scratch, &approach);
+      if (Sticks(first, contact)) {
+        AddSlipGradient(model, start, contact, &scratch, &slip);
+      }
+      if (Moves(approach, options_.directions, c) || Moves(slip, options_.directions, c)) {
+        moved.push_back(contact);
+      }
+    }
+    if (moved.empty()) {
+      continue;
+    }
+    const StartFinding found = ProbeStart(model, start, moved, options_.directions.col(c),
+                                          acceleration, options_.names[static_cast<size_t>(c)]);
+    const Place place{model.structure.get(), 0, 0.0, 0, &found.contact, ContactMode::kOpen};
+    if (found.kind == StartKind::kJump) {
+      AddJump(0.0, place, found.what);
+    } else if (found.kind == StartKind::kKink) {
+      OneSided(ContactName(*model.structure, found.contact) + " " + found.what);
+    }
+  }
+}
+
+}  // namespace tangible
