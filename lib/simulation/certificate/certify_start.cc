@@ -217,7 +217,9 @@ void RolloutCertifier::ProbeStarts(const Model<double>& model, const State<doubl
     for (const ActiveContact& contact : may_jam) {
       std::vector<JacobianEntry> approach, slip;
       AddApproachGradient(model, start, contact, &scratch, &approach);
-      if (Sticks(first, contact)) {
+      // What does not slide may begin to, and friction then turn its law around.
+      if (const double speed = SpeedsOf(model, start, contact).slip;
+          std::abs(speed) <= Negligible(model, speed)) {
         AddSlipGradient(model, start, contact, &scratch, &slip);
       }
       if (Moves(approach, options_.directions, c) || Moves(slip, options_.directions, c)) {
