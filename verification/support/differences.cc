@@ -6,10 +6,57 @@
 #include <limits>
 #include <utility>
 
+#include "tangible/geometry/mass_properties.h"
 #include "tangible/verification/support/random_scene.h"
 
 namespace tangible {
 namespace {
+
+// What a rounding of 1 in a coordinate L does to each output: a twist that a gap or a joint's drift
+// sets is L / h of it, of its angular part over the radius of gyration. It stays the same where the
+// initial state is changed a little.
+VectorX<double> GapNoise(const Scene& scene, const ModelStructure& structure) {
+  Model<double> model;
+  State<double> state;
+  BuildModel(scene, &model, &state);
+  double coordinate = 0.0;
+  for (const int body : structure.moving) {
+    coordinate =
+        std::max({coordinate, std::abs(state.pose[3 * body]), std::abs(state.pose[3 * body + 1])});
+  }
+  VectorX<double> noise = VectorX<double>::Zero(6 * structure.num_blocks());
+  for (int k = 0; k < structure.num_blocks(); ++k) {
+    const BodyIndex& body = structure.bodies[structure.moving[k]];
+    const double arm = std::sqrt(model.numbers[body.inertia] / model.numbers[body.mass]);
+    const double speed = coordinate / scene.simulation.dt;
+    noise.segment<3>(6 * k + 3) << speed, speed, speed / arm;
+  }
+  return noise;
+}
+
+// What is thrown up by less than the touching tolerance, 1e-10 of the body, lands that much lower
+// than on its surface: a change of poses, and of twists as the motion goes on with it.
+VectorX<double> TouchNoise(const Scene& scene, const ModelStructure& structure) {
+  if (scene.simulation.stepping != Stepping::kEvent) {
+    return VectorX<double>::Zero(6 * structure.num_blocks());
+  }
+  constexpr double kTouch = 2e-10;
+  Model<double> model;
+  State<double> state;
+  BuildModel(scene, &model, &state);
+  const double gravity = scene.gravity.norm();
+  VectorX<double> noise = VectorX<double>::Zero(6 * structure.num_blocks());
+  for (int k = 0; k < structure.num_blocks(); ++k) {
+    const int body = structure.moving[k];
+    if (structure.bodies[body].shape == ShapeType::kNone) continue;
+    const double size = BoundingRadius(model.Shape(body));
+    const double speed = std::hypot(state.twist[3 * body], state.twist[3 * body + 1]) +
+                         size * std::abs(state.twist[3 * body + 2]) + std::sqrt(gravity * size);
+    noise.segment<3>(6 * k) << kTouch * size, kTouch * size, kTouch;
+    noise.segment<3>(6 * k + 3) << kTouch * speed, kTouch * speed, kTouch * speed / size;
+  }
+  return noise;
+}
 
 // Runs with one parameter changed by several steps, and the extrapolation of their differences.
 class Differences {
@@ -85,6 +132,8 @@ class Differences {
   void CompareSides(DifferenceColumn* column) {
     DifferenceColumn sides[2];
     apart_ = true;
+    const VectorX<double> noise = noise_;
+    noise_ += TouchNoise(scene_, *at_.structure);
     for (const int k : {0, 1}) {
       side_ = k == 0 ? 1.0 : -1.0;
       BestTable(&sides[k]);
@@ -92,6 +141,7 @@ class Differences {
     side_ = 0.0;
     apart_ = false;
     choices_ = &at_;
+    noise_ = noise;
     if (sides[0].status != DifferenceStatus::kJudged ||
         sides[1].status != DifferenceStatus::kJudged) {
       return;
@@ -263,32 +313,6 @@ class Differences {
   bool apart_ = false;                       // each side is a function of its own
   RunTrace of_side_;
 };
-
-}  // namespace
-
-namespace {
-
-// What a rounding of 1 in a coordinate L does to each output: a twist that a gap or a joint's drift
-// sets is L / h of it, of its angular part over the radius of gyration. It stays the same where the
-// initial state is changed a little.
-VectorX<double> GapNoise(const Scene& scene, const ModelStructure& structure) {
-  Model<double> model;
-  State<double> state;
-  BuildModel(scene, &model, &state);
-  double coordinate = 0.0;
-  for (const int body : structure.moving) {
-    coordinate =
-        std::max({coordinate, std::abs(state.pose[3 * body]), std::abs(state.pose[3 * body + 1])});
-  }
-  VectorX<double> noise = VectorX<double>::Zero(6 * structure.num_blocks());
-  for (int k = 0; k < structure.num_blocks(); ++k) {
-    const BodyIndex& body = structure.bodies[structure.moving[k]];
-    const double arm = std::sqrt(model.numbers[body.inertia] / model.numbers[body.mass]);
-    const double speed = coordinate / scene.simulation.dt;
-    noise.segment<3>(6 * k + 3) << speed, speed, speed / arm;
-  }
-  return noise;
-}
 
 }  // namespace
 

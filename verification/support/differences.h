@@ -45,7 +45,7 @@ enum class ChoicesDiffer {
   kGiveUp,
   /// Differences of each side alone (a body at rest that is thrown up falls down again, and lands
   /// with what it would else have carried): judged where both sides agree to
-  /// 1e-5 of the largest.
+  /// 1e-5 of the largest. What leaves by less than the touching tolerance is as uncertain as that.
   kCompareSides,
 };
 

@@ -100,6 +100,7 @@ bool EventStepper::Settle(const Model<double>& model, const Impulses& impact, St
   const double slow = search_.SpeedTolerance(model, *state);
   Segment held;
   held.time = impact.time;
+  held.starts = true;  // what slides is held with its friction
   bool any = false;
   bool all_slow = true;     // no contact approached faster than it would return
   bool any_slides = false;  // a contact that is to stick
@@ -130,6 +131,8 @@ bool EventStepper::Settle(const Model<double>& model, const Impulses& impact, St
     if (block.has_friction && std::abs(slip) <= returns) {
       any_slides = any_slides || std::abs(slip) > slow;
       mode = ContactMode::kSticking;
+    } else if (block.has_friction) {
+      mode = slip > 0.0 ? ContactMode::kSlidingPositive : ContactMode::kSlidingNegative;
     }
     held.contacts.push_back(contact);
     held.friction.push_back(impact.friction[i]);
