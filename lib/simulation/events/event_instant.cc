@@ -24,6 +24,41 @@ namespace {
 // The share of max_events_per_step after which slow impacts are a rattle.
 constexpr int kRattling = 4;
 
+// Whether contact i of an impact is one of a body without joints that touches fixed ones on parallel
+// faces alone, and its friction does not come near to turning its law around, n M⁻¹ n > 1.1 μ |n
+// M⁻¹ t|: held with it such a body can neither wedge nor jam.
+bool SlidesFreely(const ModelStructure& structure, const Impulses& impact, size_t i) {
+  constexpr double kNear = 1.1;
+  constexpr double kParallel = 1e-6;
+  const ContactBlock<double>& block = impact.problem.contacts[i];
+  if ((block.a >= 0) == (block.b >= 0)) {
+    return false;
+  }
+  const int moving = std::max(block.a, block.b);
+  const RowPart<double>& normal = block.a >= 0 ? block.normal_a : block.normal_b;
+  const RowPart<double>& tangent = block.a >= 0 ? block.tangent_a : block.tangent_b;
+  double mixed = 0.0;
+  double straight = 0.0;
+  for (int k = 0; k < 3; ++k) {
+    mixed += normal[k] * tangent[k] / impact.problem.mass[3 * static_cast<size_t>(moving) + k];
+    straight += normal[k] * normal[k] / impact.problem.mass[3 * static_cast<size_t>(moving) + k];
+  }
+  const bool is_jointed =
+      std::any_of(structure.joints.begin(), structure.joints.end(), [&](const JointIndex& joint) {
+        return structure.bodies[joint.a].block == moving ||
+               structure.bodies[joint.b].block == moving;
+      });
+  return !is_jointed && straight > kNear * block.friction * std::abs(mixed) &&
+         std::all_of(impact.problem.contacts.begin(), impact.problem.contacts.end(),
+                     [&](const ContactBlock<double>& other) {
+                       if (other.a != moving && other.b != moving) return true;
+                       const RowPart<double>& n =
+                           other.a == moving ? other.normal_a : other.normal_b;
+                       return (other.a >= 0) != (other.b >= 0) &&
+                              std::abs(n[0] * tangent[0] + n[1] * tangent[1]) <= kParallel;
+                     });
+}
+
 }  // namespace
 
 bool EventStepper::AddInstant(const Model<double>& model, double t, EventKind kind,
@@ -100,7 +135,7 @@ bool EventStepper::Settle(const Model<double>& model, const Impulses& impact, St
   const double slow = search_.SpeedTolerance(model, *state);
   Segment held;
   held.time = impact.time;
-  held.starts = true;  // what slides is held with its friction
+  held.starts = true;  // what is held sliding has its friction
   bool any = false;
   bool all_slow = true;     // no contact approached faster than it would return
   bool any_slides = false;  // a contact that is to stick
@@ -132,7 +167,9 @@ bool EventStepper::Settle(const Model<double>& model, const Impulses& impact, St
       any_slides = any_slides || std::abs(slip) > slow;
       mode = ContactMode::kSticking;
     } else if (block.has_friction) {
-      mode = slip > 0.0 ? ContactMode::kSlidingPositive : ContactMode::kSlidingNegative;
+      mode = !SlidesFreely(*model.structure, impact, i) ? ContactMode::kClosed
+             : slip > 0.0                               ? ContactMode::kSlidingPositive
+                                                        : ContactMode::kSlidingNegative;
     }
     held.contacts.push_back(contact);
     held.friction.push_back(impact.friction[i]);
