@@ -229,7 +229,12 @@ class EventReplay {
           const double length = ValueOf(tau);
           implicit_.Factor(values_, *segment, &segment->stages[i], length * tableau.a[i][i],
                            length * length * tableau.a_hat[i][i]);
-          stages[i] = stages[i - 1];  // the iteration may have diverged
+          // The iteration may have diverged. Values are known: Newton's method is for derivatives,
+          // which those of nearby values would be taken at.
+          stages[i] = stages[i - 1];
+          for (size_t k = 0; k < stages[i].v.size(); ++k) {
+            stages[i].v[k].a = segment->stages[i].solution.v[k];
+          }
         } else {
           NewtonStep(next, &stages[i]);
         }
