@@ -5,8 +5,6 @@
 #include <cmath>
 #include <limits>
 
-#include "tangible/geometry/mass_properties.h"
-
 namespace tangible {
 namespace {
 
@@ -31,14 +29,9 @@ ContactLaw GapLaw(double gap, double h, const SimulationSettings& settings) {
 
 }  // namespace
 
-ContactSearch::ContactSearch(const Model<double>& model) {
+ContactSearch::ContactSearch(const Model<double>& model) : lengths_(model) {
   const ModelStructure& structure = *model.structure;
   const size_t n = structure.bodies.size();
-  for (int body = 0; body < structure.num_bodies(); ++body) {
-    const ShapeType type = structure.bodies[body].shape;
-    const bool bounded = type != ShapeType::kNone && type != ShapeType::kHalfPlane;
-    radius_.push_back(bounded ? BoundingRadius(model.Shape(body)) : 0.0);
-  }
   bound_.assign(n, 0.0);
   limit_bound_.assign(structure.joints.size(), 0.0);
   boxes_.resize(n);
@@ -58,7 +51,8 @@ void ContactSearch::SetBounds(const Model<double>& model, const State<double>& s
       free[i] =
           block < 0 ? twist[i] : problem.momentum[3 * block + i] / problem.mass[3 * block + i];
     }
-    bound_[body] = std::max(SpeedOf(twist, radius_[body]), SpeedOf(free, radius_[body]));
+    bound_[body] =
+        std::max(SpeedOf(twist, lengths_.radius(body)), SpeedOf(free, lengths_.radius(body)));
   }
   for (size_t j = 0; j < structure.joints.size(); ++j) {
     const JointIndex& joint = structure.joints[j];
@@ -84,7 +78,7 @@ bool ContactSearch::CheckBounds(const Model<double>& model, const std::vector<do
     }
   }
   for (const int body : model.structure->moving) {
-    const double speed = SpeedOf(&twist[3 * body], radius_[body]);
+    const double speed = SpeedOf(&twist[3 * body], lengths_.radius(body));
     if (speed > bound_[body] * (1.0 + 1e-12) &&
         model.structure->bodies[body].shape != ShapeType::kNone) {
       exceeded = true;
@@ -122,20 +116,19 @@ void ContactSearch::FindLimits(const Model<double>& model, double h,
 }
 
 // The contacts of bodies that pass by each other, as a box over flush tiles, in the place of one
-// that a corner ahead would have.
+// that a corner ahead would have. What a closed contact's gap is off by moves the bodies at that
+// over a step: no approach.
 ContactsAhead ContactSearch::FindPassed(const Model<double>& model, const State<double>& state,
-                                        const ActiveContact& contact, double approach) const {
+                                        const ActiveContact& contact, double approach,
+                                        double h) const {
   constexpr double kNone = 1e-9;  // of the bodies' speeds, and of the smaller one's size
-  const double slow = kNone * (bound_[contact.a] + bound_[contact.b]);
-  const double size = std::min(radius_[contact.a], radius_[contact.b]);
+  const double rounding = lengths_.Rounding(state, contact.a, contact.b);
+  const double slow = kNone * (bound_[contact.a] + bound_[contact.b]) + rounding / h;
+  const double size = std::min(lengths_.radius(contact.a), lengths_.radius(contact.b));
   if (!(approach < -slow) || size == 0.0) {
     return ContactsAhead();
   }
-  double place = 0.0;  // m, whose rounding counts far from the origin
-  for (const int body : {contact.a, contact.b}) {
-    place = std::max({place, std::abs(state.pose[3 * body]), std::abs(state.pose[3 * body + 1])});
-  }
-  const double none = kNone * size + 64.0 * std::numeric_limits<double>::epsilon() * place;
+  const double none = kNone * size + rounding;
   if (contact.gap < -none) {
     return ContactsAhead();
   }
@@ -177,7 +170,7 @@ void ContactSearch::Find(const Model<double>& model, const State<double>& state,
         const double distance = std::hypot(state.pose[3 * a] - state.pose[3 * b],
                                            state.pose[3 * a + 1] - state.pose[3 * b + 1]);
         const int other = body == a ? b : a;
-        reach += h * std::abs(state.twist[3 * body + 2]) * (distance + radius_[other]);
+        reach += h * std::abs(state.twist[3 * body + 2]) * (distance + lengths_.radius(other));
       }
     }
     ContactFeature features[2];
@@ -202,7 +195,7 @@ void ContactSearch::Find(const Model<double>& model, const State<double>& state,
       contact.law = GapLaw(gap, h, settings);
       const double approach = RelativeSpeed(state, a, rows.normal_a, b, rows.normal_b);
       if (!passes_by && gap + h * approach < settings.contact_margin) {
-        const ContactsAhead ahead = FindPassed(model, state, contact, approach);
+        const ContactsAhead ahead = FindPassed(model, state, contact, approach, h);
         if (ahead.count > 0) {
           passes_by = true;
           count = ahead.count;

@@ -13,6 +13,7 @@
 
 #include "tangible/dynamics/assembly/assembly.h"
 #include "tangible/dynamics/elements/contacts_ahead.h"
+#include "tangible/dynamics/model/lengths.h"
 #include "tangible/geometry/broad_phase.h"
 
 namespace tangible {
@@ -39,11 +40,11 @@ class ContactSearch {
 
  private:
   ContactsAhead FindPassed(const Model<double>& model, const State<double>& state,
-                           const ActiveContact& contact, double approach) const;
+                           const ActiveContact& contact, double approach, double h) const;
   void FindLimits(const Model<double>& model, double h, const AssemblyScratch<double>& scratch,
                   std::vector<ActiveContact>* contacts);
 
-  std::vector<double> radius_;       ///< bounding radius a body, 0 for half-planes and no shape
+  Lengths lengths_;
   std::vector<double> bound_;        ///< m/s a body
   std::vector<double> limit_bound_;  ///< a joint: bound on its coordinate's rate, rad/s or m/s
   std::vector<Aabb> boxes_;

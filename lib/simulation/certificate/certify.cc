@@ -11,14 +11,13 @@
 #include "tangible/simulation/certificate/duality.h"
 #include "tangible/simulation/certificate/feature_ties.h"
 #include "tangible/simulation/derivatives/rollout_directional.h"
+#include "tangible/simulation/events/tolerances.h"
 
 namespace tangible {
 namespace {
 
 // Beyond this many unknowns the rank is determined anew only where modes change.
 constexpr size_t kRankEachStep = 150;
-// s; edges of force windows nearer to a step's boundary than this are on it.
-constexpr double kSameTime = 1e-9;
 
 // The speed n·v before the step, and were there no contacts and joints.
 struct Approach {
@@ -255,6 +254,10 @@ void RolloutCertifier::AddStep(const Model<double>& model, long step, Stepper* s
 
 void RolloutCertifier::AddForceWindows(const Model<double>& model) {
   const SimulationSettings& settings = model.structure->settings;
+  const auto same = [&](double x, double y) {
+    return std::abs(x - y) <=
+           kSameInstant * settings.dt + kCoordinateRounding * std::max(std::abs(x), std::abs(y));
+  };
   for (const ForceIndex& force : model.structure->forces) {
     const auto check = [&](int number, const char* edge) {
       if (!Wanted(number)) {
@@ -264,8 +267,7 @@ void RolloutCertifier::AddForceWindows(const Model<double>& model) {
       const double k =
           std::clamp(std::round(time / settings.dt), 0.0, static_cast<double>(NumSteps(settings)));
       const double boundary = StepTime(settings, static_cast<long>(k));
-      if (std::abs(time - boundary) <= kSameTime ||
-          std::abs(time - settings.duration) <= kSameTime) {
+      if (same(time, boundary) || same(time, settings.duration)) {
         OneSided(std::string(edge) + " of force " + force.name + " at " + Short(time) +
                  " s is on a step's boundary");
       }
@@ -273,7 +275,7 @@ void RolloutCertifier::AddForceWindows(const Model<double>& model) {
     check(force.start, "start");
     check(force.end, "end");
     if (force.start >= 0 && force.end >= 0 && (Wanted(force.start) || Wanted(force.end)) &&
-        std::abs(model.numbers[force.start] - model.numbers[force.end]) <= kSameTime) {
+        same(model.numbers[force.start], model.numbers[force.end])) {
       OneSided("the window of force " + force.name + " is empty");
     }
   }

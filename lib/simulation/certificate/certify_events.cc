@@ -14,6 +14,7 @@
 #include "tangible/simulation/derivatives/rollout_directional.h"
 #include "tangible/simulation/events/event_search.h"
 #include "tangible/simulation/events/segment_flow.h"
+#include "tangible/simulation/events/tolerances.h"
 
 namespace tangible {
 namespace {

@@ -77,7 +77,7 @@ class GrazeFinder {
       for (int body = 0; body < model_.structure->num_bodies(); ++body) {
         const double* twist = &state->twist[3 * static_cast<size_t>(body)];
         fastest = std::max(fastest, std::hypot(twist[0], twist[1]) +
-                                        std::abs(twist[2]) * search_.bounding_radius(body));
+                                        std::abs(twist[2]) * search_.lengths().radius(body));
       }
     }
     return 2.0 * fastest;
@@ -88,8 +88,7 @@ class GrazeFinder {
     const GapCourse end = CourseAt(model_, segment.after, segment.event_contact);
     // The last rebounds of a body that comes to rest are slow, and no grazes.
     const bool from_above =
-        start.gap >
-        search_.TouchTolerance(segment.before, segment.event_contact.a, segment.event_contact.b);
+        start.gap > search_.TouchTolerance(model_, segment.before, segment.event_contact);
     const double gained =
         from_above && segment.length > 0.0
             ? std::abs(end.speed - start.speed) / segment.length * model_.structure->settings.dt

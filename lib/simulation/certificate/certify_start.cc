@@ -10,19 +10,18 @@
 #include "tangible/simulation/certificate/start_probe.h"
 #include "tangible/simulation/events/event_search.h"
 #include "tangible/simulation/events/segment_flow.h"
+#include "tangible/simulation/events/tolerances.h"
 
 namespace tangible {
 namespace {
 
-// m or rad; a gap of this size is more than rounding: the contact does not just touch.
-constexpr double kTouching = 1e-9;
 // Of a motion: an integrator's error that is more than rounding.
 constexpr double kSplitMatters = 1e-7;
 
 // What a motion differs by where an event ends a part of it early, as a share of the motion: the
 // integrator's error, which a step in two parts makes twice.
 double SplitError(const Model<double>& model, const Segment& segment) {
-  SegmentFlow flow;
+  SegmentFlow flow(model);
   std::string message;
   Segment whole;
   whole.time = segment.time;
@@ -138,13 +137,17 @@ void RolloutCertifier::AddStart(const Model<double>& model, const EventRecord& r
   }
   const bool splits = first != nullptr && SplitError(model, *first) > kSplitMatters;
   const size_t loaded = touching.size();
-  constexpr double kRounding = 1e-10;  // of a gap that is 0, m
+  EventSearch search(model);
   std::vector<ActiveContact> unloaded;
   if (start != nullptr) {
-    EventSearch(model).FindContacts(model, *start, kRounding, &unloaded);
+    double reach = 0.0;
+    for (int body = 0; body < model.structure->num_bodies(); ++body) {
+      reach = std::max(reach, search.lengths().Touch(*start, body, body));
+    }
+    search.FindContacts(model, *start, reach, &unloaded);
   }
   for (const ActiveContact& contact : unloaded) {
-    if (contact.gap <= kRounding &&
+    if (contact.gap <= search.TouchTolerance(model, *start, contact) &&
         std::none_of(touching.begin(), touching.begin() + static_cast<std::ptrdiff_t>(loaded),
                      [&](const ActiveContact* other) { return other->SameAs(contact); })) {
       touching.push_back(&contact);
@@ -162,7 +165,8 @@ void RolloutCertifier::AddStart(const Model<double>& model, const EventRecord& r
     // Out of penetration it is pushed only while it does not open by itself. One that rests on the
     // surface has both sides: what it falls late it lands with; not so where no force presses.
     const bool rests = Rests(model, *start, *contact);
-    const bool pushed = rests && (k >= loaded || contact->gap < -kTouching);
+    const double meant = kMeantTouches * search.TouchTolerance(model, *start, *contact);
+    const bool pushed = rests && (k >= loaded || contact->gap < -meant);
     if (k >= loaded && !rests) {
       continue;
     }
@@ -171,7 +175,7 @@ void RolloutCertifier::AddStart(const Model<double>& model, const EventRecord& r
       // slides stops. It is none for the physics, but ends a part of the step for all bodies.
       const bool splits_here = splits && rests && k < loaded;
       const char* what =
-          contact->gap > -kTouching && Moves(gap, options_.directions, c) ? " changes its gap"
+          contact->gap > -meant && Moves(gap, options_.directions, c) ? " changes its gap"
           : pushed && Moves(approach, options_.directions, c)
               ? " changes the speed at which it opens"
           : splits_here &&

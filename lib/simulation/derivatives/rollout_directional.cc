@@ -5,25 +5,18 @@
 #include <cmath>
 #include <sstream>
 
+#include "tangible/dynamics/model/lengths.h"
 #include "tangible/lcp/system/contact_residual.h"
 
 namespace tangible {
 
 bool JustTouches(const StepRecord& record, size_t i) {
-  constexpr double kRoundings = 64.0;
   const ActiveContact& contact = record.contacts[i];
   const ContactBlock<double>& block = record.problem.contacts[i];
   const double slack =
       RowDot(block.a, block.normal_a, block.b, block.normal_b, record.solution.v.data()) +
       block.c_n;
-  double coordinate = 0.0;
-  for (const int body : {contact.a, contact.b}) {
-    if (body >= 0) {
-      coordinate = std::max({coordinate, std::abs(record.before.pose[3 * body]),
-                             std::abs(record.before.pose[3 * body + 1])});
-    }
-  }
-  return slack <= kRoundings * std::numeric_limits<double>::epsilon() * coordinate / record.h;
+  return slack <= kCoordinateRounding * PlaceOf(record.before, contact.a, contact.b) / record.h;
 }
 
 // Whether there are any.

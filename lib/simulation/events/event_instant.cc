@@ -98,8 +98,13 @@ bool EventStepper::Rattles(const Model<double>& model, const EventOutcome& outco
 
 double EventStepper::ReturnSpeed(const Model<double>& model, const State<double>& state,
                                  const ActiveContact& contact) const {
-  const double gravity = std::hypot(model.numbers[kGravityX], model.numbers[kGravityY]);
-  return std::sqrt(2.0 * gravity * search_.TouchTolerance(state, contact.a, contact.b));
+  double acceleration = std::hypot(model.numbers[kGravityX], model.numbers[kGravityY]);
+  const double size = search_.lengths().Size(contact.a, contact.b);
+  if (contact.joint >= 0 && size > 0.0 &&
+      model.structure->joints[contact.joint].type == JointType::kRevolute) {
+    acceleration /= size;  // rad/s²
+  }
+  return std::sqrt(2.0 * acceleration * search_.TouchTolerance(model, state, contact));
 }
 
 std::string WhatIsUnsolved(const ModelStructure& structure, const Impulses& impulses,
@@ -210,10 +215,7 @@ bool EventStepper::LocateTouch(const Model<double>& model, double t, double slow
   for (size_t i = 0; i < touching_.contacts.size() && touch == nullptr; ++i) {
     // In penetration it does not matter by how much: a gap that changes moves no time.
     const ActiveContact& candidate = touching_.contacts[i];
-    const bool on_surface =
-        candidate.gap >= (candidate.joint >= 0
-                              ? -kLimitTolerance
-                              : -search_.TouchTolerance(*state, candidate.a, candidate.b));
+    const bool on_surface = candidate.gap >= -search_.TouchTolerance(model, *state, candidate);
     if (touching_.approach[i] < -slow && on_surface && !was_closed(candidate)) {
       touch = &touching_.contacts[i];
     }

@@ -254,6 +254,11 @@ class EventReplay {
       AssemblyScratch<T> scratch;
       AssembleCorrection(model_, *after, segment->contacts, segment->friction,
                          k == 0 ? T(s_.settings.recovery_speed * tau) : T(0.0), &scratch, &problem);
+      // A gap that is rounding is left as it is (SegmentFlow::LeaveRounding).
+      for (size_t i = 0; i < problem.contacts.size(); ++i) {
+        T& gap = problem.contacts[i].c_n;
+        if (node.problem.contacts[i].c_n == 0.0) gap -= ValueOf(gap);
+      }
       ContactSolution<T> correction;
       Solve(problem, node.problem, node.solution,
             std::vector<double>(segment->contacts.size(), 0.0), &node.system, &correction);

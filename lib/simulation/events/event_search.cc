@@ -6,7 +6,6 @@
 #include <limits>
 #include <string>
 
-#include "tangible/geometry/mass_properties.h"
 #include "tangible/simulation/events/event_search_inl.h"
 
 namespace tangible {
@@ -26,37 +25,25 @@ double SpeedOf(const double* twist, double radius) {
 
 }  // namespace
 
-EventSearch::EventSearch(const Model<double>& model) {
-  const ModelStructure& structure = *model.structure;
-  double smallest = kInfinity;
-  for (int body = 0; body < structure.num_bodies(); ++body) {
-    const ShapeType type = structure.bodies[body].shape;
-    const bool bounded = type != ShapeType::kNone && type != ShapeType::kHalfPlane;
-    radius_.push_back(bounded ? BoundingRadius(model.Shape(body)) : 0.0);
-    if (bounded) {
-      smallest = std::min(smallest, radius_.back());
-    }
-  }
-  scale_ = std::isfinite(smallest) ? smallest : 1.0;
-  closing_.resize(structure.bodies.size());
-  boxes_.resize(structure.bodies.size());
-}
-
-double EventSearch::TouchTolerance(const State<double>& state, int a, int b) const {
-  double place = 0.0;
-  for (const int body : {a, b}) {
-    place = std::max({place, std::abs(state.pose[3 * body]), std::abs(state.pose[3 * body + 1])});
-  }
-  return 1e-10 * SmallerRadius(a, b) + 64.0 * std::numeric_limits<double>::epsilon() * place;
+EventSearch::EventSearch(const Model<double>& model) : lengths_(model), flow_(model) {
+  closing_.resize(model.structure->bodies.size());
+  boxes_.resize(model.structure->bodies.size());
 }
 
 double EventSearch::SpeedTolerance(const Model<double>& model, const State<double>& state) const {
   double speed =
       std::hypot(model.numbers[kGravityX], model.numbers[kGravityY]) * model.structure->settings.dt;
+  double rounding = 0.0;
   for (int body = 0; body < model.structure->num_bodies(); ++body) {
-    speed = std::max(speed, SpeedOf(&state.twist[3 * body], radius_[body]));
+    const double size = lengths_.radius(body);
+    const double own = SpeedOf(&state.twist[3 * body], size);
+    speed = std::max(speed, own);
+    // A face whose gaps round is turned by as much, and slides across its neighbours' normals.
+    const double turned =
+        size > 0.0 ? kTurnedFace * lengths_.Rounding(state, body, body) / size : 0.0;
+    rounding = std::max(rounding, turned * own);
   }
-  return 1e-11 * speed + 1e-200;
+  return kSlowShare * speed + rounding + 1e-200;
 }
 
 void EventSearch::FindContacts(const Model<double>& model, const State<double>& state, double reach,
@@ -234,11 +221,13 @@ void EventSearch::FindPairs(const Model<double>& model) {
   const ModelStructure& structure = *model.structure;
   const Sample& end = *At(model, segment_->length);
   for (int body = 0; body < structure.num_bodies(); ++body) {
-    const double before = SpeedOf(&segment_->before.twist[3 * body], radius_[body]);
+    const double before = SpeedOf(&segment_->before.twist[3 * body], lengths_.radius(body));
     const double after =
-        end.good ? SpeedOf(&end.motion.after.twist[3 * body], radius_[body]) : before;
+        end.good ? SpeedOf(&end.motion.after.twist[3 * body], lengths_.radius(body)) : before;
     closing_[body] = 1.02 * std::max(before, after) + 0.25 * std::abs(after - before);
-    const double reach = closing_[body] * segment_->length + 1e-9 * scale_;
+    const double reach = closing_[body] * segment_->length +
+                         kWiderBoxes * lengths_.smallest_radius() +
+                         lengths_.Rounding(segment_->before, body, body);
     boxes_[body] = ComputeAabb(model.Shape(body), segment_->before.PoseOf(body), reach);
     if (structure.bodies[body].shape == ShapeType::kHalfPlane &&
         segment_->before.twist[3 * body + 2] != 0.0) {
@@ -276,7 +265,7 @@ bool EventSearch::Run(const Model<double>& model, const std::vector<ActiveContac
         turning = std::abs(segment->before.twist[3 * body + 2]) *
                   (std::hypot(segment->before.pose[3 * a] - segment->before.pose[3 * b],
                               segment->before.pose[3 * a + 1] - segment->before.pose[3 * b + 1]) +
-                   radius_[other]);
+                   lengths_.radius(other));
         closing_[body] =
             std::hypot(segment->before.twist[3 * body], segment->before.twist[3 * body + 1]) +
             turning;

@@ -20,11 +20,9 @@
 
 #include "tangible/geometry/broad_phase.h"
 #include "tangible/simulation/events/segment_flow.h"
+#include "tangible/simulation/events/tolerances.h"
 
 namespace tangible {
-
-/// A joint within this of its limit is at it, rad or m.
-inline constexpr double kLimitTolerance = 1e-10;
 
 class EventSearch {
  public:
@@ -37,21 +35,24 @@ class EventSearch {
   bool Run(const Model<double>& model, const std::vector<ActiveContact>& touching, Segment* segment,
            std::string* message);
 
-  /// Gap below which a pair touches, m: rounding of the poses and of the event's location.
-  double TouchTolerance(const State<double>& state, int a, int b) const;
+  /// The sizes of bodies and the tolerances on gaps that follow from them.
+  const Lengths& lengths() const { return lengths_; }
+  /// Below which a contact touches (m), or a joint is at its limit (m or rad).
+  double TouchTolerance(const Model<double>& model, const State<double>& state,
+                        const ActiveContact& contact) const {
+    return contact.joint >= 0 ? lengths_.LimitTouch(state, model.structure->joints[contact.joint])
+                              : lengths_.Touch(state, contact.a, contact.b);
+  }
   /// Speed below which a touching contact neither approaches nor slides, m/s.
   double SpeedTolerance(const Model<double>& model, const State<double>& state) const;
   /// All contacts of a pair within `reach`; gap set.
   void FindContacts(const Model<double>& model, const State<double>& state, double reach,
                     std::vector<ActiveContact>* contacts);
-  double bounding_radius(int body) const { return radius_[body]; }
   /// What all motions that it ran leaned on.
   const FlowCounts& flow_counts() const { return flow_.counts(); }
   /// Of the last search for contacts: boxes compared, pairs whose boxes overlap.
   int num_compared() const { return broad_phase_.num_compared(); }
   int num_pairs() const { return static_cast<int>(pairs_.size()); }
-  /// To which gaps are located, m.
-  double GapTolerance() const { return 8.0 * std::numeric_limits<double>::epsilon() * scale_; }
 
  private:
   struct Sample {
@@ -88,10 +89,10 @@ class EventSearch {
   double Refine(const Model<double>& model, const Function& f, double tolerance, double a,
                 double fa, double b, double fb);
   double ModeValue(const Model<double>& model, Sample* sample, const Event& event);
-  /// Of what is bounded; 0: neither is.
-  double SmallerRadius(int a, int b) const {
-    return radius_[a] > 0.0 && radius_[b] > 0.0 ? std::min(radius_[a], radius_[b])
-                                                : std::max(radius_[a], radius_[b]);
+  /// To which a pair's gaps are located, m.
+  double GapTolerance(const State<double>& state, int a, int b) const {
+    return std::max(kLocatedOfSize * lengths_.Size(a, b),
+                    kLocatedOfCoordinate * lengths_.Coordinate(state, a, b));
   }
   double AlignedWithin(int a, int b) const;
   bool HasPassed(const State<double>& state, int a, int b) const;
@@ -101,8 +102,7 @@ class EventSearch {
                    const State<double>& after, double length, int a, int b) const;
   double TouchStart(const Model<double>& model, double speed, double acceleration) const;
 
-  std::vector<double> radius_;
-  double scale_ = 0.0;
+  Lengths lengths_;
   SegmentFlow flow_;
   Segment* segment_ = nullptr;
   const std::vector<ActiveContact>* touching_ = nullptr;

@@ -10,9 +10,6 @@
 namespace tangible {
 namespace {
 
-// Of the tolerance within which a contact touches: one that lies deeper is in penetration. Bounces
-// that do not leave the tolerance sink by it, each time.
-constexpr double kDeep = 1000.0;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 bool OfPair(const ActiveContact& contact, int a, int b) {
@@ -96,7 +93,7 @@ bool EventSearch::MovesLittle(const Model<double>& model, const State<double>& b
     speed = std::max(speed, std::hypot(state->twist[3 * a] - state->twist[3 * b],
                                        state->twist[3 * a + 1] - state->twist[3 * b + 1]));
   }
-  const double size = SmallerRadius(a, b);
+  const double size = lengths_.Size(a, b);
   return size == 0.0 || speed * length < size;
 }
 
@@ -104,7 +101,7 @@ bool EventSearch::MovesLittle(const Model<double>& model, const State<double>& b
 // at least, m. A power of two as there (collide_core.cc).
 double EventSearch::AlignedWithin(int a, int b) const {
   constexpr double kAligned = 8e-9;  // of the sum of the radii, which is at least half the faces'
-  return std::ldexp(kAligned, std::ilogb(radius_[a] + radius_[b]));
+  return std::ldexp(kAligned, std::ilogb(lengths_.radius(a) + lengths_.radius(b)));
 }
 
 // Whether a pair has moved since the segment's start by more than that.
@@ -115,7 +112,7 @@ bool EventSearch::HasPassed(const State<double>& state, int a, int b) const {
     return std::abs(state.pose[3 * a + k] - before[3 * a + k] - state.pose[3 * b + k] +
                     before[3 * b + k]);
   };
-  const double size = SmallerRadius(a, b);
+  const double size = lengths_.Size(a, b);
   return moved(0) + moved(1) + moved(2) * size > kPassed * size + 2.0 * AlignedWithin(a, b);
 }
 
@@ -153,10 +150,11 @@ void EventSearch::SearchPair(const Model<double>& model, int a, int b, Event* ev
   for (const ActiveContact& contact : segment_->contacts) {
     closed = closed || OfPair(contact, a, b);
   }
-  const double touch = TouchTolerance(segment_->before, a, b);
+  const double touch = lengths_.Touch(segment_->before, a, b);
+  const double located = GapTolerance(segment_->before, a, b);
   const auto is_deep = [&](const ActiveContact& c) {
     return std::any_of(touching_->begin(), touching_->end(), [&](const ActiveContact& other) {
-      return other.gap < -kDeep * touch && other.SameAs(c);
+      return other.gap < -kDeepTouches * touch && other.SameAs(c);
     });
   };
   const double slow = SpeedTolerance(model, segment_->before);
@@ -232,7 +230,7 @@ void EventSearch::SearchPair(const Model<double>& model, int a, int b, Event* ev
         const double omega = std::abs(state->twist[3 * body + 2]);
         const bool is_circle = model.structure->bodies[body].shape == ShapeType::kCircle;
         turn += is_circle ? 0.0 : omega;
-        swept += is_circle ? 0.0 : omega * radius_[body];
+        swept += is_circle ? 0.0 : omega * lengths_.radius(body);
       }
       closing = std::max(closing, std::abs(along.dot(relative)) + swept);
       turning = std::max(turning, turn);
@@ -279,10 +277,10 @@ void EventSearch::SearchPair(const Model<double>& model, int a, int b, Event* ev
     };
     double root;
     if (from < event->length &&
-        FirstRoot(model, shifted, rate, course, GapTolerance(), from, event->length, &root) &&
+        FirstRoot(model, shifted, rate, course, located, from, event->length, &root) &&
         root > 0.0) {
       event->length = root;
-      const bool cut_in = gap(*At(model, root), all) < -kDeep * touch;
+      const bool cut_in = gap(*At(model, root), all) < -kDeepTouches * touch;
       // Poses that cut a corner have passed the gap: it is the speed that turns.
       event->kind =
           cut_in && all && Contains(*touching_, nearest) ? EventKind::kReturn : EventKind::kTouch;
@@ -295,7 +293,7 @@ void EventSearch::SearchPair(const Model<double>& model, int a, int b, Event* ev
   double allowed = touch;
   for (const ActiveContact& contact : *touching_) {
     if (OfPair(contact, a, b) && !is_closed(contact)) {
-      if (contact.gap < -kDeep * touch) {
+      if (contact.gap < -kDeepTouches * touch) {
         SearchReturn(model, contact, touch, event);
         if (event->kind == EventKind::kAtOnce) {
           return;
@@ -388,9 +386,10 @@ void EventSearch::SearchReturn(const Model<double>& model, const ActiveContact& 
       return;
     }
     if (fa > tolerance && fb < -tolerance) {
-      const double root = Refine(
-          model, apart, std::min(8.0 * std::numeric_limits<double>::epsilon() * fa, GapTolerance()),
-          a, fa, b, fb);
+      const double root = Refine(model, apart,
+                                 std::min(8.0 * std::numeric_limits<double>::epsilon() * fa,
+                                          GapTolerance(segment_->before, contact.a, contact.b)),
+                                 a, fa, b, fb);
       const double gap = GapAndSpeed(model, At(model, root)->motion.after, contact, &speed);
       event->kind = gap < -touch ? EventKind::kReturn : EventKind::kTouch;
       event->length = root;
@@ -415,6 +414,7 @@ void EventSearch::SearchLimit(const Model<double>& model, int joint, double side
   const auto evaluate = [&](const State<double>& state, double* rate) {
     return GapAndSpeed(model, state, limit, rate);
   };
+  const double touch = TouchTolerance(model, segment_->before, limit);
   double rate_before, rate_after;
   evaluate(segment_->before, &rate_before);
   const Sample& end = *At(model, event->length);
@@ -429,12 +429,12 @@ void EventSearch::SearchLimit(const Model<double>& model, int joint, double side
     if (!contact.SameAs(limit)) {
       continue;
     }
-    if (contact.gap < -kDeep * kLimitTolerance) {
-      SearchReturn(model, limit, kLimitTolerance, event);
+    if (contact.gap < -kDeepTouches * touch) {
+      SearchReturn(model, limit, touch, event);
       return;
     }
     from = TouchStart(model, rate_before, 2.0 * std::abs(rate_after - rate_before) / event->length);
-    allowed = std::max(kLimitTolerance, kLimitTolerance - contact.gap);
+    allowed = std::max(touch, touch - contact.gap);
   }
   const double rate = 1.1 * std::max(std::abs(rate_before), std::abs(rate_after)) +
                       0.25 * std::abs(rate_after - rate_before);
@@ -468,8 +468,7 @@ void EventSearch::SearchLimit(const Model<double>& model, int joint, double side
     }
     double speed;
     const double value = evaluate(sample.motion.after, &speed) + allowed;
-    return touches && value <= 0.0 && speed >= -slow && -value <= cut(sample) ? kLimitTolerance
-                                                                              : value;
+    return touches && value <= 0.0 && speed >= -slow && -value <= cut(sample) ? touch : value;
   };
   const auto rate_over = [&](double, double) { return rate; };
   const auto course_over = [&](double x, double fx, double y, double fy) {
@@ -485,8 +484,7 @@ void EventSearch::SearchLimit(const Model<double>& model, int joint, double side
       FirstRoot(model, gap, rate_over, course_over, 0.0, from, event->length, &root)) {
     double unused;
     const double depth = -evaluate(At(model, root)->motion.after, &unused);
-    event->kind =
-        touches && depth > kDeep * kLimitTolerance ? EventKind::kReturn : EventKind::kTouch;
+    event->kind = touches && depth > kDeepTouches * touch ? EventKind::kReturn : EventKind::kTouch;
     event->length = root;
     event->contact = limit;
   }

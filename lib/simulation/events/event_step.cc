@@ -79,7 +79,7 @@ std::vector<Edge> EdgesWithin(const Model<double>& model, double from, double to
 
 }  // namespace
 
-EventStepper::EventStepper(const Model<double>& model) : search_(model) {}
+EventStepper::EventStepper(const Model<double>& model) : search_(model), flow_(model) {}
 
 void EventStepper::ClearGuess() {
   starts_ = true;
@@ -379,7 +379,7 @@ EventOutcome EventStepper::Advance(const Model<double>& model, double t, double 
       return fail(outcome.message);
     }
     if (std::exchange(begins, false)) {
-      const int limit = StuckLimit(model.structure->settings.recovery_speed * h);
+      const int limit = StuckLimit(model, *state, model.structure->settings.recovery_speed * h);
       if (limit >= 0) {
         return fail(NameOfContact(*model.structure, touching_.contacts, limit) +
                     " stays broken: another one contradicts it");

@@ -107,7 +107,7 @@ class EventStepper {
   };
   /// As a step starts: a joint's limit, among what touches, that is broken and has been so for some
   /// steps without moving, where recovery moves what it can by `moved` in each; −1: none.
-  int StuckLimit(double moved);
+  int StuckLimit(const Model<double>& model, const State<double>& state, double moved);
   bool SolveImpacts(const Model<double>& model, double t, State<double>* state,
                     EventOutcome* outcome);
   /// Poisson's law: after the compression each contact that rebounds pushes with at least e times
@@ -120,8 +120,8 @@ class EventStepper {
                   const ActiveContact* contact, State<double>* state, EventOutcome* outcome);
   /// Whether a step has had so many events that slow impacts are a rattle.
   static bool Rattles(const Model<double>& model, const EventOutcome& outcome);
-  /// The speed below which gravity brings a contact back before it has left the touching
-  /// tolerance, m/s.
+  /// The speed below which gravity brings a contact (a limit) back before it has left the touching
+  /// tolerance, m/s (of an angle's rad/s).
   double ReturnSpeed(const Model<double>& model, const State<double>& state,
                      const ActiveContact& contact) const;
   /// The speed below which what touches neither approaches nor leaves nor slides, m/s.

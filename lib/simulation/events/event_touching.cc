@@ -26,22 +26,22 @@ void EventStepper::AddTouching(const Model<double>& model, const State<double>& 
 
 void EventStepper::FindTouching(const Model<double>& model, const State<double>& state) {
   const ModelStructure& structure = *model.structure;
+  const Lengths& lengths = search_.lengths();
   touching_ = Touching();
   double reach = 0.0;
   for (int body = 0; body < structure.num_bodies(); ++body) {
-    reach = std::max(reach, search_.TouchTolerance(state, body, body));
+    reach = std::max(reach, lengths.Touch(state, body, body));
   }
   std::vector<ActiveContact> found;
   search_.FindContacts(model, state, reach, &found);
   const double slow = search_.SpeedTolerance(model, state);
   for (const ActiveContact& contact : found) {
-    const double touch = search_.TouchTolerance(state, contact.a, contact.b);
+    const double touch = lengths.Touch(state, contact.a, contact.b);
     if (contact.gap > touch) {
       continue;
     }
     const double approach = SpeedsOf(model, state, contact).normal;
-    const double size =
-        std::min(search_.bounding_radius(contact.a), search_.bounding_radius(contact.b));
+    const double size = std::min(lengths.radius(contact.a), lengths.radius(contact.b));
     ContactsAhead ahead;
     if (approach < -slow && size > 0.0) {
       ahead = FindContactsAhead(model, state, contact, approach, size, touch, slow);
@@ -71,7 +71,7 @@ void EventStepper::FindTouching(const Model<double>& model, const State<double>&
       ContactRows<double> rows;
       EvaluateLimitRows(model, joint_rows, limit, &rows);
       limit.gap = rows.geometry.gap;
-      if (limit.gap <= kLimitTolerance) {
+      if (limit.gap <= lengths.LimitTouch(state, joint)) {
         touching_.contacts.push_back(limit);
         touching_.friction.emplace_back();
         touching_.restitution.emplace_back();
@@ -83,15 +83,15 @@ void EventStepper::FindTouching(const Model<double>& model, const State<double>&
   }
 }
 
-int EventStepper::StuckLimit(double moved) {
-  constexpr double kBroken = 1e-6;  // rad or m
-  constexpr double kStays = 1e-3;   // of what recovers in a step
+int EventStepper::StuckLimit(const Model<double>& model, const State<double>& state, double moved) {
+  constexpr double kStays = 1e-3;  // of what recovers in a step
   constexpr int kMostSteps = 10;
   std::vector<BrokenLimit> broken;
   int stuck = -1;
   for (size_t i = 0; i < touching_.contacts.size(); ++i) {
     const ActiveContact& limit = touching_.contacts[i];
-    if (limit.joint < 0 || !(limit.gap < -kBroken)) {
+    if (limit.joint < 0 ||
+        !(limit.gap < -kBrokenTouches * search_.TouchTolerance(model, state, limit))) {
       continue;
     }
     int steps = 0;

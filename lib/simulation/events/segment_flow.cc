@@ -6,6 +6,7 @@
 #include <cstdio>
 
 #include "tangible/lcp/system/contact_residual.h"
+#include "tangible/simulation/events/tolerances.h"
 
 namespace tangible {
 namespace {
@@ -88,20 +89,6 @@ void SizesOfTerms(const SolvedNode& node, std::vector<double>* sizes) {
   for (size_t i = 0; i < sizes->size(); ++i) {
     (*sizes)[i] /= p.mass[i];
   }
-}
-
-// Errors that a correction is to remove: joints, where they are corrected, and gaps.
-double CorrectedError(const ContactProblem<double>& problem) {
-  double error = 0.0;
-  for (const JointBlock<double>& joint : problem.joints) {
-    for (int k = 0; k < joint.rows; ++k) {
-      error = std::max(error, std::abs(joint.rhs[k]));
-    }
-  }
-  for (const ContactBlock<double>& contact : problem.contacts) {
-    error = std::max(error, std::abs(contact.c_n));
-  }
-  return error;
 }
 
 // A hinge whose points have come apart by more than this share of its arms, by a motion that starts
@@ -299,6 +286,83 @@ bool SegmentFlow::Integrate(const Model<double>& model, Segment* segment, std::s
   return true;
 }
 
+// Errors that a correction is to remove: of joints, where they are corrected, and gaps.
+struct SegmentFlow::PoseErrors {
+  double share = 0.0;  ///< the largest, as a share of what is allowed
+  double error = 0.0;  ///< that one, m or rad
+  double allowed = 0.0;
+  bool settled = true;  ///< all are rounding
+
+  void Add(double new_error, double new_allowed, double rounding) {
+    settled = settled && new_error <= rounding;
+    // What is not a number is the largest.
+    if (!(new_error <= share * new_allowed)) {
+      share = new_error / new_allowed;
+      error = new_error;
+      allowed = new_allowed;
+    }
+  }
+};
+
+SegmentFlow::PoseErrors SegmentFlow::ErrorsOf(const Model<double>& model, const Segment& segment,
+                                              const SolvedNode& node) const {
+  PoseErrors errors;
+  const ModelStructure& structure = *model.structure;
+  const double least = structure.settings.joint_tolerance;
+  const auto add_length = [&](double error, int a, int b) {
+    const double size = lengths_.Size(a, b);
+    const double place = lengths_.Coordinate(node.state, a, b);
+    errors.Add(std::abs(error), std::max(least, kCorrected * size) + kCoordinateRounding * place,
+               kSettled * (size + place));
+  };
+  const auto add_angle = [&](double error, int a, int b) {
+    const double angle = AngleOf(node.state, a, b);
+    errors.Add(std::abs(error), std::max(least, kCorrected) + kCoordinateRounding * angle,
+               kSettled * (1.0 + angle));
+  };
+  for (size_t j = 0; j < node.problem.joints.size(); ++j) {
+    const JointIndex& joint = structure.joints[j];
+    const JointBlock<double>& block = node.problem.joints[j];
+    for (int k = 0; k < block.rows; ++k) {
+      if (IsAngle(joint.type, k)) {
+        add_angle(block.rhs[k], joint.a, joint.b);
+      } else {
+        add_length(block.rhs[k], joint.a, joint.b);
+      }
+    }
+  }
+  for (size_t i = 0; i < node.problem.contacts.size(); ++i) {
+    const ActiveContact& contact = segment.contacts[i];
+    const double gap = node.problem.contacts[i].c_n;
+    if (contact.joint >= 0 && structure.joints[contact.joint].type == JointType::kRevolute) {
+      add_angle(gap, contact.a, contact.b);
+    } else {
+      add_length(gap, contact.a, contact.b);
+    }
+  }
+  return errors;
+}
+
+// Far from the origin, where all gaps are rounding, nothing corrects them: supports whose heights
+// round apart would turn a face that rests on several of them, now to and now fro. Their derivative
+// is corrected (it is that of the gaps in the correction's equations, whatever their values). All
+// or none: one that alone is moved by what others are off by turns the face too.
+void SegmentFlow::LeaveRounding(const Segment& segment, SolvedNode* node) const {
+  const auto is_far = [&](size_t i, double* left) {
+    const ActiveContact& contact = segment.contacts[i];
+    *left = kLeftAlone * lengths_.Rounding(node->state, contact.a, contact.b);
+    return contact.joint < 0 && contact.law != ContactLaw::kRecovery &&
+           *left > kLeastLeft * lengths_.Size(contact.a, contact.b);
+  };
+  double left;
+  for (size_t i = 0; i < segment.contacts.size(); ++i) {
+    if (is_far(i, &left) && !(std::abs(node->problem.contacts[i].c_n) <= left)) return;
+  }
+  for (size_t i = 0; i < segment.contacts.size(); ++i) {
+    if (is_far(i, &left)) node->problem.contacts[i].c_n = 0.0;
+  }
+}
+
 bool SegmentFlow::CorrectPoses(const Model<double>& model, Segment* segment, std::string* message) {
   const ModelStructure& structure = *model.structure;
   const SimulationSettings& settings = structure.settings;
@@ -334,23 +398,23 @@ bool SegmentFlow::CorrectPoses(const Model<double>& model, Segment* segment, std
       *message = "joints drift by more than a tenth of their arms in one motion: dt is too large";
       return false;
     }
-    const double error = CorrectedError(node.problem);
+    LeaveRounding(*segment, &node);
+    const PoseErrors errors = ErrorsOf(model, *segment, node);
     // Newton's method squares the error; what is small and does not shrink any more is rounding.
-    const double allowed = std::max(settings.joint_tolerance, 1e-9);
-    const bool shrinks = error <= 0.1 * last;
-    if (k > 0 && (once || error <= 1e-15 || (!shrinks && (recovers || error <= allowed)))) {
+    const bool shrinks = errors.share <= 0.1 * last;
+    if (k > 0 && (once || errors.settled || (!shrinks && (recovers || errors.share <= 1.0)))) {
       break;
     }
-    if (k + 1 == kMostCorrections || (k > 0 && error >= last)) {
+    if (k + 1 == kMostCorrections || (k > 0 && errors.share >= last)) {
       char text[160];
       std::snprintf(text, sizeof(text),
                     "projection onto joints and contacts: expected an error of at most %.3g, got "
                     "%.3g: dt is too large",
-                    allowed, error);
+                    errors.allowed, errors.error);
       *message = text;
       return false;
     }
-    last = error;
+    last = errors.share;
     if (!Solve(modes, &node)) {
       *message = "projection onto joints and contacts is singular";
       return false;

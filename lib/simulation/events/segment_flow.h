@@ -16,6 +16,7 @@
 #include <functional>
 #include <string>
 
+#include "tangible/dynamics/model/lengths.h"
 #include "tangible/lcp/system/mode_solve.h"
 #include "tangible/simulation/events/event_record.h"
 #include "tangible/simulation/events/implicit_stage.h"
@@ -43,6 +44,8 @@ struct FlowCounts {
 
 class SegmentFlow {
  public:
+  explicit SegmentFlow(const Model<double>& model) : lengths_(model) {}
+
   /// Fills stages, corrections, projection and `after` of a segment whose time, length, middle,
   /// before, contacts, friction and modes are set. False with a message where it fails.
   bool Run(const Model<double>& model, Segment* segment, std::string* message);
@@ -62,10 +65,15 @@ class SegmentFlow {
   bool SolveImplicitStage(const Model<double>& model, Segment* segment, int i,
                           const std::function<void(State<double>*)>& place, std::string* message);
   bool HasConverged(const SolvedNode& stage, const std::vector<double>& last, int iteration);
+  struct PoseErrors;
+  void LeaveRounding(const Segment& segment, SolvedNode* node) const;
+  PoseErrors ErrorsOf(const Model<double>& model, const Segment& segment,
+                      const SolvedNode& node) const;
   bool CorrectPoses(const Model<double>& model, Segment* segment, std::string* message);
   bool ProjectTwists(const Model<double>& model, Segment* segment, std::string* message);
 
   ModeSolve mode_solve_;
+  Lengths lengths_;
   AssemblyScratch<double> assembly_;
   std::vector<double> terms_;
   ImplicitStage implicit_;

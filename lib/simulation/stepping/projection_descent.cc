@@ -44,7 +44,7 @@ bool GoOntoJoints(const Model<double>& model, ProjectionIterate<double>* p) {
   double last = HUGE_VAL;
   for (int k = 0; k < kMostOntoJoints; ++k) {
     EvaluateProjection(model, p);
-    if (p->error <= 0.1 * s.settings.joint_tolerance) {
+    if (JointsHold(model, *p, 0.1 * s.settings.joint_tolerance)) {
       return true;
     }
     if (!(p->error < kFalls * last) || !FactorProjection(model, p, ProjectionWeight::kMass)) {

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tangible/dynamics/model/lengths.h"
+
 namespace tangible {
 namespace {
 
@@ -40,6 +42,24 @@ double LargestError(const std::vector<JointRows<T>>& rows) {
     largest = std::max(largest, LargestError(row));
   }
   return largest;
+}
+
+// Whether all joints hold to a tolerance (m or rad), as far as rounding lets them.
+template <typename T>
+bool Hold(const Model<T>& model, const State<T>& state, const std::vector<JointRows<T>>& rows,
+          double error, double tolerance) {
+  if (error <= tolerance) return true;
+  for (size_t j = 0; j < rows.size(); ++j) {
+    const JointIndex& joint = model.structure->joints[j];
+    for (int k = 0; k < rows[j].rows; ++k) {
+      const double coordinate = IsAngle(joint.type, k) ? AngleOf(state, joint.a, joint.b)
+                                                       : PlaceOf(state, joint.a, joint.b);
+      if (!(std::abs(ValueOf(rows[j].error[k])) <= tolerance + kCoordinateRounding * coordinate)) {
+        return false;
+      }
+    }
+  }
+  return true;
 }
 
 double Determinant(const double* w) {
@@ -268,6 +288,11 @@ bool FactorProjection(const Model<double>& model, ProjectionIterate<double>* ite
   return FactorMatrix(model, weight, iterate);
 }
 
+bool JointsHold(const Model<double>& model, const ProjectionIterate<double>& iterate,
+                double tolerance) {
+  return Hold(model, iterate.at, iterate.rows, iterate.error, tolerance);
+}
+
 void EvaluateProjection(const Model<double>& model, ProjectionIterate<double>* iterate) {
   EvaluateAll(model, iterate->at, &iterate->rows);
   iterate->error = LargestError(iterate->rows);
@@ -325,7 +350,7 @@ bool ResumeProjection(const Model<T>& model, int most, int extra, ProjectionIter
     const bool small = step <= (p->shifted ? kLastShiftedStep : kLastStep) ||
                        (step <= kShortStep && step > 0.5 * before);
     before = step;
-    if (fraction < 1.0 || !small || !(p->error <= tolerance)) {
+    if (fraction < 1.0 || !small || !Hold(model, p->at, p->rows, p->error, tolerance)) {
       continue;
     }
     if (done >= extra * (p->shifted ? 3 : 1)) {  // a shifted matrix gains but three digits a step

@@ -40,8 +40,8 @@ struct ProjectionIterate {
 };
 
 /// Newton from `at`, which equals `from` on entry; then `extra` more steps, for the derivatives of
-/// Jets. False where it does not converge to the scene's joint_tolerance within 60 steps; `at` is
-/// the last iterate in any case.
+/// Jets. False where it does not converge to the scene's joint_tolerance (and rounding) within 60
+/// steps; `at` is the last iterate in any case.
 template <typename T>
 bool IterateProjection(const Model<T>& model, int extra, ProjectionIterate<T>* iterate);
 
@@ -60,6 +60,11 @@ bool FactorProjection(const Model<double>& model, ProjectionIterate<double>* ite
 
 /// Sets rows and error of the iterate's poses.
 void EvaluateProjection(const Model<double>& model, ProjectionIterate<double>* iterate);
+
+/// After that: whether every joint's error is within `tolerance` (m or rad), and what its
+/// coordinates round to far from the origin.
+bool JointsHold(const Model<double>& model, const ProjectionIterate<double>& iterate,
+                double tolerance);
 
 /// After both of these: rhs becomes the step of poses (three a moving body) and multipliers;
 /// returns its size in radii of gyration.

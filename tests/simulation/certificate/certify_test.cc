@@ -218,5 +218,21 @@ TEST(CertifyRollout, EdgesOfForceWindowsOnStepsCountOnlyWhereTheyAreWanted) {
   EXPECT_TRUE(StartsWith(verdict, "one-sided: start of force push at 0.03 s")) << verdict;
 }
 
+// What counts as on a step's boundary is a share of the step: of a microsecond's steps a half of a
+// thousandth is beside it, of a second's a hundredth of a millionth is on it.
+TEST(CertifyRollout, AWindowsEdgeIsOnAStepsBoundaryByAShareOfTheStep) {
+  const auto verdict = [](const std::string& start, const std::string& settings) {
+    return Certify(R"({"bodies": [{"name": "a", "mass": 1, "inertia": 1, "position": [0, 0]}],
+        "forces": [{"name": "f", "body": "a", "force": [1, 0], "start": )" +
+                       start + R"(}], "simulation": )" + settings + "}",
+                   {"start"})
+        .verdict;
+  };
+  EXPECT_EQ(verdict("5.0005e-6", R"({"dt": 1e-6, "duration": 1e-5})"), "trustworthy");
+  EXPECT_TRUE(StartsWith(verdict("5e-6", R"({"dt": 1e-6, "duration": 1e-5})"), "one-sided: "));
+  EXPECT_TRUE(StartsWith(verdict("2.00000001", R"({"dt": 1, "duration": 5})"), "one-sided: "));
+  EXPECT_EQ(verdict("2.001", R"({"dt": 1, "duration": 5})"), "trustworthy");
+}
+
 }  // namespace
 }  // namespace tangible

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "../../support/drift.h"
+#include "../../support/rescaled.h"
 #include "../../support/scenes.h"
 #include "tangible/simulation/stepping/rollout.h"
 #include "tangible/verification/support/random_scene.h"
@@ -193,6 +194,21 @@ TEST(JointProjectionTest, JointsThatCannotHoldAreTold) {
   EXPECT_FALSE(projection.Project(model, state.pose, &state));
   EXPECT_GT(projection.error(), 0.1);
   EXPECT_GE(projection.worst_joint(), 0);
+}
+
+// Where positions round to more than the tolerance joints hold to that.
+TEST(JointProjectionTest, FarFromTheOriginJointsHoldToRounding) {
+  const Scene scene =
+      test_scenes::SceneOf(test_scenes::HeavyEnd("1", R"("dt": 0.01, "duration": 0.5)"));
+  for (const double x : {1e5, 1e6, 1e8}) {
+    Model<double> model;
+    State<double> state;
+    BuildModel(test_scenes::Rescaled(scene, {1.0, 1.0, {x, x}}), &model, &state);
+    State<double> final;
+    const RolloutReport report = Rollout(model, state, {}, &final);
+    EXPECT_EQ(report.status, StepStatus::kDone) << x << ": " << report.message;
+    EXPECT_LE(JointDrift(model, final), 1e-10 + kCoordinateRounding * x);
+  }
 }
 
 // Anchors so far away that the first matrix cannot be factorised: no step was there to try.

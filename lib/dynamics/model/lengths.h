@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// The lengths of a run, of which tolerances on gaps and joints are made: how large the bodies of a
+// pair are, and how finely their coordinates are known.
+//
+//   size        r = of the smaller body, m
+//   coordinate  x = max(|x|, |y|, |angle| r) over both bodies, m
+//   rounding    ρ = 64 ε x: what a gap or a joint's error of the pair may be off by, m
+//   touching    1e-10 r + ρ
+//
+// A pose is stored to ε x / 2, and a gap is what a few sums and products leave of poses: 64 is an
+// order of magnitude of room. Where ρ > 1e-7 r no tolerance fits between rounding and what matters
+// to the motion, and a run says so (simulation/stepping/coordinate_watch.h).
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "tangible/dynamics/model/model.h"
+
+namespace tangible {
+
+/// ρ / x.
+inline constexpr double kCoordinateRounding = 64.0 * std::numeric_limits<double>::epsilon();
+/// Of the size: a gap below this touches. A power of ten between rounding and what a gap is located
+/// to on one side, and what moves a body visibly on the other.
+inline constexpr double kTouchShare = 1e-10;
+/// rad; the same of an angle.
+inline constexpr double kTouchAngle = 1e-10;
+
+/// max(|x|, |y|) over two bodies, m.
+template <typename T>
+double PlaceOf(const State<T>& state, int a, int b) {
+  double place = 0.0;
+  for (const int body : {a, b}) {
+    place = std::max({place, std::abs(ValueOf(state.pose[3 * body])),
+                      std::abs(ValueOf(state.pose[3 * body + 1]))});
+  }
+  return place;
+}
+
+/// max |angle| over two bodies, rad.
+template <typename T>
+double AngleOf(const State<T>& state, int a, int b) {
+  return std::max(std::abs(ValueOf(state.pose[3 * a + 2])),
+                  std::abs(ValueOf(state.pose[3 * b + 2])));
+}
+
+/// Whether row k of a joint's error is an angle, rad; else it is a length, m.
+inline bool IsAngle(JointType type, int k) {
+  return type == JointType::kFixedAngle || (type == JointType::kWeld && k == 2) ||
+         (type == JointType::kPrismatic && k == 1);
+}
+
+class Lengths {
+ public:
+  explicit Lengths(const Model<double>& model);
+
+  /// The largest distance of a body's shape from its centre of mass, m; 0 without a shape and of a
+  /// half-plane.
+  double radius(int body) const { return radius_[body]; }
+  /// The same, but of a moving body without a shape √(3 I / m), half the length of a uniform rod of
+  /// its mass and inertia. 0 of what has no length at all.
+  double size(int body) const { return size_[body]; }
+  /// The smallest radius above 0, m; 1 where there is none.
+  double smallest_radius() const { return smallest_radius_; }
+
+  /// r: the smaller of the two sizes, m, or the one above 0; 0: neither is.
+  double Size(int a, int b) const {
+    return size_[a] > 0.0 && size_[b] > 0.0 ? std::min(size_[a], size_[b])
+                                            : std::max(size_[a], size_[b]);
+  }
+  /// x, m.
+  double Coordinate(const State<double>& state, int a, int b) const {
+    return std::max({PlaceOf(state, a, b), std::abs(state.pose[3 * a + 2]) * size_[a],
+                     std::abs(state.pose[3 * b + 2]) * size_[b]});
+  }
+  /// ρ, m.
+  double Rounding(const State<double>& state, int a, int b) const {
+    return kCoordinateRounding * Coordinate(state, a, b);
+  }
+  /// Gap below which two bodies touch, m.
+  double Touch(const State<double>& state, int a, int b) const {
+    return kTouchShare * Size(a, b) + Rounding(state, a, b);
+  }
+  /// Distance below which a joint is at its limit, rad or (of a prismatic one) m.
+  double LimitTouch(const State<double>& state, const JointIndex& joint) const {
+    return joint.type == JointType::kPrismatic
+               ? Touch(state, joint.a, joint.b)
+               : kTouchAngle + kCoordinateRounding * AngleOf(state, joint.a, joint.b);
+  }
+
+ private:
+  std::vector<double> radius_, size_;
+  double smallest_radius_ = 1.0;
+};
+
+}  // namespace tangible
