@@ -35,7 +35,8 @@ std::vector<std::string> RunWarnings::Finish(const Model<double>& model,
                                              const State<double>& final) {
   if (joints_.watches()) joints_.Look(model, final, report.time);
   std::vector<std::string> lines;
-  for (std::string line : {joints_.Message(model), FirstOrderByEvents(model, initial_, final)}) {
+  for (std::string line : {coordinates_.Message(model), joints_.Message(model),
+                           FirstOrderByEvents(model, initial_, final)}) {
     if (!line.empty()) lines.push_back(std::move(line));
   }
   return lines;

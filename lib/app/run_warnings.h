@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "tangible/simulation/stepping/coordinate_watch.h"
 #include "tangible/simulation/stepping/joint_opening.h"
 #include "tangible/simulation/stepping/rollout.h"
 
@@ -15,12 +16,23 @@ namespace tangible {
 class RunWarnings {
  public:
   RunWarnings(const Model<double>& model, const State<double>& initial)
-      : joints_(model), initial_(initial) {}
+      : joints_(model), coordinates_(model), initial_(initial) {}
 
-  /// Each state of the run. Joints are looked at in one of kLookEvery: they open over many steps,
-  /// and a look costs up to a quarter of a chain's step.
-  void Add(const Model<double>& model, long k, double t, const State<double>& state) {
-    if (joints_.watches() && k % kLookEvery == 0) joints_.Look(model, state, t);
+  /// Each state of the run; `stepper` is null for the initial one. Joints are looked at in one of
+  /// kLookEvery: they open over many steps, and a look costs up to a quarter of a chain's step.
+  void Add(const Model<double>& model, long k, double t, const State<double>& state,
+           const Stepper* stepper) {
+    if (stepper != nullptr) coordinates_.LookAtContacts(state, t, stepper->record().contacts);
+    if (k % kLookEvery != 0) return;
+    coordinates_.LookAtJoints(model, state, t);
+    if (joints_.watches()) joints_.Look(model, state, t);
+  }
+
+  /// The largest rounding of coordinates over the size of a body (CoordinateWatch).
+  double rounding() const { return coordinates_.rounding(); }
+  /// Empty, or the line that says they are too large.
+  std::string CoordinatesMessage(const Model<double>& model) const {
+    return coordinates_.Message(model);
   }
 
   /// All lines, without a file's name. `final` is the state at the report's time.
@@ -31,6 +43,7 @@ class RunWarnings {
   static constexpr long kLookEvery = 16;
 
   JointWatch joints_;
+  CoordinateWatch coordinates_;
   State<double> initial_;
 };
 

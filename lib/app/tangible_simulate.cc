@@ -167,10 +167,11 @@ struct Done {
   State<double> last;
   double start = 0.0;        ///< s, on the wall's clock
   double cpu_seconds = 0.0;  ///< of the steps
+  double rounding = 0.0;     ///< of coordinates over sizes (CoordinateWatch)
+  std::vector<std::string> warnings;
 };
 
-std::string WriteResults(const Job& job, const Done& run, const std::vector<std::string>& warnings,
-                         RunRecorders* r) {
+std::string WriteResults(const Job& job, const Done& run, RunRecorders* r) {
   std::string error;
   const auto write = [&error](const std::string& path, const std::string& text) {
     const std::string failed = WriteResult(path, text);
@@ -182,7 +183,8 @@ std::string WriteResults(const Job& job, const Done& run, const std::vector<std:
   if (r->view) write(FLAGS_view, ViewHtml(r->view->data()));
   if (r->summary) {
     OrderedJson summary = r->summary->ToJson(job.model, run.report, run.last);
-    summary["warnings"] = warnings;
+    summary["rounding_of_coordinates"] = run.rounding;
+    summary["warnings"] = run.warnings;
     if (r->certifier) {
       summary["certificate"] = ToJson(r->certifier->Finish(job.model, run.report));
     }
@@ -211,19 +213,24 @@ int Run(const std::string& file) {
         job.model, job.initial,
         [&](long k, double t, const State<double>& state, Stepper* stepper) {
           job.recorders.Add(job.model, k, t, state, stepper);
-          warnings.Add(job.model, k, t, state);
+          warnings.Add(job.model, k, t, state, stepper);
           progress.Show(k);
         },
         &stepper, &run.last);
   }
   run.cpu_seconds = CpuSeconds() - cpu_start - job.recorders.seconds;
-  const std::vector<std::string> lines = warnings.Finish(job.model, run.report, run.last);
-  const std::string error = WriteResults(job, run, lines, &job.recorders);
+  run.warnings = warnings.Finish(job.model, run.report, run.last);
+  run.rounding = warnings.rounding();
+  const std::string error = WriteResults(job, run, &job.recorders);
   if (!error.empty()) return ReportError(error);
   // Of a run that failed its one line says why.
-  if (run.report.status != StepStatus::kDone) return ReportError(file + ": " + run.report.message);
+  if (run.report.status != StepStatus::kDone) {
+    const std::string coordinates = warnings.CoordinatesMessage(job.model);
+    return ReportError(file + ": " + run.report.message +
+                       (coordinates.empty() ? "" : "; " + coordinates));
+  }
   const std::string warning = file + ": warning: ";
-  for (const std::string& line : lines) ReportError(warning + line);
+  for (const std::string& line : run.warnings) ReportError(warning + line);
   return kExitDone;
 }
 

@@ -85,13 +85,30 @@ TEST_F(TangibleSimulateTest, SummaryHasItsKeysAndItsNumbersAreRight) {
   const ProgramRun run = Simulate(test_scenes::Mixture(), Flag("summary", "s.json"));
   ASSERT_EQ(run.exit_status, 0) << run.error;
   const json s = json::parse(Read(Path("s.json")));
-  for (const char* key :
-       {"status",       "message",         "steps",           "seconds",
-        "cpu_seconds",  "bodies",          "contacts_max",    "lcp_rows_max",
-        "islands_max",  "events",          "fallbacks",       "solver",
-        "residual_max", "penetration_max", "joint_drift_max", "impact_energy_gain_max",
-        "energy_start", "energy_end",      "momentum_start",  "momentum_end",
-        "reductions",   "fallback_kinds",  "undetermined_end"}) {
+  for (const char* key : {"status",
+                          "message",
+                          "steps",
+                          "seconds",
+                          "cpu_seconds",
+                          "bodies",
+                          "contacts_max",
+                          "lcp_rows_max",
+                          "islands_max",
+                          "events",
+                          "fallbacks",
+                          "solver",
+                          "residual_max",
+                          "penetration_max",
+                          "joint_drift_max",
+                          "impact_energy_gain_max",
+                          "energy_start",
+                          "energy_end",
+                          "momentum_start",
+                          "momentum_end",
+                          "reductions",
+                          "fallback_kinds",
+                          "undetermined_end",
+                          "rounding_of_coordinates"}) {
     EXPECT_TRUE(s.contains(key)) << key;
   }
   EXPECT_EQ(s["status"], "done");

@@ -94,6 +94,27 @@ TEST_F(WarningsTest, ARunThatFailsHasOneLineAlone) {
   ExpectOneLine(run, 1, "dt is too large");
 }
 
+// A box of half a metre that slides: at 1e6 m its contacts are more than rounding.
+TEST_F(WarningsTest, CoordinatesThatAreTooLargeAreOneLine) {
+  const auto at = [](const std::string& x) {
+    return R"({"bodies": [
+        {"name": "box", "shape": {"box": {"size": [0.5, 0.5]}}, "mass": 1, "velocity": [1, 0],
+         "position": [)" +
+           x + R"(, 0.25]},
+        {"name": "floor", "static": true,
+         "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}}],
+      "simulation": {"dt": 0.01, "duration": 0.1, "stepping": "event"}})";
+  };
+  EXPECT_EQ(Simulate(at("1e6")).error, "");
+  EXPECT_NEAR(summary_["rounding_of_coordinates"].get<double>(), 4.02e-8, 1e-10);
+  EXPECT_EQ(summary_["warnings"], json::array());
+  const ProgramRun run = Simulate(at("1e9"), "--certify");
+  ExpectOneLine(run, 0, "coordinates are too large: body box is 1e+09 m from the origin");
+  EXPECT_NE(run.error.find(summary_["warnings"][0].get<std::string>()), std::string::npos);
+  const std::string verdict = summary_["certificate"]["verdict"];
+  EXPECT_NE(verdict.find("coordinates are too large"), std::string::npos) << verdict;
+}
+
 TEST_F(WarningsTest, ABatchSaysItOnce) {
   Write("scene.json", Chain("8"));
   Write("rows.csv", "gravity/y\n0\n-9.81\n-9.8\n-9.7\n");

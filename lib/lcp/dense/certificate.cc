@@ -21,6 +21,9 @@ std::string At(const Certificate& certificate) {
 
 // Why the derivative may change nearby, or empty.
 std::string Kink(const Certificate& certificate) {
+  if (!certificate.coordinates.empty()) {
+    return certificate.coordinates;
+  }
   if (certificate.degenerate_rows > 0) {
     return "kink of " + std::to_string(certificate.degenerate_rows) + " rows" + At(certificate);
   }
@@ -54,6 +57,7 @@ void Merge(const Certificate& other, Certificate& certificate) {
   certificate.mode_switches += other.mode_switches;
   certificate.events += other.events;
   certificate.fallbacks += other.fallbacks;
+  if (certificate.coordinates.empty()) certificate.coordinates = other.coordinates;
   if (certificate.one_sided.empty()) certificate.one_sided = other.one_sided;
   if (certificate.discontinuous.empty()) certificate.discontinuous = other.discontinuous;
   certificate.verdict.clear();

@@ -31,10 +31,12 @@ struct Certificate {
   /// Largest relative residual of a linear solve; of a rollout whose masses are far apart, also
   /// what its tangent and adjoint differ by.
   double linear_residual = 0.0;
-  int mode_switches = 0;        ///< over a rollout: contacts that changed mode between steps
-  int events = 0;               ///< over a rollout: impacts and other events
-  int fallbacks = 0;            ///< over a rollout: steps not solved by the first solver
-  std::string one_sided{};      ///< why the derivative is one-sided or a mean of two; else empty
+  int mode_switches = 0;  ///< over a rollout: contacts that changed mode between steps
+  int events = 0;         ///< over a rollout: impacts and other events
+  int fallbacks = 0;      ///< over a rollout: steps not solved by the first solver
+  std::string
+      coordinates{};        ///< where they round so coarsely that modes may be rounding; else empty
+  std::string one_sided{};  ///< why the derivative is one-sided or a mean of two; else empty
   std::string discontinuous{};  ///< what makes the value itself jump nearby; else empty
   std::string verdict{};        ///< SetVerdict's
 };
@@ -43,10 +45,10 @@ struct Certificate {
 /// the counts, the first reasons. The verdict is cleared.
 void Merge(const Certificate& other, Certificate& certificate);
 
-/// Writes `verdict`: what applies of "discontinuous: …", "near a kink: …" (degenerate rows, a
-/// margin below kNearKinkMargin, or a linear system that was not solved or is of a condition beyond
-/// kConditionLimit) and "one-sided: …", the
-/// worst first, joined by "; "; if nothing does, "trustworthy".
+/// Writes `verdict`: what applies of "discontinuous: …", "near a kink: …" (coordinates that are too
+/// large, degenerate rows, a margin below kNearKinkMargin, or a linear system that was not solved
+/// or is of a condition beyond kConditionLimit) and "one-sided: …", the worst first, joined by
+/// "; "; if nothing does, "trustworthy".
 void SetVerdict(Certificate& certificate);
 
 }  // namespace tangible

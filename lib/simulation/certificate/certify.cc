@@ -218,6 +218,10 @@ void RolloutCertifier::AddFeatures(const Model<double>& model, const StepRecord&
 }
 
 void RolloutCertifier::AddStep(const Model<double>& model, long step, Stepper* stepper) {
+  if (!coordinates_) coordinates_.emplace(model);
+  const StepRecord& at = stepper->record();
+  coordinates_->LookAtContacts(at.before, at.time, at.contacts);
+  coordinates_->LookAtJoints(model, at.before, at.time);
   if (stepper->by_events()) {
     AddEventStep(model, step, stepper);
     return;
@@ -301,6 +305,7 @@ Certificate RolloutCertifier::Finish(const Model<double>& model, const RolloutRe
         "motions were halved, as they could not be integrated over a step: how often may be chosen "
         "by rounding; dt is too large";
   }
+  if (coordinates_) certificate_.coordinates = coordinates_->Message(model);
   Certificate finished = certificate_;
   SetVerdict(finished);
   return finished;

@@ -16,12 +16,16 @@
 //                  wanted; and with event stepping a contact that touches as the run starts, where
 //                  a direction opens or closes its gap: one side falls and lands, the other is
 //                  pushed out
+//   coordinates    so large that what they round to is more than 1e-7 of a body that has contacts
+//                  or joints (coordinate_watch.h): its modes may be rounding
 //   linear systems redundant rows, condition, residual (contact_conditioning.h), of every step
 
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "tangible/lcp/dense/certificate.h"
+#include "tangible/simulation/stepping/coordinate_watch.h"
 #include "tangible/simulation/stepping/rollout.h"
 
 namespace tangible {
@@ -79,6 +83,7 @@ class RolloutCertifier {
 
   CertifyOptions options_;
   Certificate certificate_;
+  std::optional<CoordinateWatch> coordinates_;  ///< from the first step on
   double jump_margin_ = std::numeric_limits<double>::infinity();
   std::string jump_where_;
   std::string landing_;                ///< of the last step; empty if nothing landed in it

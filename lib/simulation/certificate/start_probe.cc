@@ -140,15 +140,15 @@ class Probe {
       AddApproachGradient(model, start, contact, &scratch, &approach);
       AddSlipGradient(model, start, contact, &scratch, &slip);
       rates_.push_back({Along(approach, direction), Along(slip, direction),
-                        search_.TouchTolerance(start, contact.a, contact.b)});
+                        search_.lengths().Touch(start, contact.a, contact.b)});
       speed_ = std::max({speed_, std::abs(rates_.back().approach), std::abs(rates_.back().slip)});
       touch_ = std::max(touch_, rates_.back().touch);
     }
     for (int body = 0; body < s.num_bodies(); ++body) {
-      fastest_ =
-          std::max({fastest_, std::abs(direction[s.TwistVariable(body, 0)]),
-                    std::abs(direction[s.TwistVariable(body, 1)]),
-                    std::abs(direction[s.TwistVariable(body, 2)]) * search_.bounding_radius(body)});
+      fastest_ = std::max(
+          {fastest_, std::abs(direction[s.TwistVariable(body, 0)]),
+           std::abs(direction[s.TwistVariable(body, 1)]),
+           std::abs(direction[s.TwistVariable(body, 2)]) * search_.lengths().radius(body)});
     }
   }
 
@@ -189,7 +189,7 @@ class Probe {
     Eigen::Index k = 0;
     for (const int body : moving) {
       for (int i = 0; i < 3; ++i) {
-        const double arm = i < 2 ? 1.0 : std::max(search_.bounding_radius(body), 1e-300);
+        const double arm = i < 2 ? 1.0 : std::max(search_.lengths().radius(body), 1e-300);
         speeds[k++] = arm * twist[3 * static_cast<size_t>(body) + i];
         speeds[k++] = arm * pose[3 * static_cast<size_t>(body) + i] / time;
       }
