@@ -69,6 +69,7 @@ class EventSearch {
     int index = -1;
     double sign = 0.0;
   };
+  class PairSearch;  ///< event_search_pair.cc
   Sample* At(const Model<double>& model, double length);
   void TakeMotion(Sample* sample, Segment* segment);
   void FindPairs(const Model<double>& model);
@@ -94,10 +95,6 @@ class EventSearch {
     return std::max(kLocatedOfSize * lengths_.Size(a, b),
                     kLocatedOfCoordinate * lengths_.Coordinate(state, a, b));
   }
-  double AlignedWithin(int a, int b) const;
-  bool HasPassed(const State<double>& state, int a, int b) const;
-  bool Continues(const Model<double>& model, const State<double>& state,
-                 const ActiveContact& contact, const ContactFeature* features, int count) const;
   bool MovesLittle(const Model<double>& model, const State<double>& before,
                    const State<double>& after, double length, int a, int b) const;
   double TouchStart(const Model<double>& model, double speed, double acceleration) const;

@@ -11,6 +11,11 @@
 
 namespace tangible {
 
+inline bool Contains(const std::vector<ActiveContact>& contacts, const ActiveContact& contact) {
+  return std::any_of(contacts.begin(), contacts.end(),
+                     [&](const ActiveContact& c) { return c.SameAs(contact); });
+}
+
 inline constexpr int kMostHalvings = 1000;
 inline constexpr int kMostRefinements = 200;
 // The share of a motion after which what starts at the change of a feature has left that.

@@ -77,6 +77,41 @@ std::vector<Edge> EdgesWithin(const Model<double>& model, double from, double to
   return edges;
 }
 
+// Keeps the contacts that the modes hold closed.
+void KeepClosed(const std::vector<ContactMode>& modes, double recovered, double slow,
+                std::vector<double>* slip, Segment* segment) {
+  size_t kept = 0;
+  for (size_t i = 0; i < segment->contacts.size(); ++i) {
+    if (modes[i] == ContactMode::kOpen) {
+      continue;
+    }
+    segment->contacts[kept] = segment->contacts[i];
+    ActiveContact& contact = segment->contacts[kept];
+    contact.law = contact.gap < -recovered ? ContactLaw::kRecovery : ContactLaw::kInelastic;
+    segment->friction[kept] = segment->friction[i];
+    (*slip)[kept] = (*slip)[i];
+    segment->modes.push_back(modes[i]);
+    ++kept;
+  }
+  segment->contacts.resize(kept);
+  segment->friction.resize(kept);
+  // Beside one that sticks the other end of a face does not slide: that its share of the friction
+  // is at the limit says nothing.
+  for (size_t k = 0; k < kept; ++k) {
+    const bool slides = SlidingSign(segment->modes[k]) != 0.0 && std::abs((*slip)[k]) <= slow;
+    for (size_t i = 0; i < kept; ++i) {
+      if (slides && segment->SticksWith(i, k)) {
+        segment->modes[k] = ContactMode::kSticking;
+      }
+    }
+  }
+}
+
+// Events of a step beyond which it is given up.
+int MostEvents(const Model<double>& model) {
+  return kGiveUp * model.structure->settings.max_events_per_step + kGiveUp;
+}
+
 }  // namespace
 
 EventStepper::EventStepper(const Model<double>& model) : search_(model), flow_(model) {}
@@ -107,7 +142,6 @@ ContactMode EventStepper::GuessOf(const ActiveContact& contact) const {
 bool EventStepper::SolveImpacts(const Model<double>& model, double t, State<double>* state,
                                 EventOutcome* outcome) {
   const SimulationSettings& settings = model.structure->settings;
-  const bool newton = settings.impact_law == ImpactLaw::kNewton;
   double last_approach = 0.0;
   for (int repeat = 0;; ++repeat) {
     FindTouching(model, *state);
@@ -130,69 +164,84 @@ bool EventStepper::SolveImpacts(const Model<double>& model, double t, State<doub
       inelastic_ = true;
       ++outcome->given_up.rebounds_given_up;
     }
-    if (outcome->events > kGiveUp * settings.max_events_per_step + kGiveUp) {
+    if (outcome->events > MostEvents(model)) {
       const auto fastest = std::min_element(touching_.approach.begin(), touching_.approach.end());
       outcome->message = "impacts do not end: " +
                          NameOfContact(*model.structure, touching_.contacts,
                                        static_cast<int>(fastest - touching_.approach.begin()));
       return false;
     }
-    EventPart* part = record_.Add();
-    part->is_impulses = true;
-    Impulses& impact = part->impulses;
-    impact.time = t;
-    impact.h = 0.0;
-    impact.decompression = false;
-    impact.before = *state;
-    impact.contacts.clear();
-    impact.friction.clear();
-    impact.restitution.clear();
-    rebounds_.clear();
-    for (size_t i = 0; i < touching_.contacts.size(); ++i) {
-      // In a rattle what leaves slowly is to be held with the rest: it would be back at once.
-      const double leaves = Rattles(model, *outcome)
-                                ? std::max(slow, ReturnSpeed(model, *state, touching_.contacts[i]))
-                                : slow;
-      if (touching_.approach[i] > leaves) {
-        continue;
-      }
-      ActiveContact contact = touching_.contacts[i];
-      const bool rebounds = touching_.restitution[i].value > 0.0 && !inelastic_ &&
-                            touching_.approach[i] < -settings.restitution_threshold;
-      // Poisson's law compresses all contacts inelastically first.
-      contact.law = rebounds && newton ? ContactLaw::kRestitution : ContactLaw::kInelastic;
-      rebounds_.push_back(rebounds);
-      impact.contacts.push_back(contact);
-      impact.friction.push_back(touching_.friction[i]);
-      impact.restitution.push_back(touching_.restitution[i]);
-    }
-    AssembleImpulses(model, &assembly_, &impact);
-    SizeGuess(impact.problem, &impact.solution);
-    for (size_t i = 0; i < impact.contacts.size(); ++i) {
-      impact.solution.modes[i] =
-          impact.problem.contacts[i].has_friction ? ContactMode::kSticking : ContactMode::kClosed;
-    }
-    const ContactSolverReport solved =
-        solver_.Solve(impact.problem, SolverOptionsOf(settings), &impact.solution);
-    CountSolve(solved, outcome);
-    if (!solved.solved) {
-      outcome->residual = solved.residual;
-      outcome->message = "impact: " + WhatIsUnsolved(*model.structure, impact, solved);
-      return false;
-    }
-    solver_.system().MoveFactorsTo(&impact.system);
-    const double before = KineticEnergy(model, state->twist);
-    SpreadTwists(*model.structure, impact.solution.v, &state->twist);
-    impact.new_twist = state->twist;
-    if (!newton && !Decompress(model, impact, state, outcome)) {
-      return false;
-    }
-    outcome->impact_energy_gain =
-        std::max(outcome->impact_energy_gain, KineticEnergy(model, state->twist) - before);
-    if (!Settle(model, impact, state, outcome)) {
+    Impulses* impact = ListImpact(model, t, slow, *state, *outcome);
+    if (!SolveImpact(model, impact, state, outcome)) {
       return false;
     }
   }
+}
+
+// The impact of what touches and does not leave, as a new part of the record.
+Impulses* EventStepper::ListImpact(const Model<double>& model, double t, double slow,
+                                   const State<double>& state, const EventOutcome& outcome) {
+  const SimulationSettings& settings = model.structure->settings;
+  EventPart* part = record_.Add();
+  part->is_impulses = true;
+  Impulses& impact = part->impulses;
+  impact.time = t;
+  impact.h = 0.0;
+  impact.decompression = false;
+  impact.before = state;
+  impact.contacts.clear();
+  impact.friction.clear();
+  impact.restitution.clear();
+  rebounds_.clear();
+  for (size_t i = 0; i < touching_.contacts.size(); ++i) {
+    // In a rattle what leaves slowly is to be held with the rest: it would be back at once.
+    const double leaves = Rattles(model, outcome)
+                              ? std::max(slow, ReturnSpeed(model, state, touching_.contacts[i]))
+                              : slow;
+    if (touching_.approach[i] > leaves) {
+      continue;
+    }
+    ActiveContact contact = touching_.contacts[i];
+    const bool rebounds = touching_.restitution[i].value > 0.0 && !inelastic_ &&
+                          touching_.approach[i] < -settings.restitution_threshold;
+    // Poisson's law compresses all contacts inelastically first.
+    contact.law = rebounds && settings.impact_law == ImpactLaw::kNewton ? ContactLaw::kRestitution
+                                                                        : ContactLaw::kInelastic;
+    rebounds_.push_back(rebounds);
+    impact.contacts.push_back(contact);
+    impact.friction.push_back(touching_.friction[i]);
+    impact.restitution.push_back(touching_.restitution[i]);
+  }
+  return &impact;
+}
+
+bool EventStepper::SolveImpact(const Model<double>& model, Impulses* impact, State<double>* state,
+                               EventOutcome* outcome) {
+  const SimulationSettings& settings = model.structure->settings;
+  AssembleImpulses(model, &assembly_, impact);
+  SizeGuess(impact->problem, &impact->solution);
+  for (size_t i = 0; i < impact->contacts.size(); ++i) {
+    impact->solution.modes[i] =
+        impact->problem.contacts[i].has_friction ? ContactMode::kSticking : ContactMode::kClosed;
+  }
+  const ContactSolverReport solved =
+      solver_.Solve(impact->problem, SolverOptionsOf(settings), &impact->solution);
+  CountSolve(solved, outcome);
+  if (!solved.solved) {
+    outcome->residual = solved.residual;
+    outcome->message = "impact: " + WhatIsUnsolved(*model.structure, *impact, solved);
+    return false;
+  }
+  solver_.system().MoveFactorsTo(&impact->system);
+  const double before = KineticEnergy(model, state->twist);
+  SpreadTwists(*model.structure, impact->solution.v, &state->twist);
+  impact->new_twist = state->twist;
+  if (settings.impact_law != ImpactLaw::kNewton && !Decompress(model, *impact, state, outcome)) {
+    return false;
+  }
+  outcome->impact_energy_gain =
+      std::max(outcome->impact_energy_gain, KineticEnergy(model, state->twist) - before);
+  return Settle(model, *impact, state, outcome);
 }
 
 bool EventStepper::SolveByShortStep(const Model<double>& model, double t, double dt,
@@ -229,6 +278,36 @@ bool EventStepper::SolveByShortStep(const Model<double>& model, double t, double
   return true;
 }
 
+// The last modes, and what slides sliding on: friction opposes that whatever the accelerations.
+void EventStepper::GuessModes(const std::vector<ActiveContact>& contacts,
+                              const std::vector<double>& slip, double slow,
+                              ContactProblem<double>* problem,
+                              ContactSolution<double>* solution) const {
+  double scale = 0.0;
+  for (size_t i = 0; i < problem->momentum.size(); ++i) {
+    scale = std::max(scale, std::abs(problem->momentum[i]) / problem->mass[i]);
+  }
+  for (const ContactBlock<double>& contact : problem->contacts) {
+    scale = std::max({scale, std::abs(contact.c_n), std::abs(contact.c_t)});
+  }
+  SizeGuess(*problem, solution);
+  for (size_t i = 0; i < problem->contacts.size(); ++i) {
+    ContactBlock<double>& contact = problem->contacts[i];
+    ContactMode guess = GuessOf(contacts[i]);
+    if (!contact.has_friction) {
+      guess = guess == ContactMode::kOpen ? guess : ContactMode::kClosed;
+    } else if (std::abs(slip[i]) > slow) {
+      contact.c_t += (slip[i] > 0.0 ? kForcedSlip : -kForcedSlip) * std::max(scale, 1e-300);
+      guess = guess == ContactMode::kOpen ? guess
+              : slip[i] > 0.0             ? ContactMode::kSlidingPositive
+                                          : ContactMode::kSlidingNegative;
+    } else if (guess == ContactMode::kClosed) {
+      guess = ContactMode::kSticking;
+    }
+    solution->modes[i] = guess;
+  }
+}
+
 bool EventStepper::ChooseModes(const Model<double>& model, double t, double middle, double length,
                                State<double>* state, EventOutcome* outcome, Segment* segment) {
   const SimulationSettings& settings = model.structure->settings;
@@ -252,31 +331,8 @@ bool EventStepper::ChooseModes(const Model<double>& model, double t, double midd
   ContactProblem<double> problem;
   AssembleAcceleration(model, *state, t, middle, segment->contacts, segment->friction, &assembly_,
                        &problem);
-  // Where a contact slides, friction opposes that whatever the accelerations.
-  double scale = 0.0;
-  for (size_t i = 0; i < problem.momentum.size(); ++i) {
-    scale = std::max(scale, std::abs(problem.momentum[i]) / problem.mass[i]);
-  }
-  for (const ContactBlock<double>& contact : problem.contacts) {
-    scale = std::max({scale, std::abs(contact.c_n), std::abs(contact.c_t)});
-  }
   ContactSolution<double> solution;
-  SizeGuess(problem, &solution);
-  for (size_t i = 0; i < problem.contacts.size(); ++i) {
-    ContactBlock<double>& contact = problem.contacts[i];
-    ContactMode guess = GuessOf(segment->contacts[i]);
-    if (!contact.has_friction) {
-      guess = guess == ContactMode::kOpen ? guess : ContactMode::kClosed;
-    } else if (std::abs(slip[i]) > slow) {
-      contact.c_t += (slip[i] > 0.0 ? kForcedSlip : -kForcedSlip) * std::max(scale, 1e-300);
-      guess = guess == ContactMode::kOpen ? guess
-              : slip[i] > 0.0             ? ContactMode::kSlidingPositive
-                                          : ContactMode::kSlidingNegative;
-    } else if (guess == ContactMode::kClosed) {
-      guess = ContactMode::kSticking;
-    }
-    solution.modes[i] = guess;
-  }
+  GuessModes(segment->contacts, slip, slow, &problem, &solution);
   const ContactSolverReport solved = solver_.Solve(problem, SolverOptionsOf(settings), &solution);
   CountSolve(solved, outcome);
   if (!solved.solved) {
@@ -289,32 +345,7 @@ bool EventStepper::ChooseModes(const Model<double>& model, double t, double midd
   }
   last_contacts_ = segment->contacts;
   last_modes_ = solution.modes;
-  size_t kept = 0;
-  for (size_t i = 0; i < segment->contacts.size(); ++i) {
-    if (solution.modes[i] == ContactMode::kOpen) {
-      continue;
-    }
-    segment->contacts[kept] = segment->contacts[i];
-    ActiveContact& contact = segment->contacts[kept];
-    contact.law = contact.gap < -settings.recovery_speed * length ? ContactLaw::kRecovery
-                                                                  : ContactLaw::kInelastic;
-    segment->friction[kept] = segment->friction[i];
-    slip[kept] = slip[i];
-    segment->modes.push_back(solution.modes[i]);
-    ++kept;
-  }
-  segment->contacts.resize(kept);
-  segment->friction.resize(kept);
-  // Beside one that sticks the other end of a face does not slide: that its share of the friction
-  // is at the limit says nothing.
-  for (size_t k = 0; k < kept; ++k) {
-    const bool slides = SlidingSign(segment->modes[k]) != 0.0 && std::abs(slip[k]) <= slow;
-    for (size_t i = 0; i < kept; ++i) {
-      if (slides && segment->SticksWith(i, k)) {
-        segment->modes[k] = ContactMode::kSticking;
-      }
-    }
-  }
+  KeepClosed(solution.modes, settings.recovery_speed * length, slow, &slip, segment);
   return true;
 }
 
@@ -348,6 +379,48 @@ EventOutcome EventStepper::Step(const Model<double>& model, double t, double h,
   return outcome;
 }
 
+// What happens at an instant: impacts; as a run starts and a step ends, corrections. `begins`: the
+// step's start.
+bool EventStepper::SolveInstant(const Model<double>& model, double now, double h, bool begins,
+                                bool at_end, State<double>* state, EventOutcome* outcome) {
+  if (!SolveImpacts(model, now, state, outcome)) {
+    return false;
+  }
+  if ((starts_ || at_end) &&
+      !AddInstant(model, now, EventKind::kStepEnd, nullptr, state, outcome)) {
+    return false;
+  }
+  if (begins) {
+    const int limit = StuckLimit(model, *state, model.structure->settings.recovery_speed * h);
+    if (limit >= 0) {
+      outcome->message = NameOfContact(*model.structure, touching_.contacts, limit) +
+                         " stays broken: another one contradicts it";
+      return false;
+    }
+  }
+  if (starts_ && !at_end) {
+    // It has put twists back that the joints do not allow: what slides now, and where to, is
+    // another.
+    FindTouching(model, *state);
+  }
+  starts_ = false;
+  return true;
+}
+
+// A new part of the record: motion from `now`, at most to `until`.
+Segment& EventStepper::BeginSegment(double now, double until, const State<double>& state) {
+  EventPart* part = record_.Add();
+  part->is_impulses = false;
+  Segment& segment = part->segment;
+  segment.time = now;
+  segment.length = until - now;
+  segment.starts = false;
+  segment.middle = 0.5 * (now + until);
+  segment.before = state;
+  segment.event_number = -1;
+  return segment;
+}
+
 EventOutcome EventStepper::Advance(const Model<double>& model, double t, double h,
                                    State<double>* state) {
   EventOutcome outcome;
@@ -355,13 +428,10 @@ EventOutcome EventStepper::Advance(const Model<double>& model, double t, double 
   inelastic_ = false;
   search_.StartStep();
   const std::vector<Edge> edges = EdgesWithin(model, t, t + h);
-  size_t next_edge = 0;
   const double end = t + h;
-  const int most = kGiveUp * model.structure->settings.max_events_per_step + kGiveUp;
   double now = t;
   bool impulses_tried = false;
-  int halvings = 0;
-  int shortened = 0;
+  int halvings = 0, shortened = 0;
   const auto fail = [&](const std::string& message) {
     outcome.done = false;
     outcome.message = message;
@@ -370,52 +440,25 @@ EventOutcome EventStepper::Advance(const Model<double>& model, double t, double 
   bool at_given_time = true;
   bool begins = true;
   while (end - now > 1e-14 * h || !at_given_time) {
-    if (!SolveImpacts(model, now, state, &outcome)) {
-      return fail(outcome.message);
-    }
     const bool at_end = end - now <= 1e-14 * h;
-    if ((starts_ || at_end) &&
-        !AddInstant(model, now, EventKind::kStepEnd, nullptr, state, &outcome)) {
+    if (!SolveInstant(model, now, h, std::exchange(begins, false), at_end, state, &outcome)) {
       return fail(outcome.message);
     }
-    if (std::exchange(begins, false)) {
-      const int limit = StuckLimit(model, *state, model.structure->settings.recovery_speed * h);
-      if (limit >= 0) {
-        return fail(NameOfContact(*model.structure, touching_.contacts, limit) +
-                    " stays broken: another one contradicts it");
-      }
-    }
-    if (starts_ && !at_end) {
-      // It has put twists back that the joints do not allow: what slides now, and where to, is
-      // another.
-      FindTouching(model, *state);
-    }
-    starts_ = false;
     if (at_end) {
       break;
     }
-    while (next_edge < edges.size() && edges[next_edge].time <= now + 1e-14 * h) {
-      ++next_edge;
-    }
-    const bool to_edge = next_edge < edges.size();
-    const double until = now + std::ldexp((to_edge ? edges[next_edge].time : end) - now, -halvings);
-    const double middle = 0.5 * (now + until);
+    const auto edge = std::find_if(edges.begin(), edges.end(),
+                                   [&](const Edge& e) { return e.time > now + 1e-14 * h; });
+    const bool to_edge = edge != edges.end();
+    const double until = now + std::ldexp((to_edge ? edge->time : end) - now, -halvings);
     const int parts = record_.num_parts;
-    EventPart* part = record_.Add();
-    part->is_impulses = false;
-    Segment& segment = part->segment;
-    segment.time = now;
-    segment.length = until - now;
-    segment.starts = false;
-    segment.middle = middle;
-    segment.before = *state;
-    segment.event_number = -1;
-    if (!ChooseModes(model, now, middle, until - now, state, &outcome, &segment)) {
+    Segment& segment = BeginSegment(now, until, *state);
+    if (!ChooseModes(model, now, segment.middle, until - now, state, &outcome, &segment)) {
       record_.num_parts = parts;
-      if (impulses_tried || !SolveByShortStep(model, now, h, state, &outcome)) {
+      if (std::exchange(impulses_tried, true) ||
+          !SolveByShortStep(model, now, h, state, &outcome)) {
         return fail(outcome.message);
       }
-      impulses_tried = true;
       outcome.message.clear();
       continue;
     }
@@ -445,7 +488,7 @@ EventOutcome EventStepper::Advance(const Model<double>& model, double t, double 
         halvings = 0;
       } else if (to_edge) {
         segment.event = EventKind::kEdge;
-        segment.event_number = edges[next_edge].number;
+        segment.event_number = edge->number;
         ++outcome.events;
       }
       continue;
@@ -454,7 +497,7 @@ EventOutcome EventStepper::Advance(const Model<double>& model, double t, double 
     now += segment.length;
     SwitchMode(segment);
     const bool counts = segment.event != EventKind::kTouch || segment.length <= 1e-13 * h;
-    if (counts && ++outcome.events > most) {
+    if (counts && ++outcome.events > MostEvents(model)) {
       return fail("events do not end: " +
                   NameOfContact(*model.structure, {segment.event_contact}, 0));
     }

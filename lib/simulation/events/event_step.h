@@ -114,6 +114,16 @@ class EventStepper {
   /// the impulse of its compression (event_decompression.cc).
   bool Decompress(const Model<double>& model, const Impulses& compression, State<double>* state,
                   EventOutcome* outcome);
+  Impulses* ListImpact(const Model<double>& model, double t, double slow,
+                       const State<double>& state, const EventOutcome& outcome);
+  bool SolveImpact(const Model<double>& model, Impulses* impact, State<double>* state,
+                   EventOutcome* outcome);
+  bool SolveInstant(const Model<double>& model, double now, double h, bool begins, bool at_end,
+                    State<double>* state, EventOutcome* outcome);
+  Segment& BeginSegment(double now, double until, const State<double>& state);
+  void GuessModes(const std::vector<ActiveContact>& contacts, const std::vector<double>& slip,
+                  double slow, ContactProblem<double>* problem,
+                  ContactSolution<double>* solution) const;
   bool ChooseModes(const Model<double>& model, double t, double middle, double length,
                    State<double>* state, EventOutcome* outcome, Segment* segment);
   bool AddInstant(const Model<double>& model, double t, EventKind kind,

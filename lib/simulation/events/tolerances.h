@@ -41,6 +41,8 @@ inline constexpr double kSlowShare = 1e-11;
 /// ρ / r: by how much a face may be turned whose ends touch, from −2 ρ to ρ, with room.
 inline constexpr double kTurnedFace = 4.0;
 
+/// Of a segment's length: to which the instant is found at which a feature gives way to the next.
+inline constexpr double kHandOverTime = 1e-14;
 /// Of dt: instants closer to each other are the same, beside rounding.
 inline constexpr double kSameInstant = 1e-7;
 

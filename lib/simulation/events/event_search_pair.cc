@@ -1,0 +1,368 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The search for the gaps of one pair of bodies: those that close, those that touch and return, and
+// contacts whose feature gives way to the next one.
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "tangible/simulation/events/event_search_inl.h"
+#include "tangible/simulation/events/tolerances.h"
+
+namespace tangible {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+bool OfPair(const ActiveContact& contact, int a, int b) {
+  return contact.joint < 0 && contact.a == a && contact.b == b;
+}
+
+// A vertex that leaves an edge by its end is handed over when it meets the vertex there, and not at
+// the gap of what takes over, whose edge has another end: that pair of vertices. `next` where the
+// pair has none, or where rounded corners take over smoothly.
+ActiveContact HandOver(const Model<double>& model, const State<double>& state,
+                       const ActiveContact& lost, const ActiveContact& next) {
+  constexpr double kAtEnd = 1e-6;  // of the edge
+  const bool of_first = lost.feature.kind == FeatureKind::kVertexEdge;
+  if (!of_first && lost.feature.kind != FeatureKind::kEdgeVertex) {
+    return next;
+  }
+  const ShapeView<double> shapes[2] = {model.Shape(lost.a), model.Shape(lost.b)};
+  if (CoreRadius(shapes[0]) > 0.0 || CoreRadius(shapes[1]) > 0.0) {
+    return next;
+  }
+  const int edge = of_first ? lost.feature.b : lost.feature.a;
+  const ShapeView<double>& with_edge = shapes[of_first ? 1 : 0];
+  const int ends[2] = {edge, (edge + 1) % NumVertices(with_edge.type, with_edge.num_numbers)};
+  const double length = (Vertex(with_edge, ends[0]) - Vertex(with_edge, ends[1])).norm();
+  for (const int end : ends) {
+    ActiveContact corners = next;
+    corners.feature = {FeatureKind::kVertexVertex, of_first ? lost.feature.a : end,
+                       of_first ? end : lost.feature.b};
+    ContactRows<double> rows;
+    EvaluateContactRows(model, state, corners, &rows);
+    corners.gap = rows.geometry.gap;
+    if (corners.gap <= kAtEnd * length) {
+      return corners;
+    }
+  }
+  return next;
+}
+
+// The closest features of a pair.
+struct Features {
+  ContactFeature of[2];
+  int count = 0;
+  bool Have(const ContactFeature& feature) const {
+    return std::find(of, of + count, feature) != of + count;
+  }
+};
+
+}  // namespace
+
+class EventSearch::PairSearch {
+ public:
+  PairSearch(EventSearch* search, const Model<double>& model, int a, int b, Event* event)
+      : search_(*search),
+        model_(model),
+        a_(a),
+        b_(b),
+        event_(*event),
+        segment_(*search->segment_),
+        touching_(*search->touching_),
+        touch_(search->lengths_.Touch(segment_.before, a, b)),
+        located_(search->GapTolerance(segment_.before, a, b)),
+        slow_(search->SpeedTolerance(model, segment_.before)),
+        closed_(std::any_of(segment_.contacts.begin(), segment_.contacts.end(),
+                            [&](const ActiveContact& c) { return OfPair(c, a, b); })) {}
+
+  void Run() {
+    SearchFrom(0.0, 0.0, Counts::kUntouched);
+    if (SearchTouching() && closed_) {
+      SearchHandOver();
+    }
+  }
+
+ private:
+  // Which of the pair's contacts that are not closed count: those that touch and leave do only with
+  // kAll, and never where they are in penetration: they return by their speed.
+  enum class Counts { kUntouched, kAll };
+
+  Features FeaturesAt(const State<double>& state) const {
+    Features found;
+    found.count = FindContactFeatures(model_.Shape(a_), state.PoseOf(a_), model_.Shape(b_),
+                                      state.PoseOf(b_), kInfinity, found.of);
+    return found;
+  }
+  bool IsClosed(const ActiveContact& contact) const { return Contains(segment_.contacts, contact); }
+  bool IsDeep(const ActiveContact& contact) const {
+    return std::any_of(touching_.begin(), touching_.end(), [&](const ActiveContact& other) {
+      return other.gap < -kDeepTouches * touch_ && other.SameAs(contact);
+    });
+  }
+  // The smallest gap of the contacts that count; sets nearest_.
+  double Gap(const Sample& sample, Counts counts, bool handed_over = false);
+  // Bound on how fast the gap closes over an interval.
+  double ClosingSpeed(double from, double to, Counts counts);
+  Course CourseOver(double from, double fa, double to, double fb, double allowed, Counts counts);
+  // The first time at which the gap + allowed closes; the event is then that.
+  void SearchFrom(double from, double allowed, Counts counts);
+  // Contacts that touch and stay open leave first, and may return; false where one returns at once.
+  bool SearchTouching();
+  // The closed contact that has lost its feature, or nullptr.
+  const ActiveContact* LostAt(const State<double>& state) const;
+  void SearchHandOver();
+  double AlignedWithin() const;
+  bool HasPassed(const State<double>& state) const;
+  bool Continues(const State<double>& state, const ActiveContact& contact,
+                 const Features& features) const;
+
+  EventSearch& search_;
+  const Model<double>& model_;
+  const int a_, b_;
+  Event& event_;
+  const Segment& segment_;
+  const std::vector<ActiveContact>& touching_;
+  const double touch_;    ///< gap below which the pair touches, m
+  const double located_;  ///< to which its gaps are located, m
+  const double slow_;     ///< speed below which what touches rests, m/s
+  const bool closed_;     ///< the pair has closed contacts
+  ActiveContact nearest_;
+  Vector2<double> normal_{0.0, 0.0};
+  bool on_face_ = false;  ///< the normal is a face's, not that of the line between two points
+};
+
+void EventSearch::SearchPair(const Model<double>& model, int a, int b, Event* event) {
+  PairSearch(this, model, a, b, event).Run();
+}
+
+// How far apart the ends of two bodies' faces may be along them and count as one above the other,
+// at least, m. A power of two as there (collide_core.cc).
+double EventSearch::PairSearch::AlignedWithin() const {
+  constexpr double kAligned = 8e-9;  // of the sum of the radii, which is at least half the faces'
+  return std::ldexp(kAligned,
+                    std::ilogb(search_.lengths_.radius(a_) + search_.lengths_.radius(b_)));
+}
+
+// Whether a pair has moved since the segment's start by more than that.
+bool EventSearch::PairSearch::HasPassed(const State<double>& state) const {
+  constexpr double kPassed = 1e-7;  // of the smaller body
+  const std::vector<double>& before = segment_.before.pose;
+  const auto moved = [&](int k) {
+    return std::abs(state.pose[3 * a_ + k] - before[3 * a_ + k] - state.pose[3 * b_ + k] +
+                    before[3 * b_ + k]);
+  };
+  const double size = search_.lengths_.Size(a_, b_);
+  return moved(0) + moved(1) + moved(2) * size > kPassed * size + 2.0 * AlignedWithin();
+}
+
+// Whether one of the features found is another name of a closed contact: a vertex over a vertex,
+// where rounding changes which of the two is found. It is handed over when they have parted.
+bool EventSearch::PairSearch::Continues(const State<double>& state, const ActiveContact& contact,
+                                        const Features& features) const {
+  constexpr double kParallel = 1e-7;
+  ContactRows<double> rows;
+  EvaluateContactRows(model_, state, contact, &rows);
+  const ContactGeometry<double> of_closed = rows.geometry;
+  const double within = AlignedWithin();
+  return std::any_of(features.of, features.of + features.count, [&](const ContactFeature& feature) {
+    ActiveContact other = contact;
+    other.feature = feature;
+    EvaluateContactRows(model_, state, other, &rows);
+    return (rows.geometry.point - of_closed.point).norm() <= within &&
+           (rows.geometry.normal - of_closed.normal).norm() <= kParallel;
+  });
+}
+
+double EventSearch::PairSearch::Gap(const Sample& sample, Counts counts, bool handed_over) {
+  if (!sample.good) {
+    return std::numeric_limits<double>::quiet_NaN();
+  }
+  const State<double>& state = sample.motion.after;
+  const Features features = FeaturesAt(state);
+  // What takes over from a closed contact whose feature is the closest no longer: the search for
+  // that finds it, whose gap is rounding.
+  const bool hands_over =
+      closed_ && !handed_over &&
+      std::any_of(segment_.contacts.begin(), segment_.contacts.end(),
+                  [&](const auto& c) { return OfPair(c, a_, b_) && !features.Have(c.feature); });
+  double smallest = kInfinity;
+  for (int k = 0; k < features.count; ++k) {
+    ActiveContact contact;
+    contact.a = a_;
+    contact.b = b_;
+    contact.feature = features.of[k];
+    contact.law = ContactLaw::kInelastic;
+    ContactRows<double> rows;
+    EvaluateContactRows(model_, state, contact, &rows);
+    const double gap = rows.geometry.gap;
+    if (gap < smallest && !IsClosed(contact) &&
+        (counts == Counts::kAll ? !IsDeep(contact) : !Contains(touching_, contact)) &&
+        !(hands_over && std::abs(gap) <= touch_ && !Contains(touching_, contact))) {
+      smallest = gap;
+      nearest_ = contact;
+      nearest_.gap = gap;
+      normal_ = rows.geometry.normal;
+      on_face_ = contact.feature.kind != FeatureKind::kVertexVertex;
+    }
+  }
+  return smallest;
+}
+
+// All points' speeds; where both ends have the same face, the speed along its normal and what
+// rotation adds.
+double EventSearch::PairSearch::ClosingSpeed(double from, double to, Counts counts) {
+  const double any = search_.closing_[a_] + search_.closing_[b_];
+  const Sample& first = *search_.At(model_, from);
+  if (!std::isfinite(Gap(first, counts))) {
+    return any;
+  }
+  const ActiveContact start = nearest_;
+  const Vector2<double> along(normal_.x(), normal_.y());  // the next call moves it
+  const bool face = on_face_;
+  const State<double> before = first.motion.after;
+  const Sample& last = *search_.At(model_, to);
+  if (!face || !std::isfinite(Gap(last, counts)) || !(nearest_.feature == start.feature)) {
+    return any;
+  }
+  const State<double>& after = last.motion.after;
+  double closing = 0.0;
+  double speed = 0.0;
+  double turning = 0.0;
+  for (const State<double>* state : {&before, &after}) {
+    const Vector2<double> relative(state->twist[3 * a_] - state->twist[3 * b_],
+                                   state->twist[3 * a_ + 1] - state->twist[3 * b_ + 1]);
+    speed = std::max(speed, relative.norm());
+    double turn = 0.0;
+    double swept = 0.0;
+    for (const int body : {a_, b_}) {
+      const double omega = std::abs(state->twist[3 * body + 2]);
+      const bool is_circle = model_.structure->bodies[body].shape == ShapeType::kCircle;
+      turn += is_circle ? 0.0 : omega;
+      swept += is_circle ? 0.0 : omega * search_.lengths_.radius(body);
+    }
+    closing = std::max(closing, std::abs(along.dot(relative)) + swept);
+    turning = std::max(turning, turn);
+  }
+  return std::min(any, 1.05 * closing + 1.5 * turning * (to - from) * speed);
+}
+
+// Where the same features are closest at both ends and the bodies turn and move little between them
+// the gap's rate changes monotonically.
+Course EventSearch::PairSearch::CourseOver(double from, double fa, double to, double fb,
+                                           double allowed, Counts counts) {
+  // Without a gap at both ends there is no contact whose rate it would be.
+  Sample* const first = search_.At(model_, from);
+  if (!std::isfinite(fa) || !std::isfinite(fb) || Gap(*first, counts) + allowed != fa) {
+    return Course::kUnknown;
+  }
+  const ActiveContact start = nearest_;
+  const double rate_a = SpeedsOf(model_, first->motion.after, start).normal;
+  const State<double> before = first->motion.after;
+  Sample* const last = search_.At(model_, to);
+  if (Gap(*last, counts) + allowed != fb || !(nearest_.feature == start.feature) ||
+      !search_.MovesLittle(model_, before, last->motion.after, to - from, a_, b_)) {
+    return Course::kUnknown;
+  }
+  return CourseOf(to - from, fa, rate_a, fb, SpeedsOf(model_, last->motion.after, nearest_).normal);
+}
+
+void EventSearch::PairSearch::SearchFrom(double from, double allowed, Counts counts) {
+  if (!(from < event_.length)) {
+    return;
+  }
+  if (Gap(*search_.At(model_, from), counts) > touch_) {
+    allowed = 0.0;  // it has left
+  }
+  const bool all = counts == Counts::kAll;
+  // A contact that has touched all the time returns only by approaching: the first-order
+  // integrator's poses may cut a corner that its twists do not.
+  const auto shifted = [&](const Sample& sample) {
+    const double value = Gap(sample, counts) + allowed;
+    if (!std::isfinite(value)) {
+      return value;
+    }
+    const bool approaches = value > 0.0 || !all || !Contains(touching_, nearest_) ||
+                            SpeedsOf(model_, sample.motion.after, nearest_).normal < -slow_;
+    return approaches ? value : touch_;
+  };
+  const auto rate = [&](double x, double y) { return ClosingSpeed(x, y, counts); };
+  const auto course = [&](double x, double fx, double y, double fy) {
+    return CourseOver(x, fx, y, fy, allowed, counts);
+  };
+  double root;
+  if (search_.FirstRoot(model_, shifted, rate, course, located_, from, event_.length, &root) &&
+      root > 0.0) {
+    event_.length = root;
+    const bool cut_in = Gap(*search_.At(model_, root), counts) < -kDeepTouches * touch_;
+    // Poses that cut a corner have passed the gap: it is the speed that turns.
+    event_.kind =
+        cut_in && all && Contains(touching_, nearest_) ? EventKind::kReturn : EventKind::kTouch;
+    event_.contact = nearest_;
+  }
+}
+
+bool EventSearch::PairSearch::SearchTouching() {
+  double from = kInfinity;
+  double allowed = touch_;
+  for (const ActiveContact& contact : touching_) {
+    if (!OfPair(contact, a_, b_) || IsClosed(contact)) {
+      continue;
+    }
+    if (contact.gap < -kDeepTouches * touch_) {
+      search_.SearchReturn(model_, contact, touch_, &event_);
+      if (event_.kind == EventKind::kAtOnce) {
+        return false;
+      }
+    }
+    const Sample& end = *search_.At(model_, event_.length);
+    const double speed = SpeedsOf(model_, segment_.before, contact).normal;
+    const double change =
+        end.good ? std::abs(SpeedsOf(model_, end.motion.after, contact).normal - speed) : 0.0;
+    from = std::min(from, search_.TouchStart(model_, speed, 2.0 * change / event_.length));
+    allowed = std::max(allowed, touch_ - contact.gap);
+  }
+  SearchFrom(from, allowed, Counts::kAll);
+  return true;
+}
+
+// Where corners meet the feature of a closed contact may not have been the closest as the segment
+// starts: it is once they have passed.
+const ActiveContact* EventSearch::PairSearch::LostAt(const State<double>& state) const {
+  const Features features = FeaturesAt(state);
+  for (const ActiveContact& contact : segment_.contacts) {
+    if (OfPair(contact, a_, b_) && !features.Have(contact.feature) &&
+        (HasPassed(state) || FeaturesAt(segment_.before).Have(contact.feature)) &&
+        !Continues(state, contact, features)) {
+      return &contact;
+    }
+  }
+  return nullptr;
+}
+
+// A closed contact whose feature is no longer the pair's closest hands over to the next one.
+void EventSearch::PairSearch::SearchHandOver() {
+  const auto is_lost = [&](double length) {
+    return LostAt(search_.At(model_, length)->motion.after) != nullptr;
+  };
+  if (!is_lost(event_.length)) {
+    return;
+  }
+  double low = 0.0;
+  double high = event_.length;
+  while (high - low > kHandOverTime * event_.length) {
+    const double middle = 0.5 * (low + high);
+    (is_lost(middle) ? high : low) = middle;
+  }
+  if (high < event_.length) {
+    event_.kind = EventKind::kTouch;
+    event_.length = high;
+    const Sample& sample = *search_.At(model_, high);
+    const bool next = std::isfinite(Gap(sample, Counts::kAll, true));
+    const ActiveContact lost = *LostAt(sample.motion.after);
+    event_.contact = HandOver(model_, sample.motion.after, lost, next ? nearest_ : lost);
+  }
+}
+
+}  // namespace tangible
