@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
+#include "../../support/rescaled.h"
 #include "../../support/scenes.h"
 #include "tangible/dynamics/model/parameter_map.h"
 #include "tangible/simulation/certificate/certify.h"
@@ -149,6 +150,29 @@ TEST(CertifyEventsTest, ATouchAtTheStartIsOneSidedForWhatChangesItsGap) {
                                         "bodies/box/friction"})
                 .verdict,
             "trustworthy");
+}
+
+// A hundredth of a ball's radius is a gap, also of a ball of 10 nm.
+TEST(CertifyEventsTest, WhatTouchesAtTheStartIsAShareOfTheBodies) {
+  const auto verdict = [](double y, double length) {
+    const Scene scene = test_scenes::Rescaled(
+        SceneOf(R"({"bodies": [{"name": "ball", "shape": {"circle": {"radius": 0.1}}, "mass": 1,
+            "position": [0, )" +
+                std::to_string(y) + "]}, " + Floor() +
+                R"(], "simulation": {"stepping": "event", "dt": 0.01, "duration": 0.01}})"),
+        {length, 1.0});
+    Model<double> model;
+    State<double> state;
+    BuildModel(scene, &model, &state);
+    const RowMatrixXd directions =
+        RowMatrixXd::Identity(model.structure->num_variables(), 3);  // the ball's pose
+    return CertifyDerivative(model, state, directions, {"x", "y", "angle"}).verdict;
+  };
+  for (const double length : {1e-7, 1.0, 1e6}) {
+    EXPECT_EQ(verdict(0.101, length), "trustworthy") << length;
+    EXPECT_EQ(verdict(0.1, length).find("one-sided: contact of ball and floor touches"), 0u)
+        << length << ": " << verdict(0.1, length);
+  }
 }
 
 TEST(CertifyEventsTest, ALimitAtTheStartIsOneSidedToo) {
