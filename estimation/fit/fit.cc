@@ -248,11 +248,14 @@ void Certify(RolloutResiduals* residuals, FitResult* result) {
   }
   const ParameterizedScene& scene = residuals->scene();
   std::vector<std::string> names;
+  std::vector<double> sizes;
   for (const ParameterizedScene::Entry& entry : scene.entries()) {
+    const double estimate = result->estimate[static_cast<Eigen::Index>(names.size())];
     names.push_back(entry.name);
+    sizes.push_back(std::max(std::abs(estimate), entry.scale));
   }
-  result->certificate =
-      CertifyDerivative(scene.model(), scene.initial_state(), scene.VariableDerivatives(), names);
+  result->certificate = CertifyDerivative(scene.model(), scene.initial_state(),
+                                          scene.VariableDerivatives(), names, sizes);
   if (result->certificate.verdict != "trustworthy") {
     const std::string warning =
         "the derivatives at the estimate, and with them the intervals, are not trustworthy: " +

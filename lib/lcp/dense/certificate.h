@@ -14,8 +14,8 @@ namespace tangible {
 
 /// Margins below this are reported as near a kink; dimensionless (problem.h, scaled).
 inline constexpr double kNearKinkMargin = 1e-6;
-/// Relative errors of a linear solve above this are not trustworthy: an entry may be off by ten
-/// times what the whole shows, and is to be right to 1e-9.
+/// Relative errors of a linear solve, or of an entry, above this are not trustworthy: an entry may
+/// be off by ten times what is seen, and is to be right to 1e-9.
 inline constexpr double kLinearResidualLimit = 1e-10;
 /// Beyond this condition no digit of a linear system's solution is certain.
 inline constexpr double kConditionLimit = 1e16;
@@ -28,8 +28,8 @@ struct Certificate {
   int degenerate_rows = 0;     ///< rows at a kink: z = s = 0, either mode possible
   int redundant_rows = 0;      ///< rank deficiency: z or y are not unique, v is
   double condition = 1.0;      ///< largest condition estimate of a linear system
-  /// Largest relative residual of a linear solve; of a rollout whose masses are far apart, also
-  /// what its tangent and adjoint differ by.
+  /// Largest relative residual of a linear solve; of a rollout in which that says little (masses
+  /// far apart, redundant rows, many events), also what its tangent and adjoint differ by.
   double linear_residual = 0.0;
   int mode_switches = 0;  ///< over a rollout: contacts that changed mode between steps
   int events = 0;         ///< over a rollout: impacts and other events

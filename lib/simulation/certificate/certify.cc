@@ -365,8 +365,8 @@ double MeasureContradiction(const Model<double>& model, const State<double>& ini
 }  // namespace
 
 Certificate CertifyDerivative(const Model<double>& model, const State<double>& initial,
-                              const RowMatrixXd& directions,
-                              const std::vector<std::string>& names) {
+                              const RowMatrixXd& directions, const std::vector<std::string>& names,
+                              const std::vector<double>& sizes) {
   constexpr double kMostExceeded = 1e6;
   RolloutReport report;
   Certificate certificate = CertifyRollout(
@@ -380,13 +380,13 @@ Certificate CertifyDerivative(const Model<double>& model, const State<double>& i
   // impact multiplies rounding.
   constexpr double kIllConditioned = 1e8;
   constexpr long kManyEvents = 10;
-  // The condition of redundant rows is that of δ.
-  const bool ill_conditioned =
-      certificate.redundant_rows == 0 && certificate.condition > kIllConditioned;
-  if ((HasWideMasses(model) || ill_conditioned || certificate.events >= kManyEvents) &&
+  // Where redundant rows contradict a direction no derivative exists to compare.
+  const bool compare = HasWideMasses(model) || certificate.condition > kIllConditioned ||
+                       certificate.redundant_rows > 0 || certificate.events >= kManyEvents;
+  if (compare && certificate.one_sided != kContradictingRows &&
       report.status == StepStatus::kDone) {
     certificate.linear_residual =
-        std::max(certificate.linear_residual, DualityGap(model, initial, directions));
+        std::max(certificate.linear_residual, DualityGap(model, initial, directions, sizes));
     SetVerdict(certificate);
   }
   return certificate;

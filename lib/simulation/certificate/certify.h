@@ -111,12 +111,14 @@ inline constexpr char kContradictingRows[] =
 inline constexpr char kUndeterminedMotion[] =
     "redundant contacts that slide with different friction leave the motion undetermined";
 
-/// The certificate of the derivatives along `directions` (num_variables x columns, named): of the
-/// rollout, and where rows are redundant (a box on a box) of whether each direction agrees with
-/// them (two rollouts). Where masses are far apart `linear_residual` is at least the gap between
-/// tangent and adjoint (duality.h), both of which are run.
+/// The certificate of the derivatives along `directions` (num_variables x columns, named; `sizes`
+/// as of DualityGap): of the rollout, and where rows are redundant (a box on a box) of whether each
+/// direction agrees with them (two rollouts). Where masses are far apart, rows redundant, a system
+/// ill-conditioned or events many, `linear_residual` is at least the gap between tangent and
+/// adjoint (duality.h), both of which are run.
 Certificate CertifyDerivative(const Model<double>& model, const State<double>& initial,
-                              const RowMatrixXd& directions, const std::vector<std::string>& names);
+                              const RowMatrixXd& directions, const std::vector<std::string>& names,
+                              const std::vector<double>& sizes = {});
 
 /// "contact of ball and floor", "low limit of joint hinge".
 std::string ContactName(const ModelStructure& structure, const ActiveContact& contact);

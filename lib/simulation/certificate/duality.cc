@@ -3,53 +3,255 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <vector>
 
+#include "tangible/dynamics/assembly/assembly.h"
 #include "tangible/simulation/derivatives/rollout_adjoint.h"
 #include "tangible/simulation/derivatives/rollout_tangent.h"
 
 namespace tangible {
+namespace {
+
+// What of S counts beside an entry itself.
+constexpr double kRoundingOfState = 1e-4;
+
+double GyrationRadius(const Model<double>& model, int body) {
+  const BodyIndex& index = model.structure->bodies[body];
+  return std::sqrt(model.numbers[index.inertia] / model.numbers[index.mass]);
+}
+
+// Largest magnitudes of poses and twists, angles at the radius of gyration.
+struct Extent {
+  double pose = 0.0;   // m
+  double twist = 0.0;  // m/s
+};
+
+// The largest of the state, and of its derivative along each direction, during a run.
+class RunExtents {
+ public:
+  RunExtents(const Model<double>& model, Eigen::Index columns) : model_(model), columns_(columns) {
+    for (const int body : model.structure->moving) {
+      radius_.push_back(GyrationRadius(model, body));
+    }
+  }
+  void Add(long k, double t, const State<double>& state, const RowMatrixXd& w_dot);
+  // S of the header for each of a body's three poses or twists.
+  double Scale(Eigen::Index column, bool pose, double size) const {
+    const Extent& change = columns_[column];
+    return pose ? std::max(change.pose, state_.pose / size)
+                : std::max(change.twist, state_.twist / size);
+  }
+  double radius(size_t block) const { return radius_[block]; }
+
+ private:
+  const Model<double>& model_;
+  std::vector<double> radius_;  // of moving blocks
+  Extent state_;
+  std::vector<Extent> columns_;
+  ContactProblem<double> problem_;
+  AssemblyScratch<double> scratch_;
+};
+
+void RunExtents::Add(long k, double t, const State<double>& state, const RowMatrixXd& w_dot) {
+  const ModelStructure& s = *model_.structure;
+  if (k < NumSteps(s.settings)) {
+    AssembleFree(model_, state, t, StepLength(s.settings, k), &problem_, &scratch_);
+  }
+  for (size_t block = 0; block < radius_.size(); ++block) {
+    const int body = s.moving[block];
+    const size_t pose = s.PoseVariable(body, 0);
+    const size_t twist = s.TwistVariable(body, 0);
+    state_.pose = std::max(state_.pose, radius_[block]);
+    for (int i = 0; i < 3; ++i) {
+      const double arm = i == 2 ? radius_[block] : 1.0;
+      const size_t row = 3 * block + i;
+      const double free = problem_.momentum[row] / problem_.mass[row];
+      const double speed = std::max(std::abs(state.twist[3 * body + i]), std::abs(free));
+      state_.twist = std::max(state_.twist, arm * speed);
+      if (i < 2) {
+        state_.pose = std::max(state_.pose, std::abs(state.pose[3 * body + i]));
+      }
+      for (size_t c = 0; c < columns_.size(); ++c) {
+        const auto at = static_cast<Eigen::Index>(c);
+        columns_[c].pose = std::max(columns_[c].pose, arm * std::abs(w_dot(pose + i, at)));
+        columns_[c].twist = std::max(columns_[c].twist, arm * std::abs(w_dot(twist + i, at)));
+      }
+    }
+  }
+}
+
+// The outputs that are compared, and the right-hand sides of (1).
+struct Comparison {
+  std::vector<int> variables;  // of outputs, among [poses | twists]
+  RowMatrixXd by_tangent;      // b, outputs x directions
+  RowMatrixXd allowed;         // |b| + 1e-4 S, alike
+};
+
+Comparison Compare(const ModelStructure& s, const RunExtents& extents, const RowMatrixXd& w_dot,
+                   const std::vector<double>& sizes) {
+  Comparison comparison;
+  for (const bool pose : {true, false}) {
+    for (const int body : s.moving) {
+      for (int i = 0; i < 3; ++i) {
+        comparison.variables.push_back(pose ? s.PoseVariable(body, i) : s.TwistVariable(body, i));
+      }
+    }
+  }
+  const auto outputs = static_cast<Eigen::Index>(comparison.variables.size());
+  comparison.by_tangent.resize(outputs, w_dot.cols());
+  comparison.allowed.resize(outputs, w_dot.cols());
+  for (Eigen::Index row = 0; row < outputs; ++row) {
+    const bool pose = row < outputs / 2;
+    const Eigen::Index place = pose ? row : row - outputs / 2;
+    const double arm = place % 3 == 2 ? extents.radius(static_cast<size_t>(place / 3)) : 1.0;
+    for (Eigen::Index c = 0; c < w_dot.cols(); ++c) {
+      const double size = sizes.empty() ? 1.0 : sizes[static_cast<size_t>(c)];
+      const double b = w_dot(comparison.variables[static_cast<size_t>(row)], c);
+      comparison.by_tangent(row, c) = b;
+      comparison.allowed(row, c) =
+          std::abs(b) + kRoundingOfState * extents.Scale(c, pose, size) / arm;
+    }
+  }
+  return comparison;
+}
+
+// Outputs that have a column of their own where not all do: those with an entry that is rounding,
+// but not 0. That is where the solves of one unit load are refined to less than those of several
+// together (beside masses far greater a round of refinement takes 1 % of what is left).
+std::vector<Eigen::Index> Singles(const Comparison& comparison) {
+  constexpr double kRounding = 1e-10;
+  std::vector<Eigen::Index> rows;
+  for (Eigen::Index row = 0; row < comparison.allowed.rows(); ++row) {
+    for (Eigen::Index c = 0; c < comparison.allowed.cols(); ++c) {
+      const double b = std::abs(comparison.by_tangent(row, c));
+      if (b > 0.0 && b < kRounding * comparison.allowed(row, c)) {
+        rows.push_back(row);
+        break;
+      }
+    }
+  }
+  // Evenly among them, if they are too many.
+  constexpr size_t kMost = kMostDualityColumns / 2;
+  std::vector<Eigen::Index> chosen;
+  for (size_t k = 0; k < std::min(rows.size(), kMost); ++k) {
+    chosen.push_back(rows[k * rows.size() / std::min(rows.size(), kMost)]);
+  }
+  return chosen;
+}
+
+// Outputs in classes whose sizes are alike along every direction, within as few decades as leave no
+// more classes than columns.
+using Classes = std::map<std::vector<int>, std::vector<Eigen::Index>>;
+Classes ClassesOf(const RowMatrixXd& allowed, const std::vector<char>& left_out, size_t columns) {
+  const Eigen::RowVectorXd largest = allowed.colwise().maxCoeff();
+  constexpr double kMostDecades = 1e3;  // doubles have fewer
+  Classes classes;
+  for (double decades = 1.0; decades <= kMostDecades; decades *= 2.0) {
+    classes.clear();
+    for (Eigen::Index row = 0; row < allowed.rows(); ++row) {
+      if (left_out[static_cast<size_t>(row)] != 0) {
+        continue;
+      }
+      std::vector<int> sizes;
+      for (Eigen::Index c = 0; c < allowed.cols(); ++c) {
+        const double size = allowed(row, c) / largest[c];
+        sizes.push_back(size > 0.0 && std::isfinite(size)
+                            ? static_cast<int>(std::floor(-std::log10(size) / decades))
+                            : -1);
+      }
+      classes[sizes].push_back(row);
+    }
+    if (classes.size() <= columns) {
+      break;
+    }
+  }
+  return classes;
+}
+
+// The outputs' weights in the columns of an adjoint, outputs x columns.
+RowMatrixXd WeightsOf(const Comparison& comparison) {
+  const RowMatrixXd& allowed = comparison.allowed;
+  const Eigen::Index outputs = allowed.rows();
+  if (outputs <= kMostDualityColumns) {
+    return RowMatrixXd::Identity(outputs, outputs);
+  }
+  RowMatrixXd weights = RowMatrixXd::Zero(outputs, kMostDualityColumns);
+  Eigen::Index column = 0;
+  std::vector<char> left_out(static_cast<size_t>(outputs), 0);
+  for (const Eigen::Index row : Singles(comparison)) {
+    weights(row, column++) = 1.0;
+    left_out[static_cast<size_t>(row)] = 1;
+  }
+  const size_t columns = static_cast<size_t>(kMostDualityColumns - column);
+  const Classes classes = ClassesOf(allowed, left_out, columns);
+  size_t share = 0;  // outputs a column
+  for (size_t needed = columns + 1; needed > columns;) {
+    ++share;
+    needed = 0;
+    for (const auto& [sizes, rows] : classes) {
+      needed += (rows.size() + share - 1) / share;
+    }
+  }
+  const Eigen::RowVectorXd largest = allowed.colwise().maxCoeff();
+  for (const auto& [sizes, rows] : classes) {
+    for (size_t k = 0; k < rows.size(); ++k) {
+      const double size = allowed.row(rows[k]).cwiseQuotient(largest).maxCoeff();
+      weights(rows[k], column + static_cast<Eigen::Index>(k / share)) =
+          size > 0.0 ? (k % 2 == 0 ? 1.0 : -1.0) / size : 1.0;
+    }
+    column += static_cast<Eigen::Index>((rows.size() + share - 1) / share);
+  }
+  return weights;
+}
+
+}  // namespace
 
 double DualityGap(const Model<double>& model, const State<double>& initial,
-                  const RowMatrixXd& directions) {
-  if (directions.cols() == 0) {
+                  const RowMatrixXd& directions, const std::vector<double>& sizes) {
+  const ModelStructure& s = *model.structure;
+  if (directions.cols() == 0 || s.moving.empty()) {
     return 0.0;
   }
   RowMatrixXd w_dot = directions;
   State<double> final;
-  if (RolloutTangent(model, initial, {}, &w_dot, &final).status != StepStatus::kDone) {
+  RunExtents extents(model, directions.cols());
+  const auto add = [&](long k, double t, const State<double>& state, const RowMatrixXd& dot) {
+    extents.Add(k, t, state, dot);
+  };
+  if (RolloutTangent(model, initial, add, &w_dot, &final).status != StepStatus::kDone) {
     return HUGE_VAL;
   }
-  const Eigen::Index outputs = static_cast<Eigen::Index>(2 * initial.pose.size());
-  // Entries differ by orders of magnitude, and a sum would show the largest alone.
-  VectorX<double> weights(outputs);
-  for (Eigen::Index i = 0; i < outputs; ++i) {
-    const double size = w_dot.row(i).cwiseAbs().maxCoeff();
-    weights[i] = size > 0.0 ? (i % 2 == 0 ? 1.0 : -1.0) / size : 0.0;
-  }
+  const Comparison comparison = Compare(s, extents, w_dot, sizes);
+  const RowMatrixXd weights = WeightsOf(comparison);
   RolloutTape tape;
   tape.Record(model, initial, Factorisations::kKeep, {}, &final);
   const long last = tape.steps();
   RowMatrixXd w_bar;
   tape.Adjoint(
-      model, 1,
+      model, static_cast<int>(weights.cols()),
       [&](long k, RowMatrixXd* w) {
-        if (k == last) {
-          w->topRows(outputs).col(0) += weights;
+        for (size_t i = 0; k == last && i < comparison.variables.size(); ++i) {
+          w->row(comparison.variables[i]) += weights.row(static_cast<Eigen::Index>(i));
         }
       },
       &w_bar);
+  const RowMatrixXd by_adjoint = w_bar.transpose() * directions;
+  const RowMatrixXd by_tangent = weights.transpose() * comparison.by_tangent;
+  const RowMatrixXd allowed =
+      (weights.cwiseAbs2().transpose() * comparison.allowed.cwiseAbs2()).cwiseSqrt();
   double worst = 0.0;
-  for (Eigen::Index c = 0; c < directions.cols(); ++c) {
-    const double by_tangent = weights.dot(w_dot.col(c).head(outputs));
-    const double by_adjoint = w_bar.col(0).dot(directions.col(c));
-    const double terms = std::max(weights.cwiseAbs().dot(w_dot.col(c).head(outputs).cwiseAbs()),
-                                  w_bar.col(0).cwiseAbs().dot(directions.col(c).cwiseAbs()));
-    const double gap = std::abs(by_tangent - by_adjoint);
-    if (gap > 0.0) {
-      worst = std::max(worst, std::isfinite(terms) ? gap / terms : HUGE_VAL);
+  for (Eigen::Index row = 0; row < allowed.rows(); ++row) {
+    for (Eigen::Index c = 0; c < allowed.cols(); ++c) {
+      const double gap = std::abs(by_adjoint(row, c) - by_tangent(row, c));
+      if (gap != 0.0) {
+        const double relative = gap / allowed(row, c);
+        worst = relative <= worst ? worst : relative;
+      }
     }
   }
-  return std::isfinite(worst) ? worst : HUGE_VAL;
+  // Where nothing of an entry is right it does not matter by how much.
+  return std::isfinite(worst) ? std::min(worst, 1.0) : HUGE_VAL;
 }
 
 bool HasWideMasses(const Model<double>& model) {

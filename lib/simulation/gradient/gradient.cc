@@ -191,12 +191,15 @@ bool TimeRollout(const GradientProblem& problem, Stepper* stepper, GradientResul
 
 Certificate CertificateOf(const GradientProblem& problem) {
   std::vector<std::string> names;
+  std::vector<double> sizes;
   for (const ParameterPath& parameter : problem.parameters) {
     names.push_back(parameter.path);
+    sizes.push_back(std::max(std::abs(parameter.value), parameter.scale));
   }
   return CertifyDerivative(
       problem.model, problem.initial,
-      RowMatrixXd(VariableJacobian(problem.scene, problem.structure, problem.directions)), names);
+      RowMatrixXd(VariableJacobian(problem.scene, problem.structure, problem.directions)), names,
+      sizes);
 }
 
 // Empty, or one line: why the derivative has no such side.
