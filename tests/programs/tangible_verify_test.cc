@@ -64,6 +64,23 @@ TEST_F(TangibleVerifyTest, TheCommandPrintedReplaysAScene) {
   EXPECT_EQ(json::parse(Read(Path("one.json")))["scenes"][0], all["scenes"][1]);
 }
 
+TEST_F(TangibleVerifyTest, StartsAreCheckedAloneOrBesideRandomScenes) {
+  const ProgramRun starts =
+      Verify("--starts=2 --seed=7 --stepping=event --out='" + Path("starts.json") + "'");
+  ASSERT_EQ(starts.exit_status, 0) << starts.error;
+  EXPECT_NE(starts.out.find("2 random starts from seed 7"), std::string::npos);
+  const json alone = json::parse(Read(Path("starts.json")));
+  ASSERT_EQ(alone["scenes"].size(), 2u);
+  EXPECT_EQ(alone["scenes"][1]["name"], "start 8");
+  const ProgramRun both =
+      Verify("--random=1 --starts=1 --seed=8 --stepping=event --out='" + Path("both.json") + "'");
+  ASSERT_EQ(both.exit_status, 0) << both.error;
+  const json beside = json::parse(Read(Path("both.json")));
+  ASSERT_EQ(beside["scenes"].size(), 2u);
+  EXPECT_EQ(beside["scenes"][0]["name"], "random 8");
+  EXPECT_EQ(beside["scenes"][1], alone["scenes"][1]);
+}
+
 TEST_F(TangibleVerifyTest, ErrataAreATable) {
   const ProgramRun run = Verify("--errata");
   ASSERT_EQ(run.exit_status, 0) << run.error;
@@ -72,9 +89,10 @@ TEST_F(TangibleVerifyTest, ErrataAreATable) {
 }
 
 TEST_F(TangibleVerifyTest, WrongUsageAndBadInputAreOneLine) {
-  for (const char* flags : {"--random=-2", "--random=0", "--seed=-1", "--threads=-1",
-                            "--threads=1000", "--stepping=leap", "--parameters=gravity/x",
-                            "--errata --out=x.json", "--unknown", "--random=many"}) {
+  for (const char* flags :
+       {"--random=-2", "--random=0", "--starts=-2", "--starts=0", "--seed=-1", "--threads=-1",
+        "--threads=1000", "--stepping=leap", "--parameters=gravity/x", "--errata --out=x.json",
+        "--unknown", "--random=many"}) {
     SCOPED_TRACE(flags);
     ExpectOneLine(Verify(flags), 2, "tangible-verify");
   }

@@ -83,8 +83,11 @@ class Differences {
     AddNoiseOfParameter();
     BestTable(&column);
     if (column.status == DifferenceStatus::kChoicesDiffer && side_ == 0.0 &&
-        choices_differ == ChoicesDiffer::kCompareSides) {
+        choices_differ == ChoicesDiffer::kCompareSides && !CompareSides(&column)) {
+      const VectorX<double> noise = noise_;
+      noise_ += TouchNoise(scene_, *at_.structure);
       CompareSides(&column);
+      noise_ = noise;
     }
     for (size_t k = 0; k < 2; ++k) {
       column.plain[k] = Plain(Bounded(kPlainSteps[k]));
@@ -129,11 +132,9 @@ class Differences {
   }
 
   // On each side runs are compared with each other, and their values with that at the parameter.
-  void CompareSides(DifferenceColumn* column) {
+  bool CompareSides(DifferenceColumn* column) {
     DifferenceColumn sides[2];
     apart_ = true;
-    const VectorX<double> noise = noise_;
-    noise_ += TouchNoise(scene_, *at_.structure);
     for (const int k : {0, 1}) {
       side_ = k == 0 ? 1.0 : -1.0;
       BestTable(&sides[k]);
@@ -141,20 +142,20 @@ class Differences {
     side_ = 0.0;
     apart_ = false;
     choices_ = &at_;
-    noise_ = noise;
     if (sides[0].status != DifferenceStatus::kJudged ||
         sides[1].status != DifferenceStatus::kJudged) {
-      return;
+      return false;
     }
     const VectorX<double> apart = (sides[0].values - sides[1].values).cwiseAbs();
     const VectorX<double> size = sides[0].values.cwiseAbs().cwiseMax(sides[1].values.cwiseAbs());
     const VectorX<double> errors = sides[0].errors + sides[1].errors;
     if (((apart - errors).array() > kSidesAgree * size.maxCoeff()).any()) {
-      return;
+      return false;
     }
     *column = std::move(sides[0]);
     column->values = 0.5 * (column->values + sides[1].values);
     column->errors = errors + apart;
+    return true;
   }
 
   void ForgetSide() { choices_ = apart_ ? nullptr : &at_; }

@@ -45,7 +45,8 @@ enum class ChoicesDiffer {
   kGiveUp,
   /// Differences of each side alone (a body at rest that is thrown up falls down again, and lands
   /// with what it would else have carried): judged where both sides agree to
-  /// 1e-5 of the largest. What leaves by less than the touching tolerance is as uncertain as that.
+  /// 1e-5 of the largest. Where they do not, runs count as uncertain by the touching tolerance, as what
+  /// leaves by less is found to land that much lower.
   kCompareSides,
 };
 

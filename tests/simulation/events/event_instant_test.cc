@@ -76,5 +76,26 @@ TEST(EventInstantTest, SpinAddedToARollingDiscIsSharedAtOnce) {
   }
 }
 
+// A flat box that slides and turns by less than rounding shows rocks to rest: all that its contacts
+// carry, they carry with friction, v = v0 − μ g t.
+TEST(EventInstantTest, ABoxThatRocksToRestKeepsItsFriction) {
+  for (const double turn : {0.0, 1e-6, -1e-6, 1e-5, -1e-5, 1e-4, -1e-4}) {
+    Scene scene = SceneOf(R"({"gravity": [0, -10], "bodies": [
+        {"name": "box", "shape": {"box": {"size": [0.44, 0.48]}}, "mass": 0.5, "inertia": 0.018,
+         "position": [0, 0.24], "velocity": [-0.85, 0], "friction": 0.45},
+        {"name": "floor", "static": true, "friction": 0.45,
+         "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}}],
+      "simulation": {"stepping": "event", "dt": 0.01, "duration": 0.06}})");
+    scene.bodies[0].angular_velocity = turn;
+    Model<double> model;
+    State<double> state;
+    BuildModel(scene, &model, &state);
+    State<double> final;
+    ASSERT_EQ(Rollout(model, state, {}, &final).status, StepStatus::kDone);
+    // What is left is that of a fall by the touching tolerance.
+    EXPECT_NEAR(final.twist[0], -0.85 + 0.45 * 10.0 * 0.06, 1e-9) << turn;
+  }
+}
+
 }  // namespace
 }  // namespace tangible

@@ -4,7 +4,9 @@
 
 #include "../../support/gradients.h"
 #include "../../support/scenes.h"
+#include "../../support/starts.h"
 #include "tangible/simulation/gradient/gradient.h"
+#include "tangible/simulation/stepping/rollout.h"
 
 namespace tangible {
 namespace {
@@ -100,6 +102,68 @@ TEST(GradientSidesTest, AParametersRangeMayEndBeforeTheSideBegins) {
   const GradientResult result = Sided(scene, "bodies/*/friction", DerivativeSide::kMinus);
   EXPECT_FALSE(result.done);
   EXPECT_NE(result.message.find("its range ends within"), std::string::npos) << result.message;
+}
+
+// (−3 f(p) + 4 f(p + h) − f(p + 2h)) / 2h of a rod's final state by its vertical speed.
+VectorX<double> DifferenceOfRods(double friction, double speed_x, double h) {
+  const auto final = [&](double speed_y) {
+    Model<double> model;
+    State<double> state;
+    BuildModel(test_scenes::SlidingRod(friction, speed_x, speed_y), &model, &state);
+    State<double> after;
+    EXPECT_EQ(Rollout(model, state, {}, &after).status, StepStatus::kDone);
+    VectorX<double> values(6);
+    for (int i = 0; i < 3; ++i) {
+      values[i] = after.pose[3 + i];
+      values[3 + i] = after.twist[3 + i];
+    }
+    return values;
+  };
+  return (-3.0 * final(0.0) + 4.0 * final(h) - final(2.0 * h)) / (2.0 * h);
+}
+
+// Thrown up the rod slides on for a flight of 2 v / g before it jams, thrown down it jams at once.
+TEST(GradientSidesTest, ARodThatJamsHasADerivativeOfEachSide) {
+  const Scene scene = test_scenes::SlidingRod(3.0, -2.0);
+  VectorX<double> columns[2];
+  for (const DerivativeSide side : {DerivativeSide::kPlus, DerivativeSide::kMinus}) {
+    const double sign = side == DerivativeSide::kPlus ? 1.0 : -1.0;
+    const GradientResult result = Sided(scene, "bodies/rod/velocity/y", side);
+    ASSERT_TRUE(result.done) << result.message;
+    const VectorX<double> expected = DifferenceOfRods(3.0, -2.0, sign * 2e-4);
+    columns[sign > 0.0 ? 0 : 1] = result.jacobian.col(0);
+    for (int i = 0; i < 6; ++i) {
+      // Runs are as accurate as the touching tolerance, of 5e-11 m.
+      EXPECT_NEAR(result.jacobian(i, 0), expected[i], 2e-5) << i << ", side " << sign;
+    }
+    // What does not open the contact has both sides, and they are the same.
+    const GradientResult along = Sided(scene, "bodies/rod/velocity/x", side);
+    ASSERT_TRUE(along.done) << along.message;
+    EXPECT_NEAR(along.jacobian(3, 0), 0.514339, 1e-6);
+  }
+  EXPECT_NEAR(columns[0][3], -0.0686, 1e-4);
+  EXPECT_NEAR(columns[0][4], 0.5249, 1e-4);
+  EXPECT_NEAR(columns[0][5], 0.7005, 1e-4);
+  EXPECT_NEAR(columns[1][3], -0.4305, 1e-4);
+  EXPECT_NEAR(columns[1][4], 0.2362, 1e-4);
+  EXPECT_NEAR(columns[1][5], 0.9761, 1e-4);
+}
+
+// With less friction than jams it both sides are one.
+TEST(GradientSidesTest, ARodThatSlidesHasOneDerivative) {
+  const double friction = 0.9 * test_scenes::JammingFriction();
+  const Scene scene = test_scenes::SlidingRod(friction, -2.0);
+  for (const DerivativeSide side : {DerivativeSide::kPlus, DerivativeSide::kMinus}) {
+    const double sign = side == DerivativeSide::kPlus ? 1.0 : -1.0;
+    const GradientResult result = Sided(scene, "bodies/rod/velocity/y", side);
+    ASSERT_TRUE(result.done) << result.message;
+    EXPECT_EQ(result.certificate.verdict, "trustworthy");
+    const VectorX<double> expected = DifferenceOfRods(friction, -2.0, sign * 2e-4);
+    for (int i = 0; i < 6; ++i) {
+      EXPECT_NEAR(result.jacobian(i, 0), expected[i], 1e-4 * expected.cwiseAbs().maxCoeff())
+          << i << ", side " << sign;
+    }
+  }
 }
 
 }  // namespace

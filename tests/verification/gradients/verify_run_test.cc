@@ -29,6 +29,16 @@ TEST(VerifyRunTest, RandomJobsAreSeedsInEachStepping) {
   EXPECT_EQ(SceneOf(jobs[1]).simulation.stepping, Stepping::kEvent);
 }
 
+TEST(VerifyRunTest, StartsAreAListOfTheirOwn) {
+  const std::vector<VerifyJob> jobs = RandomJobs(RandomList::kStarts, 3, 2, {Stepping::kEvent});
+  ASSERT_EQ(jobs.size(), 2u);
+  EXPECT_EQ(SceneOf(jobs[1]).name, "start 4");
+  const VerifyResult result = RunVerification(jobs, 1, KeepJacobians::kNo, {});
+  EXPECT_EQ(result.not_run, 0);
+  EXPECT_EQ(result.exceptions_unexplained, 0);
+  EXPECT_EQ(result.scenes[1].replay, "tangible-verify --starts=1 --seed=4 --stepping=event");
+}
+
 TEST(VerifyRunTest, ParametersAreAllNumbersOrAChoiceThatTheSeedMakes) {
   const Scene scene = RandomScene(8);
   const std::vector<ParameterPath> all = AllParameters(scene);

@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/simulation/certificate/start_probe.h"
+
+#include <gtest/gtest.h>
+
+#include "../../support/gradients.h"
+#include "../../support/starts.h"
+
+namespace tangible {
+namespace {
+
+using test_scenes::JammingFriction;
+using test_scenes::SceneOf;
+using test_scenes::SlidingRod;
+
+std::string VerdictOf(const Scene& scene, const std::string& path) {
+  return testing::Jacobian(scene, {path}, GradientMethod::kTangent).certificate.verdict;
+}
+
+TEST(StartProbeTest, ARodThatJamsAtItsStartIsAtAKinkForWhatOpensItsContact) {
+  const Scene scene = SlidingRod(3.0, -2.0);
+  for (const char* path : {"bodies/rod/velocity/y", "bodies/rod/angular_velocity"}) {
+    EXPECT_EQ(VerdictOf(scene, path),
+              std::string("one-sided: contact of floor and rod jams at the start, ") + path +
+                  " opens it");
+  }
+  for (const char* path : {"bodies/rod/velocity/x", "bodies/rod/mass", "gravity/y"}) {
+    EXPECT_EQ(VerdictOf(scene, path), "trustworthy") << path;
+  }
+}
+
+// Below the coefficient at which it jams a change of its vertical speed is carried by the contact,
+// thrown up or pressed down; so it is when it slides the other way, or not at all.
+TEST(StartProbeTest, WhatCannotJamIsTrustworthy) {
+  const double critical = JammingFriction();
+  EXPECT_NEAR(critical, 1.51, 0.01);
+  for (const double share : {0.2, 0.7, 0.95, 0.98}) {
+    // Near it accelerations change so fast that steps have to be short to be integrated.
+    Scene scene = SlidingRod(share * critical, -2.0);
+    scene.simulation.dt = 1e-4;
+    scene.simulation.duration = 5e-3;
+    EXPECT_EQ(VerdictOf(scene, "bodies/rod/velocity/y"), "trustworthy") << share;
+  }
+  for (const double share : {1.02, 1.1, 2.0}) {
+    const std::string verdict =
+        VerdictOf(SlidingRod(share * critical, -2.0), "bodies/rod/velocity/y");
+    EXPECT_EQ(verdict.find("one-sided: contact of floor and rod jams at the start"), 0u)
+        << share << ": " << verdict;
+    EXPECT_EQ(VerdictOf(SlidingRod(share * critical, 2.0), "bodies/rod/velocity/y"), "trustworthy")
+        << share;
+  }
+  EXPECT_EQ(VerdictOf(SlidingRod(1.0, 0.0), "bodies/rod/velocity/y"), "trustworthy");
+  EXPECT_EQ(VerdictOf(SlidingRod(0.0, -2.0), "bodies/rod/velocity/y"), "trustworthy");
+}
+
+// As fast as it turns its foot would rise by itself, and yet friction could press it down: which of
+// both goes on is decided by whether it slides at all.
+TEST(StartProbeTest, ASlipThatWouldJamARisingFootIsAKink) {
+  const Scene scene = SceneOf(R"({"bodies": [{"name": "floor", "static": true, "friction": 3.5,
+        "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}},
+      {"name": "body", "shape": {"capsule": {"length": 0.8715707612767226,
+        "radius": 0.027330959735684363}}, "mass": 1.85, "inertia": 0.105,
+       "position": [0, 0.4484262717080275], "angle": -1.3104099988826334,
+       "velocity": [-2.1696661512425557, -0.5428426435766127],
+       "angular_velocity": 4.83840106641931, "friction": 3.5}],
+    "simulation": {"dt": 0.005, "duration": 0.025, "stepping": "event",
+                   "integrator": "runge_kutta_4"}})");
+  EXPECT_NE(VerdictOf(scene, "bodies/body/velocity/x").find("sets it sliding"), std::string::npos)
+      << VerdictOf(scene, "bodies/body/velocity/x");
+}
+
+TEST(StartProbeTest, BodiesThatTouchAndSlideInOrdinaryFrictionAreTrustworthy) {
+  const auto scene = [](const std::string& body, double friction) {
+    Scene made = SceneOf(R"({"bodies": [{"name": "floor", "static": true,
+        "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}}, )" +
+                         body + R"(], "simulation": {"dt": 0.01, "duration": 0.1,
+        "stepping": "event", "integrator": "runge_kutta_4"}})");
+    for (BasicBody<double>& each : made.bodies) each.friction = friction;
+    return made;
+  };
+  const std::string box = R"({"name": "body", "shape": {"box": {"size": [0.4, 0.2]}}, "mass": 1,
+      "position": [0, 0.1], "velocity": [1.5, 0]})";
+  const std::string disc = R"({"name": "body", "shape": {"circle": {"radius": 0.1}}, "mass": 1,
+      "position": [0, 0.1], "velocity": [1.5, 0]})";
+  for (const double friction : {0.0, 0.1, 0.5, 0.8}) {
+    for (const std::string& body : {box, disc}) {
+      for (const char* path :
+           {"bodies/body/velocity/x", "bodies/body/velocity/y", "bodies/body/angular_velocity"}) {
+        EXPECT_EQ(VerdictOf(scene(body, friction), path), "trustworthy") << friction << ' ' << path;
+      }
+    }
+  }
+}
+
+TEST(StartProbeTest, OnlyContactsWhoseFrictionMayHoldThemAreLookedAt) {
+  const auto may_jam = [](const Scene& scene) {
+    Model<double> model;
+    State<double> start;
+    BuildModel(scene, &model, &start);
+    std::vector<ActiveContact> contacts;
+    EventSearch(model).FindContacts(model, start, 1e-9, &contacts);
+    EXPECT_EQ(contacts.size(), 1u);
+    return MayJam(model, start, contacts, contacts.front());
+  };
+  const double critical = JammingFriction();
+  EXPECT_FALSE(may_jam(SlidingRod(0.0, -2.0)));
+  EXPECT_FALSE(may_jam(SlidingRod(0.85 * critical, -2.0)));
+  EXPECT_TRUE(may_jam(SlidingRod(0.95 * critical, -2.0)));
+  EXPECT_TRUE(may_jam(SlidingRod(0.95 * critical, 2.0)));
+}
+
+}  // namespace
+}  // namespace tangible
