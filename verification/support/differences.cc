@@ -36,7 +36,8 @@ VectorX<double> GapNoise(const Scene& scene, const ModelStructure& structure) {
 
 // What is thrown up by less than the touching tolerance, 1e-10 of the body, lands that much lower
 // than on its surface: a change of poses, and of twists as the motion goes on with it.
-VectorX<double> TouchNoise(const Scene& scene, const ModelStructure& structure) {
+enum class Uncertain { kPoses, kPosesAndTwists };
+VectorX<double> TouchNoise(const Scene& scene, const ModelStructure& structure, Uncertain what) {
   if (scene.simulation.stepping != Stepping::kEvent) {
     return VectorX<double>::Zero(6 * structure.num_blocks());
   }
@@ -53,6 +54,7 @@ VectorX<double> TouchNoise(const Scene& scene, const ModelStructure& structure) 
     const double speed = std::hypot(state.twist[3 * body], state.twist[3 * body + 1]) +
                          size * std::abs(state.twist[3 * body + 2]) + std::sqrt(gravity * size);
     noise.segment<3>(6 * k) << kTouch * size, kTouch * size, kTouch;
+    if (what == Uncertain::kPoses) continue;
     noise.segment<3>(6 * k + 3) << kTouch * speed, kTouch * speed, kTouch * speed / size;
   }
   return noise;
@@ -83,10 +85,13 @@ class Differences {
     AddNoiseOfParameter();
     BestTable(&column);
     if (column.status == DifferenceStatus::kChoicesDiffer && side_ == 0.0 &&
-        choices_differ == ChoicesDiffer::kCompareSides && !CompareSides(&column)) {
+        choices_differ == ChoicesDiffer::kCompareSides) {
       const VectorX<double> noise = noise_;
-      noise_ += TouchNoise(scene_, *at_.structure);
-      CompareSides(&column);
+      noise_ = noise + TouchNoise(scene_, *at_.structure, Uncertain::kPoses);
+      if (!CompareSides(&column)) {
+        noise_ = noise + TouchNoise(scene_, *at_.structure, Uncertain::kPosesAndTwists);
+        CompareSides(&column);
+      }
       noise_ = noise;
     }
     for (size_t k = 0; k < 2; ++k) {

@@ -44,9 +44,9 @@ struct DifferenceColumn {
 enum class ChoicesDiffer {
   kGiveUp,
   /// Differences of each side alone (a body at rest that is thrown up falls down again, and lands
-  /// with what it would else have carried): judged where both sides agree to
-  /// 1e-5 of the largest. Where they do not, runs count as uncertain by the touching tolerance, as what
-  /// leaves by less is found to land that much lower.
+  /// with what it would else have carried): judged where both sides agree to 1e-5 of the largest.
+  /// Poses are uncertain by the touching tolerance, as what leaves by less is found to land that
+  /// much lower; where sides differ, so are twists by what the motion makes of that.
   kCompareSides,
 };
 

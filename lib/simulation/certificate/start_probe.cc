@@ -16,8 +16,11 @@ constexpr double kConfirmed = 16.0;  // by which U is smaller where a kink is co
 constexpr int kMostSteps = 16;       // for contacts to close again
 constexpr double kFlights = 4.0;     // that a run lasts at least
 // Of the derivative's largest entry: what extrapolated quotients of a smooth map may miss. A kink
-// below that is not seen.
+// below that, or below the noise, is not seen.
 constexpr double kApart = 1e-2;
+// Of poses that end within the touching tolerance, and of the speeds' rounding.
+constexpr double kNoise = 3.0;
+constexpr double kRounding = 1e-13;
 // R(τ/2) / R(τ) is 1/4 of a smooth map, 1/2 at a kink and 1 at a jump.
 constexpr double kJumps = 0.75;
 // A direction that moves bodies so much faster than the contact does not throw it.
@@ -231,7 +234,9 @@ class Probe {
     const double apart = (4.0 * of_half - of_whole).cwiseAbs().maxCoeff() / std::abs(shift);
     const double size = std::max(derivative.cwiseAbs().maxCoeff(),
                                  of_whole.cwiseAbs().maxCoeff() / std::abs(shift));
-    if (!(apart > kApart * size)) {
+    const double noise =
+        kNoise * (touch_ / time + kRounding * base.cwiseAbs().maxCoeff()) / std::abs(shift);
+    if (!(apart > std::max(kApart * size, noise))) {
       return {};
     }
     const bool jumps = of_half.cwiseAbs().maxCoeff() > kJumps * of_whole.cwiseAbs().maxCoeff();
