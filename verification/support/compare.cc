@@ -52,7 +52,7 @@ class TermsOfStep {
     std::vector<JacobianEntry> entries;
     LocalJacobianScratch scratch;
     VisitJacobian(model_, t_.record.View(t_.system.contact_block()), JacobianRoute::kByHand,
-                      &scratch, EntryListSink{&entries});
+                  &scratch, EntryListSink{&entries});
     x_.setZero(3 * t_.system.num_blocks(), w_dot.cols());
     t_.rows.setZero(x_.rows(), x_.cols());
     for (const JacobianEntry& e : entries) {

@@ -245,16 +245,14 @@ bool ContactSolver::SolveByLemke(const ContactProblem<double>& problem,
                                  const ContactSolverOptions& options,
                                  ContactSolution<double>* solution, ContactSolverReport* report) {
   int iterations = 0;
-  const bool by_lemke = SolveContactsByLemke(problem, solution, &iterations);
-  report->iterations += iterations;
-  if (by_lemke && Polish(problem, options, solution, report)) {
-    return true;
-  }
   if (options.choice == ContactSolverChoice::kLemke) {
+    const bool by_lemke = SolveContactsByLemke(problem, solution, &iterations);
+    report->iterations += iterations;
     if (!by_lemke) {
       MeasureWithoutContacts(problem, solution, report);
+      return false;
     }
-    return false;
+    return Polish(problem, options, solution, report);
   }
   const auto by_dense = [&] {
     if (!FitsDensePortfolio(problem)) {

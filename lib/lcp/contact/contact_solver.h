@@ -12,9 +12,9 @@
 //    impulses of redundant rows, where the guess is nearly right. Counted as the guess's.
 // 3. Mehrotra's interior point (contact_interior_point.h), and pivoting from its modes where small
 //    margins hide them.
-// 4. Lemke's method: pivoting from all contacts open; then on the dense one-sided form;
-//    for problems that are not proved infeasible pivoting from random starts
-//    (contact_restarts.cc); for those that are not large the dense portfolio's other attempts.
+// 4. Pivoting from all contacts open; for problems that are not proved infeasible pivoting from
+//    random starts (contact_restarts.cc); for those that are not large the dense portfolio. Only
+//    where Lemke's method is asked for it runs on the dense one-sided form.
 //
 // After 3 and 4 the modes are identified and the mode system is solved once more: the polish. A
 // solution counts only by its scaled natural residual, recomputed from the data.

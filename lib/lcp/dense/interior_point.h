@@ -35,10 +35,6 @@ struct InteriorPointOptions {
   double complementarity = kUnpolishedGoal;
   /// ... and the largest residual of the scaled equations, whose data have size 1, below this.
   double residual = kEquationGoal;
-  /// Starting value of the scaled z and s, whose data have size 1.
-  double start = 1.0;
-  /// Least centring σ; 0 is Mehrotra's rule, 0.1 to 0.5 stays near the path: slower, hardier.
-  double min_centring = 0.0;
 };
 
 template <typename T>

@@ -93,8 +93,8 @@ class InteriorPoint {
 
   void Start() {
     x_ = VectorX<T>::Constant(num_equations_, T(0.0));
-    z_ = VectorX<T>::Constant(nz_, T(options_.start));
-    s_ = VectorX<T>::Constant(nz_, T(options_.start));
+    z_ = VectorX<T>::Constant(nz_, T(1.0));
+    s_ = VectorX<T>::Constant(nz_, T(1.0));
   }
 
   // (0, 0, s) + q − K x: by how much each equation is missed.
@@ -183,7 +183,6 @@ class InteriorPoint {
     const T ratio = kappa_affine / kappa;
     T centring = ratio * ratio * ratio;
     if (ValueOf(centring) > 1.0) centring = one;
-    if (ValueOf(centring) < options_.min_centring) centring = T(options_.min_centring);
     for (Eigen::Index i = 0; i < nz_; ++i) {
       rc[i] = centring * kappa - z_[i] * s_[i] - affine.dz[i] * affine.ds[i];
     }

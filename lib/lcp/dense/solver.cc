@@ -62,11 +62,9 @@ class Portfolio {
     return Offer({solution_.v, solution_.y, zero}, LcpSolver::kGuess, kGuessRounds);
   }
 
-  bool TryInteriorPoint(double start, double min_centring) {
+  bool TryInteriorPoint() {
     const InteriorPointOptions settings{.max_iterations = options_.max_iterations,
-                                        .complementarity = kComplementarityGoal,
-                                        .start = start,
-                                        .min_centring = min_centring};
+                                        .complementarity = kComplementarityGoal};
     const auto result = SolveInteriorPoint(problem_, settings);
     solution_.iterations += result.iterations;
     return Offer({result.v, result.y, result.z}, LcpSolver::kInteriorPoint);
@@ -82,7 +80,7 @@ class Portfolio {
 
   // Proximal steps, each a regularised problem by Lemke around the last solution: where rows are
   // redundant, what W is to rounding may have no solution while the problem has.
-  bool TryProximalLemke(const VectorXd& covering, double least_shift) {
+  bool TryProximalLemke(double least_shift) {
     if (!Reduce()) return false;
     const Equilibration scaling = Equilibrate(reduced_->W);
     const VectorXd unit = (scaling.row.cwiseProduct(scaling.col)).cwiseInverse();
@@ -95,7 +93,7 @@ class Portfolio {
       Eigen::MatrixXd W = reduced_->W;
       W.diagonal() += shift * unit;
       const VectorXd q = reduced_->q - shift * unit.cwiseProduct(z);
-      if (!SolveProximal(W, q, covering, &basic)) break;
+      if (!SolveProximal(W, q, &basic)) break;
       const VectorXd last = z;
       z = basic;
       const LcpVector point = PointOf(z);
@@ -148,9 +146,8 @@ class Portfolio {
  private:
   // From the basis z > 0 of the last proximal step, or along a whole path; then once more from
   // where that ended, without the rounding of its pivots.
-  bool SolveProximal(const Eigen::MatrixXd& W, const VectorXd& q, const VectorXd& covering,
-                     VectorXd* z) {
-    const LemkeOptions options{.max_pivots = 0, .covering = covering};
+  bool SolveProximal(const Eigen::MatrixXd& W, const VectorXd& q, VectorXd* z) {
+    const LemkeOptions options{.max_pivots = 0, .covering = VectorXd()};
     LemkeResult result = SolveLemkeFrom(*z, W, q, options);
     solution_.iterations += result.pivots;
     if (result.status != LemkeStatus::kSolved) {
@@ -233,15 +230,7 @@ class Portfolio {
   LcpSolution<double> solution_;
 };
 
-bool TryInteriorPoints(Portfolio& portfolio) {
-  for (const auto& [start, centring] :
-       {std::pair{1.0, 0.2}, {100.0, 0.1}, {1e-2, 0.3}, {1e4, 0.5}}) {
-    if (portfolio.TryInteriorPoint(start, centring)) return true;
-  }
-  return false;
-}
-
-// Covering vectors between 0.1 and 10, log-uniform, from a literal seed; then proximal steps.
+// Proximal steps; then covering vectors between 0.1 and 10, log-uniform, from a literal seed.
 bool TryLemkes(Portfolio& portfolio, Index nz) {
   constexpr int kCoverings = 8;
   std::mt19937 generator(20240607);
@@ -253,15 +242,10 @@ bool TryLemkes(Portfolio& portfolio, Index nz) {
     return covering;
   };
   for (const double least_shift : kLeastShifts) {
-    if (portfolio.TryProximalLemke(VectorXd(), least_shift)) return true;
+    if (portfolio.TryProximalLemke(least_shift)) return true;
   }
   for (int k = 0; k < kCoverings; ++k) {
-    const VectorXd covering = draw();
-    if (portfolio.TryLemke(covering)) return true;
-  }
-  for (int k = 0; k < kCoverings; ++k) {
-    const VectorXd covering = draw();
-    if (portfolio.TryProximalLemke(covering, kLeastShifts[k % 2])) return true;
+    if (portfolio.TryLemke(draw())) return true;
   }
   return false;
 }
@@ -270,10 +254,9 @@ bool RunPortfolio(Portfolio& portfolio, const LcpOptions& options, Index nz) {
   const bool interior_point = options.solver != SolverChoice::kLemke;
   const bool lemke = options.solver != SolverChoice::kInteriorPoint;
   if (options.solver == SolverChoice::kAuto && portfolio.TryGuess()) return true;
-  if (interior_point && portfolio.TryInteriorPoint(1.0, 0.0)) return true;
+  if (interior_point && portfolio.TryInteriorPoint()) return true;
   if (lemke && portfolio.TryLemke(VectorXd())) return true;
   if (portfolio.ProveInfeasible()) return false;
-  if (interior_point && TryInteriorPoints(portfolio)) return true;
   if (lemke && TryLemkes(portfolio, nz)) return true;
   return options.solver == SolverChoice::kAuto && portfolio.TryEnumeration();
 }

@@ -4,9 +4,8 @@
 // The portfolio: a few changes of modes starting from z = 0 (a step without impulses: where
 // friction leaves the outcome open, as for a box between two walls, the one without squeeze is
 // chosen); then interior point, then Lemke, each followed by the active-set polish; then a checked
-// proof of infeasibility; then a few deterministic further attempts (other starts and centring,
-// other covering vectors, proximal steps, enumeration of small problems). What solved it is in
-// the result. Success is decided only by the scaled residual recomputed from the data (problem.h).
+// proof of infeasibility; then a few deterministic further attempts (proximal steps, other covering
+// vectors, enumeration of small problems). What solved it is in the result. Success is decided only by the scaled residual recomputed from the data (problem.h).
 
 #include "tangible/lcp/dense/problem.h"
 #include "tangible/lcp/dense/tolerances.h"
