@@ -112,6 +112,24 @@ bool DriftsFar(const Model<double>& model, const ContactProblem<double>& correct
   return false;
 }
 
+// Whether a correction moves a body by a tenth of its radius of gyration, or turns it by a tenth of
+// a radian, for errors that are a million times less: then the solution is rounding, as between
+// masses 1e40 apart, and would throw the body out from between its neighbours.
+bool ThrowsOut(const SolvedNode& node, double error) {
+  constexpr double kShareOfBody = 0.1;
+  constexpr double kMostOfError = 1e6;
+  const std::vector<double>& mass = node.problem.mass;
+  for (int k = 0; k < node.problem.num_bodies; ++k) {
+    const double* moved = &node.solution.v[3 * static_cast<size_t>(k)];
+    const double radius = std::sqrt(mass[3 * k + 2] / mass[3 * k]);
+    const double far = std::max(std::hypot(moved[0], moved[1]), radius * std::abs(moved[2]));
+    if (far > std::max(kShareOfBody * radius, kMostOfError * error)) {
+      return true;
+    }
+  }
+  return false;
+}
+
 }  // namespace
 
 const NystromTableau& NystromTableau::Of(Integrator integrator) {
@@ -417,6 +435,12 @@ bool SegmentFlow::CorrectPoses(const Model<double>& model, Segment* segment, std
     last = errors.share;
     if (!Solve(modes, &node)) {
       *message = "projection onto joints and contacts is singular";
+      return false;
+    }
+    if (ThrowsOut(node, error)) {
+      *message =
+          "projection onto joints and contacts: a body would move a million times farther than its "
+          "rows are off: masses are too far apart";
       return false;
     }
     AddBodies(structure, 1.0, node.solution.v, &segment->after.pose);
