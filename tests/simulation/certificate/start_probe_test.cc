@@ -92,6 +92,31 @@ TEST(StartProbeTest, BodiesThatTouchAndSlideInOrdinaryFrictionAreTrustworthy) {
   }
 }
 
+// Links that lie on the floor end as they are whichever is turned: there is nothing but rounding to
+// compare.
+TEST(StartProbeTest, WhereNothingDependsOnADirectionRoundingIsNoJump) {
+  std::string bodies = R"({"name": "floor", "static": true, "friction": 0.8,
+      "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}})";
+  std::string joints;
+  for (int i = 0; i < 12; ++i) {
+    const std::string name = "link" + std::to_string(i);
+    bodies += R"(, {"name": ")" + name +
+              R"(", "shape": {"capsule": {"length": 0.2, "radius": 0.03}}, "mass": 1,
+        "friction": 0.8, "velocity": [0.5, 0], "position": [)" +
+              std::to_string(0.2 * i) + ", 0.03]}";
+    if (i > 0) {
+      joints += (i > 1 ? ", " : "") + std::string(R"({"name": "pin)") + std::to_string(i) +
+                R"(", "type": "revolute", "bodies": [")" + name + R"(", "link)" +
+                std::to_string(i - 1) + R"("], "anchor": [)" + std::to_string(0.2 * i - 0.1) +
+                ", 0.03]}";
+    }
+  }
+  const Scene scene = SceneOf(R"({"bodies": [)" + bodies + R"(], "joints": [)" + joints +
+                              R"(], "no_contact": [["link*", "link*"]], "simulation":
+      {"dt": 0.01, "duration": 0.05, "stepping": "event", "integrator": "runge_kutta_4"}})");
+  EXPECT_EQ(VerdictOf(scene, "bodies/link8/angular_velocity"), "trustworthy");
+}
+
 TEST(StartProbeTest, OnlyContactsWhoseFrictionMayHoldThemAreLookedAt) {
   const auto may_jam = [](const Scene& scene) {
     Model<double> model;
