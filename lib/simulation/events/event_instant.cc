@@ -24,9 +24,12 @@ namespace {
 // The share of max_events_per_step after which slow impacts are a rattle.
 constexpr int kRattling = 4;
 
-// Whether contact i of an impact is one of a body without joints that touches fixed ones on parallel
-// faces alone, and its friction does not come near to turning its law around, n M⁻¹ n > 1.1 μ |n
-// M⁻¹ t|: held with it such a body can neither wedge nor jam.
+// Whether contact i of an impact is one of a body without joints that touches fixed ones on
+// parallel faces alone, and its friction does not come near to turning its law around,
+//
+//   n M⁻¹ n > 1.1 μ |n M⁻¹ t|
+//
+// Held with friction such a body can neither wedge nor jam.
 bool SlidesFreely(const ModelStructure& structure, const Impulses& impact, size_t i) {
   constexpr double kNear = 1.1;
   constexpr double kParallel = 1e-6;

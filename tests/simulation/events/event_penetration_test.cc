@@ -51,6 +51,29 @@ TEST(EventPenetrationTest, WhatOpensWithinAnotherReturnsWhereItTurns) {
   }
 }
 
+// The same in Jets, which find the time of the return from its equation alone. It slides without
+// friction until then, and with that of its weight afterwards: poses are pushed out, not twists.
+TEST(EventPenetrationTest, TheReturnInJetsIsThatOfTheClosedForm) {
+  if (!testing::HaveJets()) {
+    GTEST_SKIP() << "no width of Jets is built";
+  }
+  const double v = 0.03;
+  const double t = 0.02 - v / kG;  // held so long
+  const Scene scene = DeepBall(v, "runge_kutta_4", "0.02");
+  const std::vector<std::string> paths = {"bodies/ball/velocity/y", "bodies/ball/position/y",
+                                          "gravity/y"};
+  for (const GradientMethod method : {GradientMethod::kJetImplicit, GradientMethod::kJet}) {
+    const GradientResult r = Jacobian(scene, paths, method, CertificatePass::kSkip);
+    EXPECT_NEAR(r.values[3], 0.3 - 0.2 * kG * t, 1e-12);
+    const double expected[3][2] = {
+        {(v - 0.05) / kG, 0.2}, {1.0, 0.0}, {v * (0.5 * v - 0.05) / (kG * kG), 0.2 * 0.02}};
+    for (int k = 0; k < 3; ++k) {
+      EXPECT_NEAR(r.jacobian(1, k), expected[k][0], 1e-12) << k;
+      EXPECT_NEAR(r.jacobian(3, k), expected[k][1], 1e-12) << k;
+    }
+  }
+}
+
 TEST(EventPenetrationTest, TheReturnIsAnEventOfItsOwn) {
   const Scene scene = DeepBall(0.03, "runge_kutta_4", "0.005");
   Model<double> model;
