@@ -185,8 +185,8 @@ TEST_F(TangibleSimulateTest, SummarySaysWhereImpulsesAreNotUnique) {
 }
 
 // Whatever is counted as a fallback has its kind: a box that rocks is held, a ball whose bounces do
-// not end gives them up, a rod that catches needs pivots (Painlevé), and a solver that the scene asks
-// for is none.
+// not end gives them up, a rod that catches needs pivots (Painlevé), and a solver that the scene
+// asks for is none.
 TEST_F(TangibleSimulateTest, FallbacksAreTheSumOfTheirKinds) {
   const auto run = [&](const std::string& bodies, const std::string& floor,
                        const std::string& settings) {

@@ -2,6 +2,7 @@
 #include "layout_rules.h"
 
 #include <algorithm>
+#include <cctype>
 #include <cstddef>
 #include <map>
 #include <set>
@@ -227,6 +228,24 @@ std::string WrongComment(const CommentLine& before, const CommentLine& line,
   return "";
 }
 
+/// Whether a line of a module whose tolerances have a header has one elsewhere: a number with a
+/// negative exponent.
+bool HasTolerance(const std::string& path, const std::string& line) {
+  if (!StartsWith(path, "lib/lcp/") || EndsWith(path, "/tolerances.h")) {
+    return false;
+  }
+  const std::string code = line.substr(0, line.find("//"));
+  for (std::size_t at = code.find("e-"); at != std::string::npos; at = code.find("e-", at + 1)) {
+    const auto is_digit = [&](std::size_t i) {
+      return i < code.size() && std::isdigit(static_cast<unsigned char>(code[i])) != 0;
+    };
+    if (at > 0 && is_digit(at - 1) && is_digit(at + 2)) {
+      return true;
+    }
+  }
+  return false;
+}
+
 }  // namespace
 
 std::vector<std::string> CheckSource(const SourceFile& file) {
@@ -248,6 +267,9 @@ std::vector<std::string> CheckSource(const SourceFile& file) {
     const std::string problem = WrongInclude(file.path, line);
     if (!problem.empty()) {
       report(number, problem);
+    }
+    if (HasTolerance(file.path, line)) {
+      report(number, "a tolerance outside of its module's tolerances.h");
     }
     const CommentLine comment = ReadComment(line);
     const std::string wrong = WrongComment(before_last, last, comment);
@@ -271,6 +293,32 @@ std::vector<std::string> CheckSource(const SourceFile& file) {
     report(number, "more than " + std::to_string(kMaxLines) + " lines");
   }
   return problems;
+}
+
+std::vector<std::string> UndocumentedTolerances(const std::string& header,
+                                                const std::string& readme) {
+  std::vector<std::string> missing;
+  std::istringstream lines(header);
+  for (std::string line; std::getline(lines, line);) {
+    const std::string start = "inline constexpr double ";
+    if (!StartsWith(line, start)) {
+      continue;
+    }
+    for (std::string more; !Contains(line, ";") && std::getline(lines, more);) {
+      line += ' ' + more.substr(more.find_first_not_of(' '));
+    }
+    const std::string name =
+        line.substr(start.size(), line.find_first_of(" [", start.size()) - start.size());
+    const std::size_t equals = line.find("= ");
+    std::string value = line.substr(equals + 2, line.find(';') - equals - 2);
+    value.erase(
+        std::remove_if(value.begin(), value.end(), [](char c) { return c == '{' || c == '}'; }),
+        value.end());
+    if (!Contains(readme, "| `" + name + "` | " + value + " |")) {
+      missing.push_back(name);
+    }
+  }
+  return missing;
 }
 
 std::vector<std::string> UnlistedHeaders(const std::string& cmake_lists,

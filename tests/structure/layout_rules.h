@@ -28,8 +28,13 @@ struct SourceFile {
 ///  - an equation or a table in a comment that a formatter has wrapped like running text: a line
 ///    indented by three spaces that begins with a word for which the line before it had no room, or
 ///    a wrapped line without punctuation before a line that is indented further;
+///  - a number with a negative exponent in lib/lcp outside of a tolerances.h;
 ///  - more than 800 lines.
 std::vector<std::string> CheckSource(const SourceFile& file);
+
+/// The constants of a tolerances.h whose name and value are not in a row of the README's table.
+std::vector<std::string> UndocumentedTolerances(const std::string& header,
+                                                const std::string& readme);
 
 /// The headers (paths relative to the folder of the CMakeLists.txt) that tangible_module(...) does
 /// not list under HEADERS. Empty if there is no tangible_module. `_inl.h` need not be listed.

@@ -158,6 +158,18 @@ TEST(LayoutRules, EquationsInCommentsAreNotWrapped) {
   EXPECT_EQ(problems("// λ̇" + std::string(96, 'x') + "\n"), 0U);
 }
 
+TEST(LayoutRules, TolerancesHaveAHeaderAndATable) {
+  EXPECT_EQ(NumProblems("lib/lcp/dense/a.cc", "if (x < 1e-9) {}\n"), 1U);
+  EXPECT_EQ(NumProblems("lib/lcp/dense/a.cc", "if (x < 1e9) {}  // not 1e-9\n"), 0U);
+  EXPECT_EQ(NumProblems("lib/lcp/dense/tolerances.h", "inline constexpr double kA = 1e-9;\n"), 0U);
+  const std::string header =
+      "inline constexpr double kA = 1e-9;\n"
+      "inline constexpr double kB[] = {1e-6, 1e-9};\n";
+  EXPECT_TRUE(UndocumentedTolerances(header, "| `kA` | 1e-9 |\n| `kB` | 1e-6, 1e-9 |\n").empty());
+  EXPECT_EQ(UndocumentedTolerances(header, "| `kA` | 1e-8 |\n| `kB` | 1e-6, 1e-9 |\n"),
+            (std::vector<std::string>{"kA"}));
+}
+
 TEST(LayoutRules, EveryHeaderOfAModuleIsInstalled) {
   const std::string lists =
       "tangible_module(lcp\n  SOURCES a.cc\n  HEADERS a.h sub/b.h\n  DEPENDS c.h)\nother(HEADERS "
@@ -176,6 +188,18 @@ TEST(Layout, EverySource) {
     const std::string relative = path.lexically_relative(kTop).generic_string();
     for (const std::string& problem : CheckSource({relative, ReadText(path)})) {
       ADD_FAILURE() << problem;
+    }
+  }
+}
+
+TEST(Layout, EveryToleranceStandsInTheTable) {
+  const std::string readme = ReadText(kTop / "lib/lcp/README.md");
+  for (const char* folder : {"dense", "system", "contact"}) {
+    const std::string header = ReadText(kTop / "lib/lcp" / folder / "tolerances.h");
+    ASSERT_NE(header.find("inline constexpr double"), std::string::npos) << folder;
+    for (const std::string& name : UndocumentedTolerances(header, readme)) {
+      ADD_FAILURE() << name << " of lib/lcp/" << folder
+                    << "/tolerances.h has no row with its value in lib/lcp/README.md";
     }
   }
 }

@@ -3,7 +3,7 @@
 //
 // From scene physics to the contact problem of an instant, at one of three levels:
 //
-//   velocity       M v⁺ − Aᵀ y − Σ rᵀ λ = p         a step of length h at time t, or an impact (h = 0)
+//   velocity       M v⁺ − Aᵀ y − Σ rᵀ λ = p     a step of length h at t, or an impact (h = 0)
 //                  M = diag(m, m, I) + h diag(c, c, c_θ) + h Σ dampers       damping is implicit
 //                  p = diag(m, m, I) v + h m g + impulses of springs, forces, efforts at t
 //                  A v⁺ = b,  b = 0, or −(β/h) C(q) with Baumgarte's correction

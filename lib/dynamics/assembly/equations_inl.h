@@ -8,7 +8,7 @@
 // problem; the Jacobian evaluates it in Jets of the few variables that it reads, and hands on the
 // derivatives of its residual. A builder has
 //
-//   Scalar; kKeepsJoints                      whether RowsOf and RatesOf keep what was evaluated
+//   Scalar; kKeepsJoints                      whether RowsOf and RatesOf keep rows
 //   Begin()                                   before each element
 //   Number(i), Numbers(first, count, buffer)  parameters of the model
 //   PoseOf, Angle, TwistOf, Moving (body)     where a body is, and how it moves
@@ -22,8 +22,8 @@
 //   Body(k, mass, momentum)                   M x = momentum
 //   Push(a, row_a, b, row_b, amount)          momentum += rowᵀ amount
 //   AddForce(body, value)                     the same of a force or impulse on one body
-//   Along(a, row_a, b, row_b, push, damping)  momentum += rowᵀ (push − damping · speed along it)
-//   Joint(j, rows, rhs)                       row · x = rhs, less what prescribed motion adds
+//   Along(a, row_a, b, row_b, push, damping)  momentum += rowᵀ (push − damping · speed)
+//   Joint(j, rows, rhs)                       row · x = rhs − prescribed speed
 //   Contact(i, contact, rows, c_n, c_t)       n · x + c_n, t · x + c_t
 
 #include "tangible/dynamics/assembly/assembly.h"

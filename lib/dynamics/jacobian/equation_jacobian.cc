@@ -358,8 +358,7 @@ class EntryBuilder : private internal::LocalEntries<Sink> {
     }
   }
 
-  // A contact's entries times one column u, by the geometry's adjoint: the sum of u times the
-  // contact's rows is
+  // A contact's entries times one column u, by the geometry's adjoint. The sum of u times its rows:
   //   α_a·n_a + α_b·n_b + β_a·t_a + β_b·t_b + γ gap.
   void ContactAdjointByHand(int i, const ActiveContact& contact) {
     const Pose<double> pose_a = state_.PoseOf(contact.a);

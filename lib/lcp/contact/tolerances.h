@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// The tolerances of lcp/contact: of what each is a share, then why. lib/lcp/README.md has the table.
+// The tolerances of lcp/contact: of what each is a share, then why; lib/lcp/README.md has a table.
 
 namespace tangible {
 

@@ -10,13 +10,10 @@
 #include <limits>
 #include <string>
 
+#include "tangible/lcp/dense/tolerances.h"
+
 namespace tangible {
 
-/// Margins below this are reported as near a kink; dimensionless (problem.h, scaled).
-inline constexpr double kNearKinkMargin = 1e-6;
-/// Relative errors of a linear solve, or of an entry, above this are not trustworthy: an entry may
-/// be off by ten times what is seen, and is to be right to 1e-9.
-inline constexpr double kLinearResidualLimit = 1e-10;
 /// Beyond this condition no digit of a linear system's solution is certain.
 inline constexpr double kConditionLimit = 1e16;
 

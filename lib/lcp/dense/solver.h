@@ -5,7 +5,8 @@
 // friction leaves the outcome open, as for a box between two walls, the one without squeeze is
 // chosen); then interior point, then Lemke, each followed by the active-set polish; then a checked
 // proof of infeasibility; then a few deterministic further attempts (proximal steps, other covering
-// vectors, enumeration of small problems). What solved it is in the result. Success is decided only by the scaled residual recomputed from the data (problem.h).
+// vectors, enumeration of small problems). What solved it is in the result. Success is decided only
+// by the scaled residual recomputed from the data (problem.h).
 
 #include "tangible/lcp/dense/problem.h"
 #include "tangible/lcp/dense/tolerances.h"

@@ -37,6 +37,11 @@ inline constexpr double kSingularMatrix = 1e-14;
 inline constexpr double kRankTolerance = 1e-12;
 /// Of the largest pivot: the same of (v, y), refined once.
 inline constexpr double kReducedRank = 1e-13;
+/// Of the scale of the row: margins below it are reported as near a kink.
+inline constexpr double kNearKinkMargin = 1e-6;
+/// Of the largest entry: derivatives that differ by more between tangent and adjoint are not
+/// trustworthy: an entry may be off by ten times what the whole shows, and is to be right to 1e-9.
+inline constexpr double kLinearResidualLimit = 1e-10;
 /// Of the right-hand side: equations that leave more of it contradict each other.
 inline constexpr double kConsistent = 1e-9;
 /// Of the norm of the matrix times that of its target: where a gradient counts as 0.

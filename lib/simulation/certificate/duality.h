@@ -13,10 +13,10 @@
 //   gap = |a − b| / (|b| + 1e-4 S)                                                    (1)
 //
 // S, per unit of the parameter, in m or m/s, at the radius of gyration for an angle:
-//   the largest change of a pose (of a twist) of any body that the direction causes during the run,
-//   or, if that is more, the largest coordinate (speed) of any body during the run, over the
-//   parameter's size. A speed is also that of the free motion: what gravity would add in a step to
-//   a body at rest, and contacts take.
+// the largest change of a pose (of a twist) of any body that the direction causes during the run,
+// or, if that is more, the largest coordinate (speed) of any body during the run, over the
+// parameter's size. A speed is also that of the free motion: what gravity would add in a step to a
+// body at rest, and contacts take.
 //
 // So gap ≤ 1e-10 is |a − b| ≤ 1e-10 |b| + 1e-14 S: a change of the parameter by all of its size
 // changes the output by 1e-14 of what it is. The magnitudes of an adjoint's terms, |w̄|ᵀ |d|, are
@@ -34,10 +34,10 @@ namespace tangible {
 
 inline constexpr int kMostDualityColumns = 64;
 
-/// The largest gap (1), at most 1, over outputs and directions (num_variables x columns); `sizes`: how large
-/// each direction's parameter is, > 0, in its own unit; empty: 1 each. Infinite where the rollout
-/// fails or a derivative is not finite; 0 without directions. Cost: a tangent, and an adjoint of up
-/// to kMostDualityColumns columns.
+/// The largest gap (1), at most 1, over outputs and directions (num_variables x columns); `sizes`:
+/// how large each direction's parameter is, > 0, in its own unit; empty: 1 each. Infinite where the
+/// rollout fails or a derivative is not finite; 0 without directions. Cost: a tangent, and an
+/// adjoint of up to kMostDualityColumns columns.
 double DualityGap(const Model<double>& model, const State<double>& initial,
                   const RowMatrixXd& directions, const std::vector<double>& sizes = {});
 

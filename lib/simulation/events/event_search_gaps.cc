@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The search for gaps that close, but for pairs of bodies: returns out of penetration, and joints to
-// their limits.
+// The search for gaps that close, but for pairs of bodies: returns out of penetration, and joints
+// to their limits.
 #include <algorithm>
 #include <cmath>
 #include <limits>

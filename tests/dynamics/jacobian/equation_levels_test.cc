@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The entries of ∂R/∂w at each level, by both routes, against differences of the assembled residual.
+// The entries of ∂R/∂w at each level, by both routes, against differences of the residual.
 #include <gtest/gtest.h>
 
 #include <cmath>

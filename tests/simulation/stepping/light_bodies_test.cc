@@ -105,8 +105,8 @@ TEST(LightBodies, OneBoxOfAnyMassStands) {
   }
 }
 
-// Beyond 1e-30 too they stand, or say that they do not: the light one is not thrown out from between
-// others, as the projection onto its contacts once did.
+// Beyond 1e-30 too they stand, or say that they do not: the light one is not thrown out from
+// between others, as the projection onto its contacts once did.
 TEST(LightBodies, HeavyBoxesDoNotFallThroughALightOne) {
   for (const int decade : {6, 10, 12, 15, 16, 20, 24, 30, 40, 50, 60, 70, 80, 100, 150, 200, 300}) {
     SCOPED_TRACE("mass 1e-" + std::to_string(decade));
