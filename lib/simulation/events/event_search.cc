@@ -39,9 +39,10 @@ double EventSearch::SpeedTolerance(const Model<double>& model, const State<doubl
     const double own = SpeedOf(&state.twist[3 * body], size);
     speed = std::max(speed, own);
     // A face whose gaps round is turned by as much, and slides across its neighbours' normals.
-    const double turned =
-        size > 0.0 ? kTurnedFace * lengths_.Rounding(state, body, body) / size : 0.0;
-    rounding = std::max(rounding, turned * own);
+    if (own > 0.0 && size > 0.0) {
+      const double turned = kTurnedFace * lengths_.Rounding(state, body, body) / size;
+      rounding = std::max(rounding, turned * own);
+    }
   }
   return kSlowShare * speed + rounding + 1e-200;
 }
@@ -147,7 +148,6 @@ double EventSearch::ModeValue(const Model<double>& model, Sample* sample, const 
 }
 
 void EventSearch::SearchClosed(const Model<double>& model, Event* event) {
-  const double slow = SpeedTolerance(model, segment_->before);
   for (size_t i = 0; i < segment_->contacts.size(); ++i) {
     const ContactMode mode = segment_->modes[i];
     Event trial;
@@ -179,7 +179,7 @@ void EventSearch::SearchClosed(const Model<double>& model, Event* event) {
     if (SlidingSign(mode) != 0.0) {
       trial.kind = EventKind::kSlipEnds;
       try_function(
-          SlidingSign(mode) * SpeedsOf(model, segment_->before, segment_->contacts[i]).slip, slow);
+          SlidingSign(mode) * SpeedsOf(model, segment_->before, segment_->contacts[i]).slip, slow_);
     }
     const Sample& end = *At(model, event->length);
     if (!end.good) {
@@ -202,7 +202,7 @@ void EventSearch::SearchClosed(const Model<double>& model, Event* event) {
       }
     }
     const double tolerance =
-        std::max(kForceTolerance * scale, mass * slow / model.structure->settings.dt);
+        std::max(kForceTolerance * scale, mass * slow_ / model.structure->settings.dt);
     const double normal = start.normal_impulse[i];
     trial.kind = EventKind::kLiftOff;
     try_function(normal, tolerance);
@@ -242,6 +242,7 @@ bool EventSearch::Run(const Model<double>& model, const std::vector<ActiveContac
                       Segment* segment, std::string* message) {
   segment_ = segment;
   touching_ = &touching;
+  slow_ = SpeedTolerance(model, segment->before);
   num_samples_ = 0;
   all_good_ = true;
   const long most = kEvaluationsOfEvent * (1L + model.structure->settings.max_events_per_step);

@@ -97,12 +97,13 @@ class EventSearch {
   }
   bool MovesLittle(const Model<double>& model, const State<double>& before,
                    const State<double>& after, double length, int a, int b) const;
-  double TouchStart(const Model<double>& model, double speed, double acceleration) const;
+  double TouchStart(double speed, double acceleration) const;
 
   Lengths lengths_;
   SegmentFlow flow_;
   Segment* segment_ = nullptr;
   const std::vector<ActiveContact>* touching_ = nullptr;
+  double slow_ = 0.0;            ///< the speed tolerance as the segment starts, m/s
   std::vector<double> closing_;  ///< a body: bound on its points' speed over the segment
   std::vector<Sample> samples_;
   int num_samples_ = 0;

@@ -77,11 +77,10 @@ bool EventSearch::MovesLittle(const Model<double>& model, const State<double>& b
 
 // From a start at which a pair touches and separates with `speed`: a time by which it has left and
 // not yet returned.
-double EventSearch::TouchStart(const Model<double>& model, double speed,
-                               double acceleration) const {
+double EventSearch::TouchStart(double speed, double acceleration) const {
   const double start = speed > 0.0 && acceleration > 0.0 ? 0.5 * speed / acceleration : kInfinity;
   const double sixteenth = segment_->length / 16.0;
-  return speed <= SpeedTolerance(model, segment_->before) ? sixteenth : std::min(start, 1e9);
+  return speed <= slow_ ? sixteenth : std::min(start, 1e9);
 }
 
 void EventSearch::SearchReturn(const Model<double>& model, const ActiveContact& contact,
@@ -96,7 +95,7 @@ void EventSearch::SearchReturn(const Model<double>& model, const ActiveContact& 
     const double gap = GapAndSpeed(model, sample.motion.after, contact, &speed);
     return std::max(gap, length * speed);
   };
-  const double tolerance = length * SpeedTolerance(model, segment_->before);
+  const double tolerance = length * slow_;
   double a = 0.0;
   double speed;
   GapAndSpeed(model, segment_->before, contact, &speed);
@@ -162,7 +161,7 @@ void EventSearch::SearchLimit(const Model<double>& model, int joint, double side
       SearchReturn(model, limit, touch, event);
       return;
     }
-    from = TouchStart(model, rate_before, 2.0 * std::abs(rate_after - rate_before) / event->length);
+    from = TouchStart(rate_before, 2.0 * std::abs(rate_after - rate_before) / event->length);
     allowed = std::max(touch, touch - contact.gap);
   }
   const double rate = 1.1 * std::max(std::abs(rate_before), std::abs(rate_after)) +

@@ -73,7 +73,6 @@ class EventSearch::PairSearch {
         touching_(*search->touching_),
         touch_(search->lengths_.Touch(segment_.before, a, b)),
         located_(search->GapTolerance(segment_.before, a, b)),
-        slow_(search->SpeedTolerance(model, segment_.before)),
         closed_(std::any_of(segment_.contacts.begin(), segment_.contacts.end(),
                             [&](const ActiveContact& c) { return OfPair(c, a, b); })) {}
 
@@ -126,7 +125,6 @@ class EventSearch::PairSearch {
   const std::vector<ActiveContact>& touching_;
   const double touch_;    ///< gap below which the pair touches, m
   const double located_;  ///< to which its gaps are located, m
-  const double slow_;     ///< speed below which what touches rests, m/s
   const bool closed_;     ///< the pair has closed contacts
   ActiveContact nearest_;
   Vector2<double> normal_{0.0, 0.0};
@@ -284,7 +282,7 @@ void EventSearch::PairSearch::SearchFrom(double from, double allowed, Counts cou
       return value;
     }
     const bool approaches = value > 0.0 || !all || !Contains(touching_, nearest_) ||
-                            SpeedsOf(model_, sample.motion.after, nearest_).normal < -slow_;
+                            SpeedsOf(model_, sample.motion.after, nearest_).normal < -search_.slow_;
     return approaches ? value : touch_;
   };
   const auto rate = [&](double x, double y) { return ClosingSpeed(x, y, counts); };
@@ -320,7 +318,7 @@ bool EventSearch::PairSearch::SearchTouching() {
     const double speed = SpeedsOf(model_, segment_.before, contact).normal;
     const double change =
         end.good ? std::abs(SpeedsOf(model_, end.motion.after, contact).normal - speed) : 0.0;
-    from = std::min(from, search_.TouchStart(model_, speed, 2.0 * change / event_.length));
+    from = std::min(from, search_.TouchStart(speed, 2.0 * change / event_.length));
     allowed = std::max(allowed, touch_ - contact.gap);
   }
   SearchFrom(from, allowed, Counts::kAll);
