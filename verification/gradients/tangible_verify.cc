@@ -27,7 +27,7 @@ DEFINE_string(parameters, "",
 DEFINE_int32(random, -1,
              "number of random scenes; -1: 100 if neither scenes nor --starts are given, else 0");
 DEFINE_int32(starts, -1,
-             "number of random scenes that start in contact, near what contacts can do; -1: 20 if "
+             "number of random scenes that start in contact, near what contacts can do; -1: 10 if "
              "neither scenes nor --random are given, else 0");
 DEFINE_int32(seed, 1, "of the first random scene of each kind; the next have the next seeds");
 DEFINE_string(stepping, "", "of random scenes: fixed, event or both; empty: all that there is");
@@ -43,7 +43,7 @@ namespace {
 constexpr int kMostThreads = 256;
 constexpr int kMostRandom = 1000000;
 constexpr int kDefaultRandom = 100;
-constexpr int kDefaultStarts = 20;
+constexpr int kDefaultStarts = 10;
 
 // The steppings that --stepping asks for; empty with a line if the engine lacks one.
 std::vector<Stepping> Steppings(std::string* error) {
@@ -186,7 +186,7 @@ int Main(int argc, char** argv) {
                    "[--out=R.json] [--report=R.html]",
        .description =
            "Differentiates the final state of scenes by adjoint, tangent, Jets and differences, "
-           "and compares them\nentry by entry. Without scenes: 100 random ones and 20 starts. Exit "
+           "and compares them\nentry by entry. Without scenes: 100 random ones and 10 starts. Exit "
            "status 1 "
            "where a bound does not hold.",
        .version = TANGIBLE_VERSION,

@@ -53,7 +53,7 @@ class StartMaker {
 
   void Settings() {
     SimulationSettings& s = scene_.simulation;
-    const double steps[] = {0.001, 0.002, 0.005, 0.01};
+    const double steps[] = {0.0002, 0.0005, 0.001, 0.005};
     s.dt = steps[random_.Integer(0, 3)];
     s.duration = s.dt * random_.Integer(3, 12);
     const double kind = U(0.0, 1.0);

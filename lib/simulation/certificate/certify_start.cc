@@ -112,6 +112,34 @@ double Acceleration(const Model<double>& model, const Segment* segment) {
   return largest;
 }
 
+// Of contacts that touch, those that may jam, and those that touch a body of one of them: what they
+// are spared or given passes on to it.
+std::vector<ActiveContact> ThatMayJam(const Model<double>& model, const State<double>& start,
+                                      const std::vector<ActiveContact>& touching) {
+  const ModelStructure& s = *model.structure;
+  std::vector<char> taken(touching.size(), 0);
+  std::vector<char> jams(s.bodies.size(), 0);  // bodies
+  for (bool more = true; more;) {
+    more = false;
+    for (size_t i = 0; i < touching.size(); ++i) {
+      const ActiveContact& contact = touching[i];
+      if (taken[i] == 0 && (jams[contact.a] != 0 || jams[contact.b] != 0 ||
+                            MayJam(model, start, touching, contact))) {
+        taken[i] = 1;
+        more = true;
+        for (const int body : {contact.a, contact.b}) {
+          jams[body] = s.bodies[body].block >= 0 ? 1 : 0;
+        }
+      }
+    }
+  }
+  std::vector<ActiveContact> found;
+  for (size_t i = 0; i < touching.size(); ++i) {
+    if (taken[i] != 0) found.push_back(touching[i]);
+  }
+  return found;
+}
+
 }  // namespace
 
 // Contacts that touch as the run starts: in the impacts of its first instant and in the first
@@ -193,7 +221,7 @@ void RolloutCertifier::AddStart(const Model<double>& model, const EventRecord& r
   }
 }
 
-// Beside contacts with friction that may jam, runs.
+// Where contacts may jam runs are compared.
 void RolloutCertifier::ProbeStarts(const Model<double>& model, const State<double>& start,
                                    const std::vector<const ActiveContact*>& touching,
                                    const Segment* first) {
@@ -205,12 +233,7 @@ void RolloutCertifier::ProbeStarts(const Model<double>& model, const State<doubl
       resting.push_back(*contact);
     }
   }
-  std::vector<ActiveContact> may_jam;
-  for (const ActiveContact& contact : resting) {
-    if (MayJam(model, start, resting, contact)) {
-      may_jam.push_back(contact);
-    }
-  }
+  const std::vector<ActiveContact> may_jam = ThatMayJam(model, start, resting);
   if (may_jam.empty()) {
     return;
   }

@@ -92,6 +92,21 @@ TEST(StartProbeTest, BodiesThatTouchAndSlideInOrdinaryFrictionAreTrustworthy) {
   }
 }
 
+// The disc's own contact cannot jam, but what it spares the box under it, whose does.
+TEST(StartProbeTest, WhatRestsOnABodyThatJamsIsLookedAtToo) {
+  const Scene scene = SceneOf(R"({"bodies": [{"name": "belt", "kinematic": true, "friction": 3.02,
+        "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}, "velocity": [-0.36, 0]},
+      {"name": "box", "shape": {"box": {"size": [0.174, 0.336]}}, "mass": 2.5, "inertia": 0.0224,
+       "position": [0, 0.168], "velocity": [0.4, 0], "friction": 3.02},
+      {"name": "disc", "shape": {"circle": {"radius": 0.1}}, "mass": 1.9, "inertia": 0.00756,
+       "position": [0, 0.436], "velocity": [0.4, 0], "friction": 3.02}],
+    "simulation": {"dt": 0.005, "duration": 0.02, "stepping": "event",
+                   "integrator": "runge_kutta_4"}})");
+  const std::string verdict = VerdictOf(scene, "bodies/disc/velocity/y");
+  EXPECT_NE(verdict.find("touches at the start, bodies/disc/velocity/y"), std::string::npos)
+      << verdict;
+}
+
 // Links that lie on the floor end as they are whichever is turned: there is nothing but rounding to
 // compare.
 TEST(StartProbeTest, WhereNothingDependsOnADirectionRoundingIsNoJump) {

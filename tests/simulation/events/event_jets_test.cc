@@ -174,5 +174,34 @@ TEST(EventJetsTest, UnrolledJetsLeaveOutWhatIsRoundingOfARedundantRow) {
   EXPECT_LT((jets.jacobian - adjoint.jacobian).cwiseAbs().maxCoeff(), 1e-8);
 }
 
+// A tall box whose sliding all but jams: its implicit stage does not contract, and Newton's method
+// is for the derivatives alone, as values are known.
+TEST(EventJetsTest, AStageThatDoesNotContractIsDifferentiatedAtItsValues) {
+  if (!testing::HaveJets()) {
+    GTEST_SKIP() << "no width of Jets is built";
+  }
+  const Scene scene = test_scenes::SceneOf(R"({"bodies": [
+      {"name": "floor", "static": true, "friction": 1.2324094627714344,
+       "shape": {"half_plane": {"normal": [0.24567553698649075, 0.9693521189569864],
+                                "offset": 0}}},
+      {"name": "box", "shape": {"box": {"size": [0.25097734287150597, 0.6386085223226504]}},
+       "mass": 2.190264286950023, "inertia": 0.07644385413189067,
+       "position": [0.07844524582288326, 0.3095182621487256], "angle": -0.248216526409452,
+       "velocity": [-2.3506602388176296, 0.5957584505676823], "friction": 1.2324094627714344}],
+    "simulation": {"stepping": "event", "integrator": "trapezoidal", "dt": 0.005,
+                   "duration": 0.005}})");
+  const std::vector<std::string> paths = {"bodies/*/friction", "bodies/box/mass"};
+  const RowMatrixXd tangent =
+      testing::Jacobian(scene, paths, GradientMethod::kTangent, CertificatePass::kSkip).jacobian;
+  const RowMatrixXd jets =
+      testing::Jacobian(scene, paths, GradientMethod::kJetImplicit, CertificatePass::kSkip)
+          .jacobian;
+  EXPECT_GT(tangent.cwiseAbs().maxCoeff(), 0.1);
+  for (Eigen::Index k = 0; k < tangent.cols(); ++k) {
+    EXPECT_LE((jets - tangent).col(k).cwiseAbs().maxCoeff(),
+              1e-11 * tangent.col(k).cwiseAbs().maxCoeff());
+  }
+}
+
 }  // namespace
 }  // namespace tangible
