@@ -437,7 +437,7 @@ bool SegmentFlow::CorrectPoses(const Model<double>& model, Segment* segment, std
       *message = "projection onto joints and contacts is singular";
       return false;
     }
-    if (ThrowsOut(node, error)) {
+    if (ThrowsOut(node, errors.error)) {
       *message =
           "projection onto joints and contacts: a body would move a million times farther than its "
           "rows are off: masses are too far apart";
