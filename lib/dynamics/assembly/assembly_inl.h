@@ -147,11 +147,11 @@ class ProblemBuilder {
              const T& damping) {
     if constexpr (kLevel == Level::kVelocity) {
       // Without derivatives 0 is nothing; with them its derivative counts.
-      const bool has_derivatives = NumDerivatives<T>::value > 0;
-      if (has_derivatives || push != T(0.0)) {
+      constexpr bool kHasDerivatives = NumDerivatives<T>::value > 0;
+      if (kHasDerivatives || push != T(0.0)) {
         Push(a, row_a, b, row_b, push);
       }
-      if (has_derivatives || ValueOf(damping) != 0.0) {
+      if (kHasDerivatives || ValueOf(damping) != 0.0) {
         const T prescribed = PrescribedSpeed(s_, state_, a, row_a, b, row_b);
         Push(a, row_a, b, row_b, T(-damping * prescribed));
         p_.dampers.push_back({s_.bodies[a].block, s_.bodies[b].block, row_a, row_b, damping});

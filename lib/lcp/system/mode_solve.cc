@@ -21,12 +21,15 @@ bool ModeSolve::Solve(const ContactProblem<double>& problem, const ContactSoluti
   const size_t num_joint_rows = 3 * problem.joints.size();
   const std::vector<int>& block_of = system->contact_block();
   const auto sticks = [&](size_t i) { return modes[i] == ContactMode::kSticking; };
-  rhs_.assign(3 * static_cast<size_t>(system->num_blocks()), 0.0);
-  start_.assign(rhs_.size(), 0.0);
-  std::copy(problem.momentum.begin(), problem.momentum.end(), rhs_.begin());
+  std::vector<double>& rhs = centre != nullptr ? rhs_ : x_;
+  rhs.assign(3 * static_cast<size_t>(system->num_blocks()), 0.0);
+  if (centre != nullptr) {
+    start_.assign(rhs.size(), 0.0);
+  }
+  std::copy(problem.momentum.begin(), problem.momentum.end(), rhs.begin());
   for (size_t j = 0; j < problem.joints.size(); ++j) {
     const size_t row = first_joint + 3 * j;
-    std::copy_n(problem.joints[j].rhs, problem.joints[j].rows, &rhs_[row]);
+    std::copy_n(problem.joints[j].rhs, problem.joints[j].rows, &rhs[row]);
     if (centre != nullptr) {
       std::copy_n(&centre->joint_impulse[3 * j], 3, &start_[row]);
     }
@@ -37,8 +40,8 @@ bool ModeSolve::Solve(const ContactProblem<double>& problem, const ContactSoluti
     }
     const ContactBlock<double>& contact = problem.contacts[i];
     const size_t row = 3 * static_cast<size_t>(block_of[i]);
-    rhs_[row] = contact.driven ? contact.offset : -contact.c_n;
-    rhs_[row + 1] = sticks(i) ? -contact.c_t : 0.0;
+    rhs[row] = contact.driven ? contact.offset : -contact.c_n;
+    rhs[row + 1] = sticks(i) ? -contact.c_t : 0.0;
     if (centre != nullptr) {
       start_[row] = contact.driven ? contact.offset : centre->normal_impulse[i];
       start_[row + 1] = sticks(i) ? centre->tangent_impulse[i] : 0.0;
@@ -49,12 +52,11 @@ bool ModeSolve::Solve(const ContactProblem<double>& problem, const ContactSoluti
     x_.resize(rhs_.size());
     system->Residual<false>(problem, modes, rhs_.data(), start_.data(), 1, x_.data());
     system->SolveProximal(problem, modes, x_.data(), 1);
+    for (size_t i = 0; i < x_.size(); ++i) {
+      x_[i] += start_[i];
+    }
   } else {
-    x_ = rhs_;
     system->Solve(problem, modes, x_.data(), 1);
-  }
-  for (size_t i = 0; i < x_.size(); ++i) {
-    x_[i] += start_[i];
   }
   const auto joints = x_.begin() + static_cast<std::ptrdiff_t>(first_joint);
   solution->v.assign(x_.begin(), joints);
