@@ -17,7 +17,7 @@ constexpr int kIterationsPerStage = 30;
 // Of the cost: a stage only has to lead to the next.
 constexpr double kStageTolerance = 1e-6;
 
-/// The unknown numbers of a moving body's state in the rows of w = [poses | twists | numbers].
+/// The unknown numbers of a moving body's state in the rows of w = [poses | twists | parameters].
 int StateRow(const ModelStructure& s, int i) {
   const int body = s.moving[i / 6];
   const int component = i % 6;

@@ -93,7 +93,7 @@ class ParameterizedScene {
   const Model<double>& model() const { return model_; }
   const State<double>& initial_state() const { return state_; }
 
-  /// d [poses | twists | numbers] / d p where Set left off: num_variables x size().
+  /// d [poses | twists | the model's parameters] / d p where Set left off: num_variables x size().
   RowMatrixXd VariableDerivatives() const;
   /// d [at x, at y of each point] / d p: 2 points x size(), constant.
   const RowMatrixXd& point_derivatives() const { return point_derivatives_; }

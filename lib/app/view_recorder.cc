@@ -13,7 +13,7 @@ int ViewIndex(const ModelStructure& structure, int body) {
 }
 
 Vector2<double> PointAt(const Model<double>& model, int number) {
-  return {model.numbers[number], model.numbers[number + 1]};
+  return {model.parameters[number], model.parameters[number + 1]};
 }
 
 ViewJoint MakeJoint(const Model<double>& model, const JointIndex& joint) {

@@ -23,22 +23,6 @@ double CpuSeconds() {
   return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
 }
 
-const char* Name(SolvedBy solver) {
-  switch (solver) {
-    case SolvedBy::kDirect:
-      return "direct";
-    case SolvedBy::kGuess:
-      return "guess";
-    case SolvedBy::kInteriorPoint:
-      return "interior_point";
-    case SolvedBy::kLemke:
-      return "lemke";
-    case SolvedBy::kNothing:
-      break;
-  }
-  return "none";
-}
-
 void JudgeSolved(double residual, Answer* answer) {
   answer->residual = residual;
   answer->wrong = !(residual <= kResidualBound) || answer->known == Known::kInfeasible ||
@@ -101,7 +85,7 @@ Answer ByContacts(const ContactCase& one, Way way, std::uint64_t seed) {
   const double start = CpuSeconds();
   const ContactSolverReport report = solver.Solve(one.problem, {}, &solution);
   answer.seconds = CpuSeconds() - start;
-  answer.solver = Name(report.solved_by);
+  answer.solver = NameOf(report.rung);
   answer.solved = report.solved;
   if (answer.solved) JudgeSolved(RecomputedResidual(one.problem, solution), &answer);
   return answer;

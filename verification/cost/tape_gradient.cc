@@ -83,7 +83,7 @@ class TapedRollout {
   std::vector<double> Gradient(double* loss, std::string* message) {
     variables_.assign(initial_.pose.begin(), initial_.pose.end());
     variables_.insert(variables_.end(), initial_.twist.begin(), initial_.twist.end());
-    variables_.insert(variables_.end(), model_.numbers.begin(), model_.numbers.end());
+    variables_.insert(variables_.end(), model_.parameters.begin(), model_.parameters.end());
     trace_on(kTape, 1, kOperations, kLocations, kValues, kCoefficients, 0);
     const bool recorded = Record(loss, message);
     trace_off();
@@ -99,12 +99,12 @@ class TapedRollout {
 
  private:
   bool Record(double* loss, std::string* message) {
-    Model<adouble> model{model_.structure, std::vector<adouble>(model_.numbers.size())};
+    Model<adouble> model{model_.structure, std::vector<adouble>(model_.parameters.size())};
     State<adouble> state;
     state.pose.resize(initial_.pose.size());
     state.twist.resize(initial_.twist.size());
     size_t next = 0;
-    for (std::vector<adouble>* part : {&state.pose, &state.twist, &model.numbers}) {
+    for (std::vector<adouble>* part : {&state.pose, &state.twist, &model.parameters}) {
       for (adouble& x : *part) {
         x <<= variables_[next++];
       }

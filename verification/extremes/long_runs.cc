@@ -29,7 +29,7 @@ void AddConserved(const MeasuredRun& run, double steps, Finding* finding) {
   // Of its parts: they may cancel, and the arm grows with the way.
   const double parts =
       std::hypot(run.x("box"), run.y("box")) * before.head<2>().norm() +
-      std::abs(run.omega("box")) * run.model.numbers[run.model.structure->bodies[0].inertia];
+      std::abs(run.omega("box")) * run.model.parameters[run.model.structure->bodies[0].inertia];
   finding->figures.push_back({"change of angular momentum over its parts",
                               (after[2] - before[2]) / parts, rounding, "1",
                               "nothing acts: rounding, 4 eps a step"});

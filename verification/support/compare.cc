@@ -106,11 +106,12 @@ class TermsOfStep {
       const int body = s_.moving[k];
       const BodyIndex& index = s_.bodies[body];
       for (int i = 0; i < 3; ++i) {
-        const double gravity = i < 2 ? t_.record.h * model_.numbers[kGravityX + i] : 0.0;
+        const double gravity = i < 2 ? t_.record.h * model_.parameters[kGravityX + i] : 0.0;
         const double sum = std::abs(t_.record.new_twist[3 * body + i]) + speed[3 * k + i] +
                            std::abs(t_.record.before.twist[3 * body + i]) + std::abs(gravity);
-        const int mass = s_.NumberVariable(i < 2 ? index.mass : index.inertia);
-        const int damping = s_.NumberVariable(i < 2 ? index.linear_damping : index.angular_damping);
+        const int mass = s_.ParameterVariable(i < 2 ? index.mass : index.inertia);
+        const int damping =
+            s_.ParameterVariable(i < 2 ? index.linear_damping : index.angular_damping);
         t_.rows.row(3 * k + i) +=
             sum * (w_dot.row(mass).cwiseAbs() + t_.record.h * w_dot.row(damping).cwiseAbs());
       }

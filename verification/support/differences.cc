@@ -27,7 +27,7 @@ VectorX<double> GapNoise(const Scene& scene, const ModelStructure& structure) {
   VectorX<double> noise = VectorX<double>::Zero(6 * structure.num_blocks());
   for (int k = 0; k < structure.num_blocks(); ++k) {
     const BodyIndex& body = structure.bodies[structure.moving[k]];
-    const double arm = std::sqrt(model.numbers[body.inertia] / model.numbers[body.mass]);
+    const double arm = std::sqrt(model.parameters[body.inertia] / model.parameters[body.mass]);
     const double speed = coordinate / scene.simulation.dt;
     noise.segment<3>(6 * k + 3) << speed, speed, speed / arm;
   }

@@ -69,7 +69,8 @@ ErrorScale ScaleOf(const Scene& scene, const std::vector<ParameterPath>& paramet
   scale.duration = scene.simulation.duration;
   for (const int body : model.structure->moving) {
     const BodyIndex& index = model.structure->bodies[body];
-    scale.gyration.push_back(std::sqrt(model.numbers[index.inertia] / model.numbers[index.mass]));
+    scale.gyration.push_back(
+        std::sqrt(model.parameters[index.inertia] / model.parameters[index.mass]));
   }
   for (const ParameterPath& parameter : parameters) scale.parameters.push_back(parameter.scale);
   double low[2] = {HUGE_VAL, HUGE_VAL};

@@ -107,8 +107,8 @@ class ProblemBuilder {
   }
 
   void Begin() {}
-  const T& Number(int i) const { return model_.numbers[i]; }
-  const T* Numbers(int first, int, T*) const { return &model_.numbers[first]; }
+  const T& Number(int i) const { return model_.parameters[i]; }
+  const T* Numbers(int first, int, T*) const { return &model_.parameters[first]; }
   const Pose<T>& PoseOf(int body) const { return scratch_.poses[body]; }
   const T& Angle(int body) const { return state_.pose[3 * body + 2]; }
   const T* TwistOf(int body, T*) const { return &state_.twist[3 * body]; }
@@ -121,7 +121,7 @@ class ProblemBuilder {
   JointRows<T>& RowsOf(int j) { return scratch_.joints[j]; }
   JointRates<T>& RatesOf(int j) { return scratch_.rates[kLevel == Level::kAcceleration ? j : 0]; }
   ContactRateScratch<T>* RateScratch() { return &scratch_.contact; }
-  T Restitution(int i) const { return EvaluateCoefficient((*restitution_)[i], model_.numbers); }
+  T Restitution(int i) const { return EvaluateCoefficient((*restitution_)[i], model_.parameters); }
   T Approach(const ActiveContact& contact, const ContactRows<T>& rows) const {
     return RelativeSpeed(state_, contact.a, rows.normal_a, contact.b, rows.normal_b);
   }
@@ -187,7 +187,7 @@ class ProblemBuilder {
     block.normal_b = rows.normal_b;
     block.tangent_a = rows.tangent_a;
     block.tangent_b = rows.tangent_b;
-    block.friction = EvaluateCoefficient((*friction_)[i], model_.numbers);
+    block.friction = EvaluateCoefficient((*friction_)[i], model_.parameters);
     block.has_friction = (*friction_)[i].value > 0.0;
     block.c_n = c_n;
     block.c_t = c_t;

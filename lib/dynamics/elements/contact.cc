@@ -10,7 +10,7 @@ CoefficientSource Own(const Model<double>& model, int number) {
   CoefficientSource source;
   source.numbers[0] = number;
   source.derivatives[0] = 1.0;
-  source.value = model.numbers[number];
+  source.value = model.parameters[number];
   return source;
 }
 
@@ -18,8 +18,8 @@ CoefficientSource Mix(const Model<double>& model, int first, int second, Mixing 
   CoefficientSource source;
   source.numbers[0] = first;
   source.numbers[1] = second;
-  const double x = model.numbers[first];
-  const double y = model.numbers[second];
+  const double x = model.parameters[first];
+  const double y = model.parameters[second];
   double* d = source.derivatives;
   switch (mixing) {
     case Mixing::kAverage:

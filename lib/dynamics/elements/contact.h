@@ -177,8 +177,8 @@ template <typename T>
 void EvaluateLimitRows(const Model<T>& model, const JointRows<T>& joint_rows,
                        const ActiveContact& contact, ContactRows<T>* rows) {
   const JointIndex& joint = model.structure->joints[contact.joint];
-  EvaluateLimitRows(model.numbers[contact.side > 0.0 ? joint.low : joint.high], joint_rows, contact,
-                    rows);
+  EvaluateLimitRows(model.parameters[contact.side > 0.0 ? joint.low : joint.high], joint_rows,
+                    contact, rows);
 }
 
 }  // namespace tangible

@@ -19,7 +19,7 @@ class GradientVisitor : private internal::LocalEntries<EntryListSink> {
       JointRows<LocalJet> rows;
       LocalJointRows(joint, &locals, &rows);
       Emit(locals, 0, contact.side * rows.coordinate);
-      sink_(0, s_.NumberVariable(contact.side > 0.0 ? joint.low : joint.high), -contact.side);
+      sink_(0, s_.ParameterVariable(contact.side > 0.0 ? joint.low : joint.high), -contact.side);
       return;
     }
     ContactRows<LocalJet> rows;

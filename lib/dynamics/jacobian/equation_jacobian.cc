@@ -260,14 +260,14 @@ class EntryBuilder : private internal::LocalEntries<Sink> {
       if constexpr (kLevel == Level::kVelocity) {
         change -= before_[3 * body + i];
       }
-      sink_(3 * k + i, s_.NumberVariable(inertial),
+      sink_(3 * k + i, s_.ParameterVariable(inertial),
             i < 2 ? change - weight * x_[kGravityX + i] : change);
       if constexpr (kLevel == Level::kCorrection) {
         continue;
       }
-      sink_(3 * k + i, s_.NumberVariable(damping), weight * damped_[3 * body + i]);
+      sink_(3 * k + i, s_.ParameterVariable(damping), weight * damped_[3 * body + i]);
       if (i < 2) {
-        sink_(3 * k + i, s_.NumberVariable(kGravityX + i), -weight * x_[inertial]);
+        sink_(3 * k + i, s_.ParameterVariable(kGravityX + i), -weight * x_[inertial]);
       }
       sink_(3 * k + i, s_.TwistVariable(body, i),
             kLevel == Level::kVelocity ? -x_[inertial] : x_[damping]);
@@ -292,8 +292,8 @@ class EntryBuilder : private internal::LocalEntries<Sink> {
       // Columns: the arm's change with θ and with the anchor's two components.
       const double dx[3] = {-s * ax - c * ay, c, -s};
       const double dy[3] = {arm[0], s, c};
-      const int variables[3] = {s_.PoseVariable(body, 2), s_.NumberVariable(anchor),
-                                s_.NumberVariable(anchor + 1)};
+      const int variables[3] = {s_.PoseVariable(body, 2), s_.ParameterVariable(anchor),
+                                s_.ParameterVariable(anchor + 1)};
       const double turn = unknown_[3 * body + 2];
       const double omega = before_[3 * body + 2];
       const double along = kLevel == Level::kAcceleration ? -omega * omega : share;
@@ -343,9 +343,9 @@ class EntryBuilder : private internal::LocalEntries<Sink> {
       if (row < 2) {
         continue;
       }
-      sink_(row, s_.NumberVariable(joint.damping), sign * weight * speed);
+      sink_(row, s_.ParameterVariable(joint.damping), sign * weight * speed);
       if (joint.effort_signal < 0) {
-        sink_(row, s_.NumberVariable(joint.effort), -sign * weight);
+        sink_(row, s_.ParameterVariable(joint.effort), -sign * weight);
       } else if (slope != 0.0) {
         sink_(row, TimeVariable(s_), -sign * slope);
       }
@@ -399,7 +399,7 @@ class EntryBuilder : private internal::LocalEntries<Sink> {
       const int count =
           FeatureNumbers(index.shape, index.num_shape_numbers, is_edge, feature, used);
       for (int k = 0; k < count; ++k) {
-        sink_.w_bar[s_.NumberVariable(index.shape_numbers + used[k])] -= side.numbers[k];
+        sink_.w_bar[s_.ParameterVariable(index.shape_numbers + used[k])] -= side.numbers[k];
       }
     };
     add(contact.a, contact.feature.kind == FeatureKind::kEdgeVertex, contact.feature.a, a_bar);
@@ -438,7 +438,7 @@ class EntryBuilder : private internal::LocalEntries<Sink> {
     for (int k = 0; k < 2 && sign != 0.0; ++k) {
       if (friction.numbers[k] >= 0) {
         EmitRowTimesVariable(contact.a, rows.tangent_a, contact.b, rows.tangent_b,
-                             s_.NumberVariable(friction.numbers[k]),
+                             s_.ParameterVariable(friction.numbers[k]),
                              sign * solved_.solution->normal_impulse[i] * friction.derivatives[k]);
       }
     }
@@ -447,7 +447,7 @@ class EntryBuilder : private internal::LocalEntries<Sink> {
   void EmitCoefficient(const CoefficientSource& source, int row, double factor) {
     for (int k = 0; k < 2; ++k) {
       if (source.numbers[k] >= 0) {
-        sink_(row, s_.NumberVariable(source.numbers[k]), factor * source.derivatives[k]);
+        sink_(row, s_.ParameterVariable(source.numbers[k]), factor * source.derivatives[k]);
       }
     }
   }

@@ -5,7 +5,7 @@
 // by entry.
 //
 // The equations R(x; w) = 0 determine x = (v⁺, y, λ), or (a, y, λ), or (δ, y, λ), and have the
-// variables w = [poses | twists | numbers | t]; the time is one of accelerations alone.
+// variables w = [poses | twists | parameters | t]; the time is one of accelerations alone.
 //   R1 = M x − p − Aᵀ y − Σ (nᵀ λn + tᵀ λt)              rows of moving bodies
 //   R2 = A x − b                                         rows of joints
 //   R3 = n x + c_n, and t x + c_t where sticking         rows of closed contacts

@@ -39,14 +39,14 @@ class LocalEntries {
                LocalJacobianScratch* scratch, const Sink& sink)
       : model_(model),
         s_(*model.structure),
-        x_(model.numbers),
+        x_(model.parameters),
         state_(state),
         scratch_(*scratch),
         sink_(sink) {}
 
  protected:
   LocalJet LocalNumber(int number, Locals* locals) {
-    return locals->Add(x_[number], s_.NumberVariable(number));
+    return locals->Add(x_[number], s_.ParameterVariable(number));
   }
 
   Pose<LocalJet> LocalPose(int body, Locals* locals) {

@@ -15,8 +15,9 @@ Lengths::Lengths(const Model<double>& model) {
     radius_.push_back(radius);
     smallest = bounded ? std::min(smallest, radius) : smallest;
     const bool rod = index.shape == ShapeType::kNone && index.block >= 0;
-    size_.push_back(rod ? std::sqrt(3.0 * model.numbers[index.inertia] / model.numbers[index.mass])
-                        : radius);
+    size_.push_back(
+        rod ? std::sqrt(3.0 * model.parameters[index.inertia] / model.parameters[index.mass])
+            : radius);
   }
   smallest_radius_ = std::isfinite(smallest) ? smallest : 1.0;
 }

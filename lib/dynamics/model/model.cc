@@ -320,7 +320,7 @@ std::shared_ptr<const ModelStructure> BuildStructure(const BasicScene<T>& scene)
   AddBodies(scene, &places, structure.get());
   AddJoints(scene, &places, structure.get());
   AddForcesAndPairs(scene, &places, structure.get());
-  structure->num_numbers = places.next();
+  structure->num_parameters = places.next();
   return structure;
 }
 
@@ -331,12 +331,12 @@ void BuildModelWithStructure(const BasicScene<T>& scene,
   model->structure = structure;
   const int world = model->structure->world();
   *state = DrawnState(scene);
-  model->numbers.clear();
-  model->numbers.reserve(model->structure->num_numbers);
-  Append(scene.gravity, &model->numbers);
-  FillBodies(scene, &model->numbers);
-  FillJoints(scene, *state, world, &model->numbers);
-  FillForcesAndPairs(scene, *state, world, &model->numbers);
+  model->parameters.clear();
+  model->parameters.reserve(model->structure->num_parameters);
+  Append(scene.gravity, &model->parameters);
+  FillBodies(scene, &model->parameters);
+  FillJoints(scene, *state, world, &model->parameters);
+  FillForcesAndPairs(scene, *state, world, &model->parameters);
   ApplyInitialJoints(scene, state);
 }
 

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// The model: numbers of type T made from a scene, in one flat index, and the structure that says
+// The model: parameters of type T made from a scene, in one flat index, and the structure that says
 // what each is.
 //
-// The structure (who is joined to whom, which shapes, where each number stands) is made once and
+// The structure (who is joined to whom, which shapes, where each parameter stands) is made once and
 // does not depend on T. The variables of a step are numbered:
-//   [ poses (3 a body) | twists (3 a body) | numbers ]
+//   [ poses (3 a body) | twists (3 a body) | parameters ]
 // and each contact, joint, spring, force and body reads only a few of them (equation_jacobian.h).
 
 #include <cstdint>
@@ -21,7 +21,7 @@
 
 namespace tangible {
 
-/// Places of a body's numbers; −1 where it has none.
+/// Places of a body's parameters; −1 where it has none.
 struct BodyIndex {
   std::string name;
   Motion motion = Motion::kStatic;
@@ -50,14 +50,14 @@ struct JointIndex {
   int effort_signal = -1;                              ///< into signals; replaces effort
 };
 
-/// Local anchors (2 + 2), stiffness, damping, rest length: seven numbers from `numbers` on.
+/// Local anchors (2 + 2), stiffness, damping, rest length: seven parameters from `numbers` on.
 struct SpringIndex {
   std::string name;
   int a = -1, b = -1;
   int numbers = -1;
 };
 
-/// at (2), force (2), torque: five numbers from `numbers` on.
+/// at (2), force (2), torque: five parameters from `numbers` on.
 struct ForceIndex {
   std::string name;
   int body = -1;
@@ -85,7 +85,7 @@ struct ModelStructure {
   std::vector<std::pair<int, int>> joined;  ///< bodies with a joint without contact, ascending
   std::vector<int> moving;                  ///< body of each block
   bool joint_loops = false;
-  int num_numbers = 0;
+  int num_parameters = 0;
 
   int num_bodies() const { return static_cast<int>(bodies.size()); }
   int world() const { return num_bodies() - 1; }
@@ -93,36 +93,37 @@ struct ModelStructure {
   /// Index of a variable: component i of body's pose or twist, a number.
   int PoseVariable(int body, int i) const { return 3 * body + i; }
   int TwistVariable(int body, int i) const { return 3 * num_bodies() + 3 * body + i; }
-  int NumberVariable(int number) const { return 6 * num_bodies() + number; }
-  int num_variables() const { return 6 * num_bodies() + num_numbers; }
+  int ParameterVariable(int number) const { return 6 * num_bodies() + number; }
+  int num_variables() const { return 6 * num_bodies() + num_parameters; }
   /// Whether contacts between two bodies are looked for.
   bool MayCollide(int i, int j) const;
   /// The pair entry that holds for two bodies, or nullptr; of several the last one written.
   const PairIndex* FindPair(int i, int j) const;
 };
 
-/// Places of gravity in the numbers.
+/// Places of gravity among the parameters.
 inline constexpr int kGravityX = 0;
 inline constexpr int kGravityY = 1;
 
 template <typename T>
 struct Model {
   std::shared_ptr<const ModelStructure> structure;
-  std::vector<T> numbers;
+  std::vector<T> parameters;
 
   ShapeView<T> Shape(int body) const {
     const BodyIndex& index = structure->bodies[body];
-    return {index.shape, numbers.data() + (index.num_shape_numbers > 0 ? index.shape_numbers : 0),
+    return {index.shape,
+            parameters.data() + (index.num_shape_numbers > 0 ? index.shape_numbers : 0),
             index.num_shape_numbers};
   }
 };
 
-/// The model and the initial state of a valid scene. Derivatives of the scene's numbers flow
+/// The model and the initial state of a valid scene. Derivatives of the scene's parameters flow
 /// through anchors, inertias that follow mass and shape, and initial joint angles and rates.
 template <typename T>
 void BuildModel(const BasicScene<T>& scene, Model<T>* model, State<T>* state);
 
-/// The same structure with other numbers: as BuildModel, but reuses `structure`, which was built
+/// The same structure with other parameters: as BuildModel, but reuses `structure`, which was built
 /// from the same scene.
 template <typename T>
 void BuildModelWithStructure(const BasicScene<T>& scene,

@@ -62,7 +62,7 @@ Eigen::SparseMatrix<double> VariableJacobian(const Scene& scene,
     };
     collect(state.pose, 0);
     collect(state.twist, 3 * structure->num_bodies());
-    collect(model.numbers, 6 * structure->num_bodies());
+    collect(model.parameters, 6 * structure->num_bodies());
   }
   Eigen::SparseMatrix<double> jacobian(structure->num_variables(), num_parameters);
   jacobian.setFromTriplets(entries.begin(), entries.end());

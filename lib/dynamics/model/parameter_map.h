@@ -29,7 +29,8 @@ using ParameterDirection = std::vector<SetNumber>;
 /// The direction of a resolved path: each of its numbers with scale 1.
 ParameterDirection DirectionOf(const ParameterPath& path);
 
-/// d [poses | twists | numbers] / d parameters: num_variables x num_parameters, column-major.
+/// d [poses | twists | the model's parameters] / d the scene's parameters: num_variables x
+/// num_parameters, column-major.
 Eigen::SparseMatrix<double> VariableJacobian(const Scene& scene,
                                              const std::shared_ptr<const ModelStructure>& structure,
                                              const std::vector<ParameterDirection>& parameters);

@@ -103,7 +103,8 @@ ContactSolverReport DecompressionSolver::Solve(const ContactSolverOptions& optio
   }
   if (SolveByModeChanges(options, problem, solution, &report)) {
     report.solved = true;
-    report.solved_by = SolvedBy::kGuess;
+    report.rung = Rung::kModeChanges;
+    report.solved_by = MethodOf(report.rung);
     return finish();
   }
   report.fallbacks.dense += FitsDensePortfolio(*problem) ? 1 : 0;
@@ -114,7 +115,8 @@ ContactSolverReport DecompressionSolver::Solve(const ContactSolverOptions& optio
     }
     if (SolveByModeChanges(options, problem, solution, &report)) {
       report.solved = true;
-      report.solved_by = SolvedBy::kLemke;
+      report.rung = Rung::kDense;
+      report.solved_by = MethodOf(report.rung);
     }
   }
   return finish();

@@ -26,6 +26,49 @@ constexpr int kMaxChangesTogether = 3;
 
 }  // namespace
 
+const char* NameOf(Rung rung) {
+  switch (rung) {
+    case Rung::kDirect:
+      return "direct";
+    case Rung::kModeChanges:
+      return "mode_changes";
+    case Rung::kPivotingFromGuess:
+      return "pivoting_from_guess";
+    case Rung::kInteriorPoint:
+      return "interior_point";
+    case Rung::kPivotingFromInteriorPoint:
+      return "pivoting_from_interior_point";
+    case Rung::kPivotingFromOpen:
+      return "pivoting_from_open";
+    case Rung::kRestarts:
+      return "restarts";
+    case Rung::kDense:
+      return "dense";
+    case Rung::kLemke:
+      return "lemke";
+    case Rung::kNone:
+      break;
+  }
+  return "none";
+}
+
+SolvedBy MethodOf(Rung rung) {
+  switch (rung) {
+    case Rung::kNone:
+      return SolvedBy::kNothing;
+    case Rung::kDirect:
+      return SolvedBy::kDirect;
+    case Rung::kModeChanges:
+    case Rung::kPivotingFromGuess:
+      return SolvedBy::kGuess;
+    case Rung::kInteriorPoint:
+    case Rung::kPivotingFromInteriorPoint:
+      return SolvedBy::kInteriorPoint;
+    default:
+      return SolvedBy::kLemke;
+  }
+}
+
 void ContactFallbacks::Add(const ContactFallbacks& other) {
   pivoting += other.pivoting;
   interior_point += other.interior_point;
@@ -199,6 +242,7 @@ bool ContactSolver::SolveByInteriorPoint(const ContactProblem<double>& problem,
         SolveContactsByInteriorPoint(problem, interior_point, &interior_point_, solution);
     report->iterations += outcome.iterations;
     report->residual = NaturalResidual(problem, *solution, &report->worst_contact);
+    report->rung = Rung::kInteriorPoint;
     return system_.Factor(problem, solution->modes) && outcome.converged;
   }
   // Most modes are clear early. Where margins are small they show later, if rounding lets the
@@ -211,6 +255,7 @@ bool ContactSolver::SolveByInteriorPoint(const ContactProblem<double>& problem,
         SolveContactsByInteriorPoint(problem, interior_point, &interior_point_, solution);
     report->iterations += outcome.iterations;
     if (Polish(problem, options, solution, report)) {
+      report->rung = Rung::kInteriorPoint;
       return true;
     }
     if (outcome.complementarity > kNotArrived) {
@@ -220,6 +265,7 @@ bool ContactSolver::SolveByInteriorPoint(const ContactProblem<double>& problem,
   }
   // Rows that are almost redundant leave modes that only pivots tell apart.
   ++report->fallbacks.pivoting;
+  report->rung = Rung::kPivotingFromInteriorPoint;
   return SolveByPivoting(problem, options, ContactPivoting::From::kModes,
                          kPivotsFromInteriorPoint * (1 + static_cast<int>(problem.contacts.size())),
                          kMaxProximalRounds, solution, report);
@@ -252,6 +298,7 @@ bool ContactSolver::SolveByLemke(const ContactProblem<double>& problem,
       MeasureWithoutContacts(problem, solution, report);
       return false;
     }
+    report->rung = Rung::kLemke;
     return Polish(problem, options, solution, report);
   }
   const auto by_dense = [&] {
@@ -259,11 +306,15 @@ bool ContactSolver::SolveByLemke(const ContactProblem<double>& problem,
       return false;
     }
     ++report->fallbacks.dense;
+    report->rung = Rung::kDense;
     const bool dense = SolveContactsDense(problem, options.tolerance, solution, &iterations);
     report->iterations += iterations;
     return dense && Polish(problem, options, solution, report);
   };
-  const auto by_restarts = [&] { return SolveByRestarts(problem, options, solution, report); };
+  const auto by_restarts = [&] {
+    report->rung = Rung::kRestarts;
+    return SolveByRestarts(problem, options, solution, report);
+  };
   // What is cheaper comes first.
   return problem.contacts.size() <= kFewContacts ? by_dense() || by_restarts()
                                                  : by_restarts() || by_dense();
@@ -284,9 +335,14 @@ ContactSolverReport ContactSolver::RunPortfolio(const ContactProblem<double>& pr
                                                 const ContactSolverOptions& options,
                                                 ContactSolution<double>* solution) {
   ContactSolverReport report;
-  const auto done = [&](SolvedBy by) {
+  const auto done = [&](Rung rung) {
     report.solved = true;
-    report.solved_by = by;
+    report.rung = rung;
+    report.solved_by = MethodOf(rung);
+    return report;
+  };
+  const auto failed = [&] {
+    report.rung = Rung::kNone;
     return report;
   };
   if (problem.contacts.empty()) {
@@ -294,18 +350,18 @@ ContactSolverReport ContactSolver::RunPortfolio(const ContactProblem<double>& pr
     if (SolveWithModes(problem, solution, &report)) {
       report.residual = NaturalResidual(problem, *solution, &report.worst_contact);
       if (report.residual <= options.tolerance) {
-        return done(SolvedBy::kDirect);
+        return done(Rung::kDirect);
       }
     } else {
       MeasureWithoutContacts(problem, solution, &report);
     }
-    return report;
+    return failed();
   }
   const bool exact = options.smoothing == 0.0;
   entry_ = *solution;
   const bool any = options.choice == ContactSolverChoice::kAuto && exact;
   if (any && SolveByModeChanges(problem, options, solution, &report)) {
-    return done(SolvedBy::kGuess);
+    return done(Rung::kModeChanges);
   }
   const int num_contacts = static_cast<int>(problem.contacts.size());
   if (any) {
@@ -314,14 +370,14 @@ ContactSolverReport ContactSolver::RunPortfolio(const ContactProblem<double>& pr
     if (SolveByPivoting(problem, options, ContactPivoting::From::kModes,
                         kPivotsFromGuess + num_contacts / 2, kMaxProximalRounds, solution,
                         &report)) {
-      return done(SolvedBy::kGuess);
+      return done(Rung::kPivotingFromGuess);
     }
     *solution = entry_;
     ++report.fallbacks.interior_point;
   }
   if (options.choice != ContactSolverChoice::kLemke &&
       SolveByInteriorPoint(problem, options, solution, &report)) {
-    return done(SolvedBy::kInteriorPoint);
+    return done(report.rung);
   }
   if (options.choice != ContactSolverChoice::kInteriorPoint && exact) {
     *solution = entry_;
@@ -329,14 +385,14 @@ ContactSolverReport ContactSolver::RunPortfolio(const ContactProblem<double>& pr
     if (SolveByPivoting(problem, options, ContactPivoting::From::kOpen,
                         kPivotsFromOpen * (1 + num_contacts), kMaxProximalRounds, solution,
                         &report)) {
-      return done(SolvedBy::kLemke);
+      return done(Rung::kPivotingFromOpen);
     }
   }
   if (options.choice != ContactSolverChoice::kInteriorPoint && exact &&
       SolveByLemke(problem, options, solution, &report)) {
-    return done(SolvedBy::kLemke);
+    return done(report.rung);
   }
-  return report;
+  return failed();
 }
 
 }  // namespace tangible

@@ -39,6 +39,25 @@ namespace tangible {
 enum class ContactSolverChoice { kAuto, kInteriorPoint, kLemke };
 enum class SolvedBy : unsigned char { kNothing, kDirect, kGuess, kInteriorPoint, kLemke };
 
+/// The part of the portfolio that solved a problem.
+enum class Rung : unsigned char {
+  kNone,
+  kDirect,                     ///< no contacts: one linear system
+  kModeChanges,                ///< the guess's modes, changed where they are contradicted
+  kPivotingFromGuess,          ///< pivots from the guess
+  kInteriorPoint,              ///< the interior point, polished
+  kPivotingFromInteriorPoint,  ///< pivots from its modes
+  kPivotingFromOpen,           ///< pivots from all contacts open
+  kRestarts,                   ///< pivots from random starts
+  kDense,                      ///< the dense portfolio
+  kLemke                       ///< Lemke's method on the dense form, where it is asked for
+};
+
+/// "pivoting_from_guess", ...; "none".
+const char* NameOf(Rung rung);
+/// The method that a rung belongs to, as summaries count them.
+SolvedBy MethodOf(Rung rung);
+
 struct ContactSolverOptions {
   ContactSolverChoice choice = ContactSolverChoice::kAuto;
   double tolerance = kLcpTolerance;  ///< of the scaled natural residual
@@ -66,6 +85,7 @@ struct ContactFallbacks {
 struct ContactSolverReport {
   bool solved = false;
   SolvedBy solved_by = SolvedBy::kNothing;
+  Rung rung = Rung::kNone;
   int factorisations = 0;  ///< of mode systems
   int iterations = 0;      ///< of the interior point or Lemke
   double residual = 0.0;   ///< scaled natural residual

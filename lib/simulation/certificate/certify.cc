@@ -267,7 +267,7 @@ void RolloutCertifier::AddForceWindows(const Model<double>& model) {
       if (!Wanted(number)) {
         return;
       }
-      const double time = model.numbers[number];
+      const double time = model.parameters[number];
       const double k =
           std::clamp(std::round(time / settings.dt), 0.0, static_cast<double>(NumSteps(settings)));
       const double boundary = StepTime(settings, static_cast<long>(k));
@@ -279,7 +279,7 @@ void RolloutCertifier::AddForceWindows(const Model<double>& model) {
     check(force.start, "start");
     check(force.end, "end");
     if (force.start >= 0 && force.end >= 0 && (Wanted(force.start) || Wanted(force.end)) &&
-        same(model.numbers[force.start], model.numbers[force.end])) {
+        same(model.parameters[force.start], model.parameters[force.end])) {
       OneSided("the window of force " + force.name + " is empty");
     }
   }
@@ -336,8 +336,8 @@ namespace {
 // Places of the model's numbers that the directions change.
 std::vector<int> NumbersOf(const ModelStructure& structure, const RowMatrixXd& directions) {
   std::vector<int> numbers;
-  for (int i = 0; i < structure.num_numbers; ++i) {
-    if (!directions.row(structure.NumberVariable(i)).isZero(0.0)) {
+  for (int i = 0; i < structure.num_parameters; ++i) {
+    if (!directions.row(structure.ParameterVariable(i)).isZero(0.0)) {
       numbers.push_back(i);
     }
   }

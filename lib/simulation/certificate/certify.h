@@ -36,8 +36,8 @@ inline constexpr double kNearJumpMargin = 1e-6;
 struct CertifyOptions {
   /// Places in the model's numbers that derivatives are taken with respect to, ascending.
   std::vector<int> numbers;
-  /// The directions of [initial poses | initial twists | numbers] that derivatives are taken along,
-  /// a column each, and what they are called.
+  /// The directions of [initial poses | initial twists | parameters] that derivatives are taken
+  /// along, a column each, and what they are called.
   RowMatrixXd directions;
   std::vector<std::string> names;
 };

@@ -19,8 +19,8 @@ inline std::string Short(double x) {
 // A speed that is rounding, m/s.
 inline double Negligible(const Model<double>& model, double speed) {
   return 1e-9 *
-         (std::abs(speed) + model.structure->settings.dt *
-                                std::hypot(model.numbers[kGravityX], model.numbers[kGravityY]));
+         (std::abs(speed) + model.structure->settings.dt * std::hypot(model.parameters[kGravityX],
+                                                                      model.parameters[kGravityY]));
 }
 
 struct RolloutCertifier::Place {

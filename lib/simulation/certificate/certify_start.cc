@@ -52,7 +52,7 @@ double SplitError(const Model<double>& model, const Segment& segment) {
       apart = std::max(apart, std::abs(one[i] - two[i]));
       moved = std::max({moved, std::abs(one[i] - before[i]), kRest * std::abs(one[i])});
     }
-    const double gravity = std::hypot(model.numbers[kGravityX], model.numbers[kGravityY]);
+    const double gravity = std::hypot(model.parameters[kGravityX], model.parameters[kGravityY]);
     return apart > 0.0 ? apart / (moved + kRest * gravity * segment.length) : 0.0;
   };
   return std::max(share(segment.before.pose, whole.after.pose, rest.after.pose),
@@ -90,7 +90,7 @@ bool Rests(const Model<double>& model, const State<double>& state, const ActiveC
     const JointIndex& joint = model.structure->joints[contact.joint];
     JointRows<double> joint_rows;
     EvaluateJoint(joint.type, state.PoseOf(joint.a), state.PoseOf(joint.b),
-                  &model.numbers[joint.geometry], &joint_rows);
+                  &model.parameters[joint.geometry], &joint_rows);
     ContactRows<double> rows;
     EvaluateLimitRows(model, joint_rows, contact, &rows);
     speed = RelativeSpeed(state, contact.a, rows.normal_a, contact.b, rows.normal_b);
@@ -102,7 +102,7 @@ bool Rests(const Model<double>& model, const State<double>& state, const ActiveC
 
 // What forces give bodies as a segment starts, m/s².
 double Acceleration(const Model<double>& model, const Segment* segment) {
-  double largest = std::hypot(model.numbers[kGravityX], model.numbers[kGravityY]);
+  double largest = std::hypot(model.parameters[kGravityX], model.parameters[kGravityY]);
   if (segment != nullptr && segment->num_stages > 0) {
     const ContactProblem<double>& problem = segment->stages[0].problem;
     for (size_t i = 0; i < problem.momentum.size(); ++i) {

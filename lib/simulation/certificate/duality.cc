@@ -18,7 +18,7 @@ constexpr double kRoundingOfState = 1e-4;
 
 double GyrationRadius(const Model<double>& model, int body) {
   const BodyIndex& index = model.structure->bodies[body];
-  return std::sqrt(model.numbers[index.inertia] / model.numbers[index.mass]);
+  return std::sqrt(model.parameters[index.inertia] / model.parameters[index.mass]);
 }
 
 // Largest magnitudes of poses and twists, angles at the radius of gyration.
@@ -260,8 +260,8 @@ bool HasWideMasses(const Model<double>& model) {
   double least[2] = {HUGE_VAL, HUGE_VAL};
   double most[2] = {0.0, 0.0};
   for (const int body : s.moving) {
-    const double of_body[2] = {model.numbers[s.bodies[body].mass],
-                               model.numbers[s.bodies[body].inertia]};
+    const double of_body[2] = {model.parameters[s.bodies[body].mass],
+                               model.parameters[s.bodies[body].inertia]};
     for (int k = 0; k < 2; ++k) {
       least[k] = std::min(least[k], of_body[k]);
       most[k] = std::max(most[k], of_body[k]);

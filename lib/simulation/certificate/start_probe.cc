@@ -53,7 +53,7 @@ class Course {
     };
     add(&state_.pose, s.PoseVariable(0, 0));
     add(&state_.twist, s.TwistVariable(0, 0));
-    add(&model_.numbers, s.NumberVariable(0));
+    add(&model_.parameters, s.ParameterVariable(0));
   }
 
   bool Step(long k) {
@@ -176,9 +176,9 @@ class Probe {
  private:
   bool Allowed(double shift) const {
     const ModelStructure& s = *model_.structure;
-    for (int i = 0; i < s.num_numbers; ++i) {
-      const double change = std::abs(shift * direction_[s.NumberVariable(i)]);
-      if (change > kOfNumber * std::max(std::abs(model_.numbers[i]), 1.0)) return false;
+    for (int i = 0; i < s.num_parameters; ++i) {
+      const double change = std::abs(shift * direction_[s.ParameterVariable(i)]);
+      if (change > kOfNumber * std::max(std::abs(model_.parameters[i]), 1.0)) return false;
     }
     return true;
   }
@@ -326,7 +326,7 @@ bool MayJam(const Model<double>& model, const State<double>& start,
   const auto add = [&](int body, const RowPart<double>& n, const RowPart<double>& t) {
     const BodyIndex& index = s.bodies[body];
     for (int i = 0; moves(body) && i < 3; ++i) {
-      const double mass = model.numbers[i < 2 ? index.mass : index.inertia];
+      const double mass = model.parameters[i < 2 ? index.mass : index.inertia];
       normal += n[i] * n[i] / mass;
       mixed += n[i] * t[i] / mass;
     }

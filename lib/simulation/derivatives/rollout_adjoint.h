@@ -3,7 +3,7 @@
 //
 // The adjoint of a rollout (reverse mode): from the derivatives of one or several losses with
 // respect to states along the run to those with respect to all variables w = [initial poses |
-// initial twists | numbers].
+// initial twists | parameters].
 //
 //   each step, backwards   x̄ = v̄⁺ + h q̄⁺,   Kᵀ u = x̄,   w̄ −= (∂R/∂w)ᵀ u      (equation_jacobian.h)
 //

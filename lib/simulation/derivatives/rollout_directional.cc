@@ -30,7 +30,8 @@ bool StepDirectional::FindKinks(const Model<double>& model, const StepRecord& re
     for (int k = 0; k < 2 && record.contacts[i].joint < 0; ++k) {
       if (const int number = record.friction[i].numbers[k]; number >= 0) {
         friction_.row(static_cast<Eigen::Index>(i)) +=
-            record.friction[i].derivatives[k] * w_dot.row(model.structure->NumberVariable(number));
+            record.friction[i].derivatives[k] *
+            w_dot.row(model.structure->ParameterVariable(number));
       }
     }
   }

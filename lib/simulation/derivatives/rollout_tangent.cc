@@ -29,7 +29,7 @@ int StepTangent::FixNumbers(const Model<double>& model, const RowMatrixXd& w_dot
   const ModelStructure& s = *model.structure;
   fixed_.assign(s.num_variables(), 0);
   int count = 0;
-  for (int variable = s.NumberVariable(0); variable < s.num_variables(); ++variable) {
+  for (int variable = s.ParameterVariable(0); variable < s.num_variables(); ++variable) {
     const bool fixed = (w_dot.row(variable).array() == 0.0).all();
     fixed_[variable] = fixed ? 1 : 0;
     count += fixed ? 1 : 0;

@@ -2,7 +2,7 @@
 #pragma once
 //
 // The tangent of a rollout (forward mode): derivatives of the state with respect to any directions
-// in the variables w = [initial poses | initial twists | numbers].
+// in the variables w = [initial poses | initial twists | parameters].
 //
 //   each step   K ẋ = −(∂R/∂w) ẇ   (equation_jacobian.h),   q̇⁺ = q̇ + h v̇⁺
 //

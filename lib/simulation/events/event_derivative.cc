@@ -198,7 +198,7 @@ void EventDerivative::EventGradient(const Model<double>& model, Segment* segment
       seed(3 * block_of[i] + 1, 0) = -segment->event_sign;
       for (int k = 0; k < 2; ++k) {
         if (friction.numbers[k] >= 0) {
-          entries.push_back({0, s.NumberVariable(friction.numbers[k]),
+          entries.push_back({0, s.ParameterVariable(friction.numbers[k]),
                              friction.derivatives[k] * node.solution.normal_impulse[i]});
         }
       }
@@ -258,7 +258,7 @@ double EventDerivative::Tangent(const Model<double>& model, EventRecord* record,
     } else if (segment.event != EventKind::kAtOnce) {
       moved = -start;
       if (segment.event_number >= 0) {
-        moved += x.row(s.NumberVariable(segment.event_number));
+        moved += x.row(s.ParameterVariable(segment.event_number));
       }
     }
     moved(columns) = 0.0;
@@ -374,7 +374,7 @@ void EventDerivative::SegmentAdjoint(const Model<double>& model, Segment* segmen
   } else if (segment->event != EventKind::kAtOnce) {
     w_bar->row(TimeVariable(s)) -= alpha;
     if (segment->event_number >= 0) {
-      w_bar->row(s.NumberVariable(segment->event_number)) += alpha;
+      w_bar->row(s.ParameterVariable(segment->event_number)) += alpha;
     }
   }
   if (segment->projects_twists) {

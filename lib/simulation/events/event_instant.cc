@@ -101,7 +101,7 @@ bool EventStepper::Rattles(const Model<double>& model, const EventOutcome& outco
 
 double EventStepper::ReturnSpeed(const Model<double>& model, const State<double>& state,
                                  const ActiveContact& contact) const {
-  double acceleration = std::hypot(model.numbers[kGravityX], model.numbers[kGravityY]);
+  double acceleration = std::hypot(model.parameters[kGravityX], model.parameters[kGravityY]);
   const double size = search_.lengths().Size(contact.a, contact.b);
   if (contact.joint >= 0 && size > 0.0 &&
       model.structure->joints[contact.joint].type == JointType::kRevolute) {

@@ -108,7 +108,7 @@ class EventReplay {
       ContactBlock<T>& contact = problem->contacts[i];
       contact.driven = impulses.problem.contacts[i].driven;
       if (contact.driven) {
-        const T e = EvaluateCoefficient(impulses.restitution[i], model_.numbers);
+        const T e = EvaluateCoefficient(impulses.restitution[i], model_.parameters);
         contact.offset = e * compression_[impulses.compressed[i]];
       }
     }
@@ -279,16 +279,16 @@ class EventReplay {
       if (segment->event == EventKind::kLiftOff) {
         return solution.normal_impulse[segment->event_index];
       }
-      return segment->FrictionLeft<T>(segment->event_index,
-                                      EvaluateCoefficient(segment->event_friction, model_.numbers),
-                                      segment->event_sign, solution);
+      return segment->FrictionLeft<T>(
+          segment->event_index, EvaluateCoefficient(segment->event_friction, model_.parameters),
+          segment->event_sign, solution);
     }
     ContactRows<T> rows;
     if (contact.joint >= 0) {
       const JointIndex& joint = s_.joints[contact.joint];
       JointRows<T> joint_rows;
       EvaluateJoint(joint.type, after.PoseOf(joint.a), after.PoseOf(joint.b),
-                    &model_.numbers[joint.geometry], &joint_rows);
+                    &model_.parameters[joint.geometry], &joint_rows);
       EvaluateLimitRows(model_, joint_rows, contact, &rows);
     } else {
       EvaluateContactRows(model_, after, contact, &rows);
@@ -309,7 +309,7 @@ class EventReplay {
   // Of the map and the equation themselves: with the length as the only variable of the map, and
   // then each part of the state that the length moves, and the time, as one of the equation.
   Rate RateOf(Segment* segment) const {
-    const Model<T> constant{model_.structure, JetsOf(values_.numbers)};
+    const Model<T> constant{model_.structure, JetsOf(values_.parameters)};
     EventReplay replay(constant, values_, route_);
     State<T> by_length;
     T tau(segment->length);
@@ -391,7 +391,7 @@ class EventReplay {
       LocateEvent(segment, *state, *now, &tau, &after);
     } else {
       if (segment->event_number >= 0) {
-        tau = model_.numbers[segment->event_number] - *now;
+        tau = model_.parameters[segment->event_number] - *now;
       } else if (segment->event != EventKind::kAtOnce) {
         tau = end - *now;
       }

@@ -31,8 +31,8 @@ EventSearch::EventSearch(const Model<double>& model) : lengths_(model), flow_(mo
 }
 
 double EventSearch::SpeedTolerance(const Model<double>& model, const State<double>& state) const {
-  double speed =
-      std::hypot(model.numbers[kGravityX], model.numbers[kGravityY]) * model.structure->settings.dt;
+  double speed = std::hypot(model.parameters[kGravityX], model.parameters[kGravityY]) *
+                 model.structure->settings.dt;
   double rounding = 0.0;
   for (int body = 0; body < model.structure->num_bodies(); ++body) {
     const double size = lengths_.radius(body);
@@ -198,7 +198,7 @@ void EventSearch::SearchClosed(const Model<double>& model, Event* event) {
     double mass = 0.0;
     for (const int body : {segment_->contacts[i].a, segment_->contacts[i].b}) {
       if (model.structure->bodies[body].block >= 0) {
-        mass = std::max(mass, model.numbers[model.structure->bodies[body].mass]);
+        mass = std::max(mass, model.parameters[model.structure->bodies[body].mass]);
       }
     }
     const double tolerance =

@@ -21,7 +21,7 @@ double GapAndSpeed(const Model<double>& model, const State<double>& state,
     const JointIndex& joint = model.structure->joints[contact.joint];
     JointRows<double> joint_rows;
     EvaluateJoint(joint.type, state.PoseOf(joint.a), state.PoseOf(joint.b),
-                  &model.numbers[joint.geometry], &joint_rows);
+                  &model.parameters[joint.geometry], &joint_rows);
     EvaluateLimitRows(model, joint_rows, contact, &rows);
   } else {
     EvaluateContactRows(model, state, contact, &rows);

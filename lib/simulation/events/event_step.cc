@@ -26,8 +26,8 @@ double KineticEnergy(const Model<double>& model, const std::vector<double>& twis
   for (const int body : model.structure->moving) {
     const BodyIndex& index = model.structure->bodies[body];
     const double* v = &twist[3 * body];
-    energy += 0.5 * model.numbers[index.mass] * (v[0] * v[0] + v[1] * v[1]) +
-              0.5 * model.numbers[index.inertia] * v[2] * v[2];
+    energy += 0.5 * model.parameters[index.mass] * (v[0] * v[0] + v[1] * v[1]) +
+              0.5 * model.parameters[index.inertia] * v[2] * v[2];
   }
   return energy;
 }
@@ -63,7 +63,7 @@ std::vector<Edge> EdgesWithin(const Model<double>& model, double from, double to
   for (const ForceIndex& force : structure.forces) {
     for (const int number : {force.start, force.end}) {
       if (number >= 0) {
-        add(model.numbers[number], number);
+        add(model.parameters[number], number);
       }
     }
     add_signal(force.force_signal);

@@ -60,7 +60,7 @@ void EventStepper::FindTouching(const Model<double>& model, const State<double>&
     }
     JointRows<double> joint_rows;
     EvaluateJoint(joint.type, state.PoseOf(joint.a), state.PoseOf(joint.b),
-                  &model.numbers[joint.geometry], &joint_rows);
+                  &model.parameters[joint.geometry], &joint_rows);
     for (const double side : {1.0, -1.0}) {
       ActiveContact limit;
       limit.a = joint.a;

@@ -97,7 +97,7 @@ bool DriftsFar(const Model<double>& model, const ContactProblem<double>& correct
   constexpr double kShareOfArms = 0.1;
   for (size_t j = 0; j < correction.joints.size(); ++j) {
     const JointIndex& joint = model.structure->joints[j];
-    const double* anchors = &model.numbers[joint.geometry];
+    const double* anchors = &model.parameters[joint.geometry];
     if (joint.type != JointType::kRevolute) {
       continue;
     }

@@ -104,7 +104,7 @@ struct GradientResult {
 
 /// Names of the outputs of a scene.
 std::vector<std::string> OutputNames(const ModelStructure& structure);
-/// Their places among the poses and twists of State, and so in [poses | twists | numbers].
+/// Their places among the poses and twists of State, and so in [poses | twists | parameters].
 std::vector<int> OutputVariables(const ModelStructure& structure);
 
 /// The Jacobian of the final state. A rollout that is unsolved or diverges, settings that the

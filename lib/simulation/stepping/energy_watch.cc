@@ -19,7 +19,7 @@ bool IsDriven(const Model<double>& model, const State<double>& state) {
     return true;
   }
   for (const JointIndex& joint : s.joints) {
-    if (joint.effort_signal >= 0 || (joint.effort >= 0 && model.numbers[joint.effort] != 0.0)) {
+    if (joint.effort_signal >= 0 || (joint.effort >= 0 && model.parameters[joint.effort] != 0.0)) {
       return true;
     }
   }
@@ -43,10 +43,10 @@ EnergyWatch::EnergyWatch(const Model<double>& model, const State<double>& initia
   start_ = kinetic + PotentialEnergy(model, initial);
   // What is at hand: motion, springs, the fall over the places of bodies, recovery from
   // penetration.
-  const double g = std::hypot(model.numbers[kGravityX], model.numbers[kGravityY]);
+  const double g = std::hypot(model.parameters[kGravityX], model.parameters[kGravityY]);
   double scale = kinetic;
   for (const int body : s.moving) {
-    const double mass = model.numbers[s.bodies[body].mass];
+    const double mass = model.parameters[s.bodies[body].mass];
     const double place = std::hypot(initial.pose[3 * body], initial.pose[3 * body + 1]);
     const double fall = g * s.settings.duration * s.settings.duration;
     scale += mass * (g * (place + fall) + s.settings.recovery_speed * s.settings.recovery_speed);

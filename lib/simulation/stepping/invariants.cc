@@ -39,8 +39,8 @@ double KineticEnergy(const Model<double>& model, const State<double>& state) {
   double energy = 0.0;
   for (const int body : s.moving) {
     const double* v = &state.twist[3 * body];
-    energy += 0.5 * model.numbers[s.bodies[body].mass] * (v[0] * v[0] + v[1] * v[1]) +
-              0.5 * model.numbers[s.bodies[body].inertia] * v[2] * v[2];
+    energy += 0.5 * model.parameters[s.bodies[body].mass] * (v[0] * v[0] + v[1] * v[1]) +
+              0.5 * model.parameters[s.bodies[body].inertia] * v[2] * v[2];
   }
   return energy;
 }
@@ -49,15 +49,15 @@ double PotentialEnergy(const Model<double>& model, const State<double>& state) {
   const ModelStructure& s = *model.structure;
   double energy = 0.0;
   for (const int body : s.moving) {
-    energy -=
-        model.numbers[s.bodies[body].mass] * (model.numbers[kGravityX] * state.pose[3 * body] +
-                                              model.numbers[kGravityY] * state.pose[3 * body + 1]);
+    energy -= model.parameters[s.bodies[body].mass] *
+              (model.parameters[kGravityX] * state.pose[3 * body] +
+               model.parameters[kGravityY] * state.pose[3 * body + 1]);
   }
   for (const SpringIndex& spring : s.springs) {
     SpringRow<double> row;
-    EvaluateSpring(state.PoseOf(spring.a), state.PoseOf(spring.b), &model.numbers[spring.numbers],
-                   &row);
-    energy += 0.5 * row.tension * (row.length - model.numbers[spring.numbers + 6]);
+    EvaluateSpring(state.PoseOf(spring.a), state.PoseOf(spring.b),
+                   &model.parameters[spring.numbers], &row);
+    energy += 0.5 * row.tension * (row.length - model.parameters[spring.numbers + 6]);
   }
   return energy;
 }
@@ -68,10 +68,10 @@ Vector3<double> Momentum(const Model<double>& model, const State<double>& state)
   for (const int body : s.moving) {
     const double* x = &state.pose[3 * body];
     const double* v = &state.twist[3 * body];
-    const double mass = model.numbers[s.bodies[body].mass];
+    const double mass = model.parameters[s.bodies[body].mass];
     sum += Vector3<double>(
         mass * v[0], mass * v[1],
-        mass * (x[0] * v[1] - x[1] * v[0]) + model.numbers[s.bodies[body].inertia] * v[2]);
+        mass * (x[0] * v[1] - x[1] * v[0]) + model.parameters[s.bodies[body].inertia] * v[2]);
   }
   return sum;
 }

@@ -19,7 +19,7 @@ double SizeOf(const Model<double>& model, int body) {
   const BodyIndex& index = model.structure->bodies[body];
   if (index.block < 0) return kInfinity;
   if (index.shape != ShapeType::kNone) return 2.0 * BoundingRadius(model.Shape(body));
-  return std::sqrt(12.0 * model.numbers[index.inertia] / model.numbers[index.mass]);
+  return std::sqrt(12.0 * model.parameters[index.inertia] / model.parameters[index.mass]);
 }
 
 // The error of a joint in m, and in rad.
@@ -63,7 +63,7 @@ void JointWatch::Look(const Model<double>& model, const State<double>& state, do
   for (size_t j = 0; j < sizes_.size(); ++j) {
     JointRows<double> rows;
     EvaluateJoint(joints[j].type, state.PoseOf(joints[j].a), state.PoseOf(joints[j].b),
-                  &model.numbers[joints[j].geometry], &rows);
+                  &model.parameters[joints[j].geometry], &rows);
     const JointError error = ErrorOf(joints[j].type, rows);
     const double opening = std::fmax(error.distance / sizes_[j], error.angle);
     if (!(opening > opening_ && std::isfinite(opening))) continue;

@@ -25,7 +25,7 @@ double JointDrift(const Model<double>& model, const State<double>& state) {
   for (const JointIndex& joint : model.structure->joints) {
     JointRows<double> rows;
     EvaluateJoint(joint.type, state.PoseOf(joint.a), state.PoseOf(joint.b),
-                  &model.numbers[joint.geometry], &rows);
+                  &model.parameters[joint.geometry], &rows);
     for (int k = 0; k < rows.rows; ++k) {
       largest = std::max(largest, std::abs(rows.error[k]));
     }
@@ -75,9 +75,9 @@ void JointProjection::Visit(const Model<double>& model, const Sink& sink) {
     const BodyIndex& index = s.bodies[body];
     for (int i = 0; i < 3; ++i) {
       const int mass = i < 2 ? index.mass : index.inertia;
-      sink(3 * k + i, s.NumberVariable(mass),
+      sink(3 * k + i, s.ParameterVariable(mass),
            at.pose[3 * body + i] - iterate_.from.pose[3 * body + i]);
-      sink(3 * k + i, s.PoseVariable(body, i), -model.numbers[mass]);
+      sink(3 * k + i, s.PoseVariable(body, i), -model.parameters[mass]);
     }
   }
   for (size_t j = 0; j < s.joints.size(); ++j) {
@@ -90,8 +90,8 @@ void JointProjection::Visit(const Model<double>& model, const Sink& sink) {
     }
     LocalJet numbers[7];
     for (int i = 0; i < joint.num_geometry; ++i) {
-      variables[6 + i] = s.NumberVariable(joint.geometry + i);
-      numbers[i] = LocalJet(model.numbers[joint.geometry + i], 6 + i);
+      variables[6 + i] = s.ParameterVariable(joint.geometry + i);
+      numbers[i] = LocalJet(model.parameters[joint.geometry + i], 6 + i);
     }
     const int count = 6 + joint.num_geometry;
     const auto pose = [&](int body, int first) {
@@ -203,8 +203,8 @@ void JointProjection::ProjectUnrolled(const Model<T>& model, const std::vector<d
   if (!IterateProjection(model, kExtra, &iterate)) {
     // The way to the minimum has no part in its derivatives: it ends where Newton's method holds.
     Model<double> values{model.structure, {}};
-    for (const T& number : model.numbers) {
-      values.numbers.push_back(number.a);
+    for (const T& number : model.parameters) {
+      values.parameters.push_back(number.a);
     }
     ProjectionIterate<double> descent;
     descent.from = ValuesOf(*state);

@@ -20,7 +20,7 @@ double Distance(const Model<double>& model, const ProjectionIterate<double>& p) 
     const BodyIndex& index = model.structure->bodies[body];
     for (int i = 0; i < 3; ++i) {
       const double moved = p.at.pose[3 * body + i] - p.from.pose[3 * body + i];
-      sum += 0.5 * model.numbers[i < 2 ? index.mass : index.inertia] * moved * moved;
+      sum += 0.5 * model.parameters[i < 2 ? index.mass : index.inertia] * moved * moved;
     }
   }
   return sum;

@@ -31,7 +31,7 @@ void EvaluateAll(const Model<T>& model, const State<T>& state, std::vector<Joint
   rows->resize(joints.size());
   for (size_t j = 0; j < joints.size(); ++j) {
     EvaluateJoint(joints[j].type, state.PoseOf(joints[j].a), state.PoseOf(joints[j].b),
-                  &model.numbers[joints[j].geometry], &(*rows)[j]);
+                  &model.parameters[joints[j].geometry], &(*rows)[j]);
   }
 }
 
@@ -89,7 +89,7 @@ void JointEdges(const ModelStructure& structure, std::vector<std::pair<int, int>
 template <typename T>
 const T& MassOf(const Model<T>& model, int body, int i) {
   const BodyIndex& index = model.structure->bodies[body];
-  return model.numbers[i < 2 ? index.mass : index.inertia];
+  return model.parameters[i < 2 ? index.mass : index.inertia];
 }
 
 // Of a matrix of 3 x 3: by Sylvester's criterion, its determinant above a bound.
@@ -196,7 +196,7 @@ void EvaluateCurvatures(const Model<T>& model, ProjectionIterate<T>* p) {
   p->curvature.resize(joints.size());
   for (size_t j = 0; j < joints.size(); ++j) {
     EvaluateJointCurvature(joints[j].type, p->at.PoseOf(joints[j].a), p->at.PoseOf(joints[j].b),
-                           &model.numbers[joints[j].geometry], &p->multipliers[3 * j],
+                           &model.parameters[joints[j].geometry], &p->multipliers[3 * j],
                            &p->curvature[j]);
   }
 }

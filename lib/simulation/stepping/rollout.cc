@@ -127,8 +127,8 @@ RolloutReport RolloutJets(const Model<T>& model, const State<T>& initial, JetRou
                           const JetObserver<T>& observer, State<T>* final, long* fallbacks) {
   *fallbacks = 0;
   Model<double> values{model.structure, {}};
-  for (const T& number : model.numbers) {
-    values.numbers.push_back(ValueOf(number));
+  for (const T& number : model.parameters) {
+    values.parameters.push_back(ValueOf(number));
   }
   State<T> jets = initial;
   if (observer) {

@@ -21,10 +21,10 @@ void ProjectImplicit(const Model<T>& model, JointProjection* projection, const S
       w_dot[i * kWidth + k] = state->pose[i].v[k];
     }
   }
-  for (int i = 0; i < s.num_numbers; ++i) {
-    values.numbers.push_back(ValueOf(model.numbers[i]));
+  for (int i = 0; i < s.num_parameters; ++i) {
+    values.parameters.push_back(ValueOf(model.parameters[i]));
     for (int k = 0; k < kWidth; ++k) {
-      w_dot[static_cast<size_t>(s.NumberVariable(i)) * kWidth + k] = model.numbers[i].v[k];
+      w_dot[static_cast<size_t>(s.ParameterVariable(i)) * kWidth + k] = model.parameters[i].v[k];
     }
   }
   projection->Tangent(values, w_dot.data(), kWidth);

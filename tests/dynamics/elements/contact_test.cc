@@ -124,7 +124,7 @@ TEST(ContactTest, LimitsAreContactsOfTheCoordinate) {
   const JointIndex& joint = model.structure->joints[0];
   JointRows<double> joint_rows;
   EvaluateJoint(joint.type, state.PoseOf(joint.a), state.PoseOf(joint.b),
-                &model.numbers[joint.geometry], &joint_rows);
+                &model.parameters[joint.geometry], &joint_rows);
   ActiveContact limit;
   limit.joint = 0;
   ContactRows<double> rows;

@@ -52,7 +52,7 @@ struct Pair {
         if (v == s.TwistVariable(body, i)) return &state.twist[3 * body + i];
       }
     }
-    return &model.numbers[v - s.NumberVariable(0)];
+    return &model.parameters[v - s.ParameterVariable(0)];
   }
 };
 

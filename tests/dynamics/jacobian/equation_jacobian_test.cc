@@ -102,18 +102,18 @@ TEST(LocalJacobianTest, EntriesOfABallThatSlidesByHand) {
   const ModelStructure& s = *model.structure;
   const double impulse = 0.01 * 9.81;
   // R1: m v⁺ − m v − … + μ λ in x: ∂/∂m = v⁺ − v, ∂/∂μ_ball = λ / 2, ∂/∂v = −m, ∂/∂g_x = −h m.
-  EXPECT_NEAR(J(0, s.NumberVariable(s.bodies[0].mass)), -0.15 * impulse, 1e-15);
-  EXPECT_NEAR(J(0, s.NumberVariable(s.bodies[0].friction)), 0.5 * impulse, 1e-15);
+  EXPECT_NEAR(J(0, s.ParameterVariable(s.bodies[0].mass)), -0.15 * impulse, 1e-15);
+  EXPECT_NEAR(J(0, s.ParameterVariable(s.bodies[0].friction)), 0.5 * impulse, 1e-15);
   EXPECT_NEAR(J(0, s.TwistVariable(0, 0)), -1.0, 1e-15);
-  EXPECT_NEAR(J(0, s.NumberVariable(kGravityX)), -0.01, 1e-15);
+  EXPECT_NEAR(J(0, s.ParameterVariable(kGravityX)), -0.01, 1e-15);
   // R3: the gap over h grows with the ball's height and falls with its radius and the floor's
   // offset.
   EXPECT_NEAR(J(3, s.PoseVariable(0, 1)), 100.0, 1e-12);
-  EXPECT_NEAR(J(3, s.NumberVariable(s.bodies[0].shape_numbers)), -100.0, 1e-12);
-  EXPECT_NEAR(J(3, s.NumberVariable(s.bodies[1].shape_numbers + 2)), -100.0, 1e-12);
+  EXPECT_NEAR(J(3, s.ParameterVariable(s.bodies[0].shape_numbers)), -100.0, 1e-12);
+  EXPECT_NEAR(J(3, s.ParameterVariable(s.bodies[1].shape_numbers + 2)), -100.0, 1e-12);
   // Friction's torque: the contact's point is midway between the surfaces, so it moves by half of
   // the radius's change.
-  EXPECT_NEAR(J(2, s.NumberVariable(s.bodies[0].shape_numbers)), 0.5 * 0.15 * impulse, 1e-15);
+  EXPECT_NEAR(J(2, s.ParameterVariable(s.bodies[0].shape_numbers)), 0.5 * 0.15 * impulse, 1e-15);
 }
 
 TEST(LocalJacobianTest, SinksAreTheEntriesContracted) {

@@ -90,14 +90,14 @@ class EquationLevelsTest : public testing::TestWithParam<Case> {
     modes_.push_back(ContactMode::kClosed);
   }
 
-  // Assembles at the variables w = [poses | twists | numbers | t].
+  // Assembles at the variables w = [poses | twists | parameters | t].
   void Assemble(const std::vector<double>& w, ContactProblem<double>* problem) {
     const int n = 3 * model_.structure->num_bodies();
     Model<double> model{model_.structure, {}};
     State<double> state;
     state.pose.assign(w.begin(), w.begin() + n);
     state.twist.assign(w.begin() + n, w.begin() + 2 * n);
-    model.numbers.assign(w.begin() + 2 * n, w.end() - 1);
+    model.parameters.assign(w.begin() + 2 * n, w.end() - 1);
     AssemblyScratch<double> scratch;
     if (GetParam().level == Level::kVelocity) {
       AssembleFree(model, state, 0.5, kStep, problem, &scratch);
@@ -115,7 +115,7 @@ class EquationLevelsTest : public testing::TestWithParam<Case> {
         if (source.numbers[k] >= 0) {
           problem->contacts[i].friction +=
               source.derivatives[k] *
-              (model.numbers[source.numbers[k]] - model_.numbers[source.numbers[k]]);
+              (model.parameters[source.numbers[k]] - model_.parameters[source.numbers[k]]);
         }
       }
     }
@@ -169,7 +169,7 @@ TEST_P(EquationLevelsTest, EntriesAreTheDifferencesOfTheResidual) {
   const ModelStructure& s = *model_.structure;
   std::vector<double> w = state_.pose;
   w.insert(w.end(), state_.twist.begin(), state_.twist.end());
-  w.insert(w.end(), model_.numbers.begin(), model_.numbers.end());
+  w.insert(w.end(), model_.parameters.begin(), model_.parameters.end());
   w.push_back(0.5);
   ContactProblem<double> problem;
   Assemble(w, &problem);

@@ -38,19 +38,19 @@ TEST(ModelTest, NumbersStandWhereTheIndexSays) {
   State<double> state;
   BuildModel(scene, &model, &state);
   const ModelStructure& s = *model.structure;
-  ASSERT_EQ(static_cast<int>(model.numbers.size()), s.num_numbers);
+  ASSERT_EQ(static_cast<int>(model.parameters.size()), s.num_parameters);
   EXPECT_EQ(s.num_blocks(), 3);
   EXPECT_EQ(s.world(), 3);
-  EXPECT_EQ(model.numbers[kGravityY], -9.81);
-  EXPECT_EQ(model.numbers[s.bodies[1].mass], 3.0);
-  EXPECT_EQ(model.numbers[s.bodies[1].inertia], 0.7);
-  EXPECT_EQ(model.numbers[s.bodies[2].shape_numbers], 0.1);
-  EXPECT_EQ(model.numbers[s.joints[2].damping], 0.5);
-  EXPECT_EQ(model.numbers[s.joints[2].low], -1.0);
-  EXPECT_EQ(model.numbers[s.joints[2].high], 2.0);
-  EXPECT_EQ(model.numbers[s.joints[2].effort], 4.0);
+  EXPECT_EQ(model.parameters[kGravityY], -9.81);
+  EXPECT_EQ(model.parameters[s.bodies[1].mass], 3.0);
+  EXPECT_EQ(model.parameters[s.bodies[1].inertia], 0.7);
+  EXPECT_EQ(model.parameters[s.bodies[2].shape_numbers], 0.1);
+  EXPECT_EQ(model.parameters[s.joints[2].damping], 0.5);
+  EXPECT_EQ(model.parameters[s.joints[2].low], -1.0);
+  EXPECT_EQ(model.parameters[s.joints[2].high], 2.0);
+  EXPECT_EQ(model.parameters[s.joints[2].effort], 4.0);
   // The anchor in b's frame, which is turned by 0.2.
-  EXPECT_NEAR(model.numbers[s.joints[1].geometry], -0.05 * std::cos(0.2) + 0.5 * std::sin(0.2),
+  EXPECT_NEAR(model.parameters[s.joints[1].geometry], -0.05 * std::cos(0.2) + 0.5 * std::sin(0.2),
               1e-15);
   EXPECT_FALSE(s.joint_loops);
 }
@@ -63,12 +63,12 @@ TEST(ModelTest, InertiaFollowsMassAndShapeInValueAndDerivative) {
   Model<LocalJet> model;
   State<LocalJet> state;
   BuildModel(jets, &model, &state);
-  const LocalJet inertia = model.numbers[model.structure->bodies[0].inertia];
+  const LocalJet inertia = model.parameters[model.structure->bodies[0].inertia];
   EXPECT_NEAR(inertia.a, 2.0 * (0.01 + 1.0) / 12.0, 1e-15);
   EXPECT_NEAR(inertia.v[0], 1.01 / 12.0, 1e-15);
   EXPECT_NEAR(inertia.v[1], 2.0 * 2.0 * 1.0 / 12.0, 1e-15);
   // A given inertia is a number of its own.
-  EXPECT_EQ(model.numbers[model.structure->bodies[1].inertia].v.norm(), 0.0);
+  EXPECT_EQ(model.parameters[model.structure->bodies[1].inertia].v.norm(), 0.0);
 }
 
 // Errors of all joints and of their rates.
@@ -79,7 +79,7 @@ void ExpectClosed(const Scene& scene) {
   for (const JointIndex& joint : model.structure->joints) {
     JointRows<double> rows;
     EvaluateJoint(joint.type, state.PoseOf(joint.a), state.PoseOf(joint.b),
-                  &model.numbers[joint.geometry], &rows);
+                  &model.parameters[joint.geometry], &rows);
     for (int k = 0; k < rows.rows; ++k) {
       EXPECT_NEAR(rows.error[k], 0.0, 1e-15) << joint.name;
       double speed = 0.0;
@@ -106,7 +106,7 @@ TEST(ModelTest, InitialAnglesAndRatesKeepJointsClosed) {
     const JointIndex& joint = model.structure->joints[j];
     JointRows<double> rows;
     EvaluateJoint(joint.type, state.PoseOf(joint.a), state.PoseOf(joint.b),
-                  &model.numbers[joint.geometry], &rows);
+                  &model.parameters[joint.geometry], &rows);
     EXPECT_NEAR(rows.coordinate, expected[j], 1e-15);
   }
   EXPECT_NEAR(state.pose[2], 0.4, 1e-15);

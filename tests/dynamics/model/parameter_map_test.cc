@@ -18,8 +18,8 @@ VectorX<double> Variables(const Scene& scene) {
   const Eigen::Index n = static_cast<Eigen::Index>(state.pose.size());
   w.head(n) = Eigen::Map<const VectorX<double>>(state.pose.data(), n);
   w.segment(n, n) = Eigen::Map<const VectorX<double>>(state.twist.data(), n);
-  w.tail(model.structure->num_numbers) =
-      Eigen::Map<const VectorX<double>>(model.numbers.data(), model.structure->num_numbers);
+  w.tail(model.structure->num_parameters) =
+      Eigen::Map<const VectorX<double>>(model.parameters.data(), model.structure->num_parameters);
   return w;
 }
 
@@ -65,11 +65,11 @@ TEST(ParameterMapTest, ScalesAndSumsOfSeveralNumbers) {
   const auto structure = BuildStructure(scene);
   const Eigen::SparseMatrix<double> jacobian = VariableJacobian(scene, structure, {direction});
   const ModelStructure& s = *structure;
-  EXPECT_EQ(jacobian.coeff(s.NumberVariable(s.bodies[0].mass), 0), 1.0);
-  EXPECT_EQ(jacobian.coeff(s.NumberVariable(s.bodies[1].mass), 0), -2.0);
+  EXPECT_EQ(jacobian.coeff(s.ParameterVariable(s.bodies[0].mass), 0), 1.0);
+  EXPECT_EQ(jacobian.coeff(s.ParameterVariable(s.bodies[1].mass), 0), -2.0);
   // The ball's inertia follows its mass, m r²/2; the crate's is its own number.
-  EXPECT_NEAR(jacobian.coeff(s.NumberVariable(s.bodies[0].inertia), 0), 0.005, 1e-15);
-  EXPECT_EQ(jacobian.coeff(s.NumberVariable(s.bodies[1].inertia), 0), 0.0);
+  EXPECT_NEAR(jacobian.coeff(s.ParameterVariable(s.bodies[0].inertia), 0), 0.005, 1e-15);
+  EXPECT_EQ(jacobian.coeff(s.ParameterVariable(s.bodies[1].inertia), 0), 0.0);
 }
 
 }  // namespace

@@ -46,7 +46,7 @@ TEST(ParameterizedSceneTest, SetsEveryNumberAsScaledAndMoved) {
   EXPECT_EQ(scene.points()[0].at.y(), -7.0);
   EXPECT_EQ(scene.scene().gravity.y(), -10.0);
   EXPECT_EQ(scene.point_derivatives()(1, 0), -2.0);
-  EXPECT_EQ(scene.model().numbers[kGravityY], -10.0);
+  EXPECT_EQ(scene.model().parameters[kGravityY], -10.0);
 }
 
 TEST(ParameterizedSceneTest, VariableDerivativesAreThoseOfDifferencesAtEachPoint) {
@@ -64,7 +64,7 @@ TEST(ParameterizedSceneTest, VariableDerivativesAreThoseOfDifferencesAtEachPoint
     EXPECT_TRUE(scene.Set(at));
     std::vector<double> all = scene.initial_state().pose;
     all.insert(all.end(), scene.initial_state().twist.begin(), scene.initial_state().twist.end());
-    all.insert(all.end(), scene.model().numbers.begin(), scene.model().numbers.end());
+    all.insert(all.end(), scene.model().parameters.begin(), scene.model().parameters.end());
     return Eigen::VectorXd(Eigen::Map<Eigen::VectorXd>(all.data(), all.size()));
   };
   const double h = 1e-6;

@@ -109,6 +109,10 @@ TEST(ContactSolverTest, WhatASolveLeansOnIsCounted) {
                                   : f.interior_point > 0 ? SolvedBy::kInteriorPoint
                                                          : SolvedBy::kGuess)
           << trial;
+      EXPECT_EQ(MethodOf(report.rung), report.solved_by) << NameOf(report.rung);
+      EXPECT_EQ(report.rung == Rung::kModeChanges, f.pivoting == 0) << NameOf(report.rung);
+    } else {
+      EXPECT_EQ(report.rung, Rung::kNone) << NameOf(report.rung);
     }
     sum.Add(f);
     if (trial >= 3) continue;

@@ -39,7 +39,7 @@ struct Built {
     BuildModel(scene, &model, &initial);
     const ModelStructure& s = *model.structure;
     directions = RowMatrixXd::Zero(s.num_variables(), 2);
-    directions(s.NumberVariable(s.bodies[0].mass), 0) = 1.0;
+    directions(s.ParameterVariable(s.bodies[0].mass), 0) = 1.0;
     directions(s.PoseVariable(0, 0), 1) = 1.0;
   }
   Model<double> model;

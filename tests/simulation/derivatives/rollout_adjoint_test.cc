@@ -290,7 +290,7 @@ TEST(RolloutAdjointTest, KeptFactorisationsOfWideMassesAreRefined) {
   }
   EXPECT_EQ(w_bar[0], w_bar[1]);
   RowMatrixXd w_dot = RowMatrixXd::Zero(s.num_variables(), 1);
-  const int mass = s.NumberVariable(s.bodies[3].mass);
+  const int mass = s.ParameterVariable(s.bodies[3].mass);
   w_dot(mass, 0) = 1.0;
   ASSERT_EQ(RolloutTangent(model, initial, {}, &w_dot, &final).status, StepStatus::kDone);
   const double size = w_dot.col(0).head(outputs).cwiseAbs().maxCoeff();

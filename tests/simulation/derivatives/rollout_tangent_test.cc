@@ -90,7 +90,7 @@ TEST(RolloutTangentTest, NumbersThatNoColumnVariesAreLeftOut) {
   const RolloutReport report = RolloutTangent(model, initial, {}, &reduced, &final);
   ASSERT_EQ(report.status, StepStatus::kDone);
   // Friction, the rod's mass and inertia; the rest of the model's numbers is fixed.
-  EXPECT_EQ(report.fixed_numbers, model.structure->num_numbers - 3);
+  EXPECT_EQ(report.fixed_numbers, model.structure->num_parameters - 3);
   StepTangent tangent;
   Rollout(
       model, initial,
@@ -109,7 +109,7 @@ TEST(RolloutTangentTest, ObserverSeesTheTangentOfEachState) {
   State<double> initial, final;
   BuildModel(scene, &model, &initial);
   RowMatrixXd w_dot = RowMatrixXd::Zero(model.structure->num_variables(), 1);
-  w_dot(model.structure->NumberVariable(kGravityY), 0) = 1.0;
+  w_dot(model.structure->ParameterVariable(kGravityY), 0) = 1.0;
   long calls = 0;
   RolloutTangent(
       model, initial,

@@ -30,7 +30,7 @@ State<Jet<N>> StepInJets(const std::string& text, JetRoute route, const Seed& se
   EXPECT_EQ(report.status, StepStatus::kDone) << report.message;
   Model<Jet<N>> jets;
   jets.structure = model.structure;
-  for (const double number : model.numbers) jets.numbers.push_back(Jet<N>(number));
+  for (const double number : model.parameters) jets.parameters.push_back(Jet<N>(number));
   State<Jet<N>> state;
   for (size_t i = 0; i < start.pose.size(); ++i) {
     state.pose.push_back(Jet<N>(start.pose[i]));
@@ -103,8 +103,8 @@ void ExpectForcesThatGiveWayMoveInTime(JetRoute route, const std::string& pull, 
       R"(, "springs": [{"name": "s", "bodies": ["disc", "hand"], "anchors": [[0, 0.1], )" + hand +
           R"(], "stiffness": )" + std::to_string(rate) + R"(, "rest_length": 1}],
        "forces": [{"name": "none", "body": "disc", "start": 0.8}])");
-  const State<Jet<N>> state =
-      StepInJets<N>(text, route, [](auto* model, auto*) { model->numbers[kGravityY].v[0] = 1.0; });
+  const State<Jet<N>> state = StepInJets<N>(
+      text, route, [](auto* model, auto*) { model->parameters[kGravityY].v[0] = 1.0; });
   EXPECT_NEAR(state.twist[component].a, 0.2 * (0.8 * rate - friction * 10.0), 1e-9);
   // Less gravity holds less.
   EXPECT_NEAR(state.twist[component].v[0], 0.2 * friction, 1e-9);
@@ -125,7 +125,7 @@ void ExpectLimitsMoveInTime(JetRoute route) {
   EXPECT_NEAR(by_speed.twist[0].a, -2.0, 1e-9);
   EXPECT_NEAR(by_speed.twist[0].v[0], -8.0 * 0.25 / 3.0, 1e-9);
   const State<Jet<N>> by_limit = StepInJets<N>(text, route, [](auto* model, auto*) {
-    model->numbers[model->structure->joints[0].high].v[0] = 1.0;
+    model->parameters[model->structure->joints[0].high].v[0] = 1.0;
   });
   EXPECT_NEAR(by_limit.twist[0].v[0], 8.0 / 3.0, 1e-9);
   // x(T) = limit − ½ 8 (T − t)².

@@ -78,8 +78,8 @@ TEST(JointProjectionTest, TangentIsTheDifferenceAndAdjointItsTranspose) {
       Model<double> moved = model;
       State<double> q = state;
       for (size_t i = 0; i < q.pose.size(); ++i) q.pose[i] += step * direction(i, 0);
-      for (int i = 0; i < s.num_numbers; ++i) {
-        moved.numbers[i] += step * direction(s.NumberVariable(i), 0);
+      for (int i = 0; i < s.num_parameters; ++i) {
+        moved.parameters[i] += step * direction(s.ParameterVariable(i), 0);
       }
       JointProjection other;
       EXPECT_TRUE(other.Project(moved, q.pose, &q));
@@ -189,7 +189,7 @@ TEST(JointProjectionTest, JointsThatCannotHoldAreTold) {
   Model<double> model;
   State<double> state;
   BuildModel(scene, &model, &state);
-  model.numbers[model.structure->joints[0].geometry + 4] = 0.5;  // too short: 0.5 + 1 < 2
+  model.parameters[model.structure->joints[0].geometry + 4] = 0.5;  // too short: 0.5 + 1 < 2
   JointProjection projection;
   EXPECT_FALSE(projection.Project(model, state.pose, &state));
   EXPECT_GT(projection.error(), 0.1);

@@ -21,7 +21,7 @@ double AlongJoints(const Model<double>& model, ProjectionIterate<double>* p) {
   EXPECT_TRUE(FactorProjection(model, p, ProjectionWeight::kMass));
   const auto mass = [&](int k, int i) {
     const BodyIndex& body = model.structure->bodies[s.moving[k]];
-    return model.numbers[i < 2 ? body.mass : body.inertia];
+    return model.parameters[i < 2 ? body.mass : body.inertia];
   };
   RandomNumbers random(3);
   double largest = 0.0;
@@ -107,8 +107,8 @@ TEST(ProjectionDescentTest, DerivativesAreThoseOfTheMinimum) {
     projection.Tangent(model, w_dot.data(), 1);
 
     Model<Jet<4>> jets{model.structure, {}};
-    for (const double number : model.numbers) {
-      jets.numbers.emplace_back(number);
+    for (const double number : model.parameters) {
+      jets.parameters.emplace_back(number);
     }
     State<Jet<4>> jet;
     for (size_t i = 0; i < state.pose.size(); ++i) {

@@ -53,7 +53,7 @@ TEST(ProjectionNewtonTest, TheMoveIsOrthogonalToWhatTheJointsAllow) {
         const int q = 3 * s.moving[k] + i;
         const BodyIndex& body = s.bodies[s.moving[k]];
         force[3 * k + i] =
-            model.numbers[i < 2 ? body.mass : body.inertia] * (p.at.pose[q] - p.from.pose[q]);
+            model.parameters[i < 2 ? body.mass : body.inertia] * (p.at.pose[q] - p.from.pose[q]);
       }
     }
     RandomNumbers random(seed + 100);

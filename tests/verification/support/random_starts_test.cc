@@ -43,8 +43,8 @@ TEST(RandomStartsTest, AllTouchAndNothingApproaches) {
     const BodyIndex& body = model.structure->bodies[1];
     const RowPart<double>& n = contact.a == 1 ? rows.normal_a : rows.normal_b;
     const RowPart<double>& t = contact.a == 1 ? rows.tangent_a : rows.tangent_b;
-    const double inertia = model.numbers[body.inertia];
-    const double normal = 1.0 / model.numbers[body.mass] + n[2] * n[2] / inertia;
+    const double inertia = model.parameters[body.inertia];
+    const double normal = 1.0 / model.parameters[body.mass] + n[2] * n[2] / inertia;
     const double mixed = std::abs(n[2] * t[2]) / inertia;
     const double friction = MixedFriction(model, contact.a, contact.b).value;
     (friction * mixed > normal ? above : below) += 1;
