@@ -322,8 +322,8 @@ TEST(RolloutAdjointTest, AUsedTapeForgetsTheContactsOfItsLastRun) {
   BuildModel(scene, &wide, &on_floor);
   const ModelStructure& s = *wide.structure;
   equal = wide;
-  equal.numbers[s.bodies[0].mass] = 1.0;
-  equal.numbers[s.bodies[0].inertia] = equal.numbers[s.bodies[1].inertia];
+  equal.parameters[s.bodies[0].mass] = 1.0;
+  equal.parameters[s.bodies[0].inertia] = equal.parameters[s.bodies[1].inertia];
   above = on_floor;
   for (int body = 0; body < 2; ++body) {
     above.pose[3 * body + 1] += 0.3;
