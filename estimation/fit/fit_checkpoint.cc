@@ -215,33 +215,34 @@ FitCheckpoint::FitCheckpoint(const FitProblem& problem, Writer writer)
 }
 
 std::string FitCheckpoint::Text() const {
-  const Json fits = {ToJson(fits_[0]), ToJson(fits_[1])};
-  return Encode({{"format", kFormat},
-                 {"problem", problem_},
-                 {"content", HashOf(Encode(fits))},
-                 {"fits", fits}});
+  const Json json = {{"problem", problem_}, {"fits", {ToJson(fits_[0]), ToJson(fits_[1])}}};
+  const std::string content = Encode(json);
+  return std::string(kFormat) + " " + HashOf(content) + "\n" + content;
 }
 
+// The hash stands before the content, and is looked at first: what was not written here is never
+// decoded.
 std::string FitCheckpoint::Restore(const std::string& text, const std::string& file) {
-  const Json json = Json::from_cbor(text, true, false);
-  if (!json.is_object() || json.value("format", Json()) != kFormat) {
+  const size_t end = text.find('\n');
+  if (end == std::string::npos || text.rfind(kFormat, 0) != 0) {
     return file + ": expected a \"" + kFormat +
            "\", got another or a damaged file; remove it to begin anew";
   }
-  if (json.value("problem", Json()) != problem_) {
-    return file +
-           ": /problem: a checkpoint of another fit: scene, parameters, observations or options "
-           "differ; name another file, or remove this one to begin anew";
-  }
   const std::string damaged =
-      file + ": /fits: damaged: its content is not what was written; remove the file to begin anew";
-  const Json fits = json.value("fits", Json());
-  if (json.value("content", Json()) != HashOf(Encode(fits))) {
+      file + ": damaged: its content is not what was written; remove the file to begin anew";
+  const std::string content = text.substr(end + 1);
+  if (text.substr(0, end) != std::string(kFormat) + " " + HashOf(content)) {
     return damaged;
   }
   try {
+    const Json json = Json::from_cbor(content);
+    if (json.at("problem") != problem_) {
+      return file +
+             ": /problem: a checkpoint of another fit: scene, parameters, observations or options "
+             "differ; name another file, or remove this one to begin anew";
+    }
     for (size_t i = 0; i < fits_.size(); ++i) {
-      Read(fits.at(i), &fits_[i]);
+      Read(json.at("fits").at(i), &fits_[i]);
     }
   } catch (const Json::exception&) {
     return damaged;

@@ -156,6 +156,15 @@ bool ParseJson(const std::string& text, const std::string& name_for_messages, Js
                std::string* error) {
   JsonErrors errors(name_for_messages);
   *json = nullptr;
+  // The parser takes a NUL byte for the end, whatever follows it.
+  if (const size_t nul = text.find('\0'); nul != std::string::npos) {
+    const auto end = text.begin() + static_cast<std::ptrdiff_t>(nul);
+    const size_t line_start = text.rfind('\n', nul) + 1;  // 0 on the first line
+    errors.Add("", "line " + std::to_string(1 + std::count(text.begin(), end, '\n')) + ", column " +
+                       std::to_string(1 + nul - line_start) + ": malformed JSON: a NUL byte");
+    *error = errors.message();
+    return false;
+  }
   DocumentBuilder builder(text, json, &errors);
   if (Json::sax_parse(text, &builder)) return true;
   errors.Add("", "malformed JSON");

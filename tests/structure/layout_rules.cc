@@ -321,6 +321,91 @@ std::vector<std::string> UndocumentedTolerances(const std::string& header,
   return missing;
 }
 
+namespace {
+
+/// What stands between backticks.
+std::vector<std::string> Quoted(const std::string& text) {
+  std::vector<std::string> quoted;
+  for (std::size_t at = text.find('`'); at != std::string::npos; at = text.find('`', at + 1)) {
+    const std::size_t end = text.find('`', at + 1);
+    if (end == std::string::npos) {
+      break;
+    }
+    quoted.push_back(text.substr(at + 1, end - at - 1));
+    at = end;
+  }
+  return quoted;
+}
+
+std::vector<std::string> Cells(const std::string& row) {
+  std::vector<std::string> cells;
+  std::istringstream in(row);
+  for (std::string cell; std::getline(in, cell, '|');) {
+    cells.push_back(cell);
+  }
+  return cells;
+}
+
+/// A file of the table in full, after the file `last`.
+std::string FullPath(const std::string& name, const std::string& last) {
+  if (StartsWith(name, ".")) {
+    return last.substr(0, last.rfind('.')) + name;
+  }
+  if (!Contains(name, "/")) {
+    return last.substr(0, last.rfind('/') + 1) + name;
+  }
+  return StartsWith(name, "estimation/") ? name : "lib/" + name;
+}
+
+bool HasWord(const std::string& text, const std::string& word) {
+  const auto is_part = [&](std::size_t i) {
+    return i < text.size() &&
+           (std::isalnum(static_cast<unsigned char>(text[i])) != 0 || text[i] == '_');
+  };
+  for (std::size_t at = text.find(word); at != std::string::npos; at = text.find(word, at + 1)) {
+    if ((at == 0 || !is_part(at - 1)) && !is_part(at + word.size())) {
+      return true;
+    }
+  }
+  return false;
+}
+
+}  // namespace
+
+std::vector<std::string> WrongIndexRows(
+    const std::string& readme, const std::function<std::string(const std::string& path)>& read) {
+  std::vector<std::string> problems;
+  std::istringstream lines(readme);
+  bool inside = false;
+  for (std::string line; std::getline(lines, line);) {
+    inside = StartsWith(line, "| equation |") || (inside && StartsWith(line, "|"));
+    const std::vector<std::string> cells = Cells(line);
+    if (!inside || cells.size() < 4) {
+      continue;
+    }
+    std::string texts;
+    std::string last;
+    for (const std::string& name : Quoted(cells[2])) {
+      if (name == "lib") {
+        continue;  // the head of the table
+      }
+      last = FullPath(name, last);
+      const std::string text = read(last);
+      if (text.empty()) {
+        problems.push_back(last + " does not exist:" + cells[1]);
+      }
+      texts += text;
+    }
+    for (const std::string& name : Quoted(cells[3])) {
+      const std::size_t scope = name.rfind("::");
+      if (!HasWord(texts, scope == std::string::npos ? name : name.substr(scope + 2))) {
+        problems.push_back(name + " is in none of the files of the row" + cells[1]);
+      }
+    }
+  }
+  return problems;
+}
+
 std::vector<std::string> UnlistedHeaders(const std::string& cmake_lists,
                                          const std::vector<std::string>& headers) {
   const std::size_t module = cmake_lists.find("tangible_module(");

@@ -5,6 +5,7 @@
 //
 // The checks work on texts, so that tests can plant violations.
 
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -35,6 +36,13 @@ std::vector<std::string> CheckSource(const SourceFile& file);
 /// The constants of a tolerances.h whose name and value are not in a row of the README's table.
 std::vector<std::string> UndocumentedTolerances(const std::string& header,
                                                 const std::string& readme);
+
+/// What is wrong with the rows of the table "equation | file | function" of lib/README.md: a file
+/// that `read` knows no text of, or a function or class that none of the row's files has. In the
+/// table `.cc` stands for the last file's name with that extension, a file without a folder is in
+/// the last one's, and one without `estimation/` is below lib.
+std::vector<std::string> WrongIndexRows(
+    const std::string& readme, const std::function<std::string(const std::string& path)>& read);
 
 /// The headers (paths relative to the folder of the CMakeLists.txt) that tangible_module(...) does
 /// not list under HEADERS. Empty if there is no tangible_module. `_inl.h` need not be listed.

@@ -170,6 +170,23 @@ TEST(LayoutRules, TolerancesHaveAHeaderAndATable) {
             (std::vector<std::string>{"kA"}));
 }
 
+TEST(LayoutRules, RowsOfTheIndexNameWhatIsThere) {
+  const auto read = [](const std::string& path) {
+    return path == "lib/a/b.h" || path == "lib/a/b.cc" || path == "estimation/c.h" ? "Solve(x)"
+                                                                                   : "";
+  };
+  const auto problems = [&](const std::string& row) {
+    return WrongIndexRows("| equation | file, below `lib` | function |\n|---|---|---|\n" + row,
+                          read)
+        .size();
+  };
+  EXPECT_EQ(problems("| x | `a/b.h`, `.cc` | `A::Solve` |\n"), 0U);
+  EXPECT_EQ(problems("| x | `a/b.h`, `b.cc`; `estimation/c.h` | `Solve` |\n"), 0U);
+  EXPECT_EQ(problems("| x | `a/d.h` | `Solve` |\n"), 2U);
+  EXPECT_EQ(problems("| x | `a/b.h` | `Solv` |\n"), 1U);
+  EXPECT_EQ(problems("| x | `a/b.h` | `Solve` |\n\n| y | `z` | `w` |\n"), 0U);
+}
+
 TEST(LayoutRules, EveryHeaderOfAModuleIsInstalled) {
   const std::string lists =
       "tangible_module(lcp\n  SOURCES a.cc\n  HEADERS a.h sub/b.h\n  DEPENDS c.h)\nother(HEADERS "
@@ -201,6 +218,31 @@ TEST(Layout, EveryToleranceStandsInTheTable) {
       ADD_FAILURE() << name << " of lib/lcp/" << folder
                     << "/tolerances.h has no row with its value in lib/lcp/README.md";
     }
+  }
+}
+
+TEST(Layout, TheIndexOfEquations) {
+  // A name with * is all files that begin and end like it.
+  const auto read = [](const std::string& path) {
+    const std::size_t star = path.find('*');
+    if (star == std::string::npos) return fs::exists(kTop / path) ? ReadText(kTop / path) : "";
+    const std::size_t name = path.rfind('/') + 1;
+    const std::string start = path.substr(name, star - name);
+    const std::string end = path.substr(star + 1);
+    std::string texts;
+    for (const fs::directory_entry& entry : fs::directory_iterator(kTop / path.substr(0, name))) {
+      const std::string file = entry.path().filename().string();
+      if (file.rfind(start, 0) == 0 && file.size() > end.size() &&
+          file.compare(file.size() - end.size(), end.size(), end) == 0) {
+        texts += ReadText(entry.path());
+      }
+    }
+    return texts;
+  };
+  const std::string readme = ReadText(kTop / "lib/README.md");
+  ASSERT_NE(readme.find("| equation |"), std::string::npos);
+  for (const std::string& problem : WrongIndexRows(readme, read)) {
+    ADD_FAILURE() << problem;
   }
 }
 

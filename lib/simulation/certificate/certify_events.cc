@@ -78,7 +78,9 @@ void RolloutCertifier::AddQuality(const ContactProblem<double>& problem,
 }
 
 // Impacts on the same bodies at (nearly) the same time: were their order another, so would be the
-// result.
+// result. Impacts of bodies that have nothing to do with each other may be in any order; but where
+// they are at once, the motion has ended at the time of one of them, and the derivative of that
+// time is not the other's.
 void RolloutCertifier::AddSimultaneous(const Model<double>& model, long step,
                                        const Impulses& impact) {
   const ModelStructure& s = *model.structure;
@@ -106,6 +108,9 @@ void RolloutCertifier::AddSimultaneous(const Model<double>& model, long step,
     for (size_t l = 0; l < k; ++l) {
       const ActiveContact& x = impact.contacts[approaching[k]];
       const ActiveContact& y = impact.contacts[approaching[l]];
+      if (impact.time > 0.0 && (x.a != y.a || x.b != y.b || x.joint >= 0 || y.joint >= 0)) {
+        AddMargin(0.0, place, "two contacts touch at the same time");
+      }
       for (const int body : {x.a, x.b}) {
         if (s.bodies[body].block >= 0 && (body == y.a || body == y.b)) {
           AddJump(0.0, place, "two contacts of " + s.bodies[body].name + " touch at once");
@@ -289,6 +294,16 @@ void RolloutCertifier::AddSegment(const Model<double>& model, long step,
         &s, step, segment->time + segment->length, 0, &segment->event_contact, ContactMode::kOpen};
     AddMargin(std::abs(rate) / terms, place,
               std::string("grazing: rate of the ") + NameOf(segment->event));
+    // As of two touches at once: the derivative of the time is that of one.
+    for (size_t i = 0; i < segment->contacts.size(); ++i) {
+      const ActiveContact& other = segment->contacts[i];
+      const double slip = SlipOf(model, segment->before, other);
+      if (segment->event == EventKind::kSlipEnds && SlidingSign(segment->modes[i]) != 0.0 &&
+          (other.a != segment->event_contact.a || other.b != segment->event_contact.b) &&
+          SlipOf(model, segment->after, other) <= Negligible(model, slip)) {
+        AddMargin(0.0, place, "two contacts stop sliding at the same time");
+      }
+    }
     if (EndsInMeeting(model, *segment) &&
         MeetsACorner(model, segment->after, segment->event_contact)) {
       AddJump(0.0, place, "a corner meets a corner");

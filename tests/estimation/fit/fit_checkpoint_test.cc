@@ -163,7 +163,9 @@ TEST(FitCheckpointTest, RefusesWhatIsDamagedOrOfAnotherFit) {
   const size_t digit = text.find("residuals") + 20;
   flipped[digit] = static_cast<char>(text[digit] ^ 1);
   EXPECT_NE(refused(flipped, problem).find("c.json: "), std::string::npos);
-  for (const char* const other : {"{}", "[]", "", "\xff\xff", "\xa0"}) {
+  const std::string deep(1'000'000, '\x81');
+  for (const std::string& other :
+       {std::string("{}"), std::string("[]"), std::string(), std::string("\xff\xff"), deep}) {
     EXPECT_EQ(refused(other, problem).rfind("c.json: expected a \"tangible-fit checkpoint 2\"", 0),
               0U);
   }

@@ -37,6 +37,29 @@ TEST(CertifyEventsTest, ABounceIsTrustworthy) {
   EXPECT_EQ(c.events, 1);
 }
 
+// Two discs that have nothing to do with each other: dropped from one height, or sliding at one
+// speed. An event's time is that of one of them.
+TEST(CertifyEventsTest, EventsOfTwoBodiesAtTheSameTimeAreNamed) {
+  const auto verdict = [](double height_a, double height_b, double speed) {
+    const auto disc = [&](const char* name, double x, double y) {
+      return R"({"name": ")" + std::string(name) +
+             R"(", "shape": {"circle": {"radius": 0.125}}, "mass": 1, "friction": 0.3,
+          "restitution": 0.5, "position": [)" +
+             std::to_string(x) + ", " + std::to_string(y) + R"(], "velocity": [)" +
+             std::to_string(speed) + ", 0]}";
+    };
+    return CertificateOf(R"("bodies": [)" + disc("a", 0.0, height_a) + ", " +
+                             disc("b", 1.0, height_b) + ", " + Floor() + "]",
+                         0.2)
+        .verdict;
+  };
+  const std::string touch = verdict(0.2, 0.2, 0.0);
+  EXPECT_NE(touch.find("two contacts touch at the same time"), std::string::npos) << touch;
+  EXPECT_EQ(verdict(0.2, 0.19, 0.0), "trustworthy");
+  const std::string slip = verdict(0.125, 0.125, 0.3);
+  EXPECT_NE(slip.find("two contacts stop sliding at the same time"), std::string::npos) << slip;
+}
+
 // A ball on a floor whose bounces follow each other ever faster: most of them within one step.
 TEST(CertifyEventsTest, ASeriesThatRoundingEndsIsNamed) {
   const auto of = [](const char* more) {
