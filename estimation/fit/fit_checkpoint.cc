@@ -228,7 +228,7 @@ std::string FitCheckpoint::Restore(const std::string& text, const std::string& f
     return file + ": expected a \"" + kFormat +
            "\", got another or a damaged file; remove it to begin anew";
   }
-  const std::string damaged =
+  std::string damaged =
       file + ": damaged: its content is not what was written; remove the file to begin anew";
   const std::string content = text.substr(end + 1);
   if (text.substr(0, end) != std::string(kFormat) + " " + HashOf(content)) {
