@@ -234,19 +234,21 @@ void RolloutCertifier::ProbeStarts(const Model<double>& model, const State<doubl
     }
   }
   const std::vector<ActiveContact> may_jam = ThatMayJam(model, start, resting);
-  if (may_jam.empty()) {
-    return;
-  }
   const double acceleration = Acceleration(model, first);
   LocalJacobianScratch scratch;
   for (Eigen::Index c = 0; c < options_.directions.cols(); ++c) {
     std::vector<ActiveContact> moved;
-    for (const ActiveContact& contact : may_jam) {
+    for (const ActiveContact& contact : resting) {
       std::vector<JacobianEntry> approach, slip;
-      AddApproachGradient(model, start, contact, &scratch, &approach);
-      // What does not slide may begin to, and friction then turn its law around.
+      if (std::any_of(may_jam.begin(), may_jam.end(),
+                      [&](const ActiveContact& other) { return other.SameAs(contact); })) {
+        AddApproachGradient(model, start, contact, &scratch, &approach);
+      }
+      // What does not slide may begin to: friction then turns the law of a contact around, or acts
+      // to one side in place of the other, so that the body tips or does not.
       if (const double speed = SpeedsOf(model, start, contact).slip;
-          std::abs(speed) <= Negligible(model, speed)) {
+          std::abs(speed) <= Negligible(model, speed) &&
+          MixedFriction(model, contact.a, contact.b).value > 0.0) {
         AddSlipGradient(model, start, contact, &scratch, &slip);
       }
       if (Moves(approach, options_.directions, c) || Moves(slip, options_.directions, c)) {

@@ -69,6 +69,24 @@ TEST(StartProbeTest, ASlipThatWouldJamARisingFootIsAKink) {
       << VerdictOf(scene, "bodies/body/velocity/x");
 }
 
+// A box that a force just tips over the corner at which friction holds it: set sliding one way
+// friction goes on to tip it, the other way it sets the box back. Unpushed it comes to rest.
+TEST(StartProbeTest, ASlipThatDecidesWhetherABoxTipsIsAKink) {
+  const auto scene = [](const std::string& force) {
+    return SceneOf(R"({"bodies": [{"name": "floor", "static": true, "friction": 1,
+        "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}},
+      {"name": "box", "shape": {"box": {"size": [0.2, 0.4]}}, "mass": 1, "position": [0, 0.2],
+       "friction": 1}],
+    "forces": [{"name": "push", "body": "box", "force": [)" +
+                   force + R"(, 0]}],
+    "simulation": {"dt": 0.001, "duration": 0.04, "stepping": "event"}})");
+  };
+  EXPECT_EQ(VerdictOf(scene("5"), "bodies/box/velocity/x"),
+            "one-sided: contact of floor and box touches at the start, bodies/box/velocity/x sets "
+            "it sliding");
+  EXPECT_EQ(VerdictOf(scene("0"), "bodies/box/velocity/x"), "trustworthy");
+}
+
 TEST(StartProbeTest, BodiesThatTouchAndSlideInOrdinaryFrictionAreTrustworthy) {
   const auto scene = [](const std::string& body, double friction) {
     Scene made = SceneOf(R"({"bodies": [{"name": "floor", "static": true,
