@@ -17,10 +17,10 @@
 #include "tangible/app/program.h"
 #include "tangible/app/progress.h"
 #include "tangible/app/run_recorders.h"
-#include "tangible/app/run_warnings.h"
 #include "tangible/dynamics/model/settings.h"
 #include "tangible/scene/json_writer.h"
 #include "tangible/scene/scene_json.h"
+#include "tangible/simulation/stepping/run_warnings.h"
 
 DEFINE_string(out, "",
               "file of the trajectory (CSV); empty: stdout, unless another result is asked for");
@@ -234,21 +234,22 @@ int Run(const std::string& file) {
   return kExitDone;
 }
 
-// One line on the first row whose joints are open at its end, with how many others there are.
-void ReportOpenJoints(const BatchTable& table, const std::vector<BatchRow>& rows) {
-  std::string first;
-  int others = -1;
-  for (size_t r = 0; r < rows.size(); ++r) {
-    if (rows[r].open_joint.empty()) continue;
-    if (++others == 0) {
-      first = FLAGS_batch + ": line " + std::to_string(table.lines[r]) +
-              ": warning: " + rows[r].open_joint;
-    }
+// The lines on the first row that has any, with how many others have.
+void ReportWarnings(const BatchTable& table, const std::vector<BatchRow>& rows) {
+  const BatchRow* first = nullptr;
+  int others = 0;
+  for (const BatchRow& row : rows) {
+    if (row.warnings.empty()) continue;
+    others += first != nullptr ? 1 : 0;
+    first = first == nullptr ? &row : first;
   }
-  if (others > 0) {
-    first += " (and " + std::to_string(others) + (others == 1 ? " more row)" : " more rows)");
-  }
-  if (others >= 0) ReportError(first);
+  if (first == nullptr) return;
+  const std::string place =
+      FLAGS_batch + ": line " + std::to_string(table.lines[first - rows.data()]) + ": warning: ";
+  const std::string more = others == 0 ? ""
+                                       : " (and " + std::to_string(others) +
+                                             (others == 1 ? " more row)" : " more rows)");
+  for (const std::string& line : first->warnings) ReportError(place + line + more);
 }
 
 // All rows of a table; those that fail are told, the others written.
@@ -274,7 +275,7 @@ int RunRows(const std::string& file) {
     exit_status = ReportError(FLAGS_batch + ": line " + std::to_string(table.lines[r]) + ": " +
                               batch.rows[r].message);
   }
-  ReportOpenJoints(table, batch.rows);
+  ReportWarnings(table, batch.rows);
   return exit_status;
 }
 

@@ -125,6 +125,27 @@ TEST_F(WarningsTest, ABatchSaysItOnce) {
   EXPECT_NE(run.error.find("2 more rows"), std::string::npos) << run.error;
 }
 
+// A ball that touches nothing: its position is rounding, and so it is in a batch.
+TEST_F(WarningsTest, AFreeBodyFarAwayIsOneLineToo) {
+  const std::string text = R"({"gravity": [0, 0], "bodies": [{"name": "ball",
+      "shape": {"circle": {"radius": 0.1}}, "mass": 1, "position": [1e17, 0]}],
+    "simulation": {"dt": 0.01, "duration": 0.1, "stepping": "event",
+      "integrator": "semi_implicit_euler"}})";
+  EXPECT_NE(Simulate(text).error.find("coordinates are too large: body ball is 1e+17 m"),
+            std::string::npos);
+  EXPECT_EQ(summary_["warnings"].size(), 2u);
+  Write("rows.csv", "bodies/ball/mass\n1\n2\n");
+  const ProgramRun run =
+      Run("tangible-simulate", "'" + Path("scene.json") + "' --batch='" + Path("rows.csv") + "'");
+  EXPECT_EQ(run.exit_status, 0);
+  EXPECT_EQ(std::count(run.error.begin(), run.error.end(), '\n'), 2);
+  EXPECT_NE(run.error.find("rows.csv: line 2: warning: coordinates are too large"),
+            std::string::npos)
+      << run.error;
+  EXPECT_NE(run.error.find("rows.csv: line 2: warning: semi_implicit_euler"), std::string::npos)
+      << run.error;
+}
+
 TEST_F(WarningsTest, AGradientSaysItToo) {
   const ProgramRun run =
       Run("tangible-gradient", "'" + Write("scene.json", Chain("8")) +

@@ -63,6 +63,7 @@ class RolloutCertifier {
   void ProbeStarts(const Model<double>& model, const State<double>& start,
                    const std::vector<const ActiveContact*>& touching, const Segment* first);
   void AddImpact(const Model<double>& model, long step, Impulses* impact);
+  void AddOtherSlips(const Model<double>& model, const Segment& segment, const Place& place);
   void AddSegment(const Model<double>& model, long step, EventDerivative* derivative,
                   Segment* segment);
   void AddClosedAtOnce(const ModelStructure& s, long step, const Segment& segment);
@@ -92,8 +93,7 @@ class RolloutCertifier {
   int last_redundant_ = 0;
   // Event stepping: contacts that bear a force, the bodies that the last impact moved, and when.
   std::vector<ActiveContact> loaded_;
-  std::vector<bool> struck_;
-  double struck_at_ = -std::numeric_limits<double>::infinity();
+  std::vector<double> struck_at_;  ///< a body: the time of its last impact, s
 };
 
 /// Runs the rollout and certifies it. A rollout that fails is certified as far as it came; `report`

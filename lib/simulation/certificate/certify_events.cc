@@ -12,6 +12,8 @@
 #include "tangible/simulation/certificate/certify_place_inl.h"
 #include "tangible/simulation/certificate/feature_ties.h"
 #include "tangible/simulation/derivatives/rollout_directional.h"
+#include "tangible/simulation/events/coupled_bodies.h"
+#include "tangible/simulation/events/event_counts.h"
 #include "tangible/simulation/events/event_search.h"
 #include "tangible/simulation/events/segment_flow.h"
 #include "tangible/simulation/events/tolerances.h"
@@ -78,9 +80,8 @@ void RolloutCertifier::AddQuality(const ContactProblem<double>& problem,
 }
 
 // Impacts on the same bodies at (nearly) the same time: were their order another, so would be the
-// result. Impacts of bodies that have nothing to do with each other may be in any order; but where
-// they are at once, the motion has ended at the time of one of them, and the derivative of that
-// time is not the other's.
+// result. Impacts of bodies that have nothing to do with each other may be in any order, and are
+// impacts of their own (events/coupled_bodies.h).
 void RolloutCertifier::AddSimultaneous(const Model<double>& model, long step,
                                        const Impulses& impact) {
   const ModelStructure& s = *model.structure;
@@ -94,9 +95,6 @@ void RolloutCertifier::AddSimultaneous(const Model<double>& model, long step,
       approaching.push_back(i);
     }
   }
-  const auto share = [&](size_t i, const std::vector<bool>& bodies) {
-    return bodies[impact.contacts[i].a] || bodies[impact.contacts[i].b];
-  };
   if (approaching.empty()) {
     return;
   }
@@ -118,16 +116,18 @@ void RolloutCertifier::AddSimultaneous(const Model<double>& model, long step,
       }
     }
   }
-  if (!struck_.empty()) {
-    for (const size_t i : approaching) {
-      if (share(i, struck_)) {
-        AddJump((impact.time - struck_at_) / s.settings.dt, place,
-                "impacts follow each other within " + Short(impact.time - struck_at_) + " s");
-      }
+  struck_at_.resize(s.bodies.size(), -std::numeric_limits<double>::infinity());
+  for (const size_t i : approaching) {
+    const double last =
+        std::max(struck_at_[impact.contacts[i].a], struck_at_[impact.contacts[i].b]);
+    if (std::isfinite(last)) {
+      AddJump((impact.time - last) / s.settings.dt, place,
+              "impacts follow each other within " + Short(impact.time - last) + " s");
     }
   }
-  struck_ = struck;
-  struck_at_ = impact.time;
+  for (size_t body = 0; body < struck.size(); ++body) {
+    struck_at_[body] = struck[body] ? impact.time : struck_at_[body];
+  }
 }
 
 // A contact that only touches, without force, takes part in an impact of another: were there a gap,
@@ -229,6 +229,23 @@ void RolloutCertifier::AddClosedAtOnce(const ModelStructure& s, long step, const
   }
 }
 
+// Coupled bodies that stop sliding at the same time: the derivative of the time is that of one.
+void RolloutCertifier::AddOtherSlips(const Model<double>& model, const Segment& segment,
+                                     const Place& place) {
+  const ActiveContact& ends = segment.event_contact;
+  CoupledBodies coupled;
+  coupled.Connect(*model.structure, segment.contacts);
+  for (size_t i = 0; i < segment.contacts.size(); ++i) {
+    const ActiveContact& other = segment.contacts[i];
+    const double slip = SlipOf(model, segment.before, other);
+    if (SlidingSign(segment.modes[i]) != 0.0 && (other.a != ends.a || other.b != ends.b) &&
+        coupled.GroupOf(other) == coupled.GroupOf(ends) &&
+        SlipOf(model, segment.after, other) <= Negligible(model, slip)) {
+      AddMargin(0.0, place, "two contacts stop sliding at the same time");
+    }
+  }
+}
+
 void RolloutCertifier::AddSegment(const Model<double>& model, long step,
                                   EventDerivative* derivative, Segment* segment) {
   const ModelStructure& s = *model.structure;
@@ -262,7 +279,8 @@ void RolloutCertifier::AddSegment(const Model<double>& model, long step,
           return &other != &contact && other.a == contact.a && other.b == contact.b &&
                  segment->modes[&other - segment->contacts.data()] == ContactMode::kSticking;
         });
-    if (SlidingSign(place.mode) != 0.0 && !shared) {
+    const bool ends_at_once = segment->length == 0.0 && segment->event == EventKind::kSlipEnds;
+    if (SlidingSign(place.mode) != 0.0 && !shared && !ends_at_once) {
       const double slip =
           std::max(SlipOf(model, segment->before, contact), SlipOf(model, segment->after, contact));
       if (slip <= Negligible(model, slip)) {
@@ -294,15 +312,8 @@ void RolloutCertifier::AddSegment(const Model<double>& model, long step,
         &s, step, segment->time + segment->length, 0, &segment->event_contact, ContactMode::kOpen};
     AddMargin(std::abs(rate) / terms, place,
               std::string("grazing: rate of the ") + NameOf(segment->event));
-    // As of two touches at once: the derivative of the time is that of one.
-    for (size_t i = 0; i < segment->contacts.size(); ++i) {
-      const ActiveContact& other = segment->contacts[i];
-      const double slip = SlipOf(model, segment->before, other);
-      if (segment->event == EventKind::kSlipEnds && SlidingSign(segment->modes[i]) != 0.0 &&
-          (other.a != segment->event_contact.a || other.b != segment->event_contact.b) &&
-          SlipOf(model, segment->after, other) <= Negligible(model, slip)) {
-        AddMargin(0.0, place, "two contacts stop sliding at the same time");
-      }
+    if (segment->event == EventKind::kSlipEnds) {
+      AddOtherSlips(model, *segment, place);
     }
     if (EndsInMeeting(model, *segment) &&
         MeetsACorner(model, segment->after, segment->event_contact)) {
@@ -317,8 +328,9 @@ void RolloutCertifier::AddEventStep(const Model<double>& model, long step, Stepp
   if (step == 0 && options_.directions.cols() > 0) {
     AddStart(model, record);
   }
-  const Segment* last = nullptr;  // that an event ended
-  int located = 0;
+  const Segment* last = nullptr;  // that the last event of the pair with the most ended
+  EventCounts located;
+  int most = 0;  // events of one pair
   for (int p = 0; p < record.num_parts; ++p) {
     EventPart& part = *record.parts[p];
     if (part.is_impulses) {
@@ -327,16 +339,17 @@ void RolloutCertifier::AddEventStep(const Model<double>& model, long step, Stepp
     }
     AddSegment(model, step, &stepper->event_derivative(), &part.segment);
     if (IsLocated(part.segment.event)) {
-      last = &part.segment;
-      ++located;
+      const int count = located.Add(part.segment.event_contact);
+      last = count > most ? &part.segment : last;
+      most = std::max(most, count);
     }
   }
   // Impacts without end in a finite time (Zeno): of as many, rounding decides how many there are.
-  if (2 * located > model.structure->settings.max_events_per_step) {
+  if (2 * most > model.structure->settings.max_events_per_step) {
     const Place place{model.structure.get(),     step,
                       last->time + last->length, 0,
                       &last->event_contact,      ContactMode::kOpen};
-    AddMargin(0.0, place, "one of " + std::to_string(located) + " events in a step");
+    AddMargin(0.0, place, "one of " + std::to_string(most) + " events in a step");
   }
   std::vector<Graze> grazes;
   FindGrazes(model, record, kNearKinkMargin, &grazes);

@@ -95,8 +95,8 @@ bool EventStepper::AddInstant(const Model<double>& model, double t, EventKind ki
   return true;
 }
 
-bool EventStepper::Rattles(const Model<double>& model, const EventOutcome& outcome) {
-  return outcome.events > model.structure->settings.max_events_per_step / kRattling;
+bool EventStepper::Rattles(const Model<double>& model, const ActiveContact& contact) const {
+  return counts_.Of(contact) > model.structure->settings.max_events_per_step / kRattling;
 }
 
 double EventStepper::ReturnSpeed(const Model<double>& model, const State<double>& state,
@@ -120,12 +120,11 @@ std::string WhatIsUnsolved(const ModelStructure& structure, const Impulses& impu
   return joint < 0 ? "momentum" : NameOfContradicted(structure, joint);
 }
 
-double EventStepper::SlowSpeed(const Model<double>& model, const State<double>& state,
-                               const EventOutcome& outcome) const {
+double EventStepper::SlowSpeed(const Model<double>& model, const State<double>& state) const {
   double slow = search_.SpeedTolerance(model, state);
-  if (Rattles(model, outcome)) {
+  for (const ActiveContact& contact : touching_.contacts) {
     // What nearly dependent rows leave of the speeds that were to vanish.
-    for (const ActiveContact& contact : touching_.contacts) {
+    if (Rattles(model, contact)) {
       slow = std::max(slow, 1e-3 * ReturnSpeed(model, state, contact));
     }
   }
@@ -156,8 +155,9 @@ bool EventStepper::Settle(const Model<double>& model, const Impulses& impact, St
     ContactMode mode = impact.solution.modes[i];
     // A decompression elsewhere may have opened what its compression had closed.
     const bool opened = !rebounds_[i] && speed(*state) > slow;
-    const double returns = std::max(ReturnSpeed(model, *state, contact),
-                                    inelastic_ ? settings.restitution_threshold : 0.0);
+    const double returns =
+        std::max(ReturnSpeed(model, *state, contact),
+                 IsInelastic(model, contact) ? settings.restitution_threshold : 0.0);
     all_slow = all_slow && speed(impact.before) >= -returns;
     if (mode == ContactMode::kOpen || opened) {
       if (speed(*state) > returns) {
@@ -183,7 +183,9 @@ bool EventStepper::Settle(const Model<double>& model, const Impulses& impact, St
     held.friction.push_back(impact.friction[i]);
     held.modes.push_back(mode);
   }
-  if (!any && !(Rattles(model, *outcome) && all_slow && any_slides)) {
+  const bool rattles = std::any_of(impact.contacts.begin(), impact.contacts.end(),
+                                   [&](const ActiveContact& c) { return Rattles(model, c); });
+  if (!any && !(rattles && all_slow && any_slides)) {
     return true;
   }
   ++outcome->given_up.held_contacts;
@@ -199,12 +201,16 @@ bool EventStepper::Settle(const Model<double>& model, const Impulses& impact, St
   return true;
 }
 
-bool EventStepper::LocateTouch(const Model<double>& model, double t, double slow,
+bool EventStepper::LocateTouch(const Model<double>& model, double t, double slow, int group,
                                State<double>* state, EventOutcome* outcome) {
   if (record_.num_parts > 0) {
     const EventPart& last = *record_.parts[record_.num_parts - 1];
-    if (last.is_impulses ||
-        (last.segment.event != EventKind::kStepEnd && last.segment.event != EventKind::kEdge)) {
+    const bool is_first =
+        std::all_of(struck_.begin(), struck_.end(), [](double speed) { return speed == 0.0; });
+    if (last.is_impulses
+            ? is_first
+            : last.segment.event != EventKind::kStepEnd && last.segment.event != EventKind::kEdge &&
+                  coupled_.GroupOf(last.segment.event_contact) == group) {
       return true;
     }
   }
@@ -219,7 +225,8 @@ bool EventStepper::LocateTouch(const Model<double>& model, double t, double slow
     // In penetration it does not matter by how much: a gap that changes moves no time.
     const ActiveContact& candidate = touching_.contacts[i];
     const bool on_surface = candidate.gap >= -search_.TouchTolerance(model, *state, candidate);
-    if (touching_.approach[i] < -slow && on_surface && !was_closed(candidate)) {
+    if (touching_.approach[i] < -slow && on_surface && !was_closed(candidate) &&
+        coupled_.GroupOf(candidate) == group) {
       touch = &touching_.contacts[i];
     }
   }

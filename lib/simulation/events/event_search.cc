@@ -11,8 +11,8 @@
 namespace tangible {
 namespace {
 
-// How often the motion may be evaluated in a step, as a multiple of max_events_per_step: an event
-// takes some ten; one search over a motion whose rates are of no use a thousand.
+// How often the motion may be evaluated in a step, for each event that a pair may have: one takes
+// some ten; one search over a motion whose rates are of no use a thousand.
 constexpr long kEvaluationsOfEvent = 1000;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
@@ -245,7 +245,8 @@ bool EventSearch::Run(const Model<double>& model, const std::vector<ActiveContac
   slow_ = SpeedTolerance(model, segment->before);
   num_samples_ = 0;
   all_good_ = true;
-  const long most = kEvaluationsOfEvent * (1L + model.structure->settings.max_events_per_step);
+  const long most = kEvaluationsOfEvent * num_pairs_with_events_ *
+                    (1L + model.structure->settings.max_events_per_step);
   if (evaluations_ > most) {
     *message = "events are not found in " + std::to_string(most) +
                " evaluations of the motion: a body is too stiff for dt, or events do not end";

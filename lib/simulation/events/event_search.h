@@ -29,7 +29,12 @@ class EventSearch {
   explicit EventSearch(const Model<double>& model);
 
   /// The searches that follow are of one step, whose evaluations of the motion are bounded.
-  void StartStep() { evaluations_ = 0; }
+  void StartStep() {
+    evaluations_ = 0;
+    AllowEventsOf(1);
+  }
+  /// The bound is a multiple of max_events_per_step for each of so many pairs.
+  void AllowEventsOf(int num_pairs) { num_pairs_with_events_ = std::max(1, num_pairs); }
   /// Shortens the segment to its first event and names it; the segment is run to there. `touching`:
   /// contacts within the touching tolerance at its start, which are no events while they stay so.
   bool Run(const Model<double>& model, const std::vector<ActiveContact>& touching, Segment* segment,
@@ -108,6 +113,7 @@ class EventSearch {
   std::vector<Sample> samples_;
   int num_samples_ = 0;
   long evaluations_ = 0;  ///< of the motion, in this step
+  int num_pairs_with_events_ = 1;
   bool all_good_ = true;  ///< all samples of this search could be integrated
   std::vector<std::pair<int, int>> pairs_;
   std::vector<Aabb> boxes_;

@@ -13,7 +13,7 @@ constexpr double kShortStep = 1e-9;
 // How much further than the forces at work a contact that slides is held to its direction.
 constexpr double kForcedSlip = 1e4;
 // How often a motion that cannot be integrated over what is left of a step is halved.
-constexpr int kMostHalvings = 10;
+constexpr int kMostHalvings = 14;
 // How many such shorter motions a step may have. A stiff body's would not end.
 constexpr int kMostShortened = 50;
 // An impact that leaves an approach of no more than this many times the least speed has solved it.
@@ -139,48 +139,120 @@ ContactMode EventStepper::GuessOf(const ActiveContact& contact) const {
   return ContactMode::kSticking;
 }
 
-bool EventStepper::SolveImpacts(const Model<double>& model, double t, State<double>* state,
-                                EventOutcome* outcome) {
-  const SimulationSettings& settings = model.structure->settings;
-  double last_approach = 0.0;
-  for (int repeat = 0;; ++repeat) {
-    FindTouching(model, *state);
-    const double slow = SlowSpeed(model, *state, *outcome);
-    const double approach =
-        touching_.approach.empty()
-            ? 0.0
-            : -*std::min_element(touching_.approach.begin(), touching_.approach.end());
-    // An impact is solved to a tolerance of its own: what it leaves there is none for another one.
-    const bool solved_already =
-        repeat > 0 && approach >= 0.5 * last_approach && approach <= kSolvedApproach * slow;
-    if (!(approach > slow) || solved_already) {
-      return true;
+double EventStepper::ApproachOf(int group) {
+  double approach = 0.0;
+  for (size_t i = 0; i < touching_.contacts.size(); ++i) {
+    if (coupled_.GroupOf(touching_.contacts[i]) == group) {
+      approach = std::max(approach, -touching_.approach[i]);
     }
-    last_approach = approach;
-    if (repeat == 0 && !LocateTouch(model, t, slow, state, outcome)) {
-      return false;
+  }
+  return approach;
+}
+
+int EventStepper::NextToStrike(double slow) {
+  const EventPart* last =
+      record_.num_parts > 0 ? record_.parts[record_.num_parts - 1].get() : nullptr;
+  const bool ends_in_touch =
+      last != nullptr && !last->is_impulses && last->segment.event == EventKind::kTouch;
+  int next = -1;
+  for (size_t i = 0; i < touching_.contacts.size(); ++i) {
+    const ActiveContact& contact = touching_.contacts[i];
+    if (!(touching_.approach[i] < -slow)) {
+      continue;
     }
-    if (++outcome->events > settings.max_events_per_step && !inelastic_) {
-      inelastic_ = true;
+    const int group = coupled_.GroupOf(contact);
+    const double struck = struck_[group];
+    if (struck > 0.0) {
+      const double approach = ApproachOf(group);
+      // An impact is solved to a tolerance of its own: what approach it leaves starts no other one.
+      if (approach >= 0.5 * struck && approach <= kSolvedApproach * slow) {
+        continue;
+      }
+      return group;
+    }
+    const bool ended_segment =
+        ends_in_touch && coupled_.GroupOf(last->segment.event_contact) == group;
+    next = next < 0 || ended_segment ? group : next;
+  }
+  return next;
+}
+
+std::string EventStepper::EventsDoNotEnd(const Model<double>& model, const char* what,
+                                         const ActiveContact& contact) {
+  return std::string(what) + " do not end: more than " + std::to_string(MostEvents(model)) +
+         " in a step of the " + NameOfContact(*model.structure, {contact}, 0) +
+         ", max_events_per_step is " +
+         std::to_string(model.structure->settings.max_events_per_step);
+}
+
+// Of the group's contacts that approach, a pair of bodies once.
+bool EventStepper::CountImpact(const Model<double>& model, double slow, int group,
+                               EventOutcome* outcome) {
+  ++outcome->events;
+  const ActiveContact* last = nullptr;
+  for (size_t i = 0; i < touching_.contacts.size(); ++i) {
+    const ActiveContact& contact = touching_.contacts[i];
+    const bool same_pair = last != nullptr && last->a == contact.a && last->b == contact.b &&
+                           last->joint == contact.joint;
+    if (!(touching_.approach[i] < -slow) || coupled_.GroupOf(contact) != group || same_pair) {
+      continue;
+    }
+    last = &contact;
+    const int count = counts_.Add(contact);
+    if (count == model.structure->settings.max_events_per_step + 1) {
       ++outcome->given_up.rebounds_given_up;
     }
-    if (outcome->events > MostEvents(model)) {
-      const auto fastest = std::min_element(touching_.approach.begin(), touching_.approach.end());
-      outcome->message = "impacts do not end: " +
-                         NameOfContact(*model.structure, touching_.contacts,
-                                       static_cast<int>(fastest - touching_.approach.begin()));
+    if (count > MostEvents(model)) {
+      outcome->message = EventsDoNotEnd(model, "impacts", contact);
       return false;
     }
-    Impulses* impact = ListImpact(model, t, slow, *state, *outcome);
+  }
+  search_.AllowEventsOf(counts_.num_pairs());
+  return true;
+}
+
+bool EventStepper::SolveImpacts(const Model<double>& model, double t, State<double>* state,
+                                EventOutcome* outcome) {
+  const auto find_touching = [&] {
+    FindTouching(model, *state);
+    coupled_.Connect(*model.structure, touching_.contacts);
+    for (const int body : model.structure->moving) {
+      double& of_group = struck_[coupled_.GroupOf(body)];
+      of_group = std::max(of_group, struck_[body]);
+    }
+  };
+  struck_.assign(model.structure->bodies.size(), 0.0);
+  for (;;) {
+    find_touching();
+    const double slow = SlowSpeed(model, *state);
+    int group = NextToStrike(slow);
+    if (group < 0) {
+      return true;
+    }
+    const double approach = ApproachOf(group);
+    if (struck_[group] == 0.0) {
+      if (!LocateTouch(model, t, slow, group, state, outcome)) {
+        return false;
+      }
+      find_touching();
+      group = coupled_.GroupOf(group);
+    }
+    for (const int body : model.structure->moving) {
+      if (coupled_.GroupOf(body) == group) struck_[body] = approach;
+    }
+    if (!CountImpact(model, slow, group, outcome)) {
+      return false;
+    }
+    Impulses* impact = ListImpact(model, t, slow, group, *state);
     if (!SolveImpact(model, impact, state, outcome)) {
       return false;
     }
   }
 }
 
-// The impact of what touches and does not leave, as a new part of the record.
-Impulses* EventStepper::ListImpact(const Model<double>& model, double t, double slow,
-                                   const State<double>& state, const EventOutcome& outcome) {
+// The impact of what touches in a group and does not leave, as a new part of the record.
+Impulses* EventStepper::ListImpact(const Model<double>& model, double t, double slow, int group,
+                                   const State<double>& state) {
   const SimulationSettings& settings = model.structure->settings;
   EventPart* part = record_.Add();
   part->is_impulses = true;
@@ -193,16 +265,19 @@ Impulses* EventStepper::ListImpact(const Model<double>& model, double t, double 
   impact.friction.clear();
   impact.restitution.clear();
   rebounds_.clear();
+  const auto in_group = [&](const ActiveContact& c) { return coupled_.GroupOf(c) == group; };
+  const bool rattles =
+      std::any_of(touching_.contacts.begin(), touching_.contacts.end(),
+                  [&](const ActiveContact& c) { return in_group(c) && Rattles(model, c); });
   for (size_t i = 0; i < touching_.contacts.size(); ++i) {
     // In a rattle what leaves slowly is to be held with the rest: it would be back at once.
-    const double leaves = Rattles(model, outcome)
-                              ? std::max(slow, ReturnSpeed(model, state, touching_.contacts[i]))
-                              : slow;
-    if (touching_.approach[i] > leaves) {
+    const double leaves =
+        rattles ? std::max(slow, ReturnSpeed(model, state, touching_.contacts[i])) : slow;
+    if (touching_.approach[i] > leaves || !in_group(touching_.contacts[i])) {
       continue;
     }
     ActiveContact contact = touching_.contacts[i];
-    const bool rebounds = touching_.restitution[i].value > 0.0 && !inelastic_ &&
+    const bool rebounds = touching_.restitution[i].value > 0.0 && !IsInelastic(model, contact) &&
                           touching_.approach[i] < -settings.restitution_threshold;
     // Poisson's law compresses all contacts inelastically first.
     contact.law = rebounds && settings.impact_law == ImpactLaw::kNewton ? ContactLaw::kRestitution
@@ -311,7 +386,7 @@ void EventStepper::GuessModes(const std::vector<ActiveContact>& contacts,
 bool EventStepper::ChooseModes(const Model<double>& model, double t, double middle, double length,
                                State<double>* state, EventOutcome* outcome, Segment* segment) {
   const SimulationSettings& settings = model.structure->settings;
-  const double slow = SlowSpeed(model, *state, *outcome);
+  const double slow = SlowSpeed(model, *state);
   segment->contacts.clear();
   segment->friction.clear();
   segment->modes.clear();
@@ -321,6 +396,10 @@ bool EventStepper::ChooseModes(const Model<double>& model, double t, double midd
       segment->contacts.push_back(touching_.contacts[i]);
       segment->friction.push_back(touching_.friction[i]);
       slip.push_back(touching_.slip[i]);
+      for (const EndingSlip& ending : ending_) {
+        // Beyond doubt, as it does not slide yet against its own friction.
+        if (ending.contact.SameAs(touching_.contacts[i])) slip.back() = 2.0 * slow * ending.sign;
+      }
     }
   }
   if (segment->contacts.empty()) {
@@ -365,6 +444,42 @@ void EventStepper::SwitchMode(const Segment& segment) {
           segment.event_sign > 0.0 ? ContactMode::kSlidingNegative : ContactMode::kSlidingPositive;
     }
   }
+}
+
+bool EventStepper::EndOtherSlips(const Model<double>& model, double t, const Segment& segment,
+                                 State<double>* state, EventOutcome* outcome) {
+  if (segment.event != EventKind::kSlipEnds) {
+    return true;
+  }
+  FindTouching(model, *state);
+  coupled_.Connect(*model.structure, touching_.contacts);
+  const double slow = SlowSpeed(model, *state);
+  const int group = coupled_.GroupOf(segment.event_contact);
+  for (size_t i = 0; i < segment.contacts.size(); ++i) {
+    const double sign = SlidingSign(segment.modes[i]);
+    if (sign != 0.0 && coupled_.GroupOf(segment.contacts[i]) != group &&
+        std::abs(SpeedsOf(model, *state, segment.contacts[i]).slip) <= slow) {
+      ending_.push_back({segment.contacts[i], sign});
+    }
+  }
+  bool good = true;
+  while (good && !ending_.empty()) {
+    const ActiveContact next = ending_.front().contact;
+    const int ends = coupled_.GroupOf(next);
+    ++outcome->events;
+    counts_.Add(next);
+    good = AddInstant(model, t, EventKind::kSlipEnds, &next, state, outcome);
+    std::erase_if(ending_, [&](const EndingSlip& ending) {
+      return coupled_.GroupOf(ending.contact) == ends;
+    });
+    for (size_t i = 0; i < last_contacts_.size(); ++i) {
+      if (SlidingSign(last_modes_[i]) != 0.0 && coupled_.GroupOf(last_contacts_[i]) == ends) {
+        last_modes_[i] = ContactMode::kSticking;
+      }
+    }
+  }
+  ending_.clear();
+  return good;
 }
 
 EventOutcome EventStepper::Step(const Model<double>& model, double t, double h,
@@ -425,7 +540,7 @@ EventOutcome EventStepper::Advance(const Model<double>& model, double t, double 
                                    State<double>* state) {
   EventOutcome outcome;
   record_.Clear();
-  inelastic_ = false;
+  counts_.Clear();
   search_.StartStep();
   const std::vector<Edge> edges = EdgesWithin(model, t, t + h);
   const double end = t + h;
@@ -462,7 +577,6 @@ EventOutcome EventStepper::Advance(const Model<double>& model, double t, double 
       outcome.message.clear();
       continue;
     }
-    impulses_tried = false;
     std::string message;
     const bool moved = search_.Run(model, touching_.contacts, &segment, &message);
     outcome.pairs_compared = search_.num_compared();
@@ -472,12 +586,13 @@ EventOutcome EventStepper::Advance(const Model<double>& model, double t, double 
       // can be integrated.
       shortened += halvings == 0 ? 1 : 0;
       ++outcome.halved_motions;
+      record_.num_parts = parts;
       if (++halvings > kMostHalvings || shortened > kMostShortened) {
         return fail(message);
       }
-      record_.num_parts = parts;
       continue;
     }
+    impulses_tried = false;
     *state = segment.after;
     at_given_time = segment.event == EventKind::kStepEnd;
     if (at_given_time) {
@@ -496,10 +611,15 @@ EventOutcome EventStepper::Advance(const Model<double>& model, double t, double 
     halvings = 0;
     now += segment.length;
     SwitchMode(segment);
-    const bool counts = segment.event != EventKind::kTouch || segment.length <= 1e-13 * h;
-    if (counts && ++outcome.events > MostEvents(model)) {
-      return fail("events do not end: " +
-                  NameOfContact(*model.structure, {segment.event_contact}, 0));
+    if (segment.event != EventKind::kTouch || segment.length <= 1e-13 * h) {
+      ++outcome.events;
+      if (counts_.Add(segment.event_contact) > MostEvents(model)) {
+        return fail(EventsDoNotEnd(model, "events", segment.event_contact));
+      }
+      search_.AllowEventsOf(counts_.num_pairs());
+    }
+    if (!EndOtherSlips(model, now, segment, state, &outcome)) {
+      return fail(outcome.message);
     }
   }
   return outcome;

@@ -21,6 +21,8 @@
 #include "tangible/dynamics/model/settings.h"
 #include "tangible/lcp/contact/contact_decompression.h"
 #include "tangible/lcp/contact/contact_solver.h"
+#include "tangible/simulation/events/coupled_bodies.h"
+#include "tangible/simulation/events/event_counts.h"
 #include "tangible/simulation/events/event_search.h"
 
 namespace tangible {
@@ -29,7 +31,7 @@ namespace tangible {
 struct EventFallbacks {
   /// Accelerations that do not exist (Painlevé), for which impulses of a very short step stand.
   long short_steps = 0;
-  /// Steps beyond max_events_per_step, whose further impacts are inelastic.
+  /// Pairs beyond max_events_per_step in a step, whose further impacts in it are inelastic.
   long rebounds_given_up = 0;
   /// Impacts after which contacts that leave so slowly that they are back at once are held.
   long held_contacts = 0;
@@ -98,6 +100,11 @@ class EventStepper {
     std::vector<CoefficientSource> friction, restitution;
     std::vector<double> approach, slip;  ///< n v and t v, m/s
   };
+  /// A contact at rest that counts as sliding.
+  struct EndingSlip {
+    ActiveContact contact;
+    double sign = 0.0;
+  };
   void FindTouching(const Model<double>& model, const State<double>& state);
   void AddTouching(const Model<double>& model, const State<double>& state,
                    const ActiveContact& contact);
@@ -114,8 +121,23 @@ class EventStepper {
   /// the impulse of its compression (event_decompression.cc).
   bool Decompress(const Model<double>& model, const Impulses& compression, State<double>* state,
                   EventOutcome* outcome);
-  Impulses* ListImpact(const Model<double>& model, double t, double slow,
-                       const State<double>& state, const EventOutcome& outcome);
+  /// An impact of the group `group` of coupled_.
+  Impulses* ListImpact(const Model<double>& model, double t, double slow, int group,
+                       const State<double>& state);
+  /// A body of the group whose impact is next at this instant: one that has begun, or else that of
+  /// the event that ended the last segment, or else of the first contact that approaches; −1: none
+  /// approaches faster than `slow`, m/s.
+  int NextToStrike(double slow);
+  /// The fastest approach of a group's contacts, m/s.
+  double ApproachOf(int group);
+  bool CountImpact(const Model<double>& model, double slow, int group, EventOutcome* outcome);
+  /// "…: more than 303 events in a step of contact of a and b, max_events_per_step is 100".
+  static std::string EventsDoNotEnd(const Model<double>& model, const char* what,
+                                    const ActiveContact& contact);
+  /// Where a segment ends as a contact stops sliding and others, of bodies that are not coupled to
+  /// it, stop at the same instant: they get events of their own.
+  bool EndOtherSlips(const Model<double>& model, double t, const Segment& segment,
+                     State<double>* state, EventOutcome* outcome);
   bool SolveImpact(const Model<double>& model, Impulses* impact, State<double>* state,
                    EventOutcome* outcome);
   bool SolveInstant(const Model<double>& model, double now, double h, bool begins, bool at_end,
@@ -128,19 +150,22 @@ class EventStepper {
                    State<double>* state, EventOutcome* outcome, Segment* segment);
   bool AddInstant(const Model<double>& model, double t, EventKind kind,
                   const ActiveContact* contact, State<double>* state, EventOutcome* outcome);
-  /// Whether a step has had so many events that slow impacts are a rattle.
-  static bool Rattles(const Model<double>& model, const EventOutcome& outcome);
+  /// Whether a pair has had so many events in this step that its slow impacts are a rattle.
+  bool Rattles(const Model<double>& model, const ActiveContact& contact) const;
+  /// Whether one has had so many that it no longer rebounds.
+  bool IsInelastic(const Model<double>& model, const ActiveContact& contact) const {
+    return counts_.Of(contact) > model.structure->settings.max_events_per_step;
+  }
   /// The speed below which gravity brings a contact (a limit) back before it has left the touching
   /// tolerance, m/s (of an angle's rad/s).
   double ReturnSpeed(const Model<double>& model, const State<double>& state,
                      const ActiveContact& contact) const;
   /// The speed below which what touches neither approaches nor leaves nor slides, m/s.
-  double SlowSpeed(const Model<double>& model, const State<double>& state,
-                   const EventOutcome& outcome) const;
+  double SlowSpeed(const Model<double>& model, const State<double>& state) const;
   bool Settle(const Model<double>& model, const Impulses& impact, State<double>* state,
               EventOutcome* outcome);
-  bool LocateTouch(const Model<double>& model, double t, double slow, State<double>* state,
-                   EventOutcome* outcome);
+  bool LocateTouch(const Model<double>& model, double t, double slow, int group,
+                   State<double>* state, EventOutcome* outcome);
   bool SolveByShortStep(const Model<double>& model, double t, double dt, State<double>* state,
                         EventOutcome* outcome);
   ContactMode GuessOf(const ActiveContact& contact) const;
@@ -159,7 +184,11 @@ class EventStepper {
   // The last modes, which are the next guess.
   std::vector<ActiveContact> last_contacts_;
   std::vector<ContactMode> last_modes_;
-  bool inelastic_ = false;
+  EventCounts counts_;     ///< of this step
+  CoupledBodies coupled_;  ///< at this instant
+  std::vector<double>
+      struck_;  ///< a body: the approach before its last impact at this instant; 0: none
+  std::vector<EndingSlip> ending_;  ///< contacts that slide until an event of their own
 };
 
 }  // namespace tangible

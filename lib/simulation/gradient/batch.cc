@@ -11,7 +11,7 @@
 #include "tangible/dynamics/model/settings.h"
 #include "tangible/scene/set_parameters.h"
 #include "tangible/simulation/derivatives/rollout_tangent.h"
-#include "tangible/simulation/stepping/joint_opening.h"
+#include "tangible/simulation/stepping/run_warnings.h"
 
 namespace tangible {
 namespace {
@@ -73,7 +73,7 @@ class Worker {
     result->status = StatusOf(result->report.status);
     result->message = result->report.message;
     if (result->status != BatchStatus::kDone) return;
-    result->open_joint = OpenJointOf(model_, result->final, result->report.time);
+    result->warnings = RunWarnings(model_, initial_).Finish(model_, result->report, result->final);
     if (!batch_.loss_outputs.empty()) result->loss = Loss(result->final);
   }
 

@@ -43,9 +43,8 @@ struct BatchRow {
   std::string message;   ///< empty unless it failed: when, where, what
   RolloutReport report;  ///< of the run
   State<double> final;   ///< the last good state; that of the start where nothing was run
-  /// Empty, or a line on the joint that is widest open at the end (joint_opening.h), of a row that
-  /// is done.
-  std::string open_joint;
+  /// Of a row that is done: what its end says of joints, coordinates, energy (run_warnings.h).
+  std::vector<std::string> warnings;
   RowMatrixXd jacobian;  ///< outputs (OutputNames) x parameters; empty unless asked for and done
   double loss = std::numeric_limits<double>::quiet_NaN();
   VectorX<double> gradient;  ///< of the loss, a parameter; empty unless asked for and done

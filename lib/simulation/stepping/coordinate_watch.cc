@@ -33,6 +33,13 @@ void CoordinateWatch::LookAtJoints(const Model<double>& model, const State<doubl
   }
 }
 
+void CoordinateWatch::LookAtBodies(const Model<double>& model, const State<double>& state,
+                                   double time) {
+  for (const int body : model.structure->moving) {
+    Look(state, time, body, body);
+  }
+}
+
 std::string CoordinateWatch::Message(const Model<double>& model) const {
   if (!(rounding_ > kLargeCoordinates)) return "";
   const bool turned = std::abs(angle_) * lengths_.size(body_) > distance_;

@@ -31,6 +31,9 @@ class CoordinateWatch {
   /// Looks at the pairs that joints hold together.
   void LookAtJoints(const Model<double>& model, const State<double>& state, double time);
 
+  /// Looks at each body that moves, whether or not it may touch another: at its own places.
+  void LookAtBodies(const Model<double>& model, const State<double>& state, double time);
+
   /// The largest ρ / r so far, 0 where there was no pair.
   double rounding() const { return rounding_; }
   /// Empty, or one line with the remedy: "coordinates are too large: body box is 1e+09 m from the

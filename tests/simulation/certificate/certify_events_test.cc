@@ -37,10 +37,10 @@ TEST(CertifyEventsTest, ABounceIsTrustworthy) {
   EXPECT_EQ(c.events, 1);
 }
 
-// Two discs that have nothing to do with each other: dropped from one height, or sliding at one
-// speed. An event's time is that of one of them.
-TEST(CertifyEventsTest, EventsOfTwoBodiesAtTheSameTimeAreNamed) {
-  const auto verdict = [](double height_a, double height_b, double speed) {
+// Two discs dropped from one height, or sliding at one speed. By themselves each has events of its
+// own; a strut between them makes their impacts one, and an end of sliding that of both.
+TEST(CertifyEventsTest, EventsOfCoupledBodiesAtTheSameTimeAreNamed) {
+  const auto verdict = [](double height_a, double height_b, double speed, bool strut) {
     const auto disc = [&](const char* name, double x, double y) {
       return R"({"name": ")" + std::string(name) +
              R"(", "shape": {"circle": {"radius": 0.125}}, "mass": 1, "friction": 0.3,
@@ -49,14 +49,21 @@ TEST(CertifyEventsTest, EventsOfTwoBodiesAtTheSameTimeAreNamed) {
              std::to_string(speed) + ", 0]}";
     };
     return CertificateOf(R"("bodies": [)" + disc("a", 0.0, height_a) + ", " +
-                             disc("b", 1.0, height_b) + ", " + Floor() + "]",
+                             disc("b", 1.0, height_b) + ", " + Floor() + "]" +
+                             (strut ? R"(, "joints": [{"name": "strut", "type": "distance",
+                                 "bodies": ["a", "b"], "anchors": [[0, )" +
+                                          std::to_string(height_a) + "], [1, " +
+                                          std::to_string(height_b) + "]]}]"
+                                    : ""),
                          0.2)
         .verdict;
   };
-  const std::string touch = verdict(0.2, 0.2, 0.0);
+  EXPECT_EQ(verdict(0.2, 0.2, 0.0, false), "trustworthy");
+  EXPECT_EQ(verdict(0.2, 0.19, 0.0, false), "trustworthy");
+  EXPECT_EQ(verdict(0.125, 0.125, 0.3, false), "trustworthy");
+  const std::string touch = verdict(0.2, 0.2, 0.0, true);
   EXPECT_NE(touch.find("two contacts touch at the same time"), std::string::npos) << touch;
-  EXPECT_EQ(verdict(0.2, 0.19, 0.0), "trustworthy");
-  const std::string slip = verdict(0.125, 0.125, 0.3);
+  const std::string slip = verdict(0.125, 0.125, 0.3, true);
   EXPECT_NE(slip.find("two contacts stop sliding at the same time"), std::string::npos) << slip;
 }
 

@@ -39,6 +39,60 @@ TEST(EventDerivativeTest, ABouncingBallHasThePhysicsDerivative) {
   EXPECT_NEAR(result.jacobian(1, 0), -0.342, 5e-4);
 }
 
+// Bodies that have nothing to do with each other have events of their own though they happen at
+// one instant: each body's derivatives are those that it has alone, and those of the formula.
+TEST(EventDerivativeTest, BodiesThatLandAtTheSameInstantHaveTimesOfTheirOwn) {
+  const auto scene = [](const char* stepping) {
+    return std::string(R"({"bodies": [
+      {"name": "a", "shape": {"circle": {"radius": 0.125}}, "mass": 1, "position": [0, 0.2],
+       "friction": 0.3, "restitution": 0.5, "velocity": [0.3, 0]},
+      {"name": "rail", "shape": {"box": {"size": [0.2, 0.1]}}, "mass": 2, "position": [1, 0.05],
+       "friction": 0.3},
+      {"name": "b", "shape": {"circle": {"radius": 0.125}}, "mass": 3, "position": [2, 0.2],
+       "friction": 0.3, "restitution": 0.5, "velocity": [0.3, 0]},
+      {"name": "floor", "static": true, "restitution": 0.5, "friction": 0.3,
+       "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}}],
+    "simulation": {"stepping": "event", "dt": 0.01, "duration": 0.2)") +
+           stepping + "}}";
+  };
+  const std::vector<std::string> paths = {"bodies/a/position/y", "bodies/b/position/y"};
+  for (const char* law : {"", R"(, "impact_law": "poisson")"}) {
+    ExpectAllAgree(scene(law), paths, 2);
+    const GradientResult r = Jacobian(SceneOf(scene(law)), paths, GradientMethod::kTangent);
+    // v = e u − g (T − u / g) with u = √(2 g h):  dv/dh = (1 + e) g / u.
+    const double expected = 1.5 * 9.81 / std::sqrt(2.0 * 9.81 * 0.075);
+    EXPECT_NEAR(r.jacobian(4, 0), expected, 1e-11);
+    EXPECT_NEAR(r.jacobian(16, 1), expected, 1e-11);
+    EXPECT_NEAR(r.jacobian(4, 1), 0.0, 1e-13);
+    EXPECT_NEAR(r.jacobian(16, 0), 0.0, 1e-13);
+  }
+}
+
+TEST(EventDerivativeTest, BodiesThatStopAtTheSameInstantHaveTimesOfTheirOwn) {
+  const auto box = [](const char* name, double x) {
+    return R"({"name": ")" + std::string(name) +
+           R"(", "shape": {"box": {"size": [0.2, 0.1]}}, "mass": 1, "friction": 0.3,
+        "velocity": [0.7, 0], "position": [)" +
+           std::to_string(x) + ", 0.05]}";
+  };
+  const Scene scene = SceneOf(R"({"bodies": [)" + box("a", 0.0) + ", " + box("b", 1.0) + ", " +
+                              box("c", 2.0) + R"(, {"name": "floor", "static": true,
+      "friction": 0.3, "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}}],
+      "simulation": {"stepping": "event", "dt": 0.01, "duration": 0.5}})");
+  const std::vector<std::string> paths = {"bodies/a/velocity/x", "bodies/b/velocity/x",
+                                          "bodies/c/velocity/x"};
+  const GradientResult r = Jacobian(scene, paths, GradientMethod::kAdjoint);
+  EXPECT_EQ(r.certificate.verdict, "trustworthy");
+  EXPECT_EQ(r.certificate.events, 3);
+  testing::ExpectOthersAgree(scene, paths, r);
+  // x = v² / (2 μ g)
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) {
+      EXPECT_NEAR(r.jacobian(6 * i, j), i == j ? 0.7 / (0.3 * 9.81) : 0.0, 1e-12);
+    }
+  }
+}
+
 TEST(EventDerivativeTest, TwoEqualElasticBallsSwap) {
   const Scene scene = SceneOf(R"({"gravity": [0, 0], "bodies": [
       {"name": "a", "shape": {"circle": {"radius": 0.1}}, "mass": 1, "position": [0, 0],

@@ -380,6 +380,49 @@ TEST(EventStepTest, AChainWithAHeavyEndKeepsItsEnergy) {
   EXPECT_NEAR(energy(), before, 1e-6 * fastest);
 }
 
+// Events are bounded pair by pair: many bodies that land in one step are no series without end.
+TEST(EventStepTest, ManyBodiesMayLandInOneStep) {
+  std::string bodies;
+  constexpr int kBodies = 150;
+  for (int i = 0; i < kBodies; ++i) {
+    bodies += R"({"name": "b)" + std::to_string(i) +
+              R"(", "shape": {"circle": {"radius": 0.1}}, "mass": 1, "restitution": 0.5,
+        "velocity": [0, -1], "position": [)" +
+              std::to_string(i) + ", " + std::to_string(0.1 + 2e-5 * (1 + i / 3)) + "]}, ";
+  }
+  const Rolled run =
+      Simulate(R"({"gravity": [0, 0], "bodies": [)" + bodies +
+               R"({"name": "floor", "static": true, "restitution": 0.5,
+      "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}}], )" +
+               Settings("runge_kutta_4", 0.01, R"(, "max_events_per_step": 2)") + "}");
+  EXPECT_EQ(run.report.events, kBodies);
+  EXPECT_EQ(run.report.given_up.total(), 0);
+  for (int i = 0; i < kBodies; ++i) {
+    EXPECT_NEAR(run.final.twist[3 * i + 1], 0.5, 1e-12);
+  }
+}
+
+// A disc that rattles between two walls gives its rebounds up; another one keeps its own.
+TEST(EventStepTest, OnlyThePairWithTooManyEventsGivesUpItsRebounds) {
+  const Rolled run =
+      Simulate(R"({"gravity": [0, 0], "bodies": [
+      {"name": "disc", "shape": {"circle": {"radius": 0.1}}, "mass": 1, "restitution": 1,
+       "velocity": [3, 0], "position": [0, 0]},
+      {"name": "ball", "shape": {"circle": {"radius": 0.1}}, "mass": 1, "restitution": 1,
+       "velocity": [0, -3], "position": [0, 2.12]},
+      {"name": "left", "static": true, "restitution": 1,
+       "shape": {"half_plane": {"normal": [1, 0], "offset": -0.10001}}},
+      {"name": "right", "static": true, "restitution": 1,
+       "shape": {"half_plane": {"normal": [-1, 0], "offset": -0.10001}}},
+      {"name": "floor", "static": true, "restitution": 1,
+       "shape": {"half_plane": {"normal": [0, 1], "offset": 2}}}],
+      "no_contact": [["disc", "floor"]], )" +
+               Settings("runge_kutta_4", 0.01, R"(, "max_events_per_step": 5)") + "}");
+  EXPECT_EQ(run.report.given_up.rebounds_given_up, 1);
+  EXPECT_NEAR(run.final.twist[0], 0.0, 1e-12);
+  EXPECT_NEAR(run.final.twist[4], 3.0, 1e-12);
+}
+
 TEST(EventStepTest, ABodyTooStiffForItsStepIsRefusedSoon) {
   const Rolled run = Try(R"({"bodies": [{"name": "bead", "shape": {"circle": {"radius": 0.07}},
       "mass": 1.39e-9, "position": [-1.12, 0.429], "angle": 0.711, "linear_damping": 0.353}],

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "tangible/app/run_warnings.h"
+#include "tangible/simulation/stepping/run_warnings.h"
 
 #include <cstdio>
 
@@ -34,6 +34,7 @@ std::vector<std::string> RunWarnings::Finish(const Model<double>& model,
                                              const RolloutReport& report,
                                              const State<double>& final) {
   if (joints_.watches()) joints_.Look(model, final, report.time);
+  coordinates_.LookAtBodies(model, final, report.time);
   std::vector<std::string> lines;
   for (std::string line : {coordinates_.Message(model), joints_.Message(model),
                            FirstOrderByEvents(model, initial_, final)}) {

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// What tangible-simulate says of a run that is done, on stderr and as `warnings` of the summary: a
-// line each.
+// What the programs report of a run that is done, on stderr and as `warnings` of a summary: a line
+// each.
 
 #include <string>
 #include <vector>

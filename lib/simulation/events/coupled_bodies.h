@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// Which bodies an impulse reaches at an instant: those that joints and touching contacts connect to
+// the one that it acts on. Springs and forces do not connect: within no time they do nothing.
+//
+// Events of bodies that are not connected have times of their own even where they happen at the
+// same instant: under a change of parameters either may become the earlier one, without another
+// result.
+
+#include <vector>
+
+#include "tangible/simulation/events/event_record.h"
+
+namespace tangible {
+
+class CoupledBodies {
+ public:
+  /// Connects the moving bodies of the structure's joints and of these contacts; O(bodies + joints
+  /// + contacts).
+  void Connect(const ModelStructure& structure, const std::vector<ActiveContact>& contacts);
+
+  /// The same number for all bodies that are connected; −1 for those that no impulse moves.
+  int GroupOf(int body) { return parent_[body] < 0 ? -1 : Root(body); }
+  /// Of the contact's bodies, of which at least one moves.
+  int GroupOf(const ActiveContact& contact) {
+    return parent_[contact.a] >= 0 ? Root(contact.a) : GroupOf(contact.b);
+  }
+
+ private:
+  int Root(int body);
+  void Join(int a, int b);
+
+  std::vector<int> parent_;  ///< −1: fixed or kinematic
+};
+
+}  // namespace tangible
