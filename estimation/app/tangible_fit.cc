@@ -106,25 +106,45 @@ void PrintIteration(const std::vector<ParameterizedScene::Entry>& entries, int s
   std::fflush(stdout);
 }
 
+/// "± 0.01 (95 %: 1 to 2" or empty.
+std::string IntervalText(double deviation, const ConfidenceInterval& interval) {
+  return interval ? "± " + Cell(deviation, 3) + " (95 %: " + Cell(interval->first, 8) + " to " +
+                        Cell(interval->second, 8)
+                  : "";
+}
+
+/// The robust interval first, then the one that trusts sigma.
+std::string EstimateLine(const std::string& name, int k, const FitResult& result) {
+  const Uncertainty& uncertainty = result.uncertainty;
+  const std::string robust =
+      IntervalText(uncertainty.standard_deviation_robust[k], uncertainty.confidence_95_robust[k]);
+  const std::string trusting =
+      IntervalText(uncertainty.standard_deviation[k], uncertainty.confidence_95[k]);
+  std::string line = name + " = " + Cell(result.estimate[k], 10);
+  if (!robust.empty()) {
+    line += " " + robust + ", " + Cell(uncertainty.degrees_of_freedom[k], 3) +
+            " degrees of freedom); from sigma alone";
+  }
+  if (!trusting.empty()) {
+    line += " " + trusting + ")";
+  } else {
+    line += " (" + uncertainty.messages[k] + ")";
+  }
+  return line;
+}
+
 void PrintEstimates(const std::vector<ParameterizedScene::Entry>& entries,
                     const FitResult& result) {
   const Uncertainty& uncertainty = result.uncertainty;
   for (size_t k = 0; k < entries.size(); ++k) {
-    const auto& interval = uncertainty.confidence_95[k];
-    const double estimate = result.estimate[static_cast<Eigen::Index>(k)];
-    std::string line = entries[k].name + " = " + Cell(estimate, 10);
-    if (interval) {
-      line += " ± " + Cell(uncertainty.standard_deviation[static_cast<Eigen::Index>(k)], 3) +
-              " (95 %: " + Cell(interval->first, 8) + " to " + Cell(interval->second, 8) + ")";
-    } else {
-      line += " (" + uncertainty.messages[k] + ")";
-    }
+    std::string line = EstimateLine(entries[k].name, static_cast<int>(k), result);
     if (k == 0) {
       line += ", " + std::to_string(result.iterations.size() - 1) + " iterations, " +
               Cell(result.seconds, 2) + " s";
     }
     std::cout << line << "\n";
   }
+  std::cout << DescribeRobust(uncertainty) << "\n";
   std::cout << "cost " << Cell(result.initial_cost) << " -> " << Cell(result.final_cost)
             << ", residual rms " << Cell(uncertainty.residual_rms, 4)
             << " sigma, reduced chi-square " << Cell(uncertainty.reduced_chi_square, 4) << ", "

@@ -5,7 +5,9 @@
 #include <chrono>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <random>
+#include <tuple>
 
 #include "tangible/estimation/fit/fit_checkpoint.h"
 #include "tangible/estimation/fit/minimise.h"
@@ -138,6 +140,21 @@ bool FindStart(const FitOptions& options, RolloutResiduals* residuals, Eigen::Ve
   return false;
 }
 
+// Of an observed value: a run's rounding and what its projections leave.
+constexpr double kRounding = 1e-9;
+
+std::vector<ResidualPlace> PlacesOf(const RolloutResiduals& residuals) {
+  std::map<std::tuple<int, int, Coordinate>, int> series;
+  std::vector<ResidualPlace> places;
+  for (const Observation& observation : residuals.observations()) {
+    const auto key = std::tuple(observation.body, observation.point, observation.coordinate);
+    const int number = series.emplace(key, static_cast<int>(series.size())).first->second;
+    places.push_back(
+        {0, number, observation.time, kRounding * std::abs(observation.value) / observation.sigma});
+  }
+  return places;
+}
+
 void Finish(const FitOptions& options, const RolloutResiduals& residuals, const Minimum& best,
             FitResult* result) {
   result->status = best.status;
@@ -157,8 +174,9 @@ void Finish(const FitOptions& options, const RolloutResiduals& residuals, const 
   uncertainty.rank_tolerance = options.derivatives == DerivativeMethod::kFiniteDifference
                                    ? kRankToleranceOfDifferences
                                    : kRankTolerance;
-  result->uncertainty = EstimateUncertainty(residuals.scene().entries(), best.parameters,
-                                            best.residuals, best.jacobian, uncertainty);
+  result->uncertainty =
+      EstimateUncertainty(residuals.scene().entries(), best.parameters, best.residuals,
+                          best.jacobian, PlacesOf(residuals), uncertainty);
 }
 
 /// One fit under way.

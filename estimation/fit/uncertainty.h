@@ -10,9 +10,14 @@
 // and no part in C. A parameter at a bound is held there: it has no interval, and the others' are
 // given that it stays.
 //
-// J is decomposed as U S Vᵀ with columns scaled to unit length. Singular values below
-// `rank_tolerance` of the largest are directions that the observations do not determine: parameters
-// with a share in them have no interval, and the message names the combination.
+// These hold where the model is right and sigma too. Beside them stands what holds where they are
+// not: the same from the residuals as they are, whatever their size and however they are correlated
+// in time or within a recording (robust_covariance.h), ± the quantile of Student's t. A test of the
+// residuals' correlation (whiteness.h) warns of a model that does not fit however large sigma is.
+//
+// J is decomposed as U S Vᵀ with columns scaled to unit length (decomposition.h). Singular values
+// below `rank_tolerance` of the largest are directions that the observations do not determine:
+// parameters with a share in them have no interval, and the message names the combination.
 
 #include <Eigen/Core>
 #include <optional>
@@ -20,6 +25,9 @@
 #include <utility>
 #include <vector>
 
+#include "tangible/estimation/fit/combinations.h"
+#include "tangible/estimation/fit/robust_covariance.h"
+#include "tangible/estimation/fit/whiteness.h"
 #include "tangible/estimation/problem/parameterized_scene.h"
 #include "tangible/math/scalar.h"
 
@@ -29,12 +37,25 @@ struct UncertaintyOptions {
   double rank_tolerance = 1e-9;
   double condition_warning = 1e4;  ///< of J with unit columns
   double huber = 0.0;              ///< as FitOptions
+  /// Of each parameter the recording that it belongs to, −1: all of them; empty: all are shared.
+  std::vector<int> recording_of_parameter;
 };
+
+using ConfidenceInterval = std::optional<std::pair<double, double>>;
 
 struct Uncertainty {
   RowMatrixXd covariance;              ///< P x P; NaN rows and columns where there is none
   Eigen::VectorXd standard_deviation;  ///< NaN: none
-  std::vector<std::optional<std::pair<double, double>>> confidence_95;
+  std::vector<ConfidenceInterval> confidence_95;
+  Eigen::VectorXd standard_deviation_robust;  ///< NaN: none
+  Eigen::VectorXd degrees_of_freedom;         ///< of Student's t of the robust interval; NaN: none
+  std::vector<ConfidenceInterval> confidence_95_robust;
+  RobustMethod robust_method = RobustMethod::kNone;
+  double bandwidth = 0.0;       ///< s, over which residuals count as correlated; 0: not at all
+  Eigen::VectorXd prior_share;  ///< of a parameter's information, 0 to 1: what priors contribute
+  Whiteness whiteness;
+  /// What is determined of parameters that are not determined one by one.
+  std::vector<DeterminedCombination> combinations;
   std::vector<std::string> messages;  ///< a parameter: why it has no interval; else empty
   double condition = 1.0;             ///< of J with unit columns, over the parameters that are free
   double residual_rms = 0.0;          ///< in multiples of sigma
@@ -42,10 +63,16 @@ struct Uncertainty {
   std::vector<std::string> warnings;  ///< of the whole
 };
 
-/// `entries` and `estimate` of the parameters, residuals r (N) and J (N x P) there.
+/// `entries` and `estimate` of the parameters, residuals r (N) and J (N x P) there. `places` are
+/// those of the first residuals; the others are of priors.
 Uncertainty EstimateUncertainty(const std::vector<ParameterizedScene::Entry>& entries,
                                 const Eigen::VectorXd& estimate, const Eigen::VectorXd& residuals,
-                                const RowMatrixXd& jacobian, const UncertaintyOptions& options);
+                                const RowMatrixXd& jacobian,
+                                const std::vector<ResidualPlace>& places,
+                                const UncertaintyOptions& options);
+
+/// One line about how the robust intervals were found.
+std::string DescribeRobust(const Uncertainty& uncertainty);
 
 /// Whether an estimate lies on a bound.
 bool IsAtBound(const ParameterizedScene::Entry& entry, double estimate);

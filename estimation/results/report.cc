@@ -53,20 +53,50 @@ std::vector<Series> CollectSeries(const RolloutResiduals& residuals, const FitRe
 }
 
 std::string EstimateTable(const RolloutResiduals& residuals, const FitResult& result) {
+  const auto end = [](const ConfidenceInterval& interval,
+                      double std::pair<double, double>::*which) {
+    return interval ? CompactNumber((*interval).*which, 8) : std::string();
+  };
+  const auto number = [](double x) {
+    return std::isfinite(x) ? CompactNumber(x, 3) : std::string();
+  };
   std::vector<std::vector<std::string>> rows;
   const auto& entries = residuals.scene().entries();
+  const Uncertainty& uncertainty = result.uncertainty;
+  using Ends = std::pair<double, double>;
   for (size_t k = 0; k < entries.size(); ++k) {
-    const auto& interval = result.uncertainty.confidence_95[k];
+    const ConfidenceInterval& robust = uncertainty.confidence_95_robust[k];
+    const ConfidenceInterval& interval = uncertainty.confidence_95[k];
     const Eigen::Index i = static_cast<Eigen::Index>(k);
     rows.push_back({entries[k].name, CompactNumber(result.starts.front().initial[k], 6),
                     CompactNumber(result.estimate[i], 9),
-                    interval ? CompactNumber(result.uncertainty.standard_deviation[i], 3) : "",
-                    interval ? CompactNumber(interval->first, 8) : "",
-                    interval ? CompactNumber(interval->second, 8) : "",
-                    result.uncertainty.messages[k]});
+                    number(uncertainty.standard_deviation_robust[i]), end(robust, &Ends::first),
+                    end(robust, &Ends::second), number(uncertainty.degrees_of_freedom[i]),
+                    number(uncertainty.standard_deviation[i]), end(interval, &Ends::first),
+                    end(interval, &Ends::second), uncertainty.messages[k]});
   }
   return HtmlTable(
-      {"parameter", "initial", "estimate", "standard deviation", "95 % from", "to", ""}, rows);
+             {"parameter", "initial", "estimate", "robust standard deviation", "95 % from", "to",
+              "degrees of freedom", "standard deviation from sigma", "95 % from", "to", ""},
+             rows) +
+         "<p>" + HtmlEscape(DescribeRobust(uncertainty)) + ".</p>\n";
+}
+
+/// What is determined of parameters that are not determined one by one.
+std::string CombinationTable(const Uncertainty& uncertainty) {
+  std::vector<std::vector<std::string>> rows;
+  for (const DeterminedCombination& combination : uncertainty.combinations) {
+    const double robust = combination.standard_deviation_robust;
+    rows.push_back({combination.sum, combination.product, CompactNumber(combination.value, 9),
+                    std::isfinite(robust) ? CompactNumber(robust, 3) : "",
+                    CompactNumber(combination.standard_deviation, 3)});
+  }
+  return rows.empty()
+             ? ""
+             : "<h2>Determined combinations</h2>\n" +
+                   HtmlTable({"sum", "locally the product", "value of the sum",
+                              "robust standard deviation", "standard deviation from sigma"},
+                             rows);
 }
 
 std::string SummaryTable(const FitResult& result) {
@@ -219,9 +249,9 @@ std::string FitReport(const std::string& title, const RolloutResiduals& residual
   const std::string heading = "Fit: " + title;
   return HtmlPage(heading, "<h1>" + HtmlEscape(heading) + "</h1>\n<h2>Estimates</h2>\n" +
                                EstimateTable(residuals, result) + Warnings(result.uncertainty) +
-                               SummaryTable(result) + CorrelationTable(residuals, result) +
-                               StepTable(residuals, check) + StartTable(result) +
-                               IterationPlots(residuals, result) +
+                               CombinationTable(result.uncertainty) + SummaryTable(result) +
+                               CorrelationTable(residuals, result) + StepTable(residuals, check) +
+                               StartTable(result) + IterationPlots(residuals, result) +
                                SeriesPlots(CollectSeries(residuals, result)));
 }
 

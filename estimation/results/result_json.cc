@@ -19,19 +19,24 @@ OrderedJson Numbers(const Eigen::VectorXd& values) {
   return array;
 }
 
+OrderedJson IntervalToJson(const ConfidenceInterval& interval) {
+  return interval ? OrderedJson{Number(interval->first), Number(interval->second)}
+                  : OrderedJson(nullptr);
+}
+
 OrderedJson ParametersToJson(const RolloutResiduals& residuals, const FitResult& result) {
   OrderedJson parameters = OrderedJson::array();
   const auto& entries = residuals.scene().entries();
   for (Eigen::Index k = 0; k < result.estimate.size(); ++k) {
-    const auto& interval = result.uncertainty.confidence_95[k];
+    const Uncertainty& uncertainty = result.uncertainty;
     OrderedJson parameter = {
         {"name", entries[k].name},
         {"estimate", Number(result.estimate[k])},
-        {"standard_deviation", Number(result.uncertainty.standard_deviation[k])},
-        {"confidence_95", nullptr}};
-    if (interval) {
-      parameter["confidence_95"] = {Number(interval->first), Number(interval->second)};
-    }
+        {"standard_deviation_robust", Number(uncertainty.standard_deviation_robust[k])},
+        {"confidence_95_robust", IntervalToJson(uncertainty.confidence_95_robust[k])},
+        {"degrees_of_freedom", Number(uncertainty.degrees_of_freedom[k])},
+        {"standard_deviation", Number(uncertainty.standard_deviation[k])},
+        {"confidence_95", IntervalToJson(uncertainty.confidence_95[k])}};
     if (!result.uncertainty.messages[k].empty()) {
       parameter["message"] = result.uncertainty.messages[k];
     }
@@ -46,6 +51,34 @@ OrderedJson CovarianceToJson(const RowMatrixXd& covariance) {
     rows.push_back(Numbers(covariance.row(i)));
   }
   return rows;
+}
+
+OrderedJson CombinationsToJson(const RolloutResiduals& residuals, const Uncertainty& uncertainty) {
+  OrderedJson all = OrderedJson::array();
+  for (const DeterminedCombination& combination : uncertainty.combinations) {
+    OrderedJson terms = OrderedJson::array();
+    for (size_t i = 0; i < combination.parameters.size(); ++i) {
+      terms.push_back({{"name", residuals.scene().entries()[combination.parameters[i]].name},
+                       {"coefficient", Number(combination.coefficients[i])},
+                       {"exponent", Number(combination.exponents[i])}});
+    }
+    all.push_back({{"sum", combination.sum},
+                   {"product", combination.product.empty() ? OrderedJson(nullptr)
+                                                           : OrderedJson(combination.product)},
+                   {"terms", terms},
+                   {"value", Number(combination.value)},
+                   {"standard_deviation_robust", Number(combination.standard_deviation_robust)},
+                   {"standard_deviation", Number(combination.standard_deviation)}});
+  }
+  return all;
+}
+
+/// How the robust intervals were found.
+OrderedJson RobustToJson(const Uncertainty& uncertainty) {
+  return {{"method", NameOf(uncertainty.robust_method)},
+          {"bandwidth", Number(uncertainty.bandwidth)},
+          {"residual_correlation", Number(uncertainty.whiteness.correlation)},
+          {"whiteness_p_value", Number(uncertainty.whiteness.p_value)}};
 }
 
 OrderedJson IterationsToJson(const FitResult& result) {
@@ -113,6 +146,8 @@ OrderedJson ResultToJson(const RolloutResiduals& residuals, const FitResult& res
   const auto when = [estimated](double x) { return estimated ? Number(x) : OrderedJson(nullptr); };
   OrderedJson json = {{"status", NameOf(result.status)},
                       {"parameters", ParametersToJson(residuals, result)},
+                      {"robust", RobustToJson(uncertainty)},
+                      {"determined_combinations", CombinationsToJson(residuals, uncertainty)},
                       {"covariance", CovarianceToJson(uncertainty.covariance)},
                       {"initial_cost", when(result.initial_cost)},
                       {"final_cost", when(result.final_cost)},

@@ -30,6 +30,12 @@ inline FitResult HandMadeResult() {
   result.uncertainty.covariance(0, 0) = 0.0625;
   result.uncertainty.standard_deviation = Eigen::Vector2d(0.25, kNone);
   result.uncertainty.confidence_95 = {std::pair(-10.3125, -9.3125), std::nullopt};
+  result.uncertainty.standard_deviation_robust = Eigen::Vector2d(0.5, kNone);
+  result.uncertainty.degrees_of_freedom = Eigen::Vector2d(6.5, kNone);
+  result.uncertainty.confidence_95_robust = {std::pair(-11.0, -8.625), std::nullopt};
+  result.uncertainty.robust_method = RobustMethod::kTime;
+  result.uncertainty.bandwidth = 0.25;
+  result.uncertainty.prior_share = Eigen::Vector2d::Zero();
   result.uncertainty.messages = {"", "at its lower bound"};
   result.uncertainty.reduced_chi_square = kNone;
   result.uncertainty.warnings = {"a < b"};

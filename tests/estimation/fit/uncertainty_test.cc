@@ -4,8 +4,11 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/LU>
+#include <Eigen/QR>
+#include <algorithm>
 #include <cmath>
 #include <limits>
+#include <random>
 
 namespace tangible {
 namespace {
@@ -26,7 +29,7 @@ TEST(UncertaintyTest, CovarianceIsTheInverseOfTheNormalMatrix) {
   jacobian << 1, 2, 3, -1, 0, 5, 2e3, 1;
   const Eigen::Vector4d residuals(1.0, -2.0, 0.5, 0.25);
   const Uncertainty result =
-      EstimateUncertainty(Entries(2), Eigen::Vector2d(3.0, 4.0), residuals, jacobian, {});
+      EstimateUncertainty(Entries(2), Eigen::Vector2d(3.0, 4.0), residuals, jacobian, {}, {});
   const Eigen::Matrix2d expected = (jacobian.transpose() * jacobian).inverse();
   EXPECT_LT((result.covariance - expected).cwiseAbs().maxCoeff(), 1e-14);
   EXPECT_NEAR(result.standard_deviation[1], std::sqrt(expected(1, 1)), 1e-14);
@@ -42,8 +45,8 @@ TEST(UncertaintyTest, ResidualsBeyondHuberDoNotCount) {
   jacobian << 1, 2, 100;
   UncertaintyOptions options;
   options.huber = 3.0;
-  const Uncertainty result = EstimateUncertainty(Entries(1), Eigen::VectorXd::Ones(1),
-                                                 Eigen::Vector3d(1, -2.5, 4), jacobian, options);
+  const Uncertainty result = EstimateUncertainty(
+      Entries(1), Eigen::VectorXd::Ones(1), Eigen::Vector3d(1, -2.5, 4), jacobian, {}, options);
   EXPECT_NEAR(result.covariance(0, 0), 0.2, 1e-15);
 }
 
@@ -51,7 +54,7 @@ TEST(UncertaintyTest, FewerResidualsThanParameters) {
   RowMatrixXd jacobian(1, 2);
   jacobian << 1, -1;
   const Uncertainty result = EstimateUncertainty(Entries(2), Eigen::Vector2d::Ones(),
-                                                 Eigen::VectorXd::Zero(1), jacobian, {});
+                                                 Eigen::VectorXd::Zero(1), jacobian, {}, {});
   EXPECT_FALSE(result.confidence_95[0]);
   EXPECT_FALSE(result.confidence_95[1]);
   EXPECT_TRUE(std::isnan(result.reduced_chi_square));
@@ -62,23 +65,90 @@ TEST(UncertaintyTest, AnUndeterminedPairLeavesTheOthersTheirIntervals) {
   RowMatrixXd jacobian(4, 3);
   jacobian << 1, 2, 0, 2, 4, 0, 0, 0, 5, -1, -2, 1;
   const Uncertainty result = EstimateUncertainty(Entries(3), Eigen::Vector3d(2.0, 1.0, 1.0),
-                                                 Eigen::Vector4d::Zero(), jacobian, {});
+                                                 Eigen::Vector4d::Zero(), jacobian, {}, {});
   EXPECT_FALSE(result.confidence_95[0]);
   EXPECT_FALSE(result.confidence_95[1]);
   EXPECT_TRUE(result.confidence_95[2]);
   // a + 2 b is measured, so a - 2 da = -2 db: equal and opposite relative changes where a = 2 b.
-  ASSERT_EQ(result.warnings.size(), 1u);
+  ASSERT_EQ(result.warnings.size(), 2u);
   EXPECT_NE(result.warnings[0].find("1 'a' - 1 'b'"), std::string::npos) << result.warnings[0];
+  ASSERT_EQ(result.combinations.size(), 1u);
+  EXPECT_NE(result.warnings[1].find("the observations do determine 'a' + 2 'b' = 4"),
+            std::string::npos)
+      << result.warnings[1];
+  // Of a + 2 b alone: Σ J² = 1 + 4 + 1 in multiples of it, less what c takes of the last row.
+  EXPECT_NEAR(result.combinations[0].standard_deviation, std::sqrt(1.0 / (6.0 - 1.0 / 26.0)),
+              1e-12);
 }
 
 TEST(UncertaintyTest, IllConditionAndMisfitAreWarnedOf) {
   RowMatrixXd jacobian(3, 2);
   jacobian << 1, 1, 1, 1 + 1e-6, 1, 1;
   const Uncertainty result = EstimateUncertainty(Entries(2), Eigen::Vector2d::Ones(),
-                                                 Eigen::Vector3d(50, 50, 50), jacobian, {});
-  ASSERT_EQ(result.warnings.size(), 2u);
+                                                 Eigen::Vector3d(50, 50, 50), jacobian, {}, {});
+  ASSERT_EQ(result.warnings.size(), 3u);
   EXPECT_NE(result.warnings[0].find("larger than sigma explains"), std::string::npos);
   EXPECT_NE(result.warnings[1].find("ill-conditioned"), std::string::npos);
+  EXPECT_NE(result.warnings[2].find("do determine 'a' + 1 'b' = 2"), std::string::npos)
+      << result.warnings[2];
+}
+
+/// A line through measurements that a parabola made.
+Uncertainty FitLineToParabola(double sigma) {
+  constexpr int kCount = 100;
+  RowMatrixXd jacobian(kCount, 2);
+  Eigen::VectorXd observed(kCount);
+  std::vector<ResidualPlace> places;
+  std::mt19937 random(3);
+  std::normal_distribution<double> normal(0.0, 0.01);
+  for (int i = 0; i < kCount; ++i) {
+    const double t = 0.02 * i - 1.0;
+    jacobian.row(i) << 1.0 / sigma, t / sigma;
+    observed[i] = (t * t + normal(random)) / sigma;
+    places.push_back({0, 0, t, 0.0});
+  }
+  const Eigen::Vector2d estimate = jacobian.colPivHouseholderQr().solve(observed);
+  return EstimateUncertainty(Entries(2), estimate, jacobian * estimate - observed, jacobian, places,
+                             {});
+}
+
+TEST(UncertaintyTest, AnInflatedSigmaNeitherSilencesTheWarningNorWidensTheRobustInterval) {
+  const Uncertainty fair = FitLineToParabola(0.01);
+  const Uncertainty inflated = FitLineToParabola(1e3);
+  const auto warns = [](const Uncertainty& uncertainty) {
+    return std::any_of(uncertainty.warnings.begin(), uncertainty.warnings.end(),
+                       [](const std::string& warning) {
+                         return warning.find("correlated in time") != std::string::npos;
+                       });
+  };
+  EXPECT_TRUE(warns(fair));
+  EXPECT_TRUE(warns(inflated));
+  EXPECT_GT(fair.reduced_chi_square, 100.0);
+  EXPECT_LT(inflated.reduced_chi_square, 1e-6);
+  ASSERT_TRUE(fair.confidence_95_robust[1] && inflated.confidence_95_robust[1]);
+  EXPECT_NEAR(inflated.standard_deviation_robust[1] / fair.standard_deviation_robust[1], 1.0, 1e-9);
+  EXPECT_GT(fair.standard_deviation_robust[0], 10.0 * fair.standard_deviation[0]);
+  EXPECT_EQ(fair.robust_method, RobustMethod::kTime);
+}
+
+TEST(UncertaintyTest, PriorsShareTheInformation) {
+  // a is measured four times with deviation 1, its prior has 0.5; b has its measurements alone.
+  RowMatrixXd jacobian = RowMatrixXd::Zero(9, 2);
+  jacobian.topLeftCorner(4, 1).setOnes();
+  jacobian.block(4, 1, 4, 1).setOnes();
+  jacobian(8, 0) = 2.0;
+  std::vector<ResidualPlace> places;
+  for (int i = 0; i < 8; ++i) {
+    places.push_back({0, i / 4, 0.1 * i, 0.0});
+  }
+  Eigen::VectorXd residuals = Eigen::VectorXd::Zero(9);
+  residuals << 1, -1, 1, -1, 1, -1, 1, -1, 30;
+  const Uncertainty result =
+      EstimateUncertainty(Entries(2), Eigen::Vector2d::Ones(), residuals, jacobian, places, {});
+  EXPECT_NEAR(result.prior_share[0], 0.5, 1e-14);
+  EXPECT_EQ(result.prior_share[1], 0.0);
+  EXPECT_NEAR(result.covariance(0, 0), 1.0 / 8.0, 1e-14);
+  EXPECT_NEAR(result.residual_rms, 1.0, 1e-14) << "a prior is no measurement";
 }
 
 }  // namespace

@@ -19,6 +19,12 @@ TEST(ResultJsonTest, NumbersAreThoseOfTheResult) {
   EXPECT_EQ(json["parameters"][0]["estimate"], -9.8125);
   EXPECT_EQ(json["parameters"][0]["standard_deviation"], 0.25);
   EXPECT_EQ(json["parameters"][0]["confidence_95"], OrderedJson::array({-10.3125, -9.3125}));
+  EXPECT_EQ(json["parameters"][0]["standard_deviation_robust"], 0.5);
+  EXPECT_EQ(json["parameters"][0]["confidence_95_robust"], OrderedJson::array({-11.0, -8.625}));
+  EXPECT_EQ(json["parameters"][0]["degrees_of_freedom"], 6.5);
+  EXPECT_TRUE(json["parameters"][1]["confidence_95_robust"].is_null());
+  EXPECT_EQ(json["robust"]["method"], "time");
+  EXPECT_EQ(json["robust"]["bandwidth"], 0.25);
   EXPECT_FALSE(json["parameters"][0].contains("message"));
   // To the last bit through the text.
   EXPECT_EQ(json["parameters"][1]["estimate"], 1.0 / 3.0);
@@ -43,6 +49,23 @@ TEST(ResultJsonTest, RootMeanSquaresAreInUnits) {
   // Residuals 3 and 4 with a sigma of 0.1 m, −2 with 0.2 m.
   EXPECT_NEAR(rms["x"].get<double>(), 0.1 * std::sqrt(0.5 * (9.0 + 16.0)), 1e-15);
   EXPECT_NEAR(rms["y"].get<double>(), 0.4, 1e-15);
+}
+
+TEST(ResultJsonTest, CombinationsHaveTheirTerms) {
+  FitResult result = HandMadeResult();
+  result.uncertainty.combinations = {
+      {{0, 1}, {1.0, 2.0}, {1.0, -3.0}, "", "'g' - 3 'd'", 4.0, 0.5, 0.75}};
+  const OrderedJson json = ResultToJson(HandMadeResiduals(), result, nullptr);
+  ASSERT_EQ(json["determined_combinations"].size(), 1u);
+  const OrderedJson& combination = json["determined_combinations"][0];
+  EXPECT_EQ(combination["sum"], "'g' - 3 'd'");
+  EXPECT_TRUE(combination["product"].is_null());
+  EXPECT_EQ(combination["terms"][1]["name"], "bodies/ball/linear_damping");
+  EXPECT_EQ(combination["terms"][1]["coefficient"], -3.0);
+  EXPECT_EQ(combination["terms"][1]["exponent"], 2.0);
+  EXPECT_EQ(combination["value"], 4.0);
+  EXPECT_EQ(combination["standard_deviation"], 0.5);
+  EXPECT_EQ(combination["standard_deviation_robust"], 0.75);
 }
 
 TEST(ResultJsonTest, WhatIsNotKnownIsNull) {

@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// What a Jacobian determines: its singular value decomposition with columns of unit length,
+//
+//   J = U S Vᵀ L,   L = diag(lengths of the columns)
+//
+// of which S and V alone are needed. They are those of the triangular factor R of J = Q R, which is
+// gathered from some rows at a time: time N P², memory P². Nothing is squared, so that condition
+// numbers up to 1 / eps are told apart.
+
+#include <Eigen/Core>
+
+#include "tangible/math/scalar.h"
+
+namespace tangible {
+
+class Decomposition {
+ public:
+  /// Singular values above `tolerance` of the largest are directions that J determines.
+  Decomposition(const RowMatrixXd& jacobian, double tolerance);
+
+  Eigen::Index rank() const { return rank_; }
+  Eigen::Index size() const { return length_.size(); }
+  /// Of J with unit columns; infinite where a singular value is 0.
+  double condition() const;
+  const Eigen::VectorXd& singular_values() const { return singular_values_; }
+  /// Right singular vector i in unscaled columns: L⁻¹ v_i.
+  Eigen::VectorXd Direction(Eigen::Index i) const { return v_.col(i).cwiseQuotient(length_); }
+  /// (JᵀJ)⁻¹, or its sum over the directions that are determined.
+  Eigen::MatrixXd Covariance() const;
+
+ private:
+  Eigen::VectorXd length_;
+  Eigen::VectorXd singular_values_;
+  Eigen::MatrixXd v_;
+  Eigen::Index rank_ = 0;
+};
+
+}  // namespace tangible

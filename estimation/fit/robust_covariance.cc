@@ -1,0 +1,418 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/estimation/fit/robust_covariance.h"
+
+#include <Eigen/SVD>
+#include <algorithm>
+#include <boost/math/distributions/students_t.hpp>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <tuple>
+#include <utility>
+
+#include "tangible/estimation/fit/decomposition.h"
+
+namespace tangible {
+namespace {
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+// Wider kernels leave fewer than 4.5 degrees of freedom.
+constexpr double kLargestBandwidth = 1.0 / 3.0;
+// An autoregression that is nearer to 1 asks for a kernel beyond kLargestBandwidth anyway.
+constexpr double kLargestAutoregression = 0.97;
+constexpr double kAndrewsFactor = 1.1447;  // of Bartlett's kernel
+
+/// Residuals at the same time count as one: their influences are added.
+struct TimeSeries {
+  std::vector<double> times;       // ascending, all different
+  std::vector<Eigen::VectorXd> u;  // of each time
+  std::vector<Eigen::VectorXd> w;  // their variances were the residuals white and of size sigma
+};
+
+TimeSeries CollectTimes(const std::vector<double>& times, const Eigen::VectorXd& psi,
+                        const RowMatrixXd& influence) {
+  std::vector<int> order(times.size());
+  std::iota(order.begin(), order.end(), 0);
+  std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return times[a] < times[b]; });
+  TimeSeries series;
+  for (const int i : order) {
+    if (series.times.empty() || times[i] > series.times.back()) {
+      series.times.push_back(times[i]);
+      series.u.emplace_back(Eigen::VectorXd::Zero(influence.cols()));
+      series.w.emplace_back(Eigen::VectorXd::Zero(influence.cols()));
+    }
+    series.u.back() += psi[i] * influence.row(i).transpose();
+    series.w.back() += influence.row(i).cwiseAbs2().transpose();
+  }
+  return series;
+}
+
+/// Andrews' α of these series, with the first-order autoregression of each component.
+double AutoregressiveAlpha(const TimeSeries& series) {
+  double above = 0.0;
+  double below = 0.0;
+  const Eigen::Index size = series.u.empty() ? 0 : series.u.front().size();
+  for (Eigen::Index k = 0; k < size; ++k) {
+    double product = 0.0;
+    double square = 0.0;
+    for (size_t t = 0; t + 1 < series.u.size(); ++t) {
+      product += series.u[t][k] * series.u[t + 1][k];
+      square += 0.5 * (series.u[t][k] * series.u[t][k] + series.u[t + 1][k] * series.u[t + 1][k]);
+    }
+    if (!(square > 0.0)) {
+      continue;
+    }
+    const double rho =
+        std::clamp(product / square, -kLargestAutoregression, kLargestAutoregression);
+    above += 4.0 * rho * rho / (std::pow(1.0 - rho, 6) * std::pow(1.0 + rho, 2));
+    below += 1.0 / std::pow(1.0 - rho, 4);
+  }
+  return below > 0.0 ? above / below : 0.0;
+}
+
+/// S in seconds.
+double Bandwidth(const TimeSeries& series) {
+  if (series.times.size() < 3) {
+    return 0.0;
+  }
+  std::vector<double> spacing;
+  for (size_t t = 0; t + 1 < series.times.size(); ++t) {
+    spacing.push_back(series.times[t + 1] - series.times[t]);
+  }
+  // The median: gaps in a recording do not make its samples far apart.
+  const auto middle = spacing.begin() + static_cast<std::ptrdiff_t>(spacing.size() / 2);
+  std::nth_element(spacing.begin(), middle, spacing.end());
+  const double samples = static_cast<double>(series.times.size());
+  const double width = kAndrewsFactor * std::cbrt(AutoregressiveAlpha(series) * samples);
+  const double duration = series.times.back() - series.times.front();
+  return std::min(width * *middle, kLargestBandwidth * duration);
+}
+
+/// Σ k_tt' u_t u_t'ᵀ. Bartlett's kernel is the overlap of two windows of width S: the sum is 1/S
+/// times the integral over a sliding window of the square of what is in it. This is linear in the
+/// number of times, and never negative.
+RowMatrixXd KernelSum(const TimeSeries& series, double bandwidth) {
+  const size_t count = series.times.size();
+  const Eigen::Index size = count == 0 ? 0 : series.u.front().size();
+  RowMatrixXd sum = RowMatrixXd::Zero(size, size);
+  if (!(bandwidth > 0.0)) {
+    for (const Eigen::VectorXd& u : series.u) {
+      sum += u * u.transpose();
+    }
+    return sum;
+  }
+  Eigen::VectorXd inside = Eigen::VectorXd::Zero(size);
+  size_t in = 0;   // the next that enters at its time
+  size_t out = 0;  // the next that leaves at its time + bandwidth
+  double last = count == 0 ? 0.0 : series.times.front();
+  while (out < count) {
+    const bool enters = in < count && series.times[in] <= series.times[out] + bandwidth;
+    const double now = enters ? series.times[in] : series.times[out] + bandwidth;
+    sum += ((now - last) / bandwidth) * (inside * inside.transpose());
+    last = now;
+    if (enters) {
+      inside += series.u[in++];
+    } else {
+      inside -= series.u[out++];
+    }
+    if (in == out) {
+      inside.setZero();  // no rounding is carried on
+    }
+  }
+  return sum;
+}
+
+/// (Σ_t w_t, Σ_tt' k_tt'² w_t w_t') of each component, with k² expanded in powers of t' − t.
+std::pair<Eigen::VectorXd, Eigen::VectorXd> KernelWeights(const TimeSeries& series,
+                                                          double bandwidth) {
+  const Eigen::Index size = series.w.empty() ? 0 : series.w.front().size();
+  Eigen::VectorXd sum = Eigen::VectorXd::Zero(size);
+  Eigen::VectorXd squares = Eigen::VectorXd::Zero(size);
+  Eigen::VectorXd ahead[3];  // Σ w_t' ((t' − origin) / S)^n over the t' within S after t
+  for (Eigen::VectorXd& power : ahead) {
+    power = Eigen::VectorXd::Zero(size);
+  }
+  size_t next = 0;
+  const auto add = [&](size_t i, double sign) {
+    const double x = (series.times[i] - series.times.front()) / bandwidth;
+    ahead[0] += sign * series.w[i];
+    ahead[1] += sign * x * series.w[i];
+    ahead[2] += sign * x * x * series.w[i];
+  };
+  for (size_t t = 0; t < series.w.size(); ++t) {
+    const Eigen::VectorXd& w = series.w[t];
+    sum += w;
+    squares += w.cwiseAbs2();
+    if (!(bandwidth > 0.0)) {
+      continue;
+    }
+    while (next < series.w.size() && series.times[next] < series.times[t] + bandwidth) {
+      add(next++, 1.0);
+    }
+    add(t, -1.0);
+    const double a = 1.0 + (series.times[t] - series.times.front()) / bandwidth;
+    squares += 2.0 * w.cwiseProduct(a * a * ahead[0] - 2.0 * a * ahead[1] + ahead[2]);
+  }
+  return {sum, squares};
+}
+
+/// One recording with its own parameters eliminated.
+struct Reduced {
+  Eigen::VectorXd psi;
+  Eigen::VectorXd counts;   // 1, or 0 where Huber's loss is linear
+  RowMatrixXd shared;       // S̃
+  RowMatrixXd from_shared;  // D
+  RowMatrixXd own_normal;   // (OᵀO + own_known)⁺
+  RowMatrixXd own_known;    // of the priors
+  RowMatrixXd prior;        // S̃ of the priors on own parameters
+  RowMatrixXd known;        // their part of A_g
+  RowMatrixXd information;  // A_g
+};
+
+Reduced Reduce(const RecordingRows& rows, const RobustOptions& options) {
+  Reduced reduced;
+  reduced.psi = rows.residuals;
+  reduced.counts = Eigen::VectorXd::Ones(rows.residuals.size());
+  for (Eigen::Index i = 0; i < rows.residuals.size(); ++i) {
+    if (options.huber > 0.0 && std::abs(rows.residuals[i]) > options.huber) {
+      reduced.psi[i] = std::copysign(options.huber, rows.residuals[i]);
+      reduced.counts[i] = 0.0;
+    }
+  }
+  reduced.shared = rows.shared;
+  const Eigen::Index own = rows.own.cols();
+  const Eigen::Index priors = rows.prior_own.rows();
+  const Eigen::Index size = rows.shared.cols();
+  reduced.known = RowMatrixXd::Zero(size, size);
+  reduced.own_known = RowMatrixXd::Zero(own, own);
+  reduced.from_shared = RowMatrixXd::Zero(own, size);
+  if (own > 0) {
+    RowMatrixXd stacked(rows.own.rows() + priors, own);
+    stacked.topRows(rows.own.rows()) = reduced.counts.asDiagonal() * rows.own;
+    if (priors > 0) {
+      stacked.bottomRows(priors) = rows.prior_own;
+      reduced.own_known = rows.prior_own.transpose() * rows.prior_own;
+    }
+    reduced.own_normal = Decomposition(stacked, options.rank_tolerance).Covariance();
+    RowMatrixXd product = rows.own.transpose() * (reduced.counts.asDiagonal() * rows.shared);
+    if (priors > 0) {
+      product += rows.prior_own.transpose() * rows.prior_shared;
+    }
+    reduced.from_shared = reduced.own_normal * product;
+    reduced.shared -= rows.own * reduced.from_shared;
+  }
+  const RowMatrixXd counted = reduced.counts.asDiagonal() * reduced.shared;
+  reduced.information = counted.transpose() * counted;
+  if (priors > 0) {
+    reduced.prior = rows.prior_shared - rows.prior_own * reduced.from_shared;
+    reduced.known = reduced.prior.transpose() * reduced.prior;
+    reduced.information += reduced.known;
+  }
+  return reduced;
+}
+
+/// The factor f of equation (4) but for N / (N − P).
+double TakenAway(const TimeSeries& series, double bandwidth) {
+  const double duration = series.times.empty() ? 0.0 : series.times.back() - series.times.front();
+  const double beta = duration > 0.0 ? bandwidth / duration : 0.0;
+  return 1.0 / (1.0 - beta + beta * beta / 3.0);
+}
+
+struct KernelResult {
+  RowMatrixXd covariance;
+  Eigen::VectorXd weights, square_weights;
+  double bandwidth = 0.0;
+};
+
+KernelResult KernelCovariance(const RecordingRows& rows, const Eigen::VectorXd& psi,
+                              const RowMatrixXd& influence) {
+  const TimeSeries series = CollectTimes(rows.times, psi, influence);
+  KernelResult result;
+  result.bandwidth = Bandwidth(series);
+  result.covariance = TakenAway(series, result.bandwidth) * KernelSum(series, result.bandwidth);
+  std::tie(result.weights, result.square_weights) = KernelWeights(series, result.bandwidth);
+  return result;
+}
+
+/// Equation (3); false where a recording cannot be left out.
+bool Jackknife(const std::vector<Reduced>& reduced, const std::vector<RecordingRows>& recordings,
+               const RowMatrixXd& normal, const RowMatrixXd& information,
+               const RobustOptions& options, RobustCovariance* result) {
+  const Eigen::Index size = normal.rows();
+  const double count = static_cast<double>(recordings.size());
+  RowMatrixXd sum = RowMatrixXd::Zero(size, size);
+  Eigen::VectorXd weights = Eigen::VectorXd::Zero(size);
+  Eigen::VectorXd squares = Eigen::VectorXd::Zero(size);
+  const Eigen::VectorXd length = information.diagonal().cwiseMax(0.0).cwiseSqrt();
+  for (size_t i = 0; i < reduced.size(); ++i) {
+    const Reduced& g = reduced[i];
+    // The square of what is left out: its condition is the square of that of the rows.
+    Eigen::MatrixXd left = information - g.information;
+    Eigen::VectorXd score = g.shared.transpose() * g.psi;
+    if (g.prior.rows() > 0) {
+      score += g.prior.transpose() * recordings[i].prior_residuals;
+    }
+    for (Eigen::Index k = 0; k < size; ++k) {
+      const double scale = length[k] > 0.0 ? 1.0 / length[k] : 1.0;
+      left.row(k) *= scale;
+      left.col(k) *= scale;
+      score[k] *= scale;
+    }
+    const Eigen::BDCSVD<Eigen::MatrixXd> svd(left, Eigen::ComputeThinU | Eigen::ComputeThinV);
+    const Eigen::VectorXd& s = svd.singularValues();
+    const double least = std::max(options.rank_tolerance, 1e-12) * s[0];
+    if (!(s[size - 1] > least)) {
+      return false;
+    }
+    Eigen::VectorXd moved = svd.solve(score);
+    for (Eigen::Index k = 0; k < size; ++k) {
+      moved[k] *= length[k] > 0.0 ? 1.0 / length[k] : 1.0;
+    }
+    sum += moved * moved.transpose();
+    const Eigen::VectorXd w = (normal * g.information * normal).diagonal();
+    weights += w;
+    squares += w.cwiseAbs2();
+  }
+  result->method = RobustMethod::kRecordings;
+  result->shared = (count - 1.0) / count * sum;
+  result->shared_freedom =
+      (weights.cwiseAbs2().cwiseQuotient(squares).array() - 1.0).max(1.0).matrix();
+  return true;
+}
+
+/// A prior's part of the variance is known: the sum has more degrees of freedom (Satterthwaite).
+void AddKnown(const RowMatrixXd& known, RobustCovariance* result) {
+  for (Eigen::Index k = 0; k < known.rows(); ++k) {
+    const double estimated = result->shared(k, k);
+    if (estimated > 0.0) {
+      const double ratio = 1.0 + known(k, k) / estimated;
+      result->shared_freedom[k] *= ratio * ratio;
+    }
+  }
+  result->shared += known;
+}
+
+/// Equation (4) of the shared parameters.
+void SumOverTime(const std::vector<RecordingRows>& recordings, const std::vector<Reduced>& reduced,
+                 const RowMatrixXd& normal, double factor, RobustCovariance* result) {
+  const Eigen::Index size = normal.rows();
+  result->method = RobustMethod::kTime;
+  result->shared = RowMatrixXd::Zero(size, size);
+  RowMatrixXd known = RowMatrixXd::Zero(size, size);
+  Eigen::VectorXd weights = Eigen::VectorXd::Zero(size);
+  Eigen::VectorXd squares = Eigen::VectorXd::Zero(size);
+  for (size_t g = 0; g < recordings.size(); ++g) {
+    const KernelResult kernel =
+        KernelCovariance(recordings[g], reduced[g].psi, reduced[g].shared * normal);
+    result->shared += factor * kernel.covariance;
+    weights += kernel.weights;
+    squares += kernel.square_weights;
+    result->bandwidth = std::max(result->bandwidth, kernel.bandwidth);
+    known += reduced[g].known;
+  }
+  result->shared_freedom = weights.cwiseAbs2().cwiseQuotient(squares);
+  AddKnown(normal * known * normal, result);
+}
+
+void AddOwn(const std::vector<RecordingRows>& recordings, const std::vector<Reduced>& reduced,
+            double factor, RobustCovariance* result) {
+  for (size_t g = 0; g < recordings.size(); ++g) {
+    if (recordings[g].own.cols() == 0) {
+      result->own.emplace_back();
+      result->own_freedom.emplace_back();
+      continue;
+    }
+    const Reduced& part = reduced[g];
+    const KernelResult kernel =
+        KernelCovariance(recordings[g], part.psi, recordings[g].own * part.own_normal);
+    const RowMatrixXd of_data = factor * kernel.covariance;
+    const RowMatrixXd of_prior = part.own_normal * part.own_known * part.own_normal;
+    const RowMatrixXd of_shared = part.from_shared * result->shared * part.from_shared.transpose();
+    result->own.emplace_back(of_data + of_prior + of_shared);
+    const Eigen::VectorXd freedom = kernel.weights.cwiseAbs2().cwiseQuotient(kernel.square_weights);
+    Eigen::VectorXd all(freedom.size());
+    for (Eigen::Index k = 0; k < all.size(); ++k) {
+      double uncertain = of_data(k, k) * of_data(k, k) / freedom[k];
+      // The shared part varies with its own freedom; the largest share of it decides.
+      const Eigen::VectorXd shares =
+          part.from_shared.row(k).transpose().cwiseAbs2().cwiseProduct(result->shared.diagonal());
+      Eigen::Index most = 0;
+      if (shares.size() > 0 && shares.maxCoeff(&most) > 0.0) {
+        uncertain += of_shared(k, k) * of_shared(k, k) / result->shared_freedom[most];
+      }
+      const double total = result->own.back()(k, k);
+      all[k] = total * total / uncertain;
+    }
+    result->own_freedom.push_back(all);
+    result->bandwidth = std::max(result->bandwidth, kernel.bandwidth);
+  }
+}
+
+}  // namespace
+
+RobustCovariance EstimateRobustCovariance(const std::vector<RecordingRows>& recordings,
+                                          const RowMatrixXd& prior, const RobustOptions& options) {
+  RobustCovariance result;
+  const Eigen::Index size = recordings.empty() ? 0 : recordings.front().shared.cols();
+  std::vector<Reduced> reduced;
+  Eigen::Index stacked_rows = prior.rows();
+  Eigen::Index parameters = size;
+  for (const RecordingRows& recording : recordings) {
+    reduced.push_back(Reduce(recording, options));
+    stacked_rows += reduced.back().shared.rows() + reduced.back().prior.rows();
+    parameters += recording.own.cols();
+  }
+  result.shared = RowMatrixXd::Constant(size, size, kNaN);
+  result.shared_freedom = Eigen::VectorXd::Constant(size, kNaN);
+  if (stacked_rows <= parameters) {
+    return result;
+  }
+  // The rows themselves and not their normal matrix decide on the rank.
+  RowMatrixXd stacked(stacked_rows, size);
+  RowMatrixXd known = RowMatrixXd::Zero(size, size);
+  Eigen::Index first = 0;
+  const auto append = [&](const RowMatrixXd& rows) {
+    if (rows.rows() > 0) {
+      stacked.middleRows(first, rows.rows()) = rows;
+      first += rows.rows();
+    }
+  };
+  append(prior);
+  if (prior.rows() > 0) {
+    known = prior.transpose() * prior;
+  }
+  RowMatrixXd information = known;
+  for (const Reduced& g : reduced) {
+    append(g.counts.asDiagonal() * g.shared);
+    append(g.prior);
+    information += g.information;
+  }
+  const RowMatrixXd normal = Decomposition(stacked, options.rank_tolerance).Covariance();
+  const double rows = static_cast<double>(stacked_rows);
+  const double factor = rows / (rows - static_cast<double>(parameters));
+  if (static_cast<int>(recordings.size()) < kFewRecordings ||
+      !Jackknife(reduced, recordings, normal, information, options, &result)) {
+    SumOverTime(recordings, reduced, normal, factor, &result);
+  }
+  AddKnown(normal * known * normal, &result);
+  AddOwn(recordings, reduced, factor, &result);
+  return result;
+}
+
+const char* NameOf(RobustMethod method) {
+  switch (method) {
+    case RobustMethod::kNone:
+      return "none";
+    case RobustMethod::kRecordings:
+      return "recordings";
+    case RobustMethod::kTime:
+      return "time";
+  }
+  return "";
+}
+
+double StudentQuantile(double freedom) {
+  return boost::math::quantile(boost::math::students_t(freedom), 0.975);
+}
+
+}  // namespace tangible
