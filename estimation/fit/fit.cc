@@ -5,14 +5,11 @@
 #include <chrono>
 #include <cmath>
 #include <limits>
-#include <map>
 #include <random>
-#include <tuple>
 
 #include "tangible/estimation/fit/fit_checkpoint.h"
 #include "tangible/estimation/fit/minimise.h"
 #include "tangible/estimation/fit/shooting.h"
-#include "tangible/simulation/certificate/certify.h"
 
 namespace tangible {
 namespace {
@@ -113,7 +110,7 @@ bool FindStart(const FitOptions& options, RolloutResiduals* residuals, Eigen::Ve
   result->initial_cost = RobustCost(values, options.huber);
   const ParameterizedScene& scene = residuals->scene();
   const std::vector<ParameterizedScene::Entry>& entries = scene.entries();
-  jacobian *= scene.ParametersByInternal(scene.ToInternal(*start)).asDiagonal();
+  jacobian *= ParametersByInternal(entries, *start).asDiagonal();
   *gradient_norm = RobustGradient(values, jacobian, options.huber).norm();
   for (size_t round = 0; round <= entries.size(); ++round) {
     const int parameter = FindNoEffect(entries, jacobian);
@@ -140,17 +137,12 @@ bool FindStart(const FitOptions& options, RolloutResiduals* residuals, Eigen::Ve
   return false;
 }
 
-// Of an observed value: a run's rounding and what its projections leave.
-constexpr double kRounding = 1e-9;
-
-std::vector<ResidualPlace> PlacesOf(const RolloutResiduals& residuals) {
-  std::map<std::tuple<int, int, Coordinate>, int> series;
+std::vector<ResidualPlace> PlacesOf(const LeastSquaresProblem& problem) {
   std::vector<ResidualPlace> places;
-  for (const Observation& observation : residuals.observations()) {
-    const auto key = std::tuple(observation.body, observation.point, observation.coordinate);
-    const int number = series.emplace(key, static_cast<int>(series.size())).first->second;
-    places.push_back(
-        {0, number, observation.time, kRounding * std::abs(observation.value) / observation.sigma});
+  for (int block = 0; block < problem.num_blocks(); ++block) {
+    for (const RowPlace& row : problem.Places(block)) {
+      places.push_back({block, row.series, row.time, row.least});
+    }
   }
   return places;
 }
@@ -259,21 +251,12 @@ void RunStarts(FitRun* run, bool logged, FitResult* result) {
   }
 }
 
-// At the estimate, along the parameters that set numbers of the scene.
-void Certify(RolloutResiduals* residuals, FitResult* result) {
-  if (!residuals->SetParameters(result->estimate)) {
+void Certify(LeastSquaresProblem* problem, FitResult* result) {
+  const std::optional<Certificate> certificate = problem->Certify(result->estimate);
+  if (!certificate) {
     return;
   }
-  const ParameterizedScene& scene = residuals->scene();
-  std::vector<std::string> names;
-  std::vector<double> sizes;
-  for (const ParameterizedScene::Entry& entry : scene.entries()) {
-    const double estimate = result->estimate[static_cast<Eigen::Index>(names.size())];
-    names.push_back(entry.name);
-    sizes.push_back(std::max(std::abs(estimate), entry.scale));
-  }
-  result->certificate = CertifyDerivative(scene.model(), scene.initial_state(),
-                                          scene.VariableDerivatives(), names, sizes);
+  result->certificate = *certificate;
   if (result->certificate.verdict != "trustworthy") {
     const std::string warning =
         "the derivatives at the estimate, and with them the intervals, are not trustworthy: " +

@@ -63,7 +63,7 @@ class Minimiser : public ceres::IterationCallback {
         elapsed_(elapsed),
         progress_(progress),
         residuals_(residuals),
-        q_(residuals->scene().ToInternal(start)),
+        q_(ToInternal(residuals->entries(), start)),
         shared_([this](const Eigen::VectorXd& q, Eigen::VectorXd* values,
                        RowMatrixXd* jacobian) { return Evaluate(q, values, jacobian); },
                 &q_),
@@ -87,10 +87,12 @@ class Minimiser : public ceres::IterationCallback {
     if (minimum_.status == FitStatus::kConverged) {
       Polish();
     }
-    minimum_.parameters = residuals_->scene().ToParameters(q_);
+    minimum_.parameters = ToParameters(residuals_->entries(), q_);
     minimum_.residuals = shared_.values();
-    minimum_.jacobian = shared_.jacobian() *
-                        residuals_->scene().ParametersByInternal(q_).cwiseInverse().asDiagonal();
+    minimum_.jacobian =
+        shared_.jacobian() * ParametersByInternal(residuals_->entries(), minimum_.parameters)
+                                 .cwiseInverse()
+                                 .asDiagonal();
     minimum_.cost = RobustCost(shared_.values(), options_.huber);
     return minimum_;
   }
@@ -110,13 +112,15 @@ class Minimiser : public ceres::IterationCallback {
  private:
   bool Evaluate(const Eigen::VectorXd& q, Eigen::VectorXd* values, RowMatrixXd* jacobian) {
     const ParameterizedScene& scene = residuals_->scene();
-    if (!residuals_->Evaluate(scene.ToParameters(q), options_.derivatives, values, jacobian)) {
+    if (!residuals_->Evaluate(ToParameters(scene.entries(), q), options_.derivatives, values,
+                              jacobian)) {
       return false;
     }
     if (jacobian == nullptr) {
       return true;
     }
-    *jacobian *= scene.ParametersByInternal(q).asDiagonal();
+    *jacobian *=
+        ParametersByInternal(scene.entries(), ToParameters(scene.entries(), q)).asDiagonal();
     gradient_ = RobustGradient(*values, *jacobian, huber_);
     for (size_t k = 0; k < held_.size(); ++k) {
       if (held_[k]) {
@@ -129,7 +133,7 @@ class Minimiser : public ceres::IterationCallback {
   /// Counts the iterations in a row that each parameter is pushed out; true if one is to be held
   /// from now on.
   bool CountPushes() {
-    const Eigen::VectorXd p = residuals_->scene().ToParameters(q_);
+    const Eigen::VectorXd p = ToParameters(residuals_->entries(), q_);
     bool change = false;
     for (int k = 0; k < p.size(); ++k) {
       const bool out = PushesOut(residuals_->scene().entries()[k], p[k], gradient_[k]);
@@ -142,7 +146,7 @@ class Minimiser : public ceres::IterationCallback {
   /// Holds and releases parameters at bounds; false where nothing changes. Steps that Ceres cuts at
   /// a bound are no Gauss-Newton steps of the other parameters: without this they converge slowly.
   bool ChangeHeld() {
-    const Eigen::VectorXd p = residuals_->scene().ToParameters(q_);
+    const Eigen::VectorXd p = ToParameters(residuals_->entries(), q_);
     bool change = false;
     for (int k = 0; k < p.size(); ++k) {
       const bool hold = PushesOut(residuals_->scene().entries()[k], p[k], gradient_[k]);
@@ -159,7 +163,7 @@ class Minimiser : public ceres::IterationCallback {
       cost_ = RobustCost(shared_.values(), options_.huber);
       gradient_norm_ = RobustGradient(shared_.values(), shared_.jacobian(), options_.huber).norm();
     }
-    const Eigen::VectorXd p = residuals_->scene().ToParameters(q_);
+    const Eigen::VectorXd p = ToParameters(residuals_->entries(), q_);
     minimum_.iterations.push_back(
         {cost_, gradient_norm_, std::vector<double>(p.data(), p.data() + p.size()), elapsed_()});
     if (progress_) {
@@ -251,7 +255,7 @@ class Minimiser : public ceres::IterationCallback {
   /// fixed point.
   Eigen::VectorXd GaussNewtonStep() const {
     const auto& scene = residuals_->scene();
-    const Eigen::VectorXd p = scene.ToParameters(q_);
+    const Eigen::VectorXd p = ToParameters(scene.entries(), q_);
     RowMatrixXd jacobian = shared_.jacobian();
     Eigen::VectorXd right = shared_.values();
     for (Eigen::Index i = 0; i < right.size(); ++i) {
@@ -274,7 +278,7 @@ class Minimiser : public ceres::IterationCallback {
   /// alone.
   Eigen::VectorXd NewtonStep() const {
     const auto& scene = residuals_->scene();
-    const Eigen::VectorXd p = scene.ToParameters(q_);
+    const Eigen::VectorXd p = ToParameters(scene.entries(), q_);
     const Eigen::VectorXd& values = shared_.values();
     RowMatrixXd jacobian = shared_.jacobian();
     for (int k = 0; k < scene.size(); ++k) {
@@ -308,7 +312,7 @@ class Minimiser : public ceres::IterationCallback {
       const Eigen::VectorXd before = q_;
       double next = std::numeric_limits<double>::infinity();
       for (int halving = 0; halving <= kMaxHalvings; ++halving) {
-        q_ = residuals_->scene().ToInternal(residuals_->scene().ToParameters(before + step));
+        q_ = ToInternal(residuals_->entries(), ToParameters(residuals_->entries(), before + step));
         shared_.PrepareForEvaluation(true, true);
         if (shared_.ok()) {
           next = RobustCost(shared_.values(), options_.huber);
@@ -346,7 +350,7 @@ class Minimiser : public ceres::IterationCallback {
       }
       const Eigen::VectorXd before = q_;
       q_ += step;
-      q_ = residuals_->scene().ToInternal(residuals_->scene().ToParameters(q_));
+      q_ = ToInternal(residuals_->entries(), ToParameters(residuals_->entries(), q_));
       shared_.PrepareForEvaluation(true, true);
       const double next = shared_.ok() ? RobustCost(shared_.values(), options_.huber)
                                        : std::numeric_limits<double>::infinity();
@@ -384,8 +388,8 @@ class Minimiser : public ceres::IterationCallback {
 void SetInternalBounds(const ParameterizedScene& scene, ceres::Problem* problem,
                        Eigen::VectorXd* x) {
   for (int k = 0; k < scene.size(); ++k) {
-    const double low = scene.ToInternal(k, scene.entries()[k].lower);
-    const double high = scene.ToInternal(k, scene.entries()[k].upper);
+    const double low = ToInternal(scene.entries()[k], scene.entries()[k].lower);
+    const double high = ToInternal(scene.entries()[k], scene.entries()[k].upper);
     if (std::isfinite(low)) {
       problem->SetParameterLowerBound(x->data(), k, low);
     }

@@ -77,7 +77,7 @@ double ShootingResiduals::JumpWeight(int i) const {
 bool ShootingResiduals::Start(const Eigen::VectorXd& q, Eigen::VectorXd* unknowns) {
   unknowns->resize(num_unknowns());
   unknowns->head(num_parameters_) = q;
-  if (!residuals_->SetParameters(residuals_->scene().ToParameters(q))) {
+  if (!residuals_->SetParameters(ToParameters(residuals_->entries(), q))) {
     return false;
   }
   residuals_->CountRollout();
@@ -189,7 +189,7 @@ bool ShootingResiduals::Compute(const Eigen::VectorXd& unknowns, Eigen::VectorXd
                                 RowMatrixXd* jacobian) {
   const Eigen::VectorXd q = unknowns.head(num_parameters_);
   const ParameterizedScene& scene = residuals_->scene();
-  if (!residuals_->SetParameters(scene.ToParameters(q))) {
+  if (!residuals_->SetParameters(ToParameters(scene.entries(), q))) {
     return false;
   }
   residuals_->CountRollout();
@@ -206,7 +206,8 @@ bool ShootingResiduals::Compute(const Eigen::VectorXd& unknowns, Eigen::VectorXd
     jacobian->setZero(num_residuals(), num_unknowns());
     run.w_dot.setZero(scene.model().structure->num_variables(), num_parameters_ + state_size_);
     run.w_dot.leftCols(num_parameters_) =
-        scene.VariableDerivatives() * scene.ParametersByInternal(q).asDiagonal();
+        scene.VariableDerivatives() *
+        ParametersByInternal(scene.entries(), ToParameters(scene.entries(), q)).asDiagonal();
     run.pose_derivatives.setZero(3 * num_samples, num_parameters_ + state_size_);
   }
   for (int segment = 0; segment < num_segments(); ++segment) {
@@ -228,7 +229,8 @@ void ShootingResiduals::Scatter(const Run& run) const {
   const ParameterizedScene& scene = residuals_->scene();
   const RowMatrixXd local = residuals_->FromPoseDerivatives(
       run.poses, run.pose_derivatives,
-      scene.ParametersByInternal(run.unknowns->head(num_parameters_)));
+      ParametersByInternal(scene.entries(),
+                           ToParameters(scene.entries(), run.unknowns->head(num_parameters_))));
   for (int i = 0; i < num_observations(); ++i) {
     auto row = run.jacobian->row(i);
     row.head(num_parameters_) = local.row(i).head(num_parameters_);
@@ -274,7 +276,7 @@ bool SolveStage(const FitOptions& options, const ParameterizedScene& scene,
     return false;
   }
   result->iterations += static_cast<int>(summary.iterations.size()) - 1;
-  result->parameters = scene.ToParameters(x->head(scene.size()));
+  result->parameters = ToParameters(scene.entries(), x->head(scene.size()));
   shared.PrepareForEvaluation(false, true);
   const Eigen::Index jumps = shared.values().size() - shooting->num_observations();
   result->jump = jumps > 0 ? shared.values().tail(jumps).cwiseAbs().maxCoeff() : 0.0;
@@ -289,7 +291,7 @@ ShootingResult Shoot(const FitOptions& options, const Eigen::VectorXd& start,
   result.parameters = start;
   ShootingResiduals shooting(options.segments, residuals);
   Eigen::VectorXd x;
-  if (!shooting.Start(residuals->scene().ToInternal(start), &x)) {
+  if (!shooting.Start(ToInternal(residuals->entries(), start), &x)) {
     result.message = "multiple shooting: the run at the initial values fails";
     return result;
   }

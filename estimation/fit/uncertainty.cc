@@ -336,13 +336,6 @@ class Estimator {
 
 }  // namespace
 
-bool IsAtBound(const ParameterizedScene::Entry& entry, double estimate) {
-  // exp(ln bound) and the minimiser's projection come back to a bound within rounding.
-  const double slack = 1e-13 * std::max(std::abs(estimate), entry.scale);
-  const bool open = entry.logarithmic && entry.lower == 0.0;
-  return (!open && estimate <= entry.lower + slack) || estimate >= entry.upper - slack;
-}
-
 Uncertainty EstimateUncertainty(const std::vector<ParameterizedScene::Entry>& entries,
                                 const Eigen::VectorXd& estimate, const Eigen::VectorXd& residuals,
                                 const RowMatrixXd& jacobian,

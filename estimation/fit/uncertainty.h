@@ -74,7 +74,4 @@ Uncertainty EstimateUncertainty(const std::vector<ParameterizedScene::Entry>& en
 /// One line about how the robust intervals were found.
 std::string DescribeRobust(const Uncertainty& uncertainty);
 
-/// Whether an estimate lies on a bound.
-bool IsAtBound(const ParameterizedScene::Entry& entry, double estimate);
-
 }  // namespace tangible

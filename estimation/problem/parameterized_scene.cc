@@ -262,14 +262,6 @@ bool ParameterizedScene::SetBounds(const FitParameter& parameter, Entry* entry,
   return true;
 }
 
-Eigen::VectorXd ParameterizedScene::Initial() const {
-  Eigen::VectorXd p(size());
-  for (int k = 0; k < size(); ++k) {
-    p[k] = entries_[k].initial;
-  }
-  return p;
-}
-
 void ParameterizedScene::CollectTargets() {
   const auto numbers = EnumerateNumbers(&scene_);
   targets_.clear();
@@ -331,39 +323,6 @@ RowMatrixXd ParameterizedScene::VariableDerivatives() const {
 template <typename T>
 void ParameterizedScene::SeededModel(int first, Model<T>* model, State<T>* state) const {
   BuildModelWithStructure(SeededScene<T>(scene_, directions_, first), structure_, model, state);
-}
-
-double ParameterizedScene::ToInternal(int k, double p) const {
-  const Entry& entry = entries_[k];
-  return entry.logarithmic ? std::log(p / entry.initial) : p / entry.scale;
-}
-
-Eigen::VectorXd ParameterizedScene::ToInternal(const Eigen::VectorXd& p) const {
-  Eigen::VectorXd q(size());
-  for (int k = 0; k < size(); ++k) {
-    q[k] = ToInternal(k, p[k]);
-  }
-  return q;
-}
-
-Eigen::VectorXd ParameterizedScene::ToParameters(const Eigen::VectorXd& q) const {
-  Eigen::VectorXd p(size());
-  for (int k = 0; k < size(); ++k) {
-    const double value =
-        entries_[k].logarithmic ? entries_[k].initial * std::exp(q[k]) : q[k] * entries_[k].scale;
-    // exp(ln(upper / p_0)) p_0 may pass the bound by a rounding.
-    p[k] = std::clamp(value, entries_[k].lower, entries_[k].upper);
-  }
-  return p;
-}
-
-Eigen::VectorXd ParameterizedScene::ParametersByInternal(const Eigen::VectorXd& q) const {
-  const Eigen::VectorXd p = ToParameters(q);
-  Eigen::VectorXd derivative(size());
-  for (int k = 0; k < size(); ++k) {
-    derivative[k] = entries_[k].logarithmic ? p[k] : entries_[k].scale;
-  }
-  return derivative;
 }
 
 #define TANGIBLE_INSTANTIATE_JET(N) \

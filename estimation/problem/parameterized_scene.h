@@ -11,11 +11,6 @@
 // what hangs below). From the numbers the model and the initial state are rebuilt with an unchanged
 // structure. The derivative of that is taken where p stands: initial joint angles and inertias that
 // follow their mass make it nonlinear.
-//
-// Inside the minimiser a parameter that is positive by its bounds runs as q = ln(p / initial), any
-// other as q = p / s with a typical magnitude s. A mass that starts ten times off is then as far
-// from its value below as above, and steps of several parameters compare. The optimum and the
-// covariance, which is stated for p, do not depend on this choice.
 
 #include <Eigen/Core>
 #include <memory>
@@ -25,6 +20,7 @@
 
 #include "tangible/dynamics/model/parameter_map.h"
 #include "tangible/estimation/problem/observation.h"
+#include "tangible/estimation/problem/parameter_entry.h"
 
 namespace tangible {
 
@@ -60,14 +56,7 @@ struct ParameterError {
 class ParameterizedScene {
  public:
   /// What is known of a parameter once its paths are resolved.
-  struct Entry {
-    std::string name;
-    double initial = 0.0;
-    double lower = 0.0;  ///< −inf: not bounded
-    double upper = 0.0;
-    bool logarithmic = false;  ///< runs as ln(p / initial)
-    double scale = 1.0;        ///< typical magnitude, > 0
-  };
+  using Entry = ParameterEntry;
 
   /// Resolves the parameters. False and `error` where a path matches nothing, a number is set
   /// twice, a name is used twice, bounds are crossed or allow values that a number may not take, or
@@ -77,7 +66,7 @@ class ParameterizedScene {
 
   int size() const { return static_cast<int>(entries_.size()); }
   const std::vector<Entry>& entries() const { return entries_; }
-  Eigen::VectorXd Initial() const;
+  Eigen::VectorXd Initial() const { return InitialOf(entries_); }
 
   /// Sets the parameters and rebuilds the model; false where a number would take a value that it
   /// may not.
@@ -101,12 +90,6 @@ class ParameterizedScene {
   /// The model in Jets, derivative k of which is that of parameter first + k.
   template <typename T>
   void SeededModel(int first, Model<T>* model, State<T>* state) const;
-
-  /// q of p and back, and dp/dq; `ToParameters` stays within the bounds.
-  Eigen::VectorXd ToInternal(const Eigen::VectorXd& p) const;
-  double ToInternal(int k, double p) const;
-  Eigen::VectorXd ToParameters(const Eigen::VectorXd& q) const;
-  Eigen::VectorXd ParametersByInternal(const Eigen::VectorXd& q) const;
 
  private:
   struct NumberSet {

@@ -3,8 +3,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <tuple>
 #include <utility>
 
+#include "tangible/simulation/certificate/certify.h"
 #include "tangible/simulation/derivatives/rollout_tangent.h"
 
 namespace tangible {
@@ -15,6 +18,9 @@ namespace {
 constexpr int kAdjointColumns = 64;
 
 constexpr double kDifferenceStep = 6e-6;
+
+// Of an observed value: a run's rounding and what its projections leave.
+constexpr double kRounding = 1e-9;
 
 /// Adds a state's share to the poses of its samples.
 void AddShares(const SamplePlan& plan, long k, const std::vector<double>& pose,
@@ -29,22 +35,6 @@ void AddShares(const SamplePlan& plan, long k, const std::vector<double>& pose,
 
 }  // namespace
 
-const char* NameOf(DerivativeMethod method) {
-  switch (method) {
-    case DerivativeMethod::kTangent:
-      return "tangent";
-    case DerivativeMethod::kAdjoint:
-      return "adjoint";
-    case DerivativeMethod::kJet:
-      return "jet";
-    case DerivativeMethod::kJetImplicit:
-      return "jet_implicit";
-    case DerivativeMethod::kFiniteDifference:
-      return "finite_difference";
-  }
-  return "";
-}
-
 RolloutResiduals::RolloutResiduals(ParameterizedScene scene, std::vector<Observation> observations)
     : scene_(std::move(scene)), observations_(std::move(observations)) {
   if (scene_.scene().simulation.stepping == Stepping::kEvent) {
@@ -56,6 +46,46 @@ RolloutResiduals::RolloutResiduals(ParameterizedScene scene, std::vector<Observa
   }
   plan_ = SamplePlan(observations_, scene_.scene().simulation);
   scene_.Shorten(StepTime(scene_.scene().simulation, plan_.last_step()));
+}
+
+std::vector<RowPlace> RolloutResiduals::Places(int /*block*/) const {
+  std::map<std::tuple<int, int, Coordinate>, int> series;
+  std::vector<RowPlace> places;
+  places.reserve(observations_.size());
+  for (const Observation& observation : observations_) {
+    const auto key = std::tuple(observation.body, observation.point, observation.coordinate);
+    const int number = series.emplace(key, static_cast<int>(series.size())).first->second;
+    places.push_back(
+        {number, observation.time, kRounding * std::abs(observation.value) / observation.sigma});
+  }
+  return places;
+}
+
+bool RolloutResiduals::EvaluateBlock(int /*block*/, const Eigen::VectorXd& p,
+                                     DerivativeMethod method, BlockDerivatives derivatives,
+                                     BlockEvaluation* evaluation) {
+  const long before = rollouts_;
+  const bool done =
+      Compute(p, method, &evaluation->residuals,
+              derivatives == BlockDerivatives::kCompute ? &evaluation->jacobian : nullptr);
+  evaluation->message = message_;
+  evaluation->rollouts = rollouts_ - before;
+  return done;
+}
+
+// Along the parameters that set numbers of the scene.
+std::optional<Certificate> RolloutResiduals::Certify(const Eigen::VectorXd& p) {
+  if (!SetParameters(p)) {
+    return std::nullopt;
+  }
+  std::vector<std::string> names;
+  std::vector<double> sizes;
+  for (const ParameterEntry& entry : scene_.entries()) {
+    sizes.push_back(std::max(std::abs(p[static_cast<Eigen::Index>(names.size())]), entry.scale));
+    names.push_back(entry.name);
+  }
+  return CertifyDerivative(scene_.model(), scene_.initial_state(), scene_.VariableDerivatives(),
+                           names, sizes);
 }
 
 bool RolloutResiduals::Evaluate(const Eigen::VectorXd& p, DerivativeMethod method,

@@ -19,6 +19,7 @@
 #include <vector>
 
 #include "tangible/estimation/problem/evaluation_log.h"
+#include "tangible/estimation/problem/least_squares.h"
 #include "tangible/estimation/problem/parameterized_scene.h"
 #include "tangible/estimation/problem/sampling.h"
 #include "tangible/simulation/derivatives/rollout_adjoint.h"
@@ -26,15 +27,8 @@
 
 namespace tangible {
 
-enum class DerivativeMethod { kTangent, kAdjoint, kJet, kJetImplicit, kFiniteDifference };
-
-/// "tangent", "adjoint", "jet", "jet_implicit", "finite_difference".
-const char* NameOf(DerivativeMethod method);
-
-/// Whether this build has the method: Jets need a width in TANGIBLE_JET_WIDTHS.
-bool IsAvailable(DerivativeMethod method);
-
-class RolloutResiduals {
+/// The residuals of one run: a least-squares problem of one block without parameters of its own.
+class RolloutResiduals : public LeastSquaresProblem {
  public:
   /// `scene` holds the run, which goes on until the last observation only.
   RolloutResiduals(ParameterizedScene scene, std::vector<Observation> observations);
@@ -44,6 +38,16 @@ class RolloutResiduals {
   const ParameterizedScene& scene() const { return scene_; }
   const std::vector<Observation>& observations() const { return observations_; }
   const SamplePlan& plan() const { return plan_; }
+
+  const std::vector<ParameterEntry>& entries() const override { return scene_.entries(); }
+  int num_shared() const override { return num_parameters(); }
+  int num_blocks() const override { return 1; }
+  int num_own(int /*block*/) const override { return 0; }
+  int num_rows(int /*block*/) const override { return num_residuals(); }
+  std::vector<RowPlace> Places(int block) const override;
+  bool EvaluateBlock(int block, const Eigen::VectorXd& p, DerivativeMethod method,
+                     BlockDerivatives derivatives, BlockEvaluation* evaluation) override;
+  std::optional<Certificate> Certify(const Eigen::VectorXd& p) override;
 
   /// The residuals at p and, unless `jacobian` is null, their derivatives by `method`. False where
   /// the run fails or p sets a number to a value that it may not take; message() says which.

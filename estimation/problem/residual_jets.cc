@@ -33,11 +33,6 @@ int ChooseWidth(int num_parameters) {
 
 }  // namespace
 
-bool IsAvailable(DerivativeMethod method) {
-  return (method != DerivativeMethod::kJet && method != DerivativeMethod::kJetImplicit) ||
-         !Widths().empty();
-}
-
 template <typename T>
 bool RolloutResiduals::JetPass(int first, JetRoute route, RowMatrixXd* pose_derivatives) {
   Model<T> model;

@@ -111,7 +111,7 @@ TEST(SetInternalBoundsTest, MovesTheStartWithinTheBounds) {
   ceres::Problem problem;
   problem.AddParameterBlock(x.data(), 1);
   SetInternalBounds(residuals.scene(), &problem, &x);
-  EXPECT_NEAR(residuals.scene().ToParameters(x)[0], -8.0, 1e-12);
+  EXPECT_NEAR(ToParameters(residuals.entries(), x)[0], -8.0, 1e-12);
   EXPECT_EQ(problem.GetParameterUpperBound(x.data(), 0), x[0]);
   EXPECT_LT(problem.GetParameterLowerBound(x.data(), 0), x[0]);
 }

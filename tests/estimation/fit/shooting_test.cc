@@ -13,7 +13,7 @@ TEST(ShootingTest, AWholeRunCutInPiecesIsTheSameRun) {
   FitParameter mass = Parameter("bodies/link*/mass", 0.9);
   RolloutResiduals residuals = MakeResiduals(scene, {}, {mass}, Observe(scene, 3, 0.001, 1));
   ShootingResiduals shooting(5, &residuals);
-  const Eigen::VectorXd q = residuals.scene().ToInternal(residuals.scene().Initial());
+  const Eigen::VectorXd q = ToInternal(residuals.entries(), residuals.scene().Initial());
   Eigen::VectorXd x;
   ASSERT_TRUE(shooting.Start(q, &x));
   ASSERT_EQ(x.size(), 1 + 4 * 6 * 4);
@@ -41,7 +41,7 @@ TEST(ShootingTest, DerivativesAreThoseOfDifferences) {
   ShootingResiduals shooting(3, &residuals);
   shooting.SetJumpSigma(0.01);
   Eigen::VectorXd x;
-  ASSERT_TRUE(shooting.Start(residuals.scene().ToInternal(residuals.scene().Initial()), &x));
+  ASSERT_TRUE(shooting.Start(ToInternal(residuals.entries(), residuals.scene().Initial()), &x));
   Eigen::VectorXd r;
   RowMatrixXd jacobian;
   ASSERT_TRUE(shooting.Evaluate(x, &r, &jacobian));

@@ -90,14 +90,16 @@ TEST(ParameterizedSceneTest, PositiveBoundsRunInLogarithms) {
   EXPECT_EQ(scene.entries()[1].lower, 0.0);
   EXPECT_TRUE(scene.entries()[2].logarithmic);
   const Eigen::Vector3d p(3.0, 0.25, 2.0);
-  const Eigen::VectorXd q = scene.ToInternal(p);
-  EXPECT_LT((scene.ToParameters(q) - p).cwiseAbs().maxCoeff(), 1e-15);
-  EXPECT_LE(scene.ToParameters(q)[2], 2.0);
+  const Eigen::VectorXd q = ToInternal(scene.entries(), p);
+  EXPECT_LT((ToParameters(scene.entries(), q) - p).cwiseAbs().maxCoeff(), 1e-15);
+  EXPECT_LE(ToParameters(scene.entries(), q)[2], 2.0);
   const double h = 1e-6;
   for (int k = 0; k < 3; ++k) {
     const Eigen::Vector3d step = (k == 2 ? -h : h) * Eigen::Vector3d::Unit(k);
-    const double difference = (scene.ToParameters(q + step) - scene.ToParameters(q))[k] / step[k];
-    EXPECT_NEAR(scene.ParametersByInternal(q)[k], difference, 1e-5 * std::abs(difference));
+    const double difference =
+        (ToParameters(scene.entries(), q + step) - ToParameters(scene.entries(), q))[k] / step[k];
+    EXPECT_NEAR(ParametersByInternal(scene.entries(), p)[k], difference,
+                1e-5 * std::abs(difference));
   }
 }
 

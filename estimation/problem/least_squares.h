@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// What a fit minimises: a least-squares problem in blocks,
+//
+//   cost(p) = 1/2 Σ_b w_b Σ_i ρ_i(r_bi(p_s, p_b)²)        within lower ≤ p ≤ upper
+//   p = [p_s | p_0 | p_1 | ... ]                          shared parameters, then each block's own
+//
+// A block is one recording, or rows such as those of a prior on shared parameters. Its rows depend
+// on the shared parameters p_s and on its own p_b alone, so that the own ones of all blocks can be
+// eliminated block by block (Schur complement), and blocks can be evaluated at the same time. The
+// first rows of a block are those of observations, to which the robust loss applies; the others
+// (priors) are plain squares. w_b is the weight of the block, 1 by default.
+
+#include <Eigen/Core>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tangible/estimation/problem/derivative_method.h"
+#include "tangible/estimation/problem/parameter_entry.h"
+#include "tangible/lcp/dense/certificate.h"
+#include "tangible/math/scalar.h"
+
+namespace tangible {
+
+/// What a block's evaluation gives.
+struct BlockEvaluation {
+  Eigen::VectorXd residuals;  ///< in multiples of sigma, without the block's weight
+  RowMatrixXd jacobian;       ///< rows x [shared | own]: ∂r/∂p; only where it was asked for
+  std::string message;        ///< why it failed, one line
+  long rollouts = 0;          ///< runs that it took
+};
+
+enum class BlockDerivatives { kSkip, kCompute };
+
+/// Where and when a row was measured.
+struct RowPlace {
+  int series = 0;      ///< its own number a coordinate of a body or point, within the block
+  double time = 0.0;   ///< s
+  double least = 0.0;  ///< in multiples of sigma: smaller residuals are rounding
+};
+
+class LeastSquaresProblem {
+ public:
+  virtual ~LeastSquaresProblem() = default;
+
+  /// All parameters in the order of p.
+  virtual const std::vector<ParameterEntry>& entries() const = 0;
+  virtual int num_shared() const = 0;
+  virtual int num_blocks() const = 0;
+  virtual int num_own(int block) const = 0;
+  virtual int num_rows(int block) const = 0;
+  /// Rows of observations, which come first.
+  virtual int num_observation_rows(int block) const { return num_rows(block); }
+  /// w_b > 0. A block without observation rows is a prior, and has the weight 1.
+  virtual double weight(int /*block*/) const { return 1.0; }
+  /// Of each observation row.
+  virtual std::vector<RowPlace> Places(int block) const = 0;
+
+  /// The rows of a block at p = [shared | own], and their derivatives by `method` if asked for.
+  /// False, with a message, where a run fails, a value is not allowed, or a residual or derivative
+  /// is not finite. The same p gives the same bits. Calls for different blocks may run at the same
+  /// time; calls for one block may not.
+  virtual bool EvaluateBlock(int block, const Eigen::VectorXd& p, DerivativeMethod method,
+                             BlockDerivatives derivatives, BlockEvaluation* evaluation) = 0;
+
+  /// The certificate of the derivatives at p (all parameters); none where nothing is certified.
+  virtual std::optional<Certificate> Certify(const Eigen::VectorXd& /*p*/) { return std::nullopt; }
+
+  /// For a line of a message: of block 3 "recording 'take 4': "; empty where there is only one.
+  virtual std::string BlockName(int /*block*/) const { return ""; }
+};
+
+/// Where the blocks stand in the vectors of all parameters and of all rows.
+class BlockLayout {
+ public:
+  explicit BlockLayout(const LeastSquaresProblem& problem);
+
+  int num_parameters() const { return own_offset_.back(); }
+  long num_rows() const { return row_offset_.back(); }
+  int num_shared() const { return own_offset_.front(); }
+  int num_blocks() const { return static_cast<int>(own_offset_.size()) - 1; }
+  int num_own(int block) const { return own_offset_[block + 1] - own_offset_[block]; }
+  int num_local(int block) const { return num_shared() + num_own(block); }
+  /// Of a block's first own parameter.
+  int own_offset(int block) const { return own_offset_[block]; }
+  /// Of a block's first row.
+  long row_offset(int block) const { return row_offset_[block]; }
+
+  /// Of a block's parameter i in [shared | own] the index in p.
+  int ParameterOf(int block, int i) const {
+    return i < num_shared() ? i : own_offset_[block] + i - num_shared();
+  }
+  /// [shared | own] of a block, out of a vector with a number for each parameter.
+  Eigen::VectorXd Local(int block, const Eigen::VectorXd& all) const;
+
+ private:
+  std::vector<int> own_offset_;   ///< blocks + 1
+  std::vector<long> row_offset_;  ///< blocks + 1
+};
+
+}  // namespace tangible

@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// What the minimiser knows of a parameter, and the variable in which it moves.
+//
+//   q = ln(p / initial)   for a parameter that is positive by its bounds
+//   q = p / scale         for any other, with a typical magnitude
+//
+// A mass that starts ten times off is then as far from its value below as above, and steps of
+// several parameters compare. The optimum and the covariance, which is stated for p, do not depend
+// on this choice.
+
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+namespace tangible {
+
+struct ParameterEntry {
+  std::string name;
+  double initial = 0.0;
+  double lower = 0.0;  ///< −inf: not bounded
+  double upper = 0.0;
+  bool logarithmic = false;  ///< runs as ln(p / initial)
+  double scale = 1.0;        ///< typical magnitude, > 0
+};
+
+/// q of p.
+double ToInternal(const ParameterEntry& entry, double p);
+/// p of q, kept within the bounds.
+double ToParameter(const ParameterEntry& entry, double q);
+/// dp/dq at p.
+double ParameterByInternal(const ParameterEntry& entry, double p);
+
+/// Whether p lies on a bound, but for rounding. A lower bound of 0 of a logarithmic parameter is
+/// never reached.
+bool IsAtBound(const ParameterEntry& entry, double p);
+
+/// The same for vectors of parameters, one an entry.
+Eigen::VectorXd InitialOf(const std::vector<ParameterEntry>& entries);
+Eigen::VectorXd ToInternal(const std::vector<ParameterEntry>& entries, const Eigen::VectorXd& p);
+Eigen::VectorXd ToParameters(const std::vector<ParameterEntry>& entries, const Eigen::VectorXd& q);
+Eigen::VectorXd ParametersByInternal(const std::vector<ParameterEntry>& entries,
+                                     const Eigen::VectorXd& p);
+
+}  // namespace tangible

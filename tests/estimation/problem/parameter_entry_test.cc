@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/estimation/problem/parameter_entry.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+namespace tangible {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+const ParameterEntry kMass{"mass", 2.0, 0.5, 20.0, true, 2.0};
+const ParameterEntry kLength{"length", 0.3, -1.0, kInfinity, false, 0.5};
+
+TEST(ParameterEntryTest, TheInternalVariableIsALogarithmOrAMultipleOfTheScale) {
+  EXPECT_DOUBLE_EQ(ToInternal(kMass, 4.0), std::log(2.0));
+  EXPECT_DOUBLE_EQ(ToInternal(kLength, 0.25), 0.5);
+  for (const ParameterEntry& entry : {kMass, kLength}) {
+    const double p = 1.1 * entry.initial;
+    const double q = ToInternal(entry, p);
+    EXPECT_NEAR(ToParameter(entry, q), p, 1e-15);
+    const double h = 1e-6;
+    const double difference = (ToParameter(entry, q + h) - ToParameter(entry, q - h)) / (2.0 * h);
+    EXPECT_NEAR(ParameterByInternal(entry, p), difference, 1e-9);
+  }
+}
+
+TEST(ParameterEntryTest, WhatGoesBeyondABoundStopsThere) {
+  EXPECT_EQ(ToParameter(kMass, 100.0), 20.0);
+  EXPECT_EQ(ToParameter(kMass, -100.0), 0.5);
+  EXPECT_EQ(ToParameter(kLength, -100.0), -1.0);
+}
+
+TEST(ParameterEntryTest, ABoundIsReachedWithinRounding) {
+  EXPECT_TRUE(IsAtBound(kMass, ToParameter(kMass, ToInternal(kMass, 0.5))));
+  EXPECT_TRUE(IsAtBound(kMass, 20.0));
+  EXPECT_FALSE(IsAtBound(kMass, 0.5 + 1e-9));
+  EXPECT_TRUE(IsAtBound(kLength, -1.0));
+  const ParameterEntry positive{"positive", 1.0, 0.0, kInfinity, true, 1.0};
+  EXPECT_FALSE(IsAtBound(positive, 1e-300));
+}
+
+}  // namespace
+}  // namespace tangible
