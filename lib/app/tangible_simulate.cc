@@ -271,7 +271,7 @@ int RunRows(const std::string& file) {
   if (!error.empty()) return ReportError(error);
   int exit_status = kExitDone;
   for (size_t r = 0; r < batch.rows.size(); ++r) {
-    if (batch.rows[r].status == BatchStatus::kDone) continue;
+    if (batch.rows[r].status == RolloutStatus::kDone) continue;
     exit_status = ReportError(FLAGS_batch + ": line " + std::to_string(table.lines[r]) + ": " +
                               batch.rows[r].message);
   }

@@ -311,19 +311,26 @@ Certificate RolloutCertifier::Finish(const Model<double>& model, const RolloutRe
   return finished;
 }
 
-Certificate CertifyRollout(const Model<double>& model, const State<double>& initial,
+Certificate CertifyRollout(ControlledModel<double>* model, const State<double>& initial,
                            const CertifyOptions& options, RolloutReport* report) {
   RolloutCertifier certifier(options);
+  Stepper stepper(model->At(0));
   State<double> final;
   *report = Rollout(
       model, initial,
-      [&](long k, double, const State<double>&, Stepper* stepper) {
-        if (stepper != nullptr) {
-          certifier.AddStep(model, k - 1, stepper);
+      [&](long k, double, const State<double>&, Stepper* done) {
+        if (done != nullptr) {
+          certifier.AddStep(model->At(k - 1), k - 1, done);
         }
       },
-      &final);
-  return certifier.Finish(model, *report);
+      &stepper, &final);
+  return certifier.Finish(model->At(0), *report);
+}
+
+Certificate CertifyRollout(const Model<double>& model, const State<double>& initial,
+                           const CertifyOptions& options, RolloutReport* report) {
+  ControlledModel<double> plain(model);
+  return CertifyRollout(&plain, initial, options, report);
 }
 
 Certificate CertifyRollout(const Model<double>& model, const State<double>& initial) {

@@ -100,6 +100,9 @@ class RolloutCertifier {
 /// says so.
 Certificate CertifyRollout(const Model<double>& model, const State<double>& initial,
                            const CertifyOptions& options, RolloutReport* report);
+/// The same of a model with controls.
+Certificate CertifyRollout(ControlledModel<double>* model, const State<double>& initial,
+                           const CertifyOptions& options, RolloutReport* report);
 Certificate CertifyRollout(const Model<double>& model, const State<double>& initial);
 
 /// The reason of a verdict `one-sided` where the certificate finds that a direction contradicts

@@ -54,12 +54,19 @@ void RolloutTape::Start(const Model<double>& model, const TapeOptions& options) 
 RolloutReport RolloutTape::Record(const Model<double>& model, const State<double>& initial,
                                   const TapeOptions& options, const StateObserver& observer,
                                   State<double>* final) {
-  Start(model, options);
+  ControlledModel<double> plain(model);
+  return Record(&plain, initial, options, observer, final);
+}
+
+RolloutReport RolloutTape::Record(ControlledModel<double>* model, const State<double>& initial,
+                                  const TapeOptions& options, const StateObserver& observer,
+                                  State<double>* final) {
+  Start(model->At(0), options);
   const StateObserver record = [&](long k, double t, const State<double>& state, Stepper* stepper) {
     if (observer) {
       observer(k, t, state, stepper);
     }
-    RecordStep(model, k, state);
+    RecordStep(model->At(std::max(0L, k - 1)), k, state);
   };
   return Rollout(model, initial, record, stepper_.get(), final);
 }
@@ -239,7 +246,7 @@ void RolloutTape::ReleaseEntries(size_t keep) {
 
 // Makes the entries those of the steps up to `last`, from the checkpoint before it or, where these
 // are too many for the budget, from a new one in between.
-void RolloutTape::RunAgain(const Model<double>& model, long last) {
+void RolloutTape::RunAgain(ControlledModel<double>* model, long last) {
   RemoveCheckpoints(
       [last](long step, Origin origin) { return origin == Origin::kSplit && step >= last; });
   const auto next = std::lower_bound(
@@ -248,7 +255,7 @@ void RolloutTape::RunAgain(const Model<double>& model, long last) {
   const Checkpoint& from = std::prev(next)->first;
   stepper_->SetGuess(from.guess);
   State<double> state = from.state;
-  const SimulationSettings& settings = model.structure->settings;
+  const SimulationSettings& settings = model->structure().settings;
   used_ = 0;
   used_bytes_ = 0;
   first_ = from.step;
@@ -260,12 +267,13 @@ void RolloutTape::RunAgain(const Model<double>& model, long last) {
       used_bytes_ = 0;
       first_ = k;
     }
-    if (stepper_->Step(model, StepTime(settings, k), StepLength(settings, k), &state).status !=
+    const Model<double>& now = model->At(k);
+    if (stepper_->Step(now, StepTime(settings, k), StepLength(settings, k), &state).status !=
         StepStatus::kDone) {
       throw std::logic_error("RolloutTape: the model is not that of the recorded run");
     }
     ++steps_again_;
-    Take(model, last - k - 1);
+    Take(now, last - k - 1);
     peak_bytes_ = std::max(peak_bytes_, held_bytes());
   }
 }
@@ -313,7 +321,26 @@ void RolloutTape::Adjoint(const Model<double>& model, int num_losses, const Seed
 
 void RolloutTape::AdjointFrom(const Model<double>& model, long last, int num_losses,
                               const Seed& seed, RowMatrixXd* w_bar) {
-  w_bar->setZero(model.structure->num_variables(), num_losses);
+  ControlledModel<double> plain(model);
+  AdjointFrom(&plain, last, num_losses, seed, {}, w_bar);
+}
+
+void RolloutTape::AdjointFrom(ControlledModel<double>* model, long last, int num_losses,
+                              const Seed& seed, const ControlSink& sink, RowMatrixXd* w_bar) {
+  const ModelStructure& structure = model->structure();
+  w_bar->setZero(structure.num_variables(), num_losses);
+  RowMatrixXd controls_bar;
+  const auto hand_over = [&](long step) {
+    if (!model->is_controlled()) return;
+    const std::vector<int>& numbers = model->controls()->numbers;
+    controls_bar.resize(static_cast<Eigen::Index>(numbers.size()), num_losses);
+    for (size_t j = 0; j < numbers.size(); ++j) {
+      auto row = w_bar->row(structure.ParameterVariable(numbers[j]));
+      controls_bar.row(static_cast<Eigen::Index>(j)) = row;
+      row.setZero();
+    }
+    if (sink) sink(step, controls_bar);
+  };
   for (long k = std::min(last, steps()); k > 0; --k) {
     seed(k, w_bar);
     const long step = k - 1;
@@ -321,19 +348,22 @@ void RolloutTape::AdjointFrom(const Model<double>& model, long last, int num_los
       RunAgain(model, k);
     }
     Entry& entry = *entries_[static_cast<size_t>(step - first_)];
+    const Model<double>& now = model->At(step);
     if (stepper_->by_events()) {
-      stepper_->event_derivative().Adjoint(model, &entry.events, w_bar);
+      stepper_->event_derivative().Adjoint(now, &entry.events, w_bar);
+      hand_over(step);
       continue;
     }
     if (entry.has_factors) {
-      StepAdjoint(model, entry.record, &entry.system, entry.projection.get(), w_bar);
+      StepAdjoint(now, entry.record, &entry.system, entry.projection.get(), w_bar);
       KeepWithinBudget(&entry);
     } else {
       std::swap(entry.record.problem, refactored_);
-      stepper_->Refactor(model, &entry.record);
-      StepAdjoint(model, entry.record, &stepper_->system(), entry.projection.get(), w_bar);
+      stepper_->Refactor(now, &entry.record);
+      StepAdjoint(now, entry.record, &stepper_->system(), entry.projection.get(), w_bar);
       std::swap(entry.record.problem, refactored_);
     }
+    hand_over(step);
   }
   seed(0, w_bar);
 }

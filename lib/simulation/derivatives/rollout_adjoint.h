@@ -46,6 +46,11 @@ class RolloutTape {
     return Record(model, initial, TapeOptions{factorisations, {}}, observer, final);
   }
 
+  /// The same of a model with controls.
+  RolloutReport Record(ControlledModel<double>* model, const State<double>& initial,
+                       const TapeOptions& options, const StateObserver& observer,
+                       State<double>* final);
+
   /// Adds to w_bar the derivatives of the losses with respect to the state after k steps; called
   /// from the last k to 0. Rows of poses and twists are those of that state.
   using Seed = std::function<void(long k, RowMatrixXd* w_bar)>;
@@ -57,6 +62,12 @@ class RolloutTape {
   /// The same from the state after `last` steps on, for losses that read no later one.
   void AdjointFrom(const Model<double>& model, long last, int num_losses, const Seed& seed,
                    RowMatrixXd* w_bar);
+  /// Called with step k and the derivatives with respect to the controls' values in it: a row a
+  /// number of Controls::numbers, a column a loss.
+  using ControlSink = std::function<void(long k, const RowMatrixXd& controls_bar)>;
+  /// The same of a model with controls; the rows of their parameters in w_bar are 0 on return.
+  void AdjointFrom(ControlledModel<double>* model, long last, int num_losses, const Seed& seed,
+                   const ControlSink& sink, RowMatrixXd* w_bar);
 
   /// Memory of the tape now, and the most it was since Record began, bytes.
   size_t bytes() const;
@@ -93,7 +104,7 @@ class RolloutTape {
   void KeepWithinBudget(Entry* entry);
   void Count(Entry* entry);
   void ReleaseEntries(size_t keep);
-  void RunAgain(const Model<double>& model, long last);
+  void RunAgain(ControlledModel<double>* model, long last);
   void StepAdjoint(const Model<double>& model, const StepRecord& record, ContactSystem* system,
                    JointProjection* projection, RowMatrixXd* w_bar);
 

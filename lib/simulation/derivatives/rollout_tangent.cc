@@ -25,8 +25,13 @@ void AdvanceTangent(const Model<double>& model, Stepper* stepper, const double* 
   }
 }
 
-int StepTangent::FixNumbers(const Model<double>& model, const RowMatrixXd& w_dot) {
-  const ModelStructure& s = *model.structure;
+void StepTangent::Vary(const ModelStructure& structure, const std::vector<int>& numbers) {
+  for (const int number : numbers) {
+    fixed_[structure.ParameterVariable(number)] = 0;
+  }
+}
+
+int StepTangent::FixNumbers(const ModelStructure& s, const RowMatrixXd& w_dot) {
   fixed_.assign(s.num_variables(), 0);
   int count = 0;
   for (int variable = s.ParameterVariable(0); variable < s.num_variables(); ++variable) {
@@ -109,22 +114,35 @@ double StepTangent::Finish(const Model<double>& model, Stepper* stepper, RowMatr
   return left;
 }
 
-RolloutReport RolloutTangent(const Model<double>& model, const State<double>& initial,
-                             const TangentObserver& observer, Stepper* stepper, RowMatrixXd* w_dot,
-                             State<double>* final) {
+RolloutReport RolloutTangent(ControlledModel<double>* model, const State<double>& initial,
+                             const ControlDirections& directions, const TangentObserver& observer,
+                             Stepper* stepper, RowMatrixXd* w_dot, State<double>* final) {
   StepTangent tangent;
-  const int fixed_numbers = tangent.FixNumbers(model, *w_dot);
+  const int fixed_numbers = tangent.FixNumbers(model->structure(), *w_dot);
+  if (model->is_controlled()) {
+    tangent.Vary(model->structure(), model->controls()->numbers);
+  }
   const StateObserver each = [&](long k, double t, const State<double>& state, Stepper* done) {
     if (done != nullptr) {
-      tangent.Apply(model, done, w_dot);
+      tangent.Apply(model->At(k - 1), done, w_dot);
     }
     if (observer) {
       observer(k, t, state, *w_dot);
+    }
+    if (directions) {
+      directions(k, w_dot);
     }
   };
   RolloutReport report = Rollout(model, initial, each, stepper, final);
   report.fixed_numbers = fixed_numbers;
   return report;
+}
+
+RolloutReport RolloutTangent(const Model<double>& model, const State<double>& initial,
+                             const TangentObserver& observer, Stepper* stepper, RowMatrixXd* w_dot,
+                             State<double>* final) {
+  ControlledModel<double> plain(model);
+  return RolloutTangent(&plain, initial, {}, observer, stepper, w_dot, final);
 }
 
 RolloutReport RolloutTangent(const Model<double>& model, const State<double>& initial,

@@ -27,6 +27,14 @@ RolloutReport RolloutTangent(const Model<double>& model, const State<double>& in
                              const TangentObserver& observer, Stepper* stepper, RowMatrixXd* w_dot,
                              State<double>* final);
 
+/// Sets the rows of the controls' parameters to the directions of their values in step k.
+using ControlDirections = std::function<void(long k, RowMatrixXd* w_dot)>;
+/// The same of a model with controls. On return the rows of their parameters are those of the last
+/// step.
+RolloutReport RolloutTangent(ControlledModel<double>* model, const State<double>& initial,
+                             const ControlDirections& directions, const TangentObserver& observer,
+                             Stepper* stepper, RowMatrixXd* w_dot, State<double>* final);
+
 /// From the derivatives of the new twists of moving blocks (3 num_blocks x columns, row-major) to
 /// those of the state after the step: poses move with them, and are projected.
 void AdvanceTangent(const Model<double>& model, Stepper* stepper, const double* twists,
@@ -37,7 +45,9 @@ class StepTangent {
  public:
   /// For steps from `w_dot` on, with this object alone: the model's numbers that no column varies,
   /// which stay so, are left out of fixed steps. Returns how many.
-  int FixNumbers(const Model<double>& model, const RowMatrixXd& w_dot);
+  int FixNumbers(const ModelStructure& structure, const RowMatrixXd& w_dot);
+  /// Takes that back for some numbers.
+  void Vary(const ModelStructure& structure, const std::vector<int>& numbers);
   /// Returns the largest relative residual of the linear solve.
   double Apply(const Model<double>& model, Stepper* stepper, RowMatrixXd* w_dot);
   /// The same, and how far the derivatives of the contacts' impulses exceed what the perturbation

@@ -5,16 +5,15 @@
 //
 //   row r   p = values(r, :)  →  final state x(p),   and on request dx/dp, or ℓ(x) and dℓ/dp
 //
-// The scene's structure is made once; each thread has one stepper and one tape, whose memory goes
-// from row to row. A row is computed alone and stands at its place in the result, so its bits
-// depend neither on the number of threads nor on the other rows, and are those of a single run. A
-// row that fails says why and stops no other.
+// Rows are rollouts of one function (rollout_function.h). A row is computed alone and stands at its
+// place in the result, so its bits depend neither on the number of threads nor on the other rows,
+// and are those of a single run. A row that fails says why and stops no other.
 
 #include <functional>
 #include <string>
 #include <vector>
 
-#include "tangible/simulation/gradient/gradient.h"
+#include "tangible/simulation/gradient/rollout_function.h"
 
 namespace tangible {
 
@@ -32,14 +31,8 @@ struct BatchOptions {
   std::vector<LossTerm> loss{};
 };
 
-enum class BatchStatus { kDone, kUnsolved, kDiverged, kRefused };
-
-/// "done", "unsolved", "diverged", "refused".
-const char* NameOf(BatchStatus status);
-
 struct BatchRow {
-  /// kRefused: a parameter may not have that value; nothing was run.
-  BatchStatus status = BatchStatus::kDone;
+  RolloutStatus status = RolloutStatus::kDone;
   std::string message;   ///< empty unless it failed: when, where, what
   RolloutReport report;  ///< of the run
   State<double> final;   ///< the last good state; that of the start where nothing was run

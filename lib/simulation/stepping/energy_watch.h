@@ -11,6 +11,8 @@ namespace tangible {
 
 class EnergyWatch {
  public:
+  /// Watches nothing.
+  EnergyWatch() = default;
   EnergyWatch(const Model<double>& model, const State<double>& initial);
   /// Empty, or what has happened: "the energy grew from 1 J to 1e+09 J, though nothing drives the
   /// scene: dt is too large". Always empty where something does (forces, efforts, kinematic

@@ -85,21 +85,23 @@ void RolloutReport::Add(const StepReport& step) {
   impact_energy_gain_max = std::max(impact_energy_gain_max, step.impact_energy_gain);
 }
 
-RolloutReport Rollout(const Model<double>& model, const State<double>& initial,
+RolloutReport Rollout(ControlledModel<double>* model, const State<double>& initial,
                       const StateObserver& observer, Stepper* stepper, State<double>* final) {
-  const SimulationSettings& settings = model.structure->settings;
+  const SimulationSettings& settings = model->structure().settings;
   RolloutReport report;
   State<double> state = initial;
   stepper->ClearGuess();
   const long steps = NumSteps(settings);
-  const EnergyWatch watch(model, initial);
+  EnergyWatch watch;
+  if (!model->is_controlled()) watch = EnergyWatch(model->At(0), initial);
   if (observer) {
     observer(0, 0.0, state, nullptr);
   }
   for (long k = 0; k < steps; ++k) {
     const double t = StepTime(settings, k);
-    const StepReport step = Watched(watch, model, state, k, steps,
-                                    stepper->Step(model, t, StepLength(settings, k), &state));
+    const Model<double>& now = model->At(k);
+    const StepReport step = Watched(watch, now, state, k, steps,
+                                    stepper->Step(now, t, StepLength(settings, k), &state));
     report.Add(step);
     if (step.status != StepStatus::kDone) {
       report.status = step.status;
@@ -117,29 +119,41 @@ RolloutReport Rollout(const Model<double>& model, const State<double>& initial,
 }
 
 RolloutReport Rollout(const Model<double>& model, const State<double>& initial,
+                      const StateObserver& observer, Stepper* stepper, State<double>* final) {
+  ControlledModel<double> plain(model);
+  return Rollout(&plain, initial, observer, stepper, final);
+}
+
+RolloutReport Rollout(const Model<double>& model, const State<double>& initial,
                       const StateObserver& observer, State<double>* final) {
   Stepper stepper(model);
   return Rollout(model, initial, observer, &stepper, final);
 }
 
 template <typename T>
-RolloutReport RolloutJets(const Model<T>& model, const State<T>& initial, JetRoute route,
+RolloutReport RolloutJets(ControlledModel<T>* model, const State<T>& initial, JetRoute route,
                           const JetObserver<T>& observer, State<T>* final, long* fallbacks) {
   *fallbacks = 0;
-  Model<double> values{model.structure, {}};
-  for (const T& number : model.parameters) {
-    values.parameters.push_back(ValueOf(number));
-  }
+  Model<double> values{model->At(0).structure, {}};
+  const auto set_values = [&values](const Model<T>& jets) {
+    values.parameters.clear();
+    for (const T& number : jets.parameters) {
+      values.parameters.push_back(ValueOf(number));
+    }
+  };
+  set_values(model->At(0));
   State<T> jets = initial;
   if (observer) {
     observer(0, 0.0, jets);
   }
-  const SimulationSettings& settings = model.structure->settings;
+  const SimulationSettings& settings = model->structure().settings;
   Stepper stepper(values);
   State<double> state = ValuesOf(initial);
   RolloutReport report;
   for (long k = 0; k < NumSteps(settings); ++k) {
     const double t = StepTime(settings, k);
+    const Model<T>& now = model->At(k);
+    if (model->is_controlled()) set_values(now);
     StepReport step = stepper.Step(values, t, StepLength(settings, k), &state);
     report.Add(step);
     if (step.status != StepStatus::kDone) {
@@ -149,13 +163,13 @@ RolloutReport RolloutJets(const Model<T>& model, const State<T>& initial, JetRou
     }
     const State<T> before = jets;
     if (stepper.by_events()) {
-      EventStepInJets(model, values, route, &stepper.events().mutable_record(), &jets);
+      EventStepInJets(now, values, route, &stepper.events().mutable_record(), &jets);
     } else if (route == JetRoute::kImplicit) {
-      StepImplicit(model, &stepper, state, &jets);
-    } else if (!StepUnrolled(model, stepper.record(), &jets)) {
+      StepImplicit(now, &stepper, state, &jets);
+    } else if (!StepUnrolled(now, stepper.record(), &jets)) {
       ++*fallbacks;
       jets = before;
-      StepImplicit(model, &stepper, state, &jets);
+      StepImplicit(now, &stepper, state, &jets);
     }
     if (ValueDifference(jets, state) > kBranchTolerance && settings.smoothing == 0.0) {
       report.status = StepStatus::kUnsolved;
@@ -176,8 +190,9 @@ RolloutReport RolloutJets(const Model<T>& model, const State<T>& initial, JetRou
 }
 
 #define TANGIBLE_INSTANTIATE_JET(N)                                                                \
-  template RolloutReport RolloutJets<Jet<N>>(const Model<Jet<N>>&, const State<Jet<N>>&, JetRoute, \
-                                             const JetObserver<Jet<N>>&, State<Jet<N>>*, long*);
+  template RolloutReport RolloutJets<Jet<N>>(ControlledModel<Jet<N>>*, const State<Jet<N>>&,       \
+                                             JetRoute, const JetObserver<Jet<N>>&, State<Jet<N>>*, \
+                                             long*);
 TANGIBLE_FOR_EACH_JET_WIDTH(TANGIBLE_INSTANTIATE_JET)
 
 }  // namespace tangible

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "tangible/simulation/events/event_jets.h"
+#include "tangible/simulation/stepping/controlled_model.h"
 #include "tangible/simulation/stepping/step.h"
 
 namespace tangible {
@@ -62,6 +63,9 @@ RolloutReport Rollout(const Model<double>& model, const State<double>& initial,
 /// cleared first.
 RolloutReport Rollout(const Model<double>& model, const State<double>& initial,
                       const StateObserver& observer, Stepper* stepper, State<double>* final);
+/// The same of a model with controls.
+RolloutReport Rollout(ControlledModel<double>* model, const State<double>& initial,
+                      const StateObserver& observer, Stepper* stepper, State<double>* final);
 
 template <typename T>
 using JetObserver = std::function<void(long k, double t, const State<T>& state)>;
@@ -71,7 +75,13 @@ using JetObserver = std::function<void(long k, double t, const State<T>& state)>
 /// that differ from the double step's by more than 1e-8 (a different branch) fail the rollout with
 /// a message.
 template <typename T>
-RolloutReport RolloutJets(const Model<T>& model, const State<T>& initial, JetRoute route,
+RolloutReport RolloutJets(ControlledModel<T>* model, const State<T>& initial, JetRoute route,
                           const JetObserver<T>& observer, State<T>* final, long* fallbacks);
+template <typename T>
+RolloutReport RolloutJets(const Model<T>& model, const State<T>& initial, JetRoute route,
+                          const JetObserver<T>& observer, State<T>* final, long* fallbacks) {
+  ControlledModel<T> plain(model);
+  return RolloutJets<T>(&plain, initial, route, observer, final, fallbacks);
+}
 
 }  // namespace tangible

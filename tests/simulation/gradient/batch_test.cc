@@ -70,7 +70,7 @@ TEST_P(BatchTest, RowsHaveTheBitsOfSingleRunsWithAnyNumberOfThreads) {
       BuildModel(scene, &model, &initial);
       const RolloutReport report = Rollout(model, initial, {}, &final);
       const BatchRow& row = batch.rows[static_cast<size_t>(r)];
-      EXPECT_EQ(row.status, BatchStatus::kDone) << row.message;
+      EXPECT_EQ(row.status, RolloutStatus::kDone) << row.message;
       EXPECT_TRUE(row.final == final) << r << " of " << threads << " threads";
       EXPECT_EQ(row.report.factorisations, report.factorisations);
       EXPECT_EQ(row.jacobian.size(), 0);
@@ -142,17 +142,17 @@ TEST(BatchFailureTest, ARowThatFailsStopsNoOther) {
     for (const int threads : {1, 2}) {
       const BatchResult batch = RunBatch(scene, parameters, values, {threads, derivative, {}});
       ASSERT_EQ(batch.rows.size(), 5u);
-      EXPECT_EQ(batch.rows[0].status, BatchStatus::kDone) << batch.rows[0].message;
-      EXPECT_EQ(batch.rows[1].status, BatchStatus::kRefused);
+      EXPECT_EQ(batch.rows[0].status, RolloutStatus::kDone) << batch.rows[0].message;
+      EXPECT_EQ(batch.rows[1].status, RolloutStatus::kRefused);
       EXPECT_EQ(batch.rows[1].message, "bodies/ball/mass: expected a number > 0, got -1.0");
       EXPECT_EQ(batch.rows[1].report.steps, 0);
       EXPECT_EQ(batch.rows[1].final.pose[1], 0.5);
-      EXPECT_EQ(batch.rows[2].status, BatchStatus::kUnsolved);
+      EXPECT_EQ(batch.rows[2].status, RolloutStatus::kUnsolved);
       EXPECT_EQ(batch.rows[2].message.find("step 1"), 0u) << batch.rows[2].message;
       EXPECT_LT(batch.rows[2].report.time, 0.2);
       EXPECT_EQ(batch.rows[2].jacobian.size(), 0);
-      EXPECT_EQ(batch.rows[3].status, BatchStatus::kDone) << batch.rows[3].message;
-      EXPECT_EQ(batch.rows[4].status, BatchStatus::kRefused);
+      EXPECT_EQ(batch.rows[3].status, RolloutStatus::kDone) << batch.rows[3].message;
+      EXPECT_EQ(batch.rows[4].status, RolloutStatus::kRefused);
     }
   }
 }

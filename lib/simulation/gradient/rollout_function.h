@@ -1,0 +1,209 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// A rollout as a pure function, with its products of derivatives, and many of them at once:
+//
+//   f(p, x₀, u) = [x(t_k) for the recorded steps k]
+//
+//   p    parameters of the scene                                  (num_parameters)
+//   x₀   poses and twists of the moving bodies at the start: x, y, angle, vx, vy, omega of each,
+//        in the order of OutputNames; absent: the scene's own     (num_states)
+//   u    controls: forces, torques or efforts of joints that have a value of their own in each
+//        step                                                     (steps x num_controls)
+//   f    a row a recorded step                                    (num_records x num_states)
+//
+//   tangent  ḟ = ∂f/∂p ṗ + ∂f/∂x₀ ẋ₀ + ∂f/∂u u̇                    (rollout_tangent.h)
+//   adjoint  (p̄, x̄₀, ū) = (∂f/∂(p, x₀, u))ᵀ f̄                     (rollout_adjoint.h)
+//
+// Nothing is kept between calls but memory, so that calls nest, chain and run on several threads;
+// an evaluation has the same bits whatever ran before it, and a batch whatever the number of
+// threads.
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "tangible/simulation/certificate/certify.h"
+#include "tangible/simulation/derivatives/rollout_tangent.h"
+#include "tangible/simulation/gradient/gradient.h"
+#include "tangible/simulation/stepping/run_warnings.h"
+
+namespace tangible {
+
+struct RolloutInput {
+  VectorX<double> parameters;
+  VectorX<double> state;  ///< empty: the scene's, as its parameters make it
+  RowMatrixXd controls;
+};
+
+/// One direction in the input, or the adjoint of one: members as those of RolloutInput; `state` is
+/// filled in either case.
+using InputDirection = RolloutInput;
+
+enum class RolloutStatus { kDone, kUnsolved, kDiverged, kRefused };
+
+/// "done", "unsolved", "diverged", "refused".
+const char* NameOf(RolloutStatus status);
+
+struct RolloutOutput {
+  /// kRefused: a parameter may not have that value; nothing was run.
+  RolloutStatus status = RolloutStatus::kDone;
+  std::string message;  ///< empty unless it failed: when, where, what
+  RowMatrixXd states;   ///< rows of steps that were not reached are NaN
+  State<double> final;  ///< of all bodies: the last good state; the start's where nothing was run
+  RolloutReport report;
+};
+
+/// What is computed; nothing of it changes with the input.
+class RolloutFunction {
+ public:
+  /// Resolves paths. `records` are the steps whose states are returned, ascending, 0 the start and
+  /// num_steps() the end; empty: the end. Returns empty or one line: a path that matches nothing, a
+  /// number that two parameters set, a control that is no force, torque or effort or comes from a
+  /// file, settings that the engine lacks, a step beyond the run.
+  std::string Create(const Scene& scene, const std::vector<std::string>& parameters,
+                     const std::vector<std::string>& controls, const std::vector<long>& records);
+
+  const Scene& scene() const { return scene_; }
+  const ModelStructure& structure() const { return *structure_; }
+  int num_parameters() const { return static_cast<int>(parameters_.size()); }
+  int num_controls() const { return static_cast<int>(controls_.size()); }
+  int num_states() const { return static_cast<int>(outputs_.size()); }
+  int num_records() const { return static_cast<int>(records_.size()); }
+  long num_steps() const { return NumSteps(structure_->settings); }
+  const std::vector<long>& records() const { return records_; }
+  std::vector<double> record_times() const;
+  const std::vector<ParameterPath>& parameters() const { return parameters_; }
+  const std::vector<ParameterPath>& controls() const { return controls_; }
+  /// The scene's own values: parameters, the initial state, and controls that are the same in all
+  /// steps.
+  RolloutInput Defaults() const;
+  /// Empty, or how an input's sizes are wrong.
+  std::string CheckSizes(const RolloutInput& input) const;
+
+ private:
+  friend class RolloutWorker;
+  std::string AddControl(const std::string& path);
+
+  Scene scene_;
+  std::shared_ptr<const ModelStructure> structure_;
+  std::vector<ParameterPath> parameters_, controls_;
+  std::vector<ParameterDirection> directions_;
+  std::vector<int> control_numbers_;  ///< of the model: each control's, one after another
+  std::vector<int> control_of_number_;
+  std::vector<long> records_;
+  std::vector<int> outputs_;  ///< pose and twist variables
+};
+
+/// Evaluates one function on one thread; keeps memory from call to call. The function outlives it.
+class RolloutWorker {
+ public:
+  explicit RolloutWorker(const RolloutFunction& function);
+
+  /// Called in each step of runs (not of sweeps back); what it throws ends the run.
+  void SetInterrupt(std::function<void()> check) { interrupt_ = std::move(check); }
+
+  /// The input's sizes are right (CheckSizes).
+  RolloutOutput Run(const RolloutInput& input);
+  /// The same with products of derivatives along directions. `tangents[d]`: num_records x
+  /// num_states.
+  RolloutOutput Tangent(const RolloutInput& input, const std::vector<InputDirection>& directions,
+                        std::vector<RowMatrixXd>* tangents);
+  /// Records a run, and then sweeps back as often as is asked for: one adjoint for each of
+  /// `bars` (num_records x num_states). Until the next call of any other member.
+  RolloutOutput Record(const RolloutInput& input);
+  /// Memory of what Record keeps, bytes.
+  size_t tape_bytes() const { return tape_.bytes(); }
+  std::vector<InputDirection> Adjoint(const std::vector<RowMatrixXd>& bars);
+  enum class Inputs { kParameters, kAll };
+  /// A row an output, num_records num_states in all; columns for parameters or, of all inputs, for
+  /// parameters, initial state, controls (step by step). Auto takes tangent or adjoint, whichever
+  /// needs fewer columns.
+  RolloutOutput Jacobian(const RolloutInput& input, GradientMethod method, Inputs inputs,
+                         RowMatrixXd* jacobian, GradientMethod* used);
+  /// What the end of the last run says of joints, coordinates, energy (run_warnings.h).
+  std::vector<std::string> Warnings(const RolloutReport& report, const State<double>& final) const {
+    return RunWarnings(model_, initial_).Finish(model_, report, final);
+  }
+  /// Of the derivatives with respect to parameters, controls and, where the input has one, the
+  /// initial state; empty where the input is refused.
+  Certificate Certify(const RolloutInput& input);
+
+ private:
+  /// False and a refused output where a value is not allowed.
+  bool Set(const RolloutInput& input, RolloutOutput* output);
+  bool SetParameters(const VectorX<double>& values, RolloutOutput* output);
+  /// Runs with an observer that keeps the recorded states; `run` is a rollout of some kind.
+  using Runner = std::function<RolloutReport(ControlledModel<double>*, const StateObserver&)>;
+  void RunAs(const Runner& run, RolloutOutput* output);
+  const Eigen::SparseMatrix<double>& ParameterJacobian();
+  /// Directions of [poses | twists | parameters]: of parameters and initial states, a column each.
+  RowMatrixXd VariableDirections(const RowMatrixXd& parameters, const RowMatrixXd& states);
+  /// Runs with tangents; `keep` gets the record's index and all columns' derivatives.
+  void RunTangent(const ControlDirections& directions, RowMatrixXd w_dot,
+                  const std::function<void(int record, const RowMatrixXd& w_dot)>& keep,
+                  RolloutOutput* output);
+  /// Sweeps back over the tape; `seed(record, row, ·)` are a state's derivatives of each column.
+  using Bars = std::function<void(int record, RowMatrixXd* bars)>;
+  RowMatrixXd Sweep(int columns, const Bars& bars, const RolloutTape::ControlSink& sink);
+  RowMatrixXd ParameterBars(const RowMatrixXd& w_bar);
+  void JacobianByTangent(RowMatrixXd* jacobian, RolloutOutput* output);
+  void JacobianByAdjoint(RowMatrixXd* jacobian, RolloutOutput* output);
+  void JacobianByJets(JetRoute route, RowMatrixXd* jacobian, RolloutOutput* output);
+  /// Columns [first, first + N); false where the run fails.
+  template <int N>
+  bool JetPass(JetRoute route, Eigen::Index first, RowMatrixXd* jacobian, RolloutOutput* output);
+  void JacobianByDifferences(const RolloutInput& input, RowMatrixXd* jacobian,
+                             RolloutOutput* output);
+
+  const RolloutFunction& f_;
+  Scene scene_;
+  VectorX<double> parameters_;  ///< those that the scene has; empty: half set
+  Model<double> model_;
+  State<double> scene_state_, initial_;
+  Controls controls_;
+  bool own_state_ = false;  ///< the input has an initial state
+  std::optional<Eigen::SparseMatrix<double>> parameter_jacobian_;
+  std::optional<Stepper> stepper_;
+  RolloutTape tape_;
+  std::function<void()> interrupt_;
+};
+
+/// Runs `work(worker, i)` for i in [0, count) on `threads` threads (0: one a core), the caller's
+/// among them, each with a worker of its own. What is thrown ends the work and is passed on.
+void ForEachRollout(const RolloutFunction& function, long count, int threads,
+                    const std::function<void(RolloutWorker* worker, long i)>& work);
+
+/// Many evaluations of one function at once: a row an input.
+class RolloutBatch {
+ public:
+  /// `threads` 0: one a core. The function outlives it.
+  RolloutBatch(const RolloutFunction& function, int threads)
+      : function_(function), threads_(threads) {}
+  void SetInterrupt(std::function<void()> check) { interrupt_ = std::move(check); }
+
+  std::vector<RolloutOutput> Run(const std::vector<RolloutInput>& inputs) const;
+  /// One direction a row.
+  std::vector<RolloutOutput> Tangent(const std::vector<RolloutInput>& inputs,
+                                     const std::vector<InputDirection>& directions,
+                                     std::vector<RowMatrixXd>* tangents) const;
+  /// Runs, and keeps tapes of the first rows as far as `kTapeBudget` goes; the others are run again
+  /// by Adjoint, which may be called often.
+  std::vector<RolloutOutput> Record(std::vector<RolloutInput> inputs);
+  /// One bar a row; of a row that failed all derivatives are NaN.
+  std::vector<InputDirection> Adjoint(const std::vector<RowMatrixXd>& bars);
+  std::vector<Certificate> Certify(const std::vector<RolloutInput>& inputs) const;
+
+  static constexpr size_t kTapeBudget = size_t{512} << 20;  ///< bytes
+
+ private:
+  const RolloutFunction& function_;
+  int threads_;
+  std::function<void()> interrupt_;
+  std::vector<RolloutInput> inputs_;
+  std::vector<RolloutStatus> statuses_;
+  std::vector<std::unique_ptr<RolloutWorker>> tapes_;  ///< null: to be run again
+};
+
+}  // namespace tangible

@@ -1,0 +1,265 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/simulation/gradient/rollout_function.h"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <random>
+
+#include "../../support/gradients.h"
+#include "../../support/scenes.h"
+
+namespace tangible {
+namespace {
+
+using test_scenes::SceneOf;
+
+// A disc that is pushed along a floor and bounces on it, beside a driven pendulum.
+Scene Driven(const std::string& stepping) {
+  return SceneOf(R"({"bodies": [
+      {"name": "disc", "shape": {"circle": {"radius": 0.1}}, "mass": 1.3, "position": [0, 0.14],
+       "velocity": [0.4, 0], "angular_velocity": 1, "friction": 0.3, "restitution": 0.4},
+      {"name": "rod", "shape": {"box": {"size": [0.6, 0.05]}}, "mass": 0.7,
+       "position": [2.3, 1.5]},
+      {"name": "floor", "static": true, "friction": 0.3, "restitution": 0.4,
+       "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}}],
+    "joints": [{"name": "motor", "type": "revolute", "bodies": ["rod", "world"],
+                "anchor": [2, 1.5], "damping": 0.1, "effort": 0.2}],
+    "forces": [{"name": "push", "body": "disc", "force": [0.5, 0.1], "torque": 0.05}],
+    "simulation": {"dt": 0.01, "duration": 0.2, "stepping": ")" +
+                 stepping + R"("}})");
+}
+
+const std::vector<std::string> kParameters = {"bodies/disc/mass", "bodies/*/friction",
+                                              "bodies/disc/position/y", "gravity/y"};
+const std::vector<std::string> kControls = {"forces/push/force/x", "forces/push/torque",
+                                            "joints/motor/effort"};
+
+// Inputs that differ from the scene's in all that they have.
+RolloutInput InputOf(const RolloutFunction& function, unsigned seed) {
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<double> unit(-1.0, 1.0);
+  RolloutInput input = function.Defaults();
+  for (double& x : input.parameters) x *= 1.0 + 0.02 * unit(random);
+  for (double& x : input.state) x += 0.002 * unit(random);
+  // The pendulum stays on its joint: of its state only the disc's is another one.
+  input.state.tail(6) = function.Defaults().state.tail(6);
+  for (Eigen::Index i = 0; i < input.controls.size(); ++i) {
+    input.controls.data()[i] += 0.3 * unit(random);
+  }
+  return input;
+}
+
+RowMatrixXd Random(Eigen::Index rows, Eigen::Index columns, std::mt19937* random) {
+  std::normal_distribution<double> normal;
+  RowMatrixXd values(rows, columns);
+  for (Eigen::Index i = 0; i < values.size(); ++i) values.data()[i] = normal(*random);
+  return values;
+}
+
+class RolloutFunctionTest : public ::testing::TestWithParam<const char*> {
+ protected:
+  void Create(const std::vector<long>& records) {
+    ASSERT_EQ(function_.Create(Driven(GetParam()), kParameters, kControls, records), "");
+  }
+  RolloutFunction function_;
+};
+
+TEST_P(RolloutFunctionTest, DefaultsAreTheScenesRun) {
+  Create({});
+  RolloutWorker worker(function_);
+  RolloutInput input = function_.Defaults();
+  const RolloutOutput with_state = worker.Run(input);
+  input.state.resize(0);
+  const RolloutOutput output = worker.Run(input);
+  ASSERT_EQ(output.status, RolloutStatus::kDone) << output.message;
+  Model<double> model;
+  State<double> state;
+  BuildModel(Driven(GetParam()), &model, &state);
+  Rollout(model, state, {}, &state);
+  EXPECT_EQ(output.final.pose, state.pose);
+  EXPECT_EQ(output.final.twist, state.twist);
+  EXPECT_EQ(output.states(0, 1), state.pose[1]);
+  EXPECT_EQ(output.states(0, 9), state.twist[3]);
+  EXPECT_EQ(with_state.states, output.states);
+}
+
+TEST_P(RolloutFunctionTest, TheFiveMethodsAgree) {
+  if (!testing::HaveJets()) GTEST_SKIP() << "no width of Jets is built";
+  Create({7, 20});
+  RolloutWorker worker(function_);
+  const RolloutInput input = InputOf(function_, 3);
+  EXPECT_EQ(worker.Certify(input).verdict, "trustworthy");
+  RowMatrixXd adjoint;
+  GradientMethod used;
+  const RolloutOutput output = worker.Jacobian(input, GradientMethod::kAdjoint,
+                                               RolloutWorker::Inputs::kAll, &adjoint, &used);
+  ASSERT_EQ(output.status, RolloutStatus::kDone) << output.message;
+  ASSERT_EQ(adjoint.rows(), 2 * 12);
+  ASSERT_EQ(adjoint.cols(), 4 + 12 + 20 * 3);
+  const double size = adjoint.cwiseAbs().maxCoeff();
+  // What acts after a recorded step has no effect on it; what acts before has one.
+  EXPECT_EQ(adjoint.block(0, 16 + 7 * 3, 12, 13 * 3).cwiseAbs().maxCoeff(), 0.0);
+  EXPECT_GT(adjoint.block(0, 16, 12, 7 * 3).cwiseAbs().minCoeff(), -1.0);
+  for (int control = 0; control < 3; ++control) {
+    EXPECT_GT(adjoint.col(16 + 5 * 3 + control).cwiseAbs().maxCoeff(), 1e-4) << control;
+  }
+  const std::pair<GradientMethod, double> others[] = {{GradientMethod::kTangent, 1e-11},
+                                                      {GradientMethod::kJetImplicit, 1e-9},
+                                                      {GradientMethod::kJet, 1e-6},
+                                                      {GradientMethod::kFiniteDifference, 1e-6}};
+  for (const auto& [method, tolerance] : others) {
+    RowMatrixXd other;
+    const RolloutOutput again =
+        worker.Jacobian(input, method, RolloutWorker::Inputs::kAll, &other, &used);
+    ASSERT_EQ(again.status, RolloutStatus::kDone) << again.message;
+    EXPECT_EQ(used, method);
+    EXPECT_LE((again.states - output.states).cwiseAbs().maxCoeff(), 1e-12);
+    EXPECT_LE((other - adjoint).cwiseAbs().maxCoeff(), tolerance * size)
+        << static_cast<int>(method);
+  }
+}
+
+// ⟨f̄, J ẋ⟩ = ⟨Jᵀ f̄, ẋ⟩, with several directions and bars at once, and both agree with J.
+TEST_P(RolloutFunctionTest, ProductsAreThoseOfTheJacobian) {
+  Create({0, 5, 13});
+  RolloutWorker worker(function_);
+  const RolloutInput input = InputOf(function_, 5);
+  std::mt19937 random(11);
+  std::vector<InputDirection> directions(3);
+  std::vector<RowMatrixXd> bars;
+  for (InputDirection& d : directions) {
+    d.parameters = Random(4, 1, &random);
+    d.state = Random(12, 1, &random);
+    d.controls = Random(20, 3, &random);
+    bars.push_back(Random(3, 12, &random));
+  }
+  std::vector<RowMatrixXd> tangents;
+  ASSERT_EQ(worker.Tangent(input, directions, &tangents).status, RolloutStatus::kDone);
+  ASSERT_EQ(worker.Record(input).status, RolloutStatus::kDone);
+  const std::vector<InputDirection> adjoints = worker.Adjoint(bars);
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) {
+      const double forward = (bars[i].array() * tangents[j].array()).sum();
+      const double backward = adjoints[i].parameters.dot(directions[j].parameters) +
+                              adjoints[i].state.dot(directions[j].state) +
+                              (adjoints[i].controls.array() * directions[j].controls.array()).sum();
+      EXPECT_NEAR(forward, backward, 1e-10 * bars[i].norm() * tangents[j].norm());
+      EXPECT_GT(std::abs(forward), 1e-3);
+    }
+  }
+}
+
+TEST_P(RolloutFunctionTest, BitsDependNeitherOnThreadsNorOnWhatRanBefore) {
+  Create({});
+  constexpr long kCount = 12;
+  const auto run = [&](int threads) {
+    std::vector<RowMatrixXd> finals(kCount);
+    std::vector<InputDirection> adjoints(kCount);
+    ForEachRollout(function_, kCount, threads, [&](RolloutWorker* worker, long i) {
+      const RolloutOutput output = worker->Record(InputOf(function_, static_cast<unsigned>(i)));
+      finals[i] = output.states;
+      adjoints[i] = worker->Adjoint({RowMatrixXd::Ones(1, 12)})[0];
+    });
+    return std::make_pair(finals, adjoints);
+  };
+  const auto one = run(1);
+  const auto three = run(3);
+  for (long i = 0; i < kCount; ++i) {
+    EXPECT_EQ(one.first[i], three.first[i]);
+    EXPECT_EQ(one.second[i].parameters, three.second[i].parameters);
+    EXPECT_EQ(one.second[i].controls, three.second[i].controls);
+  }
+  RolloutWorker fresh(function_);
+  EXPECT_EQ(fresh.Run(InputOf(function_, 11)).states, one.first[11]);
+}
+
+// A row that is refused keeps none of the others from their derivatives.
+TEST_P(RolloutFunctionTest, ABatchIsItsRows) {
+  Create({});
+  std::vector<RolloutInput> inputs;
+  std::vector<InputDirection> directions;
+  for (unsigned i = 0; i < 5; ++i) {
+    inputs.push_back(InputOf(function_, i));
+    directions.push_back(InputOf(function_, 100 + i));
+  }
+  inputs[2].parameters[0] = -1.0;
+  RolloutBatch batch(function_, 2);
+  const std::vector<RowMatrixXd> bars(5, RowMatrixXd::Ones(1, 12));
+  const std::vector<RolloutOutput> runs = batch.Run(inputs);
+  const std::vector<RolloutOutput> recorded = batch.Record(inputs);
+  const std::vector<InputDirection> adjoints = batch.Adjoint(bars);
+  std::vector<RowMatrixXd> tangents;
+  batch.Tangent(inputs, directions, &tangents);
+  RolloutWorker worker(function_);
+  for (int i = 0; i < 5; ++i) {
+    if (i == 2) {
+      EXPECT_EQ(recorded[i].status, RolloutStatus::kRefused);
+      EXPECT_TRUE(std::isnan(recorded[i].states(0, 0)));
+      EXPECT_TRUE(std::isnan(adjoints[i].parameters[0]) && std::isnan(tangents[i](0, 0)));
+      continue;
+    }
+    EXPECT_EQ(recorded[i].states, runs[i].states);
+    worker.Record(inputs[i]);
+    const InputDirection alone = worker.Adjoint({bars[i]})[0];
+    EXPECT_EQ(adjoints[i].parameters, alone.parameters);
+    EXPECT_EQ(adjoints[i].state, alone.state);
+    EXPECT_EQ(adjoints[i].controls, alone.controls);
+    std::vector<RowMatrixXd> one;
+    worker.Tangent(inputs[i], {directions[i]}, &one);
+    EXPECT_EQ(tangents[i], one[0]);
+  }
+}
+
+TEST_P(RolloutFunctionTest, AnInterruptEndsTheRun) {
+  Create({});
+  struct Interrupted {};
+  RolloutBatch batch(function_, 2);
+  std::atomic<int> steps{0};
+  batch.SetInterrupt([&] {
+    if (++steps > 30) throw Interrupted();
+  });
+  EXPECT_THROW(batch.Run(std::vector<RolloutInput>(50, InputOf(function_, 1))), Interrupted);
+  EXPECT_LT(steps, 100);
+}
+
+INSTANTIATE_TEST_SUITE_P(Stepping, RolloutFunctionTest, ::testing::Values("fixed", "event"));
+
+TEST(RolloutFunctionErrorsTest, OneLineEach) {
+  RolloutFunction function;
+  const Scene scene = Driven("fixed");
+  const auto error = [&](const std::vector<std::string>& parameters,
+                         const std::vector<std::string>& controls,
+                         const std::vector<long>& records = {}) {
+    return function.Create(scene, parameters, controls, records);
+  };
+  EXPECT_NE(error({"bodies/disk/mass"}, {}).find("matches no number"), std::string::npos);
+  EXPECT_EQ(error({}, {"bodies/disc/mass"}),
+            "control bodies/disc/mass: expected forces/NAME/force/x, forces/NAME/force/y, "
+            "forces/NAME/torque or joints/NAME/effort, got bodies/disc/mass");
+  EXPECT_NE(error({"forces/push/force/x"}, {"forces/push/force/x"}), "");
+  EXPECT_EQ(error({}, {}, {3, 3}), "records: expected ascending steps from 0 to 20, got 3");
+  EXPECT_EQ(error({}, {}, {21}), "records: expected ascending steps from 0 to 20, got 21");
+  ASSERT_EQ(error(kParameters, kControls), "");
+  RolloutInput input = function.Defaults();
+  EXPECT_EQ(function.CheckSizes(input), "");
+  input.controls.resize(19, 3);
+  EXPECT_EQ(function.CheckSizes(input), "controls: expected shape (20, 3), got (19, 3)");
+  input = function.Defaults();
+  input.parameters[0] = -1.0;
+  RolloutWorker worker(function);
+  const RolloutOutput refused = worker.Run(input);
+  EXPECT_EQ(refused.status, RolloutStatus::kRefused);
+  EXPECT_EQ(refused.message, "bodies/disc/mass: expected a number > 0, got -1.0");
+  // The next call is not affected.
+  input = function.Defaults();
+  const RolloutOutput good = worker.Run(input);
+  EXPECT_EQ(good.status, RolloutStatus::kDone);
+  RolloutWorker fresh(function);
+  EXPECT_EQ(fresh.Run(input).states, good.states);
+  input.controls(3, 1) = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(worker.Run(input).message, "controls: expected finite numbers");
+}
+
+}  // namespace
+}  // namespace tangible
