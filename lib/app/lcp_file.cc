@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "tangible/app/program.h"
+#include "tangible/app/tolerances.h"
 
 namespace tangible {
 namespace {
@@ -98,7 +99,7 @@ class ProblemReader {
     Index row = 0;
     Index col = 0;
     const double difference = (M - M.transpose()).cwiseAbs().maxCoeff(&row, &col);
-    if (difference <= 1e-9 * M.cwiseAbs().maxCoeff()) return;
+    if (difference <= kSymmetric * M.cwiseAbs().maxCoeff()) return;
     root_.At("M")
         .At(static_cast<int>(row))
         .At(static_cast<int>(col))
@@ -126,7 +127,7 @@ class ProblemReader {
     basis = scale.asDiagonal() * basis;
     const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(basis.transpose() * problem.M * basis);
     const double rounding =
-        1e-15 * static_cast<double>(n) * eigen.eigenvalues().cwiseAbs().maxCoeff();
+        kDefiniteRounding * static_cast<double>(n) * eigen.eigenvalues().cwiseAbs().maxCoeff();
     if (eigen.eigenvalues()[0] > rounding) return;
     const VectorXd v = (basis * eigen.eigenvectors().col(0)).normalized();
     root_.At("M").Fail("expected a matrix that is positive definite where A v = 0, got v' M v = " +

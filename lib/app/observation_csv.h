@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "tangible/dynamics/model/model.h"
+#include "tangible/dynamics/model/tolerances.h"
 
 namespace tangible {
 
@@ -51,7 +52,7 @@ class ObservationCsv {
   void Write(double time, const State<double>& before, double part, const State<double>& after);
   double Normal();
   /// A sample this near to a step is that step's: decimal times miss it by rounding.
-  double Near() const { return 1e-9 * dt_; }
+  double Near() const { return kSameTime * dt_; }
 
   ObserveOptions options_;
   double duration_;

@@ -11,10 +11,11 @@
 #include "tangible/app/program.h"
 #include "tangible/lcp/dense/derivative.h"
 #include "tangible/lcp/dense/solver.h"
+#include "tangible/lcp/dense/tolerances.h"
 #include "tangible/scene/json_writer.h"
 
 DEFINE_string(solver, "auto", "auto, interior_point or lemke");
-DEFINE_double(tolerance, 1e-10, "largest scaled residual of a solution");
+DEFINE_double(tolerance, tangible::kLcpTolerance, "largest scaled residual of a solution");
 DEFINE_int32(max_iterations, 100, "of each interior-point run");
 DEFINE_string(out, "", "file of the result; empty: stdout");
 

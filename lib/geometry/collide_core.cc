@@ -4,16 +4,12 @@
 #include <cmath>
 #include <limits>
 
+#include "tangible/geometry/tolerances.h"
+
 namespace tangible::internal {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
-/// Ends of two faces closer than this fraction of the faces count as one above the other. A stack
-/// of equal boxes is thus not at the mercy of rounding: the same features come step after step.
-constexpr double kAligned = 1e-9;
-/// The same of a face whose neighbour is longer, as a share of its own length.
-constexpr double kBeyondEnd = 1e3 * kAligned;
 
 /// How far apart two faces' ends may be along them, m. A power of two: where features change, and
 /// what a run makes of it, must not depend on the faces' lengths, whose derivative would be
@@ -166,8 +162,8 @@ void NearestOverEdges(const Sides& sides, double* distance, FaceQuery* nearest) 
       const Vector2<double> point = sides.incident.VertexAt(j);
       const double height = edge.Height(point);
       // Behind an edge by no more than rounding: else the vertex is near another one.
-      if (height >= -kRounding * edge.length && height < *distance &&
-          IsOver(edge, point, kRounding)) {
+      if (height >= -kLengthRounding * edge.length && height < *distance &&
+          IsOver(edge, point, kLengthRounding)) {
         *distance = height;
         *nearest = {i, j, height, edge};
       }
@@ -218,7 +214,7 @@ int CollideNearest(const ConvexCore& a, const ConvexCore& b, double max_gap,
   const double vertex_distance = vertices.gap + a.Radius() + b.Radius();
   // No edge at all: distances that overflow.
   const bool has_edge = query_a.edge >= 0 || query_b.edge >= 0;
-  if (!has_edge || !(distance <= vertex_distance * (1.0 + kRounding))) {
+  if (!has_edge || !(distance <= vertex_distance * (1.0 + kLengthRounding))) {
     return WriteCandidates(&vertices, 1, max_gap, features);
   }
   const Sides sides = query_b.edge >= 0 ? Sides{b, a, false} : Sides{a, b, true};
@@ -275,14 +271,15 @@ int CollideCores(const ConvexCore& a, const ConvexCore& b, double max_gap,
   // The deepest vertex over the face of largest separation is the nearest pair, or the least way
   // out.
   const double length = reference.line.length + incident.line.length;
-  bool is_face_contact = IsOver(reference.line, sides.incident.VertexAt(query.vertex), kRounding);
+  bool is_face_contact =
+      IsOver(reference.line, sides.incident.VertexAt(query.vertex), kLengthRounding);
   // Parallel faces: rounding may have chosen a vertex beside the overlap, whose ends are as near.
   for (int i = 0; i < ends.count && !is_face_contact; ++i) {
     is_face_contact =
-        ends.candidates[i].gap <= query.separation - sides.Radii() + kRounding * length;
+        ends.candidates[i].gap <= query.separation - sides.Radii() + kLengthRounding * length;
   }
   // In penetration the least way out is through a face.
-  if (is_face_contact || query.separation < -kRounding * length) {
+  if (is_face_contact || query.separation < -kLengthRounding * length) {
     return CollideFaces(sides, query, reference, ends, max_gap, features);
   }
   return CollideNearest(a, b, max_gap, features);

@@ -1,13 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tangible/geometry/collide_core.h"
+#include "tangible/geometry/tolerances.h"
 
 namespace tangible::internal {
-namespace {
-
-/// An edge shorter than this share of its neighbour is a tip.
-constexpr double kTip = 1e-3;
-
-}  // namespace
 
 int CollideHalfPlane(const ConvexCore& core, const Vector2<double>& normal, double offset,
                      PlaneSide side, double max_gap, ContactFeature features[2]) {

@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tangible/geometry/convex_core.h"
 
+#include "tangible/geometry/tolerances.h"
+
 namespace tangible::internal {
 namespace {
 
 /// Whether an edge continues a face in the same direction, or has no length.
 bool Continues(const ConvexCore& core, const CoreEdge& face, int edge) {
   const CoreEdge next = core.Edge(edge);
-  return std::abs(Cross(face.tangent, next.tangent)) <= kRounding &&
+  return std::abs(Cross(face.tangent, next.tangent)) <= kLengthRounding &&
          face.tangent.dot(next.tangent) >= 0.0;
 }
 

@@ -14,9 +14,6 @@
 
 namespace tangible::internal {
 
-/// Lengths below this fraction of the faces at hand are rounding.
-inline constexpr double kRounding = 1e-12;
-
 /// An edge from `start`, along the unit vector `tangent`; all zero where it has no length.
 struct CoreEdge {
   Vector2<double> start{0.0, 0.0};

@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "tangible/render/html.h"
+#include "tangible/render/tolerances.h"
 
 namespace tangible {
 namespace {
@@ -61,9 +62,9 @@ struct Axis {
     }
     // Values that differ by rounding alone are one value, not a picture of rounding.
     const double magnitude = std::max(std::abs(low), std::abs(high));
-    const double pad = high - low > 1e-12 * magnitude ? fraction * (high - low)
-                       : magnitude > 0.0              ? 0.1 * magnitude
-                                                      : 1.0;
+    const double pad = high - low > kOneValue * magnitude ? fraction * (high - low)
+                       : magnitude > 0.0                  ? 0.1 * magnitude
+                                                          : 1.0;
     low -= pad;
     high += pad;
   }
@@ -201,10 +202,10 @@ Axis AxisOf(const std::vector<PlotSeries>& series, const PlotOptions& options,
 
 /// Tick labels with the digits that tell neighbours apart, and no more.
 std::string TickLabel(double tick, double step) {
-  if (std::abs(tick) < 1e-9 * step) {
+  if (std::abs(tick) < kTickRounding * step) {
     return "0";
   }
-  const double digits = std::ceil(std::log10(std::abs(tick) / step) + 1e-9) + 1.0;
+  const double digits = std::ceil(std::log10(std::abs(tick) / step) + kTickRounding) + 1.0;
   std::string label = CompactNumber(tick, static_cast<int>(std::clamp(digits, 1.0, 12.0)));
   const std::size_t exponent = label.find('e');  // 1e+04 is written 1e4
   if (exponent == std::string::npos) {

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "tangible/render/plot.h"
+#include "tangible/render/tolerances.h"
 
 namespace tangible {
 namespace {
@@ -13,12 +14,12 @@ std::vector<double> LinearTicks(double low, double high, int count) {
   double step = 10.0 * power;
   for (const double factor : {5.0, 2.0, 1.0}) {
     // Rounding of the quotient must not turn 0.2 into 0.5.
-    if (factor * power >= raw * (1.0 - 1e-9)) {
+    if (factor * power >= raw * (1.0 - kTickRounding)) {
       step = factor * power;
     }
   }
   std::vector<double> ticks;
-  const double slack = 1e-9 * (high - low);
+  const double slack = kTickRounding * (high - low);
   // Counted from the first multiple, so that a step below the spacing of doubles at `low` still
   // ends.
   const double first = std::ceil((low - slack) / step);
@@ -29,10 +30,12 @@ std::vector<double> LinearTicks(double low, double high, int count) {
 }
 
 std::vector<double> LogarithmicTicks(double low, double high, int count) {
-  const int first = static_cast<int>(std::floor(std::log10(low) + 1e-9));
-  const int last = static_cast<int>(std::ceil(std::log10(high) - 1e-9));
+  const int first = static_cast<int>(std::floor(std::log10(low) + kTickRounding));
+  const int last = static_cast<int>(std::ceil(std::log10(high) - kTickRounding));
   const int stride = std::max(1, (last - first + count - 1) / count);
-  const auto inside = [&](double x) { return x >= low * (1.0 - 1e-9) && x <= high * (1.0 + 1e-9); };
+  const auto inside = [&](double x) {
+    return x >= low * (1.0 - kTickRounding) && x <= high * (1.0 + kTickRounding);
+  };
   std::vector<double> powers;
   std::vector<double> finer;
   for (int exponent = first; exponent <= last; ++exponent) {

@@ -8,6 +8,7 @@
 
 #include "tangible/math/planar.h"
 #include "tangible/scene/scene_names.h"
+#include "tangible/scene/tolerances.h"
 
 namespace tangible {
 namespace {
@@ -43,11 +44,9 @@ double DoubleArea(const Points& points) {
 // A polygon is convex and counter-clockwise if every corner turns left and all turns add up to one
 // full turn (a pentagram's add up to two). Linear in the vertices.
 void CheckPolygon(const JsonReader& vertices, const std::vector<double>& numbers) {
-  // Corners that turn by less than rounding can tell from a straight line.
-  constexpr double kStraight = 1e-12;
   const Points points = Scaled(numbers);
   const std::size_t size = points.size();
-  if (DoubleArea(points) < -kStraight) {
+  if (DoubleArea(points) < -kStraightCorner) {
     return vertices.Fail("expected counter-clockwise vertices, got clockwise ones");
   }
   double turn = 0.0;
@@ -55,7 +54,7 @@ void CheckPolygon(const JsonReader& vertices, const std::vector<double>& numbers
     const Vector2<double> in = points[i] - points[(i + size - 1) % size];
     const Vector2<double> out = points[(i + 1) % size] - points[i];
     const double sine = Cross(in, out);
-    const double bound = kStraight * in.norm() * out.norm();
+    const double bound = kStraightCorner * in.norm() * out.norm();
     const JsonReader corner = vertices.At(static_cast<int>(i));
     if (in.norm() == 0.0 || out.norm() == 0.0) {
       const JsonReader second = in.norm() == 0.0 ? corner : vertices.At(static_cast<int>(i + 1));
@@ -141,7 +140,6 @@ void ReadShape(const JsonReader& reader, BasicShape<double>* shape) {
 
 bool IsCentred(const BasicShape<double>& shape) {
   if (shape.type != ShapeType::kPolygon) return true;
-  constexpr double kTolerance = 1e-9;
   // The centroid relative to the first vertex, and that vertex relative to the origin.
   const Points points = Scaled(shape.numbers);
   Vector2<double> moment(0.0, 0.0);
@@ -154,7 +152,7 @@ bool IsCentred(const BasicShape<double>& shape) {
   }
   const Vector2<double> centroid = moment / (3.0 * DoubleArea(points));
   const Vector2<double> first(shape.numbers[0] / extent, shape.numbers[1] / extent);
-  return (first + centroid).norm() <= kTolerance;
+  return (first + centroid).norm() <= kCentred;
 }
 
 }  // namespace tangible

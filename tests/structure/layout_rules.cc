@@ -4,7 +4,9 @@
 #include <algorithm>
 #include <cctype>
 #include <cstddef>
+#include <iterator>
 #include <map>
+#include <regex>
 #include <set>
 #include <sstream>
 
@@ -228,22 +230,54 @@ std::string WrongComment(const CommentLine& before, const CommentLine& line,
   return "";
 }
 
-/// Whether a line of a module whose tolerances have a header has one elsewhere: a number with a
-/// negative exponent.
-bool HasTolerance(const std::string& path, const std::string& line) {
-  if (!StartsWith(path, "lib/lcp/") || EndsWith(path, "/tolerances.h")) {
-    return false;
-  }
-  const std::string code = line.substr(0, line.find("//"));
-  for (std::size_t at = code.find("e-"); at != std::string::npos; at = code.find("e-", at + 1)) {
-    const auto is_digit = [&](std::size_t i) {
-      return i < code.size() && std::isdigit(static_cast<unsigned char>(code[i])) != 0;
-    };
-    if (at > 0 && is_digit(at - 1) && is_digit(at + 2)) {
-      return true;
+/// A number of lib that looks like a tolerance and is none.
+struct NoTolerance {
+  const char* path;
+  const char* text;  // in its line
+};
+constexpr NoTolerance kNoTolerances[] = {
+    // Defaults of the file format, which lib/scene/README.md lists.
+    {"lib/scene/scene.h", "double joint_tolerance ="},
+    {"lib/scene/scene.h", "double restitution_threshold ="},
+    {"lib/scene/scene.h", "double contact_margin ="},
+    {"lib/scene/scene.h", "double lcp_tolerance ="},
+    // What Eigen asks of a scalar.
+    {"lib/math/dual.h", "static Real dummy_precision()"},
+    {"lib/math/dual.h", "static Real epsilon()"},
+};
+
+/// The code of a line, without what stands in quotes and comments.
+std::string CodeOf(const std::string& line) {
+  std::string code;
+  char quote = 0;
+  for (std::size_t i = 0; i < line.size(); ++i) {
+    if (quote == 0 && line.compare(i, 2, "//") == 0) {
+      break;
+    }
+    if (quote != 0 && line[i] == '\\') {
+      ++i;
+    } else if (line[i] == '"') {
+      quote = quote == 0 ? '"' : 0;
+    } else if (quote == 0) {
+      code += line[i];
     }
   }
-  return false;
+  return code;
+}
+
+/// Whether a line of lib has a tolerance outside of a tolerances.h: a number with a negative
+/// exponent, the unit of rounding, or a constant that calls itself a tolerance.
+bool HasTolerance(const std::string& path, const std::string& line) {
+  if (!StartsWith(path, "lib/") || EndsWith(path, "/tolerances.h") ||
+      std::any_of(std::begin(kNoTolerances), std::end(kNoTolerances), [&](const NoTolerance& none) {
+        return path == none.path && Contains(line, none.text);
+      })) {
+    return false;
+  }
+  static const std::regex kTolerance(
+      "[0-9.]e-[0-9]|numeric_limits<double>::epsilon\\(\\)|DBL_EPSILON|"
+      "constexpr double k\\w*(Rounding|Tolerance)\\w* *=");
+  return std::regex_search(CodeOf(line), kTolerance);
 }
 
 }  // namespace
@@ -314,6 +348,12 @@ std::vector<std::string> UndocumentedTolerances(const std::string& header,
     value.erase(
         std::remove_if(value.begin(), value.end(), [](char c) { return c == '{' || c == '}'; }),
         value.end());
+    // The table says ε for it.
+    const std::string unit = "std::numeric_limits<double>::epsilon()";
+    for (std::size_t at = value.find(unit); at != std::string::npos; at = value.find(unit)) {
+      const std::size_t start_of_unit = at >= 2 && value[at - 2] == '*' ? at - 2 : at;
+      value.replace(start_of_unit, at - start_of_unit + unit.size(), "ε");
+    }
     if (!Contains(readme, "| `" + name + "` | " + value + " |")) {
       missing.push_back(name);
     }

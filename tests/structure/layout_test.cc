@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <map>
 #include <set>
 #include <sstream>
@@ -161,11 +162,25 @@ TEST(LayoutRules, EquationsInCommentsAreNotWrapped) {
 TEST(LayoutRules, TolerancesHaveAHeaderAndATable) {
   EXPECT_EQ(NumProblems("lib/lcp/dense/a.cc", "if (x < 1e-9) {}\n"), 1U);
   EXPECT_EQ(NumProblems("lib/lcp/dense/a.cc", "if (x < 1e9) {}  // not 1e-9\n"), 0U);
+  EXPECT_EQ(NumProblems("lib/geometry/a.cc", "if (x < 1.5e-9) {}\n"), 1U);
+  EXPECT_EQ(NumProblems("lib/app/a.cc", "Print(\"a \\\"--tolerance=1e-9\"); // 1e-9\n"), 0U);
+  EXPECT_EQ(NumProblems("lib/app/a.cc", "Print(\"a\", 1e-9);\n"), 1U);
+  EXPECT_EQ(NumProblems("lib/dynamics/a.cc", "x = 4.0 * std::numeric_limits<double>::epsilon();\n"),
+            1U);
+  EXPECT_EQ(NumProblems("lib/dynamics/a.cc", "constexpr double kFarTolerance = 0.01;\n"), 1U);
+  EXPECT_EQ(NumProblems("lib/scene/scene.h", "double contact_margin = 1e-4;\n"), 0U);
+  EXPECT_EQ(NumProblems("lib/scene/scene.cc", "double contact_margin = 1e-4;\n"), 1U);
+  EXPECT_EQ(NumProblems("verification/a.cc", "if (x < 1e-9) {}\n"), 0U);
   EXPECT_EQ(NumProblems("lib/lcp/dense/tolerances.h", "inline constexpr double kA = 1e-9;\n"), 0U);
   const std::string header =
       "inline constexpr double kA = 1e-9;\n"
       "inline constexpr double kB[] = {1e-6, 1e-9};\n";
   EXPECT_TRUE(UndocumentedTolerances(header, "| `kA` | 1e-9 |\n| `kB` | 1e-6, 1e-9 |\n").empty());
+  EXPECT_TRUE(UndocumentedTolerances(
+                  "inline constexpr double kA = 4.0 * std::numeric_limits<double>::epsilon();\n"
+                  "inline constexpr double kB = std::numeric_limits<double>::epsilon();\n",
+                  "| `kA` | 4.0 ε |\n| `kB` | ε |\n")
+                  .empty());
   EXPECT_EQ(UndocumentedTolerances(header, "| `kA` | 1e-8 |\n| `kB` | 1e-6, 1e-9 |\n"),
             (std::vector<std::string>{"kA"}));
 }
@@ -210,15 +225,21 @@ TEST(Layout, EverySource) {
 }
 
 TEST(Layout, EveryToleranceStandsInTheTable) {
-  const std::string readme = ReadText(kTop / "lib/lcp/README.md");
-  for (const char* folder : {"dense", "system", "contact"}) {
-    const std::string header = ReadText(kTop / "lib/lcp" / folder / "tolerances.h");
-    ASSERT_NE(header.find("inline constexpr double"), std::string::npos) << folder;
-    for (const std::string& name : UndocumentedTolerances(header, readme)) {
-      ADD_FAILURE() << name << " of lib/lcp/" << folder
-                    << "/tolerances.h has no row with its value in lib/lcp/README.md";
+  int headers = 0;
+  for (const fs::path& path : Files({".h"})) {
+    const fs::path relative = path.lexically_relative(kTop);
+    if (relative.filename() != "tolerances.h" || *relative.begin() != "lib") {
+      continue;
+    }
+    ++headers;
+    const fs::path table = fs::path("lib") / *std::next(relative.begin()) / "README.md";
+    const std::string header = ReadText(path);
+    ASSERT_NE(header.find("inline constexpr double"), std::string::npos) << relative;
+    for (const std::string& name : UndocumentedTolerances(header, ReadText(kTop / table))) {
+      ADD_FAILURE() << name << " of " << relative << " has no row with its value in " << table;
     }
   }
+  EXPECT_GE(headers, 10);
 }
 
 TEST(Layout, TheIndexOfEquations) {

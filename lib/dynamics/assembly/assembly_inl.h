@@ -10,6 +10,7 @@
 
 #include "tangible/dynamics/assembly/assembly.h"
 #include "tangible/dynamics/assembly/equations_inl.h"
+#include "tangible/dynamics/model/tolerances.h"
 #include "tangible/math/scratch.h"
 
 namespace tangible {
@@ -34,13 +35,12 @@ T PrescribedSpeed(const ModelStructure& structure, const State<T>& state, int a,
 // Rounding of a gap: a few units in the last place of the positions it is the difference of, m.
 template <typename T>
 double PositionRounding(const State<T>& state, int a, int b) {
-  constexpr double kUnits = 4.0 * std::numeric_limits<double>::epsilon();
   double size = 0.0;
   for (int i = 0; i < 2; ++i) {
     size = std::max(
         {size, std::abs(ValueOf(state.pose[3 * a + i])), std::abs(ValueOf(state.pose[3 * b + i]))});
   }
-  return kUnits * size;
+  return kCornerRounding * size;
 }
 
 /// The builder of equations_inl.h that stores the elements in a contact problem.

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <limits>
 
+#include "tangible/dynamics/model/tolerances.h"
+
 namespace tangible {
 namespace {
 
@@ -72,14 +74,14 @@ bool ContactSearch::CheckBounds(const Model<double>& model, const std::vector<do
       continue;
     }
     const double rate = CoordinateRate(joint, scratch.joints[j], twist.data());
-    if (rate > limit_bound_[j] * (1.0 + 1e-12)) {
+    if (rate > limit_bound_[j] * (1.0 + kSpeedBound)) {
       exceeded = true;
       limit_bound_[j] = 1.5 * rate;
     }
   }
   for (const int body : model.structure->moving) {
     const double speed = SpeedOf(&twist[3 * body], lengths_.radius(body));
-    if (speed > bound_[body] * (1.0 + 1e-12) &&
+    if (speed > bound_[body] * (1.0 + kSpeedBound) &&
         model.structure->bodies[body].shape != ShapeType::kNone) {
       exceeded = true;
       bound_[body] = 1.5 * speed;  // with room, so that few searches are repeated
@@ -121,14 +123,13 @@ void ContactSearch::FindLimits(const Model<double>& model, double h,
 ContactsAhead ContactSearch::FindPassed(const Model<double>& model, const State<double>& state,
                                         const ActiveContact& contact, double approach,
                                         double h) const {
-  constexpr double kNone = 1e-9;  // of the bodies' speeds, and of the smaller one's size
   const double rounding = lengths_.Rounding(state, contact.a, contact.b);
-  const double slow = kNone * (bound_[contact.a] + bound_[contact.b]) + rounding / h;
+  const double slow = kNoApproach * (bound_[contact.a] + bound_[contact.b]) + rounding / h;
   const double size = std::min(lengths_.radius(contact.a), lengths_.radius(contact.b));
   if (!(approach < -slow) || size == 0.0) {
     return ContactsAhead();
   }
-  const double none = kNone * size + rounding;
+  const double none = kNoApproach * size + rounding;
   if (contact.gap < -none) {
     return ContactsAhead();
   }

@@ -5,12 +5,10 @@
 #include <cmath>
 #include <limits>
 
+#include "tangible/dynamics/model/tolerances.h"
+
 namespace tangible {
 namespace {
-
-// How far beyond the meeting of two corners the features are those of what follows, as a share of
-// the smaller body: above what ends of faces may be apart, below what anything else is.
-constexpr double kBeyond = 1e-6;
 
 Pose<double> Moved(const State<double>& state, int body, double time) {
   const double* pose = &state.pose[3 * body];
@@ -25,7 +23,7 @@ ContactsAhead FindContactsAhead(const Model<double>& model, const State<double>&
                                 const ActiveContact& contact, double approach, double size,
                                 double tolerance, double slow) {
   ContactsAhead ahead;
-  const double time = (std::max(contact.gap, 0.0) + kBeyond * size) / -approach;
+  const double time = (std::max(contact.gap, 0.0) + kCorner * size) / -approach;
   const int a = contact.a;
   const int b = contact.b;
   ContactFeature features[2];

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tangible/dynamics/elements/force_inl.h"
+#include "tangible/dynamics/model/tolerances.h"
 
 namespace tangible {
 namespace internal {
@@ -19,7 +20,7 @@ double SignalValue(const Signal& signal, const std::vector<double>& column, doub
 }
 
 double Inside(double x, double low, double high) {
-  const double near = 1e-9 * (high - low);
+  const double near = kSameTime * (high - low);
   return x < low - near || x > high + near ? 0.0 : x < low + near || x > high - near ? 0.5 : 1.0;
 }
 

@@ -16,8 +16,8 @@ namespace internal {
 double SignalValue(const Signal& signal, const std::vector<double>& column, double time);
 
 /// 1 inside, 1/2 at an end, 0 outside: the derivative of an overlap with respect to an end of the
-/// window. An end of the step is k dt rounded, so times within 1e-9 of a step from it are at it, in
-/// both steps that share it.
+/// window. An end of the step is k dt rounded, so times within kSameTime of a step from it are at
+/// it, in both steps that share it.
 double Inside(double x, double low, double high);
 
 }  // namespace internal

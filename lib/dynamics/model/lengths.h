@@ -19,16 +19,9 @@
 #include <vector>
 
 #include "tangible/dynamics/model/model.h"
+#include "tangible/dynamics/model/tolerances.h"
 
 namespace tangible {
-
-/// ρ / x.
-inline constexpr double kCoordinateRounding = 64.0 * std::numeric_limits<double>::epsilon();
-/// Of the size: a gap below this touches. A power of ten between rounding and what a gap is located
-/// to on one side, and what moves a body visibly on the other.
-inline constexpr double kTouchShare = 1e-10;
-/// rad; the same of an angle.
-inline constexpr double kTouchAngle = 1e-10;
 
 /// max(|x|, |y|) over two bodies, m.
 template <typename T>

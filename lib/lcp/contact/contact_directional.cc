@@ -13,9 +13,6 @@ namespace {
 
 using Kind = ContactKink::Kind;
 
-// Impulses' rates that exceed what drives them by more than this are δ's answer to a contradiction.
-constexpr double kContradiction = 1e6;
-
 RowPart<double> Scaled(double factor, const RowPart<double>& row) {
   return {factor * row[0], factor * row[1], factor * row[2]};
 }
@@ -239,7 +236,7 @@ bool ContactDirectional::Contradicts(const std::vector<double>& rhs,
                                       std::max(std::abs(x[3 * block]), std::abs(x[3 * block + 1])));
     }
   }
-  return !(impulse <= kContradiction * driven);
+  return !(impulse <= kContradictingRate * driven);
 }
 
 VectorX<double> ContactDirectional::Constants(const std::vector<double>& r,

@@ -9,9 +9,6 @@
 namespace tangible {
 namespace {
 
-// A contact that rests at the limit of friction slides at speeds of either sign, of the size of its
-// rounding: there it keeps its mode, within this fraction of the residual asked for.
-constexpr double kSlipOfTolerance = 0.3;
 constexpr double kMaxExtrapolation = 1e6;
 
 }  // namespace

@@ -22,6 +22,11 @@ inline constexpr double kLeastRegularisation = 1e-8;
 inline constexpr double kBeyondLimit = 1e-6;
 /// Of the terms: constants and entries of the one-sided LCP below it are rounding.
 inline constexpr double kDirectionRounding = 1e-13;
+/// Of the residual asked for: a contact that rests at the limit of friction slides at speeds of
+/// either sign, of the size of its rounding: within this it keeps its mode.
+inline constexpr double kSlipOfTolerance = 0.3;
+/// Of what drives them: rates of impulses that exceed it are δ's answer to a contradiction.
+inline constexpr double kContradictingRate = 1e6;
 /// Of mean z s / κ of the interior point: goal where no polish follows (unrolled derivatives).
 inline constexpr double kContactComplementarity = 1e-14;
 /// Of mean z s / κ: an interior point that ends above it has not arrived, and going on does not

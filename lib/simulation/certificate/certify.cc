@@ -10,7 +10,9 @@
 #include "tangible/simulation/certificate/certify_place_inl.h"
 #include "tangible/simulation/certificate/duality.h"
 #include "tangible/simulation/certificate/feature_ties.h"
+#include "tangible/simulation/certificate/tolerances.h"
 #include "tangible/simulation/derivatives/rollout_directional.h"
+#include "tangible/simulation/derivatives/tolerances.h"
 #include "tangible/simulation/events/tolerances.h"
 
 namespace tangible {
@@ -136,7 +138,7 @@ void RolloutCertifier::AddLaw(const Model<double>& model, const StepRecord& reco
   const Approach approach = ApproachOf(*model.structure, record, i);
   const double threshold = settings.restitution_threshold;
   const double fast =
-      (-approach.before - threshold) / std::max({threshold, std::abs(approach.before), 1e-300});
+      (-approach.before - threshold) / std::max({threshold, std::abs(approach.before), kNoScale});
   const double reach = record.h * approach.free;
   const double near = (settings.contact_margin - gap - reach) /
                       (settings.contact_margin + std::abs(gap) + std::abs(reach));

@@ -16,8 +16,8 @@
 //                  wanted; and with event stepping a contact that touches as the run starts, where
 //                  a direction opens or closes its gap: one side falls and lands, the other is
 //                  pushed out
-//   coordinates    so large that what they round to is more than 1e-7 of a body that has contacts
-//                  or joints (coordinate_watch.h): its modes may be rounding
+//   coordinates    so large that what they round to is more than kLargeCoordinates of a body that
+//                  has contacts or joints (coordinate_watch.h): its modes may be rounding
 //   linear systems redundant rows, condition, residual (contact_conditioning.h), of every step
 
 #include <optional>
@@ -29,9 +29,6 @@
 #include "tangible/simulation/stepping/rollout.h"
 
 namespace tangible {
-
-/// Relative distances to a jump below this make the verdict `discontinuous`.
-inline constexpr double kNearJumpMargin = 1e-6;
 
 struct CertifyOptions {
   /// Places in the model's numbers that derivatives are taken with respect to, ascending.

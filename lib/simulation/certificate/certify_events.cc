@@ -11,7 +11,9 @@
 #include "tangible/simulation/certificate/certify_grazing.h"
 #include "tangible/simulation/certificate/certify_place_inl.h"
 #include "tangible/simulation/certificate/feature_ties.h"
+#include "tangible/simulation/certificate/tolerances.h"
 #include "tangible/simulation/derivatives/rollout_directional.h"
+#include "tangible/simulation/derivatives/tolerances.h"
 #include "tangible/simulation/events/coupled_bodies.h"
 #include "tangible/simulation/events/event_counts.h"
 #include "tangible/simulation/events/event_search.h"
@@ -152,7 +154,7 @@ void RolloutCertifier::AddUnloaded(const Model<double>& model, long step, const 
     const double before = speed(i);
     const bool loaded = std::any_of(loaded_.begin(), loaded_.end(),
                                     [&](const ActiveContact& l) { return l.SameAs(c); });
-    if (!loaded && impact.solution.normal_impulse[i] > 1e-9 * largest &&
+    if (!loaded && impact.solution.normal_impulse[i] > kLoaded * largest &&
         before >= -Negligible(model, before)) {
       const Place place{model.structure.get(), step, impact.time, i, &c, impact.solution.modes[i]};
       AddJump(0.0, place, "it only touches when another impact moves it");
@@ -265,7 +267,7 @@ void RolloutCertifier::AddSegment(const Model<double>& model, long step,
       certificate_.degenerate_rows += margin < kDegenerateTolerance ? 1 : 0;
     };
     add_margin(largest > 0.0 ? normal / largest : 0.0, "normal force");
-    if (normal > 1e-9 * largest) {
+    if (normal > kLoaded * largest) {
       loaded_.push_back(contact);
     }
     if (contact.joint < 0 && !HasPair(closed_, contact) &&

@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <string>
 
+#include "tangible/dynamics/model/tolerances.h"
 #include "tangible/simulation/certificate/certify.h"
 
 namespace tangible {
@@ -18,7 +19,7 @@ inline std::string Short(double x) {
 
 // A speed that is rounding, m/s.
 inline double Negligible(const Model<double>& model, double speed) {
-  return 1e-9 *
+  return kNoApproach *
          (std::abs(speed) + model.structure->settings.dt * std::hypot(model.parameters[kGravityX],
                                                                       model.parameters[kGravityY]));
 }

@@ -8,15 +8,13 @@
 #include "tangible/dynamics/jacobian/contact_gradient.h"
 #include "tangible/simulation/certificate/certify_place_inl.h"
 #include "tangible/simulation/certificate/start_probe.h"
+#include "tangible/simulation/certificate/tolerances.h"
 #include "tangible/simulation/events/event_search.h"
 #include "tangible/simulation/events/segment_flow.h"
 #include "tangible/simulation/events/tolerances.h"
 
 namespace tangible {
 namespace {
-
-// Of a motion: an integrator's error that is more than rounding.
-constexpr double kSplitMatters = 1e-7;
 
 // What a motion differs by where an event ends a part of it early, as a share of the motion: the
 // integrator's error, which a step in two parts makes twice.
@@ -42,18 +40,16 @@ double SplitError(const Model<double>& model, const Segment& segment) {
   if (!flow.Run(model, &rest, &message)) {
     return 0.0;
   }
-  // Of a scene at rest both are rounding.
-  constexpr double kRest = 1e-6;
   const auto share = [&](const std::vector<double>& before, const std::vector<double>& one,
                          const std::vector<double>& two) {
     double apart = 0.0;
     double moved = 0.0;
     for (size_t i = 0; i < one.size(); ++i) {
       apart = std::max(apart, std::abs(one[i] - two[i]));
-      moved = std::max({moved, std::abs(one[i] - before[i]), kRest * std::abs(one[i])});
+      moved = std::max({moved, std::abs(one[i] - before[i]), kAtRest * std::abs(one[i])});
     }
     const double gravity = std::hypot(model.parameters[kGravityX], model.parameters[kGravityY]);
-    return apart > 0.0 ? apart / (moved + kRest * gravity * segment.length) : 0.0;
+    return apart > 0.0 ? apart / (moved + kAtRest * gravity * segment.length) : 0.0;
   };
   return std::max(share(segment.before.pose, whole.after.pose, rest.after.pose),
                   share(segment.before.twist, whole.after.twist, rest.after.twist));
@@ -72,7 +68,6 @@ bool Sticks(const Segment* segment, const ActiveContact& contact) {
 // Whether a direction changes what the entries are the gradient of.
 bool Moves(const std::vector<JacobianEntry>& gradient, const RowMatrixXd& directions,
            Eigen::Index direction) {
-  constexpr double kUnmoved = 1e-12;  // of the terms
   double rate = 0.0;
   double terms = 0.0;
   for (const JacobianEntry& entry : gradient) {

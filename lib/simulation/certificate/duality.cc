@@ -7,14 +7,12 @@
 #include <vector>
 
 #include "tangible/dynamics/assembly/assembly.h"
+#include "tangible/simulation/certificate/tolerances.h"
 #include "tangible/simulation/derivatives/rollout_adjoint.h"
 #include "tangible/simulation/derivatives/rollout_tangent.h"
 
 namespace tangible {
 namespace {
-
-// What of S counts beside an entry itself.
-constexpr double kRoundingOfState = 1e-4;
 
 double GyrationRadius(const Model<double>& model, int body) {
   const BodyIndex& index = model.structure->bodies[body];
@@ -85,7 +83,7 @@ void RunExtents::Add(long k, double t, const State<double>& state, const RowMatr
 struct Comparison {
   std::vector<int> variables;  // of outputs, among [poses | twists]
   RowMatrixXd by_tangent;      // b, outputs x directions
-  RowMatrixXd allowed;         // |b| + 1e-4 S, alike
+  RowMatrixXd allowed;         // |b| + kStateRounding S, alike
 };
 
 Comparison Compare(const ModelStructure& s, const RunExtents& extents, const RowMatrixXd& w_dot,
@@ -110,7 +108,7 @@ Comparison Compare(const ModelStructure& s, const RunExtents& extents, const Row
       const double b = w_dot(comparison.variables[static_cast<size_t>(row)], c);
       comparison.by_tangent(row, c) = b;
       comparison.allowed(row, c) =
-          std::abs(b) + kRoundingOfState * extents.Scale(c, pose, size) / arm;
+          std::abs(b) + kStateRounding * extents.Scale(c, pose, size) / arm;
     }
   }
   return comparison;
@@ -120,12 +118,11 @@ Comparison Compare(const ModelStructure& s, const RunExtents& extents, const Row
 // but not 0. That is where the solves of one unit load are refined to less than those of several
 // together (beside masses far greater a round of refinement takes 1 % of what is left).
 std::vector<Eigen::Index> Singles(const Comparison& comparison) {
-  constexpr double kRounding = 1e-10;
   std::vector<Eigen::Index> rows;
   for (Eigen::Index row = 0; row < comparison.allowed.rows(); ++row) {
     for (Eigen::Index c = 0; c < comparison.allowed.cols(); ++c) {
       const double b = std::abs(comparison.by_tangent(row, c));
-      if (b > 0.0 && b < kRounding * comparison.allowed(row, c)) {
+      if (b > 0.0 && b < kRoundingEntry * comparison.allowed(row, c)) {
         rows.push_back(row);
         break;
       }

@@ -7,22 +7,11 @@
 #include <utility>
 
 #include "tangible/geometry/mass_properties.h"
+#include "tangible/simulation/certificate/tolerances.h"
 
 namespace tangible {
 namespace {
 
-// Jumps of the derivative count above this fraction of the pair's speed over its size, and of 1/h:
-// what remains of rounding (1e-16 over kDifference) and, after extrapolation, of curvature
-// (kDifference²), with two orders of room.
-constexpr double kJump = 1e-6;
-constexpr double kJumpOfRate = 1e-8;
-// The moves, of the size, between which the choices' equations are compared.
-constexpr double kDifference = 1e-5;
-// Contacts this many moves apart, and normals turned by less than this angle, are one contact's.
-constexpr double kContinues = 10.0;
-constexpr double kTurned = 1e-3;
-// Contacts are searched to this fraction of the size beyond the closed ones' gaps.
-constexpr double kReach = 1e-3;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 class PairTies {

@@ -19,9 +19,6 @@
 
 namespace tangible {
 
-/// Of a shape's bounding radius, and in rad.
-inline constexpr double kFeatureMargin = 1e-7;
-
 /// The relative distance, at most kFeatureMargin, at which the pair of the contacts [first, last)
 /// of the record changes features with a jump of the derivative; infinite where it does not.
 /// `system` holds the step's factorisation. Cost: six searches of the pair, and a solve where

@@ -5,31 +5,21 @@
 #include <cmath>
 
 #include "tangible/dynamics/jacobian/contact_gradient.h"
+#include "tangible/simulation/certificate/tolerances.h"
 #include "tangible/simulation/derivatives/rollout_tangent.h"
+#include "tangible/simulation/events/tolerances.h"
 
 namespace tangible {
 namespace {
 
 constexpr double kLeaves = 8.0;      // U, of the speed that just leaves the touching tolerance
-constexpr double kOfStep = 1e-3;     // U, of the speed that forces give in a step
 constexpr double kConfirmed = 16.0;  // by which U is smaller where a kink is confirmed
 constexpr int kMostSteps = 16;       // for contacts to close again
 constexpr double kFlights = 4.0;     // that a run lasts at least
-// Of the derivative's largest entry: what extrapolated quotients of a smooth map may miss. A kink
-// below that, or below the noise, is not seen.
-constexpr double kApart = 1e-2;
-// Of poses that end within the touching tolerance, and of the speeds' rounding.
-constexpr double kNoise = 3.0;
-constexpr double kRounding = 1e-13;
 // R(τ/2) / R(τ) is 1/4 of a smooth map, 1/2 at a kink and 1 at a jump.
 constexpr double kJumps = 0.75;
-// A direction that moves bodies so much faster than the contact does not throw it.
-constexpr double kThrows = 1e-4;
-// Numbers are changed by no more than this share of them.
-constexpr double kOfNumber = 1e-3;
 // A slip that ends at once has jammed where it was this many times faster than U.
 constexpr double kSlips = 10.0;
-constexpr double kStops = 1e-6;  // of that slip, what is left of it
 
 double Along(const std::vector<JacobianEntry>& gradient, const VectorX<double>& direction) {
   double rate = 0.0;
@@ -178,7 +168,7 @@ class Probe {
     const ModelStructure& s = *model_.structure;
     for (int i = 0; i < s.num_parameters; ++i) {
       const double change = std::abs(shift * direction_[s.ParameterVariable(i)]);
-      if (change > kOfNumber * std::max(std::abs(model_.parameters[i]), 1.0)) return false;
+      if (change > kOfParameter * std::max(std::abs(model_.parameters[i]), 1.0)) return false;
     }
     return true;
   }
@@ -192,7 +182,7 @@ class Probe {
     Eigen::Index k = 0;
     for (const int body : moving) {
       for (int i = 0; i < 3; ++i) {
-        const double arm = i < 2 ? 1.0 : std::max(search_.lengths().radius(body), 1e-300);
+        const double arm = i < 2 ? 1.0 : std::max(search_.lengths().radius(body), kNoScale);
         speeds[k++] = arm * twist[3 * static_cast<size_t>(body) + i];
         speeds[k++] = arm * pose[3 * static_cast<size_t>(body) + i] / time;
       }
@@ -235,7 +225,7 @@ class Probe {
     const double size = std::max(derivative.cwiseAbs().maxCoeff(),
                                  of_whole.cwiseAbs().maxCoeff() / std::abs(shift));
     const double noise =
-        kNoise * (touch_ / time + kRounding * base.cwiseAbs().maxCoeff()) / std::abs(shift);
+        kNoise * (touch_ / time + kSpeedRounding * base.cwiseAbs().maxCoeff()) / std::abs(shift);
     if (!(apart > std::max(kApart * size, noise))) {
       return {};
     }
@@ -304,7 +294,6 @@ class Probe {
 bool MayJam(const Model<double>& model, const State<double>& start,
             const std::vector<ActiveContact>& touching, const ActiveContact& contact) {
   constexpr double kNear = 0.9;
-  constexpr double kParallel = 1e-6;
   const ModelStructure& s = *model.structure;
   const double friction = MixedFriction(model, contact.a, contact.b).value;
   if (!(friction > 0.0)) {
@@ -346,7 +335,7 @@ bool MayJam(const Model<double>& model, const State<double>& start,
     if (!shares(contact.a) && !shares(contact.b)) return false;
     EvaluateContactRows(model, start, other, &rows);
     const Vector2<double>& n = rows.geometry.normal;
-    return std::abs(along.x() * n.y() - along.y() * n.x()) > kParallel;
+    return std::abs(along.x() * n.y() - along.y() * n.x()) > kFreeSlide;
   });
 }
 

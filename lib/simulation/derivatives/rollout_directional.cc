@@ -6,7 +6,9 @@
 #include <sstream>
 
 #include "tangible/dynamics/model/lengths.h"
+#include "tangible/lcp/contact/tolerances.h"
 #include "tangible/lcp/system/contact_residual.h"
+#include "tangible/simulation/derivatives/tolerances.h"
 
 namespace tangible {
 
@@ -83,7 +85,6 @@ StepDirectional::Status StepDirectional::SolveColumns(const Model<double>& model
 // The step's problem, linearised, a small way along a direction.
 void StepDirectional::MoveAlong(const Model<double>& model, const StepRecord& record,
                                 const RowMatrixXd& w_dot, ContactProblem<double>* problem) {
-  constexpr double kWay = 1e-6;  // of the speeds that the step changes
   ContactSolution<double> with_rows = record.solution;
   std::vector<int> blocks(record.contacts.size(), -1);
   int num_blocks = problem->num_bodies + static_cast<int>(problem->joints.size());
@@ -105,7 +106,7 @@ void StepDirectional::MoveAlong(const Model<double>& model, const StepRecord& re
     rate = std::max(rate, std::abs(r[i]) / mass);
     speed = body ? std::max(speed, std::abs(problem->momentum[i]) / mass) : speed;
   }
-  const double way = rate > 0.0 ? kWay * (speed > 0.0 ? speed : 1.0) / rate : 0.0;
+  const double way = rate > 0.0 ? kLinearisedWay * (speed > 0.0 ? speed : 1.0) / rate : 0.0;
   for (size_t i = 0; i < problem->momentum.size(); ++i) {
     problem->momentum[i] += way * r[static_cast<Eigen::Index>(i)];
   }
@@ -128,7 +129,6 @@ void StepDirectional::MoveAlong(const Model<double>& model, const StepRecord& re
 // where there are none.
 bool StepDirectional::ChooseImpulses(const Model<double>& model, const StepRecord& record,
                                      const RowMatrixXd& w_dot, ContactSolution<double>* solution) {
-  constexpr double kAsGood = 1e-9;  // scaled natural residual
   ContactProblem<double> moved = record.problem;
   MoveAlong(model, record, w_dot, &moved);
   ContactSolution<double> along = record.solution;
@@ -167,7 +167,7 @@ bool StepDirectional::ChooseImpulses(const Model<double>& model, const StepRecor
                                        : x[3 * block + 1];
   }
   int worst;
-  return NaturalResidual(problem, *solution, &worst) <= kAsGood;
+  return NaturalResidual(problem, *solution, &worst) <= kHoldsAsWell;
 }
 
 // A single direction that contradicts the impulses at hand.
@@ -186,11 +186,10 @@ StepDirectional::Status StepDirectional::SolveOne(const Model<double>& model,
 
 bool StepDirectional::Apply(const Model<double>& model, Stepper* stepper, RowMatrixXd* w_dot,
                             std::string* message) {
-  constexpr double kContradiction = 1e6;  // ApplyAndMeasure
   const StepRecord& record = stepper->record();
   if (!FindKinks(model, record, record.solution, *w_dot)) {
     RowMatrixXd smooth = *w_dot;
-    if (tangent_.ApplyAndMeasure(model, stepper, &smooth) < kContradiction) {
+    if (tangent_.ApplyAndMeasure(model, stepper, &smooth) < kContradictingRate) {
       *w_dot = smooth;
       return true;
     }

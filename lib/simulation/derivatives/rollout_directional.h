@@ -25,10 +25,6 @@
 
 namespace tangible {
 
-/// Impulses and slacks below this fraction of their scales are 0: two orders above what a solve
-/// leaves.
-inline constexpr double kDegenerateTolerance = 1e-10;
-
 /// Whether an open contact's slack n·v⁺ + c is within the rounding of its gap over h: it touches at
 /// no speed, and whether it closes is open.
 bool JustTouches(const StepRecord& record, size_t contact);

@@ -7,6 +7,7 @@
 #include "tangible/dynamics/jacobian/contact_gradient.h"
 #include "tangible/simulation/events/event_rows_inl.h"
 #include "tangible/simulation/events/segment_flow.h"
+#include "tangible/simulation/events/tolerances.h"
 
 namespace tangible {
 namespace {

@@ -17,6 +17,7 @@
 
 #include "tangible/lcp/system/contact_residual.h"
 #include "tangible/simulation/events/event_step.h"
+#include "tangible/simulation/events/tolerances.h"
 
 namespace tangible {
 namespace {
@@ -32,7 +33,6 @@ constexpr int kRattling = 4;
 // Held with friction such a body can neither wedge nor jam.
 bool SlidesFreely(const ModelStructure& structure, const Impulses& impact, size_t i) {
   constexpr double kNear = 1.1;
-  constexpr double kParallel = 1e-6;
   const ContactBlock<double>& block = impact.problem.contacts[i];
   if ((block.a >= 0) == (block.b >= 0)) {
     return false;
@@ -58,7 +58,7 @@ bool SlidesFreely(const ModelStructure& structure, const Impulses& impact, size_
                        const RowPart<double>& n =
                            other.a == moving ? other.normal_a : other.normal_b;
                        return (other.a >= 0) != (other.b >= 0) &&
-                              std::abs(n[0] * tangent[0] + n[1] * tangent[1]) <= kParallel;
+                              std::abs(n[0] * tangent[0] + n[1] * tangent[1]) <= kFreeSlide;
                      });
 }
 
@@ -116,7 +116,7 @@ std::string WhatIsUnsolved(const ModelStructure& structure, const Impulses& impu
     return NameOfContact(structure, impulses.contacts, solved.worst_contact);
   }
   const std::vector<double>& v = impulses.solution.v;
-  const int joint = MostViolatedJoint(impulses.problem, v, v, 1e-9);
+  const int joint = MostViolatedJoint(impulses.problem, v, v, kNamedJoint);
   return joint < 0 ? "momentum" : NameOfContradicted(structure, joint);
 }
 
@@ -125,7 +125,7 @@ double EventStepper::SlowSpeed(const Model<double>& model, const State<double>& 
   for (const ActiveContact& contact : touching_.contacts) {
     // What nearly dependent rows leave of the speeds that were to vanish.
     if (Rattles(model, contact)) {
-      slow = std::max(slow, 1e-3 * ReturnSpeed(model, state, contact));
+      slow = std::max(slow, kRattle * ReturnSpeed(model, state, contact));
     }
   }
   return slow;

@@ -9,14 +9,12 @@
 #include "tangible/simulation/events/implicit_stage.h"
 #include "tangible/simulation/events/mode_elimination_inl.h"
 #include "tangible/simulation/events/segment_flow.h"
+#include "tangible/simulation/events/tolerances.h"
 
 namespace tangible {
 namespace {
 
 constexpr int kMostIterations = 60;
-constexpr double kUnrolledComplementarity = 1e-17;
-// Newton's iteration for an event's time ends where it changes derivatives by less than this share.
-constexpr double kLocated = 1e-12;
 constexpr int kMostLocations = 8;
 
 template <typename T>
@@ -137,7 +135,7 @@ class EventReplay {
         size = std::max(size, std::abs(impulses->solution.v[i]));
       }
       // Where impulses are not unique, or it stalls, the modes that the step found are eliminated.
-      if (converged && difference <= 1e-9 * size) {
+      if (converged && difference <= kUnrolledAgrees * size) {
         return;
       }
     }
@@ -374,7 +372,7 @@ class EventReplay {
       first = k == 0 ? Derivatives(change.abs()) : first;
       const double share = (first > 0.0).select(change.abs() / first, 0.0).maxCoeff();
       // What does not fall any more is rounding.
-      if (share <= kLocated || share > 0.5 * last) {
+      if (share <= kLocatedDerivative || share > 0.5 * last) {
         return;
       }
       last = share;

@@ -65,10 +65,6 @@ const char* NameOf(EventKind event);
 /// Whether an event's time is found from an equation (and not given).
 bool IsLocated(EventKind kind);
 
-/// Below this share of its terms the rate at which an event's equation changes with the segment's
-/// length is rounding: two features hand a contact over, and nothing depends on when.
-inline constexpr double kNoRate = 1e-9;
-
 /// Smooth motion over [time, time + length] with modes held, then the event that ended it.
 struct Segment {
   double time = 0.0;

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "tangible/simulation/events/event_search_inl.h"
+#include "tangible/simulation/events/tolerances.h"
 
 namespace tangible {
 namespace {
@@ -16,8 +17,6 @@ namespace {
 constexpr long kEvaluationsOfEvent = 1000;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-// A force counts as negative, and friction as exceeded, beyond this share of the forces at work.
-constexpr double kForceTolerance = 1e-10;
 
 double SpeedOf(const double* twist, double radius) {
   return std::hypot(twist[0], twist[1]) + std::abs(twist[2]) * radius;
@@ -44,7 +43,7 @@ double EventSearch::SpeedTolerance(const Model<double>& model, const State<doubl
       rounding = std::max(rounding, turned * own);
     }
   }
-  return kSlowShare * speed + rounding + 1e-200;
+  return kSlowShare * speed + rounding + kLeastSpeed;
 }
 
 void EventSearch::FindContacts(const Model<double>& model, const State<double>& state, double reach,
@@ -167,8 +166,7 @@ void EventSearch::SearchClosed(const Model<double>& model, Event* event) {
         }
         if (fb < -tolerance) {
           const auto f = [&](Sample& sample) { return ModeValue(model, &sample, trial); };
-          trial.length = Refine(model, f, 8.0 * std::numeric_limits<double>::epsilon() * at_start,
-                                a, fa, b, fb);
+          trial.length = Refine(model, f, kLocatedOfSize * at_start, a, fa, b, fb);
           *event = trial;
           return;
         }

@@ -114,10 +114,10 @@ void EventSearch::SearchReturn(const Model<double>& model, const ActiveContact& 
       return;
     }
     if (fa > tolerance && fb < -tolerance) {
-      const double root = Refine(model, apart,
-                                 std::min(8.0 * std::numeric_limits<double>::epsilon() * fa,
-                                          GapTolerance(segment_->before, contact.a, contact.b)),
-                                 a, fa, b, fb);
+      const double root = Refine(
+          model, apart,
+          std::min(kLocatedOfSize * fa, GapTolerance(segment_->before, contact.a, contact.b)), a,
+          fa, b, fb);
       const double gap = GapAndSpeed(model, At(model, root)->motion.after, contact, &speed);
       event->kind = gap < -touch ? EventKind::kReturn : EventKind::kTouch;
       event->length = root;

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "tangible/simulation/events/event_search.h"
+#include "tangible/simulation/events/tolerances.h"
 
 namespace tangible {
 
@@ -18,8 +19,6 @@ inline bool Contains(const std::vector<ActiveContact>& contacts, const ActiveCon
 
 inline constexpr int kMostHalvings = 1000;
 inline constexpr int kMostRefinements = 200;
-// The share of a motion after which what starts at the change of a feature has left that.
-inline constexpr double kLeft = 1e-9;
 
 // Illinois' variant of the secant method within a bracket, with halving where three steps have not
 // halved it: until |f| ≤ tolerance, or to the last bit that changes the value.
@@ -30,7 +29,7 @@ double EventSearch::Refine(const Model<double>& model, const Function& f, double
   double last_width = b - a;
   for (int k = 1; k <= kMostRefinements && fb != 0.0; ++k) {
     const double width = b - a;
-    if (width <= 4.0 * std::numeric_limits<double>::epsilon() * b) {
+    if (width <= kBracket * b) {
       break;
     }
     bool halve = false;
@@ -95,12 +94,12 @@ bool EventSearch::FirstRoot(const Model<double>& model, const Gap& gap, const Ra
   struct Interval {
     double a, fa, b, fb;
   };
-  const double smallest = 1e-12 * to;
+  const double smallest = kShortestPart * to;
   double first = gap(*At(model, from));
   if (first <= 0.0 && from == 0.0) {
     // What does not touch as it starts and has no gap is where features change: a corner at the end
     // of an edge, which it leaves.
-    from = kLeft * to;
+    from = kLeftBehind * to;
     first = gap(*At(model, from));
     if (!(first > 0.0)) {
       return false;

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "tangible/dynamics/model/tolerances.h"
 #include "tangible/simulation/events/event_search_inl.h"
 #include "tangible/simulation/events/tolerances.h"
 
@@ -23,7 +24,6 @@ bool OfPair(const ActiveContact& contact, int a, int b) {
 // pair has none, or where rounded corners take over smoothly.
 ActiveContact HandOver(const Model<double>& model, const State<double>& state,
                        const ActiveContact& lost, const ActiveContact& next) {
-  constexpr double kAtEnd = 1e-6;  // of the edge
   const bool of_first = lost.feature.kind == FeatureKind::kVertexEdge;
   if (!of_first && lost.feature.kind != FeatureKind::kEdgeVertex) {
     return next;
@@ -43,7 +43,7 @@ ActiveContact HandOver(const Model<double>& model, const State<double>& state,
     ContactRows<double> rows;
     EvaluateContactRows(model, state, corners, &rows);
     corners.gap = rows.geometry.gap;
-    if (corners.gap <= kAtEnd * length) {
+    if (corners.gap <= kCorner * length) {
       return corners;
     }
   }
@@ -138,14 +138,12 @@ void EventSearch::SearchPair(const Model<double>& model, int a, int b, Event* ev
 // How far apart the ends of two bodies' faces may be along them and count as one above the other,
 // at least, m. A power of two as there (collide_core.cc).
 double EventSearch::PairSearch::AlignedWithin() const {
-  constexpr double kAligned = 8e-9;  // of the sum of the radii, which is at least half the faces'
-  return std::ldexp(kAligned,
+  return std::ldexp(kAlignedRadii,
                     std::ilogb(search_.lengths_.radius(a_) + search_.lengths_.radius(b_)));
 }
 
 // Whether a pair has moved since the segment's start by more than that.
 bool EventSearch::PairSearch::HasPassed(const State<double>& state) const {
-  constexpr double kPassed = 1e-7;  // of the smaller body
   const std::vector<double>& before = segment_.before.pose;
   const auto moved = [&](int k) {
     return std::abs(state.pose[3 * a_ + k] - before[3 * a_ + k] - state.pose[3 * b_ + k] +
@@ -159,7 +157,6 @@ bool EventSearch::PairSearch::HasPassed(const State<double>& state) const {
 // where rounding changes which of the two is found. It is handed over when they have parted.
 bool EventSearch::PairSearch::Continues(const State<double>& state, const ActiveContact& contact,
                                         const Features& features) const {
-  constexpr double kParallel = 1e-7;
   ContactRows<double> rows;
   EvaluateContactRows(model_, state, contact, &rows);
   const ContactGeometry<double> of_closed = rows.geometry;
@@ -169,7 +166,7 @@ bool EventSearch::PairSearch::Continues(const State<double>& state, const Active
     other.feature = feature;
     EvaluateContactRows(model_, state, other, &rows);
     return (rows.geometry.point - of_closed.point).norm() <= within &&
-           (rows.geometry.normal - of_closed.normal).norm() <= kParallel;
+           (rows.geometry.normal - of_closed.normal).norm() <= kSameNormal;
   });
 }
 
@@ -349,7 +346,7 @@ void EventSearch::PairSearch::SearchHandOver() {
   }
   double low = 0.0;
   double high = event_.length;
-  while (high - low > kHandOverTime * event_.length) {
+  while (high - low > kTimeRounding * event_.length) {
     const double middle = 0.5 * (low + high);
     (is_lost(middle) ? high : low) = middle;
   }

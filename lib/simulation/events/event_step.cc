@@ -5,19 +5,17 @@
 #include <cmath>
 #include <utility>
 
+#include "tangible/simulation/events/tolerances.h"
+
 namespace tangible {
 namespace {
 
-// Accelerations without a solution (Painlevé) are replaced by impulses of this share of a step.
-constexpr double kShortStep = 1e-9;
 // How much further than the forces at work a contact that slides is held to its direction.
 constexpr double kForcedSlip = 1e4;
 // How often a motion that cannot be integrated over what is left of a step is halved.
 constexpr int kMostHalvings = 14;
 // How many such shorter motions a step may have. A stiff body's would not end.
 constexpr int kMostShortened = 50;
-// An impact that leaves an approach of no more than this many times the least speed has solved it.
-constexpr double kSolvedApproach = 100.0;
 // Beyond this many times max_events_per_step a step is given up.
 constexpr int kGiveUp = 3;
 
@@ -46,7 +44,7 @@ struct Edge {
 };
 std::vector<Edge> EdgesWithin(const Model<double>& model, double from, double to) {
   std::vector<Edge> edges;
-  const double near = 1e-12 * (to - from);
+  const double near = kShortestPart * (to - from);
   const auto add = [&](double time, int number) {
     if (time > from + near && time < to - near) {
       edges.push_back({time, number});
@@ -325,7 +323,7 @@ bool EventStepper::SolveByShortStep(const Model<double>& model, double t, double
   part->is_impulses = true;
   Impulses& impulses = part->impulses;
   impulses.time = t;
-  impulses.h = kShortStep * dt;
+  impulses.h = kPainleveStep * dt;
   impulses.decompression = false;
   impulses.before = *state;
   impulses.contacts = touching_.contacts;
@@ -372,7 +370,7 @@ void EventStepper::GuessModes(const std::vector<ActiveContact>& contacts,
     if (!contact.has_friction) {
       guess = guess == ContactMode::kOpen ? guess : ContactMode::kClosed;
     } else if (std::abs(slip[i]) > slow) {
-      contact.c_t += (slip[i] > 0.0 ? kForcedSlip : -kForcedSlip) * std::max(scale, 1e-300);
+      contact.c_t += (slip[i] > 0.0 ? kForcedSlip : -kForcedSlip) * std::max(scale, kNoScale);
       guess = guess == ContactMode::kOpen ? guess
               : slip[i] > 0.0             ? ContactMode::kSlidingPositive
                                           : ContactMode::kSlidingNegative;
@@ -554,8 +552,8 @@ EventOutcome EventStepper::Advance(const Model<double>& model, double t, double 
   };
   bool at_given_time = true;
   bool begins = true;
-  while (end - now > 1e-14 * h || !at_given_time) {
-    const bool at_end = end - now <= 1e-14 * h;
+  while (end - now > kTimeRounding * h || !at_given_time) {
+    const bool at_end = end - now <= kTimeRounding * h;
     if (!SolveInstant(model, now, h, std::exchange(begins, false), at_end, state, &outcome)) {
       return fail(outcome.message);
     }
@@ -563,7 +561,7 @@ EventOutcome EventStepper::Advance(const Model<double>& model, double t, double 
       break;
     }
     const auto edge = std::find_if(edges.begin(), edges.end(),
-                                   [&](const Edge& e) { return e.time > now + 1e-14 * h; });
+                                   [&](const Edge& e) { return e.time > now + kTimeRounding * h; });
     const bool to_edge = edge != edges.end();
     const double until = now + std::ldexp((to_edge ? edge->time : end) - now, -halvings);
     const int parts = record_.num_parts;
@@ -611,7 +609,7 @@ EventOutcome EventStepper::Advance(const Model<double>& model, double t, double 
     halvings = 0;
     now += segment.length;
     SwitchMode(segment);
-    if (segment.event != EventKind::kTouch || segment.length <= 1e-13 * h) {
+    if (segment.event != EventKind::kTouch || segment.length <= kNoMotion * h) {
       ++outcome.events;
       if (counts_.Add(segment.event_contact) > MostEvents(model)) {
         return fail(EventsDoNotEnd(model, "events", segment.event_contact));

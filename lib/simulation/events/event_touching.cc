@@ -6,6 +6,7 @@
 
 #include "tangible/dynamics/elements/contacts_ahead.h"
 #include "tangible/simulation/events/event_step.h"
+#include "tangible/simulation/events/tolerances.h"
 
 namespace tangible {
 
@@ -84,7 +85,6 @@ void EventStepper::FindTouching(const Model<double>& model, const State<double>&
 }
 
 int EventStepper::StuckLimit(const Model<double>& model, const State<double>& state, double moved) {
-  constexpr double kStays = 1e-3;  // of what recovers in a step
   constexpr int kMostSteps = 10;
   std::vector<BrokenLimit> broken;
   int stuck = -1;
@@ -96,7 +96,7 @@ int EventStepper::StuckLimit(const Model<double>& model, const State<double>& st
     }
     int steps = 0;
     for (const BrokenLimit& last : broken_limits_) {
-      if (last.limit.SameAs(limit) && std::abs(last.limit.gap - limit.gap) <= kStays * moved) {
+      if (last.limit.SameAs(limit) && std::abs(last.limit.gap - limit.gap) <= kStuckLimit * moved) {
         steps = last.steps + 1;
       }
     }

@@ -18,6 +18,7 @@
 
 #include "tangible/dynamics/jacobian/equation_jacobian.h"
 #include "tangible/simulation/events/event_record.h"
+#include "tangible/simulation/events/tolerances.h"
 
 namespace tangible {
 
@@ -32,8 +33,9 @@ class FixedPoint {
     const bool falls = change < last_;
     last_ = change;
     ++iterations_;
-    return change <= 1e-15 * size || (!falls && change <= 1e-13 * size) ||
-           (iterations_ > kMostFixedPoints && change <= 1e-12 * size) ||
+    return change <= kStageDerivative * size ||
+           (!falls && change <= kStageDerivativeRounding * size) ||
+           (iterations_ > kMostFixedPoints && change <= kStageDerivativeLate * size) ||
            (iterations_ > kMostFixedPoints + 2 && !falls);
   }
 

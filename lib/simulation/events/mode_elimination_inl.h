@@ -8,14 +8,12 @@
 
 #include "tangible/lcp/dense/dense_lu.h"
 #include "tangible/lcp/system/contact_problem.h"
+#include "tangible/lcp/system/tolerances.h"
+#include "tangible/simulation/events/tolerances.h"
 
 namespace tangible {
 namespace internal {
 
-// Pivots below this share of the largest: redundant rows, solved with δ and refined. Elimination
-// leaves them at some thousand ε, and rounding over them is no derivative.
-inline constexpr double kSingularPivot = 1e-11;
-inline constexpr double kEliminationDelta = 1e-10;
 inline constexpr int kEliminationRefinements = 4;
 
 }  // namespace internal
@@ -59,10 +57,10 @@ class ModeElimination {
     const MatrixX<T> exact = System(p, modes, 0.0, row_of, size);
     DenseLu<T> lu;
     VectorX<T> x;
-    if (lu.Compute(exact) && lu.pivot_ratio() > internal::kSingularPivot) {
+    if (lu.Compute(exact) && lu.pivot_ratio() > kSingularPivot) {
       x = lu.Solve(rhs);
     } else {
-      lu.Compute(System(p, modes, internal::kEliminationDelta, row_of, size));
+      lu.Compute(System(p, modes, kContactRegularisation, row_of, size));
       x = lu.Solve(rhs);
       for (int k = 0; k < internal::kEliminationRefinements; ++k) {
         VectorX<T> left(size);

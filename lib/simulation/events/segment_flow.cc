@@ -13,7 +13,6 @@ namespace {
 
 constexpr int kMostCorrections = 12;
 constexpr int kMostIterations = 60;
-constexpr double kIterated = 1e-14;  // relative change at which the implicit stage has converged
 
 NystromTableau SemiImplicitEuler() {
   NystromTableau t;
@@ -250,7 +249,7 @@ bool SegmentFlow::HasConverged(const SolvedNode& stage, const std::vector<double
   if (by_terms) {
     SizesOfTerms(stage, &terms_);
   }
-  const double tolerance = iteration < kMostFixedPoints + 5 ? kIterated : 1e3 * kIterated;
+  const double tolerance = iteration < kMostFixedPoints + 5 ? kImplicitStage : 1e3 * kImplicitStage;
   for (size_t k = 0; k < last.size(); ++k) {
     const double change = std::abs(stage.solution.v[k] - last[k]);
     if (!(change <= tolerance * (by_terms ? std::max(size, terms_[k]) : size))) {
@@ -480,12 +479,7 @@ bool SegmentFlow::ProjectTwists(const Model<double>& model, Segment* segment,
     return false;
   }
   const Impulses& projection = segment->projection;
-  // Rounding of an ill-posed system leaves less than this share of a row's terms, at the speeds
-  // that the segment's forces would give.
-  constexpr double kMissed = 1e-6;
   SizesOfTerms(segment->stages[segment->num_stages - 1], &terms_);
-  // Where no force acts a body's angular velocity may be the rounding of its speed.
-  constexpr double kRounding = 1e-6;  // of the terms of which kMissed is too much
   const std::vector<double>& mass = projection.problem.mass;
   const std::vector<double>& v = projection.solution.v;
   const auto lever = [&](size_t block) { return std::sqrt(mass[3 * block + 2] / mass[3 * block]); };
@@ -496,11 +490,11 @@ bool SegmentFlow::ProjectTwists(const Model<double>& model, Segment* segment,
   }
   for (size_t k = 0; k < terms_.size(); ++k) {
     const double speed = k % 3 == 2 ? fastest / lever(k / 3) : fastest;
-    terms_[k] = segment->length * terms_[k] + std::abs(v[k]) + kRounding * speed;
+    terms_[k] = segment->length * terms_[k] + std::abs(v[k]) + kSpeedOfTerms * speed;
   }
   const int joint =
       segment->length > 0.0
-          ? MostViolatedJoint(projection.problem, projection.solution.v, terms_, kMissed)
+          ? MostViolatedJoint(projection.problem, projection.solution.v, terms_, kUnmetRow)
           : -1;
   if (joint >= 0) {
     *message = NameOfContradicted(*model.structure, joint);

@@ -62,7 +62,7 @@ using OutputSeed = std::function<MatrixX<double>(const VectorX<double>& values)>
 double Seconds() {
   timespec time{};
   clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
-  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
+  return static_cast<double>(time.tv_sec) + static_cast<double>(time.tv_nsec) / 1e9;
 }
 
 GradientProblem MakeProblem(const Scene& scene, const std::vector<ParameterPath>& parameters) {

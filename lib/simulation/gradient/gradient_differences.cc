@@ -5,12 +5,10 @@
 #include <cstdint>
 
 #include "tangible/simulation/gradient/gradient_methods.h"
+#include "tangible/simulation/gradient/tolerances.h"
 
 namespace tangible::internal {
 namespace {
-
-// Cube root of the rounding error: where the errors of truncation and rounding balance.
-constexpr double kRelativeStep = 6e-6;
 
 // A number that differs where the contacts or modes of two runs differ (FNV-1a).
 class Signature {

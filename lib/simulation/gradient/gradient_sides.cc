@@ -18,21 +18,13 @@
 
 #include "tangible/simulation/derivatives/rollout_tangent.h"
 #include "tangible/simulation/gradient/gradient_methods.h"
+#include "tangible/simulation/gradient/tolerances.h"
 
 namespace tangible::internal {
 namespace {
 
-// Of the parameter's size: beyond what contacts hold to, and small against the next kink.
-constexpr double kWay = 1e-5;
 constexpr double kFarther = 8.0;  // each time, beyond the touching tolerance
 constexpr int kMostWays = 3;
-constexpr double kConverged = 1e-6;  // what both orders of extrapolation may differ by
-// Of the change over the first τ, what the integral may miss: a touch at no speed is located to
-// 1e-7 m/s.
-constexpr double kContinuous = 0.05;
-constexpr double kRounding = 1e-11;  // of the values
-// Derivatives below this, of the values over the parameter's size, are 0.
-constexpr double kNothing = 1e-9;
 
 struct Beside {
   VectorX<double> values;
@@ -47,7 +39,7 @@ class OneSided {
   // The derivative by a parameter; false with a message where it has none from this side.
   bool Column(size_t k, VectorX<double>* column) {
     const ParameterPath& parameter = problem_.parameters[k];
-    const double first = kWay * std::max(std::abs(parameter.value), parameter.scale);
+    const double first = kSideWay * std::max(std::abs(parameter.value), parameter.scale);
     std::string message;
     for (int i = 0; i < kMostWays; ++i) {
       if (Extrapolate(k, first, std::pow(kFarther, i), column)) {
@@ -79,9 +71,9 @@ class OneSided {
     *column = (at[0].derivative - 6.0 * at[1].derivative + 8.0 * at[2].derivative) / 3.0;
     const double values = result_.values.cwiseAbs().maxCoeff();
     const double size =
-        std::max(column->cwiseAbs().maxCoeff(), kNothing * kWay * values / first_way);
+        std::max(column->cwiseAbs().maxCoeff(), kNoDerivative * kSideWay * values / first_way);
     const double apart = (first - *column).cwiseAbs().maxCoeff();
-    if (!(apart <= kConverged * size)) {
+    if (!(apart <= kSidesConverged * size)) {
       return Fail(parameter, "derivatives beside it do not converge: its largest is " + Text(size) +
                                  " or differs by " + Text(apart));
     }
@@ -90,7 +82,7 @@ class OneSided {
         result_.values + way / 6.0 * (*column + 4.0 * at[1].derivative + at[0].derivative);
     for (Eigen::Index i = 0; i < expected.size(); ++i) {
       const double missed = std::abs(at[0].values[i] - expected[i]);
-      const double bound = kContinuous * first_way * size + kRounding * values;
+      const double bound = kContinuous * first_way * size + kValueRounding * values;
       if (!(missed <= bound)) {
         return Fail(parameter, result_.outputs[i] + " jumps by " + Text(missed));
       }

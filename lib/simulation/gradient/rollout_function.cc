@@ -10,6 +10,7 @@
 
 #include "tangible/dynamics/model/settings.h"
 #include "tangible/scene/set_parameters.h"
+#include "tangible/simulation/gradient/tolerances.h"
 
 namespace tangible {
 namespace {
@@ -616,7 +617,7 @@ void RolloutWorker::JacobianByDifferences(const RolloutInput& input, RowMatrixXd
     const RolloutInput& from = !of_parameter && control < 0 ? defaults : input;
     RolloutInput moved = from;
     const double scale = of_parameter ? f_.parameters_[column].scale : 1.0;
-    const double h = 6e-6 * std::max(std::abs(value_of(&moved)), scale);
+    const double h = kRelativeStep * std::max(std::abs(value_of(&moved)), scale);
     const auto run = [&](double by) {
       moved = from;
       value_of(&moved) += by;

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstdio>
 
+#include "tangible/simulation/stepping/tolerances.h"
+
 namespace tangible {
 
 void CoordinateWatch::Look(const State<double>& state, double time, int a, int b) {

@@ -18,9 +18,6 @@
 
 namespace tangible {
 
-/// ρ / r beyond which a run says that its coordinates are too large.
-inline constexpr double kLargeCoordinates = 1e-7;
-
 class CoordinateWatch {
  public:
   explicit CoordinateWatch(const Model<double>& model) : lengths_(model) {}

@@ -9,26 +9,24 @@
 #include "tangible/dynamics/elements/force.h"
 #include "tangible/geometry/broad_phase.h"
 #include "tangible/geometry/collide.h"
+#include "tangible/simulation/stepping/tolerances.h"
 
 namespace tangible {
 namespace {
 
-// The gap to a face that a corner stands beyond the end of, by 1e-6 of the face's length at most,
-// counts too, and is negative a little before the boxes meet (kBeyondEnd of collide_core.cc).
-constexpr double kBeyondEnd = 1e-5;  // of a box's longer side
-constexpr double kRounding = 16.0 * std::numeric_limits<double>::epsilon();  // of its coordinates
-
-// A box that meets those of all bodies to which the body in it has a negative gap.
+// A box that meets those of all bodies to which the body in it has a negative gap. The gap to
+// a face that a corner stands beyond the end of counts too, and is negative a little before the
+// boxes meet.
 Aabb BoxOfTouching(const Aabb& box) {
   double grow = 0.0;
   for (const double length : {box.max_x - box.min_x, box.max_y - box.min_y}) {
-    if (std::isfinite(length)) grow = std::max(grow, kBeyondEnd * length);
+    if (std::isfinite(length)) grow = std::max(grow, kCoupledBeyond * length);
   }
   double place = 0.0;
   for (const double x : {box.min_x, box.min_y, box.max_x, box.max_y}) {
     if (std::isfinite(x)) place = std::max(place, std::abs(x));
   }
-  grow += kRounding * place;
+  grow += kCoupledRounding * place;
   return {box.min_x - grow, box.min_y - grow, box.max_x + grow, box.max_y + grow};
 }
 

@@ -8,6 +8,7 @@
 #include "tangible/dynamics/elements/joint.h"
 #include "tangible/geometry/mass_properties.h"
 #include "tangible/scene/scene_names.h"
+#include "tangible/simulation/stepping/tolerances.h"
 
 namespace tangible {
 namespace {

@@ -18,10 +18,6 @@
 
 namespace tangible {
 
-/// A joint is open, and a run says so, where its opening is more than this: what shows in a view
-/// and in the second digit of a body's motion.
-inline constexpr double kOpenJoint = 0.01;
-
 class JointWatch {
  public:
   /// Watches nothing where there are no joints, or `projection` keeps them closed.

@@ -4,12 +4,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tangible/simulation/stepping/tolerances.h"
+
 namespace tangible {
 namespace {
 
 constexpr int kMostSteps = 500;
 constexpr int kStepsBetween = 5;  // trials of Newton's method
-constexpr double kShortestFraction = 1e-12;
 constexpr int kMostOntoJoints = 12;
 constexpr double kFalls = 0.7;  // of the error in a step onto the joints
 
@@ -100,7 +101,7 @@ bool DescendToProjection(const Model<double>& model, const std::vector<double>& 
     }
     double fraction = 1.0;
     double moved = HUGE_VAL;
-    for (; fraction > kShortestFraction; fraction *= 0.5) {
+    for (; fraction > kShortestDescent; fraction *= 0.5) {
       Move(model, pose, fraction, step, p);
       moved = GoOntoJoints(model, p) ? Distance(model, *p) : HUGE_VAL;
       if (moved < distance) {

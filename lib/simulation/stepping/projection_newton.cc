@@ -5,6 +5,8 @@
 #include <cmath>
 
 #include "tangible/dynamics/model/lengths.h"
+#include "tangible/lcp/system/tolerances.h"
+#include "tangible/simulation/stepping/tolerances.h"
 
 namespace tangible {
 namespace {
@@ -12,18 +14,6 @@ namespace {
 // Newton converges quadratically, in 2 to 3 steps in the median and 11 at a drift of two lengths of
 // a link; more mean that the joints cannot hold.
 constexpr int kMaxIterations = 60;
-// Of a redundant joint's row (a closed loop), as in ContactSystem; Newton's iteration absorbs it.
-constexpr double kRegularisation = 1e-10;
-// A body's block of W whose determinant, over that of M, is below this is shifted by twice it:
-// small enough that refinement gains three digits a sweep, large enough that a pivot costs no more.
-constexpr double kSingularBlock = 1e-3;
-// Steps are measured in radii of gyration. Below kShortStep Newton is in its quadratic range and
-// the merit would be decided by rounding; after one of kLastStep the next would be of rounding's
-// size.
-constexpr double kShortStep = 1e-6;
-constexpr double kLastStep = 1e-8;
-constexpr double kLastShiftedStep = 1e-14;
-constexpr double kShortestFraction = 1e-3;
 
 template <typename T>
 void EvaluateAll(const Model<T>& model, const State<T>& state, std::vector<JointRows<T>>* rows) {
@@ -171,7 +161,8 @@ bool FactorMatrix(const Model<T>& model, ProjectionWeight weight, ProjectionIter
           lu.FirstSecond(edge)[3 * i + r] = -row[r][i];
         }
         if (s.joint_loops) {
-          diagonal[4 * r] += kRegularisation / ValueOf(MassOf(model, body, 0));
+          // Newton's iteration absorbs it.
+          diagonal[4 * r] += kContactRegularisation / ValueOf(MassOf(model, body, 0));
         }
       }
       ++edge;
@@ -325,14 +316,14 @@ bool ResumeProjection(const Model<T>& model, int most, int extra, ProjectionIter
     double step = factored ? SolveStep(model, p) : HUGE_VAL;
     double fraction = 1.0;
     if (factored) TryStep(model, fraction, p);
-    if (!factored || (step > kShortStep && !TrialImproves(model, p, &weight))) {
+    if (!factored || (step > kQuadraticStep && !TrialImproves(model, p, &weight))) {
       ++p->damped_steps;
       if (!FactorMatrix(model, ProjectionWeight::kMass, p)) {
         return false;
       }
       step = SolveStep(model, p);
       TryStep(model, fraction, p);
-      while (fraction > kShortestFraction && !TrialImproves(model, p, &weight)) {
+      while (fraction > kShortestNewton && !TrialImproves(model, p, &weight)) {
         fraction *= 0.5;
         TryStep(model, fraction, p);
       }
@@ -347,8 +338,8 @@ bool ResumeProjection(const Model<T>& model, int most, int extra, ProjectionIter
     }
     p->error = LargestError(p->rows);
     // Rounding far from the origin may keep steps from becoming as small as they should.
-    const bool small = step <= (p->shifted ? kLastShiftedStep : kLastStep) ||
-                       (step <= kShortStep && step > 0.5 * before);
+    const bool small = step <= (p->shifted ? kLastShiftedStep : kLastNewtonStep) ||
+                       (step <= kQuadraticStep && step > 0.5 * before);
     before = step;
     if (fraction < 1.0 || !small || !Hold(model, p->at, p->rows, p->error, tolerance)) {
       continue;

@@ -7,6 +7,7 @@
 
 #include "tangible/simulation/events/event_jets.h"
 #include "tangible/simulation/stepping/energy_watch.h"
+#include "tangible/simulation/stepping/tolerances.h"
 
 namespace tangible {
 namespace {
@@ -44,9 +45,6 @@ double ValueDifference(const State<T>& jets, const State<double>& state) {
   compare(jets.twist, state.twist);
   return worst;
 }
-
-// Unrolled steps are compared with the double ones; beyond this they are on another branch.
-constexpr double kBranchTolerance = 1e-8;
 
 template <typename T>
 void SetValues(const State<double>& values, State<T>* state) {

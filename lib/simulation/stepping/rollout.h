@@ -72,8 +72,8 @@ using JetObserver = std::function<void(long k, double t, const State<T>& state)>
 
 /// A rollout in Jets beside one in double, which makes the discrete choices. `fallbacks` counts
 /// unrolled steps in which the interior point failed and the implicit derivative was taken; values
-/// that differ from the double step's by more than 1e-8 (a different branch) fail the rollout with
-/// a message.
+/// that differ from the double step's by more than kBranchTolerance (a different branch) fail the
+/// rollout with a message.
 template <typename T>
 RolloutReport RolloutJets(ControlledModel<T>* model, const State<T>& initial, JetRoute route,
                           const JetObserver<T>& observer, State<T>* final, long* fallbacks);

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <sstream>
 
+#include "tangible/dynamics/model/tolerances.h"
 #include "tangible/lcp/system/contact_residual.h"
 
 namespace tangible {
@@ -65,7 +66,7 @@ long NumSteps(const SimulationSettings& settings) {
   if (!settings.step_times.empty()) {
     return static_cast<long>(settings.step_times.size()) - 1;
   }
-  return std::max(0L, std::lround(std::ceil(settings.duration / settings.dt - 1e-9)));
+  return std::max(0L, std::lround(std::ceil(settings.duration / settings.dt - kSameTime)));
 }
 
 double StepTime(const SimulationSettings& settings, long k) {
@@ -81,7 +82,7 @@ double StepLength(const SimulationSettings& settings, long k) {
     return settings.dt;
   }
   const double last = settings.duration - k * settings.dt;
-  return std::abs(last - settings.dt) <= 1e-9 * settings.dt ? settings.dt : last;
+  return std::abs(last - settings.dt) <= kSameTime * settings.dt ? settings.dt : last;
 }
 
 void AddStepTimes(const std::vector<double>& times, SimulationSettings* settings) {
@@ -89,7 +90,7 @@ void AddStepTimes(const std::vector<double>& times, SimulationSettings* settings
   for (long k = 0; k <= NumSteps(*settings); ++k) {
     all.push_back(StepTime(*settings, k));
   }
-  const double near = 1e-9 * settings->dt;
+  const double near = kSameTime * settings->dt;
   std::vector<double> merged = all;
   for (const double time : times) {
     const auto next = std::lower_bound(all.begin(), all.end(), time);

@@ -147,13 +147,14 @@ void StepImplicit(const Model<T>& model, Stepper* stepper, const State<double>& 
 template <typename T>
 bool StepUnrolled(const Model<T>& model, const StepRecord& record, State<T>* state);
 
-/// Number of steps: ceil(duration / dt − 1e-9).
+/// Number of steps: ceil(duration / dt − kSameTime).
 long NumSteps(const SimulationSettings& settings);
 /// Time of step k: min(k dt, duration), never accumulated.
 double StepTime(const SimulationSettings& settings, long k);
 /// Length of step k: dt, but for the last.
 double StepLength(const SimulationSettings& settings, long k);
-/// Makes steps end at further times within the run; those within 1e-9 dt of another are that one.
+/// Makes steps end at further times within the run; those within kSameTime dt of another are that
+/// one.
 void AddStepTimes(const std::vector<double>& times, SimulationSettings* settings);
 
 }  // namespace tangible

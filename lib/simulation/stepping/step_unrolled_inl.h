@@ -5,13 +5,11 @@
 // for another scalar.
 
 #include "tangible/lcp/contact/contact_interior_point.h"
+#include "tangible/simulation/events/tolerances.h"
 #include "tangible/simulation/stepping/step.h"
 
 namespace tangible {
 namespace internal {
-
-// Complementarity to which the unrolled interior point runs: derivatives lag behind values.
-inline constexpr double kUnrolledComplementarity = 1e-17;
 
 template <typename T>
 void AssembleAll(const Model<T>& model, const StepRecord& record, const State<T>& state,
@@ -45,7 +43,7 @@ bool SolveUnrolled(const Model<T>& model, const StepRecord& record, State<T>* st
   ContactSolution<T> solution;
   ContactInteriorPointOptions options;
   options.complementarity =
-      s.settings.smoothing > 0.0 ? s.settings.smoothing : internal::kUnrolledComplementarity;
+      s.settings.smoothing > 0.0 ? s.settings.smoothing : kUnrolledComplementarity;
   const InteriorPointOutcome outcome =
       SolveContactsByInteriorPoint(problem, options, &workspace, &solution);
   for (int k = 0; k < s.num_blocks(); ++k) {

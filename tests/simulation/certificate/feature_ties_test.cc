@@ -7,6 +7,7 @@
 
 #include "../../support/scenes.h"
 #include "tangible/simulation/certificate/certify.h"
+#include "tangible/simulation/certificate/tolerances.h"
 #include "tangible/simulation/stepping/rollout.h"
 
 namespace tangible {

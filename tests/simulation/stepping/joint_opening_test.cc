@@ -9,6 +9,7 @@
 
 #include "../../support/scenes.h"
 #include "tangible/simulation/stepping/rollout.h"
+#include "tangible/simulation/stepping/tolerances.h"
 
 namespace tangible {
 namespace {

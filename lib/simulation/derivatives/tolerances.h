@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// The tolerances of derivatives of rollouts: of what each is a share, then why.
+// lib/simulation/README.md has a table.
+
+namespace tangible {
+
+/// Of the scales of impulse and slack: impulses and slacks below it are 0: two orders above what a
+/// solve leaves.
+inline constexpr double kDegenerateTolerance = 1e-10;
+/// Of speeds that the step changes: how far a step's linearised problem is moved along a direction,
+/// to choose among impulses that are not unique.
+inline constexpr double kLinearisedWay = 1e-6;
+/// Of the scaled natural residual: impulses chosen in that way solve the step as well.
+inline constexpr double kHoldsAsWell = 1e-9;
+
+}  // namespace tangible
