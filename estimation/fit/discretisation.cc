@@ -12,6 +12,7 @@ DiscretisationCheck CheckDiscretisation(const FitProblem& problem, const FitResu
   half.options.starts = 1;
   half.options.segments = 1;
   half.options.certificate = CertificatePass::kSkip;
+  half.options.held_test = HeldTest::kSkip;
   for (size_t k = 0; k < half.parameters.size(); ++k) {
     half.parameters[k].initial = result.estimate[static_cast<Eigen::Index>(k)];
   }

@@ -266,6 +266,33 @@ void Certify(LeastSquaresProblem* problem, FitResult* result) {
   }
 }
 
+// Where the model does not fit, or a parameter ran into its bound, the cause may be a number that
+// is held.
+void TestHeld(const FitOptions& options, LeastSquaresProblem* problem, FitResult* result) {
+  Uncertainty& uncertainty = result->uncertainty;
+  bool suspicious = uncertainty.DoesNotFit();
+  for (size_t k = 0; k < problem->entries().size(); ++k) {
+    suspicious = suspicious ||
+                 IsAtBound(problem->entries()[k], result->estimate[static_cast<Eigen::Index>(k)]);
+  }
+  // NaN where residuals are rounding.
+  if (!suspicious || !std::isfinite(uncertainty.whiteness.correlation)) {
+    return;
+  }
+  HeldOptions held;
+  held.derivatives = options.derivatives;
+  result->held = FindHeldParameters(result->estimate, held, problem);
+  for (const HeldParameter& parameter : result->held) {
+    uncertainty.warnings.push_back(Describe(parameter));
+  }
+}
+
+void CheckBodies(LeastSquaresProblem* problem, FitResult* result) {
+  for (const std::string& body : problem->FindInconsistencies(result->estimate)) {
+    result->uncertainty.warnings.push_back(body);
+  }
+}
+
 }  // namespace
 
 const char* NameOf(FitStatus status) {
@@ -302,6 +329,12 @@ FitResult Fit(const FitOptions& options, RolloutResiduals* residuals, const FitP
   residuals->SetLog(nullptr);
   result.rollouts = residuals->rollouts() - run.rollouts_before;
   result.seconds = run.elapsed();
+  if (result.estimate.size() > 0) {
+    CheckBodies(residuals, &result);
+  }
+  if (result.estimate.size() > 0 && options.held_test == HeldTest::kRun) {
+    TestHeld(options, residuals, &result);
+  }
   if (result.estimate.size() > 0 && options.certificate == CertificatePass::kRun) {
     Certify(residuals, &result);
   }

@@ -20,6 +20,7 @@
 #include <string>
 #include <vector>
 
+#include "tangible/estimation/fit/held_parameters.h"
 #include "tangible/estimation/fit/uncertainty.h"
 #include "tangible/estimation/problem/residual.h"
 #include "tangible/simulation/gradient/gradient.h"
@@ -35,6 +36,9 @@ struct FitOptions {
   int max_iterations = 50;  ///< of each start
   /// Whether the derivatives at the estimate get a certificate: one more rollout.
   CertificatePass certificate = CertificatePass::kRun;
+  /// Whether numbers that are held are tested where the model does not fit or a parameter is at its
+  /// bound: one more run with a column for each number of the scene.
+  HeldTest held_test = HeldTest::kRun;
 };
 
 /// What the user asks for, in memory.
@@ -89,7 +93,8 @@ struct FitResult {
   int parameter = -1;   ///< the culprit of kNoEffect
   Eigen::VectorXd estimate;
   Uncertainty uncertainty;
-  double initial_cost = NAN;  ///< at the initial values
+  std::vector<HeldParameter> held;  ///< numbers of the scene that the observations contradict
+  double initial_cost = NAN;        ///< at the initial values
   double final_cost = 0.0;
   std::vector<FitIteration> iterations;  ///< of the best start; begins with the initial point
   std::vector<FitStart> starts;

@@ -140,15 +140,18 @@ class Estimator {
     const double freedom = count - static_cast<double>(free_.size());
     result_.residual_rms = std::sqrt(data.squaredNorm() / count);
     result_.reduced_chi_square = freedom > 0.0 ? data.squaredNorm() / freedom : kNaN;
-    if (result_.reduced_chi_square > 1.0 + kChiSquareDeviations * std::sqrt(2.0 / freedom)) {
+    result_.too_large =
+        result_.reduced_chi_square > 1.0 + kChiSquareDeviations * std::sqrt(2.0 / freedom);
+    if (result_.too_large) {
       result_.warnings.push_back("residuals are larger than sigma explains (reduced chi-square " +
                                  Short(result_.reduced_chi_square) +
                                  "): the model misses something, or sigma is too small, and the "
                                  "intervals from sigma are too narrow");
     }
     result_.whiteness = TestWhiteness(data, places_);
-    if (result_.whiteness.p_value < kWhitenessProbability &&
-        std::abs(result_.whiteness.correlation) > kWhitenessCorrelation) {
+    result_.correlated = result_.whiteness.p_value < kWhitenessProbability &&
+                         std::abs(result_.whiteness.correlation) > kWhitenessCorrelation;
+    if (result_.correlated) {
       result_.warnings.push_back(
           "residuals are correlated in time (" + Short(result_.whiteness.correlation) +
           " from one sample to the next, probability by chance " +

@@ -61,6 +61,11 @@ struct Uncertainty {
   double residual_rms = 0.0;          ///< in multiples of sigma
   double reduced_chi_square = 0.0;  ///< Σ r² / (N − free parameters); NaN where N is not larger
   std::vector<std::string> warnings;  ///< of the whole
+
+  /// Whether residuals are larger than sigma explains, or correlated in time.
+  bool DoesNotFit() const { return too_large || correlated; }
+  bool too_large = false;
+  bool correlated = false;
 };
 
 /// `entries` and `estimate` of the parameters, residuals r (N) and J (N x P) there. `places` are

@@ -41,6 +41,12 @@ struct RowPlace {
   double least = 0.0;  ///< in multiples of sigma: smaller residuals are rounding
 };
 
+/// Derivatives by numbers that no parameter sets.
+struct HeldColumns {
+  std::vector<ParameterEntry> entries;  ///< a number each: its path, value and allowed range
+  RowMatrixXd columns;                  ///< observation rows of the block x entries
+};
+
 class LeastSquaresProblem {
  public:
   virtual ~LeastSquaresProblem() = default;
@@ -67,6 +73,16 @@ class LeastSquaresProblem {
 
   /// The certificate of the derivatives at p (all parameters); none where nothing is certified.
   virtual std::optional<Certificate> Certify(const Eigen::VectorXd& /*p*/) { return std::nullopt; }
+
+  /// The derivatives of a block's observation rows at p = [shared | own] by the numbers of its
+  /// scene that no parameter sets; empty where there are none, more than `most`, or a run fails.
+  virtual HeldColumns EvaluateHeld(int /*block*/, const Eigen::VectorXd& /*p*/,
+                                   DerivativeMethod /*method*/, int /*most*/) {
+    return {};
+  }
+
+  /// What cannot be in reality at p (all parameters), a line each (consistency.h).
+  virtual std::vector<std::string> FindInconsistencies(const Eigen::VectorXd& /*p*/) { return {}; }
 
   /// For a line of a message: of block 3 "recording 'take 4': "; empty where there is only one.
   virtual std::string BlockName(int /*block*/) const { return ""; }

@@ -6,13 +6,16 @@
 //   q = ln(p / initial)   for a parameter that is positive by its bounds
 //   q = p / scale         for any other, with a typical magnitude
 //
-// A mass that starts ten times off is then as far from its value below as above, and steps of
-// several parameters compare. The optimum and the covariance, which is stated for p, do not depend
-// on this choice.
+// unless the user chose one of them. A mass that starts ten times off is then as far from its value
+// below as above, and steps of several parameters compare. The optimum and the covariance, which
+// is stated for p, do not depend on this choice.
 
 #include <Eigen/Core>
+#include <optional>
 #include <string>
 #include <vector>
+
+#include "tangible/estimation/problem/prior.h"
 
 namespace tangible {
 
@@ -23,6 +26,7 @@ struct ParameterEntry {
   double upper = 0.0;
   bool logarithmic = false;  ///< runs as ln(p / initial)
   double scale = 1.0;        ///< typical magnitude, > 0
+  std::optional<Prior> prior = std::nullopt;
 };
 
 /// q of p.

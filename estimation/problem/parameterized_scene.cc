@@ -146,7 +146,7 @@ bool ParameterizedScene::AddParameter(const FitParameter& parameter, ParameterEr
   }
   error->set = -1;
   entry.initial = parameter.initial.value_or(value);
-  if (!SetBounds(parameter, &entry, error)) {
+  if (!SetBounds(parameter, &entry, error) || !SetScaleAndPrior(parameter, &entry, error)) {
     return false;
   }
   entry.scale = std::max(std::abs(entry.initial), entry.scale);
@@ -260,6 +260,37 @@ bool ParameterizedScene::SetBounds(const FitParameter& parameter, Entry* entry,
   }
   entry->logarithmic = entry->lower > 0.0 || bounds.low_excluded;
   return true;
+}
+
+bool ParameterizedScene::SetScaleAndPrior(const FitParameter& parameter, Entry* entry,
+                                          ParameterError* error) {
+  const bool positive = entry->lower >= 0.0 && entry->initial > 0.0;
+  if (parameter.scale == ParameterScale::kLogarithmic && !positive) {
+    error->key = "scale";
+    error->what = "expected linear for a parameter that may be negative or starts at 0, got log";
+    return false;
+  }
+  if (parameter.scale != ParameterScale::kByBounds) {
+    entry->logarithmic = parameter.scale == ParameterScale::kLogarithmic;
+  }
+  entry->prior = parameter.prior;
+  if (entry->prior && entry->prior->kind == PriorKind::kLogNormal && !positive) {
+    error->key = "prior";
+    error->what =
+        "expected gaussian for a parameter that may be negative or starts at 0, got log_normal";
+    return false;
+  }
+  return true;
+}
+
+std::vector<bool> ParameterizedScene::NumbersSet() const {
+  std::vector<bool> set(num_scene_numbers_, false);
+  for (const NumberSet& number : numbers_) {
+    if (number.number < num_scene_numbers_) {
+      set[number.number] = true;
+    }
+  }
+  return set;
 }
 
 void ParameterizedScene::CollectTargets() {

@@ -21,6 +21,7 @@
 #include "tangible/dynamics/model/parameter_map.h"
 #include "tangible/estimation/problem/observation.h"
 #include "tangible/estimation/problem/parameter_entry.h"
+#include "tangible/estimation/problem/prior.h"
 
 namespace tangible {
 
@@ -35,6 +36,13 @@ struct ParameterSet {
   SetMode mode = SetMode::kAssign;
 };
 
+/// The minimiser's coordinate of a parameter.
+enum class ParameterScale {
+  kByBounds,  ///< logarithmic where the bounds keep it positive
+  kLinear,
+  kLogarithmic,  ///< needs a lower bound >= 0
+};
+
 /// A named number to be estimated, as the user wrote it.
 struct FitParameter {
   std::string name;
@@ -43,6 +51,8 @@ struct FitParameter {
   std::optional<double> lower;    ///< default: the smallest value that its numbers may take
   std::optional<double> upper;
   std::vector<ParameterSet> sets;
+  ParameterScale scale = ParameterScale::kByBounds;
+  std::optional<Prior> prior = std::nullopt;
 };
 
 /// What is wrong with a list of parameters, and where.
@@ -65,6 +75,8 @@ class ParameterizedScene {
               const std::vector<FitParameter>& parameters, ParameterError* error);
 
   int size() const { return static_cast<int>(entries_.size()); }
+  /// Which of the scene's numbers (EnumerateNumbers) some parameter sets or adds to.
+  std::vector<bool> NumbersSet() const;
   const std::vector<Entry>& entries() const { return entries_; }
   Eigen::VectorXd Initial() const { return InitialOf(entries_); }
 
@@ -111,6 +123,7 @@ class ParameterizedScene {
   bool AddNumber(int number, NumberKind kind, const std::string& path, const ParameterSet& set,
                  ParameterError* error);
   bool SetBounds(const FitParameter& parameter, Entry* entry, ParameterError* error) const;
+  static bool SetScaleAndPrior(const FitParameter& parameter, Entry* entry, ParameterError* error);
   void CollectTargets();
 
   Scene scene_;

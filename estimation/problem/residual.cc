@@ -7,6 +7,8 @@
 #include <tuple>
 #include <utility>
 
+#include "tangible/estimation/problem/consistency.h"
+#include "tangible/scene/parameter.h"
 #include "tangible/simulation/certificate/certify.h"
 #include "tangible/simulation/derivatives/rollout_tangent.h"
 
@@ -31,6 +33,27 @@ void AddShares(const SamplePlan& plan, long k, const std::vector<double>& pose,
       (*poses)[3 * static_cast<size_t>(share.sample) + i] += share.weight * pose[3 * body + i];
     }
   }
+}
+
+/// One parameter for each number of the scene that is not set.
+std::vector<FitParameter> Candidates(const ParameterizedScene& scene) {
+  Scene copy = scene.scene();
+  const auto numbers = EnumerateNumbers(&copy);
+  const std::vector<bool> set = scene.NumbersSet();
+  std::vector<FitParameter> candidates;
+  for (size_t i = 0; i < numbers.size(); ++i) {
+    ParameterPath path;
+    std::string error;
+    if (set[i] || !ResolveParameter(copy, numbers[i].path, &path, &error) ||
+        !IsAllowed(numbers[i].kind, *numbers[i].value)) {
+      continue;
+    }
+    FitParameter candidate;
+    candidate.name = numbers[i].path;
+    candidate.sets = {{numbers[i].path}};
+    candidates.push_back(candidate);
+  }
+  return candidates;
 }
 
 }  // namespace
@@ -309,6 +332,31 @@ RowMatrixXd RolloutResiduals::FromPoseDerivatives(const std::vector<double>& pos
     }
   }
   return jacobian;
+}
+
+HeldColumns RolloutResiduals::EvaluateHeld(int /*block*/, const Eigen::VectorXd& p,
+                                           DerivativeMethod method, int most) {
+  HeldColumns held;
+  if (!SetParameters(p)) {
+    return held;
+  }
+  const std::vector<FitParameter> candidates = Candidates(scene_);
+  ParameterizedScene scene;
+  ParameterError error;
+  if (candidates.empty() || static_cast<int>(candidates.size()) > most ||
+      !scene.Create(scene_.scene(), scene_.points(), candidates, &error)) {
+    return held;
+  }
+  RolloutResiduals released(scene, observations_);
+  Eigen::VectorXd values;
+  if (released.Evaluate(scene.Initial(), method, &values, &held.columns)) {
+    held.entries = scene.entries();
+  }
+  return held;
+}
+
+std::vector<std::string> RolloutResiduals::FindInconsistencies(const Eigen::VectorXd& p) {
+  return SetParameters(p) ? FindInconsistentBodies(scene_.scene()) : std::vector<std::string>();
 }
 
 }  // namespace tangible

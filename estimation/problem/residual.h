@@ -48,6 +48,9 @@ class RolloutResiduals : public LeastSquaresProblem {
   bool EvaluateBlock(int block, const Eigen::VectorXd& p, DerivativeMethod method,
                      BlockDerivatives derivatives, BlockEvaluation* evaluation) override;
   std::optional<Certificate> Certify(const Eigen::VectorXd& p) override;
+  HeldColumns EvaluateHeld(int block, const Eigen::VectorXd& p, DerivativeMethod method,
+                           int most) override;
+  std::vector<std::string> FindInconsistencies(const Eigen::VectorXd& p) override;
 
   /// The residuals at p and, unless `jacobian` is null, their derivatives by `method`. False where
   /// the run fails or p sets a number to a value that it may not take; message() says which.

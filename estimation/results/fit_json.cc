@@ -23,6 +23,9 @@ constexpr std::pair<const char*, DerivativeMethod> kMethods[] = {
     {"jet_implicit", DerivativeMethod::kJetImplicit},
     {"finite_difference", DerivativeMethod::kFiniteDifference}};
 
+constexpr std::pair<const char*, ParameterScale> kScales[] = {
+    {"linear", ParameterScale::kLinear}, {"log", ParameterScale::kLogarithmic}};
+
 int FindBody(const Scene& scene, const std::string& name) {
   for (size_t i = 0; i < scene.bodies.size(); ++i) {
     if (scene.bodies[i].name == name) {
@@ -120,7 +123,8 @@ FitParameter ReadParameter(const JsonReader& json) {
     parameter.sets.push_back({parameter.name});
     return parameter;
   }
-  json.ExpectKeys({"name", "initial", "lower", "upper", "sets", "path"}, " of a parameter");
+  json.ExpectKeys({"name", "initial", "lower", "upper", "sets", "path", "scale"},
+                  " of a parameter");
   const auto read = [&json](const char* key, std::optional<double>* value) {
     if (json.Has(key)) {
       *value = json.At(key).Number();
@@ -129,6 +133,9 @@ FitParameter ReadParameter(const JsonReader& json) {
   read("initial", &parameter.initial);
   read("lower", &parameter.lower);
   read("upper", &parameter.upper);
+  if (json.Has("scale")) {
+    parameter.scale = json.At("scale").Choice(kScales);
+  }
   if (json.Has("path")) {
     if (json.Has("sets")) {
       json.At("sets").Fail("expected sets or path, got both");

@@ -73,6 +73,18 @@ OrderedJson CombinationsToJson(const RolloutResiduals& residuals, const Uncertai
   return all;
 }
 
+OrderedJson HeldToJson(const FitResult& result) {
+  OrderedJson all = OrderedJson::array();
+  for (const HeldParameter& held : result.held) {
+    all.push_back({{"path", held.path},
+                   {"held_at", Number(held.value)},
+                   {"change", Number(held.change)},
+                   {"cost_share", Number(held.cost_share)},
+                   {"releases", held.releases}});
+  }
+  return all;
+}
+
 /// How the robust intervals were found.
 OrderedJson RobustToJson(const Uncertainty& uncertainty) {
   return {{"method", NameOf(uncertainty.robust_method)},
@@ -148,6 +160,7 @@ OrderedJson ResultToJson(const RolloutResiduals& residuals, const FitResult& res
                       {"parameters", ParametersToJson(residuals, result)},
                       {"robust", RobustToJson(uncertainty)},
                       {"determined_combinations", CombinationsToJson(residuals, uncertainty)},
+                      {"held_parameters", HeldToJson(result)},
                       {"covariance", CovarianceToJson(uncertainty.covariance)},
                       {"initial_cost", when(result.initial_cost)},
                       {"final_cost", when(result.final_cost)},

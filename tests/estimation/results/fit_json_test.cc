@@ -116,6 +116,11 @@ TEST_F(FitJsonTest, BadInputsAreOneLine) {
        ": /points/a*: expected a name of letters, digits and _.- , got a*"},
       {With("points", R"({"a,b": {"body": "ball"}})"),
        ": /points/a,b: expected a name of letters, digits and _.- , got a,b"},
+      {With("parameters", R"([{"path": "gravity/y", "scale": "cubic"}])"),
+       ": /parameters/0/scale: expected one of linear, log, got \"cubic\""},
+      {With("parameters", R"([{"path": "gravity/y", "scale": "log"}])"),
+       ": /parameters/0/scale: expected linear for a parameter that may be negative or starts at "
+       "0, got log"},
       {With("parameters", "{}"), ": /parameters: expected an array of parameters, got an object"},
       {With("parameters", R"([{"name": "m"}])"),
        ": /parameters/0/sets: missing, expected an array of {path, scale, offset}"},

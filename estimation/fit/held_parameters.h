@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// Numbers of the scene that are held at their values but that the observations contradict: a
+// damping that the scene leaves at 0, say, which drives an estimated mass into its bound.
+//
+// At the estimate let J have the columns of the parameters that are free, and u = ∂r/∂θ be that of
+// a number θ of the scene that is not estimated. The multiplier of the constraint that θ is held is
+// uᵀ r. Were it released, then to first order
+//
+//   ũ = u − J J⁺ u                       what the free parameters cannot do           (1)
+//   Δθ = −ũᵀ r / ũᵀ ũ                    its change
+//   ½ (ũᵀ r)² / ũᵀ ũ                     what the cost would fall by                  (2)
+//   g_b' = J_bᵀ (r + ũ Δθ)               the slope of the cost in a parameter b at its bound
+//
+// (2) is Rao's score statistic, here as a share of the cost. Where the slope g_b' no longer points
+// out of the range, θ is what has driven b there.
+//
+// References: C. R. Rao, Proc. Cambridge Phil. Soc. 44 (1948) 50; S. D. Silvey, Annals of
+// Mathematical Statistics 30 (1959) 389 (the Lagrange multiplier test).
+
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "tangible/estimation/problem/least_squares.h"
+
+namespace tangible {
+
+enum class HeldTest { kRun, kSkip };
+
+struct HeldParameter {
+  std::string path;
+  double value = 0.0;                 ///< at which it is held
+  double change = 0.0;                ///< Δθ
+  double cost_share = 0.0;            ///< (2) over the cost, 0 to 1
+  std::vector<std::string> releases;  ///< parameters that would leave their bounds
+};
+
+struct HeldOptions {
+  DerivativeMethod derivatives = DerivativeMethod::kTangent;
+  double least_share = 0.1;       ///< of the cost, for a number that releases no parameter
+  double least_deviations = 5.0;  ///< ũᵀ r over that of independent residuals of their own size
+  int most = 5;                   ///< numbers that are reported
+  int most_candidates = 400;
+};
+
+/// Tests all numbers of the problem's scenes that no parameter sets, with one run a block that has
+/// a column each; a number of several blocks' scenes counts as one. Own parameters of a block are
+/// eliminated from its rows first. Sorted: numbers that release parameters from bounds first, then
+/// by cost_share. Numbers that may not change that way (a friction of 0 that would become negative)
+/// are left out. Empty where a run fails or there are more than `most_candidates` numbers.
+std::vector<HeldParameter> FindHeldParameters(const Eigen::VectorXd& estimate,
+                                              const HeldOptions& options,
+                                              LeastSquaresProblem* problem);
+
+/// "the observations contradict 'joints/pin/damping', which is held at 0: ...", for people.
+std::string Describe(const HeldParameter& held);
+
+}  // namespace tangible

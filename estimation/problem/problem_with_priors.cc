@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/estimation/problem/problem_with_priors.h"
+
+#include <cmath>
+#include <utility>
+
+namespace tangible {
+
+ProblemWithPriors::ProblemWithPriors(LeastSquaresProblem* problem,
+                                     std::vector<RandomEffect> effects)
+    : problem_(problem), effects_(std::move(effects)), own_(problem->num_blocks()) {
+  const BlockLayout layout(*problem);
+  const auto prior_of = [&](int k) { return problem->entries()[k].prior; };
+  for (int k = 0; k < layout.num_shared(); ++k) {
+    if (prior_of(k)) {
+      shared_.push_back({k, -1, -1, *prior_of(k)});
+    }
+  }
+  for (int block = 0; block < layout.num_blocks(); ++block) {
+    for (int i = layout.num_shared(); i < layout.num_local(block); ++i) {
+      const int k = layout.ParameterOf(block, i);
+      if (prior_of(k)) {
+        own_[block].push_back({i, -1, -1, *prior_of(k)});
+      }
+      for (size_t e = 0; e < effects_.size(); ++e) {
+        if (effects_[e].own[block] == k) {
+          own_[block].push_back({i, effects_[e].mean, static_cast<int>(e), {effects_[e].kind}});
+        }
+      }
+    }
+  }
+}
+
+bool ProblemWithPriors::HasRows() const {
+  bool any = !shared_.empty();
+  for (const std::vector<PriorRow>& rows : own_) {
+    any = any || !rows.empty();
+  }
+  return any;
+}
+
+int ProblemWithPriors::num_own(int block) const {
+  return IsOfPriors(block) ? 0 : problem_->num_own(block);
+}
+
+int ProblemWithPriors::num_rows(int block) const {
+  const int rows = static_cast<int>(RowsOf(block).size());
+  return IsOfPriors(block) ? rows : problem_->num_rows(block) + rows;
+}
+
+int ProblemWithPriors::num_observation_rows(int block) const {
+  return IsOfPriors(block) ? 0 : problem_->num_observation_rows(block);
+}
+
+double ProblemWithPriors::weight(int block) const {
+  return IsOfPriors(block) ? 1.0 : problem_->weight(block);
+}
+
+std::vector<RowPlace> ProblemWithPriors::Places(int block) const {
+  return IsOfPriors(block) ? std::vector<RowPlace>() : problem_->Places(block);
+}
+
+std::string ProblemWithPriors::BlockName(int block) const {
+  return IsOfPriors(block) ? "priors: " : problem_->BlockName(block);
+}
+
+HeldColumns ProblemWithPriors::EvaluateHeld(int block, const Eigen::VectorXd& p,
+                                            DerivativeMethod method, int most) {
+  return IsOfPriors(block) ? HeldColumns() : problem_->EvaluateHeld(block, p, method, most);
+}
+
+PriorResidual ProblemWithPriors::Evaluate(const PriorRow& row, const Eigen::VectorXd& p,
+                                          PriorResidual* by_mean) const {
+  *by_mean = {};
+  if (row.mean < 0) {
+    return EvaluatePrior(row.prior, p[row.parameter]);
+  }
+  Prior prior = row.prior;
+  prior.center = p[row.mean];
+  prior.sigma = effects_[row.effect].spread;
+  // r depends on θ − μ, or on ln θ − ln μ: the derivative by μ is that by θ at θ = μ, negative.
+  by_mean->derivative = -EvaluatePrior(prior, prior.center).derivative;
+  return EvaluatePrior(prior, p[row.parameter]);
+}
+
+bool ProblemWithPriors::EvaluateBlock(int block, const Eigen::VectorXd& p, DerivativeMethod method,
+                                      BlockDerivatives derivatives, BlockEvaluation* evaluation) {
+  *evaluation = BlockEvaluation();
+  if (!IsOfPriors(block) && !problem_->EvaluateBlock(block, p, method, derivatives, evaluation)) {
+    return false;
+  }
+  const std::vector<PriorRow>& rows = RowsOf(block);
+  if (rows.empty()) {
+    return true;
+  }
+  const Eigen::Index first = evaluation->residuals.size();
+  const Eigen::Index count = first + static_cast<Eigen::Index>(rows.size());
+  evaluation->residuals.conservativeResize(count);
+  const bool with_jacobian = derivatives == BlockDerivatives::kCompute;
+  if (with_jacobian) {
+    evaluation->jacobian.conservativeResize(count, p.size());
+    evaluation->jacobian.bottomRows(count - first).setZero();
+  }
+  // Rows of priors carry no weight: that of the block is taken out of them.
+  const double root = std::sqrt(1.0 / weight(block));
+  for (size_t i = 0; i < rows.size(); ++i) {
+    const Eigen::Index at = first + static_cast<Eigen::Index>(i);
+    PriorResidual by_mean;
+    const PriorResidual row = Evaluate(rows[i], p, &by_mean);
+    if (!std::isfinite(row.residual) || !std::isfinite(row.derivative)) {
+      evaluation->message = "a log-normal prior of a value that is not positive";
+      return false;
+    }
+    evaluation->residuals[at] = root * row.residual;
+    if (with_jacobian) {
+      evaluation->jacobian(at, rows[i].parameter) = root * row.derivative;
+      if (rows[i].mean >= 0) {
+        evaluation->jacobian(at, rows[i].mean) = root * by_mean.derivative;
+      }
+    }
+  }
+  return true;
+}
+
+}  // namespace tangible
