@@ -26,7 +26,7 @@ inline ContactProblem<double> FreeBodies(const std::vector<double>& twists) {
     problem.mass.insert(problem.mass.end(), {1.0, 1.0, 0.1});
   }
   for (size_t i = 0; i < twists.size(); ++i) {
-    problem.momentum.push_back(problem.mass[i] * twists[i]);
+    problem.load.push_back(problem.mass[i] * twists[i]);
   }
   return problem;
 }
@@ -54,7 +54,7 @@ inline ContactProblem<double> RandomContactProblem(std::mt19937_64* random, int 
   p.num_bodies = bodies;
   for (int i = 0; i < 3 * bodies; ++i) {
     p.mass.push_back(Draw(random, 0.5, 2.0));
-    p.momentum.push_back(Draw(random, -1.0, 1.0));
+    p.load.push_back(Draw(random, -1.0, 1.0));
   }
   for (int i = 1; i < bodies; i += 2) {
     JointBlock<double> joint;
@@ -92,7 +92,7 @@ inline ContactProblem<double> RandomContactProblem(std::mt19937_64* random, int 
 inline ContactSolution<double> EmptySolution(const ContactProblem<double>& problem) {
   ContactSolution<double> solution;
   const size_t n = problem.contacts.size();
-  solution.v.assign(3 * problem.num_bodies, 0.0);
+  solution.motion.assign(3 * problem.num_bodies, 0.0);
   solution.joint_impulse.assign(3 * problem.joints.size(), 0.0);
   solution.normal_impulse.assign(n, 0.0);
   solution.tangent_impulse.assign(n, 0.0);

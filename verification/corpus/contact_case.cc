@@ -72,8 +72,8 @@ class Maker {
     const double mass = DrawLog(1.0, mass_ratio_);
     const double inertia = mass * Draw(0.03, 0.15);
     p.mass.insert(p.mass.end(), {mass, mass, inertia});
-    p.momentum.insert(p.momentum.end(),
-                      {mass * velocity.x, mass * (velocity.y - 9.81 * kStep), inertia * spin});
+    p.load.insert(p.load.end(),
+                  {mass * velocity.x, mass * (velocity.y - 9.81 * kStep), inertia * spin});
     return p.num_bodies++;
   }
   int AddMovingBody() { return AddBody({Draw(-1, 1), Draw(-1, 1)}, Draw(-2, 2)); }
@@ -184,12 +184,12 @@ class Maker {
   void DrawSolution() {
     ContactProblem<double>& p = case_.problem;
     ContactSolution<double>& x = case_.drawn;
-    for (int i = 0; i < 3 * p.num_bodies; ++i) x.v.push_back(Draw(-1.0, 1.0));
-    p.momentum.resize(x.v.size());
-    for (size_t i = 0; i < x.v.size(); ++i) p.momentum[i] = p.mass[i] * x.v[i];
+    for (int i = 0; i < 3 * p.num_bodies; ++i) x.motion.push_back(Draw(-1.0, 1.0));
+    p.load.resize(x.motion.size());
+    for (size_t i = 0; i < x.motion.size(); ++i) p.load[i] = p.mass[i] * x.motion[i];
     for (ContactBlock<double>& c : p.contacts) {
-      const double normal_speed = RowDot(c.a, c.normal_a, c.b, c.normal_b, x.v.data());
-      const double slip = RowDot(c.a, c.tangent_a, c.b, c.tangent_b, x.v.data());
+      const double normal_speed = RowDot(c.a, c.normal_a, c.b, c.normal_b, x.motion.data());
+      const double slip = RowDot(c.a, c.tangent_a, c.b, c.tangent_b, x.motion.data());
       double normal = Draw(0, 1) < 0.4 ? 0.0 : DrawLog(0.01, 10.0);
       double tangent = 0.0;
       ContactMode mode = ContactMode::kOpen;
@@ -208,8 +208,8 @@ class Maker {
         c.c_t = sliding - slip;
         tangent = (sliding > 0.0 ? -1.0 : 1.0) * c.friction * normal;
       }
-      AddRowTransposed(c.a, c.normal_a, c.b, c.normal_b, -normal, p.momentum.data());
-      AddRowTransposed(c.a, c.tangent_a, c.b, c.tangent_b, -tangent, p.momentum.data());
+      AddRowTransposed(c.a, c.normal_a, c.b, c.normal_b, -normal, p.load.data());
+      AddRowTransposed(c.a, c.tangent_a, c.b, c.tangent_b, -tangent, p.load.data());
       x.normal_impulse.push_back(normal);
       x.tangent_impulse.push_back(tangent);
       x.modes.push_back(mode);
@@ -276,7 +276,7 @@ MixedLcp<double> OneSidedForm(const ContactProblem<double>& problem) {
   for (const JointBlock<double>& joint : problem.joints) ny += joint.rows;
   MixedLcp<double> form;
   form.M = Eigen::Map<const VectorX<double>>(problem.mass.data(), nv).asDiagonal();
-  form.p = Eigen::Map<const VectorX<double>>(problem.momentum.data(), nv);
+  form.p = Eigen::Map<const VectorX<double>>(problem.load.data(), nv);
   form.A = MatrixX<double>::Zero(ny, nv);
   form.b = VectorX<double>::Zero(ny);
   Eigen::Index at = 0;
@@ -311,7 +311,7 @@ MixedLcp<double> OneSidedForm(const ContactProblem<double>& problem) {
 ContactSolution<double> FromOneSided(const ContactProblem<double>& problem,
                                      const LcpSolution<double>& solution) {
   ContactSolution<double> result;
-  result.v.assign(solution.v.data(), solution.v.data() + solution.v.size());
+  result.motion.assign(solution.v.data(), solution.v.data() + solution.v.size());
   result.joint_impulse.assign(3 * problem.joints.size(), 0.0);
   Eigen::Index at = 0;
   for (size_t j = 0; j < problem.joints.size(); ++j) {

@@ -58,7 +58,7 @@ Answer ByGeneral(const std::string& kind, const std::string& name, Known known,
 ContactSolution<double> Guess(const ContactProblem<double>& problem, Way way, std::uint64_t seed) {
   const size_t contacts = problem.contacts.size();
   ContactSolution<double> guess;
-  guess.v.assign(problem.mass.size(), 0.0);
+  guess.motion.assign(problem.mass.size(), 0.0);
   guess.joint_impulse.assign(3 * problem.joints.size(), 0.0);
   guess.normal_impulse.assign(contacts, 0.0);
   guess.tangent_impulse.assign(contacts, 0.0);

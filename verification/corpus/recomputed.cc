@@ -36,8 +36,8 @@ class Balance {
   Balance(const ContactProblem<double>& problem, const ContactSolution<double>& x)
       : left(3 * problem.num_bodies), terms(3 * problem.num_bodies) {
     for (Index i = 0; i < left.size(); ++i) {
-      const Real momentum = problem.momentum[i];
-      const Real carried = static_cast<Real>(problem.mass[i]) * x.v[i];
+      const Real momentum = problem.load[i];
+      const Real carried = static_cast<Real>(problem.mass[i]) * x.motion[i];
       left[i] = momentum - carried;
       terms[i] = std::abs(momentum) + std::abs(carried);
     }
@@ -80,9 +80,9 @@ class ContactJudge {
       lever_[body] = std::sqrt(Mass(body, 2) / Mass(body, 0));
       for (int i = 0; i < 3; ++i) {
         const Real length = i == 2 ? lever_[body] : 1;
-        const Real free = problem.momentum[3 * body + i] / Mass(body, i);
+        const Real free = problem.load[3 * body + i] / Mass(body, i);
         speed_[body] =
-            std::max({speed_[body], length * std::abs(static_cast<Real>(x.v[3 * body + i])),
+            std::max({speed_[body], length * std::abs(static_cast<Real>(x.motion[3 * body + i])),
                       length * std::abs(free)});
       }
       total += Mass(body, 0) * speed_[body];
@@ -155,8 +155,8 @@ class ContactJudge {
   Real Speed(const Row& row) const {
     Real sum = 0;
     for (int i = 0; i < 3; ++i) {
-      if (row.a >= 0) sum += static_cast<Real>(row.row_a[i]) * x_.v[3 * row.a + i];
-      if (row.b >= 0) sum += static_cast<Real>(row.row_b[i]) * x_.v[3 * row.b + i];
+      if (row.a >= 0) sum += static_cast<Real>(row.row_a[i]) * x_.motion[3 * row.a + i];
+      if (row.b >= 0) sum += static_cast<Real>(row.row_b[i]) * x_.motion[3 * row.b + i];
     }
     return sum;
   }
@@ -188,7 +188,7 @@ class ContactJudge {
 double RecomputedResidual(const ContactProblem<double>& problem,
                           const ContactSolution<double>& solution) {
   const size_t contacts = problem.contacts.size();
-  if (!Finite(solution.v, problem.mass.size()) || !Finite(solution.normal_impulse, contacts) ||
+  if (!Finite(solution.motion, problem.mass.size()) || !Finite(solution.normal_impulse, contacts) ||
       !Finite(solution.tangent_impulse, contacts) ||
       !Finite(solution.joint_impulse, 3 * problem.joints.size())) {
     return kInfinite;

@@ -154,7 +154,7 @@ void BenchmarkDiscSystem(benchmark::State& state, double arm) {
   for (auto _ : state) {
     system.Factor(problem, modes);
     x.assign(3 * static_cast<size_t>(system.num_blocks()), 0.0);
-    std::copy(problem.momentum.begin(), problem.momentum.end(), x.begin());
+    std::copy(problem.load.begin(), problem.load.end(), x.begin());
     benchmark::DoNotOptimize(system.SolveProximal(problem, modes, x.data(), 1));
   }
   std::vector<Turning> turning;

@@ -64,11 +64,11 @@ class ProblemBuilder {
   void AssembleElements() {
     p_.num_bodies = s_.num_blocks();
     SizeScratch(3 * static_cast<size_t>(p_.num_bodies), &p_.mass);
-    SizeScratch(3 * static_cast<size_t>(p_.num_bodies), &p_.momentum);
+    SizeScratch(3 * static_cast<size_t>(p_.num_bodies), &p_.load);
     p_.dampers.clear();
     p_.joints.clear();
     p_.contacts.clear();
-    p_.pushed_momentum.clear();
+    p_.pushed_load.clear();
     p_.redundant_joints = s_.joint_loops;
     scratch_.poses.clear();
     for (int body = 0; body < s_.num_bodies(); ++body) {
@@ -127,19 +127,18 @@ class ProblemBuilder {
   }
   const T& Time() const { return at_.time; }
 
-  void Body(int k, const T mass[3], const T momentum[3]) {
+  void Body(int k, const T mass[3], const T load[3]) {
     std::copy_n(mass, 3, &p_.mass[3 * static_cast<size_t>(k)]);
-    std::copy_n(momentum, 3, &p_.momentum[3 * static_cast<size_t>(k)]);
+    std::copy_n(load, 3, &p_.load[3 * static_cast<size_t>(k)]);
   }
 
   void Push(int a, const RowPart<T>& row_a, int b, const RowPart<T>& row_b, const T& amount) {
-    AddRowTransposed(s_.bodies[a].block, row_a, s_.bodies[b].block, row_b, amount,
-                     p_.momentum.data());
+    AddRowTransposed(s_.bodies[a].block, row_a, s_.bodies[b].block, row_b, amount, p_.load.data());
   }
 
   void AddForce(int body, const T value[3]) {
     for (int i = 0; i < 3; ++i) {
-      p_.momentum[3 * s_.bodies[body].block + i] += value[i];
+      p_.load[3 * s_.bodies[body].block + i] += value[i];
     }
   }
 

@@ -50,8 +50,7 @@ void ContactSearch::SetBounds(const Model<double>& model, const State<double>& s
     const double* twist = &state.twist[3 * body];
     double* free = &free_twist_[3 * body];
     for (int i = 0; i < 3; ++i) {
-      free[i] =
-          block < 0 ? twist[i] : problem.momentum[3 * block + i] / problem.mass[3 * block + i];
+      free[i] = block < 0 ? twist[i] : problem.load[3 * block + i] / problem.mass[3 * block + i];
     }
     bound_[body] =
         std::max(SpeedOf(twist, lengths_.radius(body)), SpeedOf(free, lengths_.radius(body)));

@@ -19,10 +19,10 @@
 //
 // and takes
 //
-//   Body(k, mass, momentum)                   M x = momentum
-//   Push(a, row_a, b, row_b, amount)          momentum += rowᵀ amount
+//   Body(k, mass, load)                       M x = load
+//   Push(a, row_a, b, row_b, amount)          load += rowᵀ amount
 //   AddForce(body, value)                     the same of a force or impulse on one body
-//   Along(a, row_a, b, row_b, push, damping)  momentum += rowᵀ (push − damping · speed)
+//   Along(a, row_a, b, row_b, push, damping)  load += rowᵀ (push − damping · speed)
 //   Joint(j, rows, rhs)                       row · x = rhs − prescribed speed
 //   Contact(i, contact, rows, c_n, c_t)       n · x + c_n, t · x + c_t
 
@@ -38,7 +38,7 @@ class Equations {
   Equations(const ModelStructure& structure, const Instant<T>& instant, Builder* builder)
       : s_(structure), at_(instant), b_(*builder) {}
 
-  /// Mass, momentum and damping of the body of block k.
+  /// Mass, load and damping of the body of block k.
   void Body(int k) {
     b_.Begin();
     const BodyIndex& index = s_.bodies[s_.moving[k]];
@@ -47,21 +47,21 @@ class Equations {
     const T mass = b_.Number(index.mass);
     const T inertia = b_.Number(index.inertia);
     T diagonal[3] = {mass, mass, inertia};
-    T momentum[3] = {T(0.0), T(0.0), T(0.0)};
+    T load[3] = {T(0.0), T(0.0), T(0.0)};
     if constexpr (kLevel == Level::kVelocity) {
       const T linear = b_.Number(index.linear_damping);
       diagonal[0] = diagonal[1] = mass + at_.h * linear;
       diagonal[2] = inertia + at_.h * b_.Number(index.angular_damping);
-      momentum[0] = mass * (twist[0] + at_.h * b_.Number(kGravityX));
-      momentum[1] = mass * (twist[1] + at_.h * b_.Number(kGravityY));
-      momentum[2] = inertia * twist[2];
+      load[0] = mass * (twist[0] + at_.h * b_.Number(kGravityX));
+      load[1] = mass * (twist[1] + at_.h * b_.Number(kGravityY));
+      load[2] = inertia * twist[2];
     } else if constexpr (kLevel == Level::kAcceleration) {
       const T linear = b_.Number(index.linear_damping);
-      momentum[0] = mass * b_.Number(kGravityX) - linear * twist[0];
-      momentum[1] = mass * b_.Number(kGravityY) - linear * twist[1];
-      momentum[2] = -b_.Number(index.angular_damping) * twist[2];
+      load[0] = mass * b_.Number(kGravityX) - linear * twist[0];
+      load[1] = mass * b_.Number(kGravityY) - linear * twist[1];
+      load[2] = -b_.Number(index.angular_damping) * twist[2];
     }
-    b_.Body(k, diagonal, momentum);
+    b_.Body(k, diagonal, load);
   }
 
   void Spring(const SpringIndex& spring) {

@@ -38,7 +38,8 @@ class EntryBuilder : private internal::LocalEntries<Sink> {
       std::vector<double>& all = scratch->unknowns;
       all.assign(3 * static_cast<size_t>(s_.num_bodies()), 0.0);
       for (int k = 0; k < s_.num_blocks(); ++k) {
-        std::copy_n(&solved.solution->v[3 * static_cast<size_t>(k)], 3, &all[3 * s_.moving[k]]);
+        std::copy_n(&solved.solution->motion[3 * static_cast<size_t>(k)], 3,
+                    &all[3 * s_.moving[k]]);
       }
       unknown_ = all.data();
     }
@@ -122,9 +123,9 @@ class EntryBuilder : private internal::LocalEntries<Sink> {
   }
   LocalJet Time() { return locals_.Add(solved_.instant.time, TimeVariable(s_)); }
 
-  void Body(int k, const LocalJet mass[3], const LocalJet momentum[3]) {
+  void Body(int k, const LocalJet mass[3], const LocalJet load[3]) {
     for (int i = 0; i < 3; ++i) {
-      Emit(locals_, 3 * k + i, mass[i] * unknown_[3 * s_.moving[k] + i] - momentum[i]);
+      Emit(locals_, 3 * k + i, mass[i] * unknown_[3 * s_.moving[k] + i] - load[i]);
     }
   }
 
@@ -476,7 +477,7 @@ class EntryBuilder : private internal::LocalEntries<Sink> {
     }
     if constexpr (kLevel == Level::kVelocity) {
       return FrictionlessSlidingSign(*solved_.problem, solved_.problem->contacts[i],
-                                     solved_.solution->v.data());
+                                     solved_.solution->motion.data());
     }
     if constexpr (kLevel == Level::kCorrection) {
       return 0.0;

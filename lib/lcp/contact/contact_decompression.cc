@@ -64,7 +64,7 @@ bool DecompressionSolver::SolveByModeChanges(const ContactSolverOptions& options
     bool changed = false;
     for (size_t i = 0; i < problem->contacts.size(); ++i) {
       ContactBlock<double>& contact = problem->contacts[i];
-      const ContactValues values = Evaluate(*problem, scales_, contact, solution->v.data());
+      const ContactValues values = Evaluate(*problem, scales_, contact, solution->motion.data());
       changed = ChangeMode(values, solution->normal_impulse[i], solution->tangent_impulse[i],
                            scales_.impulse, &contact, &solution->modes[i]) ||
                 changed;
@@ -89,11 +89,11 @@ ContactSolverReport DecompressionSolver::Solve(const ContactSolverOptions& optio
     report.fallbacks.regularised = system_.regularised_steps() - regularised;
     return report;
   };
-  problem->pushed_momentum = problem->momentum;
+  problem->pushed_load = problem->load;
   for (size_t i = 0; i < problem->contacts.size(); ++i) {
     ContactBlock<double>& contact = problem->contacts[i];
     AddRowTransposed(contact.a, contact.normal_a, contact.b, contact.normal_b, contact.offset,
-                     problem->pushed_momentum.data());
+                     problem->pushed_load.data());
     contact.driven = contact.offset > 0.0;
     solution->normal_impulse[i] = contact.offset;
     solution->tangent_impulse[i] = 0.0;

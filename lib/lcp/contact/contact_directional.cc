@@ -24,7 +24,7 @@ RowPart<double> Slanted(const RowPart<double>& n, double factor, const RowPart<d
 ContactKink KinkOf(const ContactProblem<double>& problem, const ContactSolution<double>& solution,
                    const ContactScales& scales, size_t i, bool touching, double tolerance) {
   const ContactBlock<double>& c = problem.contacts[i];
-  const double* v = solution.v.data();
+  const double* v = solution.motion.data();
   const ContactValues values = Evaluate(problem, scales, c, v);
   const double normal = solution.normal_impulse[i];
   const double zeta = std::max(scales.impulse, values.sigma_n / values.mobility_n);

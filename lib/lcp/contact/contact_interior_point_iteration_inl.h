@@ -44,7 +44,7 @@ class ContactIteration : private InteriorPointSystem<T> {
     zero(&w_.ds_affine, 3 * nc_);
     zero(&w_.target, 3 * nc_);
     for (int i = 0; i < 3 * nb_; ++i) {
-      w_.v[i] = p_.momentum[i] / p_.mass[i];
+      w_.v[i] = p_.load[i] / p_.mass[i];
     }
     for (int i = 0; i < 3 * nc_; ++i) {
       if (Used(i)) {
@@ -119,7 +119,7 @@ class ContactIteration : private InteriorPointSystem<T> {
   }
 
   void Extract(ContactSolution<T>* solution) const {
-    solution->v = w_.v;
+    solution->motion = w_.v;
     solution->joint_impulse = w_.y;
     solution->normal_impulse.assign(nc_, T(0.0));
     solution->tangent_impulse.assign(nc_, T(0.0));
@@ -168,7 +168,7 @@ class ContactIteration : private InteriorPointSystem<T> {
       double t = c_t;
       const auto add = [&](int block, const RowPart<T>& normal, const RowPart<T>& tangent) {
         for (int i = 0; i < 3 && block >= 0; ++i) {
-          const double v = ValueOf(p_.momentum[3 * block + i]) / ValueOf(p_.mass[3 * block + i]);
+          const double v = ValueOf(p_.load[3 * block + i]) / ValueOf(p_.mass[3 * block + i]);
           n += ValueOf(normal[i]) * v;
           t += ValueOf(tangent[i]) * v;
         }
@@ -203,7 +203,7 @@ class ContactIteration : private InteriorPointSystem<T> {
     T* r = w_.residual.data();
     const T* v = w_.v.data();
     for (int i = 0; i < 3 * nb_; ++i) {
-      r[i] = p_.momentum[i] - p_.mass[i] * v[i];
+      r[i] = p_.load[i] - p_.mass[i] * v[i];
     }
     for (const DamperBlock<T>& d : p_.dampers) {
       const T impulse = -d.weight * RowDot(d.a, d.row_a, d.b, d.row_b, v);

@@ -124,8 +124,8 @@ void IslandSolver::Gather(const ContactProblem<double>& problem,
   own.num_bodies = static_cast<int>(island.bodies.size());
   own.redundant_joints = problem.redundant_joints;
   own.mass.clear();
-  own.momentum.clear();
-  own.pushed_momentum.clear();
+  own.load.clear();
+  own.pushed_load.clear();
   own.dampers.clear();
   own.joints.clear();
   own.contacts.clear();
@@ -135,9 +135,9 @@ void IslandSolver::Gather(const ContactProblem<double>& problem,
   start.modes.clear();
   for (const int body : island.bodies) {
     append(problem.mass, body, &own.mass);
-    append(problem.momentum, body, &own.momentum);
-    if (!problem.pushed_momentum.empty()) {
-      append(problem.pushed_momentum, body, &own.pushed_momentum);
+    append(problem.load, body, &own.load);
+    if (!problem.pushed_load.empty()) {
+      append(problem.pushed_load, body, &own.pushed_load);
     }
   }
   for (const int i : island.dampers) {
@@ -158,7 +158,8 @@ void IslandSolver::Gather(const ContactProblem<double>& problem,
 // Islands have nothing in common: threads write to different places.
 void IslandSolver::Scatter(const Island& island, const ContactSolution<double>& solved) {
   for (size_t k = 0; k < island.bodies.size(); ++k) {
-    std::copy_n(&solved.v[3 * k], 3, &result_.v[3 * static_cast<size_t>(island.bodies[k])]);
+    std::copy_n(&solved.motion[3 * k], 3,
+                &result_.motion[3 * static_cast<size_t>(island.bodies[k])]);
   }
   for (size_t k = 0; k < island.joints.size(); ++k) {
     std::copy_n(&solved.joint_impulse[3 * k], 3,
@@ -175,7 +176,7 @@ void IslandSolver::Scatter(const Island& island, const ContactSolution<double>& 
 bool IslandSolver::Solve(const ContactProblem<double>& problem, const ContactSolverOptions& options,
                          ContactSolution<double>* solution, ContactSolverReport* report) {
   ListIslands(problem);
-  result_.v.resize(problem.momentum.size());
+  result_.motion.resize(problem.load.size());
   result_.joint_impulse.resize(3 * problem.joints.size());
   result_.modes.resize(problem.contacts.size());
   result_.normal_impulse.resize(problem.contacts.size());

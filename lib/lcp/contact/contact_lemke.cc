@@ -68,7 +68,7 @@ MixedLcp<double> DenseProblem(const ContactProblem<double>& problem) {
     SetRow(d.a, d.row_a, d.b, d.row_b, 1.0, &row, 0);
     dense.M += d.weight * row.transpose() * row;
   }
-  dense.p = Eigen::Map<const VectorX<double>>(problem.momentum.data(), nv);
+  dense.p = Eigen::Map<const VectorX<double>>(problem.load.data(), nv);
   dense.A = MatrixX<double>::Zero(ny, nv);
   dense.b = VectorX<double>::Zero(ny);
   int row = 0;
@@ -122,7 +122,7 @@ ContactMode ModeOf(const ContactBlock<double>& contact, double normal, double pl
 void Extract(const ContactProblem<double>& problem, const VectorX<double>& v,
              const VectorX<double>& y, const VectorX<double>& z_dense,
              ContactSolution<double>* solution) {
-  solution->v.assign(v.data(), v.data() + v.size());
+  solution->motion.assign(v.data(), v.data() + v.size());
   solution->joint_impulse.assign(3 * problem.joints.size(), 0.0);
   int row = 0;
   for (size_t j = 0; j < problem.joints.size(); ++j) {

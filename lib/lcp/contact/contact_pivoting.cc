@@ -52,7 +52,7 @@ bool ContactPivoting::SolveSystem() {
   const int nb = p.num_bodies;
   x_.assign(6 * static_cast<size_t>(system_->num_blocks()), 0.0);
   for (int i = 0; i < 3 * nb; ++i) {
-    x_[2 * i] = p.momentum[i];
+    x_[2 * i] = p.load[i];
   }
   for (size_t j = 0; j < p.joints.size(); ++j) {
     for (int r = 0; r < p.joints[j].rows; ++r) {
@@ -215,7 +215,7 @@ void ContactPivoting::RaiseInequalities(From from) {
   double impulse_scale = 0.0;
   for (int i = 0; i < 3 * p.num_bodies; ++i) {
     speed = std::max(speed, i % 3 == 2 ? 0.0 : std::abs(x_[2 * i] + x_[2 * i + 1]));
-    speed = std::max(speed, i % 3 == 2 ? 0.0 : std::abs(p.momentum[i] / p.mass[i]));
+    speed = std::max(speed, i % 3 == 2 ? 0.0 : std::abs(p.load[i] / p.mass[i]));
   }
   for (size_t i = 0; i < modes_.size(); ++i) {
     impulse_scale = std::max(impulse_scale, std::abs(Impulse(static_cast<int>(i)).At(1.0)));
@@ -252,7 +252,7 @@ void ContactPivoting::Extract(ContactSolution<double>* solution) const {
   const size_t nb = p.num_bodies;
   solution->modes = modes_;
   for (size_t i = 0; i < 3 * nb; ++i) {
-    solution->v[i] = x_[2 * i];
+    solution->motion[i] = x_[2 * i];
   }
   for (size_t j = 0; j < 3 * p.joints.size(); ++j) {
     solution->joint_impulse[j] = x_[2 * (3 * nb + j)];
@@ -354,7 +354,7 @@ bool ContactPivoting::Solve(const ContactProblem<double>& problem, From from, do
       if (direction > 0.0) {
         return false;  // a ray
       }
-      SizeScratch(3 * static_cast<size_t>(problem.num_bodies), &solution->v);
+      SizeScratch(3 * static_cast<size_t>(problem.num_bodies), &solution->motion);
       Extract(solution);
       return true;
     }

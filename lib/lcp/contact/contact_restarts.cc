@@ -43,7 +43,7 @@ void SetOpen(ContactSolution<double>* solution) {
 void DrawStart(const ContactProblem<double>& problem, std::mt19937_64* random,
                ContactSolution<double>* solution) {
   const auto draw = [&] { return static_cast<double>((*random)() >> 11) * 0x1p-53; };
-  const double size = ImpulseScale(problem.scale_momentum());
+  const double size = ImpulseScale(problem.scale_load());
   SetOpen(solution);
   for (size_t i = 0; i < problem.contacts.size(); ++i) {
     const ContactBlock<double>& c = problem.contacts[i];

@@ -98,7 +98,7 @@ void ContactSolver::Reserve(int num_bodies, int num_joints, int num_contacts) {
   }
   mode_solve_.Reserve(3 * static_cast<size_t>(blocks));
   for (ContactSolution<double>* solution : {&trial_, &entry_, &last_, &centre_}) {
-    solution->v.reserve(3 * num_bodies);
+    solution->motion.reserve(3 * num_bodies);
     solution->joint_impulse.reserve(3 * num_joints);
     solution->normal_impulse.reserve(num_contacts);
     solution->tangent_impulse.reserve(num_contacts);
@@ -144,7 +144,7 @@ bool ContactSolver::SolveByModeChanges(const ContactProblem<double>& problem,
     ModeChange worst_change{ContactMode::kOpen};
     for (size_t i = 0; i < num_contacts; ++i) {
       const ContactValues values =
-          Evaluate(problem, scales_, problem.contacts[i], solution->v.data());
+          Evaluate(problem, scales_, problem.contacts[i], solution->motion.data());
       const ModeChange change = Contradiction(
           problem.contacts[i], values, solution->modes[i], solution->normal_impulse[i],
           solution->tangent_impulse[i], scales_.impulse, options.tolerance);
@@ -209,7 +209,8 @@ bool ContactSolver::Polish(const ContactProblem<double>& problem,
     }
     scales_.Compute(problem, trial_);
     for (size_t i = 0; i < problem.contacts.size(); ++i) {
-      const ContactValues values = Evaluate(problem, scales_, problem.contacts[i], trial_.v.data());
+      const ContactValues values =
+          Evaluate(problem, scales_, problem.contacts[i], trial_.motion.data());
       solution->modes[i] =
           Contradiction(problem.contacts[i], values, trial_.modes[i], trial_.normal_impulse[i],
                         trial_.tangent_impulse[i], scales_.impulse, options.tolerance)
@@ -278,9 +279,9 @@ void ContactSolver::MeasureWithoutContacts(const ContactProblem<double>& problem
   solution->normal_impulse.assign(problem.contacts.size(), 0.0);
   solution->tangent_impulse.assign(problem.contacts.size(), 0.0);
   if (!SolveWithModes(problem, solution, report)) {
-    solution->v.resize(problem.momentum.size());
-    for (size_t i = 0; i < solution->v.size(); ++i) {
-      solution->v[i] = problem.momentum[i] / problem.mass[i];
+    solution->motion.resize(problem.load.size());
+    for (size_t i = 0; i < solution->motion.size(); ++i) {
+      solution->motion[i] = problem.load[i] / problem.mass[i];
     }
     solution->joint_impulse.assign(3 * problem.joints.size(), 0.0);
   }

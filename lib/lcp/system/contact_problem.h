@@ -10,8 +10,10 @@
 //   w = t v + c_t,   |λt| ≤ μ λn                        Coulomb
 //   w > 0 ⇒ λt = −μ λn,   w < 0 ⇒ λt = μ λn
 //
-// Each row touches at most two blocks. Units: v m/s and rad/s, impulses N s and N m s, M kg and
-// kg m².
+// Each row touches at most two blocks. Units: v m/s and rad/s, p and impulses N s and N m s, M kg
+// and kg m². Problems of the same form give accelerations (v m/s² and rad/s², p and λ N and N m)
+// and corrections of poses (v m and rad, p and λ kg m and kg m²): hence `motion` for v and `load`
+// for p.
 //
 // As a complementarity problem each contact with friction has three rows (the planar form of
 // Pfeiffer and Glocker, Multibody Dynamics with Unilateral Contacts, 1996, ch. 6). The sliding
@@ -91,32 +93,30 @@ struct ContactProblem {
   int num_bodies = 0;
   std::vector<T> mass;  ///< 3 num_bodies: diagonal of M
   std::vector<DamperBlock<T>> dampers;
-  std::vector<T> momentum;  ///< p, 3 num_bodies
+  std::vector<T> load;  ///< p, 3 num_bodies
   std::vector<JointBlock<T>> joints;
   bool redundant_joints = false;  ///< joints form loops: their rows may be dependent
   std::vector<ContactBlock<T>> contacts;
   /// p + Σ nᵀ o, empty where no contact has an offset: of what size speeds are. A body that the
   /// compression stopped has p = 0 to rounding, and is pushed from both sides.
-  std::vector<T> pushed_momentum;
+  std::vector<T> pushed_load;
 
-  const std::vector<T>& scale_momentum() const {
-    return pushed_momentum.empty() ? momentum : pushed_momentum;
-  }
+  const std::vector<T>& scale_load() const { return pushed_load.empty() ? load : pushed_load; }
 
   /// Empties it; memory stays.
   void Clear() {
     num_bodies = 0;
     mass.clear();
     dampers.clear();
-    momentum.clear();
+    load.clear();
     joints.clear();
     redundant_joints = false;
     contacts.clear();
-    pushed_momentum.clear();
+    pushed_load.clear();
   }
   /// Memory of the vectors.
   size_t bytes() const {
-    return sizeof(T) * (mass.capacity() + momentum.capacity() + pushed_momentum.capacity()) +
+    return sizeof(T) * (mass.capacity() + load.capacity() + pushed_load.capacity()) +
            sizeof(DamperBlock<T>) * dampers.capacity() + sizeof(JointBlock<T>) * joints.capacity() +
            sizeof(ContactBlock<T>) * contacts.capacity();
   }
@@ -125,7 +125,7 @@ struct ContactProblem {
 /// A solution; vectors are sized for the problem. Impulses of joints: 3 a joint, unused rows 0.
 template <typename T>
 struct ContactSolution {
-  std::vector<T> v;                ///< 3 num_bodies
+  std::vector<T> motion;           ///< v, 3 num_bodies
   std::vector<T> joint_impulse;    ///< 3 num_joints
   std::vector<T> normal_impulse;   ///< a contact
   std::vector<T> tangent_impulse;  ///< a contact, signed
@@ -133,7 +133,7 @@ struct ContactSolution {
 
   /// Memory of the vectors.
   size_t bytes() const {
-    return sizeof(T) * (v.capacity() + joint_impulse.capacity() + normal_impulse.capacity() +
+    return sizeof(T) * (motion.capacity() + joint_impulse.capacity() + normal_impulse.capacity() +
                         tangent_impulse.capacity()) +
            sizeof(ContactMode) * modes.capacity();
   }
@@ -191,7 +191,7 @@ void ForEachImpulse(const ContactProblem<double>& problem, const ContactSolution
 inline double FrictionlessSlidingSign(const ContactProblem<double>& problem,
                                       const ContactBlock<double>& c, const double* v) {
   const double slip = RowDot(c.a, c.tangent_a, c.b, c.tangent_b, v) + c.c_t;
-  const std::vector<double>& momentum = problem.scale_momentum();
+  const std::vector<double>& momentum = problem.scale_load();
   double terms = std::abs(c.c_t);
   const auto add = [&](int block, const RowPart<double>& row) {
     for (int i = 0; i < 3 && block >= 0; ++i) {

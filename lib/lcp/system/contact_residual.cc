@@ -39,9 +39,9 @@ double MomentumResidual(const ContactProblem<double>& problem, const ContactScal
                         const ContactSolution<double>& solution) {
   thread_local std::vector<double> left;
   thread_local std::vector<double> terms;  // the largest
-  left.assign(problem.momentum.begin(), problem.momentum.end());
+  left.assign(problem.load.begin(), problem.load.end());
   terms.resize(left.size());
-  const double* v = solution.v.data();
+  const double* v = solution.motion.data();
   for (size_t i = 0; i < left.size(); ++i) {
     terms[i] = std::max(std::abs(left[i]), std::abs(problem.mass[i] * v[i]));
     left[i] -= problem.mass[i] * v[i];
@@ -123,7 +123,7 @@ void ContactScales::Compute(const ContactProblem<double>& problem,
 
 void ContactScales::ComputeSpeeds(const ContactProblem<double>& problem,
                                   const ContactSolution<double>& solution) {
-  const std::vector<double>& momentum = problem.scale_momentum();
+  const std::vector<double>& momentum = problem.scale_load();
   const std::vector<double>& mass = problem.mass;
   speed.assign(problem.num_bodies, 0.0);
   lever.assign(problem.num_bodies, 0.0);
@@ -133,7 +133,8 @@ void ContactScales::ComputeSpeeds(const ContactProblem<double>& problem,
     lever[body] = std::sqrt(mass[3 * body + 2] / mass[3 * body]);
     for (int i = 0; i < 3; ++i) {
       const int k = 3 * body + i;
-      const double component = std::max(std::abs(solution.v[k]), std::abs(momentum[k] / mass[k]));
+      const double component =
+          std::max(std::abs(solution.motion[k]), std::abs(momentum[k] / mass[k]));
       speed[body] = std::max(speed[body], i < 2 ? component : lever[body] * component);
     }
     total_ += mass[3 * body] * speed[body];
@@ -201,10 +202,10 @@ double NaturalResidual(const ContactProblem<double>& problem,
   thread_local ContactScales scales;
   scales.Compute(problem, solution);
   double worst = std::max(MomentumResidual(problem, scales, solution),
-                          JointResidual(problem, scales, solution.v.data()));
+                          JointResidual(problem, scales, solution.motion.data()));
   for (size_t i = 0; i < problem.contacts.size(); ++i) {
     const ContactBlock<double>& c = problem.contacts[i];
-    const ContactValues values = Evaluate(problem, scales, c, solution.v.data());
+    const ContactValues values = Evaluate(problem, scales, c, solution.motion.data());
     const double normal = solution.normal_impulse[i];
     const double zeta = std::max(scales.impulse, values.sigma_n / values.mobility_n);
     double residual = RowResidual(normal - c.offset, zeta, values.s_n, values.sigma_n);
@@ -232,7 +233,7 @@ double BalancedResidual(const ContactProblem<double>& problem, double tolerance,
   if (residual <= tolerance || *worst_contact >= 0) {
     return residual;
   }
-  std::vector<double> v(problem.momentum.begin(), problem.momentum.end());
+  std::vector<double> v(problem.load.begin(), problem.load.end());
   ForEachImpulse(problem, *solution, [&](int body, const RowPart<double>& row, double impulse) {
     for (int i = 0; body >= 0 && i < 3; ++i) {
       v[3 * body + i] += row[i] * impulse;
@@ -244,15 +245,15 @@ double BalancedResidual(const ContactProblem<double>& problem, double tolerance,
   for (const DamperBlock<double>& d : problem.dampers) {
     for (const int body : {d.a, d.b}) {
       for (int i = 3 * body; body >= 0 && i < 3 * body + 3; ++i) {
-        v[i] = solution->v[i];
+        v[i] = solution->motion[i];
       }
     }
   }
-  std::swap(v, solution->v);
+  std::swap(v, solution->motion);
   int worst = -1;
   const double balanced = NaturalResidual(problem, *solution, &worst);
   if (!(balanced < residual)) {
-    std::swap(v, solution->v);
+    std::swap(v, solution->motion);
     return residual;
   }
   *worst_contact = worst;
@@ -266,7 +267,7 @@ void FindDegenerateContacts(const ContactProblem<double>& problem,
   const ContactScales scales(problem, solution);
   for (size_t i = 0; i < problem.contacts.size(); ++i) {
     const ContactBlock<double>& c = problem.contacts[i];
-    const ContactValues values = Evaluate(problem, scales, c, solution.v.data());
+    const ContactValues values = Evaluate(problem, scales, c, solution.motion.data());
     const double normal = solution.normal_impulse[i];
     const double zeta = std::max(scales.impulse, values.sigma_n / values.mobility_n);
     const bool grazes =
@@ -287,7 +288,7 @@ ContactMargin MarginOfContact(const ContactProblem<double>& problem,
                               int contact) {
   using Kind = ContactMargin::Kind;
   const ContactBlock<double>& c = problem.contacts[contact];
-  const ContactValues values = Evaluate(problem, scales, c, solution.v.data());
+  const ContactValues values = Evaluate(problem, scales, c, solution.motion.data());
   const ContactMode mode = solution.modes[contact];
   const double normal = solution.normal_impulse[contact];
   // 0 / 0: nothing moves and nothing pushes.

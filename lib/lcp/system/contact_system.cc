@@ -365,7 +365,7 @@ double ContactSystem::SolveRegularised(const ContactProblem<double>& problem,
   const size_t size = 3 * static_cast<size_t>(num_blocks()) * columns;
   rhs_.assign(x, x + size);
   SolveOnce<false>(problem, modes, x, columns);
-  const FreeMomenta free = {problem.scale_momentum().data(), 1};
+  const FreeMomenta free = {problem.scale_load().data(), 1};
   double left =
       Refine<false>(problem, modes, Regularisation::kKept, free, x, columns, kResidualGoal);
   if (Expand(left, problem, modes)) {
@@ -384,7 +384,7 @@ double ContactSystem::SolveProximal(const ContactProblem<double>& problem,
   const size_t size = 3 * static_cast<size_t>(num_blocks()) * columns;
   rhs_.assign(x, x + size);
   SolveOnce<false>(problem, modes, x, columns);
-  const FreeMomenta free = {problem.scale_momentum().data(), 1};
+  const FreeMomenta free = {problem.scale_load().data(), 1};
   const double left =
       Refine<false>(problem, modes, Regularisation::kLeftOut, free, x, columns, kResidualGoal);
   if (left <= kContradictory) {

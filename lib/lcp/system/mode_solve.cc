@@ -26,7 +26,7 @@ bool ModeSolve::Solve(const ContactProblem<double>& problem, const ContactSoluti
   if (centre != nullptr) {
     start_.assign(rhs.size(), 0.0);
   }
-  std::copy(problem.momentum.begin(), problem.momentum.end(), rhs.begin());
+  std::copy(problem.load.begin(), problem.load.end(), rhs.begin());
   for (size_t j = 0; j < problem.joints.size(); ++j) {
     const size_t row = first_joint + 3 * j;
     std::copy_n(problem.joints[j].rhs, problem.joints[j].rows, &rhs[row]);
@@ -59,7 +59,7 @@ bool ModeSolve::Solve(const ContactProblem<double>& problem, const ContactSoluti
     system->Solve(problem, modes, x_.data(), 1);
   }
   const auto joints = x_.begin() + static_cast<std::ptrdiff_t>(first_joint);
-  solution->v.assign(x_.begin(), joints);
+  solution->motion.assign(x_.begin(), joints);
   solution->joint_impulse.assign(joints, joints + static_cast<std::ptrdiff_t>(num_joint_rows));
   solution->normal_impulse.assign(problem.contacts.size(), 0.0);
   solution->tangent_impulse.assign(problem.contacts.size(), 0.0);

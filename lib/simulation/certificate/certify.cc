@@ -36,9 +36,9 @@ Approach ApproachOf(const ModelStructure& s, const StepRecord& r, size_t i) {
     for (int k = 0; k < 3; ++k) {
       const double twist = r.before.twist[3 * body + k];
       approach.before += row[k] * twist;
-      approach.free += row[k] * (moving < 0 ? twist
-                                            : r.problem.momentum[3 * moving + k] /
-                                                  r.problem.mass[3 * moving + k]);
+      approach.free +=
+          row[k] *
+          (moving < 0 ? twist : r.problem.load[3 * moving + k] / r.problem.mass[3 * moving + k]);
     }
   };
   add(contact.a, block.normal_a);

@@ -100,8 +100,8 @@ double Acceleration(const Model<double>& model, const Segment* segment) {
   double largest = std::hypot(model.parameters[kGravityX], model.parameters[kGravityY]);
   if (segment != nullptr && segment->num_stages > 0) {
     const ContactProblem<double>& problem = segment->stages[0].problem;
-    for (size_t i = 0; i < problem.momentum.size(); ++i) {
-      if (i % 3 < 2) largest = std::max(largest, std::abs(problem.momentum[i]) / problem.mass[i]);
+    for (size_t i = 0; i < problem.load.size(); ++i) {
+      if (i % 3 < 2) largest = std::max(largest, std::abs(problem.load[i]) / problem.mass[i]);
     }
   }
   return largest;

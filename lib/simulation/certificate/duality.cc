@@ -64,7 +64,7 @@ void RunExtents::Add(long k, double t, const State<double>& state, const RowMatr
     for (int i = 0; i < 3; ++i) {
       const double arm = i == 2 ? radius_[block] : 1.0;
       const size_t row = 3 * block + i;
-      const double free = problem_.momentum[row] / problem_.mass[row];
+      const double free = problem_.load[row] / problem_.mass[row];
       const double speed = std::max(std::abs(state.twist[3 * body + i]), std::abs(free));
       state_.twist = std::max(state_.twist, arm * speed);
       if (i < 2) {

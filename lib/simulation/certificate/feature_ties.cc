@@ -198,7 +198,7 @@ class PairTies {
         mass += p.mass[3 * block];
       }
       for (int k = 3 * block; k < 3 * block + 3 && block >= 0; ++k) {
-        momentum += p.momentum[k] * p.momentum[k] / p.mass[k];
+        momentum += p.load[k] * p.load[k] / p.mass[k];
       }
     }
     return std::sqrt(jump) > kDifference * (kJump * std::sqrt(momentum) +

@@ -16,7 +16,7 @@ bool JustTouches(const StepRecord& record, size_t i) {
   const ActiveContact& contact = record.contacts[i];
   const ContactBlock<double>& block = record.problem.contacts[i];
   const double slack =
-      RowDot(block.a, block.normal_a, block.b, block.normal_b, record.solution.v.data()) +
+      RowDot(block.a, block.normal_a, block.b, block.normal_b, record.solution.motion.data()) +
       block.c_n;
   return slack <= kCoordinateRounding * PlaceOf(record.before, contact.a, contact.b) / record.h;
 }
@@ -104,11 +104,11 @@ void StepDirectional::MoveAlong(const Model<double>& model, const StepRecord& re
     const bool body = i < static_cast<Eigen::Index>(problem->mass.size());
     const double mass = body ? problem->mass[i] : 1.0;
     rate = std::max(rate, std::abs(r[i]) / mass);
-    speed = body ? std::max(speed, std::abs(problem->momentum[i]) / mass) : speed;
+    speed = body ? std::max(speed, std::abs(problem->load[i]) / mass) : speed;
   }
   const double way = rate > 0.0 ? kLinearisedWay * (speed > 0.0 ? speed : 1.0) / rate : 0.0;
-  for (size_t i = 0; i < problem->momentum.size(); ++i) {
-    problem->momentum[i] += way * r[static_cast<Eigen::Index>(i)];
+  for (size_t i = 0; i < problem->load.size(); ++i) {
+    problem->load[i] += way * r[static_cast<Eigen::Index>(i)];
   }
   int block = problem->num_bodies;
   for (JointBlock<double>& joint : problem->joints) {
@@ -141,7 +141,7 @@ bool StepDirectional::ChooseImpulses(const Model<double>& model, const StepRecor
     return false;
   }
   std::vector<double> x(3 * static_cast<size_t>(system.num_blocks()), 0.0);
-  std::copy(problem.momentum.begin(), problem.momentum.end(), x.begin());
+  std::copy(problem.load.begin(), problem.load.end(), x.begin());
   const size_t joints = problem.mass.size();
   for (size_t j = 0; j < problem.joints.size(); ++j) {
     std::copy_n(problem.joints[j].rhs, problem.joints[j].rows, &x[joints + 3 * j]);

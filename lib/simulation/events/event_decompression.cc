@@ -102,7 +102,7 @@ bool EventStepper::Decompress(const Model<double>& model, const Impulses& compre
     return false;
   }
   decompression_.system().MoveFactorsTo(&impact.system);
-  SpreadTwists(s, solution.v, &state->twist);
+  SpreadTwists(s, solution.motion, &state->twist);
   impact.new_twist = state->twist;
   return true;
 }

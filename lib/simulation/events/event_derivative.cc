@@ -41,7 +41,7 @@ void PlaceTangent(const ModelStructure& s, const Segment& segment, double c, con
     }
     auto twist = TwistRows(s, body, *out);
     for (int j = 0; j < terms; ++j) {
-      const Eigen::Vector3d value = BlockOf(segment.stages[j].solution.v, block);
+      const Eigen::Vector3d value = BlockOf(segment.stages[j].solution.motion, block);
       if (a[j] != 0.0) {
         twist += a[j] * (tau * BlockRows(block, a_dot[j]) + value * tau_dot);
       }

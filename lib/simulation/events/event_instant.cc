@@ -115,7 +115,7 @@ std::string WhatIsUnsolved(const ModelStructure& structure, const Impulses& impu
   if (solved.worst_contact >= 0) {
     return NameOfContact(structure, impulses.contacts, solved.worst_contact);
   }
-  const std::vector<double>& v = impulses.solution.v;
+  const std::vector<double>& v = impulses.solution.motion;
   const int joint = MostViolatedJoint(impulses.problem, v, v, kNamedJoint);
   return joint < 0 ? "momentum" : NameOfContradicted(structure, joint);
 }
@@ -196,7 +196,7 @@ bool EventStepper::Settle(const Model<double>& model, const Impulses& impact, St
     outcome->message = "twists of contacts that come to rest";
     return false;
   }
-  SpreadTwists(*model.structure, part->impulses.solution.v, &state->twist);
+  SpreadTwists(*model.structure, part->impulses.solution.motion, &state->twist);
   part->impulses.new_twist = state->twist;
   return true;
 }

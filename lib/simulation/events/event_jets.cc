@@ -67,10 +67,10 @@ class EventReplay {
       }
       return x;
     };
-    const size_t bodies = solution.v.size();
-    out->v.resize(bodies);
+    const size_t bodies = solution.motion.size();
+    out->motion.resize(bodies);
     for (size_t i = 0; i < bodies; ++i) {
-      out->v[i] = jet(solution.v[i], i);
+      out->motion[i] = jet(solution.motion[i], i);
     }
     out->normal_impulse.assign(problem.contacts.size(), T(0.0));
     out->tangent_impulse.assign(problem.contacts.size(), T(0.0));
@@ -96,7 +96,7 @@ class EventReplay {
   void RunImpulses(Impulses* impulses, State<T>* state, bool is_impact = true) {
     ContactSolution<T> solution;
     SolveImpulses(impulses, *state, is_impact, &solution);
-    SetTwists(solution.v, state);
+    SetTwists(solution.motion, state);
     compression_ = solution.normal_impulse;
   }
 
@@ -129,10 +129,10 @@ class EventReplay {
           SolveContactsByInteriorPoint(problem, options, &workspace, solution).converged;
       double difference = 0.0;
       double size = 0.0;
-      for (size_t i = 0; i < impulses->solution.v.size(); ++i) {
-        difference =
-            std::max(difference, std::abs(ValueOf(solution->v[i]) - impulses->solution.v[i]));
-        size = std::max(size, std::abs(impulses->solution.v[i]));
+      for (size_t i = 0; i < impulses->solution.motion.size(); ++i) {
+        difference = std::max(
+            difference, std::abs(ValueOf(solution->motion[i]) - impulses->solution.motion[i]));
+        size = std::max(size, std::abs(impulses->solution.motion[i]));
       }
       // Where impulses are not unique, or it stalls, the modes that the step found are eliminated.
       if (converged && difference <= kUnrolledAgrees * size) {
@@ -172,8 +172,8 @@ class EventReplay {
       for (int k = 0; k < s_.num_blocks(); ++k) {
         for (int i = 0; i < 3; ++i) {
           const int at = 3 * s_.moving[k] + i;
-          out->pose[at] += a_hat[j] * tau * tau * stages[j].v[3 * k + i];
-          out->twist[at] += a[j] * tau * stages[j].v[3 * k + i];
+          out->pose[at] += a_hat[j] * tau * tau * stages[j].motion[3 * k + i];
+          out->twist[at] += a[j] * tau * stages[j].motion[3 * k + i];
         }
       }
     }
@@ -181,17 +181,17 @@ class EventReplay {
 
   // A ← A + (I − B)⁻¹ (N − A) of values and derivatives.
   void NewtonStep(const ContactSolution<T>& next, ContactSolution<T>* stage) const {
-    RowMatrixXd step(static_cast<Eigen::Index>(next.v.size()), kWidth + 1);
-    for (size_t k = 0; k < next.v.size(); ++k) {
-      const T left = next.v[k] - stage->v[k];
+    RowMatrixXd step(static_cast<Eigen::Index>(next.motion.size()), kWidth + 1);
+    for (size_t k = 0; k < next.motion.size(); ++k) {
+      const T left = next.motion[k] - stage->motion[k];
       step(static_cast<Eigen::Index>(k), 0) = ValueOf(left);
       step.row(static_cast<Eigen::Index>(k)).tail(kWidth) = left.v.transpose();
     }
     implicit_.Solve(&step);
-    for (size_t k = 0; k < next.v.size(); ++k) {
+    for (size_t k = 0; k < next.motion.size(); ++k) {
       T change(step(static_cast<Eigen::Index>(k), 0));
       change.v = step.row(static_cast<Eigen::Index>(k)).tail(kWidth).transpose();
-      stage->v[k] += change;
+      stage->motion[k] += change;
     }
   }
 
@@ -212,10 +212,11 @@ class EventReplay {
         Accelerate(*segment, state, T(time + tableau.c[i] * tau), &segment->stages[i], &next);
         double change = 0.0;
         double size = 0.0;
-        for (size_t k = 0; implicit && k < next.v.size(); ++k) {
-          change = std::max({change, DerivativeSize(T(next.v[k] - stages[i].v[k])),
-                             std::abs(ValueOf(next.v[k]) - ValueOf(stages[i].v[k]))});
-          size = std::max({size, DerivativeSize(next.v[k]), std::abs(ValueOf(next.v[k]))});
+        for (size_t k = 0; implicit && k < next.motion.size(); ++k) {
+          change = std::max({change, DerivativeSize(T(next.motion[k] - stages[i].motion[k])),
+                             std::abs(ValueOf(next.motion[k]) - ValueOf(stages[i].motion[k]))});
+          size =
+              std::max({size, DerivativeSize(next.motion[k]), std::abs(ValueOf(next.motion[k]))});
         }
         if (!implicit || fixed_point.Arrived(change, size)) {
           stages[i] = next;
@@ -230,8 +231,8 @@ class EventReplay {
           // The iteration may have diverged. Values are known: Newton's method is for derivatives,
           // which those of nearby values would be taken at.
           stages[i] = stages[i - 1];
-          for (size_t k = 0; k < stages[i].v.size(); ++k) {
-            stages[i].v[k].a = segment->stages[i].solution.v[k];
+          for (size_t k = 0; k < stages[i].motion.size(); ++k) {
+            stages[i].motion[k].a = segment->stages[i].solution.motion[k];
           }
         } else {
           NewtonStep(next, &stages[i]);
@@ -262,7 +263,7 @@ class EventReplay {
             std::vector<double>(segment->contacts.size(), 0.0), &node.system, &correction);
       for (int b = 0; b < s_.num_blocks(); ++b) {
         for (int i = 0; i < 3; ++i) {
-          after->pose[3 * s_.moving[b] + i] += correction.v[3 * b + i];
+          after->pose[3 * s_.moving[b] + i] += correction.motion[3 * b + i];
         }
       }
     }

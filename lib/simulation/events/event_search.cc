@@ -185,8 +185,8 @@ void EventSearch::SearchClosed(const Model<double>& model, Event* event) {
     }
     const ContactSolution<double>& start = end.motion.stages[0].solution;
     double scale = 0.0;
-    for (const double momentum : end.motion.stages[0].problem.momentum) {
-      scale = std::max(scale, std::abs(momentum));
+    for (const double load : end.motion.stages[0].problem.load) {
+      scale = std::max(scale, std::abs(load));
     }
     for (const double normal : start.normal_impulse) {
       scale = std::max(scale, std::abs(normal));

@@ -44,7 +44,7 @@ double CutByPoses(const Model<double>& model, const Segment& motion, double leng
   for (int k = 0; k < motion.num_corrections; ++k) {
     for (const int body : {limit.a, limit.b}) {
       if (const int block = model.structure->bodies[body].block; block >= 0) {
-        const double* by = &motion.corrections[k].solution.v[3 * block];
+        const double* by = &motion.corrections[k].solution.motion[3 * block];
         moved += std::hypot(by[0], by[1]) + std::abs(by[2]) * std::max(1.0, apart(at.pose));
       }
     }

@@ -307,7 +307,7 @@ bool EventStepper::SolveImpact(const Model<double>& model, Impulses* impact, Sta
   }
   solver_.system().MoveFactorsTo(&impact->system);
   const double before = KineticEnergy(model, state->twist);
-  SpreadTwists(*model.structure, impact->solution.v, &state->twist);
+  SpreadTwists(*model.structure, impact->solution.motion, &state->twist);
   impact->new_twist = state->twist;
   if (settings.impact_law != ImpactLaw::kNewton && !Decompress(model, *impact, state, outcome)) {
     return false;
@@ -346,7 +346,7 @@ bool EventStepper::SolveByShortStep(const Model<double>& model, double t, double
     return false;
   }
   solver_.system().MoveFactorsTo(&impulses.system);
-  SpreadTwists(*model.structure, impulses.solution.v, &state->twist);
+  SpreadTwists(*model.structure, impulses.solution.motion, &state->twist);
   impulses.new_twist = state->twist;
   return true;
 }
@@ -357,8 +357,8 @@ void EventStepper::GuessModes(const std::vector<ActiveContact>& contacts,
                               ContactProblem<double>* problem,
                               ContactSolution<double>* solution) const {
   double scale = 0.0;
-  for (size_t i = 0; i < problem->momentum.size(); ++i) {
-    scale = std::max(scale, std::abs(problem->momentum[i]) / problem->mass[i]);
+  for (size_t i = 0; i < problem->load.size(); ++i) {
+    scale = std::max(scale, std::abs(problem->load[i]) / problem->mass[i]);
   }
   for (const ContactBlock<double>& contact : problem->contacts) {
     scale = std::max({scale, std::abs(contact.c_n), std::abs(contact.c_t)});

@@ -22,31 +22,31 @@ class ImplicitResidual {
 
   void Fill() {
     const int nb = p_.num_bodies;
-    std::vector<T> momentum(3 * nb);
-    const double* v = s_.v.data();
+    std::vector<T> load(3 * nb);
+    const double* v = s_.motion.data();
     for (int i = 0; i < 3 * nb; ++i) {
-      momentum[i] = p_.momentum[i] - p_.mass[i] * v[i];
+      load[i] = p_.load[i] - p_.mass[i] * v[i];
     }
     for (const DamperBlock<T>& d : p_.dampers) {
       const T impulse = -d.weight * RowDot(d.a, d.row_a, d.b, d.row_b, v);
-      AddRowTransposed(d.a, d.row_a, d.b, d.row_b, impulse, momentum.data());
+      AddRowTransposed(d.a, d.row_a, d.b, d.row_b, impulse, load.data());
     }
     for (size_t j = 0; j < p_.joints.size(); ++j) {
       const JointBlock<T>& joint = p_.joints[j];
       for (int k = 0; k < joint.rows; ++k) {
         AddRowTransposed(joint.a, joint.row_a[k], joint.b, joint.row_b[k],
-                         s_.joint_impulse[3 * j + k], momentum.data());
+                         s_.joint_impulse[3 * j + k], load.data());
         Set(3 * (nb + static_cast<int>(j)) + k,
             joint.rhs[k] - RowDot(joint.a, joint.row_a[k], joint.b, joint.row_b[k], v));
       }
     }
     for (size_t i = 0; i < p_.contacts.size(); ++i) {
       if (contact_block_[i] >= 0) {
-        Contact(static_cast<int>(i), &momentum);
+        Contact(static_cast<int>(i), &load);
       }
     }
     for (int i = 0; i < 3 * nb; ++i) {
-      Set(i, momentum[i]);
+      Set(i, load[i]);
     }
   }
 
@@ -57,12 +57,12 @@ class ImplicitResidual {
     }
   }
 
-  void Contact(int i, std::vector<T>* momentum) {
+  void Contact(int i, std::vector<T>* load) {
     const ContactBlock<T>& c = p_.contacts[i];
-    const double* v = s_.v.data();
+    const double* v = s_.motion.data();
     const int row = 3 * contact_block_[i];
     const double normal = s_.normal_impulse[i];
-    AddRowTransposed(c.a, c.normal_a, c.b, c.normal_b, normal, momentum->data());
+    AddRowTransposed(c.a, c.normal_a, c.b, c.normal_b, normal, load->data());
     Set(row,
         c.driven ? T(c.offset - normal) : T(-c.c_n - RowDot(c.a, c.normal_a, c.b, c.normal_b, v)));
     const T slip = c.c_t + RowDot(c.a, c.tangent_a, c.b, c.tangent_b, v);
@@ -72,7 +72,7 @@ class ImplicitResidual {
     } else {
       tangent = -signs_[i] * normal * c.friction;
     }
-    AddRowTransposed(c.a, c.tangent_a, c.b, c.tangent_b, tangent, momentum->data());
+    AddRowTransposed(c.a, c.tangent_a, c.b, c.tangent_b, tangent, load->data());
   }
 
   const ContactProblem<T>& p_;
@@ -89,7 +89,7 @@ inline std::vector<double> SlidingSigns(const ContactProblem<double>& problem,
   std::vector<double> signs(problem.contacts.size());
   for (size_t i = 0; i < signs.size(); ++i) {
     signs[i] = solution.modes[i] == ContactMode::kClosed
-                   ? FrictionlessSlidingSign(problem, problem.contacts[i], solution.v.data())
+                   ? FrictionlessSlidingSign(problem, problem.contacts[i], solution.motion.data())
                    : SlidingSign(solution.modes[i]);
   }
   return signs;

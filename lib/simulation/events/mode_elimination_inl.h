@@ -38,7 +38,7 @@ class ModeElimination {
     }
     VectorX<T> rhs(size);
     for (int i = 0; i < 3 * p.num_bodies; ++i) {
-      rhs[i] = p.momentum[i];
+      rhs[i] = p.load[i];
     }
     int row = 3 * p.num_bodies;
     for (const JointBlock<T>& joint : p.joints) {
@@ -73,9 +73,9 @@ class ModeElimination {
         x += lu.Solve(left);
       }
     }
-    out->v.resize(3 * p.num_bodies);
+    out->motion.resize(3 * p.num_bodies);
     for (int i = 0; i < 3 * p.num_bodies; ++i) {
-      out->v[i] = x[i];
+      out->motion[i] = x[i];
     }
     out->normal_impulse.assign(p.contacts.size(), T(0.0));
     out->tangent_impulse.assign(p.contacts.size(), T(0.0));

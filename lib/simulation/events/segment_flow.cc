@@ -75,9 +75,9 @@ void AddBodies(const ModelStructure& structure, double factor, const std::vector
 // accelerations: they cancel in a body at rest, whose acceleration is the rounding of these.
 void SizesOfTerms(const SolvedNode& node, std::vector<double>* sizes) {
   const ContactProblem<double>& p = node.problem;
-  sizes->assign(p.momentum.size(), 0.0);
-  for (size_t i = 0; i < p.momentum.size(); ++i) {
-    (*sizes)[i] = std::abs(p.momentum[i]);
+  sizes->assign(p.load.size(), 0.0);
+  for (size_t i = 0; i < p.load.size(); ++i) {
+    (*sizes)[i] = std::abs(p.load[i]);
   }
   const auto add = [&](int block, const RowPart<double>& row, double impulse) {
     for (int i = 0; block >= 0 && i < 3; ++i) {
@@ -119,7 +119,7 @@ bool ThrowsOut(const SolvedNode& node, double error) {
   constexpr double kMostOfError = 1e6;
   const std::vector<double>& mass = node.problem.mass;
   for (int k = 0; k < node.problem.num_bodies; ++k) {
-    const double* moved = &node.solution.v[3 * static_cast<size_t>(k)];
+    const double* moved = &node.solution.motion[3 * static_cast<size_t>(k)];
     const double radius = std::sqrt(mass[3 * k + 2] / mass[3 * k]);
     const double far = std::max(std::hypot(moved[0], moved[1]), radius * std::abs(moved[2]));
     if (far > std::max(kShareOfBody * radius, kMostOfError * error)) {
@@ -165,7 +165,7 @@ bool SegmentFlow::Solve(const std::vector<ContactMode>& modes, SolvedNode* node)
   node->solution.modes = modes;
   const bool solved = mode_solve_.Solve(node->problem, nullptr, &node->system, &node->solution);
   counts_.whole_system += node->system.expansions() - before;
-  return solved && AllFinite(node->solution.v) && AllFinite(node->solution.joint_impulse) &&
+  return solved && AllFinite(node->solution.motion) && AllFinite(node->solution.joint_impulse) &&
          AllFinite(node->solution.normal_impulse) && AllFinite(node->solution.tangent_impulse);
 }
 
@@ -186,8 +186,8 @@ bool SegmentFlow::SolveImplicitStage(const Model<double>& model, Segment* segmen
   const NystromTableau& tableau = NystromTableau::Of(IntegratorOf(model.structure->settings));
   const double tau = segment->length;
   SolvedNode& stage = segment->stages[i];
-  std::vector<double>& acceleration = stage.solution.v;
-  const std::vector<double> start = segment->stages[i - 1].solution.v;
+  std::vector<double>& acceleration = stage.solution.motion;
+  const std::vector<double> start = segment->stages[i - 1].solution.motion;
   acceleration = start;
   State<double> state;
   for (int iteration = 0; iteration <= kMostIterations; ++iteration) {
@@ -251,7 +251,7 @@ bool SegmentFlow::HasConverged(const SolvedNode& stage, const std::vector<double
   }
   const double tolerance = iteration < kMostFixedPoints + 5 ? kImplicitStage : 1e3 * kImplicitStage;
   for (size_t k = 0; k < last.size(); ++k) {
-    const double change = std::abs(stage.solution.v[k] - last[k]);
+    const double change = std::abs(stage.solution.motion[k] - last[k]);
     if (!(change <= tolerance * (by_terms ? std::max(size, terms_[k]) : size))) {
       return false;
     }
@@ -274,7 +274,7 @@ bool SegmentFlow::Integrate(const Model<double>& model, Segment* segment, std::s
       state->pose[i] += c * tau * segment->before.twist[i];
     }
     for (int j = 0; j < terms; ++j) {
-      const std::vector<double>& acceleration = segment->stages[j].solution.v;
+      const std::vector<double>& acceleration = segment->stages[j].solution.motion;
       AddBodies(structure, tau * tau * a_hat[j], acceleration, &state->pose);
       AddBodies(structure, tau * a[j], acceleration, &state->twist);
     }
@@ -442,7 +442,7 @@ bool SegmentFlow::CorrectPoses(const Model<double>& model, Segment* segment, std
           "rows are off: masses are too far apart";
       return false;
     }
-    AddBodies(structure, 1.0, node.solution.v, &segment->after.pose);
+    AddBodies(structure, 1.0, node.solution.motion, &segment->after.pose);
     segment->num_corrections = k + 1;
   }
   return true;
@@ -481,7 +481,7 @@ bool SegmentFlow::ProjectTwists(const Model<double>& model, Segment* segment,
   const Impulses& projection = segment->projection;
   SizesOfTerms(segment->stages[segment->num_stages - 1], &terms_);
   const std::vector<double>& mass = projection.problem.mass;
-  const std::vector<double>& v = projection.solution.v;
+  const std::vector<double>& v = projection.solution.motion;
   const auto lever = [&](size_t block) { return std::sqrt(mass[3 * block + 2] / mass[3 * block]); };
   double fastest = 0.0;
   for (size_t block = 0; 3 * block < v.size(); ++block) {
@@ -494,13 +494,13 @@ bool SegmentFlow::ProjectTwists(const Model<double>& model, Segment* segment,
   }
   const int joint =
       segment->length > 0.0
-          ? MostViolatedJoint(projection.problem, projection.solution.v, terms_, kUnmetRow)
+          ? MostViolatedJoint(projection.problem, projection.solution.motion, terms_, kUnmetRow)
           : -1;
   if (joint >= 0) {
     *message = NameOfContradicted(*model.structure, joint);
     return false;
   }
-  SpreadTwists(*model.structure, projection.solution.v, &segment->after.twist);
+  SpreadTwists(*model.structure, projection.solution.motion, &segment->after.twist);
   segment->projection.new_twist = segment->after.twist;
   return true;
 }

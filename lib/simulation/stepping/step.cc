@@ -136,7 +136,7 @@ Stepper::Stepper(const Model<double>& model, int threads)
   record_.problem.joints.reserve(s.joints.size());
   for (ContactSolution<double>* solution :
        {&record_.solution, &last_solution_, &narrow_solution_}) {
-    solution->v.reserve(3 * s.num_blocks());
+    solution->motion.reserve(3 * s.num_blocks());
     solution->joint_impulse.reserve(3 * s.joints.size());
     solution->normal_impulse.reserve(contacts);
     solution->tangent_impulse.reserve(contacts);
@@ -190,7 +190,7 @@ ContactMode Stepper::InitialMode(const ContactBlock<double>& contact) const {
   double tangent = contact.c_t;
   const auto add = [&](int block, const RowPart<double>& n, const RowPart<double>& t) {
     for (int i = 0; i < 3 && block >= 0; ++i) {
-      const double v = p.momentum[3 * block + i] / p.mass[3 * block + i];
+      const double v = p.load[3 * block + i] / p.mass[3 * block + i];
       normal += n[i] * v;
       tangent += t[i] * v;
     }
@@ -262,7 +262,7 @@ void Stepper::Describe(const Model<double>& model, int contact, StepReport* repo
   report->message = NameOfContact(s, record_.contacts, contact);
   if (contact < 0) {
     const int joint =
-        MostViolatedJoint(record_.problem, record_.solution.v, record_.solution.v, 0.0);
+        MostViolatedJoint(record_.problem, record_.solution.motion, record_.solution.motion, 0.0);
     report->message = joint < 0 ? "momentum"
                                 : "the joints' equations, most of all of joint " +
                                       s.joints[joint].name + " (are they contradictory?)";
@@ -362,7 +362,7 @@ StepReport Stepper::Step(const Model<double>& model, double t, double h, State<d
   r.before.pose.assign(state->pose.begin(), state->pose.end());
   r.before.twist.assign(state->twist.begin(), state->twist.end());
   AssembleFree(model, *state, t, h, &r.problem, &scratch_);
-  if (!AllFinite(r.problem.momentum) || !AllFinite(r.problem.mass)) {
+  if (!AllFinite(r.problem.load) || !AllFinite(r.problem.mass)) {
     report.status = StepStatus::kDiverged;
     report.message = "a force or momentum is not finite";
     return report;
@@ -387,7 +387,7 @@ StepReport Stepper::Step(const Model<double>& model, double t, double h, State<d
     if (!solved.solved) {
       break;
     }
-    FullTwist(structure, *state, r.solution.v, &r.new_twist);
+    FullTwist(structure, *state, r.solution.motion, &r.new_twist);
     if (!search_.CheckBounds(model, r.new_twist, scratch_)) {
       break;
     }

@@ -55,7 +55,7 @@ void StepImplicit(const Model<T>& model, Stepper* stepper, const State<double>& 
   for (int k = 0; k < s.num_blocks(); ++k) {
     for (int i = 0; i < 3; ++i) {
       T& twist = state->twist[3 * s.moving[k] + i];
-      twist.a = record.solution.v[3 * k + i];
+      twist.a = record.solution.motion[3 * k + i];
       for (int d = 0; d < kWidth; ++d) {
         twist.v[d] = rhs[(3 * k + i) * kWidth + d];
       }

@@ -48,7 +48,7 @@ bool SolveUnrolled(const Model<T>& model, const StepRecord& record, State<T>* st
       SolveContactsByInteriorPoint(problem, options, &workspace, &solution);
   for (int k = 0; k < s.num_blocks(); ++k) {
     for (int i = 0; i < 3; ++i) {
-      state->twist[3 * s.moving[k] + i] = solution.v[3 * k + i];
+      state->twist[3 * s.moving[k] + i] = solution.motion[3 * k + i];
     }
   }
   internal::MovePoses(s, record.h, state);

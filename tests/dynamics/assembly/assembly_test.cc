@@ -35,9 +35,9 @@ TEST(AssemblyTest, AFreeBodyByHand) {
   const ContactProblem<double>& p = a.problem;
   EXPECT_DOUBLE_EQ(p.mass[0], 2.07);  // damping is implicit
   EXPECT_DOUBLE_EQ(p.mass[2], 0.59);
-  EXPECT_DOUBLE_EQ(p.momentum[0], 2.0 * (3.0 + 0.1) + 0.25);  // half of the step's force
-  EXPECT_DOUBLE_EQ(p.momentum[1], 2.0 * (4.0 - 1.0));
-  EXPECT_DOUBLE_EQ(p.momentum[2], 3.0 - 0.25 + 0.1);
+  EXPECT_DOUBLE_EQ(p.load[0], 2.0 * (3.0 + 0.1) + 0.25);  // half of the step's force
+  EXPECT_DOUBLE_EQ(p.load[1], 2.0 * (4.0 - 1.0));
+  EXPECT_DOUBLE_EQ(p.load[2], 3.0 - 0.25 + 0.1);
   EXPECT_TRUE(p.dampers.empty());
   EXPECT_TRUE(p.contacts.empty());
 }
@@ -50,7 +50,7 @@ TEST(AssemblyTest, SpringsPullAndDampAlongTheirLine) {
                  "damping": 3, "rest_length": 1.5}]})");
   const ContactProblem<double> p = Assemble(scene, 0.0, 0.1).problem;
   // −h k (ℓ − L0) and the damper's share of the carrier's prescribed speed, h c v.
-  EXPECT_DOUBLE_EQ(p.momentum[0], -0.5 + 0.15);
+  EXPECT_DOUBLE_EQ(p.load[0], -0.5 + 0.15);
   ASSERT_EQ(p.dampers.size(), 1u);
   EXPECT_DOUBLE_EQ(p.dampers[0].weight, 0.3);
   EXPECT_EQ(p.dampers[0].b, -1);
@@ -75,7 +75,7 @@ TEST(AssemblyTest, JointsWithDriftPrescribedTwistsAndDrives) {
   EXPECT_DOUBLE_EQ(joint.row_a[1][2], -0.5);
   EXPECT_EQ(joint.b, -1);
   // Effort h 7 on a, damping h 0.4 of the relative rate with k's part known.
-  EXPECT_NEAR(a.problem.momentum[2], 0.7 + 0.04 * 2.0, 1e-15);
+  EXPECT_NEAR(a.problem.load[2], 0.7 + 0.04 * 2.0, 1e-15);
   EXPECT_DOUBLE_EQ(a.problem.dampers[0].weight, 0.04);
 }
 
@@ -123,7 +123,7 @@ std::vector<double> Accelerations(const ContactProblem<double>& p) {
   ContactSystem system;
   EXPECT_TRUE(system.Factor(p, {}));
   std::vector<double> x(3 * system.num_blocks(), 0.0);
-  std::copy(p.momentum.begin(), p.momentum.end(), x.begin());
+  std::copy(p.load.begin(), p.load.end(), x.begin());
   for (size_t j = 0; j < p.joints.size(); ++j) {
     std::copy_n(p.joints[j].rhs, p.joints[j].rows, &x[3 * (p.num_bodies + j)]);
   }
@@ -140,9 +140,9 @@ TEST(AssembleAccelerationTest, ForcesOfAFreeBody) {
     "forces": [{"name": "on", "body": "a", "force": [0, 6], "torque": 0.3, "at": [0.5, 0]},
                {"name": "off", "body": "a", "force": [100, 0], "start": 0.1}]})");
   // m g − c v + k (ℓ − L0) − c_s (d·v) + F; the spring shortens at 3 m/s.
-  EXPECT_NEAR(p.momentum[0], 2 * 1 - 0.1 * 3 + 4 * 0.5 - 0.5 * 3, 1e-14);
-  EXPECT_NEAR(p.momentum[1], 2 * -9 + 0.1 + 6, 1e-14);
-  EXPECT_NEAR(p.momentum[2], -0.2 * 2 + 0.3 + 0.5 * std::cos(0.5) * 6, 1e-14);
+  EXPECT_NEAR(p.load[0], 2 * 1 - 0.1 * 3 + 4 * 0.5 - 0.5 * 3, 1e-14);
+  EXPECT_NEAR(p.load[1], 2 * -9 + 0.1 + 6, 1e-14);
+  EXPECT_NEAR(p.load[2], -0.2 * 2 + 0.3 + 0.5 * std::cos(0.5) * 6, 1e-14);
 }
 
 TEST(AssembleAccelerationTest, APendulumsAngularAcceleration) {

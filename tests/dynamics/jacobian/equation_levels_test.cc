@@ -126,11 +126,11 @@ class EquationLevelsTest : public testing::TestWithParam<Case> {
                                const ContactSolution<double>& s) const {
     std::vector<double> r(3 * (p.num_bodies + p.joints.size() + p.contacts.size()), 0.0);
     for (int i = 0; i < 3 * p.num_bodies; ++i) {
-      r[i] = p.mass[i] * s.v[i] - p.momentum[i];
+      r[i] = p.mass[i] * s.motion[i] - p.load[i];
     }
     for (const DamperBlock<double>& d : p.dampers) {
       AddRowTransposed(d.a, d.row_a, d.b, d.row_b,
-                       d.weight * RowDot(d.a, d.row_a, d.b, d.row_b, s.v.data()), r.data());
+                       d.weight * RowDot(d.a, d.row_a, d.b, d.row_b, s.motion.data()), r.data());
     }
     for (size_t j = 0; j < p.joints.size(); ++j) {
       const JointBlock<double>& joint = p.joints[j];
@@ -138,7 +138,8 @@ class EquationLevelsTest : public testing::TestWithParam<Case> {
         AddRowTransposed(joint.a, joint.row_a[k], joint.b, joint.row_b[k],
                          -s.joint_impulse[3 * j + k], r.data());
         r[3 * (p.num_bodies + j) + k] =
-            RowDot(joint.a, joint.row_a[k], joint.b, joint.row_b[k], s.v.data()) - joint.rhs[k];
+            RowDot(joint.a, joint.row_a[k], joint.b, joint.row_b[k], s.motion.data()) -
+            joint.rhs[k];
       }
     }
     for (size_t i = 0; i < p.contacts.size(); ++i) {
@@ -150,9 +151,9 @@ class EquationLevelsTest : public testing::TestWithParam<Case> {
                                  : -SlidingSign(modes_[i]) * c.friction * normal;
       AddRowTransposed(c.a, c.normal_a, c.b, c.normal_b, -normal, r.data());
       AddRowTransposed(c.a, c.tangent_a, c.b, c.tangent_b, -tangent, r.data());
-      r[row] = RowDot(c.a, c.normal_a, c.b, c.normal_b, s.v.data()) + c.c_n;
+      r[row] = RowDot(c.a, c.normal_a, c.b, c.normal_b, s.motion.data()) + c.c_n;
       if (modes_[i] == ContactMode::kSticking) {
-        r[row + 1] = RowDot(c.a, c.tangent_a, c.b, c.tangent_b, s.v.data()) + c.c_t;
+        r[row + 1] = RowDot(c.a, c.tangent_a, c.b, c.tangent_b, s.motion.data()) + c.c_t;
       }
     }
     return r;
@@ -176,7 +177,7 @@ TEST_P(EquationLevelsTest, EntriesAreTheDifferencesOfTheResidual) {
   ContactSolution<double> solution;
   solution.modes = modes_;
   for (int i = 0; i < 3 * s.num_blocks(); ++i) {
-    solution.v.push_back(std::sin(1.0 + i));
+    solution.motion.push_back(std::sin(1.0 + i));
   }
   for (size_t i = 0; i < 3 * s.joints.size(); ++i) {
     solution.joint_impulse.push_back(std::cos(2.0 + i));
@@ -200,7 +201,7 @@ TEST_P(EquationLevelsTest, EntriesAreTheDifferencesOfTheResidual) {
   // Of all bodies: of a step the new twists, those of prescribed motion too.
   std::vector<double> new_twist = state_.twist;
   for (int k = 0; k < s.num_blocks(); ++k) {
-    std::copy_n(&solution.v[3 * k], 3, &new_twist[3 * s.moving[k]]);
+    std::copy_n(&solution.motion[3 * k], 3, &new_twist[3 * s.moving[k]]);
   }
   view.new_twist = &new_twist;
   view.state = &state_;

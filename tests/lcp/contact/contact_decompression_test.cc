@@ -41,8 +41,8 @@ TEST(DecompressionSolverTest, ADrivenContactPushesByItsOffset) {
   const Solved s = Push(0.3, 0.0, 0.7, 0.0);
   EXPECT_TRUE(s.problem.contacts[0].driven);
   EXPECT_DOUBLE_EQ(s.solution.normal_impulse[0], 0.7);
-  EXPECT_DOUBLE_EQ(s.solution.v[1], 0.7);
-  EXPECT_DOUBLE_EQ(s.solution.v[0], 0.3);
+  EXPECT_DOUBLE_EQ(s.solution.motion[1], 0.7);
+  EXPECT_DOUBLE_EQ(s.solution.motion[0], 0.3);
 }
 
 TEST(DecompressionSolverTest, ItSlidesOrSticksByTheWholeImpulse) {
@@ -50,12 +50,12 @@ TEST(DecompressionSolverTest, ItSlidesOrSticksByTheWholeImpulse) {
   EXPECT_TRUE(slides.problem.contacts[0].driven);
   EXPECT_EQ(slides.solution.modes[0], ContactMode::kSlidingNegative);
   EXPECT_DOUBLE_EQ(slides.solution.tangent_impulse[0], 0.14);
-  EXPECT_DOUBLE_EQ(slides.solution.v[0], -0.16);
+  EXPECT_DOUBLE_EQ(slides.solution.motion[0], -0.16);
   const Solved sticks = Push(-0.3, 0.0, 0.7, 0.5);
   EXPECT_TRUE(sticks.problem.contacts[0].driven);
   EXPECT_EQ(sticks.solution.modes[0], ContactMode::kSticking);
   EXPECT_NEAR(sticks.solution.tangent_impulse[0], 0.3, 1e-15);
-  EXPECT_NEAR(sticks.solution.v[0], 0.0, 1e-15);
+  EXPECT_NEAR(sticks.solution.motion[0], 0.0, 1e-15);
 }
 
 TEST(DecompressionSolverTest, WhatWouldApproachClosesWithMoreThanItsOffset) {
@@ -69,15 +69,15 @@ TEST(DecompressionSolverTest, WhatWouldApproachClosesWithMoreThanItsOffset) {
   EXPECT_FALSE(s.problem.contacts[1].driven);
   EXPECT_EQ(s.solution.modes[1], ContactMode::kClosed);
   EXPECT_NEAR(s.solution.normal_impulse[1], 1.5 / 3.5, 1e-15);
-  EXPECT_NEAR(s.solution.v[1] + 0.5 * s.solution.v[2], 0.0, 1e-15);
-  EXPECT_NEAR(s.solution.v[1] - 0.5 * s.solution.v[2], 3.5 - 1.5 * 1.5 / 3.5, 1e-14);
+  EXPECT_NEAR(s.solution.motion[1] + 0.5 * s.solution.motion[2], 0.0, 1e-15);
+  EXPECT_NEAR(s.solution.motion[1] - 0.5 * s.solution.motion[2], 3.5 - 1.5 * 1.5 / 3.5, 1e-14);
 }
 
 TEST(DecompressionSolverTest, AnOffsetThatDoesNotEndAnApproachIsExceeded) {
   const Solved s = Push(0.0, -1.0, 0.7, 0.0);
   EXPECT_FALSE(s.problem.contacts[0].driven);
   EXPECT_DOUBLE_EQ(s.solution.normal_impulse[0], 1.0);
-  EXPECT_NEAR(s.solution.v[1], 0.0, 1e-15);
+  EXPECT_NEAR(s.solution.motion[1], 0.0, 1e-15);
 }
 
 TEST(DecompressionSolverTest, ABodyStoppedInCompressionIsPushedFromBothSides) {
@@ -86,8 +86,8 @@ TEST(DecompressionSolverTest, ABodyStoppedInCompressionIsPushedFromBothSides) {
   std::mt19937_64 random(3);
   for (int trial = 0; trial < 50; ++trial) {
     ContactProblem<double> problem = testing::FreeBodies({0.0, 0.0, 0.0, 0.0, 0.0, 0.0});
-    problem.momentum[1] = testing::Draw(&random, -1e-32, 1e-32);
-    problem.momentum[2] = testing::Draw(&random, -1e-32, 1e-32);
+    problem.load[1] = testing::Draw(&random, -1e-32, 1e-32);
+    problem.load[2] = testing::Draw(&random, -1e-32, 1e-32);
     problem.contacts = {FloorContact(0, -0.115488, 0.0, 0.0), FloorContact(0, 0.115488, 0.0, 0.0),
                         FloorContact(1, -0.06, 0.0, 0.0), FloorContact(1, 0.05, 0.0, 0.0)};
     const double arms[] = {testing::Draw(&random, -0.1, 0.0), testing::Draw(&random, 0.0, 0.1)};
@@ -102,15 +102,15 @@ TEST(DecompressionSolverTest, ABodyStoppedInCompressionIsPushedFromBothSides) {
     const Solved s = Decompress(problem, ContactMode::kClosed);
     EXPECT_TRUE(s.problem.contacts[2].driven && s.problem.contacts[3].driven);
     EXPECT_NEAR(s.solution.normal_impulse[0] + s.solution.normal_impulse[1], push, 1e-14);
-    EXPECT_NEAR(s.solution.v[1], 0.0, 1e-14);
-    EXPECT_NEAR(s.solution.v[4], push, 1e-14);
+    EXPECT_NEAR(s.solution.motion[1], 0.0, 1e-14);
+    EXPECT_NEAR(s.solution.motion[4], push, 1e-14);
   }
 }
 
 // Complementarity recomputed from the data, row by row.
 void ExpectSolution(const Solved& s) {
   constexpr double kTolerance = 1e-9;
-  const double* v = s.solution.v.data();
+  const double* v = s.solution.motion.data();
   for (size_t i = 0; i < s.problem.contacts.size(); ++i) {
     const ContactBlock<double>& c = s.problem.contacts[i];
     const double normal = s.solution.normal_impulse[i];
@@ -152,8 +152,8 @@ TEST(DecompressionSolverTest, RandomProblemsAreSolvedAsByTheDenseForm) {
     ExpectSolution(s);
     by_dense += s.report.solved_by == SolvedBy::kLemke ? 1 : 0;
     double difference = 0.0;
-    for (size_t i = 0; i < dense.v.size(); ++i) {
-      difference = std::max(difference, std::abs(dense.v[i] - s.solution.v[i]));
+    for (size_t i = 0; i < dense.motion.size(); ++i) {
+      difference = std::max(difference, std::abs(dense.motion[i] - s.solution.motion[i]));
     }
     EXPECT_LT(difference, 1e-8) << trial;
     for (size_t i = 0; i < problem.contacts.size(); ++i) {

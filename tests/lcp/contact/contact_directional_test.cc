@@ -19,7 +19,7 @@ ContactProblem<double> Point(double px, double py, double friction, int floors =
   ContactProblem<double> problem;
   problem.num_bodies = 1;
   problem.mass = {kMass, kMass, 1.0};
-  problem.momentum = {px, py, 0.0};
+  problem.load = {px, py, 0.0};
   for (int i = 0; i < floors; ++i) {
     problem.contacts.push_back({0,
                                 -1,
@@ -40,7 +40,7 @@ ContactSolution<double> SolutionOf(const ContactProblem<double>& problem, double
                                    double tangent, ContactMode mode) {
   const size_t count = problem.contacts.size();
   ContactSolution<double> solution;
-  solution.v = {vx, 0.0, 0.0};
+  solution.motion = {vx, 0.0, 0.0};
   solution.normal_impulse.assign(count, normal / static_cast<double>(count));
   solution.tangent_impulse.assign(count, tangent / static_cast<double>(count));
   solution.modes.assign(count, mode);
@@ -133,11 +133,11 @@ TEST(ContactDirectionalTest, TouchingAtRestFollowsCoulombInTheRates) {
   // Another body gives the impulses and speeds a scale.
   problem.num_bodies = 2;
   problem.mass.insert(problem.mass.end(), {1.0, 1.0, 1.0});
-  problem.momentum.insert(problem.momentum.end(), {0.0, -1.0, 0.0});
+  problem.load.insert(problem.load.end(), {0.0, -1.0, 0.0});
   problem.contacts.push_back(problem.contacts[0]);
   problem.contacts[1].a = 1;
   ContactSolution<double> solution = SolutionOf(problem, 0.0, 0.0, 0.0, ContactMode::kSticking);
-  solution.v.assign(6, 0.0);
+  solution.motion.assign(6, 0.0);
   solution.normal_impulse[1] = 1.0;
   Kinked kinked(problem, solution);
   EXPECT_EQ(kinked.kinks[0].kind, Kind::kTouchesAtRest);

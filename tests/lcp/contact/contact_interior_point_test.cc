@@ -35,8 +35,8 @@ TEST(ContactInteriorPointTest, SlidingStickingAndOpen) {
     p.contacts.push_back(FloorContact(0, 0.0, 0.0, c.friction));
     ContactSolution<double> solution;
     EXPECT_TRUE(RunSolver(p, 1e-14, &solution).converged);
-    EXPECT_NEAR(solution.v[0], c.expected_vx, 1e-6) << c.friction;
-    EXPECT_NEAR(solution.v[1], 0.0, 1e-6);
+    EXPECT_NEAR(solution.motion[0], c.expected_vx, 1e-6) << c.friction;
+    EXPECT_NEAR(solution.motion[1], 0.0, 1e-6);
     EXPECT_EQ(solution.modes[0], c.mode);
   }
   ContactProblem<double> apart = FreeBodies({1.0, 0.5, 0.0});
@@ -44,7 +44,7 @@ TEST(ContactInteriorPointTest, SlidingStickingAndOpen) {
   ContactSolution<double> solution;
   EXPECT_TRUE(RunSolver(apart, 1e-14, &solution).converged);
   EXPECT_EQ(solution.modes[0], ContactMode::kOpen);
-  EXPECT_NEAR(solution.v[1], 0.5, 1e-6);
+  EXPECT_NEAR(solution.motion[1], 0.5, 1e-6);
 }
 
 TEST(ContactInteriorPointTest, MassRatioOfAMillion) {
@@ -52,7 +52,7 @@ TEST(ContactInteriorPointTest, MassRatioOfAMillion) {
   ContactProblem<double> p = FreeBodies({0.0, -0.1, 0.0, 0.0, -1.0, 0.0});
   for (int i = 3; i < 6; ++i) {
     p.mass[i] *= 1e6;
-    p.momentum[i] *= 1e6;
+    p.load[i] *= 1e6;
   }
   p.contacts.push_back(FloorContact(0, 0.0, -0.1, 0.5));
   ContactBlock<double> upper = FloorContact(1, 0.0, -0.1, 0.5);
@@ -62,8 +62,8 @@ TEST(ContactInteriorPointTest, MassRatioOfAMillion) {
   p.contacts.push_back(upper);
   ContactSolution<double> solution;
   EXPECT_TRUE(RunSolver(p, 1e-14, &solution).converged);
-  EXPECT_NEAR(solution.v[1], 0.0, 1e-6);
-  EXPECT_NEAR(solution.v[4], 0.0, 1e-6);
+  EXPECT_NEAR(solution.motion[1], 0.0, 1e-6);
+  EXPECT_NEAR(solution.motion[4], 0.0, 1e-6);
   EXPECT_NEAR(solution.normal_impulse[0], 1e6 + 0.1, 1.0);
 }
 
@@ -90,7 +90,7 @@ TEST(ContactInteriorPointTest, NeverNaN) {
   p.contacts.push_back(ceiling);
   ContactSolution<double> solution;
   EXPECT_FALSE(RunSolver(p, 1e-14, &solution).converged);
-  for (const double v : solution.v) EXPECT_TRUE(std::isfinite(v));
+  for (const double v : solution.motion) EXPECT_TRUE(std::isfinite(v));
 }
 
 template <int N>
@@ -100,7 +100,7 @@ void CheckJets() {
     ContactProblem<Jet<N>> p;
     p.num_bodies = 1;
     p.mass = {Jet<N>(1.0), Jet<N>(1.0), Jet<N>(0.1)};
-    p.momentum = {Jet<N>(1.0, 0), Jet<N>(-1.0), Jet<N>(0.0)};
+    p.load = {Jet<N>(1.0, 0), Jet<N>(-1.0), Jet<N>(0.0)};
     ContactBlock<Jet<N>> c;
     c.a = 0;
     c.normal_a = {Jet<N>(0.0), Jet<N>(1.0), Jet<N>(0.0)};
@@ -115,9 +115,9 @@ void CheckJets() {
     ContactInteriorPointOptions options;
     options.complementarity = 1e-20;
     EXPECT_TRUE(SolveContactsByInteriorPoint(p, options, &workspace, &solution).converged);
-    EXPECT_NEAR(solution.v[0].a, 0.7, 1e-12);
-    EXPECT_NEAR(solution.v[0].v[0], 1.0, 1e-9);
-    EXPECT_NEAR(solution.v[0].v[1], -1.0, 1e-9);
+    EXPECT_NEAR(solution.motion[0].a, 0.7, 1e-12);
+    EXPECT_NEAR(solution.motion[0].v[0], 1.0, 1e-9);
+    EXPECT_NEAR(solution.motion[0].v[1], -1.0, 1e-9);
   } else {
     GTEST_SKIP() << "built without Jets";
   }

@@ -59,7 +59,8 @@ TEST(IslandSolverTest, WhatIsApartIsSolvedAsTogether) {
     int worst = -1;
     EXPECT_LT(NaturalResidual(p, apart, &worst), 1e-12);
     // Both solve to 1e-10 of the speeds.
-    for (size_t i = 0; i < apart.v.size(); ++i) EXPECT_NEAR(apart.v[i], together.v[i], 1e-10);
+    for (size_t i = 0; i < apart.motion.size(); ++i)
+      EXPECT_NEAR(apart.motion[i], together.motion[i], 1e-10);
     for (size_t i = 0; i < p.contacts.size(); ++i) {
       EXPECT_NEAR(apart.normal_impulse[i], together.normal_impulse[i], 1e-10);
       EXPECT_NEAR(apart.tangent_impulse[i], together.tangent_impulse[i], 1e-10);
@@ -80,7 +81,7 @@ TEST(IslandSolverTest, TheBitsDoNotDependOnThreadsOrEarlierProblems) {
     ContactSolution<double> second = testing::EmptySolution(p);
     reused.Partition(p);
     ASSERT_TRUE(reused.Solve(p, ContactSolverOptions(), &second, &report));
-    EXPECT_EQ(first.v, second.v);
+    EXPECT_EQ(first.motion, second.motion);
     EXPECT_EQ(first.normal_impulse, second.normal_impulse);
     EXPECT_EQ(first.tangent_impulse, second.tangent_impulse);
     EXPECT_EQ(first.joint_impulse, second.joint_impulse);
@@ -100,7 +101,7 @@ TEST(IslandSolverTest, AnIslandWithoutSolutionLeavesTheGuess) {
   islands.Partition(p);
   ContactSolverReport report;
   EXPECT_FALSE(islands.Solve(p, ContactSolverOptions(), &solution, &report));
-  EXPECT_EQ(solution.v, testing::EmptySolution(p).v);
+  EXPECT_EQ(solution.motion, testing::EmptySolution(p).motion);
   EXPECT_TRUE(report.worst_contact == 1 || report.worst_contact == 3) << report.worst_contact;
   EXPECT_EQ(report.fallbacks.interior_point, 1);  // of the island that leaned on it
   EXPECT_EQ(report.fallbacks.dense, 1);

@@ -47,7 +47,7 @@ TEST(ContactLemkeTest, JointsAreKept) {
   ASSERT_TRUE(SolveContactsByLemke(p, &solution, &iterations));
   EXPECT_NEAR(solution.normal_impulse[0], 4.0, 1e-13);
   EXPECT_NEAR(solution.joint_impulse[0], -3.0, 1e-13);
-  EXPECT_NEAR(solution.v[4], 0.0, 1e-13);
+  EXPECT_NEAR(solution.motion[4], 0.0, 1e-13);
 }
 
 TEST(ContactLemkeTest, ContradictoryJointsAreTold) {

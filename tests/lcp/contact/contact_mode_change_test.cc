@@ -15,11 +15,11 @@ struct Case {
   Case(double vx, double vy) : p(testing::FreeBodies({vx, vy, 0.0})) {
     p.contacts.push_back(testing::FloorContact(0, 0.0, 0.0, 0.5));
     s = testing::EmptySolution(p);
-    s.v = {vx, vy, 0.0};
+    s.motion = {vx, vy, 0.0};
   }
   ModeChange Judge(ContactMode mode, double normal, double tangent) {
     const ContactScales scales(p, s);
-    const ContactValues values = Evaluate(p, scales, p.contacts[0], s.v.data());
+    const ContactValues values = Evaluate(p, scales, p.contacts[0], s.motion.data());
     return Contradiction(p.contacts[0], values, mode, normal, tangent, 1.0, kTolerance);
   }
   ContactProblem<double> p;
@@ -42,7 +42,7 @@ TEST(ContactModeChangeTest, WhatApproachesCloses) {
 
 TEST(ContactModeChangeTest, ImpulsesAndSlipAreJudgedByTheirMode) {
   Case rest(0.0, 0.0);
-  rest.p.momentum[1] = -1.0;
+  rest.p.load[1] = -1.0;
   EXPECT_EQ(rest.Judge(ContactMode::kSticking, 1.0, 0.49).violation, 0.0);
   EXPECT_EQ(rest.Judge(ContactMode::kSticking, -0.1, 0.0).mode, ContactMode::kOpen);
   EXPECT_EQ(rest.Judge(ContactMode::kSticking, 1.0, 0.51).mode, ContactMode::kSlidingNegative);

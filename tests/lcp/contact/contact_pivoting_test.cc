@@ -33,7 +33,7 @@ double Bound(const ContactProblem<double>& p, const ContactSolution<double>& sol
   double bound = 0.0;
   const ContactScales scales(p, solution);
   for (size_t i = 0; i < p.contacts.size(); ++i) {
-    const ContactValues values = Evaluate(p, scales, p.contacts[i], solution.v.data());
+    const ContactValues values = Evaluate(p, scales, p.contacts[i], solution.motion.data());
     bound = std::max({bound, values.mobility_n * solution.normal_impulse[i] / values.sigma_n,
                       values.mobility_t * std::abs(solution.tangent_impulse[i]) /
                           std::max(values.sigma_t, values.sigma_n)});
@@ -67,7 +67,7 @@ TEST(ContactPivotingTest, RightModesTakeOneFactorisationAndWrongOnesAPivotEach) 
   ContactProblem<double> p;
   p = FreeBodies(std::vector<double>(15, 0.0));
   for (int i = 0; i < 5; ++i) {
-    p.momentum[3 * i + 1] = -1.0 - 0.1 * i;
+    p.load[3 * i + 1] = -1.0 - 0.1 * i;
     p.contacts.push_back(FloorContact(i, 0.0, 0.0, 0.5));
   }
   ContactSolution<double> solution = EmptySolution(p);
@@ -145,7 +145,7 @@ TEST(ContactPivotingTest, ScatterMakesAnotherPathAndIsTakenBack) {
     others += factorisations == usual_length ? 0 : 1;
   }
   EXPECT_GT(others, 0);
-  EXPECT_EQ(follow(0).v, usual.v);
+  EXPECT_EQ(follow(0).motion, usual.motion);
   EXPECT_EQ(factorisations, usual_length);
 }
 

@@ -42,9 +42,9 @@ TEST(ContactSolverTest, RedundantContactsOfABox) {
       const ContactSolverReport report = Solve(Box(0.9, 0.3, copies), choice, &solution);
       ASSERT_TRUE(report.solved);
       EXPECT_LE(report.residual, 1e-10);
-      EXPECT_NEAR(solution.v[0], 0.6, 1e-12);
-      EXPECT_NEAR(solution.v[1], 0.0, 1e-12);
-      EXPECT_NEAR(solution.v[2], 0.0, 1e-12);
+      EXPECT_NEAR(solution.motion[0], 0.6, 1e-12);
+      EXPECT_NEAR(solution.motion[1], 0.0, 1e-12);
+      EXPECT_NEAR(solution.motion[2], 0.0, 1e-12);
       double sum = 0.0;
       for (const double impulse : solution.normal_impulse) {
         EXPECT_GE(impulse, -1e-12);
@@ -58,7 +58,7 @@ TEST(ContactSolverTest, RedundantContactsOfABox) {
 TEST(ContactSolverTest, FrictionOfAMillionSticks) {
   ContactSolution<double> solution;
   ASSERT_TRUE(Solve(Box(0.9, 1e6, 1), ContactSolverChoice::kAuto, &solution).solved);
-  EXPECT_NEAR(solution.v[0], 0.0, 1e-12);
+  EXPECT_NEAR(solution.motion[0], 0.0, 1e-12);
 }
 
 TEST(ContactSolverTest, AllChoicesFindTheSameTwistOfRandomProblems) {
@@ -81,8 +81,8 @@ TEST(ContactSolverTest, AllChoicesFindTheSameTwistOfRandomProblems) {
     EXPECT_TRUE(solved[0]) << trial;  // little friction: there is one solution
     for (int k = 1; k < 3; ++k) {
       if (!solved[0] || !solved[k] || solutions[0].modes != solutions[k].modes) continue;
-      for (size_t i = 0; i < solutions[0].v.size(); ++i) {
-        EXPECT_NEAR(solutions[0].v[i], solutions[k].v[i], 1e-9);
+      for (size_t i = 0; i < solutions[0].motion.size(); ++i) {
+        EXPECT_NEAR(solutions[0].motion[i], solutions[k].motion[i], 1e-9);
       }
       ++compared;
     }
@@ -144,7 +144,7 @@ TEST(ContactSolverTest, AWrongGuessIsPutRightInOneChange) {
       const ContactSolverReport report = solver.Solve(p, {}, &solution);
       EXPECT_EQ(report.solved_by, SolvedBy::kGuess);
       EXPECT_EQ(report.factorisations, 2);
-      EXPECT_NEAR(solution.v[0], 0.7 * vx, 1e-15);
+      EXPECT_NEAR(solution.motion[0], 0.7 * vx, 1e-15);
     }
   }
 }
@@ -157,7 +157,7 @@ TEST(ContactSolverTest, TwoPointsOfATurningBodyDoNotBothStick) {
   ContactSolution<double> solution;
   const ContactSolverReport report = Solve(p, ContactSolverChoice::kAuto, &solution);
   ASSERT_TRUE(report.solved);
-  EXPECT_NEAR(solution.v[2], -1e-3, 1e-12);
+  EXPECT_NEAR(solution.motion[2], -1e-3, 1e-12);
   EXPECT_NE(solution.modes[0] == ContactMode::kSticking,
             solution.modes[1] == ContactMode::kSticking);
 }
@@ -194,7 +194,7 @@ TEST(ContactSolverTest, NaturalResidualSeesEachKindOfError) {
     return NaturalResidual(p, changed, &worst);
   };
   EXPECT_LT(residual([](auto*) {}), 1e-14);
-  EXPECT_GT(residual([](auto* s) { s->v[1] -= 1e-3; }), 1e-4);
+  EXPECT_GT(residual([](auto* s) { s->motion[1] -= 1e-3; }), 1e-4);
   EXPECT_GT(residual([](auto* s) { s->normal_impulse[0] -= 0.6; }), 1e-2);
   EXPECT_GT(residual([](auto* s) { s->tangent_impulse[1] *= -1.0; }), 1e-2);
 }
@@ -208,7 +208,7 @@ TEST(ContactSolverTest, DegenerateContactsAreFound) {
   std::vector<int> degenerate;
   FindDegenerateContacts(p, solution, 1e-9, &degenerate);
   EXPECT_EQ(degenerate, std::vector<int>{0});
-  p.momentum[1] = -1.0;
+  p.load[1] = -1.0;
   ASSERT_TRUE(Solve(p, ContactSolverChoice::kAuto, &solution).solved);
   FindDegenerateContacts(p, solution, 1e-9, &degenerate);
   EXPECT_TRUE(degenerate.empty());
@@ -221,7 +221,7 @@ ContactProblem<double> ProblemOf(const StepCase& step) {
   p.num_bodies = static_cast<int>(lcp.p.size() / 3);
   for (Eigen::Index i = 0; i < lcp.p.size(); ++i) {
     p.mass.push_back(lcp.M(i, i));
-    p.momentum.push_back(lcp.p[i]);
+    p.load.push_back(lcp.p[i]);
   }
   const nlohmann::json& contacts = step.data()["contacts"];
   const Eigen::Index count = static_cast<Eigen::Index>(contacts.size());
@@ -261,8 +261,8 @@ TEST(ContactSolverTest, ExactStepCases) {
     ContactSolution<double> solution;
     const ContactProblem<double> p = ProblemOf(step);
     ASSERT_TRUE(Solve(p, ContactSolverChoice::kAuto, &solution).solved) << step.id();
-    for (size_t i = 0; i < solution.v.size(); ++i) {
-      EXPECT_NEAR(solution.v[i], step.data()["solution"]["v_plus"][i].get<double>(), 1e-12)
+    for (size_t i = 0; i < solution.motion.size(); ++i) {
+      EXPECT_NEAR(solution.motion[i], step.data()["solution"]["v_plus"][i].get<double>(), 1e-12)
           << step.id();
     }
     ++solved;

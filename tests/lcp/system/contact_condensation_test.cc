@@ -98,7 +98,7 @@ ContactProblem<double> HeavyOnLight(double ratio) {
   ContactProblem<double> p = testing::FreeBodies({0.1, -1.0, 0.2, 0.0, -1.0, 0.0});
   for (int i = 3; i < 6; ++i) {
     p.mass[i] *= ratio;
-    p.momentum[i] *= ratio;
+    p.load[i] *= ratio;
   }
   for (const double x : {-0.5, 0.5}) {
     p.contacts.push_back(testing::FloorContact(0, x, -0.5, 0.5));
@@ -114,7 +114,7 @@ ContactProblem<double> HeavyOnLight(double ratio) {
 VectorX<double> SolvedAtRest(const ContactProblem<double>& p, const std::vector<ContactMode>& modes,
                              ContactSystem* system, double* left) {
   VectorX<double> x = VectorX<double>::Zero(3 * system->num_blocks());
-  for (int i = 0; i < 6; ++i) x[i] = p.momentum[i];
+  for (int i = 0; i < 6; ++i) x[i] = p.load[i];
   *left = system->Solve(p, modes, x.data(), 1);
   return x;
 }
@@ -131,7 +131,7 @@ TEST(ContactCondensationTest, AHeavyBodyOnALightOneIsSolvedCondensed) {
     EXPECT_LT(left, 1e-14) << ratio;
     EXPECT_LT(x.head<6>().norm(), 1e-12) << ratio;  // both rest
     // The floor carries both.
-    EXPECT_NEAR(x[6] + x[12], p.momentum[1] * -1.0 - p.momentum[4], 1e-9 * ratio) << ratio;
+    EXPECT_NEAR(x[6] + x[12], p.load[1] * -1.0 - p.load[4], 1e-9 * ratio) << ratio;
   }
 }
 
@@ -144,7 +144,7 @@ TEST(ContactCondensationTest, WhatDoesNotRefineIsFactorisedAsAWhole) {
   ContactSystem system;
   ASSERT_TRUE(system.Factor(p, modes));
   const VectorX<double> momenta =
-      Eigen::Map<const VectorX<double>>(p.momentum.data(), static_cast<Eigen::Index>(6));
+      Eigen::Map<const VectorX<double>>(p.load.data(), static_cast<Eigen::Index>(6));
   VectorX<double> x = VectorX<double>::Zero(3 * system.num_blocks());
   x.head<6>() = momenta;
   EXPECT_LT(system.Solve(p, modes, x.data(), 1), 1e-14);

@@ -32,7 +32,7 @@ Case MakeCase(double free_x, double free_y, double friction) {
 Case Solved(double free_x, double free_y, double friction, ContactMode mode, double normal,
             double tangent) {
   Case result = MakeCase(free_x, free_y, friction);
-  result.solution.v = {free_x + tangent, free_y + normal, 0.0};
+  result.solution.motion = {free_x + tangent, free_y + normal, 0.0};
   result.solution.normal_impulse = {normal};
   result.solution.tangent_impulse = {tangent};
   result.solution.modes = {mode};
@@ -51,8 +51,8 @@ TEST(ContactResidualTest, ValuesOfAContactAreThoseByHand) {
   ContactProblem<double> problem = testing::FreeBodies({0.0, 0.0, 0.0});
   const ContactBlock<double> contact = FloorContact(0, 0.5, -0.2, 0.3, -0.25);
   ContactSolution<double> solution = testing::EmptySolution(problem);
-  solution.v = {1.0, 2.0, 3.0};
-  const double* v = solution.v.data();
+  solution.motion = {1.0, 2.0, 3.0};
+  const double* v = solution.motion.data();
   const ContactValues values = Evaluate(problem, ContactScales(problem, solution), contact, v);
   EXPECT_DOUBLE_EQ(values.s_n, 2.0 + 0.5 * 3.0 - 0.25);
   EXPECT_DOUBLE_EQ(values.slip, 1.0 + 0.2 * 3.0);
@@ -70,7 +70,7 @@ TEST(ContactResidualTest, ScalesHoldWhatPassesThroughABodyAtRest) {
   ContactProblem<double> problem = testing::FreeBodies({0.0, 0.0, 0.0, 0.0, -0.75, 0.0});
   problem.contacts = {FloorContact(0, 0.0, 0.0, 0.0, 0.0)};
   ContactSolution<double> solution = testing::EmptySolution(problem);
-  solution.v.assign(6, 0.0);
+  solution.motion.assign(6, 0.0);
   solution.normal_impulse = {0.75};
   EXPECT_DOUBLE_EQ(ContactScales(problem, solution).speed[0], 0.75);
   // Not more than all momenta could bring about; without an impulse next to nothing.
@@ -96,7 +96,7 @@ TEST(ContactResidualTest, SolutionsHaveNoneAndFaultsHaveTheirSize) {
   unbalanced.solution.normal_impulse[0] = 1.25;
   EXPECT_NEAR(ResidualOf(unbalanced, &worst), 0.25 / 1.25, 1e-15);
   EXPECT_EQ(worst, -1);
-  unbalanced.solution.v[0] = std::nan("");
+  unbalanced.solution.motion[0] = std::nan("");
   EXPECT_EQ(ResidualOf(unbalanced, &worst), HUGE_VAL);
 }
 
@@ -105,14 +105,14 @@ TEST(ContactResidualTest, ALightBodysMomentumIsNotHiddenByAHeavyOnes) {
   ContactProblem<double> problem;
   problem.num_bodies = 2;
   problem.mass = {1e9, 1e9, 1e8, 1.0, 1.0, 0.1};
-  problem.momentum = {1e9, -1e9, 0.0, 1.0, 0.0, 0.0};
+  problem.load = {1e9, -1e9, 0.0, 1.0, 0.0, 0.0};
   ContactSolution<double> solution = testing::EmptySolution(problem);
-  solution.v = {1.0, -1.0, 0.0, 1.0, 0.0, 0.0};
+  solution.motion = {1.0, -1.0, 0.0, 1.0, 0.0, 0.0};
   int worst = -1;
   EXPECT_LE(NaturalResidual(problem, solution, &worst), 1e-15);
-  solution.v[3] = 1.0 + 1e-6;
+  solution.motion[3] = 1.0 + 1e-6;
   EXPECT_NEAR(NaturalResidual(problem, solution, &worst), 1e-6, 1e-9);
-  solution.v = {1.0, -1.0, 0.0, 1.0, 0.0, 1e-6};  // rotation at the radius of gyration
+  solution.motion = {1.0, -1.0, 0.0, 1.0, 0.0, 1e-6};  // rotation at the radius of gyration
   EXPECT_NEAR(NaturalResidual(problem, solution, &worst), 1e-6 * 0.1 / std::sqrt(0.1), 1e-9);
 }
 

@@ -16,7 +16,7 @@ ContactProblem<double> HingedOnAHeldOne(double held, double above) {
   ContactProblem<double> p = testing::FreeBodies({0.0, -0.1, 0.0, 0.0, -0.1, 0.0});
   for (int i = 0; i < 6; ++i) {
     p.mass[i] *= i < 3 ? held : above;
-    p.momentum[i] *= i < 3 ? held : above;
+    p.load[i] *= i < 3 ? held : above;
   }
   JointBlock<double> hinge;
   hinge.a = 1;
@@ -41,7 +41,7 @@ TEST_P(ContactSystemConjugateTest, WhatIsHeldStaysAndCarriesAll) {
   ContactSystem system;
   ASSERT_TRUE(system.Factor(p, modes));
   VectorX<double> x = VectorX<double>::Zero(3 * system.num_blocks());
-  std::copy(p.momentum.begin(), p.momentum.end(), x.data());
+  std::copy(p.load.begin(), p.load.end(), x.data());
   const VectorX<double> rhs = x;
   EXPECT_LT(system.Solve(p, modes, x.data(), 1), 1e-15);
   // δ alone would leave 0.1 m/s of the free 0.1 m/s.
@@ -86,7 +86,7 @@ TEST(ContactSystemConjugateTest, AContradictionIsTold) {
   ContactSystem system;
   ASSERT_TRUE(system.Factor(p, modes));
   VectorX<double> x = VectorX<double>::Zero(3 * system.num_blocks());
-  std::copy(p.momentum.begin(), p.momentum.end(), x.data());
+  std::copy(p.load.begin(), p.load.end(), x.data());
   x[9] =
       1e-3;  // the corner is asked to open at 1 mm/s by one of its two rows, to stay by the other
   const double left = system.Solve(p, modes, x.data(), 1);

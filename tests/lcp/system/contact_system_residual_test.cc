@@ -38,7 +38,7 @@ TEST(ContactSystemResidualTest, IsJudgedByTheTermsOfItsKindOfRow) {
   ContactProblem<double> p = testing::FreeBodies({0.0, -1.0, 0.0});
   for (int i = 0; i < 3; ++i) {
     p.mass[i] *= 1e6;
-    p.momentum[i] *= 1e6;
+    p.load[i] *= 1e6;
   }
   p.contacts.push_back(testing::FloorContact(0, 0.0, 0.0, 0.5));
   const std::vector<ContactMode> modes = {ContactMode::kSticking};

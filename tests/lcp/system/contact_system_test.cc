@@ -51,7 +51,7 @@ TEST(ContactSystemTest, DuplicatedContactsOfABoxLeaveTheTwistRight) {
   ContactSystem system;
   ASSERT_TRUE(system.Factor(p, modes));
   VectorX<double> x = VectorX<double>::Zero(15);
-  for (int i = 0; i < 3; ++i) x[i] = p.momentum[i];
+  for (int i = 0; i < 3; ++i) x[i] = p.load[i];
   system.Solve(p, modes, x.data(), 1);
   EXPECT_LT(x.head<3>().norm(), 1e-12);
   EXPECT_NEAR(x[3] + x[6] + x[9] + x[12], 1.0, 1e-12);  // the normal impulses carry the momentum

@@ -22,7 +22,7 @@ ContactProblem<double> Pendulum(double inertia, double angle) {
   ContactProblem<double> problem;
   problem.num_bodies = 1;
   problem.mass = {kMass, kMass, inertia};
-  problem.momentum = {0.0, 0.0, 0.0};
+  problem.load = {0.0, 0.0, 0.0};
   JointBlock<double> pin;
   pin.a = 0;
   pin.rows = 2;
@@ -98,7 +98,7 @@ TEST(JointDampingTest, ChainsKeepTheirEquations) {
   ContactProblem<double> problem = Pendulum(1e-12, 0.7);
   problem.num_bodies = 2;
   problem.mass.insert(problem.mass.end(), {1.0, 1.0, 1e-13});
-  problem.momentum.assign(6, 0.0);
+  problem.load.assign(6, 0.0);
   JointBlock<double> elbow;
   elbow.a = 1;
   elbow.b = 0;

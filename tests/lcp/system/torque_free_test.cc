@@ -63,7 +63,7 @@ TEST(TorqueFreeTest, AnglesLeftOutKeepTheirSpeedAndTheOthersAreSolved) {
     ContactSystem system;
     EXPECT_TRUE(system.Factor(p, modes));
     std::vector<double> x(3 * system.num_blocks(), 0.0);
-    std::copy(p.momentum.begin(), p.momentum.end(), x.begin());
+    std::copy(p.load.begin(), p.load.end(), x.begin());
     system.Solve(p, modes, x.data(), 1);
     return x;
   };

@@ -13,8 +13,8 @@ namespace {
 TEST(ContactCaseTest, TheSameSeedMakesTheSameProblemAndAnotherDoesNot) {
   for (const std::string& kind : ContactKinds()) {
     const ContactCase one = MakeContactCase(kind, 5, 3, 40);
-    EXPECT_EQ(one.problem.momentum, MakeContactCase(kind, 5, 3, 40).problem.momentum);
-    EXPECT_NE(one.problem.momentum, MakeContactCase(kind, 6, 3, 40).problem.momentum);
+    EXPECT_EQ(one.problem.load, MakeContactCase(kind, 5, 3, 40).problem.load);
+    EXPECT_NE(one.problem.load, MakeContactCase(kind, 6, 3, 40).problem.load);
     EXPECT_EQ(one.name, kind + " 3");
   }
 }
@@ -80,7 +80,7 @@ TEST(ContactCaseTest, TheOneSidedFormHasTheSameSolution) {
     const ContactCase one = MakeContactCase("restitution", 3, i, 20);
     const MixedLcp<double> form = OneSidedForm(one.problem);
     LcpSolution<double> solution;
-    solution.v = Eigen::Map<const VectorX<double>>(one.drawn.v.data(), form.num_v());
+    solution.v = Eigen::Map<const VectorX<double>>(one.drawn.motion.data(), form.num_v());
     solution.y = VectorX<double>::Zero(0);
     solution.z = VectorX<double>::Zero(form.num_z());
     Eigen::Index at = 0;
@@ -92,7 +92,7 @@ TEST(ContactCaseTest, TheOneSidedFormHasTheSameSolution) {
         solution.z[at + 1] = std::max(0.0, t);
         solution.z[at + 2] = std::max(0.0, -t);
         solution.z[at + 3] =
-            std::abs(RowDot(c.a, c.tangent_a, c.b, c.tangent_b, one.drawn.v.data()) + c.c_t);
+            std::abs(RowDot(c.a, c.tangent_a, c.b, c.tangent_b, one.drawn.motion.data()) + c.c_t);
       }
       at += c.has_friction ? 4 : 1;
     }

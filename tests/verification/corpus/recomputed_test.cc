@@ -19,9 +19,10 @@ TEST(RecomputedTest, EachPartOfAContactSolutionCounts) {
     spoil(x);
     return RecomputedResidual(one.problem, x);
   };
-  EXPECT_GT(spoiled([](auto& x) { x.v[0] += 1e-3; }), 1e-8);
-  EXPECT_GT(spoiled([](auto& x) { x.v[0] = std::numeric_limits<double>::quiet_NaN(); }), 1e300);
-  EXPECT_GT(spoiled([](auto& x) { x.v.pop_back(); }), 1e300);
+  EXPECT_GT(spoiled([](auto& x) { x.motion[0] += 1e-3; }), 1e-8);
+  EXPECT_GT(spoiled([](auto& x) { x.motion[0] = std::numeric_limits<double>::quiet_NaN(); }),
+            1e300);
+  EXPECT_GT(spoiled([](auto& x) { x.motion.pop_back(); }), 1e300);
   for (size_t i = 0; i < one.problem.contacts.size(); ++i) {
     EXPECT_GT(spoiled([i](auto& x) { x.normal_impulse[i] += 1e-3; }), 1e-8) << i;
     EXPECT_GT(spoiled([i](auto& x) { x.tangent_impulse[i] += 1e-3; }), 1e-8) << i;
@@ -33,7 +34,7 @@ double OneContact(double speed, double normal, double tangent, double slip) {
   ContactProblem<double> p;
   p.num_bodies = 1;
   p.mass = {1.0, 1.0, 0.1};
-  p.momentum = {slip - tangent, speed - normal, 0.0};
+  p.load = {slip - tangent, speed - normal, 0.0};
   ContactBlock<double> c;
   c.a = 0;
   c.normal_a = {0, 1, 0};
