@@ -7,15 +7,17 @@
 #include <limits>
 #include <random>
 
+#include "tangible/estimation/fit/block_system.h"
 #include "tangible/estimation/fit/fit_checkpoint.h"
+#include "tangible/estimation/fit/linearisation.h"
 #include "tangible/estimation/fit/minimise.h"
 #include "tangible/estimation/fit/shooting.h"
 
 namespace tangible {
 namespace {
 
-// A parameter that moves no residual by more than this many sigma, changed by its own magnitude,
-// has no effect.
+// A parameter that moves the residuals, as a vector, by no more than this many sigma, changed by
+// its own magnitude, has no effect.
 constexpr double kNoEffect = 1e-12;
 
 // Differences carry an error of about 1e-9, the other methods one of about 1e-12.
@@ -47,15 +49,21 @@ Eigen::VectorXd DrawStart(const std::vector<ParameterizedScene::Entry>& entries,
   return p;
 }
 
-bool HasEffect(const ParameterizedScene::Entry& entry, const Eigen::VectorXd& column) {
-  return column.cwiseAbs().maxCoeff() * entry.scale > kNoEffect;
+/// ‖∂r/∂q‖ of each parameter.
+Eigen::VectorXd EffectOf(const BlockLayout& layout, const Linearisation& model) {
+  std::vector<RowMatrixXd> blocks;
+  for (const BlockFactor& block : model.blocks) {
+    blocks.emplace_back(block.jacobian());
+  }
+  return BlockSystem(layout, blocks,
+                     std::vector<bool>(static_cast<size_t>(layout.num_parameters()), false))
+      .lengths();
 }
 
-/// The first parameter whose column of J is zero; −1 if none is.
-int FindNoEffect(const std::vector<ParameterizedScene::Entry>& entries,
-                 const RowMatrixXd& jacobian) {
-  for (size_t k = 0; k < entries.size(); ++k) {
-    if (!HasEffect(entries[k], jacobian.col(static_cast<Eigen::Index>(k)))) {
+/// The first parameter that moves no residual; −1 if none is.
+int FindNoEffect(const Eigen::VectorXd& effect) {
+  for (Eigen::Index k = 0; k < effect.size(); ++k) {
+    if (!(effect[k] > kNoEffect)) {
       return static_cast<int>(k);
     }
   }
@@ -96,34 +104,44 @@ Eigen::VectorXd Nudged(const ParameterizedScene::Entry& entry, int parameter, do
   return p;
 }
 
+/// Where the starts begin.
+struct FirstPoint {
+  Eigen::VectorXd parameters;
+  double gradient_norm = 0.0;  ///< at the initial values
+};
+
 /// A point near the initial one at which each parameter moves a residual: the initial one itself
 /// unless a parameter does nothing there. False, with the result saying why, where there is none.
-/// `gradient_norm` is that at the initial point.
-bool FindStart(const FitOptions& options, RolloutResiduals* residuals, Eigen::VectorXd* start,
-               double* gradient_norm, FitResult* result) {
-  Eigen::VectorXd values;
-  RowMatrixXd jacobian;
-  if (!residuals->Evaluate(*start, options.derivatives, &values, &jacobian)) {
-    result->message = "the run at the initial values fails: " + residuals->message();
+bool FindStart(const FitOptions& options, LeastSquaresProblem* problem, Linearizer* linearizer,
+               FirstPoint* first, FitResult* result) {
+  const std::vector<ParameterEntry>& entries = problem->entries();
+  const HuberBounds huber{options.huber, options.huber};
+  Linearisation model;
+  Linearisation target;
+  Eigen::VectorXd p = InitialOf(entries);
+  first->parameters = p;
+  if (!linearizer->Linearise(ToInternal(entries, p), huber, &model, &target)) {
+    result->message = "the run at the initial values fails: " + linearizer->message();
     return options.starts > 1;
   }
-  result->initial_cost = RobustCost(values, options.huber);
-  const ParameterizedScene& scene = residuals->scene();
-  const std::vector<ParameterizedScene::Entry>& entries = scene.entries();
-  jacobian *= ParametersByInternal(entries, *start).asDiagonal();
-  *gradient_norm = RobustGradient(values, jacobian, options.huber).norm();
+  result->initial_cost = target.cost;
+  first->gradient_norm = target.gradient.norm();
+  Eigen::VectorXd effect = EffectOf(linearizer->layout(), model);
   for (size_t round = 0; round <= entries.size(); ++round) {
-    const int parameter = FindNoEffect(entries, jacobian);
+    const int parameter = FindNoEffect(effect);
     if (parameter < 0) {
+      first->parameters = p;
       return true;
     }
     bool found = false;
     for (size_t i = 0; i < std::size(kNudges) && !found && round < entries.size(); ++i) {
-      const Eigen::VectorXd nudged = Nudged(entries[parameter], parameter, kNudges[i], *start);
-      found = residuals->Evaluate(nudged, options.derivatives, &values, &jacobian) &&
-              HasEffect(entries[parameter], jacobian.col(parameter));
+      const Eigen::VectorXd nudged = Nudged(entries[parameter], parameter, kNudges[i], p);
+      if (linearizer->Linearise(ToInternal(entries, nudged), huber, &model, &target)) {
+        effect = EffectOf(linearizer->layout(), model);
+        found = effect[parameter] > kNoEffect;
+      }
       if (found) {
-        *start = nudged;
+        p = nudged;
       }
     }
     if (!found) {
@@ -147,47 +165,41 @@ std::vector<ResidualPlace> PlacesOf(const LeastSquaresProblem& problem) {
   return places;
 }
 
-void Finish(const FitOptions& options, const RolloutResiduals& residuals, const Minimum& best,
-            FitResult* result) {
-  result->status = best.status;
-  result->message = best.message;
-  if (best.status == FitStatus::kFailed) {
-    return;
+/// The residuals of all blocks, and their derivatives by all parameters.
+void Assemble(const BlockLayout& layout, const std::vector<BlockEvaluation>& blocks,
+              Eigen::VectorXd* residuals, RowMatrixXd* jacobian) {
+  residuals->resize(layout.num_rows());
+  jacobian->setZero(layout.num_rows(), layout.num_parameters());
+  for (int b = 0; b < layout.num_blocks(); ++b) {
+    const Eigen::Index rows = blocks[b].residuals.size();
+    residuals->segment(layout.row_offset(b), rows) = blocks[b].residuals;
+    for (int i = 0; i < layout.num_local(b); ++i) {
+      jacobian->col(layout.ParameterOf(b, i)).segment(layout.row_offset(b), rows) =
+          blocks[b].jacobian.col(i);
+    }
   }
-  result->estimate = best.parameters;
-  result->iterations = best.iterations;
-  result->residuals = best.residuals;
-  if (!std::isfinite(result->initial_cost)) {
-    result->initial_cost = best.iterations.front().cost;
-  }
-  result->final_cost = best.cost;
-  UncertaintyOptions uncertainty;
-  uncertainty.huber = options.huber;
-  uncertainty.rank_tolerance = options.derivatives == DerivativeMethod::kFiniteDifference
-                                   ? kRankToleranceOfDifferences
-                                   : kRankTolerance;
-  result->uncertainty =
-      EstimateUncertainty(residuals.scene().entries(), best.parameters, best.residuals,
-                          best.jacobian, PlacesOf(residuals), uncertainty);
 }
 
 /// One fit under way.
 struct FitRun {
   const FitOptions& options;
   const FitProgress& progress;
+  const FitApproach& approach;
   std::function<double()> elapsed;
-  RolloutResiduals* residuals;
+  LeastSquaresProblem* problem;
   FitLog* log;
-  long rollouts_before;
+  bool logged;
+  long rollouts = 0;
 
   /// What the log has of the start under way has become a result of its own.
   void EndPart() const {
     log->start.Clear();
-    log->rollouts = residuals->rollouts() - rollouts_before;
+    log->rollouts = rollouts;
     if (log->on_end && log->mismatch() == 0) {
       log->on_end();
     }
   }
+  EvaluationLog* LogOfStart() const { return logged ? &log->start : nullptr; }
 };
 
 /// The next start, from `start`; how it ended is kept in the log. The first one tells of the
@@ -195,7 +207,6 @@ struct FitRun {
 void RunStart(const Eigen::VectorXd& start, double gradient_norm, double initial_cost,
               FitRun* run) {
   FitLog* const log = run->log;
-  RolloutResiduals* const residuals = run->residuals;
   const int i = static_cast<int>(log->starts.size());
   const std::function<void(int, const FitIteration&)> report =
       [run, i](int iteration, const FitIteration& values) {
@@ -203,14 +214,15 @@ void RunStart(const Eigen::VectorXd& start, double gradient_norm, double initial
           run->progress(i, iteration, values);
         }
       };
-  if (run->options.segments > 1 && !log->shot) {
-    const ShootingResult shot = Shoot(run->options, start, residuals);
-    log->shot = {shot.parameters, shot.iterations};
+  if (run->approach && !log->shot) {
+    log->shot = run->approach(start, run->LogOfStart());
+    run->rollouts += log->shot->rollouts;
     run->EndPart();
   }
   Minimum minimum = Minimise(run->options, log->shot ? log->shot->parameters : start, run->elapsed,
-                             report, residuals);
-  const Eigen::VectorXd initial = residuals->scene().Initial();
+                             report, run->problem, run->LogOfStart());
+  run->rollouts += minimum.rollouts;
+  const Eigen::VectorXd initial = InitialOf(run->problem->entries());
   if (i == 0 && start != initial && !minimum.iterations.empty()) {
     minimum.iterations.insert(
         minimum.iterations.begin(),
@@ -226,29 +238,64 @@ void RunStart(const Eigen::VectorXd& start, double gradient_norm, double initial
   run->EndPart();
 }
 
-/// All starts, with the log's evaluations if there is one.
-void RunStarts(FitRun* run, bool logged, FitResult* result) {
-  RolloutResiduals* const residuals = run->residuals;
-  FitLog* const log = run->log;
-  residuals->SetLog(logged ? &log->search : nullptr);
-  Eigen::VectorXd first = residuals->scene().Initial();
-  double gradient_norm = 0.0;
-  if (FindStart(run->options, residuals, &first, &gradient_norm, result)) {
-    residuals->SetLog(logged ? &log->start : nullptr);
-    if (!log->starts.empty() || log->shot) {
-      residuals->SetRollouts(run->rollouts_before + log->rollouts);
-    }
-    std::mt19937 random(run->options.seed);
-    for (int i = 0; i < run->options.starts; ++i) {
-      const Eigen::VectorXd start =
-          i == 0 ? first : DrawStart(residuals->scene().entries(), &random);
-      if (i >= static_cast<int>(log->starts.size())) {  // else finished before an interruption
-        RunStart(start, gradient_norm, result->initial_cost, run);
-      }
-    }
-    result->starts = log->starts;
-    Finish(run->options, *residuals, log->best, result);
+/// Residuals, intervals and warnings of the best start.
+void Finish(FitRun* run, FitResult* result) {
+  const Minimum& best = run->log->best;
+  result->status = best.status;
+  result->message = best.message;
+  if (best.status == FitStatus::kFailed) {
+    return;
   }
+  result->estimate = best.parameters;
+  result->iterations = best.iterations;
+  if (!std::isfinite(result->initial_cost)) {
+    result->initial_cost = best.iterations.front().cost;
+  }
+  result->final_cost = best.cost;
+  Linearizer linearizer(run->problem, run->options.derivatives, run->options.threads, nullptr);
+  std::vector<BlockEvaluation> blocks;
+  if (!linearizer.Rows(best.parameters, BlockDerivatives::kCompute, &blocks)) {
+    result->status = FitStatus::kFailed;
+    result->message = "the run at the estimate fails: " + linearizer.message();
+    return;
+  }
+  run->rollouts += linearizer.rollouts();
+  RowMatrixXd jacobian;
+  Assemble(linearizer.layout(), blocks, &result->residuals, &jacobian);
+  UncertaintyOptions uncertainty;
+  uncertainty.huber = run->options.huber;
+  uncertainty.rank_tolerance = run->options.derivatives == DerivativeMethod::kFiniteDifference
+                                   ? kRankToleranceOfDifferences
+                                   : kRankTolerance;
+  result->uncertainty =
+      EstimateUncertainty(run->problem->entries(), best.parameters, result->residuals, jacobian,
+                          PlacesOf(*run->problem), uncertainty);
+}
+
+/// All starts, with the log's evaluations if there is one.
+void RunStarts(FitRun* run, FitResult* result) {
+  FitLog* const log = run->log;
+  const std::vector<ParameterEntry>& entries = run->problem->entries();
+  Linearizer search(run->problem, run->options.derivatives, run->options.threads,
+                    run->logged ? &log->search : nullptr);
+  FirstPoint first;
+  const bool found = FindStart(run->options, run->problem, &search, &first, result);
+  run->rollouts = search.rollouts();
+  if (!found) {
+    return;
+  }
+  if (!log->starts.empty() || log->shot) {
+    run->rollouts = log->rollouts;
+  }
+  std::mt19937 random(run->options.seed);
+  for (int i = 0; i < run->options.starts; ++i) {
+    const Eigen::VectorXd start = i == 0 ? first.parameters : DrawStart(entries, &random);
+    if (i >= static_cast<int>(log->starts.size())) {  // else finished before an interruption
+      RunStart(start, first.gradient_norm, result->initial_cost, run);
+    }
+  }
+  result->starts = log->starts;
+  Finish(run, result);
 }
 
 void Certify(LeastSquaresProblem* problem, FitResult* result) {
@@ -309,35 +356,53 @@ const char* NameOf(FitStatus status) {
   return "";
 }
 
-FitResult Fit(const FitOptions& options, RolloutResiduals* residuals, const FitProgress& progress,
-              FitLog* log) {
+FitResult Fit(const FitOptions& options, LeastSquaresProblem* problem, const FitProgress& progress,
+              FitLog* log, const FitApproach& approach) {
   using Clock = std::chrono::steady_clock;
   const Clock::time_point began = Clock::now();
   FitLog own;
   FitRun run{options,
              progress,
+             approach,
              [began] { return std::chrono::duration<double>(Clock::now() - began).count(); },
-             residuals,
+             problem,
              log == nullptr ? &own : log,
-             residuals->rollouts()};
+             log != nullptr};
   FitResult result;
   try {
-    RunStarts(&run, log != nullptr, &result);
+    RunStarts(&run, &result);
   } catch (const EvaluationMismatch& mismatch) {
     result.message = mismatch.what();
   }
-  residuals->SetLog(nullptr);
-  result.rollouts = residuals->rollouts() - run.rollouts_before;
+  result.rollouts = run.rollouts;
   result.seconds = run.elapsed();
   if (result.estimate.size() > 0) {
-    CheckBodies(residuals, &result);
+    CheckBodies(problem, &result);
   }
   if (result.estimate.size() > 0 && options.held_test == HeldTest::kRun) {
-    TestHeld(options, residuals, &result);
+    TestHeld(options, problem, &result);
   }
   if (result.estimate.size() > 0 && options.certificate == CertificatePass::kRun) {
-    Certify(residuals, &result);
+    Certify(problem, &result);
   }
+  return result;
+}
+
+FitResult Fit(const FitOptions& options, RolloutResiduals* residuals, const FitProgress& progress,
+              FitLog* log) {
+  FitApproach approach;
+  if (options.segments > 1) {
+    approach = [&options, residuals](const Eigen::VectorXd& start, EvaluationLog* evaluations) {
+      const long before = residuals->rollouts();
+      residuals->SetLog(evaluations);
+      const ShootingResult shot = Shoot(options, start, residuals);
+      residuals->SetLog(nullptr);
+      return FitApproachResult{shot.parameters, shot.iterations, residuals->rollouts() - before};
+    };
+  }
+  const FitResult result =
+      Fit(options, static_cast<LeastSquaresProblem*>(residuals), progress, log, approach);
+  residuals->SetLog(nullptr);  // which a mismatch may have left
   return result;
 }
 

@@ -5,9 +5,9 @@
 //
 //   cost(p) = 1/2 Σ ρ(r_i(p)²),     ρ(s) = s, or Huber's 2 b sqrt(s) − b² where |r| > b
 //
-// by Levenberg-Marquardt (Ceres: trust region, dense QR) on q(p) (parameterized_scene.h), with one
-// residual block a measured coordinate, so that ρ acts on each alone; all blocks share one run an
-// evaluation. At the end Gauss-Newton steps polish the estimate to where it no longer depends on
+// of a problem in blocks (least_squares.h), by Levenberg-Marquardt on q(p) (parameter_entry.h,
+// minimise.h). Blocks are evaluated on several threads, with the same bits for any number. At the
+// end Gauss-Newton steps polish the estimate to where it no longer depends on
 // the start: the cost is flat there to rounding long before p is known to as many digits. With
 // Huber's loss plain squares lead to its neighbourhood and Newton's method to its minimum. A
 // parameter whose derivative is 0 at the initial values is nudged inwards first. An
@@ -34,6 +34,7 @@ struct FitOptions {
   int starts = 1;           ///< further starts are drawn within the bounds
   unsigned seed = 0;        ///< of these draws
   int max_iterations = 50;  ///< of each start
+  int threads = 0;  ///< that evaluate blocks; 0: one a core. The result does not depend on it
   /// Whether the derivatives at the estimate get a certificate: one more rollout.
   CertificatePass certificate = CertificatePass::kRun;
   /// Whether numbers that are held are tested where the model does not fit or a parameter is at its
@@ -82,9 +83,8 @@ struct Minimum {
   std::string message;
   Eigen::VectorXd parameters;
   double cost = 0.0;
-  Eigen::VectorXd residuals;
-  RowMatrixXd jacobian;  ///< dr/dp; 0 of a parameter held at its bound
   std::vector<FitIteration> iterations;
+  long rollouts = 0;
 };
 
 struct FitResult {
@@ -109,11 +109,27 @@ struct FitResult {
 /// Called after each iteration of each start.
 using FitProgress = std::function<void(int start, int iteration, const FitIteration&)>;
 
+/// Where an approach to the fit ended, from where the minimiser goes on.
+struct FitApproachResult {
+  Eigen::VectorXd parameters;
+  int iterations = 0;
+  long rollouts = 0;
+};
+
+/// Leads a start nearer to the minimum before the whole problem is minimised (multiple shooting).
+/// Its evaluations go through the log unless that is null.
+using FitApproach =
+    std::function<FitApproachResult(const Eigen::VectorXd& start, EvaluationLog* log)>;
+
 struct FitLog;  // fit_checkpoint.h
 
-/// Runs the fit; `progress` may be empty. With a log it goes on from what that has, keeps there
-/// what it does, and ends at the same bits; where that turns out to be of another fit the result is
-/// worth nothing (FitLog::mismatch).
+/// Runs the fit; `progress` and `approach` may be empty. With a log it goes on from what that has,
+/// keeps there what it does, and ends at the same bits; where that turns out to be of another fit
+/// the result is worth nothing (FitLog::mismatch).
+FitResult Fit(const FitOptions& options, LeastSquaresProblem* problem, const FitProgress& progress,
+              FitLog* log = nullptr, const FitApproach& approach = {});
+
+/// The fit of one run, with multiple shooting before it if `options` ask for that.
 FitResult Fit(const FitOptions& options, RolloutResiduals* residuals, const FitProgress& progress,
               FitLog* log = nullptr);
 

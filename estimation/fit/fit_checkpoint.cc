@@ -10,7 +10,7 @@
 namespace tangible {
 namespace {
 
-constexpr char kFormat[] = "tangible-fit checkpoint 2";
+constexpr char kFormat[] = "tangible-fit checkpoint 3";
 // A write waits until so many times the last one's time has gone by.
 constexpr int kWait = 10;
 
@@ -83,9 +83,8 @@ Json ToJson(const Minimum& minimum) {
           {"message", minimum.message},
           {"parameters", Array(minimum.parameters)},
           {"cost", minimum.cost},
-          {"residuals", Array(minimum.residuals)},
-          {"jacobian", Array(minimum.jacobian)},
-          {"iterations", iterations}};
+          {"iterations", iterations},
+          {"rollouts", minimum.rollouts}};
 }
 
 Minimum ReadMinimum(const Json& json) {
@@ -94,8 +93,7 @@ Minimum ReadMinimum(const Json& json) {
   minimum.message = json.at("message");
   minimum.parameters = ReadVector(json.at("parameters"));
   minimum.cost = json.at("cost");
-  minimum.residuals = ReadVector(json.at("residuals"));
-  minimum.jacobian = ReadMatrix(json.at("jacobian"), minimum.residuals.size());
+  minimum.rollouts = json.at("rollouts");
   for (const Json& i : json.at("iterations")) {
     minimum.iterations.push_back({i.at(0), i.at(1), i.at(2), i.at(3)});
   }
@@ -115,7 +113,7 @@ Json ToJson(const FitLog& log) {
     json["best"] = ToJson(log.best);
   }
   if (log.shot) {
-    json["shot"] = {Array(log.shot->parameters), log.shot->iterations};
+    json["shot"] = {Array(log.shot->parameters), log.shot->iterations, log.shot->rollouts};
   }
   return json;
 }
@@ -131,7 +129,8 @@ void Read(const Json& json, FitLog* log) {
     log->best = ReadMinimum(json.at("best"));
   }
   if (json.contains("shot")) {
-    log->shot = {ReadVector(json.at("shot").at(0)), json.at("shot").at(1)};
+    const Json& shot = json.at("shot");
+    log->shot = {ReadVector(shot.at(0)), shot.at(1), shot.at(2)};
   }
 }
 

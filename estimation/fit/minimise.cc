@@ -1,16 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tangible/estimation/fit/minimise.h"
 
-#include <Eigen/QR>
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <memory>
+#include <sstream>
 
-#include "tangible/estimation/problem/cost_function.h"
+#include "tangible/estimation/fit/block_system.h"
+#include "tangible/estimation/fit/linearisation.h"
 
 namespace tangible {
 namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 // Ceres stops where the cost changes by less than this, or q by less than that, relative; the
 // polish goes on from there.
@@ -25,75 +28,162 @@ constexpr double kApproachFactor = 4.0;
 // With Huber's loss Ceres goes on to this; then Newton's method takes over, which unlike its steps
 // counts no curvature where the loss is linear (0.75 a step where half of the residuals are).
 constexpr double kRobustTolerance = 1e-4;
-constexpr int kMaxNewtonSteps = 15;
-constexpr int kMaxHalvings = 3;
 // Root mean square of residuals, in sigma, below which the observations are free of noise and met
 // to rounding.
 constexpr double kExactFit = 1e-8;
+// ε of minimise.h.
+constexpr double kRelativeOffset = 1e-3;
 
 // A parameter that is pushed against a bound by so many iterations is held there until the others
 // have converged.
 constexpr int kPushesToHold = 2;
 constexpr int kMaxRounds = 10;
+// Where a step is left at Ceres' end it goes on with a new trust region, so many times at most.
+constexpr int kMaxAttempts = 3;
 
-constexpr int kMaxPolishSteps = 8;
 constexpr double kPolishedStep = 1e-13;  // of q
-// Directions of J with less than this share are left alone by the polish.
-constexpr double kPolishRank = 1e-9;
+// Costs that are equal to this, relative, do not tell which point is better.
+constexpr double kEqualCost = 1e-9;
+// From this number of parameters on sparse factorisations pay.
+constexpr int kManyParameters = 100;
 
-/// ρ'(r²): 1, or b / |r| where Huber's loss is linear.
-double RobustWeight(double residual, double huber) {
-  const double size = std::abs(residual);
-  return huber > 0.0 && size > huber ? huber / size : 1.0;
-}
+/// How the last steps are found and taken.
+struct FinalSteps {
+  enum class Kind { kGaussNewton, kNewton } kind;
+  int max_steps;
+  int max_halvings;
+  double slack;  ///< by which the cost may rise, relative
+  double limit;  ///< steps that do not shrink to half are rounding, if they are smaller
+};
+constexpr FinalSteps kPolish{FinalSteps::Kind::kGaussNewton, 8, 0, kEqualCost, kInfinity};
+constexpr FinalSteps kNewton{FinalSteps::Kind::kNewton, 15, 3, kPolishedStep, kParameterTolerance};
 
 /// Whether the cost falls beyond a bound that p stands on.
-bool PushesOut(const ParameterizedScene::Entry& entry, double p, double gradient) {
-  const bool upper = p > entry.lower + 0.5 * (entry.upper - entry.lower);
+bool PushesOut(const ParameterEntry& entry, double p, double gradient) {
+  const bool upper = !(p < 0.5 * (entry.lower + entry.upper));  // one of them may be infinite
   return IsAtBound(entry, p) && (upper ? gradient < 0.0 : gradient > 0.0);
 }
+
+/// The linear model at q, which Ceres changes, for all its cost functions.
+class SharedLinearisation : public ceres::EvaluationCallback {
+ public:
+  SharedLinearisation(Linearizer* linearizer, HuberBounds huber, const Eigen::VectorXd* q)
+      : linearizer_(linearizer), huber_(huber), q_(q) {}
+
+  void PrepareForEvaluation(bool evaluate_jacobians, bool /*new_evaluation_point*/) override {
+    // The line search of a bounded problem asks again for points it has had, and calls them new.
+    const bool same = at_.size() == q_->size() && at_ == *q_;
+    if (same && (has_model_ || !evaluate_jacobians || !ok_)) {
+      return;
+    }
+    at_ = *q_;
+    ok_ = evaluate_jacobians ? linearizer_->Linearise(*q_, huber_, &model_, &target_)
+                             : linearizer_->Cost(*q_, huber_, &block_costs_, &target_.cost);
+    has_model_ = ok_ && evaluate_jacobians;
+  }
+
+  void SetHuber(double current) {
+    huber_.current = current;
+    at_.resize(0);
+    PrepareForEvaluation(true, true);
+  }
+  void Update() { PrepareForEvaluation(true, true); }
+
+  bool ok() const { return ok_; }
+  const HuberBounds& huber() const { return huber_; }
+  /// After an evaluation with Jacobians.
+  const Linearisation& model() const { return model_; }
+  /// Cost and gradient of the fit's own loss.
+  const Linearisation& target() const { return target_; }
+  double BlockCost(int block) const { return block_costs_[block]; }
+
+ private:
+  Linearizer* linearizer_;
+  HuberBounds huber_;
+  const Eigen::VectorXd* q_;
+  Eigen::VectorXd at_;
+  Linearisation model_, target_;
+  Eigen::VectorXd block_costs_;
+  bool ok_ = false;
+  bool has_model_ = false;
+};
+
+/// A block's factor as residuals. Where no Jacobian is asked for only their sum of squares counts.
+class FactorCostFunction : public ceres::CostFunction {
+ public:
+  FactorCostFunction(const SharedLinearisation* shared, int block, int num_shared, int num_own,
+                     int num_factor_rows)
+      : shared_(shared), block_(block), num_own_(num_own) {
+    set_num_residuals(num_factor_rows + 1);
+    for (const int size : {num_own, num_shared}) {
+      if (size > 0) {
+        mutable_parameter_block_sizes()->push_back(size);
+      }
+    }
+  }
+
+  bool Evaluate(double const* const* /*parameters*/, double* residuals,
+                double** jacobians) const override {
+    if (!shared_->ok()) {
+      return false;
+    }
+    Eigen::Map<Eigen::VectorXd> values(residuals, num_residuals());
+    values.setZero();
+    if (jacobians == nullptr) {
+      values[0] = std::sqrt(2.0 * shared_->BlockCost(block_));
+      return true;
+    }
+    const BlockFactor& factor = shared_->model().blocks[block_];
+    values.head(factor.factor.rows()) = factor.residuals();
+    values[num_residuals() - 1] = factor.remainder;
+    Eigen::Index first = 0;
+    for (size_t i = 0; i < parameter_block_sizes().size(); ++i) {
+      const Eigen::Index size = parameter_block_sizes()[i];
+      if (jacobians[i] != nullptr) {
+        Eigen::Map<RowMatrixXd> columns(jacobians[i], num_residuals(), size);
+        columns.setZero();
+        columns.topRows(factor.factor.rows()) = factor.jacobian().middleCols(first, size);
+      }
+      first += size;
+    }
+    return true;
+  }
+
+ private:
+  const SharedLinearisation* shared_;
+  int block_;
+  int num_own_;
+};
 
 class Minimiser : public ceres::IterationCallback {
  public:
   Minimiser(const FitOptions& options, const Eigen::VectorXd& start,
             const std::function<double()>& elapsed,
             const std::function<void(int, const FitIteration&)>& progress,
-            RolloutResiduals* residuals)
+            LeastSquaresProblem* problem, EvaluationLog* log)
       : options_(options),
         elapsed_(elapsed),
         progress_(progress),
-        residuals_(residuals),
-        q_(ToInternal(residuals->entries(), start)),
-        shared_([this](const Eigen::VectorXd& q, Eigen::VectorXd* values,
-                       RowMatrixXd* jacobian) { return Evaluate(q, values, jacobian); },
-                &q_),
-        held_(start.size(), false),
-        pushed_(start.size(), 0),
-        huber_(options.huber) {}
+        linearizer_(problem, options.derivatives, options.threads, log),
+        layout_(linearizer_.layout()),
+        entries_(problem->entries()),
+        q_(ToInternal(entries_, start)),
+        shared_(&linearizer_, {options.huber, options.huber}, &q_),
+        held_(entries_.size(), false),
+        pushed_(entries_.size(), 0) {}
 
   Minimum Run() {
-    shared_.PrepareForEvaluation(true, true);
+    shared_.Update();
     if (!shared_.ok()) {
-      minimum_.message = "the run at the initial values fails: " + residuals_->message();
+      minimum_.message = "the run at the initial values fails: " + linearizer_.message();
+      minimum_.rollouts = linearizer_.rollouts();
       return minimum_;
     }
     ApproachRobustLoss();
-    if (options_.huber > 0.0) {
-      SolveWithinBounds(kRobustTolerance);
-    }
-    if (!(options_.huber > 0.0) || minimum_.status != FitStatus::kConverged || !Newton()) {
-      SolveWithinBounds(kFunctionTolerance);
-    }
-    if (minimum_.status == FitStatus::kConverged) {
-      Polish();
-    }
-    minimum_.parameters = ToParameters(residuals_->entries(), q_);
-    minimum_.residuals = shared_.values();
-    minimum_.jacobian =
-        shared_.jacobian() * ParametersByInternal(residuals_->entries(), minimum_.parameters)
-                                 .cwiseInverse()
-                                 .asDiagonal();
-    minimum_.cost = RobustCost(shared_.values(), options_.huber);
+    Minimise();
+    minimum_.parameters = ToParameters(entries_, q_);
+    minimum_.cost = shared_.target().cost;
+    minimum_.rollouts = linearizer_.rollouts();
     return minimum_;
   }
 
@@ -105,65 +195,55 @@ class Minimiser : public ceres::IterationCallback {
     if (accepted && CountPushes()) {
       return ceres::SOLVER_TERMINATE_SUCCESSFULLY;
     }
-    const double exact = 0.5 * kExactFit * kExactFit * residuals_->num_residuals();
-    return summary.cost < exact ? ceres::SOLVER_TERMINATE_SUCCESSFULLY : ceres::SOLVER_CONTINUE;
+    return summary.cost < ExactCost() ? ceres::SOLVER_TERMINATE_SUCCESSFULLY
+                                      : ceres::SOLVER_CONTINUE;
   }
 
  private:
-  bool Evaluate(const Eigen::VectorXd& q, Eigen::VectorXd* values, RowMatrixXd* jacobian) {
-    const ParameterizedScene& scene = residuals_->scene();
-    if (!residuals_->Evaluate(ToParameters(scene.entries(), q), options_.derivatives, values,
-                              jacobian)) {
-      return false;
-    }
-    if (jacobian == nullptr) {
-      return true;
-    }
-    *jacobian *=
-        ParametersByInternal(scene.entries(), ToParameters(scene.entries(), q)).asDiagonal();
-    gradient_ = RobustGradient(*values, *jacobian, huber_);
-    for (size_t k = 0; k < held_.size(); ++k) {
-      if (held_[k]) {
-        jacobian->col(static_cast<Eigen::Index>(k)).setZero();
-      }
-    }
-    return true;
+  double ExactCost() const {
+    return 0.5 * kExactFit * kExactFit * static_cast<double>(layout_.num_rows());
   }
 
   /// Counts the iterations in a row that each parameter is pushed out; true if one is to be held
   /// from now on.
   bool CountPushes() {
-    const Eigen::VectorXd p = ToParameters(residuals_->entries(), q_);
     bool change = false;
-    for (int k = 0; k < p.size(); ++k) {
-      const bool out = PushesOut(residuals_->scene().entries()[k], p[k], gradient_[k]);
-      pushed_[k] = out ? pushed_[k] + 1 : 0;
+    for (size_t k = 0; k < held_.size(); ++k) {
+      pushed_[k] = PushedOut(k) ? pushed_[k] + 1 : 0;
       change = change || (!held_[k] && pushed_[k] >= kPushesToHold);
     }
     return change;
   }
 
+  bool PushedOut(size_t k) const {
+    const auto i = static_cast<Eigen::Index>(k);
+    return PushesOut(entries_[k], ToParameter(entries_[k], q_[i]), shared_.model().gradient[i]);
+  }
+
   /// Holds and releases parameters at bounds; false where nothing changes. Steps that Ceres cuts at
   /// a bound are no Gauss-Newton steps of the other parameters: without this they converge slowly.
   bool ChangeHeld() {
-    const Eigen::VectorXd p = ToParameters(residuals_->entries(), q_);
     bool change = false;
-    for (int k = 0; k < p.size(); ++k) {
-      const bool hold = PushesOut(residuals_->scene().entries()[k], p[k], gradient_[k]);
+    for (size_t k = 0; k < held_.size(); ++k) {
+      const bool hold = PushedOut(k);
       change = change || hold != held_[k];
       held_[k] = hold;
       pushed_[k] = 0;
     }
-    return change && static_cast<int>(minimum_.iterations.size()) <= options_.max_iterations;
+    return change;
   }
 
-  /// Of the robust cost, whichever loss the iteration minimises.
+  bool HasIterationsLeft() const {
+    return static_cast<int>(minimum_.iterations.size()) <= options_.max_iterations;
+  }
+
+  /// Of the fit's own loss, whichever the iteration minimises.
   void Record(bool accepted) {
     if (accepted) {
-      cost_ = RobustCost(shared_.values(), options_.huber);
-      gradient_norm_ = RobustGradient(shared_.values(), shared_.jacobian(), options_.huber).norm();
+      cost_ = shared_.target().cost;
+      gradient_norm_ = shared_.target().gradient.norm();
     }
-    const Eigen::VectorXd p = ToParameters(residuals_->entries(), q_);
+    const Eigen::VectorXd p = ToParameters(entries_, q_);
     minimum_.iterations.push_back(
         {cost_, gradient_norm_, std::vector<double>(p.data(), p.data() + p.size()), elapsed_()});
     if (progress_) {
@@ -171,62 +251,163 @@ class Minimiser : public ceres::IterationCallback {
     }
   }
 
-  void SolveWithinBounds(double function_tolerance) {
-    for (int round = 0; round < kMaxRounds; ++round) {
-      Solve(function_tolerance);
-      shared_.PrepareForEvaluation(true, true);
-      if (!ChangeHeld()) {
-        return;
+  double MedianSize() {
+    std::vector<BlockEvaluation> blocks;
+    linearizer_.Rows(ToParameters(entries_, q_), BlockDerivatives::kSkip, &blocks);
+    std::vector<double> sizes;
+    for (int b = 0; b < layout_.num_blocks(); ++b) {
+      for (int i = 0; i < linearizer_.problem()->num_observation_rows(b); ++i) {
+        sizes.push_back(std::abs(blocks[b].residuals[i]));
       }
     }
-  }
-
-  double MedianSize() const {
-    Eigen::VectorXd sizes = shared_.values().cwiseAbs();
-    const auto middle = sizes.begin() + sizes.size() / 2;
+    const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
     std::nth_element(sizes.begin(), middle, sizes.end());
-    return *middle;
+    return sizes.empty() ? 0.0 : *middle;
   }
 
   /// Minimises with `huber` in the loss's place; back where that does not lower the robust cost.
   void Approach(double huber) {
     const Eigen::VectorXd start = q_;
-    const double before = RobustCost(shared_.values(), options_.huber);
-    huber_ = huber;
+    const double before = shared_.target().cost;
+    shared_.SetHuber(huber);
     Solve(kApproachTolerance);
-    huber_ = options_.huber;
-    shared_.PrepareForEvaluation(true, true);
-    if (!shared_.ok() || !(RobustCost(shared_.values(), options_.huber) < before)) {
+    shared_.SetHuber(options_.huber);
+    if (!shared_.ok() || !(shared_.target().cost < before)) {
       q_ = start;
-      shared_.PrepareForEvaluation(true, true);
+      shared_.Update();
     }
     pushed_.assign(pushed_.size(), 0);
   }
 
   void ApproachRobustLoss() {
-    if (!(options_.huber > 0.0) || MedianSize() <= options_.huber) {
+    double median = options_.huber > 0.0 ? MedianSize() : 0.0;
+    if (median <= options_.huber) {
       return;
     }
     Approach(0.0);
-    for (double huber = MedianSize() / kApproachFactor; huber > options_.huber;
+    median = MedianSize();
+    for (double huber = median / kApproachFactor; huber > options_.huber;
          huber /= kApproachFactor) {
       Approach(huber);
     }
   }
 
+  /// Until both tests of convergence hold, or nothing more is gained.
+  void Minimise() {
+    for (int attempt = 0; attempt < kMaxAttempts; ++attempt) {
+      const double before = shared_.model().cost;
+      const bool robust = options_.huber > 0.0;
+      if (robust) {
+        SolveWithinBounds(kRobustTolerance);
+      }
+      if (!robust || minimum_.status != FitStatus::kConverged || !Refine(kNewton)) {
+        SolveWithinBounds(kFunctionTolerance);
+      }
+      if (minimum_.status != FitStatus::kConverged) {
+        return;
+      }
+      Refine(kPolish);
+      // A bound that the last steps have reached or left.
+      ChangeHeld();
+      const std::string left = WhatIsLeft();
+      if (left.empty()) {
+        return;
+      }
+      const bool gained = shared_.model().cost < before * (1.0 - kFunctionTolerance);
+      if (!gained || attempt + 1 == kMaxAttempts || !HasIterationsLeft()) {
+        minimum_.status = FitStatus::kNotConverged;
+        minimum_.message = left;
+        return;
+      }
+    }
+  }
+
+  void SolveWithinBounds(double function_tolerance) {
+    for (int round = 0; round < kMaxRounds; ++round) {
+      Solve(function_tolerance);
+      if (!ChangeHeld() || !HasIterationsLeft()) {
+        return;
+      }
+    }
+  }
+
+  /// A parameter block with those of its parameters constant that are held.
+  void AddParameterBlock(int first, int size, ceres::Problem* problem) {
+    if (size == 0) {
+      return;
+    }
+    double* const x = q_.data() + first;
+    problem->AddParameterBlock(x, size);
+    SetInternalBounds(entries_, first, size, problem, x);
+    std::vector<int> constant;
+    for (int i = 0; i < size; ++i) {
+      if (held_[first + i]) {
+        constant.push_back(i);
+      }
+    }
+    if (static_cast<int>(constant.size()) == size) {
+      problem->SetParameterBlockConstant(x);
+    } else if (!constant.empty()) {
+      problem->SetManifold(x, new ceres::SubsetManifold(size, constant));
+    }
+  }
+
+  void AddBlocks(ceres::Problem* problem) {
+    const int num_shared = layout_.num_shared();
+    AddParameterBlock(0, num_shared, problem);
+    for (int b = 0; b < layout_.num_blocks(); ++b) {
+      const int num_own = layout_.num_own(b);
+      AddParameterBlock(layout_.own_offset(b), num_own, problem);
+      const int rows = std::min(linearizer_.problem()->num_rows(b), layout_.num_local(b) + 1);
+      std::vector<double*> parameters;
+      if (num_own > 0) {
+        parameters.push_back(q_.data() + layout_.own_offset(b));
+      }
+      if (num_shared > 0) {
+        parameters.push_back(q_.data());
+      }
+      if (rows > 0 && !parameters.empty()) {
+        problem->AddResidualBlock(new FactorCostFunction(&shared_, b, num_shared, num_own, rows),
+                                  nullptr, parameters);
+      }
+    }
+  }
+
+  bool AnyFree(int first, int last) const {
+    return std::find(held_.begin() + first, held_.begin() + last, false) != held_.begin() + last;
+  }
+
+  /// Own parameters are eliminated first, where both kinds are free.
+  void ChooseLinearSolver(ceres::Solver::Options* solver) {
+    const int num_shared = layout_.num_shared();
+    if (AnyFree(0, num_shared) && AnyFree(num_shared, layout_.num_parameters())) {
+      solver->linear_solver_type = ceres::DENSE_SCHUR;
+      solver->linear_solver_ordering = std::make_shared<ceres::ParameterBlockOrdering>();
+      solver->linear_solver_ordering->AddElementToGroup(q_.data(), 1);
+      for (int b = 0; b < layout_.num_blocks(); ++b) {
+        if (layout_.num_own(b) > 0) {
+          solver->linear_solver_ordering->AddElementToGroup(q_.data() + layout_.own_offset(b), 0);
+        }
+      }
+      return;
+    }
+    const bool many = num_shared == 0 && layout_.num_parameters() > kManyParameters;
+    solver->linear_solver_type = many ? ceres::SPARSE_NORMAL_CHOLESKY : ceres::DENSE_QR;
+  }
+
   void Solve(double function_tolerance) {
+    if (!AnyFree(0, layout_.num_parameters())) {
+      minimum_.status = FitStatus::kConverged;
+      minimum_.message = "every parameter is at a bound";
+      return;
+    }
     ceres::Problem::Options problem_options;
     problem_options.evaluation_callback = &shared_;
     ceres::Problem problem(problem_options);
-    const int num_parameters = residuals_->num_parameters();
-    for (int i = 0; i < residuals_->num_residuals(); ++i) {
-      problem.AddResidualBlock(new CoordinateCostFunction(&shared_, i, num_parameters),
-                               huber_ > 0.0 ? new ceres::HuberLoss(huber_) : nullptr, q_.data());
-    }
-    SetInternalBounds(residuals_->scene(), &problem, &q_);
+    AddBlocks(&problem);
     ceres::Solver::Options solver;
     solver.trust_region_strategy_type = ceres::LEVENBERG_MARQUARDT;
-    solver.linear_solver_type = ceres::DENSE_QR;
+    ChooseLinearSolver(&solver);
     solver.max_num_iterations = std::max(
         1, options_.max_iterations - std::max(0, static_cast<int>(minimum_.iterations.size()) - 1));
     solver.function_tolerance = function_tolerance;
@@ -249,180 +430,140 @@ class Minimiser : public ceres::IterationCallback {
       minimum_.status = FitStatus::kNotConverged;
       minimum_.message = "the cost is not finite: an observation or its sigma is beyond all bounds";
     }
+    shared_.Update();
   }
 
-  /// The Gauss-Newton step of the free parameters with Huber's weights, which has the cost's own
-  /// fixed point.
-  Eigen::VectorXd GaussNewtonStep() const {
-    const auto& scene = residuals_->scene();
-    const Eigen::VectorXd p = ToParameters(scene.entries(), q_);
-    RowMatrixXd jacobian = shared_.jacobian();
-    Eigen::VectorXd right = shared_.values();
-    for (Eigen::Index i = 0; i < right.size(); ++i) {
-      const double root = std::sqrt(RobustWeight(right[i], options_.huber));
-      jacobian.row(i) *= root;
-      right[i] *= root;
+  /// The unknowns' linear system for Gauss-Newton's or Newton's step of those that are not held.
+  BlockSystem System(FinalSteps::Kind kind) const {
+    std::vector<RowMatrixXd> blocks;
+    for (const BlockFactor& block : shared_.model().blocks) {
+      blocks.push_back(kind == FinalSteps::Kind::kNewton ? block.curved
+                                                         : RowMatrixXd(block.jacobian()));
     }
-    for (int k = 0; k < scene.size(); ++k) {
-      if (IsAtBound(scene.entries()[k], p[k])) {
-        jacobian.col(k).setZero();
-      }
-    }
-    Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> qr;
-    qr.setThreshold(kPolishRank);
-    qr.compute(jacobian);
-    return -qr.solve(right);
+    return BlockSystem(layout_, blocks, held_);
   }
 
-  /// Newton's step of the robust cost: its Hessian has the rows of residuals within the bound
-  /// alone.
-  Eigen::VectorXd NewtonStep() const {
-    const auto& scene = residuals_->scene();
-    const Eigen::VectorXd p = ToParameters(scene.entries(), q_);
-    const Eigen::VectorXd& values = shared_.values();
-    RowMatrixXd jacobian = shared_.jacobian();
-    for (int k = 0; k < scene.size(); ++k) {
-      if (IsAtBound(scene.entries()[k], p[k])) {
-        jacobian.col(k).setZero();
-      }
+  /// With Huber's weights Gauss-Newton's step has the cost's own fixed point. Newton's has a
+  /// Hessian of the rows of residuals within the bound alone.
+  Eigen::VectorXd StepOf(FinalSteps::Kind kind) const {
+    const BlockSystem system = System(kind);
+    if (kind == FinalSteps::Kind::kNewton) {
+      return system.Newton(shared_.model().gradient);
     }
-    const Eigen::VectorXd gradient = RobustGradient(values, jacobian, options_.huber);
-    for (Eigen::Index i = 0; i < values.size(); ++i) {
-      if (std::abs(values[i]) > options_.huber) {
-        jacobian.row(i).setZero();
-      }
+    std::vector<Eigen::VectorXd> residuals;
+    for (const BlockFactor& block : shared_.model().blocks) {
+      residuals.emplace_back(block.residuals());
     }
-    // H = Jᵀ J = V S² Vᵀ.
-    Eigen::JacobiSVD<Eigen::MatrixXd, Eigen::ColPivHouseholderQRPreconditioner> svd(
-        jacobian, Eigen::ComputeThinU | Eigen::ComputeThinV);
-    svd.setThreshold(kPolishRank);
-    const Eigen::Index rank = svd.rank();
-    const auto v = svd.matrixV().leftCols(rank);
-    return -(v * svd.singularValues().head(rank).array().pow(-2).matrix().asDiagonal() *
-             (v.transpose() * gradient));
+    return system.LeastSquares(residuals);
   }
 
-  /// Newton's method from where Ceres left off; false where it does not converge.
-  bool Newton() {
-    double cost = RobustCost(shared_.values(), options_.huber);
-    double last = std::numeric_limits<double>::infinity();
-    for (int i = 0; i < kMaxNewtonSteps; ++i) {
-      Eigen::VectorXd step = NewtonStep();
+  /// To q or, within the bounds, as near as possible; its cost, infinite where no run is done.
+  double MoveTo(const Eigen::VectorXd& q) {
+    q_ = ToInternal(entries_, ToParameters(entries_, q));
+    shared_.Update();
+    return shared_.ok() ? shared_.model().cost : kInfinity;
+  }
+
+  /// Takes steps until they are rounding; false where they do not get there.
+  bool Refine(const FinalSteps& how) {
+    double last = kInfinity;
+    double cost = shared_.model().cost;
+    for (int i = 0; i < how.max_steps; ++i) {
+      Eigen::VectorXd step = StepOf(how.kind);
       double size = step.cwiseAbs().maxCoeff();
+      if (!(size > kPolishedStep) || (size > 0.5 * last && size <= how.limit)) {
+        return true;
+      }
       const Eigen::VectorXd before = q_;
-      double next = std::numeric_limits<double>::infinity();
-      for (int halving = 0; halving <= kMaxHalvings; ++halving) {
-        q_ = ToInternal(residuals_->entries(), ToParameters(residuals_->entries(), before + step));
-        shared_.PrepareForEvaluation(true, true);
-        if (shared_.ok()) {
-          next = RobustCost(shared_.values(), options_.huber);
-        }
-        if (next <= cost * (1.0 + kPolishedStep)) {
-          break;
-        }
+      const double highest = cost * (1.0 + how.slack) + ExactCost();
+      double next = MoveTo(before + step);
+      for (int halving = 0; halving < how.max_halvings && !(next <= highest); ++halving) {
         step *= 0.5;
         size *= 0.5;
+        next = MoveTo(before + step);
       }
-      if (!(next <= cost * (1.0 + kPolishedStep))) {
+      if (!(next <= highest)) {
         q_ = before;
-        shared_.PrepareForEvaluation(true, true);
+        shared_.Update();
         return last <= kParameterTolerance;
       }
       cost = next;
-      Record(true);
-      if (size <= kPolishedStep || (size <= kParameterTolerance && size > 0.5 * last)) {
-        return true;
-      }
       last = size;
+      Record(true);
     }
     return last <= kParameterTolerance;
   }
 
-  void Polish() {
-    double last = std::numeric_limits<double>::infinity();
-    double cost = RobustCost(shared_.values(), options_.huber);
-    for (int i = 0; i < kMaxPolishSteps; ++i) {
-      const Eigen::VectorXd step = GaussNewtonStep();
-      const double size = step.cwiseAbs().maxCoeff();
-      // Steps that no longer shrink are rounding.
-      if (!(size > kPolishedStep) || size > 0.5 * last) {
-        return;
-      }
-      const Eigen::VectorXd before = q_;
-      q_ += step;
-      q_ = ToInternal(residuals_->entries(), ToParameters(residuals_->entries(), q_));
-      shared_.PrepareForEvaluation(true, true);
-      const double next = shared_.ok() ? RobustCost(shared_.values(), options_.huber)
-                                       : std::numeric_limits<double>::infinity();
-      // Costs that are equal to rounding do not tell which point is better: the shrinking step
-      // does.
-      const double exact = 0.5 * kExactFit * kExactFit * residuals_->num_residuals();
-      if (next > cost * (1.0 + 1e-9) + exact) {
-        q_ = before;
-        shared_.PrepareForEvaluation(true, true);
-        return;
-      }
-      cost = next;
-      last = size;
-      Record(true);
+  /// Empty where the tests of minimise.h hold; else one line.
+  std::string WhatIsLeft() const {
+    const Linearisation& model = shared_.model();
+    if (model.cost <= ExactCost()) {
+      return "";
     }
+    const auto kind =
+        options_.huber > 0.0 ? FinalSteps::Kind::kNewton : FinalSteps::Kind::kGaussNewton;
+    const Eigen::VectorXd lengths = System(FinalSteps::Kind::kGaussNewton).lengths();
+    const Eigen::VectorXd step = StepOf(kind);
+    const double num_free = static_cast<double>((lengths.array() > 0.0).count());
+    const double num_rows = static_cast<double>(layout_.num_rows());
+    const double freedom = num_rows > num_free ? num_rows - num_free : num_rows;
+    const double unit = std::sqrt(2.0 * model.cost / freedom) * std::sqrt(std::max(1.0, num_free));
+    const double offset = std::sqrt(std::max(0.0, -model.gradient.dot(step))) / unit;
+    Eigen::Index worst = 0;
+    const double gradient = (lengths.array() > 0.0)
+                                .select(model.gradient.cwiseAbs().cwiseQuotient(lengths), 0.0)
+                                .maxCoeff(&worst) /
+                            unit;
+    if (offset <= kRelativeOffset && gradient <= kRelativeOffset) {
+      return "";
+    }
+    std::ostringstream text;
+    text.precision(3);
+    text << "no further progress, but a step of " << offset
+         << " standard deviations is left, and a gradient of " << gradient << " along '"
+         << entries_[worst].name << "' (at most " << kRelativeOffset
+         << "): the derivatives do not describe the cost here";
+    return text.str();
   }
 
   const FitOptions& options_;
   const std::function<double()>& elapsed_;
   const std::function<void(int, const FitIteration&)>& progress_;
-  RolloutResiduals* residuals_;
+  Linearizer linearizer_;
+  const BlockLayout& layout_;
+  const std::vector<ParameterEntry>& entries_;
   Eigen::VectorXd q_;
-  SharedEvaluation shared_;
-  std::vector<bool> held_;    ///< parameters at a bound, without a part in the steps
-  std::vector<int> pushed_;   ///< iterations in a row that the cost falls beyond the bound
-  Eigen::VectorXd gradient_;  ///< dcost/dq at the last evaluation with Jacobians, of held ones too
-  double huber_;              ///< of the loss that is minimised now
-  double cost_ = 0.0;         ///< robust, at the last accepted point
+  SharedLinearisation shared_;
+  std::vector<bool> held_;   ///< parameters at a bound, without a part in the steps
+  std::vector<int> pushed_;  ///< iterations in a row that the cost falls beyond the bound
+  double cost_ = 0.0;        ///< of the fit's own loss, at the last accepted point
   double gradient_norm_ = 0.0;
   Minimum minimum_;
 };
 
 }  // namespace
 
-void SetInternalBounds(const ParameterizedScene& scene, ceres::Problem* problem,
-                       Eigen::VectorXd* x) {
-  for (int k = 0; k < scene.size(); ++k) {
-    const double low = ToInternal(scene.entries()[k], scene.entries()[k].lower);
-    const double high = ToInternal(scene.entries()[k], scene.entries()[k].upper);
+void SetInternalBounds(const std::vector<ParameterEntry>& entries, int first, int size,
+                       ceres::Problem* problem, double* x) {
+  for (int i = 0; i < size; ++i) {
+    const ParameterEntry& entry = entries[first + i];
+    const double low = ToInternal(entry, entry.lower);
+    const double high = ToInternal(entry, entry.upper);
     if (std::isfinite(low)) {
-      problem->SetParameterLowerBound(x->data(), k, low);
+      problem->SetParameterLowerBound(x, i, low);
     }
     if (std::isfinite(high)) {
-      problem->SetParameterUpperBound(x->data(), k, high);
+      problem->SetParameterUpperBound(x, i, high);
     }
-    (*x)[k] = std::clamp((*x)[k], low, high);
+    x[i] = std::clamp(x[i], low, high);
   }
-}
-
-double RobustCost(const Eigen::VectorXd& residuals, double huber) {
-  double sum = 0.0;
-  for (const double r : residuals) {
-    const double size = std::abs(r);
-    sum += huber > 0.0 && size > huber ? 2.0 * huber * size - huber * huber : r * r;
-  }
-  return 0.5 * sum;
-}
-
-Eigen::VectorXd RobustGradient(const Eigen::VectorXd& residuals, const RowMatrixXd& jacobian,
-                               double huber) {
-  Eigen::VectorXd gradient = Eigen::VectorXd::Zero(jacobian.cols());
-  for (Eigen::Index i = 0; i < residuals.size(); ++i) {
-    gradient += RobustWeight(residuals[i], huber) * residuals[i] * jacobian.row(i).transpose();
-  }
-  return gradient;
 }
 
 Minimum Minimise(const FitOptions& options, const Eigen::VectorXd& start,
                  const std::function<double()>& elapsed,
                  const std::function<void(int iteration, const FitIteration&)>& progress,
-                 RolloutResiduals* residuals) {
-  return Minimiser(options, start, elapsed, progress, residuals).Run();
+                 LeastSquaresProblem* problem, EvaluationLog* log) {
+  return Minimiser(options, start, elapsed, progress, problem, log).Run();
 }
 
 }  // namespace tangible

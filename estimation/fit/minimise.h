@@ -1,33 +1,49 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// One start of a fit: Levenberg-Marquardt by Ceres, then Gauss-Newton steps to the last digits.
+// One start of a fit: Levenberg-Marquardt by Ceres on the blocks' factors (linearisation.h), then
+// Gauss-Newton steps to the last digits (block_system.h).
+//
+// Ceres gets one residual block a block of the problem and one parameter block for the shared
+// parameters and for each block's own, which are eliminated first. A parameter that is held at its
+// bound is constant (ceres::SubsetManifold).
+//
+// A minimum is `converged` if two tests hold at its end, over the parameters that are not held at a
+// bound beyond which the cost falls. With the gradient g of the cost in q, the Gauss-Newton step d
+// (Newton's with Huber's loss) and s = sqrt(2 cost / (N − P)), the residuals' own deviation,
+//
+//   sqrt(−gᵀ d) ≤ ε s sqrt(P)                      a step is left of ε standard deviations    (1)
+//   |g_k| / ‖J_k‖ ≤ ε s sqrt(P)  for each k        and what one parameter alone would gain    (2)
+//
+// with ε = kRelativeOffset = 1e-3, or if the residuals are rounding. (1) is the relative offset of
+// Bates and Watts, independent of the parameters' scales and of the number of residuals. (2) holds
+// with it unless a direction that the step leaves alone has a gradient. Otherwise the status is
+// `not_converged`, and the message says what is left.
+//
+// Reference: D. M. Bates and D. G. Watts, A relative offset orthogonality convergence criterion for
+// nonlinear least squares, Technometrics 23 (1981) 179.
 
 #include <ceres/ceres.h>
 
 #include <Eigen/Core>
 #include <functional>
+#include <vector>
 
 #include "tangible/estimation/fit/fit.h"
+#include "tangible/estimation/problem/evaluation_log.h"
 
 namespace tangible {
 
-/// Minimises from `start`. `elapsed` gives the seconds since the fit began.
+/// Minimises from `start`. `elapsed` gives the seconds since the fit began; `progress` may be
+/// empty; evaluations go through `log` unless it is null.
 Minimum Minimise(const FitOptions& options, const Eigen::VectorXd& start,
                  const std::function<double()>& elapsed,
                  const std::function<void(int iteration, const FitIteration&)>& progress,
-                 RolloutResiduals* residuals);
+                 LeastSquaresProblem* problem, EvaluationLog* log = nullptr);
 
-/// The parameters' bounds as those of the first entries of the problem's only block x, which is
-/// moved within them.
-void SetInternalBounds(const ParameterizedScene& scene, ceres::Problem* problem,
-                       Eigen::VectorXd* x);
-
-/// 1/2 Σ ρ(r²).
-double RobustCost(const Eigen::VectorXd& residuals, double huber);
-
-/// Its derivative Jᵀ ρ'(r²) r.
-Eigen::VectorXd RobustGradient(const Eigen::VectorXd& residuals, const RowMatrixXd& jacobian,
-                               double huber);
+/// Bounds of entries first ... first + size − 1 as those of the parameter block `x`, which is moved
+/// within them.
+void SetInternalBounds(const std::vector<ParameterEntry>& entries, int first, int size,
+                       ceres::Problem* problem, double* x);
 
 }  // namespace tangible

@@ -261,7 +261,7 @@ bool SolveStage(const FitOptions& options, const ParameterizedScene& scene,
     problem.AddResidualBlock(new CoordinateCostFunction(&shared, i, shooting->num_unknowns()),
                              robust ? new ceres::HuberLoss(options.huber) : nullptr, x->data());
   }
-  SetInternalBounds(scene, &problem, x);
+  SetInternalBounds(scene.entries(), 0, scene.size(), &problem, x->data());
   ceres::Solver::Options solver;
   solver.linear_solver_type = ceres::DENSE_QR;
   solver.max_num_iterations = kIterationsPerStage;

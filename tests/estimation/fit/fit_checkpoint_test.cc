@@ -5,6 +5,7 @@
 
 #include <algorithm>
 
+#include "../../support/block_problem.h"
 #include "../../support/fit_scenes.h"
 #include "tangible/estimation/fit/discretisation.h"
 #include "tangible/math/bit_hash.h"
@@ -83,8 +84,7 @@ TEST(FitCheckpointTest, EndsAtTheSameBitsWhereverItWasInterrupted) {
   }
 }
 
-// What a finished fit has left needs no run but those of the search for its first point, which are
-// in the log too: with other observed values it ends the same.
+// A finished fit needs no run but the one at the estimate, of which nothing is kept.
 TEST(FitCheckpointTest, WhatIsDoneIsNotDoneAgain) {
   FitProblem problem = PendulumProblem();
   problem.options.certificate = CertificatePass::kSkip;
@@ -94,12 +94,40 @@ TEST(FitCheckpointTest, WhatIsDoneIsNotDoneAgain) {
   log.search.Restore(log.search.evaluations());
   log.start.Restore(log.start.evaluations());
   int progress = 0;
-  RolloutResiduals others =
-      MakeResiduals(problem.scene, {}, problem.parameters, Observe(problem.scene, 20, 0.01, 2));
+  RolloutResiduals others = ResidualsOf(problem);
   const FitResult again = Fit(
       problem.options, &others, [&](int, int, const FitIteration&) { ++progress; }, &log);
   EXPECT_EQ(HashOf(again), HashOf(whole));
   EXPECT_EQ(progress, 0);
+  EXPECT_EQ(others.rollouts(), 1);
+}
+
+// The blocks' factors are kept as well as those of one run, for any number of threads.
+TEST(FitCheckpointTest, AFitOfSeveralRecordingsEndsAtTheSameBits) {
+  FitOptions options;
+  options.starts = 2;
+  options.huber = 2.0;
+  options.threads = 1;
+  DecayProblem problem(6, 3);
+  const FitResult whole = Fit(options, &problem, {});
+  ASSERT_EQ(whole.status, FitStatus::kConverged) << whole.message;
+  std::vector<FitLog> interruptions;
+  FitLog log;
+  const auto keep = [&] { interruptions.push_back(log); };
+  log.on_end = keep;
+  log.search.OnIteration(keep);
+  log.start.OnIteration(keep);
+  options.threads = 3;
+  EXPECT_EQ(HashOf(Fit(options, &problem, {}, &log)), HashOf(whole));
+  ASSERT_GT(interruptions.size(), 10u);
+  const FitProblem any = PendulumProblem();
+  for (const FitLog& interrupted : interruptions) {
+    FitCheckpoint written(any, {});
+    written.fit() = interrupted;
+    FitCheckpoint read(any, [](const std::string&) { return ""; });
+    ASSERT_EQ(read.Restore(written.Text(), "c.json"), "");
+    ASSERT_EQ(HashOf(Fit(options, &problem, {}, &read.fit())), HashOf(whole));
+  }
 }
 
 TEST(FitCheckpointTest, TheCheckAtHalfTheStepGoesOnToo) {
@@ -166,7 +194,7 @@ TEST(FitCheckpointTest, RefusesWhatIsDamagedOrOfAnotherFit) {
   const std::string deep(1'000'000, '\x81');
   for (const std::string& other :
        {std::string("{}"), std::string("[]"), std::string(), std::string("\xff\xff"), deep}) {
-    EXPECT_EQ(refused(other, problem).rfind("c.json: expected a \"tangible-fit checkpoint 2\"", 0),
+    EXPECT_EQ(refused(other, problem).rfind("c.json: expected a \"tangible-fit checkpoint 3\"", 0),
               0U);
   }
 

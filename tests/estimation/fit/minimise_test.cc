@@ -3,54 +3,42 @@
 
 #include <gtest/gtest.h>
 
+#include "../../support/block_problem.h"
 #include "../../support/fit_scenes.h"
 
 namespace tangible {
 namespace {
 
-TEST(RobustCostTest, IsQuadraticWithinTheBoundAndLinearBeyond) {
-  const Eigen::Vector3d r(0.5, -2.0, 10.0);
-  EXPECT_DOUBLE_EQ(RobustCost(r, 0.0), 0.5 * (0.25 + 4.0 + 100.0));
-  // 2 b |r| − b² beyond b = 2.
-  EXPECT_DOUBLE_EQ(RobustCost(r, 2.0), 0.5 * (0.25 + 4.0 + 2.0 * 2.0 * 10.0 - 4.0));
-}
+/// A minimum with its residuals, and their derivatives by the free parameters.
+struct End : Minimum {
+  Eigen::VectorXd residuals;
+  RowMatrixXd jacobian;
+};
 
-TEST(RobustGradientTest, IsTheDerivativeOfTheCost) {
-  const RowMatrixXd jacobian = RowMatrixXd::Random(20, 3);
-  const Eigen::VectorXd r = 4.0 * Eigen::VectorXd::Random(20);
-  ASSERT_GT(r.cwiseAbs().maxCoeff(), 1.5);
-  for (const double huber : {0.0, 1.5}) {
-    const Eigen::VectorXd gradient = RobustGradient(r, jacobian, huber);
-    for (int k = 0; k < 3; ++k) {
-      const double h = 1e-6;
-      const double high = RobustCost(r + h * jacobian.col(k), huber);
-      const double low = RobustCost(r - h * jacobian.col(k), huber);
-      // Rounding of costs of order 100 over h.
-      EXPECT_NEAR((high - low) / (2.0 * h), gradient[k], 1e-7);
-    }
-  }
-}
-
-Minimum MinimiseFrom(const std::vector<FitParameter>& parameters, const FitOptions& options,
-                     const std::vector<Observation>& observations, int* reports) {
+End MinimiseFrom(const std::vector<FitParameter>& parameters, const FitOptions& options,
+                 const std::vector<Observation>& observations, int* reports) {
   const Scene scene = MakeScene(kFallingBall);
   RolloutResiduals residuals = MakeResiduals(scene, {}, parameters, observations);
-  return Minimise(
+  End end;
+  static_cast<Minimum&>(end) = Minimise(
       options, residuals.scene().Initial(), [] { return 1.0; },
       [reports](int iteration, const FitIteration&) { EXPECT_EQ(iteration, (*reports)++); },
       &residuals);
+  EXPECT_TRUE(
+      residuals.Evaluate(end.parameters, options.derivatives, &end.residuals, &end.jacobian));
+  return end;
 }
 
 TEST(MinimiseTest, EndsAtTheMinimumAndTellsEveryIteration) {
   int reports = 0;
-  const Minimum minimum = MinimiseFrom({Parameter("gravity/y", -5.0)}, {},
-                                       Observe(MakeScene(kFallingBall), 5, 0.01, 1), &reports);
+  const End minimum = MinimiseFrom({Parameter("gravity/y", -5.0)}, {},
+                                   Observe(MakeScene(kFallingBall), 5, 0.01, 1), &reports);
   ASSERT_EQ(minimum.status, FitStatus::kConverged) << minimum.message;
   EXPECT_EQ(reports, static_cast<int>(minimum.iterations.size()));
   EXPECT_EQ(minimum.iterations.front().parameters, std::vector<double>{-5.0});
   EXPECT_EQ(minimum.iterations.back().cost, minimum.cost);
   EXPECT_EQ(minimum.iterations.back().parameters[0], minimum.parameters[0]);
-  EXPECT_EQ(RobustCost(minimum.residuals, 0.0), minimum.cost);
+  EXPECT_DOUBLE_EQ(0.5 * minimum.residuals.squaredNorm(), minimum.cost);
   // Jᵀ r = 0, to rounding of its terms.
   const double gradient = minimum.jacobian.col(0).dot(minimum.residuals);
   const double terms = minimum.jacobian.col(0).cwiseAbs().dot(minimum.residuals.cwiseAbs());
@@ -61,17 +49,16 @@ TEST(MinimiseTest, AParameterThatIsPushedOutStaysAtItsBound) {
   FitParameter damping = Parameter("bodies/ball/linear_damping", 0.5);
   damping.lower = 0.4;  // the truth is 0.3
   int reports = 0;
-  const Minimum minimum = MinimiseFrom({damping, Parameter("gravity/y", -8.0)}, {},
-                                       Observe(MakeScene(kFallingBall), 5, 0.0, 1), &reports);
+  const End minimum = MinimiseFrom({damping, Parameter("gravity/y", -8.0)}, {},
+                                   Observe(MakeScene(kFallingBall), 5, 0.0, 1), &reports);
   ASSERT_EQ(minimum.status, FitStatus::kConverged) << minimum.message;
   EXPECT_DOUBLE_EQ(minimum.parameters[0], 0.4);
-  EXPECT_EQ(minimum.jacobian.col(0).cwiseAbs().maxCoeff(), 0.0);  // it is held
   EXPECT_LT(std::abs(minimum.jacobian.col(1).dot(minimum.residuals)),
             1e-8 * minimum.jacobian.col(1).cwiseAbs().dot(minimum.residuals.cwiseAbs()));
   damping.lower = 0.35;  // the cost falls beyond the bound
   reports = 0;
-  const Minimum wider = MinimiseFrom({damping, Parameter("gravity/y", -8.0)}, {},
-                                     Observe(MakeScene(kFallingBall), 5, 0.0, 1), &reports);
+  const End wider = MinimiseFrom({damping, Parameter("gravity/y", -8.0)}, {},
+                                 Observe(MakeScene(kFallingBall), 5, 0.0, 1), &reports);
   EXPECT_LT(wider.cost, 0.5 * minimum.cost);
 }
 
@@ -79,7 +66,7 @@ TEST(MinimiseTest, TheLimitOfIterationsIsKept) {
   FitOptions options;
   options.max_iterations = 2;
   int reports = 0;
-  const Minimum minimum =
+  const End minimum =
       MinimiseFrom({Parameter("gravity/y", -5.0), Parameter("bodies/ball/linear_damping", 3.0)},
                    options, Observe(MakeScene(kFallingBall), 5, 0.01, 1), &reports);
   EXPECT_EQ(minimum.status, FitStatus::kNotConverged);
@@ -100,6 +87,153 @@ TEST(MinimiseTest, AStartThatCannotBeRunFails) {
       << minimum.message;
 }
 
+Minimum MinimiseBlocks(const FitOptions& options, LeastSquaresProblem* problem) {
+  return Minimise(
+      options, InitialOf(problem->entries()), [] { return 0.0; }, {}, problem);
+}
+
+TEST(MinimiseTest, ManyRecordingsShareParameters) {
+  DecayProblem problem(20, 1);
+  problem.prior_sigma = 1e6;
+  const Minimum minimum = MinimiseBlocks({}, &problem);
+  ASSERT_EQ(minimum.status, FitStatus::kConverged) << minimum.message;
+  // 600 residuals, with 22 parameters fitted to them: 1/2 (600 − 22), ± sqrt(578 / 2).
+  EXPECT_NEAR(minimum.cost, 289.0, 5.0 * 17.0);
+  EXPECT_NEAR(minimum.parameters[0], DecayProblem::kRate, 0.02);
+  EXPECT_NEAR(minimum.parameters[1], DecayProblem::kOffset, 0.02);
+  for (int b = 0; b < 20; ++b) {
+    EXPECT_NEAR(minimum.parameters[2 + b], DecayProblem::Amplitude(b), 0.05);
+  }
+  // The same from elsewhere, to rounding, and with other numbers of threads, in every bit.
+  DecayProblem other(20, 1);
+  other.prior_sigma = 1e6;
+  for (ParameterEntry& entry : other.mutable_entries()) {
+    entry.initial *= 0.5;
+  }
+  const Minimum again = MinimiseBlocks({}, &other);
+  EXPECT_LT((again.parameters - minimum.parameters).cwiseAbs().maxCoeff(), 1e-12);
+  FitOptions options;
+  options.threads = 4;
+  EXPECT_EQ(MinimiseBlocks(options, &problem).parameters, minimum.parameters);
+}
+
+// A weight is as many copies of the recording; a prior of great weight holds its parameter.
+TEST(MinimiseTest, WeightsAndPriorsCount) {
+  DecayProblem doubled(2, 5);
+  doubled.observed()[1] = doubled.observed()[0];
+  DecayProblem weighted(1, 5);
+  weighted.weights = {2.0};
+  const Minimum a = MinimiseBlocks({}, &doubled);
+  const Minimum b = MinimiseBlocks({}, &weighted);
+  EXPECT_NEAR(a.parameters[0], b.parameters[0], 1e-12);
+  EXPECT_NEAR(a.cost, b.cost, 1e-10 * a.cost);
+  DecayProblem held(2, 5);
+  held.prior_sigma = 1e-9;
+  EXPECT_NEAR(MinimiseBlocks({}, &held).parameters[0], DecayProblem::kRate, 1e-9);
+  EXPECT_GT(std::abs(a.parameters[0] - DecayProblem::kRate), 1e-6);
+}
+
+// Outliers do not pull, and priors are never taken as such.
+TEST(MinimiseTest, TheRobustLossIsForObservationsAlone) {
+  DecayProblem problem(5, 2);
+  for (Eigen::VectorXd& observed : problem.observed()) {
+    observed[3] += 1.0;
+  }
+  FitOptions options;
+  options.huber = 1.5;
+  const Minimum robust = MinimiseBlocks(options, &problem);
+  ASSERT_EQ(robust.status, FitStatus::kConverged) << robust.message;
+  EXPECT_NEAR(robust.parameters[0], DecayProblem::kRate, 0.03);
+  EXPECT_GT(std::abs(MinimiseBlocks({}, &problem).parameters[0] - DecayProblem::kRate), 0.03);
+  // Far from the prior a linear loss would let k go.
+  for (Eigen::VectorXd& observed : problem.observed()) {
+    observed.setConstant(DecayProblem::kOffset);
+  }
+  problem.prior_sigma = 1e-4;
+  EXPECT_NEAR(MinimiseBlocks(options, &problem).parameters[0], DecayProblem::kRate, 1e-3);
+}
+
+TEST(MinimiseTest, OwnParametersAtTheirBoundsStayThere) {
+  DecayProblem problem(4, 1);
+  problem.mutable_entries()[3].upper = 1.05;  // the truth is 1.1
+  const Minimum minimum = MinimiseBlocks({}, &problem);
+  ASSERT_EQ(minimum.status, FitStatus::kConverged) << minimum.message;
+  EXPECT_DOUBLE_EQ(minimum.parameters[3], 1.05);
+  EXPECT_NEAR(minimum.parameters[2], 1.0, 0.05);
+  // All shared ones constant, and nothing free at all.
+  for (int k : {0, 1}) {
+    ParameterEntry& entry = problem.mutable_entries()[k];
+    entry.lower = entry.initial = k == 0 ? 20.0 : 3.0;
+    entry.upper = 100.0;
+  }
+  const Minimum held = MinimiseBlocks({}, &problem);
+  EXPECT_EQ(held.status, FitStatus::kConverged) << held.message;
+  EXPECT_DOUBLE_EQ(held.parameters[0], 20.0);
+  EXPECT_DOUBLE_EQ(held.parameters[1], 3.0);
+}
+
+/// One block with the two parameters x ≥ 0 and y and the residuals that `function` gives.
+class TwoParameters : public LeastSquaresProblem {
+ public:
+  using Function = std::function<void(double x, double y, Eigen::VectorXd* r, RowMatrixXd* j)>;
+  TwoParameters(int rows, Eigen::Vector2d start, Function function)
+      : rows_(rows), function_(std::move(function)) {
+    entries_ = {{"x", start[0], 0.0, HUGE_VAL, false, 1.0},
+                {"y", start[1], -HUGE_VAL, HUGE_VAL, false, 1.0}};
+  }
+  const std::vector<ParameterEntry>& entries() const override { return entries_; }
+  int num_shared() const override { return 2; }
+  int num_blocks() const override { return 1; }
+  int num_own(int) const override { return 0; }
+  int num_rows(int) const override { return rows_; }
+  std::vector<RowPlace> Places(int) const override {
+    return std::vector<RowPlace>(static_cast<size_t>(rows_));
+  }
+  bool EvaluateBlock(int, const Eigen::VectorXd& p, DerivativeMethod, BlockDerivatives,
+                     BlockEvaluation* evaluation) override {
+    evaluation->residuals.resize(rows_);
+    evaluation->jacobian.resize(rows_, 2);
+    function_(p[0], p[1], &evaluation->residuals, &evaluation->jacobian);
+    return true;
+  }
+
+ private:
+  int rows_;
+  Function function_;
+  std::vector<ParameterEntry> entries_;
+};
+
+// While y < 0 the cost falls beyond x = 0, so that x is held there; at y = 2 it falls inwards.
+TEST(MinimiseTest, AParameterThatIsReleasedMovesInside) {
+  TwoParameters problem(2, {1.0, -4.0}, [](double x, double y, Eigen::VectorXd* r, RowMatrixXd* j) {
+    *r = Eigen::Vector2d(x - y, 10.0 * (std::exp(-y) - std::exp(-2.0)));
+    *j << 1.0, -1.0, 0.0, -10.0 * std::exp(-y);
+  });
+  const Minimum minimum = MinimiseBlocks({}, &problem);
+  ASSERT_EQ(minimum.status, FitStatus::kConverged) << minimum.message;
+  int at_bound = 0;
+  for (const FitIteration& iteration : minimum.iterations) {
+    at_bound += iteration.parameters[0] == 0.0 ? 1 : 0;
+  }
+  EXPECT_GE(at_bound, 2) << "it was not held";
+  EXPECT_NEAR(minimum.parameters[0], 2.0, 1e-9);
+  EXPECT_NEAR(minimum.parameters[1], 2.0, 1e-9);
+}
+
+// Derivatives of another function: no step lowers the cost, and a large one is left.
+TEST(MinimiseTest, AStepThatIsLeftIsNotCalledConverged) {
+  TwoParameters problem(3, {1.0, 1.0}, [](double x, double y, Eigen::VectorXd* r, RowMatrixXd* j) {
+    *r = Eigen::Vector3d(x - 0.5, y - 1.0, 2.0);
+    *j << -1.0, 0.0, 0.0, 1.0, 0.0, 0.0;
+  });
+  const Minimum minimum = MinimiseBlocks({}, &problem);
+  EXPECT_EQ(minimum.status, FitStatus::kNotConverged);
+  EXPECT_NE(minimum.message.find("standard deviations is left, and a gradient of"),
+            std::string::npos)
+      << minimum.message;
+  EXPECT_NE(minimum.message.find("along 'x'"), std::string::npos) << minimum.message;
+}
+
 TEST(SetInternalBoundsTest, MovesTheStartWithinTheBounds) {
   FitParameter gravity = Parameter("gravity/y", -9.0);
   gravity.lower = -10.0;
@@ -110,7 +244,7 @@ TEST(SetInternalBoundsTest, MovesTheStartWithinTheBounds) {
   Eigen::VectorXd x = Eigen::VectorXd::Constant(1, 1e9);
   ceres::Problem problem;
   problem.AddParameterBlock(x.data(), 1);
-  SetInternalBounds(residuals.scene(), &problem, &x);
+  SetInternalBounds(residuals.entries(), 0, 1, &problem, x.data());
   EXPECT_NEAR(ToParameters(residuals.entries(), x)[0], -8.0, 1e-12);
   EXPECT_EQ(problem.GetParameterUpperBound(x.data(), 0), x[0]);
   EXPECT_LT(problem.GetParameterLowerBound(x.data(), 0), x[0]);

@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// Linear least squares in blocks that share some of their unknowns,
+//
+//   minimise over x_0, x_1, ..., y    1/2 Σ_b ‖A_b x_b + B_b y + c_b‖²                         (1)
+//
+// by the Schur complement, in its orthogonal form, which does not square the condition: with P_b
+// the projection onto the range of A_b,
+//
+//   minimise over y   1/2 Σ_b ‖(1 − P_b)(B_b y + c_b)‖²,    then   x_b = −A_b⁺ (B_b y + c_b)      (2)
+//
+// Columns are scaled to unit length. Directions with a share below kStepRankTolerance are left alone:
+// they get no part in the step. Unknowns that are held have none either.
+//
+// Newton's method has a gradient g that is not Σ [A B]ᵀ c,
+//
+//   minimise    1/2 Σ_b ‖A_b x_b + B_b y‖² + Σ_b g_bᵀ x_b + g_sᵀ y                               (3)
+//
+// and a_b = (A_bᵀ)⁺ g_b makes it Σ_b 1/2 ‖A_b x_b + B_b y + a_b‖² + (g_s − Σ B_bᵀ a_b)ᵀ y + constant.
+
+#include <Eigen/Core>
+#include <Eigen/QR>
+#include <vector>
+
+#include "tangible/estimation/problem/least_squares.h"
+
+namespace tangible {
+
+class BlockSystem {
+ public:
+  /// `blocks` are [A_b B_b]; `held` says of each unknown in the order of `layout` (shared ones,
+  /// then those of each block) whether it has no part.
+  BlockSystem(const BlockLayout& layout, const std::vector<RowMatrixXd>& blocks,
+              const std::vector<bool>& held);
+
+  /// (1), of all unknowns in the layout's order.
+  Eigen::VectorXd LeastSquares(const std::vector<Eigen::VectorXd>& c) const;
+  /// (3), with the gradient in the layout's order.
+  Eigen::VectorXd Newton(const Eigen::VectorXd& gradient) const;
+
+  /// ‖[A B]_k‖ of each unknown, 0 of one that is held.
+  const Eigen::VectorXd& lengths() const { return lengths_; }
+
+ private:
+  struct Block {
+    Eigen::MatrixXd own, shared;                                 ///< A and B in scaled columns
+    Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> qr;  ///< of A
+    Eigen::Index rank = 0;
+  };
+  /// The rows of (1 − P) x, in an orthonormal basis.
+  static Eigen::MatrixXd Complement(const Block& block, const Eigen::MatrixXd& x);
+  Eigen::VectorXd Unscaled(const Eigen::VectorXd& scaled) const;
+  void SolveOwn(const Eigen::VectorXd& y, const std::vector<Eigen::VectorXd>& c,
+                Eigen::VectorXd* scaled) const;
+
+  const BlockLayout& layout_;
+  Eigen::VectorXd lengths_;
+  Eigen::VectorXd scale_;  ///< of columns: 1 / length, 0 of those that have no part
+  std::vector<Block> blocks_;
+};
+
+}  // namespace tangible

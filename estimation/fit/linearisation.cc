@@ -1,0 +1,317 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/estimation/fit/linearisation.h"
+
+#include <Eigen/QR>
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <thread>
+#include <utility>
+
+namespace tangible {
+namespace {
+
+// Rows that are added to a triangular factor at once, in multiples of its columns and at least:
+// enough that the decomposition is one of matrices and not of single rows.
+constexpr Eigen::Index kChunkFactor = 4;
+constexpr Eigen::Index kChunk = 64;
+
+/// The triangular factor of rows that are added chunk by chunk.
+class FactorGatherer {
+ public:
+  explicit FactorGatherer(Eigen::Index columns)
+      : stacked_(columns + std::max(kChunkFactor * columns, kChunk), columns) {}
+
+  /// The next row, to be filled in.
+  auto NextRow() {
+    if (num_rows_ == stacked_.rows()) {
+      Compress();
+    }
+    return stacked_.row(num_rows_++);
+  }
+  /// Takes the last row back.
+  void DropRow() { --num_rows_; }
+
+  RowMatrixXd Factor() {
+    if (num_rows_ > 0) {
+      Compress();
+    }
+    return stacked_.topRows(num_rows_);
+  }
+
+ private:
+  void Compress() {
+    const Eigen::Index rows = std::min(num_rows_, stacked_.cols());
+    const Eigen::HouseholderQR<Eigen::MatrixXd> qr(stacked_.topRows(num_rows_));
+    stacked_.topRows(rows) = qr.matrixQR().topRows(rows).triangularView<Eigen::Upper>();
+    num_rows_ = rows;
+  }
+
+  Eigen::MatrixXd stacked_;
+  Eigen::Index num_rows_ = 0;
+};
+
+/// Appends to and reads from a vector of numbers, the form in which a log keeps an evaluation.
+class Packer {
+ public:
+  void Add(double x) { numbers_.push_back(x); }
+  void Add(const Eigen::VectorXd& x) { numbers_.insert(numbers_.end(), x.begin(), x.end()); }
+  void Add(const RowMatrixXd& x) {
+    Add(static_cast<double>(x.rows()));
+    numbers_.insert(numbers_.end(), x.data(), x.data() + x.size());
+  }
+  Eigen::VectorXd numbers() const {
+    return Eigen::Map<const Eigen::VectorXd>(numbers_.data(),
+                                             static_cast<Eigen::Index>(numbers_.size()));
+  }
+
+ private:
+  std::vector<double> numbers_;
+};
+
+class Unpacker {
+ public:
+  explicit Unpacker(const Eigen::VectorXd& numbers) : numbers_(numbers) {}
+  double Number() { return numbers_[at_++]; }
+  Eigen::VectorXd Vector(Eigen::Index size) {
+    at_ += size;
+    return numbers_.segment(at_ - size, size);
+  }
+  RowMatrixXd Matrix(Eigen::Index columns) {
+    const auto rows = static_cast<Eigen::Index>(Number());
+    at_ += rows * columns;
+    return Eigen::Map<const RowMatrixXd>(numbers_.data() + at_ - rows * columns, rows, columns);
+  }
+
+ private:
+  const Eigen::VectorXd& numbers_;
+  Eigen::Index at_ = 0;
+};
+
+/// Row i of [A B], from that of [shared | own].
+template <typename Row>
+void FillRow(const BlockEvaluation& evaluation, Eigen::Index i, const Eigen::VectorXd& q_scale,
+             Eigen::Index num_own, double scale, Row row) {
+  const Eigen::Index num_shared = q_scale.size() - num_own;
+  const auto jacobian = evaluation.jacobian.row(i);
+  row.head(num_own) =
+      scale * jacobian.tail(num_own).cwiseProduct(q_scale.tail(num_own).transpose());
+  row.segment(num_own, num_shared) =
+      scale * jacobian.head(num_shared).cwiseProduct(q_scale.head(num_shared).transpose());
+}
+
+double CostOf(const BlockEvaluation& evaluation, Eigen::Index num_observations, double weight,
+              double huber) {
+  const Eigen::Index priors = evaluation.residuals.size() - num_observations;
+  return weight * (RobustCost(evaluation.residuals.head(num_observations), huber) +
+                   RobustCost(evaluation.residuals.tail(priors), 0.0));
+}
+
+/// ∂cost/∂q of [shared | own].
+Eigen::VectorXd GradientOf(const BlockEvaluation& evaluation, const Eigen::VectorXd& q_scale,
+                           Eigen::Index num_observations, double weight, double huber) {
+  Eigen::VectorXd pull = weight * evaluation.residuals;
+  for (Eigen::Index i = 0; i < num_observations; ++i) {
+    pull[i] *= RobustWeight(evaluation.residuals[i], huber);
+  }
+  return q_scale.cwiseProduct(evaluation.jacobian.transpose() * pull);
+}
+
+}  // namespace
+
+double RobustWeight(double residual, double huber) {
+  const double size = std::abs(residual);
+  return huber > 0.0 && size > huber ? huber / size : 1.0;
+}
+
+double RobustCost(const Eigen::VectorXd& residuals, double huber) {
+  double sum = 0.0;
+  for (const double r : residuals) {
+    const double size = std::abs(r);
+    sum += huber > 0.0 && size > huber ? 2.0 * huber * size - huber * huber : r * r;
+  }
+  return 0.5 * sum;
+}
+
+BlockFactor Reduce(const BlockEvaluation& evaluation, const Eigen::VectorXd& q_scale, int num_own,
+                   int num_observation_rows, double weight, double huber) {
+  const Eigen::Index columns = q_scale.size();
+  FactorGatherer factor(columns + 1);
+  FactorGatherer curved(columns);
+  double remainder = 0.0;  // of the cost, times 2
+  for (Eigen::Index i = 0; i < evaluation.residuals.size(); ++i) {
+    const double r = evaluation.residuals[i];
+    const double size = std::abs(r);
+    const double bound = i < num_observation_rows ? huber : 0.0;
+    const double scale = std::sqrt(weight * RobustWeight(r, bound));
+    auto row = factor.NextRow();
+    FillRow(evaluation, i, q_scale, num_own, scale, row);
+    row[columns] = scale * r;
+    if (bound > 0.0 && size > bound) {
+      // ρ(r²) − ρ'(r²) r² = 2 b |r| − b² − b |r|
+      remainder += weight * bound * (size - bound);
+    } else if (huber > 0.0) {
+      FillRow(evaluation, i, q_scale, num_own, scale, curved.NextRow());
+    }
+  }
+  return {factor.Factor(), curved.Factor(), std::sqrt(remainder)};
+}
+
+int NumThreads(int threads) {
+  return threads > 0 ? threads : std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+}
+
+void ForEachOnThreads(int threads, int count, const std::function<void(int)>& function) {
+  std::atomic<int> next{0};
+  const auto work = [&] {
+    for (int i = next++; i < count; i = next++) {
+      function(i);
+    }
+  };
+  std::vector<std::thread> others;
+  for (int i = 1; i < std::min(NumThreads(threads), count); ++i) {
+    others.emplace_back(work);
+  }
+  work();
+  for (std::thread& other : others) {
+    other.join();
+  }
+}
+
+Linearizer::Linearizer(LeastSquaresProblem* problem, DerivativeMethod method, int threads,
+                       EvaluationLog* log)
+    : problem_(problem), layout_(*problem), method_(method), threads_(threads), log_(log) {}
+
+bool Linearizer::EvaluateBlocks(const Eigen::VectorXd& p, BlockDerivatives derivatives,
+                                const std::function<void(int, BlockEvaluation*)>& use) {
+  const int count = layout_.num_blocks();
+  std::vector<std::string> messages(static_cast<size_t>(count));
+  std::vector<char> done(static_cast<size_t>(count), 0);
+  std::atomic<long> rollouts{0};
+  ForEachOnThreads(threads_, count, [&](int block) {
+    BlockEvaluation evaluation;
+    done[block] =
+        problem_->EvaluateBlock(block, layout_.Local(block, p), method_, derivatives, &evaluation)
+            ? 1
+            : 0;
+    rollouts += evaluation.rollouts;
+    if (done[block] != 0) {
+      use(block, &evaluation);
+    } else {
+      messages[block] = problem_->BlockName(block) + evaluation.message;
+    }
+  });
+  rollouts_ += rollouts;
+  const auto failed = std::find(done.begin(), done.end(), 0);
+  message_ = failed == done.end() ? "" : messages[failed - done.begin()];
+  return failed == done.end();
+}
+
+bool Linearizer::Rows(const Eigen::VectorXd& p, BlockDerivatives derivatives,
+                      std::vector<BlockEvaluation>* blocks) {
+  blocks->assign(static_cast<size_t>(layout_.num_blocks()), {});
+  return EvaluateBlocks(p, derivatives, [blocks](int block, BlockEvaluation* evaluation) {
+    (*blocks)[block] = std::move(*evaluation);
+  });
+}
+
+Eigen::VectorXd Linearizer::Numbers(int block, const BlockEvaluation& evaluation,
+                                    const Eigen::VectorXd& q_scale, const HuberBounds& huber,
+                                    BlockDerivatives derivatives) const {
+  const int observations = problem_->num_observation_rows(block);
+  const double weight = problem_->weight(block);
+  Packer pack;
+  for (const double bound : {huber.current, huber.target}) {
+    pack.Add(CostOf(evaluation, observations, weight, bound));
+    if (derivatives == BlockDerivatives::kCompute) {
+      pack.Add(GradientOf(evaluation, q_scale, observations, weight, bound));
+    }
+  }
+  if (derivatives == BlockDerivatives::kCompute) {
+    const BlockFactor factor =
+        Reduce(evaluation, q_scale, layout_.num_own(block), observations, weight, huber.current);
+    pack.Add(factor.remainder);
+    pack.Add(factor.factor);
+    pack.Add(factor.curved);
+  }
+  return pack.numbers();
+}
+
+bool Linearizer::Compute(const Eigen::VectorXd& q, const HuberBounds& huber,
+                         BlockDerivatives derivatives, Eigen::VectorXd* numbers) {
+  const Eigen::VectorXd p = ToParameters(entries(), q);
+  const Eigen::VectorXd q_scale = ParametersByInternal(entries(), p);
+  std::vector<Eigen::VectorXd> blocks(static_cast<size_t>(layout_.num_blocks()));
+  if (!EvaluateBlocks(p, derivatives, [&](int block, BlockEvaluation* evaluation) {
+        blocks[block] =
+            Numbers(block, *evaluation, layout_.Local(block, q_scale), huber, derivatives);
+      })) {
+    return false;
+  }
+  Packer pack;
+  for (const Eigen::VectorXd& block : blocks) {
+    pack.Add(block);
+  }
+  *numbers = pack.numbers();
+  return true;
+}
+
+bool Linearizer::Logged(const Eigen::VectorXd& q, const HuberBounds& huber,
+                        BlockDerivatives derivatives, Eigen::VectorXd* numbers) {
+  if (log_ == nullptr) {
+    return Compute(q, huber, derivatives, numbers);
+  }
+  RowMatrixXd none;  // only that a Jacobian is asked for matters to the log
+  return log_->Evaluate(
+      q,
+      [&](Eigen::VectorXd* computed, RowMatrixXd*) {
+        return Compute(q, huber, derivatives, computed);
+      },
+      numbers, derivatives == BlockDerivatives::kCompute ? &none : nullptr, &rollouts_, &message_);
+}
+
+bool Linearizer::Cost(const Eigen::VectorXd& q, const HuberBounds& huber, Eigen::VectorXd* current,
+                      double* target) {
+  Eigen::VectorXd numbers;
+  if (!Logged(q, huber, BlockDerivatives::kSkip, &numbers)) {
+    return false;
+  }
+  Unpacker unpack(numbers);
+  current->resize(layout_.num_blocks());
+  *target = 0.0;
+  for (double& cost : *current) {
+    cost = unpack.Number();
+    *target += unpack.Number();
+  }
+  return true;
+}
+
+bool Linearizer::Linearise(const Eigen::VectorXd& q, const HuberBounds& huber,
+                           Linearisation* current, Linearisation* target) {
+  Eigen::VectorXd numbers;
+  if (!Logged(q, huber, BlockDerivatives::kCompute, &numbers)) {
+    return false;
+  }
+  Unpacker unpack(numbers);
+  for (Linearisation* model : {current, target}) {
+    *model = {0.0, Eigen::VectorXd::Zero(layout_.num_parameters()), {}};
+  }
+  for (int block = 0; block < layout_.num_blocks(); ++block) {
+    const int local = layout_.num_local(block);
+    for (Linearisation* model : {current, target}) {
+      model->cost += unpack.Number();
+      const Eigen::VectorXd gradient = unpack.Vector(local);
+      for (int i = 0; i < local; ++i) {
+        model->gradient[layout_.ParameterOf(block, i)] += gradient[i];
+      }
+    }
+    BlockFactor factor;
+    factor.remainder = unpack.Number();
+    factor.factor = unpack.Matrix(local + 1);
+    factor.curved = unpack.Matrix(local);
+    current->blocks.push_back(std::move(factor));
+  }
+  return true;
+}
+
+}  // namespace tangible

@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/estimation/fit/linearisation.h"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+
+#include "../../support/block_problem.h"
+
+namespace tangible {
+namespace {
+
+TEST(RobustCostTest, IsQuadraticWithinTheBoundAndLinearBeyond) {
+  const Eigen::Vector3d r(0.5, -2.0, 10.0);
+  EXPECT_DOUBLE_EQ(RobustCost(r, 0.0), 0.5 * (0.25 + 4.0 + 100.0));
+  // 2 b |r| − b² beyond b = 2.
+  EXPECT_DOUBLE_EQ(RobustCost(r, 2.0), 0.5 * (0.25 + 4.0 + 2.0 * 2.0 * 10.0 - 4.0));
+}
+
+/// 200 rows, so that several chunks are gathered; the last 20 are priors.
+BlockEvaluation RandomBlock() {
+  BlockEvaluation block;
+  block.residuals = 4.0 * Eigen::VectorXd::Random(200);
+  block.jacobian = RowMatrixXd::Random(200, 3);
+  return block;
+}
+
+TEST(ReduceTest, TheFactorStandsForTheRows) {
+  const BlockEvaluation block = RandomBlock();
+  const Eigen::Vector3d q_scale(1.0, 10.0, 0.1);
+  const double weight = 0.7;
+  const double huber = 1.5;
+  const BlockFactor factor = Reduce(block, q_scale, 1, 180, weight, huber);
+  ASSERT_EQ(factor.factor.rows(), 4);
+  const double cost = weight * (RobustCost(block.residuals.head(180), huber) +
+                                RobustCost(block.residuals.tail(20), 0.0));
+  EXPECT_NEAR(0.5 * factor.residuals().squaredNorm() + 0.5 * std::pow(factor.remainder, 2), cost,
+              1e-13 * cost);
+  Eigen::VectorXd pull = weight * block.residuals;
+  RowMatrixXd curved = std::sqrt(weight) * block.jacobian * q_scale.asDiagonal();
+  for (int i = 0; i < 180; ++i) {
+    pull[i] *= RobustWeight(block.residuals[i], huber);
+    if (std::abs(block.residuals[i]) > huber) {
+      curved.row(i).setZero();
+    }
+  }
+  // Own parameters, the last of [shared | own], come first.
+  const Eigen::Vector3d gradient = q_scale.asDiagonal() * (block.jacobian.transpose() * pull);
+  const Eigen::Vector3d reduced = factor.jacobian().transpose() * factor.residuals();
+  EXPECT_LT((reduced - Eigen::Vector3d(gradient[2], gradient[0], gradient[1])).norm(),
+            1e-12 * gradient.norm());
+  const Eigen::Matrix3d hessian = curved.transpose() * curved;
+  const Eigen::Matrix3d of_factor = factor.curved.transpose() * factor.curved;
+  EXPECT_NEAR(of_factor(0, 0), hessian(2, 2), 1e-12 * hessian.norm());
+  EXPECT_NEAR(of_factor(1, 2), hessian(0, 1), 1e-12 * hessian.norm());
+}
+
+// A prior of one row is not turned into more rows than it has.
+TEST(ReduceTest, FewRowsStayFew) {
+  BlockEvaluation block;
+  block.residuals = Eigen::VectorXd::Constant(1, 2.0);
+  block.jacobian = RowMatrixXd::Constant(1, 3, 0.5);
+  const BlockFactor factor = Reduce(block, Eigen::Vector3d::Ones(), 0, 0, 1.0, 1.0);
+  EXPECT_EQ(factor.factor.rows(), 1);
+  EXPECT_EQ(factor.curved.rows(), 1);  // a prior is never taken as linear
+  EXPECT_EQ(factor.remainder, 0.0);
+}
+
+TEST(LinearizerTest, TheGradientIsThatOfTheCostAndTheBitsAreThoseOfOneThread) {
+  DecayProblem problem(7, 1);
+  const Eigen::VectorXd q = ToInternal(problem.entries(), 1.1 * InitialOf(problem.entries()));
+  const HuberBounds huber{2.0, 1.0};
+  Linearisation models[2][2];
+  for (int i = 0; i < 2; ++i) {
+    Linearizer linearizer(&problem, DerivativeMethod::kTangent, i == 0 ? 1 : 5, nullptr);
+    ASSERT_TRUE(linearizer.Linearise(q, huber, &models[i][0], &models[i][1]));
+    EXPECT_EQ(linearizer.rollouts(), problem.num_blocks());
+  }
+  for (int i = 0; i < 2; ++i) {
+    EXPECT_EQ(models[0][i].cost, models[1][i].cost);
+    EXPECT_EQ(models[0][i].gradient, models[1][i].gradient);
+  }
+  EXPECT_NE(models[0][0].cost, models[0][1].cost);
+  Linearizer linearizer(&problem, DerivativeMethod::kTangent, 0, nullptr);
+  for (Eigen::Index k = 0; k < q.size(); ++k) {
+    Eigen::VectorXd current[2];
+    double target[2];
+    const double h = 1e-6;
+    for (int i = 0; i < 2; ++i) {
+      Eigen::VectorXd moved = q;
+      moved[k] += i == 0 ? -h : h;
+      ASSERT_TRUE(linearizer.Cost(moved, huber, &current[i], &target[i]));
+    }
+    // Rounding of costs of order 1e4 over h.
+    EXPECT_NEAR((current[1] - current[0]).sum() / (2.0 * h), models[0][0].gradient[k],
+                1e-6 * models[0][0].gradient.norm());
+    EXPECT_NEAR((target[1] - target[0]) / (2.0 * h), models[0][1].gradient[k],
+                1e-6 * models[0][1].gradient.norm());
+  }
+}
+
+TEST(LinearizerTest, TheFirstBlockThatFailsIsNamed) {
+  DecayProblem problem(5, 1);
+  problem.failing = {3, 1};
+  Linearizer linearizer(&problem, DerivativeMethod::kTangent, 3, nullptr);
+  std::vector<BlockEvaluation> blocks;
+  EXPECT_FALSE(linearizer.Rows(InitialOf(problem.entries()), BlockDerivatives::kSkip, &blocks));
+  EXPECT_EQ(linearizer.message(), "block 1: fails");
+}
+
+TEST(ForEachOnThreadsTest, EachIsDoneOnce) {
+  std::vector<std::atomic<int>> counts(100);
+  ForEachOnThreads(4, 100, [&](int i) { ++counts[i]; });
+  for (const std::atomic<int>& count : counts) {
+    EXPECT_EQ(count, 1);
+  }
+}
+
+}  // namespace
+}  // namespace tangible
