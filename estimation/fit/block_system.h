@@ -3,21 +3,22 @@
 //
 // Linear least squares in blocks that share some of their unknowns,
 //
-//   minimise over x_0, x_1, ..., y    1/2 Σ_b ‖A_b x_b + B_b y + c_b‖²                         (1)
+//   minimise over x_0, x_1, ..., y    1/2 Σ_b ‖A_b x_b + B_b y + c_b‖²              (1)
 //
 // by the Schur complement, in its orthogonal form, which does not square the condition: with P_b
 // the projection onto the range of A_b,
 //
-//   minimise over y   1/2 Σ_b ‖(1 − P_b)(B_b y + c_b)‖²,    then   x_b = −A_b⁺ (B_b y + c_b)      (2)
+//   minimise over y   1/2 Σ_b ‖(1 − P_b)(B_b y + c_b)‖²                             (2)
+//   x_b = −A_b⁺ (B_b y + c_b)                                                       (3)
 //
-// Columns are scaled to unit length. Directions with a share below kStepRankTolerance are left alone:
-// they get no part in the step. Unknowns that are held have none either.
+// Columns are scaled to unit length. Directions with a share below kStepRankTolerance are left
+// alone: they get no part in the step. Unknowns that are held have none either.
 //
 // Newton's method has a gradient g that is not Σ [A B]ᵀ c,
 //
-//   minimise    1/2 Σ_b ‖A_b x_b + B_b y‖² + Σ_b g_bᵀ x_b + g_sᵀ y                               (3)
+//   minimise    1/2 Σ_b ‖A_b x_b + B_b y‖² + Σ_b g_bᵀ x_b + g_sᵀ y                  (4)
 //
-// and a_b = (A_bᵀ)⁺ g_b makes it Σ_b 1/2 ‖A_b x_b + B_b y + a_b‖² + (g_s − Σ B_bᵀ a_b)ᵀ y + constant.
+// With a_b = (A_bᵀ)⁺ g_b in the place of c_b it is (1) with the gradient g_s − Σ B_bᵀ a_b of y.
 
 #include <Eigen/Core>
 #include <Eigen/QR>
@@ -36,7 +37,7 @@ class BlockSystem {
 
   /// (1), of all unknowns in the layout's order.
   Eigen::VectorXd LeastSquares(const std::vector<Eigen::VectorXd>& c) const;
-  /// (3), with the gradient in the layout's order.
+  /// (4), with the gradient in the layout's order.
   Eigen::VectorXd Newton(const Eigen::VectorXd& gradient) const;
 
   /// ‖[A B]_k‖ of each unknown, 0 of one that is held.

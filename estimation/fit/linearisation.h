@@ -7,13 +7,13 @@
 // [A B], A of its own parameters and B of the shared ones. The robust loss ρ and the weight w of
 // the block scale row i by sqrt(w ρ'_i); what that leaves of the cost is a constant,
 //
-//   w/2 Σ ρ(r_i²) = 1/2 ‖r'‖² + 1/2 remainder²       r'_i = sqrt(w ρ'_i) r_i, A', B' alike    (1)
-//   [A' B' r'] = Q F                                  F triangular: own + shared + 1 rows      (2)
-//   ‖A' x + B' y + r'‖ = ‖F [x; y; 1]‖                for all steps x, y                       (3)
+//   w/2 Σ ρ(r_i²) = 1/2 ‖r'‖² + 1/2 remainder²       r'_i = sqrt(w ρ'_i) r_i        (1)
+//   [A' B' r'] = Q F                                  F triangular                   (2)
+//   ‖A' x + B' y + r'‖ = ‖F [x; y; 1]‖                for all steps x, y             (3)
 //
-// so that F, gathered from some rows at a time, replaces any number of rows without squaring their
-// condition. For Newton's method on Huber's loss the factor of the rows within its bound, which
-// alone have curvature, is kept too.
+// so that F with its own + shared + 1 rows, gathered from some rows at a time, replaces any number
+// of rows without squaring their condition. For Newton's method on Huber's loss the factor of the
+// rows within its bound, which alone have curvature, is kept too.
 //
 // Blocks are evaluated on several threads and put together in their order: the result has the same
 // bits for any number of threads. Evaluations go through the log of a checkpoint

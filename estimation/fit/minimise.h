@@ -12,13 +12,14 @@
 // bound beyond which the cost falls. With the gradient g of the cost in q, the Gauss-Newton step d
 // (Newton's with Huber's loss) and s = sqrt(2 cost / (N − P)), the residuals' own deviation,
 //
-//   sqrt(−gᵀ d) ≤ ε s sqrt(P)                      a step is left of ε standard deviations    (1)
-//   |g_k| / ‖J_k‖ ≤ ε s sqrt(P)  for each k        and what one parameter alone would gain    (2)
+//   sqrt(−gᵀ d) ≤ ε s sqrt(P)                       (1)
+//   |g_k| / ‖J_k‖ ≤ ε s sqrt(P)    for each k       (2)
 //
-// with ε = kRelativeOffset = 1e-3, or if the residuals are rounding. (1) is the relative offset of
-// Bates and Watts, independent of the parameters' scales and of the number of residuals. (2) holds
-// with it unless a direction that the step leaves alone has a gradient. Otherwise the status is
-// `not_converged`, and the message says what is left.
+// (1) bounds the step that is left, in standard deviations, and (2) what one parameter alone would
+// gain; with ε = kRelativeOffset = 1e-3, or if the residuals are rounding. (1) is the relative
+// offset of Bates and Watts, independent of the parameters' scales and of the number of residuals.
+// (2) holds with it unless a direction that the step leaves alone has a gradient. Otherwise the
+// status is `not_converged`, and the message says what is left.
 //
 // Reference: D. M. Bates and D. G. Watts, A relative offset orthogonality convergence criterion for
 // nonlinear least squares, Technometrics 23 (1981) 179.
