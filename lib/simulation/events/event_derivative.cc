@@ -14,8 +14,6 @@ namespace {
 
 using Row = Eigen::RowVectorXd;
 
-constexpr int kMostIterations = 60;
-
 Eigen::Vector3d BlockOf(const std::vector<double>& values, int block) {
   return Eigen::Vector3d(values[3 * block], values[3 * block + 1], values[3 * block + 2]);
 }
@@ -111,45 +109,31 @@ double EventDerivative::SegmentTangent(const Model<double>& model, Segment* segm
   const ModelStructure& s = *model.structure;
   const NystromTableau& tableau = NystromTableau::Of(IntegratorOf(s.settings));
   RowMatrixXd a_dot[NystromTableau::kMost];
-  RowMatrixXd place;
+  RowMatrixXd place, solved;
   double left = 0.0;
   for (int i = 0; i < tableau.stages; ++i) {
     const bool implicit = tableau.last_is_implicit && i + 1 == tableau.stages;
-    if (implicit) {
-      a_dot[i] = a_dot[i - 1];
-      List(model, *segment, &segment->stages[i]);
+    const auto evaluate = [&](int terms, RowMatrixXd* next) {
+      PlaceTangent(s, *segment, tableau.c[i], tableau.a[i], tableau.a_hat[i], terms, tau_dot, *x,
+                   a_dot, &place);
+      left =
+          std::max(left, NodeTangent(model, *segment, &segment->stages[i], false, place, &solved));
+      *next = solved.topRows(3 * s.num_blocks());
+    };
+    if (!implicit) {
+      evaluate(i, &a_dot[i]);
+      continue;
     }
-    FixedPoint fixed_point;
-    for (int iteration = 0; iteration < kMostIterations; ++iteration) {
-      PlaceTangent(s, *segment, tableau.c[i], tableau.a[i], tableau.a_hat[i], implicit ? i + 1 : i,
-                   tau_dot, *x, a_dot, &place);
-      RowMatrixXd next;
-      left = std::max(left, NodeTangent(model, *segment, &segment->stages[i], false, place, &next));
-      const RowMatrixXd bodies = next.topRows(3 * s.num_blocks());
-      const double change =
-          implicit ? (bodies - a_dot[i].topRows(3 * s.num_blocks())).cwiseAbs().maxCoeff() : 0.0;
-      const double size = implicit ? bodies.cwiseAbs().maxCoeff() : 0.0;
-      if (!implicit || fixed_point.Arrived(change, size)) {
-        a_dot[i] = bodies;
-        break;
-      }
-      if (iteration < kMostFixedPoints) {
-        a_dot[i] = bodies;
-        continue;
-      }
-      if (iteration == kMostFixedPoints) {
-        implicit_.Factor(model, *segment, &segment->stages[i], segment->length * tableau.a[i][i],
-                         segment->length * segment->length * tableau.a_hat[i][i]);
-        a_dot[i].setZero();  // the iteration may have diverged
-        continue;
-      }
-      if (iteration + 1 == kMostIterations) {
-        left = std::max(left, change / size);  // it has not converged: the certificate says so
-      }
-      RowMatrixXd step = bodies - a_dot[i];
-      implicit_.Solve(&step);
-      a_dot[i] += step;
-    }
+    List(model, *segment, &segment->stages[i]);
+    RowMatrixXd own = a_dot[i - 1];
+    const auto map = [&](const RowMatrixXd& at, RowMatrixXd* next) {
+      a_dot[i] = at;
+      evaluate(i + 1, next);
+    };
+    // What has not converged is left, and the certificate says so.
+    left = std::max(left, implicit_.SolveDerivative(model, segment,
+                                                    ImplicitStage::Direction::kForward, map, &own));
+    a_dot[i].swap(own);
   }
   List(model, *segment, nullptr);
   PlaceTangent(s, *segment, 1.0, tableau.b, tableau.b_hat, tableau.stages, tau_dot, *x, a_dot,
@@ -276,13 +260,17 @@ void EventDerivative::StagesAdjoint(const Model<double>& model, Segment* segment
   const NystromTableau& tableau = NystromTableau::Of(IntegratorOf(s.settings));
   const Eigen::Index columns = w_bar->cols();
   const double tau = segment->length;
+  // A_j's share of what is read at q + τ² Σ â_j A_j, v + τ Σ a_j A_j.
+  const auto add_share = [&](double a, double a_hat, const RowMatrixXd& from, RowMatrixXd* bar) {
+    for (int k = 0; k < s.num_blocks(); ++k) {
+      BlockRows(k, *bar) += tau * tau * a_hat * PoseRows(s, s.moving[k], from) +
+                            tau * a * TwistRows(s, s.moving[k], from);
+    }
+  };
   RowMatrixXd a_bar[NystromTableau::kMost];
   for (int j = 0; j < tableau.stages; ++j) {
     a_bar[j].setZero(3 * s.num_blocks(), columns);
-    for (int k = 0; k < s.num_blocks(); ++k) {
-      BlockRows(k, a_bar[j]) = tau * tau * tableau.b_hat[j] * PoseRows(s, s.moving[k], *w_bar) +
-                               tau * tableau.b[j] * TwistRows(s, s.moving[k], *w_bar);
-    }
+    add_share(tableau.b[j], tableau.b_hat[j], *w_bar, &a_bar[j]);
   }
   // v̄ = v̄⁺ + c τ q̄, for all that move.
   const auto add_to_twist = [&](double factor, const RowMatrixXd& from) {
@@ -305,52 +293,24 @@ void EventDerivative::StagesAdjoint(const Model<double>& model, Segment* segment
     };
     RowMatrixXd stage_bar;
     RowMatrixXd own = a_bar[i];
-    List(model, *segment, implicit ? &stage : nullptr);
-    FixedPoint fixed_point;
-    for (int iteration = 0; iteration < kMostIterations; ++iteration) {
-      solve(own, &stage_bar);
-      if (!implicit) {
-        break;
-      }
+    if (implicit) {
       // The stage reads its own acceleration: ā = ā₀ + (τ² â q̄ + τ a v̄)(ā), a fixed point.
-      RowMatrixXd next = a_bar[i];
-      for (int k = 0; k < s.num_blocks(); ++k) {
-        BlockRows(k, next) +=
-            tau * tau * tableau.a_hat[i][i] * PoseRows(s, s.moving[k], stage_bar) +
-            tau * tableau.a[i][i] * TwistRows(s, s.moving[k], stage_bar);
-      }
-      const double change = (next - own).cwiseAbs().maxCoeff();
-      const double size = next.cwiseAbs().maxCoeff();
-      if (fixed_point.Arrived(change, size)) {
-        own = next;
-        solve(own, &stage_bar);
-        break;
-      }
-      if (iteration < kMostFixedPoints) {
-        own = next;
-        continue;
-      }
-      if (iteration == kMostFixedPoints) {
-        implicit_.Factor(model, *segment, &stage, tau * tableau.a[i][i],
-                         tau * tau * tableau.a_hat[i][i]);
-        own.setZero();  // the iteration may have diverged
-        continue;
-      }
-      RowMatrixXd step = next - own;
-      implicit_.SolveTransposed(&step);
-      own += step;
+      List(model, *segment, &stage);
+      const auto map = [&](const RowMatrixXd& at, RowMatrixXd* next) {
+        solve(at, &stage_bar);
+        *next = a_bar[i];
+        add_share(tableau.a[i][i], tableau.a_hat[i][i], stage_bar, next);
+      };
+      implicit_.SolveDerivative(model, segment, ImplicitStage::Direction::kTransposed, map, &own);
     }
+    solve(own, &stage_bar);
+    List(model, *segment, nullptr);
     for (int j = 0; j < i; ++j) {
-      for (int k = 0; k < s.num_blocks(); ++k) {
-        BlockRows(k, a_bar[j]) +=
-            tau * tau * tableau.a_hat[i][j] * PoseRows(s, s.moving[k], stage_bar) +
-            tau * tableau.a[i][j] * TwistRows(s, s.moving[k], stage_bar);
-      }
+      add_share(tableau.a[i][j], tableau.a_hat[i][j], stage_bar, &a_bar[j]);
     }
     add_to_twist(tableau.c[i] * tau, stage_bar);
     *w_bar += stage_bar;
   }
-  List(model, *segment, nullptr);
 }
 
 void EventDerivative::SegmentAdjoint(const Model<double>& model, Segment* segment,

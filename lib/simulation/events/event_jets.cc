@@ -14,13 +14,7 @@
 namespace tangible {
 namespace {
 
-constexpr int kMostIterations = 60;
 constexpr int kMostLocations = 8;
-
-template <typename T>
-double DerivativeSize(const T& x) {
-  return x.v.cwiseAbs().maxCoeff();
-}
 
 template <typename T>
 class EventReplay {
@@ -85,18 +79,10 @@ class EventReplay {
     }
   }
 
-  void SetTwists(const std::vector<T>& solved, State<T>* state) const {
-    for (int k = 0; k < s_.num_blocks(); ++k) {
-      for (int i = 0; i < 3; ++i) {
-        state->twist[3 * s_.moving[k] + i] = solved[3 * k + i];
-      }
-    }
-  }
-
   void RunImpulses(Impulses* impulses, State<T>* state, bool is_impact = true) {
     ContactSolution<T> solution;
     SolveImpulses(impulses, *state, is_impact, &solution);
-    SetTwists(solution.motion, state);
+    SpreadTwists(s_, solution.motion, &state->twist);
     compression_ = solution.normal_impulse;
   }
 
@@ -162,84 +148,54 @@ class EventReplay {
     Solve(problem, node->problem, node->solution, signs, &node->system, out);
   }
 
-  void Place(const State<T>& before, const T& tau, double c, const double* a, const double* a_hat,
-             int terms, const std::vector<ContactSolution<T>>& stages, State<T>* out) const {
-    *out = before;
-    for (size_t i = 0; i < out->pose.size(); ++i) {
-      out->pose[i] += c * tau * before.twist[i];
-    }
-    for (int j = 0; j < terms; ++j) {
-      for (int k = 0; k < s_.num_blocks(); ++k) {
-        for (int i = 0; i < 3; ++i) {
-          const int at = 3 * s_.moving[k] + i;
-          out->pose[at] += a_hat[j] * tau * tau * stages[j].motion[3 * k + i];
-          out->twist[at] += a[j] * tau * stages[j].motion[3 * k + i];
-        }
-      }
+  // Values in the first column, then derivatives.
+  static void ToColumns(const std::vector<T>& jets, RowMatrixXd* columns) {
+    columns->resize(static_cast<Eigen::Index>(jets.size()), kWidth + 1);
+    for (size_t k = 0; k < jets.size(); ++k) {
+      const auto row = static_cast<Eigen::Index>(k);
+      (*columns)(row, 0) = jets[k].a;
+      columns->row(row).tail(kWidth) = jets[k].v.transpose();
     }
   }
-
-  // A ← A + (I − B)⁻¹ (N − A) of values and derivatives.
-  void NewtonStep(const ContactSolution<T>& next, ContactSolution<T>* stage) const {
-    RowMatrixXd step(static_cast<Eigen::Index>(next.motion.size()), kWidth + 1);
-    for (size_t k = 0; k < next.motion.size(); ++k) {
-      const T left = next.motion[k] - stage->motion[k];
-      step(static_cast<Eigen::Index>(k), 0) = ValueOf(left);
-      step.row(static_cast<Eigen::Index>(k)).tail(kWidth) = left.v.transpose();
-    }
-    implicit_.Solve(&step);
-    for (size_t k = 0; k < next.motion.size(); ++k) {
-      T change(step(static_cast<Eigen::Index>(k), 0));
-      change.v = step.row(static_cast<Eigen::Index>(k)).tail(kWidth).transpose();
-      stage->motion[k] += change;
+  static void FromColumns(const RowMatrixXd& columns, std::vector<T>* jets) {
+    jets->resize(static_cast<size_t>(columns.rows()));
+    for (size_t k = 0; k < jets->size(); ++k) {
+      const auto row = static_cast<Eigen::Index>(k);
+      (*jets)[k].a = columns(row, 0);
+      (*jets)[k].v = columns.row(row).tail(kWidth).transpose();
     }
   }
 
   void Map(Segment* segment, const State<T>& before, const T& time, const T& tau, State<T>* after) {
     const NystromTableau& tableau = NystromTableau::Of(IntegratorOf(s_.settings));
     std::vector<ContactSolution<T>> stages(tableau.stages);
+    const auto stage = [&](int j) -> const std::vector<T>& { return stages[j].motion; };
     State<T> state;
     for (int i = 0; i < tableau.stages; ++i) {
-      const bool implicit = tableau.last_is_implicit && i + 1 == tableau.stages;
-      if (implicit) {
-        stages[i] = stages[i - 1];
+      const auto evaluate = [&](int terms, ContactSolution<T>* next) {
+        PlaceStage(s_, before, tau, tableau.c[i], tableau.a[i], tableau.a_hat[i], terms, stage,
+                   &state);
+        Accelerate(*segment, state, T(time + tableau.c[i] * tau), &segment->stages[i], next);
+      };
+      if (!tableau.last_is_implicit || i + 1 < tableau.stages) {
+        evaluate(i, &stages[i]);
+        continue;
       }
-      FixedPoint fixed_point;
-      for (int iteration = 0; iteration < kMostIterations; ++iteration) {
-        Place(before, tau, tableau.c[i], tableau.a[i], tableau.a_hat[i], implicit ? i + 1 : i,
-              stages, &state);
-        ContactSolution<T> next;
-        Accelerate(*segment, state, T(time + tableau.c[i] * tau), &segment->stages[i], &next);
-        double change = 0.0;
-        double size = 0.0;
-        for (size_t k = 0; implicit && k < next.motion.size(); ++k) {
-          change = std::max({change, DerivativeSize(T(next.motion[k] - stages[i].motion[k])),
-                             std::abs(ValueOf(next.motion[k]) - ValueOf(stages[i].motion[k]))});
-          size =
-              std::max({size, DerivativeSize(next.motion[k]), std::abs(ValueOf(next.motion[k]))});
-        }
-        if (!implicit || fixed_point.Arrived(change, size)) {
-          stages[i] = next;
-          break;
-        }
-        if (iteration < kMostFixedPoints) {
-          stages[i] = next;
-        } else if (iteration == kMostFixedPoints) {
-          const double length = ValueOf(tau);
-          implicit_.Factor(values_, *segment, &segment->stages[i], length * tableau.a[i][i],
-                           length * length * tableau.a_hat[i][i]);
-          // The iteration may have diverged. Values are known: Newton's method is for derivatives,
-          // which those of nearby values would be taken at.
-          stages[i] = stages[i - 1];
-          for (size_t k = 0; k < stages[i].motion.size(); ++k) {
-            stages[i].motion[k].a = segment->stages[i].solution.motion[k];
-          }
-        } else {
-          NewtonStep(next, &stages[i]);
-        }
-      }
+      // Values are known, and the derivatives of nearby ones would be taken at those.
+      RowMatrixXd own;
+      ToColumns(stages[i - 1].motion, &own);
+      own.col(0) =
+          Eigen::Map<const Eigen::VectorXd>(segment->stages[i].solution.motion.data(), own.rows());
+      const auto map = [&](const RowMatrixXd& at, RowMatrixXd* next) {
+        FromColumns(at, &stages[i].motion);
+        ContactSolution<T> solution;
+        evaluate(i + 1, &solution);
+        ToColumns(solution.motion, next);
+      };
+      implicit_.SolveDerivative(values_, segment, ImplicitStage::Direction::kForward, map, &own);
+      FromColumns(own, &stages[i].motion);
     }
-    Place(before, tau, 1.0, tableau.b, tableau.b_hat, tableau.stages, stages, after);
+    PlaceStage(s_, before, tau, 1.0, tableau.b, tableau.b_hat, tableau.stages, stage, after);
     Correct(segment, tau, after);
     if (segment->projects_twists) {
       RunImpulses(&segment->projection, after, false);
@@ -261,11 +217,7 @@ class EventReplay {
       ContactSolution<T> correction;
       Solve(problem, node.problem, node.solution,
             std::vector<double>(segment->contacts.size(), 0.0), &node.system, &correction);
-      for (int b = 0; b < s_.num_blocks(); ++b) {
-        for (int i = 0; i < 3; ++i) {
-          after->pose[3 * s_.moving[b] + i] += correction.motion[3 * b + i];
-        }
-      }
+      AddBodies(s_, T(1.0), correction.motion, &after->pose);
     }
   }
 

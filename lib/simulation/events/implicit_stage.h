@@ -11,10 +11,11 @@
 //   A ← A + (I − B)⁻¹ (N − A)
 //
 // and the same for the derivatives Ȧ, whose equation is linear with the same B, and, transposed,
-// for the adjoint's. B is dense, of 3 columns a moving body.
+// for the adjoint's. B is dense, of 3 columns a moving body. IterateStage is the one iteration of
+// values, tangents, adjoints and Jets.
 
 #include <Eigen/LU>
-#include <cmath>
+#include <functional>
 
 #include "tangible/dynamics/jacobian/equation_jacobian.h"
 #include "tangible/simulation/events/event_record.h"
@@ -25,33 +26,61 @@ namespace tangible {
 /// Iterations after which one that has not converged is left for Newton's method.
 inline constexpr int kMostFixedPoints = 20;
 
-/// Whether the derivative of an implicit stage has arrived: to rounding of its largest entry, or,
-/// where all entries are rounding (of bodies at rest), when Newton's method changes it no less.
-class FixedPoint {
- public:
-  bool Arrived(double change, double size) {
-    const bool falls = change < last_;
-    last_ = change;
-    ++iterations_;
-    return change <= kStageDerivative * size ||
-           (!falls && change <= kStageDerivativeRounding * size) ||
-           (iterations_ > kMostFixedPoints && change <= kStageDerivativeLate * size) ||
-           (iterations_ > kMostFixedPoints + 2 && !falls);
-  }
+/// Iterations of both together.
+inline constexpr int kMostStageIterations = 60;
 
- private:
-  double last_ = HUGE_VAL;
-  int iterations_ = 0;
-};
+enum class StageOutcome { kSolved, kSingular, kNotConverged };
+
+/// Solves x = N(x) by iteration and, where that does not contract or N fails, by Newton's method
+/// from the start again. `evaluate(x, &next)`: next = N(x), false where it fails;
+/// `arrived(next, x, iteration)`: whether next is the solution; `newton(next, iteration, &x)`: adds
+/// (I − B)⁻¹ (next − x) to x.
+template <typename X, typename Evaluate, typename Arrived, typename Newton>
+StageOutcome IterateStage(const Evaluate& evaluate, const Arrived& arrived, const Newton& newton,
+                          X* x) {
+  const X start = *x;
+  X next;
+  for (int iteration = 0; iteration <= kMostStageIterations; ++iteration) {
+    const bool contracts = iteration < kMostFixedPoints;
+    if (iteration == kMostFixedPoints) {
+      *x = start;
+    }
+    if (!evaluate(*x, &next)) {
+      if (!contracts) {
+        return StageOutcome::kSingular;
+      }
+      iteration = kMostFixedPoints - 1;  // it has diverged
+    } else if (arrived(next, *x, iteration)) {
+      x->swap(next);
+      return StageOutcome::kSolved;
+    } else if (contracts) {
+      x->swap(next);
+    } else {
+      newton(next, iteration, x);
+    }
+  }
+  return StageOutcome::kNotConverged;
+}
 
 class ImplicitStage {
  public:
-  /// Takes B at the stage's node, which has been solved; a τ and â τ² as above.
-  void Factor(const Model<double>& model, const Segment& segment, SolvedNode* node, double a_tau,
-              double a_hat_tau2);
+  enum class Direction { kForward, kTransposed };
+
+  /// N's derivative part at a given place: next = N(x), 3 rows a moving body.
+  using Map = std::function<void(const RowMatrixXd& x, RowMatrixXd* next)>;
+
+  /// Solves x = map(x) from a first guess, of an equation that is linear with B of the segment's
+  /// last stage, or its transposed matrix, but for columns of values that are nearly solved. To
+  /// rounding of the largest entry, or, where all entries are rounding (of bodies at rest), until
+  /// Newton's method changes it no less. Returns what is left as a share of the largest entry where
+  /// it does not converge, else 0.
+  double SolveDerivative(const Model<double>& model, Segment* segment, Direction direction,
+                         const Map& map, RowMatrixXd* x);
+
+  /// Takes B at the segment's last stage, which has been solved.
+  void Factor(const Model<double>& model, Segment* segment);
   /// x ← (I − B)⁻¹ x, 3 a moving body; or with the transposed matrix.
-  void Solve(RowMatrixXd* x) const;
-  void SolveTransposed(RowMatrixXd* x) const;
+  void Solve(Direction direction, RowMatrixXd* x) const;
 
  private:
   LocalJacobianScratch scratch_;

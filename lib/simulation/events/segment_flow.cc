@@ -12,7 +12,6 @@ namespace tangible {
 namespace {
 
 constexpr int kMostCorrections = 12;
-constexpr int kMostIterations = 60;
 
 NystromTableau SemiImplicitEuler() {
   NystromTableau t;
@@ -58,17 +57,15 @@ bool AllFinite(const std::vector<double>& values) {
   return std::all_of(values.begin(), values.end(), [](double x) { return std::isfinite(x); });
 }
 
-// x += factor · (a solution's bodies).
-void AddBodies(const ModelStructure& structure, double factor, const std::vector<double>& solved,
-               std::vector<double>* x) {
-  if (factor == 0.0) {
-    return;
-  }
-  for (int k = 0; k < structure.num_blocks(); ++k) {
-    for (int i = 0; i < 3; ++i) {
-      (*x)[3 * structure.moving[k] + i] += factor * solved[3 * k + i];
-    }
-  }
+constexpr char kSingularStage[] = "accelerations with the contacts' modes held are singular";
+
+// The state at which a segment's stage i is evaluated, from the first `terms` stages.
+void PlaceStageOf(const ModelStructure& structure, const NystromTableau& tableau,
+                  const Segment& segment, int i, int terms, State<double>* state) {
+  PlaceStage(
+      structure, segment.before, segment.length, tableau.c[i], tableau.a[i], tableau.a_hat[i],
+      terms, [&](int j) -> const std::vector<double>& { return segment.stages[j].solution.motion; },
+      state);
 }
 
 // What the parts of each component of M a = p + Aᵀ y + Σ (nᵀ λn + tᵀ λt) amount to as
@@ -140,13 +137,6 @@ const NystromTableau& NystromTableau::Of(Integrator integrator) {
                                                       : kRungeKutta;
 }
 
-void SpreadTwists(const ModelStructure& structure, const std::vector<double>& solved,
-                  std::vector<double>* twist) {
-  for (int k = 0; k < structure.num_blocks(); ++k) {
-    std::copy_n(&solved[3 * k], 3, &(*twist)[3 * structure.moving[k]]);
-  }
-}
-
 std::string NameOfContradicted(const ModelStructure& structure, int joint) {
   return "joint " + structure.joints[joint].name +
          " contradicts the others: no twist satisfies all";
@@ -178,52 +168,41 @@ bool SegmentFlow::Accelerate(const Model<double>& model, const Segment& segment,
   return Solve(segment.modes, node);
 }
 
-// A stage that reads its own accelerations: iterated, and where that does not contract by Newton's
-// method from the start again (implicit_stage.h). `place` gives the state from the stages.
-bool SegmentFlow::SolveImplicitStage(const Model<double>& model, Segment* segment, int i,
-                                     const std::function<void(State<double>*)>& place,
+// The last stage, which reads its own accelerations (implicit_stage.h).
+bool SegmentFlow::SolveImplicitStage(const Model<double>& model, Segment* segment,
                                      std::string* message) {
   const NystromTableau& tableau = NystromTableau::Of(IntegratorOf(model.structure->settings));
-  const double tau = segment->length;
+  const int i = tableau.stages - 1;
   SolvedNode& stage = segment->stages[i];
-  std::vector<double>& acceleration = stage.solution.motion;
-  const std::vector<double> start = segment->stages[i - 1].solution.motion;
-  acceleration = start;
+  const std::vector<double>& start = segment->stages[i - 1].solution.motion;
+  std::vector<double> acceleration = start;
   State<double> state;
-  for (int iteration = 0; iteration <= kMostIterations; ++iteration) {
-    const bool newton = iteration >= kMostFixedPoints;
-    if (iteration == kMostFixedPoints) {
-      ++counts_.newton_stages;
-      acceleration = start;
-    }
-    const std::vector<double> last = acceleration;
-    place(&state);
+  const auto evaluate = [&](const std::vector<double>& at, std::vector<double>* next) {
+    stage.solution.motion = at;
+    PlaceStageOf(*model.structure, tableau, *segment, i, i + 1, &state);
     const bool solved =
         AllFinite(state.pose) && AllFinite(state.twist) &&
-        Accelerate(model, *segment, state, segment->time + tableau.c[i] * tau, &stage);
-    if (!solved) {
-      if (newton) {
-        *message = "accelerations with the contacts' modes held are singular";
-        return false;
-      }
-      iteration = kMostFixedPoints - 1;  // it has diverged
-      continue;
-    }
-    if (HasConverged(stage, last, iteration)) {
-      return true;
-    }
-    if (newton) {
-      implicit_.Factor(model, *segment, &stage, tau * tableau.a[i][i],
-                       tau * tau * tableau.a_hat[i][i]);
-      RowMatrixXd step(static_cast<Eigen::Index>(last.size()), 1);
-      for (size_t k = 0; k < last.size(); ++k) {
-        step(static_cast<Eigen::Index>(k), 0) = acceleration[k] - last[k];
-      }
-      implicit_.Solve(&step);
-      for (size_t k = 0; k < last.size(); ++k) {
-        acceleration[k] = last[k] + step(static_cast<Eigen::Index>(k), 0);
-      }
-    }
+        Accelerate(model, *segment, state, segment->time + tableau.c[i] * segment->length, &stage);
+    *next = stage.solution.motion;
+    return solved;
+  };
+  const auto arrived = [&](const std::vector<double>&, const std::vector<double>& at,
+                           int iteration) { return HasConverged(stage, at, iteration); };
+  const auto newton = [&](const std::vector<double>& next, int iteration, std::vector<double>* at) {
+    counts_.newton_stages += iteration == kMostFixedPoints ? 1 : 0;
+    implicit_.Factor(model, segment);
+    const auto size = static_cast<Eigen::Index>(at->size());
+    Eigen::Map<Eigen::VectorXd> x(at->data(), size);
+    RowMatrixXd step = Eigen::Map<const Eigen::VectorXd>(next.data(), size) - x;
+    implicit_.Solve(ImplicitStage::Direction::kForward, &step);
+    x += step;
+  };
+  const StageOutcome outcome = IterateStage(evaluate, arrived, newton, &acceleration);
+  if (outcome == StageOutcome::kSingular) {
+    *message = kSingularStage;
+  }
+  if (outcome != StageOutcome::kNotConverged) {
+    return outcome == StageOutcome::kSolved;
   }
   size_t worst = 0;
   for (size_t k = 1; k < start.size(); ++k) {
@@ -267,39 +246,26 @@ bool SegmentFlow::Integrate(const Model<double>& model, Segment* segment, std::s
   if (static_cast<int>(segment->stages.size()) < tableau.stages) {
     segment->stages.resize(tableau.stages);
   }
-  const auto place = [&](double c, const double* a, const double* a_hat, int terms,
-                         State<double>* state) {
-    *state = segment->before;
-    for (size_t i = 0; i < state->pose.size(); ++i) {
-      state->pose[i] += c * tau * segment->before.twist[i];
-    }
-    for (int j = 0; j < terms; ++j) {
-      const std::vector<double>& acceleration = segment->stages[j].solution.motion;
-      AddBodies(structure, tau * tau * a_hat[j], acceleration, &state->pose);
-      AddBodies(structure, tau * a[j], acceleration, &state->twist);
-    }
-  };
   State<double> state;
   for (int i = 0; i < tableau.stages; ++i) {
-    const auto place_stage = [&](int terms, State<double>* at) {
-      place(tableau.c[i], tableau.a[i], tableau.a_hat[i], terms, at);
-    };
     if (tableau.last_is_implicit && i + 1 == tableau.stages) {
-      const auto place_implicit = [&](State<double>* at) { place_stage(i + 1, at); };
-      if (!SolveImplicitStage(model, segment, i, place_implicit, message)) {
+      if (!SolveImplicitStage(model, segment, message)) {
         return false;
       }
       continue;
     }
-    place_stage(i, &state);
+    PlaceStageOf(structure, tableau, *segment, i, i, &state);
     if (!AllFinite(state.pose) || !AllFinite(state.twist) ||
         !Accelerate(model, *segment, state, segment->time + tableau.c[i] * tau,
                     &segment->stages[i])) {
-      *message = "accelerations with the contacts' modes held are singular";
+      *message = kSingularStage;
       return false;
     }
   }
-  place(1.0, tableau.b, tableau.b_hat, tableau.stages, &segment->after);
+  PlaceStage(
+      structure, segment->before, tau, 1.0, tableau.b, tableau.b_hat, tableau.stages,
+      [&](int j) -> const std::vector<double>& { return segment->stages[j].solution.motion; },
+      &segment->after);
   return true;
 }
 

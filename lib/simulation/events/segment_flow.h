@@ -13,8 +13,9 @@
 // The latter two are exact for constant accelerations. Hairer, Nørsett, Wanner, Solving Ordinary
 // Differential Equations I, II.1 and II.14.
 
-#include <functional>
+#include <algorithm>
 #include <string>
+#include <vector>
 
 #include "tangible/dynamics/model/lengths.h"
 #include "tangible/lcp/system/mode_solve.h"
@@ -35,6 +36,46 @@ struct NystromTableau {
 
   static const NystromTableau& Of(Integrator integrator);
 };
+
+/// x += factor · solved: 3 numbers a moving body to the poses or twists of all.
+template <typename T>
+void AddBodies(const ModelStructure& structure, const T& factor, const std::vector<T>& solved,
+               std::vector<T>* x) {
+  for (int k = 0; k < structure.num_blocks(); ++k) {
+    for (int i = 0; i < 3; ++i) {
+      (*x)[3 * structure.moving[k] + i] += factor * solved[3 * k + i];
+    }
+  }
+}
+
+/// The twists of all bodies from those solved for.
+template <typename T>
+void SpreadTwists(const ModelStructure& structure, const std::vector<T>& solved,
+                  std::vector<T>* twist) {
+  for (int k = 0; k < structure.num_blocks(); ++k) {
+    std::copy_n(&solved[3 * k], 3, &(*twist)[3 * structure.moving[k]]);
+  }
+}
+
+/// The state at c τ of a motion of length τ from its stages' accelerations, 3 a moving body:
+/// q + c τ v + τ² Σ â_j A_j and v + τ Σ a_j A_j over j < terms. `accelerations(j)` is a vector.
+template <typename T, typename Accelerations>
+void PlaceStage(const ModelStructure& structure, const State<T>& before, const T& tau, double c,
+                const double* a, const double* a_hat, int terms, const Accelerations& accelerations,
+                State<T>* out) {
+  *out = before;
+  for (size_t i = 0; i < out->pose.size(); ++i) {
+    out->pose[i] += c * tau * before.twist[i];
+  }
+  for (int j = 0; j < terms; ++j) {
+    if (a_hat[j] != 0.0) {
+      AddBodies(structure, T(tau * tau * a_hat[j]), accelerations(j), &out->pose);
+    }
+    if (a[j] != 0.0) {
+      AddBodies(structure, T(tau * a[j]), accelerations(j), &out->twist);
+    }
+  }
+}
 
 /// What motions leaned on, since the start.
 struct FlowCounts {
@@ -62,8 +103,7 @@ class SegmentFlow {
  private:
   bool Solve(const std::vector<ContactMode>& modes, SolvedNode* node);
   bool Integrate(const Model<double>& model, Segment* segment, std::string* message);
-  bool SolveImplicitStage(const Model<double>& model, Segment* segment, int i,
-                          const std::function<void(State<double>*)>& place, std::string* message);
+  bool SolveImplicitStage(const Model<double>& model, Segment* segment, std::string* message);
   bool HasConverged(const SolvedNode& stage, const std::vector<double>& last, int iteration);
   struct PoseErrors;
   void LeaveRounding(const Segment& segment, SolvedNode* node) const;
@@ -90,9 +130,5 @@ std::string NameOfContradicted(const ModelStructure& structure, int joint);
 /// Assembles impulses at their state, of length h (0: an impact).
 void AssembleImpulses(const Model<double>& model, AssemblyScratch<double>* scratch,
                       Impulses* impulses);
-
-/// The twists of all bodies from those solved for.
-void SpreadTwists(const ModelStructure& structure, const std::vector<double>& solved,
-                  std::vector<double>* twist);
 
 }  // namespace tangible

@@ -7,6 +7,7 @@
 
 #include "tangible/dynamics/model/tolerances.h"
 #include "tangible/lcp/system/contact_residual.h"
+#include "tangible/simulation/events/segment_flow.h"
 
 namespace tangible {
 namespace {
@@ -26,9 +27,7 @@ bool SameContacts(const std::vector<ActiveContact>& x, const std::vector<ActiveC
 void FullTwist(const ModelStructure& structure, const State<double>& state,
                const std::vector<double>& solved, std::vector<double>* twist) {
   twist->assign(state.twist.begin(), state.twist.end());
-  for (int k = 0; k < structure.num_blocks(); ++k) {
-    std::copy_n(&solved[3 * k], 3, &(*twist)[3 * structure.moving[k]]);
-  }
+  SpreadTwists(structure, solved, twist);
 }
 
 // Work of the contacts' impulses, impulse · mean of the speeds before and after.

@@ -5,6 +5,7 @@
 // for another scalar.
 
 #include "tangible/lcp/contact/contact_interior_point.h"
+#include "tangible/simulation/events/segment_flow.h"
 #include "tangible/simulation/events/tolerances.h"
 #include "tangible/simulation/stepping/step.h"
 
@@ -46,11 +47,7 @@ bool SolveUnrolled(const Model<T>& model, const StepRecord& record, State<T>* st
       s.settings.smoothing > 0.0 ? s.settings.smoothing : kUnrolledComplementarity;
   const InteriorPointOutcome outcome =
       SolveContactsByInteriorPoint(problem, options, &workspace, &solution);
-  for (int k = 0; k < s.num_blocks(); ++k) {
-    for (int i = 0; i < 3; ++i) {
-      state->twist[3 * s.moving[k] + i] = solution.motion[3 * k + i];
-    }
-  }
+  SpreadTwists(s, solution.motion, &state->twist);
   internal::MovePoses(s, record.h, state);
   return outcome.converged;
 }
