@@ -24,6 +24,10 @@ configure_file("${PROJECT_SOURCE_DIR}/lib/cmake/jet_widths.h.in"
 
 add_library(tangible_flags INTERFACE)
 target_compile_options(tangible_flags INTERFACE -Wall -Wextra -Wpedantic -ffp-contract=off)
+# Functions of the engine are not replaced by others of their name when it is linked into a shared library.
+if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+  target_compile_options(tangible_flags INTERFACE -fno-semantic-interposition)
+endif()
 if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND CMAKE_CXX_COMPILER_VERSION VERSION_LESS 13)
   # False alarms of g++ 12 on `"literal" + std::string` (GCC bug 105651), which a precompiled header no longer hides as
   # system headers'.

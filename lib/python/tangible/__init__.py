@@ -1,0 +1,32 @@
+"""Planar rigid-body dynamics with joints, contact and friction, whose gradients can be checked.
+
+Scenes are those of the programs: a file, its JSON as a dict, or built with keyword arguments.
+Units are SI, angles are in radians, x points right and y up.
+
+    >>> import tangible
+    >>> scene = tangible.Scene(gravity=[0, -9.81], simulation={"stepping": "event", "duration": 1.0})
+    >>> scene.add_body("ball", shape={"circle": {"radius": 0.1}}, mass=1.0, position=[0, 1.1],
+    ...                restitution=0.8)
+    >>> scene.add_body("floor", static=True, restitution=0.8,
+    ...                shape={"half_plane": {"normal": [0, 1], "offset": 0}})
+    >>> tangible.simulate(scene).final["ball/y"]
+    >>> rollout = tangible.Rollout(scene, parameters=["bodies/ball/position/y"])
+    >>> rollout.jacobian().parameters
+"""
+
+from ._core import TangibleError, __version__
+from ._rollout import Jacobian, Rollout
+from ._scene import Scene
+from ._trajectory import Contacts, Events, Trajectory, simulate
+
+__all__ = [
+    "Contacts",
+    "Events",
+    "Jacobian",
+    "Rollout",
+    "Scene",
+    "TangibleError",
+    "Trajectory",
+    "__version__",
+    "simulate",
+]

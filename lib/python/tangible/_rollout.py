@@ -1,0 +1,306 @@
+"""Rollouts as pure functions, with their derivatives."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from . import _core
+from ._scene import Scene, SceneLike
+
+Floats = NDArray[np.float64]
+Certificate = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Jacobian:
+    """The derivatives of a rollout's states with respect to its inputs.
+
+    Attributes:
+        states: The states themselves, shape (S,), or (R, S) with `records`.
+        parameters: d states / d parameters, shape (..., S, P).
+        initial_state: d states / d initial state, shape (..., S, S).
+        controls: d states / d controls, shape (..., S, steps, C).
+        method: The method that was used.
+        certificate: How far the derivatives can be trusted; `certificate["verdict"]` first.
+    """
+
+    states: Floats
+    parameters: Floats
+    initial_state: Floats
+    controls: Floats
+    method: str
+    certificate: Certificate = field(repr=False)
+
+
+def _array(values: ArrayLike, name: str, axes: int) -> Floats:
+    array = np.ascontiguousarray(values, dtype=np.float64)
+    if array.ndim not in (axes, axes + 1):
+        raise ValueError(f"{name}: expected {axes} axes, or one more for a batch, got {array.ndim}")
+    return array
+
+
+class Rollout:
+    """A scene's motion as a pure function of parameters, initial state and controls.
+
+    The state of a rollout is x, y, angle, vx, vy, omega of each moving body, in the order of
+    `outputs`: S numbers. Every argument may have one more, leading axis: a batch, which runs on all
+    cores; arguments without it are the same in all rows. Nothing is kept between calls.
+
+    Args:
+        scene: A `Scene`, a scene file, or a dict of its JSON.
+        parameters: P paths of parameters, such as "bodies/ball/mass" or "bodies/*/friction".
+        controls: C paths of forces, torques or efforts that have a value of their own in each step:
+            "forces/push/force/x", "forces/push/torque", "joints/motor/effort".
+        records: Steps whose states are returned (0: the start); absent: the state at the end, and
+            results have no axis for it.
+        threads: Of batches; 0: one a core. Results have the same bits for any number.
+    """
+
+    def __init__(
+        self,
+        scene: SceneLike,
+        parameters: Sequence[str] = (),
+        controls: Sequence[str] = (),
+        *,
+        records: Sequence[int] | None = None,
+        threads: int = 0,
+    ) -> None:
+        self.scene = Scene.of(scene)
+        self.threads = int(threads)
+        self._single = records is None
+        self._core = _core.Rollout(
+            self.scene.core, list(parameters), list(controls), list(records or [])
+        )
+        self._defaults = self._core.defaults()
+
+    @property
+    def parameters(self) -> list[str]:
+        """Paths of the parameters."""
+        return self._core.parameters
+
+    @property
+    def controls(self) -> list[str]:
+        """Paths of the controls."""
+        return self._core.controls
+
+    @property
+    def outputs(self) -> list[str]:
+        """Names of the numbers of a state: "ball/x", "ball/y", "ball/angle", "ball/vx", ..."""
+        return self._core.outputs
+
+    @property
+    def num_steps(self) -> int:
+        """Steps of the run: the length of a control."""
+        return self._core.num_steps
+
+    @property
+    def times(self) -> Floats:
+        """Times of the recorded states, s."""
+        return np.array(self._core.times)
+
+    @property
+    def default_parameters(self) -> Floats:
+        """The scene's own values, shape (P,)."""
+        return np.array(self._defaults[0][0])
+
+    @property
+    def default_initial_state(self) -> Floats:
+        """The scene's own, shape (S,)."""
+        return np.array(self._defaults[1][0])
+
+    @property
+    def default_controls(self) -> Floats:
+        """The scene's own values in each step, shape (steps, C)."""
+        return np.array(self._defaults[2][0])
+
+    def _inputs(
+        self,
+        parameters: ArrayLike | None,
+        initial_state: ArrayLike | None,
+        controls: ArrayLike | None,
+    ) -> tuple[Floats, Floats | None, Floats, bool]:
+        """Arrays with a leading axis, and whether there was one."""
+        p = self._defaults[0][0] if parameters is None else _array(parameters, "parameters", 1)
+        x = None if initial_state is None else _array(initial_state, "initial_state", 1)
+        u = self._defaults[2][0] if controls is None else _array(controls, "controls", 2)
+        batched = p.ndim == 2 or u.ndim == 3 or (x is not None and x.ndim == 2)
+        sizes = {a.shape[0] for a, axes in ((p, 1), (x, 1), (u, 2)) if a is not None and a.ndim > axes}
+        if len(sizes) > 1:
+            raise ValueError(f"batch: expected leading axes of one length, got {sorted(sizes)}")
+        rows = sizes.pop() if sizes else 1
+
+        def spread(array: Floats, axes: int) -> Floats:
+            if array.ndim > axes:
+                return array
+            return np.ascontiguousarray(np.broadcast_to(array, (rows, *array.shape)))
+
+        return spread(p, 1), None if x is None else spread(x, 1), spread(u, 2), batched
+
+    def _shape(self, states: Floats, batched: bool) -> Floats:
+        shaped: Floats = states[:, 0] if self._single else states
+        return shaped if batched else np.asarray(shaped[0])
+
+    @staticmethod
+    def _check(statuses: list[str], messages: list[str], batched: bool, on_failure: str) -> None:
+        if on_failure not in ("raise", "nan"):
+            raise ValueError(f"on_failure: expected raise or nan, got {on_failure}")
+        for row, (status, message) in enumerate(zip(statuses, messages)):
+            if status != "done" and on_failure == "raise":
+                raise _core.TangibleError(f"row {row}: {message}" if batched else message)
+
+    def __call__(
+        self,
+        parameters: ArrayLike | None = None,
+        initial_state: ArrayLike | None = None,
+        controls: ArrayLike | None = None,
+        *,
+        on_failure: str = "raise",
+    ) -> Floats:
+        """The states, shape (S,); (R, S) with `records`; (N, ...) of a batch.
+
+        Args:
+            parameters: Shape (P,), SI units; absent: the scene's.
+            initial_state: Shape (S,); absent: the scene's, as its parameters make it.
+            controls: Shape (steps, C), N or N m; absent: the scene's values in all steps.
+            on_failure: "raise", or "nan" in states that were not reached.
+
+        Raises:
+            TangibleError: A value that is not allowed, or a run that ended early.
+        """
+        p, x, u, batched = self._inputs(parameters, initial_state, controls)
+        states, statuses, messages = self._core.run(p, x, u, self.threads)
+        self._check(statuses, messages, batched, on_failure)
+        return self._shape(states, batched)
+
+    def jvp(
+        self,
+        primals: tuple[ArrayLike | None, ArrayLike | None, ArrayLike | None],
+        tangents: tuple[ArrayLike | None, ArrayLike | None, ArrayLike | None],
+        *,
+        on_failure: str = "raise",
+    ) -> tuple[Floats, Floats]:
+        """States and their derivative along a direction of (parameters, initial state, controls).
+
+        None stands for the scene's value among `primals`, and for 0 among `tangents`.
+        """
+        p, x, u, batched = self._inputs(*primals)
+        rows = p.shape[0]
+
+        def direction(value: ArrayLike | None, shape: tuple[int, ...], name: str) -> Floats:
+            if value is None:
+                return np.zeros((rows, *shape))
+            array = _array(value, name, len(shape))
+            return np.ascontiguousarray(np.broadcast_to(array, (rows, *shape)))
+
+        states, statuses, messages, along = self._core.tangent(
+            p,
+            x,
+            u,
+            direction(tangents[0], p.shape[1:], "tangent of parameters"),
+            direction(tangents[1], (self._core.num_states,), "tangent of initial_state"),
+            direction(tangents[2], u.shape[1:], "tangent of controls"),
+            self.threads,
+        )
+        self._check(statuses, messages, batched, on_failure)
+        return self._shape(states, batched), self._shape(along, batched)
+
+    def vjp(
+        self,
+        parameters: ArrayLike | None = None,
+        initial_state: ArrayLike | None = None,
+        controls: ArrayLike | None = None,
+        *,
+        on_failure: str = "raise",
+    ) -> tuple[Floats, Callable[[ArrayLike], tuple[Floats, Floats, Floats]]]:
+        """States, and the function that takes derivatives of a loss back from them.
+
+        The function maps d loss / d states (their shape) to the derivatives with respect to
+        parameters, initial state and controls. It holds the tapes of this call alone and may be
+        called often. Rows that failed have NaN derivatives.
+        """
+        p, x, u, batched = self._inputs(parameters, initial_state, controls)
+        recorded = _core.Recorded(self._core, p, x, u, self.threads)
+        states, statuses, messages = recorded.outputs
+        self._check(statuses, messages, batched, on_failure)
+        result = self._shape(states, batched)
+
+        def pull(cotangent: ArrayLike) -> tuple[Floats, Floats, Floats]:
+            bars = np.ascontiguousarray(cotangent, dtype=np.float64)
+            if bars.shape != result.shape:
+                raise ValueError(f"cotangent: expected shape {result.shape}, got {bars.shape}")
+            by_parameters, by_state, by_controls = recorded.adjoint(bars.reshape(states.shape))
+            if batched:
+                return by_parameters, by_state, by_controls
+            return by_parameters[0], by_state[0], by_controls[0]
+
+        return result, pull
+
+    def jacobian(
+        self,
+        parameters: ArrayLike | None = None,
+        initial_state: ArrayLike | None = None,
+        controls: ArrayLike | None = None,
+        *,
+        method: str = "auto",
+    ) -> Jacobian:
+        """All derivatives, with their certificate.
+
+        Args:
+            parameters, initial_state, controls: As in a call, without a batch's axis.
+            method: "auto", "adjoint", "tangent", "jet", "jet_implicit" or "finite_difference".
+        """
+        p, x, u, batched = self._inputs(parameters, initial_state, controls)
+        if batched:
+            raise ValueError("jacobian: expected arguments without a batch's axis")
+        states, status, message, used, all_columns = self._core.jacobian(p, x, u, method)
+        self._check([status], [message], False, "raise")
+        matrix = all_columns[0] if self._single else all_columns
+        num_p, num_s = p.shape[1], self._core.num_states
+        by_controls = matrix[..., num_p + num_s :]
+        return Jacobian(
+            states[0] if self._single else states,
+            matrix[..., :num_p],
+            matrix[..., num_p : num_p + num_s],
+            by_controls.reshape(*matrix.shape[:-1], *u.shape[1:]),
+            used,
+            self.certificate(p[0], None if x is None else x[0], u[0]),
+        )
+
+    def certificate(
+        self,
+        parameters: ArrayLike | None = None,
+        initial_state: ArrayLike | None = None,
+        controls: ArrayLike | None = None,
+    ) -> Certificate:
+        """How far the derivatives at these inputs can be trusted.
+
+        `verdict` is "trustworthy", or names a kink, a jump or a side. The initial state counts as an
+        input only where it is given. Of a batch, see `certificates`.
+        """
+        p, x, u, batched = self._inputs(parameters, initial_state, controls)
+        if batched:
+            raise ValueError("certificate: expected arguments without a batch's axis")
+        found: Certificate = json.loads(self._core.certify(p, x, u, self.threads)[0])
+        return found
+
+    def certificates(
+        self,
+        parameters: ArrayLike | None = None,
+        initial_state: ArrayLike | None = None,
+        controls: ArrayLike | None = None,
+    ) -> list[Certificate]:
+        """The certificate of each row of a batch."""
+        p, x, u, _ = self._inputs(parameters, initial_state, controls)
+        return [json.loads(text) for text in self._core.certify(p, x, u, self.threads)]
+
+    def __repr__(self) -> str:
+        return (
+            f"Rollout({self.scene!r}, parameters={self.parameters}, controls={self.controls}, "
+            f"steps={self.num_steps})"
+        )

@@ -1,0 +1,133 @@
+"""Scenes: what the user wrote, as JSON, and what the engine has read of it."""
+
+from __future__ import annotations
+
+import copy
+import json
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Union
+
+from . import _core
+
+SceneLike = Union["Scene", Mapping[str, Any], str, "os.PathLike[str]"]
+
+
+class Scene:
+    """A scene: bodies, joints, springs, forces, and how they are simulated.
+
+    The keys, units and defaults are those of a scene file (README of `lib/scene`); a mistake raises
+    `TangibleError` with one line that says where it is, what was expected and what was found.
+
+    Args:
+        scene: A file, or the JSON of one as a dict; absent: a scene without bodies.
+        folder: Where files that a dict names (signals) are looked for.
+        **keys: Top-level keys that replace those of `scene`: `name`, `gravity`, `simulation`, ...
+    """
+
+    def __init__(
+        self,
+        scene: Mapping[str, Any] | str | os.PathLike[str] | None = None,
+        *,
+        folder: str | os.PathLike[str] = ".",
+        **keys: Any,
+    ) -> None:
+        self._name = "scene"
+        self._folder = os.fspath(folder)
+        self._read: _core.Scene | None = None
+        if scene is None:
+            self._data: dict[str, Any] = {"bodies": []}
+        elif isinstance(scene, Mapping):
+            self._data = copy.deepcopy(dict(scene))
+        else:
+            self._name = os.fspath(scene)
+            self._folder = str(Path(self._name).parent)
+            self._read = _core.Scene.load(self._name)
+            if keys:
+                self._data = json.loads(Path(self._name).read_text(encoding="utf-8-sig"))
+            else:
+                self._data = {}
+        if keys:
+            self._data.update(copy.deepcopy(keys))
+            self._read = None
+
+    @staticmethod
+    def of(scene: SceneLike) -> Scene:
+        """The scene itself, or one made from a file's name or a dict."""
+        return scene if isinstance(scene, Scene) else Scene(scene)
+
+    def _add(self, kind: str, name: str | None, keys: dict[str, Any]) -> None:
+        data = self.to_dict()
+        entry = {"name": name, **keys} if name is not None else dict(keys)
+        data.setdefault(kind, []).append(copy.deepcopy(entry))
+        self._data = data
+        self._read = None
+
+    def add_body(self, name: str, **keys: Any) -> None:
+        """Adds a body: `shape`, `mass` (kg), `position` (m), `angle` (rad), `velocity` (m/s), ..."""
+        self._add("bodies", name, keys)
+
+    def add_joint(self, name: str, **keys: Any) -> None:
+        """Adds a joint: `type`, `bodies` (two names), `anchor` (m, world), `damping`, `effort`, ..."""
+        self._add("joints", name, keys)
+
+    def add_spring(self, name: str, **keys: Any) -> None:
+        """Adds a spring: `bodies`, `anchors` (m, world), `stiffness` (N/m), `rest_length` (m), ..."""
+        self._add("springs", name, keys)
+
+    def add_force(self, name: str, **keys: Any) -> None:
+        """Adds a force: `body`, `force` (N), `torque` (N m), `at` (m, body frame), `start`, `end`."""
+        self._add("forces", name, keys)
+
+    def add_pair(self, *bodies: str, **keys: Any) -> None:
+        """Gives two bodies a `friction` and `restitution` of their own."""
+        self._add("pairs", None, {"bodies": list(bodies), **keys})
+
+    @property
+    def core(self) -> _core.Scene:
+        """What the engine has read; raises `TangibleError` where it cannot."""
+        if self._read is None:
+            text = json.dumps(self._data)
+            self._read = _core.Scene.parse(text, self._name, self._folder)
+        return self._read
+
+    def to_dict(self) -> dict[str, Any]:
+        """The scene's JSON; of one that was read from a file with all defaults written out."""
+        if not self._data:
+            data: dict[str, Any] = json.loads(self.core.to_json())
+            return data
+        return copy.deepcopy(self._data)
+
+    def to_json(self) -> str:
+        """The text of a scene file; reading it back gives the same bits."""
+        return self.core.to_json()
+
+    def save(self, file: str | os.PathLike[str]) -> None:
+        """Writes a scene file."""
+        Path(file).write_text(self.to_json() + "\n", encoding="utf-8")
+
+    def with_parameters(self, parameters: Mapping[str, float]) -> Scene:
+        """The scene with other values of parameters: {path: value in SI units}."""
+        changed = Scene.__new__(Scene)
+        changed._name = self._name
+        changed._folder = self._folder
+        changed._data = {}
+        values = [float(value) for value in parameters.values()]
+        changed._read = self.core.with_parameters(list(parameters), values)
+        return changed
+
+    def parameters(self) -> dict[str, float]:
+        """Every parameter that a path can name, with its value (SI)."""
+        return {path: value for path, value, _ in self.core.parameters()}
+
+    def units(self) -> dict[str, str]:
+        """The unit of every parameter, "1" for numbers."""
+        return {path: unit for path, _, unit in self.core.parameters()}
+
+    def __getitem__(self, path: str) -> float:
+        """The value of a parameter; of several that match, of the first."""
+        return self.core.value(path)
+
+    def __repr__(self) -> str:
+        return f"Scene({self._name!r}, bodies={self.core.body_names})"

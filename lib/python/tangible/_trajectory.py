@@ -1,0 +1,192 @@
+"""Simulations and what they give."""
+
+from __future__ import annotations
+
+import html
+import json
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import _core
+from ._scene import Scene, SceneLike
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+Floats = NDArray[np.float64]
+COMPONENTS = ("x", "y", "angle", "vx", "vy", "omega")
+
+
+@dataclass(frozen=True)
+class Contacts:
+    """Contacts of all steps, a row each.
+
+    Attributes:
+        time: End of the step, s, shape (rows,).
+        bodies: Names of the two bodies.
+        gap: Signed distance at the step's start, m.
+        normal_impulse: Along the normal, from the second body to the first, N s.
+        tangential_impulse: Along the tangent (n_y, -n_x), N s.
+        mode: "open", "closed", "sticking", "sliding_left" or "sliding_right".
+    """
+
+    time: Floats
+    bodies: list[tuple[str, str]]
+    gap: Floats
+    normal_impulse: Floats
+    tangential_impulse: Floats
+    mode: list[str]
+
+
+@dataclass(frozen=True)
+class Events:
+    """Events that event stepping located: `time` (s), the two bodies, the kind ("touch", ...)."""
+
+    time: Floats
+    bodies: list[tuple[str, str]]
+    kind: list[str]
+
+
+class Trajectory:
+    """The motion of a scene's moving and kinematic bodies.
+
+    Attributes:
+        scene: The scene that was run, with its parameters set.
+        status: "done", "unsolved" or "diverged".
+        message: Empty, or why the run ended early.
+        bodies: Names, in the order of the scene.
+        times: s, shape (T,).
+        poses: x (m), y (m), angle (rad), shape (T, bodies, 3).
+        twists: vx, vy (m/s), omega (rad/s), shape (T, bodies, 3).
+        contacts, events: See `Contacts`, `Events`.
+        summary: The figures of `tangible-simulate --summary`.
+        certificate: How near the run is to kinks and jumps; None unless asked for.
+        warnings: What the programs would warn of.
+    """
+
+    def __init__(self, scene: Scene, raw: dict[str, Any]) -> None:
+        names = scene.core.body_names + ["world"]
+
+        def pairs(table: dict[str, Any]) -> list[tuple[str, str]]:
+            return [(names[i], names[j]) for i, j in zip(table["first"], table["second"])]
+
+        self.scene = scene
+        self.status: str = raw["status"]
+        self.message: str = raw["message"]
+        self.bodies = [names[i] for i in raw["bodies"]]
+        self.times: Floats = raw["times"]
+        self.poses: Floats = raw["poses"]
+        self.twists: Floats = raw["twists"]
+        contacts = raw["contacts"]
+        self.contacts = Contacts(
+            contacts["time"],
+            pairs(contacts),
+            contacts["gap"],
+            contacts["normal_impulse"],
+            contacts["tangential_impulse"],
+            contacts["mode"],
+        )
+        events = raw["events"]
+        self.events = Events(events["time"], pairs(events), events["kind"])
+        self.summary: dict[str, Any] = json.loads(raw["summary"])
+        self.warnings: list[str] = raw["warnings"]
+        self.certificate: dict[str, Any] | None = (
+            json.loads(raw["certificate"]) if raw["certificate"] else None
+        )
+
+    def __getitem__(self, name: str) -> Floats:
+        """A coordinate over time, shape (T,): "ball/x", "ball/angle", "ball/vy", ..."""
+        body, _, component = name.rpartition("/")
+        if body not in self.bodies or component not in COMPONENTS:
+            raise KeyError(
+                f"{name}: expected BODY/COMPONENT with a body of {', '.join(self.bodies)} "
+                f"and a component of {', '.join(COMPONENTS)}"
+            )
+        i, k = self.bodies.index(body), COMPONENTS.index(component)
+        return self.poses[:, i, k] if k < 3 else self.twists[:, i, k - 3]
+
+    @property
+    def final(self) -> dict[str, float]:
+        """The last state: {"ball/x": ..., ...}."""
+        return {
+            f"{body}/{component}": float(self[f"{body}/{component}"][-1])
+            for body in self.bodies
+            for component in COMPONENTS
+        }
+
+    def html(self) -> str:
+        """The animated view as one self-contained page."""
+        page: str = _core.simulate(self.scene.core, 1, False, True)["html"]
+        return page
+
+    def show(self, file: str | os.PathLike[str]) -> None:
+        """Writes the animated view to a file, to be opened in a browser."""
+        Path(file).write_text(self.html(), encoding="utf-8")
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: the animated view in a frame of its own."""
+        return (
+            f'<iframe srcdoc="{html.escape(self.html())}" width="100%" height="520" '
+            'style="border:0"></iframe>'
+        )
+
+    def plot(self, *names: str, ax: Axes | None = None) -> Axes:
+        """Plots coordinates over time with matplotlib, by default x and y of all bodies.
+
+        Steps in which a contact bears an impulse are shaded. Returns the axes.
+        """
+        import matplotlib.pyplot as plt
+
+        axes: Axes = ax if ax is not None else plt.subplots()[1]
+        for name in names or [f"{body}/{k}" for body in self.bodies for k in ("x", "y")]:
+            axes.plot(self.times, self[name], label=name)
+        step = float(self.summary["steps"] and self.times[-1] / self.summary["steps"])
+        borne = np.unique(self.contacts.time[self.contacts.normal_impulse > 0.0])
+        for time in borne:
+            axes.axvspan(time - step, time, color="0.85", lw=0, zorder=0)
+        axes.set_xlabel("time (s)")
+        axes.legend()
+        return axes
+
+    def __repr__(self) -> str:
+        return (
+            f"Trajectory({self.status}, {len(self.times)} times to {self.times[-1]:g} s, "
+            f"bodies={self.bodies})"
+        )
+
+
+def simulate(
+    scene: SceneLike,
+    parameters: Mapping[str, float] | None = None,
+    *,
+    every: int = 1,
+    certify: bool = False,
+    on_failure: str = "raise",
+) -> Trajectory:
+    """Runs a scene.
+
+    Args:
+        scene: A `Scene`, a scene file, or a dict of its JSON.
+        parameters: Values that replace the scene's: {"bodies/ball/mass": 2.0}, SI units.
+        every: Record one state in so many steps; the first and the last are always recorded.
+        certify: Whether the certificate of the run's derivatives is computed too.
+        on_failure: "raise", or "return" the trajectory up to a step that failed.
+
+    Raises:
+        TangibleError: A mistake in the scene or a value that is not allowed; a run that ended early.
+    """
+    if on_failure not in ("raise", "return"):
+        raise ValueError(f"on_failure: expected raise or return, got {on_failure}")
+    read = Scene.of(scene)
+    if parameters:
+        read = read.with_parameters(parameters)
+    trajectory = Trajectory(read, _core.simulate(read.core, every, certify, False))
+    if trajectory.status != "done" and on_failure == "raise":
+        raise _core.TangibleError(trajectory.message)
+    return trajectory

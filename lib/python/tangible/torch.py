@@ -1,0 +1,156 @@
+"""Rollouts as a differentiable function of torch tensors; the adjoint is the backward pass.
+
+Tensors keep their dtype and device outside; inside everything is computed in double precision on the
+CPU. torch is imported with this module, not with `tangible`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import torch
+
+from ._core import TangibleError
+from ._rollout import Rollout as _Rollout
+from ._scene import SceneLike
+
+__all__ = ["RolloutLayer", "rollout"]
+
+
+def _numpy(tensor: torch.Tensor | None) -> np.ndarray[Any, Any] | None:
+    return None if tensor is None else tensor.detach().to("cpu", torch.float64).numpy()
+
+
+class _Function(torch.autograd.Function):
+    @staticmethod
+    def forward(  # type: ignore[override]
+        ctx: Any,
+        function: _Rollout,
+        kinks: str,
+        like: torch.Tensor,
+        *inputs: torch.Tensor | None,
+    ) -> torch.Tensor:
+        arrays = [_numpy(tensor) for tensor in inputs]
+        if kinks == "raise" and any(ctx.needs_input_grad):
+            for certificate in function.certificates(*arrays):
+                if certificate["verdict"] != "trustworthy":
+                    raise TangibleError(f"derivative: {certificate['verdict']}")
+        states, ctx.pull = function.vjp(*arrays)
+        ctx.inputs = [None if t is None else (t.shape, t.dtype, t.device) for t in inputs]
+        ctx.batched = states.ndim > (1 if function._single else 2)
+        return torch.as_tensor(states).to(device=like.device, dtype=like.dtype)
+
+    @staticmethod
+    def backward(ctx: Any, bar: torch.Tensor) -> Any:  # type: ignore[override]
+        found = ctx.pull(_numpy(bar))
+        gradients: list[torch.Tensor | None] = []
+        for value, entry, needed in zip(found, ctx.inputs, ctx.needs_input_grad[3:]):
+            if entry is None or not needed:
+                gradients.append(None)
+                continue
+            shape, dtype, device = entry
+            # An argument without the batch's axis is one for all rows: their derivatives add up.
+            if ctx.batched and value.ndim > len(shape):
+                value = value.sum(axis=0)
+            gradients.append(torch.as_tensor(value).to(device=device, dtype=dtype))
+        return (None, None, None, *gradients)
+
+
+def rollout(
+    function: _Rollout,
+    parameters: torch.Tensor | None = None,
+    initial_state: torch.Tensor | None = None,
+    controls: torch.Tensor | None = None,
+    *,
+    kinks: str = "element",
+) -> torch.Tensor:
+    """States of a `tangible.Rollout` of tensors, with gradients for all that are given.
+
+    Args:
+        function: What is rolled out; its arguments and shapes are those of `Rollout.__call__`.
+        parameters, initial_state, controls: Tensors, with or without a batch's axis; the result has
+            the dtype and device of the first that is given.
+        kinks: Where two-sided derivatives do not exist: "element" takes one element of the
+            generalised Jacobian (`function.certificates` says where), "raise" an error.
+    """
+    if kinks not in ("element", "raise"):
+        raise ValueError(f"kinks: expected element or raise, got {kinks}")
+    given = [t for t in (parameters, initial_state, controls) if t is not None]
+    like = given[0] if given else torch.empty(0, dtype=torch.float64)
+    result: torch.Tensor = _Function.apply(
+        function, kinks, like, parameters, initial_state, controls
+    )
+    return result
+
+
+class RolloutLayer(torch.nn.Module):
+    """A rollout whose scene's parameters are learned, and stay physical.
+
+    Each parameter is kept as a torch parameter q: p = initial exp(q) where it must be positive (a
+    mass, a radius), p = low + (high - low) sigmoid(q) where bounds are given, and p = initial + q
+    otherwise.
+
+    Args:
+        scene: As of `tangible.Rollout`.
+        parameters: Paths that are learned; they start at the scene's values.
+        controls, records: As of `tangible.Rollout`.
+        positive: Paths that stay above 0; absent: masses, inertias, radii and sizes.
+        bounds: {path: (low, high)}; the scene's value lies between.
+        kinks: As of `rollout`.
+    """
+
+    start: torch.Tensor
+    low: torch.Tensor
+    high: torch.Tensor
+
+    def __init__(
+        self,
+        scene: SceneLike,
+        parameters: Sequence[str],
+        controls: Sequence[str] = (),
+        *,
+        records: Sequence[int] | None = None,
+        positive: Sequence[str] | None = None,
+        bounds: Mapping[str, tuple[float, float]] | None = None,
+        kinks: str = "element",
+    ) -> None:
+        super().__init__()
+        self.function = _Rollout(scene, parameters, controls, records=records)
+        self.kinks = kinks
+        start = torch.as_tensor(self.function.default_parameters)
+        ends = ("/mass", "/inertia", "/radius", "/size/x", "/size/y", "/length")
+        kept = [p for p in parameters if p.endswith(ends)] if positive is None else list(positive)
+        limits = dict(bounds or {})
+        for name in [*kept, *limits]:
+            if name not in parameters:
+                raise ValueError(f"{name}: expected one of {', '.join(parameters)}")
+        self._positive = torch.tensor([p in kept and p not in limits for p in parameters])
+        self._bounded = torch.tensor([p in limits for p in parameters])
+        low = torch.tensor([limits.get(p, (0.0, 1.0))[0] for p in parameters], dtype=torch.float64)
+        high = torch.tensor([limits.get(p, (0.0, 1.0))[1] for p in parameters], dtype=torch.float64)
+        if bool((self._positive & (start <= 0.0)).any()):
+            raise ValueError("positive: expected a scene whose values are > 0")
+        if bool((self._bounded & ((start <= low) | (start >= high))).any()):
+            raise ValueError("bounds: expected the scene's values between them")
+        self.register_buffer("start", start)
+        self.register_buffer("low", low)
+        self.register_buffer("high", high)
+        share = torch.where(self._bounded, (start - low) / (high - low), torch.full_like(start, 0.5))
+        self.q = torch.nn.Parameter(torch.where(self._bounded, torch.logit(share), 0.0 * start))
+
+    def values(self) -> torch.Tensor:
+        """The parameters p, shape (P,), in SI units."""
+        positive = self.start * torch.exp(torch.where(self._positive, self.q, 0.0 * self.q))
+        bounded = self.low + (self.high - self.low) * torch.sigmoid(self.q)
+        free = self.start + self.q
+        return torch.where(self._positive, positive, torch.where(self._bounded, bounded, free))
+
+    def forward(
+        self,
+        initial_state: torch.Tensor | None = None,
+        controls: torch.Tensor | None = None,
+    ) -> torch.Tensor:
+        """States, as `rollout` gives them."""
+        return rollout(self.function, self.values(), initial_state, controls, kinks=self.kinks)

@@ -1,0 +1,163 @@
+"""Rollouts as functions, and their derivatives."""
+
+from __future__ import annotations
+
+import math
+import threading
+from typing import Any
+
+import numpy as np
+import pytest
+import tangible
+
+from conftest import ball
+
+METHODS = ["adjoint", "tangent", "jet", "jet_implicit", "finite_difference"]
+PARAMETERS = ["bodies/ball/mass", "bodies/*/friction", "bodies/ball/position/y"]
+CONTROLS = ["forces/push/force/x", "forces/push/torque"]
+
+
+def driven(**kwargs: Any) -> tuple[tangible.Rollout, dict[str, Any]]:
+    rollout = tangible.Rollout(ball(), PARAMETERS, CONTROLS, **kwargs)
+    random = np.random.default_rng(5)
+    return rollout, {
+        "parameters": rollout.default_parameters * 1.01,
+        "initial_state": rollout.default_initial_state + 0.01 * random.normal(size=6),
+        "controls": 0.3 * random.normal(size=(60, 2)),
+    }
+
+
+def test_the_gradient_of_a_bounce_is_that_of_the_physics(scene: dict[str, Any]) -> None:
+    rollout = tangible.Rollout(scene, ["bodies/ball/position/y"])
+    u = math.sqrt(2.0 * 9.81)
+    # y = e u t - g t^2 / 2 with t = T - u / g after the drop from h = 1 m: dy/dh by hand.
+    t = 0.6 - u / 9.81
+    expected = (9.81 / u) * (0.8 * t) + (0.8 * u - 9.81 * t) * (-1.0 / u)
+    for method in METHODS:
+        found = rollout.jacobian(method=method)
+        assert found.method == method
+        assert found.parameters[1, 0] == pytest.approx(expected, abs=1e-6)
+        assert found.certificate["verdict"] == "trustworthy"
+
+
+@pytest.mark.parametrize("records", [None, [0, 20, 60]])
+def test_products_agree_with_the_jacobian(records: list[int] | None) -> None:
+    rollout, at = driven(records=records)
+    jacobian = rollout.jacobian(**at)
+    states = rollout(**at)
+    random = np.random.default_rng(1)
+    directions = [random.normal(size=np.shape(at[k])) for k in ("parameters", "initial_state", "controls")]
+    same, along = rollout.jvp(tuple(at.values()), tuple(directions))
+    expected = (
+        jacobian.parameters @ directions[0]
+        + jacobian.initial_state @ directions[1]
+        + np.einsum("...kc,kc->...", jacobian.controls, directions[2])
+    )
+    assert np.array_equal(same, states) and np.array_equal(jacobian.states, states)
+    assert np.allclose(along, expected, rtol=1e-10, atol=1e-12)
+    bar = random.normal(size=states.shape)
+    _, pull = rollout.vjp(**at)
+    for _ in range(2):  # a tape may be used again
+        back = pull(bar)
+        assert np.sum(bar * along) == pytest.approx(sum(np.sum(b * d) for b, d in zip(back, directions)))
+    with pytest.raises(ValueError, match="cotangent: expected shape"):
+        pull(bar[..., :2])
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_methods_agree(method: str) -> None:
+    rollout, at = driven()
+    reference = rollout.jacobian(**at, method="tangent")
+    other = rollout.jacobian(**at, method=method)
+    for name in ("parameters", "initial_state", "controls"):
+        a, b = getattr(reference, name), getattr(other, name)
+        assert np.abs(a).max() > 1e-3
+        assert np.allclose(a, b, rtol=2e-6, atol=2e-6 * np.abs(a).max()), name
+
+
+def test_batches_are_their_rows_on_any_number_of_threads() -> None:
+    rollout, at = driven(threads=1)
+    many, _ = driven(threads=3)
+    random = np.random.default_rng(7)
+    p = at["parameters"] * (1.0 + 0.1 * random.uniform(-1, 1, size=(9, 3)))
+    finals = many(p, at["initial_state"], at["controls"])
+    assert finals.shape == (9, 6)
+    assert np.array_equal(finals, rollout(p, at["initial_state"], at["controls"]))
+    for row in range(9):
+        assert np.array_equal(finals[row], rollout(p[row], at["initial_state"], at["controls"]))
+    states, pull = many.vjp(p, None, np.zeros((9, 60, 2)))
+    bars = random.normal(size=states.shape)
+    by_p, by_x, by_u = pull(bars)
+    assert by_p.shape == (9, 3) and by_x.shape == (9, 6) and by_u.shape == (9, 60, 2)
+    _, one = rollout.vjp(p[4], None, np.zeros((60, 2)))
+    assert np.array_equal(one(bars[4])[2], by_u[4])
+    assert len(many.certificates(p)) == 9
+
+
+def test_calls_nest_and_chain() -> None:
+    rollout = tangible.Rollout(ball(), ["bodies/ball/mass"])
+    middle, pull_first = rollout.vjp(None, rollout.default_initial_state)
+    end, pull_second = rollout.vjp(None, middle)
+    alone = rollout.vjp(None, middle)[1](np.ones(6))[1]
+    through = pull_first(pull_second(np.ones(6))[1])[1]
+    assert np.array_equal(pull_second(np.ones(6))[1], alone)
+    jacobians = [rollout.jacobian(None, x).initial_state for x in (rollout.default_initial_state, middle)]
+    assert np.allclose(through, np.ones(6) @ jacobians[1] @ jacobians[0], rtol=1e-9, atol=1e-10)
+    assert not np.array_equal(end, middle)
+
+
+def test_failures_raise_or_are_nan() -> None:
+    rollout = tangible.Rollout(ball(), ["bodies/ball/mass"])
+    with pytest.raises(tangible.TangibleError, match="bodies/ball/mass: expected a number > 0"):
+        rollout([-1.0])
+    with pytest.raises(tangible.TangibleError, match="row 1: bodies/ball/mass"):
+        rollout([[1.0], [-1.0]])
+    states = rollout([[1.0], [-1.0]], on_failure="nan")
+    assert np.isfinite(states[0]).all() and np.isnan(states[1]).all()
+    _, pull = rollout.vjp([[1.0], [-1.0]], on_failure="nan")
+    assert np.isnan(pull(np.ones((2, 6)))[0][1]).all()
+    for wrong, message in [
+        ({"parameters": [1.0, 2.0]}, "parameters: expected shape"),
+        ({"initial_state": [0.0]}, "initial_state: expected shape"),
+        ({"controls": np.zeros((3, 1))}, "controls: expected shape"),
+        ({"parameters": np.ones((2, 1)), "initial_state": np.ones((3, 6))}, "leading axes"),
+    ]:
+        with pytest.raises(ValueError, match=message):
+            rollout(**wrong)
+    with pytest.raises(tangible.TangibleError, match="matches no number"):
+        tangible.Rollout(ball(), ["bodies/bal/mass"])
+    with pytest.raises(tangible.TangibleError, match="control bodies/ball/mass: expected forces"):
+        tangible.Rollout(ball(), controls=["bodies/ball/mass"])
+    with pytest.raises(ValueError, match="method: expected auto"):
+        rollout.jacobian(method="adjiont")
+
+
+def test_several_threads_may_call_one_rollout() -> None:
+    rollout, at = driven(threads=1)
+    expected = rollout(**at)
+    wrong: list[int] = []
+
+    def work(k: int) -> None:
+        for _ in range(20):
+            if not np.array_equal(rollout(**at), expected):
+                wrong.append(k)
+
+    threads = [threading.Thread(target=work, args=(k,)) for k in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert not wrong
+
+
+def test_ctrl_c_ends_a_long_run() -> None:
+    import os
+    import signal
+    import time
+
+    long = tangible.Rollout(ball(duration=1e5))
+    threading.Timer(0.3, lambda: os.kill(os.getpid(), signal.SIGINT)).start()
+    start = time.monotonic()
+    with pytest.raises(KeyboardInterrupt):
+        long()
+    assert time.monotonic() - start < 5.0
