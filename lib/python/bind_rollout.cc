@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Rollouts as functions of arrays: a leading axis for the rows of a batch, double precision, C order.
-#include "binding.h"
+// Rollouts as functions of arrays in double precision and C order, with a leading axis for the rows
+// of a batch.
 #include "tangible/app/certificate_json.h"
+#include "tangible/python/binding.h"
 #include "tangible/simulation/gradient/rollout_function.h"
 
 namespace tangible::python {
@@ -60,11 +61,10 @@ class Rollout {
       input.parameters = Eigen::Map<const VectorX<double>>(
           in.parameters.data() + r * function_.num_parameters(), function_.num_parameters());
       if (in.states) {
-        input.state =
-            Eigen::Map<const VectorX<double>>(in.states->data() + r * states, states);
+        input.state = Eigen::Map<const VectorX<double>>(in.states->data() + r * states, states);
       }
-      input.controls = Eigen::Map<const RowMatrixXd>(in.controls.data() + r * steps * controls,
-                                                     steps, controls);
+      input.controls =
+          Eigen::Map<const RowMatrixXd>(in.controls.data() + r * steps * controls, steps, controls);
     }
     return inputs;
   }
@@ -89,8 +89,8 @@ class Rollout {
 
   // A row each: states (rows x records x S).
   Array States(const std::vector<RowMatrixXd>& rows) const {
-    const py::ssize_t size = static_cast<py::ssize_t>(function_.num_records()) *
-                             function_.num_states();
+    const py::ssize_t size =
+        static_cast<py::ssize_t>(function_.num_records()) * function_.num_states();
     Array array({static_cast<py::ssize_t>(rows.size()),
                  static_cast<py::ssize_t>(function_.num_records()),
                  static_cast<py::ssize_t>(function_.num_states())});
@@ -101,11 +101,11 @@ class Rollout {
   }
 
   std::vector<RowMatrixXd> ReadStates(const char* name, const Array& array, size_t rows) const {
-    ExpectShape(name, array, {static_cast<py::ssize_t>(rows), function_.num_records(),
-                              function_.num_states()});
+    ExpectShape(name, array,
+                {static_cast<py::ssize_t>(rows), function_.num_records(), function_.num_states()});
     std::vector<RowMatrixXd> states(rows);
-    const py::ssize_t size = static_cast<py::ssize_t>(function_.num_records()) *
-                             function_.num_states();
+    const py::ssize_t size =
+        static_cast<py::ssize_t>(function_.num_records()) * function_.num_states();
     for (size_t r = 0; r < rows; ++r) {
       states[r] = Eigen::Map<const RowMatrixXd>(array.data() + static_cast<py::ssize_t>(r) * size,
                                                 function_.num_records(), function_.num_states());
@@ -150,12 +150,14 @@ class Rollout {
   // Of one input: (states, status, message, method, jacobian with all columns).
   py::tuple Jacobian(const Inputs& in, const std::string& method) const {
     const std::vector<RolloutInput> inputs = Read(in);
-    const auto* found = std::find_if(
-        std::begin(kGradientMethodNames), std::end(kGradientMethodNames),
-        [&](const auto& entry) { return method == entry.first; });
+    const auto* found =
+        std::find_if(std::begin(kGradientMethodNames), std::end(kGradientMethodNames),
+                     [&](const auto& entry) { return method == entry.first; });
     if (found == std::end(kGradientMethodNames)) {
-      throw py::value_error("method: expected auto, adjoint, tangent, jet, jet_implicit or "
-                            "finite_difference, got " + method);
+      throw py::value_error(
+          "method: expected auto, adjoint, tangent, jet, jet_implicit or "
+          "finite_difference, got " +
+          method);
     }
     RowMatrixXd jacobian;
     GradientMethod used = GradientMethod::kAuto;
@@ -178,8 +180,8 @@ class Rollout {
   // A row each, as JSON.
   std::vector<std::string> Certify(const Inputs& in, int threads) const {
     const std::vector<RolloutInput> inputs = Read(in);
-    const std::vector<Certificate> certificates = WithoutLock(
-        [&](SignalWatch*) { return RolloutBatch(function_, threads).Certify(inputs); });
+    const std::vector<Certificate> certificates =
+        WithoutLock([&](SignalWatch*) { return RolloutBatch(function_, threads).Certify(inputs); });
     std::vector<std::string> texts;
     for (const Certificate& certificate : certificates) {
       texts.push_back(ToJson(certificate).dump());
@@ -236,8 +238,7 @@ void BindRollout(py::module_* module) {
                     const std::vector<long>&>())
       .def_property_readonly("num_states",
                              [](const Rollout& r) { return r.function().num_states(); })
-      .def_property_readonly("num_steps",
-                             [](const Rollout& r) { return r.function().num_steps(); })
+      .def_property_readonly("num_steps", [](const Rollout& r) { return r.function().num_steps(); })
       .def_property_readonly("outputs",
                              [](const Rollout& r) { return OutputNames(r.function().structure()); })
       .def_property_readonly("parameters",
@@ -245,8 +246,7 @@ void BindRollout(py::module_* module) {
       .def_property_readonly("controls",
                              [paths](const Rollout& r) { return paths(r.function().controls()); })
       .def_property_readonly("records", [](const Rollout& r) { return r.function().records(); })
-      .def_property_readonly(
-          "times", [](const Rollout& r) { return r.function().record_times(); })
+      .def_property_readonly("times", [](const Rollout& r) { return r.function().record_times(); })
       .def("defaults",
            [](const Rollout& r) {
              const Inputs in = r.Write({r.function().Defaults()});
@@ -254,7 +254,9 @@ void BindRollout(py::module_* module) {
            })
       .def("run",
            [](const Rollout& r, const Array& p, const std::optional<Array>& x, const Array& u,
-              int threads) { return r.Run({p, x, u}, threads); })
+              int threads) {
+             return r.Run({p, x, u}, threads);
+           })
       .def("tangent",
            [](const Rollout& r, const Array& p, const std::optional<Array>& x, const Array& u,
               const Array& p_dot, const Array& x_dot, const Array& u_dot, int threads) {
@@ -262,9 +264,13 @@ void BindRollout(py::module_* module) {
            })
       .def("jacobian",
            [](const Rollout& r, const Array& p, const std::optional<Array>& x, const Array& u,
-              const std::string& method) { return r.Jacobian({p, x, u}, method); })
+              const std::string& method) {
+             return r.Jacobian({p, x, u}, method);
+           })
       .def("certify", [](const Rollout& r, const Array& p, const std::optional<Array>& x,
-                         const Array& u, int threads) { return r.Certify({p, x, u}, threads); });
+                         const Array& u, int threads) {
+        return r.Certify({p, x, u}, threads);
+      });
   py::class_<Recorded>(*module, "Recorded")
       .def(py::init([](const std::shared_ptr<Rollout>& r, const Array& p,
                        const std::optional<Array>& x, const Array& u, int threads) {

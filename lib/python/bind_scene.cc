@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // Scenes and runs of them.
-#include "binding.h"
 #include "tangible/app/certificate_json.h"
 #include "tangible/app/run_recorders.h"
 #include "tangible/dynamics/model/settings.h"
+#include "tangible/python/binding.h"
 #include "tangible/scene/scene_json.h"
 #include "tangible/scene/set_parameters.h"
 #include "tangible/simulation/certificate/certify.h"

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The compiled part of the Python package: thin, untyped in Python's sense; the package's Python files
+// The compiled part of the Python package. It is thin: the package's Python files
 // give it names, units and documents.
-#include "binding.h"
+#include "tangible/python/binding.h"
 
 PYBIND11_MODULE(_core, module) {
   namespace py = pybind11;
@@ -10,4 +10,5 @@ PYBIND11_MODULE(_core, module) {
   module.attr("__version__") = TANGIBLE_VERSION;
   tangible::python::BindScene(&module);
   tangible::python::BindRollout(&module);
+  tangible::python::BindFit(&module);
 }

@@ -40,6 +40,10 @@ class SignalWatch {
     const auto now = std::chrono::steady_clock::now();
     if (now < next_) return;
     next_ = now + std::chrono::milliseconds(50);
+    CheckNow();
+  }
+  /// The same at once, in the thread that has called from Python.
+  void CheckNow() {
     const py::gil_scoped_acquire gil;
     if (PyErr_CheckSignals() != 0) {
       raised_ = true;

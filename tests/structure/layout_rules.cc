@@ -54,7 +54,9 @@ const std::map<std::string, std::set<std::string>>& DirectDependencies() {
       {"estimation/results", {"estimation/fit"}},
       {"estimation/experiments", {"estimation/results"}},
       {"estimation/app", {"estimation/experiments"}},
-      {"verification", {"estimation/experiments"}}};
+      {"verification", {"estimation/experiments"}},
+      // The one part of lib that sees estimation; nothing sees it.
+      {"python", {"estimation/results"}}};
   return direct;
 }
 
@@ -77,9 +79,10 @@ const std::map<std::string, std::set<std::string>>& VisibleModules() {
   return all;
 }
 
-/// Programs see what their folder sees, and what programs share (lib/app).
+/// Programs, and the Python package, see what their folder sees, and what programs share (lib/app).
 bool IsMain(const std::string& path) {
-  return Contains(path, "/app/") || (StartsWith(path, "verification/") && EndsWith(path, ".cc"));
+  return Contains(path, "/app/") || StartsWith(path, "lib/python/") ||
+         (StartsWith(path, "verification/") && EndsWith(path, ".cc"));
 }
 
 /// The module of a header by its name behind "tangible/", or of a file of lib by its path behind
@@ -118,6 +121,9 @@ std::string WrongLibrary(const std::string& path, const std::string& name) {
   }
   if (StartsWith(name, "gflags/") && !IsMain(path)) {
     return "gflags belongs in programs";
+  }
+  if (StartsWith(name, "pybind11/") && !StartsWith(path, "lib/python/")) {
+    return "pybind11 belongs in lib/python";
   }
   if (StartsWith(name, "torch/") && !StartsWith(path, "estimation/vision/")) {
     return "torch belongs in estimation/vision";

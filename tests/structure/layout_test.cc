@@ -66,6 +66,9 @@ TEST(LayoutRules, ModulesSeeThoseBelow) {
   EXPECT_EQ(NumProblems("estimation/app/a.cc", "#include \"tangible/estimation/fit/fit.h\"\n"), 0U);
   EXPECT_EQ(NumProblems("verification/a.cc", "#include \"tangible/estimation/fit/fit.h\"\n"), 0U);
   EXPECT_EQ(NumProblems("tests/app/a.cc", "#include \"tangible/verification/a.h\"\n"), 0U);
+  EXPECT_EQ(NumProblems("lib/python/a.h", "#include <pybind11/numpy.h>\n"), 0U);
+  EXPECT_EQ(NumProblems("lib/python/a.cc", "#include \"tangible/estimation/fit/fit.h\"\n"), 0U);
+  EXPECT_EQ(NumProblems("lib/python/a.cc", "#include \"tangible/app/run_summary.h\"\n"), 0U);
 }
 
 TEST(LayoutRules, ModulesDoNotSeeThoseAbove) {
@@ -89,6 +92,9 @@ TEST(LayoutRules, ModulesDoNotSeeThoseAbove) {
   EXPECT_EQ(NumProblems("lib/simulation/stepping/a.cc", "#include \"tangible/render/view.h\"\n"),
             1U);
   EXPECT_EQ(NumProblems("lib/app/a.cc", "#include \"tangible/estimation/fit/fit.h\"\n"), 1U);
+  EXPECT_EQ(NumProblems("lib/app/a.cc", "#include \"tangible/python/binding.h\"\n"), 1U);
+  EXPECT_EQ(NumProblems("verification/a.cc", "#include \"tangible/python/binding.h\"\n"), 1U);
+  EXPECT_EQ(NumProblems("lib/simulation/gradient/a.h", "#include <pybind11/numpy.h>\n"), 1U);
   EXPECT_EQ(NumProblems("estimation/fit/a.cc", "#include \"tangible/verification/a.h\"\n"), 1U);
   EXPECT_EQ(NumProblems("estimation/problem/a.cc", "#include \"tangible/estimation/fit/fit.h\"\n"),
             1U);

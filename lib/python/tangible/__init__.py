@@ -15,6 +15,7 @@ Units are SI, angles are in radians, x points right and y up.
 """
 
 from ._core import TangibleError, __version__
+from ._fit import FitResult, Residuals, fit
 from ._rollout import Jacobian, Rollout
 from ._scene import Scene
 from ._trajectory import Contacts, Events, Trajectory, simulate
@@ -22,11 +23,14 @@ from ._trajectory import Contacts, Events, Trajectory, simulate
 __all__ = [
     "Contacts",
     "Events",
+    "FitResult",
     "Jacobian",
+    "Residuals",
     "Rollout",
     "Scene",
     "TangibleError",
     "Trajectory",
     "__version__",
+    "fit",
     "simulate",
 ]
