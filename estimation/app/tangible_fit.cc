@@ -130,6 +130,9 @@ std::string EstimateLine(const std::string& name, int k, const FitResult& result
   } else {
     line += " (" + uncertainty.messages[k] + ")";
   }
+  if (uncertainty.prior_share[k] > 0.0) {
+    line += ", " + Cell(100.0 * uncertainty.prior_share[k], 2) + " % of this by priors";
+  }
   return line;
 }
 

@@ -64,10 +64,10 @@ Eigen::MatrixXd LeftNullSpace(const Eigen::MatrixXd& n) {
   return rows;
 }
 
-void Name(const std::vector<ParameterizedScene::Entry>& entries, DeterminedCombination* c) {
+void Name(const std::vector<ParameterEntry>& entries, DeterminedCombination* c) {
   bool positive = true;
   for (size_t i = 0; i < c->parameters.size(); ++i) {
-    const ParameterizedScene::Entry& entry = entries[c->parameters[i]];
+    const ParameterEntry& entry = entries[c->parameters[i]];
     positive = positive && entry.logarithmic;
     const double weight = c->coefficients[i];
     c->sum += i == 0 ? "" : weight < 0.0 ? " - " : " + ";
@@ -83,46 +83,22 @@ void Name(const std::vector<ParameterizedScene::Entry>& entries, DeterminedCombi
 
 }  // namespace
 
-Eigen::VectorXd RelativeChanges(const std::vector<ParameterizedScene::Entry>& entries,
-                                const Eigen::VectorXd& estimate, const std::vector<int>& free,
-                                Eigen::VectorXd direction) {
-  for (size_t k = 0; k < free.size(); ++k) {
-    const double magnitude = std::abs(estimate[free[k]]);
-    direction[static_cast<Eigen::Index>(k)] /= magnitude > 0.0 ? magnitude : entries[free[k]].scale;
-  }
-  return direction;
-}
-
 std::vector<DeterminedCombination> FindDeterminedCombinations(
-    const std::vector<ParameterizedScene::Entry>& entries, const Eigen::VectorXd& estimate,
-    const std::vector<int>& free, const Decomposition& decomposition, double least,
-    const Eigen::MatrixXd& covariance, const RowMatrixXd& robust) {
+    const std::vector<ParameterEntry>& entries, const Eigen::VectorXd& estimate,
+    const Eigen::MatrixXd& none, const RowMatrixXd& covariance, const RowMatrixXd& robust) {
   std::vector<DeterminedCombination> combinations;
-  const Eigen::VectorXd& s = decomposition.singular_values();
-  Eigen::Index rank = 0;
-  while (rank < s.size() && s[rank] > least * s[0]) {
-    ++rank;
-  }
-  const Eigen::Index size = decomposition.size();
-  if (rank == size || rank == 0) {
-    return combinations;
-  }
-  Eigen::MatrixXd none(size, size - rank);
-  for (Eigen::Index i = rank; i < size; ++i) {
-    none.col(i - rank) =
-        RelativeChanges(entries, estimate, free, decomposition.Direction(i)).normalized();
-  }
-  std::vector<int> involved;  // indices into free
-  for (Eigen::Index k = 0; k < size; ++k) {
+  std::vector<int> involved;
+  for (Eigen::Index k = 0; k < none.rows() && none.cols() > 0; ++k) {
     if (none.row(k).cwiseAbs().maxCoeff() >= kSmallShare) {
       involved.push_back(static_cast<int>(k));
     }
   }
-  const Eigen::MatrixXd part = none(involved, Eigen::all);
-  const Eigen::MatrixXd weights = LeftNullSpace(part);
+  if (involved.empty()) {
+    return combinations;
+  }
+  const Eigen::MatrixXd weights = LeftNullSpace(none(involved, Eigen::all));
   for (Eigen::Index row = 0; row < weights.rows(); ++row) {
     DeterminedCombination c;
-    Eigen::VectorXd gradient = Eigen::VectorXd::Zero(size);
     double first = 0.0;
     double first_coefficient = 0.0;
     const double largest = weights.row(row).cwiseAbs().maxCoeff();
@@ -131,7 +107,7 @@ std::vector<DeterminedCombination> FindDeterminedCombinations(
       if (!(std::abs(e) > kSmallWeight * largest)) {
         continue;
       }
-      const int k = free[involved[i]];
+      const int k = involved[i];
       const double p = estimate[k] != 0.0 ? std::abs(estimate[k]) : entries[k].scale;
       first = first == 0.0 ? e : first;
       first_coefficient = first_coefficient == 0.0 ? e / p : first_coefficient;
@@ -139,10 +115,13 @@ std::vector<DeterminedCombination> FindDeterminedCombinations(
       c.exponents.push_back(e / first);
       c.coefficients.push_back(e / p / first_coefficient);
       c.value += c.coefficients.back() * estimate[k];
-      gradient[involved[i]] = c.coefficients.back();
     }
-    c.standard_deviation = std::sqrt(gradient.dot(covariance * gradient));
-    c.standard_deviation_robust = std::sqrt(gradient.dot(robust * gradient));
+    const Eigen::Map<const Eigen::VectorXd> gradient(
+        c.coefficients.data(), static_cast<Eigen::Index>(c.coefficients.size()));
+    c.standard_deviation =
+        std::sqrt(gradient.dot(covariance(c.parameters, c.parameters) * gradient));
+    c.standard_deviation_robust =
+        std::sqrt(gradient.dot(robust(c.parameters, c.parameters) * gradient));
     Name(entries, &c);
     combinations.push_back(c);
   }

@@ -19,8 +19,8 @@
 #include <string>
 #include <vector>
 
-#include "tangible/estimation/fit/decomposition.h"
-#include "tangible/estimation/problem/parameterized_scene.h"
+#include "tangible/estimation/problem/parameter_entry.h"
+#include "tangible/math/scalar.h"
 
 namespace tangible {
 
@@ -35,18 +35,12 @@ struct DeterminedCombination {
   double standard_deviation_robust = 0.0;  ///< NaN: none
 };
 
-/// The direction's parts in relative changes of the parameters `free`.
-Eigen::VectorXd RelativeChanges(const std::vector<ParameterizedScene::Entry>& entries,
-                                const Eigen::VectorXd& estimate, const std::vector<int>& free,
-                                Eigen::VectorXd direction);
-
-/// Combinations of the parameters with a share in the directions of `decomposition` whose singular
-/// values are not above `least` of the largest. `covariance` and `robust` are over `free`, and need
-/// only be right along determined directions; empty where every parameter is determined.
+/// Combinations of the parameters with a share in the columns of `none` (parameters x directions),
+/// which are relative changes that the observations do not determine. `covariance` and `robust`
+/// (parameters x parameters) need only be right along what is determined.
 std::vector<DeterminedCombination> FindDeterminedCombinations(
-    const std::vector<ParameterizedScene::Entry>& entries, const Eigen::VectorXd& estimate,
-    const std::vector<int>& free, const Decomposition& decomposition, double least,
-    const Eigen::MatrixXd& covariance, const RowMatrixXd& robust);
+    const std::vector<ParameterEntry>& entries, const Eigen::VectorXd& estimate,
+    const Eigen::MatrixXd& none, const RowMatrixXd& covariance, const RowMatrixXd& robust);
 
 /// Parameters with a smaller share of a direction than this have none.
 inline constexpr double kSmallShare = 1e-4;

@@ -29,8 +29,9 @@ Eigen::MatrixXd TriangularFactor(const RowMatrixXd& a, const Eigen::VectorXd& sc
 
 }  // namespace
 
-Decomposition::Decomposition(const RowMatrixXd& jacobian, double tolerance) {
-  length_ = jacobian.colwise().norm();
+Decomposition::Decomposition(const RowMatrixXd& jacobian, const Eigen::VectorXd& lengths,
+                             double tolerance)
+    : length_(lengths) {
   for (double& length : length_) {
     length = length > 0.0 ? length : 1.0;
   }
@@ -61,6 +62,20 @@ Eigen::MatrixXd Decomposition::Covariance() const {
     sum += v * v.transpose();
   }
   return sum;
+}
+
+Eigen::MatrixXd PseudoSolve(const RowMatrixXd& a, const RowMatrixXd& b, double tolerance) {
+  if (a.size() == 0 || b.cols() == 0) {
+    return Eigen::MatrixXd::Zero(a.cols(), b.cols());
+  }
+  Eigen::VectorXd length = a.colwise().norm();
+  for (double& x : length) {
+    x = x > 0.0 ? x : 1.0;
+  }
+  Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> qr;
+  qr.setThreshold(tolerance);
+  qr.compute(a * length.cwiseInverse().asDiagonal());
+  return length.cwiseInverse().asDiagonal() * qr.solve(Eigen::MatrixXd(b));
 }
 
 }  // namespace tangible

@@ -18,7 +18,11 @@ namespace tangible {
 class Decomposition {
  public:
   /// Singular values above `tolerance` of the largest are directions that J determines.
-  Decomposition(const RowMatrixXd& jacobian, double tolerance);
+  Decomposition(const RowMatrixXd& jacobian, double tolerance)
+      : Decomposition(jacobian, jacobian.colwise().norm(), tolerance) {}
+  /// The same with L given: lengths that the columns had before something was taken out of them, so
+  /// that what little is left of a column shows. A length of 0 counts as 1.
+  Decomposition(const RowMatrixXd& jacobian, const Eigen::VectorXd& lengths, double tolerance);
 
   Eigen::Index rank() const { return rank_; }
   Eigen::Index size() const { return length_.size(); }
@@ -36,5 +40,8 @@ class Decomposition {
   Eigen::MatrixXd v_;
   Eigen::Index rank_ = 0;
 };
+
+/// A⁺ B, with columns of A scaled to unit length; directions below `tolerance` have no part in it.
+Eigen::MatrixXd PseudoSolve(const RowMatrixXd& a, const RowMatrixXd& b, double tolerance);
 
 }  // namespace tangible

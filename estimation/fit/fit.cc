@@ -12,6 +12,7 @@
 #include "tangible/estimation/fit/linearisation.h"
 #include "tangible/estimation/fit/minimise.h"
 #include "tangible/estimation/fit/shooting.h"
+#include "tangible/estimation/problem/problem_with_priors.h"
 
 namespace tangible {
 namespace {
@@ -155,29 +156,17 @@ bool FindStart(const FitOptions& options, LeastSquaresProblem* problem, Lineariz
   return false;
 }
 
-std::vector<ResidualPlace> PlacesOf(const LeastSquaresProblem& problem) {
-  std::vector<ResidualPlace> places;
-  for (int block = 0; block < problem.num_blocks(); ++block) {
-    for (const RowPlace& row : problem.Places(block)) {
-      places.push_back({block, row.series, row.time, row.least});
-    }
+/// The residuals of all observations, block by block.
+Eigen::VectorXd ObservationResiduals(const LeastSquaresProblem& problem,
+                                     const std::vector<BlockEvaluation>& blocks) {
+  Eigen::VectorXd residuals(0);
+  for (int b = 0; b < problem.num_blocks(); ++b) {
+    const Eigen::Index before = residuals.size();
+    const Eigen::Index rows = problem.num_observation_rows(b);
+    residuals.conservativeResize(before + rows);
+    residuals.tail(rows) = blocks[b].residuals.head(rows);
   }
-  return places;
-}
-
-/// The residuals of all blocks, and their derivatives by all parameters.
-void Assemble(const BlockLayout& layout, const std::vector<BlockEvaluation>& blocks,
-              Eigen::VectorXd* residuals, RowMatrixXd* jacobian) {
-  residuals->resize(layout.num_rows());
-  jacobian->setZero(layout.num_rows(), layout.num_parameters());
-  for (int b = 0; b < layout.num_blocks(); ++b) {
-    const Eigen::Index rows = blocks[b].residuals.size();
-    residuals->segment(layout.row_offset(b), rows) = blocks[b].residuals;
-    for (int i = 0; i < layout.num_local(b); ++i) {
-      jacobian->col(layout.ParameterOf(b, i)).segment(layout.row_offset(b), rows) =
-          blocks[b].jacobian.col(i);
-    }
-  }
+  return residuals;
 }
 
 /// One fit under way.
@@ -260,16 +249,13 @@ void Finish(FitRun* run, FitResult* result) {
     return;
   }
   run->rollouts += linearizer.rollouts();
-  RowMatrixXd jacobian;
-  Assemble(linearizer.layout(), blocks, &result->residuals, &jacobian);
+  result->residuals = ObservationResiduals(*run->problem, blocks);
   UncertaintyOptions uncertainty;
   uncertainty.huber = run->options.huber;
   uncertainty.rank_tolerance = run->options.derivatives == DerivativeMethod::kFiniteDifference
                                    ? kRankToleranceOfDifferences
                                    : kRankTolerance;
-  result->uncertainty =
-      EstimateUncertainty(run->problem->entries(), best.parameters, result->residuals, jacobian,
-                          PlacesOf(*run->problem), uncertainty);
+  result->uncertainty = EstimateUncertainty(*run->problem, best.parameters, blocks, uncertainty);
 }
 
 /// All starts, with the log's evaluations if there is one.
@@ -400,8 +386,12 @@ FitResult Fit(const FitOptions& options, RolloutResiduals* residuals, const FitP
       return FitApproachResult{shot.parameters, shot.iterations, residuals->rollouts() - before};
     };
   }
-  const FitResult result =
-      Fit(options, static_cast<LeastSquaresProblem*>(residuals), progress, log, approach);
+  ProblemWithPriors with_priors(residuals, {});
+  LeastSquaresProblem* problem = residuals;
+  if (with_priors.HasRows()) {
+    problem = &with_priors;
+  }
+  const FitResult result = Fit(options, problem, progress, log, approach);
   residuals->SetLog(nullptr);  // which a mismatch may have left
   return result;
 }

@@ -98,7 +98,7 @@ struct FitResult {
   double final_cost = 0.0;
   std::vector<FitIteration> iterations;  ///< of the best start; begins with the initial point
   std::vector<FitStart> starts;
-  Eigen::VectorXd residuals;  ///< at the estimate, in multiples of sigma
+  Eigen::VectorXd residuals;  ///< of the observations at the estimate, in multiples of sigma
   long rollouts = 0;          ///< without the certificate's
   double seconds = 0.0;       ///< without the certificate's
   /// Of the derivatives at the estimate; where its verdict is not `trustworthy`, the message and a
@@ -129,7 +129,8 @@ struct FitLog;  // fit_checkpoint.h
 FitResult Fit(const FitOptions& options, LeastSquaresProblem* problem, const FitProgress& progress,
               FitLog* log = nullptr, const FitApproach& approach = {});
 
-/// The fit of one run, with multiple shooting before it if `options` ask for that.
+/// The fit of one run with the priors of its parameters, and with multiple shooting before it if
+/// `options` ask for that.
 FitResult Fit(const FitOptions& options, RolloutResiduals* residuals, const FitProgress& progress,
               FitLog* log = nullptr);
 

@@ -181,6 +181,12 @@ std::uint64_t Fingerprint(const FitProblem& problem) {
     hash.Add(parameter.name);
     AddOptional(parameter.initial, &hash);
     AddOptional(parameter.lower, &hash);
+    hash.Add(static_cast<int>(parameter.scale));
+    hash.Add(parameter.prior ? static_cast<int>(parameter.prior->kind) : -1);
+    if (parameter.prior) {
+      hash.Add(parameter.prior->center);
+      hash.Add(parameter.prior->sigma);
+    }
     AddOptional(parameter.upper, &hash);
     for (const ParameterSet& set : parameter.sets) {
       hash.Add(set.path);

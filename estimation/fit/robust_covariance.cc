@@ -179,6 +179,7 @@ Reduced Reduce(const RecordingRows& rows, const RobustOptions& options) {
       reduced.counts[i] = 0.0;
     }
   }
+  reduced.psi *= std::sqrt(rows.weight);
   reduced.shared = rows.shared;
   const Eigen::Index own = rows.own.cols();
   const Eigen::Index priors = rows.prior_own.rows();
@@ -194,11 +195,12 @@ Reduced Reduce(const RecordingRows& rows, const RobustOptions& options) {
       reduced.own_known = rows.prior_own.transpose() * rows.prior_own;
     }
     reduced.own_normal = Decomposition(stacked, options.rank_tolerance).Covariance();
-    RowMatrixXd product = rows.own.transpose() * (reduced.counts.asDiagonal() * rows.shared);
+    RowMatrixXd right(stacked.rows(), size);
+    right.topRows(rows.own.rows()) = reduced.counts.asDiagonal() * rows.shared;
     if (priors > 0) {
-      product += rows.prior_own.transpose() * rows.prior_shared;
+      right.bottomRows(priors) = rows.prior_shared;
     }
-    reduced.from_shared = reduced.own_normal * product;
+    reduced.from_shared = PseudoSolve(stacked, right, options.rank_tolerance);
     reduced.shared -= rows.own * reduced.from_shared;
   }
   const RowMatrixXd counted = reduced.counts.asDiagonal() * reduced.shared;

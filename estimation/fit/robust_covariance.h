@@ -57,6 +57,7 @@ inline constexpr int kFewRecordings = 5;
 struct RecordingRows {
   std::vector<double> times;  ///< s, of each row
   Eigen::VectorXd residuals;  ///< in multiples of sigma
+  double weight = 1.0;        ///< of the recording; the matrices have its root already
   RowMatrixXd shared;         ///< rows x shared parameters
   RowMatrixXd own;            ///< rows x parameters of this recording alone; maybe none
   /// Priors on own parameters, which may involve shared ones; may be empty.

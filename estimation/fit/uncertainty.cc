@@ -19,6 +19,8 @@ constexpr double kChiSquareDeviations = 5.0;
 // where it matters: below a tenth from one sample to the next intervals change by 10 %.
 constexpr double kWhitenessProbability = 1e-4;
 constexpr double kWhitenessCorrelation = 0.1;
+// Of a combination that a message names.
+constexpr int kMostTerms = 12;
 
 std::string Short(double x) {
   std::ostringstream text;
@@ -28,103 +30,92 @@ std::string Short(double x) {
 }
 
 /// "0.71 'a' - 0.71 'b'": a direction in the parameters' relative changes.
-std::string Combination(const std::vector<ParameterizedScene::Entry>& entries,
-                        const std::vector<int>& free, const Eigen::VectorXd& direction) {
+std::string Combination(const std::vector<ParameterEntry>& entries,
+                        const Eigen::VectorXd& direction) {
   std::string text;
+  int terms = 0;
   double largest = direction.cwiseAbs().maxCoeff();
-  for (size_t i = 0; i < free.size(); ++i) {
-    double share = direction[static_cast<Eigen::Index>(i)] / largest;
+  for (size_t k = 0; k < entries.size(); ++k) {
+    double share = direction[static_cast<Eigen::Index>(k)] / largest;
     if (std::abs(share) < kSmallShare) {
       continue;
+    }
+    if (++terms > kMostTerms) {
+      return text + " + ...";
     }
     if (text.empty() && share < 0.0) {  // a direction has no sign: the first share is positive
       largest = -largest;
       share = -share;
     }
     text += text.empty() ? "" : (share < 0.0 ? " - " : " + ");
-    text += Short(std::abs(share)) + " '" + entries[free[i]].name + "'";
+    text += Short(std::abs(share)) + " '" + entries[k].name + "'";
   }
   return text;
 }
 
-/// Rows of J that count and columns that are free; the first `num_data` have Huber's loss.
-RowMatrixXd FreePart(const Eigen::VectorXd& residuals, const RowMatrixXd& jacobian,
-                     const std::vector<int>& free, Eigen::Index num_data, double huber) {
-  RowMatrixXd part = RowMatrixXd::Zero(jacobian.rows(), static_cast<Eigen::Index>(free.size()));
-  for (Eigen::Index i = 0; i < jacobian.rows(); ++i) {
-    if (huber > 0.0 && i < num_data && std::abs(residuals[i]) > huber) {
-      continue;
-    }
-    for (size_t k = 0; k < free.size(); ++k) {
-      part(i, static_cast<Eigen::Index>(k)) = jacobian(i, free[k]);
-    }
-  }
-  return part;
-}
+/// A block at the estimate, over its free parameters.
+struct BlockPart {
+  std::vector<int> own;     ///< indices in p
+  RowMatrixXd shared_rows;  ///< with the root of the weight
+  RowMatrixXd own_rows;
+  RowMatrixXd reduced;      ///< S̃, without rows of which Huber's loss takes no notice
+  RowMatrixXd own_normal;   ///< (OᵀO)⁻¹
+  RowMatrixXd from_shared;  ///< D
+  double condition = 1.0;
+};
+
+/// A direction in all parameters that is not determined, or hardly.
+struct WeakDirection {
+  Eigen::VectorXd change;  ///< relative
+  bool undetermined = true;
+};
 
 /// One fit's uncertainty under way.
 class Estimator {
  public:
-  Estimator(const std::vector<ParameterizedScene::Entry>& entries, const Eigen::VectorXd& estimate,
-            const Eigen::VectorXd& residuals, const RowMatrixXd& jacobian,
-            const std::vector<ResidualPlace>& places, const UncertaintyOptions& options)
-      : entries_(entries),
+  Estimator(const LeastSquaresProblem& problem, const Eigen::VectorXd& estimate,
+            const std::vector<BlockEvaluation>& blocks, const UncertaintyOptions& options)
+      : problem_(problem),
+        layout_(problem),
+        entries_(problem.entries()),
         estimate_(estimate),
-        residuals_(residuals),
-        jacobian_(jacobian),
-        places_(places),
+        blocks_(blocks),
         options_(options) {
     const Eigen::Index size = estimate.size();
-    result_.covariance = RowMatrixXd::Constant(size, size, kNaN);
+    const Eigen::Index kept = size > kMostCovariance ? layout_.num_shared() : size;
+    result_.covariance = RowMatrixXd::Constant(kept, kept, kNaN);
     result_.standard_deviation = Eigen::VectorXd::Constant(size, kNaN);
     result_.standard_deviation_robust = Eigen::VectorXd::Constant(size, kNaN);
     result_.degrees_of_freedom = Eigen::VectorXd::Constant(size, kNaN);
     result_.prior_share = Eigen::VectorXd::Zero(size);
-    result_.confidence_95.resize(entries.size());
-    result_.confidence_95_robust.resize(entries.size());
-    result_.messages.resize(entries.size());
+    result_.confidence_95.resize(entries_.size());
+    result_.confidence_95_robust.resize(entries_.size());
+    result_.messages.resize(entries_.size());
   }
 
   Uncertainty Run() {
     FindFree();
     JudgeResiduals();
-    if (free_.empty()) {
+    if (num_free_ == 0) {
       return result_;
     }
-    const Decomposition decomposition(
-        FreePart(residuals_, jacobian_, free_, num_data(), options_.huber),
-        options_.rank_tolerance);
-    result_.condition = decomposition.condition();
-    MarkUndetermined(decomposition);
-    const Eigen::MatrixXd covariance = decomposition.Covariance();
-    FillCovariance(covariance);
-    FillPriorShare(covariance);
-    const RowMatrixXd robust = FillRobust();
-    // An ill-conditioned direction is given up too.
-    result_.combinations = FindDeterminedCombinations(
-        entries_, estimate_, free_, decomposition,
-        std::max(options_.rank_tolerance, 1.0 / options_.condition_warning), covariance, robust);
-    if (decomposition.rank() == decomposition.size() &&
-        result_.condition > options_.condition_warning) {
-      WarnOfCondition(decomposition);
-    }
-    for (const DeterminedCombination& combination : result_.combinations) {
-      result_.warnings.push_back("the observations do determine " + NameOf(combination));
-    }
+    Eliminate();
+    FindWeakDirections();
+    NameUndetermined();
+    FillCovariance();
+    FillPriorShares();
+    FillRobust();
+    ProposeCombinations();
     return result_;
   }
 
  private:
-  /// Residuals of measured coordinates; those after are of priors.
-  Eigen::Index num_data() const {
-    return places_.empty() ? residuals_.size() : static_cast<Eigen::Index>(places_.size());
-  }
-
   void FindFree() {
+    parts_.resize(blocks_.size());
     for (size_t k = 0; k < entries_.size(); ++k) {
       const double estimate = estimate_[static_cast<Eigen::Index>(k)];
       if (!IsAtBound(entries_[k], estimate)) {
-        free_.push_back(static_cast<int>(k));
+        ++num_free_;
         continue;
       }
       const bool lower = estimate < 0.5 * (entries_[k].lower + entries_[k].upper);
@@ -132,12 +123,30 @@ class Estimator {
           std::string("at its ") + (lower ? "lower" : "upper") + " bound: no interval";
       result_.warnings.push_back("'" + entries_[k].name + "' is " + result_.messages[k]);
     }
+    for (int k = 0; k < layout_.num_shared(); ++k) {
+      if (result_.messages[k].empty()) {
+        shared_.push_back(k);
+      }
+    }
   }
 
   void JudgeResiduals() {
-    const auto data = residuals_.head(num_data());
+    std::vector<ResidualPlace> places;
+    std::vector<double> values;
+    for (size_t b = 0; b < blocks_.size(); ++b) {
+      const int block = static_cast<int>(b);
+      const std::vector<RowPlace> rows = problem_.Places(block);
+      for (int i = 0; i < problem_.num_observation_rows(block); ++i) {
+        values.push_back(blocks_[b].residuals[i]);
+        if (i < static_cast<int>(rows.size())) {
+          places.push_back({block, rows[i].series, rows[i].time, rows[i].least});
+        }
+      }
+    }
+    const Eigen::Map<const Eigen::VectorXd> data(values.data(),
+                                                 static_cast<Eigen::Index>(values.size()));
     const double count = static_cast<double>(data.size());
-    const double freedom = count - static_cast<double>(free_.size());
+    const double freedom = count - static_cast<double>(num_free_);
     result_.residual_rms = std::sqrt(data.squaredNorm() / count);
     result_.reduced_chi_square = freedom > 0.0 ? data.squaredNorm() / freedom : kNaN;
     result_.too_large =
@@ -148,7 +157,10 @@ class Estimator {
                                  "): the model misses something, or sigma is too small, and the "
                                  "intervals from sigma are too narrow");
     }
-    result_.whiteness = TestWhiteness(data, places_);
+    if (places.size() != values.size()) {
+      return;
+    }
+    result_.whiteness = TestWhiteness(data, places);
     result_.correlated = result_.whiteness.p_value < kWhitenessProbability &&
                          std::abs(result_.whiteness.correlation) > kWhitenessCorrelation;
     if (result_.correlated) {
@@ -161,52 +173,121 @@ class Estimator {
     }
   }
 
-  /// Names the directions without information and takes the intervals of their parameters away.
-  void MarkUndetermined(const Decomposition& decomposition) {
-    for (Eigen::Index i = decomposition.rank(); i < decomposition.size(); ++i) {
-      const Eigen::VectorXd direction =
-          RelativeChanges(entries_, estimate_, free_, decomposition.Direction(i));
-      const std::string combination = Combination(entries_, free_, direction);
-      result_.warnings.push_back("not determined by the observations: relative changes along " +
-                                 combination);
-      const double largest = direction.cwiseAbs().maxCoeff();
-      for (size_t k = 0; k < free_.size(); ++k) {
-        if (std::abs(direction[static_cast<Eigen::Index>(k)]) >= kSmallShare * largest) {
-          result_.messages[free_[k]] = "not determined: the observations do not fix " + combination;
-        }
-      }
+  /// Takes the own parameters out of each block's rows and decomposes what is left.
+  void Eliminate() {
+    const Eigen::Index shared = static_cast<Eigen::Index>(shared_.size());
+    Eigen::VectorXd squares = Eigen::VectorXd::Zero(shared);
+    for (size_t b = 0; b < blocks_.size(); ++b) {
+      EliminateOwn(static_cast<int>(b));
+      squares += parts_[b].shared_rows.colwise().squaredNorm().transpose();
+    }
+    RowMatrixXd stacked(layout_.num_rows(), shared);
+    for (size_t b = 0; b < blocks_.size(); ++b) {
+      stacked.middleRows(layout_.row_offset(static_cast<int>(b)), parts_[b].reduced.rows()) =
+          parts_[b].reduced;
+    }
+    decomposition_.emplace(stacked, squares.cwiseSqrt(), options_.rank_tolerance);
+    shared_covariance_ = decomposition_->Covariance();
+    result_.condition = shared > 0 ? decomposition_->condition() : 1.0;
+    for (const BlockPart& part : parts_) {
+      result_.condition = std::max(result_.condition, part.condition);
     }
   }
 
-  void FillCovariance(const Eigen::MatrixXd& covariance) {
-    for (size_t i = 0; i < free_.size(); ++i) {
-      if (!result_.messages[free_[i]].empty()) {
-        continue;
+  void EliminateOwn(int block) {
+    BlockPart& part = parts_[block];
+    const BlockEvaluation& evaluation = blocks_[block];
+    std::vector<int> local;
+    for (int i = layout_.num_shared(); i < layout_.num_local(block); ++i) {
+      const int k = layout_.ParameterOf(block, i);
+      if (result_.messages[k].empty()) {
+        part.own.push_back(k);
+        local.push_back(i);
       }
-      for (size_t j = 0; j < free_.size(); ++j) {
-        if (result_.messages[free_[j]].empty()) {
-          result_.covariance(free_[i], free_[j]) =
-              covariance(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
-        }
-      }
-      const double deviation = std::sqrt(result_.covariance(free_[i], free_[i]));
-      result_.standard_deviation[free_[i]] = deviation;
-      result_.confidence_95[free_[i]] = IntervalAround(free_[i], kNormalQuantile * deviation);
     }
-  }
-
-  /// C = C J_dataᵀ J_data C + C J_priorᵀ J_prior C: the second part of its diagonal.
-  void FillPriorShare(const Eigen::MatrixXd& covariance) {
-    const Eigen::Index priors = residuals_.size() - num_data();
-    if (priors == 0) {
+    const double root = std::sqrt(problem_.weight(block));
+    part.shared_rows = root * evaluation.jacobian(Eigen::all, shared_);
+    part.own_rows = root * evaluation.jacobian(Eigen::all, local);
+    RowMatrixXd own = part.own_rows;
+    part.reduced = part.shared_rows;
+    for (int i = 0; i < problem_.num_observation_rows(block) && options_.huber > 0.0; ++i) {
+      if (std::abs(evaluation.residuals[i]) > options_.huber) {
+        own.row(i).setZero();
+        part.reduced.row(i).setZero();
+      }
+    }
+    part.from_shared = PseudoSolve(own, part.reduced, options_.rank_tolerance);
+    if (own.cols() == 0) {
       return;
     }
-    const RowMatrixXd rows = jacobian_.bottomRows(priors)(Eigen::all, free_) * covariance;
-    for (size_t i = 0; i < free_.size(); ++i) {
-      const Eigen::Index k = static_cast<Eigen::Index>(i);
-      if (covariance(k, k) > 0.0) {
-        result_.prior_share[free_[i]] = std::min(1.0, rows.col(k).squaredNorm() / covariance(k, k));
+    part.reduced -= own * part.from_shared;
+    const Decomposition decomposition(own, options_.rank_tolerance);
+    part.own_normal = decomposition.Covariance();
+    part.condition = decomposition.condition();
+    AddWeak(decomposition, [&](const Eigen::VectorXd& direction) {
+      Eigen::VectorXd all = Eigen::VectorXd::Zero(estimate_.size());
+      all(part.own) = direction;
+      return all;
+    });
+  }
+
+  void FindWeakDirections() {
+    AddWeak(*decomposition_, [&](const Eigen::VectorXd& direction) {
+      Eigen::VectorXd all = Eigen::VectorXd::Zero(estimate_.size());
+      all(shared_) = direction;
+      for (const BlockPart& part : parts_) {
+        if (!part.own.empty()) {
+          all(part.own) = -part.from_shared * direction;
+        }
       }
+      return all;
+    });
+  }
+
+  /// Keeps the directions of a decomposition that are not determined, or hardly; `extend` makes one
+  /// a direction in all parameters.
+  template <typename Extend>
+  void AddWeak(const Decomposition& decomposition, const Extend& extend) {
+    const Eigen::VectorXd& s = decomposition.singular_values();
+    for (Eigen::Index i = 0; i < decomposition.size(); ++i) {
+      const bool determined = i < decomposition.rank();
+      if (determined && s[i] * options_.condition_warning > s[0]) {
+        continue;
+      }
+      Eigen::VectorXd change = extend(decomposition.Direction(i));
+      for (Eigen::Index k = 0; k < change.size(); ++k) {
+        const double magnitude = std::abs(estimate_[k]);
+        change[k] /= magnitude > 0.0 ? magnitude : entries_[static_cast<size_t>(k)].scale;
+      }
+      weak_.push_back({change.normalized(), !determined});
+    }
+  }
+
+  /// Names the directions without information and takes the intervals of their parameters away.
+  void NameUndetermined() {
+    const WeakDirection* worst = nullptr;
+    bool any = false;
+    for (const WeakDirection& weak : weak_) {
+      worst = &weak;
+      if (!weak.undetermined) {
+        continue;
+      }
+      any = true;
+      const std::string combination = Combination(entries_, weak.change);
+      result_.warnings.push_back("not determined by the observations: relative changes along " +
+                                 combination);
+      const double largest = weak.change.cwiseAbs().maxCoeff();
+      for (size_t k = 0; k < entries_.size(); ++k) {
+        if (std::abs(weak.change[static_cast<Eigen::Index>(k)]) >= kSmallShare * largest) {
+          result_.messages[k] = "not determined: the observations do not fix " + combination;
+        }
+      }
+    }
+    if (!any && worst != nullptr) {
+      result_.warnings.push_back("ill-conditioned (" + Short(result_.condition) +
+                                 "): worst determined are relative changes along " +
+                                 Combination(entries_, worst->change) +
+                                 "; hold one of these parameters or observe more");
     }
   }
 
@@ -215,136 +296,211 @@ class Estimator {
     return std::pair(p - half, p + half);
   }
 
-  int RecordingOf(int parameter) const {
-    return options_.recording_of_parameter.empty() ? -1
-                                                   : options_.recording_of_parameter[parameter];
+  /// `all` (parameters x parameters, NaN to begin with) from the covariances of the shared
+  /// parameters and of each block's own.
+  template <typename Own>
+  void Spread(const RowMatrixXd& shared, const Own& own, RowMatrixXd* all) const {
+    const Eigen::Index kept = all->rows();
+    if (!shared_.empty()) {
+      (*all)(shared_, shared_) = shared;
+    }
+    for (size_t b = 0; b < parts_.size() && kept == estimate_.size(); ++b) {
+      const BlockPart& part = parts_[b];
+      if (part.own.empty()) {
+        continue;
+      }
+      const RowMatrixXd cross = -part.from_shared * shared;
+      if (!shared_.empty()) {
+        (*all)(part.own, shared_) = cross;
+        (*all)(shared_, part.own) = cross.transpose();
+      }
+      for (size_t c = 0; c < parts_.size(); ++c) {
+        if (c != b && !parts_[c].own.empty()) {
+          (*all)(part.own, parts_[c].own) = -cross * parts_[c].from_shared.transpose();
+        }
+      }
+      (*all)(part.own, part.own) = own(b);
+    }
   }
 
-  /// The robust covariance over the free parameters, which it fills into the result.
-  RowMatrixXd FillRobust() {
-    const Eigen::Index size = static_cast<Eigen::Index>(free_.size());
-    RowMatrixXd all = RowMatrixXd::Constant(size, size, kNaN);
-    if (places_.empty()) {
-      return all;
+  RowMatrixXd OwnCovariance(size_t block) const {
+    const BlockPart& part = parts_[block];
+    return part.own_normal + part.from_shared * shared_covariance_ * part.from_shared.transpose();
+  }
+
+  void FillCovariance() {
+    Eigen::VectorXd variance = Eigen::VectorXd::Constant(estimate_.size(), kNaN);
+    if (!shared_.empty()) {
+      variance(shared_) = shared_covariance_.diagonal();
     }
-    int count = 1;
-    for (const ResidualPlace& place : places_) {
-      count = std::max(count, place.recording + 1);
+    for (size_t b = 0; b < parts_.size(); ++b) {
+      if (!parts_[b].own.empty()) {
+        variance(parts_[b].own) = OwnCovariance(b).diagonal();
+      }
     }
-    std::vector<int> shared;  // indices into free
-    std::vector<std::vector<int>> own(count);
-    for (size_t i = 0; i < free_.size(); ++i) {
-      const int recording = RecordingOf(free_[i]);
-      (recording < 0 ? shared : own[recording]).push_back(static_cast<int>(i));
+    all_ = RowMatrixXd::Constant(result_.covariance.rows(), result_.covariance.cols(), kNaN);
+    Spread(
+        shared_covariance_, [&](size_t b) { return OwnCovariance(b); }, &all_);
+    result_.covariance = all_;
+    for (size_t k = 0; k < entries_.size(); ++k) {
+      const int parameter = static_cast<int>(k);
+      if (!result_.messages[k].empty()) {
+        if (parameter < all_.rows()) {
+          result_.covariance.row(parameter).setConstant(kNaN);
+          result_.covariance.col(parameter).setConstant(kNaN);
+        }
+        continue;
+      }
+      const double deviation = std::sqrt(variance[parameter]);
+      result_.standard_deviation[parameter] = deviation;
+      result_.confidence_95[k] = IntervalAround(parameter, kNormalQuantile * deviation);
     }
-    RowMatrixXd shared_prior;
-    const RobustCovariance robust = EstimateRobustCovariance(
-        Rows(shared, own, &shared_prior), shared_prior, {options_.huber, options_.rank_tolerance});
+  }
+
+  /// C = C J_dataᵀ J_data C + C J_priorᵀ J_prior C: the second part of its diagonal.
+  void FillPriorShares() {
+    if (all_.rows() < estimate_.size()) {
+      return;
+    }
+    Eigen::VectorXd part = Eigen::VectorXd::Zero(estimate_.size());
+    for (size_t b = 0; b < blocks_.size(); ++b) {
+      const int block = static_cast<int>(b);
+      const double root = std::sqrt(problem_.weight(block));
+      for (Eigen::Index i = problem_.num_observation_rows(block); i < blocks_[b].residuals.size();
+           ++i) {
+        Eigen::VectorXd moved = Eigen::VectorXd::Zero(estimate_.size());
+        for (int local = 0; local < layout_.num_local(block); ++local) {
+          const int k = layout_.ParameterOf(block, local);
+          const double derivative = root * blocks_[b].jacobian(i, local);
+          if (derivative != 0.0 && std::isfinite(all_(k, k))) {
+            moved += derivative * all_.col(k);
+          }
+        }
+        part += moved.cwiseAbs2();
+      }
+    }
+    for (Eigen::Index k = 0; k < part.size(); ++k) {
+      if (all_(k, k) > 0.0 && std::isfinite(part[k])) {
+        result_.prior_share[k] = std::min(1.0, part[k] / all_(k, k));
+      }
+    }
+  }
+
+  void FillRobust() {
+    robust_ = RowMatrixXd::Constant(all_.rows(), all_.cols(), kNaN);
+    std::vector<size_t> of_recordings;
+    RowMatrixXd prior(0, static_cast<Eigen::Index>(shared_.size()));
+    const std::vector<RecordingRows> recordings = Recordings(&of_recordings, &prior);
+    if (recordings.empty()) {
+      return;
+    }
+    const RobustCovariance robust =
+        EstimateRobustCovariance(recordings, prior, {options_.huber, options_.rank_tolerance});
     result_.robust_method = robust.method;
     result_.bandwidth = robust.bandwidth;
     if (robust.method == RobustMethod::kNone) {
-      return all;
+      return;
     }
-    const auto fill = [&](const std::vector<int>& which, const RowMatrixXd& covariance,
-                          const Eigen::VectorXd& freedom) {
-      for (size_t i = 0; i < which.size(); ++i) {
-        const int k = free_[which[i]];
-        const Eigen::Index at = static_cast<Eigen::Index>(i);
-        for (size_t j = 0; j < which.size(); ++j) {
-          all(which[i], which[j]) = covariance(at, static_cast<Eigen::Index>(j));
-        }
-        if (!result_.messages[k].empty() || !(freedom[at] > 0.0)) {
-          continue;
-        }
-        const double deviation = std::sqrt(std::max(0.0, covariance(at, at)));
-        result_.standard_deviation_robust[k] = deviation;
-        result_.degrees_of_freedom[k] = freedom[at];
-        result_.confidence_95_robust[k] =
-            IntervalAround(k, StudentQuantile(freedom[at]) * deviation);
-      }
-    };
-    fill(shared, robust.shared, robust.shared_freedom);
-    for (int g = 0; g < count; ++g) {
-      fill(own[g], robust.own[g], robust.own_freedom[g]);
+    FillRobustIntervals(shared_, robust.shared, robust.shared_freedom);
+    std::vector<RowMatrixXd> own(parts_.size());
+    for (size_t g = 0; g < of_recordings.size(); ++g) {
+      own[of_recordings[g]] = robust.own[g];
+      FillRobustIntervals(parts_[of_recordings[g]].own, robust.own[g], robust.own_freedom[g]);
     }
-    return all;
+    Spread(
+        robust.shared, [&](size_t b) { return own[b]; }, &robust_);
   }
 
-  /// The rows by recording; priors that involve no own parameter go to `shared_prior`.
-  std::vector<RecordingRows> Rows(const std::vector<int>& shared,
-                                  const std::vector<std::vector<int>>& own,
-                                  RowMatrixXd* shared_prior) const {
-    std::vector<std::vector<int>> data(own.size()), priors(own.size());
-    std::vector<int> of_shared;
-    for (size_t i = 0; i < places_.size(); ++i) {
-      data[places_[i].recording].push_back(static_cast<int>(i));
+  void FillRobustIntervals(const std::vector<int>& parameters, const RowMatrixXd& covariance,
+                           const Eigen::VectorXd& freedom) {
+    for (size_t i = 0; i < parameters.size(); ++i) {
+      const int k = parameters[i];
+      const Eigen::Index at = static_cast<Eigen::Index>(i);
+      if (!result_.messages[k].empty() || !(freedom[at] > 0.0)) {
+        continue;
+      }
+      const double deviation = std::sqrt(std::max(0.0, covariance(at, at)));
+      result_.standard_deviation_robust[k] = deviation;
+      result_.degrees_of_freedom[k] = freedom[at];
+      result_.confidence_95_robust[k] = IntervalAround(k, StudentQuantile(freedom[at]) * deviation);
     }
-    for (Eigen::Index i = num_data(); i < residuals_.size(); ++i) {
-      int recording = -1;
-      for (size_t k = 0; k < entries_.size(); ++k) {
-        if (jacobian_(i, static_cast<Eigen::Index>(k)) != 0.0) {
-          recording = std::max(recording, RecordingOf(static_cast<int>(k)));
-        }
+  }
+
+  /// The blocks with observations, whose indices go to `of`; the others' rows go to `prior`. Empty
+  /// where it is not known when rows were measured.
+  std::vector<RecordingRows> Recordings(std::vector<size_t>* of, RowMatrixXd* prior) const {
+    std::vector<RecordingRows> recordings;
+    for (size_t b = 0; b < blocks_.size(); ++b) {
+      const int block = static_cast<int>(b);
+      const BlockPart& part = parts_[b];
+      const Eigen::Index data = problem_.num_observation_rows(block);
+      const Eigen::Index priors = blocks_[b].residuals.size() - data;
+      if (data == 0) {
+        const Eigen::Index before = prior->rows();
+        prior->conservativeResize(before + priors, Eigen::NoChange);
+        prior->bottomRows(priors) = part.shared_rows;
+        continue;
       }
-      (recording < 0 ? of_shared : priors[recording]).push_back(static_cast<int>(i));
-    }
-    const auto columns = [this](const std::vector<int>& which) {
-      std::vector<int> parameters;
-      for (const int i : which) {
-        parameters.push_back(free_[i]);
+      const std::vector<RowPlace> places = problem_.Places(block);
+      if (static_cast<Eigen::Index>(places.size()) != data) {
+        return {};
       }
-      return parameters;
-    };
-    *shared_prior = jacobian_(of_shared, columns(shared));
-    std::vector<RecordingRows> recordings(own.size());
-    for (size_t g = 0; g < own.size(); ++g) {
-      RecordingRows& rows = recordings[g];
-      for (const int i : data[g]) {
-        rows.times.push_back(places_[i].time);
+      RecordingRows rows;
+      for (const RowPlace& place : places) {
+        rows.times.push_back(place.time);
       }
-      rows.residuals = residuals_(data[g]);
-      rows.shared = jacobian_(data[g], columns(shared));
-      rows.own = jacobian_(data[g], columns(own[g]));
-      rows.prior_residuals = residuals_(priors[g]);
-      rows.prior_shared = jacobian_(priors[g], columns(shared));
-      rows.prior_own = jacobian_(priors[g], columns(own[g]));
+      rows.weight = problem_.weight(block);
+      rows.residuals = blocks_[b].residuals.head(data);
+      rows.shared = part.shared_rows.topRows(data);
+      rows.own = part.own_rows.topRows(data);
+      rows.prior_residuals = std::sqrt(rows.weight) * blocks_[b].residuals.tail(priors);
+      rows.prior_shared = part.shared_rows.bottomRows(priors);
+      rows.prior_own = part.own_rows.bottomRows(priors);
+      recordings.push_back(rows);
+      of->push_back(b);
     }
     return recordings;
   }
 
-  void WarnOfCondition(const Decomposition& decomposition) {
-    const Eigen::VectorXd direction = RelativeChanges(
-        entries_, estimate_, free_, decomposition.Direction(decomposition.size() - 1));
-    result_.warnings.push_back("ill-conditioned (" + Short(result_.condition) +
-                               "): worst determined are relative changes along " +
-                               Combination(entries_, free_, direction) +
-                               "; hold one of these parameters or observe more");
+  void ProposeCombinations() {
+    if (weak_.empty() || all_.rows() < estimate_.size()) {
+      return;
+    }
+    Eigen::MatrixXd none(estimate_.size(), static_cast<Eigen::Index>(weak_.size()));
+    for (size_t i = 0; i < weak_.size(); ++i) {
+      none.col(static_cast<Eigen::Index>(i)) = weak_[i].change;
+    }
+    result_.combinations = FindDeterminedCombinations(entries_, estimate_, none, all_, robust_);
+    for (const DeterminedCombination& combination : result_.combinations) {
+      result_.warnings.push_back(
+          "the observations do determine " + combination.sum + " = " + Short(combination.value) +
+          " ± " + Short(combination.standard_deviation) +
+          (combination.product.empty() ? "" : ", locally the product " + combination.product));
+    }
   }
 
-  static std::string NameOf(const DeterminedCombination& combination) {
-    return combination.sum + " = " + Short(combination.value) + " ± " +
-           Short(combination.standard_deviation) +
-           (combination.product.empty() ? "" : ", locally the product " + combination.product);
-  }
-
-  const std::vector<ParameterizedScene::Entry>& entries_;
+  const LeastSquaresProblem& problem_;
+  const BlockLayout layout_;
+  const std::vector<ParameterEntry>& entries_;
   const Eigen::VectorXd& estimate_;
-  const Eigen::VectorXd& residuals_;
-  const RowMatrixXd& jacobian_;
-  const std::vector<ResidualPlace>& places_;
+  const std::vector<BlockEvaluation>& blocks_;
   const UncertaintyOptions& options_;
-  std::vector<int> free_;
+  int num_free_ = 0;
+  std::vector<int> shared_;  ///< those that are free
+  std::vector<BlockPart> parts_;
+  std::optional<Decomposition> decomposition_;  ///< of S̃
+  RowMatrixXd shared_covariance_;
+  std::vector<WeakDirection> weak_;
+  RowMatrixXd all_, robust_;  ///< over all parameters that are kept, also along weak directions
   Uncertainty result_;
 };
 
 }  // namespace
 
-Uncertainty EstimateUncertainty(const std::vector<ParameterizedScene::Entry>& entries,
-                                const Eigen::VectorXd& estimate, const Eigen::VectorXd& residuals,
-                                const RowMatrixXd& jacobian,
-                                const std::vector<ResidualPlace>& places,
+Uncertainty EstimateUncertainty(const LeastSquaresProblem& problem, const Eigen::VectorXd& estimate,
+                                const std::vector<BlockEvaluation>& blocks,
                                 const UncertaintyOptions& options) {
-  return Estimator(entries, estimate, residuals, jacobian, places, options).Run();
+  return Estimator(problem, estimate, blocks, options).Run();
 }
 
 std::string DescribeRobust(const Uncertainty& uncertainty) {

@@ -15,6 +15,12 @@
 // in time or within a recording (robust_covariance.h), ± the quantile of Student's t. A test of the
 // residuals' correlation (whiteness.h) warns of a model that does not fit however large sigma is.
 //
+// Parameters of single blocks are eliminated block by block (Schur complement): with O_b and S_b
+// the columns of a block's own and of the shared parameters,
+//
+//   D_b = O_b⁺ S_b,   S̃_b = S_b − O_b D_b,   C_shared = (Σ S̃_bᵀ S̃_b)⁻¹
+//   C_own = (O_bᵀ O_b)⁻¹ + D_b C_shared D_bᵀ
+//
 // J is decomposed as U S Vᵀ with columns scaled to unit length (decomposition.h). Singular values
 // below `rank_tolerance` of the largest are directions that the observations do not determine:
 // parameters with a share in them have no interval, and the message names the combination.
@@ -28,23 +34,26 @@
 #include "tangible/estimation/fit/combinations.h"
 #include "tangible/estimation/fit/robust_covariance.h"
 #include "tangible/estimation/fit/whiteness.h"
-#include "tangible/estimation/problem/parameterized_scene.h"
+#include "tangible/estimation/problem/least_squares.h"
 #include "tangible/math/scalar.h"
 
 namespace tangible {
+
+/// Of more parameters the covariances of those of single recordings are not kept.
+inline constexpr int kMostCovariance = 300;
 
 struct UncertaintyOptions {
   double rank_tolerance = 1e-9;
   double condition_warning = 1e4;  ///< of J with unit columns
   double huber = 0.0;              ///< as FitOptions
-  /// Of each parameter the recording that it belongs to, −1: all of them; empty: all are shared.
-  std::vector<int> recording_of_parameter;
 };
 
 using ConfidenceInterval = std::optional<std::pair<double, double>>;
 
 struct Uncertainty {
-  RowMatrixXd covariance;              ///< P x P; NaN rows and columns where there is none
+  /// P x P, of more than kMostCovariance parameters of the shared ones alone; NaN rows and columns
+  /// where there is none.
+  RowMatrixXd covariance;
   Eigen::VectorXd standard_deviation;  ///< NaN: none
   std::vector<ConfidenceInterval> confidence_95;
   Eigen::VectorXd standard_deviation_robust;  ///< NaN: none
@@ -68,12 +77,9 @@ struct Uncertainty {
   bool correlated = false;
 };
 
-/// `entries` and `estimate` of the parameters, residuals r (N) and J (N x P) there. `places` are
-/// those of the first residuals; the others are of priors.
-Uncertainty EstimateUncertainty(const std::vector<ParameterizedScene::Entry>& entries,
-                                const Eigen::VectorXd& estimate, const Eigen::VectorXd& residuals,
-                                const RowMatrixXd& jacobian,
-                                const std::vector<ResidualPlace>& places,
+/// `estimate` of all parameters of the problem, and its blocks there, with Jacobians.
+Uncertainty EstimateUncertainty(const LeastSquaresProblem& problem, const Eigen::VectorXd& estimate,
+                                const std::vector<BlockEvaluation>& blocks,
                                 const UncertaintyOptions& options);
 
 /// One line about how the robust intervals were found.

@@ -116,6 +116,30 @@ std::string ReadName(const JsonReader& json) {
   return name;
 }
 
+/// {"gaussian": {"mean", "sigma"}} or {"log_normal": {"median", "sigma"}}.
+std::optional<Prior> ReadPrior(const JsonReader& json) {
+  json.ExpectKeys({"gaussian", "log_normal"}, " of a prior");
+  if (json.Has("gaussian") == json.Has("log_normal")) {
+    json.Fail("expected one of gaussian and log_normal, got " +
+              std::string(json.Has("gaussian") ? "both" : "none"));
+    return std::nullopt;
+  }
+  Prior prior;
+  if (json.Has("gaussian")) {
+    const JsonReader gaussian = json.At("gaussian");
+    gaussian.ExpectKeys({"mean", "sigma"}, " of a Gaussian prior");
+    prior.center = gaussian.At("mean").Number();
+    prior.sigma = gaussian.At("sigma").Number(NumberKind::kPositive);
+    return prior;
+  }
+  const JsonReader log_normal = json.At("log_normal");
+  log_normal.ExpectKeys({"median", "sigma"}, " of a log-normal prior");
+  prior.kind = PriorKind::kLogNormal;
+  prior.center = log_normal.At("median").Number(NumberKind::kPositive);
+  prior.sigma = log_normal.At("sigma").Number(NumberKind::kPositive);
+  return prior;
+}
+
 FitParameter ReadParameter(const JsonReader& json) {
   FitParameter parameter;
   if (json.IsString()) {
@@ -123,7 +147,7 @@ FitParameter ReadParameter(const JsonReader& json) {
     parameter.sets.push_back({parameter.name});
     return parameter;
   }
-  json.ExpectKeys({"name", "initial", "lower", "upper", "sets", "path", "scale"},
+  json.ExpectKeys({"name", "initial", "lower", "upper", "sets", "path", "scale", "prior"},
                   " of a parameter");
   const auto read = [&json](const char* key, std::optional<double>* value) {
     if (json.Has(key)) {
@@ -135,6 +159,9 @@ FitParameter ReadParameter(const JsonReader& json) {
   read("upper", &parameter.upper);
   if (json.Has("scale")) {
     parameter.scale = json.At("scale").Choice(kScales);
+  }
+  if (json.Has("prior")) {
+    parameter.prior = ReadPrior(json.At("prior"));
   }
   if (json.Has("path")) {
     if (json.Has("sets")) {

@@ -73,11 +73,16 @@ std::string EstimateTable(const RolloutResiduals& residuals, const FitResult& re
                     number(uncertainty.standard_deviation_robust[i]), end(robust, &Ends::first),
                     end(robust, &Ends::second), number(uncertainty.degrees_of_freedom[i]),
                     number(uncertainty.standard_deviation[i]), end(interval, &Ends::first),
-                    end(interval, &Ends::second), uncertainty.messages[k]});
+                    end(interval, &Ends::second),
+                    uncertainty.prior_share[i] > 0.0
+                        ? CompactNumber(100.0 * uncertainty.prior_share[i], 2) + " %"
+                        : "",
+                    uncertainty.messages[k]});
   }
   return HtmlTable(
              {"parameter", "initial", "estimate", "robust standard deviation", "95 % from", "to",
-              "degrees of freedom", "standard deviation from sigma", "95 % from", "to", ""},
+              "degrees of freedom", "standard deviation from sigma", "95 % from", "to", "by priors",
+              ""},
              rows) +
          "<p>" + HtmlEscape(DescribeRobust(uncertainty)) + ".</p>\n";
 }

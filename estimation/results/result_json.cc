@@ -37,6 +37,9 @@ OrderedJson ParametersToJson(const RolloutResiduals& residuals, const FitResult&
         {"degrees_of_freedom", Number(uncertainty.degrees_of_freedom[k])},
         {"standard_deviation", Number(uncertainty.standard_deviation[k])},
         {"confidence_95", IntervalToJson(uncertainty.confidence_95[k])}};
+    if (uncertainty.prior_share[k] > 0.0) {
+      parameter["prior_share"] = Number(uncertainty.prior_share[k]);
+    }
     if (!result.uncertainty.messages[k].empty()) {
       parameter["message"] = result.uncertainty.messages[k];
     }

@@ -6,28 +6,30 @@
 #include <cmath>
 #include <limits>
 
+#include "tangible/estimation/fit/decomposition.h"
+
 namespace tangible {
 namespace {
 
-std::vector<ParameterizedScene::Entry> Positive(const std::vector<std::string>& names) {
-  std::vector<ParameterizedScene::Entry> entries;
+std::vector<ParameterEntry> Positive(const std::vector<std::string>& names) {
+  std::vector<ParameterEntry> entries;
   for (const std::string& name : names) {
     entries.push_back({name, 1.0, 0.0, std::numeric_limits<double>::infinity(), true, 1.0});
   }
   return entries;
 }
 
-std::vector<DeterminedCombination> Find(const std::vector<ParameterizedScene::Entry>& entries,
+std::vector<DeterminedCombination> Find(const std::vector<ParameterEntry>& entries,
                                         const Eigen::VectorXd& estimate,
                                         const RowMatrixXd& jacobian) {
-  std::vector<int> free(entries.size());
-  for (size_t k = 0; k < free.size(); ++k) {
-    free[k] = static_cast<int>(k);
-  }
   const Decomposition decomposition(jacobian, 1e-9);
-  const Eigen::MatrixXd covariance = decomposition.Covariance();
-  return FindDeterminedCombinations(entries, estimate, free, decomposition, 1e-9, covariance,
-                                    4.0 * covariance);
+  Eigen::MatrixXd none(estimate.size(), decomposition.size() - decomposition.rank());
+  for (Eigen::Index i = decomposition.rank(); i < decomposition.size(); ++i) {
+    none.col(i - decomposition.rank()) =
+        decomposition.Direction(i).cwiseQuotient(estimate).normalized();
+  }
+  const RowMatrixXd covariance = decomposition.Covariance();
+  return FindDeterminedCombinations(entries, estimate, none, covariance, 4.0 * covariance);
 }
 
 TEST(CombinationsTest, AProductIsFoundWithItsExponents) {
@@ -62,8 +64,8 @@ TEST(CombinationsTest, APendulumHasOnlyItsMomentOverItsInertia) {
 
 TEST(CombinationsTest, SeveralAreSeparatedAsFarAsTheyCanBe) {
   // a + b, b + c, c + d of four numbers that may have any sign.
-  std::vector<ParameterizedScene::Entry> entries = Positive({"a", "b", "c", "d"});
-  for (ParameterizedScene::Entry& entry : entries) {
+  std::vector<ParameterEntry> entries = Positive({"a", "b", "c", "d"});
+  for (ParameterEntry& entry : entries) {
     entry.logarithmic = false;
   }
   RowMatrixXd jacobian(3, 4);

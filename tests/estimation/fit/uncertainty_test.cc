@@ -9,19 +9,67 @@
 #include <cmath>
 #include <limits>
 #include <random>
+#include <utility>
 
 namespace tangible {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-std::vector<ParameterizedScene::Entry> Entries(int count) {
-  std::vector<ParameterizedScene::Entry> entries;
+std::vector<ParameterEntry> Entries(int count) {
+  std::vector<ParameterEntry> entries;
   entries.reserve(count);
   for (int k = 0; k < count; ++k) {
     entries.push_back({std::string(1, static_cast<char>('a' + k)), 1.0, -kInfinity, kInfinity});
   }
   return entries;
+}
+
+/// Rows that are there already, of one or several blocks.
+class RowsProblem : public LeastSquaresProblem {
+ public:
+  RowsProblem(std::vector<ParameterEntry> entries, int num_shared,
+              const std::vector<BlockEvaluation>& blocks, std::vector<std::vector<RowPlace>> places)
+      : entries_(std::move(entries)),
+        num_shared_(num_shared),
+        blocks_(blocks),
+        places_(std::move(places)) {}
+  const std::vector<ParameterEntry>& entries() const override { return entries_; }
+  int num_shared() const override { return num_shared_; }
+  int num_blocks() const override { return static_cast<int>(blocks_.size()); }
+  int num_own(int block) const override {
+    return static_cast<int>(blocks_[block].jacobian.cols()) - num_shared_;
+  }
+  int num_rows(int block) const override {
+    return static_cast<int>(blocks_[block].residuals.size());
+  }
+  int num_observation_rows(int block) const override {
+    return places_[block].empty() ? num_rows(block) : static_cast<int>(places_[block].size());
+  }
+  std::vector<RowPlace> Places(int block) const override { return places_[block]; }
+  bool EvaluateBlock(int, const Eigen::VectorXd&, DerivativeMethod, BlockDerivatives,
+                     BlockEvaluation*) override {
+    return false;
+  }
+
+ private:
+  std::vector<ParameterEntry> entries_;
+  int num_shared_;
+  const std::vector<BlockEvaluation>& blocks_;
+  std::vector<std::vector<RowPlace>> places_;
+};
+
+/// One block, all of whose parameters are shared; rows without a place are of priors.
+Uncertainty EstimateUncertainty(const std::vector<ParameterEntry>& entries,
+                                const Eigen::VectorXd& estimate, const Eigen::VectorXd& residuals,
+                                const RowMatrixXd& jacobian, const std::vector<RowPlace>& places,
+                                const UncertaintyOptions& options) {
+  std::vector<BlockEvaluation> blocks(1);
+  blocks[0].residuals = residuals;
+  blocks[0].jacobian = jacobian;
+  return EstimateUncertainty(
+      RowsProblem(entries, static_cast<int>(entries.size()), blocks, {places}), estimate, blocks,
+      options);
 }
 
 TEST(UncertaintyTest, CovarianceIsTheInverseOfTheNormalMatrix) {
@@ -98,14 +146,14 @@ Uncertainty FitLineToParabola(double sigma) {
   constexpr int kCount = 100;
   RowMatrixXd jacobian(kCount, 2);
   Eigen::VectorXd observed(kCount);
-  std::vector<ResidualPlace> places;
+  std::vector<RowPlace> places;
   std::mt19937 random(3);
   std::normal_distribution<double> normal(0.0, 0.01);
   for (int i = 0; i < kCount; ++i) {
     const double t = 0.02 * i - 1.0;
     jacobian.row(i) << 1.0 / sigma, t / sigma;
     observed[i] = (t * t + normal(random)) / sigma;
-    places.push_back({0, 0, t, 0.0});
+    places.push_back({0, t, 0.0});
   }
   const Eigen::Vector2d estimate = jacobian.colPivHouseholderQr().solve(observed);
   return EstimateUncertainty(Entries(2), estimate, jacobian * estimate - observed, jacobian, places,
@@ -137,9 +185,9 @@ TEST(UncertaintyTest, PriorsShareTheInformation) {
   jacobian.topLeftCorner(4, 1).setOnes();
   jacobian.block(4, 1, 4, 1).setOnes();
   jacobian(8, 0) = 2.0;
-  std::vector<ResidualPlace> places;
+  std::vector<RowPlace> places;
   for (int i = 0; i < 8; ++i) {
-    places.push_back({0, i / 4, 0.1 * i, 0.0});
+    places.push_back({i / 4, 0.1 * i, 0.0});
   }
   Eigen::VectorXd residuals = Eigen::VectorXd::Zero(9);
   residuals << 1, -1, 1, -1, 1, -1, 1, -1, 30;
@@ -149,6 +197,63 @@ TEST(UncertaintyTest, PriorsShareTheInformation) {
   EXPECT_EQ(result.prior_share[1], 0.0);
   EXPECT_NEAR(result.covariance(0, 0), 1.0 / 8.0, 1e-14);
   EXPECT_NEAR(result.residual_rms, 1.0, 1e-14) << "a prior is no measurement";
+}
+
+/// Rows of normal numbers: 3 blocks with 2 shared parameters and 2 own each.
+std::vector<BlockEvaluation> RandomBlocks(int rows) {
+  std::mt19937 random(8);
+  std::normal_distribution<double> normal(0.0, 1.0);
+  std::vector<BlockEvaluation> blocks(3);
+  for (BlockEvaluation& block : blocks) {
+    block.residuals = Eigen::VectorXd::Zero(rows);
+    block.jacobian = RowMatrixXd::Zero(rows, 4);
+    for (Eigen::Index i = 0; i < rows; ++i) {
+      block.residuals[i] = normal(random);
+      for (Eigen::Index k = 0; k < 4; ++k) {
+        block.jacobian(i, k) = normal(random);
+      }
+    }
+  }
+  return blocks;
+}
+
+TEST(UncertaintyTest, BlocksGiveWhatTheWholeMatrixGives) {
+  const std::vector<BlockEvaluation> blocks = RandomBlocks(20);
+  RowMatrixXd whole = RowMatrixXd::Zero(60, 8);
+  Eigen::VectorXd residuals(60);
+  std::vector<std::vector<RowPlace>> places(3);
+  for (int b = 0; b < 3; ++b) {
+    whole.block(20 * b, 0, 20, 2) = blocks[b].jacobian.leftCols(2);
+    whole.block(20 * b, 2 + 2 * b, 20, 2) = blocks[b].jacobian.rightCols(2);
+    residuals.segment(20 * b, 20) = blocks[b].residuals;
+    for (int i = 0; i < 20; ++i) {
+      places[b].push_back({0, 0.1 * i, 0.0});
+    }
+  }
+  const RowsProblem problem(Entries(8), 2, blocks, places);
+  const Uncertainty result =
+      EstimateUncertainty(problem, Eigen::VectorXd::Ones(8), blocks, UncertaintyOptions());
+  const Eigen::MatrixXd expected = (whole.transpose() * whole).inverse();
+  EXPECT_LT((result.covariance - expected).cwiseAbs().maxCoeff(), 1e-14);
+  for (int k = 0; k < 8; ++k) {
+    EXPECT_NEAR(result.standard_deviation[k], std::sqrt(expected(k, k)), 1e-14);
+    ASSERT_TRUE(result.confidence_95_robust[k]) << k;
+    // White residuals of unit size: the robust deviation is about the other one.
+    EXPECT_NEAR(result.standard_deviation_robust[k] / result.standard_deviation[k], 1.0, 0.6) << k;
+  }
+}
+
+TEST(UncertaintyTest, WhatABlockDoesNotDetermineTakesNoOtherInterval) {
+  std::vector<BlockEvaluation> blocks = RandomBlocks(20);
+  blocks[1].jacobian.col(3) = -2.0 * blocks[1].jacobian.col(2);  // 'e' and 'f'
+  const RowsProblem problem(Entries(8), 2, blocks, {{}, {}, {}});
+  const Uncertainty result =
+      EstimateUncertainty(problem, Eigen::VectorXd::Ones(8), blocks, UncertaintyOptions());
+  for (int k = 0; k < 8; ++k) {
+    EXPECT_EQ(result.confidence_95[k].has_value(), k != 4 && k != 5) << k;
+  }
+  ASSERT_EQ(result.combinations.size(), 1u);
+  EXPECT_EQ(result.combinations[0].sum, "'e' - 2 'f'");
 }
 
 }  // namespace

@@ -121,6 +121,18 @@ TEST_F(FitJsonTest, BadInputsAreOneLine) {
       {With("parameters", R"([{"path": "gravity/y", "scale": "log"}])"),
        ": /parameters/0/scale: expected linear for a parameter that may be negative or starts at "
        "0, got log"},
+      {With("parameters",
+            R"([{"path": "gravity/y", "prior": {"gaussian": {"mean": 1, "sigma": 0}}}])"),
+       ": /parameters/0/prior/gaussian/sigma: expected a number > 0, got 0"},
+      {With("parameters",
+            R"([{"path": "gravity/y", "prior": {"gaussian": {"mean": 1, "sigma": -1}}}])"),
+       ": /parameters/0/prior/gaussian/sigma: expected a number > 0, got -1"},
+      {With("parameters", R"([{"path": "gravity/y", "prior": {}}])"),
+       ": /parameters/0/prior: expected one of gaussian and log_normal, got none"},
+      {With("parameters",
+            R"([{"path": "gravity/y", "prior": {"log_normal": {"median": 1, "sigma": 1}}}])"),
+       ": /parameters/0/prior: expected gaussian for a parameter that may be negative or starts at "
+       "0, got log_normal"},
       {With("parameters", "{}"), ": /parameters: expected an array of parameters, got an object"},
       {With("parameters", R"([{"name": "m"}])"),
        ": /parameters/0/sets: missing, expected an array of {path, scale, offset}"},
