@@ -117,6 +117,15 @@ TEST(MinimiseTest, ManyRecordingsShareParameters) {
   EXPECT_EQ(MinimiseBlocks(options, &problem).parameters, minimum.parameters);
 }
 
+// Time grows with the number of recordings and not with its cube.
+TEST(MinimiseTest, HundredsOfRecordingsAreEliminatedOneByOne) {
+  DecayProblem problem(600, 1, 10);
+  const Minimum minimum = MinimiseBlocks({}, &problem);
+  ASSERT_EQ(minimum.status, FitStatus::kConverged) << minimum.message;
+  EXPECT_NEAR(minimum.parameters[0], DecayProblem::kRate, 0.01);
+  EXPECT_NEAR(minimum.parameters[601], DecayProblem::Amplitude(599), 0.1);
+}
+
 // A weight is as many copies of the recording; a prior of great weight holds its parameter.
 TEST(MinimiseTest, WeightsAndPriorsCount) {
   DecayProblem doubled(2, 5);
