@@ -113,7 +113,7 @@ class FactorCostFunction : public ceres::CostFunction {
  public:
   FactorCostFunction(const SharedLinearisation* shared, int block, int num_shared, int num_own,
                      int num_factor_rows)
-      : shared_(shared), block_(block), num_own_(num_own) {
+      : shared_(shared), block_(block) {
     set_num_residuals(num_factor_rows + 1);
     for (const int size : {num_own, num_shared}) {
       if (size > 0) {
@@ -152,7 +152,6 @@ class FactorCostFunction : public ceres::CostFunction {
  private:
   const SharedLinearisation* shared_;
   int block_;
-  int num_own_;
 };
 
 class Minimiser : public ceres::IterationCallback {
