@@ -244,12 +244,12 @@ void ReportWarnings(const BatchTable& table, const std::vector<BatchRow>& rows) 
     first = first == nullptr ? &row : first;
   }
   if (first == nullptr) return;
-  const std::string place =
-      FLAGS_batch + ": line " + std::to_string(table.lines[first - rows.data()]) + ": warning: ";
+  std::string place = FLAGS_batch + ": line ";
+  place += std::to_string(table.lines[first - rows.data()]) + ": warning: ";
   const std::string more = others == 0 ? ""
                                        : " (and " + std::to_string(others) +
                                              (others == 1 ? " more row)" : " more rows)");
-  for (const std::string& line : first->warnings) ReportError(place + line + more);
+  for (std::string line : first->warnings) ReportError(line.insert(0, place).append(more));
 }
 
 // All rows of a table; those that fail are told, the others written.

@@ -24,6 +24,9 @@ configure_file("${PROJECT_SOURCE_DIR}/lib/cmake/jet_widths.h.in"
 
 add_library(tangible_flags INTERFACE)
 target_compile_options(tangible_flags INTERFACE -Wall -Wextra -Wpedantic -ffp-contract=off)
+# The Python package links the engine into a shared library. As an option, and not by CMake's property: programs then
+# have the same one as libraries, and share their precompiled header.
+target_compile_options(tangible_flags INTERFACE -fPIC)
 # Functions of the engine are not replaced by others of their name when it is linked into a shared library.
 if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
   target_compile_options(tangible_flags INTERFACE -fno-semantic-interposition)
@@ -71,8 +74,6 @@ endif()
 function(tangible_precompile target)
   if(TANGIBLE_PRECOMPILE_HEADERS)
     target_precompile_headers(${target} REUSE_FROM tangible_precompiled)
-    # The header is precompiled with -fPIC, with which a program's own -fPIE does not agree.
-    target_compile_options(${target} PRIVATE -fPIC)
   endif()
 endfunction()
 
@@ -171,7 +172,6 @@ function(tangible_test name)
   target_compile_options(${name} PRIVATE ${TANGIBLE_TEST_OPTIONS})
   if(TANGIBLE_PRECOMPILE_HEADERS)
     target_precompile_headers(${name} REUSE_FROM tangible_precompiled_tests)
-    target_compile_options(${name} PRIVATE -fPIC)
   endif()
   if("unit" IN_LIST TEST_LABELS OR "program" IN_LIST TEST_LABELS)
     add_dependencies(tangible_unit_and_program_tests ${name})

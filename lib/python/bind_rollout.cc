@@ -183,6 +183,7 @@ class Rollout {
     const std::vector<Certificate> certificates =
         WithoutLock([&](SignalWatch*) { return RolloutBatch(function_, threads).Certify(inputs); });
     std::vector<std::string> texts;
+    texts.reserve(certificates.size());
     for (const Certificate& certificate : certificates) {
       texts.push_back(ToJson(certificate).dump());
     }
@@ -230,6 +231,7 @@ class Recorded {
 void BindRollout(py::module_* module) {
   const auto paths = [](const std::vector<ParameterPath>& parameters) {
     std::vector<std::string> names;
+    names.reserve(parameters.size());
     for (const ParameterPath& parameter : parameters) names.push_back(parameter.path);
     return names;
   };
