@@ -391,7 +391,7 @@ FitResult Fit(const FitOptions& options, RolloutResiduals* residuals, const FitP
   if (with_priors.HasRows()) {
     problem = &with_priors;
   }
-  const FitResult result = Fit(options, problem, progress, log, approach);
+  FitResult result = Fit(options, problem, progress, log, approach);
   residuals->SetLog(nullptr);  // which a mismatch may have left
   return result;
 }

@@ -100,6 +100,7 @@ BatchResult RunBatch(const Scene& scene, const std::vector<ParameterPath>& param
     return result;
   }
   std::vector<std::string> paths;
+  paths.reserve(parameters.size());
   for (const ParameterPath& parameter : parameters) paths.push_back(parameter.path);
   RolloutFunction function;
   result.message = function.Create(scene, paths, {}, {});
