@@ -79,11 +79,10 @@ std::string EstimateTable(const RolloutResiduals& residuals, const FitResult& re
                         : "",
                     uncertainty.messages[k]});
   }
-  return HtmlTable(
-             {"parameter", "initial", "estimate", "robust standard deviation", "95 % from", "to",
-              "degrees of freedom", "standard deviation from sigma", "95 % from", "to", "by priors",
-              ""},
-             rows) +
+  return HtmlTable({"parameter", "initial", "estimate", "robust standard deviation", "95 % from",
+                    "to", "degrees of freedom", "standard deviation from sigma", "95 % from", "to",
+                    "by priors", ""},
+                   rows) +
          "<p>" + HtmlEscape(DescribeRobust(uncertainty)) + ".</p>\n";
 }
 

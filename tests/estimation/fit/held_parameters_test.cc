@@ -53,8 +53,8 @@ TEST(HeldParametersTest, FindsWhatDrivesAnotherIntoItsBound) {
   FitParameter gravity = Parameter("gravity/y", -9.8);
   gravity.lower = -20.0;
   gravity.upper = -9.75;
-  RolloutResiduals residuals = MakeResiduals(
-      scene, {}, {gravity, Parameter("bodies/ball/velocity/y", 3.0)}, observations);
+  RolloutResiduals residuals =
+      MakeResiduals(scene, {}, {gravity, Parameter("bodies/ball/velocity/y", 3.0)}, observations);
   const FitResult result = Fit(FitOptions(), &residuals, {});
   ASSERT_EQ(result.status, FitStatus::kConverged) << result.message;
   ASSERT_EQ(result.estimate[0], -9.75);
