@@ -4,24 +4,36 @@
 
 #include <gflags/gflags.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <iostream>
 #include <memory>
+#include <numeric>
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "tangible/app/certificate_json.h"
 #include "tangible/app/program.h"
 #include "tangible/estimation/fit/fit_checkpoint.h"
 #include "tangible/estimation/results/fit_json.h"
+#include "tangible/estimation/results/fitted_scene.h"
+#include "tangible/estimation/results/prediction.h"
 #include "tangible/estimation/results/report.h"
 #include "tangible/scene/csv.h"
 #include "tangible/scene/json_reader.h"
 
 DEFINE_string(out, "", "file of the result (JSON); empty: none is written");
 DEFINE_string(report, "", "file of the report (HTML); empty: none is written");
+DEFINE_string(scene_out, "", "file of the fitted scene (JSON); empty: none is written");
+DEFINE_string(predictions, "",
+              "file of observed and predicted values and residuals at all times (CSV); empty: none "
+              "is written");
+DEFINE_double(predict_from, INFINITY,
+              "s: fit to the observations up to this time, and score the prediction of later ones");
 DEFINE_string(checkpoint, "",
               "file that keeps what is done as the fit goes on; where it is there already the fit "
               "goes on from it, and ends as if it had not been interrupted. It stays when the fit "
@@ -85,26 +97,90 @@ std::string Cell(double value, int digits = 6) {
   return text;
 }
 
-void PrintIteration(const std::vector<ParameterizedScene::Entry>& entries, int start, int iteration,
-                    const FitIteration& values) {
-  constexpr size_t kMostColumns = 6;
-  if (iteration == 0) {
-    if (start > 0) {
-      std::printf("start %d\n", start + 1);
+/// Prints the iterations of a fit as they are done, with all parameters: beside the cost, or below
+/// it where they are many.
+class IterationPrinter {
+ public:
+  explicit IterationPrinter(const std::vector<ParameterEntry>& entries) : entries_(entries) {}
+
+  void Print(int start, int iteration, const FitIteration& values) {
+    if (iteration == 0) {
+      if (start > 0) {
+        std::printf("start %d\n", start + 1);
+      }
+      PrintHeader();
     }
+    std::printf("%4d %13.6e %11.3e", iteration, values.cost, values.gradient_norm);
+    if (InOneLine()) {
+      for (const double value : values.parameters) {
+        std::printf(" %14.9g", value);
+      }
+    }
+    std::printf(" %9.3f\n", values.seconds);
+    if (!InOneLine()) {
+      PrintBelow(values.parameters);
+    }
+    last_ = values.parameters;
+    std::fflush(stdout);
+  }
+
+ private:
+  static constexpr size_t kMostColumns = 6;
+  // Of more parameters than this only those are printed that have changed the most.
+  static constexpr size_t kMostPrinted = 60;
+  static constexpr size_t kMostChanged = 24;
+  static constexpr size_t kLineWidth = 110;
+
+  bool InOneLine() const { return entries_.size() <= kMostColumns; }
+
+  void PrintHeader() const {
     std::printf("%4s %13s %11s", "iter", "cost", "gradient");
-    for (size_t k = 0; k < entries.size() && k < kMostColumns; ++k) {
-      std::printf(" %14.14s", entries[k].name.c_str());
+    if (InOneLine()) {
+      for (const ParameterEntry& entry : entries_) {
+        std::printf(" %14.14s", entry.name.c_str());
+      }
     }
-    std::printf("%s %9s\n", entries.size() > kMostColumns ? " ..." : "", "seconds");
+    std::printf(" %9s\n", "seconds");
   }
-  std::printf("%4d %13.6e %11.3e", iteration, values.cost, values.gradient_norm);
-  for (size_t k = 0; k < entries.size() && k < kMostColumns; ++k) {
-    std::printf(" %14.9g", values.parameters[k]);
+
+  /// "name value" of the parameters, as many a line as there is room for.
+  void PrintBelow(const std::vector<double>& parameters) const {
+    const std::vector<size_t> shown = Shown(parameters);
+    std::string line = "    ";
+    for (const size_t k : shown) {
+      const std::string item = entries_[k].name + " " + Cell(parameters[k], 9);
+      if (line.size() > 4 && line.size() + 2 + item.size() > kLineWidth) {
+        std::printf("%s\n", line.c_str());
+        line = "    ";
+      }
+      line += (line.size() > 4 ? ", " : "") + item;
+    }
+    if (shown.size() < entries_.size()) {
+      line += "; " + std::to_string(entries_.size() - shown.size()) + " others that changed less";
+    }
+    std::printf("%s\n", line.c_str());
   }
-  std::printf("%s %9.3f\n", entries.size() > kMostColumns ? " ..." : "", values.seconds);
-  std::fflush(stdout);
-}
+
+  std::vector<size_t> Shown(const std::vector<double>& parameters) const {
+    std::vector<size_t> all(entries_.size());
+    std::iota(all.begin(), all.end(), size_t{0});
+    if (all.size() <= kMostPrinted) {
+      return all;
+    }
+    const auto change = [&](size_t k) {
+      const double before = k < last_.size() ? last_[k] : entries_[k].initial;
+      return std::abs(ToInternal(entries_[k], parameters[k]) - ToInternal(entries_[k], before));
+    };
+    std::stable_sort(all.begin(), all.end(),
+                     [&](size_t a, size_t b) { return change(a) > change(b); });
+    all.resize(kMostChanged);
+    std::sort(all.begin(), all.end());
+    return all;
+  }
+
+  const std::vector<ParameterEntry>& entries_;
+  std::vector<double> last_;
+};
 
 /// "± 0.01 (95 %: 1 to 2" or empty.
 std::string IntervalText(double deviation, const ConfidenceInterval& interval) {
@@ -161,23 +237,52 @@ void PrintCheck(const std::vector<ParameterizedScene::Entry>& entries,
                 const DiscretisationCheck& check) {
   for (Eigen::Index k = 0; k < check.bias.size(); ++k) {
     std::cout << "bias of the step dt = " << Cell(check.dt) << " s on " << entries[k].name << ": "
-              << Cell(check.bias[k], 3)
-              << " to first order (difference to dt / 2: " << Cell(check.difference[k], 3)
+              << Cell(check.bias[k], 3) << " to " << OrderName(check.order)
+              << " order (difference to dt / 2: " << Cell(check.difference[k], 3)
               << ", extrapolated to " << Cell(check.extrapolated[k], 8) << ")\n";
   }
 }
 
+void PrintScore(const PredictionScore& score) {
+  if (!score.message.empty()) {
+    return;
+  }
+  std::cout << "prediction of " << score.all.count << " observations after " << Cell(score.from)
+            << " s: rms " << Cell(score.all.rms_in_sigma, 4) << " sigma";
+  if (std::isfinite(score.all.rms_length)) {
+    std::cout << ", " << Cell(score.all.rms_length, 4) << " m (largest "
+              << Cell(score.all.max_length, 4) << ")";
+  }
+  if (std::isfinite(score.all.rms_angle)) {
+    std::cout << ", " << Cell(score.all.rms_angle, 4) << " rad (largest "
+              << Cell(score.all.max_angle, 4) << ")";
+  }
+  std::cout << "\n";
+}
+
 int WriteFiles(const FitFile& fit, const RolloutResiduals& residuals, const FitResult& result,
-               const DiscretisationCheck* check) {
+               const DiscretisationCheck* check, const LaterObservations* later) {
+  const PredictionScore* const score = later == nullptr ? nullptr : &later->score;
   ResultWriter writer;
   writer.Write(FLAGS_out, [&] {
-    OrderedJson json = ResultToJson(residuals, result, check);
+    OrderedJson json = ResultToJson(residuals, result, check, score);
     json["certificate"] =
         result.estimate.size() > 0 ? ToJson(result.certificate) : OrderedJson(nullptr);
     return JsonText(json);
   });
   if (result.estimate.size() > 0) {
-    writer.Write(FLAGS_report, [&] { return FitReport(fit.path, residuals, result, check); });
+    writer.Write(FLAGS_report,
+                 [&] { return FitReport(fit.path, residuals, result, check, score); });
+    writer.Write(FLAGS_predictions,
+                 [&] { return PredictionCsv(residuals, result.residuals, later); });
+  }
+  if (result.estimate.size() > 0 && !FLAGS_scene_out.empty()) {
+    std::string text;
+    std::string error;
+    if (!FittedScene(fit.problem, result.estimate, FolderOf(FLAGS_scene_out), &text, &error)) {
+      return ReportError(fit.path + ": " + error);
+    }
+    writer.Write(FLAGS_scene_out, [&] { return text; });
   }
   return writer.error().empty() ? kExitDone : ReportError(writer.error());
 }
@@ -218,13 +323,20 @@ std::string Mismatch(const FitLog* log) {
          "machine; remove the file to begin anew";
 }
 
-int Run(const std::string& file) {
+/// What a fit needs before it begins.
+struct Prepared {
   FitFile fit;
+  std::vector<Observation> held_back;  ///< after --predict_from
+  std::vector<RolloutResiduals> residuals;
+};
+
+/// Reads the file and the flags; kExitDone, or the status after what is wrong has been printed.
+int Prepare(const std::string& file, Prepared* prepared) {
   std::string error;
-  if (!LoadFit(file, &fit, &error)) {
+  if (!LoadFit(file, &prepared->fit, &error)) {
     return ReportError(error);
   }
-  FitProblem& problem = fit.problem;
+  FitProblem& problem = prepared->fit.problem;
   problem.options.max_iterations = FLAGS_max_iterations;
   error = OverrideInitial(FLAGS_initial, &problem.parameters);
   if (!error.empty()) {
@@ -234,57 +346,27 @@ int Run(const std::string& file) {
   if (!error.empty()) {
     return ReportError("tangible-fit: --derivatives: " + error, kExitUsage);
   }
-  std::vector<RolloutResiduals> made;
-  if (!MakeResiduals(problem, file, &made, &error)) {
-    return ReportError(error);
-  }
-  error = OutputOverInput({"out", "report", "checkpoint"});
-  if (!error.empty()) {
-    return ReportError("tangible-fit: " + error, kExitUsage);
-  }
-  RolloutResiduals& residuals = made.front();
-  const auto& entries = residuals.scene().entries();
-  std::unique_ptr<FitCheckpoint> checkpoint;
-  error = OpenCheckpoint(problem, &checkpoint);
-  if (!error.empty()) {
-    return ReportError(error);
-  }
-  FitLog* const log = checkpoint ? &checkpoint->fit() : nullptr;
-  const FitResult result = Fit(
-      problem.options, &residuals,
-      [&](int start, int iteration, const FitIteration& values) {
-        PrintIteration(entries, start, iteration, values);
-      },
-      log);
-  error = Mismatch(log);
-  if (!error.empty()) {
-    return ReportError(error);
-  }
-  DiscretisationCheck check;
-  const bool checked = FLAGS_discretisation_check && result.status == FitStatus::kConverged;
-  if (result.estimate.size() > 0) {
-    PrintEstimates(entries, result);
-    if (result.certificate.verdict != "trustworthy") {
-      ReportError(file +
-                  ": warning: not trustworthy at the estimate: " + result.certificate.verdict);
+  if (std::isfinite(FLAGS_predict_from)) {
+    prepared->held_back = TakeLater(FLAGS_predict_from, &problem.observations);
+    if (prepared->held_back.empty() || problem.observations.empty()) {
+      return ReportError(
+          "tangible-fit: --predict_from: expected a time with observations up to it "
+          "and after it, got " +
+              Cell(FLAGS_predict_from, 10) + " with none " +
+              (prepared->held_back.empty() ? "after it" : "up to it"),
+          kExitUsage);
     }
   }
-  if (checked) {
-    FitLog* const half = checkpoint ? &checkpoint->half_step() : nullptr;
-    check = CheckDiscretisation(problem, result, half);
-    error = Mismatch(half);
-    if (!error.empty()) {
-      return ReportError(error);
-    }
-    PrintCheck(entries, check);
+  if (!MakeResiduals(problem, file, &prepared->residuals, &error)) {
+    return ReportError(error);
   }
-  if (checkpoint && !checkpoint->error().empty()) {
-    ReportError(checkpoint->error() + ": the fit went on without its checkpoint");
-  }
-  const int written = WriteFiles(fit, residuals, result, checked ? &check : nullptr);
-  if (written != kExitDone) {
-    return written;
-  }
+  error = OutputOverInput({"out", "report", "scene_out", "predictions", "checkpoint"});
+  return error.empty() ? kExitDone : ReportError("tangible-fit: " + error, kExitUsage);
+}
+
+/// The exit status of a fit whose results are written, after a line about what is wrong.
+int Conclude(const std::string& file, const FitResult& result, const DiscretisationCheck* check,
+             const LaterObservations* later, const FitCheckpoint* checkpoint) {
   if (result.status == FitStatus::kNoEffect) {
     return ReportError(file + ": /parameters/" + std::to_string(result.parameter) + ": " +
                        result.message);
@@ -292,32 +374,99 @@ int Run(const std::string& file) {
   if (result.status != FitStatus::kConverged) {
     return ReportError(file + ": " + NameOf(result.status) + ": " + result.message);
   }
-  if (checked && check.status != FitStatus::kConverged) {
-    return ReportError(file + ": the fit at dt / 2: " + NameOf(check.status) + ": " +
-                       check.message);
+  if (check != nullptr && check->status != FitStatus::kConverged) {
+    return ReportError(file + ": the fit at dt / 2: " + NameOf(check->status) + ": " +
+                       check->message);
+  }
+  if (later != nullptr && !later->score.message.empty()) {
+    return ReportError(file + ": the run after " + Cell(FLAGS_predict_from, 10) +
+                       " s fails: " + later->score.message);
   }
   // Said above: what was asked for is not there.
-  return checkpoint && !checkpoint->error().empty() ? kExitFailed : kExitDone;
+  return checkpoint != nullptr && !checkpoint->error().empty() ? kExitFailed : kExitDone;
+}
+
+int Run(const std::string& file) {
+  Prepared prepared;
+  const int status = Prepare(file, &prepared);
+  if (status != kExitDone) {
+    return status;
+  }
+  const FitProblem& problem = prepared.fit.problem;
+  RolloutResiduals& residuals = prepared.residuals.front();
+  const auto& entries = residuals.scene().entries();
+  std::unique_ptr<FitCheckpoint> checkpoint;
+  std::string error = OpenCheckpoint(problem, &checkpoint);
+  if (!error.empty()) {
+    return ReportError(error);
+  }
+  FitLog* const log = checkpoint ? &checkpoint->fit() : nullptr;
+  IterationPrinter printer(entries);
+  const FitResult result = Fit(
+      problem.options, &residuals,
+      [&](int start, int iteration, const FitIteration& values) {
+        printer.Print(start, iteration, values);
+      },
+      log);
+  error = Mismatch(log);
+  if (!error.empty()) {
+    return ReportError(error);
+  }
+  if (result.estimate.size() > 0) {
+    PrintEstimates(entries, result);
+    if (result.certificate.verdict != "trustworthy") {
+      ReportError(file +
+                  ": warning: not trustworthy at the estimate: " + result.certificate.verdict);
+    }
+  }
+  std::optional<DiscretisationCheck> check;
+  if (FLAGS_discretisation_check && result.status == FitStatus::kConverged) {
+    FitLog* const half = checkpoint ? &checkpoint->half_step() : nullptr;
+    check = CheckDiscretisation(problem, result, half);
+    error = Mismatch(half);
+    if (!error.empty()) {
+      return ReportError(error);
+    }
+    PrintCheck(entries, *check);
+  }
+  std::optional<LaterObservations> later;
+  if (!prepared.held_back.empty() && result.estimate.size() > 0) {
+    later =
+        PredictLater(problem, result.estimate, FLAGS_predict_from, std::move(prepared.held_back));
+    PrintScore(later->score);
+  }
+  if (checkpoint && !checkpoint->error().empty()) {
+    ReportError(checkpoint->error() + ": the fit went on without its checkpoint");
+  }
+  const DiscretisationCheck* const checked = check ? &*check : nullptr;
+  const LaterObservations* const predicted = later ? &*later : nullptr;
+  const int written = WriteFiles(prepared.fit, residuals, result, checked, predicted);
+  return written == kExitDone ? Conclude(file, result, checked, predicted, checkpoint.get())
+                              : written;
 }
 
 int Main(int argc, char** argv) {
   const CommandLine line = ParseCommandLine(
       argc, argv,
       {.name = "tangible-fit",
-       .synopsis = "FIT.json [--out=R.json] [--report=R.html] [--discretisation_check]\n"
-                   "                    [--checkpoint=C.json]",
+       .synopsis = "FIT.json [--out=R.json] [--report=R.html] [--scene_out=S.json]\n"
+                   "                    [--predictions=P.csv] [--predict_from=T]\n"
+                   "                    [--discretisation_check] [--checkpoint=C.json]",
        .description =
            "Identifies parameters of a scene from observed positions by nonlinear least squares.\n"
            "Prints each iteration and, for each parameter, the estimate, its standard deviation\n"
            "and 95 % interval.",
        .version = TANGIBLE_VERSION,
        .source_file = __FILE__,
-       .outputs = {"out", "report", "checkpoint"}});
+       .outputs = {"out", "report", "scene_out", "predictions", "checkpoint"}});
   if (line.exit_status) return *line.exit_status;
   if (FLAGS_max_iterations < 1) {
     return ReportError("tangible-fit: --max_iterations: expected a number >= 1, got " +
                            std::to_string(FLAGS_max_iterations),
                        kExitUsage);
+  }
+  if (std::isnan(FLAGS_predict_from)) {
+    return ReportError("tangible-fit: --predict_from: expected a time in s, got nan", kExitUsage);
   }
   return Run(line.positional[0]);
 }

@@ -93,7 +93,8 @@ bool DeriveAll(const PendulumJob& job, const FitProblem& problem, PendulumResult
   result->derived = Derive(functions, result->fit.estimate, covariance, &scene);
   const auto fine = Derive(functions, result->check.estimate_half_step, covariance, &scene);
   for (size_t i = 0; i < fine.size(); ++i) {
-    result->derived_bias.push_back(2.0 * (result->derived[i].estimate - fine[i].estimate));
+    result->derived_bias.push_back(BiasFactor(result->check.order) *
+                                   (result->derived[i].estimate - fine[i].estimate));
   }
   return true;
 }

@@ -1,12 +1,34 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tangible/estimation/fit/discretisation.h"
 
+#include <cmath>
+
 namespace tangible {
+
+int OrderOf(Integrator integrator) {
+  switch (integrator) {
+    case Integrator::kSemiImplicitEuler:
+      return 1;
+    case Integrator::kTrapezoidal:
+      return 2;
+    case Integrator::kRungeKutta4:
+      return 4;
+  }
+  return 1;
+}
+
+const char* OrderName(int order) { return order == 1 ? "first" : order == 2 ? "second" : "fourth"; }
+
+double BiasFactor(int order) {
+  const double ratio = std::exp2(order);
+  return ratio / (ratio - 1.0);
+}
 
 DiscretisationCheck CheckDiscretisation(const FitProblem& problem, const FitResult& result,
                                         FitLog* log) {
   DiscretisationCheck check;
   check.dt = problem.scene.simulation.dt;
+  check.order = OrderOf(IntegratorOf(problem.scene.simulation));
   FitProblem half = problem;
   half.scene.simulation.dt = 0.5 * check.dt;
   half.options.starts = 1;
@@ -31,7 +53,7 @@ DiscretisationCheck CheckDiscretisation(const FitProblem& problem, const FitResu
   if (fine.status == FitStatus::kConverged) {
     check.estimate_half_step = fine.estimate;
     check.difference = result.estimate - fine.estimate;
-    check.bias = 2.0 * check.difference;
+    check.bias = BiasFactor(check.order) * check.difference;
     check.extrapolated = result.estimate - check.bias;
   }
   return check;

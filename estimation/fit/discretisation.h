@@ -3,10 +3,11 @@
 //
 // What the step does to an estimate: the same fit at dt and at dt / 2.
 //
-//   p(dt) = p* + c dt + O(dt²)   ⇒   p(dt) − p(dt/2) = c dt / 2
-//   bias = p(dt) − p* ≈ 2 (p(dt) − p(dt/2))
+//   p(dt) = p* + c dt^k + O(dt^(k+1))   ⇒   p(dt) − p(dt/2) = c dt^k (1 − 2^−k)
+//   bias = p(dt) − p* ≈ F (p(dt) − p(dt/2)),   F = 2^k / (2^k − 1)
 //
-// for a first-order step, as semi-implicit Euler with impacts at step boundaries is.
+// with the order k of the step: 1 for semi-implicit Euler, 2 for trapezoidal, 4 for runge_kutta_4
+// (F = 2, 4/3, 16/15).
 
 #include <Eigen/Core>
 #include <string>
@@ -17,15 +18,22 @@ namespace tangible {
 
 struct DiscretisationCheck {
   double dt = 0.0;
+  int order = 1;                          ///< k, of the step
   FitStatus status = FitStatus::kFailed;  ///< of the fit at dt / 2
   std::string message;
   Eigen::VectorXd estimate_half_step;
   Eigen::VectorXd difference;    ///< p(dt) − p(dt/2)
-  Eigen::VectorXd bias;          ///< 2 difference: of p(dt), to first order
+  Eigen::VectorXd bias;          ///< F difference: of p(dt), to leading order
   Eigen::VectorXd extrapolated;  ///< p(dt) − bias
   long rollouts = 0;
   double seconds = 0.0;
 };
+
+int OrderOf(Integrator integrator);
+/// "first", "second", "fourth".
+const char* OrderName(int order);
+/// 2^k / (2^k − 1).
+double BiasFactor(int order);
 
 /// Fits the problem once more with half the step, from the estimate of `result`; `log` as in Fit.
 DiscretisationCheck CheckDiscretisation(const FitProblem& problem, const FitResult& result,

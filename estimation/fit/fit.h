@@ -48,6 +48,7 @@ struct FitProblem {
   std::vector<BodyPoint> points;
   std::vector<FitParameter> parameters;
   std::vector<Observation> observations;
+  std::vector<std::string> files;  ///< of the observations, as written
   FitOptions options;
 };
 

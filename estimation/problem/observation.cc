@@ -2,7 +2,9 @@
 #include "tangible/estimation/problem/observation.h"
 
 #include <array>
+#include <map>
 #include <sstream>
+#include <tuple>
 
 #include "tangible/scene/csv.h"
 #include "tangible/scene/json_reader.h"
@@ -170,18 +172,44 @@ const char* NameOf(Coordinate coordinate) {
   return "";
 }
 
+const char* UnitOf(Coordinate coordinate) { return coordinate == Coordinate::kAngle ? "rad" : "m"; }
+
 std::string TargetName(const Scene& scene, const std::vector<BodyPoint>& points,
                        const Observation& observation) {
   return observation.point >= 0 ? points[observation.point].name
                                 : scene.bodies[observation.body].name;
 }
 
+ObservationSeries IndexSeries(const std::vector<Observation>& observations) {
+  ObservationSeries series;
+  series.of.reserve(observations.size());
+  std::map<std::tuple<int, int, int, Coordinate>, int> known;
+  for (size_t i = 0; i < observations.size(); ++i) {
+    const Observation& observation = observations[i];
+    const std::tuple key(observation.file, observation.body, observation.point,
+                         observation.coordinate);
+    const auto [place, inserted] = known.try_emplace(key, series.size());
+    if (inserted) {
+      series.first.push_back(static_cast<int>(i));
+    }
+    series.of.push_back(place->second);
+  }
+  return series;
+}
+
 bool ReadObservations(const std::string& file, const Scene& scene,
                       const std::vector<BodyPoint>& points, const ObservationSigma& sigma,
-                      std::vector<Observation>* observations, std::string* error) {
+                      std::vector<Observation>* observations, std::string* error, int file_number) {
   CsvTable table;
-  return ReadCsv(file, {"time"}, AllowedColumns(), &table, error) &&
-         FromTable(table, scene, points, sigma, observations, error);
+  const size_t before = observations->size();
+  if (!ReadCsv(file, {"time"}, AllowedColumns(), &table, error) ||
+      !FromTable(table, scene, points, sigma, observations, error)) {
+    return false;
+  }
+  for (size_t i = before; i < observations->size(); ++i) {
+    (*observations)[i].file = file_number;
+  }
+  return true;
 }
 
 bool ParseObservations(const std::string& text, const std::string& file, const Scene& scene,

@@ -35,7 +35,18 @@ struct Observation {
   Coordinate coordinate = Coordinate::kX;
   double value = 0.0;  ///< m or rad
   double sigma = 1.0;  ///< m or rad: standard deviation of its noise
+  int file = 0;        ///< which of the files it is from
 };
+
+/// Observations of the same coordinate of the same body or point from the same file.
+struct ObservationSeries {
+  std::vector<int> of;     ///< of each observation its series, from 0 in the order of appearance
+  std::vector<int> first;  ///< of each series its first observation
+
+  int size() const { return static_cast<int>(first.size()); }
+};
+
+ObservationSeries IndexSeries(const std::vector<Observation>& observations);
 
 /// Standard deviations by coordinate, > 0.
 struct ObservationSigma {
@@ -48,12 +59,16 @@ struct ObservationSigma {
 std::string TargetName(const Scene& scene, const std::vector<BodyPoint>& points,
                        const Observation& observation);
 
-/// Reads a file and appends to `observations`. On failure sets one line "file: line 3: what,
-/// expected, got": a name that the scene or the points do not have, a time outside [0, duration],
-/// no measured coordinate at all.
+/// "m" or "rad".
+const char* UnitOf(Coordinate coordinate);
+
+/// Reads a file and appends to `observations` with the number of the file. On failure sets one line
+/// "file: line 3: what, expected, got": a name that the scene or the points do not have, a time
+/// outside [0, duration], no measured coordinate at all.
 bool ReadObservations(const std::string& file, const Scene& scene,
                       const std::vector<BodyPoint>& points, const ObservationSigma& sigma,
-                      std::vector<Observation>* observations, std::string* error);
+                      std::vector<Observation>* observations, std::string* error,
+                      int file_number = 0);
 
 /// The same from text.
 bool ParseObservations(const std::string& text, const std::string& file, const Scene& scene,

@@ -3,8 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
-#include <tuple>
 #include <utility>
 
 #include "tangible/estimation/problem/consistency.h"
@@ -72,14 +70,13 @@ RolloutResiduals::RolloutResiduals(ParameterizedScene scene, std::vector<Observa
 }
 
 std::vector<RowPlace> RolloutResiduals::Places(int /*block*/) const {
-  std::map<std::tuple<int, int, Coordinate>, int> series;
+  const ObservationSeries series = IndexSeries(observations_);
   std::vector<RowPlace> places;
   places.reserve(observations_.size());
-  for (const Observation& observation : observations_) {
-    const auto key = std::tuple(observation.body, observation.point, observation.coordinate);
-    const int number = series.emplace(key, static_cast<int>(series.size())).first->second;
-    places.push_back(
-        {number, observation.time, kRounding * std::abs(observation.value) / observation.sigma});
+  for (size_t i = 0; i < observations_.size(); ++i) {
+    const Observation& observation = observations_[i];
+    places.push_back({series.of[i], observation.time,
+                      kRounding * std::abs(observation.value) / observation.sigma});
   }
   return places;
 }

@@ -16,6 +16,7 @@
 
 #include <Eigen/Core>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "tangible/estimation/problem/evaluation_log.h"
@@ -38,6 +39,9 @@ class RolloutResiduals : public LeastSquaresProblem {
   const ParameterizedScene& scene() const { return scene_; }
   const std::vector<Observation>& observations() const { return observations_; }
   const SamplePlan& plan() const { return plan_; }
+  /// Names of the observations' files, by Observation::file; empty where there are none.
+  const std::vector<std::string>& files() const { return files_; }
+  void SetFiles(std::vector<std::string> files) { files_ = std::move(files); }
 
   const std::vector<ParameterEntry>& entries() const override { return scene_.entries(); }
   int num_shared() const override { return num_parameters(); }
@@ -105,6 +109,7 @@ class RolloutResiduals : public LeastSquaresProblem {
   ParameterizedScene scene_;
   std::vector<Observation> observations_;
   SamplePlan plan_;
+  std::vector<std::string> files_;
   std::vector<double> poses_;  ///< of the samples, 3 each
   RolloutTape tape_;
   std::string message_;

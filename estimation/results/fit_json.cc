@@ -267,9 +267,10 @@ class FitReader {
       }
       const size_t before = problem_->observations.size();
       if (!ReadObservations(JoinPath(folder_, file), problem_->scene, problem_->points, sigma,
-                            &problem_->observations, error_)) {
+                            &problem_->observations, error_, i)) {
         return false;
       }
+      problem_->files.push_back(file);
       for (size_t k = before; k < problem_->observations.size(); ++k) {
         const Observation& observation = problem_->observations[k];
         if (!(observation.sigma > 0.0)) {
@@ -323,6 +324,7 @@ bool MakeResiduals(const FitProblem& problem, const std::string& file,
     return false;
   }
   residuals->emplace_back(std::move(scene), problem.observations);
+  residuals->back().SetFiles(problem.files);
   return true;
 }
 

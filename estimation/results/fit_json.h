@@ -11,6 +11,7 @@
 
 #include "tangible/estimation/fit/discretisation.h"
 #include "tangible/estimation/fit/fit.h"
+#include "tangible/estimation/results/prediction.h"
 #include "tangible/scene/json_writer.h"
 
 namespace tangible {
@@ -33,8 +34,9 @@ bool ParseFit(const std::string& text, const std::string& file, FitFile* fit, st
 bool MakeResiduals(const FitProblem& problem, const std::string& file,
                    std::vector<RolloutResiduals>* residuals, std::string* error);
 
-/// The result as the program writes it; `check` may be null.
+/// The result as the program writes it; `check` and `prediction` may be null.
 OrderedJson ResultToJson(const RolloutResiduals& residuals, const FitResult& result,
-                         const DiscretisationCheck* check);
+                         const DiscretisationCheck* check,
+                         const PredictionScore* prediction = nullptr);
 
 }  // namespace tangible

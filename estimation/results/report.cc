@@ -3,44 +3,50 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
-#include <tuple>
 #include <vector>
 
+#include "tangible/estimation/results/residual_summary.h"
 #include "tangible/render/html.h"
 #include "tangible/render/plot.h"
 
 namespace tangible {
 namespace {
 
-// More coordinates than this are listed with their residuals but not drawn.
+// More coordinates, or parameters, than this are listed but not drawn.
 constexpr size_t kMostPlots = 24;
+// A plot is about twice as many pixels wide. Of more points only the extremes of each bucket are
+// drawn.
+constexpr int kBuckets = 360;
+// A table of the correlations of more parameters is too large to be read.
+constexpr size_t kMostCorrelations = 60;
 
-/// One coordinate of one body or point.
+/// One series of observations with what is fitted to it.
 struct Series {
   std::string label;
   const char* unit = "m";
   std::vector<double> time, observed, fitted, residual;
 };
 
+/// The first series, at most kMostPlots.
 std::vector<Series> CollectSeries(const RolloutResiduals& residuals, const FitResult& result) {
-  std::map<std::tuple<int, int, Coordinate>, std::vector<int>> groups;
+  const std::vector<Observation>& observations = residuals.observations();
+  const ObservationSeries index = IndexSeries(observations);
+  std::vector<std::vector<int>> members(std::min<size_t>(index.first.size(), kMostPlots));
   for (int i = 0; i < residuals.num_residuals(); ++i) {
-    const Observation& observation = residuals.observations()[i];
-    groups[{observation.body, observation.point, observation.coordinate}].push_back(i);
+    if (static_cast<size_t>(index.of[i]) < members.size()) {
+      members[index.of[i]].push_back(i);
+    }
   }
   std::vector<Series> all;
-  for (auto& [key, indices] : groups) {
-    std::stable_sort(indices.begin(), indices.end(), [&](int a, int b) {
-      return residuals.observations()[a].time < residuals.observations()[b].time;
-    });
-    const Observation& first = residuals.observations()[indices.front()];
+  for (std::vector<int>& indices : members) {
+    std::stable_sort(indices.begin(), indices.end(),
+                     [&](int a, int b) { return observations[a].time < observations[b].time; });
+    const Observation& first = observations[indices.front()];
     Series series;
-    series.label = TargetName(residuals.scene().scene(), residuals.scene().points(), first) + " " +
-                   NameOf(first.coordinate);
-    series.unit = first.coordinate == Coordinate::kAngle ? "rad" : "m";
+    series.label = SeriesLabel(residuals, first);
+    series.unit = UnitOf(first.coordinate);
     for (const int i : indices) {
-      const Observation& observation = residuals.observations()[i];
+      const Observation& observation = observations[i];
       const double residual = result.residuals[i];
       series.time.push_back(observation.time);
       series.observed.push_back(observation.value);
@@ -130,6 +136,13 @@ std::string Warnings(const Uncertainty& uncertainty) {
 
 std::string CorrelationTable(const RolloutResiduals& residuals, const FitResult& result) {
   const auto& entries = residuals.scene().entries();
+  if (entries.size() < 2) {
+    return "";
+  }
+  if (entries.size() > kMostCorrelations) {
+    return "<p>Correlations of more than " + std::to_string(kMostCorrelations) +
+           " parameters are left out; the result as JSON has the covariance.</p>\n";
+  }
   std::vector<std::string> header = {""};
   std::vector<std::vector<std::string>> rows;
   for (const auto& entry : entries) {
@@ -144,7 +157,7 @@ std::string CorrelationTable(const RolloutResiduals& residuals, const FitResult&
     }
     rows.push_back(row);
   }
-  return entries.size() < 2 ? "" : "<h2>Correlation</h2>\n" + HtmlTable(header, rows);
+  return "<h2>Correlation</h2>\n" + HtmlTable(header, rows);
 }
 
 std::string IterationPlots(const RolloutResiduals& residuals, const FitResult& result) {
@@ -163,7 +176,11 @@ std::string IterationPlots(const RolloutResiduals& residuals, const FitResult& r
                   {{"cost", index, cost, PlotStyle::kLineAndPoints, {}},
                    {"gradient norm", index, gradient, PlotStyle::kLineAndPoints, {}}});
   const auto& entries = residuals.scene().entries();
-  for (size_t k = 0; k < entries.size(); ++k) {
+  if (entries.size() > kMostPlots) {
+    html += "<p>The first " + std::to_string(kMostPlots) + " of " + std::to_string(entries.size()) +
+            " parameters are drawn.</p>\n";
+  }
+  for (size_t k = 0; k < std::min(entries.size(), kMostPlots); ++k) {
     std::vector<double> values;
     for (const FitIteration& iteration : result.iterations) {
       values.push_back(iteration.parameters[k]);
@@ -175,41 +192,115 @@ std::string IterationPlots(const RolloutResiduals& residuals, const FitResult& r
   return html;
 }
 
-std::string SeriesPlots(const std::vector<Series>& all) {
-  std::string html = "<h2>Observed and fitted</h2>\n";
+std::string ResidualTable(const ResidualSummary& summary) {
   std::vector<std::vector<std::string>> rows;
-  for (size_t i = 0; i < all.size(); ++i) {
-    const Series& series = all[i];
-    double sum = 0.0;
-    double largest = 0.0;
-    for (const double r : series.residual) {
-      sum += r * r;
-      largest = std::max(largest, std::abs(r));
-    }
-    rows.push_back({series.label, std::to_string(series.time.size()),
-                    CompactNumber(std::sqrt(sum / static_cast<double>(series.time.size())), 4),
-                    CompactNumber(largest, 4)});
-    if (i >= kMostPlots) {
-      continue;
-    }
-    html += PlotSvg({.title = series.label,
-                     .x_label = "time (s)",
-                     .y_label = std::string(series.unit),
-                     .height = 240},
-                    {{"observed", series.time, series.observed, PlotStyle::kPoints, {}},
-                     {"fitted", series.time, series.fitted, PlotStyle::kLine, {}}});
-    html += PlotSvg({.title = series.label + ": fitted − observed",
-                     .x_label = "time (s)",
-                     .y_label = "sigma",
-                     .height = 220},
-                    {{"", series.time, series.residual, PlotStyle::kPoints, {}}});
-  }
-  if (all.size() > kMostPlots) {
-    html += "<p>The first " + std::to_string(kMostPlots) + " of " + std::to_string(all.size()) +
-            " measured coordinates are drawn.</p>\n";
+  for (const SeriesSummary& series : summary.series) {
+    const std::string unit = std::string(" ") + UnitOf(series.coordinate);
+    rows.push_back({series.target, NameOf(series.coordinate), series.file,
+                    std::to_string(series.count), CompactNumber(series.rms_in_sigma, 4),
+                    CompactNumber(series.rms, 4) + unit, CompactNumber(series.mean, 3) + unit,
+                    CompactNumber(series.largest_in_sigma, 4),
+                    CompactNumber(series.largest_time, 6), std::to_string(series.outliers)});
   }
   return "<h2>Residuals</h2>\n" +
-         HtmlTable({"coordinate", "measured", "rms (sigma)", "largest (sigma)"}, rows) + html;
+         HtmlTable({"body or point", "coordinate", "file", "measured", "rms (sigma)", "rms",
+                    "mean of fitted − observed", "largest (sigma)", "at (s)", "outliers"},
+                   rows);
+}
+
+std::string OutlierTable(const ResidualSummary& summary) {
+  if (summary.num_outliers == 0) {
+    return "";
+  }
+  std::vector<std::vector<std::string>> rows;
+  for (const Outlier& outlier : summary.outliers) {
+    rows.push_back({summary.series[outlier.series].label, CompactNumber(outlier.time, 8),
+                    CompactNumber(outlier.residual, 4)});
+  }
+  return "<h2>Outliers</h2>\n<p>" + std::to_string(summary.num_outliers) +
+         " residuals are larger than five times what is usual in their series" +
+         (rows.size() < static_cast<size_t>(summary.num_outliers)
+              ? "; the largest " + std::to_string(rows.size())
+              : "") +
+         ":</p>\n" + HtmlTable({"coordinate", "time (s)", "fitted − observed (sigma)"}, rows);
+}
+
+std::string SeriesPlots(const std::vector<Series>& all, size_t num_series) {
+  std::string html = "<h2>Observed and fitted</h2>\n";
+  bool thinned = false;
+  const auto thin = [&thinned](const PlotSeries& series) {
+    PlotSeries thin = Thinned(series, kBuckets);
+    thinned = thinned || thin.x.size() < series.x.size();
+    return thin;
+  };
+  std::string plots;
+  for (const Series& series : all) {
+    plots += PlotSvg({.title = series.label,
+                      .x_label = "time (s)",
+                      .y_label = std::string(series.unit),
+                      .height = 240},
+                     {thin({"observed", series.time, series.observed, PlotStyle::kPoints, {}}),
+                      thin({"fitted", series.time, series.fitted, PlotStyle::kLine, {}})});
+    plots += PlotSvg({.title = series.label + ": fitted − observed",
+                      .x_label = "time (s)",
+                      .y_label = "sigma",
+                      .height = 220},
+                     {thin({"", series.time, series.residual, PlotStyle::kPoints, {}})});
+  }
+  if (all.size() < num_series) {
+    html += "<p>The first " + std::to_string(all.size()) + " of " + std::to_string(num_series) +
+            " measured coordinates are drawn.</p>\n";
+  }
+  if (thinned) {
+    html += "<p>The plots are thinned: of each of " + std::to_string(kBuckets) +
+            " equal parts of the time the smallest and the largest value are drawn.</p>\n";
+  }
+  return html + plots;
+}
+
+/// The error of what was not fitted, against how far ahead it was predicted.
+std::string PredictionPart(const PredictionScore* score) {
+  if (score == nullptr) {
+    return "";
+  }
+  std::string html =
+      "<h2>Prediction</h2>\n<p>Fitted to observations up to " + CompactNumber(score->from) + " s.";
+  if (!score->message.empty()) {
+    return html + " <strong>The run beyond fails:</strong> " + HtmlEscape(score->message) +
+           "</p>\n";
+  }
+  const auto text = [](double x) { return std::isfinite(x) ? CompactNumber(x, 4) : ""; };
+  html += " Beyond, " + std::to_string(score->all.count) +
+          " measured coordinates are predicted with an rms of " +
+          CompactNumber(score->all.rms_in_sigma, 4) + " sigma.</p>\n";
+  std::vector<std::vector<std::string>> rows;
+  std::vector<double> horizon, length, max_length, angle, max_angle;
+  for (const HorizonError& error : score->horizons) {
+    rows.push_back({CompactNumber(error.from, 4), CompactNumber(error.to, 4),
+                    std::to_string(error.count), text(error.rms_in_sigma), text(error.rms_length),
+                    text(error.max_length), text(error.rms_angle), text(error.max_angle)});
+    horizon.push_back(0.5 * (error.from + error.to));
+    length.push_back(error.rms_length);
+    max_length.push_back(error.max_length);
+    angle.push_back(error.rms_angle);
+    max_angle.push_back(error.max_angle);
+  }
+  const auto plot = [&](const char* unit, const std::vector<double>& rms,
+                        const std::vector<double>& max) {
+    const bool any = std::any_of(rms.begin(), rms.end(), [](double x) { return std::isfinite(x); });
+    return any ? PlotSvg({.title = "error of predictions",
+                          .x_label = "time after " + CompactNumber(score->from) + " s (s)",
+                          .y_label = unit,
+                          .y_scale = AxisScale::kLogarithmic,
+                          .height = 280},
+                         {{"rms", horizon, rms, PlotStyle::kLineAndPoints, {}},
+                          {"largest", horizon, max, PlotStyle::kLineAndPoints, {}}})
+               : std::string();
+  };
+  return html + plot("m", length, max_length) + plot("rad", angle, max_angle) +
+         HtmlTable({"from (s after)", "to", "measured", "rms (sigma)", "rms (m)", "largest (m)",
+                    "rms (rad)", "largest (rad)"},
+                   rows);
 }
 
 std::string StepTable(const RolloutResiduals& residuals, const DiscretisationCheck* check) {
@@ -224,10 +315,10 @@ std::string StepTable(const RolloutResiduals& residuals, const DiscretisationChe
                     CompactNumber(check->extrapolated[k], 8)});
   }
   return "<h2>Bias of the step</h2>\n<p>The same fit with half the step, dt / 2 = " +
-         CompactNumber(0.5 * check->dt) + " s.</p>\n" +
-         HtmlTable({"parameter", "estimate at dt / 2", "difference", "bias to first order",
-                    "extrapolated"},
-                   rows);
+         CompactNumber(0.5 * check->dt) + " s. The step is of " + OrderName(check->order) +
+         " order, so that the bias is " + CompactNumber(BiasFactor(check->order), 4) +
+         " times the difference.</p>\n" +
+         HtmlTable({"parameter", "estimate at dt / 2", "difference", "bias", "extrapolated"}, rows);
 }
 
 std::string StartTable(const FitResult& result) {
@@ -249,14 +340,19 @@ std::string StartTable(const FitResult& result) {
 }  // namespace
 
 std::string FitReport(const std::string& title, const RolloutResiduals& residuals,
-                      const FitResult& result, const DiscretisationCheck* check) {
+                      const FitResult& result, const DiscretisationCheck* check,
+                      const PredictionScore* prediction) {
   const std::string heading = "Fit: " + title;
-  return HtmlPage(heading, "<h1>" + HtmlEscape(heading) + "</h1>\n<h2>Estimates</h2>\n" +
-                               EstimateTable(residuals, result) + Warnings(result.uncertainty) +
-                               CombinationTable(result.uncertainty) + SummaryTable(result) +
-                               CorrelationTable(residuals, result) + StepTable(residuals, check) +
-                               StartTable(result) + IterationPlots(residuals, result) +
-                               SeriesPlots(CollectSeries(residuals, result)));
+  const ResidualSummary summary = SummarizeResiduals(residuals, result.residuals);
+  return HtmlPage(heading,
+                  "<h1>" + HtmlEscape(heading) + "</h1>\n<h2>Estimates</h2>\n" +
+                      EstimateTable(residuals, result) + Warnings(result.uncertainty) +
+                      CombinationTable(result.uncertainty) + SummaryTable(result) +
+                      CorrelationTable(residuals, result) + StepTable(residuals, check) +
+                      PredictionPart(prediction) + StartTable(result) +
+                      IterationPlots(residuals, result) + ResidualTable(summary) +
+                      OutlierTable(summary) +
+                      SeriesPlots(CollectSeries(residuals, result), summary.series.size()));
 }
 
 }  // namespace tangible

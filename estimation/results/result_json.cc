@@ -5,6 +5,7 @@
 #include <map>
 
 #include "tangible/estimation/results/fit_json.h"
+#include "tangible/estimation/results/residual_summary.h"
 
 namespace tangible {
 namespace {
@@ -136,6 +137,59 @@ OrderedJson RmsByCoordinate(const RolloutResiduals& residuals, const FitResult& 
   return json;
 }
 
+OrderedJson SeriesToJson(const ResidualSummary& summary) {
+  OrderedJson all = OrderedJson::array();
+  for (const SeriesSummary& series : summary.series) {
+    all.push_back({{series.is_point ? "point" : "body", series.target},
+                   {"coordinate", NameOf(series.coordinate)},
+                   {"file", series.file.empty() ? OrderedJson(nullptr) : OrderedJson(series.file)},
+                   {"count", series.count},
+                   {"rms", Number(series.rms)},
+                   {"mean", Number(series.mean)},
+                   {"rms_in_sigma", Number(series.rms_in_sigma)},
+                   {"largest_in_sigma", Number(series.largest_in_sigma)},
+                   {"largest_time", Number(series.largest_time)},
+                   {"outliers", series.outliers}});
+  }
+  return all;
+}
+
+OrderedJson OutliersToJson(const ResidualSummary& summary) {
+  OrderedJson largest = OrderedJson::array();
+  for (const Outlier& outlier : summary.outliers) {
+    const SeriesSummary& series = summary.series[outlier.series];
+    largest.push_back(
+        {{"time", Number(outlier.time)},
+         {series.is_point ? "point" : "body", series.target},
+         {"coordinate", NameOf(series.coordinate)},
+         {"file", series.file.empty() ? OrderedJson(nullptr) : OrderedJson(series.file)},
+         {"residual_in_sigma", Number(outlier.residual)}});
+  }
+  return {{"count", summary.num_outliers}, {"largest", largest}};
+}
+
+OrderedJson HorizonToJson(const HorizonError& error) {
+  return {{"from", error.from},
+          {"to", error.to},
+          {"count", error.count},
+          {"rms_in_sigma", Number(error.rms_in_sigma)},
+          {"rms_length", Number(error.rms_length)},
+          {"max_length", Number(error.max_length)},
+          {"rms_angle", Number(error.rms_angle)},
+          {"max_angle", Number(error.max_angle)}};
+}
+
+OrderedJson PredictionToJson(const PredictionScore& score) {
+  OrderedJson horizons = OrderedJson::array();
+  for (const HorizonError& error : score.horizons) {
+    horizons.push_back(HorizonToJson(error));
+  }
+  return {{"from", score.from},
+          {"message", score.message},
+          {"all", HorizonToJson(score.all)},
+          {"horizons", horizons}};
+}
+
 OrderedJson CheckToJson(const RolloutResiduals& residuals, const DiscretisationCheck& check) {
   OrderedJson parameters = OrderedJson::array();
   for (Eigen::Index k = 0; k < check.bias.size(); ++k) {
@@ -145,19 +199,18 @@ OrderedJson CheckToJson(const RolloutResiduals& residuals, const DiscretisationC
                           {"bias", Number(check.bias[k])},
                           {"extrapolated", Number(check.extrapolated[k])}});
   }
-  return {{"dt", check.dt},
-          {"status", NameOf(check.status)},
-          {"parameters", parameters},
-          {"rollouts", check.rollouts},
-          {"seconds", check.seconds}};
+  return {
+      {"dt", check.dt},           {"order", check.order},       {"status", NameOf(check.status)},
+      {"parameters", parameters}, {"rollouts", check.rollouts}, {"seconds", check.seconds}};
 }
 
 }  // namespace
 
 OrderedJson ResultToJson(const RolloutResiduals& residuals, const FitResult& result,
-                         const DiscretisationCheck* check) {
+                         const DiscretisationCheck* check, const PredictionScore* prediction) {
   const Uncertainty& uncertainty = result.uncertainty;
   const bool estimated = result.estimate.size() > 0;
+  const ResidualSummary summary = SummarizeResiduals(residuals, result.residuals);
   const auto when = [estimated](double x) { return estimated ? Number(x) : OrderedJson(nullptr); };
   OrderedJson json = {{"status", NameOf(result.status)},
                       {"parameters", ParametersToJson(residuals, result)},
@@ -169,6 +222,8 @@ OrderedJson ResultToJson(const RolloutResiduals& residuals, const FitResult& res
                       {"final_cost", when(result.final_cost)},
                       {"residual_rms", when(uncertainty.residual_rms)},
                       {"residual_rms_by_coordinate", RmsByCoordinate(residuals, result)},
+                      {"residuals_by_series", SeriesToJson(summary)},
+                      {"outliers", OutliersToJson(summary)},
                       {"reduced_chi_square", when(uncertainty.reduced_chi_square)},
                       {"residuals", residuals.num_residuals()},
                       {"condition", when(uncertainty.condition)},
@@ -180,6 +235,9 @@ OrderedJson ResultToJson(const RolloutResiduals& residuals, const FitResult& res
                       {"message", result.message}};
   if (check != nullptr) {
     json["discretisation"] = CheckToJson(residuals, *check);
+  }
+  if (prediction != nullptr) {
+    json["prediction"] = PredictionToJson(*prediction);
   }
   return json;
 }

@@ -286,6 +286,65 @@ Legend MakeLegend(const PlotOptions& options, const std::vector<PlotSeries>& ser
 
 }  // namespace
 
+PlotSeries Thinned(const PlotSeries& series, int buckets) {
+  const std::size_t size = std::min(series.x.size(), series.y.size());
+  if (size <= 2 * static_cast<std::size_t>(buckets) + 2) {
+    return series;
+  }
+  const auto finite = [&](std::size_t i) {
+    return std::isfinite(series.x[i]) && std::isfinite(series.y[i]);
+  };
+  double low = HUGE_VAL;
+  double high = -HUGE_VAL;
+  for (std::size_t i = 0; i < size; ++i) {
+    if (finite(i)) {
+      low = std::min(low, series.x[i]);
+      high = std::max(high, series.x[i]);
+    }
+  }
+  struct Bucket {
+    std::size_t lowest = 0, highest = 0;
+    bool any = false;
+  };
+  std::vector<Bucket> all(static_cast<std::size_t>(buckets));
+  std::vector<std::size_t> kept = {0, size - 1};
+  for (std::size_t i = 0; i < size; ++i) {
+    if (!finite(i)) {
+      continue;
+    }
+    const double part = high > low ? (series.x[i] - low) / (high - low) : 0.0;
+    Bucket& bucket =
+        all[static_cast<std::size_t>(std::min(buckets - 1, static_cast<int>(part * buckets)))];
+    if (!bucket.any || series.y[i] < series.y[bucket.lowest]) {
+      bucket.lowest = i;
+    }
+    if (!bucket.any || series.y[i] > series.y[bucket.highest]) {
+      bucket.highest = i;
+    }
+    bucket.any = true;
+  }
+  for (const Bucket& bucket : all) {
+    if (bucket.any) {
+      kept.push_back(bucket.lowest);
+      kept.push_back(bucket.highest);
+    }
+  }
+  std::sort(kept.begin(), kept.end());
+  kept.erase(std::unique(kept.begin(), kept.end()), kept.end());
+  PlotSeries thin{series.label, {}, {}, series.style, {}};
+  for (const std::size_t i : kept) {
+    if (!finite(i)) {
+      continue;
+    }
+    thin.x.push_back(series.x[i]);
+    thin.y.push_back(series.y[i]);
+    if (i < series.error.size()) {
+      thin.error.push_back(series.error[i]);
+    }
+  }
+  return thin;
+}
+
 std::string PlotSvg(const PlotOptions& options, const std::vector<PlotSeries>& series) {
   const double left = 74.0;
   double top = options.title.empty() ? 14.0 : 32.0;

@@ -38,6 +38,12 @@ struct PlotOptions {
 /// than three at 1, 2 and 5 times them. Wants low < high, and low > 0 if logarithmic.
 std::vector<double> PlotTicks(double low, double high, AxisScale scale, int count);
 
+/// A series of so many points that they would hide each other: the range of x is cut into `buckets`
+/// > 0 of equal width, and of each the smallest and the largest y are kept, and the first and last
+/// point of all, in the order of the series. Extremes stay visible. A series of at most 2 buckets
+/// + 2 points is returned as it is. Points that are not finite are left out of one that is thinned.
+PlotSeries Thinned(const PlotSeries& series, int buckets);
+
 /// The plot as one <svg> element. CHECKs nothing: vectors of different lengths are read to the
 /// shortest.
 std::string PlotSvg(const PlotOptions& options, const std::vector<PlotSeries>& series);

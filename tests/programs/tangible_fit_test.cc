@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
@@ -84,6 +85,67 @@ TEST_F(TangibleFitTest, FitsAndWritesResultAndReport) {
   EXPECT_NE(report.find("ball y"), std::string::npos);
   for (const char* other : {"src=", "<link", "href=\"http"}) {
     EXPECT_EQ(report.find(other), std::string::npos) << "self-contained: " << other;
+  }
+}
+
+TEST_F(TangibleFitTest, WritesTheFittedSceneAndItsPredictions) {
+  const ProgramRun run =
+      Fit(Problem(), "--predict_from=0.3 --out='" + Path("r.json") + "' --report='" +
+                         Path("r.html") + "' --scene_out='" + Path("s.json") + "' --predictions='" +
+                         Path("p.csv") + "'");
+  ASSERT_EQ(run.exit_status, 0) << run.error;
+  EXPECT_NE(run.out.find("prediction of 4 observations after 0.3 s: rms "), std::string::npos)
+      << run.out;
+  const json result = json::parse(Read(Path("r.json")));
+  EXPECT_EQ(result["residuals"], 7);  // up to 0.3 s, one of x is missing
+  ASSERT_EQ(result["residuals_by_series"].size(), 2u);
+  EXPECT_EQ(result["residuals_by_series"][0]["body"], "ball");
+  EXPECT_EQ(result["residuals_by_series"][0]["coordinate"], "x");
+  EXPECT_EQ(result["residuals_by_series"][0]["file"], "o.csv");
+  EXPECT_EQ(result["residuals_by_series"][0]["count"], 3);
+  EXPECT_EQ(result["outliers"]["count"], 0);
+  EXPECT_EQ(result["prediction"]["from"], 0.3);
+  EXPECT_EQ(result["prediction"]["all"]["count"], 4);
+  EXPECT_LT(result["prediction"]["all"]["max_length"].get<double>(), 1e-6);
+  EXPECT_EQ(result["prediction"]["horizons"].size(), 2u);
+  EXPECT_NE(Read(Path("r.html")).find("error of predictions"), std::string::npos);
+  // The fitted scene is a scene: it runs, to the same end.
+  const json scene = json::parse(Read(Path("s.json")));
+  EXPECT_EQ(scene["gravity"][1].get<double>(), -result["parameters"][0]["estimate"].get<double>());
+  EXPECT_EQ(scene["simulation"]["duration"], 0.5);
+  const ProgramRun again =
+      Run("tangible-simulate", "'" + Path("s.json") + "' --out='" + Path("t.csv") + "'");
+  EXPECT_EQ(again.exit_status, 0) << again.error;
+  const std::string csv = Read(Path("p.csv"));
+  EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'), 1 + 11) << csv;
+  EXPECT_NE(csv.find("0.5,ball,y,o.csv,prediction,0.01,"), std::string::npos) << csv;
+
+  ExpectOneLine(Fit(Problem(), "--predict_from=0.5"), 2, "none after it");
+  ExpectOneLine(Fit(Problem(), "--predict_from=-1"), 2, "none up to it");
+  ExpectOneLine(Fit(Problem(), "--predict_from=nan"), 2, "--predict_from");
+  ExpectOneLine(Fit(Problem(), "--scene_out='" + Path("o.csv") + "'"), 2, "--scene_out");
+  ExpectOneLine(Fit(Problem(), "--predictions='" + Path("none/p.csv") + "'"), 1, "none/p.csv");
+}
+
+// Each of ten links' dampings, where six columns have room beside the cost.
+TEST_F(TangibleFitTest, AllParametersAreVisibleWhileItRuns) {
+  json scene = {{"bodies", json::array()}, {"simulation", {{"dt", 0.01}, {"duration", 0.1}}}};
+  json fit = Problem({{"parameters", json::array()}});
+  std::string observations = "time,body,x,y\n";
+  for (int i = 0; i < 10; ++i) {
+    const std::string name = "ball" + std::to_string(i);
+    scene["bodies"].push_back(
+        {{"name", name}, {"mass", 1}, {"inertia", 1}, {"position", {i, 0}}, {"velocity", {1, 0}}});
+    fit["parameters"].push_back("bodies/" + name + "/velocity/x");
+    observations += "0.1," + name + "," + json(i + 0.11).dump() + ",\n";
+  }
+  Write("scene.json", scene.dump());
+  Write("o.csv", observations);
+  const ProgramRun run = Fit(fit);
+  ASSERT_EQ(run.exit_status, 0) << run.error;
+  for (int i = 0; i < 10; ++i) {
+    const std::string shown = "bodies/ball" + std::to_string(i) + "/velocity/x 1.1";
+    EXPECT_NE(run.out.find(shown), std::string::npos) << shown << "\n" << run.out;
   }
 }
 

@@ -113,5 +113,43 @@ TEST(PlotSvg, TextIsEscaped) {
   EXPECT_NE(svg.find("&quot;l&quot;"), std::string::npos);
 }
 
+TEST(Thinned, ThinnedSeriesKeepTheirExtremes) {
+  PlotSeries series{"s", {}, {}, PlotStyle::kPoints, {}};
+  for (int i = 0; i < 10000; ++i) {
+    series.x.push_back(0.01 * i);
+    series.y.push_back(std::sin(0.01 * i));
+  }
+  series.y[4321] = 50.0;
+  series.y[4322] = -60.0;
+  series.y[7000] = NAN;
+  const PlotSeries thin = Thinned(series, 100);
+  EXPECT_EQ(thin.label, "s");
+  EXPECT_EQ(thin.style, PlotStyle::kPoints);
+  EXPECT_LE(thin.x.size(), 202u);
+  EXPECT_GT(thin.x.size(), 190u);
+  EXPECT_EQ(thin.x.front(), 0.0);
+  EXPECT_EQ(thin.x.back(), series.x.back());
+  EXPECT_TRUE(std::is_sorted(thin.x.begin(), thin.x.end()));
+  EXPECT_EQ(*std::max_element(thin.y.begin(), thin.y.end()), 50.0);
+  EXPECT_EQ(*std::min_element(thin.y.begin(), thin.y.end()), -60.0);
+  // In each hundredth of the range of x the extremes are those of all points.
+  double lowest = HUGE_VAL;
+  for (size_t i = 0; i < series.x.size() && series.x[i] < 0.99; ++i) {
+    lowest = std::min(lowest, series.y[i]);
+  }
+  EXPECT_EQ(thin.y[0], lowest);
+}
+
+TEST(Thinned, FewPointsAreNotThinned) {
+  const PlotSeries series{"s", {3.0, 1.0, 2.0}, {1.0, 2.0, 3.0}, PlotStyle::kLine, {0.1, 0.2, 0.3}};
+  const PlotSeries thin = Thinned(series, 2);
+  EXPECT_EQ(thin.x, series.x);
+  EXPECT_EQ(thin.error, series.error);
+  // All at one place.
+  const PlotSeries same{
+      "", std::vector<double>(10, 1.0), {5, 4, 3, 2, 9, 8, 7, 6, 5, 5}, PlotStyle::kLine, {}};
+  EXPECT_EQ(Thinned(same, 2).y, (std::vector<double>{5, 2, 9, 5}));
+}
+
 }  // namespace
 }  // namespace tangible

@@ -47,6 +47,33 @@ TEST(DiscretisationTest, HalvingTheStepTellsTheBias) {
   EXPECT_LT(std::abs(check.extrapolated[0] + 9.81), 2.0 * 0.0125 * error);
 }
 
+// By events the ball's step is of fourth order; with a step of a second of its swing at a pin the
+// bias is large enough to be seen.
+TEST(DiscretisationTest, RungeKuttaIsOfFourthOrder) {
+  EXPECT_EQ(OrderOf(Integrator::kSemiImplicitEuler), 1);
+  EXPECT_EQ(OrderOf(Integrator::kTrapezoidal), 2);
+  EXPECT_EQ(BiasFactor(1), 2.0);
+  EXPECT_DOUBLE_EQ(BiasFactor(2), 4.0 / 3.0);
+  EXPECT_DOUBLE_EQ(BiasFactor(4), 16.0 / 15.0);
+  FitProblem problem;
+  problem.scene = MakeScene(kPendulum);
+  problem.scene.simulation.stepping = Stepping::kEvent;
+  problem.scene.simulation.dt = 1e-3;
+  problem.observations = Observe(problem.scene, 100, 0.0, 1);
+  problem.parameters = {Parameter("gravity/y", -9.0)};
+  problem.scene.simulation.dt = 0.1;
+  const FitResult result = FitOf(problem);
+  ASSERT_EQ(result.status, FitStatus::kConverged) << result.message;
+  const DiscretisationCheck check = CheckDiscretisation(problem, result);
+  ASSERT_EQ(check.status, FitStatus::kConverged) << check.message;
+  EXPECT_EQ(check.order, 4);
+  EXPECT_DOUBLE_EQ(check.bias[0], 16.0 / 15.0 * check.difference[0]);
+  const double error = result.estimate[0] + 9.81;
+  ASSERT_GT(std::abs(error), 1e-7);
+  // What is left is of the next order; doubled, the difference would be off by nearly the error.
+  EXPECT_LT(std::abs(check.extrapolated[0] + 9.81), 0.2 * std::abs(error));
+}
+
 TEST(DiscretisationTest, AProblemThatCannotBeSetUpIsSaid) {
   FitProblem problem = FreeFall();
   FitResult result;

@@ -48,5 +48,43 @@ TEST(ReportTest, PartsThatDoNotApplyAreLeftOut) {
   }
 }
 
+TEST(ReportTest, ManyObservationsAreThinned) {
+  constexpr int kMany = 100000;
+  std::vector<Observation> observations;
+  FitResult result = HandMadeResult();
+  result.residuals.resize(kMany);
+  for (int i = 0; i < kMany; ++i) {
+    observations.push_back({i / double{kMany}, 0, -1, Coordinate::kX, std::sin(i), 0.1});
+    result.residuals[i] = std::cos(i);
+  }
+  result.residuals[777] = -123.25;
+  const RolloutResiduals residuals = MakeResiduals(
+      MakeScene(kFallingBall), {},
+      {Parameter("gravity/y", -9.0), Parameter("bodies/ball/linear_damping", 0.1)}, observations);
+  const std::string html = FitReport("t", residuals, result, nullptr);
+  EXPECT_LT(html.size(), 300000u);
+  for (const char* part : {"plots are thinned", "100000", "Outliers", "-123.2", "0.00777"}) {
+    EXPECT_TRUE(Has(html, part)) << part;
+  }
+  EXPECT_FALSE(Has(FitReport("t", HandMadeResiduals(), HandMadeResult(), nullptr), "thinned"));
+}
+
+TEST(ReportTest, TheErrorOfPredictionsIsDrawnByHorizon) {
+  PredictionScore score;
+  score.from = 2.5;
+  score.all = {0.0, 1.0, 6, 1.5, 0.01, 0.02, NAN, NAN};
+  score.horizons = {{0.0, 0.5, 3, 1.0, 0.005, 0.0125, NAN, NAN},
+                    {0.5, 1.0, 3, 2.0, 0.015, 0.02, NAN, NAN}};
+  std::string html = FitReport("t", HandMadeResiduals(), HandMadeResult(), nullptr, &score);
+  for (const char* part : {"<h2>Prediction", "up to 2.5 s", "error of predictions", "0.0125"}) {
+    EXPECT_TRUE(Has(html, part)) << part;
+  }
+  EXPECT_FALSE(Has(html, ">rad<"));
+  score.message = "the ball <diverges>";
+  html = FitReport("t", HandMadeResiduals(), HandMadeResult(), nullptr, &score);
+  EXPECT_TRUE(Has(html, "the ball &lt;diverges&gt;"));
+  EXPECT_FALSE(Has(html, "error of predictions"));
+}
+
 }  // namespace
 }  // namespace tangible

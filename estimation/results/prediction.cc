@@ -1,0 +1,168 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/estimation/results/prediction.h"
+
+#include <algorithm>
+#include <charconv>
+#include <numeric>
+#include <utility>
+
+#include "tangible/estimation/results/residual_summary.h"
+
+namespace tangible {
+namespace {
+
+constexpr int kHorizons = 20;
+// Of a bin's width: a time this near to its end by rounding is in it.
+constexpr double kOnEdge = 1e-9;
+
+/// Root mean squares and largest errors, one observation after the other.
+class ErrorSum {
+ public:
+  void Add(const Observation& observation, double residual) {
+    const double error = std::abs(residual * observation.sigma);
+    sum_ += residual * residual;
+    ++count_;
+    PerUnit& unit = observation.coordinate == Coordinate::kAngle ? angle_ : length_;
+    unit.sum += error * error;
+    unit.max = std::max(unit.max, error);
+    ++unit.count;
+  }
+
+  HorizonError Result(double from, double to) const {
+    const auto rms = [](double sum, long count) {
+      return count > 0 ? std::sqrt(sum / static_cast<double>(count)) : NAN;
+    };
+    return {from,
+            to,
+            count_,
+            rms(sum_, count_),
+            rms(length_.sum, length_.count),
+            length_.count > 0 ? length_.max : NAN,
+            rms(angle_.sum, angle_.count),
+            angle_.count > 0 ? angle_.max : NAN};
+  }
+
+ private:
+  struct PerUnit {
+    double sum = 0.0;
+    double max = 0.0;
+    long count = 0;
+  };
+  double sum_ = 0.0;
+  long count_ = 0;
+  PerUnit length_, angle_;
+};
+
+/// A name as a cell: tables have no quotes.
+std::string CsvCell(std::string name) {
+  std::replace_if(
+      name.begin(), name.end(), [](char c) { return c == ',' || c == '\n'; }, '_');
+  return name;
+}
+
+void AppendCell(double x, std::string* row) {
+  char text[32];
+  const auto end = std::to_chars(text, text + sizeof text, x);
+  row->push_back(',');
+  row->append(text, end.ptr);
+}
+
+}  // namespace
+
+std::vector<Observation> TakeLater(double from, std::vector<Observation>* observations) {
+  const auto later = std::stable_partition(observations->begin(), observations->end(),
+                                           [from](const Observation& o) { return o.time <= from; });
+  std::vector<Observation> taken(later, observations->end());
+  observations->erase(later, observations->end());
+  return taken;
+}
+
+PredictionScore ScorePrediction(double from, const std::vector<Observation>& observations,
+                                const Eigen::VectorXd& residuals) {
+  PredictionScore score;
+  score.from = from;
+  double last = from;
+  for (const Observation& observation : observations) {
+    last = std::max(last, observation.time);
+  }
+  const double width = (last - from) / kHorizons;
+  ErrorSum all;
+  std::vector<ErrorSum> bins(kHorizons);
+  for (size_t i = 0; i < observations.size(); ++i) {
+    const double residual = residuals[static_cast<Eigen::Index>(i)];
+    const double part = (observations[i].time - from) / (last - from);
+    const int bin =
+        std::clamp(static_cast<int>(std::ceil(part * kHorizons - kOnEdge)) - 1, 0, kHorizons - 1);
+    all.Add(observations[i], residual);
+    bins[bin].Add(observations[i], residual);
+  }
+  score.all = all.Result(0.0, last - from);
+  for (int bin = 0; bin < kHorizons; ++bin) {
+    const HorizonError error =
+        bins[bin].Result(bin * width, bin + 1 == kHorizons ? last - from : (bin + 1) * width);
+    if (error.count > 0) {
+      score.horizons.push_back(error);
+    }
+  }
+  return score;
+}
+
+LaterObservations PredictLater(const FitProblem& problem, const Eigen::VectorXd& estimate,
+                               double from, std::vector<Observation> later) {
+  LaterObservations result;
+  result.observations = std::move(later);
+  result.score.from = from;
+  ParameterizedScene scene;
+  ParameterError fault;
+  if (!scene.Create(problem.scene, problem.points, problem.parameters, &fault)) {
+    result.score.message = fault.what;
+    return result;
+  }
+  RolloutResiduals run(std::move(scene), result.observations);
+  if (!run.Evaluate(estimate, problem.options.derivatives, &result.residuals, nullptr)) {
+    result.score.message = run.message();
+    result.residuals.resize(0);
+    return result;
+  }
+  result.score = ScorePrediction(from, result.observations, result.residuals);
+  return result;
+}
+
+std::string PredictionCsv(const RolloutResiduals& residuals, const Eigen::VectorXd& values,
+                          const LaterObservations* later) {
+  const std::vector<Observation>& fitted = residuals.observations();
+  const size_t num_later = later == nullptr ? 0 : later->observations.size();
+  const auto observation = [&](size_t i) -> const Observation& {
+    return i < fitted.size() ? fitted[i] : later->observations[i - fitted.size()];
+  };
+  std::vector<size_t> order(fitted.size() + num_later);
+  std::iota(order.begin(), order.end(), size_t{0});
+  std::stable_sort(order.begin(), order.end(),
+                   [&](size_t a, size_t b) { return observation(a).time < observation(b).time; });
+  std::string csv =
+      "time,target,coordinate,file,used,sigma,observed,predicted,residual,residual_in_sigma\n";
+  for (const size_t i : order) {
+    const Observation& o = observation(i);
+    const bool is_later = i >= fitted.size();
+    char time[32];
+    csv.append(time, std::to_chars(time, time + sizeof time, o.time).ptr);
+    csv += "," + TargetName(residuals.scene().scene(), residuals.scene().points(), o) + "," +
+           NameOf(o.coordinate) + "," + CsvCell(FileOf(residuals, o)) +
+           (is_later ? ",prediction" : ",fit");
+    AppendCell(o.sigma, &csv);
+    AppendCell(o.value, &csv);
+    if (is_later && later->residuals.size() == 0) {
+      csv += ",,,\n";
+      continue;
+    }
+    const double r = is_later ? later->residuals[static_cast<Eigen::Index>(i - fitted.size())]
+                              : values[static_cast<Eigen::Index>(i)];
+    AppendCell(o.value + r * o.sigma, &csv);
+    AppendCell(r * o.sigma, &csv);
+    AppendCell(r, &csv);
+    csv.push_back('\n');
+  }
+  return csv;
+}
+
+}  // namespace tangible

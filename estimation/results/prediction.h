@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// What the fitted scene predicts: a table of all observations beside their predictions, and the
+// error of predictions beyond the time up to which the scene was fitted.
+//
+// The error of the observations from T on is stated by horizon, t − T, in bins of equal width.
+// Every observation at a horizon in (0, t_last − T] is in one bin, and none is left out.
+
+#include <Eigen/Core>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "tangible/estimation/fit/fit.h"
+
+namespace tangible {
+
+/// Errors of one unit within a range of horizons.
+struct HorizonError {
+  double from = 0.0;  ///< s after T, excluded
+  double to = 0.0;    ///< s after T, included
+  long count = 0;
+  double rms_in_sigma = NAN;
+  double rms_length = NAN;  ///< m, of observed positions; NaN: none in this range
+  double max_length = NAN;
+  double rms_angle = NAN;  ///< rad
+  double max_angle = NAN;
+};
+
+/// How well a scene that was fitted up to a time predicts what follows.
+struct PredictionScore {
+  double from = 0.0;    ///< T, s
+  std::string message;  ///< why the run beyond T failed, or empty
+  HorizonError all;     ///< over all horizons
+  std::vector<HorizonError> horizons;
+};
+
+/// Observations that come after the fit's, and how well the fitted scene predicts them.
+struct LaterObservations {
+  std::vector<Observation> observations;
+  Eigen::VectorXd residuals;  ///< in multiples of sigma; empty where the run to them failed
+  PredictionScore score;
+};
+
+/// Moves the observations after `from` out of `observations`; the order of all stays.
+std::vector<Observation> TakeLater(double from, std::vector<Observation>* observations);
+
+/// Runs the problem's scene at `estimate` until the last of `later`, and scores it there.
+LaterObservations PredictLater(const FitProblem& problem, const Eigen::VectorXd& estimate,
+                               double from, std::vector<Observation> later);
+
+/// The score of residuals (in multiples of sigma) of observations after `from`.
+PredictionScore ScorePrediction(double from, const std::vector<Observation>& observations,
+                                const Eigen::VectorXd& residuals);
+
+/// A row an observation, by time: time, target (body or point), coordinate, file, used (fit or
+/// prediction), sigma, observed, predicted, residual (predicted − observed, in m or rad) and
+/// residual_in_sigma; the last three are empty where there is no run. `values` are the residuals of
+/// the fit, in multiples of sigma; `later` may be null.
+std::string PredictionCsv(const RolloutResiduals& residuals, const Eigen::VectorXd& values,
+                          const LaterObservations* later);
+
+}  // namespace tangible

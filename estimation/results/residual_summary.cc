@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/estimation/results/residual_summary.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace tangible {
+namespace {
+
+// Of the deviation of a Gaussian distribution over its median absolute value.
+constexpr double kDeviationByMedian = 1.4826;
+constexpr double kOutlier = 5.0;
+
+/// The residuals of each series.
+std::vector<std::vector<double>> BySeries(const ObservationSeries& index,
+                                          const Eigen::VectorXd& values) {
+  std::vector<std::vector<double>> all(index.size());
+  for (Eigen::Index i = 0; i < values.size(); ++i) {
+    all[index.of[i]].push_back(std::abs(values[i]));
+  }
+  return all;
+}
+
+/// From which size on a residual of a series is an outlier. Reorders them.
+double OutlierBound(std::vector<double>* sizes) {
+  const auto middle = sizes->begin() + static_cast<std::ptrdiff_t>(sizes->size() / 2);
+  std::nth_element(sizes->begin(), middle, sizes->end());
+  return kOutlier * std::max(1.0, kDeviationByMedian * *middle);
+}
+
+}  // namespace
+
+std::string FileOf(const RolloutResiduals& residuals, const Observation& observation) {
+  const std::vector<std::string>& files = residuals.files();
+  return observation.file < static_cast<int>(files.size()) ? files[observation.file] : "";
+}
+
+std::string SeriesLabel(const RolloutResiduals& residuals, const Observation& observation) {
+  const std::string label =
+      TargetName(residuals.scene().scene(), residuals.scene().points(), observation) + " " +
+      NameOf(observation.coordinate);
+  return residuals.files().size() > 1 ? label + " (" + FileOf(residuals, observation) + ")" : label;
+}
+
+ResidualSummary SummarizeResiduals(const RolloutResiduals& residuals,
+                                   const Eigen::VectorXd& values) {
+  ResidualSummary summary;
+  if (values.size() == 0) {
+    return summary;
+  }
+  const std::vector<Observation>& observations = residuals.observations();
+  const ObservationSeries index = IndexSeries(observations);
+  std::vector<double> bounds;
+  for (std::vector<double>& sizes : BySeries(index, values)) {
+    bounds.push_back(OutlierBound(&sizes));
+  }
+  for (const int first : index.first) {
+    const Observation& observation = observations[first];
+    SeriesSummary series;
+    series.file = FileOf(residuals, observation);
+    series.target = TargetName(residuals.scene().scene(), residuals.scene().points(), observation);
+    series.is_point = observation.point >= 0;
+    series.coordinate = observation.coordinate;
+    series.label = SeriesLabel(residuals, observation);
+    summary.series.push_back(std::move(series));
+  }
+  for (Eigen::Index i = 0; i < values.size(); ++i) {
+    const Observation& observation = observations[i];
+    SeriesSummary& series = summary.series[index.of[i]];
+    const double r = values[i];
+    const double difference = r * observation.sigma;
+    ++series.count;
+    series.rms += difference * difference;
+    series.mean += difference;
+    series.rms_in_sigma += r * r;
+    if (std::abs(r) > series.largest_in_sigma) {
+      series.largest_in_sigma = std::abs(r);
+      series.largest_time = observation.time;
+    }
+    if (std::abs(r) > bounds[index.of[i]]) {
+      ++series.outliers;
+      summary.outliers.push_back({index.of[i], observation.time, r});
+    }
+  }
+  for (SeriesSummary& series : summary.series) {
+    const double count = static_cast<double>(series.count);
+    series.rms = std::sqrt(series.rms / count);
+    series.mean /= count;
+    series.rms_in_sigma = std::sqrt(series.rms_in_sigma / count);
+  }
+  summary.num_outliers = static_cast<long>(summary.outliers.size());
+  std::stable_sort(summary.outliers.begin(), summary.outliers.end(),
+                   [](const Outlier& a, const Outlier& b) {
+                     return std::abs(a.residual) > std::abs(b.residual);
+                   });
+  summary.outliers.resize(std::min(summary.outliers.size(), kMostOutliers));
+  return summary;
+}
+
+}  // namespace tangible

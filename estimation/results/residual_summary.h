@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// Residuals by series (one coordinate of one body or point from one file): how large they are, and
+// which single ones do not belong.
+//
+// An outlier is a residual that is large for its series: |r| > 5 s with s = 1.4826 median |r|, but
+// s is at least 1: what sigma explains is no outlier. With noise that is Gaussian one in 1.7
+// million is as large.
+
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "tangible/estimation/problem/residual.h"
+
+namespace tangible {
+
+struct SeriesSummary {
+  std::string file;    ///< empty where the observations are of no file
+  std::string target;  ///< body or point
+  bool is_point = false;
+  Coordinate coordinate = Coordinate::kX;
+  long count = 0;
+  double rms = 0.0;               ///< m or rad
+  double mean = 0.0;              ///< m or rad, of fitted − observed
+  double rms_in_sigma = 0.0;      ///< in multiples of sigma
+  double largest_in_sigma = 0.0;  ///< absolute
+  double largest_time = 0.0;      ///< s, when
+  long outliers = 0;
+
+  /// "ball x", with the file where there are several.
+  std::string label;
+};
+
+/// A residual that does not belong.
+struct Outlier {
+  int series = 0;
+  double time = 0.0;      ///< s
+  double residual = 0.0;  ///< in multiples of sigma, fitted − observed
+};
+
+/// At most so many outliers are named.
+inline constexpr size_t kMostOutliers = 50;
+
+struct ResidualSummary {
+  std::vector<SeriesSummary> series;  ///< in the order of appearance
+  std::vector<Outlier> outliers;      ///< the largest, at most kMostOutliers; largest first
+  long num_outliers = 0;              ///< of all
+};
+
+/// `values`: a residual for each of the observations, in multiples of sigma.
+ResidualSummary SummarizeResiduals(const RolloutResiduals& residuals,
+                                   const Eigen::VectorXd& values);
+
+/// The file that an observation is from, as the fit file names it; empty where there is none.
+std::string FileOf(const RolloutResiduals& residuals, const Observation& observation);
+
+/// What a series is called: "ball x", "ball x (take.csv)" where there are several files.
+std::string SeriesLabel(const RolloutResiduals& residuals, const Observation& observation);
+
+}  // namespace tangible
