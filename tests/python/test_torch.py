@@ -62,7 +62,48 @@ def test_kinks_raise_if_asked() -> None:
     with pytest.raises(tangible.TangibleError, match="derivative: "):
         rollout(function, p, kinks="raise")
     with pytest.raises(ValueError, match="kinks"):
-        rollout(function, p, kinks="smooth")
+        rollout(function, p, kinks="soft")
+
+
+def test_the_smoothed_surrogate_is_used_at_kinks_alone() -> None:
+    # A box that is pushed with F moves by max(0, F - mu m g) (steps of h: h^2 n (n + 1) / 2m).
+    scene = tangible.Scene(simulation={"dt": 0.01, "duration": 0.5})
+    scene.add_body("floor", static=True, friction=0.5, shape={"half_plane": {"normal": [0, 1], "offset": 0}})
+    scene.add_body("box", shape={"box": {"size": [1, 0.5]}}, mass=1.0, position=[0, 0.25], friction=0.5)
+    scene.add_force("push", body="box", force=[0.5 * 9.81, 0])
+    function = tangible.Rollout(scene, ["forces/push/force/x"])
+    slope = 0.01**2 * 50 * 51 / 2
+    slides = function.default_parameters + 1.0
+    both = torch.tensor(np.array([function.default_parameters, slides]), requires_grad=True)
+    states = rollout(function, both, kinks="smoothed")
+    assert np.array_equal(states.detach().numpy(), function(both.detach().numpy()))
+    states[:, 0].sum().backward()
+    assert both.grad is not None
+    # Half of the samples slide: their mean; and where the box slides anyway the exact derivative.
+    assert both.grad[0, 0].item() == pytest.approx(0.5 * slope, rel=1e-6)
+    _, pull = function.vjp(slides)
+    assert both.grad[1, 0].item() == pull([1.0, 0.0, 0.0, 0.0, 0.0, 0.0])[0][0]
+    assert both.grad[1, 0].item() == pytest.approx(slope, rel=1e-9)
+    for samples, deviation in ((3, 1e-3), (0, 1e-3), (2, 0.0), (2, float("nan"))):
+        with pytest.raises(ValueError, match="expected"):
+            tangible.Smoothing(deviation, samples)
+
+
+def test_samples_that_cannot_be_run_do_not_count() -> None:
+    resting = ball()
+    resting["bodies"][0].update(position=[0, 0.1], velocity=[0, 0], mass=1e-4)
+    function = tangible.Rollout(resting, ["bodies/ball/mass", "bodies/ball/position/y"])
+    mass = function.default_parameters
+    assert function.certificate()["verdict"] != "trustworthy"
+    # A deviation of 1e-3 makes about half of the masses negative.
+    _, pull = function.vjp(mass, kinks="smoothed")
+    found = pull(np.ones(6))
+    assert all(np.isfinite(part).all() for part in found)
+    first = [part.copy() for part in found]
+    again = function.vjp(mass, kinks="smoothed", smoothing=tangible.Smoothing(seed=0))[1](np.ones(6))
+    other = function.vjp(mass, kinks="smoothed", smoothing=tangible.Smoothing(seed=1))[1](np.ones(6))
+    assert all(np.array_equal(a, b) for a, b in zip(first, again))
+    assert any(not np.array_equal(a, b) for a, b in zip(first, other))
 
 
 def test_a_layer_learns_and_its_parameters_stay_physical() -> None:

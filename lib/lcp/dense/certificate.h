@@ -32,8 +32,11 @@ struct Certificate {
   int events = 0;         ///< over a rollout: impacts and other events
   int fallbacks = 0;      ///< over a rollout: steps not solved by the first solver
   std::string
-      coordinates{};        ///< where they round so coarsely that modes may be rounding; else empty
-  std::string one_sided{};  ///< why the derivative is one-sided or a mean of two; else empty
+      coordinates{};  ///< where they round so coarsely that modes may be rounding; else empty
+  /// Where the solution is smoothed so much that its derivatives are not those of the modes; else
+  /// empty.
+  std::string smoothed{};
+  std::string one_sided{};      ///< why the derivative is one-sided or a mean of two; else empty
   std::string discontinuous{};  ///< what makes the value itself jump nearby; else empty
   std::string verdict{};        ///< SetVerdict's
 };
@@ -43,7 +46,7 @@ struct Certificate {
 void Merge(const Certificate& other, Certificate& certificate);
 
 /// Writes `verdict`: what applies of "discontinuous: …", "near a kink: …" (coordinates that are too
-/// large, degenerate rows, a margin below kNearKinkMargin, or a linear system that was not solved
+/// large, smoothing, degenerate rows, a margin below kNearKinkMargin, or a linear system that was not solved
 /// or is of a condition beyond kConditionLimit) and "one-sided: …", the worst first, joined by
 /// "; "; if nothing does, "trustworthy".
 void SetVerdict(Certificate& certificate);

@@ -16,7 +16,7 @@ Units are SI, angles are in radians, x points right and y up.
 
 from ._core import TangibleError, __version__
 from ._fit import FitResult, Residuals, fit
-from ._rollout import Jacobian, Rollout
+from ._rollout import Jacobian, Rollout, Smoothing
 from ._scene import Scene
 from ._trajectory import Contacts, Events, Trajectory, simulate
 
@@ -28,6 +28,7 @@ __all__ = [
     "Residuals",
     "Rollout",
     "Scene",
+    "Smoothing",
     "TangibleError",
     "Trajectory",
     "__version__",

@@ -38,6 +38,39 @@ class Jacobian:
     certificate: Certificate = field(repr=False)
 
 
+@dataclass(frozen=True)
+class Smoothing:
+    """The Gaussian over which the smoothed surrogate of a derivative averages.
+
+    The surrogate is the mean of the exact Jacobians at `samples` inputs around the given one, drawn
+    in pairs of opposite sign (randomised smoothing, arXiv 2109.05143, its first-order estimate). Of
+    a motion that is continuous it is the derivative of the motion's mean; jumps do not count in it.
+
+    Attributes:
+        deviation: Standard deviation of each number, as a share of max(|value|, 1).
+        samples: Even, at least 2; each costs a rollout and its adjoint.
+        seed: Of the samples.
+    """
+
+    deviation: float = 1e-3
+    samples: int = 32
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        if not (np.isfinite(self.deviation) and self.deviation > 0.0):
+            raise ValueError(f"deviation: expected a number > 0, got {self.deviation}")
+        if self.samples < 2 or self.samples % 2 != 0:
+            raise ValueError(f"samples: expected an even number >= 2, got {self.samples}")
+
+    def draw(self, values: Floats, generator: np.random.Generator) -> Floats:
+        """Samples around each row: shape (rows * samples, ...)."""
+        rows, *shape = values.shape
+        half = generator.standard_normal((rows, self.samples // 2, *shape))
+        steps = self.deviation * np.maximum(np.abs(values), 1.0)[:, None]
+        around = values[:, None] + steps * np.concatenate([half, -half], axis=1)
+        return np.ascontiguousarray(around.reshape(rows * self.samples, *shape))
+
+
 def _array(values: ArrayLike, name: str, axes: int) -> Floats:
     array = np.ascontiguousarray(values, dtype=np.float64)
     if array.ndim not in (axes, axes + 1):
@@ -217,29 +250,99 @@ class Rollout:
         controls: ArrayLike | None = None,
         *,
         on_failure: str = "raise",
+        kinks: str = "element",
+        smoothing: Smoothing | None = None,
     ) -> tuple[Floats, Callable[[ArrayLike], tuple[Floats, Floats, Floats]]]:
         """States, and the function that takes derivatives of a loss back from them.
 
         The function maps d loss / d states (their shape) to the derivatives with respect to
         parameters, initial state and controls. It holds the tapes of this call alone and may be
         called often. Rows that failed have NaN derivatives.
+
+        Args:
+            parameters, initial_state, controls, on_failure: As in a call.
+            kinks: What stands for derivatives that are not `trustworthy`: "element" is one element
+                of the generalised Jacobian (`certificates` says where); "raise" an error;
+                "smoothed" the mean of the Jacobians around (`Smoothing`), in those rows alone. The
+                states are those of the rollout in each case.
+            smoothing: Of "smoothed"; absent: its defaults.
+
+        Raises:
+            TangibleError: As a call; or with "raise" the verdict of the first row that is not
+                trustworthy; or no sample of "smoothed" could be run.
         """
+        if kinks not in ("element", "raise", "smoothed"):
+            raise ValueError(f"kinks: expected element, raise or smoothed, got {kinks}")
         p, x, u, batched = self._inputs(parameters, initial_state, controls)
         recorded = _core.Recorded(self._core, p, x, u, self.threads)
         states, statuses, messages = recorded.outputs
         self._check(statuses, messages, batched, on_failure)
         result = self._shape(states, batched)
+        smoothed = [] if kinks == "element" else self._rows_at_kinks(p, x, u, statuses)
+        if kinks == "raise" and smoothed:
+            row, verdict = smoothed[0]
+            raise _core.TangibleError(f"{f'row {row}: ' if batched else ''}derivative: {verdict}")
+        rows = [row for row, _ in smoothed]
+        average = self._average(p, x, u, rows, smoothing or Smoothing()) if rows else None
 
         def pull(cotangent: ArrayLike) -> tuple[Floats, Floats, Floats]:
             bars = np.ascontiguousarray(cotangent, dtype=np.float64)
             if bars.shape != result.shape:
                 raise ValueError(f"cotangent: expected shape {result.shape}, got {bars.shape}")
-            by_parameters, by_state, by_controls = recorded.adjoint(bars.reshape(states.shape))
+            rows_of_bars = bars.reshape(states.shape)
+            by_parameters, by_state, by_controls = recorded.adjoint(rows_of_bars)
+            if average is not None:
+                found = average(rows_of_bars[rows])
+                for into, mean in zip((by_parameters, by_state, by_controls), found):
+                    into[rows] = mean
             if batched:
                 return by_parameters, by_state, by_controls
             return by_parameters[0], by_state[0], by_controls[0]
 
         return result, pull
+
+    def _rows_at_kinks(
+        self, p: Floats, x: Floats | None, u: Floats, statuses: list[str]
+    ) -> list[tuple[int, str]]:
+        """Rows that ended well and whose derivatives are not trustworthy, with their verdicts."""
+        verdicts = [json.loads(text)["verdict"] for text in self._core.certify(p, x, u, self.threads)]
+        return [
+            (row, verdict)
+            for row, (status, verdict) in enumerate(zip(statuses, verdicts))
+            if status == "done" and verdict != "trustworthy"
+        ]
+
+    def _average(
+        self, p: Floats, x: Floats | None, u: Floats, rows: list[int], smoothing: Smoothing
+    ) -> Callable[[Floats], list[Floats]]:
+        """The mean pull of samples around `rows`; samples that cannot be run do not count."""
+        generator = np.random.default_rng(smoothing.seed)
+        samples = _core.Recorded(
+            self._core,
+            smoothing.draw(p[rows], generator),
+            None if x is None else smoothing.draw(x[rows], generator),
+            smoothing.draw(u[rows], generator),
+            self.threads,
+        )
+        _, statuses, messages = samples.outputs
+        done = np.array([status == "done" for status in statuses])
+        done = done.reshape(len(rows), smoothing.samples)
+        for index, row in enumerate(rows):
+            if not done[index].any():
+                message = messages[index * smoothing.samples]
+                raise _core.TangibleError(f"row {row}: no sample around it could be run: {message}")
+
+        def pull(bars: Floats) -> list[Floats]:
+            found = samples.adjoint(np.repeat(bars, smoothing.samples, axis=0))
+            return [
+                np.stack([
+                    part[done[index]].mean(axis=0)
+                    for index, part in enumerate(values.reshape(*done.shape, *values.shape[1:]))
+                ])
+                for values in found
+            ]
+
+        return pull
 
     def jacobian(
         self,

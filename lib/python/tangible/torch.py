@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 import torch
 
-from ._core import TangibleError
 from ._rollout import Rollout as _Rollout
+from ._rollout import Smoothing
 from ._scene import SceneLike
 
 __all__ = ["RolloutLayer", "rollout"]
@@ -29,15 +29,14 @@ class _Function(torch.autograd.Function):
         ctx: Any,
         function: _Rollout,
         kinks: str,
+        smoothing: Smoothing | None,
         like: torch.Tensor,
         *inputs: torch.Tensor | None,
     ) -> torch.Tensor:
         arrays = [_numpy(tensor) for tensor in inputs]
-        if kinks == "raise" and any(ctx.needs_input_grad):
-            for certificate in function.certificates(*arrays):
-                if certificate["verdict"] != "trustworthy":
-                    raise TangibleError(f"derivative: {certificate['verdict']}")
-        states, ctx.pull = function.vjp(*arrays)
+        # Without a derivative to take, a kink is none of the caller's business.
+        of_kinks = kinks if any(ctx.needs_input_grad) else "element"
+        states, ctx.pull = function.vjp(*arrays, kinks=of_kinks, smoothing=smoothing)
         ctx.inputs = [None if t is None else (t.shape, t.dtype, t.device) for t in inputs]
         ctx.batched = states.ndim > (1 if function._single else 2)
         return torch.as_tensor(states).to(device=like.device, dtype=like.dtype)
@@ -46,7 +45,7 @@ class _Function(torch.autograd.Function):
     def backward(ctx: Any, bar: torch.Tensor) -> Any:  # type: ignore[override]
         found = ctx.pull(_numpy(bar))
         gradients: list[torch.Tensor | None] = []
-        for value, entry, needed in zip(found, ctx.inputs, ctx.needs_input_grad[3:]):
+        for value, entry, needed in zip(found, ctx.inputs, ctx.needs_input_grad[4:]):
             if entry is None or not needed:
                 gradients.append(None)
                 continue
@@ -55,7 +54,7 @@ class _Function(torch.autograd.Function):
             if ctx.batched and value.ndim > len(shape):
                 value = value.sum(axis=0)
             gradients.append(torch.as_tensor(value).to(device=device, dtype=dtype))
-        return (None, None, None, *gradients)
+        return (None, None, None, None, *gradients)
 
 
 def rollout(
@@ -65,6 +64,7 @@ def rollout(
     controls: torch.Tensor | None = None,
     *,
     kinks: str = "element",
+    smoothing: Smoothing | None = None,
 ) -> torch.Tensor:
     """States of a `tangible.Rollout` of tensors, with gradients for all that are given.
 
@@ -72,15 +72,14 @@ def rollout(
         function: What is rolled out; its arguments and shapes are those of `Rollout.__call__`.
         parameters, initial_state, controls: Tensors, with or without a batch's axis; the result has
             the dtype and device of the first that is given.
-        kinks: Where two-sided derivatives do not exist: "element" takes one element of the
-            generalised Jacobian (`function.certificates` says where), "raise" an error.
+        kinks, smoothing: As of `Rollout.vjp`: where two-sided derivatives do not exist, "element"
+            takes one element of the generalised Jacobian (`function.certificates` says where),
+            "raise" an error, "smoothed" the mean of the Jacobians around.
     """
-    if kinks not in ("element", "raise"):
-        raise ValueError(f"kinks: expected element or raise, got {kinks}")
     given = [t for t in (parameters, initial_state, controls) if t is not None]
     like = given[0] if given else torch.empty(0, dtype=torch.float64)
     result: torch.Tensor = _Function.apply(
-        function, kinks, like, parameters, initial_state, controls
+        function, kinks, smoothing, like, parameters, initial_state, controls
     )
     return result
 
@@ -98,7 +97,7 @@ class RolloutLayer(torch.nn.Module):
         controls, records: As of `tangible.Rollout`.
         positive: Paths that stay above 0; absent: masses, inertias, radii and sizes.
         bounds: {path: (low, high)}; the scene's value lies between.
-        kinks: As of `rollout`.
+        kinks, smoothing: As of `rollout`.
     """
 
     start: torch.Tensor
@@ -115,10 +114,12 @@ class RolloutLayer(torch.nn.Module):
         positive: Sequence[str] | None = None,
         bounds: Mapping[str, tuple[float, float]] | None = None,
         kinks: str = "element",
+        smoothing: Smoothing | None = None,
     ) -> None:
         super().__init__()
         self.function = _Rollout(scene, parameters, controls, records=records)
         self.kinks = kinks
+        self.smoothing = smoothing
         start = torch.as_tensor(self.function.default_parameters)
         ends = ("/mass", "/inertia", "/radius", "/size/x", "/size/y", "/length")
         kept = [p for p in parameters if p.endswith(ends)] if positive is None else list(positive)
@@ -153,4 +154,11 @@ class RolloutLayer(torch.nn.Module):
         controls: torch.Tensor | None = None,
     ) -> torch.Tensor:
         """States, as `rollout` gives them."""
-        return rollout(self.function, self.values(), initial_state, controls, kinks=self.kinks)
+        return rollout(
+            self.function,
+            self.values(),
+            initial_state,
+            controls,
+            kinks=self.kinks,
+            smoothing=self.smoothing,
+        )

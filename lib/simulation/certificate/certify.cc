@@ -307,6 +307,12 @@ Certificate RolloutCertifier::Finish(const Model<double>& model, const RolloutRe
         "motions were halved, as they could not be integrated over a step: how often may be chosen "
         "by rounding; dt is too large";
   }
+  const double smoothing = model.structure->settings.smoothing;
+  const double margin = certificate_.margin_min;
+  if (smoothing > kSmoothedDerivative * margin * margin) {
+    certificate_.smoothed = "the motion is smoothed (smoothing " + Short(smoothing) +
+                            "), and these are the derivatives of its contacts' modes";
+  }
   if (coordinates_) certificate_.coordinates = coordinates_->Message(model);
   Certificate finished = certificate_;
   SetVerdict(finished);

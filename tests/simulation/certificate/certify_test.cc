@@ -46,6 +46,24 @@ TEST(CertifyRollout, FreeFallIsTrustworthy) {
   EXPECT_EQ(c.mode_switches, 0);
 }
 
+// Differences of a smoothed motion are not the derivatives of its contacts' modes.
+TEST(CertifyRollout, SmoothingThatMattersIsNamed) {
+  const auto ball = [](const std::string& smoothing) {
+    return R"({"bodies": [
+      {"name": "ball", "shape": {"circle": {"radius": 0.1}}, "mass": 1, "position": [0, 0.1],
+       "friction": 0.5, "velocity": [1, 0]},
+      {"name": "floor", "static": true, "friction": 0.5,
+       "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}}],
+      "simulation": {"dt": 0.01, "duration": 0.05, "smoothing": )" +
+           smoothing + "}}";
+  };
+  EXPECT_EQ(Certify(ball("0")).verdict, "trustworthy");
+  EXPECT_EQ(Certify(ball("1e-14")).verdict, "trustworthy");
+  EXPECT_EQ(Certify(ball("0.01")).verdict,
+            "near a kink: the motion is smoothed (smoothing 0.01), and these are the derivatives "
+            "of its contacts' modes");
+}
+
 // Without forces a ball beside the floor touches it at a gap of rounding: whether it closes is
 // open.
 TEST(CertifyRollout, ATouchWithoutForceIsAKinkThoughItsTermsAreAllRounding) {

@@ -1,0 +1,22 @@
+"""The README's code prints what stands behind it."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import re
+from pathlib import Path
+
+README = Path(__file__).resolve().parents[2] / "lib" / "python" / "README.md"
+
+
+def test_code_prints_its_comments() -> None:
+    blocks = re.findall(r"```python\n(.*?)```", README.read_text(encoding="utf-8"), re.DOTALL)
+    assert blocks
+    for block in blocks:
+        expected = re.findall(r"^print\(.*\) +# (?:[^:\n]*: )?(.*)$", block, re.MULTILINE)
+        assert expected
+        output = io.StringIO()
+        with contextlib.redirect_stdout(output):
+            exec(compile(block, str(README), "exec"), {})
+        assert output.getvalue().splitlines() == expected
