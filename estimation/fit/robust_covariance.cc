@@ -24,9 +24,12 @@ constexpr double kAndrewsFactor = 1.1447;  // of Bartlett's kernel
 
 /// Residuals at the same time count as one: their influences are added.
 struct TimeSeries {
-  std::vector<double> times;       // ascending, all different
-  std::vector<Eigen::VectorXd> u;  // of each time
-  std::vector<Eigen::VectorXd> w;  // their variances were the residuals white and of size sigma
+  std::vector<double> times;  // ascending, all different
+  RowMatrixXd u;              // times x parameters
+  RowMatrixXd w;              // their variances were the residuals white and of size sigma
+
+  Eigen::Index size() const { return static_cast<Eigen::Index>(times.size()); }
+  double Time(Eigen::Index t) const { return times[static_cast<size_t>(t)]; }
 };
 
 TimeSeries CollectTimes(const std::vector<double>& times, const Eigen::VectorXd& psi,
@@ -38,11 +41,15 @@ TimeSeries CollectTimes(const std::vector<double>& times, const Eigen::VectorXd&
   for (const int i : order) {
     if (series.times.empty() || times[i] > series.times.back()) {
       series.times.push_back(times[i]);
-      series.u.emplace_back(Eigen::VectorXd::Zero(influence.cols()));
-      series.w.emplace_back(Eigen::VectorXd::Zero(influence.cols()));
     }
-    series.u.back() += psi[i] * influence.row(i).transpose();
-    series.w.back() += influence.row(i).cwiseAbs2().transpose();
+  }
+  series.u.setZero(series.size(), influence.cols());
+  series.w.setZero(series.size(), influence.cols());
+  Eigen::Index t = 0;
+  for (const int i : order) {
+    t += times[i] > series.Time(t) ? 1 : 0;
+    series.u.row(t) += psi[i] * influence.row(i);
+    series.w.row(t) += influence.row(i).cwiseAbs2();
   }
   return series;
 }
@@ -51,13 +58,13 @@ TimeSeries CollectTimes(const std::vector<double>& times, const Eigen::VectorXd&
 double AutoregressiveAlpha(const TimeSeries& series) {
   double above = 0.0;
   double below = 0.0;
-  const Eigen::Index size = series.u.empty() ? 0 : series.u.front().size();
-  for (Eigen::Index k = 0; k < size; ++k) {
+  const RowMatrixXd& u = series.u;
+  for (Eigen::Index k = 0; k < u.cols(); ++k) {
     double product = 0.0;
     double square = 0.0;
-    for (size_t t = 0; t + 1 < series.u.size(); ++t) {
-      product += series.u[t][k] * series.u[t + 1][k];
-      square += 0.5 * (series.u[t][k] * series.u[t][k] + series.u[t + 1][k] * series.u[t + 1][k]);
+    for (Eigen::Index t = 0; t + 1 < u.rows(); ++t) {
+      product += u(t, k) * u(t + 1, k);
+      square += 0.5 * (u(t, k) * u(t, k) + u(t + 1, k) * u(t + 1, k));
     }
     if (!(square > 0.0)) {
       continue;
@@ -92,28 +99,28 @@ double Bandwidth(const TimeSeries& series) {
 /// times the integral over a sliding window of the square of what is in it. This is linear in the
 /// number of times, and never negative.
 RowMatrixXd KernelSum(const TimeSeries& series, double bandwidth) {
-  const size_t count = series.times.size();
-  const Eigen::Index size = count == 0 ? 0 : series.u.front().size();
+  const Eigen::Index count = series.size();
+  const Eigen::Index size = series.u.cols();
   RowMatrixXd sum = RowMatrixXd::Zero(size, size);
   if (!(bandwidth > 0.0)) {
-    for (const Eigen::VectorXd& u : series.u) {
-      sum += u * u.transpose();
+    for (Eigen::Index t = 0; t < count; ++t) {
+      sum += series.u.row(t).transpose() * series.u.row(t);
     }
     return sum;
   }
   Eigen::VectorXd inside = Eigen::VectorXd::Zero(size);
-  size_t in = 0;   // the next that enters at its time
-  size_t out = 0;  // the next that leaves at its time + bandwidth
-  double last = count == 0 ? 0.0 : series.times.front();
+  Eigen::Index in = 0;   // the next that enters at its time
+  Eigen::Index out = 0;  // the next that leaves at its time + bandwidth
+  double last = count == 0 ? 0.0 : series.Time(0);
   while (out < count) {
-    const bool enters = in < count && series.times[in] <= series.times[out] + bandwidth;
-    const double now = enters ? series.times[in] : series.times[out] + bandwidth;
+    const bool enters = in < count && series.Time(in) <= series.Time(out) + bandwidth;
+    const double now = enters ? series.Time(in) : series.Time(out) + bandwidth;
     sum += ((now - last) / bandwidth) * (inside * inside.transpose());
     last = now;
     if (enters) {
-      inside += series.u[in++];
+      inside += series.u.row(in++).transpose();
     } else {
-      inside -= series.u[out++];
+      inside -= series.u.row(out++).transpose();
     }
     if (in == out) {
       inside.setZero();  // no rounding is carried on
@@ -125,32 +132,32 @@ RowMatrixXd KernelSum(const TimeSeries& series, double bandwidth) {
 /// (Σ_t w_t, Σ_tt' k_tt'² w_t w_t') of each component, with k² expanded in powers of t' − t.
 std::pair<Eigen::VectorXd, Eigen::VectorXd> KernelWeights(const TimeSeries& series,
                                                           double bandwidth) {
-  const Eigen::Index size = series.w.empty() ? 0 : series.w.front().size();
+  const Eigen::Index size = series.w.cols();
   Eigen::VectorXd sum = Eigen::VectorXd::Zero(size);
   Eigen::VectorXd squares = Eigen::VectorXd::Zero(size);
   Eigen::VectorXd ahead[3];  // Σ w_t' ((t' − origin) / S)^n over the t' within S after t
   for (Eigen::VectorXd& power : ahead) {
     power = Eigen::VectorXd::Zero(size);
   }
-  size_t next = 0;
-  const auto add = [&](size_t i, double sign) {
-    const double x = (series.times[i] - series.times.front()) / bandwidth;
-    ahead[0] += sign * series.w[i];
-    ahead[1] += sign * x * series.w[i];
-    ahead[2] += sign * x * x * series.w[i];
+  Eigen::Index next = 0;
+  const auto add = [&](Eigen::Index i, double sign) {
+    const double x = (series.Time(i) - series.Time(0)) / bandwidth;
+    ahead[0] += sign * series.w.row(i).transpose();
+    ahead[1] += sign * x * series.w.row(i).transpose();
+    ahead[2] += sign * x * x * series.w.row(i).transpose();
   };
-  for (size_t t = 0; t < series.w.size(); ++t) {
-    const Eigen::VectorXd& w = series.w[t];
+  for (Eigen::Index t = 0; t < series.size(); ++t) {
+    const auto w = series.w.row(t).transpose();
     sum += w;
     squares += w.cwiseAbs2();
     if (!(bandwidth > 0.0)) {
       continue;
     }
-    while (next < series.w.size() && series.times[next] < series.times[t] + bandwidth) {
+    while (next < series.size() && series.Time(next) < series.Time(t) + bandwidth) {
       add(next++, 1.0);
     }
     add(t, -1.0);
-    const double a = 1.0 + (series.times[t] - series.times.front()) / bandwidth;
+    const double a = 1.0 + (series.Time(t) - series.Time(0)) / bandwidth;
     squares += 2.0 * w.cwiseProduct(a * a * ahead[0] - 2.0 * a * ahead[1] + ahead[2]);
   }
   return {sum, squares};

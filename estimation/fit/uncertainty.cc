@@ -185,6 +185,7 @@ class Estimator {
     for (size_t b = 0; b < blocks_.size(); ++b) {
       stacked.middleRows(layout_.row_offset(static_cast<int>(b)), parts_[b].reduced.rows()) =
           parts_[b].reduced;
+      parts_[b].reduced.resize(0, 0);  // as large as the observations, and no longer needed
     }
     decomposition_.emplace(stacked, squares.cwiseSqrt(), options_.rank_tolerance);
     shared_covariance_ = decomposition_->Covariance();
@@ -456,7 +457,7 @@ class Estimator {
       rows.prior_residuals = std::sqrt(rows.weight) * blocks_[b].residuals.tail(priors);
       rows.prior_shared = part.shared_rows.bottomRows(priors);
       rows.prior_own = part.own_rows.bottomRows(priors);
-      recordings.push_back(rows);
+      recordings.push_back(std::move(rows));
       of->push_back(b);
     }
     return recordings;

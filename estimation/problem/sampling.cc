@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <numeric>
 
 #include "tangible/simulation/stepping/step.h"
 
@@ -46,28 +47,39 @@ void Locate(const SimulationSettings& settings, Sample* sample) {
 SamplePlan::SamplePlan(const std::vector<Observation>& observations,
                        const SimulationSettings& settings) {
   std::map<std::pair<double, int>, int> known;  // by time and body
+  sample_of_.reserve(observations.size());
   for (const Observation& observation : observations) {
-    const auto [place, inserted] =
-        known.try_emplace({observation.time, observation.body}, num_samples());
-    if (inserted) {
+    // Most files are in the order of time.
+    const int count = num_samples();
+    const auto place = known.try_emplace(known.end(), {observation.time, observation.body}, count);
+    if (place->second == count) {
       Sample sample{observation.body, observation.time};
       Locate(settings, &sample);
       samples_.push_back(sample);
     }
     sample_of_.push_back(place->second);
   }
+  samples_.shrink_to_fit();
   long last = 0;
   for (const Sample& sample : samples_) {
     last = std::max(last, sample.step + (sample.part > 0.0 ? 1 : 0));
   }
-  shares_.resize(static_cast<size_t>(last) + 1);
-  for (int i = 0; i < num_samples(); ++i) {
-    const Sample& sample = samples_[i];
-    shares_[sample.step].push_back({i, 1.0 - sample.part});
-    if (sample.part > 0.0) {
-      shares_[sample.step + 1].push_back({i, sample.part});
+  // First how many each step has, then where they begin.
+  first_share_.assign(static_cast<size_t>(last) + 2, 0);
+  const auto for_each = [this](const auto& use) {
+    for (int i = 0; i < num_samples(); ++i) {
+      const Sample& sample = samples_[i];
+      use(sample.step, SampleShare{i, 1.0 - sample.part});
+      if (sample.part > 0.0) {
+        use(sample.step + 1, SampleShare{i, sample.part});
+      }
     }
-  }
+  };
+  for_each([this](long step, const SampleShare&) { ++first_share_[step + 1]; });
+  std::partial_sum(first_share_.begin(), first_share_.end(), first_share_.begin());
+  shares_.resize(first_share_.back());
+  std::vector<size_t> next(first_share_.begin(), first_share_.end() - 1);
+  for_each([&](long step, const SampleShare& share) { shares_[next[step]++] = share; });
 }
 
 Prediction Predict(Coordinate coordinate, const double* pose, const Vector2<double>& at) {

@@ -14,6 +14,7 @@
 // point is moved with the pose so found:
 // r = (x, y) + R(angle) at.
 
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -45,14 +46,17 @@ class SamplePlan {
   /// The sample of each observation.
   const std::vector<int>& sample_of() const { return sample_of_; }
   /// The last step whose state is needed.
-  long last_step() const { return static_cast<long>(shares_.size()) - 1; }
+  long last_step() const { return static_cast<long>(first_share_.size()) - 2; }
   /// What the state after k steps contributes to.
-  const std::vector<SampleShare>& SharesAt(long k) const { return shares_[k]; }
+  std::span<const SampleShare> SharesAt(long k) const {
+    return {shares_.data() + first_share_[k], first_share_[k + 1] - first_share_[k]};
+  }
 
  private:
   std::vector<Sample> samples_;
   std::vector<int> sample_of_;
-  std::vector<std::vector<SampleShare>> shares_;  ///< by step
+  std::vector<size_t> first_share_ = {0, 0};  ///< of each step, and the end of the last one's
+  std::vector<SampleShare> shares_;           ///< by step
 };
 
 /// A predicted coordinate with its derivatives.

@@ -218,6 +218,16 @@ std::string PointerOf(const ParameterError& error) {
   return error.key.empty() ? pointer : pointer + "/" + error.key;
 }
 
+bool Parameterize(const FitProblem& problem, const std::string& file, ParameterizedScene* scene,
+                  std::string* error) {
+  ParameterError fault;
+  if (!scene->Create(problem.scene, problem.points, problem.parameters, &fault)) {
+    *error = OneLine(file + ": " + PointerOf(fault) + ": " + fault.what);
+    return false;
+  }
+  return true;
+}
+
 /// Reads one fit file after another part: the scene is needed to check the rest.
 class FitReader {
  public:
@@ -299,8 +309,9 @@ bool FromJson(const Json& json, const std::string& file, FitFile* fit, std::stri
     *error = errors.message();
     return false;
   }
-  std::vector<RolloutResiduals> residuals;
-  return read && MakeResiduals(fit->problem, file, &residuals, error);
+  fit->problem.observations.shrink_to_fit();
+  ParameterizedScene scene;
+  return read && Parameterize(fit->problem, file, &scene, error);
 }
 
 }  // namespace
@@ -318,9 +329,7 @@ bool ParseFit(const std::string& text, const std::string& file, FitFile* fit, st
 bool MakeResiduals(const FitProblem& problem, const std::string& file,
                    std::vector<RolloutResiduals>* residuals, std::string* error) {
   ParameterizedScene scene;
-  ParameterError fault;
-  if (!scene.Create(problem.scene, problem.points, problem.parameters, &fault)) {
-    *error = OneLine(file + ": " + PointerOf(fault) + ": " + fault.what);
+  if (!Parameterize(problem, file, &scene, error)) {
     return false;
   }
   residuals->emplace_back(std::move(scene), problem.observations);

@@ -425,6 +425,20 @@ UndeterminedCounts CountUndetermined(const ContactProblem<double>& problem,
   return counts;
 }
 
+namespace {
+
+/// Numbers in [−1, 1), always the same: they are drawn once, as a run measures every step.
+const std::vector<double>& Draws(size_t count) {
+  thread_local std::mt19937 random(20240229);
+  thread_local std::vector<double> draws;
+  while (draws.size() < count) {
+    draws.push_back(2.0 * (static_cast<double>(random()) / 4294967296.0) - 1.0);
+  }
+  return draws;
+}
+
+}  // namespace
+
 SystemQuality MeasureSystem(const ContactProblem<double>& problem,
                             const std::vector<ContactMode>& modes, ContactSystem* system) {
   SystemQuality quality;
@@ -436,10 +450,10 @@ SystemQuality MeasureSystem(const ContactProblem<double>& problem,
   const std::vector<double> d = Scales(problem, rows, size);
   quality.condition = NormOfSystem(problem, rows, d) * NormOfInverse(problem, modes, d, system);
   // K x of a random x is consistent, even where rows are redundant.
-  std::mt19937 random(20240229);
+  const std::vector<double>& draws = Draws(size);
   std::vector<double> x(size), rhs(size), left(size);
   for (size_t i = 0; i < size; ++i) {
-    x[i] = d[i] * (2.0 * (static_cast<double>(random()) / 4294967296.0) - 1.0);
+    x[i] = d[i] * draws[i];
   }
   const std::vector<double> zero(size, 0.0);
   system->Residual<false>(problem, modes, zero.data(), x.data(), 1, rhs.data());
