@@ -8,6 +8,7 @@
 #include "tangible/scene/scene_json.h"
 #include "tangible/scene/set_parameters.h"
 #include "tangible/simulation/certificate/certify.h"
+#include "tangible/simulation/stepping/invariants.h"
 #include "tangible/simulation/stepping/run_warnings.h"
 
 namespace tangible::python {
@@ -58,6 +59,8 @@ struct Run {
   Table contacts, events;
   std::string status, message, summary, certificate, html;
   std::vector<std::string> warnings;
+  std::vector<double> energies;  // kinetic and potential of each time
+  std::vector<double> margins;   // of each step, where the certificate is wanted
 };
 
 void AddContacts(double t, const Stepper& stepper, Table* table) {
@@ -120,13 +123,18 @@ Run Simulate(const Scene& scene, long every, Wanted wanted, SignalWatch* watch) 
         if (summary.IsFull()) summary.EvaluateKept(model);
         warnings.Add(model, k, t, state, done);
         if (done != nullptr) {
-          if (wanted.certificate) certifier.AddStep(model, k - 1, done);
+          if (wanted.certificate) {
+            certifier.AddStep(model, k - 1, done);
+            run.margins.push_back(certifier.step_margin());
+          }
           AddContacts(t, *done, &run.contacts);
           AddEvents(done, &run.events);
         }
         if (view) view->Add(model, t, state, done != nullptr ? &done->record() : nullptr);
         if (k % every != 0 && k != steps) return;
         run.times.push_back(t);
+        run.energies.push_back(KineticEnergy(model, state));
+        run.energies.push_back(PotentialEnergy(model, state));
         for (const int body : run.bodies) {
           run.poses.insert(run.poses.end(), &state.pose[3 * body], &state.pose[3 * body] + 3);
           run.twists.insert(run.twists.end(), &state.twist[3 * body], &state.twist[3 * body] + 3);
@@ -183,6 +191,8 @@ py::dict SimulateToDict(const Scene& scene, long every, bool certify, bool html)
   out["poses"] = ToArray(run.poses, {rows, bodies, 3});
   out["twists"] = ToArray(run.twists, {rows, bodies, 3});
   out["bodies"] = run.bodies;
+  out["energies"] = ToArray(run.energies, {rows, 2});
+  out["margins"] = ToArray(run.margins, {static_cast<py::ssize_t>(run.margins.size())});
   out["contacts"] = ContactsOf(run.contacts);
   out["events"] = EventsOf(run.events);
   out["status"] = run.status;

@@ -13,10 +13,11 @@ README = Path(__file__).resolve().parents[2] / "lib" / "python" / "README.md"
 def test_code_prints_its_comments() -> None:
     blocks = re.findall(r"```python\n(.*?)```", README.read_text(encoding="utf-8"), re.DOTALL)
     assert blocks
+    names: dict[str, object] = {}
     for block in blocks:
         expected = re.findall(r"^print\(.*\) +# (?:[^:\n]*: )?(.*)$", block, re.MULTILINE)
         assert expected
         output = io.StringIO()
         with contextlib.redirect_stdout(output):
-            exec(compile(block, str(README), "exec"), {})
+            exec(compile(block, str(README), "exec"), names)
         assert output.getvalue().splitlines() == expected

@@ -72,6 +72,34 @@ def test_the_view_is_a_page_of_its_own(scene: dict[str, Any], tmp_path: Path) ->
     assert frame.startswith("<iframe srcdoc=") and "&lt;canvas" in frame or "&lt;svg" in frame
 
 
+def test_energies_and_margins_are_those_of_the_run(scene: dict[str, Any]) -> None:
+    run = tangible.simulate(scene, certify=True)
+    speed = np.hypot(run["ball/vx"], run["ball/vy"])
+    inertia = 0.5 * 1.2 * 0.1**2
+    kinetic = 0.5 * 1.2 * speed**2 + 0.5 * inertia * run["ball/omega"] ** 2
+    assert run.energies[:, 0] == pytest.approx(kinetic)
+    assert run.energies[:, 1] == pytest.approx(1.2 * 9.81 * run["ball/y"])
+    assert run.certificate is not None and len(run.margins) == 60
+    assert run.margins.min() == run.certificate["margin_min"]
+    assert len(tangible.simulate(scene).margins) == 0
+
+
+def test_plots_of_energies_contacts_and_margins() -> None:
+    matplotlib = pytest.importorskip("matplotlib")
+    matplotlib.use("Agg")
+    run = tangible.simulate(ball("fixed"), certify=True)
+    total = run.plot_energies().lines[2].get_ydata()
+    assert total == pytest.approx(run.energies.sum(axis=1))
+    contacts = run.plot_contacts().lines
+    assert [line.get_label() for line in contacts] == ["ball on floor"]
+    assert sum(contacts[0].get_ydata()) == pytest.approx(run.contacts.normal_impulse.sum())
+    margins = run.plot_margins()
+    assert margins.get_title() == "trustworthy"
+    assert min(margins.lines[0].get_ydata()) == pytest.approx(run.margins.min())
+    with pytest.raises(ValueError, match="certify=True"):
+        tangible.simulate(ball("fixed")).plot_margins()
+
+
 def test_plots_have_a_curve_a_coordinate() -> None:
     matplotlib = pytest.importorskip("matplotlib")
     matplotlib.use("Agg")

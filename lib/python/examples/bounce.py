@@ -1,6 +1,7 @@
 """The derivative of a bounce: event stepping has that of the physics, a fixed step has not."""
 
 import math
+import sys
 
 import tangible
 
@@ -32,3 +33,12 @@ print("certificate by events:", by_events.certificate["verdict"])
 print("certificate by fixed steps:", by_steps.certificate()["verdict"])
 assert abs(by_events.parameters[1, 0] - truth) < 1e-10
 assert abs(difference - truth) > 0.1
+
+if len(sys.argv) > 1:  # the picture: y and its derivative along the run
+    times = [0.01 * k for k in range(61)]
+    runs = {s: tangible.Rollout(ball(s), height, records=range(61)).jacobian() for s in ("event", "fixed")}
+    axes = tangible.simulate(ball("event")).plot("ball/y")
+    for stepping, found in runs.items():
+        axes.plot(times, found.parameters[:, 1, 0], "--", label=f"dy/dh, {stepping}")
+    axes.legend()
+    axes.figure.savefig(sys.argv[1], dpi=70)

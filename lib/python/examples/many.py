@@ -1,5 +1,6 @@
 """Two thousand rollouts at once: where a spinning disc stops, against its speed and spin."""
 
+import sys
 import time
 
 import numpy as np
@@ -26,3 +27,13 @@ done = np.abs(starts[:, 0] + 0.1 * starts[:, 1]) / (3.0 * 0.3 * 9.81) < 1.0
 print(f"2000 rollouts of {rollout.num_steps} steps in {seconds:.2f} s")
 print(f"largest error of the rolling speed: {np.abs(speed - rolling)[done].max():.1e} m/s")
 assert np.abs(speed - rolling)[done].max() < 1e-9 and done.sum() > 1900
+
+if len(sys.argv) > 1:  # the picture: where each disc stands after 1 s
+    import matplotlib.pyplot as plt
+
+    axes = plt.subplots()[1]
+    dots = axes.scatter(*starts.T, c=finals[:, rollout.outputs.index("disc/x")], s=6)
+    axes.set_xlabel("speed at the start (m/s)")
+    axes.set_ylabel("spin at the start (rad/s)")
+    axes.figure.colorbar(dots, label="x after 1 s (m)")
+    axes.figure.savefig(sys.argv[1], dpi=70)

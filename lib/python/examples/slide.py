@@ -1,5 +1,7 @@
 """Friction from a slide: scipy's least squares with exact residuals and Jacobians."""
 
+import sys
+
 import numpy as np
 import scipy.optimize
 import tangible
@@ -34,3 +36,9 @@ deviations = np.sqrt(np.diag(np.linalg.inv(fit.jac.T @ fit.jac)))
 for path, value, deviation, true in zip(paths, fit.x, deviations, truth):
     print(f"{path}: {value:.5f} +- {deviation:.5f} (true {true})")
 assert np.all(np.abs(fit.x - truth) < 4.0 * deviations) and deviations[0] < 2e-3
+
+if len(sys.argv) > 1:  # the picture: the fitted slide and what was observed
+    axes = tangible.simulate(scene, dict(zip(paths, fit.x))).plot("box/x")
+    axes.plot(0.1 * np.arange(11), observed, "o", mfc="none", label="observed")
+    axes.legend()
+    axes.figure.savefig(sys.argv[1], dpi=70)

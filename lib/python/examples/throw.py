@@ -1,5 +1,7 @@
 """A ball is thrown so that it bounces into a cup: gradient descent through the bounce."""
 
+import sys
+
 import numpy as np
 import tangible
 
@@ -29,3 +31,13 @@ run = tangible.simulate(
 print(f"throw with {velocity[0]:.6f}, {velocity[1]:.6f} m/s after {iteration} iterations")
 print(f"bounces: {len(run.events.time)}, ends at {run.final['ball/x']:.6f}, {run.final['ball/y']:.6f} m")
 assert np.linalg.norm(error) < 1e-9 and len(run.events.time) >= 1
+
+if len(sys.argv) > 1:  # the picture: the throw's path
+    import matplotlib.pyplot as plt
+
+    axes = plt.subplots()[1]
+    axes.plot(run["ball/x"], run["ball/y"], ".-", label="ball")
+    axes.plot(*cup, "s", mfc="none", ms=12, label="cup")
+    axes.set_aspect("equal")
+    axes.legend()
+    axes.figure.savefig(sys.argv[1], dpi=70)

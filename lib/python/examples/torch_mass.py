@@ -1,5 +1,7 @@
 """A network that infers the masses of two colliding discs from their motion, trained through the engine."""
 
+import sys
+
 import tangible
 import torch
 from tangible.torch import rollout
@@ -39,6 +41,17 @@ for step in range(250):
     optimiser.step()
 with torch.no_grad():
     ratio = torch.linspace(0.45, 2.2, 50, dtype=torch.float64)
-    error = (torch.exp(network(features(motion(ratio)))[:, 0]) / ratio - 1.0).abs()
+    found = torch.exp(network(features(motion(ratio)))[:, 0])
+    error = (found / ratio - 1.0).abs()
 print(f"mass ratio inferred to {100 * error.median():.2f} % in the median, {100 * error.max():.2f} % at most")
 assert error.median() < 0.02 and error.max() < 0.1
+
+if len(sys.argv) > 1:  # the picture: inferred against true ratios
+    import matplotlib.pyplot as plt
+
+    axes = plt.subplots()[1]
+    axes.plot(ratio, ratio, color="0.7")
+    axes.plot(ratio, found, ".")
+    axes.set_xlabel("true mass ratio")
+    axes.set_ylabel("inferred from motion")
+    axes.figure.savefig(sys.argv[1], dpi=70)

@@ -64,9 +64,12 @@ class Trajectory:
         times: s, shape (T,).
         poses: x (m), y (m), angle (rad), shape (T, bodies, 3).
         twists: vx, vy (m/s), omega (rad/s), shape (T, bodies, 3).
+        energies: Kinetic and potential energy (of gravity and springs), J, shape (T, 2).
         contacts, events: See `Contacts`, `Events`.
         summary: The figures of `tangible-simulate --summary`.
         certificate: How near the run is to kinks and jumps; None unless asked for.
+        margins: Of each step the smallest relative distance to a change of contact modes, infinite
+            where nothing is near, shape (steps,); empty unless the certificate is asked for.
         warnings: What the programs would warn of.
     """
 
@@ -83,6 +86,8 @@ class Trajectory:
         self.times: Floats = raw["times"]
         self.poses: Floats = raw["poses"]
         self.twists: Floats = raw["twists"]
+        self.energies: Floats = raw["energies"]
+        self.margins: Floats = raw["margins"]
         contacts = raw["contacts"]
         self.contacts = Contacts(
             contacts["time"],
@@ -152,6 +157,64 @@ class Trajectory:
             axes.axvspan(time - step, time, color="0.85", lw=0, zorder=0)
         axes.set_xlabel("time (s)")
         axes.legend()
+        return axes
+
+    def plot_energies(self, ax: Axes | None = None) -> Axes:
+        """Plots kinetic and potential energy and their sum (J) over time. Returns the axes."""
+        import matplotlib.pyplot as plt
+
+        axes: Axes = ax if ax is not None else plt.subplots()[1]
+        for values, label in zip(self.energies.T, ("kinetic", "potential")):
+            axes.plot(self.times, values, label=label)
+        axes.plot(self.times, self.energies.sum(axis=1), label="sum")
+        axes.set_xlabel("time (s)")
+        axes.set_ylabel("energy (J)")
+        axes.legend()
+        return axes
+
+    def plot_contacts(self, ax: Axes | None = None) -> Axes:
+        """Plots the normal impulse (N s) of each pair of bodies that touch, in each step.
+
+        Returns the axes.
+        """
+        import matplotlib.pyplot as plt
+
+        axes: Axes = ax if ax is not None else plt.subplots()[1]
+        of_pair: dict[tuple[str, str], list[int]] = {}
+        for row, pair in enumerate(self.contacts.bodies):
+            of_pair.setdefault(pair, []).append(row)
+        for (first, second), rows in of_pair.items():
+            times, place = np.unique(self.contacts.time[rows], return_inverse=True)
+            impulses = np.bincount(place, weights=self.contacts.normal_impulse[rows])
+            axes.plot(times, impulses, ".", label=f"{first} on {second}")
+        axes.set_xlabel("time (s)")
+        axes.set_ylabel("normal impulse (N s)")
+        if of_pair:
+            axes.legend()
+        return axes
+
+    def plot_margins(self, ax: Axes | None = None) -> Axes:
+        """Plots how near each step is to a kink of its derivatives, and below which margin the
+        verdict says so (1e-6).
+
+        Returns the axes.
+
+        Raises:
+            ValueError: The certificate was not asked for.
+        """
+        import matplotlib.pyplot as plt
+
+        if self.certificate is None:
+            raise ValueError("plot_margins: expected a run with its certificate (certify=True)")
+        axes: Axes = ax if ax is not None else plt.subplots()[1]
+        steps = (np.arange(len(self.margins)) + 1.0) * (self.times[-1] / max(len(self.margins), 1))
+        near = np.isfinite(self.margins)
+        # A margin of 0 has no logarithm: it is drawn at the bottom.
+        axes.semilogy(steps[near], np.maximum(self.margins[near], 1e-16), ".")
+        axes.axhline(1e-6, color="0.6", lw=1)
+        axes.set_xlabel("time (s)")
+        axes.set_ylabel("margin")
+        axes.set_title(str(self.certificate["verdict"]))
         return axes
 
     def __repr__(self) -> str:

@@ -85,6 +85,7 @@ void RolloutCertifier::OneSided(const std::string& reason) {
 }
 
 void RolloutCertifier::AddMargin(double margin, const Place& place, const std::string& what) {
+  step_margin_ = std::min(step_margin_, std::max(margin, 0.0));
   if (margin < certificate_.margin_min) {
     certificate_.margin_min = std::max(margin, 0.0);
     certificate_.margin_where = place.Text() + ", " + what;
@@ -221,6 +222,7 @@ void RolloutCertifier::AddFeatures(const Model<double>& model, const StepRecord&
 
 void RolloutCertifier::AddStep(const Model<double>& model, long step, Stepper* stepper) {
   if (!coordinates_) coordinates_.emplace(model);
+  step_margin_ = std::numeric_limits<double>::infinity();
   const StepRecord& at = stepper->record();
   coordinates_->LookAtContacts(at.before, at.time, at.contacts);
   coordinates_->LookAtJoints(model, at.before, at.time);

@@ -48,6 +48,8 @@ class RolloutCertifier {
   void AddStep(const Model<double>& model, long step, Stepper* stepper);
   /// The certificate with its verdict, after the last step.
   Certificate Finish(const Model<double>& model, const RolloutReport& report);
+  /// Smallest margin of the last step that was added; infinite if nothing was near.
+  double step_margin() const { return step_margin_; }
   /// Smallest relative distance to a decision at which values jump; infinite if there was none.
   double jump_margin() const { return jump_margin_; }
 
@@ -82,6 +84,7 @@ class RolloutCertifier {
   CertifyOptions options_;
   Certificate certificate_;
   std::optional<CoordinateWatch> coordinates_;  ///< from the first step on
+  double step_margin_ = std::numeric_limits<double>::infinity();
   double jump_margin_ = std::numeric_limits<double>::infinity();
   std::string jump_where_;
   std::string landing_;                ///< of the last step; empty if nothing landed in it
