@@ -40,11 +40,11 @@ DiscretisationCheck CheckDiscretisation(const FitProblem& problem, const FitResu
   }
   ParameterizedScene scene;
   ParameterError error;
-  if (!scene.Create(half.scene, half.points, half.parameters, &error)) {
+  if (!scene.Create(half.scene, half.points, half.parameters, &error, half.instruments)) {
     check.message = error.what;
     return check;
   }
-  RolloutResiduals residuals(scene, half.observations);
+  RolloutResiduals residuals(scene, half.observations, half.channels);
   const FitResult fine = Fit(half.options, &residuals, {}, log);
   check.status = fine.status;
   check.message = fine.message;

@@ -48,7 +48,9 @@ struct FitProblem {
   std::vector<BodyPoint> points;
   std::vector<FitParameter> parameters;
   std::vector<Observation> observations;
-  std::vector<std::string> files;  ///< of the observations, as written
+  Instruments instruments;
+  std::vector<Channel> channels;   ///< of the observations; empty: they are made directly
+  std::vector<std::string> files;  ///< of the channels, as written
   FitOptions options;
 };
 

@@ -195,7 +195,23 @@ std::uint64_t Fingerprint(const FitProblem& problem) {
       hash.Add(static_cast<int>(set.mode));
     }
   }
+  Instruments instruments = problem.instruments;
+  for (const InstrumentNumber& number : EnumerateNumbers(&instruments)) {
+    hash.Add(number.path);
+    hash.Add(*number.value);
+  }
+  for (const Camera& camera : problem.instruments.cameras) {
+    hash.Add(camera.marker_body);
+    hash.Add(camera.marker_point);
+  }
+  for (const Channel& channel : problem.channels) {
+    for (const int number :
+         {channel.sensor, channel.camera, channel.clock, channel.to_body, channel.to_point}) {
+      hash.Add(number);
+    }
+  }
   for (const Observation& o : problem.observations) {
+    hash.Add(o.channel);
     hash.AddAll(std::array<double, 2>{static_cast<double>(o.body), static_cast<double>(o.point)});
     hash.Add(static_cast<int>(o.coordinate));
     hash.AddAll(std::array<double, 3>{o.time, o.value, o.sigma});

@@ -48,8 +48,8 @@ struct ShootingResiduals::Run {
   State<double> state;
   RowMatrixXd
       w_dot;  ///< variables x [parameters | state at the segment's start]; no rows: values only
-  std::vector<double> poses;
-  RowMatrixXd pose_derivatives;
+  std::vector<double> samples;
+  RowMatrixXd sample_derivatives;
   std::vector<int> segment_of_sample;
   Eigen::VectorXd* residuals = nullptr;
   RowMatrixXd* jacobian = nullptr;
@@ -111,13 +111,17 @@ void ShootingResiduals::AddShares(int segment, long k, Run* run) const {
       continue;
     }
     run->segment_of_sample[share.sample] = segment;
-    for (int i = 0; i < 3; ++i) {
-      run->poses[3 * static_cast<size_t>(share.sample) + i] +=
-          share.weight * run->state.pose[3 * sample.body + i];
-    }
-    if (run->jacobian != nullptr) {
-      run->pose_derivatives.middleRows(3 * share.sample, 3) +=
-          share.weight * run->w_dot.middleRows(3 * sample.body, 3);
+    const int width = plan.width();
+    const ModelStructure& structure = *residuals_->scene().model().structure;
+    for (int i = 0; i < width; ++i) {
+      const std::vector<double>& numbers = i < 3 ? run->state.pose : run->state.twist;
+      run->samples[static_cast<size_t>(width) * share.sample + i] +=
+          share.weight * numbers[3 * static_cast<size_t>(sample.body) + i % 3];
+      if (run->jacobian != nullptr) {
+        const int row = i < 3 ? structure.PoseVariable(sample.body, i)
+                              : structure.TwistVariable(sample.body, i - 3);
+        run->sample_derivatives.row(width * share.sample + i) += share.weight * run->w_dot.row(row);
+      }
     }
   }
 }
@@ -197,7 +201,8 @@ bool ShootingResiduals::Compute(const Eigen::VectorXd& unknowns, Eigen::VectorXd
   Run run;
   run.unknowns = &unknowns;
   run.state = scene.initial_state();
-  run.poses.assign(3 * static_cast<size_t>(num_samples), 0.0);
+  const int width = residuals_->plan().width();
+  run.samples.assign(static_cast<size_t>(width * num_samples), 0.0);
   run.segment_of_sample.assign(static_cast<size_t>(num_samples), 0);
   run.residuals = residuals;
   run.jacobian = jacobian;
@@ -208,7 +213,7 @@ bool ShootingResiduals::Compute(const Eigen::VectorXd& unknowns, Eigen::VectorXd
     run.w_dot.leftCols(num_parameters_) =
         scene.VariableDerivatives() *
         ParametersByInternal(scene.entries(), ToParameters(scene.entries(), q)).asDiagonal();
-    run.pose_derivatives.setZero(3 * num_samples, num_parameters_ + state_size_);
+    run.sample_derivatives.setZero(width * num_samples, num_parameters_ + state_size_);
   }
   for (int segment = 0; segment < num_segments(); ++segment) {
     if (!RunSegment(segment, &run)) {
@@ -218,7 +223,7 @@ bool ShootingResiduals::Compute(const Eigen::VectorXd& unknowns, Eigen::VectorXd
       Meet(segment, &run);
     }
   }
-  residuals->head(num_observations()) = residuals_->FromPoses(run.poses);
+  residuals->head(num_observations()) = residuals_->FromSamples(run.samples);
   if (jacobian != nullptr) {
     Scatter(run);
   }
@@ -227,8 +232,8 @@ bool ShootingResiduals::Compute(const Eigen::VectorXd& unknowns, Eigen::VectorXd
 
 void ShootingResiduals::Scatter(const Run& run) const {
   const ParameterizedScene& scene = residuals_->scene();
-  const RowMatrixXd local = residuals_->FromPoseDerivatives(
-      run.poses, run.pose_derivatives,
+  const RowMatrixXd local = residuals_->FromSampleDerivatives(
+      run.samples, {}, run.sample_derivatives,
       ParametersByInternal(scene.entries(),
                            ToParameters(scene.entries(), run.unknowns->head(num_parameters_))));
   for (int i = 0; i < num_observations(); ++i) {

@@ -1,8 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tangible/estimation/problem/observation.h"
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <map>
+#include <numbers>
+#include <numeric>
 #include <sstream>
 #include <tuple>
 
@@ -12,23 +16,14 @@
 namespace tangible {
 namespace {
 
-constexpr std::array<Coordinate, 3> kCoordinates = {Coordinate::kX, Coordinate::kY,
-                                                    Coordinate::kAngle};
+constexpr std::array<const char*, kCoordinates> kNames = {"x",  "y",     "angle",   "vx",
+                                                          "vy", "omega", "distance"};
 
 // Times that were written as a decimal may miss the end of the run by rounding.
 constexpr double kTimeTolerance = 1e-9;
 
-double SigmaOf(const ObservationSigma& sigma, Coordinate coordinate) {
-  switch (coordinate) {
-    case Coordinate::kX:
-      return sigma.x;
-    case Coordinate::kY:
-      return sigma.y;
-    case Coordinate::kAngle:
-      return sigma.angle;
-  }
-  return sigma.x;
-}
+// Samples over which a rate is taken to lead on to the next angle.
+constexpr size_t kUnwrapSamples = 10;
 
 template <typename Items>
 std::string Names(const Items& items) {
@@ -42,10 +37,11 @@ std::string Names(const Items& items) {
 /// Turns the rows of one table into observations.
 class RowReader {
  public:
-  RowReader(const CsvTable& table, const Scene& scene, const std::vector<BodyPoint>& points,
-            std::string* error)
-      : table_(table), scene_(scene), points_(points), error_(error) {
-    by_point_ = table.Column("point") >= 0;
+  RowReader(const CsvTable& table, const ObservedScene& scene, const ObservationOptions& options,
+            std::vector<Channel>* channels, std::string* error)
+      : table_(table), scene_(scene), options_(options), channels_(channels), error_(error) {
+    by_point_ = table_.Column("point") >= 0;
+    relative_to_ = table_.Column("relative_to");
   }
 
   /// Checks that the header says who is observed and what.
@@ -55,31 +51,39 @@ class RowReader {
                 (by_point_ ? "both" : "neither");
       return false;
     }
-    for (const Coordinate coordinate : kCoordinates) {
-      if (table_.Column(NameOf(coordinate)) >= 0) {
+    for (const char* name : kNames) {
+      if (table_.Column(name) >= 0) {
         return true;
       }
     }
-    *error_ = table_.file + ": header: expected a column x, y or angle, got none of them";
+    *error_ =
+        table_.file +
+        ": header: expected a column x, y, angle, vx, vy, omega or distance, got none of them";
     return false;
   }
 
   bool Read(int row, const ObservationSigma& sigma, std::vector<Observation>* observations) {
     Observation observation;
+    Channel channel = options_.channel;
     if (!ReadCell(table_, row, table_.Column("time"), &observation.time, error_) ||
-        !CheckTime(row, &observation.time) || !FindTarget(row, &observation)) {
+        !FindObserved(row, &observation) || !FindReference(row, &channel) ||
+        !CheckTime(row, channel, &observation.time)) {
       return false;
     }
-    for (const Coordinate coordinate : kCoordinates) {
-      const int column = table_.Column(NameOf(coordinate));
+    for (int i = 0; i < kCoordinates; ++i) {
+      const int column = table_.Column(kNames[i]);
       if (column < 0 || table_.rows[row][column].empty()) {
         continue;
       }
-      observation.coordinate = coordinate;
-      observation.sigma = SigmaOf(sigma, coordinate);
+      observation.coordinate = static_cast<Coordinate>(i);
+      observation.sigma = sigma.Of(observation.coordinate);
+      if (observation.coordinate == Coordinate::kDistance && channel.to_body < 0) {
+        return Fail(row, "distance: expected relative_to to name a body or point, got none");
+      }
       if (!ReadCell(table_, row, column, &observation.value, error_)) {
         return false;
       }
+      observation.channel = NumberOf(channel);
       observations->push_back(observation);
     }
     return true;
@@ -91,57 +95,116 @@ class RowReader {
     return false;
   }
 
-  bool CheckTime(int row, double* time) {
-    const double duration = scene_.simulation.duration;
-    const double slack = kTimeTolerance * scene_.simulation.dt;
-    if (*time < -slack || *time > duration + slack) {
+  bool CheckTime(int row, const Channel& channel, double* time) {
+    const double duration = scene_.scene.simulation.duration;
+    const double slack = kTimeTolerance * scene_.scene.simulation.dt;
+    const double in_run = RunTime(scene_.instruments, channel, *time);
+    if (in_run < -slack || in_run > duration + slack) {
       std::ostringstream what;
       what << "time: expected a time within the run, [0, " << duration << "] s, got " << *time;
+      if (in_run != *time) {
+        what << ", which is " << in_run << " of the run by clock and delay";
+      }
       return Fail(row, what.str());
     }
-    *time = *time < 0.0 ? 0.0 : (*time > duration ? duration : *time);
+    if (in_run == *time) {
+      *time = std::clamp(*time, 0.0, duration);
+    }
     return true;
   }
 
-  bool FindTarget(int row, Observation* observation) {
+  bool FindObserved(int row, Observation* observation) {
     const std::string& name = table_.rows[row][table_.Column(by_point_ ? "point" : "body")];
     if (by_point_) {
-      for (size_t i = 0; i < points_.size(); ++i) {
-        if (points_[i].name == name) {
+      for (size_t i = 0; i < scene_.points.size(); ++i) {
+        if (scene_.points[i].name == name) {
           observation->point = static_cast<int>(i);
-          observation->body = points_[i].body;
+          observation->body = scene_.points[i].body;
           return true;
         }
       }
-      return Fail(row, "point: expected the name of a point (" + Names(points_) + "), got \"" +
-                           name + "\"");
+      return Fail(row, "point: expected the name of a point (" + PointNames(scene_.points) +
+                           "), got \"" + name + "\"");
     }
-    for (size_t i = 0; i < scene_.bodies.size(); ++i) {
-      if (scene_.bodies[i].name == name) {
-        observation->body = static_cast<int>(i);
-        return true;
-      }
-    }
-    return Fail(row, "body: expected the name of a body (" + Names(scene_.bodies) + "), got \"" +
+    observation->body = FindTarget(scene_.scene, {}, name).body;
+    return observation->body >= 0 ||
+           Fail(row, "body: expected the name of a body (" + BodyNames(scene_.scene) + "), got \"" +
                          name + "\"");
   }
 
+  bool FindReference(int row, Channel* channel) {
+    if (relative_to_ < 0 || table_.rows[row][relative_to_].empty()) {
+      return true;
+    }
+    const std::string& name = table_.rows[row][relative_to_];
+    const BodyOrPoint target = FindTarget(scene_.scene, scene_.points, name);
+    channel->to_body = target.body;
+    channel->to_point = target.point;
+    return target.body >= 0 || name == "world" ||
+           Fail(row, "relative_to: expected the name of a body (" + BodyNames(scene_.scene) +
+                         ") or point (" + PointNames(scene_.points) + "), got \"" + name + "\"");
+  }
+
+  int NumberOf(const Channel& channel) {
+    const auto place = std::find(channels_->begin(), channels_->end(), channel);
+    if (place != channels_->end()) {
+      return static_cast<int>(place - channels_->begin());
+    }
+    channels_->push_back(channel);
+    return static_cast<int>(channels_->size()) - 1;
+  }
+
   const CsvTable& table_;
-  const Scene& scene_;
-  const std::vector<BodyPoint>& points_;
+  const ObservedScene& scene_;
+  const ObservationOptions& options_;
+  std::vector<Channel>* channels_;
   std::string* error_;
   bool by_point_ = false;
+  int relative_to_ = -1;
 };
 
 const std::vector<std::string>& AllowedColumns() {
-  static const std::vector<std::string> columns = {"time", "body", "point", "x", "y", "angle"};
+  static const std::vector<std::string> columns = {
+      "time", "body", "point", "relative_to", "x", "y", "angle", "vx", "vy", "omega", "distance"};
   return columns;
 }
 
-bool FromTable(const CsvTable& table, const Scene& scene, const std::vector<BodyPoint>& points,
-               const ObservationSigma& sigma, std::vector<Observation>* observations,
-               std::string* error) {
-  RowReader reader(table, scene, points, error);
+/// Makes the angles of one series continuous; `order` are its observations by time.
+void UnwrapSeries(const std::vector<int>& order, std::vector<Observation>* observations) {
+  constexpr double kTurn = 2.0 * std::numbers::pi;
+  for (size_t k = 1; k < order.size(); ++k) {
+    const Observation& last = (*observations)[order[k - 1]];
+    const Observation& earlier = (*observations)[order[k - 1 - std::min(k - 1, kUnwrapSamples)]];
+    Observation& next = (*observations)[order[k]];
+    const double span = last.time - earlier.time;
+    const double rate = span > 0.0 ? (last.value - earlier.value) / span : 0.0;
+    const double expected = last.value + rate * (next.time - last.time);
+    next.value += kTurn * std::round((expected - next.value) / kTurn);
+  }
+}
+
+void Unwrap(size_t first, std::vector<Observation>* observations) {
+  const std::vector<Observation> own(observations->begin() + static_cast<std::ptrdiff_t>(first),
+                                     observations->end());
+  const ObservationSeries series = IndexSeries(own);
+  std::vector<std::vector<int>> members(series.size());
+  for (size_t i = 0; i < own.size(); ++i) {
+    if (own[i].coordinate == Coordinate::kAngle) {
+      members[series.of[i]].push_back(static_cast<int>(first + i));
+    }
+  }
+  for (std::vector<int>& order : members) {
+    std::stable_sort(order.begin(), order.end(), [&](int a, int b) {
+      return (*observations)[a].time < (*observations)[b].time;
+    });
+    UnwrapSeries(order, observations);
+  }
+}
+
+bool FromTable(const CsvTable& table, const ObservedScene& scene, const ObservationSigma& sigma,
+               const ObservationOptions& options, std::vector<Channel>* channels,
+               std::vector<Observation>* observations, std::string* error) {
+  RowReader reader(table, scene, options, channels, error);
   if (!reader.CheckHeader()) {
     return false;
   }
@@ -155,29 +218,68 @@ bool FromTable(const CsvTable& table, const Scene& scene, const std::vector<Body
     *error = table.file + ": expected at least one measured coordinate, got none";
     return false;
   }
+  if (options.unwrap) {
+    Unwrap(before, observations);
+  }
   return true;
 }
 
 }  // namespace
 
-const char* NameOf(Coordinate coordinate) {
+const char* NameOf(Coordinate coordinate) { return kNames[static_cast<size_t>(coordinate)]; }
+
+const char* UnitOf(Coordinate coordinate) {
   switch (coordinate) {
     case Coordinate::kX:
-      return "x";
     case Coordinate::kY:
-      return "y";
+    case Coordinate::kDistance:
+      return "m";
     case Coordinate::kAngle:
-      return "angle";
+      return "rad";
+    case Coordinate::kVx:
+    case Coordinate::kVy:
+      return "m/s";
+    case Coordinate::kOmega:
+      return "rad/s";
   }
   return "";
 }
 
-const char* UnitOf(Coordinate coordinate) { return coordinate == Coordinate::kAngle ? "rad" : "m"; }
+double ObservationSigma::Of(Coordinate coordinate) const {
+  const double all[kCoordinates] = {x, y, angle, vx, vy, omega, distance};
+  return all[static_cast<size_t>(coordinate)];
+}
+
+BodyOrPoint FindTarget(const Scene& scene, const std::vector<BodyPoint>& points,
+                       const std::string& name) {
+  for (size_t i = 0; i < points.size(); ++i) {
+    if (points[i].name == name) {
+      return {points[i].body, static_cast<int>(i)};
+    }
+  }
+  for (size_t i = 0; i < scene.bodies.size(); ++i) {
+    if (scene.bodies[i].name == name) {
+      return {static_cast<int>(i), -1};
+    }
+  }
+  return {};
+}
+
+std::string PointNames(const std::vector<BodyPoint>& points) { return Names(points); }
+
+std::string BodyNames(const Scene& scene) { return Names(scene.bodies); }
 
 std::string TargetName(const Scene& scene, const std::vector<BodyPoint>& points,
                        const Observation& observation) {
   return observation.point >= 0 ? points[observation.point].name
                                 : scene.bodies[observation.body].name;
+}
+
+std::string ReferenceName(const Scene& scene, const std::vector<BodyPoint>& points,
+                          const Channel& channel) {
+  return channel.to_point >= 0  ? points[channel.to_point].name
+         : channel.to_body >= 0 ? scene.bodies[channel.to_body].name
+                                : "";
 }
 
 ObservationSeries IndexSeries(const std::vector<Observation>& observations) {
@@ -186,7 +288,7 @@ ObservationSeries IndexSeries(const std::vector<Observation>& observations) {
   std::map<std::tuple<int, int, int, Coordinate>, int> known;
   for (size_t i = 0; i < observations.size(); ++i) {
     const Observation& observation = observations[i];
-    const std::tuple key(observation.file, observation.body, observation.point,
+    const std::tuple key(observation.channel, observation.body, observation.point,
                          observation.coordinate);
     const auto [place, inserted] = known.try_emplace(key, series.size());
     if (inserted) {
@@ -197,27 +299,31 @@ ObservationSeries IndexSeries(const std::vector<Observation>& observations) {
   return series;
 }
 
-bool ReadObservations(const std::string& file, const Scene& scene,
-                      const std::vector<BodyPoint>& points, const ObservationSigma& sigma,
-                      std::vector<Observation>* observations, std::string* error, int file_number) {
+bool ReadObservations(const std::string& file, const ObservedScene& scene,
+                      const ObservationSigma& sigma, const ObservationOptions& options,
+                      std::vector<Channel>* channels, std::vector<Observation>* observations,
+                      std::string* error) {
   CsvTable table;
-  const size_t before = observations->size();
-  if (!ReadCsv(file, {"time"}, AllowedColumns(), &table, error) ||
-      !FromTable(table, scene, points, sigma, observations, error)) {
-    return false;
-  }
-  for (size_t i = before; i < observations->size(); ++i) {
-    (*observations)[i].file = file_number;
-  }
-  return true;
+  return ReadCsv(file, {"time"}, AllowedColumns(), &table, error) &&
+         FromTable(table, scene, sigma, options, channels, observations, error);
+}
+
+bool ParseObservations(const std::string& text, const std::string& file, const ObservedScene& scene,
+                       const ObservationSigma& sigma, const ObservationOptions& options,
+                       std::vector<Channel>* channels, std::vector<Observation>* observations,
+                       std::string* error) {
+  CsvTable table;
+  return ParseCsv(text, file, {"time"}, AllowedColumns(), &table, error) &&
+         FromTable(table, scene, sigma, options, channels, observations, error);
 }
 
 bool ParseObservations(const std::string& text, const std::string& file, const Scene& scene,
                        const std::vector<BodyPoint>& points, const ObservationSigma& sigma,
                        std::vector<Observation>* observations, std::string* error) {
-  CsvTable table;
-  return ParseCsv(text, file, {"time"}, AllowedColumns(), &table, error) &&
-         FromTable(table, scene, points, sigma, observations, error);
+  const Instruments none;
+  std::vector<Channel> channels = {Channel()};
+  return ParseObservations(text, file, ObservedScene{scene, points, none}, sigma, {}, &channels,
+                           observations, error);
 }
 
 }  // namespace tangible

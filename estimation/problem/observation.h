@@ -4,20 +4,24 @@
 // Observations: coordinates of bodies, or of points fixed in them, that somebody measured.
 //
 // A file is a table (csv.h) with the columns `time` (s), `body` or `point` (a name), and any of
-// `x`, `y` (m) and `angle` (rad). A missing row or an empty cell is a coordinate that was not
-// measured. Times need not fall on steps nor be sorted; a coordinate may be measured more than
-// once. The angle of a point is that of its body.
+// `x`, `y` (m), `angle` (rad), `vx`, `vy` (m/s), `omega` (rad/s) and `distance` (m, to the body or
+// point that the column `relative_to` or the options name). A missing row or an empty cell is a
+// coordinate that was not measured. Times need not fall on steps nor be sorted; a coordinate may
+// be measured more than once. The angle and angular velocity of a point are those of its body.
+// What is relative is the difference to the other body or point, in the world's directions.
 
 #include <string>
 #include <vector>
 
+#include "tangible/estimation/problem/instruments.h"
 #include "tangible/scene/scene.h"
 
 namespace tangible {
 
-enum class Coordinate { kX, kY, kAngle };
+enum class Coordinate { kX, kY, kAngle, kVx, kVy, kOmega, kDistance };
+inline constexpr int kCoordinates = 7;
 
-/// "x", "y" or "angle".
+/// "x", "y", "angle", "vx", "vy", "omega", "distance".
 const char* NameOf(Coordinate coordinate);
 
 /// A point fixed in a body: r = position + R(angle) at.
@@ -29,16 +33,16 @@ struct BodyPoint {
 
 /// One measured coordinate.
 struct Observation {
-  double time = 0.0;  ///< s, within the run
+  double time = 0.0;  ///< s, by the recording's clock; without one: in the run
   int body = -1;
   int point = -1;  ///< index into the points; −1: the body's centre of mass
   Coordinate coordinate = Coordinate::kX;
-  double value = 0.0;  ///< m or rad
-  double sigma = 1.0;  ///< m or rad: standard deviation of its noise
-  int file = 0;        ///< which of the files it is from
+  double value = 0.0;  ///< m, rad, m/s or rad/s; through a camera lengths are in its units
+  double sigma = 1.0;  ///< the same: standard deviation of its noise
+  int channel = 0;     ///< how it was made
 };
 
-/// Observations of the same coordinate of the same body or point from the same file.
+/// Observations of the same coordinate of the same body or point by the same channel.
 struct ObservationSeries {
   std::vector<int> of;     ///< of each observation its series, from 0 in the order of appearance
   std::vector<int> first;  ///< of each series its first observation
@@ -48,29 +52,74 @@ struct ObservationSeries {
 
 ObservationSeries IndexSeries(const std::vector<Observation>& observations);
 
-/// Standard deviations by coordinate, > 0.
+/// Standard deviations by coordinate, > 0; NaN: the coordinate must not be measured.
 struct ObservationSigma {
-  double x = 1.0;      ///< m
-  double y = 1.0;      ///< m
-  double angle = 1.0;  ///< rad
+  double x = 1.0;         ///< m
+  double y = 1.0;         ///< m
+  double angle = 1.0;     ///< rad
+  double vx = 1.0;        ///< m/s
+  double vy = 1.0;        ///< m/s
+  double omega = 1.0;     ///< rad/s
+  double distance = 1.0;  ///< m
+
+  double Of(Coordinate coordinate) const;
 };
+
+/// How the rows of a file were made.
+struct ObservationOptions {
+  Channel channel;  ///< its relative_to is that of rows whose own is empty
+  /// Whether angles jump by whole turns where they leave a range, and are to be made continuous:
+  /// each is the one nearest to what the last ones, up to ten, lead to at their mean rate.
+  bool unwrap = false;
+};
+
+/// A body or point by name.
+struct BodyOrPoint {
+  int body = -1;
+  int point = -1;
+};
+
+/// The point with this name, or else the body; none: body −1.
+BodyOrPoint FindTarget(const Scene& scene, const std::vector<BodyPoint>& points,
+                       const std::string& name);
+
+/// The names of all, for a message; "none" where there are none.
+std::string PointNames(const std::vector<BodyPoint>& points);
+std::string BodyNames(const Scene& scene);
 
 /// What is observed: the name of the point, or of the body.
 std::string TargetName(const Scene& scene, const std::vector<BodyPoint>& points,
                        const Observation& observation);
 
-/// "m" or "rad".
+/// What it is relative to; empty: to the world.
+std::string ReferenceName(const Scene& scene, const std::vector<BodyPoint>& points,
+                          const Channel& channel);
+
+/// "m", "rad", "m/s" or "rad/s".
 const char* UnitOf(Coordinate coordinate);
 
-/// Reads a file and appends to `observations` with the number of the file. On failure sets one line
-/// "file: line 3: what, expected, got": a name that the scene or the points do not have, a time
-/// outside [0, duration], no measured coordinate at all.
-bool ReadObservations(const std::string& file, const Scene& scene,
-                      const std::vector<BodyPoint>& points, const ObservationSigma& sigma,
-                      std::vector<Observation>* observations, std::string* error,
-                      int file_number = 0);
+/// What observations refer to.
+struct ObservedScene {
+  const Scene& scene;
+  const std::vector<BodyPoint>& points;
+  const Instruments& instruments;
+};
+
+/// Reads a file and appends to `observations` and, a new one for each reference, to `channels`. On
+/// failure sets one line "file: line 3: what, expected, got": a name that the scene or the points
+/// do not have, a time outside the run, no measured coordinate at all.
+bool ReadObservations(const std::string& file, const ObservedScene& scene,
+                      const ObservationSigma& sigma, const ObservationOptions& options,
+                      std::vector<Channel>* channels, std::vector<Observation>* observations,
+                      std::string* error);
 
 /// The same from text.
+bool ParseObservations(const std::string& text, const std::string& file, const ObservedScene& scene,
+                       const ObservationSigma& sigma, const ObservationOptions& options,
+                       std::vector<Channel>* channels, std::vector<Observation>* observations,
+                       std::string* error);
+
+/// Observations without instruments, relative to the world.
 bool ParseObservations(const std::string& text, const std::string& file, const Scene& scene,
                        const std::vector<BodyPoint>& points, const ObservationSigma& sigma,
                        std::vector<Observation>* observations, std::string* error);

@@ -75,15 +75,26 @@ bool Contains(const Range& range, double x) {
          (range.high_excluded ? x < range.high : x <= range.high);
 }
 
+/// Whether a path names a number of a point or an instrument, and none of the scene.
+bool IsOfMeasurement(const std::string& path) {
+  for (const char* kind : {"points/", "sensors/", "cameras/", "clocks/"}) {
+    if (path.rfind(kind, 0) == 0) {
+      return true;
+    }
+  }
+  return false;
+}
+
 constexpr const char* kAtNames[2] = {"/at/x", "/at/y"};
 
 }  // namespace
 
 bool ParameterizedScene::Create(const Scene& scene, const std::vector<BodyPoint>& points,
-                                const std::vector<FitParameter>& parameters,
-                                ParameterError* error) {
+                                const std::vector<FitParameter>& parameters, ParameterError* error,
+                                const Instruments& instruments) {
   scene_ = scene;
   points_ = points;
+  instruments_ = instruments;
   num_scene_numbers_ = static_cast<int>(EnumerateNumbers(&scene_).size());
   entries_.clear();
   numbers_.clear();
@@ -98,12 +109,21 @@ bool ParameterizedScene::Create(const Scene& scene, const std::vector<BodyPoint>
   }
   CollectTargets();
   directions_.assign(entries_.size(), {});
-  point_derivatives_ = RowMatrixXd::Zero(2 * static_cast<Eigen::Index>(points_.size()), size());
+  const std::vector<InstrumentNumber> measured = MeasurementNumbers();
+  const int num_point_numbers = 2 * static_cast<int>(points_.size());
+  point_derivatives_ = RowMatrixXd::Zero(num_point_numbers, size());
+  instrument_derivatives_ =
+      RowMatrixXd::Zero(static_cast<Eigen::Index>(measured.size()) - num_point_numbers, size());
+  moves_times_ = false;
   for (const NumberSet& set : numbers_) {
-    if (set.number < num_scene_numbers_) {
+    const int number = set.number - num_scene_numbers_;
+    if (number < 0) {
       directions_[set.parameter].push_back({set.number, set.scale});
+    } else if (number < num_point_numbers) {
+      point_derivatives_(number, set.parameter) = set.scale;
     } else {
-      point_derivatives_(set.number - num_scene_numbers_, set.parameter) = set.scale;
+      instrument_derivatives_(number - num_point_numbers, set.parameter) = set.scale;
+      moves_times_ = moves_times_ || measured[number].moves_time;
     }
   }
   structure_ = BuildStructure(scene_);
@@ -162,7 +182,7 @@ bool ParameterizedScene::AddSet(const ParameterSet& set, double* value, double* 
     return false;
   }
   error->key = "path";
-  if (set.path.rfind("points/", 0) != 0) {
+  if (!IsOfMeasurement(set.path)) {
     ParameterPath path;
     if (!ResolveParameter(scene_, set.path, &path, &error->what)) {
       return false;
@@ -177,28 +197,49 @@ bool ParameterizedScene::AddSet(const ParameterSet& set, double* value, double* 
     }
     return true;
   }
+  return AddMeasurementSet(set, value, scale, error);
+}
+
+bool ParameterizedScene::AddMeasurementSet(const ParameterSet& set, double* value, double* scale,
+                                           ParameterError* error) {
   bool matched = false;
   std::string names;
-  for (size_t i = 0; i < points_.size(); ++i) {
-    names += (i == 0 ? "" : ", ") + points_[i].name;
-    for (int axis = 0; axis < 2; ++axis) {
-      const std::string path = "points/" + points_[i].name + kAtNames[axis];
-      if (!MatchesPath(set.path, path)) {
-        continue;
-      }
-      *value = matched ? *value : points_[i].at[axis];
-      matched = true;
-      const int number = num_scene_numbers_ + 2 * static_cast<int>(i) + axis;
-      if (!AddNumber(number, NumberKind::kFree, path, set, error)) {
-        return false;
-      }
+  const std::vector<InstrumentNumber> numbers = MeasurementNumbers();
+  for (size_t i = 0; i < numbers.size(); ++i) {
+    names += (i == 0 ? "" : ", ") + numbers[i].path;
+    if (!MatchesPath(set.path, numbers[i].path)) {
+      continue;
+    }
+    if (!matched) {
+      *value = *numbers[i].value;
+      // A time is of the size of a step.
+      *scale = numbers[i].moves_time && numbers[i].kind == NumberKind::kFree ? scene_.simulation.dt
+                                                                             : 1.0;
+    }
+    matched = true;
+    const int number = num_scene_numbers_ + static_cast<int>(i);
+    if (!AddNumber(number, numbers[i].kind, numbers[i].path, set, error)) {
+      return false;
     }
   }
-  error->what =
-      "parameter " + set.path +
-      ": matches no number, expected points/<name>/at/x or points/<name>/at/y; points are: " +
-      (names.empty() ? "none" : names);
+  error->what = "parameter " + set.path + ": matches no number; of points, sensors, cameras and " +
+                "clocks there are: " + (names.empty() ? "none" : names);
   return matched;
+}
+
+/// Those of the points, then those of the instruments.
+std::vector<InstrumentNumber> ParameterizedScene::MeasurementNumbers() {
+  std::vector<InstrumentNumber> numbers;
+  for (BodyPoint& point : points_) {
+    for (int axis = 0; axis < 2; ++axis) {
+      numbers.push_back(
+          {"points/" + point.name + kAtNames[axis], &point.at[axis], NumberKind::kFree});
+    }
+  }
+  for (const InstrumentNumber& number : EnumerateNumbers(&instruments_)) {
+    numbers.push_back(number);
+  }
+  return numbers;
 }
 
 bool ParameterizedScene::AddNumber(int number, NumberKind kind, const std::string& path,
@@ -295,14 +336,15 @@ std::vector<bool> ParameterizedScene::NumbersSet() const {
 
 void ParameterizedScene::CollectTargets() {
   const auto numbers = EnumerateNumbers(&scene_);
+  const std::vector<InstrumentNumber> measured = MeasurementNumbers();
   targets_.clear();
   for (size_t i = 0; i < numbers_.size(); ++i) {
     const NumberSet& set = numbers_[i];
     auto target = std::find_if(targets_.begin(), targets_.end(),
                                [&](const Target& other) { return other.number == set.number; });
     if (target == targets_.end()) {
-      const int point = set.number - num_scene_numbers_;
-      const double own = point < 0 ? *numbers[set.number].value : points_[point / 2].at[point % 2];
+      const int other = set.number - num_scene_numbers_;
+      const double own = other < 0 ? *numbers[set.number].value : *measured[other].value;
       target = targets_.insert(target, {set.number, set.kind, own, {}});
     }
     target->sets.push_back(static_cast<int>(i));
@@ -314,6 +356,7 @@ void ParameterizedScene::CollectTargets() {
 
 bool ParameterizedScene::Set(const Eigen::VectorXd& p) {
   const auto numbers = EnumerateNumbers(&scene_);
+  const std::vector<InstrumentNumber> measured = MeasurementNumbers();
   for (const Target& target : targets_) {
     double value = target.base;
     for (const int i : target.sets) {
@@ -325,24 +368,15 @@ bool ParameterizedScene::Set(const Eigen::VectorXd& p) {
     if (target.number < num_scene_numbers_) {
       *numbers[target.number].value = value;
     } else {
-      const int i = target.number - num_scene_numbers_;
-      points_[i / 2].at[i % 2] = value;
+      *measured[target.number - num_scene_numbers_].value = value;
     }
   }
   BuildModelWithStructure(scene_, structure_, &model_, &state_);
   return true;
 }
 
-void ParameterizedScene::Shorten(double duration) {
-  scene_.simulation.duration = duration;
-  std::vector<double>& times = scene_.simulation.step_times;
-  times.erase(std::upper_bound(times.begin(), times.end(), duration), times.end());
-  structure_ = BuildStructure(scene_);
-  BuildModelWithStructure(scene_, structure_, &model_, &state_);
-}
-
-void ParameterizedScene::SplitSteps(const std::vector<double>& times) {
-  AddStepTimes(times, &scene_.simulation);
+void ParameterizedScene::SetSimulation(const SimulationSettings& settings) {
+  scene_.simulation = settings;
   structure_ = BuildStructure(scene_);
   BuildModelWithStructure(scene_, structure_, &model_, &state_);
 }

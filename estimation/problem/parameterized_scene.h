@@ -5,7 +5,8 @@
 //
 //   number_i = scale_i p_k + offset_i        each parameter k sets one or several numbers i
 //
-// of the scene or of the observed points (`points/tip/at/x`); no number is set by two. Further
+// of the scene, of the observed points (`points/tip/at/x`) or of the instruments
+// (`sensors/encoder/delay`); no number is set by two. Further
 // parameters may add to a number: it is then what the one sets, or else the scene's own value, plus
 // the sum of scale p + offset of those that add (a pivot moves all that hangs from it, a length
 // what hangs below). From the numbers the model and the initial state are rebuilt with an unchanged
@@ -72,7 +73,8 @@ class ParameterizedScene {
   /// twice, a name is used twice, bounds are crossed or allow values that a number may not take, or
   /// the initial value is outside them.
   bool Create(const Scene& scene, const std::vector<BodyPoint>& points,
-              const std::vector<FitParameter>& parameters, ParameterError* error);
+              const std::vector<FitParameter>& parameters, ParameterError* error,
+              const Instruments& instruments = {});
 
   int size() const { return static_cast<int>(entries_.size()); }
   /// Which of the scene's numbers (EnumerateNumbers) some parameter sets or adds to.
@@ -84,13 +86,15 @@ class ParameterizedScene {
   /// may not.
   bool Set(const Eigen::VectorXd& p);
 
-  /// Ends the run at `duration`, s.
-  void Shorten(double duration);
-  /// Makes steps end at these times too.
-  void SplitSteps(const std::vector<double>& times);
+  /// Changes when the steps of the run end.
+  void SetSimulation(const SimulationSettings& settings);
+
+  /// Whether some parameter changes what time of the run an observation is of.
+  bool MovesTimes() const { return moves_times_; }
 
   const Scene& scene() const { return scene_; }
   const std::vector<BodyPoint>& points() const { return points_; }
+  const Instruments& instruments() const { return instruments_; }
   const Model<double>& model() const { return model_; }
   const State<double>& initial_state() const { return state_; }
 
@@ -98,6 +102,8 @@ class ParameterizedScene {
   RowMatrixXd VariableDerivatives() const;
   /// d [at x, at y of each point] / d p: 2 points x size(), constant.
   const RowMatrixXd& point_derivatives() const { return point_derivatives_; }
+  /// d [numbers of the instruments] / d p, constant, in the order of EnumerateNumbers.
+  const RowMatrixXd& instrument_derivatives() const { return instrument_derivatives_; }
 
   /// The model in Jets, derivative k of which is that of parameter first + k.
   template <typename T>
@@ -105,7 +111,7 @@ class ParameterizedScene {
 
  private:
   struct NumberSet {
-    int parameter, number;  ///< number: into the scene's, then two a point
+    int parameter, number;  ///< number: into the scene's, then two a point, then the instruments'
     NumberKind kind;
     double scale, offset;
     SetMode mode;
@@ -124,15 +130,21 @@ class ParameterizedScene {
                  ParameterError* error);
   bool SetBounds(const FitParameter& parameter, Entry* entry, ParameterError* error) const;
   static bool SetScaleAndPrior(const FitParameter& parameter, Entry* entry, ParameterError* error);
+  bool AddMeasurementSet(const ParameterSet& set, double* value, double* scale,
+                         ParameterError* error);
+  std::vector<InstrumentNumber> MeasurementNumbers();
   void CollectTargets();
 
   Scene scene_;
   std::vector<BodyPoint> points_;
+  Instruments instruments_;
   std::vector<Entry> entries_;
   std::vector<NumberSet> numbers_;
   std::vector<Target> targets_;
   std::vector<ParameterDirection> directions_;  ///< of the scene's numbers
   RowMatrixXd point_derivatives_;
+  RowMatrixXd instrument_derivatives_;
+  bool moves_times_ = false;
   int num_scene_numbers_ = 0;
   std::shared_ptr<const ModelStructure> structure_;
   Model<double> model_;

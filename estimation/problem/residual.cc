@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <sstream>
 #include <utility>
 
 #include "tangible/estimation/problem/consistency.h"
@@ -22,15 +23,18 @@ constexpr double kDifferenceStep = 6e-6;
 // Of an observed value: a run's rounding and what its projections leave.
 constexpr double kRounding = 1e-9;
 
-/// Adds a state's share to the poses of its samples.
-void AddShares(const SamplePlan& plan, long k, const std::vector<double>& pose,
-               std::vector<double>* poses) {
-  for (const SampleShare& share : plan.SharesAt(k)) {
-    const int body = plan.samples()[share.sample].body;
-    for (int i = 0; i < 3; ++i) {
-      (*poses)[3 * static_cast<size_t>(share.sample) + i] += share.weight * pose[3 * body + i];
-    }
-  }
+// Of a step: a time that leaves the run by no more has done so by rounding.
+constexpr double kTimeTolerance = 1e-9;
+
+/// Whether the coordinate needs a twist.
+bool IsRate(Coordinate coordinate) {
+  return coordinate == Coordinate::kVx || coordinate == Coordinate::kVy ||
+         coordinate == Coordinate::kOmega;
+}
+
+/// Whether anything stands between the run and what is recorded.
+bool IsRecorded(const Channel& channel) {
+  return channel.sensor >= 0 || channel.camera >= 0 || channel.clock >= 0 || channel.to_body >= 0;
 }
 
 /// One parameter for each number of the scene that is not set.
@@ -56,17 +60,58 @@ std::vector<FitParameter> Candidates(const ParameterizedScene& scene) {
 
 }  // namespace
 
-RolloutResiduals::RolloutResiduals(ParameterizedScene scene, std::vector<Observation> observations)
-    : scene_(std::move(scene)), observations_(std::move(observations)) {
-  if (scene_.scene().simulation.stepping == Stepping::kEvent) {
-    std::vector<double> times;
-    for (const Observation& observation : observations_) {
-      times.push_back(observation.time);
-    }
-    scene_.SplitSteps(times);
+RolloutResiduals::RolloutResiduals(ParameterizedScene scene, std::vector<Observation> observations,
+                                   std::vector<Channel> channels)
+    : scene_(std::move(scene)),
+      settings_(scene_.scene().simulation),
+      observations_(std::move(observations)),
+      channels_(std::move(channels)) {
+  if (channels_.empty()) {
+    channels_.emplace_back();
   }
-  plan_ = SamplePlan(observations_, scene_.scene().simulation);
-  scene_.Shorten(StepTime(scene_.scene().simulation, plan_.last_step()));
+  for (const Channel& channel : channels_) {
+    markers_.push_back(
+        channel.camera < 0 ? -1 : scene_.instruments().cameras[channel.camera].marker_body);
+  }
+  for (const Observation& observation : observations_) {
+    sample_options_.twists = sample_options_.twists || IsRate(observation.coordinate);
+  }
+  sample_options_.rates = scene_.MovesTimes();
+  UpdateTimes();
+}
+
+bool RolloutResiduals::FindTimes(std::vector<double>* times) {
+  const double slack = kTimeTolerance * settings_.dt;
+  bool within = true;
+  times->reserve(observations_.size());
+  for (const Observation& observation : observations_) {
+    const double time = RunTime(scene_.instruments(), ChannelOf(observation), observation.time);
+    if (within && !(time >= -slack && time <= settings_.duration + slack)) {
+      within = false;
+      std::ostringstream what;
+      what << "what was recorded at " << observation.time << " s is of the time " << time
+           << " s of the run, which is outside of [0, " << settings_.duration
+           << "] s: bound delay or clock, or let the run begin earlier (a clock's offset)";
+      message_ = what.str();
+    }
+    times->push_back(std::clamp(time, 0.0, settings_.duration));
+  }
+  return within;
+}
+
+bool RolloutResiduals::UpdateTimes() {
+  std::vector<double> times;
+  const bool within = FindTimes(&times);
+  SimulationSettings settings = settings_;
+  if (settings.stepping == Stepping::kEvent) {
+    AddStepTimes(SplitTimes(times, settings, sample_options_), &settings);
+  }
+  plan_ = SamplePlan(observations_, times, channels_, markers_, settings, sample_options_);
+  settings.duration = StepTime(settings, plan_.last_step());
+  std::vector<double>& ends = settings.step_times;
+  ends.erase(std::upper_bound(ends.begin(), ends.end(), settings.duration), ends.end());
+  scene_.SetSimulation(settings);
+  return within;
 }
 
 std::vector<RowPlace> RolloutResiduals::Places(int /*block*/) const {
@@ -145,7 +190,7 @@ bool RolloutResiduals::Compute(const Eigen::VectorXd& p, DerivativeMethod method
   if (!done) {
     return false;
   }
-  *residuals = FromPoses(poses_);
+  *residuals = FromSamples(samples_);
   const bool finite = residuals->allFinite() && (jacobian == nullptr || jacobian->allFinite());
   if (!finite) {
     message_ = "a residual or its derivative is not finite";
@@ -155,12 +200,17 @@ bool RolloutResiduals::Compute(const Eigen::VectorXd& p, DerivativeMethod method
 
 bool RolloutResiduals::SetParameters(const Eigen::VectorXd& p) {
   message_.clear();
-  poses_.assign(3 * static_cast<size_t>(plan_.num_samples()), 0.0);
-  if (scene_.Set(p)) {
-    return true;
+  if (!scene_.Set(p)) {
+    message_ = "a parameter sets a number to a value that it may not take";
+    return false;
   }
-  message_ = "a parameter sets a number to a value that it may not take";
-  return false;
+  if (scene_.MovesTimes() && !UpdateTimes()) {
+    return false;
+  }
+  samples_.assign(static_cast<size_t>(plan_.width()) * static_cast<size_t>(plan_.num_samples()),
+                  0.0);
+  rates_.assign(plan_.has_rates() ? samples_.size() : 0, 0.0);
+  return true;
 }
 
 bool RolloutResiduals::Accept(const RolloutReport& report) {
@@ -174,37 +224,43 @@ bool RolloutResiduals::Plain() {
   return Accept(Rollout(
       scene_.model(), scene_.initial_state(),
       [this](long k, double, const State<double>& state, Stepper*) {
-        AddShares(plan_, k, state.pose, &poses_);
+        plan_.Add(k, state, &samples_, &rates_);
       },
       &final));
 }
 
 bool RolloutResiduals::Tangent(RowMatrixXd* jacobian) {
   RowMatrixXd w_dot = scene_.VariableDerivatives();
-  RowMatrixXd pose_derivatives =
-      RowMatrixXd::Zero(3 * static_cast<Eigen::Index>(plan_.num_samples()), num_parameters());
+  const int width = plan_.width();
+  const ModelStructure& structure = *scene_.model().structure;
+  RowMatrixXd sample_derivatives =
+      RowMatrixXd::Zero(width * static_cast<Eigen::Index>(plan_.num_samples()), num_parameters());
   State<double> final;
   const TangentObserver observer = [&](long k, double, const State<double>& state,
                                        const RowMatrixXd& dots) {
-    AddShares(plan_, k, state.pose, &poses_);
+    plan_.Add(k, state, &samples_, &rates_);
     for (const SampleShare& share : plan_.SharesAt(k)) {
       const int body = plan_.samples()[share.sample].body;
-      pose_derivatives.middleRows(3 * share.sample, 3) +=
-          share.weight * dots.middleRows(3 * body, 3);
+      sample_derivatives.middleRows(width * share.sample, 3) +=
+          share.weight * dots.middleRows(structure.PoseVariable(body, 0), 3);
+      if (width > 3) {
+        sample_derivatives.middleRows(width * share.sample + 3, 3) +=
+            share.weight * dots.middleRows(structure.TwistVariable(body, 0), 3);
+      }
     }
   };
   if (!Accept(RolloutTangent(scene_.model(), scene_.initial_state(), observer, &w_dot, &final))) {
     return false;
   }
-  *jacobian =
-      FromPoseDerivatives(poses_, pose_derivatives, Eigen::VectorXd::Ones(num_parameters()));
+  *jacobian = FromSampleDerivatives(samples_, rates_, sample_derivatives,
+                                    Eigen::VectorXd::Ones(num_parameters()));
   return true;
 }
 
 bool RolloutResiduals::Adjoint(RowMatrixXd* jacobian) {
   State<double> final;
   const StateObserver observer = [this](long k, double, const State<double>& state, Stepper*) {
-    AddShares(plan_, k, state.pose, &poses_);
+    plan_.Add(k, state, &samples_, &rates_);
   };
   if (!Accept(tape_.Record(scene_.model(), scene_.initial_state(), Factorisations::kKeep, observer,
                            &final))) {
@@ -220,31 +276,40 @@ bool RolloutResiduals::Adjoint(RowMatrixXd* jacobian) {
 
 void RolloutResiduals::AdjointBlock(int first, int count, const RowMatrixXd& variables,
                                     RowMatrixXd* jacobian) {
-  // The losses that read each sample: (loss, derivative by the sample's pose).
+  // The losses that read each sample: (loss, derivative by the sample's state).
   struct Reader {
     int loss;
-    double by_pose[3];
+    double by_state[6];
   };
   std::vector<std::vector<Reader>> readers(plan_.num_samples());
   long last = 0;  // step that is read
   for (int i = 0; i < count; ++i) {
-    const Observation& observation = observations_[first + i];
-    const int sample = plan_.sample_of()[first + i];
-    const Prediction prediction = PredictionOf(first + i, poses_);
-    last = std::max(last, plan_.samples()[sample].step + 1);
-    Reader reader{i, {}};
-    for (int j = 0; j < 3; ++j) {
-      reader.by_pose[j] = prediction.by_pose[j] / observation.sigma;
+    const double sigma = observations_[first + i].sigma;
+    const Prediction prediction = PredictionOf(first + i, samples_);
+    for (int place = 0; place < kPlaces; ++place) {
+      const int sample = plan_.SampleOf(first + i, place);
+      if (sample < 0) {
+        continue;
+      }
+      last = std::max(last, plan_.samples()[sample].step + 1);
+      Reader reader{i, {}};
+      for (int j = 0; j < 6; ++j) {
+        reader.by_state[j] = prediction.by_state[place][j] / sigma;
+      }
+      readers[sample].push_back(reader);
     }
-    readers[sample].push_back(reader);
-    jacobian->row(first + i) = PointTerm(observation, prediction);
+    jacobian->row(first + i) = DirectTerm(first + i, prediction, rates_);
   }
+  const ModelStructure& structure = *scene_.model().structure;
   const auto seed = [&](long k, RowMatrixXd* w_bar) {
     for (const SampleShare& share : plan_.SharesAt(k)) {
       const int body = plan_.samples()[share.sample].body;
       for (const Reader& reader : readers[share.sample]) {
         for (int j = 0; j < 3; ++j) {
-          (*w_bar)(3 * body + j, reader.loss) += share.weight * reader.by_pose[j];
+          (*w_bar)(structure.PoseVariable(body, j), reader.loss) +=
+              share.weight * reader.by_state[j];
+          (*w_bar)(structure.TwistVariable(body, j), reader.loss) +=
+              share.weight * reader.by_state[3 + j];
         }
       }
     }
@@ -258,7 +323,7 @@ bool RolloutResiduals::ResidualsAt(const Eigen::VectorXd& p, Eigen::VectorXd* re
   if (!SetParameters(p) || !Plain()) {
     return false;
   }
-  *residuals = FromPoses(poses_);
+  *residuals = FromSamples(samples_);
   return true;
 }
 
@@ -287,45 +352,102 @@ bool RolloutResiduals::FiniteDifferences(const Eigen::VectorXd& p, RowMatrixXd* 
   return true;
 }
 
-Prediction RolloutResiduals::PredictionOf(int i, const std::vector<double>& poses) const {
+Prediction RolloutResiduals::PredictionOf(int i, const std::vector<double>& samples) const {
   const Observation& observation = observations_[i];
-  const Vector2<double> at =
-      observation.point >= 0 ? scene_.points()[observation.point].at : Vector2<double>(0.0, 0.0);
-  return Predict(observation.coordinate, &poses[3 * static_cast<size_t>(plan_.sample_of()[i])], at);
-}
-
-Eigen::RowVectorXd RolloutResiduals::PointTerm(const Observation& observation,
-                                               const Prediction& prediction) const {
-  Eigen::RowVectorXd term = Eigen::RowVectorXd::Zero(num_parameters());
-  if (observation.point >= 0) {
-    for (int axis = 0; axis < 2; ++axis) {
-      term += prediction.by_at[axis] / observation.sigma *
-              scene_.point_derivatives().row(2 * observation.point + axis);
+  const Channel& channel = ChannelOf(observation);
+  const Instruments& instruments = scene_.instruments();
+  const Camera* const camera = channel.camera < 0 ? nullptr : &instruments.cameras[channel.camera];
+  const int points[kPlaces] = {observation.point, channel.to_point,
+                               camera == nullptr ? -1 : camera->marker_point};
+  // Twists that nobody reads are 0.
+  double states[kPlaces][6] = {};
+  ObservedPlaces places;
+  for (int place = 0; place < kPlaces; ++place) {
+    const int sample = plan_.SampleOf(i, place);
+    if (sample < 0) {
+      continue;
+    }
+    const double* const from = &samples[static_cast<size_t>(plan_.width()) * sample];
+    std::copy(from, from + plan_.width(), states[place]);
+    places[place].state = states[place];
+    places[place].point = points[place];
+    if (points[place] >= 0) {
+      places[place].at = scene_.points()[points[place]].at;
     }
   }
-  return term;
+  if (channel.sensor < 0 && camera == nullptr && channel.to_body < 0) {
+    return PredictPlain(observation.coordinate, places[0]);
+  }
+  return PredictRecorded(observation.coordinate, places,
+                         channel.sensor < 0 ? nullptr : &instruments.sensors[channel.sensor],
+                         camera);
 }
 
-Eigen::VectorXd RolloutResiduals::FromPoses(const std::vector<double>& poses) const {
+Eigen::RowVectorXd RolloutResiduals::DirectTerm(int i, const Prediction& prediction,
+                                                const std::vector<double>& rates) const {
+  const Observation& observation = observations_[i];
+  const Channel& channel = ChannelOf(observation);
+  const Instruments& instruments = scene_.instruments();
+  Eigen::RowVectorXd term = Eigen::RowVectorXd::Zero(num_parameters());
+  const int points[kPlaces] = {
+      observation.point, channel.to_point,
+      channel.camera < 0 ? -1 : instruments.cameras[channel.camera].marker_point};
+  double by_time = 0.0;
+  for (int place = 0; place < kPlaces; ++place) {
+    const int sample = plan_.SampleOf(i, place);
+    for (int axis = 0; axis < 2 && points[place] >= 0; ++axis) {
+      term +=
+          prediction.by_at[place][axis] * scene_.point_derivatives().row(2 * points[place] + axis);
+    }
+    for (int j = 0; j < plan_.width() && sample >= 0 && !rates.empty(); ++j) {
+      by_time +=
+          prediction.by_state[place][j] * rates[static_cast<size_t>(plan_.width()) * sample + j];
+    }
+  }
+  const RowMatrixXd& by_number = scene_.instrument_derivatives();
+  if (channel.sensor >= 0) {
+    const int first = instruments.SensorNumber(channel.sensor);
+    term += -by_time * by_number.row(first) + prediction.by_sensor[0] * by_number.row(first + 1) +
+            prediction.by_sensor[1] * by_number.row(first + 2);
+  }
+  for (int j = 0; j < 4 && channel.camera >= 0; ++j) {
+    term += prediction.by_camera[j] * by_number.row(instruments.CameraNumber(channel.camera) + j);
+  }
+  if (channel.clock >= 0) {
+    const int first = instruments.ClockNumber(channel.clock);
+    term += by_time * (observation.time * by_number.row(first) + by_number.row(first + 1));
+  }
+  return term / observation.sigma;
+}
+
+Eigen::VectorXd RolloutResiduals::FromSamples(const std::vector<double>& samples) const {
   Eigen::VectorXd residuals(num_residuals());
   for (int i = 0; i < num_residuals(); ++i) {
-    residuals[i] = (PredictionOf(i, poses).value - observations_[i].value) / observations_[i].sigma;
+    residuals[i] =
+        (PredictionOf(i, samples).value - observations_[i].value) / observations_[i].sigma;
   }
   return residuals;
 }
 
-RowMatrixXd RolloutResiduals::FromPoseDerivatives(const std::vector<double>& poses,
-                                                  const RowMatrixXd& pose_derivatives,
-                                                  const Eigen::VectorXd& p_by_q) const {
-  RowMatrixXd jacobian(num_residuals(), pose_derivatives.cols());
+RowMatrixXd RolloutResiduals::FromSampleDerivatives(const std::vector<double>& samples,
+                                                    const std::vector<double>& rates,
+                                                    const RowMatrixXd& sample_derivatives,
+                                                    const Eigen::VectorXd& p_by_q) const {
+  RowMatrixXd jacobian(num_residuals(), sample_derivatives.cols());
+  const int width = plan_.width();
   for (int i = 0; i < num_residuals(); ++i) {
-    const Prediction prediction = PredictionOf(i, poses);
+    const Prediction prediction = PredictionOf(i, samples);
     jacobian.row(i).setZero();
-    jacobian.row(i).head(num_parameters()) =
-        PointTerm(observations_[i], prediction).cwiseProduct(p_by_q.transpose());
-    for (int j = 0; j < 3; ++j) {
-      jacobian.row(i) += prediction.by_pose[j] / observations_[i].sigma *
-                         pose_derivatives.row(3 * plan_.sample_of()[i] + j);
+    if (observations_[i].point >= 0 || IsRecorded(ChannelOf(observations_[i]))) {
+      jacobian.row(i).head(num_parameters()) =
+          DirectTerm(i, prediction, rates).cwiseProduct(p_by_q.transpose());
+    }
+    for (int place = 0; place < kPlaces; ++place) {
+      const int sample = plan_.SampleOf(i, place);
+      for (int j = 0; j < width && sample >= 0; ++j) {
+        jacobian.row(i) += prediction.by_state[place][j] / observations_[i].sigma *
+                           sample_derivatives.row(width * sample + j);
+      }
     }
   }
   return jacobian;
@@ -341,10 +463,10 @@ HeldColumns RolloutResiduals::EvaluateHeld(int /*block*/, const Eigen::VectorXd&
   ParameterizedScene scene;
   ParameterError error;
   if (candidates.empty() || static_cast<int>(candidates.size()) > most ||
-      !scene.Create(scene_.scene(), scene_.points(), candidates, &error)) {
+      !scene.Create(scene_.scene(), scene_.points(), candidates, &error, scene_.instruments())) {
     return held;
   }
-  RolloutResiduals released(scene, observations_);
+  RolloutResiduals released(scene, observations_, channels_);
   Eigen::VectorXd values;
   if (released.Evaluate(scene.Initial(), method, &values, &held.columns)) {
     held.entries = scene.entries();

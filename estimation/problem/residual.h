@@ -21,6 +21,7 @@
 
 #include "tangible/estimation/problem/evaluation_log.h"
 #include "tangible/estimation/problem/least_squares.h"
+#include "tangible/estimation/problem/measurement.h"
 #include "tangible/estimation/problem/parameterized_scene.h"
 #include "tangible/estimation/problem/sampling.h"
 #include "tangible/simulation/derivatives/rollout_adjoint.h"
@@ -31,15 +32,22 @@ namespace tangible {
 /// The residuals of one run: a least-squares problem of one block without parameters of its own.
 class RolloutResiduals : public LeastSquaresProblem {
  public:
-  /// `scene` holds the run, which goes on until the last observation only.
-  RolloutResiduals(ParameterizedScene scene, std::vector<Observation> observations);
+  /// `scene` holds the run, which goes on until the last observation only. Without `channels` all
+  /// observations are made directly.
+  RolloutResiduals(ParameterizedScene scene, std::vector<Observation> observations,
+                   std::vector<Channel> channels = {});
 
   int num_residuals() const { return static_cast<int>(observations_.size()); }
   int num_parameters() const { return scene_.size(); }
   const ParameterizedScene& scene() const { return scene_; }
   const std::vector<Observation>& observations() const { return observations_; }
+  /// By Observation::channel.
+  const std::vector<Channel>& channels() const { return channels_; }
+  const Channel& ChannelOf(const Observation& observation) const {
+    return channels_[observation.channel];
+  }
   const SamplePlan& plan() const { return plan_; }
-  /// Names of the observations' files, by Observation::file; empty where there are none.
+  /// Names of the observations' files, by Channel::file; empty where there are none.
   const std::vector<std::string>& files() const { return files_; }
   void SetFiles(std::vector<std::string> files) { files_ = std::move(files); }
 
@@ -81,13 +89,15 @@ class RolloutResiduals : public LeastSquaresProblem {
   /// take.
   bool SetParameters(const Eigen::VectorXd& p);
 
-  /// Residuals from the poses of the samples (3 a sample).
-  Eigen::VectorXd FromPoses(const std::vector<double>& poses) const;
-  /// Their derivatives from those of the poses: 3 a sample x any number of columns, the first P of
-  /// which belong to unknowns q with dp/dq = `p_by_q`.
-  RowMatrixXd FromPoseDerivatives(const std::vector<double>& poses,
-                                  const RowMatrixXd& pose_derivatives,
-                                  const Eigen::VectorXd& p_by_q) const;
+  /// Residuals from the samples, plan().width() numbers each.
+  Eigen::VectorXd FromSamples(const std::vector<double>& samples) const;
+  /// Their derivatives from those of the samples: width() a sample x any number of columns, the
+  /// first P of which belong to unknowns q with dp/dq = `p_by_q`. `rates` of the samples may be
+  /// empty where no time depends on a parameter.
+  RowMatrixXd FromSampleDerivatives(const std::vector<double>& samples,
+                                    const std::vector<double>& rates,
+                                    const RowMatrixXd& sample_derivatives,
+                                    const Eigen::VectorXd& p_by_q) const;
 
  private:
   bool Compute(const Eigen::VectorXd& p, DerivativeMethod method, Eigen::VectorXd* residuals,
@@ -100,17 +110,28 @@ class RolloutResiduals : public LeastSquaresProblem {
   bool FiniteDifferences(const Eigen::VectorXd& p, RowMatrixXd* jacobian);
   bool Jets(JetRoute route, RowMatrixXd* jacobian);
   template <typename T>
-  bool JetPass(int first, JetRoute route, RowMatrixXd* pose_derivatives);
+  bool JetPass(int first, JetRoute route, RowMatrixXd* sample_derivatives);
   bool ResidualsAt(const Eigen::VectorXd& p, Eigen::VectorXd* residuals);
-  Prediction PredictionOf(int i, const std::vector<double>& poses) const;
-  /// What a row of J owes to parameters that move the point in its body.
-  Eigen::RowVectorXd PointTerm(const Observation& observation, const Prediction& prediction) const;
+  /// Where steps end and samples are taken, for the times that the parameters give; false where
+  /// one is outside the run.
+  bool UpdateTimes();
+  bool FindTimes(std::vector<double>* times);
+  Prediction PredictionOf(int i, const std::vector<double>& samples) const;
+  /// What a row of J owes to parameters that do not act by way of the run: places of points in
+  /// their bodies, instruments.
+  Eigen::RowVectorXd DirectTerm(int i, const Prediction& prediction,
+                                const std::vector<double>& rates) const;
 
   ParameterizedScene scene_;
+  SimulationSettings settings_;  ///< as the scene has them
   std::vector<Observation> observations_;
+  std::vector<Channel> channels_;
+  std::vector<int> markers_;  ///< of each channel the body of its camera's marker, or −1
+  SampleOptions sample_options_;
   SamplePlan plan_;
   std::vector<std::string> files_;
-  std::vector<double> poses_;  ///< of the samples, 3 each
+  std::vector<double> samples_;  ///< plan_.width() numbers each
+  std::vector<double> rates_;    ///< of these; empty without SampleOptions::rates
   RolloutTape tape_;
   std::string message_;
   long rollouts_ = 0;

@@ -34,7 +34,7 @@ int ChooseWidth(int num_parameters) {
 }  // namespace
 
 template <typename T>
-bool RolloutResiduals::JetPass(int first, JetRoute route, RowMatrixXd* pose_derivatives) {
+bool RolloutResiduals::JetPass(int first, JetRoute route, RowMatrixXd* sample_derivatives) {
   Model<T> model;
   State<T> initial;
   State<T> final;
@@ -43,9 +43,10 @@ bool RolloutResiduals::JetPass(int first, JetRoute route, RowMatrixXd* pose_deri
   const JetObserver<T> observer = [&](long k, double, const State<T>& state) {
     for (const SampleShare& share : plan_.SharesAt(k)) {
       const int body = plan_.samples()[share.sample].body;
-      for (int i = 0; i < 3; ++i) {
-        pose_derivatives->row(3 * share.sample + i).segment(first, count) +=
-            share.weight * state.pose[3 * body + i].v.head(count).transpose();
+      for (int i = 0; i < plan_.width(); ++i) {
+        const T& number = i < 3 ? state.pose[3 * body + i] : state.twist[3 * body + i - 3];
+        sample_derivatives->row(plan_.width() * share.sample + i).segment(first, count) +=
+            share.weight * number.v.head(count).transpose();
       }
     }
   };
@@ -59,20 +60,20 @@ bool RolloutResiduals::Jets([[maybe_unused]] JetRoute route, RowMatrixXd* jacobi
     message_ = "built without Jets: use tangent, adjoint or finite_difference";
     return false;
   }
-  RowMatrixXd pose_derivatives =
-      RowMatrixXd::Zero(3 * static_cast<Eigen::Index>(plan_.num_samples()), num_parameters());
+  RowMatrixXd sample_derivatives = RowMatrixXd::Zero(
+      plan_.width() * static_cast<Eigen::Index>(plan_.num_samples()), num_parameters());
   for (int first = 0; first < num_parameters(); first += width) {
     bool done = false;
 #define TANGIBLE_PASS_IF_WIDTH(N) \
-  if (width == (N)) done = JetPass<Jet<N>>(first, route, &pose_derivatives);
+  if (width == (N)) done = JetPass<Jet<N>>(first, route, &sample_derivatives);
     TANGIBLE_FOR_EACH_JET_WIDTH(TANGIBLE_PASS_IF_WIDTH)
 #undef TANGIBLE_PASS_IF_WIDTH
     if (!done) {
       return false;
     }
   }
-  *jacobian =
-      FromPoseDerivatives(poses_, pose_derivatives, Eigen::VectorXd::Ones(num_parameters()));
+  *jacobian = FromSampleDerivatives(samples_, rates_, sample_derivatives,
+                                    Eigen::VectorXd::Ones(num_parameters()));
   return true;
 }
 

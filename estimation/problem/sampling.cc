@@ -2,7 +2,6 @@
 #include "tangible/estimation/problem/sampling.h"
 
 #include <algorithm>
-#include <cmath>
 #include <map>
 #include <numeric>
 
@@ -44,69 +43,151 @@ void Locate(const SimulationSettings& settings, Sample* sample) {
 
 }  // namespace
 
+template <typename ForEach>
+void SamplePlan::Shares::Fill(long last, const ForEach& for_each) {
+  // First how many each step has, then where they begin.
+  first.assign(static_cast<size_t>(last) + 2, 0);
+  for_each([this](long step, const SampleShare&) { ++first[step + 1]; });
+  std::partial_sum(first.begin(), first.end(), first.begin());
+  all.resize(first.back());
+  std::vector<size_t> next(first.begin(), first.end() - 1);
+  for_each([&](long step, const SampleShare& share) { all[next[step]++] = share; });
+}
+
 SamplePlan::SamplePlan(const std::vector<Observation>& observations,
-                       const SimulationSettings& settings) {
+                       const SimulationSettings& settings)
+    : SamplePlan(observations,
+                 [&] {
+                   std::vector<double> times;
+                   for (const Observation& observation : observations) {
+                     times.push_back(observation.time);
+                   }
+                   return times;
+                 }(),
+                 {}, {}, settings, {}) {}
+
+SamplePlan::SamplePlan(const std::vector<Observation>& observations,
+                       const std::vector<double>& times, const std::vector<Channel>& channels,
+                       const std::vector<int>& markers, const SimulationSettings& settings,
+                       const SampleOptions& options)
+    : options_(options), by_events_(settings.stepping == Stepping::kEvent) {
   std::map<std::pair<double, int>, int> known;  // by time and body
-  sample_of_.reserve(observations.size());
-  for (const Observation& observation : observations) {
+  const auto sample = [&](int body, double time) {
     // Most files are in the order of time.
     const int count = num_samples();
-    const auto place = known.try_emplace(known.end(), {observation.time, observation.body}, count);
-    if (place->second == count) {
-      Sample sample{observation.body, observation.time};
-      Locate(settings, &sample);
-      samples_.push_back(sample);
+    const auto place = known.try_emplace(known.end(), {time, body}, count);
+    return place->second == count ? AddSample(body, time, settings) : place->second;
+  };
+  const bool any_others =
+      std::any_of(channels.begin(), channels.end(),
+                  [](const Channel& c) { return c.to_body >= 0; }) ||
+      std::any_of(markers.begin(), markers.end(), [](int marker) { return marker >= 0; });
+  sample_of_.reserve(observations.size());
+  for (size_t i = 0; i < observations.size(); ++i) {
+    sample_of_.push_back(sample(observations[i].body, times[i]));
+    if (any_others) {
+      const int to = channels[observations[i].channel].to_body;
+      const int marker = markers[observations[i].channel];
+      others_.push_back(to < 0 ? -1 : sample(to, times[i]));
+      others_.push_back(marker < 0 ? -1 : sample(marker, times[i]));
     }
-    sample_of_.push_back(place->second);
   }
   samples_.shrink_to_fit();
-  long last = 0;
-  for (const Sample& sample : samples_) {
-    last = std::max(last, sample.step + (sample.part > 0.0 ? 1 : 0));
-  }
-  // First how many each step has, then where they begin.
-  first_share_.assign(static_cast<size_t>(last) + 2, 0);
-  const auto for_each = [this](const auto& use) {
+  const auto for_each_share = [this](const auto& use) {
     for (int i = 0; i < num_samples(); ++i) {
-      const Sample& sample = samples_[i];
-      use(sample.step, SampleShare{i, 1.0 - sample.part});
-      if (sample.part > 0.0) {
-        use(sample.step + 1, SampleShare{i, sample.part});
+      const Sample& one = samples_[i];
+      use(one.step, SampleShare{i, 1.0 - one.part});
+      if (one.part > 0.0) {
+        use(one.step + 1, SampleShare{i, one.part});
       }
     }
   };
-  for_each([this](long step, const SampleShare&) { ++first_share_[step + 1]; });
-  std::partial_sum(first_share_.begin(), first_share_.end(), first_share_.begin());
-  shares_.resize(first_share_.back());
-  std::vector<size_t> next(first_share_.begin(), first_share_.end() - 1);
-  for_each([&](long step, const SampleShare& share) { shares_[next[step]++] = share; });
+  const auto for_each_rate = [&](const auto& use) { ForEachRate(settings, use); };
+  long last = 0;
+  const auto reach = [&last](long step, const SampleShare&) { last = std::max(last, step); };
+  for_each_share(reach);
+  for_each_rate(reach);
+  shares_.Fill(last, for_each_share);
+  rate_shares_.Fill(last, for_each_rate);
 }
 
-Prediction Predict(Coordinate coordinate, const double* pose, const Vector2<double>& at) {
-  const double c = std::cos(pose[2]);
-  const double s = std::sin(pose[2]);
-  Prediction prediction;
-  switch (coordinate) {
-    case Coordinate::kX:
-      prediction.value = pose[0] + c * at.x() - s * at.y();
-      prediction.by_pose[0] = 1.0;
-      prediction.by_pose[2] = -s * at.x() - c * at.y();
-      prediction.by_at[0] = c;
-      prediction.by_at[1] = -s;
-      break;
-    case Coordinate::kY:
-      prediction.value = pose[1] + s * at.x() + c * at.y();
-      prediction.by_pose[1] = 1.0;
-      prediction.by_pose[2] = c * at.x() - s * at.y();
-      prediction.by_at[0] = s;
-      prediction.by_at[1] = c;
-      break;
-    case Coordinate::kAngle:
-      prediction.value = pose[2];
-      prediction.by_pose[2] = 1.0;
-      break;
+int SamplePlan::AddSample(int body, double time, const SimulationSettings& settings) {
+  Sample sample{body, time};
+  Locate(settings, &sample);
+  samples_.push_back(sample);
+  return num_samples() - 1;
+}
+
+/// Calls use(step, share) for the differences that make up the rates.
+template <typename Use>
+void SamplePlan::ForEachRate(const SimulationSettings& settings, const Use& use) const {
+  if (!options_.rates || (by_events_ && !options_.twists)) {
+    return;
   }
-  return prediction;
+  const long steps = NumSteps(settings);
+  for (int i = 0; i < num_samples(); ++i) {
+    long from = std::min(samples_[i].step, steps - 1);
+    long to = from + 1;
+    if (by_events_) {
+      Sample around = samples_[i];
+      around.time = std::max(0.0, samples_[i].time - kRateStep * settings.dt);
+      Locate(settings, &around);
+      from = around.step;
+      around.time = std::min(settings.duration, samples_[i].time + kRateStep * settings.dt);
+      Locate(settings, &around);
+      to = around.step;
+    }
+    const double span = StepTime(settings, to) - StepTime(settings, from);
+    use(from, SampleShare{i, -1.0 / span});
+    use(to, SampleShare{i, 1.0 / span});
+  }
+}
+
+void SamplePlan::Add(long k, const State<double>& state, std::vector<double>* numbers,
+                     std::vector<double>* rates) const {
+  for (const SampleShare& share : shares_.At(k)) {
+    const size_t body = 3 * static_cast<size_t>(samples_[share.sample].body);
+    const size_t first = static_cast<size_t>(width()) * static_cast<size_t>(share.sample);
+    for (size_t i = 0; i < 3; ++i) {
+      (*numbers)[first + i] += share.weight * state.pose[body + i];
+    }
+    for (size_t i = 0; i < 3 && options_.twists; ++i) {
+      (*numbers)[first + 3 + i] += share.weight * state.twist[body + i];
+    }
+    for (size_t i = 0; i < 3 && options_.rates && by_events_; ++i) {
+      (*rates)[first + i] += share.weight * state.twist[body + i];
+    }
+  }
+  if (!options_.rates) {
+    return;
+  }
+  for (const SampleShare& share : rate_shares_.At(k)) {
+    AddRate(share, state, rates);
+  }
+}
+
+void SamplePlan::AddRate(const SampleShare& share, const State<double>& state,
+                         std::vector<double>* rates) const {
+  const size_t body = 3 * static_cast<size_t>(samples_[share.sample].body);
+  const size_t first = static_cast<size_t>(width()) * static_cast<size_t>(share.sample);
+  for (size_t i = 0; i < 3 && !by_events_; ++i) {
+    (*rates)[first + i] += share.weight * state.pose[body + i];
+  }
+  for (size_t i = 0; i < 3 && options_.twists; ++i) {
+    (*rates)[first + 3 + i] += share.weight * state.twist[body + i];
+  }
+}
+
+std::vector<double> SplitTimes(const std::vector<double>& times, const SimulationSettings& settings,
+                               const SampleOptions& options) {
+  std::vector<double> split = times;
+  if (options.rates && options.twists) {
+    for (const double time : times) {
+      split.push_back(time - kRateStep * settings.dt);
+      split.push_back(time + kRateStep * settings.dt);
+    }
+  }
+  return split;
 }
 
 }  // namespace tangible

@@ -6,9 +6,9 @@
 #include <utility>
 
 #include "tangible/dynamics/model/settings.h"
+#include "tangible/estimation/results/instruments_json.h"
 #include "tangible/scene/json_reader.h"
 #include "tangible/scene/scene_json.h"
-#include "tangible/scene/scene_names.h"
 
 namespace tangible {
 namespace {
@@ -25,71 +25,6 @@ constexpr std::pair<const char*, DerivativeMethod> kMethods[] = {
 
 constexpr std::pair<const char*, ParameterScale> kScales[] = {
     {"linear", ParameterScale::kLinear}, {"log", ParameterScale::kLogarithmic}};
-
-int FindBody(const Scene& scene, const std::string& name) {
-  for (size_t i = 0; i < scene.bodies.size(); ++i) {
-    if (scene.bodies[i].name == name) {
-      return static_cast<int>(i);
-    }
-  }
-  return -1;
-}
-
-std::string BodyNames(const Scene& scene) {
-  std::string names;
-  for (const auto& body : scene.bodies) {
-    names += (names.empty() ? "" : ", ") + body.name;
-  }
-  return names;
-}
-
-std::vector<BodyPoint> ReadPoints(const JsonReader& json, const Scene& scene) {
-  std::vector<BodyPoint> points;
-  if (!json.exists()) {
-    return points;
-  }
-  if (!json.IsObject()) {
-    json.FailExpected("an object of points by name");
-  }
-  for (const std::string& name : json.Keys()) {
-    const JsonReader entry = json.At(name);
-    entry.ExpectKeys({"body", "at"}, " of a point");
-    BodyPoint point;
-    point.name = name;
-    const std::string body = entry.At("body").String();
-    point.body = FindBody(scene, body);
-    if (point.body < 0) {
-      entry.At("body").FailExpected("the name of a body (" + BodyNames(scene) + ")");
-    }
-    // The name stands in a path and in a cell of the observations.
-    if (!IsName(name)) {
-      entry.Fail("expected a name of letters, digits and _.- , got " + name);
-    }
-    if (entry.Has("at")) {
-      point.at = entry.At("at").Point();
-    }
-    points.push_back(point);
-  }
-  return points;
-}
-
-ObservationSigma ReadSigma(const JsonReader& json) {
-  ObservationSigma sigma;
-  if (!json.IsObject()) {
-    sigma.x = sigma.y = sigma.angle = json.Number(NumberKind::kPositive);
-    return sigma;
-  }
-  json.ExpectKeys({"x", "y", "angle"}, " of sigma");
-  const auto read = [&json](const char* key, double* value) {
-    // A coordinate without a sigma must not be measured: NaN shows it.
-    *value = json.Has(key) ? json.At(key).Number(NumberKind::kPositive)
-                           : std::numeric_limits<double>::quiet_NaN();
-  };
-  read("x", &sigma.x);
-  read("y", &sigma.y);
-  read("angle", &sigma.angle);
-  return sigma;
-}
 
 ParameterSet ReadSet(const JsonReader& json) {
   json.ExpectKeys({"path", "scale", "offset", "add"}, " of a set");
@@ -221,7 +156,8 @@ std::string PointerOf(const ParameterError& error) {
 bool Parameterize(const FitProblem& problem, const std::string& file, ParameterizedScene* scene,
                   std::string* error) {
   ParameterError fault;
-  if (!scene->Create(problem.scene, problem.points, problem.parameters, &fault)) {
+  if (!scene->Create(problem.scene, problem.points, problem.parameters, &fault,
+                     problem.instruments)) {
     *error = OneLine(file + ": " + PointerOf(fault) + ": " + fault.what);
     return false;
   }
@@ -237,8 +173,8 @@ class FitReader {
   /// False with the error of the scene or an observation file; errors of the fit file itself are
   /// the reader's.
   bool Read() {
-    root_.ExpectKeys({"scene", "observations", "points", "parameters", "derivatives", "loss",
-                      "segments", "starts", "seed"});
+    root_.ExpectKeys({"scene", "observations", "points", "sensors", "cameras", "clocks",
+                      "parameters", "derivatives", "loss", "segments", "starts", "seed"});
     const std::string scene_file = JoinPath(folder_, root_.At("scene").String());
     if (!root_.ok()) {
       return true;
@@ -251,17 +187,37 @@ class FitReader {
       return false;
     }
     problem_->points = ReadPoints(root_.At("points"), problem_->scene);
+    problem_->instruments = ReadInstruments(root_, problem_->scene, problem_->points);
     const JsonReader parameters = root_.At("parameters");
     const int count = parameters.ExpectArray("an array of parameters");
     for (int i = 0; i < count; ++i) {
       problem_->parameters.push_back(ReadParameter(parameters.At(i)));
     }
     problem_->options = ReadOptions(root_);
+    CheckShooting();
     return ReadObservationFiles();
   }
 
  private:
+  /// The states at the ends of segments are at times that stand still.
+  void CheckShooting() {
+    for (const FitParameter& parameter : problem_->parameters) {
+      for (const ParameterSet& set : parameter.sets) {
+        const bool moves_times =
+            set.path.rfind("clocks/", 0) == 0 ||
+            (set.path.rfind("sensors/", 0) == 0 && set.path.find("/delay") != std::string::npos);
+        if (moves_times && problem_->options.segments > 1) {
+          root_.At("segments")
+              .Fail("expected 1 where a delay or clock is a parameter (" + set.path + "), got " +
+                    std::to_string(problem_->options.segments));
+          return;
+        }
+      }
+    }
+  }
+
   bool ReadObservationFiles() {
+    const ObservedScene scene{problem_->scene, problem_->points, problem_->instruments};
     const JsonReader list = root_.At("observations");
     const int count = list.ExpectArray("an array of {file, sigma}");
     if (count == 0) {
@@ -269,23 +225,24 @@ class FitReader {
     }
     for (int i = 0; i < count && root_.ok(); ++i) {
       const JsonReader entry = list.At(i);
-      entry.ExpectKeys({"file", "sigma"}, " of observations");
-      const std::string file = entry.At("file").String();
-      const ObservationSigma sigma = ReadSigma(entry.At("sigma"));
+      ObservationEntry observed = ReadObservationEntry(entry, scene);
       if (!root_.ok()) {
         return true;
       }
+      observed.options.channel.file = i;
+      problem_->files.push_back(observed.file);
       const size_t before = problem_->observations.size();
-      if (!ReadObservations(JoinPath(folder_, file), problem_->scene, problem_->points, sigma,
-                            &problem_->observations, error_, i)) {
+      if (!ReadObservations(JoinPath(folder_, observed.file), scene, observed.sigma,
+                            observed.options, &problem_->channels, &problem_->observations,
+                            error_)) {
         return false;
       }
-      problem_->files.push_back(file);
       for (size_t k = before; k < problem_->observations.size(); ++k) {
         const Observation& observation = problem_->observations[k];
         if (!(observation.sigma > 0.0)) {
           entry.At("sigma").Fail(std::string("expected a sigma of ") +
-                                 NameOf(observation.coordinate) + ", which " + file + " has");
+                                 NameOf(observation.coordinate) + ", which " + observed.file +
+                                 " has");
           return true;
         }
       }
@@ -332,7 +289,7 @@ bool MakeResiduals(const FitProblem& problem, const std::string& file,
   if (!Parameterize(problem, file, &scene, error)) {
     return false;
   }
-  residuals->emplace_back(std::move(scene), problem.observations);
+  residuals->emplace_back(std::move(scene), problem.observations, problem.channels);
   residuals->back().SetFiles(problem.files);
   return true;
 }

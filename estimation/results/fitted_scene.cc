@@ -28,7 +28,8 @@ bool FittedScene(const FitProblem& problem, const Eigen::VectorXd& estimate,
                  const std::string& folder, std::string* text, std::string* error) {
   ParameterizedScene fitted;
   ParameterError fault;
-  if (!fitted.Create(problem.scene, problem.points, problem.parameters, &fault)) {
+  if (!fitted.Create(problem.scene, problem.points, problem.parameters, &fault,
+                     problem.instruments)) {
     *error = fault.what;
     return false;
   }

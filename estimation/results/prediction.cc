@@ -18,14 +18,18 @@ constexpr double kOnEdge = 1e-9;
 /// Root mean squares and largest errors, one observation after the other.
 class ErrorSum {
  public:
+  explicit ErrorSum(const std::vector<Channel>& channels) : channels_(channels) {}
+
   void Add(const Observation& observation, double residual) {
     const double error = std::abs(residual * observation.sigma);
     sum_ += residual * residual;
     ++count_;
-    PerUnit& unit = observation.coordinate == Coordinate::kAngle ? angle_ : length_;
-    unit.sum += error * error;
-    unit.max = std::max(unit.max, error);
-    ++unit.count;
+    PerUnit* const unit = UnitFor(observation);
+    if (unit != nullptr) {
+      unit->sum += error * error;
+      unit->max = std::max(unit->max, error);
+      ++unit->count;
+    }
   }
 
   HorizonError Result(double from, double to) const {
@@ -48,6 +52,22 @@ class ErrorSum {
     double max = 0.0;
     long count = 0;
   };
+  /// Null for what is neither a length in m nor an angle.
+  PerUnit* UnitFor(const Observation& observation) {
+    const bool direct = channels_.empty() || channels_[observation.channel].camera < 0;
+    switch (observation.coordinate) {
+      case Coordinate::kX:
+      case Coordinate::kY:
+      case Coordinate::kDistance:
+        return direct ? &length_ : nullptr;
+      case Coordinate::kAngle:
+        return &angle_;
+      default:
+        return nullptr;
+    }
+  }
+
+  const std::vector<Channel>& channels_;
   double sum_ = 0.0;
   long count_ = 0;
   PerUnit length_, angle_;
@@ -78,6 +98,7 @@ std::vector<Observation> TakeLater(double from, std::vector<Observation>* observ
 }
 
 PredictionScore ScorePrediction(double from, const std::vector<Observation>& observations,
+                                const std::vector<Channel>& channels,
                                 const Eigen::VectorXd& residuals) {
   PredictionScore score;
   score.from = from;
@@ -86,8 +107,8 @@ PredictionScore ScorePrediction(double from, const std::vector<Observation>& obs
     last = std::max(last, observation.time);
   }
   const double width = (last - from) / kHorizons;
-  ErrorSum all;
-  std::vector<ErrorSum> bins(kHorizons);
+  ErrorSum all(channels);
+  std::vector<ErrorSum> bins(kHorizons, ErrorSum(channels));
   for (size_t i = 0; i < observations.size(); ++i) {
     const double residual = residuals[static_cast<Eigen::Index>(i)];
     const double part = (observations[i].time - from) / (last - from);
@@ -114,17 +135,18 @@ LaterObservations PredictLater(const FitProblem& problem, const Eigen::VectorXd&
   result.score.from = from;
   ParameterizedScene scene;
   ParameterError fault;
-  if (!scene.Create(problem.scene, problem.points, problem.parameters, &fault)) {
+  if (!scene.Create(problem.scene, problem.points, problem.parameters, &fault,
+                    problem.instruments)) {
     result.score.message = fault.what;
     return result;
   }
-  RolloutResiduals run(std::move(scene), result.observations);
+  RolloutResiduals run(std::move(scene), result.observations, problem.channels);
   if (!run.Evaluate(estimate, problem.options.derivatives, &result.residuals, nullptr)) {
     result.score.message = run.message();
     result.residuals.resize(0);
     return result;
   }
-  result.score = ScorePrediction(from, result.observations, result.residuals);
+  result.score = ScorePrediction(from, result.observations, problem.channels, result.residuals);
   return result;
 }
 
@@ -140,14 +162,18 @@ std::string PredictionCsv(const RolloutResiduals& residuals, const Eigen::Vector
   std::stable_sort(order.begin(), order.end(),
                    [&](size_t a, size_t b) { return observation(a).time < observation(b).time; });
   std::string csv =
-      "time,target,coordinate,file,used,sigma,observed,predicted,residual,residual_in_sigma\n";
+      "time,target,relative_to,coordinate,file,sensor,used,sigma,observed,predicted,residual,"
+      "residual_in_sigma\n";
+  const Scene& scene = residuals.scene().scene();
+  const std::vector<BodyPoint>& points = residuals.scene().points();
   for (const size_t i : order) {
     const Observation& o = observation(i);
     const bool is_later = i >= fitted.size();
     char time[32];
     csv.append(time, std::to_chars(time, time + sizeof time, o.time).ptr);
-    csv += "," + TargetName(residuals.scene().scene(), residuals.scene().points(), o) + "," +
-           NameOf(o.coordinate) + "," + CsvCell(FileOf(residuals, o)) +
+    csv += "," + TargetName(scene, points, o) + "," +
+           ReferenceName(scene, points, residuals.ChannelOf(o)) + "," + NameOf(o.coordinate) + "," +
+           CsvCell(FileOf(residuals, o)) + "," + SensorOf(residuals, o) +
            (is_later ? ",prediction" : ",fit");
     AppendCell(o.sigma, &csv);
     AppendCell(o.value, &csv);

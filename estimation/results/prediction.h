@@ -50,14 +50,16 @@ std::vector<Observation> TakeLater(double from, std::vector<Observation>* observ
 LaterObservations PredictLater(const FitProblem& problem, const Eigen::VectorXd& estimate,
                                double from, std::vector<Observation> later);
 
-/// The score of residuals (in multiples of sigma) of observations after `from`.
+/// The score of residuals (in multiples of sigma) of observations after `from`, made by `channels`
+/// (empty: directly).
 PredictionScore ScorePrediction(double from, const std::vector<Observation>& observations,
+                                const std::vector<Channel>& channels,
                                 const Eigen::VectorXd& residuals);
 
-/// A row an observation, by time: time, target (body or point), coordinate, file, used (fit or
-/// prediction), sigma, observed, predicted, residual (predicted − observed, in m or rad) and
-/// residual_in_sigma; the last three are empty where there is no run. `values` are the residuals of
-/// the fit, in multiples of sigma; `later` may be null.
+/// A row an observation, by time: time, target (body or point), relative_to, coordinate, file,
+/// sensor, used (fit or prediction), sigma, observed, predicted, residual (predicted − observed, in
+/// the observation's unit) and residual_in_sigma; the last three are empty where there is no run.
+/// `values` are the residuals of the fit, in multiples of sigma; `later` may be null.
 std::string PredictionCsv(const RolloutResiduals& residuals, const Eigen::VectorXd& values,
                           const LaterObservations* later);
 

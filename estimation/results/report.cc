@@ -23,7 +23,7 @@ constexpr size_t kMostCorrelations = 60;
 /// One series of observations with what is fitted to it.
 struct Series {
   std::string label;
-  const char* unit = "m";
+  std::string unit;
   std::vector<double> time, observed, fitted, residual;
 };
 
@@ -44,7 +44,7 @@ std::vector<Series> CollectSeries(const RolloutResiduals& residuals, const FitRe
     const Observation& first = observations[indices.front()];
     Series series;
     series.label = SeriesLabel(residuals, first);
-    series.unit = UnitOf(first.coordinate);
+    series.unit = UnitOf(residuals, first);
     for (const int i : indices) {
       const Observation& observation = observations[i];
       const double residual = result.residuals[i];
@@ -195,16 +195,17 @@ std::string IterationPlots(const RolloutResiduals& residuals, const FitResult& r
 std::string ResidualTable(const ResidualSummary& summary) {
   std::vector<std::vector<std::string>> rows;
   for (const SeriesSummary& series : summary.series) {
-    const std::string unit = std::string(" ") + UnitOf(series.coordinate);
-    rows.push_back({series.target, NameOf(series.coordinate), series.file,
-                    std::to_string(series.count), CompactNumber(series.rms_in_sigma, 4),
-                    CompactNumber(series.rms, 4) + unit, CompactNumber(series.mean, 3) + unit,
-                    CompactNumber(series.largest_in_sigma, 4),
+    const std::string unit = " " + series.unit;
+    rows.push_back({series.target, series.relative_to, NameOf(series.coordinate), series.file,
+                    series.sensor, std::to_string(series.count),
+                    CompactNumber(series.rms_in_sigma, 4), CompactNumber(series.rms, 4) + unit,
+                    CompactNumber(series.mean, 3) + unit, CompactNumber(series.largest_in_sigma, 4),
                     CompactNumber(series.largest_time, 6), std::to_string(series.outliers)});
   }
   return "<h2>Residuals</h2>\n" +
-         HtmlTable({"body or point", "coordinate", "file", "measured", "rms (sigma)", "rms",
-                    "mean of fitted − observed", "largest (sigma)", "at (s)", "outliers"},
+         HtmlTable({"body or point", "relative to", "coordinate", "file", "sensor", "measured",
+                    "rms (sigma)", "rms", "mean of fitted − observed", "largest (sigma)", "at (s)",
+                    "outliers"},
                    rows);
 }
 
@@ -235,12 +236,10 @@ std::string SeriesPlots(const std::vector<Series>& all, size_t num_series) {
   };
   std::string plots;
   for (const Series& series : all) {
-    plots += PlotSvg({.title = series.label,
-                      .x_label = "time (s)",
-                      .y_label = std::string(series.unit),
-                      .height = 240},
-                     {thin({"observed", series.time, series.observed, PlotStyle::kPoints, {}}),
-                      thin({"fitted", series.time, series.fitted, PlotStyle::kLine, {}})});
+    plots += PlotSvg(
+        {.title = series.label, .x_label = "time (s)", .y_label = series.unit, .height = 240},
+        {thin({"observed", series.time, series.observed, PlotStyle::kPoints, {}}),
+         thin({"fitted", series.time, series.fitted, PlotStyle::kLine, {}})});
     plots += PlotSvg({.title = series.label + ": fitted − observed",
                       .x_label = "time (s)",
                       .y_label = "sigma",

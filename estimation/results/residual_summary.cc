@@ -32,13 +32,35 @@ double OutlierBound(std::vector<double>* sizes) {
 
 std::string FileOf(const RolloutResiduals& residuals, const Observation& observation) {
   const std::vector<std::string>& files = residuals.files();
-  return observation.file < static_cast<int>(files.size()) ? files[observation.file] : "";
+  const int file = residuals.ChannelOf(observation).file;
+  return file < static_cast<int>(files.size()) ? files[file] : "";
+}
+
+std::string SensorOf(const RolloutResiduals& residuals, const Observation& observation) {
+  const int sensor = residuals.ChannelOf(observation).sensor;
+  return sensor < 0 ? "" : residuals.scene().instruments().sensors[sensor].name;
+}
+
+std::string UnitOf(const RolloutResiduals& residuals, const Observation& observation) {
+  const bool is_length =
+      observation.coordinate != Coordinate::kAngle && observation.coordinate != Coordinate::kOmega;
+  const bool is_rate =
+      observation.coordinate == Coordinate::kVx || observation.coordinate == Coordinate::kVy;
+  if (residuals.ChannelOf(observation).camera >= 0 && is_length) {
+    return is_rate ? "camera units/s" : "camera units";
+  }
+  return UnitOf(observation.coordinate);
 }
 
 std::string SeriesLabel(const RolloutResiduals& residuals, const Observation& observation) {
-  const std::string label =
-      TargetName(residuals.scene().scene(), residuals.scene().points(), observation) + " " +
-      NameOf(observation.coordinate);
+  const Scene& scene = residuals.scene().scene();
+  const std::vector<BodyPoint>& points = residuals.scene().points();
+  const std::string reference = ReferenceName(scene, points, residuals.ChannelOf(observation));
+  const std::string sensor = SensorOf(residuals, observation);
+  const std::string label = TargetName(scene, points, observation) + " " +
+                            NameOf(observation.coordinate) +
+                            (reference.empty() ? "" : " relative to " + reference) +
+                            (sensor.empty() ? "" : " by " + sensor);
   return residuals.files().size() > 1 ? label + " (" + FileOf(residuals, observation) + ")" : label;
 }
 
@@ -60,6 +82,10 @@ ResidualSummary SummarizeResiduals(const RolloutResiduals& residuals,
     series.file = FileOf(residuals, observation);
     series.target = TargetName(residuals.scene().scene(), residuals.scene().points(), observation);
     series.is_point = observation.point >= 0;
+    series.relative_to = ReferenceName(residuals.scene().scene(), residuals.scene().points(),
+                                       residuals.ChannelOf(observation));
+    series.sensor = SensorOf(residuals, observation);
+    series.unit = UnitOf(residuals, observation);
     series.coordinate = observation.coordinate;
     series.label = SeriesLabel(residuals, observation);
     summary.series.push_back(std::move(series));

@@ -20,10 +20,13 @@ struct SeriesSummary {
   std::string file;    ///< empty where the observations are of no file
   std::string target;  ///< body or point
   bool is_point = false;
+  std::string relative_to;  ///< empty: to the world
+  std::string sensor;       ///< empty: none
+  std::string unit;         ///< of rms and mean
   Coordinate coordinate = Coordinate::kX;
   long count = 0;
-  double rms = 0.0;               ///< m or rad
-  double mean = 0.0;              ///< m or rad, of fitted − observed
+  double rms = 0.0;               ///< in `unit`
+  double mean = 0.0;              ///< of fitted − observed, in `unit`
   double rms_in_sigma = 0.0;      ///< in multiples of sigma
   double largest_in_sigma = 0.0;  ///< absolute
   double largest_time = 0.0;      ///< s, when
@@ -55,6 +58,11 @@ ResidualSummary SummarizeResiduals(const RolloutResiduals& residuals,
 
 /// The file that an observation is from, as the fit file names it; empty where there is none.
 std::string FileOf(const RolloutResiduals& residuals, const Observation& observation);
+
+/// The sensor's name, empty where there is none.
+std::string SensorOf(const RolloutResiduals& residuals, const Observation& observation);
+/// The observation's unit: of lengths through a camera "camera units".
+std::string UnitOf(const RolloutResiduals& residuals, const Observation& observation);
 
 /// What a series is called: "ball x", "ball x (take.csv)" where there are several files.
 std::string SeriesLabel(const RolloutResiduals& residuals, const Observation& observation);

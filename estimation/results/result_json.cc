@@ -137,19 +137,34 @@ OrderedJson RmsByCoordinate(const RolloutResiduals& residuals, const FitResult& 
   return json;
 }
 
+/// What is observed, relative to what, from which file, by which sensor.
+OrderedJson NameToJson(const SeriesSummary& series) {
+  OrderedJson json = {{series.is_point ? "point" : "body", series.target},
+                      {"coordinate", NameOf(series.coordinate)}};
+  const auto add = [&json](const char* key, const std::string& name) {
+    if (!name.empty()) {
+      json[key] = name;
+    }
+  };
+  add("relative_to", series.relative_to);
+  add("file", series.file);
+  add("sensor", series.sensor);
+  return json;
+}
+
 OrderedJson SeriesToJson(const ResidualSummary& summary) {
   OrderedJson all = OrderedJson::array();
   for (const SeriesSummary& series : summary.series) {
-    all.push_back({{series.is_point ? "point" : "body", series.target},
-                   {"coordinate", NameOf(series.coordinate)},
-                   {"file", series.file.empty() ? OrderedJson(nullptr) : OrderedJson(series.file)},
-                   {"count", series.count},
-                   {"rms", Number(series.rms)},
-                   {"mean", Number(series.mean)},
-                   {"rms_in_sigma", Number(series.rms_in_sigma)},
-                   {"largest_in_sigma", Number(series.largest_in_sigma)},
-                   {"largest_time", Number(series.largest_time)},
-                   {"outliers", series.outliers}});
+    OrderedJson json = NameToJson(series);
+    json.update({{"unit", series.unit},
+                 {"count", series.count},
+                 {"rms", Number(series.rms)},
+                 {"mean", Number(series.mean)},
+                 {"rms_in_sigma", Number(series.rms_in_sigma)},
+                 {"largest_in_sigma", Number(series.largest_in_sigma)},
+                 {"largest_time", Number(series.largest_time)},
+                 {"outliers", series.outliers}});
+    all.push_back(json);
   }
   return all;
 }
@@ -158,12 +173,10 @@ OrderedJson OutliersToJson(const ResidualSummary& summary) {
   OrderedJson largest = OrderedJson::array();
   for (const Outlier& outlier : summary.outliers) {
     const SeriesSummary& series = summary.series[outlier.series];
-    largest.push_back(
-        {{"time", Number(outlier.time)},
-         {series.is_point ? "point" : "body", series.target},
-         {"coordinate", NameOf(series.coordinate)},
-         {"file", series.file.empty() ? OrderedJson(nullptr) : OrderedJson(series.file)},
-         {"residual_in_sigma", Number(outlier.residual)}});
+    OrderedJson json = NameToJson(series);
+    json["time"] = Number(outlier.time);
+    json["residual_in_sigma"] = Number(outlier.residual);
+    largest.push_back(json);
   }
   return {{"count", summary.num_outliers}, {"largest", largest}};
 }

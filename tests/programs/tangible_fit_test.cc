@@ -118,7 +118,7 @@ TEST_F(TangibleFitTest, WritesTheFittedSceneAndItsPredictions) {
   EXPECT_EQ(again.exit_status, 0) << again.error;
   const std::string csv = Read(Path("p.csv"));
   EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'), 1 + 11) << csv;
-  EXPECT_NE(csv.find("0.5,ball,y,o.csv,prediction,0.01,"), std::string::npos) << csv;
+  EXPECT_NE(csv.find("0.5,ball,,y,o.csv,,prediction,0.01,"), std::string::npos) << csv;
 
   ExpectOneLine(Fit(Problem(), "--predict_from=0.5"), 2, "none after it");
   ExpectOneLine(Fit(Problem(), "--predict_from=-1"), 2, "none up to it");

@@ -221,5 +221,66 @@ TEST(FitTest, StartsAreDrawnBySeed) {
             FitTo(scene, {friction}, observations, options).starts[1].initial);
 }
 
+/// A pendulum by events, seen late by an encoder of unknown gain, by a camera that stands anywhere,
+/// and by a gyroscope; the run begins 0.1 s before the recording does.
+TEST(FitTest, InstrumentsAreFoundBesideThePhysics) {
+  Scene scene = MakeScene(kPendulum);
+  scene.simulation.stepping = Stepping::kEvent;
+  Instruments truth;
+  truth.sensors = {{"encoder", 0.0213, 1.05, 0.02}, {"gyroscope", 0.004, 1.0, -0.1}};
+  truth.cameras = {{"camera", 650.0, 0.04, {0.1, -0.3}}};
+  truth.clocks = {{"clock", 1.002, 0.1}};
+  std::vector<Channel> channels(3);
+  channels[0] = {.sensor = 0, .clock = 0};
+  channels[1] = {.camera = 0, .clock = 0};
+  channels[2] = {.sensor = 1, .clock = 0};
+  const std::vector<BodyPoint> points = {{"lamp", 0, {0.05, -0.4}}};
+  std::vector<Observation> observations;
+  for (int k = 0; k <= 180; ++k) {
+    const double time = 0.01 * k;
+    observations.push_back({time, 0, -1, Coordinate::kAngle, 0.0, 1e-3, 0});
+    observations.push_back({time, 0, 0, Coordinate::kX, 0.0, 0.5, 1});
+    observations.push_back({time, 0, 0, Coordinate::kY, 0.0, 0.5, 1});
+    observations.push_back({time, 0, -1, Coordinate::kOmega, 0.0, 1e-2, 2});
+  }
+  const auto residuals_of = [&](const Instruments& instruments,
+                                const std::vector<FitParameter>& parameters) {
+    ParameterizedScene parameterized;
+    ParameterError error;
+    EXPECT_TRUE(parameterized.Create(scene, points, parameters, &error, instruments)) << error.what;
+    return RolloutResiduals(parameterized, observations, channels);
+  };
+  // The truth's predictions are the observations.
+  RolloutResiduals exact = residuals_of(truth, {Parameter("joints/pin/damping", 0.05)});
+  Eigen::VectorXd predicted;
+  ASSERT_TRUE(
+      exact.Evaluate(exact.scene().Initial(), DerivativeMethod::kTangent, &predicted, nullptr))
+      << exact.message();
+  for (size_t i = 0; i < observations.size(); ++i) {
+    observations[i].value = predicted[static_cast<Eigen::Index>(i)] * observations[i].sigma;
+  }
+  const std::vector<std::pair<std::string, double>> expected = {
+      {"joints/pin/damping", 0.05},       {"joints/pin/angle", 1.0},
+      {"sensors/encoder/delay", 0.0213},  {"sensors/encoder/gain", 1.05},
+      {"sensors/encoder/bias", 0.02},     {"sensors/gyroscope/bias", -0.1},
+      {"sensors/gyroscope/delay", 0.004}, {"cameras/camera/scale", 650.0},
+      {"cameras/camera/rotation", 0.04},  {"cameras/camera/origin/x", 0.1},
+      {"clocks/clock/rate", 1.002}};
+  std::vector<FitParameter> parameters;
+  for (const auto& [path, value] : expected) {
+    parameters.push_back(Parameter(path, 0.8 * value));
+  }
+  parameters[7].initial = 600.0;
+  parameters.back().initial = 1.0;
+  RolloutResiduals residuals = residuals_of(truth, parameters);
+  const FitResult result = Fit(FitOptions(), &residuals, {});
+  ASSERT_EQ(result.status, FitStatus::kConverged) << result.message;
+  for (size_t k = 0; k < expected.size(); ++k) {
+    EXPECT_NEAR(result.estimate[static_cast<Eigen::Index>(k)], expected[k].second,
+                1e-7 * std::max(1.0, std::abs(expected[k].second)))
+        << expected[k].first;
+  }
+}
+
 }  // namespace
 }  // namespace tangible

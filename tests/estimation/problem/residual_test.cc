@@ -164,5 +164,104 @@ TEST(ResidualTest, AValueThatANumberMayNotTakeIsAFailure) {
   EXPECT_FALSE(residuals.message().empty());
 }
 
+/// The small chain's links and ball by every kind of instrument, all numbers of which are
+/// parameters.
+RolloutResiduals RecordedChain(Stepping stepping) {
+  Scene scene = MakeScene(kSmallChain);
+  scene.simulation.stepping = stepping;
+  if (stepping == Stepping::kEvent) {
+    // How a sample moves with its time is exact to the order of the step: to 7e-5 at 5 ms.
+    scene.simulation.dt = 0.001;
+  }
+  const std::vector<BodyPoint> points = {{"tip", 2, {0.15, -0.02}}, {"eye", 0, {0.02, 0.03}}};
+  Instruments instruments;
+  instruments.sensors = {{"late", 0.0033, 1.1, -0.2}};
+  instruments.cameras = {{"camera", 300.0, 0.2, {0.1, 1.0}, 0, 1}};
+  instruments.clocks = {{"clock", 0.95, 0.02}};
+  std::vector<Channel> channels(6);
+  channels[1].sensor = 0;
+  channels[2].camera = 0;
+  channels[3].clock = 0;
+  channels[3].to_body = 0;
+  channels[3].to_point = 1;
+  channels[4] = {.sensor = 0, .camera = 0, .clock = 0};
+  channels[5].to_body = 3;
+  std::vector<Observation> observations;
+  for (int i = 0; i < 84; ++i) {
+    Observation observation;
+    observation.time = 0.0137 + 0.0052 * i;
+    observation.body = i % 4;
+    observation.point = observation.body == 2 ? 0 : -1;
+    observation.channel = (i / 4) % 6;
+    observation.coordinate = static_cast<Coordinate>((i / 3) % kCoordinates);
+    // The distance of the ball to itself, and from nothing, is no observation.
+    if (observation.coordinate == Coordinate::kDistance &&
+        (channels[observation.channel].to_body < 0 || observation.body == 3)) {
+      observation.coordinate = Coordinate::kVy;
+    }
+    observation.sigma = 0.5;
+    observations.push_back(observation);
+  }
+  std::vector<FitParameter> parameters = {
+      Parameter("bodies/ball/velocity/x", 3.1), Parameter("joints/j1/angle", 0.12),
+      Parameter("points/tip/at/x", 0.16), Parameter("points/eye/at/y", 0.02)};
+  for (const InstrumentNumber& number : EnumerateNumbers(&instruments)) {
+    parameters.push_back(Parameter(number.path, *number.value));
+  }
+  ParameterizedScene parameterized;
+  ParameterError error;
+  EXPECT_TRUE(parameterized.Create(scene, points, parameters, &error, instruments)) << error.what;
+  return RolloutResiduals(parameterized, observations, channels);
+}
+
+TEST(ResidualTest, MethodsAgreeOnAllInstruments) {
+  ExpectMethodsAgree(RecordedChain(Stepping::kFixed));
+}
+
+// The unrolled Jets have no event stepping; the others see every time move with its delay.
+TEST(ResidualTest, MethodsAgreeOnAllInstrumentsByEvents) {
+  RolloutResiduals residuals = RecordedChain(Stepping::kEvent);
+  const Eigen::VectorXd p = residuals.scene().Initial();
+  Eigen::VectorXd r;
+  RowMatrixXd tangent;
+  ASSERT_TRUE(residuals.Evaluate(p, DerivativeMethod::kTangent, &r, &tangent))
+      << residuals.message();
+  for (Eigen::Index k = 0; k < tangent.cols(); ++k) {
+    EXPECT_GT(tangent.col(k).norm(), 1e-3) << residuals.scene().entries()[k].name;
+  }
+  for (const auto& [method, tolerance] : {std::pair(DerivativeMethod::kAdjoint, 1e-9),
+                                          std::pair(DerivativeMethod::kFiniteDifference, 1e-5)}) {
+    Eigen::VectorXd other;
+    RowMatrixXd jacobian;
+    ASSERT_TRUE(residuals.Evaluate(p, method, &other, &jacobian)) << residuals.message();
+    EXPECT_EQ(r, other) << NameOf(method);
+    EXPECT_LT(ColumnError(jacobian, tangent), tolerance) << NameOf(method);
+  }
+}
+
+TEST(ResidualTest, ATimeThatLeavesTheRunIsAFailure) {
+  Scene scene = MakeScene(kFallingBall);
+  Instruments instruments;
+  instruments.sensors = {{"late", 0.01}};
+  Channel channel;
+  channel.sensor = 0;
+  ParameterizedScene parameterized;
+  ParameterError error;
+  ASSERT_TRUE(
+      parameterized.Create(scene, {}, {Parameter("sensors/late/delay", 0.01)}, &error, instruments))
+      << error.what;
+  RolloutResiduals residuals(parameterized, {{0.05, 0, -1, Coordinate::kX, 0.0, 1.0}}, {channel});
+  Eigen::VectorXd r;
+  ASSERT_TRUE(residuals.Evaluate(Eigen::VectorXd::Constant(1, 0.05), DerivativeMethod::kTangent, &r,
+                                 nullptr))
+      << residuals.message();
+  EXPECT_NEAR(r[0], 0.0, 1e-15);
+  EXPECT_FALSE(residuals.Evaluate(Eigen::VectorXd::Constant(1, 0.06), DerivativeMethod::kTangent,
+                                  &r, nullptr));
+  EXPECT_NE(residuals.message().find("recorded at 0.05 s is of the time -0.01 s"),
+            std::string::npos)
+      << residuals.message();
+}
+
 }  // namespace
 }  // namespace tangible

@@ -3,7 +3,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+
+#include "tangible/simulation/stepping/step.h"
 
 namespace tangible {
 namespace {
@@ -52,42 +55,63 @@ TEST(SamplingTest, CoordinatesOfOneBodyAtOneTimeShareASample) {
   EXPECT_EQ(plan.sample_of(), (std::vector<int>{0, 0, 1, 0}));
 }
 
-TEST(SamplingTest, PointsTurnWithTheirBody) {
-  const double pose[3] = {1.0, 2.0, 0.5 * M_PI};
-  const Vector2<double> at(0.25, -0.5);
-  EXPECT_NEAR(Predict(Coordinate::kX, pose, at).value, 1.5, 1e-15);
-  EXPECT_NEAR(Predict(Coordinate::kY, pose, at).value, 2.25, 1e-15);
-  EXPECT_EQ(Predict(Coordinate::kAngle, pose, at).value, 0.5 * M_PI);
+// x(t) = sin t of one body and its twist cos t, as a run would hand them over.
+double RateError(SimulationSettings settings, const SampleOptions& options, bool of_twist) {
+  const std::vector<double> times = {0.0, 0.0337, 0.1, 0.123, 0.25};
+  if (settings.stepping == Stepping::kEvent) {
+    AddStepTimes(SplitTimes(times, settings, options), &settings);
+  }
+  std::vector<Observation> observations;
+  for (const double time : times) {
+    observations.push_back(At(time, 0));
+  }
+  const SamplePlan plan(observations, times, {Channel()}, {-1}, settings, options);
+  std::vector<double> numbers(plan.width() * times.size(), 0.0);
+  std::vector<double> rates(numbers.size(), 0.0);
+  for (long k = 0; k <= plan.last_step(); ++k) {
+    const double now = StepTime(settings, k);
+    plan.Add(k, {{std::sin(now), 0.0, 0.0}, {std::cos(now), 0.0, 0.0}}, &numbers, &rates);
+  }
+  double worst = 0.0;
+  for (size_t i = 0; i < times.size(); ++i) {
+    const size_t first = i * static_cast<size_t>(plan.width());
+    const double rate =
+        of_twist ? rates[first + 3] + std::sin(times[i]) : rates[first] - std::cos(times[i]);
+    worst = std::max(worst, std::abs(rate));
+  }
+  return worst;
 }
 
-TEST(SamplingTest, DerivativesAreThoseOfDifferences) {
-  const double pose[3] = {1.0, 2.0, 0.7};
-  const Vector2<double> at(0.25, -0.5);
-  const double h = 1e-6;
-  for (const Coordinate coordinate : {Coordinate::kX, Coordinate::kY, Coordinate::kAngle}) {
-    const Prediction prediction = Predict(coordinate, pose, at);
-    // Central differences of smooth functions of order 1: error h² / 6 and rounding 1e-16 / h.
-    const double tolerance = 1e-9;
-    for (int i = 0; i < 3; ++i) {
-      double low[3] = {pose[0], pose[1], pose[2]};
-      double high[3] = {pose[0], pose[1], pose[2]};
-      low[i] -= h;
-      high[i] += h;
-      const double difference =
-          (Predict(coordinate, high, at).value - Predict(coordinate, low, at).value) / (2.0 * h);
-      EXPECT_NEAR(prediction.by_pose[i], difference, tolerance);
-    }
-    for (int i = 0; i < 2; ++i) {
-      Vector2<double> low = at;
-      Vector2<double> high = at;
-      low[i] -= h;
-      high[i] += h;
-      const double difference =
-          (Predict(coordinate, pose, high).value - Predict(coordinate, pose, low).value) /
-          (2.0 * h);
-      EXPECT_NEAR(prediction.by_at[i], difference, tolerance);
-    }
-  }
+TEST(SamplingTest, RatesAreHowASampleChangesWithItsTime) {
+  SimulationSettings settings;
+  settings.dt = 0.01;
+  settings.duration = 0.25;
+  // The slope of a chord: half a step times the second derivative.
+  EXPECT_LT(RateError(settings, {.rates = true}, false), 0.5 * settings.dt);
+  EXPECT_LT(RateError(settings, {.twists = true, .rates = true}, true), 0.5 * settings.dt * 1.01);
+  settings.stepping = Stepping::kEvent;
+  // The twist itself; its own rate to second order in kRateStep dt, at the ends to first.
+  EXPECT_LT(RateError(settings, {.rates = true}, false), 1e-15);
+  EXPECT_LT(RateError(settings, {.twists = true, .rates = true}, true),
+            0.51 * kRateStep * settings.dt);
+}
+
+TEST(SamplingTest, WhatAnObservationIsRelativeToIsSampledToo) {
+  Channel relative;
+  relative.to_body = 2;
+  Channel seen;
+  seen.camera = 0;
+  std::vector<Observation> observations = {At(0.1, 0), At(0.1, 1), At(0.1, 2)};
+  observations[0].channel = 1;
+  observations[1].channel = 2;
+  const SamplePlan plan(observations, {0.1, 0.1, 0.1}, {Channel(), relative, seen}, {-1, -1, 3},
+                        SimulationSettings(), {});
+  EXPECT_EQ(plan.num_samples(), 4);
+  EXPECT_EQ(plan.samples()[plan.SampleOf(0, 1)].body, 2);
+  EXPECT_EQ(plan.SampleOf(0, 2), -1);
+  EXPECT_EQ(plan.samples()[plan.SampleOf(1, 2)].body, 3);
+  EXPECT_EQ(plan.SampleOf(2, 0), plan.SampleOf(0, 1));
+  EXPECT_EQ(plan.SampleOf(2, 1), -1);
 }
 
 }  // namespace

@@ -93,7 +93,8 @@ TEST_F(FitJsonTest, BadInputsAreOneLine) {
       {"{}", ": /scene: missing, expected a string"},
       {With("scene", "3"), ": /scene: expected a string, got 3"},
       {With("step", "1"),
-       ": /step: unknown key, expected one of scene, observations, points, parameters, "
+       ": /step: unknown key, expected one of scene, observations, points, sensors, cameras, "
+       "clocks, parameters, "
        "derivatives, loss, segments, starts, seed, got \"step\""},
       {With("observations", "[]"),
        ": /observations: expected at least one {file, sigma}, got none"},
@@ -180,6 +181,86 @@ TEST_F(FitJsonTest, AFileThatIsNotThereIsSaid) {
   std::string error;
   EXPECT_FALSE(LoadFit(folder_ + "fit.json", &fit, &error));
   EXPECT_EQ(error, folder_ + "fit.json: cannot be read: No such file or directory");
+}
+
+TEST_F(FitJsonTest, InstrumentsAreRead) {
+  std::ofstream(folder_ + "image.csv") << "time,body,x,omega\n0.5,ball,0.5,10.3\n1,ball,,8\n";
+  FitFile fit;
+  std::string error;
+  ASSERT_TRUE(ParseFit(R"({"scene": "scene.json",
+      "observations": [{"file": "image.csv", "sensor": "encoder", "camera": "left", "clock": "c",
+                        "relative_to": "rim"},
+                       {"file": "seen.csv", "sigma": {"x": 0.1, "y": 0.2}, "unwrap": true}],
+      "points": {"rim": {"body": "ball", "at": [0.1, 0]}},
+      "sensors": {"encoder": {"delay": 0.125, "gain": 2, "bias": 0.5, "sigma": 0.25}},
+      "cameras": {"left": {"scale": 700, "rotation": 0.1, "origin": [1, 2], "marker": "rim"}},
+      "clocks": {"c": {"rate": 0.5, "offset": 0.25}},
+      "parameters": ["gravity/y", "sensors/encoder/delay", "cameras/left/scale",
+                     {"path": "clocks/*/rate", "lower": 0.25, "upper": 0.75}]})",
+                       folder_ + "fit.json", &fit, &error))
+      << error;
+  const FitProblem& problem = fit.problem;
+  EXPECT_EQ(problem.instruments.sensors[0].delay, 0.125);
+  EXPECT_EQ(problem.instruments.sensors[0].gain, 2.0);
+  EXPECT_EQ(problem.instruments.sensors[0].bias, 0.5);
+  EXPECT_EQ(problem.instruments.cameras[0].origin.y(), 2.0);
+  EXPECT_EQ(problem.instruments.cameras[0].marker_point, 0);
+  EXPECT_EQ(problem.instruments.clocks[0].offset, 0.25);
+  ASSERT_EQ(problem.channels.size(), 2u);
+  EXPECT_EQ(problem.channels[0].sensor, 0);
+  EXPECT_EQ(problem.channels[0].camera, 0);
+  EXPECT_EQ(problem.channels[0].clock, 0);
+  EXPECT_EQ(problem.channels[0].to_point, 0);
+  EXPECT_EQ(problem.channels[1], Channel{.file = 1});
+  EXPECT_EQ(problem.observations[0].sigma, 0.25);  // the sensor's
+  EXPECT_EQ(problem.observations[1].coordinate, Coordinate::kOmega);
+  EXPECT_EQ(problem.observations[3].channel, 1);
+  std::vector<RolloutResiduals> residuals;
+  ASSERT_TRUE(MakeResiduals(problem, "fit.json", &residuals, &error)) << error;
+  EXPECT_TRUE(residuals[0].scene().MovesTimes());
+  EXPECT_EQ(residuals[0].entries()[1].initial, 0.125);
+  EXPECT_TRUE(residuals[0].entries()[2].logarithmic);
+}
+
+TEST_F(FitJsonTest, BadInstrumentsAreOneLine) {
+  // Of the file in this test's folder, without the folder.
+  const auto message = [&](const std::string& part, const std::string& entry = "",
+                           const std::string& parameter = "gravity/y") {
+    FitFile fit;
+    std::string error;
+    EXPECT_FALSE(ParseFit(R"({"scene": "scene.json", "observations": [{"file": "seen.csv",
+        "sigma": 0.1)" + entry +
+                              R"(}], "parameters": [")" + parameter + R"("], )" + part + "}",
+                          folder_ + "fit.json", &fit, &error));
+    EXPECT_EQ(error.find('\n'), std::string::npos);
+    EXPECT_EQ(error.find(folder_ + "fit.json: "), 0u) << error;
+    return error.substr(std::min(error.size(), folder_.size() + 10));
+  };
+  const std::string none = R"("starts": 1)";
+  EXPECT_EQ(message(R"("cameras": {"c": {"scale": 0}})"),
+            "/cameras/c/scale: expected a number > 0, got 0");
+  EXPECT_EQ(message(R"("clocks": {"c": {"rate": -1}})"),
+            "/clocks/c/rate: expected a number > 0, got -1");
+  EXPECT_EQ(message(R"("sensors": {"s": {"sigma": 0}})"),
+            "/sensors/s/sigma: expected a number > 0, got 0");
+  EXPECT_EQ(message(R"("sensors": {"s": {"gain": 0}})"),
+            "/sensors/s/gain: expected a number other than 0, got 0");
+  EXPECT_EQ(message(R"("sensors": {"s": {"lag": 0}})"),
+            "/sensors/s/lag: unknown key of a sensor, expected one of delay, gain, bias, sigma, "
+            "got \"lag\"");
+  EXPECT_EQ(message(R"("cameras": {"c": {"marker": "bal"}})"),
+            "/cameras/c/marker: expected the name of a body (ball) or point (none), got \"bal\"");
+  EXPECT_EQ(message(none, R"(, "sensor": "s")"),
+            "/observations/0/sensor: expected the name of a sensor (none), got \"s\"");
+  EXPECT_EQ(message(none, R"(, "relative_to": "bal")"),
+            "/observations/0/relative_to: expected the name of a body (ball) or point (none), got "
+            "\"bal\"");
+  EXPECT_EQ(message(R"("sensors": {"s": {}})", "", "sensors/t/delay"),
+            "/parameters/0/sets/0/path: parameter sensors/t/delay: matches no number; of points, "
+            "sensors, cameras and clocks there are: sensors/s/delay, sensors/s/gain, "
+            "sensors/s/bias");
+  EXPECT_EQ(message(R"("sensors": {"s": {}}, "segments": 3)", "", "sensors/s/delay"),
+            "/segments: expected 1 where a delay or clock is a parameter (sensors/s/delay), got 3");
 }
 
 }  // namespace

@@ -27,7 +27,7 @@ TEST(PredictionTest, ErrorsAreSummedByHorizonAndUnit) {
                                                  {3.0, 0, -1, Coordinate::kX, 0.0, 0.1},
                                                  {3.0, 0, -1, Coordinate::kAngle, 0.0, 0.5}};
   const PredictionScore score =
-      ScorePrediction(1.0, observations, Eigen::Vector4d(3.0, -4.0, 5.0, 2.0));
+      ScorePrediction(1.0, observations, {}, Eigen::Vector4d(3.0, -4.0, 5.0, 2.0));
   EXPECT_EQ(score.all.count, 4);
   EXPECT_DOUBLE_EQ(score.all.rms_in_sigma, std::sqrt((9.0 + 16.0 + 25.0 + 4.0) / 4.0));
   EXPECT_DOUBLE_EQ(score.all.max_length, 0.5);
@@ -63,12 +63,13 @@ TEST(PredictionTest, WhatIsFittedPredictsWhatFollows) {
   EXPECT_NEAR(predicted.score.all.max_angle, 0.25, 1e-12);
 
   const std::string csv = PredictionCsv(residuals, result.residuals, &predicted);
-  EXPECT_EQ(csv.rfind("time,target,coordinate,file,used,sigma,observed,predicted,residual,"
-                      "residual_in_sigma\n0,ball,x,fall_1.csv,fit,0.001,0,0,0,0\n",
-                      0),
-            0u)
+  EXPECT_EQ(
+      csv.rfind("time,target,relative_to,coordinate,file,sensor,used,sigma,observed,predicted,"
+                "residual,residual_in_sigma\n0,ball,,x,fall_1.csv,,fit,0.001,0,0,0,0\n",
+                0),
+      0u)
       << csv;
-  EXPECT_NE(csv.find("\n1,ball,angle,fall_1.csv,prediction,0.001,0.25,0,-0.25,-250\n"),
+  EXPECT_NE(csv.find("\n1,ball,,angle,fall_1.csv,,prediction,0.001,0.25,0,-0.25,-250\n"),
             std::string::npos)
       << csv;
   EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'),

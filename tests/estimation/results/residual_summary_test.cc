@@ -30,6 +30,8 @@ TEST(ResidualSummaryTest, EachCoordinateHasItsOwnNumbers) {
 }
 
 TEST(ResidualSummaryTest, FilesAndPointsAreSeriesOfTheirOwn) {
+  std::vector<Channel> channels(2);
+  channels[1].file = 1;
   std::vector<Observation> observations = {{0.1, 0, -1, Coordinate::kX, 0.0, 1.0, 0},
                                            {0.1, 0, 0, Coordinate::kX, 0.0, 1.0, 0},
                                            {0.1, 0, -1, Coordinate::kX, 0.0, 1.0, 1},
@@ -37,8 +39,10 @@ TEST(ResidualSummaryTest, FilesAndPointsAreSeriesOfTheirOwn) {
   const ObservationSeries index = IndexSeries(observations);
   EXPECT_EQ(index.of, (std::vector<int>{0, 1, 2, 0}));
   EXPECT_EQ(index.first, (std::vector<int>{0, 1, 2}));
-  RolloutResiduals residuals = MakeResiduals(MakeScene(kFallingBall), {{"edge", 0, {0.1, 0.0}}},
-                                             {Parameter("gravity/y", -9.0)}, observations);
+  RolloutResiduals residuals(MakeResiduals(MakeScene(kFallingBall), {{"edge", 0, {0.1, 0.0}}},
+                                           {Parameter("gravity/y", -9.0)}, {observations[0]})
+                                 .scene(),
+                             observations, channels);
   residuals.SetFiles({"a.csv", "b.csv"});
   const ResidualSummary summary = SummarizeResiduals(residuals, Eigen::Vector4d(1, 2, 3, 4));
   ASSERT_EQ(summary.series.size(), 3u);

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// What an observation of a motion would be: the measured coordinate from the states of the bodies
+// concerned (instruments.h has the equations), with its derivatives. The plain coordinates of a
+// body or point have theirs by hand, because fits with many observations spend their time there;
+// all else is evaluated in one Jet.
+
+#include <array>
+
+#include "tangible/estimation/problem/instruments.h"
+#include "tangible/estimation/problem/observation.h"
+
+namespace tangible {
+
+/// A body or a point of it at the time of an observation.
+struct Place {
+  const double* state = nullptr;  ///< x, y, angle, vx, vy, omega; null: there is none
+  int point = -1;                 ///< −1: the centre of mass
+  Vector2<double> at{0.0, 0.0};   ///< m, body frame
+};
+
+/// The body that is observed, the one that it is relative to, and the camera's marker.
+inline constexpr int kPlaces = 3;
+using ObservedPlaces = std::array<Place, kPlaces>;
+
+/// A predicted coordinate with its derivatives.
+struct Prediction {
+  double value = 0.0;
+  double by_state[kPlaces][6] = {};  ///< of each place
+  double by_at[kPlaces][2] = {};     ///< the place of the point in the body
+  double by_sensor[2] = {};          ///< gain, bias
+  double by_camera[4] = {};          ///< scale, rotation, origin x, y
+};
+
+/// The coordinate of a body or point as it is.
+Prediction PredictPlain(Coordinate coordinate, const Place& place);
+
+/// The coordinate as it is recorded; `sensor` and `camera` may be null. At a distance of 0 its
+/// derivative is that along x.
+Prediction PredictRecorded(Coordinate coordinate, const ObservedPlaces& places,
+                           const Sensor* sensor, const Camera* camera);
+
+}  // namespace tangible
