@@ -76,6 +76,11 @@ class RolloutFunction {
   std::vector<double> record_times() const;
   const std::vector<ParameterPath>& parameters() const { return parameters_; }
   const std::vector<ParameterPath>& controls() const { return controls_; }
+  /// Of the model: the controls' numbers, one control's after another's, and which control's each is.
+  const std::vector<int>& control_numbers() const { return control_numbers_; }
+  const std::vector<int>& control_of_number() const { return control_of_number_; }
+  /// Of each number of a state: its pose or twist variable.
+  const std::vector<int>& output_variables() const { return outputs_; }
   /// The scene's own values: parameters, the initial state, and controls that are the same in all
   /// steps.
   RolloutInput Defaults() const;

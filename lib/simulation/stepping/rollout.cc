@@ -12,14 +12,6 @@
 namespace tangible {
 namespace {
 
-std::string FailureMessage(const StepReport& step, double t, long k) {
-  std::ostringstream message;
-  message << "step " << k << " at t = " << t
-          << " s: " << (step.status == StepStatus::kDiverged ? "diverged: " : "unsolved: ")
-          << step.message;
-  return message.str();
-}
-
 // A step that was done, and whether the run has exploded by it. Not every one is looked at.
 StepReport Watched(const EnergyWatch& watch, const Model<double>& model, const State<double>& state,
                    long k, long steps, StepReport step) {
@@ -55,6 +47,14 @@ void SetValues(const State<double>& values, State<T>* state) {
 }
 
 }  // namespace
+
+std::string FailureMessage(const StepReport& step, double t, long k) {
+  std::ostringstream message;
+  message << "step " << k << " at t = " << t
+          << " s: " << (step.status == StepStatus::kDiverged ? "diverged: " : "unsolved: ")
+          << step.message;
+  return message.str();
+}
 
 void RolloutReport::Add(const StepReport& step) {
   contacts_max = std::max(contacts_max, step.closed);

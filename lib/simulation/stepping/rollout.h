@@ -84,4 +84,7 @@ RolloutReport RolloutJets(const Model<T>& model, const State<T>& initial, JetRou
   return RolloutJets<T>(&plain, initial, route, observer, final, fallbacks);
 }
 
+/// Of step k from time t, which was not done: one line that says where and why.
+std::string FailureMessage(const StepReport& step, double t, long k);
+
 }  // namespace tangible

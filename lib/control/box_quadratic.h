@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// A convex quadratic over a box, by projected Newton steps (Tassa, Mansard, Todorov, "Control-limited
+// differential dynamic programming", ICRA 2014, algorithm 1; Bertsekas 1982):
+//
+//   min ½ xᵀ H x + gᵀ x,   low <= x <= high
+//
+// A step is Newton's in the variables that no bound holds; its line search follows the projection
+// onto the box. The set that bounds hold is found in a few steps from a good start.
+
+#include <vector>
+
+#include "tangible/math/scalar.h"
+
+namespace tangible {
+
+enum class BoxQuadraticStatus { kSolved, kIndefinite, kIterationLimit };
+
+struct BoxQuadraticSolution {
+  /// kIndefinite: H is not positive definite in the variables that are free.
+  BoxQuadraticStatus status = BoxQuadraticStatus::kIterationLimit;
+  VectorX<double> x;
+  std::vector<int> free;                 ///< variables that no bound holds, ascending
+  Eigen::LLT<MatrixX<double>> factor{};  ///< of H over them
+  int iterations = 0;
+};
+
+/// H symmetric, m x m; low <= high, either of them infinite where there is no bound; `start` need
+/// not be within them.
+BoxQuadraticSolution SolveBoxQuadratic(const MatrixX<double>& h, const VectorX<double>& g,
+                                       const VectorX<double>& low, const VectorX<double>& high,
+                                       const VectorX<double>& start);
+
+}  // namespace tangible

@@ -1,0 +1,417 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/control/ilqr.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "tangible/control/box_quadratic.h"
+#include "tangible/control/tolerances.h"
+
+namespace tangible {
+namespace {
+
+// Shares of a step that a line search tries: 1.1^(−j²).
+constexpr int kShares = 11;
+double ShareOf(int j) { return std::pow(1.1, -j * j); }
+
+// A plan's steps to first order, and its cost to second.
+struct Linearisation {
+  std::vector<MatrixX<double>> a, b;
+  std::vector<CostExpansion> cost;  // of each step, then of the end
+};
+
+class Solver {
+ public:
+  Solver(const ControlProblem& problem, const IlqrOptions& options)
+      : p_(problem),
+        options_(options),
+        n_(problem.map->num_states()),
+        m_(problem.map->num_controls()) {}
+
+  IlqrResult Solve(const RowMatrixXd& controls) {
+    if (!Start(controls)) return std::move(result_);
+    for (int i = 0; i < options_.max_iterations; ++i) {
+      if (!Iterate()) return std::move(result_);
+      if (options_.stop && options_.stop()) {
+        Finish(IlqrStatus::kStopped, "stopped");
+        return std::move(result_);
+      }
+    }
+    if (Measure()) Finish(IlqrStatus::kConverged, "");
+    return std::move(result_);
+  }
+
+  // Fills the plan's linearisation; false with the result's message.
+  bool Linearise(const Plan& plan, Linearisation* at) {
+    const long steps = plan.controls.rows();
+    at->a.resize(steps);
+    at->b.resize(steps);
+    at->cost.resize(steps + 1);
+    VectorX<double> next;
+    for (long k = 0; k < steps; ++k) {
+      const VectorX<double> x = plan.states.row(k);
+      const VectorX<double> u = plan.controls.row(k);
+      if (!p_.map->Linearise(p_.first_step + k, x, u, &next, &at->a[k], &at->b[k],
+                             &result_.message)) {
+        return false;
+      }
+      p_.cost->Expand(x, u, options_.second_order, &at->cost[k]);
+    }
+    p_.cost->ExpandEnd(plan.states.row(steps), options_.second_order, &at->cost[steps]);
+    ++result_.linearisations;
+    return true;
+  }
+
+  // λ and ∂J/∂u.
+  void Gradient(const Linearisation& at, RowMatrixXd* costates, RowMatrixXd* gradient) const {
+    const long steps = static_cast<long>(at.a.size());
+    costates->resize(steps + 1, n_);
+    gradient->resize(steps, m_);
+    costates->row(steps) = at.cost[steps].x.transpose();
+    for (long k = steps - 1; k >= 0; --k) {
+      gradient->row(k) = at.cost[k].u.transpose() + costates->row(k + 1) * at.b[k];
+      costates->row(k) = at.cost[k].x.transpose() + costates->row(k + 1) * at.a[k];
+    }
+  }
+
+  const std::string& message() const { return result_.message; }
+
+ private:
+  void Finish(IlqrStatus status, std::string message) {
+    result_.status = status;
+    result_.message = std::move(message);
+  }
+
+  bool Start(const RowMatrixXd& controls) {
+    Plan& plan = result_.plan;
+    plan.controls = controls;
+    for (long k = 0; k < controls.rows(); ++k) {
+      plan.controls.row(k) =
+          controls.row(k).cwiseMax(p_.low.transpose()).cwiseMin(p_.high.transpose());
+    }
+    plan.states.resize(controls.rows() + 1, n_);
+    plan.states.row(0) = p_.initial.transpose();
+    plan.gains.assign(controls.rows(), MatrixX<double>::Zero(m_, n_));
+    if (!RollOut(plan, nullptr, 0.0, &plan) || !Linearise(plan, &at_)) {
+      result_.status = IlqrStatus::kFailed;
+      return false;
+    }
+    first_cost_ = std::abs(plan.cost);
+    return true;
+  }
+
+  // One iteration; false where the work is done.
+  bool Iterate() {
+    if (Measure()) {
+      Finish(IlqrStatus::kConverged, "");
+      return false;
+    }
+    if (options_.second_order && !curvature_valid_ && !FindCurvature()) {
+      result_.status = IlqrStatus::kNoDescent;
+      return false;
+    }
+    IlqrIteration iteration{result_.plan.cost, result_.gradient, 0.0, 0.0};
+    const bool convex = Backward();
+    iteration.shift = shift_;
+    if (convex) iteration.step = Search();
+    result_.iterations.push_back(iteration);
+    if (iteration.step > 0.0) {
+      Decrease();
+      curvature_valid_ = false;
+      return true;
+    }
+    Increase();
+    if (shift_ > kLargestShift) {
+      Finish(IlqrStatus::kNoDescent,
+             convex ? "no step decreases the cost: its gradient may be one of a kink, or rounding"
+                    : "the cost is not convex in the controls: some move nothing and cost nothing");
+      return false;
+    }
+    return true;
+  }
+
+  // Whether the plan is stationary.
+  bool Measure() {
+    Gradient(at_, &costates_, &gradient_);
+    const Plan& plan = result_.plan;
+    double sum = 0.0;
+    for (int i = 0; i < m_; ++i) {
+      const double range = p_.high[i] - p_.low[i];
+      const double size =
+          std::isfinite(range) ? range : std::max(1.0, plan.controls.col(i).cwiseAbs().maxCoeff());
+      for (long k = 0; k < plan.controls.rows(); ++k) {
+        const double g = gradient_(k, i);
+        const bool held = (g > 0.0 && plan.controls(k, i) <= p_.low[i]) ||
+                          (g < 0.0 && plan.controls(k, i) >= p_.high[i]);
+        if (!held) sum += std::abs(g) * size;
+      }
+    }
+    const double cost = std::max(std::abs(plan.cost), kNoCost * first_cost_);
+    result_.gradient = sum == 0.0 ? 0.0 : sum / cost;
+    return result_.gradient <= options_.gradient_tolerance;
+  }
+
+  // Σ λᵢ ∂²fᵢ of each step, symmetric in (x, u).
+  bool FindCurvature() {
+    const Plan& plan = result_.plan;
+    const long steps = plan.controls.rows();
+    curvature_.resize(steps);
+    VectorX<double> next;
+    MatrixX<double> a, b;
+    for (long k = 0; k < steps; ++k) {
+      const VectorX<double> costate = costates_.row(k + 1);
+      MatrixX<double>& h = curvature_[k];
+      h.resize(n_ + m_, n_ + m_);
+      for (int j = 0; j < n_ + m_; ++j) {
+        VectorX<double> x = plan.states.row(k);
+        VectorX<double> u = plan.controls.row(k);
+        double& value = j < n_ ? x[j] : u[j - n_];
+        const double middle = value;
+        const double step = kSecondDifference * std::max(1.0, std::abs(middle));
+        for (const double side : {1.0, -1.0}) {
+          value = middle + side * step;
+          if (!p_.map->Linearise(p_.first_step + k, x, u, &next, &a, &b, &result_.message)) {
+            return false;
+          }
+          VectorX<double> row(n_ + m_);
+          row << a.transpose() * costate, b.transpose() * costate;
+          if (side > 0.0) {
+            h.col(j) = row;
+          } else {
+            h.col(j) = (h.col(j) - row) / (2.0 * step);
+          }
+        }
+      }
+      h = 0.5 * (h + h.transpose()).eval();
+    }
+    curvature_valid_ = true;
+    return true;
+  }
+
+  // Steps k and gains K of all of the horizon; false where the quadratic is not convex.
+  bool Backward() {
+    const long steps = result_.plan.controls.rows();
+    forward_.resize(steps);
+    new_gains_.resize(steps);
+    linear_ = quadratic_ = 0.0;
+    VectorX<double> v_x = at_.cost[steps].x;
+    MatrixX<double> v_xx = at_.cost[steps].xx;
+    const double largest = LargestCurvature();
+    for (long k = steps - 1; k >= 0; --k) {
+      const MatrixX<double>& a = at_.a[k];
+      const MatrixX<double>& b = at_.b[k];
+      const CostExpansion& cost = at_.cost[k];
+      const VectorX<double> q_x = cost.x + a.transpose() * v_x;
+      const VectorX<double> q_u = cost.u + b.transpose() * v_x;
+      MatrixX<double> q_xx = cost.xx + a.transpose() * v_xx * a;
+      MatrixX<double> q_ux = cost.ux + b.transpose() * v_xx * a;
+      MatrixX<double> q_uu = cost.uu + b.transpose() * v_xx * b;
+      if (options_.second_order) {
+        q_xx += curvature_[k].topLeftCorner(n_, n_);
+        q_ux += curvature_[k].bottomLeftCorner(m_, n_);
+        q_uu += curvature_[k].bottomRightCorner(m_, m_);
+      }
+      const double shift = shift_ * largest;
+      const MatrixX<double> shifted_uu = q_uu + shift * b.transpose() * b;
+      const MatrixX<double> shifted_ux = q_ux + shift * b.transpose() * a;
+      const VectorX<double> u = result_.plan.controls.row(k);
+      const BoxQuadraticSolution box =
+          SolveBoxQuadratic(shifted_uu, q_u, p_.low - u, p_.high - u, VectorX<double>::Zero(m_));
+      if (box.status != BoxQuadraticStatus::kSolved || !box.x.allFinite()) return false;
+      MatrixX<double> gain = MatrixX<double>::Zero(m_, n_);
+      if (!box.free.empty()) {
+        gain(box.free, Eigen::all) =
+            -box.factor.solve(MatrixX<double>(shifted_ux(box.free, Eigen::all)));
+      }
+      linear_ += box.x.dot(q_u);
+      quadratic_ += 0.5 * box.x.dot(q_uu * box.x);
+      v_x = q_x + gain.transpose() * (q_uu * box.x + q_u) + q_ux.transpose() * box.x;
+      v_xx =
+          q_xx + gain.transpose() * q_uu * gain + gain.transpose() * q_ux + q_ux.transpose() * gain;
+      v_xx = 0.5 * (v_xx + v_xx.transpose()).eval();
+      forward_[k] = box.x;
+      new_gains_[k] = gain;
+    }
+    return std::isfinite(linear_) && std::isfinite(quadratic_);
+  }
+
+  // What shifts of V are shares of.
+  double LargestCurvature() const {
+    double largest = 0.0;
+    for (const CostExpansion& cost : at_.cost) {
+      largest += cost.xx.size() == 0 ? 0.0 : cost.xx.cwiseAbs().maxCoeff();
+    }
+    return largest > 0.0 ? largest : 1.0;
+  }
+
+  // Rolls out share `share` of the step (without gains where `gains` is null); false where a step
+  // cannot be made or the cost is not finite.
+  bool RollOut(const Plan& plan, const std::vector<MatrixX<double>>* gains, double share,
+               Plan* rolled) {
+    const long steps = plan.controls.rows();
+    ++result_.rollouts;
+    double cost = 0.0;
+    VectorX<double> x = plan.states.row(0);
+    VectorX<double> next;
+    std::string error;
+    for (long k = 0; k < steps; ++k) {
+      VectorX<double> u = plan.controls.row(k);
+      if (gains != nullptr) {
+        u += share * forward_[k] + (*gains)[k] * (x - plan.states.row(k).transpose());
+        u = u.cwiseMax(p_.low).cwiseMin(p_.high);
+      }
+      if (!p_.map->Step(p_.first_step + k, x, u, &next, &error)) {
+        if (gains == nullptr) result_.message = error;
+        return false;
+      }
+      cost += p_.cost->Value(x, u);
+      rolled->controls.row(k) = u.transpose();
+      rolled->states.row(k + 1) = next.transpose();
+      x = next;
+    }
+    rolled->cost = cost + p_.cost->EndValue(x);
+    if (std::isfinite(rolled->cost)) return true;
+    if (gains == nullptr) result_.message = "the cost of the initial controls is not finite";
+    return false;
+  }
+
+  // The share of the step that was taken; 0: none.
+  double Search() {
+    Plan& plan = result_.plan;
+    Plan tried = plan;
+    const double rounding = kCostRounding * std::abs(plan.cost);
+    for (int j = 0; j < kShares; ++j) {
+      const double share = ShareOf(j);
+      const double expected = share * linear_ + share * share * quadratic_;
+      if (!(expected < 0.0) || !RollOut(plan, &new_gains_, share, &tried)) continue;
+      const double change = tried.cost - plan.cost;
+      // Where the decrease is rounding, only the gradient says whether the step is one.
+      const bool of_rounding = -expected <= rounding && change <= rounding;
+      if (!of_rounding && !(change <= kSufficientDecrease * expected)) continue;
+      Linearisation there;
+      if (!Linearise(tried, &there)) continue;
+      if (of_rounding && !Improves(there, tried)) return 0.0;
+      plan = tried;
+      plan.gains = new_gains_;
+      at_ = std::move(there);
+      return share;
+    }
+    return 0.0;
+  }
+
+  // Whether the gradient at another plan is smaller.
+  bool Improves(const Linearisation& there, const Plan& tried) {
+    RowMatrixXd costates, gradient;
+    Gradient(there, &costates, &gradient);
+    const auto size = [this](const RowMatrixXd& g, const Plan& plan) {
+      double sum = 0.0;
+      for (long k = 0; k < g.rows(); ++k) {
+        for (int i = 0; i < m_; ++i) {
+          const bool held = (g(k, i) > 0.0 && plan.controls(k, i) <= p_.low[i]) ||
+                            (g(k, i) < 0.0 && plan.controls(k, i) >= p_.high[i]);
+          if (!held) sum += std::abs(g(k, i));
+        }
+      }
+      return sum;
+    };
+    return size(gradient, tried) < size(gradient_, result_.plan);
+  }
+
+  // The schedule of Tassa et al.: quadratic in the number of successes or failures in a row.
+  void Increase() {
+    growth_ = std::max(kGrowth, growth_ * kGrowth);
+    shift_ = std::max(kLeastShift, shift_ * growth_);
+  }
+  void Decrease() {
+    growth_ = std::min(1.0 / kGrowth, growth_ / kGrowth);
+    shift_ = shift_ * growth_ >= kLeastShift ? shift_ * growth_ : 0.0;
+  }
+
+  static constexpr double kGrowth = 2.0;
+
+  const ControlProblem& p_;
+  const IlqrOptions& options_;
+  int n_, m_;
+  IlqrResult result_;
+  Linearisation at_;
+  RowMatrixXd costates_, gradient_;
+  std::vector<MatrixX<double>> curvature_;
+  bool curvature_valid_ = false;
+  std::vector<VectorX<double>> forward_;
+  std::vector<MatrixX<double>> new_gains_;
+  double linear_ = 0.0, quadratic_ = 0.0;  // of the expected change of the cost
+  double shift_ = 0.0, growth_ = 1.0;
+  double first_cost_ = 0.0;
+};
+
+}  // namespace
+
+const char* NameOf(IlqrStatus status) {
+  switch (status) {
+    case IlqrStatus::kConverged:
+      return "converged";
+    case IlqrStatus::kIterationLimit:
+      return "iteration_limit";
+    case IlqrStatus::kNoDescent:
+      return "no_descent";
+    case IlqrStatus::kStopped:
+      return "stopped";
+    case IlqrStatus::kFailed:
+      return "failed";
+  }
+  return "";
+}
+
+std::string CheckProblem(const ControlProblem& problem, const RowMatrixXd& controls) {
+  const int n = problem.map->num_states();
+  const int m = problem.map->num_controls();
+  const auto expected = [](const std::string& what, long size, long got) {
+    return what + ": expected " + std::to_string(size) + ", got " + std::to_string(got);
+  };
+  if (m < 1) return "controls: expected at least one, got none";
+  if (controls.rows() < 1) return "horizon: expected at least one step, got none";
+  if (controls.cols() != m) return expected("columns of the controls", m, controls.cols());
+  if (problem.initial.size() != n) return expected("initial state", n, problem.initial.size());
+  if (problem.low.size() != m) return expected("lower bounds", m, problem.low.size());
+  if (problem.high.size() != m) return expected("upper bounds", m, problem.high.size());
+  if (problem.cost->num_states() != n || problem.cost->num_controls() != m) {
+    return expected("states of the cost", n, problem.cost->num_states());
+  }
+  for (int i = 0; i < m; ++i) {
+    if (!(problem.low[i] <= problem.high[i])) {
+      return "bounds of control " + std::to_string(i) + ": expected low <= high, got " +
+             std::to_string(problem.low[i]) + " and " + std::to_string(problem.high[i]);
+    }
+  }
+  if (!controls.allFinite()) return "controls: expected finite numbers";
+  if (!problem.initial.allFinite()) return "initial state: expected finite numbers";
+  return "";
+}
+
+IlqrResult SolveIlqr(const ControlProblem& problem, const RowMatrixXd& controls,
+                     const IlqrOptions& options) {
+  IlqrResult result;
+  result.message = CheckProblem(problem, controls);
+  if (!result.message.empty()) {
+    result.status = IlqrStatus::kFailed;
+    return result;
+  }
+  return Solver(problem, options).Solve(controls);
+}
+
+RowMatrixXd CostGradient(const ControlProblem& problem, const Plan& plan, RowMatrixXd* costates,
+                         std::string* error) {
+  const IlqrOptions options;
+  Solver solver(problem, options);
+  Linearisation at;
+  RowMatrixXd gradient;
+  if (solver.Linearise(plan, &at)) {
+    solver.Gradient(at, costates, &gradient);
+  } else {
+    *error = solver.message();
+  }
+  return gradient;
+}
+
+}  // namespace tangible

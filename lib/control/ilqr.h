@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// Iterative linear-quadratic regulation: the controls that minimise a cost over a horizon, each
+// within its bounds, of a system whose steps have exact Jacobians A_k, B_k.
+//
+//   backward  Q_x  = ℓ_x + Aᵀ V_x',          Q_u  = ℓ_u + Bᵀ V_x'
+//             Q_xx = ℓ_xx + Aᵀ V_xx' A,      Q_ux = ℓ_ux + Bᵀ (V_xx' + μ I) A
+//             Q_uu = ℓ_uu + Bᵀ (V_xx' + μ I) B
+//             k    = argmin ½ δuᵀ Q_uu δu + Q_uᵀ δu within the bounds   (box_quadratic.h)
+//             K    = −Q_uu⁻¹ Q_ux over the free controls, 0 over those that a bound holds
+//   forward   u_k ← clamp(u_k + α k_k + K_k (x_k − x̄_k)), rolled out by the system itself
+//
+// (Li, Todorov 2004; Tassa, Mansard, Todorov 2014). With second order Σ λᵢ ∂²fᵢ is added to Q, λ
+// the costate, by central differences of A and B: differential dynamic programming, which converges
+// quadratically where the cost's curvature does not vanish.
+//
+// The shift μ grows while a backward pass is not convex or its step does not decrease the cost, and
+// falls otherwise. Convergence is told by the gradient of the Lagrangian, λ_k = ℓ_x + Aᵀ λ_{k+1},
+// ∂J/∂u_k = ℓ_u + Bᵀ λ_{k+1}, and not by the change of the cost.
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "tangible/control/cost.h"
+#include "tangible/control/step_map.h"
+
+namespace tangible {
+
+struct ControlProblem {
+  StepMap* map = nullptr;
+  const Cost* cost = nullptr;
+  VectorX<double> initial;    ///< state at the start
+  VectorX<double> low, high;  ///< of each control; infinite where there is no bound
+  long first_step = 0;        ///< of the system: the plan's step 0
+};
+
+struct IlqrOptions {
+  int max_iterations = 200;  ///< >= 1
+  /// Converged where moving every control of every step by its range (high − low, or without bounds
+  /// the largest |u| of the plan, at least 1) against the gradient would change the cost, to first
+  /// order, by this share of itself.
+  double gradient_tolerance = 1e-6;
+  bool second_order = false;
+  /// Asked after each iteration; true ends the work with the best plan so far.
+  std::function<bool()> stop{};
+};
+
+/// Controls and the motion that they make. States are (steps + 1) x n, controls steps x m; gains
+/// K_k, m x n a step, are those of the last backward pass.
+struct Plan {
+  RowMatrixXd states, controls;
+  std::vector<MatrixX<double>> gains;
+  double cost = 0.0;
+};
+
+struct IlqrIteration {
+  double cost = 0.0;      ///< before the step
+  double gradient = 0.0;  ///< the share that gradient_tolerance is compared with
+  double shift = 0.0;     ///< μ over the largest entry of V
+  double step = 0.0;      ///< α; 0: no step decreased the cost
+};
+
+enum class IlqrStatus {
+  kConverged,
+  kIterationLimit,
+  kNoDescent,  ///< no step decreases the cost, whatever the shift
+  kStopped,
+  kFailed,  ///< the system's steps from the initial controls cannot be made
+};
+/// "converged", "iteration_limit", "no_descent", "stopped", "failed".
+const char* NameOf(IlqrStatus status);
+
+struct IlqrResult {
+  IlqrStatus status = IlqrStatus::kIterationLimit;
+  std::string message;  ///< one line, where it did not converge
+  Plan plan;
+  double gradient = 0.0;
+  std::vector<IlqrIteration> iterations;
+  long rollouts = 0;
+  long linearisations = 0;  ///< of whole plans
+};
+
+/// Empty, or one line: sizes that differ, a bound below another, no steps, controls out of range or
+/// not finite.
+std::string CheckProblem(const ControlProblem& problem, const RowMatrixXd& controls);
+
+/// From initial controls (steps x m), which are clamped to the bounds.
+IlqrResult SolveIlqr(const ControlProblem& problem, const RowMatrixXd& controls,
+                     const IlqrOptions& options);
+
+/// Costates λ_0 … λ_N (N + 1 rows) of a plan and ∂J/∂u (N rows, returned): exact, from the steps'
+/// Jacobians.
+RowMatrixXd CostGradient(const ControlProblem& problem, const Plan& plan, RowMatrixXd* costates,
+                         std::string* error);
+
+}  // namespace tangible

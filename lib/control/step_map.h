@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// A discrete-time system, x_{k+1} = f_k(x_k, u_k): what is controlled. The engine is one
+// (engine_step.h), a learned model another.
+
+#include <string>
+
+#include "tangible/math/scalar.h"
+
+namespace tangible {
+
+class StepMap {
+ public:
+  StepMap() = default;
+  virtual ~StepMap() = default;
+  StepMap(const StepMap&) = delete;
+  StepMap& operator=(const StepMap&) = delete;
+
+  virtual int num_states() const = 0;
+  virtual int num_controls() const = 0;
+  /// False where the step cannot be made: `error` says why, in one line.
+  virtual bool Step(long k, const VectorX<double>& x, const VectorX<double>& u,
+                    VectorX<double>* next, std::string* error) = 0;
+  /// The same with A = ∂f/∂x (num_states x num_states) and B = ∂f/∂u (num_states x num_controls).
+  virtual bool Linearise(long k, const VectorX<double>& x, const VectorX<double>& u,
+                         VectorX<double>* next, MatrixX<double>* a, MatrixX<double>* b,
+                         std::string* error) = 0;
+};
+
+}  // namespace tangible

@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/control/cost.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace tangible {
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+
+Cost EveryKind(bool at_end) {
+  std::vector<CostTerm> terms(4);
+  terms[0] = {CostTerm::Kind::kState, 3, 0, {0, 0}, 0.2, 1.5, at_end};
+  terms[1] = {CostTerm::Kind::kAngle, 2, 0, {0, 0}, 1.0, 0.7, at_end};
+  terms[2] = {CostTerm::Kind::kPoint, 0, 0, {0.3, -0.4}, 0.5, 2.0, at_end};
+  terms[3] = {CostTerm::Kind::kPoint, 0, 1, {0.3, -0.4}, -0.5, 1.1, at_end};
+  if (!at_end) terms.push_back({CostTerm::Kind::kControl, 1, 0, {0, 0}, 0.1, 0.9, false});
+  return Cost(6, 2, 0.01, terms);
+}
+
+TEST(Cost, DerivativesAreThoseOfItsValue) {
+  VectorX<double> x(6);
+  x << 0.3, 0.1, 2.4, -0.3, 0.6, 0.2;
+  VectorX<double> u(2);
+  u << 0.5, -0.2;
+  for (const bool at_end : {false, true}) {
+    const Cost cost = EveryKind(at_end);
+    const auto expand = [&](const VectorX<double>& z, bool exact, CostExpansion* e) {
+      const VectorX<double> states = z.head(6);
+      const VectorX<double> controls = z.tail(2);
+      if (at_end) {
+        cost.ExpandEnd(states, exact, e);
+        EXPECT_DOUBLE_EQ(e->value, cost.EndValue(states));
+        EXPECT_EQ(cost.Value(states, controls), 0.0);
+      } else {
+        cost.Expand(states, controls, exact, e);
+        EXPECT_DOUBLE_EQ(e->value, cost.Value(states, controls));
+        EXPECT_EQ(cost.EndValue(states), 0.0);
+      }
+    };
+    VectorX<double> z(8);
+    z << x, u;
+    CostExpansion e;
+    expand(z, true, &e);
+    VectorX<double> gradient(8);
+    gradient << e.x, e.u;
+    MatrixX<double> hessian(8, 8);
+    hessian << e.xx, e.ux.transpose(), e.ux, e.uu;
+    for (int i = 0; i < 8; ++i) {
+      for (const double h : {1e-4, 1e-5}) {
+        VectorX<double> plus = z, minus = z;
+        plus[i] += h;
+        minus[i] -= h;
+        CostExpansion a, b;
+        expand(plus, false, &a);
+        expand(minus, false, &b);
+        EXPECT_NEAR(gradient[i], (a.value - b.value) / (2.0 * h), 1e-8);
+        VectorX<double> ga(8), gb(8);
+        ga << a.x, a.u;
+        gb << b.x, b.u;
+        EXPECT_LT((hessian.col(i) - (ga - gb) / (2.0 * h)).norm(), 1e-8);
+      }
+    }
+  }
+}
+
+TEST(Cost, GaussNewtonHasNoNegativeCurvature) {
+  VectorX<double> far(6);
+  far << 3.0, -2.0, 4.1, 1.0, 0.6, 0.2;
+  CostExpansion e;
+  EveryKind(true).ExpandEnd(far, false, &e);
+  for (int i = 0; i < 200; ++i) {
+    const VectorX<double> v = VectorX<double>::Random(6);
+    EXPECT_GE(v.dot(e.xx * v), -1e-12);
+  }
+}
+
+TEST(Cost, WholeTurnsDoNotCount) {
+  const Cost cost(6, 1, 0.01, {{CostTerm::Kind::kAngle, 2, 0, {0, 0}, kPi, 1.0, true}});
+  VectorX<double> x = VectorX<double>::Zero(6);
+  x[2] = -kPi;
+  EXPECT_NEAR(cost.EndValue(x), 0.0, 1e-30);
+  x[2] = 0.0;
+  EXPECT_NEAR(cost.EndValue(x), 2.0, 1e-12);
+}
+
+}  // namespace
+}  // namespace tangible

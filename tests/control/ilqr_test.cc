@@ -1,0 +1,233 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/control/ilqr.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <random>
+
+#include "../support/scenes.h"
+#include "tangible/control/engine_step.h"
+
+namespace tangible {
+namespace {
+
+using test_scenes::SceneOf;
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kPi = 3.14159265358979323846;
+
+// x⁺ = A x + B u.
+class Linear : public StepMap {
+ public:
+  Linear(MatrixX<double> a, MatrixX<double> b) : a_(std::move(a)), b_(std::move(b)) {}
+  int num_states() const override { return static_cast<int>(a_.rows()); }
+  int num_controls() const override { return static_cast<int>(b_.cols()); }
+  bool Step(long, const VectorX<double>& x, const VectorX<double>& u, VectorX<double>* next,
+            std::string*) override {
+    *next = a_ * x + b_ * u;
+    return true;
+  }
+  bool Linearise(long k, const VectorX<double>& x, const VectorX<double>& u, VectorX<double>* next,
+                 MatrixX<double>* a, MatrixX<double>* b, std::string* error) override {
+    *a = a_;
+    *b = b_;
+    return Step(k, x, u, next, error);
+  }
+
+ private:
+  MatrixX<double> a_, b_;
+};
+
+// A pendulum with a torque, by a semi-implicit step: x = (angle from hanging, speed).
+class Pendulum : public StepMap {
+ public:
+  int num_states() const override { return 2; }
+  int num_controls() const override { return 1; }
+  bool Step(long, const VectorX<double>& x, const VectorX<double>& u, VectorX<double>* next,
+            std::string*) override {
+    next->resize(2);
+    (*next)[1] = x[1] + kStep * (u[0] - 9.81 * std::sin(x[0]));
+    (*next)[0] = x[0] + kStep * (*next)[1];
+    return true;
+  }
+  bool Linearise(long k, const VectorX<double>& x, const VectorX<double>& u, VectorX<double>* next,
+                 MatrixX<double>* a, MatrixX<double>* b, std::string* error) override {
+    const double by_angle = -kStep * 9.81 * std::cos(x[0]);
+    a->resize(2, 2);
+    *a << 1.0 + kStep * by_angle, kStep, by_angle, 1.0;
+    b->resize(2, 1);
+    *b << kStep * kStep, kStep;
+    return Step(k, x, u, next, error);
+  }
+  static constexpr double kStep = 0.02;
+};
+
+Cost SwingUp() {
+  return Cost(2, 1, Pendulum::kStep,
+              {{CostTerm::Kind::kControl, 0, 0, {0, 0}, 0.0, 0.1, false},
+               {CostTerm::Kind::kState, 0, 0, {0, 0}, kPi, 100.0, true},
+               {CostTerm::Kind::kState, 1, 0, {0, 0}, 0.0, 100.0, true}});
+}
+
+ControlProblem ProblemOf(StepMap* map, const Cost* cost, VectorX<double> initial, double bound) {
+  const VectorX<double> bounds = VectorX<double>::Constant(map->num_controls(), bound);
+  return {map, cost, std::move(initial), -bounds, bounds};
+}
+
+// The Riccati recursion of min ½ Σ h (xᵀQx + uᵀRu) + ½ x_NᵀQ_N x_N, written out here.
+TEST(Ilqr, OfALinearQuadraticProblemIsRiccatis) {
+  std::mt19937_64 random(7);
+  std::normal_distribution<double> normal;
+  const auto draw = [&] { return normal(random); };
+  for (int run = 0; run < 10; ++run) {
+    const int n = 2 + run % 4, m = 1 + run % 3, steps = 40;
+    const double h = 0.1;
+    const MatrixX<double> a =
+        MatrixX<double>::Identity(n, n) + 0.1 * MatrixX<double>::NullaryExpr(n, n, draw);
+    const MatrixX<double> b = 0.3 * MatrixX<double>::NullaryExpr(n, m, draw);
+    std::vector<CostTerm> terms;
+    VectorX<double> q(n), r(m), q_end(n);
+    for (int i = 0; i < n; ++i) {
+      q[i] = 0.5 + std::abs(draw());
+      q_end[i] = 5.0 + std::abs(draw());
+      terms.push_back({CostTerm::Kind::kState, i, 0, {0, 0}, 0.0, q[i], false});
+      terms.push_back({CostTerm::Kind::kState, i, 0, {0, 0}, 0.0, q_end[i], true});
+    }
+    for (int i = 0; i < m; ++i) {
+      r[i] = 0.2 + std::abs(draw());
+      terms.push_back({CostTerm::Kind::kControl, i, 0, {0, 0}, 0.0, r[i], false});
+    }
+    MatrixX<double> p = q_end.asDiagonal();
+    std::vector<MatrixX<double>> gains(steps);
+    for (int k = steps - 1; k >= 0; --k) {
+      const MatrixX<double> uu = h * MatrixX<double>(r.asDiagonal()) + b.transpose() * p * b;
+      gains[k] = -uu.ldlt().solve(b.transpose() * p * a);
+      p = h * MatrixX<double>(q.asDiagonal()) + a.transpose() * p * (a + b * gains[k]);
+    }
+    const VectorX<double> start = VectorX<double>::NullaryExpr(n, draw);
+    Linear map(a, b);
+    const Cost cost(n, m, h, terms);
+    const ControlProblem problem = ProblemOf(&map, &cost, start, kInfinity);
+    const IlqrResult found = SolveIlqr(problem, RowMatrixXd::Constant(steps, m, 0.3), {});
+    ASSERT_EQ(found.status, IlqrStatus::kConverged) << found.message;
+    EXPECT_EQ(found.iterations.size(), 1u);
+    EXPECT_NEAR(found.plan.cost, 0.5 * start.dot(p * start), 1e-10 * found.plan.cost);
+    VectorX<double> x = start;
+    for (int k = 0; k < steps; ++k) {
+      const VectorX<double> u = gains[k] * x;
+      EXPECT_LT((found.plan.controls.row(k).transpose() - u).norm(), 1e-10 * (1.0 + u.norm()));
+      EXPECT_LT((found.plan.gains[k] - gains[k]).norm(), 1e-9 * (1.0 + gains[k].norm()));
+      x = a * x + b * u;
+    }
+  }
+}
+
+TEST(Ilqr, SwingsAPendulumUpWithinItsBounds) {
+  Pendulum map;
+  const Cost cost = SwingUp();
+  for (const double bound : {4.0, 20.0}) {
+    const ControlProblem problem = ProblemOf(&map, &cost, VectorX<double>::Zero(2), bound);
+    const IlqrResult found =
+        SolveIlqr(problem, RowMatrixXd::Constant(150, 1, 0.5), {.max_iterations = 500});
+    EXPECT_EQ(found.status, IlqrStatus::kConverged) << found.message;
+    EXPECT_NEAR(found.plan.states(150, 0), kPi, 0.2);
+    EXPECT_LE(found.plan.controls.cwiseAbs().maxCoeff(), bound);
+    if (bound == 4.0) {
+      EXPECT_EQ(found.plan.controls.cwiseAbs().maxCoeff(), bound);
+    }
+    for (size_t i = 1; i < found.iterations.size(); ++i) {
+      EXPECT_LE(found.iterations[i].cost, found.iterations[i - 1].cost * (1.0 + 1e-12));
+    }
+  }
+}
+
+TEST(Ilqr, GradientIsThatOfTheCost) {
+  Pendulum map;
+  const Cost cost = SwingUp();
+  const ControlProblem problem = ProblemOf(&map, &cost, VectorX<double>::Zero(2), kInfinity);
+  const RowMatrixXd controls = RowMatrixXd::Random(30, 1);
+  const auto value = [&](const RowMatrixXd& u) {
+    VectorX<double> x = problem.initial, next;
+    double sum = 0.0;
+    for (long k = 0; k < u.rows(); ++k) {
+      sum += cost.Value(x, u.row(k));
+      map.Step(k, x, u.row(k), &next, nullptr);
+      x = next;
+    }
+    return sum + cost.EndValue(x);
+  };
+  Plan plan{RowMatrixXd(31, 2), controls, {}, 0.0};
+  plan.states.row(0) = problem.initial.transpose();
+  for (long k = 0; k < 30; ++k) {
+    VectorX<double> next;
+    map.Step(k, plan.states.row(k), controls.row(k), &next, nullptr);
+    plan.states.row(k + 1) = next.transpose();
+  }
+  RowMatrixXd costates;
+  std::string error;
+  const RowMatrixXd gradient = CostGradient(problem, plan, &costates, &error);
+  for (const int k : {0, 7, 29}) {
+    for (const double h : {1e-4, 1e-5}) {
+      RowMatrixXd plus = controls, minus = controls;
+      plus(k, 0) += h;
+      minus(k, 0) -= h;
+      EXPECT_NEAR(gradient(k, 0), (value(plus) - value(minus)) / (2.0 * h), 1e-6);
+    }
+  }
+}
+
+// With second order each of the last steps squares the gradient; without, it falls linearly.
+TEST(Ilqr, SecondOrderConvergesQuadratically) {
+  Pendulum map;
+  const Cost cost = SwingUp();
+  const ControlProblem problem = ProblemOf(&map, &cost, VectorX<double>::Zero(2), kInfinity);
+  IlqrOptions options{.max_iterations = 500, .gradient_tolerance = 1e-10};
+  const IlqrResult first = SolveIlqr(problem, RowMatrixXd::Constant(150, 1, 0.5), options);
+  options.second_order = true;
+  const IlqrResult second = SolveIlqr(problem, RowMatrixXd::Constant(150, 1, 0.5), options);
+  ASSERT_EQ(second.status, IlqrStatus::kConverged) << second.message;
+  EXPECT_NEAR(second.plan.cost, first.plan.cost, 1e-6 * first.plan.cost);
+  std::vector<double> gradients;
+  for (const IlqrIteration& iteration : second.iterations) gradients.push_back(iteration.gradient);
+  gradients.push_back(second.gradient);
+  // Of the last step that is well above rounding.
+  double order = 0.0;
+  for (size_t i = 2; i < gradients.size(); ++i) {
+    if (gradients[i] > 1e-10 && gradients[i - 1] < 1e-2) {
+      order = std::max(order, std::log(gradients[i] / gradients[i - 1]) /
+                                  std::log(gradients[i - 1] / gradients[i - 2]));
+    }
+  }
+  for (const double g : gradients) std::printf("%.1e ", g);
+  std::printf("order %.2f; first order: %zu iterations\n", order, first.iterations.size());
+  EXPECT_GT(order, 1.6);
+}
+
+TEST(Ilqr, MistakesAreNamed) {
+  Pendulum map;
+  const Cost cost = SwingUp();
+  ControlProblem problem = ProblemOf(&map, &cost, VectorX<double>::Zero(2), 1.0);
+  EXPECT_EQ(SolveIlqr(problem, RowMatrixXd(0, 1), {}).message,
+            "horizon: expected at least one step, got none");
+  problem.low[0] = 2.0;
+  EXPECT_EQ(SolveIlqr(problem, RowMatrixXd::Zero(3, 1), {}).message,
+            "bounds of control 0: expected low <= high, got 2.000000 and 1.000000");
+  problem.low[0] = std::nan("");
+  EXPECT_EQ(SolveIlqr(problem, RowMatrixXd::Zero(3, 1), {}).status, IlqrStatus::kFailed);
+}
+
+// Two controls that do the same: only their sum is determined where neither costs anything.
+TEST(Ilqr, ControlsThatMoveNothingAreNamed) {
+  Linear map(MatrixX<double>::Identity(1, 1), MatrixX<double>::Zero(1, 1));
+  const Cost cost(1, 1, 0.1, {{CostTerm::Kind::kState, 0, 0, {0, 0}, 1.0, 1.0, true}});
+  const ControlProblem problem = ProblemOf(&map, &cost, VectorX<double>::Zero(1), kInfinity);
+  const IlqrResult found = SolveIlqr(problem, RowMatrixXd::Zero(5, 1), {});
+  // Its gradient is 0: there is nothing to do.
+  EXPECT_EQ(found.status, IlqrStatus::kConverged);
+  EXPECT_EQ(found.plan.cost, 0.5);
+}
+
+}  // namespace
+}  // namespace tangible
