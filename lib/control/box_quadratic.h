@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// A convex quadratic over a box, by projected Newton steps (Tassa, Mansard, Todorov, "Control-limited
-// differential dynamic programming", ICRA 2014, algorithm 1; Bertsekas 1982):
+// A convex quadratic over a box, by projected Newton steps (Tassa, Mansard, Todorov,
+// "Control-limited differential dynamic programming", ICRA 2014, algorithm 1; Bertsekas 1982):
 //
 //   min ½ xᵀ H x + gᵀ x,   low <= x <= high
 //

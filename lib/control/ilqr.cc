@@ -287,11 +287,11 @@ class Solver {
       if (!(expected < 0.0) || !RollOut(plan, &new_gains_, share, &tried)) continue;
       const double change = tried.cost - plan.cost;
       // Where the decrease is rounding, only the gradient says whether the step is one.
-      const bool of_rounding = -expected <= rounding && change <= rounding;
-      if (!of_rounding && !(change <= kSufficientDecrease * expected)) continue;
+      const bool decreases = change <= kSufficientDecrease * expected;
+      if (!decreases && !(-expected <= rounding && change <= rounding)) continue;
       Linearisation there;
       if (!Linearise(tried, &there)) continue;
-      if (of_rounding && !Improves(there, tried)) return 0.0;
+      if (!decreases && !Improves(there, tried)) return 0.0;
       plan = tried;
       plan.gains = new_gains_;
       at_ = std::move(there);

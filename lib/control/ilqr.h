@@ -25,6 +25,7 @@
 
 #include "tangible/control/cost.h"
 #include "tangible/control/step_map.h"
+#include "tangible/control/tolerances.h"
 
 namespace tangible {
 
@@ -41,7 +42,7 @@ struct IlqrOptions {
   /// Converged where moving every control of every step by its range (high − low, or without bounds
   /// the largest |u| of the plan, at least 1) against the gradient would change the cost, to first
   /// order, by this share of itself.
-  double gradient_tolerance = 1e-6;
+  double gradient_tolerance = kGradientTolerance;
   bool second_order = false;
   /// Asked after each iteration; true ends the work with the best plan so far.
   std::function<bool()> stop{};

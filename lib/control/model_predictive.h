@@ -17,8 +17,8 @@ struct PredictiveOptions {
 
 class PredictiveController {
  public:
-  /// `controls` (horizon x m) are where the first plan starts. The problem's system and cost outlive
-  /// this; its initial state and first step are set by Control.
+  /// `controls` (horizon x m) are where the first plan starts. The problem's system and cost
+  /// outlive this; its initial state and first step are set by Control.
   PredictiveController(ControlProblem problem, RowMatrixXd controls, PredictiveOptions options);
 
   /// The control of step k, seen in state x. Where no plan can be made, the one before is played

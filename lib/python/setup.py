@@ -41,7 +41,12 @@ class CMakeBuild(build_ext):
         subprocess.run(["cmake", "--install", str(build), "--component", "python"], check=True)
 
 
+# What is built stands where all else is, and not among the sources.
+BUILD = ROOT / "build" / "wheel"
+BUILD.mkdir(parents=True, exist_ok=True)
+
 setup(
+    options={"build": {"build_base": str(BUILD)}, "egg_info": {"egg_base": str(BUILD)}},
     version=version(),
     ext_modules=[Extension("tangible._core", sources=[])],
     cmdclass={"build_ext": CMakeBuild},

@@ -344,12 +344,15 @@ std::string ViewHtml(const ViewData& data, const ViewOptions& options) {
       HtmlEscape(data.name) + "</title>\n<style>\n";
   html += kPageStyle;
   html += kViewStyle;
-  html += "</style>\n</head>\n<body class=\"view\">\n<div class=\"app\">\n";
+  html += "</style>\n</head>\n<body class=\"";
+  html += options.below.empty() ? "view" : "view long";
+  html += "\">\n<div class=\"app\">\n";
   html += Header(data, frames.size());
   html += "<noscript>This page draws with JavaScript, which is switched off.</noscript>";
   html += kControls;
-  html += "</div>\n<script type=\"application/json\" id=\"data\">" + DataJson(data, frames) +
-          "</script>\n";
+  html += "</div>\n";
+  if (!options.below.empty()) html += "<div class=\"below\">" + options.below + "</div>\n";
+  html += "<script type=\"application/json\" id=\"data\">" + DataJson(data, frames) + "</script>\n";
   html += "<script>\n";
   html += kViewScript;
   html += "</script>\n</body>\n</html>\n";

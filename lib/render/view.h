@@ -69,12 +69,14 @@ struct ViewData {
   std::vector<ViewFrame> frames;  ///< times increasing
 };
 
-/// Bounds of the size of the page.
+/// Bounds of the size of the page, and what stands under the animation.
 struct ViewOptions {
   std::size_t max_frames = 2000;
   /// Poses and contacts written in all; fewer frames are kept where there are many bodies. About 25
   /// bytes each.
   std::size_t max_entries = 250000;
+  /// HTML under the animation, such as plots; the page scrolls to it.
+  std::string below{};
 };
 
 /// The frames that are kept so that the page stays within the options: every k-th one, the first

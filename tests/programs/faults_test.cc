@@ -41,6 +41,7 @@ const std::vector<Job>& Jobs() {
       {"tangible-simulate", "ball.json --rate=20 --noise=0.1", {"observe"}, false},
       {"tangible-simulate", "ball.json --batch=batch.csv", {"out"}},
       {"tangible-gradient", "ball.json --parameters=bodies/ball/mass", {"out"}},
+      {"tangible-control", "control.json", {"out", "plan", "trajectory", "view"}},
       {"tangible-lcp", "lcp.json", {"out"}},
       {"tangible-fit", "fit.json", {"out", "report", "checkpoint"}},
       {"tangible-import-recording", "markers.csv --length=0.1 --to=0.01", {"out"}, false},
@@ -64,6 +65,12 @@ class FaultsTest : public ProgramTest {
     ProgramTest::SetUp();
     Write("ball.json", kBall);
     Write("lcp.json", R"({"F": [[2]], "c": [-1]})");
+    Write("pushed.json",
+          R"({"bodies": [{"name": "ball", "shape": {"circle": {"radius": 0.1}}, "mass": 1}],
+        "forces": [{"name": "push", "body": "ball", "force": [0, 0]}],
+        "simulation": {"duration": 0.1}})");
+    Write("control.json", R"({"scene": "pushed.json", "controls": [{"path": "forces/push/force/x"}],
+        "cost": [{"control": "forces/push/force/x"}, {"state": "ball/x", "target": 1, "at": "end"}]})");
     Write("batch.csv", "bodies/ball/mass\n1\n2\n");
     std::string text = "time,body,y\n";
     for (int k = 0; k <= 50; k += 10) {
@@ -213,6 +220,7 @@ std::vector<Job> JobsThatRead(const std::string& input) {
           {"tangible-simulate", "ball.json --observe=x.csv --rate=20 --points=" + input, {}},
           {"tangible-gradient", input + " --parameters=bodies/ball/mass", {}},
           {"tangible-gradient", "ball.json --parameters=bodies/ball/mass --loss=" + input, {}},
+          {"tangible-control", input, {}},
           {"tangible-lcp", input, {}},
           {"tangible-fit", input, {}},
           {"tangible-fit", "fit.json --checkpoint=" + input, {}},

@@ -106,6 +106,15 @@ TEST(ViewHtml, DataIsWhatWasGiven) {
   EXPECT_EQ(data["contacts"][3][0], nlohmann::json::array({1, 0, 0, 0, 0, 1, 5, 0, 1}));
 }
 
+TEST(ViewHtml, WhatStandsBelowIsReachedByScrolling) {
+  EXPECT_NE(ViewHtml(MakeView(2, -1)).find("<body class=\"view\">"), std::string::npos);
+  ViewOptions options;
+  options.below = "<p>plots</p>";
+  const std::string html = ViewHtml(MakeView(2, -1), options);
+  EXPECT_NE(html.find("<body class=\"view long\">"), std::string::npos);
+  EXPECT_NE(html.find("<div class=\"below\"><p>plots</p></div>"), std::string::npos);
+}
+
 TEST(ViewHtml, EveryIdThatTheScriptLooksUpExists) {
   const std::string html = ViewHtml(MakeView(2, -1));
   int num_ids = 0;

@@ -48,8 +48,9 @@ const std::map<std::string, std::set<std::string>>& DirectDependencies() {
       {"simulation/derivatives", {"simulation/stepping"}},
       {"simulation/certificate", {"simulation/derivatives"}},
       {"simulation/gradient", {"simulation/certificate"}},
+      {"control", {"simulation/gradient"}},
       {"render", {"simulation/gradient"}},
-      {"estimation/problem", {"render"}},
+      {"estimation/problem", {"control", "render"}},
       {"estimation/fit", {"estimation/problem"}},
       {"estimation/results", {"estimation/fit"}},
       {"estimation/experiments", {"estimation/results"}},
@@ -122,7 +123,9 @@ std::string WrongLibrary(const std::string& path, const std::string& name) {
   if (StartsWith(name, "gflags/") && !IsMain(path)) {
     return "gflags belongs in programs";
   }
-  if (StartsWith(name, "pybind11/") && !StartsWith(path, "lib/python/")) {
+  // Another engine's binding is for comparison alone.
+  if (StartsWith(name, "pybind11/") && !StartsWith(path, "lib/python/") &&
+      !StartsWith(path, "verification/python/")) {
     return "pybind11 belongs in lib/python";
   }
   if (StartsWith(name, "torch/") && !StartsWith(path, "estimation/vision/")) {

@@ -116,6 +116,33 @@ void RolloutCertifier::AddContact(const Model<double>& model, const StepRecord& 
   }
 }
 
+void RolloutCertifier::AddControls(const ModelStructure& structure, const Controls& controls,
+                                   long step, Stepper* stepper) {
+  if (!stepper->by_events() || controls.values.rows() == 0) return;
+  const auto changes = [&controls](long k) {
+    const Eigen::Index last = controls.values.rows() - 1;
+    const Eigen::Index before = std::clamp<Eigen::Index>(k - 1, 0, last);
+    const Eigen::Index after = std::clamp<Eigen::Index>(k, 0, last);
+    return controls.values.row(before) != controls.values.row(after);
+  };
+  const StepRecord& record = stepper->record();
+  const EventRecord& events = stepper->events().record();
+  for (int p = 0; p < events.num_parts; ++p) {
+    const EventPart& part = *events.parts[p];
+    if (part.is_impulses || !IsLocated(part.segment.event)) continue;
+    const Segment& segment = part.segment;
+    const double time = segment.time + segment.length;
+    const Place place{&structure, step, time, 0, &segment.event_contact, ContactMode::kOpen};
+    for (const long boundary : {step, step + 1}) {
+      const double edge = record.time + static_cast<double>(boundary - step) * record.h;
+      const double distance = std::abs(time - edge) / record.h;
+      if (distance < kBesideControls && changes(boundary)) {
+        AddMargin(distance, place, "an event as controls change");
+      }
+    }
+  }
+}
+
 // The choices of the law's constant: kinks where it is continuous, jumps at the conditions of an
 // impact.
 void RolloutCertifier::AddLaw(const Model<double>& model, const StepRecord& record,
@@ -331,6 +358,8 @@ Certificate CertifyRollout(ControlledModel<double>* model, const State<double>& 
       [&](long k, double, const State<double>&, Stepper* done) {
         if (done != nullptr) {
           certifier.AddStep(model->At(k - 1), k - 1, done);
+          if (model->is_controlled())
+            certifier.AddControls(model->structure(), *model->controls(), k - 1, done);
         }
       },
       &stepper, &final);

@@ -16,6 +16,8 @@
 //                  wanted; and with event stepping a contact that touches as the run starts, where
 //                  a direction opens or closes its gap: one side falls and lands, the other is
 //                  pushed out
+//   controls       an event at the boundary of two steps whose controls differ: before it and after
+//                  it other forces act, and its derivative is another on either side
 //   coordinates    so large that what they round to is more than kLargeCoordinates of a body that
 //                  has contacts or joints (coordinate_watch.h): its modes may be rounding
 //   linear systems redundant rows, condition, residual (contact_conditioning.h), of every step
@@ -46,6 +48,9 @@ class RolloutCertifier {
 
   /// The step that the stepper has just done; `step` counts from 0.
   void AddStep(const Model<double>& model, long step, Stepper* stepper);
+  /// The same step's events that coincide with a change of the controls.
+  void AddControls(const ModelStructure& structure, const Controls& controls, long step,
+                   Stepper* stepper);
   /// The certificate with its verdict, after the last step.
   Certificate Finish(const Model<double>& model, const RolloutReport& report);
   /// Smallest margin of the last step that was added; infinite if nothing was near.

@@ -9,9 +9,11 @@ namespace tangible {
 /// Of the margin's own scale: relative distances to a jump below it make the verdict
 /// `discontinuous`.
 inline constexpr double kNearJumpMargin = 1e-6;
-/// Of the square of the smallest margin: what smoothing changes a derivative by, relatively, is about
-/// its complementarity over that square.
+/// Of the square of the smallest margin: what smoothing changes a derivative by, relatively, is
+/// about its complementarity over that square.
 inline constexpr double kSmoothedDerivative = 1e-8;
+/// Of a step: an event that is nearer than that to a change of the controls has a margin.
+inline constexpr double kBesideControls = 1e-3;
 /// Of the largest impulse or force: a contact with less carries no load.
 inline constexpr double kLoaded = 1e-9;
 /// Of the terms of the rate: a direction that changes a gap or a speed by less does not change it.

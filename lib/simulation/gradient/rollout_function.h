@@ -76,7 +76,8 @@ class RolloutFunction {
   std::vector<double> record_times() const;
   const std::vector<ParameterPath>& parameters() const { return parameters_; }
   const std::vector<ParameterPath>& controls() const { return controls_; }
-  /// Of the model: the controls' numbers, one control's after another's, and which control's each is.
+  /// Of the model: the controls' numbers, one control's after another's, and which control's each
+  /// is.
   const std::vector<int>& control_numbers() const { return control_numbers_; }
   const std::vector<int>& control_of_number() const { return control_of_number_; }
   /// Of each number of a state: its pose or twist variable.

@@ -225,6 +225,44 @@ TEST_P(RolloutFunctionTest, AnInterruptEndsTheRun) {
 
 INSTANTIATE_TEST_SUITE_P(Stepping, RolloutFunctionTest, ::testing::Values("fixed", "event"));
 
+// A ball of 1 kg without gravity moves at 1 m/s towards a floor 0.1 m away, which it reaches as
+// step 10 begins. It is pushed from then on: lands later, and has already been pushed before; lands
+// sooner, and is pushed after the rebound alone. Away from the boundary there is no kink.
+TEST(RolloutFunctionTest, AnEventAsControlsChangeIsAKink) {
+  const Scene scene = SceneOf(R"({"gravity": [0, 0], "bodies": [
+      {"name": "ball", "shape": {"circle": {"radius": 0.1}}, "mass": 1, "position": [0, 0.2],
+       "velocity": [0, -1], "restitution": 0.5},
+      {"name": "floor", "static": true, "restitution": 0.5,
+       "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}}],
+    "forces": [{"name": "push", "body": "ball", "force": [0, 0]}],
+    "simulation": {"dt": 0.01, "duration": 0.2, "stepping": "event"}})");
+  RolloutFunction function;
+  ASSERT_EQ(function.Create(scene, {}, {"forces/push/force/y"}, {}), "");
+  RolloutInput input = function.Defaults();
+  input.controls.bottomRows(10).setConstant(2.0);
+  RolloutWorker worker(function);
+  const auto end = [&](double height) {
+    RolloutInput moved = input;
+    moved.state[1] += height;
+    return worker.Run(moved).states(0, 4);
+  };
+  constexpr double kStep = 1e-6;
+  const double later = (end(kStep) - end(0.0)) / kStep;
+  const double sooner = (end(0.0) - end(-kStep)) / kStep;
+  EXPECT_GT(std::abs(later - sooner), 1.0);
+  const std::string verdict = worker.Certify(input).verdict;
+  EXPECT_EQ(verdict.find("near a kink: margin"), 0u) << verdict;
+  EXPECT_NE(verdict.find("contact of ball and floor, an event as controls change"),
+            std::string::npos)
+      << verdict;
+  input.state[1] += 1e-3;
+  EXPECT_EQ(worker.Certify(input).verdict, "trustworthy");
+  input.state[1] -= 1e-3;
+  input.controls.setConstant(2.0);
+  input.state[4] = -1.0;
+  EXPECT_EQ(worker.Certify(input).verdict, "trustworthy");
+}
+
 TEST(RolloutFunctionErrorsTest, OneLineEach) {
   RolloutFunction function;
   const Scene scene = Driven("fixed");

@@ -1,0 +1,170 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/app/control_problem.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <limits>
+
+#include "tangible/scene/json_reader.h"
+#include "tangible/scene/scene_json.h"
+#include "tangible/scene/scene_names.h"
+
+namespace tangible {
+namespace {
+
+// Reads the parts of a problem whose scene is known.
+class Reader {
+ public:
+  Reader(const JsonReader& root, ControlFile* problem) : root_(root), problem_(*problem) {}
+
+  void Read() {
+    ReadControls();
+    if (!root_.ok()) return;
+    outputs_ = OutputNames(*BuildStructure(problem_.scene));
+    ReadCost();
+    if (root_.Has("max_iterations")) {
+      problem_.options.max_iterations = root_.At("max_iterations").Integer(1, 1000000);
+    }
+    if (root_.Has("gradient_tolerance")) {
+      problem_.options.gradient_tolerance =
+          root_.At("gradient_tolerance").Number(NumberKind::kPositive);
+    }
+    if (root_.Has("second_order"))
+      problem_.options.second_order = root_.At("second_order").Boolean();
+    if (root_.Has("mpc")) ReadPredictive(root_.At("mpc"));
+  }
+
+ private:
+  void ReadControls() {
+    const JsonReader list = root_.At("controls");
+    const int count = list.ExpectArray("an array of controls");
+    if (count == 0) list.Fail("expected at least one control, got none");
+    problem_.low.setConstant(count, -std::numeric_limits<double>::infinity());
+    problem_.high = -problem_.low;
+    problem_.initial.setZero(count);
+    for (int i = 0; i < count; ++i) {
+      const JsonReader control = list.At(i);
+      control.ExpectKeys({"path", "low", "high", "initial"}, " of a control");
+      problem_.paths.push_back(control.At("path").String());
+      if (control.Has("low")) problem_.low[i] = control.At("low").Number();
+      if (control.Has("high")) problem_.high[i] = control.At("high").Number();
+      if (control.Has("initial")) problem_.initial[i] = control.At("initial").Number();
+      if (problem_.low[i] > problem_.high[i]) {
+        control.At("high").FailExpected("a number >= low");
+      }
+    }
+  }
+
+  void ReadCost() {
+    const JsonReader list = root_.At("cost");
+    const int count = list.ExpectArray("an array of terms");
+    if (count == 0) list.Fail("expected at least one term, got none");
+    for (int i = 0; i < count && root_.ok(); ++i) ReadTerm(list.At(i));
+  }
+
+  // The index of a name, or 0 and a failure that lists some.
+  int IndexOf(const JsonReader& json, const std::vector<std::string>& names,
+              const std::string& what) const {
+    const std::string name = json.String();
+    const auto found = std::find(names.begin(), names.end(), name);
+    if (found == names.end())
+      json.FailExpected(what + (names.empty() ? "" : " such as " + names[0]));
+    return found == names.end() ? 0 : static_cast<int>(found - names.begin());
+  }
+
+  void ReadTerm(const JsonReader& json) {
+    json.ExpectKeys({"state", "point", "control", "target", "weight", "at", "wrap"}, " of a term");
+    const int kinds =
+        (json.Has("state") ? 1 : 0) + (json.Has("point") ? 1 : 0) + (json.Has("control") ? 1 : 0);
+    if (kinds != 1) {
+      json.Fail("expected one of state, point and control, got " + std::to_string(kinds));
+      return;
+    }
+    CostTerm term;
+    if (json.Has("weight")) term.weight = json.At("weight").Number(NumberKind::kNonNegative);
+    if (json.Has("at")) term.at_end = json.At("at").Choice({"steps", "end"}) == 1;
+    if (json.Has("wrap") && !json.Has("state")) {
+      json.At("wrap").Fail("expected with an angle only");
+    }
+    if (json.Has("point")) {
+      ReadPoint(json, term);
+      return;
+    }
+    if (json.Has("target")) term.target = json.At("target").Number();
+    if (json.Has("control")) {
+      term.kind = CostTerm::Kind::kControl;
+      term.index = IndexOf(json.At("control"), problem_.paths, "one of the controls");
+      if (term.at_end) json.At("at").Fail("expected steps with a control, got end");
+    } else {
+      term.index = IndexOf(json.At("state"), outputs_, "a number of the state");
+      if (json.Has("wrap") && json.At("wrap").Boolean()) {
+        term.kind = CostTerm::Kind::kAngle;
+        if (term.index % 6 != 2) json.At("wrap").Fail("expected with an angle only");
+      }
+    }
+    problem_.terms.push_back(term);
+  }
+
+  // A point's two coordinates are two terms.
+  void ReadPoint(const JsonReader& json, CostTerm term) {
+    const JsonReader point = json.At("point");
+    point.ExpectKeys({"body", "at"}, " of a point");
+    std::vector<std::string> bodies;
+    for (size_t i = 0; i < outputs_.size(); i += 6) {
+      bodies.push_back(outputs_[i].substr(0, outputs_[i].size() - 2));
+    }
+    term.kind = CostTerm::Kind::kPoint;
+    term.index = 6 * IndexOf(point.At("body"), bodies, "a moving body");
+    if (point.Has("at")) term.at = point.At("at").Point();
+    const Vector2<double> target = json.At("target").Point();
+    for (int axis = 0; axis < 2; ++axis) {
+      term.axis = axis;
+      term.target = target[axis];
+      problem_.terms.push_back(term);
+    }
+  }
+
+  void ReadPredictive(const JsonReader& json) {
+    json.ExpectKeys({"duration", "horizon", "iterations"}, " of mpc");
+    problem_.run_duration = json.At("duration").Number(NumberKind::kPositive);
+    problem_.plan_horizon = json.At("horizon").Number(NumberKind::kPositive);
+    if (json.Has("iterations")) {
+      problem_.plan_iterations = json.At("iterations").Integer(1, 1000000);
+    }
+  }
+
+  const JsonReader& root_;
+  ControlFile& problem_;
+  std::vector<std::string> outputs_;
+};
+
+// A scene's file stands beside the problem's, unless its path is absolute.
+std::string Beside(const std::string& file, const std::string& path) {
+  return (std::filesystem::path(file).parent_path() / path).string();
+}
+
+}  // namespace
+
+bool LoadControlFile(const std::string& file, ControlFile* problem, std::string* error) {
+  Json json;
+  if (!ParseJsonFile(file, &json, error)) return false;
+  JsonErrors errors(file);
+  const JsonReader root(json, &errors);
+  root.ExpectKeys({"name", "scene", "controls", "cost", "horizon", "max_iterations",
+                   "gradient_tolerance", "second_order", "mpc"});
+  const std::string scene = root.At("scene").String();
+  if (errors.ok()) {
+    problem->scene_path = Beside(file, scene);
+    if (!LoadScene(problem->scene_path, &problem->scene, error)) return false;
+    if (root.Has("horizon")) {
+      problem->scene.simulation.duration = root.At("horizon").Number(NumberKind::kPositive);
+    } else if (!(problem->scene.simulation.duration > 0.0)) {
+      root.Fail("horizon: missing, expected a number > 0, as the scene's duration is 0");
+    }
+    Reader(root, problem).Read();
+  }
+  *error = errors.message();
+  return errors.ok();
+}
+
+}  // namespace tangible

@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// Control problems as files (README.md of lib/control has the keys).
+
+#include <string>
+#include <vector>
+
+#include "tangible/control/engine_step.h"
+#include "tangible/control/ilqr.h"
+
+namespace tangible {
+
+struct ControlFile {
+  Scene scene;  ///< its duration is the horizon's
+  std::string scene_path;
+  std::vector<std::string> paths;  ///< of the controls
+  VectorX<double> low, high, initial;
+  std::vector<CostTerm> terms;
+  IlqrOptions options;
+  /// Receding horizon: of the plant's run, s, and of each plan, s.
+  double run_duration = 0.0;
+  double plan_horizon = 0.0;
+  int plan_iterations = 5;
+};
+
+/// Reads a problem and its scene, and resolves names. On failure sets one line.
+bool LoadControlFile(const std::string& file, ControlFile* problem, std::string* error);
+
+}  // namespace tangible

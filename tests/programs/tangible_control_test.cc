@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "run_program.h"
+
+namespace tangible {
+namespace {
+
+using nlohmann::json;
+
+constexpr char kCart[] = R"({"bodies": [
+    {"name": "cart", "shape": {"box": {"size": [0.4, 0.2]}}, "mass": 2, "position": [0, 0]}],
+  "joints": [{"name": "rail", "type": "prismatic", "bodies": ["cart", "world"], "anchor": [0, 0],
+              "axis": [1, 0]}],
+  "forces": [{"name": "push", "body": "cart", "force": [0, 0]}],
+  "simulation": {"dt": 0.05, "duration": 1}})";
+
+class TangibleControlTest : public ProgramTest {
+ protected:
+  ProgramRun Control(const std::string& problem, const std::string& flags = "") {
+    Write("cart.json", kCart);
+    return Run("tangible-control", "'" + Write("problem.json", problem) + "' " + flags);
+  }
+};
+
+std::string Problem(const std::string& controls, const std::string& more = "") {
+  return R"({"scene": "cart.json", "controls": [)" + controls + R"(], "cost": [
+    {"state": "cart/x", "target": 1, "weight": 1e6, "at": "end"},
+    {"state": "cart/vx", "weight": 1e6, "at": "end"},
+    {"control": "joints/rail/effort", "weight": 1}])" +
+         more + "}";
+}
+const std::string kEffort = R"({"path": "joints/rail/effort"})";
+
+// m x'' = u from rest to rest over 1 m in 1 s: u = 6 m (1 − 2 t) for the least ∫ u², so that
+// ½ ∫ u² = 6 m². A step of 0.05 s changes that by h².
+TEST_F(TangibleControlTest, MovesACartAsTheClosedFormSays) {
+  const ProgramRun run =
+      Control(Problem(kEffort), "--plan='" + Path("plan.csv") + "' --trajectory='" + Path("t.csv") +
+                                    "' --view='" + Path("v.html") + "'");
+  ASSERT_EQ(run.exit_status, 0) << run.error;
+  const json result = json::parse(run.out);
+  EXPECT_EQ(result["status"], "converged");
+  EXPECT_EQ(result["iterations"].size(), 1u);
+  EXPECT_NEAR(result["cost"].get<double>(), 24.0, 0.2);
+  const json& values = result["controls"]["values"];
+  ASSERT_EQ(values.size(), 20u);
+  for (size_t k = 0; k < 20; ++k) {
+    const double t = (static_cast<double>(k) + 0.5) * 0.05;
+    EXPECT_NEAR(values[k][0].get<double>(), 12.0 * (1.0 - 2.0 * t), 0.7) << k;
+  }
+  EXPECT_NEAR(result["final_state"]["cart/x"].get<double>(), 1.0, 1e-3);
+  EXPECT_EQ(result["certificate"]["verdict"], "trustworthy");
+  EXPECT_EQ(Read(Path("plan.csv")).rfind("time,joints/rail/effort\n0,", 0), 0u);
+  EXPECT_EQ(Read(Path("t.csv")).rfind("time,body,x", 0), 0u);
+  EXPECT_NE(Read(Path("v.html")).find("Controls"), std::string::npos);
+}
+
+TEST_F(TangibleControlTest, KeepsBounds) {
+  const ProgramRun run =
+      Control(Problem(R"({"path": "joints/rail/effort", "low": -9, "high": 9, "initial": 3})"));
+  ASSERT_EQ(run.exit_status, 0) << run.error;
+  const json result = json::parse(run.out);
+  EXPECT_EQ(result["status"], "converged");
+  double largest = 0.0;
+  for (const json& u : result["controls"]["values"]) {
+    largest = std::max(largest, std::abs(u[0].get<double>()));
+  }
+  EXPECT_EQ(largest, 9.0);
+  EXPECT_NEAR(result["final_state"]["cart/x"].get<double>(), 1.0, 1e-2);
+}
+
+// A plant of twice the mass: the plan alone would come half as far.
+TEST_F(TangibleControlTest, RecedingHorizonsBringAHeavierPlantToTheMark) {
+  std::string heavy = kCart;
+  heavy.replace(heavy.find("\"mass\": 2"), 9, "\"mass\": 4");
+  Write("heavy.json", heavy);
+  const std::string problem = R"({"scene": "cart.json", "controls": [)" + kEffort + R"(], "cost": [
+      {"state": "cart/x", "target": 1, "weight": 100}, {"state": "cart/vx", "weight": 10},
+      {"control": "joints/rail/effort", "weight": 0.01},
+      {"state": "cart/x", "target": 1, "weight": 100, "at": "end"}],
+    "mpc": {"duration": 3, "horizon": 1}})";
+  const ProgramRun run = Control(problem, "--mpc --plant='" + Path("heavy.json") + "'");
+  ASSERT_EQ(run.exit_status, 0) << run.error;
+  const json result = json::parse(run.out);
+  EXPECT_EQ(result["plans"], 60);
+  EXPECT_EQ(result["plans_failed"], 0);
+  EXPECT_NEAR(result["final_state"]["cart/x"].get<double>(), 1.0, 0.02);
+  EXPECT_GT(result["cpu_seconds_max"].get<double>(), 0.0);
+}
+
+TEST_F(TangibleControlTest, MistakesAreOneLine) {
+  ExpectOneLine(Control(Problem(R"({"path": "joints/rail/effort", "low": 2, "high": 1})")), 1,
+                "/controls/0/high: expected a number >= low, got 1");
+  ExpectOneLine(Control(Problem(kEffort + R"(, {"path": "bodies/cart/mass"})")), 1,
+                "control bodies/cart/mass");
+  ExpectOneLine(Control(Problem(kEffort, R"(, "horizon": 0)")), 1,
+                "/horizon: expected a number > 0, got 0");
+  ExpectOneLine(Control(Problem(kEffort, R"(, "horizons": 1)")), 1, "unknown key");
+  ExpectOneLine(Control(Problem(kEffort + R"(, {"path": "forces/push/force/y"})")), 1,
+                "forces/push/force/y: expected a control that moves something");
+  std::string name = Problem(kEffort);
+  name.replace(name.find("cart/vx"), 7, "card/vx");
+  ExpectOneLine(Control(name), 1, "/cost/1/state: expected a number of the state");
+  std::string large = Problem(kEffort);
+  large.replace(large.find("1e6"), 3, "1e308");
+  large.replace(large.find("\"target\": 1"), 11, "\"target\": 1e9");
+  ExpectOneLine(Control(large), 1, "the cost of the initial controls is not finite");
+  ExpectOneLine(Control(R"({"scene": "nowhere.json", "controls": [], "cost": []})"), 1,
+                "nowhere.json");
+  ExpectOneLine(Control(Problem(kEffort), "--mpc"), 1, "/mpc: missing");
+  ExpectOneLine(Control(Problem(kEffort), "--plant=x.json"), 2, "--plant: needs --mpc");
+  ExpectOneLine(Control(Problem(kEffort), "--budget_ms=-1 --mpc"), 2, "--budget_ms");
+}
+
+}  // namespace
+}  // namespace tangible
