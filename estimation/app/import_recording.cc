@@ -1,19 +1,30 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// tangible-import-recording: a recording of a real pendulum as observations for tangible-fit.
+// tangible-import-recording: a recording of real motion as observations for tangible-fit.
 
 #include <gflags/gflags.h>
 
+#include <cmath>
 #include <cstdio>
+#include <optional>
 #include <string>
+#include <utility>
 
 #include "tangible/app/program.h"
 #include "tangible/estimation/experiments/recording.h"
+#include "tangible/estimation/experiments/recording_table.h"
+#include "tangible/scene/text_file.h"
 
-DEFINE_string(kind, "ibm_double_pendulum", "ibm_double_pendulum or multiarm_single");
+DEFINE_string(kind, "ibm_double_pendulum",
+              "table, deeplabcut, tracker, ibm_double_pendulum or multiarm_single");
 DEFINE_string(out, "", "file of the observations (CSV); required");
+DEFINE_string(mapping, "", "of a table: file (JSON) that says which columns are what");
 DEFINE_double(from, 0.0, "s: start, which becomes time 0");
-DEFINE_double(to, 0.5, "s: end, included");
+DEFINE_double(to, 0.5, "s: end, included; of table, deeplabcut and tracker by default all");
+DEFINE_double(frame_rate, 0.0, "Hz, of a recording whose rows are frames without times");
+DEFINE_double(likelihood, 0.0, "of deeplabcut: points that are less likely are missing data");
+DEFINE_double(scale, 1.0, "m a unit of length of a table, deeplabcut or tracker");
+DEFINE_bool(y_down, false, "y counts downwards, as in images: y and angles change sign");
 DEFINE_double(rate, 400.0, "Hz, of ibm_double_pendulum");
 DEFINE_double(length, 0.091, "m: pivot to joint of ibm_double_pendulum, which sets the scale");
 
@@ -24,25 +35,83 @@ int Usage(const std::string& what) {
   return ReportError("tangible-import-recording: " + what, kExitUsage);
 }
 
-int Import(const std::string& file) {
-  RecordingOptions options;
-  bool known = false;
-  for (const auto& [name, kind] : kRecordingKindNames) {
+/// The format or kind that --kind names, if it is in the list.
+template <typename Kind, size_t N>
+std::optional<Kind> FindKind(const std::pair<const char*, Kind> (&names)[N]) {
+  for (const auto& [name, kind] : names) {
     if (FLAGS_kind == name) {
-      options.kind = kind;
-      known = true;
+      return kind;
     }
   }
-  if (!known) {
-    return Usage("--kind: expected ibm_double_pendulum or multiarm_single, got '" + FLAGS_kind +
-                 "'");
+  return std::nullopt;
+}
+
+int ImportTable(const std::string& file, TableFormat format) {
+  TableOptions options;
+  options.format = format;
+  options.from = FLAGS_from;
+  if (!gflags::GetCommandLineFlagInfoOrDie("to").is_default) {
+    options.to = FLAGS_to;
   }
+  options.frame_rate = FLAGS_frame_rate;
+  options.likelihood = FLAGS_likelihood;
+  options.scale = FLAGS_scale;
+  options.y_down = FLAGS_y_down;
+  options.mapping_file = FLAGS_mapping;
+  if (!(options.from <= options.to) || !(FLAGS_frame_rate >= 0.0) || !(FLAGS_scale > 0.0) ||
+      !std::isfinite(FLAGS_scale) || !std::isfinite(FLAGS_frame_rate) ||
+      std::isnan(FLAGS_likelihood)) {
+    return Usage(
+        "expected --from <= --to, --frame_rate > 0, --scale > 0 and --likelihood a number");
+  }
+  std::string text;
+  std::string error;
+  if (format == TableFormat::kTable) {
+    if (FLAGS_mapping.empty()) {
+      return Usage("--mapping: expected a file that says which columns are what");
+    }
+    if (!ReadTextFile(FLAGS_mapping, &options.mapping, &error)) {
+      return ReportError(error);
+    }
+  }
+  TableRecording recording;
+  if (!ReadTextFile(file, &text, &error) ||
+      !ParseTableRecording(text, file, options, &recording, &error)) {
+    return ReportError(error);
+  }
+  error = WriteFileAtomically(FLAGS_out, ObservationCsv(recording));
+  if (!error.empty()) {
+    return ReportError(error);
+  }
+  std::printf("%zu rows, %ld coordinates missing\n", recording.rows.size(), recording.missing);
+  for (const TableRecording::Noise& noise : recording.noise) {
+    if (std::isfinite(noise.value)) {
+      std::printf("noise of %s %s: %.3g %s\n", noise.name.c_str(), NameOf(noise.coordinate),
+                  noise.value, UnitOf(noise.coordinate));
+    }
+  }
+  return kExitDone;
+}
+
+int Import(const std::string& file) {
   if (FLAGS_out.empty()) {
     return Usage("--out: expected a file");
+  }
+  if (const std::optional<TableFormat> format = FindKind(kTableFormatNames)) {
+    return ImportTable(file, *format);
+  }
+  const std::optional<RecordingKind> kind = FindKind(kRecordingKindNames);
+  if (!kind) {
+    return Usage(
+        "--kind: expected table, deeplabcut, tracker, ibm_double_pendulum or multiarm_single, got "
+        "'" +
+        FLAGS_kind + "'");
   }
   if (!(FLAGS_from <= FLAGS_to) || !(FLAGS_rate > 0.0) || !(FLAGS_length > 0.0)) {
     return Usage("expected --from <= --to, --rate > 0 and --length > 0");
   }
+  RecordingOptions options;
+  options.kind = *kind;
   options.from = FLAGS_from;
   options.to = FLAGS_to;
   options.rate = FLAGS_rate;
@@ -77,11 +146,15 @@ int Main(int argc, char** argv) {
   const CommandLine line = ParseCommandLine(
       argc, argv,
       {.name = "tangible-import-recording",
-       .synopsis = "RECORDING.csv --out=O.csv [--kind=ibm_double_pendulum|multiarm_single]",
-       .description = "Makes a recording of a real pendulum into observations for tangible-fit\n"
-                      "and prints the noise of each series, from its fourth differences.",
+       .synopsis = "RECORDING --out=O.csv --kind=table|deeplabcut|tracker|ibm_double_pendulum|"
+                   "multiarm_single\n"
+                   "                                 [--mapping=M.json] [--frame_rate=HZ] "
+                   "[--likelihood=P] [--y_down]",
+       .description = "Makes a recording of real motion into observations for tangible-fit and\n"
+                      "prints the noise of each series, from its fourth differences.",
        .version = TANGIBLE_VERSION,
-       .source_file = __FILE__});
+       .source_file = __FILE__,
+       .inputs = {"mapping"}});
   return line.exit_status ? *line.exit_status : Import(line.positional[0]);
 }
 

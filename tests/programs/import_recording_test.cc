@@ -40,5 +40,30 @@ TEST_F(ImportRecordingTest, RefusesWhatItCannotDo) {
                 "none/o.csv");
 }
 
+TEST_F(ImportRecordingTest, TablesOfOthers) {
+  const std::string dlc = Write("d.csv",
+                                "scorer,n,n,n\nbodyparts,tip,tip,tip\ncoords,x,y,likelihood\n"
+                                "0,10,20,1\n1,11,21,0.1\n2,12,22,1\n");
+  const std::string out = " --out=" + Path("o.csv");
+  ProgramRun run = Run("tangible-import-recording",
+                       dlc + out + " --kind=deeplabcut --frame_rate=2 --likelihood=0.5 --y_down");
+  EXPECT_EQ(run.exit_status, 0) << run.error;
+  EXPECT_NE(run.out.find("2 rows, 2 coordinates missing"), std::string::npos) << run.out;
+  EXPECT_EQ(Read(Path("o.csv")), "time,point,x,y\n0,tip,10,-20\n1,tip,12,-22\n");
+  const std::string table = Write("t.csv", "t;a\n0;1\n2;3\n1;5\n");
+  const std::string mapping = Write(
+      "m.json", R"({"time": "t", "columns": [{"column": "a", "body": "b", "coordinate": "x"}]})");
+  const std::string of_table = table + " --kind=table --mapping=" + mapping;
+  ExpectOneLine(Run("tangible-import-recording", of_table + out), 1,
+                "t.csv: line 4: time: expected one after 2 s, got 1");
+  // Nothing has been written over.
+  EXPECT_EQ(Read(Path("o.csv")), "time,point,x,y\n0,tip,10,-20\n1,tip,12,-22\n");
+  ExpectOneLine(Run("tangible-import-recording", table + " --kind=table" + out), 2, "--mapping");
+  ExpectOneLine(Run("tangible-import-recording", dlc + " --kind=deeplabcut" + out), 1,
+                "expected a frame rate");
+  ExpectOneLine(Run("tangible-import-recording", of_table + out + " --scale=0"), 2, "--scale");
+  ExpectOneLine(Run("tangible-import-recording", of_table + " --out=" + mapping), 2, "--out");
+}
+
 }  // namespace
 }  // namespace tangible
