@@ -19,10 +19,12 @@
 #include "tangible/app/certificate_json.h"
 #include "tangible/app/program.h"
 #include "tangible/estimation/fit/fit_checkpoint.h"
+#include "tangible/estimation/fit/sensor_noise.h"
 #include "tangible/estimation/results/fit_json.h"
 #include "tangible/estimation/results/fitted_scene.h"
 #include "tangible/estimation/results/prediction.h"
 #include "tangible/estimation/results/report.h"
+#include "tangible/estimation/results/residual_summary.h"
 #include "tangible/scene/csv.h"
 #include "tangible/scene/json_reader.h"
 
@@ -233,6 +235,24 @@ void PrintEstimates(const std::vector<ParameterizedScene::Entry>& entries,
   }
 }
 
+void PrintNoise(const std::vector<SensorNoise>& noise) {
+  for (const SensorNoise& sensor : noise) {
+    std::cout << "sigma of sensor " << sensor.name << ": " << Cell(sensor.factor, 5) << " ± "
+              << Cell(sensor.deviation, 2) << " times what was given, from " << sensor.count
+              << " observations\n";
+  }
+}
+
+void PrintOutliers(const ResidualSummary& summary) {
+  if (summary.num_outliers == 0) {
+    return;
+  }
+  const Outlier& first = summary.outliers.front();
+  std::cout << summary.num_outliers << " outliers, the largest at " << Cell(first.time, 8)
+            << " s in " << summary.series[first.series].label << ": " << Cell(first.residual, 4)
+            << " sigma\n";
+}
+
 void PrintCheck(const std::vector<ParameterizedScene::Entry>& entries,
                 const DiscretisationCheck& check) {
   for (Eigen::Index k = 0; k < check.bias.size(); ++k) {
@@ -261,11 +281,15 @@ void PrintScore(const PredictionScore& score) {
 }
 
 int WriteFiles(const FitFile& fit, const RolloutResiduals& residuals, const FitResult& result,
-               const DiscretisationCheck* check, const LaterObservations* later) {
+               const DiscretisationCheck* check, const LaterObservations* later,
+               const std::vector<SensorNoise>& noise) {
   const PredictionScore* const score = later == nullptr ? nullptr : &later->score;
   ResultWriter writer;
   writer.Write(FLAGS_out, [&] {
     OrderedJson json = ResultToJson(residuals, result, check, score);
+    if (!noise.empty()) {
+      json["sensor_noise"] = NoiseToJson(noise);
+    }
     json["certificate"] =
         result.estimate.size() > 0 ? ToJson(result.certificate) : OrderedJson(nullptr);
     return JsonText(json);
@@ -360,6 +384,10 @@ int Prepare(const std::string& file, Prepared* prepared) {
   if (!MakeResiduals(problem, file, &prepared->residuals, &error)) {
     return ReportError(error);
   }
+  if (EstimatesNoise(problem.instruments) && !FLAGS_checkpoint.empty()) {
+    return ReportError(
+        file + ": /sensors: a fit that estimates a sensor's sigma has no --checkpoint", kExitUsage);
+  }
   error = OutputOverInput({"out", "report", "scene_out", "predictions", "checkpoint"});
   return error.empty() ? kExitDone : ReportError("tangible-fit: " + error, kExitUsage);
 }
@@ -402,18 +430,23 @@ int Run(const std::string& file) {
   }
   FitLog* const log = checkpoint ? &checkpoint->fit() : nullptr;
   IterationPrinter printer(entries);
-  const FitResult result = Fit(
-      problem.options, &residuals,
-      [&](int start, int iteration, const FitIteration& values) {
-        printer.Print(start, iteration, values);
-      },
-      log);
+  const FitProgress progress = [&](int start, int iteration, const FitIteration& values) {
+    printer.Print(start, iteration, values);
+  };
+  std::vector<SensorNoise> noise;
+  const FitResult result = EstimatesNoise(problem.instruments)
+                               ? FitWithSensorNoise(problem.options, &residuals, progress, &noise)
+                               : Fit(problem.options, &residuals, progress, log);
+  ScaleSigma(noise, problem.channels, &prepared.fit.problem.observations);
+  ScaleSigma(noise, problem.channels, &prepared.held_back);
   error = Mismatch(log);
   if (!error.empty()) {
     return ReportError(error);
   }
   if (result.estimate.size() > 0) {
     PrintEstimates(entries, result);
+    PrintNoise(noise);
+    PrintOutliers(SummarizeResiduals(residuals, result.residuals));
     if (result.certificate.verdict != "trustworthy") {
       ReportError(file +
                   ": warning: not trustworthy at the estimate: " + result.certificate.verdict);
@@ -440,7 +473,7 @@ int Run(const std::string& file) {
   }
   const DiscretisationCheck* const checked = check ? &*check : nullptr;
   const LaterObservations* const predicted = later ? &*later : nullptr;
-  const int written = WriteFiles(prepared.fit, residuals, result, checked, predicted);
+  const int written = WriteFiles(prepared.fit, residuals, result, checked, predicted, noise);
   return written == kExitDone ? Conclude(file, result, checked, predicted, checkpoint.get())
                               : written;
 }

@@ -276,7 +276,7 @@ class MappingReader {
   }
 
   static std::string NameAt(const JsonReader& json) {
-    const std::string name = json.String();
+    std::string name = json.String();
     if (json.IsString() && !IsName(name)) {
       json.FailExpected("a name of letters, digits and _.-");
     }

@@ -200,6 +200,9 @@ std::uint64_t Fingerprint(const FitProblem& problem) {
     hash.Add(number.path);
     hash.Add(*number.value);
   }
+  for (const Sensor& sensor : problem.instruments.sensors) {
+    hash.Add(static_cast<int>(sensor.estimate_sigma));
+  }
   for (const Camera& camera : problem.instruments.cameras) {
     hash.Add(camera.marker_body);
     hash.Add(camera.marker_point);

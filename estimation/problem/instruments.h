@@ -26,8 +26,9 @@ struct Sensor {
   std::string name;
   double delay = 0.0;  ///< s
   double gain = 1.0;
-  double bias = 0.0;   ///< in the unit of what is recorded
-  double sigma = 0.0;  ///< of its noise, in that unit; 0: that of the observations
+  double bias = 0.0;            ///< in the unit of what is recorded
+  double sigma = 0.0;           ///< of its noise, in that unit; 0: that of the observations
+  bool estimate_sigma = false;  ///< sigma is where its estimate begins (fit/sensor_noise.h)
 };
 
 struct Camera {

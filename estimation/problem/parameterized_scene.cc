@@ -375,6 +375,13 @@ bool ParameterizedScene::Set(const Eigen::VectorXd& p) {
   return true;
 }
 
+void ParameterizedScene::SetInitial(const Eigen::VectorXd& p) {
+  for (size_t k = 0; k < entries_.size(); ++k) {
+    entries_[k].initial =
+        std::clamp(p[static_cast<Eigen::Index>(k)], entries_[k].lower, entries_[k].upper);
+  }
+}
+
 void ParameterizedScene::SetSimulation(const SimulationSettings& settings) {
   scene_.simulation = settings;
   structure_ = BuildStructure(scene_);

@@ -86,6 +86,9 @@ class ParameterizedScene {
   /// may not.
   bool Set(const Eigen::VectorXd& p);
 
+  /// Other initial values, within the bounds.
+  void SetInitial(const Eigen::VectorXd& p);
+
   /// Changes when the steps of the run end.
   void SetSimulation(const SimulationSettings& settings);
 

@@ -15,6 +15,7 @@
 //   finite_difference  central, step 6e-6 max(|p|, scale); one-sided of second order at a bound
 
 #include <Eigen/Core>
+#include <functional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -84,6 +85,13 @@ class RolloutResiduals : public LeastSquaresProblem {
   /// `function`, an evaluation at this point, by way of the log.
   bool Logged(const Eigen::VectorXd& at, const EvaluationLog::Function& function,
               Eigen::VectorXd* residuals, RowMatrixXd* jacobian);
+
+  /// The values from which a fit begins, within the bounds.
+  void SetInitial(const Eigen::VectorXd& p) { scene_.SetInitial(p); }
+  /// `scale` may change the sigma of the observations, and nothing else of them.
+  void ScaleSigma(const std::function<void(std::vector<Observation>*)>& scale) {
+    scale(&observations_);
+  }
 
   /// Sets the parameters without a run; false where they set a number to a value that it may not
   /// take.

@@ -59,6 +59,7 @@ SamplePlan::SamplePlan(const std::vector<Observation>& observations,
     : SamplePlan(observations,
                  [&] {
                    std::vector<double> times;
+                   times.reserve(observations.size());
                    for (const Observation& observation : observations) {
                      times.push_back(observation.time);
                    }

@@ -11,6 +11,7 @@
 
 #include "tangible/estimation/fit/discretisation.h"
 #include "tangible/estimation/fit/fit.h"
+#include "tangible/estimation/fit/sensor_noise.h"
 #include "tangible/estimation/results/prediction.h"
 #include "tangible/scene/json_writer.h"
 
@@ -38,5 +39,8 @@ bool MakeResiduals(const FitProblem& problem, const std::string& file,
 OrderedJson ResultToJson(const RolloutResiduals& residuals, const FitResult& result,
                          const DiscretisationCheck* check,
                          const PredictionScore* prediction = nullptr);
+
+/// What was found of the noise of sensors.
+OrderedJson NoiseToJson(const std::vector<SensorNoise>& noise);
 
 }  // namespace tangible

@@ -89,13 +89,14 @@ ObservationSigma ReadSigma(const JsonReader& json) {
 }
 
 Sensor ReadSensor(const std::string& name, const JsonReader& json) {
-  json.ExpectKeys({"delay", "gain", "bias", "sigma"}, " of a sensor");
+  json.ExpectKeys({"delay", "gain", "bias", "sigma", "estimate_sigma"}, " of a sensor");
   Sensor sensor;
   sensor.name = name;
   ReadNumber(json, "delay", NumberKind::kFree, &sensor.delay);
   ReadNumber(json, "gain", NumberKind::kFree, &sensor.gain);
   ReadNumber(json, "bias", NumberKind::kFree, &sensor.bias);
   ReadNumber(json, "sigma", NumberKind::kPositive, &sensor.sigma);
+  sensor.estimate_sigma = json.Has("estimate_sigma") && json.At("estimate_sigma").Boolean();
   if (json.Has("gain") && sensor.gain == 0.0) {
     json.At("gain").FailExpected("a number other than 0");
   }

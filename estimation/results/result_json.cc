@@ -255,4 +255,16 @@ OrderedJson ResultToJson(const RolloutResiduals& residuals, const FitResult& res
   return json;
 }
 
+OrderedJson NoiseToJson(const std::vector<SensorNoise>& noise) {
+  OrderedJson all = OrderedJson::array();
+  for (const SensorNoise& sensor : noise) {
+    all.push_back({{"sensor", sensor.name},
+                   {"sigma_factor", Number(sensor.factor)},
+                   {"standard_deviation", Number(sensor.deviation)},
+                   {"observations", sensor.count},
+                   {"redundancy", Number(sensor.redundancy)}});
+  }
+  return all;
+}
+
 }  // namespace tangible

@@ -247,7 +247,7 @@ TEST_F(FitJsonTest, BadInstrumentsAreOneLine) {
             "/sensors/s/gain: expected a number other than 0, got 0");
   EXPECT_EQ(message(R"("sensors": {"s": {"lag": 0}})"),
             "/sensors/s/lag: unknown key of a sensor, expected one of delay, gain, bias, sigma, "
-            "got \"lag\"");
+            "estimate_sigma, got \"lag\"");
   EXPECT_EQ(message(R"("cameras": {"c": {"marker": "bal"}})"),
             "/cameras/c/marker: expected the name of a body (ball) or point (none), got \"bal\"");
   EXPECT_EQ(message(none, R"(, "sensor": "s")"),

@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// The standard deviation of sensors' noise, estimated beside the parameters.
+//
+// The observations of sensor s have σ_i = f_s σ_i⁰ with one unknown factor. At the estimate for
+// given factors the squares of its residuals r_i (in multiples of σ_i) sum up to about its
+// redundancy, the number n_s of its observations less what the fit has taken from them:
+//
+//   f_s² ← f_s² Σ_{i in s} r_i² / ρ_s,   ρ_s = n_s − tr(C J_sᵀ J_s)                      (1)
+//
+// with C the covariance and J_s the rows of s. Fits and (1) alternate until no factor changes by
+// more than 1e-3 of its deviation, f_s / sqrt(2 ρ_s). For one sensor this is the division by N − P;
+// for several it is what restricted maximum likelihood converges to. With Huber's loss the sum is
+// n_s (1.4826 median |r_i|)², which outliers do not move.
+//
+// Source: W. Förstner, Ein Verfahren zur Schätzung von Varianz- und Kovarianzkomponenten, AVN 86
+// (1979) 446; K.-R. Koch, Parameter Estimation and Hypothesis Testing in Linear Models, 3.6.
+
+#include <string>
+#include <vector>
+
+#include "tangible/estimation/fit/fit.h"
+
+namespace tangible {
+
+struct SensorNoise {
+  int sensor = -1;
+  std::string name;
+  double factor = 1.0;      ///< f_s, of the sigma that the observations had
+  double deviation = 0.0;   ///< standard deviation of the factor
+  long count = 0;           ///< n_s
+  double redundancy = 0.0;  ///< ρ_s
+};
+
+/// Whether some sensor's sigma is to be estimated.
+bool EstimatesNoise(const Instruments& instruments);
+
+/// Multiplies the sigma of the observations of each sensor by its factor.
+void ScaleSigma(const std::vector<SensorNoise>& noise, const std::vector<Channel>& channels,
+                std::vector<Observation>* observations);
+
+/// The fit of one run with the noise of the sensors that ask for it; the observations of
+/// `residuals` have the sigma found when it ends. Costs are in multiples of the sigma of the time,
+/// and iterations those of all fits. Where a fit does not converge, or the factors do not settle
+/// (20 fits), the status says so.
+FitResult FitWithSensorNoise(const FitOptions& options, RolloutResiduals* residuals,
+                             const FitProgress& progress, std::vector<SensorNoise>* noise);
+
+}  // namespace tangible
