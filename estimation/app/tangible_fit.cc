@@ -248,9 +248,9 @@ void PrintOutliers(const ResidualSummary& summary) {
     return;
   }
   const Outlier& first = summary.outliers.front();
-  std::cout << summary.num_outliers << " outliers, the largest at " << Cell(first.time, 8)
-            << " s in " << summary.series[first.series].label << ": " << Cell(first.residual, 4)
-            << " sigma\n";
+  std::cout << summary.num_outliers << (summary.num_outliers == 1 ? " outlier" : " outliers")
+            << ", the largest at " << Cell(first.time, 8) << " s in "
+            << summary.series[first.series].label << ": " << Cell(first.residual, 4) << " sigma\n";
 }
 
 void PrintCheck(const std::vector<ParameterizedScene::Entry>& entries,

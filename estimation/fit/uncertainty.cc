@@ -428,12 +428,13 @@ class Estimator {
   }
 
   /// The blocks with observations, whose indices go to `of`; the others' rows go to `prior`. Empty
-  /// where it is not known when rows were measured.
-  std::vector<RecordingRows> Recordings(std::vector<size_t>* of, RowMatrixXd* prior) const {
+  /// where it is not known when rows were measured. Takes the rows from the parts: they are as many
+  /// as the observations, and none is kept twice.
+  std::vector<RecordingRows> Recordings(std::vector<size_t>* of, RowMatrixXd* prior) {
     std::vector<RecordingRows> recordings;
     for (size_t b = 0; b < blocks_.size(); ++b) {
       const int block = static_cast<int>(b);
-      const BlockPart& part = parts_[b];
+      BlockPart& part = parts_[b];
       const Eigen::Index data = problem_.num_observation_rows(block);
       const Eigen::Index priors = blocks_[b].residuals.size() - data;
       if (data == 0) {
@@ -447,6 +448,7 @@ class Estimator {
         return {};
       }
       RecordingRows rows;
+      rows.times.reserve(places.size());
       for (const RowPlace& place : places) {
         rows.times.push_back(place.time);
       }
@@ -457,6 +459,8 @@ class Estimator {
       rows.prior_residuals = std::sqrt(rows.weight) * blocks_[b].residuals.tail(priors);
       rows.prior_shared = part.shared_rows.bottomRows(priors);
       rows.prior_own = part.own_rows.bottomRows(priors);
+      part.shared_rows.resize(0, 0);
+      part.own_rows.resize(0, 0);
       recordings.push_back(std::move(rows));
       of->push_back(b);
     }

@@ -352,6 +352,15 @@ bool RolloutResiduals::FiniteDifferences(const Eigen::VectorXd& p, RowMatrixXd* 
   return true;
 }
 
+bool RolloutResiduals::IsDirect(int i) const {
+  return observations_[i].point < 0 && !IsRecorded(ChannelOf(observations_[i]));
+}
+
+Eigen::Index RolloutResiduals::DirectNumber(int i) const {
+  return plan_.width() * static_cast<Eigen::Index>(plan_.sample_of()[i]) +
+         static_cast<int>(observations_[i].coordinate);
+}
+
 Prediction RolloutResiduals::PredictionOf(int i, const std::vector<double>& samples) const {
   const Observation& observation = observations_[i];
   const Channel& channel = ChannelOf(observation);
@@ -423,6 +432,11 @@ Eigen::RowVectorXd RolloutResiduals::DirectTerm(int i, const Prediction& predict
 Eigen::VectorXd RolloutResiduals::FromSamples(const std::vector<double>& samples) const {
   Eigen::VectorXd residuals(num_residuals());
   for (int i = 0; i < num_residuals(); ++i) {
+    if (IsDirect(i)) {
+      const double predicted = samples[static_cast<size_t>(DirectNumber(i))];
+      residuals[i] = (predicted - observations_[i].value) / observations_[i].sigma;
+      continue;
+    }
     residuals[i] =
         (PredictionOf(i, samples).value - observations_[i].value) / observations_[i].sigma;
   }
@@ -436,6 +450,10 @@ RowMatrixXd RolloutResiduals::FromSampleDerivatives(const std::vector<double>& s
   RowMatrixXd jacobian(num_residuals(), sample_derivatives.cols());
   const int width = plan_.width();
   for (int i = 0; i < num_residuals(); ++i) {
+    if (IsDirect(i)) {
+      jacobian.row(i) = sample_derivatives.row(DirectNumber(i)) / observations_[i].sigma;
+      continue;
+    }
     const Prediction prediction = PredictionOf(i, samples);
     jacobian.row(i).setZero();
     if (observations_[i].point >= 0 || IsRecorded(ChannelOf(observations_[i]))) {

@@ -124,6 +124,10 @@ class RolloutResiduals : public LeastSquaresProblem {
   /// one is outside the run.
   bool UpdateTimes();
   bool FindTimes(std::vector<double>* times);
+  /// Whether what is observed is a number of a sample as it is, and which. Most observations are,
+  /// and fits of many spend a tenth of their time here.
+  bool IsDirect(int i) const;
+  Eigen::Index DirectNumber(int i) const;
   Prediction PredictionOf(int i, const std::vector<double>& samples) const;
   /// What a row of J owes to parameters that do not act by way of the run: places of points in
   /// their bodies, instruments.

@@ -127,6 +127,37 @@ TEST_F(TangibleFitTest, WritesTheFittedSceneAndItsPredictions) {
   ExpectOneLine(Fit(Problem(), "--predictions='" + Path("none/p.csv") + "'"), 1, "none/p.csv");
 }
 
+// A sensor whose noise is half of what was said, with one reading far off.
+TEST_F(TangibleFitTest, SensorsNoiseAndOutliersAreNamed) {
+  std::string observations = "time,body,x,y\n";
+  for (int k = 0; k <= 50; ++k) {
+    const double noise = (k % 2 == 0 ? 0.005 : -0.005) + (k == 30 ? 1.0 : 0.0);
+    observations += json(0.01 * k).dump() + ",ball," + json(0.02 * k + noise).dump() + "," +
+                    json(Height(k) - 0.005 * (k % 3 - 1)).dump() + "\n";
+  }
+  Write("o.csv", observations);
+  const json problem =
+      Problem({{"loss", {{"huber", 2}}},
+               {"sensors", {{"camera", {{"sigma", 0.01}, {"estimate_sigma", true}}}}},
+               {"observations", json::array({{{"file", "o.csv"}, {"sensor", "camera"}}})}});
+  const ProgramRun run =
+      Fit(problem, "--out='" + Path("r.json") + "' --report='" + Path("r.html") + "'");
+  ASSERT_EQ(run.exit_status, 0) << run.error;
+  EXPECT_NE(run.out.find("sigma of sensor camera: 0."), std::string::npos) << run.out;
+  EXPECT_NE(run.out.find("1 outlier, the largest at 0.3 s in ball x by camera: -"),
+            std::string::npos)
+      << run.out;
+  const json result = json::parse(Read(Path("r.json")));
+  EXPECT_EQ(result["sensor_noise"][0]["sensor"], "camera");
+  EXPECT_NEAR(result["sensor_noise"][0]["sigma_factor"], 0.7, 0.1);  // 1.4826 · 0.005
+  EXPECT_EQ(result["outliers"]["count"], 1);
+  EXPECT_EQ(result["outliers"]["largest"][0]["sensor"], "camera");
+  EXPECT_DOUBLE_EQ(result["outliers"]["largest"][0]["time"], 0.3);
+  EXPECT_EQ(result["residuals_by_series"][0]["sensor"], "camera");
+  EXPECT_NE(Read(Path("r.html")).find("<h2>Outliers"), std::string::npos);
+  ExpectOneLine(Fit(problem, "--checkpoint='" + Path("c.json") + "'"), 2, "no --checkpoint");
+}
+
 // Each of ten links' dampings, where six columns have room beside the cost.
 TEST_F(TangibleFitTest, AllParametersAreVisibleWhileItRuns) {
   json scene = {{"bodies", json::array()}, {"simulation", {{"dt", 0.01}, {"duration", 0.1}}}};
