@@ -36,10 +36,13 @@ VectorX<double> OutputsOf(const ModelStructure& structure, const State<double>& 
   return values;
 }
 
+// Two corners of a body that does not turn stop at the same time, and which of them is found first
+// is rounding: the end of sliding is told by the bodies, and what sticks after it by the modes.
 auto KeyOf(const ContactTrace& trace) {
   const ActiveContact& c = trace.contact;
-  return std::tuple(trace.event, c.a, c.b, c.joint, c.side, c.feature.kind, c.feature.a,
-                    c.feature.b);
+  const ContactFeature feature =
+      trace.event == EventKind::kSlipEnds ? ContactFeature{} : c.feature;
+  return std::tuple(trace.event, c.a, c.b, c.joint, c.side, feature.kind, feature.a, feature.b);
 }
 
 bool SameChoice(const ContactTrace& x, const ContactTrace& y, FrictionAtZero friction) {

@@ -129,7 +129,7 @@ void RolloutCertifier::AddControls(const ModelStructure& structure, const Contro
   const EventRecord& events = stepper->events().record();
   for (int p = 0; p < events.num_parts; ++p) {
     const EventPart& part = *events.parts[p];
-    if (part.is_impulses || !IsLocated(part.segment.event)) continue;
+    if (part.is_impulses || !part.segment.IsEventLocated()) continue;
     const Segment& segment = part.segment;
     const double time = segment.time + segment.length;
     const Place place{&structure, step, time, 0, &segment.event_contact, ContactMode::kOpen};

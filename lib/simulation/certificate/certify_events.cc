@@ -307,12 +307,12 @@ void RolloutCertifier::AddSegment(const Model<double>& model, long step,
     AddClosedAtOnce(s, step, *segment);
   }
   closed_ = segment->contacts;
-  double terms;
-  const double rate = derivative->EventRate(model, segment, &terms);
-  if (IsLocated(segment->event) && terms > 0.0) {
+  const EventDerivative::Rate rate = derivative->EventRate(model, segment);
+  certificate_.linear_residual = std::max(certificate_.linear_residual, rate.residual);
+  if (segment->IsEventLocated() && rate.terms > 0.0) {
     const Place place{
         &s, step, segment->time + segment->length, 0, &segment->event_contact, ContactMode::kOpen};
-    AddMargin(std::abs(rate) / terms, place,
+    AddMargin(std::abs(rate.value) / rate.terms, place,
               std::string("grazing: rate of the ") + NameOf(segment->event));
     if (segment->event == EventKind::kSlipEnds) {
       AddOtherSlips(model, *segment, place);
@@ -340,7 +340,7 @@ void RolloutCertifier::AddEventStep(const Model<double>& model, long step, Stepp
       continue;
     }
     AddSegment(model, step, &stepper->event_derivative(), &part.segment);
-    if (IsLocated(part.segment.event)) {
+    if (part.segment.IsEventLocated()) {
       const int count = located.Add(part.segment.event_contact);
       last = count > most ? &part.segment : last;
       most = std::max(most, count);

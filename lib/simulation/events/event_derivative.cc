@@ -91,16 +91,18 @@ double EventDerivative::NodeTangent(const Model<double>& model, const Segment& s
   return node->system.Solve(node->problem, node->solution.modes, solved->data(), columns);
 }
 
-void EventDerivative::NodeAdjoint(const Model<double>& model, const Segment& segment,
-                                  SolvedNode* node, bool correction, RowMatrixXd* seed,
-                                  RowMatrixXd* w_bar) {
+double EventDerivative::NodeAdjoint(const Model<double>& model, const Segment& segment,
+                                    SolvedNode* node, bool correction, RowMatrixXd* seed,
+                                    RowMatrixXd* w_bar) {
   const int columns = static_cast<int>(w_bar->cols());
-  node->system.SolveTransposed(node->problem, node->solution.modes, seed->data(), columns);
+  const double residual =
+      node->system.SolveTransposed(node->problem, node->solution.modes, seed->data(), columns);
   if (columns == 1) {
     Visit(model, segment, *node, correction, SingleAdjointSink{seed->data(), w_bar->data()});
   } else {
     Visit(model, segment, *node, correction, AdjointSink{seed->data(), w_bar->data(), columns});
   }
+  return residual;
 }
 
 // The map of a given length: x of the state before on entry, after on return; tau_dot a column.
@@ -154,9 +156,10 @@ double EventDerivative::SegmentTangent(const Model<double>& model, Segment* segm
 }
 
 // ∇g over all variables and the time, of the event that ends the segment.
-void EventDerivative::EventGradient(const Model<double>& model, Segment* segment,
-                                    Eigen::VectorXd* gradient) {
+double EventDerivative::EventGradient(const Model<double>& model, Segment* segment,
+                                      Eigen::VectorXd* gradient) {
   const ModelStructure& s = *model.structure;
+  double residual = 0.0;
   gradient->setZero(s.num_variables() + 1);
   std::vector<JacobianEntry> entries;
   if (segment->event == EventKind::kTouch) {
@@ -189,25 +192,27 @@ void EventDerivative::EventGradient(const Model<double>& model, Segment* segment
       }
     }
     RowMatrixXd w_bar = RowMatrixXd::Zero(s.num_variables() + 1, 1);
-    NodeAdjoint(model, *segment, &node, false, &seed, &w_bar);
+    residual = NodeAdjoint(model, *segment, &node, false, &seed, &w_bar);
     *gradient += w_bar.col(0);
   }
   for (const JacobianEntry& entry : entries) {
     (*gradient)(entry.variable) += entry.value;
   }
+  return residual;
 }
 
-double EventDerivative::EventRate(const Model<double>& model, Segment* segment, double* terms) {
-  *terms = 0.0;
-  if (!IsLocated(segment->event)) {
-    return 0.0;
+EventDerivative::Rate EventDerivative::EventRate(const Model<double>& model, Segment* segment) {
+  Rate rate;
+  if (!segment->IsEventLocated()) {
+    return rate;
   }
   RowMatrixXd by_length = RowMatrixXd::Zero(model.structure->num_variables() + 1, 1);
   SegmentTangent(model, segment, &by_length, Row::Ones(1));
   Eigen::VectorXd gradient;
-  EventGradient(model, segment, &gradient);
-  *terms = gradient.cwiseAbs().dot(by_length.col(0).cwiseAbs());
-  return gradient.dot(by_length.col(0));
+  rate.residual = EventGradient(model, segment, &gradient);
+  rate.terms = gradient.cwiseAbs().dot(by_length.col(0).cwiseAbs());
+  rate.value = gradient.dot(by_length.col(0));
+  return rate;
 }
 
 double EventDerivative::Tangent(const Model<double>& model, EventRecord* record,
@@ -232,15 +237,15 @@ double EventDerivative::Tangent(const Model<double>& model, EventRecord* record,
     const Row start = x.row(time);
     left = std::max(left, SegmentTangent(model, &segment, &x, tau_dot));
     Row moved = Row::Zero(columns + 1);
-    if (IsLocated(segment.event)) {
+    if (segment.IsEventLocated()) {
       Eigen::VectorXd gradient;
-      EventGradient(model, &segment, &gradient);
+      left = std::max(left, EventGradient(model, &segment, &gradient));
       const Row change = gradient.transpose() * x;
       const double terms = gradient.cwiseAbs().dot(x.col(columns).cwiseAbs());
       if (std::abs(change(columns)) > kNoRate * terms) {
         moved = -change / change(columns);
       }
-    } else if (segment.event != EventKind::kAtOnce) {
+    } else if (!segment.IsEventAtOnce()) {
       moved = -start;
       if (segment.event_number >= 0) {
         moved += x.row(s.ParameterVariable(segment.event_number));
@@ -317,7 +322,7 @@ void EventDerivative::SegmentAdjoint(const Model<double>& model, Segment* segmen
                                      bool starts_anywhere, RowMatrixXd* w_bar) {
   const ModelStructure& s = *model.structure;
   const Eigen::Index columns = w_bar->cols();
-  const bool located = IsLocated(segment->event);
+  const bool located = segment->IsEventLocated();
   RowMatrixXd by_length = RowMatrixXd::Zero(s.num_variables() + 1, 1);
   Row alpha = Row::Zero(columns);
   if (located || segment->event_number >= 0 || starts_anywhere) {
@@ -332,7 +337,7 @@ void EventDerivative::SegmentAdjoint(const Model<double>& model, Segment* segmen
     if (std::abs(rate) > kNoRate * terms) {
       *w_bar -= gradient * (alpha / rate);
     }
-  } else if (segment->event != EventKind::kAtOnce) {
+  } else if (!segment->IsEventAtOnce()) {
     w_bar->row(TimeVariable(s)) -= alpha;
     if (segment->event_number >= 0) {
       w_bar->row(s.ParameterVariable(segment->event_number)) += alpha;
@@ -361,7 +366,7 @@ void EventDerivative::Adjoint(const Model<double>& model, EventRecord* record, R
   int first_moving = record->num_parts;  // the first segment whose end's time is not given
   for (int p = record->num_parts - 1; p >= 0; --p) {
     const EventPart& part = *record->parts[p];
-    if (!part.is_impulses && (IsLocated(part.segment.event) || part.segment.event_number >= 0)) {
+    if (!part.is_impulses && (part.segment.IsEventLocated() || part.segment.event_number >= 0)) {
       first_moving = p;
     }
   }

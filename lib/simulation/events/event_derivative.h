@@ -25,9 +25,15 @@ class EventDerivative {
   /// w_bar: num_variables x columns, of the state after the step on entry, before it on return.
   void Adjoint(const Model<double>& model, EventRecord* record, RowMatrixXd* w_bar);
 
-  /// How fast the event's equation changes with the segment's length: ∇g · S_τ, and the sum of the
-  /// magnitudes of its terms. 0 where the segment ends at a given time.
-  double EventRate(const Model<double>& model, Segment* segment, double* terms);
+  /// How fast the event's equation g changes with the segment's length. All 0 where the segment ends
+  /// at a given time.
+  struct Rate {
+    double value = 0.0;     ///< ∇g · S_τ
+    double terms = 0.0;     ///< the sum of the magnitudes of its terms
+    double residual = 0.0;  ///< of the linear solve of ∇g: large where g itself is not determined,
+                            ///< as how redundant contacts share a force
+  };
+  Rate EventRate(const Model<double>& model, Segment* segment);
 
  private:
   double SegmentTangent(const Model<double>& model, Segment* segment, RowMatrixXd* x,
@@ -41,12 +47,14 @@ class EventDerivative {
   void AddOffsetsTangent(const Impulses& impulses);
   void KeepOffsetsAdjoint(const Impulses& impulses);
   void ImpulsesAdjoint(const Model<double>& model, Impulses* impulses, RowMatrixXd* w_bar);
-  void EventGradient(const Model<double>& model, Segment* segment, Eigen::VectorXd* gradient);
+  /// Returns the relative residual of its linear solve.
+  double EventGradient(const Model<double>& model, Segment* segment, Eigen::VectorXd* gradient);
   double NodeTangent(const Model<double>& model, const Segment& segment, SolvedNode* node,
                      bool correction, const RowMatrixXd& x, RowMatrixXd* solved,
                      const Eigen::RowVectorXd* tau_dot = nullptr);
-  void NodeAdjoint(const Model<double>& model, const Segment& segment, SolvedNode* node,
-                   bool correction, RowMatrixXd* seed, RowMatrixXd* w_bar);
+  /// Returns the relative residual of the linear solve.
+  double NodeAdjoint(const Model<double>& model, const Segment& segment, SolvedNode* node,
+                     bool correction, RowMatrixXd* seed, RowMatrixXd* w_bar);
 
   /// ∂R/∂w of a node into a sink; while `listed_` is that node from its list.
   template <typename Sink>

@@ -77,6 +77,7 @@ bool EventStepper::AddInstant(const Model<double>& model, double t, EventKind ki
   segment.middle = t;
   segment.before = *state;
   segment.event_number = -1;
+  segment.at_once = false;
   // Contacts in penetration are those of a step's length: rounding is none.
   if (!ChooseModes(model, t, t, model.structure->settings.dt, state, outcome, &segment)) {
     record_.num_parts = parts;

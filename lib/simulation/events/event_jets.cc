@@ -338,12 +338,12 @@ class EventReplay {
     const double end = segment->time + segment->length;
     T tau(segment->length);
     State<T> after;
-    if (IsLocated(segment->event)) {
+    if (segment->IsEventLocated()) {
       LocateEvent(segment, *state, *now, &tau, &after);
     } else {
       if (segment->event_number >= 0) {
         tau = model_.parameters[segment->event_number] - *now;
-      } else if (segment->event != EventKind::kAtOnce) {
+      } else if (!segment->IsEventAtOnce()) {
         tau = end - *now;
       }
       tau.a = segment->length;

@@ -90,6 +90,14 @@ struct Segment {
   int event_number = -1;             ///< kEdge: the number that is the time; −1: a constant
   SolvedNode end;                    ///< kSlipBegins, kLiftOff: accelerations after the motion
   int event_index = -1;              ///< the same: which of `contacts`
+  /// The event's function does not pass through 0 but jumps, as poses and twists are corrected
+  /// where the segment starts: the event is there, whatever moves.
+  bool at_once = false;
+
+  /// Whether the event's time is found from an equation.
+  bool IsEventLocated() const { return IsLocated(event) && !at_once; }
+  /// Whether the event's time is the segment's start.
+  bool IsEventAtOnce() const { return event == EventKind::kAtOnce || at_once; }
 
   /// Whether contact i sticks between the bodies of contact k, as k does. Such contacts, the two
   /// ends of a face, begin to slide as one, when the sum of their friction reaches the sum of its

@@ -167,6 +167,8 @@ void EventSearch::SearchClosed(const Model<double>& model, Event* event) {
         if (fb < -tolerance) {
           const auto f = [&](Sample& sample) { return ModeValue(model, &sample, trial); };
           trial.length = Refine(model, f, kLocatedOfSize * at_start, a, fa, b, fb);
+          trial.at_once =
+              trial.length < kShortestPart * b && f(*At(model, trial.length)) < -tolerance;
           *event = trial;
           return;
         }
@@ -293,6 +295,7 @@ bool EventSearch::Run(const Model<double>& model, const std::vector<ActiveContac
   segment->event_contact = event.contact;
   segment->event_index = event.index;
   segment->event_sign = event.sign;
+  segment->at_once = event.at_once;
   if (event.kind == EventKind::kSlipBegins) {
     segment->event_friction = segment->friction[event.index];
   }

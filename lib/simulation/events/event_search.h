@@ -73,6 +73,7 @@ class EventSearch {
     ActiveContact contact;
     int index = -1;
     double sign = 0.0;
+    bool at_once = false;
   };
   class PairSearch;  ///< event_search_pair.cc
   Sample* At(const Model<double>& model, double length);

@@ -531,6 +531,7 @@ Segment& EventStepper::BeginSegment(double now, double until, const State<double
   segment.middle = 0.5 * (now + until);
   segment.before = state;
   segment.event_number = -1;
+  segment.at_once = false;
   return segment;
 }
 
