@@ -20,9 +20,11 @@
 #include "tangible/app/program.h"
 #include "tangible/estimation/fit/fit_checkpoint.h"
 #include "tangible/estimation/fit/sensor_noise.h"
+#include "tangible/estimation/problem/problem_with_priors.h"
 #include "tangible/estimation/results/fit_json.h"
 #include "tangible/estimation/results/fitted_scene.h"
 #include "tangible/estimation/results/prediction.h"
+#include "tangible/estimation/results/recordings_json.h"
 #include "tangible/estimation/results/report.h"
 #include "tangible/estimation/results/residual_summary.h"
 #include "tangible/scene/csv.h"
@@ -478,6 +480,59 @@ int Run(const std::string& file) {
                               : written;
 }
 
+/// Several recordings in one fit.
+int RunRecordings(const std::string& file) {
+  for (const char* flag : {"scene_out", "predictions", "predict_from", "discretisation_check",
+                           "checkpoint", "initial"}) {
+    if (!gflags::GetCommandLineFlagInfoOrDie(flag).is_default) {
+      return ReportError(std::string("tangible-fit: --") + flag + ": not with recordings",
+                         kExitUsage);
+    }
+  }
+  RecordingsFile read;
+  std::string error;
+  std::vector<Recording> recordings;
+  if (!LoadRecordings(file, &read, &error) || !MakeRecordingsProblem(read, &recordings, &error)) {
+    return ReportError(error);
+  }
+  FitOptions options = read.recordings.front().fit.problem.options;
+  options.max_iterations = FLAGS_max_iterations;
+  error = OverrideDerivatives(&options);
+  if (!error.empty()) {
+    return ReportError("tangible-fit: --derivatives: " + error, kExitUsage);
+  }
+  RecordingsProblem problem(std::move(recordings), read.own);
+  ProblemWithPriors with_priors(&problem, {});
+  IterationPrinter printer(problem.entries());
+  const FitResult result = Fit(
+      options, with_priors.HasRows() ? static_cast<LeastSquaresProblem*>(&with_priors) : &problem,
+      [&](int start, int iteration, const FitIteration& values) {
+        printer.Print(start, iteration, values);
+      });
+  const bool estimated = result.estimate.size() > 0;
+  if (estimated) {
+    PrintEstimates(problem.entries(), result);
+    if (result.certificate.verdict != "trustworthy") {
+      ReportError(file +
+                  ": warning: not trustworthy at the estimate: " + result.certificate.verdict);
+    }
+  }
+  ResultWriter writer;
+  writer.Write(FLAGS_out, [&] {
+    OrderedJson json = RecordingsResultToJson(problem, result);
+    json["certificate"] = estimated ? ToJson(result.certificate) : OrderedJson(nullptr);
+    return JsonText(json);
+  });
+  if (estimated) {
+    writer.Write(FLAGS_report, [&] { return RecordingsReport(file, problem, result); });
+  }
+  if (!writer.error().empty()) return ReportError(writer.error());
+  if (result.status == FitStatus::kNoEffect) {
+    return ReportError(file + ": /parameters: " + result.message);
+  }
+  return Conclude(file, result, nullptr, nullptr, nullptr);
+}
+
 int Main(int argc, char** argv) {
   const CommandLine line = ParseCommandLine(
       argc, argv,
@@ -501,7 +556,8 @@ int Main(int argc, char** argv) {
   if (std::isnan(FLAGS_predict_from)) {
     return ReportError("tangible-fit: --predict_from: expected a time in s, got nan", kExitUsage);
   }
-  return Run(line.positional[0]);
+  const std::string& file = line.positional[0];
+  return HasRecordings(file) ? RunRecordings(file) : Run(file);
 }
 
 }  // namespace

@@ -256,11 +256,14 @@ class FitReader {
   std::string* error_;
 };
 
-bool FromJson(const Json& json, const std::string& file, FitFile* fit, std::string* error) {
+}  // namespace
+
+bool FitFromJson(const Json& json, const std::string& name, const std::string& folder, FitFile* fit,
+                 std::string* error) {
   *fit = FitFile();
-  fit->path = file;
-  JsonErrors errors(file);
-  FitReader reader(JsonReader(json, &errors), FolderOf(file), fit, error);
+  fit->path = name;
+  JsonErrors errors(name);
+  FitReader reader(JsonReader(json, &errors), folder, fit, error);
   const bool read = reader.Read();
   if (!errors.ok()) {
     *error = errors.message();
@@ -268,19 +271,17 @@ bool FromJson(const Json& json, const std::string& file, FitFile* fit, std::stri
   }
   fit->problem.observations.shrink_to_fit();
   ParameterizedScene scene;
-  return read && Parameterize(fit->problem, file, &scene, error);
+  return read && Parameterize(fit->problem, name, &scene, error);
 }
-
-}  // namespace
 
 bool LoadFit(const std::string& file, FitFile* fit, std::string* error) {
   Json json;
-  return ParseJsonFile(file, &json, error) && FromJson(json, file, fit, error);
+  return ParseJsonFile(file, &json, error) && FitFromJson(json, file, FolderOf(file), fit, error);
 }
 
 bool ParseFit(const std::string& text, const std::string& file, FitFile* fit, std::string* error) {
   Json json;
-  return ParseJson(text, file, &json, error) && FromJson(json, file, fit, error);
+  return ParseJson(text, file, &json, error) && FitFromJson(json, file, FolderOf(file), fit, error);
 }
 
 bool MakeResiduals(const FitProblem& problem, const std::string& file,

@@ -30,6 +30,10 @@ bool LoadFit(const std::string& file, FitFile* fit, std::string* error);
 /// The same from text.
 bool ParseFit(const std::string& text, const std::string& file, FitFile* fit, std::string* error);
 
+/// The same from JSON. `name` begins its messages; files are looked for in `folder`.
+bool FitFromJson(const nlohmann::json& json, const std::string& name, const std::string& folder,
+                 FitFile* fit, std::string* error);
+
 /// The residuals of a problem. On failure sets one line with the JSON pointer of what is wrong with
 /// a parameter.
 bool MakeResiduals(const FitProblem& problem, const std::string& file,

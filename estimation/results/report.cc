@@ -58,7 +58,7 @@ std::vector<Series> CollectSeries(const RolloutResiduals& residuals, const FitRe
   return all;
 }
 
-std::string EstimateTable(const RolloutResiduals& residuals, const FitResult& result) {
+std::string EstimateTable(const std::vector<ParameterEntry>& entries, const FitResult& result) {
   const auto end = [](const ConfidenceInterval& interval,
                       double std::pair<double, double>::*which) {
     return interval ? CompactNumber((*interval).*which, 8) : std::string();
@@ -67,7 +67,6 @@ std::string EstimateTable(const RolloutResiduals& residuals, const FitResult& re
     return std::isfinite(x) ? CompactNumber(x, 3) : std::string();
   };
   std::vector<std::vector<std::string>> rows;
-  const auto& entries = residuals.scene().entries();
   const Uncertainty& uncertainty = result.uncertainty;
   using Ends = std::pair<double, double>;
   for (size_t k = 0; k < entries.size(); ++k) {
@@ -134,8 +133,7 @@ std::string Warnings(const Uncertainty& uncertainty) {
   return html;
 }
 
-std::string CorrelationTable(const RolloutResiduals& residuals, const FitResult& result) {
-  const auto& entries = residuals.scene().entries();
+std::string CorrelationTable(const std::vector<ParameterEntry>& entries, const FitResult& result) {
   if (entries.size() < 2) {
     return "";
   }
@@ -160,7 +158,7 @@ std::string CorrelationTable(const RolloutResiduals& residuals, const FitResult&
   return "<h2>Correlation</h2>\n" + HtmlTable(header, rows);
 }
 
-std::string IterationPlots(const RolloutResiduals& residuals, const FitResult& result) {
+std::string IterationPlots(const std::vector<ParameterEntry>& entries, const FitResult& result) {
   std::vector<double> index, cost, gradient;
   for (const FitIteration& iteration : result.iterations) {
     index.push_back(static_cast<double>(index.size()));
@@ -175,7 +173,6 @@ std::string IterationPlots(const RolloutResiduals& residuals, const FitResult& r
                    .height = 280},
                   {{"cost", index, cost, PlotStyle::kLineAndPoints, {}},
                    {"gradient norm", index, gradient, PlotStyle::kLineAndPoints, {}}});
-  const auto& entries = residuals.scene().entries();
   if (entries.size() > kMostPlots) {
     html += "<p>The first " + std::to_string(kMostPlots) + " of " + std::to_string(entries.size()) +
             " parameters are drawn.</p>\n";
@@ -342,16 +339,36 @@ std::string FitReport(const std::string& title, const RolloutResiduals& residual
                       const FitResult& result, const DiscretisationCheck* check,
                       const PredictionScore* prediction) {
   const std::string heading = "Fit: " + title;
+  const std::vector<ParameterEntry>& entries = residuals.scene().entries();
   const ResidualSummary summary = SummarizeResiduals(residuals, result.residuals);
   return HtmlPage(heading,
                   "<h1>" + HtmlEscape(heading) + "</h1>\n<h2>Estimates</h2>\n" +
-                      EstimateTable(residuals, result) + Warnings(result.uncertainty) +
+                      EstimateTable(entries, result) + Warnings(result.uncertainty) +
                       CombinationTable(result.uncertainty) + SummaryTable(result) +
-                      CorrelationTable(residuals, result) + StepTable(residuals, check) +
+                      CorrelationTable(entries, result) + StepTable(residuals, check) +
                       PredictionPart(prediction) + StartTable(result) +
-                      IterationPlots(residuals, result) + ResidualTable(summary) +
+                      IterationPlots(entries, result) + ResidualTable(summary) +
                       OutlierTable(summary) +
                       SeriesPlots(CollectSeries(residuals, result), summary.series.size()));
+}
+
+std::string RecordingsReport(const std::string& title, const RecordingsProblem& problem,
+                             const FitResult& result) {
+  const std::string heading = "Fit: " + title;
+  std::vector<std::vector<std::string>> rows;
+  for (int b = 0; b < problem.num_blocks(); ++b) {
+    rows.push_back({problem.recordings()[b].name, std::to_string(problem.num_rows(b)),
+                    CompactNumber(problem.weight(b)),
+                    CompactNumber(RmsOfRecording(problem, result, b), 4)});
+  }
+  return HtmlPage(
+      heading,
+      "<h1>" + HtmlEscape(heading) + "</h1>\n<h2>Estimates</h2>\n" +
+          EstimateTable(problem.entries(), result) + Warnings(result.uncertainty) +
+          CombinationTable(result.uncertainty) + SummaryTable(result) + "<h2>Recordings</h2>\n" +
+          HtmlTable({"recording", "observations", "weight", "residual rms (sigma)"}, rows) +
+          CorrelationTable(problem.entries(), result) + StartTable(result) +
+          IterationPlots(problem.entries(), result));
 }
 
 }  // namespace tangible

@@ -8,6 +8,7 @@
 #include "tangible/estimation/fit/discretisation.h"
 #include "tangible/estimation/fit/fit.h"
 #include "tangible/estimation/results/prediction.h"
+#include "tangible/estimation/results/recordings_json.h"
 
 namespace tangible {
 
@@ -19,5 +20,9 @@ namespace tangible {
 std::string FitReport(const std::string& title, const RolloutResiduals& residuals,
                       const FitResult& result, const DiscretisationCheck* check,
                       const PredictionScore* prediction = nullptr);
+
+/// The same of a fit to several recordings, without plots of their observations.
+std::string RecordingsReport(const std::string& title, const RecordingsProblem& problem,
+                             const FitResult& result);
 
 }  // namespace tangible

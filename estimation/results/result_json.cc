@@ -5,6 +5,7 @@
 #include <map>
 
 #include "tangible/estimation/results/fit_json.h"
+#include "tangible/estimation/results/recordings_json.h"
 #include "tangible/estimation/results/residual_summary.h"
 
 namespace tangible {
@@ -25,9 +26,8 @@ OrderedJson IntervalToJson(const ConfidenceInterval& interval) {
                   : OrderedJson(nullptr);
 }
 
-OrderedJson ParametersToJson(const RolloutResiduals& residuals, const FitResult& result) {
+OrderedJson ParametersToJson(const std::vector<ParameterEntry>& entries, const FitResult& result) {
   OrderedJson parameters = OrderedJson::array();
-  const auto& entries = residuals.scene().entries();
   for (Eigen::Index k = 0; k < result.estimate.size(); ++k) {
     const Uncertainty& uncertainty = result.uncertainty;
     OrderedJson parameter = {
@@ -57,12 +57,13 @@ OrderedJson CovarianceToJson(const RowMatrixXd& covariance) {
   return rows;
 }
 
-OrderedJson CombinationsToJson(const RolloutResiduals& residuals, const Uncertainty& uncertainty) {
+OrderedJson CombinationsToJson(const std::vector<ParameterEntry>& entries,
+                               const Uncertainty& uncertainty) {
   OrderedJson all = OrderedJson::array();
   for (const DeterminedCombination& combination : uncertainty.combinations) {
     OrderedJson terms = OrderedJson::array();
     for (size_t i = 0; i < combination.parameters.size(); ++i) {
-      terms.push_back({{"name", residuals.scene().entries()[combination.parameters[i]].name},
+      terms.push_back({{"name", entries[combination.parameters[i]].name},
                        {"coefficient", Number(combination.coefficients[i])},
                        {"exponent", Number(combination.exponents[i])}});
     }
@@ -225,27 +226,28 @@ OrderedJson ResultToJson(const RolloutResiduals& residuals, const FitResult& res
   const bool estimated = result.estimate.size() > 0;
   const ResidualSummary summary = SummarizeResiduals(residuals, result.residuals);
   const auto when = [estimated](double x) { return estimated ? Number(x) : OrderedJson(nullptr); };
-  OrderedJson json = {{"status", NameOf(result.status)},
-                      {"parameters", ParametersToJson(residuals, result)},
-                      {"robust", RobustToJson(uncertainty)},
-                      {"determined_combinations", CombinationsToJson(residuals, uncertainty)},
-                      {"held_parameters", HeldToJson(result)},
-                      {"covariance", CovarianceToJson(uncertainty.covariance)},
-                      {"initial_cost", when(result.initial_cost)},
-                      {"final_cost", when(result.final_cost)},
-                      {"residual_rms", when(uncertainty.residual_rms)},
-                      {"residual_rms_by_coordinate", RmsByCoordinate(residuals, result)},
-                      {"residuals_by_series", SeriesToJson(summary)},
-                      {"outliers", OutliersToJson(summary)},
-                      {"reduced_chi_square", when(uncertainty.reduced_chi_square)},
-                      {"residuals", residuals.num_residuals()},
-                      {"condition", when(uncertainty.condition)},
-                      {"iterations", IterationsToJson(result)},
-                      {"starts", StartsToJson(result)},
-                      {"rollouts", result.rollouts},
-                      {"seconds", result.seconds},
-                      {"warnings", uncertainty.warnings},
-                      {"message", result.message}};
+  OrderedJson json = {
+      {"status", NameOf(result.status)},
+      {"parameters", ParametersToJson(residuals.scene().entries(), result)},
+      {"robust", RobustToJson(uncertainty)},
+      {"determined_combinations", CombinationsToJson(residuals.scene().entries(), uncertainty)},
+      {"held_parameters", HeldToJson(result)},
+      {"covariance", CovarianceToJson(uncertainty.covariance)},
+      {"initial_cost", when(result.initial_cost)},
+      {"final_cost", when(result.final_cost)},
+      {"residual_rms", when(uncertainty.residual_rms)},
+      {"residual_rms_by_coordinate", RmsByCoordinate(residuals, result)},
+      {"residuals_by_series", SeriesToJson(summary)},
+      {"outliers", OutliersToJson(summary)},
+      {"reduced_chi_square", when(uncertainty.reduced_chi_square)},
+      {"residuals", residuals.num_residuals()},
+      {"condition", when(uncertainty.condition)},
+      {"iterations", IterationsToJson(result)},
+      {"starts", StartsToJson(result)},
+      {"rollouts", result.rollouts},
+      {"seconds", result.seconds},
+      {"warnings", uncertainty.warnings},
+      {"message", result.message}};
   if (check != nullptr) {
     json["discretisation"] = CheckToJson(residuals, *check);
   }
@@ -253,6 +255,47 @@ OrderedJson ResultToJson(const RolloutResiduals& residuals, const FitResult& res
     json["prediction"] = PredictionToJson(*prediction);
   }
   return json;
+}
+
+OrderedJson RecordingsResultToJson(const RecordingsProblem& problem, const FitResult& result) {
+  // A matrix of more than that many parameters is larger than all else.
+  constexpr Eigen::Index kMostInMatrix = 100;
+  const Uncertainty& uncertainty = result.uncertainty;
+  const bool estimated = result.estimate.size() > 0;
+  const auto when = [estimated](double x) { return estimated ? Number(x) : OrderedJson(nullptr); };
+  OrderedJson parameters = ParametersToJson(problem.entries(), result);
+  const size_t shared = static_cast<size_t>(problem.num_shared());
+  for (size_t k = shared; k < parameters.size(); ++k) {
+    const size_t block = (k - shared) / static_cast<size_t>(problem.num_own(0));
+    parameters[k]["recording"] = problem.recordings()[block].name;
+  }
+  OrderedJson recordings = OrderedJson::array();
+  for (int b = 0; b < problem.num_blocks(); ++b) {
+    recordings.push_back({{"name", problem.recordings()[b].name},
+                          {"residuals", problem.num_rows(b)},
+                          {"weight", problem.weight(b)},
+                          {"residual_rms", when(RmsOfRecording(problem, result, b))}});
+  }
+  const bool small = uncertainty.covariance.rows() <= kMostInMatrix;
+  return {{"status", NameOf(result.status)},
+          {"parameters", parameters},
+          {"recordings", recordings},
+          {"robust", RobustToJson(uncertainty)},
+          {"determined_combinations", CombinationsToJson(problem.entries(), uncertainty)},
+          {"held_parameters", HeldToJson(result)},
+          {"covariance", small ? CovarianceToJson(uncertainty.covariance) : OrderedJson(nullptr)},
+          {"initial_cost", when(result.initial_cost)},
+          {"final_cost", when(result.final_cost)},
+          {"residual_rms", when(uncertainty.residual_rms)},
+          {"reduced_chi_square", when(uncertainty.reduced_chi_square)},
+          {"residuals", result.residuals.size()},
+          {"condition", when(uncertainty.condition)},
+          {"iterations", IterationsToJson(result)},
+          {"starts", StartsToJson(result)},
+          {"rollouts", result.rollouts},
+          {"seconds", result.seconds},
+          {"warnings", uncertainty.warnings},
+          {"message", result.message}};
 }
 
 OrderedJson NoiseToJson(const std::vector<SensorNoise>& noise) {

@@ -51,6 +51,77 @@ class TangibleFitTest : public ProgramTest {
   }
 };
 
+// One ball thrown three times: gravity is shared, and each throw has its own speed; the last one is
+// recorded from 0.1 s on and has a body of another mass, which changes nothing.
+TEST_F(TangibleFitTest, FitsSeveralRecordingsAtOnce) {
+  json fit = Problem();
+  fit.erase("observations");
+  fit["parameters"][1]["per"] = "recording";
+  const double speeds[] = {2.0, 3.5, -1.0};
+  for (int take = 0; take < 3; ++take) {
+    const int first = take == 2 ? 10 : 0;
+    std::string text = "time,body,x,y\n";
+    for (int k = 0; k <= 40; k += 10) {
+      text += std::to_string(0.01 * (k + first)) + ",ball," + json(0.01 * speeds[take] * k).dump() +
+              "," + json(Height(k)).dump() + "\n";
+    }
+    const std::string file = "take" + std::to_string(take) + ".csv";
+    Write(file, text);
+    json recording = {{"name", "take " + std::to_string(take)},
+                      {"observations", {{{"file", file}, {"sigma", 0.01}}}}};
+    if (take == 2) {
+      recording.update({{"start", 0.1},
+                        {"values", {{"bodies/ball/mass", 7}}},
+                        {"weight", 2},
+                        {"initial", {{"speed", -0.5}}}});
+    }
+    fit["recordings"].push_back(recording);
+  }
+  const ProgramRun run =
+      Fit(fit, "--out='" + Path("r.json") + "' --report='" + Path("r.html") + "'");
+  ASSERT_EQ(run.exit_status, 0) << run.error;
+  const json result = json::parse(Read(Path("r.json")));
+  EXPECT_EQ(result["status"], "converged");
+  ASSERT_EQ(result["parameters"].size(), 4u);
+  EXPECT_NEAR(result["parameters"][0]["estimate"].get<double>(), 9.5, 1e-8);
+  for (int take = 0; take < 3; ++take) {
+    const json& speed = result["parameters"][1 + take];
+    EXPECT_NEAR(speed["estimate"].get<double>(), speeds[take], 1e-8);
+    EXPECT_EQ(speed["recording"], "take " + std::to_string(take));
+    EXPECT_EQ(result["recordings"][take]["residuals"], 10);
+    EXPECT_LT(result["recordings"][take]["residual_rms"].get<double>(), 1e-6);
+  }
+  EXPECT_NE(Read(Path("r.html")).find("speed of take 1"), std::string::npos);
+}
+
+TEST_F(TangibleFitTest, MistakesInRecordingsNameThem) {
+  json fit = Problem();
+  fit.erase("observations");
+  fit["parameters"][1]["per"] = "recording";
+  const json good = {{"name", "a"}, {"observations", {{{"file", "o.csv"}, {"sigma", 0.01}}}}};
+  const auto expect = [&](json changes, const std::string& what) {
+    json second = good;
+    second["name"] = "b";
+    second.merge_patch(changes);
+    fit["recordings"] = {good, second};
+    ExpectOneLine(Fit(fit), 1, what);
+  };
+  expect({{"name", "a"}}, "/recordings/1/name: expected a name that no other recording has");
+  expect({{"start", 3}}, "/recordings/1: expected observations from start to end, got none");
+  expect({{"start", 0.3}, {"end", 0.2}}, "/recordings/1/end: expected a time after start");
+  expect({{"weight", 0}}, "/recordings/1/weight: expected a number > 0");
+  expect({{"values", {{"bodies/ball/mass", -1}}}}, "recording 'b': /values: bodies/ball/mass");
+  expect({{"initial", {{"sped", 1}}}}, "/recordings/1/initial/sped: expected the name");
+  expect({{"observations", {{{"file", "o.csv"}, {"sigma", 0}}}}},
+         "recording 'b': /observations/0/sigma: expected a number > 0");
+  expect({{"observation", 1}}, "/recordings/1/observation: unknown key of a recording");
+  fit["recordings"] = {good};
+  ExpectOneLine(Fit(fit, "--discretisation_check"), 2,
+                "--discretisation_check: not with recordings");
+  fit["observations"] = good["observations"];
+  ExpectOneLine(Fit(fit), 1, "/observations: expected in each recording");
+}
+
 TEST_F(TangibleFitTest, FitsAndWritesResultAndReport) {
   const ProgramRun run = Fit(Problem(), "--discretisation_check --out='" + Path("r.json") +
                                             "' --report='" + Path("r.html") + "'");

@@ -1,0 +1,201 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/estimation/results/recordings_json.h"
+
+#include <cmath>
+#include <limits>
+#include <set>
+#include <utility>
+
+#include "tangible/scene/json_reader.h"
+#include "tangible/scene/set_parameters.h"
+#include "tangible/scene/text_file.h"
+
+namespace tangible {
+namespace {
+
+// Keys that a recording has in the place of the file's.
+constexpr const char* kOfFile[] = {"scene",   "observations", "points",
+                                   "sensors", "cameras",      "clocks"};
+
+class Reader {
+ public:
+  Reader(const Json& json, std::string file, JsonErrors* errors, RecordingsFile* out)
+      : json_(json), file_(std::move(file)), root_(json, errors), out_(*out), common_(json) {}
+
+  // False with an error of a recording's own; errors of the file itself are the reader's.
+  bool Read(std::string* error) {
+    ReadOwn();
+    const JsonReader list = root_.At("recordings");
+    const int count = list.ExpectArray("an array of recordings");
+    if (count == 0) list.Fail("expected at least one recording, got none");
+    common_.erase("recordings");
+    std::set<std::string> names;
+    for (int i = 0; i < count && root_.ok(); ++i) {
+      if (!ReadRecording(list.At(i), json_["recordings"][i], &names, error)) return false;
+    }
+    return true;
+  }
+
+ private:
+  // Which parameters are per recording; the key is none of a single recording's fit.
+  void ReadOwn() {
+    const JsonReader parameters = root_.At("parameters");
+    for (int i = 0; i < parameters.Size(); ++i) {
+      const JsonReader parameter = parameters.At(i);
+      const bool own = parameter.Has("per");
+      if (own) {
+        parameter.At("per").Choice({"recording"});
+        common_["parameters"][i].erase("per");
+      }
+      out_.own.push_back(own);
+    }
+    if (root_.Has("segments") && root_.At("segments").Integer(1, 1000000) > 1) {
+      root_.At("segments").Fail("expected 1 with recordings");
+    }
+    for (const char* key : {"observations"}) {
+      if (root_.Has(key))
+        root_.At(key).Fail("expected in each recording, where recordings are given");
+    }
+  }
+
+  bool ReadRecording(const JsonReader& reader, const Json& json, std::set<std::string>* names,
+                     std::string* error) {
+    reader.ExpectKeys({"name", "scene", "observations", "points", "sensors", "cameras", "clocks",
+                       "start", "end", "weight", "values", "initial"},
+                      " of a recording");
+    RecordingEntry entry;
+    entry.name = reader.At("name").String();
+    if (!reader.ok()) return true;
+    if (entry.name.empty() || OneLine(entry.name) != entry.name) {
+      reader.At("name").FailExpected("a name without control characters");
+    } else if (!names->insert(entry.name).second) {
+      reader.At("name").FailExpected("a name that no other recording has");
+    }
+    if (reader.Has("weight")) entry.weight = reader.At("weight").Number(NumberKind::kPositive);
+    Json own = common_;
+    for (const char* key : kOfFile) {
+      if (reader.Has(key)) own[key] = json[key];
+    }
+    if (!reader.At("observations").exists()) reader.At("observations").FailExpected("an array");
+    if (!SetInitial(reader, &own) || !reader.ok()) return true;
+    const std::string label = file_ + ": recording '" + entry.name + "'";
+    if (!FitFromJson(own, label, FolderOf(file_), &entry.fit, error)) return false;
+    if (!SetValues(reader, label, &entry.fit.problem.scene, error) ||
+        !Cut(reader, &entry.fit.problem.observations)) {
+      return error->empty();
+    }
+    out_.recordings.push_back(std::move(entry));
+    return true;
+  }
+
+  // Where the recording's parameters start: {name: value}.
+  bool SetInitial(const JsonReader& reader, Json* own) const {
+    if (!reader.Has("initial")) return true;
+    const JsonReader initial = reader.At("initial");
+    for (const std::string& name : initial.Keys()) {
+      const double value = initial.At(name).Number();
+      bool known = false;
+      for (Json& parameter : (*own)["parameters"]) {
+        if (parameter.is_string() && parameter == name) {
+          parameter = {{"path", name}, {"initial", value}};
+          known = true;
+        } else if (parameter.is_object() &&
+                   parameter.value("name", parameter.value("path", "")) == name) {
+          parameter["initial"] = value;
+          known = true;
+        }
+      }
+      if (!known) initial.At(name).Fail("expected the name of a parameter");
+    }
+    return true;
+  }
+
+  // Numbers of the scene that are others in this recording: {path: value}.
+  static bool SetValues(const JsonReader& reader, const std::string& label, Scene* scene,
+                        std::string* error) {
+    if (!reader.Has("values")) return true;
+    const JsonReader values = reader.At("values");
+    for (const std::string& path : values.Keys()) {
+      ParameterPath parameter;
+      const double value = values.At(path).Number();
+      std::string wrong;
+      if (ResolveParameter(*scene, path, &parameter, &wrong)) {
+        wrong = SetParameters({parameter}, &value, scene);
+      }
+      if (!wrong.empty()) {
+        *error = OneLine(label + ": /values: " + wrong);
+        return false;
+      }
+    }
+    return true;
+  }
+
+  // From `start`, which is the run's time 0, to `end`.
+  static bool Cut(const JsonReader& reader, std::vector<Observation>* observations) {
+    const double start = reader.Has("start") ? reader.At("start").Number() : 0.0;
+    const double end =
+        reader.Has("end") ? reader.At("end").Number() : std::numeric_limits<double>::infinity();
+    if (!(start < end)) {
+      reader.At("end").FailExpected("a time after start");
+      return false;
+    }
+    if (!reader.Has("start") && !reader.Has("end")) return true;
+    std::vector<Observation> kept;
+    for (Observation observation : *observations) {
+      if (observation.time < start || observation.time > end) continue;
+      observation.time -= start;
+      kept.push_back(observation);
+    }
+    if (kept.empty()) reader.Fail("expected observations from start to end, got none");
+    *observations = std::move(kept);
+    return !observations->empty();
+  }
+
+  const Json& json_;
+  std::string file_;
+  JsonReader root_;
+  RecordingsFile& out_;
+  Json common_;  // the file without its recordings
+};
+
+}  // namespace
+
+bool HasRecordings(const std::string& file) {
+  Json json;
+  std::string error;
+  return ParseJsonFile(file, &json, &error) && json.is_object() && json.contains("recordings");
+}
+
+bool LoadRecordings(const std::string& file, RecordingsFile* recordings, std::string* error) {
+  Json json;
+  if (!ParseJsonFile(file, &json, error)) return false;
+  *recordings = RecordingsFile();
+  recordings->path = file;
+  JsonErrors errors(file);
+  const bool read = Reader(json, file, &errors, recordings).Read(error);
+  if (!errors.ok()) *error = errors.message();
+  return read && errors.ok();
+}
+
+bool MakeRecordingsProblem(const RecordingsFile& file, std::vector<Recording>* recordings,
+                           std::string* error) {
+  for (const RecordingEntry& entry : file.recordings) {
+    std::vector<RolloutResiduals> residuals;
+    if (!MakeResiduals(entry.fit.problem, file.path + ": recording '" + entry.name + "'",
+                       &residuals, error)) {
+      return false;
+    }
+    recordings->push_back({entry.name, entry.weight, std::move(residuals.front())});
+  }
+  return true;
+}
+
+double RmsOfRecording(const RecordingsProblem& problem, const FitResult& result, int recording) {
+  Eigen::Index first = 0;
+  for (int block = 0; block < recording; ++block) first += problem.num_rows(block);
+  const Eigen::Index rows = problem.num_rows(recording);
+  if (result.residuals.size() < first + rows) return std::nan("");
+  return std::sqrt(result.residuals.segment(first, rows).squaredNorm() / static_cast<double>(rows));
+}
+
+}  // namespace tangible
