@@ -47,8 +47,8 @@ void Merge(const Certificate& other, Certificate& certificate);
 
 /// Writes `verdict`: what applies of "discontinuous: …", "near a kink: …" (coordinates that are
 /// too large, smoothing, degenerate rows, a margin below kNearKinkMargin, or a linear system that
-/// was not solved or is of a condition beyond kConditionLimit) and "one-sided: …", the worst first, joined by
-/// "; "; if nothing does, "trustworthy".
+/// was not solved or is of a condition beyond kConditionLimit) and "one-sided: …", the worst
+/// first, joined by "; "; if nothing does, "trustworthy".
 void SetVerdict(Certificate& certificate);
 
 }  // namespace tangible

@@ -25,8 +25,8 @@ class EventDerivative {
   /// w_bar: num_variables x columns, of the state after the step on entry, before it on return.
   void Adjoint(const Model<double>& model, EventRecord* record, RowMatrixXd* w_bar);
 
-  /// How fast the event's equation g changes with the segment's length. All 0 where the segment ends
-  /// at a given time.
+  /// How fast the event's equation g changes with the segment's length. All 0 where the segment
+  /// ends at a given time.
   struct Rate {
     double value = 0.0;     ///< ∇g · S_τ
     double terms = 0.0;     ///< the sum of the magnitudes of its terms
