@@ -43,7 +43,7 @@ const std::vector<Job>& Jobs() {
       {"tangible-gradient", "ball.json --parameters=bodies/ball/mass", {"out"}},
       {"tangible-control", "control.json", {"out", "plan", "trajectory", "view"}},
       {"tangible-lcp", "lcp.json", {"out"}},
-      {"tangible-fit", "fit.json", {"out", "report", "checkpoint"}},
+      {"tangible-fit", "fit.json", {"out", "report", "scene_out", "predictions", "checkpoint"}},
       {"tangible-import-recording", "markers.csv --length=0.1 --to=0.01", {"out"}, false},
       {"tangible-pendulums", "recordings", {"out"}, false, false},
       {"tangible-closed-forms", "", {"out", "picture"}, true, false},
@@ -214,26 +214,32 @@ TEST_F(FaultsTest, WithStdoutClosedFilesAreWhole) {
 
 /// Each program with each of its inputs, of which the test decides what it is.
 std::vector<Job> JobsThatRead(const std::string& input) {
-  return {{"tangible-simulate", input, {}},
-          {"tangible-simulate", "ball.json --initial=" + input, {}},
-          {"tangible-simulate", "ball.json --batch=" + input, {}},
-          {"tangible-simulate", "ball.json --observe=x.csv --rate=20 --points=" + input, {}},
-          {"tangible-gradient", input + " --parameters=bodies/ball/mass", {}},
-          {"tangible-gradient", "ball.json --parameters=bodies/ball/mass --loss=" + input, {}},
-          {"tangible-control", input, {}},
-          {"tangible-lcp", input, {}},
-          {"tangible-fit", input, {}},
-          {"tangible-fit", "fit.json --checkpoint=" + input, {}},
-          {"tangible-import-recording", input + " --out=x.csv", {}},
-          {"tangible-import-recording", input + " --kind=multiarm_single --out=x.csv", {}},
-          {"tangible-pendulums", input, {}},
-          {"tangible-tradeoff", input, {}},
-          {"tangible-verify", input, {}},
-          // Files that a file names.
-          {"tangible-fit", "names_scene.json", {}},
-          {"tangible-fit", "names_observations.json", {}},
-          {"tangible-simulate", "names_signal.json", {}},
-          {"tangible-gradient", "names_signal.json --parameters=bodies/ball/mass", {}}};
+  return {
+      {"tangible-simulate", input, {}},
+      {"tangible-simulate", "ball.json --initial=" + input, {}},
+      {"tangible-simulate", "ball.json --batch=" + input, {}},
+      {"tangible-simulate", "ball.json --observe=x.csv --rate=20 --points=" + input, {}},
+      {"tangible-gradient", input + " --parameters=bodies/ball/mass", {}},
+      {"tangible-gradient", "ball.json --parameters=bodies/ball/mass --loss=" + input, {}},
+      {"tangible-control", input, {}},
+      {"tangible-lcp", input, {}},
+      {"tangible-fit", input, {}},
+      {"tangible-fit", "fit.json --checkpoint=" + input, {}},
+      {"tangible-import-recording", input + " --out=x.csv", {}},
+      {"tangible-import-recording", input + " --kind=multiarm_single --out=x.csv", {}},
+      {"tangible-import-recording",
+       input + " --kind=table --mapping=" + input + " --out=x.csv",
+       {}},
+      {"tangible-import-recording", input + " --kind=deeplabcut --frame_rate=9 --out=x.csv", {}},
+      {"tangible-import-recording", input + " --kind=tracker --out=x.csv", {}},
+      {"tangible-pendulums", input, {}},
+      {"tangible-tradeoff", input, {}},
+      {"tangible-verify", input, {}},
+      // Files that a file names.
+      {"tangible-fit", "names_scene.json", {}},
+      {"tangible-fit", "names_observations.json", {}},
+      {"tangible-simulate", "names_signal.json", {}},
+      {"tangible-gradient", "names_signal.json --parameters=bodies/ball/mass", {}}};
 }
 
 /// The same files, which name `input` in the place of another.
