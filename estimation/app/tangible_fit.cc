@@ -495,6 +495,11 @@ int RunRecordings(const std::string& file) {
   if (!LoadRecordings(file, &read, &error) || !MakeRecordingsProblem(read, &recordings, &error)) {
     return ReportError(error);
   }
+  for (const RecordingEntry& entry : read.recordings) {
+    if (EstimatesNoise(entry.fit.problem.instruments)) {
+      return ReportError(file + ": /sensors: estimate_sigma is not with recordings");
+    }
+  }
   FitOptions options = read.recordings.front().fit.problem.options;
   options.max_iterations = FLAGS_max_iterations;
   error = OverrideDerivatives(&options);

@@ -227,6 +227,10 @@ TEST_F(TangibleFitTest, SensorsNoiseAndOutliersAreNamed) {
   EXPECT_EQ(result["residuals_by_series"][0]["sensor"], "camera");
   EXPECT_NE(Read(Path("r.html")).find("<h2>Outliers"), std::string::npos);
   ExpectOneLine(Fit(problem, "--checkpoint='" + Path("c.json") + "'"), 2, "no --checkpoint");
+  json several = problem;
+  several["recordings"] = {{{"name", "a"}, {"observations", problem["observations"]}}};
+  several.erase("observations");
+  ExpectOneLine(Fit(several), 1, "estimate_sigma is not with recordings");
 }
 
 // Each of ten links' dampings, where six columns have room beside the cost.
