@@ -491,7 +491,7 @@ int RunRecordings(const std::string& file) {
   }
   RecordingsFile read;
   std::string error;
-  std::vector<Recording> recordings;
+  std::vector<RecordedRun> recordings;
   if (!LoadRecordings(file, &read, &error) || !MakeRecordingsProblem(read, &recordings, &error)) {
     return ReportError(error);
   }

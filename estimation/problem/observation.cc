@@ -19,9 +19,6 @@ namespace {
 constexpr std::array<const char*, kCoordinates> kNames = {"x",  "y",     "angle",   "vx",
                                                           "vy", "omega", "distance"};
 
-// Times that were written as a decimal may miss the end of the run by rounding.
-constexpr double kTimeTolerance = 1e-9;
-
 // Samples over which a rate is taken to lead on to the next angle.
 constexpr size_t kUnwrapSamples = 10;
 

@@ -6,7 +6,7 @@
 
 namespace tangible {
 
-RecordingsProblem::RecordingsProblem(std::vector<Recording> recordings, std::vector<bool> own)
+RecordingsProblem::RecordingsProblem(std::vector<RecordedRun> recordings, std::vector<bool> own)
     : recordings_(std::move(recordings)) {
   for (size_t i = 0; i < own.size(); ++i) {
     (own[i] ? own_ : shared_).push_back(static_cast<int>(i));
@@ -16,7 +16,7 @@ RecordingsProblem::RecordingsProblem(std::vector<Recording> recordings, std::vec
   for (const int i : shared_) {
     entries_.push_back(recordings_.front().residuals.entries()[i]);
   }
-  for (const Recording& recording : recordings_) {
+  for (const RecordedRun& recording : recordings_) {
     for (const int i : own_) {
       ParameterEntry entry = recording.residuals.entries()[i];
       entry.name += " of " + recording.name;

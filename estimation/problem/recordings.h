@@ -16,7 +16,7 @@
 
 namespace tangible {
 
-struct Recording {
+struct RecordedRun {
   std::string name;
   double weight = 1.0;  ///< > 0
   RolloutResiduals residuals;
@@ -25,9 +25,9 @@ struct Recording {
 class RecordingsProblem : public LeastSquaresProblem {
  public:
   /// `own[i]`: whether each recording has a value of its own of parameter i.
-  RecordingsProblem(std::vector<Recording> recordings, std::vector<bool> own);
+  RecordingsProblem(std::vector<RecordedRun> recordings, std::vector<bool> own);
 
-  const std::vector<Recording>& recordings() const { return recordings_; }
+  const std::vector<RecordedRun>& recordings() const { return recordings_; }
   /// Parameter i of a recording as an index in p.
   int ParameterOf(int recording, int i) const;
   /// The recording's own parameters, in its order, out of p.
@@ -54,7 +54,7 @@ class RecordingsProblem : public LeastSquaresProblem {
   /// Out of [shared | own], in the recording's order.
   Eigen::VectorXd Ordered(const Eigen::VectorXd& local) const;
 
-  std::vector<Recording> recordings_;
+  std::vector<RecordedRun> recordings_;
   std::vector<int> shared_, own_;  ///< indices in a recording's parameters
   std::vector<int> order_;         ///< of [shared | own] the indices in a recording's parameters
   std::vector<ParameterEntry> entries_;

@@ -23,9 +23,6 @@ constexpr double kDifferenceStep = 6e-6;
 // Of an observed value: a run's rounding and what its projections leave.
 constexpr double kRounding = 1e-9;
 
-// Of a step: a time that leaves the run by no more has done so by rounding.
-constexpr double kTimeTolerance = 1e-9;
-
 /// Whether the coordinate needs a twist.
 bool IsRate(Coordinate coordinate) {
   return coordinate == Coordinate::kVx || coordinate == Coordinate::kVy ||

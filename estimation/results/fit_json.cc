@@ -2,11 +2,13 @@
 #include "tangible/estimation/results/fit_json.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <utility>
 
 #include "tangible/dynamics/model/settings.h"
 #include "tangible/estimation/results/instruments_json.h"
+#include "tangible/render/html.h"
 #include "tangible/scene/json_reader.h"
 #include "tangible/scene/scene_json.h"
 
@@ -167,8 +169,13 @@ bool Parameterize(const FitProblem& problem, const std::string& file, Parameteri
 /// Reads one fit file after another part: the scene is needed to check the rest.
 class FitReader {
  public:
-  FitReader(const JsonReader& root, std::string folder, FitFile* fit, std::string* error)
-      : root_(root), folder_(std::move(folder)), problem_(&fit->problem), error_(error) {}
+  FitReader(const JsonReader& root, std::string folder, const RecordingPart& part, FitFile* fit,
+            std::string* error)
+      : root_(root),
+        folder_(std::move(folder)),
+        part_(part),
+        problem_(&fit->problem),
+        error_(error) {}
 
   /// False with the error of the scene or an observation file; errors of the fit file itself are
   /// the reader's.
@@ -217,7 +224,11 @@ class FitReader {
   }
 
   bool ReadObservationFiles() {
-    const ObservedScene scene{problem_->scene, problem_->points, problem_->instruments};
+    // Times of a part are checked when it has been cut out.
+    Scene observed_scene = problem_->scene;
+    const bool is_part = part_.start > 0.0 || std::isfinite(part_.end);
+    if (is_part) observed_scene.simulation.duration = std::numeric_limits<double>::max();
+    const ObservedScene scene{observed_scene, problem_->points, problem_->instruments};
     const JsonReader list = root_.At("observations");
     const int count = list.ExpectArray("an array of {file, sigma}");
     if (count == 0) {
@@ -247,23 +258,46 @@ class FitReader {
         }
       }
     }
+    if (is_part && root_.ok()) Cut();
     return true;
+  }
+
+  void Cut() {
+    std::vector<Observation> kept;
+    for (Observation observation : problem_->observations) {
+      if (observation.time < part_.start || observation.time > part_.end) continue;
+      observation.time -= part_.start;
+      const double end = problem_->scene.simulation.duration;
+      const double slack = kTimeTolerance * problem_->scene.simulation.dt;
+      if (observation.time > end && observation.time <= end + slack) observation.time = end;
+      kept.push_back(observation);
+      if (observation.time > end) {
+        root_.At("observations")
+            .Fail("expected times in the run, which ends " +
+                  CompactNumber(problem_->scene.simulation.duration) + " s after start, got " +
+                  CompactNumber(observation.time) + " s after it");
+        return;
+      }
+    }
+    if (kept.empty()) root_.At("observations").Fail("expected some from start to end, got none");
+    problem_->observations = std::move(kept);
   }
 
   JsonReader root_;
   std::string folder_;
+  RecordingPart part_;
   FitProblem* problem_;
   std::string* error_;
 };
 
 }  // namespace
 
-bool FitFromJson(const Json& json, const std::string& name, const std::string& folder, FitFile* fit,
-                 std::string* error) {
+bool FitFromJson(const Json& json, const std::string& name, const std::string& folder,
+                 const RecordingPart& part, FitFile* fit, std::string* error) {
   *fit = FitFile();
   fit->path = name;
   JsonErrors errors(name);
-  FitReader reader(JsonReader(json, &errors), folder, fit, error);
+  FitReader reader(JsonReader(json, &errors), folder, part, fit, error);
   const bool read = reader.Read();
   if (!errors.ok()) {
     *error = errors.message();
@@ -276,12 +310,14 @@ bool FitFromJson(const Json& json, const std::string& name, const std::string& f
 
 bool LoadFit(const std::string& file, FitFile* fit, std::string* error) {
   Json json;
-  return ParseJsonFile(file, &json, error) && FitFromJson(json, file, FolderOf(file), fit, error);
+  return ParseJsonFile(file, &json, error) &&
+         FitFromJson(json, file, FolderOf(file), {}, fit, error);
 }
 
 bool ParseFit(const std::string& text, const std::string& file, FitFile* fit, std::string* error) {
   Json json;
-  return ParseJson(text, file, &json, error) && FitFromJson(json, file, FolderOf(file), fit, error);
+  return ParseJson(text, file, &json, error) &&
+         FitFromJson(json, file, FolderOf(file), {}, fit, error);
 }
 
 bool MakeResiduals(const FitProblem& problem, const std::string& file,

@@ -6,6 +6,7 @@
 // Every mistake in a file is one line "file: /json/pointer: what, expected, got", the first one
 // found.
 
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -30,9 +31,16 @@ bool LoadFit(const std::string& file, FitFile* fit, std::string* error);
 /// The same from text.
 bool ParseFit(const std::string& text, const std::string& file, FitFile* fit, std::string* error);
 
-/// The same from JSON. `name` begins its messages; files are looked for in `folder`.
+/// The part of a recording that is used: observations from `start`, the run's time 0, to `end`; s.
+struct RecordingPart {
+  double start = 0.0;
+  double end = std::numeric_limits<double>::infinity();
+};
+
+/// The same from JSON, with that part of the observations. `name` begins its messages; files are
+/// looked for in `folder`.
 bool FitFromJson(const nlohmann::json& json, const std::string& name, const std::string& folder,
-                 FitFile* fit, std::string* error);
+                 const RecordingPart& part, FitFile* fit, std::string* error);
 
 /// The residuals of a problem. On failure sets one line with the JSON pointer of what is wrong with
 /// a parameter.

@@ -2,10 +2,10 @@
 #include "tangible/estimation/results/recordings_json.h"
 
 #include <cmath>
-#include <limits>
 #include <set>
 #include <utility>
 
+#include "tangible/estimation/results/initial_state.h"
 #include "tangible/scene/json_reader.h"
 #include "tangible/scene/set_parameters.h"
 #include "tangible/scene/text_file.h"
@@ -29,6 +29,11 @@ class Reader {
     const int count = list.ExpectArray("an array of recordings");
     if (count == 0) list.Fail("expected at least one recording, got none");
     common_.erase("recordings");
+    common_.erase("initial");
+    if (root_.Has("initial") && !root_.At("initial").IsString()) {
+      root_.At("initial").FailExpected("from_observations");
+    }
+    FromObservations(root_);
     std::set<std::string> names;
     for (int i = 0; i < count && root_.ok(); ++i) {
       if (!ReadRecording(list.At(i), json_["recordings"][i], &names, error)) return false;
@@ -77,21 +82,24 @@ class Reader {
       if (reader.Has(key)) own[key] = json[key];
     }
     if (!reader.At("observations").exists()) reader.At("observations").FailExpected("an array");
-    if (!SetInitial(reader, &own) || !reader.ok()) return true;
+    SetInitial(reader, &own);
+    const RecordingPart part = ReadPart(reader);
+    if (!reader.ok()) return true;
     const std::string label = file_ + ": recording '" + entry.name + "'";
-    if (!FitFromJson(own, label, FolderOf(file_), &entry.fit, error)) return false;
-    if (!SetValues(reader, label, &entry.fit.problem.scene, error) ||
-        !Cut(reader, &entry.fit.problem.observations)) {
-      return error->empty();
+    if (!FitFromJson(own, label, FolderOf(file_), part, &entry.fit, error)) return false;
+    if (!SetValues(reader, label, &entry.fit.problem.scene, error)) return false;
+    if (FromObservations(reader.Has("initial") ? reader : root_)) {
+      StartFromObservations(&entry.fit.problem);
     }
     out_.recordings.push_back(std::move(entry));
     return true;
   }
 
   // Where the recording's parameters start: {name: value}.
-  bool SetInitial(const JsonReader& reader, Json* own) const {
-    if (!reader.Has("initial")) return true;
+  static void SetInitial(const JsonReader& reader, Json* own) {
+    if (!reader.Has("initial") || FromObservations(reader)) return;
     const JsonReader initial = reader.At("initial");
+    if (!initial.IsObject()) initial.FailExpected("from_observations or {parameter: value}");
     for (const std::string& name : initial.Keys()) {
       const double value = initial.At(name).Number();
       bool known = false;
@@ -107,7 +115,12 @@ class Reader {
       }
       if (!known) initial.At(name).Fail("expected the name of a parameter");
     }
-    return true;
+  }
+
+  // Whether `initial` of a recording, or of the file for all of them, is "from_observations".
+  static bool FromObservations(const JsonReader& reader) {
+    return reader.Has("initial") && reader.At("initial").IsString() &&
+           reader.At("initial").Choice({"from_observations"}) == 0;
   }
 
   // Numbers of the scene that are others in this recording: {path: value}.
@@ -131,24 +144,23 @@ class Reader {
   }
 
   // From `start`, which is the run's time 0, to `end`.
-  static bool Cut(const JsonReader& reader, std::vector<Observation>* observations) {
-    const double start = reader.Has("start") ? reader.At("start").Number() : 0.0;
-    const double end =
-        reader.Has("end") ? reader.At("end").Number() : std::numeric_limits<double>::infinity();
-    if (!(start < end)) {
-      reader.At("end").FailExpected("a time after start");
-      return false;
+  static RecordingPart ReadPart(const JsonReader& reader) {
+    RecordingPart part;
+    if (reader.Has("start")) part.start = reader.At("start").Number(NumberKind::kNonNegative);
+    if (reader.Has("end")) part.end = reader.At("end").Number();
+    if (!(part.start < part.end)) reader.At("end").FailExpected("a time after start");
+    return part;
+  }
+
+  // The initial values of the recording's own parameters that are an initial coordinate or speed of
+  // a body, from the first observations of that body.
+  void StartFromObservations(FitProblem* problem) const {
+    for (size_t i = 0; i < problem->parameters.size(); ++i) {
+      if (!out_.own[i]) continue;
+      if (const auto start = InitialFromObservations(*problem, problem->parameters[i])) {
+        problem->parameters[i].initial = *start;
+      }
     }
-    if (!reader.Has("start") && !reader.Has("end")) return true;
-    std::vector<Observation> kept;
-    for (Observation observation : *observations) {
-      if (observation.time < start || observation.time > end) continue;
-      observation.time -= start;
-      kept.push_back(observation);
-    }
-    if (kept.empty()) reader.Fail("expected observations from start to end, got none");
-    *observations = std::move(kept);
-    return !observations->empty();
   }
 
   const Json& json_;
@@ -177,7 +189,7 @@ bool LoadRecordings(const std::string& file, RecordingsFile* recordings, std::st
   return read && errors.ok();
 }
 
-bool MakeRecordingsProblem(const RecordingsFile& file, std::vector<Recording>* recordings,
+bool MakeRecordingsProblem(const RecordingsFile& file, std::vector<RecordedRun>* recordings,
                            std::string* error) {
   for (const RecordingEntry& entry : file.recordings) {
     std::vector<RolloutResiduals> residuals;

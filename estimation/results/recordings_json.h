@@ -30,7 +30,7 @@ bool HasRecordings(const std::string& file);
 bool LoadRecordings(const std::string& file, RecordingsFile* recordings, std::string* error);
 
 /// The problem of all recordings; the same on failure.
-bool MakeRecordingsProblem(const RecordingsFile& file, std::vector<Recording>* recordings,
+bool MakeRecordingsProblem(const RecordingsFile& file, std::vector<RecordedRun>* recordings,
                            std::string* error);
 
 /// The result as the program writes it.

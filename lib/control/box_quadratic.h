@@ -9,6 +9,7 @@
 // A step is Newton's in the variables that no bound holds; its line search follows the projection
 // onto the box. The set that bounds hold is found in a few steps from a good start.
 
+#include <Eigen/Cholesky>
 #include <vector>
 
 #include "tangible/math/scalar.h"

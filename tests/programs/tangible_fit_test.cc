@@ -92,6 +92,17 @@ TEST_F(TangibleFitTest, FitsSeveralRecordingsAtOnce) {
     EXPECT_LT(result["recordings"][take]["residual_rms"].get<double>(), 1e-6);
   }
   EXPECT_NE(Read(Path("r.html")).find("speed of take 1"), std::string::npos);
+  // Speeds from the first observations, which are exact: only gravity is left to be found.
+  fit["recordings"][2].erase("initial");
+  fit["initial"] = "from_observations";
+  ASSERT_EQ(Fit(fit, "--out='" + Path("r.json") + "'").exit_status, 0);
+  const json initial = json::parse(Read(Path("r.json")))["starts"][0]["initial"];
+  EXPECT_EQ(initial[0], 8.0);
+  for (int take = 0; take < 3; ++take) {
+    EXPECT_NEAR(initial[1 + take].get<double>(), speeds[take], 1e-9);
+  }
+  fit["initial"] = "from_nothing";
+  ExpectOneLine(Fit(fit), 1, "/initial: expected one of from_observations");
 }
 
 TEST_F(TangibleFitTest, MistakesInRecordingsNameThem) {
@@ -107,7 +118,7 @@ TEST_F(TangibleFitTest, MistakesInRecordingsNameThem) {
     ExpectOneLine(Fit(fit), 1, what);
   };
   expect({{"name", "a"}}, "/recordings/1/name: expected a name that no other recording has");
-  expect({{"start", 3}}, "/recordings/1: expected observations from start to end, got none");
+  expect({{"start", 3}}, "recording 'b': /observations: expected some from start to end, got none");
   expect({{"start", 0.3}, {"end", 0.2}}, "/recordings/1/end: expected a time after start");
   expect({{"weight", 0}}, "/recordings/1/weight: expected a number > 0");
   expect({{"values", {{"bodies/ball/mass", -1}}}}, "recording 'b': /values: bodies/ball/mass");

@@ -11,7 +11,7 @@ namespace {
 // Three throws of a ball: gravity and damping are shared, the speed is each one's own and stands
 // between them in the file.
 RecordingsProblem Throws() {
-  std::vector<Recording> recordings;
+  std::vector<RecordedRun> recordings;
   for (int k = 0; k < 3; ++k) {
     Scene scene = MakeScene(kFallingBall);
     const std::vector<Observation> observations = Observe(scene, 10, 0.01, 5 + k);
