@@ -65,8 +65,9 @@ class FaultsTest : public ProgramTest {
     ProgramTest::SetUp();
     Write("ball.json", kBall);
     Write("lcp.json", R"({"F": [[2]], "c": [-1]})");
-    Write("pushed.json",
-          R"({"bodies": [{"name": "ball", "shape": {"circle": {"radius": 0.1}}, "mass": 1, "position": [0, 0]}],
+    Write(
+        "pushed.json",
+        R"({"bodies": [{"name": "ball", "shape": {"circle": {"radius": 0.1}}, "mass": 1, "position": [0, 0]}],
         "forces": [{"name": "push", "body": "ball", "force": [0, 0]}],
         "simulation": {"duration": 0.1}})");
     Write("control.json", R"({"scene": "pushed.json", "controls": [{"path": "forces/push/force/x"}],

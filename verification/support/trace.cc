@@ -40,8 +40,7 @@ VectorX<double> OutputsOf(const ModelStructure& structure, const State<double>& 
 // is rounding: the end of sliding is told by the bodies, and what sticks after it by the modes.
 auto KeyOf(const ContactTrace& trace) {
   const ActiveContact& c = trace.contact;
-  const ContactFeature feature =
-      trace.event == EventKind::kSlipEnds ? ContactFeature{} : c.feature;
+  const ContactFeature feature = trace.event == EventKind::kSlipEnds ? ContactFeature{} : c.feature;
   return std::tuple(trace.event, c.a, c.b, c.joint, c.side, feature.kind, feature.a, feature.b);
 }
 
