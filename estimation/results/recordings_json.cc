@@ -136,7 +136,7 @@ class Reader {
         wrong = SetParameters({parameter}, &value, scene);
       }
       if (!wrong.empty()) {
-        *error = OneLine(label + ": /values: " + wrong);
+        *error = OneLine(wrong.insert(0, ": /values: ").insert(0, label));
         return false;
       }
     }

@@ -356,6 +356,7 @@ std::string RecordingsReport(const std::string& title, const RecordingsProblem& 
                              const FitResult& result) {
   const std::string heading = "Fit: " + title;
   std::vector<std::vector<std::string>> rows;
+  rows.reserve(problem.num_blocks());
   for (int b = 0; b < problem.num_blocks(); ++b) {
     rows.push_back({problem.recordings()[b].name, std::to_string(problem.num_rows(b)),
                     CompactNumber(problem.weight(b)),

@@ -80,9 +80,10 @@ std::string FindIdle(const ControlProblem& problem, const ControlFile& file,
     effect += b.cwiseAbs().colwise().maxCoeff().transpose();
   }
   for (Eigen::Index i = 0; i < effect.size(); ++i) {
-    if (effect[i] <= least)
+    if (effect[i] <= least) {
       return file.paths[i] +
              ": expected a control that moves something, got one that moves nothing";
+    }
   }
   return "";
 }
@@ -210,8 +211,8 @@ int Plan(const std::string& path, const ControlFile& file) {
   RolloutInput input{VectorX<double>(), VectorX<double>(), result.plan.controls};
   RolloutWorker worker(function);
   const RolloutOutput run = worker.Run(input);
-  for (const std::string& warning : worker.Warnings(run.report, run.final)) {
-    ReportError(path + ": warning: " + warning);
+  for (std::string& warning : worker.Warnings(run.report, run.final)) {
+    ReportError(warning.insert(0, ": warning: ").insert(0, path));
   }
   const Certificate certificate = worker.Certify(input);
   OrderedJson json = {
