@@ -2,6 +2,11 @@
 //
 // Rollouts as functions of arrays in double precision and C order, with a leading axis for the rows
 // of a batch.
+#include <memory>
+#include <mutex>
+#include <utility>
+#include <vector>
+
 #include "tangible/app/certificate_json.h"
 #include "tangible/python/binding.h"
 #include "tangible/simulation/gradient/rollout_function.h"
@@ -35,6 +40,28 @@ void ExpectShape(const char* name, const Array& array, const std::vector<py::ssi
   throw py::value_error(std::string(name) + ": expected shape " + expected + "), got " +
                         ShapeOf(array));
 }
+
+// Memory of single runs, from call to call: to make it costs more than a short run. Results do not
+// depend on it; calls from several threads have one each.
+class Workers {
+ public:
+  std::unique_ptr<RolloutWorker> Take(const RolloutFunction& function) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (free_.empty()) return std::make_unique<RolloutWorker>(function);
+    std::unique_ptr<RolloutWorker> worker = std::move(free_.back());
+    free_.pop_back();
+    return worker;
+  }
+  void Keep(std::unique_ptr<RolloutWorker> worker) {
+    worker->SetInterrupt({});
+    const std::lock_guard<std::mutex> lock(mutex_);
+    free_.push_back(std::move(worker));
+  }
+
+ private:
+  std::mutex mutex_;
+  std::vector<std::unique_ptr<RolloutWorker>> free_;
+};
 
 class Rollout {
  public:
@@ -129,6 +156,14 @@ class Rollout {
   py::tuple Run(const Inputs& in, int threads) const {
     const std::vector<RolloutInput> inputs = Read(in);
     return Outputs(WithoutLock([&](SignalWatch* watch) {
+      if (inputs.size() == 1) {
+        std::unique_ptr<RolloutWorker> worker = workers_.Take(function_);
+        worker->SetInterrupt([watch] { watch->Check(); });
+        std::vector<RolloutOutput> outputs;
+        outputs.push_back(worker->Run(inputs[0]));
+        workers_.Keep(std::move(worker));
+        return outputs;
+      }
       RolloutBatch batch(function_, threads);
       batch.SetInterrupt([watch] { watch->Check(); });
       return batch.Run(inputs);
@@ -192,6 +227,7 @@ class Rollout {
 
  private:
   RolloutFunction function_;
+  mutable Workers workers_;
 };
 
 // A forward pass with its tapes; the tapes belong to it, and so to the call that made it.
