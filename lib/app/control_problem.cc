@@ -161,6 +161,9 @@ bool LoadControlFile(const std::string& file, ControlFile* problem, std::string*
     } else if (!(problem->scene.simulation.duration > 0.0)) {
       root.Fail("horizon: missing, expected a number > 0, as the scene's duration is 0");
     }
+    // Controls are held over whole steps.
+    SimulationSettings& settings = problem->scene.simulation;
+    settings.duration = static_cast<double>(NumSteps(settings)) * settings.dt;
     Reader(root, problem).Read();
   }
   *error = errors.message();
