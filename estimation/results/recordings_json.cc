@@ -57,9 +57,8 @@ class Reader {
     if (root_.Has("segments") && root_.At("segments").Integer(1, 1000000) > 1) {
       root_.At("segments").Fail("expected 1 with recordings");
     }
-    for (const char* key : {"observations"}) {
-      if (root_.Has(key))
-        root_.At(key).Fail("expected in each recording, where recordings are given");
+    if (root_.Has("observations")) {
+      root_.At("observations").Fail("expected in each recording, where recordings are given");
     }
   }
 
@@ -108,7 +107,7 @@ class Reader {
           parameter = {{"path", name}, {"initial", value}};
           known = true;
         } else if (parameter.is_object() &&
-                   parameter.value("name", parameter.value("path", "")) == name) {
+                   parameter[parameter.contains("name") ? "name" : "path"] == name) {
           parameter["initial"] = value;
           known = true;
         }

@@ -126,6 +126,9 @@ TEST_F(TangibleFitTest, MistakesInRecordingsNameThem) {
   expect({{"observations", {{{"file", "o.csv"}, {"sigma", 0}}}}},
          "recording 'b': /observations/0/sigma: expected a number > 0");
   expect({{"observation", 1}}, "/recordings/1/observation: unknown key of a recording");
+  fit["parameters"][0]["name"] = 3;
+  expect({{"initial", {{"speed", 1}}}}, "recording 'a': /parameters/0/name: expected a string");
+  fit["parameters"][0]["name"] = "g";
   fit["recordings"] = {good};
   ExpectOneLine(Fit(fit, "--discretisation_check"), 2,
                 "--discretisation_check: not with recordings");
