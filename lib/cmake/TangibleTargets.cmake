@@ -163,14 +163,14 @@ endfunction()
 # Tests assert more than they compute: with -O1 they compile in two thirds of the time.
 set(TANGIBLE_TEST_OPTIONS $<$<CONFIG:Release>:-O1>)
 
-# tangible_test(<name> SOURCES file... LINK target... [LABELS label...] [TIMEOUT seconds]): one test
-# program, one ctest entry.
+# tangible_test(<name> [NO_PRECOMPILE] SOURCES file... LINK target... [LABELS label...] [TIMEOUT seconds]): one
+# test program, one ctest entry. NO_PRECOMPILE: what it links brings compiler options of its own.
 function(tangible_test name)
-  cmake_parse_arguments(TEST "" "TIMEOUT" "SOURCES;LINK;LABELS" ${ARGN})
+  cmake_parse_arguments(TEST "NO_PRECOMPILE" "TIMEOUT" "SOURCES;LINK;LABELS" ${ARGN})
   add_executable(${name} ${TEST_SOURCES})
   target_link_libraries(${name} PRIVATE tangible_flags ${TEST_LINK} GTest::gtest_main)
   target_compile_options(${name} PRIVATE ${TANGIBLE_TEST_OPTIONS})
-  if(TANGIBLE_PRECOMPILE_HEADERS)
+  if(TANGIBLE_PRECOMPILE_HEADERS AND NOT TEST_NO_PRECOMPILE)
     target_precompile_headers(${name} REUSE_FROM tangible_precompiled_tests)
   endif()
   if("unit" IN_LIST TEST_LABELS OR "program" IN_LIST TEST_LABELS)

@@ -696,17 +696,19 @@ std::vector<RolloutOutput> RolloutBatch::Tangent(const std::vector<RolloutInput>
 std::vector<RolloutOutput> RolloutBatch::Record(std::vector<RolloutInput> inputs) {
   inputs_ = std::move(inputs);
   std::vector<RolloutOutput> outputs(inputs_.size());
-  tapes_.clear();
   tapes_.resize(inputs_.size());
   std::atomic<size_t> bytes{0};
   ForEachRollout(function_, static_cast<long>(inputs_.size()), threads_,
                  [&](RolloutWorker* worker, long i) {
                    if (bytes >= kTapeBudget) {
+                     tapes_[i].reset();
                      worker->SetInterrupt(interrupt_);
                      outputs[i] = worker->Run(inputs_[i]);
                      return;
                    }
-                   tapes_[i] = std::make_unique<RolloutWorker>(function_);
+                   if (tapes_[i] == nullptr) {
+                     tapes_[i] = std::make_unique<RolloutWorker>(function_);
+                   }
                    tapes_[i]->SetInterrupt(interrupt_);
                    outputs[i] = tapes_[i]->Record(inputs_[i]);
                    bytes += tapes_[i]->tape_bytes();

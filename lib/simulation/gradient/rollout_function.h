@@ -195,7 +195,7 @@ class RolloutBatch {
                                      const std::vector<InputDirection>& directions,
                                      std::vector<RowMatrixXd>* tangents) const;
   /// Runs, and keeps tapes of the first rows as far as `kTapeBudget` goes; the others are run again
-  /// by Adjoint, which may be called often.
+  /// by Adjoint, which may be called often. A further Record replaces them and uses their memory.
   std::vector<RolloutOutput> Record(std::vector<RolloutInput> inputs);
   /// One bar a row; of a row that failed all derivatives are NaN.
   std::vector<InputDirection> Adjoint(const std::vector<RowMatrixXd>& bars);

@@ -211,6 +211,28 @@ TEST_P(RolloutFunctionTest, ABatchIsItsRows) {
   }
 }
 
+// What a batch has recorded before leaves nothing in what it records then, with more rows or fewer.
+TEST_P(RolloutFunctionTest, ABatchRecordsAgain) {
+  Create({});
+  RolloutBatch used(function_, 2);
+  for (const unsigned rows : {3U, 5U, 2U}) {
+    std::vector<RolloutInput> inputs;
+    for (unsigned i = 0; i < rows; ++i) inputs.push_back(InputOf(function_, 10 * rows + i));
+    const std::vector<RowMatrixXd> bars(rows, RowMatrixXd::Ones(1, 12));
+    RolloutBatch fresh(function_, 1);
+    const std::vector<RolloutOutput> expected = fresh.Record(inputs);
+    const std::vector<RolloutOutput> found = used.Record(inputs);
+    const std::vector<InputDirection> expected_adjoints = fresh.Adjoint(bars);
+    const std::vector<InputDirection> adjoints = used.Adjoint(bars);
+    for (unsigned i = 0; i < rows; ++i) {
+      EXPECT_EQ(found[i].states, expected[i].states);
+      EXPECT_EQ(adjoints[i].parameters, expected_adjoints[i].parameters);
+      EXPECT_EQ(adjoints[i].state, expected_adjoints[i].state);
+      EXPECT_EQ(adjoints[i].controls, expected_adjoints[i].controls);
+    }
+  }
+}
+
 TEST_P(RolloutFunctionTest, AnInterruptEndsTheRun) {
   Create({});
   struct Interrupted {};
