@@ -91,12 +91,14 @@ function(tangible_module_folder name)
   file(CREATE_LINK "${CMAKE_CURRENT_SOURCE_DIR}" "${TANGIBLE_INCLUDE_DIR}/tangible/${name}" SYMBOLIC)
 endfunction()
 
-# tangible_module(<name> [INTERNAL] [SOURCES file...] [HEADERS file...] [DEPENDS module...] [LINK target...])
+# tangible_module(<name> [INTERNAL] [NO_PRECOMPILE] [SOURCES file...] [HEADERS file...] [DEPENDS module...]
+#                 [LINK target...])
 # The library of the current folder. A name is `scene` or, for a sub-folder, `lcp/dense`: target
 # tangible_lcp_dense, alias tangible::lcp_dense. A module without sources is an INTERFACE library.
 # DEPENDS is the only way to the symbols of another module's headers. INTERNAL modules are not installed.
+# NO_PRECOMPILE: what it links brings compiler options of its own.
 function(tangible_module name)
-  cmake_parse_arguments(MODULE "INTERNAL" "" "SOURCES;HEADERS;DEPENDS;LINK;PRIVATE_LINK" ${ARGN})
+  cmake_parse_arguments(MODULE "INTERNAL;NO_PRECOMPILE" "" "SOURCES;HEADERS;DEPENDS;LINK;PRIVATE_LINK" ${ARGN})
   tangible_target_name(${name} short_name)
   if(NOT name MATCHES "/")
     tangible_module_folder(${name})
@@ -106,7 +108,9 @@ function(tangible_module name)
     add_library(${target} STATIC ${MODULE_SOURCES} ${MODULE_HEADERS})
     set(scope PUBLIC)
     target_link_libraries(${target} PRIVATE $<BUILD_INTERFACE:tangible_flags> ${MODULE_PRIVATE_LINK})
-    tangible_precompile(${target})
+    if(NOT MODULE_NO_PRECOMPILE)
+      tangible_precompile(${target})
+    endif()
     add_dependencies(tangible_unit_and_program_tests ${target})
   else()
     add_library(${target} INTERFACE)

@@ -459,22 +459,24 @@ std::vector<std::string> WrongIndexRows(
 
 std::vector<std::string> UnlistedHeaders(const std::string& cmake_lists,
                                          const std::vector<std::string>& headers) {
-  const std::size_t module = cmake_lists.find("tangible_module(");
+  const std::string call = "tangible_module(";
+  std::size_t module = cmake_lists.find(call);
   if (module == std::string::npos) {
     return {};
   }
-  std::string arguments = cmake_lists.substr(module, cmake_lists.find(')', module) - module);
-  std::replace(arguments.begin(), arguments.end(), '(', ' ');
   const std::set<std::string> keywords = {"SOURCES", "DEPENDS", "LINK", "PRIVATE_LINK"};
   std::set<std::string> listed;
-  std::istringstream words(arguments);
-  std::string word;
-  bool in_headers = false;
-  while (words >> word) {
-    if (word == "HEADERS" || keywords.count(word) > 0) {
-      in_headers = word == "HEADERS";
-    } else if (in_headers) {
-      listed.insert(word);
+  for (; module != std::string::npos; module = cmake_lists.find(call, module + 1)) {
+    const std::size_t begin = module + call.size();
+    std::istringstream words(cmake_lists.substr(begin, cmake_lists.find(')', begin) - begin));
+    std::string word;
+    bool in_headers = false;
+    while (words >> word) {
+      if (word == "HEADERS" || keywords.count(word) > 0) {
+        in_headers = word == "HEADERS";
+      } else if (in_headers) {
+        listed.insert(word);
+      }
     }
   }
   std::vector<std::string> unlisted;
