@@ -216,6 +216,22 @@ std::string EstimateLine(const std::string& name, int k, const FitResult& result
   return line;
 }
 
+/// What led to the minimum, where the plain fit did not.
+void PrintApproach(const FitResult& result) {
+  for (size_t i = 0; i < result.starts.size(); ++i) {
+    const FitStart& start = result.starts[i];
+    if (start.approach == "plain") {
+      continue;
+    }
+    std::cout << "start " << i << ": " << start.approach << " lead to a cost of "
+              << Cell(start.cost);
+    if (std::isfinite(start.plain_cost)) {
+      std::cout << ", the plain fit to " << Cell(start.plain_cost);
+    }
+    std::cout << "\n";
+  }
+}
+
 void PrintEstimates(const std::vector<ParameterizedScene::Entry>& entries,
                     const FitResult& result) {
   const Uncertainty& uncertainty = result.uncertainty;
@@ -228,6 +244,7 @@ void PrintEstimates(const std::vector<ParameterizedScene::Entry>& entries,
     std::cout << line << "\n";
   }
   std::cout << DescribeRobust(uncertainty) << "\n";
+  PrintApproach(result);
   std::cout << "cost " << Cell(result.initial_cost) << " -> " << Cell(result.final_cost)
             << ", residual rms " << Cell(uncertainty.residual_rms, 4)
             << " sigma, reduced chi-square " << Cell(uncertainty.reduced_chi_square, 4) << ", "

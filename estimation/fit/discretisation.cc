@@ -32,7 +32,7 @@ DiscretisationCheck CheckDiscretisation(const FitProblem& problem, const FitResu
   FitProblem half = problem;
   half.scene.simulation.dt = 0.5 * check.dt;
   half.options.starts = 1;
-  half.options.segments = 1;
+  half.options.approach = FitApproach::kPlain;
   half.options.certificate = CertificatePass::kSkip;
   half.options.held_test = HeldTest::kSkip;
   for (size_t k = 0; k < half.parameters.size(); ++k) {

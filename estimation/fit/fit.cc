@@ -11,7 +11,9 @@
 #include "tangible/estimation/fit/fit_checkpoint.h"
 #include "tangible/estimation/fit/linearisation.h"
 #include "tangible/estimation/fit/minimise.h"
+#include "tangible/estimation/fit/residual_quality.h"
 #include "tangible/estimation/fit/shooting.h"
+#include "tangible/estimation/fit/windows.h"
 #include "tangible/estimation/problem/problem_with_priors.h"
 
 namespace tangible {
@@ -20,6 +22,9 @@ namespace {
 // A parameter that moves the residuals, as a vector, by no more than this many sigma, changed by
 // its own magnitude, has no effect.
 constexpr double kNoEffect = 1e-12;
+
+// Minima whose costs differ by less than this, relative, are one.
+constexpr double kSameCost = 1e-6;
 
 // Differences carry an error of about 1e-9, the other methods one of about 1e-12.
 constexpr double kRankTolerance = 1e-9;
@@ -75,6 +80,8 @@ FitStart Describe(const Eigen::VectorXd& initial, const Minimum& minimum) {
   FitStart start;
   start.initial.assign(initial.data(), initial.data() + initial.size());
   start.status = NameOf(minimum.status);
+  start.approach = NameOf(minimum.approach);
+  start.approach_iterations = minimum.approach_iterations;
   start.iterations = std::max(0, static_cast<int>(minimum.iterations.size()) - 1);
   start.cost = minimum.status == FitStatus::kFailed ? std::numeric_limits<double>::quiet_NaN()
                                                     : minimum.cost;
@@ -173,7 +180,7 @@ Eigen::VectorXd ObservationResiduals(const LeastSquaresProblem& problem,
 struct FitRun {
   const FitOptions& options;
   const FitProgress& progress;
-  const FitApproach& approach;
+  const FitShooting& shooting;
   std::function<double()> elapsed;
   LeastSquaresProblem* problem;
   FitLog* log;
@@ -191,11 +198,21 @@ struct FitRun {
   EvaluationLog* LogOfStart() const { return logged ? &log->start : nullptr; }
 };
 
-/// The next start, from `start`; how it ended is kept in the log. The first one tells of the
-/// initial values too where it begins elsewhere.
-void RunStart(const Eigen::VectorXd& start, double gradient_norm, double initial_cost,
-              FitRun* run) {
+/// The minimum that this approach leads to; none where there is no window to grow.
+std::optional<Minimum> Reach(const Eigen::VectorXd& start, FitApproach approach, FitRun* run) {
   FitLog* const log = run->log;
+  const bool led = approach != FitApproach::kPlain;
+  if (led && !log->shot) {
+    log->shot = approach == FitApproach::kSegments
+                    ? run->shooting(start, run->LogOfStart())
+                    : GrowWindows(run->options, start, run->problem, run->LogOfStart());
+    run->rollouts += log->shot->rollouts;
+    run->EndPart();
+  }
+  if (approach == FitApproach::kWindows && log->shot->iterations == 0) {
+    log->shot.reset();
+    return std::nullopt;
+  }
   const int i = static_cast<int>(log->starts.size());
   const std::function<void(int, const FitIteration&)> report =
       [run, i](int iteration, const FitIteration& values) {
@@ -203,28 +220,95 @@ void RunStart(const Eigen::VectorXd& start, double gradient_norm, double initial
           run->progress(i, iteration, values);
         }
       };
-  if (run->approach && !log->shot) {
-    log->shot = run->approach(start, run->LogOfStart());
-    run->rollouts += log->shot->rollouts;
-    run->EndPart();
-  }
-  Minimum minimum = Minimise(run->options, log->shot ? log->shot->parameters : start, run->elapsed,
+  Minimum minimum = Minimise(run->options, led ? log->shot->parameters : start, run->elapsed,
                              report, run->problem, run->LogOfStart());
   run->rollouts += minimum.rollouts;
+  minimum.approach = approach;
+  minimum.approach_iterations = led ? log->shot->iterations : 0;
+  log->shot.reset();
+  return minimum;
+}
+
+/// Whether another approach may reach a better minimum.
+bool MayBeLocal(const Minimum& minimum, FitRun* run) {
+  if (minimum.status != FitStatus::kConverged) {
+    return true;
+  }
+  Linearizer linearizer(run->problem, run->options.derivatives, run->options.threads, nullptr);
+  std::vector<BlockEvaluation> blocks;
+  if (!linearizer.Rows(minimum.parameters, BlockDerivatives::kSkip, &blocks)) {
+    return true;
+  }
+  run->rollouts += linearizer.rollouts();
+  const std::vector<ParameterEntry>& entries = run->problem->entries();
+  int num_free = 0;
+  for (size_t k = 0; k < entries.size(); ++k) {
+    num_free += IsAtBound(entries[k], minimum.parameters[static_cast<Eigen::Index>(k)]) ? 0 : 1;
+  }
+  return JudgeResiduals(*run->problem, blocks, num_free).MayBeLocal();
+}
+
+/// The best minimum from `start`, and the cost of the plain fit where it was made.
+Minimum BestFrom(const Eigen::VectorXd& start, FitRun* run, double* plain_cost) {
+  FitLog* const log = run->log;
+  const FitApproach asked = run->options.approach;
+  const FitApproach first = asked == FitApproach::kAuto ? FitApproach::kPlain : asked;
+  const FitApproach second =
+      asked == FitApproach::kAuto ? FitApproach::kWindows : FitApproach::kPlain;
+  if (!log->first) {
+    std::optional<Minimum> reached = Reach(start, first, run);
+    log->first = reached ? std::move(*reached) : *Reach(start, FitApproach::kPlain, run);
+    run->EndPart();
+  }
+  Minimum best = *log->first;
+  std::optional<Minimum> other;
+  if (asked != FitApproach::kPlain && best.approach == first && MayBeLocal(best, run)) {
+    other = Reach(start, second, run);
+  }
+  for (const Minimum* minimum : {&best, other ? &*other : nullptr}) {
+    if (minimum != nullptr && minimum->approach == FitApproach::kPlain &&
+        minimum->status != FitStatus::kFailed) {
+      *plain_cost = minimum->cost;
+    }
+  }
+  // What ends at the same minimum is the first one.
+  const bool same =
+      other && other->status == best.status && other->cost >= best.cost * (1.0 - kSameCost);
+  if (other && !same && IsBetter(*other, best)) {
+    best = std::move(*other);
+  }
+  log->first.reset();
+  return best;
+}
+
+/// The next start, from `start`; how it ended is kept in the log. The first one tells of the
+/// initial values too where it begins elsewhere.
+void RunStart(const Eigen::VectorXd& start, double gradient_norm, double initial_cost,
+              FitRun* run) {
+  FitLog* const log = run->log;
+  const bool is_first = log->starts.empty();
+  double plain_cost = std::numeric_limits<double>::quiet_NaN();
+  Minimum minimum = BestFrom(start, run, &plain_cost);
   const Eigen::VectorXd initial = InitialOf(run->problem->entries());
-  if (i == 0 && start != initial && !minimum.iterations.empty()) {
+  const bool elsewhere = start != initial || minimum.approach != FitApproach::kPlain;
+  if (is_first && elsewhere && !minimum.iterations.empty() && std::isfinite(initial_cost)) {
     minimum.iterations.insert(
         minimum.iterations.begin(),
         {initial_cost, gradient_norm,
          std::vector<double>(initial.data(), initial.data() + initial.size()), 0.0});
   }
-  log->starts.push_back(Describe(i == 0 ? initial : start, minimum));
-  log->starts.back().shooting_iterations = log->shot ? log->shot->iterations : 0;
-  if (i == 0 || IsBetter(minimum, log->best)) {
+  log->starts.push_back(Describe(is_first ? initial : start, minimum));
+  log->starts.back().plain_cost = plain_cost;
+  if (is_first || IsBetter(minimum, log->best)) {
     log->best = std::move(minimum);
   }
-  log->shot.reset();
   run->EndPart();
+}
+
+std::string DescribeApproach(const Minimum& minimum) {
+  return std::string(minimum.approach == FitApproach::kWindows ? "growing windows"
+                                                               : "multiple shooting") +
+         " led to this minimum in " + std::to_string(minimum.approach_iterations) + " iterations";
 }
 
 /// Residuals, intervals and warnings of the best start.
@@ -241,6 +325,9 @@ void Finish(FitRun* run, FitResult* result) {
     result->initial_cost = best.iterations.front().cost;
   }
   result->final_cost = best.cost;
+  if (best.approach != FitApproach::kPlain) {
+    result->message += std::string(result->message.empty() ? "" : "; ") + DescribeApproach(best);
+  }
   Linearizer linearizer(run->problem, run->options.derivatives, run->options.threads, nullptr);
   std::vector<BlockEvaluation> blocks;
   if (!linearizer.Rows(best.parameters, BlockDerivatives::kCompute, &blocks)) {
@@ -270,7 +357,7 @@ void RunStarts(FitRun* run, FitResult* result) {
   if (!found) {
     return;
   }
-  if (!log->starts.empty() || log->shot) {
+  if (!log->starts.empty() || log->shot || log->first) {
     run->rollouts = log->rollouts;
   }
   std::mt19937 random(run->options.seed);
@@ -328,6 +415,20 @@ void CheckBodies(LeastSquaresProblem* problem, FitResult* result) {
 
 }  // namespace
 
+const char* NameOf(FitApproach approach) {
+  switch (approach) {
+    case FitApproach::kAuto:
+      return "auto";
+    case FitApproach::kPlain:
+      return "plain";
+    case FitApproach::kWindows:
+      return "windows";
+    case FitApproach::kSegments:
+      return "segments";
+  }
+  return "";
+}
+
 const char* NameOf(FitStatus status) {
   switch (status) {
     case FitStatus::kConverged:
@@ -343,13 +444,13 @@ const char* NameOf(FitStatus status) {
 }
 
 FitResult Fit(const FitOptions& options, LeastSquaresProblem* problem, const FitProgress& progress,
-              FitLog* log, const FitApproach& approach) {
+              FitLog* log, const FitShooting& shooting) {
   using Clock = std::chrono::steady_clock;
   const Clock::time_point began = Clock::now();
   FitLog own;
   FitRun run{options,
              progress,
-             approach,
+             shooting,
              [began] { return std::chrono::duration<double>(Clock::now() - began).count(); },
              problem,
              log == nullptr ? &own : log,
@@ -376,22 +477,20 @@ FitResult Fit(const FitOptions& options, LeastSquaresProblem* problem, const Fit
 
 FitResult Fit(const FitOptions& options, RolloutResiduals* residuals, const FitProgress& progress,
               FitLog* log) {
-  FitApproach approach;
-  if (options.segments > 1) {
-    approach = [&options, residuals](const Eigen::VectorXd& start, EvaluationLog* evaluations) {
-      const long before = residuals->rollouts();
-      residuals->SetLog(evaluations);
-      const ShootingResult shot = Shoot(options, start, residuals);
-      residuals->SetLog(nullptr);
-      return FitApproachResult{shot.parameters, shot.iterations, residuals->rollouts() - before};
-    };
-  }
+  const FitShooting shooting = [&options, residuals](const Eigen::VectorXd& start,
+                                                     EvaluationLog* evaluations) {
+    const long before = residuals->rollouts();
+    residuals->SetLog(evaluations);
+    const ShootingResult shot = Shoot(options, start, residuals);
+    residuals->SetLog(nullptr);
+    return FitApproachResult{shot.parameters, shot.iterations, residuals->rollouts() - before};
+  };
   ProblemWithPriors with_priors(residuals, {});
   LeastSquaresProblem* problem = residuals;
   if (with_priors.HasRows()) {
     problem = &with_priors;
   }
-  FitResult result = Fit(options, problem, progress, log, approach);
+  FitResult result = Fit(options, problem, progress, log, shooting);
   residuals->SetLog(nullptr);  // which a mismatch may have left
   return result;
 }

@@ -27,10 +27,23 @@
 
 namespace tangible {
 
+/// What leads a start to the minimum where minimising the whole run at once does not.
+enum class FitApproach {
+  kAuto,      ///< growing windows, where the plain fit does not explain the observations
+  kPlain,     ///< nothing
+  kWindows,   ///< growing windows (windows.h)
+  kSegments,  ///< multiple shooting (shooting.h), with FitOptions::segments
+};
+
+/// "auto", "plain", "windows", "segments".
+const char* NameOf(FitApproach approach);
+
 struct FitOptions {
   DerivativeMethod derivatives = DerivativeMethod::kTangent;
-  double huber = 0.0;       ///< b, in multiples of sigma; 0: plain squares
-  int segments = 1;         ///< > 1: multiple shooting first (shooting.h)
+  double huber = 0.0;  ///< b, in multiples of sigma; 0: plain squares
+  /// A start that this leads nowhere is minimised plainly too, and the better minimum counts.
+  FitApproach approach = FitApproach::kAuto;
+  int segments = 1;         ///< of multiple shooting
   int starts = 1;           ///< further starts are drawn within the bounds
   unsigned seed = 0;        ///< of these draws
   int max_iterations = 50;  ///< of each start
@@ -66,8 +79,10 @@ struct FitStart {
   std::vector<double> initial;
   double cost = 0.0;  ///< NaN where it failed
   int iterations = 0;
-  int shooting_iterations = 0;  ///< of multiple shooting, before
+  int approach_iterations = 0;  ///< of what led to it
   std::string status;
+  std::string approach = "plain";  ///< what led to it: "plain", "windows", "segments"
+  double plain_cost = NAN;  ///< of the plain fit from the same point; NaN: not made, or failed
 };
 
 enum class FitStatus {
@@ -88,6 +103,8 @@ struct Minimum {
   double cost = 0.0;
   std::vector<FitIteration> iterations;
   long rollouts = 0;
+  FitApproach approach = FitApproach::kPlain;  ///< what led to where it began
+  int approach_iterations = 0;
 };
 
 struct FitResult {
@@ -119,21 +136,20 @@ struct FitApproachResult {
   long rollouts = 0;
 };
 
-/// Leads a start nearer to the minimum before the whole problem is minimised (multiple shooting).
-/// Its evaluations go through the log unless that is null.
-using FitApproach =
+/// Multiple shooting, which needs more than a least-squares problem (kSegments). Its evaluations go
+/// through the log unless that is null.
+using FitShooting =
     std::function<FitApproachResult(const Eigen::VectorXd& start, EvaluationLog* log)>;
 
 struct FitLog;  // fit_checkpoint.h
 
-/// Runs the fit; `progress` and `approach` may be empty. With a log it goes on from what that has,
-/// keeps there what it does, and ends at the same bits; where that turns out to be of another fit
-/// the result is worth nothing (FitLog::mismatch).
+/// Runs the fit; `progress` and, unless the approach is kSegments, `shooting` may be empty. With a
+/// log it goes on from what that has, keeps there what it does, and ends at the same bits; where
+/// that turns out to be of another fit the result is worth nothing (FitLog::mismatch).
 FitResult Fit(const FitOptions& options, LeastSquaresProblem* problem, const FitProgress& progress,
-              FitLog* log = nullptr, const FitApproach& approach = {});
+              FitLog* log = nullptr, const FitShooting& shooting = {});
 
-/// The fit of one run with the priors of its parameters, and with multiple shooting before it if
-/// `options` ask for that.
+/// The fit of one run with the priors of its parameters.
 FitResult Fit(const FitOptions& options, RolloutResiduals* residuals, const FitProgress& progress,
               FitLog* log = nullptr);
 

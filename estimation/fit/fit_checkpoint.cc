@@ -10,7 +10,7 @@
 namespace tangible {
 namespace {
 
-constexpr char kFormat[] = "tangible-fit checkpoint 3";
+constexpr char kFormat[] = "tangible-fit checkpoint 4";
 // A write waits until so many times the last one's time has gone by.
 constexpr int kWait = 10;
 
@@ -62,16 +62,17 @@ void Read(const Json& json, EvaluationLog* log) {
 }
 
 Json ToJson(const FitStart& start) {
-  return {{"initial", start.initial},
-          {"cost", start.cost},
-          {"iterations", start.iterations},
-          {"shooting_iterations", start.shooting_iterations},
-          {"status", start.status}};
+  return {{"initial", start.initial},       {"cost", start.cost},
+          {"iterations", start.iterations}, {"approach_iterations", start.approach_iterations},
+          {"status", start.status},         {"approach", start.approach},
+          {"plain_cost", start.plain_cost}};
 }
 
 FitStart ReadStart(const Json& json) {
-  return {json.at("initial"), json.at("cost"), json.at("iterations"),
-          json.at("shooting_iterations"), json.at("status")};
+  return {json.at("initial"),    json.at("cost"),
+          json.at("iterations"), json.at("approach_iterations"),
+          json.at("status"),     json.at("approach"),
+          json.at("plain_cost")};
 }
 
 Json ToJson(const Minimum& minimum) {
@@ -84,7 +85,8 @@ Json ToJson(const Minimum& minimum) {
           {"parameters", Array(minimum.parameters)},
           {"cost", minimum.cost},
           {"iterations", iterations},
-          {"rollouts", minimum.rollouts}};
+          {"rollouts", minimum.rollouts},
+          {"approach", {static_cast<int>(minimum.approach), minimum.approach_iterations}}};
 }
 
 Minimum ReadMinimum(const Json& json) {
@@ -94,6 +96,8 @@ Minimum ReadMinimum(const Json& json) {
   minimum.parameters = ReadVector(json.at("parameters"));
   minimum.cost = json.at("cost");
   minimum.rollouts = json.at("rollouts");
+  minimum.approach = static_cast<FitApproach>(json.at("approach").at(0).get<int>());
+  minimum.approach_iterations = json.at("approach").at(1);
   for (const Json& i : json.at("iterations")) {
     minimum.iterations.push_back({i.at(0), i.at(1), i.at(2), i.at(3)});
   }
@@ -112,6 +116,9 @@ Json ToJson(const FitLog& log) {
   if (!log.starts.empty()) {
     json["best"] = ToJson(log.best);
   }
+  if (log.first) {
+    json["first"] = ToJson(*log.first);
+  }
   if (log.shot) {
     json["shot"] = {Array(log.shot->parameters), log.shot->iterations, log.shot->rollouts};
   }
@@ -127,6 +134,9 @@ void Read(const Json& json, FitLog* log) {
   }
   if (!log->starts.empty()) {
     log->best = ReadMinimum(json.at("best"));
+  }
+  if (json.contains("first")) {
+    log->first = ReadMinimum(json.at("first"));
   }
   if (json.contains("shot")) {
     const Json& shot = json.at("shot");
@@ -222,6 +232,7 @@ std::uint64_t Fingerprint(const FitProblem& problem) {
   const FitOptions& options = problem.options;
   hash.Add(NameOf(options.derivatives));
   hash.Add(options.huber);
+  hash.Add(NameOf(options.approach));
   for (const int number :
        {options.segments, options.starts, static_cast<int>(options.seed), options.max_iterations}) {
     hash.Add(number);

@@ -3,13 +3,13 @@
 //
 // A checkpoint of a fit: what is needed to go on after an interruption and end at the same bits.
 //
-//   "tangible-fit checkpoint 3 <hash of the content>\n", then in CBOR
+//   "tangible-fit checkpoint 4 <hash of the content>\n", then in CBOR
 //   {"problem": hash, "fits": [the fit, the fit at dt / 2]}
 //
 // Of each fit it keeps the starts that are finished (how they ended, and all of the best one), the
-// point at which multiple shooting arrived, and the evaluations (evaluation_log.h) of the start
-// under way: those of the search for the first point, then costs and the factors of the blocks
-// (linearisation.h), whose size does not grow with the number of observations, up to
+// point at which windows or multiple shooting arrived, and the evaluations (evaluation_log.h) of the
+// part of a start under way: those of the search for the first point, then costs and the factors of
+// the blocks (linearisation.h), whose size does not grow with the number of observations, up to
 // EvaluationLog::kMaxNumbers. CBOR holds doubles as they are. A checkpoint whose content is
 // damaged, or that belongs to another problem (scene, parameters, observations, options), is
 // refused.
@@ -33,10 +33,11 @@ struct FitLog {
   EvaluationLog search;                   ///< of a first point where every parameter does something
   std::vector<FitStart> starts;           ///< finished
   Minimum best;                           ///< of these
-  std::optional<FitApproachResult> shot;  ///< of the start under way
-  EvaluationLog start;           ///< of the start under way, since the end of multiple shooting
-  long rollouts = 0;             ///< when the last start, or multiple shooting, ended
-  std::function<void()> on_end;  ///< called at the end of a start and of multiple shooting
+  std::optional<Minimum> first;           ///< of the start under way: of its first approach
+  std::optional<FitApproachResult> shot;  ///< of the start under way: where an approach led
+  EvaluationLog start;           ///< of the start under way, since the last part of it ended
+  long rollouts = 0;             ///< when the last part of a start ended
+  std::function<void()> on_end;  ///< called at the end of each part of a start
 
   /// Not 0: the number of an evaluation that was not where the log has it.
   long mismatch() const { return search.mismatch() > 0 ? search.mismatch() : start.mismatch(); }

@@ -95,7 +95,14 @@ class SharedLinearisation : public ceres::EvaluationCallback {
   const Linearisation& model() const { return model_; }
   /// Cost and gradient of the fit's own loss.
   const Linearisation& target() const { return target_; }
-  double BlockCost(int block) const { return block_costs_[block]; }
+  /// At the last point, whether or not Jacobians were asked for there.
+  double BlockCost(int block) const {
+    if (!has_model_) {
+      return block_costs_[block];
+    }
+    const BlockFactor& factor = model_.blocks[block];
+    return 0.5 * (factor.residuals().squaredNorm() + factor.remainder * factor.remainder);
+  }
 
  private:
   Linearizer* linearizer_;

@@ -146,7 +146,7 @@ FitResult FitWithSensorNoise(const FitOptions& options, RolloutResiduals* residu
   search.held_test = HeldTest::kSkip;
   FitResult result = Fit(search, residuals, progress);
   search.starts = 1;
-  search.segments = 1;
+  search.approach = FitApproach::kPlain;
   double largest = 0.0;
   for (int fits = 1; result.status == FitStatus::kConverged; ++fits) {
     if (!Update(options, rows, residuals, &result, noise, &largest)) {

@@ -13,12 +13,6 @@ namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kNormalQuantile = 1.959963984540054;  // of 0.975
-// Of the reduced chi-square above 1, in its standard deviations sqrt(2 / (N - P)).
-constexpr double kChiSquareDeviations = 5.0;
-// Residuals are called correlated where chance gives this with less than that probability, and
-// where it matters: below a tenth from one sample to the next intervals change by 10 %.
-constexpr double kWhitenessProbability = 1e-4;
-constexpr double kWhitenessCorrelation = 0.1;
 // Of a combination that a message names.
 constexpr int kMostTerms = 12;
 
@@ -95,7 +89,7 @@ class Estimator {
 
   Uncertainty Run() {
     FindFree();
-    JudgeResiduals();
+    WarnOfResiduals();
     if (num_free_ == 0) {
       return result_;
     }
@@ -130,39 +124,14 @@ class Estimator {
     }
   }
 
-  void JudgeResiduals() {
-    std::vector<ResidualPlace> places;
-    std::vector<double> values;
-    for (size_t b = 0; b < blocks_.size(); ++b) {
-      const int block = static_cast<int>(b);
-      const std::vector<RowPlace> rows = problem_.Places(block);
-      for (int i = 0; i < problem_.num_observation_rows(block); ++i) {
-        values.push_back(blocks_[b].residuals[i]);
-        if (i < static_cast<int>(rows.size())) {
-          places.push_back({block, rows[i].series, rows[i].time, rows[i].least});
-        }
-      }
-    }
-    const Eigen::Map<const Eigen::VectorXd> data(values.data(),
-                                                 static_cast<Eigen::Index>(values.size()));
-    const double count = static_cast<double>(data.size());
-    const double freedom = count - static_cast<double>(num_free_);
-    result_.residual_rms = std::sqrt(data.squaredNorm() / count);
-    result_.reduced_chi_square = freedom > 0.0 ? data.squaredNorm() / freedom : kNaN;
-    result_.too_large =
-        result_.reduced_chi_square > 1.0 + kChiSquareDeviations * std::sqrt(2.0 / freedom);
+  void WarnOfResiduals() {
+    static_cast<ResidualQuality&>(result_) = JudgeResiduals(problem_, blocks_, num_free_);
     if (result_.too_large) {
       result_.warnings.push_back("residuals are larger than sigma explains (reduced chi-square " +
                                  Short(result_.reduced_chi_square) +
                                  "): the model misses something, or sigma is too small, and the "
                                  "intervals from sigma are too narrow");
     }
-    if (places.size() != values.size()) {
-      return;
-    }
-    result_.whiteness = TestWhiteness(data, places);
-    result_.correlated = result_.whiteness.p_value < kWhitenessProbability &&
-                         std::abs(result_.whiteness.correlation) > kWhitenessCorrelation;
     if (result_.correlated) {
       result_.warnings.push_back(
           "residuals are correlated in time (" + Short(result_.whiteness.correlation) +

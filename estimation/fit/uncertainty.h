@@ -32,8 +32,8 @@
 #include <vector>
 
 #include "tangible/estimation/fit/combinations.h"
+#include "tangible/estimation/fit/residual_quality.h"
 #include "tangible/estimation/fit/robust_covariance.h"
-#include "tangible/estimation/fit/whiteness.h"
 #include "tangible/estimation/problem/least_squares.h"
 #include "tangible/math/scalar.h"
 
@@ -50,7 +50,7 @@ struct UncertaintyOptions {
 
 using ConfidenceInterval = std::optional<std::pair<double, double>>;
 
-struct Uncertainty {
+struct Uncertainty : ResidualQuality {
   /// P x P, of more than kMostCovariance parameters of the shared ones alone; NaN rows and columns
   /// where there is none.
   RowMatrixXd covariance;
@@ -62,19 +62,11 @@ struct Uncertainty {
   RobustMethod robust_method = RobustMethod::kNone;
   double bandwidth = 0.0;       ///< s, over which residuals count as correlated; 0: not at all
   Eigen::VectorXd prior_share;  ///< of a parameter's information, 0 to 1: what priors contribute
-  Whiteness whiteness;
   /// What is determined of parameters that are not determined one by one.
   std::vector<DeterminedCombination> combinations;
   std::vector<std::string> messages;  ///< a parameter: why it has no interval; else empty
   double condition = 1.0;             ///< of J with unit columns, over the parameters that are free
-  double residual_rms = 0.0;          ///< in multiples of sigma
-  double reduced_chi_square = 0.0;  ///< Σ r² / (N − free parameters); NaN where N is not larger
   std::vector<std::string> warnings;  ///< of the whole
-
-  /// Whether residuals are larger than sigma explains, or correlated in time.
-  bool DoesNotFit() const { return too_large || correlated; }
-  bool too_large = false;
-  bool correlated = false;
 };
 
 /// `estimate` of all parameters of the problem, and its blocks there, with Jacobians.

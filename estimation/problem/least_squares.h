@@ -13,6 +13,7 @@
 // (priors) are plain squares. w_b is the weight of the block, 1 by default.
 
 #include <Eigen/Core>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -83,6 +84,10 @@ class LeastSquaresProblem {
 
   /// What cannot be in reality at p (all parameters), a line each (consistency.h).
   virtual std::vector<std::string> FindInconsistencies(const Eigen::VectorXd& /*p*/) { return {}; }
+
+  /// The problem with the observations of the first `part` (0 to 1) of each block's time alone, and
+  /// the same parameters; null where blocks have no times. This problem outlives it.
+  virtual std::unique_ptr<LeastSquaresProblem> Window(double /*part*/) const { return nullptr; }
 
   /// For a line of a message: of block 3 "recording 'take 4': "; empty where there is only one.
   virtual std::string BlockName(int /*block*/) const { return ""; }

@@ -5,22 +5,37 @@
 #include <utility>
 
 namespace tangible {
+namespace {
+
+std::vector<std::optional<Prior>> PriorsOf(const std::vector<ParameterEntry>& entries) {
+  std::vector<std::optional<Prior>> priors;
+  for (const ParameterEntry& entry : entries) {
+    priors.push_back(entry.prior);
+  }
+  return priors;
+}
+
+}  // namespace
 
 ProblemWithPriors::ProblemWithPriors(LeastSquaresProblem* problem,
                                      std::vector<RandomEffect> effects)
+    : ProblemWithPriors(problem, PriorsOf(problem->entries()), std::move(effects)) {}
+
+ProblemWithPriors::ProblemWithPriors(LeastSquaresProblem* problem,
+                                     const std::vector<std::optional<Prior>>& priors,
+                                     std::vector<RandomEffect> effects)
     : problem_(problem), effects_(std::move(effects)), own_(problem->num_blocks()) {
   const BlockLayout layout(*problem);
-  const auto prior_of = [&](int k) { return problem->entries()[k].prior; };
   for (int k = 0; k < layout.num_shared(); ++k) {
-    if (prior_of(k)) {
-      shared_.push_back({k, -1, -1, *prior_of(k)});
+    if (priors[k]) {
+      shared_.push_back({k, -1, -1, *priors[k]});
     }
   }
   for (int block = 0; block < layout.num_blocks(); ++block) {
     for (int i = layout.num_shared(); i < layout.num_local(block); ++i) {
       const int k = layout.ParameterOf(block, i);
-      if (prior_of(k)) {
-        own_[block].push_back({i, -1, -1, *prior_of(k)});
+      if (priors[k]) {
+        own_[block].push_back({i, -1, -1, *priors[k]});
       }
       for (size_t e = 0; e < effects_.size(); ++e) {
         if (effects_[e].own[block] == k) {
@@ -67,6 +82,16 @@ std::string ProblemWithPriors::BlockName(int block) const {
 HeldColumns ProblemWithPriors::EvaluateHeld(int block, const Eigen::VectorXd& p,
                                             DerivativeMethod method, int most) {
   return IsOfPriors(block) ? HeldColumns() : problem_->EvaluateHeld(block, p, method, most);
+}
+
+std::unique_ptr<LeastSquaresProblem> ProblemWithPriors::Window(double part) const {
+  std::unique_ptr<LeastSquaresProblem> window = problem_->Window(part);
+  if (window == nullptr) {
+    return nullptr;
+  }
+  auto with_priors = std::make_unique<ProblemWithPriors>(window.get(), effects_);
+  with_priors->window_ = std::move(window);
+  return with_priors;
 }
 
 PriorResidual ProblemWithPriors::Evaluate(const PriorRow& row, const Eigen::VectorXd& p,

@@ -11,6 +11,7 @@
 // the last.
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -29,7 +30,10 @@ struct RandomEffect {
 
 class ProblemWithPriors : public LeastSquaresProblem {
  public:
-  /// Takes the priors of the problem's entries; `problem` outlives this.
+  /// With these priors, an optional one for each of the problem's entries; `problem` outlives this.
+  ProblemWithPriors(LeastSquaresProblem* problem, const std::vector<std::optional<Prior>>& priors,
+                    std::vector<RandomEffect> effects);
+  /// Takes the priors of the problem's entries.
   ProblemWithPriors(LeastSquaresProblem* problem, std::vector<RandomEffect> effects);
 
   /// Whether there is any row that `problem` does not have.
@@ -56,6 +60,7 @@ class ProblemWithPriors : public LeastSquaresProblem {
   std::vector<std::string> FindInconsistencies(const Eigen::VectorXd& p) override {
     return problem_->FindInconsistencies(p);
   }
+  std::unique_ptr<LeastSquaresProblem> Window(double part) const override;
   std::string BlockName(int block) const override;
 
  private:
@@ -74,6 +79,7 @@ class ProblemWithPriors : public LeastSquaresProblem {
   }
 
   LeastSquaresProblem* problem_;
+  std::unique_ptr<LeastSquaresProblem> window_;  ///< of a window of another one: its problem
   std::vector<RandomEffect> effects_;
   std::vector<std::vector<PriorRow>> own_;  ///< of each block of `problem`
   std::vector<PriorRow> shared_;

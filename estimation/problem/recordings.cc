@@ -107,4 +107,14 @@ std::vector<std::string> RecordingsProblem::FindInconsistencies(const Eigen::Vec
   return lines;
 }
 
+std::unique_ptr<LeastSquaresProblem> RecordingsProblem::Window(double part) const {
+  std::vector<RecordedRun> early;
+  for (const RecordedRun& recording : recordings_) {
+    early.push_back({recording.name, recording.weight, recording.residuals.FirstPart(part)});
+  }
+  std::vector<bool> own(order_.size(), false);
+  for (const int i : own_) own[i] = true;
+  return std::make_unique<RecordingsProblem>(std::move(early), own);
+}
+
 }  // namespace tangible

@@ -46,6 +46,7 @@ class RecordingsProblem : public LeastSquaresProblem {
   HeldColumns EvaluateHeld(int block, const Eigen::VectorXd& p, DerivativeMethod method,
                            int most) override;
   std::vector<std::string> FindInconsistencies(const Eigen::VectorXd& p) override;
+  std::unique_ptr<LeastSquaresProblem> Window(double part) const override;
   std::string BlockName(int block) const override {
     return "recording '" + recordings_[block].name + "': ";
   }

@@ -123,6 +123,27 @@ std::vector<RowPlace> RolloutResiduals::Places(int /*block*/) const {
   return places;
 }
 
+RolloutResiduals RolloutResiduals::FirstPart(double part) const {
+  double first = HUGE_VAL;
+  double last = -HUGE_VAL;
+  for (const Observation& observation : observations_) {
+    first = std::min(first, observation.time);
+    last = std::max(last, observation.time);
+  }
+  const double end = first + part * (last - first);
+  std::vector<Observation> early;
+  for (const Observation& observation : observations_) {
+    if (observation.time <= end) {
+      early.push_back(observation);
+    }
+  }
+  return {scene_, std::move(early), channels_};
+}
+
+std::unique_ptr<LeastSquaresProblem> RolloutResiduals::Window(double part) const {
+  return std::make_unique<RolloutResiduals>(FirstPart(part));
+}
+
 bool RolloutResiduals::EvaluateBlock(int /*block*/, const Eigen::VectorXd& p,
                                      DerivativeMethod method, BlockDerivatives derivatives,
                                      BlockEvaluation* evaluation) {

@@ -64,6 +64,9 @@ class RolloutResiduals : public LeastSquaresProblem {
   HeldColumns EvaluateHeld(int block, const Eigen::VectorXd& p, DerivativeMethod method,
                            int most) override;
   std::vector<std::string> FindInconsistencies(const Eigen::VectorXd& p) override;
+  std::unique_ptr<LeastSquaresProblem> Window(double part) const override;
+  /// The residuals of the observations in the first `part` of the time.
+  RolloutResiduals FirstPart(double part) const;
 
   /// The residuals at p and, unless `jacobian` is null, their derivatives by `method`. False where
   /// the run fails or p sets a number to a value that it may not take; message() says which.

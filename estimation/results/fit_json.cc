@@ -25,6 +25,11 @@ constexpr std::pair<const char*, DerivativeMethod> kMethods[] = {
     {"jet_implicit", DerivativeMethod::kJetImplicit},
     {"finite_difference", DerivativeMethod::kFiniteDifference}};
 
+// Multiple shooting is asked for by its segments.
+constexpr std::pair<const char*, FitApproach> kApproaches[] = {{"auto", FitApproach::kAuto},
+                                                               {"plain", FitApproach::kPlain},
+                                                               {"windows", FitApproach::kWindows}};
+
 constexpr std::pair<const char*, ParameterScale> kScales[] = {
     {"linear", ParameterScale::kLinear}, {"log", ParameterScale::kLogarithmic}};
 
@@ -133,6 +138,16 @@ FitOptions ReadOptions(const JsonReader& root) {
   if (root.Has("segments")) {
     options.segments = root.At("segments").Integer(1, kMaxSegments);
   }
+  if (root.Has("approach")) {
+    options.approach = root.At("approach").Choice(kApproaches);
+  }
+  if (options.segments > 1) {
+    if (options.approach != FitApproach::kAuto) {
+      root.At("segments")
+          .Fail("expected 1 with another approach, got " + std::to_string(options.segments));
+    }
+    options.approach = FitApproach::kSegments;
+  }
   if (root.Has("starts")) {
     options.starts = root.At("starts").Integer(1, kMaxStarts);
   }
@@ -181,7 +196,8 @@ class FitReader {
   /// the reader's.
   bool Read() {
     root_.ExpectKeys({"scene", "observations", "points", "sensors", "cameras", "clocks",
-                      "parameters", "derivatives", "loss", "segments", "starts", "seed"});
+                      "parameters", "derivatives", "loss", "approach", "segments", "starts",
+                      "seed"});
     const std::string scene_file = JoinPath(folder_, root_.At("scene").String());
     if (!root_.ok()) {
       return true;

@@ -318,7 +318,7 @@ std::string StepTable(const RolloutResiduals& residuals, const DiscretisationChe
 }
 
 std::string StartTable(const FitResult& result) {
-  if (result.starts.size() < 2) {
+  if (result.starts.size() < 2 && (result.starts.empty() || result.starts[0].approach == "plain")) {
     return "";
   }
   std::vector<std::vector<std::string>> rows;
@@ -327,10 +327,12 @@ std::string StartTable(const FitResult& result) {
     for (const double x : start.initial) {
       initial += (initial.empty() ? "" : ", ") + CompactNumber(x, 4);
     }
-    rows.push_back({"(" + initial + ")", start.status, CompactNumber(start.cost),
-                    std::to_string(start.iterations)});
+    rows.push_back({"(" + initial + ")", start.approach, start.status, CompactNumber(start.cost),
+                    CompactNumber(start.plain_cost), std::to_string(start.iterations)});
   }
-  return "<h2>Starts</h2>\n" + HtmlTable({"initial", "status", "cost", "iterations"}, rows);
+  return "<h2>Starts</h2>\n" +
+         HtmlTable({"initial", "approach", "status", "cost", "cost of the plain fit", "iterations"},
+                   rows);
 }
 
 }  // namespace

@@ -116,7 +116,9 @@ OrderedJson StartsToJson(const FitResult& result) {
                       {"status", start.status},
                       {"cost", Number(start.cost)},
                       {"iterations", start.iterations},
-                      {"shooting_iterations", start.shooting_iterations}});
+                      {"approach", start.approach},
+                      {"approach_iterations", start.approach_iterations},
+                      {"plain_cost", Number(start.plain_cost)}});
   }
   return starts;
 }

@@ -73,24 +73,26 @@ TEST(ShootingTest, FindsAPeriodFromWhichOneRunStrays) {
   gravity.lower = -20.0;
   const std::vector<FitParameter> parameters = {gravity, Parameter("joints/pin/angle", 0.7)};
   FitOptions options;
+  options.approach = FitApproach::kPlain;
   RolloutResiduals single = MakeResiduals(scene, {}, parameters, observations);
   const FitResult strayed = Fit(options, &single, {});
   EXPECT_GT(strayed.uncertainty.reduced_chi_square, 100.0);
 
+  options.approach = FitApproach::kSegments;
   options.segments = 8;
   RolloutResiduals multiple = MakeResiduals(scene, {}, parameters, observations);
   const FitResult fit = Fit(options, &multiple, {});
   ASSERT_EQ(fit.status, FitStatus::kConverged) << fit.message;
   EXPECT_NEAR(fit.estimate[0], -9.81, 5.0 * fit.uncertainty.standard_deviation[0]);
   EXPECT_NEAR(fit.estimate[1], 1.0, 5.0 * fit.uncertainty.standard_deviation[1]);
-  EXPECT_GT(fit.starts[0].shooting_iterations, 0);
+  EXPECT_GT(fit.starts[0].approach_iterations, 0);
 
   // From where one run does find its way both are the same estimate.
   std::vector<FitParameter> near = parameters;
   near[0].initial = -9.7;
   near[1].initial = 1.02;
   RolloutResiduals close = MakeResiduals(scene, {}, near, observations);
-  options.segments = 1;
+  options.approach = FitApproach::kPlain;
   const FitResult direct = Fit(options, &close, {});
   EXPECT_NEAR(direct.estimate[0], fit.estimate[0], 1e-9 * 9.81);
 }

@@ -95,7 +95,7 @@ TEST_F(FitJsonTest, BadInputsAreOneLine) {
       {With("step", "1"),
        ": /step: unknown key, expected one of scene, observations, points, sensors, cameras, "
        "clocks, parameters, "
-       "derivatives, loss, segments, starts, seed, got \"step\""},
+       "derivatives, loss, approach, segments, starts, seed, got \"step\""},
       {With("observations", "[]"),
        ": /observations: expected at least one {file, sigma}, got none"},
       {With("observations", R"([{"file": "seen.csv", "sigma": -1}])"),

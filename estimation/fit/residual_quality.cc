@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/estimation/fit/residual_quality.h"
+
+#include <limits>
+
+namespace tangible {
+namespace {
+
+// Of the reduced chi-square above 1, in its standard deviations sqrt(2 / (N - P)).
+constexpr double kChiSquareDeviations = 5.0;
+// Residuals are called correlated where chance gives this with less than that probability, and
+// where it matters: below a tenth from one sample to the next intervals change by 10 %.
+constexpr double kWhitenessProbability = 1e-4;
+constexpr double kWhitenessCorrelation = 0.1;
+
+}  // namespace
+
+ResidualQuality JudgeResiduals(const LeastSquaresProblem& problem,
+                               const std::vector<BlockEvaluation>& blocks, int num_free) {
+  ResidualQuality quality;
+  std::vector<ResidualPlace> places;
+  std::vector<double> values;
+  for (size_t b = 0; b < blocks.size(); ++b) {
+    const int block = static_cast<int>(b);
+    const std::vector<RowPlace> rows = problem.Places(block);
+    for (int i = 0; i < problem.num_observation_rows(block); ++i) {
+      values.push_back(blocks[b].residuals[i]);
+      if (i < static_cast<int>(rows.size())) {
+        places.push_back({block, rows[i].series, rows[i].time, rows[i].least});
+      }
+    }
+  }
+  const Eigen::Map<const Eigen::VectorXd> data(values.data(),
+                                               static_cast<Eigen::Index>(values.size()));
+  const double count = static_cast<double>(data.size());
+  const double freedom = count - static_cast<double>(num_free);
+  quality.residual_rms = std::sqrt(data.squaredNorm() / count);
+  quality.reduced_chi_square =
+      freedom > 0.0 ? data.squaredNorm() / freedom : std::numeric_limits<double>::quiet_NaN();
+  quality.too_large =
+      quality.reduced_chi_square > 1.0 + kChiSquareDeviations * std::sqrt(2.0 / freedom);
+  if (places.size() == values.size()) {
+    quality.whiteness = TestWhiteness(data, places);
+    quality.correlated = quality.whiteness.p_value < kWhitenessProbability &&
+                         std::abs(quality.whiteness.correlation) > kWhitenessCorrelation;
+  }
+  return quality;
+}
+
+}  // namespace tangible
