@@ -201,9 +201,12 @@ double ScaleOf(Dimension dimension, const Magnitudes& of) {
     case Dimension::kInertia:
     case Dimension::kAngularDamping:
       return of.mass * of.length * of.length;
+    case Dimension::kQuadraticDrag:
+      return of.mass / of.length;
     case Dimension::kForce:
       return of.mass * of.gravity;
     case Dimension::kTorque:
+    case Dimension::kAngularStiffness:
       return of.mass * of.gravity * of.length;
   }
   return 1.0;
@@ -274,6 +277,10 @@ const char* UnitOf(Dimension dimension) {
       return "N s/m";
     case Dimension::kAngularDamping:
       return "N m s";
+    case Dimension::kQuadraticDrag:
+      return "N s^2/m^2";
+    case Dimension::kAngularStiffness:
+      return "N m/rad";
   }
   return "1";
 }

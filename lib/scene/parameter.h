@@ -18,20 +18,22 @@ namespace tangible {
 
 /// What a number measures; its unit is UnitOf.
 enum class Dimension {
-  kNone,             ///< 1
-  kLength,           ///< m
-  kAngle,            ///< rad
-  kTime,             ///< s
-  kVelocity,         ///< m/s
-  kAngularVelocity,  ///< rad/s
-  kAcceleration,     ///< m/s²
-  kMass,             ///< kg
-  kInertia,          ///< kg m²
-  kForce,            ///< N
-  kTorque,           ///< N m
-  kStiffness,        ///< N/m
-  kLinearDamping,    ///< N s/m
-  kAngularDamping,   ///< N m s
+  kNone,              ///< 1
+  kLength,            ///< m
+  kAngle,             ///< rad
+  kTime,              ///< s
+  kVelocity,          ///< m/s
+  kAngularVelocity,   ///< rad/s
+  kAcceleration,      ///< m/s²
+  kMass,              ///< kg
+  kInertia,           ///< kg m²
+  kForce,             ///< N
+  kTorque,            ///< N m
+  kStiffness,         ///< N/m
+  kLinearDamping,     ///< N s/m
+  kAngularDamping,    ///< N m s
+  kQuadraticDrag,     ///< N s²/m²
+  kAngularStiffness,  ///< N m/rad
 };
 
 /// "m", "kg m^2" and so on; "1" for kNone.

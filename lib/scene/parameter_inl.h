@@ -62,6 +62,9 @@ class NumberList {
     if (moving) {
       Add("linear_damping", kNonNegative, Dimension::kLinearDamping, &body->linear_damping);
       Add("angular_damping", kNonNegative, Dimension::kAngularDamping, &body->angular_damping);
+      if (body->quadratic_drag) {
+        Add("quadratic_drag", kNonNegative, Dimension::kQuadraticDrag, &*body->quadratic_drag);
+      }
     }
     AddShape(&body->shape);
   }
@@ -123,6 +126,11 @@ class NumberList {
     if (joint->limits) {
       Add("limits/0", kFree, coordinate, &joint->limits->first);
       Add("limits/1", kFree, coordinate, &joint->limits->second);
+    }
+    if (joint->stiffness) {
+      Add("stiffness", kNonNegative,
+          prismatic ? Dimension::kStiffness : Dimension::kAngularStiffness, &*joint->stiffness);
+      Add(prismatic ? "rest_displacement" : "rest_angle", kFree, coordinate, &joint->rest);
     }
     if (!joint->effort_signal) {
       Add("effort", kFree, prismatic ? Dimension::kForce : Dimension::kTorque, &joint->effort);
@@ -187,6 +195,7 @@ BasicBody<T> CastBody(const BasicBody<double>& from) {
   body.restitution = T(from.restitution);
   body.linear_damping = T(from.linear_damping);
   body.angular_damping = T(from.angular_damping);
+  body.quadratic_drag = CastOptional<T>(from.quadratic_drag);
   return body;
 }
 
@@ -204,6 +213,8 @@ BasicJoint<T> CastJoint(const BasicJoint<double>& from) {
   joint.rate = T(from.rate);
   joint.damping = T(from.damping);
   if (from.limits) joint.limits = {T(from.limits->first), T(from.limits->second)};
+  joint.stiffness = CastOptional<T>(from.stiffness);
+  joint.rest = T(from.rest);
   joint.effort = T(from.effort);
   joint.effort_signal = from.effort_signal;
   joint.contact = from.contact;

@@ -44,10 +44,11 @@ struct BasicBody {
   T angle{0.0};
   Vector2<T> velocity{T(0.0), T(0.0)};
   T angular_velocity{0.0};
-  T friction{0.0};         ///< Coulomb coefficient, ≥ 0
-  T restitution{0.0};      ///< in [0, 1]
-  T linear_damping{0.0};   ///< N s/m, ≥ 0: force −c v
-  T angular_damping{0.0};  ///< N m s, ≥ 0
+  T friction{0.0};                  ///< Coulomb coefficient, ≥ 0
+  T restitution{0.0};               ///< in [0, 1]
+  T linear_damping{0.0};            ///< N s/m, ≥ 0: force −c v
+  T angular_damping{0.0};           ///< N m s, ≥ 0
+  std::optional<T> quadratic_drag;  ///< N s²/m², ≥ 0: force −c |v| v
 };
 
 enum class JointType { kRevolute, kPrismatic, kWeld, kDistance, kFixedAngle };
@@ -65,9 +66,11 @@ struct Signal {
 
 /// A joint of bodies[0] against bodies[1]; −1 is the world. Anchors are world points at time 0,
 /// before `angle` and `rate` are applied. Which fields a type has:
-///   kRevolute   anchors[0], angle, rate, damping (N m s), limits (rad), effort (N m)
+///   kRevolute   anchors[0], angle, rate, damping (N m s), limits (rad), effort (N m),
+///               stiffness (N m/rad) with rest (rad)
 ///   kPrismatic  anchors[0], axis (world at time 0, fixed in bodies[1]), angle = displacement (m),
-///               rate (m/s), damping (N s/m), limits (m), effort (N)
+///               rate (m/s), damping (N s/m), limits (m), effort (N), stiffness (N/m)
+///               with rest (m)
 ///   kWeld       anchors[0]
 ///   kDistance   anchors[0] on bodies[0], anchors[1] on bodies[1]
 ///   kFixedAngle none
@@ -82,6 +85,8 @@ struct BasicJoint {
   T rate{0.0};
   T damping{0.0};
   std::optional<std::pair<T, T>> limits;
+  std::optional<T> stiffness;  ///< of a spring along the coordinate: −k (coordinate − rest)
+  T rest{0.0};                 ///< rad or m; only with a stiffness
   T effort{0.0};
   std::optional<Signal> effort_signal;  ///< replaces effort
   bool contact = false;                 ///< whether the joined bodies collide

@@ -156,10 +156,10 @@ class SceneReader {
 };
 
 void SceneReader::ReadBody(const JsonReader& item) {
-  item.ExpectKeys(
-      {"name", "static", "kinematic", "shape", "mass", "inertia", "position", "angle", "velocity",
-       "angular_velocity", "friction", "restitution", "linear_damping", "angular_damping"},
-      " of a body");
+  item.ExpectKeys({"name", "static", "kinematic", "shape", "mass", "inertia", "position", "angle",
+                   "velocity", "angular_velocity", "friction", "restitution", "linear_damping",
+                   "angular_damping", "quadratic_drag"},
+                  " of a body");
   if (!item.ok()) return;
   BasicBody<double> body;
   body.name = ReadName(item);
@@ -188,6 +188,9 @@ void SceneReader::ReadBody(const JsonReader& item) {
   ReadNumber(item, "restitution", NumberKind::kFraction, &body.restitution);
   ReadNumber(item, "linear_damping", NumberKind::kNonNegative, &body.linear_damping);
   ReadNumber(item, "angular_damping", NumberKind::kNonNegative, &body.angular_damping);
+  if (item.Has("quadratic_drag")) {
+    body.quadratic_drag = item.At("quadratic_drag").Number(NumberKind::kNonNegative);
+  }
   body_index_[body.name] = static_cast<int>(scene_->bodies.size());
   scene_->bodies.push_back(std::move(body));
 }
@@ -222,7 +225,8 @@ void SceneReader::ReadJoint(const JsonReader& item) {
   if (!distance && joint.type != JointType::kFixedAngle) keys.emplace_back("anchor");
   if (prismatic) keys.emplace_back("axis");
   if (revolute || prismatic) {
-    keys.insert(keys.end(), {displacement, "rate", "damping", "limits", "effort"});
+    keys.insert(keys.end(), {displacement, "rate", "damping", "limits", "effort", "stiffness",
+                             prismatic ? "rest_displacement" : "rest_angle"});
   }
   item.ExpectKeys(keys, " of a " + NameOf(joint.type, kJointTypeNames) + " joint");
   if (!item.ok()) return;
@@ -257,6 +261,14 @@ void SceneReader::ReadMotor(const JsonReader& item, const char* displacement,
       limits.Fail("expected [low, high] with low <= high, got [" + Json(low).dump() + ", " +
                   Json(high).dump() + "]");
     }
+  }
+  const bool prismatic = joint->type == JointType::kPrismatic;
+  const char* const rest = prismatic ? "rest_displacement" : "rest_angle";
+  if (item.Has("stiffness")) {
+    joint->stiffness = item.At("stiffness").Number(NumberKind::kNonNegative);
+    ReadNumber(item, rest, NumberKind::kFree, &joint->rest);
+  } else if (item.Has(rest)) {
+    item.At("stiffness").Fail(std::string("missing, expected a number >= 0 with ") + rest);
   }
   if (!item.Has("effort")) return;
   const JsonReader effort = item.At("effort");

@@ -68,6 +68,7 @@ OrderedJson BodyJson(const BasicBody<double>& body) {
   json["restitution"] = body.restitution;
   json["linear_damping"] = body.linear_damping;
   json["angular_damping"] = body.angular_damping;
+  if (body.quadratic_drag) json["quadratic_drag"] = *body.quadratic_drag;
   return json;
 }
 
@@ -121,6 +122,10 @@ class SceneWriter {
       json["damping"] = joint.damping;
       if (joint.limits) {
         json["limits"] = OrderedJson::array({joint.limits->first, joint.limits->second});
+      }
+      if (joint.stiffness) {
+        json["stiffness"] = *joint.stiffness;
+        json[prismatic ? "rest_displacement" : "rest_angle"] = joint.rest;
       }
       json["effort"] =
           joint.effort_signal ? SignalJson(*joint.effort_signal) : OrderedJson(joint.effort);

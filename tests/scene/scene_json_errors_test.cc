@@ -70,7 +70,7 @@ TEST(BadSceneTest, Bodies) {
       {"/bodies/3/masss", "1",
        "/bodies/3/masss: unknown key of a body, expected one of name, static, kinematic, shape, "
        "mass, inertia, position, angle, velocity, angular_velocity, friction, restitution, "
-       "linear_damping, angular_damping, got \"masss\""},
+       "linear_damping, angular_damping, quadratic_drag, got \"masss\""},
       {"/bodies/0/mass", "-1", "/bodies/0/mass: expected a number > 0, got -1"},
       {"/bodies/0/mass", "0", "/bodies/0/mass: expected a number > 0, got 0"},
       {"/bodies/0/mass", "\"1\"", "/bodies/0/mass: expected a number > 0, got \"1\""},
@@ -91,6 +91,11 @@ TEST(BadSceneTest, Bodies) {
        "/bodies/0/restitution: expected a number in [0, 1], got -0.5"},
       {"/bodies/0/linear_damping", "-1",
        "/bodies/0/linear_damping: expected a number >= 0, got -1"},
+      {"/bodies/0/quadratic_drag", "-1",
+       "/bodies/0/quadratic_drag: expected a number >= 0, got -1"},
+      {"/joints/0/stiffness", "-2", "/joints/0/stiffness: expected a number >= 0, got -2"},
+      {"/joints/0/rest_angle", "0.1",
+       "/joints/0/stiffness: missing, expected a number >= 0 with rest_angle"},
       {"/bodies/0/angular_damping", "-1",
        "/bodies/0/angular_damping: expected a number >= 0, got -1"},
       {"/bodies/3/static", "1", "/bodies/3/static: expected true or false, got 1"},
@@ -189,10 +194,12 @@ TEST(BadSceneTest, Joints) {
        "/joints/0/type: missing, expected one of revolute, prismatic, weld, distance, fixed_angle"},
       {"/joints/0/displacement", "0",
        "/joints/0/displacement: unknown key of a revolute joint, expected one of name, type, "
-       "bodies, contact, anchor, angle, rate, damping, limits, effort, got \"displacement\""},
+       "bodies, contact, anchor, angle, rate, damping, limits, effort, stiffness, rest_angle, got "
+       "\"displacement\""},
       {"/joints/1/angle", "0",
        "/joints/1/angle: unknown key of a prismatic joint, expected one of name, type, bodies, "
-       "contact, anchor, axis, displacement, rate, damping, limits, effort, got \"angle\""},
+       "contact, anchor, axis, displacement, rate, damping, limits, effort, stiffness, "
+       "rest_displacement, got \"angle\""},
       {"/joints/2/damping", "0",
        "/joints/2/damping: unknown key of a weld joint, expected one of name, type, bodies, "
        "contact, anchor, got \"damping\""},

@@ -61,6 +61,7 @@ void CoverForces(const Scene& scene, Coverage* coverage) {
     cover(joint.effort != 0.0, "effort");
     cover(joint.effort_signal.has_value(), "effort from a series");
     cover(joint.damping > 0.0, "damping of a joint");
+    cover(joint.stiffness.has_value(), "spring of a joint");
   }
   cover(!scene.springs.empty(), "spring");
   cover(scene.gravity.isZero(), "no gravity");
@@ -78,6 +79,9 @@ Coverage CoverageOf(const Scene& scene, const RunTrace& run) {
     }
     if (body.linear_damping > 0.0 || body.angular_damping > 0.0) {
       coverage["damping of a body"] = 1;
+    }
+    if (body.quadratic_drag) {
+      coverage["drag of a body"] = 1;
     }
   }
   coverage["bodies " + std::to_string(moving)] = 1;
@@ -149,6 +153,8 @@ std::vector<std::string> ExpectedCoverage() {
                            "effort from a series",
                            "damping of a joint",
                            "damping of a body",
+                           "spring of a joint",
+                           "drag of a body",
                            "spring",
                            "no gravity",
                            "coefficients of a pair",

@@ -114,6 +114,12 @@ class TermsOfStep {
             s_.ParameterVariable(i < 2 ? index.linear_damping : index.angular_damping);
         t_.rows.row(3 * k + i) +=
             sum * (w_dot.row(mass).cwiseAbs() + t_.record.h * w_dot.row(damping).cwiseAbs());
+        if (i < 2 && index.quadratic_drag >= 0) {
+          const double* before = &t_.record.before.twist[3 * body];
+          const int drag = s_.ParameterVariable(index.quadratic_drag);
+          t_.rows.row(3 * k + i) +=
+              t_.record.h * sum * std::hypot(before[0], before[1]) * w_dot.row(drag).cwiseAbs();
+        }
       }
     }
   }

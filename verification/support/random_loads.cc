@@ -138,4 +138,24 @@ void SceneMaker::Rarities() {
   }
 }
 
+void SceneMaker::Mechanisms() {
+  if (seed_ % 4 != 0) {
+    return;
+  }
+  RandomNumbers random(0x6d656368ULL + 0x9e3779b97f4a7c15ULL * seed_);
+  for (BasicBody<double>& body : scene_.bodies) {
+    if (body.motion == Motion::kMoving && random.Chance(0.4)) {
+      body.quadratic_drag = random.Chance(0.1) ? 0.0 : random.Uniform(0.05, 1.0);
+    }
+  }
+  for (BasicJoint<double>& joint : scene_.joints) {
+    const bool has_coordinate =
+        joint.type == JointType::kRevolute || joint.type == JointType::kPrismatic;
+    if (has_coordinate && random.Chance(0.4)) {
+      joint.stiffness = random.Uniform(0.5, 20.0);
+      joint.rest = random.Uniform(-0.2, 0.2);
+    }
+  }
+}
+
 }  // namespace tangible::internal

@@ -41,7 +41,7 @@ double HalfHeight(const BasicShape<double>& shape) {
 }  // namespace
 
 SceneMaker::SceneMaker(unsigned seed, const RandomSceneOptions& options)
-    : random_(0x7a6e67ULL + 0x9e3779b97f4a7c15ULL * seed), options_(options) {
+    : random_(0x7a6e67ULL + 0x9e3779b97f4a7c15ULL * seed), options_(options), seed_(seed) {
   scene_.name = "random " + std::to_string(seed);
 }
 
@@ -77,6 +77,7 @@ Scene SceneMaker::Make() {
       scene_.simulation.impact_law = ImpactLaw::kPoisson;
     }
   }
+  Mechanisms();
   return scene_;
 }
 

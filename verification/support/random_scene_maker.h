@@ -61,9 +61,13 @@ class SceneMaker {
   /// What few scenes have: torques and efforts that follow a series, narrow limits of a prismatic
   /// joint, no gravity.
   void Rarities();
+  /// Drag and joint springs, in every fourth scene. They have random numbers of their own, so that
+  /// a seed is otherwise the scene that it would be without them.
+  void Mechanisms();
 
   RandomNumbers random_;
   const RandomSceneOptions options_;
+  const unsigned seed_;
   Scene scene_;
   bool level_ = true;
   bool bounces_ = false;

@@ -90,6 +90,7 @@ class ProblemBuilder {
     p_.joints.reserve(s_.joints.size());
     for (size_t j = 0; j < s_.joints.size(); ++j) {
       equations_.Joint(static_cast<int>(j));
+      equations_.JointSpring(static_cast<int>(j));
     }
   }
 

@@ -49,14 +49,14 @@ class Equations {
     T diagonal[3] = {mass, mass, inertia};
     T load[3] = {T(0.0), T(0.0), T(0.0)};
     if constexpr (kLevel == Level::kVelocity) {
-      const T linear = b_.Number(index.linear_damping);
+      const T linear = LinearDamping(index, twist);
       diagonal[0] = diagonal[1] = mass + at_.h * linear;
       diagonal[2] = inertia + at_.h * b_.Number(index.angular_damping);
       load[0] = mass * (twist[0] + at_.h * b_.Number(kGravityX));
       load[1] = mass * (twist[1] + at_.h * b_.Number(kGravityY));
       load[2] = inertia * twist[2];
     } else if constexpr (kLevel == Level::kAcceleration) {
-      const T linear = b_.Number(index.linear_damping);
+      const T linear = LinearDamping(index, twist);
       load[0] = mass * b_.Number(kGravityX) - linear * twist[0];
       load[1] = mass * b_.Number(kGravityY) - linear * twist[1];
       load[2] = -b_.Number(index.angular_damping) * twist[2];
@@ -111,6 +111,24 @@ class Equations {
     }
     b_.Joint(j, rows, rhs);
     Drive(joint, rows.coordinate_a, rows.coordinate_b);
+  }
+
+  /// The spring along a joint's coordinate. An element of its own: with the joint's it would read
+  /// more variables than a local Jet has.
+  void JointSpring(int j) {
+    const JointIndex& joint = s_.joints[j];
+    if (kLevel == Level::kCorrection || joint.stiffness < 0 || Weight() == 0.0) {
+      return;
+    }
+    b_.Begin();
+    JointRows<T> rows;
+    T buffer[7];
+    EvaluateJoint<T>(joint.type, b_.PoseOf(joint.a), b_.PoseOf(joint.b),
+                     b_.Numbers(joint.geometry, joint.num_geometry, buffer), &rows);
+    T spring[2];
+    const T* k = b_.Numbers(joint.stiffness, 2, spring);
+    b_.Push(joint.a, rows.coordinate_a, joint.b, rows.coordinate_b,
+            T(-Weight() * k[0] * (rows.coordinate - k[1])));
   }
 
   /// Effort and damping along a joint's coordinate.
@@ -181,6 +199,19 @@ class Equations {
   }
 
  private:
+  /// c of the force −c v: the linear damping, and of quadratic drag c |v| at the speed before. The
+  /// speed of a body at rest has no derivative; that of |v| v there is 0.
+  T LinearDamping(const BodyIndex& index, const T* twist) {
+    using std::sqrt;
+    const T linear = b_.Number(index.linear_damping);
+    if (index.quadratic_drag < 0) {
+      return linear;
+    }
+    const T square = twist[0] * twist[0] + twist[1] * twist[1];
+    const T drag = b_.Number(index.quadratic_drag);
+    return ValueOf(square) > 0.0 ? linear + drag * sqrt(square) : linear;
+  }
+
   void EvaluateRows(const JointIndex& joint, JointRows<T>* rows, JointRates<T>* rates) {
     T buffer[7];
     if constexpr (kLevel == Level::kAcceleration) {

@@ -48,7 +48,7 @@ class EntryBuilder : private internal::LocalEntries<Sink> {
 
   void Visit() {
     for (int k = 0; k < s_.num_blocks(); ++k) {
-      if (by_hand_) {
+      if (by_hand_ && s_.bodies[s_.moving[k]].quadratic_drag < 0) {
         BodyByHand(k);
       } else {
         equations_.Body(k);
@@ -68,6 +68,7 @@ class EntryBuilder : private internal::LocalEntries<Sink> {
       } else {
         equations_.Joint(j);
       }
+      equations_.JointSpring(j);
     }
     for (size_t i = 0; i < solved_.contacts->size(); ++i) {
       const ActiveContact& contact = (*solved_.contacts)[i];

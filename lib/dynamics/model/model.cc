@@ -74,6 +74,7 @@ void AddBodies(const BasicScene<T>& scene, Places* places, ModelStructure* struc
       index.inertia = places->Take(1);
       index.linear_damping = places->Take(1);
       index.angular_damping = places->Take(1);
+      index.quadratic_drag = body.quadratic_drag ? places->Take(1) : -1;
     }
     structure->bodies.push_back(index);
   }
@@ -101,6 +102,7 @@ void AddJoints(const BasicScene<T>& scene, Places* places, ModelStructure* struc
         index.low = places->Take(1);
         index.high = places->Take(1);
       }
+      index.stiffness = joint.stiffness ? places->Take(2) : -1;
     }
     if (joint.effort_signal) {
       index.effort_signal = static_cast<int>(structure->signals.size());
@@ -189,6 +191,9 @@ void FillBodies(const BasicScene<T>& scene, std::vector<T>* numbers) {
                                       : UniformInertia(ViewOf(body.shape), body.mass));
       numbers->push_back(body.linear_damping);
       numbers->push_back(body.angular_damping);
+      if (body.quadratic_drag) {
+        numbers->push_back(*body.quadratic_drag);
+      }
     }
   }
 }
@@ -227,6 +232,10 @@ void FillJoints(const BasicScene<T>& scene, const State<T>& drawn, int world,
       if (joint.limits) {
         numbers->push_back(joint.limits->first);
         numbers->push_back(joint.limits->second);
+      }
+      if (joint.stiffness) {
+        numbers->push_back(*joint.stiffness);
+        numbers->push_back(joint.rest);
       }
     }
   }

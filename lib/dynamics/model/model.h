@@ -27,6 +27,7 @@ struct BodyIndex {
   Motion motion = Motion::kStatic;
   int block = -1;  ///< among the moving bodies: its three unknowns in a step; −1: not moving
   int mass = -1, inertia = -1, linear_damping = -1, angular_damping = -1;
+  int quadratic_drag = -1;  ///< −1: none
   int friction = -1, restitution = -1;
   ShapeType shape = ShapeType::kNone;
   int shape_numbers = -1;
@@ -47,7 +48,8 @@ struct JointIndex {
   int geometry = -1;
   int num_geometry = 0;
   int damping = -1, effort = -1, low = -1, high = -1;  ///< −1: none of this type, or no limits
-  int effort_signal = -1;                              ///< into signals; replaces effort
+  int stiffness = -1;      ///< then the coordinate at rest; −1: no spring
+  int effort_signal = -1;  ///< into signals; replaces effort
 };
 
 /// Local anchors (2 + 2), stiffness, damping, rest length: seven parameters from `numbers` on.

@@ -57,6 +57,15 @@ double PotentialEnergy(const Model<double>& model, const State<double>& state) {
                    &model.parameters[spring.numbers], &row);
     energy += 0.5 * row.tension * (row.length - model.parameters[spring.numbers + 6]);
   }
+  for (const JointIndex& joint : s.joints) {
+    if (joint.stiffness >= 0) {
+      JointRows<double> rows;
+      EvaluateJoint(joint.type, state.PoseOf(joint.a), state.PoseOf(joint.b),
+                    &model.parameters[joint.geometry], &rows);
+      const double stretch = rows.coordinate - model.parameters[joint.stiffness + 1];
+      energy += 0.5 * model.parameters[joint.stiffness] * stretch * stretch;
+    }
+  }
   return energy;
 }
 

@@ -4,7 +4,7 @@
 // What a motion should keep: energy, momentum, gaps, groups of bodies.
 //
 //   kinetic     T = Σ ½ m (vx² + vy²) + ½ I ω²
-//   potential   U = −Σ m g·x + Σ_springs ½ k (ℓ − L0)²
+//   potential   U = −Σ m g·x + Σ_springs ½ k (ℓ − L0)² + Σ_joints ½ k (coordinate − rest)²
 //   momentum    (Σ m vx, Σ m vy, Σ m (x vy − y vx) + I ω), angular about the world's origin
 //
 // Sums over the bodies that move by forces. Joint drift is JointDrift of joint_projection.h.

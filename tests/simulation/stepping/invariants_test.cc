@@ -40,6 +40,18 @@ TEST(Energy, CountsTranslationRotationGravityAndSprings) {
   EXPECT_NEAR(PotentialEnergy(built.model, built.state), 74.0 + 31.5, 105.5 * kRounding);
 }
 
+TEST(Energy, CountsSpringsOfJoints) {
+  const Built built = Build(R"({"gravity": [0, 0], "bodies": [
+      {"name": "a", "mass": 2, "inertia": 0.5, "position": [0, -1]},
+      {"name": "b", "mass": 1, "inertia": 0.1, "position": [5, 0]}],
+    "joints": [{"name": "hinge", "type": "revolute", "bodies": ["a", "world"], "anchor": [0, 0],
+                "angle": 0.3, "stiffness": 8, "rest_angle": -0.1},
+               {"name": "rail", "type": "prismatic", "bodies": ["b", "world"], "anchor": [5, 0],
+                "axis": [1, 0], "displacement": 0.5, "stiffness": 20}]})");
+  EXPECT_NEAR(PotentialEnergy(built.model, built.state), 0.5 * 8.0 * 0.16 + 0.5 * 20.0 * 0.25,
+              10.0 * kRounding);
+}
+
 TEST(Momentum, IsAboutTheOrigin) {
   const Built built = Build(R"({"bodies": [
       {"name": "a", "mass": 2, "inertia": 0.5, "position": [3, 4], "velocity": [1, -2],
