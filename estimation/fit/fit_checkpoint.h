@@ -7,10 +7,11 @@
 //   {"problem": hash, "fits": [the fit, the fit at dt / 2]}
 //
 // Of each fit it keeps the starts that are finished (how they ended, and all of the best one), the
-// point at which windows or multiple shooting arrived, and the evaluations (evaluation_log.h) of the
-// part of a start under way: those of the search for the first point, then costs and the factors of
-// the blocks (linearisation.h), whose size does not grow with the number of observations, up to
-// EvaluationLog::kMaxNumbers. CBOR holds doubles as they are. A checkpoint whose content is
+// point at which windows or multiple shooting arrived, and the evaluations (evaluation_log.h) of
+// the part of a start under way: those of the search for the first point, then costs and the
+// factors of the blocks (linearisation.h), whose size does not grow with the number of
+// observations, up to EvaluationLog::kMaxNumbers. CBOR holds doubles as they are. A checkpoint
+// whose content is
 // damaged, or that belongs to another problem (scene, parameters, observations, options), is
 // refused.
 

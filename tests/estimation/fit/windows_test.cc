@@ -11,7 +11,7 @@
 namespace tangible {
 namespace {
 
-/// A pendulum over five periods, of which the plain fit loses count from a gravity that is too small.
+/// A pendulum over five periods, of which the plain fit loses count from too small a gravity.
 struct PendulumFit {
   Scene scene = MakeScene(kPendulum);
   std::vector<FitParameter> parameters = {Parameter("gravity/y", -2.5),
