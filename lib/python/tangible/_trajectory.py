@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import html
+import importlib
 import json
 import os
 from collections.abc import Mapping
@@ -130,9 +131,21 @@ class Trajectory:
         page: str = _core.simulate(self.scene.core, 1, False, True)["html"]
         return page
 
-    def show(self, file: str | os.PathLike[str]) -> None:
-        """Writes the animated view to a file, to be opened in a browser."""
-        Path(file).write_text(self.html(), encoding="utf-8")
+    def show(self, file: str | os.PathLike[str] | None = None) -> None:
+        """Plays the animated view in a notebook, or writes it to a file for a browser.
+
+        Without a file and outside a notebook it raises `RuntimeError`.
+        """
+        if file is not None:
+            Path(file).write_text(self.html(), encoding="utf-8")
+            return
+        try:
+            ipython = importlib.import_module("IPython")
+        except ImportError:
+            ipython = None
+        if ipython is None or ipython.get_ipython() is None:
+            raise RuntimeError("show() plays in a notebook; expected a file outside of one, got none")
+        ipython.display.display(self)
 
     def _repr_html_(self) -> str:
         """What a notebook shows: the animated view in a frame of its own."""
