@@ -45,6 +45,11 @@ class Track {
   void Put(int first, int end, double* state) const {
     std::tie(state[0], state[2]) = Line(x_, first, end);
     std::tie(state[1], state[3]) = Line(y_, first, end);
+    if (end - first < 2 || std::hypot(state[2], state[3]) > kRests) return;
+    for (int c = 0; c < 2; ++c) {
+      state[c] -= 0.5 * (end - first) * state[2 + c];
+      state[2 + c] = 0.0;
+    }
   }
   /// Something was met between the last two frames, and nothing just before.
   bool MetAtEnd() const {

@@ -146,12 +146,14 @@ function(tangible_module_group name)
   install(TARGETS tangible_${name} EXPORT tangible_targets)
 endfunction()
 
-# tangible_program(<name> SOURCES file... LINK target...): an installed program.
+# tangible_program(<name> [NO_PRECOMPILE] SOURCES file... LINK target...): an installed program.
 function(tangible_program name)
-  cmake_parse_arguments(PROGRAM "" "" "SOURCES;LINK" ${ARGN})
+  cmake_parse_arguments(PROGRAM "NO_PRECOMPILE" "" "SOURCES;LINK" ${ARGN})
   add_executable(${name} ${PROGRAM_SOURCES})
   target_link_libraries(${name} PRIVATE tangible_flags ${PROGRAM_LINK})
-  tangible_precompile(${name})
+  if(NOT PROGRAM_NO_PRECOMPILE)
+    tangible_precompile(${name})
+  endif()
   # Those of verification come with the tests that run them; under the sanitizers others are not built.
   set(optional)
   if(NOT CMAKE_CURRENT_SOURCE_DIR MATCHES "/verification/")

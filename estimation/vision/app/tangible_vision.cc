@@ -1,0 +1,303 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// tangible-vision: pictures of discs, and models that predict them.
+#include <ATen/Parallel.h>
+#include <gflags/gflags.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+#include <iterator>
+#include <map>
+#include <mutex>
+#include <thread>
+
+#include "tangible/app/program.h"
+#include "tangible/estimation/vision/png.h"
+#include "tangible/estimation/vision/report.h"
+#include "tangible/estimation/vision/study.h"
+#include "tangible/scene/json_writer.h"
+
+DEFINE_bool(quick, false,
+            "a tiny training with its checks: the loss falls, gradients are right, a "
+            "checkpoint resumes to the same bits");
+DEFINE_bool(all, false, "train and measure every cell of the tables");
+DEFINE_string(cells, "",
+              "train and measure these cells: names or beginnings of names, with commas");
+DEFINE_bool(list, false, "print the names of all cells");
+DEFINE_string(folder, "out/vision",
+              "of checkpoints and results of cells, which are not made again");
+DEFINE_int32(jobs, 1, "cells that are trained at once, on one thread each");
+DEFINE_int32(seed, 0, "of the data");
+DEFINE_string(make, "", "make a data set: billiards or simb (with --out, --sequences, --frames)");
+DEFINE_int32(sequences, 100, "of --make");
+DEFINE_int32(frames, 100, "of --make: frames of a sequence");
+DEFINE_string(check, "", "read a data set and say what it holds");
+DEFINE_string(out, "", "JSON of all cells, or the data set of --make");
+DEFINE_string(picture, "", "SVG: error against frames ahead");
+DEFINE_string(labels_picture, "", "SVG: error against the share of labels");
+DEFINE_string(strips, "", "PNG: rows of true and predicted pictures");
+DEFINE_string(page, "", "HTML: true and predicted pictures, animated");
+
+namespace tangible {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string ReadBytes(const std::string& path) {
+  std::ifstream stream(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+// Iterations done of all cells, and the time that is left, in place on a terminal.
+class Watch {
+ public:
+  explicit Watch(long total) : total_(total), terminal_(isatty(STDERR_FILENO) != 0) {}
+  ~Watch() {
+    if (terminal_) std::fputs("\r\033[K", stderr);
+  }
+  Watch(const Watch&) = delete;
+  Watch& operator=(const Watch&) = delete;
+  /// `resumed`: iterations that were not done now.
+  void Skip(long resumed) { skipped_ += resumed; }
+  void Add() {
+    const long done = ++done_;
+    if (!terminal_ || done % 10 != 0) return;
+    const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - start_;
+    const double left =
+        spent.count() / static_cast<double>(done) * static_cast<double>(total_ - skipped_ - done);
+    std::fprintf(stderr, "\r%ld of %ld iterations, %.0f s left ", done + skipped_.load(), total_,
+                 left);
+  }
+
+ private:
+  long total_;
+  bool terminal_;
+  std::atomic<long> done_{0}, skipped_{0};
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
+
+// Trains the cells that are not there yet, and reads the others.
+class Study {
+ public:
+  explicit Study(std::vector<StudyCell> cells) : cells_(std::move(cells)) {}
+
+  std::string Run() {
+    std::error_code failed;
+    fs::create_directories(FLAGS_folder, failed);
+    if (failed) return FLAGS_folder + ": expected a folder that can be made: " + failed.message();
+    long total = 0;
+    for (const StudyCell& cell : cells_) {
+      if (!fs::exists(File(cell, ".json"))) total += cell.training.iterations;
+    }
+    Watch watch(total);
+    std::atomic<size_t> next{0};
+    const auto work = [&] {
+      at::set_num_threads(1);
+      for (size_t k = next++; k < cells_.size() && error_.empty(); k = next++) {
+        const std::string error = Make(cells_[k], &watch);
+        const std::lock_guard<std::mutex> lock(mutex_);
+        if (error_.empty()) error_ = error;
+      }
+    };
+    {
+      std::vector<std::jthread> others;
+      for (int k = 1; k < FLAGS_jobs; ++k) others.emplace_back(work);
+      work();
+    }
+    return error_;
+  }
+
+  std::vector<OrderedJson> Results() const {
+    std::vector<OrderedJson> results;
+    for (const StudyCell& cell : cells_) {
+      results.push_back(OrderedJson::parse(ReadBytes(File(cell, ".json")), nullptr, false));
+    }
+    return results;
+  }
+  std::string File(const StudyCell& cell, const char* ending) const {
+    return FLAGS_folder + "/" + cell.name + ending;
+  }
+  const std::vector<StudyCell>& cells() const { return cells_; }
+
+ private:
+  const StudyData& Data(DiscKind kind) {
+    const std::lock_guard<std::mutex> lock(data_mutex_);
+    const auto found = data_.find(kind);
+    if (found != data_.end()) return found->second;
+    return data_[kind] = MakeStudyData(kind, static_cast<std::uint64_t>(FLAGS_seed));
+  }
+
+  std::string Make(const StudyCell& cell, Watch* watch) {
+    const std::string done = File(cell, ".json"), checkpoint = File(cell, ".checkpoint");
+    if (fs::exists(done)) return "";
+    CellHooks hooks;
+    std::string error, saving;
+    hooks.checkpoint = ReadBytes(checkpoint);
+    hooks.progress = [&, first = true](long iteration) mutable {
+      if (first) watch->Skip(iteration - 1);
+      first = false;
+      watch->Add();
+    };
+    hooks.save = [&](long, const std::string& bytes) {
+      const std::string failed = WriteFileAtomically(checkpoint, bytes, Over::kOwnInput);
+      if (saving.empty()) saving = failed;
+    };
+    const CellResult result = RunCell(cell, Data(cell.kind), hooks, &error);
+    if (!error.empty()) return error;
+    if (!saving.empty()) return saving;
+    if (!result.truth.empty()) {
+      // Kept beside the result: planes of all pictures, true ones first.
+      std::string pictures;
+      for (const auto& picture : result.truth) pictures += picture;
+      for (const auto& picture : result.predicted) pictures += picture;
+      const std::string failed = WriteFileAtomically(File(cell, ".pictures"), pictures);
+      if (!failed.empty()) return failed;
+    }
+    return WriteFileAtomically(done, JsonText(result.json));
+  }
+
+  std::vector<StudyCell> cells_;
+  std::map<DiscKind, StudyData> data_;
+  std::mutex mutex_, data_mutex_;
+  std::string error_;
+};
+
+// Rows of the first cells with pictures: the truth once, then each cell's.
+std::vector<std::vector<std::string>> PictureRowsOf(const Study& study) {
+  std::vector<std::vector<std::string>> rows;
+  for (const StudyCell& cell : study.cells()) {
+    const std::string bytes = ReadBytes(study.File(cell, ".pictures"));
+    const size_t count = bytes.size() / kPictureBytes / 2;
+    if (count == 0) continue;
+    for (const size_t first : {size_t{0}, count}) {
+      if (first == 0 && !rows.empty()) continue;
+      std::vector<std::string>& row = rows.emplace_back();
+      for (size_t k = first; k < first + count; ++k) {
+        row.push_back(bytes.substr(k * kPictureBytes, kPictureBytes));
+      }
+    }
+  }
+  return rows;
+}
+
+int RunStudy() {
+  std::vector<StudyCell> cells;
+  const std::vector<std::string> wanted = SplitAtCommas(FLAGS_cells);
+  for (const StudyCell& cell : StudyCells()) {
+    const bool named = std::any_of(wanted.begin(), wanted.end(), [&](const std::string& start) {
+      return !start.empty() && cell.name.rfind(start, 0) == 0;
+    });
+    if (FLAGS_all || named) cells.push_back(cell);
+  }
+  if (cells.empty()) {
+    return ReportError("--cells: expected names of cells (--list), got " + FLAGS_cells, kExitUsage);
+  }
+  Study study(std::move(cells));
+  std::string error = study.Run();
+  if (!error.empty()) return ReportError(error);
+  std::vector<OrderedJson> results = study.Results();
+  for (size_t k = 0; k < results.size(); ++k) {
+    if (!results[k].is_object() || !results[k].contains("cell")) {
+      return ReportError(study.File(study.cells()[k], ".json") +
+                         ": expected a cell's result, got something else: remove it");
+    }
+  }
+  results.push_back(TimePhysics());
+  std::cout << StudyTables(results);
+  const OrderedJson timing = results.back();
+  results.pop_back();
+  const std::vector<std::vector<std::string>> rows = PictureRowsOf(study);
+  ResultWriter writer;
+  writer.Write(FLAGS_out, [&] {
+    return JsonText({{"cells", OrderedJson(results)}, {"timing", timing}});
+  });
+  writer.Write(FLAGS_picture, [&] { return ErrorByFrameSvg(results); });
+  writer.Write(FLAGS_labels_picture, [&] { return ErrorByLabelsSvg(results); });
+  if (rows.size() > 1) {
+    writer.Write(FLAGS_strips, [&] { return PngStrip(rows, kPictureSize, 1); });
+    writer.Write(FLAGS_page, [&] {
+      return PredictionPage("Billiards, three frames seen and ten predicted", rows[0], rows[1],
+                            ErrorByFrameSvg(results) + ErrorByLabelsSvg(results));
+    });
+  }
+  return writer.error().empty() ? kExitDone : ReportError(writer.error());
+}
+
+int MakeData() {
+  if (FLAGS_make != "billiards" && FLAGS_make != "simb") {
+    return ReportError("--make: expected billiards or simb, got " + FLAGS_make, kExitUsage);
+  }
+  if (FLAGS_out.empty()) return ReportError("--make: expected --out=FILE too", kExitUsage);
+  if (FLAGS_sequences < 1 || FLAGS_frames < 1) {
+    return ReportError("--sequences and --frames: expected numbers >= 1", kExitUsage);
+  }
+  const DiscData data =
+      MakeDiscData({.kind = FLAGS_make == "simb" ? DiscKind::kSimb : DiscKind::kBilliards,
+                    .sequences = FLAGS_sequences,
+                    .frames = FLAGS_frames,
+                    .seed = static_cast<std::uint64_t>(FLAGS_seed)});
+  const std::string error = WriteFileAtomically(FLAGS_out, SerializeDiscData(data));
+  return error.empty() ? kExitDone : ReportError(error);
+}
+
+int CheckData() {
+  DiscData data;
+  std::string error;
+  if (!LoadDiscData(FLAGS_check, &data, &error)) return ReportError(error);
+  std::printf("%s: %s, seed %llu, %d sequences of %d frames, %d discs\n", FLAGS_check.c_str(),
+              NameOf(data.kind), static_cast<unsigned long long>(data.seed), data.num_sequences(),
+              data.frames, data.world.size());
+  return kExitDone;
+}
+
+int Main(int argc, char** argv) {
+  const CommandLine line = ParseCommandLine(
+      argc, argv,
+      {.name = "tangible-vision",
+       .synopsis = "--quick | --all | --cells=NAMES | --list | --make=KIND --out=D | --check=D",
+       .description =
+           "Predicts pictures of moving discs: an encoder, the engine, a decoder, trained with few "
+           "labels, and\nwhat stands in the engine's place for comparison. --cells and --all go on "
+           "where they were interrupted.",
+       .version = TANGIBLE_VERSION,
+       .source_file = __FILE__,
+       .num_positional = 0,
+       .outputs = {"out", "picture", "labels_picture", "strips", "page"},
+       .inputs = {"check"}});
+  if (line.exit_status) return *line.exit_status;
+  const int modes = (FLAGS_quick ? 1 : 0) + (FLAGS_all ? 1 : 0) + (FLAGS_list ? 1 : 0) +
+                    (FLAGS_cells.empty() ? 0 : 1) + (FLAGS_make.empty() ? 0 : 1) +
+                    (FLAGS_check.empty() ? 0 : 1);
+  if (modes != 1) {
+    return ReportError(
+        "tangible-vision: expected one of --quick, --all, --cells, --list, --make and --check",
+        kExitUsage);
+  }
+  if (FLAGS_jobs < 1 || FLAGS_seed < 0) {
+    return ReportError("tangible-vision: expected --jobs >= 1 and --seed >= 0", kExitUsage);
+  }
+  // Torch's own threads spin where others work.
+  at::set_num_threads(1);
+  if (FLAGS_list) {
+    for (const StudyCell& cell : StudyCells()) std::puts(cell.name.c_str());
+    return kExitDone;
+  }
+  if (!FLAGS_make.empty()) return MakeData();
+  if (!FLAGS_check.empty()) return CheckData();
+  if (!FLAGS_quick) return RunStudy();
+  std::string lines;
+  const bool good = QuickCheck(&lines);
+  std::cout << lines;
+  return good ? kExitDone : kExitFailed;
+}
+
+}  // namespace
+}  // namespace tangible
+
+int main(int argc, char** argv) { return tangible::RunMain(&tangible::Main, argc, argv); }

@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// Encoder, dynamics and decoder: from a few pictures of discs to their states, to states ahead, and
+// back to pictures. Sizes: B rows of a batch, K frames seen, F frames ahead, n discs; positions are
+// in pixels, velocities in pixels a frame.
+//
+// The encoder's two convolutions give each pixel a weight w ≥ 0 for each disc, whose position is
+// the weights' centre, Σ w r / Σ w. The velocity is the last difference of positions and a
+// correction by a network that sees all discs' positions in the window.
+//
+// The dynamics are the engine (rollout_layer.h) with its physical parameters; or in its place a
+// multilayer perceptron on all discs' states, or an interaction network (Battaglia et al. 2016),
+// in which effects of pairs, added up, and the disc's own state give its change.
+//
+// The decoder's picture is cloth + Σ share(|r − xᵢ|) (colourᵢ − cloth). The share is a network of
+// the distance to the disc's centre, and colours are learned; or all is the known renderer.
+
+#include <torch/torch.h>
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "tangible/estimation/vision/disc_world.h"
+#include "tangible/estimation/vision/rollout_layer.h"
+
+namespace tangible {
+
+class EncoderImpl : public torch::nn::Module {
+ public:
+  EncoderImpl(const DiscWorld& world, int frames);
+  /// Starts from the known colours in the place of random weights: positions without any label.
+  void StartFromColours(const DiscWorld& world);
+  /// (N, 3, 64, 64) in [0, 1] to (N, n, 2).
+  at::Tensor Positions(const at::Tensor& pictures);
+  /// Positions (B, K, n, 2) to states (B, n, 4) at the last frame.
+  at::Tensor State(const at::Tensor& positions);
+
+ private:
+  int discs_;
+  torch::nn::Conv2d first_{nullptr}, second_{nullptr};
+  torch::nn::Sequential velocity_{nullptr};
+};
+TORCH_MODULE(Encoder);
+
+enum class DecoderKind { kLearned, kRenderer };
+
+class DecoderImpl : public torch::nn::Module {
+ public:
+  DecoderImpl(const DiscWorld& world, DecoderKind kind);
+  /// (N, n, 2) to (N, 3, 64, 64).
+  at::Tensor forward(const at::Tensor& positions);
+
+ private:
+  at::Tensor Share(const at::Tensor& distance);
+  DecoderKind kind_;
+  DiscStyle style_;
+  double radius_;
+  at::Tensor cloth_, colours_;
+  torch::nn::Sequential share_{nullptr};
+};
+TORCH_MODULE(Decoder);
+
+enum class DynamicsKind { kEngine, kPerceptron, kInteraction };
+/// "engine", "mlp", "interaction".
+const char* NameOf(DynamicsKind kind);
+
+/// States ahead, and which rows the engine could run.
+struct Ahead {
+  at::Tensor states;  ///< (B, F, n, 4), without the start; 0 in rows that were not run
+  at::Tensor valid;   ///< (B), 1 or 0
+};
+
+struct DynamicsOptions {
+  DynamicsKind kind = DynamicsKind::kEngine;
+  int frames = 10;  ///< F
+  /// Of the engine: masses (the first disc's is 1), restitutions and damping are learned, from
+  /// wrong values; else they are the world's.
+  bool learns_parameters = false;
+  int threads = 1;  ///< of the engine
+};
+
+class DynamicsImpl : public torch::nn::Module {
+ public:
+  DynamicsImpl(const DiscWorld& world, const DynamicsOptions& options);
+  /// From states (B, n, 4).
+  Ahead forward(const at::Tensor& state);
+  /// Names and values of the physical parameters that are learned.
+  const std::vector<std::string>& parameter_names() const { return names_; }
+  at::Tensor PhysicalParameters() const;
+  /// After a step of the optimiser: restitutions back into [0, 1].
+  void Project();
+
+ private:
+  Ahead ByEngine(const at::Tensor& state);
+  at::Tensor OneFrame(const at::Tensor& state);
+
+  DynamicsOptions options_;
+  int discs_;
+  std::vector<std::string> names_;
+  RolloutLayer layer_;
+  at::Tensor log_masses_, restitutions_, log_damping_;
+  torch::nn::Sequential pair_{nullptr}, disc_{nullptr};
+};
+TORCH_MODULE(Dynamics);
+
+}  // namespace tangible

@@ -1,0 +1,204 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/estimation/vision/report.h"
+
+#include <cmath>
+#include <cstdio>
+#include <map>
+
+#include "tangible/estimation/vision/disc_world.h"
+#include "tangible/estimation/vision/png.h"
+#include "tangible/render/html.h"
+#include "tangible/render/plot.h"
+
+namespace tangible {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+template <typename... Values>
+std::string Line(const char* format, Values... values) {
+  char text[256];
+  std::snprintf(text, sizeof(text), format, values...);
+  return text;
+}
+
+bool IsOf(const Json& cell, const char* kind) {
+  return cell["cell"].get<std::string>().rfind(kind, 0) == 0;
+}
+
+std::string SimbTable(const std::vector<Json>& cells) {
+  std::string text;
+  const auto row = [&](const std::string& name, double seen, const Json& score) {
+    const Json& near = score["near"];
+    const Json& far = score["far"];
+    text += Line("%-26s %6.3f  %7.3f %7.3f %7.3f %7.3f  %7.2f %7.2f %7.2f %7.2f\n", name.c_str(),
+                 seen, near["mean"].get<double>(), near["lower_quartile"].get<double>(),
+                 near["median"].get<double>(), near["upper_quartile"].get<double>(),
+                 far["mean"].get<double>(), far["lower_quartile"].get<double>(),
+                 far["median"].get<double>(), far["upper_quartile"].get<double>());
+  };
+  const Json* any = nullptr;
+  for (const Json& cell : cells) {
+    if (!cell.contains("simb")) continue;
+    if (any == nullptr) {
+      text +=
+          "SimB, mean squared normalised position error x 1000; published (all labels, true "
+          "boxes): "
+          "2.55 at [0, T], 25.77 at [T, 2T]\n"
+          "cell                      seen px  [0, T]: mean quartile median quartile  [T, 2T]: mean "
+          "quartile median quartile\n";
+      any = &cell;
+    }
+    row(cell["cell"], cell["seen_error"], cell["simb"]["ours"]);
+  }
+  if (any == nullptr) return "";
+  for (const char* other : {"true state", "constant velocity", "last frame"}) {
+    row(other, NAN, (*any)["simb"][other]);
+  }
+  return text + "\n";
+}
+
+std::string BilliardTable(const std::vector<Json>& cells) {
+  std::string text;
+  const std::vector<int> frames = {1, 2, 3, 5, 7, 10};
+  const auto row = [&](const std::string& name, double seen, const Json& errors) {
+    text += Line("%-34s %6.3f ", name.c_str(), seen);
+    for (const int k : frames) text += Line(" %8.3f", errors["position"][k - 1].get<double>());
+    text += " ";
+    for (const int k : frames) text += Line(" %8.3f", 1e3 * errors["picture"][k - 1].get<double>());
+    text += "\n";
+  };
+  const Json* any = nullptr;
+  for (const Json& cell : cells) {
+    if (!IsOf(cell, "billiards") || !cell.contains("ahead")) continue;
+    if (any == nullptr) {
+      text +=
+          "Billiards: mean squared position error (pixels^2) and 1000 times the pictures', 1, 2, "
+          "3, "
+          "5, 7 and 10 frames ahead\n";
+      any = &cell;
+    }
+    row(cell["cell"], cell["seen_error"], cell["ahead"]["model"]);
+  }
+  if (any == nullptr) return "";
+  for (const char* other : {"constant velocity", "last frame", "true state"}) {
+    row(std::string(other) + " (first cell's encoder)", NAN, (*any)["ahead"][other]);
+  }
+  return text + "\n";
+}
+
+std::string ParameterTable(const std::vector<Json>& cells) {
+  std::string text;
+  for (const Json& cell : cells) {
+    if (!cell.contains("parameters")) continue;
+    if (text.empty()) text += "Physical parameters, estimate (truth)\n";
+    text += Line("%-34s", cell["cell"].get<std::string>().c_str());
+    for (const Json& parameter : cell["parameters"]) {
+      text += Line("  %s %.4f (%g)", parameter["name"].get<std::string>().c_str(),
+                   parameter["estimate"].get<double>(), parameter["truth"].get<double>());
+    }
+    text += "\n";
+  }
+  return text.empty() ? "" : text + "\n";
+}
+
+std::string Base64(const std::string& bytes) {
+  static constexpr char kLetters[] =
+      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string text;
+  for (size_t k = 0; k < bytes.size(); k += 3) {
+    unsigned group = 0;
+    for (size_t i = 0; i < 3; ++i) {
+      group = group << 8 | (k + i < bytes.size() ? static_cast<unsigned char>(bytes[k + i]) : 0U);
+    }
+    for (size_t i = 0; i < 4; ++i) {
+      text += k + i <= bytes.size() ? kLetters[group >> (18 - 6 * i) & 63U] : '=';
+    }
+  }
+  return text;
+}
+
+}  // namespace
+
+std::string StudyTables(const std::vector<Json>& cells) {
+  std::string text = SimbTable(cells) + BilliardTable(cells) + ParameterTable(cells);
+  for (const Json& cell : cells) {
+    if (!cell.contains("physics_seconds")) continue;
+    text += Line(
+        "physics layer, forward and backward, batch %d x %d frames: %.1f ms; training "
+        "iteration %.1f ms; share %.1f %%\n",
+        cell["batch"].get<int>(), cell["frames"].get<int>(),
+        1e3 * cell["physics_seconds"].get<double>(), 1e3 * cell["iteration_seconds"].get<double>(),
+        1e2 * cell["share"].get<double>());
+  }
+  return text;
+}
+
+std::string ErrorByFrameSvg(const std::vector<Json>& cells) {
+  std::vector<PlotSeries> series;
+  for (const Json& cell : cells) {
+    if (!IsOf(cell, "billiards") || !cell.contains("ahead")) continue;
+    PlotSeries& one = series.emplace_back();
+    one.label = cell["cell"];
+    for (size_t k = 0; k < cell["ahead"]["model"]["position"].size(); ++k) {
+      one.x.push_back(static_cast<double>(k + 1));
+      one.y.push_back(cell["ahead"]["model"]["position"][k]);
+    }
+  }
+  return PlotSvg({.title = "Billiards: error of predicted positions",
+                  .x_label = "frames ahead",
+                  .y_label = "mean squared error (pixels²)",
+                  .y_scale = AxisScale::kLogarithmic,
+                  .height = 480},
+                 series);
+}
+
+std::string ErrorByLabelsSvg(const std::vector<Json>& cells) {
+  std::map<std::string, std::map<double, std::pair<double, int>>> sums;
+  for (const Json& cell : cells) {
+    if (!IsOf(cell, "billiards") || !cell.contains("ahead")) continue;
+    const std::string name = cell["cell"];
+    const std::string model = name.substr(0, name.find('_', std::string("billiards_").size()));
+    auto& [sum, count] = sums[model][100.0 * cell["labels"].get<double>()];
+    sum += cell["ahead"]["model"]["position"].back().get<double>();
+    ++count;
+  }
+  std::vector<PlotSeries> series;
+  for (const auto& [model, points] : sums) {
+    PlotSeries& one = series.emplace_back();
+    one.label = model;
+    one.style = PlotStyle::kLineAndPoints;
+    for (const auto& [labels, sum] : points) {
+      one.x.push_back(labels);
+      one.y.push_back(sum.first / sum.second);
+    }
+  }
+  return PlotSvg({.title = "Billiards: error at the last frame by labels",
+                  .x_label = "labels (%)",
+                  .y_label = "mean squared error (pixels²)",
+                  .x_scale = AxisScale::kLogarithmic,
+                  .y_scale = AxisScale::kLogarithmic},
+                 series);
+}
+
+std::string PredictionPage(const std::string& title, const std::vector<std::string>& truth,
+                           const std::vector<std::string>& predicted, const std::string& below) {
+  std::string frames = "[";
+  for (size_t k = 0; k < truth.size() && k < predicted.size(); ++k) {
+    const std::string png = PngStrip({{truth[k], predicted[k]}}, kPictureSize, 4);
+    frames += (k == 0 ? "\"" : ",\"") + Base64(png) + "\"";
+  }
+  frames += "]";
+  const std::string script =
+      "<p>True (left) and predicted (right), frame <span id=\"frame\"></span></p>"
+      "<img id=\"picture\" alt=\"true and predicted picture\">"
+      "<script>\nconst frames = " +
+      frames +
+      ";\nlet k = 0;\nfunction show() {\n"
+      "  document.getElementById('picture').src = 'data:image/png;base64,' + frames[k];\n"
+      "  document.getElementById('frame').textContent = k + 1;\n  k = (k + 1) % frames.length;\n}\n"
+      "show();\nsetInterval(show, 250);\n</script>";
+  return HtmlPage(title, "<h1>" + HtmlEscape(title) + "</h1>" + script + below);
+}
+
+}  // namespace tangible

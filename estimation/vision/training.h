@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// Training of encoder, dynamics and decoder on sequences of which the first few have labels.
+//
+// * With labels: L_enc = |estimated − true state|², L_phys = |dynamics(true state) − true states
+//   ahead| (Huber's loss), and L_dec = |decoded − true picture|² of the true positions.
+// * Without: L_dec of the positions seen, and of those that the dynamics give from the estimated
+//   state. If asked, L_self = |dynamics(estimated state) − positions seen later|.
+//
+// A step draws its windows from the seed and its own number alone, so that a training that was
+// interrupted goes on to the same result, bit for bit on one thread.
+
+#include <cstdint>
+#include <memory>
+#include <string>
+
+#include "tangible/estimation/vision/disc_data.h"
+#include "tangible/estimation/vision/model.h"
+
+namespace tangible {
+
+struct TrainingOptions {
+  DynamicsKind dynamics = DynamicsKind::kEngine;
+  DecoderKind decoder = DecoderKind::kLearned;
+  double labels = 1.0;  ///< share of the sequences, from the first on, whose states are used
+  bool physics_loss = true;
+  bool self_consistency = false;     ///< L_self
+  bool learns_parameters = true;     ///< the engine's, from wrong values
+  bool starts_from_colours = false;  ///< the encoder (EncoderImpl::StartFromColours)
+  int seen = 3;
+  int ahead = 10;
+  int batch = 32;
+  long iterations = 1500;
+  double learning_rate = 2e-3;  ///< falls to a fiftieth along half a cosine
+  std::uint64_t seed = 0;
+};
+
+struct TrainingLoss {
+  double total = 0.0, encoder = 0.0, physics = 0.0, decoder = 0.0, self = 0.0;
+};
+
+class Trainer {
+ public:
+  /// The data outlive it.
+  Trainer(const DiscData& data, const TrainingOptions& options);
+  ~Trainer();
+
+  /// One iteration.
+  TrainingLoss Step();
+  long iteration() const { return iteration_; }
+
+  /// All that the next steps depend on, as a file's bytes; and back: false and one line where they
+  /// are damaged or of another training.
+  std::string Save();
+  bool Load(const std::string& bytes, const std::string& name_for_messages, std::string* error);
+
+  const TrainingOptions& options() const { return options_; }
+  Encoder& encoder() { return encoder_; }
+  Decoder& decoder() { return decoder_; }
+  Dynamics& dynamics() { return dynamics_; }
+
+ private:
+  struct Batch;
+  Batch Draw() const;
+  TrainingLoss Loss(const Batch& batch, at::Tensor* total);
+  std::string Fingerprint() const;
+
+  const DiscData& data_;
+  TrainingOptions options_;
+  long iteration_ = 0;
+  Encoder encoder_{nullptr};
+  Decoder decoder_{nullptr};
+  Dynamics dynamics_{nullptr};
+  std::unique_ptr<torch::optim::Adam> adam_;
+};
+
+/// Pictures (count, 3, 64, 64) in [0, 1] of frames of sequences.
+at::Tensor PicturesOf(const DiscData& data, const std::vector<std::pair<int, int>>& frames);
+
+/// States (count, n, 4).
+at::Tensor StatesOf(const DiscData& data, const std::vector<std::pair<int, int>>& frames);
+
+}  // namespace tangible
