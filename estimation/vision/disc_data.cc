@@ -138,7 +138,9 @@ std::string Compress(const std::string& bytes) {
   std::string packed(size, '\0');
   compress2(reinterpret_cast<Bytef*>(packed.data()), &size,
             reinterpret_cast<const Bytef*>(bytes.data()), bytes.size(), 6);
+  // The bound is sixty times what pictures take.
   packed.resize(size);
+  packed.shrink_to_fit();
   return packed;
 }
 

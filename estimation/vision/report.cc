@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tangible/estimation/vision/report.h"
 
-#include <cmath>
 #include <cstdio>
 #include <map>
+#include <optional>
 
 #include "tangible/estimation/vision/disc_world.h"
 #include "tangible/estimation/vision/png.h"
@@ -22,38 +22,43 @@ std::string Line(const char* format, Values... values) {
   return text;
 }
 
+// The root of the mean square error of positions seen; of predictors that see none, a dash.
+std::string Seen(const std::optional<double>& error) {
+  return error ? Line("%6.3f", *error) : "     -";
+}
+
 bool IsOf(const Json& cell, const char* kind) {
   return cell["cell"].get<std::string>().rfind(kind, 0) == 0;
 }
 
 std::string SimbTable(const std::vector<Json>& cells) {
   std::string text;
-  const auto row = [&](const std::string& name, double seen, const Json& score) {
+  const auto row = [&](const std::string& name, std::optional<double> seen, const Json& score) {
     const Json& near = score["near"];
     const Json& far = score["far"];
-    text += Line("%-26s %6.3f  %7.3f %7.3f %7.3f %7.3f  %7.2f %7.2f %7.2f %7.2f\n", name.c_str(),
-                 seen, near["mean"].get<double>(), near["lower_quartile"].get<double>(),
-                 near["median"].get<double>(), near["upper_quartile"].get<double>(),
-                 far["mean"].get<double>(), far["lower_quartile"].get<double>(),
-                 far["median"].get<double>(), far["upper_quartile"].get<double>());
+    text +=
+        Line("%-26s %s  %7.3f %7.3f %7.3f %7.3f  %7.2f %7.2f %7.2f %7.2f\n", name.c_str(),
+             Seen(seen).c_str(), near["mean"].get<double>(), near["lower_quartile"].get<double>(),
+             near["median"].get<double>(), near["upper_quartile"].get<double>(),
+             far["mean"].get<double>(), far["lower_quartile"].get<double>(),
+             far["median"].get<double>(), far["upper_quartile"].get<double>());
   };
   const Json* any = nullptr;
   for (const Json& cell : cells) {
     if (!cell.contains("simb")) continue;
     if (any == nullptr) {
       text +=
-          "SimB, mean squared normalised position error x 1000; published (all labels, true "
-          "boxes): "
-          "2.55 at [0, T], 25.77 at [T, 2T]\n"
-          "cell                      seen px  [0, T]: mean quartile median quartile  [T, 2T]: mean "
-          "quartile median quartile\n";
+          "SimB: 1000 times the mean squared normalised position error, by sequence; published "
+          "with "
+          "all labels and true boxes: 2.55 and 25.77\n"
+          "cell                        seen  [0, T] mean, quartile, median, quartile     [T, 2T]\n";
       any = &cell;
     }
-    row(cell["cell"], cell["seen_error"], cell["simb"]["ours"]);
+    row(cell["cell"], cell["seen_error"].get<double>(), cell["simb"]["ours"]);
   }
   if (any == nullptr) return "";
   for (const char* other : {"true state", "constant velocity", "last frame"}) {
-    row(other, NAN, (*any)["simb"][other]);
+    row(other, {}, (*any)["simb"][other]);
   }
   return text + "\n";
 }
@@ -61,8 +66,8 @@ std::string SimbTable(const std::vector<Json>& cells) {
 std::string BilliardTable(const std::vector<Json>& cells) {
   std::string text;
   const std::vector<int> frames = {1, 2, 3, 5, 7, 10};
-  const auto row = [&](const std::string& name, double seen, const Json& errors) {
-    text += Line("%-34s %6.3f ", name.c_str(), seen);
+  const auto row = [&](const std::string& name, std::optional<double> seen, const Json& errors) {
+    text += Line("%-34s %s ", name.c_str(), Seen(seen).c_str());
     for (const int k : frames) text += Line(" %8.3f", errors["position"][k - 1].get<double>());
     text += " ";
     for (const int k : frames) text += Line(" %8.3f", 1e3 * errors["picture"][k - 1].get<double>());
@@ -78,11 +83,11 @@ std::string BilliardTable(const std::vector<Json>& cells) {
           "5, 7 and 10 frames ahead\n";
       any = &cell;
     }
-    row(cell["cell"], cell["seen_error"], cell["ahead"]["model"]);
+    row(cell["cell"], cell["seen_error"].get<double>(), cell["ahead"]["model"]);
   }
   if (any == nullptr) return "";
   for (const char* other : {"constant velocity", "last frame", "true state"}) {
-    row(std::string(other) + " (first cell's encoder)", NAN, (*any)["ahead"][other]);
+    row(other, {}, (*any)["ahead"][other]);
   }
   return text + "\n";
 }
@@ -121,17 +126,16 @@ std::string Base64(const std::string& bytes) {
 }  // namespace
 
 std::string StudyTables(const std::vector<Json>& cells) {
-  std::string text = SimbTable(cells) + BilliardTable(cells) + ParameterTable(cells);
-  for (const Json& cell : cells) {
-    if (!cell.contains("physics_seconds")) continue;
-    text += Line(
-        "physics layer, forward and backward, batch %d x %d frames: %.1f ms; training "
-        "iteration %.1f ms; share %.1f %%\n",
-        cell["batch"].get<int>(), cell["frames"].get<int>(),
-        1e3 * cell["physics_seconds"].get<double>(), 1e3 * cell["iteration_seconds"].get<double>(),
-        1e2 * cell["share"].get<double>());
-  }
-  return text;
+  return SimbTable(cells) + BilliardTable(cells) + ParameterTable(cells);
+}
+
+std::string TimingLine(const Json& timing) {
+  return Line(
+      "physics layer, forward and backward, batch %d x %d frames: %.1f ms; training iteration "
+      "%.1f ms; share %.1f %%\n",
+      timing["batch"].get<int>(), timing["frames"].get<int>(),
+      1e3 * timing["physics_seconds"].get<double>(),
+      1e3 * timing["iteration_seconds"].get<double>(), 1e2 * timing["share"].get<double>());
 }
 
 std::string ErrorByFrameSvg(const std::vector<Json>& cells) {

@@ -12,6 +12,9 @@ namespace tangible {
 /// Tables of all cells that are there, as text.
 std::string StudyTables(const std::vector<nlohmann::ordered_json>& cells);
 
+/// The physics layer's share of a training iteration (TimePhysics), as a line.
+std::string TimingLine(const nlohmann::ordered_json& timing);
+
 /// Error against frames ahead, and against the share of labels, of billiards: two <svg> elements.
 std::string ErrorByFrameSvg(const std::vector<nlohmann::ordered_json>& cells);
 std::string ErrorByLabelsSvg(const std::vector<nlohmann::ordered_json>& cells);

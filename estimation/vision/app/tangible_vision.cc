@@ -22,6 +22,7 @@
 #include "tangible/estimation/vision/report.h"
 #include "tangible/estimation/vision/study.h"
 #include "tangible/scene/json_writer.h"
+#include "tangible/scene/text_file.h"
 
 DEFINE_bool(quick, false,
             "a tiny training with its checks: the loss falls, gradients are right, a "
@@ -99,10 +100,17 @@ class Study {
     std::atomic<size_t> next{0};
     const auto work = [&] {
       at::set_num_threads(1);
-      for (size_t k = next++; k < cells_.size() && error_.empty(); k = next++) {
-        const std::string error = Make(cells_[k], &watch);
+      for (size_t k = next++; k < cells_.size(); k = next++) {
+        std::string error;
+        try {
+          error = Make(cells_[k], &watch);
+        } catch (const std::exception& exception) {
+          error = cells_[k].name + ": " + OneLine(exception.what());
+        }
+        if (error.empty()) continue;
         const std::lock_guard<std::mutex> lock(mutex_);
         if (error_.empty()) error_ = error;
+        next = cells_.size();
       }
     };
     {
@@ -208,10 +216,8 @@ int RunStudy() {
                          ": expected a cell's result, got something else: remove it");
     }
   }
-  results.push_back(TimePhysics());
-  std::cout << StudyTables(results);
-  const OrderedJson timing = results.back();
-  results.pop_back();
+  const OrderedJson timing = TimePhysics();
+  std::cout << StudyTables(results) << TimingLine(timing);
   const std::vector<std::vector<std::string>> rows = PictureRowsOf(study);
   ResultWriter writer;
   writer.Write(FLAGS_out, [&] {

@@ -69,6 +69,21 @@ nlohmann::ordered_json Cell(const std::string& name, double labels, double error
   return json;
 }
 
+TEST(ReportTest, SimbHasItsTable) {
+  const nlohmann::ordered_json score = {
+      {"mean", 1.25}, {"lower_quartile", 0.5}, {"median", 0.75}, {"upper_quartile", 1.5}};
+  nlohmann::ordered_json cell = {
+      {"cell", "simb_engine_10_0"}, {"labels", 0.1}, {"seen_error", 0.03}};
+  for (const char* predictor : {"ours", "true state", "constant velocity", "last frame"}) {
+    cell["simb"][predictor] = {{"near", score}, {"far", score}};
+  }
+  const std::string tables = StudyTables({cell});
+  for (const char* part : {"simb_engine_10_0", "true state", "1.250", "2.55"}) {
+    EXPECT_NE(tables.find(part), std::string::npos) << part;
+  }
+  EXPECT_EQ(tables.find("Billiards"), std::string::npos);
+}
+
 TEST(ReportTest, TablesAndPlotsHaveEveryCell) {
   const std::vector<nlohmann::ordered_json> cells = {Cell("billiards_engine_10_0", 0.1, 0.5),
                                                      Cell("billiards_engine_100_0", 1.0, 0.25),
@@ -79,6 +94,13 @@ TEST(ReportTest, TablesAndPlotsHaveEveryCell) {
     EXPECT_NE(tables.find(part), std::string::npos) << part;
   }
   EXPECT_EQ(tables.find("SimB"), std::string::npos);
+  EXPECT_NE(TimingLine({{"batch", 32},
+                        {"frames", 10},
+                        {"physics_seconds", 0.004},
+                        {"iteration_seconds", 0.2},
+                        {"share", 0.02}})
+                .find("share 2.0 %"),
+            std::string::npos);
   EXPECT_NE(ErrorByFrameSvg(cells).find("billiards_engine_100_0"), std::string::npos);
   const std::string by_labels = ErrorByLabelsSvg(cells);
   EXPECT_EQ(by_labels.find("<svg"), 0U);
