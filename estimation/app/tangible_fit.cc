@@ -20,7 +20,6 @@
 #include "tangible/app/program.h"
 #include "tangible/estimation/fit/fit_checkpoint.h"
 #include "tangible/estimation/fit/sensor_noise.h"
-#include "tangible/estimation/problem/problem_with_priors.h"
 #include "tangible/estimation/results/fit_json.h"
 #include "tangible/estimation/results/fitted_scene.h"
 #include "tangible/estimation/results/prediction.h"
@@ -29,6 +28,7 @@
 #include "tangible/estimation/results/residual_summary.h"
 #include "tangible/scene/csv.h"
 #include "tangible/scene/json_reader.h"
+#include "tangible/scene/text_file.h"
 
 DEFINE_string(out, "", "file of the result (JSON); empty: none is written");
 DEFINE_string(report, "", "file of the report (HTML); empty: none is written");
@@ -374,9 +374,9 @@ struct Prepared {
 };
 
 /// Reads the file and the flags; kExitDone, or the status after what is wrong has been printed.
-int Prepare(const std::string& file, Prepared* prepared) {
+int Prepare(const std::string& text, const std::string& file, Prepared* prepared) {
   std::string error;
-  if (!LoadFit(file, &prepared->fit, &error)) {
+  if (!ParseFit(text, file, &prepared->fit, &error)) {
     return ReportError(error);
   }
   FitProblem& problem = prepared->fit.problem;
@@ -433,9 +433,9 @@ int Conclude(const std::string& file, const FitResult& result, const Discretisat
   return checkpoint != nullptr && !checkpoint->error().empty() ? kExitFailed : kExitDone;
 }
 
-int Run(const std::string& file) {
+int Run(const std::string& text, const std::string& file) {
   Prepared prepared;
-  const int status = Prepare(file, &prepared);
+  const int status = Prepare(text, file, &prepared);
   if (status != kExitDone) {
     return status;
   }
@@ -498,7 +498,7 @@ int Run(const std::string& file) {
 }
 
 /// Several recordings in one fit.
-int RunRecordings(const std::string& file) {
+int RunRecordings(const std::string& text, const std::string& file) {
   for (const char* flag : {"scene_out", "predictions", "predict_from", "discretisation_check",
                            "checkpoint", "initial"}) {
     if (!gflags::GetCommandLineFlagInfoOrDie(flag).is_default) {
@@ -509,7 +509,7 @@ int RunRecordings(const std::string& file) {
   RecordingsFile read;
   std::string error;
   std::vector<RecordedRun> recordings;
-  if (!LoadRecordings(file, &read, &error) || !MakeRecordingsProblem(read, &recordings, &error)) {
+  if (!ParseRecordings(text, file, &read, &error) || !MakeRecordingsProblem(read, &recordings, &error)) {
     return ReportError(error);
   }
   for (const RecordingEntry& entry : read.recordings) {
@@ -524,11 +524,9 @@ int RunRecordings(const std::string& file) {
     return ReportError("tangible-fit: --derivatives: " + error, kExitUsage);
   }
   RecordingsProblem problem(std::move(recordings), read.own);
-  ProblemWithPriors with_priors(&problem, {});
   IterationPrinter printer(problem.entries());
-  const FitResult result = Fit(
-      options, with_priors.HasRows() ? static_cast<LeastSquaresProblem*>(&with_priors) : &problem,
-      [&](int start, int iteration, const FitIteration& values) {
+  const FitResult result =
+      Fit(options, &problem, [&](int start, int iteration, const FitIteration& values) {
         printer.Print(start, iteration, values);
       });
   const bool estimated = result.estimate.size() > 0;
@@ -579,7 +577,12 @@ int Main(int argc, char** argv) {
     return ReportError("tangible-fit: --predict_from: expected a time in s, got nan", kExitUsage);
   }
   const std::string& file = line.positional[0];
-  return HasRecordings(file) ? RunRecordings(file) : Run(file);
+  std::string text;
+  std::string error;
+  if (!ReadTextFile(file, &text, &error)) {
+    return ReportError(error);
+  }
+  return HasRecordings(text) ? RunRecordings(text, file) : Run(text, file);
 }
 
 }  // namespace

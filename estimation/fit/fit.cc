@@ -475,6 +475,20 @@ FitResult Fit(const FitOptions& options, LeastSquaresProblem* problem, const Fit
   return result;
 }
 
+namespace {
+
+FitResult FitWithPriors(const FitOptions& options, LeastSquaresProblem* problem,
+                        const FitProgress& progress, FitLog* log, const FitShooting& shooting) {
+  ProblemWithPriors with_priors(problem, {});
+  return Fit(options, with_priors.HasRows() ? &with_priors : problem, progress, log, shooting);
+}
+
+}  // namespace
+
+FitResult Fit(const FitOptions& options, RecordingsProblem* problem, const FitProgress& progress) {
+  return FitWithPriors(options, problem, progress, nullptr, {});
+}
+
 FitResult Fit(const FitOptions& options, RolloutResiduals* residuals, const FitProgress& progress,
               FitLog* log) {
   const FitShooting shooting = [&options, residuals](const Eigen::VectorXd& start,
@@ -485,12 +499,7 @@ FitResult Fit(const FitOptions& options, RolloutResiduals* residuals, const FitP
     residuals->SetLog(nullptr);
     return FitApproachResult{shot.parameters, shot.iterations, residuals->rollouts() - before};
   };
-  ProblemWithPriors with_priors(residuals, {});
-  LeastSquaresProblem* problem = residuals;
-  if (with_priors.HasRows()) {
-    problem = &with_priors;
-  }
-  FitResult result = Fit(options, problem, progress, log, shooting);
+  FitResult result = FitWithPriors(options, residuals, progress, log, shooting);
   residuals->SetLog(nullptr);  // which a mismatch may have left
   return result;
 }

@@ -22,6 +22,7 @@
 
 #include "tangible/estimation/fit/held_parameters.h"
 #include "tangible/estimation/fit/uncertainty.h"
+#include "tangible/estimation/problem/recordings.h"
 #include "tangible/estimation/problem/residual.h"
 #include "tangible/simulation/gradient/gradient.h"
 
@@ -148,6 +149,9 @@ struct FitLog;  // fit_checkpoint.h
 /// that turns out to be of another fit the result is worth nothing (FitLog::mismatch).
 FitResult Fit(const FitOptions& options, LeastSquaresProblem* problem, const FitProgress& progress,
               FitLog* log = nullptr, const FitShooting& shooting = {});
+
+/// The fit of several recordings with the priors of their parameters.
+FitResult Fit(const FitOptions& options, RecordingsProblem* problem, const FitProgress& progress);
 
 /// The fit of one run with the priors of its parameters.
 FitResult Fit(const FitOptions& options, RolloutResiduals* residuals, const FitProgress& progress,

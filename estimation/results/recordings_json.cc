@@ -171,15 +171,16 @@ class Reader {
 
 }  // namespace
 
-bool HasRecordings(const std::string& file) {
+bool HasRecordings(const std::string& text) {
   Json json;
   std::string error;
-  return ParseJsonFile(file, &json, &error) && json.is_object() && json.contains("recordings");
+  return ParseJson(text, "", &json, &error) && json.is_object() && json.contains("recordings");
 }
 
-bool LoadRecordings(const std::string& file, RecordingsFile* recordings, std::string* error) {
+bool ParseRecordings(const std::string& text, const std::string& file, RecordingsFile* recordings,
+                     std::string* error) {
   Json json;
-  if (!ParseJsonFile(file, &json, error)) return false;
+  if (!ParseJson(text, file, &json, error)) return false;
   *recordings = RecordingsFile();
   recordings->path = file;
   JsonErrors errors(file);

@@ -23,11 +23,13 @@ struct RecordingsFile {
   std::vector<bool> own;  ///< of each parameter: "per": "recording"
 };
 
-/// Whether a fit file has the key `recordings`; a file that cannot be read has not.
-bool HasRecordings(const std::string& file);
+/// Whether the text of a fit file has the key `recordings`; one that is not JSON has not.
+bool HasRecordings(const std::string& text);
 
-/// Reads the file, its scenes and observations. On failure sets one line that names the recording.
-bool LoadRecordings(const std::string& file, RecordingsFile* recordings, std::string* error);
+/// Reads a fit file's text, and its scenes and observations, whose names are relative to `file`. On
+/// failure sets one line that names the recording.
+bool ParseRecordings(const std::string& text, const std::string& file, RecordingsFile* recordings,
+                     std::string* error);
 
 /// The problem of all recordings; the same on failure.
 bool MakeRecordingsProblem(const RecordingsFile& file, std::vector<RecordedRun>* recordings,

@@ -220,36 +220,44 @@ OrderedJson CheckToJson(const RolloutResiduals& residuals, const DiscretisationC
       {"parameters", parameters}, {"rollouts", check.rollouts}, {"seconds", check.seconds}};
 }
 
+/// What the results of one run and of several recordings have in common.
+OrderedJson CommonToJson(const LeastSquaresProblem& problem, const FitResult& result) {
+  const Uncertainty& uncertainty = result.uncertainty;
+  const bool estimated = result.estimate.size() > 0;
+  const auto when = [estimated](double x) { return estimated ? Number(x) : OrderedJson(nullptr); };
+  long residuals = 0;
+  for (int block = 0; block < problem.num_blocks(); ++block) {
+    residuals += problem.num_observation_rows(block);
+  }
+  return {{"status", NameOf(result.status)},
+          {"parameters", ParametersToJson(problem.entries(), result)},
+          {"robust", RobustToJson(uncertainty)},
+          {"determined_combinations", CombinationsToJson(problem.entries(), uncertainty)},
+          {"held_parameters", HeldToJson(result)},
+          {"covariance", CovarianceToJson(uncertainty.covariance)},
+          {"initial_cost", when(result.initial_cost)},
+          {"final_cost", when(result.final_cost)},
+          {"residual_rms", when(uncertainty.residual_rms)},
+          {"reduced_chi_square", when(uncertainty.reduced_chi_square)},
+          {"residuals", residuals},
+          {"condition", when(uncertainty.condition)},
+          {"iterations", IterationsToJson(result)},
+          {"starts", StartsToJson(result)},
+          {"rollouts", result.rollouts},
+          {"seconds", result.seconds},
+          {"warnings", uncertainty.warnings},
+          {"message", result.message}};
+}
+
 }  // namespace
 
 OrderedJson ResultToJson(const RolloutResiduals& residuals, const FitResult& result,
                          const DiscretisationCheck* check, const PredictionScore* prediction) {
-  const Uncertainty& uncertainty = result.uncertainty;
-  const bool estimated = result.estimate.size() > 0;
   const ResidualSummary summary = SummarizeResiduals(residuals, result.residuals);
-  const auto when = [estimated](double x) { return estimated ? Number(x) : OrderedJson(nullptr); };
-  OrderedJson json = {
-      {"status", NameOf(result.status)},
-      {"parameters", ParametersToJson(residuals.scene().entries(), result)},
-      {"robust", RobustToJson(uncertainty)},
-      {"determined_combinations", CombinationsToJson(residuals.scene().entries(), uncertainty)},
-      {"held_parameters", HeldToJson(result)},
-      {"covariance", CovarianceToJson(uncertainty.covariance)},
-      {"initial_cost", when(result.initial_cost)},
-      {"final_cost", when(result.final_cost)},
-      {"residual_rms", when(uncertainty.residual_rms)},
-      {"residual_rms_by_coordinate", RmsByCoordinate(residuals, result)},
-      {"residuals_by_series", SeriesToJson(summary)},
-      {"outliers", OutliersToJson(summary)},
-      {"reduced_chi_square", when(uncertainty.reduced_chi_square)},
-      {"residuals", residuals.num_residuals()},
-      {"condition", when(uncertainty.condition)},
-      {"iterations", IterationsToJson(result)},
-      {"starts", StartsToJson(result)},
-      {"rollouts", result.rollouts},
-      {"seconds", result.seconds},
-      {"warnings", uncertainty.warnings},
-      {"message", result.message}};
+  OrderedJson json = CommonToJson(residuals, result);
+  json["residual_rms_by_coordinate"] = RmsByCoordinate(residuals, result);
+  json["residuals_by_series"] = SeriesToJson(summary);
+  json["outliers"] = OutliersToJson(summary);
   if (check != nullptr) {
     json["discretisation"] = CheckToJson(residuals, *check);
   }
@@ -262,42 +270,26 @@ OrderedJson ResultToJson(const RolloutResiduals& residuals, const FitResult& res
 OrderedJson RecordingsResultToJson(const RecordingsProblem& problem, const FitResult& result) {
   // A matrix of more than that many parameters is larger than all else.
   constexpr Eigen::Index kMostInMatrix = 100;
-  const Uncertainty& uncertainty = result.uncertainty;
   const bool estimated = result.estimate.size() > 0;
-  const auto when = [estimated](double x) { return estimated ? Number(x) : OrderedJson(nullptr); };
-  OrderedJson parameters = ParametersToJson(problem.entries(), result);
+  OrderedJson json = CommonToJson(problem, result);
+  OrderedJson& parameters = json["parameters"];
   const size_t shared = static_cast<size_t>(problem.num_shared());
   for (size_t k = shared; k < parameters.size(); ++k) {
     const size_t block = (k - shared) / static_cast<size_t>(problem.num_own(0));
     parameters[k]["recording"] = problem.recordings()[block].name;
   }
-  OrderedJson recordings = OrderedJson::array();
+  json["recordings"] = OrderedJson::array();
   for (int b = 0; b < problem.num_blocks(); ++b) {
-    recordings.push_back({{"name", problem.recordings()[b].name},
-                          {"residuals", problem.num_rows(b)},
-                          {"weight", problem.weight(b)},
-                          {"residual_rms", when(RmsOfRecording(problem, result, b))}});
+    const double rms = RmsOfRecording(problem, result, b);
+    json["recordings"].push_back({{"name", problem.recordings()[b].name},
+                                  {"residuals", problem.num_rows(b)},
+                                  {"weight", problem.weight(b)},
+                                  {"residual_rms", estimated ? Number(rms) : OrderedJson()}});
   }
-  const bool small = uncertainty.covariance.rows() <= kMostInMatrix;
-  return {{"status", NameOf(result.status)},
-          {"parameters", parameters},
-          {"recordings", recordings},
-          {"robust", RobustToJson(uncertainty)},
-          {"determined_combinations", CombinationsToJson(problem.entries(), uncertainty)},
-          {"held_parameters", HeldToJson(result)},
-          {"covariance", small ? CovarianceToJson(uncertainty.covariance) : OrderedJson(nullptr)},
-          {"initial_cost", when(result.initial_cost)},
-          {"final_cost", when(result.final_cost)},
-          {"residual_rms", when(uncertainty.residual_rms)},
-          {"reduced_chi_square", when(uncertainty.reduced_chi_square)},
-          {"residuals", result.residuals.size()},
-          {"condition", when(uncertainty.condition)},
-          {"iterations", IterationsToJson(result)},
-          {"starts", StartsToJson(result)},
-          {"rollouts", result.rollouts},
-          {"seconds", result.seconds},
-          {"warnings", uncertainty.warnings},
-          {"message", result.message}};
+  if (result.uncertainty.covariance.rows() > kMostInMatrix) {
+    json["covariance"] = nullptr;
+  }
+  return json;
 }
 
 OrderedJson NoiseToJson(const std::vector<SensorNoise>& noise) {

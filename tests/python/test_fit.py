@@ -54,3 +54,47 @@ def test_mistakes_are_one_line(tmp_path: Path) -> None:
     assert tangible.fit(FIT, max_iterations=1, on_failure="return").status == "not_converged"
     with pytest.raises(ValueError, match="parameters: expected 1 values"):
         good([1.0, 2.0])
+
+
+def test_recordings_share_what_they_have_in_common(tmp_path: Path) -> None:
+    """Two falls with a drag in common, each from a height and at a speed of its own."""
+    scene = {
+        "name": "fall",
+        "bodies": [{"name": "ball", "mass": 1, "inertia": 0.1, "position": [0, 0],
+                    "quadratic_drag": 0.2}],
+        "simulation": {"dt": 0.01, "duration": 1, "stepping": "event"},
+    }
+    recordings = []
+    for k, (y, vy) in enumerate([(1.0, 2.0), (3.0, -4.0)]):
+        run = tangible.simulate(
+            scene, parameters={"bodies/ball/position/y": y, "bodies/ball/velocity/y": vy})
+        rows = [f"{t:.17g},ball,{q:.17g}" for t, q in zip(run.times, run["ball/y"])]
+        (tmp_path / f"{k}.csv").write_text("\n".join(["time,body,y", *rows]))
+        recordings.append(
+            {"name": f"fall {k}", "observations": [{"file": f"{k}.csv", "sigma": 0.001}],
+             "initial": {"y": y + 0.1, "vy": 0.0}, "weight": k + 1.0})
+    (tmp_path / "fall.json").write_text(json.dumps(scene))
+    problem = {
+        "scene": "fall.json",
+        "recordings": recordings,
+        "parameters": [
+            {"name": "drag", "path": "bodies/ball/quadratic_drag", "initial": 0.05},
+            {"name": "y", "path": "bodies/ball/position/y", "per": "recording"},
+            {"name": "vy", "path": "bodies/ball/velocity/y", "per": "recording"},
+        ],
+    }
+    result = tangible.fit(problem, folder=tmp_path)
+    assert result["drag"] == pytest.approx(0.2, rel=1e-9)
+    assert result["vy of fall 1"] == pytest.approx(-4.0, rel=1e-9)
+    assert "fall 1" in result.report()
+    residuals = tangible.Residuals(problem, folder=tmp_path)
+    at = residuals.initial
+    assert residuals.names == ["drag", "y of fall 0", "vy of fall 0", "y of fall 1", "vy of fall 1"]
+    jacobian = residuals.jacobian(at)
+    for k in range(len(at)):
+        step = np.zeros(len(at))
+        step[k] = 1e-6
+        difference = (residuals(at + step) - residuals(at - step)) / 2e-6
+        assert np.abs(difference - jacobian[:, k]).max() < 1e-5 * np.abs(jacobian[:, k]).max()
+    # The second one weighs twice as much.
+    assert np.abs(jacobian[101:, 3]).max() == pytest.approx(2**0.5 * np.abs(jacobian[:101, 1]).max())
