@@ -509,7 +509,8 @@ int RunRecordings(const std::string& text, const std::string& file) {
   RecordingsFile read;
   std::string error;
   std::vector<RecordedRun> recordings;
-  if (!ParseRecordings(text, file, &read, &error) || !MakeRecordingsProblem(read, &recordings, &error)) {
+  if (!ParseRecordings(text, file, &read, &error) ||
+      !MakeRecordingsProblem(read, &recordings, &error)) {
     return ReportError(error);
   }
   for (const RecordingEntry& entry : read.recordings) {

@@ -96,8 +96,7 @@ class FitProblemOf {
   bool ReadRecordings(const std::string& text, const std::string& file, std::string* error) {
     RecordingsFile read;
     std::vector<RecordedRun> runs;
-    if (!ParseRecordings(text, file, &read, error) ||
-        !MakeRecordingsProblem(read, &runs, error)) {
+    if (!ParseRecordings(text, file, &read, error) || !MakeRecordingsProblem(read, &runs, error)) {
       return false;
     }
     recordings_.emplace(std::move(runs), read.own);
