@@ -60,13 +60,15 @@ void ContactsCsv::Add(const ModelStructure& structure, double t, const StepRecor
   const std::string time = FormatNumber(t);
   for (size_t i = 0; i < record.contacts.size(); ++i) {
     const ActiveContact& contact = record.contacts[i];
-    const std::string names = contact.joint >= 0
-                                  ? ",limit," + structure.joints[contact.joint].name +
-                                        (contact.side > 0.0 ? ",low," : ",high,")
-                                  : ",contact," + structure.bodies[contact.a].name + "," +
-                                        structure.bodies[contact.b].name + ",";
+    const bool is_friction = contact.IsJointFriction();  // which has no normal impulse
+    const std::string names =
+        is_friction          ? ",friction," + structure.joints[contact.joint].name + ",,"
+        : contact.joint >= 0 ? ",limit," + structure.joints[contact.joint].name +
+                                   (contact.side > 0.0 ? ",low," : ",high,")
+                             : ",contact," + structure.bodies[contact.a].name + "," +
+                                   structure.bodies[contact.b].name + ",";
     text_ += time + names + FormatNumber(contact.gap) + "," +
-             FormatNumber(record.solution.normal_impulse[i]) + "," +
+             FormatNumber(is_friction ? 0.0 : record.solution.normal_impulse[i]) + "," +
              FormatNumber(record.solution.tangent_impulse[i]) + "," +
              ModeName(record.solution.modes[i]) + ",,,\n";
   }

@@ -127,6 +127,10 @@ class NumberList {
       Add("limits/0", kFree, coordinate, &joint->limits->first);
       Add("limits/1", kFree, coordinate, &joint->limits->second);
     }
+    if (joint->friction) {
+      Add("friction", kNonNegative, prismatic ? Dimension::kForce : Dimension::kTorque,
+          &*joint->friction);
+    }
     if (joint->stiffness) {
       Add("stiffness", kNonNegative,
           prismatic ? Dimension::kStiffness : Dimension::kAngularStiffness, &*joint->stiffness);
@@ -214,6 +218,7 @@ BasicJoint<T> CastJoint(const BasicJoint<double>& from) {
   joint.damping = T(from.damping);
   if (from.limits) joint.limits = {T(from.limits->first), T(from.limits->second)};
   joint.stiffness = CastOptional<T>(from.stiffness);
+  joint.friction = CastOptional<T>(from.friction);
   joint.rest = T(from.rest);
   joint.effort = T(from.effort);
   joint.effort_signal = from.effort_signal;

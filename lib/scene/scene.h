@@ -87,6 +87,7 @@ struct BasicJoint {
   std::optional<std::pair<T, T>> limits;
   std::optional<T> stiffness;  ///< of a spring along the coordinate: −k (coordinate − rest)
   T rest{0.0};                 ///< rad or m; only with a stiffness
+  std::optional<T> friction;   ///< Coulomb's: the torque or force at which it slides, ≥ 0
   T effort{0.0};
   std::optional<Signal> effort_signal;  ///< replaces effort
   bool contact = false;                 ///< whether the joined bodies collide

@@ -225,8 +225,8 @@ void SceneReader::ReadJoint(const JsonReader& item) {
   if (!distance && joint.type != JointType::kFixedAngle) keys.emplace_back("anchor");
   if (prismatic) keys.emplace_back("axis");
   if (revolute || prismatic) {
-    keys.insert(keys.end(), {displacement, "rate", "damping", "limits", "effort", "stiffness",
-                             prismatic ? "rest_displacement" : "rest_angle"});
+    keys.insert(keys.end(), {displacement, "rate", "damping", "friction", "limits", "effort",
+                             "stiffness", prismatic ? "rest_displacement" : "rest_angle"});
   }
   item.ExpectKeys(keys, " of a " + NameOf(joint.type, kJointTypeNames) + " joint");
   if (!item.ok()) return;
@@ -264,6 +264,9 @@ void SceneReader::ReadMotor(const JsonReader& item, const char* displacement,
   }
   const bool prismatic = joint->type == JointType::kPrismatic;
   const char* const rest = prismatic ? "rest_displacement" : "rest_angle";
+  if (item.Has("friction")) {
+    joint->friction = item.At("friction").Number(NumberKind::kNonNegative);
+  }
   if (item.Has("stiffness")) {
     joint->stiffness = item.At("stiffness").Number(NumberKind::kNonNegative);
     ReadNumber(item, rest, NumberKind::kFree, &joint->rest);

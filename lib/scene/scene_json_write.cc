@@ -123,6 +123,7 @@ class SceneWriter {
       if (joint.limits) {
         json["limits"] = OrderedJson::array({joint.limits->first, joint.limits->second});
       }
+      if (joint.friction) json["friction"] = *joint.friction;
       if (joint.stiffness) {
         json["stiffness"] = *joint.stiffness;
         json[prismatic ? "rest_displacement" : "rest_angle"] = joint.rest;

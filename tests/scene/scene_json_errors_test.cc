@@ -93,6 +93,7 @@ TEST(BadSceneTest, Bodies) {
        "/bodies/0/linear_damping: expected a number >= 0, got -1"},
       {"/bodies/0/quadratic_drag", "-1",
        "/bodies/0/quadratic_drag: expected a number >= 0, got -1"},
+      {"/joints/0/friction", "-2", "/joints/0/friction: expected a number >= 0, got -2"},
       {"/joints/0/stiffness", "-2", "/joints/0/stiffness: expected a number >= 0, got -2"},
       {"/joints/0/rest_angle", "0.1",
        "/joints/0/stiffness: missing, expected a number >= 0 with rest_angle"},
@@ -194,11 +195,11 @@ TEST(BadSceneTest, Joints) {
        "/joints/0/type: missing, expected one of revolute, prismatic, weld, distance, fixed_angle"},
       {"/joints/0/displacement", "0",
        "/joints/0/displacement: unknown key of a revolute joint, expected one of name, type, "
-       "bodies, contact, anchor, angle, rate, damping, limits, effort, stiffness, rest_angle, got "
-       "\"displacement\""},
+       "bodies, contact, anchor, angle, rate, damping, friction, limits, effort, stiffness, "
+       "rest_angle, got \"displacement\""},
       {"/joints/1/angle", "0",
        "/joints/1/angle: unknown key of a prismatic joint, expected one of name, type, bodies, "
-       "contact, anchor, axis, displacement, rate, damping, limits, effort, stiffness, "
+       "contact, anchor, axis, displacement, rate, damping, friction, limits, effort, stiffness, "
        "rest_displacement, got \"angle\""},
       {"/joints/2/damping", "0",
        "/joints/2/damping: unknown key of a weld joint, expected one of name, type, bodies, "

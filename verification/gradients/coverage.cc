@@ -62,6 +62,7 @@ void CoverForces(const Scene& scene, Coverage* coverage) {
     cover(joint.effort_signal.has_value(), "effort from a series");
     cover(joint.damping > 0.0, "damping of a joint");
     cover(joint.stiffness.has_value(), "spring of a joint");
+    cover(joint.friction.has_value(), "friction in a joint");
   }
   cover(!scene.springs.empty(), "spring");
   cover(scene.gravity.isZero(), "no gravity");
@@ -154,6 +155,7 @@ std::vector<std::string> ExpectedCoverage() {
                            "damping of a joint",
                            "damping of a body",
                            "spring of a joint",
+                           "friction in a joint",
                            "drag of a body",
                            "spring",
                            "no gravity",

@@ -6,10 +6,11 @@
 FOLDER holds multiarm_pendulum/single_freeswing_200Hz.csv and double_freeswing_200Hz.csv
 (dynamicslab/MultiArm-Pendulum, MIT licence; Kaheman et al., arXiv 2205.06231). A recording is cut
 into blocks of five seconds. Parameters are identified from the even blocks together, each with
-an initial state of its own. In each odd block the initial state is fitted to the first second,
-with the parameters held, and the three seconds after it are predicted: once with the parameters
-identified here, once with those that were published with the data. Printed are medians over the
-windows of the largest error of any angle within 1, 2 and 3 s.
+an initial state of its own: those that were published, and dry friction in the hinges. In each odd
+block the initial state is fitted to the first second, with the parameters held, and the three
+seconds after it are predicted: once with the parameters identified here, once with those that were
+published with the data. Printed are medians over the windows of the largest error of any angle
+within 1, 2 and 3 s.
 """
 
 from __future__ import annotations
@@ -71,7 +72,8 @@ class Arm:
             ],
             "joints": [
                 {"name": f"j{k}", "type": "revolute", "anchor": [0, pivots[k]],
-                 "bodies": [f"l{k}", f"l{k - 1}" if k else "world"], "damping": values[f"k{k}"]}
+                 "bodies": [f"l{k}", f"l{k - 1}" if k else "world"], "damping": values[f"k{k}"],
+                 "friction": values.get(f"f{k}", 0.0)}
                 for k in range(self.links)
             ],
             "simulation": {"dt": 2.5e-3, "duration": duration, "stepping": "event"},
@@ -98,7 +100,7 @@ class Arm:
 
     def identify(self, folder: Path) -> tuple[dict[str, float], tangible.FitResult]:
         """Parameters from the even blocks, beginning at the published ones."""
-        begin = dict(self.published)
+        begin = {**self.published, **{f"f{k}": 1e-4 for k in range(self.links)}}
         scene = self.scene(begin, BLOCK / 2)
         own: list[dict[str, Any]] = [
             {"name": name, "path": name, "per": "recording"} for name in self.start
@@ -107,7 +109,8 @@ class Arm:
             {"name": f"I{k}", "path": f"bodies/l{k}/inertia", "lower": 1e-6}
             for k in range(self.links)
         ]
-        shared += [{"name": f"k{k}", "path": f"joints/j{k}/damping", "lower": 0}
+        shared += [{"name": name + str(k), "path": f"joints/j{k}/{path}", "lower": 0}
+                   for name, path in (("k", "damping"), ("f", "friction"))
                    for k in range(self.links)]  # fmt: skip
         if self.links == 2:
             # The second link hangs from the first one's end, at −L, by its centre at −L − a1.

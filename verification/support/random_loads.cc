@@ -2,6 +2,7 @@
 //
 // Springs, forces and pairs of random scenes.
 #include <algorithm>
+#include <cmath>
 #include <string>
 
 #include "tangible/verification/support/random_scene_maker.h"
@@ -154,6 +155,13 @@ void SceneMaker::Mechanisms() {
     if (has_coordinate && random.Chance(0.4)) {
       joint.stiffness = random.Uniform(0.5, 20.0);
       joint.rest = random.Uniform(-0.2, 0.2);
+    }
+  }
+  for (BasicJoint<double>& joint : scene_.joints) {
+    const bool has_coordinate =
+        joint.type == JointType::kRevolute || joint.type == JointType::kPrismatic;
+    if (has_coordinate && random.Chance(0.5)) {
+      joint.friction = random.Chance(0.1) ? 0.0 : std::pow(10.0, random.Uniform(-2.0, 1.0));
     }
   }
 }

@@ -77,7 +77,7 @@ class ProblemBuilder {
     for (int k = 0; k < p_.num_bodies; ++k) {
       equations_.Body(k);
     }
-    if (kLevel != Level::kCorrection && equations_.Weight() > 0.0) {
+    if (equations_.Weight() > 0.0) {
       for (const SpringIndex& spring : s_.springs) {
         equations_.Spring(spring);
       }
@@ -191,6 +191,10 @@ class ProblemBuilder {
     block.has_friction = (*friction_)[i].value > 0.0;
     block.c_n = c_n;
     block.c_t = c_t;
+    if (contact.IsJointFriction()) {
+      block.limit_given = block.driven = true;
+      block.offset = T(equations_.Weight());
+    }
     if constexpr (kLevel == Level::kVelocity) {
       block.c_n += PrescribedSpeed(s_, state_, contact.a, rows.normal_a, contact.b, rows.normal_b);
       block.c_t +=

@@ -105,7 +105,8 @@ void ContactSearch::FindLimits(const Model<double>& model, double h,
       limit.joint = static_cast<int>(j);
       limit.side = side;
       ContactRows<double> rows;
-      EvaluateLimitRows(model, scratch.joints[j], limit, &rows);
+      EvaluateLimitRows(model.parameters[LimitNumber(joint, limit)], scratch.joints[j], limit,
+                        &rows);
       limit.gap = rows.geometry.gap;
       if (limit.gap > structure.settings.contact_margin + h * limit_bound_[j]) {
         continue;
@@ -224,6 +225,10 @@ void ContactSearch::Find(const Model<double>& model, const State<double>& state,
   }
   FindLimits(model, h, scratch, contacts);
   friction->resize(contacts->size());
+  AppendJointFriction(model, contacts);
+  for (size_t i = friction->size(); i < contacts->size(); ++i) {
+    friction->push_back(FrictionOf(model, (*contacts)[i]));
+  }
   restitution->resize(contacts->size());
 }
 

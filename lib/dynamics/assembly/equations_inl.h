@@ -117,7 +117,7 @@ class Equations {
   /// more variables than a local Jet has.
   void JointSpring(int j) {
     const JointIndex& joint = s_.joints[j];
-    if (kLevel == Level::kCorrection || joint.stiffness < 0 || Weight() == 0.0) {
+    if (joint.stiffness < 0 || Weight() == 0.0) {
       return;
     }
     b_.Begin();
@@ -182,8 +182,10 @@ class Equations {
     b_.Contact(i, contact, rows, rates.normal, rates.tangent);
   }
 
-  /// What forces are multiplied by: the step's length, or 1.
-  double Weight() const { return kLevel == Level::kVelocity ? at_.h : 1.0; }
+  /// What forces are multiplied by: the step's length, or 1; corrections have none.
+  double Weight() const {
+    return kLevel == Level::kVelocity ? at_.h : kLevel == Level::kAcceleration ? 1.0 : 0.0;
+  }
 
   /// The factor of the joints' position errors: their correction acts in steps, not in impacts.
   double DriftShare() const {
@@ -234,10 +236,10 @@ class Equations {
     if constexpr (!Builder::kKeepsJoints) {
       EvaluateRows(joint, &of_joint, &rates_of_joint);
     }
-    EvaluateLimitRows(b_.Number(contact.side > 0.0 ? joint.low : joint.high), of_joint, contact,
-                      rows);
+    const T limit = contact.IsJointFriction() ? T(0.0) : b_.Number(LimitNumber(joint, contact));
+    EvaluateLimitRows(limit, of_joint, contact, rows);
     if constexpr (kLevel == Level::kAcceleration) {
-      rates->normal = contact.side * rates_of_joint.coordinate;
+      SetLimitRates(contact, rates_of_joint, rates);
     }
   }
 

@@ -58,6 +58,27 @@ CoefficientSource MixedFriction(const Model<double>& model, int a, int b) {
              structure.settings.friction_mixing);
 }
 
+CoefficientSource FrictionOf(const Model<double>& model, const ActiveContact& contact) {
+  if (contact.joint < 0) {
+    return MixedFriction(model, contact.a, contact.b);
+  }
+  return contact.IsJointFriction() ? Own(model, model.structure->joints[contact.joint].friction)
+                                   : CoefficientSource();
+}
+
+void AppendJointFriction(const Model<double>& model, std::vector<ActiveContact>* contacts) {
+  const std::vector<JointIndex>& joints = model.structure->joints;
+  for (size_t j = 0; j < joints.size(); ++j) {
+    if (joints[j].friction >= 0) {
+      ActiveContact& contact = contacts->emplace_back();
+      contact.a = joints[j].a;
+      contact.b = joints[j].b;
+      contact.joint = static_cast<int>(j);
+      contact.law = ContactLaw::kInelastic;
+    }
+  }
+}
+
 CoefficientSource MixedRestitution(const Model<double>& model, int a, int b) {
   const ModelStructure& structure = *model.structure;
   const PairIndex* pair = structure.FindPair(a, b);

@@ -14,7 +14,9 @@
 //
 // An impact is e > 0, n·v < −threshold and gap + h n·v_free < margin; in penetration the smaller of
 // both constants holds. A joint limit is a row like a contact without friction or restitution, its
-// gap the coordinate's distance from the limit.
+// gap the coordinate's distance from the limit. Dry friction in a joint is a contact without a
+// normal row, which is always closed: its tangent row is the coordinate's, and the force or torque
+// at which it slides stands in the place of μ (contact_problem.h).
 //
 // The law is a discrete choice made in double; on either side of a choice the derivative is that of
 // the chosen law. Between kGap and kRestitution the map jumps: the margins say how near that is.
@@ -28,14 +30,20 @@ namespace tangible {
 
 enum class ContactLaw : unsigned char { kGap, kRecovery, kRestitution, kInelastic, kPoisson };
 
-/// The discrete part of a contact of a step. A limit has joint ≥ 0 and no feature.
+/// The discrete part of a contact of a step. A limit or friction in a joint has joint ≥ 0 and no
+/// feature.
 struct ActiveContact {
   int a = -1, b = -1;  ///< bodies; a < b for contacts of shapes
   ContactFeature feature;
-  int joint = -1;     ///< of a limit
-  double side = 0.0;  ///< of a limit: +1 low, −1 high
+  int joint = -1;     ///< of a limit or friction in a joint
+  double side = 0.0;  ///< of a limit: +1 low, −1 high; 0 of friction in a joint
   ContactLaw law = ContactLaw::kGap;
   double gap = 0.0;  ///< m (rad for the limit of an angle), at the step's start
+  bool IsJointFriction() const { return joint >= 0 && side == 0.0; }
+  /// Whether both are of the same shapes, as the two ends of a face are, or of the same joint.
+  bool IsBetweenTheSame(const ActiveContact& other) const {
+    return a == other.a && b == other.b && joint == other.joint;
+  }
   /// Whether two steps' contacts are the same one.
   bool SameAs(const ActiveContact& other) const {
     return a == other.a && b == other.b && feature == other.feature && joint == other.joint &&
@@ -55,6 +63,11 @@ struct CoefficientSource {
 /// minimum, maximum (at a tie the mean of both derivatives), geometric mean (at 0 derivative 0).
 CoefficientSource MixedFriction(const Model<double>& model, int a, int b);
 CoefficientSource MixedRestitution(const Model<double>& model, int a, int b);
+/// Of any active contact: mixed between shapes, that of a joint's friction; a limit has none.
+CoefficientSource FrictionOf(const Model<double>& model, const ActiveContact& contact);
+
+/// The friction of each joint that has some, active at all times.
+void AppendJointFriction(const Model<double>& model, std::vector<ActiveContact>* contacts);
 
 /// The coefficient in T: value and chain rule of the source.
 template <typename T>
@@ -146,39 +159,54 @@ void EvaluateContactRows(const Model<T>& model, const std::vector<Pose<T>>& pose
   EvaluateContactRows(model, poses[contact.a], poses[contact.b], contact, rows);
 }
 
-/// How fast a contact's points part (n v), and slide (t v), m/s.
+/// Evaluates a joint limit: the coordinate's row times its side, gap = side (coordinate − limit),
+/// no tangent; or friction in a joint: the coordinate's row as the tangent, no normal, gap 0.
+/// `limit`: of friction any number.
+template <typename T>
+void EvaluateLimitRows(const T& limit, const JointRows<T>& joint_rows, const ActiveContact& contact,
+                       ContactRows<T>* rows) {
+  const bool slides = contact.IsJointFriction();
+  rows->geometry.gap = slides ? T(0.0) : T(contact.side * (joint_rows.coordinate - limit));
+  rows->geometry.normal = Vector2<T>(T(0.0), T(0.0));
+  rows->geometry.point = Vector2<T>(T(0.0), T(0.0));
+  for (int i = 0; i < 3; ++i) {
+    rows->normal_a[i] = slides ? T(0.0) : T(contact.side * joint_rows.coordinate_a[i]);
+    rows->normal_b[i] = slides ? T(0.0) : T(contact.side * joint_rows.coordinate_b[i]);
+    rows->tangent_a[i] = slides ? joint_rows.coordinate_a[i] : T(0.0);
+    rows->tangent_b[i] = slides ? joint_rows.coordinate_b[i] : T(0.0);
+  }
+}
+
+/// The number of the model that a limit or friction in a joint is at.
+inline int LimitNumber(const JointIndex& joint, const ActiveContact& contact) {
+  return contact.IsJointFriction() ? joint.friction : contact.side > 0.0 ? joint.low : joint.high;
+}
+
+/// Any active contact at a state.
+template <typename T>
+void EvaluateActiveRows(const Model<T>& model, const State<T>& state, const ActiveContact& contact,
+                        ContactRows<T>* rows) {
+  if (contact.joint < 0) {
+    EvaluateContactRows(model, state, contact, rows);
+    return;
+  }
+  const JointIndex& joint = model.structure->joints[contact.joint];
+  JointRows<T> joint_rows;
+  EvaluateJoint(joint.type, state.PoseOf(joint.a), state.PoseOf(joint.b),
+                &model.parameters[joint.geometry], &joint_rows);
+  EvaluateLimitRows(model.parameters[LimitNumber(joint, contact)], joint_rows, contact, rows);
+}
+
+/// How fast a contact's points part (n v), and slide (t v), m/s; of a joint rad/s where it turns.
 struct ContactSpeeds {
   double normal, slip;
 };
 inline ContactSpeeds SpeedsOf(const Model<double>& model, const State<double>& state,
                               const ActiveContact& contact) {
   ContactRows<double> rows;
-  EvaluateContactRows(model, state, contact, &rows);
+  EvaluateActiveRows(model, state, contact, &rows);
   return {RelativeSpeed(state, contact.a, rows.normal_a, contact.b, rows.normal_b),
           RelativeSpeed(state, contact.a, rows.tangent_a, contact.b, rows.tangent_b)};
-}
-
-/// Evaluates a joint limit: the coordinate's row times its side, gap = side (coordinate − limit),
-/// no tangent.
-template <typename T>
-void EvaluateLimitRows(const T& limit, const JointRows<T>& joint_rows, const ActiveContact& contact,
-                       ContactRows<T>* rows) {
-  rows->geometry.gap = contact.side * (joint_rows.coordinate - limit);
-  rows->geometry.normal = Vector2<T>(T(0.0), T(0.0));
-  rows->geometry.point = Vector2<T>(T(0.0), T(0.0));
-  for (int i = 0; i < 3; ++i) {
-    rows->normal_a[i] = contact.side * joint_rows.coordinate_a[i];
-    rows->normal_b[i] = contact.side * joint_rows.coordinate_b[i];
-    rows->tangent_a[i] = T(0.0);
-    rows->tangent_b[i] = T(0.0);
-  }
-}
-template <typename T>
-void EvaluateLimitRows(const Model<T>& model, const JointRows<T>& joint_rows,
-                       const ActiveContact& contact, ContactRows<T>* rows) {
-  const JointIndex& joint = model.structure->joints[contact.joint];
-  EvaluateLimitRows(model.parameters[contact.side > 0.0 ? joint.low : joint.high], joint_rows,
-                    contact, rows);
 }
 
 }  // namespace tangible

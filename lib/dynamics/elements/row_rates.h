@@ -43,6 +43,14 @@ struct ContactRates {
   T tangent{0.0};
 };
 
+/// Those of a limit or friction in a joint.
+template <typename T>
+void SetLimitRates(const ActiveContact& contact, const JointRates<T>& of_joint,
+                   ContactRates<T>* rates) {
+  (contact.IsJointFriction() ? rates->tangent : rates->normal) =
+      contact.IsJointFriction() ? of_joint.coordinate : T(contact.side * of_joint.coordinate);
+}
+
 /// Memory of shapes in dual numbers.
 template <typename T>
 struct ContactRateScratch {

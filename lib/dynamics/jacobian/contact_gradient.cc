@@ -29,6 +29,12 @@ class GradientVisitor : private internal::LocalEntries<EntryListSink> {
 
   void Slip(const ActiveContact& contact) {
     Locals locals;
+    if (contact.joint >= 0) {
+      JointRows<LocalJet> rows;
+      LocalJointRows(s_.joints[contact.joint], &locals, &rows);
+      Speed(contact, locals, rows.coordinate_a, rows.coordinate_b);
+      return;
+    }
     ContactRows<LocalJet> rows;
     LocalContactRows(contact, &locals, &rows);
     Speed(contact, locals, rows.tangent_a, rows.tangent_b);

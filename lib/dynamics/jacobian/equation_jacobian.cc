@@ -54,7 +54,7 @@ class EntryBuilder : private internal::LocalEntries<Sink> {
         equations_.Body(k);
       }
     }
-    if (kLevel != Level::kCorrection && equations_.Weight() > 0.0) {
+    if (equations_.Weight() > 0.0) {
       for (const SpringIndex& spring : s_.springs) {
         equations_.Spring(spring);
       }
@@ -254,7 +254,7 @@ class EntryBuilder : private internal::LocalEntries<Sink> {
   void BodyByHand(int k) {
     const int body = s_.moving[k];
     const BodyIndex& index = s_.bodies[body];
-    const double weight = kLevel == Level::kCorrection ? 0.0 : equations_.Weight();
+    const double weight = equations_.Weight();
     for (int i = 0; i < 3; ++i) {
       const int inertial = i < 2 ? index.mass : index.inertia;
       const int damping = i < 2 ? index.linear_damping : index.angular_damping;
@@ -521,7 +521,7 @@ class EntryBuilder : private internal::LocalEntries<Sink> {
     if (contact.joint >= 0) {
       JointRates<LocalJet> of_joint;
       RatesByTwist(s_.joints[contact.joint], twists, &of_joint);
-      rates->normal = contact.side * of_joint.coordinate;
+      SetLimitRates(contact, of_joint, rates);
       return;
     }
     const MovingPose<LocalJet> a = ByTwist(contact.a, twists);

@@ -103,6 +103,7 @@ void AddJoints(const BasicScene<T>& scene, Places* places, ModelStructure* struc
         index.high = places->Take(1);
       }
       index.stiffness = joint.stiffness ? places->Take(2) : -1;
+      index.friction = joint.friction ? places->Take(1) : -1;
     }
     if (joint.effort_signal) {
       index.effort_signal = static_cast<int>(structure->signals.size());
@@ -236,6 +237,9 @@ void FillJoints(const BasicScene<T>& scene, const State<T>& drawn, int world,
       if (joint.stiffness) {
         numbers->push_back(*joint.stiffness);
         numbers->push_back(joint.rest);
+      }
+      if (joint.friction) {
+        numbers->push_back(*joint.friction);
       }
     }
   }

@@ -14,7 +14,7 @@ constexpr int kMaxRounds = 20;
 // Changes a mode that the solution contradicts; whether it did.
 bool ChangeMode(const ContactValues& values, double normal, double tangent, double impulse_scale,
                 ContactBlock<double>* contact, ContactMode* mode) {
-  const double zeta = std::max(impulse_scale, values.sigma_n / values.mobility_n);
+  const double zeta = NormalScale(*contact, values, impulse_scale);
   const bool approaches = values.s_n < -kModeTolerance * values.sigma_n;
   if (*mode == ContactMode::kOpen) {
     if (approaches) {

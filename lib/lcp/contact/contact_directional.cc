@@ -27,8 +27,8 @@ ContactKink KinkOf(const ContactProblem<double>& problem, const ContactSolution<
   const double* v = solution.motion.data();
   const ContactValues values = Evaluate(problem, scales, c, v);
   const double normal = solution.normal_impulse[i];
-  const double zeta = std::max(scales.impulse, values.sigma_n / values.mobility_n);
-  const bool loaded = normal > tolerance * zeta;
+  const double zeta = NormalScale(c, values, scales.impulse);
+  const bool loaded = c.limit_given || normal > tolerance * zeta;
   const double along = values.slip > 0.0 ? 1.0 : -1.0;
   if (!loaded) {
     if (!touching && std::abs(values.s_n) > tolerance * values.sigma_n) {

@@ -41,8 +41,11 @@ class InteriorPointSystem {
   // Redundant contacts make K as ill-conditioned as 1 / complementarity. A term on the change of z
   // bounds that and does not change the solution.
 
-  // Whether a row of z, s exists: the normal one, or a contact with friction.
-  bool Used(int row) const { return row % 3 == 0 || p_.contacts[row / 3].has_friction; }
+  // Whether a row of z, s exists: the normal one, unless λn is given, or a contact with friction.
+  bool Used(int row) const {
+    const ContactBlock<T>& contact = p_.contacts[row / 3];
+    return row % 3 == 0 ? !contact.limit_given : contact.has_friction;
+  }
   void SetPattern() {
     w_.edges.clear();
     for (const DamperBlock<T>& damper : p_.dampers) {
@@ -208,7 +211,8 @@ class InteriorPointSystem {
       const int at = 3 * (nb_ + nj_ + i);
       const T* dz = x + at;
       AddRowTransposed(c.a, c.normal_a, c.b, c.normal_b, dz[0], r);
-      r[at] -= RowDot(c.a, c.normal_a, c.b, c.normal_b, x) + ContactDiagonal(3 * i) * dz[0];
+      r[at] -= RowDot(c.a, c.normal_a, c.b, c.normal_b, x) +
+               (Used(3 * i) ? ContactDiagonal(3 * i) : T(1.0)) * dz[0];
       if (c.has_friction) {
         const T tangential = dz[1] - c.friction * dz[0];
         AddRowTransposed(c.a, c.tangent_a, c.b, c.tangent_b, tangential, r);

@@ -50,6 +50,8 @@ class ContactIteration : private InteriorPointSystem<T> {
       if (Used(i)) {
         w_.z[i] = T(w_.unit_z[i]);
         w_.s[i] = T(w_.unit_s[i]);
+      } else if (i % 3 == 0) {
+        w_.z[i] = p_.contacts[i / 3].offset;
       }
     }
   }
@@ -145,7 +147,7 @@ class ContactIteration : private InteriorPointSystem<T> {
   }
 
   ContactMode Mode(int i) const {
-    if (!ImpulseDominates(3 * i)) {
+    if (Used(3 * i) && !ImpulseDominates(3 * i)) {
       return ContactMode::kOpen;
     }
     if (!p_.contacts[i].has_friction) {
@@ -184,8 +186,10 @@ class ContactIteration : private InteriorPointSystem<T> {
     w_.unit_s.assign(3 * nc_, 1.0);
     for (int i = 0; i < nc_; ++i) {
       const ContactBlock<T>& c = p_.contacts[i];
-      w_.unit_s[3 * i] = speed;
-      w_.unit_z[3 * i] = speed / RowMobility(p_.mass, c.a, c.normal_a, c.b, c.normal_b);
+      if (Used(3 * i)) {
+        w_.unit_s[3 * i] = speed;
+        w_.unit_z[3 * i] = speed / RowMobility(p_.mass, c.a, c.normal_a, c.b, c.normal_b);
+      }
       if (c.has_friction) {
         const double impulse = speed / RowMobility(p_.mass, c.a, c.tangent_a, c.b, c.tangent_b);
         w_.unit_s[3 * i + 1] = speed;
@@ -223,7 +227,9 @@ class ContactIteration : private InteriorPointSystem<T> {
       const T* s = &w_.s[3 * i];
       T* out = r + 3 * (nb_ + nj_ + i);
       AddRowTransposed(c.a, c.normal_a, c.b, c.normal_b, z[0], r);
-      out[0] = s[0] - c.c_n - RowDot(c.a, c.normal_a, c.b, c.normal_b, v);
+      if (Used(3 * i)) {
+        out[0] = s[0] - c.c_n - RowDot(c.a, c.normal_a, c.b, c.normal_b, v);
+      }
       if (c.has_friction) {
         const T tangential = z[1] - c.friction * z[0];
         AddRowTransposed(c.a, c.tangent_a, c.b, c.tangent_b, tangential, r);

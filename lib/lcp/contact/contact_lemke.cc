@@ -84,7 +84,7 @@ MixedLcp<double> DenseProblem(const ContactProblem<double>& problem) {
   row = 0;
   for (const ContactBlock<double>& c : problem.contacts) {
     SetRow(c.a, c.normal_a, c.b, c.normal_b, 1.0, &dense.G, row);
-    dense.c(row) = c.c_n;
+    dense.c(row) = c.limit_given ? 1.0 : c.c_n;  // so that its z is 0
     if (c.offset > 0.0) {
       AddRowTransposed(c.a, c.normal_a, c.b, c.normal_b, c.offset, dense.p.data());
     }

@@ -18,7 +18,8 @@ ContactMode ModeOfClosing(const ContactBlock<double>& contact, const ContactValu
     return ContactMode::kClosed;
   }
   const double needed = std::abs(values.slip) / values.mobility_t;
-  const double available = contact.friction * -values.s_n / values.mobility_n;
+  const double available = contact.limit_given ? contact.friction * contact.offset
+                                               : contact.friction * -values.s_n / values.mobility_n;
   return needed <= available ? ContactMode::kSticking
          : values.slip > 0.0 ? ContactMode::kSlidingPositive
                              : ContactMode::kSlidingNegative;
@@ -27,8 +28,11 @@ ContactMode ModeOfClosing(const ContactBlock<double>& contact, const ContactValu
 ModeChange Contradiction(const ContactBlock<double>& contact, const ContactValues& values,
                          ContactMode mode, double normal, double tangent, double impulse_scale,
                          double tolerance) {
-  const double zeta = std::max(impulse_scale, values.sigma_n / values.mobility_n);
+  const double zeta = NormalScale(contact, values, impulse_scale);
   ModeChange change{mode};
+  if (mode == ContactMode::kOpen && contact.limit_given) {
+    return {ModeOfClosing(contact, values), 1.0};
+  }
   if (mode == ContactMode::kOpen) {
     if (values.s_n < -kModeTolerance * values.sigma_n) {
       change.violation = -values.s_n / values.sigma_n;

@@ -84,8 +84,8 @@ bool ContactPivoting::SolveSystem() {
       push(c.a, c.tangent_a, c.b, c.tangent_b, -SlidingSign(mode) * c.friction * shift.b);
     }
     const size_t row = 3 * static_cast<size_t>(block_of[i]);
-    x_[2 * row] = delta[row] * shift.centre_n - c.c_n;
-    x_[2 * row + 1] = -shift.a_n;
+    x_[2 * row] = c.limit_given ? c.offset : delta[row] * shift.centre_n - c.c_n;
+    x_[2 * row + 1] = c.limit_given ? 0.0 : -shift.a_n;
     if (mode == ContactMode::kSticking) {
       x_[2 * row + 2] = delta[row + 1] * shift.centre_t - c.c_t;
       x_[2 * row + 3] = -shift.a_t;
@@ -175,15 +175,19 @@ int ContactPivoting::Tests(int contact, Test* tests) const {
                 ContactMode::kSlidingPositive};
     return 2;
   }
-  tests[0] = Impulse(contact);
-  tests[0].next = ContactMode::kOpen;
-  if (mode == ContactMode::kClosed) {
-    return 1;
+  int count = 0;
+  if (!problem_->contacts[contact].limit_given) {
+    tests[0] = Impulse(contact);
+    tests[0].next = ContactMode::kOpen;
+    count = 1;
   }
-  const Test sliding = Sliding(contact);
-  const double sign = SlidingSign(mode);
-  tests[1] = {sign * sliding.value, sign * sliding.rate, ContactMode::kSticking};
-  return 2;
+  if (mode != ContactMode::kClosed) {
+    const Test sliding = Sliding(contact);
+    const double sign = SlidingSign(mode);
+    tests[count] = {sign * sliding.value, sign * sliding.rate, ContactMode::kSticking};
+    ++count;
+  }
+  return count;
 }
 
 // Shifts under which the present modes solve the problem at τ = 1.
@@ -196,7 +200,8 @@ bool ContactPivoting::Start(From from) {
     // the solution: it opens instead.
     bool opened = false;
     for (size_t i = 0; i < modes_.size(); ++i) {
-      if (Slides(modes_[i]) && Impulse(static_cast<int>(i)).At(1.0) <= 0.0) {
+      if (Slides(modes_[i]) && !problem_->contacts[i].limit_given &&
+          Impulse(static_cast<int>(i)).At(1.0) <= 0.0) {
         modes_[i] = ContactMode::kOpen;
         opened = true;
       }
@@ -241,7 +246,7 @@ void ContactPivoting::RaiseInequalities(From from) {
     } else if (mode == ContactMode::kSticking) {
       const double friction = std::abs(Friction(i).At(1.0)) / p.contacts[k].friction;
       shift.b = needed(impulse - friction, impulse_scale, Scatter(k, 2));
-    } else {
+    } else if (!p.contacts[k].limit_given) {
       shift.b = needed(impulse, impulse_scale, Scatter(k, 2));
     }
   }
@@ -341,6 +346,12 @@ bool ContactPivoting::Solve(const ContactProblem<double>& problem, From from, do
   modes_ = solution->modes;
   if (from == From::kOpen) {
     modes_.assign(modes_.size(), ContactMode::kOpen);
+  }
+  for (size_t i = 0; i < modes_.size(); ++i) {
+    const ContactBlock<double>& contact = problem.contacts[i];
+    if (contact.limit_given && modes_[i] == ContactMode::kOpen) {
+      modes_[i] = contact.has_friction ? ContactMode::kSlidingPositive : ContactMode::kClosed;
+    }
   }
   SetCentre(*solution);
   if (!Start(from)) {

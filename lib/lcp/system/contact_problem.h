@@ -23,6 +23,8 @@
 //   σ⁻  = 2 μ λn − σ       ⊥ w⁻         σ⁻ = μ λn − λt
 // An impact's decompression (contact_decompression.h) adds a least impulse o to a contact:
 //   s_n = n v + c_n ≥ 0,   λn ≥ o,   s_n (λn − o) = 0
+// Dry friction in a joint is a contact without a normal row: λn = o = h, and μ is the torque or force
+// at which it slides.
 // The planar form has a unique, strictly complementary solution at a disc at rest, where the
 // one-sided form of two friction rows has a continuum.
 
@@ -86,6 +88,8 @@ struct ContactBlock {
   double rounding = 0.0;
   /// λn = o with s_n ≥ 0: in the mode system this equation stands in place of s_n = 0.
   bool driven = false;
+  /// Friction whose limit μ o is given: its normal rows are 0, and it is driven whatever moves.
+  bool limit_given = false;
 };
 
 template <typename T>

@@ -118,7 +118,12 @@ void ContactScales::Compute(const ContactProblem<double>& problem,
     RaiseLevers(problem, solution);
     AddPushes(problem, solution);
   }
-  impulse = ImpulseScale(solution.normal_impulse);
+  impulse = 0.0;
+  for (size_t i = 0; i < problem.contacts.size(); ++i) {
+    if (!problem.contacts[i].limit_given) {
+      impulse = std::max(impulse, std::abs(solution.normal_impulse[i]));
+    }
+  }
 }
 
 void ContactScales::ComputeSpeeds(const ContactProblem<double>& problem,
@@ -176,6 +181,9 @@ ContactValues Evaluate(const ContactProblem<double>& problem, const ContactScale
   values.s_n = RowDot(c.a, c.normal_a, c.b, c.normal_b, v) + c.c_n;
   values.sigma_n = RowSpeed(scales, c.a, c.normal_a, c.b, c.normal_b) + std::abs(c.c_n);
   values.mobility_n = RowMobility(problem.mass, c.a, c.normal_a, c.b, c.normal_b);
+  if (c.limit_given) {
+    values.sigma_n = 0.0;
+  }
   values.slip = values.sigma_t = 0.0;
   values.mobility_t = 1.0;
   if (c.has_friction) {
@@ -185,7 +193,17 @@ ContactValues Evaluate(const ContactProblem<double>& problem, const ContactScale
     // One contact, one scale of speed: an impulse along one row leaves rounding in the other.
     values.sigma_n = values.sigma_t = std::max(values.sigma_n, values.sigma_t);
   }
+  if (c.limit_given) {  // far from closing, as it has no gap
+    values.s_n = values.sigma_n = values.sigma_n > 0.0 ? values.sigma_n : 1.0;
+    values.mobility_n = c.offset > 0.0 ? values.sigma_n / c.offset : 1.0;
+  }
   return values;
+}
+
+double NormalScale(const ContactBlock<double>& contact, const ContactValues& values,
+                   double impulse_scale) {
+  const double own = values.sigma_n / values.mobility_n;
+  return contact.limit_given ? own : std::max(impulse_scale, own);
 }
 
 double ImpulseScale(const std::vector<double>& impulses) {
@@ -207,7 +225,7 @@ double NaturalResidual(const ContactProblem<double>& problem,
     const ContactBlock<double>& c = problem.contacts[i];
     const ContactValues values = Evaluate(problem, scales, c, solution.motion.data());
     const double normal = solution.normal_impulse[i];
-    const double zeta = std::max(scales.impulse, values.sigma_n / values.mobility_n);
+    const double zeta = NormalScale(c, values, scales.impulse);
     double residual = RowResidual(normal - c.offset, zeta, values.s_n, values.sigma_n);
     if (c.has_friction) {
       const double limit = c.friction * normal;
@@ -269,7 +287,7 @@ void FindDegenerateContacts(const ContactProblem<double>& problem,
     const ContactBlock<double>& c = problem.contacts[i];
     const ContactValues values = Evaluate(problem, scales, c, solution.motion.data());
     const double normal = solution.normal_impulse[i];
-    const double zeta = std::max(scales.impulse, values.sigma_n / values.mobility_n);
+    const double zeta = NormalScale(c, values, scales.impulse);
     const bool grazes =
         std::abs(values.s_n) <= tolerance * values.sigma_n && normal - c.offset <= tolerance * zeta;
     const double zeta_t = std::max(zeta * c.friction, values.sigma_t / values.mobility_t);
@@ -296,7 +314,7 @@ ContactMargin MarginOfContact(const ContactProblem<double>& problem,
   if (mode == ContactMode::kOpen) {
     return {ratio(values.s_n, values.sigma_n), Kind::kClosing};
   }
-  const double zeta = std::max(scales.impulse, values.sigma_n / values.mobility_n);
+  const double zeta = NormalScale(c, values, scales.impulse);
   const ContactMargin opening =
       c.driven ? ContactMargin{ratio(values.s_n, values.sigma_n), Kind::kClosing}
                : ContactMargin{ratio(normal - c.offset, zeta), Kind::kOpening};

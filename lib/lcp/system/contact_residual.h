@@ -58,6 +58,10 @@ ContactValues Evaluate(const ContactProblem<double>& problem, const ContactScale
 /// The largest magnitude of a list of impulses.
 double ImpulseScale(const std::vector<double>& impulses);
 
+/// ζ of a contact's normal impulse.
+double NormalScale(const ContactBlock<double>& contact, const ContactValues& values,
+                   double impulse_scale);
+
 /// Scaled natural residual: the largest over rows of |min(z/ζ, s/σ)|, with σ the sum of |terms| of
 /// s and ζ the largest z of its kind (or σ over the row's mobility if that is larger), and the
 /// equations' residuals scaled by their terms.

@@ -49,6 +49,9 @@ Approach ApproachOf(const ModelStructure& s, const StepRecord& r, size_t i) {
 }  // namespace
 
 std::string ContactName(const ModelStructure& structure, const ActiveContact& contact) {
+  if (contact.IsJointFriction()) {
+    return "friction in joint " + structure.joints[contact.joint].name;
+  }
   if (contact.joint >= 0) {
     return std::string(contact.side > 0.0 ? "low" : "high") + " limit of joint " +
            structure.joints[contact.joint].name;

@@ -66,6 +66,10 @@ class RolloutCertifier {
   void AddStart(const Model<double>& model, const EventRecord& record);
   void ProbeStarts(const Model<double>& model, const State<double>& start,
                    const std::vector<const ActiveContact*>& touching, const Segment* first);
+  /// Whether friction in a joint that is at rest as the run starts, and slides at once, keeps its
+  /// side: no direction changes the rate.
+  bool KeepsSide(const Model<double>& model, const Segment& segment,
+                 const ActiveContact& contact) const;
   void AddImpact(const Model<double>& model, long step, Impulses* impact);
   void AddOtherSlips(const Model<double>& model, const Segment& segment, const Place& place);
   void AddSegment(const Model<double>& model, long step, EventDerivative* derivative,

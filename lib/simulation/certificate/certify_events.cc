@@ -240,7 +240,7 @@ void RolloutCertifier::AddOtherSlips(const Model<double>& model, const Segment& 
   for (size_t i = 0; i < segment.contacts.size(); ++i) {
     const ActiveContact& other = segment.contacts[i];
     const double slip = SlipOf(model, segment.before, other);
-    if (SlidingSign(segment.modes[i]) != 0.0 && (other.a != ends.a || other.b != ends.b) &&
+    if (SlidingSign(segment.modes[i]) != 0.0 && !other.IsBetweenTheSame(ends) &&
         coupled.GroupOf(other) == coupled.GroupOf(ends) &&
         SlipOf(model, segment.after, other) <= Negligible(model, slip)) {
       AddMargin(0.0, place, "two contacts stop sliding at the same time");
@@ -254,8 +254,10 @@ void RolloutCertifier::AddSegment(const Model<double>& model, long step,
   SolvedNode& start = segment->stages[0];
   loaded_.clear();
   double largest = 0.0;
-  for (const double normal : start.solution.normal_impulse) {
-    largest = std::max(largest, normal);
+  for (size_t i = 0; i < segment->contacts.size(); ++i) {
+    if (!segment->contacts[i].IsJointFriction()) {
+      largest = std::max(largest, start.solution.normal_impulse[i]);
+    }
   }
   for (size_t i = 0; i < segment->contacts.size(); ++i) {
     const ActiveContact& contact = segment->contacts[i];
@@ -266,9 +268,11 @@ void RolloutCertifier::AddSegment(const Model<double>& model, long step,
       AddMargin(margin, place, what);
       certificate_.degenerate_rows += margin < kDegenerateTolerance ? 1 : 0;
     };
-    add_margin(largest > 0.0 ? normal / largest : 0.0, "normal force");
-    if (normal > kLoaded * largest) {
-      loaded_.push_back(contact);
+    if (!contact.IsJointFriction()) {
+      add_margin(largest > 0.0 ? normal / largest : 0.0, "normal force");
+      if (normal > kLoaded * largest) {
+        loaded_.push_back(contact);
+      }
     }
     if (contact.joint < 0 && !HasPair(closed_, contact) &&
         MeetsACorner(model, segment->before, contact)) {
@@ -278,11 +282,12 @@ void RolloutCertifier::AddSegment(const Model<double>& model, long step,
     // sticks this says only how they share the load.
     const bool shared = std::any_of(
         segment->contacts.begin(), segment->contacts.end(), [&](const ActiveContact& other) {
-          return &other != &contact && other.a == contact.a && other.b == contact.b &&
+          return &other != &contact && other.IsBetweenTheSame(contact) &&
                  segment->modes[&other - segment->contacts.data()] == ContactMode::kSticking;
         });
     const bool ends_at_once = segment->length == 0.0 && segment->event == EventKind::kSlipEnds;
-    if (SlidingSign(place.mode) != 0.0 && !shared && !ends_at_once) {
+    if (SlidingSign(place.mode) != 0.0 && !shared && !ends_at_once &&
+        !KeepsSide(model, *segment, contact)) {
       const double slip =
           std::max(SlipOf(model, segment->before, contact), SlipOf(model, segment->after, contact));
       if (slip <= Negligible(model, slip)) {

@@ -80,18 +80,7 @@ bool Moves(const std::vector<JacobianEntry>& gradient, const RowMatrixXd& direct
 
 // Whether a contact neither opens nor approaches.
 bool Rests(const Model<double>& model, const State<double>& state, const ActiveContact& contact) {
-  double speed;
-  if (contact.joint >= 0) {
-    const JointIndex& joint = model.structure->joints[contact.joint];
-    JointRows<double> joint_rows;
-    EvaluateJoint(joint.type, state.PoseOf(joint.a), state.PoseOf(joint.b),
-                  &model.parameters[joint.geometry], &joint_rows);
-    ContactRows<double> rows;
-    EvaluateLimitRows(model, joint_rows, contact, &rows);
-    speed = RelativeSpeed(state, contact.a, rows.normal_a, contact.b, rows.normal_b);
-  } else {
-    speed = SpeedsOf(model, state, contact).normal;
-  }
+  const double speed = SpeedsOf(model, state, contact).normal;
   return std::abs(speed) <= Negligible(model, speed);
 }
 
@@ -137,6 +126,20 @@ std::vector<ActiveContact> ThatMayJam(const Model<double>& model, const State<do
 
 }  // namespace
 
+bool RolloutCertifier::KeepsSide(const Model<double>& model, const Segment& segment,
+                                 const ActiveContact& contact) const {
+  if (!segment.starts || !contact.IsJointFriction() || options_.directions.cols() == 0) {
+    return false;
+  }
+  LocalJacobianScratch scratch;
+  std::vector<JacobianEntry> slip;
+  AddSlipGradient(model, segment.before, contact, &scratch, &slip);
+  for (Eigen::Index c = 0; c < options_.directions.cols(); ++c) {
+    if (Moves(slip, options_.directions, c)) return false;
+  }
+  return true;
+}
+
 // Contacts that touch as the run starts: in the impacts of its first instant and in the first
 // segment.
 void RolloutCertifier::AddStart(const Model<double>& model, const EventRecord& record) {
@@ -151,7 +154,7 @@ void RolloutCertifier::AddStart(const Model<double>& model, const EventRecord& r
             : part.is_impulses ? &part.impulses.before
                                : &part.segment.before;
     for (const ActiveContact& contact : contacts) {
-      touching.push_back(&contact);
+      if (!contact.IsJointFriction()) touching.push_back(&contact);
     }
     if (!part.is_impulses && part.segment.length > 0.0) {
       first = &part.segment;

@@ -235,15 +235,7 @@ class EventReplay {
           segment->event_sign, solution);
     }
     ContactRows<T> rows;
-    if (contact.joint >= 0) {
-      const JointIndex& joint = s_.joints[contact.joint];
-      JointRows<T> joint_rows;
-      EvaluateJoint(joint.type, after.PoseOf(joint.a), after.PoseOf(joint.b),
-                    &model_.parameters[joint.geometry], &joint_rows);
-      EvaluateLimitRows(model_, joint_rows, contact, &rows);
-    } else {
-      EvaluateContactRows(model_, after, contact, &rows);
-    }
+    EvaluateActiveRows(model_, after, contact, &rows);
     return segment->event == EventKind::kTouch ? rows.geometry.gap
            : segment->event == EventKind::kReturn
                ? RelativeSpeed(after, contact.a, rows.normal_a, contact.b, rows.normal_b)

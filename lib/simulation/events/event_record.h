@@ -103,8 +103,7 @@ struct Segment {
   /// ends of a face, begin to slide as one, when the sum of their friction reaches the sum of its
   /// limits: how they share it is not determined, and nothing moves before.
   bool SticksWith(size_t i, size_t k) const {
-    return modes[i] == ContactMode::kSticking && contacts[i].joint < 0 &&
-           contacts[i].a == contacts[k].a && contacts[i].b == contacts[k].b;
+    return modes[i] == ContactMode::kSticking && contacts[i].IsBetweenTheSame(contacts[k]);
   }
   /// Whether a contact before it in `contacts` sticks with contact k.
   bool SticksWithEarlier(size_t k) const {

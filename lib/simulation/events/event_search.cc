@@ -190,8 +190,10 @@ void EventSearch::SearchClosed(const Model<double>& model, Event* event) {
     for (const double load : end.motion.stages[0].problem.load) {
       scale = std::max(scale, std::abs(load));
     }
-    for (const double normal : start.normal_impulse) {
-      scale = std::max(scale, std::abs(normal));
+    for (size_t k = 0; k < start.normal_impulse.size(); ++k) {
+      if (!segment_->contacts[k].IsJointFriction()) {
+        scale = std::max(scale, std::abs(start.normal_impulse[k]));
+      }
     }
     // What changes no speed within a step but by its rounding is no force: where none acts (no
     // gravity, bodies that coast side by side) all of them are rounding.
@@ -203,9 +205,10 @@ void EventSearch::SearchClosed(const Model<double>& model, Event* event) {
     }
     const double tolerance =
         std::max(kForceTolerance * scale, mass * slow_ / model.structure->settings.dt);
-    const double normal = start.normal_impulse[i];
-    trial.kind = EventKind::kLiftOff;
-    try_function(normal, tolerance);
+    if (!segment_->contacts[i].IsJointFriction()) {
+      trial.kind = EventKind::kLiftOff;
+      try_function(start.normal_impulse[i], tolerance);
+    }
     if (mode == ContactMode::kSticking && !segment_->SticksWithEarlier(i)) {
       trial.kind = EventKind::kSlipBegins;
       for (const double sign : {1.0, -1.0}) {

@@ -17,15 +17,7 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 double GapAndSpeed(const Model<double>& model, const State<double>& state,
                    const ActiveContact& contact, double* speed) {
   ContactRows<double> rows;
-  if (contact.joint >= 0) {
-    const JointIndex& joint = model.structure->joints[contact.joint];
-    JointRows<double> joint_rows;
-    EvaluateJoint(joint.type, state.PoseOf(joint.a), state.PoseOf(joint.b),
-                  &model.parameters[joint.geometry], &joint_rows);
-    EvaluateLimitRows(model, joint_rows, contact, &rows);
-  } else {
-    EvaluateContactRows(model, state, contact, &rows);
-  }
+  EvaluateActiveRows(model, state, contact, &rows);
   *speed = RelativeSpeed(state, contact.a, rows.normal_a, contact.b, rows.normal_b);
   return rows.geometry.gap;
 }

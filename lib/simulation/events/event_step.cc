@@ -271,7 +271,9 @@ Impulses* EventStepper::ListImpact(const Model<double>& model, double t, double 
     // In a rattle what leaves slowly is to be held with the rest: it would be back at once.
     const double leaves =
         rattles ? std::max(slow, ReturnSpeed(model, state, touching_.contacts[i])) : slow;
-    if (touching_.approach[i] > leaves || !in_group(touching_.contacts[i])) {
+    // Friction in a joint is a force, which does nothing at once.
+    if (touching_.approach[i] > leaves || !in_group(touching_.contacts[i]) ||
+        touching_.contacts[i].IsJointFriction()) {
       continue;
     }
     ActiveContact contact = touching_.contacts[i];
@@ -435,8 +437,7 @@ void EventStepper::SwitchMode(const Segment& segment) {
     if (segment.event == EventKind::kLiftOff && last_contacts_[i].SameAs(segment.event_contact)) {
       last_modes_[i] = ContactMode::kOpen;
     } else if (segment.event == EventKind::kSlipBegins && last_modes_[i] != ContactMode::kOpen &&
-               last_contacts_[i].joint < 0 && last_contacts_[i].a == segment.event_contact.a &&
-               last_contacts_[i].b == segment.event_contact.b) {
+               last_contacts_[i].IsBetweenTheSame(segment.event_contact)) {
       // Both ends of a face slide against the force that was at its limit.
       last_modes_[i] =
           segment.event_sign > 0.0 ? ContactMode::kSlidingNegative : ContactMode::kSlidingPositive;

@@ -19,8 +19,9 @@ void EventStepper::AddTouching(const Model<double>& model, const State<double>& 
   }
   const ContactSpeeds speeds = SpeedsOf(model, state, contact);
   touching_.contacts.push_back(contact);
-  touching_.friction.push_back(MixedFriction(model, contact.a, contact.b));
-  touching_.restitution.push_back(MixedRestitution(model, contact.a, contact.b));
+  touching_.friction.push_back(FrictionOf(model, contact));
+  touching_.restitution.push_back(contact.joint < 0 ? MixedRestitution(model, contact.a, contact.b)
+                                                    : CoefficientSource());
   touching_.approach.push_back(speeds.normal);
   touching_.slip.push_back(speeds.slip);
 }
@@ -59,9 +60,6 @@ void EventStepper::FindTouching(const Model<double>& model, const State<double>&
     if (joint.low < 0) {
       continue;
     }
-    JointRows<double> joint_rows;
-    EvaluateJoint(joint.type, state.PoseOf(joint.a), state.PoseOf(joint.b),
-                  &model.parameters[joint.geometry], &joint_rows);
     for (const double side : {1.0, -1.0}) {
       ActiveContact limit;
       limit.a = joint.a;
@@ -70,17 +68,17 @@ void EventStepper::FindTouching(const Model<double>& model, const State<double>&
       limit.side = side;
       limit.law = ContactLaw::kInelastic;
       ContactRows<double> rows;
-      EvaluateLimitRows(model, joint_rows, limit, &rows);
+      EvaluateActiveRows(model, state, limit, &rows);
       limit.gap = rows.geometry.gap;
       if (limit.gap <= lengths.LimitTouch(state, joint)) {
-        touching_.contacts.push_back(limit);
-        touching_.friction.emplace_back();
-        touching_.restitution.emplace_back();
-        touching_.approach.push_back(
-            RelativeSpeed(state, limit.a, rows.normal_a, limit.b, rows.normal_b));
-        touching_.slip.push_back(0.0);
+        AddTouching(model, state, limit);
       }
     }
+  }
+  found.clear();
+  AppendJointFriction(model, &found);
+  for (const ActiveContact& contact : found) {
+    AddTouching(model, state, contact);
   }
 }
 

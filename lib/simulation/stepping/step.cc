@@ -196,15 +196,17 @@ ContactMode Stepper::InitialMode(const ContactBlock<double>& contact) const {
   };
   add(contact.a, contact.normal_a, contact.tangent_a);
   add(contact.b, contact.normal_b, contact.tangent_b);
-  if (normal >= 0.0) {
+  if (normal >= 0.0 && !contact.limit_given) {
     return ContactMode::kOpen;
   }
   if (!contact.has_friction) {
     return ContactMode::kClosed;
   }
   const double available =
-      -contact.friction * normal /
-      RowMobility(p.mass, contact.a, contact.normal_a, contact.b, contact.normal_b);
+      contact.limit_given
+          ? contact.friction * contact.offset
+          : -contact.friction * normal /
+                RowMobility(p.mass, contact.a, contact.normal_a, contact.b, contact.normal_b);
   const double needed = std::abs(tangent) / RowMobility(p.mass, contact.a, contact.tangent_a,
                                                         contact.b, contact.tangent_b);
   if (needed <= available) {

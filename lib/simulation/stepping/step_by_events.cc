@@ -58,9 +58,10 @@ std::string NameOfContact(const ModelStructure& structure,
     return "joints";
   }
   const ActiveContact& contact = contacts[index];
-  return contact.joint >= 0 ? "limit of joint " + structure.joints[contact.joint].name
-                            : "contact of " + structure.bodies[contact.a].name + " and " +
-                                  structure.bodies[contact.b].name;
+  return contact.IsJointFriction() ? "friction in joint " + structure.joints[contact.joint].name
+         : contact.joint >= 0      ? "limit of joint " + structure.joints[contact.joint].name
+                                   : "contact of " + structure.bodies[contact.a].name + " and " +
+                                    structure.bodies[contact.b].name;
 }
 
 // Forces integrate to impulses with the integrator's own weights.

@@ -121,22 +121,41 @@ TEST(ContactTest, LimitsAreContactsOfTheCoordinate) {
   Model<double> model;
   State<double> state;
   BuildModel(scene, &model, &state);  // limits −1.5, 2 at angle 0.1
-  const JointIndex& joint = model.structure->joints[0];
-  JointRows<double> joint_rows;
-  EvaluateJoint(joint.type, state.PoseOf(joint.a), state.PoseOf(joint.b),
-                &model.parameters[joint.geometry], &joint_rows);
   ActiveContact limit;
   limit.joint = 0;
+  limit.a = model.structure->joints[0].a;
+  limit.b = model.structure->joints[0].b;
   ContactRows<double> rows;
   limit.side = 1.0;
-  EvaluateLimitRows(model, joint_rows, limit, &rows);
+  EvaluateActiveRows(model, state, limit, &rows);
   EXPECT_NEAR(rows.geometry.gap, 1.6, 1e-15);
   EXPECT_EQ(rows.normal_a[2], 1.0);
   limit.side = -1.0;
-  EvaluateLimitRows(model, joint_rows, limit, &rows);
+  EvaluateActiveRows(model, state, limit, &rows);
   EXPECT_NEAR(rows.geometry.gap, 1.9, 1e-15);
   EXPECT_EQ(rows.normal_a[2], -1.0);
   EXPECT_EQ(rows.tangent_a[2], 0.0);
+}
+
+TEST(ContactTest, FrictionInAJointIsAContactWithoutANormal) {
+  Scene scene = test_scenes::SceneOf(test_scenes::Mixture());
+  scene.joints[0].friction = 0.3;
+  Model<double> model;
+  State<double> state;
+  BuildModel(scene, &model, &state);
+  std::vector<ActiveContact> contacts;
+  AppendJointFriction(model, &contacts);
+  ASSERT_EQ(contacts.size(), 1u);
+  EXPECT_TRUE(contacts[0].IsJointFriction());
+  const CoefficientSource source = FrictionOf(model, contacts[0]);
+  EXPECT_EQ(source.value, 0.3);
+  EXPECT_EQ(source.numbers[0], model.structure->joints[0].friction);
+  ContactRows<double> rows;
+  EvaluateActiveRows(model, state, contacts[0], &rows);
+  EXPECT_EQ(rows.geometry.gap, 0.0);
+  EXPECT_EQ(rows.normal_a[2], 0.0);
+  EXPECT_EQ(rows.tangent_a[2], 1.0);
+  EXPECT_EQ(rows.tangent_b[2], -1.0);
 }
 
 TEST(ContactTest, LawConstants) {

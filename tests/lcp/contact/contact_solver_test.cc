@@ -3,6 +3,10 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <random>
+#include <vector>
+
 #include "../../support/contact_problems.h"
 #include "../../support/step_cases.h"
 
@@ -33,6 +37,50 @@ ContactProblem<double> Box(double vx, double friction, int copies) {
     p.contacts.push_back(FloorContact(0, 0.5, -0.1, friction));
   }
   return p;
+}
+
+// Of friction whose limit is given, as in a joint, beside contacts: every solver, the same motion.
+TEST(ContactSolverTest, FrictionWithAGivenLimit) {
+  std::mt19937_64 random(1);
+  int sticking = 0, sliding = 0;
+  for (int trial = 0; trial < 50; ++trial) {
+    ContactProblem<double> problem = testing::RandomContactProblem(&random, 4, 5);
+    for (const size_t i : {1, 3}) {
+      ContactBlock<double>& c = problem.contacts[i];
+      c.normal_a = c.normal_b = {0.0, 0.0, 0.0};
+      c.c_n = 0.0;
+      c.friction = testing::Draw(&random, 0.1, 3.0);
+      c.has_friction = c.limit_given = c.driven = true;
+      c.offset = 0.1;
+    }
+    std::vector<double> motion;
+    for (const ContactSolverChoice choice : kChoices) {
+      ContactSolution<double> solution;
+      const ContactSolverReport report = Solve(problem, choice, &solution);
+      ASSERT_TRUE(report.solved) << trial;
+      if (motion.empty()) motion = solution.motion;
+      for (size_t k = 0; k < motion.size(); ++k) {
+        EXPECT_NEAR(solution.motion[k], motion[k], 1e-8) << trial;
+      }
+      for (const size_t i : {1, 3}) {
+        const ContactBlock<double>& c = problem.contacts[i];
+        const double limit = 0.1 * c.friction;
+        const double slip =
+            RowDot(c.a, c.tangent_a, c.b, c.tangent_b, solution.motion.data()) + c.c_t;
+        const double impulse = solution.tangent_impulse[i];
+        EXPECT_NEAR(solution.normal_impulse[i], 0.1, 1e-14);
+        if (std::abs(slip) < 1e-9) {
+          EXPECT_LE(std::abs(impulse), limit * (1.0 + 1e-9));
+          ++sticking;
+        } else {
+          EXPECT_NEAR(impulse, slip > 0.0 ? -limit : limit, 1e-9);
+          ++sliding;
+        }
+      }
+    }
+  }
+  EXPECT_GT(sticking, 30);
+  EXPECT_GT(sliding, 30);
 }
 
 TEST(ContactSolverTest, RedundantContactsOfABox) {

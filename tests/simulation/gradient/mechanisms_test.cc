@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Drag and joint springs: motions and derivatives against closed forms, by every method.
+// Drag, joint springs and dry friction in joints: motions and derivatives against closed forms, by every method.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -92,6 +92,84 @@ TEST(MechanismsTest, ASpringAtASliderMovesBothBodies) {
                           {-0.6 * 0.2 * std::sin(w) * w / 12.0, 0.6 * (1.0 - std::cos(w))}};
   const std::vector<std::string> paths = {"joints/s/stiffness", "joints/s/rest_displacement"};
   Expect(SceneOf(bodies + Simulation("event", 0.005)), paths, 0, exact, 1e-9);
+}
+
+// A wheel on a hinge with dry friction M:  ω = ω_0 − M t / I until it stops, at θ = I ω_0² / (2 M).
+TEST(MechanismsTest, FrictionAtAHingeStopsAWheel) {
+  const auto wheel = [](const char* stepping, double dt, double friction) {
+    return SceneOf(R"({"gravity": [0, -9.81], "bodies": [
+      {"name": "b", "mass": 2, "inertia": 0.5, "position": [0, 0]}],
+    "joints": [{"name": "h", "type": "revolute", "bodies": ["b", "world"], "anchor": [0, 0],
+                "rate": 2, "friction": )" +
+                   std::to_string(friction) + "}], " + Simulation(stepping, dt));
+  };
+  const std::vector<std::string> paths = {"joints/h/friction", "joints/h/rate", "bodies/b/inertia"};
+  const Expected slows = {2.0 - 0.6 / 0.5, {-1.0 / 0.5, 1.0, 0.6 / 0.25}};
+  const Expected stops = {0.5 * 4.0 / 3.0, {-0.5 * 4.0 / 4.5, 2.0 / 3.0, 4.0 / 3.0}};
+  Expect(wheel("event", 0.1, 0.6), paths, 5, slows, 1e-13);
+  Expect(wheel("fixed", 0.1, 0.6), paths, 5, slows, 1e-13);
+  // It stops after 2/3 s, within a step.
+  Expect(wheel("event", 0.1, 1.5), paths, 2, stops, 1e-12);
+  Expect(wheel("fixed", 0.001, 1.5), paths, 2, stops, 5e-3);
+}
+
+// A force below the limit moves nothing, to the bit, and no parameter changes that; once it exceeds
+// the limit, the slider accelerates by the difference.
+TEST(MechanismsTest, FrictionAtASliderHoldsUpToItsLimit) {
+  const auto slider = [](const char* stepping, double force) {
+    return SceneOf(R"({"gravity": [0, -9.81], "bodies": [
+      {"name": "b", "mass": 2, "inertia": 0.5, "position": [0, 0]}],
+    "joints": [{"name": "s", "type": "prismatic", "bodies": ["b", "world"], "anchor": [0, 0],
+                "axis": [1, 0], "friction": 3, "effort": )" +
+                   std::to_string(force) + "}], " + Simulation(stepping, 0.01));
+  };
+  const std::vector<std::string> paths = {"joints/s/friction", "joints/s/effort", "bodies/b/mass"};
+  for (const char* stepping : {"fixed", "event"}) {
+    Expect(slider(stepping, 2.9), paths, 0, {0.0, {0.0, 0.0, 0.0}}, 1e-15);
+    Expect(slider(stepping, -2.9), paths, 3, {0.0, {0.0, 0.0, 0.0}}, 1e-15);
+    Expect(slider(stepping, 5.0), paths, 3, {1.0, {-0.5, 0.5, -0.5}}, 1e-13);
+    Expect(slider(stepping, -5.0), paths, 3, {-1.0, {0.5, 0.5, 0.5}}, 1e-13);
+  }
+}
+
+// Each half swing of a spring k with dry friction F loses 2 F / k of its amplitude (Lorenz 1924;
+// Den Hartog, Mechanical Vibrations, sec. 8.3): after three of them x = −(x_0 − 6 F / k).
+TEST(MechanismsTest, FrictionTakesItsShareOfEachHalfSwing) {
+  const double k = 9.0 * M_PI * M_PI * 2.0;  // three half swings in the second that it runs
+  const Scene scene = SceneOf(R"({"gravity": [0, 0], "bodies": [
+      {"name": "b", "mass": 2, "inertia": 0.5, "position": [0, 0]}],
+    "joints": [{"name": "s", "type": "prismatic", "bodies": ["b", "world"], "anchor": [0, 0],
+                "axis": [1, 0], "displacement": 1, "friction": 4, "stiffness": )" +
+                              std::to_string(k) + "}], " + Simulation("event", 0.002));
+  const std::vector<std::string> paths = {"joints/s/friction", "joints/s/displacement"};
+  // The last half swing ends with the run, where the velocity's derivatives jump; not the place's.
+  const GradientResult result = Jacobian(scene, paths, GradientMethod::kAdjoint);
+  EXPECT_NEAR(result.values[0], -(1.0 - 24.0 / k), 1e-8);
+  EXPECT_NEAR(result.jacobian(0, 0), 6.0 / k, 1e-8);
+  EXPECT_NEAR(result.jacobian(0, 1), -1.0, 1e-8);
+}
+
+// Both links of a double pendulum come to rest in their hinges, at different times, and a link that
+// had stuck is torn loose again: derivatives by every method, and by differences.
+TEST(MechanismsTest, FrictionBetweenLinks) {
+  for (const char* stepping : {"fixed", "event"}) {
+    const Scene scene = SceneOf(R"({"gravity": [0, -9.81], "bodies": [
+      {"name": "a", "shape": {"box": {"size": [1, 0.1]}}, "mass": 2, "position": [0.5, 0]},
+      {"name": "b", "shape": {"box": {"size": [0.8, 0.1]}}, "mass": 1, "position": [1.4, 0]}],
+    "joints": [{"name": "h", "type": "revolute", "bodies": ["a", "world"], "anchor": [0, 0],
+                "friction": 0.6, "angle": -1},
+               {"name": "k", "type": "revolute", "bodies": ["b", "a"], "anchor": [1, 0],
+                "friction": 0.4, "rate": 2}],
+    "simulation": {"duration": 6, "dt": 0.01, "stepping": ")" +
+                                std::string(stepping) + "\"}}");
+    const std::vector<std::string> paths = {"joints/h/friction", "joints/k/friction",
+                                            "joints/k/rate", "bodies/b/mass"};
+    const GradientResult result = Jacobian(scene, paths, GradientMethod::kAdjoint);
+    EXPECT_EQ(result.certificate.verdict, "trustworthy");
+    testing::ExpectOthersAgree(scene, paths, result);
+    const GradientResult differences = Jacobian(scene, paths, GradientMethod::kFiniteDifference);
+    EXPECT_LT((result.jacobian - differences.jacobian).cwiseAbs().maxCoeff(), 1e-6);
+  }
 }
 
 }  // namespace
