@@ -413,7 +413,7 @@ int Prepare(const std::string& text, const std::string& file, Prepared* prepared
 
 /// The exit status of a fit whose results are written, after a line about what is wrong.
 int Conclude(const std::string& file, const FitResult& result, const DiscretisationCheck* check,
-             const LaterObservations* later, const FitCheckpoint* checkpoint) {
+             const PredictionScore* score, const FitCheckpoint* checkpoint) {
   if (result.status == FitStatus::kNoEffect) {
     return ReportError(file + ": /parameters/" + std::to_string(result.parameter) + ": " +
                        result.message);
@@ -425,9 +425,9 @@ int Conclude(const std::string& file, const FitResult& result, const Discretisat
     return ReportError(file + ": the fit at dt / 2: " + NameOf(check->status) + ": " +
                        check->message);
   }
-  if (later != nullptr && !later->score.message.empty()) {
+  if (score != nullptr && !score->message.empty()) {
     return ReportError(file + ": the run after " + Cell(FLAGS_predict_from, 10) +
-                       " s fails: " + later->score.message);
+                       " s fails: " + score->message);
   }
   // Said above: what was asked for is not there.
   return checkpoint != nullptr && !checkpoint->error().empty() ? kExitFailed : kExitDone;
@@ -493,38 +493,121 @@ int Run(const std::string& text, const std::string& file) {
   const DiscretisationCheck* const checked = check ? &*check : nullptr;
   const LaterObservations* const predicted = later ? &*later : nullptr;
   const int written = WriteFiles(prepared.fit, residuals, result, checked, predicted, noise);
-  return written == kExitDone ? Conclude(file, result, checked, predicted, checkpoint.get())
-                              : written;
+  const PredictionScore* const score = predicted == nullptr ? nullptr : &predicted->score;
+  return written == kExitDone ? Conclude(file, result, checked, score, checkpoint.get()) : written;
 }
 
-/// Several recordings in one fit.
-int RunRecordings(const std::string& text, const std::string& file) {
-  for (const char* flag : {"scene_out", "predictions", "predict_from", "discretisation_check",
-                           "checkpoint", "initial"}) {
+/// The same of a file with recordings.
+struct PreparedRecordings {
+  RecordingsFile file;
+  std::vector<std::vector<Observation>> held_back;  ///< of each recording, or empty
+  std::vector<RecordedRun> runs;
+};
+
+/// Moves what each recording has after --predict_from out of the fit. Returns what is wrong.
+std::string HoldBack(PreparedRecordings* prepared) {
+  bool any = false;
+  for (RecordingEntry& entry : prepared->file.recordings) {
+    std::vector<Observation>& observations = entry.fit.problem.observations;
+    prepared->held_back.push_back(TakeLater(FLAGS_predict_from, &observations));
+    any = any || !prepared->held_back.back().empty();
+    if (observations.empty()) {
+      return "expected a time with observations up to it in each recording, got " +
+             Cell(FLAGS_predict_from, 10) + " with none in '" + entry.name + "'";
+    }
+  }
+  return any ? ""
+             : "expected a time with observations after it, got " + Cell(FLAGS_predict_from, 10);
+}
+
+int Prepare(const std::string& text, const std::string& path, PreparedRecordings* prepared) {
+  for (const char* flag : {"discretisation_check", "checkpoint"}) {
     if (!gflags::GetCommandLineFlagInfoOrDie(flag).is_default) {
       return ReportError(std::string("tangible-fit: --") + flag + ": not with recordings",
                          kExitUsage);
     }
   }
-  RecordingsFile read;
   std::string error;
-  std::vector<RecordedRun> recordings;
-  if (!ParseRecordings(text, file, &read, &error) ||
-      !MakeRecordingsProblem(read, &recordings, &error)) {
+  if (!ParseRecordings(text, path, &prepared->file, &error)) {
     return ReportError(error);
   }
-  for (const RecordingEntry& entry : read.recordings) {
-    if (EstimatesNoise(entry.fit.problem.instruments)) {
-      return ReportError(file + ": /sensors: estimate_sigma is not with recordings");
+  for (RecordingEntry& entry : prepared->file.recordings) {
+    FitProblem& problem = entry.fit.problem;
+    problem.options.max_iterations = FLAGS_max_iterations;
+    if (EstimatesNoise(problem.instruments)) {
+      return ReportError(path + ": /sensors: estimate_sigma is not with recordings");
+    }
+    error = OverrideInitial(FLAGS_initial, &problem.parameters);
+    if (!error.empty()) {
+      return ReportError("tangible-fit: --initial: " + error, kExitUsage);
+    }
+    error = OverrideDerivatives(&problem.options);
+    if (!error.empty()) {
+      return ReportError("tangible-fit: --derivatives: " + error, kExitUsage);
     }
   }
-  FitOptions options = read.recordings.front().fit.problem.options;
-  options.max_iterations = FLAGS_max_iterations;
-  error = OverrideDerivatives(&options);
-  if (!error.empty()) {
-    return ReportError("tangible-fit: --derivatives: " + error, kExitUsage);
+  if (std::isfinite(FLAGS_predict_from)) {
+    error = HoldBack(prepared);
+    if (!error.empty()) return ReportError("tangible-fit: --predict_from: " + error, kExitUsage);
   }
-  RecordingsProblem problem(std::move(recordings), read.own);
+  if (!MakeRecordingsProblem(prepared->file, &prepared->runs, &error)) {
+    return ReportError(error);
+  }
+  error = OutputOverInput({"out", "report", "predictions"});
+  return error.empty() ? kExitDone : ReportError("tangible-fit: " + error, kExitUsage);
+}
+
+/// Of recording b: "scene_2.json" for "scene.json".
+std::string SceneOut(int b) {
+  const std::filesystem::path path(FLAGS_scene_out);
+  const std::string name =
+      path.stem().string() + "_" + std::to_string(b) + path.extension().string();
+  return (path.parent_path() / name).string();
+}
+
+/// Returns what went wrong or empty.
+std::string WriteFiles(const PreparedRecordings& prepared, const RecordingsProblem& problem,
+                       const FitResult& result, const LaterOfRecordings* later) {
+  const bool estimated = result.estimate.size() > 0;
+  ResultWriter writer;
+  writer.Write(FLAGS_out, [&] {
+    OrderedJson json = RecordingsResultToJson(problem, result, later);
+    json["certificate"] = estimated ? ToJson(result.certificate) : OrderedJson(nullptr);
+    return JsonText(json);
+  });
+  if (!estimated) {
+    return writer.error();
+  }
+  writer.Write(FLAGS_report, [&] {
+    return RecordingsReport(prepared.file.path, problem, result,
+                            later == nullptr ? nullptr : &later->score);
+  });
+  writer.Write(FLAGS_predictions, [&] {
+    return PredictionCsv(problem, result.residuals,
+                         later == nullptr ? std::vector<LaterObservations>() : later->runs);
+  });
+  for (int b = 0; b < problem.num_blocks() && !FLAGS_scene_out.empty(); ++b) {
+    const RecordingEntry& entry = prepared.file.recordings[b];
+    std::string text;
+    std::string error;
+    if (!FittedScene(entry.fit.problem, problem.ParametersOf(b, result.estimate),
+                     FolderOf(FLAGS_scene_out), &text, &error)) {
+      return prepared.file.path + ": recording '" + entry.name + "': " + error;
+    }
+    writer.Write(SceneOut(b), [&] { return text; });
+  }
+  return writer.error();
+}
+
+/// Several recordings in one fit.
+int RunRecordings(const std::string& text, const std::string& file) {
+  PreparedRecordings prepared;
+  const int status = Prepare(text, file, &prepared);
+  if (status != kExitDone) {
+    return status;
+  }
+  const FitOptions& options = prepared.file.recordings.front().fit.problem.options;
+  RecordingsProblem problem(std::move(prepared.runs), prepared.file.own);
   IterationPrinter printer(problem.entries());
   const FitResult result =
       Fit(options, &problem, [&](int start, int iteration, const FitIteration& values) {
@@ -538,20 +621,18 @@ int RunRecordings(const std::string& text, const std::string& file) {
                   ": warning: not trustworthy at the estimate: " + result.certificate.verdict);
     }
   }
-  ResultWriter writer;
-  writer.Write(FLAGS_out, [&] {
-    OrderedJson json = RecordingsResultToJson(problem, result);
-    json["certificate"] = estimated ? ToJson(result.certificate) : OrderedJson(nullptr);
-    return JsonText(json);
-  });
-  if (estimated) {
-    writer.Write(FLAGS_report, [&] { return RecordingsReport(file, problem, result); });
+  std::optional<LaterOfRecordings> later;
+  if (!prepared.held_back.empty() && estimated) {
+    later = PredictLater(prepared.file, problem, result.estimate, FLAGS_predict_from,
+                         std::move(prepared.held_back));
+    PrintScore(later->score);
   }
-  if (!writer.error().empty()) return ReportError(writer.error());
+  const std::string failed = WriteFiles(prepared, problem, result, later ? &*later : nullptr);
+  if (!failed.empty()) return ReportError(failed);
   if (result.status == FitStatus::kNoEffect) {
     return ReportError(file + ": /parameters: " + result.message);
   }
-  return Conclude(file, result, nullptr, nullptr, nullptr);
+  return Conclude(file, result, nullptr, later ? &later->score : nullptr, nullptr);
 }
 
 int Main(int argc, char** argv) {

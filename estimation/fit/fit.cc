@@ -95,20 +95,26 @@ bool IsBetter(const Minimum& a, const Minimum& b) {
 
 // Where a derivative is 0 at a bound (restitution 0) or by symmetry, these moves into the interior
 // tell whether the parameter does anything, as fractions of the way to the other bound, or of its
-// scale.
-constexpr double kNudges[] = {0.1, 0.01};
+// scale. So do moves to the nearer bound: friction above that at which a contact sticks does
+// nothing, and less of it does.
+struct Nudge {
+  bool inwards;
+  double fraction;
+};
+constexpr Nudge kNudges[] = {{true, 0.1}, {true, 0.01}, {false, 0.5}, {false, 0.9}};
 
-/// `p` with this parameter moved inwards.
-Eigen::VectorXd Nudged(const ParameterizedScene::Entry& entry, int parameter, double fraction,
+/// `p` with this parameter moved.
+Eigen::VectorXd Nudged(const ParameterizedScene::Entry& entry, int parameter, const Nudge& nudge,
                        Eigen::VectorXd p) {
   const double value = p[parameter];
   const double up = std::isfinite(entry.upper) ? entry.upper - value : HUGE_VAL;
   const double down = std::isfinite(entry.lower) ? value - entry.lower : HUGE_VAL;
-  const double room = std::max(up, down);
+  const bool upwards = (up >= down) == nudge.inwards;
+  const double room = upwards ? up : down;
   // A bounded mass may be 10 000 times another one: it is moved by a part of itself.
   const double span = entry.logarithmic ? value : std::isfinite(room) ? room : entry.scale;
-  const double move = std::min(fraction * span, room);
-  p[parameter] += up >= down ? move : -move;
+  const double move = std::min(nudge.fraction * span, room);
+  p[parameter] += upwards ? move : -move;
   return p;
 }
 

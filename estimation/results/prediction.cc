@@ -18,13 +18,11 @@ constexpr double kOnEdge = 1e-9;
 /// Root mean squares and largest errors, one observation after the other.
 class ErrorSum {
  public:
-  explicit ErrorSum(const std::vector<Channel>& channels) : channels_(channels) {}
-
-  void Add(const Observation& observation, double residual) {
+  void Add(const Observation& observation, const std::vector<Channel>& channels, double residual) {
     const double error = std::abs(residual * observation.sigma);
     sum_ += residual * residual;
     ++count_;
-    PerUnit* const unit = UnitFor(observation);
+    PerUnit* const unit = UnitFor(observation, channels);
     if (unit != nullptr) {
       unit->sum += error * error;
       unit->max = std::max(unit->max, error);
@@ -53,8 +51,8 @@ class ErrorSum {
     long count = 0;
   };
   /// Null for what is neither a length in m nor an angle.
-  PerUnit* UnitFor(const Observation& observation) {
-    const bool direct = channels_.empty() || channels_[observation.channel].camera < 0;
+  PerUnit* UnitFor(const Observation& observation, const std::vector<Channel>& channels) {
+    const bool direct = channels.empty() || channels[observation.channel].camera < 0;
     switch (observation.coordinate) {
       case Coordinate::kX:
       case Coordinate::kY:
@@ -67,7 +65,6 @@ class ErrorSum {
     }
   }
 
-  const std::vector<Channel>& channels_;
   double sum_ = 0.0;
   long count_ = 0;
   PerUnit length_, angle_;
@@ -97,25 +94,28 @@ std::vector<Observation> TakeLater(double from, std::vector<Observation>* observ
   return taken;
 }
 
-PredictionScore ScorePrediction(double from, const std::vector<Observation>& observations,
-                                const std::vector<Channel>& channels,
-                                const Eigen::VectorXd& residuals) {
+PredictionScore ScorePrediction(double from, const std::vector<PredictedRun>& runs) {
   PredictionScore score;
   score.from = from;
   double last = from;
-  for (const Observation& observation : observations) {
-    last = std::max(last, observation.time);
+  for (const PredictedRun& run : runs) {
+    for (const Observation& observation : run.observations) {
+      last = std::max(last, observation.time);
+    }
   }
   const double width = (last - from) / kHorizons;
-  ErrorSum all(channels);
-  std::vector<ErrorSum> bins(kHorizons, ErrorSum(channels));
-  for (size_t i = 0; i < observations.size(); ++i) {
-    const double residual = residuals[static_cast<Eigen::Index>(i)];
-    const double part = (observations[i].time - from) / (last - from);
-    const int bin =
-        std::clamp(static_cast<int>(std::ceil(part * kHorizons - kOnEdge)) - 1, 0, kHorizons - 1);
-    all.Add(observations[i], residual);
-    bins[bin].Add(observations[i], residual);
+  ErrorSum all;
+  std::vector<ErrorSum> bins(kHorizons);
+  for (const PredictedRun& run : runs) {
+    for (size_t i = 0; i < run.observations.size(); ++i) {
+      const Observation& observation = run.observations[i];
+      const double residual = run.residuals[static_cast<Eigen::Index>(i)];
+      const double part = (observation.time - from) / (last - from);
+      const int bin =
+          std::clamp(static_cast<int>(std::ceil(part * kHorizons - kOnEdge)) - 1, 0, kHorizons - 1);
+      all.Add(observation, run.channels, residual);
+      bins[bin].Add(observation, run.channels, residual);
+    }
   }
   score.all = all.Result(0.0, last - from);
   for (int bin = 0; bin < kHorizons; ++bin) {
@@ -146,12 +146,20 @@ LaterObservations PredictLater(const FitProblem& problem, const Eigen::VectorXd&
     result.residuals.resize(0);
     return result;
   }
-  result.score = ScorePrediction(from, result.observations, problem.channels, result.residuals);
+  result.score = ScorePrediction(from, {{result.observations, problem.channels, result.residuals}});
   return result;
 }
 
-std::string PredictionCsv(const RolloutResiduals& residuals, const Eigen::VectorXd& values,
-                          const LaterObservations* later) {
+namespace {
+
+constexpr const char* kColumns =
+    "time,target,relative_to,coordinate,file,sensor,used,sigma,observed,predicted,residual,"
+    "residual_in_sigma\n";
+
+/// The rows of a run, each after `prefix`.
+void AppendRows(const std::string& prefix, const RolloutResiduals& residuals,
+                const Eigen::Ref<const Eigen::VectorXd>& values, const LaterObservations* later,
+                std::string* csv) {
   const std::vector<Observation>& fitted = residuals.observations();
   const size_t num_later = later == nullptr ? 0 : later->observations.size();
   const auto observation = [&](size_t i) -> const Observation& {
@@ -161,32 +169,52 @@ std::string PredictionCsv(const RolloutResiduals& residuals, const Eigen::Vector
   std::iota(order.begin(), order.end(), size_t{0});
   std::stable_sort(order.begin(), order.end(),
                    [&](size_t a, size_t b) { return observation(a).time < observation(b).time; });
-  std::string csv =
-      "time,target,relative_to,coordinate,file,sensor,used,sigma,observed,predicted,residual,"
-      "residual_in_sigma\n";
   const Scene& scene = residuals.scene().scene();
   const std::vector<BodyPoint>& points = residuals.scene().points();
   for (const size_t i : order) {
     const Observation& o = observation(i);
     const bool is_later = i >= fitted.size();
     char time[32];
-    csv.append(time, std::to_chars(time, time + sizeof time, o.time).ptr);
-    csv += "," + TargetName(scene, points, o) + "," +
-           ReferenceName(scene, points, residuals.ChannelOf(o)) + "," + NameOf(o.coordinate) + "," +
-           CsvCell(FileOf(residuals, o)) + "," + SensorOf(residuals, o) +
-           (is_later ? ",prediction" : ",fit");
-    AppendCell(o.sigma, &csv);
-    AppendCell(o.value, &csv);
+    csv->append(prefix);
+    csv->append(time, std::to_chars(time, time + sizeof time, o.time).ptr);
+    *csv += "," + TargetName(scene, points, o) + "," +
+            ReferenceName(scene, points, residuals.ChannelOf(o)) + "," + NameOf(o.coordinate) +
+            "," + CsvCell(FileOf(residuals, o)) + "," + SensorOf(residuals, o) +
+            (is_later ? ",prediction" : ",fit");
+    AppendCell(o.sigma, csv);
+    AppendCell(o.value, csv);
     if (is_later && later->residuals.size() == 0) {
-      csv += ",,,\n";
+      *csv += ",,,\n";
       continue;
     }
     const double r = is_later ? later->residuals[static_cast<Eigen::Index>(i - fitted.size())]
                               : values[static_cast<Eigen::Index>(i)];
-    AppendCell(o.value + r * o.sigma, &csv);
-    AppendCell(r * o.sigma, &csv);
-    AppendCell(r, &csv);
-    csv.push_back('\n');
+    AppendCell(o.value + r * o.sigma, csv);
+    AppendCell(r * o.sigma, csv);
+    AppendCell(r, csv);
+    csv->push_back('\n');
+  }
+}
+
+}  // namespace
+
+std::string PredictionCsv(const RolloutResiduals& residuals, const Eigen::VectorXd& values,
+                          const LaterObservations* later) {
+  std::string csv = kColumns;
+  AppendRows("", residuals, values, later, &csv);
+  return csv;
+}
+
+std::string PredictionCsv(const RecordingsProblem& problem, const Eigen::VectorXd& values,
+                          const std::vector<LaterObservations>& later) {
+  std::string csv = std::string("recording,") + kColumns;
+  Eigen::Index first = 0;
+  for (int b = 0; b < problem.num_blocks(); ++b) {
+    const RecordedRun& recording = problem.recordings()[b];
+    const Eigen::Index rows = recording.residuals.num_residuals();
+    AppendRows(CsvCell(recording.name) + ",", recording.residuals, values.segment(first, rows),
+               later.empty() ? nullptr : &later[b], &csv);
+    first += rows;
   }
   return csv;
 }

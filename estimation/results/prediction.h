@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "tangible/estimation/fit/fit.h"
+#include "tangible/estimation/problem/recordings.h"
 
 namespace tangible {
 
@@ -50,11 +51,16 @@ std::vector<Observation> TakeLater(double from, std::vector<Observation>* observ
 LaterObservations PredictLater(const FitProblem& problem, const Eigen::VectorXd& estimate,
                                double from, std::vector<Observation> later);
 
-/// The score of residuals (in multiples of sigma) of observations after `from`, made by `channels`
-/// (empty: directly).
-PredictionScore ScorePrediction(double from, const std::vector<Observation>& observations,
-                                const std::vector<Channel>& channels,
-                                const Eigen::VectorXd& residuals);
+/// The observations of a run after a time, by channels (none: directly), and their residuals in
+/// multiples of sigma.
+struct PredictedRun {
+  const std::vector<Observation>& observations;
+  const std::vector<Channel>& channels;
+  const Eigen::VectorXd& residuals;
+};
+
+/// The score of runs together.
+PredictionScore ScorePrediction(double from, const std::vector<PredictedRun>& runs);
 
 /// A row an observation, by time: time, target (body or point), relative_to, coordinate, file,
 /// sensor, used (fit or prediction), sigma, observed, predicted, residual (predicted − observed, in
@@ -62,5 +68,10 @@ PredictionScore ScorePrediction(double from, const std::vector<Observation>& obs
 /// `values` are the residuals of the fit, in multiples of sigma; `later` may be null.
 std::string PredictionCsv(const RolloutResiduals& residuals, const Eigen::VectorXd& values,
                           const LaterObservations* later);
+
+/// The same of several recordings, one after the other, with the recording in a first column.
+/// `later`: of each recording, or empty.
+std::string PredictionCsv(const RecordingsProblem& problem, const Eigen::VectorXd& values,
+                          const std::vector<LaterObservations>& later);
 
 }  // namespace tangible

@@ -202,6 +202,30 @@ bool MakeRecordingsProblem(const RecordingsFile& file, std::vector<RecordedRun>*
   return true;
 }
 
+LaterOfRecordings PredictLater(const RecordingsFile& file, const RecordingsProblem& problem,
+                               const Eigen::VectorXd& estimate, double from,
+                               std::vector<std::vector<Observation>> later) {
+  LaterOfRecordings result;
+  std::vector<PredictedRun> runs;
+  result.runs.reserve(later.size());
+  for (size_t b = 0; b < later.size(); ++b) {
+    const RecordingEntry& entry = file.recordings[b];
+    LaterObservations& run = result.runs.emplace_back();
+    if (later[b].empty()) continue;
+    run = PredictLater(entry.fit.problem, problem.ParametersOf(static_cast<int>(b), estimate), from,
+                       std::move(later[b]));
+    if (!run.score.message.empty() && result.score.message.empty()) {
+      result.score.message = "recording '" + entry.name + "': " + run.score.message;
+    }
+    runs.push_back({run.observations, entry.fit.problem.channels, run.residuals});
+  }
+  if (result.score.message.empty()) {
+    result.score = ScorePrediction(from, runs);
+  }
+  result.score.from = from;
+  return result;
+}
+
 double RmsOfRecording(const RecordingsProblem& problem, const FitResult& result, int recording) {
   Eigen::Index first = 0;
   for (int block = 0; block < recording; ++block) first += problem.num_rows(block);

@@ -8,6 +8,7 @@
 
 #include "tangible/estimation/problem/recordings.h"
 #include "tangible/estimation/results/fit_json.h"
+#include "tangible/estimation/results/prediction.h"
 
 namespace tangible {
 
@@ -35,8 +36,18 @@ bool ParseRecordings(const std::string& text, const std::string& file, Recording
 bool MakeRecordingsProblem(const RecordingsFile& file, std::vector<RecordedRun>* recordings,
                            std::string* error);
 
-/// The result as the program writes it.
-OrderedJson RecordingsResultToJson(const RecordingsProblem& problem, const FitResult& result);
+/// What the fitted scenes predict of observations that were held back, of each recording.
+struct LaterOfRecordings {
+  std::vector<LaterObservations> runs;
+  PredictionScore score;  ///< of all together
+};
+LaterOfRecordings PredictLater(const RecordingsFile& file, const RecordingsProblem& problem,
+                               const Eigen::VectorXd& estimate, double from,
+                               std::vector<std::vector<Observation>> later);
+
+/// The result as the program writes it; `later` may be null.
+OrderedJson RecordingsResultToJson(const RecordingsProblem& problem, const FitResult& result,
+                                   const LaterOfRecordings* later = nullptr);
 
 /// Root mean square of the residuals of a recording, in multiples of sigma.
 double RmsOfRecording(const RecordingsProblem& problem, const FitResult& result, int recording);

@@ -355,7 +355,7 @@ std::string FitReport(const std::string& title, const RolloutResiduals& residual
 }
 
 std::string RecordingsReport(const std::string& title, const RecordingsProblem& problem,
-                             const FitResult& result) {
+                             const FitResult& result, const PredictionScore* prediction) {
   const std::string heading = "Fit: " + title;
   std::vector<std::vector<std::string>> rows;
   rows.reserve(problem.num_blocks());
@@ -370,8 +370,8 @@ std::string RecordingsReport(const std::string& title, const RecordingsProblem& 
           EstimateTable(problem.entries(), result) + Warnings(result.uncertainty) +
           CombinationTable(result.uncertainty) + SummaryTable(result) + "<h2>Recordings</h2>\n" +
           HtmlTable({"recording", "observations", "weight", "residual rms (sigma)"}, rows) +
-          CorrelationTable(problem.entries(), result) + StartTable(result) +
-          IterationPlots(problem.entries(), result));
+          CorrelationTable(problem.entries(), result) + PredictionPart(prediction) +
+          StartTable(result) + IterationPlots(problem.entries(), result));
 }
 
 }  // namespace tangible

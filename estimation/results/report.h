@@ -23,6 +23,6 @@ std::string FitReport(const std::string& title, const RolloutResiduals& residual
 
 /// The same of a fit to several recordings, without plots of their observations.
 std::string RecordingsReport(const std::string& title, const RecordingsProblem& problem,
-                             const FitResult& result);
+                             const FitResult& result, const PredictionScore* prediction = nullptr);
 
 }  // namespace tangible

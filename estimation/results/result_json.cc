@@ -267,7 +267,8 @@ OrderedJson ResultToJson(const RolloutResiduals& residuals, const FitResult& res
   return json;
 }
 
-OrderedJson RecordingsResultToJson(const RecordingsProblem& problem, const FitResult& result) {
+OrderedJson RecordingsResultToJson(const RecordingsProblem& problem, const FitResult& result,
+                                   const LaterOfRecordings* later) {
   // A matrix of more than that many parameters is larger than all else.
   constexpr Eigen::Index kMostInMatrix = 100;
   const bool estimated = result.estimate.size() > 0;
@@ -285,6 +286,12 @@ OrderedJson RecordingsResultToJson(const RecordingsProblem& problem, const FitRe
                                   {"residuals", problem.num_rows(b)},
                                   {"weight", problem.weight(b)},
                                   {"residual_rms", estimated ? Number(rms) : OrderedJson()}});
+    if (later != nullptr) {
+      json["recordings"].back()["prediction_rms"] = Number(later->runs[b].score.all.rms_in_sigma);
+    }
+  }
+  if (later != nullptr) {
+    json["prediction"] = PredictionToJson(later->score);
   }
   if (result.uncertainty.covariance.rows() > kMostInMatrix) {
     json["covariance"] = nullptr;

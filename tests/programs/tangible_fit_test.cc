@@ -92,6 +92,34 @@ TEST_F(TangibleFitTest, FitsSeveralRecordingsAtOnce) {
     EXPECT_LT(result["recordings"][take]["residual_rms"].get<double>(), 1e-6);
   }
   EXPECT_NE(Read(Path("r.html")).find("speed of take 1"), std::string::npos);
+  // Up to 0.25 s of each recording's time; the rest is predicted, exactly as there is no noise.
+  ASSERT_EQ(Fit(fit, "--out='" + Path("r.json") + "' --report='" + Path("r.html") +
+                         "' --predictions='" + Path("p.csv") + "' --scene_out='" + Path("s.json") +
+                         "' --predict_from=0.25 --initial=g=9")
+                .exit_status,
+            0);
+  const json part = json::parse(Read(Path("r.json")));
+  EXPECT_EQ(part["starts"][0]["initial"][0], 9.0);
+  EXPECT_EQ(part["residuals"], 18);
+  EXPECT_EQ(part["prediction"]["all"]["count"], 12);
+  EXPECT_LT(part["prediction"]["all"]["rms_in_sigma"].get<double>(), 1e-6);
+  EXPECT_LT(part["recordings"][1]["prediction_rms"].get<double>(), 1e-6);
+  EXPECT_NE(Read(Path("r.html")).find("<h2>Prediction</h2>"), std::string::npos);
+  const std::string table = Read(Path("p.csv"));
+  EXPECT_EQ(table.find("recording,time,target,"), 0u);
+  EXPECT_EQ(std::count(table.begin(), table.end(), '\n'), 31);
+  EXPECT_NE(table.find("take 2,0.3"), std::string::npos);
+  for (int take = 0; take < 3; ++take) {
+    const json scene = json::parse(Read(Path("s_" + std::to_string(take) + ".json")));
+    EXPECT_NEAR(scene["bodies"][0]["velocity"][0].get<double>(), speeds[take], 1e-8);
+    EXPECT_NEAR(scene["gravity"][1].get<double>(), -9.5, 1e-8);
+  }
+  EXPECT_EQ(json::parse(Read(Path("s_2.json")))["bodies"][0]["mass"], 7);
+  ExpectOneLine(Fit(fit, "--predict_from=-1"), 2,
+                "--predict_from: expected a time with observations up to it in each recording");
+  ExpectOneLine(Fit(fit, "--predict_from=9"), 2,
+                "--predict_from: expected a time with observations after it, got 9");
+  ExpectOneLine(Fit(fit, "--initial=speeed=3"), 2, "expected the name of a parameter");
   // Speeds from the first observations, which are exact: only gravity is left to be found.
   fit["recordings"][2].erase("initial");
   fit["initial"] = "from_observations";

@@ -23,8 +23,8 @@
 //   σ⁻  = 2 μ λn − σ       ⊥ w⁻         σ⁻ = μ λn − λt
 // An impact's decompression (contact_decompression.h) adds a least impulse o to a contact:
 //   s_n = n v + c_n ≥ 0,   λn ≥ o,   s_n (λn − o) = 0
-// Dry friction in a joint is a contact without a normal row: λn = o = h, and μ is the torque or force
-// at which it slides.
+// Dry friction in a joint is a contact without a normal row: λn = o = h, and μ is the torque or
+// force at which it slides.
 // The planar form has a unique, strictly complementary solution at a disc at rest, where the
 // one-sided form of two friction rows has a continuum.
 

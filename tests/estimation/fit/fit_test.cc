@@ -148,6 +148,20 @@ TEST(FitTest, AParameterWithoutEffectIsNamed) {
   EXPECT_NE(fit.message.find("\"bodies/ball/friction\" has no effect"), std::string::npos);
 }
 
+// With more friction than stops a disc's lowest point in its impact it does nothing at the start.
+TEST(FitTest, FrictionIsFoundFromAStartAtWhichItSticks) {
+  const Scene scene = MakeScene(R"({"bodies": [
+      {"name": "ball", "shape": {"circle": {"radius": 0.1}}, "mass": 1, "position": [0, 0.5],
+       "velocity": [3, 0]},
+      {"name": "floor", "static": true, "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}}],
+      "pairs": [{"bodies": ["ball", "floor"], "restitution": 0.6, "friction": 0.1}],
+      "simulation": {"dt": 0.01, "duration": 0.6, "stepping": "event"}})");
+  const FitResult fit =
+      FitTo(scene, {Parameter("pairs/ball:floor/friction", 0.9)}, Observe(scene, 1, 0.0, 1));
+  ASSERT_EQ(fit.status, FitStatus::kConverged) << fit.message;
+  EXPECT_NEAR(fit.estimate[0], 0.1, 1e-9);
+}
+
 // At restitution 0 an impact has another law, and the derivative is 0 by definition.
 TEST(FitTest, AParameterWhoseDerivativeVanishesAtItsBoundIsFitted) {
   const Scene scene = MakeScene(R"({"bodies": [

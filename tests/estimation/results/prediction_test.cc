@@ -26,8 +26,9 @@ TEST(PredictionTest, ErrorsAreSummedByHorizonAndUnit) {
                                                  {1.1, 0, -1, Coordinate::kY, 0.0, 0.1},
                                                  {3.0, 0, -1, Coordinate::kX, 0.0, 0.1},
                                                  {3.0, 0, -1, Coordinate::kAngle, 0.0, 0.5}};
-  const PredictionScore score =
-      ScorePrediction(1.0, observations, {}, Eigen::Vector4d(3.0, -4.0, 5.0, 2.0));
+  const std::vector<Channel> direct;
+  const Eigen::VectorXd residuals = Eigen::Vector4d(3.0, -4.0, 5.0, 2.0);
+  const PredictionScore score = ScorePrediction(1.0, {{observations, direct, residuals}});
   EXPECT_EQ(score.all.count, 4);
   EXPECT_DOUBLE_EQ(score.all.rms_in_sigma, std::sqrt((9.0 + 16.0 + 25.0 + 4.0) / 4.0));
   EXPECT_DOUBLE_EQ(score.all.max_length, 0.5);

@@ -79,8 +79,8 @@ TEST(ContactSolverTest, FrictionWithAGivenLimit) {
       }
     }
   }
-  EXPECT_GT(sticking, 30);
-  EXPECT_GT(sliding, 30);
+  EXPECT_GT(sticking, 15);
+  EXPECT_GT(sliding, 15);
 }
 
 TEST(ContactSolverTest, RedundantContactsOfABox) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Drag, joint springs and dry friction in joints: motions and derivatives against closed forms, by every method.
+// Drag, joint springs and dry friction in joints: motions and derivatives against closed forms, by
+// every method.
 #include <gtest/gtest.h>
 
 #include <cmath>
