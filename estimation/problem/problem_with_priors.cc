@@ -9,6 +9,7 @@ namespace {
 
 std::vector<std::optional<Prior>> PriorsOf(const std::vector<ParameterEntry>& entries) {
   std::vector<std::optional<Prior>> priors;
+  priors.reserve(entries.size());
   for (const ParameterEntry& entry : entries) {
     priors.push_back(entry.prior);
   }

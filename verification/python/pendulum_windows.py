@@ -6,11 +6,11 @@
 FOLDER holds multiarm_pendulum/single_freeswing_200Hz.csv and double_freeswing_200Hz.csv
 (dynamicslab/MultiArm-Pendulum, MIT licence; Kaheman et al., arXiv 2205.06231). A recording is cut
 into blocks of five seconds. Parameters are identified from the even blocks together, each with
-an initial state of its own: those that were published, and dry friction in the hinges. In each odd
-block the initial state is fitted to the first second, with the parameters held, and the three
-seconds after it are predicted: once with the parameters identified here, once with those that were
-published with the data. Printed are medians over the windows of the largest error of any angle
-within 1, 2 and 3 s.
+an initial state of its own: those that were published, dry friction in the hinges, quadratic drag,
+and by how much the encoders' zero is not the vertical. In each odd block the initial state is
+fitted to the first second, with the parameters held, and the three seconds after it are predicted:
+once with the parameters identified here, once with those that were published with the data. Printed
+are medians over the windows of the largest error of any angle within 1, 2 and 3 s.
 """
 
 from __future__ import annotations
@@ -64,10 +64,11 @@ class Arm:
         pivots = [0.0, -values.get("L", 0.0)]
         return {
             "name": f"{self.name} pendulum",
-            "gravity": [0, -self.gravity],
+            "gravity": [values.get("gx", 0.0), -self.gravity],
             "bodies": [
                 {"name": f"l{k}", "mass": self.masses[k], "inertia": values[f"I{k}"],
-                 "position": [0, pivots[k] - values[f"a{k}"]]}
+                 "position": [0, pivots[k] - values[f"a{k}"]],
+                 "quadratic_drag": values.get(f"c{k}", 0.0)}
                 for k in range(self.links)
             ],
             "joints": [
@@ -100,7 +101,9 @@ class Arm:
 
     def identify(self, folder: Path) -> tuple[dict[str, float], tangible.FitResult]:
         """Parameters from the even blocks, beginning at the published ones."""
-        begin = {**self.published, **{f"f{k}": 1e-4 for k in range(self.links)}}
+        begin = {**self.published, "gx": 0.0}
+        for k in range(self.links):
+            begin.update({f"f{k}": 1e-4, f"c{k}": 1e-3})
         scene = self.scene(begin, BLOCK / 2)
         own: list[dict[str, Any]] = [
             {"name": name, "path": name, "per": "recording"} for name in self.start
@@ -112,6 +115,9 @@ class Arm:
         shared += [{"name": name + str(k), "path": f"joints/j{k}/{path}", "lower": 0}
                    for name, path in (("k", "damping"), ("f", "friction"))
                    for k in range(self.links)]  # fmt: skip
+        shared += [{"name": f"c{k}", "path": f"bodies/l{k}/quadratic_drag", "lower": 0}
+                   for k in range(self.links)]  # fmt: skip
+        shared.append({"name": "gx", "path": "gravity/x"})
         if self.links == 2:
             # The second link hangs from the first one's end, at −L, by its centre at −L − a1.
             scene["bodies"][1]["position"] = [0, 0]

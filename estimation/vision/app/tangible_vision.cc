@@ -164,7 +164,7 @@ class Study {
       std::string pictures;
       for (const auto& picture : result.truth) pictures += picture;
       for (const auto& picture : result.predicted) pictures += picture;
-      const std::string failed = WriteFileAtomically(File(cell, ".pictures"), pictures);
+      std::string failed = WriteFileAtomically(File(cell, ".pictures"), pictures);
       if (!failed.empty()) return failed;
     }
     return WriteFileAtomically(done, JsonText(result.json));
