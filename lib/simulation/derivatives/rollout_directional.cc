@@ -29,7 +29,7 @@ bool StepDirectional::FindKinks(const Model<double>& model, const StepRecord& re
   friction_.setZero(static_cast<Eigen::Index>(count), w_dot.cols());
   for (size_t i = 0; i < count; ++i) {
     touching[i] = solution.modes[i] == ContactMode::kOpen && JustTouches(record, i);
-    for (int k = 0; k < 2 && record.contacts[i].joint < 0; ++k) {
+    for (int k = 0; k < 2; ++k) {
       if (const int number = record.friction[i].numbers[k]; number >= 0) {
         friction_.row(static_cast<Eigen::Index>(i)) +=
             record.friction[i].derivatives[k] *

@@ -90,6 +90,15 @@ std::string ArmAtItsStop() {
          SimulationOf(8) + "}";
 }
 
+// A slider with dry friction, pushed with as much.
+std::string PushedSlider() {
+  return R"({"gravity": [0, -8], "bodies": [{"name": "box", "mass": 1, "inertia": 1,
+       "position": [0, 0]}],
+      "joints": [{"name": "rail", "type": "prismatic", "bodies": ["box", "world"],
+                  "anchor": [0, 0], "axis": [1, 0], "friction": 4, "effort": 4}], )" +
+         SimulationOf(8) + "}";
+}
+
 std::vector<Case> Cases() {
   return {
       {"disc at the limit",
@@ -132,6 +141,11 @@ std::vector<Case> Cases() {
         "bodies/middle/position/y", "bodies/left/position/y", "bodies/right/shape/radius"},
        "one-sided: redundant contacts contradict",
        false},
+      {"slider at the limit",
+       PushedSlider(),
+       {"joints/rail/friction", "joints/rail/effort", "bodies/box/mass", "joints/rail/rate"},
+       "near a kink: kink of 8 rows",
+       true},
       {"arm at its stop",
        ArmAtItsStop(),
        {"joints/pin/rate", "gravity/y", "bodies/rod/mass"},
