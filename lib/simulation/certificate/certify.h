@@ -67,9 +67,9 @@ class RolloutCertifier {
   void ProbeStarts(const Model<double>& model, const State<double>& start,
                    const std::vector<const ActiveContact*>& touching, const Segment* first);
   /// Whether friction in a joint that is at rest as the run starts, and slides at once, keeps its
-  /// side: no direction changes the rate.
-  bool KeepsSide(const Model<double>& model, const Segment& segment,
-                 const ActiveContact& contact) const;
+  /// side: no direction changes the rate, nor the twists of other bodies that joints pass on.
+  bool KeepsSide(const Model<double>& model, const ActiveContact& contact,
+                 EventDerivative* derivative, Segment* segment) const;
   void AddImpact(const Model<double>& model, long step, Impulses* impact);
   void AddOtherSlips(const Model<double>& model, const Segment& segment, const Place& place);
   void AddSegment(const Model<double>& model, long step, EventDerivative* derivative,

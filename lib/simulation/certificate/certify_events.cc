@@ -287,7 +287,7 @@ void RolloutCertifier::AddSegment(const Model<double>& model, long step,
         });
     const bool ends_at_once = segment->length == 0.0 && segment->event == EventKind::kSlipEnds;
     if (SlidingSign(place.mode) != 0.0 && !shared && !ends_at_once &&
-        !KeepsSide(model, *segment, contact)) {
+        !KeepsSide(model, contact, derivative, segment)) {
       const double slip =
           std::max(SlipOf(model, segment->before, contact), SlipOf(model, segment->after, contact));
       if (slip <= Negligible(model, slip)) {

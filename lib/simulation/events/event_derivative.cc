@@ -215,6 +215,14 @@ EventDerivative::Rate EventDerivative::EventRate(const Model<double>& model, Seg
   return rate;
 }
 
+RowMatrixXd EventDerivative::AlongSegment(const Model<double>& model, Segment* segment,
+                                          const RowMatrixXd& directions) {
+  RowMatrixXd x = RowMatrixXd::Zero(model.structure->num_variables() + 1, directions.cols());
+  x.topRows(directions.rows()) = directions;
+  SegmentTangent(model, segment, &x, Row::Zero(directions.cols()));
+  return x.topRows(directions.rows());
+}
+
 double EventDerivative::Tangent(const Model<double>& model, EventRecord* record,
                                 RowMatrixXd* w_dot) {
   const ModelStructure& s = *model.structure;

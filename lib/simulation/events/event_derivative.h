@@ -25,6 +25,11 @@ class EventDerivative {
   /// w_bar: num_variables x columns, of the state after the step on entry, before it on return.
   void Adjoint(const Model<double>& model, EventRecord* record, RowMatrixXd* w_bar);
 
+  /// What a segment of its given length makes of directions of the state before it (num_variables
+  /// x columns, both).
+  RowMatrixXd AlongSegment(const Model<double>& model, Segment* segment,
+                           const RowMatrixXd& directions);
+
   /// How fast the event's equation g changes with the segment's length. All 0 where the segment
   /// ends at a given time.
   struct Rate {

@@ -173,5 +173,26 @@ TEST(MechanismsTest, FrictionBetweenLinks) {
   }
 }
 
+// A link that is released from rest, and falls in spite of its friction: a change of its rate to the
+// other side is braked from that side first. So is one of a twist that the joints turn into a rate.
+TEST(MechanismsTest, FrictionAtRestHasTwoSides) {
+  const Scene scene = SceneOf(R"({"gravity": [0, -9.81], "bodies": [
+      {"name": "a", "shape": {"box": {"size": [1, 0.1]}}, "mass": 2, "position": [0.5, 0]},
+      {"name": "b", "shape": {"box": {"size": [0.8, 0.1]}}, "mass": 1, "position": [1.4, 0]}],
+    "joints": [{"name": "h", "type": "revolute", "bodies": ["a", "world"], "anchor": [0, 0],
+                "friction": 0.6, "angle": -1},
+               {"name": "k", "type": "revolute", "bodies": ["b", "a"], "anchor": [1, 0],
+                "rate": 2}], )" +
+                              Simulation("event", 0.01));
+  const auto verdict = [&](const char* path) {
+    return Jacobian(scene, {path}, GradientMethod::kTangent).certificate.verdict;
+  };
+  EXPECT_EQ(verdict("joints/h/friction"), "trustworthy");
+  EXPECT_EQ(verdict("joints/k/rate"), "trustworthy");
+  EXPECT_EQ(verdict("bodies/b/mass"), "trustworthy");
+  EXPECT_EQ(verdict("joints/h/rate").rfind("near a kink", 0), 0u);
+  EXPECT_EQ(verdict("bodies/b/velocity/y").rfind("near a kink", 0), 0u);
+}
+
 }  // namespace
 }  // namespace tangible
