@@ -173,8 +173,8 @@ TEST(MechanismsTest, FrictionBetweenLinks) {
   }
 }
 
-// A link that is released from rest, and falls in spite of its friction: a change of its rate to the
-// other side is braked from that side first. So is one of a twist that the joints turn into a rate.
+// A link that is released from rest, and falls in spite of its friction: a change of its rate to
+// the other side is braked from that side first. So is one of a twist that the joints turn into it.
 TEST(MechanismsTest, FrictionAtRestHasTwoSides) {
   const Scene scene = SceneOf(R"({"gravity": [0, -9.81], "bodies": [
       {"name": "a", "shape": {"box": {"size": [1, 0.1]}}, "mass": 2, "position": [0.5, 0]},
