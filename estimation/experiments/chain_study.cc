@@ -4,22 +4,12 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <numbers>
 #include <random>
+
+#include "tangible/estimation/experiments/random.h"
 
 namespace tangible {
 namespace {
-
-/// In (0, 1), the same everywhere: the library's distributions are not.
-double Uniform(std::mt19937_64* random) {
-  return (static_cast<double>((*random)() >> 11) + 0.5) / 9007199254740992.0;
-}
-
-/// By Box and Muller.
-double Normal(std::mt19937_64* random) {
-  const double radius = std::sqrt(-2.0 * std::log(Uniform(random)));
-  return radius * std::cos(2.0 * std::numbers::pi * Uniform(random));
-}
 
 RolloutResiduals ResidualsOf(const FitProblem& problem) {
   ParameterizedScene scene;

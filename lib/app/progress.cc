@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <utility>
 
@@ -13,7 +14,8 @@ Progress::Progress(std::string what, long total)
     : what_(std::move(what)),
       total_(total),
       terminal_(isatty(STDERR_FILENO) != 0),
-      next_(std::chrono::steady_clock::now() + std::chrono::seconds(1)) {}
+      began_(std::chrono::steady_clock::now()),
+      next_(began_ + std::chrono::seconds(1)) {}
 
 Progress::~Progress() {
   if (shown_) {
@@ -22,7 +24,7 @@ Progress::~Progress() {
 }
 
 void Progress::Show(long done) {
-  if (!terminal_ || done < look_) {
+  if (!terminal_ || done <= 0 || done < look_) {
     return;
   }
   // Where much is done between two looks at the clock, it is read less often.
@@ -41,7 +43,11 @@ void Progress::Show(long done) {
   }
   next_ = now + std::chrono::milliseconds(200);
   shown_ = true;
-  std::fprintf(stderr, "\r%ld of %ld %s", done, total_, what_.c_str());
+  const std::chrono::duration<double> spent = now - began_;
+  const double left =
+      spent.count() * static_cast<double>(total_ - done) / static_cast<double>(done);
+  std::fprintf(stderr, "\r%ld of %ld %s, about %.0f s left\033[K", done, total_, what_.c_str(),
+               std::ceil(left));
   std::fflush(stderr);
 }
 

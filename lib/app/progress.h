@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// Progress of long work, in place on stderr, where that is a terminal.
+// Progress of long work and the time that is left, in place on stderr, where that is a terminal.
 
 #include <chrono>
 #include <string>
@@ -24,6 +24,7 @@ class Progress {
   long total_;
   bool terminal_;
   bool shown_ = false;
+  std::chrono::steady_clock::time_point began_;
   std::chrono::steady_clock::time_point next_;
   std::chrono::steady_clock::time_point looked_;  ///< when the clock was read last
   long stride_ = 1;

@@ -15,13 +15,12 @@ Model<double> ModelOf(const RolloutFunction& function, State<double>* start) {
 EngineStep::EngineStep(const RolloutFunction& function)
     : function_(function), model_(ModelOf(function, &start_)), stepper_(model_) {
   const ModelStructure& s = *model_.structure;
-  directions_.setZero(s.num_variables(), num_states() + num_controls());
-  for (int i = 0; i < num_states(); ++i) directions_(function.output_variables()[i], i) = 1.0;
+  controls_.setZero(s.num_variables(), num_controls());
   for (size_t j = 0; j < function.control_numbers().size(); ++j) {
-    directions_(s.ParameterVariable(function.control_numbers()[j]),
-                num_states() + function.control_of_number()[j]) = 1.0;
+    controls_(s.ParameterVariable(function.control_numbers()[j]), function.control_of_number()[j]) =
+        1.0;
   }
-  tangent_.FixNumbers(s, directions_);
+  tangent_.FixNumbers(s, controls_);
 }
 
 State<double> EngineStep::StateOf(long k, const VectorX<double>& x) const {
@@ -73,14 +72,25 @@ bool EngineStep::Step(long k, const VectorX<double>& x, const VectorX<double>& u
 bool EngineStep::Linearise(long k, const VectorX<double>& x, const VectorX<double>& u,
                            VectorX<double>* next, MatrixX<double>* a, MatrixX<double>* b,
                            std::string* error) {
+  return LineariseAlong(k, x, u, MatrixX<double>::Identity(num_states(), num_states()), next, a, b,
+                        error);
+}
+
+bool EngineStep::LineariseAlong(long k, const VectorX<double>& x, const VectorX<double>& u,
+                                const MatrixX<double>& columns, VectorX<double>* next,
+                                MatrixX<double>* a, MatrixX<double>* b, std::string* error) {
   if (!Advance(k, x, u, next, error)) return false;
-  w_dot_ = directions_;
+  w_dot_.setZero(controls_.rows(), columns.cols() + num_controls());
+  w_dot_.rightCols(num_controls()) = controls_;
+  for (int i = 0; i < num_states(); ++i) {
+    w_dot_.row(function_.output_variables()[i]).head(columns.cols()) = columns.row(i);
+  }
   tangent_.Apply(model_, &stepper_, &w_dot_);
-  a->resize(num_states(), num_states());
+  a->resize(num_states(), columns.cols());
   b->resize(num_states(), num_controls());
   for (int i = 0; i < num_states(); ++i) {
     const auto row = w_dot_.row(function_.output_variables()[i]);
-    a->row(i) = row.head(num_states());
+    a->row(i) = row.head(columns.cols());
     b->row(i) = row.tail(num_controls());
   }
   if (a->allFinite() && b->allFinite()) return true;

@@ -26,6 +26,11 @@ class EngineStep : public StepMap {
             std::string* error) override;
   bool Linearise(long k, const VectorX<double>& x, const VectorX<double>& u, VectorX<double>* next,
                  MatrixX<double>* a, MatrixX<double>* b, std::string* error) override;
+  /// The same along `columns` (num_states x d) alone: A columns, as where x is a function of fewer
+  /// coordinates.
+  bool LineariseAlong(long k, const VectorX<double>& x, const VectorX<double>& u,
+                      const MatrixX<double>& columns, VectorX<double>* next, MatrixX<double>* a,
+                      MatrixX<double>* b, std::string* error);
 
   /// The scene's own.
   VectorX<double> initial() const { return function_.Defaults().state; }
@@ -41,7 +46,7 @@ class EngineStep : public StepMap {
   Model<double> model_;
   Stepper stepper_;
   StepTangent tangent_;
-  RowMatrixXd directions_, w_dot_;  ///< of the variables: unit vectors of states, then controls
+  RowMatrixXd controls_, w_dot_;  ///< of the variables: unit vectors of controls
 };
 
 }  // namespace tangible

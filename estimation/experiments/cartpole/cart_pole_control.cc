@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/estimation/experiments/cartpole/cart_pole_control.h"
+
+#include <cmath>
+#include <ctime>
+#include <numbers>
+
+#include "tangible/estimation/experiments/random.h"
+
+namespace tangible {
+namespace {
+
+// What a success is.
+constexpr double kUprightAngle = 0.2, kMiddle = 0.5, kUprightTime = 2.0;
+// N: where the first plan starts. At rest hanging down no force is a stationary plan.
+constexpr double kFirstForce = 1.0;
+
+// s: of this thread alone.
+double CpuSeconds() {
+  timespec time{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
+  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
+}
+
+CostTerm Term(CostTerm::Kind kind, int index, double weight, bool at_end) {
+  CostTerm term;
+  term.kind = kind;
+  term.index = index;
+  term.weight = weight;
+  term.at_end = at_end;
+  return term;
+}
+
+}  // namespace
+
+Cost SwingUpCost() {
+  using Kind = CostTerm::Kind;
+  return Cost(4, 1, kCartPoleStep,
+              {Term(Kind::kAngle, 1, 10.0, false), Term(Kind::kState, 0, 1.0, false),
+               Term(Kind::kState, 2, 0.1, false), Term(Kind::kState, 3, 0.1, false),
+               Term(Kind::kControl, 0, 0.01, false), Term(Kind::kAngle, 1, 10.0, true),
+               Term(Kind::kState, 0, 2.0, true), Term(Kind::kState, 2, 1.0, true),
+               Term(Kind::kState, 3, 0.5, true)});
+}
+
+SwingUp RunSwingUp(StepMap* model, CartPolePlant* plant, const CartPoleState& start,
+                   const SwingUpOptions& options) {
+  const Cost cost = SwingUpCost();
+  const VectorX<double> bound = VectorX<double>::Constant(1, kCartPoleForce);
+  PredictiveOptions predictive;
+  predictive.ilqr.max_iterations = options.iterations;
+  PredictiveController controller({model, &cost, start, -bound, bound, 0},
+                                  RowMatrixXd::Constant(options.horizon, 1, kFirstForce),
+                                  predictive);
+  SwingUp run;
+  CartPoleState state = start;
+  const int last = static_cast<int>(std::lround(kUprightTime / kCartPoleStep));
+  run.success = true;
+  for (int k = 0; k < options.steps; ++k) {
+    run.states.push_back(state);
+    const double began = CpuSeconds();
+    const double force = controller.Control(k, state)[0];
+    run.cpu_seconds.push_back(CpuSeconds() - began);
+    run.forces.push_back(force);
+    state = plant->Advance(state, force, kCartPoleStep);
+    run.reward += 0.5 * (1.0 + std::cos(state[1])) / options.steps;
+    if (k + last >= options.steps && std::cos(state[1]) < std::cos(kUprightAngle)) {
+      run.success = false;
+    }
+  }
+  run.states.push_back(state);
+  run.success = run.success && std::abs(state[0]) <= kMiddle;
+  return run;
+}
+
+CartPoleState RandomStart(unsigned seed, unsigned number) {
+  std::mt19937_64 random = Generator(seed, number);
+  CartPoleState start;
+  start[0] = Uniform(-0.5, 0.5, &random);
+  start[1] = Uniform(-std::numbers::pi, std::numbers::pi, &random);
+  start[2] = Uniform(-0.5, 0.5, &random);
+  start[3] = Uniform(-2.0, 2.0, &random);
+  return start;
+}
+
+}  // namespace tangible

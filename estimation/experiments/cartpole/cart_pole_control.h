@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// Swing-up and balance by plans over a receding horizon of 1 s, made anew every 20 ms from the
+// state of the plant, with whatever model of the plant there is.
+
+#include <vector>
+
+#include "tangible/control/model_predictive.h"
+#include "tangible/estimation/experiments/cartpole/cart_pole.h"
+
+namespace tangible {
+
+struct SwingUpOptions {
+  int steps = 300;     ///< of kCartPoleStep
+  int horizon = 50;    ///< of a plan, steps
+  int iterations = 2;  ///< of iLQR in each plan
+};
+
+struct SwingUp {
+  std::vector<CartPoleState> states;  ///< of the plant, steps + 1
+  std::vector<double> forces;
+  std::vector<double> cpu_seconds;  ///< of each plan
+  double reward = 0.0;              ///< mean of (1 + cos φ) / 2: 1 is upright all the time
+  /// Within the last 2 s the pole is always within 0.2 rad of upright, and the cart at the end
+  /// within 0.5 m of the middle.
+  bool success = false;
+};
+
+/// The cost of plans: upright in the middle of the rail, at rest.
+Cost SwingUpCost();
+
+/// `model`: 4 states, 1 control, as CartPoleStep.
+SwingUp RunSwingUp(StepMap* model, CartPolePlant* plant, const CartPoleState& start,
+                   const SwingUpOptions& options);
+
+/// One of many starts: x in ±0.5 m, any angle, v in ±0.5 m/s, ω in ±2 rad/s.
+CartPoleState RandomStart(unsigned seed, unsigned number);
+
+}  // namespace tangible
