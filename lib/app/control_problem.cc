@@ -31,6 +31,14 @@ class Reader {
     }
     if (root_.Has("second_order"))
       problem_.options.second_order = root_.At("second_order").Boolean();
+    if (root_.Has("reference_extension")) {
+      const JsonReader extension = root_.At("reference_extension");
+      problem_.options.reference_extension = extension.Boolean();
+      if (problem_.options.reference_extension &&
+          problem_.scene.simulation.stepping != Stepping::kEvent) {
+        extension.Fail("expected with event stepping only, got fixed stepping");
+      }
+    }
     if (root_.Has("mpc")) ReadPredictive(root_.At("mpc"));
   }
 
@@ -151,7 +159,7 @@ bool LoadControlFile(const std::string& file, ControlFile* problem, std::string*
   JsonErrors errors(file);
   const JsonReader root(json, &errors);
   root.ExpectKeys({"name", "scene", "controls", "cost", "horizon", "max_iterations",
-                   "gradient_tolerance", "second_order", "mpc"});
+                   "gradient_tolerance", "second_order", "reference_extension", "mpc"});
   const std::string scene = root.At("scene").String();
   if (errors.ok()) {
     problem->scene_path = Beside(file, scene);

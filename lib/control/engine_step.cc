@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tangible/control/engine_step.h"
 
+#include <algorithm>
+#include <cmath>
+
 namespace tangible {
 namespace {
 
@@ -10,7 +13,36 @@ Model<double> ModelOf(const RolloutFunction& function, State<double>* start) {
   return model;
 }
 
+// Whether impulses change a twist by more than what counts as an impact.
+bool Jumps(const Impulses& impulses, double threshold) {
+  for (size_t i = 0; i < impulses.new_twist.size(); ++i) {
+    if (std::abs(impulses.new_twist[i] - impulses.before.twist[i]) > threshold) return true;
+  }
+  return false;
+}
+
+// The model's numbers of forces against motion.
+std::vector<int> DampingOf(const ModelStructure& structure) {
+  std::vector<int> numbers;
+  for (const BodyIndex& body : structure.bodies) {
+    for (const int number : {body.linear_damping, body.angular_damping, body.quadratic_drag}) {
+      numbers.push_back(number);
+    }
+  }
+  for (const JointIndex& joint : structure.joints) numbers.push_back(joint.damping);
+  // Of the seven numbers of a spring.
+  for (const SpringIndex& spring : structure.springs) numbers.push_back(spring.numbers + 5);
+  numbers.erase(std::remove(numbers.begin(), numbers.end(), -1), numbers.end());
+  return numbers;
+}
+
 }  // namespace
+
+// The scene in which some bodies pass through each other, and its steps.
+struct EngineStep::Reduced {
+  RolloutFunction function;
+  std::unique_ptr<EngineStep> step;
+};
 
 EngineStep::EngineStep(const RolloutFunction& function)
     : function_(function), model_(ModelOf(function, &start_)), stepper_(model_) {
@@ -37,15 +69,29 @@ State<double> EngineStep::StateOf(long k, const VectorX<double>& x) const {
   return state;
 }
 
-bool EngineStep::Advance(long k, const VectorX<double>& x, const VectorX<double>& u,
-                         VectorX<double>* next, std::string* error) {
+bool EngineStep::Set(long k, const VectorX<double>& x, const VectorX<double>& u,
+                     std::string* error) {
   for (size_t j = 0; j < function_.control_numbers().size(); ++j) {
     model_.parameters[function_.control_numbers()[j]] = u[function_.control_of_number()[j]];
   }
-  if (!x.allFinite() || !u.allFinite()) {
-    *error = "step " + std::to_string(k) + ": expected finite states and controls";
-    return false;
+  if (x.allFinite() && u.allFinite()) return true;
+  *error = "step " + std::to_string(k) + ": expected finite states and controls";
+  return false;
+}
+
+VectorX<double> EngineStep::PartOf(const State<double>& state) const {
+  VectorX<double> x(num_states());
+  const int poses = static_cast<int>(state.pose.size());
+  for (int i = 0; i < num_states(); ++i) {
+    const int variable = function_.output_variables()[i];
+    x[i] = variable < poses ? state.pose[variable] : state.twist[variable - poses];
   }
+  return x;
+}
+
+bool EngineStep::Advance(long k, const VectorX<double>& x, const VectorX<double>& u,
+                         VectorX<double>* next, std::string* error) {
+  if (!Set(k, x, u, error)) return false;
   State<double> state = StateOf(k, x);
   const double h = model_.structure->settings.dt;
   const double t = static_cast<double>(k) * h;
@@ -55,13 +101,77 @@ bool EngineStep::Advance(long k, const VectorX<double>& x, const VectorX<double>
     *error = FailureMessage(report, t, k);
     return false;
   }
-  next->resize(num_states());
-  const int poses = static_cast<int>(state.pose.size());
-  for (int i = 0; i < num_states(); ++i) {
-    const int variable = function_.output_variables()[i];
-    (*next)[i] = variable < poses ? state.pose[variable] : state.twist[variable - poses];
-  }
+  FindImpacts();
+  *next = PartOf(state);
   return true;
+}
+
+bool EngineStep::StepBack(long k, const VectorX<double>& next, const VectorX<double>& u,
+                          VectorX<double>* x) {
+  std::string error;
+  if (!Set(k, next, u, &error)) return false;
+  const auto turn_twists = [](State<double>* state) {
+    for (double& speed : state->twist) speed = -speed;
+  };
+  Model<double> turned = model_;
+  for (const int number : DampingOf(*model_.structure)) {
+    turned.parameters[number] = -turned.parameters[number];
+  }
+  State<double> state = StateOf(k + 1, next);
+  turn_twists(&state);
+  const double h = model_.structure->settings.dt;
+  stepper_.ClearGuess();
+  const StepReport report = stepper_.Step(turned, static_cast<double>(k) * h, h, &state);
+  if (report.status != StepStatus::kDone) return false;
+  turn_twists(&state);
+  *x = PartOf(state);
+  return true;
+}
+
+void EngineStep::FindImpacts() {
+  impacts_.clear();
+  if (!stepper_.by_events()) return;
+  const EventRecord& record = stepper_.events().record();
+  const double threshold = model_.structure->settings.restitution_threshold;
+  for (int i = 0; i < record.num_parts; ++i) {
+    const EventPart& part = *record.parts[i];
+    if (!part.is_impulses || !Jumps(part.impulses, threshold)) continue;
+    const Impulses& impulses = part.impulses;
+    std::vector<Meeting> kind;
+    for (size_t c = 0; c < impulses.contacts.size(); ++c) {
+      const ActiveContact& contact = impulses.contacts[c];
+      if (contact.IsJointFriction() || impulses.solution.normal_impulse[c] <= 0.0) continue;
+      kind.push_back({contact.a, contact.b, contact.joint});
+    }
+    // The decompression of an impact is the same impact.
+    if (kind.empty() || impulses.decompression) continue;
+    std::sort(kind.begin(), kind.end());
+    kind.erase(std::unique(kind.begin(), kind.end()), kind.end());
+    const auto found = std::find(kinds_.begin(), kinds_.end(), kind);
+    impacts_.push_back(static_cast<int>(found - kinds_.begin()));
+    if (found == kinds_.end()) kinds_.push_back(kind);
+  }
+}
+
+StepMap* EngineStep::Without(int impact) {
+  std::shared_ptr<Reduced>& reduced = without_[impact];
+  if (reduced == nullptr) {
+    reduced = std::make_shared<Reduced>();
+    Scene scene = function_.scene();
+    for (const Meeting& meeting : kinds_[impact]) {
+      if (meeting.joint >= 0) {
+        scene.joints[meeting.joint].limits.reset();
+      } else {
+        scene.no_contact.emplace_back(scene.bodies[meeting.a].name, scene.bodies[meeting.b].name);
+      }
+    }
+    std::vector<std::string> controls;
+    for (const ParameterPath& path : function_.controls()) controls.push_back(path.path);
+    if (reduced->function.Create(scene, {}, controls, {}).empty()) {
+      reduced->step = std::make_unique<EngineStep>(reduced->function);
+    }
+  }
+  return reduced->step.get();
 }
 
 bool EngineStep::Step(long k, const VectorX<double>& x, const VectorX<double>& u,

@@ -8,6 +8,9 @@
 //   x   x, y, angle, vx, vy, omega of each moving body, as OutputNames orders them
 //   u   the controls of a RolloutFunction
 
+#include <map>
+#include <memory>
+
 #include "tangible/control/step_map.h"
 #include "tangible/simulation/derivatives/rollout_tangent.h"
 #include "tangible/simulation/gradient/rollout_function.h"
@@ -31,6 +34,13 @@ class EngineStep : public StepMap {
   bool LineariseAlong(long k, const VectorX<double>& x, const VectorX<double>& u,
                       const MatrixX<double>& columns, VectorX<double>* next, MatrixX<double>* a,
                       MatrixX<double>* b, std::string* error);
+  /// Of event stepping: twists that jump by more than the restitution threshold.
+  const std::vector<int>& impacts() const override { return impacts_; }
+  StepMap* Without(int impact) override;
+  /// A step with all twists turned round. Damping takes from them what it gave; friction of
+  /// contacts and joints is not turned round, and nothing that an impact loses comes back.
+  bool StepBack(long k, const VectorX<double>& next, const VectorX<double>& u,
+                VectorX<double>* x) override;
 
   /// The scene's own.
   VectorX<double> initial() const { return function_.Defaults().state; }
@@ -38,15 +48,30 @@ class EngineStep : public StepMap {
   State<double> StateOf(long k, const VectorX<double>& x) const;
 
  private:
+  /// Sets the controls; false where they or the state are not finite.
+  bool Set(long k, const VectorX<double>& x, const VectorX<double>& u, std::string* error);
+  /// The moving bodies' part.
+  VectorX<double> PartOf(const State<double>& state) const;
   bool Advance(long k, const VectorX<double>& x, const VectorX<double>& u, VectorX<double>* next,
                std::string* error);
+  void FindImpacts();
+
+  /// Two bodies, or a joint whose limit was reached (−1: none).
+  struct Meeting {
+    int a, b, joint;
+    auto operator<=>(const Meeting&) const = default;
+  };
+  struct Reduced;
 
   const RolloutFunction& function_;
   State<double> start_;
   Model<double> model_;
   Stepper stepper_;
   StepTangent tangent_;
-  RowMatrixXd controls_, w_dot_;  ///< of the variables: unit vectors of controls
+  RowMatrixXd controls_, w_dot_;             ///< of the variables: unit vectors of controls
+  std::vector<std::vector<Meeting>> kinds_;  ///< of impacts: what meets at once, ascending
+  std::vector<int> impacts_;
+  std::map<int, std::shared_ptr<Reduced>> without_;
 };
 
 }  // namespace tangible

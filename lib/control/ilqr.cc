@@ -3,9 +3,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <utility>
 
 #include "tangible/control/box_quadratic.h"
+#include "tangible/control/reference_extension.h"
 #include "tangible/control/tolerances.h"
 
 namespace tangible {
@@ -93,6 +95,7 @@ class Solver {
     plan.states.resize(controls.rows() + 1, n_);
     plan.states.row(0) = p_.initial.transpose();
     plan.gains.assign(controls.rows(), MatrixX<double>::Zero(m_, n_));
+    if (options_.reference_extension) plan.impacts.resize(controls.rows());
     if (!RollOut(plan, nullptr, 0.0, &plan) || !Linearise(plan, &at_)) {
       result_.status = IlqrStatus::kFailed;
       return false;
@@ -255,15 +258,20 @@ class Solver {
     VectorX<double> x = plan.states.row(0);
     VectorX<double> next;
     std::string error;
+    std::vector<int> impacts;
     for (long k = 0; k < steps; ++k) {
       VectorX<double> u = plan.controls.row(k);
       if (gains != nullptr) {
-        u += share * forward_[k] + (*gains)[k] * (x - plan.states.row(k).transpose());
+        u += share * forward_[k] + Feedback(*gains, k, plan, impacts, x);
         u = u.cwiseMax(p_.low).cwiseMin(p_.high);
       }
       if (!p_.map->Step(p_.first_step + k, x, u, &next, &error)) {
         if (gains == nullptr) result_.message = error;
         return false;
+      }
+      if (options_.reference_extension) {
+        rolled->impacts[k] = p_.map->impacts();
+        impacts.insert(impacts.end(), rolled->impacts[k].begin(), rolled->impacts[k].end());
       }
       cost += p_.cost->Value(x, u);
       rolled->controls.row(k) = u.transpose();
@@ -276,11 +284,21 @@ class Solver {
     return false;
   }
 
+  // K (x − x̄) of step k in a run that has had `impacts`.
+  VectorX<double> Feedback(const std::vector<MatrixX<double>>& gains, long k, const Plan& plan,
+                           const std::vector<int>& impacts, const VectorX<double>& x) {
+    if (!reference_) return gains[k] * (x - plan.states.row(k).transpose());
+    const ExtendedReference::Point& point = reference_->At(k, impacts);
+    if (point.gain < 0) return VectorX<double>::Zero(m_);
+    return gains[point.gain] * (x - point.state);
+  }
+
   // The share of the step that was taken; 0: none.
   double Search() {
     Plan& plan = result_.plan;
     Plan tried = plan;
     const double rounding = kCostRounding * std::abs(plan.cost);
+    if (options_.reference_extension) reference_.emplace(p_.map, p_.first_step, plan);
     for (int j = 0; j < kShares; ++j) {
       const double share = ShareOf(j);
       const double expected = share * linear_ + share * share * quadratic_;
@@ -338,6 +356,7 @@ class Solver {
   RowMatrixXd costates_, gradient_;
   std::vector<MatrixX<double>> curvature_;
   bool curvature_valid_ = false;
+  std::optional<ExtendedReference> reference_;  // of the plan, in a search
   std::vector<VectorX<double>> forward_;
   std::vector<MatrixX<double>> new_gains_;
   double linear_ = 0.0, quadratic_ = 0.0;  // of the expected change of the cost

@@ -9,7 +9,8 @@
 //             Q_uu = ℓ_uu + Bᵀ (V_xx' + μ I) B
 //             k    = argmin ½ δuᵀ Q_uu δu + Q_uᵀ δu within the bounds   (box_quadratic.h)
 //             K    = −Q_uu⁻¹ Q_ux over the free controls, 0 over those that a bound holds
-//   forward   u_k ← clamp(u_k + α k_k + K_k (x_k − x̄_k)), rolled out by the system itself
+//   forward   u_k ← clamp(u_k + α k_k + K_k (x_k − x̄_k)), rolled out by the system itself; x̄_k
+//             across impacts: reference_extension.h
 //
 // (Li, Todorov 2004; Tassa, Mansard, Todorov 2014). With second order Σ λᵢ ∂²fᵢ is added to Q, λ
 // the costate, by central differences of A and B: differential dynamic programming, which converges
@@ -44,6 +45,9 @@ struct IlqrOptions {
   /// order, by this share of itself.
   double gradient_tolerance = kGradientTolerance;
   bool second_order = false;
+  /// Feedback of a run that has an impact earlier or later than the plan is relative to the plan's
+  /// motion extended across it (reference_extension.h), and not to states on the other side.
+  bool reference_extension = false;
   /// Asked after each iteration; true ends the work with the best plan so far.
   std::function<bool()> stop{};
 };
@@ -54,6 +58,8 @@ struct Plan {
   RowMatrixXd states, controls;
   std::vector<MatrixX<double>> gains;
   double cost = 0.0;
+  /// Of each step, as StepMap has them; empty without reference_extension.
+  std::vector<std::vector<int>> impacts{};
 };
 
 struct IlqrIteration {

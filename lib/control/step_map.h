@@ -5,6 +5,7 @@
 // (engine_step.h), a learned model another.
 
 #include <string>
+#include <vector>
 
 #include "tangible/math/scalar.h"
 
@@ -26,6 +27,26 @@ class StepMap {
   virtual bool Linearise(long k, const VectorX<double>& x, const VectorX<double>& u,
                          VectorX<double>* next, MatrixX<double>* a, MatrixX<double>* b,
                          std::string* error) = 0;
+
+  /// The impacts of the last Step or Linearise in their order, each as a number of its kind (which
+  /// bodies met): where states jump. Systems without jumps have none.
+  virtual const std::vector<int>& impacts() const {
+    static const std::vector<int> none;
+    return none;
+  }
+  /// The same system where impacts of that kind do not happen, bodies passing through each other;
+  /// null where there is no such system. It lives as long as this.
+  virtual StepMap* Without(int impact) {
+    (void)impact;
+    return nullptr;
+  }
+  /// The state from which step k leads to `next`, as far as the system can trace it back; false
+  /// where it cannot.
+  virtual bool StepBack(long k, const VectorX<double>& next, const VectorX<double>& u,
+                        VectorX<double>* x) {
+    (void)k, (void)next, (void)u, (void)x;
+    return false;
+  }
 };
 
 }  // namespace tangible

@@ -109,6 +109,8 @@ TEST_F(TangibleControlTest, MistakesAreOneLine) {
   ExpectOneLine(Control(large), 1, "the cost of the initial controls is not finite");
   ExpectOneLine(Control(R"({"scene": "nowhere.json", "controls": [], "cost": []})"), 1,
                 "nowhere.json");
+  ExpectOneLine(Control(Problem(kEffort, R"(, "reference_extension": true)")), 1,
+                "/reference_extension: expected with event stepping only");
   ExpectOneLine(Control(Problem(kEffort), "--mpc"), 1, "/mpc: missing");
   ExpectOneLine(Control(Problem(kEffort), "--plant=x.json"), 2, "--plant: needs --mpc");
   ExpectOneLine(Control(Problem(kEffort), "--budget_ms=-1 --mpc"), 2, "--budget_ms");
