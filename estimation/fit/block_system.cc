@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tangible/estimation/fit/block_system.h"
 
-#include <Eigen/SVD>
 #include <utility>
+
+#include "tangible/estimation/fit/decomposition.h"
 
 namespace tangible {
 namespace {
@@ -118,15 +119,8 @@ Eigen::VectorXd BlockSystem::Newton(const Eigen::VectorXd& gradient) const {
   Eigen::VectorXd scaled = Eigen::VectorXd::Zero(layout_.num_parameters());
   const Eigen::MatrixXd stacked = Stack(parts, num_shared);
   if (num_shared > 0 && stacked.rows() > 0) {
-    // The Hessian is V S² Vᵀ.
-    Eigen::JacobiSVD<Eigen::MatrixXd, Eigen::ColPivHouseholderQRPreconditioner> svd(
-        stacked, Eigen::ComputeThinU | Eigen::ComputeThinV);
-    svd.setThreshold(kStepRankTolerance);
-    const Eigen::Index rank = svd.rank();
-    const auto v = svd.matrixV().leftCols(rank);
-    scaled.head(num_shared) =
-        -(v * svd.singularValues().head(rank).array().pow(-2).matrix().asDiagonal() *
-          (v.transpose() * shared_gradient));
+    const Decomposition hessian(stacked, Eigen::VectorXd::Ones(num_shared), kStepRankTolerance);
+    scaled.head(num_shared) = -hessian.Covariance() * shared_gradient;
   }
   SolveOwn(scaled.head(num_shared), a, &scaled);
   return Unscaled(scaled);

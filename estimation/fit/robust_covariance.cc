@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tangible/estimation/fit/robust_covariance.h"
 
-#include <Eigen/SVD>
+#include <Eigen/QR>
 #include <algorithm>
 #include <boost/math/distributions/students_t.hpp>
 #include <cmath>
@@ -267,13 +267,13 @@ bool Jackknife(const std::vector<Reduced>& reduced, const std::vector<RecordingR
       left.col(k) *= scale;
       score[k] *= scale;
     }
-    const Eigen::BDCSVD<Eigen::MatrixXd> svd(left, Eigen::ComputeThinU | Eigen::ComputeThinV);
-    const Eigen::VectorXd& s = svd.singularValues();
-    const double least = std::max(options.rank_tolerance, 1e-12) * s[0];
-    if (!(s[size - 1] > least)) {
+    Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr;
+    qr.setThreshold(std::max(options.rank_tolerance, 1e-12));
+    qr.compute(left);
+    if (qr.rank() < size) {
       return false;
     }
-    Eigen::VectorXd moved = svd.solve(score);
+    Eigen::VectorXd moved = qr.solve(score);
     for (Eigen::Index k = 0; k < size; ++k) {
       moved[k] *= length[k] > 0.0 ? 1.0 / length[k] : 1.0;
     }

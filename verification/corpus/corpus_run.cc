@@ -12,6 +12,7 @@
 #include "tangible/lcp/contact/contact_solver.h"
 #include "tangible/lcp/contact/worker_pool.h"
 #include "tangible/lcp/dense/solver.h"
+#include "tangible/verification/corpus/plain_case.h"
 #include "tangible/verification/corpus/recomputed.h"
 
 namespace tangible::corpus {
@@ -92,6 +93,10 @@ Answer ByContacts(const ContactCase& one, Way way, std::uint64_t seed) {
 }
 
 std::vector<Answer> ByAll(const std::string& kind, int index, const RunOptions& options) {
+  if (kind == kSmallIntegers) {
+    const PlainCase one = MakeSmallIntegers(options.seed, index);
+    return {ByGeneral(kind, one.name, Known::kHardlySolvable, one.problem, nullptr)};
+  }
   const ContactCase one = MakeContactCase(kind, options.seed, index, options.most_contacts);
   std::vector<Answer> answers = {ByContacts(one, Way::kContact, 0),
                                  ByContacts(one, Way::kMisled, options.seed + index)};
@@ -162,9 +167,18 @@ bool Answer::right() const {
   return true;
 }
 
+const std::vector<std::string>& RandomKinds() {
+  static const std::vector<std::string> kKinds = [] {
+    std::vector<std::string> kinds = ContactKinds();
+    kinds.emplace_back(kSmallIntegers);
+    return kinds;
+  }();
+  return kKinds;
+}
+
 CorpusResult RunCorpus(const std::vector<FileCase>& files, const RunOptions& options) {
   const std::vector<std::string> kinds =
-      options.only.empty() ? ContactKinds() : std::vector<std::string>{options.only};
+      options.only.empty() ? RandomKinds() : std::vector<std::string>{options.only};
   const size_t total = files.size() + kinds.size() * static_cast<size_t>(options.random);
   std::vector<std::vector<Answer>> answers(total);
   std::mutex mutex;

@@ -69,6 +69,9 @@ struct CorpusResult {
   int problems = 0;
 };
 
+/// The kinds of random problems, in the order in which they are listed.
+const std::vector<std::string>& RandomKinds();
+
 /// Problems of files, and random ones.
 CorpusResult RunCorpus(const std::vector<FileCase>& files, const RunOptions& options);
 

@@ -49,7 +49,7 @@ std::string CheckFlags() {
   if (FLAGS_random == 0 && FLAGS_problems.empty()) {
     return "--random: expected a number > 0 where there are no --problems, got 0";
   }
-  const std::vector<std::string>& kinds = corpus::ContactKinds();
+  const std::vector<std::string>& kinds = corpus::RandomKinds();
   if (FLAGS_kind.empty() || std::find(kinds.begin(), kinds.end(), FLAGS_kind) != kinds.end()) {
     return "";
   }
@@ -64,10 +64,9 @@ int Run() {
   if (!FLAGS_problems.empty()) error = corpus::ReadProblemFolder(FLAGS_problems, &files);
   if (!error.empty()) return ReportError(error);
   const int cores = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
-  const long total =
-      static_cast<long>(files.size()) +
-      static_cast<long>(FLAGS_random) *
-          (FLAGS_kind.empty() ? static_cast<long>(corpus::ContactKinds().size()) : 1);
+  const long total = static_cast<long>(files.size()) +
+                     static_cast<long>(FLAGS_random) *
+                         (FLAGS_kind.empty() ? static_cast<long>(corpus::RandomKinds().size()) : 1);
   Progress progress("problems", total);
   const corpus::CorpusResult result =
       corpus::RunCorpus(files, {.random = FLAGS_random,

@@ -35,6 +35,7 @@ ContactSearch::ContactSearch(const Model<double>& model) : lengths_(model) {
   const ModelStructure& structure = *model.structure;
   const size_t n = structure.bodies.size();
   bound_.assign(n, 0.0);
+  AppendLimits(model, &limits_);
   limit_bound_.assign(structure.joints.size(), 0.0);
   boxes_.resize(n);
   free_twist_.assign(3 * n, 0.0);
@@ -93,25 +94,14 @@ void ContactSearch::FindLimits(const Model<double>& model, double h,
                                const AssemblyScratch<double>& scratch,
                                std::vector<ActiveContact>* contacts) {
   const ModelStructure& structure = *model.structure;
-  for (size_t j = 0; j < structure.joints.size(); ++j) {
-    const JointIndex& joint = structure.joints[j];
-    if (joint.low < 0) {
-      continue;
-    }
-    for (const double side : {1.0, -1.0}) {
-      ActiveContact limit;
-      limit.a = joint.a;
-      limit.b = joint.b;
-      limit.joint = static_cast<int>(j);
-      limit.side = side;
-      ContactRows<double> rows;
-      EvaluateLimitRows(model.parameters[LimitNumber(joint, limit)], scratch.joints[j], limit,
-                        &rows);
-      limit.gap = rows.geometry.gap;
-      if (limit.gap > structure.settings.contact_margin + h * limit_bound_[j]) {
-        continue;
-      }
-      limit.law = GapLaw(rows.geometry.gap, h, structure.settings);
+  for (ActiveContact limit : limits_) {
+    const JointIndex& joint = structure.joints[limit.joint];
+    ContactRows<double> rows;
+    EvaluateLimitRows(model.parameters[LimitNumber(joint, limit)], scratch.joints[limit.joint],
+                      limit, &rows);
+    limit.gap = rows.geometry.gap;
+    if (limit.gap <= structure.settings.contact_margin + h * limit_bound_[limit.joint]) {
+      limit.law = GapLaw(limit.gap, h, structure.settings);
       contacts->push_back(limit);
     }
   }
@@ -129,11 +119,11 @@ ContactsAhead ContactSearch::FindPassed(const Model<double>& model, const State<
   if (!(approach < -slow) || size == 0.0) {
     return ContactsAhead();
   }
-  const double none = kNoApproach * size + rounding;
-  if (contact.gap < -none) {
+  const double touch = lengths_.Touch(state, contact.a, contact.b);
+  if (contact.gap < -touch) {
     return ContactsAhead();
   }
-  const ContactsAhead ahead = FindContactsAhead(model, state, contact, approach, size, none, slow);
+  const ContactsAhead ahead = FindContactsAhead(model, state, contact, approach, size, touch, slow);
   for (int k = 0; k < ahead.count; ++k) {
     if (ahead.speed[k] < -slow) {
       return ContactsAhead();

@@ -45,8 +45,9 @@ class ContactSearch {
                   std::vector<ActiveContact>* contacts);
 
   Lengths lengths_;
-  std::vector<double> bound_;        ///< m/s a body
-  std::vector<double> limit_bound_;  ///< a joint: bound on its coordinate's rate, rad/s or m/s
+  std::vector<double> bound_;          ///< m/s a body
+  std::vector<ActiveContact> limits_;  ///< of all joints
+  std::vector<double> limit_bound_;    ///< a joint: bound on its coordinate's rate, rad/s or m/s
   std::vector<Aabb> boxes_;
   std::vector<std::pair<int, int>> pairs_;
   std::vector<double> free_twist_;

@@ -66,6 +66,23 @@ CoefficientSource FrictionOf(const Model<double>& model, const ActiveContact& co
                                    : CoefficientSource();
 }
 
+void AppendLimits(const Model<double>& model, std::vector<ActiveContact>* contacts) {
+  const std::vector<JointIndex>& joints = model.structure->joints;
+  for (size_t j = 0; j < joints.size(); ++j) {
+    if (joints[j].low < 0) {
+      continue;
+    }
+    for (const double side : {1.0, -1.0}) {
+      ActiveContact& limit = contacts->emplace_back();
+      limit.a = joints[j].a;
+      limit.b = joints[j].b;
+      limit.joint = static_cast<int>(j);
+      limit.side = side;
+      limit.law = ContactLaw::kInelastic;
+    }
+  }
+}
+
 void AppendJointFriction(const Model<double>& model, std::vector<ActiveContact>* contacts) {
   const std::vector<JointIndex>& joints = model.structure->joints;
   for (size_t j = 0; j < joints.size(); ++j) {

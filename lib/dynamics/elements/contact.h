@@ -66,6 +66,9 @@ CoefficientSource MixedRestitution(const Model<double>& model, int a, int b);
 /// Of any active contact: mixed between shapes, that of a joint's friction; a limit has none.
 CoefficientSource FrictionOf(const Model<double>& model, const ActiveContact& contact);
 
+/// Both limits of each joint that has them, the low one first; gaps are not set.
+void AppendLimits(const Model<double>& model, std::vector<ActiveContact>* contacts);
+
 /// The friction of each joint that has some, active at all times.
 void AppendJointFriction(const Model<double>& model, std::vector<ActiveContact>* contacts);
 

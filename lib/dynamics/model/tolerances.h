@@ -22,8 +22,7 @@ inline constexpr double kCornerRounding = 4.0 * std::numeric_limits<double>::eps
 
 /// Of the step: times that are closer are the same: an end of a step is k dt rounded.
 inline constexpr double kSameTime = 1e-9;
-/// Of speeds at hand and, of a gap, of the smaller body: an approach or a penetration at the
-/// meeting of two corners below it is none; an order above what the solver leaves.
+/// Of speeds at hand: an approach below it is none; an order above what the solver leaves.
 inline constexpr double kNoApproach = 1e-9;
 /// Of the size of the smaller body, or length of an edge: beyond the meeting of two corners: above
 /// what ends of faces may be apart, below what anything else is.

@@ -4,14 +4,18 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <utility>
 
+#include "tangible/lcp/dense/nnls.h"
+#include "tangible/lcp/dense/scaling.h"
 #include "tangible/lcp/dense/tolerances.h"
 
 namespace tangible {
 namespace {
 
 using Eigen::Index;
+using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 double Ratio(double value, double scale) { return value == 0.0 ? 0.0 : value / scale; }
@@ -165,16 +169,31 @@ LcpVector Polish(const MixedLcp<double>& problem, const LcpVector& point, int ma
 
 LcpVector EnumerateModes(const MixedLcp<double>& problem, double tolerance) {
   const Index nz = problem.num_z();
-  const LcpVector zero{VectorXd::Zero(problem.num_v()), VectorXd::Zero(problem.num_y()),
-                       VectorXd::Zero(nz)};
-  Best best(problem, zero);
-  std::vector<RowMode> modes(nz);
+  const Index num_free = problem.num_v() + problem.num_y();
+  const auto [E, f] = AllEquations(problem);
+  Best best(problem,
+            {VectorXd::Zero(problem.num_v()), VectorXd::Zero(problem.num_y()), VectorXd::Zero(nz)});
+  // v, y, and z of active or s of inactive rows.
+  std::vector<Index> columns(num_free + nz);
+  std::iota(columns.begin(), columns.end(), 0);
   for (unsigned set = 0; set < (1U << nz) && best.Residual() > tolerance; ++set) {
+    const auto active = [set](Index i) { return ((set >> i) & 1U) != 0; };
     for (Index i = 0; i < nz; ++i) {
-      modes[i] = ((set >> i) & 1U) != 0 ? RowMode::kActive : RowMode::kInactive;
+      columns[num_free + i] = num_free + i + (active(i) ? 0 : nz);
     }
-    const LcpVector point = SolveModes(problem, modes, zero);
-    if (point.z.allFinite() && point.v.allFinite()) best.Offer(point);
+    const MatrixXd system = E(Eigen::all, columns);
+    const Equilibration scaling = Equilibrate(system);
+    VectorXd x = SolveNnls(scaling.row.asDiagonal() * system * scaling.col.asDiagonal(),
+                           scaling.row.cwiseProduct(f), num_free)
+                     .x;
+    x = scaling.col.cwiseProduct(x);
+    for (Index i = 0; i < nz; ++i) {
+      x[num_free + i] = active(i) ? x[num_free + i] : 0.0;
+    }
+    if (x.allFinite()) {
+      best.Offer(
+          {x.head(problem.num_v()), x.segment(problem.num_v(), problem.num_y()), x.tail(nz)});
+    }
   }
   return best.Point();
 }

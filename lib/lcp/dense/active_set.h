@@ -26,8 +26,9 @@ LcpVector Polish(const MixedLcp<double>& problem, const LcpVector& point, int ma
 LcpVector Polish(const MixedLcp<double>& problem, const LcpVector& point, int max_rounds,
                  std::vector<RowMode> modes);
 
-/// Solves the equality systems of all 2ⁿ sets of modes, nz ≤ kMaxEnumeratedRows, until one is a
-/// solution to `tolerance`; returns the best point.
+/// Looks in all 2ⁿ sets of modes, nz ≤ kMaxEnumeratedRows, for v, y and z, s ≥ 0 that satisfy the
+/// equations (nnls.h; also where rows are redundant), until one is a solution to `tolerance`;
+/// returns the best point.
 inline constexpr int kMaxEnumeratedRows = 12;
 LcpVector EnumerateModes(const MixedLcp<double>& problem, double tolerance);
 

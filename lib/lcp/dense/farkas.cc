@@ -50,27 +50,15 @@ bool CheckFarkas(const MixedLcp<double>& problem, const VectorXd& farkas) {
 }
 
 VectorXd FindFarkas(const MixedLcp<double>& problem) {
-  const Index nv = problem.num_v();
-  const Index ny = problem.num_y();
-  const Index nz = problem.num_z();
-  const Index n = nv + ny + nz;
-  // E (v, y, z, s) = f are the equations; the residual of their least squares is the proof.
-  MatrixXd E = MatrixXd::Zero(n, n + nz);
-  E.topLeftCorner(nv, nv) = problem.M;
-  E.block(0, nv, nv, ny) = -problem.A.transpose();
-  E.block(0, nv + ny, nv, nz) = -problem.G.transpose();
-  E.block(nv, 0, ny, nv) = problem.A;
-  E.block(nv + ny, 0, nz, nv) = -problem.G;
-  E.block(nv + ny, nv + ny, nz, nz) = -problem.F;
-  E.bottomRightCorner(nz, nz).setIdentity();
-  VectorXd f(n);
-  f << problem.p, problem.b, problem.c;
+  const auto [E, f] = AllEquations(problem);
   const Equilibration scaling = Equilibrate(E);
-  const NnlsResult least = SolveNnls(scaling.row.asDiagonal() * E * scaling.col.asDiagonal(),
-                                     scaling.row.cwiseProduct(f), nv + ny);
+  // The residual of their least squares is the proof.
+  const NnlsResult least =
+      SolveNnls(scaling.row.asDiagonal() * E * scaling.col.asDiagonal(),
+                scaling.row.cwiseProduct(f), problem.num_v() + problem.num_y());
   VectorXd farkas = scaling.row.cwiseProduct(least.residual);
-  farkas.tail(nz) = (-farkas.tail(nz)).cwiseMax(0.0);
-  const double largest = n > 0 ? farkas.cwiseAbs().maxCoeff() : 0.0;
+  farkas.tail(problem.num_z()) = (-farkas.tail(problem.num_z())).cwiseMax(0.0);
+  const double largest = farkas.size() > 0 ? farkas.cwiseAbs().maxCoeff() : 0.0;
   if (!(largest > 0.0)) return VectorXd();
   // The residual is a difference of numbers of f's size: what is below their rounding is zero.
   const double rounding = kLcpRounding * scaling.row.maxCoeff() * f.cwiseAbs().maxCoeff();

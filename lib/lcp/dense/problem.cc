@@ -87,6 +87,23 @@ void ConformEmptyBlocks(MixedLcp<T>& problem) {
   conform(problem.F, problem.num_z(), problem.num_z());
 }
 
+LinearEquations AllEquations(const MixedLcp<double>& problem) {
+  const Index nv = problem.num_v();
+  const Index ny = problem.num_y();
+  const Index nz = problem.num_z();
+  const Index n = nv + ny + nz;
+  LinearEquations all{MatrixX<double>::Zero(n, n + nz), VectorX<double>(n)};
+  all.E.topLeftCorner(nv, nv) = problem.M;
+  all.E.block(0, nv, nv, ny) = -problem.A.transpose();
+  all.E.block(0, nv + ny, nv, nz) = -problem.G.transpose();
+  all.E.block(nv, 0, ny, nv) = problem.A;
+  all.E.block(nv + ny, 0, nz, nv) = -problem.G;
+  all.E.block(nv + ny, nv + ny, nz, nz) = -problem.F;
+  all.E.bottomRightCorner(nz, nz).setIdentity();
+  all.f << problem.p, problem.b, problem.c;
+  return all;
+}
+
 std::string ValidateProblem(const MixedLcp<double>& problem) {
   const Index nv = problem.num_v();
   const Index ny = problem.num_y();

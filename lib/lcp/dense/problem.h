@@ -76,6 +76,13 @@ std::string ValidateProblem(const MixedLcp<double>& problem);
 template <typename T>
 MixedLcp<double> ValuesOf(const MixedLcp<T>& problem);
 
+/// All equations of a problem as E (v, y, z, s) = f; E is n x (n + nz), n = nv + ny + nz.
+struct LinearEquations {
+  MatrixX<double> E;
+  VectorX<double> f;
+};
+LinearEquations AllEquations(const MixedLcp<double>& problem);
+
 /// What the sizes of the terms in each row say about its rounding.
 struct LcpScales {
   VectorX<double> momentum;  ///< nv: (|M||v| + |A|ᵀ|y| + |G|ᵀ|z| + |p|) of the row

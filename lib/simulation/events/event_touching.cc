@@ -55,24 +55,14 @@ void EventStepper::FindTouching(const Model<double>& model, const State<double>&
       AddTouching(model, state, ahead.contacts[k]);
     }
   }
-  for (size_t j = 0; j < structure.joints.size(); ++j) {
-    const JointIndex& joint = structure.joints[j];
-    if (joint.low < 0) {
-      continue;
-    }
-    for (const double side : {1.0, -1.0}) {
-      ActiveContact limit;
-      limit.a = joint.a;
-      limit.b = joint.b;
-      limit.joint = static_cast<int>(j);
-      limit.side = side;
-      limit.law = ContactLaw::kInelastic;
-      ContactRows<double> rows;
-      EvaluateActiveRows(model, state, limit, &rows);
-      limit.gap = rows.geometry.gap;
-      if (limit.gap <= lengths.LimitTouch(state, joint)) {
-        AddTouching(model, state, limit);
-      }
+  found.clear();
+  AppendLimits(model, &found);
+  for (ActiveContact& limit : found) {
+    ContactRows<double> rows;
+    EvaluateActiveRows(model, state, limit, &rows);
+    limit.gap = rows.geometry.gap;
+    if (limit.gap <= lengths.LimitTouch(state, structure.joints[limit.joint])) {
+      AddTouching(model, state, limit);
     }
   }
   found.clear();

@@ -350,6 +350,48 @@ ContactSystem& Stepper::system() {
   return solver_.system();
 }
 
+ContactSolverReport Stepper::SolveWithContacts(const Model<double>& model,
+                                               const State<double>& state, double h,
+                                               StepReport* report) {
+  const ModelStructure& structure = *model.structure;
+  StepRecord& r = record_;
+  search_.SetBounds(model, state, r.problem, scratch_);
+  ContactSolverReport solved;
+  search_.Find(model, state, h, scratch_, &r.contacts, &r.friction, &r.restitution);
+  for (int search = 0; search < kMaxSearches; ++search) {
+    AssembleContacts(model, state, h, r.contacts, r.friction, r.restitution, &scratch_, &r.problem);
+    if (search == 0) {
+      CarryGuess(model, last_contacts_, last_solution_, Guess::kLastStep);
+    } else {
+      // What was found with fewer contacts, and the further ones open: often that is the solution.
+      CarryGuess(model, wider_contacts_, narrow_solution_, Guess::kSameStep);
+    }
+    const ContactSolverReport before = solved;
+    solved = SolveContacts(SolverOptionsOf(structure.settings), &report->islands);
+    solved.factorisations += before.factorisations;
+    solved.iterations += before.iterations;
+    report->solver.Add(solved.fallbacks);
+    if (!solved.solved) {
+      break;
+    }
+    FullTwist(structure, state, r.solution.motion, &r.new_twist);
+    if (!search_.CheckBounds(model, r.new_twist, scratch_)) {
+      break;
+    }
+    // A wider search that finds the same contacts changes nothing.
+    search_.Find(model, state, h, scratch_, &wider_contacts_, &wider_friction_,
+                 &wider_restitution_);
+    if (SameContacts(r.contacts, wider_contacts_)) {
+      break;
+    }
+    narrow_solution_ = r.solution;
+    r.contacts.swap(wider_contacts_);
+    r.friction.swap(wider_friction_);
+    r.restitution.swap(wider_restitution_);
+  }
+  return solved;
+}
+
 StepReport Stepper::Step(const Model<double>& model, double t, double h, State<double>* state) {
   if (events_) {
     return StepByEvents(model, t, h, state);
@@ -368,42 +410,7 @@ StepReport Stepper::Step(const Model<double>& model, double t, double h, State<d
     report.message = "a force or momentum is not finite";
     return report;
   }
-  search_.SetBounds(model, *state, r.problem, scratch_);
-  ContactSolverReport solved;
-  search_.Find(model, *state, h, scratch_, &r.contacts, &r.friction, &r.restitution);
-  for (int search = 0; search < kMaxSearches; ++search) {
-    AssembleContacts(model, *state, h, r.contacts, r.friction, r.restitution, &scratch_,
-                     &r.problem);
-    if (search == 0) {
-      CarryGuess(model, last_contacts_, last_solution_, Guess::kLastStep);
-    } else {
-      // What was found with fewer contacts, and the further ones open: often that is the solution.
-      CarryGuess(model, wider_contacts_, narrow_solution_, Guess::kSameStep);
-    }
-    const ContactSolverReport before = solved;
-    solved = SolveContacts(SolverOptionsOf(settings), &report.islands);
-    solved.factorisations += before.factorisations;
-    solved.iterations += before.iterations;
-    report.solver.Add(solved.fallbacks);
-    if (!solved.solved) {
-      break;
-    }
-    FullTwist(structure, *state, r.solution.motion, &r.new_twist);
-    if (!search_.CheckBounds(model, r.new_twist, scratch_)) {
-      break;
-    }
-    // A wider search that finds the same contacts changes nothing.
-    search_.Find(model, *state, h, scratch_, &wider_contacts_, &wider_friction_,
-                 &wider_restitution_);
-    if (SameContacts(r.contacts, wider_contacts_)) {
-      break;
-    }
-    narrow_solution_ = r.solution;
-    r.contacts.swap(wider_contacts_);
-    r.friction.swap(wider_friction_);
-    r.restitution.swap(wider_restitution_);
-  }
-  FillReport(model, solved, &report);
+  FillReport(model, SolveWithContacts(model, *state, h, &report), &report);
   if (report.status != StepStatus::kDone) {
     return report;
   }

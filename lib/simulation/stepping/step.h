@@ -113,6 +113,10 @@ class Stepper {
   void CarryGuess(const Model<double>& model, const std::vector<ActiveContact>& contacts,
                   const ContactSolution<double>& solution, Guess from_where);
   ContactSolverReport SolveContacts(const ContactSolverOptions& options, int* islands);
+  // Finds the contacts that the step may close and solves with them; again with more contacts where
+  // bodies turn out faster than was assumed.
+  ContactSolverReport SolveWithContacts(const Model<double>& model, const State<double>& state,
+                                        double h, StepReport* report);
   ContactMode InitialMode(const ContactBlock<double>& contact) const;
   void FillReport(const Model<double>& model, const ContactSolverReport& solved,
                   StepReport* report);

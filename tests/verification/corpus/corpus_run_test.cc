@@ -12,7 +12,7 @@ namespace {
 TEST(CorpusRunTest, BoundsHoldOnAFewOfEachKind) {
   const CorpusResult result = RunCorpus({}, {.random = 6, .seed = 1, .most_contacts = 40});
   EXPECT_EQ(FirstFailure(result), "");
-  EXPECT_EQ(result.problems, 6 * static_cast<int>(ContactKinds().size()));
+  EXPECT_EQ(result.problems, 6 * static_cast<int>(RandomKinds().size()));
   for (const Row& row : result.rows) {
     EXPECT_GT(row.problems, 0) << row.kind;
     if (row.known == Known::kSolvable) {
