@@ -54,7 +54,8 @@ VectorXd FindFarkas(const MixedLcp<double>& problem) {
   const Index ny = problem.num_y();
   const Index nz = problem.num_z();
   const Index n = nv + ny + nz;
-  // E (v, y, z, s) = f are the equations; the residual of their least squares is the proof.
+  // The equations are E (v, y, z, s) = f; the residual of their least-squares solution is the
+  // proof.
   MatrixXd E = MatrixXd::Zero(n, n + nz);
   E.topLeftCorner(nv, nv) = problem.M;
   E.block(0, nv, nv, ny) = -problem.A.transpose();
@@ -72,7 +73,8 @@ VectorXd FindFarkas(const MixedLcp<double>& problem) {
   farkas.tail(nz) = (-farkas.tail(nz)).cwiseMax(0.0);
   const double largest = n > 0 ? farkas.cwiseAbs().maxCoeff() : 0.0;
   if (!(largest > 0.0)) return VectorXd();
-  // The residual is a difference of numbers of f's size: what is below their rounding is zero.
+  // The residual is a difference of numbers of f's size: entries below their rounding count as
+  // zero.
   const double rounding = kLcpRounding * scaling.row.maxCoeff() * f.cwiseAbs().maxCoeff();
   const double threshold = std::clamp(rounding / largest, kLeastFarkasEntry, kMostFarkasEntry);
   farkas = farkas.unaryExpr(

@@ -40,7 +40,7 @@ VectorX<T> SlackOf(const MixedLcp<T>& problem, const VectorX<T>& v, const Vector
   return s;
 }
 
-/// Everything of a solution in double but the vectors' derivatives.
+/// Copies a solution in double to T, without the derivatives of its vectors.
 template <typename T>
 LcpSolution<T> WithoutDerivatives(const LcpSolution<double>& values) {
   LcpSolution<T> solution;
@@ -57,9 +57,9 @@ LcpSolution<T> WithoutDerivatives(const LcpSolution<double>& values) {
   return solution;
 }
 
-/// Solves the system of the rows' modes in T, as corrections of `solution`. The diagonal carries
-/// 1e-9, so that redundant rows have a solution; three corrections take its error to 1e-27 of the
-/// consistent part.
+/// Solves the system of the rows' modes in T, as corrections of `solution`. 1e-9 is added to the
+/// diagonal, so that redundant rows have a solution; three corrections reduce the error of that to
+/// 1e-27 of the consistent part.
 template <typename T>
 void SolveModesIn(const MixedLcp<T>& problem, const RowModes& row_modes, LcpSolution<T>& solution) {
   const Eigen::Index nv = problem.num_v();
