@@ -88,7 +88,7 @@ class JsonReader {
   bool Has(const std::string& key) const;
   /// The member of an object; a reader of nothing if there is none, which fails once it is read.
   JsonReader At(const std::string& key) const;
-  /// The element of an array, alike.
+  /// The element of an array, in the same way.
   JsonReader At(int index) const;
   /// Elements of an array; 0 for anything else.
   int Size() const;

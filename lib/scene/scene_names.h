@@ -56,8 +56,8 @@ std::string NameOf(Enum value, const std::pair<const char*, Enum> (&table)[N]) {
   return "";
 }
 
-/// Whether this is a name: letters, digits, `_`, `.`, `-` and the characters of `extra`, one at
-/// least.
+/// Whether this is a name: at least one character, each a letter, a digit, `_`, `.`, `-` or one of
+/// `extra`.
 inline bool IsName(const std::string& name, const std::string& extra = "") {
   if (name.empty()) return false;
   for (const char c : name) {
