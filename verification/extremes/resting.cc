@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Stacks, pyramids and an arch at rest: nothing creeps.
+// Stacks, pyramids and an arch at rest: they must not creep.
 
 #include <algorithm>
 #include <cmath>

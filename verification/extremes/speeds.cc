@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Speeds to 1e4 m/s against a wall of 1 mm: nothing goes through.
+// Speeds up to 1e4 m/s against a wall of 1 mm: nothing passes through.
 
 #include <algorithm>
 #include <cmath>

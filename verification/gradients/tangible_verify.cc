@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// tangible-verify: derivatives of scenes by every method, compared.
+// tangible-verify: compares derivatives of scenes by every method.
 
 #include <gflags/gflags.h>
 
