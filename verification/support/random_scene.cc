@@ -239,8 +239,8 @@ void SceneMaker::FreeBody() {
 }
 
 void SceneMaker::Obstacles() {
-  // A paddle that presses against a wall, or against a body that friction holds, makes a problem
-  // without a solution.
+  // If a paddle presses a body against a wall, or presses a body that friction holds, the problem
+  // has no solution.
   const bool paddle_fits = friction_ <= 0.5;
   if (paddle_fits && random_.Chance(0.4)) {
     BasicBody<double> paddle;
