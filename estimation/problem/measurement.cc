@@ -49,8 +49,8 @@ Motion6 Less(const Motion6& a, const Motion6& b) {
   return {a.x - b.x, a.y - b.y, a.angle - b.angle, a.vx - b.vx, a.vy - b.vy, a.omega - b.omega};
 }
 
-/// The motion in the camera's frame. For a relative motion neither the camera's origin nor, from the
-/// angle, its rotation is subtracted.
+/// The motion in the camera's frame. For a relative motion the camera's origin is not subtracted,
+/// nor its rotation from the angle.
 Motion6 Seen(const Motion6& motion, const Camera& camera, const Motion6& marker, bool is_relative) {
   const Local scale(camera.scale, kCameraAt);
   const Local rotation(camera.rotation, kCameraAt + 1);

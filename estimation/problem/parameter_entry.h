@@ -8,8 +8,7 @@
 //
 // unless the user chose one of them. A mass that starts ten times too small is then as far from its
 // value as one that starts ten times too large, and steps of different parameters are comparable.
-// The optimum and the covariance, which
-// is stated for p, do not depend on this choice.
+// The optimum and the covariance, which is stated for p, do not depend on this choice.
 
 #include <Eigen/Core>
 #include <optional>
