@@ -242,7 +242,7 @@ class ContactIteration : private InteriorPointSystem<T> {
     }
   }
 
-  // Computes the Computes the Newton direction for z ds + s dz = target; fills step and ds.
+  // Computes the Newton direction for z ds + s dz = target; fills step and ds.
   void Direction() {
     w_.step = w_.residual;
     T* contact_rows = w_.step.data() + 3 * (nb_ + nj_);

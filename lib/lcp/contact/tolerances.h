@@ -30,8 +30,7 @@ inline constexpr double kSlipOfTolerance = 0.3;
 /// Of what drives them: larger rates of impulses are an effect of δ: the rows contradict each
 /// other.
 inline constexpr double kContradictingRate = 1e6;
-/// Of mean z s / κ of the interior point: the the goal where no polish follows (unrolled
-/// derivatives).
+/// Of mean z s / κ of the interior point: the goal where no polish follows (unrolled derivatives).
 inline constexpr double kContactComplementarity = 1e-14;
 /// Of mean z s / κ: an interior-point run that ends above it has not converged, and more iterations
 /// do not help.
@@ -46,7 +45,7 @@ inline constexpr double kNeighbourhood = 1e-4;
 /// Of the step to the boundary: several shorter steps in a row mean that rounding has stopped the
 /// iteration.
 inline constexpr double kShortInteriorStep = 1e-3;
-/// Of the unit of z / s of the row: the the proximal term of redundant rows in the interior point.
+/// Of the unit of z / s of the row: the proximal term of redundant rows in the interior point.
 inline constexpr double kProximal = 1e-9;
 /// Of the unit of z / s of the row: the proximal term for goals below 1e-15, for which its effect
 /// on the equations has to be smaller.

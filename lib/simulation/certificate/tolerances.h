@@ -58,8 +58,8 @@ inline constexpr double kOfStep = 1e-3;
 /// Of the largest entry of the derivative: the error allowed in extrapolated quotients of a smooth
 /// map: smaller kinks are not detected.
 inline constexpr double kApart = 1e-2;
-/// Of the touching tolerance over the time, and rounding: the the noise of poses that end within
-/// the tolerance.
+/// Of the touching tolerance over the time, and rounding: the noise of poses that end within the
+/// tolerance.
 inline constexpr double kNoise = 3.0;
 /// Of the largest speed: the rounding of speeds, part of the noise above.
 inline constexpr double kSpeedRounding = 1e-13;
