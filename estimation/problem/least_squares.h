@@ -72,7 +72,7 @@ class LeastSquaresProblem {
   virtual bool EvaluateBlock(int block, const Eigen::VectorXd& p, DerivativeMethod method,
                              BlockDerivatives derivatives, BlockEvaluation* evaluation) = 0;
 
-  /// The certificate of the derivatives at p (all parameters); none where nothing is certified.
+  /// The certificate of the derivatives at p (all parameters); empty where nothing is certified.
   virtual std::optional<Certificate> Certify(const Eigen::VectorXd& /*p*/) { return std::nullopt; }
 
   /// The derivatives of a block's observation rows at p = [shared | own] with respect to the

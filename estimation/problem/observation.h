@@ -83,7 +83,7 @@ struct BodyOrPoint {
   int point = -1;
 };
 
-/// The point with this name, or else the body; none: body −1.
+/// The point with this name, or else the body; body −1 if there is none.
 BodyOrPoint FindTarget(const Scene& scene, const std::vector<BodyPoint>& points,
                        const std::string& name);
 

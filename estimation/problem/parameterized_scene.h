@@ -115,7 +115,7 @@ class ParameterizedScene {
 
  private:
   struct NumberSet {
-    int parameter, number;  ///< number: into the scene's, then two a point, then the instruments'
+    int parameter, number;  ///< number: of the scene, then two per point, then instruments
     NumberKind kind;
     double scale, offset;
     SetMode mode;

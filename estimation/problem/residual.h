@@ -30,7 +30,7 @@
 
 namespace tangible {
 
-/// The residuals of one run: a least-squares problem of one block without parameters of its own.
+/// The residuals of one run: a least-squares problem of one block without own parameters.
 class RolloutResiduals : public LeastSquaresProblem {
  public:
   /// `scene` is the scene of the run, which ends at the last observation. Without `channels` all

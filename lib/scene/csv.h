@@ -34,7 +34,7 @@ bool ParseCsv(const std::string& text, const std::string& file,
 /// A finite number that fills the whole text; decimal point whatever the locale.
 bool ParseNumber(const std::string& text, double* value);
 
-/// The number in a cell; false and "file: line 3: x: expected a number, got ..." if it is none.
+/// The number in a cell; false and "file: line 3: x: expected a number, got ..." otherwise.
 bool ReadCell(const CsvTable& table, int row, int column, double* value, std::string* error);
 
 }  // namespace tangible

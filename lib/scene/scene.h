@@ -195,7 +195,7 @@ using Scene = BasicScene<double>;
 /// Whether `name` matches `pattern`, in which each `*` stands for any characters.
 bool MatchesPattern(const std::string& pattern, const std::string& name);
 
-/// The same for paths such as `bodies/link*/mass`: a `*` stands for any characters but `/`.
+/// The same for paths such as `bodies/link*/mass`: a `*` stands for any characters except `/`.
 bool MatchesPath(const std::string& pattern, const std::string& path);
 
 }  // namespace tangible

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// The words of a scene file for the enumerations of scene.h, for reading and writing alike.
+// The names in a scene file for the enumerations of scene.h, used for reading and writing.
 
 #include <cstddef>
 #include <string>

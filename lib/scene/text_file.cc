@@ -84,7 +84,7 @@ std::string ReadAll(const std::string& file, std::string* content) {
   return "";
 }
 
-/// A character of UTF-8, or a byte that is none.
+/// A character of UTF-8, or a byte that is not part of one.
 struct Character {
   std::uint32_t code = 0;
   std::size_t size = 1;

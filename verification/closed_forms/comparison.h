@@ -60,7 +60,7 @@ struct Study {
   double derivative_order = 0.0;
 };
 
-/// Steps of a case that has no duration of its own: one.
+/// Number of steps of a case without a duration: one.
 Study RunStudy(const ClosedForm& form, const Scheme& scheme, const std::vector<int>& steps);
 
 /// Least squares through (log dt, log error); NaN where fewer than three errors exceed `floor`.

@@ -23,7 +23,7 @@ double RecomputedResidual(const MixedLcp<double>& problem, const VectorX<double>
                           const VectorX<double>& y, const VectorX<double>& z);
 
 /// Whether (u, t, w) proves that nothing is feasible: w ≥ 0 and M u + Aᵀ t + Gᵀ w = 0, A u = 0,
-/// Fᵀ w ≤ G u to 1e-10 of their terms, and uᵀ p + tᵀ b − wᵀ c above 1e-6 of its own.
+/// Fᵀ w ≤ G u to 1e-10 of their terms, and uᵀ p + tᵀ b − wᵀ c above 1e-6 of its terms.
 bool ProvesInfeasible(const MixedLcp<double>& problem, const VectorX<double>& farkas);
 
 }  // namespace tangible::corpus

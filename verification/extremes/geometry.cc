@@ -141,8 +141,8 @@ Finding CornerOnCorner(const std::string& stepping) {
   return finding;
 }
 
-// A box slides over forty tiles that lie flush, in a frame that is turned by `tilt`: corner meets
-// corner at every seam, up to rounding.
+// A box slides over forty flush tiles, in a frame that is turned by `tilt`: corner meets corner at
+// every seam, up to rounding.
 Finding FlushTiles(const std::string& stepping, double tilt) {
   constexpr double kSpeed = 2.0;
   constexpr double kTile = 0.1;

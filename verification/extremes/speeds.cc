@@ -60,7 +60,7 @@ Finding AgainstWall(const std::string& stepping, Flyer flyer, double speed, doub
   return finding;
 }
 
-// Two discs meet head on.
+// Two discs collide head on.
 Finding HeadOn(const std::string& stepping, double speed) {
   Scene scene = NewScene("head on", stepping, 0.01, 0.1);
   scene.gravity = {0.0, 0.0};

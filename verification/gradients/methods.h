@@ -42,7 +42,7 @@ struct MethodJacobians {
   MatrixX<double> jacobian[kNumMethods];      ///< outputs x parameters; empty where it was not run
   std::string missing[kNumMethods];           ///< why it was not run
   long unrolled_fallbacks = 0;                ///< steps solved by the implicit method instead
-  std::vector<DifferenceColumn> differences;  ///< a parameter
+  std::vector<DifferenceColumn> differences;  ///< for each parameter
   double closed_form_tolerance = 0.0;
 };
 

@@ -118,7 +118,7 @@ struct SceneCheck {
   KindRow total;
   std::vector<CheckedEntry> worst;  ///< by ratio, of bounded pairs, at most kMostWorst
   std::vector<CheckedException> exceptions;
-  /// Filled if they are asked for: outputs, parameters and every method's Jacobian.
+  /// Filled only on request: outputs, parameters and every method's Jacobian.
   std::vector<std::string> outputs, parameter_paths;
   MatrixX<double> jacobian[kNumMethods], contributions, ridders_error;
 };

@@ -36,7 +36,7 @@ namespace tangible {
 
 struct Contributions {
   MatrixX<double> sum;     ///< S above, outputs x parameters
-  VectorX<double> column;  ///< a parameter: the largest of its column, and of ⌈ẇₖ⌉ at any step
+  VectorX<double> column;  ///< the largest of each parameter's column, and of ⌈ẇₖ⌉ at any step
 };
 Contributions ContributionsOf(const Scene& scene, const std::vector<ParameterPath>& parameters);
 

@@ -23,7 +23,7 @@ namespace tangible::tradeoff {
 struct SampledRun {
   std::string message;               ///< empty, or one line: why it failed
   std::vector<double> poses;         ///< x, y, angle of each moving body, of each sample
-  RowMatrixXd jacobian;              ///< of the final state, a column a parameter
+  RowMatrixXd jacobian;              ///< of the final state, a column for each parameter
   std::vector<double> run_seconds;   ///< CPU time of each repeat of a plain rollout
   std::vector<double> both_seconds;  ///< and of one with the Jacobian
   long steps = 0;

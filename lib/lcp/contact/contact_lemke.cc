@@ -37,7 +37,7 @@ constexpr int kMaxUnknowns = 1000;
 
 int RowsOf(const ContactBlock<double>& contact) { return contact.has_friction ? 4 : 1; }
 
-// Whether the dense form has at most so many rows of z; asked before its matrices are made.
+// Whether the dense form has at most this many rows of z; called before its matrices are made.
 bool Fits(const ContactProblem<double>& problem, int max_rows) {
   size_t unknowns = 3 * static_cast<size_t>(problem.num_bodies);
   for (const JointBlock<double>& joint : problem.joints) {

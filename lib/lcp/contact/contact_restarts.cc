@@ -142,7 +142,7 @@ bool ContactSolver::SolveByRestarts(const ContactProblem<double>& problem,
   }
   pivoting_.SetScatter(0);
   if (!solved) {
-    // The earlier solution is restored, whose residual and worst contact the report then describes.
+    // The earlier solution is restored, and with it its residual and worst contact in the report.
     *solution = last;
     report->residual = before.residual;
     report->worst_contact = before.worst_contact;

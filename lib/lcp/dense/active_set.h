@@ -16,7 +16,7 @@
 
 namespace tangible {
 
-/// The modes read from a point, none of them a kink.
+/// The modes read from a point; no row counts as a kink.
 std::vector<RowMode> IdentifyModes(const MixedLcp<double>& problem, const LcpVector& point);
 
 /// Returns the point of the least scaled residual among the given one (with negative z set to 0)

@@ -144,8 +144,8 @@ LcpSolution<T> SolveUnrolled(const MixedLcp<T>& problem, const LcpOptions& optio
     return ScaledResidual(values, s.v.unaryExpr(value), s.y.unaryExpr(value), s.z.unaryExpr(value));
   };
   solution.residual = measure(solution);
-  // The residual at κ is κ / margin: 1e-10 stands for margins of 1e-4, where derivatives are off by
-  // κ / margin² = 1e-6. Nearer to a kink the modes have to be identified.
+  // The residual at κ is κ / margin: 1e-10 corresponds to margins of 1e-4, where the error of
+  // derivatives is κ / margin² = 1e-6. Nearer to a kink the modes have to be identified.
   if (run.converged && solution.residual <= options.tolerance) {
     solution.status = LcpStatus::kSolved;
     solution.solver = LcpSolver::kInteriorPoint;

@@ -60,7 +60,7 @@ struct LcpSolution {
   std::string message;  ///< why it is unsolved or was refused; else empty
 };
 
-/// The words of the result file: solved, unsolved, infeasible; none, guess, interior_point, lemke,
+/// The names in the result file: solved, unsolved, infeasible; none, guess, interior_point, lemke,
 /// enumeration.
 const char* ToString(LcpStatus status);
 const char* ToString(LcpSolver solver);

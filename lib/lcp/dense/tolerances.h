@@ -47,7 +47,7 @@ inline constexpr double kNearKinkMargin = 1e-6;
 /// the error of an entry may be ten times the difference of the whole, and each entry has to be
 /// right to 1e-9.
 inline constexpr double kLinearResidualLimit = 1e-10;
-/// Of the right-hand side: equations that leave more of it contradict each other.
+/// Of the right-hand side: equations with a larger residual contradict each other.
 inline constexpr double kConsistent = 1e-9;
 /// Of the norm of the matrix times that of its target: a gradient below it counts as 0.
 inline constexpr double kNnlsGradient = 1e-12;

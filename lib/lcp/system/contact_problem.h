@@ -132,9 +132,9 @@ template <typename T>
 struct ContactSolution {
   std::vector<T> motion;           ///< v, 3 num_bodies
   std::vector<T> joint_impulse;    ///< 3 num_joints
-  std::vector<T> normal_impulse;   ///< a contact
+  std::vector<T> normal_impulse;   ///< for each contact
   std::vector<T> tangent_impulse;  ///< for each contact, signed
-  std::vector<ContactMode> modes;  ///< a contact
+  std::vector<ContactMode> modes;  ///< for each contact
 
   /// Memory of the vectors.
   size_t bytes() const {

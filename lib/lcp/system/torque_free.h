@@ -11,7 +11,7 @@
 
 namespace tangible {
 
-/// What the rows of a problem do to a body.
+/// The effect of the rows of a problem on a body.
 enum class Turning : unsigned char {
   kUntouched,  ///< it has no row
   kNone,       ///< rows, but none with an entry for its angle

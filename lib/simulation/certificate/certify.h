@@ -105,14 +105,14 @@ class RolloutCertifier {
   // For event stepping: contacts that carry a force, the bodies that the last impact moved, and
   // when.
   std::vector<ActiveContact> loaded_;
-  std::vector<double> struck_at_;  ///< a body: the time of its last impact, s
+  std::vector<double> struck_at_;  ///< for each body: the time of its last impact, s
 };
 
 /// Runs the rollout and certifies it. A rollout that fails is certified up to the failure, which
 /// `report` describes.
 Certificate CertifyRollout(const Model<double>& model, const State<double>& initial,
                            const CertifyOptions& options, RolloutReport* report);
-/// The same of a model with controls.
+/// The same for a model with controls.
 Certificate CertifyRollout(ControlledModel<double>* model, const State<double>& initial,
                            const CertifyOptions& options, RolloutReport* report);
 Certificate CertifyRollout(const Model<double>& model, const State<double>& initial);

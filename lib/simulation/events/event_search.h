@@ -112,7 +112,7 @@ class EventSearch {
   Segment* segment_ = nullptr;
   const std::vector<ActiveContact>* touching_ = nullptr;
   double slow_ = 0.0;            ///< the speed tolerance as the segment starts, m/s
-  std::vector<double> closing_;  ///< a body: bound on its points' speed over the segment
+  std::vector<double> closing_;  ///< bound on the speed of each body's points over the segment
   std::vector<Sample> samples_;
   int num_samples_ = 0;
   long evaluations_ = 0;  ///< of the motion, in this step

@@ -10,7 +10,8 @@
 namespace tangible {
 namespace {
 
-// The force that holds a sliding contact to its direction, as a multiple of the acting forces.
+// The shift of a sliding contact's tangential acceleration that keeps its direction of sliding, as
+// a multiple of the accelerations that the acting forces cause.
 constexpr double kForcedSlip = 1e4;
 // How often a motion is halved that cannot be integrated over the rest of a step.
 constexpr int kMostHalvings = 14;

@@ -57,7 +57,7 @@ void SpreadTwists(const ModelStructure& structure, const std::vector<T>& solved,
   }
 }
 
-/// The state at c τ of a motion of length τ from its stages' accelerations, 3 a moving body:
+/// The state at c τ of a motion of length τ from its stages' accelerations, 3 for each moving body:
 /// q + c τ v + τ² Σ â_j A_j and v + τ Σ a_j A_j over j < terms. `accelerations(j)` is a vector.
 template <typename T, typename Accelerations>
 void PlaceStage(const ModelStructure& structure, const State<T>& before, const T& tau, double c,

@@ -265,7 +265,7 @@ GradientResult Differentiate(const GradientProblem& problem, const GradientOptio
   if (!result.message.empty()) {
     return result;
   }
-  // Event stepping needs the certificate to tell whether there are sides.
+  // Event stepping needs the certificate to find out whether the two sides differ.
   const bool sides = options.side != DerivativeSide::kBoth;
   if (sides) {
     result.certificate = CertificateOf(problem);

@@ -36,7 +36,8 @@ class OneSided {
   OneSided(const GradientProblem& problem, double sign, GradientResult* result)
       : problem_(problem), sign_(sign), result_(*result) {}
 
-  // The derivative by a parameter; false with a message where it has none from this side.
+  // The derivative with respect to a parameter; false with a message where there is none from this
+  // side.
   bool Column(size_t k, VectorX<double>* column) {
     const ParameterPath& parameter = problem_.parameters[k];
     const double first = kSideWay * std::max(std::abs(parameter.value), parameter.scale);

@@ -25,7 +25,7 @@ class JointProjection {
   bool Project(const Model<double>& model, const std::vector<double>& start, State<double>* state);
   /// Largest |C| after the last projection, m or rad.
   double error() const { return iterate_.error; }
-  /// How many of its steps were not full Newton steps.
+  /// How many of its steps were not Newton steps.
   int damped_steps() const { return iterate_.damped_steps; }
   /// The joint with that error; −1 without joints.
   int worst_joint() const;

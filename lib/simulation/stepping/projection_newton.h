@@ -28,7 +28,7 @@ namespace tangible {
 template <typename T>
 struct ProjectionIterate {
   State<T> from, at, trial;    ///< q̃, q, and q + a step
-  std::vector<T> multipliers;  ///< μ, three a joint
+  std::vector<T> multipliers;  ///< μ, three for each joint
   std::vector<JointRows<T>> rows, trial_rows;
   std::vector<JointCurvature<T>> curvature;
   std::vector<std::pair<int, int>> edges;
