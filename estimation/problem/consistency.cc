@@ -12,7 +12,8 @@
 namespace tangible {
 namespace {
 
-// A thin ring or two points at the ends have the largest inertia exactly: rounding is no violation.
+// A thin ring, or two points at the ends, have exactly the largest inertia, so that rounding must
+// not count as a violation.
 constexpr double kSlack = 1e-9;
 
 std::string Short(double x) {
@@ -28,7 +29,7 @@ double Cross(const Vector2<double>& a, const Vector2<double>& b) {
 
 /// Σ w |v|² of three vertices with Σ w v = 0; negative if the origin is outside their triangle.
 double OfTriangle(const Vector2<double>& a, const Vector2<double>& b, const Vector2<double>& c) {
-  // Barycentric weights of the origin are the areas opposite; of a triangle without an area none.
+  // Barycentric weights of the origin are the areas opposite; a triangle without an area has none.
   const double wa = Cross(b, c);
   const double wb = Cross(c, a);
   const double wc = Cross(a, b);

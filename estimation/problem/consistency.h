@@ -28,7 +28,7 @@ namespace tangible {
 double LargestSquaredGyration(const BasicShape<double>& shape);
 
 /// One line for each moving body that cannot exist, e.g. "body 'arm' cannot exist: ..."; bodies
-/// without a shape are only asked for positive numbers, which a scene has anyway.
+/// without a shape only need positive numbers, which a scene guarantees.
 std::vector<std::string> FindInconsistentBodies(const Scene& scene);
 
 }  // namespace tangible

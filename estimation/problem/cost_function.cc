@@ -7,7 +7,7 @@ namespace tangible {
 
 void SharedEvaluation::PrepareForEvaluation(bool evaluate_jacobians,
                                             bool /*new_evaluation_point*/) {
-  // The line search of a bounded problem asks again for points it has had, and calls them new.
+  // The line search of a bounded problem evaluates earlier points again, and calls them new.
   const bool same = evaluated_.size() == x_->size() && evaluated_ == *x_;
   if (same && (has_jacobian_ || !evaluate_jacobians || !ok_)) {
     return;

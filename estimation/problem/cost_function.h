@@ -4,8 +4,8 @@
 // Residuals as Ceres cost functions.
 //
 // Ceres applies a loss function to a residual block as a whole, so that each measured coordinate is
-// a block of its own. Before it asks the blocks, Ceres calls SharedEvaluation, which does the one
-// run that they all read. The only parameter block is the vector of all unknowns.
+// a block of its own. Before it evaluates the blocks, Ceres calls SharedEvaluation, which makes the
+// single run from which all blocks read. The only parameter block is the vector of all unknowns.
 
 #include <ceres/ceres.h>
 
@@ -17,20 +17,20 @@
 
 namespace tangible {
 
-/// Residuals at x and, unless `jacobian` is null, their derivatives by x; false where they cannot
-/// be had.
+/// Residuals at x and, unless `jacobian` is null, their derivatives with respect to x; false where
+/// they cannot be computed.
 using ResidualFunction = std::function<bool(const Eigen::VectorXd& x, Eigen::VectorXd* residuals,
                                             RowMatrixXd* jacobian)>;
 
 class SharedEvaluation : public ceres::EvaluationCallback {
  public:
-  /// The parameter block is x->data(), which outlives this.
+  /// The parameter block is x->data(), which must outlive this object.
   SharedEvaluation(ResidualFunction function, const Eigen::VectorXd* x)
       : function_(std::move(function)), x_(x) {}
 
   void PrepareForEvaluation(bool evaluate_jacobians, bool new_evaluation_point) override;
 
-  /// Whether the run at x was done.
+  /// Whether the run at x succeeded.
   bool ok() const { return ok_; }
   const Eigen::VectorXd& values() const { return values_; }
   /// Valid after an evaluation with Jacobians.
@@ -46,7 +46,8 @@ class SharedEvaluation : public ceres::EvaluationCallback {
   bool has_jacobian_ = false;
 };
 
-/// Residual i of the shared evaluation; false where that failed, so that the minimiser steps back.
+/// Residual i of the shared evaluation; false where that failed, so that the minimiser shortens its
+/// step.
 class CoordinateCostFunction : public ceres::CostFunction {
  public:
   CoordinateCostFunction(const SharedEvaluation* shared, int i, int num_unknowns);

@@ -48,7 +48,7 @@ bool EvaluationLog::Evaluate(const Eigen::VectorXd& at, const Function& function
       *jacobian = evaluation.jacobian;
     }
   } else {
-    // What a failed evaluation leaves behind is nobody's.
+    // The partial result of a failed evaluation is not used.
     evaluation.residuals.resize(0);
     evaluation.jacobian.resize(0, 0);
   }

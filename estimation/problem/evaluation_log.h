@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// The evaluations of a fit in their order, so that one that was interrupted walks the same way
-// again without the runs.
+// The evaluations of a fit in their order, so that an interrupted fit can repeat them without the
+// runs.
 //
-// A minimiser's state (its trust region, what it has tried) cannot be set from outside, but it
-// follows from the evaluations alone: given the same residuals and Jacobians, bit for bit, it asks
-// for the same points in the same order. So they are kept, and a fit that starts again is handed
-// them one after the other; where they end it computes on. The result is that of a fit that was
-// never interrupted, to the last bit.
+// A minimiser's state (its trust region, the points tried) cannot be set from outside, but it
+// follows from the evaluations alone: given the same residuals and Jacobians, bit for bit, it
+// evaluates the same points in the same order. Therefore the evaluations are kept, and a fit that
+// starts again reads them one after the other; after the last one it continues to compute. The
+// result is that of a fit that was never interrupted, bit for bit.
 
 #include <Eigen/Core>
 #include <functional>
@@ -21,32 +21,34 @@
 
 namespace tangible {
 
-/// Thrown through the minimiser, which would otherwise try other points: the log is of another fit.
+/// Thrown through the minimiser, which would otherwise try other points: the log belongs to another
+/// fit.
 struct EvaluationMismatch : std::runtime_error {
   EvaluationMismatch() : std::runtime_error("the checkpoint is of another fit") {}
 };
 
-/// What was asked for and what it gave.
+/// The point of an evaluation and its result.
 struct Evaluation {
   Eigen::VectorXd at;
   bool with_jacobian = false;
   bool done = false;
-  std::string message;  ///< why not done
-  long rollouts = 0;    ///< runs that it took
+  std::string message;  ///< why it failed
+  long rollouts = 0;    ///< number of runs
   Eigen::VectorXd residuals;
   RowMatrixXd jacobian;
 };
 
 class EvaluationLog {
  public:
-  /// Numbers that a log keeps at most: 64 MB, or 128 MB of text. Evaluations beyond are not kept.
+  /// Maximum number of values that a log keeps: 64 MB, or 128 MB of text. Further evaluations are
+  /// not kept.
   static constexpr long kMaxNumbers = 8'000'000;
 
   using Function = std::function<bool(Eigen::VectorXd* residuals, RowMatrixXd* jacobian)>;
 
-  /// The next evaluation of the log, which must be at this point, or else that of `function`, which
-  /// is kept. `jacobian` may be null; `rollouts` counts, `message` says why false is returned.
-  /// Throws EvaluationMismatch.
+  /// Returns the next evaluation of the log, which must be at this point, or else evaluates
+  /// `function` and keeps the result. `jacobian` may be null; `rollouts` is increased by the runs,
+  /// `message` says why false is returned. Throws EvaluationMismatch.
   bool Evaluate(const Eigen::VectorXd& at, const Function& function, Eigen::VectorXd* residuals,
                 RowMatrixXd* jacobian, long* rollouts, std::string* message);
 
@@ -54,11 +56,12 @@ class EvaluationLog {
   long mismatch() const { return mismatch_; }
 
   const std::vector<Evaluation>& evaluations() const { return evaluations_; }
-  /// Hands these out from the first on.
+  /// Replays these, beginning with the first.
   void Restore(std::vector<Evaluation> evaluations);
   void Clear() { Restore({}); }
 
-  /// Called after each evaluation with a Jacobian that is kept: an iteration was accepted.
+  /// Sets a function that is called after each kept evaluation with a Jacobian, that is, after each
+  /// accepted iteration.
   void OnIteration(std::function<void()> function) { on_iteration_ = std::move(function); }
 
  private:

@@ -1,18 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// What stands between a motion and what was recorded of it: sensors, cameras, clocks.
+// The instruments between a motion and its recording: sensors, cameras, clocks.
 //
-//   t = offset + rate τ − delay       time in the run of what is recorded at τ (clock, sensor)
+//   t = offset + rate τ − delay       time in the run of the value recorded at τ (clock, sensor)
 //   d = r − origin − r_marker         or the position relative to another point
 //   u = scale R(−rotation) d          in the camera's frame
 //   recorded = gain u + bias          by the sensor
 //
-// rate counts seconds of the run a second of the clock. A sensor with a delay shows at τ what was
-// at τ − delay. Angles are recorded relative to the camera's rotation, velocities turn and scale
-// as positions do, and angular velocities are left as they are. What is relative to another body or
-// point needs no origin. Every number may be a parameter of a fit: sensors/NAME/delay, gain, bias;
-// cameras/NAME/scale, rotation, origin/x, origin/y; clocks/NAME/rate, offset.
+// rate is the number of seconds of the run in a second of the clock. A sensor with a delay shows at
+// τ the value at τ − delay. Angles are recorded relative to the camera's rotation, velocities are
+// turned and scaled like positions, and angular velocities are unchanged. Coordinates relative to
+// another body or point need no origin. Every number may be a parameter of a fit:
+// sensors/NAME/delay, gain, bias; cameras/NAME/scale, rotation, origin/x, origin/y;
+// clocks/NAME/rate, offset.
 
 #include <string>
 #include <vector>
@@ -26,16 +27,16 @@ struct Sensor {
   std::string name;
   double delay = 0.0;  ///< s
   double gain = 1.0;
-  double bias = 0.0;            ///< in the unit of what is recorded
-  double sigma = 0.0;           ///< of its noise, in that unit; 0: that of the observations
-  bool estimate_sigma = false;  ///< sigma is where its estimate begins (fit/sensor_noise.h)
+  double bias = 0.0;            ///< in the unit of the recorded value
+  double sigma = 0.0;           ///< of its noise, in that unit; 0: the sigma of the observations
+  bool estimate_sigma = false;  ///< sigma is the initial value of its estimate (fit/sensor_noise.h)
 };
 
 struct Camera {
   std::string name;
-  double scale = 1.0;                ///< units of the image a metre, > 0
+  double scale = 1.0;                ///< units of the image per metre, > 0
   double rotation = 0.0;             ///< rad: of its axes in the world
-  Vector2<double> origin{0.0, 0.0};  ///< m: where the image has (0, 0); of the marker if it has one
+  Vector2<double> origin{0.0, 0.0};  ///< m: position of the image's (0, 0), from the marker if any
   int marker_body = -1;              ///< −1: none
   int marker_point = -1;             ///< −1: the body's centre of mass
 };
@@ -51,7 +52,7 @@ struct Instruments {
   std::vector<Camera> cameras;
   std::vector<Clock> clocks;
 
-  /// Where the numbers of a sensor, camera or clock begin in EnumerateNumbers.
+  /// Index in EnumerateNumbers of the first number of a sensor, camera or clock.
   int SensorNumber(int sensor) const { return 3 * sensor; }
   int CameraNumber(int camera) const { return 3 * static_cast<int>(sensors.size()) + 4 * camera; }
   int ClockNumber(int clock) const {
@@ -59,7 +60,7 @@ struct Instruments {
   }
 };
 
-/// How an observation was made: by what, and of what relative to what.
+/// How an observation was made: by which instruments, and relative to which body or point.
 struct Channel {
   int file = 0;       ///< which of the files it is from
   int sensor = -1;    ///< index into the instruments; −1: none
@@ -76,14 +77,14 @@ struct InstrumentNumber {
   std::string path;  ///< "sensors/encoder/delay"
   double* value;     ///< points into the instruments
   NumberKind kind;
-  bool moves_time = false;  ///< it changes what time of the run is observed
+  bool moves_time = false;  ///< it changes the observed time of the run
 };
 
 /// Delay, gain, bias of each sensor; scale, rotation, origin/x, origin/y of each camera; rate,
 /// offset of each clock.
 std::vector<InstrumentNumber> EnumerateNumbers(Instruments* instruments);
 
-/// t, in s of the run, of what is recorded at τ.
+/// t, in s of the run, of the value recorded at τ.
 double RunTime(const Instruments& instruments, const Channel& channel, double recorded);
 
 }  // namespace tangible

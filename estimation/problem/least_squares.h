@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// What a fit minimises: a least-squares problem in blocks,
+// The function that a fit minimises: a least-squares problem in blocks,
 //
 //   cost(p) = 1/2 Σ_b w_b Σ_i ρ_i(r_bi(p_s, p_b)²)        within lower ≤ p ≤ upper
 //   p = [p_s | p_0 | p_1 | ... ]                          shared parameters, then each block's own
 //
 // A block is one recording, or rows such as those of a prior on shared parameters. Its rows depend
-// on the shared parameters p_s and on its own p_b alone, so that the own ones of all blocks can be
-// eliminated block by block (Schur complement), and blocks can be evaluated at the same time. The
-// first rows of a block are those of observations, to which the robust loss applies; the others
-// (priors) are plain squares. w_b is the weight of the block, 1 by default.
+// only on the shared parameters p_s and on its own p_b, so that the own parameters of all blocks
+// can be eliminated block by block (Schur complement), and blocks can be evaluated at the same
+// time. The first rows of a block are those of observations, to which the robust loss applies; the
+// others (priors) are plain squares. w_b is the weight of the block, 1 by default.
 
 #include <Eigen/Core>
 #include <memory>
@@ -25,26 +25,26 @@
 
 namespace tangible {
 
-/// What a block's evaluation gives.
+/// The result of a block's evaluation.
 struct BlockEvaluation {
   Eigen::VectorXd residuals;  ///< in multiples of sigma, without the block's weight
-  RowMatrixXd jacobian;       ///< rows x [shared | own]: ∂r/∂p; only where it was asked for
+  RowMatrixXd jacobian;       ///< rows x [shared | own]: ∂r/∂p; only if requested
   std::string message;        ///< why it failed, one line
   long rollouts = 0;          ///< runs that it took
 };
 
 enum class BlockDerivatives { kSkip, kCompute };
 
-/// Where and when a row was measured.
+/// The series and time of a row.
 struct RowPlace {
-  int series = 0;      ///< its own number a coordinate of a body or point, within the block
+  int series = 0;      ///< a number for each coordinate of a body or point, within the block
   double time = 0.0;   ///< s
   double least = 0.0;  ///< in multiples of sigma: smaller residuals are rounding
 };
 
-/// Derivatives by numbers that no parameter sets.
+/// Derivatives with respect to numbers that no parameter sets.
 struct HeldColumns {
-  std::vector<ParameterEntry> entries;  ///< a number each: its path, value and allowed range
+  std::vector<ParameterEntry> entries;  ///< for each number: its path, value and allowed range
   RowMatrixXd columns;                  ///< observation rows of the block x entries
 };
 
@@ -58,11 +58,11 @@ class LeastSquaresProblem {
   virtual int num_blocks() const = 0;
   virtual int num_own(int block) const = 0;
   virtual int num_rows(int block) const = 0;
-  /// Rows of observations, which come first.
+  /// Number of rows of observations, which come first.
   virtual int num_observation_rows(int block) const { return num_rows(block); }
   /// w_b > 0. A block without observation rows is a prior, and has the weight 1.
   virtual double weight(int /*block*/) const { return 1.0; }
-  /// Of each observation row.
+  /// The place of each observation row.
   virtual std::vector<RowPlace> Places(int block) const = 0;
 
   /// The rows of a block at p = [shared | own], and their derivatives by `method` if asked for.
@@ -72,28 +72,30 @@ class LeastSquaresProblem {
   virtual bool EvaluateBlock(int block, const Eigen::VectorXd& p, DerivativeMethod method,
                              BlockDerivatives derivatives, BlockEvaluation* evaluation) = 0;
 
-  /// The certificate of the derivatives at p (all parameters); none where nothing is certified.
+  /// The certificate of the derivatives at p (all parameters); empty where nothing is certified.
   virtual std::optional<Certificate> Certify(const Eigen::VectorXd& /*p*/) { return std::nullopt; }
 
-  /// The derivatives of a block's observation rows at p = [shared | own] by the numbers of its
-  /// scene that no parameter sets; empty where there are none, more than `most`, or a run fails.
+  /// The derivatives of a block's observation rows at p = [shared | own] with respect to the
+  /// numbers of its scene that no parameter sets; empty where there are none, more than `most`, or
+  /// a run fails.
   virtual HeldColumns EvaluateHeld(int /*block*/, const Eigen::VectorXd& /*p*/,
                                    DerivativeMethod /*method*/, int /*most*/) {
     return {};
   }
 
-  /// What cannot be in reality at p (all parameters), a line each (consistency.h).
+  /// Physical inconsistencies at p (all parameters), a line each (consistency.h).
   virtual std::vector<std::string> FindInconsistencies(const Eigen::VectorXd& /*p*/) { return {}; }
 
-  /// The problem with the observations of the first `part` (0 to 1) of each block's time alone, and
-  /// the same parameters; null where blocks have no times. This problem outlives it.
+  /// The problem with only the observations of the first `part` (0 to 1) of each block's time, and
+  /// the same parameters; null where blocks have no times. This problem must outlive it.
   virtual std::unique_ptr<LeastSquaresProblem> Window(double /*part*/) const { return nullptr; }
 
-  /// For a line of a message: of block 3 "recording 'take 4': "; empty where there is only one.
+  /// The start of a message about a block, for block 3 "recording 'take 4': "; empty where there is
+  /// only one.
   virtual std::string BlockName(int /*block*/) const { return ""; }
 };
 
-/// Where the blocks stand in the vectors of all parameters and of all rows.
+/// The places of the blocks in the vectors of all parameters and of all rows.
 class BlockLayout {
  public:
   explicit BlockLayout(const LeastSquaresProblem& problem);
@@ -104,12 +106,12 @@ class BlockLayout {
   int num_blocks() const { return static_cast<int>(own_offset_.size()) - 1; }
   int num_own(int block) const { return own_offset_[block + 1] - own_offset_[block]; }
   int num_local(int block) const { return num_shared() + num_own(block); }
-  /// Of a block's first own parameter.
+  /// Index of a block's first own parameter.
   int own_offset(int block) const { return own_offset_[block]; }
-  /// Of a block's first row.
+  /// Index of a block's first row.
   long row_offset(int block) const { return row_offset_[block]; }
 
-  /// Of a block's parameter i in [shared | own] the index in p.
+  /// The index in p of a block's parameter i in [shared | own].
   int ParameterOf(int block, int i) const {
     return i < num_shared() ? i : own_offset_[block] + i - num_shared();
   }

@@ -44,12 +44,13 @@ Motion6 MotionOf(const Place& place, int index) {
   return motion;
 }
 
-/// a of b's kind, less b.
+/// The difference a − b.
 Motion6 Less(const Motion6& a, const Motion6& b) {
   return {a.x - b.x, a.y - b.y, a.angle - b.angle, a.vx - b.vx, a.vy - b.vy, a.omega - b.omega};
 }
 
-/// The motion as the camera sees it. What is relative has no origin and no direction of its own.
+/// The motion in the camera's frame. For a relative motion the camera's origin is not subtracted,
+/// nor its rotation from the angle.
 Motion6 Seen(const Motion6& motion, const Camera& camera, const Motion6& marker, bool is_relative) {
   const Local scale(camera.scale, kCameraAt);
   const Local rotation(camera.rotation, kCameraAt + 1);
@@ -73,7 +74,7 @@ Motion6 Seen(const Motion6& motion, const Camera& camera, const Motion6& marker,
 
 Local Distance(const Motion6& relative) {
   const Local square = relative.x * relative.x + relative.y * relative.y;
-  // The root has no derivative at 0; that of |x| there is taken as 1.
+  // The square root has no derivative at 0; that of |x| at 0 is set to 1.
   return square.a > 0.0 ? Local(sqrt(square)) : relative.x;
 }
 

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// What an observation of a motion would be: the measured coordinate from the states of the bodies
-// concerned (instruments.h has the equations), with its derivatives. The plain coordinates of a
-// body or point have theirs by hand, because fits with many observations spend their time there;
-// all else is evaluated in one Jet.
+// Predicts observations of a motion: the measured coordinate from the states of the bodies
+// concerned (instruments.h has the equations), with its derivatives. The derivatives of the plain
+// coordinates of a body or point are written by hand, because fits with many observations spend
+// their time there; all others are evaluated in one Jet.
 
 #include <array>
 
@@ -20,7 +20,7 @@ struct Place {
   Vector2<double> at{0.0, 0.0};   ///< m, body frame
 };
 
-/// The body that is observed, the one that it is relative to, and the camera's marker.
+/// The observed body, the body to which it is relative, and the camera's marker.
 inline constexpr int kPlaces = 3;
 using ObservedPlaces = std::array<Place, kPlaces>;
 
@@ -33,7 +33,7 @@ struct Prediction {
   double by_camera[4] = {};          ///< scale, rotation, origin x, y
 };
 
-/// The coordinate of a body or point as it is.
+/// The coordinate of a body or point without instruments.
 Prediction PredictPlain(Coordinate coordinate, const Place& place);
 
 /// The coordinate as it is recorded; `sensor` and `camera` may be null. At a distance of 0 its

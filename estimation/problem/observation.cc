@@ -19,7 +19,7 @@ namespace {
 constexpr std::array<const char*, kCoordinates> kNames = {"x",  "y",     "angle",   "vx",
                                                           "vy", "omega", "distance"};
 
-// Samples over which a rate is taken to lead on to the next angle.
+// Number of samples whose mean rate predicts the next angle.
 constexpr size_t kUnwrapSamples = 10;
 
 template <typename Items>
@@ -41,7 +41,7 @@ class RowReader {
     relative_to_ = table_.Column("relative_to");
   }
 
-  /// Checks that the header says who is observed and what.
+  /// Checks that the header names the observed bodies or points and the coordinates.
   bool CheckHeader() {
     if (by_point_ == (table_.Column("body") >= 0)) {
       *error_ = table_.file + ": header: expected a column body or a column point, got " +

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// Observations: coordinates of bodies, or of points fixed in them, that somebody measured.
+// Observations: measured coordinates of bodies, or of points fixed in them.
 //
 // A file is a table (csv.h) with the columns `time` (s), `body` or `point` (a name), and any of
 // `x`, `y` (m), `angle` (rad), `vx`, `vy` (m/s), `omega` (rad/s) and `distance` (m, to the body or
 // point that the column `relative_to` or the options name). A missing row or an empty cell is a
 // coordinate that was not measured. Times need not fall on steps nor be sorted; a coordinate may
 // be measured more than once. The angle and angular velocity of a point are those of its body.
-// What is relative is the difference to the other body or point, in the world's directions.
+// A relative coordinate is the difference to the other body or point, in the world's directions.
 
 #include <string>
 #include <vector>
@@ -18,7 +18,7 @@
 
 namespace tangible {
 
-/// Of a step: times that differ by less are the same.
+/// As a fraction of a step: times that differ by less are the same.
 inline constexpr double kTimeTolerance = 1e-9;
 
 enum class Coordinate { kX, kY, kAngle, kVx, kVy, kOmega, kDistance };
@@ -42,20 +42,20 @@ struct Observation {
   Coordinate coordinate = Coordinate::kX;
   double value = 0.0;  ///< m, rad, m/s or rad/s; through a camera lengths are in its units
   double sigma = 1.0;  ///< the same: standard deviation of its noise
-  int channel = 0;     ///< how it was made
+  int channel = 0;     ///< index into the channels
 };
 
 /// Observations of the same coordinate of the same body or point by the same channel.
 struct ObservationSeries {
-  std::vector<int> of;     ///< of each observation its series, from 0 in the order of appearance
-  std::vector<int> first;  ///< of each series its first observation
+  std::vector<int> of;     ///< the series of each observation, from 0 in the order of appearance
+  std::vector<int> first;  ///< the first observation of each series
 
   int size() const { return static_cast<int>(first.size()); }
 };
 
 ObservationSeries IndexSeries(const std::vector<Observation>& observations);
 
-/// Standard deviations by coordinate, > 0; NaN: the coordinate must not be measured.
+/// Standard deviations by coordinate, > 0; NaN: the coordinate may not be measured.
 struct ObservationSigma {
   double x = 1.0;         ///< m
   double y = 1.0;         ///< m
@@ -71,8 +71,9 @@ struct ObservationSigma {
 /// How the rows of a file were made.
 struct ObservationOptions {
   Channel channel;  ///< its relative_to is that of rows whose own is empty
-  /// Whether angles jump by whole turns where they leave a range, and are to be made continuous:
-  /// each is the one nearest to what the last ones, up to ten, lead to at their mean rate.
+  /// Whether angles jump by whole turns where they leave a range, and have to be made continuous:
+  /// each becomes the one nearest to the extrapolation of up to ten earlier ones at their mean
+  /// rate.
   bool unwrap = false;
 };
 
@@ -82,26 +83,26 @@ struct BodyOrPoint {
   int point = -1;
 };
 
-/// The point with this name, or else the body; none: body −1.
+/// The point with this name, or else the body; body −1 if there is none.
 BodyOrPoint FindTarget(const Scene& scene, const std::vector<BodyPoint>& points,
                        const std::string& name);
 
-/// The names of all, for a message; "none" where there are none.
+/// The names of all points, for a message; "none" where there are none.
 std::string PointNames(const std::vector<BodyPoint>& points);
 std::string BodyNames(const Scene& scene);
 
-/// What is observed: the name of the point, or of the body.
+/// The name of the observed point or body.
 std::string TargetName(const Scene& scene, const std::vector<BodyPoint>& points,
                        const Observation& observation);
 
-/// What it is relative to; empty: to the world.
+/// The name of the body or point to which it is relative; empty: the world.
 std::string ReferenceName(const Scene& scene, const std::vector<BodyPoint>& points,
                           const Channel& channel);
 
 /// "m", "rad", "m/s" or "rad/s".
 const char* UnitOf(Coordinate coordinate);
 
-/// What observations refer to.
+/// The scene, points and instruments to which observations refer.
 struct ObservedScene {
   const Scene& scene;
   const std::vector<BodyPoint>& points;

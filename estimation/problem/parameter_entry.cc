@@ -9,7 +9,7 @@
 namespace tangible {
 namespace {
 
-/// `function` of each entry and its number in `x`.
+/// Applies `function` to each entry and its number in `x`.
 template <typename Function>
 Eigen::VectorXd Map(const std::vector<ParameterEntry>& entries, const Eigen::VectorXd& x,
                     const Function& function) {
@@ -21,7 +21,7 @@ Eigen::VectorXd Map(const std::vector<ParameterEntry>& entries, const Eigen::Vec
   return y;
 }
 
-// exp(ln bound) and the minimiser's projection come back to a bound within this, relative.
+// exp(ln bound) and the minimiser's projection reach a bound within this relative error.
 constexpr double kBoundRounding = 1e-13;
 
 }  // namespace

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// What the minimiser knows of a parameter, and the variable in which it moves.
+// The minimiser's data of a parameter, and the variable in which it steps.
 //
 //   q = ln(p / initial)   for a parameter that is positive by its bounds
 //   q = p / scale         for any other, with a typical magnitude
 //
-// unless the user chose one of them. A mass that starts ten times off is then as far from its value
-// below as above, and steps of several parameters compare. The optimum and the covariance, which
-// is stated for p, do not depend on this choice.
+// unless the user chose one of them. A mass that starts ten times too small is then as far from its
+// value as one that starts ten times too large, and steps of different parameters are comparable.
+// The optimum and the covariance, which is stated for p, do not depend on this choice.
 
 #include <Eigen/Core>
 #include <optional>
@@ -24,7 +24,7 @@ struct ParameterEntry {
   double initial = 0.0;
   double lower = 0.0;  ///< −inf: not bounded
   double upper = 0.0;
-  bool logarithmic = false;  ///< runs as ln(p / initial)
+  bool logarithmic = false;  ///< the variable is ln(p / initial)
   double scale = 1.0;        ///< typical magnitude, > 0
   std::optional<Prior> prior = std::nullopt;
 };
@@ -36,11 +36,11 @@ double ToParameter(const ParameterEntry& entry, double q);
 /// dp/dq at p.
 double ParameterByInternal(const ParameterEntry& entry, double p);
 
-/// Whether p lies on a bound, but for rounding. A lower bound of 0 of a logarithmic parameter is
+/// Whether p lies on a bound, up to rounding. A lower bound of 0 of a logarithmic parameter is
 /// never reached.
 bool IsAtBound(const ParameterEntry& entry, double p);
 
-/// The same for vectors of parameters, one an entry.
+/// The same for vectors of parameters, one for each entry.
 Eigen::VectorXd InitialOf(const std::vector<ParameterEntry>& entries);
 Eigen::VectorXd ToInternal(const std::vector<ParameterEntry>& entries, const Eigen::VectorXd& p);
 Eigen::VectorXd ToParameters(const std::vector<ParameterEntry>& entries, const Eigen::VectorXd& q);

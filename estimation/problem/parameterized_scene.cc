@@ -21,7 +21,7 @@ std::string Text(double x) {
   return text.str();
 }
 
-/// The values that a number of a kind may take.
+/// The values that a number of a kind may have.
 struct Range {
   double low = -kInfinity;
   double high = kInfinity;
@@ -75,7 +75,7 @@ bool Contains(const Range& range, double x) {
          (range.high_excluded ? x < range.high : x <= range.high);
 }
 
-/// Whether a path names a number of a point or an instrument, and none of the scene.
+/// Whether a path names a number of a point or an instrument, and not of the scene.
 bool IsOfMeasurement(const std::string& path) {
   for (const char* kind : {"points/", "sensors/", "cameras/", "clocks/"}) {
     if (path.rfind(kind, 0) == 0) {
@@ -212,7 +212,7 @@ bool ParameterizedScene::AddMeasurementSet(const ParameterSet& set, double* valu
     }
     if (!matched) {
       *value = *numbers[i].value;
-      // A time is of the size of a step.
+      // The typical size of a time is a step.
       *scale = numbers[i].moves_time && numbers[i].kind == NumberKind::kFree ? scene_.simulation.dt
                                                                              : 1.0;
     }
@@ -227,7 +227,7 @@ bool ParameterizedScene::AddMeasurementSet(const ParameterSet& set, double* valu
   return matched;
 }
 
-/// Those of the points, then those of the instruments.
+/// The numbers of the points, then those of the instruments.
 std::vector<InstrumentNumber> ParameterizedScene::MeasurementNumbers() {
   std::vector<InstrumentNumber> numbers;
   for (BodyPoint& point : points_) {
@@ -269,13 +269,13 @@ bool ParameterizedScene::SetBounds(const FitParameter& parameter, Entry* entry,
   };
   Range allowed;
   for (const NumberSet& set : numbers_) {
-    // What is added may have any sign; Set refuses a sum that is not allowed.
+    // An added value may have any sign; Set refuses a sum that is not allowed.
     if (set.parameter == error->parameter && set.mode == SetMode::kAssign) {
       Intersect(Preimage(RangeOf(set.kind), set.scale, set.offset), &allowed);
     }
   }
-  // An excluded bound at 0 is never reached by a logarithm; elsewhere the user must say how near is
-  // near enough.
+  // A logarithm never reaches an excluded bound at 0; for other excluded bounds the user has to
+  // give a bound that is near enough.
   const bool open_at_zero = allowed.low_excluded && allowed.low == 0.0;
   entry->lower = parameter.lower.value_or(allowed.low);
   entry->upper = parameter.upper.value_or(allowed.high);

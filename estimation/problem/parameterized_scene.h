@@ -6,12 +6,12 @@
 //   number_i = scale_i p_k + offset_i        each parameter k sets one or several numbers i
 //
 // of the scene, of the observed points (`points/tip/at/x`) or of the instruments
-// (`sensors/encoder/delay`); no number is set by two. Further
-// parameters may add to a number: it is then what the one sets, or else the scene's own value, plus
-// the sum of scale p + offset of those that add (a pivot moves all that hangs from it, a length
-// what hangs below). From the numbers the model and the initial state are rebuilt with an unchanged
-// structure. The derivative of that is taken where p stands: initial joint angles and inertias that
-// follow their mass make it nonlinear.
+// (`sensors/encoder/delay`); no number is set by two. Further parameters may add to a number: it is
+// then the value set by the first one, or else the scene's own value, plus the sum of scale p +
+// offset of those that add (a pivot moves everything that hangs from it, a length everything below
+// it). From the numbers the model and the initial state are rebuilt with an unchanged structure.
+// The derivative of this map is taken at the current p, because initial joint angles and inertias
+// that follow their mass make it nonlinear.
 
 #include <Eigen/Core>
 #include <memory>
@@ -37,7 +37,7 @@ struct ParameterSet {
   SetMode mode = SetMode::kAssign;
 };
 
-/// The minimiser's coordinate of a parameter.
+/// The minimiser's variable for a parameter.
 enum class ParameterScale {
   kByBounds,  ///< logarithmic where the bounds keep it positive
   kLinear,
@@ -47,7 +47,7 @@ enum class ParameterScale {
 /// A named number to be estimated, as the user wrote it.
 struct FitParameter {
   std::string name;
-  std::optional<double> initial;  ///< default: what the scene has for the first number set; 0 if
+  std::optional<double> initial;  ///< default: the scene's value of the first number set; 0 if
                                   ///< the first is added to
   std::optional<double> lower;    ///< default: the smallest value that its numbers may take
   std::optional<double> upper;
@@ -56,7 +56,7 @@ struct FitParameter {
   std::optional<Prior> prior = std::nullopt;
 };
 
-/// What is wrong with a list of parameters, and where.
+/// An error in a list of parameters, and its place.
 struct ParameterError {
   int parameter = -1;
   int set = -1;     ///< −1: the parameter itself
@@ -66,11 +66,11 @@ struct ParameterError {
 
 class ParameterizedScene {
  public:
-  /// What is known of a parameter once its paths are resolved.
+  /// The data of a parameter once its paths are resolved.
   using Entry = ParameterEntry;
 
   /// Resolves the parameters. False and `error` where a path matches nothing, a number is set
-  /// twice, a name is used twice, bounds are crossed or allow values that a number may not take, or
+  /// twice, a name is used twice, bounds are crossed or allow values that a number may not have, or
   /// the initial value is outside them.
   bool Create(const Scene& scene, const std::vector<BodyPoint>& points,
               const std::vector<FitParameter>& parameters, ParameterError* error,
@@ -82,17 +82,17 @@ class ParameterizedScene {
   const std::vector<Entry>& entries() const { return entries_; }
   Eigen::VectorXd Initial() const { return InitialOf(entries_); }
 
-  /// Sets the parameters and rebuilds the model; false where a number would take a value that it
-  /// may not.
+  /// Sets the parameters and rebuilds the model; false where a number would get a value that is not
+  /// allowed.
   bool Set(const Eigen::VectorXd& p);
 
   /// Other initial values, within the bounds.
   void SetInitial(const Eigen::VectorXd& p);
 
-  /// Changes when the steps of the run end.
+  /// Changes the times at which the steps of the run end.
   void SetSimulation(const SimulationSettings& settings);
 
-  /// Whether some parameter changes what time of the run an observation is of.
+  /// Whether some parameter changes the time in the run of an observation.
   bool MovesTimes() const { return moves_times_; }
 
   const Scene& scene() const { return scene_; }
@@ -101,7 +101,8 @@ class ParameterizedScene {
   const Model<double>& model() const { return model_; }
   const State<double>& initial_state() const { return state_; }
 
-  /// d [poses | twists | the model's parameters] / d p where Set left off: num_variables x size().
+  /// d [poses | twists | the model's parameters] / d p at the p of the last Set: num_variables x
+  /// size().
   RowMatrixXd VariableDerivatives() const;
   /// d [at x, at y of each point] / d p: 2 points x size(), constant.
   const RowMatrixXd& point_derivatives() const { return point_derivatives_; }
@@ -114,13 +115,13 @@ class ParameterizedScene {
 
  private:
   struct NumberSet {
-    int parameter, number;  ///< number: into the scene's, then two a point, then the instruments'
+    int parameter, number;  ///< number: of the scene, then two per point, then instruments
     NumberKind kind;
     double scale, offset;
     SetMode mode;
   };
-  /// A number that some parameter sets or adds to; base: what those that add to it start from,
-  /// unless a parameter sets it.
+  /// A number that some parameter sets or adds to; base: the value to which parameters add, unless
+  /// a parameter sets it.
   struct Target {
     int number;
     NumberKind kind;

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// What is known of a parameter before it is observed, as a further residual of the fit:
+// Prior knowledge about a parameter, as a further residual of the fit:
 //
 //   Gaussian       r = (p − mean) / σ
 //   log-normal     r = (ln p − ln median) / σ            p > 0; σ is that of ln p
 //
-// It is a row like those of the observations, with σ in their sense. The estimate is then the mode
-// of the posterior density (of ln p for a log-normal prior), and (JᵀJ)⁻¹ its covariance there.
+// It is a row like those of the observations, and σ has the same meaning. The estimate is then the
+// mode of the posterior density (of ln p for a log-normal prior), and (JᵀJ)⁻¹ its covariance there.
 
 namespace tangible {
 

@@ -104,7 +104,8 @@ PriorResidual ProblemWithPriors::Evaluate(const PriorRow& row, const Eigen::Vect
   Prior prior = row.prior;
   prior.center = p[row.mean];
   prior.sigma = effects_[row.effect].spread;
-  // r depends on θ − μ, or on ln θ − ln μ: the derivative by μ is that by θ at θ = μ, negative.
+  // r depends on θ − μ, or on ln θ − ln μ: the derivative with respect to μ is the negative of that
+  // with respect to θ at θ = μ.
   by_mean->derivative = -EvaluatePrior(prior, prior.center).derivative;
   return EvaluatePrior(prior, p[row.parameter]);
 }
@@ -127,7 +128,7 @@ bool ProblemWithPriors::EvaluateBlock(int block, const Eigen::VectorXd& p, Deriv
     evaluation->jacobian.conservativeResize(count, p.size());
     evaluation->jacobian.bottomRows(count - first).setZero();
   }
-  // Rows of priors carry no weight: that of the block is taken out of them.
+  // Rows of priors have no weight: they are divided by the root of the block's weight.
   const double root = std::sqrt(1.0 / weight(block));
   for (size_t i = 0; i < rows.size(); ++i) {
     const Eigen::Index at = first + static_cast<Eigen::Index>(i);

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// A least-squares problem with rows for what is known of its parameters beforehand (prior.h) and
-// for parameters that vary from recording to recording around a shared value:
+// A least-squares problem with rows for prior knowledge about its parameters (prior.h) and for
+// parameters that vary from recording to recording around a shared value:
 //
 //   r = (θ_b − μ) / τ        or (ln θ_b − ln μ) / τ           for each block b
 //
 // θ_b is an own parameter of block b, μ a shared one, τ the spread. The rows of own parameters
-// follow the observations of their block; those of shared parameters are a block of their own,
-// the last.
+// follow the observations of their block; those of shared parameters form a separate block, the
+// last.
 
 #include <memory>
 #include <optional>
@@ -30,7 +30,8 @@ struct RandomEffect {
 
 class ProblemWithPriors : public LeastSquaresProblem {
  public:
-  /// With these priors, an optional one for each of the problem's entries; `problem` outlives this.
+  /// `priors` has an optional prior for each of the problem's entries; `problem` must outlive this
+  /// object.
   ProblemWithPriors(LeastSquaresProblem* problem, const std::vector<std::optional<Prior>>& priors,
                     std::vector<RandomEffect> effects);
   /// Takes the priors of the problem's entries.
@@ -79,7 +80,7 @@ class ProblemWithPriors : public LeastSquaresProblem {
   }
 
   LeastSquaresProblem* problem_;
-  std::unique_ptr<LeastSquaresProblem> window_;  ///< of a window of another one: its problem
+  std::unique_ptr<LeastSquaresProblem> window_;  ///< the problem of a window, if this is one
   std::vector<RandomEffect> effects_;
   std::vector<std::vector<PriorRow>> own_;  ///< of each block of `problem`
   std::vector<PriorRow> shared_;

@@ -94,7 +94,7 @@ HeldColumns RecordingsProblem::EvaluateHeld(int block, const Eigen::VectorXd& p,
   return recordings_[block].residuals.EvaluateHeld(0, Ordered(p), method, most);
 }
 
-// What is shared is wrong in all recordings, and told once.
+// An inconsistency of shared parameters occurs in all recordings, and is reported once.
 std::vector<std::string> RecordingsProblem::FindInconsistencies(const Eigen::VectorXd& p) {
   std::vector<std::string> lines;
   std::set<std::string> told;

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// Several recordings in one fit: a block each, with parameters that all share and parameters that
-// each has for itself, such as where and how fast bodies start.
+// Several recordings in one fit: a block for each, with shared parameters and with parameters that
+// each recording has separately, such as the initial positions and speeds of bodies.
 //
 //   p = [p_s | p_0 | p_1 | ... ],   r_b = r_b(p_s, p_b)
 //
@@ -24,7 +24,7 @@ struct RecordedRun {
 
 class RecordingsProblem : public LeastSquaresProblem {
  public:
-  /// `own[i]`: whether each recording has a value of its own of parameter i.
+  /// `own[i]`: whether each recording has a separate value of parameter i.
   RecordingsProblem(std::vector<RecordedRun> recordings, std::vector<bool> own);
 
   const std::vector<RecordedRun>& recordings() const { return recordings_; }
@@ -57,7 +57,7 @@ class RecordingsProblem : public LeastSquaresProblem {
 
   std::vector<RecordedRun> recordings_;
   std::vector<int> shared_, own_;  ///< indices in a recording's parameters
-  std::vector<int> order_;         ///< of [shared | own] the indices in a recording's parameters
+  std::vector<int> order_;         ///< indices of [shared | own] in a recording's parameters
   std::vector<ParameterEntry> entries_;
 };
 

@@ -14,13 +14,13 @@
 namespace tangible {
 namespace {
 
-// Residuals in one sweep back. More columns share each step's local derivatives but leave the
+// Residuals in one reverse sweep. More columns share each step's local derivatives but exceed the
 // cache.
 constexpr int kAdjointColumns = 64;
 
 constexpr double kDifferenceStep = 6e-6;
 
-// Of an observed value: a run's rounding and what its projections leave.
+// As a fraction of an observed value: a run's rounding and the errors that its projections leave.
 constexpr double kRounding = 1e-9;
 
 /// Whether the coordinate needs a twist.
@@ -29,7 +29,7 @@ bool IsRate(Coordinate coordinate) {
          coordinate == Coordinate::kOmega;
 }
 
-/// Whether anything stands between the run and what is recorded.
+/// Whether an instrument or another body changes the recorded value.
 bool IsRecorded(const Channel& channel) {
   return channel.sensor >= 0 || channel.camera >= 0 || channel.clock >= 0 || channel.to_body >= 0;
 }
@@ -156,7 +156,7 @@ bool RolloutResiduals::EvaluateBlock(int /*block*/, const Eigen::VectorXd& p,
   return done;
 }
 
-// Along the parameters that set numbers of the scene.
+// The certificate is for the parameters that set numbers of the scene.
 std::optional<Certificate> RolloutResiduals::Certify(const Eigen::VectorXd& p) {
   if (!SetParameters(p)) {
     return std::nullopt;
@@ -294,13 +294,13 @@ bool RolloutResiduals::Adjoint(RowMatrixXd* jacobian) {
 
 void RolloutResiduals::AdjointBlock(int first, int count, const RowMatrixXd& variables,
                                     RowMatrixXd* jacobian) {
-  // The losses that read each sample: (loss, derivative by the sample's state).
+  // The losses that depend on each sample: (loss, derivative with respect to the sample's state).
   struct Reader {
     int loss;
     double by_state[6];
   };
   std::vector<std::vector<Reader>> readers(plan_.num_samples());
-  long last = 0;  // step that is read
+  long last = 0;  // the step that is read
   for (int i = 0; i < count; ++i) {
     const double sigma = observations_[first + i].sigma;
     const Prediction prediction = PredictionOf(first + i, samples_);
@@ -351,7 +351,7 @@ bool RolloutResiduals::FiniteDifferences(const Eigen::VectorXd& p, RowMatrixXd* 
   for (int k = 0; k < num_parameters(); ++k) {
     const ParameterizedScene::Entry& entry = scene_.entries()[k];
     const double h = kDifferenceStep * std::max(std::abs(p[k]), entry.scale);
-    // Forward or backward where a central difference would leave the bounds.
+    // The difference is forward or backward where a central one would leave the bounds.
     const double side = p[k] - h < entry.lower ? 1.0 : (p[k] + h > entry.upper ? -1.0 : 0.0);
     const double offsets[3] = {side == 0.0 ? -h : 0.0, side == 0.0 ? h : side * h, 2.0 * side * h};
     for (int i = 0; i < (side == 0.0 ? 2 : 3); ++i) {
@@ -386,7 +386,7 @@ Prediction RolloutResiduals::PredictionOf(int i, const std::vector<double>& samp
   const Camera* const camera = channel.camera < 0 ? nullptr : &instruments.cameras[channel.camera];
   const int points[kPlaces] = {observation.point, channel.to_point,
                                camera == nullptr ? -1 : camera->marker_point};
-  // Twists that nobody reads are 0.
+  // Twists that are not needed are 0.
   double states[kPlaces][6] = {};
   ObservedPlaces places;
   for (int place = 0; place < kPlaces; ++place) {

@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// The residuals of a run against observations: one a measured coordinate, never one for a
-// trajectory,
+// The residuals of a run with respect to observations: one for each measured coordinate, never one
+// for a trajectory,
 //
 //   r_i(p) = (predicted_i(p) − observed_i) / σ_i,        J = ∂r / ∂p   (observations x parameters)
 //
 // with J by any of five methods, which must agree (tests/estimation/problem/residual_test.cc):
 //
 //   tangent            forward mode with the step's own factorisation: one run, P columns
-//   adjoint            reverse mode: one recorded run, sweeps of 64 residuals back
+//   adjoint            reverse mode: one recorded run, reverse sweeps of 64 residuals
 //   jet_implicit       Jets pushed through each step's factorisation, in passes
 //   jet                Jets through every operation of the interior point: slow
 //   finite_difference  central, step 6e-6 max(|p|, scale); one-sided of second order at a bound
@@ -30,10 +30,10 @@
 
 namespace tangible {
 
-/// The residuals of one run: a least-squares problem of one block without parameters of its own.
+/// The residuals of one run: a least-squares problem of one block without own parameters.
 class RolloutResiduals : public LeastSquaresProblem {
  public:
-  /// `scene` holds the run, which goes on until the last observation only. Without `channels` all
+  /// `scene` is the scene of the run, which ends at the last observation. Without `channels` all
   /// observations are made directly.
   RolloutResiduals(ParameterizedScene scene, std::vector<Observation> observations,
                    std::vector<Channel> channels = {});
@@ -42,7 +42,7 @@ class RolloutResiduals : public LeastSquaresProblem {
   int num_parameters() const { return scene_.size(); }
   const ParameterizedScene& scene() const { return scene_; }
   const std::vector<Observation>& observations() const { return observations_; }
-  /// By Observation::channel.
+  /// The channels, indexed by Observation::channel.
   const std::vector<Channel>& channels() const { return channels_; }
   const Channel& ChannelOf(const Observation& observation) const {
     return channels_[observation.channel];
@@ -75,23 +75,23 @@ class RolloutResiduals : public LeastSquaresProblem {
                 RowMatrixXd* jacobian);
   const std::string& message() const { return message_; }
 
-  /// Runs done so far, in double or Jets; a sweep back of the adjoint is none.
+  /// Runs made so far, in double or Jets; a reverse sweep of the adjoint does not count.
   long rollouts() const { return rollouts_; }
-  /// For runs that others do with this scene.
+  /// Counts a run that other code makes with this scene.
   void CountRollout() { ++rollouts_; }
-  /// For what a checkpoint spares.
+  /// Sets the count, for runs that a checkpoint saves.
   void SetRollouts(long rollouts) { rollouts_ = rollouts; }
 
-  /// Evaluations, those of multiple shooting too, are looked up in this log and kept there; null:
-  /// they are not. The log outlives them.
+  /// Sets the log in which evaluations, including those of multiple shooting, are looked up and
+  /// kept; null: none. The log must outlive the residuals.
   void SetLog(EvaluationLog* log) { log_ = log; }
-  /// `function`, an evaluation at this point, by way of the log.
+  /// Evaluates `function` at this point through the log.
   bool Logged(const Eigen::VectorXd& at, const EvaluationLog::Function& function,
               Eigen::VectorXd* residuals, RowMatrixXd* jacobian);
 
   /// The values from which a fit begins, within the bounds.
   void SetInitial(const Eigen::VectorXd& p) { scene_.SetInitial(p); }
-  /// `scale` may change the sigma of the observations, and nothing else of them.
+  /// `scale` may change only the sigma of the observations.
   void ScaleSigma(const std::function<void(std::vector<Observation>*)>& scale) {
     scale(&observations_);
   }
@@ -102,9 +102,9 @@ class RolloutResiduals : public LeastSquaresProblem {
 
   /// Residuals from the samples, plan().width() numbers each.
   Eigen::VectorXd FromSamples(const std::vector<double>& samples) const;
-  /// Their derivatives from those of the samples: width() a sample x any number of columns, the
-  /// first P of which belong to unknowns q with dp/dq = `p_by_q`. `rates` of the samples may be
-  /// empty where no time depends on a parameter.
+  /// Their derivatives from those of the samples: width() rows for each sample, any number of
+  /// columns, the first P of which belong to unknowns q with dp/dq = `p_by_q`. `rates` of the
+  /// samples may be empty where no time depends on a parameter.
   RowMatrixXd FromSampleDerivatives(const std::vector<double>& samples,
                                     const std::vector<double>& rates,
                                     const RowMatrixXd& sample_derivatives,
@@ -123,25 +123,25 @@ class RolloutResiduals : public LeastSquaresProblem {
   template <typename T>
   bool JetPass(int first, JetRoute route, RowMatrixXd* sample_derivatives);
   bool ResidualsAt(const Eigen::VectorXd& p, Eigen::VectorXd* residuals);
-  /// Where steps end and samples are taken, for the times that the parameters give; false where
-  /// one is outside the run.
+  /// Updates the ends of steps and the samples for the times that the parameters give; false where
+  /// a time is outside the run.
   bool UpdateTimes();
   bool FindTimes(std::vector<double>* times);
-  /// Whether what is observed is a number of a sample as it is, and which. Most observations are,
-  /// and fits of many spend a tenth of their time here.
+  /// Whether the observed value is a number of a sample without further computation, and which.
+  /// This holds for most observations, and fits of many spend a tenth of their time here.
   bool IsDirect(int i) const;
   Eigen::Index DirectNumber(int i) const;
   Prediction PredictionOf(int i, const std::vector<double>& samples) const;
-  /// What a row of J owes to parameters that do not act by way of the run: places of points in
-  /// their bodies, instruments.
+  /// The contribution to a row of J of parameters that do not act through the run: places of points
+  /// in their bodies, instruments.
   Eigen::RowVectorXd DirectTerm(int i, const Prediction& prediction,
                                 const std::vector<double>& rates) const;
 
   ParameterizedScene scene_;
-  SimulationSettings settings_;  ///< as the scene has them
+  SimulationSettings settings_;  ///< those of the scene
   std::vector<Observation> observations_;
   std::vector<Channel> channels_;
-  std::vector<int> markers_;  ///< of each channel the body of its camera's marker, or −1
+  std::vector<int> markers_;  ///< the body of the camera's marker of each channel, or −1
   SampleOptions sample_options_;
   SamplePlan plan_;
   std::vector<std::string> files_;

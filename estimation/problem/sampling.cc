@@ -10,7 +10,8 @@
 namespace tangible {
 namespace {
 
-// A time this near to a step, in steps, is that step's: decimal times miss it by rounding.
+// A time this near to a step, in steps, belongs to that step, because decimal times miss it by
+// rounding.
 constexpr double kOnStep = 1e-9;
 
 /// Sets step and part of a sample from its time.
@@ -45,7 +46,7 @@ void Locate(const SimulationSettings& settings, Sample* sample) {
 
 template <typename ForEach>
 void SamplePlan::Shares::Fill(long last, const ForEach& for_each) {
-  // First how many each step has, then where they begin.
+  // `first` is first the number of each step, then the index of its first entry.
   first.assign(static_cast<size_t>(last) + 2, 0);
   for_each([this](long step, const SampleShare&) { ++first[step + 1]; });
   std::partial_sum(first.begin(), first.end(), first.begin());
@@ -119,7 +120,7 @@ int SamplePlan::AddSample(int body, double time, const SimulationSettings& setti
   return num_samples() - 1;
 }
 
-/// Calls use(step, share) for the differences that make up the rates.
+/// Calls use(step, share) for the differences that form the rates.
 template <typename Use>
 void SamplePlan::ForEachRate(const SimulationSettings& settings, const Use& use) const {
   if (!options_.rates || (by_events_ && !options_.twists)) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// Where a run is read: the states of bodies at the times of the observations.
+// The sampling of a run: the states of bodies at the times of the observations.
 //
 // With fixed steps each component of a state, the angle included, is linear in time between the
 // steps at t_k ≤ t ≤ t_{k+1},
@@ -9,15 +9,15 @@
 //   q(t) = (1 − a) q_k + a q_{k+1},   a = (t − t_k) / (t_{k+1} − t_k)
 //
 // which is exact for the poses of semi-implicit Euler. With event stepping steps end at the
-// observations' times (AddStepTimes), so that nothing is interpolated, and never across an event. A
-// point is moved with the pose so found: r = (x, y) + R(angle) at.
+// observations' times (AddStepTimes), so that nothing is interpolated, in particular not across an
+// event. A point moves with the interpolated pose: r = (x, y) + R(angle) at.
 //
-// Where delays or clocks are parameters, the times move with them, and the rate of a sample says
-// how it changes: (q_{k+1} − q_k) / h of the interval with fixed steps, which is the derivative of
-// what is sampled (at a step: that of the interval after it). By events a pose changes with the
-// twist at that time, and a twist with the mean acceleration over twice kRateStep of a step around
-// it, for which steps end there too. Steps that end elsewhere integrate alike but for the
-// integrator's error, so that this derivative holds to the order of the step.
+// Where delays or clocks are parameters, the times move with them, and a sample has a rate: with
+// fixed steps it is (q_{k+1} − q_k) / h of the interval, the derivative of the interpolation (at a
+// step: that of the interval after it). With event stepping the rate of a pose is the twist at that
+// time, and that of a twist the mean acceleration over twice kRateStep of a step around it, for
+// which steps end there too. Moving the ends of steps changes the motion only by the integrator's
+// error, so that this derivative is right to the order of the step.
 
 #include <span>
 #include <utility>
@@ -36,19 +36,20 @@ struct Sample {
   double part = 0.0;  ///< a in [0, 1)
 };
 
-/// A state's share in a sample.
+/// The weight of a state in a sample.
 struct SampleShare {
   int sample = -1;
   double weight = 0.0;
 };
 
-/// What is read of each sample.
+/// The quantities that are read at each sample.
 struct SampleOptions {
   bool twists = false;  ///< velocities are observed
   bool rates = false;   ///< the times of observations depend on parameters
 };
 
-/// Of a step with event stepping: half the time over which an acceleration is averaged.
+/// With event stepping: half the time over which an acceleration is averaged, as a fraction of a
+/// step.
 inline constexpr double kRateStep = 1e-3;
 
 class SamplePlan {
@@ -66,7 +67,7 @@ class SamplePlan {
   /// Numbers of a sample: x, y, angle, and with twists vx, vy, omega.
   int width() const { return options_.twists ? 6 : 3; }
   bool has_rates() const { return options_.rates; }
-  /// The sample of the body of each observation.
+  /// The index of the sample of each observation's body.
   const std::vector<int>& sample_of() const { return sample_of_; }
   /// The sample of one of the places (measurement.h) of an observation; −1: it has none.
   int SampleOf(int observation, int place) const {
@@ -76,18 +77,18 @@ class SamplePlan {
   }
   /// The last step whose state is needed.
   long last_step() const { return static_cast<long>(shares_.first.size()) - 2; }
-  /// What the state after k steps contributes to.
+  /// The samples to which the state after k steps contributes.
   std::span<const SampleShare> SharesAt(long k) const { return shares_.At(k); }
 
-  /// Adds the share of the state after k steps to the samples' numbers, and to their rates, width()
-  /// a sample each.
+  /// Adds the contribution of the state after k steps to the samples' numbers, and to their rates,
+  /// width() numbers for each sample.
   void Add(long k, const State<double>& state, std::vector<double>* numbers,
            std::vector<double>* rates) const;
 
  private:
   /// Shares by step.
   struct Shares {
-    std::vector<size_t> first = {0, 0};  ///< of each step, and the end of the last one's
+    std::vector<size_t> first = {0, 0};  ///< of each step, then the end of the last
     std::vector<SampleShare> all;
 
     std::span<const SampleShare> At(long k) const {
@@ -106,7 +107,7 @@ class SamplePlan {
   bool by_events_ = false;
   std::vector<Sample> samples_;
   std::vector<int> sample_of_;
-  std::vector<int> others_;  ///< two an observation; empty where no channel has any
+  std::vector<int> others_;  ///< two for each observation; empty where no channel has any
   Shares shares_;
   Shares rate_shares_;
 };

@@ -25,7 +25,7 @@ constexpr std::pair<const char*, DerivativeMethod> kMethods[] = {
     {"jet_implicit", DerivativeMethod::kJetImplicit},
     {"finite_difference", DerivativeMethod::kFiniteDifference}};
 
-// Multiple shooting is asked for by its segments.
+// Multiple shooting is selected by the number of its segments.
 constexpr std::pair<const char*, FitApproach> kApproaches[] = {{"auto", FitApproach::kAuto},
                                                                {"plain", FitApproach::kPlain},
                                                                {"windows", FitApproach::kWindows}};
@@ -49,7 +49,7 @@ ParameterSet ReadSet(const JsonReader& json) {
   return set;
 }
 
-// It is printed as it is, on a line with others.
+// The name is printed unchanged, on a line with others.
 std::string ReadName(const JsonReader& json) {
   std::string name = json.String();
   if (json.IsString() && (name.empty() || OneLine(name) != name)) {
@@ -158,7 +158,7 @@ FitOptions ReadOptions(const JsonReader& root) {
   return options;
 }
 
-/// Where a parameter's fault stands.
+/// The JSON pointer of an error in a parameter.
 std::string PointerOf(const ParameterError& error) {
   std::string pointer = "/parameters";
   if (error.parameter >= 0) {
@@ -181,7 +181,7 @@ bool Parameterize(const FitProblem& problem, const std::string& file, Parameteri
   return true;
 }
 
-/// Reads one fit file after another part: the scene is needed to check the rest.
+/// Reads a fit file part by part, because the scene is needed to check the other parts.
 class FitReader {
  public:
   FitReader(const JsonReader& root, std::string folder, const RecordingPart& part, FitFile* fit,
@@ -222,7 +222,7 @@ class FitReader {
   }
 
  private:
-  /// The states at the ends of segments are at times that stand still.
+  /// The states at the ends of segments are at fixed times.
   void CheckShooting() {
     for (const FitParameter& parameter : problem_->parameters) {
       for (const ParameterSet& set : parameter.sets) {
@@ -240,7 +240,7 @@ class FitReader {
   }
 
   bool ReadObservationFiles() {
-    // Times of a part are checked when it has been cut out.
+    // Times of a part are checked after it has been cut out.
     Scene observed_scene = problem_->scene;
     const bool is_part = part_.start > 0.0 || std::isfinite(part_.end);
     if (is_part) observed_scene.simulation.duration = std::numeric_limits<double>::max();

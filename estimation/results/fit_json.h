@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// Fit files, and the result of a fit as JSON (README.md of this folder has every key).
+// Fit files, and the result of a fit as JSON (README.md of this folder describes every key).
 //
 // Every mistake in a file is one line "file: /json/pointer: what, expected, got", the first one
 // found.
@@ -52,7 +52,7 @@ OrderedJson ResultToJson(const RolloutResiduals& residuals, const FitResult& res
                          const DiscretisationCheck* check,
                          const PredictionScore* prediction = nullptr);
 
-/// What was found of the noise of sensors.
+/// The estimated noise of sensors.
 OrderedJson NoiseToJson(const std::vector<SensorNoise>& noise);
 
 }  // namespace tangible

@@ -10,7 +10,7 @@
 namespace tangible {
 namespace {
 
-/// A file that is named from one folder, as named from another.
+/// Converts the name of a file relative to one folder to one relative to another.
 std::string Renamed(const std::string& file, const std::string& from, const std::string& to) {
   namespace fs = std::filesystem;
   std::error_code error;

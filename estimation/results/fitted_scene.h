@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// The fitted scene as a scene file of its own.
+// The fitted scene as a separate scene file.
 
 #include <string>
 

@@ -10,7 +10,7 @@
 namespace tangible {
 namespace {
 
-// Few, so that no impact is likely to lie between them.
+// The number is small, so that an impact is unlikely between the samples.
 constexpr size_t kSamples = 5;
 
 struct Wanted {

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// Where a recording's initial state is sought from: a polynomial through the first observations.
+// The initial guess of a recording's initial state: a polynomial through the first observations.
 //
 //   value(t) ~ a + b t + ½ c t²   by weighted least squares over the first samples of a coordinate
 //
-// gives a position or angle a, a speed b, at the run's time 0. What is observed relative to another
-// body, or through an instrument, is not used.
+// gives a position or angle a, a speed b, at the run's time 0. Coordinates relative to another
+// body, or recorded through an instrument, are not used.
 
 #include <optional>
 
@@ -14,8 +14,8 @@
 
 namespace tangible {
 
-/// The value of a parameter that is one number of one body's initial pose or twist; nothing where
-/// it is another one, or the body's coordinate was not observed often enough: once for a pose,
+/// The value of a parameter that is one number of one body's initial pose or twist; nothing for
+/// other parameters, or where the body's coordinate was not observed often enough: once for a pose,
 /// twice for a twist.
 std::optional<double> InitialFromObservations(const FitProblem& problem,
                                               const FitParameter& parameter);

@@ -19,7 +19,7 @@ void ReadByName(const JsonReader& json, const std::string& what, const Read& rea
   }
   for (const std::string& name : json.Keys()) {
     const JsonReader entry = json.At(name);
-    // The name stands in a path and in a cell of tables.
+    // The name is part of a path and of a table's cell.
     if (!IsName(name)) {
       entry.Fail("expected a name of letters, digits and _.- , got " + name);
     }
@@ -81,7 +81,7 @@ ObservationSigma ReadSigma(const JsonReader& json) {
   json.ExpectKeys({"x", "y", "angle", "vx", "vy", "omega", "distance"}, " of sigma");
   for (int i = 0; i < kCoordinates; ++i) {
     const char* const key = NameOf(static_cast<Coordinate>(i));
-    // A coordinate without a sigma must not be measured: NaN shows it.
+    // A coordinate without a sigma may not be measured, which NaN marks.
     *values[i] = json.Has(key) ? json.At(key).Number(NumberKind::kPositive)
                                : std::numeric_limits<double>::quiet_NaN();
   }

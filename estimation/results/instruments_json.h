@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// The parts of a fit file that say how observations were made: points, sensors, cameras, clocks and
-// the list of observation files.
+// The parts of a fit file that describe how observations were made: points, sensors, cameras,
+// clocks and the list of observation files.
 
 #include <string>
 #include <vector>

@@ -12,10 +12,10 @@ namespace tangible {
 namespace {
 
 constexpr int kHorizons = 20;
-// Of a bin's width: a time this near to its end by rounding is in it.
+// As a fraction of a bin's width: a time this near to the end of a bin, by rounding, belongs to it.
 constexpr double kOnEdge = 1e-9;
 
-/// Root mean squares and largest errors, one observation after the other.
+/// Accumulates root mean squares and largest errors, one observation after the other.
 class ErrorSum {
  public:
   void Add(const Observation& observation, const std::vector<Channel>& channels, double residual) {
@@ -50,7 +50,7 @@ class ErrorSum {
     double max = 0.0;
     long count = 0;
   };
-  /// Null for what is neither a length in m nor an angle.
+  /// Null for observations that are neither lengths in m nor angles.
   PerUnit* UnitFor(const Observation& observation, const std::vector<Channel>& channels) {
     const bool direct = channels.empty() || channels[observation.channel].camera < 0;
     switch (observation.coordinate) {
@@ -70,7 +70,7 @@ class ErrorSum {
   PerUnit length_, angle_;
 };
 
-/// A name as a cell: tables have no quotes.
+/// A name as a cell; tables have no quoting.
 std::string CsvCell(std::string name) {
   std::replace_if(
       name.begin(), name.end(), [](char c) { return c == ',' || c == '\n'; }, '_');

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// What the fitted scene predicts: a table of all observations beside their predictions, and the
-// error of predictions beyond the time up to which the scene was fitted.
+// The predictions of the fitted scene: a table of all observations beside their predictions, and
+// the error of predictions after the time up to which the scene was fitted.
 //
 // The error of the observations from T on is stated by horizon, t − T, in bins of equal width.
 // Every observation at a horizon in (0, t_last − T] is in one bin, and none is left out.
@@ -29,10 +29,10 @@ struct HorizonError {
   double max_angle = NAN;
 };
 
-/// How well a scene that was fitted up to a time predicts what follows.
+/// How well a scene that was fitted up to a time predicts later observations.
 struct PredictionScore {
   double from = 0.0;    ///< T, s
-  std::string message;  ///< why the run beyond T failed, or empty
+  std::string message;  ///< why the run after T failed, or empty
   HorizonError all;     ///< over all horizons
   std::vector<HorizonError> horizons;
 };
@@ -44,7 +44,7 @@ struct LaterObservations {
   PredictionScore score;
 };
 
-/// Moves the observations after `from` out of `observations`; the order of all stays.
+/// Moves the observations after `from` out of `observations`; both lists keep their order.
 std::vector<Observation> TakeLater(double from, std::vector<Observation>* observations);
 
 /// Runs the problem's scene at `estimate` until the last of `later`, and scores it there.
@@ -59,18 +59,19 @@ struct PredictedRun {
   const Eigen::VectorXd& residuals;
 };
 
-/// The score of runs together.
+/// The score of several runs together.
 PredictionScore ScorePrediction(double from, const std::vector<PredictedRun>& runs);
 
-/// A row an observation, by time: time, target (body or point), relative_to, coordinate, file,
-/// sensor, used (fit or prediction), sigma, observed, predicted, residual (predicted − observed, in
-/// the observation's unit) and residual_in_sigma; the last three are empty where there is no run.
-/// `values` are the residuals of the fit, in multiples of sigma; `later` may be null.
+/// A row for each observation, ordered by time: time, target (body or point), relative_to,
+/// coordinate, file, sensor, used (fit or prediction), sigma, observed, predicted, residual
+/// (predicted − observed, in the observation's unit) and residual_in_sigma; the last three are
+/// empty where there is no run. `values` are the residuals of the fit, in multiples of sigma;
+/// `later` may be null.
 std::string PredictionCsv(const RolloutResiduals& residuals, const Eigen::VectorXd& values,
                           const LaterObservations* later);
 
-/// The same of several recordings, one after the other, with the recording in a first column.
-/// `later`: of each recording, or empty.
+/// The same for several recordings, one after the other, with the recording in the first column.
+/// `later` has an entry for each recording, or is empty.
 std::string PredictionCsv(const RecordingsProblem& problem, const Eigen::VectorXd& values,
                           const std::vector<LaterObservations>& later);
 

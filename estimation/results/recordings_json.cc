@@ -13,7 +13,7 @@
 namespace tangible {
 namespace {
 
-// Keys that a recording has in the place of the file's.
+// Keys that a recording may have instead of the file.
 constexpr const char* kOfFile[] = {"scene",   "observations", "points",
                                    "sensors", "cameras",      "clocks"};
 
@@ -22,7 +22,7 @@ class Reader {
   Reader(const Json& json, std::string file, JsonErrors* errors, RecordingsFile* out)
       : json_(json), file_(std::move(file)), root_(json, errors), out_(*out), common_(json) {}
 
-  // False with an error of a recording's own; errors of the file itself are the reader's.
+  // False with an error of a single recording; errors of the file itself go to the reader.
   bool Read(std::string* error) {
     ReadOwn();
     const JsonReader list = root_.At("recordings");
@@ -42,7 +42,8 @@ class Reader {
   }
 
  private:
-  // Which parameters are per recording; the key is none of a single recording's fit.
+  // Reads which parameters are per recording; the key is not allowed in the fit of a single
+  // recording.
   void ReadOwn() {
     const JsonReader parameters = root_.At("parameters");
     for (int i = 0; i < parameters.Size(); ++i) {
@@ -94,7 +95,7 @@ class Reader {
     return true;
   }
 
-  // Where the recording's parameters start: {name: value}.
+  // Sets the initial values of the recording's parameters: {name: value}.
   static void SetInitial(const JsonReader& reader, Json* own) {
     if (!reader.Has("initial") || FromObservations(reader)) return;
     const JsonReader initial = reader.At("initial");
@@ -122,7 +123,7 @@ class Reader {
            reader.At("initial").Choice({"from_observations"}) == 0;
   }
 
-  // Numbers of the scene that are others in this recording: {path: value}.
+  // Sets numbers of the scene that differ in this recording: {path: value}.
   static bool SetValues(const JsonReader& reader, const std::string& label, Scene* scene,
                         std::string* error) {
     if (!reader.Has("values")) return true;
@@ -142,7 +143,7 @@ class Reader {
     return true;
   }
 
-  // From `start`, which is the run's time 0, to `end`.
+  // Reads the part of the recording from `start`, which is the run's time 0, to `end`.
   static RecordingPart ReadPart(const JsonReader& reader) {
     RecordingPart part;
     if (reader.Has("start")) part.start = reader.At("start").Number(NumberKind::kNonNegative);
@@ -151,8 +152,8 @@ class Reader {
     return part;
   }
 
-  // The initial values of the recording's own parameters that are an initial coordinate or speed of
-  // a body, from the first observations of that body.
+  // Sets the initial values of those own parameters of the recording that are an initial coordinate
+  // or speed of a body, from the first observations of that body.
   void StartFromObservations(FitProblem* problem) const {
     for (size_t i = 0; i < problem->parameters.size(); ++i) {
       if (!out_.own[i]) continue;

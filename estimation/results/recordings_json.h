@@ -15,16 +15,16 @@ namespace tangible {
 struct RecordingEntry {
   std::string name;
   double weight = 1.0;
-  FitFile fit;  ///< what the recording would be alone; options are those of the file
+  FitFile fit;  ///< the fit of this recording alone; options are those of the file
 };
 
 struct RecordingsFile {
   std::string path;
   std::vector<RecordingEntry> recordings;
-  std::vector<bool> own;  ///< of each parameter: "per": "recording"
+  std::vector<bool> own;  ///< whether each parameter has "per": "recording"
 };
 
-/// Whether the text of a fit file has the key `recordings`; one that is not JSON has not.
+/// Whether the text of a fit file has the key `recordings`; false if it is not JSON.
 bool HasRecordings(const std::string& text);
 
 /// Reads a fit file's text, and its scenes and observations, whose names are relative to `file`. On
@@ -32,14 +32,14 @@ bool HasRecordings(const std::string& text);
 bool ParseRecordings(const std::string& text, const std::string& file, RecordingsFile* recordings,
                      std::string* error);
 
-/// The problem of all recordings; the same on failure.
+/// The problem of all recordings; on failure sets the same kind of message.
 bool MakeRecordingsProblem(const RecordingsFile& file, std::vector<RecordedRun>* recordings,
                            std::string* error);
 
-/// What the fitted scenes predict of observations that were held back, of each recording.
+/// The predictions of the fitted scenes for observations that were held back, for each recording.
 struct LaterOfRecordings {
   std::vector<LaterObservations> runs;
-  PredictionScore score;  ///< of all together
+  PredictionScore score;  ///< of all recordings together
 };
 LaterOfRecordings PredictLater(const RecordingsFile& file, const RecordingsProblem& problem,
                                const Eigen::VectorXd& estimate, double from,

@@ -14,20 +14,20 @@ namespace {
 
 // More coordinates, or parameters, than this are listed but not drawn.
 constexpr size_t kMostPlots = 24;
-// A plot is about twice as many pixels wide. Of more points only the extremes of each bucket are
+// A plot is about twice this many pixels wide. Of more points only the extremes of each bucket are
 // drawn.
 constexpr int kBuckets = 360;
-// A table of the correlations of more parameters is too large to be read.
+// A table of the correlations of more parameters is too large to read.
 constexpr size_t kMostCorrelations = 60;
 
-/// One series of observations with what is fitted to it.
+/// One series of observations with its fitted values.
 struct Series {
   std::string label;
   std::string unit;
   std::vector<double> time, observed, fitted, residual;
 };
 
-/// The first series, at most kMostPlots.
+/// Collects the first series, at most kMostPlots.
 std::vector<Series> CollectSeries(const RolloutResiduals& residuals, const FitResult& result) {
   const std::vector<Observation>& observations = residuals.observations();
   const ObservationSeries index = IndexSeries(observations);
@@ -91,7 +91,7 @@ std::string EstimateTable(const std::vector<ParameterEntry>& entries, const FitR
          "<p>" + HtmlEscape(DescribeRobust(uncertainty)) + ".</p>\n";
 }
 
-/// What is determined of parameters that are not determined one by one.
+/// The combinations that are determined of parameters that are not determined individually.
 std::string CombinationTable(const Uncertainty& uncertainty) {
   std::vector<std::vector<std::string>> rows;
   for (const DeterminedCombination& combination : uncertainty.combinations) {
@@ -254,7 +254,7 @@ std::string SeriesPlots(const std::vector<Series>& all, size_t num_series) {
   return html + plots;
 }
 
-/// The error of what was not fitted, against how far ahead it was predicted.
+/// The error of observations that were not fitted, over the horizon of the prediction.
 std::string PredictionPart(const PredictionScore* score) {
   if (score == nullptr) {
     return "";

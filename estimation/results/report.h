@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// The report of a fit: one self-contained HTML page for people.
+// The report of a fit: one self-contained HTML page for readers.
 
 #include <string>
 
@@ -21,7 +21,7 @@ std::string FitReport(const std::string& title, const RolloutResiduals& residual
                       const FitResult& result, const DiscretisationCheck* check,
                       const PredictionScore* prediction = nullptr);
 
-/// The same of a fit to several recordings, without plots of their observations.
+/// The same for a fit to several recordings, without plots of their observations.
 std::string RecordingsReport(const std::string& title, const RecordingsProblem& problem,
                              const FitResult& result, const PredictionScore* prediction = nullptr);
 

@@ -7,7 +7,7 @@
 namespace tangible {
 namespace {
 
-// Of the deviation of a Gaussian distribution over its median absolute value.
+// The ratio of the standard deviation of a Gaussian distribution to its median absolute value.
 constexpr double kDeviationByMedian = 1.4826;
 constexpr double kOutlier = 5.0;
 
@@ -21,7 +21,7 @@ std::vector<std::vector<double>> BySeries(const ObservationSeries& index,
   return all;
 }
 
-/// From which size on a residual of a series is an outlier. Reorders them.
+/// The size above which a residual of a series is an outlier. Reorders `sizes`.
 double OutlierBound(std::vector<double>* sizes) {
   const auto middle = sizes->begin() + static_cast<std::ptrdiff_t>(sizes->size() / 2);
   std::nth_element(sizes->begin(), middle, sizes->end());

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// Residuals by series (one coordinate of one body or point from one file): how large they are, and
-// which single ones do not belong.
+// Residuals by series (one coordinate of one body or point from one file): their size, and single
+// outliers.
 //
-// An outlier is a residual that is large for its series: |r| > 5 s with s = 1.4826 median |r|, but
-// s is at least 1: what sigma explains is no outlier. With noise that is Gaussian one in 1.7
-// million is as large.
+// An outlier is a residual that is large for its series: |r| > 5 s with s = 1.4826 median |r|,
+// where s is at least 1, so that residuals within sigma are never outliers. With Gaussian noise one
+// in 1.7 million is as large.
 
 #include <Eigen/Core>
 #include <string>
@@ -17,7 +17,7 @@
 namespace tangible {
 
 struct SeriesSummary {
-  std::string file;    ///< empty where the observations are of no file
+  std::string file;    ///< empty where the observations are not from a file
   std::string target;  ///< body or point
   bool is_point = false;
   std::string relative_to;  ///< empty: to the world
@@ -36,35 +36,35 @@ struct SeriesSummary {
   std::string label;
 };
 
-/// A residual that does not belong.
+/// An outlier.
 struct Outlier {
   int series = 0;
   double time = 0.0;      ///< s
   double residual = 0.0;  ///< in multiples of sigma, fitted − observed
 };
 
-/// At most so many outliers are named.
+/// At most this many outliers are listed.
 inline constexpr size_t kMostOutliers = 50;
 
 struct ResidualSummary {
   std::vector<SeriesSummary> series;  ///< in the order of appearance
   std::vector<Outlier> outliers;      ///< the largest, at most kMostOutliers; largest first
-  long num_outliers = 0;              ///< of all
+  long num_outliers = 0;              ///< the number of all outliers
 };
 
 /// `values`: a residual for each of the observations, in multiples of sigma.
 ResidualSummary SummarizeResiduals(const RolloutResiduals& residuals,
                                    const Eigen::VectorXd& values);
 
-/// The file that an observation is from, as the fit file names it; empty where there is none.
+/// The file of an observation, as the fit file names it; empty where there is none.
 std::string FileOf(const RolloutResiduals& residuals, const Observation& observation);
 
 /// The sensor's name, empty where there is none.
 std::string SensorOf(const RolloutResiduals& residuals, const Observation& observation);
-/// The observation's unit: of lengths through a camera "camera units".
+/// The observation's unit; for lengths through a camera "camera units".
 std::string UnitOf(const RolloutResiduals& residuals, const Observation& observation);
 
-/// What a series is called: "ball x", "ball x (take.csv)" where there are several files.
+/// The name of a series: "ball x", "ball x (take.csv)" where there are several files.
 std::string SeriesLabel(const RolloutResiduals& residuals, const Observation& observation);
 
 }  // namespace tangible

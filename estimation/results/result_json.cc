@@ -90,7 +90,7 @@ OrderedJson HeldToJson(const FitResult& result) {
   return all;
 }
 
-/// How the robust intervals were found.
+/// How the robust intervals were computed.
 OrderedJson RobustToJson(const Uncertainty& uncertainty) {
   return {{"method", NameOf(uncertainty.robust_method)},
           {"bandwidth", Number(uncertainty.bandwidth)},
@@ -140,7 +140,7 @@ OrderedJson RmsByCoordinate(const RolloutResiduals& residuals, const FitResult& 
   return json;
 }
 
-/// What is observed, relative to what, from which file, by which sensor.
+/// The observed body or point and coordinate, its reference, file and sensor.
 OrderedJson NameToJson(const SeriesSummary& series) {
   OrderedJson json = {{series.is_point ? "point" : "body", series.target},
                       {"coordinate", NameOf(series.coordinate)}};
@@ -220,7 +220,7 @@ OrderedJson CheckToJson(const RolloutResiduals& residuals, const DiscretisationC
       {"parameters", parameters}, {"rollouts", check.rollouts}, {"seconds", check.seconds}};
 }
 
-/// What the results of one run and of several recordings have in common.
+/// The common part of the results of one run and of several recordings.
 OrderedJson CommonToJson(const LeastSquaresProblem& problem, const FitResult& result) {
   const Uncertainty& uncertainty = result.uncertainty;
   const bool estimated = result.estimate.size() > 0;
@@ -269,7 +269,7 @@ OrderedJson ResultToJson(const RolloutResiduals& residuals, const FitResult& res
 
 OrderedJson RecordingsResultToJson(const RecordingsProblem& problem, const FitResult& result,
                                    const LaterOfRecordings* later) {
-  // A matrix of more than that many parameters is larger than all else.
+  // A matrix of more parameters than this is larger than all other parts of the result.
   constexpr Eigen::Index kMostInMatrix = 100;
   const bool estimated = result.estimate.size() > 0;
   OrderedJson json = CommonToJson(problem, result);

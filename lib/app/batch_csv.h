@@ -10,15 +10,15 @@
 
 namespace tangible {
 
-/// A table of parameters: a column a path, a row a rollout.
+/// A table of parameters: a column for each path, a row for each rollout.
 struct BatchTable {
   std::vector<ParameterPath> parameters;
   RowMatrixXd values;      ///< rows x parameters
   std::vector<int> lines;  ///< of each row in the file, from 1
 };
 
-/// Reads the table of a scene. On failure, paths that match nothing and values that a number may
-/// not have included, sets one line "file: line 3: bodies/ball/mass: expected, got".
+/// Reads the table of a scene. On failure, including paths that match nothing and values that are
+/// not allowed, sets one line "file: line 3: bodies/ball/mass: expected, got".
 bool ReadBatch(const std::string& file, const Scene& scene, BatchTable* table, std::string* error);
 
 /// Rows row,status, then x, y, angle, vx, vy, omega of each moving and kinematic body, in scene

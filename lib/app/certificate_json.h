@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// The certificate of a derivative as JSON, as the results of the programs have it.
+// The certificate of a derivative as JSON, as in the results of the programs.
 
 #include "tangible/lcp/dense/certificate.h"
 #include "tangible/scene/json_writer.h"

@@ -146,7 +146,8 @@ class Reader {
   std::vector<std::string> outputs_;
 };
 
-// A scene's file stands beside the problem's, unless its path is absolute.
+// The path of a scene's file is relative to the folder of the problem's file, unless it is
+// absolute.
 std::string Beside(const std::string& file, const std::string& path) {
   return (std::filesystem::path(file).parent_path() / path).string();
 }

@@ -18,13 +18,13 @@ struct ControlFile {
   VectorX<double> low, high, initial;
   std::vector<CostTerm> terms;
   IlqrOptions options;
-  /// Receding horizon: of the plant's run, s, and of each plan, s.
+  /// Receding horizon: the duration of the plant's run, s, and of each plan, s.
   double run_duration = 0.0;
   double plan_horizon = 0.0;
   int plan_iterations = 5;
 };
 
-/// Reads a problem and its scene, and resolves names. On failure sets one line.
+/// Reads a problem and its scene, and resolves names. On failure sets a message of one line.
 bool LoadControlFile(const std::string& file, ControlFile* problem, std::string* error);
 
 }  // namespace tangible

@@ -16,7 +16,7 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// Reads the problem from the root of a file; faults end up in the reader's errors.
+/// Reads the problem from the root of a file; faults are added to the reader's errors.
 class ProblemReader {
  public:
   explicit ProblemReader(const JsonReader& root) : root_(root) {}
@@ -71,7 +71,7 @@ class ProblemReader {
     return std::to_string(rows) + " x " + std::to_string(cols);
   }
 
-  // Absent: zeros of the expected size (none if that is -1).
+  // If absent: zeros of the expected size (none if that is -1).
   VectorXd ReadVector(const char* key, Index size) const {
     const JsonReader list = root_.At(key);
     if (!list.exists()) return VectorXd::Zero(std::max<Index>(size, 0));
@@ -82,7 +82,7 @@ class ProblemReader {
     return VectorXd::Zero(size);
   }
 
-  // Absent: zeros. A matrix without entries may be written [], whatever its rows.
+  // If absent: zeros. A matrix without entries may be written [], whatever its number of rows.
   MatrixXd ReadMatrix(const char* key, Index rows, Index cols) const {
     const JsonReader list = root_.At(key);
     const bool empty = list.IsArray() && list.Size() == 0 && rows * cols == 0;
@@ -108,8 +108,8 @@ class ProblemReader {
   }
 
   // M is positive definite where A v = 0: v is then unique given z, and (1) is the motion of least
-  // energy, not a saddle of it. Beyond A's null space any M will do. Each v is scaled by M's
-  // diagonal, so that masses of any ratio pass.
+  // energy, not a saddle of it. Outside A's null space M is not restricted. Each v is scaled by M's
+  // diagonal, so that masses of any ratio are accepted.
   void CheckDefinite(const MixedLcp<double>& problem) const {
     const Index n = problem.num_v();
     if (n == 0) return;
@@ -118,7 +118,7 @@ class ProblemReader {
     MatrixXd basis = MatrixXd::Identity(n, n);
     if (problem.A.rows() > 0) {
       MatrixXd A = problem.A * scale.asDiagonal();
-      A.rowwise().normalize();  // a row of zeros stays
+      A.rowwise().normalize();  // a row of zeros remains
       const Eigen::ColPivHouseholderQR<MatrixXd> qr(A.transpose());
       const MatrixXd q = qr.householderQ();
       basis = q.rightCols(n - qr.rank());

@@ -53,7 +53,7 @@ std::string ReadPoints(const std::string& file, const ModelStructure& structure,
     bodies.emplace(structure.bodies[body].name, body);
   }
   for (const std::string& name : root.Keys()) {
-    // The name stands in a cell of the observations.
+    // The name is written in a cell of the observations.
     if (!IsName(name)) {
       root.At(name).Fail("expected a name of letters, digits and _.- , got " + name);
     }
@@ -108,8 +108,8 @@ void ObservationCsv::Write(double time, const State<double>& before, double part
       q[i] = from + part * (after.pose[3 * point.body + i] - from);
     }
     const Vector2<double> r = Pose<double>(Vector2<double>(q[0], q[1]), q[2]) * point.at;
-    // Without noise nothing is added, not even 0 · g, so that the positions are the run's to the
-    // bit.
+    // Without noise nothing is added, not even 0 · g, so that the positions are those of the run
+    // bit for bit.
     const double dx = options_.noise > 0.0 ? options_.noise * Normal() : 0.0;
     const double dy = options_.noise > 0.0 ? options_.noise * Normal() : 0.0;
     AppendNumber(time, &text_);

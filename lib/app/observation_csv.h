@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// Noisy observations of a run: positions of bodies, or of points fixed in them, at a rate of their
-// own.
+// Noisy observations of a run: positions of bodies, or of points fixed in them, at a given rate.
 //
 //   observed = position + sigma g,   g standard normal, independent for x and y of every row
 //
 // Between steps poses, angles included, are linear in time, which is exact for the map of
-// semi-implicit Euler; a point is moved with the pose so found. The normal numbers are Box and
+// semi-implicit Euler; a point moves with the interpolated pose. The normal numbers are Box and
 // Muller's from std::mt19937_64, so that a seed gives the same file with every standard library.
 
 #include <random>
@@ -19,7 +18,7 @@
 
 namespace tangible {
 
-/// What is observed: a point of a body (its frame, m).
+/// An observed point of a body (in its frame, m).
 struct ObservedPoint {
   std::string name;
   int body = -1;
@@ -44,14 +43,14 @@ class ObservationCsv {
   ObservationCsv(const ModelStructure& structure, ObserveOptions options);
   /// Every state of the run, in order.
   void Add(long k, double t, const State<double>& state);
-  /// Whether the state at time t, which is to be added next, brings rows.
+  /// Whether the state at time t, which will be added next, adds rows.
   bool Writes(double t) const;
   std::string Finish() { return std::move(text_); }
 
  private:
   void Write(double time, const State<double>& before, double part, const State<double>& after);
   double Normal();
-  /// A sample this near to a step is that step's: decimal times miss it by rounding.
+  /// A sample this near to a step belongs to that step, because decimal times miss it by rounding.
   double Near() const { return kSameTime * dt_; }
 
   ObserveOptions options_;

@@ -64,7 +64,8 @@ FlagText SplitFlag(std::string_view argument) {
   return {std::string(argument.substr(0, equal)), std::string(argument.substr(equal + 1))};
 }
 
-// Finds a flag of the program's own; those of libraries could read files and change exit statuses.
+// Finds a flag that the program itself defines; flags of libraries could read files and change exit
+// statuses.
 bool FindFlag(const ProgramInfo& info, const std::string& name, CommandLineFlagInfo* flag) {
   return gflags::GetCommandLineFlagInfo(name.c_str(), flag) && flag->filename == info.source_file;
 }
@@ -91,13 +92,13 @@ std::string CompleteFlag(int argc, char** argv, const ProgramInfo& info, FlagTex
   return "";
 }
 
-// A file that the command line names, and by which word.
+// A file that the command line names, and the argument that names it.
 struct NamedFile {
   std::string word;
   std::string path;
 };
 
-// The file that links name, which may not be there yet: it is to be replaced and not the link.
+// The file to which links lead, which may not exist yet: it has to be replaced, not the link.
 std::filesystem::path FollowLinks(std::filesystem::path path) {
   constexpr int kMostLinks = 40;
   std::error_code error;
@@ -169,13 +170,14 @@ std::string WriteDirectly(const std::string& path, std::string_view text) {
   return errno != 0 ? std::strerror(errno) : "write failed";
 }
 
-// A pipe whose reader is gone and a file beyond the size that is allowed would end the program
-// between two outputs; as errors of the write they are reported, and the other outputs are written.
+// A pipe without a reader and a file above the allowed size would end the program between two
+// outputs; as errors of the write they are reported, and the other outputs are written.
 void TakeFaultsAsErrors() {
   std::signal(SIGPIPE, SIG_IGN);
   std::signal(SIGXFSZ, SIG_IGN);
-  // Where stdin, stdout or stderr is closed, the next file opened would take its number, and what
-  // is meant for the one would end in the other. What holds the number instead can only fail.
+  // Where stdin, stdout or stderr is closed, the next opened file would take its number, and output
+  // for the one would end in the other. The number is therefore taken by a descriptor that can only
+  // fail.
   for (int number = STDIN_FILENO; number <= STDERR_FILENO; ++number) {
     if (::fcntl(number, F_GETFD) == -1 && errno == EBADF) {
       static_cast<void>(::open("/dev/null", number == STDIN_FILENO ? O_WRONLY : O_RDONLY));
@@ -183,21 +185,22 @@ void TakeFaultsAsErrors() {
   }
 }
 
-// Without its folder, whose name may be anything.
+// The program's name without its folder, whose name may be anything.
 const char* ProgramName(char** argv) {
   if (argv == nullptr || argv[0] == nullptr) return "tangible";
   const char* const slash = std::strrchr(argv[0], '/');
   return slash == nullptr ? argv[0] : slash + 1;
 }
 
-// An error where something that went to stdout did not arrive, or empty.
+// An error where output to stdout was lost, or empty.
 std::string LostOutput() {
   errno = 0;
   const bool flushed = std::cout.flush() && std::fflush(stdout) == 0 && std::ferror(stdout) == 0;
   return flushed ? "" : Unwritable("stdout", errno != 0 ? std::strerror(errno) : "write failed");
 }
 
-// What will keep a file from being written, found before the work that it is to hold; or empty.
+// The reason why a file cannot be written, which is checked before the work whose result it will
+// hold; or empty.
 std::string WhyUnwritable(const std::string& path) {
   namespace fs = std::filesystem;
   std::error_code error;
@@ -268,7 +271,7 @@ int RunMain(int (*body)(int, char**), int argc, char** argv) noexcept {
     const std::string lost = LostOutput();
     return exit_status == kExitDone && !lost.empty() ? ReportError(lost) : exit_status;
   } catch (const std::bad_alloc&) {
-    // What the work held has been given back, so that there is room for a message again; but
+    // The memory of the work has been released, so that there is room for a message again; but
     // nothing here relies on it.
     std::fprintf(stderr, "%s: not enough memory for this job\n", ProgramName(argv));
   } catch (const std::exception& error) {
@@ -347,7 +350,7 @@ std::string WriteFileAtomically(const std::string& path, std::string_view text, 
     fs::remove(temporary, error);
     return Unwritable(path, reason);
   }
-  // What is replaced keeps its permissions.
+  // A file that is replaced keeps its permissions.
   if (fs::exists(status)) fs::permissions(temporary, status.permissions(), error);
   fs::rename(temporary, target, error);
   if (!error) return "";

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// What every program shares: the command line, one-line errors, atomic output. Their JSON is read
-// and written by the scene module (json_reader.h, json_writer.h).
+// Functions that all programs share: the command line, one-line errors, atomic output. The scene
+// module reads and writes JSON (json_reader.h, json_writer.h).
 //
 // Exit statuses: 0 done; 1 the job could not be done (bad input, an unsolved problem); 2 wrong
 // usage of flags. gflags itself exits 1 on an unknown flag, a malformed value and --help, so
@@ -37,9 +37,9 @@ struct ProgramInfo {
   std::string version;      ///< "0.1.0"
   std::string source_file;  ///< __FILE__ of the main: its flags are the ones that --help lists
   int num_positional = 1;   ///< number of arguments that are not flags
-  int most_positional = 0;  ///< where more of them are allowed: how many
+  int most_positional = 0;  ///< if more are allowed: at most this many
   /// Flags whose values are files that the program writes, and reads. No file is written twice, or
-  /// over an input; a folder that is not there is found before the work begins.
+  /// over an input; a missing folder is reported before the work begins.
   std::vector<std::string> outputs = {"out"};
   std::vector<std::string> inputs{};
 };
@@ -51,13 +51,14 @@ struct CommandLine {
 };
 
 /// Checks the arguments and sets the gflags they name: those of the main's own file. The flags that
-/// gflags and glog bring (--flagfile, --fromenv, --v) are unknown; glog takes its settings from the
-/// environment (GLOG_v, GLOG_logtostderr). Prints help or the version on stdout, or one
+/// gflags and glog define (--flagfile, --fromenv, --v) are not accepted; glog takes its settings
+/// from the environment (GLOG_v, GLOG_logtostderr). Prints help or the version on stdout, or one
 /// line about what is wrong on stderr.
 CommandLine ParseCommandLine(int argc, char** argv, const ProgramInfo& info);
 
-/// Runs `body`; memory that ran out, an exception that nobody expected, and output that did not
-/// reach stdout (closed, a full disk, a pipe without a reader), is one line on stderr and status 1.
+/// Runs `body`. If memory runs out, an unexpected exception is thrown, or output does not reach
+/// stdout (closed, a full disk, a pipe without a reader), it prints one line on stderr and returns
+/// status 1.
 int RunMain(int (*body)(int, char**), int argc, char** argv) noexcept;
 
 /// Prints `message` as exactly one line on stderr and returns `exit_status`.
@@ -66,38 +67,41 @@ int ReportError(std::string_view message, int exit_status = kExitFailed);
 /// The values of a flag that takes several: "a,b" is {"a", "b"}, "" one empty value.
 std::vector<std::string> SplitAtCommas(const std::string& text);
 
-/// A number with 17 significant digits, which read back give the same double.
+/// A number with 17 significant digits, so that reading it gives the same double.
 std::string FormatNumber(double value);
-/// The same at the end of a text.
+/// Appends the same to a text.
 void AppendNumber(double value, std::string* text);
 
-/// What a write may replace: any file but one that was read as an input (json_reader.h), or also an
-/// input that is the program's own to go on with.
+/// Files that a write may replace: any file except one that was read as an input (json_reader.h),
+/// or also an input that the program itself wrote in order to continue.
 enum class Over { kNoInput, kOwnInput };
 
 /// Writes a file so that it is either the old or the whole new one: a temporary in the same folder,
-/// then a rename. Devices and pipes are written directly. A program that is killed on the way may
-/// leave the temporary, PATH.tmp and its process's number. Returns an error (one line) or empty.
+/// then a rename. Devices and pipes are written directly. A program that is killed meanwhile may
+/// leave the temporary, PATH.tmp followed by its process number. Returns an error (one line) or
+/// empty.
 std::string WriteFileAtomically(const std::string& path, std::string_view text,
                                 Over over = Over::kNoInput);
 
 /// "--report: expected a file of its own, got that of an input, PATH" where a flag names a file
-/// that was read; empty where none does. Before the work, once all inputs are read.
+/// that was read; empty where none does. To be called before the work, after all inputs have been
+/// read.
 std::string OutputOverInput(const std::vector<std::string>& flags);
 
 /// Writes a result to `out_path`, or to stdout if that is empty. Returns an error or empty.
 std::string WriteResult(const std::string& out_path, std::string_view text);
 
-/// Several results one after the other: what fails does not keep the others from being written.
+/// Writes several results one after the other; a failure does not prevent the others from being
+/// written.
 class ResultWriter {
  public:
-  /// Nothing without a path.
+  /// Writes nothing if the path is empty.
   void Write(const std::string& path, const std::function<std::string()>& text) {
     if (path.empty()) return;
     const std::string failed = WriteFileAtomically(path, text());
     if (error_.empty()) error_ = failed;
   }
-  /// The first, or empty.
+  /// The first error, or empty.
   const std::string& error() const { return error_; }
 
  private:

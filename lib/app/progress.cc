@@ -27,7 +27,7 @@ void Progress::Show(long done) {
   if (!terminal_ || done <= 0 || done < look_) {
     return;
   }
-  // Where much is done between two looks at the clock, it is read less often.
+  // Where much work is done between two readings of the clock, it is read less often.
   constexpr long kMostStride = 1024;
   const auto now = std::chrono::steady_clock::now();
   const auto since = now - looked_;

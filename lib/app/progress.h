@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// Progress of long work and the time that is left, in place on stderr, where that is a terminal.
+// Progress of long work and the remaining time, in one line on stderr if that is a terminal.
 
 #include <chrono>
 #include <string>
@@ -10,7 +10,7 @@ namespace tangible {
 
 class Progress {
  public:
-  /// `what`: of what there are `total`, "steps".
+  /// `what`: the unit of `total`, for example "steps".
   Progress(std::string what, long total);
   ~Progress();
   Progress(const Progress&) = delete;
@@ -28,7 +28,7 @@ class Progress {
   std::chrono::steady_clock::time_point next_;
   std::chrono::steady_clock::time_point looked_;  ///< when the clock was read last
   long stride_ = 1;
-  long look_ = 0;  ///< when so many are done it is read again
+  long look_ = 0;  ///< when this many are done it is read again
 };
 
 }  // namespace tangible

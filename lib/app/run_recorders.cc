@@ -33,7 +33,7 @@ void RunRecorders::Add(const Model<double>& model, long k, double t, const State
   }
   summary->Keep(model, state, stepper);
   if (!WritesRows(k, t, stepper) && !summary->IsFull()) {
-    Record(model, k, t, state, stepper);  // what is kept for rows to come: copies
+    Record(model, k, t, state, stepper);  // only copies, for later rows
     return;
   }
   const double start = clock();

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// What a run of tangible-simulate writes, and how much CPU time recording took.
+// The outputs of a run of tangible-simulate, and the CPU time that recording took.
 //
-// Reading the process's CPU clock is a call of the system, a microsecond or so, and a step of a
-// small scene takes five. So it is read only where the summary reports the steps' own time, and
-// there only around what is worth timing: rows that are written, and the summary's figures of many
-// steps at once.
+// Reading the process's CPU clock is a system call of about a microsecond, while a step of a small
+// scene takes five. Therefore it is read only where the summary reports the time of the steps, and
+// there only around work that takes long enough: rows that are written, and the summary's figures
+// for many steps at once.
 
 #include <optional>
 
@@ -21,7 +21,7 @@ namespace tangible {
 /// CPU time of the process with all its threads, s.
 double CpuSeconds();
 
-/// Each member is there if it was asked for.
+/// Each member is set if the user asked for it.
 struct RunRecorders {
   std::optional<TrajectoryCsv> trajectory;
   std::optional<ContactsCsv> contacts;
@@ -30,9 +30,9 @@ struct RunRecorders {
   std::optional<RunSummary> summary;
   std::optional<RolloutCertifier> certifier;
 
-  /// s; a test has its own.
+  /// The clock, s; tests replace it.
   double (*clock)() = &CpuSeconds;
-  /// CPU time that recording took, s; 0 without a summary, which is where it counts.
+  /// CPU time that recording took, s; 0 without a summary, because only the summary uses it.
   double seconds = 0.0;
 
   /// The state after k steps, at time t; `stepper` is null for the initial one.

@@ -22,7 +22,7 @@ double Energy(const Model<double>& model, const State<double>& state) {
   return KineticEnergy(model, state) + PotentialEnergy(model, state);
 }
 
-// What the model left out, in all steps.
+// Counts of what the model left out, in all steps.
 OrderedJson ReductionsJson(const RolloutReport& report) {
   return {{"pairs_compared", report.pairs_compared},
           {"pairs_near", report.pairs_near},
@@ -61,7 +61,8 @@ long SumOf(const OrderedJson& counts) {
   return sum;
 }
 
-// Of the ranks that tell what is undetermined, all groups of bodies together: a few seconds.
+// Limit of the operations of the ranks that tell what is undetermined, for all groups of bodies
+// together: a few seconds.
 constexpr double kMostRankOperations = 1e10;
 
 std::string NotCounted(const UndeterminedCounts& counts) {
@@ -73,8 +74,8 @@ std::string NotCounted(const UndeterminedCounts& counts) {
   return text.data();
 }
 
-// What the last step's equations leave open (redundant supports, joints and sticking contacts), and
-// which of the solutions its impulses are.
+// What the last step's equations leave undetermined (redundant supports, joints and sticking
+// contacts), and which of the solutions the impulses are.
 OrderedJson UndeterminedJson(const Model<double>& model, const State<double>& at,
                              const StepRecord& step) {
   ContactProblem<double> problem;
@@ -147,8 +148,8 @@ void RunSummary::Keep(const Model<double>& model, const State<double>& state,
 }
 
 bool RunSummary::IsFull() const {
-  // What stays in a processor's cache. A step of a scene that fills it by itself takes far longer
-  // than a look at the clock.
+  // As many numbers as remain in a processor's cache. A step of a scene that alone fills it takes
+  // far longer than reading the clock.
   constexpr size_t kMostNumbers = 8192;
   constexpr size_t kMostSteps = 256;
   return poses_.size() + closed_.size() >= kMostNumbers || closed_ends_.size() >= kMostSteps;
@@ -176,11 +177,13 @@ OrderedJson RunSummary::ToJson(const Model<double>& model, const RolloutReport& 
                                const State<double>& last) {
   EvaluateKept(model);
   const OrderedJson fallbacks = FallbacksJson(report);
-  // The steps' reports give gaps at their starts; the end has no step.
+  // The steps' reports give gaps at the starts of steps, so that the end of the run is evaluated
+  // here.
   const double penetration = std::max(report.penetration_max, DeepestPenetration(model, last));
   OrderedJson undetermined = nullptr;
   if (stepped_) {
-    // The rows of a fixed step are those of its start; event stepping's last are those of its end.
+    // The rows of a fixed step are those at its start; the last ones of event stepping are those at
+    // its end.
     undetermined = UndeterminedJson(model, by_events_ ? last : last_step_.before, last_step_);
   }
   return {{"status", ToString(report.status)},

@@ -10,16 +10,16 @@ namespace tangible {
 
 class RunSummary {
  public:
-  /// Every state of the run, in order; `stepper` is null for the initial one. Only copies what the
-  /// summary's figures need: they are evaluated for many steps at once, so that their time can be
-  /// taken with two looks at the clock.
+  /// Every state of the run, in order; `stepper` is null for the initial one. Only copies the data
+  /// that the summary's figures need: the figures are evaluated for many steps at once, so that
+  /// their time can be measured by reading the clock twice.
   void Keep(const Model<double>& model, const State<double>& state, const Stepper* stepper);
-  /// Whether so much is kept that it should be evaluated.
+  /// Whether enough data are kept that they should be evaluated.
   bool IsFull() const;
-  /// Evaluates what is kept and forgets it.
+  /// Evaluates the kept data and discards them.
   void EvaluateKept(const Model<double>& model);
-  /// `last`: the run's last state. Without "seconds" and "cpu_seconds", which are null: they are
-  /// known when all else is done.
+  /// `last`: the run's last state. "seconds" and "cpu_seconds" are null, because they are known
+  /// only at the very end.
   OrderedJson ToJson(const Model<double>& model, const RolloutReport& report,
                      const State<double>& last);
 
@@ -33,12 +33,12 @@ class RunSummary {
   bool stepped_ = false;
   bool by_events_ = false;
 
-  // Kept: the poses of states one after the other, where the scene has joints, and each step's
-  // bodies in contact with the place in `closed_` where they end.
+  // The kept data: the poses of states one after the other, where the scene has joints, and for
+  // each step the bodies in contact and the position in `closed_` where they end.
   std::vector<double> poses_;
   std::vector<std::pair<int, int>> closed_;
   std::vector<size_t> closed_ends_;
-  State<double> at_;  // whose joints are measured
+  State<double> at_;  // the state whose joints are measured
 };
 
 /// "done", "unsolved" or "diverged".

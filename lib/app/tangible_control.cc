@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// tangible-control: the forces and efforts that make a scene do what a cost asks for.
+// tangible-control: finds the forces and efforts with which a scene minimises a cost.
 
 #include <gflags/gflags.h>
 
@@ -50,13 +50,13 @@ std::vector<double> ToVector(const VectorX<double>& values) {
   return {values.data(), values.data() + values.size()};
 }
 
-// What was planned or played, and the motion.
+// The planned or applied controls, and the motion.
 struct Played {
   RowMatrixXd states, controls;
   double cost = 0.0;
 };
 
-// A control without effect on anything in any step.
+// Finds a control without any effect in any step.
 std::string FindIdle(const ControlProblem& problem, const ControlFile& file,
                      const RolloutFunction& function, const Plan& plan) {
   Model<double> model;
@@ -142,7 +142,7 @@ std::string CostPlot(const std::vector<IlqrIteration>& iterations) {
                  {series});
 }
 
-// Runs the scene once more with what was played, for the tables and the view.
+// Runs the scene once more with the applied controls, for the tables and the view.
 std::string WriteMotion(const ControlFile& file, Scene scene, const Played& played,
                         const std::vector<IlqrIteration>& iterations) {
   const double dt = scene.simulation.dt;
@@ -159,7 +159,7 @@ std::string WriteMotion(const ControlFile& file, Scene scene, const Played& play
   BuildModel(scene, &model, &initial);
   TrajectoryCsv trajectory(*model.structure, 1);
   ViewRecorder view(scene, model);
-  // The motion that was planned: a run of all steps at once would be the same but for rounding.
+  // The planned motion is written: a run of all steps at once would differ only by rounding.
   for (Eigen::Index k = 0; k < played.states.rows(); ++k) {
     const State<double> state = step.StateOf(k, played.states.row(k));
     const double t = static_cast<double>(k) * dt;

@@ -51,7 +51,7 @@ bool FindMethod(const std::string& name, GradientMethod* method) {
   return false;
 }
 
-// Whether a flag is written that only the adjoint heeds, whatever its value.
+// Whether a flag is given that only the adjoint uses, whatever its value.
 bool AsksForTheAdjoint() {
   const auto written = [](const char* flag) {
     return !gflags::GetCommandLineFlagInfoOrDie(flag).is_default;
@@ -162,7 +162,7 @@ OrderedJson Describe(const GradientResult& result) {
   return text;
 }
 
-// Empty, or one line: derivatives of numbers near 1e308 or 1e-308 may be beyond what numbers hold.
+// Empty, or one line: derivatives of numbers near 1e308 or 1e-308 may overflow.
 std::string CheckFinite(const std::string& file, const GradientResult& result) {
   const bool finite = result.values.allFinite() && result.jacobian.allFinite() &&
                       result.gradient.allFinite() &&

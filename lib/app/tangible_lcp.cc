@@ -50,7 +50,7 @@ bool IsFinite(const MixedLcp<double>& gradient) {
          gradient.b.allFinite();
 }
 
-// `overflows`: whether the gradient does; there is none then.
+// `overflows`: whether the gradient overflows, in which case none is written.
 OrderedJson Describe(const LcpFile& input, const LcpSolution<double>& solution, bool* overflows) {
   OrderedJson result = {{"status", ToString(solution.status)},
                         {"v", ToJson(solution.v)},

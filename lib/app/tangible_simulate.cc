@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // tangible-simulate: runs a scene and writes its trajectory, contacts, summary, observations and
-// view; or for many vectors of parameters, and writes the final states.
+// view; or runs it for many vectors of parameters and writes the final states.
 
 #include <gflags/gflags.h>
 
@@ -52,7 +52,7 @@ constexpr int kMostThreads = 256;
 
 bool IsDefault(const char* flag) { return gflags::GetCommandLineFlagInfoOrDie(flag).is_default; }
 
-// The same of the flags of batches.
+// The same for the flags of batches.
 std::string CheckBatchFlags() {
   if (FLAGS_threads < 0 || FLAGS_threads > kMostThreads) {
     return "--threads: expected a number from 0 to " + std::to_string(kMostThreads) + ", got " +
@@ -66,7 +66,7 @@ std::string CheckBatchFlags() {
   return "";
 }
 
-// m; what it adds to a position is finite.
+// m; a position with this noise is still finite.
 constexpr double kMaxNoise = 1e150;
 
 // Empty, or one line about a flag's value.
@@ -100,7 +100,7 @@ struct Job {
   std::string error;
 };
 
-// Lines of observations, which are written at once as the run ends.
+// Maximum number of lines of observations, which are written together at the end of the run.
 constexpr double kMaxSamples = 1e7;
 
 void MakeRecorders(Job* job) {
@@ -126,7 +126,7 @@ void MakeRecorders(Job* job) {
   r.observations.emplace(structure, std::move(options));
 }
 
-// Event stepping interpolates nothing: its steps end where it is observed.
+// With event stepping nothing is interpolated: steps end at the times of observation.
 void EndStepsAtObservations(SimulationSettings* settings) {
   const double samples = FLAGS_rate * settings->duration;
   if (FLAGS_observe.empty() || settings->stepping != Stepping::kEvent ||
@@ -165,7 +165,7 @@ void Prepare(const std::string& file, Job* job) {
 struct Done {
   RolloutReport report;
   State<double> last;
-  double start = 0.0;        ///< s, on the wall's clock
+  double start = 0.0;        ///< s, wall-clock time
   double cpu_seconds = 0.0;  ///< of the steps
   double rounding = 0.0;     ///< of coordinates over sizes (CoordinateWatch)
   std::vector<std::string> warnings;
@@ -223,7 +223,7 @@ int Run(const std::string& file) {
   run.rounding = warnings.rounding();
   const std::string error = WriteResults(job, run, &job.recorders);
   if (!error.empty()) return ReportError(error);
-  // Of a run that failed its one line says why.
+  // If the run failed, its message says why.
   if (run.report.status != StepStatus::kDone) {
     const std::string coordinates = warnings.CoordinatesMessage(job.model);
     return ReportError(file + ": " + run.report.message +
@@ -234,7 +234,7 @@ int Run(const std::string& file) {
   return kExitDone;
 }
 
-// The lines on the first row that has any, with how many others have.
+// Prints the warnings of the first row that has any, with the number of other rows that have some.
 void ReportWarnings(const BatchTable& table, const std::vector<BatchRow>& rows) {
   const BatchRow* first = nullptr;
   int others = 0;
@@ -252,7 +252,7 @@ void ReportWarnings(const BatchTable& table, const std::vector<BatchRow>& rows) 
   for (std::string line : first->warnings) ReportError(line.insert(0, place).append(more));
 }
 
-// All rows of a table; those that fail are told, the others written.
+// Runs all rows of a table; those that fail are reported, the others written.
 int RunRows(const std::string& file) {
   Scene scene;
   BatchTable table;

@@ -10,12 +10,12 @@
 namespace tangible {
 
 /// Rows time,body,x,y,angle,vx,vy,omega of moving and kinematic bodies, every `every` steps; the
-/// first and the last state given are always there.
+/// first and the last state are always included.
 class TrajectoryCsv {
  public:
   TrajectoryCsv(const ModelStructure& structure, long every);
   void Add(long k, double t, const State<double>& state);
-  /// Whether the state after k steps is written, as it comes; the last one is at the end.
+  /// Whether the state after k steps is written at once; the last one is written by Finish.
   bool Writes(long k) const { return k % every_ == 0; }
   /// The table, up to the last state that was added.
   std::string Finish();
@@ -43,12 +43,13 @@ class ContactsCsv {
   std::string text_;
 };
 
-/// Sets the poses and twists of the bodies that a trajectory has rows for, to the last row of each.
-/// On failure sets one line "file: line 3: what, expected, got".
+/// Sets the poses and twists of the bodies for which a trajectory has rows, to the last row of
+/// each. On failure sets one line "file: line 3: what, expected, got".
 bool ReadInitialState(const std::string& file, const ModelStructure& structure,
                       State<double>* state, std::string* error);
 
-/// Empty, or what of the first state is not finite: joints' rates on arms of 1e308 m, say.
+/// Empty, or the part of the first state that is not finite, for example joints' rates on arms of
+/// 1e308 m.
 std::string CheckInitialState(const ModelStructure& structure, const State<double>& state);
 
 }  // namespace tangible

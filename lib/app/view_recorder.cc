@@ -7,7 +7,7 @@
 namespace tangible {
 namespace {
 
-// The view writes the world as −1.
+// In the view the world has the index −1.
 int ViewIndex(const ModelStructure& structure, int body) {
   return body == structure.world() ? -1 : body;
 }

@@ -38,7 +38,7 @@ class Search {
     VectorX<double> direction = VectorX<double>::Zero(x.size());
     direction(solution->free) = -solution->factor.solve(VectorX<double>(gradient(solution->free)));
     if (!Move(gradient, direction, &solution->x)) {
-      // What is left is rounding.
+      // The remaining gradient is rounding.
       solution->status = BoxQuadraticStatus::kSolved;
       return false;
     }

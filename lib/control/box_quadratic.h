@@ -6,8 +6,9 @@
 //
 //   min ½ xᵀ H x + gᵀ x,   low <= x <= high
 //
-// A step is Newton's in the variables that no bound holds; its line search follows the projection
-// onto the box. The set that bounds hold is found in a few steps from a good start.
+// A step is a Newton step in the free variables (those not at a bound); its line search follows the
+// projection onto the box. From a good start the set of variables at bounds is found in a few
+// steps.
 
 #include <Eigen/Cholesky>
 #include <vector>
@@ -22,7 +23,7 @@ struct BoxQuadraticSolution {
   /// kIndefinite: H is not positive definite in the variables that are free.
   BoxQuadraticStatus status = BoxQuadraticStatus::kIterationLimit;
   VectorX<double> x;
-  std::vector<int> free;                 ///< variables that no bound holds, ascending
+  std::vector<int> free;                 ///< variables not at a bound, ascending
   Eigen::LLT<MatrixX<double>> factor{};  ///< of H over them
   int iterations = 0;
 };

@@ -7,13 +7,13 @@
 namespace tangible {
 namespace {
 
-// A residual of one or two variables: its value, and its derivatives by `variable` (of a point: the
-// body's position on that axis) and by `angle`.
+// A residual of one or two variables: its value, and its derivatives with respect to `variable`
+// (for a point the body's position on that axis) and `angle`.
 struct Residual {
   double value;
   double by_variable = 1.0;
   double by_angle = 0.0;
-  double curvature = 0.0;  // second derivative by the variable, or of a point by the angle
+  double curvature = 0.0;  // second derivative by the variable, for a point by the angle
 };
 
 Residual Evaluate(const CostTerm& term, const VectorX<double>& x, const VectorX<double>& u) {

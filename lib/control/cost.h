@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// What a plan costs: a sum of squares over the steps and at the end,
+// The cost of a plan: a sum of squares over the steps and at the end,
 //
 //   J = h Σ_k Σ_i ½ wᵢ rᵢ(x_k, u_k)² + Σ_j ½ wⱼ rⱼ(x_N)²
 //
 // with residuals r of states, controls, points of bodies. Its Gauss-Newton approximation leaves out
-// r ∂²r, which is 0 but for angles that wrap and points.
+// r ∂²r, which is 0 except for angles that wrap and points.
 
 #include <string>
 #include <vector>
@@ -31,13 +31,13 @@ struct CostTerm {
     kControl,  ///< r = u[index] − target
   };
   Kind kind = Kind::kState;
-  /// Of the state or control; of a point, of the body's x, which y and the angle follow.
+  /// Index of the state or control; for a point, of the body's x, which y and the angle follow.
   int index = 0;
-  int axis = 0;                  ///< of a point: 0 x, 1 y
-  Vector2<double> at{0.0, 0.0};  ///< of a point: in the body's frame, m
-  double target = 0.0;           ///< in the unit of what is compared
+  int axis = 0;                  ///< for a point: 0 x, 1 y
+  Vector2<double> at{0.0, 0.0};  ///< for a point: in the body's frame, m
+  double target = 0.0;           ///< in the unit of the compared quantity
   double weight = 1.0;           ///< >= 0
-  bool at_end = false;           ///< of the end alone; else of each step
+  bool at_end = false;           ///< only at the end; else in each step
 };
 
 class Cost {
@@ -48,9 +48,9 @@ class Cost {
   int num_controls() const { return m_; }
   const std::vector<CostTerm>& terms() const { return terms_; }
 
-  /// Of one step.
+  /// The cost of one step.
   double Value(const VectorX<double>& x, const VectorX<double>& u) const;
-  /// Of the end.
+  /// The cost of the end.
   double EndValue(const VectorX<double>& x) const;
   /// The same to second order; `exact` adds r ∂²r to the Gauss-Newton terms.
   void Expand(const VectorX<double>& x, const VectorX<double>& u, bool exact,

@@ -13,7 +13,7 @@ Model<double> ModelOf(const RolloutFunction& function, State<double>* start) {
   return model;
 }
 
-// Whether impulses change a twist by more than what counts as an impact.
+// Whether impulses change a twist enough to count as an impact.
 bool Jumps(const Impulses& impulses, double threshold) {
   for (size_t i = 0; i < impulses.new_twist.size(); ++i) {
     if (std::abs(impulses.new_twist[i] - impulses.before.twist[i]) > threshold) return true;
@@ -21,7 +21,7 @@ bool Jumps(const Impulses& impulses, double threshold) {
   return false;
 }
 
-// The model's numbers of forces against motion.
+// Indices of the model's numbers that describe damping.
 std::vector<int> DampingOf(const ModelStructure& structure) {
   std::vector<int> numbers;
   for (const BodyIndex& body : structure.bodies) {
@@ -30,7 +30,7 @@ std::vector<int> DampingOf(const ModelStructure& structure) {
     }
   }
   for (const JointIndex& joint : structure.joints) numbers.push_back(joint.damping);
-  // Of the seven numbers of a spring.
+  // The index among the seven numbers of a spring.
   for (const SpringIndex& spring : structure.springs) numbers.push_back(spring.numbers + 5);
   numbers.erase(std::remove(numbers.begin(), numbers.end(), -1), numbers.end());
   return numbers;
@@ -59,7 +59,7 @@ State<double> EngineStep::StateOf(long k, const VectorX<double>& x) const {
   State<double> state = start_;
   const ModelStructure& s = *model_.structure;
   const double t = static_cast<double>(k) * s.settings.dt;
-  // Bodies that move by themselves keep their speed.
+  // Bodies of prescribed motion keep their speed.
   for (size_t i = 0; i < state.pose.size(); ++i) state.pose[i] += t * state.twist[i];
   const int poses = static_cast<int>(state.pose.size());
   for (int i = 0; i < num_states(); ++i) {
@@ -143,7 +143,7 @@ void EngineStep::FindImpacts() {
       if (contact.IsJointFriction() || impulses.solution.normal_impulse[c] <= 0.0) continue;
       kind.push_back({contact.a, contact.b, contact.joint});
     }
-    // The decompression of an impact is the same impact.
+    // The decompression belongs to the same impact as the compression.
     if (kind.empty() || impulses.decompression) continue;
     std::sort(kind.begin(), kind.end());
     kind.erase(std::unique(kind.begin(), kind.end()), kind.end());

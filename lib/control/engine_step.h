@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// The engine as a system to control: a step of a scene, with forces, torques or efforts of joints
-// that are held over it. A and B are the step's tangent; with event stepping they hold the jumps of
-// its events.
+// The engine as a controlled system: a step of a scene, with forces, torques or efforts of joints
+// that are constant over the step. A and B are the step's tangent; with event stepping they include
+// the jumps at its events.
 //
 //   x   x, y, angle, vx, vy, omega of each moving body, as OutputNames orders them
 //   u   the controls of a RolloutFunction
@@ -19,8 +19,8 @@ namespace tangible {
 
 class EngineStep : public StepMap {
  public:
-  /// The function gives the scene and the controls' paths, and outlives this. Steps beyond its end
-  /// have its dt.
+  /// The function gives the scene and the controls' paths, and must outlive this object. Steps
+  /// after its end have its dt.
   explicit EngineStep(const RolloutFunction& function);
 
   int num_states() const override { return function_.num_states(); }
@@ -29,28 +29,29 @@ class EngineStep : public StepMap {
             std::string* error) override;
   bool Linearise(long k, const VectorX<double>& x, const VectorX<double>& u, VectorX<double>* next,
                  MatrixX<double>* a, MatrixX<double>* b, std::string* error) override;
-  /// The same along `columns` (num_states x d) alone: A columns, as where x is a function of fewer
-  /// coordinates.
+  /// The same only along `columns` (num_states x d): returns A columns, for an x that is a function
+  /// of fewer coordinates.
   bool LineariseAlong(long k, const VectorX<double>& x, const VectorX<double>& u,
                       const MatrixX<double>& columns, VectorX<double>* next, MatrixX<double>* a,
                       MatrixX<double>* b, std::string* error);
-  /// Of event stepping: twists that jump by more than the restitution threshold.
+  /// With event stepping: jumps of twists by more than the restitution threshold.
   const std::vector<int>& impacts() const override { return impacts_; }
   StepMap* Without(int impact) override;
-  /// A step with all twists turned round. Damping takes from them what it gave; friction of
-  /// contacts and joints is not turned round, and nothing that an impact loses comes back.
+  /// A step with all twists reversed. Damping is reversed too and restores the speed that it took;
+  /// friction of contacts and joints is not reversed, and energy that an impact loses is not
+  /// restored.
   bool StepBack(long k, const VectorX<double>& next, const VectorX<double>& u,
                 VectorX<double>* x) override;
 
-  /// The scene's own.
+  /// The initial state of the scene.
   VectorX<double> initial() const { return function_.Defaults().state; }
-  /// The whole state, of bodies that move by themselves too.
+  /// The state of all bodies, including those of prescribed motion.
   State<double> StateOf(long k, const VectorX<double>& x) const;
 
  private:
   /// Sets the controls; false where they or the state are not finite.
   bool Set(long k, const VectorX<double>& x, const VectorX<double>& u, std::string* error);
-  /// The moving bodies' part.
+  /// The part of the state that belongs to moving bodies.
   VectorX<double> PartOf(const State<double>& state) const;
   bool Advance(long k, const VectorX<double>& x, const VectorX<double>& u, VectorX<double>* next,
                std::string* error);
@@ -69,7 +70,7 @@ class EngineStep : public StepMap {
   Stepper stepper_;
   StepTangent tangent_;
   RowMatrixXd controls_, w_dot_;             ///< of the variables: unit vectors of controls
-  std::vector<std::vector<Meeting>> kinds_;  ///< of impacts: what meets at once, ascending
+  std::vector<std::vector<Meeting>> kinds_;  ///< of impacts: all that meet at once, ascending
   std::vector<int> impacts_;
   std::map<int, std::shared_ptr<Reduced>> without_;
 };

@@ -13,11 +13,11 @@
 namespace tangible {
 namespace {
 
-// Shares of a step that a line search tries: 1.1^(−j²).
+// Number of the fractions of a step that a line search tries: 1.1^(−j²).
 constexpr int kShares = 11;
 double ShareOf(int j) { return std::pow(1.1, -j * j); }
 
-// A plan's steps to first order, and its cost to second.
+// A plan's steps to first order, and its cost to second order.
 struct Linearisation {
   std::vector<MatrixX<double>> a, b;
   std::vector<CostExpansion> cost;  // of each step, then of the end
@@ -65,7 +65,7 @@ class Solver {
     return true;
   }
 
-  // λ and ∂J/∂u.
+  // Computes λ and ∂J/∂u.
   void Gradient(const Linearisation& at, RowMatrixXd* costates, RowMatrixXd* gradient) const {
     const long steps = static_cast<long>(at.a.size());
     costates->resize(steps + 1, n_);
@@ -239,7 +239,7 @@ class Solver {
     return std::isfinite(linear_) && std::isfinite(quadratic_);
   }
 
-  // What shifts of V are shares of.
+  // The largest entry of V, to which shifts are relative.
   double LargestCurvature() const {
     double largest = 0.0;
     for (const CostExpansion& cost : at_.cost) {
@@ -248,8 +248,8 @@ class Solver {
     return largest > 0.0 ? largest : 1.0;
   }
 
-  // Rolls out share `share` of the step (without gains where `gains` is null); false where a step
-  // cannot be made or the cost is not finite.
+  // Rolls out the fraction `share` of the step (without gains where `gains` is null); false where a
+  // step cannot be made or the cost is not finite.
   bool RollOut(const Plan& plan, const std::vector<MatrixX<double>>* gains, double share,
                Plan* rolled) {
     const long steps = plan.controls.rows();
@@ -293,7 +293,7 @@ class Solver {
     return gains[point.gain] * (x - point.state);
   }
 
-  // The share of the step that was taken; 0: none.
+  // Returns the accepted fraction of the step; 0: none.
   double Search() {
     Plan& plan = result_.plan;
     Plan tried = plan;
@@ -304,7 +304,7 @@ class Solver {
       const double expected = share * linear_ + share * share * quadratic_;
       if (!(expected < 0.0) || !RollOut(plan, &new_gains_, share, &tried)) continue;
       const double change = tried.cost - plan.cost;
-      // Where the decrease is rounding, only the gradient says whether the step is one.
+      // Where the decrease is rounding, only the gradient tells whether the step is an improvement.
       const bool decreases = change <= kSufficientDecrease * expected;
       if (!decreases && !(-expected <= rounding && change <= rounding)) continue;
       Linearisation there;

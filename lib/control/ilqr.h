@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// Iterative linear-quadratic regulation: the controls that minimise a cost over a horizon, each
-// within its bounds, of a system whose steps have exact Jacobians A_k, B_k.
+// Iterative linear-quadratic regulation: finds the controls, each within its bounds, that minimise
+// a cost over a horizon for a system whose steps have exact Jacobians A_k, B_k.
 //
 //   backward  Q_x  = ℓ_x + Aᵀ V_x',          Q_u  = ℓ_u + Bᵀ V_x'
 //             Q_xx = ℓ_xx + Aᵀ V_xx' A,      Q_ux = ℓ_ux + Bᵀ (V_xx' + μ I) A
 //             Q_uu = ℓ_uu + Bᵀ (V_xx' + μ I) B
 //             k    = argmin ½ δuᵀ Q_uu δu + Q_uᵀ δu within the bounds   (box_quadratic.h)
-//             K    = −Q_uu⁻¹ Q_ux over the free controls, 0 over those that a bound holds
+//             K    = −Q_uu⁻¹ Q_ux over the free controls, 0 over those at a bound
 //   forward   u_k ← clamp(u_k + α k_k + K_k (x_k − x̄_k)), rolled out by the system itself; x̄_k
 //             across impacts: reference_extension.h
 //
@@ -17,7 +17,7 @@
 // quadratically where the cost's curvature does not vanish.
 //
 // The shift μ grows while a backward pass is not convex or its step does not decrease the cost, and
-// falls otherwise. Convergence is told by the gradient of the Lagrangian, λ_k = ℓ_x + Aᵀ λ_{k+1},
+// falls otherwise. Convergence is judged by the gradient of the Lagrangian, λ_k = ℓ_x + Aᵀ λ_{k+1},
 // ∂J/∂u_k = ℓ_u + Bᵀ λ_{k+1}, and not by the change of the cost.
 
 #include <functional>
@@ -35,36 +35,37 @@ struct ControlProblem {
   const Cost* cost = nullptr;
   VectorX<double> initial;    ///< state at the start
   VectorX<double> low, high;  ///< of each control; infinite where there is no bound
-  long first_step = 0;        ///< of the system: the plan's step 0
+  long first_step = 0;        ///< the system's step that is the plan's step 0
 };
 
 struct IlqrOptions {
   int max_iterations = 200;  ///< >= 1
-  /// Converged where moving every control of every step by its range (high − low, or without bounds
-  /// the largest |u| of the plan, at least 1) against the gradient would change the cost, to first
-  /// order, by this share of itself.
+  /// The plan has converged when moving every control of every step by its range (high − low, or
+  /// without bounds the largest |u| of the plan, at least 1) against the gradient would change the
+  /// cost, to first order, by at most this fraction of the cost.
   double gradient_tolerance = kGradientTolerance;
   bool second_order = false;
-  /// Feedback of a run that has an impact earlier or later than the plan is relative to the plan's
-  /// motion extended across it (reference_extension.h), and not to states on the other side.
+  /// Where a run has an impact earlier or later than the plan, the feedback is relative to the
+  /// plan's motion extended across the impact (reference_extension.h), and not to states on its
+  /// other side.
   bool reference_extension = false;
-  /// Asked after each iteration; true ends the work with the best plan so far.
+  /// Called after each iteration; true ends the work with the best plan so far.
   std::function<bool()> stop{};
 };
 
-/// Controls and the motion that they make. States are (steps + 1) x n, controls steps x m; gains
-/// K_k, m x n a step, are those of the last backward pass.
+/// Controls and the motion that they cause. States are (steps + 1) x n, controls steps x m; the
+/// gains K_k, m x n for each step, are those of the last backward pass.
 struct Plan {
   RowMatrixXd states, controls;
   std::vector<MatrixX<double>> gains;
   double cost = 0.0;
-  /// Of each step, as StepMap has them; empty without reference_extension.
+  /// The impacts of each step, as StepMap reports them; empty without reference_extension.
   std::vector<std::vector<int>> impacts{};
 };
 
 struct IlqrIteration {
   double cost = 0.0;      ///< before the step
-  double gradient = 0.0;  ///< the share that gradient_tolerance is compared with
+  double gradient = 0.0;  ///< the fraction that is compared with gradient_tolerance
   double shift = 0.0;     ///< μ over the largest entry of V
   double step = 0.0;      ///< α; 0: no step decreased the cost
 };
@@ -74,7 +75,7 @@ enum class IlqrStatus {
   kIterationLimit,
   kNoDescent,  ///< no step decreases the cost, whatever the shift
   kStopped,
-  kFailed,  ///< the system's steps from the initial controls cannot be made
+  kFailed,  ///< the system cannot be stepped with the initial controls
 };
 /// "converged", "iteration_limit", "no_descent", "stopped", "failed".
 const char* NameOf(IlqrStatus status);
@@ -93,7 +94,7 @@ struct IlqrResult {
 /// not finite.
 std::string CheckProblem(const ControlProblem& problem, const RowMatrixXd& controls);
 
-/// From initial controls (steps x m), which are clamped to the bounds.
+/// Solves the problem from initial controls (steps x m), which are clamped to the bounds.
 IlqrResult SolveIlqr(const ControlProblem& problem, const RowMatrixXd& controls,
                      const IlqrOptions& options);
 

@@ -32,13 +32,13 @@ const ExtendedReference::Point& ExtendedReference::InMode(long k, long count) {
 }
 
 ExtendedReference::Point ExtendedReference::Later(long k, long count) {
-  // The state before, in the same mode: the plan's last one, or extended itself.
+  // The previous state in the same mode: the plan's last one, or itself an extension.
   if (k == 0 || so_far_[k - 1] < count) return Own(k);
   StepMap* without = map_->Without(impacts_[count]);
   const Point before = InMode(k - 1, count);
   VectorX<double> next;
   std::string error;
-  // A plan that is never in that mode has its own state there.
+  // If the plan is never in that mode, its own state is used.
   const bool of_mode = so_far_[k - 1] == count || before.gain < k - 1;
   if (without == nullptr || !of_mode ||
       !without->Step(first_step_ + k - 1, before.state, plan_.controls.row(k - 1), &next, &error)) {

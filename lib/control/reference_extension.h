@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// What a run through impacts is compared with, where it has an impact earlier or later than the
-// plan that it follows (Kong, Li, Council, Johnson, "iLQR for piecewise-smooth hybrid dynamical
-// systems", arXiv 2103.14584):
+// The reference with which a run through impacts is compared where it has an impact earlier or
+// later than the plan that it follows (Kong, Li, Council, Johnson, "iLQR for piecewise-smooth
+// hybrid dynamical systems", arXiv 2103.14584):
 //
 //   u_k = ū_k + α k_k + K (x_k − x̄_k)
 //
 // Between the two impacts the states differ by the jump, however near the motions are, and the
-// feedback acts on it. There the plan's motion is extended instead, from the last of its states in
-// the run's mode on without the impact, or from the first back:
+// feedback would act on it. There the plan's motion is extended instead: forwards without the
+// impact from the last of its states in the run's mode, or backwards from the first:
 //
 //   late    x̄_j, …, f̃(f̃(x̄_j, ū_j), ū_{j+1}), …      f̃: the steps without the impact
 //   early   f̃⁻¹(x̄_j, ū_{j−1}), …                    (StepMap::StepBack)
@@ -28,15 +28,15 @@ class ExtendedReference {
  public:
   struct Point {
     VectorX<double> state;
-    long gain;  ///< step of the plan whose gain belongs to it; −1: none, as of its last state
+    long gain;  ///< step of the plan whose gain belongs to it; −1: none, as for the last state
   };
 
-  /// The system and the plan, whose `impacts` are filled in, outlive this.
+  /// The system and the plan, whose `impacts` are filled in, must outlive this object.
   ExtendedReference(StepMap* map, long first_step, const Plan& plan);
 
-  /// For step k of a run that has had `impacts`. Where the plan is never in that mode (its impacts
-  /// are others, or two in a step), or the system has no steps without the impact, it is the plan's
-  /// own state.
+  /// The reference for step k of a run that has had `impacts`. Where the plan is never in that mode
+  /// (its impacts are others, or two in a step), or the system has no steps without the impact, it
+  /// is the plan's state of step k.
   const Point& At(long k, const std::vector<int>& impacts);
 
  private:

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// A discrete-time system, x_{k+1} = f_k(x_k, u_k): what is controlled. The engine is one
+// The controlled system in discrete time, x_{k+1} = f_k(x_k, u_k). The engine is one
 // (engine_step.h), a learned model another.
 
 #include <string>
@@ -28,14 +28,14 @@ class StepMap {
                          VectorX<double>* next, MatrixX<double>* a, MatrixX<double>* b,
                          std::string* error) = 0;
 
-  /// The impacts of the last Step or Linearise in their order, each as a number of its kind (which
-  /// bodies met): where states jump. Systems without jumps have none.
+  /// The impacts of the last Step or Linearise in their order, at which states jump. Each is the
+  /// number of its kind, which stands for the bodies that met. Systems without jumps have none.
   virtual const std::vector<int>& impacts() const {
     static const std::vector<int> none;
     return none;
   }
   /// The same system where impacts of that kind do not happen, bodies passing through each other;
-  /// null where there is no such system. It lives as long as this.
+  /// null where there is no such system. It lives as long as this object.
   virtual StepMap* Without(int impact) {
     (void)impact;
     return nullptr;

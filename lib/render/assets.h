@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// Texts that pages carry: style.css and the scripts of the viewer, made into string literals by
-// CMake.
+// Texts that pages contain: style.css and the scripts of the viewer, which CMake turns into string
+// literals.
 
 namespace tangible {
 

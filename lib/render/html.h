@@ -16,7 +16,7 @@ std::string HtmlEscape(const std::string& text);
 /// written as \u003c (so neither `</script>` nor `<!--` can occur), invalid UTF-8 replaced.
 std::string ScriptString(const std::string& text);
 
-/// A number for JSON and for people: `digits` significant digits, the shortest form of these, null
+/// A number for JSON and for readers, with `digits` significant digits in their shortest form; null
 /// where it is not finite.
 std::string CompactNumber(double value, int digits = 6);
 

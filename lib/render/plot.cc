@@ -14,7 +14,7 @@ namespace {
 
 constexpr int kNumColours = 8;  // of style.css
 
-// The colours of a page where there is one, else those of its light form.
+// The colours of the page if there is one, else those of its light style.
 constexpr char kStyle[] =
     "<style>.plot text{font:12px system-ui,sans-serif;fill:var(--text,#1b2330)}"
     ".plot .title{font-size:14px;font-weight:600}.plot "
@@ -48,7 +48,7 @@ struct Axis {
       high = std::max(high, value);
     }
   }
-  /// Leaves room around the data, and makes an interval of none or of one value.
+  /// Leaves room around the data, and widens an empty interval or one of a single value.
   void Pad(double fraction) {
     if (!(low <= high)) {
       low = scale == AxisScale::kLogarithmic ? 0.1 : 0.0;
@@ -60,7 +60,8 @@ struct Axis {
       high *= factor;
       return;
     }
-    // Values that differ by rounding alone are one value, not a picture of rounding.
+    // Values that differ only by rounding are drawn as one value, so that a plot does not show
+    // rounding.
     const double magnitude = std::max(std::abs(low), std::abs(high));
     const double pad = high - low > kOneValue * magnitude ? fraction * (high - low)
                        : magnitude > 0.0                  ? 0.1 * magnitude
@@ -108,7 +109,7 @@ std::string Line(double x1, double y1, double x2, double y2, const std::string& 
          Attribute("y2", y2) + " class=\"" + classes + "\"/>\n";
 }
 
-/// Runs of points that a line joins: it has a gap where a point is left out.
+/// Runs of points that a line connects; the line has a gap where a point is left out.
 std::vector<std::vector<Point>> Runs(const std::vector<Point>& points, const Axis& x,
                                      const Axis& y) {
   std::vector<std::vector<Point>> runs(1);
@@ -200,7 +201,7 @@ Axis AxisOf(const std::vector<PlotSeries>& series, const PlotOptions& options,
   return axis;
 }
 
-/// Tick labels with the digits that tell neighbours apart, and no more.
+/// Tick labels with only as many digits as distinguish neighbours.
 std::string TickLabel(double tick, double step) {
   if (std::abs(tick) < kTickRounding * step) {
     return "0";

@@ -33,19 +33,20 @@ struct PlotOptions {
   int height = 360;  ///< px
 };
 
-/// Where the ticks of an axis stand: at most about `count` of them within [low, high], at multiples
-/// of 1, 2 or 5 times a power of ten, or (logarithmic) at powers of ten, and where these are fewer
-/// than three at 1, 2 and 5 times them. Wants low < high, and low > 0 if logarithmic.
+/// The positions of the ticks of an axis: at most about `count` of them within [low, high], at
+/// multiples of 1, 2 or 5 times a power of ten, or (logarithmic) at powers of ten, and where these
+/// are fewer than three at 1, 2 and 5 times them. Requires low < high, and low > 0 if logarithmic.
 std::vector<double> PlotTicks(double low, double high, AxisScale scale, int count);
 
-/// A series of so many points that they would hide each other: the range of x is cut into `buckets`
-/// > 0 of equal width, and of each the smallest and the largest y are kept, and the first and last
-/// point of all, in the order of the series. Extremes stay visible. A series of at most 2 buckets
-/// + 2 points is returned as it is. Points that are not finite are left out of one that is thinned.
+/// Thins a series that has so many points that they would hide each other: the range of x is cut
+/// into `buckets` > 0 of equal width; the smallest and the largest y of each are kept, and the
+/// first and last point of all, in the order of the series. Extremes stay visible. A series of at
+/// most 2 buckets + 2 points is returned unchanged. Points that are not finite are left out of a
+/// thinned series.
 PlotSeries Thinned(const PlotSeries& series, int buckets);
 
-/// The plot as one <svg> element. CHECKs nothing: vectors of different lengths are read to the
-/// shortest.
+/// The plot as one <svg> element. It does not CHECK its input: of vectors of different lengths as
+/// many entries are read as the shortest has.
 std::string PlotSvg(const PlotOptions& options, const std::vector<PlotSeries>& series);
 
 }  // namespace tangible

@@ -65,7 +65,7 @@ std::vector<double> PlotTicks(double low, double high, AxisScale scale, int coun
     return {};
   }
   std::vector<double> ticks = LogarithmicTicks(low, high, count);
-  // Within less than a decade there may be none: then linear ones are the readable choice.
+  // Within less than a decade there may be none: then linear ticks are used.
   return ticks.size() >= 2 ? ticks : LinearTicks(low, high, count);
 }
 

@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// The tolerances of plots: of what each is a share, then why. The README has a table.
+// The tolerances of plots. Each comment names the quantity of which the tolerance is a fraction,
+// then the reason. The README has a table.
 
 namespace tangible {
 
-/// Of the largest value: values that differ by less are one value, not a picture of rounding.
+/// Of the largest value: values that differ by less are drawn as one value, so that a plot does not
+/// show rounding.
 inline constexpr double kOneValue = 1e-12;
 /// Of the step, range or power of ten of an axis: rounding of a quotient must not turn a tick of
 /// 0.2 into one of 0.5, nor lose one at an end.

@@ -54,7 +54,7 @@ const char* Name(JointType type) {
   }
 }
 
-/// Numbers and arrays of JSON, without blanks: most of the page's size.
+/// Writes numbers and arrays of JSON, which are most of the page's size, without blanks.
 class JsonWriter {
  public:
   void Raw(const std::string& text) { text_ += text; }

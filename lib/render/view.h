@@ -3,10 +3,10 @@
 //
 // A simulated motion as one self-contained HTML page: no network, no other file.
 //
-// The page draws the bodies (with a radius mark, so that rotation is seen), joints, springs, and
+// The page draws the bodies (with a radius mark, so that rotation is visible), joints, springs, and
 // the contacts with their impulses; it plays, pauses, steps and zooms, and plots kinetic, potential
-// and total energy. ViewData is plain data, so whoever steps a scene fills it and this module needs
-// no dynamics.
+// and total energy. ViewData is plain data that the code which steps a scene fills in, so that this
+// module does not depend on dynamics.
 
 #include <cstddef>
 #include <string>
@@ -17,7 +17,7 @@
 
 namespace tangible {
 
-/// What is drawn of a body; its poses are in the frames.
+/// The parts of a body that are drawn; its poses are in the frames.
 struct ViewBody {
   std::string name;
   Motion motion = Motion::kMoving;
@@ -33,7 +33,7 @@ struct ViewJoint {
   Vector2<double> axis = Vector2<double>::UnitX();  ///< prismatic: in the frame of bodies[1]
 };
 
-/// A spring; anchors as ViewJoint has them.
+/// A spring; anchors as in ViewJoint.
 struct ViewSpring {
   std::string name;
   int bodies[2] = {-1, -1};
@@ -48,7 +48,7 @@ struct ViewContact {
   Vector2<double> normal = Vector2<double>::UnitY();
   double normal_impulse = 0.0;
   double tangential_impulse = 0.0;
-  std::string mode;  ///< open, sticking, sliding_left, ...: written as it is
+  std::string mode;  ///< open, sticking, sliding_left, ...: written unchanged
 };
 
 /// The scene at one time.
@@ -69,7 +69,7 @@ struct ViewData {
   std::vector<ViewFrame> frames;  ///< times increasing
 };
 
-/// Bounds of the size of the page, and what stands under the animation.
+/// Limits of the size of the page, and the content under the animation.
 struct ViewOptions {
   std::size_t max_frames = 2000;
   /// Poses and contacts written in all; fewer frames are kept where there are many bodies. About 25
@@ -85,8 +85,9 @@ struct ViewOptions {
 std::vector<ViewFrame> ThinFrames(const ViewData& data, const ViewOptions& options);
 
 /// The page. Numbers are written with 6 significant digits; one that is not finite becomes null,
-/// and what it belongs to is not drawn. CHECK-free: indices of bodies that do not exist are drawn
-/// as the world, and a frame with the wrong number of poses is left out.
+/// and the object to which it belongs is not drawn. It does not CHECK its input: indices of bodies
+/// that do not exist are drawn as the world, and a frame with the wrong number of poses is left
+/// out.
 std::string ViewHtml(const ViewData& data, const ViewOptions& options = {});
 
 }  // namespace tangible

@@ -36,7 +36,7 @@ bool Contains(const std::vector<std::string>& names, const std::string& name) {
   return std::find(names.begin(), names.end(), name) != names.end();
 }
 
-// A name for a message: as it is where it is plain and not too long, else quoted and cut.
+// A name for a message: unchanged if it is plain and not too long, else quoted and cut.
 std::string Shown(const std::string& name) {
   constexpr std::size_t kLongest = 200;
   const bool plain =
@@ -130,7 +130,7 @@ bool ReadCsv(const std::string& file, const std::vector<std::string>& required,
 }
 
 bool ParseNumber(const std::string& text, double* value) {
-  // from_chars takes no leading plus, which some programs write.
+  // from_chars does not accept a leading plus, which some programs write.
   const std::size_t skip = text.size() > 1 && text[0] == '+' && text[1] != '-' ? 1 : 0;
   const char* const end = text.data() + text.size();
   double parsed = 0.0;

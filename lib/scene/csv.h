@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// Tables in text files: a header line with the names of the columns, then one row a line, cells
-// separated by commas. No quoting; spaces around cells, blank lines, carriage returns and a
-// byte-order mark (UTF-8) before the header are ignored.
+// Tables in text files: a header line with the names of the columns, then one row on each line,
+// with cells separated by commas. There is no quoting; spaces around cells, blank lines, carriage
+// returns and a byte-order mark (UTF-8) before the header are ignored.
 
 #include <string>
 #include <vector>
@@ -34,7 +34,7 @@ bool ParseCsv(const std::string& text, const std::string& file,
 /// A finite number that fills the whole text; decimal point whatever the locale.
 bool ParseNumber(const std::string& text, double* value);
 
-/// The number in a cell; false and "file: line 3: x: expected a number, got ..." if it is none.
+/// The number in a cell; false and "file: line 3: x: expected a number, got ..." otherwise.
 bool ReadCell(const CsvTable& table, int row, int column, double* value, std::string* error);
 
 }  // namespace tangible

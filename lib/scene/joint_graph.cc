@@ -24,7 +24,7 @@ class BridgeSearch {
       incident_[edges[e][0]].push_back(static_cast<int>(e));
       incident_[edges[e][1]].push_back(static_cast<int>(e));
     }
-    // Node 0 (the fixed one) first, so that it is the root of its component.
+    // Node 0 (the fixed one) is visited first, so that it is the root of its component.
     for (int node = 0; node < num_nodes; ++node) {
       if (order_[node] < 0) VisitFrom(node);
     }
@@ -74,7 +74,7 @@ class BridgeSearch {
 
   const std::vector<std::array<int, 2>>& edges_;
   std::vector<std::vector<int>> incident_;
-  std::vector<int> order_;         // of visiting
+  std::vector<int> order_;         // of visits
   std::vector<int> low_;           // the earliest node that the subtree reaches
   std::vector<int> root_;          // of the node's component
   std::vector<int> parent_edge_;   // by which it was visited

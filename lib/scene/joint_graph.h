@@ -4,8 +4,8 @@
 // The graph of joints: which of them may be given an initial angle, displacement or rate.
 //
 // Nodes are the moving bodies and one node for everything fixed (the world, static and kinematic
-// bodies); every joint is an edge. An initial angle turns all that hangs on the joint's bodies[0]
-// side. That is possible if the edge is a bridge and the fixed node is not on that side.
+// bodies); every joint is an edge. An initial angle turns all bodies on the joint's bodies[0] side.
+// That is possible if the edge is a bridge and the fixed node is not on that side.
 
 #include <vector>
 

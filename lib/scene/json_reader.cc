@@ -41,8 +41,8 @@ std::string Join(const std::vector<std::string>& names) {
   return list;
 }
 
-// Builds a document from the parser's calls. The library's own builder keeps the last of two equal
-// keys in silence; a scene with two masses is a mistake of its author.
+// Builds a document from the parser's calls. The library's own builder silently keeps the last of
+// two equal keys, but a scene with two masses is an error.
 class DocumentBuilder : public nlohmann::json_sax<Json> {
  public:
   DocumentBuilder(const std::string& text, Json* root, JsonErrors* errors)
@@ -84,7 +84,8 @@ class DocumentBuilder : public nlohmann::json_sax<Json> {
  private:
   static constexpr std::size_t kMostReason = 200;
 
-  // "[json.exception.x.101] parse error at line 1, column 2: reason" without what stands elsewhere.
+  // "[json.exception.x.101] parse error at line 1, column 2: reason" without the parts that are
+  // reported elsewhere.
   static std::string Reason(const std::string& what) {
     const std::string prefix = "parse error at ";
     std::size_t begin = what.find("] ");
@@ -156,7 +157,7 @@ bool ParseJson(const std::string& text, const std::string& name_for_messages, Js
                std::string* error) {
   JsonErrors errors(name_for_messages);
   *json = nullptr;
-  // The parser takes a NUL byte for the end, whatever follows it.
+  // The parser treats a NUL byte as the end, whatever follows it.
   if (const size_t nul = text.find('\0'); nul != std::string::npos) {
     const auto end = text.begin() + static_cast<std::ptrdiff_t>(nul);
     const size_t line_start = text.rfind('\n', nul) + 1;  // 0 on the first line

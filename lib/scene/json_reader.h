@@ -86,13 +86,13 @@ class JsonReader {
 
   /// Whether this is an object with that key.
   bool Has(const std::string& key) const;
-  /// The member of an object; a reader of nothing if there is none, which fails once it is read.
+  /// The member of an object; if there is none, a reader of nothing, which fails when it is read.
   JsonReader At(const std::string& key) const;
-  /// The element of an array, alike.
+  /// The element of an array, in the same way.
   JsonReader At(int index) const;
   /// Elements of an array; 0 for anything else.
   int Size() const;
-  /// The keys of an object, sorted; none for anything else.
+  /// The keys of an object, sorted; empty for anything else.
   std::vector<std::string> Keys() const;
 
   /// Fails unless this is an object whose keys are all among these. `where` ends the message on an

@@ -6,7 +6,7 @@
 namespace tangible {
 namespace {
 
-// Longer lists than this get a line an entry.
+// Lists longer than this have a line for each entry.
 constexpr std::size_t kLineLength = 100;
 
 std::string Scalar(const OrderedJson& json) {

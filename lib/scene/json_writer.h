@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// JSON as text that people read: keys in the order given, two spaces a level, and arrays or objects
-// that hold no further ones, and points in arrays, on one line.
+// JSON as readable text: keys in the order given, an indentation of two spaces for each level;
+// arrays or objects that hold no further ones, and points in arrays, are on one line.
 
 #include <nlohmann/json.hpp>
 #include <string>

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// What values a number that the user writes may take.
+// The values that a number in a scene may have.
 
 namespace tangible {
 
-/// Decides what a file may say, the bounds of a fit and the step of finite differences.
+/// It determines the values that a file may contain, the bounds of a fit and the step of finite
+/// differences.
 enum class NumberKind {
   kFree,         ///< any finite number (positions, velocities, angles, ...)
   kPositive,     ///< > 0 (mass, inertia, radius, size, ...)

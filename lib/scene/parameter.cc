@@ -106,14 +106,14 @@ std::string ExplainNoMatch(const Scene& scene, const std::vector<SceneNumber<dou
   return "matches no number of the scene; " + have;
 }
 
-// Numbers that a path asks for and that the scene has, but that are no parameters. Empty if it asks
-// for none of them. Checked even where a `*` matches others: leaving some out in silence would
-// answer another question than the one asked.
+// Numbers that a path names and that the scene has, but that are not parameters. Empty if it names
+// none of them. This is checked even where a `*` matches others, because silently leaving some out
+// would give the derivative of something else.
 std::string ExplainNoParameter(const Scene& scene, const std::string& path) {
   for (const auto& body : scene.bodies) {
     if (body.motion != Motion::kMoving || body.inertia) continue;
     if (!MatchesPath(path, "bodies/" + body.name + "/inertia")) continue;
-    // `bodies/ball/*` asks for whatever there is.
+    // `bodies/ball/*` names all numbers that exist.
     if (Components(path).back() == "*") continue;
     return "body " + body.name +
            " has no inertia of its own: it follows mass and shape; write \"inertia\" in the scene "
@@ -141,7 +141,7 @@ std::string ExplainNoParameter(const Scene& scene, const std::string& path) {
   return "";
 }
 
-// Magnitudes by which quantities of the scene matter, from which those of all dimensions follow.
+// Typical magnitudes of the scene, from which those of all dimensions follow.
 struct Magnitudes {
   double length = 0.0;
   double mass = 0.0;
@@ -220,7 +220,7 @@ double ScaleOf(const SceneNumber<double>& number, const Magnitudes& of) {
   return ScaleOf(number.dimension, of);
 }
 
-// How much a kind restricts; the more restrictive one of several holds for a parameter.
+// How restrictive a kind is; a parameter has the most restrictive kind of its numbers.
 int Restriction(NumberKind kind) {
   switch (kind) {
     case NumberKind::kFree:
@@ -287,7 +287,7 @@ const char* UnitOf(Dimension dimension) {
 
 bool ResolveParameter(const Scene& scene, const std::string& path, ParameterPath* parameter,
                       std::string* error) {
-  Scene copy = scene;  // EnumerateNumbers gives pointers that can be written through
+  Scene copy = scene;  // EnumerateNumbers gives mutable pointers
   const std::vector<SceneNumber<double>> numbers = EnumerateNumbers(&copy);
   ParameterPath result;
   result.path = path;

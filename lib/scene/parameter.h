@@ -16,7 +16,7 @@
 
 namespace tangible {
 
-/// What a number measures; its unit is UnitOf.
+/// The physical dimension of a number; its unit is UnitOf.
 enum class Dimension {
   kNone,              ///< 1
   kLength,            ///< m

@@ -8,8 +8,9 @@ namespace tangible {
 namespace {
 
 // Greedy matching that only returns to the last `*`: an earlier one cannot do better. At most
-// |pattern| · |name| comparisons. A `*` does not take the separator, so the parts between
-// separators match one by one; the separator '\0', which no name holds, makes it take anything.
+// |pattern| · |name| comparisons. A `*` does not match the separator, so that the parts between
+// separators match one by one; with the separator '\0', which no name contains, it matches
+// anything.
 bool Matches(const std::string& pattern, const std::string& name, char separator) {
   std::size_t p = 0;
   std::size_t n = 0;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// The scene: what the user wrote, as plain data. It knows no dynamics.
+// The scene: the content of the user's file, as plain data without any dynamics.
 //
 // Every number of a scene outside `simulation` is a possible parameter, so the structs are
 // templated on the number type: BasicScene<double> is what is read from a file, BasicScene<Jet<N>>
@@ -53,8 +53,8 @@ struct BasicBody {
 
 enum class JointType { kRevolute, kPrismatic, kWeld, kDistance, kFixedAngle };
 
-/// A series (time, value) read from a file; what a force, torque or effort follows instead of a
-/// number.
+/// A series (time, value) read from a file, which a force, torque or effort follows instead of a
+/// constant.
 struct Signal {
   std::string file;  ///< as written in the scene
   enum class Interpolation { kConstant, kLinear } interpolation = Interpolation::kConstant;
@@ -90,7 +90,7 @@ struct BasicJoint {
   std::optional<T> friction;   ///< Coulomb's: the torque or force at which it slides, ≥ 0
   T effort{0.0};
   std::optional<Signal> effort_signal;  ///< replaces effort
-  bool contact = false;                 ///< whether the joined bodies collide
+  bool contact = false;                 ///< whether the joined bodies may collide
 };
 
 template <typename T>
@@ -132,21 +132,21 @@ enum class JointCorrection { kNone, kBaumgarte, kProjection };
 enum class Mixing { kAverage, kGeometricMean, kMinimum, kMaximum };
 enum class ImpactLaw { kNewton, kPoisson };
 
-/// How the scene is simulated: no number of it is a parameter.
+/// How the scene is simulated; none of its numbers is a parameter.
 struct SimulationSettings {
   double dt = 0.01;       ///< s
   double duration = 1.0;  ///< s
-  /// Where not empty: the times of the steps' ends, 0 first, in the place of k dt. No key of the
+  /// If not empty: the times of the steps' ends, 0 first, instead of k dt. It is not a key of the
   /// scene file: observations between steps add their times (event stepping).
   std::vector<double> step_times;
   Stepping stepping = Stepping::kFixed;
-  /// These two follow the stepping as long as they are not set, whenever and wherever `stepping`
-  /// is: a program that sets `stepping = Stepping::kEvent` alone gets what a file with that one key
-  /// gets. What a run then uses, and what there is to read, say IntegratorOf and JointCorrectionOf.
+  /// These two follow the stepping as long as they are not set: a program that sets only `stepping
+  /// = Stepping::kEvent` gets the same settings as a file with that one key. IntegratorOf and
+  /// JointCorrectionOf return the settings that a run uses.
   std::optional<Integrator> integrator;
   std::optional<JointCorrection> joint_correction;
   double joint_tolerance = 1e-10;  ///< m or rad, of `projection`
-  double baumgarte = 0.2;          ///< fraction of the joint drift corrected a step
+  double baumgarte = 0.2;          ///< fraction of the joint drift corrected in a step
   Mixing friction_mixing = Mixing::kAverage;
   Mixing restitution_mixing = Mixing::kAverage;
   ImpactLaw impact_law = ImpactLaw::kNewton;
@@ -195,7 +195,7 @@ using Scene = BasicScene<double>;
 /// Whether `name` matches `pattern`, in which each `*` stands for any characters.
 bool MatchesPattern(const std::string& pattern, const std::string& name);
 
-/// The same for paths such as `bodies/link*/mass`: a `*` stands for any characters but `/`.
+/// The same for paths such as `bodies/link*/mass`: a `*` stands for any characters except `/`.
 bool MatchesPath(const std::string& pattern, const std::string& path);
 
 }  // namespace tangible

@@ -160,7 +160,8 @@ class SceneWriter {
     OrderedJson json = {{"dt", settings.dt},
                         {"duration", settings.duration},
                         {"stepping", NameOf(settings.stepping, kSteppingNames)}};
-    // What is not set stays so: read back it follows the stepping as before.
+    // Settings that are not set are not written, so that they follow the stepping when the file is
+    // read.
     if (settings.integrator) json["integrator"] = NameOf(*settings.integrator, kIntegratorNames);
     if (settings.joint_correction) {
       json["joint_correction"] = NameOf(*settings.joint_correction, kJointCorrectionNames);

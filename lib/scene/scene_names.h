@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// The words of a scene file for the enumerations of scene.h, for reading and writing alike.
+// The names in a scene file for the enumerations of scene.h, used for reading and writing.
 
 #include <cstddef>
 #include <string>
@@ -56,8 +56,8 @@ std::string NameOf(Enum value, const std::pair<const char*, Enum> (&table)[N]) {
   return "";
 }
 
-/// Whether this is a name: letters, digits, `_`, `.`, `-` and the characters of `extra`, one at
-/// least.
+/// Whether this is a name: at least one character, each a letter, a digit, `_`, `.`, `-` or one of
+/// `extra`.
 inline bool IsName(const std::string& name, const std::string& extra = "") {
   if (name.empty()) return false;
   for (const char c : name) {

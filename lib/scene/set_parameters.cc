@@ -9,7 +9,7 @@
 namespace tangible {
 namespace {
 
-// Whether the values that a number may take depend on other numbers; of the rest its kind says all.
+// Whether the allowed values of a number depend on other numbers, and not only on its kind.
 bool DependsOnOthers(const std::string& path) {
   const auto has = [&path](const char* part) { return path.find(part) != std::string::npos; };
   return has("/vertices/") || has("/normal/") || has("/axis/") || has("/limits/") ||

@@ -10,7 +10,7 @@
 
 namespace tangible {
 
-/// Whether each number of the scene belongs to one of the parameters at most; if not, `error` gets
+/// Whether each number of the scene belongs to at most one of the parameters; if not, `error` gets
 /// one line.
 bool CheckApart(const Scene& scene, const std::vector<ParameterPath>& parameters,
                 std::string* error);

@@ -13,8 +13,8 @@ namespace tangible {
 void ReadShape(const JsonReader& reader, BasicShape<double>* shape);
 
 /// Whether the uniform shape's centre of mass is the origin of the body's frame, so that its
-/// inertia about the origin is known: always but for polygons, whose centroid may be off by 1e-9 of
-/// their size.
+/// inertia about the origin is known: always, except that the centroid of polygons may differ from
+/// the origin by 1e-9 of their size.
 bool IsCentred(const BasicShape<double>& shape);
 
 }  // namespace tangible

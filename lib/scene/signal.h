@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// Signal files: what a force, torque or effort follows over time.
+// Signal files: the values of a force, torque or effort over time.
 //
 // A table (csv.h) with the column `time` (s, strictly increasing) and `x`, `y` (N, a force) or
 // `value` (N m, or N for a prismatic effort).

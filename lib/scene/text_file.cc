@@ -25,7 +25,7 @@ std::set<std::string>& FilesReadSet() {
 /// A file that is open for reading.
 class OpenFile {
  public:
-  /// Without O_NONBLOCK a pipe that nobody writes to would keep the program waiting here.
+  /// Without O_NONBLOCK a pipe without a writer would keep the program waiting here.
   explicit OpenFile(const std::string& file)
       : number_(::open(file.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC)) {}
   ~OpenFile() {
@@ -52,12 +52,12 @@ std::string TooLarge() {
 
 // Why it cannot be read, or empty.
 std::string ReadAll(const std::string& file, std::string* content) {
-  // The system would take the name up to there, and read another file.
+  // The system would use the name only up to there, and read another file.
   if (file.find('\0') != std::string::npos) return "expected a name without a zero byte";
   const OpenFile opened(file);
   struct stat status {};
   if (opened.number() < 0 || ::fstat(opened.number(), &status) != 0) {
-    // So a socket answers.
+    // This is the error for a socket.
     return errno == ENXIO ? "expected a regular file, got a socket or a device"
                           : std::strerror(errno);
   }
@@ -66,7 +66,8 @@ std::string ReadAll(const std::string& file, std::string* content) {
     return "expected a regular file, got " + WhatItIs(status.st_mode);
   }
   if (status.st_size > static_cast<off_t>(kMaxFileSize)) return TooLarge();
-  // The size may be 0 for files that the system makes up (/proc), and another one may be writing.
+  // The size may be 0 for files that the system generates (/proc), and another program may be
+  // writing.
   constexpr std::size_t kPart = std::size_t{1} << 16;
   content->resize(static_cast<std::size_t>(status.st_size) + 1);
   std::size_t size = 0;
@@ -83,7 +84,7 @@ std::string ReadAll(const std::string& file, std::string* content) {
   return "";
 }
 
-/// A character of UTF-8, or a byte that is none.
+/// A character of UTF-8, or a byte that is not part of one.
 struct Character {
   std::uint32_t code = 0;
   std::size_t size = 1;

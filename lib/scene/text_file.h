@@ -22,8 +22,8 @@ inline constexpr std::size_t kMaxMessage = 8192;
 /// is read from it (/dev/stdin is taken where it is redirected from a regular file).
 bool ReadTextFile(const std::string& file, std::string* text, std::string* error);
 
-/// The files that ReadTextFile has read, each once: a program does not write over its inputs, also
-/// those that another file names.
+/// The files that ReadTextFile has read, each once. A program does not write over its inputs,
+/// including those that another file names.
 std::vector<std::string> FilesRead();
 
 /// The text after the byte-order mark of UTF-8, which some editors and spreadsheets write first.

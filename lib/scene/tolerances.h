@@ -1,15 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// The tolerances of reading a scene: of what each is a share, then why. The README has a table.
+// The tolerances of reading a scene. Each comment names the quantity of which the tolerance is a
+// fraction, then the reason. The README has a table.
 
 namespace tangible {
 
 /// The sine of the turn, or area of the polygon over its extent squared: a corner of a polygon that
-/// turns by less is straight: more cannot be told from rounding.
+/// turns by less counts as straight, because it cannot be distinguished from rounding.
 inline constexpr double kStraightCorner = 1e-12;
-/// Of the extent of a polygon: its centroid is the origin, and its inertia about the origin is
-/// known.
+/// Of the extent of a polygon: a centroid nearer to the origin counts as the origin, so that the
+/// inertia about the origin is known.
 inline constexpr double kCentred = 1e-9;
 
 }  // namespace tangible

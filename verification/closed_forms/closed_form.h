@@ -2,9 +2,9 @@
 #pragma once
 //
 // Motions that are known in closed form (or as the solution of a reduced ordinary differential
-// equation), each with the scene that shows it.
+// equation), each with a scene that has this motion.
 //
-// A case has physical parameters p (a height, a slope, a time T at which one looks). They enter
+// A case has physical parameters p (a height, a slope, a time T of observation). They enter
 //
 //   exact   outputs(p): the formula
 //   scene   numbers of the scene, by path: n(p)
@@ -12,8 +12,8 @@
 //
 // and all three are written in Jets over p, so that they carry every derivative: those of the
 // formula, the chain dn/dp from physical parameters to numbers of the scene, and with the engine's
-// d state/dn its derivative of the outputs. T is no number of a scene: the engine's derivative with
-// respect to it is not asked for.
+// d state/dn its derivative of the outputs. T is not a number of a scene, so that the engine's
+// derivative with respect to it is not compared.
 //
 // A derivative of `exact` that is NaN does not exist on both sides (friction at rest, v = 0).
 
@@ -35,14 +35,14 @@ inline constexpr int kMaxParameters = 16;
 using Number = ceres::Jet<double, kMaxParameters>;
 using NumberMap = std::map<std::string, Number>;
 
-/// What the motion consists of, hence what of it an integrator can hold exactly.
+/// The kind of motion, which determines what an integrator can compute exactly.
 enum class Kind {
   kBallistic,   ///< constant accelerations between impacts
   kFrictional,  ///< constant accelerations between changes of the contacts' modes
   kSmooth,      ///< accelerations vary: the integrator's order shows
 };
 
-/// Six numbers a moving body: x, y, angle, vx, vy, omega, in the scene's order.
+/// Six numbers for each moving body: x, y, angle, vx, vy, omega, in the scene's order.
 using FinalState = std::vector<Number>;
 
 struct ClosedForm {
@@ -55,13 +55,13 @@ struct ClosedForm {
   /// Path and value of the numbers that the parameters set.
   std::function<std::vector<std::pair<std::string, Number>>(const NumberMap& p)> numbers;
   std::function<std::vector<Number>(const NumberMap& p, const FinalState& state)> read;
-  double instant = 0.0;  ///< s; a case without "T": how short the only step is
+  double instant = 0.0;  ///< s; a case without "T": length of its only step
 };
 
 using Inputs = std::map<std::string, double>;
 
-// Each wants its parameters by name, SI units. `T`: the time at which one looks, not that of an
-// event.
+// Each function takes its parameters by name, in SI units. `T` is the time of observation, not that
+// of an event.
 
 /// y0, v0, e, g, r, T: a disc that falls on a floor; as many bounces as there are before T.
 ClosedForm Drop(const std::string& name, const Inputs& inputs);
@@ -98,7 +98,7 @@ ClosedForm DoublePendulum(const std::string& name, const Inputs& inputs);
 /// upper one. Reference: as for the double pendulum.
 ClosedForm BoxTip(const std::string& name, const Inputs& inputs);
 
-/// All of the above with numbers of their own.
+/// All of the above, each with values for its parameters.
 std::vector<ClosedForm> AllClosedForms();
 
 /// Values of the parameters with unit derivatives.
@@ -114,7 +114,7 @@ void DropDerivative(const Number& p, std::vector<Number>* numbers);
 /// The scene in doubles, and the weights of the parameters on its numbers.
 struct PreparedScene {
   Scene scene;
-  /// A direction a parameter: (index into EnumerateNumbers, dn/dp).
+  /// A direction for each parameter: (index into EnumerateNumbers, dn/dp).
   std::vector<std::vector<std::pair<int, double>>> directions;
 };
 

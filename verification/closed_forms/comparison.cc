@@ -27,7 +27,7 @@ Outcome FromNumbers(const ClosedForm& form, const std::vector<Number>& outputs) 
   return outcome;
 }
 
-// Variables of the final state that outputs are read from, in the order of FinalState.
+// Variables of the final state from which outputs are computed, in the order of FinalState.
 std::vector<int> StateVariables(const ModelStructure& structure) {
   std::vector<int> variables;
   for (const int body : structure.moving) {
@@ -187,7 +187,7 @@ double Order(const std::vector<double>& dt, const std::vector<double>& error, do
 }
 
 Study RunStudy(const ClosedForm& form, const Scheme& scheme, const std::vector<int>& steps) {
-  // Below, an error is rounding and says nothing of the order.
+  // A smaller error is rounding and gives no information about the order.
   constexpr double kFloor = 1e-11;
   Study study{form.name, form.kind, scheme.name, {}, {}, {}, "", kNan, kNan};
   const Outcome exact = Exact(form);

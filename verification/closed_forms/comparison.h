@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// The engine against closed forms: errors of values and of derivatives, and how they fall with dt.
+// The engine compared with closed forms: errors of values and of derivatives, and their order in
+// dt.
 
 #include <Eigen/Core>
 #include <string>
@@ -28,13 +29,13 @@ struct Outcome {
   Eigen::MatrixXd jacobian;  ///< outputs x parameters; NaN where there is none (T; no two sides)
 };
 
-/// The formula's.
+/// The outcome of the formula.
 Outcome Exact(const ClosedForm& form);
 
-/// The engine's, in `steps` equal steps.
+/// The outcome of the engine, in `steps` equal steps.
 Outcome Simulate(const ClosedForm& form, const Scheme& scheme, int steps, Method method);
 
-/// Entries compared are those that both have. Scale is the largest |b| of its kind.
+/// The entries that both have are compared. The scale is the largest |b| of its kind.
 struct Errors {
   double value = 0.0;       ///< max |a − b| / scale
   double derivative = 0.0;  ///< max |a − b| / scale
@@ -59,7 +60,7 @@ struct Study {
   double derivative_order = 0.0;
 };
 
-/// Steps of a case that has no duration of its own: one.
+/// Number of steps of a case without a duration: one.
 Study RunStudy(const ClosedForm& form, const Scheme& scheme, const std::vector<int>& steps);
 
 /// Least squares through (log dt, log error); NaN where fewer than three errors exceed `floor`.

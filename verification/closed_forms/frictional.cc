@@ -9,7 +9,7 @@
 namespace tangible::closed_forms {
 namespace {
 
-// Low blocks, so that they neither tip nor rock: rotation plays no part.
+// The blocks are low, so that they neither tip nor rock.
 constexpr double kBlockHeight = 0.1;
 constexpr char kBlockAndPlane[] = R"({"bodies": [
   {"name": "block", "shape": {"box": {"size": [1, 0.1]}}, "mass": 1, "position": [0, 0.05]},
@@ -57,7 +57,7 @@ std::vector<Number> ExactIncline(const NumberMap& p) {
   if (pull.a > grip.a) {  // slips, down
     outputs = {s + 0.5 * (pull - grip) * left * left, (pull - grip) * left};
   }
-  // An uphill start feels friction of the other sign.
+  // An uphill start has friction of the other sign.
   if (v0.a == 0.0) DropDerivative(v0, &outputs);
   return outputs;
 }
@@ -76,8 +76,9 @@ std::vector<Number> ExactSlideToRoll(const NumberMap& p) {
           p.at("th0") + w0 * t + 0.5 * turn * t * t + w * rest, v, w};
 }
 
-// From v0 = −w0 r. A perturbation that breaks this slips for a time of its own order and then
-// rolls, with the twist of which the moment about the contact is the same.
+// The disc starts from v0 = −w0 r. After a perturbation that violates this it slips for a time of
+// the same order and then rolls, with the twist that has the same angular momentum about the
+// contact.
 std::vector<Number> ExactRolling(const NumberMap& p) {
   const Number &r = p.at("r"), &T = p.at("T");
   const Number k = p.at("I") / (p.at("m") * r * r);

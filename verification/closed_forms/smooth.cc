@@ -32,8 +32,8 @@ constexpr char kTippingBox[] = R"({"bodies": [
   "forces": [{"name": "push", "body": "box", "force": [1, 0], "at": [-0.5, 0.5]}],
   "pairs": [{"bodies": ["box", "plane"], "friction": 0.5}]})";
 
-// Point masses: bodies have an inertia > 0, so they hang by their centres on rods without mass, and
-// their own angles play no part.
+// Point masses: bodies have an inertia > 0, so that they hang by their centres on massless rods,
+// and their own angles do not matter.
 constexpr char kPointPendulum[] = R"({"bodies": [
   {"name": "mass", "mass": 1, "inertia": 1, "position": [0, -1]}],
   "joints": [{"name": "rod", "type": "distance", "bodies": ["mass", "world"],

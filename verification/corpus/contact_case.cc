@@ -34,8 +34,8 @@ class Maker {
       friction_high_ = 1e6;
       case_.known = Known::kHardlySolvable;
     }
-    // Surfaces that move and rebound at any speed: theory says nothing, and pivots may end on a
-    // ray.
+    // Surfaces move and rebound at any speed: no theorem guarantees a solution, and pivots may end
+    // on a ray.
     if (kind == "restitution") case_.known = Known::kHardlySolvable;
     if (kind == "frictionless") friction_low_ = friction_high_ = 0.0;
     if (kind == "mass ratio") mass_ratio_ = 1e9;
@@ -83,7 +83,7 @@ class Maker {
             sign * (arm.x * direction.y - arm.y * direction.x)};
   }
 
-  // b = −1: what does not move. The arms lead from the bodies' centres to the point.
+  // b = −1: a body that does not move. The arms lead from the bodies' centres to the point.
   void AddContact(int a, Vec arm_a, int b, Vec arm_b, Vec normal, double c_n) {
     const Vec tangent{normal.y, -normal.x};
     ContactBlock<double> c;
@@ -124,7 +124,7 @@ class Maker {
     }
   }
 
-  // Any points, any normals; one body for one to four contacts.
+  // Arbitrary points and normals; one body for one to four contacts.
   void Scatter(int contacts) {
     const int bodies = 1 + Pick(std::max(1, contacts));
     for (int i = 0; i < std::max(bodies, contacts / 4); ++i) AddMovingBody();
@@ -136,7 +136,7 @@ class Maker {
     }
   }
 
-  // Rows of points on few faces, some of them twice: far more contacts than velocities.
+  // Rows of points on few faces, some of them repeated: far more contacts than velocities.
   void Redundant(int contacts) {
     const int bodies = 1 + Pick(1 + contacts / 6);
     for (int i = 0; i < bodies; ++i) AddMovingBody();
@@ -179,8 +179,8 @@ class Maker {
     }
   }
 
-  // Draws speeds, modes and impulses, and what p, c_n and c_t must be for them: contacts rebound at
-  // speeds that have nothing to do with each other, and surfaces move.
+  // Draws speeds, modes and impulses, and computes p, c_n and c_t from them: contacts rebound at
+  // independent speeds, and surfaces move.
   void DrawSolution() {
     ContactProblem<double>& p = case_.problem;
     ContactSolution<double>& x = case_.drawn;
@@ -216,7 +216,8 @@ class Maker {
     }
   }
 
-  // A row of bodies between walls that come closer, and other contacts that any speeds satisfy.
+  // A row of bodies between walls that approach each other, and other contacts that any speeds
+  // satisfy.
   ContactCase Squeezed(int contacts) {
     const int in_row = std::max(1, std::min(contacts - 1, 1 + Pick(8)));
     for (int i = 0; i < in_row; ++i) AddMovingBody();
@@ -227,7 +228,7 @@ class Maker {
       AddContact(i, arm(-0.25), i - 1, arm(0.25), normal, i == 0 ? -Draw(0.1, 1.0) : 0.0);
     }
     AddContact(in_row - 1, arm(0.25), -1, {0, 0}, {-normal.x, -normal.y}, Draw(0.0, 0.05));
-    // No arm: spinning does not open the way, not even by rounding.
+    // The arms are 0, so that spinning cannot open the contacts, not even by rounding.
     for (ContactBlock<double>& c : case_.problem.contacts) c.normal_a[2] = c.normal_b[2] = 0.0;
     const int others = std::max(0, contacts - in_row - 1);
     for (int k = 0; k < others; ++k) {

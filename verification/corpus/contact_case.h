@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// Planar contact problems of which it is known whether they have a solution, made from a seed.
+// Planar contact problems, generated from a seed, for which it is known whether they have a
+// solution.
 //
 // Known by theory: with c_n ≥ 0, c_t = 0 and joints at rest (b = 0) the one-sided form
 // (lcp/problem.h) is copositive, and every z of its homogeneous problem has Gᵀ z = 0 and zᵀ c = λnᵀ
 // c_n ≥ 0: there is a solution for any friction, any rows and any momenta (Cottle, Pang, Stone
 // 1992, theorem 3.8.6). Known by construction: speeds, modes and impulses are drawn first, and p,
-// c_n, c_t follow from them. Known to have none: bodies in a row between two walls that come
-// closer, weights w ≥ 0 on the normal rows with Σ w n = 0 and Σ w c_n < 0.
+// c_n, c_t follow from them. Known to have no solution: bodies in a row between two walls that
+// approach each other, weights w ≥ 0 on the normal rows with Σ w n = 0 and Σ w c_n < 0.
 
 #include <cstdint>
 #include <string>
@@ -19,11 +20,11 @@
 
 namespace tangible::corpus {
 
-/// What is known of a problem, and what is asked of the solvers.
+/// What is known about a problem, and what the solvers have to achieve.
 enum class Known {
   kSolvable,        ///< monotone, a P-matrix, or friction up to 2: all must be solved
-  kHardlySolvable,  ///< any other with a solution: 95 % must be
-  kInfeasible,      ///< must be said, and proved
+  kHardlySolvable,  ///< any other with a solution: 95 % must be solved
+  kInfeasible,      ///< must be reported, and proved
   kUnsolvable,      ///< feasible without a solution: must not be called solved
   kUnknown,         ///< must not be answered wrongly
 };

@@ -10,7 +10,7 @@
 
 namespace tangible::corpus {
 
-/// A line a kind and way, then the names of what was not answered rightly and a sum.
+/// A line for each kind and way, then the names of the problems with a wrong answer and a sum.
 std::string TableText(const CorpusResult& result);
 
 OrderedJson ToJson(const CorpusResult& result);

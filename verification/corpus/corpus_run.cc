@@ -30,7 +30,8 @@ void JudgeSolved(double residual, Answer* answer) {
                   answer->known == Known::kUnsolvable;
 }
 
-// `contacts`: what the problem is the one-sided form of, whose own measure then counts too.
+// `contacts`: the contact problem of which the problem is the one-sided form; its residual then
+// counts too.
 Answer ByGeneral(const std::string& kind, const std::string& name, Known known,
                  const MixedLcp<double>& problem, const ContactProblem<double>* contacts) {
   Answer answer{.kind = kind, .name = name, .known = known, .way = Way::kGeneral};
@@ -205,7 +206,7 @@ std::string FirstFailure(const CorpusResult& result) {
     int right = 0, problems = 0;
     std::string missed{};
   };
-  std::map<std::pair<double, Way>, Share> shares;  // by what is asked for, below which all is well
+  std::map<std::pair<double, Way>, Share> shares;  // with the requirement for each
   for (const Row& row : result.rows) {
     const std::string what = row.kind + ", " + ToString(row.way) + ": ";
     if (row.wrong > 0) {

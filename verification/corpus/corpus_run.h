@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// Every problem by every way to solve it, each answer judged from the data (recomputed.h).
+// Solves every problem in every way, and checks each answer from the data (recomputed.h).
 
 #include <cstdint>
 #include <functional>
@@ -16,43 +16,44 @@ namespace tangible::corpus {
 /// Ways to solve a problem.
 enum class Way {
   kContact,  ///< the solver of the engine's steps, from all contacts open
-  kMisled,   ///< the same, from modes and impulses that have nothing to do with the solution
+  kMisled,   ///< the same, from modes and impulses that are unrelated to the solution
   kGeneral,  ///< the general solver, on the dense one-sided form
 };
 const char* ToString(Way way);
 
 /// The largest scaled residual of a solution.
 inline constexpr double kResidualBound = 1e-10;
-/// The share of solved problems that is asked for of those of Known::kHardlySolvable.
+/// The least fraction of solved problems among those of Known::kHardlySolvable.
 inline constexpr double kHardShare = 0.95;
 
 struct RunOptions {
   int random = 0;           ///< problems of each kind
   std::uint64_t seed = 1;   ///< of their generator
   int first = 0;            ///< number of the first one
-  std::string only{};       ///< this kind alone; empty: all
+  std::string only{};       ///< only this kind; empty: all
   int most_contacts = 100;  ///< in one problem
   int most_dense = 30;      ///< contacts up to which the general solver takes part
   int threads = 1;
-  std::function<void(long)> progress{};  ///< called with how many problems are done
+  std::function<void(long)> progress{};  ///< called with the number of finished problems
 };
 
 struct Answer {
   std::string kind, name;
   Known known = Known::kUnknown;
   Way way = Way::kGeneral;
-  bool solved = false;      ///< says so
-  bool infeasible = false;  ///< says so
-  bool wrong = false;       ///< says what the data contradict
-  double residual = 0.0;    ///< recomputed; of what is said to be solved
-  std::string solver{};     ///< which of the portfolio
+  bool solved = false;      ///< the solver reports a solution
+  bool infeasible = false;  ///< the solver reports infeasibility
+  bool wrong = false;       ///< the data contradict the answer
+  double residual = 0.0;    ///< recomputed, where a solution is reported
+  std::string solver{};     ///< the part of the portfolio that solved it
   double seconds = 0.0;     ///< of CPU time
 
-  /// Whether it is what is known: solved, proved infeasible by the general solver, not solved.
+  /// Whether the answer agrees with what is known: solved, proved infeasible by the general solver,
+  /// or not solved.
   bool right() const;
 };
 
-/// A kind by a way.
+/// The results of one kind of problem by one way.
 struct Row {
   std::string kind;
   Known known = Known::kUnknown;
@@ -76,7 +77,7 @@ const std::vector<std::string>& RandomKinds();
 CorpusResult RunCorpus(const std::vector<FileCase>& files, const RunOptions& options);
 
 /// The first bound that does not hold as one line, or empty: no wrong answer; all solved, or 95 %
-/// of those of Known::kHardlySolvable a way; all infeasible ones proved.
+/// of those of Known::kHardlySolvable in each way; all infeasible ones proved.
 std::string FirstFailure(const CorpusResult& result);
 
 }  // namespace tangible::corpus

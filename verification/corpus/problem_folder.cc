@@ -15,7 +15,7 @@ bool Says(const Json& json, const char* key) {
          json["props"].value(key, Json(false)) == Json(true);
 }
 
-// Whether all friction coefficients are told, and at most 2.
+// Whether all friction coefficients are given, and at most 2.
 bool LittleFriction(const Json& json) {
   if (!json.contains("contact") || !json["contact"].is_object()) return false;
   const Json mu = json["contact"].value("mu", Json());

@@ -2,7 +2,7 @@
 #pragma once
 //
 // A folder of problem files: those of tangible-lcp, whose answer is not known, and published plain
-// LCPs w = M z + q with what is known of them, {"M", "q", "status", "props", ...}.
+// LCPs w = M z + q with what is known about them, {"M", "q", "status", "props", ...}.
 
 #include <string>
 #include <vector>

@@ -15,14 +15,14 @@ using Vector = VectorX<Real>;
 using Matrix = MatrixX<Real>;
 
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
-// A body's speed counts as at least this share of the fastest one's.
+// A body's speed counts as at least this fraction of the fastest one's.
 constexpr Real kSlowest = 1e-6L;
 
 Real Share(Real value, Real scale) {
   return value == 0 ? 0 : scale > 0 ? value / scale : HUGE_VALL;
 }
 
-// The positive part of −min(a, b), or min(a, b): how far a ≥ 0 ⊥ b ≥ 0 is from holding.
+// The positive part of −min(a, b), or min(a, b): the violation of a ≥ 0 ⊥ b ≥ 0.
 Real Complementary(Real a, Real b) { return std::abs(std::min(a, b)); }
 
 bool Finite(const std::vector<double>& values, size_t size) {
@@ -72,7 +72,7 @@ class ContactJudge {
  public:
   ContactJudge(const ContactProblem<double>& problem, const ContactSolution<double>& x)
       : problem_(problem), x_(x), balance_(problem, x) {
-    // Impulses count up to what all momenta together could bring about.
+    // Impulses count up to the sum of all momenta.
     speed_.setZero(problem.num_bodies);
     lever_.setZero(problem.num_bodies);
     Real total = 0;
@@ -140,7 +140,7 @@ class ContactJudge {
     const Real sigma_t = Terms(tangent) + std::abs(static_cast<Real>(c.c_t));
     const Real zeta_t = zeta * std::max<Real>(1, mu);
     worst = std::max(worst, Share(std::max<Real>(0, std::abs(rubbed) - mu * pushed), zeta_t));
-    // Where it slides, friction is at its limit against it.
+    // Where the contact slides, friction has its limit and opposes the sliding.
     const Real missing = std::abs(rubbed + (slip > 0 ? mu : -mu) * pushed);
     return std::max(worst, std::min(Share(std::abs(slip), sigma_t), Share(missing, zeta_t)));
   }
@@ -206,7 +206,7 @@ double RecomputedResidual(const MixedLcp<double>& problem, const VectorX<double>
       !y_in.allFinite() || !z_in.allFinite()) {
     return kInfinite;
   }
-  // With rows of their own where a block is absent.
+  // An absent block is replaced by one with its own rows.
   const auto real = [](const MatrixX<double>& block, Index rows, Index cols) -> Matrix {
     if (block.size() == 0) return Matrix::Zero(rows, cols);
     return block.cast<Real>();
@@ -219,7 +219,7 @@ double RecomputedResidual(const MixedLcp<double>& problem, const VectorX<double>
                         G.cwiseAbs().transpose() * z.cwiseAbs();
   const Vector left = M * v - A.transpose() * y - G.transpose() * z - p;
   const Vector terms = M.cwiseAbs() * v.cwiseAbs() + pushed;
-  // Impulses count up to what the energy of all could bring about.
+  // Impulses count up to those that the energy of all bodies could cause.
   Real root_energy = 0;
   for (Index j = 0; j < nv; ++j) {
     const Real mass = std::max<Real>(M(j, j), 0);
@@ -261,7 +261,7 @@ bool ProvesInfeasible(const MixedLcp<double>& problem, const VectorX<double>& fa
   const auto u = [&](Index j) { return all[j]; };
   const auto t = [&](Index j) { return all[nv + j]; };
   const auto w = [&](Index j) { return all[nv + ny + j]; };
-  // A sum of products with that of their sizes; the entry of an absent block is 0.
+  // A sum of products, and the sum of their sizes; the entry of an absent block is 0.
   struct Sum {
     Real value = 0, size = 0;
     void Add(Real term) {

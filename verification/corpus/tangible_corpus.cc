@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// tangible-corpus: the solvers on many problems of which the answer is known.
+// tangible-corpus: runs the solvers on many problems with known answers.
 
 #include <gflags/gflags.h>
 

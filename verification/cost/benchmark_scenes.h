@@ -7,7 +7,7 @@
 
 namespace tangible {
 
-/// What does not move in a scene of discs: half-planes for one pile, thin boxes between several.
+/// The static bodies in a scene of discs: half-planes for one pile, thin boxes between several.
 struct DiscPile {
   int columns;
   double width;  ///< of the inside, m
@@ -19,7 +19,7 @@ Vector2<double> DiscStart(const DiscPile& pile, int i);
 
 /// n discs (radius 0.1 m, 1 kg, μ 0.5) that fall into a box; dt 2 ms.
 Scene DiscsScene(int discs);
-/// `piles` boxes of `discs` discs each, apart from each other, on one floor.
+/// `piles` separate boxes of `discs` discs each, on one floor.
 Scene PilesScene(int piles, int discs);
 /// Unit boxes (1 kg, μ 0.5) in rows of base, base − 1, ... 1, a little apart; dt 1/60 s.
 Scene PyramidScene(int base);

@@ -26,7 +26,8 @@ constexpr int kChildDone = 0;
 constexpr int kChildFailed = 3;
 constexpr int kChildOutOfMemory = 4;
 
-// The sanitizers map far more than is used; a limit on the address space would end them at once.
+// The sanitizers map far more memory than they use; a limit on the address space would end them at
+// once.
 #if defined(__SANITIZE_ADDRESS__)
 constexpr bool kLimitsAddressSpace = false;
 #else
@@ -55,8 +56,8 @@ void SetLimits(const Budget& budget) {
   }
   const rlimit nothing{0, 0};
   setrlimit(RLIMIT_CORE, &nothing);
-  // What does not fit into memory may not go to files either: that ends the child, whatever a
-  // program takes the signal for.
+  // Data that do not fit into memory may not be written to files either: this ends the child,
+  // however the program handles the signal.
   signal(SIGXFSZ, SIG_DFL);
   setrlimit(RLIMIT_FSIZE, &nothing);
   SetTimer(ITIMER_PROF, budget.seconds);
@@ -107,7 +108,7 @@ int RunWork(const Budget& budget, const TextWork& work, int out) {
   return kChildDone;
 }
 
-// A folder that is removed with all that was left in it; empty if there is none.
+// A temporary folder that is removed with its content; empty if it could not be made.
 class TemporaryFolder {
  public:
   TemporaryFolder() {
@@ -192,7 +193,7 @@ TextChild::TextChild(const Budget& budget, const TextWork& work)
   state_->process = fork();
   if (state_->process == 0) {
     close(ends[0]);
-    // A tape opens files where it stands.
+    // A tape opens files in the current folder.
     if (chdir(state_->folder.path().c_str()) != 0) {
       _exit(kChildFailed);
     }

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// Work in a process of its own, so that its peak memory is its own and its budget is kept: beyond
-// so many seconds of CPU time, or so many bytes of memory, the system ends it.
+// Runs work in a separate process, so that its peak memory can be measured and its budget is kept:
+// the system ends it when it exceeds its CPU time or its memory.
 
 #include <functional>
 #include <memory>
@@ -27,23 +27,23 @@ struct ChildOutcome {
   double cpu_seconds = 0.0;    ///< of the whole process
 };
 
-/// What the work gets.
+/// The interface through which the work controls its limits.
 class ChildLimits {
  public:
-  /// Ends the time limit: what follows may take longer.
+  /// Removes the time limit: the following work may take longer.
   void LiftSeconds() const;
 };
 
-/// Runs `work` in a child of this process. It returns numbers, and a message where it failed. Time
-/// that other processes take is not counted, but the child ends after ten times its seconds in any
+/// Runs `work` in a child of this process. It returns numbers, and a message where it failed. The
+/// time of other processes is not counted, but the child ends after ten times its seconds in any
 /// case.
 ChildOutcome RunInChild(
     const Budget& budget,
     const std::function<std::vector<double>(const ChildLimits& limits, std::string* error)>& work);
 
 /// Work that returns a text, in a child of this process from its construction on. Several may run
-/// at the same time. The process itself should have one thread: what another one has locked stays
-/// locked in the child.
+/// at the same time. The process itself should have one thread, because locks held by another
+/// thread would remain locked in the child.
 class TextChild {
  public:
   TextChild(const Budget& budget,
@@ -51,7 +51,7 @@ class TextChild {
   ~TextChild();
   TextChild(TextChild&&) noexcept;
   TextChild& operator=(TextChild&&) = delete;
-  /// Waits for the end; once.
+  /// Waits for the end; to be called once.
   ChildOutcome Wait();
 
  private:

@@ -12,7 +12,7 @@ namespace {
 constexpr int kBoundedParameters = 8;
 constexpr double kMebibyte = 1048576.0;
 
-// The largest ratio of a method's cells with at most so many parameters.
+// The largest ratio of a method's cells with at most this many parameters.
 CheckedBound LargestRatio(const std::string& what, double limit, CostMethod method,
                           int most_parameters, long least_steps,
                           const std::vector<CostCell>& cells) {
@@ -52,7 +52,8 @@ Crossover CrossoverOf(const std::vector<CostCell>& cells, long steps, CostMethod
     if (rival == nullptr) {
       continue;
     }
-    // Each against its own run's rollout: the machine's speed varies from cell to cell.
+    // Each time is relative to the rollout of its own run, because the machine's speed varies from
+    // cell to cell.
     const double log = std::log(cell.ratio() / rival->ratio());
     if (log < 0.0 && std::isnan(crossover.parameters)) {
       crossover.from_the_first = last_count == 0.0;

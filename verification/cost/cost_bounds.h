@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// The bounds that the costs hold, and where one method becomes cheaper than another.
+// The bounds on the costs, and where one method becomes cheaper than another.
 
 #include <string>
 #include <vector>
@@ -10,8 +10,8 @@
 
 namespace tangible::cost {
 
-/// What is stated: multiples of a rollout, of runs of at least `least_steps` steps (shorter ones
-/// last a millisecond, of which making the problem is a part).
+/// The stated bounds: multiples of a rollout, for runs of at least `least_steps` steps (shorter
+/// ones last a millisecond, which includes building the problem).
 struct CostBounds {
   long least_steps = 1000;
   double adjoint = 2.0;        ///< any number of parameters
@@ -26,11 +26,11 @@ struct CheckedBound {
   std::string what;
   double limit = 0.0;
   double measured = 0.0;  ///< NaN where it was not checked
-  std::string why_not;    ///< not checked: why
+  std::string why_not;    ///< why it was not checked
   bool holds() const { return !why_not.empty() || measured <= limit; }
 };
 
-/// `long_run`: the adjoint with checkpoints of a run of that many steps.
+/// `long_run`: the adjoint with checkpoints for a run of that many steps.
 std::vector<CheckedBound> CheckBounds(const CostBounds& bounds, const std::vector<CostCell>& cells,
                                       const CostCell& long_run);
 
@@ -41,13 +41,13 @@ std::string BrokenBound(const std::vector<CheckedBound>& bounds,
 struct Crossover {
   long steps = 0;
   CostMethod method = CostMethod::kAdjoint, other = CostMethod::kDifferences;
-  /// The number of parameters from which on the method takes less time than the other, between
-  /// measured ones interpolated in logarithms; NaN: nowhere within those measured.
+  /// The number of parameters above which the method takes less time than the other, interpolated
+  /// in logarithms between measured numbers; NaN: none within the measured range.
   double parameters = 0.0;
   bool from_the_first = false;  ///< already at the least number measured
 };
 
-/// Against central differences all other methods; and the adjoint against the tangent.
+/// Compares all other methods with central differences, and the adjoint with the tangent.
 std::vector<Crossover> Crossovers(const std::vector<CostCell>& cells);
 
 }  // namespace tangible::cost

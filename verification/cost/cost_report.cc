@@ -46,7 +46,7 @@ std::vector<long> StepsOf(const std::vector<CostCell>& cells) {
 
 std::vector<int> ParametersOf(const std::vector<CostCell>& cells) {
   std::vector<int> counts = Distinct<int>(cells, [](const CostCell& c) { return c.parameters; });
-  std::erase(counts, 0);  // the plain rollout's
+  std::erase(counts, 0);  // that of the plain rollout
   return counts;
 }
 
@@ -109,7 +109,7 @@ OrderedJson CellJson(const CostCell& cell) {
 std::vector<PlotSeries> Series(const std::vector<CostCell>& cells, bool of_time, long steps,
                                int parameters) {
   std::vector<PlotSeries> all;
-  // The plain rollout last, so that methods have the same colours in both plots.
+  // The plain rollout comes last, so that methods have the same colours in both plots.
   for (int k = 1; k <= (of_time ? kNumCostMethods - 1 : kNumCostMethods); ++k) {
     const int m = k % kNumCostMethods;
     const auto method = static_cast<CostMethod>(m);

@@ -11,8 +11,8 @@
 
 namespace tangible::cost {
 
-/// A block a number of steps: a line a method, a column a number of parameters, in each cell the
-/// time in rollouts and the peak memory.
+/// A block for each number of steps: a line for each method, a column for each number of
+/// parameters; each cell has the time in rollouts and the peak memory.
 std::string TableText(const std::vector<CostCell>& cells);
 std::string CrossoverText(const std::vector<Crossover>& crossovers);
 std::string BoundsText(const std::vector<CheckedBound>& bounds);
@@ -21,8 +21,8 @@ OrderedJson ToJson(const std::vector<CostCell>& cells, const CostCell& long_run,
                    const std::vector<Crossover>& crossovers,
                    const std::vector<CheckedBound>& bounds);
 
-/// SVG: time over the number of parameters, of runs of the most steps but one (or of those there
-/// are), and memory over the number of steps, of the least number of parameters.
+/// SVG: time over the number of parameters, for runs of the second largest number of steps (or of
+/// the only one), and memory over the number of steps, for the least number of parameters.
 std::string Picture(const std::vector<CostCell>& cells);
 
 }  // namespace tangible::cost

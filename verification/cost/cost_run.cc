@@ -17,8 +17,8 @@ constexpr CostMethod kMethods[] = {
     CostMethod::kTangent,     CostMethod::kImplicitJets, CostMethod::kUnrolledJets,
     CostMethod::kDifferences, CostMethod::kTape};
 
-// How far a gradient may be from the adjoint's. The unrolled solver's own error is about 1e-7
-// (lib/lcp/README.md); differences of one step are only shown.
+// The allowed difference of a gradient from the adjoint's. The unrolled solver's own error is about
+// 1e-7 (lib/lcp/README.md); differences of one step are only shown.
 double Tolerance(CostMethod method) {
   switch (method) {
     case CostMethod::kDifferences:
@@ -65,7 +65,7 @@ bool IsBuilt(CostMethod method) {
   return !jets || WidestJetBuilt() > 0;
 }
 
-// A rollout timed as a gradient's is.
+// A rollout, timed in the same way as a gradient.
 GradientResult RolloutAlone(const Scene& scene, int repeat) {
   GradientOptions options;
   options.certificate = CertificatePass::kSkip;
@@ -88,7 +88,7 @@ GradientResult Differentiate(CostMethod method, const CostOptions& options, cons
 constexpr int kLeastRepeats = 3;
 constexpr double kLongRun = 1.0;  // s; longer ones are not repeated
 
-// What a child hands over: numbers in a row, each list after its length.
+// The data that a child returns: a sequence of numbers, each list after its length.
 void Put(const std::vector<double>& list, std::vector<double>* out) {
   out->push_back(static_cast<double>(list.size()));
   out->insert(out->end(), list.begin(), list.end());
@@ -107,7 +107,7 @@ std::string Budgeted(double amount, const char* unit) {
   return text.str();
 }
 
-// What stands in the place of a time that there is none of; true where there is one.
+// Sets the text that replaces a missing time; true where there is a time.
 bool SetInstead(const Budget& budget, const ChildOutcome& outcome, CostCell* cell) {
   switch (outcome.status) {
     case ChildStatus::kOverSeconds:
@@ -233,7 +233,7 @@ CostCell MeasureCell(const CostOptions& options, CostMethod method, int paramete
     }
     const double once = result.seconds + result.rollout_seconds;
     const double wanted = std::min<double>(options.most_repeats, options.repeat_seconds / once);
-    // A single run's time is that of memory got from the system for the first time, too.
+    // The time of a single run includes the first allocation of memory by the system.
     const int repeats = once < kLongRun ? std::max(kLeastRepeats, static_cast<int>(wanted)) : 1;
     const auto tape_bytes = static_cast<double>(result.tape_bytes);
     const auto again = static_cast<double>(result.steps_again) / static_cast<double>(steps);

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// What the gradient of a loss of a rollout costs by each method, in a process of its own: CPU time,
-// as a multiple of one rollout of the same run, and peak memory.
+// The cost of the gradient of a rollout's loss by each method, measured in a separate process: CPU
+// time, as a multiple of one rollout of the same run, and peak memory.
 //
 // Every gradient is compared with the adjoint's before it is timed.
 
@@ -44,8 +44,8 @@ struct CostCell {
   CostMethod method = CostMethod::kRollout;
   int parameters = 0;
   long steps = 0;
-  /// Empty: measured. Else what stands in the cell: "over 5 s", "over 1 GiB", "not built", or what
-  /// failed.
+  /// Empty: measured. Otherwise the text of the cell: "over 5 s", "over 1 GiB", "not built", or the
+  /// failure.
   std::string instead;
   bool failed = false;                           ///< `instead` is a failure
   std::vector<double> seconds, rollout_seconds;  ///< CPU time of each repeat

@@ -18,7 +18,7 @@ BasicBody<double> Body(const std::string& name, const BasicShape<double>& shape,
   body.name = name;
   body.shape = shape;
   body.mass = 1.0;
-  body.inertia = inertia;  // written out, so that it is a number of its own
+  body.inertia = inertia;  // written out, so that it is a separate number
   body.friction = 0.3;
   body.restitution = 0.5;
   return body;
@@ -30,10 +30,10 @@ std::string Attribute(const std::string& path) {
   return second == std::string::npos ? path : path.substr(second + 1);
 }
 
-// Numbers of one attribute stand together, the usual parameters first.
+// Sorts numbers of one attribute together, the usual parameters first.
 int Rank(const std::string& path) {
   if (path == "bodies/ball/velocity/x") {
-    return -1;  // alone of these it matters before the ball has hit the chain
+    return -1;  // the only one that matters before the ball hits the chain
   }
   static const char* const kFirst[] = {"mass",       "friction",   "restitution", "velocity/x",
                                        "velocity/y", "position/x", "position/y",  "angle"};
@@ -66,8 +66,8 @@ std::vector<std::string> Patterns(const std::vector<std::string>& paths) {
     for (const std::string& path : paths) {
       const std::string pattern = kind + Attribute(path);
       const bool known = std::find(patterns.begin(), patterns.end(), pattern) != patterns.end();
-      // Radii and sizes are those of some bodies alone; their pattern would be the same as one
-      // number's or as that of all links.
+      // Only some bodies have radii and sizes; their pattern would match the same as a single
+      // number or as that of all links.
       const bool shape = Attribute(path).rfind("shape/", 0) == 0;
       if (path.rfind(start, 0) == 0 && !known && !shape) {
         patterns.push_back(pattern);
@@ -102,7 +102,7 @@ Scene ChainAndBall(long steps, Stepping stepping) {
   scene.no_contact.emplace_back("link*", "link*");
   scene.simulation.dt = kStep;
   scene.simulation.duration = kStep * static_cast<double>(steps);
-  // Written out: what is timed does not follow defaults.
+  // The settings are written out, so that the timed scene does not depend on defaults.
   scene.simulation.stepping = stepping;
   scene.simulation.integrator =
       stepping == Stepping::kEvent ? Integrator::kRungeKutta4 : Integrator::kSemiImplicitEuler;

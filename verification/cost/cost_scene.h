@@ -2,7 +2,7 @@
 #pragma once
 //
 // The scene of the costs: a chain of ten links of 0.3 m that hangs on pins, and a ball that hits
-// it; and parameters of it, as many as wanted.
+// it; and any number of its parameters.
 
 #include <string>
 #include <vector>
@@ -14,7 +14,7 @@ namespace tangible::cost {
 /// Steps of 0.002 s; by events with runge_kutta_4.
 Scene ChainAndBall(long steps, Stepping stepping = Stepping::kFixed);
 
-/// How many numbers of the scene there are to differentiate by, each alone.
+/// How many numbers of the scene can be parameters, each separately.
 int NumNumbers(const Scene& scene);
 
 /// The first `count` of: the ball's speed, masses, coefficients of friction and restitution,

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// What finding and evaluating a contact costs, by pair of shapes, and what the broad phase saves.
+// The cost of finding and evaluating a contact for each pair of shapes, and the saving by the broad
+// phase.
 #include <benchmark/benchmark.h>
 
 #include <cmath>
@@ -37,8 +38,8 @@ const Body kBox{ShapeType::kBox, {1.0, 1.0}};
 const Body kCapsule{ShapeType::kCapsule, {1.0, 0.5}};
 const Body kHalfPlane{ShapeType::kHalfPlane, {0.0, 1.0, 0.0}};
 
-/// The second body above the first, in turn a little nearer and farther, so that no choice can be
-/// foreseen.
+/// The second body is above the first, alternately a little nearer and farther, so that no branch
+/// can be predicted.
 void FindFeatures(benchmark::State& state, const Body& a, const Body& b, double distance,
                   double angle, double max_gap) {
   std::vector<Pose<double>> poses;

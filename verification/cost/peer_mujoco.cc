@@ -65,7 +65,7 @@ class Writer {
       default:
         std::abort();  // no benchmark has it
     }
-    // Bodies named in no_contact do not touch each other.
+    // Bodies named in no_contact do not collide.
     bool apart = false;
     for (const auto& [x, y] : scene_.no_contact) {
       apart = apart || MatchesPattern(x, body.name) || MatchesPattern(y, body.name);

@@ -10,7 +10,7 @@
 
 namespace tangible {
 
-/// A scene of another engine; bodies have our scene's places.
+/// A scene of another engine; bodies have the indices of our scene.
 class Peer {
  public:
   virtual ~Peer() = default;

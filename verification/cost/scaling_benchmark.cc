@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// What a settled step costs by size, and beside the engines that Debian ships: the same scene, in
-// one process, CPU time. Growth exponents are those of the last two sizes of a family.
+// The cost of a settled step by size, compared with the engines that Debian ships: the same scene,
+// in one process, CPU time. Growth exponents are those of the last two sizes of a family.
 //
 // Counters: `apart` is the distance of the mean position of all bodies from ours when timing starts
-// (m); `factorisations` and `residual` (largest) are of the timed steps; `rollouts` is an adjoint
-// (recording included) in units of the plain rollout; MB is what the engine holds.
+// (m); `factorisations` and `residual` (largest) are of the timed steps; `rollouts` is the time of
+// an adjoint (recording included) in units of the plain rollout; MB is the memory of the engine.
 #include <benchmark/benchmark.h>
 #include <malloc.h>
 
@@ -55,7 +55,7 @@ Vector2<double> MeanPosition(const Scene& scene,
   return Vector2<double>(sum / count);
 }
 
-// A run that has settled; made once a scene.
+// A run that has settled; made once for each scene.
 struct Settled {
   Settled(const Scene& scene, int steps) : scene(scene) {
     BuildModel(scene, &model, &state);
@@ -157,7 +157,7 @@ void TimeAdjoint(benchmark::State& state, const Family& family, int size) {
   state.counters["MB"] = 1e-6 * static_cast<double>(tape.bytes());
 }
 
-// Prints as usual, and keeps the times of our steps.
+// Prints the usual output, and keeps the times of our steps.
 class Reporter : public benchmark::ConsoleReporter {
  public:
   Reporter() : ConsoleReporter(OO_None) {}

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// What steps and their derivatives cost: the chain that a ball hits (11 bodies, 10 joints, 1
+// The cost of steps and their derivatives: the chain that a ball hits (11 bodies, 10 joints, 1
 // contact at a time) and ten discs in a box. Times are CPU time; ratios to the plain rollout of the
 // same run are counters.
 #include <benchmark/benchmark.h>
@@ -130,7 +130,7 @@ void BenchmarkJacobian(benchmark::State& state, const Scene& scene, JacobianRout
 }
 
 // The linear system of a step of `discs` settled discs without friction, factorised and solved;
-// with angles that are coupled by nothing that counts, or without.
+// with angles that are coupled by a negligible entry, or without angles.
 void BenchmarkDiscSystem(benchmark::State& state, double arm) {
   Scene scene = DiscsScene(static_cast<int>(state.range(0)));
   for (BasicBody<double>& body : scene.bodies) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// tangible-cost: what a gradient costs by each method, in time and memory.
+// tangible-cost: measures the cost of a gradient by each method, in time and memory.
 
 #include <gflags/gflags.h>
 
@@ -48,7 +48,7 @@ constexpr double kMebibyte = 1048576.0;
 constexpr int kMostParameters = 4096;
 constexpr int kMostSteps = 1000000;
 
-// Whole numbers from 1 to `most`, ascending; false if it is none such.
+// Reads whole numbers from 1 to `most`, ascending; false if the text is not such a list.
 template <typename Number>
 bool ReadList(const std::string& text, Number most, std::vector<Number>* list) {
   const char* at = text.data();
@@ -97,7 +97,7 @@ std::string CheckFlags(CostOptions* options, CostBounds* bounds) {
       {"--repeat_seconds", FLAGS_repeat_seconds}, {"--adjoint_bound", FLAGS_adjoint_bound},
       {"--tangent_bound", FLAGS_tangent_bound},   {"--jet_bound", FLAGS_jet_bound}};
   for (const auto& [flag, value] : positive) {
-    // Beyond a million seconds or MiB a timer or a limit would overflow.
+    // Above a million seconds or MiB a timer or a limit would overflow.
     if (!(value > 0.0 && value <= 1e6)) {
       return std::string(flag) + ": expected a number > 0 and <= 1e6, got " + FormatNumber(value);
     }
@@ -175,7 +175,7 @@ int Main(int argc, char** argv) {
   const std::string wrong = CheckFlags(&options, &bounds);
   if (!wrong.empty()) return ReportError("tangible-cost: " + wrong, kExitUsage);
 #if defined(__SANITIZE_ADDRESS__)
-  // The sanitizer's own memory: its shadow, what was freed, room around each block.
+  // The sanitizer's own memory: its shadow memory, freed blocks, the space around each block.
   bounds.long_run_mib += 512.0;
 #endif
   return Run(options, bounds);

@@ -3,13 +3,14 @@
 
 #include <adolc/adolc.h>
 
-// What the engine's templates ask of a scalar. It stands where ADOL-C's own names do, in the global
-// namespace: there the templates, which were declared before, find it by its argument.
+// The functions that the engine's templates require of a scalar. They are in the global namespace
+// like ADOL-C's own names: there the templates, which were declared earlier, find them by their
+// argument.
 inline double ValueOf(const adouble& x) { return x.value(); }
 
 namespace tangible {
 
-// One derivative direction: the reverse sweep finds all of them.
+// One derivative direction is enough, because the reverse sweep computes all derivatives.
 template <>
 struct NumDerivatives<adouble> {
   static constexpr int value = 1;
@@ -42,8 +43,8 @@ namespace tangible::cost {
 namespace {
 
 constexpr short kTape = 1;
-// Buffers of operations, locations, values and Taylor coefficients, entries. What is beyond them
-// goes to files, which would hide how much memory a tape takes.
+// Buffers of operations, locations, values and Taylor coefficients, entries. The excess would be
+// written to files, which would hide the memory of a tape.
 constexpr unsigned kOperations = 64u << 20;
 constexpr unsigned kLocations = 112u << 20;
 constexpr unsigned kValues = 16u << 20;
@@ -55,7 +56,7 @@ double Seconds() {
   return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
 }
 
-// The places of the terms' outputs among the state's poses and twists; empty if one has none.
+// The indices of the terms' outputs among the state's poses and twists; empty if one has none.
 std::vector<int> PlacesOf(const ModelStructure& structure, const std::vector<LossTerm>& terms) {
   const std::vector<std::string> outputs = OutputNames(structure);
   std::vector<int> places;
@@ -125,8 +126,8 @@ class TapedRollout {
     return message->empty();
   }
 
-  // Each step in double, which makes the choices, then unrolled; values stay those of the double
-  // run, as with Jets.
+  // Runs each step in double, which makes the choices, then unrolled; values remain those of the
+  // double run, as with Jets.
   RolloutReport Steps(const Model<adouble>& model, State<adouble>* state, std::string* message) {
     Stepper stepper(model_);
     State<double> final;

@@ -16,8 +16,8 @@ namespace tangible::cost {
 /// Whether ADOL-C was found when this was built.
 bool TapeIsBuilt();
 
-/// As LossGradient, of a scene with fixed steps; contacts are those of a run in double. The timed
-/// part is that run, the recording and the reverse sweep.
+/// The same as LossGradient, for a scene with fixed steps; contacts are those of a run in double.
+/// The timed part is that run, the recording and the reverse sweep.
 GradientResult TapeLossGradient(const Scene& scene, const std::vector<ParameterPath>& parameters,
                                 const std::vector<LossTerm>& terms, int repeat);
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// In the place of tape_gradient.cc where ADOL-C is not installed.
+// Replaces tape_gradient.cc where ADOL-C is not installed.
 #include "tangible/verification/cost/tape_gradient.h"
 
 namespace tangible::cost {

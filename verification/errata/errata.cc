@@ -107,7 +107,7 @@ double Loss(const LcpSolution<double>& solution) {
   return kWeights[0] * solution.v[0] + kWeights[1] * solution.v[1] + kWeights[2] * solution.v[2];
 }
 
-// NaN where the problem is not solved.
+// The loss; NaN where the problem is not solved.
 double LossOf(const SlidingBody& body, Misprint misprint) {
   const LcpSolution<double> solution = SolveLcp(ProblemOf(body, misprint));
   return solution.status == LcpStatus::kSolved ? Loss(solution)
@@ -143,7 +143,7 @@ SlidingBody RandomBody(std::mt19937_64* engine) {
 
 double RelativeError(double a, double b) { return std::abs(a - b) / std::abs(b); }
 
-// By the formulas as printed, or of the problem as printed.
+// The gradient by the formulas as printed, or for the problem as printed.
 std::vector<double> Printed(const SlidingBody& body, Misprint misprint) {
   return misprint == Misprint::kSignOfQ || misprint == Misprint::kSignOfF
              ? GradientByDifferences(body, misprint)

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// The mistakes of the method's published summary as printed, each against finite differences, on a
-// body that slides on one contact.
+// The errors in the method's published summary as printed, each compared with finite differences,
+// for a body that slides on one contact.
 //
 // In the summary's symbols, with x = −v⁺ (the new twist) and z = (λn, λ+, λ−, γ):
 //
@@ -16,7 +16,7 @@
 //
 //   q = M v + h f,   F = −[0 0 0; 0 0 E; μ −Eᵀ 0],   m = (c; 0; 0)                   (4)
 //
-// (1) to (4) are right. Printed is, instead of each in turn:
+// (1) to (4) are right. The summary prints instead:
 //
 //   differential   D(z) G  F − D(s) in the second row of K: without D(z) before F
 //   gradient of G  −D(z) (dz xᵀ + z dxᵀ)
@@ -67,9 +67,10 @@ MixedLcp<double> ProblemOf(const SlidingBody& body, Misprint misprint = Misprint
 /// The gradient of ℓ = w·v⁺ with respect to the parameters by (2), (3), (4), with one misprint in
 /// (2) or (3), or none. Empty if the body does not slide.
 std::vector<double> GradientByFormulas(const SlidingBody& body, Misprint misprint);
-/// The same by differences of solutions, central, extrapolated from two steps: of the right
-/// problem, or with the sign of q or F as printed (which changes the solution itself: with F's
-/// sliding is not possible at any speed, and friction holds whatever μ is). Empty if not solved.
+/// The same by central differences of solutions, extrapolated from two steps: for the right
+/// problem, or with the sign of q or F as printed (which changes the solution itself: with the sign
+/// of F as printed sliding is not possible at any speed, and friction holds whatever μ is). Empty
+/// if not solved.
 std::vector<double> GradientByDifferences(const SlidingBody& body, Misprint misprint);
 
 struct ErrataTable {

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// A case at the engine's limits: what is measured, the bound that physics or arithmetic puts on it,
-// and the gradient of the same scene by several methods.
+// A case at the engine's limits: measured figures, the bounds that physics or arithmetic puts on
+// them, and the gradient of the same scene by several methods.
 //
 //   holds            |figure| ≤ bound for every figure, and each is a number
 //   gradient holds   all entries are finite, and, where the certificate says "trustworthy",
@@ -11,8 +11,8 @@
 //                    systems, which the certificate tells, where that is more, up to 1e-6: what it
 //                    allows a system that is said to be solved)
 //
-// A case runs in a process of its own (cost/child.h): a crash or an endless loop of one is a row
-// that failed.
+// A case runs in a separate process (cost/child.h), so that a crash or an endless loop gives a
+// failed row.
 
 #include <functional>
 #include <limits>
@@ -37,7 +37,7 @@ struct Figure {
 
 struct GradientFinding {
   bool taken = false;
-  std::string message;  ///< not empty: the derivative could not be had, and why
+  std::string message;  ///< not empty: why there is no derivative
   bool finite = false;
   double adjoint = kNotMeasured;      ///< largest error against the tangent, see above
   double differences = kNotMeasured;  ///< the same; NaN where no choice-preserving step was found
@@ -52,17 +52,17 @@ struct GradientFinding {
 inline constexpr double kAdjointTolerance = 1e-9;
 inline constexpr double kDifferenceTolerance = 1e-5;
 
-/// What a case found.
+/// The result of a case.
 struct Finding {
   std::vector<Figure> figures;
   GradientFinding gradient;
-  std::string note;  ///< which of several solutions was taken, say
+  std::string note;  ///< for example which of several solutions was found
 
   bool holds() const;
 };
 
-/// Sizes: kShort for every day (all cases within two minutes), kLong as in the table's title (60 s
-/// at rest, a million steps).
+/// Lengths of cases: kShort for daily use (all cases within two minutes), kLong as in the table's
+/// title (60 s at rest, a million steps).
 enum class Length { kShort, kLong };
 
 struct ExtremeCase {
@@ -70,7 +70,7 @@ struct ExtremeCase {
   std::string stepping;  ///< "fixed", "event", or what else is compared
   std::function<Finding(Length)> run;
   double seconds = 30.0;       ///< of CPU time, at most; a long run may take 20 times that
-  std::string known_reason{};  ///< not empty: it is known not to hold, and why
+  std::string known_reason{};  ///< not empty: why it is known not to hold
 };
 
 /// All of them, groups one after the other. Names are unique together with the stepping.

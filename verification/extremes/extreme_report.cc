@@ -16,7 +16,7 @@ std::string Format(const char* format, Values... values) {
   return text;
 }
 
-// Of its bound; a figure that is not a number is beyond any.
+// A figure as a fraction of its bound; one that is not a number exceeds any bound.
 double Share(const Figure& figure) {
   const double size = std::abs(figure.value);
   if (!std::isfinite(size)) return std::numeric_limits<double>::infinity();
@@ -24,7 +24,7 @@ double Share(const Figure& figure) {
   return size / figure.bound;  // infinite where the bound is 0
 }
 
-// The figure nearest its bound; of equals the first that is not whether the run ended.
+// The figure nearest its bound; among equals the first other than whether the run ended.
 const Figure* Nearest(const std::vector<Figure>& figures) {
   const Figure* nearest = nullptr;
   for (const Figure& figure : figures) {
@@ -56,7 +56,7 @@ std::string GradientColumns(const GradientFinding& gradient) {
                 Error(gradient.differences).c_str(), ShortVerdict(gradient.verdict).c_str());
 }
 
-// What does not hold, a line each.
+// The bounds that do not hold, a line each.
 std::vector<std::string> Broken(const CaseResult& result) {
   std::vector<std::string> lines;
   if (!result.message.empty()) lines.push_back(result.message);

@@ -20,13 +20,13 @@ Counts Count(const std::vector<CaseResult>& results);
 /// "302 cases: 300 hold, 2 known, 0 fail; ..."
 std::string SummaryText(const Counts& counts);
 
-/// A line a case and stepping with the figure that is nearest its bound, the gradient's columns
-/// and, where it does not hold, what does not and why.
+/// A line for each case and stepping with the figure that is nearest its bound, the gradient's
+/// columns and, where a bound does not hold, which one and why.
 std::string TableText(const std::vector<CaseResult>& results);
 
 OrderedJson ToJson(const std::vector<CaseResult>& results);
 
-/// All figures, a table a group.
+/// All figures, in a table for each group.
 std::string Page(const std::vector<CaseResult>& results, const std::string& origin);
 
 /// The first case that fails as one line, or empty.

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// Runs cases, each in a process of its own.
+// Runs cases, each in a separate process.
 
 #include <functional>
 #include <string>

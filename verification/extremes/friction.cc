@@ -37,12 +37,13 @@ Finding SpinningDisc(const std::string& stepping, double friction) {
   return finding;
 }
 
-// A block with an initial speed: it slides v² / (2 μ g) where that does not tip it; a wide one.
+// A wide block with an initial speed: it slides v² / (2 μ g) where friction does not tip it.
 Finding SlidingBlock(const std::string& stepping, double friction) {
   const double speed = 2.0, dt = 0.001;
   Scene scene = NewScene("sliding block", stepping, dt, 0.5);
-  // With friction up to 1e12 only a block of no height does not trip: 1e-3 m, at h / w < 1 / mu for
-  // the first two; beyond, an impact stops it at once and may lift it.
+  // With friction up to 1e12 only a block of zero height would not trip: its height is 1e-3 m, so
+  // that h / w < 1 / mu for the first two; with more friction an impact stops it at once and may
+  // lift it.
   AddBox(&scene, "block", 1.0, 1e-3, 1.0, 0.0, 0.5e-3).velocity = {speed, 0.0};
   AddFloor(&scene);
   SetMaterial(&scene, friction, 0.0);
@@ -67,7 +68,7 @@ Finding SlidingBlock(const std::string& stepping, double friction) {
   return finding;
 }
 
-// A block on a slope of 40 degrees: it sticks from mu = tan 40° on.
+// A block on a slope of 40 degrees: it sticks for mu of at least tan 40°.
 Finding Slope(const std::string& stepping, double friction) {
   const double slope = 40.0 * std::atan(1.0) / 45.0, t = 0.5, dt = 0.01;
   Scene scene = NewScene("slope", stepping, dt, t);
@@ -87,7 +88,7 @@ Finding Slope(const std::string& stepping, double friction) {
   return finding;
 }
 
-// A stack that a force pulls at, sticks.
+// A stack that a force pulls sticks.
 Finding PulledStack(const std::string& stepping, double friction) {
   Scene scene = NewScene("pulled stack", stepping, 0.01, 0.5);
   AddStack(&scene, {1.0, 1.0, 1.0, 1.0, 1.0});

@@ -15,7 +15,7 @@ namespace {
 
 constexpr char kGroup[] = "geometry";
 
-// Two bodies that overlap, without gravity: they part, no faster than recovery_speed.
+// Two bodies that overlap, without gravity: they separate no faster than recovery_speed.
 Finding Part(Scene scene, const std::vector<std::string>& parameters) {
   scene.gravity = {0.0, 0.0};
   scene.simulation.duration = 1.0;
@@ -46,7 +46,7 @@ Scene TwoDiscs(const std::string& stepping, double x) {
   return scene;
 }
 
-// Upon the floor for a second; it should not move.
+// A scene on the floor for a second; it should not move.
 Finding Rests(const Scene& scene, double bound, const std::string& reason,
               const std::vector<std::string>& parameters) {
   const MeasuredRun run = RunScene(scene);
@@ -90,11 +90,12 @@ Finding Needle(const std::string& stepping, double thickness) {
   return finding;
 }
 
-// A disc of 1e-6 m between the floor and nothing, beside one of 1e3 m.
+// A disc of 1e-6 m on the floor, beside one of 1e3 m.
 Finding SmallBesideLarge(const std::string& stepping) {
   Scene scene = NewScene("discs", stepping, 0.01, 1.0);
   AddDisc(&scene, "large", 1e3, 1e9, 0.0, 1e3);
-  // It touches neither the large one nor the floor's inside: x beyond 2 sqrt(R r).
+  // The small disc touches neither the large one nor the inside of the floor: x exceeds 2 sqrt(R
+  // r).
   AddDisc(&scene, "small", 1e-6, 1e-9, 0.1, 1e-6);
   AddFloor(&scene);
   SetMaterial(&scene, 0.5, 0.0);
@@ -132,7 +133,7 @@ Finding CornerOnCorner(const std::string& stepping) {
   finding.figures.push_back(
       {"penetration", run.penetration, stepping == "fixed" ? 2e-4 : 1e-4, "m",
        stepping == "fixed" ? "contact_margin, and (v h)^2 / r of a step" : "contact_margin"});
-  // Wherever it tips or slides to, no faster than it could fall freely.
+  // The square may tip or slide, but no faster than in free fall.
   finding.figures.push_back({"largest speed over that of free fall", run.speed_max / (9.81 * 0.2),
                              1.0 + 1e-9, "1", "gravity alone"});
   AddGradient(scene, 10, {"bodies/upper/mass", "gravity/y", "bodies/upper/velocity/x"},
@@ -140,8 +141,8 @@ Finding CornerOnCorner(const std::string& stepping) {
   return finding;
 }
 
-// A box slides over forty tiles that lie flush, in a frame that is turned by `tilt`: corner meets
-// corner at every seam, up to rounding.
+// A box slides over forty flush tiles, in a frame that is turned by `tilt`: corner meets corner at
+// every seam, up to rounding.
 Finding FlushTiles(const std::string& stepping, double tilt) {
   constexpr double kSpeed = 2.0;
   constexpr double kTile = 0.1;

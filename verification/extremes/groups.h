@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// The groups of cases, a function each, that append theirs.
+// The groups of cases; the function of each group appends its cases.
 
 #include <vector>
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Loops of joints, redundant and contradictory joints, limits at their stop.
+// Loops of joints, redundant and contradictory joints, joints at their limits.
 
 #include <algorithm>
 #include <cmath>

@@ -18,7 +18,7 @@ constexpr double kRounding = 2.3e-16;
 void AddConserved(const MeasuredRun& run, double steps, Finding* finding) {
   const Vector3<double> before = Momentum(run.model, run.first);
   const Vector3<double> after = Momentum(run.model, run.last);
-  // Positions round in every step, angular momentum about the origin with them.
+  // Positions are rounded in every step, and with them angular momentum about the origin.
   const double rounding = 1e-12 + 4.0 * kRounding * steps;
   finding->figures.push_back({"change of energy over energy",
                               (run.energy_end - run.energy_start) / run.energy_start, rounding, "1",
@@ -26,7 +26,7 @@ void AddConserved(const MeasuredRun& run, double steps, Finding* finding) {
   finding->figures.push_back({"change of momentum over momentum",
                               (after - before).head<2>().norm() / before.head<2>().norm(), rounding,
                               "1", "nothing acts: rounding, 4 eps a step"});
-  // Of its parts: they may cancel, and the arm grows with the way.
+  // The error is relative to the parts, which may cancel; the arm grows with the distance.
   const double parts =
       std::hypot(run.x("box"), run.y("box")) * before.head<2>().norm() +
       std::abs(run.omega("box")) * run.model.parameters[run.model.structure->bodies[0].inertia];

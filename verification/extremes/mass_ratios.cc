@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Masses that differ by up to 1e9: what rests on what carries its weight exactly, chains hold.
+// Masses that differ by a factor of up to 1e9: contact forces equal the weight that they carry, and
+// chains hold.
 
 #include <algorithm>
 #include <cmath>
@@ -72,8 +73,8 @@ Finding HangingChain(const std::string& stepping, double end_mass, Length length
   return finding;
 }
 
-// The same chain swings, straight, from an angle. Transverse waves of the links, of frequency
-// w² = 4 T / (m l), are resolved by event steps, or, of fewer links, not.
+// The same chain swings, straight, from an angle. Transverse waves of the links, of frequency w² =
+// 4 T / (m l), are resolved by event steps or, with fewer links, are not.
 enum class Waves { kResolved, kNot };
 Finding SwingingChain(const std::string& stepping, double end_mass, Waves waves, Length length) {
   const int links = waves == Waves::kResolved ? 20 : 10;

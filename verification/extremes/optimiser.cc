@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// What an optimiser does to a scene: absurd masses, parameters that are not numbers, rollouts by
-// the hundred thousand.
+// What an optimiser may do with a scene: absurd masses, parameters that are not numbers, a hundred
+// thousand rollouts.
 
 #include <unistd.h>
 
@@ -26,7 +26,7 @@ std::string Format(const char* format, double value) {
   return text;
 }
 
-// A ball that hits a box on the floor, hinged to a bar: something of everything.
+// A ball that hits a box on the floor that is hinged to a bar: the scene has every kind of element.
 Scene Everything(const std::string& stepping) {
   Scene scene = NewScene("everything", stepping, 0.01, 0.3);
   AddBox(&scene, "box", 0.4, 0.4, 1.0, 0.0, 0.2);
@@ -53,8 +53,8 @@ Finding AbsurdMass(const std::string& stepping, const std::string& body, double 
   const MeasuredRun run = RunScene(scene);
   Finding finding;
   // The hinge's 0.01 N m s on the inertia of 1e-12 kg is a rate of 1e12 1/s. The trapezoidal rule
-  // would turn such a speed around in each step for ever: that it does not resolve it is to be
-  // said.
+  // would reverse such a speed in every step: the run has to report that it does not resolve this
+  // rate.
   const std::string& message = run.report.message;
   if (stepping == "event" && mass < 1e-9 && message.find("dt is too large") != std::string::npos) {
     finding.figures.push_back({"runs that end otherwise than by the status that dt is too large",
@@ -69,8 +69,8 @@ Finding AbsurdMass(const std::string& stepping, const std::string& body, double 
   return finding;
 }
 
-// Every number of the scene set to NaN, infinity, the largest double: the run says that it failed,
-// or its values and gradient are numbers.
+// Every number of the scene set to NaN, infinity, the largest double: the run reports a failure, or
+// its values and gradient are numbers.
 Finding NotNumbers(const std::string& stepping) {
   Scene scene = Everything(stepping);
   long tried = 0, silent = 0, refused = 0;

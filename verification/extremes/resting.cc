@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Stacks, pyramids and an arch at rest: nothing creeps.
+// Stacks, pyramids and an arch at rest: they must not creep.
 
 #include <algorithm>
 #include <cmath>
@@ -140,7 +140,7 @@ Finding Cards(const std::string& stepping, Length length) {
   Scene scene = NewScene("cards", stepping, 0.01, length == Length::kLong ? 60.0 : 1.0);
   const double lean = 0.3, w = 0.02, h = 1.0;
   for (const double side : {-1.0, 1.0}) {
-    // The lowest corner of each stands on the floor, the inner upper corners touch at x = 0.
+    // The lowest corner of each touches the floor, the inner upper corners touch at x = 0.
     const double low = 0.5 * (h * std::cos(lean) + w * std::sin(lean));
     const double inner = 0.5 * (h * std::sin(lean) + w * std::cos(lean));
     AddBox(&scene, side < 0.0 ? "left" : "right", w, h, 1.0, side * inner, low).angle = side * lean;

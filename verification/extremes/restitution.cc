@@ -56,7 +56,7 @@ Finding ZenoBall(const std::string& stepping) {
                                  ? "a fixed step turns up to v h above the floor: told"
                                  : "1.354 s, to a step"});
   finding.figures.push_back({"energy gain", run.energy_gain, 1e-9, "J", "e < 1"});
-  // Through the first three bounces; its end is a jump at the threshold.
+  // The gradient covers the first three bounces; the end of the motion is a jump at the threshold.
   AddGradient(scene, 100, {"bodies/ball/restitution", "bodies/ball/position/y", "gravity/y"},
               Differences::kTake, &finding);
   return finding;
@@ -80,8 +80,9 @@ Finding ElasticBall(const std::string& stepping, Length length) {
   });
   Finding finding;
   AddDone(run, &finding);
-  // A fixed step turns up to v h above the floor; its energy alternates by m g h v / 2 within a
-  // bounce, so heights are compared. Peaks are sampled: within g h^2 / 8 of event steps.
+  // With fixed steps the ball rebounds up to v h above the floor; its energy alternates by m g h v
+  // / 2 within a bounce, so heights are compared. Peaks are sampled: within g h^2 / 8 of event
+  // steps.
   const bool fixed = stepping == "fixed";
   finding.figures.push_back({"rise of the highest peak over the first height",
                              std::max(0.0, peak - 1.0), fixed ? 1e-3 : 1e-9, "m",
@@ -104,7 +105,7 @@ Scene Cradle(const std::string& stepping, int count, double gap) {
   Scene scene = NewScene("cradle", stepping, 0.01, 0.1);
   scene.gravity = {0.0, 0.0};
   for (int i = 0; i < count; ++i) {
-    // The first flies in and arrives within a step.
+    // The first ball flies in and arrives within a step.
     AddDisc(&scene, "ball" + std::to_string(i), 0.1, 1.0, (0.2 + gap) * i - (i == 0 ? 0.005 : 0.0),
             0.0);
   }
@@ -138,7 +139,7 @@ Finding TouchingCradle(const std::string& stepping) {
   return finding;
 }
 
-// With gaps the impacts come one after the other.
+// With gaps the impacts occur one after the other.
 Finding SpacedCradle(const std::string& stepping, int count) {
   const Scene scene = Cradle(stepping, count, 1e-4);
   const MeasuredRun run = RunScene(scene);

@@ -52,8 +52,8 @@ Finding TimeStep(const std::string& stepping, double dt) {
   return finding;
 }
 
-// A box slides to rest while a disc bounces, all lengths and masses times `scale`; gravity and what
-// the settings measure in metres scale with them, so the motion is the same one.
+// A box slides to rest while a disc bounces, all lengths and masses times `scale`; gravity and the
+// settings in metres scale with them, so that the motion is the same.
 Scene SlideAndBounce(const std::string& stepping, double length, double mass) {
   Scene scene = NewScene("slide and bounce", stepping, 0.01, 0.6);
   scene.gravity *= length;

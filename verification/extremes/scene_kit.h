@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// Scenes of the cases, written in a few lines, and what is measured of a run.
+// Short functions to build the scenes of the cases, and the measurements of a run.
 
 #include <string>
 #include <vector>
@@ -37,7 +37,7 @@ void AddChain(Scene* scene, int count, double length, double mass, double x, dou
 /// `count` unit boxes "box0", ... upon the floor.
 void AddStack(Scene* scene, const std::vector<double>& masses);
 
-/// A run with what is measured along the way.
+/// A run with the quantities measured during it.
 struct MeasuredRun {
   Model<double> model;
   State<double> first, last;
@@ -67,8 +67,8 @@ struct MeasuredRun {
   double Coordinate(const std::string& body, int i, const std::vector<double>& of) const;
 };
 
-/// Runs a scene; it goes through its text, so that what a file would not be allowed is not here
-/// either (throws std::invalid_argument).
+/// Runs a scene after converting it to text and back, so that values that a file may not have are
+/// refused here too (throws std::invalid_argument).
 MeasuredRun RunScene(const Scene& scene, const StateObserver& observer = {});
 Scene ThroughText(const Scene& scene);
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Speeds to 1e4 m/s against a wall of 1 mm: nothing goes through.
+// Speeds up to 1e4 m/s against a wall of 1 mm: nothing passes through.
 
 #include <algorithm>
 #include <cmath>
@@ -60,7 +60,7 @@ Finding AgainstWall(const std::string& stepping, Flyer flyer, double speed, doub
   return finding;
 }
 
-// Two discs meet head on.
+// Two discs collide head on.
 Finding HeadOn(const std::string& stepping, double speed) {
   Scene scene = NewScene("head on", stepping, 0.01, 0.1);
   scene.gravity = {0.0, 0.0};

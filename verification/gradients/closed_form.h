@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// Derivatives that are known in closed form, as one more opinion beside the computed ones.
+// Derivatives that are known in closed form, as a further check of the computed ones.
 //
-// Who knows such scenes registers a function; tangible-verify asks each in turn and compares with
-// the first that knows the scene. Without any the column is left out.
+// A program that has closed forms registers a function; tangible-verify calls each in turn and
+// compares with the first one that knows the scene. Without any the column is left out.
 
 #include <functional>
 #include <optional>
@@ -19,21 +19,22 @@ namespace tangible {
 struct ClosedFormJacobian {
   /// Outputs (simulation/gradient.h) x parameters, SI units; NaN where it is not known.
   MatrixX<double> jacobian;
-  /// What the computed derivative may be off by, relative: 1e-9 for the derivative of the discrete
+  /// The allowed relative error of the computed derivative: 1e-9 for the derivative of the discrete
   /// map, more for that of the motion in continuous time.
   double tolerance = 1e-9;
 };
 
-/// Nothing for a scene that it does not know.
+/// Returns nothing for a scene that it does not know.
 using ClosedForm = std::function<std::optional<ClosedFormJacobian>(
     const Scene& scene, const std::vector<ParameterPath>& parameters)>;
 
-/// Adds a closed form under a name, or replaces the one of that name. Not while scenes are checked.
+/// Adds a closed form under a name, or replaces the one of that name. It must not be called while
+/// scenes are checked.
 void RegisterClosedForm(const std::string& name, ClosedForm form);
-/// Removes it; nothing where there is none.
+/// Removes it; does nothing if there is none.
 void RemoveClosedForm(const std::string& name);
 
-/// What the first registered function that knows the scene says, in the order of registration.
+/// The result of the first registered function that knows the scene, in the order of registration.
 std::optional<ClosedFormJacobian> FindClosedForm(const Scene& scene,
                                                  const std::vector<ParameterPath>& parameters);
 

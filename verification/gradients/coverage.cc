@@ -116,7 +116,7 @@ std::vector<std::string> ExpectedCoverage() {
   std::vector<std::string> expected;
   for (const auto& [name_a, a] : kShapeTypeNames) {
     for (const auto& [name_b, b] : kShapeTypeNames) {
-      // Of two half-planes neither moves.
+      // Two half-planes are left out, because neither moves.
       if (a <= b && !(a == ShapeType::kHalfPlane && b == ShapeType::kHalfPlane)) {
         expected.push_back(PairName(a, b));
       }

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// What a set of scenes had in it: so that a check of random scenes can say what it has not checked.
+// The features that occurred in a set of scenes, so that a check of random scenes can report what
+// it has not checked.
 
 #include <map>
 #include <string>
@@ -11,11 +12,11 @@
 
 namespace tangible {
 
-/// How many scenes had each thing: "contact circle, box" (closed in some step), "joint weld",
+/// How many scenes had each feature: "contact circle, box" (closed in some step), "joint weld",
 /// "mixing of friction minimum", "friction sticking", "bodies 3", ...
 using Coverage = std::map<std::string, long>;
 
-/// Of one scene and its run: 1 a thing.
+/// The coverage of one scene and its run: 1 for each feature.
 Coverage CoverageOf(const Scene& scene, const RunTrace& run);
 
 /// sum += one.
@@ -24,7 +25,7 @@ void Add(const Coverage& one, Coverage* sum);
 /// Everything that random scenes are meant to have.
 std::vector<std::string> ExpectedCoverage();
 
-/// Those of ExpectedCoverage that are not there.
+/// Those of ExpectedCoverage that are missing.
 std::vector<std::string> MissingCoverage(const Coverage& coverage);
 
 }  // namespace tangible

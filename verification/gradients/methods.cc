@@ -18,7 +18,7 @@ class MethodRun {
       : scene_(scene), parameters_(parameters) {}
 
   MethodJacobians Run() {
-    // The certificate comes with the first method, before anything is compared.
+    // The certificate is computed with the first method, before anything is compared.
     const GradientResult tangent = Differentiate(parameters_, GradientMethod::kTangent,
                                                  Factorisations::kKeep, CertificatePass::kRun);
     r_.outputs = tangent.outputs;
@@ -51,7 +51,7 @@ class MethodRun {
     return FinalStateJacobian(scene_, parameters, options);
   }
 
-  // Some reasons (a tie of the mixing rule, friction 0) concern some parameters only.
+  // Some reasons (equal coefficients in the mixing rule, friction 0) concern only some parameters.
   void NameKinks() {
     r_.named.resize(parameters_.size());
     if (r_.certificate.verdict == kTrustworthy) {
@@ -85,7 +85,7 @@ class MethodRun {
       r_.jacobian[method].setConstant(rows, columns, kUnknown);
     }
     for (Eigen::Index k = 0; k < columns; ++k) {
-      // What the certificate has named need not be told apart from what is smooth.
+      // A parameter that the certificate has named need not have the same choices on both sides.
       DifferenceColumn column =
           FiniteDifferences(scene_, r_.trace, noise, parameters_[k],
                             r_.named[static_cast<size_t>(k)].empty() ? ChoicesDiffer::kCompareSides

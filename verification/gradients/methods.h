@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// The Jacobian of a scene's final state by every method there is, and what is needed to judge them:
+// The Jacobian of a scene's final state by every method, and the data that their comparison needs:
 // the certificate (computed before any of them is compared), the discrete choices of the run, the
 // sum of contributions to each entry, the error estimate of the differences.
 
@@ -22,7 +22,7 @@ enum Method {
   kByUnrolledJets,
   kByCoarseDifference,  ///< central, of kPlainSteps[0] of the parameter's scale
   kByFineDifference,    ///< central, of kPlainSteps[1]
-  kByRidders,           ///< extrapolated, with an error estimate of its own
+  kByRidders,           ///< extrapolated, with an error estimate
   kByClosedForm,
   kNumMethods
 };
@@ -34,15 +34,15 @@ struct MethodJacobians {
   bool done = false;    ///< the run at the scene's own values
   std::string message;  ///< why not
   std::vector<std::string> outputs;
-  /// A parameter: what the certificate says of it; empty where it says "trustworthy".
+  /// For each parameter the certificate's verdict; empty where that is "trustworthy".
   std::vector<std::string> named;
   Certificate certificate;  ///< with respect to all parameters
   RunTrace trace;
-  Contributions contributions;            ///< support/compare.h
-  MatrixX<double> jacobian[kNumMethods];  ///< outputs x parameters; empty where it was not run
-  std::string missing[kNumMethods];       ///< why it was not run
-  long unrolled_fallbacks = 0;            ///< steps in which the unrolled way took the implicit one
-  std::vector<DifferenceColumn> differences;  ///< a parameter
+  Contributions contributions;                ///< support/compare.h
+  MatrixX<double> jacobian[kNumMethods];      ///< outputs x parameters; empty where it was not run
+  std::string missing[kNumMethods];           ///< why it was not run
+  long unrolled_fallbacks = 0;                ///< steps solved by the implicit method instead
+  std::vector<DifferenceColumn> differences;  ///< for each parameter
   double closed_form_tolerance = 0.0;
 };
 

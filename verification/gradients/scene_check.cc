@@ -117,7 +117,8 @@ class Judge {
     }
   }
 
-  // A width of Jets that is not built is no exception; a run that another solution ended is.
+  // A width of Jets that is not built does not count as an exception; a run that ended because of
+  // another solution does.
   void JudgeMissing(int p, int pair, KindRow* row) {
     const MethodPair& methods = kMethodPairs[pair];
     const std::string& why = run_.missing[methods.a];
@@ -166,7 +167,7 @@ class Judge {
     return entry;
   }
 
-  // 10 κ / margin²: what is left of the influence of rows that are not active, relative.
+  // 10 κ / margin²: the relative remaining influence of inactive rows.
   double InteriorPointError() const {
     const double margin = run_.certificate.margin_min;
     return 10.0 * kInteriorPointEnd / (margin * margin);
@@ -179,7 +180,7 @@ class Judge {
     return std::max(run_.contributions.column[p], run_.trace.values.cwiseAbs().maxCoeff() / size);
   }
 
-  // What the certificate had said that explains an exception; empty if nothing does.
+  // The certificate's verdict that explains an exception; empty if there is none.
   std::string Reason(int p, int pair) const {
     if (!run_.named[p].empty()) {
       return run_.named[p];

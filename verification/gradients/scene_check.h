@@ -12,25 +12,25 @@
 //   C  the size of the parameter's column: its largest contributions at any step, or the largest
 //      output over the parameter's size, if that is more.
 //
-// e is the method's own estimate of its error: 0 but for
+// e is the method's own estimate of its error: 0 except for
 //
 //   Ridders        from the table of differences (support/differences.h), with rounding
 //   unrolled Jets  (10 κ / margin²) N C after N steps, or 0 if that factor is above the tolerance;
 //                  κ = 1e-14 is the complementarity at which the interior point ends, margin the
 //                  certificate's smallest. Here S = C, as all bodies are solved at once.
 //
-// There is no absolute tolerance. The error that is told of an entry is the tolerance at which (1)
-// would just hold if S and e shrank with it, tolerance |a − b| / (the right-hand side); it is to be
-// compared with the tolerance. Differences of one step have no bound; their error is told relative
-// to the largest entry of the column, at least 1e-5 C.
+// There is no absolute tolerance. The reported error of an entry is the tolerance at which (1)
+// would just hold if S and e shrank with it, tolerance |a − b| / (the right-hand side); it has to
+// be compared with the tolerance. Differences of one step have no bound; their error is reported
+// relative to the largest entry of the column, at least 1e-5 C.
 //
 // An entry that does not agree is an exception. It is `named` if the certificate, computed before
-// the comparison, had said of this parameter that the derivative is at a kink, one-sided or beside
-// a jump; or, of the unrolled Jets, if it had told a margin at which 10 κ / margin² is above the
-// tolerance; or, of modes that differ at p ± h, if it had told of redundant rows, whose impulses
-// and so modes are not unique. It is of `another solution` if the unrolled interior point ended at
-// other values than the step: with large friction a problem may have several. Else it is
-// unexplained, and the check has failed.
+// the comparison, had reported for this parameter that the derivative is at a kink, one-sided or
+// beside a jump; for the unrolled Jets also if it had reported a margin at which 10 κ / margin² is
+// above the tolerance; for modes that differ at p ± h also if it had reported redundant rows, whose
+// impulses and so modes are not unique. It is of `another solution` if the unrolled interior point
+// ended at other values than the step: with large friction a problem may have several. Otherwise it
+// is unexplained, and the check has failed.
 //
 // Differences are taken where the runs at p ± h make the same choices as the run at p, contact by
 // contact (support/trace.h). Where no step is small enough for that the column is an exception.
@@ -62,7 +62,7 @@ inline constexpr MethodPair kMethodPairs[] = {
     {kByClosedForm, kByTangent, "closed form", 0.0, true}};  // its tolerance is its own
 inline constexpr int kNumPairs = static_cast<int>(std::size(kMethodPairs));
 
-/// One entry with what every method said.
+/// One entry with the value of every method.
 struct CheckedEntry {
   std::string output, parameter;
   int pair = 0;        ///< of kMethodPairs: which was compared
@@ -79,8 +79,8 @@ struct CheckedException {
   int pair = 0;
   long entries = 0;
   double error = 0.0;  ///< the largest; infinite where they could not be compared
-  std::string what;    ///< what was seen: the contact that differs at p ± h, values, a message
-  std::string named;   ///< what the certificate had said before; or empty
+  std::string what;    ///< details: the contact that differs at p ± h, values, a message
+  std::string named;   ///< the certificate's earlier verdict; or empty
   bool other_solution = false;
 
   bool unexplained() const { return named.empty() && !other_solution; }
@@ -118,7 +118,7 @@ struct SceneCheck {
   KindRow total;
   std::vector<CheckedEntry> worst;  ///< by ratio, of bounded pairs, at most kMostWorst
   std::vector<CheckedException> exceptions;
-  /// Filled if they are asked for: outputs, parameters and every method's Jacobian.
+  /// Filled only on request: outputs, parameters and every method's Jacobian.
   std::vector<std::string> outputs, parameter_paths;
   MatrixX<double> jacobian[kNumMethods], contributions, ridders_error;
 };
@@ -133,8 +133,8 @@ std::string KindOf(const std::string& path);
 /// The error of an entry as above: a, b, S and e.
 double EntryError(double a, double b, double tolerance, double contributions, double estimate);
 
-/// Whether e is too large for the entry to say much: above 1e-3 of it and 1e-6 of its column (one
-/// that is not 0).
+/// Whether e is too large for a useful comparison: above 1e-3 of the entry and 1e-6 of its column
+/// (if that is not 0).
 bool IsCoarse(double value, double estimate, double largest_of_column);
 
 /// Checks a scene with respect to the parameters.

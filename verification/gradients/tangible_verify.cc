@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// tangible-verify: derivatives of scenes by every method, compared.
+// tangible-verify: compares derivatives of scenes by every method.
 
 #include <gflags/gflags.h>
 
@@ -45,7 +45,7 @@ constexpr int kMostRandom = 1000000;
 constexpr int kDefaultRandom = 100;
 constexpr int kDefaultStarts = 10;
 
-// The steppings that --stepping asks for; empty with a line if the engine lacks one.
+// The steppings named by --stepping; empty with a line if the engine does not have one of them.
 std::vector<Stepping> Steppings(std::string* error) {
   std::vector<Stepping> available = AvailableSteppings();
   if (FLAGS_stepping.empty()) {

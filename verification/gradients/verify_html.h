@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// The report of a verification: one self-contained HTML page for people.
+// The report of a verification: one self-contained HTML page for readers.
 
 #include <string>
 
@@ -13,9 +13,9 @@ namespace tangible {
 /// it and below, 1 at the bound.
 double HeatOf(double error_over_bound);
 
-/// Bounds, the heat map (a column a scene, a row a pair of methods), kinds of parameters, the worst
-/// entries with their scenes, exceptions. `origin` says where the figures come from; `verdict` is
-/// empty if every bound holds.
+/// Bounds, the heat map (a column for each scene, a row for each pair of methods), kinds of
+/// parameters, the worst entries with their scenes, exceptions. `origin` says where the figures
+/// come from; `verdict` is empty if every bound holds.
 std::string VerifyReport(const VerifyResult& result, const std::string& origin,
                          const std::string& verdict);
 

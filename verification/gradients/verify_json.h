@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// The result of a verification as JSON: every figure of the table, what was an exception and why,
-// and the worst entries with their scenes.
+// The result of a verification as JSON: every figure of the table, all exceptions with their
+// reasons, and the worst entries with their scenes.
 
 #include "tangible/scene/json_writer.h"
 #include "tangible/verification/gradients/verify_run.h"
 
 namespace tangible {
 
-/// The result; numbers that are not finite are null. What differs from run to run (provenance) is
-/// the caller's to add.
+/// The result; numbers that are not finite are null. The caller adds the data that differ from run
+/// to run (provenance).
 OrderedJson ToJson(const VerifyResult& result);
 
 }  // namespace tangible

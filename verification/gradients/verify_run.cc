@@ -188,7 +188,7 @@ std::string BrokenBound(const std::vector<VerifyJob>& jobs, const VerifyResult& 
       return scene.message;
     }
   }
-  // One of a few is no share.
+  // With few scenes a single failure may exceed this fraction.
   if (random_not_run > std::max(1.0, std::ceil(kMostNotRun * random))) {
     line << random_not_run << " of " << random << " random scenes do not run, expected at most "
          << 100.0 * kMostNotRun << " %";

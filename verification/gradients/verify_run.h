@@ -15,7 +15,7 @@
 
 namespace tangible {
 
-/// Of which list a random scene is: random_scene.h, or random_starts.h.
+/// The list to which a random scene belongs: random_scene.h, or random_starts.h.
 enum class RandomList { kScenes, kStarts };
 
 /// A scene to be checked: a random one by its seed, or one of the user's.
@@ -52,8 +52,8 @@ struct VerifyResult {
   int not_run = 0;  ///< scenes whose own rollout fails
 };
 
-/// At most this share of random scenes may fail to run: a body between a kinematic one and a floor
-/// that hold it has nowhere to go.
+/// At most this fraction of random scenes may fail to run: for example a body between a kinematic
+/// body and a floor that approach each other cannot move.
 inline constexpr double kMostNotRun = 0.03;
 
 /// The same result for any number of threads. `progress` may be empty; it is called from any

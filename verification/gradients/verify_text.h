@@ -15,10 +15,10 @@ std::string ErrorText(double error);
 /// Pairs that were compared in at least one scene, in the order of kMethodPairs.
 std::vector<int> PairsShown(const VerifyResult& result);
 
-/// A row a scene and kind of parameter.
+/// A row for each scene and kind of parameter.
 std::string TableText(const VerifyResult& result);
 
-/// Exceptions, zero columns, sums by kind and in all, what was covered, the worst entries.
+/// Exceptions, zero columns, sums by kind and over all kinds, coverage, the worst entries.
 std::string SummaryText(const VerifyResult& result, bool random);
 
 }  // namespace tangible

@@ -74,8 +74,8 @@ class TermsOfStep {
   }
 
  private:
-  // The entries of masses and dampings hold v⁺ − v − h g and h v⁺, in which v⁺ is itself what
-  // impulses leave: their terms.
+  // The entries of masses and dampings contain v⁺ − v − h g and h v⁺, in which v⁺ is itself a
+  // remainder after impulses cancel: this adds the terms of v⁺.
   void AddInertia(const RowMatrixXd& w_dot) {
     const ContactProblem<double>& problem = t_.record.problem;
     const ContactSolution<double>& solution = t_.record.solution;
@@ -225,7 +225,7 @@ Contributions ContributionsOf(const Scene& scene, const std::vector<ParameterPat
   }
   RowMatrixXd w_dot = VariableJacobian(scene, model.structure, directions);
   const RowMatrixXd initial = w_dot.cwiseAbs();
-  // Of poses and twists alone: a number's own derivative is 1 for ever.
+  // Only for poses and twists, because a number's own derivative is always 1.
   const int num_state = 6 * model.structure->num_bodies();
   VectorX<double> largest = initial.topRows(num_state).colwise().maxCoeff().transpose();
   std::vector<std::unique_ptr<StepTerms>> steps;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// How the Jacobians of a rollout by two methods (simulation/gradient.h) are compared.
+// The comparison of the Jacobians of a rollout by two methods (simulation/gradient.h).
 //
 // The outputs are the final poses and twists of the moving bodies, (x, y, angle, vx, vy, omega) a
 // body. Two entries agree where
@@ -18,13 +18,13 @@
 //   ⌈ẇₖ⌉ = |ẇₖ| but for  ⌈v̇⁺⌉ = M⁻¹ (the rows of (|∂R/∂w| |ẇ| + |K| |ẋ|) of momentum),
 //                        ⌈q̇⁺⌉ = |q̇| + h ⌈v̇⁺⌉.
 //
-// Of event steps the inside is not looked at: S = Σₖ |w̄ₖ|ᵀ |ẇₖ|.
+// The parts of event steps are not included: S = Σₖ |w̄ₖ|ᵀ |ẇₖ|.
 //
 // S is large where large terms cancel (a body at rest, whose impulses cancel all that acts on it; a
 // landing, which has ∂v/∂y of order 1/h). It is at least a tenth of the column's largest, ⌈ẇₖ⌉ at
-// any step included, as rounding inside of an element's derivatives, which is not seen here, is a
-// fraction of those, and as what a landing cancels is cancelled again in each step at rest: an
-// entry below 1e-14 of its column is rounding. 1e-13 is 450 ε: roundings of some steps.
+// any step included, because rounding inside an element's derivatives, which is not measured here,
+// is a fraction of those, and because the terms that cancel in a landing cancel again in each step
+// at rest: an entry below 1e-14 of its column is rounding. 1e-13 is 450 ε: roundings of some steps.
 
 #include <string>
 #include <vector>
@@ -36,11 +36,11 @@ namespace tangible {
 
 struct Contributions {
   MatrixX<double> sum;     ///< S above, outputs x parameters
-  VectorX<double> column;  ///< a parameter: the largest of its column, and of ⌈ẇₖ⌉ at any step
+  VectorX<double> column;  ///< the largest of each parameter's column, and of ⌈ẇₖ⌉ at any step
 };
 Contributions ContributionsOf(const Scene& scene, const std::vector<ParameterPath>& parameters);
 
-/// S alone.
+/// Only S.
 MatrixX<double> ContributionMagnitudes(const Scene& scene,
                                        const std::vector<ParameterPath>& parameters);
 

@@ -12,9 +12,9 @@
 namespace tangible {
 namespace {
 
-// What a rounding of 1 in a coordinate L does to each output: a twist that a gap or a joint's drift
-// sets is L / h of it, of its angular part over the radius of gyration. It stays the same where the
-// initial state is changed a little.
+// The effect of a relative rounding of 1 in a coordinate L on each output: a twist that a gap or a
+// joint's drift determines changes by L / h, its angular part by that over the radius of gyration.
+// The rounding itself stays the same where the initial state is changed a little.
 VectorX<double> GapNoise(const Scene& scene, const ModelStructure& structure) {
   Model<double> model;
   State<double> state;
@@ -34,8 +34,8 @@ VectorX<double> GapNoise(const Scene& scene, const ModelStructure& structure) {
   return noise;
 }
 
-// What is thrown up by less than the touching tolerance, 1e-10 of the body, lands that much lower
-// than on its surface: a change of poses, and of twists as the motion goes on with it.
+// A body that rises by less than the touching tolerance, 1e-10 of the body, lands that much lower
+// than the surface: this changes poses, and twists as the motion continues.
 enum class Uncertain { kPoses, kPosesAndTwists };
 VectorX<double> TouchNoise(const Scene& scene, const ModelStructure& structure, Uncertain what) {
   if (scene.simulation.stepping != Stepping::kEvent) {
@@ -66,7 +66,7 @@ class Differences {
   Differences(const Scene& scene, const RunTrace& at, const VectorX<double>& noise,
               const ParameterPath& parameter)
       : scene_(scene), at_(at), noise_(noise), parameter_(parameter), choices_(&at) {
-    // Scenes are of the size of 1 in SI units, which the scale of a large floor is not.
+    // Scenes have sizes of about 1 in SI units, unlike the scale of a large floor.
     scale_ = std::max(std::abs(parameter.value), std::min(parameter.scale, 1.0));
     Scene copy = scene;
     const std::vector<SceneNumber<double>> numbers = EnumerateNumbers(&copy);
@@ -125,7 +125,7 @@ class Differences {
         }
         continue;
       }
-      // A table that has not converged may not know how far it is off.
+      // The error estimate of a table that has not converged may be too small.
       ++tables;
       if (tables == 1 || next.errors.maxCoeff() < column.errors.maxCoeff()) {
         column = std::move(next);
@@ -136,7 +136,8 @@ class Differences {
     }
   }
 
-  // On each side runs are compared with each other, and their values with that at the parameter.
+  // The runs on each side are compared with each other, and their values with that at the
+  // parameter.
   bool CompareSides(DifferenceColumn* column) {
     DifferenceColumn sides[2];
     apart_ = true;
@@ -230,9 +231,9 @@ class Differences {
     return DifferenceStatus::kJudged;
   }
 
-  // Second differences of tiny steps are rounding alone. Runs from exact numbers (a box on a floor
-  // at 0) are rounded less than those beside them, so that changes of the initial state's last
-  // digits do not show it all.
+  // Second differences of tiny steps are only rounding. Runs from exact numbers (a box on a floor
+  // at 0) have less rounding than those beside them, so that changes of the initial state's last
+  // digits do not show all of it.
   void AddNoiseOfParameter() {
     for (const double relative : {2.3e-9, 1.0e-9, 3.1e-10, 0.7e-10}) {
       const double h = Bounded(relative);
@@ -248,7 +249,7 @@ class Differences {
   }
 
   // (f(p + h) − f(p − h)) / 2h, or (−3 f(p) + 4 f(p ± h) − f(p ± 2h)) / ±2h. Where choices differ
-  // the quotient is still given.
+  // the quotient is still returned.
   PlainDifference Plain(double h) {
     PlainDifference plain;
     plain.step = h;
@@ -311,20 +312,20 @@ class Differences {
   VectorX<double> noise_;
   const ParameterPath& parameter_;
   double scale_ = 0.0;                       // of the parameter
-  double room_ = 1e300;                      // how far the parameter may be changed to both sides
+  double room_ = 1e300;                      // how far the parameter may be changed either way
   bool low_end_ = false, high_end_ = false;  // at the end of its range
   double side_ = 0.0;                        // 0: central; else the only side that is allowed
   std::string where_;                        // the runs of the last pair that differed
-  const RunTrace* choices_;                  // those that runs must make; null: of the next run
-  bool apart_ = false;                       // each side is a function of its own
+  const RunTrace* choices_;                  // choices that runs must make; null: of the next run
+  bool apart_ = false;                       // each side is a separate function
   RunTrace of_side_;
 };
 
 }  // namespace
 
 VectorX<double> RoundingNoise(const Scene& scene, const RunTrace& at) {
-  // Of a body at rest most runs end with the same bits, and one in ten is off by an ε of a gap / h.
-  // Event steps take ten times longer.
+  // For a body at rest most runs end with the same bits, and one in ten differs by an ε of a gap /
+  // h. Event steps take ten times longer.
   const bool events = scene.simulation.stepping == Stepping::kEvent;
   const int samples = events ? 12 : 32;
   const double epsilon = std::numeric_limits<double>::epsilon();
@@ -344,7 +345,7 @@ VectorX<double> RoundingNoise(const Scene& scene, const RunTrace& at) {
       noise = noise.cwiseMax((trace.values - at.values).cwiseAbs());
     }
   }
-  // Fewer samples show less of it.
+  // Fewer samples show less of the noise.
   return events ? VectorX<double>(2.0 * noise) : noise;
 }
 

@@ -46,7 +46,7 @@ int SceneMaker::Chain(int links) {
   const double turn = U(-1.2, 1.2);
   Vector2<double> end = FloorPoint(x) + Vector2<double>(0.0, top);
   const Vector2<double> direction(std::sin(turn), -std::cos(turn));
-  // Links of one joint overlap, and could not part.
+  // Links of one joint overlap, and could not separate.
   if (links > 1) {
     scene_.no_contact.emplace_back("link*", "link*");
   }

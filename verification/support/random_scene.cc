@@ -207,7 +207,7 @@ void SceneMaker::FreeBody() {
   double height = HalfHeight(body.shape);
   body.angle = slope_;
   if (kind == 0 && (body.shape.type != ShapeType::kPolygon)) {
-    // At rest, exactly so on a level floor.
+    // The body is at rest, exactly so on a level floor.
   } else if (kind == 1) {
     const double speed = U(-2.0, 2.0);
     body.velocity = Along() * speed;
@@ -239,8 +239,8 @@ void SceneMaker::FreeBody() {
 }
 
 void SceneMaker::Obstacles() {
-  // A paddle that presses a body against a wall, or one that friction holds, asks for what cannot
-  // be.
+  // If a paddle presses a body against a wall, or presses a body that friction holds, the problem
+  // has no solution.
   const bool paddle_fits = friction_ <= 0.5;
   if (paddle_fits && random_.Chance(0.4)) {
     BasicBody<double> paddle;

@@ -4,8 +4,8 @@
 // Random scenes for checks of the engine: every shape, joint, force and setting in turn, placed so
 // that contacts close, slide, stick, bounce and rest within the few steps they run.
 //
-// The same seed gives the same scene on every machine: the generator is std::mt19937_64 with a
-// uniform of its own (the distributions of the standard library are not the same everywhere).
+// The same seed gives the same scene on every machine: the generator is std::mt19937_64 with our
+// own uniform distribution (those of the standard library are not the same everywhere).
 
 #include <cstdint>
 #include <random>
@@ -40,8 +40,9 @@ struct RandomSceneOptions {
 /// The ways to step that the engine has (simulation/settings.h).
 std::vector<Stepping> AvailableSteppings();
 
-/// A valid scene. Bodies stand apart or touch at their start but for those meant to start in
-/// penetration; loops of joints have no contradiction; edges of force windows are off the steps'.
+/// A valid scene. Bodies are apart or touch at their start, except for those meant to start in
+/// penetration; loops of joints are consistent; the edges of force windows do not coincide with the
+/// ends of steps.
 Scene RandomScene(unsigned seed, const RandomSceneOptions& options = {});
 
 }  // namespace tangible

@@ -58,11 +58,11 @@ class SceneMaker {
   Signal ValueSignal(double dt, double largest);
   int CountNamed(const std::string& start) const;
   void Pairs();
-  /// What few scenes have: torques and efforts that follow a series, narrow limits of a prismatic
-  /// joint, no gravity.
+  /// Rare features: torques and efforts that follow a series, narrow limits of a prismatic joint,
+  /// no gravity.
   void Rarities();
-  /// Drag and joint springs, in every fourth scene. They have random numbers of their own, so that
-  /// a seed is otherwise the scene that it would be without them.
+  /// Drag and joint springs, in every fourth scene. They use separate random numbers, so that the
+  /// rest of the scene of a seed does not change.
   void Mechanisms();
 
   RandomNumbers random_;

@@ -60,7 +60,7 @@ class StartMaker {
     const double law = U(0.0, 1.0);
     slope_ = random_.Chance(0.3) ? U(-0.4, 0.4) : 0.0;
     if (s.stepping == Stepping::kEvent) {
-      // The first order's splits are named whatever happens.
+      // With the first-order integrator the certificate names split steps in any case.
       s.integrator = kind < 0.6   ? Integrator::kRungeKutta4
                      : kind < 0.9 ? Integrator::kTrapezoidal
                                   : Integrator::kSemiImplicitEuler;
@@ -97,7 +97,8 @@ class StartMaker {
     }
   }
 
-  // A slip of the contact at the arm r, a turn, and the twist that neither opens nor closes it.
+  // Draws a slip of the contact at the arm r and a rotation, and sets the twist that neither opens
+  // nor closes the contact.
   void SetTwist(const Vector2<double>& r, BasicBody<double>* body) {
     const double slip = random_.Chance(0.2) ? 0.0 : Sign() * U(0.3, 3.0);
     const double turn = random_.Chance(0.5) ? 0.0 : Sign() * U(0.2, 6.0);
@@ -106,7 +107,8 @@ class StartMaker {
         Vector2<double>(scene_.bodies[0].velocity.x() + slip + turn * r.y(), -turn * r.x());
   }
 
-  // Around the coefficient at which a slip jams: of the bodies' arms alone.
+  // Draws friction around the coefficient at which a slip jams, which depends only on the bodies'
+  // arms.
   double FrictionAt(const Vector2<double>& r, const BasicBody<double>& body) {
     const double normal = 1.0 / body.mass + r.x() * r.x() / *body.inertia;
     const double mixed = std::abs(r.x() * r.y()) / *body.inertia;
@@ -123,7 +125,7 @@ class StartMaker {
     SetFriction(friction);
   }
 
-  // Of a turn, the arm to the lowest point of what is drawn with these ends (or corners) and
+  // After a rotation, the arm to the lowest point of the shape with these ends (or corners) and
   // radius.
   static Vector2<double> Lowest(const std::vector<Vector2<double>>& points, double angle,
                                 double radius) {
@@ -220,7 +222,7 @@ class StartMaker {
     scene_.bodies.push_back(std::move(body));
   }
 
-  // All of it, but not gravity.
+  // Rotates the whole scene, but not gravity.
   void Tilt() {
     const double c = std::cos(slope_);
     const double s = std::sin(slope_);

@@ -36,8 +36,9 @@ VectorX<double> OutputsOf(const ModelStructure& structure, const State<double>& 
   return values;
 }
 
-// Two corners of a body that does not turn stop at the same time, and which of them is found first
-// is rounding: the end of sliding is told by the bodies, and what sticks after it by the modes.
+// Two corners of a body that does not turn stop at the same time, and rounding decides which of
+// them is found first: the key of an end of sliding is its bodies, and the modes tell which
+// contacts stick afterwards.
 auto KeyOf(const ContactTrace& trace) {
   const ActiveContact& c = trace.contact;
   const ContactFeature feature = trace.event == EventKind::kSlipEnds ? ContactFeature{} : c.feature;
@@ -70,7 +71,7 @@ class PartTrace {
     if (mode == ContactMode::kOpen) {
       return;
     }
-    // Of what the equations depend on.
+    // Only coefficients on which the equations depend count.
     friction_tie = friction_tie && mode != ContactMode::kSticking;
     const bool rebounds = contact.law == ContactLaw::kRestitution || driven;
     restitution_tie = restitution_tie && rebounds;
@@ -121,9 +122,8 @@ void TraceImpulses(const Record& record, long step, RunTrace* trace) {
   AddDegenerate(record.problem, record.solution, trace);
 }
 
-// The contact that a touch is told by. Where a face lands flat both its corners take part in the
-// same impact, and which of them is found first is rounding: it is told by the first in their
-// order.
+// The contact that stands for a touch. Where a face lands flat both its corners take part in the
+// same impact, and rounding decides which of them is found first: the first in their order is used.
 ActiveContact TouchOf(const Segment& segment, const EventPart* next) {
   const ActiveContact& touch = segment.event_contact;
   const auto has = [](const std::vector<ActiveContact>& contacts, const ActiveContact& contact) {
@@ -156,7 +156,7 @@ void TraceSegment(const Segment& segment, const EventPart* next, long step, RunT
     part.Add(segment.contacts[i], segment.modes[i], segment.friction[i].tie, false);
   }
   if (segment.event != EventKind::kStepEnd) {
-    // The edge of a force's window has no contact: the record keeps that of an earlier segment.
+    // The edge of a force's window has no contact; the record still has that of an earlier segment.
     const bool of_contact = segment.event != EventKind::kEdge;
     part.AddEvent(segment.event, of_contact ? TouchOf(segment, next) : ActiveContact());
   }

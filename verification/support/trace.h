@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// Runs with the discrete choices that they made: two runs are parts of the same smooth map where
-// these are the same, contact by contact.
+// Runs with the discrete choices that they made: two runs belong to the same smooth map if these
+// are the same, contact by contact.
 
 #include <memory>
 #include <string>
@@ -18,7 +18,7 @@ struct ContactTrace {
   ContactMode mode = ContactMode::kOpen;
   bool friction_tie = false, restitution_tie = false;  ///< at a kink of the mixing rule
   bool driven = false;  ///< by Poisson's law, in decompression: pushed by e times its compression
-  /// Event stepping: not a closed contact but what ended a segment there.
+  /// With event stepping: the event that ended a segment there, in place of a closed contact.
   EventKind event = EventKind::kStepEnd;
 };
 
@@ -27,7 +27,7 @@ struct RunTrace {
   bool done = false;
   std::string message;
   VectorX<double> values;  ///< outputs
-  /// A step each; with event stepping a segment or an impact each.
+  /// The closed contacts of each step; with event stepping of each segment or impact.
   std::vector<std::vector<ContactTrace>> steps;
   std::vector<long> step_of;  ///< the step of each of these
   std::shared_ptr<const ModelStructure> structure;
@@ -48,7 +48,7 @@ RunTrace TraceRun(const Scene& scene);
 /// without friction are the same as sliding ones (one-sided differences from friction 0).
 enum class FrictionAtZero { kDistinct, kMaySlide };
 bool SameChoices(const RunTrace& x, const RunTrace& y, FrictionAtZero friction);
-/// The first step and contact in which they are not; empty if they are.
+/// The first step and contact in which the choices differ; empty if they are the same.
 std::string FirstDifference(const RunTrace& x, const RunTrace& y, FrictionAtZero friction);
 
 }  // namespace tangible

@@ -10,7 +10,8 @@
 namespace tangible::tradeoff {
 namespace {
 
-// The adjoint's records; where they would take more, steps are run again, as a user's would.
+// Memory of the adjoint's records; if they would take more, steps are run again, as in a user's
+// program.
 constexpr size_t kTapeBytes = size_t{512} << 20;
 
 // The poses at the samples; a message or empty.

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// Which simulation settings are tried, and by which parameters runs are differentiated.
+// The simulation settings that are tried, and the parameters with respect to which runs are
+// differentiated.
 
 #include <string>
 #include <vector>
@@ -12,15 +13,15 @@
 namespace tangible::tradeoff {
 
 enum class SweepKind {
-  /// Every stepping and integrator with every joint correction; and with the scene's own one, each
-  /// other solver, tolerance and smoothing alone.
+  /// Every stepping and integrator with every joint correction; and with the scene's own correction
+  /// each other solver, tolerance and smoothing separately.
   kStar,
   kFull,  ///< every combination
 };
 
 struct Sweep {
-  std::vector<SimulationSettings> settings;  ///< whose dt is not one of the sweep's
-  std::vector<std::string> left_out;  ///< a line a kind of combination that is not tried, and why
+  std::vector<SimulationSettings> settings;  ///< their dt is not one of the sweep's
+  std::vector<std::string> left_out;         ///< kinds of combinations not tried, a line each
 };
 
 /// The settings beside dt. Joint corrections are tried where there are joints; solvers, tolerances

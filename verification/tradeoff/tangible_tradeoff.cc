@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// tangible-tradeoff: errors of a scene's trajectory and gradient against seconds, over the settings
+// tangible-tradeoff: errors of a scene's trajectory and gradient over CPU time, for many settings
 // of its simulation.
 
 #include <gflags/gflags.h>
@@ -93,7 +93,7 @@ std::string CheckFlags(size_t scenes, TradeoffOptions* options, Target* target) 
   return "";
 }
 
-// The scene and what it is differentiated by; a message or empty.
+// Loads the scene and its parameters; returns a message or empty.
 std::string Load(const std::string& file, const TradeoffOptions& options, Scene* scene,
                  std::vector<ParameterPath>* parameters) {
   std::string error;

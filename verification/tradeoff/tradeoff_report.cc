@@ -29,7 +29,7 @@ std::string ErrorText(double error, bool below_reference) {
   return Format("%.1e%s", error, below_reference ? "*" : "");
 }
 
-// The least times of all cells, to which others are ratios.
+// The least times of all cells, to which other times are relative.
 struct LeastSeconds {
   double run = HUGE_VAL, both = HUGE_VAL;
 };
@@ -116,7 +116,7 @@ OrderedJson CellJson(const Tradeoff& tradeoff, const LeastSeconds& least, const 
   return json;
 }
 
-// What a plot shows of a cell.
+// The values of a cell that a plot shows.
 struct Axes {
   double Cell::*seconds;
   double Cell::*error;
@@ -133,7 +133,7 @@ Axes AxesOf(const Tradeoff& tradeoff, bool of_gradient) {
           tradeoff.reference.trajectory_error};
 }
 
-// No lower than the reference's own: what is below it is not known.
+// The error is drawn no lower than the reference's own, because smaller errors cannot be measured.
 void AddPoint(const Cell& cell, const Axes& axes, PlotSeries* series) {
   series->x.push_back(1e3 * cell.*axes.seconds);
   series->y.push_back(std::max(cell.*axes.error, axes.own_error));

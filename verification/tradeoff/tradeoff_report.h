@@ -12,14 +12,14 @@
 
 namespace tangible::tradeoff {
 
-/// The reference, what was left out, and a line a cell on a front. An error below the reference's
-/// own is marked *; T and G: on the front of trajectories, of gradients.
+/// The reference, the combinations left out, and a line for each cell on a front. An error below
+/// the reference's own is marked *; T and G: on the front of trajectories, of gradients.
 std::string TableText(const Tradeoff& tradeoff);
 
 OrderedJson ToJson(const Tradeoff& tradeoff);
 
-/// SVG: errors of trajectory and gradient over seconds. Of one scene every cell, a colour a
-/// stepping and integrator, and the fronts; of several their fronts.
+/// SVG: errors of trajectory and gradient over seconds. For one scene every cell, with a colour for
+/// each stepping and integrator, and the fronts; for several scenes only the fronts.
 std::string Picture(const std::vector<Tradeoff>& tradeoffs);
 
 /// `provenance`: a line. Pictures and all cells of each scene.
@@ -28,7 +28,7 @@ std::string Page(const std::vector<Tradeoff>& tradeoffs, const std::string& prov
 /// `"simulation": {...}` of a scene with these settings, every key, to be pasted into it.
 std::string SimulationBlock(const Scene& scene, const SimulationSettings& settings);
 
-/// Why no cell meets a target: the least errors there are, and the reference's own.
+/// Why no cell meets a target: the least errors of all cells, and the reference's own.
 std::string WhyNone(const Tradeoff& tradeoff, double error);
 
 }  // namespace tangible::tradeoff

@@ -16,10 +16,10 @@ constexpr double kReferenceJointTolerance = 1e-12;
 constexpr double kMostReferenceSteps = 4e6;
 constexpr double kFirstReferenceFactor = 4.0;  // of the scene's dt
 constexpr int kMostFailedLevels = 6;
-// What is smaller is rounding, and no order of runs.
+// Smaller differences are rounding and do not rank runs.
 constexpr double kRounding = 1e-13;
-// Cells that differ by a solver alone have the same errors but for rounding, and the same times but
-// for chance: one of them is enough, the one whose settings are nearer to the scene's.
+// Cells that differ only by a solver have the same errors up to rounding, and the same times up to
+// chance: one of them is enough, the one whose settings are nearer to the scene's.
 constexpr double kBetter = 0.9;
 constexpr double kSameTime = 1.1;
 
@@ -27,8 +27,8 @@ double CostOf(const SampledRun& run) {
   return LowerMedian(run.run_seconds) + LowerMedian(run.both_seconds);
 }
 
-// Halves the step as the header says. False, with the last run's message, where no two in a row
-// ran.
+// Halves the step as the header says. False, with the last run's message, where no two successive
+// runs succeeded.
 bool Halve(const Scene& scene, const std::vector<ParameterPath>& parameters,
            const TradeoffOptions& options, Reference* best) {
   Scene copy = scene;
@@ -66,7 +66,7 @@ bool Halve(const Scene& scene, const std::vector<ParameterPath>& parameters,
   return found;
 }
 
-// A message or empty.
+// Computes the reference; returns a message or empty.
 std::string MakeReference(const Scene& scene, const std::vector<ParameterPath>& parameters,
                           const TradeoffOptions& options, Reference* reference) {
   Scene copy = scene;
@@ -99,7 +99,7 @@ std::string MakeReference(const Scene& scene, const std::vector<ParameterPath>& 
   return "";
 }
 
-// Cells of one setting, from the longest step on.
+// Runs the cells of one setting, beginning with the longest step.
 void RunGroup(const Scene& scene, const std::vector<ParameterPath>& parameters,
               const TradeoffOptions& options, const Tradeoff& tradeoff, Cell* cells, size_t count,
               const std::function<void()>& done) {
@@ -150,7 +150,7 @@ void RunCells(const Scene& scene, const std::vector<ParameterPath>& parameters,
   });
 }
 
-// Marks the cells that are better than all cheaper ones by more than what two runs' times vary.
+// Marks the cells that are better than all cheaper ones by more than the variation of times.
 void MarkFront(std::vector<Cell>* cells, double own_error, double Cell::*error,
                double Cell::*seconds, bool Cell::*front) {
   std::vector<Cell*> order;

@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// Errors and times of a scene with every setting of a sweep, against a reference; what is on the
-// fronts; and the cheapest settings for a target.
+// Errors and times of a scene with every setting of a sweep, compared with a reference; the cells
+// on the fronts; and the cheapest settings for a target.
 //
 // Reference: event stepping with runge_kutta_4, all joints projected to 1e-12, at a step that is
 // four times the scene's at first and is halved until a further halving changes it by less than a
 // bound, or by more than it did before (rounding, chaos), or until its time is up; where event
-// stepping does not run, fixed stepping alike. Its own error is what the last halving changed, at
-// least 1e-13 (rounding). Its Jacobian is the tangent's, those of the cells are the adjoint's.
+// stepping does not run, fixed stepping in the same way. Its own error is the change by the last
+// halving, at least 1e-13 (rounding). Its Jacobian is the tangent's, those of the cells are the
+// adjoint's.
 
 #include <functional>
 #include <string>
@@ -27,7 +28,7 @@ struct TradeoffOptions {
   double budget_seconds = 2.0;  ///< CPU time of one rollout with its Jacobian
   double reference_error = 1e-10;
   double reference_seconds = 20.0;
-  int threads = 1;  ///< of the cells; others' runs at the same time disturb times
+  int threads = 1;  ///< of the cells; simultaneous runs disturb times
 };
 
 struct Reference {
@@ -39,7 +40,7 @@ struct Reference {
 
 struct Cell {
   SimulationSettings settings;
-  /// Empty: measured. Else "over 2 s", or what failed.
+  /// Empty: measured. Otherwise "over 2 s", or the failure.
   std::string instead;
   bool failed = false;  ///< `instead` is a failure
   double trajectory_error = 0.0, gradient_error = 0.0;
@@ -63,7 +64,7 @@ struct Tradeoff {
   std::vector<Cell> cells;  ///< in the order of the sweep, steps descending
   std::vector<std::string> left_out;
 
-  /// An error that is below the reference's own says no more than that.
+  /// Whether the error is below the reference's own, so that its value has no further meaning.
   bool TrajectoryBelowReference(const Cell& cell) const {
     return cell.trajectory_error <= reference.trajectory_error;
   }
@@ -77,9 +78,9 @@ Tradeoff RunTradeoff(const Scene& scene, const std::vector<ParameterPath>& param
                      const TradeoffOptions& options,
                      const std::function<void(long done, long total)>& progress);
 
-/// Sets the cells' front flags. An error counts as no less than the reference's own. Of cells whose
-/// times and errors are the same to a tenth the first in the sweep, with the scene's own solver, is
-/// taken.
+/// Sets the cells' front flags. An error counts as at least the reference's own. Among cells whose
+/// times and errors agree to a tenth the first in the sweep, with the scene's own solver, is
+/// chosen.
 void MarkFronts(Tradeoff* tradeoff);
 
 enum class Target { kTrajectory, kGradient, kBoth };

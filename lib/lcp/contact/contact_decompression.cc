@@ -11,7 +11,7 @@ namespace {
 
 constexpr int kMaxRounds = 20;
 
-// Changes a mode that the solution contradicts; whether it did.
+// Changes a mode that the solution contradicts; returns whether it changed one.
 bool ChangeMode(const ContactValues& values, double normal, double tangent, double impulse_scale,
                 ContactBlock<double>* contact, ContactMode* mode) {
   const double zeta = NormalScale(*contact, values, impulse_scale);
@@ -56,7 +56,7 @@ bool DecompressionSolver::SolveByModeChanges(const ContactSolverOptions& options
                                              ContactSolverReport* report) {
   for (int round = 0; round < kMaxRounds; ++round) {
     ++report->factorisations;
-    // Among redundant impulses those nearest to the solution's.
+    // Where impulses are not unique, those nearest to the given solution's are chosen.
     if (!mode_solve_.Solve(*problem, solution, &system_, solution)) {
       return false;
     }

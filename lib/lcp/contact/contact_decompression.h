@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// The decompression of an impact by Poisson's law: a contact problem with a least impulse o a
-// contact, e times that of its compression (0: it does not rebound).
+// The decompression of an impact by Poisson's law: a contact problem in which each contact has a
+// least impulse o, e times its impulse of compression (0: it does not rebound).
 //
 //   M v − Aᵀ y − Σ (nᵀ λn + tᵀ λt) = p,   A v = b
 //   s_n = n v + c_n ≥ 0,   λn ≥ o,   s_n (λn − o) = 0
 //   |λt| ≤ μ λn, against the sliding speed t v + c_t
 //
 // Each contact is open (o = 0 alone), closed (s_n = 0), or driven (λn = o, s_n ≥ 0), and sticks or
-// slides as others do. Modes that the solution of their linear system contradicts are changed and
-// it is solved again; where that does not settle, the dense portfolio on the one-sided form says
-// them. A solution counts only by its scaled natural residual.
+// slides like any other contact. Modes that the solution of their linear system contradicts are
+// changed and the system is solved again; where that does not converge, the dense portfolio finds
+// the modes from the one-sided form. A solution is accepted only by its scaled natural residual.
 //
 // Pfeiffer, Glocker: Multibody Dynamics with Unilateral Contacts, 1996, ch. 8.
 
@@ -23,7 +23,7 @@ namespace tangible {
 
 class DecompressionSolver {
  public:
-  /// The contacts' offsets are given; `driven` of each is found, and the pushed momentum.
+  /// The contacts' offsets are given; Solve sets `driven` of each contact and `pushed_load`.
   /// `solution` holds a guess on entry (the compression's modes, sized for the problem) and the
   /// solution on return, its normal impulses with the offsets in them.
   ContactSolverReport Solve(const ContactSolverOptions& options, ContactProblem<double>* problem,

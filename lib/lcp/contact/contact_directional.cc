@@ -196,8 +196,8 @@ void ContactDirectional::MakeMatrix() {
   }
 }
 
-// The right-hand side of the base's system: the rows that it has, and what friction changes at
-// given normal impulses.
+// The right-hand side of the base system: its rows of r, and the change of friction at given normal
+// impulses.
 void ContactDirectional::FillBase(const std::vector<double>& r, const std::vector<double>& friction,
                                   std::vector<double>* x) const {
   x->assign(3 * static_cast<size_t>(base_.num_blocks()), 0.0);

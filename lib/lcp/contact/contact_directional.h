@@ -5,8 +5,8 @@
 //
 // At a kink the solution is a piecewise linear function of the data: along a direction of the data
 // it has a derivative, which is not linear in the direction. Contacts that are not degenerate keep
-// their modes; the rates of a degenerate one solve what is left of its complementarity, with ṡ, ẇ
-// those of its speeds and λ̇ of its impulses:
+// their modes; the rates of a degenerate one satisfy the remaining complementarity conditions,
+// where ṡ, ẇ are the rates of its speeds and λ̇ those of its impulses:
 //
 //   touches              s = λn = 0, sliding at w ≠ 0 or without friction:
 //                        0 ≤ λ̇n ⊥ ṡ ≥ 0,  λ̇t = −σ μ λ̇n,  σ = sign w
@@ -19,7 +19,7 @@
 //
 //   ẋ = K⁻¹ (r + B z),   0 ≤ z ⊥ q + W z ≥ 0
 //
-// a plain LCP of one to three rows a degenerate contact, solved by the portfolio (solver.h).
+// a plain LCP of one to three rows for each degenerate contact, solved by the portfolio (solver.h).
 // Source: J.-S. Pang, Newton's method for B-differentiable equations, Math. Oper. Res. 15 (1990)
 // 311.
 
@@ -42,7 +42,7 @@ struct ContactKink {
   double sign = 0.0;  ///< σ; 0 without friction
 };
 
-/// The kink of each contact; `tolerance` is relative to the scales of contact_residual.h, and
+/// Finds the kink of each contact; `tolerance` is relative to the scales of contact_residual.h, and
 /// `touching[i]` says that an open contact's slack is 0 where all of its terms are rounding.
 /// kFrictionFromZero is a kink only for directions in which μ changes.
 void FindKinks(const ContactProblem<double>& problem, const ContactSolution<double>& solution,
@@ -52,14 +52,14 @@ void FindKinks(const ContactProblem<double>& problem, const ContactSolution<doub
 class ContactDirectional {
  public:
   /// Factorises; false where the system of the other modes is singular. `problem` and `solution`
-  /// must stay until the last Solve.
+  /// must exist until the last Solve.
   bool Factor(const ContactProblem<double>& problem, const ContactSolution<double>& solution,
               const std::vector<ContactKink>& kinks);
 
   /// The rows in which a direction is given, r = −(∂R/∂w) ẇ at fixed impulses and speeds: 3
-  /// num_blocks(), bodies and joints first. blocks()[i] is that of contact i, −1: none; as modes()
-  /// say it has a normal row, and a tangent row where sticking, which degenerate contacts are
-  /// wherever they may have friction.
+  /// num_blocks(), bodies and joints first. blocks()[i] is the block of contact i, −1: none.
+  /// According to modes() it has a normal row, and a tangent row if the contact sticks; degenerate
+  /// contacts count as sticking wherever they may have friction.
   const std::vector<ContactMode>& modes() const { return row_modes_; }
   const std::vector<int>& blocks() const { return row_blocks_; }
   int num_blocks() const { return num_blocks_; }
@@ -75,8 +75,8 @@ class ContactDirectional {
 
  private:
   enum class Part : unsigned char { kNormal, kTangent, kSpeed };
-  // A row of the LCP. kNormal: λ̇n ⊥ ṡ. kTangent: ζ ⊥ σ ẇ, or λ̇t + μ λ̇n ⊥ ẇ⁺. kSpeed: ẇ⁻ ⊥ what is
-  // left of friction, the row after its kTangent.
+  // A row of the LCP. kNormal: λ̇n ⊥ ṡ. kTangent: ζ ⊥ σ ẇ, or λ̇t + μ λ̇n ⊥ ẇ⁺. kSpeed: ẇ⁻ ⊥ the
+  // remaining friction, the row after its kTangent.
   struct Row {
     int contact;
     Part part;

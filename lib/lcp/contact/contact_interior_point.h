@@ -21,13 +21,13 @@
 
 namespace tangible {
 
-/// Scratch; keeps its memory. z and s have three entries a contact.
+/// Scratch that keeps its memory. z and s have three entries for each contact.
 template <typename T>
 struct InteriorPointWorkspace {
   BlockLu<T> lu;
   std::vector<std::pair<int, int>> edges;
   std::vector<T> v, y, z, s;
-  std::vector<T> step;  ///< of (v, y, z): three a block
+  std::vector<T> step;  ///< of (v, y, z): three for each block
   std::vector<T> affine;
   std::vector<T> rhs, correction;  ///< of the refined solve
   std::vector<T> ds, ds_affine, target, residual;
@@ -44,14 +44,14 @@ struct ContactInteriorPointOptions {
   double complementarity = kContactComplementarity;  ///< goal: mean of z s / κ
   int max_iterations = 100;
   bool resume = false;  ///< goes on from where the workspace's last call on the same problem ended
-  /// Of the term on the change of impulses that keeps redundant contacts regular
+  /// Size of the term on the change of impulses that keeps the system of redundant contacts regular
   /// (contact_interior_point_inl.h).
   double proximal = kProximal;
 };
 
 /// Solves from a neutral start until the mean of z s / κ is at most `complementarity` (1e-14 for
-/// unrolled derivatives). Fills v, impulses and modes of `solution`. Never NaN: a step that is not
-/// finite ends it, unconverged.
+/// unrolled derivatives). Fills v, impulses and modes of `solution`. Never returns NaN: a step that
+/// is not finite ends the iteration, unconverged.
 template <typename T>
 InteriorPointOutcome SolveContactsByInteriorPoint(const ContactProblem<T>& problem,
                                                   const ContactInteriorPointOptions& options,

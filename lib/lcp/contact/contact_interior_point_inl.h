@@ -28,7 +28,7 @@ class InteriorPointSystem {
         nc_(static_cast<int>(problem.contacts.size())) {}
 
  protected:
-  // Refinements of a linear solve.
+  // Maximum number of refinements of a linear solve.
   static constexpr int kMaxRefinements = 3;
   // Where joints form loops their rows may be dependent; a proximal term keeps K regular and does
   // not change the solution, as it acts on the change of y only.
@@ -38,10 +38,11 @@ class InteriorPointSystem {
     const double proximal = row % 3 == 2 ? 0.0 : proximal_ * w_.unit_s[row] / w_.unit_z[row];
     return w_.s[row] / w_.z[row] + proximal;
   }
-  // Redundant contacts make K as ill-conditioned as 1 / complementarity. A term on the change of z
-  // bounds that and does not change the solution.
+  // Redundant contacts give K a condition number of the order of 1 / complementarity. A term on the
+  // change of z bounds it and does not change the solution.
 
-  // Whether a row of z, s exists: the normal one, unless λn is given, or a contact with friction.
+  // Whether a row of z, s exists: the normal row exists unless λn is given, the others where the
+  // contact has friction.
   bool Used(int row) const {
     const ContactBlock<T>& contact = p_.contacts[row / 3];
     return row % 3 == 0 ? !contact.limit_given : contact.has_friction;
@@ -165,8 +166,9 @@ class InteriorPointSystem {
     }
   }
 
-  // step += K⁻¹ (rhs − K step). Near the end, with redundant contacts, K is as ill-conditioned as
-  // 1 / complementarity; without this the equations drift by 1e-6 and the iteration stalls.
+  // step += K⁻¹ (rhs − K step). Near the end, with redundant contacts, the condition number of K is
+  // of the order of 1 / complementarity; without refinement the equations drift by 1e-6 and the
+  // iteration stalls.
   void Refine() {
     double last = HUGE_VAL;
     for (int round = 0; round < kMaxRefinements; ++round) {
@@ -177,7 +179,7 @@ class InteriorPointSystem {
         size += std::abs(ValueOf(w_.correction[i]));
       }
       if (!(size < last)) {
-        break;  // it no longer helps (or is not finite)
+        break;  // refinement no longer helps, or is not finite
       }
       for (size_t i = 0; i < w_.step.size(); ++i) {
         w_.step[i] += w_.correction[i];

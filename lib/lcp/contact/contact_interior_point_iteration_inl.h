@@ -14,14 +14,16 @@
 namespace tangible {
 namespace internal {
 
-// Fraction of the way to the boundary; near 1 at the end, so that convergence stays fast.
+// The step as a fraction of the way to the boundary; near 1 at the end, so that convergence stays
+// fast.
 inline constexpr double kStepToBoundary = 0.995;
 inline constexpr double kShortening = 0.8;
 inline constexpr int kMaxShortenings = 20;
-// After a shorter step the next one goes back to the central path, without the second-order term.
+// After a step shorter than this the next one returns to the central path, without the second-order
+// term.
 inline constexpr double kRecentreBelow = 0.2;
 inline constexpr double kRecentring = 0.5;
-// So many short steps in a row mean that rounding has stopped the iteration.
+// This many short steps in a row mean that rounding has stopped the iteration.
 inline constexpr int kMaxShortSteps = 20;
 
 template <typename T>
@@ -108,7 +110,7 @@ class ContactIteration : private InteriorPointSystem<T> {
     return Advance(alpha);
   }
 
-  // Largest violation of the three equations, relative to the units.
+  // Largest violation of the three equations, relative to their units.
   double Violation() {
     Residuals();
     double worst = 0.0;
@@ -160,8 +162,8 @@ class ContactIteration : private InteriorPointSystem<T> {
   }
 
   void SetScales() {
-    // One speed for all: with a contact's own, a third of the problems of a settling pile were
-    // lost.
+    // One speed scale is used for all contacts: with a scale for each contact a third of the
+    // problems of a settling pile were not solved.
     double speed = 0.0;
     for (const ContactBlock<T>& c : p_.contacts) {
       const double c_n = ValueOf(c.c_n);
@@ -194,14 +196,15 @@ class ContactIteration : private InteriorPointSystem<T> {
         const double impulse = speed / RowMobility(p_.mass, c.a, c.tangent_a, c.b, c.tangent_b);
         w_.unit_s[3 * i + 1] = speed;
         w_.unit_z[3 * i + 1] = impulse;
-        // The cone row's slack is 2 μ λn − σ: measured by max(1, μ), so that μ up to 1e6 works.
+        // The cone row's slack is 2 μ λn − σ: its unit grows with max(1, μ), so that μ up to 1e6
+        // works.
         w_.unit_s[3 * i + 2] = impulse * std::max(1.0, 2.0 * ValueOf(c.friction));
         w_.unit_z[3 * i + 2] = speed;
       }
     }
   }
 
-  // residual := right-hand side of the Newton system but for the complementarity's part.
+  // residual := right-hand side of the Newton system except for the complementarity rows.
   void Residuals() {
     w_.residual.assign(3 * (nb_ + nj_ + nc_), T(0.0));
     T* r = w_.residual.data();
@@ -239,7 +242,7 @@ class ContactIteration : private InteriorPointSystem<T> {
     }
   }
 
-  // Newton direction for z ds + s dz = target; fills step and ds.
+  // Computes the Newton direction for z ds + s dz = target; fills step and ds.
   void Direction() {
     w_.step = w_.residual;
     T* contact_rows = w_.step.data() + 3 * (nb_ + nj_);
@@ -291,7 +294,8 @@ class ContactIteration : private InteriorPointSystem<T> {
   }
 
   // The fraction of the step after which no product z s has fallen far below the mean: friction
-  // makes the problem non-monotone, and a point that hugs the boundary goes no further.
+  // makes the problem non-monotone, and from a point too close to the boundary the iteration makes
+  // no progress.
   double CentredFraction(double alpha) const {
     double fraction = 1.0;
     for (int trial = 0; trial < kMaxShortenings; ++trial) {
@@ -313,7 +317,7 @@ class ContactIteration : private InteriorPointSystem<T> {
       }
       fraction *= kShortening;
     }
-    return 1.0;  // it was off the path before: go on as far as the boundary allows
+    return 1.0;  // already off the path: only the boundary limits the step
   }
 
   bool Advance(const T& alpha) {
@@ -354,7 +358,8 @@ InteriorPointOutcome SolveContactsByInteriorPoint(const ContactProblem<T>& probl
     iteration.Start();
   }
   outcome.complementarity = iteration.Complementarity();
-  // At least two steps: the first makes the equations hold, which a neutral start need not.
+  // At least two steps are taken: the first makes the equations hold, which they need not at a
+  // neutral start.
   int short_steps = 0;
   while (outcome.iterations < options.max_iterations && short_steps < internal::kMaxShortSteps) {
     if (!iteration.Step()) {

@@ -7,7 +7,7 @@
 namespace tangible {
 namespace {
 
-// Threads take turns only where an island costs more than handing it over.
+// Threads are used only where solving an island costs more than handing it to a thread.
 constexpr size_t kLeastContactsForThreads = 64;
 
 }  // namespace
@@ -26,7 +26,7 @@ int IslandSolver::Root(int body) {
   return body;
 }
 
-// The smaller root stays, so that an island's root is its first body.
+// The smaller root remains the root, so that an island's root is its first body.
 void IslandSolver::Join(int a, int b) {
   if (a < 0 || b < 0) {
     return;
@@ -155,7 +155,7 @@ void IslandSolver::Gather(const ContactProblem<double>& problem,
   }
 }
 
-// Islands have nothing in common: threads write to different places.
+// Islands share no bodies or contacts, so that threads write to different places.
 void IslandSolver::Scatter(const Island& island, const ContactSolution<double>& solved) {
   for (size_t k = 0; k < island.bodies.size(); ++k) {
     std::copy_n(&solved.motion[3 * k], 3,

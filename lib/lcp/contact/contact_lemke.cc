@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Lemke's method for a contact problem, on the one-sided form that it is copositive in: a contact
-// with friction has λn, two one-sided tangential impulses and its sliding speed,
+// Lemke's method for a contact problem, on the one-sided form, in which the problem is copositive:
+// a contact with friction has λn, two one-sided tangential impulses and its sliding speed,
 //   G = [n; t; −t; 0],  F = [0 0 0 0; 0 0 0 1; 0 0 0 1; μ −1 −1 0]  on (λn − o, λ+, λ−, γ).
 // A least impulse o acts in p, and adds μ o to the constant of the last row.
 #include <cmath>
@@ -26,9 +26,9 @@ void SetRow(int a, const RowPart<double>& row_a, int b, const RowPart<double>& r
   }
 }
 
-// Up to so many rows of z the dense form is worth its time, which grows as their cube. Of the
-// portfolio's many attempts each costs that; a proof that nothing is feasible and a single path of
-// Lemke's cost less (400 rows: 0.07 s with a pivot a row, seconds at its limit of pivots).
+// Up to this many rows of z the dense form is worth its time, which grows as their cube. Each of
+// the portfolio's many attempts costs that; a proof of infeasibility and a single path of Lemke's
+// method cost less (400 rows: 0.07 s with one pivot for each row, seconds at its limit of pivots).
 constexpr int kMaxPortfolioRows = 240;
 constexpr int kMaxRows = 400;
 // v and y are eliminated by an orthogonal decomposition of (both together)³: 1000 take 0.8 s and
@@ -37,7 +37,7 @@ constexpr int kMaxUnknowns = 1000;
 
 int RowsOf(const ContactBlock<double>& contact) { return contact.has_friction ? 4 : 1; }
 
-// Whether the dense form has at most so many rows of z; asked before its matrices are made.
+// Whether the dense form has at most this many rows of z; called before its matrices are made.
 bool Fits(const ContactProblem<double>& problem, int max_rows) {
   size_t unknowns = 3 * static_cast<size_t>(problem.num_bodies);
   for (const JointBlock<double>& joint : problem.joints) {

@@ -44,8 +44,8 @@ ModeChange Contradiction(const ContactBlock<double>& contact, const ContactValue
     return {ContactMode::kOpen, -normal / zeta};
   }
   if (mode == ContactMode::kSticking) {
-    // Slip is what δ leaves of a sticking row; where it should be more (two points of a body that
-    // turns cannot both stick) the impulse outgrows friction.
+    // The sliding speed of a sticking contact is only the effect of δ; where it should be more (two
+    // points of a body that turns cannot both stick) the impulse exceeds the friction limit.
     const double excess = std::abs(tangent) - contact.friction * normal;
     const double scale = std::max(zeta * std::max(1.0, contact.friction), std::abs(tangent));
     if (excess > kModeTolerance * scale) {

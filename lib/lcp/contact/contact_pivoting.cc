@@ -12,7 +12,7 @@
 namespace tangible {
 namespace {
 
-// Rounds in which sliding contacts that would pull are opened before the start.
+// Maximum number of rounds in which sliding contacts that would pull are opened before the start.
 constexpr int kMaxStartRounds = 30;
 
 bool Slides(ContactMode mode) {
@@ -28,8 +28,8 @@ void ContactPivoting::Reserve(int num_blocks, int num_contacts) {
   joint_centre_.reserve(3 * static_cast<size_t>(num_blocks));
 }
 
-// Numbers in [0.5, 1) that no symmetry of a scene shares, the golden ratio's sequence; with a seed
-// in [0.1, 10), log-uniform.
+// Numbers in [0.5, 1) from the sequence of the golden ratio, which no symmetry of a scene repeats;
+// with a seed in [0.1, 10), log-uniform.
 double ContactPivoting::Scatter(size_t contact, int kind) const {
   const size_t at = 3 * contact + static_cast<size_t>(kind);
   if (scatter_ != 0) {
@@ -60,7 +60,7 @@ bool ContactPivoting::SolveSystem() {
       x_[2 * row] = p.joints[j].rhs[r] + delta[row] * joint_centre_[3 * j + r];
     }
   }
-  // Known impulses of a contact push its bodies.
+  // Adds the known impulses of a contact to its bodies.
   const auto push = [&](int a, const RowPart<double>& row_a, int b, const RowPart<double>& row_b,
                         double rate) {
     for (int i = 0; i < 3; ++i) {
@@ -190,14 +190,14 @@ int ContactPivoting::Tests(int contact, Test* tests) const {
   return count;
 }
 
-// Shifts under which the present modes solve the problem at τ = 1.
+// Chooses the shifts with which the present modes solve the problem at τ = 1.
 bool ContactPivoting::Start(From from) {
   for (int round = 0; round < kMaxStartRounds; ++round) {
     if (!SolveSystem()) {
       return false;
     }
-    // A sliding contact's friction follows its impulse, so a shift of a negative one would change
-    // the solution: it opens instead.
+    // The friction of a sliding contact is proportional to its normal impulse, so that a shift of a
+    // negative one would change the solution: such a contact is opened instead.
     bool opened = false;
     for (size_t i = 0; i < modes_.size(); ++i) {
       if (Slides(modes_[i]) && !problem_->contacts[i].limit_given &&
@@ -274,7 +274,7 @@ void ContactPivoting::SetCentre(const ContactSolution<double>& solution) {
   shifts_.assign(modes_.size(), Shift());
   const double shift = regularisation_ * kCentreShift * ImpulseScale(solution.normal_impulse);
   for (size_t i = 0; i < modes_.size(); ++i) {
-    // What τ adds to the centre is written as a shift of the rows.
+    // The shift of the centre by τ is written as a shift of the rows.
     const ContactBlock<double>& c = p.contacts[i];
     shifts_[i].centre_n = std::max(0.0, solution.normal_impulse[i]);
     shifts_[i].a_n = shift * Scatter(i, 0) * RowMobility(p.mass, c.a, c.normal_a, c.b, c.normal_b);
@@ -286,7 +286,7 @@ void ContactPivoting::SetCentre(const ContactSolution<double>& solution) {
   }
 }
 
-// The next inequality that becomes tight; of several at once the one that falls fastest.
+// The next inequality that becomes tight; if there are several, the one that falls fastest.
 ContactPivoting::Event ContactPivoting::NextEvent(double tau, double direction) const {
   Event event;
   event.distance = direction < 0.0 ? tau : HUGE_VAL;
@@ -315,7 +315,7 @@ ContactPivoting::Event ContactPivoting::NextEvent(double tau, double direction) 
 double ContactPivoting::Pivot(int contact, ContactMode next, double tau, double direction) {
   const ContactMode before = modes_[contact];
   if (before == ContactMode::kOpen && next == ContactMode::kSticking) {
-    // At λ' = 0 the sliding speed says which side of the cone is tight.
+    // At λ' = 0 the sign of the sliding speed determines which side of the cone is tight.
     next = Sliding(contact).At(tau) > 0.0 ? ContactMode::kSlidingPositive
                                           : ContactMode::kSlidingNegative;
   }

@@ -13,11 +13,11 @@
 //
 // While the modes hold, the solution is affine in τ: two right-hand sides of one system. Where an
 // inequality becomes tight, that contact changes its mode, and the path goes on in the direction
-// (which may turn back) in which the new mode's inequality becomes slack. The
-// path has finitely many pieces and ends at τ = 0, in a solution of the proximal problem, or runs
-// to infinity. For bounded or little friction the map is monotone and it arrives. Contacts that are
+// (which may turn back) in which the new mode's inequality becomes slack. The path has finitely
+// many pieces and ends at τ = 0, in a solution of the proximal problem, or runs to infinity. For
+// bounded or little friction the map is monotone and the path reaches τ = 0. Contacts that are
 // redundant, or nearly so (gaps of a lattice that differ by 1e-9 m), cost pivots but no accuracy: δ
-// decides among them.
+// determines the impulses among them.
 //
 // Source: R. W. Cottle, J.-S. Pang, R. E. Stone, The Linear Complementarity Problem, 1992, section
 // 4.5 (parametric methods); B. C. Eaves, On the basic theorem of complementarity, 1971.
@@ -32,9 +32,9 @@ namespace tangible {
 
 class ContactPivoting {
  public:
-  /// Where the path starts: from the solution's modes, which is short where few are wrong; or from
-  /// all contacts open, held apart by shifts, as Lemke's method does: on friction's copositive form
-  /// that path ends in a solution, if at length.
+  /// Where the path starts: at the solution's modes, which makes it short where few are wrong; or
+  /// at all contacts open, held apart by shifts, as in Lemke's method. On the copositive form of
+  /// friction the latter path ends in a solution, but may be long.
   enum class From { kModes, kOpen };
   /// Follows the path from `solution`'s modes; its impulses are the centre of the proximal step.
   /// On success `solution` has the modes at τ = 0 and the proximal problem's solution; otherwise it
@@ -43,7 +43,7 @@ class ContactPivoting {
              int max_pivots, ContactSystem* system, ContactSolution<double>* solution,
              int* factorisations);
   void Reserve(int num_blocks, int num_contacts);
-  /// Other shifts, over two powers of ten, for another path; 0: the usual ones.
+  /// Selects other shifts, spread over two powers of ten, for another path; 0: the default ones.
   void SetScatter(std::uint64_t seed) { scatter_ = seed; }
 
  private:
@@ -65,7 +65,7 @@ class ContactPivoting {
     ContactMode next = ContactMode::kOpen;
   };
 
-  // What breaks ties: a factor for one of a contact's shifts.
+  // A factor for one of a contact's shifts, so that no two inequalities become tight at once.
   double Scatter(size_t contact, int kind) const;
   void SetCentre(const ContactSolution<double>& solution);
   bool SolveSystem();

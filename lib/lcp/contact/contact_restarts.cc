@@ -2,10 +2,10 @@
 //
 // Paths of pivots that end in proximal steps, and many of them from random starts.
 //
-// Where speeds of surfaces and of rebound are any, a path may run into a jam: contacts that
-// contradict each other, whose impulses grow without limit as δ falls. Another path, over other
-// shifts or from other modes, ends elsewhere. One in ten of them arrives, or more, in problems of
-// up to 100 contacts that no other method solved; each takes some hundred pivots.
+// With arbitrary speeds of surfaces and of rebound a path may end at contacts that contradict each
+// other, whose impulses grow without limit as δ falls. Another path, over other shifts or from
+// other modes, ends elsewhere. At least one path in ten ends in a solution, in problems of up to
+// 100 contacts that no other method solved; each takes some hundred pivots.
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -18,12 +18,13 @@
 namespace tangible {
 namespace {
 
-// What has not arrived after so many rounds is tried with the values of
+// A path that has not converged after this many rounds is tried with the values of
 // kStubbornRegularisation in turn.
 constexpr int kStubbornRound = 8;
-// Restarts, and proximal steps of each (what arrives needs up to 4). Pivots as a multiple of the
-// contacts, one multiple more after every few; the factorisations of all together: a multiple of
-// the contacts, and less where one is dear.
+// Number of restarts, and of proximal steps of each (those that converge need up to 4). The limit
+// of pivots is a multiple of the number of contacts, which is raised by one after every few
+// restarts. The limit of all factorisations together is a multiple of the number of contacts, and
+// lower where one factorisation is expensive.
 constexpr int kMaxRestarts = 100;
 constexpr int kRestartRounds = 5;
 constexpr int kPivotsOfRestart = 20;
@@ -31,7 +32,7 @@ constexpr int kRestartsOfMultiple = 4;
 constexpr int kFactorisationsOfContact = 1000;
 constexpr int kMaxRestartWork = 8000000;
 
-// No contact acts.
+// Sets all contacts open, without impulses.
 void SetOpen(ContactSolution<double>* solution) {
   std::fill(solution->joint_impulse.begin(), solution->joint_impulse.end(), 0.0);
   std::fill(solution->normal_impulse.begin(), solution->normal_impulse.end(), 0.0);
@@ -39,7 +40,7 @@ void SetOpen(ContactSolution<double>* solution) {
   std::fill(solution->modes.begin(), solution->modes.end(), ContactMode::kOpen);
 }
 
-// Modes and impulses that have nothing to do with the problem but their size.
+// Draws modes and impulses that are independent of the problem except for their size.
 void DrawStart(const ContactProblem<double>& problem, std::mt19937_64* random,
                ContactSolution<double>* solution) {
   const auto draw = [&] { return static_cast<double>((*random)() >> 11) * 0x1p-53; };
@@ -93,8 +94,8 @@ bool ContactSolver::SolveByPivoting(const ContactProblem<double>& problem,
       ++report->factorisations;
       return system_.Factor(problem, solution->modes);
     }
-    // What δ leaves no longer falls: rows contradict each other by that much, and their impulses
-    // grow by as much a step until one meets its limit.
+    // The residual due to δ no longer falls: rows contradict each other by that much, and their
+    // impulses grow by the same amount in each step until one reaches its limit.
     if (regularisation == kLeastRegularisation && solution->modes == last_.modes &&
         report->residual > 0.5 * last_residual) {
       ExtrapolateImpulses(problem, last_, solution);
@@ -141,7 +142,7 @@ bool ContactSolver::SolveByRestarts(const ContactProblem<double>& problem,
   }
   pivoting_.SetScatter(0);
   if (!solved) {
-    // What was there before says no less, and where.
+    // The earlier solution is restored, and with it its residual and worst contact in the report.
     *solution = last;
     report->residual = before.residual;
     report->worst_contact = before.worst_contact;

@@ -11,17 +11,19 @@ namespace tangible {
 namespace {
 
 constexpr int kMaxRounds = 20;
-// Where more are contradicted than in the round before, and more than a few, they will not settle.
+// If more modes are contradicted than in the round before, and more than this, mode changes are
+// given up.
 constexpr int kFewContradicted = 2;
-// Pivots: from the guess (and half as many as contacts), and as multiples of that number.
+// Limits of pivots: from the guess (to which half the number of contacts is added), and as
+// multiples of the number of contacts.
 constexpr int kPivotsFromGuess = 40;
 constexpr int kPivotsFromInteriorPoint = 2;
 constexpr int kPivotsFromOpen = 20;
-// Up to so many contacts the dense portfolio takes milliseconds.
+// Up to this many contacts the dense portfolio takes milliseconds.
 constexpr size_t kFewContacts = 8;
-// Proximal steps at a path's end.
+// Maximum number of proximal steps at a path's end.
 constexpr int kMaxProximalRounds = 40;
-// A contact whose mode has been changed this often changes alone, the worst one first.
+// Contacts whose modes have been changed this often are changed one at a time, the worst first.
 constexpr int kMaxChangesTogether = 3;
 
 }  // namespace
@@ -118,7 +120,7 @@ void ContactSolver::SetCentre(const ContactSolution<double>& solution) {
 bool ContactSolver::SolveWithModes(const ContactProblem<double>& problem,
                                    ContactSolution<double>* solution, ContactSolverReport* report) {
   ++report->factorisations;
-  // From the last impulses where there may be a choice among them.
+  // The solve starts from the last impulses where impulses may not be unique.
   const auto open = std::count(solution->modes.begin(), solution->modes.end(), ContactMode::kOpen);
   const bool choice = static_cast<long>(solution->modes.size()) - open > 1 ||
                       (problem.redundant_joints && !problem.joints.empty());
@@ -174,9 +176,9 @@ bool ContactSolver::SolveByModeChanges(const ContactProblem<double>& problem,
         return false;
       }
       last_residual = report->residual;
-      SetCentre(*solution);  // what δ leaves goes with another proximal step
+      SetCentre(*solution);  // another proximal step removes the effect of δ
     } else if (contradicted > std::max(last_contradicted, kFewContradicted)) {
-      return false;  // an avalanche: pivots go one by one
+      return false;  // too many changes: pivoting changes one at a time
     }
     last_contradicted = contradicted > 0 ? contradicted : static_cast<int>(num_contacts);
   }
@@ -190,8 +192,8 @@ bool ContactSolver::Polish(const ContactProblem<double>& problem,
   bool polished = false;
   int worst = -1;
   double before = NaturalResidual(problem, *solution, &worst);
-  // A round may show that a row near its limit was judged wrongly; two more put it right or give
-  // up.
+  // The first round may show that the mode of a row near its limit was wrong; two more rounds
+  // correct it or give up.
   for (int round = 0; round < 3; ++round) {
     trial_ = *solution;
     SetCentre(*solution);
@@ -222,8 +224,8 @@ bool ContactSolver::Polish(const ContactProblem<double>& problem,
   if (polished || before > options.tolerance) {
     return before <= options.tolerance;
   }
-  // It was good enough as given. What was tried has left another system and other modes behind; the
-  // derivative needs those of the solution.
+  // The given solution was good enough. The attempts have left another system and other modes
+  // behind; the derivative needs those of the solution.
   solution->modes = given;
   ++report->factorisations;
   return system_.Factor(problem, given);
@@ -236,8 +238,8 @@ bool ContactSolver::SolveByInteriorPoint(const ContactProblem<double>& problem,
   ContactInteriorPointOptions interior_point;
   interior_point.max_iterations = options.max_iterations;
   if (options.smoothing > 0.0) {
-    // A smoothed solution is what was asked for; it is not exact, and no polish makes it so. The
-    // system of its modes is still factorised, for the derivative.
+    // The options ask for a smoothed solution, which is not exact and is not polished. The system
+    // of its modes is still factorised, for the derivative.
     interior_point.complementarity = options.smoothing;
     const InteriorPointOutcome outcome =
         SolveContactsByInteriorPoint(problem, interior_point, &interior_point_, solution);
@@ -246,11 +248,12 @@ bool ContactSolver::SolveByInteriorPoint(const ContactProblem<double>& problem,
     report->rung = Rung::kInteriorPoint;
     return system_.Factor(problem, solution->modes) && outcome.converged;
   }
-  // Most modes are clear early. Where margins are small they show later, if rounding lets the
-  // iteration go on.
+  // Most modes can be read early. Where margins are small the modes become visible later, if
+  // rounding lets the iteration go on.
   for (const double goal : kInteriorPointGoals) {
     interior_point.complementarity = goal;
-    // At the end the steps are small, and what the proximal term leaves of the equations must go.
+    // At the end the steps are small, and the error of the proximal term in the equations must
+    // vanish.
     interior_point.proximal = goal < kContactComplementarity ? kLastProximal : kProximal;
     const InteriorPointOutcome outcome =
         SolveContactsByInteriorPoint(problem, interior_point, &interior_point_, solution);
@@ -260,11 +263,11 @@ bool ContactSolver::SolveByInteriorPoint(const ContactProblem<double>& problem,
       return true;
     }
     if (outcome.complementarity > kNotArrived) {
-      break;  // it has not arrived; going on from there would not help
+      break;  // not converged, and more iterations would not help
     }
     interior_point.resume = true;
   }
-  // Rows that are almost redundant leave modes that only pivots tell apart.
+  // Where rows are almost redundant only pivots can determine the modes.
   ++report->fallbacks.pivoting;
   report->rung = Rung::kPivotingFromInteriorPoint;
   return SolveByPivoting(problem, options, ContactPivoting::From::kModes,
@@ -316,7 +319,7 @@ bool ContactSolver::SolveByLemke(const ContactProblem<double>& problem,
     report->rung = Rung::kRestarts;
     return SolveByRestarts(problem, options, solution, report);
   };
-  // What is cheaper comes first.
+  // The cheaper method comes first.
   return problem.contacts.size() <= kFewContacts ? by_dense() || by_restarts()
                                                  : by_restarts() || by_dense();
 }

@@ -6,22 +6,24 @@
 // 1. With modes given the problem is one linear system (contact_system.h). Its solution is exact
 //    where it satisfies every inequality. Modes that are contradicted are changed and the system is
 //    solved again, as long as fewer are contradicted from round to round. Where rows are redundant
-//    each solve is a proximal step from the last impulses: these change as little as the data
+//    each solve is a proximal step from the last impulses, which change as little as the data
 //    require.
-// 2. Pivoting from the guess (contact_pivoting.h), a bounded number of pivots: the search among the
-//    impulses of redundant rows, where the guess is nearly right. Counted as the guess's.
-// 3. Mehrotra's interior point (contact_interior_point.h), and pivoting from its modes where small
-//    margins hide them.
+// 2. 2. Pivoting from the guess (contact_pivoting.h) with a bounded number of pivots: it searches
+//    among the impulses of redundant rows where the guess is nearly right. It counts as part of the
+//    guess.
+// 3. Mehrotra's interior point (contact_interior_point.h), and pivoting from its modes where
+//    margins are too small to read the modes from it.
 // 4. Pivoting from all contacts open; for problems that are not proved infeasible pivoting from
-//    random starts (contact_restarts.cc); for those that are not large the dense portfolio. Only
-//    where Lemke's method is asked for it runs on the dense one-sided form.
+//    random starts (contact_restarts.cc); for problems that are not large the dense portfolio.
+//    Lemke's method on the dense one-sided form runs only if the options ask for it.
 //
 // After 3 and 4 the modes are identified and the mode system is solved once more: the polish. A
-// solution counts only by its scaled natural residual, recomputed from the data.
+// solution is accepted only by its scaled natural residual, recomputed from the data.
 //
-// Pivoting ends in proximal steps with δ falling from 1e-7 to 1e-8. What then still remains and no
-// longer falls is a contradiction of rows among which only the impulses' limits can choose: these
-// are approached along the impulses' last change.
+// Pivoting ends in proximal steps with δ falling from 1e-7 to 1e-8. A residual that then remains
+// and no longer falls means that rows contradict each other, and only the limits of impulses can
+// decide between them: the impulses are extrapolated along their last change until one reaches its
+// limit.
 
 #include <vector>
 
@@ -55,29 +57,29 @@ enum class Rung : unsigned char {
 
 /// "pivoting_from_guess", ...; "none".
 const char* NameOf(Rung rung);
-/// The method that a rung belongs to, as summaries count them.
+/// The method under which summaries count a rung.
 SolvedBy MethodOf(Rung rung);
 
 struct ContactSolverOptions {
   ContactSolverChoice choice = ContactSolverChoice::kAuto;
-  double tolerance = kLcpTolerance;  ///< of the scaled natural residual
-  int max_iterations = 100;          ///< of the interior point
+  double tolerance = kLcpTolerance;  ///< largest scaled natural residual
+  int max_iterations = 100;          ///< limit of iterations of the interior point
   double smoothing = 0.0;  ///< relative complementarity at which the interior point stops, without
                            ///< polish; 0: exact
 };
 
-/// What solves leaned on beyond changes of the guess's modes. A method that the options ask for is
-/// none.
+/// Counts of the methods that were needed beyond changes of the guess's modes. A method that the
+/// options ask for does not count.
 struct ContactFallbacks {
   long pivoting = 0;          ///< paths of pivots from the guess or from the interior point's modes
   long interior_point = 0;    ///< runs of the interior point
   long lemke = 0;             ///< paths of pivots from all contacts open, Lemke's method
   long dense = 0;             ///< the dense portfolio
   long restarts = 0;          ///< paths of pivots from many random starts
-  long extrapolation = 0;     ///< impulses of rows that contradict each other moved on
+  long extrapolation = 0;     ///< extrapolations of impulses of contradictory rows
   long regularised = 0;       ///< proximal steps in which δ stands for redundant rows
   long whole_system = 0;      ///< condensed systems that were factorised as a whole instead
-  long islands_together = 0;  ///< islands that could not be solved apart
+  long islands_together = 0;  ///< islands that could not be solved separately
 
   void Add(const ContactFallbacks& other);
 };
@@ -86,8 +88,8 @@ struct ContactSolverReport {
   bool solved = false;
   SolvedBy solved_by = SolvedBy::kNothing;
   Rung rung = Rung::kNone;
-  int factorisations = 0;  ///< of mode systems
-  int iterations = 0;      ///< of the interior point or Lemke
+  int factorisations = 0;  ///< number of factorised mode systems
+  int iterations = 0;      ///< number of iterations of the interior point or Lemke
   double residual = 0.0;   ///< scaled natural residual
   int worst_contact = -1;  ///< where it is largest, −1: an equation
   ContactFallbacks fallbacks;
@@ -119,7 +121,7 @@ class ContactSolver {
                             ContactSolverReport* report);
   bool SolveByLemke(const ContactProblem<double>& problem, const ContactSolverOptions& options,
                     ContactSolution<double>* solution, ContactSolverReport* report);
-  // Where a method ends without any iterate: the motion without contact impulses stands in for it,
+  // Used where a method ends without any iterate: the motion without contact impulses replaces it,
   // so that the report names a contact that is violated and by how much.
   void MeasureWithoutContacts(const ContactProblem<double>& problem,
                               ContactSolution<double>* solution, ContactSolverReport* report);
@@ -138,13 +140,13 @@ class ContactSolver {
   InteriorPointWorkspace<double> interior_point_;
   ModeSolve mode_solve_;
   ContactSolution<double> trial_, entry_, last_;
-  ContactSolution<double> centre_;  ///< impulses alone
+  ContactSolution<double> centre_;  ///< only the impulses are used
   std::vector<int> changes_;
   ContactScales scales_;
 };
 
 /// Whether the problem is small enough for the dense portfolio: up to 240 rows of the one-sided
-/// form (4 a contact with friction, else 1), and 1000 unknowns of bodies and joints.
+/// form (4 for each contact with friction, else 1), and 1000 unknowns of bodies and joints.
 bool FitsDensePortfolio(const ContactProblem<double>& problem);
 
 /// The dense portfolio (solver.h) with its further attempts, on the one-sided form; false where it

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// Threads that wait for work between calls: a step's islands are too short for threads of their
-// own.
+// Threads that wait for work between calls, because the islands of a step take too little time to
+// start threads for them.
 
 #include <algorithm>
 #include <atomic>
@@ -19,7 +19,7 @@ namespace tangible {
 /// Runs the indices of a loop on several threads, the caller's included.
 class WorkerPool {
  public:
-  /// Below 2: the caller alone.
+  /// Below 2: only the caller's thread works.
   explicit WorkerPool(int threads = 1) : threads_wanted_(std::max(1, threads)) {}
   WorkerPool(const WorkerPool&) = delete;
   WorkerPool& operator=(const WorkerPool&) = delete;
@@ -28,8 +28,8 @@ class WorkerPool {
   int threads() const { return threads_wanted_; }
 
   /// task(0, ·) ... task(count − 1, ·), each once, in any order, the second argument the number of
-  /// the thread; returns when all are done. With `threads` 1 the caller does them in turn. What a
-  /// task throws is thrown here, the first of them.
+  /// the thread; returns when all are done. With `threads` 1 the caller runs them in turn. If tasks
+  /// throw, the first exception is rethrown here.
   void Run(size_t count, int threads, const std::function<void(size_t, int)>& task);
 
  private:

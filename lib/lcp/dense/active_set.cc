@@ -20,7 +20,7 @@ using Eigen::VectorXd;
 
 double Ratio(double value, double scale) { return value == 0.0 ? 0.0 : value / scale; }
 
-// The point plus the correction that puts it on the equations of `modes`.
+// The point plus the correction with which it satisfies the equations of `modes`.
 LcpVector SolveModes(const MixedLcp<double>& problem, const std::vector<RowMode>& modes,
                      const LcpVector& from) {
   LcpVector point = from;
@@ -28,7 +28,7 @@ LcpVector SolveModes(const MixedLcp<double>& problem, const std::vector<RowMode>
     if (modes[i] == RowMode::kInactive) point.z[i] = 0.0;
   }
   const ModeSystem system(problem, modes, VectorXd::Zero(point.z.size()));
-  // The second pass corrects what rounding left of the first.
+  // The second pass corrects the rounding error of the first.
   for (int pass = 0; pass < 2; ++pass) {
     const LcpVector missing{problem.p - problem.M * point.v + problem.A.transpose() * point.y +
                                 problem.G.transpose() * point.z,
@@ -46,7 +46,8 @@ struct SignCheck {
   Index worst = -1;
 };
 
-// Rows of the wrong sign, beyond rounding; flips their modes (only the worst one if `only_worst`).
+// Finds the rows whose sign is wrong by more than rounding and flips their modes (only the worst
+// one if `only_worst`).
 enum class Flip { kAll, kWorst };
 SignCheck FlipWrongSigns(const MixedLcp<double>& problem, const LcpVector& point, Flip flip,
                          std::vector<RowMode>& modes) {
@@ -75,8 +76,8 @@ SignCheck FlipWrongSigns(const MixedLcp<double>& problem, const LcpVector& point
   return check;
 }
 
-// Keeps the better of two points. The one that was solved for on its modes' equations, with exact
-// zeros, wins over a residual that is lower only by rounding.
+// Keeps the better of two points. A point that solves the equations of its modes, with exact zeros,
+// is preferred to one whose residual is lower only by rounding.
 class Best {
  public:
   Best(const MixedLcp<double>& problem, LcpVector point)
@@ -95,8 +96,8 @@ class Best {
 
  private:
   void ConsiderWithoutCrumbs(LcpVector point) {
-    // What rounding left of an impulse, 1e-48, is of the same size as its cone's other terms: as a
-    // violation of that row it would count in full.
+    // An impulse that is a remainder of rounding, such as 1e-48, can be as large as the other terms
+    // of its cone row: it would count in full as a violation of that row.
     const LcpScales scales = ComputeScales(problem_, point.v, point.y, point.z);
     for (const double crumb : kCrumbs) {
       if (residual_ <= 2.0 * crumb) return;
@@ -152,8 +153,8 @@ LcpVector Polish(const MixedLcp<double>& problem, const LcpVector& point, int ma
     current = SolveModes(problem, modes, current);
     if (!current.v.allFinite() || !current.y.allFinite() || !current.z.allFinite()) break;
     best.Offer(current);
-    // All wrong rows at once while that makes progress, then one by one (both may be needed: the
-    // first is fast, the second cycles less).
+    // All wrong rows are flipped at once while that makes progress, then one by one (both may be
+    // needed: the first is fast, the second cycles less).
     const SignCheck check =
         FlipWrongSigns(problem, current, patience > 0 ? Flip::kAll : Flip::kWorst, modes);
     if (check.violations == 0) break;

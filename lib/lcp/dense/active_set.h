@@ -5,8 +5,8 @@
 //
 // Row i is active (sᵢ = 0) where zᵢ / ζᵢ > sᵢ / σᵢ (problem.h), else inactive (zᵢ = 0). The
 // equality system of these modes is solved for the *correction* of the given point, of least norm
-// where rows are redundant, so that impulses which are not unique stay where they are: near the
-// given, non-negative ones (the minimum-norm impulses of right modes can be negative). Rows with a
+// where rows are redundant, so that impulses which are not unique stay near the given, non-negative
+// ones (the impulses of minimum norm can be negative although the modes are right). Rows with a
 // wrong sign change their mode, a bounded number of times.
 
 #include <vector>
@@ -16,13 +16,14 @@
 
 namespace tangible {
 
-/// The modes read from a point, none of them a kink.
+/// The modes read from a point; no row counts as a kink.
 std::vector<RowMode> IdentifyModes(const MixedLcp<double>& problem, const LcpVector& point);
 
-/// The point of the least scaled residual among the given one (with negative z set to 0) and those
-/// visited. Cost: a factorisation a visited set of modes, at most `max_rounds`.
+/// Returns the point of the least scaled residual among the given one (with negative z set to 0)
+/// and those visited. Cost: one factorisation for each visited set of modes, at most `max_rounds`.
 LcpVector Polish(const MixedLcp<double>& problem, const LcpVector& point, int max_rounds = 30);
-/// The same, beginning with these modes: those of a basis, where the point is too near others.
+/// The same, beginning with the given modes: for example those of a basis, where the point is too
+/// close to a change of modes to read them from it.
 LcpVector Polish(const MixedLcp<double>& problem, const LcpVector& point, int max_rounds,
                  std::vector<RowMode> modes);
 

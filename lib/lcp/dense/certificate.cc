@@ -19,7 +19,7 @@ std::string At(const Certificate& certificate) {
   return certificate.margin_where.empty() ? "" : " at " + certificate.margin_where;
 }
 
-// Why the derivative may change nearby, or empty.
+// The reason why the derivative may change nearby; empty if there is none.
 std::string Kink(const Certificate& certificate) {
   if (!certificate.coordinates.empty()) {
     return certificate.coordinates;

@@ -3,9 +3,10 @@
 //
 // The certificate of a derivative: what a user needs to know to trust it.
 //
-// The map from data to solution is smooth inside a set of contact modes and has kinks on its
-// border; where values themselves jump it is discontinuous. A derivative says how near those are,
-// how well its linear systems were solved, and what was done where it is not unique.
+// The map from data to solution is smooth while the contact modes stay the same and has kinks where
+// they change; where values themselves jump it is discontinuous. The certificate reports how near
+// kinks and jumps are, how well the linear systems of the derivative were solved, and what was done
+// where the derivative is not unique.
 
 #include <limits>
 #include <string>
@@ -14,41 +15,42 @@
 
 namespace tangible {
 
-/// Beyond this condition no digit of a linear system's solution is certain.
+/// Above this condition number no digit of a linear system's solution is certain.
 inline constexpr double kConditionLimit = 1e16;
 
 struct Certificate {
-  /// Smallest distance to a change of modes: zᵢ / ζᵢ of active, sᵢ / σᵢ of inactive rows.
+  /// Smallest distance to a change of modes: zᵢ / ζᵢ for active, sᵢ / σᵢ for inactive rows.
   /// Infinite if there are no rows.
   double margin_min = std::numeric_limits<double>::infinity();
   std::string margin_where{};  ///< the row, contact or step of margin_min
   int degenerate_rows = 0;     ///< rows at a kink: z = s = 0, either mode possible
   int redundant_rows = 0;      ///< rank deficiency: z or y are not unique, v is
   double condition = 1.0;      ///< largest condition estimate of a linear system
-  /// Largest relative residual of a linear solve; of a rollout in which that says little (masses
-  /// far apart, redundant rows, many events), also what its tangent and adjoint differ by.
+  /// Largest relative residual of a linear solve. For a rollout in which the residual alone says
+  /// little (very different masses, redundant rows, many events) it also includes the difference
+  /// between its tangent and its adjoint.
   double linear_residual = 0.0;
   int mode_switches = 0;  ///< over a rollout: contacts that changed mode between steps
   int events = 0;         ///< over a rollout: impacts and other events
   int fallbacks = 0;      ///< over a rollout: steps not solved by the first solver
   std::string
       coordinates{};  ///< where they round so coarsely that modes may be rounding; else empty
-  /// Where the solution is smoothed so much that its derivatives are not those of the modes; else
-  /// empty.
+  /// Where the solution is smoothed so much that its derivatives differ from those of the contact
+  /// modes; else empty.
   std::string smoothed{};
   std::string one_sided{};      ///< why the derivative is one-sided or a mean of two; else empty
   std::string discontinuous{};  ///< what makes the value itself jump nearby; else empty
-  std::string verdict{};        ///< SetVerdict's
+  std::string verdict{};        ///< written by SetVerdict
 };
 
 /// Adds `other` (another step of a rollout): the worse margin, condition and residual, the sum of
 /// the counts, the first reasons. The verdict is cleared.
 void Merge(const Certificate& other, Certificate& certificate);
 
-/// Writes `verdict`: what applies of "discontinuous: …", "near a kink: …" (coordinates that are
+/// Writes `verdict`: those that apply of "discontinuous: …", "near a kink: …" (coordinates that are
 /// too large, smoothing, degenerate rows, a margin below kNearKinkMargin, or a linear system that
-/// was not solved or is of a condition beyond kConditionLimit) and "one-sided: …", the worst
-/// first, joined by "; "; if nothing does, "trustworthy".
+/// was not solved or whose condition number exceeds kConditionLimit) and "one-sided: …", the worst
+/// first, joined by "; "; if none applies, "trustworthy".
 void SetVerdict(Certificate& certificate);
 
 }  // namespace tangible

@@ -3,9 +3,9 @@
 //
 // Dense LU with partial pivoting for every scalar, P K = L U, n x n; solves K x = r and Kᵀ x = r.
 //
-// Why not Eigen's: its vector solves skip entries of the right-hand side whose *value* is zero, and
-// with it their derivatives (a body at rest). Here no entry is ever skipped. Pivots are chosen by
-// value; a derivative does not depend on the order of elimination.
+// Eigen's LU is not used because its vector solves skip entries of the right-hand side whose
+// *value* is zero and thereby lose their derivatives (a body at rest). Here no entry is ever
+// skipped. Pivots are chosen by value; a derivative does not depend on the order of elimination.
 
 #include <vector>
 
@@ -25,7 +25,7 @@ class DenseLu {
   /// K⁻ᵀ r. Cost n².
   VectorX<T> SolveTransposed(const VectorX<T>& r) const;
 
-  /// The smallest pivot over the largest, by value: a cheap hint of near singularity.
+  /// The smallest pivot over the largest, by value: a cheap indicator of near singularity.
   double pivot_ratio() const { return pivot_ratio_; }
 
  private:

@@ -33,7 +33,8 @@ LcpVector LcpDerivative::Tangent(const MixedLcp<double>& perturbation) const {
   const LcpVector rhs = RightHandSide(perturbation);
   double error = 0.0;
   LcpVector change = system_.Solve(rhs, &error);
-  // Terms that cancel leave their rounding, which no solve can be measured against.
+  // The residual is compared with the size of the terms, because terms that cancel leave only
+  // rounding.
   const LcpVector& at = rows_.point;
   const double terms =
       LargestEntry(perturbation.p) + LargestEntry(perturbation.b) + LargestEntry(perturbation.c) +
@@ -57,7 +58,7 @@ bool LcpDerivative::OneSidedTangent(const MixedLcp<double>& perturbation, LcpVec
   const ModeSystem system(problem_, held, rows_.kink_weight);
   const LcpVector rhs = RightHandSide(perturbation);
   change = system.Solve(rhs);
-  // ds on the kink rows = W dz + q, the others held to their modes.
+  // On the kink rows ds = W dz + q; the other rows keep their modes.
   const Eigen::Index n = static_cast<Eigen::Index>(kinks.size());
   const auto slack = [&](const LcpVector& x) -> VectorX<double> {
     return problem_.G(kinks, Eigen::all) * x.v + problem_.F(kinks, Eigen::all) * x.z;

@@ -15,13 +15,14 @@
 //   ℓ_p = u     ℓ_b = t      ℓ_c = −w      ℓ_M = −sym(u vᵀ)     ℓ_F = −w zᵀ
 //   ℓ_G = z uᵀ − w vᵀ        ℓ_A = y uᵀ − t vᵀ
 //
-// (F is not symmetric, so the transpose is another system.) This is the differential with D(z),
-// D(s) in the limit of exact complementarity, where a row is either divided by z or drops out.
+// (F is not symmetric, so the transposed system differs from (1).) This is the differential of the
+// interior-point equations with D(z), D(s) in the limit of exact complementarity, where a row is
+// either divided by z or drops out.
 //
 // Where rows are redundant z and y are not unique; dv is right for perturbations that keep the rows
-// consistent (all physical ones), and single entries of ℓ_G, ℓ_F, ℓ_c, ℓ_A mean something only
-// contracted with those. At a kink it is the element of the central path. The certificate says
-// both.
+// consistent (all physical ones), and single entries of ℓ_G, ℓ_F, ℓ_c, ℓ_A are meaningful only
+// contracted with such perturbations. At a kink the derivative is the element of the generalised
+// Jacobian that the central path selects. The certificate reports both cases.
 
 #include "tangible/lcp/dense/certificate.h"
 #include "tangible/lcp/dense/mode_system.h"
@@ -33,7 +34,7 @@ namespace tangible {
 class LcpDerivative {
  public:
   /// `problem` valid and conformed, `solution` solved. Both are copied. Cost: one factorisation,
-  /// and what ClassifyRows costs where rows are degenerate.
+  /// and the cost of ClassifyRows where rows are degenerate.
   LcpDerivative(const MixedLcp<double>& problem, const LcpVector& solution);
 
   /// The change of the solution for a change of the data, which has the shape of the problem.
@@ -41,7 +42,8 @@ class LcpDerivative {
 
   /// The one-sided derivative along `perturbation`, exact also at kinks: dz ≥ 0, ds ≥ 0 and
   /// complementary on the kink rows, a small LCP. False if that LCP has no solution (the perturbed
-  /// problem has none, or jumps). The other side's is −OneSidedTangent(−perturbation).
+  /// problem has none, or its solution jumps). The derivative from the other side is
+  /// −OneSidedTangent(−perturbation).
   bool OneSidedTangent(const MixedLcp<double>& perturbation, LcpVector& change) const;
 
   /// The gradient of a loss with respect to the data, in the shape of the problem, given its
@@ -50,7 +52,7 @@ class LcpDerivative {
 
   const RowModes& row_modes() const { return rows_; }
 
-  /// Its linear_residual is that of the derivatives taken so far.
+  /// Its linear_residual covers the derivatives computed so far.
   Certificate certificate() const;
 
  private:

@@ -60,7 +60,8 @@ VectorXd FindFarkas(const MixedLcp<double>& problem) {
   farkas.tail(problem.num_z()) = (-farkas.tail(problem.num_z())).cwiseMax(0.0);
   const double largest = farkas.size() > 0 ? farkas.cwiseAbs().maxCoeff() : 0.0;
   if (!(largest > 0.0)) return VectorXd();
-  // The residual is a difference of numbers of f's size: what is below their rounding is zero.
+  // The residual is a difference of numbers of f's size: entries below their rounding count as
+  // zero.
   const double rounding = kLcpRounding * scaling.row.maxCoeff() * f.cwiseAbs().maxCoeff();
   const double threshold = std::clamp(rounding / largest, kLeastFarkasEntry, kMostFarkasEntry);
   farkas = farkas.unaryExpr(

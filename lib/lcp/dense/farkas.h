@@ -12,12 +12,12 @@
 
 namespace tangible {
 
-/// Whether (u, t, w) proves infeasibility: each condition to 1e-10 of the sizes of its terms, and
-/// δ at least 1e-6 of the sizes of its own.
+/// Whether (u, t, w) proves infeasibility: each condition holds to 1e-10 of the sizes of its terms,
+/// and δ is at least 1e-6 of the sizes of its terms.
 bool CheckFarkas(const MixedLcp<double>& problem, const VectorX<double>& farkas);
 
-/// A checked vector (u, t, w), largest entry 1; or empty if the constraints can be satisfied or
-/// nothing could be proved. By non-negative least squares: up to 3 (2 nz) QRs.
+/// Returns a checked vector (u, t, w), largest entry 1; empty if the constraints can be satisfied
+/// or nothing could be proved. Method: non-negative least squares, up to 3 (2 nz) QRs.
 VectorX<double> FindFarkas(const MixedLcp<double>& problem);
 
 }  // namespace tangible

@@ -38,7 +38,7 @@ class InteriorPoint {
     InteriorPointResult<T> result;
     Start();
     double best = std::numeric_limits<double>::infinity();
-    // Where numbers overflow from the start no iterate is ever stored.
+    // This is the result if numbers overflow in the first iteration, before any iterate is stored.
     result.v = VectorX<T>::Constant(nv_, T(0.0));
     result.y = VectorX<T>::Constant(num_equations_ - nv_, T(0.0));
     result.z = VectorX<T>::Constant(nz_, T(0.0));
@@ -46,7 +46,8 @@ class InteriorPoint {
       const VectorX<T> r = Residual();
       const T kappa = Complementarity(z_, s_);
       const double missed = LargestValue(r);
-      // A residual that is small enough must not hide that κ still falls.
+      // The residual counts only above its goal, so that a further decrease of κ is still seen as
+      // progress.
       const double merit = std::max(missed, options_.residual) + ValueOf(kappa);
       if (!std::isfinite(merit)) break;
       if (merit <= best) {
@@ -82,7 +83,7 @@ class InteriorPoint {
       q_[i] *= scaling.row[i];
       for (Eigen::Index j = 0; j < n; ++j) K_(i, j) *= scaling.row[i] * scaling.col[j];
     }
-    // Data of size 1: x and s are proportional to q.
+    // The data are scaled to size 1; x and s are proportional to q.
     const double size = LargestValue(q_);
     if (size > 0.0) {
       for (Eigen::Index i = 0; i < n; ++i) q_[i] *= 1.0 / size;
@@ -186,7 +187,8 @@ class InteriorPoint {
       rc[i] = centring * kappa - z_[i] * s_[i] - affine.dz[i] * affine.ds[i];
     }
     const Direction direction = Solve(r, rc);
-    // A fixed fraction of the way to the boundary, all of it near the end (superlinear).
+    // The step is a fixed fraction of the way to the boundary; near the end the fraction tends to
+    // 1, which makes convergence superlinear.
     const double fraction = std::max(0.99, 1.0 - ValueOf(kappa));
     step = LargestStep(direction) * fraction;
     if (ValueOf(step) > 1.0) step = one;
@@ -196,7 +198,8 @@ class InteriorPoint {
   }
 
   // Values converge before derivatives: Newton steps at fixed κ until those of the central path at
-  // κ are reached. Two, as derivatives lag one step behind a quadratic convergence.
+  // κ are reached. Two steps are needed, because derivatives lag one step behind a quadratic
+  // convergence.
   void FinishDerivatives(InteriorPointResult<T>& result) {
     if (NumDerivatives<T>::value == 0 || nz_ == 0) return;
     for (int k = 0; k < 2; ++k) {

@@ -12,13 +12,15 @@
 //   [ A             0     0               ]         rows of (3) divided by zᵢ + sᵢ
 //   [ D(z) G        0     D(s) + D(z) F   ]
 //
-// of the equilibrated problem (scaling.h), uncondensed, because G M⁻¹ Gᵀ of redundant contacts,
-// rounded, can be indefinite. Blocks that may be singular (A redundant, M semidefinite) get 1e-12
-// on their diagonal, which changes the step but not the point it converges to.
+// of the equilibrated problem (scaling.h). v and y are not eliminated, because with redundant
+// contacts rounding can make G M⁻¹ Gᵀ indefinite. Blocks that may be singular (A redundant, M
+// semidefinite) get 1e-12 on their diagonal, which changes the step but not the point it converges
+// to.
 //
 // With Jets every operation runs in Jets ("unrolled"), to a complementarity of 1e-14: the
 // derivatives are those of the central path at κ, off by about max(1e-7, 10 κ / margin²).
-// Not monotone problems (friction) have no guarantee; the caller checks the residual.
+// For problems that are not monotone (friction) convergence is not guaranteed; the caller checks
+// the residual.
 //
 // S. Mehrotra, SIAM J. Optim. 2 (1992) 575; S. J. Wright, Primal-Dual Interior-Point Methods
 // (1997).
@@ -30,8 +32,8 @@ namespace tangible {
 
 struct InteriorPointOptions {
   int max_iterations = 100;
-  /// Stop when κ is below this, dimensionless. Modes with a margin m are told apart at κ < m²; the
-  /// default is that of derivatives by unrolled Jets.
+  /// Stop when κ is below this, dimensionless. Modes with a margin m can be distinguished at κ <
+  /// m²; the default suits derivatives by unrolled Jets.
   double complementarity = kUnpolishedGoal;
   /// ... and the largest residual of the scaled equations, whose data have size 1, below this.
   double residual = kEquationGoal;

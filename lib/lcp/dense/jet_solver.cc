@@ -39,7 +39,7 @@ VectorX<T> SlackOf(const MixedLcp<T>& problem, const VectorX<T>& v, const Vector
   return s;
 }
 
-/// Everything of a solution in double but the vectors' derivatives.
+/// Copies a solution in double to T, without the derivatives of its vectors.
 template <typename T>
 LcpSolution<T> WithoutDerivatives(const LcpSolution<double>& values) {
   LcpSolution<T> solution;
@@ -56,9 +56,9 @@ LcpSolution<T> WithoutDerivatives(const LcpSolution<double>& values) {
   return solution;
 }
 
-/// Solves the system of the rows' modes in T, as corrections of `solution`. The diagonal carries
-/// 1e-9, so that redundant rows have a solution; three corrections take its error to 1e-27 of the
-/// consistent part.
+/// Solves the system of the rows' modes in T, as corrections of `solution`. 1e-9 is added to the
+/// diagonal, so that redundant rows have a solution; three corrections reduce the error of that to
+/// 1e-27 of the consistent part.
 template <typename T>
 void SolveModesIn(const MixedLcp<T>& problem, const RowModes& row_modes, LcpSolution<T>& solution) {
   const Eigen::Index nv = problem.num_v();
@@ -143,8 +143,8 @@ LcpSolution<T> SolveUnrolled(const MixedLcp<T>& problem, const LcpOptions& optio
     return ScaledResidual(values, s.v.unaryExpr(value), s.y.unaryExpr(value), s.z.unaryExpr(value));
   };
   solution.residual = measure(solution);
-  // The residual at κ is κ / margin: 1e-10 stands for margins of 1e-4, where derivatives are off by
-  // κ / margin² = 1e-6. Nearer to a kink the modes have to be identified.
+  // The residual at κ is κ / margin: 1e-10 corresponds to margins of 1e-4, where the error of
+  // derivatives is κ / margin² = 1e-6. Nearer to a kink the modes have to be identified.
   if (run.converged && solution.residual <= options.tolerance) {
     solution.status = LcpStatus::kSolved;
     solution.solver = LcpSolver::kInteriorPoint;

@@ -17,8 +17,8 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-// Columns w (0 to n-1), z (n to 2n-1), z₀ (2n), right-hand side (2n+1). The columns of w hold B⁻¹,
-// which the lexicographic rule reads.
+// The columns are w (0 to n-1), z (n to 2n-1), z₀ (2n) and the right-hand side (2n+1). The columns
+// of w hold B⁻¹, which the lexicographic rule reads.
 class Tableau {
  public:
   Tableau(const MatrixXd& W, const VectorXd& q, const VectorXd& d)
@@ -34,7 +34,7 @@ class Tableau {
   Index Basic(Index row) const { return basis_[row]; }
   Index Complement(Index variable) const { return variable < n_ ? variable + n_ : variable - n_; }
 
-  // The row that z₀ enters: the lexicographic minimum of (q, B⁻¹)ᵢ / dᵢ.
+  // The row in which z₀ enters the basis: the lexicographic minimum of (q, B⁻¹)ᵢ / dᵢ.
   Index FirstRow() const {
     const VectorXd d = -rows_.col(Artificial());
     Index best = 0;
@@ -44,7 +44,8 @@ class Tableau {
     return best;
   }
 
-  // The row that limits `entering`, or -1: a ray. z₀ leaves if it can (that ends the path).
+  // The row that limits `entering`, or -1 on a ray. z₀ is preferred as the leaving variable,
+  // because that ends the path.
   Index LeavingRow(Index entering) const {
     const auto column = rows_.col(entering);
     const double tolerance = kLeastPivot * std::max(1.0, column.cwiseAbs().maxCoeff());
@@ -161,7 +162,7 @@ LemkeResult SolveLemkeFrom(const VectorXd& start, const MatrixXd& W, const Vecto
     const MatrixXd x = once(rhs);
     return x + once(rhs - square * x);
   };
-  // Of w and z changing places in the basis, rows in their old places.
+  // The basis after w and z have changed places, with the rows in their old places.
   const MatrixXd inverse = solve(MatrixXd::Identity(size, size));
   const MatrixXd by_others = solve(W(basis, others));
   const VectorXd at = solve(-q(basis));

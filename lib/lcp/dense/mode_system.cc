@@ -43,7 +43,7 @@ ModeSystem::ModeSystem(const MixedLcp<double>& problem, const std::vector<RowMod
   K_ = scaling_.row.asDiagonal() * K * scaling_.col.asDiagonal();
   if (n == 0) return;
   lu_.compute(K_);
-  // The estimate of rcond() means nothing where a pivot is zero or nearly.
+  // The estimate of rcond() is meaningless where a pivot is zero or nearly zero.
   const auto pivots = lu_.matrixLU().diagonal().cwiseAbs();
   const bool vanishing = !(pivots.minCoeff() > kSingularMatrix * pivots.maxCoeff());
   const double reciprocal = vanishing ? 0.0 : lu_.rcond();

@@ -44,7 +44,7 @@ class ModeSystem {
   /// The solution of the transposed system.
   LcpVector SolveTransposed(const LcpVector& g, double* relative_error = nullptr) const;
 
-  /// How many unknowns the equations leave open.
+  /// How many unknowns the equations leave undetermined.
   int rank_deficiency() const { return rank_deficiency_; }
   /// Estimate of the condition of the equilibrated matrix (of its regular part if singular).
   double condition() const { return condition_; }

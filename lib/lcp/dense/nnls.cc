@@ -41,7 +41,7 @@ NnlsResult SolveNnls(const MatrixXd& E, const VectorXd& f, Index num_free) {
     const VectorXd gradient = E.transpose() * result.residual;
     Index entering = -1;
     for (Index j = num_free; j < n; ++j) {
-      // A column that rounding drove straight out again must not come back at once.
+      // A column that rounding has just removed again must not re-enter at once.
       if (passive[j] || j == last_entered || gradient[j] <= tolerance) continue;
       if (entering < 0 || gradient[j] > gradient[entering]) entering = j;
     }

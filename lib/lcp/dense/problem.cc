@@ -28,11 +28,11 @@ std::string CheckBlock(const char* name, const MatrixXd& block, Index rows, Inde
   return "";
 }
 
-// value / scale, where a row without any terms is exact.
+// value / scale; 0 for a row without any terms, which holds exactly.
 double Ratio(double value, double scale) { return value == 0.0 ? 0.0 : value / scale; }
 
-// The smallest y with the same Aᵀ y: joints that contradict each other hold a y that cancels, of
-// any size, which moves nothing and must not stand in a scale.
+// The smallest y with the same Aᵀ y. Joints that contradict each other can have a part of y of any
+// size that cancels in Aᵀ y; it moves nothing and must not enter a scale.
 VectorXd EffectiveImpulse(const MatrixXd& A, const VectorXd& y) {
   if (y.size() < 2 || A.cols() == 0 || !y.allFinite()) return y;
   const MatrixXd rows = A.transpose();

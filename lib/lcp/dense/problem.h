@@ -11,8 +11,9 @@
 //   A  ny x nv                  b  ny
 //   G  nz x nv                  F  nz x nz, need not be symmetric   c  nz
 //
-// With nv = ny = 0 it is the plain LCP s = F z + c. The room knows no bodies; where this is a time
-// step, v is a twist (m/s, rad/s), y and z are impulses (N s) or sliding speeds (m/s), s speeds.
+// With nv = ny = 0 it is the plain LCP s = F z + c. This module knows nothing of bodies; where the
+// problem is a time step, v holds twists (m/s, rad/s), y and z are impulses (N s) or sliding speeds
+// (m/s), and s are speeds.
 
 #include <limits>
 #include <string>
@@ -59,17 +60,17 @@ struct LcpSolution {
   std::string message;  ///< why it is unsolved or was refused; else empty
 };
 
-/// The words of the result file: solved, unsolved, infeasible; none, guess, interior_point, lemke,
+/// The names in the result file: solved, unsolved, infeasible; none, guess, interior_point, lemke,
 /// enumeration.
 const char* ToString(LcpStatus status);
 const char* ToString(LcpSolver solver);
 
-/// Gives empty blocks the shape that their neighbours ask for (an absent A becomes 0 x nv).
+/// Gives empty blocks the shape that the other blocks require (an absent A becomes 0 x nv).
 template <typename T>
 void ConformEmptyBlocks(MixedLcp<T>& problem);
 
-/// What is wrong with the data, or empty: shapes that do not fit, or numbers that are not finite.
-/// "M: expected 3 x 3, got 3 x 2".
+/// Describes what is wrong with the data (shapes that do not fit, or numbers that are not finite),
+/// for example "M: expected 3 x 3, got 3 x 2"; empty if nothing is.
 std::string ValidateProblem(const MixedLcp<double>& problem);
 
 /// The values of a problem, without derivatives.
@@ -83,7 +84,7 @@ struct LinearEquations {
 };
 LinearEquations AllEquations(const MixedLcp<double>& problem);
 
-/// What the sizes of the terms in each row say about its rounding.
+/// The magnitude of the terms of each row, to which the rounding of the row is proportional.
 struct LcpScales {
   VectorX<double> momentum;  ///< nv: (|M||v| + |A|ᵀ|y| + |G|ᵀ|z| + |p|) of the row
   VectorX<double> joint;     ///< ny: (|A| v̂ + |b|)
@@ -92,17 +93,17 @@ struct LcpScales {
 };
 
 /// v̂ⱼ = max(|vⱼ|, (|p| + |A|ᵀ|y| + |G|ᵀ|z|)ⱼ / Mⱼⱼ): a v that is the small difference of large
-/// impulses is only as exact as those; up to what the energy of all v and M⁻¹ p could bring about,
-/// for rows that contradict each other have any impulses, and would hide it. Of y only the part
-/// outside the null space of Aᵀ counts, here and in `momentum`: what cancels there can grow without
-/// bound where joints contradict each other, and would hide that A v = b does not hold. Rows of a
-/// kind: those with G's row zero, and the others. W is the diagonal of F + G diag(M)⁻¹ Gᵀ; where
-/// Wᵢᵢ ≤ 0 (a sliding speed, which moves other slacks only) the largest σₖ / |Fₖᵢ| stands for σᵢ /
-/// Wᵢᵢ.
+/// impulses is only as exact as those. The scale is limited to the speed that the energy of all v
+/// and M⁻¹ p could cause, because rows that contradict each other can have impulses of any size,
+/// which would hide the contradiction. Of y only the part outside the null space of Aᵀ counts, here
+/// and in `momentum`: the part inside can grow without bound where joints contradict each other,
+/// and would hide that A v = b does not hold. There are two kinds of rows: those whose row of G is
+/// zero, and the others. W is the diagonal of F + G diag(M)⁻¹ Gᵀ; where Wᵢᵢ ≤ 0 (a sliding speed,
+/// which changes only the slacks of other rows) the largest σₖ / |Fₖᵢ| stands for σᵢ / Wᵢᵢ.
 LcpScales ComputeScales(const MixedLcp<double>& problem, const VectorX<double>& v,
                         const VectorX<double>& y, const VectorX<double>& z);
 
-/// Row i of a matrix that may have no columns (Eigen's row() of those offsets a null pointer).
+/// Row i of a matrix that may have no columns (for which Eigen's row() offsets a null pointer).
 inline VectorX<double> RowOf(const MatrixX<double>& matrix, Eigen::Index i) {
   return VectorX<double>::NullaryExpr(matrix.cols(),
                                       [&matrix, i](Eigen::Index j) { return matrix(i, j); });
@@ -117,10 +118,10 @@ VectorX<double> Slack(const MixedLcp<double>& problem, const VectorX<double>& v,
 double ScaledResidual(const MixedLcp<double>& problem, const VectorX<double>& v,
                       const VectorX<double>& y, const VectorX<double>& z);
 
-/// Whether a point of residual `residual` is a solution, and not just large: z and v on a ray of
-/// the constraints satisfy s = G v + F z + c relative to |F||z| however wrong c is, but then they
-/// satisfy the problem with p = b = c = 0 as well. True if the residual is at most 1e-8 of that
-/// one's.
+/// Whether a point of residual `residual` is a solution rather than merely large: large z and v on
+/// a ray of the constraints satisfy s = G v + F z + c relative to |F||z| however wrong c is, but
+/// then they satisfy the problem with p = b = c = 0 as well. True if `residual` is at most 1e-8 of
+/// the residual of the point in that problem.
 bool DependsOnData(const MixedLcp<double>& problem, const VectorX<double>& v,
                    const VectorX<double>& y, const VectorX<double>& z, double residual);
 

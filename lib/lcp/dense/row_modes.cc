@@ -34,7 +34,7 @@ Ratios ComputeRatios(const MixedLcp<double>& problem, const LcpVector& point) {
   return ratios;
 }
 
-// Lowers the z that act on nothing but slacks of rows without force; see the header.
+// Lowers the z that act only on slacks of rows without force; see the header.
 LcpVector LowerFreeRows(const MixedLcp<double>& problem, const LcpVector& solution) {
   LcpVector point = solution;
   for (Index i = 0; i < point.z.size(); ++i) {
@@ -47,7 +47,7 @@ LcpVector LowerFreeRows(const MixedLcp<double>& problem, const LcpVector& soluti
       const double effect = problem.F(k, i);
       if (effect == 0.0) continue;
       is_free = effect > 0.0 && ratios.z[k] <= kLcpZero;
-      // The slack closes at this z; a slack of rounding size is closed already.
+      // The slack reaches 0 at this z; a slack of rounding size counts as 0 already.
       const double slack = ratios.s[k] <= kLcpZero ? 0.0 : s[k];
       least = std::max(least, point.z[i] - slack / effect);
     }
@@ -56,8 +56,8 @@ LcpVector LowerFreeRows(const MixedLcp<double>& problem, const LcpVector& soluti
   return point;
 }
 
-// The functionals dz, ds of the rows in `degenerate` on a basis of the equations' null space: rows
-// of the result, dz first.
+// The functionals dz, ds of the rows in `degenerate` on a basis of the equations' null space, as
+// the rows of the result, dz first.
 MatrixXd ConeFunctionals(const MixedLcp<double>& problem, const std::vector<Index>& active,
                          const std::vector<Index>& degenerate) {
   const Index nv = problem.num_v();
@@ -78,7 +78,7 @@ MatrixXd ConeFunctionals(const MixedLcp<double>& problem, const std::vector<Inde
   MatrixXd null_space = MatrixXd::Identity(equations.cols(), equations.cols());
   if (equations.rows() > 0) {
     const MatrixXd scaled = scaling.row.asDiagonal() * equations * scaling.col.asDiagonal();
-    // Of the transpose, the last columns of Q are orthogonal to all rows.
+    // In the QR of the transpose the last columns of Q are orthogonal to all rows.
     Eigen::ColPivHouseholderQR<MatrixXd> qr;
     qr.setThreshold(kRankTolerance);
     qr.compute(scaled.transpose());
@@ -126,7 +126,7 @@ std::vector<Index> RowsOfMode(const std::vector<RowMode>& modes, RowMode mode) {
   return rows;
 }
 
-// Assigns rows marked kKink to a side where the others leave no choice.
+// Makes rows marked kKink active or inactive where the other rows leave no choice.
 void ResolveDegenerate(const MixedLcp<double>& problem, std::vector<RowMode>& modes) {
   const std::vector<Index> degenerate = RowsOfMode(modes, RowMode::kKink);
   if (degenerate.empty()) return;
@@ -142,8 +142,8 @@ void ResolveDegenerate(const MixedLcp<double>& problem, std::vector<RowMode>& mo
   }
 }
 
-// Wᵢᵢ of F + G diag(M)⁻¹ Gᵀ; for a row without (a sliding speed) what its z does through the first
-// row k it acts on, |Fₖᵢ Fᵢₖ| / Wₖₖ.
+// Wᵢᵢ of F + G diag(M)⁻¹ Gᵀ; for a row where it is 0 (a sliding speed) the effect of its z through
+// the first row k that it acts on, |Fₖᵢ Fᵢₖ| / Wₖₖ.
 double WeightAlone(const MixedLcp<double>& problem, Index i) {
   const auto diagonal = [&problem](Index k) {
     double weight = std::abs(problem.F(k, k));
@@ -187,8 +187,8 @@ void WeighKinks(const MixedLcp<double>& problem, RowModes& result) {
   }
 }
 
-// Ratios for margins: a speed is small if it is small against the largest one, not only against the
-// terms it is the sum of (a gap that closes at 1e-9 m/s under a body that slides at 1 m/s).
+// Ratios for margins: a speed is small if it is small compared with the largest speed, not only
+// compared with its own terms (a gap that closes at 1e-9 m/s under a body that slides at 1 m/s).
 Ratios ComputeMargins(const MixedLcp<double>& problem, const LcpVector& point) {
   const LcpScales scales = ComputeScales(problem, point.v, point.y, point.z);
   const VectorXd s = Slack(problem, point.v, point.z);
@@ -207,8 +207,9 @@ Ratios ComputeMargins(const MixedLcp<double>& problem, const LcpVector& point) {
 // The smallest margin of rows whose change of mode would change the derivative.
 void FindMargin(const MixedLcp<double>& problem, RowModes& result) {
   const Ratios ratios = ComputeMargins(problem, result.point);
-  // A small margin does not count if the row is bound to stay on its side (λ₊ of a sticking contact
-  // with hardly any side load): treated as degenerate, it is resolved.
+  // A small margin does not count if the other rows force the row to keep its mode (λ₊ of a
+  // sticking contact with hardly any tangential load): such a row is treated as degenerate, and
+  // then resolved.
   std::vector<RowMode> suspects = result.modes;
   for (Index i = 0; i < ratios.z.size(); ++i) {
     if (std::max(ratios.z[i], ratios.s[i]) < kSuspectMargin) suspects[i] = RowMode::kKink;
@@ -218,7 +219,7 @@ void FindMargin(const MixedLcp<double>& problem, RowModes& result) {
   result.margin_min = std::numeric_limits<double>::infinity();
   for (Index i = 0; i < ratios.z.size(); ++i) {
     if (suspects[i] == RowMode::kKink && resolved[i] != RowMode::kKink) continue;
-    // Degenerate, but bound to its side by other rows, whose margins count instead.
+    // The row is degenerate, but other rows force its mode; their margins count instead.
     const bool bound = result.modes[i] != RowMode::kKink;
     if (bound && std::max(ratios.z[i], ratios.s[i]) <= kLcpZero) continue;
     const double margin =

@@ -10,15 +10,16 @@
 //   M dv − Aᵀ dy − Gᵀ dz = 0,  A dv = 0,  ds = 0 on active, dz = 0 on inactive rows,
 //   dz ≥ 0 and ds ≥ 0 on degenerate ones
 //
-// a functional dzᵢ or dsᵢ that is zero throughout is zero by the structure of the rows, whatever is
-// perturbed (it is part of a non-negative combination that vanishes). So
+// a functional dzᵢ or dsᵢ that is zero everywhere is zero because of the structure of the rows, for
+// every perturbation (it is part of a non-negative combination that vanishes). Therefore
 //
 //   dsᵢ ≡ 0            active     a box at rest: both friction rows, ds₊ + ds₋ = 2 dγ = 0
 //   dzᵢ ≡ 0            inactive   friction rows of an open contact: dλ₊ + dλ₋ ≤ μ dλₙ = 0
 //   neither            a kink     a contact that just touches
 //
-// A kink row gets ds + κ dz = …, κ = Wᵢᵢ its own slack's rise with zᵢ, the limit of the central
-// path z s → 0: half the sum of both sides' derivatives where it is alone.
+// A kink row gets the equation ds + κ dz = …, where κ = Wᵢᵢ is the rate at which its own slack
+// rises with zᵢ. This is the limit of the central path z s → 0: for a single kink the mean of the
+// two one-sided derivatives.
 //
 // A. J. Goldman, A. W. Tucker (1956), on strictly complementary pairs of inequalities.
 
@@ -38,10 +39,11 @@ struct RowModes {
   Eigen::Index margin_row = -1;  ///< -1: no row has a margin
 };
 
-/// Reads the modes at a solution. zᵢ that act on nothing but the slack of rows without force (the
-/// sliding speed γ of an open contact) are not unique; they are first lowered to the least value,
-/// where the rows around them show their kinks: `point` differs from the solution by that alone.
-/// Cost: for n degenerate rows a null space and up to 2 n small non-negative least squares.
+/// Reads the modes at a solution. Variables zᵢ that act only on the slack of rows without force
+/// (the sliding speed γ of an open contact) are not unique; they are first lowered to their least
+/// value, at which kinks of the rows around them become visible. `point` differs from the solution
+/// only by that. Cost: for n degenerate rows a null space and up to 2 n small non-negative least
+/// squares.
 RowModes ClassifyRows(const MixedLcp<double>& problem, const LcpVector& solution);
 
 }  // namespace tangible

@@ -2,8 +2,8 @@
 #pragma once
 //
 // Equilibration: positive diagonal R, C such that the largest entry in every row and column of
-// R K C is near 1. Powers of two, so that scaling rounds nothing. A cone row with μ = 1e6 is
-// divided by about μ, without which an interior-point method fails from μ = 1e3 on.
+// R K C is near 1. They are powers of two, so that scaling causes no rounding. A friction-cone row
+// with μ = 1e6 is divided by about μ; without this the interior-point method fails from μ = 1e3 on.
 
 #include "tangible/math/scalar.h"
 

@@ -21,18 +21,19 @@ namespace {
 using Eigen::Index;
 using Eigen::VectorXd;
 
-// Few, so that a wrong guess costs no more than a few iterations of the interior point.
+// The number is small, so that a wrong guess costs no more than a few interior-point iterations.
 constexpr int kGuessRounds = 4;
 
-// Proximal steps.
+// Maximum number of proximal steps.
 constexpr int kProximalRounds = 24;
-// After so many rounds shares of the least shift take turns: what flickers with one does not with
-// another.
+// After this many rounds different fractions of the least shift are used in turn, because modes
+// that alternate from round to round with one shift usually settle with another.
 constexpr int kStubbornRound = 9;
 constexpr double kStubbornShares[] = {0.1, 0.01, 1.0};
 constexpr int kBasisRounds = 5;
 
-// Proximal steps go on, so many rounds at most, until this share of the tolerance is left.
+// Proximal steps go on, at most this many rounds, until the residual is this fraction of the
+// tolerance.
 constexpr double kRoom = 0.01;
 constexpr int kRoundsForRoom = 4;
 
@@ -45,7 +46,7 @@ double LimitedBy(const VectorXd& z, const VectorXd& change) {
   return factor;
 }
 
-// One run of the portfolio: the attempts so far and the best point.
+// One run of the portfolio; it holds the attempts so far and the best point.
 class Portfolio {
  public:
   Portfolio(const MixedLcp<double>& problem, const LcpOptions& options)
@@ -56,7 +57,7 @@ class Portfolio {
     solution_.residual = ScaledResidual(problem, solution_.v, solution_.y, solution_.z);
   }
 
-  // From z = 0, v and y without impulses.
+  // Starts from z = 0 and the v and y without impulses.
   bool TryGuess() {
     const VectorXd zero = VectorXd::Zero(problem_.num_z());
     return Offer({solution_.v, solution_.y, zero}, LcpSolver::kGuess, kGuessRounds);
@@ -78,8 +79,9 @@ class Portfolio {
     return Offer(PointOf(result.z), LcpSolver::kLemke);
   }
 
-  // Proximal steps, each a regularised problem by Lemke around the last solution: where rows are
-  // redundant, what W is to rounding may have no solution while the problem has.
+  // Proximal steps: in each, Lemke's method solves a problem regularised around the last solution.
+  // Where rows are redundant, the LCP with the rounded W may have no solution although the exact
+  // one has.
   bool TryProximalLemke(double least_shift) {
     if (!Reduce()) return false;
     const Equilibration scaling = Equilibrate(reduced_->W);
@@ -99,14 +101,15 @@ class Portfolio {
       const LcpVector point = PointOf(z);
       if (Judge(point, LcpSolver::kLemke) || Offer(point, LcpSolver::kLemke) ||
           OfferBasis(point, LcpSolver::kLemke)) {
-        // Just within the tolerance: a few more rounds leave room for who judges otherwise.
+        // The point is just within the tolerance: a few more rounds leave a margin for a stricter
+        // check of the residual.
         if (solution_.residual <= kRoom * options_.tolerance || ++solved == kRoundsForRoom) {
           return true;
         }
       }
       const VectorXd change = z - last;
-      // Rows that contradict each other by rounding: impulses grow by as much a round until one
-      // meets its limit.
+      // Rows contradict each other by rounding: impulses grow by the same amount in each round
+      // until one of them reaches its limit.
       if (round > 0 && (change - last_change).norm() <= 0.01 * change.norm()) {
         z = (z + LimitedBy(z, change) * change).cwiseMax(0.0);
       }
@@ -144,8 +147,8 @@ class Portfolio {
   }
 
  private:
-  // From the basis z > 0 of the last proximal step, or along a whole path; then once more from
-  // where that ended, without the rounding of its pivots.
+  // Starts from the basis z > 0 of the last proximal step, or follows a whole path; then it solves
+  // once more from the basis where that ended, to remove the rounding of its pivots.
   bool SolveProximal(const Eigen::MatrixXd& W, const VectorXd& q, VectorXd* z) {
     const LemkeOptions options{.max_pivots = 0, .covering = VectorXd()};
     LemkeResult result = SolveLemkeFrom(*z, W, q, options);
@@ -167,7 +170,8 @@ class Portfolio {
     return reduced_.has_value();
   }
 
-  // Of the reduced problem: with the v and y that z brings about.
+  // The point of the full problem that belongs to z of the reduced one, with the v and y that z
+  // causes.
   LcpVector PointOf(const VectorXd& z) const {
     return {reduced_->v0 + reduced_->v_z * z, reduced_->y0 + reduced_->y_z * z, z};
   }
@@ -177,7 +181,7 @@ class Portfolio {
     return Judge(Polish(problem_, point, max_rounds), solver);
   }
 
-  // The same where the rows in the basis, z > 0, are the active ones.
+  // The same, with the rows in the basis, z > 0, as the active ones.
   bool OfferBasis(const LcpVector& point, LcpSolver solver) {
     std::vector<RowMode> modes;
     for (const double z : point.z) modes.push_back(z > 0.0 ? RowMode::kActive : RowMode::kInactive);
@@ -188,9 +192,9 @@ class Portfolio {
     return JudgeAsIs(polished, solver) || JudgeAsIs(WithoutRounding(polished), solver);
   }
 
-  // Without what is rounding beside the others: z of a kind, y, v by their shares of the energy. A
-  // row that multiplies nothing else (friction's limit of an impulse that is none, the slip of what
-  // rests) has no scale but that.
+  // Sets entries to 0 that are mere rounding beside the others: z compared with those of its kind,
+  // y, and v by its share of the energy. A row that contains nothing else (the friction limit of a
+  // vanishing impulse, the slip of a body at rest) would otherwise be scaled by that rounding.
   LcpVector WithoutRounding(LcpVector point) const {
     const LcpScales scales = ComputeScales(problem_, point.v, point.y, point.z);
     for (Index i = 0; i < point.z.size(); ++i) {
@@ -230,7 +234,7 @@ class Portfolio {
   LcpSolution<double> solution_;
 };
 
-// Proximal steps; then covering vectors between 0.1 and 10, log-uniform, from a literal seed.
+// Tries proximal steps, then covering vectors between 0.1 and 10, log-uniform, from a literal seed.
 bool TryLemkes(Portfolio& portfolio, Index nz) {
   constexpr int kCoverings = 8;
   std::mt19937 generator(20240607);
@@ -261,8 +265,9 @@ bool RunPortfolio(Portfolio& portfolio, const LcpOptions& options, Index nz) {
   return options.solver == SolverChoice::kAuto && portfolio.TryEnumeration();
 }
 
-// A plain problem whose z span many decades: in one whose F is equilibrated the largest z says what
-// is small beside it. Empty where it need not be, or what it would be overflows.
+// Solves a plain problem whose z span many decades in equilibrated units, in which an entry is
+// small if it is small beside the largest z. Empty where equilibration is not needed, or would
+// overflow.
 std::optional<LcpSolution<double>> SolveEquilibrated(const MixedLcp<double>& problem,
                                                      const LcpOptions& options) {
   constexpr double kWide = 1e6;

@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// The portfolio: a few changes of modes starting from z = 0 (a step without impulses: where
-// friction leaves the outcome open, as for a box between two walls, the one without squeeze is
-// chosen); then interior point, then Lemke, each followed by the active-set polish; then a checked
-// proof of infeasibility; then a few deterministic further attempts (proximal steps, other covering
-// vectors, enumeration of small problems). What solved it is in the result. Success is decided only
-// by the scaled residual recomputed from the data (problem.h).
+// The portfolio tries its methods in turn: a few changes of modes starting from z = 0 (a step
+// without impulses: where friction admits several solutions, as for a box between two walls, the
+// one without squeezing is chosen); then interior point, then Lemke, each followed by the
+// active-set polish; then a checked proof of infeasibility; then a few deterministic further
+// attempts (proximal steps, other covering vectors, enumeration of small problems). The result
+// names the method that solved the problem. Success is decided only by the scaled residual
+// recomputed from the data (problem.h).
 
 #include "tangible/lcp/dense/problem.h"
 #include "tangible/lcp/dense/tolerances.h"
@@ -20,7 +21,7 @@ struct LcpOptions {
   int max_iterations = 100;          ///< of each interior-point run
 };
 
-/// Solves the problem, or says why not. Data that does not fit or is not finite is refused: status
+/// Solves the problem, or reports why not. Data of wrong shape or not finite are refused: status
 /// kUnsolved with a message and empty vectors. Never returns NaN.
 LcpSolution<double> SolveLcp(const MixedLcp<double>& problem, const LcpOptions& options = {});
 

@@ -18,11 +18,12 @@ bool InsertSorted(std::vector<int>* list, int node) {
   return true;
 }
 
-// State of a node: how many of its bodies must go first (constraints), or:
+// State of a node: for constraints, how many of its bodies must be eliminated first; or:
 constexpr int kReady = 0;
 constexpr int kEliminated = -1;
 
-// Least of a changing list of keys: a tournament, a change costs the logarithm of its size.
+// The least of a changing list of keys, by a tournament tree: a change costs the logarithm of its
+// size.
 class Tournament {
  public:
   static constexpr std::int64_t kOut = std::numeric_limits<std::int64_t>::max();
@@ -113,8 +114,8 @@ class Ordering {
                                             : Tournament::kOut);
   }
 
-  // The ready node of least degree, the first of equals. One is always ready: a body is from the
-  // start, a constraint once a body of its is gone.
+  // The ready node of least degree, the first of equals. One node is always ready: bodies are ready
+  // from the start, a constraint once one of its bodies is eliminated.
   int Choose() const { return static_cast<int>(ready_.Least() & 0x7fffffff); }
 
   void Eliminate(int node) {
@@ -151,8 +152,8 @@ class Ordering {
   BlockLuPattern& pattern_;
 };
 
-// Place of the pair of blocks of nodes i and j: the slot in the list of whichever goes first.
-// `position[node]` is its place in the order. Neighbour lists are sorted by node.
+// Place of the pair of blocks of nodes i and j: the slot in the list of the node that is eliminated
+// first. `position[node]` is its place in the order. Neighbour lists are sorted by node.
 int FindSlot(const BlockLuPattern& pattern, const std::vector<int>& position, int i, int j) {
   const int first = position[i] < position[j] ? i : j;
   const int later = first == i ? j : i;

@@ -10,7 +10,7 @@
 // (joints, contacts), whose diagonal block may be zero before a neighbour is eliminated. The order
 // is of minimum degree, with a constraint only after one of its bodies; a chain of bodies and
 // joints then has no fill and costs O(number of links). Blocks smaller than 3 are padded with the
-// identity; of those said to be narrow the third unknown is left out of all products. There is no
+// identity; for blocks marked as narrow the third unknown is left out of all products. There is no
 // pivoting between blocks (within a block there is): the systems of mechanics [M −Jᵀ; J δ] are
 // quasi-definite, for which any order is stable; sliding friction makes them slightly unsymmetric,
 // so the solution is refined by the caller against the true residual.
@@ -50,15 +50,15 @@ class BlockLu {
   /// Sets the pattern: `num_bodies` nodes that may be eliminated at any time, then constraints;
   /// edges join any two nodes and may repeat. Cheap where the pattern is that of the last call.
   void SetPattern(int num_blocks, int num_bodies, const std::vector<std::pair<int, int>>& edges);
-  /// Sizes the storage for patterns of up to this many blocks and edges.
+  /// Allocates the storage for patterns of up to this many blocks and edges.
   void Reserve(int num_blocks, int num_edges);
 
   void SetZero();
-  /// 3 x 3 row-major diagonal block, to be added to after SetZero and before Factor.
+  /// 3 x 3 row-major diagonal block; the caller adds to it after SetZero and before Factor.
   T* Diagonal(int block) { return &values_[9 * static_cast<size_t>(block)]; }
   /// Promises that the third unknown of a block is coupled to no other, of its own block or of
-  /// another (a hinge has two rows; on a disc without friction nothing exerts a torque). After
-  /// SetZero and before Factor.
+  /// another (a hinge has two rows; on a disc without friction nothing exerts a torque). To be
+  /// called after SetZero and before Factor.
   void SetNarrow(int block) { width_[block] = 2; }
   /// Block (row = first node of the edge, column = second).
   T* FirstSecond(int edge) { return Place(edge, pattern_->edge_flipped[edge] != 0); }
@@ -72,8 +72,8 @@ class BlockLu {
   /// x := K⁻ᵀ x.
   void SolveTransposed(T* x, int columns) const;
 
-  /// Hands the factors over; this object keeps the pattern, and takes the other's memory for its
-  /// next factors.
+  /// Moves the factors to `other`; this object keeps the pattern, and takes the other's memory for
+  /// its next factors.
   void MoveFactorsTo(BlockLu* other) {
     other->pattern_ = pattern_;
     values_.swap(other->values_);
@@ -82,12 +82,12 @@ class BlockLu {
     other->all_narrow_ = all_narrow_;
   }
 
-  /// Exchanges the pattern with one kept elsewhere: symbolic work stays with what it is of. Factors
-  /// are lost.
+  /// Exchanges the pattern with one kept elsewhere, so that the symbolic factorisation can be
+  /// reused. The factors are lost.
   void SwapPattern(std::shared_ptr<BlockLuPattern>* pattern) { pattern_.swap(*pattern); }
 
   int num_blocks() const { return pattern_ ? pattern_->num_blocks : 0; }
-  /// Memory, bytes, but for the pattern, which copies share.
+  /// Memory, bytes, without the pattern, which copies share.
   size_t bytes() const;
 
  private:

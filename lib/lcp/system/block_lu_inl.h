@@ -13,17 +13,19 @@
 namespace tangible {
 namespace internal {
 
-/// Order of elimination, fill and places of a pattern whose blocks and edges are set; the rest is
-/// scratch.
+/// Computes the order of elimination, the fill and the places of a pattern whose blocks and edges
+/// are set; the other arguments are scratch.
 void OrderBlocks(std::vector<std::vector<int>>* adjacency, std::vector<int>* state,
                  std::vector<int>* merged, std::vector<std::pair<int, int>>* waiting,
                  std::vector<std::int64_t>* keys, BlockLuPattern* pattern);
 
-// Of single right-hand sides, of which there are the most: its loops vanish.
+// The number of columns of a single right-hand side, the most frequent case, known when compiled so
+// that its loops vanish.
 using OneColumn = std::integral_constant<int, 1>;
 
-// Blocks are 3 x 3, row-major. kWidth (3, or 2 of a narrow block) is that of the pivot: what its
-// third unknown adds is 0. kRows (3, or 2 where all blocks are narrow) are the rows of the others.
+// Blocks are 3 x 3, row-major. kWidth (3, or 2 of a narrow block) is the width of the pivot, whose
+// third unknown contributes 0 if it is narrow. kRows (3, or 2 where all blocks are narrow) is the
+// number of rows of the others.
 
 // c −= a b.
 template <int kWidth, int kRows, typename T>
@@ -49,8 +51,8 @@ inline bool InvertPivot(T* pivot) {
 
 // Pivot blocks are kept as triangles: P A = L U by Gauss elimination with partial pivoting (by
 // value), row i of the block being row order[i] of A, and 1 / U_ii in place of U_ii. An inverse
-// would lose what contacts with a small δ on their diagonal (contact_condensation.h) leave of the
-// other directions. False where a pivot is 0 or not finite.
+// would lose the digits of those directions that contacts with a small δ on their diagonal
+// (contact_condensation.h) do not hold. False where a pivot is 0 or not finite.
 template <int kWidth, typename T>
 inline bool FactorPivot(T* a, unsigned char* order) {
   T m[kWidth][kWidth];
@@ -207,7 +209,7 @@ void BlockLu<T>::SetPattern(int num_blocks, int num_bodies,
       pattern_->edges == edges && pattern_->order.size() == static_cast<size_t>(num_blocks)) {
     return;
   }
-  if (!pattern_ || pattern_.use_count() > 1) {  // copies keep theirs
+  if (!pattern_ || pattern_.use_count() > 1) {  // copies keep the old pattern
     pattern_ = std::make_shared<BlockLuPattern>();
   }
   pattern_->num_blocks = num_blocks;
@@ -224,7 +226,7 @@ void BlockLu<T>::SetZero() {
   width_.assign(pattern_->num_blocks, 3);
 }
 
-// A call of its own costs a step of a chain 5 %.
+// A separate function call costs a step of a chain 5 %.
 template <typename T>
 template <int kWidth, int kRows>
 [[gnu::always_inline]] inline bool BlockLu<T>::Eliminate(int k) {
@@ -293,7 +295,7 @@ void BlockLu<T>::SolveColumns(T* x, Columns columns) const {
   }
 }
 
-// L, then U with its pivot blocks; transposed Uᵀ with them, then Lᵀ.
+// Solves with L, then with U and its pivot blocks; transposed with Uᵀ and these, then with Lᵀ.
 template <typename T>
 template <bool kTransposed, int kRows, typename Columns>
 void BlockLu<T>::SolveRows(T* x, Columns columns) const {

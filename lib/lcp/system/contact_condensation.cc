@@ -6,9 +6,10 @@
 namespace tangible {
 namespace {
 
-// Few contacts are eliminated as fast as they are, and without loss of digits.
+// Fewer contacts are factorised as fast without condensation, and without loss of digits.
 constexpr int kLeastContacts = 3;
-// B = n − σ μ t: what δ takes, μ takes once more.
+// With B = n − σ μ t the digits lost to δ are lost once more to μ; sliding contacts with more
+// friction are not condensed.
 constexpr double kLargeFriction = 10.0;
 
 // A row of C and the direction B of its impulse, on both bodies.
@@ -27,7 +28,7 @@ double DiagonalOf(const ClosedContacts& contacts, size_t contact, int k) {
              : contacts.delta[3 * static_cast<size_t>(contacts.block[contact]) + k];
 }
 
-// Rows 0 (normal) and, of a sticking contact, 1 (tangent).
+// Visits row 0 (normal) and, for a sticking contact, row 1 (tangent).
 template <typename Visit>
 void ForEachRow(const ContactBlock<double>& c, ContactMode mode, const Visit& visit) {
   const double along = -SlidingSign(mode) * c.friction;
@@ -83,7 +84,7 @@ void AddProduct(int body, const RowPart<double>& row, double weight, const doubl
   }
 }
 
-// visit(contact, row, its unknown, its entry of D), of all closed contacts.
+// Calls visit(contact, row, its unknown, its entry of D) for all closed contacts.
 template <typename Visit>
 void ForEachClosedRow(const ClosedContacts& contacts, const Visit& visit) {
   for (size_t i = 0; i < contacts.problem.contacts.size(); ++i) {

@@ -46,7 +46,7 @@ std::vector<ActiveRow> ListActiveRows(const ContactProblem<double>& problem,
       continue;
     }
     const ContactBlock<double>& c = problem.contacts[i];
-    // The impulse of a driven contact is known beforehand: what remains are the other rows.
+    // The impulse of a driven contact is known beforehand, so that only its other rows count.
     if (!c.driven) {
       ActiveRow& normal = add(3 * block, c.a, c.b, c.normal_a, c.normal_b);
       if (const double along = -SlidingSign(modes[i]) * c.friction; along != 0.0) {
@@ -150,14 +150,14 @@ double NormOfInverse(const ContactProblem<double>& problem, const std::vector<Co
   return norm;
 }
 
-// Of the scaled rows, or of the directions in which their impulses act.
+// Selects the scaled rows, or the directions in which their impulses act.
 enum class Side { kRows, kPushes };
 
-// Columns have norm 1; poses are known to about 1e-12 of their size. What tells pushes apart has to
-// be more than that.
+// Columns have norm 1; poses are known to about 1e-12 of their size. The difference between
+// independent directions of impulses has to exceed that error.
 double RankThreshold(Side side) { return side == Side::kRows ? kRowRank : kPushRank; }
 
-// What a row has on one of its bodies, in units in which it has norm 1.
+// The part of a row on one of its bodies, in units in which the row has norm 1.
 Eigen::Vector3d ScaledPart(const ContactProblem<double>& problem, const ActiveRow& row, int body,
                            Side side) {
   const bool rows = side == Side::kRows;
@@ -188,9 +188,9 @@ bool AreIndependent(Eigen::Matrix3d columns, int count, double threshold) {
 }
 
 // The ranks of the active rows and of their pushes, by groups of bodies that rows connect; the
-// ground and what is static connect none. Before groups are formed joint trees and the like are
-// taken off body by body: where all that is left of a body's rows connects it to one other, and
-// they are independent by their parts on this body alone, they are independent of all other rows.
+// ground and static bodies connect none. Before groups are formed joint trees and similar
+// structures are removed body by body: where all remaining rows of a body connect it to one other
+// body, and their parts on this body alone are independent, they are independent of all other rows.
 class RowGroups {
  public:
   RowGroups(const ContactProblem<double>& problem, std::vector<ActiveRow> rows)
@@ -199,7 +199,7 @@ class RowGroups {
     TakeOffLeaves();
     FormGroups();
   }
-  // Operations of a rank by dense factorisations, of all groups.
+  // Number of operations of the dense factorisations that determine the ranks, for all groups.
   double operations() const;
   // Rows in the group of the most operations, and its bodies.
   RowGroupSize largest() const;
@@ -284,7 +284,7 @@ void RowGroups::TakeOffLeaves() {
     const int body = leaves.back();
     leaves.pop_back();
     if (left[body] != 1) {
-      continue;  // the other end has been taken off
+      continue;  // the other end has been removed
     }
     Connection& connection = connections_[*std::find_if(
         of_body_[body].begin(), of_body_[body].end(), [&](int c) { return connections_[c].left; })];
@@ -427,7 +427,8 @@ UndeterminedCounts CountUndetermined(const ContactProblem<double>& problem,
 
 namespace {
 
-/// Numbers in [−1, 1), always the same: they are drawn once, as a run measures every step.
+/// Numbers in [−1, 1), always the same; they are drawn only once, because a run measures every
+/// step.
 const std::vector<double>& Draws(size_t count) {
   thread_local std::mt19937 random(20240229);
   thread_local std::vector<double> draws;

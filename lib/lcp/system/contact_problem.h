@@ -26,7 +26,7 @@
 // Dry friction in a joint is a contact without a normal row: λn = o = h, and μ is the torque or
 // force at which it slides.
 // The planar form has a unique, strictly complementary solution at a disc at rest, where the
-// one-sided form of two friction rows has a continuum.
+// one-sided form of two friction rows has a continuum of solutions.
 
 #include <algorithm>
 #include <array>
@@ -38,12 +38,12 @@
 
 namespace tangible {
 
-/// One constraint row on up to two blocks; −1: that body does not move (its part is in the row's
-/// constant).
+/// One constraint row on up to two blocks; −1: that body is prescribed or static (its part is in
+/// the row's constant).
 template <typename T>
 using RowPart = std::array<T, 3>;
 
-/// What a contact does at a solution.
+/// The mode of a contact at a solution.
 enum class ContactMode : unsigned char {
   kOpen,             ///< λn = λt = 0
   kSticking,         ///< s_n = 0, w = 0
@@ -83,12 +83,12 @@ struct ContactBlock {
   T friction;         ///< μ
   bool has_friction;  ///< μ > 0: rows for it
   T offset = T(0.0);  ///< o ≥ 0, the least λn, N s
-  /// What c_n is uncertain by: rounding of the positions whose gap it is, m/s. Modes are not
-  /// changed for less.
+  /// The uncertainty of c_n, m/s: rounding of the positions from which the gap is computed. Modes
+  /// are not changed for smaller violations.
   double rounding = 0.0;
   /// λn = o with s_n ≥ 0: in the mode system this equation stands in place of s_n = 0.
   bool driven = false;
-  /// Friction whose limit μ o is given: its normal rows are 0, and it is driven whatever moves.
+  /// Friction with a given limit μ o: its normal rows are 0, and it is always driven.
   bool limit_given = false;
 };
 
@@ -101,13 +101,13 @@ struct ContactProblem {
   std::vector<JointBlock<T>> joints;
   bool redundant_joints = false;  ///< joints form loops: their rows may be dependent
   std::vector<ContactBlock<T>> contacts;
-  /// p + Σ nᵀ o, empty where no contact has an offset: of what size speeds are. A body that the
+  /// p + Σ nᵀ o, empty where no contact has an offset; it gives the size of speeds. A body that the
   /// compression stopped has p = 0 to rounding, and is pushed from both sides.
   std::vector<T> pushed_load;
 
   const std::vector<T>& scale_load() const { return pushed_load.empty() ? load : pushed_load; }
 
-  /// Empties it; memory stays.
+  /// Empties the problem; its memory is kept.
   void Clear() {
     num_bodies = 0;
     mass.clear();
@@ -126,14 +126,15 @@ struct ContactProblem {
   }
 };
 
-/// A solution; vectors are sized for the problem. Impulses of joints: 3 a joint, unused rows 0.
+/// A solution; vectors are sized for the problem. Impulses of joints: 3 for each joint, unused rows
+/// 0.
 template <typename T>
 struct ContactSolution {
   std::vector<T> motion;           ///< v, 3 num_bodies
   std::vector<T> joint_impulse;    ///< 3 num_joints
-  std::vector<T> normal_impulse;   ///< a contact
-  std::vector<T> tangent_impulse;  ///< a contact, signed
-  std::vector<ContactMode> modes;  ///< a contact
+  std::vector<T> normal_impulse;   ///< for each contact
+  std::vector<T> tangent_impulse;  ///< for each contact, signed
+  std::vector<ContactMode> modes;  ///< for each contact
 
   /// Memory of the vectors.
   size_t bytes() const {
@@ -189,9 +190,9 @@ void ForEachImpulse(const ContactProblem<double>& problem, const ContactSolution
   }
 }
 
-/// The sign of the sliding speed of a contact without friction, along which friction would act as μ
-/// leaves 0; 0 where the speed is the rounding of its terms, at the solved or the free twist
-/// (bodies that rest side by side): there the contact would stick.
+/// The sign of the sliding speed of a contact without friction, along which friction would act as
+/// soon as μ exceeds 0; 0 where the speed is the rounding of its terms, at the solved or the free
+/// twist (bodies that rest side by side): there the contact would stick.
 inline double FrictionlessSlidingSign(const ContactProblem<double>& problem,
                                       const ContactBlock<double>& c, const double* v) {
   const double slip = RowDot(c.a, c.tangent_a, c.b, c.tangent_b, v) + c.c_t;

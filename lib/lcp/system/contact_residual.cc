@@ -10,23 +10,24 @@
 namespace tangible {
 namespace {
 
-// The fastest scale of what impulses alone would do to a body, of the fastest one's speed. Between
-// masses 1e20 times as large it would be beyond all speeds that there are, and any row small.
+// The upper limit of the speed scale due to impulses, as a multiple of the fastest body's speed.
+// For a body between masses 1e20 times as large that scale would exceed all actual speeds, and
+// every residual would seem small.
 constexpr double kMostPushed = 1e6;
 
-// The largest component of a row for a body, rotation at the body's lever.
+// The largest component of a row for a body, with rotation taken at the body's lever.
 double RowSize(const RowPart<double>& row, double lever) {
   return std::max({std::abs(row[0]), std::abs(row[1]), std::abs(row[2]) / lever});
 }
 
-// Scale of a row's value: its largest term a body, at the body's speed scale.
+// Scale of a row's value: for each body its largest term, at the body's speed scale.
 double RowSpeed(const ContactScales& scales, int a, const RowPart<double>& row_a, int b,
                 const RowPart<double>& row_b) {
   return (a >= 0 ? scales.speed[a] * RowSize(row_a, scales.lever[a]) : 0.0) +
          (b >= 0 ? scales.speed[b] * RowSize(row_b, scales.lever[b]) : 0.0);
 }
 
-// |min(z/ζ, s/σ)|, with 0/0 = 0. Beside a scale beyond what numbers hold anything would be small.
+// |min(z/ζ, s/σ)|, with 0/0 = 0. A scale that overflows would make every residual seem small.
 double RowResidual(double z, double zeta, double s, double sigma) {
   if (!std::isfinite(sigma)) return HUGE_VAL;
   const double scaled_z = zeta > 0.0 ? z / zeta : 0.0;
@@ -34,11 +35,12 @@ double RowResidual(double z, double zeta, double s, double sigma) {
   return std::abs(std::min(scaled_z, scaled_s));
 }
 
-// Of each body by itself: a heavy one's terms say nothing of what a light one lacks.
+// The residual is relative to the terms of each body itself: those of a heavy body would hide the
+// error of a light one.
 double MomentumResidual(const ContactProblem<double>& problem, const ContactScales& scales,
                         const ContactSolution<double>& solution) {
   thread_local std::vector<double> left;
-  thread_local std::vector<double> terms;  // the largest
+  thread_local std::vector<double> terms;  // the largest of each row
   left.assign(problem.load.begin(), problem.load.end());
   terms.resize(left.size());
   const double* v = solution.motion.data();
@@ -46,7 +48,7 @@ double MomentumResidual(const ContactProblem<double>& problem, const ContactScal
     terms[i] = std::max(std::abs(left[i]), std::abs(problem.mass[i] * v[i]));
     left[i] -= problem.mass[i] * v[i];
   }
-  // `size`: of the terms that cancel in the impulse.
+  // `size` is the size of the terms that cancel in the impulse.
   const auto add_sized = [&](int a, const RowPart<double>& row_a, int b,
                              const RowPart<double>& row_b, double impulse, double size) {
     AddRowTransposed(a, row_a, b, row_b, impulse, left.data());
@@ -86,7 +88,7 @@ double MomentumResidual(const ContactProblem<double>& problem, const ContactScal
     const double* of = &terms[3 * body];
     const double missing = std::max({std::abs(x[0]), std::abs(x[1]), std::abs(x[2]) / lever});
     const double scale = std::max({of[0], of[1], of[2] / lever});
-    // Terms beyond what numbers hold would make anything small beside them.
+    // Terms that overflow would make every residual seem small.
     if (!std::isfinite(scale) || std::isnan(x[0] + x[1] + x[2])) return HUGE_VAL;
     worst = std::max(worst, scale > 0.0 ? missing / scale : 0.0);
   }
@@ -190,7 +192,8 @@ ContactValues Evaluate(const ContactProblem<double>& problem, const ContactScale
     values.slip = RowDot(c.a, c.tangent_a, c.b, c.tangent_b, v) + c.c_t;
     values.sigma_t = RowSpeed(scales, c.a, c.tangent_a, c.b, c.tangent_b) + std::abs(c.c_t);
     values.mobility_t = RowMobility(problem.mass, c.a, c.tangent_a, c.b, c.tangent_b);
-    // One contact, one scale of speed: an impulse along one row leaves rounding in the other.
+    // Both rows of a contact have one scale of speed, because an impulse along one row leaves
+    // rounding in the other.
     values.sigma_n = values.sigma_t = std::max(values.sigma_n, values.sigma_t);
   }
   if (c.limit_given) {  // far from closing, as it has no gap
@@ -309,7 +312,7 @@ ContactMargin MarginOfContact(const ContactProblem<double>& problem,
   const ContactValues values = Evaluate(problem, scales, c, solution.motion.data());
   const ContactMode mode = solution.modes[contact];
   const double normal = solution.normal_impulse[contact];
-  // 0 / 0: nothing moves and nothing pushes.
+  // 0 / 0 counts as 0: nothing moves and nothing pushes.
   const auto ratio = [](double x, double scale) { return scale > 0.0 ? x / scale : 0.0; };
   if (mode == ContactMode::kOpen) {
     return {ratio(values.s_n, values.sigma_n), Kind::kClosing};

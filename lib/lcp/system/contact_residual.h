@@ -10,19 +10,19 @@
 
 namespace tangible {
 
-/// The scales by which a solution's rows are judged: of what size the terms are that cancel in
-/// them.
+/// The scales of a solution's rows: the size of the terms that cancel in them.
 struct ContactScales {
-  /// A body's speed, m/s, rotation at the radius of gyration: the largest of its solved twist, its
-  /// free one M⁻¹ p and what one impulse changes it by, M⁻¹ rᵀ λ. A body that is pushed from both
-  /// sides and stays at rest has rounding for the first two. Impulses count up to what the momenta
-  /// of all bodies could bring about: rows that contradict each other have any impulses; and what
-  /// they change a light body by up to 1e6 times the fastest twist's. At least 1e-6 of that.
+  /// A body's speed, m/s, with rotation taken at the radius of gyration: the largest of its solved
+  /// twist, its free twist M⁻¹ p, and the change M⁻¹ rᵀ λ that a single impulse causes. For a body
+  /// that is pushed from both sides and stays at rest the first two are only rounding. Impulses
+  /// count up to the momenta of all bodies together, because rows that contradict each other can
+  /// have impulses of any size; the change of a light body's speed counts up to 1e6 times the speed
+  /// of the fastest twist. The scale is at least 1e-6 of the speed of the fastest twist.
   std::vector<double> speed;
-  /// The arm, m, at which a body's speed scale is one of rotation: its radius of gyration, but at
-  /// least a thousandth of the longest arm of its rows. A body of next to no inertia could turn at
-  /// any speed at no cost, and beside that speed any row is met, whatever its other terms are: a
-  /// box would fall through the floor with a small residual.
+  /// The arm, m, that converts a body's speed scale to a scale of rotation: its radius of gyration,
+  /// but at least a thousandth of the longest arm of its rows. A body of almost no inertia could
+  /// turn at any speed at no cost, and compared with that speed every row would seem satisfied,
+  /// whatever its other terms are: a box would fall through the floor with a small residual.
   std::vector<double> lever;
   double impulse = 0.0;  ///< the largest normal impulse, N s
 
@@ -33,10 +33,10 @@ struct ContactScales {
   void Compute(const ContactProblem<double>& problem, const ContactSolution<double>& solution);
 
  private:
-  /// Speeds of the solved and the free twists; levers are radii of gyration.
+  /// Computes the speeds of the solved and the free twists, with radii of gyration as levers.
   void ComputeSpeeds(const ContactProblem<double>& problem,
                      const ContactSolution<double>& solution);
-  /// Speeds that impulses bring about; false where a lever is too short.
+  /// Adds the speeds that impulses cause; false where a lever is too short.
   bool AddPushes(const ContactProblem<double>& problem, const ContactSolution<double>& solution);
   void RaiseLevers(const ContactProblem<double>& problem, const ContactSolution<double>& solution);
 
@@ -44,7 +44,7 @@ struct ContactScales {
   double fastest_ = 0.0;  ///< speed of a solved or free twist, m/s
 };
 
-/// What a contact's rows are at a solution, with the scales by which they are judged.
+/// The values of a contact's rows at a solution, with their scales.
 struct ContactValues {
   double s_n, slip;         // n v + c_n, t v + c_t
   double sigma_n, sigma_t;  // sums of |terms|
@@ -68,15 +68,15 @@ double NormalScale(const ContactBlock<double>& contact, const ContactValues& val
 double NaturalResidual(const ContactProblem<double>& problem,
                        const ContactSolution<double>& solution, int* worst_contact);
 
-/// The same; but where it is equations that exceed `tolerance`, v is made what the impulses say,
-/// M v = p + Σ rᵀ λ, if that leaves less: what rounding leaves of a light body's momentum in a
-/// system with far heavier ones belongs to the rows whose impulses are as large. Not for bodies at
-/// dampers.
+/// The same; but where equations exceed `tolerance`, v is recomputed from the impulses, M v = p + Σ
+/// rᵀ λ, if that leaves a smaller residual: in a system with far heavier bodies the rounding in the
+/// momentum of a light body belongs to the rows whose impulses are as large. Bodies with dampers
+/// are left out.
 double BalancedResidual(const ContactProblem<double>& problem, double tolerance,
                         ContactSolution<double>* solution, int* worst_contact);
 
-/// Which contacts of a solution are degenerate: impulse and slack both 0 to `tolerance` of their
-/// scales, in the normal direction or at the limit of friction.
+/// Finds the degenerate contacts of a solution: impulse and slack are both 0 to `tolerance` of
+/// their scales, in the normal direction or at the limit of friction.
 void FindDegenerateContacts(const ContactProblem<double>& problem,
                             const ContactSolution<double>& solution, double tolerance,
                             std::vector<int>* degenerate);
@@ -98,9 +98,9 @@ ContactMargin MarginOfContact(const ContactProblem<double>& problem,
                               const ContactSolution<double>& solution, const ContactScales& scales,
                               int contact);
 
-/// The joint whose rows a v = b the speeds miss by the largest share of what their terms are at
-/// speeds of the size `sizes` (3 a body; of a body at rest those that cancel in it, as its own are
-/// rounding), if by more than `share`; −1: none, also where nothing was solved.
+/// The joint whose rows a v = b are violated most, relative to their terms at speeds of the size
+/// `sizes` (3 for each body; for a body at rest the speeds that cancel in it, because its own are
+/// rounding), if the relative violation exceeds `share`; −1: none, also where nothing was solved.
 int MostViolatedJoint(const ContactProblem<double>& problem, const std::vector<double>& v,
                       const std::vector<double>& sizes, double share);
 

@@ -14,9 +14,10 @@ namespace tangible {
 namespace {
 
 // Refinement ends where the residual is at rounding level, or no longer falls. Derivatives of many
-// steps sum what is left of each: they take two rounds and more, as long as it helps a column.
+// steps add up the residuals of each: they take two rounds or more, as long as that helps a column.
 constexpr int kMaxRefinements = 40;
-// What contradicts redundant rows stays; a correction that leaves more than this of it is none.
+// The contradictory part of redundant rows remains in the residual; a correction after which the
+// residual exceeds this multiple of it is rejected.
 constexpr double kStays = 2.0;
 
 // Adds (left)ᵀ (right) weight to a 3 x 3 block.
@@ -47,8 +48,9 @@ RowPart<double> Combine(const RowPart<double>& x, double factor, const RowPart<d
   return {x[0] + factor * y[0], x[1] + factor * y[1], x[2] + factor * y[2]};
 }
 
-// Masses that differ by more than this lose so many digits in a factorisation (a chain with an end
-// of 1e6 of its links' mass: residuals of 2e-10 without refinement).
+// If masses differ by more than this factor, a factorisation loses so many digits that solutions
+// are refined (a chain whose last body has 1e6 of its links' mass: residuals of 2e-10 without
+// refinement).
 constexpr double kRefinedRatio = 1e4;
 
 bool MassesDiffer(const ContactProblem<double>& problem) {
@@ -150,7 +152,7 @@ void ContactSystem::AddBodies(const ContactProblem<double>& problem) {
   }
 }
 
-// Hinges and bars have less than three rows, contacts two.
+// Hinges and bars have fewer than three rows, contacts two.
 void ContactSystem::NarrowBlocks(const ContactProblem<double>& problem) {
   FindTurning(problem, &turning_);
   int block = 0;
@@ -206,7 +208,7 @@ void ContactSystem::AddJoints(const ContactProblem<double>& problem, double regu
 
 void ContactSystem::AddContacts(const ContactProblem<double>& problem,
                                 const std::vector<ContactMode>& modes) {
-  // Edges of contacts come last: of a, then of b, where these move.
+  // Edges of contacts come last: those to body a, then those to body b, where these move.
   int edge = static_cast<int>(edges_.size());
   for (size_t i = problem.contacts.size(); i-- > 0;) {
     if (modes[i] == ContactMode::kOpen) {
@@ -287,7 +289,7 @@ bool ContactSystem::FactorAs(bool condensed, const ContactProblem<double>& given
   } else {
     AddContacts(problem, modes);
   }
-  // What is solved in another form is refined as what is regularised.
+  // A system that is factorised in the equivalent form is refined like a regularised one.
   regularised_ = spread || (problem.redundant_joints && !problem.joints.empty());
   for (const int block : contact_block_) {
     regularised_ = regularised_ || block >= 0;
@@ -329,8 +331,8 @@ double ContactSystem::RefinedSolve(const ContactProblem<double>& problem,
   const size_t size = 3 * static_cast<size_t>(num_blocks()) * columns;
   rhs_.assign(x, x + size);
   SolveOnce<kTransposed>(problem, modes, x, columns);
-  // Bodies that are held have speeds of rounding: what their rows leave is judged by the speeds
-  // they would have if they were free.
+  // The speeds of bodies that are held at rest are rounding: the residual of their rows is compared
+  // with the speeds that they would have if they were free.
   const double left = Refine<kTransposed>(problem, modes, Regularisation::kLeftOut,
                                           {rhs_.data(), columns}, x, columns, kDerivativeGoal);
   if (Expand(left, problem, modes)) {
@@ -407,7 +409,7 @@ ContactSystem::RefinementScratch& ContactSystem::Scratch() {
   return scratch;
 }
 
-// Refines x for the right-hand side rhs_ as long as a round halves what is left of a column.
+// Refines x for the right-hand side rhs_ as long as a round halves the residual of some column.
 template <bool kTransposed>
 double ContactSystem::Refine(const ContactProblem<double>& problem,
                              const std::vector<ContactMode>& modes, Regularisation regularisation,
@@ -444,7 +446,7 @@ double ContactSystem::Refine(const ContactProblem<double>& problem,
       }
     }
     residual(&next_sizes);
-    // Of a derivative the first round is not judged.
+    // For a derivative the first round is always kept.
     const bool derivative = goal < kResidualGoal;
     lessens = derivative && i == 0;
     for (int c = 0; c < columns; ++c) {
@@ -452,8 +454,8 @@ double ContactSystem::Refine(const ContactProblem<double>& problem,
       const double left = next_sizes[c].ToParts();
       const bool halves = refined[c] == 0 && left < 0.5 * before;
       lessens = lessens || (halves && before > kResidualGoal);
-      // What contradicts redundant rows does not fall, nor does rounding; neither must keep the
-      // rest of its column from what a round does.
+      // The contradictory part of redundant rows does not fall, nor does rounding; neither must
+      // prevent the rest of the column from being improved.
       const bool stays = derivative && left <= std::max(kStays * before, kResidualGoal);
       if (refined[c] != 0 || halves || stays) {
         sizes[c] = next_sizes[c];

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// The linear system that a contact problem is once the mode of each contact is known.
+// The linear system to which a contact problem reduces once the mode of each contact is known.
 //
 //   K [v; y; λ] = [p; b; −c],     K = [ M  −Aᵀ  −Bᵀ
 //                                       A   δ    0
@@ -10,19 +10,22 @@
 // C has the rows n (closed contacts) and t (sticking ones); B the directions in which impulses act:
 // n − σ μ t for a sliding contact, so that K is unsymmetric there and the adjoint needs Kᵀ. A step
 // is solved with this system, and differentiated with the same factorisation. A driven contact
-// (contact_problem.h) has λn = o in place of its row n; its impulse acts as others do.
+// (contact_problem.h) has λn = o in place of its row n; its impulse acts like those of other
+// contacts.
 //
 // δ regularises redundant rows (four legs on a floor, a closed loop of bars): 1e-10 of the row's
 // own r M⁻¹ rᵀ, on contacts and, where joints form loops, on joints. Solutions are refined against
-// the K without δ, so what remains of δ is only the choice among redundant impulses.
+// the K without δ, so that δ only determines which of the possible impulses of redundant rows is
+// found.
 //
-// Where several contacts are closed they are taken out before factorisation
+// Where several contacts are closed they are eliminated before factorisation
 // (contact_condensation.h). Where refinement then stalls, the whole system is factorised instead.
 //
-// Beside a mass far greater δ is none of little: a body of 1 kg between the floor and 1e12 kg moves
-// as if it were free by 1 / kg, but with both held by 1e-12 / kg, of which δ is the hundredfold. A
-// round of refinement then takes 1 % of what is left in that direction, and all of the others;
-// directions so slow are as few as such bodies, and conjugate residuals take one a round.
+// At extreme mass ratios δ exceeds the compliance of the bodies: a body of 1 kg between the floor
+// and 1e12 kg has a mobility of 1 / kg if it is free, but of 1e-12 / kg together with the mass on
+// it, and δ is a hundred times that. A round of refinement then removes only 1 % of the residual in
+// that direction, and all of it in the others. There are no more such slow directions than such
+// bodies, and conjugate residuals remove one in each round.
 
 #include <algorithm>
 #include <cmath>
@@ -47,11 +50,11 @@ class ContactSystem {
   /// Block of contact i, −1 if open.
   const std::vector<int>& contact_block() const { return contact_block_; }
   int num_blocks() const { return num_blocks_; }
-  /// How often a condensed system did not refine, or was singular, and was factorised as a whole,
-  /// since the start.
+  /// How often, since the start, a condensed system was factorised as a whole because refinement
+  /// failed or it was singular.
   int expansions() const { return expansions_; }
-  /// In how many proximal steps redundant rows contradicted each other, to rounding or more, so
-  /// that δ stood for them, since the start.
+  /// In how many proximal steps, since the start, redundant rows contradicted each other, by
+  /// rounding or more, so that the solution depends on δ.
   int regularised_steps() const { return regularised_steps_; }
   /// Memory, bytes.
   size_t bytes() const {
@@ -62,14 +65,15 @@ class ContactSystem {
            sizeof(Turning) * turning_.capacity();
   }
   void Reserve(int num_blocks, int num_edges);
-  /// Whether solves need the problem: they are refined against K without δ, as the factorisation
-  /// found when it was made. Else they read the factors alone, and the problem may be any.
+  /// Whether solves need the problem, because they are refined against K without δ; the
+  /// factorisation decides that. Otherwise they read only the factors, and any problem may be
+  /// passed.
   bool needs_problem() const { return regularised_ || masses_differ_; }
-  /// Exchanges what is known of the pattern of the system; it must be factorised anew before it
-  /// solves.
+  /// Exchanges the symbolic factorisation of the system, which must be factorised anew before the
+  /// next solve.
   void SwapPattern(std::shared_ptr<BlockLuPattern>* pattern) { lu_.SwapPattern(pattern); }
-  /// Hands the factorisation over (a tape keeps it); this object must be factorised anew before it
-  /// solves.
+  /// Moves the factorisation to `other` (a tape keeps it); this object must be factorised anew
+  /// before the next solve.
   void MoveFactorsTo(ContactSystem* other);
 
   /// x := K⁻¹ x or K⁻ᵀ x; x row-major of shape (3 num_blocks, columns). Returns the largest
@@ -79,13 +83,13 @@ class ContactSystem {
   double SolveTransposed(const ContactProblem<double>& problem,
                          const std::vector<ContactMode>& modes, double* x, int columns);
 
-  /// x := (K with δ)⁻¹ x, refined: the proximal step, which redundant rows that contradict each
-  /// other do not upset. Returns as Solve does.
+  /// x := (K with δ)⁻¹ x, refined: the proximal step, which has a solution even if redundant rows
+  /// contradict each other. Returns as Solve does.
   double SolveRegularised(const ContactProblem<double>& problem,
                           const std::vector<ContactMode>& modes, double* x, int columns);
-  /// The proximal step, and further ones as long as each lessens what δ left of the residual by
-  /// half: the solution of K without δ where there is one, the regularised one where redundant rows
-  /// contradict each other. Returns as Solve does.
+  /// The proximal step, and further ones as long as each halves the residual that δ causes: this
+  /// gives the solution of K without δ where there is one, the regularised solution where redundant
+  /// rows contradict each other. Returns as Solve does.
   double SolveProximal(const ContactProblem<double>& problem, const std::vector<ContactMode>& modes,
                        double* x, int columns);
   /// δ of every row, 3 num_blocks; 0 but on rows of closed contacts and of joints in loops.
@@ -98,10 +102,10 @@ class ContactSystem {
 
  private:
   enum class Regularisation { kLeftOut, kKept };
-  // Largest magnitudes of a kind of row: of its terms and of what is left.
+  // Largest magnitudes in a kind of row: of its terms and of its residual.
   struct RowScale {
     double terms = 0.0;
-    // Of the products that a constraint's value sums, and of the free motion: at rest all terms
+    // The products that a constraint's value sums, and those of the free motion: at rest all terms
     // cancel to rounding, which is relative to these.
     double parts = 0.0;
     double left = 0.0;
@@ -115,8 +119,8 @@ class ContactSystem {
       return scale > 0.0 ? left / scale : left > 0.0 ? HUGE_VAL : 0.0;
     }
   };
-  // Of a column, or of all. Its largest entry is relative to the terms of its kind of row, or to
-  // the products that these sum.
+  // The residual of a column, or of all columns. Its largest entry is relative to the terms of its
+  // kind of row, or to the products that these sum.
   struct ResidualSize {
     RowScale momentum, constraint;
     void Include(const ResidualSize& other);
@@ -127,13 +131,14 @@ class ContactSystem {
   };
   template <bool kTransposed>
   class ColumnResidual;
-  // Momenta of the motion without constraints, whose speeds are of the size that rows cancel from:
-  // row-major, 3 num_bodies rows; of each column, or one for all.
+  // Momenta of the motion without constraints, whose speeds have the size of the terms that cancel
+  // in rows: row-major, 3 num_bodies rows; of each column, or one for all.
   struct FreeMomenta {
     const double* values;
     int columns;
   };
-  // Writes the size of each column's residual where `sizes` is given; returns that of all.
+  // Writes the size of each column's residual where `sizes` is given; returns the size over all
+  // columns.
   template <bool kTransposed>
   ResidualSize ResidualWith(const ContactProblem<double>& problem,
                             const std::vector<ContactMode>& modes, Regularisation regularisation,
@@ -150,8 +155,8 @@ class ContactSystem {
                        int columns, int column);
   bool FactorAs(bool condensed, const ContactProblem<double>& problem,
                 const std::vector<ContactMode>& modes);
-  // Whether the whole system could be factorised in place of the condensed one, where refinement
-  // with that left this much.
+  // Factorises the whole system in place of the condensed one if refinement left the residual
+  // `left`; returns whether it did.
   bool Expand(double left, const ContactProblem<double>& problem,
               const std::vector<ContactMode>& modes);
   template <bool kTransposed>
@@ -168,7 +173,8 @@ class ContactSystem {
   double RefinedSolve(const ContactProblem<double>& problem, const std::vector<ContactMode>& modes,
                       double* x, int columns);
 
-  // Of refinement, one a thread: systems that a tape keeps are many.
+  // Scratch of refinement, one for each thread rather than for each system, because a tape keeps
+  // many systems.
   struct RefinementScratch {
     std::vector<ResidualSize> sizes, next_sizes;  // of columns
     std::vector<char> refined;                    // whether a column is done
@@ -192,8 +198,8 @@ class ContactSystem {
   std::vector<Turning> turning_;
 };
 
-/// r M⁻¹ rᵀ with the diagonal of M: what a unit impulse along the row changes its speed by, were
-/// its bodies free.
+/// r M⁻¹ rᵀ with the diagonal of M: the change of the row's speed by a unit impulse along it if its
+/// bodies were free.
 template <typename T>
 double RowMobility(const std::vector<T>& mass, int a, const RowPart<T>& row_a, int b,
                    const RowPart<T>& row_b) {

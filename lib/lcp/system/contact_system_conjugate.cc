@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Refinement where δ is large beside what held bodies yield: generalised conjugate residuals on
-// K K_δ⁻¹, with K_δ as factorised.
+// Refinement where δ is large beside the compliance of held bodies: generalised conjugate residuals
+// on K K_δ⁻¹, where K_δ is the factorised matrix.
 #include <algorithm>
 #include <cmath>
 
@@ -12,10 +12,10 @@
 namespace tangible {
 namespace {
 
-// Directions that are slow are as few as heavy bodies.
+// There are no more slow directions than heavy bodies, which are few.
 constexpr int kMostDirections = 12;
-// Rounds in a row that lessen nothing by a tenth, after which none will: rows contradict each
-// other, or what is left is rounding.
+// After this many rounds in a row that reduce no residual by a tenth the iteration ends: rows
+// contradict each other, or the residual is rounding.
 constexpr int kMostIdle = 3;
 constexpr double kLessened = 0.9;
 

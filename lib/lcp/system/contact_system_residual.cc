@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// What a mode system leaves at a point: K is not stored, its rows are those of the problem.
+// The residual of a mode system at a point. K is not stored; its rows are computed from the
+// problem.
 #include <algorithm>
 #include <cmath>
 
@@ -52,7 +53,7 @@ class ContactSystem::ColumnResidual {
   void Contact(const ContactBlock<double>& c, ContactMode mode, int block) {
     const double along = -SlidingSign(mode) * c.friction;  // the impulse's part on the tangent
     const double impulse = At(block, 0);
-    // A driven contact has a column as others, and of rows λn alone.
+    // A driven contact has a column like any other, but its row is λn alone.
     double row = c.driven && !kTransposed ? impulse : Dot(c.a, c.normal_a, c.b, c.normal_b);
     if (c.driven && kTransposed) {
       row -= impulse;
@@ -72,8 +73,8 @@ class ContactSystem::ColumnResidual {
     Constrain(block, 0, row);
   }
 
-  // The free motion's momenta, as strided as the column or one for all; rotation at the radius of
-  // gyration.
+  // The free motion's momenta, with the stride of the column or one for all; rotation is taken at
+  // the radius of gyration.
   void FreeMotion(const double* momenta, int columns) {
     for (int i = 0; i < 3 * p_.num_bodies; ++i) {
       const double size = std::abs(momenta[static_cast<size_t>(i) * columns]);
@@ -83,7 +84,7 @@ class ContactSystem::ColumnResidual {
     }
   }
 
-  // After all rows. Unused ones of constraints have a right-hand side of 0.
+  // Called after all rows. Unused rows of constraints have a right-hand side of 0.
   ResidualSize Size(int rows) {
     for (int i = 0; i < rows; ++i) {
       RowScale& kind = i < 3 * p_.num_bodies ? momentum_ : constraint_;

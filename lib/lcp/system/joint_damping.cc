@@ -10,7 +10,7 @@ double Translation(const ContactProblem<double>& problem, int body, const RowPar
                         row[1] * row[1] / problem.mass[3 * body + 1];
 }
 
-// w of a row; 0 where it does not translate (a fixed angle), which needs none.
+// w of a row; 0 for a row without translation (a fixed angle), which needs none.
 double WeightOf(const ContactProblem<double>& problem, const JointBlock<double>& joint, int k) {
   const double mobility =
       Translation(problem, joint.a, joint.row_a[k]) + Translation(problem, joint.b, joint.row_b[k]);
@@ -73,7 +73,7 @@ bool HasSpreadJoints(const ContactProblem<double>& problem) {
     if (body < 0) {
       return false;
     }
-    // Without divisions: this is asked in every step.
+    // The test has no divisions, because it runs in every step.
     const double* mass = &problem.mass[3 * static_cast<size_t>(body)];
     const double moves = row[0] * row[0] + row[1] * row[1];
     return moves > 0.0 && row[2] * row[2] * mass[0] > kSpread * moves * mass[2];

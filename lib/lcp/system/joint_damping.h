@@ -3,9 +3,9 @@
 //
 // An equivalent form of a mode system for bodies of little inertia far from their joints.
 //
-// Elimination of such a body leaves A M⁻¹ Aᵀ with entries r²/I, beside which 1/m is lost, though
-// the system is well conditioned: the joint holds what inertia does not. Multiples of the joints'
-// rows A v = b added to the rows of momentum,
+// Elimination of such a body leaves A M⁻¹ Aᵀ with entries r²/I, beside which 1/m is lost to
+// rounding, although the system is well conditioned: the joint restrains the rotation that inertia
+// does not. Multiples of the joints' rows A v = b added to the rows of momentum,
 //
 //   E K x = E r,   E = [1  Aᵀ w; 0  1],   (E K)₁₁ = M + Aᵀ w A
 //
@@ -18,11 +18,11 @@
 
 namespace tangible {
 
-/// Whether at some joint r²/I of a body exceeds 1/m by more than elimination bears: 1e3, so that at
-/// most 1e-13 is lost.
+/// Whether at some joint r²/I of a body exceeds 1/m by more than a factor of 1e3, so that
+/// elimination would lose more than 1e-13.
 bool HasSpreadJoints(const ContactProblem<double>& problem);
 
-/// The problem with Aᵀ w A as dampers of every joint's rows.
+/// The problem with Aᵀ w A added as dampers along the rows of every joint.
 ContactProblem<double> WithJointDampers(const ContactProblem<double>& problem);
 
 /// x := K⁻¹ x or K⁻ᵀ x (row-major of `columns`, in the order of ContactSystem's unknowns) by the

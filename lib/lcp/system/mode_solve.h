@@ -3,8 +3,8 @@
 //
 // The solution of a contact problem whose modes are given: one linear system,
 //   K x = (p, b, −c),   x = (v, y, λ),
-// with λt = −σ μ λn where a contact slides, and λn = o where it is driven. Whether the solution
-// satisfies the inequalities that the modes assume is for the caller to look at.
+// with λt = −σ μ λn where a contact slides, and λn = o where it is driven. The caller has to check
+// whether the solution satisfies the inequalities that the modes assume.
 
 #include <vector>
 
@@ -16,10 +16,11 @@ class ModeSolve {
  public:
   /// Factorises `system` with the modes of `solution` and fills in the rest of it; false where the
   /// system is singular. With `centre`, whose impulses are given, the solve is a proximal step from
-  /// these: of many impulses with the same motion those near to them. `centre` may be `solution`.
+  /// these: of the impulses that give the same motion it finds those nearest to them. `centre` may
+  /// be `solution`.
   bool Solve(const ContactProblem<double>& problem, const ContactSolution<double>* centre,
              ContactSystem* system, ContactSolution<double>* solution);
-  /// Memory for so many rows.
+  /// Reserves memory for this many rows.
   void Reserve(size_t rows);
 
  private:

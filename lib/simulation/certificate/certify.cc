@@ -18,10 +18,10 @@
 namespace tangible {
 namespace {
 
-// Beyond this many unknowns the rank is determined anew only where modes change.
+// With more unknowns than this the rank is determined anew only where modes change.
 constexpr size_t kRankEachStep = 150;
 
-// The speed n·v before the step, and were there no contacts and joints.
+// The speed n·v before the step, and after a free motion without contacts and joints.
 struct Approach {
   double before = 0.0;
   double free = 0.0;
@@ -146,8 +146,8 @@ void RolloutCertifier::AddControls(const ModelStructure& structure, const Contro
   }
 }
 
-// The choices of the law's constant: kinks where it is continuous, jumps at the conditions of an
-// impact.
+// The choice of the constant in the contact law: it causes kinks where the constant is continuous,
+// jumps at the conditions of an impact.
 void RolloutCertifier::AddLaw(const Model<double>& model, const StepRecord& record,
                               const Place& place) {
   const SimulationSettings& settings = model.structure->settings;
@@ -190,7 +190,8 @@ void RolloutCertifier::AddLaw(const Model<double>& model, const StepRecord& reco
     }
   }
   const bool impact = fast > 0.0 && near > 0.0;
-  // To flip an impact one condition must change; to make one, each that does not hold.
+  // An impact disappears if one condition changes; an impact arises if all conditions that do not
+  // hold change.
   const double distance =
       impact ? std::min(fast, near) : std::max(std::max(-fast, 0.0), std::max(-near, 0.0));
   const bool by_speed = impact ? fast < near : -fast > -near;
@@ -232,7 +233,7 @@ void RolloutCertifier::AddLinearSystem(const StepRecord& record, ContactSystem* 
   certificate_.linear_residual = std::max(certificate_.linear_residual, quality.residual);
 }
 
-// Each pair of shapes once: its contacts stand together.
+// Each pair of shapes is examined once; its contacts are adjacent in the list.
 void RolloutCertifier::AddFeatures(const Model<double>& model, const StepRecord& record, long step,
                                    ContactSystem* system) {
   const std::vector<ActiveContact>& contacts = record.contacts;
@@ -323,7 +324,7 @@ Certificate RolloutCertifier::Finish(const Model<double>& model, const RolloutRe
   AddForceWindows(model);
   certificate_.mode_switches = static_cast<int>(report.mode_switches);
   certificate_.events = static_cast<int>(report.events);
-  // A solver that the scene asks for is no fallback.
+  // A solver that the scene asks for does not count as a fallback.
   certificate_.fallbacks =
       static_cast<int>(report.given_up.total()) +
       (model.structure->settings.solver == SolverChoice::kAuto
@@ -382,7 +383,7 @@ Certificate CertifyRollout(const Model<double>& model, const State<double>& init
 
 namespace {
 
-// Places of the model's numbers that the directions change.
+// Indices of the model's numbers that the directions change.
 std::vector<int> NumbersOf(const ModelStructure& structure, const RowMatrixXd& directions) {
   std::vector<int> numbers;
   for (int i = 0; i < structure.num_parameters; ++i) {
@@ -393,7 +394,7 @@ std::vector<int> NumbersOf(const ModelStructure& structure, const RowMatrixXd& d
   return numbers;
 }
 
-// How far the directions exceed what redundant rows allow (StepTangent::ApplyAndMeasure).
+// How far the directions contradict redundant rows (StepTangent::ApplyAndMeasure).
 double MeasureContradiction(const Model<double>& model, const State<double>& initial,
                             RowMatrixXd directions) {
   StepTangent tangent;
@@ -425,11 +426,11 @@ Certificate CertifyDerivative(const Model<double>& model, const State<double>& i
     certificate.one_sided = kContradictingRows;
     SetVerdict(certificate);
   }
-  // Residuals of single solves do not show what a stiff chain of them loses, nor how impact after
-  // impact multiplies rounding.
+  // Residuals of single solves do not show the digits that an ill-conditioned sequence of them
+  // loses, nor how successive impacts multiply rounding.
   constexpr double kIllConditioned = 1e8;
   constexpr long kManyEvents = 10;
-  // Where redundant rows contradict a direction no derivative exists to compare.
+  // Where a direction contradicts redundant rows no derivative exists that could be compared.
   const bool compare = HasWideMasses(model) || certificate.condition > kIllConditioned ||
                        certificate.redundant_rows > 0 || certificate.events >= kManyEvents;
   if (compare && certificate.one_sided != kContradictingRows &&

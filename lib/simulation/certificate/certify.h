@@ -4,22 +4,23 @@
 // The certificate of a rollout's derivative: how near its steps are to kinks and jumps.
 //
 //   margins        of every contact and limit of every step, by its mode (MarginOfContact);
-//                  besides, of the choice between the constants gap / h, −recovery_speed and
-//                  e (n·v) where these are continuous, and of the choice of the corners and edges
-//                  that touch (feature_ties.h)
+//                  also of the choice between the constants gap / h, −recovery_speed and e (n·v)
+//                  where these are continuous, and of the choice of the corners and edges that
+//                  touch (feature_ties.h)
 //   jumps          the restitution decisions (contact.h): the smallest relative
 //                  |approach speed − threshold| and |gap + h n·v_free − margin| of contacts with
 //                  e > 0; and a landing in the last step, whose twist has derivatives of order 1/h
 //                  that the next step would cancel
-//   one-sided      friction exactly 0, a tie of the mixing rule, an edge of a force's window on a
-//                  step's boundary: only where derivatives with respect to these numbers are
-//                  wanted; and with event stepping a contact that touches as the run starts, where
-//                  a direction opens or closes its gap: one side falls and lands, the other is
-//                  pushed out
-//   controls       an event at the boundary of two steps whose controls differ: before it and after
-//                  it other forces act, and its derivative is another on either side
-//   coordinates    so large that what they round to is more than kLargeCoordinates of a body that
-//                  has contacts or joints (coordinate_watch.h): its modes may be rounding
+//   one-sided      friction exactly 0, equal coefficients in the mixing rule, an edge of a force's
+//                  window on a step's boundary: only where derivatives with respect to these
+//                  numbers are wanted; and with event stepping a contact that touches as the run
+//                  starts, where a direction opens or closes its gap: on one side the body falls
+//                  and lands, on the other it is pushed out
+//   controls       an event at the boundary of two steps whose controls differ: different forces
+//                  act before and after it, so that its derivative differs on the two sides
+//   coordinates    so large that their rounding exceeds kLargeCoordinates of the size of a body
+//                  that has contacts or joints (coordinate_watch.h): its modes may be determined by
+//                  rounding
 //   linear systems redundant rows, condition, residual (contact_conditioning.h), of every step
 
 #include <optional>
@@ -33,10 +34,10 @@
 namespace tangible {
 
 struct CertifyOptions {
-  /// Places in the model's numbers that derivatives are taken with respect to, ascending.
+  /// Indices of the model's numbers with respect to which derivatives are taken, ascending.
   std::vector<int> numbers;
-  /// The directions of [initial poses | initial twists | parameters] that derivatives are taken
-  /// along, a column each, and what they are called.
+  /// The directions of [initial poses | initial twists | parameters] along which derivatives are
+  /// taken, one in each column, and their names.
   RowMatrixXd directions;
   std::vector<std::string> names;
 };
@@ -48,7 +49,7 @@ class RolloutCertifier {
 
   /// The step that the stepper has just done; `step` counts from 0.
   void AddStep(const Model<double>& model, long step, Stepper* stepper);
-  /// The same step's events that coincide with a change of the controls.
+  /// Adds the events of the same step that coincide with a change of the controls.
   void AddControls(const ModelStructure& structure, const Controls& controls, long step,
                    Stepper* stepper);
   /// The certificate with its verdict, after the last step.
@@ -67,7 +68,8 @@ class RolloutCertifier {
   void ProbeStarts(const Model<double>& model, const State<double>& start,
                    const std::vector<const ActiveContact*>& touching, const Segment* first);
   /// Whether friction in a joint that is at rest as the run starts, and slides at once, keeps its
-  /// side: no direction changes the rate, nor the twists of other bodies that joints pass on.
+  /// direction: no direction of the parameters changes the rate, or the twists of other bodies that
+  /// joints transmit.
   bool KeepsSide(const Model<double>& model, const ActiveContact& contact,
                  EventDerivative* derivative, Segment* segment) const;
   void AddImpact(const Model<double>& model, long step, Impulses* impact);
@@ -100,34 +102,35 @@ class RolloutCertifier {
   std::vector<ActiveContact> closed_;  ///< of the last step, or segment
   std::vector<ContactMode> last_modes_;
   int last_redundant_ = 0;
-  // Event stepping: contacts that bear a force, the bodies that the last impact moved, and when.
+  // For event stepping: contacts that carry a force, the bodies that the last impact moved, and
+  // when.
   std::vector<ActiveContact> loaded_;
-  std::vector<double> struck_at_;  ///< a body: the time of its last impact, s
+  std::vector<double> struck_at_;  ///< for each body: the time of its last impact, s
 };
 
-/// Runs the rollout and certifies it. A rollout that fails is certified as far as it came; `report`
-/// says so.
+/// Runs the rollout and certifies it. A rollout that fails is certified up to the failure, which
+/// `report` describes.
 Certificate CertifyRollout(const Model<double>& model, const State<double>& initial,
                            const CertifyOptions& options, RolloutReport* report);
-/// The same of a model with controls.
+/// The same for a model with controls.
 Certificate CertifyRollout(ControlledModel<double>* model, const State<double>& initial,
                            const CertifyOptions& options, RolloutReport* report);
 Certificate CertifyRollout(const Model<double>& model, const State<double>& initial);
 
-/// The reason of a verdict `one-sided` where the certificate finds that a direction contradicts
-/// redundant rows: one contact would open or slip and the others not.
+/// The reason for a verdict `one-sided` where a direction contradicts redundant rows: one contact
+/// would open or slip and the others not.
 inline constexpr char kContradictingRows[] =
     "redundant contacts contradict the change of a parameter";
 
-/// The same of a motion that redundant contacts leave undetermined (contact_conditioning.h).
+/// The reason where redundant contacts leave a motion undetermined (contact_conditioning.h).
 inline constexpr char kUndeterminedMotion[] =
     "redundant contacts that slide with different friction leave the motion undetermined";
 
 /// The certificate of the derivatives along `directions` (num_variables x columns, named; `sizes`
-/// as of DualityGap): of the rollout, and where rows are redundant (a box on a box) of whether each
-/// direction agrees with them (two rollouts). Where masses are far apart, rows redundant, a system
-/// ill-conditioned or events many, `linear_residual` is at least the gap between tangent and
-/// adjoint (duality.h), both of which are run.
+/// as in DualityGap). It covers the rollout and, where rows are redundant (a box on a box), whether
+/// each direction is consistent with them (two rollouts). Where masses are very different, rows
+/// redundant, a system ill-conditioned or events many, `linear_residual` is at least the gap
+/// between tangent and adjoint (duality.h), both of which are run.
 Certificate CertifyDerivative(const Model<double>& model, const State<double>& initial,
                               const RowMatrixXd& directions, const std::vector<std::string>& names,
                               const std::vector<double>& sizes = {});

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Certificates of event steps. A mode that ends at an event has margin 0 there by construction:
-// what counts is how transversally the event is crossed, and how far modes are from a change where
-// they start.
+// Certificates of event steps. A mode that ends at an event has margin 0 there by construction. The
+// certificate therefore measures how transversally the event is crossed, and how far modes are from
+// a change where they start.
 #include <algorithm>
 #include <cmath>
 
@@ -23,7 +23,7 @@
 namespace tangible {
 namespace {
 
-// Bodies that an impact's impulses move, with those joined to them: one by one until none is added.
+// Bodies that an impact's impulses move, with those joined to them, which are added one by one.
 std::vector<bool> Struck(const ModelStructure& s, const Impulses& impact) {
   std::vector<bool> struck(s.bodies.size(), false);
   const auto moves = [&](int body) { return s.bodies[body].block >= 0; };
@@ -51,7 +51,7 @@ bool HasPair(const std::vector<ActiveContact>& contacts, const ActiveContact& co
   });
 }
 
-// Whether a segment ends as two bodies that were apart touch.
+// Whether a segment ends because two bodies that were apart touch.
 bool EndsInMeeting(const Model<double>& model, const Segment& segment) {
   const ActiveContact& contact = segment.event_contact;
   if (segment.event != EventKind::kTouch || contact.joint >= 0 ||
@@ -81,9 +81,9 @@ void RolloutCertifier::AddQuality(const ContactProblem<double>& problem,
   certificate_.linear_residual = std::max(certificate_.linear_residual, quality.residual);
 }
 
-// Impacts on the same bodies at (nearly) the same time: were their order another, so would be the
-// result. Impacts of bodies that have nothing to do with each other may be in any order, and are
-// impacts of their own (events/coupled_bodies.h).
+// Impacts on the same bodies at (nearly) the same time: the result depends on their order. Impacts
+// of bodies that are not coupled may be in any order, and are separate impacts
+// (events/coupled_bodies.h).
 void RolloutCertifier::AddSimultaneous(const Model<double>& model, long step,
                                        const Impulses& impact) {
   const ModelStructure& s = *model.structure;
@@ -103,7 +103,7 @@ void RolloutCertifier::AddSimultaneous(const Model<double>& model, long step,
   const ActiveContact& first = impact.contacts[approaching[0]];
   const Place place{
       &s, step, impact.time, approaching[0], &first, impact.solution.modes[approaching[0]]};
-  // Several that approach at once, where one moves bodies of another.
+  // Several contacts approach at once, and the impulse of one moves bodies of another.
   for (size_t k = 0; k < approaching.size(); ++k) {
     for (size_t l = 0; l < k; ++l) {
       const ActiveContact& x = impact.contacts[approaching[k]];
@@ -132,14 +132,14 @@ void RolloutCertifier::AddSimultaneous(const Model<double>& model, long step,
   }
 }
 
-// A contact that only touches, without force, takes part in an impact of another: were there a gap,
-// however small, it would have one of its own later.
+// A contact that only touches, without force, takes part in the impact of another contact: with a
+// gap, however small, it would have a separate impact later.
 void RolloutCertifier::AddUnloaded(const Model<double>& model, long step, const Impulses& impact) {
   double largest = 0.0;
   for (const double normal : impact.solution.normal_impulse) {
     largest = std::max(largest, normal);
   }
-  // The impact of another: what approaches by rounding alone is none.
+  // The impact of another contact; one that approaches by rounding alone does not count.
   const auto speed = [&](size_t i) {
     const ActiveContact& c = impact.contacts[i];
     const ContactBlock<double>& block = impact.problem.contacts[i];
@@ -205,8 +205,8 @@ void RolloutCertifier::AddImpact(const Model<double>& model, long step, Impulses
   AddQuality(impact->problem, impact->solution.modes, &impact->system);
 }
 
-// Contacts of different pairs that begin to bear a body at the same time: were one the first, it
-// would bear it alone for as long.
+// Contacts of different pairs that begin to support a body at the same time: if one were earlier,
+// it would support the body alone until the other closes.
 void RolloutCertifier::AddClosedAtOnce(const ModelStructure& s, long step, const Segment& segment) {
   std::vector<size_t> begun;
   for (size_t i = 0; i < segment.contacts.size(); ++i) {
@@ -231,7 +231,8 @@ void RolloutCertifier::AddClosedAtOnce(const ModelStructure& s, long step, const
   }
 }
 
-// Coupled bodies that stop sliding at the same time: the derivative of the time is that of one.
+// Coupled bodies that stop sliding at the same time: the derivative of the time is that of only one
+// of them.
 void RolloutCertifier::AddOtherSlips(const Model<double>& model, const Segment& segment,
                                      const Place& place) {
   const ActiveContact& ends = segment.event_contact;
@@ -278,8 +279,8 @@ void RolloutCertifier::AddSegment(const Model<double>& model, long step,
         MeetsACorner(model, segment->before, contact)) {
       AddJump(0.0, place, "a corner meets a corner");
     }
-    // Sliding at no speed: friction stays at its limit. Beside a contact of the same bodies that
-    // sticks this says only how they share the load.
+    // The contact slides at zero speed: friction stays at its limit. Beside a sticking contact of
+    // the same bodies this only determines how they share the load.
     const bool shared = std::any_of(
         segment->contacts.begin(), segment->contacts.end(), [&](const ActiveContact& other) {
           return &other != &contact && other.IsBetweenTheSame(contact) &&
@@ -335,7 +336,7 @@ void RolloutCertifier::AddEventStep(const Model<double>& model, long step, Stepp
   if (step == 0 && options_.directions.cols() > 0) {
     AddStart(model, record);
   }
-  const Segment* last = nullptr;  // that the last event of the pair with the most ended
+  const Segment* last = nullptr;  // ended by the last event of the pair with the most events
   EventCounts located;
   int most = 0;  // events of one pair
   for (int p = 0; p < record.num_parts; ++p) {
@@ -351,7 +352,8 @@ void RolloutCertifier::AddEventStep(const Model<double>& model, long step, Stepp
       most = std::max(most, count);
     }
   }
-  // Impacts without end in a finite time (Zeno): of as many, rounding decides how many there are.
+  // Infinitely many impacts in a finite time (Zeno): rounding decides how many of them are
+  // computed.
   if (2 * most > model.structure->settings.max_events_per_step) {
     const Place place{model.structure.get(),     step,
                       last->time + last->length, 0,

@@ -20,8 +20,8 @@ GapCourse CourseAt(const Model<double>& model, const State<double>& state,
           RelativeSpeed(state, contact.a, rows.normal_a, contact.b, rows.normal_b)};
 }
 
-// The smallest value on [0, length] of the cubic with these ends, one of which approaches and the
-// other leaves.
+// The smallest value on [0, length] of the cubic with these end values; the gap closes at the start
+// and opens at the end.
 double Least(const GapCourse& start, const GapCourse& end, double length) {
   // ġ(s) = ġ0 + b s + c s², s in [0, 1], per length.
   const double v0 = start.speed * length;
@@ -70,7 +70,7 @@ class GrazeFinder {
   }
 
  private:
-  // Of any two points, m/s.
+  // The fastest approach of any two points, m/s.
   double FastestApproach(const Segment& segment) const {
     double fastest = 0.0;
     for (const State<double>* state : {&segment.before, &segment.after}) {
@@ -86,7 +86,7 @@ class GrazeFinder {
   void AddTouch(const Segment& segment) {
     const GapCourse start = CourseAt(model_, segment.before, segment.event_contact);
     const GapCourse end = CourseAt(model_, segment.after, segment.event_contact);
-    // The last rebounds of a body that comes to rest are slow, and no grazes.
+    // The last rebounds of a body that comes to rest are slow, but they are not grazing.
     const bool from_above =
         start.gap > search_.TouchTolerance(model_, segment.before, segment.event_contact);
     const double gained =
@@ -101,7 +101,7 @@ class GrazeFinder {
   void AddMiss(const Segment& segment, const ActiveContact& contact) {
     const GapCourse start = CourseAt(model_, segment.before, contact);
     const GapCourse end = CourseAt(model_, segment.after, contact);
-    // What starts at rest on the surface is a contact that opens.
+    // A body that starts at rest on the surface is a contact that opens.
     const double rest = search_.SpeedTolerance(model_, segment.before);
     if (!(start.speed < -rest && end.speed >= -rest)) {
       return;
@@ -110,7 +110,7 @@ class GrazeFinder {
     const double dt = model_.structure->settings.dt;
     const double height =
         std::max(0.5 * start.speed * start.speed / acceleration, 0.5 * acceleration * dt * dt);
-    // Just below 0 it is rounding: it did not touch.
+    // A minimum just below 0 is rounding: the bodies did not touch.
     List(std::abs(Least(start, end, segment.length)) / height, segment, contact, false);
   }
 

@@ -12,19 +12,20 @@
 
 namespace tangible {
 
-/// A contact of shapes that nearly grazes.
+/// A contact of shapes that nearly graze each other.
 struct Graze {
-  double margin = 0.0;  ///< relative, as other margins: what of its data has to change
+  double margin = 0.0;  ///< relative, like other margins: the change of data that is needed
   double time = 0.0;    ///< s
   ActiveContact contact;
   bool touches = false;
 };
 
-/// A touch at the end of a segment with ġ1 < 0, after ġ0 at its start: margin (ġ1 / v)², as depth
-/// goes with the speed's square, v = max(|ġ0| + |ġ1|, |a| dt) with the relative acceleration a
-/// (from above: the rebounds of a body that comes to rest are slow). A gap g* at which an approach
-/// turns around: margin g* / h, h = max(ġ0² / 2a, a dt² / 2) the height that it falls from, or
-/// falls in a step. Only those below `most` are listed.
+/// A touch at the end of a segment with ġ1 < 0, after ġ0 at its start: margin (ġ1 / v)², because
+/// depth grows with the square of speed, v = max(|ġ0| + |ġ1|, |a| dt) with the relative
+/// acceleration a (only where the contact approaches from above, because the rebounds of a body
+/// that comes to rest are slow). A gap g* at which an approach turns around: margin g* / h, h =
+/// max(ġ0² / 2a, a dt² / 2) the height that it falls from, or falls in a step. Only those below
+/// `most` are listed.
 void FindGrazes(const Model<double>& model, const EventRecord& record, double most,
                 std::vector<Graze>* grazes);
 

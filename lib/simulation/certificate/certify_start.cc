@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Certificates of event steps: contacts that touch as the run starts, and what a direction does to
-// them.
+// Certificates of event steps: contacts that touch as the run starts, and the effect of a direction
+// on them.
 #include <algorithm>
 #include <cmath>
 
@@ -16,8 +16,8 @@
 namespace tangible {
 namespace {
 
-// What a motion differs by where an event ends a part of it early, as a share of the motion: the
-// integrator's error, which a step in two parts makes twice.
+// The difference that a motion gets if an event splits it in two parts, as a fraction of the
+// motion: the integrator's error, which occurs once in each part.
 double SplitError(const Model<double>& model, const Segment& segment) {
   SegmentFlow flow(model);
   std::string message;
@@ -65,7 +65,7 @@ bool Sticks(const Segment* segment, const ActiveContact& contact) {
   return false;
 }
 
-// Whether a direction changes what the entries are the gradient of.
+// Whether a direction changes the quantity whose gradient the entries are.
 bool Moves(const std::vector<JacobianEntry>& gradient, const RowMatrixXd& directions,
            Eigen::Index direction) {
   double rate = 0.0;
@@ -84,7 +84,7 @@ bool Rests(const Model<double>& model, const State<double>& state, const ActiveC
   return std::abs(speed) <= Negligible(model, speed);
 }
 
-// What forces give bodies as a segment starts, m/s².
+// The acceleration of bodies by forces as a segment starts, m/s².
 double Acceleration(const Model<double>& model, const Segment* segment) {
   double largest = std::hypot(model.parameters[kGravityX], model.parameters[kGravityY]);
   if (segment != nullptr && segment->num_stages > 0) {
@@ -96,8 +96,8 @@ double Acceleration(const Model<double>& model, const Segment* segment) {
   return largest;
 }
 
-// Of contacts that touch, those that may jam, and those that touch a body of one of them: what they
-// are spared or given passes on to it.
+// Among contacts that touch, those that may jam, and those that touch a body of one of them,
+// because changes of their impulses are transmitted to it.
 std::vector<ActiveContact> ThatMayJam(const Model<double>& model, const State<double>& start,
                                       const std::vector<ActiveContact>& touching) {
   const ModelStructure& s = *model.structure;
@@ -142,7 +142,7 @@ bool RolloutCertifier::KeepsSide(const Model<double>& model, const ActiveContact
       rate += entry.value * after(entry.variable, c);
       size += std::abs(entry.value);
     }
-    // Of joints that pass nothing on rounding is left.
+    // Joints that transmit nothing leave only rounding.
     if (std::abs(rate) > kUnmoved * size * after.col(c).cwiseAbs().maxCoeff()) return false;
   }
   return true;
@@ -196,8 +196,9 @@ void RolloutCertifier::AddStart(const Model<double>& model, const EventRecord& r
     if (Sticks(first, *contact)) {
       AddSlipGradient(model, *start, *contact, &scratch, &slip);
     }
-    // Out of penetration it is pushed only while it does not open by itself. One that rests on the
-    // surface has both sides: what it falls late it lands with; not so where no force presses.
+    // A contact in penetration is pushed out only while it does not open by itself. For a contact
+    // at rest on the surface both sides have the same derivative, because a later fall is made up
+    // for by the landing; not so where no force presses.
     const bool rests = Rests(model, *start, *contact);
     const double meant = kMeantTouches * search.TouchTolerance(model, *start, *contact);
     const bool pushed = rests && (k >= loaded || contact->gap < -meant);
@@ -205,8 +206,9 @@ void RolloutCertifier::AddStart(const Model<double>& model, const EventRecord& r
       continue;
     }
     for (Eigen::Index c = 0; c < options_.directions.cols(); ++c) {
-      // An event soon after the start, on one side or on both: a twist that lifts lands, one that
-      // slides stops. It is none for the physics, but ends a part of the step for all bodies.
+      // There is an event soon after the start, on one side or on both: a body whose twist is
+      // changed lifts off and lands, or slides and stops. The physics does not change by it, but it
+      // splits the step for all bodies.
       const bool splits_here = splits && rests && k < loaded;
       const char* what =
           contact->gap > -meant && Moves(gap, options_.directions, c) ? " changes its gap"
@@ -227,7 +229,7 @@ void RolloutCertifier::AddStart(const Model<double>& model, const EventRecord& r
   }
 }
 
-// Where contacts may jam runs are compared.
+// Where contacts may jam, runs are compared.
 void RolloutCertifier::ProbeStarts(const Model<double>& model, const State<double>& start,
                                    const std::vector<const ActiveContact*>& touching,
                                    const Segment* first) {
@@ -250,8 +252,8 @@ void RolloutCertifier::ProbeStarts(const Model<double>& model, const State<doubl
                       [&](const ActiveContact& other) { return other.SameAs(contact); })) {
         AddApproachGradient(model, start, contact, &scratch, &approach);
       }
-      // What does not slide may begin to: friction then turns the law of a contact around, or acts
-      // to one side in place of the other, so that the body tips or does not.
+      // A contact that does not slide may begin to slide: friction then reverses the law of the
+      // contact, or acts in one direction instead of the other, so that the body tips or does not.
       if (const double speed = SpeedsOf(model, start, contact).slip;
           std::abs(speed) <= Negligible(model, speed) &&
           MixedFriction(model, contact.a, contact.b).value > 0.0) {

@@ -25,7 +25,7 @@ struct Extent {
   double twist = 0.0;  // m/s
 };
 
-// The largest of the state, and of its derivative along each direction, during a run.
+// The largest entries of the state, and of its derivative along each direction, during a run.
 class RunExtents {
  public:
   RunExtents(const Model<double>& model, Eigen::Index columns) : model_(model), columns_(columns) {
@@ -34,7 +34,7 @@ class RunExtents {
     }
   }
   void Add(long k, double t, const State<double>& state, const RowMatrixXd& w_dot);
-  // S of the header for each of a body's three poses or twists.
+  // S of the header for each of the three entries of a body's pose or twist.
   double Scale(Eigen::Index column, bool pose, double size) const {
     const Extent& change = columns_[column];
     return pose ? std::max(change.pose, state_.pose / size)
@@ -83,7 +83,7 @@ void RunExtents::Add(long k, double t, const State<double>& state, const RowMatr
 struct Comparison {
   std::vector<int> variables;  // of outputs, among [poses | twists]
   RowMatrixXd by_tangent;      // b, outputs x directions
-  RowMatrixXd allowed;         // |b| + kStateRounding S, alike
+  RowMatrixXd allowed;         // |b| + kStateRounding S, likewise
 };
 
 Comparison Compare(const ModelStructure& s, const RunExtents& extents, const RowMatrixXd& w_dot,
@@ -114,9 +114,10 @@ Comparison Compare(const ModelStructure& s, const RunExtents& extents, const Row
   return comparison;
 }
 
-// Outputs that have a column of their own where not all do: those with an entry that is rounding,
-// but not 0. That is where the solves of one unit load are refined to less than those of several
-// together (beside masses far greater a round of refinement takes 1 % of what is left).
+// Outputs that have a column of their own where not all do: those with an entry of rounding size
+// that is not 0. For such an output the residual of a solve with a single unit load is refined
+// further than that of several loads together (beside far greater masses a round of refinement
+// removes only 1 % of the residual).
 std::vector<Eigen::Index> Singles(const Comparison& comparison) {
   std::vector<Eigen::Index> rows;
   for (Eigen::Index row = 0; row < comparison.allowed.rows(); ++row) {
@@ -128,7 +129,7 @@ std::vector<Eigen::Index> Singles(const Comparison& comparison) {
       }
     }
   }
-  // Evenly among them, if they are too many.
+  // If there are too many, they are chosen at even intervals.
   constexpr size_t kMost = kMostDualityColumns / 2;
   std::vector<Eigen::Index> chosen;
   for (size_t k = 0; k < std::min(rows.size(), kMost); ++k) {
@@ -137,8 +138,8 @@ std::vector<Eigen::Index> Singles(const Comparison& comparison) {
   return chosen;
 }
 
-// Outputs in classes whose sizes are alike along every direction, within as few decades as leave no
-// more classes than columns.
+// Outputs in classes whose sizes are similar along every direction; similar means within the
+// smallest number of decades for which there are no more classes than columns.
 using Classes = std::map<std::vector<int>, std::vector<Eigen::Index>>;
 Classes ClassesOf(const RowMatrixXd& allowed, const std::vector<char>& left_out, size_t columns) {
   const Eigen::RowVectorXd largest = allowed.colwise().maxCoeff();
@@ -182,7 +183,7 @@ RowMatrixXd WeightsOf(const Comparison& comparison) {
   }
   const size_t columns = static_cast<size_t>(kMostDualityColumns - column);
   const Classes classes = ClassesOf(allowed, left_out, columns);
-  size_t share = 0;  // outputs a column
+  size_t share = 0;  // outputs for each column
   for (size_t needed = columns + 1; needed > columns;) {
     ++share;
     needed = 0;
@@ -247,7 +248,7 @@ double DualityGap(const Model<double>& model, const State<double>& initial,
       }
     }
   }
-  // Where nothing of an entry is right it does not matter by how much.
+  // Where no digit of an entry is right the size of the error does not matter.
   return std::isfinite(worst) ? std::min(worst, 1.0) : HUGE_VAL;
 }
 

@@ -6,27 +6,28 @@
 //
 //   a = (eᵢᵀ J) d  by the adjoint,   b = eᵢᵀ (J d)  by the tangent
 //
-// Both use the same factorisations, but sum in opposite order: what they differ by is what rounding
-// has left of the derivative, however small each residual is. An entry's difference is relative to
-// the entry, and to what of the state is rounding whatever the parameter does:
+// Both use the same factorisations, but sum in opposite order: their difference shows the rounding
+// error of the derivative, however small each residual is. The difference of an entry is relative
+// to the entry and to the rounding of the state, which does not depend on the parameter:
 //
 //   gap = |a − b| / (|b| + 1e-4 S)                                                    (1)
 //
 // S, per unit of the parameter, in m or m/s, at the radius of gyration for an angle:
 // the largest change of a pose (of a twist) of any body that the direction causes during the run,
 // or, if that is more, the largest coordinate (speed) of any body during the run, over the
-// parameter's size. A speed is also that of the free motion: what gravity would add in a step to a
-// body at rest, and contacts take.
+// parameter's size. The speed of the free motion counts too: the speed that gravity would add in a
+// step to a body at rest and that contacts cancel.
 //
-// So gap ≤ 1e-10 is |a − b| ≤ 1e-10 |b| + 1e-14 S: a change of the parameter by all of its size
-// changes the output by 1e-14 of what it is. The magnitudes of an adjoint's terms, |w̄|ᵀ |d|, are
+// So gap ≤ 1e-10 means |a − b| ≤ 1e-10 |b| + 1e-14 S: for a change of the parameter by its whole
+// size the second term is 1e-14 of the output. The magnitudes of an adjoint's terms, |w̄|ᵀ |d|, are
 // not part of S: where they cancel (a chain that is turned as a whole, a heavy load) the adjoint
-// loses the digits that the tangent keeps.
+// loses digits that the tangent keeps.
 //
-// Of up to kMostDualityColumns outputs each has its column of the adjoint. Of more, up to half of
-// the columns are of single outputs that have an entry at rounding, and outputs whose |b| + 1e-4 S
-// are alike along every direction share the others, with weights 1 / (that) and signs that
-// alternate; the denominator of (1) is then the root of the sum of squares.
+// Up to kMostDualityColumns outputs have a column of the adjoint each. If there are more, up to
+// half of the columns belong to single outputs that have an entry of rounding size; the other
+// outputs share the remaining columns in groups whose |b| + 1e-4 S are similar along every
+// direction, with weights 1 / (|b| + 1e-4 S) and alternating signs. The denominator of (1) is then
+// the root of the sum of squares.
 
 #include "tangible/simulation/stepping/rollout.h"
 
@@ -41,7 +42,8 @@ inline constexpr int kMostDualityColumns = 64;
 double DualityGap(const Model<double>& model, const State<double>& initial,
                   const RowMatrixXd& directions, const std::vector<double>& sizes = {});
 
-/// Whether a model's masses (or inertias) are so far apart that the test is worth its time: by 1e3.
+/// Whether a model's masses (or inertias) differ by a factor of 1e3, so that the test is worth its
+/// time.
 bool HasWideMasses(const Model<double>& model);
 
 }  // namespace tangible

@@ -85,7 +85,7 @@ class PairTies {
     return rows;
   }
 
-  // A normal that turns within the move, as that of two vertices that all but coincide.
+  // Whether the normal turns within the move, as for two vertices that almost coincide.
   bool Turns(const ContactFeature& feature) const {
     return (Rows(moved_, feature).geometry.normal - Rows(record_.before, feature).geometry.normal)
                .norm() > kTurned;

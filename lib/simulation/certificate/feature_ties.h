@@ -1,19 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// How near a pair's closed contacts are to a change of features that a derivative feels.
+// How near a pair's closed contacts are to a change of features at which a derivative jumps.
 //
-// Which vertex, edge or plane a contact is of is a discrete choice (collide.h). On its border the
-// gap is continuous, but its derivatives need not be: a ball above a box's corner has a turning
-// normal on one side and a fixed one on the other. The pair's relative pose is moved by
+// The vertices, edges or planes that form a contact are a discrete choice (collide.h). Where it
+// changes the gap is continuous, but its derivatives need not be: a ball above a box's corner has a
+// turning normal on one side and a fixed one on the other. The pair's relative pose is moved by
 // ±kFeatureMargin along x, y and angle. Where a closed contact then has other features, the two
 // choices' equations R and R' differ by (∂R'/∂q − ∂R/∂q) dq, and with the step's matrix K
 //
 //   δv⁺ = K⁻¹ (R − R') / |dq|
 //
-// is the jump of the derivative of the new twist. Ties without such a jump (equal boxes at rest on
-// each other) do not count. Where no contact of the new choice continues a closed one, or the
-// normal turns within the move, the geometry itself is not smooth: that counts in any case.
+// is the jump of the derivative of the new twist. Equivalent choices without such a jump (equal
+// boxes at rest on each other) do not count. Where no contact of the new choice continues a closed
+// one, or the normal turns within the move, the geometry itself is not smooth: this always counts.
 
 #include "tangible/simulation/stepping/step.h"
 
@@ -28,8 +28,8 @@ double FeatureChangeMargin(const Model<double>& model, const StepRecord& record,
 
 /// Whether two corners meet where two shapes touch at `state`: beside the contact, by
 /// kFeatureMargin of the smaller body's size to either side along its tangent, none of the pair's
-/// contacts has its normal. On one side of that the bodies collide, on the other they pass or
-/// collide otherwise.
+/// contacts has its normal. A small shift to one side makes the bodies collide, to the other pass
+/// or collide differently.
 bool MeetsACorner(const Model<double>& model, const State<double>& state,
                   const ActiveContact& contact);
 

@@ -12,13 +12,13 @@
 namespace tangible {
 namespace {
 
-constexpr double kLeaves = 8.0;      // U, of the speed that just leaves the touching tolerance
-constexpr double kConfirmed = 16.0;  // by which U is smaller where a kink is confirmed
+constexpr double kLeaves = 8.0;      // U over the speed that just leaves the tolerance
+constexpr double kConfirmed = 16.0;  // factor by which U is reduced to confirm a kink
 constexpr int kMostSteps = 16;       // for contacts to close again
 constexpr double kFlights = 4.0;     // that a run lasts at least
-// R(τ/2) / R(τ) is 1/4 of a smooth map, 1/2 at a kink and 1 at a jump.
+// R(τ/2) / R(τ) is 1/4 for a smooth map, 1/2 at a kink and 1 at a jump.
 constexpr double kJumps = 0.75;
-// A slip that ends at once has jammed where it was this many times faster than U.
+// A slip that ends at once counts as jammed if it was this many times faster than U.
 constexpr double kSlips = 10.0;
 
 double Along(const std::vector<JacobianEntry>& gradient, const VectorX<double>& direction) {
@@ -108,7 +108,7 @@ class Course {
   std::vector<std::pair<ActiveContact, double>> jams_;
 };
 
-// What a direction does to a contact, per unit of it.
+// The rates of a contact's speeds, per unit of a direction.
 struct Rates {
   double approach = 0.0, slip = 0.0;  // m/s
   double touch = 0.0;                 // the tolerance within which it touches, m
@@ -173,8 +173,8 @@ class Probe {
     return true;
   }
 
-  // Speeds of all moving bodies, their angular part at their radius, and the mean speeds of what
-  // poses have gained.
+  // Speeds of all moving bodies, angular ones times the body's radius, and the mean speeds of the
+  // changes of poses.
   VectorX<double> Speeds(const std::vector<double>& pose, const std::vector<double>& twist,
                          double time) const {
     const std::vector<int>& moving = model_.structure->moving;
@@ -244,7 +244,7 @@ class Probe {
     return Speeds(pose, twist, time);
   }
 
-  // The contact that jams, or else does not come back, or else is moved most.
+  // Names the contact that jams, or else one that does not close again, or else the one moved most.
   StartFinding Describe(StartKind kind, double shift, double speed, Course* at,
                         Course* beside) const {
     const auto jams = [&](const Course& course, size_t i) {
@@ -283,7 +283,7 @@ class Probe {
   const std::string& name_;
   EventSearch search_;
   std::vector<Rates> rates_;
-  double acceleration_;   // of what is thrown up, m/s²
+  double acceleration_;   // of bodies whose contact opens, m/s²
   double speed_ = 0.0;    // of contacts, per unit of the direction
   double fastest_ = 0.0;  // of bodies, the same
   double touch_ = 0.0;
@@ -325,7 +325,7 @@ bool MayJam(const Model<double>& model, const State<double>& start,
   if (friction * std::abs(mixed) >= kNear * normal) {
     return true;
   }
-  // Wedged between faces that are not parallel.
+  // The body is wedged between faces that are not parallel.
   const Vector2<double> along = rows.geometry.normal;
   return std::any_of(touching.begin(), touching.end(), [&](const ActiveContact& other) {
     if (other.joint >= 0 || !(MixedFriction(model, other.a, other.b).value > 0.0)) return false;

@@ -9,10 +9,10 @@ namespace tangible {
 namespace {
 
 constexpr double kMebibyte = 1048576.0;
-// No machine has more, and as bytes it is far from the limits of size_t.
+// No machine has more memory, and in bytes it is far below the limit of size_t.
 constexpr double kMostMebibytes = 1e9;
 
-// The whole of `text` as a number.
+// Reads the whole of `text` as a number.
 template <typename Number>
 bool ReadNumber(const std::string& text, Number* number) {
   const char* end = text.data() + text.size();

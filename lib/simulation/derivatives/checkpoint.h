@@ -1,18 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// Checkpoints of a rollout: from which steps it can be run again with the same bits, and how far
-// apart they stand, so that its adjoint needs a bounded memory.
+// Checkpoints of a rollout: the steps from which it can be run again with the same bits, and their
+// spacing, so that its adjoint needs a bounded memory.
 //
 // With a checkpoint every k of N steps (c bytes each) and the records of one segment of k steps (r
-// bytes each), which are made anew as the reverse sweep reaches it,
+// bytes each), which are computed again when the reverse sweep reaches it,
 //
 //   memory   c N / k + r k,   least 2 √(N c r) at k = √(N c / r)
-//   cost     one more rollout, but for the last segment
+//   cost     one more rollout, except for the last segment
 //
-// Where a segment's records do not fit (steps that have more contacts than the first had), it is
-// split by further checkpoints, and runs twice. Source: A. Griewank, A. Walther, Evaluating
-// Derivatives, 2nd ed., SIAM 2008, ch. 12.
+// Where a segment's records do not fit (steps that have more contacts than the first), it is split
+// by further checkpoints, and runs twice. Source: A. Griewank, A. Walther, Evaluating Derivatives,
+// 2nd ed., SIAM 2008, ch. 12.
 
 #include <string>
 
@@ -24,18 +24,18 @@ struct Checkpointing {
   enum class Kind {
     kAll,     ///< every step's record is kept
     kEvery,   ///< a checkpoint every `every` steps
-    kBudget,  ///< as fast as `budget` bytes let it be
+    kBudget,  ///< as fast as `budget` bytes allow
   };
   Kind kind = Kind::kAll;
   long every = 0;
   size_t budget = 0;  ///< bytes
 };
 
-/// Reads "all", "every:K" (K ≥ 1 steps) or "budget:MIB" (MIB > 0, in 2^20 bytes); false with what
-/// was expected.
+/// Reads "all", "every:K" (K ≥ 1 steps) or "budget:MIB" (MIB > 0, in 2^20 bytes); false with the
+/// expected form if it is none of these.
 bool ParseCheckpointing(const std::string& text, Checkpointing* checkpointing, std::string* error);
 
-/// The state after `step` steps, and all else that the next step starts from.
+/// The state after `step` steps, and everything else from which the next step starts.
 struct Checkpoint {
   long step = 0;
   State<double> state;

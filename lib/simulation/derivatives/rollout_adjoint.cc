@@ -30,7 +30,7 @@ void RolloutTape::Start(const Model<double>& model, const TapeOptions& options) 
   checkpoints_.clear();
   checkpoint_bytes_ = entry_bytes_ = used_bytes_ = peak_bytes_ = 0;
   for (const std::unique_ptr<Entry>& entry : entries_) {
-    entry->counted = 0;  // until it is counted anew
+    entry->counted = 0;  // until it is counted again
   }
   last_record_bytes_ = last_factor_bytes_ = most_record_bytes_ = 0;
   if (!stepper_ || structure_ != model.structure) {
@@ -71,7 +71,7 @@ RolloutReport RolloutTape::Record(ControlledModel<double>* model, const State<do
   return Rollout(model, initial, record, stepper_.get(), final);
 }
 
-// After k steps of the first run, the last of which the stepper still holds.
+// Called after k steps of the first run, the last of which the stepper still holds.
 void RolloutTape::RecordStep(const Model<double>& model, long k, const State<double>& state) {
   steps_ = k;
   if (k > record_from_) {
@@ -102,7 +102,7 @@ void RolloutTape::MakeRoom() {
     record_from_ = record_from_ == 0 ? (total_ - 1) / spacing_ * spacing_ : total_;
   }
   if (checkpoint_bytes_ > budget() / 2 && checkpoints_.size() > 2) {
-    // More than planned: every other one stays.
+    // There are more checkpoints than planned: every other one is kept.
     spacing_ *= 2;
     RemoveCheckpoints([this](long step, Origin) { return step % spacing_ != 0; });
     record_from_ =
@@ -110,7 +110,8 @@ void RolloutTape::MakeRoom() {
   }
 }
 
-// After the first step, by what it took. Whether all records fit is seen when they do not.
+// Plans after the first step, from its memory. Whether all records fit is found out only when they
+// do not.
 void RolloutTape::PlanByBudget(const State<double>& state) {
   const size_t checkpoint = MakeCheckpoint(1, state).bytes();
   const auto least_memory = [&](size_t record) {
@@ -148,8 +149,8 @@ void RolloutTape::RemoveCheckpoints(const std::function<bool(long step, Origin o
   });
 }
 
-// Whether the stepper's factors fit beside the records of `remaining` further steps, with an eighth
-// to spare: where records do not fit in the end, all of them are run again.
+// Whether the stepper's factors fit beside the records of `remaining` further steps, with a reserve
+// of an eighth, because all steps are run again if records do not fit in the end.
 bool RolloutTape::HasRoomForFactors(long remaining) const {
   const size_t record = last_record_bytes_ + last_record_bytes_ / 8;
   return checkpoint_bytes_ + used_bytes_ + last_factor_bytes_ +
@@ -157,7 +158,7 @@ bool RolloutTape::HasRoomForFactors(long remaining) const {
          budget();
 }
 
-// The stepper's last step becomes the next entry; `remaining` are to follow it.
+// The stepper's last step becomes the next entry; `remaining` steps follow it.
 void RolloutTape::Take(const Model<double>& model, long remaining) {
   if (used_ == entries_.size()) {
     entries_.push_back(std::make_unique<Entry>());
@@ -197,7 +198,8 @@ void RolloutTape::DropFactors(Entry* entry) {
   entry->record.problem = ContactProblem<double>();
 }
 
-// A step with more contacts than those before it, or whose factors took memory to solve with.
+// The entry may exceed the plan: a step with more contacts than those before it, or whose factors
+// needed memory for solves.
 void RolloutTape::KeepWithinBudget(Entry* entry) {
   const auto recount = [&] {
     const size_t bytes = entry->bytes();
@@ -215,7 +217,7 @@ void RolloutTape::KeepWithinBudget(Entry* entry) {
   }
 }
 
-// Puts an entry's memory into the sums; without checkpoints nobody reads them.
+// Adds an entry's memory to the sums; without checkpoints they are not used.
 void RolloutTape::Count(Entry* entry) {
   if (options_.checkpointing.kind == Checkpointing::Kind::kAll) {
     return;
@@ -236,7 +238,7 @@ void RolloutTape::Count(Entry* entry) {
   }
 }
 
-// Gives back the memory of all entries but the first `keep`.
+// Releases the memory of all entries but the first `keep`.
 void RolloutTape::ReleaseEntries(size_t keep) {
   while (entries_.size() > keep) {
     entry_bytes_ -= entries_.back()->counted;
@@ -244,8 +246,8 @@ void RolloutTape::ReleaseEntries(size_t keep) {
   }
 }
 
-// Makes the entries those of the steps up to `last`, from the checkpoint before it or, where these
-// are too many for the budget, from a new one in between.
+// Fills the entries with the steps up to `last`, starting from the checkpoint before it or, where
+// these steps exceed the budget, from a new checkpoint in between.
 void RolloutTape::RunAgain(ControlledModel<double>* model, long last) {
   RemoveCheckpoints(
       [last](long step, Origin origin) { return origin == Origin::kSplit && step >= last; });

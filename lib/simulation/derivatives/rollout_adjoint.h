@@ -24,18 +24,18 @@ namespace tangible {
 
 enum class Factorisations {
   kKeep,       ///< fastest; about ten times the memory of the states
-  kRecompute,  ///< one assembly and factorisation more a step
+  kRecompute,  ///< one more assembly and factorisation for each step
 };
 
 struct TapeOptions {
   Factorisations factorisations = Factorisations::kKeep;
-  /// With a budget factorisations are kept as long as there is room for them.
+  /// With a budget, factorisations are kept as long as memory remains for them.
   Checkpointing checkpointing = {};
 };
 
 class RolloutTape {
  public:
-  /// Runs and records. The observer sees the states as Rollout's does.
+  /// Runs and records. The observer is called as in Rollout.
   RolloutReport Record(const Model<double>& model, const State<double>& initial,
                        const TapeOptions& options, const StateObserver& observer,
                        State<double>* final);
@@ -46,7 +46,7 @@ class RolloutTape {
     return Record(model, initial, TapeOptions{factorisations, {}}, observer, final);
   }
 
-  /// The same of a model with controls.
+  /// The same for a model with controls.
   RolloutReport Record(ControlledModel<double>* model, const State<double>& initial,
                        const TapeOptions& options, const StateObserver& observer,
                        State<double>* final);
@@ -59,17 +59,18 @@ class RolloutTape {
   /// initial poses, twists and the numbers. Chain with VariableJacobian(...)ᵀ w_bar for user
   /// parameters. `model` has the numbers of the recorded run.
   void Adjoint(const Model<double>& model, int num_losses, const Seed& seed, RowMatrixXd* w_bar);
-  /// The same from the state after `last` steps on, for losses that read no later one.
+  /// The same, starting from the state after `last` steps, for losses that depend on no later
+  /// state.
   void AdjointFrom(const Model<double>& model, long last, int num_losses, const Seed& seed,
                    RowMatrixXd* w_bar);
-  /// Called with step k and the derivatives with respect to the controls' values in it: a row a
-  /// number of Controls::numbers, a column a loss.
+  /// Called with step k and the derivatives with respect to the controls' values in it: a row for
+  /// each entry of Controls::numbers, a column for each loss.
   using ControlSink = std::function<void(long k, const RowMatrixXd& controls_bar)>;
-  /// The same of a model with controls; the rows of their parameters in w_bar are 0 on return.
+  /// The same for a model with controls; the rows of their parameters in w_bar are 0 on return.
   void AdjointFrom(ControlledModel<double>* model, long last, int num_losses, const Seed& seed,
                    const ControlSink& sink, RowMatrixXd* w_bar);
 
-  /// Memory of the tape now, and the most it was since Record began, bytes.
+  /// Memory of the tape now, and its maximum since Record began, bytes.
   size_t bytes() const;
   size_t peak_bytes() const { return std::max(peak_bytes_, bytes()); }
   long steps() const { return steps_; }
@@ -81,9 +82,9 @@ class RolloutTape {
     StepRecord record;
     ContactSystem system;
     std::unique_ptr<JointProjection> projection;  ///< where the scene asks for it
-    EventRecord events;  ///< event stepping: the step, in the place of all above
+    EventRecord events;  ///< event stepping: the step, in place of all of the above
     bool has_factors = false;
-    size_t counted = 0;  ///< bytes of it that the tape's sums hold
+    size_t counted = 0;  ///< its bytes as contained in the tape's sums
     size_t bytes() const;
     size_t factor_bytes() const { return system.bytes() + record.problem.bytes(); }
   };
@@ -117,7 +118,8 @@ class RolloutTape {
   std::vector<std::pair<Checkpoint, Origin>> checkpoints_;  ///< ascending
   long spacing_ = 0;                                        ///< of checkpoints, steps; 0: none
   long record_from_ = 0;  ///< the first run records steps from here on
-  // With checkpoints: sums of bytes; what the last entry took, its factors apart, and the most.
+  // With checkpoints: sums of bytes; the bytes of the last entry, with its factors counted
+  // separately, and the maximum.
   size_t entry_bytes_ = 0, used_bytes_ = 0, checkpoint_bytes_ = 0, peak_bytes_ = 0;
   size_t last_record_bytes_ = 0, last_factor_bytes_ = 0, most_record_bytes_ = 0;
   std::unique_ptr<Stepper> stepper_;

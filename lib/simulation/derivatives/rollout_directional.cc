@@ -21,7 +21,7 @@ bool JustTouches(const StepRecord& record, size_t i) {
   return slack <= kCoordinateRounding * PlaceOf(record.before, contact.a, contact.b) / record.h;
 }
 
-// Whether there are any.
+// Finds the kinks of the step; returns whether there are any.
 bool StepDirectional::FindKinks(const Model<double>& model, const StepRecord& record,
                                 const ContactSolution<double>& solution, const RowMatrixXd& w_dot) {
   const size_t count = record.contacts.size();
@@ -82,7 +82,7 @@ StepDirectional::Status StepDirectional::SolveColumns(const Model<double>& model
   return Status::kSolved;
 }
 
-// The step's problem, linearised, a small way along a direction.
+// Moves the linearised problem of the step a small way along a direction.
 void StepDirectional::MoveAlong(const Model<double>& model, const StepRecord& record,
                                 const RowMatrixXd& w_dot, ContactProblem<double>* problem) {
   ContactSolution<double> with_rows = record.solution;
@@ -125,8 +125,8 @@ void StepDirectional::MoveAlong(const Model<double>& model, const StepRecord& re
   }
 }
 
-// Impulses with which the step holds as well, in the modes that the direction leads into; false
-// where there are none.
+// Finds impulses that also solve the step and whose modes agree with the direction; false where
+// there are none.
 bool StepDirectional::ChooseImpulses(const Model<double>& model, const StepRecord& record,
                                      const RowMatrixXd& w_dot, ContactSolution<double>* solution) {
   ContactProblem<double> moved = record.problem;
@@ -170,7 +170,7 @@ bool StepDirectional::ChooseImpulses(const Model<double>& model, const StepRecor
   return NaturalResidual(problem, *solution, &worst) <= kHoldsAsWell;
 }
 
-// A single direction that contradicts the impulses at hand.
+// Handles a single direction that contradicts the impulses of the solution.
 StepDirectional::Status StepDirectional::SolveOne(const Model<double>& model,
                                                   const StepRecord& record,
                                                   const RowMatrixXd& w_dot, RowMatrixXd* v_dot) {

@@ -4,19 +4,20 @@
 // One-sided derivatives of a rollout of fixed steps: exact at kinks, where the tangent gives the
 // element of the generalised Jacobian that belongs to the modes found.
 //
-// Each direction ẇ goes through the steps on its own: where a step's contacts are degenerate, its
-// v̇⁺ solves a small LCP (contact_directional.h), elsewhere it is the tangent's. Directional
-// derivatives of piecewise smooth maps obey the chain rule, so that what comes out is
-// lim (x(w + τ ẇ) − x(w)) / τ for τ → 0 from above; it is positively homogeneous in ẇ, not linear.
+// Each direction ẇ is carried through the steps separately: where a step's contacts are degenerate,
+// its v̇⁺ solves a small LCP (contact_directional.h), elsewhere it is that of the tangent.
+// Directional derivatives of piecewise smooth maps obey the chain rule, so that the result is lim
+// (x(w + τ ẇ) − x(w)) / τ for τ → 0 from above; it is positively homogeneous in ẇ, not linear.
 //
 // Where redundant contacts contradict a direction (one of three supports in a row is raised), the
-// impulses that they share are not those at hand, but those that the direction singles out: they
-// are found from the linearised step a small way along it, and only their modes are taken from
-// there.
+// shared impulses of the solution do not fit, and the direction determines which ones do: they are
+// found from the linearised step a small way along the direction, and only their modes are taken
+// from there.
 //
-// What is resolved: contacts and joint limits that touch without force, friction at its limit, and
-// friction that leaves 0. What is not: ties of corners and edges, of the mixing rule, of the law's
-// constants and of force windows with steps, and jumps.
+// The method resolves contacts and joint limits that touch without force, friction at its limit,
+// and friction coefficients that leave 0. It does not resolve jumps, nor kinks where corners and
+// edges, the mixing rule or the constants of the contact law change, or where force windows
+// coincide with steps.
 
 #include <string>
 
@@ -25,16 +26,16 @@
 
 namespace tangible {
 
-/// Whether an open contact's slack n·v⁺ + c is within the rounding of its gap over h: it touches at
-/// no speed, and whether it closes is open.
+/// Whether an open contact's slack n·v⁺ + c is within the rounding of its gap over h: it touches
+/// without speed, and rounding decides whether it closes.
 bool JustTouches(const StepRecord& record, size_t contact);
 
 /// The directional derivative of the step that the stepper has just done.
 class StepDirectional {
  public:
-  /// `w_dot`: a direction a column, as RolloutTangent's. False with one line in `message` where a
-  /// step has no derivative along a direction: the direction contradicts redundant rows, or the LCP
-  /// has no solution.
+  /// `w_dot`: a direction in each column, as for RolloutTangent. False with one line in `message`
+  /// where a step has no derivative along a direction: the direction contradicts redundant rows, or
+  /// the LCP has no solution.
   bool Apply(const Model<double>& model, Stepper* stepper, RowMatrixXd* w_dot,
              std::string* message);
 

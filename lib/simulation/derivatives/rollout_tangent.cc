@@ -69,7 +69,7 @@ double StepTangent::ApplyAndMeasure(const Model<double>& model, Stepper* stepper
   const ContactProblem<double>& problem = stepper->record().problem;
   const int columns = static_cast<int>(w_dot->cols());
   Assemble(model, stepper, *w_dot);
-  // The speeds that the perturbation drives: of bodies, and of constraints.
+  // The speeds that the perturbation drives, of bodies and of constraints.
   const auto speed = [&](size_t row, int column) {
     const double value = std::abs(rhs_[row * columns + column]);
     return row < problem.mass.size() ? value / problem.mass[row] : value;

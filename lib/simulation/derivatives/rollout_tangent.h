@@ -22,38 +22,38 @@ using TangentObserver =
 RolloutReport RolloutTangent(const Model<double>& model, const State<double>& initial,
                              const TangentObserver& observer, RowMatrixXd* w_dot,
                              State<double>* final);
-/// The same with a stepper of the caller's, which keeps its memory from run to run.
+/// The same with the caller's stepper, which keeps its memory from run to run.
 RolloutReport RolloutTangent(const Model<double>& model, const State<double>& initial,
                              const TangentObserver& observer, Stepper* stepper, RowMatrixXd* w_dot,
                              State<double>* final);
 
 /// Sets the rows of the controls' parameters to the directions of their values in step k.
 using ControlDirections = std::function<void(long k, RowMatrixXd* w_dot)>;
-/// The same of a model with controls. On return the rows of their parameters are those of the last
+/// The same for a model with controls. On return the rows of their parameters are those of the last
 /// step.
 RolloutReport RolloutTangent(ControlledModel<double>* model, const State<double>& initial,
                              const ControlDirections& directions, const TangentObserver& observer,
                              Stepper* stepper, RowMatrixXd* w_dot, State<double>* final);
 
-/// From the derivatives of the new twists of moving blocks (3 num_blocks x columns, row-major) to
-/// those of the state after the step: poses move with them, and are projected.
+/// Turns the derivatives of the new twists of moving blocks (3 num_blocks x columns, row-major)
+/// into those of the state after the step: poses move with the twists, and are projected.
 void AdvanceTangent(const Model<double>& model, Stepper* stepper, const double* twists,
                     RowMatrixXd* w_dot);
 
 /// The tangent of the step that the stepper has just done.
 class StepTangent {
  public:
-  /// For steps from `w_dot` on, with this object alone: the model's numbers that no column varies,
-  /// which stay so, are left out of fixed steps. Returns how many.
+  /// For all further steps from `w_dot` on, made with this object alone: numbers of the model that
+  /// no column varies are left out of the derivatives of fixed steps. Returns how many they are.
   int FixNumbers(const ModelStructure& structure, const RowMatrixXd& w_dot);
-  /// Takes that back for some numbers.
+  /// Reverts this for some numbers.
   void Vary(const ModelStructure& structure, const std::vector<int>& numbers);
   /// Returns the largest relative residual of the linear solve.
   double Apply(const Model<double>& model, Stepper* stepper, RowMatrixXd* w_dot);
-  /// The same, and how far the derivatives of the contacts' impulses exceed what the perturbation
-  /// drives: the largest over columns of |λ̇| mobility / max(|ṗ| / m, |ċ|, |v̇|). About 1 to 1e3;
-  /// above 1e6 the perturbation contradicts redundant rows (it breaks one contact and not the
-  /// other), and no derivative exists.
+  /// The same; it also measures how far the derivatives of the contacts' impulses exceed the speeds
+  /// that the perturbation drives: the largest over columns of |λ̇| mobility / max(|ṗ| / m, |ċ|,
+  /// |v̇|). The usual values are 1 to 1e3; above 1e6 the perturbation contradicts redundant rows
+  /// (it breaks one contact and not the other), and no derivative exists.
   double ApplyAndMeasure(const Model<double>& model, Stepper* stepper, RowMatrixXd* w_dot);
 
  private:
@@ -61,7 +61,7 @@ class StepTangent {
   double Finish(const Model<double>& model, Stepper* stepper, RowMatrixXd* w_dot);
 
   std::vector<double> rhs_;
-  std::vector<char> fixed_;  ///< 1 a variable that no column varies; empty: not known
+  std::vector<char> fixed_;  ///< 1: no column varies the variable; empty: unknown
   LocalJacobianScratch scratch_;
 };
 

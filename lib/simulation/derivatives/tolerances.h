@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// The tolerances of derivatives of rollouts: of what each is a share, then why.
-// lib/simulation/README.md has a table.
+// The tolerances of derivatives of rollouts. Each comment names the quantity of which the tolerance
+// is a fraction, then the reason. lib/simulation/README.md has the table.
 
 namespace tangible {
 
-/// Of the scales of impulse and slack: impulses and slacks below it are 0: two orders above what a
-/// solve leaves.
+/// Of the scales of impulse and slack: impulses and slacks below it count as 0; it lies two orders
+/// of magnitude above the error of a solve.
 inline constexpr double kDegenerateTolerance = 1e-10;
 /// Of speeds that the step changes: how far a step's linearised problem is moved along a direction,
 /// to choose among impulses that are not unique.

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// Which bodies an impulse reaches at an instant: those that joints and touching contacts connect to
-// the one that it acts on. Springs and forces do not connect: within no time they do nothing.
+// The bodies that an impulse reaches at an instant: those that joints and touching contacts connect
+// to the body on which it acts. Springs and forces do not connect bodies, because they need time to
+// act.
 //
-// Events of bodies that are not connected have times of their own even where they happen at the
-// same instant: under a change of parameters either may become the earlier one, without another
-// result.
+// Events of bodies that are not connected have separate times even where they happen at the same
+// instant: after a change of parameters either may become the earlier one, with the same result.
 
 #include <vector>
 
@@ -22,7 +22,7 @@ class CoupledBodies {
 
   /// The same number for all bodies that are connected; −1 for those that no impulse moves.
   int GroupOf(int body) { return parent_[body] < 0 ? -1 : Root(body); }
-  /// Of the contact's bodies, of which at least one moves.
+  /// The group of the contact's bodies, of which at least one moves.
   int GroupOf(const ActiveContact& contact) {
     return parent_[contact.a] >= 0 ? Root(contact.a) : GroupOf(contact.b);
   }

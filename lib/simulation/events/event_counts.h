@@ -21,7 +21,7 @@ class EventCounts {
     const auto place = std::lower_bound(counts_.begin(), counts_.end(), Entry{KeyOf(contact), 0});
     return place != counts_.end() && place->first == KeyOf(contact) ? place->second : 0;
   }
-  /// Counts one more and returns the number with it.
+  /// Counts one more and returns the new number.
   int Add(const ActiveContact& contact) {
     const auto place = std::lower_bound(counts_.begin(), counts_.end(), Entry{KeyOf(contact), 0});
     if (place != counts_.end() && place->first == KeyOf(contact)) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The second phase of an impact by Poisson's law. What the contacts' compression did not reach is
-// left out: only contacts on bodies that a rebounding one pushes, through joints and contacts.
+// The second phase of an impact by Poisson's law. It includes only contacts on bodies that a
+// rebounding contact pushes, directly or through joints and contacts.
 #include <algorithm>
 
 #include "tangible/simulation/events/event_step.h"
@@ -10,7 +10,7 @@
 namespace tangible {
 namespace {
 
-// Bodies that move by forces and hang together with a contact that rebounds.
+// Bodies that move under forces and are connected with a contact that rebounds.
 std::vector<bool> Reached(const ModelStructure& s, const Impulses& compression,
                           const std::vector<bool>& rebounds) {
   std::vector<bool> reached(s.bodies.size(), false);

@@ -18,8 +18,8 @@ Eigen::Vector3d BlockOf(const std::vector<double>& values, int block) {
   return Eigen::Vector3d(values[3 * block], values[3 * block + 1], values[3 * block + 2]);
 }
 
-// The state's rows of stage i: x + c τ v + τ² Σ â A and so on, differentiated. `a_dot[j]` are the
-// stages' derivatives, one for each of `terms`.
+// The rows of the state at stage i: the derivatives of x + c τ v + τ² Σ â A and so on. `a_dot[j]`
+// are the stages' derivatives, one for each of `terms`.
 void PlaceTangent(const ModelStructure& s, const Segment& segment, double c, const double* a,
                   const double* a_hat, int terms, const Row& tau_dot, const RowMatrixXd& x,
                   const RowMatrixXd* a_dot, RowMatrixXd* out) {
@@ -81,7 +81,8 @@ double EventDerivative::NodeTangent(const Model<double>& model, const Segment& s
   const int columns = static_cast<int>(x.cols());
   solved->setZero(3 * static_cast<Eigen::Index>(node->system.num_blocks()), columns);
   Visit(model, segment, *node, correction, TangentSink{x.data(), solved->data(), columns});
-  // Out of penetration by recovery_speed times the segment's length, in the first correction.
+  // A contact in penetration moves by recovery_speed times the segment's length, in the first
+  // correction.
   for (size_t i = 0; tau_dot != nullptr && i < segment.contacts.size(); ++i) {
     const int block = node->system.contact_block()[i];
     if (segment.contacts[i].law == ContactLaw::kRecovery && block >= 0) {
@@ -105,7 +106,8 @@ double EventDerivative::NodeAdjoint(const Model<double>& model, const Segment& s
   return residual;
 }
 
-// The map of a given length: x of the state before on entry, after on return; tau_dot a column.
+// The tangent of the map of a given length: x of the state before on entry, after on return;
+// tau_dot has an entry for each column.
 double EventDerivative::SegmentTangent(const Model<double>& model, Segment* segment, RowMatrixXd* x,
                                        const Row& tau_dot) {
   const ModelStructure& s = *model.structure;
@@ -132,7 +134,7 @@ double EventDerivative::SegmentTangent(const Model<double>& model, Segment* segm
       a_dot[i] = at;
       evaluate(i + 1, next);
     };
-    // What has not converged is left, and the certificate says so.
+    // A derivative that has not converged is used, and the certificate reports it.
     left = std::max(left, implicit_.SolveDerivative(model, segment,
                                                     ImplicitStage::Direction::kForward, map, &own));
     a_dot[i].swap(own);
@@ -228,7 +230,7 @@ double EventDerivative::Tangent(const Model<double>& model, EventRecord* record,
   const ModelStructure& s = *model.structure;
   const Eigen::Index columns = w_dot->cols();
   const int time = TimeVariable(s);
-  // One column more: the derivative by the segment's length.
+  // One more column holds the derivative with respect to the segment's length.
   RowMatrixXd x = RowMatrixXd::Zero(s.num_variables() + 1, columns + 1);
   x.topLeftCorner(s.num_variables(), columns) = *w_dot;
   Row tau_dot = Row::Zero(columns + 1);
@@ -266,14 +268,15 @@ double EventDerivative::Tangent(const Model<double>& model, EventRecord* record,
   return left;
 }
 
-// Back through the stages: w_bar of the integrated state on entry, of the state before on return.
+// The reverse sweep through the stages: w_bar of the integrated state on entry, of the state before
+// on return.
 void EventDerivative::StagesAdjoint(const Model<double>& model, Segment* segment,
                                     RowMatrixXd* w_bar) {
   const ModelStructure& s = *model.structure;
   const NystromTableau& tableau = NystromTableau::Of(IntegratorOf(s.settings));
   const Eigen::Index columns = w_bar->cols();
   const double tau = segment->length;
-  // A_j's share of what is read at q + τ² Σ â_j A_j, v + τ Σ a_j A_j.
+  // Adds the contribution of A_j to the adjoint at q + τ² Σ â_j A_j, v + τ Σ a_j A_j.
   const auto add_share = [&](double a, double a_hat, const RowMatrixXd& from, RowMatrixXd* bar) {
     for (int k = 0; k < s.num_blocks(); ++k) {
       BlockRows(k, *bar) += tau * tau * a_hat * PoseRows(s, s.moving[k], from) +
@@ -285,7 +288,7 @@ void EventDerivative::StagesAdjoint(const Model<double>& model, Segment* segment
     a_bar[j].setZero(3 * s.num_blocks(), columns);
     add_share(tableau.b[j], tableau.b_hat[j], *w_bar, &a_bar[j]);
   }
-  // v̄ = v̄⁺ + c τ q̄, for all that move.
+  // v̄ = v̄⁺ + c τ q̄, for all moving bodies.
   const auto add_to_twist = [&](double factor, const RowMatrixXd& from) {
     for (int body = 0; body < s.num_bodies(); ++body) {
       if (s.bodies[body].motion != Motion::kStatic) {
@@ -307,7 +310,7 @@ void EventDerivative::StagesAdjoint(const Model<double>& model, Segment* segment
     RowMatrixXd stage_bar;
     RowMatrixXd own = a_bar[i];
     if (implicit) {
-      // The stage reads its own acceleration: ā = ā₀ + (τ² â q̄ + τ a v̄)(ā), a fixed point.
+      // The stage depends on its own acceleration: ā = ā₀ + (τ² â q̄ + τ a v̄)(ā), a fixed point.
       List(model, *segment, &stage);
       const auto map = [&](const RowMatrixXd& at, RowMatrixXd* next) {
         solve(at, &stage_bar);

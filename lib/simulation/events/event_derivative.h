@@ -4,12 +4,12 @@
 // Tangent and adjoint of an event step.
 //
 // Each segment is a map x⁺ = S(x, w, t, τ) of its length τ. The event at its end, g(x⁺, w, t + τ) =
-// 0, makes τ a function of the rest (implicit function theorem):
+// 0, makes τ a function of the other variables (implicit function theorem):
 //   τ̇ = −(∇g · Ṡ|τ) / (∇g · S_τ),   ẋ⁺ = Ṡ|τ + S_τ τ̇
-// and the time t + τ at which the next segment starts moves with it, so that the one that ends the
-// step has τ̇ = −ṫ. In the limit of small segments this is the saltation matrix of hybrid systems
-// (Leine, Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical Systems, 2004, ch. 7). The
-// adjoint is its transpose.
+// and the time t + τ at which the next segment starts moves with it, so that the segment that ends
+// the step has τ̇ = −ṫ. In the limit of small segments this is the saltation matrix of hybrid
+// systems (Leine, Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical Systems, 2004, ch.
+// 7). The adjoint is its transpose.
 
 #include "tangible/math/scalar.h"
 #include "tangible/simulation/events/event_record.h"
@@ -25,8 +25,8 @@ class EventDerivative {
   /// w_bar: num_variables x columns, of the state after the step on entry, before it on return.
   void Adjoint(const Model<double>& model, EventRecord* record, RowMatrixXd* w_bar);
 
-  /// What a segment of its given length makes of directions of the state before it (num_variables
-  /// x columns, both).
+  /// The images of directions of the state before a segment of given length (num_variables x
+  /// columns, both).
   RowMatrixXd AlongSegment(const Model<double>& model, Segment* segment,
                            const RowMatrixXd& directions);
 
@@ -35,8 +35,8 @@ class EventDerivative {
   struct Rate {
     double value = 0.0;     ///< ∇g · S_τ
     double terms = 0.0;     ///< the sum of the magnitudes of its terms
-    double residual = 0.0;  ///< of the linear solve of ∇g: large where g itself is not determined,
-                            ///< as how redundant contacts share a force
+    double residual = 0.0;  ///< of the solve for ∇g: large where g itself is not determined,
+                            ///< ///< such as the share of a redundant contact in a force
   };
   Rate EventRate(const Model<double>& model, Segment* segment);
 
@@ -44,7 +44,7 @@ class EventDerivative {
   double SegmentTangent(const Model<double>& model, Segment* segment, RowMatrixXd* x,
                         const Eigen::RowVectorXd& tau_dot);
   double ImpulsesTangent(const Model<double>& model, Impulses* impulses, RowMatrixXd* x);
-  /// `starts_anywhere`: an event before it in the step has a time that moves.
+  /// `starts_anywhere`: the time of an earlier event in the step varies.
   void SegmentAdjoint(const Model<double>& model, Segment* segment, bool starts_anywhere,
                       RowMatrixXd* w_bar);
   void StagesAdjoint(const Model<double>& model, Segment* segment, RowMatrixXd* w_bar);
@@ -61,11 +61,11 @@ class EventDerivative {
   double NodeAdjoint(const Model<double>& model, const Segment& segment, SolvedNode* node,
                      bool correction, RowMatrixXd* seed, RowMatrixXd* w_bar);
 
-  /// ∂R/∂w of a node into a sink; while `listed_` is that node from its list.
+  /// Visits ∂R/∂w of a node with a sink, from the list of entries if `listed_` is that node.
   template <typename Sink>
   void Visit(const Model<double>& model, const Segment& segment, const SolvedNode& node,
              bool correction, const Sink& sink);
-  /// Lists the entries of a node that an iteration reads again and again; null: of none.
+  /// Lists the entries of a node that an iteration reads repeatedly; null clears the list.
   void List(const Model<double>& model, const Segment& segment, const SolvedNode* node);
 
   LocalJacobianScratch scratch_;
@@ -73,8 +73,8 @@ class EventDerivative {
   std::vector<JacobianEntry> entries_;
   ImplicitStage implicit_;
   RowMatrixXd rhs_;
-  // Poisson's law, between an impact's two parts: derivatives of the compression's normal impulses,
-  // and of the losses with respect to them; a row a contact of the compression.
+  // For Poisson's law, between an impact's two parts: derivatives of the compression's normal
+  // impulses, and of the losses with respect to them; a row for each contact of the compression.
   RowMatrixXd compression_dot_, compression_bar_;
 };
 

@@ -36,7 +36,7 @@ void EventDerivative::ImpulsesAdjoint(const Model<double>& model, Impulses* impu
     BlockRows(k, rhs_) = TwistRows(s, s.moving[k], *w_bar);
     TwistRows(s, s.moving[k], *w_bar).setZero();
   }
-  // Of the decompression that follows, if one does.
+  // From the decompression that follows, if there is one.
   for (Eigen::Index i = 0; i < compression_bar_.rows(); ++i) {
     const int block = impulses->system.contact_block()[i];
     if (block >= 0) {

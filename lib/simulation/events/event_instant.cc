@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Segments of no length. They move nothing, but derivatives need them at instants that a step's
-// ends give and no search finds:
+// Segments of zero length. They move nothing, but derivatives need them at instants that are given
+// by the ends of a step and not found by a search:
 //
-//   a touch at the start of a step   the search of the step before ended on it. Its time depends on
-//                                    the state all the same: it is an event (kTouch) like others
-//   an event at the end of a step    what follows it starts at a given time, not at the event's
+//   a touch at the start of a step   the search of the step before ended on it. Its time still
+//                                    depends on the state: it is an event (kTouch) like others
+//   an event at the end of a step    the next segment starts at a given time, not at the event's
 //   the start of a run               a change of the initial twist that breaks a rolling contact or
 //                                    a joint acts as the impulse that restores it, at once and not
-//                                    after the first segment; one that lifts a contact or makes
-//                                    it land carries what it would else: the same, with friction
+//                                    after the first segment; one that lifts a contact or makes it
+//                                    land acts in the same way, with friction
 // A box that rocks from corner to corner comes to rest after infinitely many impacts in finite
 // time. Settle ends that.
 #include <algorithm>
@@ -22,11 +22,11 @@
 namespace tangible {
 namespace {
 
-// The share of max_events_per_step after which slow impacts are a rattle.
+// Slow impacts count as a rattle after max_events_per_step divided by this.
 constexpr int kRattling = 4;
 
-// Whether contact i of an impact is one of a body without joints that touches fixed ones on
-// parallel faces alone, and its friction does not come near to turning its law around,
+// Whether contact i of an impact belongs to a body without joints that touches only fixed bodies on
+// parallel faces, and whose friction is far from reversing the contact law,
 //
 //   n M⁻¹ n > 1.1 μ |n M⁻¹ t|
 //
@@ -78,11 +78,11 @@ bool EventStepper::AddInstant(const Model<double>& model, double t, EventKind ki
   segment.before = *state;
   segment.event_number = -1;
   segment.at_once = false;
-  // Contacts in penetration are those of a step's length: rounding is none.
+  // Penetration is decided with the step's length, so that rounding does not count.
   if (!ChooseModes(model, t, t, model.structure->settings.dt, state, outcome, &segment)) {
     record_.num_parts = parts;
     outcome->message.clear();
-    return true;  // without accelerations there is nothing to say
+    return true;  // no conclusion without accelerations
   }
   segment.event = kind;
   segment.event_index = -1;
@@ -124,7 +124,7 @@ std::string WhatIsUnsolved(const ModelStructure& structure, const Impulses& impu
 double EventStepper::SlowSpeed(const Model<double>& model, const State<double>& state) const {
   double slow = search_.SpeedTolerance(model, state);
   for (const ActiveContact& contact : touching_.contacts) {
-    // What nearly dependent rows leave of the speeds that were to vanish.
+    // Nearly dependent rows leave a remainder of the speeds that should vanish.
     if (Rattles(model, contact)) {
       slow = std::max(slow, kRattle * ReturnSpeed(model, state, contact));
     }
@@ -132,21 +132,22 @@ double EventStepper::SlowSpeed(const Model<double>& model, const State<double>& 
   return slow;
 }
 
-// After an impact: where a contact that had rested leaves so slowly that gravity would bring it
-// back before it has left the touching tolerance (or, beyond max_events_per_step, more slowly than
-// the restitution threshold), it stays: all that touch there are held, along their tangents too
-// where they slide no faster. So they are after a slow impact that only sets a contact sliding,
-// which opens another one that returns, where that has gone on for long.
+// After an impact: where a contact that had been at rest leaves so slowly that gravity would bring
+// it back before it has left the touching tolerance (or, after max_events_per_step, more slowly
+// than the restitution threshold), it stays closed: all touching contacts there are held, along
+// their tangents too where they slide no faster. The same is done after a slow impact that only
+// sets a contact sliding, which opens another contact that returns, where this has repeated many
+// times.
 bool EventStepper::Settle(const Model<double>& model, const Impulses& impact, State<double>* state,
                           EventOutcome* outcome) {
   const SimulationSettings& settings = model.structure->settings;
   const double slow = search_.SpeedTolerance(model, *state);
   Segment held;
   held.time = impact.time;
-  held.starts = true;  // what is held sliding has its friction
+  held.starts = true;  // contacts held while sliding have friction
   bool any = false;
   bool all_slow = true;     // no contact approached faster than it would return
-  bool any_slides = false;  // a contact that is to stick
+  bool any_slides = false;  // although it should stick
   for (size_t i = 0; i < impact.contacts.size(); ++i) {
     const ActiveContact& contact = impact.contacts[i];
     const ContactBlock<double>& block = impact.problem.contacts[i];
@@ -169,7 +170,8 @@ bool EventStepper::Settle(const Model<double>& model, const Impulses& impact, St
     } else if (rebounds_[i]) {
       continue;
     }
-    // What slides no faster sticks: while it slides it may push another contact open again.
+    // A contact that slides no faster than this is made to stick: while it slides it may push
+    // another contact open again.
     const double slip =
         RelativeSpeed(*state, contact.a, block.tangent_a, contact.b, block.tangent_b);
     if (block.has_friction && std::abs(slip) <= returns) {
@@ -223,7 +225,7 @@ bool EventStepper::LocateTouch(const Model<double>& model, double t, double slow
   };
   const ActiveContact* touch = nullptr;
   for (size_t i = 0; i < touching_.contacts.size() && touch == nullptr; ++i) {
-    // In penetration it does not matter by how much: a gap that changes moves no time.
+    // In penetration the depth does not matter: a change of the gap does not change a time.
     const ActiveContact& candidate = touching_.contacts[i];
     const bool on_surface = candidate.gap >= -search_.TouchTolerance(model, *state, candidate);
     if (touching_.approach[i] < -slow && on_surface && !was_closed(candidate) &&
@@ -235,7 +237,8 @@ bool EventStepper::LocateTouch(const Model<double>& model, double t, double slow
     return true;
   }
   const ActiveContact contact = *touch;
-  // What touches acts by its impact alone: the motion up to here had only what rested before.
+  // The contact that touches acts only by its impact: the motion up to here had only the contacts
+  // that were closed before.
   for (size_t i = 0; i < touching_.contacts.size(); ++i) {
     if (touching_.approach[i] < -slow) touching_.approach[i] = HUGE_VAL;
   }

@@ -42,7 +42,7 @@ class EventReplay {
   }
 
  private:
-  // Solves a problem whose solution in double is known; of bodies, joints and contacts.
+  // Solves a problem whose solution in double is known, for bodies, joints and contacts.
   void Solve(const ContactProblem<T>& problem, const ContactProblem<double>& in_double,
              const ContactSolution<double>& solution, const std::vector<double>& signs,
              ContactSystem* system, ContactSolution<T>* out) {
@@ -86,7 +86,7 @@ class EventReplay {
     compression_ = solution.normal_impulse;
   }
 
-  // Of a decompression: e times the impulses of the part before.
+  // Sets the offsets of a decompression: e times the impulses of the part before.
   void SetOffsets(const Impulses& impulses, ContactProblem<T>* problem) const {
     for (size_t i = 0; i < impulses.contacts.size(); ++i) {
       ContactBlock<T>& contact = problem->contacts[i];
@@ -120,7 +120,8 @@ class EventReplay {
             difference, std::abs(ValueOf(solution->motion[i]) - impulses->solution.motion[i]));
         size = std::max(size, std::abs(impulses->solution.motion[i]));
       }
-      // Where impulses are not unique, or it stalls, the modes that the step found are eliminated.
+      // Where impulses are not unique, or the interior point stalls, the mode system of the double
+      // step is solved by elimination.
       if (converged && difference <= kUnrolledAgrees * size) {
         return;
       }
@@ -181,7 +182,7 @@ class EventReplay {
         evaluate(i, &stages[i]);
         continue;
       }
-      // Values are known, and the derivatives of nearby ones would be taken at those.
+      // The values are known; derivatives at nearby values would differ.
       RowMatrixXd own;
       ToColumns(stages[i - 1].motion, &own);
       own.col(0) =
@@ -242,15 +243,16 @@ class EventReplay {
                : RelativeSpeed(after, contact.a, rows.tangent_a, contact.b, rows.tangent_b);
   }
 
-  // How fast the event's equation changes with the segment's length, and the sum of the magnitudes
-  // of the terms of which that is made.
+  // The rate at which the event's equation changes with the segment's length, and the sum of the
+  // magnitudes of its terms.
   struct Rate {
     double value = 0.0;
     double terms = 0.0;
   };
 
-  // Of the map and the equation themselves: with the length as the only variable of the map, and
-  // then each part of the state that the length moves, and the time, as one of the equation.
+  // The rate from the map and the equation themselves: first with the length as the only variable
+  // of the map, then with the time and each part of the state that the length changes as a variable
+  // of the equation.
   Rate RateOf(Segment* segment) const {
     const Model<T> constant{model_.structure, JetsOf(values_.parameters)};
     EventReplay replay(constant, values_, route_);
@@ -316,7 +318,7 @@ class EventReplay {
       const Derivatives change = Equation(segment, *after, T(now + *tau)).v.array() / rate.value;
       first = k == 0 ? Derivatives(change.abs()) : first;
       const double share = (first > 0.0).select(change.abs() / first, 0.0).maxCoeff();
-      // What does not fall any more is rounding.
+      // A change that no longer falls is rounding.
       if (share <= kLocatedDerivative || share > 0.5 * last) {
         return;
       }

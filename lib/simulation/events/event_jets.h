@@ -12,8 +12,8 @@
 //   g(S(τ), t + τ) = 0,   τ ← τ − g / (dg/dτ)
 //
 // by Newton's iteration from the length that the double step found, with the map S and the equation
-// g (gap, speed or force) evaluated in Jets at each. So is dg/dτ, with τ as the only variable:
-// nothing of the tangent's derivatives (event_derivative.h) enters.
+// g (gap, speed or force) evaluated in Jets in each iteration. dg/dτ is evaluated in Jets too, with
+// τ as the only variable: the derivatives of the tangent (event_derivative.h) are not used.
 
 #include "tangible/simulation/events/event_record.h"
 

@@ -8,7 +8,7 @@ size_t BytesOf(const State<double>& state) {
   return sizeof(double) * (state.pose.capacity() + state.twist.capacity());
 }
 
-// Without the node itself, which stands in a vector.
+// Bytes without the node itself, which is stored in a vector.
 size_t BytesOf(const SolvedNode& node) {
   return BytesOf(node.state) + node.problem.bytes() + node.solution.bytes() + node.system.bytes();
 }

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// What an event step was made of, as its derivatives need it: segments of smooth motion, each up to
-// an event or to the step's end, and impacts between them.
+// The record of an event step that its derivatives need: segments of smooth motion, each up to an
+// event or to the step's end, and impacts between them.
 
 #include <memory>
 #include <vector>
@@ -21,7 +21,7 @@ struct SolvedNode {
   ContactSystem system;
 };
 
-/// A solved step, fixed or of impulses: all that its derivative needs.
+/// A solved step, fixed or of impulses, with everything that its derivative needs.
 struct StepRecord {
   double time = 0.0;
   double h = 0.0;
@@ -42,14 +42,14 @@ struct StepRecord {
 /// impact is two parts of the record, its compression and then its decompression.
 struct Impulses : StepRecord {
   ContactSystem system;
-  bool decompression = false;   ///< of the impulses that the part before has found
-  std::vector<int> compressed;  ///< decompression: the place of each contact in that part
+  bool decompression = false;   ///< of the impulses found by the part before
+  std::vector<int> compressed;  ///< decompression: each contact's index in that part
 
   SolvedEquations View() const;
 };
 
 enum class EventKind : unsigned char {
-  kStepEnd,     ///< none: the step's time is over
+  kStepEnd,     ///< no event: the end of the step
   kEdge,        ///< a force's window opens or closes, or a signal has a corner
   kTouch,       ///< a gap or the distance from a joint limit closes
   kSlipEnds,    ///< a sliding speed reaches 0
@@ -69,7 +69,7 @@ bool IsLocated(EventKind kind);
 struct Segment {
   double time = 0.0;
   double length = 0.0;
-  /// The instant at which a run starts: what its initial twists approach acts with friction.
+  /// At the start of a run: contacts that the initial twists approach act with friction.
   bool starts = false;
   double middle = 0.0;  ///< the time at which forces and pieces of signals are chosen
   State<double> before, after;
@@ -90,8 +90,8 @@ struct Segment {
   int event_number = -1;             ///< kEdge: the number that is the time; −1: a constant
   SolvedNode end;                    ///< kSlipBegins, kLiftOff: accelerations after the motion
   int event_index = -1;              ///< the same: which of `contacts`
-  /// The event's function does not pass through 0 but jumps, as poses and twists are corrected
-  /// where the segment starts: the event is there, whatever moves.
+  /// The event's function does not pass through 0 but jumps where poses and twists are corrected at
+  /// the start of the segment: the time of the event is that start, whatever varies.
   bool at_once = false;
 
   /// Whether the event's time is found from an equation.
@@ -100,8 +100,8 @@ struct Segment {
   bool IsEventAtOnce() const { return event == EventKind::kAtOnce || at_once; }
 
   /// Whether contact i sticks between the bodies of contact k, as k does. Such contacts, the two
-  /// ends of a face, begin to slide as one, when the sum of their friction reaches the sum of its
-  /// limits: how they share it is not determined, and nothing moves before.
+  /// ends of a face, begin to slide together, when the sum of their friction reaches the sum of its
+  /// limits: the share of each is not determined, and nothing moves before.
   bool SticksWith(size_t i, size_t k) const {
     return modes[i] == ContactMode::kSticking && contacts[i].IsBetweenTheSame(contacts[k]);
   }
@@ -126,7 +126,7 @@ struct Segment {
   }
 };
 
-/// One part of a step; of the two members the one that `is_impulses` says holds.
+/// One part of a step; `is_impulses` tells which of the two members is valid.
 struct EventPart {
   bool is_impulses = false;
   Segment segment;
@@ -144,7 +144,7 @@ struct EventRecord {
   size_t bytes() const;
 };
 
-/// The view that VisitJacobian takes.
+/// The view of a node that VisitJacobian takes.
 SolvedEquations ViewOf(const Segment& segment, const SolvedNode& node, bool correction);
 
 }  // namespace tangible

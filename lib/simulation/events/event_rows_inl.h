@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Rows of derivatives by what they belong to. Included by event_derivative*.cc alone.
+// Selects the rows of derivatives that belong to a body. Included by event_derivative*.cc alone.
 
 #include "tangible/dynamics/model/model.h"
 

@@ -12,8 +12,9 @@
 namespace tangible {
 namespace {
 
-// How often the motion may be evaluated in a step, for each event that a pair may have: one takes
-// some ten; one search over a motion whose rates are of no use a thousand.
+// How often the motion may be evaluated in a step, for each event that a pair may have: an event
+// takes about ten evaluations; one search over a motion whose rates cannot be used takes a
+// thousand.
 constexpr long kEvaluationsOfEvent = 1000;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
@@ -37,7 +38,8 @@ double EventSearch::SpeedTolerance(const Model<double>& model, const State<doubl
     const double size = lengths_.radius(body);
     const double own = SpeedOf(&state.twist[3 * body], size);
     speed = std::max(speed, own);
-    // A face whose gaps round is turned by as much, and slides across its neighbours' normals.
+    // A face is turned by the rounding of its gaps, and then has a small speed along its
+    // neighbours' normals.
     if (own > 0.0 && size > 0.0) {
       const double turned = kTurnedFace * lengths_.Rounding(state, body, body) / size;
       rounding = std::max(rounding, turned * own);
@@ -79,7 +81,7 @@ EventSearch::Sample* EventSearch::At(const Model<double>& model, double length) 
       return &samples_[i];
     }
   }
-  // A bracket's ends are asked for again; older samples are not.
+  // The ends of a bracket are used again; older samples are not.
   constexpr int kMostSamples = 64;
   if (num_samples_ == kMostSamples) {
     std::rotate(samples_.begin(), samples_.begin() + kMostSamples / 2, samples_.end());
@@ -108,7 +110,7 @@ EventSearch::Sample* EventSearch::At(const Model<double>& model, double length) 
   return &sample;
 }
 
-// What the motion of a sample has found, for the segment that it is a motion of.
+// Moves the result of a sample's motion to the segment to which it belongs.
 void EventSearch::TakeMotion(Sample* sample, Segment* segment) {
   Segment& motion = sample->motion;
   std::swap(segment->after, motion.after);
@@ -118,7 +120,7 @@ void EventSearch::TakeMotion(Sample* sample, Segment* segment) {
   segment->num_corrections = motion.num_corrections;
   segment->projects_twists = motion.projects_twists;
   std::swap(segment->projection, motion.projection);
-  num_samples_ = 0;  // this one is spent
+  num_samples_ = 0;  // the sample's data have been moved
 }
 
 // The function of a closed contact whose sign tells that its mode ends.
@@ -195,8 +197,8 @@ void EventSearch::SearchClosed(const Model<double>& model, Event* event) {
         scale = std::max(scale, std::abs(start.normal_impulse[k]));
       }
     }
-    // What changes no speed within a step but by its rounding is no force: where none acts (no
-    // gravity, bodies that coast side by side) all of them are rounding.
+    // A force that changes a speed within a step only by rounding counts as 0: where no force acts
+    // (no gravity, bodies that coast side by side) all computed forces are rounding.
     double mass = 0.0;
     for (const int body : {segment_->contacts[i].a, segment_->contacts[i].b}) {
       if (model.structure->bodies[body].block >= 0) {
@@ -303,7 +305,7 @@ bool EventSearch::Run(const Model<double>& model, const std::vector<ActiveContac
     segment->event_friction = segment->friction[event.index];
   }
   At(model, length);
-  // What a motion that cannot be integrated would have met nobody knows.
+  // If a motion could not be integrated, the events that it would have met are unknown.
   if (!all_good_) {
     *message = message_;
     return false;

@@ -9,8 +9,8 @@
 // exceeds what the pair's speed bound can close is free of contact; others are halved, so that
 // grazing and rotating corners are not missed (Mirtich, Impulse-based Dynamic Simulation, 1996, ch.
 // 2, for the bound). Where bodies turn and move little between an interval's ends and the same
-// features are closest at both, the gap's rates of change there say whether it has a root. Forces
-// and sliding speeds are sampled at the segment's middle and end.
+// features are closest at both, the gap's rates of change at the ends tell whether it has a root.
+// Forces and sliding speeds are sampled at the segment's middle and end.
 
 #include <algorithm>
 #include <limits>
@@ -28,21 +28,22 @@ class EventSearch {
  public:
   explicit EventSearch(const Model<double>& model);
 
-  /// The searches that follow are of one step, whose evaluations of the motion are bounded.
+  /// Starts the searches of one step, whose evaluations of the motion are bounded in number.
   void StartStep() {
     evaluations_ = 0;
     AllowEventsOf(1);
   }
-  /// The bound is a multiple of max_events_per_step for each of so many pairs.
+  /// The bound is a multiple of max_events_per_step for each of this many pairs.
   void AllowEventsOf(int num_pairs) { num_pairs_with_events_ = std::max(1, num_pairs); }
-  /// Shortens the segment to its first event and names it; the segment is run to there. `touching`:
-  /// contacts within the touching tolerance at its start, which are no events while they stay so.
+  /// Shortens the segment to its first event, sets the kind of the event, and runs the segment up
+  /// to it. `touching`: contacts within the touching tolerance at its start, which are no events
+  /// while they stay within it.
   bool Run(const Model<double>& model, const std::vector<ActiveContact>& touching, Segment* segment,
            std::string* message);
 
   /// The sizes of bodies and the tolerances on gaps that follow from them.
   const Lengths& lengths() const { return lengths_; }
-  /// Below which a contact touches (m), or a joint is at its limit (m or rad).
+  /// The gap below which a contact touches (m), or a joint is at its limit (m or rad).
   double TouchTolerance(const Model<double>& model, const State<double>& state,
                         const ActiveContact& contact) const {
     return contact.joint >= 0 ? lengths_.LimitTouch(state, model.structure->joints[contact.joint])
@@ -53,7 +54,7 @@ class EventSearch {
   /// All contacts of a pair within `reach`; gap set.
   void FindContacts(const Model<double>& model, const State<double>& state, double reach,
                     std::vector<ActiveContact>* contacts);
-  /// What all motions that it ran leaned on.
+  /// The fallbacks of all motions of the searches.
   const FlowCounts& flow_counts() const { return flow_.counts(); }
   /// Of the last search for contacts: boxes compared, pairs whose boxes overlap.
   int num_compared() const { return broad_phase_.num_compared(); }
@@ -80,13 +81,14 @@ class EventSearch {
   void TakeMotion(Sample* sample, Segment* segment);
   void FindPairs(const Model<double>& model);
   void SearchPair(const Model<double>& model, int a, int b, Event* event);
-  // When a contact that opens out of penetration approaches again, if it has not left by then.
+  // Searches for the time at which a contact that opens in penetration approaches again, if it has
+  // not left by then.
   void SearchReturn(const Model<double>& model, const ActiveContact& contact, double touch,
                     Event* event);
   void SearchLimit(const Model<double>& model, int joint, double side, Event* event);
   /// The first crossing of gap from above 0 within [from, to]; rate_over(a, b) bounds how fast it
-  /// closes between; course_over(a, gap(a), b, gap(b)) is what is known of it beyond that. To
-  /// |gap| ≤ tolerance, or as near as doubles allow.
+  /// closes between; course_over(a, gap(a), b, gap(b)) tells what else is known about it. The
+  /// crossing is found to |gap| ≤ tolerance, or as near as doubles allow.
   template <typename Gap, typename Rate, typename CourseOver>
   bool FirstRoot(const Model<double>& model, const Gap& gap, const Rate& rate_over,
                  const CourseOver& course_over, double tolerance, double from, double to,
@@ -96,7 +98,7 @@ class EventSearch {
   double Refine(const Model<double>& model, const Function& f, double tolerance, double a,
                 double fa, double b, double fb);
   double ModeValue(const Model<double>& model, Sample* sample, const Event& event);
-  /// To which a pair's gaps are located, m.
+  /// The tolerance to which a pair's gaps are located, m.
   double GapTolerance(const State<double>& state, int a, int b) const {
     return std::max(kLocatedOfSize * lengths_.Size(a, b),
                     kLocatedOfCoordinate * lengths_.Coordinate(state, a, b));
@@ -110,7 +112,7 @@ class EventSearch {
   Segment* segment_ = nullptr;
   const std::vector<ActiveContact>* touching_ = nullptr;
   double slow_ = 0.0;            ///< the speed tolerance as the segment starts, m/s
-  std::vector<double> closing_;  ///< a body: bound on its points' speed over the segment
+  std::vector<double> closing_;  ///< bound on the speed of each body's points over the segment
   std::vector<Sample> samples_;
   int num_samples_ = 0;
   long evaluations_ = 0;  ///< of the motion, in this step

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The search for gaps that close, but for pairs of bodies: returns out of penetration, and joints
-// to their limits.
+// The search for gaps that close, except for those of pairs of bodies: returns of contacts in
+// penetration, and joints that reach their limits.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -22,8 +22,8 @@ double GapAndSpeed(const Model<double>& model, const State<double>& state,
   return rows.geometry.gap;
 }
 
-// What poses cut off as the bodies of a limit turn by an angle, which is of its second order, and
-// what corrections move.
+// The error of poses while the bodies of a limit turn by an angle, which is of second order in the
+// angle, plus the change by corrections.
 double CutByPoses(const Model<double>& model, const Segment& motion, double length,
                   const ActiveContact& limit) {
   const State<double>& at = motion.after;
@@ -78,7 +78,8 @@ double EventSearch::TouchStart(double speed, double acceleration) const {
 void EventSearch::SearchReturn(const Model<double>& model, const ActiveContact& contact,
                                double touch, Event* event) {
   const double length = event->length;
-  // Above 0 while it separates or has left: a length, with the speed times that of the segment.
+  // Positive while the contact separates or has left: a length, in which the speed is multiplied by
+  // the duration of the segment.
   const auto apart = [&](const Sample& sample) {
     if (!sample.good) {
       return std::numeric_limits<double>::quiet_NaN();
@@ -92,7 +93,8 @@ void EventSearch::SearchReturn(const Model<double>& model, const ActiveContact& 
   double speed;
   GapAndSpeed(model, segment_->before, contact, &speed);
   double fa = length * speed;
-  // A correction of poses or twists may turn it: it returns at once, whatever moves the start.
+  // A correction of poses or twists may reverse the speed: the contact then returns at once,
+  // whatever changes the start.
   if (fa > tolerance && apart(*At(model, 0.0)) < -tolerance) {
     event->kind = EventKind::kAtOnce;
     event->length = 0.0;
@@ -160,7 +162,7 @@ void EventSearch::SearchLimit(const Model<double>& model, int joint, double side
                       0.25 * std::abs(rate_after - rate_before);
   const bool touches = allowed > 0.0;
   const double slow = SpeedTolerance(model, segment_->before);
-  // As of a pair's contacts: a limit that has touched all the time returns only by approaching.
+  // As for a pair's contacts: a limit that has touched all the time returns only if it approaches.
   const auto gap = [&](const Sample& sample) {
     if (!sample.good) {
       return std::numeric_limits<double>::quiet_NaN();

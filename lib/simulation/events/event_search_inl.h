@@ -66,8 +66,8 @@ double EventSearch::Refine(const Model<double>& model, const Function& f, double
   return b;
 }
 
-// What the values and rates of change at both ends of an interval say of a function whose rate
-// changes monotonically between them. Without that: nothing.
+// The conclusion about roots in an interval from the values and rates of change at both ends, for a
+// function whose rate changes monotonically between them; otherwise there is none.
 enum class Course { kUnknown, kNoRoot, kOneRoot };
 inline Course CourseOf(double length, double fa, double rate_a, double fb, double rate_b) {
   constexpr double kSlack = 0.1;
@@ -82,7 +82,7 @@ inline Course CourseOf(double length, double fa, double rate_a, double fb, doubl
   if (rate_a >= 0.0 || rate_b <= 0.0) {
     return Course::kNoRoot;  // the smaller end is the minimum
   }
-  // Above both ends' tangents.
+  // The function lies above the tangents at both ends.
   const double at = (fb - fa - rate_b * length) / (rate_a - rate_b);
   return fa + rate_a * at > kSlack * std::min(fa, fb) ? Course::kNoRoot : Course::kUnknown;
 }
@@ -97,8 +97,8 @@ bool EventSearch::FirstRoot(const Model<double>& model, const Gap& gap, const Ra
   const double smallest = kShortestPart * to;
   double first = gap(*At(model, from));
   if (first <= 0.0 && from == 0.0) {
-    // What does not touch as it starts and has no gap is where features change: a corner at the end
-    // of an edge, which it leaves.
+    // A contact without a gap that does not touch at the start is at a change of features: a corner
+    // at the end of an edge, which it leaves.
     from = kLeftBehind * to;
     first = gap(*At(model, from));
     if (!(first > 0.0)) {
@@ -134,7 +134,7 @@ bool EventSearch::FirstRoot(const Model<double>& model, const Gap& gap, const Ra
       *root = Refine(model, gap, tolerance, i.a, i.fa, i.b, i.fb);
       return true;
     }
-    // Where the gap closes at more than half of what the bound allows it does not open in between:
+    // Where the gap closes by more than half of what the bound allows it does not open in between:
     // the crossing is the first.
     if (i.fb <= 0.0 && (i.b - i.a <= smallest || i.fa - i.fb > 0.5 * reach)) {
       *root = Refine(model, gap, tolerance, i.a, i.fa, i.b, i.fb);

@@ -19,9 +19,10 @@ bool OfPair(const ActiveContact& contact, int a, int b) {
   return contact.joint < 0 && contact.a == a && contact.b == b;
 }
 
-// A vertex that leaves an edge by its end is handed over when it meets the vertex there, and not at
-// the gap of what takes over, whose edge has another end: that pair of vertices. `next` where the
-// pair has none, or where rounded corners take over smoothly.
+// The contact of a vertex that leaves an edge at its end changes its feature when the vertex meets
+// the vertex there, not when the gap of the next feature is reached, whose edge has another end:
+// this returns the contact of these two vertices. It returns `next` where the pair has none, or
+// where rounded corners continue the contact smoothly.
 ActiveContact HandOver(const Model<double>& model, const State<double>& state,
                        const ActiveContact& lost, const ActiveContact& next) {
   const bool of_first = lost.feature.kind == FeatureKind::kVertexEdge;
@@ -84,8 +85,8 @@ class EventSearch::PairSearch {
   }
 
  private:
-  // Which of the pair's contacts that are not closed count: those that touch and leave do only with
-  // kAll, and never where they are in penetration: they return by their speed.
+  // Which of the pair's contacts that are not closed count: those that touch and leave count only
+  // with kAll, and never in penetration, where the sign of their speed marks the return.
   enum class Counts { kUntouched, kAll };
 
   Features FeaturesAt(const State<double>& state) const {
@@ -105,11 +106,11 @@ class EventSearch::PairSearch {
   // Bound on how fast the gap closes over an interval.
   double ClosingSpeed(double from, double to, Counts counts);
   Course CourseOver(double from, double fa, double to, double fb, double allowed, Counts counts);
-  // The first time at which the gap + allowed closes; the event is then that.
+  // Searches for the first time at which gap + allowed closes, and sets the event to it.
   void SearchFrom(double from, double allowed, Counts counts);
-  // Contacts that touch and stay open leave first, and may return; false where one returns at once.
+  // Searches for the return of contacts that touch and open; false where one returns at once.
   bool SearchTouching();
-  // The closed contact that has lost its feature, or nullptr.
+  // The closed contact whose feature is no longer the closest, or nullptr.
   const ActiveContact* LostAt(const State<double>& state) const;
   void SearchHandOver();
   double AlignedWithin() const;
@@ -124,7 +125,7 @@ class EventSearch::PairSearch {
   const Segment& segment_;
   const std::vector<ActiveContact>& touching_;
   const double touch_;    ///< gap below which the pair touches, m
-  const double located_;  ///< to which its gaps are located, m
+  const double located_;  ///< tolerance to which they are located, m
   const bool closed_;     ///< the pair has closed contacts
   ActiveContact nearest_;
   Vector2<double> normal_{0.0, 0.0};
@@ -135,8 +136,8 @@ void EventSearch::SearchPair(const Model<double>& model, int a, int b, Event* ev
   PairSearch(this, model, a, b, event).Run();
 }
 
-// How far apart the ends of two bodies' faces may be along them and count as one above the other,
-// at least, m. A power of two as there (collide_core.cc).
+// The distance along two faces up to which their ends certainly count as one above the other, m. It
+// is a power of two as in collide_core.cc.
 double EventSearch::PairSearch::AlignedWithin() const {
   return std::ldexp(kAlignedRadii,
                     std::ilogb(search_.lengths_.radius(a_) + search_.lengths_.radius(b_)));
@@ -153,8 +154,9 @@ bool EventSearch::PairSearch::HasPassed(const State<double>& state) const {
   return moved(0) + moved(1) + moved(2) * size > kPassed * size + 2.0 * AlignedWithin();
 }
 
-// Whether one of the features found is another name of a closed contact: a vertex over a vertex,
-// where rounding changes which of the two is found. It is handed over when they have parted.
+// Whether one of the features found is equivalent to a closed contact: for a vertex above a vertex
+// rounding decides which of the two is found. The feature changes only when the vertices have moved
+// apart.
 bool EventSearch::PairSearch::Continues(const State<double>& state, const ActiveContact& contact,
                                         const Features& features) const {
   ContactRows<double> rows;
@@ -176,8 +178,8 @@ double EventSearch::PairSearch::Gap(const Sample& sample, Counts counts, bool ha
   }
   const State<double>& state = sample.motion.after;
   const Features features = FeaturesAt(state);
-  // What takes over from a closed contact whose feature is the closest no longer: the search for
-  // that finds it, whose gap is rounding.
+  // The next feature of a closed contact whose feature is no longer the closest does not count
+  // here, because its gap is rounding: SearchHandOver finds it.
   const bool hands_over =
       closed_ && !handed_over &&
       std::any_of(segment_.contacts.begin(), segment_.contacts.end(),
@@ -205,8 +207,8 @@ double EventSearch::PairSearch::Gap(const Sample& sample, Counts counts, bool ha
   return smallest;
 }
 
-// All points' speeds; where both ends have the same face, the speed along its normal and what
-// rotation adds.
+// The bound is the speed of all points; where both ends have the same face, the speed along its
+// normal plus the effect of rotation.
 double EventSearch::PairSearch::ClosingSpeed(double from, double to, Counts counts) {
   const double any = search_.closing_[a_] + search_.closing_[b_];
   const Sample& first = *search_.At(model_, from);
@@ -247,7 +249,7 @@ double EventSearch::PairSearch::ClosingSpeed(double from, double to, Counts coun
 // the gap's rate changes monotonically.
 Course EventSearch::PairSearch::CourseOver(double from, double fa, double to, double fb,
                                            double allowed, Counts counts) {
-  // Without a gap at both ends there is no contact whose rate it would be.
+  // Without a gap at both ends there is no contact whose rate could be used.
   Sample* const first = search_.At(model_, from);
   if (!std::isfinite(fa) || !std::isfinite(fb) || Gap(*first, counts) + allowed != fa) {
     return Course::kUnknown;
@@ -271,8 +273,8 @@ void EventSearch::PairSearch::SearchFrom(double from, double allowed, Counts cou
     allowed = 0.0;  // it has left
   }
   const bool all = counts == Counts::kAll;
-  // A contact that has touched all the time returns only by approaching: the first-order
-  // integrator's poses may cut a corner that its twists do not.
+  // A contact that has touched all the time returns only if it approaches: the poses of the
+  // first-order integrator may pass the gap although its twists do not close it.
   const auto shifted = [&](const Sample& sample) {
     const double value = Gap(sample, counts) + allowed;
     if (!std::isfinite(value)) {
@@ -291,7 +293,7 @@ void EventSearch::PairSearch::SearchFrom(double from, double allowed, Counts cou
       root > 0.0) {
     event_.length = root;
     const bool cut_in = Gap(*search_.At(model_, root), counts) < -kDeepTouches * touch_;
-    // Poses that cut a corner have passed the gap: it is the speed that turns.
+    // If only the poses have passed the gap, the event is the reversal of the speed.
     event_.kind =
         cut_in && all && Contains(touching_, nearest_) ? EventKind::kReturn : EventKind::kTouch;
     event_.contact = nearest_;
@@ -322,8 +324,8 @@ bool EventSearch::PairSearch::SearchTouching() {
   return true;
 }
 
-// Where corners meet the feature of a closed contact may not have been the closest as the segment
-// starts: it is once they have passed.
+// Where corners meet, the feature of a closed contact may not be the closest at the start of the
+// segment, but is once they have passed each other.
 const ActiveContact* EventSearch::PairSearch::LostAt(const State<double>& state) const {
   const Features features = FeaturesAt(state);
   for (const ActiveContact& contact : segment_.contacts) {
@@ -336,7 +338,8 @@ const ActiveContact* EventSearch::PairSearch::LostAt(const State<double>& state)
   return nullptr;
 }
 
-// A closed contact whose feature is no longer the pair's closest hands over to the next one.
+// Searches for the time at which a closed contact's feature is no longer the pair's closest and the
+// next one replaces it.
 void EventSearch::PairSearch::SearchHandOver() {
   const auto is_lost = [&](double length) {
     return LostAt(search_.At(model_, length)->motion.after) != nullptr;

@@ -10,13 +10,14 @@
 namespace tangible {
 namespace {
 
-// How much further than the forces at work a contact that slides is held to its direction.
+// The shift of a sliding contact's tangential acceleration that keeps its direction of sliding, as
+// a multiple of the accelerations that the acting forces cause.
 constexpr double kForcedSlip = 1e4;
-// How often a motion that cannot be integrated over what is left of a step is halved.
+// How often a motion is halved that cannot be integrated over the rest of a step.
 constexpr int kMostHalvings = 14;
-// How many such shorter motions a step may have. A stiff body's would not end.
+// How many such shortened motions a step may have. Those of a stiff body would not end.
 constexpr int kMostShortened = 50;
-// Beyond this many times max_events_per_step a step is given up.
+// After more than this many times max_events_per_step events a step is given up.
 constexpr int kGiveUp = 3;
 
 double KineticEnergy(const Model<double>& model, const std::vector<double>& twist) {
@@ -93,8 +94,8 @@ void KeepClosed(const std::vector<ContactMode>& modes, double recovered, double 
   }
   segment->contacts.resize(kept);
   segment->friction.resize(kept);
-  // Beside one that sticks the other end of a face does not slide: that its share of the friction
-  // is at the limit says nothing.
+  // If one end of a face sticks, the other end does not slide, even if its share of the friction is
+  // at the limit.
   for (size_t k = 0; k < kept; ++k) {
     const bool slides = SlidingSign(segment->modes[k]) != 0.0 && std::abs((*slip)[k]) <= slow;
     for (size_t i = 0; i < kept; ++i) {
@@ -105,7 +106,7 @@ void KeepClosed(const std::vector<ContactMode>& modes, double recovered, double 
   }
 }
 
-// Events of a step beyond which it is given up.
+// Number of events after which a step is given up.
 int MostEvents(const Model<double>& model) {
   return kGiveUp * model.structure->settings.max_events_per_step + kGiveUp;
 }
@@ -162,7 +163,8 @@ int EventStepper::NextToStrike(double slow) {
     const double struck = struck_[group];
     if (struck > 0.0) {
       const double approach = ApproachOf(group);
-      // An impact is solved to a tolerance of its own: what approach it leaves starts no other one.
+      // A residual approach speed below the tolerance of the impact's solve must not start another
+      // impact.
       if (approach >= 0.5 * struck && approach <= kSolvedApproach * slow) {
         continue;
       }
@@ -183,7 +185,7 @@ std::string EventStepper::EventsDoNotEnd(const Model<double>& model, const char*
          std::to_string(model.structure->settings.max_events_per_step);
 }
 
-// Of the group's contacts that approach, a pair of bodies once.
+// Counts the contacts of the group that approach, each pair of bodies once.
 bool EventStepper::CountImpact(const Model<double>& model, double slow, int group,
                                EventOutcome* outcome) {
   ++outcome->events;
@@ -248,7 +250,7 @@ bool EventStepper::SolveImpacts(const Model<double>& model, double t, State<doub
   }
 }
 
-// The impact of what touches in a group and does not leave, as a new part of the record.
+// The impact of the contacts of a group that touch and do not leave, as a new part of the record.
 Impulses* EventStepper::ListImpact(const Model<double>& model, double t, double slow, int group,
                                    const State<double>& state) {
   const SimulationSettings& settings = model.structure->settings;
@@ -268,10 +270,11 @@ Impulses* EventStepper::ListImpact(const Model<double>& model, double t, double 
       std::any_of(touching_.contacts.begin(), touching_.contacts.end(),
                   [&](const ActiveContact& c) { return in_group(c) && Rattles(model, c); });
   for (size_t i = 0; i < touching_.contacts.size(); ++i) {
-    // In a rattle what leaves slowly is to be held with the rest: it would be back at once.
+    // In a rattle contacts that leave slowly are held with the others, because they would return at
+    // once.
     const double leaves =
         rattles ? std::max(slow, ReturnSpeed(model, state, touching_.contacts[i])) : slow;
-    // Friction in a joint is a force, which does nothing at once.
+    // Friction in a joint is a force, which does nothing at an instant.
     if (touching_.approach[i] > leaves || !in_group(touching_.contacts[i]) ||
         touching_.contacts[i].IsJointFriction()) {
       continue;
@@ -353,7 +356,8 @@ bool EventStepper::SolveByShortStep(const Model<double>& model, double t, double
   return true;
 }
 
-// The last modes, and what slides sliding on: friction opposes that whatever the accelerations.
+// The guess is the last modes; contacts that slide keep sliding, because friction opposes the
+// sliding whatever the accelerations are.
 void EventStepper::GuessModes(const std::vector<ActiveContact>& contacts,
                               const std::vector<double>& slip, double slow,
                               ContactProblem<double>* problem,
@@ -397,7 +401,8 @@ bool EventStepper::ChooseModes(const Model<double>& model, double t, double midd
       segment->friction.push_back(touching_.friction[i]);
       slip.push_back(touching_.slip[i]);
       for (const EndingSlip& ending : ending_) {
-        // Beyond doubt, as it does not slide yet against its own friction.
+        // The speed is set above the tolerance, because the contact does not slide yet against its
+        // own friction.
         if (ending.contact.SameAs(touching_.contacts[i])) slip.back() = 2.0 * slow * ending.sign;
       }
     }
@@ -430,7 +435,8 @@ bool EventStepper::ChooseModes(const Model<double>& model, double t, double midd
 
 void EventStepper::SwitchMode(const Segment& segment) {
   for (size_t i = 0; i < last_contacts_.size(); ++i) {
-    // A body that stops stops at all its contacts; those that still slide are told by their speed.
+    // A body that stops does so at all its contacts; the speed of a contact tells whether it still
+    // slides.
     if (segment.event == EventKind::kSlipEnds && SlidingSign(last_modes_[i]) != 0.0) {
       last_modes_[i] = ContactMode::kSticking;
     }
@@ -493,8 +499,8 @@ EventOutcome EventStepper::Step(const Model<double>& model, double t, double h,
   return outcome;
 }
 
-// What happens at an instant: impacts; as a run starts and a step ends, corrections. `begins`: the
-// step's start.
+// Solves an instant: impacts, and corrections at the start of a run and the end of a step.
+// `begins`: the step's start.
 bool EventStepper::SolveInstant(const Model<double>& model, double now, double h, bool begins,
                                 bool at_end, State<double>* state, EventOutcome* outcome) {
   if (!SolveImpacts(model, now, state, outcome)) {
@@ -513,8 +519,8 @@ bool EventStepper::SolveInstant(const Model<double>& model, double now, double h
     }
   }
   if (starts_ && !at_end) {
-    // It has put twists back that the joints do not allow: what slides now, and where to, is
-    // another.
+    // The projection has changed twists that the joints do not allow, so that other contacts may
+    // slide, or in other directions.
     FindTouching(model, *state);
   }
   starts_ = false;
@@ -598,7 +604,8 @@ EventOutcome EventStepper::Advance(const Model<double>& model, double t, double 
     if (at_given_time) {
       now = until;
       if (halvings > 0) {
-        // A given share of what was left: an instant like a signal's corner.
+        // The end is at a given fraction of the rest of the step, an instant like a signal's
+        // corner.
         segment.event = EventKind::kEdge;
         halvings = 0;
       } else if (to_edge) {

@@ -6,13 +6,14 @@
 //
 //   1. contacts that touch: where one approaches, an impact (Newton's law, or Poisson's in two
 //      phases; no forces) is solved, until none does
-//   2. those that neither approach nor separate: accelerations as an LCP say which stay closed, and
-//      whether they stick; where it has no solution (Painlevé) impulses of a very short step
+//   2. for those that neither approach nor separate an LCP in the accelerations determines which
+//      stay closed, and whether they stick; where it has no solution (Painlevé) impulses of a very
+//      short step are used instead
 //   3. with these modes held the motion is integrated up to the earliest event (event_search.h)
 //
 // The time of an event is a function of state and parameters, by its own equation: gap = 0, sliding
-// speed = 0, normal force = 0, friction at its limit. The derivatives (event_derivative.h) follow
-// it.
+// speed = 0, normal force = 0, friction at its limit. The derivatives (event_derivative.h) take
+// this into account.
 
 #include <string>
 #include <vector>
@@ -27,13 +28,14 @@
 
 namespace tangible {
 
-/// What event stepping gives up of its own rules, and how often.
+/// How often event stepping had to relax its own rules.
 struct EventFallbacks {
-  /// Accelerations that do not exist (Painlevé), for which impulses of a very short step stand.
+  /// Accelerations that do not exist (Painlevé) and are replaced by impulses of a very short step.
   long short_steps = 0;
   /// Pairs beyond max_events_per_step in a step, whose further impacts in it are inelastic.
   long rebounds_given_up = 0;
-  /// Impacts after which contacts that leave so slowly that they are back at once are held.
+  /// Impacts after which contacts are held closed because they leave so slowly that they would
+  /// return at once.
   long held_contacts = 0;
 
   void Add(const EventFallbacks& other) {
@@ -44,7 +46,7 @@ struct EventFallbacks {
   long total() const { return short_steps + rebounds_given_up + held_contacts; }
 };
 
-/// What an event step reports beside its record.
+/// The report of an event step, besides its record.
 struct EventOutcome {
   bool done = true;
   std::string message;  ///< empty unless it failed
@@ -54,29 +56,30 @@ struct EventOutcome {
   int iterations = 0;
   double residual = 0.0;
   double impact_energy_gain = 0.0;  ///< J, the largest of an impact
-  bool by_guess = true;             ///< whether the modes of the last segment served everywhere
+  bool by_guess = true;             ///< whether the modes of the last segment were right everywhere
   bool by_lemke = false;
-  ContactFallbacks solver;  ///< what its solves and motions leaned on
+  ContactFallbacks solver;  ///< fallbacks of its solves and motions
   int newton_stages = 0;    ///< implicit stages whose iteration does not contract
-  int halved_motions = 0;   ///< that could not be integrated over what was left of the step
+  int halved_motions = 0;   ///< that could not be integrated over the rest of the step
   int pairs_compared = 0;   ///< boxes compared by the broad phase of its last search for events
   int pairs_near = 0;       ///< pairs whose boxes overlap, in that search
 };
 
-/// What an event step takes from the last one beside the state.
+/// The data of the last event step that the next one uses, besides the state.
 struct EventGuess {
   std::vector<ActiveContact> contacts;
   std::vector<ContactMode> modes;
   bool starts = true;  ///< the next step is a run's first
 };
 
-/// Adds a solve to what a step reports.
+/// Adds a solve to the report of a step.
 void CountSolve(const ContactSolverReport& solved, EventOutcome* outcome);
 /// "contact of ball and floor", "limit of joint hinge"; index −1: "joints".
 std::string NameOfContact(const ModelStructure& structure,
                           const std::vector<ActiveContact>& contacts, int index);
 
-/// What of impulses their solve has left: a contact, a joint that contradicts others, or momentum.
+/// Names the part of an impulse problem that was not solved: a contact, a joint that contradicts
+/// others, or momentum.
 std::string WhatIsUnsolved(const ModelStructure& structure, const Impulses& impulses,
                            const ContactSolverReport& solved);
 
@@ -85,7 +88,7 @@ class EventStepper {
   explicit EventStepper(const Model<double>& model);
 
   EventOutcome Step(const Model<double>& model, double t, double h, State<double>* state);
-  /// Of the last step.
+  /// The record of the last step.
   const EventRecord& record() const { return record_; }
   EventRecord& mutable_record() { return record_; }
   /// Forgets the contacts' modes.
@@ -110,10 +113,10 @@ class EventStepper {
                    const ActiveContact& contact);
   struct BrokenLimit {
     ActiveContact limit;
-    int steps = 0;  ///< for which it has stayed as it is
+    int steps = 0;  ///< during which it has stayed unchanged
   };
-  /// As a step starts: a joint's limit, among what touches, that is broken and has been so for some
-  /// steps without moving, where recovery moves what it can by `moved` in each; −1: none.
+  /// At the start of a step: a joint limit among the touching contacts that has been violated for
+  /// some steps without moving, although recovery would move it by `moved` in each; −1: none.
   int StuckLimit(const Model<double>& model, const State<double>& state, double moved);
   bool SolveImpacts(const Model<double>& model, double t, State<double>* state,
                     EventOutcome* outcome);
@@ -124,9 +127,9 @@ class EventStepper {
   /// An impact of the group `group` of coupled_.
   Impulses* ListImpact(const Model<double>& model, double t, double slow, int group,
                        const State<double>& state);
-  /// A body of the group whose impact is next at this instant: one that has begun, or else that of
-  /// the event that ended the last segment, or else of the first contact that approaches; −1: none
-  /// approaches faster than `slow`, m/s.
+  /// A body of the group whose impact is the next one at this instant: the one that has begun, or
+  /// else that of the event that ended the last segment, or else that of the first contact that
+  /// approaches; −1: none approaches faster than `slow`, m/s.
   int NextToStrike(double slow);
   /// The fastest approach of a group's contacts, m/s.
   double ApproachOf(int group);
@@ -134,8 +137,8 @@ class EventStepper {
   /// "…: more than 303 events in a step of contact of a and b, max_events_per_step is 100".
   static std::string EventsDoNotEnd(const Model<double>& model, const char* what,
                                     const ActiveContact& contact);
-  /// Where a segment ends as a contact stops sliding and others, of bodies that are not coupled to
-  /// it, stop at the same instant: they get events of their own.
+  /// Where a segment ends because a contact stops sliding, other contacts that stop at the same
+  /// instant and whose bodies are not coupled to it get separate events.
   bool EndOtherSlips(const Model<double>& model, double t, const Segment& segment,
                      State<double>* state, EventOutcome* outcome);
   bool SolveImpact(const Model<double>& model, Impulses* impact, State<double>* state,
@@ -150,9 +153,10 @@ class EventStepper {
                    State<double>* state, EventOutcome* outcome, Segment* segment);
   bool AddInstant(const Model<double>& model, double t, EventKind kind,
                   const ActiveContact* contact, State<double>* state, EventOutcome* outcome);
-  /// Whether a pair has had so many events in this step that its slow impacts are a rattle.
+  /// Whether a pair has had so many events in this step that its slow impacts count as a rattle (an
+  /// infinite sequence of ever smaller impacts).
   bool Rattles(const Model<double>& model, const ActiveContact& contact) const;
-  /// Whether one has had so many that it no longer rebounds.
+  /// Whether a pair has had so many events that it no longer rebounds.
   bool IsInelastic(const Model<double>& model, const ActiveContact& contact) const {
     return counts_.Of(contact) > model.structure->settings.max_events_per_step;
   }
@@ -160,7 +164,8 @@ class EventStepper {
   /// tolerance, m/s (of an angle's rad/s).
   double ReturnSpeed(const Model<double>& model, const State<double>& state,
                      const ActiveContact& contact) const;
-  /// The speed below which what touches neither approaches nor leaves nor slides, m/s.
+  /// The speed below which a touching contact counts as neither approaching nor leaving nor
+  /// sliding, m/s.
   double SlowSpeed(const Model<double>& model, const State<double>& state) const;
   bool Settle(const Model<double>& model, const Impulses& impact, State<double>* state,
               EventOutcome* outcome);
@@ -187,8 +192,8 @@ class EventStepper {
   EventCounts counts_;     ///< of this step
   CoupledBodies coupled_;  ///< at this instant
   std::vector<double>
-      struck_;  ///< a body: the approach before its last impact at this instant; 0: none
-  std::vector<EndingSlip> ending_;  ///< contacts that slide until an event of their own
+      struck_;  ///< for each body: approach before its last impact at this instant; 0: none
+  std::vector<EndingSlip> ending_;  ///< contacts that slide until a separate event
 };
 
 }  // namespace tangible

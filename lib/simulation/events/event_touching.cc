@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// What touches at an instant, with its speeds.
+// The contacts that touch at an instant, with their speeds.
 #include <algorithm>
 #include <cmath>
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// The residual of a contact problem in Jets at the solution in double: what the implicit derivative
-// K ẋ = −Ṙ starts from. Included by the files that step in Jets alone.
+// The residual of a contact problem in Jets at the solution in double, the right-hand side of the
+// implicit derivative K ẋ = −Ṙ. Included only by the files that step in Jets.
 
 #include <vector>
 
@@ -82,8 +82,8 @@ class ImplicitResidual {
   std::vector<double>& rhs_;
 };
 
-/// σ of each contact by its mode; where a contact without friction slides, that sign all the same:
-/// the one-sided derivative as μ leaves 0.
+/// σ of each contact by its mode; a sliding contact without friction has the sign of its sliding
+/// too, which gives the one-sided derivative as μ increases from 0.
 inline std::vector<double> SlidingSigns(const ContactProblem<double>& problem,
                                         const ContactSolution<double>& solution) {
   std::vector<double> signs(problem.contacts.size());

@@ -3,16 +3,23 @@
 //
 // The implicit stage of an integrator whose fixed-point iteration does not contract.
 //
-// The stage's accelerations A solve  A = N(Q, V),  Q = … + â τ² A,  V = … + a τ A. With
-// B = â τ² ∂N/∂q + a τ ∂N/∂v  the iteration A ← N contracts while the eigenvalues of B are below 1:
-// while dt resolves the fastest oscillation that joints and contacts under load have (transverse
-// waves of a taut chain: B ≈ T τ² / (m l)). Beyond, Newton's method does what it does not:
+// The stage's accelerations A solve  A = N(Q, V),  Q = … + â τ² A,  V = … + a τ A. With B = â τ²
+//                                                                   ∂N/∂q + a τ ∂N/∂v the iteration
+//                                                                   A ← N contracts if the
+//                                                                   eigenvalues of B are below 1,
+//                                                                   that is, if dt resolves the
+//                                                                   fastest oscillation of joints
+//                                                                   and contacts under load
+//                                                                   (transverse waves of a taut
+//                                                                   chain: B ≈ T τ² / (m l)).
+//                                                                   Otherwise Newton's method
+//                                                                   converges:
 //
 //   A ← A + (I − B)⁻¹ (N − A)
 //
-// and the same for the derivatives Ȧ, whose equation is linear with the same B, and, transposed,
-// for the adjoint's. B is dense, of 3 columns a moving body. IterateStage is the one iteration of
-// values, tangents, adjoints and Jets.
+// The same holds for the derivatives Ȧ, whose equation is linear with the same B, and, transposed,
+// for those of the adjoint. B is dense, with 3 columns for each moving body. IterateStage is the
+// common iteration for values, tangents, adjoints and Jets.
 
 #include <Eigen/LU>
 #include <functional>
@@ -23,10 +30,11 @@
 
 namespace tangible {
 
-/// Iterations after which one that has not converged is left for Newton's method.
+/// Number of fixed-point iterations after which Newton's method replaces an iteration that has not
+/// converged.
 inline constexpr int kMostFixedPoints = 20;
 
-/// Iterations of both together.
+/// Maximum number of iterations of both together.
 inline constexpr int kMostStageIterations = 60;
 
 enum class StageOutcome { kSolved, kSingular, kNotConverged };
@@ -66,20 +74,20 @@ class ImplicitStage {
  public:
   enum class Direction { kForward, kTransposed };
 
-  /// N's derivative part at a given place: next = N(x), 3 rows a moving body.
+  /// The derivative part of N at a given point: next = N(x), 3 rows for each moving body.
   using Map = std::function<void(const RowMatrixXd& x, RowMatrixXd* next)>;
 
-  /// Solves x = map(x) from a first guess, of an equation that is linear with B of the segment's
-  /// last stage, or its transposed matrix, but for columns of values that are nearly solved. To
-  /// rounding of the largest entry, or, where all entries are rounding (of bodies at rest), until
-  /// Newton's method changes it no less. Returns what is left as a share of the largest entry where
-  /// it does not converge, else 0.
+  /// Solves x = map(x) from a first guess. The equation is linear with B of the segment's last
+  /// stage, or its transposed matrix, except for columns of values that are nearly solved. The
+  /// iteration ends at rounding of the largest entry, or, where all entries are rounding (of bodies
+  /// at rest), when changes by Newton's method no longer fall. Returns the remaining change as a
+  /// fraction of the largest entry where it does not converge, else 0.
   double SolveDerivative(const Model<double>& model, Segment* segment, Direction direction,
                          const Map& map, RowMatrixXd* x);
 
-  /// Takes B at the segment's last stage, which has been solved.
+  /// Computes B at the segment's last stage, which must have been solved.
   void Factor(const Model<double>& model, Segment* segment);
-  /// x ← (I − B)⁻¹ x, 3 a moving body; or with the transposed matrix.
+  /// x ← (I − B)⁻¹ x, 3 rows for each moving body; or with the transposed matrix.
   void Solve(Direction direction, RowMatrixXd* x) const;
 
  private:

@@ -2,7 +2,7 @@
 #pragma once
 //
 // The linear system of given contact modes (lcp/system/contact_system.h) by elimination in the
-// scalar itself: nothing of a solve in double enters it. Included by event_jets.cc alone.
+// scalar itself, independently of any solve in double. Included by event_jets.cc alone.
 
 #include <vector>
 
@@ -21,8 +21,8 @@ inline constexpr int kEliminationRefinements = 4;
 template <typename T>
 class ModeElimination {
  public:
-  /// Bodies and contacts of the problem whose contacts have these modes; the tangential impulses of
-  /// those that stick. Cost: the cube of the number of rows.
+  /// Solves the problem with the given modes of its contacts, for bodies, normal impulses, and the
+  /// tangential impulses of contacts that stick. Cost: the cube of the number of rows.
   static void Solve(const ContactProblem<T>& p, const std::vector<ContactMode>& modes,
                     ContactSolution<T>* out) {
     int size = 3 * p.num_bodies;

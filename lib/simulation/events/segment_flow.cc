@@ -68,8 +68,8 @@ void PlaceStageOf(const ModelStructure& structure, const NystromTableau& tableau
       state);
 }
 
-// What the parts of each component of M a = p + Aᵀ y + Σ (nᵀ λn + tᵀ λt) amount to as
-// accelerations: they cancel in a body at rest, whose acceleration is the rounding of these.
+// The sizes, as accelerations, of the terms in each component of M a = p + Aᵀ y + Σ (nᵀ λn + tᵀ
+// λt): they cancel in a body at rest, whose acceleration is their rounding.
 void SizesOfTerms(const SolvedNode& node, std::vector<double>* sizes) {
   const ContactProblem<double>& p = node.problem;
   sizes->assign(p.load.size(), 0.0);
@@ -87,8 +87,8 @@ void SizesOfTerms(const SolvedNode& node, std::vector<double>* sizes) {
   }
 }
 
-// A hinge whose points have come apart by more than this share of its arms, by a motion that starts
-// on it, in a correction's problem.
+// Whether in a correction's problem the points of some hinge have come apart by more than this
+// fraction of its arms, after a motion that started with the hinge closed.
 bool DriftsFar(const Model<double>& model, const ContactProblem<double>& correction) {
   constexpr double kShareOfArms = 0.1;
   for (size_t j = 0; j < correction.joints.size(); ++j) {
@@ -110,7 +110,7 @@ bool DriftsFar(const Model<double>& model, const ContactProblem<double>& correct
 
 // Whether a correction moves a body by a tenth of its radius of gyration, or turns it by a tenth of
 // a radian, for errors that are a million times less: then the solution is rounding, as between
-// masses 1e40 apart, and would throw the body out from between its neighbours.
+// masses that differ by a factor of 1e40, and would throw the body out from between its neighbours.
 bool ThrowsOut(const SolvedNode& node, double error) {
   constexpr double kShareOfBody = 0.1;
   constexpr double kMostOfError = 1e6;
@@ -168,7 +168,7 @@ bool SegmentFlow::Accelerate(const Model<double>& model, const Segment& segment,
   return Solve(segment.modes, node);
 }
 
-// The last stage, which reads its own accelerations (implicit_stage.h).
+// Solves the last stage, which depends on its own accelerations (implicit_stage.h).
 bool SegmentFlow::SolveImplicitStage(const Model<double>& model, Segment* segment,
                                      std::string* message) {
   const NystromTableau& tableau = NystromTableau::Of(IntegratorOf(model.structure->settings));
@@ -222,8 +222,9 @@ bool SegmentFlow::HasConverged(const SolvedNode& stage, const std::vector<double
   for (const double acceleration : last) {
     size = std::max(size, std::abs(acceleration));
   }
-  // What rests does not get nearer to 0 than the terms that cancel in it round; and rounding may
-  // keep the iteration from the last digit: beyond some iterations less is enough.
+  // The acceleration of a body at rest cannot fall below the rounding of the terms that cancel in
+  // it, and rounding may prevent the last digit: after some iterations a weaker criterion is
+  // enough.
   const bool by_terms = iteration >= 3;
   if (by_terms) {
     SizesOfTerms(stage, &terms_);
@@ -269,16 +270,16 @@ bool SegmentFlow::Integrate(const Model<double>& model, Segment* segment, std::s
   return true;
 }
 
-// Errors that a correction is to remove: of joints, where they are corrected, and gaps.
+// Errors that a correction has to remove: those of joints, where these are corrected, and gaps.
 struct SegmentFlow::PoseErrors {
-  double share = 0.0;  ///< the largest, as a share of what is allowed
+  double share = 0.0;  ///< the largest, as a fraction of the allowed error
   double error = 0.0;  ///< that one, m or rad
   double allowed = 0.0;
   bool settled = true;  ///< all are rounding
 
   void Add(double new_error, double new_allowed, double rounding) {
     settled = settled && new_error <= rounding;
-    // What is not a number is the largest.
+    // A value that is not a number counts as the largest.
     if (!(new_error <= share * new_allowed)) {
       share = new_error / new_allowed;
       error = new_error;
@@ -327,9 +328,10 @@ SegmentFlow::PoseErrors SegmentFlow::ErrorsOf(const Model<double>& model, const 
 }
 
 // Far from the origin, where all gaps are rounding, nothing corrects them: supports whose heights
-// round apart would turn a face that rests on several of them, now to and now fro. Their derivative
-// is corrected (it is that of the gaps in the correction's equations, whatever their values). All
-// or none: one that alone is moved by what others are off by turns the face too.
+// differ by rounding would turn a face that rests on several of them, in changing directions. Their
+// derivative is corrected (it is that of the gaps in the correction's equations, whatever their
+// values). Either all contacts are corrected or none, because correcting a single one would turn
+// the face too.
 void SegmentFlow::LeaveRounding(const Segment& segment, SolvedNode* node) const {
   const auto is_far = [&](size_t i, double* left) {
     const ActiveContact& contact = segment.contacts[i];
@@ -356,7 +358,8 @@ bool SegmentFlow::CorrectPoses(const Model<double>& model, Segment* segment, std
     return true;
   }
   const bool once = joints && JointCorrectionOf(settings) == JointCorrection::kBaumgarte;
-  // What recovers may move another contact off its surface: then there is an error that stays.
+  // A body that recovers from penetration may move another contact off its surface; that error
+  // remains.
   bool recovers = false;
   for (const ActiveContact& contact : segment->contacts) {
     recovers = recovers || contact.law == ContactLaw::kRecovery;
@@ -370,20 +373,21 @@ bool SegmentFlow::CorrectPoses(const Model<double>& model, Segment* segment, std
     SolvedNode& node = segment->corrections[k];
     node.state = segment->after;
     node.time = segment->time + segment->length;
-    // What recovers from penetration does so by the first correction, and is held by the others.
+    // Contacts that recover from penetration move in the first correction; the other corrections
+    // hold them.
     AssembleCorrection(model, node.state, segment->contacts, segment->friction,
                        k == 0 ? settings.recovery_speed * segment->length : 0.0, &assembly_,
                        &node.problem);
     if (k == 0 && JointCorrectionOf(settings) == JointCorrection::kProjection &&
         DriftsFar(model, node.problem)) {
-      // So they do where links whip faster than dt resolves, and where the implicit stage has found
-      // another of its solutions than the one that the motion continues with.
+      // This happens where links move faster than dt resolves, and where the implicit stage has
+      // found a solution other than the one that continues the motion.
       *message = "joints drift by more than a tenth of their arms in one motion: dt is too large";
       return false;
     }
     LeaveRounding(*segment, &node);
     const PoseErrors errors = ErrorsOf(model, *segment, node);
-    // Newton's method squares the error; what is small and does not shrink any more is rounding.
+    // Newton's method squares the error; an error that is small and no longer falls is rounding.
     const bool shrinks = errors.share <= 0.1 * last;
     if (k > 0 && (once || errors.settled || (!shrinks && (recovers || errors.share <= 1.0)))) {
       break;
@@ -474,7 +478,7 @@ bool SegmentFlow::ProjectTwists(const Model<double>& model, Segment* segment,
 bool SegmentFlow::Project(const Model<double>& model, Impulses* impulses) {
   Impulses& projection = *impulses;
   AssembleImpulses(model, &assembly_, &projection);
-  // The same solve as a node's; only its members are kept elsewhere.
+  // The same solve as for a node, whose members are stored elsewhere here.
   SolvedNode node;
   std::swap(node.problem, projection.problem);
   std::swap(node.system, projection.system);
@@ -489,7 +493,7 @@ bool SegmentFlow::Project(const Model<double>& model, Impulses* impulses) {
 bool SegmentFlow::Run(const Model<double>& model, Segment* segment, std::string* message) {
   if (!Integrate(model, segment, message)) return false;
   if (CorrectPoses(model, segment, message)) return ProjectTwists(model, segment, message);
-  // Joints that no twist satisfies leave no poses either, and are what there is to say.
+  // If no twist satisfies the joints, no poses do either, and the message names these joints.
   std::string why;
   if (!ProjectTwists(model, segment, &why)) *message = why;
   return false;

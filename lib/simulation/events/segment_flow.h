@@ -37,7 +37,7 @@ struct NystromTableau {
   static const NystromTableau& Of(Integrator integrator);
 };
 
-/// x += factor · solved: 3 numbers a moving body to the poses or twists of all.
+/// x += factor · solved: adds 3 numbers for each moving body to the poses or twists of all bodies.
 template <typename T>
 void AddBodies(const ModelStructure& structure, const T& factor, const std::vector<T>& solved,
                std::vector<T>* x) {
@@ -48,7 +48,7 @@ void AddBodies(const ModelStructure& structure, const T& factor, const std::vect
   }
 }
 
-/// The twists of all bodies from those solved for.
+/// The twists of all bodies from the solved ones.
 template <typename T>
 void SpreadTwists(const ModelStructure& structure, const std::vector<T>& solved,
                   std::vector<T>* twist) {
@@ -57,7 +57,7 @@ void SpreadTwists(const ModelStructure& structure, const std::vector<T>& solved,
   }
 }
 
-/// The state at c τ of a motion of length τ from its stages' accelerations, 3 a moving body:
+/// The state at c τ of a motion of length τ from its stages' accelerations, 3 for each moving body:
 /// q + c τ v + τ² Σ â_j A_j and v + τ Σ a_j A_j over j < terms. `accelerations(j)` is a vector.
 template <typename T, typename Accelerations>
 void PlaceStage(const ModelStructure& structure, const State<T>& before, const T& tau, double c,
@@ -77,7 +77,7 @@ void PlaceStage(const ModelStructure& structure, const State<T>& before, const T
   }
 }
 
-/// What motions leaned on, since the start.
+/// Fallbacks of motions, counted since the start.
 struct FlowCounts {
   long whole_system = 0;   ///< condensed systems that were factorised as a whole instead
   long newton_stages = 0;  ///< implicit stages whose iteration does not contract
@@ -95,7 +95,7 @@ class SegmentFlow {
   bool Accelerate(const Model<double>& model, const Segment& segment, const State<double>& state,
                   double time, SolvedNode* node);
 
-  /// Twists onto the rows of an instant whose modes are given (SetUpProjection).
+  /// Projects twists onto the rows of an instant whose modes are given (SetUpProjection).
   bool Project(const Model<double>& model, Impulses* projection);
 
   const FlowCounts& counts() const { return counts_; }
@@ -120,8 +120,8 @@ class SegmentFlow {
   FlowCounts counts_;
 };
 
-/// Sets a segment's twist projection up at a state: its contacts without rebound, those that slide
-/// without friction (with it as a run starts: a twist that approaches there lands).
+/// Sets up a segment's twist projection at a state: contacts act without rebound, sliding ones
+/// without friction (with friction at the start of a run, where a contact that approaches lands).
 void SetUpProjection(const Segment& segment, const State<double>& state, Impulses* projection);
 
 /// "joint crank contradicts the others: no twist satisfies all".

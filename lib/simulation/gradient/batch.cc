@@ -63,7 +63,7 @@ class Row {
     return loss;
   }
 
-  // Derivatives of the loss with respect to the outputs, a row.
+  // Derivatives of the loss with respect to the outputs, as a row.
   RowMatrixXd Seed(const RowMatrixXd& states) const {
     RowMatrixXd seed = RowMatrixXd::Zero(1, states.cols());
     for (size_t i = 0; i < loss_outputs_.size(); ++i) {

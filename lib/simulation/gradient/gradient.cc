@@ -42,8 +42,8 @@ namespace {
 using internal::FailureOf;
 using internal::GradientProblem;
 
-// Empty, or one line: the first number of the scene that is not finite. What a file may not hold
-// can still be set by a program, an optimiser's step say.
+// Empty, or one line: the first number of the scene that is not finite. A program, for example an
+// optimiser, can set values that a file may not contain.
 std::string CheckNumbers(const GradientProblem& problem) {
   Scene scene = problem.scene;
   for (const SceneNumber<double>& number : EnumerateNumbers(&scene)) {
@@ -58,7 +58,7 @@ std::string CheckNumbers(const GradientProblem& problem) {
 // Derivatives of the losses with respect to the outputs (outputs x losses), given the outputs.
 using OutputSeed = std::function<MatrixX<double>(const VectorX<double>& values)>;
 
-// CPU time of this thread: others' work on the machine is not counted.
+// CPU time of this thread, which excludes other work on the machine.
 double Seconds() {
   timespec time{};
   clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
@@ -75,7 +75,7 @@ GradientProblem MakeProblem(const Scene& scene, const std::vector<ParameterPath>
   return problem;
 }
 
-// What the tape took; false, with a message, where that is more than its budget.
+// Reports the memory of the tape; false, with a message, where it exceeds the budget.
 bool ReportTape(const Checkpointing& checkpointing, const RolloutTape& tape,
                 GradientResult* result) {
   result->tape_bytes = tape.peak_bytes();
@@ -148,7 +148,8 @@ bool ByTangent(const GradientProblem& problem, DerivativeSide side, GradientResu
   return true;
 }
 
-// All methods but the adjoint: the whole Jacobian, which a loss is chained with.
+// All methods except the adjoint: they compute the whole Jacobian, with which the gradient of a
+// loss is multiplied.
 bool ByColumns(const GradientProblem& problem, const GradientOptions& options,
                GradientResult* result) {
   result->notes.clear();
@@ -226,7 +227,7 @@ std::string CheckSide(const GradientProblem& problem, const GradientOptions& opt
   return "";
 }
 
-// Notes what one-sided derivatives of fixed steps do not resolve.
+// Adds notes on what one-sided derivatives of fixed steps do not resolve.
 void JudgeSide(const GradientProblem& problem, const GradientOptions& options,
                GradientResult* result) {
   const Certificate& certificate = result->certificate;
@@ -264,7 +265,7 @@ GradientResult Differentiate(const GradientProblem& problem, const GradientOptio
   if (!result.message.empty()) {
     return result;
   }
-  // Event stepping needs the certificate to tell whether there are sides.
+  // Event stepping needs the certificate to find out whether the two sides differ.
   const bool sides = options.side != DerivativeSide::kBoth;
   if (sides) {
     result.certificate = CertificateOf(problem);

@@ -1,18 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// The derivative of a rollout's final state, or of a loss of it, with respect to parameters of the
-// scene, by any of five methods that must agree:
+// The derivative of a rollout's final state, or of a loss that depends on it, with respect to
+// parameters of the scene, by any of five methods that must agree:
 //
-//   adjoint            one reverse sweep, a column an output (rollout_adjoint.h)
-//   tangent            one forward sweep, a column a parameter (rollout_tangent.h)
+//   adjoint            one reverse sweep, a column for each output (rollout_adjoint.h)
+//   tangent            one forward sweep, a column for each parameter (rollout_tangent.h)
 //   jet_implicit       Jets in passes of their width, through K⁻¹ of each step
 //   jet                Jets through every operation of the interior point:
 //                      the independent reference
 //   finite_difference  central; at the end of a parameter's range one-sided,
 //                      (−3 f(p) + 4 f(p ± h) − f(p ± 2h)) / ±2h
 //
-// With auto, the default, the first or the second is taken, by their columns: MethodOf.
+// With auto, the default, the first or the second is used, whichever has fewer columns: MethodOf.
 //
 // A path that matches several numbers is one parameter that sets all of them: its derivative is
 // their sum.
@@ -41,28 +41,28 @@ enum class CertificatePass { kRun, kSkip };
 
 /// At a kink: one element of the generalised Jacobian (that of the modes found); or the derivative
 /// for growing parameters (kPlus), or for shrinking ones (kMinus: lim (f(p) − f(p − h)) / h), each
-/// parameter alone. One-sided: of the tangent alone, which auto then takes; with fixed steps exact
-/// (rollout_directional.h), with event stepping, at a kink, extrapolated from tangents beside it
-/// (gradient_sides.cc).
+/// parameter alone. Only the tangent has one-sided derivatives, so that auto then selects it. With
+/// fixed steps they are exact (rollout_directional.h); with event stepping, at a kink, they are
+/// extrapolated from tangents beside it (gradient_sides.cc).
 enum class DerivativeSide { kBoth, kPlus, kMinus };
 
 struct GradientOptions {
   GradientMethod method = GradientMethod::kAuto;
-  /// Of finite differences, in the parameter's unit; 0: 6e-6 max(|p|, the parameter's scale).
+  /// Step of finite differences, in the parameter's unit; 0: 6e-6 max(|p|, the parameter's scale).
   double step = 0.0;
   DerivativeSide side = DerivativeSide::kBoth;
   Factorisations factorisations = Factorisations::kKeep;  ///< of the adjoint
   Checkpointing checkpointing{};                          ///< of the adjoint
-  int repeat = 1;                                         ///< CPU times are the best of so many
+  int repeat = 1;                                         ///< CPU times are the best of this many
   CertificatePass certificate = CertificatePass::kRun;    ///< one more rollout, not timed
 };
 
 enum class Differentiated { kFinalState, kLoss };
 
-/// The method that is used: the one that the options name, or where they leave it to auto the one
-/// whose columns are fewer. A sweep is a rollout and, a column, a solve and a product a step, which
-/// cost about the same forwards and backwards; the adjoint's records cost another half rollout or
-/// less. So, first that applies:
+/// The method that is used: the one that the options name or, with auto, the one that has fewer
+/// columns. A sweep is a rollout and, for each column and step, a solve and a product, which cost
+/// about the same forwards and backwards; the adjoint's records cost another half rollout or less.
+/// The first rule that applies decides:
 ///   a one-sided derivative           tangent: no other method has it
 ///   the adjoint's memory is limited  adjoint: checkpoints, recomputed factorisations
 ///   a loss                           adjoint: one column
@@ -80,17 +80,17 @@ struct LossTerm {
 
 struct GradientResult {
   bool done = false;
-  GradientMethod method = GradientMethod::kAuto;  ///< that was used; kAuto before one was chosen
+  GradientMethod method = GradientMethod::kAuto;  ///< the one used; kAuto before one was chosen
   std::string message;                            ///< empty, or one line: what failed
   std::vector<std::string> outputs;  ///< body/x, y, angle, vx, vy, omega of each moving body
   VectorX<double> values;            ///< of the outputs, at the end
-  RowMatrixXd jacobian;              ///< outputs x parameters; of FinalStateJacobian alone
+  RowMatrixXd jacobian;              ///< outputs x parameters; only from FinalStateJacobian
   double loss = std::numeric_limits<double>::quiet_NaN();
-  VectorX<double> gradient;  ///< a parameter; of LossGradient alone
+  VectorX<double> gradient;  ///< by parameter; only from LossGradient
   double seconds =
       std::numeric_limits<double>::quiet_NaN();  ///< the method's own forward pass included
   double rollout_seconds = std::numeric_limits<double>::quiet_NaN();  ///< of a plain rollout
-  /// Both of each repeat, CPU time; a rollout is run before every repeat of the method.
+  /// Both times of each repeat, CPU time; a rollout is run before every repeat of the method.
   std::vector<double> all_seconds, all_rollout_seconds;
   /// One-sided differences, changes of modes between them, fallbacks, and open_joint.
   std::vector<std::string> notes;
@@ -104,11 +104,11 @@ struct GradientResult {
 
 /// Names of the outputs of a scene.
 std::vector<std::string> OutputNames(const ModelStructure& structure);
-/// Their places among the poses and twists of State, and so in [poses | twists | parameters].
+/// Their indices among the poses and twists of State, and so in [poses | twists | parameters].
 std::vector<int> OutputVariables(const ModelStructure& structure);
 
-/// The Jacobian of the final state. A rollout that is unsolved or diverges, settings that the
-/// engine lacks and Jets of which no width is built are told in `message`.
+/// The Jacobian of the final state. `message` reports a rollout that is unsolved or diverges,
+/// settings that the engine does not support, and Jets of which no width is built.
 GradientResult FinalStateJacobian(const Scene& scene, const std::vector<ParameterPath>& parameters,
                                   const GradientOptions& options);
 

@@ -10,7 +10,7 @@
 namespace tangible::internal {
 namespace {
 
-// A number that differs where the contacts or modes of two runs differ (FNV-1a).
+// A hash of the contacts and modes of a run (FNV-1a), to find out whether those of two runs differ.
 class Signature {
  public:
   void Add(const StepRecord& record, long step) {
@@ -45,7 +45,7 @@ class Differences {
   Differences(const GradientProblem& problem, GradientResult* result)
       : problem_(problem), result_(*result), stepper_(problem.model) {}
 
-  // The outputs with all numbers of a parameter moved by `shift`.
+  // Computes the outputs with all numbers of a parameter changed by `shift`.
   bool Evaluate(const ParameterPath& parameter, double shift, Sample* sample) {
     Scene scene = problem_.scene;
     const std::vector<SceneNumber<double>> numbers = EnumerateNumbers(&scene);
@@ -135,7 +135,8 @@ bool JacobianByDifferences(const GradientProblem& problem, double step, Gradient
     const ParameterPath& parameter = problem.parameters[k];
     double h =
         step > 0.0 ? step : kRelativeStep * std::max(std::abs(parameter.value), parameter.scale);
-    // Exactly representable, so that p + h and p − h are as far apart as is divided by.
+    // The value is exactly representable, so that the distance of p + h and p − h equals the
+    // divisor.
     const volatile double moved = parameter.value + h;
     h = moved - parameter.value;
     VectorX<double> column;

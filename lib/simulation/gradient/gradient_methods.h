@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// What the methods of gradient.h share; not for other users.
+// Types and functions that the methods of gradient.h share; not for other users.
 
 #include <functional>
 #include <memory>
@@ -28,7 +28,8 @@ std::string FailureOf(const GradientProblem& problem, const RolloutReport& repor
 
 /// Fills values and jacobian; false with a message where a rollout fails.
 bool JacobianByDifferences(const GradientProblem& problem, double step, GradientResult* result);
-/// By tangents beside the scene's parameters: event stepping, at a kink. Reads the certificate.
+/// Uses tangents at parameters beside those of the scene: for event stepping, at a kink. Reads the
+/// certificate.
 bool JacobianBySides(const GradientProblem& problem, DerivativeSide side, GradientResult* result);
 bool JacobianByJets(const GradientProblem& problem, JetRoute route, GradientResult* result);
 

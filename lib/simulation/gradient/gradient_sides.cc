@@ -8,9 +8,9 @@
 // that is the one-sided derivative (by the mean value theorem). Both are checked: the
 // extrapolations of first and second order must agree, and the values at p + τ must be those at p
 // and the integral of the derivative between. A square root (a gap that just closes) fails the
-// first, a jump (a flat landing) the second. Where they fail close to p they are tried again
-// farther away: what is thrown up by less than the touching tolerance is found to land late, by
-// √(2 tolerance / g), which counts where it then jams.
+// first check, a jump (a flat landing) the second. Where they fail close to p they are tried again
+// farther away: the landing of a body that rises by less than the touching tolerance is found late,
+// by √(2 tolerance / g), which matters where it then jams.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -23,7 +23,7 @@
 namespace tangible::internal {
 namespace {
 
-constexpr double kFarther = 8.0;  // each time, beyond the touching tolerance
+constexpr double kFarther = 8.0;  // factor of each further attempt
 constexpr int kMostWays = 3;
 
 struct Beside {
@@ -36,7 +36,8 @@ class OneSided {
   OneSided(const GradientProblem& problem, double sign, GradientResult* result)
       : problem_(problem), sign_(sign), result_(*result) {}
 
-  // The derivative by a parameter; false with a message where it has none from this side.
+  // The derivative with respect to a parameter; false with a message where there is none from this
+  // side.
   bool Column(size_t k, VectorX<double>* column) {
     const ParameterPath& parameter = problem_.parameters[k];
     const double first = kSideWay * std::max(std::abs(parameter.value), parameter.scale);
@@ -46,18 +47,18 @@ class OneSided {
         result_.message.clear();
         return true;
       }
-      // What there is to say is said of the nearest.
+      // The message of the nearest attempt is reported.
       message = i == 0 ? result_.message : message;
     }
     result_.message = message;
     return false;
   }
 
-  // What two orders of extrapolation differ by, of a column's largest entry.
+  // The difference between the two orders of extrapolation, relative to a column's largest entry.
   double apart() const { return apart_; }
 
  private:
-  // From p + τ, p + τ / 2, p + τ / 4 with τ = `times` the first way.
+  // Extrapolates from p + τ, p + τ / 2, p + τ / 4 with τ = `times` the first distance.
   bool Extrapolate(size_t k, double first_way, double times, VectorX<double>* column) {
     const ParameterPath& parameter = problem_.parameters[k];
     const double way = sign_ * times * first_way;

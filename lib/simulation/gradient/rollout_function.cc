@@ -530,7 +530,7 @@ bool RolloutWorker::JetPass(JetRoute route, Eigen::Index first, RowMatrixXd* jac
       SeededScene<Jet<N>>(scene_, f_.directions_,
                           static_cast<int>(std::min<Eigen::Index>(first, f_.num_parameters()))),
       f_.structure_, &model, &state);
-  // Beyond the parameters: initial states, and then controls.
+  // The columns after the parameters are initial states, and then controls.
   const auto seed = [&](Eigen::Index column, Jet<N>* value) {
     if (column >= first && column < first + N) value->v[column - first] += 1.0;
   };
@@ -589,7 +589,7 @@ void RolloutWorker::JacobianByJets(JetRoute route, RowMatrixXd* jacobian, Rollou
   }
 }
 
-// Central; where one side is refused, of second order on the other one.
+// Central differences; where one side is refused, one-sided ones of second order on the other side.
 void RolloutWorker::JacobianByDifferences(const RolloutInput& input, RowMatrixXd* jacobian,
                                           RolloutOutput* output) {
   const RolloutOutput base = Run(input);
@@ -654,7 +654,7 @@ void ForEachRollout(const RolloutFunction& function, long count, int threads,
     try {
       RolloutWorker worker(function);
       for (long i = next++; i < count; i = next++) work(&worker, i);
-    } catch (...) {  // the caller's thread says so
+    } catch (...) {  // reported by the caller's thread
       const std::lock_guard<std::mutex> lock(mutex);
       thrown = std::current_exception();
       next = count;

@@ -1,23 +1,23 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// A rollout as a pure function, with its products of derivatives, and many of them at once:
+// A rollout as a pure function, with products of its derivatives, and batches of rollouts:
 //
 //   f(p, x₀, u) = [x(t_k) for the recorded steps k]
 //
 //   p    parameters of the scene                                  (num_parameters)
 //   x₀   poses and twists of the moving bodies at the start: x, y, angle, vx, vy, omega of each,
 //        in the order of OutputNames; absent: the scene's own     (num_states)
-//   u    controls: forces, torques or efforts of joints that have a value of their own in each
+//   u    controls: forces, torques or efforts of joints that have a separate value in each
 //        step                                                     (steps x num_controls)
-//   f    a row a recorded step                                    (num_records x num_states)
+//   f    a row for each recorded step                             (num_records x num_states)
 //
 //   tangent  ḟ = ∂f/∂p ṗ + ∂f/∂x₀ ẋ₀ + ∂f/∂u u̇                    (rollout_tangent.h)
 //   adjoint  (p̄, x̄₀, ū) = (∂f/∂(p, x₀, u))ᵀ f̄                     (rollout_adjoint.h)
 //
-// Nothing is kept between calls but memory, so that calls nest, chain and run on several threads;
-// an evaluation has the same bits whatever ran before it, and a batch whatever the number of
-// threads.
+// Only memory is kept between calls, so that calls can be nested, chained and run on several
+// threads; an evaluation has the same bits whatever ran before it, and a batch whatever the number
+// of threads.
 
 #include <functional>
 #include <memory>
@@ -33,11 +33,11 @@ namespace tangible {
 
 struct RolloutInput {
   VectorX<double> parameters;
-  VectorX<double> state;  ///< empty: the scene's, as its parameters make it
+  VectorX<double> state;  ///< empty: that of the scene with its parameters
   RowMatrixXd controls;
 };
 
-/// One direction in the input, or the adjoint of one: members as those of RolloutInput; `state` is
+/// One direction in the input, or the adjoint of one, with the members of RolloutInput; `state` is
 /// filled in either case.
 using InputDirection = RolloutInput;
 
@@ -47,7 +47,7 @@ enum class RolloutStatus { kDone, kUnsolved, kDiverged, kRefused };
 const char* NameOf(RolloutStatus status);
 
 struct RolloutOutput {
-  /// kRefused: a parameter may not have that value; nothing was run.
+  /// kRefused: a parameter has a value that is not allowed; nothing was run.
   RolloutStatus status = RolloutStatus::kDone;
   std::string message;  ///< empty unless it failed: when, where, what
   RowMatrixXd states;   ///< rows of steps that were not reached are NaN
@@ -55,13 +55,13 @@ struct RolloutOutput {
   RolloutReport report;
 };
 
-/// What is computed; nothing of it changes with the input.
+/// The definition of the function, which does not change with the input.
 class RolloutFunction {
  public:
   /// Resolves paths. `records` are the steps whose states are returned, ascending, 0 the start and
   /// num_steps() the end; empty: the end. Returns empty or one line: a path that matches nothing, a
-  /// number that two parameters set, a control that is no force, torque or effort or comes from a
-  /// file, settings that the engine lacks, a step beyond the run.
+  /// number that two parameters set, a control that is not a force, torque or effort or comes from
+  /// a file, settings that the engine does not support, a step beyond the run.
   std::string Create(const Scene& scene, const std::vector<std::string>& parameters,
                      const std::vector<std::string>& controls, const std::vector<long>& records);
 
@@ -76,11 +76,11 @@ class RolloutFunction {
   std::vector<double> record_times() const;
   const std::vector<ParameterPath>& parameters() const { return parameters_; }
   const std::vector<ParameterPath>& controls() const { return controls_; }
-  /// Of the model: the controls' numbers, one control's after another's, and which control's each
-  /// is.
+  /// The controls' numbers in the model, those of one control after those of another, and the
+  /// control to which each belongs.
   const std::vector<int>& control_numbers() const { return control_numbers_; }
   const std::vector<int>& control_of_number() const { return control_of_number_; }
-  /// Of each number of a state: its pose or twist variable.
+  /// The pose or twist variable of each entry of a state.
   const std::vector<int>& output_variables() const { return outputs_; }
   /// The scene's own values: parameters, the initial state, and controls that are the same in all
   /// steps.
@@ -102,55 +102,58 @@ class RolloutFunction {
   std::vector<int> outputs_;  ///< pose and twist variables
 };
 
-/// Evaluates one function on one thread; keeps memory from call to call. The function outlives it.
+/// Evaluates one function on one thread; keeps memory from call to call. The function must outlive
+/// it.
 class RolloutWorker {
  public:
   explicit RolloutWorker(const RolloutFunction& function);
 
-  /// Called in each step of runs (not of sweeps back); what it throws ends the run.
+  /// Called in each step of runs (not of reverse sweeps); an exception that it throws ends the run.
   void SetInterrupt(std::function<void()> check) { interrupt_ = std::move(check); }
 
-  /// The input's sizes are right (CheckSizes).
+  /// Runs the rollout; the input's sizes must be right (CheckSizes).
   RolloutOutput Run(const RolloutInput& input);
   /// The same with products of derivatives along directions. `tangents[d]`: num_records x
   /// num_states.
   RolloutOutput Tangent(const RolloutInput& input, const std::vector<InputDirection>& directions,
                         std::vector<RowMatrixXd>* tangents);
-  /// Records a run, and then sweeps back as often as is asked for: one adjoint for each of
-  /// `bars` (num_records x num_states). Until the next call of any other member.
+  /// Record records a run; Adjoint may then be called repeatedly until the next call of any other
+  /// member, and returns one adjoint for each of `bars` (num_records x num_states).
   RolloutOutput Record(const RolloutInput& input);
-  /// Memory of what Record keeps, bytes.
+  /// Memory of the tape that Record keeps, bytes.
   size_t tape_bytes() const { return tape_.bytes(); }
   std::vector<InputDirection> Adjoint(const std::vector<RowMatrixXd>& bars);
   enum class Inputs { kParameters, kAll };
-  /// A row an output, num_records num_states in all; columns for parameters or, of all inputs, for
-  /// parameters, initial state, controls (step by step). Auto takes tangent or adjoint, whichever
-  /// needs fewer columns.
+  /// The Jacobian has a row for each output, num_records num_states in all; columns for parameters
+  /// or, if all inputs are asked for, for parameters, initial state, controls (step by step). Auto
+  /// selects tangent or adjoint, whichever needs fewer columns.
   RolloutOutput Jacobian(const RolloutInput& input, GradientMethod method, Inputs inputs,
                          RowMatrixXd* jacobian, GradientMethod* used);
-  /// What the end of the last run says of joints, coordinates, energy (run_warnings.h).
+  /// Warnings about joints, coordinates and energy at the end of the last run (run_warnings.h).
   std::vector<std::string> Warnings(const RolloutReport& report, const State<double>& final) const {
     return RunWarnings(model_, initial_).Finish(model_, report, final);
   }
-  /// Of the derivatives with respect to parameters, controls and, where the input has one, the
-  /// initial state; empty where the input is refused.
+  /// The certificate of the derivatives with respect to parameters, controls and, where the input
+  /// has one, the initial state; empty where the input is refused.
   Certificate Certify(const RolloutInput& input);
 
  private:
-  /// False and a refused output where a value is not allowed.
+  /// Sets the input; false and a refused output where a value is not allowed.
   bool Set(const RolloutInput& input, RolloutOutput* output);
   bool SetParameters(const VectorX<double>& values, RolloutOutput* output);
   /// Runs with an observer that keeps the recorded states; `run` is a rollout of some kind.
   using Runner = std::function<RolloutReport(ControlledModel<double>*, const StateObserver&)>;
   void RunAs(const Runner& run, RolloutOutput* output);
   const Eigen::SparseMatrix<double>& ParameterJacobian();
-  /// Directions of [poses | twists | parameters]: of parameters and initial states, a column each.
+  /// Directions of [poses | twists | parameters] from those of parameters and initial states, one
+  /// in each column.
   RowMatrixXd VariableDirections(const RowMatrixXd& parameters, const RowMatrixXd& states);
   /// Runs with tangents; `keep` gets the record's index and all columns' derivatives.
   void RunTangent(const ControlDirections& directions, RowMatrixXd w_dot,
                   const std::function<void(int record, const RowMatrixXd& w_dot)>& keep,
                   RolloutOutput* output);
-  /// Sweeps back over the tape; `seed(record, row, ·)` are a state's derivatives of each column.
+  /// Runs the reverse sweep over the tape; `seed(record, row, ·)` gives a state's derivatives for
+  /// each column.
   using Bars = std::function<void(int record, RowMatrixXd* bars)>;
   RowMatrixXd Sweep(int columns, const Bars& bars, const RolloutTape::ControlSink& sink);
   RowMatrixXd ParameterBars(const RowMatrixXd& w_bar);
@@ -165,7 +168,7 @@ class RolloutWorker {
 
   const RolloutFunction& f_;
   Scene scene_;
-  VectorX<double> parameters_;  ///< those that the scene has; empty: half set
+  VectorX<double> parameters_;  ///< those set in the scene; empty: set incompletely
   Model<double> model_;
   State<double> scene_state_, initial_;
   Controls controls_;
@@ -176,28 +179,29 @@ class RolloutWorker {
   std::function<void()> interrupt_;
 };
 
-/// Runs `work(worker, i)` for i in [0, count) on `threads` threads (0: one a core), the caller's
-/// among them, each with a worker of its own. What is thrown ends the work and is passed on.
+/// Runs `work(worker, i)` for i in [0, count) on `threads` threads (0: one for each core) including
+/// the caller's, each with a separate worker. An exception ends the work and is passed on.
 void ForEachRollout(const RolloutFunction& function, long count, int threads,
                     const std::function<void(RolloutWorker* worker, long i)>& work);
 
-/// Many evaluations of one function at once: a row an input.
+/// Many evaluations of one function at once: a row for each input.
 class RolloutBatch {
  public:
-  /// `threads` 0: one a core. The function outlives it.
+  /// `threads` 0: one for each core. The function must outlive this object.
   RolloutBatch(const RolloutFunction& function, int threads)
       : function_(function), threads_(threads) {}
   void SetInterrupt(std::function<void()> check) { interrupt_ = std::move(check); }
 
   std::vector<RolloutOutput> Run(const std::vector<RolloutInput>& inputs) const;
-  /// One direction a row.
+  /// One direction for each row.
   std::vector<RolloutOutput> Tangent(const std::vector<RolloutInput>& inputs,
                                      const std::vector<InputDirection>& directions,
                                      std::vector<RowMatrixXd>* tangents) const;
-  /// Runs, and keeps tapes of the first rows as far as `kTapeBudget` goes; the others are run again
-  /// by Adjoint, which may be called often. A further Record replaces them and uses their memory.
+  /// Runs all rows, and keeps tapes of as many first rows as fit into `kTapeBudget`; the others are
+  /// run again by Adjoint, which may be called repeatedly. A further Record replaces the tapes and
+  /// reuses their memory.
   std::vector<RolloutOutput> Record(std::vector<RolloutInput> inputs);
-  /// One bar a row; of a row that failed all derivatives are NaN.
+  /// One bar for each row; for a row that failed all derivatives are NaN.
   std::vector<InputDirection> Adjoint(const std::vector<RowMatrixXd>& bars);
   std::vector<Certificate> Certify(const std::vector<RolloutInput>& inputs) const;
 

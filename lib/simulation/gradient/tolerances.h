@@ -1,25 +1,25 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// The tolerances of the methods of gradients: of what each is a share, then why.
-// lib/simulation/README.md has a table.
+// The tolerances of the methods of gradients. Each comment names the quantity of which the
+// tolerance is a fraction, then the reason. lib/simulation/README.md has the table.
 
 namespace tangible {
 
-/// Of the parameter (or state, or control), at least its scale: of central differences: cube root
-/// of ε, where the errors of truncation and rounding balance.
+/// Of the parameter (or state, or control), at least its scale: the step of central differences,
+/// the cube root of ε, where the errors of truncation and rounding balance.
 inline constexpr double kRelativeStep = 6e-6;
-/// Of the parameter, at least its scale: first way of a one-sided derivative: beyond what contacts
-/// hold to, and small against the next kink.
+/// Of the parameter, at least its scale: the first distance τ of a one-sided derivative: larger
+/// than the tolerance of contacts, and small compared with the distance to the next kink.
 inline constexpr double kSideWay = 1e-5;
-/// Of the largest entry: what both orders of extrapolation may differ by.
+/// Of the largest entry: the allowed difference between the two orders of extrapolation.
 inline constexpr double kSidesConverged = 1e-6;
-/// Of the change over the first way: what the integral of the derivative may miss: a touch at no
-/// speed is located to 1e-7 m/s.
+/// Of the change over the first distance: the allowed error of the integral of the derivative,
+/// because a touch at zero speed is located to 1e-7 m/s.
 inline constexpr double kContinuous = 0.05;
-/// Of the values: rounding, on top of the above.
+/// Of the values: rounding, added to the above.
 inline constexpr double kValueRounding = 1e-11;
-/// Of the values over the parameter's size: derivatives below it are 0.
+/// Of the values over the parameter's size: smaller derivatives count as 0.
 inline constexpr double kNoDerivative = 1e-9;
 
 }  // namespace tangible

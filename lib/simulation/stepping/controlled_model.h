@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// Controls: parameters of a model that take a value of their own in each step, such as a motor's
-// torque or a push.
+// Controls: parameters of a model that have a separate value in each step, such as a motor's torque
+// or a push.
 //
 //   parameter numbers[j] of the model = values(k, j)     during step k, [t_k, t_k+1)
 //
@@ -20,7 +20,7 @@ namespace tangible {
 template <typename T>
 struct BasicControls {
   std::vector<int> numbers;  ///< places in Model::parameters
-  /// A row a step, a column a number; steps beyond the last row keep that.
+  /// A row for each step, a column for each number; steps after the last row use the last row.
   Eigen::Matrix<T, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> values;
 };
 using Controls = BasicControls<double>;
@@ -29,13 +29,13 @@ using Controls = BasicControls<double>;
 template <typename T>
 class ControlledModel {
  public:
-  /// The same in all steps. The model outlives this.
+  /// A model that is the same in all steps; it must outlive this object.
   explicit ControlledModel(const Model<T>& model) : model_(&model) {}
   ControlledModel(const Model<T>& model, const BasicControls<T>& controls)
       : model_(&model), controls_(&controls), own_(model) {}
 
   bool is_controlled() const { return controls_ != nullptr; }
-  /// Null where it is not controlled.
+  /// Null where the model has no controls.
   const BasicControls<T>* controls() const { return controls_; }
   const ModelStructure& structure() const { return *model_->structure; }
   /// The model in step k, until the next call.

@@ -11,7 +11,7 @@ namespace tangible {
 void CoordinateWatch::Look(const State<double>& state, double time, int a, int b) {
   const double size = lengths_.Size(a, b);
   const double rounding = lengths_.Rounding(state, a, b);
-  // What is not finite is said by the step itself.
+  // Values that are not finite are reported by the step itself.
   if (!(rounding > rounding_ * size) || size == 0.0 || !std::isfinite(rounding)) return;
   rounding_ = rounding / size;
   size_ = size;

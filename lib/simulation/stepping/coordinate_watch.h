@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// Whether a run's coordinates are too large for its bodies. Of two bodies that may touch or are
+// Whether a run's coordinates are too large for its bodies. For two bodies that may touch or are
 // joined
 //
 //   ρ / r      the rounding of their coordinates over the size of the smaller (lengths.h)
 //
-// is the smallest share of a body that a gap or a joint's error can tell. What must be told apart
-// (a corner from the one beside it, a seam from a step) is of 1e-6 of a body; contacts are rounding
-// where ρ / r comes near to that, and a run goes on with numbers that look like any others.
+// is the smallest fraction of a body that a gap or a joint's error can resolve. Details that must
+// be distinguished (a corner from the one beside it, a seam from a step) have a size of 1e-6 of a
+// body; contacts are determined by rounding where ρ / r approaches that, although the results look
+// plausible.
 
 #include <string>
 #include <vector>
@@ -22,13 +23,13 @@ class CoordinateWatch {
  public:
   explicit CoordinateWatch(const Model<double>& model) : lengths_(model) {}
 
-  /// Looks at the pairs of a step's contacts and limits, which touch or are within reach.
+  /// Examines the pairs of a step's contacts and limits, which touch or are within reach.
   void LookAtContacts(const State<double>& state, double time,
                       const std::vector<ActiveContact>& contacts);
-  /// Looks at the pairs that joints hold together.
+  /// Examines the pairs that joints connect.
   void LookAtJoints(const Model<double>& model, const State<double>& state, double time);
 
-  /// Looks at each body that moves, whether or not it may touch another: at its own places.
+  /// Examines each moving body by itself, whether or not it may touch another.
   void LookAtBodies(const Model<double>& model, const State<double>& state, double time);
 
   /// The largest ρ / r so far, 0 where there was no pair.
@@ -43,7 +44,7 @@ class CoordinateWatch {
 
   Lengths lengths_;
   double rounding_ = 0.0;
-  // There: the body whose coordinate is the largest, and the pair's size.
+  // At that largest ratio: the body whose coordinate is the largest, and the pair's size.
   int body_ = -1;
   double size_ = 0.0;
   double distance_ = 0.0;  ///< m from the origin

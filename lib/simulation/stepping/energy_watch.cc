@@ -10,7 +10,8 @@
 namespace tangible {
 namespace {
 
-// Far beyond what impacts by Newton's law with friction, corrections of drift and coarse steps add.
+// Far more than the energy that impacts by Newton's law with friction, corrections of drift and
+// coarse steps add.
 constexpr double kExploded = 1e4;
 
 bool IsDriven(const Model<double>& model, const State<double>& state) {
@@ -41,8 +42,8 @@ EnergyWatch::EnergyWatch(const Model<double>& model, const State<double>& initia
   }
   const double kinetic = KineticEnergy(model, initial);
   start_ = kinetic + PotentialEnergy(model, initial);
-  // What is at hand: motion, springs, the fall over the places of bodies, recovery from
-  // penetration.
+  // The energy that is available: motion, springs, the fall over the range of the bodies'
+  // positions, recovery from penetration.
   const double g = std::hypot(model.parameters[kGravityX], model.parameters[kGravityY]);
   double scale = kinetic;
   for (const int body : s.moving) {

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// Whether a run has exploded: an explicit step amplifies what is too stiff for it (a spring with
-// ω h > 2, a damper in event steps) by a factor a step, until numbers overflow. What nothing drives
-// keeps its energy or loses some; ten thousand times what it can have is of no motion.
+// Whether a run has exploded: an explicit step amplifies motions that are too stiff for it (a
+// spring with ω h > 2, a damper in event steps) by a constant factor in each step, until numbers
+// overflow. A scene that nothing drives keeps its energy or loses some, so that ten thousand times
+// its greatest possible energy cannot belong to a real motion.
 
 #include "tangible/simulation/stepping/step.h"
 
@@ -11,12 +12,12 @@ namespace tangible {
 
 class EnergyWatch {
  public:
-  /// Watches nothing.
+  /// A watch that examines nothing.
   EnergyWatch() = default;
   EnergyWatch(const Model<double>& model, const State<double>& initial);
   /// Empty, or what has happened: "the energy grew from 1 J to 1e+09 J, though nothing drives the
-  /// scene: dt is too large". Always empty where something does (forces, efforts, kinematic
-  /// bodies), or where the energy at the start is not finite.
+  /// scene: dt is too large". Always empty where something drives the scene (forces, efforts,
+  /// kinematic bodies), or where the energy at the start is not finite.
   std::string Exploded(const Model<double>& model, const State<double>& state) const;
 
  private:

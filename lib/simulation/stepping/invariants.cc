@@ -14,9 +14,9 @@
 namespace tangible {
 namespace {
 
-// A box that meets those of all bodies to which the body in it has a negative gap. The gap to
-// a face that a corner stands beyond the end of counts too, and is negative a little before the
-// boxes meet.
+// A box that meets the boxes of all bodies to which the body in it has a negative gap. The gap
+// between a face and a corner slightly beyond its end counts too, and is negative shortly before
+// the boxes meet.
 Aabb BoxOfTouching(const Aabb& box) {
   double grow = 0.0;
   for (const double length : {box.max_x - box.min_x, box.max_y - box.min_y}) {

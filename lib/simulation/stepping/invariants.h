@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// What a motion should keep: energy, momentum, gaps, groups of bodies.
+// Quantities that characterise a motion: energy, momentum, gaps, groups of bodies.
 //
 //   kinetic     T = Σ ½ m (vx² + vy²) + ½ I ω²
 //   potential   U = −Σ m g·x + Σ_springs ½ k (ℓ − L0)² + Σ_joints ½ k (coordinate − rest)²
 //   momentum    (Σ m vx, Σ m vy, Σ m (x vy − y vx) + I ω), angular about the world's origin
 //
-// Sums over the bodies that move by forces. Joint drift is JointDrift of joint_projection.h.
+// The sums include the bodies that move under forces. Joint drift is JointDrift of
+// joint_projection.h.
 
 #include <utility>
 #include <vector>
@@ -23,12 +24,12 @@ double PotentialEnergy(const Model<double>& model, const State<double>& state);
 /// N s, N s, N m s.
 Vector3<double> Momentum(const Model<double>& model, const State<double>& state);
 
-/// How deep bodies that may collide are in each other: the largest −gap of all pairs, m; 0 where no
-/// pair overlaps. Pairs that are apart contribute nothing, so only those are looked at whose boxes
-/// meet: O(n log n) for n bodies that each touch a few.
+/// The depth of penetration of bodies that may collide: the largest −gap of all pairs, m; 0 where
+/// no pair overlaps. Pairs that are apart contribute nothing, so that only those whose boxes meet
+/// are examined: O(n log n) for n bodies that each touch a few.
 double DeepestPenetration(const Model<double>& model, const State<double>& state);
 
-/// Adds the pairs of bodies that a step's closed contacts and joint limits hold together.
+/// Adds the pairs of bodies that a step's closed contacts and joint limits connect.
 void AddClosedContacts(const StepRecord& record, std::vector<std::pair<int, int>>* pairs);
 
 /// Groups of moving bodies that joints, springs, dampers and the closed contacts connect; a body by

@@ -15,7 +15,7 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-// m; infinite for what does not move.
+// The size of a body, m; infinite for bodies that do not move.
 double SizeOf(const Model<double>& model, int body) {
   const BodyIndex& index = model.structure->bodies[body];
   if (index.block < 0) return kInfinity;

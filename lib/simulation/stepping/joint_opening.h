@@ -5,8 +5,8 @@
 // (dynamics/joint.h) grows with the run where nothing corrects it: `none` is the default with fixed
 // stepping.
 //
-//   opening = |C| / size       of what is in m; of an angle |C| itself, in rad: by that share of
-//                              its size the body's far end is off
+//   opening = |C| / size       for errors in m; for an angle |C| itself, in rad: the body's far end
+//                              is displaced by that fraction of its size
 //   size                       of the smaller of the joint's moving bodies: twice its shape's
 //                              largest distance from the centre of mass; without a shape the length
 //                              of a uniform rod of its mass and inertia, √(12 I / m)
@@ -24,7 +24,8 @@ class JointWatch {
   explicit JointWatch(const Model<double>& model);
   bool watches() const { return !sizes_.empty(); }
 
-  /// Looks at a state of the run; as dear as the joints' rows. What is not finite is passed over.
+  /// Examines a state of the run, at the cost of the joints' rows. Values that are not finite are
+  /// ignored.
   void Look(const Model<double>& model, const State<double>& state, double time);
 
   /// The largest opening so far, 0 without one.
@@ -34,7 +35,7 @@ class JointWatch {
   std::string Message(const Model<double>& model) const;
 
  private:
-  std::vector<double> sizes_;  ///< a joint, m
+  std::vector<double> sizes_;  ///< for each joint, m
   std::vector<int> bodies_;    ///< whose size that is
   double opening_ = 0.0;
   double error_ = 0.0;  ///< |C| there, m or rad
@@ -43,7 +44,7 @@ class JointWatch {
   bool turned_ = false;  ///< whether that is an angle
 };
 
-/// The message of a single state, that of a run's end say.
+/// The message for a single state, for example that at the end of a run.
 std::string OpenJointOf(const Model<double>& model, const State<double>& state, double time);
 
 }  // namespace tangible

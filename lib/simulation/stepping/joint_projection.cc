@@ -9,7 +9,7 @@
 namespace tangible {
 namespace {
 
-// Of each column, x row-major.
+// Squared norm of each column; x is row-major.
 std::vector<double> SquaredNorms(const std::vector<double>& x, int columns) {
   std::vector<double> sums(columns, 0.0);
   for (size_t i = 0; i < x.size(); ++i) {
@@ -63,7 +63,7 @@ int JointProjection::worst_joint() const {
   return worst == iterate_.rows.end() ? -1 : static_cast<int>(worst - iterate_.rows.begin());
 }
 
-// Entries of ∂(R1, R2)/∂w at fixed q⁺, μ:
+// Visits the entries of ∂(R1, R2)/∂w at fixed q⁺, μ:
 //   R1 = M (q⁺ − q̃) − A(q⁺)ᵀ μ,   R2 = C(q⁺), of prescribed poses and numbers.
 template <typename Sink>
 void JointProjection::Visit(const Model<double>& model, const Sink& sink) {
@@ -123,8 +123,8 @@ void JointProjection::Visit(const Model<double>& model, const Sink& sink) {
   }
 }
 
-// x := K⁻¹ x; refined where the factorised matrix was shifted or regularised, each column for as
-// long as its residual falls.
+// x := K⁻¹ x, refined where the factorised matrix was shifted or regularised; each column is
+// refined as long as its residual falls.
 void JointProjection::SolveRefined(const Model<double>& model, std::vector<double>* x,
                                    int columns) {
   FactorProjection(model, &iterate_);
@@ -198,10 +198,12 @@ void JointProjection::ProjectUnrolled(const Model<T>& model, const std::vector<d
   ProjectionIterate<T> iterate;
   iterate.from = *state;
   iterate.at = *state;
-  // Derivatives converge one step behind values: two more steps after these have.
+  // Derivatives converge one step later than values: two more steps follow after convergence of the
+  // values.
   constexpr int kExtra = 2;
   if (!IterateProjection(model, kExtra, &iterate)) {
-    // The way to the minimum has no part in its derivatives: it ends where Newton's method holds.
+    // The path to the minimum does not enter the derivatives: it ends where Newton's method
+    // converges.
     Model<double> values{model.structure, {}};
     for (const T& number : model.parameters) {
       values.parameters.push_back(number.a);

@@ -6,9 +6,9 @@
 //
 //   M (q⁺ − q̃) = A(q⁺)ᵀ μ,   C(q⁺) = 0,   A = ∂C/∂q
 //
-// The directions A(q⁺) are those of the solution, not of q̃: with directions frozen at q̃ there is no
-// solution where the drift is large. The matrix of projection_newton.h's last iterate is the
-// derivative's.
+// The directions A(q⁺) are those at the solution, not at q̃: with directions frozen at q̃ there is
+// no solution where the drift is large. The derivative uses the matrix of the last iterate of
+// projection_newton.h.
 
 #include <vector>
 
@@ -25,16 +25,16 @@ class JointProjection {
   bool Project(const Model<double>& model, const std::vector<double>& start, State<double>* state);
   /// Largest |C| after the last projection, m or rad.
   double error() const { return iterate_.error; }
-  /// How many steps of it were not Newton's.
+  /// How many of its steps were not Newton steps.
   int damped_steps() const { return iterate_.damped_steps; }
-  /// The joint of that error; −1 without joints.
+  /// The joint with that error; −1 without joints.
   int worst_joint() const;
 
   /// Tangent at the last projection: w_dot (poses of q̃, twists, numbers) has its poses of moving
   /// bodies replaced by those of q⁺. Row-major, `columns` columns.
   void Tangent(const Model<double>& model, double* w_dot, int columns);
-  /// Adjoint: w_bar's poses of moving bodies are those of q⁺ on entry, of q̃ on return; the rest is
-  /// added to.
+  /// Adjoint: w_bar's poses of moving bodies are those of q⁺ on entry, of q̃ on return; the other
+  /// entries are added to.
   void Adjoint(const Model<double>& model, double* w_bar, int columns);
 
   /// The unrolled iteration in Jets: the same steps in T, and more until derivatives, which lag

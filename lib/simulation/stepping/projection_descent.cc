@@ -12,7 +12,7 @@ namespace {
 constexpr int kMostSteps = 500;
 constexpr int kStepsBetween = 5;  // trials of Newton's method
 constexpr int kMostOntoJoints = 12;
-constexpr double kFalls = 0.7;  // of the error in a step onto the joints
+constexpr double kFalls = 0.7;  // least reduction of the error in a step onto the joints
 
 // ½|q − q̃|²_M.
 double Distance(const Model<double>& model, const ProjectionIterate<double>& p) {
@@ -39,7 +39,7 @@ void Move(const Model<double>& model, const std::vector<double>& pose, double fr
   }
 }
 
-// By the nearest poses on the joints' tangents, again and again.
+// Moves repeatedly to the nearest poses on the joints' tangents.
 bool GoOntoJoints(const Model<double>& model, ProjectionIterate<double>* p) {
   const ModelStructure& s = *model.structure;
   double last = HUGE_VAL;

@@ -12,7 +12,7 @@ namespace tangible {
 namespace {
 
 // Newton converges quadratically, in 2 to 3 steps in the median and 11 at a drift of two lengths of
-// a link; more mean that the joints cannot hold.
+// a link; more steps mean that the joints cannot be satisfied.
 constexpr int kMaxIterations = 60;
 
 template <typename T>
@@ -34,7 +34,7 @@ double LargestError(const std::vector<JointRows<T>>& rows) {
   return largest;
 }
 
-// Whether all joints hold to a tolerance (m or rad), as far as rounding lets them.
+// Whether all joints are satisfied to a tolerance (m or rad), plus rounding.
 template <typename T>
 bool Hold(const Model<T>& model, const State<T>& state, const std::vector<JointRows<T>>& rows,
           double error, double tolerance) {
@@ -57,7 +57,8 @@ double Determinant(const double* w) {
          w[2] * (w[3] * w[7] - w[4] * w[6]);
 }
 
-// Each joint with its moving bodies, and these with each other where its curvature couples them.
+// The edges of each joint with its moving bodies, and of these with each other where its curvature
+// couples them.
 void JointEdges(const ModelStructure& structure, std::vector<std::pair<int, int>>* edges) {
   edges->clear();
   int block = structure.num_blocks();
@@ -82,13 +83,15 @@ const T& MassOf(const Model<T>& model, int body, int i) {
   return model.parameters[i < 2 ? index.mass : index.inertia];
 }
 
-// Of a matrix of 3 x 3: by Sylvester's criterion, its determinant above a bound.
+// Whether a matrix of 3 x 3 is positive definite by Sylvester's criterion, with its determinant
+// above a bound.
 bool IsPositive(const double* w, double least) {
   const double minor = w[0] * w[4] - w[1] * w[3];
   return w[0] > 0.0 && minor > 0.0 && Determinant(w) > least;
 }
 
-// The weight on the matrix's diagonal; that of W between bodies comes with their joint.
+// Adds the weight to the matrix's diagonal; the blocks of W between bodies are added with their
+// joint.
 template <typename T>
 void AddBodies(const Model<T>& model, ProjectionWeight weight, ProjectionIterate<T>* p) {
   const ModelStructure& s = *model.structure;
@@ -135,7 +138,8 @@ void AddBodies(const Model<T>& model, ProjectionWeight weight, ProjectionIterate
   }
 }
 
-// The matrix (2) with a weight, factorised; but for that of the masses after EvaluateCurvatures.
+// Factorises the matrix (2) with a weight; except for the weight M, EvaluateCurvatures must have
+// been called.
 template <typename T>
 bool FactorMatrix(const Model<T>& model, ProjectionWeight weight, ProjectionIterate<T>* p) {
   const ModelStructure& s = *model.structure;
@@ -161,7 +165,7 @@ bool FactorMatrix(const Model<T>& model, ProjectionWeight weight, ProjectionIter
           lu.FirstSecond(edge)[3 * i + r] = -row[r][i];
         }
         if (s.joint_loops) {
-          // Newton's iteration absorbs it.
+          // Newton's iteration compensates for this term.
           diagonal[4 * r] += kContactRegularisation / ValueOf(MassOf(model, body, 0));
         }
       }
@@ -344,7 +348,7 @@ bool ResumeProjection(const Model<T>& model, int most, int extra, ProjectionIter
     if (fraction < 1.0 || !small || !Hold(model, p->at, p->rows, p->error, tolerance)) {
       continue;
     }
-    if (done >= extra * (p->shifted ? 3 : 1)) {  // a shifted matrix gains but three digits a step
+    if (done >= extra * (p->shifted ? 3 : 1)) {  // shifted: only three digits in a step
       return true;
     }
     ++done;

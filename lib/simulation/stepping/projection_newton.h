@@ -11,8 +11,8 @@
 //
 // A step that does not lower the merit ½|q − q̃|²_M + ν |C|₁ is replaced by one with W = M, halved
 // until it does. W may be indefinite where the drift is of the order of a link's inertia over its
-// arm; a body's block of it that is nearly singular is shifted before the factorisation, which
-// costs convergence, not accuracy.
+// arm; a nearly singular block of a body is shifted before the factorisation, which slows
+// convergence, but does not reduce accuracy.
 
 #include <algorithm>
 #include <cmath>
@@ -28,7 +28,7 @@ namespace tangible {
 template <typename T>
 struct ProjectionIterate {
   State<T> from, at, trial;    ///< q̃, q, and q + a step
-  std::vector<T> multipliers;  ///< μ, three a joint
+  std::vector<T> multipliers;  ///< μ, three for each joint
   std::vector<JointRows<T>> rows, trial_rows;
   std::vector<JointCurvature<T>> curvature;
   std::vector<std::pair<int, int>> edges;
@@ -36,7 +36,7 @@ struct ProjectionIterate {
   std::vector<T> rhs;
   bool shifted = false;  ///< the factorised matrix is not K itself
   double error = 0.0;    ///< largest |C| at q
-  int damped_steps = 0;  ///< with W = M, as Newton's did not lower the merit
+  int damped_steps = 0;  ///< with W = M, because Newton's step did not lower the merit
 };
 
 /// Newton from `at`, which equals `from` on entry; then `extra` more steps, for the derivatives of
@@ -45,12 +45,13 @@ struct ProjectionIterate {
 template <typename T>
 bool IterateProjection(const Model<T>& model, int extra, ProjectionIterate<T>* iterate);
 
-/// The same from `at` and the multipliers as they are after one, with at most `most` steps.
+/// The same, continued from `at` and the multipliers of an earlier iteration, with at most `most`
+/// steps.
 template <typename T>
 bool ResumeProjection(const Model<T>& model, int most, int extra, ProjectionIterate<T>* iterate);
 
-/// What stands for W in (2): itself; M; or W without what couples bodies, and M where a body's
-/// block of that is not positive definite.
+/// The matrix used as W in (2): W itself; M; or W without the coupling of bodies, with M where the
+/// block of a body is not positive definite.
 enum class ProjectionWeight { kExact, kMass, kConvex };
 
 /// Factorises (2) at the iterate, or where `shifted` becomes true a matrix near it; false where it
@@ -61,13 +62,13 @@ bool FactorProjection(const Model<double>& model, ProjectionIterate<double>* ite
 /// Sets rows and error of the iterate's poses.
 void EvaluateProjection(const Model<double>& model, ProjectionIterate<double>* iterate);
 
-/// After that: whether every joint's error is within `tolerance` (m or rad), and what its
-/// coordinates round to far from the origin.
+/// To be called after that: whether every joint's error is within `tolerance` (m or rad) plus the
+/// rounding of its coordinates, which matters far from the origin.
 bool JointsHold(const Model<double>& model, const ProjectionIterate<double>& iterate,
                 double tolerance);
 
-/// After both of these: rhs becomes the step of poses (three a moving body) and multipliers;
-/// returns its size in radii of gyration.
+/// To be called after both of these: rhs becomes the step of poses (three for each moving body) and
+/// multipliers; returns its size in radii of gyration.
 double SolveProjectionStep(const Model<double>& model, ProjectionIterate<double>* iterate);
 
 /// y −= K x, row-major with `columns` columns, after FactorProjection.

@@ -12,7 +12,7 @@
 namespace tangible {
 namespace {
 
-// A step that was done, and whether the run has exploded by it. Not every one is looked at.
+// Adds to a step's report whether the run has exploded. Not every step is examined.
 StepReport Watched(const EnergyWatch& watch, const Model<double>& model, const State<double>& state,
                    long k, long steps, StepReport step) {
   constexpr long kEvery = 8;
@@ -175,7 +175,7 @@ RolloutReport RolloutJets(ControlledModel<T>* model, const State<T>& initial, Je
                        ": different branch: the unrolled solver found another solution";
       break;
     }
-    // Rounding must not accumulate into other modes than the double run's.
+    // Rounding must not accumulate until the modes differ from those of the run in double.
     SetValues(state, &jets);
     ++report.steps;
     report.time = StepTime(settings, k + 1);

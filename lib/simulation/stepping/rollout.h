@@ -13,7 +13,7 @@
 
 namespace tangible {
 
-/// What happened in a run: sums and extremes of the steps' reports.
+/// The report of a run: sums and extremes of the steps' reports.
 struct RolloutReport {
   StepStatus status = StepStatus::kDone;
   std::string message;   ///< empty unless it failed: when, where, what
@@ -59,11 +59,11 @@ using StateObserver =
 RolloutReport Rollout(const Model<double>& model, const State<double>& initial,
                       const StateObserver& observer, State<double>* final);
 
-/// The same with a stepper of the caller's, which keeps its memory from run to run; its guess is
-/// cleared first.
+/// The same with the caller's stepper, which keeps its memory from run to run; its guess is cleared
+/// first.
 RolloutReport Rollout(const Model<double>& model, const State<double>& initial,
                       const StateObserver& observer, Stepper* stepper, State<double>* final);
-/// The same of a model with controls.
+/// The same for a model with controls.
 RolloutReport Rollout(ControlledModel<double>* model, const State<double>& initial,
                       const StateObserver& observer, Stepper* stepper, State<double>* final);
 
@@ -71,9 +71,9 @@ template <typename T>
 using JetObserver = std::function<void(long k, double t, const State<T>& state)>;
 
 /// A rollout in Jets beside one in double, which makes the discrete choices. `fallbacks` counts
-/// unrolled steps in which the interior point failed and the implicit derivative was taken; values
-/// that differ from the double step's by more than kBranchTolerance (a different branch) fail the
-/// rollout with a message.
+/// unrolled steps in which the interior point failed and the implicit derivative was used instead;
+/// values that differ from the double step's by more than kBranchTolerance (a different branch)
+/// fail the rollout with a message.
 template <typename T>
 RolloutReport RolloutJets(ControlledModel<T>* model, const State<T>& initial, JetRoute route,
                           const JetObserver<T>& observer, State<T>* final, long* fallbacks);
@@ -84,7 +84,7 @@ RolloutReport RolloutJets(const Model<T>& model, const State<T>& initial, JetRou
   return RolloutJets<T>(&plain, initial, route, observer, final, fallbacks);
 }
 
-/// Of step k from time t, which was not done: one line that says where and why.
+/// The message about step k from time t, which failed: one line that says where and why.
 std::string FailureMessage(const StepReport& step, double t, long k);
 
 }  // namespace tangible

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// What the programs report of a run that is done, on stderr and as `warnings` of a summary: a line
-// each.
+// The warnings that programs print about a finished run, on stderr and as `warnings` of a summary,
+// one line each.
 
 #include <string>
 #include <vector>
@@ -18,8 +18,9 @@ class RunWarnings {
   RunWarnings(const Model<double>& model, const State<double>& initial)
       : joints_(model), coordinates_(model), initial_(initial) {}
 
-  /// Each state of the run; `stepper` is null for the initial one. Joints are looked at in one of
-  /// kLookEvery: they open over many steps, and a look costs up to a quarter of a chain's step.
+  /// Examines a state of the run; `stepper` is null for the initial one. Joints are examined in one
+  /// of kLookEvery states, because they open over many steps, and the examination costs up to a
+  /// quarter of a chain's step.
   void Add(const Model<double>& model, long k, double t, const State<double>& state,
            const Stepper* stepper) {
     if (stepper != nullptr) coordinates_.LookAtContacts(state, t, stepper->record().contacts);
@@ -30,7 +31,7 @@ class RunWarnings {
 
   /// The largest rounding of coordinates over the size of a body (CoordinateWatch).
   double rounding() const { return coordinates_.rounding(); }
-  /// Empty, or the line that says they are too large.
+  /// Empty, or the line that says that coordinates are too large.
   std::string CoordinatesMessage(const Model<double>& model) const {
     return coordinates_.Message(model);
   }
@@ -47,7 +48,7 @@ class RunWarnings {
   State<double> initial_;
 };
 
-/// Empty, or a line on what `semi_implicit_euler` with event stepping costs.
+/// Empty, or a line on the loss of accuracy by `semi_implicit_euler` with event stepping.
 std::string FirstOrderByEvents(const Model<double>& model, const State<double>& initial,
                                const State<double>& final);
 

@@ -12,10 +12,10 @@
 namespace tangible {
 namespace {
 
-// A body that turns out faster than its bound makes the search repeat; bounds grow by half each
+// If a body turns out to be faster than its bound, the search is repeated; bounds grow by half each
 // time.
 constexpr int kMaxSearches = 12;
-// Fewer contacts, or islands, are solved together faster than apart.
+// Fewer contacts, or islands, are solved faster together than separately.
 constexpr size_t kLeastContactsApart = 8;
 constexpr int kLeastIslands = 2;
 
@@ -183,7 +183,8 @@ size_t StepperGuess::bytes() const {
 }
 
 ContactMode Stepper::InitialMode(const ContactBlock<double>& contact) const {
-  // Alone, would it touch in the free motion, and would it stick?
+  // The guess for a single contact: whether it would touch in the free motion, and whether it would
+  // stick.
   const ContactProblem<double>& p = record_.problem;
   double normal = contact.c_n;
   double tangent = contact.c_t;
@@ -248,7 +249,7 @@ void Stepper::CarryGuess(const Model<double>& model, const std::vector<ActiveCon
     }
     from = found;
     const ContactMode last = solution.modes[found];
-    // Friction may have become 0 or more than 0 with other numbers.
+    // With other parameters friction may have become 0, or more than 0.
     const bool fits =
         last == ContactMode::kOpen || (last == ContactMode::kClosed) == !block.has_friction;
     const bool keeps = from_where == Guess::kSameStep || (last != ContactMode::kOpen && fits);
@@ -334,7 +335,7 @@ ContactSolverReport Stepper::SolveContacts(const ContactSolverOptions& options, 
     factored_ = false;
     return report;
   }
-  // What the islands leaned on counts too.
+  // The fallbacks of the islands count too.
   ContactFallbacks fallbacks = report.fallbacks;
   fallbacks.islands_together += apart ? 1 : 0;
   report = solver_.Solve(record_.problem, options, &record_.solution);
@@ -363,7 +364,8 @@ ContactSolverReport Stepper::SolveWithContacts(const Model<double>& model,
     if (search == 0) {
       CarryGuess(model, last_contacts_, last_solution_, Guess::kLastStep);
     } else {
-      // What was found with fewer contacts, and the further ones open: often that is the solution.
+      // The guess is the solution with fewer contacts, with the additional ones open: often that is
+      // the solution.
       CarryGuess(model, wider_contacts_, narrow_solution_, Guess::kSameStep);
     }
     const ContactSolverReport before = solved;
@@ -448,7 +450,7 @@ void Stepper::TakeRecord(StepRecord* record, ContactSystem* system) {
   std::swap(*record, record_);
   if (system == nullptr || !system->needs_problem()) {
     std::swap(record->problem, record_.problem);
-    record->problem.Clear();  // what is left there is of another step
+    record->problem.Clear();  // its content belongs to another step
   }
 }
 

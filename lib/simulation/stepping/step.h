@@ -11,8 +11,7 @@
 // factorisation that the solve ended with. Two ways for Jets:
 //   implicit   the double step's modes and solution, and K⁻¹ applied to the Jets' residual
 //   unrolled   every operation of the interior point in Jets, from the same contacts
-// After its first call a step in double allocates nothing but for more contacts than it has had
-// before.
+// After its first call a step in double allocates memory only if it has more contacts than before.
 
 #include <memory>
 #include <string>
@@ -29,14 +28,14 @@ namespace tangible {
 
 enum class StepStatus { kDone, kUnsolved, kDiverged };
 
-/// What happened in a step; sums over the run are made by the caller.
+/// The report of a step; the caller sums over the run.
 struct StepReport {
   StepStatus status = StepStatus::kDone;
   SolvedBy solved_by = SolvedBy::kNothing;
   int contacts = 0;  ///< contacts and limits listed
   int closed = 0;    ///< of these, with an impulse
-  int lcp_rows = 0;  ///< complementarity rows: 1 a frictionless contact or limit, 3 with friction
-  // What the model leaves out, in the last search for contacts.
+  int lcp_rows = 0;  ///< complementarity rows: 1 for a frictionless contact or limit, else 3
+  // Counts of what the step left out, in the last search for contacts.
   int pairs_compared = 0;   ///< pairs of boxes that the broad phase compared
   int pairs_near = 0;       ///< pairs whose boxes overlap
   int beyond_reach = 0;     ///< of these, without rows: out of reach in this step (fixed stepping)
@@ -59,7 +58,7 @@ struct StepReport {
   std::string message;  ///< empty unless it failed: names the contact or joint
 };
 
-/// What a step takes from those before it beside the state: modes and impulses to start from.
+/// What a step uses of earlier steps besides the state: modes and impulses to start from.
 struct StepperGuess {
   std::vector<ActiveContact> contacts;
   ContactSolution<double> solution;  ///< without v
@@ -73,24 +72,24 @@ class Stepper {
   /// `threads` solve a step's islands; the bits are the same for any number.
   explicit Stepper(const Model<double>& model, int threads = 1);
 
-  /// Advances the state from t by h. The numbers of `model` may differ from call to call, its
+  /// Advances the state from t by h. The parameters of `model` may differ from call to call, its
   /// structure may not.
   StepReport Step(const Model<double>& model, double t, double h, State<double>* state);
 
-  /// Of the last step. With event stepping: its contacts, with the impulses they had in all and the
-  /// modes they ended with.
+  /// The record of the last step. With event stepping: its contacts, with the sums of their
+  /// impulses and their modes at the end.
   const StepRecord& record() const { return record_; }
-  /// Whether steps are event steps; then events() made the last one, and its record is the
-  /// derivative's.
+  /// Whether steps are event steps; then events() made the last one, and derivatives use its
+  /// record.
   bool by_events() const { return events_ != nullptr; }
   EventStepper& events() { return *events_; }
   EventDerivative& event_derivative() { return event_derivative_; }
-  /// Factorised with the last step's modes.
+  /// The mode system, factorised with the last step's modes.
   ContactSystem& system();
   JointProjection& projection() { return projection_; }
-  /// Hands the last step's record and, unless null, its factorisation over; for a tape, without
-  /// copies. Until the next step record() and system() are not that step's. The record's problem is
-  /// only handed over where the factorisation's solves need it.
+  /// Moves the last step's record and, unless null, its factorisation to the arguments; a tape uses
+  /// this to avoid copies. Until the next step record() and system() are not valid. The record's
+  /// problem is moved only where the solves of the factorisation need it.
   void TakeRecord(StepRecord* record, ContactSystem* system);
   /// Assembles and factorises a recorded step anew, so that system() is that step's; its problem is
   /// filled in.
@@ -100,7 +99,8 @@ class Stepper {
   void ClearGuess();
   /// Sets the guess to that of a recorded step, so that a run can be resumed with the same bits.
   void SetGuess(const StepRecord& record);
-  /// What the next step starts from, and back: from the same state it gives the same bits.
+  /// Saves the guess of the next step, and restores it: from the same state the step then gives the
+  /// same bits.
   void SaveGuess(StepperGuess* guess) const;
   void SetGuess(const StepperGuess& guess);
 
@@ -108,8 +108,8 @@ class Stepper {
   StepReport StepByEvents(const Model<double>& model, double t, double h, State<double>* state);
   void SumImpulses(const Model<double>& model);
   enum class Guess { kLastStep, kSameStep };
-  // The modes and impulses from which this problem's solution is sought: those of `solution` for
-  // the contacts that it has too.
+  // Sets the modes and impulses from which this problem's solution is sought: those of `solution`
+  // for the contacts that both have.
   void CarryGuess(const Model<double>& model, const std::vector<ActiveContact>& contacts,
                   const ContactSolution<double>& solution, Guess from_where);
   ContactSolverReport SolveContacts(const ContactSolverOptions& options, int* islands);
@@ -134,7 +134,7 @@ class Stepper {
   // The last step's contacts and impulses: the guess.
   std::vector<ActiveContact> last_contacts_;
   ContactSolution<double> last_solution_;
-  std::vector<ActiveContact> wider_contacts_;  // of a wider search, or (swapped) a narrower one
+  std::vector<ActiveContact> wider_contacts_;  // of a wider or (swapped) narrower search
   ContactSolution<double> narrow_solution_;
   std::vector<CoefficientSource> wider_friction_, wider_restitution_;
   std::vector<Turning> turning_;  // scratch
@@ -155,10 +155,10 @@ bool StepUnrolled(const Model<T>& model, const StepRecord& record, State<T>* sta
 long NumSteps(const SimulationSettings& settings);
 /// Time of step k: min(k dt, duration), never accumulated.
 double StepTime(const SimulationSettings& settings, long k);
-/// Length of step k: dt, but for the last.
+/// Length of step k: dt, except for the last.
 double StepLength(const SimulationSettings& settings, long k);
-/// Makes steps end at further times within the run; those within kSameTime dt of another are that
-/// one.
+/// Makes steps end at further times within the run; times within kSameTime dt of another are the
+/// same.
 void AddStepTimes(const std::vector<double>& times, SimulationSettings* settings);
 
 }  // namespace tangible

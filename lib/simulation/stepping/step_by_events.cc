@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The stepper's event step: what event_step.h does, reported as any step.
+// The stepper's event step: it runs event_step.h and reports the result like any other step.
 #include <algorithm>
 #include <cmath>
 
@@ -26,7 +26,7 @@ size_t PlaceOf(const ActiveContact& contact, const CoefficientSource& friction,
   return record->contacts.size() - 1;
 }
 
-// Bodies that rows of some part push and those of none turn.
+// Number of bodies that the rows of some part push but that no rows turn.
 int AnglesLeftOut(const EventRecord& record, std::vector<Turning>* scratch) {
   scratch->clear();
   for (int p = 0; p < record.num_parts; ++p) {
@@ -64,7 +64,7 @@ std::string NameOfContact(const ModelStructure& structure,
                                     structure.bodies[contact.b].name;
 }
 
-// Forces integrate to impulses with the integrator's own weights.
+// Forces are integrated to impulses with the integrator's own weights.
 void Stepper::SumImpulses(const Model<double>& model) {
   StepRecord& r = record_;
   r.contacts.clear();

@@ -21,7 +21,7 @@ void AssembleAll(const Model<T>& model, const StepRecord& record, const State<T>
                    &scratch, problem);
 }
 
-// q := q + h v, by derivative parts too.
+// q := q + h v, including the derivative parts.
 template <typename T>
 void MovePoses(const ModelStructure& structure, double h, State<T>* state) {
   for (int body = 0; body < structure.num_bodies(); ++body) {
@@ -33,8 +33,8 @@ void MovePoses(const ModelStructure& structure, double h, State<T>* state) {
 
 }  // namespace internal
 
-/// The step but for the projection onto joints: the twist of the unrolled interior point, and the
-/// poses that it moves to; false where it does not converge.
+/// The step without the projection onto joints: the twist from the unrolled interior point, and the
+/// poses after moving with it; false where it does not converge.
 template <typename T>
 bool SolveUnrolled(const Model<T>& model, const StepRecord& record, State<T>* state) {
   const ModelStructure& s = *model.structure;
