@@ -15,10 +15,6 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-bool OfPair(const ActiveContact& contact, int a, int b) {
-  return contact.joint < 0 && contact.a == a && contact.b == b;
-}
-
 // A vertex that leaves an edge by its end is handed over when it meets the vertex there, and not at
 // the gap of what takes over, whose edge has another end: that pair of vertices. `next` where the
 // pair has none, or where rounded corners take over smoothly.
@@ -28,8 +24,8 @@ ActiveContact HandOver(const Model<double>& model, const State<double>& state,
   if (!of_first && lost.feature.kind != FeatureKind::kEdgeVertex) {
     return next;
   }
-  const ShapeView<double> shapes[2] = {model.Shape(lost.a), model.Shape(lost.b)};
-  if (CoreRadius(shapes[0]) > 0.0 || CoreRadius(shapes[1]) > 0.0) {
+  const ShapeView<double> shapes[2] = {ShapeOfA(model, lost), ShapeOfB(model, lost)};
+  if (IsRound(shapes[0]) || IsRound(shapes[1])) {
     return next;
   }
   const int edge = of_first ? lost.feature.b : lost.feature.a;
@@ -38,8 +34,9 @@ ActiveContact HandOver(const Model<double>& model, const State<double>& state,
   const double length = (Vertex(with_edge, ends[0]) - Vertex(with_edge, ends[1])).norm();
   for (const int end : ends) {
     ActiveContact corners = next;
-    corners.feature = {FeatureKind::kVertexVertex, of_first ? lost.feature.a : end,
-                       of_first ? end : lost.feature.b};
+    corners.feature = lost.feature;
+    corners.feature.kind = FeatureKind::kVertexVertex;
+    (of_first ? corners.feature.b : corners.feature.a) = end;
     ContactRows<double> rows;
     EvaluateContactRows(model, state, corners, &rows);
     corners.gap = rows.geometry.gap;
@@ -63,18 +60,20 @@ struct Features {
 
 class EventSearch::PairSearch {
  public:
-  PairSearch(EventSearch* search, const Model<double>& model, int a, int b, Event* event)
+  PairSearch(EventSearch* search, const Model<double>& model, int a, int b, PartPair parts,
+             Event* event)
       : search_(*search),
         model_(model),
         a_(a),
         b_(b),
+        parts_(parts),
         event_(*event),
         segment_(*search->segment_),
         touching_(*search->touching_),
         touch_(search->lengths_.Touch(segment_.before, a, b)),
         located_(search->GapTolerance(segment_.before, a, b)),
         closed_(std::any_of(segment_.contacts.begin(), segment_.contacts.end(),
-                            [&](const ActiveContact& c) { return OfPair(c, a, b); })) {}
+                            [&](const ActiveContact& c) { return IsOfPair(c); })) {}
 
   void Run() {
     SearchFrom(0.0, 0.0, Counts::kUntouched);
@@ -90,9 +89,13 @@ class EventSearch::PairSearch {
 
   Features FeaturesAt(const State<double>& state) const {
     Features found;
-    found.count = FindContactFeatures(model_.Shape(a_), state.PoseOf(a_), model_.Shape(b_),
-                                      state.PoseOf(b_), kInfinity, found.of);
+    found.count = FindFeatures(model_, a_, state.PoseOf(a_), b_, state.PoseOf(b_), parts_,
+                               kInfinity, found.of);
     return found;
+  }
+  bool IsOfPair(const ActiveContact& contact) const {
+    return contact.joint < 0 && contact.a == a_ && contact.b == b_ &&
+           contact.feature.part_a == parts_.a && contact.feature.part_b == parts_.b;
   }
   bool IsClosed(const ActiveContact& contact) const { return Contains(segment_.contacts, contact); }
   bool IsDeep(const ActiveContact& contact) const {
@@ -120,6 +123,7 @@ class EventSearch::PairSearch {
   EventSearch& search_;
   const Model<double>& model_;
   const int a_, b_;
+  const PartPair parts_;
   Event& event_;
   const Segment& segment_;
   const std::vector<ActiveContact>& touching_;
@@ -131,8 +135,9 @@ class EventSearch::PairSearch {
   bool on_face_ = false;  ///< the normal is a face's, not that of the line between two points
 };
 
-void EventSearch::SearchPair(const Model<double>& model, int a, int b, Event* event) {
-  PairSearch(this, model, a, b, event).Run();
+void EventSearch::SearchPair(const Model<double>& model, int a, int b, PartPair parts,
+                             Event* event) {
+  PairSearch(this, model, a, b, parts, event).Run();
 }
 
 // How far apart the ends of two bodies' faces may be along them and count as one above the other,
@@ -181,7 +186,7 @@ double EventSearch::PairSearch::Gap(const Sample& sample, Counts counts, bool ha
   const bool hands_over =
       closed_ && !handed_over &&
       std::any_of(segment_.contacts.begin(), segment_.contacts.end(),
-                  [&](const auto& c) { return OfPair(c, a_, b_) && !features.Have(c.feature); });
+                  [&](const auto& c) { return IsOfPair(c) && !features.Have(c.feature); });
   double smallest = kInfinity;
   for (int k = 0; k < features.count; ++k) {
     ActiveContact contact;
@@ -233,7 +238,8 @@ double EventSearch::PairSearch::ClosingSpeed(double from, double to, Counts coun
     double swept = 0.0;
     for (const int body : {a_, b_}) {
       const double omega = std::abs(state->twist[3 * body + 2]);
-      const bool is_circle = model_.structure->bodies[body].shape == ShapeType::kCircle;
+      const int part = body == a_ ? parts_.a : parts_.b;
+      const bool is_circle = model_.structure->bodies[body].Part(part).type == ShapeType::kCircle;
       turn += is_circle ? 0.0 : omega;
       swept += is_circle ? 0.0 : omega * search_.lengths_.radius(body);
     }
@@ -302,7 +308,7 @@ bool EventSearch::PairSearch::SearchTouching() {
   double from = kInfinity;
   double allowed = touch_;
   for (const ActiveContact& contact : touching_) {
-    if (!OfPair(contact, a_, b_) || IsClosed(contact)) {
+    if (!IsOfPair(contact) || IsClosed(contact)) {
       continue;
     }
     if (contact.gap < -kDeepTouches * touch_) {
@@ -327,7 +333,7 @@ bool EventSearch::PairSearch::SearchTouching() {
 const ActiveContact* EventSearch::PairSearch::LostAt(const State<double>& state) const {
   const Features features = FeaturesAt(state);
   for (const ActiveContact& contact : segment_.contacts) {
-    if (OfPair(contact, a_, b_) && !features.Have(contact.feature) &&
+    if (IsOfPair(contact) && !features.Have(contact.feature) &&
         (HasPassed(state) || FeaturesAt(segment_.before).Have(contact.feature)) &&
         !Continues(state, contact, features)) {
       return &contact;
