@@ -52,6 +52,7 @@ double LargestSquaredGyration(const BasicShape<double>& shape) {
     case ShapeType::kHalfPlane:
       return std::numeric_limits<double>::infinity();
     case ShapeType::kCircle:
+    case ShapeType::kEllipse:
     case ShapeType::kCapsule:
     case ShapeType::kBox: {
       // Symmetric about the origin: half the mass at each of two opposite farthest points.

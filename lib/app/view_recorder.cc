@@ -39,7 +39,7 @@ ViewRecorder::ViewRecorder(const Scene& scene, const Model<double>& model) {
   data_.name = scene.name;
   data_.gravity = scene.gravity;
   for (const auto& body : scene.bodies) {
-    data_.bodies.push_back({body.name, body.motion, body.shape});
+    data_.bodies.push_back({body.name, body.motion, body.shape, body.contact_points});
   }
   for (const JointIndex& joint : s.joints) {
     data_.joints.push_back(MakeJoint(model, joint));

@@ -30,11 +30,26 @@ Aabb HalfPlaneBox(const ShapeView<double>& shape, const Pose<double>& pose, doub
   return box;
 }
 
+/// Its half sides are its support function along x and y.
+Aabb EllipseBox(const ShapeView<double>& shape, const Pose<double>& pose, double margin) {
+  const double a = shape.numbers[0];
+  const double b = shape.numbers[1];
+  const double c = pose.rotation.cosine;
+  const double s = pose.rotation.sine;
+  const double x = std::hypot(a * c, b * s) + margin;
+  const double y = std::hypot(a * s, b * c) + margin;
+  return {pose.position.x() - x, pose.position.y() - y, pose.position.x() + x,
+          pose.position.y() + y};
+}
+
 }  // namespace
 
 Aabb ComputeAabb(const ShapeView<double>& shape, const Pose<double>& pose, double margin) {
   if (shape.type == ShapeType::kHalfPlane) {
     return HalfPlaneBox(shape, pose, margin);
+  }
+  if (shape.type == ShapeType::kEllipse) {
+    return EllipseBox(shape, pose, margin);
   }
   Aabb box{kInfinity, kInfinity, -kInfinity, -kInfinity};
   const int num_vertices = NumVertices(shape.type, shape.num_numbers);

@@ -33,6 +33,8 @@ struct ContactFeature {
   FeatureKind kind = FeatureKind::kVertexVertex;
   int a = 0;  ///< vertex or edge of the first shape
   int b = 0;  ///< vertex or edge of the second shape
+  /// Which shape of its body, where one has several, as the bodies' owner numbers them.
+  int part_a = 0, part_b = 0;
   friend bool operator==(const ContactFeature&, const ContactFeature&) = default;
 };
 

@@ -32,4 +32,9 @@ enum class PlaneSide { kFirst, kSecond };
 int CollideHalfPlane(const ConvexCore& core, const Vector2<double>& normal, double offset,
                      PlaneSide side, double max_gap, ContactFeature features[2]);
 
+/// Contacts of a pair of which one is an ellipse: one at most, for an ellipse is strictly convex.
+int CollideEllipse(const ShapeView<double>& shape_a, const Pose<double>& pose_a,
+                   const ShapeView<double>& shape_b, const Pose<double>& pose_b, double max_gap,
+                   ContactFeature features[2]);
+
 }  // namespace tangible::internal

@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Line by line the reverse of contact_geometry_inl.h, whose names are kept: x̄ is `x_bar`.
+// Line by line the reverse of contact_geometry_inl.h, whose names are kept: x̄ is `x_bar`. Ellipses
+// are evaluated in Jets.
 #include "tangible/geometry/contact_geometry_adjoint.h"
+
+#include <vector>
 
 #include "tangible/geometry/contact_geometry_inl.h"
 
@@ -155,12 +158,72 @@ void VertexAgainstVertexAdjoint(const ContactFeature& feature, const ShapeView<d
                 b_bar);
 }
 
+// A shape's numbers that the feature reads, or its pose, as variables from `*next` on.
+ShapeView<LocalJet> LocalShape(const ShapeView<double>& shape, bool is_edge, int feature,
+                               std::vector<LocalJet>* numbers, int* next) {
+  numbers->resize(shape.num_numbers);
+  int used[4];
+  const int count = FeatureNumbers(shape.type, shape.num_numbers, is_edge, feature, used);
+  for (int i = 0; i < count; ++i) {
+    (*numbers)[used[i]] = LocalJet(shape.numbers[used[i]], (*next)++);
+  }
+  return {shape.type, numbers->data(), shape.num_numbers};
+}
+
+Pose<LocalJet> LocalPose(const Pose<double>& pose, int* next) {
+  Pose<LocalJet> local;
+  local.position.x() = LocalJet(pose.position.x(), (*next)++);
+  local.position.y() = LocalJet(pose.position.y(), (*next)++);
+  local.angle = LocalJet(pose.angle, *next);
+  local.rotation.cosine = LocalJet(pose.rotation.cosine);
+  local.rotation.cosine.v[*next] = -pose.rotation.sine;
+  local.rotation.sine = LocalJet(pose.rotation.sine);
+  local.rotation.sine.v[*next] = pose.rotation.cosine;
+  ++*next;
+  return local;
+}
+
+// Of an ellipse: its nearest points are roots of an equation, whose derivatives the template has.
+void AdjointByJets(const ContactFeature& feature, const ShapeView<double>& shape_a,
+                   const Pose<double>& pose_a, const ShapeView<double>& shape_b,
+                   const Pose<double>& pose_b, const ContactGeometry<double>& bar,
+                   ContactSideAdjoint* a_bar, ContactSideAdjoint* b_bar) {
+  std::vector<LocalJet> numbers_a;
+  std::vector<LocalJet> numbers_b;
+  int count = 0;
+  const Pose<LocalJet> local_a = LocalPose(pose_a, &count);
+  const Pose<LocalJet> local_b = LocalPose(pose_b, &count);
+  const int first_a = count;
+  const ShapeView<LocalJet> view_a =
+      LocalShape(shape_a, feature.kind == FeatureKind::kEdgeVertex, feature.a, &numbers_a, &count);
+  const int first_b = count;
+  const ShapeView<LocalJet> view_b =
+      LocalShape(shape_b, feature.kind == FeatureKind::kVertexEdge, feature.b, &numbers_b, &count);
+  const ContactGeometry<LocalJet> geometry =
+      EvaluateContact(feature, view_a, local_a, view_b, local_b);
+  for (int i = 0; i < count; ++i) {
+    double sum = bar.gap * geometry.gap.v[i];
+    for (int k = 0; k < 2; ++k) {
+      sum += bar.normal[k] * geometry.normal[k].v[i] + bar.point[k] * geometry.point[k].v[i];
+    }
+    double& entry = i < 3         ? a_bar->pose[i]
+                    : i < first_a ? b_bar->pose[i - 3]
+                    : i < first_b ? a_bar->numbers[i - first_a]
+                                  : b_bar->numbers[i - first_b];
+    entry += sum;
+  }
+}
+
 }  // namespace
 
 void EvaluateContactAdjoint(const ContactFeature& feature, const ShapeView<double>& shape_a,
                             const Pose<double>& pose_a, const ShapeView<double>& shape_b,
                             const Pose<double>& pose_b, const ContactGeometry<double>& bar,
                             ContactSideAdjoint* a_bar, ContactSideAdjoint* b_bar) {
+  if (shape_a.type == ShapeType::kEllipse || shape_b.type == ShapeType::kEllipse) {
+    AdjointByJets(feature, shape_a, pose_a, shape_b, pose_b, bar, a_bar, b_bar);
+    return;
+  }
   switch (feature.kind) {
     case FeatureKind::kVertexEdge: {
       const Line line = internal::EdgeLine(shape_b, feature.b);

@@ -11,6 +11,7 @@
 #include <cmath>
 
 #include "tangible/geometry/collide.h"
+#include "tangible/geometry/ellipse_inl.h"
 
 namespace tangible::internal {
 
@@ -68,15 +69,19 @@ BoundaryLine<T> HalfPlaneLine(const ShapeView<T>& shape) {
 }
 
 /// A vertex of `shape` against a line of the body at `line_pose`; the normal points to the vertex.
+/// Of an ellipse that is the point that the line's normal supports.
 template <typename T>
 ContactGeometry<T> VertexAgainstLine(const ShapeView<T>& shape, const Pose<T>& pose, int vertex,
                                      const BoundaryLine<T>& line, const Pose<T>& line_pose) {
   // Relative to the body's position first: far from the origin, positions cancel before they are
   // rounded.
-  const Vector2<T> arm = pose.rotation * Vertex(shape, vertex);
+  const Vector2<T> normal = line_pose.rotation * line.normal;
+  const Vector2<T> arm =
+      shape.type == ShapeType::kEllipse
+          ? SupportOf(shape, pose, vertex, Vector2<T>(-normal.x(), -normal.y())).arm
+          : Vector2<T>(pose.rotation * Vertex(shape, vertex));
   const Vector2<T> relative(pose.position.x() - line_pose.position.x() + arm.x(),
                             pose.position.y() - line_pose.position.y() + arm.y());
-  const Vector2<T> normal = line_pose.rotation * line.normal;
   const T radius = CoreRadius(shape);
   ContactGeometry<T> result;
   result.normal = normal;
@@ -92,6 +97,9 @@ template <typename T>
 ContactGeometry<T> VertexAgainstVertex(const ContactFeature& feature, const ShapeView<T>& shape_a,
                                        const Pose<T>& pose_a, const ShapeView<T>& shape_b,
                                        const Pose<T>& pose_b) {
+  if (shape_a.type == ShapeType::kEllipse || shape_b.type == ShapeType::kEllipse) {
+    return RoundAgainstRound(feature, shape_a, pose_a, shape_b, pose_b);
+  }
   const Vector2<T> arm_a = pose_a.rotation * Vertex(shape_a, feature.a);
   const Vector2<T> arm_b = pose_b.rotation * Vertex(shape_b, feature.b);
   const Vector2<T> apart(pose_a.position.x() - pose_b.position.x() + arm_a.x() - arm_b.x(),

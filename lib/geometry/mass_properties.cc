@@ -10,6 +10,9 @@ double BoundingRadius(const ShapeView<double>& shape) {
   if (shape.type == ShapeType::kHalfPlane) {
     return std::numeric_limits<double>::infinity();
   }
+  if (shape.type == ShapeType::kEllipse) {
+    return std::fmax(shape.numbers[0], shape.numbers[1]);
+  }
   const int num_vertices = NumVertices(shape.type, shape.num_numbers);
   double square = 0.0;
   for (int i = 0; i < num_vertices; ++i) {

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// Areas and their moments, for any scalar; r radius, L length between cap centres, w, h sides, and
-// over a polygon's edges c_i = v_i × v_{i+1}:
+// Areas and their moments, for any scalar; r radius, a, b semi-axes, L length between cap centres,
+// w, h sides, and over a polygon's edges c_i = v_i × v_{i+1}:
 //   circle   A = π r²                 I/m = r²/2
+//   ellipse  A = π a b                I/m = (a² + b²)/4
 //   box      A = w h                  I/m = (w² + h²)/12
 //   capsule  A = r (2 L + π r)        I/m = (L (L² + 4 r²)/6 + π r³/2 + 4 L r²/3 + π r L²/4)
 //                                           / (2 L + π r)
@@ -53,6 +54,8 @@ T Area(const ShapeView<T>& shape) {
       return std::numbers::pi * shape.numbers[0] * shape.numbers[0];
     case ShapeType::kBox:
       return shape.numbers[0] * shape.numbers[1];
+    case ShapeType::kEllipse:
+      return std::numbers::pi * shape.numbers[0] * shape.numbers[1];
     case ShapeType::kCapsule:
       return shape.numbers[1] * (2.0 * shape.numbers[0] + std::numbers::pi * shape.numbers[1]);
     case ShapeType::kPolygon:
@@ -80,6 +83,8 @@ T UniformInertia(const ShapeView<T>& shape, const T& mass) {
       return 0.5 * mass * numbers[0] * numbers[0];
     case ShapeType::kBox:
       return mass * (numbers[0] * numbers[0] + numbers[1] * numbers[1]) / 12.0;
+    case ShapeType::kEllipse:
+      return 0.25 * mass * (numbers[0] * numbers[0] + numbers[1] * numbers[1]);
     case ShapeType::kCapsule: {
       const T& length = numbers[0];
       const T& radius = numbers[1];

@@ -3,10 +3,11 @@
 //
 // Shapes in the body frame, as vertices with a radius.
 //
-// Every shape but the half-plane is a convex core (a point, a segment or a polygon,
+// Every shape but the half-plane and the ellipse is a convex core (a point, a segment or a polygon,
 // counter-clockwise) grown by a radius: circle = point, capsule = segment, box and polygon have
 // radius 0. The half-plane is solid where n·r ≤ d, with n = normal / |normal|, d = offset /
-// |normal|.
+// |normal|. An ellipse is a point, its centre, grown by a radius that depends on the direction
+// (ellipse.h).
 
 #include "tangible/math/planar.h"
 #include "tangible/math/scalar.h"
@@ -23,10 +24,12 @@ struct ShapeView {
   int num_numbers = 0;
 };
 
-/// Vertices of the core: circle 1, capsule 2, box 4, polygon n; 0 for a half-plane and no shape.
+/// Vertices of the core: circle and ellipse 1, capsule 2, box 4, polygon n; 0 for a half-plane and
+/// no shape.
 inline int NumVertices(ShapeType type, int num_numbers) {
   switch (type) {
     case ShapeType::kCircle:
+    case ShapeType::kEllipse:
       return 1;
     case ShapeType::kCapsule:
       return 2;
@@ -58,7 +61,7 @@ Vector2<T> Vertex(const ShapeView<T>& shape, int i) {
   }
 }
 
-/// The radius by which the core is grown.
+/// The radius by which the core is grown; 0 for an ellipse, which has none that is constant.
 template <typename T>
 T CoreRadius(const ShapeView<T>& shape) {
   switch (shape.type) {
@@ -69,6 +72,11 @@ T CoreRadius(const ShapeView<T>& shape) {
     default:
       return T(0.0);
   }
+}
+
+/// Whether the core is grown at all: its corners are round.
+inline bool IsRound(const ShapeView<double>& shape) {
+  return shape.type == ShapeType::kEllipse || CoreRadius(shape) > 0.0;
 }
 
 }  // namespace tangible

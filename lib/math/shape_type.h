@@ -6,6 +6,6 @@
 
 namespace tangible {
 
-enum class ShapeType { kNone, kCircle, kBox, kCapsule, kPolygon, kHalfPlane };
+enum class ShapeType { kNone, kCircle, kBox, kCapsule, kPolygon, kHalfPlane, kEllipse };
 
 }  // namespace tangible

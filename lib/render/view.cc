@@ -26,6 +26,8 @@ const char* Name(ShapeType type) {
   switch (type) {
     case ShapeType::kCircle:
       return "circle";
+    case ShapeType::kEllipse:
+      return "ellipse";
     case ShapeType::kBox:
       return "box";
     case ShapeType::kCapsule:
@@ -119,6 +121,14 @@ void WriteBodies(const ViewData& data, const std::vector<ViewFrame>& frames, Jso
       json->Number(number);
     }
     json->Close(']');
+    if (!body.contact_points.empty()) {
+      json->Key("points");
+      json->Open('[');
+      for (const Vector2<double>& point : body.contact_points) {
+        WriteVector(point, json);
+      }
+      json->Close(']');
+    }
     if (body.motion == Motion::kStatic) {
       json->Key("pose");
       json->Open('[');

@@ -47,6 +47,8 @@ function coreOf(body) {
   const n = body.numbers;
   switch (body.shape) {
     case "circle": return {points: [[0, 0]], radius: n[0]};
+    case "ellipse": return {points: Array.from({length: 96}, (_, i) => [n[0] * Math.cos(i * Math.PI / 48),
+                                                                        n[1] * Math.sin(i * Math.PI / 48)]), radius: 0};
     case "capsule": return {points: [[-n[0] / 2, 0], [n[0] / 2, 0]], radius: n[1]};
     case "box": return {points: [[-n[0] / 2, -n[1] / 2], [n[0] / 2, -n[1] / 2], [n[0] / 2, n[1] / 2],
                                  [-n[0] / 2, n[1] / 2]], radius: 0};
@@ -208,6 +210,10 @@ function drawHalfPlane(g, body, pose) {
   g.fillStyle = hatch(g, colours.muted); g.fill();
   g.strokeStyle = colours.text; g.lineWidth = 1.5; line(g, at(-far, 0), at(far, 0));
 }
+function drawContactPoints(g, body, pose) {
+  g.fillStyle = bodyColour(body);
+  for (const point of body.points || []) { disc(g, toScreen(toWorld(pose, point)), 3); g.fill(); }
+}
 function drawBody(g, body, pose, hovered) {
   if (body.shape === "half_plane") { drawHalfPlane(g, body, pose); return; }
   const colour = bodyColour(body), centre = toScreen([pose[0], pose[1]]);
@@ -226,7 +232,7 @@ function drawBody(g, body, pose, hovered) {
   if (body.motion === "kinematic") g.setLineDash([6, 4]);
   g.stroke(); g.setLineDash([]);
   // The mark runs from the centre along the body's x axis to its outline.
-  const mark = body.shape === "circle" ? body.core.radius
+  const mark = body.shape === "circle" ? body.core.radius : body.shape === "ellipse" ? body.numbers[0]
       : body.core.radius + 0.5 * Math.max(...body.core.points.map((p) => p[0]));
   g.lineWidth = 1.5; line(g, centre, toScreen(toWorld(pose, [mark, 0])));
   g.fillStyle = colour; disc(g, centre, 2.2); g.fill();
@@ -307,6 +313,7 @@ function drawStage(k, hovered) {
   const poses = view.bodies.map((_, i) => poseOf(k, i));
   view.bodies.forEach((body, i) => { if (poses[i] && body.motion === "static") drawBody(g, body, poses[i], i === hovered); });
   view.bodies.forEach((body, i) => { if (poses[i] && body.motion !== "static") drawBody(g, body, poses[i], i === hovered); });
+  view.bodies.forEach((body, i) => { if (poses[i]) drawContactPoints(g, body, poses[i]); });
   if (show.joints) {
     for (const spring of view.springs) drawSpring(g, spring, k);
     for (const joint of view.joints) drawJoint(g, joint, k);

@@ -156,6 +156,8 @@ double SizeOf(const BasicShape<double>& shape) {
       return 0.0;
     case ShapeType::kCircle:
       return 2.0 * shape.numbers[0];
+    case ShapeType::kEllipse:
+      return 2.0 * std::max(shape.numbers[0], shape.numbers[1]);
     case ShapeType::kCapsule:
       return shape.numbers[0] + 2.0 * shape.numbers[1];
     case ShapeType::kBox:
@@ -171,6 +173,9 @@ Magnitudes MagnitudesOf(const Scene& scene) {
   Magnitudes result;
   for (const auto& body : scene.bodies) {
     result.length = std::max(result.length, SizeOf(body.shape));
+    for (const auto& point : body.contact_points) {
+      result.length = std::max(result.length, point.norm());
+    }
     if (body.motion == Motion::kMoving) result.mass = std::max(result.mass, body.mass);
   }
   result.gravity = scene.gravity.norm();

@@ -67,6 +67,10 @@ class NumberList {
       }
     }
     AddShape(&body->shape);
+    for (std::size_t i = 0; i < body->contact_points.size(); ++i) {
+      AddVector("contact_points/" + std::to_string(i) + "/", Dimension::kLength,
+                &body->contact_points[i]);
+    }
   }
 
   void AddShape(BasicShape<T>* shape) {
@@ -76,6 +80,10 @@ class NumberList {
         break;
       case ShapeType::kCircle:
         Add("shape/radius", kPositive, Dimension::kLength, &numbers[0]);
+        break;
+      case ShapeType::kEllipse:
+        Add("shape/radii/x", kPositive, Dimension::kLength, &numbers[0]);
+        Add("shape/radii/y", kPositive, Dimension::kLength, &numbers[1]);
         break;
       case ShapeType::kBox:
         Add("shape/size/x", kPositive, Dimension::kLength, &numbers[0]);
@@ -189,6 +197,9 @@ BasicBody<T> CastBody(const BasicBody<double>& from) {
   body.motion = from.motion;
   body.shape.type = from.shape.type;
   for (const double number : from.shape.numbers) body.shape.numbers.push_back(T(number));
+  for (const Vector2<double>& point : from.contact_points) {
+    body.contact_points.push_back(CastVector<T>(point));
+  }
   body.mass = T(from.mass);
   body.inertia = CastOptional<T>(from.inertia);
   body.position = CastVector<T>(from.position);

@@ -22,6 +22,7 @@ namespace tangible {
 /// A shape in the body frame; `numbers` holds, by type:
 ///   kCircle    radius
 ///   kBox       width, height
+///   kEllipse   semi-axes along body x and y
 ///   kCapsule   length between the cap centres (along body x), radius
 ///   kPolygon   x0, y0, x1, y1, ...: convex, counter-clockwise
 ///   kHalfPlane normal x, normal y, offset: solid where normal·r ≤ offset; not necessarily unit
@@ -38,7 +39,8 @@ struct BasicBody {
   std::string name;
   Motion motion = Motion::kMoving;
   BasicShape<T> shape;
-  T mass{0.0};               ///< kg, > 0; moving bodies only
+  std::vector<Vector2<T>> contact_points;  ///< body frame, m: each touches as a corner does
+  T mass{0.0};                             ///< kg, > 0; moving bodies only
   std::optional<T> inertia;  ///< kg m² about the centre of mass; absent: follows mass and shape
   Vector2<T> position{T(0.0), T(0.0)};  ///< m, centre of mass
   T angle{0.0};

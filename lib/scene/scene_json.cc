@@ -156,9 +156,9 @@ class SceneReader {
 };
 
 void SceneReader::ReadBody(const JsonReader& item) {
-  item.ExpectKeys({"name", "static", "kinematic", "shape", "mass", "inertia", "position", "angle",
-                   "velocity", "angular_velocity", "friction", "restitution", "linear_damping",
-                   "angular_damping", "quadratic_drag"},
+  item.ExpectKeys({"name", "static", "kinematic", "shape", "contact_points", "mass", "inertia",
+                   "position", "angle", "velocity", "angular_velocity", "friction", "restitution",
+                   "linear_damping", "angular_damping", "quadratic_drag"},
                   " of a body");
   if (!item.ok()) return;
   BasicBody<double> body;
@@ -171,6 +171,11 @@ void SceneReader::ReadBody(const JsonReader& item) {
   if (is_static) body.motion = Motion::kStatic;
   if (is_kinematic) body.motion = Motion::kKinematic;
   if (item.Has("shape")) ReadShape(item.At("shape"), &body.shape);
+  if (item.Has("contact_points")) {
+    const JsonReader points = item.At("contact_points");
+    const int size = points.ExpectArray("an array of points [x, y]");
+    for (int i = 0; i < size; ++i) body.contact_points.push_back(points.At(i).Point());
+  }
   ReadMass(item, &body);
   if (item.Has("position") || body.motion == Motion::kMoving) {
     body.position = item.At("position").Point();

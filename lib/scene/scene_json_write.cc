@@ -30,6 +30,9 @@ OrderedJson ShapeJson(const BasicShape<double>& shape) {
     case ShapeType::kCircle:
       body["radius"] = numbers[0];
       break;
+    case ShapeType::kEllipse:
+      body["radii"] = {numbers[0], numbers[1]};
+      break;
     case ShapeType::kBox:
       body["size"] = {numbers[0], numbers[1]};
       break;
@@ -58,6 +61,9 @@ OrderedJson BodyJson(const BasicBody<double>& body) {
   if (body.motion == Motion::kStatic) json["static"] = true;
   if (body.motion == Motion::kKinematic) json["kinematic"] = true;
   if (body.shape.type != ShapeType::kNone) json["shape"] = ShapeJson(body.shape);
+  for (const Vector2<double>& point : body.contact_points) {
+    json["contact_points"].push_back(PointJson(point));
+  }
   if (body.mass > 0.0) json["mass"] = body.mass;
   if (body.inertia) json["inertia"] = *body.inertia;
   json["position"] = PointJson(body.position);

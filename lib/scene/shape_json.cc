@@ -84,11 +84,25 @@ void ReadPolygon(const JsonReader& reader, std::vector<double>* numbers) {
   if (reader.ok()) CheckPolygon(vertices, *numbers);
 }
 
-void ReadBox(const JsonReader& reader, std::vector<double>* numbers) {
-  reader.ExpectKeys({"size"}, " of a box");
-  const JsonReader size = reader.At("size");
-  if (size.Size() != 2) return size.FailExpected("an array of 2 numbers > 0 [width, height]");
-  for (int i = 0; i < 2; ++i) numbers->push_back(size.At(i).Number(NumberKind::kPositive));
+// Two lengths, as a box's size and an ellipse's radii are.
+void ReadLengths(const JsonReader& reader, const char* key, const char* expected,
+                 std::vector<double>* numbers) {
+  const JsonReader lengths = reader.At(key);
+  if (lengths.Size() != 2) return lengths.FailExpected(expected);
+  for (int i = 0; i < 2; ++i) numbers->push_back(lengths.At(i).Number(NumberKind::kPositive));
+}
+
+void ReadEllipse(const JsonReader& reader, std::vector<double>* numbers) {
+  reader.ExpectKeys({"radii"}, " of an ellipse");
+  ReadLengths(reader, "radii", "an array of 2 numbers > 0, the semi-axes along x and y", numbers);
+  if (!reader.ok()) return;
+  const double smaller = std::min((*numbers)[0], (*numbers)[1]);
+  const double larger = std::max((*numbers)[0], (*numbers)[1]);
+  if (smaller < kSlenderEllipse * larger) {
+    reader.At("radii").Fail("expected two radii of a ratio of at most 1e9, got " +
+                            Describe(Json(numbers->at(0))) + " and " +
+                            Describe(Json(numbers->at(1))));
+  }
 }
 
 void ReadHalfPlane(const JsonReader& reader, std::vector<double>* numbers) {
@@ -110,7 +124,7 @@ void ReadShape(const JsonReader& reader, BasicShape<double>* shape) {
   if (!reader.ok()) return;
   const std::vector<std::string> keys = reader.Keys();
   if (keys.size() != 1) {
-    return reader.Fail("expected one of circle, box, capsule, polygon, half_plane, got " +
+    return reader.Fail("expected one of circle, ellipse, box, capsule, polygon, half_plane, got " +
                        std::to_string(keys.size()) + " of them");
   }
   for (const auto& entry : kShapeTypeNames) {
@@ -122,8 +136,12 @@ void ReadShape(const JsonReader& reader, BasicShape<double>* shape) {
       body.ExpectKeys({"radius"}, " of a circle");
       shape->numbers = {body.At("radius").Number(NumberKind::kPositive)};
       break;
+    case ShapeType::kEllipse:
+      return ReadEllipse(body, &shape->numbers);
     case ShapeType::kBox:
-      return ReadBox(body, &shape->numbers);
+      body.ExpectKeys({"size"}, " of a box");
+      return ReadLengths(body, "size", "an array of 2 numbers > 0 [width, height]",
+                         &shape->numbers);
     case ShapeType::kCapsule:
       body.ExpectKeys({"length", "radius"}, " of a capsule");
       shape->numbers = {body.At("length").Number(NumberKind::kPositive),

@@ -12,5 +12,8 @@ inline constexpr double kStraightCorner = 1e-12;
 /// Of the extent of a polygon: a centroid nearer to the origin counts as the origin, so that the
 /// inertia about the origin is known.
 inline constexpr double kCentred = 1e-9;
+/// Of the larger radius of an ellipse: the smaller one is at least as large: beyond, the curvature
+/// at its ends, of (b / a)² of its size, is below rounding.
+inline constexpr double kSlenderEllipse = 1e-9;
 
 }  // namespace tangible

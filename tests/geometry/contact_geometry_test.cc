@@ -12,6 +12,7 @@
 #include "random_shapes.h"
 #include "tangible/geometry/collide.h"
 #include "tangible/geometry/contact_geometry_adjoint.h"
+#include "tangible/math/dual.h"
 
 namespace tangible::testing {
 namespace {
@@ -200,6 +201,95 @@ TEST(ContactGeometry, JetsAgreeWithDifferencesOnRandomPairs) {
   }
 }
 
+/// A pair of which one is an ellipse, neither of them nearer than 0.1 m: the curvature of the gap
+/// is bounded there.
+bool MakeEllipsePair(std::mt19937* random, int sample, Case* pair) {
+  TestShape other = sample % 4 == 0   ? HalfPlane(0.3, -2.0, 0.7)
+                    : sample % 4 == 1 ? RandomEllipse(random)
+                                      : RandomShape(random);
+  const Pose<double> pose = RandomPose(random, 2.5);
+  const Pose<double> other_pose = RandomPose(random, 2.5);
+  const double a = Uniform(random, 0.4, 1.0);
+  const TestShape ellipse = Ellipse(a, a * Uniform(random, 0.6, 1.6));
+  *pair = sample % 8 < 4 ? Case{ellipse, pose, other, other_pose, {}}
+                         : Case{other, other_pose, ellipse, pose, {}};
+  const Contacts contacts = Collide(pair->a, pair->pose_a, pair->b, pair->pose_b);
+  pair->feature = contacts.features[0];
+  return contacts.count == 1 && contacts.geometry[0].gap > 0.1;
+}
+
+TEST(ContactGeometry, EllipsesHaveTheirDifferencesAndAdjoints) {
+  std::mt19937 random(20240703);
+  int num_of_kind[5] = {};
+  for (int sample = 0; sample < 400; ++sample) {
+    Case pair;
+    if (MakeEllipsePair(&random, sample, &pair)) {
+      ExpectDerivatives(pair);
+      ExpectAdjointOfJets(pair);
+      ++num_of_kind[static_cast<int>(pair.feature.kind)];
+    }
+  }
+  for (const int count : num_of_kind) {
+    EXPECT_GT(count, 5);
+  }
+}
+
+/// The geometry along a motion, q(t) = q + t v, in dual numbers over T.
+template <typename T>
+std::array<Dual<T>, 5> AlongMotion(const Case& pair, const std::array<T, 6>& poses) {
+  constexpr double kTwist[6] = {0.7, -0.4, 1.3, -0.2, 0.9, -0.8};
+  std::array<Dual<T>, 6> moving;
+  for (int i = 0; i < 6; ++i) {
+    moving[i] = Dual<T>(poses[i], T(kTwist[i]));
+  }
+  const auto constant = [](const TestShape& shape) {
+    OwnedShape<Dual<T>> result{shape.type, {}};
+    for (const double number : shape.numbers) {
+      result.numbers.push_back(Dual<T>(T(number), T(0.0)));
+    }
+    return result;
+  };
+  return Evaluate(pair.feature, constant(pair.a), constant(pair.b), moving);
+}
+
+/// Second derivatives, which the rates of rows take: the derivative of the rate along a motion is
+/// the difference quotient of that rate.
+TEST(ContactGeometry, EllipsesHaveTheirSecondDerivatives) {
+  std::mt19937 random(20240704);
+  int compared = 0;
+  for (int sample = 0; sample < 200; ++sample) {
+    Case pair;
+    if (!MakeEllipsePair(&random, sample, &pair)) {
+      continue;
+    }
+    const std::array<double, 6> at = {pair.pose_a.position.x(), pair.pose_a.position.y(),
+                                      pair.pose_a.angle,        pair.pose_b.position.x(),
+                                      pair.pose_b.position.y(), pair.pose_b.angle};
+    std::array<LocalJet, 6> jets;
+    for (int i = 0; i < 6; ++i) {
+      jets[i] = LocalJet(at[i], i);
+    }
+    const std::array<Dual<LocalJet>, 5> exact = AlongMotion(pair, jets);
+    for (int i = 0; i < 6; ++i) {
+      for (const double h : {1e-4, 2e-4}) {
+        std::array<double, 6> low = at;
+        std::array<double, 6> high = at;
+        low[i] -= h;
+        high[i] += h;
+        const std::array<Dual<double>, 5> before = AlongMotion(pair, low);
+        const std::array<Dual<double>, 5> after = AlongMotion(pair, high);
+        for (int k = 0; k < 5; ++k) {
+          const double quotient = (after[k].b - before[k].b) / (2.0 * h);
+          // h² / 6 times fourth derivatives of up to 1 / 0.1³.
+          EXPECT_NEAR(exact[k].b.v[i], quotient, 500.0 * h * h) << sample << " " << i << " " << k;
+        }
+      }
+    }
+    ++compared;
+  }
+  EXPECT_GT(compared, 50);
+}
+
 TEST(ContactGeometry, GapRateIsTheNormalVelocityAtThePoint) {
   // ∂gap/∂pose = (n, (point − position) × n) of the first body, its negative of the second: what a
   // contact row has.
@@ -212,6 +302,9 @@ TEST(ContactGeometry, GapRateIsTheNormalVelocityAtThePoint) {
               {}};
     if (sample % 4 == 0) {
       pair.b = HalfPlane(0.3, -2.0, 0.7);
+    }
+    if (sample % 8 == 1) {
+      pair.a = Ellipse(0.5, 0.3);
     }
     const Contacts contacts = Collide(pair.a, pair.pose_a, pair.b, pair.pose_b);
     for (int i = 0; i < contacts.count; ++i) {

@@ -34,6 +34,15 @@ TEST(MassProperties, Box) {
   ExpectClose(BoundingRadius(box.View()), 2.5);
 }
 
+TEST(MassProperties, Ellipse) {
+  const TestShape ellipse = Ellipse(3.0, 0.5);
+  ExpectClose(Area(ellipse.View()), 1.5 * kPi);
+  ExpectClose(UniformInertia(ellipse.View(), 4.0), 9.25);
+  EXPECT_EQ(BoundingRadius(ellipse.View()), 3.0);
+  ExpectClose(UniformInertia(Ellipse(0.7, 0.7).View(), 2.0),
+              UniformInertia(Circle(0.7).View(), 2.0));
+}
+
 TEST(MassProperties, Polygon) {
   // The triangle (0,0), (3,0), (0,3): area 4.5, centroid (1, 1), about the origin m (9 + 9)/6.
   const TestShape triangle = Polygon({0, 0, 3, 0, 0, 3});

@@ -28,6 +28,7 @@ inline TestShape Box(double width, double height) { return {ShapeType::kBox, {wi
 inline TestShape Capsule(double length, double radius) {
   return {ShapeType::kCapsule, {length, radius}};
 }
+inline TestShape Ellipse(double a, double b) { return {ShapeType::kEllipse, {a, b}}; }
 inline TestShape Polygon(std::vector<double> vertices) {
   return {ShapeType::kPolygon, std::move(vertices)};
 }
@@ -89,6 +90,11 @@ inline TestShape RandomShape(std::mt19937* random) {
     default:
       return RandomPolygon(random, std::uniform_int_distribution<int>(3, 12)(*random));
   }
+}
+
+inline TestShape RandomEllipse(std::mt19937* random) {
+  const double a = Uniform(random, 0.3, 1.5);
+  return Ellipse(a, Uniform(random, 0.3, 1.5));
 }
 
 inline Pose<double> RandomPose(std::mt19937* random, double extent) {

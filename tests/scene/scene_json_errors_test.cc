@@ -140,12 +140,15 @@ TEST(BadSceneTest, Shapes) {
   Check({
       {shape, "\"circle\"", shape + ": expected an object, got \"circle\""},
       {shape, "{}",
-       shape + ": expected one of circle, box, capsule, polygon, half_plane, got 0 of them"},
+       shape +
+           ": expected one of circle, ellipse, box, capsule, polygon, half_plane, got 0 of them"},
       {shape, R"({"circle": {"radius": 1}, "box": {"size": [1, 1]}})",
-       shape + ": expected one of circle, box, capsule, polygon, half_plane, got 2 of them"},
+       shape +
+           ": expected one of circle, ellipse, box, capsule, polygon, half_plane, got 2 of them"},
       {shape, R"({"disc": {}})",
-       shape + "/disc: unknown key of a shape, expected one of circle, box, capsule, polygon, "
-               "half_plane, got \"disc\""},
+       shape +
+           "/disc: unknown key of a shape, expected one of circle, ellipse, box, capsule, polygon, "
+           "half_plane, got \"disc\""},
       {shape, R"({"circle": {"radius": 0}})",
        shape + "/circle/radius: expected a number > 0, got 0"},
       {shape, R"({"circle": {"radius": 1, "size": 1}})",
@@ -155,6 +158,19 @@ TEST(BadSceneTest, Shapes) {
        shape + "/box/size/1: expected a number > 0, got -1"},
       {shape, R"({"box": {"size": 1}})",
        shape + "/box/size: expected an array of 2 numbers > 0 [width, height], got 1"},
+      {shape, R"({"ellipse": {"radii": [1, 0]}})",
+       shape + "/ellipse/radii/1: expected a number > 0, got 0"},
+      {shape, R"({"ellipse": {"radii": 1}})",
+       shape + "/ellipse/radii: expected an array of 2 numbers > 0, the semi-axes along x and y, "
+               "got 1"},
+      {shape, R"({"ellipse": {"radii": [1, 1e-10]}})",
+       shape + "/ellipse/radii: expected two radii of a ratio of at most 1e9, got 1 and 1e-10"},
+      {shape, R"({"ellipse": {"radius": 1}})",
+       shape + "/ellipse/radius: unknown key of an ellipse, expected one of radii, got \"radius\""},
+      {"/bodies/0/contact_points", "3",
+       "/bodies/0/contact_points: expected an array of points [x, y], got 3"},
+      {"/bodies/0/contact_points", "[[0, 1], [0]]",
+       "/bodies/0/contact_points/1: expected an array of 2 numbers [x, y], got an array of 1"},
       {shape, R"({"capsule": {"length": 0, "radius": 1}})",
        shape + "/capsule/length: expected a number > 0, got 0"},
       {shape, R"({"capsule": {"length": 1, "radius": -1}})",

@@ -36,6 +36,10 @@ TEST(ReadShapeTest, NumbersOfEachType) {
   EXPECT_EQ(shape.type, ShapeType::kCircle);
   EXPECT_EQ(shape.numbers, (std::vector<double>{0.5}));
   shape = {};
+  EXPECT_EQ(Message(Json::parse(R"({"ellipse": {"radii": [1, 1e-6]}})"), &shape), "");
+  EXPECT_EQ(shape.type, ShapeType::kEllipse);
+  EXPECT_EQ(shape.numbers, (std::vector<double>{1, 1e-6}));
+  shape = {};
   EXPECT_EQ(Message(Json::parse(R"({"box": {"size": [1, 2]}})"), &shape), "");
   EXPECT_EQ(shape.type, ShapeType::kBox);
   EXPECT_EQ(shape.numbers, (std::vector<double>{1, 2}));

@@ -27,7 +27,10 @@ void CoverContacts(const Scene& scene, const RunTrace& run, Coverage* coverage) 
       if (c.joint >= 0) {
         (*coverage)["limit of a " + NameOf(scene.joints[c.joint].type, kJointTypeNames)] = 1;
       } else {
-        (*coverage)[PairName(scene.bodies[c.a].shape.type, scene.bodies[c.b].shape.type)] = 1;
+        const bool is_point = c.feature.part_a > 0 || c.feature.part_b > 0;
+        (*coverage)[is_point
+                        ? "point fixed in a body"
+                        : PairName(scene.bodies[c.a].shape.type, scene.bodies[c.b].shape.type)] = 1;
       }
     }
   }
@@ -156,6 +159,7 @@ std::vector<std::string> ExpectedCoverage() {
                            "damping of a body",
                            "spring of a joint",
                            "friction in a joint",
+                           "point fixed in a body",
                            "drag of a body",
                            "spring",
                            "no gravity",

@@ -6,7 +6,7 @@
 #include <limits>
 #include <utility>
 
-#include "tangible/geometry/mass_properties.h"
+#include "tangible/dynamics/model/lengths.h"
 #include "tangible/verification/support/random_scene.h"
 
 namespace tangible {
@@ -49,8 +49,8 @@ VectorX<double> TouchNoise(const Scene& scene, const ModelStructure& structure, 
   VectorX<double> noise = VectorX<double>::Zero(6 * structure.num_blocks());
   for (int k = 0; k < structure.num_blocks(); ++k) {
     const int body = structure.moving[k];
-    if (structure.bodies[body].shape == ShapeType::kNone) continue;
-    const double size = BoundingRadius(model.Shape(body));
+    const double size = RadiusOf(model, body);
+    if (!(size > 0.0)) continue;
     const double speed = std::hypot(state.twist[3 * body], state.twist[3 * body + 1]) +
                          size * std::abs(state.twist[3 * body + 2]) + std::sqrt(gravity * size);
     noise.segment<3>(6 * k) << kTouch * size, kTouch * size, kTouch;

@@ -166,4 +166,29 @@ void SceneMaker::Mechanisms() {
   }
 }
 
+void SceneMaker::Outlines() {
+  if (seed_ % 4 != 1) {
+    return;
+  }
+  RandomNumbers random(0x6f75746cULL + 0x9e3779b97f4a7c15ULL * seed_);
+  for (BasicBody<double>& body : scene_.bodies) {
+    const ShapeType type = body.shape.type;
+    if (body.name == "floor" || type == ShapeType::kNone) {
+      continue;
+    }
+    // As high as the shape was, so that what rests goes on resting.
+    const double height = HalfHeight(body.shape);
+    if (random.Chance(0.6)) {
+      body.shape = {ShapeType::kEllipse, {height * random.Uniform(0.6, 1.8), height}};
+    }
+    if (random.Chance(0.4)) {
+      for (int k = random.Integer(1, 2); k > 0; --k) {
+        const double side = random.Chance(0.5) ? 1.0 : -1.0;
+        body.contact_points.emplace_back(side * random.Uniform(0.5, 1.5) * height,
+                                         random.Uniform(-1.1, 0.8) * height);
+      }
+    }
+  }
+}
+
 }  // namespace tangible::internal

@@ -17,13 +17,16 @@ namespace {
 constexpr double kPi = std::numbers::pi;
 constexpr double kColumn = 0.7;  // m, between places where bodies start
 
-// A body's half height above a level floor, as drawn at angle 0 (or a bound of it).
+}  // namespace
+
 double HalfHeight(const BasicShape<double>& shape) {
   switch (shape.type) {
     case ShapeType::kCircle:
       return shape.numbers[0];
     case ShapeType::kBox:
       return 0.5 * shape.numbers[1];
+    case ShapeType::kEllipse:
+      return shape.numbers[1];
     case ShapeType::kCapsule:
       return shape.numbers[1];
     case ShapeType::kPolygon: {
@@ -37,8 +40,6 @@ double HalfHeight(const BasicShape<double>& shape) {
       return 0.1;
   }
 }
-
-}  // namespace
 
 SceneMaker::SceneMaker(unsigned seed, const RandomSceneOptions& options)
     : random_(0x7a6e67ULL + 0x9e3779b97f4a7c15ULL * seed), options_(options), seed_(seed) {
@@ -78,6 +79,7 @@ Scene SceneMaker::Make() {
     }
   }
   Mechanisms();
+  Outlines();
   return scene_;
 }
 

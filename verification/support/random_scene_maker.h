@@ -10,6 +10,9 @@
 
 namespace tangible::internal {
 
+/// A body's half height above a level floor, as drawn at angle 0 (or a bound of it).
+double HalfHeight(const BasicShape<double>& shape);
+
 class SceneMaker {
  public:
   SceneMaker(unsigned seed, const RandomSceneOptions& options);
@@ -64,6 +67,9 @@ class SceneMaker {
   /// Drag and joint springs, in every fourth scene. They use separate random numbers, so that the
   /// rest of the scene of a seed does not change.
   void Mechanisms();
+  /// Ellipses in the place of other shapes, and contact points, in every fourth scene; with random
+  /// numbers of their own as well.
+  void Outlines();
 
   RandomNumbers random_;
   const RandomSceneOptions options_;

@@ -42,7 +42,8 @@ VectorX<double> OutputsOf(const ModelStructure& structure, const State<double>& 
 auto KeyOf(const ContactTrace& trace) {
   const ActiveContact& c = trace.contact;
   const ContactFeature feature = trace.event == EventKind::kSlipEnds ? ContactFeature{} : c.feature;
-  return std::tuple(trace.event, c.a, c.b, c.joint, c.side, feature.kind, feature.a, feature.b);
+  return std::tuple(trace.event, c.a, c.b, c.joint, c.side, feature.kind, feature.a, feature.b,
+                    feature.part_a, feature.part_b);
 }
 
 bool SameChoice(const ContactTrace& x, const ContactTrace& y, FrictionAtZero friction) {
@@ -135,7 +136,7 @@ ActiveContact TouchOf(const Segment& segment, const EventPart* next) {
     return touch;
   }
   const auto key = [](const ActiveContact& c) {
-    return std::tuple(c.feature.kind, c.feature.a, c.feature.b);
+    return std::tuple(c.feature.part_a, c.feature.part_b, c.feature.kind, c.feature.a, c.feature.b);
   };
   const Impulses& impact = next->impulses;
   ActiveContact first = touch;

@@ -22,12 +22,7 @@ bool MayTouch(const ModelStructure& structure) {
   }
   for (int i = 0; i < structure.world(); ++i) {
     for (int j = i + 1; j < structure.world(); ++j) {
-      const BodyIndex& a = structure.bodies[i];
-      const BodyIndex& b = structure.bodies[j];
-      if ((a.block >= 0 || b.block >= 0) && a.shape != ShapeType::kNone &&
-          b.shape != ShapeType::kNone && structure.MayCollide(i, j)) {
-        return true;
-      }
+      if (structure.MayCollide(i, j)) return true;
     }
   }
   return false;

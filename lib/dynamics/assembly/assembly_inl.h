@@ -117,8 +117,12 @@ class ProblemBuilder {
     return {PoseOf(body),
             {state_.twist[3 * body], state_.twist[3 * body + 1], state_.twist[3 * body + 2]}};
   }
-  ShapeView<T> ShapeOfA(const ActiveContact& contact) const { return model_.Shape(contact.a); }
-  ShapeView<T> ShapeOfB(const ActiveContact& contact) const { return model_.Shape(contact.b); }
+  ShapeView<T> ShapeOfA(const ActiveContact& contact) const {
+    return tangible::ShapeOfA(model_, contact);
+  }
+  ShapeView<T> ShapeOfB(const ActiveContact& contact) const {
+    return tangible::ShapeOfB(model_, contact);
+  }
   JointRows<T>& RowsOf(int j) { return scratch_.joints[j]; }
   JointRates<T>& RatesOf(int j) { return scratch_.rates[kLevel == Level::kAcceleration ? j : 0]; }
   ContactRateScratch<T>* RateScratch() { return &scratch_.contact; }

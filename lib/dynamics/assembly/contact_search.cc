@@ -81,8 +81,7 @@ bool ContactSearch::CheckBounds(const Model<double>& model, const std::vector<do
   }
   for (const int body : model.structure->moving) {
     const double speed = SpeedOf(&twist[3 * body], lengths_.radius(body));
-    if (speed > bound_[body] * (1.0 + kSpeedBound) &&
-        model.structure->bodies[body].shape != ShapeType::kNone) {
+    if (speed > bound_[body] * (1.0 + kSpeedBound) && model.structure->bodies[body].HasContacts()) {
       exceeded = true;
       bound_[body] = 1.5 * speed;  // with room, so that few searches are repeated
     }
@@ -132,19 +131,13 @@ ContactsAhead ContactSearch::FindPassed(const Model<double>& model, const State<
   return ahead;
 }
 
-void ContactSearch::Find(const Model<double>& model, const State<double>& state, double h,
-                         const AssemblyScratch<double>& scratch,
-                         std::vector<ActiveContact>* contacts,
-                         std::vector<CoefficientSource>* friction,
-                         std::vector<CoefficientSource>* restitution) {
+// Which pairs of bodies may have contacts.
+void ContactSearch::FindPairs(const Model<double>& model, const State<double>& state, double h,
+                              const AssemblyScratch<double>& scratch) {
   const ModelStructure& structure = *model.structure;
-  const SimulationSettings& settings = structure.settings;
-  contacts->clear();
-  friction->clear();
-  restitution->clear();
   for (int body = 0; body < structure.num_bodies(); ++body) {
-    const double reach = 0.5 * settings.contact_margin + h * bound_[body];
-    boxes_[body] = ComputeAabb(model.Shape(body), scratch.poses[body], reach);
+    const double reach = 0.5 * structure.settings.contact_margin + h * bound_[body];
+    boxes_[body] = BoxOf(model, body, scratch.poses[body], reach);
     if (structure.bodies[body].shape == ShapeType::kHalfPlane && state.twist[3 * body + 2] != 0.0) {
       // A turning half-plane may reach any place.
       const double infinity = std::numeric_limits<double>::infinity();
@@ -153,65 +146,96 @@ void ContactSearch::Find(const Model<double>& model, const State<double>& state,
   }
   broad_phase_.FindPairs(
       boxes_, [&](int i, int j) { return structure.MayCollide(i, j); }, &pairs_);
-  beyond_reach_ = 0;
-  for (const auto& [a, b] : pairs_) {
-    double reach = settings.contact_margin + h * (bound_[a] + bound_[b]);
-    for (const int body : {a, b}) {
-      if (structure.bodies[body].shape == ShapeType::kHalfPlane) {
-        const double distance = std::hypot(state.pose[3 * a] - state.pose[3 * b],
-                                           state.pose[3 * a + 1] - state.pose[3 * b + 1]);
-        const int other = body == a ? b : a;
-        reach += h * std::abs(state.twist[3 * body + 2]) * (distance + lengths_.radius(other));
+}
+
+// The gap below which two bodies may meet within the step, m.
+double ContactSearch::ReachOf(const Model<double>& model, const State<double>& state, double h,
+                              int a, int b) const {
+  const ModelStructure& structure = *model.structure;
+  double reach = structure.settings.contact_margin + h * (bound_[a] + bound_[b]);
+  for (const int body : {a, b}) {
+    if (structure.bodies[body].shape == ShapeType::kHalfPlane) {
+      const double distance = std::hypot(state.pose[3 * a] - state.pose[3 * b],
+                                         state.pose[3 * a + 1] - state.pose[3 * b + 1]);
+      const int other = body == a ? b : a;
+      reach += h * std::abs(state.twist[3 * body + 2]) * (distance + lengths_.radius(other));
+    }
+  }
+  return reach;
+}
+
+// The contacts of one part of each of two bodies.
+void ContactSearch::FindContacts(const Model<double>& model, const State<double>& state, double h,
+                                 const AssemblyScratch<double>& scratch, ActiveContact contact,
+                                 PartPair parts, std::vector<ActiveContact>* contacts) const {
+  const SimulationSettings& settings = model.structure->settings;
+  const int a = contact.a;
+  const int b = contact.b;
+  ContactFeature features[2];
+  int count = FindFeatures(model, a, scratch.poses[a], b, scratch.poses[b], parts,
+                           ReachOf(model, state, h, a, b), features);
+  if (count == 0) {
+    return;
+  }
+  const double e = MixedRestitution(model, a, b).value;
+  bool passes_by = false;
+  for (int k = 0; k < count; ++k) {
+    contact.feature = features[k];
+    ContactRows<double> rows;
+    EvaluateContactRows(model, scratch.poses, contact, &rows);
+    const double gap = rows.geometry.gap;
+    contact.gap = gap;
+    contact.law = GapLaw(gap, h, settings);
+    const double approach = RelativeSpeed(state, a, rows.normal_a, b, rows.normal_b);
+    if (!passes_by && gap + h * approach < settings.contact_margin) {
+      const ContactsAhead ahead = FindPassed(model, state, contact, approach, h);
+      if (ahead.count > 0) {
+        passes_by = true;
+        count = ahead.count;
+        features[0] = ahead.contacts[0].feature;
+        features[1] = ahead.contacts[1].feature;
+        k = -1;
+        continue;
       }
     }
-    ContactFeature features[2];
-    int count = FindContactFeatures(model.Shape(a), scratch.poses[a], model.Shape(b),
-                                    scratch.poses[b], reach, features);
-    if (count == 0) {
+    double free_approach = 0.0;
+    for (int i = 0; i < 3; ++i) {
+      free_approach +=
+          rows.normal_a[i] * free_twist_[3 * a + i] + rows.normal_b[i] * free_twist_[3 * b + i];
+    }
+    // In penetration the constant that drives apart faster holds.
+    if (e > 0.0 && approach < -settings.restitution_threshold &&
+        gap + h * free_approach < settings.contact_margin &&
+        (gap >= 0.0 || e * approach < std::max(gap / h, -settings.recovery_speed))) {
+      contact.law = ContactLaw::kRestitution;
+    }
+    contacts->push_back(contact);
+  }
+}
+
+void ContactSearch::Find(const Model<double>& model, const State<double>& state, double h,
+                         const AssemblyScratch<double>& scratch,
+                         std::vector<ActiveContact>* contacts,
+                         std::vector<CoefficientSource>* friction,
+                         std::vector<CoefficientSource>* restitution) {
+  contacts->clear();
+  friction->clear();
+  restitution->clear();
+  FindPairs(model, state, h, scratch);
+  beyond_reach_ = 0;
+  for (const auto& pair : pairs_) {
+    ActiveContact contact;
+    contact.a = pair.first;
+    contact.b = pair.second;
+    model.structure->ForEachPartPair(contact.a, contact.b, [&](PartPair parts) {
+      FindContacts(model, state, h, scratch, contact, parts, contacts);
+    });
+    if (contacts->size() == friction->size()) {
       ++beyond_reach_;
       continue;
     }
-    const CoefficientSource pair_friction = MixedFriction(model, a, b);
-    const CoefficientSource pair_restitution = MixedRestitution(model, a, b);
-    bool passes_by = false;
-    for (int k = 0; k < count; ++k) {
-      ActiveContact contact;
-      contact.a = a;
-      contact.b = b;
-      contact.feature = features[k];
-      ContactRows<double> rows;
-      EvaluateContactRows(model, scratch.poses, contact, &rows);
-      const double gap = rows.geometry.gap;
-      contact.gap = gap;
-      contact.law = GapLaw(gap, h, settings);
-      const double approach = RelativeSpeed(state, a, rows.normal_a, b, rows.normal_b);
-      if (!passes_by && gap + h * approach < settings.contact_margin) {
-        const ContactsAhead ahead = FindPassed(model, state, contact, approach, h);
-        if (ahead.count > 0) {
-          passes_by = true;
-          count = ahead.count;
-          features[0] = ahead.contacts[0].feature;
-          features[1] = ahead.contacts[1].feature;
-          k = -1;
-          continue;
-        }
-      }
-      double free_approach = 0.0;
-      for (int i = 0; i < 3; ++i) {
-        free_approach +=
-            rows.normal_a[i] * free_twist_[3 * a + i] + rows.normal_b[i] * free_twist_[3 * b + i];
-      }
-      const double e = pair_restitution.value;
-      // In penetration the constant that drives apart faster holds.
-      if (e > 0.0 && approach < -settings.restitution_threshold &&
-          gap + h * free_approach < settings.contact_margin &&
-          (gap >= 0.0 || e * approach < std::max(gap / h, -settings.recovery_speed))) {
-        contact.law = ContactLaw::kRestitution;
-      }
-      contacts->push_back(contact);
-      friction->push_back(pair_friction);
-      restitution->push_back(pair_restitution);
-    }
+    friction->resize(contacts->size(), MixedFriction(model, contact.a, contact.b));
+    restitution->resize(contacts->size(), MixedRestitution(model, contact.a, contact.b));
   }
   FindLimits(model, h, scratch, contacts);
   friction->resize(contacts->size());

@@ -41,6 +41,13 @@ class ContactSearch {
  private:
   ContactsAhead FindPassed(const Model<double>& model, const State<double>& state,
                            const ActiveContact& contact, double approach, double h) const;
+  void FindPairs(const Model<double>& model, const State<double>& state, double h,
+                 const AssemblyScratch<double>& scratch);
+  double ReachOf(const Model<double>& model, const State<double>& state, double h, int a,
+                 int b) const;
+  void FindContacts(const Model<double>& model, const State<double>& state, double h,
+                    const AssemblyScratch<double>& scratch, ActiveContact contact, PartPair parts,
+                    std::vector<ActiveContact>* contacts) const;
   void FindLimits(const Model<double>& model, double h, const AssemblyScratch<double>& scratch,
                   std::vector<ActiveContact>* contacts);
 

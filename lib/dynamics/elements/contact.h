@@ -40,16 +40,45 @@ struct ActiveContact {
   ContactLaw law = ContactLaw::kGap;
   double gap = 0.0;  ///< m (rad for the limit of an angle), at the step's start
   bool IsJointFriction() const { return joint >= 0 && side == 0.0; }
-  /// Whether both are of the same shapes, as the two ends of a face are, or of the same joint.
+  /// Whether both are of the same bodies, as the two ends of a face are, or of the same joint.
   bool IsBetweenTheSame(const ActiveContact& other) const {
     return a == other.a && b == other.b && joint == other.joint;
   }
+  /// Whether both are contacts of the same two shapes.
+  bool IsOfTheSameShapes(const ActiveContact& other) const {
+    return joint < 0 && other.joint < 0 && a == other.a && b == other.b &&
+           feature.part_a == other.feature.part_a && feature.part_b == other.feature.part_b;
+  }
+  PartPair Parts() const { return {feature.part_a, feature.part_b}; }
   /// Whether two steps' contacts are the same one.
   bool SameAs(const ActiveContact& other) const {
     return a == other.a && b == other.b && feature == other.feature && joint == other.joint &&
            side == other.side;
   }
 };
+
+/// FindContactFeatures of one part of each of two bodies.
+inline int FindFeatures(const Model<double>& model, int a, const Pose<double>& pose_a, int b,
+                        const Pose<double>& pose_b, PartPair parts, double max_gap,
+                        ContactFeature features[2]) {
+  const int count = FindContactFeatures(model.Shape(a, parts.a), pose_a, model.Shape(b, parts.b),
+                                        pose_b, max_gap, features);
+  for (int k = 0; k < count; ++k) {
+    features[k].part_a = parts.a;
+    features[k].part_b = parts.b;
+  }
+  return count;
+}
+
+/// The shapes of a contact.
+template <typename T>
+ShapeView<T> ShapeOfA(const Model<T>& model, const ActiveContact& contact) {
+  return model.Shape(contact.a, contact.feature.part_a);
+}
+template <typename T>
+ShapeView<T> ShapeOfB(const Model<T>& model, const ActiveContact& contact) {
+  return model.Shape(contact.b, contact.feature.part_b);
+}
 
 /// The coefficients of a contact and their derivatives with respect to the numbers they come from.
 struct CoefficientSource {
@@ -144,8 +173,8 @@ double SlipSign(const State<double>& state, const ActiveContact& contact,
 template <typename T>
 void EvaluateContactRows(const Model<T>& model, const Pose<T>& pose_a, const Pose<T>& pose_b,
                          const ActiveContact& contact, ContactRows<T>* rows) {
-  const ShapeView<T> shape_a = model.Shape(contact.a);
-  const ShapeView<T> shape_b = model.Shape(contact.b);
+  const ShapeView<T> shape_a = ShapeOfA(model, contact);
+  const ShapeView<T> shape_b = ShapeOfB(model, contact);
   rows->geometry = EvaluateContact(contact.feature, shape_a, pose_a, shape_b, pose_b);
   RowsFromGeometry(shape_a.type, pose_a.position, shape_b.type, pose_b.position, rows);
 }

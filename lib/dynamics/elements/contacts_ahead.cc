@@ -28,8 +28,8 @@ ContactsAhead FindContactsAhead(const Model<double>& model, const State<double>&
   const int b = contact.b;
   ContactFeature features[2];
   const int count =
-      FindContactFeatures(model.Shape(a), Moved(state, a, time), model.Shape(b),
-                          Moved(state, b, time), std::numeric_limits<double>::infinity(), features);
+      FindFeatures(model, a, Moved(state, a, time), b, Moved(state, b, time), contact.Parts(),
+                   std::numeric_limits<double>::infinity(), features);
   for (int k = 0; k < count; ++k) {
     ActiveContact& next = ahead.contacts[k];
     next = contact;

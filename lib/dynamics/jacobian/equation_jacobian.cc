@@ -365,8 +365,8 @@ class EntryBuilder : private internal::LocalEntries<Sink> {
   void ContactAdjointByHand(int i, const ActiveContact& contact) {
     const Pose<double> pose_a = state_.PoseOf(contact.a);
     const Pose<double> pose_b = state_.PoseOf(contact.b);
-    const ShapeView<double> shape_a = model_.Shape(contact.a);
-    const ShapeView<double> shape_b = model_.Shape(contact.b);
+    const ShapeView<double> shape_a = tangible::ShapeOfA(model_, contact);
+    const ShapeView<double> shape_b = tangible::ShapeOfB(model_, contact);
     ContactRows<double> rows;
     rows.geometry = EvaluateContact(contact.feature, shape_a, pose_a, shape_b, pose_b);
     RowsFromGeometry(shape_a.type, pose_a.position, shape_b.type, pose_b.position, &rows);
@@ -392,20 +392,21 @@ class EntryBuilder : private internal::LocalEntries<Sink> {
     ContactSideAdjoint b_bar;
     ContactRowsAdjoint(contact.feature, shape_a, pose_a, shape_b, pose_b, rows, bar, &a_bar,
                        &b_bar);
-    const auto add = [&](int body, bool is_edge, int feature, const ContactSideAdjoint& side) {
+    const auto add = [&](int body, int part, bool is_edge, int feature,
+                         const ContactSideAdjoint& side) {
       for (int k = 0; k < 3; ++k) {
         sink_.w_bar[s_.PoseVariable(body, k)] -= side.pose[k];
       }
-      const BodyIndex& index = s_.bodies[body];
+      const PartIndex index = s_.bodies[body].Part(part);
       int used[4];
-      const int count =
-          FeatureNumbers(index.shape, index.num_shape_numbers, is_edge, feature, used);
+      const int count = FeatureNumbers(index.type, index.num_numbers, is_edge, feature, used);
       for (int k = 0; k < count; ++k) {
-        sink_.w_bar[s_.ParameterVariable(index.shape_numbers + used[k])] -= side.numbers[k];
+        sink_.w_bar[s_.ParameterVariable(index.numbers + used[k])] -= side.numbers[k];
       }
     };
-    add(contact.a, contact.feature.kind == FeatureKind::kEdgeVertex, contact.feature.a, a_bar);
-    add(contact.b, contact.feature.kind == FeatureKind::kVertexEdge, contact.feature.b, b_bar);
+    const ContactFeature& feature = contact.feature;
+    add(contact.a, feature.part_a, feature.kind == FeatureKind::kEdgeVertex, feature.a, a_bar);
+    add(contact.b, feature.part_b, feature.kind == FeatureKind::kVertexEdge, feature.b, b_bar);
     EmitByRows(i, contact, rows);
   }
 

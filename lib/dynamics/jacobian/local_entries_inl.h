@@ -85,26 +85,27 @@ class LocalEntries {
   }
 
   /// A shape's numbers that the feature reads, as LocalJets in their places.
-  ShapeView<LocalJet> LocalShape(int body, bool is_edge, int feature, Locals* locals,
+  ShapeView<LocalJet> LocalShape(const PartIndex& index, bool is_edge, int feature, Locals* locals,
                                  std::vector<LocalJet>* numbers) {
-    const BodyIndex& index = s_.bodies[body];
-    if (static_cast<int>(numbers->size()) < index.num_shape_numbers) {
-      numbers->resize(index.num_shape_numbers);
+    if (static_cast<int>(numbers->size()) < index.num_numbers) {
+      numbers->resize(index.num_numbers);
     }
     int used[4];
-    const int count = FeatureNumbers(index.shape, index.num_shape_numbers, is_edge, feature, used);
+    const int count = FeatureNumbers(index.type, index.num_numbers, is_edge, feature, used);
     for (int i = 0; i < count; ++i) {
-      (*numbers)[used[i]] = LocalNumber(index.shape_numbers + used[i], locals);
+      (*numbers)[used[i]] = LocalNumber(index.numbers + used[i], locals);
     }
-    return {index.shape, numbers->data(), index.num_shape_numbers};
+    return {index.type, numbers->data(), index.num_numbers};
   }
   ShapeView<LocalJet> LocalShapeOfA(const ActiveContact& contact, Locals* locals) {
-    return LocalShape(contact.a, contact.feature.kind == FeatureKind::kEdgeVertex,
-                      contact.feature.a, locals, &scratch_.numbers_a);
+    return LocalShape(s_.bodies[contact.a].Part(contact.feature.part_a),
+                      contact.feature.kind == FeatureKind::kEdgeVertex, contact.feature.a, locals,
+                      &scratch_.numbers_a);
   }
   ShapeView<LocalJet> LocalShapeOfB(const ActiveContact& contact, Locals* locals) {
-    return LocalShape(contact.b, contact.feature.kind == FeatureKind::kVertexEdge,
-                      contact.feature.b, locals, &scratch_.numbers_b);
+    return LocalShape(s_.bodies[contact.b].Part(contact.feature.part_b),
+                      contact.feature.kind == FeatureKind::kVertexEdge, contact.feature.b, locals,
+                      &scratch_.numbers_b);
   }
 
   void LocalContactRows(const ActiveContact& contact, Locals* locals, ContactRows<LocalJet>* rows) {

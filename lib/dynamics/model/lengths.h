@@ -20,6 +20,7 @@
 
 #include "tangible/dynamics/model/model.h"
 #include "tangible/dynamics/model/tolerances.h"
+#include "tangible/geometry/broad_phase.h"
 
 namespace tangible {
 
@@ -41,6 +42,13 @@ double AngleOf(const State<T>& state, int a, int b) {
                   std::abs(ValueOf(state.pose[3 * b + 2])));
 }
 
+/// The largest distance of a body's shape and contact points from its centre of mass, m; 0 without
+/// any. A half-plane counts for nothing.
+double RadiusOf(const Model<double>& model, int body);
+
+/// The box of a body's shape and contact points, grown by `margin`.
+Aabb BoxOf(const Model<double>& model, int body, const Pose<double>& pose, double margin);
+
 /// Whether row k of a joint's error is an angle, rad; else it is a length, m.
 inline bool IsAngle(JointType type, int k) {
   return type == JointType::kFixedAngle || (type == JointType::kWeld && k == 2) ||
@@ -51,10 +59,9 @@ class Lengths {
  public:
   explicit Lengths(const Model<double>& model);
 
-  /// The largest distance of a body's shape from its centre of mass, m; 0 without a shape and of a
-  /// half-plane.
+  /// RadiusOf.
   double radius(int body) const { return radius_[body]; }
-  /// The same, but of a moving body without a shape √(3 I / m), half the length of a uniform rod of
+  /// The same, but of a moving body without any √(3 I / m), half the length of a uniform rod of
   /// its mass and inertia. 0 of what has no length at all.
   double size(int body) const { return size_[body]; }
   /// The smallest radius above 0, m; 1 where there is none.

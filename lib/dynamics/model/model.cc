@@ -65,6 +65,8 @@ void AddBodies(const BasicScene<T>& scene, Places* places, ModelStructure* struc
     index.shape = body.shape.type;
     index.num_shape_numbers = static_cast<int>(body.shape.numbers.size());
     index.shape_numbers = places->Take(index.num_shape_numbers);
+    index.num_contact_points = static_cast<int>(body.contact_points.size());
+    index.contact_points = places->Take(2 * index.num_contact_points);
     index.friction = places->Take(1);
     index.restitution = places->Take(1);
     if (body.motion == Motion::kMoving) {
@@ -175,6 +177,12 @@ void AddForcesAndPairs(const BasicScene<T>& scene, Places* places, ModelStructur
 }
 
 template <typename T>
+void Append(const Vector2<T>& v, std::vector<T>* numbers) {
+  numbers->push_back(v.x());
+  numbers->push_back(v.y());
+}
+
+template <typename T>
 ShapeView<T> ViewOf(const BasicShape<T>& shape) {
   return {shape.type, shape.numbers.data(), static_cast<int>(shape.numbers.size())};
 }
@@ -184,6 +192,9 @@ template <typename T>
 void FillBodies(const BasicScene<T>& scene, std::vector<T>* numbers) {
   for (const BasicBody<T>& body : scene.bodies) {
     numbers->insert(numbers->end(), body.shape.numbers.begin(), body.shape.numbers.end());
+    for (const Vector2<T>& point : body.contact_points) {
+      Append(point, numbers);
+    }
     numbers->push_back(body.friction);
     numbers->push_back(body.restitution);
     if (body.motion == Motion::kMoving) {
@@ -197,12 +208,6 @@ void FillBodies(const BasicScene<T>& scene, std::vector<T>* numbers) {
       }
     }
   }
-}
-
-template <typename T>
-void Append(const Vector2<T>& v, std::vector<T>* numbers) {
-  numbers->push_back(v.x());
-  numbers->push_back(v.y());
 }
 
 template <typename T>
@@ -299,7 +304,8 @@ bool MatchesEither(const std::vector<bool>& first, const std::vector<bool>& seco
 bool ModelStructure::MayCollide(int i, int j) const {
   const BodyIndex& a = bodies[i];
   const BodyIndex& b = bodies[j];
-  if ((a.block < 0 && b.block < 0) || a.shape == ShapeType::kNone || b.shape == ShapeType::kNone) {
+  if ((a.block < 0 && b.block < 0) || !a.HasContacts() || !b.HasContacts() ||
+      (a.shape == ShapeType::kNone && b.shape == ShapeType::kNone)) {
     return false;
   }
   if (std::binary_search(joined.begin(), joined.end(),

@@ -21,7 +21,15 @@
 
 namespace tangible {
 
-/// Places of a body's parameters; −1 where it has none.
+/// A shape of a body, its type and the places of its numbers.
+struct PartIndex {
+  ShapeType type = ShapeType::kNone;
+  int numbers = -1;
+  int num_numbers = 0;
+};
+
+/// Places of a body's parameters; −1 where it has none. A body has parts: 0 is its shape, those
+/// from 1 on are its contact points, each a polygon of one vertex.
 struct BodyIndex {
   std::string name;
   Motion motion = Motion::kStatic;
@@ -32,6 +40,19 @@ struct BodyIndex {
   ShapeType shape = ShapeType::kNone;
   int shape_numbers = -1;
   int num_shape_numbers = 0;
+  int contact_points = -1;  ///< two coordinates each
+  int num_contact_points = 0;
+
+  PartIndex Part(int part) const {
+    return part == 0 ? PartIndex{shape, shape_numbers, num_shape_numbers}
+                     : PartIndex{ShapeType::kPolygon, contact_points + 2 * (part - 1), 2};
+  }
+  bool HasContacts() const { return shape != ShapeType::kNone || num_contact_points > 0; }
+};
+
+/// One part of each body of a pair.
+struct PartPair {
+  int a = 0, b = 0;
 };
 
 /// Places of a joint's parameters. Geometry, by type, from `geometry` on:
@@ -98,6 +119,18 @@ struct ModelStructure {
   int TwistVariable(int body, int i) const { return 3 * num_bodies() + 3 * body + i; }
   int ParameterVariable(int number) const { return 6 * num_bodies() + number; }
   int num_variables() const { return 6 * num_bodies() + num_parameters; }
+  /// visit(PartPair) for the parts of two bodies that may touch: both shapes, and the contact
+  /// points of each with the shape of the other. Two points never meet.
+  template <typename Visit>
+  void ForEachPartPair(int i, int j, const Visit& visit) const {
+    visit(PartPair{0, 0});
+    for (int k = 1; k <= bodies[i].num_contact_points; ++k) {
+      visit(PartPair{k, 0});
+    }
+    for (int k = 1; k <= bodies[j].num_contact_points; ++k) {
+      visit(PartPair{0, k});
+    }
+  }
   /// Whether contacts between two bodies are looked for.
   bool MayCollide(int i, int j) const;
   /// The pair entry that holds for two bodies, or nullptr; of several the last one written.
@@ -113,11 +146,10 @@ struct Model {
   std::shared_ptr<const ModelStructure> structure;
   std::vector<T> parameters;
 
-  ShapeView<T> Shape(int body) const {
-    const BodyIndex& index = structure->bodies[body];
-    return {index.shape,
-            parameters.data() + (index.num_shape_numbers > 0 ? index.shape_numbers : 0),
-            index.num_shape_numbers};
+  ShapeView<T> Shape(int body, int part = 0) const {
+    const PartIndex index = structure->bodies[body].Part(part);
+    return {index.type, parameters.data() + (index.num_numbers > 0 ? index.numbers : 0),
+            index.num_numbers};
   }
 };
 

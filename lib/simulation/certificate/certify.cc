@@ -239,9 +239,8 @@ void RolloutCertifier::AddFeatures(const Model<double>& model, const StepRecord&
   const std::vector<ActiveContact>& contacts = record.contacts;
   size_t last = 0;
   for (size_t first = 0; first < contacts.size(); first = last) {
-    for (last = first + 1; last < contacts.size() && contacts[first].joint < 0 &&
-                           contacts[last].joint < 0 && contacts[last].a == contacts[first].a &&
-                           contacts[last].b == contacts[first].b;) {
+    for (last = first + 1;
+         last < contacts.size() && contacts[last].IsOfTheSameShapes(contacts[first]);) {
       ++last;
     }
     const Place place{model.structure.get(),       step, record.time, first, &contacts[first],

@@ -6,7 +6,7 @@
 #include <limits>
 #include <utility>
 
-#include "tangible/geometry/mass_properties.h"
+#include "tangible/dynamics/model/lengths.h"
 #include "tangible/simulation/certificate/tolerances.h"
 
 namespace tangible {
@@ -25,11 +25,12 @@ class PairTies {
         system_(*system),
         a_(record.contacts[first].a),
         b_(record.contacts[first].b),
+        parts_(record.contacts[first].Parts()),
         moved_(record.before) {
     size_ = kInfinity;
     for (const int body : {a_, b_}) {
       if (model.structure->bodies[body].shape != ShapeType::kHalfPlane) {
-        size_ = std::min(size_, BoundingRadius(model.Shape(body)));
+        size_ = std::min(size_, RadiusOf(model, body));
       }
     }
     reach_ = 0.0;
@@ -65,8 +66,8 @@ class PairTies {
   // Moves the first body relative to the second, and searches the features there.
   void Move(int direction, double length) {
     MovePose(direction, length);
-    count_ = FindContactFeatures(model_.Shape(a_), moved_.PoseOf(a_), model_.Shape(b_),
-                                 moved_.PoseOf(b_), reach_, features_);
+    count_ = FindFeatures(model_, a_, moved_.PoseOf(a_), b_, moved_.PoseOf(b_), parts_, reach_,
+                          features_);
   }
 
   bool Closed(size_t i) const { return record_.solution.modes[i] != ContactMode::kOpen; }
@@ -222,6 +223,7 @@ class PairTies {
   size_t first_, last_;
   ContactSystem& system_;
   int a_, b_;
+  PartPair parts_;
   State<double> moved_;
   double size_ = 0.0;   ///< m, of the smaller shape
   double reach_ = 0.0;  ///< m
@@ -252,10 +254,12 @@ bool MeetsACorner(const Model<double>& model, const State<double>& state,
     if (model.structure->bodies[body].shape == ShapeType::kHalfPlane) {
       return false;
     }
-    size = std::min(size, BoundingRadius(model.Shape(body)));
+    size = std::min(size, RadiusOf(model, body));
   }
   const auto normal = [&](const Pose<double>& pose_a, const ContactFeature& feature) {
-    return EvaluateContact(feature, model.Shape(a), pose_a, model.Shape(b), state.PoseOf(b)).normal;
+    return EvaluateContact(feature, ShapeOfA(model, contact), pose_a, ShapeOfB(model, contact),
+                           state.PoseOf(b))
+        .normal;
   };
   const Vector2<double> n = normal(state.PoseOf(a), contact.feature);
   const Vector2<double> along(n.y(), -n.x());
@@ -263,8 +267,8 @@ bool MeetsACorner(const Model<double>& model, const State<double>& state,
     Pose<double> moved = state.PoseOf(a);
     moved.position += kFeatureMargin * size * direction;
     ContactFeature features[2];
-    const int count = FindContactFeatures(model.Shape(a), moved, model.Shape(b), state.PoseOf(b),
-                                          kInfinity, features);
+    const int count =
+        FindFeatures(model, a, moved, b, state.PoseOf(b), contact.Parts(), kInfinity, features);
     const bool continues = std::any_of(features, features + count, [&](const auto& feature) {
       return (normal(moved, feature) - n).norm() <= kTurned;
     });

@@ -53,25 +53,29 @@ void EventSearch::FindContacts(const Model<double>& model, const State<double>& 
   const ModelStructure& structure = *model.structure;
   contacts->clear();
   for (int body = 0; body < structure.num_bodies(); ++body) {
-    boxes_[body] = ComputeAabb(model.Shape(body), state.PoseOf(body), 0.5 * reach);
+    boxes_[body] = BoxOf(model, body, state.PoseOf(body), 0.5 * reach);
   }
   broad_phase_.FindPairs(
       boxes_, [&](int i, int j) { return structure.MayCollide(i, j); }, &pairs_);
-  for (const auto& [a, b] : pairs_) {
-    ContactFeature features[2];
-    const int count = FindContactFeatures(model.Shape(a), state.PoseOf(a), model.Shape(b),
-                                          state.PoseOf(b), reach, features);
-    for (int k = 0; k < count; ++k) {
-      ActiveContact contact;
-      contact.a = a;
-      contact.b = b;
-      contact.feature = features[k];
-      contact.law = ContactLaw::kInelastic;
-      ContactRows<double> rows;
-      EvaluateContactRows(model, state, contact, &rows);
-      contact.gap = rows.geometry.gap;
-      contacts->push_back(contact);
-    }
+  for (const auto& [first, second] : pairs_) {
+    const int a = first;
+    const int b = second;
+    structure.ForEachPartPair(a, b, [&](PartPair parts) {
+      ContactFeature features[2];
+      const int count =
+          FindFeatures(model, a, state.PoseOf(a), b, state.PoseOf(b), parts, reach, features);
+      for (int k = 0; k < count; ++k) {
+        ActiveContact contact;
+        contact.a = a;
+        contact.b = b;
+        contact.feature = features[k];
+        contact.law = ContactLaw::kInelastic;
+        ContactRows<double> rows;
+        EvaluateContactRows(model, state, contact, &rows);
+        contact.gap = rows.geometry.gap;
+        contacts->push_back(contact);
+      }
+    });
   }
 }
 
@@ -233,7 +237,7 @@ void EventSearch::FindPairs(const Model<double>& model) {
     const double reach = closing_[body] * segment_->length +
                          kWiderBoxes * lengths_.smallest_radius() +
                          lengths_.Rounding(segment_->before, body, body);
-    boxes_[body] = ComputeAabb(model.Shape(body), segment_->before.PoseOf(body), reach);
+    boxes_[body] = BoxOf(model, body, segment_->before.PoseOf(body), reach);
     if (structure.bodies[body].shape == ShapeType::kHalfPlane &&
         segment_->before.twist[3 * body + 2] != 0.0) {
       boxes_[body] = {-kInfinity, -kInfinity, kInfinity, kInfinity};
@@ -264,7 +268,9 @@ bool EventSearch::Run(const Model<double>& model, const std::vector<ActiveContac
     return false;
   }
   FindPairs(model);
-  for (const auto& [a, b] : pairs_) {
+  for (const auto& [first, second] : pairs_) {
+    const int a = first;
+    const int b = second;
     double turning = 0.0;  // a turning half-plane sweeps by its distance
     for (const int body : {a, b}) {
       if (model.structure->bodies[body].shape == ShapeType::kHalfPlane) {
@@ -278,7 +284,11 @@ bool EventSearch::Run(const Model<double>& model, const std::vector<ActiveContac
             turning;
       }
     }
-    SearchPair(model, a, b, &event);
+    model.structure->ForEachPartPair(a, b, [&](PartPair parts) {
+      if (event.kind != EventKind::kAtOnce) {
+        SearchPair(model, a, b, parts, &event);
+      }
+    });
     if (event.kind == EventKind::kAtOnce) {
       break;
     }

@@ -80,7 +80,7 @@ class EventSearch {
   Sample* At(const Model<double>& model, double length);
   void TakeMotion(Sample* sample, Segment* segment);
   void FindPairs(const Model<double>& model);
-  void SearchPair(const Model<double>& model, int a, int b, Event* event);
+  void SearchPair(const Model<double>& model, int a, int b, PartPair parts, Event* event);
   // Searches for the time at which a contact that opens in penetration approaches again, if it has
   // not left by then.
   void SearchReturn(const Model<double>& model, const ActiveContact& contact, double touch,

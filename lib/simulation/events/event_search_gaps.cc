@@ -54,7 +54,9 @@ bool EventSearch::MovesLittle(const Model<double>& model, const State<double>& b
   for (const int body : {a, b}) {
     const double omega =
         std::max(std::abs(before.twist[3 * body + 2]), std::abs(after.twist[3 * body + 2]));
-    if (model.structure->bodies[body].shape != ShapeType::kCircle && omega * length > kLittle) {
+    const BodyIndex& index = model.structure->bodies[body];
+    const bool is_circle = index.shape == ShapeType::kCircle && index.num_contact_points == 0;
+    if (!is_circle && omega * length > kLittle) {
       return false;
     }
   }

@@ -15,10 +15,6 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-bool OfPair(const ActiveContact& contact, int a, int b) {
-  return contact.joint < 0 && contact.a == a && contact.b == b;
-}
-
 // The contact of a vertex that leaves an edge at its end changes its feature when the vertex meets
 // the vertex there, not when the gap of the next feature is reached, whose edge has another end:
 // this returns the contact of these two vertices. It returns `next` where the pair has none, or
@@ -29,8 +25,8 @@ ActiveContact HandOver(const Model<double>& model, const State<double>& state,
   if (!of_first && lost.feature.kind != FeatureKind::kEdgeVertex) {
     return next;
   }
-  const ShapeView<double> shapes[2] = {model.Shape(lost.a), model.Shape(lost.b)};
-  if (CoreRadius(shapes[0]) > 0.0 || CoreRadius(shapes[1]) > 0.0) {
+  const ShapeView<double> shapes[2] = {ShapeOfA(model, lost), ShapeOfB(model, lost)};
+  if (IsRound(shapes[0]) || IsRound(shapes[1])) {
     return next;
   }
   const int edge = of_first ? lost.feature.b : lost.feature.a;
@@ -39,8 +35,9 @@ ActiveContact HandOver(const Model<double>& model, const State<double>& state,
   const double length = (Vertex(with_edge, ends[0]) - Vertex(with_edge, ends[1])).norm();
   for (const int end : ends) {
     ActiveContact corners = next;
-    corners.feature = {FeatureKind::kVertexVertex, of_first ? lost.feature.a : end,
-                       of_first ? end : lost.feature.b};
+    corners.feature = lost.feature;
+    corners.feature.kind = FeatureKind::kVertexVertex;
+    (of_first ? corners.feature.b : corners.feature.a) = end;
     ContactRows<double> rows;
     EvaluateContactRows(model, state, corners, &rows);
     corners.gap = rows.geometry.gap;
@@ -64,18 +61,20 @@ struct Features {
 
 class EventSearch::PairSearch {
  public:
-  PairSearch(EventSearch* search, const Model<double>& model, int a, int b, Event* event)
+  PairSearch(EventSearch* search, const Model<double>& model, int a, int b, PartPair parts,
+             Event* event)
       : search_(*search),
         model_(model),
         a_(a),
         b_(b),
+        parts_(parts),
         event_(*event),
         segment_(*search->segment_),
         touching_(*search->touching_),
         touch_(search->lengths_.Touch(segment_.before, a, b)),
         located_(search->GapTolerance(segment_.before, a, b)),
         closed_(std::any_of(segment_.contacts.begin(), segment_.contacts.end(),
-                            [&](const ActiveContact& c) { return OfPair(c, a, b); })) {}
+                            [&](const ActiveContact& c) { return IsOfPair(c); })) {}
 
   void Run() {
     SearchFrom(0.0, 0.0, Counts::kUntouched);
@@ -91,9 +90,13 @@ class EventSearch::PairSearch {
 
   Features FeaturesAt(const State<double>& state) const {
     Features found;
-    found.count = FindContactFeatures(model_.Shape(a_), state.PoseOf(a_), model_.Shape(b_),
-                                      state.PoseOf(b_), kInfinity, found.of);
+    found.count = FindFeatures(model_, a_, state.PoseOf(a_), b_, state.PoseOf(b_), parts_,
+                               kInfinity, found.of);
     return found;
+  }
+  bool IsOfPair(const ActiveContact& contact) const {
+    return contact.joint < 0 && contact.a == a_ && contact.b == b_ &&
+           contact.feature.part_a == parts_.a && contact.feature.part_b == parts_.b;
   }
   bool IsClosed(const ActiveContact& contact) const { return Contains(segment_.contacts, contact); }
   bool IsDeep(const ActiveContact& contact) const {
@@ -121,6 +124,7 @@ class EventSearch::PairSearch {
   EventSearch& search_;
   const Model<double>& model_;
   const int a_, b_;
+  const PartPair parts_;
   Event& event_;
   const Segment& segment_;
   const std::vector<ActiveContact>& touching_;
@@ -132,8 +136,9 @@ class EventSearch::PairSearch {
   bool on_face_ = false;  ///< the normal is a face's, not that of the line between two points
 };
 
-void EventSearch::SearchPair(const Model<double>& model, int a, int b, Event* event) {
-  PairSearch(this, model, a, b, event).Run();
+void EventSearch::SearchPair(const Model<double>& model, int a, int b, PartPair parts,
+                             Event* event) {
+  PairSearch(this, model, a, b, parts, event).Run();
 }
 
 // The distance along two faces up to which their ends certainly count as one above the other, m. It
@@ -183,7 +188,7 @@ double EventSearch::PairSearch::Gap(const Sample& sample, Counts counts, bool ha
   const bool hands_over =
       closed_ && !handed_over &&
       std::any_of(segment_.contacts.begin(), segment_.contacts.end(),
-                  [&](const auto& c) { return OfPair(c, a_, b_) && !features.Have(c.feature); });
+                  [&](const auto& c) { return IsOfPair(c) && !features.Have(c.feature); });
   double smallest = kInfinity;
   for (int k = 0; k < features.count; ++k) {
     ActiveContact contact;
@@ -235,7 +240,8 @@ double EventSearch::PairSearch::ClosingSpeed(double from, double to, Counts coun
     double swept = 0.0;
     for (const int body : {a_, b_}) {
       const double omega = std::abs(state->twist[3 * body + 2]);
-      const bool is_circle = model_.structure->bodies[body].shape == ShapeType::kCircle;
+      const int part = body == a_ ? parts_.a : parts_.b;
+      const bool is_circle = model_.structure->bodies[body].Part(part).type == ShapeType::kCircle;
       turn += is_circle ? 0.0 : omega;
       swept += is_circle ? 0.0 : omega * search_.lengths_.radius(body);
     }
@@ -304,7 +310,7 @@ bool EventSearch::PairSearch::SearchTouching() {
   double from = kInfinity;
   double allowed = touch_;
   for (const ActiveContact& contact : touching_) {
-    if (!OfPair(contact, a_, b_) || IsClosed(contact)) {
+    if (!IsOfPair(contact) || IsClosed(contact)) {
       continue;
     }
     if (contact.gap < -kDeepTouches * touch_) {
@@ -329,7 +335,7 @@ bool EventSearch::PairSearch::SearchTouching() {
 const ActiveContact* EventSearch::PairSearch::LostAt(const State<double>& state) const {
   const Features features = FeaturesAt(state);
   for (const ActiveContact& contact : segment_.contacts) {
-    if (OfPair(contact, a_, b_) && !features.Have(contact.feature) &&
+    if (IsOfPair(contact) && !features.Have(contact.feature) &&
         (HasPassed(state) || FeaturesAt(segment_.before).Have(contact.feature)) &&
         !Continues(state, contact, features)) {
       return &contact;

@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "tangible/dynamics/elements/force.h"
+#include "tangible/dynamics/model/lengths.h"
 #include "tangible/geometry/broad_phase.h"
 #include "tangible/geometry/collide.h"
 #include "tangible/simulation/stepping/tolerances.h"
@@ -88,25 +89,29 @@ double DeepestPenetration(const Model<double>& model, const State<double>& state
   std::vector<Aabb> boxes;
   boxes.reserve(s.num_bodies());
   for (int body = 0; body < s.num_bodies(); ++body) {
-    boxes.push_back(BoxOfTouching(ComputeAabb(model.Shape(body), state.PoseOf(body), 0.0)));
+    boxes.push_back(BoxOfTouching(BoxOf(model, body, state.PoseOf(body), 0.0)));
   }
   BroadPhase broad_phase;
   std::vector<std::pair<int, int>> pairs;
   broad_phase.FindPairs(
       boxes, [&s](int a, int b) { return s.MayCollide(a, b); }, &pairs);
   double deepest = 0.0;
-  for (const auto& [a, b] : pairs) {
-    ContactFeature features[2];
-    const ShapeView<double> shape_a = model.Shape(a);
-    const ShapeView<double> shape_b = model.Shape(b);
-    const Pose<double> pose_a = state.PoseOf(a);
-    const Pose<double> pose_b = state.PoseOf(b);
-    const int count = FindContactFeatures(shape_a, pose_a, shape_b, pose_b,
-                                          std::numeric_limits<double>::infinity(), features);
-    for (int k = 0; k < count; ++k) {
-      const double gap = EvaluateContact(features[k], shape_a, pose_a, shape_b, pose_b).gap;
-      deepest = std::max(deepest, -gap);
-    }
+  for (const auto& [first, second] : pairs) {
+    const int a = first;
+    const int b = second;
+    s.ForEachPartPair(a, b, [&](PartPair parts) {
+      ContactFeature features[2];
+      const ShapeView<double> shape_a = model.Shape(a, parts.a);
+      const ShapeView<double> shape_b = model.Shape(b, parts.b);
+      const Pose<double> pose_a = state.PoseOf(a);
+      const Pose<double> pose_b = state.PoseOf(b);
+      const int count = FindContactFeatures(shape_a, pose_a, shape_b, pose_b,
+                                            std::numeric_limits<double>::infinity(), features);
+      for (int k = 0; k < count; ++k) {
+        const double gap = EvaluateContact(features[k], shape_a, pose_a, shape_b, pose_b).gap;
+        deepest = std::max(deepest, -gap);
+      }
+    });
   }
   return deepest;
 }

@@ -6,7 +6,7 @@
 #include <limits>
 
 #include "tangible/dynamics/elements/joint.h"
-#include "tangible/geometry/mass_properties.h"
+#include "tangible/dynamics/model/lengths.h"
 #include "tangible/scene/scene_names.h"
 #include "tangible/simulation/stepping/tolerances.h"
 
@@ -19,7 +19,8 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 double SizeOf(const Model<double>& model, int body) {
   const BodyIndex& index = model.structure->bodies[body];
   if (index.block < 0) return kInfinity;
-  if (index.shape != ShapeType::kNone) return 2.0 * BoundingRadius(model.Shape(body));
+  const double radius = RadiusOf(model, body);
+  if (radius > 0.0) return 2.0 * radius;
   return std::sqrt(12.0 * model.parameters[index.inertia] / model.parameters[index.mass]);
 }
 

@@ -115,7 +115,7 @@ Stepper::Stepper(const Model<double>& model, int threads)
   }
   int shaped = 0;
   for (const BodyIndex& body : s.bodies) {
-    shaped += body.shape != ShapeType::kNone ? 1 : 0;
+    shaped += (body.shape != ShapeType::kNone ? 1 : 0) + body.num_contact_points;
   }
   // Planar packings have at most about three neighbours a body, two points each.
   const int contacts = 6 * shaped + 2 * static_cast<int>(s.joints.size());

@@ -64,11 +64,11 @@ TEST(CoverageTest, RandomScenesHaveEverything) {
     Add(CoverageOf(scene, TraceRun(scene)), &sum);
   }
   for (const std::string& what : MissingCoverage(sum)) ADD_FAILURE() << what;
-  // Of two of five shapes, in either order, but for two half-planes.
+  // Of two of six shapes, in either order, but for two half-planes.
   const std::vector<std::string> expected = ExpectedCoverage();
   EXPECT_EQ(std::count_if(expected.begin(), expected.end(),
                           [](const std::string& what) { return what.rfind("contact ", 0) == 0; }),
-            14);
+            20);
 }
 
 }  // namespace
