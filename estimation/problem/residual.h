@@ -15,12 +15,12 @@
 //   finite_difference  central, step 6e-6 max(|p|, scale); one-sided of second order at a bound
 
 #include <Eigen/Core>
+#include <array>
 #include <functional>
 #include <string>
 #include <utility>
 #include <vector>
 
-#include "tangible/estimation/problem/evaluation_log.h"
 #include "tangible/estimation/problem/least_squares.h"
 #include "tangible/estimation/problem/measurement.h"
 #include "tangible/estimation/problem/parameterized_scene.h"
@@ -77,17 +77,6 @@ class RolloutResiduals : public LeastSquaresProblem {
 
   /// Runs done so far, in double or Jets; a sweep back of the adjoint is none.
   long rollouts() const { return rollouts_; }
-  /// For runs that others do with this scene.
-  void CountRollout() { ++rollouts_; }
-  /// For what a checkpoint spares.
-  void SetRollouts(long rollouts) { rollouts_ = rollouts; }
-
-  /// Evaluations, those of multiple shooting too, are looked up in this log and kept there; null:
-  /// they are not. The log outlives them.
-  void SetLog(EvaluationLog* log) { log_ = log; }
-  /// `function`, an evaluation at this point, by way of the log.
-  bool Logged(const Eigen::VectorXd& at, const EvaluationLog::Function& function,
-              Eigen::VectorXd* residuals, RowMatrixXd* jacobian);
 
   /// The values from which a fit begins, within the bounds.
   void SetInitial(const Eigen::VectorXd& p) { scene_.SetInitial(p); }
@@ -100,6 +89,11 @@ class RolloutResiduals : public LeastSquaresProblem {
   /// take.
   bool SetParameters(const Eigen::VectorXd& p);
 
+  /// What observation i would be with the bodies in this state of the scene's model.
+  Prediction PredictionIn(int i, const State<double>& state) const;
+  /// The bodies (−1: none) of an observation's places (measurement.h).
+  std::array<int, kPlaces> BodiesOf(int i) const;
+
   /// Residuals from the samples, plan().width() numbers each.
   Eigen::VectorXd FromSamples(const std::vector<double>& samples) const;
   /// Their derivatives from those of the samples: width() a sample x any number of columns, the
@@ -111,8 +105,6 @@ class RolloutResiduals : public LeastSquaresProblem {
                                     const Eigen::VectorXd& p_by_q) const;
 
  private:
-  bool Compute(const Eigen::VectorXd& p, DerivativeMethod method, Eigen::VectorXd* residuals,
-               RowMatrixXd* jacobian);
   bool Accept(const RolloutReport& report);
   bool Plain();
   bool Tangent(RowMatrixXd* jacobian);
@@ -132,6 +124,7 @@ class RolloutResiduals : public LeastSquaresProblem {
   bool IsDirect(int i) const;
   Eigen::Index DirectNumber(int i) const;
   Prediction PredictionOf(int i, const std::vector<double>& samples) const;
+  Prediction PredictAt(int i, ObservedPlaces places) const;
   /// What a row of J owes to parameters that do not act by way of the run: places of points in
   /// their bodies, instruments.
   Eigen::RowVectorXd DirectTerm(int i, const Prediction& prediction,
@@ -150,7 +143,6 @@ class RolloutResiduals : public LeastSquaresProblem {
   RolloutTape tape_;
   std::string message_;
   long rollouts_ = 0;
-  EvaluationLog* log_ = nullptr;
 };
 
 }  // namespace tangible
