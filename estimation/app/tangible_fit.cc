@@ -19,11 +19,10 @@
 #include "tangible/app/certificate_json.h"
 #include "tangible/app/program.h"
 #include "tangible/estimation/fit/fit_checkpoint.h"
-#include "tangible/estimation/fit/sensor_noise.h"
+#include "tangible/estimation/fit/variance_components.h"
 #include "tangible/estimation/results/fit_json.h"
 #include "tangible/estimation/results/fitted_scene.h"
 #include "tangible/estimation/results/prediction.h"
-#include "tangible/estimation/results/recordings_json.h"
 #include "tangible/estimation/results/report.h"
 #include "tangible/estimation/results/residual_summary.h"
 #include "tangible/scene/csv.h"
@@ -211,24 +210,30 @@ std::string EstimateLine(const std::string& name, int k, const FitResult& result
     line += " (" + uncertainty.messages[k] + ")";
   }
   if (uncertainty.prior_share[k] > 0.0) {
-    line += ", " + Cell(100.0 * uncertainty.prior_share[k], 2) + " % of this by priors";
+    line += ", " + Cell(100.0 * uncertainty.prior_share[k], 3) + " % of this by priors";
   }
   return line;
 }
 
-/// What led to the minimum, where the plain fit did not.
+/// What led to the minimum, where that was not the plain fit alone.
 void PrintApproach(const FitResult& result) {
   for (size_t i = 0; i < result.starts.size(); ++i) {
     const FitStart& start = result.starts[i];
-    if (start.approach == "plain") {
+    const bool plain = start.approach == "plain";
+    if (plain && start.tried.empty()) {
       continue;
     }
-    std::cout << "start " << i << ": " << start.approach << " lead to a cost of "
-              << Cell(start.cost);
-    if (std::isfinite(start.plain_cost)) {
+    std::cout << "start " << i << ": " << start.approach << (plain ? " leads" : " lead")
+              << " to a cost of " << Cell(start.cost);
+    if (!plain && std::isfinite(start.plain_cost)) {
       std::cout << ", the plain fit to " << Cell(start.plain_cost);
     }
-    std::cout << "\n";
+    if (!start.tried.empty()) {
+      std::cout << ", " << start.tried << " to "
+                << (std::isfinite(start.tried_cost) ? Cell(start.tried_cost) : "none")
+                << ", which is no better";
+    }
+    std::cout << (start.message.empty() ? "" : "; " + start.message) << "\n";
   }
 }
 
@@ -254,11 +259,25 @@ void PrintEstimates(const std::vector<ParameterizedScene::Entry>& entries,
   }
 }
 
-void PrintNoise(const std::vector<SensorNoise>& noise) {
-  for (const SensorNoise& sensor : noise) {
+void PrintComponents(const VarianceComponents& components) {
+  for (const SensorNoise& sensor : components.noise) {
     std::cout << "sigma of sensor " << sensor.name << ": " << Cell(sensor.factor, 5) << " ± "
               << Cell(sensor.deviation, 2) << " times what was given, from " << sensor.count
               << " observations\n";
+  }
+  for (const SpreadEstimate& spread : components.spreads) {
+    const bool gaussian = spread.kind == PriorKind::kGaussian;
+    std::cout << "spread of " << (gaussian ? "" : "ln ") << spread.name << ": "
+              << Cell(spread.spread, 5);
+    if (spread.interval) {
+      std::cout << " (95 %: " << Cell(spread.interval->first, 5) << " to "
+                << Cell(spread.interval->second, 5) << ")";
+    }
+    std::cout << (spread.estimated ? "" : " (given)") << ", " << spread.recordings << " recordings"
+              << (spread.estimated && spread.spread == 0.0
+                      ? "; they do not differ by more than their noise explains"
+                      : "")
+              << "\n";
   }
 }
 
@@ -299,44 +318,13 @@ void PrintScore(const PredictionScore& score) {
   std::cout << "\n";
 }
 
-int WriteFiles(const FitFile& fit, const RolloutResiduals& residuals, const FitResult& result,
-               const DiscretisationCheck* check, const LaterObservations* later,
-               const std::vector<SensorNoise>& noise) {
-  const PredictionScore* const score = later == nullptr ? nullptr : &later->score;
-  ResultWriter writer;
-  writer.Write(FLAGS_out, [&] {
-    OrderedJson json = ResultToJson(residuals, result, check, score);
-    if (!noise.empty()) {
-      json["sensor_noise"] = NoiseToJson(noise);
-    }
-    json["certificate"] =
-        result.estimate.size() > 0 ? ToJson(result.certificate) : OrderedJson(nullptr);
-    return JsonText(json);
-  });
-  if (result.estimate.size() > 0) {
-    writer.Write(FLAGS_report,
-                 [&] { return FitReport(fit.path, residuals, result, check, score); });
-    writer.Write(FLAGS_predictions,
-                 [&] { return PredictionCsv(residuals, result.residuals, later); });
-  }
-  if (result.estimate.size() > 0 && !FLAGS_scene_out.empty()) {
-    std::string text;
-    std::string error;
-    if (!FittedScene(fit.problem, result.estimate, FolderOf(FLAGS_scene_out), &text, &error)) {
-      return ReportError(fit.path + ": " + error);
-    }
-    writer.Write(FLAGS_scene_out, [&] { return text; });
-  }
-  return writer.error().empty() ? kExitDone : ReportError(writer.error());
-}
-
 /// A checkpoint in its file, with what that holds already; null without --checkpoint. Returns what
 /// is wrong or empty: a file that cannot be written is found before the work, not after it.
-std::string OpenCheckpoint(const FitProblem& problem, std::unique_ptr<FitCheckpoint>* checkpoint) {
+std::string OpenCheckpoint(const FitInput& input, std::unique_ptr<FitCheckpoint>* checkpoint) {
   if (FLAGS_checkpoint.empty()) {
     return "";
   }
-  *checkpoint = std::make_unique<FitCheckpoint>(problem, [](const std::string& text) {
+  *checkpoint = std::make_unique<FitCheckpoint>(input, [](const std::string& text) {
     return WriteFileAtomically(FLAGS_checkpoint, text, Over::kOwnInput);
   });
   std::error_code none;
@@ -356,12 +344,12 @@ std::string OpenCheckpoint(const FitProblem& problem, std::unique_ptr<FitCheckpo
   return (*checkpoint)->Write();
 }
 
-/// One line unless the log was of this very fit; empty without one.
-std::string Mismatch(const FitLog* log) {
-  if (log == nullptr || log->mismatch() == 0) {
+/// One line unless the logs were of these very fits; empty without a checkpoint.
+std::string Mismatch(const FitCheckpoint* checkpoint) {
+  if (checkpoint == nullptr || checkpoint->mismatch() == 0) {
     return "";
   }
-  return FLAGS_checkpoint + ": /fits: evaluation " + std::to_string(log->mismatch()) +
+  return FLAGS_checkpoint + ": /fits: evaluation " + std::to_string(checkpoint->mismatch()) +
          " is not the one that this program makes: written by another version or on another "
          "machine; remove the file to begin anew";
 }
@@ -369,175 +357,37 @@ std::string Mismatch(const FitLog* log) {
 /// What a fit needs before it begins.
 struct Prepared {
   FitFile fit;
-  std::vector<Observation> held_back;  ///< after --predict_from
-  std::vector<RolloutResiduals> residuals;
-};
-
-/// Reads the file and the flags; kExitDone, or the status after what is wrong has been printed.
-int Prepare(const std::string& text, const std::string& file, Prepared* prepared) {
-  std::string error;
-  if (!ParseFit(text, file, &prepared->fit, &error)) {
-    return ReportError(error);
-  }
-  FitProblem& problem = prepared->fit.problem;
-  problem.options.max_iterations = FLAGS_max_iterations;
-  error = OverrideInitial(FLAGS_initial, &problem.parameters);
-  if (!error.empty()) {
-    return ReportError("tangible-fit: --initial: " + error, kExitUsage);
-  }
-  error = OverrideDerivatives(&problem.options);
-  if (!error.empty()) {
-    return ReportError("tangible-fit: --derivatives: " + error, kExitUsage);
-  }
-  if (std::isfinite(FLAGS_predict_from)) {
-    prepared->held_back = TakeLater(FLAGS_predict_from, &problem.observations);
-    if (prepared->held_back.empty() || problem.observations.empty()) {
-      return ReportError(
-          "tangible-fit: --predict_from: expected a time with observations up to it "
-          "and after it, got " +
-              Cell(FLAGS_predict_from, 10) + " with none " +
-              (prepared->held_back.empty() ? "after it" : "up to it"),
-          kExitUsage);
-    }
-  }
-  if (!MakeResiduals(problem, file, &prepared->residuals, &error)) {
-    return ReportError(error);
-  }
-  if (EstimatesNoise(problem.instruments) && !FLAGS_checkpoint.empty()) {
-    return ReportError(
-        file + ": /sensors: a fit that estimates a sensor's sigma has no --checkpoint", kExitUsage);
-  }
-  error = OutputOverInput({"out", "report", "scene_out", "predictions", "checkpoint"});
-  return error.empty() ? kExitDone : ReportError("tangible-fit: " + error, kExitUsage);
-}
-
-/// The exit status of a fit whose results are written, after a line about what is wrong.
-int Conclude(const std::string& file, const FitResult& result, const DiscretisationCheck* check,
-             const PredictionScore* score, const FitCheckpoint* checkpoint) {
-  if (result.status == FitStatus::kNoEffect) {
-    return ReportError(file + ": /parameters/" + std::to_string(result.parameter) + ": " +
-                       result.message);
-  }
-  if (result.status != FitStatus::kConverged) {
-    return ReportError(file + ": " + NameOf(result.status) + ": " + result.message);
-  }
-  if (check != nullptr && check->status != FitStatus::kConverged) {
-    return ReportError(file + ": the fit at dt / 2: " + NameOf(check->status) + ": " +
-                       check->message);
-  }
-  if (score != nullptr && !score->message.empty()) {
-    return ReportError(file + ": the run after " + Cell(FLAGS_predict_from, 10) +
-                       " s fails: " + score->message);
-  }
-  // Said above: what was asked for is not there.
-  return checkpoint != nullptr && !checkpoint->error().empty() ? kExitFailed : kExitDone;
-}
-
-int Run(const std::string& text, const std::string& file) {
-  Prepared prepared;
-  const int status = Prepare(text, file, &prepared);
-  if (status != kExitDone) {
-    return status;
-  }
-  const FitProblem& problem = prepared.fit.problem;
-  RolloutResiduals& residuals = prepared.residuals.front();
-  const auto& entries = residuals.scene().entries();
+  std::vector<std::vector<Observation>> held_back;  ///< of each recording, after --predict_from
+  std::unique_ptr<RecordingsProblem> problem;
   std::unique_ptr<FitCheckpoint> checkpoint;
-  std::string error = OpenCheckpoint(problem, &checkpoint);
-  if (!error.empty()) {
-    return ReportError(error);
-  }
-  FitLog* const log = checkpoint ? &checkpoint->fit() : nullptr;
-  IterationPrinter printer(entries);
-  const FitProgress progress = [&](int start, int iteration, const FitIteration& values) {
-    printer.Print(start, iteration, values);
-  };
-  std::vector<SensorNoise> noise;
-  const FitResult result = EstimatesNoise(problem.instruments)
-                               ? FitWithSensorNoise(problem.options, &residuals, progress, &noise)
-                               : Fit(problem.options, &residuals, progress, log);
-  ScaleSigma(noise, problem.channels, &prepared.fit.problem.observations);
-  ScaleSigma(noise, problem.channels, &prepared.held_back);
-  error = Mismatch(log);
-  if (!error.empty()) {
-    return ReportError(error);
-  }
-  if (result.estimate.size() > 0) {
-    PrintEstimates(entries, result);
-    PrintNoise(noise);
-    PrintOutliers(SummarizeResiduals(residuals, result.residuals));
-    if (result.certificate.verdict != "trustworthy") {
-      ReportError(file +
-                  ": warning: not trustworthy at the estimate: " + result.certificate.verdict);
-    }
-  }
-  std::optional<DiscretisationCheck> check;
-  if (FLAGS_discretisation_check && result.status == FitStatus::kConverged) {
-    FitLog* const half = checkpoint ? &checkpoint->half_step() : nullptr;
-    check = CheckDiscretisation(problem, result, half);
-    error = Mismatch(half);
-    if (!error.empty()) {
-      return ReportError(error);
-    }
-    PrintCheck(entries, *check);
-  }
-  std::optional<LaterObservations> later;
-  if (!prepared.held_back.empty() && result.estimate.size() > 0) {
-    later =
-        PredictLater(problem, result.estimate, FLAGS_predict_from, std::move(prepared.held_back));
-    PrintScore(later->score);
-  }
-  if (checkpoint && !checkpoint->error().empty()) {
-    ReportError(checkpoint->error() + ": the fit went on without its checkpoint");
-  }
-  const DiscretisationCheck* const checked = check ? &*check : nullptr;
-  const LaterObservations* const predicted = later ? &*later : nullptr;
-  const int written = WriteFiles(prepared.fit, residuals, result, checked, predicted, noise);
-  const PredictionScore* const score = predicted == nullptr ? nullptr : &predicted->score;
-  return written == kExitDone ? Conclude(file, result, checked, score, checkpoint.get()) : written;
-}
-
-/// The same of a file with recordings.
-struct PreparedRecordings {
-  RecordingsFile file;
-  std::vector<std::vector<Observation>> held_back;  ///< of each recording, or empty
-  std::vector<RecordedRun> runs;
 };
 
 /// Moves what each recording has after --predict_from out of the fit. Returns what is wrong.
-std::string HoldBack(PreparedRecordings* prepared) {
+std::string HoldBack(Prepared* prepared) {
   bool any = false;
-  for (RecordingEntry& entry : prepared->file.recordings) {
-    std::vector<Observation>& observations = entry.fit.problem.observations;
+  for (RecordingInput& recording : prepared->fit.input.recordings) {
+    std::vector<Observation>& observations = recording.problem.observations;
     prepared->held_back.push_back(TakeLater(FLAGS_predict_from, &observations));
     any = any || !prepared->held_back.back().empty();
     if (observations.empty()) {
-      return "expected a time with observations up to it in each recording, got " +
-             Cell(FLAGS_predict_from, 10) + " with none in '" + entry.name + "'";
+      return "expected a time with observations up to it" +
+             (recording.name.empty()
+                  ? " and after it, got " + Cell(FLAGS_predict_from, 10) + " with none up to it"
+                  : " in each recording, got " + Cell(FLAGS_predict_from, 10) + " with none in '" +
+                        recording.name + "'");
     }
   }
   return any ? ""
-             : "expected a time with observations after it, got " + Cell(FLAGS_predict_from, 10);
+             : "expected a time with observations after it, got " + Cell(FLAGS_predict_from, 10) +
+                   " with none after it";
 }
 
-int Prepare(const std::string& text, const std::string& path, PreparedRecordings* prepared) {
-  for (const char* flag : {"discretisation_check", "checkpoint"}) {
-    if (!gflags::GetCommandLineFlagInfoOrDie(flag).is_default) {
-      return ReportError(std::string("tangible-fit: --") + flag + ": not with recordings",
-                         kExitUsage);
-    }
-  }
-  std::string error;
-  if (!ParseRecordings(text, path, &prepared->file, &error)) {
-    return ReportError(error);
-  }
-  for (RecordingEntry& entry : prepared->file.recordings) {
-    FitProblem& problem = entry.fit.problem;
+/// The flags' changes of the file; kExitDone, or the status after what is wrong has been printed.
+int ApplyFlags(Prepared* prepared) {
+  for (RecordingInput& recording : prepared->fit.input.recordings) {
+    FitProblem& problem = recording.problem;
     problem.options.max_iterations = FLAGS_max_iterations;
-    if (EstimatesNoise(problem.instruments)) {
-      return ReportError(path + ": /sensors: estimate_sigma is not with recordings");
-    }
-    error = OverrideInitial(FLAGS_initial, &problem.parameters);
+    std::string error = OverrideInitial(FLAGS_initial, &problem.parameters);
     if (!error.empty()) {
       return ReportError("tangible-fit: --initial: " + error, kExitUsage);
     }
@@ -547,18 +397,41 @@ int Prepare(const std::string& text, const std::string& path, PreparedRecordings
     }
   }
   if (std::isfinite(FLAGS_predict_from)) {
-    error = HoldBack(prepared);
-    if (!error.empty()) return ReportError("tangible-fit: --predict_from: " + error, kExitUsage);
+    const std::string error = HoldBack(prepared);
+    if (!error.empty()) {
+      return ReportError("tangible-fit: --predict_from: " + error, kExitUsage);
+    }
   }
-  if (!MakeRecordingsProblem(prepared->file, &prepared->runs, &error)) {
-    return ReportError(error);
-  }
-  error = OutputOverInput({"out", "report", "predictions"});
-  return error.empty() ? kExitDone : ReportError("tangible-fit: " + error, kExitUsage);
+  return kExitDone;
 }
 
-/// Of recording b: "scene_2.json" for "scene.json".
-std::string SceneOut(int b) {
+/// Reads the file and the flags; the same.
+int Prepare(const std::string& text, const std::string& file, Prepared* prepared) {
+  std::string error;
+  if (!ParseFit(text, file, &prepared->fit, &error)) {
+    return ReportError(error);
+  }
+  const int status = ApplyFlags(prepared);
+  if (status != kExitDone) {
+    return status;
+  }
+  prepared->problem = MakeProblem(prepared->fit, &error);
+  if (prepared->problem == nullptr) {
+    return ReportError(error);
+  }
+  error = OutputOverInput({"out", "report", "scene_out", "predictions", "checkpoint"});
+  if (!error.empty()) {
+    return ReportError("tangible-fit: " + error, kExitUsage);
+  }
+  error = OpenCheckpoint(prepared->fit.input, &prepared->checkpoint);
+  return error.empty() ? kExitDone : ReportError(error);
+}
+
+/// Of recording b: "scene_2.json" for "scene.json"; the name itself of a file with one run.
+std::string SceneOut(const RecordingsProblem& problem, int b) {
+  if (!problem.IsNamed()) {
+    return FLAGS_scene_out;
+  }
   const std::filesystem::path path(FLAGS_scene_out);
   const std::string name =
       path.stem().string() + "_" + std::to_string(b) + path.extension().string();
@@ -566,73 +439,140 @@ std::string SceneOut(int b) {
 }
 
 /// Returns what went wrong or empty.
-std::string WriteFiles(const PreparedRecordings& prepared, const RecordingsProblem& problem,
-                       const FitResult& result, const LaterOfRecordings* later) {
+std::string WriteFiles(const Prepared& prepared, const FitResult& result,
+                       const FitFindings& findings) {
+  const RecordingsProblem& problem = *prepared.problem;
   const bool estimated = result.estimate.size() > 0;
   ResultWriter writer;
   writer.Write(FLAGS_out, [&] {
-    OrderedJson json = RecordingsResultToJson(problem, result, later);
+    OrderedJson json = ResultToJson(problem, result, findings);
     json["certificate"] = estimated ? ToJson(result.certificate) : OrderedJson(nullptr);
     return JsonText(json);
   });
   if (!estimated) {
     return writer.error();
   }
-  writer.Write(FLAGS_report, [&] {
-    return RecordingsReport(prepared.file.path, problem, result,
-                            later == nullptr ? nullptr : &later->score);
-  });
-  writer.Write(FLAGS_predictions, [&] {
-    return PredictionCsv(problem, result.residuals,
-                         later == nullptr ? std::vector<LaterObservations>() : later->runs);
-  });
+  writer.Write(FLAGS_report,
+               [&] { return FitReport(prepared.fit.path, problem, result, findings); });
+  writer.Write(FLAGS_predictions,
+               [&] { return PredictionCsv(problem, result.residuals, findings.later); });
   for (int b = 0; b < problem.num_blocks() && !FLAGS_scene_out.empty(); ++b) {
-    const RecordingEntry& entry = prepared.file.recordings[b];
     std::string text;
     std::string error;
-    if (!FittedScene(entry.fit.problem, problem.ParametersOf(b, result.estimate),
-                     FolderOf(FLAGS_scene_out), &text, &error)) {
-      return prepared.file.path + ": recording '" + entry.name + "': " + error;
+    if (!FittedScene(prepared.fit.input.recordings[b].problem,
+                     problem.ParametersOf(b, result.estimate), FolderOf(FLAGS_scene_out), &text,
+                     &error)) {
+      return prepared.fit.path + ": " + problem.BlockName(b) + error;
     }
-    writer.Write(SceneOut(b), [&] { return text; });
+    writer.Write(SceneOut(problem, b), [&] { return text; });
   }
   return writer.error();
 }
 
-/// Several recordings in one fit.
-int RunRecordings(const std::string& text, const std::string& file) {
-  PreparedRecordings prepared;
+/// The exit status of a fit whose results are written, after a line about what is wrong.
+int Conclude(const Prepared& prepared, const FitResult& result, const FitFindings& findings) {
+  const std::string& file = prepared.fit.path;
+  if (result.status == FitStatus::kNoEffect) {
+    const int index = prepared.problem->IndexInRecording(result.parameter);
+    return ReportError(file + ": /parameters/" + std::to_string(index) + ": " + result.message);
+  }
+  if (result.status != FitStatus::kConverged) {
+    return ReportError(file + ": " + NameOf(result.status) + ": " + result.message);
+  }
+  const DiscretisationCheck* const check = findings.check;
+  if (check != nullptr && check->status != FitStatus::kConverged) {
+    return ReportError(file + ": the fit at dt / 2: " + NameOf(check->status) + ": " +
+                       check->message);
+  }
+  if (findings.later != nullptr && !findings.later->score.message.empty()) {
+    return ReportError(file + ": the run after " + Cell(FLAGS_predict_from, 10) +
+                       " s fails: " + findings.later->score.message);
+  }
+  // Said above: what was asked for is not there.
+  const FitCheckpoint* const checkpoint = prepared.checkpoint.get();
+  return checkpoint != nullptr && !checkpoint->error().empty() ? kExitFailed : kExitDone;
+}
+
+/// The sigma that were found, for what follows the fit.
+void ScaleObservations(const std::vector<SensorNoise>& noise, Prepared* prepared) {
+  for (size_t b = 0; b < prepared->fit.input.recordings.size(); ++b) {
+    FitProblem& problem = prepared->fit.input.recordings[b].problem;
+    ScaleSigma(noise, problem.instruments, problem.channels, &problem.observations);
+    if (!prepared->held_back.empty()) {
+      ScaleSigma(noise, problem.instruments, problem.channels, &prepared->held_back[b]);
+    }
+  }
+}
+
+void PrintResult(const Prepared& prepared, const FitResult& result,
+                 const VarianceComponents& components) {
+  PrintEstimates(prepared.problem->entries(), result);
+  PrintComponents(components);
+  PrintOutliers(SummarizeResiduals(*prepared.problem, result.residuals));
+  if (result.certificate.verdict != "trustworthy") {
+    ReportError(prepared.fit.path +
+                ": warning: not trustworthy at the estimate: " + result.certificate.verdict);
+  }
+}
+
+/// The fit at dt / 2.
+DiscretisationCheck CheckStep(const Prepared& prepared, const FitResult& result) {
+  std::vector<double> spreads;
+  for (const RandomEffect& effect : prepared.problem->effects()) {
+    spreads.push_back(effect.spread);
+  }
+  FitLog* const log = prepared.checkpoint ? prepared.checkpoint->Next() : nullptr;
+  return CheckDiscretisation(prepared.fit.input, spreads, result, log);
+}
+
+int Run(const std::string& text, const std::string& file) {
+  Prepared prepared;
   const int status = Prepare(text, file, &prepared);
   if (status != kExitDone) {
     return status;
   }
-  const FitOptions& options = prepared.file.recordings.front().fit.problem.options;
-  RecordingsProblem problem(std::move(prepared.runs), prepared.file.own);
-  IterationPrinter printer(problem.entries());
+  FitCheckpoint* const checkpoint = prepared.checkpoint.get();
+  const FitOptions& options = prepared.fit.input.options();
+  IterationPrinter printer(prepared.problem->entries());
+  const FitProgress progress = [&](int start, int iteration, const FitIteration& values) {
+    printer.Print(start, iteration, values);
+  };
+  const NextLog next_log =
+      checkpoint == nullptr ? NextLog() : NextLog([checkpoint] { return checkpoint->Next(); });
+  VarianceComponents components;
   const FitResult result =
-      Fit(options, &problem, [&](int start, int iteration, const FitIteration& values) {
-        printer.Print(start, iteration, values);
-      });
+      FitWithComponents(options, prepared.problem.get(), progress, &components, next_log);
+  ScaleObservations(components.noise, &prepared);
+  std::string error = Mismatch(checkpoint);
+  if (!error.empty()) {
+    return ReportError(error);
+  }
+  FitFindings findings{&components};
   const bool estimated = result.estimate.size() > 0;
   if (estimated) {
-    PrintEstimates(problem.entries(), result);
-    if (result.certificate.verdict != "trustworthy") {
-      ReportError(file +
-                  ": warning: not trustworthy at the estimate: " + result.certificate.verdict);
-    }
+    PrintResult(prepared, result, components);
   }
-  std::optional<LaterOfRecordings> later;
+  std::optional<DiscretisationCheck> check;
+  if (FLAGS_discretisation_check && result.status == FitStatus::kConverged) {
+    findings.check = &check.emplace(CheckStep(prepared, result));
+    error = Mismatch(checkpoint);
+    if (!error.empty()) {
+      return ReportError(error);
+    }
+    PrintCheck(prepared.problem->entries(), *check);
+  }
+  std::optional<PredictedRecordings> later;
   if (!prepared.held_back.empty() && estimated) {
-    later = PredictLater(prepared.file, problem, result.estimate, FLAGS_predict_from,
-                         std::move(prepared.held_back));
+    findings.later =
+        &later.emplace(PredictLater(prepared.fit.input, *prepared.problem, result.estimate,
+                                    FLAGS_predict_from, std::move(prepared.held_back)));
     PrintScore(later->score);
   }
-  const std::string failed = WriteFiles(prepared, problem, result, later ? &*later : nullptr);
-  if (!failed.empty()) return ReportError(failed);
-  if (result.status == FitStatus::kNoEffect) {
-    return ReportError(file + ": /parameters: " + result.message);
+  if (checkpoint != nullptr && !checkpoint->error().empty()) {
+    ReportError(checkpoint->error() + ": the fit went on without its checkpoint");
   }
-  return Conclude(file, result, nullptr, later ? &later->score : nullptr, nullptr);
+  error = WriteFiles(prepared, result, findings);
+  return error.empty() ? Conclude(prepared, result, findings) : ReportError(error);
 }
 
 int Main(int argc, char** argv) {
@@ -664,7 +604,7 @@ int Main(int argc, char** argv) {
   if (!ReadTextFile(file, &text, &error)) {
     return ReportError(error);
   }
-  return HasRecordings(text) ? RunRecordings(text, file) : Run(text, file);
+  return Run(text, file);
 }
 
 }  // namespace

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <memory>
+#include <utility>
 
 #include "tangible/estimation/results/fit_json.h"
 #include "tangible/scene/scene_json.h"
@@ -52,23 +54,27 @@ bool Predict(const PendulumJob& job, const FitProblem& problem, PendulumResult* 
   Recording recording;
   FitProblem next = problem;
   next.observations.clear();
-  std::vector<RolloutResiduals> made;
   if (!ReadRecording(job.recording, whole, &recording, error) ||
       !ParseObservations(ObservationCsv(recording), job.recording, problem.scene, problem.points,
-                         ObservationSigma(), &next.observations, error) ||
-      !MakeResiduals(next, job.name, &made, error)) {
+                         ObservationSigma(), &next.observations, error)) {
     return false;
   }
+  const std::unique_ptr<RecordingsProblem> made =
+      MakeProblem({job.name, InputOf(std::move(next))}, error);
+  if (made == nullptr) {
+    return false;
+  }
+  RolloutResiduals& run = *made->run(0);
   Eigen::VectorXd errors;
-  if (!made.front().Evaluate(result->fit.estimate, problem.options.derivatives, &errors, nullptr)) {
-    *error = job.name + ": " + made.front().message();
+  if (!run.Evaluate(result->fit.estimate, problem.options.derivatives, &errors, nullptr)) {
+    *error = job.name + ": " + run.message();
     return false;
   }
   const double fitted = job.window.to - job.window.from;
   for (int seconds = 1; seconds <= static_cast<int>(kPredictedSeconds); ++seconds) {
     PredictionError prediction{static_cast<double>(seconds), 0.0};
     for (Eigen::Index i = 0; i < errors.size(); ++i) {
-      const double time = made.front().observations()[i].time;
+      const double time = run.observations()[i].time;
       if (time > fitted && time <= fitted + seconds + 1e-9) {
         prediction.error = std::max(prediction.error, std::abs(errors[i]));
       }
@@ -128,27 +134,30 @@ bool RunPendulum(const PendulumJob& job, const std::string& fits, const std::str
   *result = PendulumResult();
   result->name = job.name;
   FitFile file;
-  std::vector<RolloutResiduals> made;
   const std::string fit_file = fits + "/" + job.name + ".json";
   if (!ReadRecording(job.recording, job.window, &result->recording, error) ||
       !WriteObservations(result->recording, out + "/" + job.name + ".csv", error) ||
-      !LoadFit(fit_file, &file, error) || !MakeResiduals(file.problem, fit_file, &made, error)) {
+      !LoadFit(fit_file, &file, error)) {
     return false;
   }
-  result->parameters = made.front().scene().entries();
-  result->fit = Fit(file.problem.options, &made.front(), {});
+  const std::unique_ptr<RecordingsProblem> made = MakeProblem(file, error);
+  if (made == nullptr) {
+    return false;
+  }
+  result->parameters = made->entries();
+  result->fit = Fit(file.input.options(), made.get(), {});
   if (result->fit.status != FitStatus::kConverged) {
     *error = fit_file + ": " + NameOf(result->fit.status) + ": " + result->fit.message;
     return false;
   }
-  result->check = CheckDiscretisation(file.problem, result->fit);
+  result->check = CheckDiscretisation(file.input, {}, result->fit);
   if (result->check.status != FitStatus::kConverged) {
     *error = fit_file + ": the fit at dt / 2: " + result->check.message;
     return false;
   }
-  result->residual_rms = ResidualRms(made.front().observations(), result->fit.residuals);
-  return DeriveAll(job, file.problem, result, error) &&
-         (job.prediction_to == 0.0 || Predict(job, file.problem, result, error));
+  result->residual_rms = ResidualRms(made->run(0)->observations(), result->fit.residuals);
+  return DeriveAll(job, file.run(), result, error) &&
+         (job.prediction_to == 0.0 || Predict(job, file.run(), result, error));
 }
 
 OrderedJson PendulumToJson(const PendulumResult& result) {

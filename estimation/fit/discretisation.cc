@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tangible/estimation/fit/discretisation.h"
 
+#include <algorithm>
 #include <cmath>
+#include <memory>
 
 namespace tangible {
 
@@ -24,28 +26,61 @@ double BiasFactor(int order) {
   return ratio / (ratio - 1.0);
 }
 
-DiscretisationCheck CheckDiscretisation(const FitProblem& problem, const FitResult& result,
-                                        FitLog* log) {
-  DiscretisationCheck check;
-  check.dt = problem.scene.simulation.dt;
-  check.order = OrderOf(IntegratorOf(problem.scene.simulation));
-  FitProblem half = problem;
-  half.scene.simulation.dt = 0.5 * check.dt;
-  half.options.starts = 1;
-  half.options.approach = FitApproach::kPlain;
-  half.options.certificate = CertificatePass::kSkip;
-  half.options.held_test = HeldTest::kSkip;
-  for (size_t k = 0; k < half.parameters.size(); ++k) {
-    half.parameters[k].initial = result.estimate[static_cast<Eigen::Index>(k)];
+namespace {
+
+/// The input with half the step, without what judges an estimate; false, with a message, where
+/// orders differ.
+bool HalveSteps(FitInput* input, DiscretisationCheck* check) {
+  check->order = OrderOf(IntegratorOf(input->recordings.front().problem.scene.simulation));
+  for (RecordingInput& recording : input->recordings) {
+    SimulationSettings& simulation = recording.problem.scene.simulation;
+    if (OrderOf(IntegratorOf(simulation)) != check->order) {
+      check->message = "the scenes' steps are of different orders";
+      return false;
+    }
+    check->dt = std::max(check->dt, simulation.dt);
+    simulation.dt *= 0.5;
+    FitOptions& options = recording.problem.options;
+    options.starts = 1;
+    options.approach = FitApproach::kPlain;
+    options.certificate = CertificatePass::kSkip;
+    options.held_test = HeldTest::kSkip;
   }
-  ParameterizedScene scene;
+  return true;
+}
+
+}  // namespace
+
+DiscretisationCheck CheckDiscretisation(const FitInput& input, const std::vector<double>& spreads,
+                                        const FitResult& result, FitLog* log) {
+  DiscretisationCheck check;
+  FitInput half = input;
+  if (!HalveSteps(&half, &check)) {
+    return check;
+  }
   ParameterError error;
-  if (!scene.Create(half.scene, half.points, half.parameters, &error, half.instruments)) {
+  int fault = 0;
+  std::unique_ptr<RecordingsProblem> problem = MakeProblem(half, &error, &fault);
+  for (size_t b = 0; b < half.recordings.size() && problem != nullptr; ++b) {
+    const Eigen::VectorXd p = problem->ParametersOf(static_cast<int>(b), result.estimate);
+    for (Eigen::Index i = 0; i < p.size(); ++i) {
+      half.recordings[b].problem.parameters[static_cast<size_t>(i)].initial = p[i];
+    }
+  }
+  if (problem != nullptr) {
+    problem = MakeProblem(half, &error, &fault);
+  }
+  if (problem == nullptr) {
     check.message = error.what;
     return check;
   }
-  RolloutResiduals residuals(scene, half.observations, half.channels);
-  const FitResult fine = Fit(half.options, &residuals, {}, log);
+  for (size_t e = 0; e < spreads.size(); ++e) {
+    problem->SetSpread(static_cast<int>(e), spreads[e]);
+  }
+  if (!spreads.empty()) {
+    problem->SetInitial(result.estimate);
+  }
+  const FitResult fine = Fit(half.options(), problem.get(), {}, log);
   check.status = fine.status;
   check.message = fine.message;
   check.rollouts = fine.rollouts;

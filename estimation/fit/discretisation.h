@@ -11,13 +11,14 @@
 
 #include <Eigen/Core>
 #include <string>
+#include <vector>
 
 #include "tangible/estimation/fit/fit.h"
 
 namespace tangible {
 
 struct DiscretisationCheck {
-  double dt = 0.0;
+  double dt = 0.0;                        ///< of several recordings the largest
   int order = 1;                          ///< k, of the step
   FitStatus status = FitStatus::kFailed;  ///< of the fit at dt / 2
   std::string message;
@@ -35,8 +36,10 @@ const char* OrderName(int order);
 /// 2^k / (2^k − 1).
 double BiasFactor(int order);
 
-/// Fits the problem once more with half the step, from the estimate of `result`; `log` as in Fit.
-DiscretisationCheck CheckDiscretisation(const FitProblem& problem, const FitResult& result,
-                                        FitLog* log = nullptr);
+/// Fits everything once more with half the step, from the estimate of `result`, with `spreads` of
+/// the parameters that vary held; `log` as in Fit. Scenes whose steps are of different orders are
+/// refused.
+DiscretisationCheck CheckDiscretisation(const FitInput& input, const std::vector<double>& spreads,
+                                        const FitResult& result, FitLog* log = nullptr);
 
 }  // namespace tangible

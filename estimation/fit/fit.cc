@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <random>
+#include <utility>
 
 #include "tangible/estimation/fit/block_system.h"
 #include "tangible/estimation/fit/fit_checkpoint.h"
@@ -82,6 +83,7 @@ FitStart Describe(const Eigen::VectorXd& initial, const Minimum& minimum) {
   start.status = NameOf(minimum.status);
   start.approach = NameOf(minimum.approach);
   start.approach_iterations = minimum.approach_iterations;
+  start.message = minimum.approach_message;
   start.iterations = std::max(0, static_cast<int>(minimum.iterations.size()) - 1);
   start.cost = minimum.status == FitStatus::kFailed ? std::numeric_limits<double>::quiet_NaN()
                                                     : minimum.cost;
@@ -231,6 +233,7 @@ std::optional<Minimum> Reach(const Eigen::VectorXd& start, FitApproach approach,
   run->rollouts += minimum.rollouts;
   minimum.approach = approach;
   minimum.approach_iterations = led ? log->shot->iterations : 0;
+  minimum.approach_message = led ? log->shot->message : "";
   log->shot.reset();
   return minimum;
 }
@@ -254,8 +257,8 @@ bool MayBeLocal(const Minimum& minimum, FitRun* run) {
   return JudgeResiduals(*run->problem, blocks, num_free).MayBeLocal();
 }
 
-/// The best minimum from `start`, and the cost of the plain fit where it was made.
-Minimum BestFrom(const Eigen::VectorXd& start, FitRun* run, double* plain_cost) {
+/// What was made of a start: the best minimum, and what `start` tells of the others.
+Minimum BestFrom(const Eigen::VectorXd& start, FitRun* run, FitStart* told) {
   FitLog* const log = run->log;
   const FitApproach asked = run->options.approach;
   const FitApproach first = asked == FitApproach::kAuto ? FitApproach::kPlain : asked;
@@ -271,19 +274,28 @@ Minimum BestFrom(const Eigen::VectorXd& start, FitRun* run, double* plain_cost) 
   if (asked != FitApproach::kPlain && best.approach == first && MayBeLocal(best, run)) {
     other = Reach(start, second, run);
   }
-  for (const Minimum* minimum : {&best, other ? &*other : nullptr}) {
-    if (minimum != nullptr && minimum->approach == FitApproach::kPlain &&
-        minimum->status != FitStatus::kFailed) {
-      *plain_cost = minimum->cost;
-    }
-  }
+  log->first.reset();
+  const auto cost_of = [](const Minimum& minimum) {
+    return minimum.status == FitStatus::kFailed ? std::numeric_limits<double>::quiet_NaN()
+                                                : minimum.cost;
+  };
   // What ends at the same minimum is the first one.
   const bool same =
       other && other->status == best.status && other->cost >= best.cost * (1.0 - kSameCost);
   if (other && !same && IsBetter(*other, best)) {
-    best = std::move(*other);
+    std::swap(*other, best);
   }
-  log->first.reset();
+  const Minimum* const plain = best.approach == FitApproach::kPlain ? &best
+                               : other                              ? &*other
+                                                                    : nullptr;
+  if (plain != nullptr) {
+    told->plain_cost = cost_of(*plain);
+  }
+  if (other && other->approach != FitApproach::kPlain) {
+    told->tried = NameOf(other->approach);
+    told->tried_cost = cost_of(*other);
+    told->message = other->approach_message;
+  }
   return best;
 }
 
@@ -293,8 +305,8 @@ void RunStart(const Eigen::VectorXd& start, double gradient_norm, double initial
               FitRun* run) {
   FitLog* const log = run->log;
   const bool is_first = log->starts.empty();
-  double plain_cost = std::numeric_limits<double>::quiet_NaN();
-  Minimum minimum = BestFrom(start, run, &plain_cost);
+  FitStart told;
+  Minimum minimum = BestFrom(start, run, &told);
   const Eigen::VectorXd initial = InitialOf(run->problem->entries());
   const bool elsewhere = start != initial || minimum.approach != FitApproach::kPlain;
   if (is_first && elsewhere && !minimum.iterations.empty() && std::isfinite(initial_cost)) {
@@ -303,8 +315,14 @@ void RunStart(const Eigen::VectorXd& start, double gradient_norm, double initial
         {initial_cost, gradient_norm,
          std::vector<double>(initial.data(), initial.data() + initial.size()), 0.0});
   }
-  log->starts.push_back(Describe(is_first ? initial : start, minimum));
-  log->starts.back().plain_cost = plain_cost;
+  FitStart described = Describe(is_first ? initial : start, minimum);
+  described.plain_cost = told.plain_cost;
+  described.tried = told.tried;
+  described.tried_cost = told.tried_cost;
+  if (!told.message.empty()) {
+    described.message = told.message;
+  }
+  log->starts.push_back(std::move(described));
   if (is_first || IsBetter(minimum, log->best)) {
     log->best = std::move(minimum);
   }
@@ -344,6 +362,7 @@ void Finish(FitRun* run, FitResult* result) {
   run->rollouts += linearizer.rollouts();
   result->residuals = ObservationResiduals(*run->problem, blocks);
   UncertaintyOptions uncertainty;
+  uncertainty.leverages = run->options.leverages;
   uncertainty.huber = run->options.huber;
   uncertainty.rank_tolerance = run->options.derivatives == DerivativeMethod::kFiniteDifference
                                    ? kRankToleranceOfDifferences
@@ -481,33 +500,56 @@ FitResult Fit(const FitOptions& options, LeastSquaresProblem* problem, const Fit
   return result;
 }
 
-namespace {
-
-FitResult FitWithPriors(const FitOptions& options, LeastSquaresProblem* problem,
-                        const FitProgress& progress, FitLog* log, const FitShooting& shooting) {
-  ProblemWithPriors with_priors(problem, {});
-  return Fit(options, with_priors.HasRows() ? &with_priors : problem, progress, log, shooting);
-}
-
-}  // namespace
-
-FitResult Fit(const FitOptions& options, RecordingsProblem* problem, const FitProgress& progress) {
-  return FitWithPriors(options, problem, progress, nullptr, {});
+FitResult Fit(const FitOptions& options, RecordingsProblem* problem, const FitProgress& progress,
+              FitLog* log) {
+  const FitShooting shooting = [&options, problem](const Eigen::VectorXd& start,
+                                                   EvaluationLog* evaluations) {
+    return Shoot(options, start, problem, evaluations);
+  };
+  ProblemWithPriors with_priors(problem, problem->effects());
+  LeastSquaresProblem* const whole =
+      with_priors.HasRows() ? static_cast<LeastSquaresProblem*>(&with_priors) : problem;
+  FitResult result = Fit(options, whole, progress, log, shooting);
+  for (const RandomEffect& effect : problem->effects()) {
+    // All that is known of a shared value comes by way of the recordings' values, if not by a prior.
+    if (result.estimate.size() > 0 && !problem->entries()[effect.mean].prior) {
+      result.uncertainty.prior_share[effect.mean] = 0.0;
+    }
+  }
+  return result;
 }
 
 FitResult Fit(const FitOptions& options, RolloutResiduals* residuals, const FitProgress& progress,
               FitLog* log) {
-  const FitShooting shooting = [&options, residuals](const Eigen::VectorXd& start,
-                                                     EvaluationLog* evaluations) {
-    const long before = residuals->rollouts();
-    residuals->SetLog(evaluations);
-    const ShootingResult shot = Shoot(options, start, residuals);
-    residuals->SetLog(nullptr);
-    return FitApproachResult{shot.parameters, shot.iterations, residuals->rollouts() - before};
-  };
-  FitResult result = FitWithPriors(options, residuals, progress, log, shooting);
-  residuals->SetLog(nullptr);  // which a mismatch may have left
+  RecordingsProblem problem(std::move(*residuals));
+  FitResult result = Fit(options, &problem, progress, log);
+  *residuals = std::move(*problem.run(0));
   return result;
+}
+
+FitInput InputOf(FitProblem problem) {
+  FitInput input;
+  input.scopes.resize(problem.parameters.size());
+  input.recordings.push_back({"", 1.0, std::move(problem)});
+  return input;
+}
+
+std::unique_ptr<RecordingsProblem> MakeProblem(const FitInput& input, ParameterError* error,
+                                               int* fault) {
+  std::vector<RecordedRun> runs;
+  for (const RecordingInput& recording : input.recordings) {
+    const FitProblem& problem = recording.problem;
+    ParameterizedScene scene;
+    if (!scene.Create(problem.scene, problem.points, problem.parameters, error,
+                      problem.instruments)) {
+      *fault = static_cast<int>(runs.size());
+      return nullptr;
+    }
+    runs.push_back({recording.name, recording.weight,
+                    RolloutResiduals(std::move(scene), problem.observations, problem.channels)});
+    runs.back().residuals.SetFiles(problem.files);
+  }
+  return std::make_unique<RecordingsProblem>(std::move(runs), input.scopes);
 }
 
 }  // namespace tangible

@@ -16,12 +16,14 @@
 #include <Eigen/Core>
 #include <cmath>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "tangible/estimation/fit/held_parameters.h"
 #include "tangible/estimation/fit/uncertainty.h"
+#include "tangible/estimation/problem/evaluation_log.h"
 #include "tangible/estimation/problem/recordings.h"
 #include "tangible/estimation/problem/residual.h"
 #include "tangible/simulation/gradient/gradient.h"
@@ -54,9 +56,11 @@ struct FitOptions {
   /// Whether numbers that are held are tested where the model does not fit or a parameter is at its
   /// bound: one more run with a column for each number of the scene.
   HeldTest held_test = HeldTest::kRun;
+  /// Whether each residual's leverage is computed (Uncertainty::leverages).
+  Leverages leverages = Leverages::kSkip;
 };
 
-/// What the user asks for, in memory.
+/// One run as the user describes it, in memory.
 struct FitProblem {
   Scene scene;
   std::vector<BodyPoint> points;
@@ -67,6 +71,29 @@ struct FitProblem {
   std::vector<std::string> files;  ///< of the channels, as written
   FitOptions options;
 };
+
+/// A run that is fitted with others.
+struct RecordingInput {
+  std::string name;  ///< empty: the only one
+  double weight = 1.0;
+  FitProblem problem;  ///< what it would be alone; options are those of the fit
+};
+
+/// What the user asks for, in memory.
+struct FitInput {
+  std::vector<RecordingInput> recordings;  ///< at least one
+  std::vector<ParameterScope> scopes;      ///< of each parameter
+
+  const FitOptions& options() const { return recordings.front().problem.options; }
+};
+
+/// The fit of one run.
+FitInput InputOf(FitProblem problem);
+
+/// The residuals of an input. Null with `error` where a parameter is wrong; that is one of
+/// recording `fault`.
+std::unique_ptr<RecordingsProblem> MakeProblem(const FitInput& input, ParameterError* error,
+                                               int* fault);
 
 struct FitIteration {
   double cost = 0.0;
@@ -84,6 +111,9 @@ struct FitStart {
   std::string status;
   std::string approach = "plain";  ///< what led to it: "plain", "windows", "segments"
   double plain_cost = NAN;  ///< of the plain fit from the same point; NaN: not made, or failed
+  std::string tried;  ///< another approach that was made but not taken: "windows", ...; or empty
+  double tried_cost = NAN;  ///< where it led; NaN: it failed
+  std::string message;      ///< of what led to it, where that ended early
 };
 
 enum class FitStatus {
@@ -106,6 +136,7 @@ struct Minimum {
   long rollouts = 0;
   FitApproach approach = FitApproach::kPlain;  ///< what led to where it began
   int approach_iterations = 0;
+  std::string approach_message;  ///< why that ended early, or empty
 };
 
 struct FitResult {
@@ -135,6 +166,7 @@ struct FitApproachResult {
   Eigen::VectorXd parameters;
   int iterations = 0;
   long rollouts = 0;
+  std::string message = "";  ///< why it ended early, or empty
 };
 
 /// Multiple shooting, which needs more than a least-squares problem (kSegments). Its evaluations go
@@ -150,8 +182,10 @@ struct FitLog;  // fit_checkpoint.h
 FitResult Fit(const FitOptions& options, LeastSquaresProblem* problem, const FitProgress& progress,
               FitLog* log = nullptr, const FitShooting& shooting = {});
 
-/// The fit of several recordings with the priors of their parameters.
-FitResult Fit(const FitOptions& options, RecordingsProblem* problem, const FitProgress& progress);
+/// The fit of recordings with the priors of their parameters, and with the spreads of those that
+/// vary as they are.
+FitResult Fit(const FitOptions& options, RecordingsProblem* problem, const FitProgress& progress,
+              FitLog* log = nullptr);
 
 /// The fit of one run with the priors of its parameters.
 FitResult Fit(const FitOptions& options, RolloutResiduals* residuals, const FitProgress& progress,

@@ -10,7 +10,7 @@
 namespace tangible {
 namespace {
 
-constexpr char kFormat[] = "tangible-fit checkpoint 4";
+constexpr char kFormat[] = "tangible-fit checkpoint 5";
 // A write waits until so many times the last one's time has gone by.
 constexpr int kWait = 10;
 
@@ -65,14 +65,16 @@ Json ToJson(const FitStart& start) {
   return {{"initial", start.initial},       {"cost", start.cost},
           {"iterations", start.iterations}, {"approach_iterations", start.approach_iterations},
           {"status", start.status},         {"approach", start.approach},
-          {"plain_cost", start.plain_cost}};
+          {"plain_cost", start.plain_cost}, {"tried", start.tried},
+          {"tried_cost", start.tried_cost}, {"message", start.message}};
 }
 
 FitStart ReadStart(const Json& json) {
   return {json.at("initial"),    json.at("cost"),
           json.at("iterations"), json.at("approach_iterations"),
           json.at("status"),     json.at("approach"),
-          json.at("plain_cost")};
+          json.at("plain_cost"), json.at("tried"),
+          json.at("tried_cost"), json.at("message")};
 }
 
 Json ToJson(const Minimum& minimum) {
@@ -86,7 +88,9 @@ Json ToJson(const Minimum& minimum) {
           {"cost", minimum.cost},
           {"iterations", iterations},
           {"rollouts", minimum.rollouts},
-          {"approach", {static_cast<int>(minimum.approach), minimum.approach_iterations}}};
+          {"approach",
+           {static_cast<int>(minimum.approach), minimum.approach_iterations,
+            minimum.approach_message}}};
 }
 
 Minimum ReadMinimum(const Json& json) {
@@ -98,6 +102,7 @@ Minimum ReadMinimum(const Json& json) {
   minimum.rollouts = json.at("rollouts");
   minimum.approach = static_cast<FitApproach>(json.at("approach").at(0).get<int>());
   minimum.approach_iterations = json.at("approach").at(1);
+  minimum.approach_message = json.at("approach").at(2);
   for (const Json& i : json.at("iterations")) {
     minimum.iterations.push_back({i.at(0), i.at(1), i.at(2), i.at(3)});
   }
@@ -120,7 +125,8 @@ Json ToJson(const FitLog& log) {
     json["first"] = ToJson(*log.first);
   }
   if (log.shot) {
-    json["shot"] = {Array(log.shot->parameters), log.shot->iterations, log.shot->rollouts};
+    json["shot"] = {Array(log.shot->parameters), log.shot->iterations, log.shot->rollouts,
+                    log.shot->message};
   }
   return json;
 }
@@ -140,7 +146,7 @@ void Read(const Json& json, FitLog* log) {
   }
   if (json.contains("shot")) {
     const Json& shot = json.at("shot");
-    log->shot = {ReadVector(shot.at(0)), shot.at(1), shot.at(2)};
+    log->shot = {ReadVector(shot.at(0)), shot.at(1), shot.at(2), shot.at(3)};
   }
 }
 
@@ -170,34 +176,36 @@ void AddOptional(const std::optional<double>& x, BitHash* hash) {
   hash->Add(x.value_or(0.0));
 }
 
-}  // namespace
-
-std::uint64_t Fingerprint(const FitProblem& problem) {
-  BitHash hash;
+void AddScene(const FitProblem& problem, BitHash* to) {
+  BitHash& hash = *to;
   hash.Add(SceneToJson(problem.scene));
   for (const auto& joint : problem.scene.joints) {
-    AddSignal(joint.effort_signal, &hash);
+    AddSignal(joint.effort_signal, to);
   }
   for (const auto& force : problem.scene.forces) {
-    AddSignal(force.force_signal, &hash);
-    AddSignal(force.torque_signal, &hash);
+    AddSignal(force.force_signal, to);
+    AddSignal(force.torque_signal, to);
   }
   for (const BodyPoint& point : problem.points) {
     hash.Add(point.name);
     hash.Add(point.body);
     hash.AddAll(point.at);
   }
+}
+
+void AddParameters(const FitProblem& problem, BitHash* to) {
+  BitHash& hash = *to;
   for (const FitParameter& parameter : problem.parameters) {
     hash.Add(parameter.name);
-    AddOptional(parameter.initial, &hash);
-    AddOptional(parameter.lower, &hash);
+    AddOptional(parameter.initial, to);
+    AddOptional(parameter.lower, to);
     hash.Add(static_cast<int>(parameter.scale));
     hash.Add(parameter.prior ? static_cast<int>(parameter.prior->kind) : -1);
     if (parameter.prior) {
       hash.Add(parameter.prior->center);
       hash.Add(parameter.prior->sigma);
     }
-    AddOptional(parameter.upper, &hash);
+    AddOptional(parameter.upper, to);
     for (const ParameterSet& set : parameter.sets) {
       hash.Add(set.path);
       hash.Add(set.scale);
@@ -205,6 +213,10 @@ std::uint64_t Fingerprint(const FitProblem& problem) {
       hash.Add(static_cast<int>(set.mode));
     }
   }
+}
+
+void AddObservations(const FitProblem& problem, BitHash* to) {
+  BitHash& hash = *to;
   Instruments instruments = problem.instruments;
   for (const InstrumentNumber& number : EnumerateNumbers(&instruments)) {
     hash.Add(number.path);
@@ -229,7 +241,25 @@ std::uint64_t Fingerprint(const FitProblem& problem) {
     hash.Add(static_cast<int>(o.coordinate));
     hash.AddAll(std::array<double, 3>{o.time, o.value, o.sigma});
   }
-  const FitOptions& options = problem.options;
+}
+
+}  // namespace
+
+std::uint64_t Fingerprint(const FitInput& input) {
+  BitHash hash;
+  for (const ParameterScope& scope : input.scopes) {
+    hash.Add(static_cast<int>(scope.kind));
+    hash.Add(static_cast<int>(scope.distribution));
+    AddOptional(scope.spread, &hash);
+  }
+  for (const RecordingInput& recording : input.recordings) {
+    hash.Add(recording.name);
+    hash.Add(recording.weight);
+    AddScene(recording.problem, &hash);
+    AddParameters(recording.problem, &hash);
+    AddObservations(recording.problem, &hash);
+  }
+  const FitOptions& options = input.options();
   hash.Add(NameOf(options.derivatives));
   hash.Add(options.huber);
   hash.Add(NameOf(options.approach));
@@ -240,17 +270,34 @@ std::uint64_t Fingerprint(const FitProblem& problem) {
   return hash.value();
 }
 
-FitCheckpoint::FitCheckpoint(const FitProblem& problem, Writer writer)
-    : problem_(Fingerprint(problem)), writer_(std::move(writer)) {
-  for (FitLog& log : fits_) {
-    log.on_end = [this] { WriteOnTheWay(); };
-    log.search.OnIteration([this] { WriteNowAndThen(); });
-    log.start.OnIteration([this] { WriteNowAndThen(); });
+FitCheckpoint::FitCheckpoint(const FitInput& input, Writer writer)
+    : problem_(Fingerprint(input)), writer_(std::move(writer)) {}
+
+FitLog* FitCheckpoint::Add() {
+  FitLog& log = fits_.emplace_back();
+  log.on_end = [this] { WriteOnTheWay(); };
+  log.search.OnIteration([this] { WriteNowAndThen(); });
+  log.start.OnIteration([this] { WriteNowAndThen(); });
+  return &log;
+}
+
+FitLog* FitCheckpoint::Next() { return next_++ < fits_.size() ? &fits_[next_ - 1] : Add(); }
+
+long FitCheckpoint::mismatch() const {
+  for (const FitLog& log : fits_) {
+    if (log.mismatch() != 0) {
+      return log.mismatch();
+    }
   }
+  return 0;
 }
 
 std::string FitCheckpoint::Text() const {
-  const Json json = {{"problem", problem_}, {"fits", {ToJson(fits_[0]), ToJson(fits_[1])}}};
+  Json fits = Json::array();
+  for (const FitLog& log : fits_) {
+    fits.push_back(ToJson(log));
+  }
+  const Json json = {{"problem", problem_}, {"fits", fits}};
   const std::string content = Encode(json);
   return std::string(kFormat) + " " + HashOf(content) + "\n" + content;
 }
@@ -276,8 +323,8 @@ std::string FitCheckpoint::Restore(const std::string& text, const std::string& f
              ": /problem: a checkpoint of another fit: scene, parameters, observations or options "
              "differ; name another file, or remove this one to begin anew";
     }
-    for (size_t i = 0; i < fits_.size(); ++i) {
-      Read(json.at("fits").at(i), &fits_[i]);
+    for (const Json& fit : json.at("fits")) {
+      Read(fit, Add());
     }
   } catch (const Json::exception&) {
     return damaged;

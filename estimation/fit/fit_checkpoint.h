@@ -3,10 +3,11 @@
 //
 // A checkpoint of a fit: what is needed to go on after an interruption and end at the same bits.
 //
-//   "tangible-fit checkpoint 4 <hash of the content>\n", then in CBOR
-//   {"problem": hash, "fits": [the fit, the fit at dt / 2]}
+//   "tangible-fit checkpoint 5 <hash of the content>\n", then in CBOR
+//   {"problem": hash, "fits": [the first fit, the next, ...]}
 //
-// Of each fit it keeps the starts that are finished (how they ended, and all of the best one), the
+// Fits follow each other where standard deviations of noise or spreads are estimated
+// (variance_components.h), and the last is the one at dt / 2. Of each fit it keeps the starts that are finished (how they ended, and all of the best one), the
 // point at which windows or multiple shooting arrived, and the evaluations (evaluation_log.h) of
 // the part of a start under way: those of the search for the first point, then costs and the
 // factors of the blocks (linearisation.h), whose size does not grow with the number of
@@ -16,9 +17,9 @@
 // refused.
 
 #include <Eigen/Core>
-#include <array>
 #include <chrono>
 #include <cstdint>
+#include <deque>
 #include <functional>
 #include <optional>
 #include <string>
@@ -45,22 +46,24 @@ struct FitLog {
 };
 
 /// Of everything that determines a fit's result.
-std::uint64_t Fingerprint(const FitProblem& problem);
+std::uint64_t Fingerprint(const FitInput& input);
 
 class FitCheckpoint {
  public:
   /// Puts the text of a checkpoint into its file; returns an error or empty.
   using Writer = std::function<std::string(const std::string& text)>;
 
-  FitCheckpoint(const FitProblem& problem, Writer writer);
+  FitCheckpoint(const FitInput& input, Writer writer);
   FitCheckpoint(const FitCheckpoint&) = delete;
   FitCheckpoint& operator=(const FitCheckpoint&) = delete;
 
   /// Takes over what a file holds. Returns one line "file: what, expected, got", or empty.
   std::string Restore(const std::string& text, const std::string& file);
 
-  FitLog& fit() { return fits_[0]; }
-  FitLog& half_step() { return fits_[1]; }
+  /// The log of the next fit.
+  FitLog* Next();
+  /// Not 0: the number of an evaluation that was not where its log has it.
+  long mismatch() const;
 
   std::string Text() const;
 
@@ -77,7 +80,11 @@ class FitCheckpoint {
 
   std::uint64_t problem_ = 0;
   Writer writer_;
-  std::array<FitLog, 2> fits_;
+  /// A log whose changes are written.
+  FitLog* Add();
+
+  std::deque<FitLog> fits_;  ///< logs do not move
+  size_t next_ = 0;
   std::string error_;
   std::chrono::steady_clock::time_point written_{};
   std::chrono::steady_clock::duration write_time_{};

@@ -9,8 +9,8 @@
 //
 //   f_s² ← f_s² Σ_{i in s} r_i² / ρ_s,   ρ_s = n_s − tr(C J_sᵀ J_s)                      (1)
 //
-// with C the covariance and J_s the rows of s. Fits and (1) alternate until no factor changes by
-// more than 1e-3 of its deviation, f_s / sqrt(2 ρ_s). For one sensor this is the division by N − P;
+// with C the covariance and J_s the rows of s, in all recordings. Fits and (1) alternate until no
+// factor changes by more than 1e-3 of its deviation, f_s / sqrt(2 ρ_s) (variance_components.h). For one sensor this is the division by N − P;
 // for several it is what restricted maximum likelihood converges to. With Huber's loss the sum is
 // n_s (1.4826 median |r_i|)², which outliers do not move.
 //
@@ -21,11 +21,11 @@
 #include <vector>
 
 #include "tangible/estimation/fit/fit.h"
+#include "tangible/estimation/problem/recordings.h"
 
 namespace tangible {
 
 struct SensorNoise {
-  int sensor = -1;
   std::string name;
   double factor = 1.0;      ///< f_s, of the sigma that the observations had
   double deviation = 0.0;   ///< standard deviation of the factor
@@ -33,18 +33,17 @@ struct SensorNoise {
   double redundancy = 0.0;  ///< ρ_s
 };
 
-/// Whether some sensor's sigma is to be estimated.
-bool EstimatesNoise(const Instruments& instruments);
+/// The sensors whose sigma is to be estimated, by name: what recordings name alike is one sensor.
+std::vector<SensorNoise> SensorsToEstimate(const RecordingsProblem& problem);
 
-/// Multiplies the sigma of the observations of each sensor by its factor.
-void ScaleSigma(const std::vector<SensorNoise>& noise, const std::vector<Channel>& channels,
-                std::vector<Observation>* observations);
+/// Multiplies the sigma of the observations of each sensor that asks for it by its factor.
+void ScaleSigma(const std::vector<SensorNoise>& noise, const Instruments& instruments,
+                const std::vector<Channel>& channels, std::vector<Observation>* observations);
 
-/// The fit of one run with the noise of the sensors that ask for it; the observations of
-/// `residuals` have the sigma found when it ends. Costs are in multiples of the sigma of the time,
-/// and iterations those of all fits. Where a fit does not converge, or the factors do not settle
-/// (20 fits), the status says so.
-FitResult FitWithSensorNoise(const FitOptions& options, RolloutResiduals* residuals,
-                             const FitProgress& progress, std::vector<SensorNoise>* noise);
+/// Equation (1), at the result of a fit with leverages; the observations of `problem` get the sigma
+/// found. False, with a message, where it cannot be taken. `largest` gets the largest change of a
+/// factor in multiples of its deviation, if that is larger.
+bool UpdateNoise(const FitOptions& options, const FitResult& result, RecordingsProblem* problem,
+                 std::vector<SensorNoise>* noise, double* largest, std::string* message);
 
 }  // namespace tangible

@@ -5,7 +5,8 @@
 #include <cmath>
 
 #include "tangible/estimation/fit/minimise.h"
-#include "tangible/estimation/problem/cost_function.h"
+#include "tangible/estimation/fit/observed_state.h"
+#include "tangible/estimation/problem/problem_with_priors.h"
 #include "tangible/simulation/derivatives/rollout_tangent.h"
 
 namespace tangible {
@@ -14,8 +15,6 @@ namespace {
 // Standard deviations of the jumps, stage by stage, in multiples of the observations' median sigma.
 constexpr double kStages[] = {1e3, 30.0, 1.0};
 constexpr int kIterationsPerStage = 30;
-// Of the cost: a stage only has to lead to the next.
-constexpr double kStageTolerance = 1e-6;
 
 /// The unknown numbers of a moving body's state in the rows of w = [poses | twists | parameters].
 int StateRow(const ModelStructure& s, int i) {
@@ -74,13 +73,11 @@ double ShootingResiduals::JumpWeight(int i) const {
   return (i % 6 < 3 ? 1.0 : segment_seconds_) / jump_sigma_;
 }
 
-bool ShootingResiduals::Start(const Eigen::VectorXd& q, Eigen::VectorXd* unknowns) {
-  unknowns->resize(num_unknowns());
-  unknowns->head(num_parameters_) = q;
-  if (!residuals_->SetParameters(ToParameters(residuals_->entries(), q))) {
+bool ShootingResiduals::StatesOfRun(const Eigen::VectorXd& p, Eigen::VectorXd* states) {
+  states->setZero(num_states());
+  if (!residuals_->SetParameters(p)) {
     return false;
   }
-  residuals_->CountRollout();
   const Model<double>& model = residuals_->scene().model();
   State<double> final;
   int segment = 1;
@@ -90,13 +87,30 @@ bool ShootingResiduals::Start(const Eigen::VectorXd& q, Eigen::VectorXd* unknown
     }
     State<double> copy = state;
     for (int i = 0; i < state_size_; ++i) {
-      (*unknowns)[num_parameters_ + (segment - 1) * state_size_ + i] =
-          StateNumber(*model.structure, i, &copy);
+      (*states)[(segment - 1) * state_size_ + i] = StateNumber(*model.structure, i, &copy);
     }
     ++segment;
   };
   return Rollout(model, residuals_->scene().initial_state(), keep, &final).status ==
          StepStatus::kDone;
+}
+
+void ShootingResiduals::StatesFromObservations(const Eigen::VectorXd& p, Eigen::VectorXd* states) {
+  const ParameterizedScene& scene = residuals_->scene();
+  const bool runs = StatesOfRun(p, states);
+  State<double> state = scene.initial_state();
+  for (int segment = 1; segment < num_segments(); ++segment) {
+    const Eigen::Index first = static_cast<Eigen::Index>(segment - 1) * state_size_;
+    for (int i = 0; i < state_size_ && runs; ++i) {
+      StateNumber(*scene.model().structure, i, &state) = (*states)[first + i];
+    }
+    // Where the run fails the state before is as near as anything known.
+    const double time = StepTime(scene.scene().simulation, cuts_[segment]);
+    state = StateFromObservations(*residuals_, time, state);
+    for (int i = 0; i < state_size_; ++i) {
+      (*states)[first + i] = StateNumber(*scene.model().structure, i, &state);
+    }
+  }
 }
 
 void ShootingResiduals::AddShares(int segment, long k, Run* run) const {
@@ -181,22 +195,10 @@ void ShootingResiduals::Meet(int segment, Run* run) const {
 
 bool ShootingResiduals::Evaluate(const Eigen::VectorXd& unknowns, Eigen::VectorXd* residuals,
                                  RowMatrixXd* jacobian) {
-  return residuals_->Logged(
-      unknowns,
-      [&](Eigen::VectorXd* computed, RowMatrixXd* derivatives) {
-        return Compute(unknowns, computed, derivatives);
-      },
-      residuals, jacobian);
-}
-
-bool ShootingResiduals::Compute(const Eigen::VectorXd& unknowns, Eigen::VectorXd* residuals,
-                                RowMatrixXd* jacobian) {
-  const Eigen::VectorXd q = unknowns.head(num_parameters_);
-  const ParameterizedScene& scene = residuals_->scene();
-  if (!residuals_->SetParameters(ToParameters(scene.entries(), q))) {
+  if (!residuals_->SetParameters(unknowns.head(num_parameters_))) {
     return false;
   }
-  residuals_->CountRollout();
+  const ParameterizedScene& scene = residuals_->scene();
   const Eigen::Index num_samples = residuals_->plan().num_samples();
   Run run;
   run.unknowns = &unknowns;
@@ -210,9 +212,7 @@ bool ShootingResiduals::Compute(const Eigen::VectorXd& unknowns, Eigen::VectorXd
   if (jacobian != nullptr) {
     jacobian->setZero(num_residuals(), num_unknowns());
     run.w_dot.setZero(scene.model().structure->num_variables(), num_parameters_ + state_size_);
-    run.w_dot.leftCols(num_parameters_) =
-        scene.VariableDerivatives() *
-        ParametersByInternal(scene.entries(), ToParameters(scene.entries(), q)).asDiagonal();
+    run.w_dot.leftCols(num_parameters_) = scene.VariableDerivatives();
     run.sample_derivatives.setZero(width * num_samples, num_parameters_ + state_size_);
   }
   for (int segment = 0; segment < num_segments(); ++segment) {
@@ -231,11 +231,8 @@ bool ShootingResiduals::Compute(const Eigen::VectorXd& unknowns, Eigen::VectorXd
 }
 
 void ShootingResiduals::Scatter(const Run& run) const {
-  const ParameterizedScene& scene = residuals_->scene();
   const RowMatrixXd local = residuals_->FromSampleDerivatives(
-      run.samples, {}, run.sample_derivatives,
-      ParametersByInternal(scene.entries(),
-                           ToParameters(scene.entries(), run.unknowns->head(num_parameters_))));
+      run.samples, {}, run.sample_derivatives, Eigen::VectorXd::Ones(num_parameters_));
   for (int i = 0; i < num_observations(); ++i) {
     auto row = run.jacobian->row(i);
     row.head(num_parameters_) = local.row(i).head(num_parameters_);
@@ -247,66 +244,110 @@ void ShootingResiduals::Scatter(const Run& run) const {
   }
 }
 
-namespace {
-
-/// Minimises with the jumps' sigma as set; false, with a message, where Ceres finds no point to go
-/// on from.
-bool SolveStage(const FitOptions& options, const ParameterizedScene& scene,
-                ShootingResiduals* shooting, Eigen::VectorXd* x, ShootingResult* result) {
-  SharedEvaluation shared(
-      [shooting](const Eigen::VectorXd& at, Eigen::VectorXd* values, RowMatrixXd* jacobian) {
-        return shooting->Evaluate(at, values, jacobian);
-      },
-      x);
-  ceres::Problem::Options problem_options;
-  problem_options.evaluation_callback = &shared;
-  ceres::Problem problem(problem_options);
-  for (int i = 0; i < shooting->num_residuals(); ++i) {
-    const bool robust = options.huber > 0.0 && i < shooting->num_observations();
-    problem.AddResidualBlock(new CoordinateCostFunction(&shared, i, shooting->num_unknowns()),
-                             robust ? new ceres::HuberLoss(options.huber) : nullptr, x->data());
+ShootingProblem::ShootingProblem(int segments, RecordingsProblem* problem)
+    : problem_(problem), effects_(problem->effects()) {
+  const std::vector<ParameterEntry>& entries = problem->entries();
+  entries_.assign(entries.begin(), entries.begin() + num_shared());
+  for (int block = 0; block < num_blocks(); ++block) {
+    runs_.emplace_back(segments, problem->run(block));
+    median_sigma_.push_back(MedianSigma(problem->run(block)->observations()));
+    const int before = num_shared() + block * problem->num_own(block);
+    const int shift = static_cast<int>(entries_.size()) - before;
+    for (RandomEffect& effect : effects_) {
+      effect.own[block] += shift;
+    }
+    const auto own = entries.begin() + before;
+    entries_.insert(entries_.end(), own, own + problem->num_own(block));
+    const ParameterEntry state{"a state between segments", 0.0, -HUGE_VAL, HUGE_VAL};
+    entries_.insert(entries_.end(), static_cast<size_t>(runs_.back().num_states()), state);
   }
-  SetInternalBounds(scene.entries(), 0, scene.size(), &problem, x->data());
-  ceres::Solver::Options solver;
-  solver.linear_solver_type = ceres::DENSE_QR;
-  solver.max_num_iterations = kIterationsPerStage;
-  solver.function_tolerance = kStageTolerance;
-  solver.max_num_consecutive_invalid_steps = 20;
-  solver.line_search_interpolation_type = ceres::QUADRATIC;
-  solver.logging_type = ceres::SILENT;
-  ceres::Solver::Summary summary;
-  ceres::Solve(solver, &problem, &summary);
-  if (!summary.IsSolutionUsable()) {
-    result->message = "multiple shooting: " + summary.message;
+}
+
+bool ShootingProblem::Start(const Eigen::VectorXd& p, Eigen::VectorXd* unknowns) {
+  const BlockLayout layout(*this);
+  unknowns->resize(layout.num_parameters());
+  unknowns->head(num_shared()) = p.head(num_shared());
+  bool any = false;
+  for (int block = 0; block < num_blocks(); ++block) {
+    const int own = problem_->num_own(block);
+    Eigen::VectorXd states;
+    runs_[block].StatesFromObservations(problem_->ParametersOf(block, p), &states);
+    unknowns->segment(layout.own_offset(block), own) = p.segment(num_shared() + block * own, own);
+    unknowns->segment(layout.own_offset(block) + own, states.size()) = states;
+    any = any || states.size() > 0;
+  }
+  return any;
+}
+
+Eigen::VectorXd ShootingProblem::ParametersOf(const Eigen::VectorXd& unknowns) const {
+  const BlockLayout layout(*this);
+  Eigen::VectorXd p(static_cast<Eigen::Index>(problem_->entries().size()));
+  p.head(num_shared()) = unknowns.head(num_shared());
+  for (int block = 0; block < num_blocks(); ++block) {
+    const int own = problem_->num_own(block);
+    p.segment(num_shared() + block * own, own) = unknowns.segment(layout.own_offset(block), own);
+  }
+  return p;
+}
+
+void ShootingProblem::SetJumpSigma(double sigma) {
+  for (size_t block = 0; block < runs_.size(); ++block) {
+    runs_[block].SetJumpSigma(sigma * median_sigma_[block]);
+  }
+}
+
+bool ShootingProblem::EvaluateBlock(int block, const Eigen::VectorXd& p,
+                                    DerivativeMethod /*method*/, BlockDerivatives derivatives,
+                                    BlockEvaluation* evaluation) {
+  ShootingResiduals& run = runs_[block];
+  const Eigen::Index states = run.num_states();
+  const Eigen::VectorXd ordered = problem_->Ordered(p.head(p.size() - states));
+  const Eigen::Index parameters = ordered.size();
+  Eigen::VectorXd unknowns(parameters + states);
+  unknowns << ordered, p.tail(states);
+  const bool with_jacobian = derivatives == BlockDerivatives::kCompute;
+  RowMatrixXd jacobian;
+  evaluation->rollouts = 1;
+  if (!run.Evaluate(unknowns, &evaluation->residuals, with_jacobian ? &jacobian : nullptr)) {
+    evaluation->message = "a segment's run fails";
     return false;
   }
-  result->iterations += static_cast<int>(summary.iterations.size()) - 1;
-  result->parameters = ToParameters(scene.entries(), x->head(scene.size()));
-  shared.PrepareForEvaluation(false, true);
-  const Eigen::Index jumps = shared.values().size() - shooting->num_observations();
-  result->jump = jumps > 0 ? shared.values().tail(jumps).cwiseAbs().maxCoeff() : 0.0;
+  if (with_jacobian) {
+    const std::vector<int>& order = problem_->order();
+    evaluation->jacobian.setZero(jacobian.rows(), p.size());
+    evaluation->jacobian.rightCols(states) = jacobian.rightCols(states);
+    for (size_t k = 0; k < order.size(); ++k) {
+      if (order[k] >= 0) {
+        evaluation->jacobian.col(static_cast<Eigen::Index>(k)) = jacobian.col(order[k]);
+      }
+    }
+  }
   return true;
 }
 
-}  // namespace
-
-ShootingResult Shoot(const FitOptions& options, const Eigen::VectorXd& start,
-                     RolloutResiduals* residuals) {
-  ShootingResult result;
-  result.parameters = start;
-  ShootingResiduals shooting(options.segments, residuals);
+FitApproachResult Shoot(const FitOptions& options, const Eigen::VectorXd& start,
+                        RecordingsProblem* problem, EvaluationLog* log) {
+  FitApproachResult result{start};
+  ShootingProblem shooting(options.segments, problem);
   Eigen::VectorXd x;
-  if (!shooting.Start(ToInternal(residuals->entries(), start), &x)) {
-    result.message = "multiple shooting: the run at the initial values fails";
+  if (!shooting.Start(start, &x)) {
     return result;
   }
-  const double sigma = MedianSigma(residuals->observations());
+  FitOptions stage_options = options;
+  stage_options.max_iterations = kIterationsPerStage;
   for (const double stage : kStages) {
-    shooting.SetJumpSigma(stage * sigma);
-    if (!SolveStage(options, residuals->scene(), &shooting, &x, &result)) {
+    shooting.SetJumpSigma(stage);
+    ProblemWithPriors with_priors(&shooting, shooting.effects());
+    const Minimum minimum = Minimise(
+        stage_options, x, [] { return 0.0; }, {}, &with_priors, log);
+    result.rollouts += minimum.rollouts;
+    if (minimum.status == FitStatus::kFailed || !std::isfinite(minimum.cost)) {
+      result.message = "multiple shooting ended early: " + minimum.message;
       return result;
     }
-    result.jump *= stage;
+    x = minimum.parameters;
+    result.iterations += std::max(0, static_cast<int>(minimum.iterations.size()) - 1);
+    result.parameters = shooting.ParametersOf(x);
   }
   return result;
 }

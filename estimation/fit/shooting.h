@@ -4,41 +4,34 @@
 // Multiple shooting: a start for the fit where a single run is too long to be steered from its
 // beginning.
 //
-// The run is cut at S − 1 steps. The states x_j of the moving bodies there are unknowns beside the
-// parameters q; every segment runs from its own x_j, and its end must meet the next one:
+// Each run is cut at S − 1 steps. The states x_j of the moving bodies there are unknowns beside the
+// parameters p, of the run's recording alone; every segment runs from its own x_j, and its end must
+// meet the next one:
 //
-//   minimise  1/2 Σ ρ(r_i(q, x)²) + 1/2 Σ_j ‖W (end_j(q, x_j) − x_{j+1})‖²
+//   minimise  1/2 Σ ρ(r_i(p, x)²) + 1/2 Σ_j ‖W (end_j(p, x_j) − x_{j+1})‖²
 //
-//   j = 0 .. S − 2,   x_0 = x_0(q)
+//   j = 0 .. S − 2,   x_0 = x_0(p)
 //
 // Over a short segment the predictions are nearly linear in the unknowns, so that a wrong period or
-// a chaotic end does not trap the minimiser. W grows in stages, from jumps that cost little, when
-// the observations alone place the states, to jumps of less than the noise. Joints and contacts of
-// a segment's first step put right a state that violates them. The single run then starts at the
-// parameters found: optimum and covariance are the fit's own, whatever S.
+// a chaotic end does not trap the minimiser. The states begin at what the observations around them
+// say (observed_state.h), on the joints; what those do not say is that of the run at the initial
+// values. W grows in stages, from jumps that cost little, when the observations alone place the
+// states, to jumps of less than the noise. Joints and contacts of a segment's first step put right
+// a state that violates them. The single run then starts at the parameters found: optimum and
+// covariance are the fit's own, whatever S.
 
 #include <Eigen/Core>
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "tangible/estimation/fit/fit.h"
+#include "tangible/estimation/problem/recordings.h"
 
 namespace tangible {
 
-struct ShootingResult {
-  Eigen::VectorXd parameters;
-  int iterations = 0;   ///< of all stages
-  double jump = 0.0;    ///< the largest jump left, in multiples of the median sigma
-  std::string message;  ///< why not all stages were done, or empty
-};
-
-/// Multiple shooting from `start`. Where a stage fails, the parameters of the one before are
-/// returned.
-ShootingResult Shoot(const FitOptions& options, const Eigen::VectorXd& start,
-                     RolloutResiduals* residuals);
-
-/// The residuals of multiple shooting: those of the observations, then the jumps; unknowns [q | x_1
-/// | .. | x_{S−1}].
+/// The residuals of one run in segments: those of the observations, then the jumps; unknowns [p |
+/// x_1 | .. | x_{S−1}].
 class ShootingResiduals {
  public:
   /// At most one segment a step.
@@ -46,22 +39,25 @@ class ShootingResiduals {
 
   int num_segments() const { return static_cast<int>(cuts_.size()) - 1; }
   int state_size() const { return state_size_; }
-  int num_unknowns() const { return num_parameters_ + (num_segments() - 1) * state_size_; }
+  int num_states() const { return (num_segments() - 1) * state_size_; }
+  int num_unknowns() const { return num_parameters_ + num_states(); }
   int num_observations() const;
-  int num_residuals() const { return num_observations() + (num_segments() - 1) * state_size_; }
+  int num_residuals() const { return num_observations() + num_states(); }
 
-  /// The unknowns with the states of one whole run at q; false where that fails.
-  bool Start(const Eigen::VectorXd& q, Eigen::VectorXd* unknowns);
+  /// The states x_1 ... x_{S−1} of one whole run at p; false where that fails.
+  bool StatesOfRun(const Eigen::VectorXd& p, Eigen::VectorXd* states);
+  /// The same with what the observations around each cut say of them.
+  void StatesFromObservations(const Eigen::VectorXd& p, Eigen::VectorXd* states);
 
   /// Standard deviation of jumps of positions and angles, in m and rad; of rates by the length of a
   /// segment.
   void SetJumpSigma(double sigma) { jump_sigma_ = sigma; }
 
+  /// At [p | states]; `jacobian` may be null.
   bool Evaluate(const Eigen::VectorXd& unknowns, Eigen::VectorXd* residuals, RowMatrixXd* jacobian);
 
  private:
   struct Run;
-  bool Compute(const Eigen::VectorXd& unknowns, Eigen::VectorXd* residuals, RowMatrixXd* jacobian);
   bool RunSegment(int segment, Run* run);
   void AddShares(int segment, long k, Run* run) const;
   void Meet(int segment, Run* run) const;
@@ -75,5 +71,48 @@ class ShootingResiduals {
   double segment_seconds_ = 0.0;
   double jump_sigma_ = 1.0;
 };
+
+/// All runs in segments: the states are further own parameters of each recording, the jumps further
+/// rows of its block, without the robust loss.
+class ShootingProblem : public LeastSquaresProblem {
+ public:
+  /// `problem` outlives this.
+  ShootingProblem(int segments, RecordingsProblem* problem);
+
+  /// [p | states] from p. False where there is nothing to cut.
+  bool Start(const Eigen::VectorXd& p, Eigen::VectorXd* unknowns);
+  /// p out of [p | states].
+  Eigen::VectorXd ParametersOf(const Eigen::VectorXd& unknowns) const;
+  /// In multiples of the median sigma of each recording.
+  void SetJumpSigma(double sigma);
+  /// The parameters that vary, with their indices in [p | states].
+  const std::vector<RandomEffect>& effects() const { return effects_; }
+
+  const std::vector<ParameterEntry>& entries() const override { return entries_; }
+  int num_shared() const override { return problem_->num_shared(); }
+  int num_blocks() const override { return problem_->num_blocks(); }
+  int num_own(int block) const override {
+    return problem_->num_own(block) + runs_[block].num_states();
+  }
+  int num_rows(int block) const override { return runs_[block].num_residuals(); }
+  int num_observation_rows(int block) const override { return problem_->num_rows(block); }
+  double weight(int block) const override { return problem_->weight(block); }
+  std::vector<RowPlace> Places(int block) const override { return problem_->Places(block); }
+  bool EvaluateBlock(int block, const Eigen::VectorXd& p, DerivativeMethod method,
+                     BlockDerivatives derivatives, BlockEvaluation* evaluation) override;
+  std::string BlockName(int block) const override { return problem_->BlockName(block); }
+
+ private:
+  RecordingsProblem* problem_;
+  std::vector<ShootingResiduals> runs_;
+  std::vector<double> median_sigma_;
+  std::vector<ParameterEntry> entries_;
+  std::vector<RandomEffect> effects_;
+};
+
+/// Multiple shooting from `start`. Where a stage fails, the parameters of the one before are
+/// returned, with a message. Evaluations go through `log` unless it is null.
+FitApproachResult Shoot(const FitOptions& options, const Eigen::VectorXd& start,
+                        RecordingsProblem* problem, EvaluationLog* log);
 
 }  // namespace tangible

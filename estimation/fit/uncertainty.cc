@@ -98,6 +98,9 @@ class Estimator {
     NameUndetermined();
     FillCovariance();
     FillPriorShares();
+    if (options_.leverages == Leverages::kCompute) {
+      FillLeverages();
+    }
     FillRobust();
     ProposeCombinations();
     return result_;
@@ -354,6 +357,31 @@ class Estimator {
         result_.prior_share[k] = std::min(1.0, part[k] / all_(k, k));
       }
     }
+  }
+
+  /// With C's parts of the shared and of a block's own parameters.
+  void FillLeverages() {
+    std::vector<double> all;
+    all.reserve(static_cast<size_t>(layout_.num_rows()));
+    for (size_t b = 0; b < parts_.size(); ++b) {
+      const BlockPart& part = parts_[b];
+      const Eigen::Index rows = problem_.num_observation_rows(static_cast<int>(b));
+      // u = s − o D: o (OᵀO)⁻¹ oᵀ + u C_shared uᵀ
+      RowMatrixXd u = part.shared_rows.topRows(rows);
+      if (!part.own.empty()) {
+        u -= part.own_rows.topRows(rows) * part.from_shared;
+      }
+      for (Eigen::Index i = 0; i < rows; ++i) {
+        double leverage = shared_.empty() ? 0.0 : u.row(i).dot(u.row(i) * shared_covariance_);
+        if (!part.own.empty()) {
+          const auto own = part.own_rows.row(i);
+          leverage += own.dot(own * part.own_normal);
+        }
+        all.push_back(leverage);
+      }
+    }
+    result_.leverages =
+        Eigen::Map<const Eigen::VectorXd>(all.data(), static_cast<Eigen::Index>(all.size()));
   }
 
   void FillRobust() {

@@ -42,10 +42,14 @@ namespace tangible {
 /// Of more parameters the covariances of those of single recordings are not kept.
 inline constexpr int kMostCovariance = 300;
 
+/// Whether leverages are computed: time N P² and a number a residual.
+enum class Leverages { kSkip, kCompute };
+
 struct UncertaintyOptions {
   double rank_tolerance = 1e-9;
   double condition_warning = 1e4;  ///< of J with unit columns
   double huber = 0.0;              ///< as FitOptions
+  Leverages leverages = Leverages::kSkip;
 };
 
 using ConfidenceInterval = std::optional<std::pair<double, double>>;
@@ -67,6 +71,9 @@ struct Uncertainty : ResidualQuality {
   std::vector<std::string> messages;  ///< a parameter: why it has no interval; else empty
   double condition = 1.0;             ///< of J with unit columns, over the parameters that are free
   std::vector<std::string> warnings;  ///< of the whole
+  /// J_i C J_iᵀ of each observation row i: what part of it the parameters take. Empty unless it was
+  /// asked for.
+  Eigen::VectorXd leverages;
 };
 
 /// `estimate` of all parameters of the problem, and its blocks there, with Jacobians.

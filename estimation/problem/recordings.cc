@@ -1,44 +1,92 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tangible/estimation/problem/recordings.h"
 
+#include <algorithm>
 #include <set>
 #include <utility>
 
 namespace tangible {
 
-RecordingsProblem::RecordingsProblem(std::vector<RecordedRun> recordings, std::vector<bool> own)
-    : recordings_(std::move(recordings)) {
-  for (size_t i = 0; i < own.size(); ++i) {
-    (own[i] ? own_ : shared_).push_back(static_cast<int>(i));
+RecordingsProblem::RecordingsProblem(std::vector<RecordedRun> recordings,
+                                     std::vector<ParameterScope> scopes)
+    : recordings_(std::move(recordings)), scopes_(std::move(scopes)) {
+  for (size_t i = 0; i < scopes_.size(); ++i) {
+    const int parameter = static_cast<int>(i);
+    if (scopes_[i].kind != ParameterScope::Kind::kOwn) {
+      shared_.push_back(parameter);
+      order_.push_back(scopes_[i].kind == ParameterScope::Kind::kVaries ? -1 : parameter);
+    }
+    if (scopes_[i].kind != ParameterScope::Kind::kShared) own_.push_back(parameter);
   }
-  order_ = shared_;
   order_.insert(order_.end(), own_.begin(), own_.end());
+  AddEntries();
+  AddEffects();
+}
+
+RecordingsProblem::RecordingsProblem(RolloutResiduals residuals) {
+  scopes_.resize(residuals.entries().size());
+  for (int i = 0; i < residuals.num_parameters(); ++i) shared_.push_back(i);
+  order_ = shared_;
+  recordings_.push_back({"", 1.0, std::move(residuals)});
+  AddEntries();
+}
+
+void RecordingsProblem::AddEntries() {
   for (const int i : shared_) {
     entries_.push_back(recordings_.front().residuals.entries()[i]);
   }
   for (const RecordedRun& recording : recordings_) {
     for (const int i : own_) {
       ParameterEntry entry = recording.residuals.entries()[i];
-      entry.name += " of " + recording.name;
+      if (IsNamed()) entry.name += " of " + recording.name;
+      // What is known beforehand of a parameter that varies is known of the shared value.
+      if (scopes_[i].kind == ParameterScope::Kind::kVaries) entry.prior.reset();
       entries_.push_back(std::move(entry));
     }
   }
 }
 
-int RecordingsProblem::ParameterOf(int recording, int i) const {
+void RecordingsProblem::AddEffects() {
   for (size_t k = 0; k < shared_.size(); ++k) {
-    if (shared_[k] == i) return static_cast<int>(k);
+    const int i = shared_[k];
+    const ParameterScope& scope = scopes_[i];
+    if (scope.kind != ParameterScope::Kind::kVaries) continue;
+    RandomEffect effect;
+    effect.name = entries_[k].name;
+    effect.kind = scope.distribution;
+    effect.mean = static_cast<int>(k);
+    for (int block = 0; block < num_blocks(); ++block) effect.own.push_back(ParameterOf(block, i));
+    const double wide = effect.kind == PriorKind::kLogNormal ? 1.0 : entries_[k].scale;
+    effect.spread = scope.spread.value_or(wide);
+    effects_.push_back(std::move(effect));
+    effect_parameters_.push_back(i);
   }
+}
+
+int RecordingsProblem::ParameterOf(int recording, int i) const {
   for (size_t k = 0; k < own_.size(); ++k) {
     if (own_[k] == i) {
       return num_shared() + recording * num_own(recording) + static_cast<int>(k);
     }
   }
+  for (size_t k = 0; k < shared_.size(); ++k) {
+    if (shared_[k] == i) return static_cast<int>(k);
+  }
   return -1;
 }
 
+int RecordingsProblem::IndexInRecording(int k) const {
+  const int own = k - num_shared();
+  return own < 0 ? shared_[k] : own_[own % num_own(0)];
+}
+
+int RecordingsProblem::RecordingOf(int k) const {
+  const int own = k - num_shared();
+  return own < 0 ? -1 : own / num_own(0);
+}
+
 Eigen::VectorXd RecordingsProblem::ParametersOf(int recording, const Eigen::VectorXd& p) const {
-  Eigen::VectorXd ordered(static_cast<Eigen::Index>(order_.size()));
+  Eigen::VectorXd ordered(static_cast<Eigen::Index>(scopes_.size()));
   for (Eigen::Index i = 0; i < ordered.size(); ++i) {
     ordered[i] = p[ParameterOf(recording, static_cast<int>(i))];
   }
@@ -46,11 +94,21 @@ Eigen::VectorXd RecordingsProblem::ParametersOf(int recording, const Eigen::Vect
 }
 
 Eigen::VectorXd RecordingsProblem::Ordered(const Eigen::VectorXd& local) const {
-  Eigen::VectorXd ordered(local.size());
+  Eigen::VectorXd ordered(static_cast<Eigen::Index>(scopes_.size()));
   for (size_t k = 0; k < order_.size(); ++k) {
-    ordered[order_[k]] = local[static_cast<Eigen::Index>(k)];
+    if (order_[k] >= 0) ordered[order_[k]] = local[static_cast<Eigen::Index>(k)];
   }
   return ordered;
+}
+
+void RecordingsProblem::SetInitial(const Eigen::VectorXd& p) {
+  for (size_t k = 0; k < entries_.size(); ++k) {
+    entries_[k].initial =
+        std::clamp(p[static_cast<Eigen::Index>(k)], entries_[k].lower, entries_[k].upper);
+  }
+  for (int block = 0; block < num_blocks(); ++block) {
+    recordings_[block].residuals.SetInitial(ParametersOf(block, p));
+  }
 }
 
 std::vector<RowPlace> RecordingsProblem::Places(int block) const {
@@ -60,12 +118,17 @@ std::vector<RowPlace> RecordingsProblem::Places(int block) const {
 bool RecordingsProblem::EvaluateBlock(int block, const Eigen::VectorXd& p, DerivativeMethod method,
                                       BlockDerivatives derivatives, BlockEvaluation* evaluation) {
   if (!recordings_[block].residuals.EvaluateBlock(0, Ordered(p), method, derivatives, evaluation)) {
-    evaluation->message = BlockName(block) + evaluation->message;
     return false;
   }
-  if (derivatives == BlockDerivatives::kCompute) {
-    const RowMatrixXd ordered = evaluation->jacobian(Eigen::all, order_);
-    evaluation->jacobian = ordered;
+  if (derivatives == BlockDerivatives::kCompute && order_ != shared_) {
+    RowMatrixXd ordered =
+        RowMatrixXd::Zero(evaluation->jacobian.rows(), static_cast<Eigen::Index>(order_.size()));
+    for (size_t k = 0; k < order_.size(); ++k) {
+      if (order_[k] >= 0) {
+        ordered.col(static_cast<Eigen::Index>(k)) = evaluation->jacobian.col(order_[k]);
+      }
+    }
+    evaluation->jacobian = std::move(ordered);
   }
   return true;
 }
@@ -112,9 +175,7 @@ std::unique_ptr<LeastSquaresProblem> RecordingsProblem::Window(double part) cons
   for (const RecordedRun& recording : recordings_) {
     early.push_back({recording.name, recording.weight, recording.residuals.FirstPart(part)});
   }
-  std::vector<bool> own(order_.size(), false);
-  for (const int i : own_) own[i] = true;
-  return std::make_unique<RecordingsProblem>(std::move(early), own);
+  return std::make_unique<RecordingsProblem>(std::move(early), scopes_);
 }
 
 }  // namespace tangible

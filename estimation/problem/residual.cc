@@ -149,8 +149,8 @@ bool RolloutResiduals::EvaluateBlock(int /*block*/, const Eigen::VectorXd& p,
                                      BlockEvaluation* evaluation) {
   const long before = rollouts_;
   const bool done =
-      Compute(p, method, &evaluation->residuals,
-              derivatives == BlockDerivatives::kCompute ? &evaluation->jacobian : nullptr);
+      Evaluate(p, method, &evaluation->residuals,
+               derivatives == BlockDerivatives::kCompute ? &evaluation->jacobian : nullptr);
   evaluation->message = message_;
   evaluation->rollouts = rollouts_ - before;
   return done;
@@ -173,22 +173,6 @@ std::optional<Certificate> RolloutResiduals::Certify(const Eigen::VectorXd& p) {
 
 bool RolloutResiduals::Evaluate(const Eigen::VectorXd& p, DerivativeMethod method,
                                 Eigen::VectorXd* residuals, RowMatrixXd* jacobian) {
-  return Logged(
-      p,
-      [&](Eigen::VectorXd* computed, RowMatrixXd* derivatives) {
-        return Compute(p, method, computed, derivatives);
-      },
-      residuals, jacobian);
-}
-
-bool RolloutResiduals::Logged(const Eigen::VectorXd& at, const EvaluationLog::Function& function,
-                              Eigen::VectorXd* residuals, RowMatrixXd* jacobian) {
-  return log_ == nullptr ? function(residuals, jacobian)
-                         : log_->Evaluate(at, function, residuals, jacobian, &rollouts_, &message_);
-}
-
-bool RolloutResiduals::Compute(const Eigen::VectorXd& p, DerivativeMethod method,
-                               Eigen::VectorXd* residuals, RowMatrixXd* jacobian) {
   if (!SetParameters(p)) {
     return false;
   }
@@ -380,13 +364,7 @@ Eigen::Index RolloutResiduals::DirectNumber(int i) const {
 }
 
 Prediction RolloutResiduals::PredictionOf(int i, const std::vector<double>& samples) const {
-  const Observation& observation = observations_[i];
-  const Channel& channel = ChannelOf(observation);
-  const Instruments& instruments = scene_.instruments();
-  const Camera* const camera = channel.camera < 0 ? nullptr : &instruments.cameras[channel.camera];
-  const int points[kPlaces] = {observation.point, channel.to_point,
-                               camera == nullptr ? -1 : camera->marker_point};
-  // Twists that are not needed are 0.
+  // Twists that nobody reads are 0.
   double states[kPlaces][6] = {};
   ObservedPlaces places;
   for (int place = 0; place < kPlaces; ++place) {
@@ -397,8 +375,41 @@ Prediction RolloutResiduals::PredictionOf(int i, const std::vector<double>& samp
     const double* const from = &samples[static_cast<size_t>(plan_.width()) * sample];
     std::copy(from, from + plan_.width(), states[place]);
     places[place].state = states[place];
-    places[place].point = points[place];
-    if (points[place] >= 0) {
+  }
+  return PredictAt(i, places);
+}
+
+std::array<int, kPlaces> RolloutResiduals::BodiesOf(int i) const {
+  const int channel = observations_[i].channel;
+  return {observations_[i].body, channels_[channel].to_body, markers_[channel]};
+}
+
+Prediction RolloutResiduals::PredictionIn(int i, const State<double>& state) const {
+  double states[kPlaces][6] = {};
+  ObservedPlaces places;
+  const std::array<int, kPlaces> bodies = BodiesOf(i);
+  for (int place = 0; place < kPlaces; ++place) {
+    if (bodies[place] >= 0) {
+      const size_t first = 3 * static_cast<size_t>(bodies[place]);
+      std::copy_n(&state.pose[first], 3, states[place]);
+      std::copy_n(&state.twist[first], 3, states[place] + 3);
+      places[place].state = states[place];
+    }
+  }
+  return PredictAt(i, places);
+}
+
+/// `places` have their states.
+Prediction RolloutResiduals::PredictAt(int i, ObservedPlaces places) const {
+  const Observation& observation = observations_[i];
+  const Channel& channel = ChannelOf(observation);
+  const Instruments& instruments = scene_.instruments();
+  const Camera* const camera = channel.camera < 0 ? nullptr : &instruments.cameras[channel.camera];
+  const int points[kPlaces] = {observation.point, channel.to_point,
+                               camera == nullptr ? -1 : camera->marker_point};
+  for (int place = 0; place < kPlaces; ++place) {
+    if (places[place].state != nullptr && points[place] >= 0) {
+      places[place].point = points[place];
       places[place].at = scene_.points()[points[place]].at;
     }
   }

@@ -15,12 +15,12 @@
 //   finite_difference  central, step 6e-6 max(|p|, scale); one-sided of second order at a bound
 
 #include <Eigen/Core>
+#include <array>
 #include <functional>
 #include <string>
 #include <utility>
 #include <vector>
 
-#include "tangible/estimation/problem/evaluation_log.h"
 #include "tangible/estimation/problem/least_squares.h"
 #include "tangible/estimation/problem/measurement.h"
 #include "tangible/estimation/problem/parameterized_scene.h"
@@ -77,17 +77,6 @@ class RolloutResiduals : public LeastSquaresProblem {
 
   /// Runs made so far, in double or Jets; a reverse sweep of the adjoint does not count.
   long rollouts() const { return rollouts_; }
-  /// Counts a run that other code makes with this scene.
-  void CountRollout() { ++rollouts_; }
-  /// Sets the count, for runs that a checkpoint saves.
-  void SetRollouts(long rollouts) { rollouts_ = rollouts; }
-
-  /// Sets the log in which evaluations, including those of multiple shooting, are looked up and
-  /// kept; null: none. The log must outlive the residuals.
-  void SetLog(EvaluationLog* log) { log_ = log; }
-  /// Evaluates `function` at this point through the log.
-  bool Logged(const Eigen::VectorXd& at, const EvaluationLog::Function& function,
-              Eigen::VectorXd* residuals, RowMatrixXd* jacobian);
 
   /// The values from which a fit begins, within the bounds.
   void SetInitial(const Eigen::VectorXd& p) { scene_.SetInitial(p); }
@@ -100,6 +89,11 @@ class RolloutResiduals : public LeastSquaresProblem {
   /// take.
   bool SetParameters(const Eigen::VectorXd& p);
 
+  /// What observation i would be with the bodies in this state of the scene's model.
+  Prediction PredictionIn(int i, const State<double>& state) const;
+  /// The bodies (−1: none) of an observation's places (measurement.h).
+  std::array<int, kPlaces> BodiesOf(int i) const;
+
   /// Residuals from the samples, plan().width() numbers each.
   Eigen::VectorXd FromSamples(const std::vector<double>& samples) const;
   /// Their derivatives from those of the samples: width() rows for each sample, any number of
@@ -111,8 +105,6 @@ class RolloutResiduals : public LeastSquaresProblem {
                                     const Eigen::VectorXd& p_by_q) const;
 
  private:
-  bool Compute(const Eigen::VectorXd& p, DerivativeMethod method, Eigen::VectorXd* residuals,
-               RowMatrixXd* jacobian);
   bool Accept(const RolloutReport& report);
   bool Plain();
   bool Tangent(RowMatrixXd* jacobian);
@@ -132,8 +124,9 @@ class RolloutResiduals : public LeastSquaresProblem {
   bool IsDirect(int i) const;
   Eigen::Index DirectNumber(int i) const;
   Prediction PredictionOf(int i, const std::vector<double>& samples) const;
-  /// The contribution to a row of J of parameters that do not act through the run: places of points
-  /// in their bodies, instruments.
+  Prediction PredictAt(int i, ObservedPlaces places) const;
+  /// What a row of J owes to parameters that do not act by way of the run: places of points in
+  /// their bodies, instruments.
   Eigen::RowVectorXd DirectTerm(int i, const Prediction& prediction,
                                 const std::vector<double>& rates) const;
 
@@ -150,7 +143,6 @@ class RolloutResiduals : public LeastSquaresProblem {
   RolloutTape tape_;
   std::string message_;
   long rollouts_ = 0;
-  EvaluationLog* log_ = nullptr;
 };
 
 }  // namespace tangible

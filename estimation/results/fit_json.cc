@@ -1,350 +1,280 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tangible/estimation/results/fit_json.h"
 
-#include <algorithm>
 #include <cmath>
-#include <limits>
+#include <set>
 #include <utility>
 
-#include "tangible/dynamics/model/settings.h"
-#include "tangible/estimation/results/instruments_json.h"
-#include "tangible/render/html.h"
-#include "tangible/scene/json_reader.h"
-#include "tangible/scene/scene_json.h"
+#include "tangible/estimation/fit/observed_state.h"
+#include "tangible/estimation/results/run_json.h"
+#include "tangible/scene/set_parameters.h"
 
 namespace tangible {
 namespace {
 
-constexpr int kMaxSegments = 1000;
-constexpr int kMaxStarts = 10000;
+// Keys that a recording has in the place of the file's.
+constexpr const char* kOfFile[] = {"scene",   "observations", "points",
+                                   "sensors", "cameras",      "clocks"};
 
-constexpr std::pair<const char*, DerivativeMethod> kMethods[] = {
-    {"tangent", DerivativeMethod::kTangent},
-    {"adjoint", DerivativeMethod::kAdjoint},
-    {"jet", DerivativeMethod::kJet},
-    {"jet_implicit", DerivativeMethod::kJetImplicit},
-    {"finite_difference", DerivativeMethod::kFiniteDifference}};
-
-// Multiple shooting is selected by the number of its segments.
-constexpr std::pair<const char*, FitApproach> kApproaches[] = {{"auto", FitApproach::kAuto},
-                                                               {"plain", FitApproach::kPlain},
-                                                               {"windows", FitApproach::kWindows}};
-
-constexpr std::pair<const char*, ParameterScale> kScales[] = {
-    {"linear", ParameterScale::kLinear}, {"log", ParameterScale::kLogarithmic}};
-
-ParameterSet ReadSet(const JsonReader& json) {
-  json.ExpectKeys({"path", "scale", "offset", "add"}, " of a set");
-  ParameterSet set;
-  set.path = json.At("path").String();
-  if (json.Has("scale")) {
-    set.scale = json.At("scale").Number();
-  }
-  if (json.Has("offset")) {
-    set.offset = json.At("offset").Number();
-  }
-  if (json.Has("add") && json.At("add").Boolean()) {
-    set.mode = SetMode::kAdd;
-  }
-  return set;
-}
-
-// The name is printed unchanged, on a line with others.
-std::string ReadName(const JsonReader& json) {
-  std::string name = json.String();
-  if (json.IsString() && (name.empty() || OneLine(name) != name)) {
-    json.FailExpected(name.empty() ? "a name" : "a name without control characters");
-  }
-  return name;
-}
-
-/// {"gaussian": {"mean", "sigma"}} or {"log_normal": {"median", "sigma"}}.
-std::optional<Prior> ReadPrior(const JsonReader& json) {
-  json.ExpectKeys({"gaussian", "log_normal"}, " of a prior");
-  if (json.Has("gaussian") == json.Has("log_normal")) {
-    json.Fail("expected one of gaussian and log_normal, got " +
-              std::string(json.Has("gaussian") ? "both" : "none"));
-    return std::nullopt;
-  }
-  Prior prior;
-  if (json.Has("gaussian")) {
-    const JsonReader gaussian = json.At("gaussian");
-    gaussian.ExpectKeys({"mean", "sigma"}, " of a Gaussian prior");
-    prior.center = gaussian.At("mean").Number();
-    prior.sigma = gaussian.At("sigma").Number(NumberKind::kPositive);
-    return prior;
-  }
-  const JsonReader log_normal = json.At("log_normal");
-  log_normal.ExpectKeys({"median", "sigma"}, " of a log-normal prior");
-  prior.kind = PriorKind::kLogNormal;
-  prior.center = log_normal.At("median").Number(NumberKind::kPositive);
-  prior.sigma = log_normal.At("sigma").Number(NumberKind::kPositive);
-  return prior;
-}
-
-FitParameter ReadParameter(const JsonReader& json) {
-  FitParameter parameter;
-  if (json.IsString()) {
-    parameter.name = json.String();
-    parameter.sets.push_back({parameter.name});
-    return parameter;
-  }
-  json.ExpectKeys({"name", "initial", "lower", "upper", "sets", "path", "scale", "prior"},
-                  " of a parameter");
-  const auto read = [&json](const char* key, std::optional<double>* value) {
-    if (json.Has(key)) {
-      *value = json.At(key).Number();
-    }
-  };
-  read("initial", &parameter.initial);
-  read("lower", &parameter.lower);
-  read("upper", &parameter.upper);
-  if (json.Has("scale")) {
-    parameter.scale = json.At("scale").Choice(kScales);
-  }
-  if (json.Has("prior")) {
-    parameter.prior = ReadPrior(json.At("prior"));
-  }
-  if (json.Has("path")) {
-    if (json.Has("sets")) {
-      json.At("sets").Fail("expected sets or path, got both");
-    }
-    parameter.sets.push_back({json.At("path").String()});
-    parameter.name = json.Has("name") ? ReadName(json.At("name")) : parameter.sets[0].path;
-    return parameter;
-  }
-  parameter.name = ReadName(json.At("name"));
-  const JsonReader sets = json.At("sets");
-  const int count = sets.ExpectArray("an array of {path, scale, offset}");
-  for (int i = 0; i < count; ++i) {
-    parameter.sets.push_back(ReadSet(sets.At(i)));
-  }
-  return parameter;
-}
-
-FitOptions ReadOptions(const JsonReader& root) {
-  FitOptions options;
-  if (root.Has("derivatives")) {
-    options.derivatives = root.At("derivatives").Choice(kMethods);
-    if (!IsAvailable(options.derivatives)) {
-      root.At("derivatives")
-          .Fail("this build has no Jets, expected tangent, adjoint or finite_difference");
-    }
-  }
-  if (root.Has("loss")) {
-    root.At("loss").ExpectKeys({"huber"}, " of loss");
-    options.huber = root.At("loss").At("huber").Number(NumberKind::kPositive);
-  }
-  if (root.Has("segments")) {
-    options.segments = root.At("segments").Integer(1, kMaxSegments);
-  }
-  if (root.Has("approach")) {
-    options.approach = root.At("approach").Choice(kApproaches);
-  }
-  if (options.segments > 1) {
-    if (options.approach != FitApproach::kAuto) {
-      root.At("segments")
-          .Fail("expected 1 with another approach, got " + std::to_string(options.segments));
-    }
-    options.approach = FitApproach::kSegments;
-  }
-  if (root.Has("starts")) {
-    options.starts = root.At("starts").Integer(1, kMaxStarts);
-  }
-  if (root.Has("seed")) {
-    options.seed =
-        static_cast<unsigned>(root.At("seed").Integer(0, std::numeric_limits<int>::max()));
-  }
-  return options;
-}
-
-/// The JSON pointer of an error in a parameter.
-std::string PointerOf(const ParameterError& error) {
-  std::string pointer = "/parameters";
-  if (error.parameter >= 0) {
-    pointer += "/" + std::to_string(error.parameter);
-  }
-  if (error.set >= 0) {
-    pointer += "/sets/" + std::to_string(error.set);
-  }
-  return error.key.empty() ? pointer : pointer + "/" + error.key;
-}
-
-bool Parameterize(const FitProblem& problem, const std::string& file, ParameterizedScene* scene,
-                  std::string* error) {
-  ParameterError fault;
-  if (!scene->Create(problem.scene, problem.points, problem.parameters, &fault,
-                     problem.instruments)) {
-    *error = OneLine(file + ": " + PointerOf(fault) + ": " + fault.what);
-    return false;
-  }
-  return true;
-}
-
-/// Reads a fit file part by part, because the scene is needed to check the other parts.
-class FitReader {
+class Reader {
  public:
-  FitReader(const JsonReader& root, std::string folder, const RecordingPart& part, FitFile* fit,
-            std::string* error)
-      : root_(root),
-        folder_(std::move(folder)),
-        part_(part),
-        problem_(&fit->problem),
-        error_(error) {}
+  Reader(const Json& json, std::string file, JsonErrors* errors, FitInput* out)
+      : json_(json), file_(std::move(file)), root_(json, errors), out_(*out), common_(json) {}
 
-  /// False with the error of the scene or an observation file; errors of the fit file itself are
-  /// the reader's.
-  bool Read() {
-    root_.ExpectKeys({"scene", "observations", "points", "sensors", "cameras", "clocks",
-                      "parameters", "derivatives", "loss", "approach", "segments", "starts",
-                      "seed"});
-    const std::string scene_file = JoinPath(folder_, root_.At("scene").String());
-    if (!root_.ok()) {
+  // False with an error of a recording's own; errors of the file itself are the reader's.
+  bool Read(std::string* error) {
+    if (!root_.IsObject()) {
+      root_.FailExpected("an object");
       return true;
     }
-    if (!LoadScene(scene_file, &problem_->scene, error_)) {
-      return false;
+    has_recordings_ = root_.Has("recordings");
+    ReadScopes();
+    if (root_.Has("initial") && !root_.At("initial").IsString()) {
+      root_.At("initial").FailExpected("from_observations");
     }
-    if (!CheckSettings(problem_->scene.simulation, error_)) {
-      *error_ = scene_file + ": " + *error_;
-      return false;
-    }
-    problem_->points = ReadPoints(root_.At("points"), problem_->scene);
-    problem_->instruments = ReadInstruments(root_, problem_->scene, problem_->points);
-    const JsonReader parameters = root_.At("parameters");
-    const int count = parameters.ExpectArray("an array of parameters");
-    for (int i = 0; i < count; ++i) {
-      problem_->parameters.push_back(ReadParameter(parameters.At(i)));
-    }
-    problem_->options = ReadOptions(root_);
-    CheckShooting();
-    return ReadObservationFiles();
+    FromObservations(root_);
+    common_.erase("recordings");
+    common_.erase("initial");
+    if (!root_.ok()) return true;
+    return has_recordings_ ? ReadRecordings(error) : ReadSingle(error);
   }
 
  private:
-  /// The states at the ends of segments are at fixed times.
-  void CheckShooting() {
-    for (const FitParameter& parameter : problem_->parameters) {
-      for (const ParameterSet& set : parameter.sets) {
-        const bool moves_times =
-            set.path.rfind("clocks/", 0) == 0 ||
-            (set.path.rfind("sensors/", 0) == 0 && set.path.find("/delay") != std::string::npos);
-        if (moves_times && problem_->options.segments > 1) {
-          root_.At("segments")
-              .Fail("expected 1 where a delay or clock is a parameter (" + set.path + "), got " +
-                    std::to_string(problem_->options.segments));
+  bool ReadSingle(std::string* error) {
+    RecordingInput& only = out_.recordings.emplace_back();
+    if (!ReadRun(common_, file_, FolderOf(file_), {}, &only.problem, error)) return false;
+    out_.scopes.resize(only.problem.parameters.size());
+    if (FromObservations(root_)) StartFromObservations(&only.problem);
+    return true;
+  }
+
+  bool ReadRecordings(std::string* error) {
+    if (root_.Has("observations")) {
+      root_.At("observations").Fail("expected in each recording, where recordings are given");
+    }
+    const JsonReader list = root_.At("recordings");
+    const int count = list.ExpectArray("an array of recordings");
+    if (count == 0) list.Fail("expected at least one recording, got none");
+    std::set<std::string> names;
+    for (int i = 0; i < count && root_.ok(); ++i) {
+      if (!ReadRecording(list.At(i), json_["recordings"][i], &names, error)) return false;
+    }
+    if (root_.ok()) CheckSpreads(count);
+    return true;
+  }
+
+  // Whose each parameter is; these keys are none of a run's.
+  void ReadScopes() {
+    const JsonReader parameters = root_.At("parameters");
+    for (int i = 0; i < parameters.Size(); ++i) {
+      const JsonReader parameter = parameters.At(i);
+      ParameterScope& scope = out_.scopes.emplace_back();
+      if (parameter.Has("per")) {
+        parameter.At("per").Choice({"recording"});
+        scope.kind = ParameterScope::Kind::kOwn;
+        if (!has_recordings_) parameter.At("per").Fail("expected recordings in the file, got none");
+        common_["parameters"][i].erase("per");
+      }
+      if (parameter.Has("varies")) {
+        ReadSpread(parameter.At("varies"), &scope);
+        if (scope.kind != ParameterScope::Kind::kOwn) {
+          parameter.At("varies").Fail("expected \"per\": \"recording\" beside it, got none");
+        }
+        scope.kind = ParameterScope::Kind::kVaries;
+        common_["parameters"][i].erase("varies");
+      }
+    }
+  }
+
+  // {"gaussian": {"spread": "estimate" or a number}} or {"log_normal": ...}.
+  static void ReadSpread(const JsonReader& json, ParameterScope* scope) {
+    if (!ReadDistribution(json, " of varies", &scope->distribution)) return;
+    const bool gaussian = scope->distribution == PriorKind::kGaussian;
+    const JsonReader of = json.At(gaussian ? "gaussian" : "log_normal");
+    of.ExpectKeys({"spread"}, " of what varies");
+    const JsonReader spread = of.At("spread");
+    if (!spread.IsString()) {
+      scope->spread = spread.Number(NumberKind::kPositive);
+    } else if (spread.String() != "estimate") {
+      spread.FailExpected("\"estimate\" or a number > 0");
+    }
+  }
+
+  void CheckSpreads(int num_recordings) {
+    for (size_t i = 0; i < out_.scopes.size(); ++i) {
+      const ParameterScope& scope = out_.scopes[i];
+      if (scope.kind != ParameterScope::Kind::kVaries) continue;
+      const JsonReader varies = root_.At("parameters").At(static_cast<int>(i)).At("varies");
+      if (!scope.spread && num_recordings < 2) {
+        varies.Fail("expected at least two recordings, of which a spread is estimated, got one");
+      }
+      for (const RecordingInput& recording : out_.recordings) {
+        const FitProblem& problem = recording.problem;
+        ParameterizedScene scene;
+        ParameterError fault;  // none: it was made before
+        scene.Create(problem.scene, problem.points, problem.parameters, &fault,
+                     problem.instruments);
+        const ParameterEntry& entry = scene.entries()[i];
+        if (scope.distribution == PriorKind::kLogNormal &&
+            !(entry.lower >= 0.0 && entry.initial > 0.0)) {
+          varies.Fail(
+              "expected gaussian for a parameter that may be negative or starts at 0, got "
+              "log_normal");
           return;
         }
       }
     }
   }
 
-  bool ReadObservationFiles() {
-    // Times of a part are checked after it has been cut out.
-    Scene observed_scene = problem_->scene;
-    const bool is_part = part_.start > 0.0 || std::isfinite(part_.end);
-    if (is_part) observed_scene.simulation.duration = std::numeric_limits<double>::max();
-    const ObservedScene scene{observed_scene, problem_->points, problem_->instruments};
-    const JsonReader list = root_.At("observations");
-    const int count = list.ExpectArray("an array of {file, sigma}");
-    if (count == 0) {
-      list.Fail("expected at least one {file, sigma}, got none");
+  bool ReadRecording(const JsonReader& reader, const Json& json, std::set<std::string>* names,
+                     std::string* error) {
+    reader.ExpectKeys({"name", "scene", "observations", "points", "sensors", "cameras", "clocks",
+                       "start", "end", "weight", "values", "initial"},
+                      " of a recording");
+    RecordingInput entry;
+    entry.name = reader.At("name").String();
+    if (!reader.ok()) return true;
+    if (entry.name.empty() || OneLine(entry.name) != entry.name) {
+      reader.At("name").FailExpected("a name without control characters");
+    } else if (!names->insert(entry.name).second) {
+      reader.At("name").FailExpected("a name that no other recording has");
     }
-    for (int i = 0; i < count && root_.ok(); ++i) {
-      const JsonReader entry = list.At(i);
-      ObservationEntry observed = ReadObservationEntry(entry, scene);
-      if (!root_.ok()) {
-        return true;
-      }
-      observed.options.channel.file = i;
-      problem_->files.push_back(observed.file);
-      const size_t before = problem_->observations.size();
-      if (!ReadObservations(JoinPath(folder_, observed.file), scene, observed.sigma,
-                            observed.options, &problem_->channels, &problem_->observations,
-                            error_)) {
-        return false;
-      }
-      for (size_t k = before; k < problem_->observations.size(); ++k) {
-        const Observation& observation = problem_->observations[k];
-        if (!(observation.sigma > 0.0)) {
-          entry.At("sigma").Fail(std::string("expected a sigma of ") +
-                                 NameOf(observation.coordinate) + ", which " + observed.file +
-                                 " has");
-          return true;
-        }
-      }
+    if (reader.Has("weight")) entry.weight = reader.At("weight").Number(NumberKind::kPositive);
+    Json own = common_;
+    for (const char* key : kOfFile) {
+      if (reader.Has(key)) own[key] = json[key];
     }
-    if (is_part && root_.ok()) Cut();
+    if (!reader.At("observations").exists()) reader.At("observations").FailExpected("an array");
+    SetInitial(reader, &own);
+    const RecordingPart part = ReadPart(reader);
+    if (!reader.ok()) return true;
+    const std::string label = file_ + ": recording '" + entry.name + "'";
+    if (!ReadRun(own, label, FolderOf(file_), part, &entry.problem, error)) return false;
+    if (!SetValues(reader, label, &entry.problem.scene, error)) return false;
+    if (FromObservations(reader.Has("initial") ? reader : root_)) {
+      StartFromObservations(&entry.problem);
+    }
+    out_.recordings.push_back(std::move(entry));
     return true;
   }
 
-  void Cut() {
-    std::vector<Observation> kept;
-    for (Observation observation : problem_->observations) {
-      if (observation.time < part_.start || observation.time > part_.end) continue;
-      observation.time -= part_.start;
-      const double end = problem_->scene.simulation.duration;
-      const double slack = kTimeTolerance * problem_->scene.simulation.dt;
-      if (observation.time > end && observation.time <= end + slack) observation.time = end;
-      kept.push_back(observation);
-      if (observation.time > end) {
-        root_.At("observations")
-            .Fail("expected times in the run, which ends " +
-                  CompactNumber(problem_->scene.simulation.duration) + " s after start, got " +
-                  CompactNumber(observation.time) + " s after it");
-        return;
+  // Where the recording's parameters start: {name: value}.
+  static void SetInitial(const JsonReader& reader, Json* own) {
+    if (!reader.Has("initial") || FromObservations(reader)) return;
+    const JsonReader initial = reader.At("initial");
+    if (!initial.IsObject()) initial.FailExpected("from_observations or {parameter: value}");
+    for (const std::string& name : initial.Keys()) {
+      const double value = initial.At(name).Number();
+      bool known = false;
+      for (Json& parameter : (*own)["parameters"]) {
+        if (parameter.is_string() && parameter == name) {
+          parameter = {{"path", name}, {"initial", value}};
+          known = true;
+        } else if (parameter.is_object() &&
+                   parameter[parameter.contains("name") ? "name" : "path"] == name) {
+          parameter["initial"] = value;
+          known = true;
+        }
       }
+      if (!known) initial.At(name).Fail("expected the name of a parameter");
     }
-    if (kept.empty()) root_.At("observations").Fail("expected some from start to end, got none");
-    problem_->observations = std::move(kept);
   }
 
+  // Whether `initial` of a recording, or of the file for all of them, is "from_observations".
+  static bool FromObservations(const JsonReader& reader) {
+    return reader.Has("initial") && reader.At("initial").IsString() &&
+           reader.At("initial").Choice({"from_observations"}) == 0;
+  }
+
+  // Numbers of the scene that are others in this recording: {path: value}.
+  static bool SetValues(const JsonReader& reader, const std::string& label, Scene* scene,
+                        std::string* error) {
+    if (!reader.Has("values")) return true;
+    const JsonReader values = reader.At("values");
+    for (const std::string& path : values.Keys()) {
+      ParameterPath parameter;
+      const double value = values.At(path).Number();
+      std::string wrong;
+      if (ResolveParameter(*scene, path, &parameter, &wrong)) {
+        wrong = SetParameters({parameter}, &value, scene);
+      }
+      if (!wrong.empty()) {
+        *error = OneLine(wrong.insert(0, ": /values: ").insert(0, label));
+        return false;
+      }
+    }
+    return true;
+  }
+
+  // From `start`, which is the run's time 0, to `end`.
+  static RecordingPart ReadPart(const JsonReader& reader) {
+    RecordingPart part;
+    if (reader.Has("start")) part.start = reader.At("start").Number(NumberKind::kNonNegative);
+    if (reader.Has("end")) part.end = reader.At("end").Number();
+    if (!(part.start < part.end)) reader.At("end").FailExpected("a time after start");
+    return part;
+  }
+
+  // The initial values of what is a pose or twist at the start, of several recordings those that
+  // each has for itself.
+  void StartFromObservations(FitProblem* problem) const {
+    ParameterizedScene scene;
+    ParameterError fault;
+    if (!scene.Create(problem->scene, problem->points, problem->parameters, &fault,
+                      problem->instruments)) {
+      return;  // said when the residuals are made
+    }
+    std::vector<bool> free;
+    for (size_t i = 0; i < problem->parameters.size(); ++i) {
+      const bool own = out_.scopes[i].kind != ParameterScope::Kind::kShared;
+      free.push_back((own || !has_recordings_) && IsOfInitialState(problem->parameters[i]));
+    }
+    const Eigen::VectorXd found = ParametersFromObservations(
+        RolloutResiduals(std::move(scene), problem->observations, problem->channels), free);
+    for (size_t i = 0; i < free.size(); ++i) {
+      if (free[i]) problem->parameters[i].initial = found[static_cast<Eigen::Index>(i)];
+    }
+  }
+
+  const Json& json_;
+  std::string file_;
   JsonReader root_;
-  std::string folder_;
-  RecordingPart part_;
-  FitProblem* problem_;
-  std::string* error_;
+  FitInput& out_;
+  Json common_;  // the file without its recordings
+  bool has_recordings_ = false;
 };
+
+bool FitFromJson(const Json& json, const std::string& file, FitFile* fit, std::string* error) {
+  *fit = FitFile();
+  fit->path = file;
+  JsonErrors errors(file);
+  const bool read = Reader(json, file, &errors, &fit->input).Read(error);
+  if (!errors.ok()) *error = errors.message();
+  return read && errors.ok();
+}
 
 }  // namespace
 
-bool FitFromJson(const Json& json, const std::string& name, const std::string& folder,
-                 const RecordingPart& part, FitFile* fit, std::string* error) {
-  *fit = FitFile();
-  fit->path = name;
-  JsonErrors errors(name);
-  FitReader reader(JsonReader(json, &errors), folder, part, fit, error);
-  const bool read = reader.Read();
-  if (!errors.ok()) {
-    *error = errors.message();
-    return false;
-  }
-  fit->problem.observations.shrink_to_fit();
-  ParameterizedScene scene;
-  return read && Parameterize(fit->problem, name, &scene, error);
-}
-
 bool LoadFit(const std::string& file, FitFile* fit, std::string* error) {
   Json json;
-  return ParseJsonFile(file, &json, error) &&
-         FitFromJson(json, file, FolderOf(file), {}, fit, error);
+  return ParseJsonFile(file, &json, error) && FitFromJson(json, file, fit, error);
 }
 
 bool ParseFit(const std::string& text, const std::string& file, FitFile* fit, std::string* error) {
   Json json;
-  return ParseJson(text, file, &json, error) &&
-         FitFromJson(json, file, FolderOf(file), {}, fit, error);
+  return ParseJson(text, file, &json, error) && FitFromJson(json, file, fit, error);
 }
 
-bool MakeResiduals(const FitProblem& problem, const std::string& file,
-                   std::vector<RolloutResiduals>* residuals, std::string* error) {
-  ParameterizedScene scene;
-  if (!Parameterize(problem, file, &scene, error)) {
-    return false;
+std::unique_ptr<RecordingsProblem> MakeProblem(const FitFile& fit, std::string* error) {
+  ParameterError fault;
+  int at = 0;
+  std::unique_ptr<RecordingsProblem> problem = MakeProblem(fit.input, &fault, &at);
+  if (problem == nullptr) {
+    const std::string& name = fit.input.recordings[at].name;
+    *error =
+        DescribeFault(name.empty() ? fit.path : fit.path + ": recording '" + name + "'", fault);
   }
-  residuals->emplace_back(std::move(scene), problem.observations, problem.channels);
-  residuals->back().SetFiles(problem.files);
-  return true;
+  return problem;
 }
 
 }  // namespace tangible

@@ -198,22 +198,40 @@ void AppendRows(const std::string& prefix, const RolloutResiduals& residuals,
 
 }  // namespace
 
-std::string PredictionCsv(const RolloutResiduals& residuals, const Eigen::VectorXd& values,
-                          const LaterObservations* later) {
-  std::string csv = kColumns;
-  AppendRows("", residuals, values, later, &csv);
-  return csv;
+PredictedRecordings PredictLater(const FitInput& input, const RecordingsProblem& problem,
+                                 const Eigen::VectorXd& estimate, double from,
+                                 std::vector<std::vector<Observation>> later) {
+  PredictedRecordings result;
+  std::vector<PredictedRun> runs;
+  result.runs.reserve(later.size());
+  for (size_t b = 0; b < later.size(); ++b) {
+    const RecordingInput& recording = input.recordings[b];
+    const int block = static_cast<int>(b);
+    LaterObservations& run = result.runs.emplace_back();
+    if (later[b].empty()) continue;
+    run = PredictLater(recording.problem, problem.ParametersOf(block, estimate), from,
+                       std::move(later[b]));
+    if (!run.score.message.empty() && result.score.message.empty()) {
+      result.score.message = problem.BlockName(block) + run.score.message;
+    }
+    runs.push_back({run.observations, recording.problem.channels, run.residuals});
+  }
+  if (result.score.message.empty()) {
+    result.score = ScorePrediction(from, runs);
+  }
+  result.score.from = from;
+  return result;
 }
 
 std::string PredictionCsv(const RecordingsProblem& problem, const Eigen::VectorXd& values,
-                          const std::vector<LaterObservations>& later) {
-  std::string csv = std::string("recording,") + kColumns;
+                          const PredictedRecordings* later) {
+  std::string csv = std::string(problem.IsNamed() ? "recording," : "") + kColumns;
   Eigen::Index first = 0;
   for (int b = 0; b < problem.num_blocks(); ++b) {
     const RecordedRun& recording = problem.recordings()[b];
     const Eigen::Index rows = recording.residuals.num_residuals();
-    AppendRows(CsvCell(recording.name) + ",", recording.residuals, values.segment(first, rows),
-               later.empty() ? nullptr : &later[b], &csv);
+    AppendRows(problem.IsNamed() ? CsvCell(recording.name) + "," : "", recording.residuals,
+               values.segment(first, rows), later == nullptr ? nullptr : &later->runs[b], &csv);
     first += rows;
   }
   return csv;

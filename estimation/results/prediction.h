@@ -62,17 +62,21 @@ struct PredictedRun {
 /// The score of several runs together.
 PredictionScore ScorePrediction(double from, const std::vector<PredictedRun>& runs);
 
-/// A row for each observation, ordered by time: time, target (body or point), relative_to,
-/// coordinate, file, sensor, used (fit or prediction), sigma, observed, predicted, residual
-/// (predicted − observed, in the observation's unit) and residual_in_sigma; the last three are
-/// empty where there is no run. `values` are the residuals of the fit, in multiples of sigma;
-/// `later` may be null.
-std::string PredictionCsv(const RolloutResiduals& residuals, const Eigen::VectorXd& values,
-                          const LaterObservations* later);
+/// The later observations of each recording, and the score of all together.
+struct PredictedRecordings {
+  std::vector<LaterObservations> runs;
+  PredictionScore score;
+};
+PredictedRecordings PredictLater(const FitInput& input, const RecordingsProblem& problem,
+                                 const Eigen::VectorXd& estimate, double from,
+                                 std::vector<std::vector<Observation>> later);
 
-/// The same for several recordings, one after the other, with the recording in the first column.
-/// `later` has an entry for each recording, or is empty.
+/// A row an observation, by time: time, target (body or point), relative_to, coordinate, file,
+/// sensor, used (fit or prediction), sigma, observed, predicted, residual (predicted − observed, in
+/// the observation's unit) and residual_in_sigma; the last three are empty where there is no run.
+/// Recordings follow each other, with their names, where they have any, in a first column. `values`
+/// are the residuals of the fit, in multiples of sigma; `later` may be null.
 std::string PredictionCsv(const RecordingsProblem& problem, const Eigen::VectorXd& values,
-                          const std::vector<LaterObservations>& later);
+                          const PredictedRecordings* later);
 
 }  // namespace tangible

@@ -17,7 +17,9 @@ constexpr size_t kMostPlots = 24;
 // A plot is about twice this many pixels wide. Of more points only the extremes of each bucket are
 // drawn.
 constexpr int kBuckets = 360;
-// A table of the correlations of more parameters is too large to read.
+// Rows of a table of series or recordings: more are in the result as JSON.
+constexpr size_t kMostRows = 500;
+// A table of the correlations of more parameters is too large to be read.
 constexpr size_t kMostCorrelations = 60;
 
 /// One series of observations with its fitted values.
@@ -27,11 +29,13 @@ struct Series {
   std::vector<double> time, observed, fitted, residual;
 };
 
-/// Collects the first series, at most kMostPlots.
-std::vector<Series> CollectSeries(const RolloutResiduals& residuals, const FitResult& result) {
+/// The first series of a recording, at most `most`; `values` are its residuals.
+std::vector<Series> CollectSeries(const RecordedRun& recording, const Eigen::VectorXd& values,
+                                  size_t most) {
+  const RolloutResiduals& residuals = recording.residuals;
   const std::vector<Observation>& observations = residuals.observations();
   const ObservationSeries index = IndexSeries(observations);
-  std::vector<std::vector<int>> members(std::min<size_t>(index.first.size(), kMostPlots));
+  std::vector<std::vector<int>> members(std::min<size_t>(index.first.size(), most));
   for (int i = 0; i < residuals.num_residuals(); ++i) {
     if (static_cast<size_t>(index.of[i]) < members.size()) {
       members[index.of[i]].push_back(i);
@@ -43,17 +47,35 @@ std::vector<Series> CollectSeries(const RolloutResiduals& residuals, const FitRe
                      [&](int a, int b) { return observations[a].time < observations[b].time; });
     const Observation& first = observations[indices.front()];
     Series series;
-    series.label = SeriesLabel(residuals, first);
+    series.label =
+        (recording.name.empty() ? "" : recording.name + ": ") + SeriesLabel(residuals, first);
     series.unit = UnitOf(residuals, first);
     for (const int i : indices) {
       const Observation& observation = observations[i];
-      const double residual = result.residuals[i];
+      const double residual = values[i];
       series.time.push_back(observation.time);
       series.observed.push_back(observation.value);
       series.fitted.push_back(observation.value + residual * observation.sigma);
       series.residual.push_back(residual);
     }
     all.push_back(std::move(series));
+  }
+  return all;
+}
+
+/// The first series of all recordings, at most kMostPlots.
+std::vector<Series> CollectSeries(const RecordingsProblem& problem, const FitResult& result) {
+  std::vector<Series> all;
+  Eigen::Index first = 0;
+  for (const RecordedRun& recording : problem.recordings()) {
+    const Eigen::Index rows = recording.residuals.num_residuals();
+    if (all.size() < kMostPlots) {
+      for (Series& series : CollectSeries(recording, result.residuals.segment(first, rows),
+                                          kMostPlots - all.size())) {
+        all.push_back(std::move(series));
+      }
+    }
+    first += rows;
   }
   return all;
 }
@@ -189,20 +211,29 @@ std::string IterationPlots(const std::vector<ParameterEntry>& entries, const Fit
   return html;
 }
 
+std::string FirstOf(size_t shown, size_t all) {
+  return shown < all ? "<p>The first " + std::to_string(shown) + " of " + std::to_string(all) +
+                           " are listed; the result as JSON has all.</p>\n"
+                     : "";
+}
+
 std::string ResidualTable(const ResidualSummary& summary) {
   std::vector<std::vector<std::string>> rows;
   for (const SeriesSummary& series : summary.series) {
+    if (rows.size() == kMostRows) {
+      break;
+    }
     const std::string unit = " " + series.unit;
-    rows.push_back({series.target, series.relative_to, NameOf(series.coordinate), series.file,
-                    series.sensor, std::to_string(series.count),
+    rows.push_back({series.recording, series.target, series.relative_to, NameOf(series.coordinate),
+                    series.file, series.sensor, std::to_string(series.count),
                     CompactNumber(series.rms_in_sigma, 4), CompactNumber(series.rms, 4) + unit,
                     CompactNumber(series.mean, 3) + unit, CompactNumber(series.largest_in_sigma, 4),
                     CompactNumber(series.largest_time, 6), std::to_string(series.outliers)});
   }
-  return "<h2>Residuals</h2>\n" +
-         HtmlTable({"body or point", "relative to", "coordinate", "file", "sensor", "measured",
-                    "rms (sigma)", "rms", "mean of fitted − observed", "largest (sigma)", "at (s)",
-                    "outliers"},
+  return "<h2>Residuals</h2>\n" + FirstOf(rows.size(), summary.series.size()) +
+         HtmlTable({"recording", "body or point", "relative to", "coordinate", "file", "sensor",
+                    "measured", "rms (sigma)", "rms", "mean of fitted − observed",
+                    "largest (sigma)", "at (s)", "outliers"},
                    rows);
 }
 
@@ -299,14 +330,14 @@ std::string PredictionPart(const PredictionScore* score) {
                    rows);
 }
 
-std::string StepTable(const RolloutResiduals& residuals, const DiscretisationCheck* check) {
+std::string StepTable(const std::vector<ParameterEntry>& entries,
+                      const DiscretisationCheck* check) {
   if (check == nullptr || check->bias.size() == 0) {
     return "";
   }
   std::vector<std::vector<std::string>> rows;
   for (Eigen::Index k = 0; k < check->bias.size(); ++k) {
-    rows.push_back({residuals.scene().entries()[k].name,
-                    CompactNumber(check->estimate_half_step[k], 8),
+    rows.push_back({entries[k].name, CompactNumber(check->estimate_half_step[k], 8),
                     CompactNumber(check->difference[k], 3), CompactNumber(check->bias[k], 3),
                     CompactNumber(check->extrapolated[k], 8)});
   }
@@ -318,7 +349,9 @@ std::string StepTable(const RolloutResiduals& residuals, const DiscretisationChe
 }
 
 std::string StartTable(const FitResult& result) {
-  if (result.starts.size() < 2 && (result.starts.empty() || result.starts[0].approach == "plain")) {
+  const bool one = result.starts.size() == 1;
+  if (result.starts.empty() ||
+      (one && result.starts[0].approach == "plain" && result.starts[0].tried.empty())) {
     return "";
   }
   std::vector<std::vector<std::string>> rows;
@@ -328,50 +361,80 @@ std::string StartTable(const FitResult& result) {
       initial += (initial.empty() ? "" : ", ") + CompactNumber(x, 4);
     }
     rows.push_back({"(" + initial + ")", start.approach, start.status, CompactNumber(start.cost),
-                    CompactNumber(start.plain_cost), std::to_string(start.iterations)});
+                    CompactNumber(start.plain_cost), std::to_string(start.iterations), start.tried,
+                    start.tried.empty() ? "" : CompactNumber(start.tried_cost), start.message});
   }
   return "<h2>Starts</h2>\n" +
-         HtmlTable({"initial", "approach", "status", "cost", "cost of the plain fit", "iterations"},
+         HtmlTable({"initial", "approach", "status", "cost", "cost of the plain fit", "iterations",
+                    "also tried", "its cost", ""},
                    rows);
+}
+
+std::string SpreadTable(const VarianceComponents* components) {
+  if (components == nullptr || components->spreads.empty()) {
+    return "";
+  }
+  std::vector<std::vector<std::string>> rows;
+  for (const SpreadEstimate& spread : components->spreads) {
+    rows.push_back({spread.name, spread.kind == PriorKind::kGaussian ? "gaussian" : "log_normal",
+                    CompactNumber(spread.spread, 5),
+                    spread.interval ? CompactNumber(spread.interval->first, 4) : "",
+                    spread.interval ? CompactNumber(spread.interval->second, 4) : "",
+                    spread.estimated ? "" : "given", std::to_string(spread.recordings)});
+  }
+  return "<h2>What varies from recording to recording</h2>\n" +
+         HtmlTable({"parameter", "distribution", "spread", "95 % from", "to", "", "recordings"},
+                   rows);
+}
+
+std::string NoiseTable(const VarianceComponents* components) {
+  if (components == nullptr || components->noise.empty()) {
+    return "";
+  }
+  std::vector<std::vector<std::string>> rows;
+  for (const SensorNoise& noise : components->noise) {
+    rows.push_back({noise.name, CompactNumber(noise.factor, 5), CompactNumber(noise.deviation, 2),
+                    std::to_string(noise.count)});
+  }
+  return "<h2>Noise of sensors</h2>\n" +
+         HtmlTable({"sensor", "sigma, in multiples of what was given", "standard deviation",
+                    "observations"},
+                   rows);
+}
+
+std::string RecordingTable(const RecordingsProblem& problem, const FitResult& result) {
+  if (!problem.IsNamed()) {
+    return "";
+  }
+  std::vector<std::vector<std::string>> rows;
+  const size_t all = problem.recordings().size();
+  for (int b = 0; b < static_cast<int>(std::min(all, kMostRows)); ++b) {
+    rows.push_back({problem.recordings()[b].name, std::to_string(problem.num_rows(b)),
+                    CompactNumber(problem.weight(b)),
+                    CompactNumber(RmsOfRecording(problem, result.residuals, b), 4)});
+  }
+  return "<h2>Recordings</h2>\n" + FirstOf(rows.size(), all) +
+         HtmlTable({"recording", "observations", "weight", "residual rms (sigma)"}, rows);
 }
 
 }  // namespace
 
-std::string FitReport(const std::string& title, const RolloutResiduals& residuals,
-                      const FitResult& result, const DiscretisationCheck* check,
-                      const PredictionScore* prediction) {
+std::string FitReport(const std::string& title, const RecordingsProblem& problem,
+                      const FitResult& result, const FitFindings& findings) {
   const std::string heading = "Fit: " + title;
-  const std::vector<ParameterEntry>& entries = residuals.scene().entries();
-  const ResidualSummary summary = SummarizeResiduals(residuals, result.residuals);
-  return HtmlPage(heading,
-                  "<h1>" + HtmlEscape(heading) + "</h1>\n<h2>Estimates</h2>\n" +
-                      EstimateTable(entries, result) + Warnings(result.uncertainty) +
-                      CombinationTable(result.uncertainty) + SummaryTable(result) +
-                      CorrelationTable(entries, result) + StepTable(residuals, check) +
-                      PredictionPart(prediction) + StartTable(result) +
-                      IterationPlots(entries, result) + ResidualTable(summary) +
-                      OutlierTable(summary) +
-                      SeriesPlots(CollectSeries(residuals, result), summary.series.size()));
-}
-
-std::string RecordingsReport(const std::string& title, const RecordingsProblem& problem,
-                             const FitResult& result, const PredictionScore* prediction) {
-  const std::string heading = "Fit: " + title;
-  std::vector<std::vector<std::string>> rows;
-  rows.reserve(problem.num_blocks());
-  for (int b = 0; b < problem.num_blocks(); ++b) {
-    rows.push_back({problem.recordings()[b].name, std::to_string(problem.num_rows(b)),
-                    CompactNumber(problem.weight(b)),
-                    CompactNumber(RmsOfRecording(problem, result, b), 4)});
-  }
-  return HtmlPage(
-      heading,
-      "<h1>" + HtmlEscape(heading) + "</h1>\n<h2>Estimates</h2>\n" +
-          EstimateTable(problem.entries(), result) + Warnings(result.uncertainty) +
-          CombinationTable(result.uncertainty) + SummaryTable(result) + "<h2>Recordings</h2>\n" +
-          HtmlTable({"recording", "observations", "weight", "residual rms (sigma)"}, rows) +
-          CorrelationTable(problem.entries(), result) + PredictionPart(prediction) +
-          StartTable(result) + IterationPlots(problem.entries(), result));
+  const std::vector<ParameterEntry>& entries = problem.entries();
+  const ResidualSummary summary = SummarizeResiduals(problem, result.residuals);
+  const PredictionScore* const score = findings.later == nullptr ? nullptr : &findings.later->score;
+  return HtmlPage(heading, "<h1>" + HtmlEscape(heading) + "</h1>\n<h2>Estimates</h2>\n" +
+                               EstimateTable(entries, result) + Warnings(result.uncertainty) +
+                               CombinationTable(result.uncertainty) +
+                               SpreadTable(findings.components) + SummaryTable(result) +
+                               RecordingTable(problem, result) + NoiseTable(findings.components) +
+                               CorrelationTable(entries, result) +
+                               StepTable(entries, findings.check) + PredictionPart(score) +
+                               StartTable(result) + IterationPlots(entries, result) +
+                               ResidualTable(summary) + OutlierTable(summary) +
+                               SeriesPlots(CollectSeries(problem, result), summary.series.size()));
 }
 
 }  // namespace tangible

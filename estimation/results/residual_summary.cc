@@ -64,35 +64,41 @@ std::string SeriesLabel(const RolloutResiduals& residuals, const Observation& ob
   return residuals.files().size() > 1 ? label + " (" + FileOf(residuals, observation) + ")" : label;
 }
 
-ResidualSummary SummarizeResiduals(const RolloutResiduals& residuals,
-                                   const Eigen::VectorXd& values) {
-  ResidualSummary summary;
-  if (values.size() == 0) {
-    return summary;
-  }
-  const std::vector<Observation>& observations = residuals.observations();
+namespace {
+
+SeriesSummary Describe(const RolloutResiduals& residuals, const std::string& recording,
+                       const Observation& observation) {
+  SeriesSummary series;
+  const Scene& scene = residuals.scene().scene();
+  series.recording = recording;
+  series.file = FileOf(residuals, observation);
+  series.target = TargetName(scene, residuals.scene().points(), observation);
+  series.is_point = observation.point >= 0;
+  series.relative_to =
+      ReferenceName(scene, residuals.scene().points(), residuals.ChannelOf(observation));
+  series.sensor = SensorOf(residuals, observation);
+  series.unit = UnitOf(residuals, observation);
+  series.coordinate = observation.coordinate;
+  series.label = (recording.empty() ? "" : recording + ": ") + SeriesLabel(residuals, observation);
+  return series;
+}
+
+/// Appends the series and outliers of a recording.
+void Append(const RecordedRun& recording, const Eigen::VectorXd& values, ResidualSummary* summary) {
+  const std::vector<Observation>& observations = recording.residuals.observations();
   const ObservationSeries index = IndexSeries(observations);
+  const size_t before = summary->series.size();
   std::vector<double> bounds;
   for (std::vector<double>& sizes : BySeries(index, values)) {
     bounds.push_back(OutlierBound(&sizes));
   }
   for (const int first : index.first) {
-    const Observation& observation = observations[first];
-    SeriesSummary series;
-    series.file = FileOf(residuals, observation);
-    series.target = TargetName(residuals.scene().scene(), residuals.scene().points(), observation);
-    series.is_point = observation.point >= 0;
-    series.relative_to = ReferenceName(residuals.scene().scene(), residuals.scene().points(),
-                                       residuals.ChannelOf(observation));
-    series.sensor = SensorOf(residuals, observation);
-    series.unit = UnitOf(residuals, observation);
-    series.coordinate = observation.coordinate;
-    series.label = SeriesLabel(residuals, observation);
-    summary.series.push_back(std::move(series));
+    summary->series.push_back(Describe(recording.residuals, recording.name, observations[first]));
   }
   for (Eigen::Index i = 0; i < values.size(); ++i) {
     const Observation& observation = observations[i];
-    SeriesSummary& series = summary.series[index.of[i]];
+    const size_t at = before + static_cast<size_t>(index.of[i]);
+    SeriesSummary& series = summary->series[at];
     const double r = values[i];
     const double difference = r * observation.sigma;
     ++series.count;
@@ -105,8 +111,24 @@ ResidualSummary SummarizeResiduals(const RolloutResiduals& residuals,
     }
     if (std::abs(r) > bounds[index.of[i]]) {
       ++series.outliers;
-      summary.outliers.push_back({index.of[i], observation.time, r});
+      summary->outliers.push_back({static_cast<int>(at), observation.time, r});
     }
+  }
+}
+
+}  // namespace
+
+ResidualSummary SummarizeResiduals(const RecordingsProblem& problem,
+                                   const Eigen::VectorXd& values) {
+  ResidualSummary summary;
+  if (values.size() == 0) {
+    return summary;
+  }
+  Eigen::Index first = 0;
+  for (const RecordedRun& recording : problem.recordings()) {
+    const Eigen::Index rows = recording.residuals.num_residuals();
+    Append(recording, values.segment(first, rows), &summary);
+    first += rows;
   }
   for (SeriesSummary& series : summary.series) {
     const double count = static_cast<double>(series.count);
@@ -121,6 +143,15 @@ ResidualSummary SummarizeResiduals(const RolloutResiduals& residuals,
                    });
   summary.outliers.resize(std::min(summary.outliers.size(), kMostOutliers));
   return summary;
+}
+
+double RmsOfRecording(const RecordingsProblem& problem, const Eigen::VectorXd& values,
+                      int recording) {
+  Eigen::Index first = 0;
+  for (int block = 0; block < recording; ++block) first += problem.num_rows(block);
+  const Eigen::Index rows = problem.num_rows(recording);
+  if (values.size() < first + rows) return std::nan("");
+  return std::sqrt(values.segment(first, rows).squaredNorm() / static_cast<double>(rows));
 }
 
 }  // namespace tangible

@@ -12,13 +12,14 @@
 #include <string>
 #include <vector>
 
-#include "tangible/estimation/problem/residual.h"
+#include "tangible/estimation/problem/recordings.h"
 
 namespace tangible {
 
 struct SeriesSummary {
-  std::string file;    ///< empty where the observations are not from a file
-  std::string target;  ///< body or point
+  std::string recording;  ///< empty: the only one
+  std::string file;       ///< empty where the observations are of no file
+  std::string target;     ///< body or point
   bool is_point = false;
   std::string relative_to;  ///< empty: to the world
   std::string sensor;       ///< empty: none
@@ -32,7 +33,7 @@ struct SeriesSummary {
   double largest_time = 0.0;      ///< s, when
   long outliers = 0;
 
-  /// "ball x", with the file where there are several.
+  /// "ball x", with the file where there are several, after the recording's name.
   std::string label;
 };
 
@@ -53,8 +54,11 @@ struct ResidualSummary {
 };
 
 /// `values`: a residual for each of the observations, in multiples of sigma.
-ResidualSummary SummarizeResiduals(const RolloutResiduals& residuals,
-                                   const Eigen::VectorXd& values);
+ResidualSummary SummarizeResiduals(const RecordingsProblem& problem, const Eigen::VectorXd& values);
+
+/// Root mean square of the residuals of a recording, in multiples of sigma; NaN without any.
+double RmsOfRecording(const RecordingsProblem& problem, const Eigen::VectorXd& values,
+                      int recording);
 
 /// The file of an observation, as the fit file names it; empty where there is none.
 std::string FileOf(const RolloutResiduals& residuals, const Observation& observation);

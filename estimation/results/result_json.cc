@@ -5,7 +5,6 @@
 #include <map>
 
 #include "tangible/estimation/results/fit_json.h"
-#include "tangible/estimation/results/recordings_json.h"
 #include "tangible/estimation/results/residual_summary.h"
 
 namespace tangible {
@@ -26,8 +25,9 @@ OrderedJson IntervalToJson(const ConfidenceInterval& interval) {
                   : OrderedJson(nullptr);
 }
 
-OrderedJson ParametersToJson(const std::vector<ParameterEntry>& entries, const FitResult& result) {
+OrderedJson ParametersToJson(const RecordingsProblem& problem, const FitResult& result) {
   OrderedJson parameters = OrderedJson::array();
+  const std::vector<ParameterEntry>& entries = problem.entries();
   for (Eigen::Index k = 0; k < result.estimate.size(); ++k) {
     const Uncertainty& uncertainty = result.uncertainty;
     OrderedJson parameter = {
@@ -43,6 +43,10 @@ OrderedJson ParametersToJson(const std::vector<ParameterEntry>& entries, const F
     }
     if (!result.uncertainty.messages[k].empty()) {
       parameter["message"] = result.uncertainty.messages[k];
+    }
+    const int recording = problem.RecordingOf(static_cast<int>(k));
+    if (recording >= 0) {
+      parameter["recording"] = problem.recordings()[recording].name;
     }
     parameters.push_back(parameter);
   }
@@ -119,19 +123,30 @@ OrderedJson StartsToJson(const FitResult& result) {
                       {"approach", start.approach},
                       {"approach_iterations", start.approach_iterations},
                       {"plain_cost", Number(start.plain_cost)}});
+    if (!start.tried.empty()) {
+      starts.back().update({{"tried", start.tried}, {"tried_cost", Number(start.tried_cost)}});
+    }
+    if (!start.message.empty()) {
+      starts.back()["message"] = start.message;
+    }
   }
   return starts;
 }
 
 /// Root mean squares in m and rad.
-OrderedJson RmsByCoordinate(const RolloutResiduals& residuals, const FitResult& result) {
+OrderedJson RmsByCoordinate(const RecordingsProblem& problem, const FitResult& result) {
   std::map<std::string, std::pair<double, int>> sums;
-  for (Eigen::Index i = 0; i < result.residuals.size(); ++i) {
-    const Observation& observation = residuals.observations()[i];
-    const double difference = result.residuals[i] * observation.sigma;
-    auto& [sum, count] = sums[NameOf(observation.coordinate)];
-    sum += difference * difference;
-    ++count;
+  Eigen::Index i = 0;
+  for (const RecordedRun& recording : problem.recordings()) {
+    for (const Observation& observation : recording.residuals.observations()) {
+      if (i == result.residuals.size()) {
+        break;  // there is no estimate
+      }
+      const double difference = result.residuals[i++] * observation.sigma;
+      auto& [sum, count] = sums[NameOf(observation.coordinate)];
+      sum += difference * difference;
+      ++count;
+    }
   }
   OrderedJson json = OrderedJson::object();
   for (const auto& [name, sum] : sums) {
@@ -149,6 +164,7 @@ OrderedJson NameToJson(const SeriesSummary& series) {
       json[key] = name;
     }
   };
+  add("recording", series.recording);
   add("relative_to", series.relative_to);
   add("file", series.file);
   add("sensor", series.sensor);
@@ -206,10 +222,11 @@ OrderedJson PredictionToJson(const PredictionScore& score) {
           {"horizons", horizons}};
 }
 
-OrderedJson CheckToJson(const RolloutResiduals& residuals, const DiscretisationCheck& check) {
+OrderedJson CheckToJson(const std::vector<ParameterEntry>& entries,
+                        const DiscretisationCheck& check) {
   OrderedJson parameters = OrderedJson::array();
   for (Eigen::Index k = 0; k < check.bias.size(); ++k) {
-    parameters.push_back({{"name", residuals.scene().entries()[k].name},
+    parameters.push_back({{"name", entries[k].name},
                           {"estimate_half_step", Number(check.estimate_half_step[k])},
                           {"difference", Number(check.difference[k])},
                           {"bias", Number(check.bias[k])},
@@ -220,8 +237,58 @@ OrderedJson CheckToJson(const RolloutResiduals& residuals, const DiscretisationC
       {"parameters", parameters}, {"rollouts", check.rollouts}, {"seconds", check.seconds}};
 }
 
-/// The common part of the results of one run and of several recordings.
-OrderedJson CommonToJson(const LeastSquaresProblem& problem, const FitResult& result) {
+/// What was found of the noise of sensors.
+OrderedJson NoiseToJson(const std::vector<SensorNoise>& noise) {
+  OrderedJson all = OrderedJson::array();
+  for (const SensorNoise& sensor : noise) {
+    all.push_back({{"sensor", sensor.name},
+                   {"sigma_factor", Number(sensor.factor)},
+                   {"standard_deviation", Number(sensor.deviation)},
+                   {"observations", sensor.count},
+                   {"redundancy", Number(sensor.redundancy)}});
+  }
+  return all;
+}
+
+/// How far parameters vary from recording to recording.
+OrderedJson SpreadsToJson(const std::vector<SpreadEstimate>& spreads) {
+  OrderedJson all = OrderedJson::array();
+  for (const SpreadEstimate& spread : spreads) {
+    const bool gaussian = spread.kind == PriorKind::kGaussian;
+    all.push_back({{"name", spread.name},
+                   {"distribution", gaussian ? "gaussian" : "log_normal"},
+                   {"spread", Number(spread.spread)},
+                   {"confidence_95", IntervalToJson(spread.interval)},
+                   {"estimated", spread.estimated},
+                   {"recordings", spread.recordings}});
+  }
+  return all;
+}
+
+OrderedJson RecordingsToJson(const RecordingsProblem& problem, const FitResult& result,
+                             const PredictedRecordings* later) {
+  OrderedJson all = OrderedJson::array();
+  for (int b = 0; b < problem.num_blocks(); ++b) {
+    all.push_back({{"name", problem.recordings()[b].name},
+                   {"residuals", problem.num_rows(b)},
+                   {"weight", problem.weight(b)},
+                   {"residual_rms", Number(RmsOfRecording(problem, result.residuals, b))}});
+    if (later != nullptr) {
+      all.back()["prediction_rms"] = Number(later->runs[b].score.all.rms_in_sigma);
+    }
+  }
+  return all;
+}
+
+/// A matrix of many parameters of single recordings is larger than all else.
+OrderedJson CovarianceOf(const RecordingsProblem& problem, const RowMatrixXd& covariance) {
+  constexpr Eigen::Index kMostInMatrix = 100;
+  const bool any_own = static_cast<int>(problem.entries().size()) > problem.num_shared();
+  return any_own && covariance.rows() > kMostInMatrix ? OrderedJson(nullptr)
+                                                      : CovarianceToJson(covariance);
+}
+
+OrderedJson EstimatesToJson(const RecordingsProblem& problem, const FitResult& result) {
   const Uncertainty& uncertainty = result.uncertainty;
   const bool estimated = result.estimate.size() > 0;
   const auto when = [estimated](double x) { return estimated ? Number(x) : OrderedJson(nullptr); };
@@ -230,11 +297,11 @@ OrderedJson CommonToJson(const LeastSquaresProblem& problem, const FitResult& re
     residuals += problem.num_observation_rows(block);
   }
   return {{"status", NameOf(result.status)},
-          {"parameters", ParametersToJson(problem.entries(), result)},
+          {"parameters", ParametersToJson(problem, result)},
           {"robust", RobustToJson(uncertainty)},
           {"determined_combinations", CombinationsToJson(problem.entries(), uncertainty)},
           {"held_parameters", HeldToJson(result)},
-          {"covariance", CovarianceToJson(uncertainty.covariance)},
+          {"covariance", CovarianceOf(problem, uncertainty.covariance)},
           {"initial_cost", when(result.initial_cost)},
           {"final_cost", when(result.final_cost)},
           {"residual_rms", when(uncertainty.residual_rms)},
@@ -251,64 +318,29 @@ OrderedJson CommonToJson(const LeastSquaresProblem& problem, const FitResult& re
 
 }  // namespace
 
-OrderedJson ResultToJson(const RolloutResiduals& residuals, const FitResult& result,
-                         const DiscretisationCheck* check, const PredictionScore* prediction) {
-  const ResidualSummary summary = SummarizeResiduals(residuals, result.residuals);
-  OrderedJson json = CommonToJson(residuals, result);
-  json["residual_rms_by_coordinate"] = RmsByCoordinate(residuals, result);
+OrderedJson ResultToJson(const RecordingsProblem& problem, const FitResult& result,
+                         const FitFindings& findings) {
+  const ResidualSummary summary = SummarizeResiduals(problem, result.residuals);
+  OrderedJson json = EstimatesToJson(problem, result);
+  json["residual_rms_by_coordinate"] = RmsByCoordinate(problem, result);
   json["residuals_by_series"] = SeriesToJson(summary);
   json["outliers"] = OutliersToJson(summary);
-  if (check != nullptr) {
-    json["discretisation"] = CheckToJson(residuals, *check);
+  if (problem.IsNamed()) {
+    json["recordings"] = RecordingsToJson(problem, result, findings.later);
   }
-  if (prediction != nullptr) {
-    json["prediction"] = PredictionToJson(*prediction);
+  if (findings.check != nullptr) {
+    json["discretisation"] = CheckToJson(problem.entries(), *findings.check);
   }
-  return json;
-}
-
-OrderedJson RecordingsResultToJson(const RecordingsProblem& problem, const FitResult& result,
-                                   const LaterOfRecordings* later) {
-  // A matrix of more parameters than this is larger than all other parts of the result.
-  constexpr Eigen::Index kMostInMatrix = 100;
-  const bool estimated = result.estimate.size() > 0;
-  OrderedJson json = CommonToJson(problem, result);
-  OrderedJson& parameters = json["parameters"];
-  const size_t shared = static_cast<size_t>(problem.num_shared());
-  for (size_t k = shared; k < parameters.size(); ++k) {
-    const size_t block = (k - shared) / static_cast<size_t>(problem.num_own(0));
-    parameters[k]["recording"] = problem.recordings()[block].name;
+  if (findings.later != nullptr) {
+    json["prediction"] = PredictionToJson(findings.later->score);
   }
-  json["recordings"] = OrderedJson::array();
-  for (int b = 0; b < problem.num_blocks(); ++b) {
-    const double rms = RmsOfRecording(problem, result, b);
-    json["recordings"].push_back({{"name", problem.recordings()[b].name},
-                                  {"residuals", problem.num_rows(b)},
-                                  {"weight", problem.weight(b)},
-                                  {"residual_rms", estimated ? Number(rms) : OrderedJson()}});
-    if (later != nullptr) {
-      json["recordings"].back()["prediction_rms"] = Number(later->runs[b].score.all.rms_in_sigma);
-    }
+  if (findings.components != nullptr && !findings.components->noise.empty()) {
+    json["sensor_noise"] = NoiseToJson(findings.components->noise);
   }
-  if (later != nullptr) {
-    json["prediction"] = PredictionToJson(later->score);
-  }
-  if (result.uncertainty.covariance.rows() > kMostInMatrix) {
-    json["covariance"] = nullptr;
+  if (findings.components != nullptr && !findings.components->spreads.empty()) {
+    json["spreads"] = SpreadsToJson(findings.components->spreads);
   }
   return json;
-}
-
-OrderedJson NoiseToJson(const std::vector<SensorNoise>& noise) {
-  OrderedJson all = OrderedJson::array();
-  for (const SensorNoise& sensor : noise) {
-    all.push_back({{"sensor", sensor.name},
-                   {"sigma_factor", Number(sensor.factor)},
-                   {"standard_deviation", Number(sensor.deviation)},
-                   {"observations", sensor.count},
-                   {"redundancy", Number(sensor.redundancy)}});
-  }
-  return all;
 }
 
 }  // namespace tangible

@@ -2,14 +2,13 @@
 //
 // Fits: what tangible-fit does, and the residuals and Jacobians that it minimises.
 #include <cmath>
-#include <optional>
+#include <memory>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "tangible/app/certificate_json.h"
 #include "tangible/estimation/results/fit_json.h"
-#include "tangible/estimation/results/recordings_json.h"
 #include "tangible/estimation/results/report.h"
 #include "tangible/python/binding.h"
 
@@ -21,10 +20,8 @@ class FitProblemOf {
  public:
   FitProblemOf(const std::string& text, const std::string& file) {
     std::string error;
-    const bool good = HasRecordings(text) ? ReadRecordings(text, file, &error)
-                                          : ParseFit(text, file, &fit_, &error) &&
-                                                MakeResiduals(fit_.problem, file, &run_, &error);
-    if (!good) throw Error(error);
+    if (ParseFit(text, file, &fit_, &error)) problem_ = MakeProblem(fit_, &error);
+    if (problem_ == nullptr) throw Error(error);
   }
 
   std::vector<std::string> names() {
@@ -66,44 +63,26 @@ class FitProblemOf {
 
   // (the result as tangible-fit writes it, the report as a page)
   py::tuple Run(int max_iterations) {
-    fit_.problem.options.max_iterations = max_iterations;
+    fit_.run().options.max_iterations = max_iterations;
     std::string json;
     std::string report;
     WithoutLock([&](SignalWatch* watch) {
       const FitProgress progress = [watch](int, int, const FitIteration&) { watch->CheckNow(); };
-      const FitOptions& options = fit_.problem.options;
-      const FitResult result = recordings_ ? Fit(options, &*recordings_, progress)
-                                           : Fit(options, &run_.front(), progress);
-      OrderedJson all = recordings_ ? RecordingsResultToJson(*recordings_, result)
-                                    : ResultToJson(run_.front(), result, nullptr);
+      VarianceComponents components;
+      const FitResult result =
+          FitWithComponents(fit_.input.options(), problem_.get(), progress, &components);
+      OrderedJson all = ResultToJson(*problem_, result, {&components});
       const bool any = result.estimate.size() > 0;
       all["certificate"] = any ? ToJson(result.certificate) : OrderedJson(nullptr);
       json = all.dump();
-      if (any) {
-        report = recordings_ ? RecordingsReport(fit_.path, *recordings_, result)
-                             : FitReport(fit_.path, run_.front(), result, nullptr);
-      }
+      if (any) report = FitReport(fit_.path, *problem_, result, {&components});
       return 0;
     });
     return py::make_tuple(json, report);
   }
 
  private:
-  LeastSquaresProblem& problem() {
-    return recordings_ ? static_cast<LeastSquaresProblem&>(*recordings_) : run_.front();
-  }
-
-  bool ReadRecordings(const std::string& text, const std::string& file, std::string* error) {
-    RecordingsFile read;
-    std::vector<RecordedRun> runs;
-    if (!ParseRecordings(text, file, &read, error) || !MakeRecordingsProblem(read, &runs, error)) {
-      return false;
-    }
-    recordings_.emplace(std::move(runs), read.own);
-    fit_.path = file;
-    fit_.problem.options = read.recordings.front().fit.problem.options;
-    return true;
-  }
+  RecordingsProblem& problem() { return *problem_; }
 
   // Rows of all blocks, each times the root of its weight; what is wrong, or empty. No Jacobian
   // where that has no rows.
@@ -114,9 +93,9 @@ class FitProblemOf {
     for (int b = 0; b < layout.num_blocks(); ++b) {
       watch->CheckNow();
       BlockEvaluation block;
-      if (!problem().EvaluateBlock(b, layout.Local(b, p), fit_.problem.options.derivatives,
+      if (!problem().EvaluateBlock(b, layout.Local(b, p), fit_.input.options().derivatives,
                                    derivatives, &block)) {
-        return block.message;
+        return problem().BlockName(b) + block.message;
       }
       const double root = std::sqrt(problem().weight(b));
       const Eigen::Index first = layout.row_offset(b);
@@ -130,8 +109,7 @@ class FitProblemOf {
   }
 
   FitFile fit_;
-  std::vector<RolloutResiduals> run_;  // one, or none with recordings
-  std::optional<RecordingsProblem> recordings_;
+  std::unique_ptr<RecordingsProblem> problem_;
 };
 
 }  // namespace

@@ -4,7 +4,6 @@
 #include <cstdint>
 #include <cstdlib>
 #include <string>
-#include <vector>
 
 #include "tangible/estimation/results/fit_json.h"
 
@@ -13,9 +12,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   tangible::FitFile fit;
   std::string error;
   const std::string text(reinterpret_cast<const char*>(data), size);
-  std::vector<tangible::RolloutResiduals> residuals;
-  const bool made = tangible::ParseFit(text, file, &fit, &error) &&
-                    tangible::MakeResiduals(fit.problem, file, &residuals, &error);
+  const bool made =
+      tangible::ParseFit(text, file, &fit, &error) && tangible::MakeProblem(fit, &error) != nullptr;
   if (made != error.empty() || error.find('\n') != std::string::npos) std::abort();
   return 0;
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 
 #include "run_program.h"
@@ -158,10 +159,126 @@ TEST_F(TangibleFitTest, MistakesInRecordingsNameThem) {
   expect({{"initial", {{"speed", 1}}}}, "recording 'a': /parameters/0/name: expected a string");
   fit["parameters"][0]["name"] = "g";
   fit["recordings"] = {good};
-  ExpectOneLine(Fit(fit, "--discretisation_check"), 2,
-                "--discretisation_check: not with recordings");
   fit["observations"] = good["observations"];
   ExpectOneLine(Fit(fit), 1, "/observations: expected in each recording");
+}
+
+// One recording without own parameters is the same fit as the run alone, with everything that can be
+// asked for, to the last digit.
+TEST_F(TangibleFitTest, ARunIsTheCaseOfOneRecording) {
+  const json alone = Problem({{"segments", 2}, {"starts", 2}});
+  json recorded = alone;
+  recorded["recordings"] = {{{"name", "a"}, {"observations", alone["observations"]}}};
+  recorded.erase("observations");
+  json results[2];
+  std::string reports[2];
+  for (int i = 0; i < 2; ++i) {
+    const ProgramRun run =
+        Fit(i == 0 ? alone : recorded, "--discretisation_check --predict_from=0.4 --checkpoint='" +
+                                           Path("c" + std::to_string(i)) + "' --out='" +
+                                           Path("r.json") + "' --report='" + Path("r.html") +
+                                           "' --predictions='" + Path("p.csv") + "'");
+    ASSERT_EQ(run.exit_status, 0) << run.error;
+    results[i] = json::parse(Read(Path("r.json")));
+    reports[i] = Read(Path("r.html"));
+  }
+  for (const char* key : {"covariance", "final_cost", "initial_cost", "residual_rms_by_coordinate",
+                          "rollouts", "starts", "prediction", "robust"}) {
+    EXPECT_EQ(results[0][key], results[1][key]) << key;
+  }
+  EXPECT_EQ(results[0]["parameters"], results[1]["parameters"]);
+  EXPECT_EQ(results[0]["discretisation"]["parameters"], results[1]["discretisation"]["parameters"]);
+  EXPECT_EQ(results[1]["residuals_by_series"][0]["recording"], "a");
+  EXPECT_EQ(results[1]["recordings"][0]["name"], "a");
+  EXPECT_FALSE(results[0].contains("recordings"));
+  EXPECT_FALSE(results[0]["residuals_by_series"][0].contains("recording"));
+  for (const std::string& report : reports) {
+    EXPECT_NE(report.find("Bias of the step"), std::string::npos);
+    EXPECT_NE(report.find("Observed and fitted"), std::string::npos);
+  }
+}
+
+// Five throws of one ball whose speeds vary: 2 ± 0.5 m/s by hand, seen to 1 mm.
+TEST_F(TangibleFitTest, ASpreadIsEstimatedAndItsMistakesAreOneLine) {
+  json fit = Problem();
+  fit.erase("observations");
+  fit["parameters"][1].update(
+      {{"per", "recording"}, {"varies", {{"gaussian", {{"spread", "estimate"}}}}}});
+  const double speeds[] = {1.5, 2.5, 2.0, 1.25, 2.75};
+  double squares = 0.0;
+  for (int take = 0; take < 5; ++take) {
+    squares += std::pow(speeds[take] - 2.0, 2);
+    std::string text = "time,body,x,y\n";
+    for (int k = 0; k <= 40; k += 10) {
+      text += std::to_string(0.01 * k) + ",ball," + json(0.01 * speeds[take] * k).dump() + "," +
+              json(Height(k)).dump() + "\n";
+    }
+    const std::string file = "take" + std::to_string(take) + ".csv";
+    Write(file, text);
+    fit["recordings"].push_back({{"name", "take " + std::to_string(take)},
+                                 {"observations", {{{"file", file}, {"sigma", 0.001}}}}});
+  }
+  const auto run_all = [&](const std::string& flags) {
+    const ProgramRun run =
+        Fit(fit, flags + " --out='" + Path("r.json") + "' --report='" + Path("r.html") + "'");
+    EXPECT_EQ(run.exit_status, 0) << run.error;
+    EXPECT_NE(run.out.find("spread of "), std::string::npos) << run.out;
+    return json::parse(Read(Path("r.json")));
+  };
+  const std::string checkpoint = "--discretisation_check --checkpoint='" + Path("c") + "'";
+  const json result = run_all(checkpoint);
+  EXPECT_EQ(run_all(checkpoint)["parameters"], result["parameters"]);
+  ASSERT_EQ(result["parameters"].size(), 7u);
+  EXPECT_EQ(result["parameters"][1]["name"], "speed");
+  EXPECT_NEAR(result["parameters"][1]["estimate"].get<double>(), 2.0, 1e-5);
+  EXPECT_NEAR(result["parameters"][2]["estimate"].get<double>(), 1.5, 1e-4);
+  const json& spread = result["spreads"][0];
+  // What is left of the noise, 1 mm over 0.4 s, is nothing beside it.
+  EXPECT_NEAR(spread["spread"].get<double>(), std::sqrt(squares / 4.0), 1e-4);
+  // χ² with four degrees of freedom.
+  EXPECT_NEAR(spread["confidence_95"][0].get<double>(), std::sqrt(squares / 11.143), 1e-3);
+  EXPECT_NEAR(spread["confidence_95"][1].get<double>(), std::sqrt(squares / 0.48442), 2e-3);
+  EXPECT_NE(Read(Path("r.html")).find("What varies from recording to recording"),
+            std::string::npos);
+
+  const auto expect = [&](const json& varies, const std::string& what) {
+    json wrong = fit;
+    wrong["parameters"][1]["varies"] = varies;
+    std::filesystem::remove(Path("r.json"));
+    ExpectOneLine(Fit(wrong, "--out='" + Path("r.json") + "'"), 1, what);
+    EXPECT_FALSE(std::filesystem::exists(Path("r.json")));
+  };
+  expect({{"gaussian", {{"spread", 0}}}}, "/varies/gaussian/spread: expected a number > 0, got 0");
+  expect({{"gaussian", {{"spread", "guess"}}}}, "/spread: expected \"estimate\" or a number > 0");
+  expect({{"gaussian", {{"sigma", 1}}}}, "/varies/gaussian/sigma: unknown key");
+  expect({{"uniform", 1}}, "/parameters/1/varies/uniform: unknown key of varies");
+  expect(json::object(), "/varies: expected one of gaussian and log_normal, got none");
+  expect({{"log_normal", {{"spread", "estimate"}}}},
+         "/varies: expected gaussian for a parameter that may be negative or starts at 0");
+  json shared = fit;
+  shared["parameters"][1].erase("per");
+  ExpectOneLine(Fit(shared), 1, "/varies: expected \"per\": \"recording\" beside it, got none");
+  json one = fit;
+  one["recordings"].erase(one["recordings"].begin() + 1, one["recordings"].end());
+  ExpectOneLine(Fit(one), 1, "/parameters/1/varies: expected at least two recordings");
+  one = Problem();
+  one["parameters"][1]["per"] = "recording";
+  ExpectOneLine(Fit(one), 1, "/parameters/1/per: expected recordings in the file, got none");
+}
+
+// The parabola through the first observations, whose step adds half a step's fall to the speed.
+TEST_F(TangibleFitTest, ASingleRunBeginsWhereTheObservationsSay) {
+  json fit = Problem({{"initial", "from_observations"}});
+  fit["parameters"].push_back("bodies/ball/velocity/y");
+  fit["parameters"].push_back("bodies/ball/position/y");
+  ASSERT_EQ(Fit(fit, "--out='" + Path("r.json") + "'").exit_status, 0);
+  const json initial = json::parse(Read(Path("r.json")))["starts"][0]["initial"];
+  EXPECT_EQ(initial[0], 8.0);
+  EXPECT_NEAR(initial[1].get<double>(), 2.0, 1e-9);
+  EXPECT_NEAR(initial[2].get<double>(), 3.0 - 0.5 * 9.5 * 0.01, 1e-9);
+  EXPECT_NEAR(initial[3].get<double>(), 1.0, 1e-9);
+  fit["initial"] = "from_nothing";
+  ExpectOneLine(Fit(fit), 1, "/initial: expected one of from_observations");
 }
 
 TEST_F(TangibleFitTest, FitsAndWritesResultAndReport) {
@@ -268,11 +385,20 @@ TEST_F(TangibleFitTest, SensorsNoiseAndOutliersAreNamed) {
   EXPECT_DOUBLE_EQ(result["outliers"]["largest"][0]["time"], 0.3);
   EXPECT_EQ(result["residuals_by_series"][0]["sensor"], "camera");
   EXPECT_NE(Read(Path("r.html")).find("<h2>Outliers"), std::string::npos);
-  ExpectOneLine(Fit(problem, "--checkpoint='" + Path("c.json") + "'"), 2, "no --checkpoint");
+  // The same as one recording, with a checkpoint, which the second time has all that was done.
   json several = problem;
   several["recordings"] = {{{"name", "a"}, {"observations", problem["observations"]}}};
   several.erase("observations");
-  ExpectOneLine(Fit(several), 1, "estimate_sigma is not with recordings");
+  const std::string checkpoint = "--checkpoint='" + Path("c.json") + "' ";
+  for (int time = 0; time < 2; ++time) {
+    ASSERT_EQ(Fit(several, checkpoint + "--out='" + Path("s.json") + "'").exit_status, 0);
+    const json again = json::parse(Read(Path("s.json")));
+    for (const char* key : {"sensor_noise", "covariance", "final_cost", "residuals", "outliers"}) {
+      const json& value = key == std::string("outliers") ? again[key]["count"] : again[key];
+      EXPECT_EQ(value, key == std::string("outliers") ? result[key]["count"] : result[key]) << key;
+    }
+    EXPECT_EQ(again["parameters"][0]["estimate"], result["parameters"][0]["estimate"]);
+  }
 }
 
 // Each of ten links' dampings, where six columns have room beside the cost.

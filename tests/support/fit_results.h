@@ -11,12 +11,23 @@
 namespace tangible {
 
 /// Two parameters, seen in x (twice) and y.
-inline RolloutResiduals HandMadeResiduals() {
-  return MakeResiduals(MakeScene(kFallingBall), {},
-                       {Parameter("gravity/y", -9.0), Parameter("bodies/ball/linear_damping", 0.1)},
-                       {{0.5, 0, -1, Coordinate::kX, 0.5, 0.1},
-                        {0.5, 0, -1, Coordinate::kY, 10.0, 0.2},
-                        {1.0, 0, -1, Coordinate::kX, 1.0, 0.1}});
+inline RecordingsProblem HandMadeProblem() {
+  return RecordingsProblem(
+      MakeResiduals(MakeScene(kFallingBall), {},
+                    {Parameter("gravity/y", -9.0), Parameter("bodies/ball/linear_damping", 0.1)},
+                    {{0.5, 0, -1, Coordinate::kX, 0.5, 0.1},
+                     {0.5, 0, -1, Coordinate::kY, 10.0, 0.2},
+                     {1.0, 0, -1, Coordinate::kX, 1.0, 0.1}}));
+}
+
+inline FitStart HandMadeStart(const std::vector<double>& initial, double cost,
+                              const std::string& status) {
+  FitStart start;
+  start.initial = initial;
+  start.cost = cost;
+  start.iterations = 1;
+  start.status = status;
+  return start;
 }
 
 /// Gravity with an interval, a damping at its bound without.
@@ -42,7 +53,7 @@ inline FitResult HandMadeResult() {
   result.initial_cost = 40.0;
   result.final_cost = 3.0;
   result.iterations = {{40.0, 5.0, {-9.0, 0.1}, 0.0}, {3.0, 1e-9, {-9.8125, 1.0 / 3.0}, 0.5}};
-  result.starts = {{{-9.0, 0.1}, 3.0, 1, 0, "converged"}};
+  result.starts = {HandMadeStart({-9.0, 0.1}, 3.0, "converged")};
   result.residuals = Eigen::Vector3d(3.0, -2.0, 4.0);
   result.rollouts = 7;
   return result;

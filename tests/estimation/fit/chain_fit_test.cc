@@ -29,14 +29,14 @@ FitProblem LoadProblem(const std::string& name) {
   std::string error;
   EXPECT_TRUE(LoadFit(std::string(TANGIBLE_SOURCE_DIR) + "/data/fits/" + name, &file, &error))
       << error;
-  return file.problem;
+  return file.run();
 }
 
 FitResult RunFit(const FitProblem& problem) {
-  std::vector<RolloutResiduals> residuals;
   std::string error;
-  EXPECT_TRUE(MakeResiduals(problem, "", &residuals, &error)) << error;
-  return Fit(problem.options, &residuals.front(), FitProgress());
+  const std::unique_ptr<RecordingsProblem> made = MakeProblem({"", InputOf(problem)}, &error);
+  EXPECT_NE(made, nullptr) << error;
+  return Fit(problem.options, made.get(), FitProgress());
 }
 
 // Replaces every observed value by what the scene predicts at the true mass, which is that of the
@@ -158,7 +158,7 @@ TEST(ChainFit, ErrorFallsInProportionToTheStep) {
     const FitResult result = RunFit(problem);
     ASSERT_EQ(result.status, FitStatus::kConverged) << result.message;
     const double error = result.estimate(0) - kMass;
-    const DiscretisationCheck check = CheckDiscretisation(problem, result);
+    const DiscretisationCheck check = CheckDiscretisation(InputOf(problem), {}, result);
     ASSERT_EQ(check.status, FitStatus::kConverged) << check.message;
     std::printf("dt %.4f s: mass %.6f kg, error %+.6f kg, foretold %+.6f kg\n", dt,
                 result.estimate(0), error, check.bias(0));

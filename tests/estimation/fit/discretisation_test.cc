@@ -33,7 +33,7 @@ TEST(DiscretisationTest, HalvingTheStepTellsTheBias) {
   const FitProblem problem = FreeFall();
   const FitResult result = FitOf(problem);
   ASSERT_EQ(result.status, FitStatus::kConverged) << result.message;
-  const DiscretisationCheck check = CheckDiscretisation(problem, result);
+  const DiscretisationCheck check = CheckDiscretisation(InputOf(problem), {}, result);
   ASSERT_EQ(check.status, FitStatus::kConverged) << check.message;
   EXPECT_EQ(check.dt, 0.01);
   EXPECT_GT(check.rollouts, 0);
@@ -64,7 +64,7 @@ TEST(DiscretisationTest, RungeKuttaIsOfFourthOrder) {
   problem.scene.simulation.dt = 0.1;
   const FitResult result = FitOf(problem);
   ASSERT_EQ(result.status, FitStatus::kConverged) << result.message;
-  const DiscretisationCheck check = CheckDiscretisation(problem, result);
+  const DiscretisationCheck check = CheckDiscretisation(InputOf(problem), {}, result);
   ASSERT_EQ(check.status, FitStatus::kConverged) << check.message;
   EXPECT_EQ(check.order, 4);
   EXPECT_DOUBLE_EQ(check.bias[0], 16.0 / 15.0 * check.difference[0]);
@@ -79,7 +79,7 @@ TEST(DiscretisationTest, AProblemThatCannotBeSetUpIsSaid) {
   FitResult result;
   result.estimate = Eigen::VectorXd::Constant(1, -9.8);
   problem.parameters = {Parameter("bodies/none/mass", 1.0)};
-  const DiscretisationCheck check = CheckDiscretisation(problem, result);
+  const DiscretisationCheck check = CheckDiscretisation(InputOf(problem), {}, result);
   EXPECT_EQ(check.status, FitStatus::kFailed);
   EXPECT_NE(check.message, "");
   EXPECT_EQ(check.bias.size(), 0);

@@ -74,14 +74,14 @@ TEST(FitCheckpointTest, EndsAtTheSameBitsWhereverItWasInterrupted) {
   ASSERT_GT(interruptions.size(), 40u);
 
   for (size_t i = 0; i < interruptions.size(); i += 3) {
-    FitCheckpoint written(problem, {});
-    written.fit() = interruptions[i];
-    FitCheckpoint read(problem, [](const std::string&) { return ""; });
+    FitCheckpoint written(InputOf(problem), {});
+    *written.Next() = interruptions[i];
+    FitCheckpoint read(InputOf(problem), [](const std::string&) { return ""; });
     ASSERT_EQ(read.Restore(written.Text(), "c.json"), "");
     EXPECT_EQ(read.Text(), written.Text());
     RolloutResiduals again = ResidualsOf(problem);
-    ASSERT_EQ(HashOf(Fit(problem.options, &again, {}, &read.fit())), HashOf(whole)) << i;
-    ASSERT_EQ(read.fit().mismatch(), 0);
+    ASSERT_EQ(HashOf(Fit(problem.options, &again, {}, read.Next())), HashOf(whole)) << i;
+    ASSERT_EQ(read.mismatch(), 0);
   }
 }
 
@@ -123,11 +123,11 @@ TEST(FitCheckpointTest, AFitOfSeveralRecordingsEndsAtTheSameBits) {
   ASSERT_GT(interruptions.size(), 10u);
   const FitProblem any = PendulumProblem();
   for (const FitLog& interrupted : interruptions) {
-    FitCheckpoint written(any, {});
-    written.fit() = interrupted;
-    FitCheckpoint read(any, [](const std::string&) { return ""; });
+    FitCheckpoint written(InputOf(any), {});
+    *written.Next() = interrupted;
+    FitCheckpoint read(InputOf(any), [](const std::string&) { return ""; });
     ASSERT_EQ(read.Restore(written.Text(), "c.json"), "");
-    ASSERT_EQ(HashOf(Fit(options, &problem, {}, &read.fit())), HashOf(whole));
+    ASSERT_EQ(HashOf(Fit(options, &problem, {}, read.Next())), HashOf(whole));
   }
 }
 
@@ -136,19 +136,19 @@ TEST(FitCheckpointTest, TheCheckAtHalfTheStepGoesOnToo) {
   problem.options.starts = 1;
   RolloutResiduals residuals = ResidualsOf(problem);
   const FitResult fit = Fit(problem.options, &residuals, {});
-  const DiscretisationCheck whole = CheckDiscretisation(problem, fit);
+  const DiscretisationCheck whole = CheckDiscretisation(InputOf(problem), {}, fit);
   ASSERT_EQ(whole.status, FitStatus::kConverged) << whole.message;
   std::vector<std::string> texts;
-  FitCheckpoint checkpoint(problem, [&](const std::string& text) {
+  FitCheckpoint checkpoint(InputOf(problem), [&](const std::string& text) {
     texts.push_back(text);
     return "";
   });
-  CheckDiscretisation(problem, fit, &checkpoint.half_step());
+  CheckDiscretisation(InputOf(problem), {}, fit, checkpoint.Next());
   ASSERT_GT(texts.size(), 1u);
   for (const std::string& text : texts) {
-    FitCheckpoint read(problem, [](const std::string&) { return ""; });
+    FitCheckpoint read(InputOf(problem), [](const std::string&) { return ""; });
     ASSERT_EQ(read.Restore(text, "c.json"), "");
-    const DiscretisationCheck again = CheckDiscretisation(problem, fit, &read.half_step());
+    const DiscretisationCheck again = CheckDiscretisation(InputOf(problem), {}, fit, read.Next());
     EXPECT_EQ(again.estimate_half_step, whole.estimate_half_step);
     EXPECT_EQ(again.rollouts, whole.rollouts);
   }
@@ -176,12 +176,12 @@ TEST(FitCheckpointTest, AnotherFitsEvaluationsAreNoticed) {
 
 TEST(FitCheckpointTest, RefusesWhatIsDamagedOrOfAnotherFit) {
   const FitProblem problem = PendulumProblem();
-  FitCheckpoint checkpoint(problem, [](const std::string&) { return ""; });
+  FitCheckpoint checkpoint(InputOf(problem), [](const std::string&) { return ""; });
   RolloutResiduals residuals = ResidualsOf(problem);
-  Fit(problem.options, &residuals, {}, &checkpoint.fit());
+  Fit(problem.options, &residuals, {}, checkpoint.Next());
   const std::string text = checkpoint.Text();
   const auto refused = [&](const std::string& damaged, const FitProblem& of) {
-    FitCheckpoint other(of, {});
+    FitCheckpoint other(InputOf(of), {});
     return other.Restore(damaged, "c.json");
   };
   EXPECT_EQ(refused(text, problem), "");
@@ -195,7 +195,7 @@ TEST(FitCheckpointTest, RefusesWhatIsDamagedOrOfAnotherFit) {
   const std::string deep(1'000'000, '\x81');
   for (const std::string& other :
        {std::string("{}"), std::string("[]"), std::string(), std::string("\xff\xff"), deep}) {
-    EXPECT_EQ(refused(other, problem).rfind("c.json: expected a \"tangible-fit checkpoint 4\"", 0),
+    EXPECT_EQ(refused(other, problem).rfind("c.json: expected a \"tangible-fit checkpoint 5\"", 0),
               0U);
   }
 
@@ -219,11 +219,11 @@ TEST(FitCheckpointTest, RefusesWhatIsDamagedOrOfAnotherFit) {
 TEST(FitCheckpointTest, AFileThatCannotBeWrittenStopsNothing) {
   const FitProblem problem = PendulumProblem();
   int writes = 0;
-  FitCheckpoint checkpoint(problem, [&](const std::string&) {
+  FitCheckpoint checkpoint(InputOf(problem), [&](const std::string&) {
     return ++writes < 3 ? std::string() : std::string("c.json: no space");
   });
   RolloutResiduals residuals = ResidualsOf(problem);
-  EXPECT_EQ(Fit(problem.options, &residuals, {}, &checkpoint.fit()).status, FitStatus::kConverged);
+  EXPECT_EQ(Fit(problem.options, &residuals, {}, checkpoint.Next()).status, FitStatus::kConverged);
   EXPECT_EQ(checkpoint.error(), "c.json: no space");
   EXPECT_EQ(writes, 3);
 }

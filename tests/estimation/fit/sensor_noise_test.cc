@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "../../support/fit_scenes.h"
+#include "tangible/estimation/fit/variance_components.h"
 
 namespace tangible {
 namespace {
@@ -35,20 +36,21 @@ struct TwoSensors {
     }
   }
 
-  RolloutResiduals Residuals() const {
+  RecordingsProblem Residuals() const {
     ParameterizedScene parameterized;
     ParameterError error;
     EXPECT_TRUE(parameterized.Create(scene, {}, parameters, &error, instruments)) << error.what;
-    return RolloutResiduals(parameterized, observations, channels);
+    return RecordingsProblem(RolloutResiduals(parameterized, observations, channels));
   }
 };
 
 TEST(SensorNoiseTest, EachSensorHasItsOwn) {
   TwoSensors problem(7);
-  RolloutResiduals residuals = problem.Residuals();
-  std::vector<SensorNoise> noise;
-  const FitResult result = FitWithSensorNoise(FitOptions(), &residuals, {}, &noise);
+  RecordingsProblem residuals = problem.Residuals();
+  VarianceComponents noise_components;
+  const FitResult result = FitWithComponents(FitOptions(), &residuals, {}, &noise_components);
   ASSERT_EQ(result.status, FitStatus::kConverged) << result.message;
+  const std::vector<SensorNoise>& noise = noise_components.noise;
   ASSERT_EQ(noise.size(), 2u);
   EXPECT_EQ(noise[0].name, "rough");
   EXPECT_EQ(noise[0].count, 51);
@@ -59,8 +61,8 @@ TEST(SensorNoiseTest, EachSensorHasItsOwn) {
   EXPECT_NEAR(noise[0].redundancy + noise[1].redundancy, 102.0 - 3.0, 1e-3);
   // Then the residuals are as large as sigma says, of each sensor.
   double sums[2] = {};
-  for (int i = 0; i < residuals.num_residuals(); ++i) {
-    sums[residuals.observations()[i].channel] += result.residuals[i] * result.residuals[i];
+  for (int i = 0; i < residuals.num_rows(0); ++i) {
+    sums[residuals.run(0)->observations()[i].channel] += result.residuals[i] * result.residuals[i];
   }
   EXPECT_NEAR(sums[0], noise[0].redundancy, 1e-2 * noise[0].redundancy);
   EXPECT_NEAR(sums[1], noise[1].redundancy, 1e-2 * noise[1].redundancy);
@@ -72,10 +74,11 @@ TEST(SensorNoiseTest, EachSensorHasItsOwn) {
   for (Observation& observation : other.observations) {
     observation.sigma *= observation.channel == 0 ? 20.0 : 0.2;
   }
-  RolloutResiduals again = other.Residuals();
-  std::vector<SensorNoise> found;
-  const FitResult same = FitWithSensorNoise(FitOptions(), &again, {}, &found);
+  RecordingsProblem again = other.Residuals();
+  VarianceComponents found_components;
+  const FitResult same = FitWithComponents(FitOptions(), &again, {}, &found_components);
   ASSERT_EQ(same.status, FitStatus::kConverged) << same.message;
+  const std::vector<SensorNoise>& found = found_components.noise;
   EXPECT_NEAR(20.0 * found[0].factor, noise[0].factor, 1e-2 * noise[0].deviation);
   EXPECT_NEAR(0.2 * found[1].factor, noise[1].factor, 1e-2 * noise[1].deviation);
 }
@@ -85,12 +88,13 @@ TEST(SensorNoiseTest, OutliersDoNotMoveItWithHubersLoss) {
   for (size_t i = 0; i < problem.observations.size(); i += 17) {
     problem.observations[i].value += 5.0;
   }
-  RolloutResiduals residuals = problem.Residuals();
-  std::vector<SensorNoise> noise;
+  RecordingsProblem residuals = problem.Residuals();
+  VarianceComponents noise_components;
   FitOptions options;
   options.huber = 2.0;
-  const FitResult result = FitWithSensorNoise(options, &residuals, {}, &noise);
+  const FitResult result = FitWithComponents(options, &residuals, {}, &noise_components);
   ASSERT_EQ(result.status, FitStatus::kConverged) << result.message;
+  const std::vector<SensorNoise>& noise = noise_components.noise;
   EXPECT_NEAR(noise[0].factor, 3.0, 1.5);
   EXPECT_NEAR(noise[1].factor, 0.1, 0.05);
 }
@@ -100,9 +104,9 @@ TEST(SensorNoiseTest, ASensorWithoutResidualsIsSaid) {
   problem.observations.resize(2);
   problem.parameters.resize(2);
   problem.observations[0].time = problem.observations[1].time = 0.5;
-  RolloutResiduals residuals = problem.Residuals();
-  std::vector<SensorNoise> noise;
-  const FitResult result = FitWithSensorNoise(FitOptions(), &residuals, {}, &noise);
+  RecordingsProblem residuals = problem.Residuals();
+  VarianceComponents noise_components;
+  const FitResult result = FitWithComponents(FitOptions(), &residuals, {}, &noise_components);
   EXPECT_EQ(result.status, FitStatus::kNotConverged);
   EXPECT_NE(result.message.find("the sigma of sensor \"rough\" cannot be estimated"),
             std::string::npos)

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "../../support/fit_scenes.h"
+#include "tangible/estimation/fit/linearisation.h"
 
 namespace tangible {
 namespace {
@@ -22,7 +23,9 @@ RecordingsProblem Throws() {
                                          Parameter("gravity/x", 0.1)},
                                         observations)});
   }
-  return RecordingsProblem(std::move(recordings), {false, true, false});
+  std::vector<ParameterScope> scopes(3);
+  scopes[1].kind = ParameterScope::Kind::kOwn;
+  return RecordingsProblem(std::move(recordings), scopes);
 }
 
 TEST(RecordingsTest, SharedParametersStandFirst) {
@@ -70,13 +73,59 @@ TEST(RecordingsTest, DerivativesAreThoseOfTheRows) {
   }
 }
 
+// What varies has a value of each recording and a shared one, on which no observation depends.
+TEST(RecordingsTest, WhatVariesHasASharedValueToo) {
+  std::vector<RecordedRun> runs;
+  const Scene scene = MakeScene(kFallingBall);
+  FitParameter speed = Parameter("bodies/ball/velocity/x", 0.5);
+  speed.prior = Prior{PriorKind::kGaussian, 0.4, 0.1};
+  for (int k = 0; k < 2; ++k) {
+    runs.push_back({k == 0 ? "a" : "b", 1.0,
+                    MakeResiduals(scene, {}, {speed, Parameter("gravity/y", -9.0)},
+                                  Observe(scene, 10, 0.01, 5 + k))});
+  }
+  std::vector<ParameterScope> scopes(2);
+  scopes[0] = {ParameterScope::Kind::kVaries, PriorKind::kGaussian, 0.25};
+  RecordingsProblem problem(std::move(runs), scopes);
+  ASSERT_EQ(problem.entries().size(), 4u);
+  EXPECT_EQ(problem.num_shared(), 2);
+  EXPECT_EQ(problem.order(), (std::vector<int>{-1, 1, 0}));
+  EXPECT_TRUE(problem.entries()[0].prior);  // of the shared value alone
+  EXPECT_FALSE(problem.entries()[2].prior);
+  ASSERT_EQ(problem.effects().size(), 1u);
+  EXPECT_EQ(problem.effects()[0].mean, 0);
+  EXPECT_EQ(problem.effects()[0].own, (std::vector<int>{2, 3}));
+  EXPECT_EQ(problem.effects()[0].spread, 0.25);
+  EXPECT_FALSE(problem.EstimatesSpread(0));
+  EXPECT_EQ(problem.IndexInRecording(0), 0);
+  EXPECT_EQ(problem.IndexInRecording(3), 0);
+  EXPECT_EQ(problem.RecordingOf(1), -1);
+  EXPECT_EQ(problem.RecordingOf(3), 1);
+  BlockEvaluation block;
+  ASSERT_TRUE(problem.EvaluateBlock(1, Eigen::Vector3d(7.0, -9.5, 0.6), DerivativeMethod::kTangent,
+                                    BlockDerivatives::kCompute, &block));
+  EXPECT_EQ(block.jacobian.col(0).norm(), 0.0);
+  EXPECT_GT(block.jacobian.col(2).norm(), 1.0);
+  const Eigen::VectorXd p = Eigen::Vector4d(7.0, -9.5, 0.6, 0.7);
+  EXPECT_EQ(problem.ParametersOf(1, p), Eigen::Vector2d(0.7, -9.5));
+  problem.SetInitial(p);
+  EXPECT_EQ(InitialOf(problem.entries()), p);
+  EXPECT_EQ(problem.recordings()[0].residuals.entries()[0].initial, 0.6);
+}
+
 TEST(RecordingsTest, AFailureNamesItsRecording) {
   RecordingsProblem problem = Throws();
   BlockEvaluation evaluation;
   EXPECT_FALSE(problem.EvaluateBlock(1, Eigen::Vector3d(std::nan(""), 0.0, 0.0),
                                      DerivativeMethod::kTangent, BlockDerivatives::kSkip,
                                      &evaluation));
-  EXPECT_EQ(evaluation.message.rfind("recording 'take 1': ", 0), 0u) << evaluation.message;
+  EXPECT_NE(evaluation.message, "");
+  Linearizer linearizer(&problem, DerivativeMethod::kTangent, 1, nullptr);
+  std::vector<BlockEvaluation> blocks;
+  Eigen::VectorXd p = InitialOf(problem.entries());
+  p[3] = std::nan("");
+  EXPECT_FALSE(linearizer.Rows(p, BlockDerivatives::kSkip, &blocks));
+  EXPECT_EQ(linearizer.message(), "recording 'take 1': " + evaluation.message);
 }
 
 }  // namespace

@@ -39,7 +39,7 @@ TEST_F(FitJsonTest, ReadsWhatIsWritten) {
                        folder_ + "fit.json", &fit, &error))
       << error;
   EXPECT_EQ(fit.path, folder_ + "fit.json");
-  const FitProblem& problem = fit.problem;
+  const FitProblem& problem = fit.run();
   EXPECT_EQ(problem.scene.name, "falling ball");
   ASSERT_EQ(problem.observations.size(), 3u);
   EXPECT_EQ(problem.observations[0].sigma, 0.1);
@@ -79,9 +79,9 @@ TEST_F(FitJsonTest, APointIsAtTheCentreOfMassByDefault) {
   ASSERT_TRUE(ParseFit(With("points", R"({"tip.1": {"body": "ball"}})"), folder_ + "fit.json", &fit,
                        &error))
       << error;
-  ASSERT_EQ(fit.problem.points.size(), 1u);
-  EXPECT_EQ(fit.problem.points[0].name, "tip.1");
-  EXPECT_EQ(fit.problem.points[0].at, Vector2<double>(0.0, 0.0));
+  ASSERT_EQ(fit.run().points.size(), 1u);
+  EXPECT_EQ(fit.run().points[0].name, "tip.1");
+  EXPECT_EQ(fit.run().points[0].at, Vector2<double>(0.0, 0.0));
 }
 
 TEST_F(FitJsonTest, BadInputsAreOneLine) {
@@ -199,7 +199,7 @@ TEST_F(FitJsonTest, InstrumentsAreRead) {
                      {"path": "clocks/*/rate", "lower": 0.25, "upper": 0.75}]})",
                        folder_ + "fit.json", &fit, &error))
       << error;
-  const FitProblem& problem = fit.problem;
+  const FitProblem& problem = fit.run();
   EXPECT_EQ(problem.instruments.sensors[0].delay, 0.125);
   EXPECT_EQ(problem.instruments.sensors[0].gain, 2.0);
   EXPECT_EQ(problem.instruments.sensors[0].bias, 0.5);
@@ -215,11 +215,12 @@ TEST_F(FitJsonTest, InstrumentsAreRead) {
   EXPECT_EQ(problem.observations[0].sigma, 0.25);  // the sensor's
   EXPECT_EQ(problem.observations[1].coordinate, Coordinate::kOmega);
   EXPECT_EQ(problem.observations[3].channel, 1);
-  std::vector<RolloutResiduals> residuals;
-  ASSERT_TRUE(MakeResiduals(problem, "fit.json", &residuals, &error)) << error;
-  EXPECT_TRUE(residuals[0].scene().MovesTimes());
-  EXPECT_EQ(residuals[0].entries()[1].initial, 0.125);
-  EXPECT_TRUE(residuals[0].entries()[2].logarithmic);
+  const std::unique_ptr<RecordingsProblem> made = MakeProblem(fit, &error);
+  ASSERT_NE(made, nullptr) << error;
+  const RolloutResiduals& run = made->recordings()[0].residuals;
+  EXPECT_TRUE(run.scene().MovesTimes());
+  EXPECT_EQ(run.entries()[1].initial, 0.125);
+  EXPECT_TRUE(run.entries()[2].logarithmic);
 }
 
 TEST_F(FitJsonTest, BadInstrumentsAreOneLine) {

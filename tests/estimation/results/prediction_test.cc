@@ -63,7 +63,9 @@ TEST(PredictionTest, WhatIsFittedPredictsWhatFollows) {
   EXPECT_LT(predicted.score.all.max_length, 1e-9);
   EXPECT_NEAR(predicted.score.all.max_angle, 0.25, 1e-12);
 
-  const std::string csv = PredictionCsv(residuals, result.residuals, &predicted);
+  const PredictedRecordings all{{predicted}, predicted.score};
+  const std::string csv =
+      PredictionCsv(RecordingsProblem(std::move(residuals)), result.residuals, &all);
   EXPECT_EQ(
       csv.rfind("time,target,relative_to,coordinate,file,sensor,used,sigma,observed,predicted,"
                 "residual,residual_in_sigma\n0,ball,,x,fall_1.csv,,fit,0.001,0,0,0,0\n",
@@ -88,10 +90,11 @@ TEST(PredictionTest, ARunThatFailsIsSaid) {
       PredictLater(problem, Eigen::VectorXd::Constant(1, -1.0), 0.5, later);
   EXPECT_NE(predicted.score.message, "");
   EXPECT_EQ(predicted.residuals.size(), 0);
-  const RolloutResiduals residuals =
-      MakeResiduals(problem.scene, problem.points, problem.parameters, problem.observations);
+  const RecordingsProblem residuals(
+      MakeResiduals(problem.scene, problem.points, problem.parameters, problem.observations));
+  const PredictedRecordings all{{predicted}, predicted.score};
   const std::string csv =
-      PredictionCsv(residuals, Eigen::VectorXd::Zero(residuals.num_residuals()), &predicted);
+      PredictionCsv(residuals, Eigen::VectorXd::Zero(residuals.num_rows(0)), &all);
   EXPECT_NE(csv.find("prediction,0.001,0,,,\n"), std::string::npos) << csv;
 }
 

@@ -9,8 +9,8 @@ namespace tangible {
 namespace {
 
 TEST(ResidualSummaryTest, EachCoordinateHasItsOwnNumbers) {
-  RolloutResiduals residuals = HandMadeResiduals();
-  residuals.SetFiles({"a.csv"});
+  RecordingsProblem residuals = HandMadeProblem();
+  residuals.run(0)->SetFiles({"a.csv"});
   // x has 3 at 0.5 s and 4 at 1 s with a sigma of 0.1 m, y has −2 with 0.2 m.
   const ResidualSummary summary = SummarizeResiduals(residuals, HandMadeResult().residuals);
   ASSERT_EQ(summary.series.size(), 2u);
@@ -39,11 +39,12 @@ TEST(ResidualSummaryTest, FilesAndPointsAreSeriesOfTheirOwn) {
   const ObservationSeries index = IndexSeries(observations);
   EXPECT_EQ(index.of, (std::vector<int>{0, 1, 2, 0}));
   EXPECT_EQ(index.first, (std::vector<int>{0, 1, 2}));
-  RolloutResiduals residuals(MakeResiduals(MakeScene(kFallingBall), {{"edge", 0, {0.1, 0.0}}},
-                                           {Parameter("gravity/y", -9.0)}, {observations[0]})
-                                 .scene(),
-                             observations, channels);
-  residuals.SetFiles({"a.csv", "b.csv"});
+  RecordingsProblem residuals(
+      RolloutResiduals(MakeResiduals(MakeScene(kFallingBall), {{"edge", 0, {0.1, 0.0}}},
+                                     {Parameter("gravity/y", -9.0)}, {observations[0]})
+                           .scene(),
+                       observations, channels));
+  residuals.run(0)->SetFiles({"a.csv", "b.csv"});
   const ResidualSummary summary = SummarizeResiduals(residuals, Eigen::Vector4d(1, 2, 3, 4));
   ASSERT_EQ(summary.series.size(), 3u);
   EXPECT_EQ(summary.series[0].label, "ball x (a.csv)");
@@ -71,8 +72,8 @@ TEST(ResidualSummaryTest, NamesWhatDoesNotBelong) {
   }
   values[81] = 40.0;
   values[101] = 80.0;
-  const RolloutResiduals residuals =
-      MakeResiduals(MakeScene(kFallingBall), {}, {Parameter("gravity/y", -9.0)}, observations);
+  const RecordingsProblem residuals(
+      MakeResiduals(MakeScene(kFallingBall), {}, {Parameter("gravity/y", -9.0)}, observations));
   const ResidualSummary summary = SummarizeResiduals(residuals, values);
   EXPECT_EQ(summary.num_outliers, 2);
   ASSERT_EQ(summary.outliers.size(), 2u);

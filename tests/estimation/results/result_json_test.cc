@@ -10,9 +10,8 @@ namespace tangible {
 namespace {
 
 TEST(ResultJsonTest, NumbersAreThoseOfTheResult) {
-  const RolloutResiduals residuals = HandMadeResiduals();
-  const OrderedJson json =
-      OrderedJson::parse(JsonText(ResultToJson(residuals, HandMadeResult(), nullptr)));
+  const RecordingsProblem residuals = HandMadeProblem();
+  const OrderedJson json = OrderedJson::parse(JsonText(ResultToJson(residuals, HandMadeResult())));
   EXPECT_EQ(json["status"], "converged");
   ASSERT_EQ(json["parameters"].size(), 2u);
   EXPECT_EQ(json["parameters"][0]["name"], "gravity/y");
@@ -43,7 +42,7 @@ TEST(ResultJsonTest, NumbersAreThoseOfTheResult) {
 }
 
 TEST(ResultJsonTest, RootMeanSquaresAreInUnits) {
-  const OrderedJson json = ResultToJson(HandMadeResiduals(), HandMadeResult(), nullptr);
+  const OrderedJson json = ResultToJson(HandMadeProblem(), HandMadeResult());
   const OrderedJson& rms = json["residual_rms_by_coordinate"];
   ASSERT_EQ(rms.size(), 2u);
   // Residuals 3 and 4 with a sigma of 0.1 m, −2 with 0.2 m.
@@ -55,7 +54,7 @@ TEST(ResultJsonTest, CombinationsHaveTheirTerms) {
   FitResult result = HandMadeResult();
   result.uncertainty.combinations = {
       {{0, 1}, {1.0, 2.0}, {1.0, -3.0}, "", "'g' - 3 'd'", 4.0, 0.5, 0.75}};
-  const OrderedJson json = ResultToJson(HandMadeResiduals(), result, nullptr);
+  const OrderedJson json = ResultToJson(HandMadeProblem(), result);
   ASSERT_EQ(json["determined_combinations"].size(), 1u);
   const OrderedJson& combination = json["determined_combinations"][0];
   EXPECT_EQ(combination["sum"], "'g' - 3 'd'");
@@ -69,14 +68,14 @@ TEST(ResultJsonTest, CombinationsHaveTheirTerms) {
 }
 
 TEST(ResultJsonTest, WhatIsNotKnownIsNull) {
-  const RolloutResiduals residuals = HandMadeResiduals();
-  OrderedJson json = ResultToJson(residuals, HandMadeResult(), nullptr);
+  const RecordingsProblem residuals = HandMadeProblem();
+  OrderedJson json = ResultToJson(residuals, HandMadeResult());
   EXPECT_TRUE(json["parameters"][1]["standard_deviation"].is_null());
   EXPECT_TRUE(json["parameters"][1]["confidence_95"].is_null());
   EXPECT_EQ(json["parameters"][1]["message"], "at its lower bound");
   EXPECT_TRUE(json["covariance"][1][1].is_null());
   EXPECT_TRUE(json["reduced_chi_square"].is_null());
-  json = ResultToJson(residuals, FitResult(), nullptr);
+  json = ResultToJson(residuals, FitResult());
   EXPECT_EQ(json["status"], "failed");
   EXPECT_TRUE(json["parameters"].empty());
   for (const char* key : {"initial_cost", "final_cost", "residual_rms", "condition"}) {
@@ -86,7 +85,7 @@ TEST(ResultJsonTest, WhatIsNotKnownIsNull) {
 
 TEST(ResultJsonTest, TheCheckOfTheStepIsListed) {
   const DiscretisationCheck check = HandMadeCheck();
-  const OrderedJson json = ResultToJson(HandMadeResiduals(), HandMadeResult(), &check);
+  const OrderedJson json = ResultToJson(HandMadeProblem(), HandMadeResult(), {.check = &check});
   const OrderedJson& part = json["discretisation"];
   EXPECT_EQ(part["dt"], 0.01);
   EXPECT_EQ(part["status"], "converged");

@@ -1,0 +1,333 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/estimation/fit/observed_state.h"
+
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "tangible/dynamics/elements/joint.h"
+#include "tangible/estimation/fit/minimise.h"
+#include "tangible/simulation/stepping/invariants.h"
+
+namespace tangible {
+namespace {
+
+// Of a parabola at first: few, so that no impact is likely to lie between them.
+constexpr size_t kFewest = 5;
+// A parabola explains its samples where the sum of squares is no more than this many times its
+// degrees of freedom, with a little room for few of them.
+constexpr double kExplained = 2.0;
+// Weights of joints and contacts, stage by stage, in multiples of that of the best observation.
+// From far outside of the joints the observations alone lead the way.
+constexpr double kStages[] = {0.0, 1.0, 1e2, 1e5};
+// Of an unknown's scale: the standard deviation of a prior that it stays where it was. What is
+// observed to 1e-3 of its scale is moved by 1e-14 of it; what nothing determines stays.
+constexpr double kAnchor = 1e4;
+// Of an unknown's scale: of central differences, whose error is of its square.
+constexpr double kDifference = 1e-5;
+constexpr int kIterations = 50;
+
+/// One sample of a series.
+struct SeriesSample {
+  double time = 0.0;  // from t₀
+  double value = 0.0;
+  double sigma = 1.0;
+};
+
+/// The parabola through the first `count` samples; `explains`: whether it does.
+SmoothedSeries FitParabola(const std::vector<SeriesSample>& samples, size_t count, bool* explains) {
+  std::vector<double> times;
+  times.reserve(count);
+  for (size_t i = 0; i < count; ++i) times.push_back(samples[i].time);
+  std::sort(times.begin(), times.end());
+  const auto distinct = std::unique(times.begin(), times.end()) - times.begin();
+  const double unit = std::max(std::abs(times.front()), std::abs(*(times.begin() + distinct - 1)));
+  const double second = unit > 0.0 ? unit : 1.0;
+  const auto rows = static_cast<Eigen::Index>(count);
+  Eigen::MatrixXd terms(rows, std::min<Eigen::Index>(distinct, 3));
+  Eigen::VectorXd values(rows);
+  for (Eigen::Index i = 0; i < rows; ++i) {
+    const SeriesSample& sample = samples[static_cast<size_t>(i)];
+    double power = 1.0 / sample.sigma;
+    for (Eigen::Index j = 0; j < terms.cols(); ++j) {
+      terms(i, j) = power;
+      power *= sample.time / second;
+    }
+    values[i] = sample.value / sample.sigma;
+  }
+  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(terms);
+  const Eigen::VectorXd found = qr.solve(values);
+  const Eigen::MatrixXd r = qr.matrixQR().topRows(terms.cols()).triangularView<Eigen::Upper>();
+  const Eigen::MatrixXd inverse =
+      r.triangularView<Eigen::Upper>().solve(Eigen::MatrixXd::Identity(r.rows(), r.cols()));
+  const double squares = (values - terms * found).squaredNorm();
+  const double freedom = static_cast<double>(rows - terms.cols());
+  *explains = squares <= kExplained * (freedom + 2.0 * std::sqrt(freedom));
+  // What it does not explain widens it.
+  const double factor = freedom > 0.0 ? std::sqrt(std::max(1.0, squares / freedom)) : 1.0;
+  SmoothedSeries series;
+  series.samples = static_cast<int>(count);
+  series.value = found[0];
+  series.value_sigma = factor * inverse.row(0).norm();
+  series.rate = terms.cols() > 1 ? found[1] / second : 0.0;
+  series.rate_sigma = terms.cols() > 1 ? factor * inverse.row(1).norm() / second : HUGE_VAL;
+  return series;
+}
+
+SmoothedSeries Smooth(std::vector<SeriesSample> samples) {
+  std::stable_sort(samples.begin(), samples.end(),
+                   [](const SeriesSample& a, const SeriesSample& b) {
+                     return std::abs(a.time) < std::abs(b.time);
+                   });
+  bool explains = false;
+  size_t count = std::min(samples.size(), kFewest);
+  SmoothedSeries best = FitParabola(samples, count, &explains);
+  while (explains && count < samples.size()) {
+    count = std::min(samples.size(), 2 * count);
+    const SmoothedSeries longer = FitParabola(samples, count, &explains);
+    if (explains) best = longer;
+  }
+  return best;
+}
+
+bool IsVelocity(Coordinate coordinate) {
+  return coordinate == Coordinate::kVx || coordinate == Coordinate::kVy ||
+         coordinate == Coordinate::kOmega;
+}
+
+/// The least-squares problem of the state; unknowns are what `state_of` makes a state of.
+class StateProblem : public LeastSquaresProblem {
+ public:
+  /// False where the unknowns have no state.
+  using StateOf = std::function<bool(const Eigen::VectorXd& x, State<double>* state)>;
+
+  /// `model` is that of the state that was made last.
+  StateProblem(const RolloutResiduals& residuals, const Model<double>& model,
+               std::vector<SmoothedSeries> series, std::vector<ParameterEntry> entries,
+               StateOf state_of)
+      : residuals_(residuals),
+        model_(model),
+        series_(std::move(series)),
+        entries_(std::move(entries)),
+        state_of_(std::move(state_of)) {
+    for (const SmoothedSeries& one : series_) {
+      smallest_ = std::min(smallest_, one.value_sigma);
+    }
+  }
+
+  void SetStage(double weight) { weight_ = weight; }
+
+  const std::vector<ParameterEntry>& entries() const override { return entries_; }
+  int num_shared() const override { return static_cast<int>(entries_.size()); }
+  int num_blocks() const override { return 1; }
+  int num_own(int /*block*/) const override { return 0; }
+  int num_rows(int /*block*/) const override {
+    return 2 * static_cast<int>(series_.size()) + num_joint_rows() + 1 + num_shared();
+  }
+  std::vector<RowPlace> Places(int /*block*/) const override { return {}; }
+
+  bool EvaluateBlock(int /*block*/, const Eigen::VectorXd& p, DerivativeMethod /*method*/,
+                     BlockDerivatives derivatives, BlockEvaluation* evaluation) override {
+    if (!Rows(p, &evaluation->residuals)) {
+      evaluation->message = "there is no such state";
+      return false;
+    }
+    if (derivatives == BlockDerivatives::kSkip) return true;
+    evaluation->jacobian.resize(evaluation->residuals.size(), p.size());
+    for (Eigen::Index k = 0; k < p.size(); ++k) {
+      const ParameterEntry& entry = entries_[static_cast<size_t>(k)];
+      const double h = kDifference * entry.scale;
+      Eigen::VectorXd moved[2] = {p, p};
+      moved[0][k] = std::max(p[k] - h, entry.lower);
+      moved[1][k] = std::min(p[k] + h, entry.upper);
+      Eigen::VectorXd rows[2];
+      if (!Rows(moved[0], &rows[0]) || !Rows(moved[1], &rows[1])) {
+        evaluation->message = "there is no such state";
+        return false;
+      }
+      evaluation->jacobian.col(k) = (rows[1] - rows[0]) / (moved[1][k] - moved[0][k]);
+    }
+    return true;
+  }
+
+ private:
+  // Two or three equations and as many of their rates; those of a joint that has fewer are 0.
+  int num_joint_rows() const {
+    return 6 * static_cast<int>(residuals_.scene().model().structure->joints.size());
+  }
+
+  bool Rows(const Eigen::VectorXd& p, Eigen::VectorXd* rows) const {
+    State<double> state;
+    if (!state_of_(p, &state)) return false;
+    rows->setZero(num_rows(0));
+    Eigen::Index row = 0;
+    for (const SmoothedSeries& series : series_) {
+      AddSeries(series, state, &row, rows);
+    }
+    AddJoints(state, &row, rows);
+    (*rows)[row] = weight_ / smallest_ * DeepestPenetration(model_, state);
+    ++row;
+    for (Eigen::Index k = 0; k < p.size(); ++k) {
+      const ParameterEntry& entry = entries_[static_cast<size_t>(k)];
+      (*rows)[row++] = (p[k] - entry.initial) / (kAnchor * entry.scale);
+    }
+    return rows->allFinite();
+  }
+
+  void AddSeries(const SmoothedSeries& series, const State<double>& state, Eigen::Index* row,
+                 Eigen::VectorXd* rows) const {
+    const Prediction prediction = residuals_.PredictionIn(series.observation, state);
+    (*rows)[(*row)++] = (prediction.value - series.value) / series.value_sigma;
+    const Coordinate coordinate = residuals_.observations()[series.observation].coordinate;
+    if (!IsVelocity(coordinate) && std::isfinite(series.rate_sigma)) {
+      double rate = 0.0;
+      const std::array<int, kPlaces> bodies = residuals_.BodiesOf(series.observation);
+      for (int place = 0; place < kPlaces; ++place) {
+        for (int j = 0; j < 3 && bodies[place] >= 0; ++j) {
+          rate += prediction.by_state[place][j] * state.twist[3 * bodies[place] + j];
+        }
+      }
+      (*rows)[*row] = (rate - series.rate) / series.rate_sigma;
+    }
+    ++*row;
+  }
+
+  void AddJoints(const State<double>& state, Eigen::Index* row, Eigen::VectorXd* rows) const {
+    for (const JointIndex& joint : model_.structure->joints) {
+      JointRows<double> equations;
+      EvaluateJoint(joint.type, state.PoseOf(joint.a), state.PoseOf(joint.b),
+                    &model_.parameters[joint.geometry], &equations);
+      for (int k = 0; k < equations.rows; ++k) {
+        double rate = 0.0;
+        for (int j = 0; j < 3; ++j) {
+          rate += equations.row_a[k][j] * state.twist[3 * joint.a + j] +
+                  equations.row_b[k][j] * state.twist[3 * joint.b + j];
+        }
+        (*rows)[*row + 2 * k] = weight_ / smallest_ * equations.error[k];
+        (*rows)[*row + 2 * k + 1] = weight_ / smallest_ * rate;
+      }
+      *row += 6;
+    }
+  }
+
+  const RolloutResiduals& residuals_;
+  const Model<double>& model_;
+  std::vector<SmoothedSeries> series_;
+  std::vector<ParameterEntry> entries_;
+  StateOf state_of_;
+  double smallest_ = HUGE_VAL;  ///< σ_a
+  double weight_ = 0.0;
+};
+
+/// The unknowns that minimise all stages, from the entries' initial values.
+Eigen::VectorXd Solve(StateProblem* problem) {
+  FitOptions options;
+  options.max_iterations = kIterations;
+  options.threads = 1;
+  Eigen::VectorXd x = InitialOf(problem->entries());
+  for (const double stage : kStages) {
+    problem->SetStage(stage);
+    const Minimum minimum = Minimise(
+        options, x, [] { return 0.0; }, {}, problem);
+    if (minimum.status == FitStatus::kFailed || !minimum.parameters.allFinite()) break;
+    x = minimum.parameters;
+  }
+  return x;
+}
+
+/// "bodies/NAME/what" has the ending of a pose's or twist's number.
+bool IsOfState(const std::string& path) {
+  const size_t first = path.find('/');
+  const size_t second = path.find('/', first + 1);
+  if (first == std::string::npos || second == std::string::npos) return false;
+  const std::string kind = path.substr(0, first);
+  const std::string what = path.substr(second + 1);
+  if (kind == "joints") return what == "angle" || what == "rate";
+  return kind == "bodies" && (what.rfind("position", 0) == 0 || what == "angle" ||
+                              what.rfind("velocity", 0) == 0 || what == "angular_velocity");
+}
+
+}  // namespace
+
+std::vector<SmoothedSeries> SmoothAt(const RolloutResiduals& residuals, double time) {
+  const std::vector<Observation>& observations = residuals.observations();
+  const ObservationSeries index = IndexSeries(observations);
+  std::vector<std::vector<SeriesSample>> samples(static_cast<size_t>(index.size()));
+  for (size_t i = 0; i < observations.size(); ++i) {
+    const Observation& observation = observations[i];
+    const double at = RunTime(residuals.scene().instruments(), residuals.ChannelOf(observation),
+                              observation.time);
+    samples[static_cast<size_t>(index.of[i])].push_back(
+        {at - time, observation.value, observation.sigma});
+  }
+  std::vector<SmoothedSeries> all;
+  for (size_t i = 0; i < samples.size(); ++i) {
+    all.push_back(Smooth(std::move(samples[i])));
+    all.back().observation = index.first[i];
+  }
+  return all;
+}
+
+State<double> StateFromObservations(const RolloutResiduals& residuals, double time,
+                                    const State<double>& guess) {
+  const ModelStructure& structure = *residuals.scene().model().structure;
+  // The number i of the moving bodies' states.
+  const auto number = [&structure](int i, State<double>* state) -> double& {
+    const size_t body = static_cast<size_t>(structure.moving[i / 6]);
+    return i % 6 < 3 ? state->pose[3 * body + i % 6] : state->twist[3 * body + i % 6 - 3];
+  };
+  State<double> found = guess;
+  std::vector<ParameterEntry> entries;
+  for (int i = 0; i < 6 * structure.num_blocks(); ++i) {
+    const double initial = number(i, &found);
+    entries.push_back({"", initial, -HUGE_VAL, HUGE_VAL, false, std::max(1.0, std::abs(initial))});
+  }
+  const auto state_of = [&](const Eigen::VectorXd& x, State<double>* state) {
+    *state = guess;
+    for (int i = 0; i < static_cast<int>(x.size()); ++i) number(i, state) = x[i];
+    return true;
+  };
+  StateProblem problem(residuals, residuals.scene().model(), SmoothAt(residuals, time), entries,
+                       state_of);
+  const Eigen::VectorXd x = Solve(&problem);
+  for (int i = 0; i < static_cast<int>(x.size()); ++i) number(i, &found) = x[i];
+  return found;
+}
+
+Eigen::VectorXd ParametersFromObservations(const RolloutResiduals& residuals,
+                                           const std::vector<bool>& free) {
+  const std::vector<ParameterEntry>& all = residuals.entries();
+  Eigen::VectorXd p = InitialOf(all);
+  std::vector<ParameterEntry> entries;
+  std::vector<int> indices;
+  for (size_t k = 0; k < all.size(); ++k) {
+    if (free[k]) {
+      entries.push_back(all[k]);
+      indices.push_back(static_cast<int>(k));
+    }
+  }
+  if (entries.empty()) return p;
+  ParameterizedScene scene = residuals.scene();
+  const auto state_of = [&](const Eigen::VectorXd& x, State<double>* state) {
+    Eigen::VectorXd at = p;
+    at(indices) = x;
+    if (!scene.Set(at)) return false;
+    *state = scene.initial_state();
+    return true;
+  };
+  StateProblem problem(residuals, scene.model(), SmoothAt(residuals, 0.0), entries, state_of);
+  const Eigen::VectorXd x = Solve(&problem);
+  p(indices) = x;
+  return p;
+}
+
+bool IsOfInitialState(const FitParameter& parameter) {
+  return std::all_of(parameter.sets.begin(), parameter.sets.end(),
+                     [](const ParameterSet& set) { return IsOfState(set.path); });
+}
+
+}  // namespace tangible

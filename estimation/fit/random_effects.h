@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// The spread of parameters that vary from recording to recording.
+//
+//   θ_b ~ N(μ, τ²)    or    ln θ_b ~ N(ln μ, τ²)          of each recording b
+//
+// At given τ the fit finds all θ_b, drawn towards μ, and μ (problem_with_priors.h). Minimising the
+// cost over τ too would end at τ = 0 with all θ_b equal. Instead τ is the mode of the restricted
+// likelihood, the density of the observations with all parameters p = (μ, θ, others) integrated out,
+// in the problem linearised at the estimate (Laplace's approximation):
+//
+//   ℓ(τ) = −Σ_e n_e ln τ_e − ½ ln det (Jᵀ J) − cost_min(τ)                                (1)
+//
+// n_e is the number of recordings, J the rows of observations, priors and effects; cost_min is the
+// least cost over p of the linear problem. Fits and (1) alternate until τ no longer changes. Blocks
+// are reduced to their triangular factors, and own parameters are eliminated block by block: one
+// value of (1) costs the number of recordings times the cube of a recording's parameters.
+//
+// The interval of τ_e is made of the values that the contrasts of the θ_b do not reject, the other
+// spreads held:
+//
+//   Q(τ_e) = 2 (cost_min(τ_e) − cost_min(∞))  ~  χ² with n_e − 1 degrees of freedom         (2)
+//
+// which is exact for a linear model and noise of the size sigma (n_e where μ has a prior). Its lower
+// end is 0 where the recordings do not differ more than their noise explains.
+//
+// References: H. D. Patterson and R. Thompson, Biometrika 58 (1971) 545 (restricted likelihood);
+// N. Laird and J. Ware, Biometrics 38 (1982) 963; J. Pinheiro and D. Bates, Mixed-Effects Models in
+// S and S-PLUS (2000), ch. 7 (alternating with the linearisation); W. Viechtbauer, Statistics in
+// Medicine 26 (2007) 37, "Q-profile" (2).
+
+#include <Eigen/Core>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "tangible/estimation/fit/fit.h"
+#include "tangible/estimation/fit/linearisation.h"
+#include "tangible/estimation/fit/uncertainty.h"
+#include "tangible/estimation/problem/recordings.h"
+
+namespace tangible {
+
+/// The spread of one parameter.
+struct SpreadEstimate {
+  std::string name;  ///< of the parameter
+  PriorKind kind = PriorKind::kGaussian;
+  double spread = 0.0;  ///< τ, in the parameter's unit or of its logarithm; 0: none is seen
+  ConfidenceInterval interval;  ///< 95 %; none where the spread was given
+  bool estimated = false;
+  int recordings = 0;  ///< n_e
+};
+
+/// The linear problem at an estimate, in which the spreads are sought.
+class SpreadLikelihood {
+ public:
+  /// `blocks`: of each block of the layout the factor of its observations and priors, without the
+  /// rows of the effects, for changes of p as it is (Reduce with dp/dq = 1). `free[k]`: parameter k
+  /// is at no bound.
+  SpreadLikelihood(const BlockLayout& layout, std::vector<BlockFactor> blocks,
+                   std::vector<RandomEffect> effects, Eigen::VectorXd estimate,
+                   std::vector<bool> free);
+
+  /// ℓ of (1) for these spreads, and 2 cost_min; each spread > 0.
+  struct Value {
+    double likelihood = 0.0;
+    double twice_cost = 0.0;
+  };
+  Value At(const std::vector<double>& spreads) const;
+
+  /// The smallest and largest spread of an effect that is looked at: a thousandth of the deviation
+  /// of a recording's own value, below which nothing changes any more, and far above what is seen.
+  std::pair<double, double> RangeOf(int effect) const;
+
+ private:
+  struct Normal {
+    double log_determinant = 0.0;
+    RowMatrixXd reduced;  ///< rows x [shared | r], own parameters eliminated
+  };
+  Normal Eliminate(int block, const std::vector<double>& spreads) const;
+
+  BlockLayout layout_;
+  std::vector<BlockFactor> blocks_;
+  std::vector<RandomEffect> effects_;
+  Eigen::VectorXd estimate_;
+  std::vector<bool> free_;
+};
+
+/// The spreads that maximise (1), from those of `problem`'s effects, with their intervals. A spread
+/// that is given stays. One of 0 is set as the smallest of its range in `problem`. `largest` gets
+/// the largest change of a spread that is above that, relative, if it is larger. False, with a
+/// message, where a run at the estimate fails.
+bool UpdateSpreads(const FitOptions& options, const FitResult& result, RecordingsProblem* problem,
+                   std::vector<SpreadEstimate>* spreads, double* largest, std::string* message);
+
+}  // namespace tangible

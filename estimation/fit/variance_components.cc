@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/estimation/fit/variance_components.h"
+
+#include <algorithm>
+#include <string>
+#include <utility>
+
+#include "tangible/estimation/fit/fit_checkpoint.h"
+
+namespace tangible {
+namespace {
+
+constexpr int kMostFits = 20;
+// Changes of a sensor's factor, in multiples of its deviation, and of a spread, relative.
+constexpr double kSettledChange = 1e-3;
+
+/// `next` as the continuation of `result`.
+void Append(FitResult next, FitResult* result) {
+  std::vector<FitIteration> iterations = std::move(result->iterations);
+  for (FitIteration& iteration : next.iterations) {
+    iteration.seconds += result->seconds;
+    iterations.push_back(std::move(iteration));
+  }
+  next.iterations = std::move(iterations);
+  next.starts = std::move(result->starts);
+  next.initial_cost = result->initial_cost;
+  next.rollouts += result->rollouts;
+  next.seconds += result->seconds;
+  *result = std::move(next);
+}
+
+std::vector<SpreadEstimate> SpreadsOf(const RecordingsProblem& problem) {
+  std::vector<SpreadEstimate> spreads;
+  for (size_t e = 0; e < problem.effects().size(); ++e) {
+    const RandomEffect& effect = problem.effects()[e];
+    spreads.push_back({effect.name, effect.kind, effect.spread, std::nullopt,
+                       problem.EstimatesSpread(static_cast<int>(e)), problem.num_blocks()});
+  }
+  return spreads;
+}
+
+bool Update(const FitOptions& options, RecordingsProblem* problem, FitResult* result,
+            VarianceComponents* components, double* largest) {
+  const bool spreads = std::any_of(components->spreads.begin(), components->spreads.end(),
+                                   [](const SpreadEstimate& one) { return one.estimated; });
+  return (components->noise.empty() ||
+          UpdateNoise(options, *result, problem, &components->noise, largest, &result->message)) &&
+         (!spreads || UpdateSpreads(options, *result, problem, &components->spreads, largest,
+                                    &result->message));
+}
+
+}  // namespace
+
+FitResult FitWithComponents(const FitOptions& options, RecordingsProblem* problem,
+                            const FitProgress& progress, VarianceComponents* components,
+                            const NextLog& next_log) {
+  *components = {SensorsToEstimate(*problem), SpreadsOf(*problem)};
+  const auto fit = [&](const FitOptions& how, const FitProgress& told, bool* same) {
+    FitLog* const log = next_log ? next_log() : nullptr;
+    FitResult result = Fit(how, problem, told, log);
+    *same = log == nullptr || log->mismatch() == 0;
+    return result;
+  };
+  bool same = true;
+  const bool estimates = !components->noise.empty() ||
+                         std::any_of(components->spreads.begin(), components->spreads.end(),
+                                     [](const SpreadEstimate& one) { return one.estimated; });
+  if (!estimates) {
+    return fit(options, progress, &same);
+  }
+  // What judges the estimate is done once, for the components that are found.
+  FitOptions search = options;
+  search.certificate = CertificatePass::kSkip;
+  search.held_test = HeldTest::kSkip;
+  search.leverages = components->noise.empty() ? Leverages::kSkip : Leverages::kCompute;
+  FitResult result = fit(search, progress, &same);
+  search.starts = 1;
+  search.approach = FitApproach::kPlain;
+  for (int fits = 1; same && result.status == FitStatus::kConverged; ++fits) {
+    double largest = 0.0;
+    if (!Update(options, problem, &result, components, &largest)) {
+      result.status = FitStatus::kNotConverged;
+      break;
+    }
+    problem->SetInitial(result.estimate);
+    const bool settled = largest < kSettledChange;
+    if (settled) {
+      search.certificate = options.certificate;
+      search.held_test = options.held_test;
+    }
+    Append(fit(search, {}, &same), &result);
+    if (settled) {
+      break;
+    }
+    if (fits == kMostFits) {
+      result.status = FitStatus::kNotConverged;
+      result.message = "the sigma of sensors, or the spread of parameters, did not settle in " +
+                       std::to_string(fits) + " fits";
+    }
+  }
+  return result;
+}
+
+}  // namespace tangible

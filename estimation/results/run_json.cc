@@ -1,0 +1,324 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/estimation/results/run_json.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "tangible/dynamics/model/settings.h"
+#include "tangible/estimation/results/instruments_json.h"
+#include "tangible/render/html.h"
+#include "tangible/scene/scene_json.h"
+
+namespace tangible {
+namespace {
+
+constexpr int kMaxSegments = 1000;
+constexpr int kMaxStarts = 10000;
+
+constexpr std::pair<const char*, DerivativeMethod> kMethods[] = {
+    {"tangent", DerivativeMethod::kTangent},
+    {"adjoint", DerivativeMethod::kAdjoint},
+    {"jet", DerivativeMethod::kJet},
+    {"jet_implicit", DerivativeMethod::kJetImplicit},
+    {"finite_difference", DerivativeMethod::kFiniteDifference}};
+
+// Multiple shooting is asked for by its segments.
+constexpr std::pair<const char*, FitApproach> kApproaches[] = {{"auto", FitApproach::kAuto},
+                                                               {"plain", FitApproach::kPlain},
+                                                               {"windows", FitApproach::kWindows}};
+
+constexpr std::pair<const char*, ParameterScale> kScales[] = {
+    {"linear", ParameterScale::kLinear}, {"log", ParameterScale::kLogarithmic}};
+
+ParameterSet ReadSet(const JsonReader& json) {
+  json.ExpectKeys({"path", "scale", "offset", "add"}, " of a set");
+  ParameterSet set;
+  set.path = json.At("path").String();
+  if (json.Has("scale")) {
+    set.scale = json.At("scale").Number();
+  }
+  if (json.Has("offset")) {
+    set.offset = json.At("offset").Number();
+  }
+  if (json.Has("add") && json.At("add").Boolean()) {
+    set.mode = SetMode::kAdd;
+  }
+  return set;
+}
+
+// It is printed as it is, on a line with others.
+std::string ReadName(const JsonReader& json) {
+  std::string name = json.String();
+  if (json.IsString() && (name.empty() || OneLine(name) != name)) {
+    json.FailExpected(name.empty() ? "a name" : "a name without control characters");
+  }
+  return name;
+}
+
+/// {"gaussian": {"mean", "sigma"}} or {"log_normal": {"median", "sigma"}}.
+std::optional<Prior> ReadPrior(const JsonReader& json) {
+  Prior prior;
+  if (!ReadDistribution(json, " of a prior", &prior.kind)) return std::nullopt;
+  const bool gaussian = prior.kind == PriorKind::kGaussian;
+  const JsonReader of = json.At(gaussian ? "gaussian" : "log_normal");
+  if (gaussian) {
+    of.ExpectKeys({"mean", "sigma"}, " of a Gaussian prior");
+    prior.center = of.At("mean").Number();
+  } else {
+    of.ExpectKeys({"median", "sigma"}, " of a log-normal prior");
+    prior.center = of.At("median").Number(NumberKind::kPositive);
+  }
+  prior.sigma = of.At("sigma").Number(NumberKind::kPositive);
+  return prior;
+}
+
+FitParameter ReadParameter(const JsonReader& json) {
+  FitParameter parameter;
+  if (json.IsString()) {
+    parameter.name = json.String();
+    parameter.sets.push_back({parameter.name});
+    return parameter;
+  }
+  json.ExpectKeys({"name", "initial", "lower", "upper", "sets", "path", "scale", "prior"},
+                  " of a parameter");
+  const auto read = [&json](const char* key, std::optional<double>* value) {
+    if (json.Has(key)) {
+      *value = json.At(key).Number();
+    }
+  };
+  read("initial", &parameter.initial);
+  read("lower", &parameter.lower);
+  read("upper", &parameter.upper);
+  if (json.Has("scale")) {
+    parameter.scale = json.At("scale").Choice(kScales);
+  }
+  if (json.Has("prior")) {
+    parameter.prior = ReadPrior(json.At("prior"));
+  }
+  if (json.Has("path")) {
+    if (json.Has("sets")) {
+      json.At("sets").Fail("expected sets or path, got both");
+    }
+    parameter.sets.push_back({json.At("path").String()});
+    parameter.name = json.Has("name") ? ReadName(json.At("name")) : parameter.sets[0].path;
+    return parameter;
+  }
+  parameter.name = ReadName(json.At("name"));
+  const JsonReader sets = json.At("sets");
+  const int count = sets.ExpectArray("an array of {path, scale, offset}");
+  for (int i = 0; i < count; ++i) {
+    parameter.sets.push_back(ReadSet(sets.At(i)));
+  }
+  return parameter;
+}
+
+FitOptions ReadOptions(const JsonReader& root) {
+  FitOptions options;
+  if (root.Has("derivatives")) {
+    options.derivatives = root.At("derivatives").Choice(kMethods);
+    if (!IsAvailable(options.derivatives)) {
+      root.At("derivatives")
+          .Fail("this build has no Jets, expected tangent, adjoint or finite_difference");
+    }
+  }
+  if (root.Has("loss")) {
+    root.At("loss").ExpectKeys({"huber"}, " of loss");
+    options.huber = root.At("loss").At("huber").Number(NumberKind::kPositive);
+  }
+  if (root.Has("segments")) {
+    options.segments = root.At("segments").Integer(1, kMaxSegments);
+  }
+  if (root.Has("approach")) {
+    options.approach = root.At("approach").Choice(kApproaches);
+  }
+  if (options.segments > 1) {
+    if (options.approach != FitApproach::kAuto) {
+      root.At("segments")
+          .Fail("expected 1 with another approach, got " + std::to_string(options.segments));
+    }
+    options.approach = FitApproach::kSegments;
+  }
+  if (root.Has("starts")) {
+    options.starts = root.At("starts").Integer(1, kMaxStarts);
+  }
+  if (root.Has("seed")) {
+    options.seed =
+        static_cast<unsigned>(root.At("seed").Integer(0, std::numeric_limits<int>::max()));
+  }
+  return options;
+}
+
+/// Where a parameter's fault stands.
+std::string PointerOf(const ParameterError& error) {
+  std::string pointer = "/parameters";
+  if (error.parameter >= 0) {
+    pointer += "/" + std::to_string(error.parameter);
+  }
+  if (error.set >= 0) {
+    pointer += "/sets/" + std::to_string(error.set);
+  }
+  return error.key.empty() ? pointer : pointer + "/" + error.key;
+}
+
+/// Reads one part after another: the scene is needed to check the rest.
+class RunReader {
+ public:
+  RunReader(const JsonReader& root, std::string folder, const RecordingPart& part,
+            FitProblem* problem, std::string* error)
+      : root_(root), folder_(std::move(folder)), part_(part), problem_(problem), error_(error) {}
+
+  /// False with the error of the scene or an observation file; errors of the fit file itself are
+  /// the reader's.
+  bool Read() {
+    root_.ExpectKeys({"scene", "observations", "points", "sensors", "cameras", "clocks",
+                      "parameters", "derivatives", "loss", "approach", "segments", "starts",
+                      "seed"});
+    const std::string scene_file = JoinPath(folder_, root_.At("scene").String());
+    if (!root_.ok()) {
+      return true;
+    }
+    if (!LoadScene(scene_file, &problem_->scene, error_)) {
+      return false;
+    }
+    if (!CheckSettings(problem_->scene.simulation, error_)) {
+      *error_ = scene_file + ": " + *error_;
+      return false;
+    }
+    problem_->points = ReadPoints(root_.At("points"), problem_->scene);
+    problem_->instruments = ReadInstruments(root_, problem_->scene, problem_->points);
+    const JsonReader parameters = root_.At("parameters");
+    const int count = parameters.ExpectArray("an array of parameters");
+    for (int i = 0; i < count; ++i) {
+      problem_->parameters.push_back(ReadParameter(parameters.At(i)));
+    }
+    problem_->options = ReadOptions(root_);
+    CheckShooting();
+    return ReadObservationFiles();
+  }
+
+ private:
+  /// The states at the ends of segments are at times that stand still.
+  void CheckShooting() {
+    for (const FitParameter& parameter : problem_->parameters) {
+      for (const ParameterSet& set : parameter.sets) {
+        const bool moves_times =
+            set.path.rfind("clocks/", 0) == 0 ||
+            (set.path.rfind("sensors/", 0) == 0 && set.path.find("/delay") != std::string::npos);
+        if (moves_times && problem_->options.segments > 1) {
+          root_.At("segments")
+              .Fail("expected 1 where a delay or clock is a parameter (" + set.path + "), got " +
+                    std::to_string(problem_->options.segments));
+          return;
+        }
+      }
+    }
+  }
+
+  bool ReadObservationFiles() {
+    // Times of a part are checked when it has been cut out.
+    Scene observed_scene = problem_->scene;
+    const bool is_part = part_.start > 0.0 || std::isfinite(part_.end);
+    if (is_part) observed_scene.simulation.duration = std::numeric_limits<double>::max();
+    const ObservedScene scene{observed_scene, problem_->points, problem_->instruments};
+    const JsonReader list = root_.At("observations");
+    const int count = list.ExpectArray("an array of {file, sigma}");
+    if (count == 0) {
+      list.Fail("expected at least one {file, sigma}, got none");
+    }
+    for (int i = 0; i < count && root_.ok(); ++i) {
+      const JsonReader entry = list.At(i);
+      ObservationEntry observed = ReadObservationEntry(entry, scene);
+      if (!root_.ok()) {
+        return true;
+      }
+      observed.options.channel.file = i;
+      problem_->files.push_back(observed.file);
+      const size_t before = problem_->observations.size();
+      if (!ReadObservations(JoinPath(folder_, observed.file), scene, observed.sigma,
+                            observed.options, &problem_->channels, &problem_->observations,
+                            error_)) {
+        return false;
+      }
+      for (size_t k = before; k < problem_->observations.size(); ++k) {
+        const Observation& observation = problem_->observations[k];
+        if (!(observation.sigma > 0.0)) {
+          entry.At("sigma").Fail(std::string("expected a sigma of ") +
+                                 NameOf(observation.coordinate) + ", which " + observed.file +
+                                 " has");
+          return true;
+        }
+      }
+    }
+    if (is_part && root_.ok()) Cut();
+    return true;
+  }
+
+  void Cut() {
+    std::vector<Observation> kept;
+    for (Observation observation : problem_->observations) {
+      if (observation.time < part_.start || observation.time > part_.end) continue;
+      observation.time -= part_.start;
+      const double end = problem_->scene.simulation.duration;
+      const double slack = kTimeTolerance * problem_->scene.simulation.dt;
+      if (observation.time > end && observation.time <= end + slack) observation.time = end;
+      kept.push_back(observation);
+      if (observation.time > end) {
+        root_.At("observations")
+            .Fail("expected times in the run, which ends " +
+                  CompactNumber(problem_->scene.simulation.duration) + " s after start, got " +
+                  CompactNumber(observation.time) + " s after it");
+        return;
+      }
+    }
+    if (kept.empty()) root_.At("observations").Fail("expected some from start to end, got none");
+    problem_->observations = std::move(kept);
+  }
+
+  JsonReader root_;
+  std::string folder_;
+  RecordingPart part_;
+  FitProblem* problem_;
+  std::string* error_;
+};
+
+}  // namespace
+
+bool ReadDistribution(const JsonReader& json, const std::string& of, PriorKind* kind) {
+  json.ExpectKeys({"gaussian", "log_normal"}, of);
+  if (json.Has("gaussian") == json.Has("log_normal")) {
+    json.Fail("expected one of gaussian and log_normal, got " +
+              std::string(json.Has("gaussian") ? "both" : "none"));
+    return false;
+  }
+  *kind = json.Has("gaussian") ? PriorKind::kGaussian : PriorKind::kLogNormal;
+  return true;
+}
+
+std::string DescribeFault(const std::string& name, const ParameterError& fault) {
+  return OneLine(name + ": " + PointerOf(fault) + ": " + fault.what);
+}
+
+bool ReadRun(const Json& json, const std::string& name, const std::string& folder,
+             const RecordingPart& part, FitProblem* problem, std::string* error) {
+  *problem = FitProblem();
+  JsonErrors errors(name);
+  RunReader reader(JsonReader(json, &errors), folder, part, problem, error);
+  const bool read = reader.Read();
+  if (!errors.ok()) {
+    *error = errors.message();
+    return false;
+  }
+  problem->observations.shrink_to_fit();
+  ParameterizedScene scene;
+  ParameterError fault;
+  if (read && !scene.Create(problem->scene, problem->points, problem->parameters, &fault,
+                            problem->instruments)) {
+    *error = DescribeFault(name, fault);
+    return false;
+  }
+  return read;
+}
+
+}  // namespace tangible

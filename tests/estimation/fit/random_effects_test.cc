@@ -1,0 +1,186 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/estimation/fit/random_effects.h"
+
+#include <gtest/gtest.h>
+
+#include "../../support/fit_scenes.h"
+#include "tangible/estimation/fit/variance_components.h"
+
+namespace tangible {
+namespace {
+
+/// A value θ_b of each block, seen once with a deviation of kSigma, around a shared μ.
+class MeansProblem : public LeastSquaresProblem {
+ public:
+  static constexpr double kSigma = 0.5;
+  explicit MeansProblem(std::vector<double> seen) : seen_(std::move(seen)) {
+    entries_.assign(seen_.size() + 1, {"x", 1.0, -HUGE_VAL, HUGE_VAL});
+  }
+  const std::vector<ParameterEntry>& entries() const override { return entries_; }
+  int num_shared() const override { return 1; }
+  int num_blocks() const override { return static_cast<int>(seen_.size()); }
+  int num_own(int) const override { return 1; }
+  int num_rows(int) const override { return 1; }
+  std::vector<RowPlace> Places(int) const override { return {{}}; }
+  bool EvaluateBlock(int block, const Eigen::VectorXd& p, DerivativeMethod, BlockDerivatives,
+                     BlockEvaluation* evaluation) override {
+    evaluation->residuals = Eigen::VectorXd::Constant(1, (p[1] - seen_[block]) / kSigma);
+    evaluation->jacobian = Eigen::RowVector2d(0.0, 1.0 / kSigma);
+    return true;
+  }
+
+ private:
+  std::vector<double> seen_;
+  std::vector<ParameterEntry> entries_;
+};
+
+// ln L(τ) = −(B − 1)/2 ln v − S / (2 v) + a constant, v = τ² + σ², S the sum of squares about the
+// mean; the contrasts are S / v. The point at which the problem is linearised does not matter.
+TEST(SpreadLikelihoodTest, IsThatOfTheMeansOfGroups) {
+  const std::vector<double> seen = {1.0, 3.5, 2.0, -0.5, 4.0, 2.5};
+  const double count = static_cast<double>(seen.size());
+  double mean = 0.0;
+  for (const double y : seen) mean += y / count;
+  double squares = 0.0;
+  for (const double y : seen) squares += (y - mean) * (y - mean);
+  MeansProblem problem(seen);
+  RandomEffect effect{"x", PriorKind::kGaussian, 0, {1, 2, 3, 4, 5, 6}};
+  Eigen::VectorXd at = Eigen::VectorXd::LinSpaced(7, 1.5, -2.0);
+  std::vector<BlockFactor> factors;
+  for (int b = 0; b < problem.num_blocks(); ++b) {
+    BlockEvaluation block;
+    problem.EvaluateBlock(b, Eigen::Vector2d(at[0], at[b + 1]), DerivativeMethod::kTangent,
+                          BlockDerivatives::kCompute, &block);
+    factors.push_back(Reduce(block, Eigen::Vector2d::Ones(), 1, 1, 1.0, 0.0));
+  }
+  const SpreadLikelihood likelihood(BlockLayout(problem), factors, {effect}, at,
+                                    std::vector<bool>(7, true));
+  const auto exact = [&](double spread) {
+    const double v = spread * spread + MeansProblem::kSigma * MeansProblem::kSigma;
+    return -0.5 * (count - 1.0) * std::log(v) - 0.5 * squares / v;
+  };
+  const double shift = likelihood.At({1.0}).likelihood - exact(1.0);
+  const double infinite = likelihood.At({1e8}).twice_cost;
+  for (const double spread : {1e-3, 0.1, 0.7, 1.5, 20.0}) {
+    const SpreadLikelihood::Value value = likelihood.At({spread});
+    EXPECT_NEAR(value.likelihood - shift, exact(spread), 1e-8 * std::abs(exact(spread))) << spread;
+    const double v = spread * spread + MeansProblem::kSigma * MeansProblem::kSigma;
+    EXPECT_NEAR(value.twice_cost - infinite, squares / v, 1e-8 * squares / v) << spread;
+  }
+  EXPECT_NEAR(likelihood.RangeOf(0).first, 1e-3 * MeansProblem::kSigma, 1e-12);
+}
+
+constexpr double kSpeed = 2.0;
+constexpr double kSpread = 0.3;
+
+/// Throws of a ball whose speed varies; each speed is seen to about 0.1 m/s.
+RecordingsProblem Throws(int count, double spread, unsigned seed,
+                         std::optional<double> given = {}) {
+  std::mt19937 random(seed);
+  std::normal_distribution<double> normal(0.0, 1.0);
+  Scene scene = MakeScene(kFallingBall);
+  scene.simulation.duration = 0.2;
+  std::vector<RecordedRun> runs;
+  for (int b = 0; b < count; ++b) {
+    scene.bodies[0].velocity = {kSpeed + spread * normal(random), 3.0};
+    std::vector<Observation> observations;
+    for (Observation observation : Observe(scene, 5, 0.0, 1)) {
+      if (observation.coordinate != Coordinate::kX) continue;
+      observation.sigma = 0.03;
+      observation.value += 0.03 * normal(random);
+      observations.push_back(observation);
+    }
+    runs.push_back(
+        {"take " + std::to_string(b), 1.0,
+         MakeResiduals(scene, {}, {Parameter("bodies/ball/velocity/x", 1.5)}, observations)});
+  }
+  ParameterScope scope{ParameterScope::Kind::kVaries, PriorKind::kGaussian, given};
+  return RecordingsProblem(std::move(runs), {scope});
+}
+
+FitResult FitThrows(RecordingsProblem* problem, VarianceComponents* components) {
+  FitOptions options;
+  options.certificate = CertificatePass::kSkip;
+  options.held_test = HeldTest::kSkip;
+  options.threads = 1;
+  return FitWithComponents(options, problem, {}, components);
+}
+
+bool Contains(const ConfidenceInterval& interval, double x) {
+  return interval && interval->first <= x && x <= interval->second;
+}
+
+// The bounds are four standard deviations of a count below 95 % (100 replicas: 2.2 each).
+TEST(RandomEffectsTest, IntervalsOfSpreadAndMeanContainTheTruth) {
+  constexpr int kReplicas = 100;
+  int spreads = 0;
+  int means = 0;
+  double sum = 0.0;
+  double squared_errors = 0.0;
+  for (unsigned seed = 0; seed < kReplicas; ++seed) {
+    RecordingsProblem problem = Throws(10, kSpread, 100 + seed);
+    VarianceComponents components;
+    const FitResult result = FitThrows(&problem, &components);
+    ASSERT_EQ(result.status, FitStatus::kConverged) << result.message;
+    ASSERT_EQ(components.spreads.size(), 1u);
+    const SpreadEstimate& spread = components.spreads[0];
+    EXPECT_EQ(spread.recordings, 10);
+    spreads += Contains(spread.interval, kSpread) ? 1 : 0;
+    means += Contains(result.uncertainty.confidence_95_robust[0], kSpeed) ? 1 : 0;
+    sum += spread.spread * spread.spread;
+    // Each recording's value is drawn towards the shared one.
+    squared_errors += std::pow(result.estimate[0] - kSpeed, 2);
+  }
+  EXPECT_GE(spreads, 95 - 9);
+  EXPECT_GE(means, 95 - 9);
+  // The variance has no bias: its deviation is 0.5 of itself, a tenth of that the mean's.
+  EXPECT_NEAR(sum / kReplicas, kSpread * kSpread, 4.0 * 0.05 * kSpread * kSpread);
+  EXPECT_LT(squared_errors / kReplicas, 2.0 * (kSpread * kSpread + 0.01) / 10.0);
+}
+
+TEST(RandomEffectsTest, WithoutASpreadTheRecordingsAreOne) {
+  int none = 0;
+  int contain_zero = 0;
+  for (unsigned seed = 0; seed < 20; ++seed) {
+    RecordingsProblem problem = Throws(6, 0.0, 500 + seed);
+    VarianceComponents components;
+    const FitResult result = FitThrows(&problem, &components);
+    ASSERT_EQ(result.status, FitStatus::kConverged) << result.message;
+    const SpreadEstimate& spread = components.spreads[0];
+    ASSERT_TRUE(spread.interval);
+    contain_zero += spread.interval->first == 0.0 ? 1 : 0;
+    if (spread.spread == 0.0) {
+      ++none;
+      // All have the shared value, to a thousandth of its deviation.
+      for (int b = 1; b <= 6; ++b) EXPECT_NEAR(result.estimate[b], result.estimate[0], 1e-4);
+    }
+  }
+  // χ² with 5 degrees of freedom is below 5 in 58 % of all cases; below its 0.975 quantile in 97.5.
+  EXPECT_GE(none, 5);
+  EXPECT_LT(none, 20);
+  EXPECT_GE(contain_zero, 17);
+}
+
+// A spread that is given is a prior around an unknown mean: the estimate of each recording is the
+// mean of its own and the shared value, weighed by 1 / s² and 1 / τ².
+TEST(RandomEffectsTest, ValuesAreDrawnTowardsTheSharedOne) {
+  RecordingsProblem given = Throws(5, kSpread, 9, 0.1);
+  RecordingsProblem wide = Throws(5, kSpread, 9, 1e6);
+  VarianceComponents components;
+  const FitResult drawn = FitThrows(&given, &components);
+  EXPECT_FALSE(components.spreads[0].estimated);
+  EXPECT_FALSE(components.spreads[0].interval);
+  EXPECT_EQ(components.spreads[0].spread, 0.1);
+  const FitResult alone = FitThrows(&wide, &components);
+  const double s = alone.uncertainty.standard_deviation[1];
+  const double part = 0.01 / (0.01 + s * s);
+  EXPECT_GT(s, 0.02);
+  for (int b = 1; b <= 5; ++b) {
+    EXPECT_NEAR(drawn.estimate[b],
+                drawn.estimate[0] + part * (alone.estimate[b] - drawn.estimate[0]), 1e-6);
+  }
+  EXPECT_NEAR(drawn.estimate[0], alone.estimate.tail(5).mean(), 1e-6);
+}
+
+}  // namespace
+}  // namespace tangible
