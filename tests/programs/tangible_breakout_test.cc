@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "run_program.h"
+
+namespace tangible {
+namespace {
+
+using TangibleBreakoutTest = ProgramTest;
+
+TEST_F(TangibleBreakoutTest, TheQuickRunWritesAll) {
+  const ProgramRun run =
+      Run("tangible-breakout", "--quick --out=" + Path("r.json") + " --view=" + Path("v.html") +
+                                   " --plot=" + Path("p.svg"));
+  EXPECT_EQ(run.exit_status, 0) << run.out << run.error;
+  EXPECT_NE(run.out.find("DIAMOND"), std::string::npos) << run.out;
+  const auto json = nlohmann::json::parse(Read(Path("r.json")));
+  ASSERT_EQ(json["players"].size(), 9U);
+  EXPECT_EQ(json["players"][0]["player"], "random");
+  EXPECT_LT(json["players"][0]["mean"].get<double>(), 10.0);
+  const auto& learned = json["players"][4];
+  EXPECT_EQ(learned["random_frames"], 1000);
+  EXPECT_GT(learned["mean"].get<double>(), 50.0);
+  const auto& curve = learned["games"][0]["curve"];
+  EXPECT_LT(curve.back()["errors"]["paddle_way"], curve.front()["errors"]["paddle_way"]);
+  EXPECT_GT(curve.back()["paddle"]["gain"], 1.5);
+  EXPECT_NE(Read(Path("p.svg")).find("returns expected wrong"), std::string::npos);
+  EXPECT_NE(Read(Path("v.html")).find("const frames = ["), std::string::npos);
+  // Results do not depend on the number of threads.
+  EXPECT_EQ(Run("tangible-breakout", "--quick --threads=1 --out=" + Path("one.json")).exit_status,
+            0);
+  EXPECT_EQ(Read(Path("one.json")), Read(Path("r.json")));
+}
+
+TEST_F(TangibleBreakoutTest, WrongFlagsAreOneLine) {
+  ExpectOneLine(Run("tangible-breakout", "--games=0"), 2, "--games");
+  ExpectOneLine(Run("tangible-breakout", "--seed=-1"), 2, "--seed");
+  ExpectOneLine(Run("tangible-breakout", "--threads=-1"), 2, "--threads");
+  for (const char* sticky : {"1", "-0.1", "nan"}) {
+    ExpectOneLine(Run("tangible-breakout", std::string("--sticky=") + sticky), 2, "--sticky");
+  }
+  for (const char* frames : {"", "7", "-4", "x", "1e9", "1000,"}) {
+    ExpectOneLine(Run("tangible-breakout", std::string("--random_frames=") + frames), 2,
+                  "--random_frames");
+  }
+  ExpectOneLine(Run("tangible-breakout", "scene.json"), 2, "expected 0 argument");
+}
+
+}  // namespace
+}  // namespace tangible
