@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "tangible/estimation/vision/simb_score.h"
 #include "tangible/estimation/vision/training.h"
 
 namespace tangible {
@@ -27,6 +28,7 @@ std::vector<StudyCell> StudyCells();
 /// Sequences that are trained on, and others that are tested on.
 struct StudyData {
   DiscData train, test;
+  SimbScore floor;  ///< of SimB: the engine from the true states of `test`
 };
 StudyData MakeStudyData(DiscKind kind, std::uint64_t seed);
 
