@@ -2,7 +2,6 @@
 #include "tangible/estimation/vision/study.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <ctime>
@@ -17,10 +16,6 @@ using OrderedJson = nlohmann::ordered_json;
 
 constexpr int kCurvePoints = 40;  // of a loss over a training
 constexpr int kTestStride = 3;    // frames between windows that billiards are tested on
-
-double Now() {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
 
 // Of this thread: a training's on any number of busy cores.
 double CpuSeconds() {
@@ -248,13 +243,13 @@ nlohmann::ordered_json TimePhysics() {
   for (int row = 0; row < options.batch; ++row) frames.emplace_back(row, row % 10);
   std::vector<double> iterations, physics;
   for (int repeat = 0; repeat < kRepeats; ++repeat) {
-    double start = Now();
+    double start = CpuSeconds();
     trainer.Step();
-    iterations.push_back(Now() - start);
+    iterations.push_back(CpuSeconds() - start);
     const at::Tensor state = StatesOf(data, frames).requires_grad_();
-    start = Now();
+    start = CpuSeconds();
     trainer.dynamics()(state).states.square().sum().backward();
-    physics.push_back(Now() - start);
+    physics.push_back(CpuSeconds() - start);
   }
   return {{"batch", options.batch},
           {"frames", options.ahead},

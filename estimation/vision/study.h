@@ -50,8 +50,8 @@ struct CellResult {
 CellResult RunCell(const StudyCell& cell, const StudyData& data, const CellHooks& hooks,
                    std::string* error);
 
-/// Seconds of the physics layer, forward and backward, for batch 32 over 10 frames, and of a
-/// training iteration of that batch: medians of several.
+/// CPU seconds of the physics layer, forward and backward, for batch 32 over 10 frames, and of a
+/// training iteration of that batch, on one thread: medians of several.
 nlohmann::ordered_json TimePhysics();
 
 /// The small training of continuous integration: a line a check, and whether all hold.

@@ -5,12 +5,10 @@
 #include <array>
 #include <cmath>
 
+#include "tangible/estimation/vision/tolerances.h"
+
 namespace tangible {
 namespace {
-
-// Pixels: a way by the engine that differs less from its velocity has met nothing. Rounding in
-// positions of 64 pixels is 1e-14.
-constexpr double kStraight = 1e-9;
 
 // A line through positions x[first], ..., x[last] of one coordinate: value at `last` and slope.
 std::pair<double, double> Line(const std::vector<double>& x, int first, int last) {
@@ -70,7 +68,7 @@ class WindowState::Track {
   bool MetAtEnd() const { return last_ >= 2 && !Uniform(last_ - 1); }
   /// And something in the frames before.
   bool MetTwice() const { return last_ >= 3 && MetAtEnd() && !Uniform(last_ - 2); }
-  Vector2<double> end() const { return {x_[last_], y_[last_]}; }
+  Vector2<double> End() const { return {x_[last_], y_[last_]}; }
   Vector2<double> LastStep() const {
     return {x_[last_] - x_[last_ - 1], y_[last_] - y_[last_ - 1]};
   }
@@ -89,6 +87,26 @@ RolloutOutput WindowState::Run(const States& start) {
   return worker_.Run(input);
 }
 
+// The disc's velocity by a run from `start` frames before the last, if it leads nearer than `least`
+// to the last position seen.
+void WindowState::ByEngine(const Track& track, int disc, const RolloutOutput& found, int start,
+                           double* least, double* state) {
+  if (found.status != RolloutStatus::kDone) return;
+  const auto at = [&](int frame, int first) -> Vector2<double> {
+    return {found.states(frame, 6 * disc + first), found.states(frame, 6 * disc + first + 1)};
+  };
+  const double miss = (at(start, 0) - track.End()).norm();
+  if (miss > *least) return;
+  *least = miss;
+  // Met before the last two frames, these show the velocity.
+  const bool straight =
+      start > 1 && (at(start, 0) - at(start - 1, 0) - at(start, 3)).norm() < kStraight;
+  const Vector2<double> velocity = straight ? track.LastStep() : at(start, 3);
+  state[2] = velocity.x();
+  state[3] = velocity.y();
+}
+
+// The velocities of two discs that met each other and nothing else.
 void WindowState::ByImpulse(const std::vector<Track>& tracks, const States& before,
                             States* states) const {
   std::vector<int> met;
@@ -101,7 +119,7 @@ void WindowState::ByImpulse(const std::vector<Track>& tracks, const States& befo
   const auto received = [&](int k) -> Vector2<double> {
     std::array<double, 4> free{};
     Move(&before[4 * k], 1.0, free.data());
-    return world_.masses[k] * (tracks[k].end() - Vector2<double>(free[0], free[1]));
+    return world_.masses[k] * (tracks[k].End() - Vector2<double>(free[0], free[1]));
   };
   const Vector2<double> both = 0.5 * (received(i) - received(j));
   const double mass = std::min(world_.masses[i], world_.masses[j]);
@@ -151,23 +169,8 @@ std::vector<double> WindowState::operator()(const std::vector<double>& seen, int
   for (int i = 0; i < n; ++i) {
     if (!tracks[i].MetAtEnd()) continue;
     double least = kImpactMissed;
-    // From `start` frames before the last.
-    const auto consider = [&](const RolloutOutput& found, int start) {
-      if (found.status != RolloutStatus::kDone) return;
-      const auto at = [&](int k) -> Vector2<double> {
-        return found.states.row(k).segment(6 * i, 2).transpose();
-      };
-      const Vector2<double> v = found.states.row(start).segment(6 * i + 3, 2).transpose();
-      const double miss = (at(start) - tracks[i].end()).norm();
-      if (miss > least) return;
-      least = miss;
-      const bool straight = start > 1 && (at(start) - at(start - 1) - v).norm() < kStraight;
-      const Vector2<double> velocity = straight ? tracks[i].LastStep() : v;
-      states[4 * i + 2] = velocity.x();
-      states[4 * i + 3] = velocity.y();
-    };
-    consider(by_late, 1);
-    if (tracks[i].MetTwice()) consider(by_early, 2);
+    ByEngine(tracks[i], i, by_late, 1, &least, &states[4 * i]);
+    if (tracks[i].MetTwice()) ByEngine(tracks[i], i, by_early, 2, &least, &states[4 * i]);
   }
   if (!twice) ByImpulse(tracks, before, &states);
   return states;

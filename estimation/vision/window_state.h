@@ -24,18 +24,6 @@
 
 namespace tangible {
 
-/// Pixels: second differences of positions below it count as uniform motion. Positions are seen to
-/// 0.02 pixels, 0.05 beside walls, which makes second differences 0.05 and 0.12 in the mean.
-inline constexpr double kUniformMotion = 0.15;
-/// Pixels a frame: slower discs rest. Positions seen to 0.05 pixels in four frames give the slope
-/// of a line to 0.02.
-inline constexpr double kRests = 0.06;
-/// Pixels: the engine's position after an impact is at most so far from the one seen. SimB's own
-/// impacts are up to a substep late, 1.2 pixels of the way each.
-inline constexpr double kImpactMissed = 2.5;
-/// Pixels: the way of two discs since their impact whose direction counts as seen, to 0.2 radians.
-inline constexpr double kImpulseSeen = 0.15;
-
 class WindowState {
  public:
   explicit WindowState(const DiscWorld& world);
@@ -50,6 +38,8 @@ class WindowState {
   using States = std::vector<double>;  ///< (n, 4)
 
   RolloutOutput Run(const States& start);
+  static void ByEngine(const Track& track, int disc, const RolloutOutput& found, int start,
+                       double* least, double* state);
   void ByImpulse(const std::vector<Track>& tracks, const States& before, States* states) const;
 
   DiscWorld world_;
