@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tangible/estimation/vision/model.h"
 
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
@@ -19,7 +20,11 @@ constexpr double kSpeedScale = 4.0;
 constexpr double kSharpness = 10.0;
 constexpr int64_t kFeatures = 12;
 constexpr int64_t kHidden = 128;
-constexpr int64_t kPatch = 16;  // pixels that a disc is drawn on, each way
+// Pixels around a disc: those that the encoder's second look sees beside it, as the first one misses
+// by a pixel at most, and those that the decoder may draw on.
+constexpr int64_t kSeenBeside = 2;
+constexpr int64_t kDrawnBeside = 3;
+constexpr double kOutside = -1.0;  // of pixels beyond the picture
 
 at::Tensor ColourTensor(const Colour& colour) {
   return torch::tensor({colour[0], colour[1], colour[2]}, torch::kFloat);
@@ -29,6 +34,10 @@ at::Tensor ColourMatrix(const DiscWorld& world) {
   std::vector<at::Tensor> rows;
   for (const Colour& colour : world.colours) rows.push_back(ColourTensor(colour));
   return torch::stack(rows);
+}
+
+int64_t LargestRadius(const DiscWorld& world) {
+  return static_cast<int64_t>(std::ceil(*std::max_element(world.radii.begin(), world.radii.end())));
 }
 
 // Input, two hidden layers, and an output that begins as 0.
@@ -61,10 +70,13 @@ at::Tensor WithNumbers(const at::Tensor& values) {
 
 }  // namespace
 
-EncoderImpl::EncoderImpl(const DiscWorld& world, int frames) : discs_(world.size()) {
-  first_ = register_module("first", nn::Conv2d(nn::Conv2dOptions(3, kFeatures, 5).padding(2)));
+EncoderImpl::EncoderImpl(const DiscWorld& world, int frames)
+    : discs_(world.size()), patch_(2 * (LargestRadius(world) + kSeenBeside) + 1) {
+  first_ = register_module("first", nn::Conv2d(nn::Conv2dOptions(3, kFeatures, 3).padding(1)));
   second_ =
       register_module("second", nn::Conv2d(nn::Conv2dOptions(kFeatures, discs_, 3).padding(1)));
+  correction_ =
+      register_module("correction", Perceptron(3 * patch_ * patch_ + 2 + discs_, kHidden / 2, 2));
   velocity_ =
       register_module("velocity", Perceptron(discs_ * (2 + 2 * (frames - 1)) + discs_, kHidden, 2));
 }
@@ -77,7 +89,7 @@ void EncoderImpl::StartFromColours(const DiscWorld& world) {
   const at::Tensor shares = torch::linalg_pinv((ColourMatrix(world) - cloth).t());
   for (int i = 0; i < discs_; ++i) {
     first_->weight[i].zero_();
-    first_->weight.index_put_({i, Slice(), 2, 2}, shares[i]);
+    first_->weight.index_put_({i, Slice(), 1, 1}, shares[i]);
     first_->bias[i] = -shares[i].dot(cloth);
     second_->weight[i].zero_();
     second_->weight.index_put_({i, i, 1, 1}, 8.0);
@@ -85,16 +97,34 @@ void EncoderImpl::StartFromColours(const DiscWorld& world) {
   }
 }
 
-at::Tensor EncoderImpl::Positions(const at::Tensor& pictures) {
-  const at::Tensor z = second_(torch::relu(first_(pictures)));
+at::Tensor EncoderImpl::Centres(const at::Tensor& pictures) {
+  // The mean of four pixels keeps the centre of what they show.
+  const at::Tensor z = second_(torch::relu(first_(torch::avg_pool2d(pictures, 2))));
   const at::Tensor weights = torch::nn::functional::softplus(
                                  z, torch::nn::functional::SoftplusFuncOptions().beta(kSharpness)) +
                              1e-9;
-  const at::Tensor at = torch::arange(kPictureSize, pictures.options()) + 0.5;
+  const at::Tensor at = 2.0 * torch::arange(kPictureSize / 2, pictures.options()) + 1.0;
   const at::Tensor total = weights.sum({2, 3});
   const at::Tensor x = (weights.sum(2) * at).sum(-1) / total;
   const at::Tensor y = (weights.sum(3) * at).sum(-1) / total;
   return torch::stack({x, y}, -1);
+}
+
+at::Tensor EncoderImpl::Refine(const at::Tensor& pictures, const at::Tensor& centres) {
+  const int64_t rows = pictures.size(0), beside = patch_ / 2, width = kPictureSize + 2 * beside;
+  const at::Tensor padded =
+      torch::constant_pad_nd(pictures, {beside, beside, beside, beside}, kOutside);
+  const at::Tensor pixel = torch::clamp(torch::floor(centres.detach()), 0, kPictureSize - 1);
+  const at::Tensor offset = torch::arange(patch_, torch::kLong);
+  const at::Tensor first = pixel.to(torch::kLong);
+  const at::Tensor x = (first.select(-1, 0).unsqueeze(-1) + offset).unsqueeze(-2);
+  const at::Tensor y = (first.select(-1, 1).unsqueeze(-1) + offset).unsqueeze(-1);
+  // (N, 3, n P²) to (N, n, 3 P²).
+  const at::Tensor which = (y * width + x).reshape({rows, 1, -1}).expand({rows, 3, -1});
+  const at::Tensor patches =
+      padded.flatten(2).gather(2, which).reshape({rows, 3, discs_, -1}).transpose(1, 2).flatten(2);
+  const at::Tensor features = torch::cat({patches, centres - pixel - 0.5}, 2);
+  return centres + correction_->forward(WithNumbers(features));
 }
 
 at::Tensor EncoderImpl::State(const at::Tensor& positions) {
@@ -107,7 +137,10 @@ at::Tensor EncoderImpl::State(const at::Tensor& positions) {
 }
 
 DecoderImpl::DecoderImpl(const DiscWorld& world, DecoderKind kind)
-    : kind_(kind), style_(world.style), radius_(world.radii[0]) {
+    : kind_(kind),
+      style_(world.style),
+      radius_(world.radii[0]),
+      patch_(2 * (LargestRadius(world) + kDrawnBeside)) {
   if (kind_ == DecoderKind::kRenderer) {
     cloth_ = register_buffer("cloth", ColourTensor(world.cloth));
     colours_ = register_buffer("colours", ColourMatrix(world));
@@ -123,7 +156,7 @@ DecoderImpl::DecoderImpl(const DiscWorld& world, DecoderKind kind)
 at::Tensor DecoderImpl::Share(const at::Tensor& distance) {
   if (kind_ == DecoderKind::kLearned) {
     // Nothing at the border of the patch, which moves from pixel to pixel.
-    const at::Tensor fade = torch::clamp(8.0 - distance, 0.0, 1.0);
+    const at::Tensor fade = torch::clamp(0.5 * patch_ - distance, 0.0, 1.0);
     return fade * share_->forward(distance.unsqueeze(-1) - 4.0).squeeze(-1);
   }
   if (style_ == DiscStyle::kSoft) return torch::exp(-torch::pow(distance / radius_, 8));
@@ -133,9 +166,9 @@ at::Tensor DecoderImpl::Share(const at::Tensor& distance) {
 at::Tensor DecoderImpl::forward(const at::Tensor& positions) {
   const int64_t rows = positions.size(0), n = positions.size(1);
   // Beyond the picture nothing is drawn; far beyond it indices would overflow.
-  const at::Tensor inside = torch::clamp(positions, -kPatch, kPictureSize + kPatch);
-  const at::Tensor corner = torch::floor(inside.detach()) - kPatch / 2 + 1;
-  const at::Tensor offset = torch::arange(kPatch, positions.options());
+  const at::Tensor inside = torch::clamp(positions, -patch_, kPictureSize + patch_);
+  const at::Tensor corner = torch::floor(inside.detach()) - patch_ / 2 + 1;
+  const at::Tensor offset = torch::arange(patch_, positions.options());
   const at::Tensor x = (corner.select(-1, 0).unsqueeze(-1) + offset).unsqueeze(-2);
   const at::Tensor y = (corner.select(-1, 1).unsqueeze(-1) + offset).unsqueeze(-1);
   const at::Tensor dx = x + 0.5 - inside.select(-1, 0).reshape({rows, n, 1, 1});
@@ -148,10 +181,10 @@ at::Tensor DecoderImpl::forward(const at::Tensor& positions) {
   const at::Tensor pixel =
       (torch::clamp(y, 0, kPictureSize - 1) * kPictureSize + torch::clamp(x, 0, kPictureSize - 1))
           .to(torch::kLong)
-          .reshape({rows, 1, n * kPatch * kPatch});
+          .reshape({rows, 1, n * patch_ * patch_});
   const at::Tensor tint = (colours_ - cloth_).t().reshape({1, 3, n, 1});
   const at::Tensor light =
-      (share.reshape({rows, 1, n, kPatch * kPatch}) * tint).reshape({rows, 3, -1});
+      (share.reshape({rows, 1, n, patch_ * patch_}) * tint).reshape({rows, 3, -1});
   const at::Tensor cloth = cloth_.reshape({1, 3, 1}).expand({rows, 3, kPicturePixels});
   return cloth.scatter_add(2, pixel.expand({rows, 3, -1}), light)
       .reshape({rows, 3, kPictureSize, kPictureSize});

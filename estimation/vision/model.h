@@ -5,9 +5,11 @@
 // back to pictures. Sizes: B rows of a batch, K frames seen, F frames ahead, n discs; positions are
 // in pixels, velocities in pixels a frame.
 //
-// The encoder's two convolutions give each pixel a weight w ≥ 0 for each disc, whose position is
-// the weights' centre, Σ w r / Σ w. The velocity is the last difference of positions and a
-// correction by a network that sees all discs' positions in the window.
+// The encoder looks twice. Two convolutions of the picture at half its size give each of its pixels a
+// weight w ≥ 0 for each disc, and the weights' centre, Σ w r / Σ w, tells where the disc is to a
+// twentieth of its radius. A network that sees the pixels around it corrects the position to a
+// hundredth of a pixel. The velocity is the last difference of positions and a correction by a
+// network that sees all discs' positions in the window.
 //
 // The dynamics are the engine (rollout_layer.h) with its physical parameters; or in its place a
 // multilayer perceptron on all discs' states, or an interaction network (Battaglia et al. 2016),
@@ -32,15 +34,20 @@ class EncoderImpl : public torch::nn::Module {
   EncoderImpl(const DiscWorld& world, int frames);
   /// Starts from the known colours in the place of random weights: positions without any label.
   void StartFromColours(const DiscWorld& world);
-  /// (N, 3, 64, 64) in [0, 1] to (N, n, 2).
-  at::Tensor Positions(const at::Tensor& pictures);
+  /// The first look: (N, 3, 64, 64) in [0, 1] to (N, n, 2).
+  at::Tensor Centres(const at::Tensor& pictures);
+  /// The second: the corrected centres.
+  at::Tensor Refine(const at::Tensor& pictures, const at::Tensor& centres);
+  /// Both.
+  at::Tensor Positions(const at::Tensor& pictures) { return Refine(pictures, Centres(pictures)); }
   /// Positions (B, K, n, 2) to states (B, n, 4) at the last frame.
   at::Tensor State(const at::Tensor& positions);
 
  private:
   int discs_;
+  int64_t patch_;  ///< pixels that the second look sees, each way
   torch::nn::Conv2d first_{nullptr}, second_{nullptr};
-  torch::nn::Sequential velocity_{nullptr};
+  torch::nn::Sequential correction_{nullptr}, velocity_{nullptr};
 };
 TORCH_MODULE(Encoder);
 
@@ -57,6 +64,7 @@ class DecoderImpl : public torch::nn::Module {
   DecoderKind kind_;
   DiscStyle style_;
   double radius_;
+  int64_t patch_;  ///< pixels that a disc is drawn on, each way
   at::Tensor cloth_, colours_;
   torch::nn::Sequential share_{nullptr};
 };

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tangible/estimation/vision/report.h"
 
+#include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <map>
 #include <optional>
@@ -107,6 +109,23 @@ std::string ParameterTable(const std::vector<Json>& cells) {
   return text.empty() ? "" : text + "\n";
 }
 
+// CPU time of the trainings that were made without an interruption.
+std::string TrainingLine(const std::vector<Json>& cells) {
+  double least = HUGE_VAL, most = 0.0, sum = 0.0;
+  int count = 0;
+  for (const Json& cell : cells) {
+    if (cell.value("iterations_now", 0L) < cell.value("iterations", 1L)) continue;
+    const double seconds = cell["cpu_seconds"];
+    least = std::min(least, seconds);
+    most = std::max(most, seconds);
+    sum += seconds;
+    ++count;
+  }
+  if (count == 0) return "";
+  return Line("%d trainings of one thread: %.0f to %.0f s of CPU time, together %.0f s\n", count,
+              least, most, sum);
+}
+
 std::string Base64(const std::string& bytes) {
   static constexpr char kLetters[] =
       "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
@@ -126,7 +145,7 @@ std::string Base64(const std::string& bytes) {
 }  // namespace
 
 std::string StudyTables(const std::vector<Json>& cells) {
-  return SimbTable(cells) + BilliardTable(cells) + ParameterTable(cells);
+  return SimbTable(cells) + BilliardTable(cells) + ParameterTable(cells) + TrainingLine(cells);
 }
 
 std::string TimingLine(const Json& timing) {

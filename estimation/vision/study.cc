@@ -2,13 +2,12 @@
 #include "tangible/estimation/vision/study.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstdio>
+#include <ctime>
 #include <mutex>
 
 #include "tangible/estimation/vision/evaluation.h"
-#include "tangible/estimation/vision/simb_score.h"
 
 namespace tangible {
 namespace {
@@ -18,8 +17,11 @@ using OrderedJson = nlohmann::ordered_json;
 constexpr int kCurvePoints = 40;  // of a loss over a training
 constexpr int kTestStride = 3;    // frames between windows that billiards are tested on
 
-double Now() {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+// Of this thread: a training's on any number of busy cores.
+double CpuSeconds() {
+  timespec time{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
+  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
 }
 
 double Median(std::vector<double> values) {
@@ -64,7 +66,8 @@ OrderedJson ToJson(const SimbScore& score) {
           {"unsolved", score.unsolved}};
 }
 
-OrderedJson SimbJson(Trainer* trainer, const DiscData& test, OrderedJson* seen_error) {
+OrderedJson SimbJson(Trainer* trainer, const StudyData& data, OrderedJson* seen_error) {
+  const DiscData& test = data.test;
   const std::vector<double> positions = SeePositions(trainer, test);
   *seen_error = SeenError(positions, test);
   const std::ptrdiff_t size = 2 * static_cast<std::ptrdiff_t>(test.world.size());
@@ -73,7 +76,7 @@ OrderedJson SimbJson(Trainer* trainer, const DiscData& test, OrderedJson* seen_e
   };
   OrderedJson json;
   json["ours"] = ToJson(ScoreSimb(test, SimbPredictor::kEngine, seen, 1));
-  json["true state"] = ToJson(ScoreSimbFromTruth(test, 1));
+  json["true state"] = ToJson(data.floor);
   json["constant velocity"] = ToJson(ScoreSimb(test, SimbPredictor::kConstantVelocity, seen, 1));
   json["last frame"] = ToJson(ScoreSimb(test, SimbPredictor::kLastFrame, seen, 1));
   return json;
@@ -173,6 +176,7 @@ StudyData MakeStudyData(DiscKind kind, std::uint64_t seed) {
   options.seed = 2 * seed + 2;
   options.sequences = simb ? 1000 : 200;
   data.test = MakeDiscData(options);
+  if (simb) data.floor = ScoreSimbFromTruth(data.test, 1);
   return data;
 }
 
@@ -191,7 +195,8 @@ CellResult RunCell(const StudyCell& cell, const StudyData& data, const CellHooks
     return result;
   }
   Curve curve(cell.training.iterations);
-  const double start = Now();
+  const double start = CpuSeconds();
+  const long from = trainer->iteration();
   while (trainer->iteration() < cell.training.iterations) {
     const TrainingLoss loss = trainer->Step();
     const long iteration = trainer->iteration();
@@ -207,11 +212,12 @@ CellResult RunCell(const StudyCell& cell, const StudyData& data, const CellHooks
   json["labels"] = cell.training.labels;
   json["iterations"] = cell.training.iterations;
   json["batch"] = cell.training.batch;
-  json["seconds_since_start_or_checkpoint"] = Now() - start;
+  json["iterations_now"] = cell.training.iterations - from;
+  json["cpu_seconds"] = CpuSeconds() - start;
   json["loss"] = curve.json();
   if (cell.kind == DiscKind::kSimb) {
     OrderedJson seen_error;
-    json["simb"] = SimbJson(trainer.get(), data.test, &seen_error);
+    json["simb"] = SimbJson(trainer.get(), data, &seen_error);
     json["seen_error"] = seen_error;
     return result;
   }
@@ -237,13 +243,13 @@ nlohmann::ordered_json TimePhysics() {
   for (int row = 0; row < options.batch; ++row) frames.emplace_back(row, row % 10);
   std::vector<double> iterations, physics;
   for (int repeat = 0; repeat < kRepeats; ++repeat) {
-    double start = Now();
+    double start = CpuSeconds();
     trainer.Step();
-    iterations.push_back(Now() - start);
+    iterations.push_back(CpuSeconds() - start);
     const at::Tensor state = StatesOf(data, frames).requires_grad_();
-    start = Now();
+    start = CpuSeconds();
     trainer.dynamics()(state).states.square().sum().backward();
-    physics.push_back(Now() - start);
+    physics.push_back(CpuSeconds() - start);
   }
   return {{"batch", options.batch},
           {"frames", options.ahead},

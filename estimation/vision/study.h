@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "tangible/estimation/vision/simb_score.h"
 #include "tangible/estimation/vision/training.h"
 
 namespace tangible {
@@ -27,6 +28,7 @@ std::vector<StudyCell> StudyCells();
 /// Sequences that are trained on, and others that are tested on.
 struct StudyData {
   DiscData train, test;
+  SimbScore floor;  ///< of SimB: the engine from the true states of `test`
 };
 StudyData MakeStudyData(DiscKind kind, std::uint64_t seed);
 
@@ -48,8 +50,8 @@ struct CellResult {
 CellResult RunCell(const StudyCell& cell, const StudyData& data, const CellHooks& hooks,
                    std::string* error);
 
-/// Seconds of the physics layer, forward and backward, for batch 32 over 10 frames, and of a
-/// training iteration of that batch: medians of several.
+/// CPU seconds of the physics layer, forward and backward, for batch 32 over 10 frames, and of a
+/// training iteration of that batch, on one thread: medians of several.
 nlohmann::ordered_json TimePhysics();
 
 /// The small training of continuous integration: a line a check, and whether all hold.

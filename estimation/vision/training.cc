@@ -14,6 +14,7 @@ namespace {
 namespace nn = torch::nn;
 
 // Weights of the losses: pixels² against squares of shares of light.
+constexpr double kPositionWeight = 30.0;  // positions are seen to hundredths of pixels
 constexpr double kPhysicsWeight = 0.3;
 constexpr double kDecoderWeight = 100.0;
 constexpr double kSelfWeight = 0.3;
@@ -151,12 +152,18 @@ TrainingLoss Trainer::Loss(const Batch& batch, at::Tensor* total) {
   const int64_t rows = options_.batch, n = data_.world.size();
   const at::Tensor with = batch.labelled, without = 1.0 - batch.labelled;
   const at::Tensor flags = with.reshape({rows, 1, 1}) > 0.5;
-  const at::Tensor positions =
-      encoder_->Positions(batch.pictures.flatten(0, 1)).reshape({rows, options_.seen, n, 2});
+  const at::Tensor seen = batch.pictures.flatten(0, 1);
+  const at::Tensor centres = encoder_->Centres(seen);
+  const at::Tensor positions = encoder_->Refine(seen, centres).reshape({rows, options_.seen, n, 2});
   const at::Tensor estimate = encoder_->State(positions);
   const at::Tensor truth = batch.seen.select(1, -1);
-  const at::Tensor encoder_loss = WeightedMean((positions - Positions(batch.seen)).square(), with) +
-                                  WeightedMean((estimate - truth).slice(2, 2, 4).square(), with);
+  const at::Tensor places_seen = Positions(batch.seen);
+  // Velocities are off by pixels a frame after an impact, which must not move positions.
+  const at::Tensor labelled = encoder_->State(positions.detach());
+  const at::Tensor encoder_loss =
+      WeightedMean((centres.reshape(positions.sizes()) - places_seen).square(), with) +
+      kPositionWeight * WeightedMean((positions - places_seen).square(), with) +
+      WeightedMean((labelled - truth).slice(2, 2, 4).square(), with);
   const Ahead ahead = dynamics_(torch::where(flags, truth, estimate));
   const at::Tensor physics_loss =
       WeightedMean(Huber(ahead.states - batch.ahead), with * ahead.valid);

@@ -5,25 +5,24 @@
 //
 // A disc that stays where it is rests. One that has moved uniformly over the last m ≥ 3 frames has
 // the line through its m positions (least squares). One that has met something between the last two
-// frames, and moved uniformly before, has the velocity that the engine gives it from the frame
-// before. Where that misses the position seen, and where something was met earlier, the difference
-// of the last two positions stands.
+// frames, a and b, has the velocity that the engine gives it from frame a. If its motion was not
+// uniform before a either, its velocity at a is the difference to the frame before, or the engine's
+// from that frame, whichever leads closer to the position seen at b. Where neither leads there, and
+// where the engine meets nothing after a, the difference of the last two positions stands.
+//
+// Two discs that met each other, and nothing else, show the impulse's direction: with the free
+// motion removed, m (r(b) − r(a) − v(a)) is the momentum that a disc received times the time since.
+// Along this direction n the impulse of the two is
+//
+//   p = −(1 + e) ((vᵢ − vⱼ)·n) / (1/mᵢ + 1/mⱼ)
+//
+// which also holds where the discs overlapped before they turned, as SimB's do.
 
 #include <vector>
 
 #include "tangible/estimation/vision/disc_rollout.h"
 
 namespace tangible {
-
-/// Pixels: second differences of positions below it count as uniform motion. Positions are seen to
-/// 0.1 pixels, which makes them 0.24 in the mean.
-inline constexpr double kUniformMotion = 0.3;
-/// Pixels a frame: slower discs rest. Positions seen to 0.05 pixels in four frames give the slope
-/// of a line to 0.02.
-inline constexpr double kRests = 0.06;
-/// Pixels: the engine's position after an impact is at most so far from the one seen. SimB's own
-/// impacts are up to a substep late, 1.2 pixels of the way each.
-inline constexpr double kImpactMissed = 2.5;
 
 class WindowState {
  public:
@@ -35,9 +34,17 @@ class WindowState {
   std::vector<double> operator()(const std::vector<double>& seen, int frames);
 
  private:
-  RolloutFunction function_;  ///< one frame
+  class Track;
+  using States = std::vector<double>;  ///< (n, 4)
+
+  RolloutOutput Run(const States& start);
+  static void ByEngine(const Track& track, int disc, const RolloutOutput& found, int start,
+                       double* least, double* state);
+  void ByImpulse(const std::vector<Track>& tracks, const States& before, States* states) const;
+
+  DiscWorld world_;
+  RolloutFunction function_;  ///< two frames
   RolloutWorker worker_;
-  int discs_;
 };
 
 }  // namespace tangible

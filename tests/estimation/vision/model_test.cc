@@ -49,6 +49,29 @@ TEST_P(ModelTest, FromColoursTheEncoderSeesToATenthOfAPixel) {
   EXPECT_TRUE(torch::allclose(state.slice(2, 2, 4), torch::full({8, 3, 2}, 0.5)));
 }
 
+// The second look depends on the pixels around the centre alone, wherever they are.
+TEST_P(ModelTest, TheSecondLookSeesThePixelsAroundTheCentre) {
+  Encoder encoder(data_.world, 3);
+  EXPECT_TRUE(torch::equal(encoder->Positions(pictures_), encoder->Centres(pictures_)));
+  const torch::NoGradGuard guard;
+  for (at::Tensor& weight : encoder->parameters()) weight.normal_(0.0, 0.1);
+  const auto corrections = [&](double x, double y) {
+    const std::vector<double> places = {20.3 + x, 30.7 + y, 32.1 + x, 31.2 + y, 31.0 + x, 15.6 + y};
+    const std::string picture = DrawDiscs(data_.world, places);
+    at::Tensor pixels = torch::empty({1, 3, kPictureSize, kPictureSize});
+    for (int k = 0; k < kPictureBytes; ++k) {
+      pixels.view({-1})[k] = static_cast<unsigned char>(picture[k]) / 255.0;
+    }
+    const at::Tensor centres = torch::tensor(places).to(torch::kFloat).reshape({1, 3, 2}) + 0.1;
+    return encoder->Refine(pixels, centres) - centres;
+  };
+  const at::Tensor here = corrections(0.0, 0.0);
+  EXPECT_TRUE(torch::allclose(here, corrections(7.0, -4.0), 1e-4, 1e-4));
+  EXPECT_FALSE(torch::allclose(here, corrections(0.4, 0.0), 1e-2, 1e-2));
+  // Beyond the picture's edge pixels are others.
+  EXPECT_FALSE(torch::allclose(here, corrections(-19.0, 0.0), 1e-2, 1e-2));
+}
+
 TEST_P(ModelTest, TheRendererDrawsThePicturesAndIsDifferentiatedRight) {
   Decoder renderer(data_.world, DecoderKind::kRenderer);
   const at::Tensor drawn = renderer(states_.slice(2, 0, 2));

@@ -61,7 +61,9 @@ TEST(PngTest, AStripHasAllPictures) {
 
 nlohmann::ordered_json Cell(const std::string& name, double labels, double error) {
   const std::vector<double> position(10, error), picture(10, 0.001);
-  nlohmann::ordered_json json = {{"cell", name}, {"labels", labels}, {"seen_error", 0.05}};
+  nlohmann::ordered_json json = {{"cell", name},          {"labels", labels},
+                                 {"seen_error", 0.05},    {"iterations", 100},
+                                 {"iterations_now", 100}, {"cpu_seconds", 40.0 * labels}};
   for (const char* predictor : {"model", "constant velocity", "last frame", "true state"}) {
     json["ahead"][predictor] = {{"position", position}, {"picture", picture}};
   }
@@ -89,11 +91,16 @@ TEST(ReportTest, TablesAndPlotsHaveEveryCell) {
                                                      Cell("billiards_engine_100_0", 1.0, 0.25),
                                                      Cell("billiards_mlp_10_0", 0.1, 4.0)};
   const std::string tables = StudyTables(cells);
-  for (const char* part : {"billiards_engine_10_0", "billiards_mlp_10_0", "4.000", "0.0210 (0.02)",
-                           "constant velocity"}) {
+  for (const char* part :
+       {"billiards_engine_10_0", "billiards_mlp_10_0", "4.000", "0.0210 (0.02)",
+        "constant velocity", "3 trainings of one thread: 4 to 40 s of CPU time, together 48 s"}) {
     EXPECT_NE(tables.find(part), std::string::npos) << part;
   }
   EXPECT_EQ(tables.find("SimB"), std::string::npos);
+  // A training that was interrupted is not counted.
+  std::vector<nlohmann::ordered_json> resumed = {cells[0]};
+  resumed[0]["iterations_now"] = 99;
+  EXPECT_EQ(StudyTables(resumed).find("trainings"), std::string::npos);
   EXPECT_NE(TimingLine({{"batch", 32},
                         {"frames", 10},
                         {"physics_seconds", 0.004},
