@@ -371,6 +371,11 @@ class EntryBuilder : private internal::LocalEntries<Sink> {
     Vector2<double> r, e, w, o;
   };
 
+  // Along a joint's coordinate: the force amount = damping · speed − push, against the motion.
+  struct Drive {
+    double amount = 0.0, damping = 0.0, speed = 0.0, slope = 0.0;
+  };
+
   void PrismaticByHand(int j) {
     const JointIndex& joint = s_.joints[j];
     const double* numbers = &x_[joint.geometry];
@@ -383,8 +388,9 @@ class EntryBuilder : private internal::LocalEntries<Sink> {
     at.e = pose_a.position + at.r - pose_b.position;
     at.o = at.e - arm_b;
     at.w = Perp(Vector2<double>(pose_b.rotation * Vector2<double>(numbers[4], numbers[5])));
+    const Drive drive = DriveOf(joint, at);
     const auto by = [&](int variable, const Slider& change) {
-      EmitSlider(j, at, change, variable);
+      EmitSlider(j, at, drive, change, variable);
     };
     for (int i = 0; i < 2; ++i) {
       const Vector2<double> unit(i == 0 ? 1.0 : 0.0, i == 0 ? 0.0 : 1.0);
@@ -400,7 +406,7 @@ class EntryBuilder : private internal::LocalEntries<Sink> {
     by(s_.PoseVariable(joint.a, 2), {turned, turned, zero, turned});
     by(s_.PoseVariable(joint.b, 2), {zero, zero, Perp(at.w), -Perp(arm_b)});
     SliderByTwists(j, at);
-    DriveSlider(joint, at);
+    DriveSlider(joint, at, drive);
     const double share = equations_.DriftShare();
     if (share != 0.0) {
       sink_(JointRow(j) + 1, s_.PoseVariable(joint.a, 2), share);
@@ -414,7 +420,7 @@ class EntryBuilder : private internal::LocalEntries<Sink> {
   }
 
   // Entries by one variable, along which r, e, w, o change as given.
-  void EmitSlider(int j, const Slider& at, const Slider& d, int variable) {
+  void EmitSlider(int j, const Slider& at, const Drive& drive, const Slider& d, int variable) {
     const JointIndex& joint = s_.joints[j];
     const double y = solved_.solution->joint_impulse[3 * static_cast<size_t>(j)];
     const Vector2<double> across = Perp(at.w);
@@ -440,7 +446,6 @@ class EntryBuilder : private internal::LocalEntries<Sink> {
     }
     emit(JointRow(j), row);
     // Momentum rows: −y rowᵀ, and of effort and damping A along u, with A's own change.
-    const Drive drive = DriveOf(joint, at);
     const double d_speed = -d_across.dot(PlaneOf(damped_, joint.a) - PlaneOf(damped_, joint.b)) -
                            damped_[3 * joint.a + 2] * d_wr + damped_[3 * joint.b + 2] * d_we;
     const double d_amount = drive.damping * d_speed;
@@ -492,11 +497,6 @@ class EntryBuilder : private internal::LocalEntries<Sink> {
     }
   }
 
-  // Along a joint's coordinate: the force amount = damping · speed − push, against the motion.
-  struct Drive {
-    double amount = 0.0, damping = 0.0, speed = 0.0, slope = 0.0;
-  };
-
   bool HasDrive(const JointIndex& joint) const {
     return kLevel != Level::kCorrection && joint.damping >= 0 && equations_.Weight() != 0.0;
   }
@@ -527,9 +527,8 @@ class EntryBuilder : private internal::LocalEntries<Sink> {
   }
 
   // Effort and damping by their numbers, the time, and the twists that dampers act against.
-  void DriveSlider(const JointIndex& joint, const Slider& at) {
+  void DriveSlider(const JointIndex& joint, const Slider& at, const Drive& drive) {
     if (!HasDrive(joint)) return;
-    const Drive drive = DriveOf(joint, at);
     const double weight = equations_.Weight();
     const Vector2<double> along = -Perp(at.w);
     const RowPart<double> row_a = {along.x(), along.y(), -at.w.dot(at.r)};
