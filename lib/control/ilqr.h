@@ -25,6 +25,7 @@
 #include <vector>
 
 #include "tangible/control/cost.h"
+#include "tangible/control/sampled_surrogate.h"
 #include "tangible/control/step_map.h"
 #include "tangible/control/tolerances.h"
 
@@ -40,14 +41,18 @@ struct ControlProblem {
 
 struct IlqrOptions {
   int max_iterations = 200;  ///< >= 1
-  /// Converged where moving every control of every step by its range (high − low, or without bounds
-  /// the largest |u| of the plan, at least 1) against the gradient would change the cost, to first
-  /// order, by this share of itself.
+  /// Converged where moving every control of every step by its range (ControlSizes of
+  /// sampled_surrogate.h) against the gradient would change the cost, to first order, by this share
+  /// of itself.
   double gradient_tolerance = kGradientTolerance;
   bool second_order = false;
   /// Feedback of a run that has an impact earlier or later than the plan is relative to the plan's
   /// motion extended across it (reference_extension.h), and not to states on the other side.
   bool reference_extension = false;
+  /// Where it has samples, the first half of max_iterations at most is spent with means of
+  /// Jacobians over samples in the place of exact ones; what they lead to is where exact ones
+  /// begin. Steps count only where they decrease the cost of the real motion, with either.
+  SampledSurrogate surrogate{};
   /// Asked after each iteration; true ends the work with the best plan so far.
   std::function<bool()> stop{};
 };
@@ -85,6 +90,7 @@ struct IlqrResult {
   Plan plan;
   double gradient = 0.0;
   std::vector<IlqrIteration> iterations;
+  long surrogate_iterations = 0;  ///< the first ones, with sampled Jacobians
   long rollouts = 0;
   long linearisations = 0;  ///< of whole plans
 };

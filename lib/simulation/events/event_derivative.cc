@@ -24,8 +24,11 @@ void PlaceTangent(const ModelStructure& s, const Segment& segment, double c, con
                   const double* a_hat, int terms, const Row& tau_dot, const RowMatrixXd& x,
                   const RowMatrixXd* a_dot, RowMatrixXd* out) {
   const double tau = segment.length;
-  *out = x;
-  out->row(TimeVariable(s)) += c * tau_dot;
+  const int time = TimeVariable(s);
+  // The model's numbers are the same in all stages.
+  if (out->rows() != x.rows() || out->cols() != x.cols()) *out = x;
+  out->topRows(s.ParameterVariable(0)) = x.topRows(s.ParameterVariable(0));
+  out->row(time) = x.row(time) + c * tau_dot;
   for (int body = 0; body < s.num_bodies(); ++body) {
     if (s.bodies[body].motion == Motion::kStatic) {
       continue;
