@@ -24,6 +24,9 @@ constexpr double kEffortWeight = 1e-3, kCupWeight = 100.0;
 // Of the surrogate: its deviation is a share of the range of efforts.
 constexpr int kSamples = 8;
 constexpr double kDeviation = 0.05;
+// Of problems: a ball that comes so far, m, was struck; so many are drawn for one, at most.
+constexpr double kStruck = 0.8;
+constexpr int kMostDraws = 100;
 
 double CpuSeconds() {
   timespec time{};
@@ -81,10 +84,11 @@ class Planned {
     }
     return true;
   }
-  double Distance(const Plan& plan) const {
+  Vector2<double> BallAtEnd(const Plan& plan) const {
     const auto last = plan.states.row(plan.states.rows() - 1);
-    return std::hypot(last[ball_] - problem_.cup.x(), last[ball_ + 1] - problem_.cup.y());
+    return {last[ball_], last[ball_ + 1]};
   }
+  double Distance(const Plan& plan) const { return (BallAtEnd(plan) - problem_.cup).norm(); }
 
  private:
   const Problem& problem_;
@@ -123,11 +127,19 @@ Problem Draw(const Scene& scene, unsigned seed, unsigned number) {
   Problem problem;
   problem.scene = scene;
   BasicBody<double>& ball = problem.scene.bodies[Find(scene.bodies, "ball") - scene.bodies.data()];
-  ball.position[0] += Uniform(-0.1, 0.1, &random);
-  ball.position[1] += Uniform(-0.15, 0.15, &random);
-  ball.velocity[0] += Uniform(-0.1, 0.1, &random);
-  problem.cup.x() = Uniform(1.5, 2.1, &random);
-  problem.cup.y() = Uniform(0.3, 0.5, &random);
+  const Vector2<double> position = ball.position;
+  const double speed = ball.velocity[0];
+  for (int i = 0; i < kMostDraws; ++i) {
+    ball.position[0] = position[0] + Uniform(-0.1, 0.1, &random);
+    ball.position[1] = position[1] + Uniform(-0.15, 0.15, &random);
+    ball.velocity[0] = speed + Uniform(-0.1, 0.1, &random);
+    problem.effort = Uniform(4.0, 14.0, &random);
+    Planned planned(problem, Stepping::kEvent);
+    Plan plan;
+    if (!planned.Play(planned.Start(), &plan)) continue;
+    problem.cup = planned.BallAtEnd(plan);
+    if (problem.cup.x() > ball.position[0] + kStruck) break;
+  }
   problem.effort = Uniform(3.0, 10.0, &random);
   return problem;
 }

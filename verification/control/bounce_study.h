@@ -32,9 +32,9 @@ struct Problem {
   Vector2<double> cup{0.0, 0.0};  ///< m
 };
 
-/// Ball, cup and start are uniformly random around the scene's: the ball's position in ±0.1 m and
-/// ±0.15 m, its speed along x in ±0.1 m/s, the cup in [1.5, 2.1] x [0.3, 0.5], the effort in
-/// [3, 10] N.
+/// The ball is uniformly random around the scene's: its position in ±0.1 m and ±0.15 m, its speed
+/// along x in ±0.1 m/s. The cup is where a random effort in [4, 14] N that is held brings it, as far
+/// as it is struck; plans start at another one in [3, 10] N.
 Problem Draw(const Scene& scene, unsigned seed, unsigned number);
 
 enum class Method { kExact, kExtended, kSurrogate, kFixed };

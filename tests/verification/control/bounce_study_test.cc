@@ -24,8 +24,8 @@ TEST_F(BounceStudyTest, ProblemsAreThoseOfTheirSeed) {
   EXPECT_EQ(a.cup, b.cup);
   EXPECT_NE(a.effort, c.effort);
   EXPECT_NE(a.cup, c.cup);
-  EXPECT_GE(a.cup.x(), 1.5);
-  EXPECT_LE(a.cup.x(), 2.1);
+  // Where the ball is only if it was struck.
+  EXPECT_GT(a.cup.x(), 0.9);
 }
 
 // A plan of event steps is played as it was made; one of fixed steps believes in another motion.
