@@ -39,6 +39,7 @@ class Reader {
         extension.Fail("expected with event stepping only, got fixed stepping");
       }
     }
+    if (root_.Has("surrogate")) ReadSurrogate(root_.At("surrogate"));
     if (root_.Has("mpc")) ReadPredictive(root_.At("mpc"));
   }
 
@@ -132,6 +133,19 @@ class Reader {
     }
   }
 
+  void ReadSurrogate(const JsonReader& json) {
+    json.ExpectKeys({"samples", "deviation", "seed"}, " of surrogate");
+    SampledSurrogate& surrogate = problem_.options.surrogate;
+    surrogate.samples = json.At("samples").Integer(2, 1000000);
+    if (surrogate.samples % 2 != 0) json.At("samples").FailExpected("an even number");
+    if (json.Has("deviation")) {
+      surrogate.deviation = json.At("deviation").Number(NumberKind::kPositive);
+    }
+    if (json.Has("seed")) {
+      surrogate.seed = static_cast<unsigned>(json.At("seed").Integer(0, 1000000000));
+    }
+  }
+
   void ReadPredictive(const JsonReader& json) {
     json.ExpectKeys({"duration", "horizon", "iterations"}, " of mpc");
     problem_.run_duration = json.At("duration").Number(NumberKind::kPositive);
@@ -160,7 +174,8 @@ bool LoadControlFile(const std::string& file, ControlFile* problem, std::string*
   JsonErrors errors(file);
   const JsonReader root(json, &errors);
   root.ExpectKeys({"name", "scene", "controls", "cost", "horizon", "max_iterations",
-                   "gradient_tolerance", "second_order", "reference_extension", "mpc"});
+                   "gradient_tolerance", "second_order", "reference_extension", "surrogate",
+                   "mpc"});
   const std::string scene = root.At("scene").String();
   if (errors.ok()) {
     problem->scene_path = Beside(file, scene);

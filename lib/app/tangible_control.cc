@@ -174,13 +174,16 @@ std::string WriteMotion(const ControlFile& file, Scene scene, const Played& play
   return WriteResult(FLAGS_view, ViewHtml(view.data(), options));
 }
 
-OrderedJson DescribeIterations(const std::vector<IlqrIteration>& iterations) {
+// `sampled`: how many of them, at the start, have the surrogate's Jacobians.
+OrderedJson DescribeIterations(const std::vector<IlqrIteration>& iterations, long sampled) {
   OrderedJson list = OrderedJson::array();
   for (const IlqrIteration& iteration : iterations) {
+    const bool is_sampled = static_cast<long>(list.size()) < sampled;
     list.push_back({{"cost", iteration.cost},
                     {"gradient", iteration.gradient},
                     {"shift", iteration.shift},
                     {"step", iteration.step}});
+    if (sampled > 0) list.back()["jacobians"] = is_sampled ? "surrogate" : "exact";
   }
   return list;
 }
@@ -225,8 +228,14 @@ int Plan(const std::string& path, const ControlFile& file) {
       {"rollouts", result.rollouts},
       {"linearisations", result.linearisations},
       {"cpu_seconds", seconds},
-      {"iterations", DescribeIterations(result.iterations)},
+      {"iterations", DescribeIterations(result.iterations, result.surrogate_iterations)},
       {"controls", DescribeControls(file, result.plan.controls, file.scene.simulation.dt)}};
+  if (file.options.surrogate.samples > 0) {
+    json["surrogate"] = {{"samples", file.options.surrogate.samples},
+                         {"deviation", file.options.surrogate.deviation},
+                         {"seed", file.options.surrogate.seed},
+                         {"iterations", result.surrogate_iterations}};
+  }
   error =
       WriteMotion(file, file.scene, {result.plan.states, result.plan.controls, result.plan.cost},
                   result.iterations);

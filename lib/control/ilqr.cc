@@ -61,6 +61,9 @@ class Solver {
       p_.cost->Expand(x, u, options_.second_order, &at->cost[k]);
     }
     p_.cost->ExpandEnd(plan.states.row(steps), options_.second_order, &at->cost[steps]);
+    if (options_.surrogate.samples > 0) {
+      AverageJacobians(p_, plan, options_.surrogate, &at->a, &at->b);
+    }
     ++result_.linearisations;
     return true;
   }
@@ -139,15 +142,13 @@ class Solver {
     Gradient(at_, &costates_, &gradient_);
     const Plan& plan = result_.plan;
     double sum = 0.0;
+    const VectorX<double> sizes = ControlSizes(p_, plan.controls);
     for (int i = 0; i < m_; ++i) {
-      const double range = p_.high[i] - p_.low[i];
-      const double size =
-          std::isfinite(range) ? range : std::max(1.0, plan.controls.col(i).cwiseAbs().maxCoeff());
       for (long k = 0; k < plan.controls.rows(); ++k) {
         const double g = gradient_(k, i);
         const bool held = (g > 0.0 && plan.controls(k, i) <= p_.low[i]) ||
                           (g < 0.0 && plan.controls(k, i) >= p_.high[i]);
-        if (!held) sum += std::abs(g) * size;
+        if (!held) sum += std::abs(g) * sizes[i];
       }
     }
     const double cost = std::max(std::abs(plan.cost), kNoCost * first_cost_);
@@ -416,7 +417,25 @@ IlqrResult SolveIlqr(const ControlProblem& problem, const RowMatrixXd& controls,
     result.status = IlqrStatus::kFailed;
     return result;
   }
-  return Solver(problem, options).Solve(controls);
+  IlqrOptions exact = options;
+  exact.surrogate.samples = 0;
+  if (options.surrogate.samples == 0) return Solver(problem, exact).Solve(controls);
+  IlqrOptions sampled = options;
+  sampled.max_iterations = std::max(1, options.max_iterations / 2);
+  const IlqrResult first = Solver(problem, sampled).Solve(controls);
+  const auto spent = static_cast<long>(first.iterations.size());
+  if (first.status == IlqrStatus::kFailed || first.status == IlqrStatus::kStopped) {
+    result = first;
+  } else {
+    exact.max_iterations = std::max(1, options.max_iterations - static_cast<int>(spent));
+    result = Solver(problem, exact).Solve(first.plan.controls);
+    result.iterations.insert(result.iterations.begin(), first.iterations.begin(),
+                             first.iterations.end());
+    result.rollouts += first.rollouts;
+    result.linearisations += first.linearisations;
+  }
+  result.surrogate_iterations = spent;
+  return result;
 }
 
 RowMatrixXd CostGradient(const ControlProblem& problem, const Plan& plan, RowMatrixXd* costates,

@@ -25,6 +25,7 @@
 #include <vector>
 
 #include "tangible/control/cost.h"
+#include "tangible/control/sampled_surrogate.h"
 #include "tangible/control/step_map.h"
 #include "tangible/control/tolerances.h"
 
@@ -40,15 +41,19 @@ struct ControlProblem {
 
 struct IlqrOptions {
   int max_iterations = 200;  ///< >= 1
-  /// The plan has converged when moving every control of every step by its range (high − low, or
-  /// without bounds the largest |u| of the plan, at least 1) against the gradient would change the
-  /// cost, to first order, by at most this fraction of the cost.
+  /// The plan has converged when moving every control of every step by its range (ControlSizes of
+  /// sampled_surrogate.h) against the gradient would change the cost, to first order, by at most
+  /// this fraction of the cost.
   double gradient_tolerance = kGradientTolerance;
   bool second_order = false;
   /// Where a run has an impact earlier or later than the plan, the feedback is relative to the
   /// plan's motion extended across the impact (reference_extension.h), and not to states on its
   /// other side.
   bool reference_extension = false;
+  /// Where it has samples, at most the first half of max_iterations uses means of Jacobians over
+  /// samples in the place of exact ones; exact ones go on from there. With either a step counts only
+  /// where it decreases the cost of the real motion.
+  SampledSurrogate surrogate{};
   /// Called after each iteration; true ends the work with the best plan so far.
   std::function<bool()> stop{};
 };
@@ -86,6 +91,7 @@ struct IlqrResult {
   Plan plan;
   double gradient = 0.0;
   std::vector<IlqrIteration> iterations;
+  long surrogate_iterations = 0;  ///< the first ones, with sampled Jacobians
   long rollouts = 0;
   long linearisations = 0;  ///< of whole plans
 };

@@ -90,6 +90,20 @@ TEST_F(TangibleControlTest, RecedingHorizonsBringAHeavierPlantToTheMark) {
   EXPECT_GT(result["cpu_seconds_max"].get<double>(), 0.0);
 }
 
+// A surrogate is named as such, and the plan ends with exact Jacobians: of a linear system in one
+// iteration of each.
+TEST_F(TangibleControlTest, LabelsASurrogate) {
+  const ProgramRun run =
+      Control(Problem(kEffort, R"(, "surrogate": {"samples": 4, "deviation": 0.2, "seed": 7})"));
+  ASSERT_EQ(run.exit_status, 0) << run.error;
+  const json result = json::parse(run.out);
+  EXPECT_EQ(result["status"], "converged");
+  EXPECT_EQ(result["surrogate"]["samples"], 4);
+  EXPECT_EQ(result["surrogate"]["seed"], 7);
+  EXPECT_EQ(result["surrogate"]["iterations"], 1);
+  EXPECT_EQ(result["iterations"][0]["jacobians"], "surrogate");
+}
+
 TEST_F(TangibleControlTest, MistakesAreOneLine) {
   ExpectOneLine(Control(Problem(R"({"path": "joints/rail/effort", "low": 2, "high": 1})")), 1,
                 "/controls/0/high: expected a number >= low, got 1");
@@ -111,6 +125,10 @@ TEST_F(TangibleControlTest, MistakesAreOneLine) {
                 "nowhere.json");
   ExpectOneLine(Control(Problem(kEffort, R"(, "reference_extension": true)")), 1,
                 "/reference_extension: expected with event stepping only");
+  ExpectOneLine(Control(Problem(kEffort, R"(, "surrogate": {"samples": 3})")), 1,
+                "/surrogate/samples: expected an even number, got 3");
+  ExpectOneLine(Control(Problem(kEffort, R"(, "surrogate": {"samples": 2, "deviation": 0})")), 1,
+                "/surrogate/deviation: expected a number > 0");
   ExpectOneLine(Control(Problem(kEffort), "--mpc"), 1, "/mpc: missing");
   ExpectOneLine(Control(Problem(kEffort), "--plant=x.json"), 2, "--plant: needs --mpc");
   ExpectOneLine(Control(Problem(kEffort), "--budget_ms=-1 --mpc"), 2, "--budget_ms");

@@ -65,6 +65,8 @@ class EntryBuilder : private internal::LocalEntries<Sink> {
     for (int j = 0; j < static_cast<int>(s_.joints.size()); ++j) {
       if (s_.joints[j].type == JointType::kRevolute && by_hand_) {
         RevoluteByHand(j);
+      } else if (s_.joints[j].type == JointType::kPrismatic && by_hand_) {
+        PrismaticByHand(j);
       } else {
         equations_.Joint(j);
       }
@@ -357,6 +359,192 @@ class EntryBuilder : private internal::LocalEntries<Sink> {
                 (i == k ? weight : -weight) * x_[joint.damping]);
         }
       }
+    }
+  }
+
+  // A prismatic joint (joint_prismatic_inl.h) with the arm r, the reach e = p_a + r − x_b and the
+  // direction w across its axis u = −w⊥; X, Ω are the unknowns of positions and angles, ζ = v_a +
+  // ω_a r⊥ − v_b, o the offset of the anchors. Besides rows of θ_a − θ_b,
+  //   row   w·(X_a − X_b) − Ω_a w⊥·r + Ω_b w⊥·e + share w·o + 2 ω_b w⊥·ζ − ω_b² w·e − ω_a² w·r
+  // the last three of accelerations. Derivatives are those by r, e, w, o along each variable.
+  struct Slider {
+    Vector2<double> r, e, w, o;
+  };
+
+  // Along a joint's coordinate: the force amount = damping · speed − push, against the motion.
+  struct Drive {
+    double amount = 0.0, damping = 0.0, speed = 0.0, slope = 0.0;
+  };
+
+  void PrismaticByHand(int j) {
+    const JointIndex& joint = s_.joints[j];
+    const double* numbers = &x_[joint.geometry];
+    const Pose<double> pose_a = state_.PoseOf(joint.a);
+    const Pose<double> pose_b = state_.PoseOf(joint.b);
+    const Vector2<double> zero(0.0, 0.0);
+    Slider at;
+    at.r = pose_a.rotation * Vector2<double>(numbers[0], numbers[1]);
+    const Vector2<double> arm_b = pose_b.rotation * Vector2<double>(numbers[2], numbers[3]);
+    at.e = pose_a.position + at.r - pose_b.position;
+    at.o = at.e - arm_b;
+    at.w = Perp(Vector2<double>(pose_b.rotation * Vector2<double>(numbers[4], numbers[5])));
+    const Drive drive = DriveOf(joint, at);
+    const auto by = [&](int variable, const Slider& change) {
+      EmitSlider(j, at, drive, change, variable);
+    };
+    for (int i = 0; i < 2; ++i) {
+      const Vector2<double> unit(i == 0 ? 1.0 : 0.0, i == 0 ? 0.0 : 1.0);
+      const Vector2<double> in_a = pose_a.rotation * unit;
+      const Vector2<double> in_b = pose_b.rotation * unit;
+      by(s_.PoseVariable(joint.a, i), {zero, unit, zero, unit});
+      by(s_.PoseVariable(joint.b, i), {zero, -unit, zero, -unit});
+      by(s_.ParameterVariable(joint.geometry + i), {in_a, in_a, zero, in_a});
+      by(s_.ParameterVariable(joint.geometry + 2 + i), {zero, zero, zero, -in_b});
+      by(s_.ParameterVariable(joint.geometry + 4 + i), {zero, zero, Perp(in_b), zero});
+    }
+    const Vector2<double> turned = Perp(at.r);
+    by(s_.PoseVariable(joint.a, 2), {turned, turned, zero, turned});
+    by(s_.PoseVariable(joint.b, 2), {zero, zero, Perp(at.w), -Perp(arm_b)});
+    SliderByTwists(j, at);
+    DriveSlider(joint, at, drive);
+    const double share = equations_.DriftShare();
+    if (share != 0.0) {
+      sink_(JointRow(j) + 1, s_.PoseVariable(joint.a, 2), share);
+      sink_(JointRow(j) + 1, s_.PoseVariable(joint.b, 2), -share);
+      sink_(JointRow(j) + 1, s_.ParameterVariable(joint.geometry + 6), -share);
+    }
+  }
+
+  Vector2<double> PlaneOf(const double* values, int body) const {
+    return {values[3 * body], values[3 * body + 1]};
+  }
+
+  // Entries by one variable, along which r, e, w, o change as given.
+  void EmitSlider(int j, const Slider& at, const Drive& drive, const Slider& d, int variable) {
+    const JointIndex& joint = s_.joints[j];
+    const double y = solved_.solution->joint_impulse[3 * static_cast<size_t>(j)];
+    const Vector2<double> across = Perp(at.w);
+    const Vector2<double> d_across = Perp(d.w);
+    // Of w·r, w·e, w⊥·r, w⊥·e.
+    const double d_wr = d.w.dot(at.r) + at.w.dot(d.r);
+    const double d_we = d.w.dot(at.e) + at.w.dot(d.e);
+    const double d_ar = d_across.dot(at.r) + across.dot(d.r);
+    const double d_ae = d_across.dot(at.e) + across.dot(d.e);
+    const auto emit = [&](int row, double value) {
+      if (value != 0.0) sink_(row, variable, value);
+    };
+    double row = d.w.dot(PlaneOf(unknown_, joint.a) - PlaneOf(unknown_, joint.b)) -
+                 unknown_[3 * joint.a + 2] * d_ar + unknown_[3 * joint.b + 2] * d_ae;
+    const double share = equations_.DriftShare();
+    row += share * (d.w.dot(at.o) + at.w.dot(d.o));
+    if constexpr (kLevel == Level::kAcceleration) {
+      const double omega_a = before_[3 * joint.a + 2];
+      const double omega_b = before_[3 * joint.b + 2];
+      row +=
+          2.0 * omega_b * (d_across.dot(SlidingOf(joint, at)) + omega_a * across.dot(Perp(d.r))) -
+          omega_b * omega_b * d_we - omega_a * omega_a * d_wr;
+    }
+    emit(JointRow(j), row);
+    // Momentum rows: −y rowᵀ, and of effort and damping A along u, with A's own change.
+    const double d_speed = -d_across.dot(PlaneOf(damped_, joint.a) - PlaneOf(damped_, joint.b)) -
+                           damped_[3 * joint.a + 2] * d_wr + damped_[3 * joint.b + 2] * d_we;
+    const double d_amount = drive.damping * d_speed;
+    const Vector2<double> plane = -y * d.w - d_across * drive.amount - across * d_amount;
+    const int row_a = BodyRow(s_, joint.a);
+    const int row_b = BodyRow(s_, joint.b);
+    if (row_a >= 0) {
+      emit(row_a, plane.x());
+      emit(row_a + 1, plane.y());
+      emit(row_a + 2, y * d_ar - d_wr * drive.amount - at.w.dot(at.r) * d_amount);
+    }
+    if (row_b >= 0) {
+      emit(row_b, -plane.x());
+      emit(row_b + 1, -plane.y());
+      emit(row_b + 2, -y * d_ae + d_we * drive.amount + at.w.dot(at.e) * d_amount);
+    }
+  }
+
+  // ζ.
+  Vector2<double> SlidingOf(const JointIndex& joint, const Slider& at) const {
+    return PlaneOf(before_, joint.a) + before_[3 * joint.a + 2] * Perp(at.r) -
+           PlaneOf(before_, joint.b);
+  }
+
+  // The rows by twists that they read: of accelerations, and of prescribed motion.
+  void SliderByTwists(int j, const Slider& at) {
+    const JointIndex& joint = s_.joints[j];
+    const Vector2<double> across = Perp(at.w);
+    const int bodies[2] = {joint.a, joint.b};
+    for (int k = 0; k < 2; ++k) {
+      const int body = bodies[k];
+      const double sign = k == 0 ? 1.0 : -1.0;
+      const Vector2<double>& arm = k == 0 ? at.r : at.e;
+      if (kLevel == Level::kVelocity && s_.bodies[body].motion == Motion::kKinematic) {
+        sink_(JointRow(j), s_.TwistVariable(body, 0), sign * at.w.x());
+        sink_(JointRow(j), s_.TwistVariable(body, 1), sign * at.w.y());
+        sink_(JointRow(j), s_.TwistVariable(body, 2), -sign * across.dot(arm));
+        sink_(JointRow(j) + 1, s_.TwistVariable(body, 2), sign);
+      }
+      if (kLevel == Level::kAcceleration && s_.bodies[body].motion != Motion::kStatic) {
+        const double omega_a = before_[3 * joint.a + 2];
+        const double omega_b = before_[3 * joint.b + 2];
+        sink_(JointRow(j), s_.TwistVariable(body, 0), 2.0 * sign * omega_b * across.x());
+        sink_(JointRow(j), s_.TwistVariable(body, 1), 2.0 * sign * omega_b * across.y());
+        sink_(JointRow(j), s_.TwistVariable(body, 2),
+              k == 0 ? 2.0 * (omega_b - omega_a) * at.w.dot(at.r)
+                     : 2.0 * (across.dot(SlidingOf(joint, at)) - omega_b * at.w.dot(at.e)));
+      }
+    }
+  }
+
+  bool HasDrive(const JointIndex& joint) const {
+    return kLevel != Level::kCorrection && joint.damping >= 0 && equations_.Weight() != 0.0;
+  }
+
+  Drive DriveOf(const JointIndex& joint, const Slider& at) {
+    Drive drive;
+    if (!HasDrive(joint)) return drive;
+    const double weight = equations_.Weight();
+    drive.speed = -Perp(at.w).dot(PlaneOf(damped_, joint.a) - PlaneOf(damped_, joint.b)) -
+                  damped_[3 * joint.a + 2] * at.w.dot(at.r) +
+                  damped_[3 * joint.b + 2] * at.w.dot(at.e);
+    drive.damping = weight * x_[joint.damping];
+    drive.amount = drive.damping * drive.speed - weight * EffortOf(joint, &drive.slope);
+    return drive;
+  }
+
+  // With its slope in time where accelerations read it.
+  double EffortOf(const JointIndex& joint, double* slope) {
+    if (joint.effort_signal < 0) return x_[joint.effort];
+    if constexpr (kLevel == Level::kVelocity) {
+      return MeanEffort(s_, joint, solved_.instant.t, solved_.instant.h);
+    }
+    const Signal& signal = s_.signals[joint.effort_signal];
+    const LocalJet effort =
+        SignalAt(signal, signal.value, LocalJet(solved_.instant.time, 0), at_.middle);
+    *slope = effort.v[0];
+    return effort.a;
+  }
+
+  // Effort and damping by their numbers, the time, and the twists that dampers act against.
+  void DriveSlider(const JointIndex& joint, const Slider& at, const Drive& drive) {
+    if (!HasDrive(joint)) return;
+    const double weight = equations_.Weight();
+    const Vector2<double> along = -Perp(at.w);
+    const RowPart<double> row_a = {along.x(), along.y(), -at.w.dot(at.r)};
+    const RowPart<double> row_b = {-along.x(), -along.y(), at.w.dot(at.e)};
+    const auto emit = [&](int variable, double value) {
+      EmitRowTimesVariable(joint.a, row_a, joint.b, row_b, variable, value);
+    };
+    emit(s_.ParameterVariable(joint.damping), weight * drive.speed);
+    if (joint.effort_signal < 0) {
+      emit(s_.ParameterVariable(joint.effort), -weight);
+    } else if (drive.slope != 0.0) {
+      emit(TimeVariable(s_), -weight * drive.slope);
+    }
+    for (int i = 0; i < 3; ++i) {
+      if (SpeedsReadTwist(joint.a)) emit(s_.TwistVariable(joint.a, i), drive.damping * row_a[i]);
+      if (SpeedsReadTwist(joint.b)) emit(s_.TwistVariable(joint.b, i), drive.damping * row_b[i]);
     }
   }
 

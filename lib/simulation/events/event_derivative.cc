@@ -24,8 +24,11 @@ void PlaceTangent(const ModelStructure& s, const Segment& segment, double c, con
                   const double* a_hat, int terms, const Row& tau_dot, const RowMatrixXd& x,
                   const RowMatrixXd* a_dot, RowMatrixXd* out) {
   const double tau = segment.length;
-  *out = x;
-  out->row(TimeVariable(s)) += c * tau_dot;
+  const int time = TimeVariable(s);
+  // The model's numbers are the same in all stages.
+  if (out->rows() != x.rows() || out->cols() != x.cols()) *out = x;
+  out->topRows(s.ParameterVariable(0)) = x.topRows(s.ParameterVariable(0));
+  out->row(time) = x.row(time) + c * tau_dot;
   for (int body = 0; body < s.num_bodies(); ++body) {
     if (s.bodies[body].motion == Motion::kStatic) {
       continue;
@@ -80,7 +83,8 @@ double EventDerivative::NodeTangent(const Model<double>& model, const Segment& s
                                     RowMatrixXd* solved, const Row* tau_dot) {
   const int columns = static_cast<int>(x.cols());
   solved->setZero(3 * static_cast<Eigen::Index>(node->system.num_blocks()), columns);
-  Visit(model, segment, *node, correction, TangentSink{x.data(), solved->data(), columns});
+  Visit(model, segment, *node, correction,
+        TangentSink{x.data(), solved->data(), columns, fixed_.empty() ? nullptr : fixed_.data()});
   // A contact in penetration moves by recovery_speed times the segment's length, in the first
   // correction.
   for (size_t i = 0; tau_dot != nullptr && i < segment.contacts.size(); ++i) {
@@ -208,6 +212,7 @@ EventDerivative::Rate EventDerivative::EventRate(const Model<double>& model, Seg
   if (!segment->IsEventLocated()) {
     return rate;
   }
+  fixed_.clear();
   RowMatrixXd by_length = RowMatrixXd::Zero(model.structure->num_variables() + 1, 1);
   SegmentTangent(model, segment, &by_length, Row::Ones(1));
   Eigen::VectorXd gradient;
@@ -221,6 +226,7 @@ RowMatrixXd EventDerivative::AlongSegment(const Model<double>& model, Segment* s
                                           const RowMatrixXd& directions) {
   RowMatrixXd x = RowMatrixXd::Zero(model.structure->num_variables() + 1, directions.cols());
   x.topRows(directions.rows()) = directions;
+  fixed_.clear();
   SegmentTangent(model, segment, &x, Row::Zero(directions.cols()));
   return x.topRows(directions.rows());
 }
@@ -233,6 +239,11 @@ double EventDerivative::Tangent(const Model<double>& model, EventRecord* record,
   // One more column holds the derivative with respect to the segment's length.
   RowMatrixXd x = RowMatrixXd::Zero(s.num_variables() + 1, columns + 1);
   x.topLeftCorner(s.num_variables(), columns) = *w_dot;
+  // Numbers of the model stay as they are through the step.
+  fixed_.assign(static_cast<size_t>(x.rows()), 0);
+  for (int variable = s.ParameterVariable(0); variable < s.num_variables(); ++variable) {
+    fixed_[variable] = (w_dot->row(variable).array() == 0.0).all() ? 1 : 0;
+  }
   Row tau_dot = Row::Zero(columns + 1);
   tau_dot(columns) = 1.0;
   double left = 0.0;

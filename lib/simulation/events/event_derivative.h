@@ -68,6 +68,7 @@ class EventDerivative {
   /// Lists the entries of a node that an iteration reads repeatedly; null clears the list.
   void List(const Model<double>& model, const Segment& segment, const SolvedNode* node);
 
+  std::vector<char> fixed_;  ///< 1: a variable that no column varies; empty: not known
   LocalJacobianScratch scratch_;
   const SolvedNode* listed_ = nullptr;
   std::vector<JacobianEntry> entries_;
