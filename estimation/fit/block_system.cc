@@ -3,7 +3,7 @@
 
 #include <utility>
 
-#include "tangible/estimation/fit/decomposition.h"
+#include "tangible/estimation/uncertainty/decomposition.h"
 
 namespace tangible {
 namespace {

@@ -24,7 +24,7 @@
 #include <string>
 #include <vector>
 
-#include "tangible/estimation/problem/evaluation_log.h"
+#include "tangible/estimation/fit/evaluation_log.h"
 #include "tangible/estimation/problem/least_squares.h"
 
 namespace tangible {

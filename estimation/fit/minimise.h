@@ -31,7 +31,7 @@
 #include <vector>
 
 #include "tangible/estimation/fit/fit.h"
-#include "tangible/estimation/problem/evaluation_log.h"
+#include "tangible/estimation/fit/evaluation_log.h"
 
 namespace tangible {
 

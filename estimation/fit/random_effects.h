@@ -37,7 +37,7 @@
 
 #include "tangible/estimation/fit/fit.h"
 #include "tangible/estimation/fit/linearisation.h"
-#include "tangible/estimation/fit/uncertainty.h"
+#include "tangible/estimation/uncertainty/uncertainty.h"
 #include "tangible/estimation/problem/recordings.h"
 
 namespace tangible {

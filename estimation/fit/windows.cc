@@ -9,7 +9,7 @@
 
 #include "tangible/estimation/fit/linearisation.h"
 #include "tangible/estimation/fit/minimise.h"
-#include "tangible/estimation/fit/residual_quality.h"
+#include "tangible/estimation/uncertainty/residual_quality.h"
 #include "tangible/estimation/problem/problem_with_priors.h"
 
 namespace tangible {

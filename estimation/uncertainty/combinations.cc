@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "tangible/estimation/fit/combinations.h"
+#include "tangible/estimation/uncertainty/combinations.h"
 
 #include <Eigen/LU>
 #include <algorithm>

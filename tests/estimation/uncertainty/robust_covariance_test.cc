@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "tangible/estimation/fit/robust_covariance.h"
+#include "tangible/estimation/uncertainty/robust_covariance.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <cmath>
 #include <random>
 
-#include "tangible/estimation/fit/decomposition.h"
+#include "tangible/estimation/uncertainty/decomposition.h"
 
 namespace tangible {
 namespace {

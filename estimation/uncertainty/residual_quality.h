@@ -7,7 +7,7 @@
 #include <cmath>
 #include <vector>
 
-#include "tangible/estimation/fit/whiteness.h"
+#include "tangible/estimation/uncertainty/whiteness.h"
 #include "tangible/estimation/problem/least_squares.h"
 
 namespace tangible {

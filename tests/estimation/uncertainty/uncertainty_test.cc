@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "tangible/estimation/fit/uncertainty.h"
+#include "tangible/estimation/uncertainty/uncertainty.h"
 
 #include <gtest/gtest.h>
 

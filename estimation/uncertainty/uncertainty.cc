@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "tangible/estimation/fit/uncertainty.h"
+#include "tangible/estimation/uncertainty/uncertainty.h"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <sstream>
 
-#include "tangible/estimation/fit/decomposition.h"
+#include "tangible/estimation/uncertainty/decomposition.h"
 
 namespace tangible {
 namespace {

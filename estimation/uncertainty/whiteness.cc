@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "tangible/estimation/fit/whiteness.h"
+#include "tangible/estimation/uncertainty/whiteness.h"
 
 #include <algorithm>
 #include <boost/math/distributions/chi_squared.hpp>

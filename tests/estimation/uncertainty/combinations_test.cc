@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "tangible/estimation/fit/combinations.h"
+#include "tangible/estimation/uncertainty/combinations.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <limits>
 
-#include "tangible/estimation/fit/decomposition.h"
+#include "tangible/estimation/uncertainty/decomposition.h"
 
 namespace tangible {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "tangible/estimation/problem/evaluation_log.h"
+#include "tangible/estimation/fit/evaluation_log.h"
 
 #include <cstring>
 #include <utility>

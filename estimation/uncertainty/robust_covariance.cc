@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "tangible/estimation/fit/robust_covariance.h"
+#include "tangible/estimation/uncertainty/robust_covariance.h"
 
 #include <Eigen/QR>
 #include <algorithm>
@@ -10,7 +10,7 @@
 #include <tuple>
 #include <utility>
 
-#include "tangible/estimation/fit/decomposition.h"
+#include "tangible/estimation/uncertainty/decomposition.h"
 
 namespace tangible {
 namespace {

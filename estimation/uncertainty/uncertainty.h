@@ -31,9 +31,9 @@
 #include <utility>
 #include <vector>
 
-#include "tangible/estimation/fit/combinations.h"
-#include "tangible/estimation/fit/residual_quality.h"
-#include "tangible/estimation/fit/robust_covariance.h"
+#include "tangible/estimation/uncertainty/combinations.h"
+#include "tangible/estimation/uncertainty/residual_quality.h"
+#include "tangible/estimation/uncertainty/robust_covariance.h"
 #include "tangible/estimation/problem/least_squares.h"
 #include "tangible/math/scalar.h"
 

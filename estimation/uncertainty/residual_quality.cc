@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "tangible/estimation/fit/residual_quality.h"
+#include "tangible/estimation/uncertainty/residual_quality.h"
 
 #include <limits>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "tangible/estimation/fit/held_parameters.h"
+#include "tangible/estimation/uncertainty/held_parameters.h"
 
 #include <gtest/gtest.h>
 
