@@ -7,11 +7,11 @@
 //
 // of the scene, of the observed points (`points/tip/at/x`) or of the instruments
 // (`sensors/encoder/delay`); no number is set by two. Further parameters may add to a number: it is
-// then the value set by the first one, or else the scene's own value, plus the sum of scale p +
-// offset of those that add (a pivot moves everything that hangs from it, a length everything below
-// it). From the numbers the model and the initial state are rebuilt with an unchanged structure.
-// The derivative of this map is taken at the current p, because initial joint angles and inertias
-// that follow their mass make it nonlinear.
+// then the value set by the first one, or else the scene's own value, plus the sum of
+// scale p + offset of those that add (a pivot moves everything that hangs from it, a length
+// everything below it). From the numbers the model and the initial state are rebuilt with an
+// unchanged structure. The derivative of this map is taken at the current p, because initial joint
+// angles and inertias that follow their mass make it nonlinear.
 
 #include <Eigen/Core>
 #include <memory>

@@ -27,8 +27,8 @@ constexpr char kDiscAndPlane[] = R"({"bodies": [
   {"name": "plane", "static": true, "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}}],
   "pairs": [{"bodies": ["ball", "plane"], "friction": 0, "restitution": 1}]})";
 
-// Time to close the distance c > 0 from speed u along the normal under acceleration a: c + u t + a
-// t²/2 = 0, its smaller root, written without cancellation.
+// Time to close the distance c > 0 from speed u along the normal under acceleration a:
+// c + u t + a t²/2 = 0, its smaller root, written without cancellation.
 Number TimeToReach(const Number& c, const Number& u, const Number& a) {
   return 2.0 * c / (-u + sqrt(u * u - 2.0 * a * c));
 }

@@ -94,8 +94,8 @@ Finding Needle(const std::string& stepping, double thickness) {
 Finding SmallBesideLarge(const std::string& stepping) {
   Scene scene = NewScene("discs", stepping, 0.01, 1.0);
   AddDisc(&scene, "large", 1e3, 1e9, 0.0, 1e3);
-  // The small disc touches neither the large one nor the inside of the floor: x exceeds 2 sqrt(R
-  // r).
+  // The small disc touches neither the large one nor the inside of the floor: x exceeds
+  // 2 sqrt(R r).
   AddDisc(&scene, "small", 1e-6, 1e-9, 0.1, 1e-6);
   AddFloor(&scene);
   SetMaterial(&scene, 0.5, 0.0);

@@ -73,8 +73,8 @@ Finding HangingChain(const std::string& stepping, double end_mass, Length length
   return finding;
 }
 
-// The same chain swings, straight, from an angle. Transverse waves of the links, of frequency w² =
-// 4 T / (m l), are resolved by event steps or, with fewer links, are not.
+// The same chain swings, straight, from an angle. Transverse waves of the links, of frequency
+// w² = 4 T / (m l), are resolved by event steps or, with fewer links, are not.
 enum class Waves { kResolved, kNot };
 Finding SwingingChain(const std::string& stepping, double end_mass, Waves waves, Length length) {
   const int links = waves == Waves::kResolved ? 20 : 10;

@@ -80,9 +80,9 @@ Finding ElasticBall(const std::string& stepping, Length length) {
   });
   Finding finding;
   AddDone(run, &finding);
-  // With fixed steps the ball rebounds up to v h above the floor; its energy alternates by m g h v
-  // / 2 within a bounce, so heights are compared. Peaks are sampled: within g h^2 / 8 of event
-  // steps.
+  // With fixed steps the ball rebounds up to v h above the floor; its energy alternates by
+  // m g h v / 2 within a bounce, so heights are compared. Peaks are sampled: within g h^2 / 8 of
+  // event steps.
   const bool fixed = stepping == "fixed";
   finding.figures.push_back({"rise of the highest peak over the first height",
                              std::max(0.0, peak - 1.0), fixed ? 1e-3 : 1e-9, "m",

@@ -85,7 +85,8 @@ class MethodRun {
       r_.jacobian[method].setConstant(rows, columns, kUnknown);
     }
     for (Eigen::Index k = 0; k < columns; ++k) {
-      // A parameter that the certificate has named need not have the same choices on both sides.
+      // Where the certificate has named a parameter, the differences of its two sides are not
+      // compared.
       DifferenceColumn column =
           FiniteDifferences(scene_, r_.trace, noise, parameters_[k],
                             r_.named[static_cast<size_t>(k)].empty() ? ChoicesDiffer::kCompareSides

@@ -324,8 +324,8 @@ class Differences {
 }  // namespace
 
 VectorX<double> RoundingNoise(const Scene& scene, const RunTrace& at) {
-  // For a body at rest most runs end with the same bits, and one in ten differs by an ε of a gap /
-  // h. Event steps take ten times longer.
+  // For a body at rest most runs end with the same bits, and one in ten differs by an ε of a
+  // gap / h. Event steps take ten times longer.
   const bool events = scene.simulation.stepping == Stepping::kEvent;
   const int samples = events ? 12 : 32;
   const double epsilon = std::numeric_limits<double>::epsilon();

@@ -8,7 +8,7 @@
 //    solved again, as long as fewer are contradicted from round to round. Where rows are redundant
 //    each solve is a proximal step from the last impulses, which change as little as the data
 //    require.
-// 2. 2. Pivoting from the guess (contact_pivoting.h) with a bounded number of pivots: it searches
+// 2. Pivoting from the guess (contact_pivoting.h) with a bounded number of pivots: it searches
 //    among the impulses of redundant rows where the guess is nearly right. It counts as part of the
 //    guess.
 // 3. Mehrotra's interior point (contact_interior_point.h), and pivoting from its modes where

@@ -4,8 +4,8 @@
 // Non-negative least squares: min ‖E x − f‖₂ over x with xⱼ ≥ 0 for j ≥ num_free.
 //
 // It decides whether a system of linear inequalities has a solution, and proves either answer. With
-// r = f − E x at the minimum, Eᵀ r = 0 on the free columns and ≤ 0 on the others: if r ≠ 0, rᵀ f =
-// ‖r‖² > 0 proves that E x = f has no such x (Farkas).
+// r = f − E x at the minimum, Eᵀ r = 0 on the free columns and ≤ 0 on the others: if r ≠ 0,
+// rᵀ f = ‖r‖² > 0 proves that E x = f has no such x (Farkas).
 //
 // C. L. Lawson, R. J. Hanson, Solving Least Squares Problems (1974), chapter 23.
 

@@ -4,8 +4,8 @@
 // How well a mode system (contact_system.h) is determined. This is for certificates, not for the
 // inner loop of a simulation.
 //
-// Everything is measured in units that make bodies and constraints comparable: K̃ = D K D with D =
-// M^(-1/2) on bodies and (r M⁻¹ rᵀ)^(-1/2) on a constraint's row r. Then M̃ has a diagonal of 1
+// Everything is measured in units that make bodies and constraints comparable: K̃ = D K D with
+// D = M^(-1/2) on bodies and (r M⁻¹ rᵀ)^(-1/2) on a constraint's row r. Then M̃ has a diagonal of 1
 // (plus dampers), and the rows of [A; C] have norm 1.
 
 #include "tangible/lcp/system/contact_system.h"
@@ -15,8 +15,8 @@ namespace tangible {
 /// Rank deficiency of the active rows (joints, normals of closed contacts, tangents of sticking
 /// ones): how many impulses are not determined. Joint trees, and other bodies that independent rows
 /// attach to a single body, are removed body by body. For each group of bodies that the remaining
-/// rows connect, a dense column-pivoted QR of the scaled rows gives the rank: O(rows · 3 bodies ·
-/// the smaller of both).
+/// rows connect, a dense column-pivoted QR of the scaled rows gives the rank:
+/// O(rows · 3 bodies · the smaller of both).
 int CountRedundantRows(const ContactProblem<double>& problem,
                        const std::vector<ContactMode>& modes);
 

@@ -68,10 +68,10 @@ double NormalScale(const ContactBlock<double>& contact, const ContactValues& val
 double NaturalResidual(const ContactProblem<double>& problem,
                        const ContactSolution<double>& solution, int* worst_contact);
 
-/// The same; but where equations exceed `tolerance`, v is recomputed from the impulses, M v = p + Σ
-/// rᵀ λ, if that leaves a smaller residual: in a system with far heavier bodies the rounding in the
-/// momentum of a light body belongs to the rows whose impulses are as large. Bodies with dampers
-/// are left out.
+/// The same; but where equations exceed `tolerance`, v is recomputed from the impulses,
+/// M v = p + Σ rᵀ λ, if that leaves a smaller residual: in a system with far heavier bodies the
+/// rounding in the momentum of a light body belongs to the rows whose impulses are as large. Bodies
+/// with dampers are left out.
 double BalancedResidual(const ContactProblem<double>& problem, double tolerance,
                         ContactSolution<double>* solution, int* worst_contact);
 

@@ -17,7 +17,7 @@
 //                  starts, where a direction opens or closes its gap: on one side the body falls
 //                  and lands, on the other it is pushed out
 //   controls       an event at the boundary of two steps whose controls differ: different forces
-//                  act before and after it, so that its derivative differs on the two sides
+//                  act before and after it, and its derivative differs on each side
 //   coordinates    so large that their rounding exceeds kLargeCoordinates of the size of a body
 //                  that has contacts or joints (coordinate_watch.h): its modes may be determined by
 //                  rounding

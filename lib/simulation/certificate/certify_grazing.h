@@ -23,8 +23,8 @@ struct Graze {
 /// A touch at the end of a segment with ġ1 < 0, after ġ0 at its start: margin (ġ1 / v)², because
 /// depth grows with the square of speed, v = max(|ġ0| + |ġ1|, |a| dt) with the relative
 /// acceleration a (only where the contact approaches from above, because the rebounds of a body
-/// that comes to rest are slow). A gap g* at which an approach turns around: margin g* / h, h =
-/// max(ġ0² / 2a, a dt² / 2) the height that it falls from, or falls in a step. Only those below
+/// that comes to rest are slow). A gap g* at which an approach turns around: margin g* / h,
+/// h = max(ġ0² / 2a, a dt² / 2) the height that it falls from, or falls in a step. Only those below
 /// `most` are listed.
 void FindGrazes(const Model<double>& model, const EventRecord& record, double most,
                 std::vector<Graze>* grazes);

@@ -6,8 +6,8 @@
 //
 // Each direction ẇ is carried through the steps separately: where a step's contacts are degenerate,
 // its v̇⁺ solves a small LCP (contact_directional.h), elsewhere it is that of the tangent.
-// Directional derivatives of piecewise smooth maps obey the chain rule, so that the result is lim
-// (x(w + τ ẇ) − x(w)) / τ for τ → 0 from above; it is positively homogeneous in ẇ, not linear.
+// Directional derivatives of piecewise smooth maps obey the chain rule, so that the result is
+// lim (x(w + τ ẇ) − x(w)) / τ for τ → 0 from above; it is positively homogeneous in ẇ, not linear.
 //
 // Where redundant contacts contradict a direction (one of three supports in a row is raised), the
 // shared impulses of the solution do not fit, and the direction determines which ones do: they are

@@ -36,7 +36,7 @@ class EventDerivative {
     double value = 0.0;     ///< ∇g · S_τ
     double terms = 0.0;     ///< the sum of the magnitudes of its terms
     double residual = 0.0;  ///< of the solve for ∇g: large where g itself is not determined,
-                            ///< ///< such as the share of a redundant contact in a force
+                            ///< such as the share of a redundant contact in a force
   };
   Rate EventRate(const Model<double>& model, Segment* segment);
 

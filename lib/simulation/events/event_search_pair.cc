@@ -129,7 +129,7 @@ class EventSearch::PairSearch {
   const Segment& segment_;
   const std::vector<ActiveContact>& touching_;
   const double touch_;    ///< gap below which the pair touches, m
-  const double located_;  ///< tolerance to which they are located, m
+  const double located_;  ///< tolerance of the location of the pair's gaps, m
   const bool closed_;     ///< the pair has closed contacts
   ActiveContact nearest_;
   Vector2<double> normal_{0.0, 0.0};

@@ -3,17 +3,10 @@
 //
 // The implicit stage of an integrator whose fixed-point iteration does not contract.
 //
-// The stage's accelerations A solve  A = N(Q, V),  Q = … + â τ² A,  V = … + a τ A. With B = â τ²
-//                                                                   ∂N/∂q + a τ ∂N/∂v the iteration
-//                                                                   A ← N contracts if the
-//                                                                   eigenvalues of B are below 1,
-//                                                                   that is, if dt resolves the
-//                                                                   fastest oscillation of joints
-//                                                                   and contacts under load
-//                                                                   (transverse waves of a taut
-//                                                                   chain: B ≈ T τ² / (m l)).
-//                                                                   Otherwise Newton's method
-//                                                                   converges:
+// The stage's accelerations A solve  A = N(Q, V),  Q = … + â τ² A,  V = … + a τ A. With
+// B = â τ² ∂N/∂q + a τ ∂N/∂v  the iteration A ← N contracts if the eigenvalues of B are below 1,
+// that is, if dt resolves the fastest oscillation of joints and contacts under load (transverse
+// waves of a taut chain: B ≈ T τ² / (m l)). Otherwise Newton's method converges:
 //
 //   A ← A + (I − B)⁻¹ (N − A)
 //

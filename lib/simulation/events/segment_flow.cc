@@ -68,8 +68,9 @@ void PlaceStageOf(const ModelStructure& structure, const NystromTableau& tableau
       state);
 }
 
-// The sizes, as accelerations, of the terms in each component of M a = p + Aᵀ y + Σ (nᵀ λn + tᵀ
-// λt): they cancel in a body at rest, whose acceleration is their rounding.
+// The sizes, as accelerations, of the terms in each component of
+// M a = p + Aᵀ y + Σ (nᵀ λn + tᵀ λt): they cancel in a body at rest, whose acceleration is their
+// rounding.
 void SizesOfTerms(const SolvedNode& node, std::vector<double>* sizes) {
   const ContactProblem<double>& p = node.problem;
   sizes->assign(p.load.size(), 0.0);

@@ -120,8 +120,8 @@ inline constexpr double kAlignedRadii = 8.0 * kAligned;
 /// depends on the time.
 inline constexpr double kNoRate = 1e-9;
 /// Of the largest pivot: smaller pivots belong to redundant rows, which elimination leaves at some
-/// thousand ε; division by them would turn rounding into derivatives, so that δ =
-/// `kContactRegularisation` is added.
+/// thousand ε; division by them would turn rounding into derivatives, so that
+/// δ = `kContactRegularisation` is added.
 inline constexpr double kSingularPivot = 1e-11;
 /// Of mean z s / κ: goal of the unrolled interior point, because derivatives lag behind values.
 inline constexpr double kUnrolledComplementarity = 1e-17;

@@ -4,8 +4,8 @@
 // The derivative of a rollout's final state, or of a loss that depends on it, with respect to
 // parameters of the scene, by any of five methods that must agree:
 //
-//   adjoint            one reverse sweep, a column for each output (rollout_adjoint.h)
-//   tangent            one forward sweep, a column for each parameter (rollout_tangent.h)
+//   adjoint            one reverse sweep, a column per output (rollout_adjoint.h)
+//   tangent            one forward sweep, a column per parameter (rollout_tangent.h)
 //   jet_implicit       Jets in passes of their width, through K⁻¹ of each step
 //   jet                Jets through every operation of the interior point:
 //                      the independent reference
