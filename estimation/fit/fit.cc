@@ -12,10 +12,10 @@
 #include "tangible/estimation/fit/fit_checkpoint.h"
 #include "tangible/estimation/fit/linearisation.h"
 #include "tangible/estimation/fit/minimise.h"
-#include "tangible/estimation/uncertainty/residual_quality.h"
 #include "tangible/estimation/fit/shooting.h"
 #include "tangible/estimation/fit/windows.h"
 #include "tangible/estimation/problem/problem_with_priors.h"
+#include "tangible/estimation/uncertainty/residual_quality.h"
 
 namespace tangible {
 namespace {

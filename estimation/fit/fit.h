@@ -21,11 +21,11 @@
 #include <string>
 #include <vector>
 
-#include "tangible/estimation/uncertainty/held_parameters.h"
-#include "tangible/estimation/uncertainty/uncertainty.h"
 #include "tangible/estimation/fit/evaluation_log.h"
 #include "tangible/estimation/problem/recordings.h"
 #include "tangible/estimation/problem/residual.h"
+#include "tangible/estimation/uncertainty/held_parameters.h"
+#include "tangible/estimation/uncertainty/uncertainty.h"
 #include "tangible/simulation/gradient/gradient.h"
 
 namespace tangible {

@@ -25,8 +25,8 @@
 #include <string>
 #include <vector>
 
-#include "tangible/estimation/fit/fit.h"
 #include "tangible/estimation/fit/evaluation_log.h"
+#include "tangible/estimation/fit/fit.h"
 
 namespace tangible {
 

@@ -30,8 +30,8 @@
 #include <functional>
 #include <vector>
 
-#include "tangible/estimation/fit/fit.h"
 #include "tangible/estimation/fit/evaluation_log.h"
+#include "tangible/estimation/fit/fit.h"
 
 namespace tangible {
 

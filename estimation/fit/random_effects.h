@@ -37,8 +37,8 @@
 
 #include "tangible/estimation/fit/fit.h"
 #include "tangible/estimation/fit/linearisation.h"
-#include "tangible/estimation/uncertainty/uncertainty.h"
 #include "tangible/estimation/problem/recordings.h"
+#include "tangible/estimation/uncertainty/uncertainty.h"
 
 namespace tangible {
 

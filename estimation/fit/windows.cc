@@ -9,8 +9,8 @@
 
 #include "tangible/estimation/fit/linearisation.h"
 #include "tangible/estimation/fit/minimise.h"
-#include "tangible/estimation/uncertainty/residual_quality.h"
 #include "tangible/estimation/problem/problem_with_priors.h"
+#include "tangible/estimation/uncertainty/residual_quality.h"
 
 namespace tangible {
 namespace {

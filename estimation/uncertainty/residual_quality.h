@@ -7,8 +7,8 @@
 #include <cmath>
 #include <vector>
 
-#include "tangible/estimation/uncertainty/whiteness.h"
 #include "tangible/estimation/problem/least_squares.h"
+#include "tangible/estimation/uncertainty/whiteness.h"
 
 namespace tangible {
 

@@ -31,10 +31,10 @@
 #include <utility>
 #include <vector>
 
+#include "tangible/estimation/problem/least_squares.h"
 #include "tangible/estimation/uncertainty/combinations.h"
 #include "tangible/estimation/uncertainty/residual_quality.h"
 #include "tangible/estimation/uncertainty/robust_covariance.h"
-#include "tangible/estimation/problem/least_squares.h"
 #include "tangible/math/scalar.h"
 
 namespace tangible {

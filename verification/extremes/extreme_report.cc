@@ -42,7 +42,7 @@ std::string Error(double error) {
 }
 
 std::string Bound(const Figure& figure) {
-  return figure.bound == kReported ? "told" : Format("%.3g", figure.bound);
+  return figure.bound == kReported ? "none" : Format("%.3g", figure.bound);
 }
 
 std::string ShortVerdict(const std::string& verdict) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// The portfolio for contact problems: guess by contact modes, then interior point, then Lemke.
+// The portfolio for contact problems: guess by contact modes, then pivoting, then interior point.
 //
 // 1. With modes given the problem is one linear system (contact_system.h). Its solution is exact
 //    where it satisfies every inequality. Modes that are contradicted are changed and the system is

@@ -34,7 +34,7 @@ inline constexpr double kReach = 1e-3;
 inline constexpr double kDifference = 1e-5;
 /// Of the speed of the pair over its size: jumps of the derivative count above it; it exceeds the
 /// remainders of rounding (1e-16 over kDifference) and, after extrapolation, of curvature
-/// (kDifference²) by two orders of magnitude.
+/// (kDifference²) by four orders of magnitude.
 inline constexpr double kJump = 1e-6;
 /// Of 1 / h: the same limit for rates.
 inline constexpr double kJumpOfRate = 1e-8;
