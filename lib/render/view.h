@@ -22,7 +22,7 @@ struct ViewBody {
   std::string name;
   Motion motion = Motion::kMoving;
   BasicShape<double> shape;
-  std::vector<Vector2<double>> contact_points;
+  std::vector<Vector2<double>> contact_points = {};  ///< body frame, m
 };
 
 /// A joint; an anchor is in the frame of its body, and in the world where the body is −1.

@@ -37,8 +37,9 @@ bool FitToRun(const Scene& scene) {
   if (scene.simulation.max_events_per_step > 1000 || scene.simulation.lcp_max_iterations > 1000) {
     return false;
   }
-  return std::all_of(scene.bodies.begin(), scene.bodies.end(),
-                     [](const auto& body) { return body.shape.numbers.size() <= kMostNumbers; });
+  return std::all_of(scene.bodies.begin(), scene.bodies.end(), [](const auto& body) {
+    return body.shape.numbers.size() + 2 * body.contact_points.size() <= kMostNumbers;
+  });
 }
 
 void RunFewSteps(Scene scene, Stepping stepping) {

@@ -176,6 +176,27 @@ TEST(ComputeAabb, HoldsTheShapeAndItsMargin) {
   }
 }
 
+TEST(ComputeAabb, EllipseIsHeldTightly) {
+  const TestShape ellipse = Ellipse(0.5, 0.2);
+  const Pose<double> pose = At(1.0, -2.0, 0.7);
+  const Aabb box = ComputeAabb(ellipse.View(), pose, 0.1);
+  double reach[4] = {};
+  for (int k = 0; k < 10000; ++k) {
+    const double anomaly = 6.283185307179586e-4 * k;
+    const Vector2<double> p =
+        pose.rotation * Vector2<double>(0.5 * std::cos(anomaly), 0.2 * std::sin(anomaly));
+    const double along[4] = {-p.x(), -p.y(), p.x(), p.y()};
+    for (int i = 0; i < 4; ++i) {
+      reach[i] = std::max(reach[i], along[i]);
+    }
+  }
+  // The nearest of 10000 points is off by (3e-4)² / 2 of its size.
+  EXPECT_NEAR(box.min_x, 1.0 - reach[0] - 0.1, 1e-7);
+  EXPECT_NEAR(box.min_y, -2.0 - reach[1] - 0.1, 1e-7);
+  EXPECT_NEAR(box.max_x, 1.0 + reach[2] + 0.1, 1e-7);
+  EXPECT_NEAR(box.max_y, -2.0 + reach[3] + 0.1, 1e-7);
+}
+
 TEST(ComputeAabb, HalfPlaneIsBoundedAlongAnAxisAlone) {
   const Aabb floor = ComputeAabb(HalfPlane(0, 2, 1).View(), At(5, 3), 0.25);
   EXPECT_EQ(floor.max_y, 3.75);

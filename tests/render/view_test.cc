@@ -106,6 +106,17 @@ TEST(ViewHtml, DataIsWhatWasGiven) {
   EXPECT_EQ(data["contacts"][3][0], nlohmann::json::array({1, 0, 0, 0, 0, 1, 5, 0, 1}));
 }
 
+TEST(ViewHtml, EllipsesAndContactPointsAreGiven) {
+  ViewData view = MakeView(2, -1);
+  view.bodies[1].shape = {ShapeType::kEllipse, {0.5, 0.25}};
+  view.bodies[1].contact_points = {{0.0, -0.5}, {0.25, 0.5}};
+  const nlohmann::json bodies = DataOf(ViewHtml(view))["bodies"];
+  EXPECT_EQ(bodies[1]["shape"], "ellipse");
+  EXPECT_EQ(bodies[1]["numbers"], nlohmann::json({0.5, 0.25}));
+  EXPECT_EQ(bodies[1]["points"], nlohmann::json::parse("[[0, -0.5], [0.25, 0.5]]"));
+  EXPECT_FALSE(bodies[0].contains("points"));
+}
+
 TEST(ViewHtml, WhatStandsBelowIsReachedByScrolling) {
   EXPECT_NE(ViewHtml(MakeView(2, -1)).find("<body class=\"view\">"), std::string::npos);
   ViewOptions options;

@@ -69,7 +69,8 @@ TEST(BadSceneTest, Bodies) {
       {"/bodies/0", "[]", "/bodies/0: expected an object, got an array of 0"},
       {"/bodies/3/masss", "1",
        "/bodies/3/masss: unknown key of a body, expected one of name, static, kinematic, shape, "
-       "mass, inertia, position, angle, velocity, angular_velocity, friction, restitution, "
+       "contact_points, mass, inertia, position, angle, velocity, angular_velocity, friction, "
+       "restitution, "
        "linear_damping, angular_damping, quadratic_drag, got \"masss\""},
       {"/bodies/0/mass", "-1", "/bodies/0/mass: expected a number > 0, got -1"},
       {"/bodies/0/mass", "0", "/bodies/0/mass: expected a number > 0, got 0"},
@@ -164,7 +165,7 @@ TEST(BadSceneTest, Shapes) {
        shape + "/ellipse/radii: expected an array of 2 numbers > 0, the semi-axes along x and y, "
                "got 1"},
       {shape, R"({"ellipse": {"radii": [1, 1e-10]}})",
-       shape + "/ellipse/radii: expected two radii of a ratio of at most 1e9, got 1 and 1e-10"},
+       shape + "/ellipse/radii: expected two radii of a ratio of at most 1e9, got 1.0 and 1e-10"},
       {shape, R"({"ellipse": {"radius": 1}})",
        shape + "/ellipse/radius: unknown key of an ellipse, expected one of radii, got \"radius\""},
       {"/bodies/0/contact_points", "3",

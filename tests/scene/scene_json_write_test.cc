@@ -68,6 +68,29 @@ TEST(SceneToJsonTest, RoundTripBitForBit) {
   EXPECT_EQ(SceneToJson(back), SceneToJson(scene));
 }
 
+TEST(SceneToJsonTest, EllipsesAndContactPointsReadBack) {
+  const std::string text =
+      R"({"bodies": [{"name": "foot", "shape": {"ellipse": {"radii": [0.1, 0.3]}},
+      "contact_points": [[0.1, -0.2], [0.3, 5e-324]], "mass": 1, "position": [0, 0]}]})";
+  Scene scene = Parsed(text);
+  Scene back = Parsed(SceneToJson(scene));
+  ASSERT_EQ(back.bodies[0].contact_points.size(), 2U);
+  EXPECT_EQ(back.bodies[0].contact_points[1], Vector2<double>(0.3, 5e-324));
+  EXPECT_EQ(Bits(&scene), Bits(&back));
+  EXPECT_EQ(SceneToJson(back), SceneToJson(scene));
+  std::vector<std::string> paths;
+  for (const auto& number : EnumerateNumbers(&scene)) {
+    paths.push_back(number.path);
+  }
+  const std::vector<std::string> last(paths.end() - 6, paths.end());
+  EXPECT_EQ(last, (std::vector<std::string>{
+                      "bodies/foot/shape/radii/x", "bodies/foot/shape/radii/y",
+                      "bodies/foot/contact_points/0/x", "bodies/foot/contact_points/0/y",
+                      "bodies/foot/contact_points/1/x", "bodies/foot/contact_points/1/y"}));
+  // A copy in another scalar keeps the points.
+  EXPECT_EQ(CastScene<double>(scene).bodies[0].contact_points[0], Vector2<double>(0.1, -0.2));
+}
+
 // Every combination, of what is set and what follows the stepping, reads back as it was.
 TEST(SceneToJsonTest, IntegratorAndCorrectionOfJointsReadBackTheSame) {
   Scene scene = Parsed(kFullScene);

@@ -46,6 +46,48 @@ TEST_F(LengthsTest, Sizes) {
   EXPECT_EQ(lengths.Size(3, 4), 0.0);
 }
 
+// A rod with a point 0.5 m from its centre, and a disc with one beyond its rim.
+TEST(LengthsOfContactPointsTest, CountTheirPoints) {
+  Model<double> model;
+  State<double> state;
+  BuildModel(test_scenes::SceneOf(R"({"bodies": [
+      {"name": "rod", "contact_points": [[0.3, -0.4], [0.1, 0]], "mass": 3, "inertia": 0.25,
+       "position": [0, 0]},
+      {"name": "disc", "shape": {"circle": {"radius": 0.1}}, "contact_points": [[0, 0.2]],
+       "mass": 1, "position": [1, 0]}]})"),
+             &model, &state);
+  EXPECT_DOUBLE_EQ(RadiusOf(model, 0), 0.5);
+  EXPECT_DOUBLE_EQ(RadiusOf(model, 1), 0.2);
+  EXPECT_EQ(RadiusOf(model, 2), 0.0);
+  EXPECT_DOUBLE_EQ(Lengths(model).size(0), 0.5);
+  EXPECT_DOUBLE_EQ(Lengths(model).smallest_radius(), 0.2);
+  const Aabb rod = BoxOf(model, 0, state.PoseOf(0), 0.01);
+  EXPECT_DOUBLE_EQ(rod.min_x, 0.09);
+  EXPECT_DOUBLE_EQ(rod.min_y, -0.41);
+  EXPECT_DOUBLE_EQ(rod.max_x, 0.31);
+  EXPECT_DOUBLE_EQ(rod.max_y, 0.01);
+  const Aabb disc = BoxOf(model, 1, state.PoseOf(1), 0.0);
+  EXPECT_DOUBLE_EQ(disc.max_y, 0.2);
+  EXPECT_DOUBLE_EQ(disc.min_y, -0.1);
+  const Aabb none = BoxOf(model, 2, state.PoseOf(2), 0.0);
+  EXPECT_GT(none.min_x, none.max_x);
+}
+
+// A point meets shapes alone: two bodies that have nothing but points are not looked at.
+TEST(LengthsOfContactPointsTest, MayCollideWithShapes) {
+  Model<double> model;
+  State<double> state;
+  BuildModel(test_scenes::SceneOf(R"({"bodies": [
+      {"name": "p", "contact_points": [[0, 0]], "mass": 3, "inertia": 1, "position": [0, 0]},
+      {"name": "q", "contact_points": [[0, 0]], "mass": 3, "inertia": 1, "position": [0, 0]},
+      {"name": "n", "mass": 3, "inertia": 1, "position": [0, 0]},
+      {"name": "disc", "shape": {"circle": {"radius": 0.1}}, "mass": 1, "position": [1, 0]}]})"),
+             &model, &state);
+  EXPECT_FALSE(model.structure->MayCollide(0, 1));
+  EXPECT_FALSE(model.structure->MayCollide(2, 3));
+  EXPECT_TRUE(model.structure->MayCollide(0, 3));
+}
+
 TEST_F(LengthsTest, CoordinatesArePlacesAndTurns) {
   const Lengths lengths(model_);
   EXPECT_EQ(lengths.Coordinate(state_, 0, 3), 7.0);

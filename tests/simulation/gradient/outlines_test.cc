@@ -246,7 +246,7 @@ TEST(EllipseTest, MeetsOtherShapes) {
        "angular_velocity": 1, "friction": 0.3, "restitution": 0.2},
       {"name": "block", "static": true, "shape": {"box": {"size": [1, 0.2]}}, "friction": 0.3,
        "position": [-0.2, -0.05], "angle": -0.1}], )" +
-                                  Simulation(stepping, 0.005, 0.35));
+                                  Simulation(stepping, 0.01, 0.3));
       SCOPED_TRACE(std::string(stepping) + other);
       ExpectAllAgree(scene, {"bodies/b/shape/radii/x", "bodies/b/angle", "bodies/c/position/x"});
     }

@@ -34,5 +34,21 @@ TEST(RandomLoadsTest, EveryKindTakesItsTurnOffTheStepsEdges) {
   EXPECT_GE(weightless, 2);
 }
 
+// Every fourth scene has them; the others are what they were before.
+TEST(RandomLoadsTest, EllipsesAndContactPoints) {
+  int ellipses = 0;
+  int points = 0;
+  for (unsigned seed = 0; seed < 100; ++seed) {
+    for (const BasicBody<double>& body : RandomScene(seed).bodies) {
+      const bool is_ellipse = body.shape.type == ShapeType::kEllipse;
+      ellipses += is_ellipse ? 1 : 0;
+      points += static_cast<int>(body.contact_points.size());
+      EXPECT_TRUE(seed % 4 == 1 || (!is_ellipse && body.contact_points.empty())) << seed;
+    }
+  }
+  EXPECT_GE(ellipses, 10);
+  EXPECT_GE(points, 10);
+}
+
 }  // namespace
 }  // namespace tangible
