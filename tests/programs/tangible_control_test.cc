@@ -88,6 +88,11 @@ TEST_F(TangibleControlTest, RecedingHorizonsBringAHeavierPlantToTheMark) {
   EXPECT_EQ(result["plans_failed"], 0);
   EXPECT_NEAR(result["final_state"]["cart/x"].get<double>(), 1.0, 0.02);
   EXPECT_GT(result["cpu_seconds_max"].get<double>(), 0.0);
+  // The best plan of a budget of time is played too.
+  const ProgramRun timed =
+      Control(problem, "--mpc --budget_ms=2 --plant='" + Path("heavy.json") + "'");
+  ASSERT_EQ(timed.exit_status, 0) << timed.error;
+  EXPECT_NEAR(json::parse(timed.out)["final_state"]["cart/x"].get<double>(), 1.0, 0.05);
 }
 
 // A surrogate is named as such, and the plan ends with exact Jacobians: of a linear system in one

@@ -21,6 +21,13 @@ Eigen::VectorXd InputOf(const VectorX<double>& x, double u) {
   return input;
 }
 
+// What speeds that stay the same make of a state.
+VectorX<double> Coasting(const VectorX<double>& x) {
+  VectorX<double> next = x;
+  next.head(2) += kCartPoleStep * x.tail(2);
+  return next;
+}
+
 Eigen::VectorXd DeviationOf(const Eigen::MatrixXd& columns, const Eigen::VectorXd& mean) {
   const Eigen::VectorXd variance =
       (columns.colwise() - mean).rowwise().squaredNorm() / static_cast<double>(columns.cols());
@@ -90,7 +97,7 @@ LearnedStep::LearnedStep(const CartPoleRecording& recording, const LearnedStepOp
   for (Eigen::Index i = 0; i < samples; ++i) {
     const int k = usable[i];
     inputs.col(i) = InputOf(states.row(k).transpose(), recording.forces[k]);
-    targets.col(i) = states.row(k + 1) - states.row(k);
+    targets.col(i) = states.row(k + 1).transpose() - Coasting(states.row(k));
   }
   mean_ = inputs.rowwise().mean();
   scale_ = DeviationOf(inputs, mean_);
@@ -119,7 +126,7 @@ bool LearnedStep::Step(long k, const VectorX<double>& x, const VectorX<double>& 
   Eigen::VectorXd change = Eigen::VectorXd::Zero(4);
   for (const Perceptron& member : members_) change += member.Evaluate(input).col(0);
   change /= static_cast<double>(members_.size());
-  *next = x + target_mean_ + target_scale_.cwiseProduct(change);
+  *next = Coasting(x) + target_mean_ + target_scale_.cwiseProduct(change);
   if (next->allFinite()) return true;
   *error = "step " + std::to_string(k) + ": the prediction is not finite";
   return false;
@@ -136,9 +143,10 @@ bool LearnedStep::Linearise(long k, const VectorX<double>& x, const VectorX<doub
     sum += one;
   }
   const double share = 1.0 / static_cast<double>(members_.size());
-  *next = x + target_mean_ + share * target_scale_.cwiseProduct(change);
+  *next = Coasting(x) + target_mean_ + share * target_scale_.cwiseProduct(change);
   sum = share * target_scale_.asDiagonal() * sum * scale_.cwiseInverse().asDiagonal();
   a->setIdentity(4, 4);
+  (*a)(0, 2) = (*a)(1, 3) = kCartPoleStep;
   a->col(1) += sum.col(0) * std::cos(x[1]) - sum.col(1) * std::sin(x[1]);
   a->col(2) += sum.col(2);
   a->col(3) += sum.col(3);

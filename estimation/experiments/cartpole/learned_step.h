@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// A model of cart and pole that knows nothing of mechanics: perceptrons map (sin φ, cos φ, v, ω, u)
-// to the change of (x, φ, v, ω) over a step, each number scaled by its standard deviation in the
+// A model of cart and pole that knows of mechanics only that speeds move positions: perceptrons map
+// (sin φ, cos φ, v, ω, u) to the change of (x, φ, v, ω) over a step beyond that of positions at
+// constant speeds, each number scaled by its standard deviation in the
 // recording. Speeds, which nobody measures, are the slopes of quadratic polynomials that are fitted
 // to the positions around each sample (Savitzky, Golay 1964). An ensemble's prediction is the mean
 // of its members', which are trained on bootstrap samples.

@@ -421,6 +421,9 @@ class EntryBuilder : private internal::LocalEntries<Sink> {
 
   // Entries by one variable, along which r, e, w, o change as given.
   void EmitSlider(int j, const Slider& at, const Drive& drive, const Slider& d, int variable) {
+    if constexpr (std::is_same_v<Sink, TangentSink>) {
+      if (sink_.fixed != nullptr && sink_.fixed[variable] != 0) return;
+    }
     const JointIndex& joint = s_.joints[j];
     const double y = solved_.solution->joint_impulse[3 * static_cast<size_t>(j)];
     const Vector2<double> across = Perp(at.w);
