@@ -17,9 +17,9 @@
 // h is what would be observed, through whatever instruments and relative to whatever body; observed
 // velocities have the first sum alone. σ_a and σ_b are the parabola's, larger where it explains the
 // samples badly. Joints and contacts are rows of growing weight, at last 1e5 times that of the
-// observations: a joint is then open by less than 1e-8 of a σ. The unknowns are poses and twists, or
-// parameters that set them: joint angles and rates then too. What nothing determines stays as it
-// was.
+// observations: a joint is then open by less than 1e-8 of a σ. The unknowns are poses and twists,
+// or parameters that set them: joint angles and rates then too. What nothing determines stays as
+// it was.
 
 #include <Eigen/Core>
 #include <vector>

@@ -7,8 +7,8 @@
 //
 // At given τ the fit finds all θ_b, drawn towards μ, and μ (problem_with_priors.h). Minimising the
 // cost over τ too would end at τ = 0 with all θ_b equal. Instead τ is the mode of the restricted
-// likelihood, the density of the observations with all parameters p = (μ, θ, others) integrated out,
-// in the problem linearised at the estimate (Laplace's approximation):
+// likelihood, the density of the observations with all parameters p = (μ, θ, others) integrated
+// out, in the problem linearised at the estimate (Laplace's approximation):
 //
 //   ℓ(τ) = −Σ_e n_e ln τ_e − ½ ln det (Jᵀ J) − cost_min(τ)                                (1)
 //
@@ -22,8 +22,8 @@
 //
 //   Q(τ_e) = 2 (cost_min(τ_e) − cost_min(∞))  ~  χ² with n_e − 1 degrees of freedom         (2)
 //
-// which is exact for a linear model and noise of the size sigma (n_e where μ has a prior). Its lower
-// end is 0 where the recordings do not differ more than their noise explains.
+// which is exact for a linear model and noise of the size sigma (n_e where μ has a prior). Its
+// lower end is 0 where the recordings do not differ more than their noise explains.
 //
 // References: H. D. Patterson and R. Thompson, Biometrika 58 (1971) 545 (restricted likelihood);
 // N. Laird and J. Ware, Biometrics 38 (1982) 963; J. Pinheiro and D. Bates, Mixed-Effects Models in

@@ -10,7 +10,8 @@
 //   f_s² ← f_s² Σ_{i in s} r_i² / ρ_s,   ρ_s = n_s − tr(C J_sᵀ J_s)                      (1)
 //
 // with C the covariance and J_s the rows of s, in all recordings. Fits and (1) alternate until no
-// factor changes by more than 1e-3 of its deviation, f_s / sqrt(2 ρ_s) (variance_components.h). For one sensor this is the division by N − P;
+// factor changes by more than 1e-3 of its deviation, f_s / sqrt(2 ρ_s) (variance_components.h).
+// For one sensor this is the division by N − P;
 // for several it is what restricted maximum likelihood converges to. With Huber's loss the sum is
 // n_s (1.4826 median |r_i|)², which outliers do not move.
 //

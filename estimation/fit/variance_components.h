@@ -25,9 +25,9 @@ struct VarianceComponents {
 using NextLog = std::function<FitLog*()>;
 
 /// The fit of recordings with the components that ask to be estimated; one fit where none does. The
-/// observations and effects of `problem` have what was found when it ends. Costs are in multiples of
-/// the sigma of the time, and iterations those of all fits. Where a fit does not converge, or the
-/// components do not settle (20 fits), the status says so.
+/// observations and effects of `problem` have what was found when it ends. Costs are in multiples
+/// of the sigma of the time, and iterations those of all fits. Where a fit does not converge, or
+/// the components do not settle (20 fits), the status says so.
 FitResult FitWithComponents(const FitOptions& options, RecordingsProblem* problem,
                             const FitProgress& progress, VarianceComponents* components,
                             const NextLog& next_log = {});

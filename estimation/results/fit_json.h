@@ -33,8 +33,8 @@ bool LoadFit(const std::string& file, FitFile* fit, std::string* error);
 /// The same from text.
 bool ParseFit(const std::string& text, const std::string& file, FitFile* fit, std::string* error);
 
-/// The residuals of a file; null on failure, with one line that has the JSON pointer of what is wrong
-/// with a parameter.
+/// The residuals of a file; null on failure, with one line that has the JSON pointer of what is
+/// wrong with a parameter.
 std::unique_ptr<RecordingsProblem> MakeProblem(const FitFile& fit, std::string* error);
 
 /// What was found beside the estimates; each may be null.

@@ -375,6 +375,7 @@ std::string SpreadTable(const VarianceComponents* components) {
     return "";
   }
   std::vector<std::vector<std::string>> rows;
+  rows.reserve(components->spreads.size());
   for (const SpreadEstimate& spread : components->spreads) {
     rows.push_back({spread.name, spread.kind == PriorKind::kGaussian ? "gaussian" : "log_normal",
                     CompactNumber(spread.spread, 5),
@@ -392,6 +393,7 @@ std::string NoiseTable(const VarianceComponents* components) {
     return "";
   }
   std::vector<std::vector<std::string>> rows;
+  rows.reserve(components->noise.size());
   for (const SensorNoise& noise : components->noise) {
     rows.push_back({noise.name, CompactNumber(noise.factor, 5), CompactNumber(noise.deviation, 2),
                     std::to_string(noise.count)});
@@ -408,6 +410,7 @@ std::string RecordingTable(const RecordingsProblem& problem, const FitResult& re
   }
   std::vector<std::vector<std::string>> rows;
   const size_t all = problem.recordings().size();
+  rows.reserve(std::min(all, kMostRows));
   for (int b = 0; b < static_cast<int>(std::min(all, kMostRows)); ++b) {
     rows.push_back({problem.recordings()[b].name, std::to_string(problem.num_rows(b)),
                     CompactNumber(problem.weight(b)),

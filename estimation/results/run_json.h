@@ -17,8 +17,8 @@ struct RecordingPart {
   double end = std::numeric_limits<double>::infinity();
 };
 
-/// One run from JSON, with its scene and that part of its observations. `name` begins messages, each
-/// "name: /json/pointer: what, expected, got"; files are looked for in `folder`.
+/// One run from JSON, with its scene and that part of its observations. `name` begins messages,
+/// each "name: /json/pointer: what, expected, got"; files are looked for in `folder`.
 bool ReadRun(const Json& json, const std::string& name, const std::string& folder,
              const RecordingPart& part, FitProblem* problem, std::string* error);
 

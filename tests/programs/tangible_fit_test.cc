@@ -163,8 +163,8 @@ TEST_F(TangibleFitTest, MistakesInRecordingsNameThem) {
   ExpectOneLine(Fit(fit), 1, "/observations: expected in each recording");
 }
 
-// One recording without own parameters is the same fit as the run alone, with everything that can be
-// asked for, to the last digit.
+// One recording without own parameters is the same fit as the run alone, with everything that can
+// be asked for, to the last digit.
 TEST_F(TangibleFitTest, ARunIsTheCaseOfOneRecording) {
   const json alone = Problem({{"segments", 2}, {"starts", 2}});
   json recorded = alone;
