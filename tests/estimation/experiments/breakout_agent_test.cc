@@ -165,6 +165,31 @@ TEST(BreakoutPaddle, FindsTheNumbersOfALawfulPaddle) {
   EXPECT_FALSE(PaddleModel(8.0, 136.0).Fit());
 }
 
+TEST(BreakoutPaddle, LearnsWhatTheLawLeavesAndHowSureItIs) {
+  PaddleModel model(8.0, 136.0);
+  PaddleState state;
+  state.x = 70.0;
+  const double unknown = model.Variance(state, 1);
+  // To the right and to the left alike: 11 and 13 pixels in turn.
+  for (int i = 0; i < 12; ++i) {
+    state.last = state.before = 0;
+    state.v = 0.0;
+    state.x = 70.0;
+    state = model.Learn(state, i % 2 == 0 ? 1 : -1,
+                        70.0 + (i % 2 == 0 ? 1 : -1) * (i % 4 < 2 ? 11 : 13));
+  }
+  state = PaddleState();
+  state.x = 70.0;
+  EXPECT_NEAR(model.After(state, 1).x, 82.0, 0.5);
+  EXPECT_NEAR(model.After(state, -1).x, 58.0, 0.5);
+  EXPECT_LT(model.Variance(state, 1), 2.0);
+  EXPECT_GT(model.Variance(state, 1), 0.5);
+  EXPECT_GT(unknown, 10.0);
+  // From a wall it is another situation.
+  state.x = 8.0;
+  EXPECT_EQ(model.Variance(state, 1), unknown);
+}
+
 TEST(BreakoutPaddle, TheStepHasExactJacobians) {
   const PaddleModel model = Lawful();
   PaddleStep step(model);
@@ -244,9 +269,9 @@ TEST(BreakoutAim, FindsTheOnlyBrick) {
   FlightModel flights(ArenaOf(), &responses);
   const std::vector<AimOption> options = AimOptions(responses, {2.0, 3.0}, 16.0);
   ASSERT_EQ(options.size(), 2U);
-  EXPECT_EQ(options[0].low, 1.0);
+  EXPECT_EQ(options[0].low, 0.0);
   EXPECT_EQ(options[0].high, 7.0);
-  EXPECT_EQ(options[1].high, 13.0);
+  EXPECT_EQ(options[1].high, 14.0);
   std::mt19937_64 random = Generator(1, 0);
   AimProblem problem;
   problem.arrival.v = {2.0, 3.0};
@@ -263,7 +288,15 @@ TEST(BreakoutAim, FindsTheOnlyBrick) {
     const Aim aim = ChooseAim(problem, responses, &flights, &random, false);
     EXPECT_FALSE(aim.random);
     EXPECT_EQ(aim.option.after.x() > 0.0, right);
+    // Within the interval and off its ends.
+    EXPECT_GE(aim.offset, aim.option.low + 1.0);
+    EXPECT_LE(aim.offset, aim.option.high - 1.0);
   }
+  // The less is known of where the paddle will be, the nearer to its middle.
+  problem.uncertainty = 6.0;
+  const Aim unsure = ChooseAim(problem, responses, &flights, &random, false);
+  EXPECT_NEAR(unsure.offset, 7.0, 1.5);
+  problem.uncertainty = 0.0;
   // A brick that takes several returns is found too; without bricks there is nothing to find.
   problem.bricks.reset();
   problem.bricks.set(18 + 9);

@@ -114,6 +114,7 @@ void Agent::Predict(const Sight& sight) {
   problem.width = paddle_width_;
   problem.paddle_x = paddle_.x;
   problem.speed = kReachSpeed;
+  problem.uncertainty = knowledge_.paddle->Uncertainty();
   aim_ = ChooseAim(problem, knowledge_.responses, flights_.get(), &random_,
                    useless_returns_ > kMostUseless);
   if (aim_->random) ++num_random_aims_;
@@ -130,7 +131,7 @@ int Agent::Choose(const Sight& sight) {
   PaddleGoal goal;
   goal.frames = left_;
   if (aim_) {
-    goal.x = x - aim_->option.middle();
+    goal.x = x - aim_->offset;
     goal.low = x - aim_->option.high;
     goal.high = x - aim_->option.low;
   } else {

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <set>
 #include <tuple>
 
@@ -11,12 +12,12 @@
 namespace tangible {
 namespace {
 
-constexpr int kMostFlights = 160;       // followed for one aim
-constexpr double kMostFrames = 1000.0;  // of a flight
-constexpr double kDiscount = 0.997;     // a frame
-constexpr double kEdge = 1.0;    // pixels at the paddle's ends that are no option if others are
-constexpr double kNarrow = 3.0;  // pixels: narrower options are missed at times
-constexpr double kMissed = 0.7;  // share of their value that these have
+constexpr int kMostFlights = 160;        // followed for one aim
+constexpr double kMostFrames = 1000.0;   // of a flight
+constexpr double kDiscount = 0.997;      // a frame
+constexpr double kLeastDeviation = 0.7;  // pixels: of where the ball meets a paddle in whole ones
+constexpr double kLife = 30.0;           // points that a life is worth
+constexpr double kAnyReturn = 1.0;       // points that a return is worth which breaks nothing soon
 
 struct Node {
   BallState ball;  // arriving
@@ -72,9 +73,8 @@ class Search {
         if (one.brick >= 0) first = std::min(first, one.frames);
       }
       found_ = true;
-      const double sure = option.high - option.low < kNarrow ? kMissed : 1.0;
       values_[node.first] =
-          std::max(values_[node.first], sure * points * std::pow(kDiscount, node.frames + first));
+          std::max(values_[node.first], points * std::pow(kDiscount, node.frames + first));
     } else if (flight.arrives) {
       const auto place = std::make_tuple(std::lround(flight.end.at.x()), flight.end.v.x() > 0.0,
                                          std::lround(2.0 * flight.end.v.y()));
@@ -106,35 +106,58 @@ std::vector<AimOption> AimOptions(const Responses& responses, const Vector2<doub
     }
     options.back().high = offset;
   }
-  for (AimOption& option : options) {
-    if (option.high >= kEdge) option.low = std::max(option.low, kEdge);
-    if (option.low <= width - kBallAcross - kEdge) {
-      option.high = std::min(option.high, width - kBallAcross - kEdge);
-    }
-  }
   return options;
 }
 
+namespace {
+
+// The chance that a normal number of that mean and deviation is below x.
+double Below(double x, double mean, double deviation) {
+  return 0.5 * std::erfc((mean - x) / (deviation * std::numbers::sqrt2));
+}
+
+// What meeting the ball at an offset is likely to be worth.
+double Worth(const std::vector<AimOption>& options, const std::vector<double>& values,
+             double offset, double deviation) {
+  // The ball is in whole pixels, and options end between them.
+  double worth = -kLife;
+  for (size_t i = 0; i < options.size(); ++i) {
+    const double chance = Below(options[i].high + 0.5, offset, deviation) -
+                          Below(options[i].low - 0.5, offset, deviation);
+    worth += chance * (kLife + kAnyReturn + values[i]);
+  }
+  return worth;
+}
+
+}  // namespace
+
 Aim ChooseAim(const AimProblem& problem, const Responses& responses, FlightModel* flights,
               std::mt19937_64* random, bool break_loop) {
-  std::vector<AimOption> options = AimOptions(responses, problem.arrival.v, problem.width);
-  const double reach = problem.speed * problem.frames;
-  const auto out_of_reach = [&](const AimOption& option) {
-    return std::abs(problem.arrival.at.x() - option.middle() - problem.paddle_x) > reach;
-  };
-  std::vector<AimOption> near = options;
-  near.erase(std::remove_if(near.begin(), near.end(), out_of_reach), near.end());
-  if (!near.empty()) options = std::move(near);
-  Aim aim;
+  const std::vector<AimOption> options = AimOptions(responses, problem.arrival.v, problem.width);
   const Search search(problem, responses, flights, options);
+  Aim aim;
   aim.flights = search.num_flights();
   aim.random = break_loop || !search.found();
-  const size_t best =
-      aim.random
-          ? static_cast<size_t>(Uniform(random) * static_cast<double>(options.size()))
-          : static_cast<size_t>(std::max_element(search.values().begin(), search.values().end()) -
-                                search.values().begin());
-  aim.option = options[best];
+  std::vector<double> values = search.values();
+  if (aim.random) {
+    // One of them, whatever it may be worth.
+    std::fill(values.begin(), values.end(), 0.0);
+    values[static_cast<size_t>(Uniform(random) * static_cast<double>(values.size()))] = kLife;
+  }
+  const double deviation = std::max(problem.uncertainty, kLeastDeviation);
+  const double reach = problem.speed * problem.frames;
+  double best = -HUGE_VAL;
+  for (const AimOption& option : options) {
+    for (double offset = option.low; offset <= option.high; offset += 1.0) {
+      const double way = std::abs(problem.arrival.at.x() - offset - problem.paddle_x);
+      const double worth =
+          Worth(options, values, offset, deviation) - (way > reach ? way - reach : 0.0) * kLife;
+      if (worth <= best) continue;
+      best = worth;
+      aim.option = option;
+      aim.offset = offset;
+    }
+  }
   return aim;
 }
 

@@ -6,10 +6,10 @@
 // The paddle's places fall into options, intervals of places that send the ball the same way. From
 // each option the ball's further flight is followed by event stepping, return after return, breadth
 // first, to the first returns that break bricks: of these the one with the most points, discounted
-// by the frames until then, wins. Places of the ball that were reached before are not followed
-// again, so that the search ends, and loops that break nothing are left as soon as any sequence of
-// returns leads out of them. Where none is found, or the ball has come back too often without
-// breaking anything, an option is drawn at random.
+// by the frames until then, counts most. Places of the ball that were reached before are not
+// followed again, so that the search ends, and loops that break nothing are left as soon as any
+// sequence of returns leads out of them. Where none is found, or the ball has come back too often
+// without breaking anything, an option is drawn at random.
 
 #include <random>
 
@@ -21,7 +21,6 @@ namespace tangible {
 struct AimOption {
   double low = 0.0, high = 0.0;
   Vector2<double> after{0.0, 0.0};
-  double middle() const { return 0.5 * (low + high); }
 };
 
 /// For a ball that comes to the paddle with that velocity.
@@ -32,13 +31,17 @@ struct AimProblem {
   BallState arrival;    ///< as it overlaps the paddle's rows
   double frames = 0.0;  ///< until then
   Bricks bricks;
-  double width = 0.0;     ///< of the paddle
-  double paddle_x = 0.0;  ///< now
-  double speed = 0.0;     ///< of the paddle, pixels/frame: what it cannot reach is no option
+  double width = 0.0;        ///< of the paddle
+  double paddle_x = 0.0;     ///< now
+  double speed = 0.0;        ///< of the paddle, pixels/frame: what it cannot reach is no option
+  double uncertainty = 0.0;  ///< standard deviation of where the paddle will be, pixels
 };
 
 struct Aim {
   AimOption option;
+  /// Where the ball should be met: what is likely to be worth most, with the paddle's uncertainty
+  /// and a life lost where the ball is missed.
+  double offset = 0.0;
   int flights = 0;      ///< that were followed
   bool random = false;  ///< nothing was found
 };

@@ -15,6 +15,8 @@ constexpr int kIterations = 4;     // of iLQR
 constexpr double kPressed = 0.5;   // a planned press beyond it becomes one
 // Of the comparison, pixels²: out of the interval, a press, a pixel a frame as the ball is met.
 constexpr double kOutside = 25.0, kPress = 0.05, kMoving = 0.1;
+// What is left of a step's uncertainty with each step after it, in which it can be corrected.
+constexpr double kCorrected = 0.4;
 // Of a plan: the distance at the end, over the way, and a press.
 constexpr double kEndWeight = 1.0, kWayWeight = 0.05, kPressWeight = 20.0;
 
@@ -62,7 +64,9 @@ PaddleControl::Best PaddleControl::Compare(const PaddleState& state, const Paddl
   // No press first: of equal costs it wins.
   for (const int direction : {0, -1, 1}) {
     const PaddleState after = model_->After(state, direction, std::min(frames, kFrameSkip));
-    double cost = kPress * std::abs(direction);
+    const int later = (frames - 1) / kFrameSkip;  // steps
+    double cost = kPress * std::abs(direction) +
+                  std::pow(kCorrected, later) * model_->Variance(state, direction);
     if (frames > kFrameSkip) {
       cost += Compare(after, goal, frames - kFrameSkip).cost;
     } else {

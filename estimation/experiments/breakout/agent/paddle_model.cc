@@ -14,6 +14,9 @@ constexpr int kLeastSteps = 8;       // of which some move
 constexpr double kSigma = 0.5;       // pixels, of a position that is seen in whole ones
 constexpr double kPriorShare = 3.0;  // deviation of the numbers' prior over its value
 constexpr double kForget = 0.98;     // of what is left
+constexpr int kMostCounted = 20;     // means and variances are those of about so many steps
+constexpr double kUnknown = 100.0;   // pixels²: of a situation that was never seen
+constexpr int kLeastVaried = 5;      // steps that a variance of its own takes
 
 template <typename T>
 struct Law {
@@ -85,11 +88,10 @@ class PaddleWays : public LeastSquaresProblem {
     for (int i = 0; i < model_.num_steps(); ++i) {
       const PaddleModel::Seen& step = model_.steps_[i];
       if (step.begins) v = Number(0.0);
-      Number x(step.from);
+      Number x(step.before.x);
       for (int frame = 0; frame < kFrameSkip; ++frame) law.Frame(Number(step.direction), &x, &v);
       // A wall tells nothing of the law.
-      const bool at_wall = step.to <= model_.low() || step.to >= model_.high() ||
-                           step.from <= model_.low() || step.from >= model_.high();
+      const bool at_wall = model_.AtWall(step.to) || model_.AtWall(step.before.x);
       const Number error = at_wall ? Number(0.0) : (x - step.to) / kSigma;
       evaluation->residuals[i] = error.a;
       evaluation->jacobian.row(i) = error.v.transpose();
@@ -110,56 +112,88 @@ class PaddleWays : public LeastSquaresProblem {
   std::vector<ParameterEntry> entries_;
 };
 
+PaddleModel::Situation PaddleModel::SituationOf(const PaddleState& state, int direction) const {
+  Situation situation;
+  // The last press is to the right, after an exchange if need be.
+  const int press = direction != 0 ? direction : state.last != 0 ? state.last : state.before;
+  if (press < 0) situation.sign = -1.0;
+  const int sign = press < 0 ? -1 : 1;
+  const int wall = state.x <= low_ ? -sign : state.x >= high_ ? sign : 0;
+  situation.beside =
+      9 * (sign * state.before + 1) + 3 * (sign * state.last + 1) + sign * direction + 1;
+  situation.number = kSequences * (wall + 1 + (state.from_wall ? 3 : 0)) + situation.beside;
+  situation.beside += kSequences;
+  return situation;
+}
+
+const PaddleModel::Rest& PaddleModel::RestOf(const Situation& situation) const {
+  const Rest& own = rests_[situation.number];
+  return own.count > 0 ? own : rests_[situation.beside];
+}
+
+void PaddleModel::Rest::Add(double error) {
+  // The mean over all, but over no more than kMostCounted.
+  count = std::min(count + 1, kMostCounted);
+  const double off = error - mean;
+  mean += off / count;
+  variance += (off * off - variance) / count;
+}
+
 PaddleState PaddleModel::After(const PaddleState& state, int direction, int frames) const {
   const Law<double> law = LawOf<double>(numbers_, low_, high_);
   PaddleState after = state;
   for (int i = 0; i < frames; ++i) law.Frame(direction, &after.x, &after.v);
-  const double mean = means_[ContextOf(state.before, state.last, direction)];
+  const Situation situation = SituationOf(state, direction);
+  const double mean = situation.sign * RestOf(situation).mean;
   after.x = std::clamp(after.x + mean * frames / kFrameSkip, low_, high_);
   after.before = state.last;
   after.last = direction;
+  after.from_wall = AtWall(state.x);
   return after;
+}
+
+double PaddleModel::Variance(const PaddleState& state, int direction) const {
+  const Rest& rest = rests_[SituationOf(state, direction).number];
+  return rest.count >= kLeastVaried ? rest.variance : rest.count > 0 ? rest_ : kUnknown;
 }
 
 PaddleState PaddleModel::Learn(const PaddleState& before, int direction, double x) {
   if (steps_.size() >= kMostSteps) steps_.erase(steps_.begin(), steps_.begin() + kMostSteps / 4);
-  steps_.push_back(
-      {before.x, x, direction, before.last, before.before, sequence_begins_ || steps_.empty()});
+  steps_.push_back({before, x, direction, sequence_begins_ || steps_.empty()});
   sequence_begins_ = false;
+  const Law<double> law = LawOf<double>(numbers_, low_, high_);
   PaddleState after = After(before, direction);
-  const bool at_wall = x <= low_ || x >= high_ || before.x <= low_ || before.x >= high_;
-  const int context = ContextOf(before.before, before.last, direction);
-  const double error = x - after.x;
-  if (!at_wall) {
-    // A mean over all, but no slower than a twentieth.
-    counts_[context] = std::min(counts_[context] + 1, 20);
-    means_[context] += error / counts_[context];
-    rest_ = kForget * rest_ + (1.0 - kForget) * error * error;
+  if (!AtWall(x)) {
+    double by_law = before.x, v = before.v;
+    for (int i = 0; i < kFrameSkip; ++i) law.Frame(direction, &by_law, &v);
+    const Situation situation = SituationOf(before, direction);
+    const double error = x - after.x;
+    if (rests_[situation.number].count > 0) {
+      rest_ = kForget * rest_ + (1.0 - kForget) * error * error;
+    }
+    rests_[situation.number].Add(situation.sign * (x - by_law));
+  } else {
+    after.v = 0.0;
   }
   after.x = x;
-  if (x <= low_ || x >= high_) after.v = 0.0;
   return after;
 }
 
 void PaddleModel::Average() {
-  means_ = {};
-  counts_ = {};
+  rests_ = {};
   const Law<double> law = LawOf<double>(numbers_, low_, high_);
-  std::array<double, 27> sums{};
   double v = 0.0;
-  for (const Seen& step : steps_) {
+  for (Seen& step : steps_) {
     if (step.begins) v = 0.0;
-    double x = step.from;
+    step.before.v = v;
+    double x = step.before.x;
     for (int i = 0; i < kFrameSkip; ++i) law.Frame(step.direction, &x, &v);
-    if (step.to <= low_ || step.to >= high_) v = 0.0;
-    if (step.to <= low_ || step.to >= high_ || step.from <= low_ || step.from >= high_) continue;
-    const int context = ContextOf(step.before, step.last, step.direction);
-    sums[context] += step.to - x;
-    ++counts_[context];
-  }
-  for (int i = 0; i < 27; ++i) {
-    if (counts_[i] > 0) means_[i] = sums[i] / counts_[i];
-    counts_[i] = std::min(counts_[i], 20);
+    if (AtWall(step.to)) {
+      v = 0.0;
+    } else {
+      const Situation situation = SituationOf(step.before, step.direction);
+      rests_[situation.number].Add(situation.sign * (step.to - x));
+    }
   }
 }
 
@@ -186,6 +220,7 @@ double PaddleModel::Way(int first, int second, int third) const {
   state = After(After(state, first), second);
   const double middle = 0.5 * (low_ + high_);
   state.x = middle;
+  state.from_wall = false;
   return After(state, third).x - middle;
 }
 

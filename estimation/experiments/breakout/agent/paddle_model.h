@@ -10,8 +10,10 @@
 //   x⁺ = x + v⁺, stopped by the walls
 //
 // The four numbers minimise the squared errors of the ways that were seen over four frames each
-// (estimation/fit). What the law leaves is a mean for each sequence of three buttons, learned
-// beside it: the game counts presses in whole pixels, which no law of this form does.
+// (estimation/fit). What the law leaves is a mean and a variance for each situation, learned beside
+// it: the last three buttons, the wall at which the step begins, and whether the step before began
+// at one, where left and right are alike. The game counts presses in whole pixels, which no law of
+// this form does; and buttons that stick make the answer random.
 
 #include <array>
 #include <vector>
@@ -39,6 +41,7 @@ struct PaddleState {
   double x = 0.0;            ///< of the left edge, pixels
   double v = 0.0;            ///< pixels a frame
   int last = 0, before = 0;  ///< directions of the last two steps
+  bool from_wall = false;    ///< the last step began at a wall
 };
 
 class PaddleModel {
@@ -56,6 +59,8 @@ class PaddleModel {
   PaddleState After(const PaddleState& state, int direction) const {
     return After(state, direction, kFrameSkip);
   }
+  /// Of the place after a step in that direction, pixels².
+  double Variance(const PaddleState& state, int direction) const;
   /// A step was seen to end at x: returns the state there, and keeps the step to learn from.
   PaddleState Learn(const PaddleState& before, int direction, double x);
   /// The way of three steps' last, from rest far from the walls, pixels: what is compared with the
@@ -63,7 +68,8 @@ class PaddleModel {
   double Way(int first, int second, int third) const;
   /// Adopts the numbers that fit the steps seen so far; false where there are too few.
   bool Fit();
-  /// Root mean square of what the law and the means leave of the last steps, pixels.
+  /// Root mean square of what the law and the means leave of the last steps that end away from
+  /// walls, pixels.
   double Uncertainty() const;
   int num_steps() const { return static_cast<int>(steps_.size()); }
 
@@ -72,23 +78,35 @@ class PaddleModel {
 
  private:
   struct Seen {
-    double from = 0.0, to = 0.0;
-    int direction = 0, last = 0, before = 0;
+    PaddleState before;
+    double to = 0.0;
+    int direction = 0;
     bool begins = false;  ///< the paddle rests before it
   };
   friend class PaddleWays;
-  static int ContextOf(int before, int last, int direction) {
-    return 9 * (before + 1) + 3 * (last + 1) + direction + 1;
-  }
+  static constexpr int kSequences = 27, kSituations = 6 * kSequences;
+  struct Situation {
+    int number = 0;
+    int beside = 0;     ///< the same far from walls
+    double sign = 1.0;  ///< −1: left and right are exchanged
+  };
+  /// What was left by the law in a situation.
+  struct Rest {
+    double mean = 0.0, variance = 0.0;
+    int count = 0;
+    void Add(double error);
+  };
+  Situation SituationOf(const PaddleState& state, int direction) const;
+  const Rest& RestOf(const Situation& situation) const;
+  bool AtWall(double x) const { return x <= low_ || x >= high_; }
   void Average();
 
   double low_, high_;
   PaddleNumbers numbers_;
   std::vector<Seen> steps_;
   bool sequence_begins_ = true;
-  std::array<double, 27> means_{};
-  std::array<int, 27> counts_{};
-  double rest_ = 0.0;  ///< mean square of what is left
+  std::array<Rest, kSituations> rests_{};
+  double rest_ = 0.0;  ///< mean square of what is left of all
 };
 
 /// The law, without the means, as a step to plan over: states x, v; the control u in [−1, 1].
