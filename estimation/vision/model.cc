@@ -20,8 +20,8 @@ constexpr double kSpeedScale = 4.0;
 constexpr double kSharpness = 10.0;
 constexpr int64_t kFeatures = 12;
 constexpr int64_t kHidden = 128;
-// Pixels around a disc: those that the encoder's second look sees beside it, as the first one misses
-// by a pixel at most, and those that the decoder may draw on.
+// Pixels around a disc: those that the encoder's second look sees beside it, as the first one
+// misses by a pixel at most, and those that the decoder may draw on.
 constexpr int64_t kSeenBeside = 2;
 constexpr int64_t kDrawnBeside = 3;
 constexpr double kOutside = -1.0;  // of pixels beyond the picture

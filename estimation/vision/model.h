@@ -5,11 +5,11 @@
 // back to pictures. Sizes: B rows of a batch, K frames seen, F frames ahead, n discs; positions are
 // in pixels, velocities in pixels a frame.
 //
-// The encoder looks twice. Two convolutions of the picture at half its size give each of its pixels a
-// weight w ≥ 0 for each disc, and the weights' centre, Σ w r / Σ w, tells where the disc is to a
-// twentieth of its radius. A network that sees the pixels around it corrects the position to a
-// hundredth of a pixel. The velocity is the last difference of positions and a correction by a
-// network that sees all discs' positions in the window.
+// The encoder looks twice. Two convolutions of the picture at half its size give each of its pixels
+// a weight w ≥ 0 for each disc, and the weights' centre, Σ w r / Σ w, tells where the disc is. A
+// network that sees the pixels around it corrects that to hundredths of a pixel. The velocity is
+// the last difference of positions and a correction by a network that sees all discs' positions in
+// the window.
 //
 // The dynamics are the engine (rollout_layer.h) with its physical parameters; or in its place a
 // multilayer perceptron on all discs' states, or an interaction network (Battaglia et al. 2016),
@@ -26,6 +26,7 @@
 
 #include "tangible/estimation/vision/disc_world.h"
 #include "tangible/estimation/vision/rollout_layer.h"
+#include "tangible/estimation/vision/training_options.h"
 
 namespace tangible {
 
@@ -51,8 +52,6 @@ class EncoderImpl : public torch::nn::Module {
 };
 TORCH_MODULE(Encoder);
 
-enum class DecoderKind { kLearned, kRenderer };
-
 class DecoderImpl : public torch::nn::Module {
  public:
   DecoderImpl(const DiscWorld& world, DecoderKind kind);
@@ -69,10 +68,6 @@ class DecoderImpl : public torch::nn::Module {
   torch::nn::Sequential share_{nullptr};
 };
 TORCH_MODULE(Decoder);
-
-enum class DynamicsKind { kEngine, kPerceptron, kInteraction };
-/// "engine", "mlp", "interaction".
-const char* NameOf(DynamicsKind kind);
 
 /// States ahead, and which rows the engine could run.
 struct Ahead {

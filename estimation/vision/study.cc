@@ -8,6 +8,7 @@
 #include <mutex>
 
 #include "tangible/estimation/vision/evaluation.h"
+#include "tangible/estimation/vision/training.h"
 
 namespace tangible {
 namespace {

@@ -9,8 +9,9 @@
 #include <string>
 #include <vector>
 
+#include "tangible/estimation/vision/disc_data.h"
 #include "tangible/estimation/vision/simb_score.h"
-#include "tangible/estimation/vision/training.h"
+#include "tangible/estimation/vision/training_options.h"
 
 namespace tangible {
 

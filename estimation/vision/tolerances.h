@@ -14,7 +14,8 @@ inline constexpr double kRests = 0.06;
 /// Pixels: the engine's position after an impact is at most so far from the one seen. SimB's own
 /// impacts are up to a substep late, 1.2 pixels of the way each.
 inline constexpr double kImpactMissed = 2.5;
-/// Pixels: the way of two discs since their impact from which its direction is seen, to 0.2 radians.
+/// Pixels: the way of two discs since their impact from which its direction is seen, to 0.2
+/// radians.
 inline constexpr double kImpulseSeen = 0.15;
 /// Pixels: a way by the engine that differs less from its velocity has met nothing. Rounding in
 /// positions of 64 pixels is 1e-14.

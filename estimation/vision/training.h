@@ -11,30 +11,14 @@
 // A step draws its windows from the seed and its own number alone, so that a training that was
 // interrupted goes on to the same result, bit for bit on one thread.
 
-#include <cstdint>
 #include <memory>
 #include <string>
 
 #include "tangible/estimation/vision/disc_data.h"
 #include "tangible/estimation/vision/model.h"
+#include "tangible/estimation/vision/training_options.h"
 
 namespace tangible {
-
-struct TrainingOptions {
-  DynamicsKind dynamics = DynamicsKind::kEngine;
-  DecoderKind decoder = DecoderKind::kLearned;
-  double labels = 1.0;  ///< share of the sequences, from the first on, whose states are used
-  bool physics_loss = true;
-  bool self_consistency = false;     ///< L_self
-  bool learns_parameters = true;     ///< the engine's, from wrong values
-  bool starts_from_colours = false;  ///< the encoder (EncoderImpl::StartFromColours)
-  int seen = 3;
-  int ahead = 10;
-  int batch = 32;
-  long iterations = 1500;
-  double learning_rate = 2e-3;  ///< falls to a fiftieth along half a cosine
-  std::uint64_t seed = 0;
-};
 
 struct TrainingLoss {
   double total = 0.0, encoder = 0.0, physics = 0.0, decoder = 0.0, self = 0.0;
