@@ -174,10 +174,6 @@ void ContactSearch::FindContacts(const Model<double>& model, const State<double>
   ContactFeature features[2];
   int count = FindFeatures(model, a, scratch.poses[a], b, scratch.poses[b], parts,
                            ReachOf(model, state, h, a, b), features);
-  if (count == 0) {
-    return;
-  }
-  const double e = MixedRestitution(model, a, b).value;
   bool passes_by = false;
   for (int k = 0; k < count; ++k) {
     contact.feature = features[k];
@@ -203,11 +199,13 @@ void ContactSearch::FindContacts(const Model<double>& model, const State<double>
       free_approach +=
           rows.normal_a[i] * free_twist_[3 * a + i] + rows.normal_b[i] * free_twist_[3 * b + i];
     }
-    // In penetration the constant that drives apart faster holds.
-    if (e > 0.0 && approach < -settings.restitution_threshold &&
-        gap + h * free_approach < settings.contact_margin &&
-        (gap >= 0.0 || e * approach < std::max(gap / h, -settings.recovery_speed))) {
-      contact.law = ContactLaw::kRestitution;
+    if (approach < -settings.restitution_threshold &&
+        gap + h * free_approach < settings.contact_margin) {
+      const double e = MixedRestitution(model, a, b).value;
+      // In penetration the constant that drives apart faster holds.
+      if (e > 0.0 && (gap >= 0.0 || e * approach < std::max(gap / h, -settings.recovery_speed))) {
+        contact.law = ContactLaw::kRestitution;
+      }
     }
     contacts->push_back(contact);
   }
