@@ -511,7 +511,7 @@ FitResult Fit(const FitOptions& options, RecordingsProblem* problem, const FitPr
       with_priors.HasRows() ? static_cast<LeastSquaresProblem*>(&with_priors) : problem;
   FitResult result = Fit(options, whole, progress, log, shooting);
   for (const RandomEffect& effect : problem->effects()) {
-    // All that is known of a shared value comes by way of the recordings' values, if not by a prior.
+    // All that is known of a shared value comes by way of the recordings' values, or by a prior.
     if (result.estimate.size() > 0 && !problem->entries()[effect.mean].prior) {
       result.uncertainty.prior_share[effect.mean] = 0.0;
     }

@@ -7,7 +7,8 @@
 //   {"problem": hash, "fits": [the first fit, the next, ...]}
 //
 // Fits follow each other where standard deviations of noise or spreads are estimated
-// (variance_components.h), and the last is the one at dt / 2. Of each fit it keeps the starts that are finished (how they ended, and all of the best one), the
+// (variance_components.h), and the last is the one at dt / 2. Of each fit it keeps the starts that
+// are finished (how they ended, and all of the best one), the
 // point at which windows or multiple shooting arrived, and the evaluations (evaluation_log.h) of
 // the part of a start under way: those of the search for the first point, then costs and the
 // factors of the blocks (linearisation.h), whose size does not grow with the number of

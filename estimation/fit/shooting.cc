@@ -4,6 +4,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tangible/dynamics/elements/joint.h"
+#include "tangible/dynamics/jacobian/equation_jacobian.h"
+#include "tangible/estimation/fit/linearisation.h"
 #include "tangible/estimation/fit/minimise.h"
 #include "tangible/estimation/fit/observed_state.h"
 #include "tangible/estimation/problem/problem_with_priors.h"
@@ -15,6 +18,8 @@ namespace {
 // Standard deviations of the jumps, stage by stage, in multiples of the observations' median sigma.
 constexpr double kStages[] = {1e3, 30.0, 1.0};
 constexpr int kIterationsPerStage = 30;
+// Standard deviation of the joints' errors, the same.
+constexpr double kOnJoints = 0.01;
 
 /// The unknown numbers of a moving body's state in the rows of w = [poses | twists | parameters].
 int StateRow(const ModelStructure& s, int i) {
@@ -193,6 +198,65 @@ void ShootingResiduals::Meet(int segment, Run* run) const {
   }
 }
 
+int ShootingResiduals::num_joint_rows() const {
+  return 6 * static_cast<int>(residuals_->scene().model().structure->joints.size());
+}
+
+/// Errors and rates of the joints at the start of the segment after this one.
+void ShootingResiduals::AddJoints(int segment, Run* run) const {
+  const Model<double>& model = residuals_->scene().model();
+  const ModelStructure& s = *model.structure;
+  const State<double>& state = run->state;
+  int row = num_observations() + num_states() + segment * num_joint_rows();
+  for (const JointIndex& joint : s.joints) {
+    int variables[kLocalJetWidth];
+    LocalJet local[kLocalJetWidth];
+    for (int i = 0; i < 6; ++i) {
+      const int body = i < 3 ? joint.a : joint.b;
+      variables[i] = s.PoseVariable(body, i % 3);
+      local[i] = LocalJet(state.pose[3 * static_cast<size_t>(body) + i % 3], i);
+    }
+    for (int i = 0; i < joint.num_geometry; ++i) {
+      variables[6 + i] = s.ParameterVariable(joint.geometry + i);
+      local[6 + i] = LocalJet(model.parameters[joint.geometry + i], 6 + i);
+    }
+    JointRows<LocalJet> rows;
+    EvaluateJoint(joint.type, Pose<LocalJet>(Vector2<LocalJet>(local[0], local[1]), local[2]),
+                  Pose<LocalJet>(Vector2<LocalJet>(local[3], local[4]), local[5]), local + 6,
+                  &rows);
+    for (int r = 0; r < rows.rows; ++r) {
+      LocalJet rate(0.0);
+      Eigen::RowVectorXd by_twist = Eigen::RowVectorXd::Zero(run->w_dot.cols());
+      for (int i = 0; i < 6; ++i) {
+        const int body = i < 3 ? joint.a : joint.b;
+        const LocalJet& entry = i < 3 ? rows.row_a[r][i] : rows.row_b[r][i - 3];
+        rate += entry * state.twist[3 * static_cast<size_t>(body) + i % 3];
+        if (run->jacobian != nullptr) {
+          by_twist += entry.a * run->w_dot.row(s.TwistVariable(body, i % 3));
+        }
+      }
+      const LocalJet* const values[2] = {&rows.error[r], &rate};
+      for (int k = 0; k < 2; ++k) {
+        const double weight = (k == 0 ? 1.0 : segment_seconds_) / joint_sigma_;
+        (*run->residuals)[row + 2 * r + k] = weight * values[k]->a;
+        if (run->jacobian == nullptr) {
+          continue;
+        }
+        Eigen::RowVectorXd dots =
+            k == 0 ? Eigen::RowVectorXd::Zero(run->w_dot.cols()).eval() : by_twist;
+        for (int v = 0; v < 6 + joint.num_geometry; ++v) {
+          dots += values[k]->v[v] * run->w_dot.row(variables[v]);
+        }
+        auto out = run->jacobian->row(row + 2 * r + k);
+        out.head(num_parameters_) = weight * dots.head(num_parameters_);
+        out.segment(num_parameters_ + segment * state_size_, state_size_) =
+            weight * dots.tail(state_size_);
+      }
+    }
+    row += 6;
+  }
+}
+
 bool ShootingResiduals::Evaluate(const Eigen::VectorXd& unknowns, Eigen::VectorXd* residuals,
                                  RowMatrixXd* jacobian) {
   if (!residuals_->SetParameters(unknowns.head(num_parameters_))) {
@@ -221,6 +285,7 @@ bool ShootingResiduals::Evaluate(const Eigen::VectorXd& unknowns, Eigen::VectorX
     }
     if (segment + 1 < num_segments()) {
       Meet(segment, &run);
+      AddJoints(segment, &run);
     }
   }
   residuals->head(num_observations()) = residuals_->FromSamples(run.samples);
@@ -293,6 +358,7 @@ Eigen::VectorXd ShootingProblem::ParametersOf(const Eigen::VectorXd& unknowns) c
 void ShootingProblem::SetJumpSigma(double sigma) {
   for (size_t block = 0; block < runs_.size(); ++block) {
     runs_[block].SetJumpSigma(sigma * median_sigma_[block]);
+    runs_[block].SetJointSigma(kOnJoints * median_sigma_[block]);
   }
 }
 
@@ -325,6 +391,22 @@ bool ShootingProblem::EvaluateBlock(int block, const Eigen::VectorXd& p,
   return true;
 }
 
+namespace {
+
+/// The cost of the whole runs at p; infinite where one fails.
+double CostOfRuns(const FitOptions& options, const Eigen::VectorXd& p, RecordingsProblem* problem,
+                  long* rollouts) {
+  Linearizer linearizer(problem, options.derivatives, options.threads, nullptr);
+  Eigen::VectorXd blocks;
+  double cost = 0.0;
+  const bool done = linearizer.Cost(ToInternal(problem->entries(), p),
+                                    {options.huber, options.huber}, &blocks, &cost);
+  *rollouts += linearizer.rollouts();
+  return done ? cost : HUGE_VAL;
+}
+
+}  // namespace
+
 FitApproachResult Shoot(const FitOptions& options, const Eigen::VectorXd& start,
                         RecordingsProblem* problem, EvaluationLog* log) {
   FitApproachResult result{start};
@@ -335,6 +417,7 @@ FitApproachResult Shoot(const FitOptions& options, const Eigen::VectorXd& start,
   }
   FitOptions stage_options = options;
   stage_options.max_iterations = kIterationsPerStage;
+  double least = HUGE_VAL;
   for (const double stage : kStages) {
     shooting.SetJumpSigma(stage);
     ProblemWithPriors with_priors(&shooting, shooting.effects());
@@ -347,7 +430,13 @@ FitApproachResult Shoot(const FitOptions& options, const Eigen::VectorXd& start,
     }
     x = minimum.parameters;
     result.iterations += std::max(0, static_cast<int>(minimum.iterations.size()) - 1);
-    result.parameters = shooting.ParametersOf(x);
+    // Where jumps that cost much trap the minimiser, the stage before has led nearer.
+    const Eigen::VectorXd p = shooting.ParametersOf(x);
+    const double cost = CostOfRuns(options, p, problem, &result.rollouts);
+    if (cost < least || least == HUGE_VAL) {
+      result.parameters = p;
+      least = cost;
+    }
   }
   return result;
 }

@@ -14,11 +14,11 @@
 //
 // Over a short segment the predictions are nearly linear in the unknowns, so that a wrong period or
 // a chaotic end does not trap the minimiser. The states begin at what the observations around them
-// say (observed_state.h), on the joints; what those do not say is that of the run at the initial
-// values. W grows in stages, from jumps that cost little, when the observations alone place the
-// states, to jumps of less than the noise. Joints and contacts of a segment's first step put right
-// a state that violates them. The single run then starts at the parameters found: optimum and
-// covariance are the fit's own, whatever S.
+// say (observed_state.h), on the joints, and stay there by rows of the joints' errors and of their
+// rates; what the observations do not say is that of the run at the initial values. W grows in
+// stages, from jumps that cost little, when the observations alone place the states, to jumps of
+// less than the noise. The single run then starts at the parameters found: optimum and covariance
+// are the fit's own, whatever S.
 
 #include <Eigen/Core>
 #include <memory>
@@ -30,8 +30,8 @@
 
 namespace tangible {
 
-/// The residuals of one run in segments: those of the observations, then the jumps; unknowns [p |
-/// x_1 | .. | x_{S−1}].
+/// The residuals of one run in segments: those of the observations, then the jumps, then the errors
+/// of the joints of each state and their rates, six a joint; unknowns [p | x_1 | .. | x_{S−1}].
 class ShootingResiduals {
  public:
   /// At most one segment a step.
@@ -42,7 +42,9 @@ class ShootingResiduals {
   int num_states() const { return (num_segments() - 1) * state_size_; }
   int num_unknowns() const { return num_parameters_ + num_states(); }
   int num_observations() const;
-  int num_residuals() const { return num_observations() + num_states(); }
+  int num_residuals() const {
+    return num_observations() + num_states() + (num_segments() - 1) * num_joint_rows();
+  }
 
   /// The states x_1 ... x_{S−1} of one whole run at p; false where that fails.
   bool StatesOfRun(const Eigen::VectorXd& p, Eigen::VectorXd* states);
@@ -52,6 +54,8 @@ class ShootingResiduals {
   /// Standard deviation of jumps of positions and angles, in m and rad; of rates by the length of a
   /// segment.
   void SetJumpSigma(double sigma) { jump_sigma_ = sigma; }
+  /// The same of the joints' errors.
+  void SetJointSigma(double sigma) { joint_sigma_ = sigma; }
 
   /// At [p | states]; `jacobian` may be null.
   bool Evaluate(const Eigen::VectorXd& unknowns, Eigen::VectorXd* residuals, RowMatrixXd* jacobian);
@@ -61,6 +65,8 @@ class ShootingResiduals {
   bool RunSegment(int segment, Run* run);
   void AddShares(int segment, long k, Run* run) const;
   void Meet(int segment, Run* run) const;
+  int num_joint_rows() const;
+  void AddJoints(int segment, Run* run) const;
   void Scatter(const Run& run) const;
   double JumpWeight(int i) const;
 
@@ -70,6 +76,7 @@ class ShootingResiduals {
   int state_size_ = 0;
   double segment_seconds_ = 0.0;
   double jump_sigma_ = 1.0;
+  double joint_sigma_ = 1.0;
 };
 
 /// All runs in segments: the states are further own parameters of each recording, the jumps further
@@ -110,8 +117,9 @@ class ShootingProblem : public LeastSquaresProblem {
   std::vector<RandomEffect> effects_;
 };
 
-/// Multiple shooting from `start`. Where a stage fails, the parameters of the one before are
-/// returned, with a message. Evaluations go through `log` unless it is null.
+/// Multiple shooting from `start`: the parameters of that stage at which the whole runs cost the
+/// least. Where a stage fails, those before it count, with a message. Evaluations of stages go
+/// through `log` unless it is null.
 FitApproachResult Shoot(const FitOptions& options, const Eigen::VectorXd& start,
                         RecordingsProblem* problem, EvaluationLog* log);
 
