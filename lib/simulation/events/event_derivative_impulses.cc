@@ -13,9 +13,9 @@ double EventDerivative::ImpulsesTangent(const Model<double>& model, Impulses* im
   const ModelStructure& s = *model.structure;
   const int columns = static_cast<int>(x->cols());
   rhs_.setZero(3 * static_cast<Eigen::Index>(impulses->system.num_blocks()), columns);
-  VisitJacobian(model, impulses->View(), JacobianRoute::kByHand, &scratch_,
-                TangentSink{x->data(), rhs_.data(), columns,
-                            fixed_.empty() ? nullptr : fixed_.data()});
+  VisitJacobian(
+      model, impulses->View(), JacobianRoute::kByHand, &scratch_,
+      TangentSink{x->data(), rhs_.data(), columns, fixed_.empty() ? nullptr : fixed_.data()});
   if (impulses->decompression) {
     AddOffsetsTangent(*impulses);
   }
