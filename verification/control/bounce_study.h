@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// Plans through a bounce: a hammer on a slider strikes a falling ball so that it bounces once and is
-// in a cup at the end. From how many random starts is it found, and with which derivatives?
+// Plans through a bounce: a hammer on a slider strikes a falling ball so that it bounces once and
+// is in a cup at the end. From how many random starts is it found, and with which derivatives?
 //
 //   exact      event stepping: the Jacobians hold the jumps of the impacts
 //   extended   the same, and late and early runs are compared with the plan's motion extended
@@ -33,8 +33,8 @@ struct Problem {
 };
 
 /// The ball is uniformly random around the scene's: its position in ±0.1 m and ±0.15 m, its speed
-/// along x in ±0.1 m/s. The cup is where a random effort in [4, 14] N that is held brings it, as far
-/// as it is struck; plans start at another one in [3, 10] N.
+/// along x in ±0.1 m/s. The cup is where a random effort in [4, 14] N that is held brings it, as
+/// far as it is struck; plans start at another one in [3, 10] N.
 Problem Draw(const Scene& scene, unsigned seed, unsigned number);
 
 enum class Method { kExact, kExtended, kSurrogate, kFixed };

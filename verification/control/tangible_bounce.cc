@@ -57,6 +57,9 @@ double MedianOf(std::vector<double> values) {
 Column ColumnOf(const std::vector<bounce::Row>& rows, size_t method) {
   Column column;
   std::vector<double> distance, believed, iterations, seconds;
+  for (std::vector<double>* values : {&distance, &believed, &iterations, &seconds}) {
+    values->reserve(rows.size());
+  }
   for (const bounce::Row& row : rows) {
     const bounce::Outcome& outcome = row.outcomes[method];
     const bool away = row.fixed == bounce::Direction::kUp;

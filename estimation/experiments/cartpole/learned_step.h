@@ -3,10 +3,10 @@
 //
 // A model of cart and pole that knows of mechanics only that speeds move positions: perceptrons map
 // (sin φ, cos φ, v, ω, u) to the change of (x, φ, v, ω) over a step beyond that of positions at
-// constant speeds, each number scaled by its standard deviation in the
-// recording. Speeds, which nobody measures, are the slopes of quadratic polynomials that are fitted
-// to the positions around each sample (Savitzky, Golay 1964). An ensemble's prediction is the mean
-// of its members', which are trained on bootstrap samples.
+// constant speeds, each number scaled by its standard deviation in the recording. Speeds, which
+// nobody measures, are the slopes of quadratic polynomials that are fitted to the positions around
+// each sample (Savitzky, Golay 1964). An ensemble's prediction is the mean of its members', which
+// are trained on bootstrap samples.
 
 #include <string>
 #include <vector>
