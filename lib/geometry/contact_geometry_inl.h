@@ -134,8 +134,8 @@ ContactGeometry<T> EllipseAgainstLine(const ShapeView<T>& shape, const Pose<T>& 
   return result;
 }
 
-/// Of a pair with an ellipse. Apart from the other pairs, whose evaluation takes 16 ns and 7 ns more
-/// where the compiler has both to arrange.
+/// Of a pair with an ellipse. Apart from the other pairs, whose evaluation takes 16 ns, and 7 ns
+/// more where the compiler has both to arrange.
 template <typename T>
 [[gnu::noinline]] ContactGeometry<T> EvaluateEllipse(const ContactFeature& feature,
                                                      const ShapeView<T>& shape_a,
