@@ -51,8 +51,8 @@ struct IlqrOptions {
   /// other side.
   bool reference_extension = false;
   /// Where it has samples, at most the first half of max_iterations uses means of Jacobians over
-  /// samples in the place of exact ones; exact ones go on from there. With either a step counts only
-  /// where it decreases the cost of the real motion.
+  /// samples in the place of exact ones; exact ones go on from there. With either a step counts
+  /// only where it decreases the cost of the real motion.
   SampledSurrogate surrogate{};
   /// Called after each iteration; true ends the work with the best plan so far.
   std::function<bool()> stop{};

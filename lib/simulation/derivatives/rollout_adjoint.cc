@@ -201,19 +201,13 @@ void RolloutTape::DropFactors(Entry* entry) {
 // The entry may exceed the plan: a step with more contacts than those before it, or whose factors
 // needed memory for solves.
 void RolloutTape::KeepWithinBudget(Entry* entry) {
-  const auto recount = [&] {
-    const size_t bytes = entry->bytes();
-    used_bytes_ += bytes - entry->counted;
-    entry_bytes_ += bytes - entry->counted;
-    entry->counted = bytes;
-  };
   if (!by_budget()) {
     return;
   }
-  recount();
+  Recount(entry);
   if (held_bytes() > budget()) {
     DropFactors(entry);
-    recount();
+    Recount(entry);
   }
 }
 
@@ -244,6 +238,29 @@ void RolloutTape::ReleaseEntries(size_t keep) {
     entry_bytes_ -= entries_.back()->counted;
     entries_.pop_back();
   }
+}
+
+// The factors of an event step or of a projection have needed memory for the sweep's solves. Where
+// that exceeds the budget, the steps from this one on, with which the sweep is done, are released;
+// another sweep runs them again.
+void RolloutTape::ReleaseSwept(long step) {
+  if (!by_budget()) {
+    return;
+  }
+  Entry* entry = entries_[static_cast<size_t>(step - first_)].get();
+  Recount(entry);
+  if (held_bytes() > budget()) {
+    used_ = static_cast<size_t>(step - first_);
+    ReleaseEntries(used_);
+    used_bytes_ = entry_bytes_;
+  }
+}
+
+void RolloutTape::Recount(Entry* entry) {
+  const size_t bytes = entry->bytes();
+  used_bytes_ += bytes - entry->counted;
+  entry_bytes_ += bytes - entry->counted;
+  entry->counted = bytes;
 }
 
 // Fills the entries with the steps up to `last`, starting from the checkpoint before it or, where
@@ -353,10 +370,7 @@ void RolloutTape::AdjointFrom(ControlledModel<double>* model, long last, int num
     const Model<double>& now = model->At(step);
     if (stepper_->by_events()) {
       stepper_->event_derivative().Adjoint(now, &entry.events, w_bar);
-      hand_over(step);
-      continue;
-    }
-    if (entry.has_factors) {
+    } else if (entry.has_factors) {
       StepAdjoint(now, entry.record, &entry.system, entry.projection.get(), w_bar);
       KeepWithinBudget(&entry);
     } else {
@@ -365,6 +379,7 @@ void RolloutTape::AdjointFrom(ControlledModel<double>* model, long last, int num
       StepAdjoint(now, entry.record, &stepper_->system(), entry.projection.get(), w_bar);
       std::swap(entry.record.problem, refactored_);
     }
+    ReleaseSwept(step);
     hand_over(step);
   }
   seed(0, w_bar);

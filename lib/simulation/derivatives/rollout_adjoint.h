@@ -103,6 +103,8 @@ class RolloutTape {
   bool HasRoomForFactors(long remaining) const;
   static void DropFactors(Entry* entry);
   void KeepWithinBudget(Entry* entry);
+  void ReleaseSwept(long step);
+  void Recount(Entry* entry);
   void Count(Entry* entry);
   void ReleaseEntries(size_t keep);
   void RunAgain(ControlledModel<double>* model, long last);
