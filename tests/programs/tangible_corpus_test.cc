@@ -22,7 +22,7 @@ TEST_F(TangibleCorpusTest, PrintsATableAndWritesJson) {
   EXPECT_EQ(run.out.rfind("commit ", 0), 0u) << run.out;
   EXPECT_NE(run.out.find("30 problems, "), std::string::npos) << run.out;
   const json result = json::parse(Read(Path("r.json")));
-  EXPECT_EQ(result["problems"], 27);
+  EXPECT_EQ(result["problems"], 30);
   EXPECT_EQ(result["seed"], 3);
   EXPECT_NE(result["provenance"]["cpu"], "");
   for (const json& row : result["rows"]) EXPECT_EQ(row["wrong"], 0) << row;
