@@ -158,25 +158,28 @@ class Reader {
     return true;
   }
 
-  // Where the recording's parameters start: {name: value}.
-  static void SetInitial(const JsonReader& reader, Json* own) {
+  // Where the recording's own parameters start: {name: value}. Those that are shared start where the
+  // file says.
+  void SetInitial(const JsonReader& reader, Json* own) const {
     if (!reader.Has("initial") || FromObservations(reader)) return;
     const JsonReader initial = reader.At("initial");
     if (!initial.IsObject()) initial.FailExpected("from_observations or {parameter: value}");
     for (const std::string& name : initial.Keys()) {
       const double value = initial.At(name).Number();
       bool known = false;
+      size_t index = 0;
       for (Json& parameter : (*own)["parameters"]) {
+        const bool is_shared = out_.scopes[index++].kind == ParameterScope::Kind::kShared;
         if (parameter.is_string() && parameter == name) {
           parameter = {{"path", name}, {"initial", value}};
-          known = true;
+          known = !is_shared;
         } else if (parameter.is_object() &&
                    parameter[parameter.contains("name") ? "name" : "path"] == name) {
           parameter["initial"] = value;
-          known = true;
+          known = !is_shared;
         }
       }
-      if (!known) initial.At(name).Fail("expected the name of a parameter");
+      if (!known) initial.At(name).Fail("expected the name of a parameter per recording");
     }
   }
 

@@ -152,6 +152,9 @@ TEST_F(TangibleFitTest, MistakesInRecordingsNameThem) {
   expect({{"weight", 0}}, "/recordings/1/weight: expected a number > 0");
   expect({{"values", {{"bodies/ball/mass", -1}}}}, "recording 'b': /values: bodies/ball/mass");
   expect({{"initial", {{"sped", 1}}}}, "/recordings/1/initial/sped: expected the name");
+  // A shared parameter starts where the file says.
+  expect({{"initial", {{"g", 1}}}},
+         "/recordings/1/initial/g: expected the name of a parameter per recording");
   expect({{"observations", {{{"file", "o.csv"}, {"sigma", 0}}}}},
          "recording 'b': /observations/0/sigma: expected a number > 0");
   expect({{"observation", 1}}, "/recordings/1/observation: unknown key of a recording");
