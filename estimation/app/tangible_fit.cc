@@ -405,6 +405,35 @@ int ApplyFlags(Prepared* prepared) {
   return kExitDone;
 }
 
+/// Of recording b: "scene_2.json" for "scene.json"; the name itself of a file with one run.
+std::string SceneOut(const RecordingsProblem& problem, int b) {
+  if (!problem.IsNamed()) {
+    return FLAGS_scene_out;
+  }
+  const std::filesystem::path path(FLAGS_scene_out);
+  const std::string name =
+      path.stem().string() + "_" + std::to_string(b) + path.extension().string();
+  return (path.parent_path() / name).string();
+}
+
+/// Empty, or that a recording's scene would be written over another file.
+std::string SceneOverOther(const RecordingsProblem& problem) {
+  for (int b = 0; b < problem.num_blocks() && !FLAGS_scene_out.empty(); ++b) {
+    const std::string scene = SceneOut(problem, b);
+    const std::vector<std::string> inputs = FilesRead();
+    const bool over_input = std::any_of(
+        inputs.begin(), inputs.end(), [&](const auto& input) { return IsSameFile(scene, input); });
+    for (const std::string& other :
+         {FLAGS_out, FLAGS_report, FLAGS_predictions, FLAGS_checkpoint}) {
+      if (over_input || (!other.empty() && IsSameFile(scene, other))) {
+        return "--scene_out: expected files of their own, got " + scene +
+               (over_input ? ", an input" : " for two outputs");
+      }
+    }
+  }
+  return "";
+}
+
 /// Reads the file and the flags; the same.
 int Prepare(const std::string& text, const std::string& file, Prepared* prepared) {
   std::string error;
@@ -420,22 +449,14 @@ int Prepare(const std::string& text, const std::string& file, Prepared* prepared
     return ReportError(error);
   }
   error = OutputOverInput({"out", "report", "scene_out", "predictions", "checkpoint"});
+  if (error.empty()) {
+    error = SceneOverOther(*prepared->problem);
+  }
   if (!error.empty()) {
     return ReportError("tangible-fit: " + error, kExitUsage);
   }
   error = OpenCheckpoint(prepared->fit.input, &prepared->checkpoint);
   return error.empty() ? kExitDone : ReportError(error);
-}
-
-/// Of recording b: "scene_2.json" for "scene.json"; the name itself of a file with one run.
-std::string SceneOut(const RecordingsProblem& problem, int b) {
-  if (!problem.IsNamed()) {
-    return FLAGS_scene_out;
-  }
-  const std::filesystem::path path(FLAGS_scene_out);
-  const std::string name =
-      path.stem().string() + "_" + std::to_string(b) + path.extension().string();
-  return (path.parent_path() / name).string();
 }
 
 /// Returns what went wrong or empty.

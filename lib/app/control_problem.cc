@@ -12,6 +12,18 @@
 namespace tangible {
 namespace {
 
+// Steps of a plan or a run: each has controls, and a plan has Jacobians of each.
+constexpr double kMostSteps = 1e7;
+
+// A time of at least `least` steps of dt, s.
+double ReadSpan(const JsonReader& json, double dt, double least) {
+  const double span = json.Number(NumberKind::kPositive);
+  if (json.ok() && !(span >= least * dt && span <= kMostSteps * dt)) {
+    json.FailExpected("a time of at least half a step and at most 1e7 steps");
+  }
+  return span;
+}
+
 // Reads the parts of a problem whose scene is known.
 class Reader {
  public:
@@ -57,9 +69,15 @@ class Reader {
       problem_.paths.push_back(control.At("path").String());
       if (control.Has("low")) problem_.low[i] = control.At("low").Number();
       if (control.Has("high")) problem_.high[i] = control.At("high").Number();
-      if (control.Has("initial")) problem_.initial[i] = control.At("initial").Number();
       if (problem_.low[i] > problem_.high[i]) {
         control.At("high").FailExpected("a number >= low");
+        return;
+      }
+      problem_.initial[i] = std::clamp(0.0, problem_.low[i], problem_.high[i]);
+      if (!control.Has("initial")) continue;
+      problem_.initial[i] = control.At("initial").Number();
+      if (!(problem_.initial[i] >= problem_.low[i] && problem_.initial[i] <= problem_.high[i])) {
+        control.At("initial").FailExpected("a number from low to high");
       }
     }
   }
@@ -148,8 +166,9 @@ class Reader {
 
   void ReadPredictive(const JsonReader& json) {
     json.ExpectKeys({"duration", "horizon", "iterations"}, " of mpc");
-    problem_.run_duration = json.At("duration").Number(NumberKind::kPositive);
-    problem_.plan_horizon = json.At("horizon").Number(NumberKind::kPositive);
+    const double dt = problem_.scene.simulation.dt;
+    problem_.run_duration = ReadSpan(json.At("duration"), dt, 0.5);
+    problem_.plan_horizon = ReadSpan(json.At("horizon"), dt, 0.5);
     if (json.Has("iterations")) {
       problem_.plan_iterations = json.At("iterations").Integer(1, 1000000);
     }
@@ -181,7 +200,8 @@ bool LoadControlFile(const std::string& file, ControlFile* problem, std::string*
     problem->scene_path = Beside(file, scene);
     if (!LoadScene(problem->scene_path, &problem->scene, error)) return false;
     if (root.Has("horizon")) {
-      problem->scene.simulation.duration = root.At("horizon").Number(NumberKind::kPositive);
+      problem->scene.simulation.duration =
+          ReadSpan(root.At("horizon"), problem->scene.simulation.dt, 0.0);
     } else if (!(problem->scene.simulation.duration > 0.0)) {
       root.Fail("horizon: missing, expected a number > 0, as the scene's duration is 0");
     }

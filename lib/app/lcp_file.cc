@@ -118,7 +118,9 @@ class ProblemReader {
     MatrixXd basis = MatrixXd::Identity(n, n);
     if (problem.A.rows() > 0) {
       MatrixXd A = problem.A * scale.asDiagonal();
-      A.rowwise().normalize();  // a row of zeros remains
+      for (Index i = 0; i < A.rows(); ++i) {
+        A.row(i).normalize();  // a row of zeros remains
+      }
       const Eigen::ColPivHouseholderQR<MatrixXd> qr(A.transpose());
       const MatrixXd q = qr.householderQ();
       basis = q.rightCols(n - qr.rank());

@@ -109,21 +109,6 @@ std::filesystem::path FollowLinks(std::filesystem::path path) {
   return path;
 }
 
-bool IsSameFile(const std::string& a, const std::string& b) {
-  namespace fs = std::filesystem;
-  std::error_code error;
-  const fs::file_status status = fs::status(a, error);
-  if (fs::exists(status) && !fs::is_regular_file(status) && !fs::is_directory(status)) {
-    return false;  // a device or a pipe may be written to twice
-  }
-  if (fs::equivalent(a, b, error) && !error) return true;
-  std::error_code error_a;
-  std::error_code error_b;
-  const fs::path canonical_a = fs::weakly_canonical(FollowLinks(fs::absolute(a, error)), error_a);
-  const fs::path canonical_b = fs::weakly_canonical(FollowLinks(fs::absolute(b, error)), error_b);
-  return !error_a && !error_b && canonical_a == canonical_b;
-}
-
 // An error, or empty where no output is another output or an input.
 std::string SharedFile(const ProgramInfo& info, const std::vector<std::string>& positional) {
   std::vector<NamedFile> files;
@@ -311,6 +296,21 @@ std::string FormatNumber(double value) {
   std::string text;
   AppendNumber(value, &text);
   return text;
+}
+
+bool IsSameFile(const std::string& a, const std::string& b) {
+  namespace fs = std::filesystem;
+  std::error_code error;
+  const fs::file_status status = fs::status(a, error);
+  if (fs::exists(status) && !fs::is_regular_file(status) && !fs::is_directory(status)) {
+    return false;  // a device or a pipe may be written to twice
+  }
+  if (fs::equivalent(a, b, error) && !error) return true;
+  std::error_code error_a;
+  std::error_code error_b;
+  const fs::path canonical_a = fs::weakly_canonical(FollowLinks(fs::absolute(a, error)), error_a);
+  const fs::path canonical_b = fs::weakly_canonical(FollowLinks(fs::absolute(b, error)), error_b);
+  return !error_a && !error_b && canonical_a == canonical_b;
 }
 
 std::string OutputOverInput(const std::vector<std::string>& flags) {

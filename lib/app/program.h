@@ -83,6 +83,9 @@ enum class Over { kNoInput, kOwnInput };
 std::string WriteFileAtomically(const std::string& path, std::string_view text,
                                 Over over = Over::kNoInput);
 
+/// Whether two paths are of one file, there or not.
+bool IsSameFile(const std::string& a, const std::string& b);
+
 /// "--report: expected a file of its own, got that of an input, PATH" where a flag names a file
 /// that was read; empty where none does. To be called before the work, after all inputs have been
 /// read.

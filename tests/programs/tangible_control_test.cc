@@ -117,6 +117,18 @@ TEST_F(TangibleControlTest, MistakesAreOneLine) {
   ExpectOneLine(Control(Problem(kEffort, R"(, "horizon": 0)")), 1,
                 "/horizon: expected a number > 0, got 0");
   ExpectOneLine(Control(Problem(kEffort, R"(, "horizons": 1)")), 1, "unknown key");
+  ExpectOneLine(Control(Problem(kEffort, R"(, "horizon": 1e300)")), 1, "/horizon: expected a time");
+  for (const char* span : {"1e19", "1e-12"}) {
+    const std::string of(span);
+    ExpectOneLine(
+        Control(Problem(kEffort, R"(, "mpc": {"horizon": 1, "duration": )" + of + "}"), "--mpc"), 1,
+        "/mpc/duration: expected a time");
+    ExpectOneLine(
+        Control(Problem(kEffort, R"(, "mpc": {"duration": 1, "horizon": )" + of + "}"), "--mpc"), 1,
+        "/mpc/horizon: expected a time");
+  }
+  ExpectOneLine(Control(Problem(R"({"path": "joints/rail/effort", "high": 1, "initial": 2})")), 1,
+                "/controls/0/initial: expected a number from low to high");
   ExpectOneLine(Control(Problem(kEffort + R"(, {"path": "forces/push/force/y"})")), 1,
                 "forces/push/force/y: expected a control that moves something");
   std::string name = Problem(kEffort);

@@ -147,6 +147,12 @@ TEST_F(TangibleFitTest, MistakesInRecordingsNameThem) {
     ExpectOneLine(Fit(fit), 1, what);
   };
   expect({{"name", "a"}}, "/recordings/1/name: expected a name that no other recording has");
+  json second = good;
+  second["name"] = "b";
+  fit["recordings"] = {good, second};
+  ExpectOneLine(
+      Fit(fit, "--scene_out='" + Path("s.json") + "' --predictions='" + Path("s_1.json") + "'"), 2,
+      "--scene_out: expected files of their own");
   expect({{"start", 3}}, "recording 'b': /observations: expected some from start to end, got none");
   expect({{"start", 0.3}, {"end", 0.2}}, "/recordings/1/end: expected a time after start");
   expect({{"weight", 0}}, "/recordings/1/weight: expected a number > 0");

@@ -170,6 +170,19 @@ TEST_F(TangibleLcpTest, FlagsInEveryForm) {
             0);
 }
 
+// A row of A without entries says nothing, wherever it stands.
+TEST_F(TangibleLcpTest, RowsOfZerosInA) {
+  for (const char* rows : {R"("A": [[0, 0]], "b": [0])", R"("A": [[0, 0], [-1, 0]], "b": [0, 0])",
+                           R"("A": [[1, 0], [0, 0]], "b": [0, 0])"}) {
+    const ProgramRun run = Solve(std::string(R"({"M": [[1, 0], [0, 1]], "p": [0, 1], )") + rows +
+                                 R"(, "G": [[1, 1]], "F": [[0]], "c": [0]})");
+    ASSERT_EQ(run.exit_status, 0) << run.error;
+    const json v = json::parse(run.out)["v"];
+    EXPECT_NEAR(v[0], 0.0, 1e-15) << rows;
+    EXPECT_NEAR(v[1], 1.0, 1e-15) << rows;
+  }
+}
+
 // v is unique given z where M is positive definite on the null space of A, and need not be
 // elsewhere.
 TEST_F(TangibleLcpTest, MIsPositiveDefiniteWhereTheJointsLetMove) {

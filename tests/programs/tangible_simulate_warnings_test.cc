@@ -65,6 +65,19 @@ TEST_F(WarningsTest, SemiImplicitEulerByEventsSaysWhatItCosts) {
   EXPECT_NE(run.error.find(warning), std::string::npos) << run.error;
 }
 
+// A slender ellipse rolls over its tip, whose radius is 9e-6 m, within a step.
+TEST_F(WarningsTest, EnergyThatGrowsByEventsIsOneLine) {
+  const auto ellipse = [](const std::string& least) {
+    return R"({"bodies": [{"name": "e", "shape": {"ellipse": {"radii": [1, )" + least +
+           R"(]}}, "mass": 1, "position": [0, 0.5], "angle": 0.3},
+                {"name": "f", "static": true, "shape": {"half_plane": {"normal": [0, 1]}}}],
+                "simulation": {"dt": 0.005, "duration": 1, "stepping": "event"}})";
+  };
+  ExpectOneLine(Simulate(ellipse("0.003")), 0, "the energy grew from 4.905 J to");
+  EXPECT_GT(EnergyGain(), 1.0);
+  EXPECT_EQ(Simulate(ellipse("0.5")).error, "");
+}
+
 TEST_F(WarningsTest, OpenJointsAreOneLineWithTheRemedy) {
   const ProgramRun run = Simulate(Chain("8"));
   ExpectOneLine(run, 0, kRemedy);

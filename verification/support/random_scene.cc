@@ -26,7 +26,6 @@ double HalfHeight(const BasicShape<double>& shape) {
     case ShapeType::kBox:
       return 0.5 * shape.numbers[1];
     case ShapeType::kEllipse:
-      return shape.numbers[1];
     case ShapeType::kCapsule:
       return shape.numbers[1];
     case ShapeType::kPolygon: {

@@ -14,6 +14,8 @@ namespace {
 // coarse steps add.
 constexpr double kExploded = 1e4;
 
+}  // namespace
+
 bool IsDriven(const Model<double>& model, const State<double>& state) {
   const ModelStructure& s = *model.structure;
   if (!s.forces.empty()) {
@@ -32,8 +34,6 @@ bool IsDriven(const Model<double>& model, const State<double>& state) {
   }
   return false;
 }
-
-}  // namespace
 
 EnergyWatch::EnergyWatch(const Model<double>& model, const State<double>& initial) {
   const ModelStructure& s = *model.structure;

@@ -10,6 +10,9 @@
 
 namespace tangible {
 
+/// Whether forces, efforts or bodies of given motion drive the scene.
+bool IsDriven(const Model<double>& model, const State<double>& state);
+
 class EnergyWatch {
  public:
   /// A watch that examines nothing.

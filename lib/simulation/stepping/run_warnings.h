@@ -52,4 +52,9 @@ class RunWarnings {
 std::string FirstOrderByEvents(const Model<double>& model, const State<double>& initial,
                                const State<double>& final);
 
+/// Empty, or a line that the energy of a run by events has grown, though nothing drives the scene:
+/// a step that is too long for the motion.
+std::string EnergyGrown(const Model<double>& model, const RolloutReport& report,
+                        const State<double>& initial, const State<double>& final);
+
 }  // namespace tangible

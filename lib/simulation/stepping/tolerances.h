@@ -31,6 +31,9 @@ inline constexpr double kQuadraticStep = 1e-6;
 inline constexpr double kLastNewtonStep = 1e-8;
 /// Of the radius of gyration: the last step where a block is shifted, and convergence is linear.
 inline constexpr double kLastShiftedStep = 1e-14;
+/// Of the kinetic energies at both ends of a run: energy that grows by more without a cause is
+/// reported; it shows in the second digit of a speed.
+inline constexpr double kEnergyGrowth = 0.01;
 /// Of a step of Newton's method: the shortest part of it that is tried; then descent follows.
 inline constexpr double kShortestNewton = 1e-3;
 /// Of a step of descent: the shortest part of it that is tried.
