@@ -158,8 +158,8 @@ class Reader {
     return true;
   }
 
-  // Where the recording's own parameters start: {name: value}. Those that are shared start where the
-  // file says.
+  // Where the recording's own parameters start: {name: value}. Those that are shared start where
+  // the file says.
   void SetInitial(const JsonReader& reader, Json* own) const {
     if (!reader.Has("initial") || FromObservations(reader)) return;
     const JsonReader initial = reader.At("initial");

@@ -67,7 +67,7 @@ std::vector<std::string> RunWarnings::Finish(const Model<double>& model,
   coordinates_.LookAtBodies(model, final, report.time);
   std::vector<std::string> lines;
   std::string energy = FirstOrderByEvents(model, initial_, final);
-  if (energy.empty()) energy = EnergyGrown(model, report, initial_, final);
+  if (energy.empty() && !is_controlled_) energy = EnergyGrown(model, report, initial_, final);
   for (std::string line :
        {coordinates_.Message(model), joints_.Message(model), std::move(energy)}) {
     if (!line.empty()) lines.push_back(std::move(line));

@@ -36,6 +36,9 @@ class RunWarnings {
     return coordinates_.Message(model);
   }
 
+  /// Controls drive the scene, so that its energy may grow.
+  void SetControlled() { is_controlled_ = true; }
+
   /// All lines, without a file's name. `final` is the state at the report's time.
   std::vector<std::string> Finish(const Model<double>& model, const RolloutReport& report,
                                   const State<double>& final);
@@ -46,6 +49,7 @@ class RunWarnings {
   JointWatch joints_;
   CoordinateWatch coordinates_;
   State<double> initial_;
+  bool is_controlled_ = false;
 };
 
 /// Empty, or a line on the loss of accuracy by `semi_implicit_euler` with event stepping.
