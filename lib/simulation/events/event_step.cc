@@ -542,6 +542,21 @@ Segment& EventStepper::BeginSegment(double now, double until, const State<double
   return segment;
 }
 
+// The event that has ended `segment` at `now`: the modes after it, and its count, which is limited.
+bool EventStepper::TakeEvent(const Model<double>& model, double now, double h,
+                             const Segment& segment, State<double>* state, EventOutcome* outcome) {
+  SwitchMode(segment);
+  if (segment.event != EventKind::kTouch || segment.length <= kNoMotion * h) {
+    ++outcome->events;
+    if (counts_.Add(segment.event_contact) > MostEvents(model)) {
+      outcome->message = EventsDoNotEnd(model, "events", segment.event_contact);
+      return false;
+    }
+    search_.AllowEventsOf(counts_.num_pairs());
+  }
+  return EndOtherSlips(model, now, segment, state, outcome);
+}
+
 EventOutcome EventStepper::Advance(const Model<double>& model, double t, double h,
                                    State<double>* state) {
   EventOutcome outcome;
@@ -617,15 +632,7 @@ EventOutcome EventStepper::Advance(const Model<double>& model, double t, double 
     }
     halvings = 0;
     now += segment.length;
-    SwitchMode(segment);
-    if (segment.event != EventKind::kTouch || segment.length <= kNoMotion * h) {
-      ++outcome.events;
-      if (counts_.Add(segment.event_contact) > MostEvents(model)) {
-        return fail(EventsDoNotEnd(model, "events", segment.event_contact));
-      }
-      search_.AllowEventsOf(counts_.num_pairs());
-    }
-    if (!EndOtherSlips(model, now, segment, state, &outcome)) {
+    if (!TakeEvent(model, now, h, segment, state, &outcome)) {
       return fail(outcome.message);
     }
   }

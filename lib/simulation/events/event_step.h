@@ -139,6 +139,8 @@ class EventStepper {
                                     const ActiveContact& contact);
   /// Where a segment ends because a contact stops sliding, other contacts that stop at the same
   /// instant and whose bodies are not coupled to it get separate events.
+  bool TakeEvent(const Model<double>& model, double now, double h, const Segment& segment,
+                 State<double>* state, EventOutcome* outcome);
   bool EndOtherSlips(const Model<double>& model, double t, const Segment& segment,
                      State<double>* state, EventOutcome* outcome);
   bool SolveImpact(const Model<double>& model, Impulses* impact, State<double>* state,
