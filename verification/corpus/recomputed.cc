@@ -137,12 +137,12 @@ class ContactJudge {
     const Real mu = c.friction;
     const Row tangent{c.a, c.b, c.tangent_a, c.tangent_b};
     const Real slip = Speed(tangent) + c.c_t;
-    const Real sigma_t = Terms(tangent) + std::abs(static_cast<Real>(c.c_t));
+    const Real scale_t = Terms(tangent) + std::abs(static_cast<Real>(c.c_t));
     const Real zeta_t = zeta * std::max<Real>(1, mu);
     worst = std::max(worst, Share(std::max<Real>(0, std::abs(rubbed) - mu * pushed), zeta_t));
     // Where the contact slides, friction has its limit and opposes the sliding.
     const Real missing = std::abs(rubbed + (slip > 0 ? mu : -mu) * pushed);
-    return std::max(worst, std::min(Share(std::abs(slip), sigma_t), Share(missing, zeta_t)));
+    return std::max(worst, std::min(Share(std::abs(slip), scale_t), Share(missing, zeta_t)));
   }
 
  private:

@@ -86,7 +86,8 @@ void AssembleCorrection(const Model<T>& model, const State<T>& state,
 /// The share of joint drift that a correction removes: 0, Baumgarte's fraction, or 1.
 double JointCorrectionShare(const SimulationSettings& settings);
 
-/// The constant c_n of a contact's law; `approach` is n·v before the step, all bodies counted.
+/// The constant c_n of a contact's law, s_n = n·v⁺ + c_n (contact.h); `approach` is n·v before the
+/// step, all bodies counted.
 template <typename T>
 T LawConstant(ContactLaw law, const T& gap, double h, const T& restitution, const T& approach,
               const SimulationSettings& settings) {
@@ -98,9 +99,10 @@ T LawConstant(ContactLaw law, const T& gap, double h, const T& restitution, cons
       return T(0.0);
     case ContactLaw::kRecovery:
       return T(-settings.recovery_speed);
-    default:
-      return gap / h;
+    case ContactLaw::kGap:
+      break;
   }
+  return gap / h;
 }
 
 }  // namespace tangible

@@ -71,7 +71,8 @@ class Equations {
     SpringRow<T> row;
     EvaluateSpring<T>(b_.PoseOf(spring.a), b_.PoseOf(spring.b), x, &row);
     b_.Push(spring.a, row.pull_a, spring.b, row.pull_b, T(-Weight()));
-    b_.Along(spring.a, row.row_a, spring.b, row.row_b, T(0.0), T(Weight() * x[5]));
+    b_.Along(spring.a, row.row_a, spring.b, row.row_b, T(0.0),
+             T(Weight() * x[SpringIndex::kDamping]));
   }
 
   void Force(const ForceIndex& force) {

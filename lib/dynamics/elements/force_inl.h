@@ -89,8 +89,10 @@ void EvaluateSpring(const Pose<T>& pose_a, const Pose<T>& pose_b, const T* numbe
       apart ? Vector2<T>(offset / out->length) : Vector2<T>(T(0.0), T(0.0));
   out->row_a = PointRow(direction, arm_a);
   out->row_b = Negative(PointRow(direction, arm_b));
-  out->tension = numbers[4] * (out->length - numbers[6]);
-  const Vector2<T> pull = (offset - direction * numbers[6]) * numbers[4];
+  const T& stiffness = numbers[SpringIndex::kStiffness];
+  const T& rest_length = numbers[SpringIndex::kRestLength];
+  out->tension = stiffness * (out->length - rest_length);
+  const Vector2<T> pull = (offset - direction * rest_length) * stiffness;
   out->pull_a = PointRow(pull, arm_a);
   out->pull_b = Negative(PointRow(pull, arm_b));
 }

@@ -45,6 +45,7 @@ ShapeView<Dual<T>> DualShape(const ShapeView<T>& shape, bool is_edge, int featur
 
 }  // namespace
 
+// For a hinge the rates sum up to the centripetal term, Ȧ v = −ω_a² r_a + ω_b² r_b with the arms r.
 template <typename T>
 void EvaluateJointRates(JointType type, const MovingPose<T>& a, const MovingPose<T>& b,
                         const T* numbers, int num_numbers, JointRows<T>* rows,

@@ -76,6 +76,7 @@ struct JointIndex {
 
 /// Local anchors (2 + 2), stiffness, damping, rest length: seven parameters from `numbers` on.
 struct SpringIndex {
+  enum Place { kStiffness = 4, kDamping = 5, kRestLength = 6 };  ///< counted from `numbers`
   std::string name;
   int a = -1, b = -1;
   int numbers = -1;

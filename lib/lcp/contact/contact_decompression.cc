@@ -15,7 +15,7 @@ constexpr int kMaxRounds = 20;
 bool ChangeMode(const ContactValues& values, double normal, double tangent, double impulse_scale,
                 ContactBlock<double>* contact, ContactMode* mode) {
   const double zeta = NormalScale(*contact, values, impulse_scale);
-  const bool approaches = values.s_n < -kModeTolerance * values.sigma_n;
+  const bool approaches = values.s_n < -kModeTolerance * values.scale_n;
   if (*mode == ContactMode::kOpen) {
     if (approaches) {
       *mode = ModeOfClosing(*contact, values);
@@ -41,7 +41,7 @@ bool ChangeMode(const ContactValues& values, double normal, double tangent, doub
       *mode = tangent < 0.0 ? ContactMode::kSlidingPositive : ContactMode::kSlidingNegative;
       return true;
     }
-  } else if (SlidingSign(*mode) * values.slip < -kModeTolerance * values.sigma_t) {
+  } else if (SlidingSign(*mode) * values.slip < -kModeTolerance * values.scale_t) {
     *mode = ContactMode::kSticking;
     return true;
   }

@@ -27,17 +27,17 @@ ContactKink KinkOf(const ContactProblem<double>& problem, const ContactSolution<
   const double* v = solution.motion.data();
   const ContactValues values = Evaluate(problem, scales, c, v);
   const double normal = solution.normal_impulse[i];
-  const double zeta = NormalScale(c, values, scales.impulse);
-  const bool loaded = c.limit_given || normal > tolerance * zeta;
+  const double normal_scale = NormalScale(c, values, scales.impulse);
+  const bool loaded = c.limit_given || normal > tolerance * normal_scale;
   const double along = values.slip > 0.0 ? 1.0 : -1.0;
   if (!loaded) {
-    if (!touching && std::abs(values.s_n) > tolerance * values.sigma_n) {
+    if (!touching && std::abs(values.s_n) > tolerance * values.scale_n) {
       return {};
     }
     if (!c.has_friction) {
       return {Kind::kTouches, 0.0};
     }
-    const bool rests = std::abs(values.slip) <= tolerance * values.sigma_t;
+    const bool rests = std::abs(values.slip) <= tolerance * values.scale_t;
     return rests ? ContactKink{Kind::kTouchesAtRest, 0.0} : ContactKink{Kind::kTouches, along};
   }
   if (!c.has_friction) {
@@ -48,9 +48,10 @@ ContactKink KinkOf(const ContactProblem<double>& problem, const ContactSolution<
                : ContactKink{};
   }
   const double tangent = solution.tangent_impulse[i];
-  const double zeta_t = std::max(zeta * c.friction, values.sigma_t / values.mobility_t);
-  if (std::abs(values.slip) <= tolerance * values.sigma_t &&
-      c.friction * normal - std::abs(tangent) <= tolerance * zeta_t) {
+  const double tangent_scale =
+      std::max(normal_scale * c.friction, values.scale_t / values.mobility_t);
+  if (std::abs(values.slip) <= tolerance * values.scale_t &&
+      c.friction * normal - std::abs(tangent) <= tolerance * tangent_scale) {
     return {Kind::kFrictionLimit, tangent > 0.0 ? -1.0 : 1.0};
   }
   return {};

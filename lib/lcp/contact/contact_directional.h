@@ -12,7 +12,7 @@
 //                        0 ≤ λ̇n ⊥ ṡ ≥ 0,  λ̇t = −σ μ λ̇n,  σ = sign w
 //   touches at rest      s = λn = w = 0: Coulomb's law in the rates, |λ̇t| ≤ μ λ̇n
 //   friction limit       λn > 0, w = 0, λt = −σ μ λn:
-//                        λ̇t = −σ (μ λn)˙ + σ ζ,  0 ≤ ζ ⊥ σ ẇ ≥ 0
+//                        λ̇t = −σ (μ λn)˙ + σ ξ,  0 ≤ ξ ⊥ σ ẇ ≥ 0
 //   friction from zero   λn > 0, w = 0, μ = 0: |λ̇t| ≤ μ̇ λn, against ẇ
 //
 // With the system K of the other modes (contact_system.h), factorised once, a direction has
@@ -75,7 +75,7 @@ class ContactDirectional {
 
  private:
   enum class Part : unsigned char { kNormal, kTangent, kSpeed };
-  // A row of the LCP. kNormal: λ̇n ⊥ ṡ. kTangent: ζ ⊥ σ ẇ, or λ̇t + μ λ̇n ⊥ ẇ⁺. kSpeed: ẇ⁻ ⊥ the
+  // A row of the LCP. kNormal: λ̇n ⊥ ṡ. kTangent: ξ ⊥ σ ẇ, or λ̇t + μ λ̇n ⊥ ẇ⁺. kSpeed: ẇ⁻ ⊥ the
   // remaining friction, the row after its kTangent.
   struct Row {
     int contact;

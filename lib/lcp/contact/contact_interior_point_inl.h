@@ -30,16 +30,13 @@ class InteriorPointSystem {
  protected:
   // Maximum number of refinements of a linear solve.
   static constexpr int kMaxRefinements = 3;
-  // Where joints form loops their rows may be dependent; a proximal term keeps K regular and does
-  // not change the solution, as it acts on the change of y only.
-
-  // s / z, and a proximal term on the impulses' rows.
+  // s / z, and on the impulses' rows a proximal term: redundant contacts give K a condition number
+  // of the order of 1 / complementarity. A term on the change of z bounds it and does not change
+  // the solution.
   T ContactDiagonal(int row) const {
     const double proximal = row % 3 == 2 ? 0.0 : proximal_ * w_.unit_s[row] / w_.unit_z[row];
     return w_.s[row] / w_.z[row] + proximal;
   }
-  // Redundant contacts give K a condition number of the order of 1 / complementarity. A term on the
-  // change of z bounds it and does not change the solution.
 
   // Whether a row of z, s exists: the normal row exists unless λn is given, the others where the
   // contact has friction.
@@ -112,6 +109,8 @@ class InteriorPointSystem {
         if (r >= joint.rows) {
           diagonal[4 * r] = T(1.0);
         } else if (p_.redundant_joints) {
+          // Where joints form loops their rows may be dependent. A proximal term keeps K regular
+          // and does not change the solution, as it acts on the change of y only.
           diagonal[4 * r] =
               T(kProximal * RowMobility(p_.mass, joint.a, joint.row_a[r], joint.b, joint.row_b[r]));
         }
@@ -139,6 +138,7 @@ class InteriorPointSystem {
         d[4 * r] = Used(3 * i + r) ? ContactDiagonal(3 * i + r) : T(1.0);
       }
       if (c.has_friction) {
+        // F = [0 0 0; 0 0 1; 2μ −1 0] beside the diagonal, by rows (contact_problem.h).
         d[5] = T(1.0);
         d[6] = 2.0 * c.friction;
         d[7] = T(-1.0);

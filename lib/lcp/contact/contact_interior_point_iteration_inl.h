@@ -82,7 +82,7 @@ class ContactIteration : private InteriorPointSystem<T> {
       return false;
     }
     Residuals();
-    const double mu = Complementarity();
+    const double mean_product = Complementarity();
     for (int i = 0; i < 3 * nc_; ++i) {
       w_.target[i] = -w_.s[i] * w_.z[i];
     }
@@ -90,13 +90,14 @@ class ContactIteration : private InteriorPointSystem<T> {
     w_.ds_affine = w_.ds;
     w_.affine = w_.step;
     const double affine_alpha = std::min(1.0, ValueOf(BoundaryStep()));
-    const double ratio = mu > 0.0 ? AffineComplementarity(affine_alpha) / mu : 0.0;
+    const double ratio =
+        mean_product > 0.0 ? AffineComplementarity(affine_alpha) / mean_product : 0.0;
     const bool recentre = last_step_ < kRecentreBelow;
     const double centring = std::max(ratio * ratio * ratio, recentre ? kRecentring : 0.0);
     const double second_order = recentre ? 0.0 : 1.0;
     for (int i = 0; i < 3 * nc_; ++i) {
       if (Used(i)) {
-        w_.target[i] = centring * mu * Unit(i) - w_.s[i] * w_.z[i] -
+        w_.target[i] = centring * mean_product * Unit(i) - w_.s[i] * w_.z[i] -
                        second_order * w_.ds_affine[i] * Dz(w_.affine, i);
       }
     }
@@ -196,7 +197,7 @@ class ContactIteration : private InteriorPointSystem<T> {
         const double impulse = speed / RowMobility(p_.mass, c.a, c.tangent_a, c.b, c.tangent_b);
         w_.unit_s[3 * i + 1] = speed;
         w_.unit_z[3 * i + 1] = impulse;
-        // The cone row's slack is 2 μ λn − σ: its unit grows with max(1, μ), so that μ up to 1e6
+        // The cone row's slack is 2 μ λn − τ⁺: its unit grows with max(1, μ), so that μ up to 1e6
         // works.
         w_.unit_s[3 * i + 2] = impulse * std::max(1.0, 2.0 * ValueOf(c.friction));
         w_.unit_z[3 * i + 2] = speed;
@@ -242,7 +243,8 @@ class ContactIteration : private InteriorPointSystem<T> {
     }
   }
 
-  // Computes the Newton direction for z ds + s dz = target; fills step and ds.
+  // Computes the Newton direction for z ds + s dz = target; fills step and ds. With ds = (target −
+  // s dz) / z the rows G dv + F dz − ds = r become G dv + (F + diag(s / z)) dz = r + target / z.
   void Direction() {
     w_.step = w_.residual;
     T* contact_rows = w_.step.data() + 3 * (nb_ + nj_);

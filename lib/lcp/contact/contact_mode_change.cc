@@ -34,8 +34,8 @@ ModeChange Contradiction(const ContactBlock<double>& contact, const ContactValue
     return {ModeOfClosing(contact, values), 1.0};
   }
   if (mode == ContactMode::kOpen) {
-    if (values.s_n < -kModeTolerance * values.sigma_n) {
-      change.violation = -values.s_n / values.sigma_n;
+    if (values.s_n < -kModeTolerance * values.scale_n) {
+      change.violation = -values.s_n / values.scale_n;
       change.mode = ModeOfClosing(contact, values);
     }
     return change;
@@ -55,9 +55,9 @@ ModeChange Contradiction(const ContactBlock<double>& contact, const ContactValue
   } else if (mode != ContactMode::kClosed) {
     const double along = SlidingSign(mode) * values.slip;
     const double rounding =
-        std::min(contact.rounding, kSlipOfTolerance * tolerance * values.sigma_t);
-    if (along < -std::max(kModeTolerance * values.sigma_t, rounding)) {
-      change = {ContactMode::kSticking, -along / values.sigma_t};
+        std::min(contact.rounding, kSlipOfTolerance * tolerance * values.scale_t);
+    if (along < -std::max(kModeTolerance * values.scale_t, rounding)) {
+      change = {ContactMode::kSticking, -along / values.scale_t};
     }
   }
   return change;

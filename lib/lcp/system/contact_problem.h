@@ -17,10 +17,10 @@
 //
 // As a complementarity problem each contact with friction has three rows (the planar form of
 // Pfeiffer and Glocker, Multibody Dynamics with Unilateral Contacts, 1996, ch. 6). The sliding
-// speed is w = w⁺ − w⁻, its positive and negative parts, and λt = σ − μ λn:
+// speed is w = w⁺ − w⁻, its positive and negative parts, and λt = τ⁺ − μ λn:
 //   s_n = n v + c_n        ⊥ λn
-//   w⁺  = t v + c_t + w⁻   ⊥ σ
-//   σ⁻  = 2 μ λn − σ       ⊥ w⁻         σ⁻ = μ λn − λt
+//   w⁺  = t v + c_t + w⁻   ⊥ τ⁺        τ⁺ = μ λn + λt
+//   τ⁻  = 2 μ λn − τ⁺      ⊥ w⁻         τ⁻ = μ λn − λt
 // An impact's decompression (contact_decompression.h) adds a least impulse o to a contact:
 //   s_n = n v + c_n ≥ 0,   λn ≥ o,   s_n (λn − o) = 0
 // Dry friction in a joint is a contact without a normal row: λn = o = h, and μ is the torque or

@@ -181,31 +181,31 @@ ContactValues Evaluate(const ContactProblem<double>& problem, const ContactScale
                        const ContactBlock<double>& c, const double* v) {
   ContactValues values;
   values.s_n = RowDot(c.a, c.normal_a, c.b, c.normal_b, v) + c.c_n;
-  values.sigma_n = RowSpeed(scales, c.a, c.normal_a, c.b, c.normal_b) + std::abs(c.c_n);
+  values.scale_n = RowSpeed(scales, c.a, c.normal_a, c.b, c.normal_b) + std::abs(c.c_n);
   values.mobility_n = RowMobility(problem.mass, c.a, c.normal_a, c.b, c.normal_b);
   if (c.limit_given) {
-    values.sigma_n = 0.0;
+    values.scale_n = 0.0;
   }
-  values.slip = values.sigma_t = 0.0;
+  values.slip = values.scale_t = 0.0;
   values.mobility_t = 1.0;
   if (c.has_friction) {
     values.slip = RowDot(c.a, c.tangent_a, c.b, c.tangent_b, v) + c.c_t;
-    values.sigma_t = RowSpeed(scales, c.a, c.tangent_a, c.b, c.tangent_b) + std::abs(c.c_t);
+    values.scale_t = RowSpeed(scales, c.a, c.tangent_a, c.b, c.tangent_b) + std::abs(c.c_t);
     values.mobility_t = RowMobility(problem.mass, c.a, c.tangent_a, c.b, c.tangent_b);
     // Both rows of a contact have one scale of speed, because an impulse along one row leaves
     // rounding in the other.
-    values.sigma_n = values.sigma_t = std::max(values.sigma_n, values.sigma_t);
+    values.scale_n = values.scale_t = std::max(values.scale_n, values.scale_t);
   }
   if (c.limit_given) {  // far from closing, as it has no gap
-    values.s_n = values.sigma_n = values.sigma_n > 0.0 ? values.sigma_n : 1.0;
-    values.mobility_n = c.offset > 0.0 ? values.sigma_n / c.offset : 1.0;
+    values.s_n = values.scale_n = values.scale_n > 0.0 ? values.scale_n : 1.0;
+    values.mobility_n = c.offset > 0.0 ? values.scale_n / c.offset : 1.0;
   }
   return values;
 }
 
 double NormalScale(const ContactBlock<double>& contact, const ContactValues& values,
                    double impulse_scale) {
-  const double own = values.sigma_n / values.mobility_n;
+  const double own = values.scale_n / values.mobility_n;
   return contact.limit_given ? own : std::max(impulse_scale, own);
 }
 
@@ -229,16 +229,16 @@ double NaturalResidual(const ContactProblem<double>& problem,
     const ContactValues values = Evaluate(problem, scales, c, solution.motion.data());
     const double normal = solution.normal_impulse[i];
     const double zeta = NormalScale(c, values, scales.impulse);
-    double residual = RowResidual(normal - c.offset, zeta, values.s_n, values.sigma_n);
+    double residual = RowResidual(normal - c.offset, zeta, values.s_n, values.scale_n);
     if (c.has_friction) {
       const double limit = c.friction * normal;
       const double tangent = solution.tangent_impulse[i];
-      const double zeta_t = std::max(zeta * c.friction, values.sigma_t / values.mobility_t);
-      // w⁺ against σ⁺ = μ λn + λt, w⁻ against σ⁻ = μ λn − λt.
+      const double zeta_t = std::max(zeta * c.friction, values.scale_t / values.mobility_t);
+      // w⁺ against τ⁺ = μ λn + λt, w⁻ against τ⁻ = μ λn − λt.
       residual = std::max(
           {residual,
-           RowResidual(limit + tangent, zeta_t, std::max(0.0, values.slip), values.sigma_t),
-           RowResidual(limit - tangent, zeta_t, std::max(0.0, -values.slip), values.sigma_t)});
+           RowResidual(limit + tangent, zeta_t, std::max(0.0, values.slip), values.scale_t),
+           RowResidual(limit - tangent, zeta_t, std::max(0.0, -values.slip), values.scale_t)});
     }
     if (!(residual <= worst)) {
       worst = std::isnan(residual) ? HUGE_VAL : residual;
@@ -292,11 +292,11 @@ void FindDegenerateContacts(const ContactProblem<double>& problem,
     const double normal = solution.normal_impulse[i];
     const double zeta = NormalScale(c, values, scales.impulse);
     const bool grazes =
-        std::abs(values.s_n) <= tolerance * values.sigma_n && normal - c.offset <= tolerance * zeta;
-    const double zeta_t = std::max(zeta * c.friction, values.sigma_t / values.mobility_t);
+        std::abs(values.s_n) <= tolerance * values.scale_n && normal - c.offset <= tolerance * zeta;
+    const double zeta_t = std::max(zeta * c.friction, values.scale_t / values.mobility_t);
     const bool at_limit =
         c.has_friction && normal > tolerance * zeta &&
-        std::abs(values.slip) <= tolerance * values.sigma_t &&
+        std::abs(values.slip) <= tolerance * values.scale_t &&
         c.friction * normal - std::abs(solution.tangent_impulse[i]) <= tolerance * zeta_t;
     if (grazes || at_limit) {
       degenerate->push_back(static_cast<int>(i));
@@ -315,19 +315,19 @@ ContactMargin MarginOfContact(const ContactProblem<double>& problem,
   // 0 / 0 counts as 0: nothing moves and nothing pushes.
   const auto ratio = [](double x, double scale) { return scale > 0.0 ? x / scale : 0.0; };
   if (mode == ContactMode::kOpen) {
-    return {ratio(values.s_n, values.sigma_n), Kind::kClosing};
+    return {ratio(values.s_n, values.scale_n), Kind::kClosing};
   }
   const double zeta = NormalScale(c, values, scales.impulse);
   const ContactMargin opening =
-      c.driven ? ContactMargin{ratio(values.s_n, values.sigma_n), Kind::kClosing}
+      c.driven ? ContactMargin{ratio(values.s_n, values.scale_n), Kind::kClosing}
                : ContactMargin{ratio(normal - c.offset, zeta), Kind::kOpening};
   ContactMargin friction = opening;
   if (mode == ContactMode::kSticking) {
-    const double zeta_t = std::max(zeta * c.friction, values.sigma_t / values.mobility_t);
+    const double zeta_t = std::max(zeta * c.friction, values.scale_t / values.mobility_t);
     const double left = c.friction * normal - std::abs(solution.tangent_impulse[contact]);
     friction = {ratio(left, zeta_t), Kind::kFrictionLimit};
   } else if (mode != ContactMode::kClosed) {
-    friction = {ratio(SlidingSign(mode) * values.slip, values.sigma_t), Kind::kSlidingSpeed};
+    friction = {ratio(SlidingSign(mode) * values.slip, values.scale_t), Kind::kSlidingSpeed};
   }
   return friction.value < opening.value ? friction : opening;
 }

@@ -47,7 +47,7 @@ struct ContactScales {
 /// The values of a contact's rows at a solution, with their scales.
 struct ContactValues {
   double s_n, slip;         // n v + c_n, t v + c_t
-  double sigma_n, sigma_t;  // sums of |terms|
+  double scale_n, scale_t;  // sums of |terms|
   double mobility_n, mobility_t;
 };
 

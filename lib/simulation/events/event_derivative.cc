@@ -175,6 +175,7 @@ double EventDerivative::EventGradient(const Model<double>& model, Segment* segme
   } else if (segment->event == EventKind::kSlipEnds) {
     AddSlipGradient(model, segment->after, segment->event_contact, &scratch_, &entries);
   } else {
+    // Lift-off has g = λn; slip begins at g = Σ (μ λn − sign λt) over contacts that stick together.
     SolvedNode& node = segment->end;
     RowMatrixXd seed =
         RowMatrixXd::Zero(3 * static_cast<Eigen::Index>(node.system.num_blocks()), 1);
@@ -244,39 +245,40 @@ double EventDerivative::Tangent(const Model<double>& model, EventRecord* record,
   for (int variable = s.ParameterVariable(0); variable < s.num_variables(); ++variable) {
     fixed_[variable] = (w_dot->row(variable).array() == 0.0).all() ? 1 : 0;
   }
-  Row tau_dot = Row::Zero(columns + 1);
-  tau_dot(columns) = 1.0;
-  double left = 0.0;
+  Row length_seed = Row::Zero(columns + 1);
+  length_seed(columns) = 1.0;
+  double residual = 0.0;
   for (int p = 0; p < record->num_parts; ++p) {
     EventPart& part = *record->parts[p];
     if (part.is_impulses) {
-      left = std::max(left, ImpulsesTangent(model, &part.impulses, &x));
+      residual = std::max(residual, ImpulsesTangent(model, &part.impulses, &x));
       continue;
     }
     Segment& segment = part.segment;
     x.col(columns).setZero();
     const Row start = x.row(time);
-    left = std::max(left, SegmentTangent(model, &segment, &x, tau_dot));
-    Row moved = Row::Zero(columns + 1);
+    residual = std::max(residual, SegmentTangent(model, &segment, &x, length_seed));
+    Row tau_dot = Row::Zero(columns + 1);
     if (segment.IsEventLocated()) {
       Eigen::VectorXd gradient;
-      left = std::max(left, EventGradient(model, &segment, &gradient));
-      const Row change = gradient.transpose() * x;
+      residual = std::max(residual, EventGradient(model, &segment, &gradient));
+      const Row g_dot = gradient.transpose() * x;
       const double terms = gradient.cwiseAbs().dot(x.col(columns).cwiseAbs());
-      if (std::abs(change(columns)) > kNoRate * terms) {
-        moved = -change / change(columns);
+      if (std::abs(g_dot(columns)) > kNoRate * terms) {
+        tau_dot = -g_dot / g_dot(columns);
       }
     } else if (!segment.IsEventAtOnce()) {
-      moved = -start;
+      tau_dot = -start;
       if (segment.event_number >= 0) {
-        moved += x.row(s.ParameterVariable(segment.event_number));
+        tau_dot += x.row(s.ParameterVariable(segment.event_number));
       }
     }
-    moved(columns) = 0.0;
-    x += (x.col(columns) * moved).eval();
+    tau_dot(columns) = 0.0;
+    // ẋ⁺ = Ṡ|τ + S_τ τ̇
+    x += (x.col(columns) * tau_dot).eval();
   }
   *w_dot = x.topLeftCorner(s.num_variables(), columns);
-  return left;
+  return residual;
 }
 
 // The reverse sweep through the stages: w_bar of the integrated state on entry, of the state before

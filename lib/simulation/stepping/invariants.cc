@@ -56,7 +56,8 @@ double PotentialEnergy(const Model<double>& model, const State<double>& state) {
     SpringRow<double> row;
     EvaluateSpring(state.PoseOf(spring.a), state.PoseOf(spring.b),
                    &model.parameters[spring.numbers], &row);
-    energy += 0.5 * row.tension * (row.length - model.parameters[spring.numbers + 6]);
+    energy += 0.5 * row.tension *
+              (row.length - model.parameters[spring.numbers + SpringIndex::kRestLength]);
   }
   for (const JointIndex& joint : s.joints) {
     if (joint.stiffness >= 0) {

@@ -34,9 +34,9 @@ double Bound(const ContactProblem<double>& p, const ContactSolution<double>& sol
   const ContactScales scales(p, solution);
   for (size_t i = 0; i < p.contacts.size(); ++i) {
     const ContactValues values = Evaluate(p, scales, p.contacts[i], solution.motion.data());
-    bound = std::max({bound, values.mobility_n * solution.normal_impulse[i] / values.sigma_n,
+    bound = std::max({bound, values.mobility_n * solution.normal_impulse[i] / values.scale_n,
                       values.mobility_t * std::abs(solution.tangent_impulse[i]) /
-                          std::max(values.sigma_t, values.sigma_n)});
+                          std::max(values.scale_t, values.scale_n)});
   }
   return 2.0 * kDelta * bound + 1e-14;
 }

@@ -57,8 +57,8 @@ TEST(ContactResidualTest, ValuesOfAContactAreThoseByHand) {
   EXPECT_DOUBLE_EQ(values.s_n, 2.0 + 0.5 * 3.0 - 0.25);
   EXPECT_DOUBLE_EQ(values.slip, 1.0 + 0.2 * 3.0);
   // Scales are no less than the largest term and the constant, and one for both rows of a contact.
-  EXPECT_GE(values.sigma_n, 2.0 + 0.25);
-  EXPECT_DOUBLE_EQ(values.sigma_t, values.sigma_n);
+  EXPECT_GE(values.scale_n, 2.0 + 0.25);
+  EXPECT_DOUBLE_EQ(values.scale_t, values.scale_n);
   EXPECT_DOUBLE_EQ(values.mobility_n, 1.0 + 0.25 / 0.1);
   EXPECT_DOUBLE_EQ(values.mobility_t, 1.0 + 0.04 / 0.1);
   EXPECT_EQ(ImpulseScale({1.0, -3.0, 2.0}), 3.0);
