@@ -160,9 +160,11 @@ std::string TimingLine(const Json& timing) {
 std::string ErrorByFrameSvg(const std::vector<Json>& cells) {
   std::vector<PlotSeries> series;
   for (const Json& cell : cells) {
-    if (!IsOf(cell, "billiards") || !cell.contains("ahead")) continue;
+    const std::string name = cell["cell"];
+    // Other seeds than the first would lie upon it.
+    if (!IsOf(cell, "billiards") || !cell.contains("ahead") || !name.ends_with("_0")) continue;
     PlotSeries& one = series.emplace_back();
-    one.label = cell["cell"];
+    one.label = name;
     for (size_t k = 0; k < cell["ahead"]["model"]["position"].size(); ++k) {
       one.x.push_back(static_cast<double>(k + 1));
       one.y.push_back(cell["ahead"]["model"]["position"][k]);
@@ -181,7 +183,8 @@ std::string ErrorByLabelsSvg(const std::vector<Json>& cells) {
   for (const Json& cell : cells) {
     if (!IsOf(cell, "billiards") || !cell.contains("ahead")) continue;
     const std::string name = cell["cell"];
-    const std::string model = name.substr(0, name.find('_', std::string("billiards_").size()));
+    const size_t labels_at = name.rfind('_', name.rfind('_') - 1);  // MODEL_LABELS_SEED
+    const std::string model = name.substr(0, labels_at);
     auto& [sum, count] = sums[model][100.0 * cell["labels"].get<double>()];
     sum += cell["ahead"]["model"]["position"].back().get<double>();
     ++count;
