@@ -3,17 +3,15 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <memory>
 #include <sstream>
 
 #include "tangible/estimation/fit/block_system.h"
 #include "tangible/estimation/fit/linearisation.h"
+#include "tangible/math/scalar.h"
 
 namespace tangible {
 namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 // Ceres stops where the cost changes by less than this, or q by less than that, relative; the
 // polish goes on from there.

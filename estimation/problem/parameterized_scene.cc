@@ -3,16 +3,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <sstream>
 
+#include "tangible/math/scalar.h"
 #include "tangible/scene/parameter.h"
 #include "tangible/simulation/stepping/step.h"
 
 namespace tangible {
 namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 std::string Text(double x) {
   std::ostringstream text;

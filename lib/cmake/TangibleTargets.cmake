@@ -112,6 +112,11 @@ function(tangible_module name)
       tangible_precompile(${target})
     endif()
     add_dependencies(tangible_unit_and_program_tests ${target})
+    # Sources of verification have names of their own in common, as each is a list of cases.
+    if(TANGIBLE_UNITY AND NOT CMAKE_CURRENT_SOURCE_DIR MATCHES "/verification")
+      set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 8
+        UNITY_BUILD_CODE_BEFORE_INCLUDE "#undef TANGIBLE_INSTANTIATE\n#undef TANGIBLE_INSTANTIATE_JET")
+    endif()
   else()
     add_library(${target} INTERFACE)
     set(scope INTERFACE)

@@ -3,13 +3,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numeric>
+
+#include "tangible/math/scalar.h"
 
 namespace tangible {
 namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 /// Bounded only where its normal lies along an axis.
 Aabb HalfPlaneBox(const ShapeView<double>& shape, const Pose<double>& pose, double margin) {

@@ -2,14 +2,12 @@
 #include "tangible/geometry/collide_core.h"
 
 #include <cmath>
-#include <limits>
 
 #include "tangible/geometry/tolerances.h"
+#include "tangible/math/scalar.h"
 
 namespace tangible::internal {
 namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 /// How far apart two faces' ends may be along them, m. A power of two: where features change, and
 /// what a run makes of it, must not depend on the faces' lengths, whose derivative would be

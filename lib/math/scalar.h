@@ -15,6 +15,7 @@
 #include <ceres/jet.h>
 
 #include <Eigen/Core>
+#include <limits>
 
 #include "tangible/config/jet_widths.h"
 
@@ -27,6 +28,8 @@ using Jet = ceres::Jet<double, N>;
 /// that such an evaluation calls are instantiated for it whatever the widths listed.
 inline constexpr int kLocalJetWidth = TANGIBLE_LOCAL_JET_WIDTH;
 using LocalJet = Jet<kLocalJetWidth>;
+
+inline constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 /// The value of a scalar, without its derivatives.
 inline double ValueOf(double x) { return x; }

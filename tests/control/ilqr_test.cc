@@ -3,19 +3,19 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Cholesky>
 #include <cmath>
-#include <limits>
 #include <random>
 
 #include "../support/scenes.h"
 #include "tangible/control/engine_step.h"
+#include "tangible/math/scalar.h"
 
 namespace tangible {
 namespace {
 
 using test_scenes::SceneOf;
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kPi = 3.14159265358979323846;
 
 // x⁺ = A x + B u.

@@ -3,17 +3,16 @@
 
 #include <gtest/gtest.h>
 
-#include <limits>
 #include <random>
 
 #include "../support/allocation_counter.h"
 #include "random_shapes.h"
+#include "tangible/math/scalar.h"
 
 namespace tangible::testing {
 namespace {
 
 using Pairs = std::vector<std::pair<int, int>>;
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr auto kAll = [](int, int) { return true; };
 
 bool Overlap(const Aabb& a, const Aabb& b) {

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "tangible/math/scalar.h"
 #include "tangible/scene/parameter.h"
 #include "tangible/scene/scene_json.h"
 #include "tangible/simulation/gradient/gradient.h"
@@ -15,8 +16,6 @@
 
 namespace tangible::extremes {
 namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 double Energy(const Model<double>& model, const State<double>& state) {
   return KineticEnergy(model, state) + PotentialEnergy(model, state);

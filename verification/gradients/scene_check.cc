@@ -8,6 +8,7 @@
 #include <map>
 #include <utility>
 
+#include "tangible/math/scalar.h"
 #include "tangible/simulation/stepping/step.h"
 
 namespace tangible {
@@ -16,7 +17,6 @@ namespace {
 constexpr double kRounding = 1e-13;  // of the contributions
 constexpr double kShareOfColumn = 0.1;
 constexpr double kInteriorPointEnd = 1e-14;
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
 std::string Short(double x) {

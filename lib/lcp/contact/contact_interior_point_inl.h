@@ -79,22 +79,15 @@ class InteriorPointSystem {
     }
     int edge = 0;
     for (const DamperBlock<T>& d : p_.dampers) {
-      const auto add = [&](const RowPart<T>& left, const RowPart<T>& right, T* block) {
-        for (int i = 0; i < 3; ++i) {
-          for (int j = 0; j < 3; ++j) {
-            block[3 * i + j] += d.weight * left[i] * right[j];
-          }
-        }
-      };
       if (d.a >= 0) {
-        add(d.row_a, d.row_a, w_.lu.Diagonal(d.a));
+        AddOuter(d.row_a, d.row_a, d.weight, w_.lu.Diagonal(d.a));
       }
       if (d.b >= 0) {
-        add(d.row_b, d.row_b, w_.lu.Diagonal(d.b));
+        AddOuter(d.row_b, d.row_b, d.weight, w_.lu.Diagonal(d.b));
       }
       if (d.a >= 0 && d.b >= 0) {
-        add(d.row_a, d.row_b, w_.lu.FirstSecond(edge));
-        add(d.row_b, d.row_a, w_.lu.SecondFirst(edge));
+        AddOuter(d.row_a, d.row_b, d.weight, w_.lu.FirstSecond(edge));
+        AddOuter(d.row_b, d.row_a, d.weight, w_.lu.SecondFirst(edge));
         ++edge;
       }
     }

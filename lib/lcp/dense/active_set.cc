@@ -18,8 +18,6 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-double Ratio(double value, double scale) { return value == 0.0 ? 0.0 : value / scale; }
-
 // The point plus the correction with which it satisfies the equations of `modes`.
 LcpVector SolveModes(const MixedLcp<double>& problem, const std::vector<RowMode>& modes,
                      const LcpVector& from) {

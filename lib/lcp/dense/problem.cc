@@ -28,9 +28,6 @@ std::string CheckBlock(const char* name, const MatrixXd& block, Index rows, Inde
   return "";
 }
 
-// value / scale; 0 for a row without any terms, which holds exactly.
-double Ratio(double value, double scale) { return value == 0.0 ? 0.0 : value / scale; }
-
 // The smallest y with the same Aᵀ y. Joints that contradict each other can have a part of y of any
 // size that cancels in Aᵀ y; it moves nothing and must not enter a scale.
 VectorXd EffectiveImpulse(const MatrixXd& A, const VectorXd& y) {

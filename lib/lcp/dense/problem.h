@@ -113,6 +113,9 @@ inline VectorX<double> RowOf(const MatrixX<double>& matrix, Eigen::Index i) {
 VectorX<double> Slack(const MixedLcp<double>& problem, const VectorX<double>& v,
                       const VectorX<double>& z);
 
+/// value / scale; 0 for a row without any terms, which holds exactly.
+inline double Ratio(double value, double scale) { return value == 0.0 ? 0.0 : value / scale; }
+
 /// The scaled natural residual: the largest of |min(zᵢ / ζᵢ, sᵢ / σᵢ)| over the rows of (3) and of
 /// the residuals of (1) and (2) over their scales. Infinite if a number is not finite.
 double ScaledResidual(const MixedLcp<double>& problem, const VectorX<double>& v,

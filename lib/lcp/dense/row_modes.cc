@@ -16,8 +16,6 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-double Ratio(double value, double scale) { return value == 0.0 ? 0.0 : value / scale; }
-
 struct Ratios {
   VectorXd z;  // zᵢ / ζᵢ
   VectorXd s;  // sᵢ / σᵢ

@@ -18,10 +18,6 @@ struct CondensedRow {
   RowPart<double> constraint_a, constraint_b;
 };
 
-RowPart<double> Combine(const RowPart<double>& x, double factor, const RowPart<double>& y) {
-  return {x[0] + factor * y[0], x[1] + factor * y[1], x[2] + factor * y[2]};
-}
-
 double DiagonalOf(const ClosedContacts& contacts, size_t contact, int k) {
   return k == 0 && contacts.problem.contacts[contact].driven
              ? 1.0
@@ -38,17 +34,6 @@ void ForEachRow(const ContactBlock<double>& c, ContactMode mode, const Visit& vi
                         c.driven ? none : c.normal_b});
   if (mode == ContactMode::kSticking) {
     visit(1, CondensedRow{c.tangent_a, c.tangent_b, c.tangent_a, c.tangent_b});
-  }
-}
-
-// block += (left)ᵀ (right) weight, 3 x 3.
-void AddOuter(const RowPart<double>& left, const RowPart<double>& right, double weight,
-              double* block) {
-  for (int i = 0; i < 3; ++i) {
-    const double scaled = weight * left[i];
-    for (int j = 0; j < 3; ++j) {
-      block[3 * i + j] += scaled * right[j];
-    }
   }
 }
 

@@ -144,6 +144,22 @@ struct ContactSolution {
   }
 };
 
+/// x + factor y.
+inline RowPart<double> Combine(const RowPart<double>& x, double factor, const RowPart<double>& y) {
+  return {x[0] + factor * y[0], x[1] + factor * y[1], x[2] + factor * y[2]};
+}
+
+/// block += leftᵀ weight right, 3 x 3 by rows.
+template <typename T>
+void AddOuter(const RowPart<T>& left, const RowPart<T>& right, const T& weight, T* block) {
+  for (int i = 0; i < 3; ++i) {
+    const T scaled = weight * left[i];
+    for (int j = 0; j < 3; ++j) {
+      block[3 * i + j] += scaled * right[j];
+    }
+  }
+}
+
 /// row · v over the moving blocks.
 template <typename T, typename V>
 T RowDot(int a, const RowPart<T>& row_a, int b, const RowPart<T>& row_b, const V* v) {

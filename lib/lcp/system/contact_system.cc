@@ -20,16 +20,6 @@ constexpr int kMaxRefinements = 40;
 // residual exceeds this multiple of it is rejected.
 constexpr double kStays = 2.0;
 
-// Adds (left)ᵀ (right) weight to a 3 x 3 block.
-void AddOuter(const RowPart<double>& left, const RowPart<double>& right, double weight,
-              double* block) {
-  for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j) {
-      block[3 * i + j] += weight * left[i] * right[j];
-    }
-  }
-}
-
 // block(row, :) += part, of a constraint's 3 x 3 block on a body.
 void AddToRow(const RowPart<double>& part, int row, double* block) {
   for (int i = 0; i < 3; ++i) {
@@ -42,10 +32,6 @@ void SubtractFromColumn(const RowPart<double>& part, int column, double* block) 
   for (int i = 0; i < 3; ++i) {
     block[3 * i + column] -= part[i];
   }
-}
-
-RowPart<double> Combine(const RowPart<double>& x, double factor, const RowPart<double>& y) {
-  return {x[0] + factor * y[0], x[1] + factor * y[1], x[2] + factor * y[2]};
 }
 
 // If masses differ by more than this factor, a factorisation loses so many digits that solutions

@@ -3,16 +3,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
 
 #include "tangible/dynamics/model/lengths.h"
+#include "tangible/math/scalar.h"
 #include "tangible/simulation/certificate/tolerances.h"
 
 namespace tangible {
 namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 class PairTies {
  public:

@@ -6,6 +6,7 @@
 #include <limits>
 #include <string>
 
+#include "tangible/math/scalar.h"
 #include "tangible/simulation/events/event_search_inl.h"
 #include "tangible/simulation/events/tolerances.h"
 
@@ -16,8 +17,6 @@ namespace {
 // takes about ten evaluations; one search over a motion whose rates cannot be used takes a
 // thousand.
 constexpr long kEvaluationsOfEvent = 1000;
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 double SpeedOf(const double* twist, double radius) {
   return std::hypot(twist[0], twist[1]) + std::abs(twist[2]) * radius;

@@ -6,12 +6,11 @@
 #include <cmath>
 #include <limits>
 
+#include "tangible/math/scalar.h"
 #include "tangible/simulation/events/event_search_inl.h"
 
 namespace tangible {
 namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 // The gap of a contact or limit, and the speed at which it grows.
 double GapAndSpeed(const Model<double>& model, const State<double>& state,

@@ -17,7 +17,7 @@ inline bool Contains(const std::vector<ActiveContact>& contacts, const ActiveCon
                      [&](const ActiveContact& c) { return c.SameAs(contact); });
 }
 
-inline constexpr int kMostHalvings = 1000;
+inline constexpr int kMostBisections = 1000;
 inline constexpr int kMostRefinements = 200;
 
 // Illinois' variant of the secant method within a bracket, with halving where three steps have not
@@ -116,7 +116,7 @@ bool EventSearch::FirstRoot(const Model<double>& model, const Gap& gap, const Ra
     if (i.fb <= 0.0) {
       crossing = i;
     }
-    if (k == kMostHalvings) {
+    if (k == kMostBisections) {
       break;
     }
     if (std::isnan(i.fa) || std::isnan(i.fb)) {

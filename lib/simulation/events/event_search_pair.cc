@@ -7,13 +7,12 @@
 #include <limits>
 
 #include "tangible/dynamics/model/tolerances.h"
+#include "tangible/math/scalar.h"
 #include "tangible/simulation/events/event_search_inl.h"
 #include "tangible/simulation/events/tolerances.h"
 
 namespace tangible {
 namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 // The contact of a vertex that leaves an edge at its end changes its feature when the vertex meets
 // the vertex there, not when the gap of the next feature is reached, whose edge has another end:

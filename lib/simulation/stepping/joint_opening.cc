@@ -3,17 +3,15 @@
 
 #include <cmath>
 #include <cstdio>
-#include <limits>
 
 #include "tangible/dynamics/elements/joint.h"
 #include "tangible/dynamics/model/lengths.h"
+#include "tangible/math/scalar.h"
 #include "tangible/scene/scene_names.h"
 #include "tangible/simulation/stepping/tolerances.h"
 
 namespace tangible {
 namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 // The size of a body, m; infinite for bodies that do not move.
 double SizeOf(const Model<double>& model, int body) {

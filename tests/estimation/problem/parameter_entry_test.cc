@@ -4,12 +4,12 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <limits>
+
+#include "tangible/math/scalar.h"
 
 namespace tangible {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 const ParameterEntry kMass{"mass", 2.0, 0.5, 20.0, true, 2.0};
 const ParameterEntry kLength{"length", 0.3, -1.0, kInfinity, false, 0.5};
 

@@ -7,14 +7,13 @@
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <random>
 #include <utility>
 
+#include "tangible/math/scalar.h"
+
 namespace tangible {
 namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 std::vector<ParameterEntry> Entries(int count) {
   std::vector<ParameterEntry> entries;
