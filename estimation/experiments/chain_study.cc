@@ -7,6 +7,7 @@
 #include <random>
 
 #include "tangible/estimation/experiments/random.h"
+#include "tangible/estimation/experiments/tolerances.h"
 
 namespace tangible {
 namespace {
@@ -45,7 +46,8 @@ ChainStudy::ChainStudy(const Scene& scene, double rate, const ChainStudyOptions&
       exact_.parameters.push_back(mass);
       truth_.push_back(link.mass);
     }
-    const int samples = static_cast<int>(std::floor(scene.simulation.duration * rate + 1e-9));
+    const int samples =
+        static_cast<int>(std::floor(scene.simulation.duration * rate + kSampleRounding));
     for (int k = 0; k <= samples && link.motion == Motion::kMoving; ++k) {
       for (const Coordinate coordinate : {Coordinate::kX, Coordinate::kY}) {
         exact_.observations.push_back(

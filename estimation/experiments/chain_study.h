@@ -13,6 +13,7 @@
 #include <string>
 #include <vector>
 
+#include "tangible/estimation/experiments/tolerances.h"
 #include "tangible/estimation/fit/fit.h"
 
 namespace tangible {
@@ -20,7 +21,7 @@ namespace tangible {
 struct ChainStudyOptions {
   int starts = 20;
   double range = 100.0;
-  double reached = 1e-8;
+  double reached = kReachedTruth;
   int replicas = 1000;
   double sigma = 0.001;  ///< m
   unsigned seed = 1;

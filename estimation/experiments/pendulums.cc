@@ -8,6 +8,7 @@
 #include <memory>
 #include <utility>
 
+#include "tangible/estimation/experiments/tolerances.h"
 #include "tangible/estimation/results/fit_json.h"
 #include "tangible/scene/scene_json.h"
 
@@ -75,7 +76,7 @@ bool Predict(const PendulumJob& job, const FitProblem& problem, PendulumResult* 
     PredictionError prediction{static_cast<double>(seconds), 0.0};
     for (Eigen::Index i = 0; i < errors.size(); ++i) {
       const double time = run.observations()[i].time;
-      if (time > fitted && time <= fitted + seconds + 1e-9) {
+      if (time > fitted && time <= fitted + seconds + kWindowRounding) {
         prediction.error = std::max(prediction.error, std::abs(errors[i]));
       }
     }

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "tangible/estimation/experiments/recording.h"
+#include "tangible/estimation/experiments/tolerances.h"
 #include "tangible/scene/csv.h"
 #include "tangible/scene/json_reader.h"
 #include "tangible/scene/scene_names.h"
@@ -17,8 +18,6 @@ namespace tangible {
 namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-// A row whose time is off by rounding still belongs to the window.
-constexpr double kTimeSlack = 1e-9;
 
 /// One column of a file.
 struct ValueColumn {
@@ -387,7 +386,8 @@ class RowCollector {
         return false;
       }
       const bool wanted = layout_.name < 0 || !name.empty();
-      if (!wanted || time < options_.from - kTimeSlack || time > options_.to + kTimeSlack) {
+      if (!wanted || time < options_.from - kWindowRounding ||
+          time > options_.to + kWindowRounding) {
         continue;
       }
       if (!ReadValues(row, time - options_.from, name)) {

@@ -13,23 +13,14 @@
 #include "tangible/estimation/fit/linearisation.h"
 #include "tangible/estimation/fit/minimise.h"
 #include "tangible/estimation/fit/shooting.h"
+#include "tangible/estimation/fit/tolerances.h"
 #include "tangible/estimation/fit/windows.h"
 #include "tangible/estimation/problem/problem_with_priors.h"
 #include "tangible/estimation/uncertainty/residual_quality.h"
+#include "tangible/estimation/uncertainty/tolerances.h"
 
 namespace tangible {
 namespace {
-
-// A parameter that moves the residuals, as a vector, by no more than this many sigma, changed by
-// its own magnitude, has no effect.
-constexpr double kNoEffect = 1e-12;
-
-// Minima whose costs differ by less than this, relative, are one.
-constexpr double kSameCost = 1e-6;
-
-// Differences carry an error of about 1e-9, the other methods one of about 1e-12.
-constexpr double kRankTolerance = 1e-9;
-constexpr double kRankToleranceOfDifferences = 1e-6;
 
 /// A start drawn within the bounds, evenly in the minimiser's coordinates; where there is no bound,
 /// within a factor of ten, or a typical magnitude, of the initial value.
@@ -365,8 +356,8 @@ void Finish(FitRun* run, FitResult* result) {
   uncertainty.leverages = run->options.leverages;
   uncertainty.huber = run->options.huber;
   uncertainty.rank_tolerance = run->options.derivatives == DerivativeMethod::kFiniteDifference
-                                   ? kRankToleranceOfDifferences
-                                   : kRankTolerance;
+                                   ? kDifferencesRank
+                                   : kJacobianRank;
   result->uncertainty = EstimateUncertainty(*run->problem, best.parameters, blocks, uncertainty);
 }
 

@@ -9,30 +9,12 @@
 
 #include "tangible/estimation/fit/block_system.h"
 #include "tangible/estimation/fit/linearisation.h"
+#include "tangible/estimation/fit/tolerances.h"
 
 namespace tangible {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
-// Ceres stops where the cost changes by less than this, or q by less than that, relative; the
-// polish goes on from there.
-constexpr double kFunctionTolerance = 1e-10;
-constexpr double kParameterTolerance = 1e-9;
-// Far from the optimum Huber's loss is linear in nearly all residuals, and steps of Gauss-Newton
-// creep: where the median residual is beyond its bound, plain squares lead the way, until an
-// iteration gains less than this. Outliers then cost nothing, for the robust loss has the last
-// word.
-constexpr double kApproachTolerance = 1e-2;
-constexpr double kApproachFactor = 4.0;
-// With Huber's loss Ceres goes on to this; then Newton's method takes over, which unlike its steps
-// counts no curvature where the loss is linear (0.75 a step where half of the residuals are).
-constexpr double kRobustTolerance = 1e-4;
-// Root mean square of residuals, in sigma, below which the observations are free of noise and met
-// to rounding.
-constexpr double kExactFit = 1e-8;
-// ε of minimise.h.
-constexpr double kRelativeOffset = 1e-3;
 
 // A parameter that is pushed against a bound by so many iterations is held there until the others
 // have converged.
@@ -41,9 +23,6 @@ constexpr int kMaxRounds = 10;
 // Where a step is left at Ceres' end it goes on with a new trust region, so many times at most.
 constexpr int kMaxAttempts = 3;
 
-constexpr double kPolishedStep = 1e-13;  // of q
-// Costs that are equal to this, relative, do not tell which point is better.
-constexpr double kEqualCost = 1e-9;
 // From this number of parameters on sparse factorisations pay.
 constexpr int kManyParameters = 100;
 

@@ -11,6 +11,7 @@
 
 #include "tangible/dynamics/elements/joint.h"
 #include "tangible/estimation/fit/minimise.h"
+#include "tangible/estimation/fit/tolerances.h"
 #include "tangible/simulation/stepping/invariants.h"
 
 namespace tangible {
@@ -18,17 +19,6 @@ namespace {
 
 // Of a parabola at first: few, so that no impact is likely to lie between them.
 constexpr size_t kFewest = 5;
-// A parabola explains its samples where the sum of squares is no more than this many times its
-// degrees of freedom, with a little room for few of them.
-constexpr double kExplained = 2.0;
-// Weights of joints and contacts, stage by stage, in multiples of that of the best observation.
-// From far outside of the joints the observations alone lead the way.
-constexpr double kStages[] = {0.0, 1.0, 1e2, 1e5};
-// Of an unknown's scale: the standard deviation of a prior that it stays where it was. What is
-// observed to 1e-3 of its scale is moved by 1e-14 of it; what nothing determines stays.
-constexpr double kAnchor = 1e4;
-// Of an unknown's scale: of central differences, whose error is of its square.
-constexpr double kDifference = 1e-5;
 constexpr int kIterations = 50;
 
 /// One sample of a series.
@@ -140,7 +130,7 @@ class StateProblem : public LeastSquaresProblem {
     evaluation->jacobian.resize(evaluation->residuals.size(), p.size());
     for (Eigen::Index k = 0; k < p.size(); ++k) {
       const ParameterEntry& entry = entries_[static_cast<size_t>(k)];
-      const double h = kDifference * entry.scale;
+      const double h = kStateDifference * entry.scale;
       Eigen::VectorXd moved[2] = {p, p};
       moved[0][k] = std::max(p[k] - h, entry.lower);
       moved[1][k] = std::min(p[k] + h, entry.upper);
@@ -173,7 +163,7 @@ class StateProblem : public LeastSquaresProblem {
     ++row;
     for (Eigen::Index k = 0; k < p.size(); ++k) {
       const ParameterEntry& entry = entries_[static_cast<size_t>(k)];
-      (*rows)[row++] = (p[k] - entry.initial) / (kAnchor * entry.scale);
+      (*rows)[row++] = (p[k] - entry.initial) / (kStatePrior * entry.scale);
     }
     return rows->allFinite();
   }
@@ -229,7 +219,7 @@ Eigen::VectorXd Solve(StateProblem* problem) {
   options.max_iterations = kIterations;
   options.threads = 1;
   Eigen::VectorXd x = InitialOf(problem->entries());
-  for (const double stage : kStages) {
+  for (const double stage : kJointWeights) {
     problem->SetStage(stage);
     const Minimum minimum = Minimise(
         options, x, [] { return 0.0; }, {}, problem);

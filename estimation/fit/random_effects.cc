@@ -9,24 +9,17 @@
 #include <functional>
 #include <utility>
 
+#include "tangible/estimation/fit/tolerances.h"
 #include "tangible/estimation/problem/problem_with_priors.h"
 
 namespace tangible {
 namespace {
 
-// Of a column's length: what is left of it is rounding, and the column not determined.
-constexpr double kUndetermined = 1e-12;
-// RangeOf, in multiples of the median deviation of a recording's own value; and of the spread now.
-constexpr double kSmallest = 1e-3;
-constexpr double kLargest = 1e3;
 // Points at which a likelihood is looked at before its maximum is sought between two of them.
 constexpr int kGrid = 41;
-// Of ln τ: bits to which a maximum, which is flat, can be found; and changes that are none.
+// Bits of ln τ to which a maximum, which is flat, can be found.
 constexpr int kBits = 24;
-constexpr double kSettledLogarithm = 1e-6;
 constexpr int kMostSweeps = 50;
-// Far above the range: as good as infinite in (2).
-constexpr double kInfinite = 1e6;
 constexpr int kBisections = 100;
 
 /// ln of the diagonal's sizes of a triangular matrix, of those that are determined.
@@ -35,7 +28,7 @@ double LogDiagonal(const Eigen::MatrixXd& factor, const Eigen::VectorXd& lengths
   double sum = 0.0;
   for (Eigen::Index i = 0; i < std::min(count, factor.rows()); ++i) {
     const double size = std::abs(factor(i, i));
-    if (size > kUndetermined * lengths[i]) sum += std::log(size);
+    if (size > kUndeterminedColumn * lengths[i]) sum += std::log(size);
   }
   return sum;
 }
@@ -144,15 +137,15 @@ std::pair<double, double> SpreadLikelihood::RangeOf(int effect) const {
     const Eigen::HouseholderQR<Eigen::MatrixXd> qr(own);
     const Eigen::Index last = own.cols() - 1;
     const double left = own.rows() > last ? std::abs(qr.matrixQR()(last, last)) : 0.0;
-    if (left > kUndetermined * own.norm()) {
+    if (left > kUndeterminedColumn * own.norm()) {
       const double size = of.kind == PriorKind::kLogNormal ? std::abs(estimate_[k]) : 1.0;
       deviations.push_back(1.0 / (left * size));
     }
   }
-  if (deviations.empty()) return {kSmallest * of.spread, kLargest * of.spread};
+  if (deviations.empty()) return {kLeastSpread * of.spread, kLargestSpread * of.spread};
   const auto middle = deviations.begin() + static_cast<std::ptrdiff_t>(deviations.size() / 2);
   std::nth_element(deviations.begin(), middle, deviations.end());
-  return {kSmallest * *middle, kLargest * std::max(*middle, of.spread)};
+  return {kLeastSpread * *middle, kLargestSpread * std::max(*middle, of.spread)};
 }
 
 namespace {
@@ -198,7 +191,7 @@ double Crossing(const std::function<double(double)>& q, double level, double low
 ConfidenceInterval IntervalOf(const SpreadLikelihood& likelihood, size_t effect, int recordings,
                               bool mean_has_prior, std::vector<double> spreads) {
   const auto [low, high] = likelihood.RangeOf(static_cast<int>(effect));
-  spreads[effect] = kInfinite * high;
+  spreads[effect] = kInfiniteSpread * high;
   const double free = likelihood.At(spreads).twice_cost;
   const auto q = [&](double spread) {
     spreads[effect] = spread;
@@ -207,8 +200,9 @@ ConfidenceInterval IntervalOf(const SpreadLikelihood& likelihood, size_t effect,
   const int freedom = recordings - (mean_has_prior ? 0 : 1);
   if (freedom < 1) return std::nullopt;
   const boost::math::chi_squared distribution(freedom);
-  return std::pair(Crossing(q, boost::math::quantile(distribution, 0.975), low, kInfinite * high),
-                   Crossing(q, boost::math::quantile(distribution, 0.025), low, kInfinite * high));
+  return std::pair(
+      Crossing(q, boost::math::quantile(distribution, 0.975), low, kInfiniteSpread * high),
+      Crossing(q, boost::math::quantile(distribution, 0.025), low, kInfiniteSpread * high));
 }
 
 /// The linear problem at the estimate; false where a run fails.

@@ -5,12 +5,11 @@
 #include <cmath>
 #include <utility>
 
+#include "tangible/estimation/fit/tolerances.h"
+#include "tangible/estimation/uncertainty/tolerances.h"
+
 namespace tangible {
 namespace {
-
-constexpr double kDeviationByMedian = 1.4826;
-// ρ_s below which a sensor's observations leave no residuals.
-constexpr double kLeastRedundancy = 0.5;
 
 /// Σ r² of some rows, or what stands for it with Huber's loss.
 double SquareSum(const Eigen::VectorXd& residuals, const std::vector<int>& rows, double huber) {

@@ -9,17 +9,14 @@
 #include "tangible/estimation/fit/linearisation.h"
 #include "tangible/estimation/fit/minimise.h"
 #include "tangible/estimation/fit/observed_state.h"
+#include "tangible/estimation/fit/tolerances.h"
 #include "tangible/estimation/problem/problem_with_priors.h"
 #include "tangible/simulation/derivatives/rollout_tangent.h"
 
 namespace tangible {
 namespace {
 
-// Standard deviations of the jumps, stage by stage, in multiples of the observations' median sigma.
-constexpr double kStages[] = {1e3, 30.0, 1.0};
 constexpr int kIterationsPerStage = 30;
-// Standard deviation of the joints' errors, the same.
-constexpr double kOnJoints = 0.01;
 
 /// The unknown numbers of a moving body's state in the rows of w = [poses | twists | parameters].
 int StateRow(const ModelStructure& s, int i) {
@@ -418,7 +415,7 @@ FitApproachResult Shoot(const FitOptions& options, const Eigen::VectorXd& start,
   FitOptions stage_options = options;
   stage_options.max_iterations = kIterationsPerStage;
   double least = HUGE_VAL;
-  for (const double stage : kStages) {
+  for (const double stage : kJumpSigmas) {
     shooting.SetJumpSigma(stage);
     ProblemWithPriors with_priors(&shooting, shooting.effects());
     const Minimum minimum = Minimise(

@@ -6,13 +6,12 @@
 #include <utility>
 
 #include "tangible/estimation/fit/fit_checkpoint.h"
+#include "tangible/estimation/fit/tolerances.h"
 
 namespace tangible {
 namespace {
 
 constexpr int kMostFits = 20;
-// Changes of a sensor's factor, in multiples of its deviation, and of a spread, relative.
-constexpr double kSettledChange = 1e-3;
 
 /// `next` as the continuation of `result`.
 void Append(FitResult next, FitResult* result) {

@@ -6,11 +6,10 @@
 #include <cmath>
 #include <sstream>
 
+#include "tangible/estimation/uncertainty/tolerances.h"
+
 namespace tangible {
 namespace {
-
-// Weights that are rounding or derivatives' errors beside the largest of a combination.
-constexpr double kSmallWeight = 1e-6;
 
 std::string Short(double x) {
   std::ostringstream text;

@@ -42,7 +42,4 @@ std::vector<DeterminedCombination> FindDeterminedCombinations(
     const std::vector<ParameterEntry>& entries, const Eigen::VectorXd& estimate,
     const Eigen::MatrixXd& none, const RowMatrixXd& covariance, const RowMatrixXd& robust);
 
-/// Parameters with a smaller share of a direction than this have none.
-inline constexpr double kSmallShare = 1e-4;
-
 }  // namespace tangible

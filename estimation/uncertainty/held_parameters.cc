@@ -8,11 +8,10 @@
 #include <sstream>
 #include <utility>
 
+#include "tangible/estimation/uncertainty/tolerances.h"
+
 namespace tangible {
 namespace {
-
-// A number of which the free parameters can do all but this part cannot be told from them.
-constexpr double kSeparable = 1e-5;
 
 std::string Short(double x) {
   std::ostringstream text;

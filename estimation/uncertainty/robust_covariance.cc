@@ -11,16 +11,12 @@
 #include <utility>
 
 #include "tangible/estimation/uncertainty/decomposition.h"
+#include "tangible/estimation/uncertainty/tolerances.h"
 
 namespace tangible {
 namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-// Wider kernels leave fewer than 4.5 degrees of freedom.
-constexpr double kLargestBandwidth = 1.0 / 3.0;
-// An autoregression that is nearer to 1 asks for a kernel beyond kLargestBandwidth anyway.
-constexpr double kLargestAutoregression = 0.97;
-constexpr double kAndrewsFactor = 1.1447;  // of Bartlett's kernel
 
 /// Residuals at the same time count as one: their influences are added.
 struct TimeSeries {
@@ -268,7 +264,7 @@ bool Jackknife(const std::vector<Reduced>& reduced, const std::vector<RecordingR
       score[k] *= scale;
     }
     Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr;
-    qr.setThreshold(std::max(options.rank_tolerance, 1e-12));
+    qr.setThreshold(std::max(options.rank_tolerance, kJackknifeRank));
     qr.compute(left);
     if (qr.rank() < size) {
       return false;

@@ -46,6 +46,7 @@
 #include <Eigen/Core>
 #include <vector>
 
+#include "tangible/estimation/uncertainty/tolerances.h"
 #include "tangible/math/scalar.h"
 
 namespace tangible {
@@ -68,7 +69,7 @@ struct RecordingRows {
 
 struct RobustOptions {
   double huber = 0.0;  ///< as FitOptions
-  double rank_tolerance = 1e-9;
+  double rank_tolerance = kJacobianRank;
 };
 
 enum class RobustMethod {

@@ -7,12 +7,12 @@
 #include <sstream>
 
 #include "tangible/estimation/uncertainty/decomposition.h"
+#include "tangible/estimation/uncertainty/tolerances.h"
 
 namespace tangible {
 namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-constexpr double kNormalQuantile = 1.959963984540054;  // of 0.975
 // Of a combination that a message names.
 constexpr int kMostTerms = 12;
 
@@ -139,7 +139,8 @@ class Estimator {
       result_.warnings.push_back(
           "residuals are correlated in time (" + Short(result_.whiteness.correlation) +
           " from one sample to the next, probability by chance " +
-          (result_.whiteness.p_value > 1e-12 ? Short(result_.whiteness.p_value) : "below 1e-12") +
+          (result_.whiteness.p_value > kLeastProbability ? Short(result_.whiteness.p_value)
+                                                         : "below " + Short(kLeastProbability)) +
           "): the model misses something, whatever sigma is, and the intervals from sigma are too "
           "narrow");
     }

@@ -35,6 +35,7 @@
 #include "tangible/estimation/uncertainty/combinations.h"
 #include "tangible/estimation/uncertainty/residual_quality.h"
 #include "tangible/estimation/uncertainty/robust_covariance.h"
+#include "tangible/estimation/uncertainty/tolerances.h"
 #include "tangible/math/scalar.h"
 
 namespace tangible {
@@ -46,7 +47,7 @@ inline constexpr int kMostCovariance = 300;
 enum class Leverages { kSkip, kCompute };
 
 struct UncertaintyOptions {
-  double rank_tolerance = 1e-9;
+  double rank_tolerance = kJacobianRank;
   double condition_warning = 1e4;  ///< of J with unit columns
   double huber = 0.0;              ///< as FitOptions
   Leverages leverages = Leverages::kSkip;

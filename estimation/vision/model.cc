@@ -5,6 +5,8 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "tangible/estimation/vision/tolerances.h"
+
 namespace tangible {
 namespace {
 
@@ -102,7 +104,7 @@ at::Tensor EncoderImpl::Centres(const at::Tensor& pictures) {
   const at::Tensor z = second_(torch::relu(first_(torch::avg_pool2d(pictures, 2))));
   const at::Tensor weights = torch::nn::functional::softplus(
                                  z, torch::nn::functional::SoftplusFuncOptions().beta(kSharpness)) +
-                             1e-9;
+                             kLeastWeight;
   const at::Tensor at = 2.0 * torch::arange(kPictureSize / 2, pictures.options()) + 1.0;
   const at::Tensor total = weights.sum({2, 3});
   const at::Tensor x = (weights.sum(2) * at).sum(-1) / total;
@@ -173,8 +175,7 @@ at::Tensor DecoderImpl::forward(const at::Tensor& positions) {
   const at::Tensor y = (corner.select(-1, 1).unsqueeze(-1) + offset).unsqueeze(-1);
   const at::Tensor dx = x + 0.5 - inside.select(-1, 0).reshape({rows, n, 1, 1});
   const at::Tensor dy = y + 0.5 - inside.select(-1, 1).reshape({rows, n, 1, 1});
-  // The root's slope at 0 is infinite.
-  const at::Tensor distance = torch::sqrt(dx * dx + dy * dy + 1e-6);
+  const at::Tensor distance = torch::sqrt(dx * dx + dy * dy + kSmoothDistance);
   const auto within = [](const at::Tensor& at) { return (at >= 0).logical_and(at < kPictureSize); };
   const at::Tensor drawn = within(x).logical_and(within(y)).expand_as(distance);
   const at::Tensor share = Share(distance) * drawn.to(positions.scalar_type());

@@ -8,6 +8,7 @@
 #include <mutex>
 
 #include "tangible/estimation/vision/evaluation.h"
+#include "tangible/estimation/vision/tolerances.h"
 #include "tangible/estimation/vision/training.h"
 
 namespace tangible {
@@ -22,7 +23,7 @@ constexpr int kTestStride = 3;    // frames between windows that billiards are t
 double CpuSeconds() {
   timespec time{};
   clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
-  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
+  return static_cast<double>(time.tv_sec) + static_cast<double>(time.tv_nsec) / 1e9;
 }
 
 double Median(std::vector<double> values) {
@@ -283,14 +284,15 @@ double GradientError() {
   };
   const at::Tensor p = mass.clone().requires_grad_(), x = state.clone().requires_grad_();
   loss(p, x).backward();
-  constexpr double kStep = 1e-6;
   const auto error = [](double a, double b) {
     return std::abs(a - b) / (std::abs(a) + std::abs(b));
   };
-  const double by_mass =
-      ((loss(mass + kStep, state) - loss(mass - kStep, state)) / (2.0 * kStep)).item<double>();
+  const double by_mass = ((loss(mass + kGradientStep, state) - loss(mass - kGradientStep, state)) /
+                          (2.0 * kGradientStep))
+                             .item<double>();
   const double by_state =
-      ((loss(mass, state + kStep * way) - loss(mass, state - kStep * way)) / (2.0 * kStep))
+      ((loss(mass, state + kGradientStep * way) - loss(mass, state - kGradientStep * way)) /
+       (2.0 * kGradientStep))
           .item<double>();
   return std::max(error(by_mass, p.grad().item<double>()),
                   error(by_state, (x.grad() * way).sum().item<double>()));
@@ -316,9 +318,9 @@ bool QuickCheck(std::string* lines) {
     good = good && holds;
   };
   const double gradient = GradientError();
-  check(gradient < 1e-6,
+  check(gradient < kGradientAgrees,
         "gradient of the physics layer against central differences: relative error " +
-            Format("%.1e", gradient) + ", at most 1e-6");
+            Format("%.1e", gradient) + ", at most " + Format("%.0e", kGradientAgrees));
   const DiscData data =
       MakeDiscData({.kind = DiscKind::kBilliards, .sequences = 24, .frames = 20, .seed = 1});
   TrainingOptions options;

@@ -8,6 +8,8 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "tangible/estimation/vision/tolerances.h"
+
 namespace tangible {
 namespace {
 
@@ -111,7 +113,7 @@ Trainer::~Trainer() = default;
 
 Trainer::Batch Trainer::Draw() const {
   const int count = data_.num_sequences();
-  const int labelled = static_cast<int>(std::ceil(options_.labels * count - 1e-9));
+  const int labelled = static_cast<int>(std::ceil(options_.labels * count - kLabelRounding));
   std::uint64_t counter = Mix(options_.seed) ^ (static_cast<std::uint64_t>(iteration_) << 20);
   const auto below = [&](int n) {
     return static_cast<int>(Mix(counter++) % static_cast<std::uint64_t>(n));

@@ -19,7 +19,7 @@ constexpr double kFirstForce = 1.0;
 double CpuSeconds() {
   timespec time{};
   clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
-  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
+  return static_cast<double>(time.tv_sec) + static_cast<double>(time.tv_nsec) / 1e9;
 }
 
 CostTerm Term(CostTerm::Kind kind, int index, double weight, bool at_end) {

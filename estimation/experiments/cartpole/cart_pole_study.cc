@@ -9,6 +9,7 @@
 #include <mutex>
 #include <numbers>
 
+#include "tangible/estimation/experiments/cartpole/tolerances.h"
 #include "tangible/estimation/experiments/random.h"
 #include "tangible/estimation/fit/linearisation.h"
 
@@ -19,7 +20,6 @@ constexpr int kTestSamples = 400;        // of the motion that is predicted
 constexpr unsigned kTestSeed = 1000000;  // beyond those of recordings
 constexpr int kMembers = 5;              // of the ensemble
 constexpr int kRepetitions = 20;         // of timings
-constexpr double kDifference = 1e-6;     // of states and forces
 
 const CartPoleState kHanging(0.0, std::numbers::pi, 0.0, 0.0);
 
@@ -129,10 +129,10 @@ class DifferencedStep : public StepMap {
       VectorX<double> ends[2];
       for (const int end : {0, 1}) {
         VectorX<double> at = x, force = u;
-        (i < n ? at[i] : force[i - n]) += end == 0 ? -kDifference : kDifference;
+        (i < n ? at[i] : force[i - n]) += end == 0 ? -kMapDifference : kMapDifference;
         if (!map_->Step(k, at, force, &ends[end], error)) return false;
       }
-      (i < n ? a->col(i) : b->col(i - n)) = (ends[1] - ends[0]) / (2.0 * kDifference);
+      (i < n ? a->col(i) : b->col(i - n)) = (ends[1] - ends[0]) / (2.0 * kMapDifference);
     }
     return map_->Step(k, x, u, next, error);
   }

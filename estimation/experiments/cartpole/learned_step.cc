@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "tangible/estimation/experiments/cartpole/tolerances.h"
 #include "tangible/estimation/experiments/random.h"
 
 namespace tangible {
@@ -13,7 +14,6 @@ namespace {
 constexpr int kInputs = 5;
 constexpr int kAhead = 10;                // steps, of the comparison of candidates
 constexpr double kValidationShare = 0.2;  // of the recording, at its end
-constexpr double kLeastDeviation = 1e-9;  // of a number that hardly varies: not scaled further
 
 Eigen::VectorXd InputOf(const VectorX<double>& x, double u) {
   Eigen::VectorXd input(kInputs);

@@ -3,11 +3,12 @@
 
 #include <cmath>
 
+#include "tangible/estimation/experiments/breakout/agent/tolerances.h"
+
 namespace tangible {
 namespace {
 
-constexpr double kAsPredicted = 1.01;  // pixels: speeds of 1.5 are 1 and 2 in turn
-constexpr double kFastest = 6.0;       // pixels a frame: no ball is faster
+constexpr double kFastest = 6.0;  // pixels a frame: no ball is faster
 
 }  // namespace
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tangible/estimation/experiments/breakout/agent/tolerances.h"
 #include "tangible/scene/scene.h"
 
 namespace tangible {
@@ -12,10 +13,7 @@ namespace {
 // Bodies: the ball, walls, the paddle's line, bricks.
 constexpr int kBall = 0, kLeftWall = 1, kRightWall = 2, kCeiling = 3, kLine = 4, kFirstBrick = 5;
 constexpr int kMostPlaced = 8;          // bricks in the scene: a row is met in at most three
-constexpr double kBeside = 1.0;         // pixels beside the ball's way that count as on it
 constexpr double kAway = -1000.0;       // m: where bricks are that do not count
-constexpr double kBeyond = 0.01;        // frames: a step ends so long after the walls are reached
-constexpr double kSameFrame = 1e-6;     // frames: rounding of the time of a meeting
 constexpr double kFarFrames = 10000.0;  // longer than any flight from wall to wall
 constexpr int kMostMeetings = 60;       // of a flight
 
@@ -95,8 +93,8 @@ void FlightModel::PlaceBricks(const BallState& ball, const Bricks& bricks, doubl
     for (int column = 0; column < kBrickColumns; ++column) {
       const int brick = row * kBrickColumns + column;
       const Rectangle& place = arena_.bricks[brick];
-      if (!bricks[brick] || place.x > right + kBallAcross + kBeside ||
-          place.x + place.width < left - kBeside) {
+      if (!bricks[brick] || place.x > right + kBallAcross + kBesideWay ||
+          place.x + place.width < left - kBesideWay) {
         continue;
       }
       double* pose = &state_.pose[3 * (kFirstBrick + placed_.size())];
@@ -130,7 +128,8 @@ bool FlightModel::FirstMeeting(const BallState& ball, const Bricks& bricks, doub
                       : ball.v.y() < 0.0 ? (arena_.top - ball.at.y()) / ball.v.y()
                                          : kFarFrames;
   const double length =
-      std::min(frames, std::max(0.0, std::min(across, down > -1.0 ? down : kFarFrames))) + kBeyond;
+      std::min(frames, std::max(0.0, std::min(across, down > -1.0 ? down : kFarFrames))) +
+      kPassedWall;
   Place(ball, bricks, length);
   stepper_->ClearGuess();
   ++num_steps_;

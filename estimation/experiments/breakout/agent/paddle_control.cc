@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "tangible/control/ilqr.h"
+#include "tangible/estimation/experiments/breakout/agent/tolerances.h"
 
 namespace tangible {
 namespace {
@@ -12,8 +13,6 @@ namespace {
 constexpr int kComparedSteps = 5;  // 3⁵ sequences
 constexpr int kLongestPlan = 12;   // steps
 constexpr int kIterations = 4;     // of iLQR
-constexpr double kThere = 4.0;     // pixels: nearer than any press brings it
-constexpr double kAtRest = 1.0;    // pixels a frame
 constexpr double kPressed = 0.5;   // a planned press beyond it becomes one
 // Of the comparison, pixels²: out of the interval, a press, a pixel a frame as the ball is met.
 constexpr double kOutside = 25.0, kPress = 0.05, kMoving = 0.1;
@@ -42,7 +41,7 @@ int PaddleControl::Direction(const PaddleState& state, const PaddleGoal& goal) {
 
 int PaddleControl::Plan(const PaddleState& state, const PaddleGoal& goal) {
   // A paddle that waits where it should be has nothing to plan.
-  if (std::abs(state.x - goal.x) < kThere && std::abs(state.v) < kAtRest) return 0;
+  if (std::abs(state.x - goal.x) < kAtPlace && std::abs(state.v) < kPaddleRests) return 0;
   ++num_plans_;
   const int steps = std::min(kLongestPlan, static_cast<int>(std::ceil(goal.frames / kFrameSkip)));
   using Kind = CostTerm::Kind;

@@ -3,10 +3,11 @@
 
 #include <cmath>
 
+#include "tangible/estimation/experiments/breakout/agent/tolerances.h"
+
 namespace tangible {
 namespace {
 
-constexpr double kSameOffset = 1.6;   // pixels: returns this near are alike
 constexpr size_t kMostReturns = 400;  // kept
 
 // What is met: rows of bricks are several things.
