@@ -6,8 +6,8 @@
 #include <cmath>
 #include <random>
 
-#include "tangible/estimation/experiments/random.h"
 #include "tangible/estimation/experiments/tolerances.h"
+#include "tangible/math/random.h"
 
 namespace tangible {
 namespace {

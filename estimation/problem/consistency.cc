@@ -4,21 +4,14 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <sstream>
 
 #include "tangible/estimation/problem/tolerances.h"
 #include "tangible/geometry/mass_properties.h"
 #include "tangible/geometry/shape.h"
+#include "tangible/render/html.h"
 
 namespace tangible {
 namespace {
-
-std::string Short(double x) {
-  std::ostringstream text;
-  text.precision(4);
-  text << x;
-  return text.str();
-}
 
 double Cross(const Vector2<double>& a, const Vector2<double>& b) {
   return a[0] * b[1] - a[1] * b[0];
@@ -83,9 +76,9 @@ std::vector<std::string> FindInconsistentBodies(const Scene& scene) {
                       "' cannot exist: its centre of mass is outside of its shape");
     } else if (body.inertia && *body.inertia > (1.0 + kInertiaRounding) * body.mass * largest) {
       found.push_back("body '" + body.name + "' cannot exist: expected an inertia of at most " +
-                      Short(body.mass * largest) + " kg m^2, that of its mass of " +
-                      Short(body.mass) + " kg at the border of its shape, got " +
-                      Short(*body.inertia));
+                      CompactNumber(body.mass * largest, 4) + " kg m^2, that of its mass of " +
+                      CompactNumber(body.mass, 4) + " kg at the border of its shape, got " +
+                      CompactNumber(*body.inertia, 4));
     }
   }
   return found;

@@ -5,20 +5,13 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <sstream>
 #include <utility>
 
 #include "tangible/estimation/uncertainty/tolerances.h"
+#include "tangible/render/html.h"
 
 namespace tangible {
 namespace {
-
-std::string Short(double x) {
-  std::ostringstream text;
-  text.precision(3);
-  text << x;
-  return text.str();
-}
 
 /// v without what the columns of `qr` can do.
 template <typename Matrix>
@@ -216,9 +209,9 @@ std::vector<HeldParameter> FindHeldParameters(const Eigen::VectorXd& estimate,
 
 std::string Describe(const HeldParameter& held) {
   std::string text = "the observations contradict '" + held.path + "', which is held at " +
-                     Short(held.value) + ": released, it would change by " + Short(held.change) +
-                     " to first order and the cost fall by " + Short(100.0 * held.cost_share) +
-                     " %";
+                     CompactNumber(held.value, 3) + ": released, it would change by " +
+                     CompactNumber(held.change, 3) + " to first order and the cost fall by " +
+                     CompactNumber(100.0 * held.cost_share, 3) + " %";
   for (size_t i = 0; i < held.releases.size(); ++i) {
     text += (i == 0 ? ", and it drives '" : ", '") + held.releases[i] + "'";
   }

@@ -5,7 +5,7 @@
 #include <memory>
 
 #include "tangible/estimation/experiments/breakout/agent/detector.h"
-#include "tangible/estimation/experiments/random.h"
+#include "tangible/math/random.h"
 
 namespace tangible {
 namespace {

@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <mutex>
 
-#include "tangible/estimation/experiments/random.h"
 #include "tangible/estimation/fit/linearisation.h"
+#include "tangible/math/random.h"
 
 namespace tangible {
 namespace {

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "tangible/estimation/experiments/breakout/game/breakout_game.h"
-#include "tangible/estimation/experiments/random.h"
+#include "tangible/math/random.h"
 
 namespace tangible {
 namespace {

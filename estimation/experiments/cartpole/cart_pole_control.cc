@@ -5,7 +5,7 @@
 #include <ctime>
 #include <numbers>
 
-#include "tangible/estimation/experiments/random.h"
+#include "tangible/math/random.h"
 
 namespace tangible {
 namespace {

@@ -10,8 +10,8 @@
 #include <numbers>
 
 #include "tangible/estimation/experiments/cartpole/tolerances.h"
-#include "tangible/estimation/experiments/random.h"
 #include "tangible/estimation/fit/linearisation.h"
+#include "tangible/math/random.h"
 
 namespace tangible {
 namespace {

@@ -6,7 +6,7 @@
 #include <limits>
 
 #include "tangible/estimation/experiments/cartpole/tolerances.h"
-#include "tangible/estimation/experiments/random.h"
+#include "tangible/math/random.h"
 
 namespace tangible {
 namespace {

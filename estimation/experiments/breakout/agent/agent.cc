@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "tangible/estimation/experiments/random.h"
+#include "tangible/math/random.h"
 
 namespace tangible {
 namespace {

@@ -7,7 +7,7 @@
 #include <set>
 #include <tuple>
 
-#include "tangible/estimation/experiments/random.h"
+#include "tangible/math/random.h"
 
 namespace tangible {
 namespace {

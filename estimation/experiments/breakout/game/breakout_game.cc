@@ -5,7 +5,7 @@
 #include <cmath>
 #include <cstdlib>
 
-#include "tangible/estimation/experiments/random.h"
+#include "tangible/math/random.h"
 
 namespace tangible {
 namespace {
