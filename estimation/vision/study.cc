@@ -4,12 +4,12 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <ctime>
 #include <mutex>
 
 #include "tangible/estimation/vision/evaluation.h"
 #include "tangible/estimation/vision/tolerances.h"
 #include "tangible/estimation/vision/training.h"
+#include "tangible/math/cpu_time.h"
 
 namespace tangible {
 namespace {
@@ -18,13 +18,6 @@ using OrderedJson = nlohmann::ordered_json;
 
 constexpr int kCurvePoints = 40;  // of a loss over a training
 constexpr int kTestStride = 3;    // frames between windows that billiards are tested on
-
-// Of this thread: a training's on any number of busy cores.
-double CpuSeconds() {
-  timespec time{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
-  return static_cast<double>(time.tv_sec) + static_cast<double>(time.tv_nsec) / 1e9;
-}
 
 double Median(std::vector<double> values) {
   std::sort(values.begin(), values.end());
@@ -197,7 +190,7 @@ CellResult RunCell(const StudyCell& cell, const StudyData& data, const CellHooks
     return result;
   }
   Curve curve(cell.training.iterations);
-  const double start = CpuSeconds();
+  const double start = ThreadCpuSeconds();
   const long from = trainer->iteration();
   while (trainer->iteration() < cell.training.iterations) {
     const TrainingLoss loss = trainer->Step();
@@ -215,7 +208,7 @@ CellResult RunCell(const StudyCell& cell, const StudyData& data, const CellHooks
   json["iterations"] = cell.training.iterations;
   json["batch"] = cell.training.batch;
   json["iterations_now"] = cell.training.iterations - from;
-  json["cpu_seconds"] = CpuSeconds() - start;
+  json["cpu_seconds"] = ThreadCpuSeconds() - start;
   json["loss"] = curve.json();
   if (cell.kind == DiscKind::kSimb) {
     OrderedJson seen_error;
@@ -245,13 +238,13 @@ nlohmann::ordered_json TimePhysics() {
   for (int row = 0; row < options.batch; ++row) frames.emplace_back(row, row % 10);
   std::vector<double> iterations, physics;
   for (int repeat = 0; repeat < kRepeats; ++repeat) {
-    double start = CpuSeconds();
+    double start = ThreadCpuSeconds();
     trainer.Step();
-    iterations.push_back(CpuSeconds() - start);
+    iterations.push_back(ThreadCpuSeconds() - start);
     const at::Tensor state = StatesOf(data, frames).requires_grad_();
-    start = CpuSeconds();
+    start = ThreadCpuSeconds();
     trainer.dynamics()(state).states.square().sum().backward();
-    physics.push_back(CpuSeconds() - start);
+    physics.push_back(ThreadCpuSeconds() - start);
   }
   return {{"batch", options.batch},
           {"frames", options.ahead},
