@@ -17,7 +17,7 @@
 namespace tangible {
 namespace {
 
-// Of a parabola at first: few, so that no impact is likely to lie between them.
+// The first number of samples of a parabola; few, so that no impact is likely to lie between them.
 constexpr size_t kFewest = 5;
 constexpr int kIterations = 50;
 
@@ -57,7 +57,7 @@ SmoothedSeries FitParabola(const std::vector<SeriesSample>& samples, size_t coun
   const double squares = (values - terms * found).squaredNorm();
   const double freedom = static_cast<double>(rows - terms.cols());
   *explains = squares <= kExplained * (freedom + 2.0 * std::sqrt(freedom));
-  // What it does not explain widens it.
+  // The standard deviations increase where the parabola does not explain the samples.
   const double factor = freedom > 0.0 ? std::sqrt(std::max(1.0, squares / freedom)) : 1.0;
   SmoothedSeries series;
   series.samples = static_cast<int>(count);
@@ -89,10 +89,10 @@ bool IsVelocity(Coordinate coordinate) {
          coordinate == Coordinate::kOmega;
 }
 
-/// The least-squares problem of the state; unknowns are what `state_of` makes a state of.
+/// The least-squares problem of the state; `state_of` makes a state from the unknowns.
 class StateProblem : public LeastSquaresProblem {
  public:
-  /// False where the unknowns have no state.
+  /// Returns false where the unknowns give no state.
   using StateOf = std::function<bool(const Eigen::VectorXd& x, State<double>* state)>;
 
   /// `model` is that of the state that was made last.
@@ -145,7 +145,8 @@ class StateProblem : public LeastSquaresProblem {
   }
 
  private:
-  // Two or three equations and as many of their rates; those of a joint that has fewer are 0.
+  // There are up to three equations and as many rates of them; those that a joint does not have are
+  // 0.
   int num_joint_rows() const {
     return 6 * static_cast<int>(residuals_.scene().model().structure->joints.size());
   }
@@ -229,7 +230,7 @@ Eigen::VectorXd Solve(StateProblem* problem) {
   return x;
 }
 
-/// "bodies/NAME/what" has the ending of a pose's or twist's number.
+/// Whether a path "bodies/NAME/..." ends with a component of a pose or twist.
 bool IsOfState(const std::string& path) {
   const size_t first = path.find('/');
   const size_t second = path.find('/', first + 1);
@@ -265,7 +266,7 @@ std::vector<SmoothedSeries> SmoothAt(const RolloutResiduals& residuals, double t
 State<double> StateFromObservations(const RolloutResiduals& residuals, double time,
                                     const State<double>& guess) {
   const ModelStructure& structure = *residuals.scene().model().structure;
-  // The number i of the moving bodies' states.
+  // Component i of the states of the moving bodies.
   const auto number = [&structure](int i, State<double>* state) -> double& {
     const size_t body = static_cast<size_t>(structure.moving[i / 6]);
     return i % 6 < 3 ? state->pose[3 * body + i % 6] : state->twist[3 * body + i % 6 - 3];

@@ -15,14 +15,15 @@
 namespace tangible {
 namespace {
 
-// Points at which a likelihood is looked at before its maximum is sought between two of them.
+// The number of points at which a likelihood is evaluated before its maximum is searched between
+// two of them.
 constexpr int kGrid = 41;
-// Bits of ln τ to which a maximum, which is flat, can be found.
+// The number of bits of ln τ to which a maximum, which is flat, can be located.
 constexpr int kBits = 24;
 constexpr int kMostSweeps = 50;
 constexpr int kBisections = 100;
 
-/// ln of the diagonal's sizes of a triangular matrix, of those that are determined.
+/// The sum of ln |diagonal entry| of a triangular matrix over the columns that are determined.
 double LogDiagonal(const Eigen::MatrixXd& factor, const Eigen::VectorXd& lengths,
                    Eigen::Index count) {
   double sum = 0.0;
@@ -130,7 +131,7 @@ std::pair<double, double> SpreadLikelihood::RangeOf(int effect) const {
     const int k = of.own[block];
     const int b = static_cast<int>(block);
     if (k < 0) continue;
-    // What is left of the parameter's column beside the block's other own ones.
+    // The part of the parameter's column that is orthogonal to the other own columns of the block.
     RowMatrixXd own = blocks_[block].factor.leftCols(layout_.num_own(b));
     const Eigen::Index column = k - layout_.own_offset(b);
     own.col(column).swap(own.col(own.cols() - 1));
@@ -150,7 +151,7 @@ std::pair<double, double> SpreadLikelihood::RangeOf(int effect) const {
 
 namespace {
 
-/// The place of the largest ℓ over one spread's range, the others as they are.
+/// The spread that maximises ℓ over its range, with the other spreads held.
 double BestSpread(const SpreadLikelihood& likelihood, size_t effect, std::vector<double> spreads) {
   const auto [low, high] = likelihood.RangeOf(static_cast<int>(effect));
   const auto cost = [&](double log_spread) {
@@ -174,8 +175,8 @@ double BestSpread(const SpreadLikelihood& likelihood, size_t effect, std::vector
   return std::exp(boost::math::tools::brent_find_minima(cost, from, to, kBits).first);
 }
 
-/// Where the decreasing function Q falls to `level`, between these spreads; 0 where it is below
-/// already at the first.
+/// The spread between `from` and `to` at which the decreasing function Q falls to `level`; 0 where
+/// Q is below it at `from`.
 double Crossing(const std::function<double(double)>& q, double level, double low, double high) {
   if (q(low) <= level) return 0.0;
   double from = std::log(low);
@@ -260,7 +261,7 @@ bool UpdateSpreads(const FitOptions& options, const FitResult& result, Recording
     one.spread = none ? 0.0 : now[e];
     const bool has_prior = entries[problem->effects()[e].mean].prior.has_value();
     one.interval = IntervalOf(likelihood, e, one.recordings, has_prior, now);
-    // Which of the smallest it is does not matter.
+    // A change between spreads at the lower end of the range does not matter.
     const bool was_none = before[e] <= 2.0 * smallest;
     if (!(none && was_none)) {
       *largest = std::max(*largest, std::abs(std::log(now[e] / before[e])));

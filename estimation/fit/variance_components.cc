@@ -67,7 +67,7 @@ FitResult FitWithComponents(const FitOptions& options, RecordingsProblem* proble
   if (!estimates) {
     return fit(options, progress, &same);
   }
-  // What judges the estimate is done once, for the components that are found.
+  // The tests that judge the estimate are made once, with the final components.
   FitOptions search = options;
   search.certificate = CertificatePass::kSkip;
   search.held_test = HeldTest::kSkip;

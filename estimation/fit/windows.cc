@@ -16,7 +16,7 @@
 namespace tangible {
 namespace {
 
-// A window only has to lead to the next.
+// A window only has to lead to the next one, which limits its iterations.
 constexpr int kIterationsPerWindow = 100;
 
 long NumRows(const LeastSquaresProblem& problem) {
@@ -36,7 +36,7 @@ double RmsAt(const FitOptions& options, const Eigen::VectorXd& p, LeastSquaresPr
              : HUGE_VAL;
 }
 
-/// Growing windows under way.
+/// The state of growing windows.
 class Windows {
  public:
   Windows(const FitOptions& options, const Eigen::VectorXd& start, LeastSquaresProblem* problem,
@@ -60,8 +60,8 @@ class Windows {
   }
 
  private:
-  /// What a window does not determine must not drift: each parameter is known to be near where the
-  /// last window left it, unless it has a prior of its own.
+  /// Parameters that a window does not determine must not drift: each has a prior around its
+  /// estimate from the last window, unless it has a prior of its own.
   std::vector<std::optional<Prior>> Anchors() const {
     const std::vector<ParameterEntry>& entries = problem_->entries();
     std::vector<std::optional<Prior>> anchors(entries.size());
@@ -89,7 +89,7 @@ class Windows {
     return true;
   }
 
-  /// The window after one with so many rows.
+  /// The window after one with the given number of rows.
   std::unique_ptr<LeastSquaresProblem> Next(long rows) {
     const double allowed =
         kFarOff * std::max(1.0, RmsAt(options_, result_.parameters, problem_->Window(part_).get()));
