@@ -42,7 +42,7 @@ StudyCell CellOf(DiscKind kind, DynamicsKind dynamics, int percent, std::uint64_
   cell.training.iterations = kind == DiscKind::kSimb ? 2000 : 1000;
   cell.training.learning_rate = kind == DiscKind::kSimb ? 3e-3 : 2e-3;
   cell.training.seen = kind == DiscKind::kSimb ? kSimbSeen : 3;
-  // SimB's rules are known: three equal elastic discs.
+  // The rules of SimB are known: three equal elastic discs.
   cell.training.learns_parameters = kind == DiscKind::kBilliards;
   return cell;
 }
@@ -106,7 +106,7 @@ OrderedJson ParametersJson(const Dynamics& dynamics, const DiscWorld& world) {
   return json;
 }
 
-// The means of a training's losses over equal parts of it.
+// The mean losses of a training over equal parts of it.
 class Curve {
  public:
   explicit Curve(long iterations) : part_(std::max(1L, iterations / kCurvePoints)) {}
@@ -177,7 +177,7 @@ StudyData MakeStudyData(DiscKind kind, std::uint64_t seed) {
 
 CellResult RunCell(const StudyCell& cell, const StudyData& data, const CellHooks& hooks,
                    std::string* error) {
-  // Weights are drawn from torch's own generator, of which all threads have one.
+  // Weights are drawn from torch's generator, which all threads share.
   static std::mutex drawing;
   std::unique_ptr<Trainer> trainer;
   {
@@ -291,7 +291,8 @@ double GradientError() {
                   error(by_state, (x.grad() * way).sum().item<double>()));
 }
 
-// Files of a training differ where nothing else does: they name tensors by their addresses.
+// The weights are compared, because files of equal trainings differ: they name tensors by their
+// addresses.
 bool SameWeights(Trainer* a, Trainer* b) {
   const auto same = [](const torch::nn::Module& one, const torch::nn::Module& other) {
     const std::vector<at::Tensor> mine = one.parameters(), others = other.parameters();
