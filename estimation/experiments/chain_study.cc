@@ -55,7 +55,7 @@ ChainStudy::ChainStudy(const Scene& scene, double rate, const ChainStudyOptions&
       }
     }
   }
-  // What is predicted at the truth: the residuals of observations that are 0.
+  // The predictions at the truth are the residuals of observations that are 0.
   RolloutResiduals residuals = ResidualsOf(exact_);
   Eigen::VectorXd predicted;
   residuals.Evaluate(residuals.scene().Initial(), DerivativeMethod::kTangent, &predicted, nullptr);

@@ -10,9 +10,10 @@
 namespace tangible {
 namespace {
 
-// What a success is.
+// The bounds of a successful swing-up.
 constexpr double kUprightAngle = 0.2, kMiddle = 0.5, kUprightTime = 2.0;
-// N: where the first plan starts. At rest hanging down no force is a stationary plan.
+// N: the controls from which the first plan starts. For a pole that hangs at rest, a plan without
+// force is stationary.
 constexpr double kFirstForce = 1.0;
 
 CostTerm Term(CostTerm::Kind kind, int index, double weight, bool at_end) {

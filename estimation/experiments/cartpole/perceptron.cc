@@ -11,7 +11,7 @@
 namespace tangible {
 namespace {
 
-// Adam's, as its authors have them.
+// The constants of Adam, as its authors recommend them.
 constexpr double kFirstMoment = 0.9, kSecondMoment = 0.999;
 
 }  // namespace

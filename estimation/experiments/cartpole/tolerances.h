@@ -9,8 +9,8 @@ namespace tangible {
 /// Of the state of the plant: the absolute and relative error of a step of its integrator, far
 /// below the noise of what is seen.
 inline constexpr double kIntegrationError = 1e-12;
-/// Of 1, of states and forces: the step of central differences to which the cost of a plan is
-/// compared.
+/// Of 1, of states and forces: the step of the central differences with whose cost that of the
+/// exact Jacobians is compared.
 inline constexpr double kMapDifference = 1e-6;
 /// Of 1, of inputs and outputs: an input of a perceptron that varies by less is not scaled further.
 inline constexpr double kLeastDeviation = 1e-9;

@@ -50,14 +50,14 @@ Scene SceneOf(const Arena& arena) {
     brick.position = {0.0, kAway};
     scene.bodies.push_back(brick);
   }
-  // It never turns.
+  // The ball does not rotate.
   BasicJoint<double> upright;
   upright.name = "upright";
   upright.type = JointType::kFixedAngle;
   upright.bodies[0] = kBall;
   scene.joints = {upright};
   scene.simulation.stepping = Stepping::kEvent;
-  // Without forces its ways are straight and it stays upright: any integrator is exact.
+  // Without forces the ball flies straight and does not rotate, so that any integrator is exact.
   scene.simulation.integrator = Integrator::kSemiImplicitEuler;
   scene.simulation.joint_correction = JointCorrection::kNone;
   scene.simulation.dt = kFarFrames;
@@ -78,10 +78,10 @@ void FlightModel::PlaceBricks(const BallState& ball, const Bricks& bricks, doubl
   placed_.clear();
   const int rows = static_cast<int>(arena_.bricks.size()) / kBrickColumns;
   for (int i = 0; i < rows; ++i) {
-    // Rows in the order in which the ball comes to them.
+    // The rows in the order in which the ball reaches them.
     const int row = ball.v.y() < 0.0 ? rows - 1 - i : i;
     const Rectangle& first = arena_.bricks[static_cast<size_t>(row) * kBrickColumns];
-    // When the ball overlaps the row, and the way that it makes meanwhile.
+    // The times at which the ball overlaps the row, and its horizontal path meanwhile.
     double from = (first.y - kBallDown - ball.at.y()) / ball.v.y();
     double to = (first.y + first.height - ball.at.y()) / ball.v.y();
     if (from > to) std::swap(from, to);
@@ -172,7 +172,7 @@ void FlightModel::Turn(int body, const Vector2<double>& rigid, Flight* flight) {
     ball.armed = true;
   } else {
     ball.at.x() = body == kLeftWall ? arena_.left : arena_.right - kBallAcross;
-    // Beside bricks the walls do not count.
+    // Contacts with walls beside bricks do not count.
     const Rectangle &first = arena_.bricks.front(), &last = arena_.bricks.back();
     const bool beside = ball.at.y() >= first.y && ball.at.y() <= last.y + last.height;
     ball.armed = ball.armed || !beside;
@@ -194,7 +194,7 @@ Flight FlightModel::Predict(const BallState& ball, const Bricks& bricks, double 
     const bool below = end.at.y() + kBallDown > arena_.paddle_y && end.v.y() > 0.0;
     const bool meets = !below && static_cast<int>(flight.meetings.size()) < kMostMeetings &&
                        FirstMeeting(end, flight.bricks, left, &body, &when, &rigid);
-    // The paddle turns what overlaps it, all others what touches them.
+    // The paddle reflects a ball that overlaps it, all other bodies a ball that touches them.
     const double frame = !meets          ? left
                          : body == kLine ? std::floor(when + kSameFrame) + 1.0
                                          : std::ceil(when - kSameFrame);
@@ -207,7 +207,7 @@ Flight FlightModel::Predict(const BallState& ball, const Bricks& bricks, double 
     flight.frames += frame;
     if (!meets) break;
     if (body == kLine) {
-      // A side wall may come in the same frame.
+      // The ball may meet a side wall in the same frame.
       end.at.x() = std::clamp(end.at.x(), static_cast<double>(arena_.left),
                               static_cast<double>(arena_.right - kBallAcross));
       flight.arrives = true;

@@ -20,7 +20,7 @@ inline constexpr double kSameOffset = 1.6;
 inline constexpr double kAsPredicted = 1.01;
 /// Of a pixel: a paddle that is nearer to its place than any press brings it has arrived.
 inline constexpr double kAtPlace = 4.0;
-/// Of a pixel a frame: a slower paddle is at rest.
+/// Of one pixel a frame: a slower paddle is at rest.
 inline constexpr double kPaddleRests = 1.0;
 
 }  // namespace tangible
