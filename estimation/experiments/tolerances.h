@@ -6,8 +6,8 @@
 
 namespace tangible {
 
-/// Of 1 s: a row whose time is beyond an end of the window by less belongs to the window, because
-/// it differs by rounding.
+/// Absolute, s: a row whose time is beyond an end of the window by less belongs to the window,
+/// because it differs by rounding.
 inline constexpr double kWindowRounding = 1e-9;
 /// Of one sample: a number of samples that is smaller than a whole number by less is that whole
 /// number.

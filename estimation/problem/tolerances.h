@@ -9,11 +9,12 @@ namespace tangible {
 /// Of a step: times that differ by less are the same, because decimal times miss a step by
 /// rounding.
 inline constexpr double kTimeTolerance = 1e-9;
-/// Of a step: half the time over which the mean acceleration by events is taken where times are
-/// estimated; steps end at both ends of it.
+/// Of a step: half the time over which an acceleration is averaged in event stepping; steps end at
+/// both ends of that time.
 inline constexpr double kRateStep = 1e-3;
-/// Of the parameter, at least its scale: a parameter this near to a bound is at it: exp(ln bound)
-/// and the projection of the minimiser reach a bound within this error.
+/// Of the parameter, at least its scale: a parameter that differs from a bound by less is at the
+/// bound, because exp(ln bound) and the projection of the minimiser reach a bound within this
+/// error.
 inline constexpr double kBoundRounding = 1e-13;
 /// Of the observed value: the rounding of a run and the errors that its projections leave; smaller
 /// residuals carry no information.
