@@ -18,7 +18,7 @@ namespace {
 
 constexpr int kIterationsPerStage = 30;
 
-/// The unknown numbers of a moving body's state in the rows of w = [poses | twists | parameters].
+/// The row of unknown i of the states of moving bodies in w = [poses | twists | parameters].
 int StateRow(const ModelStructure& s, int i) {
   const int body = s.moving[i / 6];
   const int component = i % 6;

@@ -6,8 +6,8 @@
 //
 //   curves    for several seeds and numbers of samples of random motion: prediction errors 1 to 100
 //             steps ahead, and the reward of swing-ups planned with what was learned
-//   coverage  over many seeds: which of the 95 % intervals contain the true numbers
-//   swing-ups from many random starts, with the true and with learned numbers
+//   coverage  over many seeds: which of the 95 % intervals contain the true parameters
+//   swing-ups from many random starts, with the true and with learned parameters
 
 #include <functional>
 #include <memory>

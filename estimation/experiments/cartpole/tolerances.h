@@ -7,7 +7,7 @@
 namespace tangible {
 
 /// Of the state of the plant: the absolute and relative error of a step of its integrator, far
-/// below the noise of what is seen.
+/// below the noise of the measurements.
 inline constexpr double kIntegrationError = 1e-12;
 /// Of 1, of states and forces: the step of the central differences with whose cost that of the
 /// exact Jacobians is compared.

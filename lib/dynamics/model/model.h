@@ -22,7 +22,7 @@
 
 namespace tangible {
 
-/// A shape of a body, its type and the places of its numbers.
+/// A shape of a body: its type and the places of its parameters.
 struct PartIndex {
   ShapeType type = ShapeType::kNone;
   int numbers = -1;
