@@ -13,7 +13,7 @@
 namespace tangible {
 namespace {
 
-/// v without what the columns of `qr` can do.
+/// The part of v that is orthogonal to the columns of `qr`.
 template <typename Matrix>
 Matrix Project(const Eigen::ColPivHouseholderQR<Eigen::MatrixXd>& qr, const Matrix& v) {
   if (qr.cols() == 0 || qr.rank() == 0) {
@@ -68,7 +68,7 @@ class Gatherer {
     rows->residuals = Eigen::VectorXd::Zero(count);
     rows->free = RowMatrixXd::Zero(count, static_cast<Eigen::Index>(free_.size()));
     rows->bound = RowMatrixXd::Zero(count, static_cast<Eigen::Index>(bound_.size()));
-    // Candidates first: they decide on the number of columns.
+    // The candidates come first, because they determine the number of columns.
     std::vector<HeldColumns> held(layout_.num_blocks());
     for (int block = 0; block < layout_.num_blocks(); ++block) {
       held[block] = problem_->EvaluateHeld(block, layout_.Local(block, estimate_),
@@ -138,7 +138,8 @@ class Gatherer {
   std::map<std::string, int> index_;
 };
 
-/// False where the number cannot be told from the free parameters, or may not change so.
+/// Returns false where the value cannot be distinguished from the free parameters, or may not
+/// change in that direction.
 bool TestOne(const ParameterEntry& entry, const Eigen::VectorXd& column, const Eigen::VectorXd& own,
              const Eigen::VectorXd& residuals, HeldParameter* held) {
   const double square = own.squaredNorm();

@@ -13,7 +13,7 @@ namespace tangible {
 namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-// Of a combination that a message names.
+// The number of terms that a message has of a combination.
 constexpr int kMostTerms = 12;
 
 /// "0.71 'a' - 0.71 'b'": a direction in the parameters' relative changes.
@@ -57,7 +57,7 @@ struct WeakDirection {
   bool undetermined = true;
 };
 
-/// One fit's uncertainty under way.
+/// Computes the uncertainty of one fit.
 class Estimator {
  public:
   Estimator(const LeastSquaresProblem& problem, const Eigen::VectorXd& estimate,
@@ -140,7 +140,7 @@ class Estimator {
     }
   }
 
-  /// Takes the own parameters out of each block's rows and decomposes what is left.
+  /// Eliminates the own parameters from the rows of each block and decomposes the rest.
   void Eliminate() {
     const Eigen::Index shared = static_cast<Eigen::Index>(shared_.size());
     Eigen::VectorXd squares = Eigen::VectorXd::Zero(shared);
@@ -212,8 +212,8 @@ class Estimator {
     });
   }
 
-  /// Keeps the directions of a decomposition that are not determined, or hardly; `extend` makes one
-  /// a direction in all parameters.
+  /// Keeps the directions of a decomposition that are not determined, or hardly; `extend` converts
+  /// one to a direction in all parameters.
   template <typename Extend>
   void AddWeak(const Decomposition& decomposition, const Extend& extend) {
     const Eigen::VectorXd& s = decomposition.singular_values();
@@ -231,7 +231,7 @@ class Estimator {
     }
   }
 
-  /// Names the directions without information and takes the intervals of their parameters away.
+  /// Names the undetermined directions and removes the intervals of their parameters.
   void NameUndetermined() {
     const WeakDirection* worst = nullptr;
     bool any = false;
