@@ -94,11 +94,6 @@ double MedianOver(const std::vector<BreakoutResult>& games, const Value& value) 
   return MedianOf(std::move(values));
 }
 
-bool Report(bool holds, const std::string& what) {
-  std::printf("%s: %s\n", what.c_str(), holds ? "holds" : "DOES NOT HOLD");
-  return holds;
-}
-
 void PrintTable(const BreakoutStudyOptions& options, const BreakoutResults& results) {
   std::printf("%-30s %7s %7s %5s %5s %9s   frames of 60 Hz in all\n", "player", "median", "mean",
               "least", "most", "games 864");
@@ -157,11 +152,11 @@ bool PrintLearning(const BreakoutStudyOptions& options, const BreakoutResults& r
     const auto bricks = line("share of bricks' speeds expected wrong",
                              [](const CurvePoint& p) { return p.errors.bricks; });
     if (options.most_frames < breakout::kMostFrames) continue;
-    holds = Report(returns[2] < returns[0] && bricks[2] < bricks[0],
-                   "  what was learned in the game is better than what was before") &&
+    holds = PrintBound(returns[2] < returns[0] && bricks[2] < bricks[0],
+                       "  what was learned in the game is better than what was before") &&
             holds;
-    holds = Report(returns[1] > returns[2] || bricks[1] > bricks[2],
-                   "  high reward comes before it has settled") &&
+    holds = PrintBound(returns[1] > returns[2] || bricks[1] > bricks[2],
+                       "  high reward comes before it has settled") &&
             holds;
   }
   return holds;
@@ -174,9 +169,10 @@ bool PrintBounds(const BreakoutStudyOptions& options, const BreakoutResults& res
     if (one.kind != PlayerKind::kLearned || one.sticky > 0.0) continue;
     const double median = MedianScore(results[i]);
     if (one.random_frames == kFrames) {
-      holds = Report(median >= kMedian, NameOfCase(one) + ": 864 in the median") && holds;
+      holds = PrintBound(median >= kMedian, NameOfCase(one) + ": 864 in the median") && holds;
     } else if (one.random_frames == kFewFrames) {
-      holds = Report(median > kFewMedian, NameOfCase(one) + ": above 400 in the median") && holds;
+      holds =
+          PrintBound(median > kFewMedian, NameOfCase(one) + ": above 400 in the median") && holds;
     }
   }
   return holds;
@@ -299,15 +295,10 @@ std::string CheckFlags(BreakoutStudyOptions* options) {
   if (!(FLAGS_sticky >= 0.0 && FLAGS_sticky < 1.0)) {
     return "--sticky: expected a number >= 0 and < 1, got " + FormatNumber(FLAGS_sticky);
   }
-  std::vector<int> random_frames;
-  for (const std::string& text : SplitAtCommas(FLAGS_random_frames)) {
-    char* end = nullptr;
-    const long count = std::strtol(text.c_str(), &end, 10);
-    if (text.empty() || *end != '\0' || count < 0 || count > 1000000 || count % kFrameSkip != 0) {
-      return "--random_frames: expected multiples of 4 from 0 to 1000000, got " +
-             FLAGS_random_frames;
-    }
-    random_frames.push_back(static_cast<int>(count));
+  const std::vector<int> random_frames = WholeNumbersAtCommas(FLAGS_random_frames, 0, 1000000);
+  if (random_frames.empty() || std::any_of(random_frames.begin(), random_frames.end(),
+                                           [](int count) { return count % kFrameSkip != 0; })) {
+    return "--random_frames: expected multiples of 4 from 0 to 1000000, got " + FLAGS_random_frames;
   }
   using enum PlayerKind;
   options->cases = {{kRandom, 0, 0.0}, {kFollow, 0, 0.0}, {kIntercept, 0, 0.0}, {kTruth, 0, 0.0}};

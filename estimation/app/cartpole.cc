@@ -60,12 +60,6 @@ Quartiles ErrorOf(const std::vector<std::vector<CartPoleCell>>& seeds, int model
       OfCells(seeds, model, [&](const CartPoleCell& c) { return c.errors[horizon]; }));
 }
 
-bool Report(bool holds, const char* what) {
-  std::printf("%s: %s\n", what, holds ? "holds" : "DOES NOT HOLD");
-  std::fflush(stdout);
-  return holds;
-}
-
 bool PrintCurves(const CartPoleStudyOptions& options, const CartPoleCurves& curves) {
   std::printf(
       "pole's tip 1, 10 and 100 steps ahead, rms error in m, and reward of a swing-up from "
@@ -88,7 +82,7 @@ bool PrintCurves(const CartPoleStudyOptions& options, const CartPoleCurves& curv
         "one step ahead the perceptron's error is %.0f times the engine's (expected at "
         "least %g)",
         ratio, kLeastErrorRatio);
-    holds = Report(ratio >= kLeastErrorRatio, "") && holds;
+    holds = PrintBound(ratio >= kLeastErrorRatio, "") && holds;
   }
   return holds;
 }
@@ -211,7 +205,7 @@ bool PrintCoverage(const CartPoleStudyOptions& options, OrderedJson* json) {
         {{"name", names[i]}, {"covered", share}, {"largest_error", coverage.largest_off[i]}});
   }
   (*json)["coverage"] = {{"recordings", coverage.seeds}, {"samples", kSamples}, {"numbers", list}};
-  return Report(holds, "each within 90 to 99 %");
+  return PrintBound(holds, "each within 90 to 99 %");
 }
 
 bool PrintSwingUps(const CartPoleStudyOptions& options, OrderedJson* json) {
@@ -240,9 +234,9 @@ bool PrintSwingUps(const CartPoleStudyOptions& options, OrderedJson* json) {
                           {"plans_in_time", share},
                           {"cpu_seconds_median", plans == 0 ? NAN : table.cpu_seconds[plans / 2]},
                           {"cpu_seconds_max", worst}};
-  return Report(table.with_truth >= kLeastTrue * table.starts &&
-                    table.with_learned >= kLeastLearned * table.starts,
-                "at least 99 % and 95 %");
+  return PrintBound(table.with_truth >= kLeastTrue * table.starts &&
+                        table.with_learned >= kLeastLearned * table.starts,
+                    "at least 99 % and 95 %");
 }
 
 void PrintTiming(const CartPoleStudyOptions& options, OrderedJson* json) {
@@ -304,16 +298,12 @@ std::string CheckFlags(CartPoleStudyOptions* options) {
       return std::string(name) + ": expected a number >= 0, got " + std::to_string(value);
     }
   }
-  options->samples.clear();
-  for (const std::string& text : SplitAtCommas(FLAGS_samples)) {
-    char* end = nullptr;
-    const long count = std::strtol(text.c_str(), &end, 10);
-    const int least = options->samples.empty() ? 20 : options->samples.back() + 1;
-    if (text.empty() || *end != '\0' || count < least || count > 100000) {
-      return "--samples: expected ascending numbers from 20 to 100000, got " + FLAGS_samples;
-    }
-    options->samples.push_back(static_cast<int>(count));
+  const std::vector<int> samples = WholeNumbersAtCommas(FLAGS_samples, 20, 100000);
+  if (samples.empty() ||
+      std::adjacent_find(samples.begin(), samples.end(), std::greater_equal<>()) != samples.end()) {
+    return "--samples: expected ascending numbers from 20 to 100000, got " + FLAGS_samples;
   }
+  options->samples = samples;
   options->seeds = FLAGS_seeds;
   options->seed = static_cast<unsigned>(FLAGS_seed);
   options->threads = FLAGS_threads;

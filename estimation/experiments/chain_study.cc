@@ -6,7 +6,8 @@
 #include <cmath>
 #include <random>
 
-#include "tangible/estimation/experiments/random.h"
+#include "tangible/estimation/experiments/tolerances.h"
+#include "tangible/math/random.h"
 
 namespace tangible {
 namespace {
@@ -45,7 +46,8 @@ ChainStudy::ChainStudy(const Scene& scene, double rate, const ChainStudyOptions&
       exact_.parameters.push_back(mass);
       truth_.push_back(link.mass);
     }
-    const int samples = static_cast<int>(std::floor(scene.simulation.duration * rate + 1e-9));
+    const int samples =
+        static_cast<int>(std::floor(scene.simulation.duration * rate + kSampleRounding));
     for (int k = 0; k <= samples && link.motion == Motion::kMoving; ++k) {
       for (const Coordinate coordinate : {Coordinate::kX, Coordinate::kY}) {
         exact_.observations.push_back(
@@ -53,7 +55,7 @@ ChainStudy::ChainStudy(const Scene& scene, double rate, const ChainStudyOptions&
       }
     }
   }
-  // What is predicted at the truth: the residuals of observations that are 0.
+  // The predictions at the truth are the residuals of observations that are 0.
   RolloutResiduals residuals = ResidualsOf(exact_);
   Eigen::VectorXd predicted;
   residuals.Evaluate(residuals.scene().Initial(), DerivativeMethod::kTangent, &predicted, nullptr);

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// How well the masses of all links of the chain (data/scenes/chain.json) are found at once.
+// A study of how well the masses of all links of a chain (data/scenes/chain.json) are estimated at
+// once.
 //
-// Observations are what the scene predicts at its own masses m_k, with or without normal noise.
+// Observations are predictions of the scene at its own masses m_k, with or without normal noise.
 //
 //   starts     without noise, from starts with each link log-uniform in [m / range, range m]:
 //              reached if every mass is within `reached` of the truth, relative
@@ -13,6 +14,7 @@
 #include <string>
 #include <vector>
 
+#include "tangible/estimation/experiments/tolerances.h"
 #include "tangible/estimation/fit/fit.h"
 
 namespace tangible {
@@ -20,7 +22,7 @@ namespace tangible {
 struct ChainStudyOptions {
   int starts = 20;
   double range = 100.0;
-  double reached = 1e-8;
+  double reached = kReachedTruth;
   int replicas = 1000;
   double sigma = 0.001;  ///< m
   unsigned seed = 1;
@@ -35,7 +37,7 @@ struct ChainStart {
   double seconds = 0.0;
 };
 
-/// Intervals that contain the truth, of each link and of all.
+/// The numbers of intervals that contain the truth, for each link and for all.
 struct ChainCoverage {
   int replicas = 0;
   int failed = 0;  ///< replicas without intervals: they count as not covered
@@ -45,12 +47,12 @@ struct ChainCoverage {
 
 class ChainStudy {
  public:
-  /// `scene` has bodies named link*, all of which are observed `rate` times a second.
+  /// `scene` has bodies named link*, which are all observed `rate` times a second.
   ChainStudy(const Scene& scene, double rate, const ChainStudyOptions& options);
 
   int num_links() const { return static_cast<int>(truth_.size()); }
 
-  /// One start; they are numbered, each with its own seed.
+  /// Runs one of the numbered starts, each of which has its own seed.
   ChainStart RunStart(int number) const;
   /// `progress` is called after each replica, with its number.
   ChainCoverage RunCoverage(const std::function<void(int)>& progress) const;

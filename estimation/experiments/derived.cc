@@ -4,10 +4,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tangible/estimation/experiments/tolerances.h"
+#include "tangible/estimation/uncertainty/tolerances.h"
+
 namespace tangible {
 namespace {
-
-constexpr double kNormal95 = 1.959963984540054;
 
 template <typename T>
 const T* Find(const std::vector<T>& items, const std::string& name) {
@@ -84,7 +85,7 @@ std::vector<DerivedQuantity> Derive(const std::vector<DerivedFunction>& function
       held.col(k).setZero();
       continue;
     }
-    const double step = 1e-6 * scene->entries()[k].scale;
+    const double step = kDerivedStep * scene->entries()[k].scale;
     Eigen::VectorXd p = estimate;
     p[k] = estimate[k] + step;
     const Eigen::VectorXd above = values(p);
@@ -95,8 +96,8 @@ std::vector<DerivedQuantity> Derive(const std::vector<DerivedFunction>& function
   std::vector<DerivedQuantity> quantities;
   for (Eigen::Index i = 0; i < at.size(); ++i) {
     const double deviation = std::sqrt(gradient.row(i).dot(held * gradient.row(i).transpose()));
-    quantities.push_back({functions[i].name, at[i], deviation, at[i] - kNormal95 * deviation,
-                          at[i] + kNormal95 * deviation});
+    quantities.push_back({functions[i].name, at[i], deviation, at[i] - kNormalQuantile * deviation,
+                          at[i] + kNormalQuantile * deviation});
   }
   return quantities;
 }

@@ -8,6 +8,7 @@
 #include <memory>
 #include <utility>
 
+#include "tangible/estimation/experiments/tolerances.h"
 #include "tangible/estimation/results/fit_json.h"
 #include "tangible/scene/scene_json.h"
 
@@ -21,7 +22,7 @@ constexpr double kPredictedSeconds = 3.0;
 bool WriteObservations(const Recording& recording, const std::string& file, std::string* error) {
   std::error_code failure;
   std::filesystem::create_directories(std::filesystem::path(file).parent_path(), failure);
-  // The old file or the whole new one.
+  // The file is either the old one or the complete new one.
   const std::string temporary = file + ".tmp";
   std::ofstream stream(temporary);
   stream << ObservationCsv(recording);
@@ -46,7 +47,7 @@ double ResidualRms(const std::vector<Observation>& observations, const Eigen::Ve
   return std::sqrt(sum / static_cast<double>(residuals.size()));
 }
 
-/// Runs the scene at the estimate over the recording's next seconds, which the fit has not seen.
+/// Runs the scene at the estimate over the next seconds of the recording, which were not fitted.
 bool Predict(const PendulumJob& job, const FitProblem& problem, PendulumResult* result,
              std::string* error) {
   RecordingOptions whole = job.window;
@@ -75,7 +76,7 @@ bool Predict(const PendulumJob& job, const FitProblem& problem, PendulumResult* 
     PredictionError prediction{static_cast<double>(seconds), 0.0};
     for (Eigen::Index i = 0; i < errors.size(); ++i) {
       const double time = run.observations()[i].time;
-      if (time > fitted && time <= fitted + seconds + 1e-9) {
+      if (time > fitted && time <= fitted + seconds + kWindowRounding) {
         prediction.error = std::max(prediction.error, std::abs(errors[i]));
       }
     }

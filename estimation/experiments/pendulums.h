@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// What the recordings of real pendulums (recording.h) say: the fit of data/fits/recording_*.json,
-// how its residuals compare with the noise, what it identifies, and, for the single pendulum, how
-// well it predicts what comes after the part that was fitted.
+// The fits of the recordings of real pendulums (recording.h) by data/fits/recording_*.json: their
+// residuals beside the noise, the parameters and derived quantities, and, for the single pendulum,
+// the error of its prediction for the time after the fitted part.
 
 #include <functional>
 #include <optional>
@@ -24,8 +24,8 @@ struct PendulumJob {
   double prediction_to = 0.0;  ///< s: end of what is predicted; 0: nothing is
 };
 
-/// The single pendulum and the double pendulums' two recordings, in a folder laid out as
-/// `multiarm_pendulum/`, `ibm_double_pendulum/`.
+/// The jobs for the single pendulum and for two recordings of the double pendulum, in a folder with
+/// `multiarm_pendulum/` and `ibm_double_pendulum/`.
 std::vector<PendulumJob> PendulumJobs(const std::string& recordings);
 
 struct PredictionError {
@@ -45,8 +45,8 @@ struct PendulumResult {
   std::vector<PredictionError> predictions;
 };
 
-/// Reads the recording, writes its observations to `out` (where the fit file looks for them), fits.
-/// False and one line where something fails.
+/// Reads the recording, writes its observations to `out` (where the fit file expects them), and
+/// fits them. Returns false, with one line, where something fails.
 bool RunPendulum(const PendulumJob& job, const std::string& fits, const std::string& out,
                  PendulumResult* result, std::string* error);
 

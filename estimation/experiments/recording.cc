@@ -7,6 +7,7 @@
 #include <numbers>
 #include <sstream>
 
+#include "tangible/estimation/experiments/tolerances.h"
 #include "tangible/scene/csv.h"
 #include "tangible/scene/text_file.h"
 
@@ -16,8 +17,6 @@ namespace {
 constexpr double kFifthsOfPixel = 0.2;
 const std::vector<std::string> kMarkerColumns = {"pivot down",  "pivot right", "joint down",
                                                  "joint right", "tip down",    "tip right"};
-// A row whose time is off by rounding still belongs to the window.
-constexpr double kTimeSlack = 1e-9;
 
 using MarkerRow = std::array<double, 6>;
 
@@ -38,7 +37,7 @@ bool ReadMarkers(const std::string& text, const std::string& file, const Recordi
   }
   for (int i = 0; i < static_cast<int>(table.rows.size()); ++i) {
     const double time = i / options.rate;
-    if (time < options.from - kTimeSlack || time > options.to + kTimeSlack) {
+    if (time < options.from - kWindowRounding || time > options.to + kWindowRounding) {
       continue;
     }
     MarkerRow row;
@@ -110,7 +109,7 @@ bool ParseAngles(const std::string& text, const std::string& file, const Recordi
         !ReadCell(table, i, table.Column("th1"), &angle, error)) {
       return false;
     }
-    if (time >= options.from - kTimeSlack && time <= options.to + kTimeSlack) {
+    if (time >= options.from - kWindowRounding && time <= options.to + kWindowRounding) {
       recording->times.push_back(time - options.from);
       series.values.push_back(angle - std::numbers::pi);
     }

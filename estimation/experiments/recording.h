@@ -59,7 +59,7 @@ double NoiseFromFourthDifferences(const std::vector<double>& values);
 bool ParseRecording(const std::string& text, const std::string& file,
                     const RecordingOptions& options, Recording* recording, std::string* error);
 
-/// The same from a file.
+/// Reads a recording from a file.
 bool ReadRecording(const std::string& file, const RecordingOptions& options, Recording* recording,
                    std::string* error);
 

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "tangible/estimation/experiments/recording.h"
+#include "tangible/estimation/experiments/tolerances.h"
 #include "tangible/scene/csv.h"
 #include "tangible/scene/json_reader.h"
 #include "tangible/scene/scene_names.h"
@@ -17,8 +18,6 @@ namespace tangible {
 namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-// A row whose time is off by rounding still belongs to the window.
-constexpr double kTimeSlack = 1e-9;
 
 /// One column of a file.
 struct ValueColumn {
@@ -31,7 +30,7 @@ struct ValueColumn {
   int likelihood = -1;  ///< its column, −1: none
 };
 
-/// A file as columns of known meaning.
+/// The layout of a file: the meaning of its columns.
 struct Layout {
   std::string target_column = "point";
   int time = -1;  ///< −1: rows are frames
@@ -43,7 +42,7 @@ struct Layout {
   std::vector<ValueColumn> values;
 };
 
-/// A name as observation files and paths may have it.
+/// The name with the characters that observation files and paths allow.
 std::string Cleaned(const std::string& name) {
   std::string clean = name;
   for (char& c : clean) {
@@ -54,7 +53,7 @@ std::string Cleaned(const std::string& name) {
   return clean;
 }
 
-/// The text with its cells separated by commas, numbers with points, no quotes.
+/// The text with commas between cells, decimal points and no quotes.
 std::string WithCommas(std::string_view text) {
   const std::string_view header = text.substr(0, text.find('\n'));
   // Tracker's first line may be a name alone.
@@ -90,7 +89,7 @@ std::vector<std::string> Cells(const std::string& line) {
   return cells;
 }
 
-/// The first lines of a text, and what follows them.
+/// The first lines of a text, and the rest.
 std::vector<std::string> TakeLines(size_t count, std::string* text) {
   std::vector<std::string> lines;
   while (lines.size() < count && !text->empty()) {
@@ -165,7 +164,7 @@ bool ReadDeepLabCut(std::string text, const std::string& file, CsvTable* table, 
   return ParseRows(text, file, parts.size(), num_headers, table, error);
 }
 
-/// The coordinate of a column of Tracker; false where it is none that is taken.
+/// The coordinate of a column of Tracker; returns false for columns that are not read.
 bool TrackerCoordinate(const std::string& name, Coordinate* coordinate) {
   static const std::map<std::string, Coordinate> known = {
       {"x", Coordinate::kX},   {"y", Coordinate::kY},      {"vx", Coordinate::kVx},
@@ -206,7 +205,7 @@ bool ReadTracker(std::string text, const std::string& file, CsvTable* table, Lay
              "Tracker exports them";
     return false;
   }
-  // Rows too may end with a separator.
+  // Rows may end with a separator too.
   std::string rows;
   std::istringstream lines(text);
   for (std::string line; std::getline(lines, line);) {
@@ -372,7 +371,7 @@ bool TurnsWithY(Coordinate coordinate) {
          coordinate == Coordinate::kAngle || coordinate == Coordinate::kOmega;
 }
 
-/// Makes rows of a table of known layout.
+/// Reads the rows of a table with a known layout.
 class RowCollector {
  public:
   RowCollector(const CsvTable& table, const Layout& layout, const TableOptions& options,
@@ -387,7 +386,8 @@ class RowCollector {
         return false;
       }
       const bool wanted = layout_.name < 0 || !name.empty();
-      if (!wanted || time < options_.from - kTimeSlack || time > options_.to + kTimeSlack) {
+      if (!wanted || time < options_.from - kWindowRounding ||
+          time > options_.to + kWindowRounding) {
         continue;
       }
       if (!ReadValues(row, time - options_.from, name)) {
@@ -442,7 +442,7 @@ class RowCollector {
     return true;
   }
 
-  /// The row of this name among those of the present time.
+  /// The row with this name among those of the current time.
   TableRow* RowOf(double time, const std::string& name, const std::string& relative_to,
                   size_t first) {
     for (size_t i = first; i < recording_->rows.size(); ++i) {

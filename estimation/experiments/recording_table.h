@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// Recordings in the formats of others, made into observation files (observation.h).
+// Recordings in the formats of other programs, converted to observation files (observation.h).
 //
 //   table        any table, wide (a column a coordinate) or long (a row a body or point), with a
 //                mapping that says which columns are what:
@@ -51,7 +51,7 @@ struct TableOptions {
   bool y_down = false;      ///< y, and with it angles, are counted downwards: they change sign
 };
 
-/// What was measured of a body or point at one time; NaN: missing.
+/// The measurements of a body or point at one time; NaN: missing.
 struct TableRow {
   double time = 0.0;  ///< s
   std::string name;
@@ -62,7 +62,7 @@ struct TableRow {
 struct TableRecording {
   std::string target_column;  ///< "body" or "point"
   std::vector<TableRow> rows;
-  /// Of each series the standard deviation of its noise, by fourth differences (recording.h).
+  /// The standard deviation of the noise of each series, by fourth differences (recording.h).
   struct Noise {
     std::string name;
     Coordinate coordinate;

@@ -4,12 +4,10 @@
 #include <utility>
 
 #include "tangible/estimation/uncertainty/decomposition.h"
+#include "tangible/estimation/uncertainty/tolerances.h"
 
 namespace tangible {
 namespace {
-
-// Share of the largest below which a direction is left alone: derivatives are known to about this.
-constexpr double kStepRankTolerance = 1e-9;
 
 Eigen::MatrixXd Stack(const std::vector<Eigen::MatrixXd>& parts, Eigen::Index columns) {
   Eigen::Index num_rows = 0;
@@ -50,7 +48,7 @@ BlockSystem::BlockSystem(const BlockLayout& layout, const std::vector<RowMatrixX
     block.shared =
         blocks[b].rightCols(layout.num_shared()) * scale_.head(layout.num_shared()).asDiagonal();
     if (block.own.size() > 0) {
-      block.qr.setThreshold(kStepRankTolerance);
+      block.qr.setThreshold(kJacobianRank);
       block.qr.compute(block.own);
       block.rank = block.qr.rank();
     }
@@ -92,7 +90,7 @@ Eigen::VectorXd BlockSystem::LeastSquares(const std::vector<Eigen::VectorXd>& c)
   const Eigen::MatrixXd stacked = Stack(parts, num_shared + 1);
   if (num_shared > 0 && stacked.rows() > 0) {
     Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> qr;
-    qr.setThreshold(kStepRankTolerance);
+    qr.setThreshold(kJacobianRank);
     qr.compute(stacked.leftCols(num_shared));
     scaled.head(num_shared) = -qr.solve(stacked.col(num_shared));
   }
@@ -119,7 +117,7 @@ Eigen::VectorXd BlockSystem::Newton(const Eigen::VectorXd& gradient) const {
   Eigen::VectorXd scaled = Eigen::VectorXd::Zero(layout_.num_parameters());
   const Eigen::MatrixXd stacked = Stack(parts, num_shared);
   if (num_shared > 0 && stacked.rows() > 0) {
-    const Decomposition hessian(stacked, Eigen::VectorXd::Ones(num_shared), kStepRankTolerance);
+    const Decomposition hessian(stacked, Eigen::VectorXd::Ones(num_shared), kJacobianRank);
     scaled.head(num_shared) = -hessian.Covariance() * shared_gradient;
   }
   SolveOwn(scaled.head(num_shared), a, &scaled);

@@ -11,10 +11,10 @@
 //   minimise over y   1/2 Σ_b ‖(1 − P_b)(B_b y + c_b)‖²                             (2)
 //   x_b = −A_b⁺ (B_b y + c_b)                                                       (3)
 //
-// Columns are scaled to unit length. Directions with a share below kStepRankTolerance are left
-// alone: they get no part in the step. Unknowns that are held have none either.
+// Columns are scaled to unit length. Directions with a singular value below kJacobianRank of the
+// largest are left out of the step, and so are unknowns that are held.
 //
-// Newton's method has a gradient g that is not Σ [A B]ᵀ c,
+// For Newton's method the gradient g is not Σ [A B]ᵀ c,
 //
 //   minimise    1/2 Σ_b ‖A_b x_b + B_b y‖² + Σ_b g_bᵀ x_b + g_sᵀ y                  (4)
 //
@@ -30,17 +30,17 @@ namespace tangible {
 
 class BlockSystem {
  public:
-  /// `blocks` are [A_b B_b]; `held` says of each unknown in the order of `layout` (shared ones,
-  /// then those of each block) whether it has no part.
+  /// `blocks` are [A_b B_b]; `held` says for each unknown, in the order of `layout` (shared ones,
+  /// then those of each block), whether it is held.
   BlockSystem(const BlockLayout& layout, const std::vector<RowMatrixXd>& blocks,
               const std::vector<bool>& held);
 
-  /// (1), of all unknowns in the layout's order.
+  /// The solution of (1), in the order of the layout.
   Eigen::VectorXd LeastSquares(const std::vector<Eigen::VectorXd>& c) const;
-  /// (4), with the gradient in the layout's order.
+  /// The solution of (4), with the gradient in the order of the layout.
   Eigen::VectorXd Newton(const Eigen::VectorXd& gradient) const;
 
-  /// ‖[A B]_k‖ of each unknown, 0 of one that is held.
+  /// ‖[A B]_k‖ of each unknown; 0 of one that is held.
   const Eigen::VectorXd& lengths() const { return lengths_; }
 
  private:

@@ -28,8 +28,8 @@ double BiasFactor(int order) {
 
 namespace {
 
-/// The input with half the step, without what judges an estimate; false, with a message, where
-/// orders differ.
+/// The input with half the step, without the tests that judge an estimate; false, with a message,
+/// where orders differ.
 bool HalveSteps(FitInput* input, DiscretisationCheck* check) {
   check->order = OrderOf(IntegratorOf(input->recordings.front().problem.scene.simulation));
   for (RecordingInput& recording : input->recordings) {

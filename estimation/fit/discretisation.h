@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// What the step does to an estimate: the same fit at dt and at dt / 2.
+// The bias of an estimate that is due to the step: the same fit at dt and at dt / 2.
 //
 //   p(dt) = p* + c dt^k + O(dt^(k+1))   ⇒   p(dt) − p(dt/2) = c dt^k (1 − 2^−k)
 //   bias = p(dt) − p* ≈ F (p(dt) − p(dt/2)),   F = 2^k / (2^k − 1)
@@ -36,9 +36,9 @@ const char* OrderName(int order);
 /// 2^k / (2^k − 1).
 double BiasFactor(int order);
 
-/// Fits everything once more with half the step, from the estimate of `result`, with `spreads` of
-/// the parameters that vary held; `log` as in Fit. Scenes whose steps are of different orders are
-/// refused.
+/// Repeats the fit with half the step, from the estimate of `result`, with the spreads of
+/// parameters that vary held at `spreads`; `log` is that of Fit. Scenes whose steps are of
+/// different orders are refused.
 DiscretisationCheck CheckDiscretisation(const FitInput& input, const std::vector<double>& spreads,
                                         const FitResult& result, FitLog* log = nullptr);
 

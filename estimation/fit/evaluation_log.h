@@ -52,11 +52,11 @@ class EvaluationLog {
   bool Evaluate(const Eigen::VectorXd& at, const Function& function, Eigen::VectorXd* residuals,
                 RowMatrixXd* jacobian, long* rollouts, std::string* message);
 
-  /// Not 0: this evaluation, counted from 1, was at another point than the log's.
+  /// If not 0, this evaluation, counted from 1, was at another point than that in the log.
   long mismatch() const { return mismatch_; }
 
   const std::vector<Evaluation>& evaluations() const { return evaluations_; }
-  /// Replays these, beginning with the first.
+  /// Replays these evaluations, beginning with the first.
   void Restore(std::vector<Evaluation> evaluations);
   void Clear() { Restore({}); }
 

@@ -13,23 +13,14 @@
 #include "tangible/estimation/fit/linearisation.h"
 #include "tangible/estimation/fit/minimise.h"
 #include "tangible/estimation/fit/shooting.h"
+#include "tangible/estimation/fit/tolerances.h"
 #include "tangible/estimation/fit/windows.h"
 #include "tangible/estimation/problem/problem_with_priors.h"
 #include "tangible/estimation/uncertainty/residual_quality.h"
+#include "tangible/estimation/uncertainty/tolerances.h"
 
 namespace tangible {
 namespace {
-
-// A parameter that moves the residuals, as a vector, by no more than this many sigma, changed by
-// its own magnitude, has no effect.
-constexpr double kNoEffect = 1e-12;
-
-// Minima whose costs differ by less than this, relative, are one.
-constexpr double kSameCost = 1e-6;
-
-// Differences carry an error of about 1e-9, the other methods one of about 1e-12.
-constexpr double kRankTolerance = 1e-9;
-constexpr double kRankToleranceOfDifferences = 1e-6;
 
 /// A start drawn within the bounds, evenly in the minimiser's coordinates; where there is no bound,
 /// within a factor of ten, or a typical magnitude, of the initial value.
@@ -67,7 +58,7 @@ Eigen::VectorXd EffectOf(const BlockLayout& layout, const Linearisation& model) 
       .lengths();
 }
 
-/// The first parameter that moves no residual; −1 if none is.
+/// The first parameter that changes no residual; −1 if every parameter changes one.
 int FindNoEffect(const Eigen::VectorXd& effect) {
   for (Eigen::Index k = 0; k < effect.size(); ++k) {
     if (!(effect[k] > kNoEffect)) {
@@ -95,10 +86,10 @@ bool IsBetter(const Minimum& a, const Minimum& b) {
   return a.status != b.status ? a.status < b.status : a.cost < b.cost;
 }
 
-// Where a derivative is 0 at a bound (restitution 0) or by symmetry, these moves into the interior
-// tell whether the parameter does anything, as fractions of the way to the other bound, or of its
-// scale. So do moves to the nearer bound: friction above that at which a contact sticks does
-// nothing, and less of it does.
+// A derivative may be 0 at a bound (restitution 0) or by symmetry. These moves into the interior,
+// as fractions of the distance to the other bound or of the scale, then show whether the parameter
+// has an effect. So do moves to the nearer bound: friction above that at which a contact sticks has
+// no effect, and less friction has one.
 struct Nudge {
   bool inwards;
   double fraction;
@@ -126,8 +117,9 @@ struct FirstPoint {
   double gradient_norm = 0.0;  ///< at the initial values
 };
 
-/// A point near the initial one at which each parameter moves a residual: the initial one itself
-/// unless a parameter does nothing there. False, with the result saying why, where there is none.
+/// A point near the initial one at which each parameter changes a residual: the initial point
+/// itself unless a parameter has no effect there. Returns false, with the reason in the result,
+/// where there is none.
 bool FindStart(const FitOptions& options, LeastSquaresProblem* problem, Linearizer* linearizer,
                FirstPoint* first, FitResult* result) {
   const std::vector<ParameterEntry>& entries = problem->entries();
@@ -184,7 +176,7 @@ Eigen::VectorXd ObservationResiduals(const LeastSquaresProblem& problem,
   return residuals;
 }
 
-/// One fit under way.
+/// The state of one fit.
 struct FitRun {
   const FitOptions& options;
   const FitProgress& progress;
@@ -206,7 +198,7 @@ struct FitRun {
   EvaluationLog* LogOfStart() const { return logged ? &log->start : nullptr; }
 };
 
-/// The minimum that this approach leads to; none where there is no window to grow.
+/// The minimum that this approach leads to; none where the whole run is the first window.
 std::optional<Minimum> Reach(const Eigen::VectorXd& start, FitApproach approach, FitRun* run) {
   FitLog* const log = run->log;
   const bool led = approach != FitApproach::kPlain;
@@ -257,7 +249,7 @@ bool MayBeLocal(const Minimum& minimum, FitRun* run) {
   return JudgeResiduals(*run->problem, blocks, num_free).MayBeLocal();
 }
 
-/// What was made of a start: the best minimum, and what `start` tells of the others.
+/// The best minimum from a start; `told` describes the other attempts.
 Minimum BestFrom(const Eigen::VectorXd& start, FitRun* run, FitStart* told) {
   FitLog* const log = run->log;
   const FitApproach asked = run->options.approach;
@@ -279,7 +271,7 @@ Minimum BestFrom(const Eigen::VectorXd& start, FitRun* run, FitStart* told) {
     return minimum.status == FitStatus::kFailed ? std::numeric_limits<double>::quiet_NaN()
                                                 : minimum.cost;
   };
-  // What ends at the same minimum is the first one.
+  // If both end at the same minimum, the first one is taken.
   const bool same =
       other && other->status == best.status && other->cost >= best.cost * (1.0 - kSameCost);
   if (other && !same && IsBetter(*other, best)) {
@@ -299,8 +291,8 @@ Minimum BestFrom(const Eigen::VectorXd& start, FitRun* run, FitStart* told) {
   return best;
 }
 
-/// The next start, from `start`; how it ended is kept in the log. The first one tells of the
-/// initial values too where it begins elsewhere.
+/// Minimises from `start` and keeps in the log how that ended. The first start also describes the
+/// initial values where it begins elsewhere.
 void RunStart(const Eigen::VectorXd& start, double gradient_norm, double initial_cost,
               FitRun* run) {
   FitLog* const log = run->log;
@@ -365,8 +357,8 @@ void Finish(FitRun* run, FitResult* result) {
   uncertainty.leverages = run->options.leverages;
   uncertainty.huber = run->options.huber;
   uncertainty.rank_tolerance = run->options.derivatives == DerivativeMethod::kFiniteDifference
-                                   ? kRankToleranceOfDifferences
-                                   : kRankTolerance;
+                                   ? kDifferencesRank
+                                   : kJacobianRank;
   result->uncertainty = EstimateUncertainty(*run->problem, best.parameters, blocks, uncertainty);
 }
 
@@ -411,8 +403,8 @@ void Certify(LeastSquaresProblem* problem, FitResult* result) {
   }
 }
 
-// Where the model does not fit, or a parameter ran into its bound, the cause may be a number that
-// is held.
+// Where the model does not fit, or a parameter is at its bound, the cause may be a held parameter
+// of the scene.
 void TestHeld(const FitOptions& options, LeastSquaresProblem* problem, FitResult* result) {
   Uncertainty& uncertainty = result->uncertainty;
   bool suspicious = uncertainty.DoesNotFit();
@@ -420,7 +412,7 @@ void TestHeld(const FitOptions& options, LeastSquaresProblem* problem, FitResult
     suspicious = suspicious ||
                  IsAtBound(problem->entries()[k], result->estimate[static_cast<Eigen::Index>(k)]);
   }
-  // NaN where residuals are rounding.
+  // This is NaN where residuals are rounding.
   if (!suspicious || !std::isfinite(uncertainty.whiteness.correlation)) {
     return;
   }
@@ -511,7 +503,7 @@ FitResult Fit(const FitOptions& options, RecordingsProblem* problem, const FitPr
       with_priors.HasRows() ? static_cast<LeastSquaresProblem*>(&with_priors) : problem;
   FitResult result = Fit(options, whole, progress, log, shooting);
   for (const RandomEffect& effect : problem->effects()) {
-    // All that is known of a shared value comes by way of the recordings' values, or by a prior.
+    // A shared value is determined only through the values of the recordings, or by a prior.
     if (result.estimate.size() > 0 && !problem->entries()[effect.mean].prior) {
       result.uncertainty.prior_share[effect.mean] = 0.0;
     }

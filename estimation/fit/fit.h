@@ -6,12 +6,12 @@
 //   cost(p) = 1/2 Σ ρ(r_i(p)²),     ρ(s) = s, or Huber's 2 b sqrt(s) − b² where |r| > b
 //
 // of a problem in blocks (least_squares.h), by Levenberg-Marquardt on q(p) (parameter_entry.h,
-// minimise.h). Blocks are evaluated on several threads, with the same bits for any number. At the
-// end Gauss-Newton steps polish the estimate to where it no longer depends on
-// the start: the cost is flat there to rounding long before p is known to as many digits. With
-// Huber's loss plain squares lead to its neighbourhood and Newton's method to its minimum. A
-// parameter whose derivative is 0 at the initial values is nudged inwards first. An
-// evaluation that fails makes Ceres step back.
+// minimise.h). Blocks are evaluated on several threads, and the result has the same bits for any
+// number of threads. Final Gauss-Newton steps improve the estimate until it no longer depends on
+// the start, because the cost is constant to rounding while p still has few exact digits. With
+// Huber's loss, plain squares lead to the neighbourhood of the minimum and Newton's method to the
+// minimum. A parameter whose derivative is 0 at the initial values is moved inwards first. Where an
+// evaluation fails, Ceres takes a shorter step.
 
 #include <Eigen/Core>
 #include <cmath>
@@ -30,7 +30,7 @@
 
 namespace tangible {
 
-/// What leads a start to the minimum where minimising the whole run at once does not.
+/// The method that leads a start to the minimum where minimising the whole run at once does not.
 enum class FitApproach {
   kAuto,      ///< growing windows, where the plain fit does not explain the observations
   kPlain,     ///< nothing
@@ -44,17 +44,19 @@ const char* NameOf(FitApproach approach);
 struct FitOptions {
   DerivativeMethod derivatives = DerivativeMethod::kTangent;
   double huber = 0.0;  ///< b, in multiples of sigma; 0: plain squares
-  /// A start that this leads nowhere is minimised plainly too, and the better minimum counts.
+  /// If a start does not reach the minimum by it, it is also minimised plainly, and the better
+  /// minimum is taken.
   FitApproach approach = FitApproach::kAuto;
   int segments = 1;         ///< of multiple shooting
   int starts = 1;           ///< further starts are drawn within the bounds
   unsigned seed = 0;        ///< of these draws
   int max_iterations = 50;  ///< of each start
   int threads = 0;  ///< that evaluate blocks; 0: one a core. The result does not depend on it
-  /// Whether the derivatives at the estimate get a certificate: one more rollout.
+  /// Whether a certificate of the derivatives at the estimate is computed, which takes one more
+  /// rollout.
   CertificatePass certificate = CertificatePass::kRun;
-  /// Whether numbers that are held are tested where the model does not fit or a parameter is at its
-  /// bound: one more run with a column for each number of the scene.
+  /// Whether held parameters of the scene are tested where the model does not fit or a parameter is
+  /// at its bound, which takes one more run with a column for each of them.
   HeldTest held_test = HeldTest::kRun;
   /// Whether each residual's leverage is computed (Uncertainty::leverages).
   Leverages leverages = Leverages::kSkip;
@@ -90,8 +92,7 @@ struct FitInput {
 /// The fit of one run.
 FitInput InputOf(FitProblem problem);
 
-/// The residuals of an input. Null with `error` where a parameter is wrong; that is one of
-/// recording `fault`.
+/// The residuals of an input; null with `error` where a parameter of recording `fault` is wrong.
 std::unique_ptr<RecordingsProblem> MakeProblem(const FitInput& input, ParameterError* error,
                                                int* fault);
 
@@ -153,15 +154,16 @@ struct FitResult {
   Eigen::VectorXd residuals;  ///< of the observations at the estimate, in multiples of sigma
   long rollouts = 0;          ///< without the certificate's
   double seconds = 0.0;       ///< without the certificate's
-  /// Of the derivatives at the estimate; where its verdict is not `trustworthy`, the message and a
-  /// warning of `uncertainty` say so: the intervals rest on these derivatives.
+  /// The certificate of the derivatives at the estimate. Where its verdict is not `trustworthy`,
+  /// the message and a warning of `uncertainty` say so, because the intervals depend on these
+  /// derivatives.
   Certificate certificate;
 };
 
 /// Called after each iteration of each start.
 using FitProgress = std::function<void(int start, int iteration, const FitIteration&)>;
 
-/// Where an approach to the fit ended, from where the minimiser goes on.
+/// The point at which an approach to the fit ended, where the minimiser continues.
 struct FitApproachResult {
   Eigen::VectorXd parameters;
   int iterations = 0;
@@ -177,8 +179,8 @@ using FitShooting =
 struct FitLog;  // fit_checkpoint.h
 
 /// Runs the fit; `progress` and, unless the approach is kSegments, `shooting` may be empty. With a
-/// log it goes on from what that has, keeps there what it does, and ends at the same bits; where
-/// that turns out to be of another fit the result is worth nothing (FitLog::mismatch).
+/// log it continues from the evaluations in the log, adds its own to it, and has the same bits as
+/// without; if the log belongs to another fit the result is invalid (FitLog::mismatch).
 FitResult Fit(const FitOptions& options, LeastSquaresProblem* problem, const FitProgress& progress,
               FitLog* log = nullptr, const FitShooting& shooting = {});
 

@@ -11,10 +11,10 @@ namespace tangible {
 namespace {
 
 constexpr char kFormat[] = "tangible-fit checkpoint 5";
-// A write waits until so many times the last one's time has gone by.
+// A write waits for this multiple of the duration of the last write.
 constexpr int kWait = 10;
 
-// CBOR holds doubles as they are, infinite ones too.
+// CBOR stores doubles exactly, including infinite ones.
 template <typename Values>
 Json Array(const Values& values) {
   return std::vector<double>(values.data(), values.data() + values.size());
@@ -302,8 +302,8 @@ std::string FitCheckpoint::Text() const {
   return std::string(kFormat) + " " + HashOf(content) + "\n" + content;
 }
 
-// The hash stands before the content, and is looked at first: what was not written here is never
-// decoded.
+// The hash stands before the content and is checked first, so that only content written by this
+// program is decoded.
 std::string FitCheckpoint::Restore(const std::string& text, const std::string& file) {
   const size_t end = text.find('\n');
   if (end == std::string::npos || text.rfind(kFormat, 0) != 0) {

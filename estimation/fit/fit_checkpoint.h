@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// A checkpoint of a fit: what is needed to go on after an interruption and end at the same bits.
+// A checkpoint of a fit: the data with which a fit continues after an interruption and ends with
+// the same bits.
 //
 //   "tangible-fit checkpoint 5 <hash of the content>\n", then in CBOR
 //   {"problem": hash, "fits": [the first fit, the next, ...]}
@@ -42,11 +43,11 @@ struct FitLog {
   long rollouts = 0;             ///< when the last part of a start ended
   std::function<void()> on_end;  ///< called at the end of each part of a start
 
-  /// Not 0: the number of an evaluation that was not where the log has it.
+  /// If not 0, the number of an evaluation that was at another point than that in the log.
   long mismatch() const { return search.mismatch() > 0 ? search.mismatch() : start.mismatch(); }
 };
 
-/// Of everything that determines a fit's result.
+/// A hash of everything that determines the result of a fit.
 std::uint64_t Fingerprint(const FitInput& input);
 
 class FitCheckpoint {
@@ -63,20 +64,20 @@ class FitCheckpoint {
 
   /// The log of the next fit.
   FitLog* Next();
-  /// Not 0: the number of an evaluation that was not where its log has it.
+  /// If not 0, the number of an evaluation that was at another point than that in its log.
   long mismatch() const;
 
   std::string Text() const;
 
   /// Writes the file now; returns an error or empty.
   std::string Write();
-  /// What the first write that failed on the way said; empty: none did.
+  /// The message of the first write that failed; empty where none did.
   const std::string& error() const { return error_; }
 
  private:
-  /// Unless a write failed before.
+  /// Writes the file, unless a write has failed before.
   void WriteOnTheWay();
-  /// And unless writing would take more than a tenth of the time.
+  /// The same, unless writing would take more than a tenth of the time.
   void WriteNowAndThen();
 
   std::uint64_t problem_ = 0;

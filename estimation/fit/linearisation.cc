@@ -11,8 +11,9 @@
 namespace tangible {
 namespace {
 
-// Rows that are added to a triangular factor at once, in multiples of its columns and at least:
-// enough that the decomposition is one of matrices and not of single rows.
+// The number of rows that are added to a triangular factor at once: a multiple of its columns, and
+// at least kChunk. It is large enough for the decomposition to work on matrices and not on single
+// rows.
 constexpr Eigen::Index kChunkFactor = 4;
 constexpr Eigen::Index kChunk = 64;
 

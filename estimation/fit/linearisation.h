@@ -3,20 +3,20 @@
 //
 // A least-squares problem and its linear model at a point, block by block in constant memory.
 //
-// The minimiser moves in q (parameter_entry.h). In it a block has residuals r and the Jacobian
-// [A B], A of its own parameters and B of the shared ones. The robust loss ρ and the weight w of
-// the block scale row i by sqrt(w ρ'_i); what that leaves of the cost is a constant,
+// The minimiser moves in q (parameter_entry.h). In it a block has residuals r and the Jacobian [A
+// B], A of its own parameters and B of the shared ones. The robust loss ρ and the weight w of the
+// block scale row i by sqrt(w ρ'_i); the rest of the cost is a constant,
 //
 //   w/2 Σ ρ(r_i²) = 1/2 ‖r'‖² + 1/2 remainder²       r'_i = sqrt(w ρ'_i) r_i        (1)
 //   [A' B' r'] = Q F                                  F triangular                   (2)
 //   ‖A' x + B' y + r'‖ = ‖F [x; y; 1]‖                for all steps x, y             (3)
 //
-// so that F with its own + shared + 1 rows, gathered from some rows at a time, replaces any number
-// of rows without squaring their condition. For Newton's method on Huber's loss the factor of the
-// rows within its bound, which alone have curvature, is kept too.
+// so that F, with own + shared + 1 rows, replaces any number of rows without squaring their
+// condition; it is computed from some rows at a time. For Newton's method on Huber's loss the
+// factor of the rows within its bound, which are the only ones with curvature, is kept too.
 //
-// Blocks are evaluated on several threads and put together in their order: the result has the same
-// bits for any number of threads. Evaluations go through the log of a checkpoint
+// Blocks are evaluated on several threads and combined in their order, so that the result has the
+// same bits for any number of threads. Evaluations go through the log of a checkpoint
 // (evaluation_log.h), which keeps the factors and not the rows.
 
 #include <Eigen/Core>
@@ -29,7 +29,7 @@
 
 namespace tangible {
 
-/// What stands for the rows of a block.
+/// The factors that replace the rows of a block.
 struct BlockFactor {
   RowMatrixXd factor;      ///< F; at most own + shared + 1 rows, as many columns
   RowMatrixXd curved;      ///< of [A B] of the rows that have curvature; with plain squares empty
@@ -46,8 +46,8 @@ struct Linearisation {
   std::vector<BlockFactor> blocks;
 };
 
-/// b of Huber's loss, 0: plain squares. `target` is that of the fit, `current` what the iteration
-/// minimises: the cost and its gradient are stated for the target too.
+/// b of Huber's loss; 0 means plain squares. `target` is that of the fit, `current` that which the
+/// iteration minimises; the cost and its gradient are computed for the target too.
 struct HuberBounds {
   double current = 0.0;
   double target = 0.0;
@@ -58,28 +58,27 @@ double RobustWeight(double residual, double huber);
 /// 1/2 Σ ρ(r²).
 double RobustCost(const Eigen::VectorXd& residuals, double huber);
 
-/// [A' B' r'] of the rows of a block -> F, from its evaluation with `q_scale` = dp/dq of [shared |
-/// own].
+/// F of a block from its evaluation, with `q_scale` = dp/dq of [shared | own].
 BlockFactor Reduce(const BlockEvaluation& evaluation, const Eigen::VectorXd& q_scale, int num_own,
                    int num_observation_rows, double weight, double huber);
 
-/// Number of threads that `threads` stands for: 0 is one a core.
+/// The number of threads for an option `threads`: 0 means one for each core.
 int NumThreads(int threads);
 
-/// Calls `function` with 0 .. count − 1 on so many threads.
+/// Calls `function` with 0 .. count − 1 on the given number of threads.
 void ForEachOnThreads(int threads, int count, const std::function<void(int)>& function);
 
 /// Evaluates a problem at points q.
 class Linearizer {
  public:
-  /// The log may be null. Both outlive this.
+  /// `log` may be null. The problem and the log must outlive this object.
   Linearizer(LeastSquaresProblem* problem, DerivativeMethod method, int threads,
              EvaluationLog* log);
 
   const BlockLayout& layout() const { return layout_; }
   const std::vector<ParameterEntry>& entries() const { return problem_->entries(); }
   LeastSquaresProblem* problem() const { return problem_; }
-  /// Runs of all evaluations so far.
+  /// The number of runs in all evaluations so far.
   long rollouts() const { return rollouts_; }
 
   /// The rows of all blocks at p. False, with a message, where one fails.

@@ -8,44 +8,24 @@
 
 #include "tangible/estimation/fit/block_system.h"
 #include "tangible/estimation/fit/linearisation.h"
+#include "tangible/estimation/fit/tolerances.h"
 #include "tangible/math/scalar.h"
 
 namespace tangible {
 namespace {
 
-// Ceres stops where the cost changes by less than this, or q by less than that, relative; the
-// polish goes on from there.
-constexpr double kFunctionTolerance = 1e-10;
-constexpr double kParameterTolerance = 1e-9;
-// Far from the optimum Huber's loss is linear in nearly all residuals, and steps of Gauss-Newton
-// creep: where the median residual is beyond its bound, plain squares lead the way, until an
-// iteration gains less than this. Outliers then cost nothing, for the robust loss has the last
-// word.
-constexpr double kApproachTolerance = 1e-2;
-constexpr double kApproachFactor = 4.0;
-// With Huber's loss Ceres goes on to this; then Newton's method takes over, which unlike its steps
-// counts no curvature where the loss is linear (0.75 a step where half of the residuals are).
-constexpr double kRobustTolerance = 1e-4;
-// Root mean square of residuals, in sigma, below which the observations are free of noise and met
-// to rounding.
-constexpr double kExactFit = 1e-8;
-// ε of minimise.h.
-constexpr double kRelativeOffset = 1e-3;
-
-// A parameter that is pushed against a bound by so many iterations is held there until the others
-// have converged.
+// A parameter that this many iterations push against a bound is held there until the others have
+// converged.
 constexpr int kPushesToHold = 2;
 constexpr int kMaxRounds = 10;
-// Where a step is left at Ceres' end it goes on with a new trust region, so many times at most.
+// Where a step remains when Ceres ends, Ceres starts again with a new trust region, at most this
+// many times.
 constexpr int kMaxAttempts = 3;
 
-constexpr double kPolishedStep = 1e-13;  // of q
-// Costs that are equal to this, relative, do not tell which point is better.
-constexpr double kEqualCost = 1e-9;
-// From this number of parameters on sparse factorisations pay.
+// From this number of parameters on sparse factorisations are faster.
 constexpr int kManyParameters = 100;
 
-/// How the last steps are found and taken.
+/// The method of the last steps, and their limits.
 struct FinalSteps {
   enum class Kind { kGaussNewton, kNewton } kind;
   int max_steps;
@@ -56,7 +36,7 @@ struct FinalSteps {
 constexpr FinalSteps kPolish{FinalSteps::Kind::kGaussNewton, 8, 0, kEqualCost, kInfinity};
 constexpr FinalSteps kNewton{FinalSteps::Kind::kNewton, 15, 3, kPolishedStep, kParameterTolerance};
 
-/// Whether the cost falls beyond a bound that p stands on.
+/// Whether p is at a bound beyond which the cost falls.
 bool PushesOut(const ParameterEntry& entry, double p, double gradient) {
   const bool upper = !(p < 0.5 * (entry.lower + entry.upper));  // one of them may be infinite
   return IsAtBound(entry, p) && (upper ? gradient < 0.0 : gradient > 0.0);
@@ -69,7 +49,7 @@ class SharedLinearisation : public ceres::EvaluationCallback {
       : linearizer_(linearizer), huber_(huber), q_(q) {}
 
   void PrepareForEvaluation(bool evaluate_jacobians, bool /*new_evaluation_point*/) override {
-    // The line search of a bounded problem asks again for points it has had, and calls them new.
+    // The line search of a bounded problem asks again for earlier points and declares them new.
     const bool same = at_.size() == q_->size() && at_ == *q_;
     if (same && (has_model_ || !evaluate_jacobians || !ok_)) {
       return;
@@ -93,7 +73,7 @@ class SharedLinearisation : public ceres::EvaluationCallback {
   const Linearisation& model() const { return model_; }
   /// Cost and gradient of the fit's own loss.
   const Linearisation& target() const { return target_; }
-  /// At the last point, whether or not Jacobians were asked for there.
+  /// At the last point, whether or not Jacobians were evaluated there.
   double BlockCost(int block) const {
     if (!has_model_) {
       return block_costs_[block];
@@ -113,7 +93,8 @@ class SharedLinearisation : public ceres::EvaluationCallback {
   bool has_model_ = false;
 };
 
-/// A block's factor as residuals. Where no Jacobian is asked for only their sum of squares counts.
+/// The factor of a block as residuals. Where no Jacobian is requested, only their sum of squares
+/// matters.
 class FactorCostFunction : public ceres::CostFunction {
  public:
   FactorCostFunction(const SharedLinearisation* shared, int block, int num_shared, int num_own,
@@ -208,8 +189,8 @@ class Minimiser : public ceres::IterationCallback {
     return 0.5 * kExactFit * kExactFit * static_cast<double>(layout_.num_rows());
   }
 
-  /// Counts the iterations in a row that each parameter is pushed out; true if one is to be held
-  /// from now on.
+  /// Counts the consecutive iterations that push each parameter out of its range; returns whether
+  /// one is to be held from now on.
   bool CountPushes() {
     bool change = false;
     for (size_t k = 0; k < held_.size(); ++k) {
@@ -224,8 +205,9 @@ class Minimiser : public ceres::IterationCallback {
     return PushesOut(entries_[k], ToParameter(entries_[k], q_[i]), shared_.model().gradient[i]);
   }
 
-  /// Holds and releases parameters at bounds; false where nothing changes. Steps that Ceres cuts at
-  /// a bound are no Gauss-Newton steps of the other parameters: without this they converge slowly.
+  /// Holds and releases parameters at bounds; returns false where nothing changes. A step that
+  /// Ceres cuts at a bound is no Gauss-Newton step of the other parameters, which would converge
+  /// slowly otherwise.
   bool ChangeHeld() {
     bool change = false;
     for (size_t k = 0; k < held_.size(); ++k) {
@@ -241,7 +223,7 @@ class Minimiser : public ceres::IterationCallback {
     return static_cast<int>(minimum_.iterations.size()) <= options_.max_iterations;
   }
 
-  /// Of the fit's own loss, whichever the iteration minimises.
+  /// The cost of the fit's own loss, whichever loss the iteration minimises.
   void Record(bool accepted) {
     if (accepted) {
       cost_ = shared_.target().cost;
@@ -269,7 +251,8 @@ class Minimiser : public ceres::IterationCallback {
     return sizes.empty() ? 0.0 : *middle;
   }
 
-  /// Minimises with `huber` in the loss's place; back where that does not lower the robust cost.
+  /// Minimises with the bound `huber` of the loss; goes back where that does not lower the robust
+  /// cost.
   void Approach(double huber) {
     const Eigen::VectorXd start = q_;
     const double before = shared_.target().cost;
@@ -296,7 +279,7 @@ class Minimiser : public ceres::IterationCallback {
     }
   }
 
-  /// Until both tests of convergence hold, or nothing more is gained.
+  /// Repeats until both tests of convergence hold, or the cost no longer falls.
   void Minimise() {
     for (int attempt = 0; attempt < kMaxAttempts; ++attempt) {
       const double before = shared_.model().cost;
@@ -311,7 +294,7 @@ class Minimiser : public ceres::IterationCallback {
         return;
       }
       Refine(kPolish);
-      // A bound that the last steps have reached or left.
+      // The last steps may have reached or left a bound.
       ChangeHeld();
       const std::string left = WhatIsLeft();
       if (left.empty()) {
@@ -335,7 +318,7 @@ class Minimiser : public ceres::IterationCallback {
     }
   }
 
-  /// A parameter block with those of its parameters constant that are held.
+  /// Declares those parameters of a block constant that are held.
   void AddParameterBlock(int first, int size, ceres::Problem* problem) {
     if (size == 0) {
       return;
@@ -381,7 +364,7 @@ class Minimiser : public ceres::IterationCallback {
     return std::find(held_.begin() + first, held_.begin() + last, false) != held_.begin() + last;
   }
 
-  /// Own parameters are eliminated first, where both kinds are free.
+  /// Own parameters are eliminated first if there are free parameters of both kinds.
   void ChooseLinearSolver(ceres::Solver::Options* solver) {
     const int num_shared = layout_.num_shared();
     if (AnyFree(0, num_shared) && AnyFree(num_shared, layout_.num_parameters())) {
@@ -430,14 +413,14 @@ class Minimiser : public ceres::IterationCallback {
                            summary.termination_type == ceres::USER_SUCCESS;
     minimum_.status = converged ? FitStatus::kConverged : FitStatus::kNotConverged;
     if (!std::isfinite(summary.final_cost)) {
-      // Of which Ceres says that it does not change any more.
+      // Ceres reports that the cost does not change any more.
       minimum_.status = FitStatus::kNotConverged;
       minimum_.message = "the cost is not finite: an observation or its sigma is beyond all bounds";
     }
     shared_.Update();
   }
 
-  /// The unknowns' linear system for Gauss-Newton's or Newton's step of those that are not held.
+  /// The linear system for Gauss-Newton's or Newton's step of the parameters that are not held.
   BlockSystem System(FinalSteps::Kind kind) const {
     std::vector<RowMatrixXd> blocks;
     for (const BlockFactor& block : shared_.model().blocks) {
@@ -447,8 +430,8 @@ class Minimiser : public ceres::IterationCallback {
     return BlockSystem(layout_, blocks, held_);
   }
 
-  /// With Huber's weights Gauss-Newton's step has the cost's own fixed point. Newton's has a
-  /// Hessian of the rows of residuals within the bound alone.
+  /// With Huber's weights, Gauss-Newton's steps have the minimum of the cost as their fixed point.
+  /// The Hessian of Newton's step is that of the residuals within the bound only.
   Eigen::VectorXd StepOf(FinalSteps::Kind kind) const {
     const BlockSystem system = System(kind);
     if (kind == FinalSteps::Kind::kNewton) {
@@ -461,14 +444,15 @@ class Minimiser : public ceres::IterationCallback {
     return system.LeastSquares(residuals);
   }
 
-  /// To q or, within the bounds, as near as possible; its cost, infinite where no run is done.
+  /// Moves to q, or as near as the bounds allow, and returns the cost, which is infinite where a
+  /// run fails.
   double MoveTo(const Eigen::VectorXd& q) {
     q_ = ToInternal(entries_, ToParameters(entries_, q));
     shared_.Update();
     return shared_.ok() ? shared_.model().cost : kInfinity;
   }
 
-  /// Takes steps until they are rounding; false where they do not get there.
+  /// Takes steps until they are rounding; returns false where they do not become that small.
   bool Refine(const FinalSteps& how) {
     double last = kInfinity;
     double cost = shared_.model().cost;
@@ -498,7 +482,7 @@ class Minimiser : public ceres::IterationCallback {
     return last <= kParameterTolerance;
   }
 
-  /// Empty where the tests of minimise.h hold; else one line.
+  /// Returns an empty text where the tests of minimise.h hold, else one line.
   std::string WhatIsLeft() const {
     const Linearisation& model = shared_.model();
     if (model.cost <= ExactCost()) {

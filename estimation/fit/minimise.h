@@ -15,11 +15,11 @@
 //   sqrt(−gᵀ d) ≤ ε s sqrt(P)                       (1)
 //   |g_k| / ‖J_k‖ ≤ ε s sqrt(P)    for each k       (2)
 //
-// (1) bounds the step that is left, in standard deviations, and (2) what one parameter alone would
-// gain; with ε = kRelativeOffset = 1e-3, or if the residuals are rounding. (1) is the relative
-// offset of Bates and Watts, independent of the parameters' scales and of the number of residuals.
-// (2) holds with it unless a direction that the step leaves alone has a gradient. Otherwise the
-// status is `not_converged`, and the message says what is left.
+// (1) bounds the remaining step in standard deviations, and (2) the step of one parameter alone;
+// with ε = kRelativeOffset = 1e-3. Residuals that are rounding count as converged. (1) is the
+// relative offset of Bates and Watts, independent of the parameters' scales and of the number of
+// residuals. (1) implies (2) unless a direction that is left out of the step has a gradient. If a
+// test fails, the status is `not_converged`, and the message says which.
 //
 // Reference: D. M. Bates and D. G. Watts, A relative offset orthogonality convergence criterion for
 // nonlinear least squares, Technometrics 23 (1981) 179.
@@ -42,8 +42,8 @@ Minimum Minimise(const FitOptions& options, const Eigen::VectorXd& start,
                  const std::function<void(int iteration, const FitIteration&)>& progress,
                  LeastSquaresProblem* problem, EvaluationLog* log = nullptr);
 
-/// Bounds of entries first ... first + size − 1 as those of the parameter block `x`, which is moved
-/// within them.
+/// Sets the bounds of entries first ... first + size − 1 as those of the parameter block `x`, which
+/// is moved into them.
 void SetInternalBounds(const std::vector<ParameterEntry>& entries, int first, int size,
                        ceres::Problem* problem, double* x);
 

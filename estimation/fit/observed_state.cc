@@ -11,24 +11,14 @@
 
 #include "tangible/dynamics/elements/joint.h"
 #include "tangible/estimation/fit/minimise.h"
+#include "tangible/estimation/fit/tolerances.h"
 #include "tangible/simulation/stepping/invariants.h"
 
 namespace tangible {
 namespace {
 
-// Of a parabola at first: few, so that no impact is likely to lie between them.
+// The first number of samples of a parabola; few, so that no impact is likely to lie between them.
 constexpr size_t kFewest = 5;
-// A parabola explains its samples where the sum of squares is no more than this many times its
-// degrees of freedom, with a little room for few of them.
-constexpr double kExplained = 2.0;
-// Weights of joints and contacts, stage by stage, in multiples of that of the best observation.
-// From far outside of the joints the observations alone lead the way.
-constexpr double kStages[] = {0.0, 1.0, 1e2, 1e5};
-// Of an unknown's scale: the standard deviation of a prior that it stays where it was. What is
-// observed to 1e-3 of its scale is moved by 1e-14 of it; what nothing determines stays.
-constexpr double kAnchor = 1e4;
-// Of an unknown's scale: of central differences, whose error is of its square.
-constexpr double kDifference = 1e-5;
 constexpr int kIterations = 50;
 
 /// One sample of a series.
@@ -67,7 +57,7 @@ SmoothedSeries FitParabola(const std::vector<SeriesSample>& samples, size_t coun
   const double squares = (values - terms * found).squaredNorm();
   const double freedom = static_cast<double>(rows - terms.cols());
   *explains = squares <= kExplained * (freedom + 2.0 * std::sqrt(freedom));
-  // What it does not explain widens it.
+  // The standard deviations increase where the parabola does not explain the samples.
   const double factor = freedom > 0.0 ? std::sqrt(std::max(1.0, squares / freedom)) : 1.0;
   SmoothedSeries series;
   series.samples = static_cast<int>(count);
@@ -99,10 +89,10 @@ bool IsVelocity(Coordinate coordinate) {
          coordinate == Coordinate::kOmega;
 }
 
-/// The least-squares problem of the state; unknowns are what `state_of` makes a state of.
+/// The least-squares problem of the state; `state_of` makes a state from the unknowns.
 class StateProblem : public LeastSquaresProblem {
  public:
-  /// False where the unknowns have no state.
+  /// Returns false where the unknowns give no state.
   using StateOf = std::function<bool(const Eigen::VectorXd& x, State<double>* state)>;
 
   /// `model` is that of the state that was made last.
@@ -140,7 +130,7 @@ class StateProblem : public LeastSquaresProblem {
     evaluation->jacobian.resize(evaluation->residuals.size(), p.size());
     for (Eigen::Index k = 0; k < p.size(); ++k) {
       const ParameterEntry& entry = entries_[static_cast<size_t>(k)];
-      const double h = kDifference * entry.scale;
+      const double h = kStateDifference * entry.scale;
       Eigen::VectorXd moved[2] = {p, p};
       moved[0][k] = std::max(p[k] - h, entry.lower);
       moved[1][k] = std::min(p[k] + h, entry.upper);
@@ -155,7 +145,8 @@ class StateProblem : public LeastSquaresProblem {
   }
 
  private:
-  // Two or three equations and as many of their rates; those of a joint that has fewer are 0.
+  // There are up to three equations and as many rates of them; those that a joint does not have are
+  // 0.
   int num_joint_rows() const {
     return 6 * static_cast<int>(residuals_.scene().model().structure->joints.size());
   }
@@ -173,7 +164,7 @@ class StateProblem : public LeastSquaresProblem {
     ++row;
     for (Eigen::Index k = 0; k < p.size(); ++k) {
       const ParameterEntry& entry = entries_[static_cast<size_t>(k)];
-      (*rows)[row++] = (p[k] - entry.initial) / (kAnchor * entry.scale);
+      (*rows)[row++] = (p[k] - entry.initial) / (kStatePrior * entry.scale);
     }
     return rows->allFinite();
   }
@@ -229,7 +220,7 @@ Eigen::VectorXd Solve(StateProblem* problem) {
   options.max_iterations = kIterations;
   options.threads = 1;
   Eigen::VectorXd x = InitialOf(problem->entries());
-  for (const double stage : kStages) {
+  for (const double stage : kJointWeights) {
     problem->SetStage(stage);
     const Minimum minimum = Minimise(
         options, x, [] { return 0.0; }, {}, problem);
@@ -239,7 +230,7 @@ Eigen::VectorXd Solve(StateProblem* problem) {
   return x;
 }
 
-/// "bodies/NAME/what" has the ending of a pose's or twist's number.
+/// Whether a path "bodies/NAME/..." ends with a component of a pose or twist.
 bool IsOfState(const std::string& path) {
   const size_t first = path.find('/');
   const size_t second = path.find('/', first + 1);
@@ -275,7 +266,7 @@ std::vector<SmoothedSeries> SmoothAt(const RolloutResiduals& residuals, double t
 State<double> StateFromObservations(const RolloutResiduals& residuals, double time,
                                     const State<double>& guess) {
   const ModelStructure& structure = *residuals.scene().model().structure;
-  // The number i of the moving bodies' states.
+  // Component i of the states of the moving bodies.
   const auto number = [&structure](int i, State<double>* state) -> double& {
     const size_t body = static_cast<size_t>(structure.moving[i / 6]);
     return i % 6 < 3 ? state->pose[3 * body + i % 6] : state->twist[3 * body + i % 6 - 3];

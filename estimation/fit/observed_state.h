@@ -3,23 +3,23 @@
 //
 // The state of a run at one time, from the observations around it.
 //
-// Through the samples of each observed coordinate that are nearest to the time t₀ a parabola is
-// laid by weighted least squares,
+// A parabola is fitted by weighted least squares to the samples of each observed coordinate that
+// are nearest to the time t₀,
 //
 //   value(t) ~ a + b (t − t₀) + ½ c (t − t₀)²
 //
-// through five of them at first and twice as many each time, as long as it explains them. The
-// state (q, v) is the one that meets a and b best, and the joints and contacts:
+// to five of them at first and to twice as many each time, as long as it explains them. The state
+// (q, v) is the one that agrees best with a and b while it satisfies joints and contacts:
 //
 //   minimise  Σ ((h(q, v) − a) / σ_a)² + Σ ((∂h/∂q v − b) / σ_b)²
 //   with      C(q) = 0,  ∂C/∂q v = 0 of all joints,  gaps ≥ 0
 //
-// h is what would be observed, through whatever instruments and relative to whatever body; observed
-// velocities have the first sum alone. σ_a and σ_b are the parabola's, larger where it explains the
-// samples badly. Joints and contacts are rows of growing weight, at last 1e5 times that of the
-// observations: a joint is then open by less than 1e-8 of a σ. The unknowns are poses and twists,
-// or parameters that set them: joint angles and rates then too. What nothing determines stays as
-// it was.
+// h is the predicted observation, with its instruments and relative to its reference body; observed
+// velocities enter the first sum only. σ_a and σ_b are the standard deviations of the parabola,
+// larger where it explains the samples badly. Joints and contacts are rows of increasing weight, at
+// the end 1e5 times that of the observations, so that a joint is open by less than 1e-8 of a σ. The
+// unknowns are poses and twists, or the parameters that set them, which may also be joint angles
+// and rates. Unknowns that nothing determines keep their values.
 
 #include <Eigen/Core>
 #include <vector>
@@ -29,7 +29,8 @@
 
 namespace tangible {
 
-/// What a parabola through the samples of one observed coordinate says of it at one time.
+/// The value and the rate of one observed coordinate at one time, by a parabola through its
+/// samples.
 struct SmoothedSeries {
   int observation = -1;  ///< one of the series
   double value = 0.0;    ///< a, in the observation's unit
@@ -42,8 +43,9 @@ struct SmoothedSeries {
 /// All series of a run at time t₀ (s, of the run).
 std::vector<SmoothedSeries> SmoothAt(const RolloutResiduals& residuals, double time);
 
-/// The state of the run at `time`, with the moving bodies' poses and twists sought from `guess`;
-/// `guess` itself where there is none that is finite. The model is that of the scene as it is.
+/// The state of the run at `time`, where the poses and twists of moving bodies are estimated from
+/// `guess`; `guess` itself where no estimate is finite. The model is that of the scene at its
+/// current parameters.
 State<double> StateFromObservations(const RolloutResiduals& residuals, double time,
                                     const State<double>& guess);
 

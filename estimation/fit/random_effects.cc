@@ -9,33 +9,27 @@
 #include <functional>
 #include <utility>
 
+#include "tangible/estimation/fit/tolerances.h"
 #include "tangible/estimation/problem/problem_with_priors.h"
 
 namespace tangible {
 namespace {
 
-// Of a column's length: what is left of it is rounding, and the column not determined.
-constexpr double kUndetermined = 1e-12;
-// RangeOf, in multiples of the median deviation of a recording's own value; and of the spread now.
-constexpr double kSmallest = 1e-3;
-constexpr double kLargest = 1e3;
-// Points at which a likelihood is looked at before its maximum is sought between two of them.
+// The number of points at which a likelihood is evaluated before its maximum is searched between
+// two of them.
 constexpr int kGrid = 41;
-// Of ln τ: bits to which a maximum, which is flat, can be found; and changes that are none.
+// The number of bits of ln τ to which a maximum, which is flat, can be located.
 constexpr int kBits = 24;
-constexpr double kSettledLogarithm = 1e-6;
 constexpr int kMostSweeps = 50;
-// Far above the range: as good as infinite in (2).
-constexpr double kInfinite = 1e6;
 constexpr int kBisections = 100;
 
-/// ln of the diagonal's sizes of a triangular matrix, of those that are determined.
+/// The sum of ln |diagonal entry| of a triangular matrix over the columns that are determined.
 double LogDiagonal(const Eigen::MatrixXd& factor, const Eigen::VectorXd& lengths,
                    Eigen::Index count) {
   double sum = 0.0;
   for (Eigen::Index i = 0; i < std::min(count, factor.rows()); ++i) {
     const double size = std::abs(factor(i, i));
-    if (size > kUndetermined * lengths[i]) sum += std::log(size);
+    if (size > kUndeterminedColumn * lengths[i]) sum += std::log(size);
   }
   return sum;
 }
@@ -137,27 +131,27 @@ std::pair<double, double> SpreadLikelihood::RangeOf(int effect) const {
     const int k = of.own[block];
     const int b = static_cast<int>(block);
     if (k < 0) continue;
-    // What is left of the parameter's column beside the block's other own ones.
+    // The part of the parameter's column that is orthogonal to the other own columns of the block.
     RowMatrixXd own = blocks_[block].factor.leftCols(layout_.num_own(b));
     const Eigen::Index column = k - layout_.own_offset(b);
     own.col(column).swap(own.col(own.cols() - 1));
     const Eigen::HouseholderQR<Eigen::MatrixXd> qr(own);
     const Eigen::Index last = own.cols() - 1;
     const double left = own.rows() > last ? std::abs(qr.matrixQR()(last, last)) : 0.0;
-    if (left > kUndetermined * own.norm()) {
+    if (left > kUndeterminedColumn * own.norm()) {
       const double size = of.kind == PriorKind::kLogNormal ? std::abs(estimate_[k]) : 1.0;
       deviations.push_back(1.0 / (left * size));
     }
   }
-  if (deviations.empty()) return {kSmallest * of.spread, kLargest * of.spread};
+  if (deviations.empty()) return {kLeastSpread * of.spread, kLargestSpread * of.spread};
   const auto middle = deviations.begin() + static_cast<std::ptrdiff_t>(deviations.size() / 2);
   std::nth_element(deviations.begin(), middle, deviations.end());
-  return {kSmallest * *middle, kLargest * std::max(*middle, of.spread)};
+  return {kLeastSpread * *middle, kLargestSpread * std::max(*middle, of.spread)};
 }
 
 namespace {
 
-/// The place of the largest ℓ over one spread's range, the others as they are.
+/// The spread that maximises ℓ over its range, with the other spreads held.
 double BestSpread(const SpreadLikelihood& likelihood, size_t effect, std::vector<double> spreads) {
   const auto [low, high] = likelihood.RangeOf(static_cast<int>(effect));
   const auto cost = [&](double log_spread) {
@@ -181,8 +175,8 @@ double BestSpread(const SpreadLikelihood& likelihood, size_t effect, std::vector
   return std::exp(boost::math::tools::brent_find_minima(cost, from, to, kBits).first);
 }
 
-/// Where the decreasing function Q falls to `level`, between these spreads; 0 where it is below
-/// already at the first.
+/// The spread between `from` and `to` at which the decreasing function Q falls to `level`; 0 where
+/// Q is below it at `from`.
 double Crossing(const std::function<double(double)>& q, double level, double low, double high) {
   if (q(low) <= level) return 0.0;
   double from = std::log(low);
@@ -198,7 +192,7 @@ double Crossing(const std::function<double(double)>& q, double level, double low
 ConfidenceInterval IntervalOf(const SpreadLikelihood& likelihood, size_t effect, int recordings,
                               bool mean_has_prior, std::vector<double> spreads) {
   const auto [low, high] = likelihood.RangeOf(static_cast<int>(effect));
-  spreads[effect] = kInfinite * high;
+  spreads[effect] = kInfiniteSpread * high;
   const double free = likelihood.At(spreads).twice_cost;
   const auto q = [&](double spread) {
     spreads[effect] = spread;
@@ -207,8 +201,9 @@ ConfidenceInterval IntervalOf(const SpreadLikelihood& likelihood, size_t effect,
   const int freedom = recordings - (mean_has_prior ? 0 : 1);
   if (freedom < 1) return std::nullopt;
   const boost::math::chi_squared distribution(freedom);
-  return std::pair(Crossing(q, boost::math::quantile(distribution, 0.975), low, kInfinite * high),
-                   Crossing(q, boost::math::quantile(distribution, 0.025), low, kInfinite * high));
+  return std::pair(
+      Crossing(q, boost::math::quantile(distribution, 0.975), low, kInfiniteSpread * high),
+      Crossing(q, boost::math::quantile(distribution, 0.025), low, kInfiniteSpread * high));
 }
 
 /// The linear problem at the estimate; false where a run fails.
@@ -266,7 +261,7 @@ bool UpdateSpreads(const FitOptions& options, const FitResult& result, Recording
     one.spread = none ? 0.0 : now[e];
     const bool has_prior = entries[problem->effects()[e].mean].prior.has_value();
     one.interval = IntervalOf(likelihood, e, one.recordings, has_prior, now);
-    // Which of the smallest it is does not matter.
+    // A change between spreads at the lower end of the range does not matter.
     const bool was_none = before[e] <= 2.0 * smallest;
     if (!(none && was_none)) {
       *largest = std::max(*largest, std::abs(std::log(now[e] / before[e])));

@@ -5,10 +5,10 @@
 //
 //   θ_b ~ N(μ, τ²)    or    ln θ_b ~ N(ln μ, τ²)          of each recording b
 //
-// At given τ the fit finds all θ_b, drawn towards μ, and μ (problem_with_priors.h). Minimising the
-// cost over τ too would end at τ = 0 with all θ_b equal. Instead τ is the mode of the restricted
-// likelihood, the density of the observations with all parameters p = (μ, θ, others) integrated
-// out, in the problem linearised at the estimate (Laplace's approximation):
+// At given τ the fit estimates μ and all θ_b, which are drawn towards μ (problem_with_priors.h).
+// Minimising the cost over τ as well would end at τ = 0 with all θ_b equal. Instead τ is the mode
+// of the restricted likelihood, the density of the observations with all parameters p = (μ, θ,
+// others) integrated out, in the problem linearised at the estimate (Laplace's approximation):
 //
 //   ℓ(τ) = −Σ_e n_e ln τ_e − ½ ln det (Jᵀ J) − cost_min(τ)                                (1)
 //
@@ -17,8 +17,8 @@
 // are reduced to their triangular factors, and own parameters are eliminated block by block: one
 // value of (1) costs the number of recordings times the cube of a recording's parameters.
 //
-// The interval of τ_e is made of the values that the contrasts of the θ_b do not reject, the other
-// spreads held:
+// The interval of τ_e consists of the values that the contrasts of the θ_b do not reject, with the
+// other spreads held:
 //
 //   Q(τ_e) = 2 (cost_min(τ_e) − cost_min(∞))  ~  χ² with n_e − 1 degrees of freedom         (2)
 //
@@ -52,12 +52,12 @@ struct SpreadEstimate {
   int recordings = 0;  ///< n_e
 };
 
-/// The linear problem at an estimate, in which the spreads are sought.
+/// The problem linearised at an estimate, by which the spreads are estimated.
 class SpreadLikelihood {
  public:
-  /// `blocks`: of each block of the layout the factor of its observations and priors, without the
-  /// rows of the effects, for changes of p as it is (Reduce with dp/dq = 1). `free[k]`: parameter k
-  /// is at no bound.
+  /// `blocks`: for each block of the layout the factor of its observations and priors, without the
+  /// rows of the effects, for changes of p itself (Reduce with dp/dq = 1). `free[k]`: parameter k
+  /// is not at a bound.
   SpreadLikelihood(const BlockLayout& layout, std::vector<BlockFactor> blocks,
                    std::vector<RandomEffect> effects, Eigen::VectorXd estimate,
                    std::vector<bool> free);
@@ -69,8 +69,9 @@ class SpreadLikelihood {
   };
   Value At(const std::vector<double>& spreads) const;
 
-  /// The smallest and largest spread of an effect that is looked at: a thousandth of the deviation
-  /// of a recording's own value, below which nothing changes any more, and far above what is seen.
+  /// The smallest and largest spread of an effect that is considered: a thousandth of the deviation
+  /// of a recording's own value, below which the likelihood is constant, and far above any
+  /// estimate.
   std::pair<double, double> RangeOf(int effect) const;
 
  private:
@@ -87,10 +88,10 @@ class SpreadLikelihood {
   std::vector<bool> free_;
 };
 
-/// The spreads that maximise (1), from those of `problem`'s effects, with their intervals. A spread
-/// that is given stays. One of 0 is set as the smallest of its range in `problem`. `largest` gets
-/// the largest change of a spread that is above that, relative, if it is larger. False, with a
-/// message, where a run at the estimate fails.
+/// Finds the spreads that maximise (1), starting from those of the effects of `problem`, with their
+/// intervals. A given spread is not changed. A spread of 0 becomes the smallest of its range in
+/// `problem`. `largest` is raised to the largest relative change of a spread above that. Returns
+/// false, with a message, where a run at the estimate fails.
 bool UpdateSpreads(const FitOptions& options, const FitResult& result, RecordingsProblem* problem,
                    std::vector<SpreadEstimate>* spreads, double* largest, std::string* message);
 

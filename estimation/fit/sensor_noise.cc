@@ -5,14 +5,13 @@
 #include <cmath>
 #include <utility>
 
+#include "tangible/estimation/fit/tolerances.h"
+#include "tangible/estimation/uncertainty/tolerances.h"
+
 namespace tangible {
 namespace {
 
-constexpr double kDeviationByMedian = 1.4826;
-// ρ_s below which a sensor's observations leave no residuals.
-constexpr double kLeastRedundancy = 0.5;
-
-/// Σ r² of some rows, or what stands for it with Huber's loss.
+/// Σ r² of some rows, or its robust estimate with Huber's loss.
 double SquareSum(const Eigen::VectorXd& residuals, const std::vector<int>& rows, double huber) {
   if (huber > 0.0 && !rows.empty()) {
     std::vector<double> sizes;
@@ -46,7 +45,7 @@ const SensorNoise* NoiseOf(const std::vector<SensorNoise>& noise, const Instrume
   return nullptr;
 }
 
-/// Of each sensor its rows among the observations of all recordings.
+/// The rows of each sensor among the observations of all recordings.
 std::vector<std::vector<int>> RowsOf(const RecordingsProblem& problem,
                                      const std::vector<SensorNoise>& noise) {
   std::vector<std::vector<int>> rows(noise.size());

@@ -9,19 +9,16 @@
 #include "tangible/estimation/fit/linearisation.h"
 #include "tangible/estimation/fit/minimise.h"
 #include "tangible/estimation/fit/observed_state.h"
+#include "tangible/estimation/fit/tolerances.h"
 #include "tangible/estimation/problem/problem_with_priors.h"
 #include "tangible/simulation/derivatives/rollout_tangent.h"
 
 namespace tangible {
 namespace {
 
-// Standard deviations of the jumps, stage by stage, in multiples of the observations' median sigma.
-constexpr double kStages[] = {1e3, 30.0, 1.0};
 constexpr int kIterationsPerStage = 30;
-// Standard deviation of the joints' errors, the same.
-constexpr double kOnJoints = 0.01;
 
-/// The unknown numbers of a moving body's state in the rows of w = [poses | twists | parameters].
+/// The row of unknown i of the states of moving bodies in w = [poses | twists | parameters].
 int StateRow(const ModelStructure& s, int i) {
   const int body = s.moving[i / 6];
   const int component = i % 6;
@@ -109,7 +106,7 @@ void ShootingResiduals::StatesFromObservations(const Eigen::VectorXd& p, Eigen::
     for (int i = 0; i < state_size_ && runs; ++i) {
       StateNumber(*scene.model().structure, i, &state) = (*states)[first + i];
     }
-    // Where the run fails the state before is as near as anything known.
+    // Where the run fails the state before it is the best known approximation.
     const double time = StepTime(scene.scene().simulation, cuts_[segment]);
     state = StateFromObservations(*residuals_, time, state);
     for (int i = 0; i < state_size_; ++i) {
@@ -122,8 +119,8 @@ void ShootingResiduals::AddShares(int segment, long k, Run* run) const {
   const SamplePlan& plan = residuals_->plan();
   for (const SampleShare& share : plan.SharesAt(k)) {
     const Sample& sample = plan.samples()[share.sample];
-    // At a cut the end of one segment serves samples that began before it, the start of the next
-    // those after.
+    // At a cut, samples that began before it use the end of the segment, and those after it the
+    // start of the next one.
     const bool begins_here = sample.step == k;
     const bool at_end = k == cuts_[segment + 1] && segment + 1 < num_segments();
     if (begins_here ? at_end : k == cuts_[segment]) {
@@ -165,8 +162,8 @@ bool ShootingResiduals::RunSegment(int segment, Run* run) {
   return true;
 }
 
-/// The jump at the end of a segment; then the next segment's start: its own state for moving
-/// bodies, all else goes on.
+/// Adds the jump at the end of a segment and sets the start of the next one: moving bodies get its
+/// own state, everything else continues.
 void ShootingResiduals::Meet(int segment, Run* run) const {
   const ModelStructure& structure = *residuals_->scene().model().structure;
   const int first_row = num_observations() + segment * state_size_;
@@ -418,7 +415,7 @@ FitApproachResult Shoot(const FitOptions& options, const Eigen::VectorXd& start,
   FitOptions stage_options = options;
   stage_options.max_iterations = kIterationsPerStage;
   double least = HUGE_VAL;
-  for (const double stage : kStages) {
+  for (const double stage : kJumpSigmas) {
     shooting.SetJumpSigma(stage);
     ProblemWithPriors with_priors(&shooting, shooting.effects());
     const Minimum minimum = Minimise(
@@ -430,7 +427,8 @@ FitApproachResult Shoot(const FitOptions& options, const Eigen::VectorXd& start,
     }
     x = minimum.parameters;
     result.iterations += std::max(0, static_cast<int>(minimum.iterations.size()) - 1);
-    // Where jumps that cost much trap the minimiser, the stage before has led nearer.
+    // If the high cost of jumps traps the minimiser, the stage before it may be nearer to the
+    // optimum.
     const Eigen::VectorXd p = shooting.ParametersOf(x);
     const double cost = CostOfRuns(options, p, problem, &result.rollouts);
     if (cost < least || least == HUGE_VAL) {

@@ -1,24 +1,24 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// Multiple shooting: a start for the fit where a single run is too long to be steered from its
-// beginning.
+// Multiple shooting: a start for the fit where a single run depends too strongly on its initial
+// state.
 //
-// Each run is cut at S − 1 steps. The states x_j of the moving bodies there are unknowns beside the
-// parameters p, of the run's recording alone; every segment runs from its own x_j, and its end must
-// meet the next one:
+// Each run is cut at S − 1 steps. The states x_j of the moving bodies at the cuts are further
+// unknowns beside the parameters p, own parameters of the recording. Every segment runs from its
+// own x_j, and its end must agree with the next state:
 //
 //   minimise  1/2 Σ ρ(r_i(p, x)²) + 1/2 Σ_j ‖W (end_j(p, x_j) − x_{j+1})‖²
 //
 //   j = 0 .. S − 2,   x_0 = x_0(p)
 //
 // Over a short segment the predictions are nearly linear in the unknowns, so that a wrong period or
-// a chaotic end does not trap the minimiser. The states begin at what the observations around them
-// say (observed_state.h), on the joints, and stay there by rows of the joints' errors and of their
-// rates; what the observations do not say is that of the run at the initial values. W grows in
-// stages, from jumps that cost little, when the observations alone place the states, to jumps of
-// less than the noise. The single run then starts at the parameters found: optimum and covariance
-// are the fit's own, whatever S.
+// a chaotic end does not trap the minimiser. The states begin at those that the observations around
+// them give (observed_state.h), on the joints, where rows of the joints' errors and rates keep
+// them; components that are not observed begin at those of the run at the initial values. W grows
+// in stages: at first jumps cost little and the observations determine the states, at the end jumps
+// are smaller than the noise. The fit of the whole run then starts at the parameters found, so that
+// its optimum and covariance do not depend on S.
 
 #include <Eigen/Core>
 #include <memory>
@@ -34,7 +34,7 @@ namespace tangible {
 /// of the joints of each state and their rates, six a joint; unknowns [p | x_1 | .. | x_{S−1}].
 class ShootingResiduals {
  public:
-  /// At most one segment a step.
+  /// There is at most one segment for each step.
   ShootingResiduals(int segments, RolloutResiduals* residuals);
 
   int num_segments() const { return static_cast<int>(cuts_.size()) - 1; }
@@ -46,15 +46,16 @@ class ShootingResiduals {
     return num_observations() + num_states() + (num_segments() - 1) * num_joint_rows();
   }
 
-  /// The states x_1 ... x_{S−1} of one whole run at p; false where that fails.
+  /// The states x_1 ... x_{S−1} of one whole run at p; returns false where that fails.
   bool StatesOfRun(const Eigen::VectorXd& p, Eigen::VectorXd* states);
-  /// The same with what the observations around each cut say of them.
+  /// The same, with the components that the observations around each cut determine taken from
+  /// these.
   void StatesFromObservations(const Eigen::VectorXd& p, Eigen::VectorXd* states);
 
-  /// Standard deviation of jumps of positions and angles, in m and rad; of rates by the length of a
-  /// segment.
+  /// Sets the standard deviation of jumps of positions and angles, in m and rad; that of jumps of
+  /// rates follows from the length of a segment.
   void SetJumpSigma(double sigma) { jump_sigma_ = sigma; }
-  /// The same of the joints' errors.
+  /// The same for the errors of the joints.
   void SetJointSigma(double sigma) { joint_sigma_ = sigma; }
 
   /// At [p | states]; `jacobian` may be null.
@@ -83,14 +84,14 @@ class ShootingResiduals {
 /// rows of its block, without the robust loss.
 class ShootingProblem : public LeastSquaresProblem {
  public:
-  /// `problem` outlives this.
+  /// `problem` must outlive this object.
   ShootingProblem(int segments, RecordingsProblem* problem);
 
-  /// [p | states] from p. False where there is nothing to cut.
+  /// [p | states] from p; returns false where no run can be cut.
   bool Start(const Eigen::VectorXd& p, Eigen::VectorXd* unknowns);
-  /// p out of [p | states].
+  /// The parameters p of [p | states].
   Eigen::VectorXd ParametersOf(const Eigen::VectorXd& unknowns) const;
-  /// In multiples of the median sigma of each recording.
+  /// Sets the standard deviation of jumps in multiples of the median sigma of each recording.
   void SetJumpSigma(double sigma);
   /// The parameters that vary, with their indices in [p | states].
   const std::vector<RandomEffect>& effects() const { return effects_; }
@@ -117,9 +118,9 @@ class ShootingProblem : public LeastSquaresProblem {
   std::vector<RandomEffect> effects_;
 };
 
-/// Multiple shooting from `start`: the parameters of that stage at which the whole runs cost the
-/// least. Where a stage fails, those before it count, with a message. Evaluations of stages go
-/// through `log` unless it is null.
+/// Multiple shooting from `start`. The result has the parameters of the stage with the least cost
+/// of the whole runs. If a stage fails, the stages before it count, with a message. Evaluations of
+/// stages go through `log` unless it is null.
 FitApproachResult Shoot(const FitOptions& options, const Eigen::VectorXd& start,
                         RecordingsProblem* problem, EvaluationLog* log);
 

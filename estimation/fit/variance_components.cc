@@ -6,13 +6,12 @@
 #include <utility>
 
 #include "tangible/estimation/fit/fit_checkpoint.h"
+#include "tangible/estimation/fit/tolerances.h"
 
 namespace tangible {
 namespace {
 
 constexpr int kMostFits = 20;
-// Changes of a sensor's factor, in multiples of its deviation, and of a spread, relative.
-constexpr double kSettledChange = 1e-3;
 
 /// `next` as the continuation of `result`.
 void Append(FitResult next, FitResult* result) {
@@ -68,7 +67,7 @@ FitResult FitWithComponents(const FitOptions& options, RecordingsProblem* proble
   if (!estimates) {
     return fit(options, progress, &same);
   }
-  // What judges the estimate is done once, for the components that are found.
+  // The tests that judge the estimate are made once, with the final components.
   FitOptions search = options;
   search.certificate = CertificatePass::kSkip;
   search.held_test = HeldTest::kSkip;

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// A fit with what is estimated beside its parameters: the standard deviation of sensors' noise
-// (sensor_noise.h) and the spread of parameters that vary from recording to recording
-// (random_effects.h). Each has an equation at the estimate of a fit with given values; fits and
-// equations alternate until no value changes any more.
+// A fit that also estimates variances: the standard deviation of sensors' noise (sensor_noise.h)
+// and the spread of parameters that vary from recording to recording (random_effects.h). Each has
+// an equation at the estimate of a fit with given values; fits and equations alternate until no
+// value changes any more.
 
 #include <functional>
 #include <vector>
@@ -24,10 +24,10 @@ struct VarianceComponents {
 /// The log of the next fit, or null.
 using NextLog = std::function<FitLog*()>;
 
-/// The fit of recordings with the components that ask to be estimated; one fit where none does. The
-/// observations and effects of `problem` have what was found when it ends. Costs are in multiples
-/// of the sigma of the time, and iterations those of all fits. Where a fit does not converge, or
-/// the components do not settle (20 fits), the status says so.
+/// Fits recordings and estimates the components for which this is requested; it is a single fit
+/// where none is. At the end the observations and effects of `problem` have the estimated values.
+/// Costs are in multiples of the sigma of their fit, and iterations are those of all fits. If a fit
+/// does not converge, or the components still change after 20 fits, the status says so.
 FitResult FitWithComponents(const FitOptions& options, RecordingsProblem* problem,
                             const FitProgress& progress, VarianceComponents* components,
                             const NextLog& next_log = {});

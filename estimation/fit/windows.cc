@@ -9,22 +9,14 @@
 
 #include "tangible/estimation/fit/linearisation.h"
 #include "tangible/estimation/fit/minimise.h"
+#include "tangible/estimation/fit/tolerances.h"
 #include "tangible/estimation/problem/problem_with_priors.h"
 #include "tangible/estimation/uncertainty/residual_quality.h"
 
 namespace tangible {
 namespace {
 
-// The first window is this part of the time.
-constexpr double kFirstPart = 1.0 / 32.0;
-// The next one is as many times as long, by the first of these at which the residuals of what is
-// new are no larger than this many times those of the window before, or than this many sigma.
-constexpr double kGrowth[] = {2.0, 1.5, 1.2, 1.1, 1.05};
-constexpr double kFarOff = 3.0;
-// Standard deviation of a parameter around where the last window left it: of its logarithm, or in
-// multiples of its scale.
-constexpr double kAnchor = 3.0;
-// A window only has to lead to the next.
+// A window only has to lead to the next one, which limits its iterations.
 constexpr int kIterationsPerWindow = 100;
 
 long NumRows(const LeastSquaresProblem& problem) {
@@ -44,7 +36,7 @@ double RmsAt(const FitOptions& options, const Eigen::VectorXd& p, LeastSquaresPr
              : HUGE_VAL;
 }
 
-/// Growing windows under way.
+/// The state of growing windows.
 class Windows {
  public:
   Windows(const FitOptions& options, const Eigen::VectorXd& start, LeastSquaresProblem* problem,
@@ -68,8 +60,8 @@ class Windows {
   }
 
  private:
-  /// What a window does not determine must not drift: each parameter is known to be near where the
-  /// last window left it, unless it has a prior of its own.
+  /// Parameters that a window does not determine must not drift: each has a prior around its
+  /// estimate from the last window, unless it has a prior of its own.
   std::vector<std::optional<Prior>> Anchors() const {
     const std::vector<ParameterEntry>& entries = problem_->entries();
     std::vector<std::optional<Prior>> anchors(entries.size());
@@ -77,7 +69,7 @@ class Windows {
       if (!entries[k].prior) {
         anchors[k] = {entries[k].logarithmic ? PriorKind::kLogNormal : PriorKind::kGaussian,
                       result_.parameters[static_cast<Eigen::Index>(k)],
-                      kAnchor * (entries[k].logarithmic ? 1.0 : entries[k].scale)};
+                      kWindowPrior * (entries[k].logarithmic ? 1.0 : entries[k].scale)};
       }
     }
     return anchors;
@@ -97,13 +89,13 @@ class Windows {
     return true;
   }
 
-  /// The window after one with so many rows.
+  /// The window after one with the given number of rows.
   std::unique_ptr<LeastSquaresProblem> Next(long rows) {
     const double allowed =
         kFarOff * std::max(1.0, RmsAt(options_, result_.parameters, problem_->Window(part_).get()));
     std::unique_ptr<LeastSquaresProblem> next;
     double grown = part_;
-    for (const double growth : kGrowth) {
+    for (const double growth : kWindowGrowth) {
       grown = part_ * growth;
       next = problem_->Window(std::min(1.0, grown));
       if (NumRows(*next) == rows || RmsAt(options_, result_.parameters, next.get()) <= allowed) {

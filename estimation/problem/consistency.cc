@@ -4,24 +4,14 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <sstream>
 
+#include "tangible/estimation/problem/tolerances.h"
 #include "tangible/geometry/mass_properties.h"
 #include "tangible/geometry/shape.h"
+#include "tangible/render/html.h"
 
 namespace tangible {
 namespace {
-
-// A thin ring, or two points at the ends, have exactly the largest inertia, so that rounding must
-// not count as a violation.
-constexpr double kSlack = 1e-9;
-
-std::string Short(double x) {
-  std::ostringstream text;
-  text.precision(4);
-  text << x;
-  return text.str();
-}
 
 double Cross(const Vector2<double>& a, const Vector2<double>& b) {
   return a[0] * b[1] - a[1] * b[0];
@@ -34,7 +24,7 @@ double OfTriangle(const Vector2<double>& a, const Vector2<double>& b, const Vect
   const double wb = Cross(c, a);
   const double wc = Cross(a, b);
   const double sum = wa + wb + wc;
-  const double least = -kSlack * std::abs(sum);
+  const double least = -kInertiaRounding * std::abs(sum);
   const double sign = sum < 0.0 ? -1.0 : 1.0;
   if (sum == 0.0 || sign * wa < least || sign * wb < least || sign * wc < least) {
     return -1.0;
@@ -84,11 +74,11 @@ std::vector<std::string> FindInconsistentBodies(const Scene& scene) {
     if (largest < 0.0) {
       found.push_back("body '" + body.name +
                       "' cannot exist: its centre of mass is outside of its shape");
-    } else if (body.inertia && *body.inertia > (1.0 + kSlack) * body.mass * largest) {
+    } else if (body.inertia && *body.inertia > (1.0 + kInertiaRounding) * body.mass * largest) {
       found.push_back("body '" + body.name + "' cannot exist: expected an inertia of at most " +
-                      Short(body.mass * largest) + " kg m^2, that of its mass of " +
-                      Short(body.mass) + " kg at the border of its shape, got " +
-                      Short(*body.inertia));
+                      CompactNumber(body.mass * largest, 4) + " kg m^2, that of its mass of " +
+                      CompactNumber(body.mass, 4) + " kg at the border of its shape, got " +
+                      CompactNumber(*body.inertia, 4));
     }
   }
   return found;

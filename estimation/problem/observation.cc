@@ -10,6 +10,7 @@
 #include <sstream>
 #include <tuple>
 
+#include "tangible/estimation/problem/tolerances.h"
 #include "tangible/scene/csv.h"
 #include "tangible/scene/json_reader.h"
 

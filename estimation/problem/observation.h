@@ -18,9 +18,6 @@
 
 namespace tangible {
 
-/// As a fraction of a step: times that differ by less are the same.
-inline constexpr double kTimeTolerance = 1e-9;
-
 enum class Coordinate { kX, kY, kAngle, kVx, kVy, kOmega, kDistance };
 inline constexpr int kCoordinates = 7;
 

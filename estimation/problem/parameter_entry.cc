@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tangible/estimation/problem/tolerances.h"
+
 namespace tangible {
 namespace {
 
@@ -20,9 +22,6 @@ Eigen::VectorXd Map(const std::vector<ParameterEntry>& entries, const Eigen::Vec
   }
   return y;
 }
-
-// exp(ln bound) and the minimiser's projection reach a bound within this relative error.
-constexpr double kBoundRounding = 1e-13;
 
 }  // namespace
 

@@ -7,9 +7,11 @@
 #include <utility>
 
 #include "tangible/estimation/problem/consistency.h"
+#include "tangible/estimation/problem/tolerances.h"
 #include "tangible/scene/parameter.h"
 #include "tangible/simulation/certificate/certify.h"
 #include "tangible/simulation/derivatives/rollout_tangent.h"
+#include "tangible/simulation/gradient/tolerances.h"
 
 namespace tangible {
 namespace {
@@ -17,11 +19,6 @@ namespace {
 // Residuals in one reverse sweep. More columns share each step's local derivatives but exceed the
 // cache.
 constexpr int kAdjointColumns = 64;
-
-constexpr double kDifferenceStep = 6e-6;
-
-// As a fraction of an observed value: a run's rounding and the errors that its projections leave.
-constexpr double kRounding = 1e-9;
 
 /// Whether the coordinate needs a twist.
 bool IsRate(Coordinate coordinate) {
@@ -118,7 +115,7 @@ std::vector<RowPlace> RolloutResiduals::Places(int /*block*/) const {
   for (size_t i = 0; i < observations_.size(); ++i) {
     const Observation& observation = observations_[i];
     places.push_back({series.of[i], observation.time,
-                      kRounding * std::abs(observation.value) / observation.sigma});
+                      kPredictionRounding * std::abs(observation.value) / observation.sigma});
   }
   return places;
 }
@@ -334,7 +331,7 @@ bool RolloutResiduals::FiniteDifferences(const Eigen::VectorXd& p, RowMatrixXd* 
   Eigen::VectorXd at[3];
   for (int k = 0; k < num_parameters(); ++k) {
     const ParameterizedScene::Entry& entry = scene_.entries()[k];
-    const double h = kDifferenceStep * std::max(std::abs(p[k]), entry.scale);
+    const double h = kRelativeStep * std::max(std::abs(p[k]), entry.scale);
     // The difference is forward or backward where a central one would leave the bounds.
     const double side = p[k] - h < entry.lower ? 1.0 : (p[k] + h > entry.upper ? -1.0 : 0.0);
     const double offsets[3] = {side == 0.0 ? -h : 0.0, side == 0.0 ? h : side * h, 2.0 * side * h};

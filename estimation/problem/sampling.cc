@@ -5,14 +5,11 @@
 #include <map>
 #include <numeric>
 
+#include "tangible/estimation/problem/tolerances.h"
 #include "tangible/simulation/stepping/step.h"
 
 namespace tangible {
 namespace {
-
-// A time this near to a step, in steps, belongs to that step, because decimal times miss it by
-// rounding.
-constexpr double kOnStep = 1e-9;
 
 /// Sets step and part of a sample from its time.
 void Locate(const SimulationSettings& settings, Sample* sample) {
@@ -35,9 +32,9 @@ void Locate(const SimulationSettings& settings, Sample* sample) {
   }
   const double start = StepTime(settings, k);
   const double part = (sample->time - start) / (StepTime(settings, k + 1) - start);
-  if (part > 1.0 - kOnStep) {
+  if (part > 1.0 - kTimeTolerance) {
     sample->step = k + 1;
-  } else if (part > kOnStep) {
+  } else if (part > kTimeTolerance) {
     sample->part = part;
   }
 }

@@ -48,10 +48,6 @@ struct SampleOptions {
   bool rates = false;   ///< the times of observations depend on parameters
 };
 
-/// With event stepping: half the time over which an acceleration is averaged, as a fraction of a
-/// step.
-inline constexpr double kRateStep = 1e-3;
-
 class SamplePlan {
  public:
   SamplePlan() = default;

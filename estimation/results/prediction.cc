@@ -7,13 +7,12 @@
 #include <utility>
 
 #include "tangible/estimation/results/residual_summary.h"
+#include "tangible/estimation/results/tolerances.h"
 
 namespace tangible {
 namespace {
 
 constexpr int kHorizons = 20;
-// As a fraction of a bin's width: a time this near to the end of a bin, by rounding, belongs to it.
-constexpr double kOnEdge = 1e-9;
 
 /// Accumulates root mean squares and largest errors, one observation after the other.
 class ErrorSum {
@@ -111,8 +110,8 @@ PredictionScore ScorePrediction(double from, const std::vector<PredictedRun>& ru
       const Observation& observation = run.observations[i];
       const double residual = run.residuals[static_cast<Eigen::Index>(i)];
       const double part = (observation.time - from) / (last - from);
-      const int bin =
-          std::clamp(static_cast<int>(std::ceil(part * kHorizons - kOnEdge)) - 1, 0, kHorizons - 1);
+      const int bin = std::clamp(static_cast<int>(std::ceil(part * kHorizons - kEdgeRounding)) - 1,
+                                 0, kHorizons - 1);
       all.Add(observation, run.channels, residual);
       bins[bin].Add(observation, run.channels, residual);
     }

@@ -4,12 +4,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tangible/estimation/results/tolerances.h"
+#include "tangible/estimation/uncertainty/tolerances.h"
+
 namespace tangible {
 namespace {
-
-// The ratio of the standard deviation of a Gaussian distribution to its median absolute value.
-constexpr double kDeviationByMedian = 1.4826;
-constexpr double kOutlier = 5.0;
 
 /// The residuals of each series.
 std::vector<std::vector<double>> BySeries(const ObservationSeries& index,
@@ -25,7 +24,7 @@ std::vector<std::vector<double>> BySeries(const ObservationSeries& index,
 double OutlierBound(std::vector<double>* sizes) {
   const auto middle = sizes->begin() + static_cast<std::ptrdiff_t>(sizes->size() / 2);
   std::nth_element(sizes->begin(), middle, sizes->end());
-  return kOutlier * std::max(1.0, kDeviationByMedian * *middle);
+  return kOutlierDeviations * std::max(1.0, kDeviationByMedian * *middle);
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "tangible/dynamics/model/settings.h"
+#include "tangible/estimation/problem/tolerances.h"
 #include "tangible/estimation/results/instruments_json.h"
 #include "tangible/render/html.h"
 #include "tangible/scene/scene_json.h"

@@ -4,20 +4,12 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
-#include <sstream>
+
+#include "tangible/estimation/uncertainty/tolerances.h"
+#include "tangible/render/html.h"
 
 namespace tangible {
 namespace {
-
-// Weights that are rounding or derivatives' errors beside the largest of a combination.
-constexpr double kSmallWeight = 1e-6;
-
-std::string Short(double x) {
-  std::ostringstream text;
-  text.precision(4);
-  text << x;
-  return text.str();
-}
 
 /// Brings the rows to reduced row echelon form, the largest entry that is left being the next
 /// pivot.
@@ -71,10 +63,10 @@ void Name(const std::vector<ParameterEntry>& entries, DeterminedCombination* c) 
     positive = positive && entry.logarithmic;
     const double weight = c->coefficients[i];
     c->sum += i == 0 ? "" : weight < 0.0 ? " - " : " + ";
-    c->sum += (i == 0 ? "" : Short(std::abs(weight)) + " ") + "'" + entry.name + "'";
+    c->sum += (i == 0 ? "" : CompactNumber(std::abs(weight), 4) + " ") + "'" + entry.name + "'";
     const double exponent = c->exponents[i];
     c->product += std::string(i == 0 ? "" : " * ") + "'" + entry.name + "'" +
-                  (std::abs(exponent - 1.0) < kSmallShare ? "" : "^" + Short(exponent));
+                  (std::abs(exponent - 1.0) < kSmallShare ? "" : "^" + CompactNumber(exponent, 4));
   }
   if (!positive) {
     c->product.clear();

@@ -1,19 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// Where observations do not determine parameters one by one: what they do determine.
+// The combinations that observations determine where they do not determine parameters one by one.
 //
 // Let the columns of N be the directions, in relative changes d ln p of n parameters, along which
 // no residual changes (or hardly any). A combination with weights e is determined if eᵀ N = 0. The
-// combinations proposed are a basis of those e, brought to reduced row echelon form: each has a
-// parameter of its own and as few others as that allows. A combination reads
+// combinations are a basis of those e in reduced row echelon form: each has a parameter that the
+// others do not have, and few further ones. A combination is
 //
 //   Σ e_k d ln p_k:    locally the product Π p_k^e_k, for parameters that are positive,
 //                      and the sum Σ (e_k / p_k) p_k, with weights taken at the estimate
 //
-// both of which have the same derivative. m a² + I of a pendulum, say, has the weights (m a², 2 m
-// a², I) and stands as the sum m + 2 (m / a) a + I / a² in numbers; m1 m2 with nothing else stands
-// as the product.
+// both of which have the same derivative. For example, m a² + I of a pendulum has the weights (m
+// a², 2 m a², I) and is written as the sum m + 2 (m / a) a + I / a², with the values of these
+// coefficients; m1 m2 is written as the product.
 
 #include <Eigen/Core>
 #include <string>
@@ -37,12 +37,9 @@ struct DeterminedCombination {
 
 /// Combinations of the parameters with a share in the columns of `none` (parameters x directions),
 /// which are relative changes that the observations do not determine. `covariance` and `robust`
-/// (parameters x parameters) need only be right along what is determined.
+/// (parameters x parameters) only have to be right along determined directions.
 std::vector<DeterminedCombination> FindDeterminedCombinations(
     const std::vector<ParameterEntry>& entries, const Eigen::VectorXd& estimate,
     const Eigen::MatrixXd& none, const RowMatrixXd& covariance, const RowMatrixXd& robust);
-
-/// Parameters with a smaller share of a direction than this have none.
-inline constexpr double kSmallShare = 1e-4;
 
 }  // namespace tangible

@@ -5,23 +5,15 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <sstream>
 #include <utility>
+
+#include "tangible/estimation/uncertainty/tolerances.h"
+#include "tangible/render/html.h"
 
 namespace tangible {
 namespace {
 
-// A number of which the free parameters can do all but this part cannot be told from them.
-constexpr double kSeparable = 1e-5;
-
-std::string Short(double x) {
-  std::ostringstream text;
-  text.precision(3);
-  text << x;
-  return text.str();
-}
-
-/// v without what the columns of `qr` can do.
+/// The part of v that is orthogonal to the columns of `qr`.
 template <typename Matrix>
 Matrix Project(const Eigen::ColPivHouseholderQR<Eigen::MatrixXd>& qr, const Matrix& v) {
   if (qr.cols() == 0 || qr.rank() == 0) {
@@ -76,7 +68,7 @@ class Gatherer {
     rows->residuals = Eigen::VectorXd::Zero(count);
     rows->free = RowMatrixXd::Zero(count, static_cast<Eigen::Index>(free_.size()));
     rows->bound = RowMatrixXd::Zero(count, static_cast<Eigen::Index>(bound_.size()));
-    // Candidates first: they decide on the number of columns.
+    // The candidates come first, because they determine the number of columns.
     std::vector<HeldColumns> held(layout_.num_blocks());
     for (int block = 0; block < layout_.num_blocks(); ++block) {
       held[block] = problem_->EvaluateHeld(block, layout_.Local(block, estimate_),
@@ -146,7 +138,8 @@ class Gatherer {
   std::map<std::string, int> index_;
 };
 
-/// False where the number cannot be told from the free parameters, or may not change so.
+/// Returns false where the value cannot be distinguished from the free parameters, or may not
+/// change in that direction.
 bool TestOne(const ParameterEntry& entry, const Eigen::VectorXd& column, const Eigen::VectorXd& own,
              const Eigen::VectorXd& residuals, HeldParameter* held) {
   const double square = own.squaredNorm();
@@ -217,9 +210,9 @@ std::vector<HeldParameter> FindHeldParameters(const Eigen::VectorXd& estimate,
 
 std::string Describe(const HeldParameter& held) {
   std::string text = "the observations contradict '" + held.path + "', which is held at " +
-                     Short(held.value) + ": released, it would change by " + Short(held.change) +
-                     " to first order and the cost fall by " + Short(100.0 * held.cost_share) +
-                     " %";
+                     CompactNumber(held.value, 3) + ": released, it would change by " +
+                     CompactNumber(held.change, 3) + " to first order and the cost fall by " +
+                     CompactNumber(100.0 * held.cost_share, 3) + " %";
   for (size_t i = 0; i < held.releases.size(); ++i) {
     text += (i == 0 ? ", and it drives '" : ", '") + held.releases[i] + "'";
   }

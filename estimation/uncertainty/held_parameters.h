@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// Numbers of the scene that are held at their values but that the observations contradict: a
-// damping that the scene leaves at 0, say, which drives an estimated mass into its bound.
+// Held parameters: values of the scene that are not estimated and that the observations contradict,
+// for example a damping of 0 that drives an estimated mass to its bound.
 //
-// At the estimate let J have the columns of the parameters that are free, and u = ∂r/∂θ be that of
-// a number θ of the scene that is not estimated. The multiplier of the constraint that θ is held is
-// uᵀ r. Were it released, then to first order
+// At the estimate let J have the columns of the free parameters, and let u = ∂r/∂θ be the column of
+// a held parameter θ. The multiplier of the constraint that holds θ is uᵀ r. If θ were released,
+// then to first order
 //
 //   ũ = u − J J⁺ u                       what the free parameters cannot do           (1)
 //   Δθ = −ũᵀ r / ũᵀ ũ                    its change
@@ -45,16 +45,17 @@ struct HeldOptions {
   int most_candidates = 400;
 };
 
-/// Tests all numbers of the problem's scenes that no parameter sets, with one run a block that has
-/// a column each; a number of several blocks' scenes counts as one. Own parameters of a block are
-/// eliminated from its rows first. Sorted: numbers that release parameters from bounds first, then
-/// by cost_share. Numbers that may not change that way (a friction of 0 that would become negative)
-/// are left out. Empty where a run fails or there are more than `most_candidates` numbers.
+/// Tests all values of the problem's scenes that no parameter sets, with one run of each block that
+/// has a column for each; the same value of several blocks' scenes counts as one. Own parameters of
+/// a block are eliminated from its rows first. Those that release parameters from bounds come
+/// first, then the order is by cost_share. Values that may not change that way (a friction of 0
+/// that would become negative) are left out. The result is empty where a run fails or there are
+/// more than `most_candidates` values.
 std::vector<HeldParameter> FindHeldParameters(const Eigen::VectorXd& estimate,
                                               const HeldOptions& options,
                                               LeastSquaresProblem* problem);
 
-/// "the observations contradict 'joints/pin/damping', which is held at 0: ...", for people.
+/// The message "the observations contradict 'joints/pin/damping', which is held at 0: ...".
 std::string Describe(const HeldParameter& held);
 
 }  // namespace tangible

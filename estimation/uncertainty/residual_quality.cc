@@ -3,18 +3,9 @@
 
 #include <limits>
 
+#include "tangible/estimation/uncertainty/tolerances.h"
+
 namespace tangible {
-namespace {
-
-// Of the reduced chi-square above 1, in its standard deviations sqrt(2 / (N - P)).
-constexpr double kChiSquareDeviations = 5.0;
-// Residuals are called correlated where chance gives this with less than that probability, and
-// where it matters: below a tenth from one sample to the next intervals change by 10 %.
-constexpr double kWhitenessProbability = 1e-4;
-constexpr double kWhitenessCorrelation = 0.1;
-
-}  // namespace
-
 ResidualQuality JudgeResiduals(const LeastSquaresProblem& problem,
                                const std::vector<BlockEvaluation>& blocks, int num_free) {
   ResidualQuality quality;

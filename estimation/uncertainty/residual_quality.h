@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// Whether residuals are what a right model leaves: not larger than sigma explains, and not
+// Tests whether residuals are consistent with the model: not larger than sigma explains, and not
 // correlated in time (whiteness.h).
 
 #include <cmath>
@@ -19,14 +19,15 @@ struct ResidualQuality {
   bool too_large = false;   ///< larger than sigma explains
   bool correlated = false;  ///< in time
   bool DoesNotFit() const { return too_large || correlated; }
-  /// Whether another minimum may fit better. Residuals that are large but independent are those of
-  /// a sigma that is too small; of few the correlation is not known.
+  /// Whether another minimum may fit better. Residuals that are large but independent mean that
+  /// sigma is too small; the correlation of few residuals is not known.
   bool MayBeLocal() const {
     return correlated || (too_large && !std::isfinite(whiteness.correlation));
   }
 };
 
-/// Of the observations' rows of all blocks, of a fit with so many free parameters.
+/// Judges the rows of the observations of all blocks, for a fit with this number of free
+/// parameters.
 ResidualQuality JudgeResiduals(const LeastSquaresProblem& problem,
                                const std::vector<BlockEvaluation>& blocks, int num_free);
 

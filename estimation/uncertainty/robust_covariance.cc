@@ -11,16 +11,12 @@
 #include <utility>
 
 #include "tangible/estimation/uncertainty/decomposition.h"
+#include "tangible/estimation/uncertainty/tolerances.h"
 
 namespace tangible {
 namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-// Wider kernels leave fewer than 4.5 degrees of freedom.
-constexpr double kLargestBandwidth = 1.0 / 3.0;
-// An autoregression that is nearer to 1 asks for a kernel beyond kLargestBandwidth anyway.
-constexpr double kLargestAutoregression = 0.97;
-constexpr double kAndrewsFactor = 1.1447;  // of Bartlett's kernel
 
 /// Residuals at the same time count as one: their influences are added.
 struct TimeSeries {
@@ -77,7 +73,7 @@ double AutoregressiveAlpha(const TimeSeries& series) {
   return below > 0.0 ? above / below : 0.0;
 }
 
-/// S in seconds.
+/// The bandwidth S in seconds.
 double Bandwidth(const TimeSeries& series) {
   if (series.times.size() < 3) {
     return 0.0;
@@ -86,7 +82,7 @@ double Bandwidth(const TimeSeries& series) {
   for (size_t t = 0; t + 1 < series.times.size(); ++t) {
     spacing.push_back(series.times[t + 1] - series.times[t]);
   }
-  // The median: gaps in a recording do not make its samples far apart.
+  // The spacing is the median, which gaps in a recording do not change.
   const auto middle = spacing.begin() + static_cast<std::ptrdiff_t>(spacing.size() / 2);
   std::nth_element(spacing.begin(), middle, spacing.end());
   const double samples = static_cast<double>(series.times.size());
@@ -220,7 +216,7 @@ Reduced Reduce(const RecordingRows& rows, const RobustOptions& options) {
   return reduced;
 }
 
-/// The factor f of equation (4) but for N / (N − P).
+/// The factor f of equation (4) without N / (N − P).
 double TakenAway(const TimeSeries& series, double bandwidth) {
   const double duration = series.times.empty() ? 0.0 : series.times.back() - series.times.front();
   const double beta = duration > 0.0 ? bandwidth / duration : 0.0;
@@ -255,7 +251,7 @@ bool Jackknife(const std::vector<Reduced>& reduced, const std::vector<RecordingR
   const Eigen::VectorXd length = information.diagonal().cwiseMax(0.0).cwiseSqrt();
   for (size_t i = 0; i < reduced.size(); ++i) {
     const Reduced& g = reduced[i];
-    // The square of what is left out: its condition is the square of that of the rows.
+    // This matrix is a square: its condition is the square of that of the rows.
     Eigen::MatrixXd left = information - g.information;
     Eigen::VectorXd score = g.shared.transpose() * g.psi;
     if (g.prior.rows() > 0) {
@@ -268,7 +264,7 @@ bool Jackknife(const std::vector<Reduced>& reduced, const std::vector<RecordingR
       score[k] *= scale;
     }
     Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr;
-    qr.setThreshold(std::max(options.rank_tolerance, 1e-12));
+    qr.setThreshold(std::max(options.rank_tolerance, kJackknifeRank));
     qr.compute(left);
     if (qr.rank() < size) {
       return false;
@@ -342,7 +338,7 @@ void AddOwn(const std::vector<RecordingRows>& recordings, const std::vector<Redu
     Eigen::VectorXd all(freedom.size());
     for (Eigen::Index k = 0; k < all.size(); ++k) {
       double uncertain = of_data(k, k) * of_data(k, k) / freedom[k];
-      // The shared part varies with its own freedom; the largest share of it decides.
+      // The shared part has degrees of freedom of its own; those of its largest share are used.
       const Eigen::VectorXd shares =
           part.from_shared.row(k).transpose().cwiseAbs2().cwiseProduct(result->shared.diagonal());
       Eigen::Index most = 0;
@@ -376,7 +372,7 @@ RobustCovariance EstimateRobustCovariance(const std::vector<RecordingRows>& reco
   if (stacked_rows <= parameters) {
     return result;
   }
-  // The rows themselves and not their normal matrix decide on the rank.
+  // The rank is that of the rows and not of their normal matrix.
   RowMatrixXd stacked(stacked_rows, size);
   RowMatrixXd known = RowMatrixXd::Zero(size, size);
   Eigen::Index first = 0;

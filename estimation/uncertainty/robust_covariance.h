@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// The covariance of estimates whose residuals are not what sigma says: too large, of unequal size,
-// correlated in time or within a recording because the model misses something.
+// The covariance of estimates whose residuals are not consistent with sigma: too large, of unequal
+// size, or correlated in time or within a recording, because the model is incomplete.
 //
 // Let recording g have residuals r_i (i in g), rows S_i = ∂r_i/∂(shared parameters) and O_i =
 // ∂r_i/∂(its own ones), and weights ψ(r) = r, or Huber's b sign(r) beyond b. Own parameters are
@@ -18,21 +18,21 @@
 //   V = (G − 1)/G Σ_g δ_g δ_gᵀ + A⁻¹ A_prior A⁻¹      (3)
 //   ν_k = max(1, G*_k − 1),   G*_k = (Σ_g w_g)² / Σ_g w_g²,   w_g = (A⁻¹ A_g A⁻¹)_kk
 //
-// G*, the effective number of clusters, is G where all tell the same about parameter k. With fewer
-// recordings V is the sum over them of a covariance that allows for autocorrelation: with u_t the
-// sum of u_i over all residuals at the same time, and Bartlett's kernel of time differences,
+// G*, the effective number of clusters, is G where all carry the same information about parameter
+// k. With fewer recordings V is the sum over them of a covariance that allows for autocorrelation:
+// with u_t the sum of u_i over all residuals at the same time, and Bartlett's kernel of time
+// differences,
 //
 //   V_g = f Σ_{t, t'} k_tt' u_t u_t'ᵀ,   k_tt' = max(0, 1 − |t − t'| / S)      (4)
 //   f = N / (N − P) / (1 − β + β²/3),    β = S / duration of the recording
 //   ν_k = (Σ_t w_t)² / Σ_tt' k_tt'² w_t w_t',    w_t = Σ_{i at t} (A⁻¹ S̃_iᵀ)_k²
 //
-// S follows Andrews: a first-order autoregression (ρ_k, σ_k) of each u_k gives the width
-// 1.1447 (α T)^(1/3) samples, α = Σ_k 4 ρ_k² / ((1 − ρ_k)⁶ (1 + ρ_k)²) / Σ_k 1 / (1 − ρ_k)⁴ with
-// u_k scaled to σ_k = 1. β is at most a third. f makes up for the part of the variance that the
-// fit has taken away from the residuals. ν_k is Satterthwaite's number of degrees of freedom for
-// residuals that are white. A prior is a measurement of known deviation: it adds A⁻¹ A_prior A⁻¹,
-// whose degrees of freedom are infinite. An interval is ± the 0.975 quantile of Student's t with
-// ν_k degrees of freedom.
+// S follows Andrews: a first-order autoregression (ρ_k, σ_k) of each u_k gives the width 1.1447 (α
+// T)^(1/3) samples, α = Σ_k 4 ρ_k² / ((1 − ρ_k)⁶ (1 + ρ_k)²) / Σ_k 1 / (1 − ρ_k)⁴ with u_k scaled
+// to σ_k = 1. β is at most a third. f compensates for the reduction of the variance of residuals by
+// the fit. ν_k is Satterthwaite's number of degrees of freedom for residuals that are white. A
+// prior is a measurement of known deviation: it adds A⁻¹ A_prior A⁻¹, whose degrees of freedom are
+// infinite. An interval is ± the 0.975 quantile of Student's t with ν_k degrees of freedom.
 //
 // Own parameters of a recording have (4) of O_g⁺ ψ alone, and D_g V D_gᵀ of the shared ones.
 //
@@ -46,11 +46,12 @@
 #include <Eigen/Core>
 #include <vector>
 
+#include "tangible/estimation/uncertainty/tolerances.h"
 #include "tangible/math/scalar.h"
 
 namespace tangible {
 
-/// From this number of recordings on they are the clusters.
+/// From this number of recordings on, the recordings are the clusters.
 inline constexpr int kFewRecordings = 5;
 
 /// The residuals of one recording at the estimate, over the parameters that are free.
@@ -68,7 +69,7 @@ struct RecordingRows {
 
 struct RobustOptions {
   double huber = 0.0;  ///< as FitOptions
-  double rank_tolerance = 1e-9;
+  double rank_tolerance = kJacobianRank;
 };
 
 enum class RobustMethod {
@@ -89,12 +90,12 @@ struct RobustCovariance {
   double bandwidth = 0.0;  ///< S, s, the largest of a recording; 0: no autocorrelation counts
 };
 
-/// `prior` holds rows of priors on shared parameters (any number x shared parameters). Cost linear
-/// in the number of rows but for sorting them by time.
+/// `prior` has the rows of priors on shared parameters (any number x shared parameters). The cost
+/// is linear in the number of rows except for sorting them by time.
 RobustCovariance EstimateRobustCovariance(const std::vector<RecordingRows>& recordings,
                                           const RowMatrixXd& prior, const RobustOptions& options);
 
-/// The 0.975 quantile of Student's t; `freedom` > 0 need not be whole.
+/// The 0.975 quantile of Student's t; `freedom` > 0 need not be a whole number.
 double StudentQuantile(double freedom);
 
 }  // namespace tangible

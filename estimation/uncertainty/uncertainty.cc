@@ -4,24 +4,17 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <sstream>
 
 #include "tangible/estimation/uncertainty/decomposition.h"
+#include "tangible/estimation/uncertainty/tolerances.h"
+#include "tangible/render/html.h"
 
 namespace tangible {
 namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-constexpr double kNormalQuantile = 1.959963984540054;  // of 0.975
-// Of a combination that a message names.
+// The number of terms that a message has of a combination.
 constexpr int kMostTerms = 12;
-
-std::string Short(double x) {
-  std::ostringstream text;
-  text.precision(3);
-  text << x;
-  return text.str();
-}
 
 /// "0.71 'a' - 0.71 'b'": a direction in the parameters' relative changes.
 std::string Combination(const std::vector<ParameterEntry>& entries,
@@ -42,7 +35,7 @@ std::string Combination(const std::vector<ParameterEntry>& entries,
       share = -share;
     }
     text += text.empty() ? "" : (share < 0.0 ? " - " : " + ");
-    text += Short(std::abs(share)) + " '" + entries[k].name + "'";
+    text += CompactNumber(std::abs(share), 3) + " '" + entries[k].name + "'";
   }
   return text;
 }
@@ -64,7 +57,7 @@ struct WeakDirection {
   bool undetermined = true;
 };
 
-/// One fit's uncertainty under way.
+/// Computes the uncertainty of one fit.
 class Estimator {
  public:
   Estimator(const LeastSquaresProblem& problem, const Eigen::VectorXd& estimate,
@@ -131,21 +124,23 @@ class Estimator {
     static_cast<ResidualQuality&>(result_) = JudgeResiduals(problem_, blocks_, num_free_);
     if (result_.too_large) {
       result_.warnings.push_back("residuals are larger than sigma explains (reduced chi-square " +
-                                 Short(result_.reduced_chi_square) +
+                                 CompactNumber(result_.reduced_chi_square, 3) +
                                  "): the model misses something, or sigma is too small, and the "
                                  "intervals from sigma are too narrow");
     }
     if (result_.correlated) {
       result_.warnings.push_back(
-          "residuals are correlated in time (" + Short(result_.whiteness.correlation) +
+          "residuals are correlated in time (" + CompactNumber(result_.whiteness.correlation, 3) +
           " from one sample to the next, probability by chance " +
-          (result_.whiteness.p_value > 1e-12 ? Short(result_.whiteness.p_value) : "below 1e-12") +
+          (result_.whiteness.p_value > kLeastProbability
+               ? CompactNumber(result_.whiteness.p_value, 3)
+               : "below " + CompactNumber(kLeastProbability, 3)) +
           "): the model misses something, whatever sigma is, and the intervals from sigma are too "
           "narrow");
     }
   }
 
-  /// Takes the own parameters out of each block's rows and decomposes what is left.
+  /// Eliminates the own parameters from the rows of each block and decomposes the rest.
   void Eliminate() {
     const Eigen::Index shared = static_cast<Eigen::Index>(shared_.size());
     Eigen::VectorXd squares = Eigen::VectorXd::Zero(shared);
@@ -217,8 +212,8 @@ class Estimator {
     });
   }
 
-  /// Keeps the directions of a decomposition that are not determined, or hardly; `extend` makes one
-  /// a direction in all parameters.
+  /// Keeps the directions of a decomposition that are not determined, or hardly; `extend` converts
+  /// one to a direction in all parameters.
   template <typename Extend>
   void AddWeak(const Decomposition& decomposition, const Extend& extend) {
     const Eigen::VectorXd& s = decomposition.singular_values();
@@ -236,7 +231,7 @@ class Estimator {
     }
   }
 
-  /// Names the directions without information and takes the intervals of their parameters away.
+  /// Names the undetermined directions and removes the intervals of their parameters.
   void NameUndetermined() {
     const WeakDirection* worst = nullptr;
     bool any = false;
@@ -257,7 +252,7 @@ class Estimator {
       }
     }
     if (!any && worst != nullptr) {
-      result_.warnings.push_back("ill-conditioned (" + Short(result_.condition) +
+      result_.warnings.push_back("ill-conditioned (" + CompactNumber(result_.condition, 3) +
                                  "): worst determined are relative changes along " +
                                  Combination(entries_, worst->change) +
                                  "; hold one of these parameters or observe more");
@@ -475,8 +470,9 @@ class Estimator {
     result_.combinations = FindDeterminedCombinations(entries_, estimate_, none, all_, robust_);
     for (const DeterminedCombination& combination : result_.combinations) {
       result_.warnings.push_back(
-          "the observations do determine " + combination.sum + " = " + Short(combination.value) +
-          " ± " + Short(combination.standard_deviation) +
+          "the observations do determine " + combination.sum + " = " +
+          CompactNumber(combination.value, 3) + " ± " +
+          CompactNumber(combination.standard_deviation, 3) +
           (combination.product.empty() ? "" : ", locally the product " + combination.product));
     }
   }
@@ -513,7 +509,7 @@ std::string DescribeRobust(const Uncertainty& uncertainty) {
       return "robust intervals: jackknife over the recordings, Student's t";
     case RobustMethod::kTime:
       return "robust intervals: residuals as they are, correlated over " +
-             Short(uncertainty.bandwidth) + " s, Student's t";
+             CompactNumber(uncertainty.bandwidth, 3) + " s, Student's t";
   }
   return "";
 }

@@ -12,8 +12,8 @@
 namespace tangible {
 namespace {
 
-// Numbers of a sequence, the same wherever they are drawn (distributions of the standard library
-// are not).
+// Random numbers of a sequence, which are the same on every platform (those of the standard
+// library's distributions are not).
 class Draw {
  public:
   Draw(std::uint64_t seed, int sequence) {
@@ -40,7 +40,7 @@ bool Apart(const DiscWorld& world, const std::vector<double>& x, double room) {
   return true;
 }
 
-// Centres within the box, apart from each other; at rest.
+// Draws centres within the box, apart from each other, at rest.
 std::vector<double> Place(const DiscWorld& world, double room, Draw* draw) {
   std::vector<double> x(4 * static_cast<size_t>(world.size()));
   do {
@@ -64,7 +64,7 @@ std::vector<double> BilliardStart(const DiscWorld& world, Draw* draw) {
   return x;
 }
 
-// Runs a start by event stepping; false where the engine gives up.
+// Runs a start by event stepping; returns false where the engine cannot continue.
 bool RunBilliards(const std::vector<double>& start, int frames, RolloutWorker* worker,
                   std::vector<double>* states) {
   const auto discs = static_cast<int>(start.size() / 4);
@@ -138,7 +138,7 @@ std::string Compress(const std::string& bytes) {
   std::string packed(size, '\0');
   compress2(reinterpret_cast<Bytef*>(packed.data()), &size,
             reinterpret_cast<const Bytef*>(bytes.data()), bytes.size(), 6);
-  // The bound is sixty times what pictures take.
+  // The bound is sixty times the size of usual pictures.
   packed.resize(size);
   packed.shrink_to_fit();
   return packed;

@@ -3,8 +3,8 @@
 //
 // Sequences of pictures of discs with their states, made from a seed, and as files.
 //
-// Billiards are our own: discs of BilliardWorld, all moving, with states by event stepping.
-// SimB has the rules of RPIN's benchmark (HaozhiQi/RPIN, tools/gen_billiard.py, which goes back to
+// Billiards are defined here: the discs of BilliardWorld, all of which move, with states by event
+// stepping. SimB follows the rules of RPIN's benchmark (HaozhiQi/RPIN, tools/gen_billiard.py, after
 // Sutskever's bouncing balls). One disc moves at 2, 3, 4, 5 or 6 pixels a frame in one of 12
 // directions, the others rest. Five substeps a frame move all discs, turn speeds inwards where a
 // disc overlaps a wall, and exchange the normal speeds of two discs that overlap, at most once a
@@ -41,7 +41,7 @@ struct DiscData {
   std::vector<DiscSequence> sequences;
 
   int num_sequences() const { return static_cast<int>(sequences.size()); }
-  /// Of one frame: 4 n numbers.
+  /// The 4 n numbers of one frame.
   const double* State(int sequence, int frame) const {
     return sequences[sequence].states.data() + static_cast<size_t>(frame) * 4 * world.size();
   }
@@ -55,15 +55,17 @@ struct DiscDataOptions {
   int threads = 0;  ///< 0: one a core; the data have the same bits for any number
 };
 
-/// Each sequence has random numbers of its own, so that a shorter set is the beginning of a longer.
+/// Each sequence has random numbers of its own, so that a shorter set is the beginning of a longer
+/// one.
 DiscData MakeDiscData(const DiscDataOptions& options);
 
-/// Writes kPictureBytes at `pixels`. False if the compressed picture is damaged.
+/// Writes kPictureBytes at `pixels`; returns false if the compressed picture is damaged.
 bool Decompress(const std::string& picture, unsigned char* pixels);
 
 /// The file's bytes.
 std::string SerializeDiscData(const DiscData& data);
-/// False and one line where `bytes` are not a whole file: damaged, cut off, or of another kind.
+/// Returns false, with one line, if `bytes` are not a complete file: damaged, cut off, or of
+/// another kind.
 bool ParseDiscData(const std::string& bytes, const std::string& name_for_messages, DiscData* data,
                    std::string* error);
 bool LoadDiscData(const std::string& file, DiscData* data, std::string* error);

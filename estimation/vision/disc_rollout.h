@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// Discs as the engine rolls them out: a step a frame.
+// Rollouts of discs by the engine, with one step for each frame.
 
 #include "tangible/estimation/vision/disc_world.h"
 #include "tangible/simulation/gradient/rollout_function.h"
 
 namespace tangible {
 
-/// The world's motion over `frames` ≥ 1 frames, recorded in each, the first included.
+/// The motion of the world over `frames` ≥ 1 frames, recorded in each frame including the first.
 RolloutFunction RolloutOf(const DiscWorld& world, int frames);
 
-/// Positions and velocities (n, 4) as the state of the scene's moving bodies, which do not turn.
+/// The state of the scene's moving bodies, which do not turn, for positions and velocities (n, 4).
 VectorX<double> EngineState(const double* states, int discs);
 
 }  // namespace tangible

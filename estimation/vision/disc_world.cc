@@ -43,7 +43,7 @@ Scene SceneOf(const DiscWorld& world, int frames) {
     disc.shape = {ShapeType::kCircle, {world.radii[i]}};
     disc.mass = world.masses[i];
     disc.linear_damping = world.linear_damping;
-    // Apart, whatever the number: a state is given with each rollout.
+    // The initial positions only have to be apart, because each rollout is given a state.
     disc.position = {middle, world.low + (world.high - world.low) * (i + 1.0) / (world.size() + 1)};
     scene.bodies.push_back(disc);
   }
@@ -74,7 +74,7 @@ Scene SceneOf(const DiscWorld& world, int frames) {
 
 namespace {
 
-// The share of a pixel at (x, y) from the disc's centre that it covers: 4 x 4 points.
+// The fraction of a pixel at (x, y) from the disc's centre that the disc covers, by 4 x 4 points.
 double Coverage(double x, double y, double radius) {
   const double d = std::hypot(x, y);
   // Half the diagonal of a pixel is 0.71.

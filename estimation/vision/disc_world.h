@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// Coloured discs in a box, as pictures of 64 x 64 pixels show them. Lengths are in pixels and times
-// in frames: x runs along a row of the picture and y down its columns, and the pixel in column i
-// and row j has its centre at (i + 1/2, j + 1/2).
+// Coloured discs in a box that is shown in pictures of 64 x 64 pixels. Lengths are in pixels and
+// times in frames: x runs along a row of the picture and y down its columns, and the pixel in
+// column i and row j has its centre at (i + 1/2, j + 1/2).
 //
 // A state of n discs is (n, 4): x, y, vx, vy of each. Discs are without friction and do not turn.
 
@@ -17,7 +17,7 @@ namespace tangible {
 
 inline constexpr int kPictureSize = 64;
 inline constexpr int kPicturePixels = kPictureSize * kPictureSize;
-/// Bytes of a picture: three planes (red, green, blue) of rows.
+/// The number of bytes of a picture: three planes (red, green, blue) of rows.
 inline constexpr int kPictureBytes = 3 * kPicturePixels;
 
 using Colour = std::array<double, 3>;  ///< red, green, blue, in [0, 1]
@@ -46,12 +46,12 @@ struct DiscWorld {
 /// elastic and two inelastic walls.
 DiscWorld BilliardWorld();
 
-/// Three equal elastic discs of radius 2 (Sutskever's bouncing balls, as RPIN's SimB has them).
+/// Three equal elastic discs of radius 2, as in RPIN's SimB (Sutskever's bouncing balls).
 DiscWorld SimbWorld();
 
-/// The world as a scene with event stepping, a step a frame: bodies disc0, disc1, ..., side_left,
-/// side_right, end_top and end_bottom, with pairs disc0:disc1, disc0:side_left, ... that have the
-/// restitutions.
+/// The world as a scene with event stepping and one step for each frame. Its bodies are disc0,
+/// disc1, ..., side_left, side_right, end_top and end_bottom; its pairs disc0:disc1,
+/// disc0:side_left, ... have the restitutions.
 Scene SceneOf(const DiscWorld& world, int frames);
 
 /// A picture of discs whose centres are (x0, y0, x1, y1, ...): kPictureBytes.

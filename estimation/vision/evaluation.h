@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// How well a trained model predicts sequences that it was not trained on.
+// Measures the predictions of a trained model on sequences that it was not trained on.
 
 #include <functional>
 #include <string>
@@ -11,8 +11,8 @@
 
 namespace tangible {
 
-/// What predicts: the trained dynamics from the estimated state; the estimated state itself, moving
-/// on or standing still; or the engine with the true parameters, from the true state.
+/// The predictor: the trained dynamics from the estimated state; the estimated state with constant
+/// velocities, or at rest; or the engine with the true parameters from the true state.
 enum class Predictor { kModel, kConstantVelocity, kLastFrame, kTruth };
 /// "model", "constant velocity", "last frame", "true state".
 const char* NameOf(Predictor predictor);
@@ -29,11 +29,11 @@ struct HorizonErrors {
 /// Windows begin at each `stride`-th frame.
 HorizonErrors Evaluate(Trainer* trainer, const DiscData& data, Predictor predictor, int stride);
 
-/// Positions that the encoder sees in all frames: (sequences, frames, n, 2).
+/// The positions that the encoder estimates in all frames: (sequences, frames, n, 2).
 std::vector<double> SeePositions(Trainer* trainer, const DiscData& data,
                                  const std::function<void(int sequence)>& progress = {});
 
-/// Root of the mean square of their errors, by coordinate.
+/// The root mean square error of these positions over all coordinates.
 double SeenError(const std::vector<double>& seen, const DiscData& data);
 
 /// Pictures of one window: those of the data (seen and ahead), and those decoded from the

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "tangible/estimation/vision/tolerances.h"
+
 namespace tangible {
 namespace {
 
@@ -13,15 +15,15 @@ using torch::indexing::Ellipsis;
 using torch::indexing::None;
 using torch::indexing::Slice;
 
-// Positions and velocities come to networks as numbers of about 1.
+// Positions and velocities are scaled to about 1 for networks.
 constexpr double kPositionScale = kPictureSize / 2.0;
 constexpr double kSpeedScale = 4.0;
 // Weights of pixels are softplus(kSharpness z) / kSharpness: nearly max(0, z), and never flat.
 constexpr double kSharpness = 10.0;
 constexpr int64_t kFeatures = 12;
 constexpr int64_t kHidden = 128;
-// Pixels around a disc: those that the encoder's second look sees beside it, as the first one
-// misses by a pixel at most, and those that the decoder may draw on.
+// Margins around a disc in pixels: of the encoder's second look, because the first one is wrong by
+// at most a pixel, and of the area in which the decoder may draw.
 constexpr int64_t kSeenBeside = 2;
 constexpr int64_t kDrawnBeside = 3;
 constexpr double kOutside = -1.0;  // of pixels beyond the picture
@@ -40,7 +42,7 @@ int64_t LargestRadius(const DiscWorld& world) {
   return static_cast<int64_t>(std::ceil(*std::max_element(world.radii.begin(), world.radii.end())));
 }
 
-// Input, two hidden layers, and an output that begins as 0.
+// A network with two hidden layers whose output is 0 at the start.
 nn::Sequential Perceptron(int64_t in, int64_t hidden, int64_t out) {
   nn::Linear last(hidden, out);
   torch::nn::init::zeros_(last->weight);
@@ -55,7 +57,8 @@ at::Tensor Scaled(const at::Tensor& states) {
                     -1);
 }
 
-// (B, n, S) to (B, n, n S): of each disc its own numbers, then those of the others in turn.
+// From (B, n, S) to (B, n, n S): for each disc its own numbers, then those of the other discs in
+// turn.
 at::Tensor OwnFirst(const at::Tensor& values) {
   const int64_t n = values.size(1);
   std::vector<at::Tensor> rows;
@@ -83,8 +86,9 @@ EncoderImpl::EncoderImpl(const DiscWorld& world, int frames)
 
 void EncoderImpl::StartFromColours(const DiscWorld& world) {
   const torch::NoGradGuard guard;
-  // A picture is cloth + Σ shareᵢ (colourᵢ − cloth): with three colours the shares are a linear
-  // function of the pixel. Feature i is share i; the weight is it less a small threshold.
+  // A picture is cloth + Σ shareᵢ (colourᵢ − cloth), so that with three colours the shares are a
+  // linear function of the pixel. Feature i is share i, and the weight is the share minus a small
+  // threshold.
   const at::Tensor cloth = ColourTensor(world.cloth);
   const at::Tensor shares = torch::linalg_pinv((ColourMatrix(world) - cloth).t());
   for (int i = 0; i < discs_; ++i) {
@@ -98,11 +102,11 @@ void EncoderImpl::StartFromColours(const DiscWorld& world) {
 }
 
 at::Tensor EncoderImpl::Centres(const at::Tensor& pictures) {
-  // The mean of four pixels keeps the centre of what they show.
+  // Averaging four pixels does not move the centre of a disc.
   const at::Tensor z = second_(torch::relu(first_(torch::avg_pool2d(pictures, 2))));
   const at::Tensor weights = torch::nn::functional::softplus(
                                  z, torch::nn::functional::SoftplusFuncOptions().beta(kSharpness)) +
-                             1e-9;
+                             kLeastWeight;
   const at::Tensor at = 2.0 * torch::arange(kPictureSize / 2, pictures.options()) + 1.0;
   const at::Tensor total = weights.sum({2, 3});
   const at::Tensor x = (weights.sum(2) * at).sum(-1) / total;
@@ -155,7 +159,7 @@ DecoderImpl::DecoderImpl(const DiscWorld& world, DecoderKind kind)
 
 at::Tensor DecoderImpl::Share(const at::Tensor& distance) {
   if (kind_ == DecoderKind::kLearned) {
-    // Nothing at the border of the patch, which moves from pixel to pixel.
+    // The share is 0 at the border of the patch, because the patch moves from pixel to pixel.
     const at::Tensor fade = torch::clamp(0.5 * patch_ - distance, 0.0, 1.0);
     return fade * share_->forward(distance.unsqueeze(-1) - 4.0).squeeze(-1);
   }
@@ -165,7 +169,8 @@ at::Tensor DecoderImpl::Share(const at::Tensor& distance) {
 
 at::Tensor DecoderImpl::forward(const at::Tensor& positions) {
   const int64_t rows = positions.size(0), n = positions.size(1);
-  // Beyond the picture nothing is drawn; far beyond it indices would overflow.
+  // Nothing is drawn beyond the picture; positions are clamped, because indices far beyond it would
+  // overflow.
   const at::Tensor inside = torch::clamp(positions, -patch_, kPictureSize + patch_);
   const at::Tensor corner = torch::floor(inside.detach()) - patch_ / 2 + 1;
   const at::Tensor offset = torch::arange(patch_, positions.options());
@@ -173,8 +178,7 @@ at::Tensor DecoderImpl::forward(const at::Tensor& positions) {
   const at::Tensor y = (corner.select(-1, 1).unsqueeze(-1) + offset).unsqueeze(-1);
   const at::Tensor dx = x + 0.5 - inside.select(-1, 0).reshape({rows, n, 1, 1});
   const at::Tensor dy = y + 0.5 - inside.select(-1, 1).reshape({rows, n, 1, 1});
-  // The root's slope at 0 is infinite.
-  const at::Tensor distance = torch::sqrt(dx * dx + dy * dy + 1e-6);
+  const at::Tensor distance = torch::sqrt(dx * dx + dy * dy + kSmoothDistance);
   const auto within = [](const at::Tensor& at) { return (at >= 0).logical_and(at < kPictureSize); };
   const at::Tensor drawn = within(x).logical_and(within(y)).expand_as(distance);
   const at::Tensor share = Share(distance) * drawn.to(positions.scalar_type());
@@ -210,7 +214,7 @@ DynamicsImpl::DynamicsImpl(const DiscWorld& world, const DynamicsOptions& option
   }
   if (options_.kind == DynamicsKind::kInteraction) {
     constexpr int64_t kEffect = 32;
-    // Its output is the disc's input: it must not begin as 0.
+    // The output of this network is an input of the next one and must not be 0 at the start.
     pair_ = register_module("pair", nn::Sequential(nn::Linear(8 + 2 * discs_, 64), nn::ReLU(),
                                                    nn::Linear(64, kEffect), nn::ReLU()));
     disc_ = register_module("disc", Perceptron(4 + discs_ + kEffect, kHidden, 4));
@@ -226,7 +230,7 @@ DynamicsImpl::DynamicsImpl(const DiscWorld& world, const DynamicsOptions& option
                   {"disc restitution", "side restitution", "end restitution", "damping"});
     paths.insert(paths.end(), {"pairs/disc*:disc*/restitution", "pairs/disc*:side*/restitution",
                                "pairs/disc*:end*/restitution", "bodies/disc*/linear_damping"});
-    // Wrong: equal masses, dull impacts, three times less friction.
+    // The initial values are wrong: equal masses, inelastic impacts, a third of the friction.
     log_masses_ = register_parameter("log_masses", torch::zeros({discs_ - 1}, torch::kDouble));
     restitutions_ = register_parameter("restitutions", torch::full({3}, 0.6, torch::kDouble));
     log_damping_ =
@@ -281,7 +285,7 @@ at::Tensor DynamicsImpl::OneFrame(const at::Tensor& state) {
     const at::Tensor others = (1.0 - torch::eye(discs_)).reshape({1, discs_, discs_, 1});
     change = disc_->forward(torch::cat({numbered, (effects * others).sum(2)}, 2));
   }
-  // Uniform motion and a change of position and velocity.
+  // The prediction is uniform motion plus a change of position and velocity.
   const at::Tensor velocity = state.slice(2, 2, 4);
   return torch::cat({state.slice(2, 0, 2) + velocity + change.slice(2, 0, 2) * kSpeedScale,
                      velocity + change.slice(2, 2, 4) * kSpeedScale},

@@ -6,17 +6,18 @@
 // in pixels, velocities in pixels a frame.
 //
 // The encoder looks twice. Two convolutions of the picture at half its size give each of its pixels
-// a weight w ≥ 0 for each disc, and the weights' centre, Σ w r / Σ w, tells where the disc is. A
-// network that sees the pixels around it corrects that to hundredths of a pixel. The velocity is
-// the last difference of positions and a correction by a network that sees all discs' positions in
-// the window.
+// a weight w ≥ 0 for each disc, and the centre of the weights, Σ w r / Σ w, is the position of the
+// disc. A network whose input are the pixels around it corrects that position to hundredths of a
+// pixel. The velocity is the last difference of positions and a correction by a network that sees
+// all discs' positions in the window.
 //
-// The dynamics are the engine (rollout_layer.h) with its physical parameters; or in its place a
-// multilayer perceptron on all discs' states, or an interaction network (Battaglia et al. 2016),
-// in which effects of pairs, added up, and the disc's own state give its change.
+// The dynamics are the engine (rollout_layer.h) with its physical parameters, or a multilayer
+// perceptron of the states of all discs, or an interaction network (Battaglia et al. 2016), in
+// which the sum of the effects of pairs and the disc's own state give its change.
 //
 // The decoder's picture is cloth + Σ share(|r − xᵢ|) (colourᵢ − cloth). The share is a network of
-// the distance to the disc's centre, and colours are learned; or all is the known renderer.
+// the distance to the disc's centre, and colours are learned; alternatively the decoder is the
+// known renderer.
 
 #include <torch/torch.h>
 
@@ -33,15 +34,16 @@ namespace tangible {
 class EncoderImpl : public torch::nn::Module {
  public:
   EncoderImpl(const DiscWorld& world, int frames);
-  /// Starts from the known colours in the place of random weights: positions without any label.
+  /// Sets the weights by the known colours instead of at random, which gives positions without any
+  /// label.
   void StartFromColours(const DiscWorld& world);
-  /// The first look: (N, 3, 64, 64) in [0, 1] to (N, n, 2).
+  /// The first look, from (N, 3, 64, 64) in [0, 1] to centres (N, n, 2).
   at::Tensor Centres(const at::Tensor& pictures);
-  /// The second: the corrected centres.
+  /// The second look, which corrects these centres.
   at::Tensor Refine(const at::Tensor& pictures, const at::Tensor& centres);
-  /// Both.
+  /// Both looks.
   at::Tensor Positions(const at::Tensor& pictures) { return Refine(pictures, Centres(pictures)); }
-  /// Positions (B, K, n, 2) to states (B, n, 4) at the last frame.
+  /// From positions (B, K, n, 2) to states (B, n, 4) at the last frame.
   at::Tensor State(const at::Tensor& positions);
 
  private:
@@ -55,7 +57,7 @@ TORCH_MODULE(Encoder);
 class DecoderImpl : public torch::nn::Module {
  public:
   DecoderImpl(const DiscWorld& world, DecoderKind kind);
-  /// (N, n, 2) to (N, 3, 64, 64).
+  /// From centres (N, n, 2) to pictures (N, 3, 64, 64).
   at::Tensor forward(const at::Tensor& positions);
 
  private:
@@ -69,7 +71,7 @@ class DecoderImpl : public torch::nn::Module {
 };
 TORCH_MODULE(Decoder);
 
-/// States ahead, and which rows the engine could run.
+/// Predicted states, and the rows that the engine could run.
 struct Ahead {
   at::Tensor states;  ///< (B, F, n, 4), without the start; 0 in rows that were not run
   at::Tensor valid;   ///< (B), 1 or 0
@@ -78,8 +80,8 @@ struct Ahead {
 struct DynamicsOptions {
   DynamicsKind kind = DynamicsKind::kEngine;
   int frames = 10;  ///< F
-  /// Of the engine: masses (the first disc's is 1), restitutions and damping are learned, from
-  /// wrong values; else they are the world's.
+  /// Whether the engine's masses (that of the first disc is 1), restitutions and damping are
+  /// learned, from wrong values; otherwise they are those of the world.
   bool learns_parameters = false;
   int threads = 1;  ///< of the engine
 };
@@ -87,12 +89,12 @@ struct DynamicsOptions {
 class DynamicsImpl : public torch::nn::Module {
  public:
   DynamicsImpl(const DiscWorld& world, const DynamicsOptions& options);
-  /// From states (B, n, 4).
+  /// Predicts from states (B, n, 4).
   Ahead forward(const at::Tensor& state);
   /// Names and values of the physical parameters that are learned.
   const std::vector<std::string>& parameter_names() const { return names_; }
   at::Tensor PhysicalParameters() const;
-  /// After a step of the optimiser: restitutions back into [0, 1].
+  /// Moves restitutions back into [0, 1] after a step of the optimiser.
   void Project();
 
  private:

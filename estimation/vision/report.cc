@@ -24,7 +24,7 @@ std::string Line(const char* format, Values... values) {
   return text;
 }
 
-// The root of the mean square error of positions seen; of predictors that see none, a dash.
+// The root mean square error of estimated positions; a dash for predictors that estimate none.
 std::string Seen(const std::optional<double>& error) {
   return error ? Line("%6.3f", *error) : "     -";
 }
@@ -109,7 +109,7 @@ std::string ParameterTable(const std::vector<Json>& cells) {
   return text.empty() ? "" : text + "\n";
 }
 
-// CPU time of the trainings that were made without an interruption.
+// The CPU time of the trainings that were not interrupted.
 std::string TrainingLine(const std::vector<Json>& cells) {
   double least = HUGE_VAL, most = 0.0, sum = 0.0;
   int count = 0;

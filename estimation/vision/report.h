@@ -9,13 +9,14 @@
 
 namespace tangible {
 
-/// Tables of all cells that are there, as text.
+/// The tables of all cells that have results, as text.
 std::string StudyTables(const std::vector<nlohmann::ordered_json>& cells);
 
-/// The physics layer's share of a training iteration (TimePhysics), as a line.
+/// The share of the physics layer in a training iteration (TimePhysics), as a line.
 std::string TimingLine(const nlohmann::ordered_json& timing);
 
-/// Error against frames ahead, and against the share of labels, of billiards: two <svg> elements.
+/// The errors for billiards over the frames ahead, and over the share of labels: two <svg>
+/// elements.
 std::string ErrorByFrameSvg(const std::vector<nlohmann::ordered_json>& cells);
 std::string ErrorByLabelsSvg(const std::vector<nlohmann::ordered_json>& cells);
 

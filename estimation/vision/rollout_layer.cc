@@ -9,8 +9,8 @@
 
 namespace tangible {
 
-// What calls share. Batches keep their tapes' memory from call to call: to make it costs three
-// times a forward pass of ten steps. A batch in use belongs to one graph.
+// The state that calls share. Batches keep the memory of their tapes from call to call, because
+// allocating it costs three times a forward pass of ten steps. A batch in use belongs to one graph.
 struct RolloutLayer::Shared {
   RolloutFunction function;
   int threads = 0;

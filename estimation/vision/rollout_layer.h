@@ -7,9 +7,9 @@
 //   (p̄, x̄₀, ū) = (∂f/∂(p, x₀, u))ᵀ f̄
 //
 // for each row of a batch; rollout_function.h defines the symbols. Both passes run the batch of
-// lib/simulation on several threads, the same that the Python package runs. Inside everything is
-// computed in double precision on the CPU; outside tensors are of any type of floating-point
-// numbers. Results have the same bits for any number of threads.
+// lib/simulation on several threads, as the Python package does. All computations are in double
+// precision on the CPU; input and output tensors may have any floating-point type. Results have the
+// same bits for any number of threads.
 //
 // Where two-sided derivatives do not exist (a grazing contact), backward takes one element of the
 // generalised Jacobian; RolloutBatch::Certify of `function()` says where. Second derivatives are
@@ -27,14 +27,15 @@ namespace tangible {
 
 struct RolloutLayerOptions {
   std::vector<std::string> parameters{};  ///< P paths into the scene
-  /// C paths of forces, torques and efforts that have a value of their own in each step.
+  /// C paths of forces, torques and efforts that have a separate value in each step.
   std::vector<std::string> controls{};
   std::vector<long> records{};  ///< R ascending steps, 0 the start; empty: the end alone
   int threads = 0;              ///< 0: one a core
 };
 
-/// What tensors are rolled out from. One that is undefined stands for the scene's own values; one
-/// without the batch's axis is the same in all N rows, and its derivative is the sum over them.
+/// The inputs of a rollout. An undefined tensor stands for the values of the scene. A tensor
+/// without the axis of the batch is the same in all N rows, and its derivative is the sum over
+/// them.
 struct RolloutTensors {
   at::Tensor parameters{};  ///< (P) or (N, P), SI units
   at::Tensor state{};       ///< (S) or (N, S): x, y, angle, vx, vy, omega of each moving body
@@ -50,14 +51,14 @@ struct RolledOut {
 
 class RolloutLayer {
  public:
-  /// Returns empty or one line, as RolloutFunction::Create.
+  /// Returns an empty text, or one line as RolloutFunction::Create does.
   std::string Create(const Scene& scene, const RolloutLayerOptions& options);
 
   const RolloutFunction& function() const;
 
-  /// Throws c10::Error where a shape is wrong: which, expected, got. A row that ended early stops
-  /// no other. Its derivatives are NaN, unless its cotangent is zero (a loss that leaves the row
-  /// out by torch::where or indexing): then they are zero.
+  /// Throws c10::Error where a shape is wrong, with the tensor, the expected and the given shape. A
+  /// row that ends early does not stop the others. Its derivatives are NaN, or zero if its
+  /// cotangent is zero (because the loss leaves the row out by torch::where or indexing).
   RolledOut operator()(const RolloutTensors& inputs) const;
 
  private:

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// The benchmark's measure of predictions of SimB: over every window of 4 seen frames and the 40
-// that follow,
+// The benchmark's measure for predictions of SimB, over every window of 4 seen frames and the 40
+// frames that follow:
 //
 //   error(frame) = mean over discs of ((x̂ − x)² + (ŷ − y)²) / 64²
 //   near         = 1000 mean of error over the last seen frame and the T = 20 after it
@@ -20,7 +20,7 @@ namespace tangible {
 inline constexpr int kSimbSeen = 4;
 inline constexpr int kSimbHorizon = 20;
 
-/// Mean over all windows, and quartiles of the sequences' own means.
+/// The mean over all windows, and the quartiles of the means of sequences.
 struct ScoreSummary {
   double mean = 0.0, lower_quartile = 0.0, median = 0.0, upper_quartile = 0.0;
 };
@@ -33,7 +33,7 @@ struct SimbScore {
 
 enum class SimbPredictor { kEngine, kConstantVelocity, kLastFrame };
 
-/// Positions of all discs, (n, 2), in a frame of a sequence: seen, or true.
+/// Gives the positions of all discs, (n, 2), in a frame of a sequence, estimated or true.
 using SeenPositions = std::function<const double*(int sequence, int frame)>;
 
 /// Scores predictions from the positions that `seen` gives in 4 frames: by the engine from the
@@ -41,7 +41,7 @@ using SeenPositions = std::function<const double*(int sequence, int frame)>;
 SimbScore ScoreSimb(const DiscData& data, SimbPredictor predictor, const SeenPositions& seen,
                     int threads);
 
-/// The floor: the engine from the true state at the last seen frame.
+/// The score of the engine from the true state at the last seen frame, which is the floor.
 SimbScore ScoreSimbFromTruth(const DiscData& data, int threads);
 
 }  // namespace tangible

@@ -4,11 +4,12 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <ctime>
 #include <mutex>
 
 #include "tangible/estimation/vision/evaluation.h"
+#include "tangible/estimation/vision/tolerances.h"
 #include "tangible/estimation/vision/training.h"
+#include "tangible/math/cpu_time.h"
 
 namespace tangible {
 namespace {
@@ -17,13 +18,6 @@ using OrderedJson = nlohmann::ordered_json;
 
 constexpr int kCurvePoints = 40;  // of a loss over a training
 constexpr int kTestStride = 3;    // frames between windows that billiards are tested on
-
-// Of this thread: a training's on any number of busy cores.
-double CpuSeconds() {
-  timespec time{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
-  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
-}
 
 double Median(std::vector<double> values) {
   std::sort(values.begin(), values.end());
@@ -48,7 +42,7 @@ StudyCell CellOf(DiscKind kind, DynamicsKind dynamics, int percent, std::uint64_
   cell.training.iterations = kind == DiscKind::kSimb ? 2000 : 1000;
   cell.training.learning_rate = kind == DiscKind::kSimb ? 3e-3 : 2e-3;
   cell.training.seen = kind == DiscKind::kSimb ? kSimbSeen : 3;
-  // SimB's rules are known: three equal elastic discs.
+  // The rules of SimB are known: three equal elastic discs.
   cell.training.learns_parameters = kind == DiscKind::kBilliards;
   return cell;
 }
@@ -112,7 +106,7 @@ OrderedJson ParametersJson(const Dynamics& dynamics, const DiscWorld& world) {
   return json;
 }
 
-// The means of a training's losses over equal parts of it.
+// The mean losses of a training over equal parts of it.
 class Curve {
  public:
   explicit Curve(long iterations) : part_(std::max(1L, iterations / kCurvePoints)) {}
@@ -183,7 +177,7 @@ StudyData MakeStudyData(DiscKind kind, std::uint64_t seed) {
 
 CellResult RunCell(const StudyCell& cell, const StudyData& data, const CellHooks& hooks,
                    std::string* error) {
-  // Weights are drawn from torch's own generator, of which all threads have one.
+  // Weights are drawn from torch's generator, which all threads share.
   static std::mutex drawing;
   std::unique_ptr<Trainer> trainer;
   {
@@ -196,7 +190,7 @@ CellResult RunCell(const StudyCell& cell, const StudyData& data, const CellHooks
     return result;
   }
   Curve curve(cell.training.iterations);
-  const double start = CpuSeconds();
+  const double start = ThreadCpuSeconds();
   const long from = trainer->iteration();
   while (trainer->iteration() < cell.training.iterations) {
     const TrainingLoss loss = trainer->Step();
@@ -214,7 +208,7 @@ CellResult RunCell(const StudyCell& cell, const StudyData& data, const CellHooks
   json["iterations"] = cell.training.iterations;
   json["batch"] = cell.training.batch;
   json["iterations_now"] = cell.training.iterations - from;
-  json["cpu_seconds"] = CpuSeconds() - start;
+  json["cpu_seconds"] = ThreadCpuSeconds() - start;
   json["loss"] = curve.json();
   if (cell.kind == DiscKind::kSimb) {
     OrderedJson seen_error;
@@ -244,13 +238,13 @@ nlohmann::ordered_json TimePhysics() {
   for (int row = 0; row < options.batch; ++row) frames.emplace_back(row, row % 10);
   std::vector<double> iterations, physics;
   for (int repeat = 0; repeat < kRepeats; ++repeat) {
-    double start = CpuSeconds();
+    double start = ThreadCpuSeconds();
     trainer.Step();
-    iterations.push_back(CpuSeconds() - start);
+    iterations.push_back(ThreadCpuSeconds() - start);
     const at::Tensor state = StatesOf(data, frames).requires_grad_();
-    start = CpuSeconds();
+    start = ThreadCpuSeconds();
     trainer.dynamics()(state).states.square().sum().backward();
-    physics.push_back(CpuSeconds() - start);
+    physics.push_back(ThreadCpuSeconds() - start);
   }
   return {{"batch", options.batch},
           {"frames", options.ahead},
@@ -283,20 +277,22 @@ double GradientError() {
   };
   const at::Tensor p = mass.clone().requires_grad_(), x = state.clone().requires_grad_();
   loss(p, x).backward();
-  constexpr double kStep = 1e-6;
   const auto error = [](double a, double b) {
     return std::abs(a - b) / (std::abs(a) + std::abs(b));
   };
-  const double by_mass =
-      ((loss(mass + kStep, state) - loss(mass - kStep, state)) / (2.0 * kStep)).item<double>();
+  const double by_mass = ((loss(mass + kGradientStep, state) - loss(mass - kGradientStep, state)) /
+                          (2.0 * kGradientStep))
+                             .item<double>();
   const double by_state =
-      ((loss(mass, state + kStep * way) - loss(mass, state - kStep * way)) / (2.0 * kStep))
+      ((loss(mass, state + kGradientStep * way) - loss(mass, state - kGradientStep * way)) /
+       (2.0 * kGradientStep))
           .item<double>();
   return std::max(error(by_mass, p.grad().item<double>()),
                   error(by_state, (x.grad() * way).sum().item<double>()));
 }
 
-// Files of a training differ where nothing else does: they name tensors by their addresses.
+// The weights are compared, because files of equal trainings differ: they name tensors by their
+// addresses.
 bool SameWeights(Trainer* a, Trainer* b) {
   const auto same = [](const torch::nn::Module& one, const torch::nn::Module& other) {
     const std::vector<at::Tensor> mine = one.parameters(), others = other.parameters();
@@ -316,9 +312,9 @@ bool QuickCheck(std::string* lines) {
     good = good && holds;
   };
   const double gradient = GradientError();
-  check(gradient < 1e-6,
+  check(gradient < kGradientAgrees,
         "gradient of the physics layer against central differences: relative error " +
-            Format("%.1e", gradient) + ", at most 1e-6");
+            Format("%.1e", gradient) + ", at most " + Format("%.0e", kGradientAgrees));
   const DiscData data =
       MakeDiscData({.kind = DiscKind::kBilliards, .sequences = 24, .frames = 20, .seed = 1});
   TrainingOptions options;

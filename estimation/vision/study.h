@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// The study's trainings, each a cell of its tables: what is trained on which data, and what is
-// measured afterwards, as JSON.
+// The trainings of the study. Each is a cell of its tables: a model, its data, and the measures
+// after the training, as JSON.
 
 #include <functional>
 #include <nlohmann/json.hpp>
@@ -21,19 +21,19 @@ struct StudyCell {
   TrainingOptions training;
 };
 
-/// SimB at 100, 25, 10 and 2 % of the labels; billiards with the engine, the perceptron and the
-/// interaction network at each, and with the engine the ablations; parameters without labels. One
-/// seed a cell, three at 10 % and of the parameters.
+/// The cells: SimB at 100, 25, 10 and 2 % of the labels; billiards with the engine, the perceptron
+/// and the interaction network at each of these, and ablations with the engine; parameters without
+/// labels. Each cell has one seed; at 10 % of the labels, and for the parameters, there are three.
 std::vector<StudyCell> StudyCells();
 
-/// Sequences that are trained on, and others that are tested on.
+/// The sequences for training, and others for testing.
 struct StudyData {
   DiscData train, test;
   SimbScore floor;  ///< of SimB: the engine from the true states of `test`
 };
 StudyData MakeStudyData(DiscKind kind, std::uint64_t seed);
 
-/// What a training needs of its surroundings.
+/// The interface of a training to the program.
 struct CellHooks {
   std::string checkpoint{};  ///< bytes to go on from; empty: from the start
   std::function<void(long iteration, const std::string& bytes)> save{};
@@ -43,19 +43,20 @@ struct CellHooks {
 
 struct CellResult {
   nlohmann::ordered_json json;
-  /// Of billiards: pictures of one test sequence, true and predicted.
+  /// For billiards, pictures of one test sequence, true and predicted.
   std::vector<std::string> truth, predicted;
 };
 
-/// Trains and measures; empty `error`, or one line about the checkpoint.
+/// Trains and measures. `error` is empty, or one line about the checkpoint.
 CellResult RunCell(const StudyCell& cell, const StudyData& data, const CellHooks& hooks,
                    std::string* error);
 
-/// CPU seconds of the physics layer, forward and backward, for batch 32 over 10 frames, and of a
-/// training iteration of that batch, on one thread: medians of several.
+/// The CPU time (s) of the physics layer, forward and backward, for batch 32 over 10 frames, and of
+/// a training iteration of that batch, on one thread: medians of several repetitions.
 nlohmann::ordered_json TimePhysics();
 
-/// The small training of continuous integration: a line a check, and whether all hold.
+/// A small training for continuous integration: writes a line for each check, and returns whether
+/// all hold.
 bool QuickCheck(std::string* lines);
 
 }  // namespace tangible

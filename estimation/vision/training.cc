@@ -8,18 +8,21 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "tangible/estimation/vision/tolerances.h"
+
 namespace tangible {
 namespace {
 
 namespace nn = torch::nn;
 
-// Weights of the losses: pixels² against squares of shares of light.
+// Weights of the losses, whose units are pixels² and squares of colour values.
 constexpr double kPositionWeight = 30.0;  // positions are seen to hundredths of pixels
 constexpr double kPhysicsWeight = 0.3;
 constexpr double kDecoderWeight = 100.0;
 constexpr double kSelfWeight = 0.3;
 constexpr int kDrawn = 3;  // frames ahead that are decoded in a row
-// Physical parameters are few and move together: Adam's step is a share of them.
+// The rate of the physical parameters over that of the networks: they are few, and one step of Adam
+// changes each by a fraction of its value.
 constexpr double kPhysicalRate = 10.0;
 constexpr double kClip = 10.0;
 
@@ -31,7 +34,7 @@ std::uint64_t Mix(std::uint64_t x) {
   return x ^ (x >> 31);
 }
 
-// Of values whose rows count by `weights` (B).
+// The mean of values whose rows have the `weights` (B).
 at::Tensor WeightedMean(const at::Tensor& values, const at::Tensor& weights) {
   return (values.flatten(1).mean(1) * weights).sum() / torch::clamp_min(weights.sum(), 1.0);
 }
@@ -111,7 +114,7 @@ Trainer::~Trainer() = default;
 
 Trainer::Batch Trainer::Draw() const {
   const int count = data_.num_sequences();
-  const int labelled = static_cast<int>(std::ceil(options_.labels * count - 1e-9));
+  const int labelled = static_cast<int>(std::ceil(options_.labels * count - kLabelRounding));
   std::uint64_t counter = Mix(options_.seed) ^ (static_cast<std::uint64_t>(iteration_) << 20);
   const auto below = [&](int n) {
     return static_cast<int>(Mix(counter++) % static_cast<std::uint64_t>(n));
@@ -135,7 +138,7 @@ Trainer::Batch Trainer::Draw() const {
   }
   const int64_t rows = options_.batch, n = data_.world.size();
   const at::Tensor with_labels = torch::tensor(flags);
-  // States of rows without labels are not known here.
+  // The states of rows without labels are not used.
   const auto labels = [&](const std::vector<std::pair<int, int>>& frames, int count) {
     return torch::where(with_labels.reshape({rows, 1, 1, 1}) > 0.5,
                         StatesOf(data_, frames).reshape({rows, count, n, 4}), torch::zeros({}));
@@ -158,7 +161,8 @@ TrainingLoss Trainer::Loss(const Batch& batch, at::Tensor* total) {
   const at::Tensor estimate = encoder_->State(positions);
   const at::Tensor truth = batch.seen.select(1, -1);
   const at::Tensor places_seen = Positions(batch.seen);
-  // Velocities are off by pixels a frame after an impact, which must not move positions.
+  // Estimated velocities are wrong by pixels per frame after an impact, which must not change
+  // positions.
   const at::Tensor labelled = encoder_->State(positions.detach());
   const at::Tensor encoder_loss =
       WeightedMean((centres.reshape(positions.sizes()) - places_seen).square(), with) +
@@ -167,7 +171,8 @@ TrainingLoss Trainer::Loss(const Batch& batch, at::Tensor* total) {
   const Ahead ahead = dynamics_(torch::where(flags, truth, estimate));
   const at::Tensor physics_loss =
       WeightedMean(Huber(ahead.states - batch.ahead), with * ahead.valid);
-  // Frames ahead that are drawn: of true positions with labels, else of the predicted ones.
+  // The frames ahead that are decoded: at the true positions with labels, otherwise at the
+  // predicted ones.
   const at::Tensor four = flags.unsqueeze(3);
   const at::Tensor which = batch.drawn.reshape({rows, kDrawn, 1, 1}).expand({rows, kDrawn, n, 2});
   const at::Tensor later =

@@ -8,8 +8,8 @@
 // * Without: L_dec of the positions seen, and of those that the dynamics give from the estimated
 //   state. If asked, L_self = |dynamics(estimated state) − positions seen later|.
 //
-// A step draws its windows from the seed and its own number alone, so that a training that was
-// interrupted goes on to the same result, bit for bit on one thread.
+// The windows of a step follow from the seed and the number of the step only, so that a training
+// that was interrupted ends with the same bits on one thread.
 
 #include <memory>
 #include <string>
@@ -26,16 +26,16 @@ struct TrainingLoss {
 
 class Trainer {
  public:
-  /// The data outlive it.
+  /// The data must outlive the trainer.
   Trainer(const DiscData& data, const TrainingOptions& options);
   ~Trainer();
 
-  /// One iteration.
+  /// Runs one iteration.
   TrainingLoss Step();
   long iteration() const { return iteration_; }
 
-  /// All that the next steps depend on, as a file's bytes; and back: false and one line where they
-  /// are damaged or of another training.
+  /// Everything on which the next steps depend, as the bytes of a file, and the reverse, which
+  /// returns false, with one line, where they are damaged or belong to another training.
   std::string Save();
   bool Load(const std::string& bytes, const std::string& name_for_messages, std::string* error);
 

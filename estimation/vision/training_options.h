@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// What is trained and how (model.h, training.h). It knows nothing of torch, whose headers take 20 s
-// to compile.
+// The options of a training (model.h, training.h), apart from torch, whose headers take 20 s to
+// compile.
 
 #include <cstdint>
 

@@ -24,7 +24,7 @@ std::pair<double, double> Line(const std::vector<double>& x, int first, int last
   return {mean + slope * 0.5 * (count - 1), slope};
 }
 
-// `frames` later by uniform motion, of one disc.
+// The state of one disc `frames` later by uniform motion.
 void Move(const double* from, double frames, double* to) {
   for (int c = 0; c < 2; ++c) {
     to[c] = from[c] + frames * from[2 + c];
@@ -34,7 +34,7 @@ void Move(const double* from, double frames, double* to) {
 
 }  // namespace
 
-// One disc's positions in a window.
+// The positions of one disc in a window.
 class WindowState::Track {
  public:
   Track(const std::vector<double>& seen, int frames, int disc, int discs) : last_(frames - 1) {
@@ -64,9 +64,9 @@ class WindowState::Track {
       state[2 + c] = 0.0;
     }
   }
-  /// Something was met between the last two frames.
+  /// Whether the disc met something between the last two frames.
   bool MetAtEnd() const { return last_ >= 2 && !Uniform(last_ - 1); }
-  /// And something in the frames before.
+  /// Whether it also met something in the frames before.
   bool MetTwice() const { return last_ >= 3 && MetAtEnd() && !Uniform(last_ - 2); }
   Vector2<double> End() const { return {x_[last_], y_[last_]}; }
   Vector2<double> LastStep() const {
@@ -87,8 +87,8 @@ RolloutOutput WindowState::Run(const States& start) {
   return worker_.Run(input);
 }
 
-// The disc's velocity by a run from `start` frames before the last, if it leads nearer than `least`
-// to the last position seen.
+// The velocity of the disc by a run from `start` frames before the last, if that run ends nearer
+// than `least` to the last position seen.
 void WindowState::ByEngine(const Track& track, int disc, const RolloutOutput& found, int start,
                            double* least, double* state) {
   if (found.status != RolloutStatus::kDone) return;
@@ -98,7 +98,7 @@ void WindowState::ByEngine(const Track& track, int disc, const RolloutOutput& fo
   const double miss = (at(start, 0) - track.End()).norm();
   if (miss > *least) return;
   *least = miss;
-  // Met before the last two frames, these show the velocity.
+  // The disc met something before the last two frames, which therefore show its velocity.
   const bool straight =
       start > 1 && (at(start, 0) - at(start - 1, 0) - at(start, 3)).norm() < kStraight;
   const Vector2<double> velocity = straight ? track.LastStep() : at(start, 3);
@@ -115,7 +115,7 @@ void WindowState::ByImpulse(const std::vector<Track>& tracks, const States& befo
   }
   if (met.size() != 2) return;
   const int i = met[0], j = met[1];
-  // Momentum received, times the time since.
+  // The momentum received, times the time since.
   const auto received = [&](int k) -> Vector2<double> {
     std::array<double, 4> free{};
     Move(&before[4 * k], 1.0, free.data());
@@ -123,7 +123,7 @@ void WindowState::ByImpulse(const std::vector<Track>& tracks, const States& befo
   };
   const Vector2<double> both = 0.5 * (received(i) - received(j));
   const double mass = std::min(world_.masses[i], world_.masses[j]);
-  // Something else was met too.
+  // One of them met something else too.
   if ((received(i) + received(j)).norm() > 2.0 * mass * kUniformMotion) return;
   if (both.norm() < mass * kImpulseSeen) return;
   const Vector2<double> n = both.normalized();
@@ -132,7 +132,7 @@ void WindowState::ByImpulse(const std::vector<Track>& tracks, const States& befo
   const double impulse = -(1.0 + world_.disc_restitution) * v.dot(n) /
                          (1.0 / world_.masses[i] + 1.0 / world_.masses[j]);
   if (impulse <= 0.0) return;
-  // Where their free motion does not lead to each other they met two walls.
+  // If their free motion does not lead to each other, they met two walls.
   const double nearest = std::clamp(-r.dot(v) / v.squaredNorm(), 0.0, 1.0);
   if ((r + nearest * v).norm() > world_.radii[i] + world_.radii[j] + kUniformMotion) return;
   for (int c = 0; c < 2; ++c) {

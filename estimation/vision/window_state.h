@@ -3,20 +3,21 @@
 //
 // The state of discs at the last of a few frames, from their positions in each of them.
 //
-// A disc that stays where it is rests. One that has moved uniformly over the last m ≥ 3 frames has
-// the line through its m positions (least squares). One that has met something between the last two
-// frames, a and b, has the velocity that the engine gives it from frame a. If its motion was not
-// uniform before a either, its velocity at a is the difference to the frame before, or the engine's
-// from that frame, whichever leads closer to the position seen at b. Where neither leads there, and
-// where the engine meets nothing after a, the difference of the last two positions stands.
+// A disc whose position does not change is at rest. The state of a disc that has moved uniformly
+// over the last m ≥ 3 frames follows from the line through its m positions (least squares). A disc
+// that has met something between the last two frames, a and b, has the velocity that the engine
+// predicts from frame a. If its motion before a was not uniform either, its velocity at a is the
+// difference to the frame before, or the velocity that the engine predicts from that frame,
+// whichever leads closer to the position seen at b. Where neither does, and where the engine
+// predicts no impact after a, the velocity is the difference of the last two positions.
 //
-// Two discs that met each other, and nothing else, show the impulse's direction: with the free
-// motion removed, m (r(b) − r(a) − v(a)) is the momentum that a disc received times the time since.
-// Along this direction n the impulse of the two is
+// Two discs that met each other and nothing else show the direction n of the impulse: without the
+// free motion, m (r(b) − r(a) − v(a)) is the momentum that a disc received, times the time since.
+// Along n the impulse is
 //
 //   p = −(1 + e) ((vᵢ − vⱼ)·n) / (1/mᵢ + 1/mⱼ)
 //
-// which also holds where the discs overlapped before they turned, as SimB's do.
+// which also holds where the discs overlap before their velocities change, as in SimB.
 
 #include <vector>
 

@@ -284,6 +284,26 @@ std::vector<std::string> SplitAtCommas(const std::string& text) {
   return parts;
 }
 
+std::vector<int> WholeNumbersAtCommas(const std::string& text, int least, int most) {
+  std::vector<int> numbers;
+  for (const std::string& part : SplitAtCommas(text)) {
+    const char* const end = part.data() + part.size();
+    int number = 0;
+    const std::from_chars_result read = std::from_chars(part.data(), end, number);
+    if (read.ec != std::errc() || read.ptr != end || number < least || number > most) {
+      return {};
+    }
+    numbers.push_back(number);
+  }
+  return numbers;
+}
+
+bool PrintBound(bool holds, const std::string& what) {
+  std::printf("%s: %s\n", what.c_str(), holds ? "holds" : "DOES NOT HOLD");
+  std::fflush(stdout);
+  return holds;
+}
+
 void AppendNumber(double value, std::string* text) {
   // The digits of "%.17g", in a third of printf's time.
   std::array<char, 32> digits{};

@@ -66,6 +66,11 @@ int ReportError(std::string_view message, int exit_status = kExitFailed);
 
 /// The values of a flag that takes several: "a,b" is {"a", "b"}, "" one empty value.
 std::vector<std::string> SplitAtCommas(const std::string& text);
+/// The same for whole numbers from `least` to `most`; empty where a value is none.
+std::vector<int> WholeNumbersAtCommas(const std::string& text, int least, int most);
+
+/// Prints "what: holds" or "what: DOES NOT HOLD" on stdout at once; returns `holds`.
+bool PrintBound(bool holds, const std::string& what);
 
 /// A number with 17 significant digits, so that reading it gives the same double.
 std::string FormatNumber(double value);

@@ -28,7 +28,7 @@ DEFINE_string(side, "both",
               "derivatives for growing (plus) or shrinking (minus) parameters; by the tangent");
 DEFINE_double(step, 0.0, "of finite differences, in the parameter's unit; 0: 6e-6 max(|p|, scale)");
 DEFINE_string(loss, "", "file of a scalar loss (JSON) to differentiate instead of the final state");
-DEFINE_int32(repeat, 1, "runs of which the best times are told");
+DEFINE_int32(repeat, 1, "runs, of which the best times are reported");
 DEFINE_string(factorisations, "keep", "of the adjoint's steps: keep, or recompute to save memory");
 DEFINE_string(
     checkpoint, "all",

@@ -10,7 +10,7 @@
 namespace tangible {
 namespace {
 
-/// Bounded only where its normal lies along an axis.
+/// The box of a half-plane is bounded only where its normal lies along an axis.
 Aabb HalfPlaneBox(const ShapeView<double>& shape, const Pose<double>& pose, double margin) {
   Aabb box{-kInfinity, -kInfinity, kInfinity, kInfinity};
   const Vector2<double> normal(shape.numbers[0], shape.numbers[1]);
@@ -29,7 +29,7 @@ Aabb HalfPlaneBox(const ShapeView<double>& shape, const Pose<double>& pose, doub
   return box;
 }
 
-/// Its half sides are its support function along x and y.
+/// The half sides of the box are the support function of the ellipse along x and y.
 Aabb EllipseBox(const ShapeView<double>& shape, const Pose<double>& pose, double margin) {
   const double a = shape.numbers[0];
   const double b = shape.numbers[1];
@@ -63,8 +63,8 @@ Aabb ComputeAabb(const ShapeView<double>& shape, const Pose<double>& pose, doubl
   return {box.min_x - grow, box.min_y - grow, box.max_x + grow, box.max_y + grow};
 }
 
-// Boxes are swept along the axis on which they are spread more: a stack or a hanging chain has all
-// of them above each other. The entries' x is that axis.
+// Boxes are swept along the axis over which they are spread more, because those of a stack or a
+// hanging chain all overlap along x. The entries' x is the coordinate along that axis.
 bool BroadPhase::ChooseAxis(const std::vector<Aabb>& boxes) {
   double sum[2] = {0.0, 0.0};
   double squares[2] = {0.0, 0.0};
@@ -79,7 +79,7 @@ bool BroadPhase::ChooseAxis(const std::vector<Aabb>& boxes) {
       }
     }
   }
-  // With room, so that a square pile does not change its axis from step to step.
+  // The factor prevents that the axis of a square pile changes from step to step.
   const double x = squares[0] - sum[0] * sum[0] / std::max(1, count);
   const double y = squares[1] - sum[1] * sum[1] / std::max(1, count);
   const bool along_y = along_y_ ? 2.0 * y > x : y > 2.0 * x;
@@ -104,7 +104,7 @@ void BroadPhase::Sort(const std::vector<Aabb>& boxes) {
   for (Entry& entry : entries_) {
     entry.box = turned(boxes[entry.index]);
   }
-  // Insertion sort: linear on an order that has hardly changed.
+  // Insertion sort takes linear time on an order that has hardly changed.
   for (std::size_t k = 1; k < entries_.size(); ++k) {
     const Entry moving = entries_[k];
     std::size_t place = k;
@@ -116,7 +116,8 @@ void BroadPhase::Sort(const std::vector<Aabb>& boxes) {
 }
 
 void BroadPhase::SortOverlaps(int num_boxes) {
-  // By counting the pairs of each first body: linear, and the second bodies of one are few.
+  // The pairs are sorted by counting those of each first body, which takes linear time; the second
+  // bodies of one first body are few.
   first_.assign(num_boxes + 1, 0);
   for (const auto& pair : found_) {
     ++first_[pair.first + 1];
@@ -126,7 +127,7 @@ void BroadPhase::SortOverlaps(int num_boxes) {
   for (const auto& pair : found_) {
     overlaps_[first_[pair.first]++] = pair;
   }
-  // Each first_[i] has advanced to the end of its pairs.
+  // By now each first_[i] has advanced to the end of its pairs.
   int begin = 0;
   for (int i = 0; i < num_boxes; ++i) {
     std::sort(overlaps_.begin() + begin, overlaps_.begin() + first_[i]);
@@ -146,7 +147,7 @@ void BroadPhase::SortAndSweep(const std::vector<Aabb>& boxes) {
       if (!(other.box.min_x <= entry.box.max_x)) {
         break;
       }
-      // The last condition keeps empty boxes (min > max) out, which an infinite one would meet.
+      // The last condition excludes empty boxes (min > max), which an infinite box would overlap.
       if (other.box.min_y <= entry.box.max_y && entry.box.min_y <= other.box.max_y &&
           other.box.min_x <= other.box.max_x) {
         found_.emplace_back(std::min(entry.index, other.index), std::max(entry.index, other.index));
@@ -154,7 +155,7 @@ void BroadPhase::SortAndSweep(const std::vector<Aabb>& boxes) {
     }
     num_compared_ += static_cast<int>(l - k - 1);
   }
-  // Ascending, so that what follows does not depend on how the bodies moved before.
+  // The order is ascending, so that results do not depend on how the bodies moved before.
   SortOverlaps(static_cast<int>(boxes.size()));
 }
 

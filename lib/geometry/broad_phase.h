@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// Which pairs of bodies may be near each other: axis-aligned boxes, sort and sweep along x.
+// Finds the pairs of bodies that may be near each other, by axis-aligned boxes and sort and sweep
+// along x or y.
 
 #include <utility>
 #include <vector>
@@ -10,8 +11,8 @@
 
 namespace tangible {
 
-/// Axis-aligned box, m; a half-plane's may be infinite; an empty one (no shape) has min > max and
-/// overlaps nothing.
+/// An axis-aligned box, m. The box of a half-plane may be infinite. An empty box (of no shape) has
+/// min > max and overlaps nothing.
 struct Aabb {
   double min_x, min_y, max_x, max_y;
 };
@@ -19,16 +20,16 @@ struct Aabb {
 /// The box of a shape at a pose, grown by `margin` on each side.
 Aabb ComputeAabb(const ShapeView<double>& shape, const Pose<double>& pose, double margin);
 
-/// Finds overlapping pairs; keeps the sorted order of the last call, so that coherent motion costs
-/// little more than a pass. Allocates nothing once its vectors have grown. Pairs come as (i, j), i
-/// < j, in ascending order whatever the history, so that results do not depend on it.
+/// Finds overlapping pairs. It keeps the sorted order of the last call, so that coherent motion
+/// costs little more than one pass, and allocates nothing once its vectors have grown. Pairs are
+/// (i, j) with i < j, in ascending order, so that results do not depend on earlier calls.
 class BroadPhase {
  public:
   /// The pairs with overlapping boxes for which allowed(i, j) (i < j).
   template <typename Allowed>
   void FindPairs(const std::vector<Aabb>& boxes, Allowed&& allowed,
                  std::vector<std::pair<int, int>>* pairs);
-  /// How many pairs of boxes the last sweep compared; all pairs of n are n (n − 1) / 2.
+  /// The number of pairs of boxes that the last sweep compared; n boxes have n (n − 1) / 2 pairs.
   int num_compared() const { return num_compared_; }
 
  private:

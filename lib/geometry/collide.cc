@@ -25,7 +25,7 @@ int CollideWithHalfPlane(const ShapeView<double>& shape, const Pose<double>& pos
                                     offset, side, max_gap, features);
 }
 
-/// Two circles need no search.
+/// The features of two circles are known without a search.
 int CollideCircles(const ShapeView<double>& shape_a, const Pose<double>& pose_a,
                    const ShapeView<double>& shape_b, const Pose<double>& pose_b, double max_gap,
                    ContactFeature features[2]) {

@@ -2,7 +2,7 @@
 #pragma once
 //
 // Contacts of a pair of shapes: which features meet (a discrete choice, made in double), and the
-// gap, normal and point as smooth functions of poses and shape numbers (templated).
+// gap, normal and point as smooth functions of poses and shape parameters (templated).
 //
 // Signs: gap > 0 apart, < 0 in penetration; the normal is unit and points from the second body to
 // the first; the point is midway between the two surface points, so both bodies receive equal and
@@ -33,7 +33,7 @@ struct ContactFeature {
   FeatureKind kind = FeatureKind::kVertexVertex;
   int a = 0;  ///< vertex or edge of the first shape
   int b = 0;  ///< vertex or edge of the second shape
-  /// Which shape of its body, where one has several, as the bodies' owner numbers them.
+  /// The index of the shape in its body, where a body has several; the caller numbers them.
   int part_a = 0, part_b = 0;
   friend bool operator==(const ContactFeature&, const ContactFeature&) = default;
 };
@@ -45,21 +45,22 @@ struct ContactGeometry {
   T gap;              ///< m
 };
 
-/// The features of up to two contacts of the pair whose gap is below max_gap, smallest gap first;
-/// returns how many. Faces that are (nearly) parallel give two, at the two ends of their overlap:
-/// each is a vertex of one shape against the face of the other. Two half-planes give none.
+/// Writes the features of up to two contacts of the pair whose gap is below max_gap, smallest gap
+/// first, and returns their number. Faces that are (nearly) parallel have two contacts, at the two
+/// ends of their overlap, each a vertex of one shape against the face of the other. Two half-planes
+/// have none.
 int FindContactFeatures(const ShapeView<double>& shape_a, const Pose<double>& pose_a,
                         const ShapeView<double>& shape_b, const Pose<double>& pose_b,
                         double max_gap, ContactFeature features[2]);
 
-/// Gap, normal and point of a feature. Finite, with finite derivatives, at coincident points too
-/// (then the normal is (0, 1), its derivative zero).
+/// Gap, normal and point of a feature. All are finite, with finite derivatives, at coincident
+/// points too, where the normal is (0, 1) and its derivative zero.
 template <typename T>
 ContactGeometry<T> EvaluateContact(const ContactFeature& feature, const ShapeView<T>& shape_a,
                                    const Pose<T>& pose_a, const ShapeView<T>& shape_b,
                                    const Pose<T>& pose_b);
 
-/// Indices into a shape's numbers that EvaluateContact reads of it: at most 4. `is_edge`: the
+/// Indices of the parameters of a shape that EvaluateContact reads, at most 4. `is_edge`: the
 /// feature on this shape is an edge.
 int FeatureNumbers(ShapeType type, int num_numbers, bool is_edge, int feature, int numbers[4]);
 

@@ -9,9 +9,9 @@
 namespace tangible::internal {
 namespace {
 
-/// How far apart two faces' ends may be along them, m. A power of two: where features change, and
-/// what a run makes of it, must not depend on the faces' lengths, whose derivative would be
-/// missing.
+/// The largest distance along two faces at which their ends count as one above the other, m. It is
+/// a power of two, hence locally constant: otherwise the place where features change would depend
+/// on the lengths of the faces, and that derivative would be missing.
 double AlignedWithin(const CoreEdge& a, const CoreEdge& b) {
   return std::ldexp(kAligned, std::ilogb(a.length + b.length));
 }
@@ -41,8 +41,9 @@ struct FaceQuery {
   CoreEdge line;                   ///< the edge
 };
 
-/// The edge that the other core is farthest in front of. The distance of the cores is at least the
-/// separation, and equal to it where a vertex is nearest to the inside of an edge.
+/// The edge with the largest height of the other core above it. The distance of the cores is at
+/// least this separation, and equal to it where the nearest points are a vertex and the inside of
+/// an edge.
 FaceQuery QueryFaces(const ConvexCore& faces, const ConvexCore& points) {
   FaceQuery best;
   const int num_edges = faces.Size() > 1 ? faces.Size() : 0;
@@ -66,7 +67,7 @@ FaceQuery QueryFaces(const ConvexCore& faces, const ConvexCore& points) {
   return best;
 }
 
-/// Whether the foot of a point lies on a face, up to a fraction of its length.
+/// Whether the projection of a point onto a face lies on it, up to a fraction of its length.
 bool IsOver(const CoreEdge& line, const Vector2<double>& point, double fraction) {
   const double along = line.tangent.dot(point - line.start);
   return along >= -fraction * line.length && along <= (1.0 + fraction) * line.length;
@@ -92,23 +93,23 @@ struct VertexOverVertex {
             incident.line.Height(sides.reference.VertexAt(reference_vertex)) - sides.Radii()} {}
 
   bool IsTie(double tie) const { return std::abs(of_incident.gap - of_reference.gap) <= tie; }
-  /// The first body's vertex stands, whichever rounding prefers.
+  /// The vertex of the first body is chosen, so that rounding does not decide.
   const Candidate& Chosen(const Sides& sides) const {
     return sides.reference_is_first ? of_reference : of_incident;
   }
 };
 
-/// One end of the overlap. `overhang`: how far the incident face ends inside of the reference face;
-/// `tie`: how far apart ends may be that count as one above the other.
-/// Adds nothing where the reference's vertex has no foot on the incident face and the incident one
-/// is beyond the reference's end; by rounding alone it is not beyond, and may be the nearest there
-/// is.
+/// Adds the contact at one end of the overlap. `overhang`: how far the incident face ends inside of
+/// the reference face; `tie`: the distance up to which two ends count as one above the other. Adds
+/// nothing where the vertex of the reference face does not project onto the incident face and the
+/// incident vertex is beyond the end of the reference face. A vertex that is beyond the end by
+/// rounding alone is a contact, because it may be the nearest one.
 void AddEnd(const Sides& sides, const CoreFace& reference, const CoreFace& incident,
             int reference_vertex, int incident_vertex, double overhang, double tie,
             FaceEnds* ends) {
   const VertexOverVertex vertices(sides, reference, incident, reference_vertex, incident_vertex);
-  // As far beyond the end as vertices count as one above the other: what is found must not depend
-  // on which face rounding made the reference.
+  // The projection may be beyond the end by `tie` as well, so that the result does not depend on
+  // which face rounding has made the reference.
   const bool has_foot =
       IsOver(incident.line, sides.reference.VertexAt(reference_vertex), tie / incident.line.length);
   if (std::abs(overhang) <= tie && has_foot && vertices.IsTie(tie)) {
@@ -120,14 +121,14 @@ void AddEnd(const Sides& sides, const CoreFace& reference, const CoreFace& incid
   }
 }
 
-/// One where they overlap in no more than a point, and are parallel; none where they do not oppose
-/// each other.
+/// There is one end where the faces are parallel and overlap in no more than a point, and none
+/// where they do not oppose each other.
 FaceEnds FindFaceEnds(const Sides& sides, const CoreFace& reference, const CoreFace& incident) {
   FaceEnds ends;
   if (incident.edge < 0 || reference.line.tangent.dot(incident.line.tangent) >= 0.0) {
     return ends;
   }
-  // Along the reference face; an opposing face runs the other way.
+  // Coordinates along the reference face; an opposing face runs in the other direction.
   const auto along = [&](int vertex) {
     return reference.line.tangent.dot(sides.incident.VertexAt(vertex) - reference.line.start);
   };
@@ -151,7 +152,7 @@ FaceEnds FindFaceEnds(const Sides& sides, const CoreFace& reference, const CoreF
   return ends;
 }
 
-/// The nearest vertex over an edge of `sides.reference`, if nearer than `*distance`.
+/// Finds the nearest vertex over an edge of `sides.reference`, if it is nearer than `*distance`.
 void NearestOverEdges(const Sides& sides, double* distance, FaceQuery* nearest) {
   const int num_edges = sides.reference.Size() > 1 ? sides.reference.Size() : 0;
   for (int i = 0; i < num_edges; ++i) {
@@ -159,7 +160,7 @@ void NearestOverEdges(const Sides& sides, double* distance, FaceQuery* nearest) 
     for (int j = 0; j < sides.incident.Size() && edge.length > 0.0; ++j) {
       const Vector2<double> point = sides.incident.VertexAt(j);
       const double height = edge.Height(point);
-      // Behind an edge by no more than rounding: else the vertex is near another one.
+      // The vertex may be behind the edge by rounding only; otherwise it is near another edge.
       if (height >= -kLengthRounding * edge.length && height < *distance &&
           IsOver(edge, point, kLengthRounding)) {
         *distance = height;
@@ -187,8 +188,8 @@ Candidate NearestVertices(const ConvexCore& a, const ConvexCore& b) {
   return nearest;
 }
 
-/// Contacts with the reference face of `query`, whose deepest vertex is a valid contact. Without
-/// two ends there is the one.
+/// Contacts with the reference face of `query`, whose deepest vertex is a valid contact. Where the
+/// overlap does not have two ends, this is the only contact.
 int CollideFaces(const Sides& sides, const FaceQuery& query, const CoreFace& reference,
                  const FaceEnds& ends, double max_gap, ContactFeature features[2]) {
   if (ends.count > 0) {
@@ -199,8 +200,8 @@ int CollideFaces(const Sides& sides, const FaceQuery& query, const CoreFace& ref
   return WriteCandidates(&deepest, 1, max_gap, features);
 }
 
-/// The cores are apart and no face of either separates them best, or rounding hid it: compares all
-/// vertices with all edges and vertices.
+/// For cores that are apart while no face of either separates them best, or rounding hides it:
+/// compares all vertices with all edges and vertices.
 int CollideNearest(const ConvexCore& a, const ConvexCore& b, double max_gap,
                    ContactFeature features[2]) {
   const Candidate vertices = NearestVertices(a, b);
@@ -210,7 +211,7 @@ int CollideNearest(const ConvexCore& a, const ConvexCore& b, double max_gap,
   NearestOverEdges({a, b, true}, &distance, &query_a);
   NearestOverEdges({b, a, false}, &distance, &query_b);
   const double vertex_distance = vertices.gap + a.Radius() + b.Radius();
-  // No edge at all: distances that overflow.
+  // No edge was found, because distances overflow.
   const bool has_edge = query_a.edge >= 0 || query_b.edge >= 0;
   if (!has_edge || !(distance <= vertex_distance * (1.0 + kLengthRounding))) {
     return WriteCandidates(&vertices, 1, max_gap, features);
@@ -242,8 +243,8 @@ int CollideCores(const ConvexCore& a, const ConvexCore& b, double max_gap,
                  ContactFeature features[2]) {
   const double max_separation = max_gap + a.Radius() + b.Radius();
   const FaceQuery query_a = QueryFaces(a, b);
-  // A vertex that counts as above the end of a face may be as far beyond it, and so further away
-  // than its gap says.
+  // A vertex that counts as above the end of a face may be beyond the end by the tolerance, and
+  // hence farther away than its gap.
   const auto is_far = [&](const FaceQuery& query) {
     return query.separation >= max_separation &&
            query.separation >= max_separation + kBeyondEnd * query.line.length;
@@ -266,17 +267,18 @@ int CollideCores(const ConvexCore& a, const ConvexCore& b, double max_gap,
   const CoreFace incident = FaceAgainst(sides.incident, query.vertex, reference.line.Normal());
   const FaceEnds ends = FindFaceEnds(sides, reference, incident);
 
-  // The deepest vertex over the face of largest separation is the nearest pair, or the least way
-  // out.
+  // The deepest vertex over the face with the largest separation is the nearest pair, or the least
+  // depth.
   const double length = reference.line.length + incident.line.length;
   bool is_face_contact =
       IsOver(reference.line, sides.incident.VertexAt(query.vertex), kLengthRounding);
-  // Parallel faces: rounding may have chosen a vertex beside the overlap, whose ends are as near.
+  // The faces are parallel, and rounding may have chosen a vertex beside the overlap, while the
+  // ends of the overlap are equally near.
   for (int i = 0; i < ends.count && !is_face_contact; ++i) {
     is_face_contact =
         ends.candidates[i].gap <= query.separation - sides.Radii() + kLengthRounding * length;
   }
-  // In penetration the least way out is through a face.
+  // In penetration the direction of least depth is the normal of a face.
   if (is_face_contact || query.separation < -kLengthRounding * length) {
     return CollideFaces(sides, query, reference, ends, max_gap, features);
   }

@@ -8,7 +8,7 @@
 namespace tangible::internal {
 namespace {
 
-/// The ellipse of a pair, and what it meets. All candidates' gaps are EvaluateContact's.
+/// The ellipse of a pair and the other shape. EvaluateContact computes the gaps of all candidates.
 class EllipsePair {
  public:
   EllipsePair(const ShapeView<double>& shape_a, const Pose<double>& pose_a,
@@ -28,10 +28,10 @@ class EllipsePair {
     return {feature, Evaluate(feature).gap};
   }
 
-  /// The nearest of the other core's features, or the least way out: of those whose nearest point
-  /// lies within them the one with the largest gap; at a border, where an edge and its end have the
-  /// same one, the edge. Where the ellipse's centre is deep inside there may be none; then the edge
-  /// with the largest gap.
+  /// The nearest feature of the other core: the one with the largest gap among those that contain
+  /// their nearest point. On a border, where an edge and its end have the same gap, it is the edge.
+  /// Where the centre of the ellipse is deep inside there may be no such feature; then it is the
+  /// edge with the largest gap.
   Candidate AgainstCore() const {
     Candidate best;
     Candidate any_edge;
@@ -57,7 +57,7 @@ class EllipsePair {
         has_edge = true;
       }
     }
-    // Of shapes that are apart one pair of features alone has its nearest point within it.
+    // Where the shapes are apart, only one feature contains its nearest point.
     const bool is_apart = found && best.gap + other_.Radius() > 0.0;
     for (int i = 0; i < other_.Size() && !is_apart; ++i) {
       const ContactFeature feature = {FeatureKind::kVertexVertex, ellipse_is_first_ ? 0 : i,

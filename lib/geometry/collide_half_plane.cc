@@ -25,8 +25,8 @@ int CollideHalfPlane(const ConvexCore& core, const Vector2<double>& normal, doub
     return 0;
   }
   if (core.IsPolygon()) {
-    // The lowest vertex may lie between the ends of a flat face of several edges: its ends support
-    // it.
+    // The lowest vertex may lie between the ends of a flat face of several edges; the contacts are
+    // at its ends.
     const CoreFace face = FaceAgainst(core, lowest, normal);
     if (face.edge >= 0) {
       candidates[0] = candidate(face.first);
@@ -37,8 +37,9 @@ int CollideHalfPlane(const ConvexCore& core, const Vector2<double>& normal, doub
   }
   const Candidate next = candidate(core.Next(lowest));
   const Candidate previous = candidate(core.Previous(lowest));
-  // The lower one: where the other takes its place both have the same gap. But a needle's two
-  // corners at its tip are one place, and it is its other end that lands.
+  // The lower neighbour is the second contact; where the other neighbour takes its place, both have
+  // the same gap. The two corners at the tip of a needle count as one contact, and its other end is
+  // the second.
   const auto length = [&](int vertex) {
     return (core.VertexAt(vertex) - core.VertexAt(lowest)).norm();
   };

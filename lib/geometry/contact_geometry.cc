@@ -5,8 +5,8 @@
 namespace tangible {
 namespace {
 
-/// Numbers of an edge: boxes and capsules have constant normals, and a capsule's edge lies on the
-/// axis.
+/// The parameters that an edge reads. Boxes and capsules have constant normals, and the edge of a
+/// capsule's core lies on its axis.
 int EdgeNumbers(ShapeType type, int num_numbers, int edge, int numbers[4]) {
   switch (type) {
     case ShapeType::kBox:

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Line by line the reverse of contact_geometry_inl.h, whose names are kept: x̄ is `x_bar`. Ellipses
-// are evaluated in Jets.
+// This file reverses contact_geometry_inl.h line by line and keeps its names: x̄ is `x_bar`.
+// Ellipses are evaluated in Jets.
 #include "tangible/geometry/contact_geometry_adjoint.h"
 
 #include <vector>
@@ -15,7 +15,7 @@ using Vector = Vector2<double>;
 
 double Dot(const Vector& x, const Vector& y) { return x.x() * y.x() + x.y() * y.y(); }
 
-// Of n = v / norm, `norm` = |v| or, where v = 0, a constant 1 beside a constant n.
+// The adjoint of n = v / norm with `norm` = |v|; where v = 0, norm = 1 and n are constants.
 Vector NormalisedAdjoint(const Vector& v, const Vector& n, double norm, const Vector& n_bar) {
   if (!(Dot(v, v) > 0.0)) {
     return Vector(0.0, 0.0);
@@ -29,7 +29,7 @@ void AddPosition(const Vector& bar, double sign, ContactSideAdjoint* side) {
   side->pose[1] += sign * bar.y();
 }
 
-// Of y = R(θ) x with y known: adds to the angle, returns x̄ = Rᵀ ȳ.
+// The adjoint of y = R(θ) x with y known: adds to that of the angle and returns x̄ = Rᵀ ȳ.
 Vector RotationAdjoint(const Pose<double>& pose, const Vector& y, const Vector& y_bar,
                        ContactSideAdjoint* side) {
   side->pose[2] += y_bar.y() * y.x() - y_bar.x() * y.y();
@@ -38,7 +38,7 @@ Vector RotationAdjoint(const Pose<double>& pose, const Vector& y, const Vector& 
   return Vector(c * y_bar.x() + s * y_bar.y(), c * y_bar.y() - s * y_bar.x());
 }
 
-// Of Vertex and CoreRadius, in the places of FeatureNumbers.
+// The adjoint of Vertex and CoreRadius, in the order of FeatureNumbers.
 void VertexAdjoint(const ShapeView<double>& shape, int vertex, const Vector& bar, double radius_bar,
                    ContactSideAdjoint* side) {
   switch (shape.type) {
@@ -105,7 +105,7 @@ void HalfPlaneLineAdjoint(const ShapeView<double>& shape, const Line& bar,
   side->numbers[2] += bar.offset / norm;
 }
 
-// Returns the adjoint of the line.
+// This returns the adjoint of the line.
 Line VertexAgainstLineAdjoint(const ShapeView<double>& shape, const Pose<double>& pose, int vertex,
                               const Line& line, const Pose<double>& line_pose,
                               const ContactGeometry<double>& bar, ContactSideAdjoint* side,
@@ -158,7 +158,7 @@ void VertexAgainstVertexAdjoint(const ContactFeature& feature, const ShapeView<d
                 b_bar);
 }
 
-// A shape's numbers that the feature reads, or its pose, as variables from `*next` on.
+// The shape parameters that the feature reads, or the pose, as variables from `*next` on.
 ShapeView<LocalJet> LocalShape(const ShapeView<double>& shape, bool is_edge, int feature,
                                std::vector<LocalJet>* numbers, int* next) {
   numbers->resize(shape.num_numbers);
@@ -183,7 +183,8 @@ Pose<LocalJet> LocalPose(const Pose<double>& pose, int* next) {
   return local;
 }
 
-// Of an ellipse: its nearest points are roots of an equation, whose derivatives the template has.
+// The adjoint for an ellipse, by Jets: its nearest points are roots of an equation, which the
+// template differentiates.
 void AdjointByJets(const ContactFeature& feature, const ShapeView<double>& shape_a,
                    const Pose<double>& pose_a, const ShapeView<double>& shape_b,
                    const Pose<double>& pose_b, const ContactGeometry<double>& bar,

@@ -35,7 +35,7 @@ CoreFace FaceAgainst(const ConvexCore& core, int vertex, const Vector2<double>& 
   if (core.Size() < 2) {
     return CoreFace{};
   }
-  // Edges without length are passed over, on either side.
+  // Edges without length are skipped on either side.
   int after = vertex;
   int before = core.Previous(vertex);
   CoreEdge edge_after = core.Edge(after);

@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// A shape's core at a pose, in double: what the choice of features walks over. Internal to the
-// module.
+// The core of a shape at a pose, in double, from which features are chosen. Internal to the module.
 //
-// A point is a polygon of one vertex and no edge, a segment one of two vertices and two edges, one
-// seen from either side: so all pairs share one code. Coordinates are relative to a common origin
-// near the pair, for which positions cancel before they are rounded.
+// A point is a polygon with one vertex and no edge, a segment is one with two vertices and two
+// edges, one for each side, so that all pairs share the same code. Coordinates are relative to a
+// common origin near the pair, so that little is lost to rounding far from the world's origin.
 
 #include <cmath>
 
@@ -14,14 +13,14 @@
 
 namespace tangible::internal {
 
-/// An edge from `start`, along the unit vector `tangent`; all zero where it has no length.
+/// An edge from `start` along the unit vector `tangent`; both are zero where it has no length.
 struct CoreEdge {
   Vector2<double> start{0.0, 0.0};
   Vector2<double> tangent{0.0, 0.0};
   double length = 0.0;
 
   Vector2<double> Normal() const { return Vector2<double>(tangent.y(), -tangent.x()); }
-  /// How far a point is in front of the edge's line.
+  /// The height of a point above the edge's line.
   double Height(const Vector2<double>& p) const { return Normal().dot(p - start); }
 };
 
@@ -41,7 +40,7 @@ class ConvexCore {
 
   int Size() const { return size_; }
   double Radius() const { return radius_; }
-  /// Collinear vertices are possible: a polygon's face may consist of several edges.
+  /// Vertices may be collinear, so that a face of a polygon may consist of several edges.
   bool IsPolygon() const { return shape_.type == ShapeType::kPolygon; }
   int Next(int i) const { return i + 1 == size_ ? 0 : i + 1; }
   int Previous(int i) const { return i == 0 ? size_ - 1 : i - 1; }
@@ -80,11 +79,11 @@ struct CoreFace {
   CoreEdge line;  ///< from the first vertex to the last
 };
 
-/// The face of an edge, given as Edge(edge), that has a length.
+/// The face that contains an edge, given as Edge(edge), which must have a length.
 CoreFace FaceOfEdge(const ConvexCore& core, int edge, const CoreEdge& line);
 
-/// The face at a vertex whose outward normal is closest to −`direction`; edge −1 where the core has
-/// none.
+/// The face at a vertex whose outward normal is closest to −`direction`; its edge is −1 where the
+/// core has no face.
 CoreFace FaceAgainst(const ConvexCore& core, int vertex, const Vector2<double>& direction);
 
 }  // namespace tangible::internal

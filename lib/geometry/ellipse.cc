@@ -41,7 +41,7 @@ class Search {
       if (first.slope >= 0.0 && next.slope <= 0.0) {
         const Vector top = Refine(first, next);
         const double value = At(top).value;
-        // Of equal ones the first stands, whichever rounding prefers.
+        // Of directions with equal separations the first is kept, so that rounding does not decide.
         if (value > largest + kLengthRounding * size_) {
           largest = value;
           best = top;
@@ -60,15 +60,16 @@ class Search {
     double angle = 0.0;
     double slope = 0.0;
   };
-  // At so many directions of each ellipse, evenly over its eccentric anomaly: its separation's
-  // slope changes sign once between two of them, however slender it is.
+  // The number of directions of each ellipse, spread evenly over its eccentric anomaly: the slope
+  // of the separation changes sign at most once between two of them, however slender the ellipse
+  // is.
   static constexpr int kPerEllipse = 16;
 
   Vector Support(const RoundShape& shape, const Vector& n, double* bend) const {
     if (!(shape.axes[0] > 0.0)) {
       return Vector(0.0, 0.0);
     }
-    // In units of the larger axis, as in ellipse_inl.h.
+    // Lengths are in units of the larger axis, as in ellipse_inl.h.
     const double scale = std::max(shape.axes[0], shape.axes[1]);
     const double ratios[2] = {shape.axes[0] / scale, shape.axes[1] / scale};
     const Vector m = shape.rotation.Inverse(n);
@@ -89,8 +90,8 @@ class Search {
     return result;
   }
 
-  // Newton's method from the line of centres. Of shapes that are apart the directions that separate
-  // them are one interval, in which s is concave (3): what it ends at there is the largest.
+  // Newton's method from the line of centres. The directions that separate two shapes are one
+  // interval, in which s is concave (3), so that a root there is the maximum.
   bool FindApart(Vector* direction) const {
     const double norm = std::sqrt(apart_.squaredNorm());
     if (!(norm > 0.0)) {
@@ -139,8 +140,8 @@ class Search {
               [](const Sample& x, const Sample& y) { return x.angle < y.angle; });
   }
 
-  // The root of the slope between two directions less than half a turn apart: Newton's step while
-  // it stays within the bracket and halves it, else the middle.
+  // The root of the slope between two directions less than half a turn apart, by Newton's steps
+  // where they stay within the bracket and halve it, and by bisection otherwise.
   Vector Refine(const Sample& first, const Sample& last) const {
     if (first.slope == 0.0) {
       return first.direction;

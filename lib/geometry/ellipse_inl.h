@@ -12,7 +12,7 @@
 
 namespace tangible::internal {
 
-/// x and ρ of (1); of a core's vertex the vertex itself, and 0.
+/// x and ρ of (1); for a vertex of a core, the vertex itself and 0.
 template <typename T>
 struct Support {
   Vector2<T> arm;  ///< m, world, from the body's position
@@ -26,7 +26,8 @@ Support<T> SupportOf(const ShapeView<T>& shape, const Pose<T>& pose, int vertex,
   if (shape.type != ShapeType::kEllipse) {
     return {pose.rotation * Vertex(shape, vertex), T(0.0)};
   }
-  // In units of the larger axis: squares neither overflow nor vanish, however large the ellipse is.
+  // Lengths are in units of the larger axis, so that squares neither overflow nor vanish, however
+  // large the ellipse is.
   const T& a = shape.numbers[0];
   const T& b = shape.numbers[1];
   const T& scale = ValueOf(a) < ValueOf(b) ? b : a;
@@ -52,8 +53,8 @@ RoundShape RoundShapeOf(const ShapeView<T>& shape, const Pose<T>& pose) {
   return round;
 }
 
-/// An ellipse against an ellipse or a vertex. The offset d is that of the vertices; an ellipse's is
-/// its centre.
+/// An ellipse against an ellipse or a vertex. The offset d is that between the vertices of the
+/// cores; the vertex of an ellipse is its centre.
 template <typename T>
 ContactGeometry<T> RoundAgainstRound(const ContactFeature& feature, const ShapeView<T>& shape_a,
                                      const Pose<T>& pose_a, const ShapeView<T>& shape_b,

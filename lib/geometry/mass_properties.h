@@ -7,15 +7,16 @@
 
 namespace tangible {
 
-/// m²; of shapes with an area (not kNone, not kHalfPlane).
+/// The area of a shape that has one (not kNone, not kHalfPlane), m².
 template <typename T>
 T Area(const ShapeView<T>& shape);
 
-/// m, body frame.
+/// The centroid in the body frame, m.
 template <typename T>
 Vector2<T> Centroid(const ShapeView<T>& shape);
 
-/// kg m² about the frame's origin (the centre of mass) of the uniform shape of this mass (kg).
+/// The moment of inertia, kg m², of a uniform shape with this mass (kg) about the frame's origin,
+/// which is the centre of mass.
 template <typename T>
 T UniformInertia(const ShapeView<T>& shape, const T& mass);
 

@@ -15,8 +15,9 @@
 
 namespace tangible {
 
-/// The numbers of a shape, by type as BasicShape has them; does not own them. Functions read only
-/// the numbers that they need, so unused ones may be uninitialised (local Jets rely on it).
+/// A view of the parameters of a shape, in the order that BasicShape has for each type. Functions
+/// read only the parameters that they need, so that unused ones may be uninitialised (local Jets
+/// rely on it).
 template <typename T>
 struct ShapeView {
   ShapeType type = ShapeType::kNone;
@@ -24,8 +25,8 @@ struct ShapeView {
   int num_numbers = 0;
 };
 
-/// Vertices of the core: circle and ellipse 1, capsule 2, box 4, polygon n; 0 for a half-plane and
-/// no shape.
+/// The number of vertices of the core: 1 of a circle or ellipse, 2 of a capsule, 4 of a box, n of a
+/// polygon; 0 of a half-plane and of no shape.
 inline int NumVertices(ShapeType type, int num_numbers) {
   switch (type) {
     case ShapeType::kCircle:
@@ -42,8 +43,8 @@ inline int NumVertices(ShapeType type, int num_numbers) {
   }
 }
 
-/// Vertex i of the core, body frame, counter-clockwise. Box: starts at the lower left corner;
-/// capsule: the cap centre at −x first.
+/// Vertex i of the core in the body frame, counter-clockwise. The first vertex of a box is its
+/// lower left corner, that of a capsule the centre of the cap at −x.
 template <typename T>
 Vector2<T> Vertex(const ShapeView<T>& shape, int i) {
   switch (shape.type) {
@@ -61,7 +62,7 @@ Vector2<T> Vertex(const ShapeView<T>& shape, int i) {
   }
 }
 
-/// The radius by which the core is grown; 0 for an ellipse, which has none that is constant.
+/// The radius by which the core is grown; 0 for an ellipse, whose radius is not constant.
 template <typename T>
 T CoreRadius(const ShapeView<T>& shape) {
   switch (shape.type) {
@@ -74,7 +75,7 @@ T CoreRadius(const ShapeView<T>& shape) {
   }
 }
 
-/// Whether the core is grown at all: its corners are round.
+/// Whether the core is grown by a radius, so that its corners are round.
 inline bool IsRound(const ShapeView<double>& shape) {
   return shape.type == ShapeType::kEllipse || CoreRadius(shape) > 0.0;
 }

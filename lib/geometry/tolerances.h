@@ -1,27 +1,30 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// The tolerances of geometry: of what each is a share, then why. The README has a table.
+// The tolerances of geometry. Each comment names the quantity of which the tolerance is a fraction,
+// then the reason. The README has the table.
 
 #include <limits>
 
 namespace tangible {
 
-/// Of the the length of the faces at hand, or an angle in rad: lengths below it are rounding, and
-/// edges that turn by less are one face.
+/// Of the length of the faces that are compared, or an angle in rad: smaller lengths are rounding,
+/// and edges that turn by a smaller angle belong to one face.
 inline constexpr double kLengthRounding = 1e-12;
-/// Of the the length of two faces, as a power of two: their ends count as one above the other: a
-/// stack of equal boxes has the same features step after step.
+/// Of the length of two faces, as a power of two: ends that are no farther apart along the faces
+/// count as one above the other, so that a stack of equal boxes has the same features step after
+/// step.
 inline constexpr double kAligned = 1e-9;
-/// Of the the length of a face: the same where its neighbour is longer.
+/// Of the length of a face: the same tolerance where the other face is longer.
 inline constexpr double kBeyondEnd = 1e3 * kAligned;
-/// Of the the length of the neighbouring edge: a shorter edge is a tip, which a half-plane touches
-/// with one vertex.
+/// Of the length of the neighbouring edge: a shorter edge is a tip, which a half-plane touches with
+/// one vertex.
 inline constexpr double kTip = 1e-3;
-/// Of the size of two shapes and their distance: where the distance and the radii of curvature sum
-/// up to less, a direction is rounding, as that between two circles about one centre.
+/// Of the size of two shapes and their distance: where the sum of the distance and the radii of
+/// curvature is smaller, the direction of the normal is rounding, as it is between two circles
+/// about one centre.
 inline constexpr double kUnbent = 4.0 * std::numeric_limits<double>::epsilon();
-/// A turn in rad: below it two directions are one, but for rounding.
+/// Rad: two directions that differ by a smaller angle are the same up to rounding.
 inline constexpr double kTurnRounding = 2.0 * std::numeric_limits<double>::epsilon();
 
 }  // namespace tangible

@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <limits>
 #include <random>
+#include <vector>
 
 namespace tangible {
 namespace {
@@ -36,6 +37,16 @@ TEST(FormatNumberTest, IsPrintfsToTheByte) {
   std::string text = "x=";
   AppendNumber(2.5, &text);
   EXPECT_EQ(text, "x=2.5");
+}
+
+TEST(WholeNumbersAtCommasTest, AreAllOrNone) {
+  using Numbers = std::vector<int>;
+  EXPECT_EQ(WholeNumbersAtCommas("20,25,-3", -3, 25), (Numbers{20, 25, -3}));
+  EXPECT_EQ(WholeNumbersAtCommas("7", 7, 7), Numbers{7});
+  for (const char* text : {"", "20,", ",20", "20,x", "20x", "2.5", " 20", "19", "26", "20,26",
+                           "99999999999999999999"}) {
+    EXPECT_EQ(WholeNumbersAtCommas(text, 20, 25), Numbers{}) << text;
+  }
 }
 
 }  // namespace

@@ -242,7 +242,7 @@ std::string WrongComment(const CommentLine& before, const CommentLine& line,
   return "";
 }
 
-/// A number of lib that looks like a tolerance and is none.
+/// A number of lib or estimation that looks like a tolerance and is none.
 struct NoTolerance {
   const char* path;
   const char* text;  // in its line
@@ -256,6 +256,12 @@ constexpr NoTolerance kNoTolerances[] = {
     // What Eigen asks of a scalar.
     {"lib/math/dual.h", "static Real dummy_precision()"},
     {"lib/math/dual.h", "static Real epsilon()"},
+    // Rates of learning, and the bound of an example that stands alone.
+    {"estimation/experiments/cartpole/learned_step.cc", "for (const double rate : {"},
+    {"estimation/experiments/cartpole/perceptron.h", "double rate ="},
+    {"estimation/vision/study.cc", "training.learning_rate ="},
+    {"estimation/vision/training_options.h", "double learning_rate ="},
+    {"estimation/vision/examples/learn_restitution.cc", "restitution.item<double>() - 0.8"},
 };
 
 /// The code of a line, without what stands in quotes and comments.
@@ -277,10 +283,11 @@ std::string CodeOf(const std::string& line) {
   return code;
 }
 
-/// Whether a line of lib has a tolerance outside of a tolerances.h: a number with a negative
-/// exponent, the unit of rounding, or a constant that calls itself a tolerance.
+/// Whether a line of lib or estimation has a tolerance outside of a tolerances.h: a number with a
+/// negative exponent, the unit of rounding, or a constant that calls itself a tolerance.
 bool HasTolerance(const std::string& path, const std::string& line) {
-  if (!StartsWith(path, "lib/") || EndsWith(path, "/tolerances.h") ||
+  if (!(StartsWith(path, "lib/") || StartsWith(path, "estimation/")) ||
+      EndsWith(path, "/tolerances.h") ||
       std::any_of(std::begin(kNoTolerances), std::end(kNoTolerances), [&](const NoTolerance& none) {
         return path == none.path && Contains(line, none.text);
       })) {
@@ -341,9 +348,8 @@ std::vector<std::string> CheckSource(const SourceFile& file) {
   return problems;
 }
 
-std::vector<std::string> UndocumentedTolerances(const std::string& header,
-                                                const std::string& readme) {
-  std::vector<std::string> missing;
+std::vector<Tolerance> TolerancesOf(const std::string& header) {
+  std::vector<Tolerance> tolerances;
   std::istringstream lines(header);
   for (std::string line; std::getline(lines, line);) {
     const std::string start = "inline constexpr double ";
@@ -366,8 +372,17 @@ std::vector<std::string> UndocumentedTolerances(const std::string& header,
       const std::size_t start_of_unit = at >= 2 && value[at - 2] == '*' ? at - 2 : at;
       value.replace(start_of_unit, at - start_of_unit + unit.size(), "ε");
     }
-    if (!Contains(readme, "| `" + name + "` | " + value + " |")) {
-      missing.push_back(name);
+    tolerances.push_back({name, value});
+  }
+  return tolerances;
+}
+
+std::vector<std::string> UndocumentedTolerances(const std::string& header,
+                                                const std::string& readme) {
+  std::vector<std::string> missing;
+  for (const Tolerance& tolerance : TolerancesOf(header)) {
+    if (!Contains(readme, "| `" + tolerance.name + "` | " + tolerance.value + " |")) {
+      missing.push_back(tolerance.name);
     }
   }
   return missing;

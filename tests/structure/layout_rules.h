@@ -29,13 +29,20 @@ struct SourceFile {
 ///  - an equation or a table in a comment that a formatter has wrapped like running text: a line
 ///    indented by three spaces that begins with a word for which the line before it had no room, or
 ///    a wrapped line without punctuation before a line that is indented further;
-///  - in lib, outside of a tolerances.h: a number with a negative exponent, the unit of rounding,
-///    or a constant named Rounding or Tolerance, but for a list of what is none;
+///  - in lib and estimation, outside of a tolerances.h: a number with a negative exponent, the unit
+///    of rounding, or a constant named Rounding or Tolerance, but for a list of what is none;
 ///  - more than 800 lines.
 std::vector<std::string> CheckSource(const SourceFile& file);
 
-/// The constants of a tolerances.h whose name and value (ε for the unit of rounding) are not in a
-/// row of the README's table.
+/// A constant of a tolerances.h, its value as the README's table has it: ε is the unit of rounding.
+struct Tolerance {
+  std::string name;
+  std::string value;
+};
+
+std::vector<Tolerance> TolerancesOf(const std::string& header);
+
+/// The names of those of a tolerances.h that are not in a row of the README's table.
 std::vector<std::string> UndocumentedTolerances(const std::string& header,
                                                 const std::string& readme);
 

@@ -176,6 +176,8 @@ TEST(LayoutRules, TolerancesHaveAHeaderAndATable) {
   EXPECT_EQ(NumProblems("lib/dynamics/a.cc", "constexpr double kFarTolerance = 0.01;\n"), 1U);
   EXPECT_EQ(NumProblems("lib/scene/scene.h", "double contact_margin = 1e-4;\n"), 0U);
   EXPECT_EQ(NumProblems("lib/scene/scene.cc", "double contact_margin = 1e-4;\n"), 1U);
+  EXPECT_EQ(NumProblems("estimation/fit/a.cc", "if (x < 1e-9) {}\n"), 1U);
+  EXPECT_EQ(NumProblems("estimation/fit/tolerances.h", "inline constexpr double kA = 1e-9;\n"), 0U);
   EXPECT_EQ(NumProblems("verification/a.cc", "if (x < 1e-9) {}\n"), 0U);
   EXPECT_EQ(NumProblems("lib/lcp/dense/tolerances.h", "inline constexpr double kA = 1e-9;\n"), 0U);
   const std::string header =
@@ -230,22 +232,42 @@ TEST(Layout, EverySource) {
   }
 }
 
+/// The README with the table of a tolerances.h: in lib that of the module, in estimation the
+/// nearest one above the header.
+fs::path ReadmeOfTolerances(const fs::path& header) {
+  if (*header.begin() == "lib") {
+    return fs::path("lib") / *std::next(header.begin()) / "README.md";
+  }
+  fs::path folder = header.parent_path();
+  while (!folder.empty() && !fs::exists(kTop / folder / "README.md")) {
+    folder = folder.parent_path();
+  }
+  return folder / "README.md";
+}
+
 TEST(Layout, EveryToleranceStandsInTheTable) {
   int headers = 0;
+  std::map<std::string, fs::path> headers_of;
   for (const fs::path& path : Files({".h"})) {
-    const fs::path relative = path.lexically_relative(kTop);
-    if (relative.filename() != "tolerances.h" || *relative.begin() != "lib") {
+    const fs::path header = path.lexically_relative(kTop);
+    if (header.filename() != "tolerances.h") {
       continue;
     }
     ++headers;
-    const fs::path table = fs::path("lib") / *std::next(relative.begin()) / "README.md";
-    const std::string header = ReadText(path);
-    ASSERT_NE(header.find("inline constexpr double"), std::string::npos) << relative;
-    for (const std::string& name : UndocumentedTolerances(header, ReadText(kTop / table))) {
-      ADD_FAILURE() << name << " of " << relative << " has no row with its value in " << table;
+    const fs::path table = ReadmeOfTolerances(header);
+    const std::string text = ReadText(path);
+    const std::vector<Tolerance> tolerances = TolerancesOf(text);
+    ASSERT_FALSE(tolerances.empty()) << header;
+    for (const std::string& name : UndocumentedTolerances(text, ReadText(kTop / table))) {
+      ADD_FAILURE() << name << " of " << header << " has no row with its value in " << table;
+    }
+    for (const Tolerance& tolerance : tolerances) {
+      const auto [first, is_new] = headers_of.emplace(tolerance.name, header);
+      EXPECT_TRUE(is_new) << tolerance.name << " stands in " << first->second << " and in "
+                          << header;
     }
   }
-  EXPECT_GE(headers, 10);
+  EXPECT_GE(headers, 20);
 }
 
 TEST(Layout, TheIndexOfEquations) {

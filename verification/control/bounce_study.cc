@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <ctime>
 #include <limits>
 #include <memory>
 #include <mutex>
@@ -14,6 +13,7 @@
 #include "tangible/control/engine_step.h"
 #include "tangible/control/ilqr.h"
 #include "tangible/estimation/fit/linearisation.h"
+#include "tangible/math/cpu_time.h"
 #include "tangible/math/random.h"
 
 namespace tangible::bounce {
@@ -27,12 +27,6 @@ constexpr double kDeviation = 0.05;
 // Of problems: a ball that comes so far, m, was struck; so many are drawn for one, at most.
 constexpr double kStruck = 0.8;
 constexpr int kMostDraws = 100;
-
-double CpuSeconds() {
-  timespec time{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
-  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
-}
 
 template <typename Named>
 const Named* Find(const std::vector<Named>& list, const std::string& name) {
@@ -167,9 +161,9 @@ Outcome Solve(const Problem& problem, Method method, int iterations) {
     options.surrogate = {.samples = kSamples, .deviation = kDeviation};
   }
   Outcome outcome;
-  const double began = CpuSeconds();
+  const double began = ThreadCpuSeconds();
   const IlqrResult result = SolveIlqr(own.control(), own.Start(), options);
-  outcome.cpu_seconds = CpuSeconds() - began;
+  outcome.cpu_seconds = ThreadCpuSeconds() - began;
   outcome.iterations = static_cast<int>(result.iterations.size());
   outcome.distance = outcome.believed = std::numeric_limits<double>::infinity();
   if (result.status == IlqrStatus::kFailed) return outcome;

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tangible/verification/corpus/corpus_run.h"
 
-#include <time.h>
-
 #include <algorithm>
 #include <cmath>
 #include <mutex>
@@ -12,17 +10,12 @@
 #include "tangible/lcp/contact/contact_solver.h"
 #include "tangible/lcp/contact/worker_pool.h"
 #include "tangible/lcp/dense/solver.h"
+#include "tangible/math/cpu_time.h"
 #include "tangible/verification/corpus/plain_case.h"
 #include "tangible/verification/corpus/recomputed.h"
 
 namespace tangible::corpus {
 namespace {
-
-double CpuSeconds() {
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
 
 void JudgeSolved(double residual, Answer* answer) {
   answer->residual = residual;
@@ -35,9 +28,9 @@ void JudgeSolved(double residual, Answer* answer) {
 Answer ByGeneral(const std::string& kind, const std::string& name, Known known,
                  const MixedLcp<double>& problem, const ContactProblem<double>* contacts) {
   Answer answer{.kind = kind, .name = name, .known = known, .way = Way::kGeneral};
-  const double start = CpuSeconds();
+  const double start = ThreadCpuSeconds();
   const LcpSolution<double> solution = SolveLcp(problem);
-  answer.seconds = CpuSeconds() - start;
+  answer.seconds = ThreadCpuSeconds() - start;
   answer.solver = ToString(solution.solver);
   answer.solved = solution.status == LcpStatus::kSolved;
   answer.infeasible = solution.status == LcpStatus::kInfeasible;
@@ -84,9 +77,9 @@ Answer ByContacts(const ContactCase& one, Way way, std::uint64_t seed) {
   Answer answer{.kind = one.kind, .name = one.name, .known = one.known, .way = way};
   ContactSolution<double> solution = Guess(one.problem, way, seed);
   ContactSolver solver;
-  const double start = CpuSeconds();
+  const double start = ThreadCpuSeconds();
   const ContactSolverReport report = solver.Solve(one.problem, {}, &solution);
-  answer.seconds = CpuSeconds() - start;
+  answer.seconds = ThreadCpuSeconds() - start;
   answer.solver = NameOf(report.rung);
   answer.solved = report.solved;
   if (answer.solved) JudgeSolved(RecomputedResidual(one.problem, solution), &answer);

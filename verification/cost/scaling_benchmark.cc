@@ -11,13 +11,13 @@
 
 #include <cmath>
 #include <cstdio>
-#include <ctime>
 #include <functional>
 #include <map>
 #include <memory>
 #include <string>
 #include <vector>
 
+#include "tangible/math/cpu_time.h"
 #include "tangible/simulation/derivatives/rollout_adjoint.h"
 #include "tangible/verification/cost/benchmark_scenes.h"
 #include "tangible/verification/cost/peers.h"
@@ -33,12 +33,6 @@ struct Family {
   std::vector<int> sizes;
   std::vector<int> peer_sizes;
 };
-
-double CpuSeconds() {
-  timespec time;
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
-  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
-}
 
 double HeapMegabytes() { return 1e-6 * static_cast<double>(mallinfo2().uordblks); }
 
@@ -138,20 +132,20 @@ void TimeAdjoint(benchmark::State& state, const Family& family, int size) {
   State<double> final;
   double rollout = HUGE_VAL;
   for (int i = 0; i < 3; ++i) {
-    const double start = CpuSeconds();
+    const double start = ThreadCpuSeconds();
     Rollout(model, run.state, StateObserver(), &stepper, &final);
-    rollout = std::min(rollout, CpuSeconds() - start);
+    rollout = std::min(rollout, ThreadCpuSeconds() - start);
   }
   RolloutTape tape;
   RowMatrixXd w_bar;
   const long last = NumSteps(scene.simulation);
   double best = HUGE_VAL;
   for (auto _ : state) {
-    const double start = CpuSeconds();
+    const double start = ThreadCpuSeconds();
     tape.Record(model, run.state, Factorisations::kKeep, StateObserver(), &final);
     tape.Adjoint(
         model, 1, [&](long k, RowMatrixXd* w) { (*w)(0, 0) += k == last ? 1.0 : 0.0; }, &w_bar);
-    best = std::min(best, CpuSeconds() - start);
+    best = std::min(best, ThreadCpuSeconds() - start);
   }
   state.counters["rollouts"] = best / rollout;
   state.counters["MB"] = 1e-6 * static_cast<double>(tape.bytes());

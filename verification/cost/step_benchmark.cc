@@ -7,11 +7,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <ctime>
 #include <string>
 #include <vector>
 
 #include "tangible/dynamics/model/parameter_map.h"
+#include "tangible/math/cpu_time.h"
 #include "tangible/scene/scene_json.h"
 #include "tangible/simulation/derivatives/rollout_adjoint.h"
 #include "tangible/simulation/derivatives/rollout_tangent.h"
@@ -19,12 +19,6 @@
 
 namespace tangible {
 namespace {
-
-double CpuSeconds() {
-  timespec time;
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
-  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
-}
 
 Scene Chain() {
   Scene scene;
@@ -43,9 +37,9 @@ struct Case {
     State<double> final;
     double best = HUGE_VAL;
     for (int i = 0; i < 10; ++i) {
-      const double start = CpuSeconds();
+      const double start = ThreadCpuSeconds();
       Rollout(model, initial, StateObserver(), &stepper, &final);
-      best = std::min(best, CpuSeconds() - start);
+      best = std::min(best, ThreadCpuSeconds() - start);
     }
     return best;
   }
@@ -60,9 +54,9 @@ void BenchmarkRollout(benchmark::State& state, const Scene& scene) {
   State<double> final;
   double best = HUGE_VAL;
   for (auto _ : state) {
-    const double start = CpuSeconds();
+    const double start = ThreadCpuSeconds();
     benchmark::DoNotOptimize(Rollout(c.model, c.initial, StateObserver(), &stepper, &final));
-    best = std::min(best, CpuSeconds() - start);
+    best = std::min(best, ThreadCpuSeconds() - start);
   }
   state.counters["us_per_step"] = 1e6 * best / static_cast<double>(NumSteps(scene.simulation));
 }
@@ -83,10 +77,10 @@ void BenchmarkAdjoint(benchmark::State& state, const Scene& scene, Factorisation
   };
   double best = HUGE_VAL;
   for (auto _ : state) {
-    const double start = CpuSeconds();
+    const double start = ThreadCpuSeconds();
     tape.Record(c.model, c.initial, factorisations, StateObserver(), &final);
     tape.Adjoint(c.model, 1, seed, &w_bar);
-    best = std::min(best, CpuSeconds() - start);
+    best = std::min(best, ThreadCpuSeconds() - start);
   }
   state.counters["rollouts"] = best / rollout;
   state.counters["tape_MB"] = 1e-6 * static_cast<double>(tape.bytes());
@@ -102,9 +96,9 @@ void BenchmarkTangent(benchmark::State& state, const Scene& scene) {
   for (auto _ : state) {
     RowMatrixXd w_dot = RowMatrixXd::Zero(c.model.structure->num_variables(), width);
     w_dot.topRows(width).setIdentity();
-    const double start = CpuSeconds();
+    const double start = ThreadCpuSeconds();
     RolloutTangent(c.model, c.initial, TangentObserver(), &w_dot, &final);
-    best = std::min(best, CpuSeconds() - start);
+    best = std::min(best, ThreadCpuSeconds() - start);
   }
   state.counters["rollouts"] = best / rollout;
 }

@@ -28,7 +28,6 @@ struct Eigen::NumTraits<adouble> : Eigen::NumTraits<double> {
 };
 
 #include <algorithm>
-#include <ctime>
 #include <new>
 
 #include "tangible/dynamics/assembly/assembly_inl.h"
@@ -37,6 +36,7 @@ struct Eigen::NumTraits<adouble> : Eigen::NumTraits<double> {
 #include "tangible/geometry/contact_geometry_inl.h"
 #include "tangible/lcp/contact/contact_interior_point_iteration_inl.h"
 #include "tangible/lcp/system/block_lu_inl.h"
+#include "tangible/math/cpu_time.h"
 #include "tangible/simulation/stepping/step_unrolled_inl.h"
 
 namespace tangible::cost {
@@ -49,12 +49,6 @@ constexpr unsigned kOperations = 64u << 20;
 constexpr unsigned kLocations = 112u << 20;
 constexpr unsigned kValues = 16u << 20;
 constexpr unsigned kCoefficients = 32u << 20;
-
-double Seconds() {
-  timespec time{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
-  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
-}
 
 // The indices of the terms' outputs among the state's poses and twists; empty if one has none.
 std::vector<int> PlacesOf(const ModelStructure& structure, const std::vector<LossTerm>& terms) {
@@ -195,10 +189,10 @@ GradientResult TapeLossGradient(const Scene& scene, const std::vector<ParameterP
   }
   Stepper stepper(model);
   for (int i = 0; i < std::max(1, repeat); ++i) {
-    double start = Seconds();
+    double start = ThreadCpuSeconds();
     result.message = Rollout(model, initial, {}, &stepper, &final).message;
-    result.all_rollout_seconds.push_back(Seconds() - start);
-    start = Seconds();
+    result.all_rollout_seconds.push_back(ThreadCpuSeconds() - start);
+    start = ThreadCpuSeconds();
     const std::vector<double> bar =
         TapedRollout(model, initial, terms, places).Gradient(&result.loss, &result.message);
     if (bar.empty()) {
@@ -207,7 +201,7 @@ GradientResult TapeLossGradient(const Scene& scene, const std::vector<ParameterP
     const Eigen::SparseMatrix<double> map = VariableJacobian(scene, model.structure, directions);
     result.gradient = map.transpose() * Eigen::Map<const VectorX<double>>(
                                             bar.data(), static_cast<Eigen::Index>(bar.size()));
-    result.all_seconds.push_back(Seconds() - start);
+    result.all_seconds.push_back(ThreadCpuSeconds() - start);
   }
   const auto best = [](const std::vector<double>& times) {
     return *std::min_element(times.begin(), times.end());

@@ -97,7 +97,7 @@ Finding SwingingChain(const std::string& stepping, double end_mass, Waves waves,
   const double change = (run.energy_end - run.energy_start) / run.energy_scale;
   finding.figures.push_back({"energy change over the largest kinetic energy", change,
                              stepping == "fixed" ? kReported : 1e-2, "1",
-                             stepping == "fixed" ? "a step of first order: told, not bounded"
+                             stepping == "fixed" ? "no bound: the step is of first order"
                                                  : "no force does work but gravity"});
   AddGradient(scene, 5,
               {"bodies/" + scene.bodies.back().name + "/mass", "gravity/y", "joints/pin0/angle"},

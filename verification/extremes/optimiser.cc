@@ -104,9 +104,9 @@ Finding NotNumbers(const std::string& stepping) {
     }
   }
   Finding finding;
-  finding.note = std::to_string(refused) + " of " + std::to_string(tried) + " told" +
+  finding.note = std::to_string(refused) + " of " + std::to_string(tried) + " reported" +
                  (first.empty() ? "" : "; silent: " + first);
-  finding.figures.push_back({"results that are not numbers and not told",
+  finding.figures.push_back({"results that are not numbers and not reported",
                              static_cast<double>(silent), 0.0, "1", "never a silent NaN"});
   return finding;
 }

@@ -53,7 +53,7 @@ Finding ZenoBall(const std::string& stepping) {
   finding.figures.push_back({"error of the time of rest", last_motion - stops,
                              stepping == "fixed" ? kReported : 0.011, "s",
                              stepping == "fixed"
-                                 ? "a fixed step turns up to v h above the floor: told"
+                                 ? "no bound: a fixed step rebounds up to v h above the floor"
                                  : "1.354 s, to a step"});
   finding.figures.push_back({"energy gain", run.energy_gain, 1e-9, "J", "e < 1"});
   // The gradient covers the first three bounces; the end of the motion is a jump at the threshold.
@@ -149,10 +149,10 @@ Finding SpacedCradle(const std::string& stepping, int count) {
   for (int i = 0; i + 1 < count; ++i) {
     off = std::max(off, std::abs(run.vx("ball" + std::to_string(i))));
   }
-  finding.figures.push_back({"error of the velocities (0, ..., 0, 1)", off,
-                             stepping == "fixed" ? kReported : 1e-9, "m/s",
-                             stepping == "fixed" ? "told: gaps within a step are one impact"
-                                                 : "equal masses exchange velocities"});
+  finding.figures.push_back(
+      {"error of the velocities (0, ..., 0, 1)", off, stepping == "fixed" ? kReported : 1e-9, "m/s",
+       stepping == "fixed" ? "no bound: gaps that close within a step are one impact"
+                           : "equal masses exchange velocities"});
   finding.figures.push_back({"energy gain over energy", run.energy_gain / run.energy_start, 1e-9,
                              "1", "e = 1 without friction"});
   AddGradient(scene, 10, {"bodies/ball0/velocity/x", "bodies/ball1/mass", "bodies/ball2/mass"},

@@ -43,15 +43,15 @@ Finding AgainstWall(const std::string& stepping, Flyer flyer, double speed, doub
   Finding finding;
   AddDone(run, &finding);
   const bool speculative_box = stepping == "fixed" && flyer != Flyer::kDisc;
-  finding.figures.push_back(
-      {"furthest centre beyond the wall's middle", std::max(0.0, furthest),
-       speculative_box ? kReported : 0.0, "m",
-       speculative_box ? "rows are those of the step's start: told" : "nothing goes through"});
+  finding.figures.push_back({"furthest centre beyond the wall's middle", std::max(0.0, furthest),
+                             speculative_box ? kReported : 0.0, "m",
+                             speculative_box ? "no bound: rows are those of the start of the step"
+                                             : "nothing goes through"});
   // A box's corner may turn into the wall within a fixed step.
-  finding.figures.push_back(
-      {"penetration", run.penetration,
-       stepping == "fixed" ? kReported : 1e-9 * (1.0 + 1e-3 * speed), "m",
-       stepping == "fixed" ? "told; of first order in h" : "the time of an impact to rounding"});
+  finding.figures.push_back({"penetration", run.penetration,
+                             stepping == "fixed" ? kReported : 1e-9 * (1.0 + 1e-3 * speed), "m",
+                             stepping == "fixed" ? "no bound: of first order in h"
+                                                 : "the time of an impact to rounding"});
   finding.figures.push_back({"energy gain over energy", run.energy_gain / run.energy_start,
                              flyer == Flyer::kDisc || restitution == 0.0 ? 1e-9 : kReported, "1",
                              "no gain without friction's help (Newton's law)"});

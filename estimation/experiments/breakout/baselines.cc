@@ -5,7 +5,7 @@
 #include <memory>
 
 #include "tangible/estimation/experiments/breakout/agent/detector.h"
-#include "tangible/estimation/experiments/random.h"
+#include "tangible/math/random.h"
 
 namespace tangible {
 namespace {
@@ -14,10 +14,10 @@ constexpr double kDeadBand = 6.0;   // pixels: a press moves the paddle by more
 constexpr int kLoopPictures = 400;  // without points: about four returns of a fast ball
 constexpr double kAside = 5.0;      // pixels from the paddle's middle
 
-// Sees the ball and moves the paddle's middle to a place.
+// Detects the ball and moves the middle of the paddle to a place.
 class Seer {
  public:
-  // False where there is nothing to do but to serve.
+  // Returns false where the only useful button is the serve.
   bool See(const Picture& picture) {
     if (!detector_.started() && !detector_.Start(picture)) return false;
     const Sight sight = detector_.Look(picture);
@@ -32,7 +32,8 @@ class Seer {
     return off > kDeadBand ? Button::kRight : off < -kDeadBand ? Button::kLeft : Button::kNone;
   }
   double BallMiddle() const { return ball_.x + 0.5 * ball_.width; }
-  /// Where the ball's middle comes down if only side walls are met; as it is while it rises.
+  /// The place at which the middle of the ball comes down if it meets side walls only; its current
+  /// place while it rises.
   double ComesDown() const {
     const double vx = ball_.x - last_.x, vy = ball_.y - last_.y;
     if (last_.y < 0 || vy <= 0.0) return BallMiddle();

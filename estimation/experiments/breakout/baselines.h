@@ -15,7 +15,7 @@
 
 namespace tangible {
 
-/// The next button, from the picture, the points since the last one and the lives.
+/// The next button, from the picture, the points since the last picture, and the lives.
 using Player = std::function<Button(const Picture&, double, int)>;
 
 Player RandomPlayer(unsigned seed);

@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <mutex>
 
-#include "tangible/estimation/experiments/random.h"
 #include "tangible/estimation/fit/linearisation.h"
+#include "tangible/math/random.h"
 
 namespace tangible {
 namespace {
@@ -14,7 +14,7 @@ constexpr int kMostNoOps = 30;
 constexpr long kFirstPoints = 400, kLaterPoints = 1000;  // frames between points of a curve
 constexpr long kFirstPart = 4000;                        // frames, with the closer points
 
-// Tasks of a seed, beside those of the players.
+// Tasks of a seed, in addition to those of the players.
 constexpr unsigned kNoOpTask = 10, kStickyTask = 11, kPracticeTask = 12;
 
 CurvePoint PointOf(const Agent& agent, long frames_seen, int score) {
@@ -26,7 +26,7 @@ CurvePoint PointOf(const Agent& agent, long frames_seen, int score) {
   return point;
 }
 
-// Random play in games of its own; returns the frames.
+// Plays at random in separate games; returns the number of frames.
 long Practise(const BreakoutCase& one, unsigned seed, int steps, Agent* agent,
               std::vector<CurvePoint>* curve) {
   BreakoutGame game({one.sticky, static_cast<unsigned>(Generator(seed, kPracticeTask)())});
@@ -116,7 +116,7 @@ BreakoutResults RunBreakout(const BreakoutStudyOptions& options,
   std::mutex mutex;
   long done = 0;
   const int tasks = num_cases * options.games;
-  // The cases of a game follow each other, so that progress is even.
+  // The cases of the same game follow each other, so that progress is steady.
   ForEachOnThreads(options.threads, tasks, [&](int task) {
     const int one = task % num_cases, number = task / num_cases;
     results[one][number] = PlayBreakout(

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// How soon Breakout is learned, and how well it is then played: the agent after so many frames of
-// random play beside players that learn nothing, in the same seeded games.
+// How many frames it takes to learn Breakout, and how well it is then played: the agent after a
+// number of frames of random play, beside players that learn nothing, in the same seeded games.
 
 #include <functional>
 #include <memory>
@@ -34,7 +34,7 @@ struct BreakoutStudyOptions {
   int threads = 0;                           ///< 0: one a core
 };
 
-/// What was so after so many frames.
+/// The state of a game and of the knowledge after a number of frames.
 struct CurvePoint {
   long frames_seen = 0;  ///< at 60 a second, of random play and of the game
   int score = 0;
@@ -53,13 +53,13 @@ struct BreakoutResult {
   std::string error;              ///< why the agent could not play
 };
 
-/// results[case][game]; `progress` is called with how many of how many games are done, by one
-/// thread at a time.
+/// results[case][game]; `progress` is called with the number of games that are done and with that
+/// of all, by one thread at a time.
 using BreakoutResults = std::vector<std::vector<BreakoutResult>>;
 BreakoutResults RunBreakout(const BreakoutStudyOptions& options,
                             const std::function<void(long, long)>& progress);
 
-/// Called before each button is held, with what is on the screen.
+/// Called before each button is held, with the picture on the screen.
 using GameWatcher = std::function<void(const BreakoutGame&, const Agent*)>;
 
 /// One game of a case.
@@ -69,7 +69,7 @@ BreakoutResult PlayBreakout(const BreakoutCase& one, unsigned seed, long most_fr
 /// The number of frames without a button with which a seed's game begins.
 int NoOpFrames(unsigned seed);
 
-/// Of the scores of games.
+/// The median of the scores of games.
 double MedianScore(const std::vector<BreakoutResult>& games);
 double MeanScore(const std::vector<BreakoutResult>& games);
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// A game as a page that plays it: every picture that the agent saw, and where it expected the ball.
+// A page that replays a game: every picture that the agent saw, and the expected place of the ball.
 
 #include <string>
 #include <vector>
@@ -13,7 +13,7 @@ namespace tangible {
 
 class Replay {
  public:
-  /// The game as it is; `agent` may be null.
+  /// Adds the current picture of the game; `agent` may be null.
   void Add(const BreakoutGame& game, const Agent* agent);
   /// The page; `below` is HTML under the game.
   std::string Html(const std::string& title, const std::string& below) const;

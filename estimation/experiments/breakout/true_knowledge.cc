@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "tangible/estimation/experiments/breakout/game/breakout_game.h"
-#include "tangible/estimation/experiments/random.h"
+#include "tangible/math/random.h"
 
 namespace tangible {
 namespace {
@@ -33,7 +33,7 @@ BreakoutGame::State InPlay(int speed, int right, int down) {
   return state;
 }
 
-// One frame of a game in that state.
+// Advances a game in that state by one frame.
 BreakoutGame::State AfterFrame(const BreakoutGame::State& state) {
   BreakoutGame game({});
   game.Reset(0);
@@ -42,7 +42,7 @@ BreakoutGame::State AfterFrame(const BreakoutGame::State& state) {
   return game.state();
 }
 
-// visit(before, after, offset): all returns of both paddles.
+// Calls visit(before, after, offset) for all returns of both paddles.
 template <typename Visit>
 void VisitReturns(const Visit& visit) {
   for (int speed = 0; speed < breakout::kNumSpeeds; ++speed) {
@@ -62,7 +62,7 @@ void VisitReturns(const Visit& visit) {
   }
 }
 
-// visit(before, after, row): bricks of every row from below.
+// Calls visit(before, after, row) for bricks of every row that are met from below.
 template <typename Visit>
 void VisitBricks(const Visit& visit) {
   for (int speed = 0; speed < breakout::kNumSpeeds; ++speed) {
@@ -92,7 +92,7 @@ double TrueWay(int first, int second, int third) {
   return state.paddle_x - kMiddle;
 }
 
-// visit(first, second, third): all sequences of three directions.
+// Calls visit(first, second, third) for all sequences of three directions.
 template <typename Visit>
 void VisitButtons(const Visit& visit) {
   for (int first = -1; first <= 1; ++first) {
@@ -110,7 +110,7 @@ Knowledge TrueKnowledge() {
   Knowledge knowledge;
   PaddleModel& paddle =
       knowledge.paddle.emplace(breakout::kLeft, breakout::kRight - breakout::kPaddleWidth);
-  // Random buttons until every sequence of three was there often; nothing is served.
+  // Random buttons until every sequence of three has occurred often; the ball is not served.
   BreakoutGame game({});
   game.Reset(0);
   std::mt19937_64 random = Generator(0, 0);

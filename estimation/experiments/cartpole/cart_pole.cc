@@ -7,12 +7,12 @@
 #include <cmath>
 #include <vector>
 
+#include "tangible/estimation/experiments/cartpole/tolerances.h"
+
 namespace tangible {
 namespace {
 
 constexpr double kGravity = 9.81;
-/// Of the integrator: absolute and relative error of a step.
-constexpr double kIntegrationError = 1e-12;
 
 class EquationPlant : public CartPolePlant {
  public:

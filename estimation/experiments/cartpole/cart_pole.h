@@ -2,8 +2,9 @@
 #pragma once
 //
 // Cart and pole: a cart on a straight rail, pushed along it by a force u, and a uniform pole hinged
-// to it. Here it is what is controlled, the plant, and not the engine. With the angle φ of the pole
-// from upright, counter-clockwise, a = length / 2 and I the pole's inertia about its centre,
+// to it. This is the plant, which is controlled, and does not use the engine. With the angle φ of
+// the pole from upright, counter-clockwise, a = length / 2, and the inertia I of the pole about its
+// centre,
 //
 //   (M + m) v' − m a cos φ ω' + m a sin φ ω² = u − b v
 //   −m a cos φ v' + (I + m a²) ω' = m g a sin φ − c ω
@@ -36,14 +37,14 @@ using CartPoleState = Eigen::Vector4d;
 /// The derivative of the state.
 CartPoleState CartPoleRates(const CartPole& numbers, const CartPoleState& state, double force);
 
-/// What is controlled.
+/// The system that is controlled.
 class CartPolePlant {
  public:
   CartPolePlant() = default;
   virtual ~CartPolePlant() = default;
   CartPolePlant(const CartPolePlant&) = delete;
   CartPolePlant& operator=(const CartPolePlant&) = delete;
-  /// The state after `seconds` under a force that is held.
+  /// The state after `seconds` under a constant force.
   virtual CartPoleState Advance(const CartPoleState& state, double force, double seconds) = 0;
 };
 

@@ -2,25 +2,19 @@
 #include "tangible/estimation/experiments/cartpole/cart_pole_control.h"
 
 #include <cmath>
-#include <ctime>
 #include <numbers>
 
-#include "tangible/estimation/experiments/random.h"
+#include "tangible/math/cpu_time.h"
+#include "tangible/math/random.h"
 
 namespace tangible {
 namespace {
 
-// What a success is.
+// The bounds of a successful swing-up.
 constexpr double kUprightAngle = 0.2, kMiddle = 0.5, kUprightTime = 2.0;
-// N: where the first plan starts. At rest hanging down no force is a stationary plan.
+// N: the controls from which the first plan starts. For a pole that hangs at rest, a plan without
+// force is stationary.
 constexpr double kFirstForce = 1.0;
-
-// s: of this thread alone.
-double CpuSeconds() {
-  timespec time{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
-  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
-}
 
 CostTerm Term(CostTerm::Kind kind, int index, double weight, bool at_end) {
   CostTerm term;
@@ -58,9 +52,9 @@ SwingUp RunSwingUp(StepMap* model, CartPolePlant* plant, const CartPoleState& st
   run.success = true;
   for (int k = 0; k < options.steps; ++k) {
     run.states.push_back(state);
-    const double began = CpuSeconds();
+    const double began = ThreadCpuSeconds();
     const double force = controller.Control(k, state)[0];
-    run.cpu_seconds.push_back(CpuSeconds() - began);
+    run.cpu_seconds.push_back(ThreadCpuSeconds() - began);
     run.forces.push_back(force);
     state = plant->Advance(state, force, kCartPoleStep);
     run.reward += 0.5 * (1.0 + std::cos(state[1])) / options.steps;

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// Swing-up and balance by plans over a receding horizon of 1 s, made anew every 20 ms from the
-// state of the plant, with whatever model of the plant there is.
+// Swing-up and balance by plans over a receding horizon of 1 s. A new plan is made every 20 ms from
+// the state of the plant, with any model of it.
 
 #include <vector>
 
@@ -27,14 +27,14 @@ struct SwingUp {
   bool success = false;
 };
 
-/// The cost of plans: upright in the middle of the rail, at rest.
+/// The cost of plans, whose target is the upright pole at rest in the middle of the rail.
 Cost SwingUpCost();
 
-/// `model`: 4 states, 1 control, as CartPoleStep.
+/// `model` has 4 states and 1 control, as CartPoleStep.
 SwingUp RunSwingUp(StepMap* model, CartPolePlant* plant, const CartPoleState& start,
                    const SwingUpOptions& options);
 
-/// One of many starts: x in ±0.5 m, any angle, v in ±0.5 m/s, ω in ±2 rad/s.
+/// A random start: x in ±0.5 m, any angle, v in ±0.5 m/s, ω in ±2 rad/s.
 CartPoleState RandomStart(unsigned seed, unsigned number);
 
 }  // namespace tangible

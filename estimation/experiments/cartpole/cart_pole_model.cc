@@ -7,7 +7,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "tangible/estimation/experiments/random.h"
+#include "tangible/math/random.h"
 
 namespace tangible {
 namespace {

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// The engine's cart and pole: a scene of two bodies, a slider and a hinge, whose masses, length and
-// frictions are estimated from a recording, and whose steps are planned over. The engine knows the
-// structure; the numbers are learned.
+// The engine's model of cart and pole: a scene of two bodies, a slider and a hinge. Its masses,
+// length and frictions are estimated from a recording, and plans are made over its steps. The
+// structure is known, and the parameters are learned.
 
 #include <optional>
 #include <string>
@@ -15,7 +15,8 @@
 
 namespace tangible {
 
-/// Upright at rest; the force on the cart is the effort of the joint "rail".
+/// The scene, with the pole upright at rest; the force on the cart is the effort of the joint
+/// "rail".
 Scene CartPoleScene(const CartPole& numbers);
 
 /// The state of the scene's bodies.
@@ -41,22 +42,22 @@ class CartPoleStep : public StepMap {
   MatrixX<double> a_, b_;
 };
 
-/// What was seen of a plant that forces pushed: sample k at k kCartPoleStep.
+/// The measurements of a plant under known forces: sample k is at the time k kCartPoleStep.
 struct CartPoleRecording {
   std::vector<double> forces;        ///< N, held from sample k to k + 1
   RowMatrixXd positions;             ///< x (m), φ (rad) with noise: samples x 2
   std::vector<CartPoleState> truth;  ///< the same without noise
 
   int samples() const { return static_cast<int>(positions.rows()); }
-  /// Its first samples.
+  /// The first samples of the recording.
   CartPoleRecording Head(int samples) const;
 };
 
 inline constexpr double kPositionNoise = 0.001;  ///< m
 inline constexpr double kAngleNoise = 0.002;     ///< rad
 
-/// Pushes the plant, which hangs at rest, by uniformly random forces that are held for 0.1 s each,
-/// without ever interrupting it.
+/// Records the plant, which hangs at rest at first, under uniformly random forces that are held for
+/// 0.1 s each, without interruption.
 CartPoleRecording RecordRandomly(CartPolePlant* plant, int samples, unsigned seed);
 
 struct CartPoleEstimate {
@@ -66,11 +67,11 @@ struct CartPoleEstimate {
   bool ok = false;
 };
 
-/// Masses, length and frictions with the state at the start, from wrong initial values: masses 1,
-/// length 1, dampings 0.02.
+/// Fits masses, length, frictions and the state at the start, from wrong initial values: masses 1
+/// kg, length 1 m, dampings 0.02.
 CartPoleEstimate EstimateCartPole(const CartPoleRecording& recording);
 
-/// The five numbers in the order of the estimate's.
+/// The five parameters in the order of the estimate.
 std::vector<double> NumbersOf(const CartPole& numbers);
 
 }  // namespace tangible

@@ -9,8 +9,9 @@
 #include <mutex>
 #include <numbers>
 
-#include "tangible/estimation/experiments/random.h"
+#include "tangible/estimation/experiments/cartpole/tolerances.h"
 #include "tangible/estimation/fit/linearisation.h"
+#include "tangible/math/random.h"
 
 namespace tangible {
 namespace {
@@ -19,7 +20,6 @@ constexpr int kTestSamples = 400;        // of the motion that is predicted
 constexpr unsigned kTestSeed = 1000000;  // beyond those of recordings
 constexpr int kMembers = 5;              // of the ensemble
 constexpr int kRepetitions = 20;         // of timings
-constexpr double kDifference = 1e-6;     // of states and forces
 
 const CartPoleState kHanging(0.0, std::numbers::pi, 0.0, 0.0);
 
@@ -27,7 +27,7 @@ Eigen::Vector2d Tip(const CartPole& numbers, const VectorX<double>& x) {
   return {x[0] - numbers.length * std::sin(x[1]), numbers.length * std::cos(x[1])};
 }
 
-// Over all windows of the test motion.
+// The errors over all windows of the test motion.
 std::vector<double> PredictionErrors(StepMap* model, const CartPole& truth,
                                      const CartPoleRecording& test) {
   std::vector<double> sums(std::size(kHorizons), 0.0);
@@ -82,7 +82,7 @@ CartPoleCell EvaluateEngine(const CartPoleRecording& recording, const CartPoleSt
   return cell;
 }
 
-// Calls `work` for each number below `count` on threads, and the progress after each.
+// Calls `work` for each number below `count` on several threads, and `progress` after each.
 void ForEachTask(int threads, int count, const std::function<void(int)>& work,
                  const std::function<void(long, long)>& progress) {
   std::mutex mutex;
@@ -110,7 +110,7 @@ double LeastTime(const std::function<void()>& call) {
   return least;
 }
 
-// The engine's step with Jacobians by central differences of it.
+// The engine's step with Jacobians by central differences.
 class DifferencedStep : public StepMap {
  public:
   explicit DifferencedStep(StepMap* map) : map_(map) {}
@@ -129,10 +129,10 @@ class DifferencedStep : public StepMap {
       VectorX<double> ends[2];
       for (const int end : {0, 1}) {
         VectorX<double> at = x, force = u;
-        (i < n ? at[i] : force[i - n]) += end == 0 ? -kDifference : kDifference;
+        (i < n ? at[i] : force[i - n]) += end == 0 ? -kMapDifference : kMapDifference;
         if (!map_->Step(k, at, force, &ends[end], error)) return false;
       }
-      (i < n ? a->col(i) : b->col(i - n)) = (ends[1] - ends[0]) / (2.0 * kDifference);
+      (i < n ? a->col(i) : b->col(i - n)) = (ends[1] - ends[0]) / (2.0 * kMapDifference);
     }
     return map_->Step(k, x, u, next, error);
   }
@@ -156,7 +156,7 @@ CartPoleCurves RunCurves(const CartPoleStudyOptions& options,
   const int counts = static_cast<int>(options.samples.size());
   CartPoleCurves curves(counts, std::vector<std::vector<CartPoleCell>>(options.seeds));
   const auto work = [&](int task) {
-    // The longest first, so that the threads end together.
+    // The longest tasks come first, so that all threads end at about the same time.
     const int count = counts - 1 - task / options.seeds, seed = task % options.seeds;
     const std::unique_ptr<CartPolePlant> plant = MakePlant(options.plant, options.truth);
     const CartPoleRecording recording =
@@ -270,7 +270,7 @@ Quartiles QuartilesOf(std::vector<double> values) {
     const auto below = static_cast<size_t>(place);
     const size_t above = std::min(below + 1, values.size() - 1);
     const double part = place - static_cast<double>(below);
-    // Where both are infinite their difference is no number.
+    // If both are infinite, their difference is not a number.
     return part == 0.0 ? values[below] : (1.0 - part) * values[below] + part * values[above];
   };
   return {at(0.25), at(0.5), at(0.75)};

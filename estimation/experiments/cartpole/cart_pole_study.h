@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// How soon a cart and pole is learned and swung up: the engine beside perceptrons.
+// How many samples it takes to learn and to swing up a cart and pole, with the engine and with
+// perceptrons.
 //
 //   curves    for several seeds and numbers of samples of random motion: prediction errors 1 to 100
 //             steps ahead, and the reward of swing-ups planned with what was learned
-//   coverage  over many seeds: which of the 95 % intervals contain the true numbers
-//   swing-ups from many random starts, with the true and with learned numbers
+//   coverage  over many seeds: which of the 95 % intervals contain the true parameters
+//   swing-ups from many random starts, with the true and with learned parameters
 
 #include <functional>
 #include <memory>
@@ -41,7 +42,7 @@ inline constexpr const char* kCartPoleModels[] = {"engine", "perceptron", "ensem
 inline constexpr int kNumCartPoleModels = 3;
 inline constexpr int kHorizons[] = {1, 2, 5, 10, 20, 50, 100};  ///< steps
 
-/// One model from one recording's first samples.
+/// The results of one model that was learned from the first samples of one recording.
 struct CartPoleCell {
   std::vector<double> errors;  ///< by horizon: rms distance of the pole's tip from the truth, m
   double reward = 0.0;         ///< of a swing-up from rest
@@ -54,7 +55,8 @@ struct CartPoleCell {
 /// cells[samples][seed][model].
 using CartPoleCurves = std::vector<std::vector<std::vector<CartPoleCell>>>;
 
-/// `progress` is called with how many of how many recordings are done, by one thread at a time.
+/// `progress` is called with the number of recordings that are done and with that of all, by one
+/// thread at a time.
 CartPoleCurves RunCurves(const CartPoleStudyOptions& options,
                          const std::function<void(long, long)>& progress);
 
@@ -63,7 +65,7 @@ struct CartPoleCoverage {
   std::vector<int> covered;         ///< of each number
   std::vector<double> largest_off;  ///< of each number, relative
 };
-/// With as many samples as given.
+/// The coverage with the given number of samples.
 CartPoleCoverage RunCoverage(const CartPoleStudyOptions& options, int seeds, int samples,
                              const std::function<void(long, long)>& progress);
 
@@ -71,7 +73,7 @@ struct SwingUpTable {
   int starts = 0, with_truth = 0, with_learned = 0;
   std::vector<double> cpu_seconds;  ///< of all plans with learned numbers, ascending
 };
-/// Each start with its own recording of so many samples.
+/// Each start has its own recording with the given number of samples.
 SwingUpTable RunSwingUps(const CartPoleStudyOptions& options, int starts, int samples,
                          const std::function<void(long, long)>& progress);
 
@@ -84,7 +86,7 @@ struct PlanCost {
 };
 PlanCost MeasurePlan(const CartPoleStudyOptions& options);
 
-/// Lower quartile, median, upper quartile.
+/// The lower quartile, the median and the upper quartile.
 struct Quartiles {
   double low = 0.0, median = 0.0, high = 0.0;
 };

@@ -5,7 +5,8 @@
 #include <cmath>
 #include <limits>
 
-#include "tangible/estimation/experiments/random.h"
+#include "tangible/estimation/experiments/cartpole/tolerances.h"
+#include "tangible/math/random.h"
 
 namespace tangible {
 namespace {
@@ -13,7 +14,6 @@ namespace {
 constexpr int kInputs = 5;
 constexpr int kAhead = 10;                // steps, of the comparison of candidates
 constexpr double kValidationShare = 0.2;  // of the recording, at its end
-constexpr double kLeastDeviation = 1e-9;  // of a number that hardly varies: not scaled further
 
 Eigen::VectorXd InputOf(const VectorX<double>& x, double u) {
   Eigen::VectorXd input(kInputs);
@@ -21,7 +21,7 @@ Eigen::VectorXd InputOf(const VectorX<double>& x, double u) {
   return input;
 }
 
-// What speeds that stay the same make of a state.
+// The state after a step at constant speeds.
 VectorX<double> Coasting(const VectorX<double>& x) {
   VectorX<double> next = x;
   next.head(2) += kCartPoleStep * x.tail(2);
@@ -60,8 +60,8 @@ double ValidationError(StepMap* step, const CartPoleRecording& recording, int fi
 }  // namespace
 
 RowMatrixXd SmoothedStates(const CartPoleRecording& recording, int half_window) {
-  // Of the normal equations of a quadratic over j = −w … w, by symmetry: the slope is
-  // Σ j y / Σ j², the value (Σ j⁴ Σ y − Σ j² Σ j² y) / (n Σ j⁴ − (Σ j²)²).
+  // From the normal equations of a quadratic over j = −w … w, by symmetry: the slope is Σ j y / Σ
+  // j², the value (Σ j⁴ Σ y − Σ j² Σ j² y) / (n Σ j⁴ − (Σ j²)²).
   const int w = half_window, n = 2 * w + 1;
   double second = 0.0, fourth = 0.0;
   for (int j = -w; j <= w; ++j) {

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// A model of cart and pole that knows of mechanics only that speeds move positions: perceptrons map
-// (sin φ, cos φ, v, ω, u) to the change of (x, φ, v, ω) over a step beyond that of positions at
-// constant speeds, each number scaled by its standard deviation in the recording. Speeds, which
-// nobody measures, are the slopes of quadratic polynomials that are fitted to the positions around
-// each sample (Savitzky, Golay 1964). An ensemble's prediction is the mean of its members', which
-// are trained on bootstrap samples.
+// A model of cart and pole whose only mechanical prior is that speeds change positions: perceptrons
+// map (sin φ, cos φ, v, ω, u) to the change of (x, φ, v, ω) over a step beyond that at constant
+// speeds. Inputs and outputs are scaled by their standard deviations in the recording. Speeds,
+// which are not measured, are the slopes of quadratic polynomials that are fitted to the positions
+// around each sample (Savitzky, Golay 1964). The prediction of an ensemble is the mean of those of
+// its members, which are trained on bootstrap samples.
 
 #include <string>
 #include <vector>
@@ -25,7 +25,7 @@ struct LearnedStepOptions {
 
 class LearnedStep : public StepMap {
  public:
-  /// Trains on all samples of the recording but those at its ends.
+  /// Trains on all samples of the recording except those at its ends.
   LearnedStep(const CartPoleRecording& recording, const LearnedStepOptions& options);
 
   int num_states() const override { return 4; }
@@ -43,9 +43,9 @@ class LearnedStep : public StepMap {
 /// States with smoothed positions and slopes; NaN where the window leaves the recording.
 RowMatrixXd SmoothedStates(const CartPoleRecording& recording, int half_window);
 
-/// Width, depth and rate of Adam, and the window, that predict best ten steps ahead from smoothed
-/// states on the last fifth of the recording, trained on the rest: against observed positions in
-/// multiples of their noise. `tried` gets how many were compared.
+/// The width, depth, rate of Adam and window with the best predictions on the last fifth of the
+/// recording after training on the rest: ten steps ahead from smoothed states, compared with
+/// observed positions in multiples of their noise. `tried` gets the number of candidates.
 LearnedStepOptions TuneLearnedStep(const CartPoleRecording& recording, int updates, int* tried);
 
 }  // namespace tangible

@@ -5,13 +5,14 @@
 #include <cmath>
 #include <numbers>
 
-#include "tangible/estimation/experiments/random.h"
+#include "tangible/estimation/experiments/cartpole/tolerances.h"
+#include "tangible/math/random.h"
 
 namespace tangible {
 namespace {
 
-// Adam's, as its authors have them.
-constexpr double kFirstMoment = 0.9, kSecondMoment = 0.999, kDivisor = 1e-8;
+// The constants of Adam, as its authors recommend them.
+constexpr double kFirstMoment = 0.9, kSecondMoment = 0.999;
 
 }  // namespace
 
@@ -102,7 +103,7 @@ void Perceptron::Train(const Eigen::MatrixXd& inputs, const Eigen::MatrixXd& tar
     const double rate =
         0.5 * options_.rate * (1.0 + std::cos(std::numbers::pi * update / options_.updates));
     weights_.array() -= rate * first.array() / (1.0 - first_left) /
-                        ((second.array() / (1.0 - second_left)).sqrt() + kDivisor);
+                        ((second.array() / (1.0 - second_left)).sqrt() + kAdamDivisor);
   }
 }
 

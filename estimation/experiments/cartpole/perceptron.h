@@ -23,11 +23,11 @@ class Perceptron {
  public:
   Perceptron(int inputs, int outputs, const PerceptronOptions& options);
 
-  /// Outputs of a batch: a column a sample.
+  /// The outputs for a batch, a column for each sample.
   Eigen::MatrixXd Evaluate(const Eigen::MatrixXd& inputs) const;
   /// y and ∂y/∂z (outputs x inputs) of one sample.
   Eigen::VectorXd Evaluate(const Eigen::VectorXd& input, Eigen::MatrixXd* jacobian) const;
-  /// ½ mean squared error over the batch and its gradient by all weights.
+  /// Half the mean squared error over the batch, and its gradient with respect to all weights.
   double Loss(const Eigen::MatrixXd& inputs, const Eigen::MatrixXd& targets,
               Eigen::VectorXd* gradient) const;
   void Train(const Eigen::MatrixXd& inputs, const Eigen::MatrixXd& targets);

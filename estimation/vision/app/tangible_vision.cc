@@ -55,7 +55,7 @@ std::string ReadBytes(const std::string& path) {
   return {std::istreambuf_iterator<char>(stream), {}};
 }
 
-// Iterations done of all cells, and the time that is left, in place on a terminal.
+// Shows the iterations done of all cells and the remaining time, in place on a terminal.
 class Watch {
  public:
   explicit Watch(long total) : total_(total), terminal_(isatty(STDERR_FILENO) != 0) {}
@@ -83,7 +83,7 @@ class Watch {
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 };
 
-// Trains the cells that are not there yet, and reads the others.
+// Trains the cells that have no results yet, and reads the results of the others.
 class Study {
  public:
   explicit Study(std::vector<StudyCell> cells) : cells_(std::move(cells)) {}
@@ -160,7 +160,7 @@ class Study {
     if (!error.empty()) return error;
     if (!saving.empty()) return saving;
     if (!result.truth.empty()) {
-      // Kept beside the result: planes of all pictures, true ones first.
+      // The pictures are kept beside the result: the planes of all pictures, true ones first.
       std::string pictures;
       for (const auto& picture : result.truth) pictures += picture;
       for (const auto& picture : result.predicted) pictures += picture;
@@ -176,7 +176,7 @@ class Study {
   std::string error_;
 };
 
-// Rows of the first cells with pictures: the truth once, then each cell's.
+// Rows of pictures of the first cells that have some: the true ones once, then those of each cell.
 std::vector<std::vector<std::string>> PictureRowsOf(const Study& study) {
   std::vector<std::vector<std::string>> rows;
   for (const StudyCell& cell : study.cells()) {
@@ -288,7 +288,7 @@ int Main(int argc, char** argv) {
   if (FLAGS_jobs < 1 || FLAGS_seed < 0) {
     return ReportError("tangible-vision: expected --jobs >= 1 and --seed >= 0", kExitUsage);
   }
-  // Torch's own threads spin where others work.
+  // The threads of torch spin while other work runs.
   at::set_num_threads(1);
   if (FLAGS_list) {
     for (const StudyCell& cell : StudyCells()) std::puts(cell.name.c_str());

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// From scene physics to the contact problem of an instant, at one of three levels:
+// Builds the contact problem of a model at one of three levels:
 //
 //   velocity       M v⁺ − Aᵀ y − Σ rᵀ λ = p     a step of length h at t, or an impact (h = 0)
 //                  M = diag(m, m, I) + h diag(c, c, c_θ) + h Σ dampers       damping is implicit
@@ -13,10 +13,10 @@
 //                  n a + ṅ v ≥ 0 ⊥ λn ≥ 0,  t a + ṫ v where it sticks
 //   correction     M δ − Aᵀ y − Σ nᵀ λn = 0,   A δ = −w C(q),   n δ = −gap(q)
 //
-// each in the form of contact_problem.h, with a (m/s²) or δ (m) in the place of v, and forces or
-// N s² in the place of impulses, so that its solvers serve. The element's equations stand in
-// equations_inl.h. Bodies that do not move have no unknowns; their prescribed twists enter the
-// constants.
+// Each has the form of contact_problem.h, with a (m/s²) or δ (m) in the place of v, and forces or N
+// s² in the place of impulses, so that the same solvers apply. The equations of each element stand
+// in equations_inl.h. Bodies that forces do not move have no unknowns; their prescribed twists
+// enter the constants.
 
 #include <vector>
 
@@ -28,20 +28,21 @@ namespace tangible {
 
 enum class Level : unsigned char { kVelocity, kAcceleration, kCorrection };
 
-/// When the equations hold, and for how long. `T`: of accelerations the time is a variable.
+/// The level, the time and the length of the step. The time is a `T` because it is a variable of
+/// accelerations.
 template <typename T>
 struct Instant {
   double t = 0.0, h = 0.0;     ///< velocity: the step's start and length, s
   bool corrects_drift = true;  ///< velocity: with Baumgarte's term, if the scene has it
   T time{0.0};                 ///< acceleration, s
-  /// Acceleration: the time at which forces' windows and pieces of signals are chosen, so that the
-  /// choice holds over a segment.
+  /// Acceleration: the time at which windows of forces and pieces of signals are chosen, so that
+  /// the choice is the same over a segment.
   double middle = 0.0;
   T recovery{0.0};  ///< correction: how far a contact of law kRecovery moves, m
 };
 
-/// What is evaluated on the way and needed again: poses, with their sines and cosines, and joint
-/// rows at the start; memory of shapes.
+/// Intermediate results that later functions use: poses with their sines and cosines, and joint
+/// rows at the start; and memory for shapes.
 template <typename T>
 struct AssemblyScratch {
   std::vector<Pose<T>> poses;
@@ -50,17 +51,17 @@ struct AssemblyScratch {
   ContactRateScratch<T> contact;
 };
 
-/// Bodies, springs, forces, dampers and joints of a step; leaves the problem without contacts. With
-/// h = 0 it is that of an impact: an instant in which no force, spring or damper acts. Without
-/// `correct_drift` Baumgarte's term is left out. Allocates
-/// nothing once its vectors have grown.
+/// Adds the bodies, springs, forces, dampers and joints of a step to a problem without contacts.
+/// With h = 0 the problem is that of an impact: an instant in which no force, spring or damper
+/// acts. Without `correct_drift` Baumgarte's term is left out. Allocates nothing once its vectors
+/// have grown.
 template <typename T>
 void AssembleFree(const Model<T>& model, const State<T>& state, double t, double h,
                   ContactProblem<T>* problem, AssemblyScratch<T>* scratch,
                   bool correct_drift = true);
 
-/// The contacts' blocks, with the given coefficients (one source a contact). `scratch` is that of
-/// AssembleFree at the same state.
+/// Adds the blocks of the contacts, with the given coefficients (one source for each contact).
+/// `scratch` is that of AssembleFree at the same state.
 template <typename T>
 void AssembleContacts(const Model<T>& model, const State<T>& state, double h,
                       const std::vector<ActiveContact>& contacts,
@@ -68,26 +69,26 @@ void AssembleContacts(const Model<T>& model, const State<T>& state, double h,
                       const std::vector<CoefficientSource>& restitution,
                       AssemblyScratch<T>* scratch, ContactProblem<T>* problem);
 
-/// The accelerations' problem at a state. The given contacts' c_n and c_t are ṅ v and ṫ v.
+/// The problem of accelerations at a state. c_n and c_t of the given contacts are ṅ v and ṫ v.
 template <typename T>
 void AssembleAcceleration(const Model<T>& model, const State<T>& state, const T& t, double middle,
                           const std::vector<ActiveContact>& contacts,
                           const std::vector<CoefficientSource>& friction,
                           AssemblyScratch<T>* scratch, ContactProblem<T>* problem);
 
-/// The corrections' problem at a pose. A contact whose law is kRecovery moves out of penetration by
-/// `recovery` (m) and no more.
+/// The problem of a correction at a pose. A contact with the law kRecovery moves out of penetration
+/// by at most `recovery` (m).
 template <typename T>
 void AssembleCorrection(const Model<T>& model, const State<T>& state,
                         const std::vector<ActiveContact>& contacts,
                         const std::vector<CoefficientSource>& friction, const T& recovery,
                         AssemblyScratch<T>* scratch, ContactProblem<T>* problem);
 
-/// The share of joint drift that a correction removes: 0, Baumgarte's fraction, or 1.
+/// The fraction of the joints' drift that a correction removes: 0, Baumgarte's fraction, or 1.
 double JointCorrectionShare(const SimulationSettings& settings);
 
-/// The constant c_n of a contact's law, s_n = n·v⁺ + c_n (contact.h); `approach` is n·v before the
-/// step, all bodies counted.
+/// The constant c_n of a contact's law, s_n = n·v⁺ + c_n (contact.h); `approach` is n·v of both
+/// bodies before the step.
 template <typename T>
 T LawConstant(ContactLaw law, const T& gap, double h, const T& restitution, const T& approach,
               const SimulationSettings& settings) {

@@ -16,7 +16,7 @@
 namespace tangible {
 namespace internal {
 
-/// row · twist over the bodies of the row that do not move by forces (block < 0).
+/// row · twist over those bodies of the row that forces do not move (block < 0).
 template <typename T>
 T PrescribedSpeed(const ModelStructure& structure, const State<T>& state, int a,
                   const RowPart<T>& row_a, int b, const RowPart<T>& row_b) {
@@ -32,7 +32,8 @@ T PrescribedSpeed(const ModelStructure& structure, const State<T>& state, int a,
   return speed;
 }
 
-// Rounding of a gap: a few units in the last place of the positions it is the difference of, m.
+// The rounding of a gap, m: a few units in the last place of the positions of which it is the
+// difference.
 template <typename T>
 double PositionRounding(const State<T>& state, int a, int b) {
   double size = 0.0;
@@ -60,7 +61,7 @@ class ProblemBuilder {
         p_(*problem),
         equations_(s_, at_, this) {}
 
-  /// All but the contacts. An impact has no forces.
+  /// Adds all elements but the contacts. An impact has no forces.
   void AssembleElements() {
     p_.num_bodies = s_.num_blocks();
     SizeScratch(3 * static_cast<size_t>(p_.num_bodies), &p_.mass);
@@ -94,7 +95,7 @@ class ProblemBuilder {
     }
   }
 
-  /// `restitution` may be null where no contact rebounds.
+  /// `restitution` may be null if no contact rebounds.
   void AssembleContacts(const std::vector<ActiveContact>& contacts,
                         const std::vector<CoefficientSource>& friction,
                         const std::vector<CoefficientSource>* restitution) {
@@ -150,7 +151,7 @@ class ProblemBuilder {
   void Along(int a, const RowPart<T>& row_a, int b, const RowPart<T>& row_b, const T& push,
              const T& damping) {
     if constexpr (kLevel == Level::kVelocity) {
-      // Without derivatives 0 is nothing; with them its derivative counts.
+      // In double a coefficient of 0 has no effect; in Jets its derivative has one.
       constexpr bool kHasDerivatives = NumDerivatives<T>::value > 0;
       if (kHasDerivatives || push != T(0.0)) {
         Push(a, row_a, b, row_b, push);

@@ -14,7 +14,7 @@ double SpeedOf(const double* twist, double radius) {
   return std::sqrt(twist[0] * twist[0] + twist[1] * twist[1]) + std::abs(twist[2]) * radius;
 }
 
-// Rate of a joint's coordinate, rad/s or m/s.
+// The rate of a joint's coordinate, rad/s or m/s.
 double CoordinateRate(const JointIndex& joint, const JointRows<double>& rows, const double* twist) {
   double rate = 0.0;
   for (int i = 0; i < 3; ++i) {
@@ -24,7 +24,7 @@ double CoordinateRate(const JointIndex& joint, const JointRows<double>& rows, co
   return std::abs(rate);
 }
 
-// Whether the gap constant is held back by the recovery speed.
+// Whether the recovery speed limits the constant of the gap.
 ContactLaw GapLaw(double gap, double h, const SimulationSettings& settings) {
   return gap / h < -settings.recovery_speed ? ContactLaw::kRecovery : ContactLaw::kGap;
 }
@@ -106,9 +106,9 @@ void ContactSearch::FindLimits(const Model<double>& model, double h,
   }
 }
 
-// The contacts of bodies that pass by each other, as a box over flush tiles, in the place of one
-// that a corner ahead would have. What a closed contact's gap is off by moves the bodies at that
-// over a step: no approach.
+// Replaces a contact with a corner ahead by those of bodies that pass by each other, as a box that
+// slides over flush tiles. A speed that is no larger than the error of a closed contact's gap over
+// the step is not an approach.
 ContactsAhead ContactSearch::FindPassed(const Model<double>& model, const State<double>& state,
                                         const ActiveContact& contact, double approach,
                                         double h) const {
@@ -131,7 +131,7 @@ ContactsAhead ContactSearch::FindPassed(const Model<double>& model, const State<
   return ahead;
 }
 
-// Which pairs of bodies may have contacts.
+// The pairs of bodies that may have contacts.
 void ContactSearch::FindPairs(const Model<double>& model, const State<double>& state, double h,
                               const AssemblyScratch<double>& scratch) {
   const ModelStructure& structure = *model.structure;
@@ -139,7 +139,7 @@ void ContactSearch::FindPairs(const Model<double>& model, const State<double>& s
     const double reach = 0.5 * structure.settings.contact_margin + h * bound_[body];
     boxes_[body] = BoxOf(model, body, scratch.poses[body], reach);
     if (structure.bodies[body].shape == ShapeType::kHalfPlane && state.twist[3 * body + 2] != 0.0) {
-      // A turning half-plane may reach any place.
+      // A half-plane that turns may reach any place.
       const double infinity = std::numeric_limits<double>::infinity();
       boxes_[body] = {-infinity, -infinity, infinity, infinity};
     }
@@ -148,7 +148,7 @@ void ContactSearch::FindPairs(const Model<double>& model, const State<double>& s
       boxes_, [&](int i, int j) { return structure.MayCollide(i, j); }, &pairs_);
 }
 
-// The gap below which two bodies may meet within the step, m.
+// The gap below which two bodies may touch within the step, m.
 double ContactSearch::ReachOf(const Model<double>& model, const State<double>& state, double h,
                               int a, int b) const {
   const ModelStructure& structure = *model.structure;
@@ -202,7 +202,7 @@ void ContactSearch::FindContacts(const Model<double>& model, const State<double>
     if (approach < -settings.restitution_threshold &&
         gap + h * free_approach < settings.contact_margin) {
       const double e = MixedRestitution(model, a, b).value;
-      // In penetration the constant that drives apart faster holds.
+      // In penetration the constant that separates the bodies faster is taken.
       if (e > 0.0 && (gap >= 0.0 || e * approach < std::max(gap / h, -settings.recovery_speed))) {
         contact.law = ContactLaw::kRestitution;
       }

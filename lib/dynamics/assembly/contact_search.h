@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// Which contacts and joint limits a step has rows for.
+// Finds the contacts and joint limits that have rows in a step.
 //
 // Every pair whose gap is below margin + h (speed bound of a + speed bound of b) is listed, whether
-// or not the free motion reaches it: another impact may drive it there. Which open contacts are
-// listed does not change the result. A bound is the larger of the speeds before and after the step
-// without contacts; after the solve CheckBounds tells whether a body turned out faster, and the
-// search is repeated.
+// or not the free motion closes the gap, because another impact may close it. The result does not
+// depend on which open contacts are listed. A bound is the larger of the speeds before and after
+// the step without contacts; after the solve CheckBounds says whether a body is faster than its
+// bound, and if so the search is repeated.
 
 #include <vector>
 
@@ -22,18 +22,19 @@ class ContactSearch {
  public:
   explicit ContactSearch(const Model<double>& model);
 
-  /// Starts a step: bounds from the state and the free twists p / M of the assembled problem.
+  /// Starts a step: sets the bounds from the state and the free twists p / M of the assembled
+  /// problem.
   void SetBounds(const Model<double>& model, const State<double>& state,
                  const ContactProblem<double>& problem, const AssemblyScratch<double>& scratch);
-  /// Raises the bounds to the solved twists; true if any body is faster than its bound.
+  /// Raises the bounds to the solved twists and returns whether any body was faster than its bound.
   bool CheckBounds(const Model<double>& model, const std::vector<double>& twist,
                    const AssemblyScratch<double>& scratch);
-  /// The contacts, in ascending order of bodies, then the limits; with their laws and coefficients.
+  /// The contacts in ascending order of bodies, then the limits, with their laws and coefficients.
   void Find(const Model<double>& model, const State<double>& state, double h,
             const AssemblyScratch<double>& scratch, std::vector<ActiveContact>* contacts,
             std::vector<CoefficientSource>* friction, std::vector<CoefficientSource>* restitution);
-  /// Of the last search: how many pairs of boxes the broad phase compared, how many pairs it let
-  /// pass, and how many of these have no row as they are beyond reach.
+  /// Counts of the last search: the pairs of boxes that the broad phase compared, the pairs that
+  /// overlap, and those among them that have no row because they are out of reach.
   int num_compared() const { return broad_phase_.num_compared(); }
   int num_pairs() const { return static_cast<int>(pairs_.size()); }
   int num_beyond_reach() const { return beyond_reach_; }

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// The equations of each element, once for all levels and all uses. Included by the assembly of
-// problems (assembly_inl.h) and by their derivatives (jacobian/equation_jacobian.cc).
+// The equations of each element, written once for all levels and all uses. The assembly of problems
+// (assembly_inl.h) and their derivatives (jacobian/equation_jacobian.cc) include this file.
 //
-// A builder decides what becomes of an element: the assembly stores its blocks in a contact
-// problem; the Jacobian evaluates it in Jets of the few variables that it reads, and hands on the
+// A builder receives each element: that of the assembly stores its blocks in a contact problem;
+// that of the Jacobian evaluates it in Jets of the few variables that it reads, and emits the
 // derivatives of its residual. A builder has
 //
 //   Scalar; kKeepsJoints                      whether RowsOf and RatesOf keep rows
@@ -114,8 +114,8 @@ class Equations {
     Drive(joint, rows.coordinate_a, rows.coordinate_b);
   }
 
-  /// The spring along a joint's coordinate. An element of its own: with the joint's it would read
-  /// more variables than a local Jet has.
+  /// The spring along a joint's coordinate. It is an element of its own, because together with the
+  /// joint it would read more variables than a local Jet has.
   void JointSpring(int j) {
     const JointIndex& joint = s_.joints[j];
     if (joint.stiffness < 0 || Weight() == 0.0) {
@@ -183,12 +183,12 @@ class Equations {
     b_.Contact(i, contact, rows, rates.normal, rates.tangent);
   }
 
-  /// What forces are multiplied by: the step's length, or 1; corrections have none.
+  /// The factor of forces: the length of the step, or 1; corrections have no forces.
   double Weight() const {
     return kLevel == Level::kVelocity ? at_.h : kLevel == Level::kAcceleration ? 1.0 : 0.0;
   }
 
-  /// The factor of the joints' position errors: their correction acts in steps, not in impacts.
+  /// The factor of the joints' position errors, which steps correct and impacts do not.
   double DriftShare() const {
     if constexpr (kLevel == Level::kCorrection) {
       return JointCorrectionShare(s_.settings);
@@ -202,8 +202,8 @@ class Equations {
   }
 
  private:
-  /// c of the force −c v: the linear damping, and of quadratic drag c |v| at the speed before. The
-  /// speed of a body at rest has no derivative; that of |v| v there is 0.
+  /// c of the force −c v: the linear damping plus, for quadratic drag, the coefficient times |v|
+  /// before the step. The speed |v| of a body at rest has no derivative; that of |v| v is 0 there.
   T LinearDamping(const BodyIndex& index, const T* twist) {
     using std::sqrt;
     const T linear = b_.Number(index.linear_damping);

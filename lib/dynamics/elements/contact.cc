@@ -28,7 +28,8 @@ CoefficientSource Mix(const Model<double>& model, int first, int second, Mixing 
       break;
     case Mixing::kGeometricMean:
       source.value = std::sqrt(x * y);
-      // The derivative is infinite where one coefficient is 0 and the other is not.
+      // The derivative of the geometric mean is infinite where one coefficient is 0 and the other
+      // is not.
       source.tie = source.value == 0.0;
       d[0] = source.tie ? 0.0 : 0.5 * y / source.value;
       d[1] = source.tie ? 0.0 : 0.5 * x / source.value;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// Contacts and joint limits of a step: which rows it has, and the constant c_n of each.
+// Contacts and joint limits of a step: their rows, and the constant c_n of each row.
 //
 //   s_n = n·v⁺ + c_n ≥ 0
 //   kGap          c_n = gap / h: lands on the surface and rests there without drift
@@ -12,14 +12,15 @@
 //   kPoisson      c_n = 0, λn ≥ e λ¹n: the decompression that follows a compression with impulse
 //                 λ¹n (event stepping alone)
 //
-// An impact is e > 0, n·v < −threshold and gap + h n·v_free < margin; in penetration the smaller of
-// both constants holds. A joint limit is a row like a contact without friction or restitution, its
-// gap the coordinate's distance from the limit. Dry friction in a joint is a contact without a
-// normal row, which is always closed: its tangent row is the coordinate's, and the force or torque
-// at which it slides stands in the place of μ (contact_problem.h).
+// A contact has an impact where e > 0, n·v < −threshold and gap + h n·v_free < margin; in
+// penetration the smaller of both constants is taken. A joint limit is a row like a contact without
+// friction or restitution, its gap the coordinate's distance from the limit. Dry friction in a
+// joint is a contact without a normal row that is always closed: its tangent row is that of the
+// coordinate, and the force or torque at which it slides takes the place of μ (contact_problem.h).
 //
-// The law is a discrete choice made in double; on either side of a choice the derivative is that of
-// the chosen law. Between kGap and kRestitution the map jumps: the margins say how near that is.
+// The law is a discrete choice that is made in double, and the derivative is that of the chosen
+// law. The map from states to states jumps between kGap and kRestitution; the margins say how near
+// that jump is.
 
 #include <cmath>
 
@@ -30,8 +31,8 @@ namespace tangible {
 
 enum class ContactLaw : unsigned char { kGap, kRecovery, kRestitution, kInelastic, kPoisson };
 
-/// The discrete part of a contact of a step. A limit or friction in a joint has joint ≥ 0 and no
-/// feature.
+/// The discrete part of a contact of a step. A limit of a joint, or friction in it, has joint ≥ 0
+/// and no feature.
 struct ActiveContact {
   int a = -1, b = -1;  ///< bodies; a < b for contacts of shapes
   ContactFeature feature;
@@ -40,24 +41,25 @@ struct ActiveContact {
   ContactLaw law = ContactLaw::kGap;
   double gap = 0.0;  ///< m (rad for the limit of an angle), at the step's start
   bool IsJointFriction() const { return joint >= 0 && side == 0.0; }
-  /// Whether both are of the same bodies, as the two ends of a face are, or of the same joint.
+  /// Whether both contacts are between the same bodies, as those at the two ends of a face, or of
+  /// the same joint.
   bool IsBetweenTheSame(const ActiveContact& other) const {
     return a == other.a && b == other.b && joint == other.joint;
   }
-  /// Whether both are contacts of the same two shapes.
+  /// Whether both contacts are between the same two shapes.
   bool IsOfTheSameShapes(const ActiveContact& other) const {
     return joint < 0 && other.joint < 0 && a == other.a && b == other.b &&
            feature.part_a == other.feature.part_a && feature.part_b == other.feature.part_b;
   }
   PartPair Parts() const { return {feature.part_a, feature.part_b}; }
-  /// Whether two steps' contacts are the same one.
+  /// Whether contacts of two steps are the same.
   bool SameAs(const ActiveContact& other) const {
     return a == other.a && b == other.b && feature == other.feature && joint == other.joint &&
            side == other.side;
   }
 };
 
-/// FindContactFeatures of one part of each of two bodies.
+/// FindContactFeatures for one part of each of two bodies.
 inline int FindFeatures(const Model<double>& model, int a, const Pose<double>& pose_a, int b,
                         const Pose<double>& pose_b, PartPair parts, double max_gap,
                         ContactFeature features[2]) {
@@ -80,7 +82,7 @@ ShapeView<T> ShapeOfB(const Model<T>& model, const ActiveContact& contact) {
   return model.Shape(contact.b, contact.feature.part_b);
 }
 
-/// The coefficients of a contact and their derivatives with respect to the numbers they come from.
+/// A coefficient of a contact and its derivatives with respect to the parameters that determine it.
 struct CoefficientSource {
   int numbers[2] = {-1, -1};  ///< places in the model's numbers, −1: none
   double derivatives[2] = {0, 0};
@@ -88,20 +90,22 @@ struct CoefficientSource {
   bool tie = false;  ///< a kink of the mixing rule: min/max of equal values, geometric mean at 0
 };
 
-/// Friction (or restitution) of two bodies by their pair's entry or the mixing rule. average,
-/// minimum, maximum (at a tie the mean of both derivatives), geometric mean (at 0 derivative 0).
+/// The friction (or restitution) of two bodies, by the entry of their pair or by the mixing rule:
+/// average, minimum, maximum (at a tie the derivative is the mean of both), geometric mean (at 0
+/// the derivative is 0).
 CoefficientSource MixedFriction(const Model<double>& model, int a, int b);
 CoefficientSource MixedRestitution(const Model<double>& model, int a, int b);
-/// Of any active contact: mixed between shapes, that of a joint's friction; a limit has none.
+/// The coefficient of any active contact: mixed between shapes, or that of a joint's friction; a
+/// limit has none.
 CoefficientSource FrictionOf(const Model<double>& model, const ActiveContact& contact);
 
-/// Both limits of each joint that has them, the low one first; gaps are not set.
+/// Both limits of each joint that has limits, the low one first; gaps are not set.
 void AppendLimits(const Model<double>& model, std::vector<ActiveContact>* contacts);
 
-/// The friction of each joint that has some, active at all times.
+/// The friction of each joint that has friction, which is active at all times.
 void AppendJointFriction(const Model<double>& model, std::vector<ActiveContact>* contacts);
 
-/// The coefficient in T: value and chain rule of the source.
+/// The coefficient as a T, by the chain rule.
 template <typename T>
 T EvaluateCoefficient(const CoefficientSource& source, const std::vector<T>& numbers) {
   T value(source.value);
@@ -114,16 +118,16 @@ T EvaluateCoefficient(const CoefficientSource& source, const std::vector<T>& num
   return value;
 }
 
-/// Geometry and rows of a contact at a state, with c_n and c_t; `h` the step. The twists of bodies
-/// that do not move by the step's forces enter c.
+/// Geometry and rows of a contact at a state, with c_n and c_t; `h` is the step. The twists of
+/// bodies that forces do not move enter c.
 template <typename T>
 struct ContactRows {
   ContactGeometry<T> geometry;
   RowPart<T> normal_a, normal_b, tangent_a, tangent_b;
 };
 
-/// Rows of a contact of two shapes from its geometry. Tangent t = (n_y, −n_x). A normal passes
-/// through a disc's centre: its row has no angle, to the bit.
+/// Rows of a contact of two shapes from its geometry, with the tangent t = (n_y, −n_x). The normal
+/// passes through the centre of a disc, so the angular entry of the disc's normal row is exactly 0.
 template <typename T>
 void RowsFromGeometry(ShapeType shape_a, const Vector2<T>& position_a, ShapeType shape_b,
                       const Vector2<T>& position_b, ContactRows<T>* rows) {
@@ -143,7 +147,7 @@ void RowsFromGeometry(ShapeType shape_a, const Vector2<T>& position_a, ShapeType
   rows->tangent_b = Negative(PointRow(t, arm_b));
 }
 
-/// row_a · twist_a + row_b · twist_b over all bodies (those of prescribed motion too).
+/// row_a · twist_a + row_b · twist_b, whether the bodies move freely or as prescribed.
 template <typename T>
 T RelativeSpeed(const State<T>& state, int a, const RowPart<T>& row_a, int b,
                 const RowPart<T>& row_b) {
@@ -154,7 +158,7 @@ T RelativeSpeed(const State<T>& state, int a, const RowPart<T>& row_a, int b,
   return speed;
 }
 
-/// The sign of the sliding speed of a contact, 0 where that is rounding of its terms.
+/// The sign of the sliding speed of a contact; 0 where the speed is rounding of its terms.
 template <typename T>
 double SlipSign(const State<double>& state, const ActiveContact& contact,
                 const ContactRows<T>& rows) {
@@ -169,7 +173,7 @@ double SlipSign(const State<double>& state, const ActiveContact& contact,
   return std::abs(slip) <= kSlipRounding * terms ? 0.0 : slip > 0.0 ? 1.0 : -1.0;
 }
 
-/// Evaluates a contact of shapes between bodies at given poses.
+/// Evaluates a contact between the shapes of two bodies at given poses.
 template <typename T>
 void EvaluateContactRows(const Model<T>& model, const Pose<T>& pose_a, const Pose<T>& pose_b,
                          const ActiveContact& contact, ContactRows<T>* rows) {
@@ -179,7 +183,7 @@ void EvaluateContactRows(const Model<T>& model, const Pose<T>& pose_a, const Pos
   RowsFromGeometry(shape_a.type, pose_a.position, shape_b.type, pose_b.position, rows);
 }
 
-/// The same at a state, and with the poses of all bodies.
+/// The same at a state, with the poses of all bodies.
 template <typename T>
 void EvaluateContactRows(const Model<T>& model, const State<T>& state, const ActiveContact& contact,
                          ContactRows<T>* rows) {
@@ -191,9 +195,10 @@ void EvaluateContactRows(const Model<T>& model, const std::vector<Pose<T>>& pose
   EvaluateContactRows(model, poses[contact.a], poses[contact.b], contact, rows);
 }
 
-/// Evaluates a joint limit: the coordinate's row times its side, gap = side (coordinate − limit),
-/// no tangent; or friction in a joint: the coordinate's row as the tangent, no normal, gap 0.
-/// `limit`: of friction any number.
+/// Evaluates a joint limit (the normal row is that of the coordinate times its side, the gap is
+/// side (coordinate − limit), and there is no tangent) or friction in a joint (the tangent row is
+/// that of the coordinate, there is no normal row, and the gap is 0). `limit` is not read for
+/// friction.
 template <typename T>
 void EvaluateLimitRows(const T& limit, const JointRows<T>& joint_rows, const ActiveContact& contact,
                        ContactRows<T>* rows) {
@@ -209,12 +214,12 @@ void EvaluateLimitRows(const T& limit, const JointRows<T>& joint_rows, const Act
   }
 }
 
-/// The number of the model that a limit or friction in a joint is at.
+/// The parameter of the model that is the limit, or the friction, of a joint.
 inline int LimitNumber(const JointIndex& joint, const ActiveContact& contact) {
   return contact.IsJointFriction() ? joint.friction : contact.side > 0.0 ? joint.low : joint.high;
 }
 
-/// Any active contact at a state.
+/// Evaluates any active contact at a state.
 template <typename T>
 void EvaluateActiveRows(const Model<T>& model, const State<T>& state, const ActiveContact& contact,
                         ContactRows<T>* rows) {
@@ -229,7 +234,8 @@ void EvaluateActiveRows(const Model<T>& model, const State<T>& state, const Acti
   EvaluateLimitRows(model.parameters[LimitNumber(joint, contact)], joint_rows, contact, rows);
 }
 
-/// How fast a contact's points part (n v), and slide (t v), m/s; of a joint rad/s where it turns.
+/// The speeds at which the points of a contact separate (n v) and slide (t v), m/s; rad/s for a
+/// joint that turns.
 struct ContactSpeeds {
   double normal, slip;
 };

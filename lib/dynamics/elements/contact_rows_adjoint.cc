@@ -4,7 +4,7 @@
 namespace tangible {
 namespace {
 
-// Of PointRow(direction, arm) = (direction, arm × direction), times `sign`.
+// The adjoint of PointRow(direction, arm) = (direction, arm × direction), times `sign`.
 void PointRowAdjoint(const Vector2<double>& direction, const Vector2<double>& arm,
                      const double bar[3], double sign, Vector2<double>* direction_bar,
                      Vector2<double>* arm_bar) {
@@ -29,7 +29,7 @@ void ContactRowsAdjoint(const ContactFeature& feature, const ShapeView<double>& 
   Vector2<double> tangent_bar(0.0, 0.0);
   Vector2<double> arm_a_bar(0.0, 0.0);
   Vector2<double> arm_b_bar(0.0, 0.0);
-  // A disc's normal row has no angle.
+  // The angular entry of a disc's normal row is 0.
   const double turn_a = shape_a.type == ShapeType::kCircle ? 0.0 : bar.normal_a[2];
   const double turn_b = shape_b.type == ShapeType::kCircle ? 0.0 : bar.normal_b[2];
   const double normal_a_bar[3] = {bar.normal_a[0], bar.normal_a[1], turn_a};

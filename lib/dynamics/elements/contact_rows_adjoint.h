@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// The adjoint of a contact's rows: from a weight on each entry of the rows and on the gap to poses
-// and shape numbers.
+// The adjoint of a contact's rows: from the derivatives of a scalar with respect to each entry of
+// the rows and the gap to those with respect to poses and shape parameters.
 
 #include "tangible/dynamics/elements/contact.h"
 #include "tangible/geometry/contact_geometry_adjoint.h"
@@ -15,8 +15,8 @@ struct RowsAdjoint {
   double gap;
 };
 
-/// Adds to `a_bar` and `b_bar` what `bar` pulls back to through RowsFromGeometry and
-/// EvaluateContact; `rows` are theirs.
+/// Adds to `a_bar` and `b_bar` the derivatives that follow from `bar` through RowsFromGeometry and
+/// EvaluateContact, whose result is `rows`.
 void ContactRowsAdjoint(const ContactFeature& feature, const ShapeView<double>& shape_a,
                         const Pose<double>& pose_a, const ShapeView<double>& shape_b,
                         const Pose<double>& pose_b, const ContactRows<double>& rows,

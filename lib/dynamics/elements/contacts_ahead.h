@@ -1,28 +1,28 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// Contacts of corners. Where a corner meets a corner, as that of a box that slides over flush tiles
-// meets the next tile's, the nearest features have a normal that rounding chooses. Convex bodies
-// touch only where no line separates them: of two that touch within the tolerance, the one whose
-// features are nearest right after the corners have met is the last to be crossed, and its normal
-// is the contact's (the separating axis of the time of impact; Ericson, Real-Time Collision
-// Detection, 2005, 5.5.8). Without an approach along it there is no impact.
+// Contacts of corners. Where a corner meets a corner, for example when a box slides over flush
+// tiles and reaches the next tile, rounding chooses the normal of the nearest features. Convex
+// bodies touch only where no line separates them: the last line to separate them belongs to the
+// features that are nearest right after the corners have met, and its normal is that of the contact
+// (the separating axis at the time of impact; Ericson, Real-Time Collision Detection, 2005, 5.5.8).
+// Where the bodies do not approach along it there is no impact.
 
 #include "tangible/dynamics/elements/contact.h"
 
 namespace tangible {
 
-/// What an approached contact is replaced by.
+/// The contacts that replace an approached one.
 struct ContactsAhead {
   ActiveContact contacts[2];  ///< gap set, at the state given
   double speed[2] = {0, 0};   ///< n v, m/s
   int count = 0;              ///< 0: the contact stands
 };
 
-/// For `contact` of two shapes, approached with `approach` < 0 (n v, m/s) at `state`: the contacts
-/// nearest when the bodies have closed its gap at their twists and gone on by a millionth of `size`
-/// (m), if all of them touch at `state` within `tolerance` (m) and are approached by more than
-/// `slow` (m/s) less fast. Allocates nothing.
+/// For a `contact` of two shapes that approach with `approach` < 0 (n v, m/s) at `state`: the
+/// contacts that are nearest when the bodies have closed its gap at their twists and moved on by a
+/// millionth of `size` (m), if all of these touch at `state` within `tolerance` (m) and their
+/// approach is slower by more than `slow` (m/s). Allocates nothing.
 ContactsAhead FindContactsAhead(const Model<double>& model, const State<double>& state,
                                 const ActiveContact& contact, double approach, double size,
                                 double tolerance, double slow);

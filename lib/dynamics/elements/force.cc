@@ -36,7 +36,7 @@ double IntegrateSignal(const Signal& signal, const std::vector<double>& column, 
   while (left < to) {
     const auto next = std::upper_bound(signal.time.begin(), signal.time.end(), left);
     const double right = next == signal.time.end() ? to : std::min(to, *next);
-    // Both kinds are exact at the midpoint of a piece: linear or constant within it.
+    // The midpoint rule is exact for both kinds, which are linear or constant within a piece.
     integral += (right - left) * internal::SignalValue(signal, column, 0.5 * (left + right));
     left = right;
   }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// Forces and springs: the impulse that a step of [t, t + h] receives from each.
+// Forces and springs: the impulse of each over a step [t, t + h].
 //
 //   force    within [start, end] a constant F gives F · |[t, t+h] ∩ [start, end]|; a signal from a
 //            file gives its integral over the overlap, so that a window that ends inside a step is
@@ -19,29 +19,29 @@ namespace tangible {
 double IntegrateSignal(const Signal& signal, const std::vector<double>& column, double from,
                        double to);
 
-/// Length of [t, t + h] ∩ [start, end]; null pointers: unbounded. Where an end of the window
-/// coincides with an end of the step its derivative is the mean of both sides'.
+/// The length of [t, t + h] ∩ [start, end]; a null pointer means that this end is unbounded. Where
+/// an end of the window coincides with an end of the step, the derivative is the mean of both
+/// sides.
 template <typename T>
 T WindowOverlap(double t, double h, const T* start, const T* end);
 
-/// Impulse (N s, N s, N m s) on the body of a force in a step. `numbers` as ForceIndex has them;
-/// start and end may be null.
+/// The impulse (N s, N s, N m s) of a force on its body in a step. `numbers` are the parameters in
+/// the order of ForceIndex; start and end may be null.
 template <typename T>
 void ForceImpulse(const ModelStructure& structure, const ForceIndex& force, double t, double h,
                   const T& angle, const T* numbers, const T* start, const T* end, T impulse[3]);
 
-/// A signal's column at t, on the piece that holds at `middle`; of Jets the rate is that of the
-/// piece.
+/// A column of a signal at t, by the piece that contains `middle`, whose slope is the derivative.
 template <typename T>
 T SignalAt(const Signal& signal, const std::vector<double>& column, const T& t, double middle);
 
-/// Force and torque (N, N, N m) on the body of a force at t; 0 where its window excludes `middle`.
-/// `numbers`, start and end as for ForceImpulse.
+/// The force and torque (N, N, N m) on the body of a force at t; 0 where its window excludes
+/// `middle`. `numbers`, start and end are those of ForceImpulse.
 template <typename T>
 void ForceAt(const ModelStructure& structure, const ForceIndex& force, const T& angle,
              const T* numbers, const T* start, const T* end, const T& t, double middle, T out[3]);
 
-/// Mean effort (N m, N) of a joint's signal over a step.
+/// The mean effort (N m, N) of a joint's signal over a step.
 double MeanEffort(const ModelStructure& structure, const JointIndex& joint, double t, double h);
 
 template <typename T>
@@ -53,8 +53,9 @@ struct SpringRow {
       pull_b;  ///< generalised force against which the spring pulls: k (d − L0 u) at the anchors
 };
 
-/// A spring at two poses; `numbers` as SpringIndex has them, d = p_a − p_b. At coincident anchors
-/// the direction u is 0: no damping, and of the force only k d is left, which is smooth for L0 = 0.
+/// A spring at two poses; `numbers` are the parameters in the order of SpringIndex, d = p_a − p_b.
+/// At coincident anchors the direction u is 0: there is no damping, and the force is k d, which is
+/// smooth for L0 = 0.
 template <typename T>
 void EvaluateSpring(const Pose<T>& pose_a, const Pose<T>& pose_b, const T* numbers,
                     SpringRow<T>* out);

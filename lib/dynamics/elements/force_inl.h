@@ -15,9 +15,9 @@ namespace internal {
 /// A column of a signal at a time.
 double SignalValue(const Signal& signal, const std::vector<double>& column, double time);
 
-/// 1 inside, 1/2 at an end, 0 outside: the derivative of an overlap with respect to an end of the
-/// window. An end of the step is k dt rounded, so times within kSameTime of a step from it are at
-/// it, in both steps that share it.
+/// The derivative of an overlap with respect to an end of the window: 1 inside, 1/2 at an end of
+/// the step, 0 outside. An end of a step is k dt rounded, so times that differ from it by less than
+/// kSameTime of a step count as equal to it, in both steps that share it.
 double Inside(double x, double low, double high);
 
 }  // namespace internal
@@ -42,7 +42,8 @@ void ForceImpulse(const ModelStructure& structure, const ForceIndex& force, doub
   const T overlap = WindowOverlap(t, h, start, end);
   const double from = start ? std::max(t, ValueOf(*start)) : t;
   const double to = end ? std::min(t + h, ValueOf(*end)) : t + h;
-  // A signal over the overlap: its integral, and its value at the ends for their derivatives.
+  // The integral of a signal over the overlap; its values at the ends give the derivatives with
+  // respect to them.
   const auto integrate = [&](const Signal& signal, const std::vector<double>& column) {
     T integral(IntegrateSignal(signal, column, from, to));
     if (!column.empty() && start) {
@@ -82,7 +83,7 @@ void EvaluateSpring(const Pose<T>& pose_a, const Pose<T>& pose_b, const T* numbe
   const Vector2<T> arm_b = pose_b.rotation * Vector2<T>(numbers[2], numbers[3]);
   const Vector2<T> offset = pose_a.position + arm_a - pose_b.position - arm_b;
   const T squared = offset.squaredNorm();
-  // At coincident anchors the direction is undefined, and sqrt has no derivative.
+  // At coincident anchors the direction is undefined and sqrt has no derivative.
   const bool apart = ValueOf(squared) > 0.0;
   out->length = apart ? T(sqrt(squared)) : T(0.0);
   const Vector2<T> direction =

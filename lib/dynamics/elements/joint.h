@@ -32,8 +32,8 @@ template <typename T>
 void EvaluateJoint(JointType type, const Pose<T>& pose_a, const Pose<T>& pose_b, const T* numbers,
                    JointRows<T>* out);
 
-/// The row of a body on the velocity along `direction` of a world point with `arm` from its centre
-/// of mass.
+/// The row that maps the twist of a body to the velocity along `direction` of the point at `arm`
+/// from its centre of mass (world frame).
 template <typename T>
 RowPart<T> PointRow(const Vector2<T>& direction, const Vector2<T>& arm) {
   return {direction.x(), direction.y(), Cross(arm, direction)};

@@ -7,7 +7,7 @@
 namespace tangible {
 namespace {
 
-// Place of (θ, θ) in a block.
+// The place of (θ, θ) in a block.
 constexpr int kAngle = 8;
 
 template <typename T>

@@ -13,8 +13,8 @@
 //   prismatic        θaθa: −μ w·r_a          θbθb: −μ w·(p_a − x_b)   w = u⊥, fixed in b
 //                    xaθb: μ w⊥              xbθb: −μ w⊥              θaθb: μ w·r_a
 //
-// These are the exact second derivatives; the projection onto the joints needs them, for at its
-// solution the constraint's force turns with the bodies.
+// These are the exact second derivatives; the projection onto the joints needs them, because the
+// direction of its constraint forces turns with the bodies.
 
 #include "tangible/dynamics/elements/joint.h"
 
@@ -31,8 +31,8 @@ inline bool CouplesBodies(JointType type) {
   return type == JointType::kPrismatic || type == JointType::kDistance;
 }
 
-/// `multipliers`: one a row of the joint. A distance joint whose anchors coincide counts as
-/// straight (t-part 0).
+/// `multipliers`: one for each row of the joint. For a distance joint whose anchors coincide the
+/// term with t is 0.
 template <typename T>
 void EvaluateJointCurvature(JointType type, const Pose<T>& pose_a, const Pose<T>& pose_b,
                             const T* numbers, const T* multipliers, JointCurvature<T>* out);

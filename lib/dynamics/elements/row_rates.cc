@@ -18,7 +18,7 @@ Pose<Dual<T>> DualPose(const MovingPose<T>& moving) {
   return dual;
 }
 
-// The row, and what its rate adds to the acceleration of the row's speed.
+// A row, and the term that its rate adds to the acceleration along it.
 template <typename T>
 T SplitRow(const RowPart<Dual<T>>& dual, const T twist[3], RowPart<T>* row) {
   T rate(0.0);

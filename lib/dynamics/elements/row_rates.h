@@ -43,7 +43,7 @@ struct ContactRates {
   T tangent{0.0};
 };
 
-/// Those of a limit or friction in a joint.
+/// The rates of a limit of a joint, or of friction in it.
 template <typename T>
 void SetLimitRates(const ActiveContact& contact, const JointRates<T>& of_joint,
                    ContactRates<T>* rates) {
@@ -51,13 +51,14 @@ void SetLimitRates(const ActiveContact& contact, const JointRates<T>& of_joint,
       contact.IsJointFriction() ? of_joint.coordinate : T(contact.side * of_joint.coordinate);
 }
 
-/// Memory of shapes in dual numbers.
+/// Memory for shapes in dual numbers.
 template <typename T>
 struct ContactRateScratch {
   std::vector<Dual<T>> numbers_a, numbers_b;
 };
 
-/// A contact's rows and rates; of each shape only the numbers that the feature reads are used.
+/// The rows and rates of a contact; of each shape only the parameters that the feature reads are
+/// used.
 template <typename T>
 void EvaluateContactRates(const ContactFeature& feature, const ShapeView<T>& shape_a,
                           const MovingPose<T>& a, const ShapeView<T>& shape_b,

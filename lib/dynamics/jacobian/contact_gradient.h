@@ -1,22 +1,23 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// Gradients of what event stepping finds events by: a contact's gap, its sliding speed t v, and the
-// speed n v at which it opens.
+// Gradients of the functions whose roots are events: a contact's gap, its sliding speed t v, and
+// the speed n v at which it opens.
 
 #include "tangible/dynamics/jacobian/equation_jacobian.h"
 
 namespace tangible {
 
-/// Entries (row 0, variable, value) of the gap of a contact or limit, m or rad.
+/// Emits the entries (row 0, variable, value) of the gap of a contact or limit, m or rad.
 void AddGapGradient(const Model<double>& model, const State<double>& state,
                     const ActiveContact& contact, LocalJacobianScratch* scratch,
                     std::vector<JacobianEntry>* entries);
-/// The same of the sliding speed of a contact of shapes, m/s.
+/// The same for the sliding speed of a contact of shapes, m/s.
 void AddSlipGradient(const Model<double>& model, const State<double>& state,
                      const ActiveContact& contact, LocalJacobianScratch* scratch,
                      std::vector<JacobianEntry>* entries);
-/// The same of the speed at which a contact opens, m/s; of a limit's coordinate, rad/s or m/s.
+/// The same for the speed at which a contact opens, m/s; for a limit that of its coordinate, rad/s
+/// or m/s.
 void AddApproachGradient(const Model<double>& model, const State<double>& state,
                          const ActiveContact& contact, LocalJacobianScratch* scratch,
                          std::vector<JacobianEntry>* entries);

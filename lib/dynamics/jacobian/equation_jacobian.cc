@@ -14,7 +14,7 @@ namespace {
 
 using internal::BodyRow;
 
-// The builder of equations_inl.h that hands on the derivatives of an element's residual.
+// The builder of equations_inl.h that emits the derivatives of an element's residual.
 template <Level kLevel, typename Sink>
 class EntryBuilder : private internal::LocalEntries<Sink> {
  public:
@@ -119,7 +119,7 @@ class EntryBuilder : private internal::LocalEntries<Sink> {
   JointRows<LocalJet>& RowsOf(int) { return joint_rows_; }
   JointRates<LocalJet>& RatesOf(int) { return joint_rates_; }
   ContactRateScratch<LocalJet>* RateScratch() { return &scratch_.rates; }
-  // A number of its own: EntriesOfCoefficients has its derivative.
+  // The coefficient is a parameter of its own; EntriesOfCoefficients has its derivative.
   LocalJet Restitution(int i) const { return LocalJet((*solved_.restitution)[i].value); }
   LocalJet Approach(const ActiveContact& contact, const ContactRows<LocalJet>& rows) const {
     return RowTimes(before_, contact.a, rows.normal_a, contact.b, rows.normal_b);
@@ -230,15 +230,16 @@ class EntryBuilder : private internal::LocalEntries<Sink> {
     return sum;
   }
 
-  // Whether the speeds that dampers act against are variables: of a step the new ones, which are
-  // unknowns but for prescribed motion, of accelerations those of the state.
+  // Whether the speeds that dampers act against are variables. In a step these are the new speeds,
+  // which are unknowns except for prescribed motion; at the level of accelerations they are those
+  // of the state.
   bool SpeedsReadTwist(int body) const {
     const Motion motion = s_.bodies[body].motion;
     return kLevel == Level::kAcceleration ? motion != Motion::kStatic
                                           : motion == Motion::kKinematic;
   }
 
-  // A constraint row of velocities reads the twist of a body of prescribed motion.
+  // A constraint row of velocities reads the twist of a body with prescribed motion.
   template <typename T>
   void EmitPrescribed(int a, const RowPart<T>& row_a, int b, const RowPart<T>& row_b, int row) {
     const auto emit = [&](int body, const RowPart<T>& part) {
@@ -252,7 +253,8 @@ class EntryBuilder : private internal::LocalEntries<Sink> {
     }
   }
 
-  // R1 = m (x − v − h g) + h c x of a step, m (a − g) + c v of accelerations, m δ of a correction.
+  // R1 = m (x − v − h g) + h c x for a step, m (a − g) + c v for accelerations, m δ for a
+  // correction.
   void BodyByHand(int k) {
     const int body = s_.moving[k];
     const BodyIndex& index = s_.bodies[body];
@@ -293,7 +295,8 @@ class EntryBuilder : private internal::LocalEntries<Sink> {
       const double ax = x_[anchor];
       const double ay = x_[anchor + 1];
       const double arm[2] = {c * ax - s * ay, s * ax + c * ay};
-      // Columns: the arm's change with θ and with the anchor's two components.
+      // The columns are the derivatives of the arm with respect to θ and the two components of the
+      // anchor.
       const double dx[3] = {-s * ax - c * ay, c, -s};
       const double dy[3] = {arm[0], s, c};
       const int variables[3] = {s_.PoseVariable(body, 2), s_.ParameterVariable(anchor),
@@ -371,7 +374,7 @@ class EntryBuilder : private internal::LocalEntries<Sink> {
     Vector2<double> r, e, w, o;
   };
 
-  // Along a joint's coordinate: the force amount = damping · speed − push, against the motion.
+  // Along a joint's coordinate the force against the motion is amount = damping · speed − push.
   struct Drive {
     double amount = 0.0, damping = 0.0, speed = 0.0, slope = 0.0;
   };
@@ -419,7 +422,7 @@ class EntryBuilder : private internal::LocalEntries<Sink> {
     return {values[3 * body], values[3 * body + 1]};
   }
 
-  // Entries by one variable, along which r, e, w, o change as given.
+  // The entries of one variable, with the given derivatives of r, e, w and o.
   void EmitSlider(int j, const Slider& at, const Drive& drive, const Slider& d, int variable) {
     if constexpr (std::is_same_v<Sink, TangentSink>) {
       if (sink_.fixed != nullptr && sink_.fixed[variable] != 0) return;
@@ -428,7 +431,7 @@ class EntryBuilder : private internal::LocalEntries<Sink> {
     const double y = solved_.solution->joint_impulse[3 * static_cast<size_t>(j)];
     const Vector2<double> across = Perp(at.w);
     const Vector2<double> d_across = Perp(d.w);
-    // Of w·r, w·e, w⊥·r, w⊥·e.
+    // The derivatives of w·r, w·e, w⊥·r, w⊥·e.
     const double d_wr = d.w.dot(at.r) + at.w.dot(d.r);
     const double d_we = d.w.dot(at.e) + at.w.dot(d.e);
     const double d_ar = d_across.dot(at.r) + across.dot(d.r);
@@ -448,7 +451,7 @@ class EntryBuilder : private internal::LocalEntries<Sink> {
           omega_b * omega_b * d_we - omega_a * omega_a * d_wr;
     }
     emit(JointRow(j), row);
-    // Momentum rows: −y rowᵀ, and of effort and damping A along u, with A's own change.
+    // Momentum rows: −y rowᵀ, and effort and damping A along u, with the derivative of A.
     const double d_speed = -d_across.dot(PlaneOf(damped_, joint.a) - PlaneOf(damped_, joint.b)) -
                            damped_[3 * joint.a + 2] * d_wr + damped_[3 * joint.b + 2] * d_we;
     const double d_amount = drive.damping * d_speed;
@@ -473,7 +476,8 @@ class EntryBuilder : private internal::LocalEntries<Sink> {
            PlaneOf(before_, joint.b);
   }
 
-  // The rows by twists that they read: of accelerations, and of prescribed motion.
+  // The derivatives of the rows with respect to the twists that they read: those of accelerations,
+  // and of prescribed motion.
   void SliderByTwists(int j, const Slider& at) {
     const JointIndex& joint = s_.joints[j];
     const Vector2<double> across = Perp(at.w);
@@ -516,7 +520,7 @@ class EntryBuilder : private internal::LocalEntries<Sink> {
     return drive;
   }
 
-  // With its slope in time where accelerations read it.
+  // With its slope in time at the level of accelerations.
   double EffortOf(const JointIndex& joint, double* slope) {
     if (joint.effort_signal < 0) return x_[joint.effort];
     if constexpr (kLevel == Level::kVelocity) {
@@ -529,7 +533,8 @@ class EntryBuilder : private internal::LocalEntries<Sink> {
     return effort.a;
   }
 
-  // Effort and damping by their numbers, the time, and the twists that dampers act against.
+  // The derivatives of effort and damping with respect to their parameters, the time, and the
+  // twists that dampers act against.
   void DriveSlider(const JointIndex& joint, const Slider& at, const Drive& drive) {
     if (!HasDrive(joint)) return;
     const double weight = equations_.Weight();
@@ -551,7 +556,8 @@ class EntryBuilder : private internal::LocalEntries<Sink> {
     }
   }
 
-  // A contact's entries times one column u, by the geometry's adjoint. The sum of u times its rows:
+  // The entries of a contact times one column u, by the adjoint of its geometry. The sum of u times
+  // its rows:
   //   α_a·n_a + α_b·n_b + β_a·t_a + β_b·t_b + γ gap.
   void ContactAdjointByHand(int i, const ActiveContact& contact) {
     const Pose<double> pose_a = state_.PoseOf(contact.a);
@@ -606,7 +612,8 @@ class EntryBuilder : private internal::LocalEntries<Sink> {
            solved_.problem->contacts[i].driven;
   }
 
-  // What depends on the rows' values alone: prescribed twists, restitution and friction.
+  // The entries that depend on the values of the rows only: prescribed twists, restitution,
+  // friction.
   template <typename T>
   void EmitByRows(int i, const ActiveContact& contact, const ContactRows<T>& rows) {
     const int row = 3 * (*solved_.contact_block)[i];
@@ -646,7 +653,7 @@ class EntryBuilder : private internal::LocalEntries<Sink> {
     }
   }
 
-  // e n·v, by e and by the twists before the impact.
+  // The derivatives of e n·v with respect to e and to the twists before the impact.
   template <typename T>
   void EmitRestitution(const CoefficientSource& restitution, const ActiveContact& contact,
                        const ContactRows<T>& rows, int row) {
@@ -661,8 +668,8 @@ class EntryBuilder : private internal::LocalEntries<Sink> {
                     ValueOf(RowTimes(before_, contact.a, rows.normal_a, contact.b, rows.normal_b)));
   }
 
-  // Without friction σ is the sign of the sliding speed all the same: the one-sided derivative as μ
-  // leaves 0. A correction of poses has none.
+  // Without friction σ is the sign of the sliding speed too, which gives the one-sided derivative
+  // as μ increases from 0. A correction of poses has no friction.
   template <typename T>
   double SignOfSliding(int i, const ActiveContact& contact, const ContactRows<T>& rows) const {
     if (solved_.solution->modes[i] != ContactMode::kClosed) {
@@ -678,7 +685,7 @@ class EntryBuilder : private internal::LocalEntries<Sink> {
     return SlipSign(state_, contact, rows);
   }
 
-  // A pose as it is, with its twist as variables.
+  // A pose in double, with its twist as variables.
   MovingPose<LocalJet> ByTwist(int body, internal::Locals* twists) {
     internal::Locals constants;
     MovingPose<LocalJet> moving{LocalPose(body, &constants), {}};

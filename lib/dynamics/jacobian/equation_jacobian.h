@@ -4,22 +4,22 @@
 // The derivatives of the equations of an instant (assembly.h) with respect to its variables, entry
 // by entry.
 //
-// The equations R(x; w) = 0 determine x = (v⁺, y, λ), or (a, y, λ), or (δ, y, λ), and have the
-// variables w = [poses | twists | parameters | t]; the time is one of accelerations alone.
+// The equations R(x; w) = 0 determine x = (v⁺, y, λ), (a, y, λ) or (δ, y, λ). Their variables are w
+// = [poses | twists | parameters | t]; the time is a variable of accelerations only.
 //   R1 = M x − p − Aᵀ y − Σ (nᵀ λn + tᵀ λt)              rows of moving bodies
 //   R2 = A x − b                                         rows of joints
 //   R3 = n x + c_n, and t x + c_t where sticking         rows of closed contacts
 //        λn − e λ¹n where driven, at a fixed impulse λ¹n of the compression (law kPoisson)
 // K = ∂R/∂x is the matrix of the solved system. This file gives ∂R/∂w at fixed x: each body,
-// spring, force, joint and contact reads a few variables only, is evaluated in a LocalJet of these
-// by the equations that assemble it (equations_inl.h), and handed on as entries (row, variable,
-// value). Tangent and adjoint use the same entries:
+// spring, force, joint and contact reads only a few variables, is evaluated in a LocalJet of these
+// by the equations that assemble it (equations_inl.h), and its entries (row, variable, value) are
+// passed on. Tangent and adjoint use the same entries:
 //   tangent   K ẋ = −(∂R/∂w) ẇ            adjoint   Kᵀ u = x̄,  w̄ −= (∂R/∂w)ᵀ u
 // Open contacts have no rows and no entries.
 //
-// Written by hand are the entries of bodies, of revolute joints, which chains are made of, and of a
-// contact for a single column of the adjoint; a test compares them with the generic route. What
-// they save: jacobian/README.md.
+// The entries of bodies, of revolute and prismatic joints, and of contacts for a single column of
+// the adjoint are written by hand; a test compares them with the templates, and jacobian/README.md
+// has the times that this saves.
 
 #include <vector>
 
@@ -28,7 +28,7 @@
 namespace tangible {
 
 /// Accumulates rhs(row, :) −= value w_dot(variable, :); both row-major with the same number of
-/// columns. Variables that are known not to vary may be marked in `fixed`.
+/// columns. Variables whose derivative is known to be 0 may be marked in `fixed`.
 struct TangentSink {
   const double* w_dot;
   double* rhs;
@@ -60,14 +60,14 @@ struct AdjointSink {
   }
 };
 
-/// AdjointSink for one column: the case in which the adjoint pays.
+/// AdjointSink for one column, for which the adjoint pays most.
 struct SingleAdjointSink {
   const double* u;
   double* w_bar;
   void operator()(int row, int variable, double value) const { w_bar[variable] -= value * u[row]; }
 };
 
-/// Lists the entries themselves (tests, sums of magnitudes).
+/// Lists the entries themselves, for tests and for sums of magnitudes.
 struct JacobianEntry {
   int row, variable;
   double value;
@@ -79,8 +79,8 @@ struct EntryListSink {
   }
 };
 
-/// The solved equations of an instant, as far as their derivatives need them. Of accelerations and
-/// corrections `restitution` is null.
+/// The parts of a solved problem that its derivatives need. `restitution` is null for accelerations
+/// and corrections.
 struct SolvedEquations {
   Level level = Level::kVelocity;
   Instant<double> instant;
@@ -94,10 +94,10 @@ struct SolvedEquations {
   const std::vector<int>* contact_block = nullptr;  ///< −1: open
 };
 
-/// Index of the time among the variables of accelerations.
+/// The index of the time among the variables of accelerations.
 inline int TimeVariable(const ModelStructure& structure) { return structure.num_variables(); }
 
-/// Memory: shapes as LocalJets, the accelerations of all bodies.
+/// Memory for shapes as LocalJets and for the accelerations of all bodies.
 struct LocalJacobianScratch {
   std::vector<LocalJet> numbers_a, numbers_b;
   ContactRateScratch<LocalJet> rates;
@@ -106,7 +106,8 @@ struct LocalJacobianScratch {
 
 enum class JacobianRoute { kByHand, kGeneric };
 
-/// All entries of ∂R/∂w; a velocity with h = 0 is an impact: an instant in which no force acts.
+/// Passes all entries of ∂R/∂w to a sink. The velocity level with h = 0 is an impact: an instant in
+/// which no force acts.
 template <typename Sink>
 void VisitJacobian(const Model<double>& model, const SolvedEquations& solved, JacobianRoute route,
                    LocalJacobianScratch* scratch, const Sink& sink);

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// What the visitors of local derivatives share (equation_jacobian.cc, contact_gradient.cc): the
-// variables of one element as LocalJets, and the entries that its equations have.
+// Shared by equation_jacobian.cc and contact_gradient.cc: the variables of one element as
+// LocalJets, and the entries of its equations.
 
 #include <cmath>
 #include <vector>
@@ -58,7 +58,7 @@ class LocalEntries {
     pose.position.x() = locals->Add(q[0], s_.PoseVariable(body, 0));
     pose.position.y() = locals->Add(q[1], s_.PoseVariable(body, 1));
     pose.angle = locals->Add(q[2], s_.PoseVariable(body, 2));
-    // The angle is a variable: its sine and cosine have one derivative each, and are computed once.
+    // The angle is a variable; its sine and cosine have one derivative each and are computed once.
     const int angle = locals->count() - 1;
     const double cosine = std::cos(q[2]);
     const double sine = std::sin(q[2]);
@@ -69,7 +69,7 @@ class LocalEntries {
     return pose;
   }
 
-  /// A joint's numbers, up to seven.
+  /// The parameters of a joint, up to seven.
   void LocalGeometry(const JointIndex& joint, Locals* locals, LocalJet numbers[7]) {
     for (int i = 0; i < joint.num_geometry; ++i) {
       numbers[i] = LocalNumber(joint.geometry + i, locals);
@@ -84,7 +84,7 @@ class LocalEntries {
     EvaluateJoint(joint.type, pose_a, pose_b, numbers, rows);
   }
 
-  /// A shape's numbers that the feature reads, as LocalJets in their places.
+  /// The shape parameters that the feature reads, as LocalJets in their places.
   ShapeView<LocalJet> LocalShape(const PartIndex& index, bool is_edge, int feature, Locals* locals,
                                  std::vector<LocalJet>* numbers) {
     if (static_cast<int>(numbers->size()) < index.num_numbers) {
@@ -167,7 +167,8 @@ class LocalEntries {
     }
   }
 
-  /// Momentum rows += rowᵀ value, of a row known in double, times one variable.
+  /// Momentum rows += rowᵀ value of a row in double, for the derivative with respect to one
+  /// variable.
   template <typename Row>
   void EmitRowTimesVariable(int a, const Row& row_a, int b, const Row& row_b, int variable,
                             double value) {

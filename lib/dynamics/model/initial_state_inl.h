@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// The state at time 0: poses as drawn, then turned or moved by the joints' initial angles,
-// displacements and rates. Each acts on all that hangs on its bodies[0] side; as relative
-// coordinates they commute, so their order does not matter.
+// The state at time 0: the poses of the scene, turned or moved by the joints' initial angles,
+// displacements and rates. Each of these acts on all bodies that are connected to the joint on the
+// side of bodies[0]. They are relative coordinates and commute, so their order does not matter.
 
 #include <vector>
 
@@ -14,13 +14,13 @@
 
 namespace tangible {
 
-/// Bodies on the bodies[0] side of a joint of a tree.
+/// The bodies on the bodies[0] side of a joint of a tree.
 template <typename T>
 std::vector<bool> SubtreeOfJoint(const BasicScene<T>& scene, int joint) {
   std::vector<bool> inside(scene.bodies.size(), false);
   inside[scene.joints[joint].bodies[0]] = true;
-  // Spreads over the other joints until nothing changes; a scene is built once, so the square is
-  // affordable.
+  // The set spreads over the other joints until nothing changes. This takes quadratic time, which
+  // is affordable because a scene is built once.
   for (bool changed = true; changed;) {
     changed = false;
     for (size_t k = 0; k < scene.joints.size(); ++k) {
@@ -89,7 +89,8 @@ void ApplyInitialJoints(const BasicScene<T>& scene, State<T>* state) {
         state->pose[3 * i + 2] += joint.angle;
       }
     }
-    // Joints whose bodies[1] side was moved are carried along (an axis is fixed in bodies[1]).
+    // The anchors and axes of joints whose bodies[1] has moved, move along (an axis is fixed in
+    // bodies[1]).
     for (size_t m = 0; m < scene.joints.size(); ++m) {
       const int b = scene.joints[m].bodies[1];
       if (m != k && b >= 0 && subtrees[k][b]) {

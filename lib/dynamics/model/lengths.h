@@ -1,17 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// The lengths of a run, of which tolerances on gaps and joints are made: how large the bodies of a
-// pair are, and how finely their coordinates are known.
+// The lengths of which tolerances on gaps and joints are multiples: the size of the bodies of a
+// pair, and the accuracy of their coordinates.
 //
 //   size        r = of the smaller body, m
 //   coordinate  x = max(|x|, |y|, |angle| r) over both bodies, m
 //   rounding    ρ = 64 ε x: what a gap or a joint's error of the pair may be off by, m
 //   touching    1e-10 r + ρ
 //
-// A pose is stored to ε x / 2, and a gap is what a few sums and products leave of poses: 64 is an
-// order of magnitude of room. Where ρ > 1e-7 r no tolerance fits between rounding and what matters
-// to the motion, and a run says so (simulation/stepping/coordinate_watch.h).
+// A pose is stored to ε x / 2, and a gap is computed from poses by a few sums and products: the
+// factor 64 leaves an order of magnitude of room. Where ρ > 1e-7 r no tolerance fits between
+// rounding and the lengths that matter to the motion, and a run prints a warning
+// (simulation/stepping/coordinate_watch.h).
 
 #include <algorithm>
 #include <cmath>
@@ -42,8 +43,8 @@ double AngleOf(const State<T>& state, int a, int b) {
                   std::abs(ValueOf(state.pose[3 * b + 2])));
 }
 
-/// The largest distance of a body's shape and contact points from its centre of mass, m; 0 without
-/// any. A half-plane counts for nothing.
+/// The largest distance of a body's shape and contact points from its centre of mass, m; 0 of a
+/// body without any. Half-planes are not counted.
 double RadiusOf(const Model<double>& model, int body);
 
 /// The box of a body's shape and contact points, grown by `margin`.
@@ -61,13 +62,13 @@ class Lengths {
 
   /// RadiusOf.
   double radius(int body) const { return radius_[body]; }
-  /// The same, but of a moving body without any √(3 I / m), half the length of a uniform rod of
-  /// its mass and inertia. 0 of what has no length at all.
+  /// The same, but √(3 I / m) of a moving body without a shape, which is half the length of a
+  /// uniform rod with its mass and inertia. 0 of a body without any length.
   double size(int body) const { return size_[body]; }
-  /// The smallest radius above 0, m; 1 where there is none.
+  /// The smallest of these radii above 0, m; 1 where none is.
   double smallest_radius() const { return smallest_radius_; }
 
-  /// r: the smaller of the two sizes, m, or the one above 0; 0: neither is.
+  /// r, m: the smaller of the two sizes, or the one that is above 0; 0 where neither is.
   double Size(int a, int b) const {
     return size_[a] > 0.0 && size_[b] > 0.0 ? std::min(size_[a], size_[b])
                                             : std::max(size_[a], size_[b]);

@@ -42,7 +42,7 @@ std::vector<bool> Matches(const std::vector<BodyIndex>& bodies, const std::strin
   return matches;
 }
 
-// Gives out places in the flat index, in the order in which FillNumbers appends.
+// Assigns places in the flat index, in the order in which FillNumbers appends.
 class Places {
  public:
   int Take(int count) {
@@ -117,7 +117,8 @@ void AddJoints(const BasicScene<T>& scene, Places* places, ModelStructure* struc
     }
   }
   std::sort(structure->joined.begin(), structure->joined.end());
-  // One node for all that is fixed; a joint that closes a cycle may have dependent rows.
+  // All fixed bodies are one node of the graph; a joint that closes a cycle may have dependent
+  // rows.
   std::vector<int> root(structure->num_bodies());
   for (int i = 0; i < structure->num_bodies(); ++i) {
     root[i] = structure->bodies[i].block >= 0 ? i : world;
@@ -187,7 +188,7 @@ ShapeView<T> ViewOf(const BasicShape<T>& shape) {
   return {shape.type, shape.numbers.data(), static_cast<int>(shape.numbers.size())};
 }
 
-// Appends the bodies' numbers, in the order of AddBodies.
+// Appends the parameters of the bodies, in the order of AddBodies.
 template <typename T>
 void FillBodies(const BasicScene<T>& scene, std::vector<T>* numbers) {
   for (const BasicBody<T>& body : scene.bodies) {

@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// The model: parameters of type T made from a scene, in one flat index, and the structure that says
-// what each is.
+// The model: the parameters of a scene as numbers of type T with one flat index, and the structure
+// that says what each of them is.
 //
-// The structure (who is joined to whom, which shapes, where each parameter stands) is made once and
-// does not depend on T. The variables of a step are numbered:
+// The structure (which bodies are joined, which shapes they have, where each parameter stands) is
+// built once and does not depend on T. The variables of a step are numbered:
 //   [ poses (3 a body) | twists (3 a body) | parameters ]
-// and each contact, joint, spring, force and body reads only a few of them (equation_jacobian.h).
+// and each contact, joint, spring, force and body depends on only a few of them
+// (equation_jacobian.h).
 
 #include <cstdint>
 #include <memory>
@@ -21,15 +22,15 @@
 
 namespace tangible {
 
-/// A shape of a body, its type and the places of its numbers.
+/// A shape of a body: its type and the places of its parameters.
 struct PartIndex {
   ShapeType type = ShapeType::kNone;
   int numbers = -1;
   int num_numbers = 0;
 };
 
-/// Places of a body's parameters; −1 where it has none. A body has parts: 0 is its shape, those
-/// from 1 on are its contact points, each a polygon of one vertex.
+/// Places of a body's parameters; −1 where it has none. Part 0 of a body is its shape; the parts
+/// from 1 on are its contact points, each a polygon with one vertex.
 struct BodyIndex {
   std::string name;
   Motion motion = Motion::kStatic;
@@ -120,8 +121,8 @@ struct ModelStructure {
   int TwistVariable(int body, int i) const { return 3 * num_bodies() + 3 * body + i; }
   int ParameterVariable(int number) const { return 6 * num_bodies() + number; }
   int num_variables() const { return 6 * num_bodies() + num_parameters; }
-  /// visit(PartPair) for the parts of two bodies that may touch: both shapes, and the contact
-  /// points of each with the shape of the other. Two points never meet.
+  /// Calls visit(PartPair) for the parts of two bodies that may touch: both shapes, and the contact
+  /// points of each with the shape of the other. Two points never touch.
   template <typename Visit>
   void ForEachPartPair(int i, int j, const Visit& visit) const {
     visit(PartPair{0, 0});
@@ -132,9 +133,9 @@ struct ModelStructure {
       visit(PartPair{0, k});
     }
   }
-  /// Whether contacts between two bodies are looked for.
+  /// Whether contacts between two bodies are searched.
   bool MayCollide(int i, int j) const;
-  /// The pair entry that holds for two bodies, or nullptr; of several the last one written.
+  /// The pair entry for two bodies, or nullptr; of several entries the last one in the scene.
   const PairIndex* FindPair(int i, int j) const;
 };
 
@@ -159,14 +160,14 @@ struct Model {
 template <typename T>
 void BuildModel(const BasicScene<T>& scene, Model<T>* model, State<T>* state);
 
-/// The same structure with other parameters: as BuildModel, but reuses `structure`, which was built
-/// from the same scene.
+/// As BuildModel with other parameters, but reuses `structure`, which was built from the same
+/// scene.
 template <typename T>
 void BuildModelWithStructure(const BasicScene<T>& scene,
                              const std::shared_ptr<const ModelStructure>& structure,
                              Model<T>* model, State<T>* state);
 
-/// The discrete part alone.
+/// Builds the structure alone.
 template <typename T>
 std::shared_ptr<const ModelStructure> BuildStructure(const BasicScene<T>& scene);
 

@@ -15,7 +15,7 @@ ParameterDirection DirectionOf(const ParameterPath& path) {
 
 namespace {
 
-// Adds `weight` to the derivatives k of the numbers that parameters[first + k] sets.
+// Adds the weights to the derivatives k of the values that parameters[first + k] sets.
 template <typename T>
 void Seed(const std::vector<ParameterDirection>& parameters, int first, double weight,
           const std::vector<SceneNumber<T>>& numbers) {
@@ -42,7 +42,7 @@ Eigen::SparseMatrix<double> VariableJacobian(const Scene& scene,
                                              const std::vector<ParameterDirection>& parameters) {
   std::vector<Eigen::Triplet<double>> entries;
   const int num_parameters = static_cast<int>(parameters.size());
-  // One copy of the scene, and of its paths, for all passes.
+  // All passes use one copy of the scene and of its paths.
   BasicScene<LocalJet> seeded = CastScene<LocalJet>(scene);
   const std::vector<SceneNumber<LocalJet>> numbers = EnumerateNumbers(&seeded);
   Model<LocalJet> model;

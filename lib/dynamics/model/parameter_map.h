@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// From user parameters to the variables of a model: the initial poses and twists and the flat
-// numbers.
+// From the user's parameters to the variables of a model: the initial poses and twists, and the
+// parameters in their flat index.
 //
-// A parameter sets several numbers of the scene, each as scale · p + offset. The map from scene to
-// model is smooth but not linear (an inertia follows mass and shape, joint angles turn subtrees),
-// so its Jacobian, sparse, is taken where the scene stands.
+// A parameter p sets several values of the scene, each to scale · p + offset. The map from scene to
+// model is smooth but not linear (an inertia follows from mass and shape, joint angles turn
+// subtrees), so its sparse Jacobian is evaluated at the given scene.
 
 #include <Eigen/SparseCore>
 #include <string>
@@ -17,16 +17,16 @@
 
 namespace tangible {
 
-/// One number of a scene that a parameter sets.
+/// One value of a scene that a parameter sets.
 struct SetNumber {
   int number = 0;  ///< index into EnumerateNumbers
   double scale = 1.0;
 };
 
-/// What one parameter changes, to first order.
+/// The values that one parameter changes, to first order.
 using ParameterDirection = std::vector<SetNumber>;
 
-/// The direction of a resolved path: each of its numbers with scale 1.
+/// The direction of a resolved path: each of its values with scale 1.
 ParameterDirection DirectionOf(const ParameterPath& path);
 
 /// d [poses | twists | the model's parameters] / d the scene's parameters: num_variables x
@@ -35,7 +35,7 @@ Eigen::SparseMatrix<double> VariableJacobian(const Scene& scene,
                                              const std::shared_ptr<const ModelStructure>& structure,
                                              const std::vector<ParameterDirection>& parameters);
 
-/// The scene in Jets, with derivative k that of parameters[first + k].
+/// The scene in Jets, whose derivative k is that with respect to parameters[first + k].
 template <typename T>
 BasicScene<T> SeededScene(const Scene& scene, const std::vector<ParameterDirection>& parameters,
                           int first);

@@ -8,7 +8,7 @@
 namespace tangible {
 namespace {
 
-// What of fixed stepping goes with one choice only.
+// Settings of fixed stepping that exclude each other.
 std::string NeedsEvents(const std::string& key, const std::string& have, const std::string& others,
                         const std::string& got) {
   return "/simulation/" + key + ": expected \"" + have + "\" with fixed stepping (the " + others +

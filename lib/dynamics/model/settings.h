@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// Which of a scene's simulation settings the engine can run.
+// Checks whether the engine can run a scene's simulation settings.
 
 #include <string>
 
@@ -10,12 +10,11 @@
 
 namespace tangible {
 
-/// Whether the engine has what the settings ask for; if not, `error` gets one line without the
-/// file's name:
-/// "/simulation/stepping: expected \"fixed\", got \"event\"".
+/// Whether the engine can run these settings; if not, `error` gets one line without the file's
+/// name: "/simulation/stepping: expected \"fixed\", got \"event\"".
 bool CheckSettings(const SimulationSettings& settings, std::string* error);
 
-/// The contact solver's options by a scene's settings.
+/// The contact solver's options that follow from a scene's settings.
 ContactSolverOptions SolverOptionsOf(const SimulationSettings& settings);
 
 }  // namespace tangible

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// The state of a model: poses and twists of all its bodies, those that never move included.
+// The state of a model: poses and twists of all its bodies, including those that never move.
 
 #include <vector>
 

@@ -1,31 +1,33 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// The tolerances of dynamics: of what each is a share, then why. Lengths and coordinates are those
-// of lengths.h; lib/dynamics/README.md has a table.
+// The tolerances of dynamics. Each comment names the quantity of which the tolerance is a fraction,
+// then the reason. Lengths and coordinates are those of lengths.h; lib/dynamics/README.md has the
+// table.
 
 #include <limits>
 
 namespace tangible {
 
-/// Of the coordinate x: ρ, what a gap or a joint's error of the pair may be off by: poses are
-/// stored to ε x / 2, and some sums and products follow.
+/// Of the coordinate x: ρ, the rounding of a gap or of a joint's error of the pair: poses are
+/// stored to ε x / 2, and a few sums and products follow.
 inline constexpr double kCoordinateRounding = 64.0 * std::numeric_limits<double>::epsilon();
-/// Of the size r, and ρ on top: a gap below it touches: between rounding and what gaps are located
-/// to on one side, and what moves a body visibly on the other.
+/// Of the size r, and ρ on top: a contact with a smaller gap touches: the tolerance lies above
+/// rounding and the accuracy to which gaps are located, and far below what moves a body visibly.
 inline constexpr double kTouchShare = 1e-10;
-/// Rad, and rounding on top: the same of an angle: a joint is at its limit.
+/// Rad, and rounding on top: a joint whose angle is nearer to its limit is at the limit.
 inline constexpr double kTouchAngle = 1e-10;
-/// Of the coordinates of two bodies: what the constant of a contact's row is uncertain by, over the
-/// step: modes do not follow it.
+/// Of the coordinates of two bodies: divided by the step, the rounding of the constant of a
+/// contact's row; smaller changes do not change its mode.
 inline constexpr double kCornerRounding = 4.0 * std::numeric_limits<double>::epsilon();
 
-/// Of the step: times that are closer are the same: an end of a step is k dt rounded.
+/// Of the step: times that differ by less are the same, because an end of a step is k dt rounded.
 inline constexpr double kSameTime = 1e-9;
-/// Of speeds at hand: an approach below it is none; an order above what the solver leaves.
+/// Of the speeds of the contact: a slower approach counts as none; the tolerance lies an order of
+/// magnitude above the residual of the solver.
 inline constexpr double kNoApproach = 1e-9;
-/// Of the size of the smaller body, or length of an edge: beyond the meeting of two corners: above
-/// what ends of faces may be apart, below what anything else is.
+/// Of the size of the smaller body, or length of an edge: how far bodies move on after two corners
+/// have met: farther than the ends of faces that count as aligned, and less than any other length.
 inline constexpr double kCorner = 1e-6;
 /// Of the bound of a speed: a speed that exceeds its bound by less is rounding, and no search is
 /// repeated.

@@ -56,6 +56,6 @@ inline constexpr double kInteriorPointGoals[] = {1e-10, 1e-14, 1e-18, 1e-22,
                                                  1e-26, 1e-26, 1e-26, 1e-26};
 /// Of the r M⁻¹ rᵀ of the row: used in turn where masses differ by a factor of 1e9: modes that
 /// alternate with one value settle with another.
-inline constexpr double kStubbornRegularisation[] = {1e-9, 1e-10, kLeastRegularisation};
+inline constexpr double kRegularisationAgainstCycling[] = {1e-9, 1e-10, kLeastRegularisation};
 
 }  // namespace tangible

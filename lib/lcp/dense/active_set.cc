@@ -82,26 +82,26 @@ class Best {
       : problem_(problem), point_(std::move(point)) {
     point_.z = point_.z.cwiseMax(0.0);
     residual_ = ScaledResidual(problem_, point_.v, point_.y, point_.z) + kPolishPreference;
-    ConsiderWithoutCrumbs(point_);
+    ConsiderWithoutNegligible(point_);
   }
   void Offer(LcpVector point) {
     point.z = point.z.cwiseMax(0.0);
     Consider(point);
-    ConsiderWithoutCrumbs(std::move(point));
+    ConsiderWithoutNegligible(std::move(point));
   }
   double Residual() const { return residual_; }
   const LcpVector& Point() const { return point_; }
 
  private:
-  void ConsiderWithoutCrumbs(LcpVector point) {
+  void ConsiderWithoutNegligible(LcpVector point) {
     // An impulse that is a remainder of rounding, such as 1e-48, can be as large as the other terms
     // of its cone row: it would count in full as a violation of that row.
     const LcpScales scales = ComputeScales(problem_, point.v, point.y, point.z);
-    for (const double crumb : kCrumbs) {
-      if (residual_ <= 2.0 * crumb) return;
+    for (const double negligible : kNegligibleImpulses) {
+      if (residual_ <= 2.0 * negligible) return;
       bool cleaned = false;
       for (Index i = 0; i < point.z.size(); ++i) {
-        if (point.z[i] == 0.0 || point.z[i] > crumb * scales.force[i]) continue;
+        if (point.z[i] == 0.0 || point.z[i] > negligible * scales.force[i]) continue;
         point.z[i] = 0.0;
         cleaned = true;
       }

@@ -26,10 +26,10 @@ constexpr int kGuessRounds = 4;
 
 // Maximum number of proximal steps.
 constexpr int kProximalRounds = 24;
-// After this many rounds different fractions of the least shift are used in turn, because modes
+// From this round on different fractions of the least shift are used in turn against cycling: modes
 // that alternate from round to round with one shift usually settle with another.
-constexpr int kStubbornRound = 9;
-constexpr double kStubbornShares[] = {0.1, 0.01, 1.0};
+constexpr int kCyclingRound = 9;
+constexpr double kSharesAgainstCycling[] = {0.1, 0.01, 1.0};
 constexpr int kBasisRounds = 5;
 
 // Proximal steps go on, at most this many rounds, until the residual is this fraction of the
@@ -114,8 +114,8 @@ class Portfolio {
         z = (z + LimitedBy(z, change) * change).cwiseMax(0.0);
       }
       last_change = change;
-      shift = round < kStubbornRound ? std::max(least_shift, 0.1 * shift)
-                                     : least_shift * kStubbornShares[round % 3];
+      shift = round < kCyclingRound ? std::max(least_shift, 0.1 * shift)
+                                    : least_shift * kSharesAgainstCycling[round % 3];
     }
     return solved > 0;
   }

@@ -85,6 +85,6 @@ inline constexpr double kFirstShift = 1e-4;
 inline constexpr double kLeastShifts[] = {1e-6, 1e-9};
 /// Of the scale of the impulse: smaller impulses are tried as 0, because in a friction cone without
 /// larger terms they would count in full.
-inline constexpr double kCrumbs[] = {1e-15, 1e-13, 1e-11, 1e-9, 1e-7};
+inline constexpr double kNegligibleImpulses[] = {1e-15, 1e-13, 1e-11, 1e-9, 1e-7};
 
 }  // namespace tangible

@@ -3,10 +3,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <ctime>
 #include <functional>
 
 #include "tangible/dynamics/model/settings.h"
+#include "tangible/math/cpu_time.h"
 #include "tangible/scene/scene_names.h"
 #include "tangible/simulation/certificate/certify.h"
 #include "tangible/simulation/derivatives/rollout_directional.h"
@@ -57,13 +57,6 @@ std::string CheckNumbers(const GradientProblem& problem) {
 
 // Derivatives of the losses with respect to the outputs (outputs x losses), given the outputs.
 using OutputSeed = std::function<MatrixX<double>(const VectorX<double>& values)>;
-
-// CPU time of this thread, which excludes other work on the machine.
-double Seconds() {
-  timespec time{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
-  return static_cast<double>(time.tv_sec) + static_cast<double>(time.tv_nsec) / 1e9;
-}
 
 GradientProblem MakeProblem(const Scene& scene, const std::vector<ParameterPath>& parameters) {
   GradientProblem problem{scene, parameters, {}, BuildStructure(scene), {}, {}, {}};
@@ -182,9 +175,9 @@ bool RunMethod(const GradientProblem& problem, const GradientOptions& options,
 
 bool TimeRollout(const GradientProblem& problem, Stepper* stepper, GradientResult* result) {
   State<double> final;
-  const double start = Seconds();
+  const double start = ThreadCpuSeconds();
   const RolloutReport report = Rollout(problem.model, problem.initial, {}, stepper, &final);
-  result->all_rollout_seconds.push_back(Seconds() - start);
+  result->all_rollout_seconds.push_back(ThreadCpuSeconds() - start);
   result->message = FailureOf(problem, report);
   result->open_joint = OpenJointOf(problem.model, final, report.time);
   return result->message.empty();
@@ -276,11 +269,11 @@ GradientResult Differentiate(const GradientProblem& problem, const GradientOptio
     if (!TimeRollout(problem, &stepper, &result)) {
       return result;
     }
-    const double start = Seconds();
+    const double start = ThreadCpuSeconds();
     if (!RunMethod(problem, options, output_seed, &tape, &result, derivative)) {
       return result;
     }
-    result.all_seconds.push_back(Seconds() - start);
+    result.all_seconds.push_back(ThreadCpuSeconds() - start);
   }
   const auto best = [](const std::vector<double>& times) {
     return *std::min_element(times.begin(), times.end());

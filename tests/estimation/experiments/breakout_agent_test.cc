@@ -7,7 +7,7 @@
 #include <cmath>
 
 #include "tangible/estimation/experiments/breakout/agent/agent.h"
-#include "tangible/estimation/experiments/random.h"
+#include "tangible/math/random.h"
 
 namespace tangible {
 namespace {

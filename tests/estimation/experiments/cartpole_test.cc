@@ -8,7 +8,7 @@
 #include <numbers>
 
 #include "tangible/estimation/experiments/cartpole/cart_pole_study.h"
-#include "tangible/estimation/experiments/random.h"
+#include "tangible/math/random.h"
 
 namespace tangible {
 namespace {

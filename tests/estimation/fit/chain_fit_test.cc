@@ -160,9 +160,9 @@ TEST(ChainFit, ErrorFallsInProportionToTheStep) {
     const double error = result.estimate(0) - kMass;
     const DiscretisationCheck check = CheckDiscretisation(InputOf(problem), {}, result);
     ASSERT_EQ(check.status, FitStatus::kConverged) << check.message;
-    std::printf("dt %.4f s: mass %.6f kg, error %+.6f kg, foretold %+.6f kg\n", dt,
+    std::printf("dt %.4f s: mass %.6f kg, error %+.6f kg, predicted %+.6f kg\n", dt,
                 result.estimate(0), error, check.bias(0));
-    // The data's own step shifts them too: foretold is the distance from dt = 0, the error that
+    // The data's own step shifts them too: predicted is the distance from dt = 0, the error that
     // from dt = 5e-6.
     EXPECT_NEAR(error, check.bias(0) * (dt - fine_step) / dt, 0.05 * std::abs(error));
     if (previous != 0.0) {

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tangible/estimation/problem/tolerances.h"
 #include "tangible/simulation/stepping/step.h"
 
 namespace tangible {

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "tangible/estimation/experiments/random.h"
+#include "tangible/math/random.h"
 
 namespace tangible {
 namespace {
@@ -36,7 +36,7 @@ bool Agent::Start(const Picture& picture) {
     const Arena& arena = detector_->arena();
     const Sight sight = detector_->Look(picture);
     if (!knowledge_.paddle) {
-      // The narrow paddle goes no further than the wide one.
+      // The narrow paddle has the same range as the wide one.
       knowledge_.paddle.emplace(arena.left, arena.right - sight.paddle.width);
     }
     flights_ = std::make_unique<FlightModel>(arena, &knowledge_.responses);
@@ -57,7 +57,7 @@ bool Agent::Start(const Picture& picture) {
 }
 
 PaddlePath Agent::PathOf(const PaddleState& before, int direction, const PaddleState& after) const {
-  // What the model says of each frame, moved so that it ends where the paddle was seen.
+  // The places in each frame by the model, moved so that the last one is where the paddle was seen.
   PaddlePath path;
   path.width = paddle_width_;
   const double end = knowledge_.paddle->After(before, direction).x;
@@ -98,7 +98,7 @@ void Agent::Learn(const Sight& sight, double reward) {
 void Agent::Predict(const Sight& sight) {
   left_ -= kFrameSkip;
   const BallState& ball = tracker_->ball();
-  // Below all bricks the way down is sure, and is aimed for.
+  // Below all bricks the flight to the paddle is certain, so that the agent aims.
   const Rectangle& last = detector_->arena().bricks.back();
   const bool below = ball.v.y() > 0.0 && ball.at.y() > last.y + last.height;
   const bool stale = !flight_ || tracker_->surprised() || tracker_->returned() || left_ < 0.0;

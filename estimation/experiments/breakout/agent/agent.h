@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// Learns to play Breakout from pictures, rewards and lives alone.
+// The agent that learns to play Breakout from pictures, rewards and lives.
 //
-// It begins with random buttons; meanwhile and ever after it learns how the paddle answers
-// (paddle_model.h) and how the ball leaves what it meets (responses.h). It follows the ball
-// (ball_tracker.h), predicts by event stepping where it comes down (flight.h), chooses where the
-// paddle should meet it (aim.h) and brings the paddle there (paddle_control.h).
+// It begins with random buttons. Then and during the whole game it learns how the paddle responds
+// to buttons (paddle_model.h) and with which velocity the ball leaves a contact (responses.h). It
+// follows the ball (ball_tracker.h), predicts by event stepping where the ball comes down
+// (flight.h), chooses where the paddle should meet it (aim.h) and moves the paddle there
+// (paddle_control.h).
 
 #include <memory>
 #include <optional>
@@ -19,7 +20,7 @@
 
 namespace tangible {
 
-/// What is learned.
+/// The knowledge that is learned.
 struct Knowledge {
   std::optional<PaddleModel> paddle;  ///< none before the first picture
   Responses responses;
@@ -28,7 +29,7 @@ struct Knowledge {
 struct AgentOptions {
   unsigned seed = 0;
   int random_steps = 250;  ///< of kFrameSkip frames, before it plays
-  /// Where given, it is used as it is and nothing is learned.
+  /// If given, this knowledge is used and nothing is learned.
   std::optional<Knowledge> given;
 };
 
@@ -36,7 +37,7 @@ class Agent {
  public:
   explicit Agent(AgentOptions options);
 
-  /// A new game begins: what was learned stays.
+  /// Begins a new game and keeps what was learned.
   void StartGame();
   /// The button for the next kFrameSkip frames, with the picture after those before, the points
   /// won in them and the lives left.
@@ -45,10 +46,10 @@ class Agent {
   bool plays() const { return steps_ >= options_.random_steps; }
   long steps() const { return steps_; }
   const Knowledge& knowledge() const { return knowledge_; }
-  /// Empty, or why it cannot play.
+  /// An error that prevents play, or empty.
   const std::string& error() const { return error_; }
   const std::optional<Detector>& detector() const { return detector_; }
-  /// Where it believes that the ball comes down, for replays.
+  /// The predicted place where the ball comes down, for replays.
   const std::optional<Flight>& prediction() const { return flight_; }
   long num_event_steps() const { return flights_ == nullptr ? 0 : flights_->num_steps(); }
   long num_plans() const { return control_ == nullptr ? 0 : control_->num_plans(); }
@@ -70,7 +71,7 @@ class Agent {
   std::optional<BallTracker> tracker_;
   std::string error_;
   long steps_ = 0, num_random_aims_ = 0;
-  // Of the game.
+  // The state of the current game.
   bool first_ = true;  ///< no picture of it was seen
   bool fresh_ = true;  ///< no button of it was pressed
   int lives_ = 0;

@@ -7,7 +7,7 @@
 #include <set>
 #include <tuple>
 
-#include "tangible/estimation/experiments/random.h"
+#include "tangible/math/random.h"
 
 namespace tangible {
 namespace {
@@ -111,15 +111,15 @@ std::vector<AimOption> AimOptions(const Responses& responses, const Vector2<doub
 
 namespace {
 
-// The chance that a normal number of that mean and deviation is below x.
+// The probability that a normal variable with this mean and deviation is below x.
 double Below(double x, double mean, double deviation) {
   return 0.5 * std::erfc((mean - x) / (deviation * std::numbers::sqrt2));
 }
 
-// What meeting the ball at an offset is likely to be worth.
+// The expected value of meeting the ball at an offset.
 double Worth(const std::vector<AimOption>& options, const std::vector<double>& values,
              double offset, double deviation) {
-  // The ball is in whole pixels, and options end between them.
+  // The ball is at whole pixels, and options end between them.
   double worth = -kLife;
   for (size_t i = 0; i < options.size(); ++i) {
     const double chance = Below(options[i].high + 0.5, offset, deviation) -
@@ -140,7 +140,7 @@ Aim ChooseAim(const AimProblem& problem, const Responses& responses, FlightModel
   aim.random = break_loop || !search.found();
   std::vector<double> values = search.values();
   if (aim.random) {
-    // One of them, whatever it may be worth.
+    // One option at random, whatever its value.
     std::fill(values.begin(), values.end(), 0.0);
     values[static_cast<size_t>(Uniform(random) * static_cast<double>(values.size()))] = kLife;
   }

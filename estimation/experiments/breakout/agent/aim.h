@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// Where on the paddle the ball should be met, so that it soon breaks bricks.
+// Chooses the place on the paddle at which the ball should be met, so that it soon breaks bricks.
 //
-// The paddle's places fall into options, intervals of places that send the ball the same way. From
-// each option the ball's further flight is followed by event stepping, return after return, breadth
-// first, to the first returns that break bricks: of these the one with the most points, discounted
-// by the frames until then, counts most. Places of the ball that were reached before are not
-// followed again, so that the search ends, and loops that break nothing are left as soon as any
-// sequence of returns leads out of them. Where none is found, or the ball has come back too often
-// without breaking anything, an option is drawn at random.
+// The places on the paddle are divided into options: intervals that give the ball the same
+// velocity. From each option the ball's further flight is followed by event stepping, return after
+// return, breadth first, to the first returns that break bricks: of these the one with the most
+// points, discounted by the frames until then, counts most. Places of the ball that were reached
+// before are not followed again, so that the search ends, and loops that break nothing are left as
+// soon as any sequence of returns leads out of them. If no such return is found, or the ball has
+// come back too often without breaking a brick, an option is drawn at random.
 
 #include <random>
 
@@ -23,7 +23,7 @@ struct AimOption {
   Vector2<double> after{0.0, 0.0};
 };
 
-/// For a ball that comes to the paddle with that velocity.
+/// The options for a ball that comes to the paddle with that velocity.
 std::vector<AimOption> AimOptions(const Responses& responses, const Vector2<double>& v,
                                   double width);
 
@@ -39,8 +39,8 @@ struct AimProblem {
 
 struct Aim {
   AimOption option;
-  /// Where the ball should be met: what is likely to be worth most, with the paddle's uncertainty
-  /// and a life lost where the ball is missed.
+  /// The offset with the largest expected value, given the uncertainty of the paddle's place and
+  /// the loss of a life if the ball is missed.
   double offset = 0.0;
   int flights = 0;      ///< that were followed
   bool random = false;  ///< nothing was found

@@ -3,19 +3,20 @@
 
 #include <cmath>
 
+#include "tangible/estimation/experiments/breakout/agent/tolerances.h"
+
 namespace tangible {
 namespace {
 
-constexpr double kAsPredicted = 1.01;  // pixels: speeds of 1.5 are 1 and 2 in turn
-constexpr double kFastest = 6.0;       // pixels a frame: no ball is faster
+constexpr double kFastest = 6.0;  // pixels a frame: no ball is faster
 
 }  // namespace
 
-// The ball four frames later, with what it meets listed in met_.
+// The ball four frames later; its contacts are listed in met_.
 BallState BallTracker::Advance(const Bricks& bricks, const PaddlePath& paddle) {
   BallState ball = ball_;
   double frames = 0.0;
-  // At most one return; below the paddle's rows nothing is met.
+  // There is at most one return, and no contact below the rows of the paddle.
   for (int part = 0; part < 2; ++part) {
     const Flight flight = flights_->Predict(ball, bricks, kFrameSkip - frames);
     for (const FlightMeeting& one : flight.meetings) {
@@ -80,14 +81,14 @@ void BallTracker::See(const Sight& sight, const Bricks& bricks_before, const Pad
     ball_.v = predicted.v;
     ball_.armed = predicted.armed;
     if (met_.size() == met_before && !was_hidden) {
-      // Believed: over a whole step without a meeting the difference is exact.
+      // The velocity is accepted: over a whole step without a contact the difference is exact.
       ball_.v = v;
       believed_ = true;
       LearnFrom(v);
     }
   } else {
     surprised_ = true;
-    // From a velocity that was not believed no meetings follow.
+    // A velocity that was not accepted does not predict contacts.
     if (!believed_) met_.resize(met_before);
     believed_ = false;
     const Bricks broken = bricks_before & ~sight.bricks;

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// Follows the ball from picture to picture with the flight model, and learns from what it meets.
+// Follows the ball from picture to picture with the flight model, and learns from its contacts.
 //
 // A ball that is where it was predicted has the predicted velocity. Otherwise its velocity is the
-// difference of its places, and is believed when the next picture agrees. When a velocity is
-// believed after exactly one meeting, that meeting is learned.
+// difference of its places, and is accepted when the next picture agrees. When a velocity is
+// accepted after exactly one contact, that contact is learned.
 
 #include <optional>
 
@@ -13,7 +13,7 @@
 
 namespace tangible {
 
-/// Where the paddle was between two pictures: of each frame its left edge.
+/// The left edge of the paddle in each frame between two pictures.
 struct PaddlePath {
   std::array<double, kFrameSkip + 1> x{};
   double width = 0.0;
@@ -24,16 +24,17 @@ class BallTracker {
   BallTracker(FlightModel* flights, Responses* responses)
       : flights_(flights), responses_(responses) {}
 
-  /// The ball of this picture, the bricks before and in it, the paddle since the last one.
+  /// Processes a picture: its ball, the bricks before it and in it, and the paddle since the last
+  /// picture.
   void See(const Sight& sight, const Bricks& bricks_before, const PaddlePath& paddle);
   /// Whether the ball was seen lately.
   bool in_play() const { return seen_ && unseen_ <= kPatience; }
   /// Whether its velocity is known.
   bool known() const { return in_play() && known_; }
   const BallState& ball() const { return ball_; }
-  /// Of the last See: it was not where it was predicted to be.
+  /// Whether in the last See the ball was not at its predicted place.
   bool surprised() const { return surprised_; }
-  /// Of the last See: the paddle returned the ball, or was predicted to.
+  /// Whether in the last See the paddle returned the ball, or was predicted to.
   bool returned() const { return returned_; }
 
  private:

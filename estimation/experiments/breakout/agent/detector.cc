@@ -49,7 +49,7 @@ bool Detector::Start(const Picture& picture) {
     y = end;
   }
   if (arena_.bricks.empty() || arena_.bricks.size() > kMostBricks) return false;
-  // The paddle is the lowest thing that is wide.
+  // The paddle is the lowest wide object.
   int bottom = kPictureHeight - 1;
   while (bottom > middle &&
          LongestRun(picture, bottom, arena_.left, arena_.right).width < kLeastPaddle) {
@@ -75,7 +75,7 @@ bool Detector::Start(const Picture& picture) {
 void Detector::FindBricks(const Picture& picture, Sight* sight) {
   for (size_t i = 0; i < arena_.bricks.size(); ++i) {
     const Rectangle& brick = arena_.bricks[i];
-    // The ball hides one corner at most.
+    // The ball hides at most one corner.
     int corners = 0;
     for (const int y : {brick.y, brick.y + brick.height - 1}) {
       for (const int x : {brick.x, brick.x + brick.width - 1}) {
@@ -92,8 +92,8 @@ void Detector::FindBricks(const Picture& picture, Sight* sight) {
 }
 
 void Detector::FindPaddle(const Picture& picture, Sight* sight) {
-  // The ball may cover a part of the paddle, or lengthen it at an end: then what was seen last says
-  // how wide it is, and the middle row that the ball does not touch says where.
+  // The ball may cover a part of the paddle, or appear to lengthen it at an end. Then its width is
+  // the last one that was seen, and its place that of the middle row that the ball does not touch.
   Rectangle shortest{0, 0, kPictureWidth, 1};
   for (int y = arena_.paddle_y; y < arena_.paddle_y + arena_.paddle_height; ++y) {
     const Rectangle run = LongestRun(picture, y, arena_.left, arena_.right);
@@ -104,7 +104,7 @@ void Detector::FindPaddle(const Picture& picture, Sight* sight) {
   sight->paddle = {shortest.x, arena_.paddle_y, shortest.width, arena_.paddle_height};
   if (shortest.width > paddle_.width && sight->bricks != Bricks() &&
       shortest.width <= paddle_.width + 2) {
-    // Lengthened: the end that is nearer to where it was stays.
+    // If the paddle appears longer, the end that is nearer to its last place is kept.
     const int right = shortest.x + shortest.width - paddle_.width;
     if (std::abs(right - paddle_.x) < std::abs(shortest.x - paddle_.x)) sight->paddle.x = right;
     sight->paddle.width = paddle_.width;
@@ -134,7 +134,8 @@ void Detector::FindBall(const Picture& picture, Sight* sight) const {
   const int across = right + 1 - left, down = bottom + 1 - top;
   if (count == 0 || count != across * down) return;
   sight->ball = {left, top, across, down};
-  // A part of it is hidden by the paddle, or below the picture: its upper left corner is seen.
+  // A part of the ball may be hidden by the paddle or below the picture; its upper left corner is
+  // seen.
   const bool cut = bottom + 1 == paddle.y || bottom + 1 == kPictureHeight;
   sight->ball_seen = across == 2 && (down == 4 || (cut && down < 4));
 }

@@ -3,9 +3,9 @@
 //
 // Finds walls, bricks, paddle and ball in pictures.
 //
-// What it takes for granted: a border of one colour around a black arena; rows of 18 bricks, each
-// row of one colour; a paddle of one colour below them; a ball of another colour than what is
-// behind it. Where these things are, and how large, it finds.
+// It assumes a border of one colour around a black arena; rows of 18 bricks, each row of one
+// colour; a paddle of one colour below them; and a ball whose colour differs from the background.
+// It finds the places and sizes of these objects.
 
 #include <bitset>
 #include <vector>
@@ -23,7 +23,7 @@ struct Rectangle {
   int x = 0, y = 0, width = 0, height = 0;
 };
 
-/// What stands still: the inner faces of the walls and the places of bricks.
+/// The fixed objects: the inner faces of the walls and the places of bricks.
 struct Arena {
   int left = 0, right = 0, top = 0;
   std::vector<Rectangle> bricks;
@@ -38,7 +38,7 @@ struct Sight {
 
 class Detector {
  public:
-  /// False where the picture shows no arena as above.
+  /// Returns false if the picture does not show such an arena.
   bool Start(const Picture& picture);
   bool started() const { return !arena_.bricks.empty(); }
   const Arena& arena() const { return arena_; }

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tangible/estimation/experiments/breakout/agent/tolerances.h"
 #include "tangible/scene/scene.h"
 
 namespace tangible {
@@ -12,10 +13,7 @@ namespace {
 // Bodies: the ball, walls, the paddle's line, bricks.
 constexpr int kBall = 0, kLeftWall = 1, kRightWall = 2, kCeiling = 3, kLine = 4, kFirstBrick = 5;
 constexpr int kMostPlaced = 8;          // bricks in the scene: a row is met in at most three
-constexpr double kBeside = 1.0;         // pixels beside the ball's way that count as on it
 constexpr double kAway = -1000.0;       // m: where bricks are that do not count
-constexpr double kBeyond = 0.01;        // frames: a step ends so long after the walls are reached
-constexpr double kSameFrame = 1e-6;     // frames: rounding of the time of a meeting
 constexpr double kFarFrames = 10000.0;  // longer than any flight from wall to wall
 constexpr int kMostMeetings = 60;       // of a flight
 
@@ -52,14 +50,14 @@ Scene SceneOf(const Arena& arena) {
     brick.position = {0.0, kAway};
     scene.bodies.push_back(brick);
   }
-  // It never turns.
+  // The ball does not rotate.
   BasicJoint<double> upright;
   upright.name = "upright";
   upright.type = JointType::kFixedAngle;
   upright.bodies[0] = kBall;
   scene.joints = {upright};
   scene.simulation.stepping = Stepping::kEvent;
-  // Without forces its ways are straight and it stays upright: any integrator is exact.
+  // Without forces the ball flies straight and does not rotate, so that any integrator is exact.
   scene.simulation.integrator = Integrator::kSemiImplicitEuler;
   scene.simulation.joint_correction = JointCorrection::kNone;
   scene.simulation.dt = kFarFrames;
@@ -80,10 +78,10 @@ void FlightModel::PlaceBricks(const BallState& ball, const Bricks& bricks, doubl
   placed_.clear();
   const int rows = static_cast<int>(arena_.bricks.size()) / kBrickColumns;
   for (int i = 0; i < rows; ++i) {
-    // Rows in the order in which the ball comes to them.
+    // The rows in the order in which the ball reaches them.
     const int row = ball.v.y() < 0.0 ? rows - 1 - i : i;
     const Rectangle& first = arena_.bricks[static_cast<size_t>(row) * kBrickColumns];
-    // When the ball overlaps the row, and the way that it makes meanwhile.
+    // The times at which the ball overlaps the row, and its horizontal path meanwhile.
     double from = (first.y - kBallDown - ball.at.y()) / ball.v.y();
     double to = (first.y + first.height - ball.at.y()) / ball.v.y();
     if (from > to) std::swap(from, to);
@@ -95,8 +93,8 @@ void FlightModel::PlaceBricks(const BallState& ball, const Bricks& bricks, doubl
     for (int column = 0; column < kBrickColumns; ++column) {
       const int brick = row * kBrickColumns + column;
       const Rectangle& place = arena_.bricks[brick];
-      if (!bricks[brick] || place.x > right + kBallAcross + kBeside ||
-          place.x + place.width < left - kBeside) {
+      if (!bricks[brick] || place.x > right + kBallAcross + kBesideWay ||
+          place.x + place.width < left - kBesideWay) {
         continue;
       }
       double* pose = &state_.pose[3 * (kFirstBrick + placed_.size())];
@@ -130,7 +128,8 @@ bool FlightModel::FirstMeeting(const BallState& ball, const Bricks& bricks, doub
                       : ball.v.y() < 0.0 ? (arena_.top - ball.at.y()) / ball.v.y()
                                          : kFarFrames;
   const double length =
-      std::min(frames, std::max(0.0, std::min(across, down > -1.0 ? down : kFarFrames))) + kBeyond;
+      std::min(frames, std::max(0.0, std::min(across, down > -1.0 ? down : kFarFrames))) +
+      kPassedWall;
   Place(ball, bricks, length);
   stepper_->ClearGuess();
   ++num_steps_;
@@ -173,7 +172,7 @@ void FlightModel::Turn(int body, const Vector2<double>& rigid, Flight* flight) {
     ball.armed = true;
   } else {
     ball.at.x() = body == kLeftWall ? arena_.left : arena_.right - kBallAcross;
-    // Beside bricks the walls do not count.
+    // Contacts with walls beside bricks do not count.
     const Rectangle &first = arena_.bricks.front(), &last = arena_.bricks.back();
     const bool beside = ball.at.y() >= first.y && ball.at.y() <= last.y + last.height;
     ball.armed = ball.armed || !beside;
@@ -195,7 +194,7 @@ Flight FlightModel::Predict(const BallState& ball, const Bricks& bricks, double 
     const bool below = end.at.y() + kBallDown > arena_.paddle_y && end.v.y() > 0.0;
     const bool meets = !below && static_cast<int>(flight.meetings.size()) < kMostMeetings &&
                        FirstMeeting(end, flight.bricks, left, &body, &when, &rigid);
-    // The paddle turns what overlaps it, all others what touches them.
+    // The paddle reflects a ball that overlaps it, all other bodies a ball that touches them.
     const double frame = !meets          ? left
                          : body == kLine ? std::floor(when + kSameFrame) + 1.0
                                          : std::ceil(when - kSameFrame);
@@ -208,7 +207,7 @@ Flight FlightModel::Predict(const BallState& ball, const Bricks& bricks, double 
     flight.frames += frame;
     if (!meets) break;
     if (body == kLine) {
-      // A side wall may come in the same frame.
+      // The ball may meet a side wall in the same frame.
       end.at.x() = std::clamp(end.at.x(), static_cast<double>(arena_.left),
                               static_cast<double>(arena_.right - kBallAcross));
       flight.arrives = true;

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// Where the ball will fly: the engine's event stepping in a scene of ball, walls, bricks and the
-// line of the paddle, 1 m a pixel and 1 s a frame, y upwards. Of the bricks the scene has the few
-// that the ball's straight way reaches first: others cost time and are not met.
+// Predicts the flight of the ball by event stepping in a scene of ball, walls, bricks and the line
+// of the paddle, with 1 m for a pixel, 1 s for a frame, and y upwards. The scene has only the few
+// bricks that the straight flight of the ball reaches first.
 //
-// Each meeting is located by the engine, which also says how a rigid ball would leave. The game
-// differs from it in three ways that are modelled here:
+// The engine locates each contact and gives the velocity of a rigid ball after it. The game differs
+// from that in three ways that are modelled here:
 //   - it moves the ball by whole frames: a meeting counts at the end of its frame. Walls put the
 //     ball back to their faces; bricks and the paddle do not;
 //   - the ball leaves with the velocity that Responses say;
@@ -38,8 +38,9 @@ struct FlightMeeting {
 
 struct Flight {
   std::vector<FlightMeeting> meetings;
-  /// Whether it comes down to the paddle within the frames given, and then how: `end` is the ball
-  /// in the first frame in which it overlaps the paddle's rows. Else `end` is after all frames.
+  /// Whether the ball comes down to the paddle within the given frames. If it does, `end` is the
+  /// ball in the first frame in which it overlaps the rows of the paddle; otherwise `end` is the
+  /// ball after all frames.
   bool arrives = false;
   double frames = 0.0;
   BallState end;
@@ -56,7 +57,7 @@ class FlightModel {
   long num_steps() const { return num_steps_; }
 
  private:
-  /// The first meeting within `frames`; false where there is none.
+  /// Finds the first contact within `frames`; returns false where there is none.
   bool FirstMeeting(const BallState& ball, const Bricks& bricks, double frames, int* body,
                     double* when, Vector2<double>* rigid);
   void Place(const BallState& ball, const Bricks& bricks, double frames);

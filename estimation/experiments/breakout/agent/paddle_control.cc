@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "tangible/control/ilqr.h"
+#include "tangible/estimation/experiments/breakout/agent/tolerances.h"
 
 namespace tangible {
 namespace {
@@ -12,14 +13,13 @@ namespace {
 constexpr int kComparedSteps = 5;  // 3⁵ sequences
 constexpr int kLongestPlan = 12;   // steps
 constexpr int kIterations = 4;     // of iLQR
-constexpr double kThere = 4.0;     // pixels: nearer than any press brings it
-constexpr double kAtRest = 1.0;    // pixels a frame
 constexpr double kPressed = 0.5;   // a planned press beyond it becomes one
-// Of the comparison, pixels²: out of the interval, a press, a pixel a frame as the ball is met.
+// Costs of the comparison, pixels²: outside of the interval, of a press, and of a pixel a frame as
+// the ball is met.
 constexpr double kOutside = 25.0, kPress = 0.05, kMoving = 0.1;
-// What is left of a step's uncertainty with each step after it, in which it can be corrected.
+// The factor by which each later step reduces the uncertainty of a step, because it can correct it.
 constexpr double kCorrected = 0.4;
-// Of a plan: the distance at the end, over the way, and a press.
+// Weights of a plan: of the distance at the end, of that on the way, and of a press.
 constexpr double kEndWeight = 1.0, kWayWeight = 0.05, kPressWeight = 20.0;
 
 CostTerm Term(CostTerm::Kind kind, int index, double target, double weight, bool at_end) {
@@ -41,8 +41,8 @@ int PaddleControl::Direction(const PaddleState& state, const PaddleGoal& goal) {
 }
 
 int PaddleControl::Plan(const PaddleState& state, const PaddleGoal& goal) {
-  // A paddle that waits where it should be has nothing to plan.
-  if (std::abs(state.x - goal.x) < kThere && std::abs(state.v) < kAtRest) return 0;
+  // A paddle that waits at its place needs no plan.
+  if (std::abs(state.x - goal.x) < kAtPlace && std::abs(state.v) < kPaddleRests) return 0;
   ++num_plans_;
   const int steps = std::min(kLongestPlan, static_cast<int>(std::ceil(goal.frames / kFrameSkip)));
   using Kind = CostTerm::Kind;
@@ -65,7 +65,7 @@ int PaddleControl::Plan(const PaddleState& state, const PaddleGoal& goal) {
 PaddleControl::Best PaddleControl::Compare(const PaddleState& state, const PaddleGoal& goal,
                                            int frames) const {
   Best best{HUGE_VAL, 0};
-  // No press first: of equal costs it wins.
+  // No press comes first, so that it is chosen among equal costs.
   for (const int direction : {0, -1, 1}) {
     const PaddleState after = model_->After(state, direction, std::min(frames, kFrameSkip));
     const int later = (frames - 1) / kFrameSkip;  // steps

@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// Buttons that bring the paddle to where the ball will be.
+// Chooses buttons that move the paddle to the ball.
 //
 // While there is time, iLQR (lib/control) plans presses in [−1, 1] over the learned law, and the
-// nearest button is pressed. In the last steps all sequences of buttons are compared with the
-// learned model, means included: whole presses move the paddle by more than a section is wide.
+// nearest button is pressed. In the last steps all sequences of buttons are compared by the learned
+// model with its means, because whole presses move the paddle by more than the width of a section.
 
 #include "tangible/estimation/experiments/breakout/agent/paddle_model.h"
 
 namespace tangible {
 
-/// Where the left edge should be after so many frames.
+/// The desired place of the left edge after a number of frames.
 struct PaddleGoal {
   double x = 0.0;
   double low = 0.0, high = 0.0;  ///< what is as good to the ball
@@ -22,7 +22,7 @@ class PaddleControl {
  public:
   explicit PaddleControl(const PaddleModel* model) : model_(model) {}
 
-  /// −1, 0 or 1: of the next step.
+  /// The direction of the next step: −1, 0 or 1.
   int Direction(const PaddleState& state, const PaddleGoal& goal);
   long num_plans() const { return num_plans_; }
 

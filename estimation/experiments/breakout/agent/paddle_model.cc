@@ -52,7 +52,7 @@ Button ButtonOf(int direction) {
   return direction > 0 ? Button::kRight : direction < 0 ? Button::kLeft : Button::kNone;
 }
 
-// The errors of all steps that were seen, as a least-squares problem in the four numbers.
+// The errors of all recorded steps, as a least-squares problem in the four parameters.
 class PaddleWays : public LeastSquaresProblem {
  public:
   explicit PaddleWays(const PaddleModel& model) : model_(model) {
@@ -90,7 +90,7 @@ class PaddleWays : public LeastSquaresProblem {
       if (step.begins) v = Number(0.0);
       Number x(step.before.x);
       for (int frame = 0; frame < kFrameSkip; ++frame) law.Frame(Number(step.direction), &x, &v);
-      // A wall tells nothing of the law.
+      // A step that ends at a wall carries no information about the law.
       const bool at_wall = model_.AtWall(step.to) || model_.AtWall(step.before.x);
       const Number error = at_wall ? Number(0.0) : (x - step.to) / kSigma;
       evaluation->residuals[i] = error.a;
@@ -114,7 +114,7 @@ class PaddleWays : public LeastSquaresProblem {
 
 PaddleModel::Situation PaddleModel::SituationOf(const PaddleState& state, int direction) const {
   Situation situation;
-  // The last press is to the right, after an exchange if need be.
+  // Left and right are exchanged where necessary, so that the last press is to the right.
   const int press = direction != 0 ? direction : state.last != 0 ? state.last : state.before;
   if (press < 0) situation.sign = -1.0;
   const int sign = press < 0 ? -1 : 1;
@@ -132,7 +132,7 @@ const PaddleModel::Rest& PaddleModel::RestOf(const Situation& situation) const {
 }
 
 void PaddleModel::Rest::Add(double error) {
-  // The mean over all, but over no more than kMostCounted.
+  // The mean over all residuals, but over at most about kMostCounted.
   count = std::min(count + 1, kMostCounted);
   const double off = error - mean;
   mean += off / count;

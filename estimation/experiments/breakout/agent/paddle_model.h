@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// How the paddle answers buttons: a body that is pushed against drag, learned from what is seen.
+// The response of the paddle to buttons: a body that is pushed against drag, learned from its
+// places.
 //
 // In each frame, with u = −1, 0 or 1 for left, none, right (pixels, frames):
 //
@@ -9,11 +10,11 @@
 //   v⁺ = (1 − d₀ − (d₁ − d₀) |u|) w + a u    drag d₀ of a free paddle and d₁ of a pressed one
 //   x⁺ = x + v⁺, stopped by the walls
 //
-// The four numbers minimise the squared errors of the ways that were seen over four frames each
-// (estimation/fit). What the law leaves is a mean and a variance for each situation, learned beside
-// it: the last three buttons, the wall at which the step begins, and whether the step before began
-// at one, where left and right are alike. The game counts presses in whole pixels, which no law of
-// this form does; and buttons that stick make the answer random.
+// The four parameters minimise the squared errors of the displacements over four frames each
+// (estimation/fit). The residual of the law has a mean and a variance for each situation, which are
+// learned as well. A situation is the last three buttons, the wall at which the step begins, and
+// whether the step before began at one; left and right are symmetric. The game moves the paddle by
+// whole pixels, which no law of this form describes, and sticky buttons make the response random.
 
 #include <array>
 #include <vector>
@@ -46,7 +47,7 @@ struct PaddleState {
 
 class PaddleModel {
  public:
-  /// Of what is between low and high, the range of x.
+  /// Uses the range of x between low and high.
   PaddleModel(double low, double high) : low_(low), high_(high) {}
 
   double low() const { return low_; }
@@ -54,26 +55,26 @@ class PaddleModel {
   const PaddleNumbers& numbers() const { return numbers_; }
   void set_numbers(const PaddleNumbers& numbers) { numbers_ = numbers; }
 
-  /// After `frames` ≤ kFrameSkip of a step in that direction.
+  /// The state after `frames` ≤ kFrameSkip of a step in that direction.
   PaddleState After(const PaddleState& state, int direction, int frames) const;
   PaddleState After(const PaddleState& state, int direction) const {
     return After(state, direction, kFrameSkip);
   }
-  /// Of the place after a step in that direction, pixels².
+  /// The variance of the place after a step in that direction, pixels².
   double Variance(const PaddleState& state, int direction) const;
-  /// A step was seen to end at x: returns the state there, and keeps the step to learn from.
+  /// Records that a step ended at x, and returns the state there.
   PaddleState Learn(const PaddleState& before, int direction, double x);
-  /// The way of three steps' last, from rest far from the walls, pixels: what is compared with the
-  /// truth.
+  /// The displacement in the last of three steps from rest, far from the walls, pixels, which is
+  /// compared with the truth.
   double Way(int first, int second, int third) const;
-  /// Adopts the numbers that fit the steps seen so far; false where there are too few.
+  /// Estimates the parameters from the steps so far; returns false where there are too few.
   bool Fit();
-  /// Root mean square of what the law and the means leave of the last steps that end away from
+  /// The root mean square of the residuals of law and means over the last steps that end away from
   /// walls, pixels.
   double Uncertainty() const;
   int num_steps() const { return static_cast<int>(steps_.size()); }
 
-  /// Where the paddle is by itself: nothing before it is known.
+  /// A paddle at x of which nothing else is known.
   void Forget() { sequence_begins_ = true; }
 
  private:
@@ -90,7 +91,7 @@ class PaddleModel {
     int beside = 0;     ///< the same far from walls
     double sign = 1.0;  ///< −1: left and right are exchanged
   };
-  /// What was left by the law in a situation.
+  /// The residuals of the law in a situation.
   struct Rest {
     double mean = 0.0, variance = 0.0;
     int count = 0;
@@ -109,7 +110,7 @@ class PaddleModel {
   double rest_ = 0.0;  ///< mean square of what is left of all
 };
 
-/// The law, without the means, as a step to plan over: states x, v; the control u in [−1, 1].
+/// The law, without the means, as a step for plans: states x, v; the control u in [−1, 1].
 class PaddleStep : public StepMap {
  public:
   explicit PaddleStep(const PaddleModel& model) : model_(model) {}

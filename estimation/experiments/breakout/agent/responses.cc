@@ -3,13 +3,14 @@
 
 #include <cmath>
 
+#include "tangible/estimation/experiments/breakout/agent/tolerances.h"
+
 namespace tangible {
 namespace {
 
-constexpr double kSameOffset = 1.6;   // pixels: returns this near are alike
 constexpr size_t kMostReturns = 400;  // kept
 
-// What is met: rows of bricks are several things.
+// The kind of contact; each row of bricks is a kind of its own.
 int ThingOf(Meeting meeting, int row) {
   return meeting == Meeting::kBrick ? 10 + row : static_cast<int>(meeting);
 }
@@ -32,7 +33,7 @@ Vector2<double> Responses::After(Meeting meeting, int row, double offset,
                                  const Vector2<double>& before,
                                  const Vector2<double>& rigid) const {
   if (meeting == Meeting::kPaddle) return AfterPaddle(offset, before, rigid);
-  // Signs are those of walls, whatever face the engine's ball met.
+  // Signs are those of reflection at the wall, whatever face the engine's ball met.
   Vector2<double> speed = Sizes(before);
   const auto same = speeds_.find({ThingOf(meeting, row), SpeedOf(before)});
   if (same != speeds_.end()) {
@@ -47,25 +48,26 @@ Vector2<double> Responses::After(Meeting meeting, int row, double offset,
 
 Vector2<double> Responses::AfterPaddle(double offset, const Vector2<double>& before,
                                        const Vector2<double>& rigid) const {
-  // The nearest return at the same speed: with the same direction if there is one near enough.
+  // The nearest return at the same speed, with the same direction if there is one near enough.
   const Return *near = nullptr, *any = nullptr;
   double least = kSameOffset, least_of_any = HUGE_VAL;
   for (const Return& one : returns_) {
     const double distance = std::abs(one.offset - offset);
     const bool same_speed = SpeedOf(one.before) == SpeedOf(before);
     const bool same_way = one.before.x() * before.x() > 0.0;
-    // Later ones count more at the same place.
+    // At the same place, later returns are preferred.
     const double far = distance + (same_speed ? 0.0 : 0.5) + (same_way ? 0.0 : 0.25);
     if (far <= least) least = far, near = &one;
     if (same_speed && distance <= least_of_any) least_of_any = distance, any = &one;
   }
   if (near == nullptr) {
-    // Never met there: turned like a rigid body, at the speed of other returns.
+    // Without a return near this place, the ball is reflected like a rigid body, at the speed of
+    // other returns.
     if (any == nullptr) return rigid;
     return {std::copysign(any->after.x(), before.x()), any->after.y()};
   }
   if (SpeedOf(near->before) == SpeedOf(before)) return near->after;
-  // From another speed only the direction is taken.
+  // From a return at another speed only the direction is used.
   const Vector2<double> speed = any != nullptr ? Sizes(any->after) : Sizes(rigid);
   return {std::copysign(speed.x(), near->after.x()), -speed.y()};
 }

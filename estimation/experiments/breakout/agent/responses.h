@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// How the ball leaves what it meets: learned from what was seen, and before that as the engine's
-// rigid bodies do without friction and loss.
+// The velocity of the ball after a contact: learned, and before that the velocity of the engine's
+// rigid bodies without friction and loss.
 //
-// Where the game's contacts are not rigid ones: walls turn x alone, the ceiling and bricks y alone,
-// whatever face or corner is met (prior); the speeds afterwards are those seen after the same
-// contact at the same speed (learned), those of a row of bricks (learned), and from the paddle
-// direction and speed follow from where the ball meets it (learned).
+// Contacts of the game differ from rigid ones. Walls reverse x only, the ceiling and bricks y only,
+// whatever face or corner is met (prior). The speed after a contact is the one seen after the same
+// contact at the same speed (learned), or after a brick of the same row (learned). After the
+// paddle, direction and speed follow from the place where the ball meets it (learned).
 
 #include <map>
 #include <utility>
@@ -21,18 +21,18 @@ enum class Meeting { kSide, kCeiling, kBrick, kPaddle };
 
 class Responses {
  public:
-  /// The velocity after the meeting (pixels/frame, y downwards). `row` of bricks; `offset` of the
-  /// ball's left edge from the paddle's. `rigid`: what the engine says.
+  /// The velocity after the contact (pixels/frame, y downwards). `row`: of a brick; `offset`: of
+  /// the ball's left edge from the paddle's; `rigid`: the velocity by the engine.
   Vector2<double> After(Meeting meeting, int row, double offset, const Vector2<double>& before,
                         const Vector2<double>& rigid) const;
   void Learn(Meeting meeting, int row, double offset, const Vector2<double>& before,
              const Vector2<double>& after);
 
-  /// Points of a brick of that row, 1 before one was seen.
+  /// The points of a brick of that row; 1 before one was broken.
   double Points(int row) const;
   void LearnPoints(int row, double points) { points_[row] = points; }
 
-  /// How many returns from the paddle were seen.
+  /// The number of recorded returns from the paddle.
   int num_returns() const { return static_cast<int>(returns_.size()); }
 
  private:
@@ -40,7 +40,7 @@ class Responses {
     double offset = 0.0;
     Vector2<double> before, after;
   };
-  /// Of a speed that is met with: half pixels a frame, x and y.
+  /// A speed before a contact, in half pixels a frame, x and y.
   using Speed = std::pair<int, int>;
   static Speed SpeedOf(const Vector2<double>& v);
   Vector2<double> AfterPaddle(double offset, const Vector2<double>& before,

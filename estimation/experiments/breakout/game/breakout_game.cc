@@ -5,7 +5,7 @@
 #include <cmath>
 #include <cstdlib>
 
-#include "tangible/estimation/experiments/random.h"
+#include "tangible/math/random.h"
 
 namespace tangible {
 namespace {
@@ -25,7 +25,7 @@ constexpr uint32_t kWallColour = 0x8e8e8e, kBallColour = 0xc84848;
 constexpr uint32_t kRowColours[kRows] = {0xc84848, 0xc66c3a, 0xb47a30,
                                          0xa2a22a, 0x48a048, 0x4248c8};
 
-// Half, rounded to the nearest integer, and to the even one from between two.
+// Half of it, rounded to the nearest integer, and to the even one of two equally near ones.
 int Half(int value) { return static_cast<int>(std::nearbyint(0.5 * value)); }
 
 }  // namespace
@@ -55,7 +55,7 @@ int BreakoutGame::Frame(Button button) {
   if (state_.in_play) {
     MoveBall();
     points = BreakBrick();
-    // The second wall comes as the paddle returns the ball.
+    // The second wall appears when the paddle returns the ball.
     if (state_.cleared && state_.walls < 2 && TouchesPaddle()) {
       state_.bricks.set();
       state_.cleared = false;
@@ -89,7 +89,7 @@ void BreakoutGame::MovePaddle(Button button) {
   const int direction = button == Button::kRight ? 1 : button == Button::kLeft ? -1 : 0;
   int& speed = state_.paddle_speed;
   const bool at_wall = state_.paddle_x <= kLeft || state_.paddle_x >= kPaddleEnd;
-  // That of a press which turns the paddle round is still counted from the presses before.
+  // The gain of a press that reverses the paddle follows from the count of the presses before.
   const int gain = at_wall ? kGainsAtWall[state_.presses] : kGains[state_.presses];
   if (direction * speed < 0) {
     speed = 0;
@@ -128,7 +128,7 @@ void BreakoutGame::LeavePaddle() {
 }
 
 void BreakoutGame::MoveBall() {
-  // The velocity is that of the frame before.
+  // This is the velocity of the frame before.
   const int* speed = kSpeeds[state_.speed][(frame_ + 1) % 2];
   state_.ball_x += state_.right * speed[0];
   state_.ball_y += state_.down * speed[1];

@@ -13,7 +13,7 @@
 
 namespace tangible {
 
-/// The numbers of the rules.
+/// The constants of the rules.
 namespace breakout {
 inline constexpr int kRows = 6, kColumns = 18, kBricks = kRows * kColumns;
 inline constexpr int kBrickWidth = 8, kBrickHeight = 6, kBricksTop = 57;
@@ -36,7 +36,7 @@ inline constexpr long kMostFrames = 108000;
 }  // namespace breakout
 
 struct BreakoutOptions {
-  /// The chance, in each frame, that the button of the frame before is held on.
+  /// The probability, in each frame, that the button of the frame before is held instead.
   double sticky = 0.0;
   unsigned seed = 0;  ///< of sticky buttons
 };
@@ -46,11 +46,11 @@ class BreakoutGame {
   explicit BreakoutGame(const BreakoutOptions& options)
       : options_(options), random_(options.seed) {}
 
-  /// A new game, after so many frames without a button.
+  /// Starts a new game with a number of frames without a button.
   void Reset(int no_op_frames);
-  /// One frame; returns the points that it won.
+  /// Advances by one frame and returns the points that it won.
   int Frame(Button button);
-  /// The button over kFrameSkip frames, or until the game is over.
+  /// Holds the button over kFrameSkip frames, or until the game is over.
   int Step(Button button);
   void Draw(Picture* picture) const;
 
@@ -61,7 +61,7 @@ class BreakoutGame {
   int score() const { return score_; }
   long frame() const { return frame_; }
 
-  // The state, for tests and for what is compared with the truth.
+  // The state, for tests and for comparison with the learned knowledge.
   struct State {
     int paddle_x = 0, paddle_speed = 0, presses = 0;
     bool narrow = false;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// What passes between a game and who plays it: pictures one way, buttons the other.
+// The interface between a game and its player: pictures from the game, buttons to it.
 
 #include <array>
 #include <cstdint>
@@ -11,7 +11,7 @@ namespace tangible {
 
 inline constexpr int kPictureWidth = 160;   ///< pixels
 inline constexpr int kPictureHeight = 210;  ///< pixels
-/// A button is held for so many pictures of 60 a second, of which the last is seen.
+/// A button is held for this number of frames, at 60 a second, of which the last one is seen.
 inline constexpr int kFrameSkip = 4;
 
 /// 0xRRGGBB of each pixel, row by row from the top left.
@@ -24,7 +24,7 @@ struct Picture {
   }
   uint32_t* Row(int y) { return pixels.data() + static_cast<size_t>(y) * kPictureWidth; }
   uint32_t At(int x, int y) const { return Row(y)[x]; }
-  /// Fills the rectangle, as far as it is within the picture.
+  /// Fills the part of the rectangle that is within the picture.
   void Fill(int x, int y, int width, int height, uint32_t colour) {
     for (int j = y < 0 ? 0 : y; j < y + height && j < kPictureHeight; ++j) {
       for (int i = x < 0 ? 0 : x; i < x + width && i < kPictureWidth; ++i) Row(j)[i] = colour;

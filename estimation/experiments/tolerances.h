@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// The tolerances of recordings and studies. Each comment names the quantity of which the tolerance
+// is a fraction or multiple, then the reason. The README has the table.
+
+namespace tangible {
+
+/// Absolute, s: a row whose time is beyond an end of the window by less belongs to the window,
+/// because it differs by rounding.
+inline constexpr double kWindowRounding = 1e-9;
+/// Of one sample: a number of samples that is smaller than a whole number by less is that whole
+/// number.
+inline constexpr double kSampleRounding = 1e-9;
+/// Of the scale of a parameter: the step of central differences of derived quantities.
+inline constexpr double kDerivedStep = 1e-6;
+/// Of the true mass: a start whose masses all differ by less has reached the truth.
+inline constexpr double kReachedTruth = 1e-8;
+
+}  // namespace tangible

@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// The tolerances of the minimisation. Each comment names the quantity of which the tolerance is a
+// fraction or multiple, then the reason. The README has the table.
+
+namespace tangible {
+
+/// Of sigma: a parameter that moves the vector of residuals by no more, changed by its own
+/// magnitude, has no effect.
+inline constexpr double kNoEffect = 1e-12;
+/// Of the cost: minima of two starts whose costs differ by less are the same.
+inline constexpr double kSameCost = 1e-6;
+/// Of the cost: Ceres stops where an iteration changes the cost by less; final Gauss-Newton steps
+/// go on from there.
+inline constexpr double kFunctionTolerance = 1e-10;
+/// Of the length of q: Ceres stops where an iteration changes q by less; a final step that is
+/// shorter and does not shrink to half of the last one is rounding.
+inline constexpr double kParameterTolerance = 1e-9;
+/// Of the cost: while plain squares lead towards an optimum of Huber's loss, iterations end where
+/// they gain less: outliers then do no harm, because the robust loss decides in the end.
+inline constexpr double kApproachTolerance = 1e-2;
+/// Of the bound of Huber's loss: its bound falls by this factor from the median residual; far from
+/// the optimum the loss is linear in nearly all residuals, and Gauss-Newton steps are short.
+inline constexpr double kApproachFactor = 4.0;
+/// Of the cost: with Huber's loss Ceres ends here and Newton's method goes on, which unlike Ceres
+/// counts no curvature where the loss is linear (convergence by 0.75 a step where half of the
+/// residuals are).
+inline constexpr double kRobustTolerance = 1e-4;
+/// Of sigma: residuals with a smaller root mean square are free of noise and met to rounding.
+inline constexpr double kExactFit = 1e-8;
+/// Of the standard deviation of a parameter: a shorter Gauss-Newton step is left at convergence (ε
+/// of minimise.h; Bates and Watts).
+inline constexpr double kRelativeOffset = 1e-3;
+/// Of the length of q: a shorter final step is rounding.
+inline constexpr double kPolishedStep = 1e-13;
+/// Of the cost: costs that differ by less do not show which of two points is better.
+inline constexpr double kEqualCost = 1e-9;
+/// Of the deviation of a sensor's factor, or the spread itself: a fit with estimated noise or
+/// spreads has converged where it changes them by less.
+inline constexpr double kSettledChange = 1e-3;
+/// Of one observation: the sigma of a sensor whose observations have a smaller redundancy ρ cannot
+/// be estimated, because they leave no residuals.
+inline constexpr double kLeastRedundancy = 0.5;
+/// Of the time of all observations: the first window.
+inline constexpr double kFirstPart = 1.0 / 32.0;
+/// Of the window before: the length of the next window: the first of these at which the residuals
+/// of what is new are small enough.
+inline constexpr double kWindowGrowth[] = {2.0, 1.5, 1.2, 1.1, 1.05};
+/// Of the residuals of the window before, at least sigma: larger residuals of the next window are
+/// too far off, and it grows by less.
+inline constexpr double kFarOff = 3.0;
+/// Of 1 for a logarithm, else the scale of a parameter: the standard deviation of a parameter
+/// around the estimate of the last window.
+inline constexpr double kWindowPrior = 3.0;
+/// Of the median sigma of the observations: the standard deviations of the jumps of multiple
+/// shooting, stage by stage.
+inline constexpr double kJumpSigmas[] = {1e3, 30.0, 1.0};
+/// Of the median sigma of the observations: the standard deviation of the errors of joints at the
+/// cuts of multiple shooting.
+inline constexpr double kOnJoints = 0.01;
+/// Of the degrees of freedom, with a little room for few of them: a parabola explains its samples
+/// where their sum of squares is no larger.
+inline constexpr double kExplained = 2.0;
+/// Of the weight of the best observation: the weights of joints and contacts of an observed state,
+/// stage by stage: from far outside of the joints the observations alone lead the way.
+inline constexpr double kJointWeights[] = {0.0, 1.0, 1e2, 1e5};
+/// Of the scale of an unknown: the standard deviation of a prior that an observed state stays where
+/// it was: what is observed to 1e-3 of its scale is moved by 1e-14 of it, and what nothing
+/// determines stays.
+inline constexpr double kStatePrior = 1e4;
+/// Of the scale of an unknown: the step of central differences, whose error is of its square.
+inline constexpr double kStateDifference = 1e-5;
+/// Of the length of a column: what elimination leaves of a column is rounding where it is shorter,
+/// and the column is not determined.
+inline constexpr double kUndeterminedColumn = 1e-12;
+/// Of the median deviation of the value of a recording: the lower end of the range in which a
+/// spread τ is sought.
+inline constexpr double kLeastSpread = 1e-3;
+/// Of the same, or the spread as it was if that is larger: the upper end of that range.
+inline constexpr double kLargestSpread = 1e3;
+/// Of 1, for ln τ: smaller changes do not count, because a maximum is flat.
+inline constexpr double kSettledLogarithm = 1e-6;
+/// Of the upper end of the range: a spread as good as infinite: the recordings then say nothing
+/// about each other.
+inline constexpr double kInfiniteSpread = 1e6;
+
+}  // namespace tangible

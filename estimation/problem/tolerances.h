@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// The tolerances of the problem of a fit. Each comment names the quantity of which the tolerance is
+// a fraction or multiple, then the reason. The README has the table.
+
+namespace tangible {
+
+/// Of a step: times that differ by less are the same, because decimal times miss a step by
+/// rounding.
+inline constexpr double kTimeTolerance = 1e-9;
+/// Of a step: half the time over which an acceleration is averaged in event stepping; steps end at
+/// both ends of that time.
+inline constexpr double kRateStep = 1e-3;
+/// Of the parameter, at least its scale: a parameter that differs from a bound by less is at the
+/// bound, because exp(ln bound) and the projection of the minimiser reach a bound within this
+/// error.
+inline constexpr double kBoundRounding = 1e-13;
+/// Of the observed value: the rounding of a run and the errors that its projections leave; smaller
+/// residuals carry no information.
+inline constexpr double kPredictionRounding = 1e-9;
+/// Of the largest inertia, or the area of a triangle: a thin ring, or two points at the ends, have
+/// exactly the largest inertia, and rounding must not count as a violation.
+inline constexpr double kInertiaRounding = 1e-9;
+
+}  // namespace tangible
