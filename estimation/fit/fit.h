@@ -44,7 +44,8 @@ const char* NameOf(FitApproach approach);
 struct FitOptions {
   DerivativeMethod derivatives = DerivativeMethod::kTangent;
   double huber = 0.0;  ///< b, in multiples of sigma; 0: plain squares
-  /// A start that this leads nowhere is minimised plainly too, and the better minimum counts.
+  /// A start that this leads nowhere is minimised plainly too, after kSegments with growing windows
+  /// as well, and the best minimum counts.
   FitApproach approach = FitApproach::kAuto;
   int segments = 1;         ///< of multiple shooting
   int starts = 1;           ///< further starts are drawn within the bounds
@@ -173,6 +174,10 @@ struct FitApproachResult {
 /// through the log unless that is null.
 using FitShooting =
     std::function<FitApproachResult(const Eigen::VectorXd& start, EvaluationLog* log)>;
+
+/// Adds the certificate of the derivatives at the estimate to a result, with a warning where it is
+/// not `trustworthy`.
+void Certify(LeastSquaresProblem* problem, FitResult* result);
 
 struct FitLog;  // fit_checkpoint.h
 

@@ -19,7 +19,7 @@
 // samples badly. Joints and contacts are rows of growing weight, at last 1e5 times that of the
 // observations: a joint is then open by less than 1e-8 of a σ. The unknowns are poses and twists,
 // or parameters that set them: joint angles and rates then too. What nothing determines stays as
-// it was.
+// it was; an angle that is determined but for whole turns is within half a turn of where it was.
 
 #include <Eigen/Core>
 #include <vector>

@@ -27,7 +27,8 @@ using NextLog = std::function<FitLog*()>;
 /// The fit of recordings with the components that ask to be estimated; one fit where none does. The
 /// observations and effects of `problem` have what was found when it ends. Costs are in multiples
 /// of the sigma of the time, and iterations those of all fits. Where a fit does not converge, or
-/// the components do not settle (20 fits), the status says so.
+/// the components do not settle (20 fits), the status says so, and no estimated spread has an
+/// interval; a warning says why one has none.
 FitResult FitWithComponents(const FitOptions& options, RecordingsProblem* problem,
                             const FitProgress& progress, VarianceComponents* components,
                             const NextLog& next_log = {});
