@@ -141,9 +141,9 @@ TEST(RandomEffectsTest, IntervalsOfSpreadAndMeanContainTheTruth) {
   EXPECT_LT(squared_errors / kReplicas, 2.0 * (kSpread * kSpread + 0.01) / 10.0);
 }
 
-// Log-normal: the shared value is the median. 40 replicas of 95 %: 38 with a deviation of 1.4.
+// Log-normal: the shared value is the median. 20 replicas of 95 %: 19 with a deviation of 1.
 TEST(RandomEffectsTest, SpreadsOfLogarithmsContainTheTruth) {
-  constexpr int kReplicas = 40;
+  constexpr int kReplicas = 20;
   int spreads = 0;
   int medians = 0;
   double sum = 0.0;
@@ -156,16 +156,17 @@ TEST(RandomEffectsTest, SpreadsOfLogarithmsContainTheTruth) {
     const SpreadEstimate& spread = components.spreads[0];
     EXPECT_EQ(spread.kind, PriorKind::kLogNormal);
     EXPECT_TRUE(spread.limited);
-    EXPECT_TRUE(spread.interval && spread.interval->second < 3.0 * kSpread);
+    // It ends at sqrt(9 / 2.7) times what is seen, which is above twice the truth in 1e-4.
+    EXPECT_TRUE(spread.interval && spread.interval->second < 4.0 * kSpread);
     spreads += Contains(spread.interval, kSpread) ? 1 : 0;
     medians += Contains(result.uncertainty.confidence_95_robust[0], kSpeed) ? 1 : 0;
     sum += spread.spread * spread.spread;
     sum_of_logarithms += std::log(result.estimate[0] / kSpeed);
   }
-  EXPECT_GE(spreads, 38 - 6);
-  EXPECT_GE(medians, 38 - 6);
-  // A variance of ten values deviates by about half of itself, its mean over replicas by 0.08.
-  EXPECT_NEAR(sum / kReplicas, kSpread * kSpread, 4.0 * 0.08 * kSpread * kSpread);
+  EXPECT_GE(spreads, 19 - 4);
+  EXPECT_GE(medians, 19 - 4);
+  // A variance of ten values deviates by about half of itself, its mean over replicas by 0.11.
+  EXPECT_NEAR(sum / kReplicas, kSpread * kSpread, 4.0 * 0.11 * kSpread * kSpread);
   // ln of the median deviates by about kSpread / sqrt(10).
   EXPECT_NEAR(sum_of_logarithms / kReplicas, 0.0, 4.0 * kSpread / std::sqrt(10.0 * kReplicas));
 }
