@@ -436,9 +436,9 @@ std::string FewerSegments(int segments, RecordingsProblem* problem) {
              ? ""
              : "only " + std::to_string(most) + " of " + std::to_string(segments) + " segments" +
                    (problem->num_blocks() > 1 ? " in the shortest recording" : "") +
-                   ", each with at least " + std::to_string(kTimesPerSegment) +
-                   " times of observations and at most " + std::to_string(kMostStateNumbers) +
-                   " numbers of their states";
+                   ": each needs observations at " + std::to_string(kTimesPerSegment) +
+                   " times, and all states at cuts may have " + std::to_string(kMostStateNumbers) +
+                   " numbers";
 }
 
 }  // namespace

@@ -168,7 +168,7 @@ TEST_F(TangibleFitTest, MistakesInRecordingsNameThem) {
          "recording 'b': /observations/0/sigma: expected a number > 0");
   expect({{"observation", 1}}, "/recordings/1/observation: unknown key of a recording");
   fit["parameters"][0]["name"] = 3;
-  expect({{"initial", {{"speed", 1}}}}, "recording 'a': /parameters/0/name: expected a string");
+  expect({{"initial", {{"speed", 1}}}}, "fit.json: /parameters/0/name: expected a string");
   fit["parameters"][0]["name"] = "g";
   fit["recordings"] = {good};
   fit["observations"] = good["observations"];
@@ -260,7 +260,8 @@ TEST_F(TangibleFitTest, ASpreadIsEstimatedAndItsMistakesAreOneLine) {
     ExpectOneLine(Fit(wrong, "--out='" + Path("r.json") + "'"), 1, what);
     EXPECT_FALSE(std::filesystem::exists(Path("r.json")));
   };
-  expect({{"gaussian", {{"spread", 0}}}}, "/varies/gaussian/spread: expected a number > 0, got 0");
+  expect({{"gaussian", {{"spread", 0}}}},
+         "/varies/gaussian/spread: expected \"estimate\" or a number > 0, got 0");
   expect({{"gaussian", {{"spread", "guess"}}}}, "/spread: expected \"estimate\" or a number > 0");
   expect({{"gaussian", {{"sigma", 1}}}}, "/varies/gaussian/sigma: unknown key");
   expect({{"uniform", 1}}, "/parameters/1/varies/uniform: unknown key of varies");

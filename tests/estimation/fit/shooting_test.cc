@@ -88,7 +88,7 @@ TEST(ShootingTest, TakesNoMoreSegmentsThanObservationsSupport) {
   options.segments = 1000;
   const FitResult fit = Fit(options, &few, {});
   EXPECT_EQ(fit.status, FitStatus::kConverged) << fit.message;
-  EXPECT_EQ(fit.starts[0].message.find("only 5 of 1000 segments, "), 0u) << fit.starts[0].message;
+  EXPECT_EQ(fit.starts[0].message.find("only 5 of 1000 segments: "), 0u) << fit.starts[0].message;
   options.segments = 5;
   EXPECT_EQ(Fit(options, &few, {}).starts[0].message, "");
   scene.simulation.duration = 9.0;
