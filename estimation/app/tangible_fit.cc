@@ -377,6 +377,12 @@ std::string HoldBack(Prepared* prepared) {
                         recording.name + "'");
     }
   }
+  const std::string sensor = SensorWithoutObservations(prepared->fit.input);
+  if (!sensor.empty()) {
+    return "expected a time with observations of sensor \"" + sensor +
+           "\", whose sigma is estimated, up to it, got " + Cell(FLAGS_predict_from, 10) +
+           " with none";
+  }
   return any ? ""
              : "expected a time with observations after it, got " + Cell(FLAGS_predict_from, 10) +
                    " with none after it";
@@ -416,13 +422,17 @@ std::string SceneOut(const RecordingsProblem& problem, int b) {
   return (path.parent_path() / name).string();
 }
 
-/// Empty, or that a recording's scene would be written over another file.
+/// Empty, or that a recording's scene would be written over another file, or cannot be written.
 std::string SceneOverOther(const RecordingsProblem& problem) {
   for (int b = 0; b < problem.num_blocks() && !FLAGS_scene_out.empty(); ++b) {
     const std::string scene = SceneOut(problem, b);
     const std::vector<std::string> inputs = FilesRead();
     const bool over_input = std::any_of(
         inputs.begin(), inputs.end(), [&](const auto& input) { return IsSameFile(scene, input); });
+    std::error_code none;
+    if (std::filesystem::is_directory(scene, none)) {
+      return "--scene_out: expected files, got " + scene + ", a directory";
+    }
     for (const std::string& other :
          {FLAGS_out, FLAGS_report, FLAGS_predictions, FLAGS_checkpoint}) {
       if (over_input || (!other.empty() && IsSameFile(scene, other))) {
@@ -467,7 +477,8 @@ std::string WriteFiles(const Prepared& prepared, const FitResult& result,
   ResultWriter writer;
   writer.Write(FLAGS_out, [&] {
     OrderedJson json = ResultToJson(problem, result, findings);
-    json["certificate"] = estimated ? ToJson(result.certificate) : OrderedJson(nullptr);
+    json["certificate"] =
+        result.certificate.verdict.empty() ? OrderedJson(nullptr) : ToJson(result.certificate);
     return JsonText(json);
   });
   if (!estimated) {
@@ -530,9 +541,9 @@ void PrintResult(const Prepared& prepared, const FitResult& result,
   PrintEstimates(prepared.problem->entries(), result);
   PrintComponents(components);
   PrintOutliers(SummarizeResiduals(*prepared.problem, result.residuals));
-  if (result.certificate.verdict != "trustworthy") {
-    ReportError(prepared.fit.path +
-                ": warning: not trustworthy at the estimate: " + result.certificate.verdict);
+  const std::string& verdict = result.certificate.verdict;
+  if (!verdict.empty() && verdict != "trustworthy") {
+    ReportError(prepared.fit.path + ": warning: not trustworthy at the estimate: " + verdict);
   }
 }
 

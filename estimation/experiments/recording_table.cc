@@ -53,43 +53,69 @@ std::string Cleaned(const std::string& name) {
   return clean;
 }
 
-/// The text with commas between cells, decimal points and no quotes.
-std::string WithCommas(std::string_view text) {
-  const std::string_view header = text.substr(0, text.find('\n'));
+/// What separates the cells of a text: what its first lines have outside of quotes.
+char SeparatorOf(std::string_view text) {
+  bool quoted = false;
+  bool semicolon = false;
+  int lines = 0;
   // Tracker's first line may be a name alone.
-  const std::string_view second =
-      header.size() < text.size() ? text.substr(header.size() + 1) : std::string_view();
-  const std::string_view lines = text.substr(0, header.size() + 1 + second.find('\n'));
-  const char separator = lines.find('\t') != std::string_view::npos  ? '\t'
-                         : lines.find(';') != std::string_view::npos ? ';'
-                                                                     : ',';
+  for (size_t i = 0; i < text.size() && lines < 2; ++i) {
+    quoted = quoted != (text[i] == '"');
+    if (quoted) continue;
+    if (text[i] == '\t') return '\t';
+    semicolon = semicolon || text[i] == ';';
+    lines += text[i] == '\n' ? 1 : 0;
+  }
+  return semicolon ? ';' : ',';
+}
+
+/// The last cell of a text, from `first` on, whose commas are none that separate cells: a decimal
+/// comma becomes a point, others are put in quotes.
+void FinishCell(size_t first, std::string* text) {
+  if (text->find(',', first) == std::string::npos) return;
+  const std::string raw = text->substr(first);
+  const bool quoted = raw[raw.find_first_not_of(" \t")] == '"';
+  const std::string cell = SplitCsvLine(quoted ? raw : CsvCell(raw))[0];
+  std::string number = cell;
+  std::replace(number.begin(), number.end(), ',', '.');
+  double value = 0.0;
+  text->replace(first, std::string::npos, ParseNumber(number, &value) ? number : CsvCell(cell));
+}
+
+/// The text with its cells separated by commas and numbers with points. A line break in a quoted
+/// cell becomes a space, and a blank line follows, so that lines keep their numbers.
+std::string WithCommas(std::string_view text) {
+  const char separator = SeparatorOf(text);
   std::string commas;
   commas.reserve(text.size());
-  for (const char c : text) {
-    if (c == '"' || c == '\r') {
-      continue;
+  size_t first = 0;  // of the cell
+  int breaks = 0;
+  bool quoted = false;
+  for (size_t i = 0; i < text.size(); ++i) {
+    const char c = text[i];
+    if (c == '"') {
+      // It opens at a cell's beginning, or is the second one of two; elsewhere it is no quote.
+      const bool begins = commas.find_first_not_of(" \t", first) == std::string::npos;
+      if (!quoted && !begins && text[i - 1] != '"') continue;
+      quoted = !quoted;
+      commas += c;
+    } else if (!quoted && (c == separator || c == '\n')) {
+      if (separator != ',') FinishCell(first, &commas);
+      commas += c == separator ? ',' : c;
+      if (c == '\n') commas.append(static_cast<size_t>(std::exchange(breaks, 0)), c);
+      first = commas.size();
+    } else if (c == '\n') {
+      commas += ' ';
+      ++breaks;
+    } else if (c != '\r') {
+      commas += c;
     }
-    commas += c == separator ? ',' : (c == ',' ? '.' : c);
   }
+  if (separator != ',') FinishCell(first, &commas);
   return commas;
 }
 
-std::vector<std::string> Cells(const std::string& line) {
-  std::vector<std::string> cells;
-  std::istringstream stream(line);
-  for (std::string cell; std::getline(stream, cell, ',');) {
-    const size_t first = cell.find_first_not_of(' ');
-    cells.push_back(first == std::string::npos
-                        ? ""
-                        : cell.substr(first, cell.find_last_not_of(' ') - first + 1));
-  }
-  if (!line.empty() && line.back() == ',') {
-    cells.emplace_back();
-  }
-  return cells;
-}
-
-/// The first lines of a text, and the rest.
+/// The first lines of a text, and what follows them.
 std::vector<std::string> TakeLines(size_t count, std::string* text) {
   std::vector<std::string> lines;
   while (lines.size() < count && !text->empty()) {
@@ -122,12 +148,12 @@ bool ReadDeepLabCut(std::string text, const std::string& file, CsvTable* table, 
   std::vector<std::string> headers = TakeLines(3, &text);
   std::vector<std::string> individuals;
   if (headers[1].rfind("individuals", 0) == 0) {
-    individuals = Cells(headers[1]);
+    individuals = SplitCsvLine(headers[1]);
     headers.push_back(TakeLines(1, &text)[0]);
     headers.erase(headers.begin() + 1);
   }
-  const std::vector<std::string> parts = Cells(headers[1]);
-  const std::vector<std::string> coords = Cells(headers[2]);
+  const std::vector<std::string> parts = SplitCsvLine(headers[1]);
+  const std::vector<std::string> coords = SplitCsvLine(headers[2]);
   if (headers[0].rfind("scorer", 0) != 0 || parts.empty() || parts[0] != "bodyparts" ||
       coords.empty() || coords[0] != "coords" || parts.size() != coords.size() ||
       (!individuals.empty() && individuals.size() != parts.size())) {
@@ -180,11 +206,11 @@ bool ReadTracker(std::string text, const std::string& file, CsvTable* table, Lay
                  std::string* error) {
   const bool multi = text.rfind("#multi:", 0) == 0;
   const std::vector<std::string> headers = TakeLines(multi ? 3 : 2, &text);
-  std::vector<std::string> columns = Cells(headers.back());
+  std::vector<std::string> columns = SplitCsvLine(headers.back());
   while (!columns.empty() && columns.back().empty()) {
     columns.pop_back();  // lines end with a separator
   }
-  std::vector<std::string> tracks = Cells(headers[headers.size() - 2]);
+  std::vector<std::string> tracks = SplitCsvLine(headers[headers.size() - 2]);
   tracks.resize(std::max(tracks.size(), columns.size()));
   std::string track = multi || tracks.empty() ? "" : tracks[0];
   track.erase(0, track.find_first_not_of('#'));
@@ -209,13 +235,13 @@ bool ReadTracker(std::string text, const std::string& file, CsvTable* table, Lay
   std::string rows;
   std::istringstream lines(text);
   for (std::string line; std::getline(lines, line);) {
-    std::vector<std::string> cells = Cells(line);
+    std::vector<std::string> cells = SplitCsvLine(line);
     while (cells.size() > columns.size() && cells.back().empty()) {
       cells.pop_back();
     }
     cells.resize(std::max(cells.size(), line.empty() ? 0 : columns.size()));
     for (size_t i = 0; i < cells.size(); ++i) {
-      rows += (i == 0 ? "" : ",") + cells[i];
+      rows += (i == 0 ? "" : ",") + CsvCell(cells[i]);
     }
     rows += "\n";
   }

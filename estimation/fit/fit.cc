@@ -81,9 +81,19 @@ FitStart Describe(const Eigen::VectorXd& initial, const Minimum& minimum) {
   return start;
 }
 
-/// Converged before not converged before failed, then the smaller cost.
+/// Whether a minimum is refuted by one that costs far less, by more than noise makes it.
+bool IsFarAbove(double cost, double other) { return cost > kFarAbove * other + 1.0; }
+
+/// Converged before not converged before failed, then the smaller cost. What has not converged is
+/// better than a local minimum that costs far more.
 bool IsBetter(const Minimum& a, const Minimum& b) {
-  return a.status != b.status ? a.status < b.status : a.cost < b.cost;
+  if (a.status == b.status) {
+    return a.cost < b.cost;
+  }
+  if (a.status == FitStatus::kFailed || b.status == FitStatus::kFailed) {
+    return b.status == FitStatus::kFailed;
+  }
+  return a.status < b.status ? !IsFarAbove(a.cost, b.cost) : IsFarAbove(b.cost, a.cost);
 }
 
 // A derivative may be 0 at a bound (restitution 0) or by symmetry. These moves into the interior,
@@ -249,46 +259,71 @@ bool MayBeLocal(const Minimum& minimum, FitRun* run) {
   return JudgeResiduals(*run->problem, blocks, num_free).MayBeLocal();
 }
 
-/// The best minimum from a start; `told` describes the other attempts.
+/// The approaches to one minimum, each made where those before it may have led to another one. The
+/// plain fit is always among them, so that none ends worse.
+std::vector<FitApproach> ApproachesOf(FitApproach asked) {
+  switch (asked) {
+    case FitApproach::kAuto:
+      return {FitApproach::kPlain, FitApproach::kWindows};
+    case FitApproach::kPlain:
+      return {FitApproach::kPlain};
+    case FitApproach::kWindows:
+      return {FitApproach::kWindows, FitApproach::kPlain};
+    case FitApproach::kSegments:
+      return {FitApproach::kSegments, FitApproach::kPlain, FitApproach::kWindows};
+  }
+  return {};
+}
+
+/// The best of what a start's approaches reached, the earlier one where they end at the same
+/// minimum.
+size_t BestOf(const std::vector<Minimum>& reached) {
+  size_t best = 0;
+  for (size_t i = 1; i < reached.size(); ++i) {
+    const bool same = reached[i].status == reached[best].status &&
+                      reached[i].cost >= reached[best].cost * (1.0 - kSameCost);
+    best = !same && IsBetter(reached[i], reached[best]) ? i : best;
+  }
+  return best;
+}
+
+/// What was made of a start: the best minimum, and what `told` says of the others.
 Minimum BestFrom(const Eigen::VectorXd& start, FitRun* run, FitStart* told) {
-  FitLog* const log = run->log;
-  const FitApproach asked = run->options.approach;
-  const FitApproach first = asked == FitApproach::kAuto ? FitApproach::kPlain : asked;
-  const FitApproach second =
-      asked == FitApproach::kAuto ? FitApproach::kWindows : FitApproach::kPlain;
-  if (!log->first) {
-    std::optional<Minimum> reached = Reach(start, first, run);
-    log->first = reached ? std::move(*reached) : *Reach(start, FitApproach::kPlain, run);
-    run->EndPart();
+  std::vector<Minimum>& reached = run->log->reached;
+  const std::vector<FitApproach> approaches = ApproachesOf(run->options.approach);
+  // Those up to the last one that is kept were made, or had nothing to do, before an interruption.
+  auto next = approaches.begin();
+  if (!reached.empty()) {
+    next = std::find(next, approaches.end(), reached.back().approach) + 1;
   }
-  Minimum best = *log->first;
-  std::optional<Minimum> other;
-  if (asked != FitApproach::kPlain && best.approach == first && MayBeLocal(best, run)) {
-    other = Reach(start, second, run);
+  for (; next != approaches.end(); ++next) {
+    // Where an approach has led somewhere this was asked before an interruption.
+    const bool decided = reached.empty() || run->log->shot;
+    if (!decided && !MayBeLocal(reached[BestOf(reached)], run)) break;
+    std::optional<Minimum> minimum = Reach(start, *next, run);
+    if (minimum) {
+      reached.push_back(std::move(*minimum));
+      run->EndPart();
+    }
   }
-  log->first.reset();
   const auto cost_of = [](const Minimum& minimum) {
     return minimum.status == FitStatus::kFailed ? std::numeric_limits<double>::quiet_NaN()
                                                 : minimum.cost;
   };
-  // If both end at the same minimum, the first one is taken.
-  const bool same =
-      other && other->status == best.status && other->cost >= best.cost * (1.0 - kSameCost);
-  if (other && !same && IsBetter(*other, best)) {
-    std::swap(*other, best);
+  const size_t best = BestOf(reached);
+  for (size_t i = 0; i < reached.size(); ++i) {
+    const double cost = cost_of(reached[i]);
+    if (reached[i].approach == FitApproach::kPlain) {
+      told->plain_cost = cost;
+    } else if (i != best && !(cost > told->tried_cost)) {
+      told->tried = NameOf(reached[i].approach);
+      told->tried_cost = cost;
+      told->message = reached[i].approach_message;
+    }
   }
-  const Minimum* const plain = best.approach == FitApproach::kPlain ? &best
-                               : other                              ? &*other
-                                                                    : nullptr;
-  if (plain != nullptr) {
-    told->plain_cost = cost_of(*plain);
-  }
-  if (other && other->approach != FitApproach::kPlain) {
-    told->tried = NameOf(other->approach);
-    told->tried_cost = cost_of(*other);
-    told->message = other->approach_message;
-  }
-  return best;
+  Minimum result = std::move(reached[best]);
+  reached.clear();
+  return result;
 }
 
 /// Minimises from `start` and keeps in the log how that ended. The first start also describes the
@@ -374,7 +409,7 @@ void RunStarts(FitRun* run, FitResult* result) {
   if (!found) {
     return;
   }
-  if (!log->starts.empty() || log->shot || log->first) {
+  if (!log->starts.empty() || log->shot || !log->reached.empty()) {
     run->rollouts = log->rollouts;
   }
   std::mt19937 random(run->options.seed);
@@ -386,21 +421,6 @@ void RunStarts(FitRun* run, FitResult* result) {
   }
   result->starts = log->starts;
   Finish(run, result);
-}
-
-void Certify(LeastSquaresProblem* problem, FitResult* result) {
-  const std::optional<Certificate> certificate = problem->Certify(result->estimate);
-  if (!certificate) {
-    return;
-  }
-  result->certificate = *certificate;
-  if (result->certificate.verdict != "trustworthy") {
-    const std::string warning =
-        "the derivatives at the estimate, and with them the intervals, are not trustworthy: " +
-        result->certificate.verdict;
-    result->uncertainty.warnings.push_back(warning);
-    result->message += (result->message.empty() ? "" : "; ") + warning;
-  }
 }
 
 // Where the model does not fit, or a parameter is at its bound, the cause may be a held parameter
@@ -458,6 +478,21 @@ const char* NameOf(FitStatus status) {
       return "no_effect";
   }
   return "";
+}
+
+void Certify(LeastSquaresProblem* problem, FitResult* result) {
+  const std::optional<Certificate> certificate = problem->Certify(result->estimate);
+  if (!certificate) {
+    return;
+  }
+  result->certificate = *certificate;
+  if (result->certificate.verdict != "trustworthy") {
+    const std::string warning =
+        "the derivatives at the estimate, and with them the intervals, are not trustworthy: " +
+        result->certificate.verdict;
+    result->uncertainty.warnings.push_back(warning);
+    result->message += (result->message.empty() ? "" : "; ") + warning;
+  }
 }
 
 FitResult Fit(const FitOptions& options, LeastSquaresProblem* problem, const FitProgress& progress,

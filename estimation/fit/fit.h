@@ -44,8 +44,8 @@ const char* NameOf(FitApproach approach);
 struct FitOptions {
   DerivativeMethod derivatives = DerivativeMethod::kTangent;
   double huber = 0.0;  ///< b, in multiples of sigma; 0: plain squares
-  /// If a start does not reach the minimum by it, it is also minimised plainly, and the better
-  /// minimum is taken.
+  /// If a start does not reach the minimum by it, it is also minimised plainly, after kSegments with
+  /// growing windows as well, and the best minimum is taken.
   FitApproach approach = FitApproach::kAuto;
   int segments = 1;         ///< of multiple shooting
   int starts = 1;           ///< further starts are drawn within the bounds
@@ -175,6 +175,10 @@ struct FitApproachResult {
 /// through the log unless that is null.
 using FitShooting =
     std::function<FitApproachResult(const Eigen::VectorXd& start, EvaluationLog* log)>;
+
+/// Adds the certificate of the derivatives at the estimate to a result, with a warning where it is
+/// not `trustworthy`.
+void Certify(LeastSquaresProblem* problem, FitResult* result);
 
 struct FitLog;  // fit_checkpoint.h
 

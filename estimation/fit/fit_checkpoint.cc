@@ -10,7 +10,7 @@
 namespace tangible {
 namespace {
 
-constexpr char kFormat[] = "tangible-fit checkpoint 5";
+constexpr char kFormat[] = "tangible-fit checkpoint 6";
 // A write waits for this multiple of the duration of the last write.
 constexpr int kWait = 10;
 
@@ -121,8 +121,8 @@ Json ToJson(const FitLog& log) {
   if (!log.starts.empty()) {
     json["best"] = ToJson(log.best);
   }
-  if (log.first) {
-    json["first"] = ToJson(*log.first);
+  for (const Minimum& minimum : log.reached) {
+    json["reached"].push_back(ToJson(minimum));
   }
   if (log.shot) {
     json["shot"] = {Array(log.shot->parameters), log.shot->iterations, log.shot->rollouts,
@@ -141,8 +141,8 @@ void Read(const Json& json, FitLog* log) {
   if (!log->starts.empty()) {
     log->best = ReadMinimum(json.at("best"));
   }
-  if (json.contains("first")) {
-    log->first = ReadMinimum(json.at("first"));
+  for (const Json& minimum : json.value("reached", Json::array())) {
+    log->reached.push_back(ReadMinimum(minimum));
   }
   if (json.contains("shot")) {
     const Json& shot = json.at("shot");

@@ -4,7 +4,7 @@
 // A checkpoint of a fit: the data with which a fit continues after an interruption and ends with
 // the same bits.
 //
-//   "tangible-fit checkpoint 5 <hash of the content>\n", then in CBOR
+//   "tangible-fit checkpoint 6 <hash of the content>\n", then in CBOR
 //   {"problem": hash, "fits": [the first fit, the next, ...]}
 //
 // Fits follow each other where standard deviations of noise or spreads are estimated
@@ -37,7 +37,7 @@ struct FitLog {
   EvaluationLog search;                   ///< of a first point where every parameter does something
   std::vector<FitStart> starts;           ///< finished
   Minimum best;                           ///< of these
-  std::optional<Minimum> first;           ///< of the start under way: of its first approach
+  std::vector<Minimum> reached;           ///< of the start under way: of approaches that ended
   std::optional<FitApproachResult> shot;  ///< of the start under way: where an approach led
   EvaluationLog start;           ///< of the start under way, since the last part of it ended
   long rollouts = 0;             ///< when the last part of a start ended

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <numbers>
 #include <optional>
 #include <string>
 #include <utility>
@@ -214,6 +215,36 @@ class StateProblem : public LeastSquaresProblem {
   double weight_ = 0.0;
 };
 
+/// Whole turns away from the initial values that change no row are taken back: of all unknowns
+/// together, as bodies that joints hold at an angle turn together, then of each.
+void TakeTurnsBack(StateProblem* problem, Eigen::VectorXd* x) {
+  const std::vector<ParameterEntry>& entries = problem->entries();
+  const Eigen::VectorXd initial = InitialOf(entries);
+  BlockEvaluation rows;
+  const auto cost = [&](const Eigen::VectorXd& at) {
+    const bool done =
+        problem->EvaluateBlock(0, at, DerivativeMethod::kTangent, BlockDerivatives::kSkip, &rows);
+    return done ? rows.residuals.squaredNorm() : HUGE_VAL;
+  };
+  double least = cost(*x);
+  for (Eigen::Index one = -1; one < x->size(); ++one) {
+    Eigen::VectorXd back = *x;
+    for (Eigen::Index k = 0; k < x->size(); ++k) {
+      const ParameterEntry& entry = entries[static_cast<size_t>(k)];
+      if (one < 0 || one == k) {
+        const double near =
+            initial[k] + std::remainder(back[k] - initial[k], 2.0 * std::numbers::pi);
+        back[k] = std::clamp(near, entry.lower, entry.upper);
+      }
+    }
+    const double here = back == *x ? HUGE_VAL : cost(back);
+    if (here <= least) {
+      *x = back;
+      least = here;
+    }
+  }
+}
+
 /// The unknowns that minimise all stages, from the entries' initial values.
 Eigen::VectorXd Solve(StateProblem* problem) {
   FitOptions options;
@@ -227,6 +258,7 @@ Eigen::VectorXd Solve(StateProblem* problem) {
     if (minimum.status == FitStatus::kFailed || !minimum.parameters.allFinite()) break;
     x = minimum.parameters;
   }
+  TakeTurnsBack(problem, &x);
   return x;
 }
 

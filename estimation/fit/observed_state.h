@@ -19,7 +19,8 @@
 // larger where it explains the samples badly. Joints and contacts are rows of increasing weight, at
 // the end 1e5 times that of the observations, so that a joint is open by less than 1e-8 of a σ. The
 // unknowns are poses and twists, or the parameters that set them, which may also be joint angles
-// and rates. Unknowns that nothing determines keep their values.
+// and rates. Unknowns that nothing determines keep their values; an angle
+// that is determined but for whole turns is within half a turn of its value.
 
 #include <Eigen/Core>
 #include <vector>

@@ -7,6 +7,7 @@
 #include <boost/math/tools/minima.hpp>
 #include <cmath>
 #include <functional>
+#include <limits>
 #include <utility>
 
 #include "tangible/estimation/fit/tolerances.h"
@@ -22,6 +23,8 @@ constexpr int kGrid = 41;
 constexpr int kBits = 24;
 constexpr int kMostSweeps = 50;
 constexpr int kBisections = 100;
+// A spread of logarithms, −ln ε: one recording's value would be rounding beside another's.
+const double kLargestLogSpread = -std::log(std::numeric_limits<double>::epsilon());
 
 /// The sum of ln |diagonal entry| of a triangular matrix over the columns that are determined.
 double LogDiagonal(const Eigen::MatrixXd& factor, const Eigen::VectorXd& lengths,
@@ -206,6 +209,17 @@ ConfidenceInterval IntervalOf(const SpreadLikelihood& likelihood, size_t effect,
       Crossing(q, boost::math::quantile(distribution, 0.025), low, kInfiniteSpread * high));
 }
 
+/// Above this a spread is as good as infinite.
+double LargestSpread(const RandomEffect& effect, const ParameterEntry& mean,
+                     const Eigen::VectorXd& estimate) {
+  if (effect.kind == PriorKind::kLogNormal) return kLargestLogSpread;
+  double largest = std::max(mean.scale, std::abs(estimate[effect.mean]));
+  for (const int own : effect.own) {
+    if (own >= 0) largest = std::max(largest, std::abs(estimate[own]));
+  }
+  return kUnlimitedSpread * largest;
+}
+
 /// The linear problem at the estimate; false where a run fails.
 bool Linearise(const FitOptions& options, const Eigen::VectorXd& estimate,
                ProblemWithPriors* with_priors, std::vector<BlockFactor>* factors,
@@ -252,6 +266,7 @@ bool UpdateSpreads(const FitOptions& options, const FitResult& result, Recording
     }
     if (change < kSettledLogarithm) break;
   }
+  bool limited = true;
   for (size_t e = 0; e < now.size(); ++e) {
     const int effect = static_cast<int>(e);
     SpreadEstimate& one = (*spreads)[e];
@@ -261,6 +276,14 @@ bool UpdateSpreads(const FitOptions& options, const FitResult& result, Recording
     one.spread = none ? 0.0 : now[e];
     const bool has_prior = entries[problem->effects()[e].mean].prior.has_value();
     one.interval = IntervalOf(likelihood, e, one.recordings, has_prior, now);
+    const RandomEffect& of = problem->effects()[e];
+    const double most = LargestSpread(of, entries[of.mean], result.estimate);
+    one.limited = now[e] <= most && !(one.interval && one.interval->second > most);
+    if (!one.limited) one.interval.reset();
+    if (now[e] > most) {
+      limited = false;
+      *message = "the observations do not limit the spread of \"" + one.name + "\"";
+    }
     // A change between spreads at the lower end of the range does not matter.
     const bool was_none = before[e] <= 2.0 * smallest;
     if (!(none && was_none)) {
@@ -268,7 +291,7 @@ bool UpdateSpreads(const FitOptions& options, const FitResult& result, Recording
     }
     problem->SetSpread(effect, now[e]);
   }
-  return true;
+  return limited;
 }
 
 }  // namespace tangible

@@ -23,7 +23,10 @@
 //   Q(τ_e) = 2 (cost_min(τ_e) − cost_min(∞))  ~  χ² with n_e − 1 degrees of freedom         (2)
 //
 // which is exact for a linear model and noise of the size sigma (n_e where μ has a prior). Its
-// lower end is 0 where the recordings do not differ more than their noise explains.
+// lower end is 0 where the recordings do not differ more than their noise explains. An interval
+// that ends above LargestSpread, and a spread that grows beyond it as fits and (1) alternate (where
+// the value of a recording may be infinite, or 0 on a logarithmic scale), are not limited by the
+// observations, and there is no interval.
 //
 // References: H. D. Patterson and R. Thompson, Biometrika 58 (1971) 545 (restricted likelihood);
 // N. Laird and J. Ware, Biometrics 38 (1982) 963; J. Pinheiro and D. Bates, Mixed-Effects Models in
@@ -47,9 +50,10 @@ struct SpreadEstimate {
   std::string name;  ///< of the parameter
   PriorKind kind = PriorKind::kGaussian;
   double spread = 0.0;  ///< τ, in the parameter's unit or of its logarithm; 0: none is seen
-  ConfidenceInterval interval;  ///< 95 %; none where the spread was given
+  ConfidenceInterval interval;  ///< 95 %; none where the spread was given, or not found or limited
   bool estimated = false;
-  int recordings = 0;  ///< n_e
+  int recordings = 0;   ///< n_e
+  bool limited = true;  ///< from above, by the observations
 };
 
 /// The problem linearised at an estimate, by which the spreads are estimated.
@@ -91,7 +95,8 @@ class SpreadLikelihood {
 /// Finds the spreads that maximise (1), starting from those of the effects of `problem`, with their
 /// intervals. A given spread is not changed. A spread of 0 becomes the smallest of its range in
 /// `problem`. `largest` is raised to the largest relative change of a spread above that. Returns
-/// false, with a message, where a run at the estimate fails.
+/// false, with a message, where a run at the estimate fails or the observations do not limit a
+/// spread.
 bool UpdateSpreads(const FitOptions& options, const FitResult& result, RecordingsProblem* problem,
                    std::vector<SpreadEstimate>* spreads, double* largest, std::string* message);
 

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 #include <utility>
 
 #include "tangible/estimation/fit/tolerances.h"
@@ -79,6 +80,24 @@ std::vector<SensorNoise> SensorsToEstimate(const RecordingsProblem& problem) {
     }
   }
   return noise;
+}
+
+std::string SensorWithoutObservations(const FitInput& input) {
+  std::set<std::string> observed;
+  for (const RecordingInput& recording : input.recordings) {
+    const FitProblem& problem = recording.problem;
+    for (const Observation& observation : problem.observations) {
+      const int sensor =
+          problem.channels.empty() ? -1 : problem.channels[observation.channel].sensor;
+      if (sensor >= 0) observed.insert(problem.instruments.sensors[sensor].name);
+    }
+  }
+  for (const RecordingInput& recording : input.recordings) {
+    for (const Sensor& sensor : recording.problem.instruments.sensors) {
+      if (sensor.estimate_sigma && observed.count(sensor.name) == 0) return sensor.name;
+    }
+  }
+  return "";
 }
 
 void ScaleSigma(const std::vector<SensorNoise>& noise, const Instruments& instruments,

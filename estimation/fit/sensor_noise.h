@@ -38,6 +38,10 @@ struct SensorNoise {
 /// one.
 std::vector<SensorNoise> SensorsToEstimate(const RecordingsProblem& problem);
 
+/// The name of a sensor whose sigma is to be estimated and that no observation has; empty if there
+/// is none.
+std::string SensorWithoutObservations(const FitInput& input);
+
 /// Multiplies the sigma of the observations of each sensor that asks for it by its factor.
 void ScaleSigma(const std::vector<SensorNoise>& noise, const Instruments& instruments,
                 const std::vector<Channel>& channels, std::vector<Observation>* observations);

@@ -17,6 +17,12 @@ namespace tangible {
 namespace {
 
 constexpr int kIterationsPerStage = 30;
+// Times of a segment with observations, on average, at least: from fewer than two positions no
+// velocity is known.
+constexpr int kTimesPerSegment = 2;
+// Numbers of the states at the cuts of a run, at most: they are columns of a dense factorisation,
+// which takes 2 · 1200² operations a row.
+constexpr int kMostStateNumbers = 1200;
 
 /// The row of unknown i of the states of moving bodies in w = [poses | twists | parameters].
 int StateRow(const ModelStructure& s, int i) {
@@ -56,11 +62,26 @@ struct ShootingResiduals::Run {
   RowMatrixXd* jacobian = nullptr;
 };
 
+int MostSegments(const RolloutResiduals& residuals) {
+  std::vector<double> times;
+  times.reserve(residuals.observations().size());
+  for (const Observation& observation : residuals.observations()) {
+    times.push_back(observation.time);
+  }
+  std::sort(times.begin(), times.end());
+  const auto distinct = std::unique(times.begin(), times.end()) - times.begin();
+  const int state_size = 6 * residuals.scene().model().structure->num_blocks();
+  const long most =
+      std::min({static_cast<long>(distinct) / kTimesPerSegment,
+                1L + kMostStateNumbers / std::max(1, state_size), residuals.plan().last_step()});
+  return static_cast<int>(std::max(1L, most));
+}
+
 ShootingResiduals::ShootingResiduals(int segments, RolloutResiduals* residuals)
     : residuals_(residuals) {
   const ParameterizedScene& scene = residuals->scene();
   const long last = std::max(1L, residuals->plan().last_step());
-  const long count = std::min<long>(segments, last);
+  const long count = std::min(segments, MostSegments(*residuals));
   for (long j = 0; j <= count; ++j) {
     cuts_.push_back(last * j / count);
   }
@@ -402,6 +423,21 @@ double CostOfRuns(const FitOptions& options, const Eigen::VectorXd& p, Recording
   return done ? cost : HUGE_VAL;
 }
 
+/// What to say where runs are cut into fewer segments than was asked for; else empty.
+std::string FewerSegments(int segments, RecordingsProblem* problem) {
+  int most = segments;
+  for (int block = 0; block < problem->num_blocks(); ++block) {
+    most = std::min(most, MostSegments(*problem->run(block)));
+  }
+  return most == segments
+             ? ""
+             : "only " + std::to_string(most) + " of " + std::to_string(segments) + " segments" +
+                   (problem->num_blocks() > 1 ? " in the shortest recording" : "") +
+                   ": each needs observations at " + std::to_string(kTimesPerSegment) +
+                   " times, and all states at cuts may have " + std::to_string(kMostStateNumbers) +
+                   " numbers";
+}
+
 }  // namespace
 
 FitApproachResult Shoot(const FitOptions& options, const Eigen::VectorXd& start,
@@ -409,6 +445,7 @@ FitApproachResult Shoot(const FitOptions& options, const Eigen::VectorXd& start,
   FitApproachResult result{start};
   ShootingProblem shooting(options.segments, problem);
   Eigen::VectorXd x;
+  result.message = FewerSegments(options.segments, problem);
   if (!shooting.Start(start, &x)) {
     return result;
   }
@@ -422,7 +459,8 @@ FitApproachResult Shoot(const FitOptions& options, const Eigen::VectorXd& start,
         stage_options, x, [] { return 0.0; }, {}, &with_priors, log);
     result.rollouts += minimum.rollouts;
     if (minimum.status == FitStatus::kFailed || !std::isfinite(minimum.cost)) {
-      result.message = "multiple shooting ended early: " + minimum.message;
+      result.message += std::string(result.message.empty() ? "" : "; ") +
+                        "multiple shooting ended early: " + minimum.message;
       return result;
     }
     x = minimum.parameters;

@@ -30,11 +30,15 @@
 
 namespace tangible {
 
+/// The most segments into which a run can be cut: each needs a step, observations at two times on
+/// average, and the states at the cuts are not so many that a factorisation takes longer than runs.
+int MostSegments(const RolloutResiduals& residuals);
+
 /// The residuals of one run in segments: those of the observations, then the jumps, then the errors
 /// of the joints of each state and their rates, six a joint; unknowns [p | x_1 | .. | x_{S−1}].
 class ShootingResiduals {
  public:
-  /// There is at most one segment for each step.
+  /// `segments`, or as many as MostSegments.
   ShootingResiduals(int segments, RolloutResiduals* residuals);
 
   int num_segments() const { return static_cast<int>(cuts_.size()) - 1; }

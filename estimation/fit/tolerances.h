@@ -11,6 +11,8 @@ namespace tangible {
 inline constexpr double kNoEffect = 1e-12;
 /// Of the cost: minima of two starts whose costs differ by less are the same.
 inline constexpr double kSameCost = 1e-6;
+/// Of the lower cost, beyond 1 σ²: a minimum that costs more is not the global one.
+inline constexpr double kFarAbove = 2.0;
 /// Of the cost: Ceres stops where an iteration changes the cost by less; final Gauss-Newton steps
 /// go on from there.
 inline constexpr double kFunctionTolerance = 1e-10;
@@ -79,6 +81,10 @@ inline constexpr double kUndeterminedColumn = 1e-12;
 inline constexpr double kLeastSpread = 1e-3;
 /// Of the same, or the spread as it was if that is larger: the upper end of that range.
 inline constexpr double kLargestSpread = 1e3;
+/// Of the largest of the values of the recordings, the shared one and the parameter's typical
+/// magnitude: the observations do not limit a larger spread. Two recordings limit it to some 30
+/// times what is seen.
+inline constexpr double kUnlimitedSpread = 1e3;
 /// Of 1, for ln τ: smaller changes do not count, because a maximum is flat.
 inline constexpr double kSettledLogarithm = 1e-6;
 /// Of the upper end of the range: a spread as good as infinite: the recordings then say nothing

@@ -48,6 +48,27 @@ bool Update(const FitOptions& options, RecordingsProblem* problem, FitResult* re
                                     &result->message));
 }
 
+/// Intervals of spreads, and the certificate, of a result that is the last one.
+void Conclude(const FitOptions& options, RecordingsProblem* problem, FitResult* result,
+              std::vector<SpreadEstimate>* spreads) {
+  const bool converged = result->status == FitStatus::kConverged;
+  for (SpreadEstimate& one : *spreads) {
+    if (!one.estimated || (converged && one.limited)) {
+      continue;
+    }
+    one.interval.reset();
+    result->uncertainty.warnings.push_back(
+        one.limited ? "the spread of '" + one.name +
+                          "' has no interval, for the fits that look for it did not converge"
+                    : "the observations do not limit the spread of '" + one.name +
+                          "' from above, and it has no interval");
+  }
+  const bool certified = !result->certificate.verdict.empty();
+  if (!certified && result->estimate.size() > 0 && options.certificate == CertificatePass::kRun) {
+    Certify(problem, result);
+  }
+}
+
 }  // namespace
 
 FitResult FitWithComponents(const FitOptions& options, RecordingsProblem* problem,
@@ -87,7 +108,14 @@ FitResult FitWithComponents(const FitOptions& options, RecordingsProblem* proble
       search.certificate = options.certificate;
       search.held_test = options.held_test;
     }
-    Append(fit(search, {}, &same), &result);
+    FitResult next = fit(search, {}, &same);
+    if (next.estimate.size() == 0 && same) {
+      result.status = FitStatus::kNotConverged;
+      result.message =
+          "with the sigma of sensors and spread of parameters that were found: " + next.message;
+      break;
+    }
+    Append(std::move(next), &result);
     if (settled) {
       break;
     }
@@ -97,6 +125,7 @@ FitResult FitWithComponents(const FitOptions& options, RecordingsProblem* proble
                        std::to_string(fits) + " fits";
     }
   }
+  Conclude(options, problem, &result, &components->spreads);
   return result;
 }
 

@@ -7,6 +7,7 @@
 
 #include "tangible/math/scalar.h"
 #include "tangible/scene/parameter.h"
+#include "tangible/scene/shape_json.h"
 #include "tangible/simulation/stepping/step.h"
 
 namespace tangible {
@@ -367,6 +368,11 @@ bool ParameterizedScene::Set(const Eigen::VectorXd& p) {
       *numbers[target.number].value = value;
     } else {
       *measured[target.number - num_scene_numbers_].value = value;
+    }
+  }
+  for (const auto& body : scene_.bodies) {
+    if (body.shape.type == ShapeType::kEllipse && !CheckRadii(body.shape.numbers).empty()) {
+      return false;
     }
   }
   BuildModelWithStructure(scene_, structure_, &model_, &state_);

@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tangible/estimation/results/fit_json.h"
 
+#include <algorithm>
 #include <cmath>
 #include <set>
 #include <utility>
 
 #include "tangible/estimation/fit/observed_state.h"
+#include "tangible/estimation/fit/sensor_noise.h"
 #include "tangible/estimation/results/run_json.h"
 #include "tangible/scene/set_parameters.h"
 
@@ -44,6 +46,7 @@ class Reader {
     RecordingInput& only = out_.recordings.emplace_back();
     if (!ReadRun(common_, file_, FolderOf(file_), {}, &only.problem, error)) return false;
     out_.scopes.resize(only.problem.parameters.size());
+    CheckSensors();
     if (FromObservations(root_)) StartFromObservations(&only.problem);
     return true;
   }
@@ -60,7 +63,23 @@ class Reader {
       if (!ReadRecording(list.At(i), json_["recordings"][i], &names, error)) return false;
     }
     if (root_.ok()) CheckSpreads(count);
+    if (root_.ok()) CheckSensors();
     return true;
+  }
+
+  // A sigma is estimated from residuals: the sensor needs observations in some recording.
+  void CheckSensors() {
+    const std::string sensor = SensorWithoutObservations(out_);
+    if (sensor.empty()) return;
+    JsonReader place = root_;
+    for (int i = 0; i < root_.At("recordings").Size(); ++i) {
+      const JsonReader recording = root_.At("recordings").At(i);
+      if (recording.At("sensors").Has(sensor)) place = recording;
+    }
+    place.At("sensors")
+        .At(sensor)
+        .At("estimate_sigma")
+        .Fail("expected a sensor that observations name, got one without observations");
   }
 
   // Whose each parameter is; these keys are none of a run's.
@@ -93,9 +112,9 @@ class Reader {
     const JsonReader of = json.At(gaussian ? "gaussian" : "log_normal");
     of.ExpectKeys({"spread"}, " of what varies");
     const JsonReader spread = of.At("spread");
-    if (!spread.IsString()) {
-      scope->spread = spread.Number(NumberKind::kPositive);
-    } else if (spread.String() != "estimate") {
+    if (spread.IsNumber() && spread.Number() > 0.0) {
+      scope->spread = spread.Number();
+    } else if (!spread.IsString() || spread.String() != "estimate") {
       spread.FailExpected("\"estimate\" or a number > 0");
     }
   }
@@ -149,13 +168,36 @@ class Reader {
     const RecordingPart part = ReadPart(reader);
     if (!reader.ok()) return true;
     const std::string label = file_ + ": recording '" + entry.name + "'";
-    if (!ReadRun(own, label, FolderOf(file_), part, &entry.problem, error)) return false;
-    if (!SetValues(reader, label, &entry.problem.scene, error)) return false;
+    if (!ReadRun(own, label, FolderOf(file_), part, &entry.problem, error)) {
+      if (!ConcernsRecording(reader, label, *error)) error->replace(0, label.size(), file_);
+      return false;
+    }
+    if (!SetValues(reader, label, &entry.problem, error)) return false;
     if (FromObservations(reader.Has("initial") ? reader : root_)) {
       StartFromObservations(&entry.problem);
     }
     out_.recordings.push_back(std::move(entry));
     return true;
+  }
+
+  // Whether a message of ReadRun is of the recording, not of a key that the file has for all: the
+  // recording has that key, or one without which the key could be right.
+  bool ConcernsRecording(const JsonReader& recording, const std::string& label,
+                         const std::string& message) const {
+    const std::string start = label + ": /";
+    if (message.rfind(start, 0) != 0) return true;  // of another file, or of several keys
+    const size_t end = message.find_first_of("/:", start.size());
+    const std::string key = message.substr(start.size(), end - start.size());
+    if (key == "observations") return true;
+    if (key == "scene") return recording.Has(key) || !root_.Has(key);
+    if (key == "parameters" && recording.Has("initial")) return true;
+    // What is observed and estimated depends on the scene and what belongs to it.
+    const auto is = [&key](const std::string& one) { return one == key; };
+    const auto differs = [&recording](const std::string& one) {
+      return one != "observations" && recording.Has(one);
+    };
+    return (key == "parameters" || std::any_of(std::begin(kOfFile), std::end(kOfFile), is)) &&
+           std::any_of(std::begin(kOfFile), std::end(kOfFile), differs);
   }
 
   // Where the recording's own parameters start: {name: value}. Those that are shared start where
@@ -189,8 +231,9 @@ class Reader {
            reader.At("initial").Choice({"from_observations"}) == 0;
   }
 
-  // Numbers of the scene that are others in this recording: {path: value}.
-  static bool SetValues(const JsonReader& reader, const std::string& label, Scene* scene,
+  // Numbers of the scene that are others in this recording, and that no parameter sets: {path:
+  // value}.
+  static bool SetValues(const JsonReader& reader, const std::string& label, FitProblem* problem,
                         std::string* error) {
     if (!reader.Has("values")) return true;
     const JsonReader values = reader.At("values");
@@ -198,8 +241,12 @@ class Reader {
       ParameterPath parameter;
       const double value = values.At(path).Number();
       std::string wrong;
-      if (ResolveParameter(*scene, path, &parameter, &wrong)) {
-        wrong = SetParameters({parameter}, &value, scene);
+      if (ResolveParameter(problem->scene, path, &parameter, &wrong)) {
+        const std::string owner = ParameterThatSets(parameter, *problem);
+        wrong = owner.empty()
+                    ? SetParameters({parameter}, &value, &problem->scene)
+                    : path + ": expected a number that no parameter sets, got one that \"" + owner +
+                          "\" sets (initial says where its value in a recording begins)";
       }
       if (!wrong.empty()) {
         *error = OneLine(wrong.insert(0, ": /values: ").insert(0, label));
@@ -207,6 +254,24 @@ class Reader {
       }
     }
     return true;
+  }
+
+  // The name of the parameter that sets a number of the path; empty if none does. What is added
+  // to a number leaves its own value in force.
+  static std::string ParameterThatSets(const ParameterPath& path, const FitProblem& problem) {
+    for (const FitParameter& parameter : problem.parameters) {
+      for (const ParameterSet& set : parameter.sets) {
+        ParameterPath other;
+        std::string none;  // points and instruments are no numbers of the scene
+        if (set.mode == SetMode::kAssign &&
+            ResolveParameter(problem.scene, set.path, &other, &none) &&
+            std::find_first_of(path.numbers.begin(), path.numbers.end(), other.numbers.begin(),
+                               other.numbers.end()) != path.numbers.end()) {
+          return parameter.name;
+        }
+      }
+    }
+    return "";
   }
 
   // From `start`, which is the run's time 0, to `end`.

@@ -132,6 +132,7 @@ std::string CombinationTable(const Uncertainty& uncertainty) {
 
 std::string SummaryTable(const FitResult& result) {
   const Uncertainty& uncertainty = result.uncertainty;
+  const std::string& verdict = result.certificate.verdict;
   return HtmlTable({"", ""},
                    {{"status", NameOf(result.status)},
                     {"message", result.message},
@@ -141,7 +142,7 @@ std::string SummaryTable(const FitResult& result) {
                     {"residual rms (sigma)", CompactNumber(uncertainty.residual_rms, 4)},
                     {"reduced chi-square", CompactNumber(uncertainty.reduced_chi_square, 4)},
                     {"condition of the Jacobian", CompactNumber(uncertainty.condition, 3)},
-                    {"derivatives at the estimate", result.certificate.verdict},
+                    {"derivatives at the estimate", verdict.empty() ? "not examined" : verdict},
                     {"iterations", std::to_string(result.iterations.size() - 1)},
                     {"rollouts", std::to_string(result.rollouts)},
                     {"seconds", CompactNumber(result.seconds, 3)}});

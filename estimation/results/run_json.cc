@@ -82,8 +82,9 @@ FitParameter ReadParameter(const JsonReader& json) {
     parameter.sets.push_back({parameter.name});
     return parameter;
   }
-  json.ExpectKeys({"name", "initial", "lower", "upper", "sets", "path", "scale", "prior"},
-                  " of a parameter");
+  json.ExpectKeys(
+      {"name", "initial", "lower", "upper", "sets", "path", "scale", "prior", "per", "varies"},
+      " of a parameter");
   const auto read = [&json](const char* key, std::optional<double>* value) {
     if (json.Has(key)) {
       *value = json.At(key).Number();
@@ -173,9 +174,9 @@ class RunReader {
   /// False with the error of the scene or an observation file; errors of the fit file itself are
   /// the reader's.
   bool Read() {
-    root_.ExpectKeys({"scene", "observations", "points", "sensors", "cameras", "clocks",
-                      "parameters", "derivatives", "loss", "approach", "segments", "starts",
-                      "seed"});
+    root_.ExpectKeys({"scene", "observations", "recordings", "initial", "points", "sensors",
+                      "cameras", "clocks", "parameters", "derivatives", "loss", "approach",
+                      "segments", "starts", "seed"});
     const std::string scene_file = JoinPath(folder_, root_.At("scene").String());
     if (!root_.ok()) {
       return true;

@@ -108,6 +108,10 @@ OrderedJson UndeterminedJson(const Model<double>& model, const State<double>& at
           {"reason", ""}};
 }
 
+bool RunsByEvents(const Model<double>& model) {
+  return model.structure->settings.stepping == Stepping::kEvent;
+}
+
 }  // namespace
 
 const char* ToString(StepStatus status) {
@@ -128,7 +132,7 @@ void RunSummary::Keep(const Model<double>& model, const State<double>& state,
     started_ = true;
     first_ = state;
   }
-  if (!model.structure->joints.empty()) {
+  if (!model.structure->joints.empty() || RunsByEvents(model)) {
     poses_.insert(poses_.end(), state.pose.begin(), state.pose.end());
   }
   if (stepper != nullptr) {
@@ -161,6 +165,9 @@ void RunSummary::EvaluateKept(const Model<double>& model) {
   for (auto pose = poses_.cbegin(); pose != poses_.cend(); pose += size) {
     at_.pose.assign(pose, pose + size);
     joint_drift_max_ = std::max(joint_drift_max_, JointDrift(model, at_));
+    if (RunsByEvents(model)) {
+      penetration_max_ = std::max(penetration_max_, DeepestPenetration(model, at_));
+    }
   }
   size_t begin = 0;
   for (const size_t end : closed_ends_) {
@@ -177,9 +184,10 @@ OrderedJson RunSummary::ToJson(const Model<double>& model, const RolloutReport& 
                                const State<double>& last) {
   EvaluateKept(model);
   const OrderedJson fallbacks = FallbacksJson(report);
-  // The steps' reports give gaps at the starts of steps, so that the end of the run is evaluated
-  // here.
-  const double penetration = std::max(report.penetration_max, DeepestPenetration(model, last));
+  // The reports of fixed steps give the gaps at their starts, so that the end of the run is
+  // evaluated here. Those of event stepping have only the pairs that act on each other.
+  const double penetration =
+      std::max({report.penetration_max, penetration_max_, DeepestPenetration(model, last)});
   OrderedJson undetermined = nullptr;
   if (stepped_) {
     // The rows of a fixed step are those at its start; the last ones of event stepping are those at

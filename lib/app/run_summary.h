@@ -28,17 +28,18 @@ class RunSummary {
   State<double> first_;
   int islands_max_ = 0;
   double joint_drift_max_ = 0.0;
+  double penetration_max_ = 0.0;  // by events: at the ends of steps
   // The last step, without its problem.
   StepRecord last_step_;
   bool stepped_ = false;
   bool by_events_ = false;
 
-  // The kept data: the poses of states one after the other, where the scene has joints, and for
-  // each step the bodies in contact and the position in `closed_` where they end.
+  // The kept data: the poses of states one after the other, where the scene has joints or runs by
+  // events, and for each step the bodies in contact and the position in `closed_` where they end.
   std::vector<double> poses_;
   std::vector<std::pair<int, int>> closed_;
   std::vector<size_t> closed_ends_;
-  State<double> at_;  // the state whose joints are measured
+  State<double> at_;  // the state whose joints and gaps are measured
 };
 
 /// "done", "unsolved" or "diverged".

@@ -21,15 +21,19 @@ std::string_view Trim(std::string_view text) {
   return text.substr(begin, text.find_last_not_of(blanks) - begin + 1);
 }
 
-std::vector<std::string> Split(std::string_view line) {
-  std::vector<std::string> cells;
-  std::size_t begin = 0;
-  while (true) {
-    const std::size_t comma = line.find(',', begin);
-    cells.emplace_back(Trim(line.substr(begin, comma - begin)));
-    if (comma == std::string_view::npos) return cells;
-    begin = comma + 1;
+// The text of a cell that begins with a quote; `line` is left with what follows the closing one.
+std::string TakeQuoted(std::string_view* line) {
+  std::string text;
+  std::size_t i = 1;
+  for (; i < line->size(); ++i) {
+    if ((*line)[i] == '"') {
+      if (i + 1 == line->size() || (*line)[i + 1] != '"') break;
+      ++i;
+    }
+    text += (*line)[i];
   }
+  line->remove_prefix(std::min(i + 1, line->size()));
+  return text;
 }
 
 bool Contains(const std::vector<std::string>& names, const std::string& name) {
@@ -86,6 +90,33 @@ int CsvTable::Column(const std::string& name) const {
   return place == columns.end() ? -1 : static_cast<int>(place - columns.begin());
 }
 
+std::vector<std::string> SplitCsvLine(std::string_view line) {
+  std::vector<std::string> cells;
+  while (true) {
+    std::string quoted;
+    const std::size_t first = line.find_first_not_of(" \t");
+    if (first != std::string_view::npos && line[first] == '"') {
+      line.remove_prefix(first);
+      quoted = TakeQuoted(&line);
+    }
+    const std::size_t comma = line.find(',');
+    const std::string_view rest = Trim(line.substr(0, comma));
+    cells.emplace_back(quoted.empty() ? rest : Trim(quoted.append(rest)));
+    if (comma == std::string_view::npos) return cells;
+    line.remove_prefix(comma + 1);
+  }
+}
+
+std::string CsvCell(const std::string& cell) {
+  if (cell.find_first_of(",\"") == std::string::npos) return cell;
+  std::string quoted = "\"";
+  for (const char c : cell) {
+    quoted += c;
+    if (c == '"') quoted += c;
+  }
+  return quoted + "\"";
+}
+
 bool ParseCsv(const std::string& text_of_file, const std::string& file,
               const std::vector<std::string>& required, const std::vector<std::string>& allowed,
               CsvTable* table, std::string* error) {
@@ -99,7 +130,7 @@ bool ParseCsv(const std::string& text_of_file, const std::string& file,
     begin = end + 1;
     ++line_number;
     if (line.empty()) continue;
-    std::vector<std::string> cells = Split(line);
+    std::vector<std::string> cells = SplitCsvLine(line);
     std::string what;
     if (table->columns.empty()) {
       what = CheckHeader(cells, required, allowed);

@@ -2,10 +2,12 @@
 #pragma once
 //
 // Tables in text files: a header line with the names of the columns, then one row on each line,
-// with cells separated by commas. There is no quoting; spaces around cells, blank lines, carriage
-// returns and a byte-order mark (UTF-8) before the header are ignored.
+// with cells separated by commas. A cell in double quotes may hold commas, and quotes as "" (RFC
+// 4180, but for line breaks); spaces around cells, blank lines, carriage returns and a byte-order
+// mark (UTF-8) before the header are ignored.
 
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace tangible {
@@ -30,6 +32,12 @@ bool ReadCsv(const std::string& file, const std::vector<std::string>& required,
 bool ParseCsv(const std::string& text, const std::string& file,
               const std::vector<std::string>& required, const std::vector<std::string>& allowed,
               CsvTable* table, std::string* error);
+
+/// The cells of one line.
+std::vector<std::string> SplitCsvLine(std::string_view line);
+
+/// A cell as SplitCsvLine reads it: in quotes where it has commas or quotes.
+std::string CsvCell(const std::string& cell);
 
 /// A finite number that fills the whole text; decimal point whatever the locale.
 bool ParseNumber(const std::string& text, double* value);

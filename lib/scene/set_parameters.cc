@@ -13,7 +13,8 @@ namespace {
 bool DependsOnOthers(const std::string& path) {
   const auto has = [&path](const char* part) { return path.find(part) != std::string::npos; };
   return has("/vertices/") || has("/normal/") || has("/axis/") || has("/limits/") ||
-         has("/anchors/") || (path.rfind("forces/", 0) == 0 && (has("/start") || has("/end")));
+         has("/anchors/") || has("/radii/") ||
+         (path.rfind("forces/", 0) == 0 && (has("/start") || has("/end")));
 }
 
 }  // namespace

@@ -153,6 +153,9 @@ TEST_F(TangibleFitTest, MistakesInRecordingsNameThem) {
   ExpectOneLine(
       Fit(fit, "--scene_out='" + Path("s.json") + "' --predictions='" + Path("s_1.json") + "'"), 2,
       "--scene_out: expected files of their own");
+  std::filesystem::create_directory(Path("d_1.json"));
+  ExpectOneLine(Fit(fit, "--scene_out='" + Path("d.json") + "'"), 2, "_1.json, a directory");
+  EXPECT_FALSE(std::filesystem::exists(Path("d_0.json")));
   expect({{"start", 3}}, "recording 'b': /observations: expected some from start to end, got none");
   expect({{"start", 0.3}, {"end", 0.2}}, "/recordings/1/end: expected a time after start");
   expect({{"weight", 0}}, "/recordings/1/weight: expected a number > 0");
@@ -165,7 +168,7 @@ TEST_F(TangibleFitTest, MistakesInRecordingsNameThem) {
          "recording 'b': /observations/0/sigma: expected a number > 0");
   expect({{"observation", 1}}, "/recordings/1/observation: unknown key of a recording");
   fit["parameters"][0]["name"] = 3;
-  expect({{"initial", {{"speed", 1}}}}, "recording 'a': /parameters/0/name: expected a string");
+  expect({{"initial", {{"speed", 1}}}}, "fit.json: /parameters/0/name: expected a string");
   fit["parameters"][0]["name"] = "g";
   fit["recordings"] = {good};
   fit["observations"] = good["observations"];
@@ -257,7 +260,8 @@ TEST_F(TangibleFitTest, ASpreadIsEstimatedAndItsMistakesAreOneLine) {
     ExpectOneLine(Fit(wrong, "--out='" + Path("r.json") + "'"), 1, what);
     EXPECT_FALSE(std::filesystem::exists(Path("r.json")));
   };
-  expect({{"gaussian", {{"spread", 0}}}}, "/varies/gaussian/spread: expected a number > 0, got 0");
+  expect({{"gaussian", {{"spread", 0}}}},
+         "/varies/gaussian/spread: expected \"estimate\" or a number > 0, got 0");
   expect({{"gaussian", {{"spread", "guess"}}}}, "/spread: expected \"estimate\" or a number > 0");
   expect({{"gaussian", {{"sigma", 1}}}}, "/varies/gaussian/sigma: unknown key");
   expect({{"uniform", 1}}, "/parameters/1/varies/uniform: unknown key of varies");
@@ -539,6 +543,16 @@ TEST_F(TangibleFitTest, MistakesAreOneLineWithTheirPlace) {
     const ProgramRun run = Fit(Problem(changes));
     ExpectOneLine(run, 1, message);
   }
+}
+
+TEST_F(TangibleFitTest, ASensorThatIsPredictedHasNoSigmaToEstimate) {
+  Write("late.csv", "time,body,x\n0.4,ball,0.8\n0.5,ball,1\n");
+  const json late = {{"file", "late.csv"}, {"sigma", 0.01}, {"sensor", "s"}};
+  json fit = Problem({{"sensors", {{"s", {{"estimate_sigma", true}}}}}});
+  fit["observations"].push_back(late);
+  ExpectOneLine(Fit(fit, "--predict_from=0.3"), 2,
+                "--predict_from: expected a time with observations of sensor \"s\", whose sigma is "
+                "estimated, up to it, got 0.3 with none");
 }
 
 TEST_F(TangibleFitTest, NoFileIsWrittenTwice) {

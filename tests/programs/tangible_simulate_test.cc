@@ -141,6 +141,24 @@ TEST_F(TangibleSimulateTest, SummaryHasItsKeysAndItsNumbersAreRight) {
 // Which of many solutions a run ends with is told: a disc's impulses are unique; a box's two
 // corners may share its friction as they like; four corners its weight, and as they slide with
 // different friction the motion itself.
+// Discs that begin 0.05 m into each other and part: no pair of them ever acts.
+TEST_F(TangibleSimulateTest, SummaryHasTheOverlapOfBodiesThatSeparate) {
+  for (const char* stepping : {"fixed", "event"}) {
+    const std::string scene = Write("s.json", R"({"gravity": [0, 0], "bodies": [
+      {"name": "a", "shape": {"circle": {"radius": 0.1}}, "mass": 1, "position": [0, 0],
+       "velocity": [-1, 0]},
+      {"name": "b", "shape": {"circle": {"radius": 0.1}}, "mass": 1, "position": [0.15, 0],
+       "velocity": [1, 0]}],
+      "simulation": {"dt": 0.01, "duration": 0.1, "stepping": ")" +
+                                                  std::string(stepping) + "\"}}");
+    ASSERT_EQ(
+        Run("tangible-simulate", "'" + scene + "' --summary='" + Path("s.out") + "'").exit_status,
+        0);
+    const json summary = json::parse(Read(Path("s.out")));
+    EXPECT_NEAR(summary["penetration_max"].get<double>(), 0.05, 1e-12) << stepping;
+  }
+}
+
 TEST_F(TangibleSimulateTest, SummarySaysWhereImpulsesAreNotUnique) {
   const std::string floor = R"({"name": "floor", "static": true,
       "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}, "friction": 0.3})";

@@ -35,6 +35,23 @@ TEST(CsvTest, ReadsCellsAndTheirLines) {
   EXPECT_EQ(error, "t.csv: line 4: y: expected a number, got \"z\"");
 }
 
+TEST(CsvTest, QuotedCellsHoldCommasAndQuotes) {
+  CsvTable table;
+  std::string error;
+  ASSERT_TRUE(ParseCsv("\"time, s\", \"the \"\"tip\"\"\" ,\"\",5\" disc\n\"0\",\"1,5\",,\"\"\"\"\n",
+                       "t.csv", {}, {}, &table, &error))
+      << error;
+  EXPECT_EQ(table.columns, (std::vector<std::string>{"time, s", "the \"tip\"", "", "5\" disc"}));
+  EXPECT_EQ(table.rows[0], (std::vector<std::string>{"0", "1,5", "", "\""}));
+  for (const std::string& cell : table.columns) {
+    EXPECT_EQ(SplitCsvLine("a," + CsvCell(cell) + ",b"),
+              (std::vector<std::string>{"a", cell, "b"}));
+  }
+  // A quote that is not closed ends with its line.
+  EXPECT_FALSE(ParseCsv("a,b\n1,2\n\"3,4\n5,6\n", "t.csv", {}, {}, &table, &error));
+  EXPECT_EQ(error, "t.csv: line 3: expected 2 cells, got 1");
+}
+
 TEST(CsvTest, TakesAnyColumnsWhereNoneAreNamed) {
   CsvTable table;
   std::string error;

@@ -49,6 +49,18 @@ TEST_F(SetParametersTest, SetsAllNumbersOfEachParameter) {
   EXPECT_EQ(scene_.bodies[1].position.x(), 3.0);
 }
 
+TEST_F(SetParametersTest, RadiiAreCheckedAsWhenASceneIsRead) {
+  std::string error;
+  ASSERT_TRUE(ParseScene(R"({"bodies": [{"name": "e", "shape": {"ellipse": {"radii": [1, 2]}},
+      "mass": 1, "position": [0, 1]}]})",
+                         "s.json", "", &scene_, &error))
+      << error;
+  EXPECT_EQ(Set("bodies/e/shape/radii/x", 3e-9), "");
+  EXPECT_EQ(Set("bodies/e/shape/radii/x", 1e-9),
+            "the scene with these values: /bodies/0/shape/ellipse/radii: expected two radii of a "
+            "ratio of at most 1e9, got 1e-09 and 2.0");
+}
+
 TEST_F(SetParametersTest, RefusesWhatNumbersMayNotBe) {
   EXPECT_EQ(Set("bodies/a/mass", -1.0), "bodies/a/mass: expected a number > 0, got -1.0");
   EXPECT_EQ(Set("bodies/a/restitution", 1.5),

@@ -59,6 +59,24 @@ TEST(RecordingTableTest, WideTablesByAMapping) {
             "time,body,relative_to,angle,omega\n0.5,upper,,2,3\n0.5,lower,upper,4.25,\n");
 }
 
+TEST(RecordingTableTest, QuotedNamesMayHoldSeparatorsQuotesAndLineBreaks) {
+  const TableOptions options = Mapped(R"({"time": "t, s", "columns": [
+      {"column": "the \"tip\", x", "point": "tip", "coordinate": "x"},
+      {"column": "y of it", "point": "tip", "coordinate": "y"}]})");
+  const std::string wanted = "time,point,x,y\n0.5,tip,2.5,-3\n1,tip,4,5\n";
+  Imported imported = Import(
+      "\"t, s\",\"the \"\"tip\"\", x\",\"y\nof it\"\r\n0.5,\"2.5\",-3\r\n1,4,5\r\n", options);
+  ASSERT_TRUE(imported.ok) << imported.error;
+  EXPECT_EQ(imported.csv, wanted);
+  // Between semicolons commas need no quotes, and are those of decimals in numbers alone.
+  imported = Import("t, s;\"the \"\"tip\"\", x\";y of it\n\"0,5\";2,5;-3\n1; 4,0 ;5\n", options);
+  ASSERT_TRUE(imported.ok) << imported.error;
+  EXPECT_EQ(imported.csv, wanted);
+  // Other lines keep their numbers.
+  EXPECT_EQ(Import("\"t, s\",\"the \"\"tip\"\", x\",\"y\nof it\"\n0.5,2.5,z\n", options).error,
+            "r.csv: line 3: \"y of it\": expected a number, got \"z\"");
+}
+
 TEST(RecordingTableTest, LongTablesByAMapping) {
   TableOptions options = Mapped(R"({"time": {"column": "ms", "scale": 0.001}, "target": "point",
       "name": "marker", "names": {"LED 1": "tip", "LED 2": "joint"},

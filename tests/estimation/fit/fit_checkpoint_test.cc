@@ -195,7 +195,7 @@ TEST(FitCheckpointTest, RefusesWhatIsDamagedOrOfAnotherFit) {
   const std::string deep(1'000'000, '\x81');
   for (const std::string& other :
        {std::string("{}"), std::string("[]"), std::string(), std::string("\xff\xff"), deep}) {
-    EXPECT_EQ(refused(other, problem).rfind("c.json: expected a \"tangible-fit checkpoint 5\"", 0),
+    EXPECT_EQ(refused(other, problem).rfind("c.json: expected a \"tangible-fit checkpoint 6\"", 0),
               0U);
   }
 

@@ -73,6 +73,28 @@ TEST(ShootingTest, DerivativesAreThoseOfDifferences) {
   }
 }
 
+// Ten times of observations make five segments; of one body's states, 6 numbers at each cut, there
+// are at most 201.
+TEST(ShootingTest, TakesNoMoreSegmentsThanObservationsSupport) {
+  Scene scene = MakeScene(kPendulum);
+  scene.simulation.duration = 0.9;
+  const std::vector<FitParameter> parameters = {Parameter("joints/pin/angle", 0.9)};
+  RolloutResiduals few = MakeResiduals(scene, {}, parameters, Observe(scene, 10, 0.002, 3));
+  EXPECT_EQ(MostSegments(few), 5);
+  EXPECT_EQ(ShootingResiduals(1000, &few).num_segments(), 5);
+  EXPECT_EQ(ShootingResiduals(3, &few).num_segments(), 3);
+  FitOptions options;
+  options.approach = FitApproach::kSegments;
+  options.segments = 1000;
+  const FitResult fit = Fit(options, &few, {});
+  EXPECT_EQ(fit.status, FitStatus::kConverged) << fit.message;
+  EXPECT_EQ(fit.starts[0].message.find("only 5 of 1000 segments: "), 0u) << fit.starts[0].message;
+  options.segments = 5;
+  EXPECT_EQ(Fit(options, &few, {}).starts[0].message, "");
+  scene.simulation.duration = 9.0;
+  EXPECT_EQ(MostSegments(MakeResiduals(scene, {}, parameters, Observe(scene, 1, 0.002, 3))), 201);
+}
+
 TEST(ShootingTest, FindsAPeriodFromWhichOneRunStrays) {
   Scene scene = MakeScene(kPendulum);
   scene.simulation.duration = 8.0;

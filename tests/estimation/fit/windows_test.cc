@@ -65,6 +65,17 @@ TEST(WindowsTest, LeadWhereThePlainFitEndsElsewhere) {
   }
 }
 
+// One segment is the plain fit, which ends elsewhere.
+TEST(WindowsTest, LeadWhereSegmentsAndThePlainFitEndElsewhere) {
+  const FitResult fit = PendulumFit().Run(FitApproach::kSegments);
+  ASSERT_EQ(fit.status, FitStatus::kConverged) << fit.message;
+  EXPECT_NEAR(fit.estimate[0], -9.81, 5.0 * fit.uncertainty.standard_deviation[0]);
+  EXPECT_EQ(fit.starts[0].approach, "windows");
+  EXPECT_EQ(fit.starts[0].tried, "segments");
+  EXPECT_GT(fit.starts[0].plain_cost, 100.0 * fit.final_cost);
+  EXPECT_EQ(fit.starts[0].tried_cost, fit.starts[0].plain_cost);
+}
+
 TEST(WindowsTest, AreNotGrownWhereThePlainFitExplainsTheObservations) {
   PendulumFit pendulum;
   pendulum.parameters[0].initial = -9.7;

@@ -113,6 +113,22 @@ TEST(ParameterizedSceneTest, ValuesThatANumberMayNotTakeAreRefused) {
   EXPECT_TRUE(scene.Set(Eigen::VectorXd::Constant(1, 1.0)));
 }
 
+// Radii beyond the ratio that a scene may have make an evaluation fail, from which a fit steps back.
+TEST(ParameterizedSceneTest, RadiiAreCheckedAsWhenASceneIsRead) {
+  Scene scene = MakeScene(kFallingBall);
+  scene.bodies[0].shape = {ShapeType::kEllipse, {1.0, 2.0}};
+  ParameterizedScene fitted;
+  ParameterError error;
+  ASSERT_TRUE(
+      fitted.Create(scene, {}, {Bounded("bodies/ball/shape/radii/x", {}, 1.0, 1e12)}, &error))
+      << error.what;
+  EXPECT_TRUE(fitted.Set(Eigen::VectorXd::Constant(1, 1.9e9)));
+  EXPECT_FALSE(fitted.Set(Eigen::VectorXd::Constant(1, 2.1e9)));
+  EXPECT_FALSE(fitted.Set(Eigen::VectorXd::Constant(1, 1.9e-9)));
+  EXPECT_FALSE(fitted.Create(scene, {}, {Parameter("bodies/ball/shape/radii/x", 1e11)}, &error));
+  EXPECT_EQ(error.what, "the initial values give a number that is not allowed");
+}
+
 TEST(ParameterizedSceneTest, ParametersThatAddShareANumber) {
   FitParameter shift = Parameter("bodies/link*/position/y", 0.5);
   shift.sets[0].mode = SetMode::kAdd;

@@ -7,6 +7,7 @@
 #include <fstream>
 
 #include "../../support/fit_scenes.h"
+#include "tangible/scene/json_reader.h"
 
 namespace tangible {
 namespace {
@@ -93,9 +94,12 @@ TEST_F(FitJsonTest, BadInputsAreOneLine) {
       {"{}", ": /scene: missing, expected a string"},
       {With("scene", "3"), ": /scene: expected a string, got 3"},
       {With("step", "1"),
-       ": /step: unknown key, expected one of scene, observations, points, sensors, cameras, "
-       "clocks, parameters, "
-       "derivatives, loss, approach, segments, starts, seed, got \"step\""},
+       ": /step: unknown key, expected one of scene, observations, recordings, initial, points, "
+       "sensors, cameras, clocks, parameters, derivatives, loss, approach, segments, starts, seed, "
+       "got \"step\""},
+      {With("parameters", R"([{"path": "gravity/y", "step": 1}])"),
+       ": /parameters/0/step: unknown key of a parameter, expected one of name, initial, lower, "
+       "upper, sets, path, scale, prior, per, varies, got \"step\""},
       {With("observations", "[]"),
        ": /observations: expected at least one {file, sigma}, got none"},
       {With("observations", R"([{"file": "seen.csv", "sigma": -1}])"),
@@ -181,6 +185,92 @@ TEST_F(FitJsonTest, AFileThatIsNotThereIsSaid) {
   std::string error;
   EXPECT_FALSE(LoadFit(folder_ + "fit.json", &fit, &error));
   EXPECT_EQ(error, folder_ + "fit.json: cannot be read: No such file or directory");
+}
+
+// A file with two recordings, one of which has other keys than the file.
+TEST_F(FitJsonTest, MistakesInRecordingsNameTheRecordingOnlyWhereItHasThem) {
+  const auto message = [this](const Json& file, const Json& own) {
+    Json json = Json::parse(R"({"scene": "scene.json", "parameters": ["gravity/y"], "recordings": [
+        {"name": "a", "observations": [{"file": "seen.csv", "sigma": 0.01}]},
+        {"name": "b", "observations": [{"file": "seen.csv", "sigma": 0.01}]}]})");
+    json.update(file);
+    json["recordings"][1].update(own);
+    FitFile fit;
+    std::string error;
+    EXPECT_FALSE(ParseFit(json.dump(), folder_ + "fit.json", &fit, &error)) << json;
+    EXPECT_EQ(error.find(folder_ + "fit.json: "), 0u) << error;
+    return error.substr(std::min(error.size(), folder_.size() + 10));
+  };
+  const Json none = Json::object();
+  EXPECT_EQ(message({{"seed", -1}}, none), "/seed: expected an integer in [0, 2147483647], got -1");
+  EXPECT_EQ(message({{"sead", 1}}, none).find("/sead: unknown key, expected one of scene, "), 0u);
+  EXPECT_EQ(message({{"parameters", {"gravity/z"}}}, none).find("/parameters/0/sets/0/path: "), 0u);
+  EXPECT_EQ(message({{"points", {{"p", {{"body", "bal"}}}}}}, none).find("/points/p/body: "), 0u);
+  EXPECT_EQ(message({{"scene", nullptr}}, none), "/scene: expected a string, got null");
+  EXPECT_EQ(message(none, {{"points", {{"p", {{"body", "bal"}}}}}})
+                .find("recording 'b': /points/p/body: "),
+            0u);
+  EXPECT_EQ(message({{"parameters", {"points/p/at/x"}}, {"points", {{"p", {{"body", "ball"}}}}}},
+                    {{"points", Json::object()}})
+                .find("recording 'b': /parameters/0/sets/0/path: "),
+            0u);
+  EXPECT_EQ(message(none, {{"observations", {{{"file", "seen.csv"}}}}}),
+            "recording 'b': /observations/0/sigma: missing, expected a number > 0");
+  // Values that a parameter sets would be those of the parameter; what is added to them is not.
+  EXPECT_EQ(message({{"parameters", {{{"name", "g"}, {"path", "gravity/*"}}}}},
+                    {{"values", {{"gravity/y", -9}}}}),
+            "recording 'b': /values: gravity/y: expected a number that no parameter sets, got one "
+            "that \"g\" sets (initial says where its value in a recording begins)");
+  const auto spread = [&](const Json& value) {
+    return message({{"parameters",
+                     {{{"path", "gravity/y"},
+                       {"per", "recording"},
+                       {"varies", {{"gaussian", {{"spread", value}}}}}}}}},
+                   none);
+  };
+  const std::string place = "/parameters/0/varies/gaussian/spread: ";
+  EXPECT_EQ(spread(0), place + "expected \"estimate\" or a number > 0, got 0");
+  EXPECT_EQ(spread(true), place + "expected \"estimate\" or a number > 0, got true");
+  EXPECT_EQ(spread("estimated"),
+            place + "expected \"estimate\" or a number > 0, got \"estimated\"");
+}
+
+TEST_F(FitJsonTest, ValuesThatAParameterAddsToAreThoseOfTheRecording) {
+  FitFile fit;
+  std::string error;
+  ASSERT_TRUE(ParseFit(R"({"scene": "scene.json",
+      "parameters": [{"name": "more", "initial": 0, "sets": [{"path": "gravity/y", "add": true}]}],
+      "recordings": [{"name": "a", "observations": [{"file": "seen.csv", "sigma": 0.01}],
+                      "values": {"gravity/y": -9}}]})",
+                       folder_ + "fit.json", &fit, &error))
+      << error;
+  EXPECT_EQ(fit.run().scene.gravity.y(), -9.0);
+}
+
+TEST_F(FitJsonTest, ASensorWhoseSigmaIsEstimatedNeedsObservations) {
+  const auto message = [this](Json json) {
+    FitFile fit;
+    std::string error;
+    ParseFit(json.dump(), folder_ + "fit.json", &fit, &error);
+    return error.substr(std::min(error.size(), folder_.size() + 10));
+  };
+  Json json = Json::parse(With("sensors", R"({"s": {"sigma": 0.1, "estimate_sigma": true}})"));
+  EXPECT_EQ(message(json),
+            "/sensors/s/estimate_sigma: expected a sensor that observations name, got one without "
+            "observations");
+  json["observations"][0]["sensor"] = "s";
+  EXPECT_EQ(message(json), "");
+  // What recordings name alike is one sensor, and may be used by one of them.
+  const Json seen = json["observations"];
+  json.erase("observations");
+  json["recordings"] = {{{"name", "a"}, {"observations", seen}},
+                        {{"name", "b"}, {"observations", seen}}};
+  json["recordings"][1]["observations"][0].erase("sensor");
+  EXPECT_EQ(message(json), "");
+  json["recordings"][1]["sensors"] = {{"other", {{"estimate_sigma", true}}}};
+  EXPECT_EQ(message(json),
+            "/recordings/1/sensors/other/estimate_sigma: expected a sensor that observations name, "
+            "got one without observations");
 }
 
 TEST_F(FitJsonTest, InstrumentsAreRead) {
