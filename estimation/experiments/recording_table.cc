@@ -9,6 +9,7 @@
 
 #include "tangible/estimation/experiments/recording.h"
 #include "tangible/estimation/experiments/tolerances.h"
+#include "tangible/math/scalar.h"
 #include "tangible/scene/csv.h"
 #include "tangible/scene/json_reader.h"
 #include "tangible/scene/scene_names.h"
@@ -16,8 +17,6 @@
 
 namespace tangible {
 namespace {
-
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 /// One column of a file.
 struct ValueColumn {

@@ -5,18 +5,16 @@
 #include <algorithm>
 #include <boost/math/distributions/students_t.hpp>
 #include <cmath>
-#include <limits>
 #include <numeric>
 #include <tuple>
 #include <utility>
 
 #include "tangible/estimation/uncertainty/decomposition.h"
 #include "tangible/estimation/uncertainty/tolerances.h"
+#include "tangible/math/scalar.h"
 
 namespace tangible {
 namespace {
-
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 /// Residuals at the same time count as one: their influences are added.
 struct TimeSeries {

@@ -3,16 +3,15 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "tangible/estimation/uncertainty/decomposition.h"
 #include "tangible/estimation/uncertainty/tolerances.h"
+#include "tangible/math/scalar.h"
 #include "tangible/render/html.h"
 
 namespace tangible {
 namespace {
 
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 // The number of terms that a message has of a combination.
 constexpr int kMostTerms = 12;
 

@@ -30,6 +30,7 @@ inline constexpr int kLocalJetWidth = TANGIBLE_LOCAL_JET_WIDTH;
 using LocalJet = Jet<kLocalJetWidth>;
 
 inline constexpr double kInfinity = std::numeric_limits<double>::infinity();
+inline constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 /// The value of a scalar, without its derivatives.
 inline double ValueOf(double x) { return x; }
