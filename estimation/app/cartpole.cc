@@ -78,10 +78,12 @@ bool PrintCurves(const CartPoleStudyOptions& options, const CartPoleCurves& curv
     }
     const double ratio = ErrorOf(curves[i], 1, 0).median / ErrorOf(curves[i], 0, 0).median;
     if (options.samples[i] != kSamples) continue;
-    std::printf(
-        "one step ahead the perceptron's error is %.0f times the engine's (expected at "
-        "least %g)",
-        ratio, kLeastErrorRatio);
+    std::printf("one step ahead the perceptron's error is %.0f times the engine's", ratio);
+    if (options.plant == PlantKind::kMujoco) {
+      std::printf("; the engine's is that of MuJoCo's integrator, which is of first order\n");
+      continue;
+    }
+    std::printf(" (expected at least %g)", kLeastErrorRatio);
     holds = PrintBound(ratio >= kLeastErrorRatio, "") && holds;
   }
   return holds;
