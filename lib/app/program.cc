@@ -411,17 +411,17 @@ std::string WriteAllOrNone(const std::vector<OutputFile>& files) {
   pending.reserve(files.size());
   for (const OutputFile& file : files) {
     if (file.path.empty()) continue;
-    const std::string error = pending.emplace_back(file.path).Prepare(file.text, Over::kNoInput);
+    std::string error = pending.emplace_back(file.path).Prepare(file.text, Over::kNoInput);
     if (!error.empty()) return error;
   }
   for (const OutputFile& file : files) {
-    const std::string error = file.path.empty() ? WriteResult("", file.text) : "";
+    std::string error = file.path.empty() ? WriteResult("", file.text) : "";
     if (!error.empty()) return error;
   }
   // What cannot be taken back comes first.
   for (const bool direct : {true, false}) {
     for (PendingFile& file : pending) {
-      const std::string error = file.is_direct() == direct ? file.Commit() : "";
+      std::string error = file.is_direct() == direct ? file.Commit() : "";
       if (!error.empty()) return error;
     }
   }
