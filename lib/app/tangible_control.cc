@@ -163,7 +163,7 @@ std::string WriteResults(const ControlFile& file, Scene scene, const Played& pla
   if (FLAGS_trajectory.empty() && FLAGS_view.empty()) return WriteAllOrNone(files);
   scene.simulation.duration = static_cast<double>(played.controls.rows()) * dt;
   RolloutFunction function;
-  const std::string error = function.Create(scene, {}, file.paths, {});
+  std::string error = function.Create(scene, {}, file.paths, {});
   if (!error.empty()) return error;
   const EngineStep step(function);
   Model<double> model;
@@ -211,6 +211,14 @@ OrderedJson FinalState(const RolloutFunction& function, const RowMatrixXd& state
   return json;
 }
 
+void WarnOfMaximum(const std::string& path) {
+  ReportError(
+      path +
+      ": warning: with the initial controls the cost has no gradient, as an angle that wraps "
+      "is half a turn from its target, where its cost is largest; they were offset by " +
+      FormatNumber(kStartOffset) + " of their ranges");
+}
+
 int Plan(const std::string& path, const ControlFile& file) {
   RolloutFunction function;
   std::string error = function.Create(file.scene, {}, file.paths, {});
@@ -225,13 +233,7 @@ int Plan(const std::string& path, const ControlFile& file) {
   const IlqrResult result = SolveIlqr(problem, start, file.options);
   const double seconds = static_cast<double>(std::clock() - began) / CLOCKS_PER_SEC;
   if (result.status == IlqrStatus::kFailed) return ReportError(path + ": " + result.message);
-  if (result.left_maximum) {
-    ReportError(path +
-                ": warning: with the initial controls the cost has no gradient, as an angle that "
-                "wraps is half a turn from its target, where its cost is largest; they were offset "
-                "by " +
-                FormatNumber(kStartOffset) + " of their ranges");
-  }
+  if (result.left_maximum) WarnOfMaximum(path);
   RolloutInput input{VectorX<double>(), VectorX<double>(), result.plan.controls};
   RolloutWorker worker(function);
   const RolloutOutput run = worker.Run(input);
@@ -305,6 +307,7 @@ struct PredictiveRun {
   Played played;
   std::vector<double> seconds;  // of each plan, CPU
   long failed = 0;
+  bool left_maximum = false;  // in any plan
   std::string error;
 };
 
@@ -334,6 +337,7 @@ PredictiveRun RunPredictive(const ControlFile& file, EngineStep* map, EngineStep
     const std::clock_t began = std::clock();
     const VectorX<double> u = controller.Control(k, x);
     run.seconds.push_back(static_cast<double>(std::clock() - began) / CLOCKS_PER_SEC);
+    run.left_maximum |= controller.last().left_maximum;
     run.failed += controller.last().status == IlqrStatus::kFailed ? 1 : 0;
     if (!plant->Step(k, x, u, &next, &run.error)) return run;
     run.played.cost += cost.Value(x, u);
@@ -364,6 +368,7 @@ int Predict(const std::string& path, const ControlFile& file) {
   if (!run.error.empty()) {
     return ReportError((FLAGS_plant.empty() ? file.scene_path : FLAGS_plant) + ": " + run.error);
   }
+  if (run.left_maximum) WarnOfMaximum(path);
   std::vector<double> sorted = run.seconds;
   std::sort(sorted.begin(), sorted.end());
   OrderedJson json = {

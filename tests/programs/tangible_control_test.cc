@@ -197,6 +197,22 @@ TEST_F(TangibleControlTest, AForceThatEndsBeforeTheHorizonIsPlanned) {
   EXPECT_EQ(result["controls"]["values"][19][0], 0.5);
 }
 
+// A pendulum that hangs and is to stand, with whole turns not counted, has no gradient.
+TEST_F(TangibleControlTest, SaysThatItLeavesAMaximum) {
+  Write("rod.json", R"({"bodies": [
+      {"name": "rod", "shape": {"box": {"size": [0.05, 1]}}, "mass": 1, "position": [0, -0.5]}],
+    "joints": [{"name": "motor", "type": "revolute", "bodies": ["rod", "world"], "anchor": [0, 0]}],
+    "simulation": {"dt": 0.05, "duration": 1, "joint_correction": "projection"}})");
+  const ProgramRun run = Control(R"({"scene": "rod.json", "controls": [
+      {"path": "joints/motor/effort", "low": -20, "high": 20}], "cost": [
+      {"state": "rod/angle", "target": 3.141592653589793, "wrap": true, "weight": 100, "at": "end"},
+      {"control": "joints/motor/effort", "weight": 0.01}]})");
+  ExpectOneLine(run, 0, "warning: with the initial controls the cost has no gradient");
+  const json result = json::parse(run.out);
+  EXPECT_EQ(result["status"], "converged") << result["message"];
+  EXPECT_NEAR(std::cos(result["final_state"]["rod/angle"].get<double>()), -1.0, 1e-2);
+}
+
 // An output that cannot be written leaves the others as they were.
 TEST_F(TangibleControlTest, WritesAllOutputsOrNone) {
   Write("plan.csv", "old");
