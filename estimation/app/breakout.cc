@@ -21,10 +21,10 @@ DEFINE_string(random_frames, "1000,200",
               "frames of random play, at 60 a second, before the agent plays");
 DEFINE_double(sticky, 0.25,
               "chance that a button sticks for a frame, in games of their own; 0: none");
-DEFINE_int32(games, 20, "of each player, with seeds that follow each other");
+DEFINE_int32(games, 20, "of each player, with seeds that follow each other; with --quick 2");
 DEFINE_int32(seed, 1, "of the first game");
 DEFINE_int32(threads, 0, "0: one a core; results do not depend on it");
-DEFINE_bool(quick, false, "two short games, without the bounds");
+DEFINE_bool(quick, false, "short games, two unless --games is given, without the bounds");
 DEFINE_string(out, "", "file of all results (JSON)");
 DEFINE_string(plot, "", "file of reward and errors over frames (SVG)");
 DEFINE_string(view, "", "file of the first learned game that is played (HTML)");
@@ -38,6 +38,7 @@ constexpr double kMedian = breakout::kMostPoints, kFewMedian = 400.0;
 // High reward, where errors are compared with those at the end.
 constexpr int kHighScore = 400;
 constexpr long kQuickFrames = 8000;  // of a game
+constexpr int kQuickGames = 2;
 constexpr int kPlotPoints = 120;
 
 struct Published {
@@ -78,20 +79,12 @@ const CurvePoint& At(const BreakoutResult& game, double frames) {
   return *last;
 }
 
-// The first point of a curve with that score, or the last one.
-const CurvePoint& AtScore(const BreakoutResult& game, int score) {
+// The first point of a curve with that score; null where the game never had it.
+const CurvePoint* AtScore(const BreakoutResult& game, int score) {
   for (const CurvePoint& point : game.curve) {
-    if (point.score >= score) return point;
+    if (point.score >= score) return &point;
   }
-  return game.curve.back();
-}
-
-template <typename Value>
-double MedianOver(const std::vector<BreakoutResult>& games, const Value& value) {
-  std::vector<double> values;
-  values.reserve(games.size());
-  for (const BreakoutResult& game : games) values.push_back(value(game));
-  return MedianOf(std::move(values));
+  return nullptr;
 }
 
 void PrintTable(const BreakoutStudyOptions& options, const BreakoutResults& results) {
@@ -117,45 +110,65 @@ void PrintTable(const BreakoutStudyOptions& options, const BreakoutResults& resu
   std::fflush(stdout);
 }
 
+// One line of the table of learning: the medians of a number at the start of the games, at high
+// reward, where games came to it, and at their end; `settled` is that at the end of these alone.
+struct LearningLine {
+  double start = NAN, high = NAN, end = NAN, settled = NAN;
+};
+
+template <typename Value>
+LearningLine PrintLearningLine(const char* what, const std::vector<BreakoutResult>& games,
+                               int random_frames, const Value& value) {
+  std::vector<double> start, high, end, settled;
+  for (const BreakoutResult& game : games) {
+    size_t first = 0;
+    while (game.curve[first].frames_seen < random_frames && first + 1 < game.curve.size()) ++first;
+    start.push_back(value(game.curve[first]));
+    end.push_back(value(game.curve.back()));
+    const CurvePoint* point = AtScore(game, kHighScore);
+    if (point == nullptr) continue;
+    high.push_back(value(*point));
+    settled.push_back(value(game.curve.back()));
+  }
+  const LearningLine line{MedianOf(start), MedianOf(high), MedianOf(end), MedianOf(settled)};
+  std::printf("  %-46s %8.3g ", what, line.start);
+  if (high.empty()) {
+    std::printf("%8s", "-");
+  } else {
+    std::printf("%8.3g", line.high);
+  }
+  std::printf(" %8.3g\n", line.end);
+  return line;
+}
+
 // How far learning was at its start, at high reward and at the end of the games.
 bool PrintLearning(const BreakoutStudyOptions& options, const BreakoutResults& results) {
   bool holds = true;
   for (size_t i = 0; i < results.size(); ++i) {
     if (options.cases[i].kind != PlayerKind::kLearned) continue;
-    std::printf("%s: medians at the game's start, at %d points, at its end\n",
-                NameOfCase(options.cases[i]).c_str(), kHighScore);
-    const int random_frames = options.cases[i].random_frames;
-    const auto start = [&](const BreakoutResult& game) -> const CurvePoint& {
-      size_t i = 0;
-      while (game.curve[i].frames_seen < random_frames && i + 1 < game.curve.size()) ++i;
-      return game.curve[i];
-    };
-    const auto high = [](const BreakoutResult& game) -> const CurvePoint& {
-      return AtScore(game, kHighScore);
-    };
-    const auto end = [](const BreakoutResult& game) -> const CurvePoint& {
-      return game.curve.back();
-    };
+    const std::vector<BreakoutResult>& games = results[i];
+    const auto reached = std::count_if(games.begin(), games.end(), [](const BreakoutResult& game) {
+      return AtScore(game, kHighScore) != nullptr;
+    });
+    std::printf("%s: medians at the game's start, at %d points (%ld of %zu games), at its end\n",
+                NameOfCase(options.cases[i]).c_str(), kHighScore, static_cast<long>(reached),
+                games.size());
     const auto line = [&](const char* what, const auto& value) {
-      const auto median = [&](const auto& point) {
-        return MedianOver(results[i],
-                          [&](const BreakoutResult& game) { return value(point(game)); });
-      };
-      std::printf("  %-46s %8.3g %8.3g %8.3g\n", what, median(start), median(high), median(end));
-      return std::array<double, 3>{median(start), median(high), median(end)};
+      return PrintLearningLine(what, games, options.cases[i].random_frames, value);
     };
     line("frames seen", [](const CurvePoint& p) { return static_cast<double>(p.frames_seen); });
     line("error of the paddle's way in a step (pixels)",
          [](const CurvePoint& p) { return p.errors.paddle_way; });
-    const auto returns = line("share of returns expected wrong",
-                              [](const CurvePoint& p) { return p.errors.returns; });
-    const auto bricks = line("share of bricks' speeds expected wrong",
-                             [](const CurvePoint& p) { return p.errors.bricks; });
+    const LearningLine returns = line("share of returns expected wrong",
+                                      [](const CurvePoint& p) { return p.errors.returns; });
+    const LearningLine bricks = line("share of bricks' speeds expected wrong",
+                                     [](const CurvePoint& p) { return p.errors.bricks; });
     if (options.most_frames < breakout::kMostFrames) continue;
-    holds = PrintBound(returns[2] < returns[0] && bricks[2] < bricks[0],
+    holds = PrintBound(returns.end < returns.start && bricks.end < bricks.start,
                        "  what was learned in the game is better than what was before") &&
             holds;
-    holds = PrintBound(returns[1] > returns[2] || bricks[1] > bricks[2],
+    if (reached == 0) continue;
+    holds = PrintBound(returns.high > returns.settled || bricks.high > bricks.settled,
                        "  high reward comes before it has settled") &&
             holds;
   }
@@ -312,7 +325,7 @@ std::string CheckFlags(BreakoutStudyOptions* options) {
   options->seed = static_cast<unsigned>(FLAGS_seed);
   options->threads = FLAGS_threads;
   if (FLAGS_quick) {
-    options->games = 2;
+    if (gflags::GetCommandLineFlagInfoOrDie("games").is_default) options->games = kQuickGames;
     options->most_frames = kQuickFrames;
   }
   return "";

@@ -2,6 +2,7 @@
 #include "tangible/app/control_problem.h"
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <limits>
 
@@ -15,10 +16,17 @@ namespace {
 // Steps of a plan or a run: each has controls, and a plan has Jacobians of each.
 constexpr double kMostSteps = 1e7;
 
-// A time of at least `least` steps of dt, s.
-double ReadSpan(const JsonReader& json, double dt, double least) {
+// The duration of a problem, which is rounded up to whole steps of dt, s.
+double ReadHorizon(const JsonReader& json, double dt) {
+  const double horizon = json.Number(NumberKind::kPositive);
+  if (json.ok() && horizon > kMostSteps * dt) json.FailExpected("a time of at most 1e7 steps");
+  return horizon;
+}
+
+// A duration that is rounded to the nearest number of steps, s.
+double ReadSpan(const JsonReader& json, double dt) {
   const double span = json.Number(NumberKind::kPositive);
-  if (json.ok() && !(span >= least * dt && span <= kMostSteps * dt)) {
+  if (json.ok() && !(span >= 0.5 * dt && span <= kMostSteps * dt)) {
     json.FailExpected("a time of at least half a step and at most 1e7 steps");
   }
   return span;
@@ -80,6 +88,10 @@ class Reader {
         control.At("initial").FailExpected("a number from low to high");
       }
     }
+    if (!root_.ok()) return;
+    int which = -1;
+    const std::string error = CheckControls(problem_.scene, problem_.paths, &which);
+    if (!error.empty()) (which < 0 ? root_.At("scene") : list.At(which).At("path")).Fail(error);
   }
 
   void ReadCost() {
@@ -159,6 +171,15 @@ class Reader {
     if (json.Has("deviation")) {
       surrogate.deviation = json.At("deviation").Number(NumberKind::kPositive);
     }
+    for (int i = 0; i < static_cast<int>(problem_.paths.size()); ++i) {
+      if (std::isfinite(problem_.low[i]) && std::isfinite(problem_.high[i])) continue;
+      root_.At("controls")
+          .At(i)
+          .Fail(
+              "expected low and high with a surrogate, whose deviation is a share of their range, "
+              "got "
+              "a control without both");
+    }
     if (json.Has("seed")) {
       surrogate.seed = static_cast<unsigned>(json.At("seed").Integer(0, 1000000000));
     }
@@ -167,8 +188,8 @@ class Reader {
   void ReadPredictive(const JsonReader& json) {
     json.ExpectKeys({"duration", "horizon", "iterations"}, " of mpc");
     const double dt = problem_.scene.simulation.dt;
-    problem_.run_duration = ReadSpan(json.At("duration"), dt, 0.5);
-    problem_.plan_horizon = ReadSpan(json.At("horizon"), dt, 0.5);
+    problem_.run_duration = ReadSpan(json.At("duration"), dt);
+    problem_.plan_horizon = ReadSpan(json.At("horizon"), dt);
     if (json.Has("iterations")) {
       problem_.plan_iterations = json.At("iterations").Integer(1, 1000000);
     }
@@ -187,6 +208,17 @@ std::string Beside(const std::string& file, const std::string& path) {
 
 }  // namespace
 
+std::string CheckControls(const Scene& scene, const std::vector<std::string>& paths, int* which) {
+  RolloutFunction function;
+  *which = -1;
+  std::string error = function.Create(scene, {}, {}, {});
+  for (size_t i = 0; i < paths.size() && error.empty(); ++i) {
+    *which = static_cast<int>(i);
+    error = function.Create(scene, {}, {paths.begin(), paths.begin() + *which + 1}, {});
+  }
+  return error;
+}
+
 bool LoadControlFile(const std::string& file, ControlFile* problem, std::string* error) {
   Json json;
   if (!ParseJsonFile(file, &json, error)) return false;
@@ -195,15 +227,16 @@ bool LoadControlFile(const std::string& file, ControlFile* problem, std::string*
   root.ExpectKeys({"name", "scene", "controls", "cost", "horizon", "max_iterations",
                    "gradient_tolerance", "second_order", "reference_extension", "surrogate",
                    "mpc"});
+  if (root.Has("name")) root.At("name").String();
   const std::string scene = root.At("scene").String();
   if (errors.ok()) {
     problem->scene_path = Beside(file, scene);
     if (!LoadScene(problem->scene_path, &problem->scene, error)) return false;
     if (root.Has("horizon")) {
       problem->scene.simulation.duration =
-          ReadSpan(root.At("horizon"), problem->scene.simulation.dt, 0.0);
+          ReadHorizon(root.At("horizon"), problem->scene.simulation.dt);
     } else if (!(problem->scene.simulation.duration > 0.0)) {
-      root.Fail("horizon: missing, expected a number > 0, as the scene's duration is 0");
+      root.At("horizon").Fail("missing, expected a number > 0, as the scene's duration is 0");
     }
     // Controls are held over whole steps.
     SimulationSettings& settings = problem->scene.simulation;

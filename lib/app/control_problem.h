@@ -24,6 +24,10 @@ struct ControlFile {
   int plan_iterations = 5;
 };
 
+/// What is wrong with the paths of controls in a scene, one line, and which path it is (-1: none,
+/// it is the scene); empty where each is a force, torque or effort of its own.
+std::string CheckControls(const Scene& scene, const std::vector<std::string>& paths, int* which);
+
 /// Reads a problem and its scene, and resolves names. On failure sets a message of one line.
 bool LoadControlFile(const std::string& file, ControlFile* problem, std::string* error);
 

@@ -19,6 +19,7 @@
 #include <new>
 #include <sstream>
 #include <system_error>
+#include <utility>
 
 #include "tangible/scene/text_file.h"
 
@@ -196,6 +197,71 @@ std::string WhyUnwritable(const std::string& path) {
   return Unwritable(path, std::strerror(fs::exists(folder, error) && !error ? ENOTDIR : ENOENT));
 }
 
+// A file's new content, written beside its place until it is put there; the content for a device or
+// a pipe is kept until then.
+class PendingFile {
+ public:
+  explicit PendingFile(std::string path) : path_(std::move(path)) {}
+  PendingFile(PendingFile&& other) noexcept
+      : path_(std::move(other.path_)),
+        target_(std::move(other.target_)),
+        temporary_(std::exchange(other.temporary_, {})),
+        direct_text_(other.direct_text_) {}
+  PendingFile(const PendingFile&) = delete;
+  PendingFile& operator=(const PendingFile&) = delete;
+  ~PendingFile() {
+    std::error_code error;
+    if (!temporary_.empty()) std::filesystem::remove(temporary_, error);
+  }
+
+  // `text` has to live until Commit. Both return an error (one line) or empty.
+  std::string Prepare(std::string_view text, Over over);
+  std::string Commit();
+  bool is_direct() const { return direct_text_.has_value(); }
+
+ private:
+  std::string path_;
+  std::filesystem::path target_;
+  std::string temporary_;
+  std::optional<std::string_view> direct_text_;
+};
+
+std::string PendingFile::Prepare(std::string_view text, Over over) {
+  namespace fs = std::filesystem;
+  if (over == Over::kNoInput) {
+    for (const std::string& input : FilesRead()) {
+      if (IsSameFile(path_, input)) return Unwritable(path_, "it was read as an input");
+    }
+  }
+  std::error_code error;
+  const fs::file_status status = fs::status(path_, error);
+  if (fs::is_directory(status)) return Unwritable(path_, "it is a directory");
+  if (fs::exists(status) && !fs::is_regular_file(status)) {
+    direct_text_ = text;
+    return "";
+  }
+  target_ = FollowLinks(path_);
+  if (fs::is_symlink(target_, error)) return Unwritable(path_, "its links lead round");
+  temporary_ = target_.string() + ".tmp" + std::to_string(::getpid());
+  const std::string reason = WriteDirectly(temporary_, text);
+  if (!reason.empty()) return Unwritable(path_, reason);
+  // A file that is replaced keeps its permissions.
+  if (fs::exists(status)) fs::permissions(temporary_, status.permissions(), error);
+  return "";
+}
+
+std::string PendingFile::Commit() {
+  if (direct_text_) {
+    const std::string reason = WriteDirectly(path_, *direct_text_);
+    return reason.empty() ? "" : Unwritable(path_, reason);
+  }
+  std::error_code error;
+  std::filesystem::rename(temporary_, target_, error);
+  if (error) return Unwritable(path_, error.message());
+  temporary_.clear();
+  return "";
+}
+
 }  // namespace
 
 CommandLine ParseCommandLine(int argc, char** argv, const ProgramInfo& info) {
@@ -349,40 +415,37 @@ std::string OutputOverInput(const std::vector<std::string>& flags) {
 }
 
 std::string WriteFileAtomically(const std::string& path, std::string_view text, Over over) {
-  namespace fs = std::filesystem;
-  if (over == Over::kNoInput) {
-    for (const std::string& input : FilesRead()) {
-      if (IsSameFile(path, input)) return Unwritable(path, "it was read as an input");
-    }
-  }
-  std::error_code error;
-  const fs::file_status status = fs::status(path, error);
-  if (fs::exists(status) && !fs::is_regular_file(status)) {
-    const std::string reason =
-        fs::is_directory(status) ? "it is a directory" : WriteDirectly(path, text);
-    return reason.empty() ? "" : Unwritable(path, reason);
-  }
-  const fs::path target = FollowLinks(path);
-  if (fs::is_symlink(target, error)) return Unwritable(path, "its links lead round");
-  const std::string temporary = target.string() + ".tmp" + std::to_string(::getpid());
-  const std::string reason = WriteDirectly(temporary, text);
-  if (!reason.empty()) {
-    fs::remove(temporary, error);
-    return Unwritable(path, reason);
-  }
-  // A file that is replaced keeps its permissions.
-  if (fs::exists(status)) fs::permissions(temporary, status.permissions(), error);
-  fs::rename(temporary, target, error);
-  if (!error) return "";
-  const std::string why = error.message();
-  fs::remove(temporary, error);
-  return Unwritable(path, why);
+  PendingFile file(path);
+  const std::string error = file.Prepare(text, over);
+  return error.empty() ? file.Commit() : error;
 }
 
 std::string WriteResult(const std::string& out_path, std::string_view text) {
   if (!out_path.empty()) return WriteFileAtomically(out_path, text);
   std::cout << text;
   return LostOutput();
+}
+
+std::string WriteAllOrNone(const std::vector<OutputFile>& files) {
+  std::vector<PendingFile> pending;
+  pending.reserve(files.size());
+  for (const OutputFile& file : files) {
+    if (file.path.empty()) continue;
+    std::string error = pending.emplace_back(file.path).Prepare(file.text, Over::kNoInput);
+    if (!error.empty()) return error;
+  }
+  for (const OutputFile& file : files) {
+    std::string error = file.path.empty() ? WriteResult("", file.text) : "";
+    if (!error.empty()) return error;
+  }
+  // What cannot be taken back comes first.
+  for (const bool direct : {true, false}) {
+    for (PendingFile& file : pending) {
+      std::string error = file.is_direct() == direct ? file.Commit() : "";
+      if (!error.empty()) return error;
+    }
+  }
+  return "";
 }
 
 }  // namespace tangible

@@ -99,6 +99,17 @@ std::string OutputOverInput(const std::vector<std::string>& flags);
 /// Writes a result to `out_path`, or to stdout if that is empty. Returns an error or empty.
 std::string WriteResult(const std::string& out_path, std::string_view text);
 
+/// A file to write, or stdout where the path is empty.
+struct OutputFile {
+  std::string path;
+  std::string text;
+};
+
+/// Writes all files or none: each is first written beside its place, and all are put there once
+/// every one, and what goes to stdout, devices and pipes, has been written. Returns the first error
+/// (one line) or empty.
+std::string WriteAllOrNone(const std::vector<OutputFile>& files);
+
 /// Writes several results one after the other; a failure does not prevent the others from being
 /// written.
 class ResultWriter {

@@ -56,9 +56,16 @@ struct Played {
   double cost = 0.0;
 };
 
-// Finds a control without any effect in any step.
+// Adds the largest entries of the columns of B, a control each.
+void AddEffect(const MatrixX<double>& b, VectorX<double>* effect) {
+  *effect += b.cwiseAbs().colwise().maxCoeff().transpose();
+}
+
+// Finds a control that moves nothing in any step of the motion with the initial controls, and with
+// a surrogate in none of its samples either. Empty, or an error of one line. Where a step cannot be
+// made only those before it count.
 std::string FindIdle(const ControlProblem& problem, const ControlFile& file,
-                     const RolloutFunction& function, const Plan& plan) {
+                     const RolloutFunction& function, long steps) {
   Model<double> model;
   State<double> state;
   BuildModel(function.scene(), &model, &state);
@@ -69,23 +76,27 @@ std::string FindIdle(const ControlProblem& problem, const ControlFile& file,
   }
   const double least = kMovesNothing * file.scene.simulation.dt / heaviest;
   VectorX<double> effect = VectorX<double>::Zero(problem.map->num_controls());
-  VectorX<double> next;
+  VectorX<double> x = problem.initial, next;
   MatrixX<double> a, b;
   std::string error;
-  for (long k = 0; k < plan.controls.rows(); ++k) {
-    if (!problem.map->Linearise(k, plan.states.row(k), plan.controls.row(k), &next, &a, &b,
-                                &error)) {
-      return error;
-    }
-    effect += b.cwiseAbs().colwise().maxCoeff().transpose();
+  for (long k = 0; k < steps && effect.minCoeff() <= least; ++k) {
+    if (!problem.map->Linearise(k, x, file.initial, &next, &a, &b, &error)) return "";
+    AddEffect(b, &effect);
+    x = next;
   }
-  for (Eigen::Index i = 0; i < effect.size(); ++i) {
-    if (effect[i] <= least) {
-      return file.paths[i] +
-             ": expected a control that moves something, got one that moves nothing";
-    }
+  if (effect.minCoeff() <= least && file.options.surrogate.samples > 0) {
+    Plan plan;
+    plan.controls = file.initial.transpose().replicate(steps, 1);
+    plan.states = problem.initial.transpose();
+    std::vector<MatrixX<double>> mean_a(steps, a), mean_b(steps, MatrixX<double>(0.0 * b));
+    AverageJacobians(problem, plan, file.options.surrogate, &mean_a, &mean_b);
+    for (const MatrixX<double>& one : mean_b) AddEffect(one, &effect);
   }
-  return "";
+  Eigen::Index idle = 0;
+  if (effect.minCoeff(&idle) > least) return "";
+  return "/controls/" + std::to_string(idle) +
+         "/path: expected a control that moves something, got " + file.paths[idle] +
+         ", which moves nothing in any step with the initial controls";
 }
 
 OrderedJson DescribeControls(const ControlFile& file, const RowMatrixXd& controls, double dt) {
@@ -142,16 +153,17 @@ std::string CostPlot(const std::vector<IlqrIteration>& iterations) {
                  {series});
 }
 
-// Runs the scene once more with the applied controls, for the tables and the view.
-std::string WriteMotion(const ControlFile& file, Scene scene, const Played& played,
-                        const std::vector<IlqrIteration>& iterations) {
+// Writes the result and what else is asked for: the controls as a table, the motion as a table and
+// as a view.
+std::string WriteResults(const ControlFile& file, Scene scene, const Played& played,
+                         const std::vector<IlqrIteration>& iterations, const OrderedJson& result) {
   const double dt = scene.simulation.dt;
-  std::string error;
-  if (!FLAGS_plan.empty()) error = WriteResult(FLAGS_plan, PlanCsv(file, played.controls, dt));
-  if (!error.empty() || (FLAGS_trajectory.empty() && FLAGS_view.empty())) return error;
+  std::vector<OutputFile> files = {{FLAGS_out, JsonText(result)}};
+  if (!FLAGS_plan.empty()) files.push_back({FLAGS_plan, PlanCsv(file, played.controls, dt)});
+  if (FLAGS_trajectory.empty() && FLAGS_view.empty()) return WriteAllOrNone(files);
   scene.simulation.duration = static_cast<double>(played.controls.rows()) * dt;
   RolloutFunction function;
-  error = function.Create(scene, {}, file.paths, {});
+  std::string error = function.Create(scene, {}, file.paths, {});
   if (!error.empty()) return error;
   const EngineStep step(function);
   Model<double> model;
@@ -166,12 +178,14 @@ std::string WriteMotion(const ControlFile& file, Scene scene, const Played& play
     trajectory.Add(k, t, state);
     view.Add(model, t, state, nullptr);
   }
-  if (!FLAGS_trajectory.empty()) error = WriteResult(FLAGS_trajectory, trajectory.Finish());
-  if (!error.empty() || FLAGS_view.empty()) return error;
-  ViewOptions options;
-  options.below =
-      ControlPlot(file, played.controls, dt) + (iterations.empty() ? "" : CostPlot(iterations));
-  return WriteResult(FLAGS_view, ViewHtml(view.data(), options));
+  if (!FLAGS_trajectory.empty()) files.push_back({FLAGS_trajectory, trajectory.Finish()});
+  if (!FLAGS_view.empty()) {
+    ViewOptions options;
+    options.below =
+        ControlPlot(file, played.controls, dt) + (iterations.empty() ? "" : CostPlot(iterations));
+    files.push_back({FLAGS_view, ViewHtml(view.data(), options)});
+  }
+  return WriteAllOrNone(files);
 }
 
 // `sampled`: how many of them, at the start, have the surrogate's Jacobians.
@@ -197,6 +211,14 @@ OrderedJson FinalState(const RolloutFunction& function, const RowMatrixXd& state
   return json;
 }
 
+void WarnOfMaximum(const std::string& path) {
+  ReportError(
+      path +
+      ": warning: with the initial controls the cost has no gradient, as an angle that wraps "
+      "is half a turn from its target, where its cost is largest; they were offset by " +
+      FormatNumber(kStartOffset) + " of their ranges");
+}
+
 int Plan(const std::string& path, const ControlFile& file) {
   RolloutFunction function;
   std::string error = function.Create(file.scene, {}, file.paths, {});
@@ -204,13 +226,14 @@ int Plan(const std::string& path, const ControlFile& file) {
   EngineStep map(function);
   const Cost cost(map.num_states(), map.num_controls(), file.scene.simulation.dt, file.terms);
   const ControlProblem problem{&map, &cost, map.initial(), file.low, file.high, 0};
+  error = FindIdle(problem, file, function, function.num_steps());
+  if (!error.empty()) return ReportError(path + ": " + error);
   const RowMatrixXd start = file.initial.transpose().replicate(function.num_steps(), 1);
   const std::clock_t began = std::clock();
   const IlqrResult result = SolveIlqr(problem, start, file.options);
   const double seconds = static_cast<double>(std::clock() - began) / CLOCKS_PER_SEC;
   if (result.status == IlqrStatus::kFailed) return ReportError(path + ": " + result.message);
-  error = FindIdle(problem, file, function, result.plan);
-  if (!error.empty()) return ReportError(path + ": " + error);
+  if (result.left_maximum) WarnOfMaximum(path);
   RolloutInput input{VectorX<double>(), VectorX<double>(), result.plan.controls};
   RolloutWorker worker(function);
   const RolloutOutput run = worker.Run(input);
@@ -237,10 +260,27 @@ int Plan(const std::string& path, const ControlFile& file) {
                          {"iterations", result.surrogate_iterations}};
   }
   error =
-      WriteMotion(file, file.scene, {result.plan.states, result.plan.controls, result.plan.cost},
-                  result.iterations);
-  if (error.empty()) error = WriteResult(FLAGS_out, JsonText(json));
+      WriteResults(file, file.scene, {result.plan.states, result.plan.controls, result.plan.cost},
+                   result.iterations, json);
   return error.empty() ? kExitDone : ReportError(error);
+}
+
+std::vector<std::string> MovingBodies(const Scene& scene) {
+  std::vector<std::string> names;
+  for (const BasicBody<double>& body : scene.bodies) {
+    if (body.motion == Motion::kMoving) names.push_back(body.name);
+  }
+  return names;
+}
+
+// "a, b", of many the first ones.
+std::string Listed(const std::vector<std::string>& names) {
+  constexpr size_t kMostNames = 5;
+  std::string list;
+  for (size_t i = 0; i < std::min(names.size(), kMostNames); ++i) {
+    list.append(i == 0 ? "" : ", ").append(names[i]);
+  }
+  return list + (names.size() > kMostNames ? ", ... (" + std::to_string(names.size()) + ")" : "");
 }
 
 // The scene that is controlled, with the model's steps.
@@ -253,25 +293,34 @@ std::string LoadPlant(const ControlFile& file, Scene* plant) {
     return FLAGS_plant + ": /simulation/dt: expected the problem's, " +
            FormatNumber(file.scene.simulation.dt) + ", got " + FormatNumber(plant->simulation.dt);
   }
-  if (OutputNames(*BuildStructure(*plant)) != OutputNames(*BuildStructure(file.scene))) {
-    return FLAGS_plant + ": expected the moving bodies of " + file.scene_path + ", got others";
+  const std::vector<std::string> expected = MovingBodies(file.scene), got = MovingBodies(*plant);
+  if (got != expected) {
+    return FLAGS_plant + ": /bodies: expected the moving bodies of " + file.scene_path + ", " +
+           Listed(expected) + ", got " + Listed(got);
   }
-  return "";
+  int which = -1;
+  error = CheckControls(*plant, file.paths, &which);
+  return error.empty() ? "" : FLAGS_plant + ": " + error;
 }
 
 struct PredictiveRun {
   Played played;
   std::vector<double> seconds;  // of each plan, CPU
   long failed = 0;
+  bool left_maximum = false;  // in any plan
   std::string error;
 };
+
+long NumRunSteps(const ControlFile& file) {
+  SimulationSettings whole = file.scene.simulation;
+  whole.duration = file.run_duration;
+  return NumSteps(whole);
+}
 
 PredictiveRun RunPredictive(const ControlFile& file, EngineStep* map, EngineStep* plant) {
   PredictiveRun run;
   const double dt = file.scene.simulation.dt;
-  SimulationSettings whole = file.scene.simulation;
-  whole.duration = file.run_duration;
-  const long steps = NumSteps(whole);
+  const long steps = NumRunSteps(file);
   const long horizon = std::max(1L, std::lround(file.plan_horizon / dt));
   const Cost cost(map->num_states(), map->num_controls(), dt, file.terms);
   PredictiveOptions options{file.options, FLAGS_budget_ms / 1000.0};
@@ -288,6 +337,7 @@ PredictiveRun RunPredictive(const ControlFile& file, EngineStep* map, EngineStep
     const std::clock_t began = std::clock();
     const VectorX<double> u = controller.Control(k, x);
     run.seconds.push_back(static_cast<double>(std::clock() - began) / CLOCKS_PER_SEC);
+    run.left_maximum |= controller.last().left_maximum;
     run.failed += controller.last().status == IlqrStatus::kFailed ? 1 : 0;
     if (!plant->Step(k, x, u, &next, &run.error)) return run;
     run.played.cost += cost.Value(x, u);
@@ -311,8 +361,14 @@ int Predict(const std::string& path, const ControlFile& file) {
   if (error.empty()) error = of_plant.Create(plant_scene, {}, file.paths, {});
   if (!error.empty()) return ReportError(path + ": " + error);
   EngineStep map(function), plant(of_plant);
-  PredictiveRun run = RunPredictive(file, &map, &plant);
-  if (!run.error.empty()) return ReportError(path + ": plant: " + run.error);
+  error = FindIdle({&map, nullptr, map.initial(), file.low, file.high}, file, function,
+                   NumRunSteps(file));
+  if (!error.empty()) return ReportError(path + ": " + error);
+  const PredictiveRun run = RunPredictive(file, &map, &plant);
+  if (!run.error.empty()) {
+    return ReportError((FLAGS_plant.empty() ? file.scene_path : FLAGS_plant) + ": " + run.error);
+  }
+  if (run.left_maximum) WarnOfMaximum(path);
   std::vector<double> sorted = run.seconds;
   std::sort(sorted.begin(), sorted.end());
   OrderedJson json = {
@@ -324,8 +380,7 @@ int Predict(const std::string& path, const ControlFile& file) {
       {"cpu_seconds_median", sorted[sorted.size() / 2]},
       {"cpu_seconds_max", sorted.back()},
       {"controls", DescribeControls(file, run.played.controls, file.scene.simulation.dt)}};
-  error = WriteMotion(file, plant_scene, run.played, {});
-  if (error.empty()) error = WriteResult(FLAGS_out, JsonText(json));
+  error = WriteResults(file, plant_scene, run.played, {}, json);
   return error.empty() ? kExitDone : ReportError(error);
 }
 

@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tangible/control/cost.h"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
+
+#include "tangible/control/tolerances.h"
 
 namespace tangible {
 namespace {
@@ -69,6 +72,28 @@ double Cost::EndValue(const VectorX<double>& x) const {
     sum += 0.5 * term.weight * r * r;
   }
   return sum;
+}
+
+double Cost::ValueOfUnits(long steps) const {
+  double sum = 0.0;
+  for (const CostTerm& term : terms_) {
+    const double unit = std::max(1.0, std::abs(term.target));
+    const double times = term.at_end ? 1.0 : h_ * static_cast<double>(steps);
+    sum += 0.5 * times * term.weight * unit * unit;
+  }
+  return sum;
+}
+
+bool Cost::HasAngleAtMaximum(const RowMatrixXd& states) const {
+  const long end = states.rows() - 1;
+  for (const CostTerm& term : terms_) {
+    if (term.kind != CostTerm::Kind::kAngle || term.weight == 0.0) continue;
+    for (long k = term.at_end ? end : 0; k < (term.at_end ? end + 1 : end); ++k) {
+      const double slope = Evaluate(term, states.row(k), VectorX<double>()).by_variable;
+      if (std::abs(slope) <= kAtMaximum) return true;
+    }
+  }
+  return false;
 }
 
 void Cost::Add(const CostTerm& term, double factor, const VectorX<double>& x,

@@ -52,6 +52,12 @@ class Cost {
   double Value(const VectorX<double>& x, const VectorX<double>& u) const;
   /// The cost of the end.
   double EndValue(const VectorX<double>& x) const;
+  /// The cost of so many steps and the end where each residual is as large as its target, and at
+  /// least 1: the scale of the cost's rounding.
+  double ValueOfUnits(long steps) const;
+  /// Whether an angle that wraps is half a turn from its target, where its cost is largest and has
+  /// no gradient, at one of these states (a row each: of the steps, then the end).
+  bool HasAngleAtMaximum(const RowMatrixXd& states) const;
   /// The same to second order; `exact` adds r ∂²r to the Gauss-Newton terms.
   void Expand(const VectorX<double>& x, const VectorX<double>& u, bool exact,
               CostExpansion* expansion) const;

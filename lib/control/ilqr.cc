@@ -40,7 +40,7 @@ class Solver {
         return std::move(result_);
       }
     }
-    if (Measure()) Finish(IlqrStatus::kConverged, "");
+    if (Measure()) Converge();
     return std::move(result_);
   }
 
@@ -88,6 +88,13 @@ class Solver {
     result_.message = std::move(message);
   }
 
+  void Converge() {
+    Finish(IlqrStatus::kConverged,
+           IsAtMaximum() ? "an angle that wraps is half a turn from its target, where its cost is "
+                           "largest and has no gradient"
+                         : "");
+  }
+
   bool Start(const RowMatrixXd& controls) {
     Plan& plan = result_.plan;
     plan.controls = controls;
@@ -99,18 +106,44 @@ class Solver {
     plan.states.row(0) = p_.initial.transpose();
     plan.gains.assign(controls.rows(), MatrixX<double>::Zero(m_, n_));
     if (options_.reference_extension) plan.impacts.resize(controls.rows());
-    if (!RollOut(plan, nullptr, 0.0, &plan) || !Linearise(plan, &at_)) {
-      result_.status = IlqrStatus::kFailed;
-      return false;
+    met_ = kNoCost * p_.cost->ValueOfUnits(controls.rows());
+    if (Follow() && Measure() && IsAtMaximum()) {
+      result_.left_maximum = true;
+      LeaveMaximum();
+      Follow();
     }
-    first_cost_ = std::abs(plan.cost);
-    return true;
+    return result_.status != IlqrStatus::kFailed;
+  }
+
+  // Rolls out the plan's own controls and linearises there; false with the status where that fails.
+  bool Follow() {
+    Plan& plan = result_.plan;
+    if (RollOut(plan, nullptr, 0.0, &plan) && Linearise(plan, &at_)) return true;
+    result_.status = IlqrStatus::kFailed;
+    return false;
+  }
+
+  // Whether the cost has no gradient because an angle that wraps is half a turn from its target.
+  bool IsAtMaximum() const {
+    const Plan& plan = result_.plan;
+    return std::abs(plan.cost) > met_ && p_.cost->HasAngleAtMaximum(plan.states);
+  }
+
+  void LeaveMaximum() {
+    RowMatrixXd& controls = result_.plan.controls;
+    const VectorX<double> offset = kStartOffset * ControlSizes(p_, controls);
+    for (long k = 0; k < controls.rows(); ++k) {
+      for (int i = 0; i < m_; ++i) {
+        double& u = controls(k, i);
+        u = u + offset[i] <= p_.high[i] ? u + offset[i] : std::max(u - offset[i], p_.low[i]);
+      }
+    }
   }
 
   // One iteration; false where the work is done.
   bool Iterate() {
     if (Measure()) {
-      Finish(IlqrStatus::kConverged, "");
+      Converge();
       return false;
     }
     if (options_.second_order && !curvature_valid_ && !FindCurvature()) {
@@ -131,13 +164,13 @@ class Solver {
     if (shift_ > kLargestShift) {
       Finish(IlqrStatus::kNoDescent,
              convex ? "no step decreases the cost: its gradient may be one of a kink, or rounding"
-                    : "the cost is not convex in the controls: some move nothing and cost nothing");
+                    : "the cost is not convex in the controls, whatever the shift");
       return false;
     }
     return true;
   }
 
-  // Whether the plan is stationary.
+  // Whether the plan is stationary, or the target is met.
   bool Measure() {
     Gradient(at_, &costates_, &gradient_);
     const Plan& plan = result_.plan;
@@ -151,9 +184,10 @@ class Solver {
         if (!held) sum += std::abs(g) * sizes[i];
       }
     }
-    const double cost = std::max(std::abs(plan.cost), kNoCost * first_cost_);
-    result_.gradient = sum == 0.0 ? 0.0 : sum / cost;
-    return result_.gradient <= options_.gradient_tolerance;
+    // Where the target is met, what is left of the gradient is rounding.
+    const bool met = std::abs(plan.cost) <= met_;
+    result_.gradient = met || sum == 0.0 ? 0.0 : sum / std::abs(plan.cost);
+    return met || result_.gradient <= options_.gradient_tolerance;
   }
 
   // Σ λᵢ ∂²fᵢ of each step, symmetric in (x, u).
@@ -202,6 +236,7 @@ class Solver {
     VectorX<double> v_x = at_.cost[steps].x;
     MatrixX<double> v_xx = at_.cost[steps].xx;
     const double largest = LargestCurvature();
+    const VectorX<double> effects = LargestEffects();
     for (long k = steps - 1; k >= 0; --k) {
       const MatrixX<double>& a = at_.a[k];
       const MatrixX<double>& b = at_.b[k];
@@ -219,9 +254,7 @@ class Solver {
       const double shift = shift_ * largest;
       const MatrixX<double> shifted_uu = q_uu + shift * b.transpose() * b;
       const MatrixX<double> shifted_ux = q_ux + shift * b.transpose() * a;
-      const VectorX<double> u = result_.plan.controls.row(k);
-      const BoxQuadraticSolution box =
-          SolveBoxQuadratic(shifted_uu, q_u, p_.low - u, p_.high - u, VectorX<double>::Zero(m_));
+      const BoxQuadraticSolution box = SolveStep(k, effects, shifted_uu, q_u);
       if (box.status != BoxQuadraticStatus::kSolved || !box.x.allFinite()) return false;
       MatrixX<double> gain = MatrixX<double>::Zero(m_, n_);
       if (!box.free.empty()) {
@@ -238,6 +271,34 @@ class Solver {
       new_gains_[k] = gain;
     }
     return std::isfinite(linear_) && std::isfinite(quadratic_);
+  }
+
+  // The controls of step k. Controls that neither move nor cost anything in it stay as they are:
+  // the quadratic does not determine them. Where controls move the same it determines their sum
+  // alone, and a share of its diagonal decides between them.
+  BoxQuadraticSolution SolveStep(long k, const VectorX<double>& effects,
+                                 const MatrixX<double>& q_uu, const VectorX<double>& q_u) const {
+    const VectorX<double> u = result_.plan.controls.row(k);
+    VectorX<double> low = p_.low - u, high = p_.high - u;
+    for (int i = 0; i < m_; ++i) {
+      const bool moves = at_.b[k].col(i).cwiseAbs().maxCoeff() > kMovesNothing * effects[i];
+      if (!moves && at_.cost[k].uu(i, i) == 0.0) low[i] = high[i] = 0.0;
+    }
+    const VectorX<double> none = VectorX<double>::Zero(m_);
+    BoxQuadraticSolution box = SolveBoxQuadratic(q_uu, q_u, low, high, none);
+    if (box.status != BoxQuadraticStatus::kIndefinite) return box;
+    MatrixX<double> decided = q_uu;
+    decided.diagonal() += kRedundantShare * q_uu.diagonal().cwiseAbs();
+    return SolveBoxQuadratic(decided, q_u, low, high, none);
+  }
+
+  // The largest entry of any B_k in the column of each control.
+  VectorX<double> LargestEffects() const {
+    VectorX<double> effects = VectorX<double>::Zero(m_);
+    for (const MatrixX<double>& b : at_.b) {
+      effects = effects.cwiseMax(b.cwiseAbs().colwise().maxCoeff().transpose());
+    }
+    return effects;
   }
 
   // The largest entry of V, to which shifts are relative.
@@ -362,7 +423,7 @@ class Solver {
   std::vector<MatrixX<double>> new_gains_;
   double linear_ = 0.0, quadratic_ = 0.0;  // of the expected change of the cost
   double shift_ = 0.0, growth_ = 1.0;
-  double first_cost_ = 0.0;
+  double met_ = 0.0;  // the cost below which the target is met
 };
 
 }  // namespace
@@ -413,6 +474,9 @@ IlqrResult SolveIlqr(const ControlProblem& problem, const RowMatrixXd& controls,
                      const IlqrOptions& options) {
   IlqrResult result;
   result.message = CheckProblem(problem, controls);
+  if (result.message.empty() && options.surrogate.samples > 0) {
+    result.message = CheckSurrogate(problem);
+  }
   if (!result.message.empty()) {
     result.status = IlqrStatus::kFailed;
     return result;
@@ -433,6 +497,7 @@ IlqrResult SolveIlqr(const ControlProblem& problem, const RowMatrixXd& controls,
                              first.iterations.end());
     result.rollouts += first.rollouts;
     result.linearisations += first.linearisations;
+    result.left_maximum |= first.left_maximum;
   }
   result.surrogate_iterations = spent;
   return result;

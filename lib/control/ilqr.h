@@ -17,7 +17,8 @@
 // quadratically where the cost's curvature does not vanish.
 //
 // The shift μ grows while a backward pass is not convex or its step does not decrease the cost, and
-// falls otherwise. Convergence is judged by the gradient of the Lagrangian, λ_k = ℓ_x + Aᵀ λ_{k+1},
+// falls otherwise. In steps where a control neither moves nor costs anything it stays as it was.
+// Convergence is judged by the gradient of the Lagrangian, λ_k = ℓ_x + Aᵀ λ_{k+1},
 // ∂J/∂u_k = ℓ_u + Bᵀ λ_{k+1}, and not by the change of the cost.
 
 #include <functional>
@@ -87,7 +88,10 @@ const char* NameOf(IlqrStatus status);
 
 struct IlqrResult {
   IlqrStatus status = IlqrStatus::kIterationLimit;
-  std::string message;  ///< one line, where it did not converge
+  std::string message;  ///< one line, where it did not converge or did at a maximum
+  /// The initial controls had no gradient because an angle that wraps was half a turn from its
+  /// target, where its cost is largest: they were offset by kStartOffset of their ranges.
+  bool left_maximum = false;
   Plan plan;
   double gradient = 0.0;
   std::vector<IlqrIteration> iterations;

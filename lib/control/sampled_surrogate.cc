@@ -20,6 +20,15 @@ VectorX<double> ControlSizes(const ControlProblem& problem, const RowMatrixXd& c
   return sizes;
 }
 
+std::string CheckSurrogate(const ControlProblem& problem) {
+  for (Eigen::Index i = 0; i < problem.low.size(); ++i) {
+    if (std::isfinite(problem.low[i]) && std::isfinite(problem.high[i])) continue;
+    return "bounds of control " + std::to_string(i) +
+           ": expected finite ones, of whose range a surrogate's deviation is a share, got none";
+  }
+  return "";
+}
+
 void AverageJacobians(const ControlProblem& problem, const Plan& plan,
                       const SampledSurrogate& options, std::vector<MatrixX<double>>* a,
                       std::vector<MatrixX<double>>* b) {

@@ -16,6 +16,7 @@
 // with the deviation d as a share of each control's range r. The means are not the derivative of
 // the motion: results say where they were used, and end with exact Jacobians.
 
+#include <string>
 #include <vector>
 
 #include "tangible/math/scalar.h"
@@ -34,6 +35,9 @@ struct SampledSurrogate {
 /// What a control's changes are shares of: high − low, or without bounds the largest |u| of the
 /// plan, at least 1.
 VectorX<double> ControlSizes(const ControlProblem& problem, const RowMatrixXd& controls);
+
+/// Empty, or one line: a control without bounds has no range of which the deviation is a share.
+std::string CheckSurrogate(const ControlProblem& problem);
 
 /// Replaces the exact A_k and B_k of the plan's steps by means over the samples. A sample whose
 /// step cannot be made counts up to there; steps that no sample reaches keep theirs.

@@ -13,8 +13,16 @@ inline constexpr double kSufficientDecrease = 1e-4;
 /// Of the cost: smaller changes are not significant, because of rounding and of the errors that
 /// remain in projected joints.
 inline constexpr double kCostRounding = 1e-10;
-/// Of the first cost: at a smaller cost the target is met, and gradients are rounding.
-inline constexpr double kNoCost = 1e-24;
+/// Of the cost with every residual as large as its target, and at least 1: at a smaller cost the
+/// target is met: residuals are below 1e-10, to which joints are projected, and gradients are
+/// rounding.
+inline constexpr double kNoCost = 1e-20;
+/// Of the slope 1 of an angle's residual at its target: where the residual of an angle that wraps
+/// has a smaller slope, within 0.1 degrees of half a turn, a cost without gradient is at a maximum.
+inline constexpr double kAtMaximum = 1e-3;
+/// Of the range of a control: by so much initial controls at a maximum of the cost are offset. The
+/// gradient there is in proportion to the offset, and far above its tolerance.
+inline constexpr double kStartOffset = 1e-3;
 /// Of the largest entry of V: the least shift of states that makes a backward pass convex.
 inline constexpr double kLeastShift = 1e-9;
 /// Of the same: with a larger shift no step is large enough to be worth trying.
@@ -22,9 +30,12 @@ inline constexpr double kLargestShift = 1e9;
 /// Of the cost, to first order: the default for the change of the cost, at convergence, if all
 /// controls moved by their ranges.
 inline constexpr double kGradientTolerance = 1e-6;
-/// Of the effect of a step's force on the heaviest body: a control with a smaller effect counts as
-/// idle.
+/// Of the effect of a step's force on the heaviest body, and in a step of the control's largest
+/// effect in the horizon: a control with a smaller effect moves nothing.
 inline constexpr double kMovesNothing = 1e-12;
+/// Of the diagonal of Q_uu: added where controls do the same, so that one of many least costs is
+/// taken; a step then falls short of it by this share.
+inline constexpr double kRedundantShare = 1e-9;
 /// Of the variable, at least 1: step of central differences of exact Jacobians: cube root of ε.
 inline constexpr double kSecondDifference = 6e-6;
 

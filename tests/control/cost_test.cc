@@ -86,5 +86,28 @@ TEST(Cost, WholeTurnsDoNotCount) {
   EXPECT_NEAR(cost.EndValue(x), 2.0, 1e-12);
 }
 
+// Two steps of 0.01 s and the end: residuals of 1, of the target where that is larger.
+TEST(Cost, ValueOfUnitsIsOfResidualsAsLargeAsTheirTargets) {
+  const Cost cost(6, 2, 0.01,
+                  {{CostTerm::Kind::kState, 3, 0, {0, 0}, -4.0, 1.5, true},
+                   {CostTerm::Kind::kControl, 1, 0, {0, 0}, 0.1, 0.8, false}});
+  EXPECT_DOUBLE_EQ(cost.ValueOfUnits(2), 0.5 * 1.5 * 16.0 + 2.0 * 0.01 * 0.5 * 0.8);
+}
+
+TEST(Cost, KnowsAnAngleHalfATurnFromItsTarget) {
+  const auto has = [](double first, double last, bool at_end, double weight) {
+    const Cost cost(1, 1, 0.1, {{CostTerm::Kind::kAngle, 0, 0, {0, 0}, 1.0, weight, at_end}});
+    RowMatrixXd states(2, 1);
+    states << first, last;
+    return cost.HasAngleAtMaximum(states);
+  };
+  EXPECT_TRUE(has(0.0, 1.0 + 3.0 * kPi, true, 1.0));
+  EXPECT_TRUE(has(1.0 - kPi, 0.0, false, 1.0));
+  EXPECT_FALSE(has(1.0 - kPi, 0.0, true, 1.0));         // not at the end
+  EXPECT_FALSE(has(0.0, 1.0 + kPi, false, 1.0));        // not in a step
+  EXPECT_FALSE(has(0.0, 1.0 + kPi, true, 0.0));         // costs nothing
+  EXPECT_FALSE(has(0.0, 1.0 + kPi + 0.01, true, 1.0));  // its gradient is not zero
+}
+
 }  // namespace
 }  // namespace tangible

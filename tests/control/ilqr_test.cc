@@ -218,15 +218,120 @@ TEST(Ilqr, MistakesAreNamed) {
   EXPECT_EQ(SolveIlqr(problem, RowMatrixXd::Zero(3, 1), {}).status, IlqrStatus::kFailed);
 }
 
+// x⁺ = x + u in the first steps, and nothing moves afterwards.
+class FirstSteps : public Linear {
+ public:
+  explicit FirstSteps(long steps)
+      : Linear(MatrixX<double>::Identity(1, 1), MatrixX<double>::Ones(1, 1)), steps_(steps) {}
+  bool Step(long k, const VectorX<double>& x, const VectorX<double>& u, VectorX<double>* next,
+            std::string*) override {
+    *next = k < steps_ ? VectorX<double>(x + u) : x;
+    return true;
+  }
+  bool Linearise(long k, const VectorX<double>& x, const VectorX<double>& u, VectorX<double>* next,
+                 MatrixX<double>* a, MatrixX<double>* b, std::string* error) override {
+    Linear::Linearise(k, x, u, next, a, b, error);
+    if (k >= steps_) b->setZero();
+    return Step(k, x, u, next, error);
+  }
+
+ private:
+  long steps_;
+};
+
+Cost EndAt(double target, int num_controls) {
+  return Cost(1, num_controls, 0.1, {{CostTerm::Kind::kState, 0, 0, {0, 0}, target, 1.0, true}});
+}
+
+// Where a control momentarily moves nothing it stays as it was, and the others reach the target.
+TEST(Ilqr, StepsInWhichAControlMovesNothingDoNotMatter) {
+  FirstSteps map(3);
+  const Cost cost = EndAt(1.0, 1);
+  const ControlProblem problem = ProblemOf(&map, &cost, VectorX<double>::Zero(1), kInfinity);
+  for (const bool second_order : {false, true}) {
+    const IlqrResult found =
+        SolveIlqr(problem, RowMatrixXd::Constant(8, 1, 0.1), {.second_order = second_order});
+    EXPECT_EQ(found.status, IlqrStatus::kConverged) << found.message;
+    EXPECT_NEAR(found.plan.states(8, 0), 1.0, 1e-9);
+    for (int k = 3; k < 8; ++k) EXPECT_EQ(found.plan.controls(k, 0), 0.1) << k;
+  }
+}
+
 // Two controls that do the same: only their sum is determined where neither costs anything.
-TEST(Ilqr, ControlsThatMoveNothingAreNamed) {
+TEST(Ilqr, ControlsThatDoTheSameShareTheWork) {
+  Linear map(MatrixX<double>::Identity(1, 1), MatrixX<double>::Ones(1, 2));
+  const Cost cost = EndAt(1.0, 2);
+  const ControlProblem problem = ProblemOf(&map, &cost, VectorX<double>::Zero(1), kInfinity);
+  const IlqrResult found = SolveIlqr(problem, RowMatrixXd::Zero(5, 2), {});
+  EXPECT_EQ(found.status, IlqrStatus::kConverged) << found.message;
+  EXPECT_NEAR(found.plan.states(5, 0), 1.0, 1e-9);
+  EXPECT_NEAR(found.plan.controls(4, 0), found.plan.controls(4, 1), 1e-6);
+}
+
+TEST(Ilqr, WhereNothingMovesThereIsNothingToDo) {
   Linear map(MatrixX<double>::Identity(1, 1), MatrixX<double>::Zero(1, 1));
-  const Cost cost(1, 1, 0.1, {{CostTerm::Kind::kState, 0, 0, {0, 0}, 1.0, 1.0, true}});
+  const Cost cost = EndAt(1.0, 1);
   const ControlProblem problem = ProblemOf(&map, &cost, VectorX<double>::Zero(1), kInfinity);
   const IlqrResult found = SolveIlqr(problem, RowMatrixXd::Zero(5, 1), {});
-  // Its gradient is 0: there is nothing to do.
   EXPECT_EQ(found.status, IlqrStatus::kConverged);
   EXPECT_EQ(found.plan.cost, 0.5);
+}
+
+// What is left of the cost is rounding, of which no step is a decrease.
+TEST(Ilqr, ATargetThatIsMetHasConverged) {
+  Linear map(MatrixX<double>::Identity(1, 1), MatrixX<double>::Ones(1, 1));
+  for (const double target : {1.0, 1000.0}) {
+    const Cost cost = EndAt(target, 1);
+    const double start = target * (1.0 + 1e-15);
+    const ControlProblem problem =
+        ProblemOf(&map, &cost, VectorX<double>::Constant(1, start), kInfinity);
+    const IlqrResult found = SolveIlqr(problem, RowMatrixXd::Zero(5, 1), {});
+    EXPECT_GT(found.plan.cost, 0.0);
+    EXPECT_EQ(found.status, IlqrStatus::kConverged) << found.message;
+    EXPECT_EQ(found.iterations.size(), 0u);
+    EXPECT_EQ(found.gradient, 0.0);
+  }
+}
+
+// The cost of an angle that wraps is largest half a turn from its target: a pendulum that hangs
+// and shall stand has no gradient there. It gets up nevertheless.
+TEST(Ilqr, LeavesTheMaximumOfAnAngleThatWraps) {
+  Pendulum map;
+  const Cost cost(2, 1, Pendulum::kStep,
+                  {{CostTerm::Kind::kControl, 0, 0, {0, 0}, 0.0, 0.01, false},
+                   {CostTerm::Kind::kAngle, 0, 0, {0, 0}, kPi, 100.0, true},
+                   {CostTerm::Kind::kState, 1, 0, {0, 0}, 0.0, 10.0, true}});
+  ControlProblem problem = ProblemOf(&map, &cost, VectorX<double>::Zero(2), 20.0);
+  IlqrResult found = SolveIlqr(problem, RowMatrixXd::Zero(100, 1), {.max_iterations = 500});
+  EXPECT_TRUE(found.left_maximum);
+  EXPECT_EQ(found.status, IlqrStatus::kConverged) << found.message;
+  EXPECT_NEAR(std::abs(found.plan.states(100, 0)), kPi, 0.1);
+  // Controls at their upper bound are offset downwards.
+  problem.high[0] = 0.0;
+  found = SolveIlqr(problem, RowMatrixXd::Zero(100, 1), {.max_iterations = 500});
+  EXPECT_TRUE(found.left_maximum);
+  EXPECT_LT(found.plan.cost, 20.0);
+  // Elsewhere the initial controls are used as they are.
+  EXPECT_FALSE(
+      SolveIlqr(problem, RowMatrixXd::Constant(100, 1, -1.0), {.max_iterations = 1}).left_maximum);
+  // Controls that cannot move: the maximum is named.
+  problem.low[0] = problem.high[0] = 0.0;
+  found = SolveIlqr(problem, RowMatrixXd::Zero(100, 1), {});
+  EXPECT_EQ(found.status, IlqrStatus::kConverged);
+  EXPECT_NE(found.message.find("half a turn from its target"), std::string::npos) << found.message;
+}
+
+TEST(Ilqr, ASurrogateNeedsBounds) {
+  Pendulum map;
+  const Cost cost = SwingUp();
+  const ControlProblem problem = ProblemOf(&map, &cost, VectorX<double>::Zero(2), kInfinity);
+  IlqrOptions options;
+  options.surrogate.samples = 2;
+  const IlqrResult found = SolveIlqr(problem, RowMatrixXd::Zero(3, 1), options);
+  EXPECT_EQ(found.status, IlqrStatus::kFailed);
+  EXPECT_EQ(found.message,
+            "bounds of control 0: expected finite ones, of whose range a surrogate's deviation is "
+            "a share, got none");
 }
 
 }  // namespace

@@ -28,10 +28,24 @@ TEST_F(TangibleBreakoutTest, TheQuickRunWritesAll) {
   EXPECT_GT(curve.back()["paddle"]["gain"], 1.5);
   EXPECT_NE(Read(Path("p.svg")).find("returns expected wrong"), std::string::npos);
   EXPECT_NE(Read(Path("v.html")).find("const frames = ["), std::string::npos);
+  // Of games that never came to 400 points nothing is said there.
+  const size_t at =
+      run.out.find("learned after 200: medians at the game's start, at 400 points (0 of");
+  ASSERT_NE(at, std::string::npos) << run.out;
+  const std::string frames = run.out.substr(run.out.find("  frames seen", at));
+  EXPECT_NE(frames.substr(0, frames.find('\n')).find(" - "), std::string::npos) << run.out;
   // Results do not depend on the number of threads.
   EXPECT_EQ(Run("tangible-breakout", "--quick --threads=1 --out=" + Path("one.json")).exit_status,
             0);
   EXPECT_EQ(Read(Path("one.json")), Read(Path("r.json")));
+}
+
+TEST_F(TangibleBreakoutTest, AQuickRunHasAsManyGamesAsAreAskedFor) {
+  const ProgramRun run =
+      Run("tangible-breakout",
+          "--quick --games=1 --random_frames=1000 --sticky=0 --out=" + Path("r.json"));
+  EXPECT_EQ(run.exit_status, 0) << run.out << run.error;
+  EXPECT_EQ(nlohmann::json::parse(Read(Path("r.json")))["games"], 1);
 }
 
 TEST_F(TangibleBreakoutTest, WrongFlagsAreOneLine) {

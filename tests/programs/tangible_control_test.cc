@@ -32,6 +32,7 @@ std::string Problem(const std::string& controls, const std::string& more = "") {
          more + "}";
 }
 const std::string kEffort = R"({"path": "joints/rail/effort"})";
+const std::string kBounded = R"({"path": "joints/rail/effort", "low": -1e3, "high": 1e3})";
 
 // m x'' = u from rest to rest over 1 m in 1 s: u = 6 m (1 − 2 t) for the least ∫ u², so that
 // ½ ∫ u² = 6 m². A step of 0.05 s changes that by h².
@@ -99,7 +100,7 @@ TEST_F(TangibleControlTest, RecedingHorizonsBringAHeavierPlantToTheMark) {
 // iteration of each.
 TEST_F(TangibleControlTest, LabelsASurrogate) {
   const ProgramRun run =
-      Control(Problem(kEffort, R"(, "surrogate": {"samples": 4, "deviation": 0.2, "seed": 7})"));
+      Control(Problem(kBounded, R"(, "surrogate": {"samples": 4, "deviation": 0.2, "seed": 7})"));
   ASSERT_EQ(run.exit_status, 0) << run.error;
   const json result = json::parse(run.out);
   EXPECT_EQ(result["status"], "converged");
@@ -113,7 +114,13 @@ TEST_F(TangibleControlTest, MistakesAreOneLine) {
   ExpectOneLine(Control(Problem(R"({"path": "joints/rail/effort", "low": 2, "high": 1})")), 1,
                 "/controls/0/high: expected a number >= low, got 1");
   ExpectOneLine(Control(Problem(kEffort + R"(, {"path": "bodies/cart/mass"})")), 1,
-                "control bodies/cart/mass");
+                "problem.json: /controls/1/path: control bodies/cart/mass: expected");
+  ExpectOneLine(Control(Problem(kEffort + R"(, {"path": "forces/pull/torque"})")), 1,
+                "problem.json: /controls/1/path: parameter forces/pull/torque: matches no number");
+  ExpectOneLine(Control(Problem(kEffort + ", " + kEffort)), 1, "problem.json: /controls/1/path: ");
+  ExpectOneLine(Control(Problem(kEffort, R"(, "name": 3)")), 1, "/name: expected a string, got 3");
+  ExpectOneLine(Control(Problem(kEffort, R"(, "surrogate": {"samples": 2})")), 1,
+                "/controls/0: expected low and high with a surrogate");
   ExpectOneLine(Control(Problem(kEffort, R"(, "horizon": 0)")), 1,
                 "/horizon: expected a number > 0, got 0");
   ExpectOneLine(Control(Problem(kEffort, R"(, "horizons": 1)")), 1, "unknown key");
@@ -130,7 +137,8 @@ TEST_F(TangibleControlTest, MistakesAreOneLine) {
   ExpectOneLine(Control(Problem(R"({"path": "joints/rail/effort", "high": 1, "initial": 2})")), 1,
                 "/controls/0/initial: expected a number from low to high");
   ExpectOneLine(Control(Problem(kEffort + R"(, {"path": "forces/push/force/y"})")), 1,
-                "forces/push/force/y: expected a control that moves something");
+                "problem.json: /controls/1/path: expected a control that moves something, got "
+                "forces/push/force/y, which moves nothing");
   std::string name = Problem(kEffort);
   name.replace(name.find("cart/vx"), 7, "card/vx");
   ExpectOneLine(Control(name), 1, "/cost/1/state: expected a number of the state");
@@ -142,13 +150,83 @@ TEST_F(TangibleControlTest, MistakesAreOneLine) {
                 "nowhere.json");
   ExpectOneLine(Control(Problem(kEffort, R"(, "reference_extension": true)")), 1,
                 "/reference_extension: expected with event stepping only");
-  ExpectOneLine(Control(Problem(kEffort, R"(, "surrogate": {"samples": 3})")), 1,
+  ExpectOneLine(Control(Problem(kBounded, R"(, "surrogate": {"samples": 3})")), 1,
                 "/surrogate/samples: expected an even number, got 3");
-  ExpectOneLine(Control(Problem(kEffort, R"(, "surrogate": {"samples": 2, "deviation": 0})")), 1,
+  ExpectOneLine(Control(Problem(kBounded, R"(, "surrogate": {"samples": 2, "deviation": 0})")), 1,
                 "/surrogate/deviation: expected a number > 0");
   ExpectOneLine(Control(Problem(kEffort), "--mpc"), 1, "/mpc: missing");
+  ExpectOneLine(Control(Problem(kEffort + R"(, {"path": "forces/push/force/y"})",
+                                R"(, "mpc": {"duration": 1, "horizon": 1})"),
+                        "--mpc"),
+                1, "/controls/1/path: expected a control that moves something");
   ExpectOneLine(Control(Problem(kEffort), "--plant=x.json"), 2, "--plant: needs --mpc");
   ExpectOneLine(Control(Problem(kEffort), "--budget_ms=-1 --mpc"), 2, "--budget_ms");
+}
+
+// Errors of the plant name its file, and the place in it.
+TEST_F(TangibleControlTest, MistakesOfThePlantAreItsOwn) {
+  const auto with = [this](const std::string& from, const std::string& to) {
+    std::string plant = kCart;
+    plant.replace(plant.find(from), from.size(), to);
+    return Control(Problem(kEffort, R"(, "mpc": {"duration": 1, "horizon": 1})"),
+                   "--mpc --plant='" + Write("plant.json", plant) + "'");
+  };
+  ExpectOneLine(with("\"dt\": 0.05", "\"dt\": 0.1"), 1, "plant.json: /simulation/dt: expected");
+  ExpectOneLine(with("\"name\": \"rail\"", "\"name\": \"track\""), 1,
+                "plant.json: parameter joints/rail/effort: matches no number");
+  ExpectOneLine(
+      with("{\"bodies\": [",
+           R"({"bodies": [{"name": "dog", "mass": 1, "inertia": 1, "position": [9, 9]},)"),
+      1, "plant.json: /bodies: expected the moving bodies of");
+}
+
+// A force that ends before the horizon does, and costs nothing, is a convex problem as any other.
+TEST_F(TangibleControlTest, AForceThatEndsBeforeTheHorizonIsPlanned) {
+  std::string scene = kCart;
+  const std::string force = "\"force\": [0, 0]";
+  scene.replace(scene.find(force), force.size(), force + ", \"start\": 0, \"end\": 0.5");
+  const std::string early = Write("early.json", scene);
+  const ProgramRun run = Control(R"({"scene": "early.json", "controls": [
+      {"path": "forces/push/force/x", "initial": 0.5}], "cost": [
+      {"state": "cart/x", "target": 1, "weight": 1e6, "at": "end"}]})");
+  ASSERT_EQ(run.exit_status, 0) << run.error;
+  const json result = json::parse(run.out);
+  EXPECT_EQ(result["status"], "converged") << result["message"];
+  EXPECT_EQ(result["gradient"], 0.0);
+  EXPECT_NEAR(result["final_state"]["cart/x"].get<double>(), 1.0, 1e-9);
+  EXPECT_EQ(result["controls"]["values"][19][0], 0.5);
+}
+
+// A pendulum that hangs and is to stand, with whole turns not counted, has no gradient.
+TEST_F(TangibleControlTest, SaysThatItLeavesAMaximum) {
+  Write("rod.json", R"({"bodies": [
+      {"name": "rod", "shape": {"box": {"size": [0.05, 1]}}, "mass": 1, "position": [0, -0.5]}],
+    "joints": [{"name": "motor", "type": "revolute", "bodies": ["rod", "world"], "anchor": [0, 0]}],
+    "simulation": {"dt": 0.05, "duration": 1, "joint_correction": "projection"}})");
+  const ProgramRun run = Control(R"({"scene": "rod.json", "controls": [
+      {"path": "joints/motor/effort", "low": -20, "high": 20}], "cost": [
+      {"state": "rod/angle", "target": 3.141592653589793, "wrap": true, "weight": 100, "at": "end"},
+      {"control": "joints/motor/effort", "weight": 0.01}]})");
+  ExpectOneLine(run, 0, "warning: with the initial controls the cost has no gradient");
+  const json result = json::parse(run.out);
+  EXPECT_EQ(result["status"], "converged") << result["message"];
+  EXPECT_NEAR(std::cos(result["final_state"]["rod/angle"].get<double>()), -1.0, 1e-2);
+}
+
+// An output that cannot be written leaves the others as they were.
+TEST_F(TangibleControlTest, WritesAllOutputsOrNone) {
+  Write("plan.csv", "old");
+  std::filesystem::create_symlink(Path("nowhere/r.json"), Path("r.json"));
+  const ProgramRun run =
+      Control(Problem(kEffort), "--out='" + Path("r.json") + "' --plan='" + Path("plan.csv") +
+                                    "' --trajectory='" + Path("t.csv") + "'");
+  ExpectOneLine(run, 1, "r.json: cannot be written");
+  EXPECT_EQ(Read(Path("plan.csv")), "old");
+  EXPECT_FALSE(std::filesystem::exists(Path("t.csv")));
+  // Nor is anything left beside them.
+  for (const auto& entry : std::filesystem::directory_iterator(Path(""))) {
+    EXPECT_EQ(entry.path().string().find(".tmp"), std::string::npos) << entry.path();
+  }
 }
 
 }  // namespace

@@ -20,6 +20,70 @@ bool Small(const VectorXd& value, const VectorXd& terms) {
   return (value.array() <= kFarkasCondition * terms.array()).all();
 }
 
+// The slacks' columns, those of the unit matrix, follow the rows: they would keep small rows small.
+void AppendSlacks(Index num_z, Equilibration* scaling) {
+  scaling->col.conservativeResize(scaling->col.size() + num_z);
+  scaling->col.tail(num_z) = scaling->row.tail(num_z).cwiseInverse();
+}
+
+// The largest entry of every row and column is near 1.
+Equilibration ByLargest(const MixedLcp<double>& problem, const MatrixXd& E) {
+  Equilibration scaling = Equilibrate(E.leftCols(E.rows()));
+  AppendSlacks(problem.num_z(), &scaling);
+  return scaling;
+}
+
+double InverseOr1(double size) { return size > 0.0 ? 1.0 / size : 1.0; }
+
+// M has a diagonal of 1, and the largest entry of every row of A and G in such units is 1, also
+// where it is far from those of M. Rows of G that are zero are scaled by F.
+Equilibration ByMass(const MixedLcp<double>& problem) {
+  const Index nv = problem.num_v(), ny = problem.num_y(), nz = problem.num_z();
+  Equilibration scaling;
+  scaling.row = VectorXd::Ones(nv + ny + nz);
+  for (Index j = 0; j < nv; ++j) {
+    scaling.row[j] = InverseOr1(std::sqrt(std::max(problem.M(j, j), 0.0)));
+  }
+  const VectorXd v = scaling.row.head(nv);
+  const auto largest = [&v](const MatrixXd& rows, Index i) {
+    return v.size() == 0 ? 0.0 : RowOf(rows, i).cwiseProduct(v).cwiseAbs().maxCoeff();
+  };
+  for (Index i = 0; i < ny; ++i) scaling.row[nv + i] = InverseOr1(largest(problem.A, i));
+  for (Index i = 0; i < nz; ++i) scaling.row[nv + ny + i] = InverseOr1(largest(problem.G, i));
+  scaling.col = scaling.row;
+  for (Index i = 0; i < nz; ++i) {
+    if (largest(problem.G, i) > 0.0) continue;
+    const VectorXd row = problem.F.row(i).transpose().cwiseProduct(scaling.col.tail(nz));
+    scaling.row[nv + ny + i] = InverseOr1(row.cwiseAbs().maxCoeff());
+  }
+  AppendSlacks(nz, &scaling);
+  return scaling;
+}
+
+// A checked proof from the least squares of the scaled equations, or empty.
+VectorXd SearchScaled(const MixedLcp<double>& problem, const LinearEquations& equations,
+                      const Equilibration& scaling) {
+  const MatrixXd E = scaling.row.asDiagonal() * equations.E * scaling.col.asDiagonal();
+  const VectorXd f = scaling.row.cwiseProduct(equations.f);
+  if (!E.allFinite() || !f.allFinite()) return VectorXd();
+  // Their residual is the proof.
+  VectorXd residual = SolveNnls(E, f, problem.num_v() + problem.num_y()).residual;
+  residual.tail(problem.num_z()) = (-residual.tail(problem.num_z())).cwiseMax(0.0);
+  const double largest = residual.size() > 0 ? residual.cwiseAbs().maxCoeff() : 0.0;
+  if (!(largest > 0.0)) return VectorXd();
+  // The residual is a difference of numbers of f's size, and entries that are rounding count as
+  // zero. That is decided here, as the entries of the proof differ by what the rows differ.
+  const double rounding = kLcpRounding * f.cwiseAbs().maxCoeff();
+  for (const double least : kFarkasEntries) {
+    const double threshold = std::clamp(rounding, least * largest, kMostFarkasEntry * largest);
+    VectorXd farkas = scaling.row.cwiseProduct(
+        residual.unaryExpr([=](double x) { return std::abs(x) < threshold ? 0.0 : x; }));
+    farkas /= farkas.cwiseAbs().maxCoeff();
+    if (CheckFarkas(problem, farkas)) return farkas;
+  }
+  return VectorXd();
+}
+
 }  // namespace
 
 bool CheckFarkas(const MixedLcp<double>& problem, const VectorXd& farkas) {
@@ -50,23 +114,13 @@ bool CheckFarkas(const MixedLcp<double>& problem, const VectorXd& farkas) {
 }
 
 VectorXd FindFarkas(const MixedLcp<double>& problem) {
-  const auto [E, f] = AllEquations(problem);
-  const Equilibration scaling = Equilibrate(E);
-  // The residual of their least squares is the proof.
-  const NnlsResult least =
-      SolveNnls(scaling.row.asDiagonal() * E * scaling.col.asDiagonal(),
-                scaling.row.cwiseProduct(f), problem.num_v() + problem.num_y());
-  VectorXd farkas = scaling.row.cwiseProduct(least.residual);
-  farkas.tail(problem.num_z()) = (-farkas.tail(problem.num_z())).cwiseMax(0.0);
-  const double largest = farkas.size() > 0 ? farkas.cwiseAbs().maxCoeff() : 0.0;
-  if (!(largest > 0.0)) return VectorXd();
-  // The residual is a difference of numbers of f's size: entries below their rounding count as
-  // zero.
-  const double rounding = kLcpRounding * scaling.row.maxCoeff() * f.cwiseAbs().maxCoeff();
-  const double threshold = std::clamp(rounding / largest, kLeastFarkasEntry, kMostFarkasEntry);
-  farkas = farkas.unaryExpr(
-      [=](double x) { return std::abs(x) < threshold * largest ? 0.0 : x / largest; });
-  return CheckFarkas(problem, farkas) ? farkas : VectorXd();
+  const LinearEquations equations = AllEquations(problem);
+  // Which scaling distinguishes a proof from rounding depends on whether it contains M's rows.
+  for (const Equilibration& scaling : {ByLargest(problem, equations.E), ByMass(problem)}) {
+    VectorXd farkas = SearchScaled(problem, equations, scaling);
+    if (farkas.size() > 0) return farkas;
+  }
+  return VectorXd();
 }
 
 }  // namespace tangible

@@ -17,7 +17,8 @@ namespace tangible {
 bool CheckFarkas(const MixedLcp<double>& problem, const VectorX<double>& farkas);
 
 /// Returns a checked vector (u, t, w), largest entry 1; empty if the constraints can be satisfied
-/// or nothing could be proved. Method: non-negative least squares, up to 3 (2 nz) QRs.
+/// or nothing could be proved. Method: non-negative least squares, up to 3 (2 nz) QRs, of equations
+/// that are scaled in two ways, as rows may be in any units; the check is of the problem as it is.
 VectorX<double> FindFarkas(const MixedLcp<double>& problem);
 
 }  // namespace tangible

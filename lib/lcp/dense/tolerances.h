@@ -73,9 +73,11 @@ inline constexpr double kJetShift = 1e-9;
 inline constexpr double kFarkasCondition = 1e-10;
 /// Of the terms of its right-hand side: a proof has to exceed rounding by far.
 inline constexpr double kProofMargin = 1e-6;
-/// Of the largest entry: smaller entries of a proof are set to 0.
-inline constexpr double kLeastFarkasEntry = 1e-12;
-/// Of the largest entry: larger entries of a proof are never set to 0, however large the rounding.
+/// Of the largest entry of a proof of the scaled equations: smaller entries are set to 0, with the
+/// least fraction of these with which the proof holds; the solution of ill-conditioned rows has
+/// rounding of the larger ones.
+inline constexpr double kFarkasEntries[] = {1e-12, 1e-9, 1e-6};
+/// Of the same: larger entries of a proof are never set to 0, however large the rounding.
 inline constexpr double kMostFarkasEntry = 1e-3;
 /// Of the diagonal of the equilibrated rows: the first shift of the proximal steps of Lemke's
 /// method.

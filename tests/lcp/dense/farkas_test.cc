@@ -53,6 +53,50 @@ TEST(FarkasTest, ProvesNothingOfFeasibleProblems) {
   EXPECT_EQ(FindFarkas(PlainLcp({{-2, 1}, {-2, 1}}, {-2, -1})).size(), 0);
 }
 
+// Rows and impulses may have any units: a proof of rows that are scaled by d is w / d.
+TEST(FarkasTest, ProvesItWithRowsOfAnyScale) {
+  // v1 + v2 >= 1, -v1 >= 1 and -v2 >= 1: w = (1, 1, 1); a fourth row that is open.
+  for (const double scale : {1e-6, 1.0, 1e6}) {
+    for (const double other : {1e-6, 1.0, 1e6}) {
+      MixedLcp<double> problem;
+      problem.M = MatrixX<double>{{2.0, 0.3}, {0.3, 1.0}};
+      problem.p = ListOf({0.7, -0.4});
+      problem.G = MatrixX<double>{{1.0, 1.0}, {-1.0, 0.0}, {0.0, -1.0}, {0.5, -2.0}};
+      problem.F = MatrixX<double>::Zero(4, 4);
+      problem.c = ListOf({-1.0, -1.0, -1.0, 3.0});
+      const VectorX<double> rows = ListOf({scale, other, scale, scale});
+      problem.G = rows.asDiagonal() * problem.G;
+      problem.c = rows.cwiseProduct(problem.c);
+      ConformEmptyBlocks(problem);
+      const VectorX<double> proof = FindFarkas(problem);
+      ASSERT_EQ(proof.size(), 6) << scale << " " << other;
+      EXPECT_TRUE(CheckFarkas(problem, proof));
+      const VectorX<double> w = proof.tail(4).cwiseProduct(rows);
+      EXPECT_NEAR(w[1], w[0], 1e-9 * w[0]);
+      EXPECT_NEAR(w[2], w[0], 1e-9 * w[0]);
+      EXPECT_EQ(w[3], 0.0);
+    }
+  }
+}
+
+TEST(FarkasTest, ProvesAPlainProblemWithRowsOfAnyScale) {
+  // The sum of the first two rows is -z3 - 1 < 0.
+  const MatrixX<double> F{{1.0, -2.0, 0.5}, {-1.0, 2.0, -1.5}, {1.0, 1.0, 1.0}};
+  for (const double first : {1e-6, 1.0, 1e6}) {
+    for (const double second : {1e-6, 1.0, 1e6}) {
+      const VectorX<double> rows = ListOf({first, second, 1.0});
+      MixedLcp<double> problem;
+      problem.F = rows.asDiagonal() * F;
+      problem.c = rows.cwiseProduct(ListOf({1.0, -2.0, 1.0}));
+      ConformEmptyBlocks(problem);
+      const VectorX<double> proof = FindFarkas(problem);
+      ASSERT_EQ(proof.size(), 3) << first << " " << second;
+      EXPECT_NEAR(proof[0] * first, proof[1] * second, 1e-9 * proof[0] * first);
+      EXPECT_EQ(proof[2], 0.0);
+    }
+  }
+}
+
 TEST(FarkasTest, CheckRefusesWhatIsNoProof) {
   const MixedLcp<double> problem = PlainLcp({{-1, 0}, {0, -1}}, {-1, 2});
   EXPECT_TRUE(CheckFarkas(problem, ListOf({1.0, 0.0})));
