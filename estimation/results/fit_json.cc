@@ -243,10 +243,8 @@ class Reader {
       std::string wrong;
       if (ResolveParameter(problem->scene, path, &parameter, &wrong)) {
         const std::string owner = ParameterThatSets(parameter, *problem);
-        wrong = owner.empty()
-                    ? SetParameters({parameter}, &value, &problem->scene)
-                    : path + ": expected a number that no parameter sets, got one that \"" + owner +
-                          "\" sets (initial says where its value in a recording begins)";
+        wrong = owner.empty() ? SetParameters({parameter}, &value, &problem->scene)
+                              : ExpectedUnset(path, owner);
       }
       if (!wrong.empty()) {
         *error = OneLine(wrong.insert(0, ": /values: ").insert(0, label));
@@ -254,6 +252,11 @@ class Reader {
       }
     }
     return true;
+  }
+
+  static std::string ExpectedUnset(const std::string& path, const std::string& owner) {
+    return path + ": expected a number that no parameter sets, got one that \"" + owner +
+           "\" sets (initial says where its value in a recording begins)";
   }
 
   // The name of the parameter that sets a number of the path; empty if none does. What is added
