@@ -204,6 +204,7 @@ OrderedJson RunSummary::ToJson(const Model<double>& model, const RolloutReport& 
           {"lcp_rows_max", report.lcp_rows_max},
           {"islands_max", islands_max_},
           {"events", report.events},
+          {"ellipse_motions", report.ellipse_motions},
           {"fallbacks", SumOf(fallbacks)},
           {"solver",
            {{"guess", report.solved_by_guess},

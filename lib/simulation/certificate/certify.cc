@@ -339,6 +339,7 @@ Certificate RolloutCertifier::Finish(const Model<double>& model, const RolloutRe
         "motions were halved, as they could not be integrated over a step: how often may be chosen "
         "by rounding; dt is too large";
   }
+  if (certificate_.discontinuous.empty()) certificate_.discontinuous = report.energy_grown;
   const double smoothing = model.structure->settings.smoothing;
   const double margin = certificate_.margin_min;
   if (smoothing > kSmoothedDerivative * margin * margin) {

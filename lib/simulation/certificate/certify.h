@@ -11,6 +11,8 @@
 //                  |approach speed − threshold| and |gap + h n·v_free − margin| of contacts with
 //                  e > 0; and a landing in the last step, whose twist has derivatives of order 1/h
 //                  that the next step would cancel
+//   energy         that has grown by events though nothing drives the scene: motions were too long
+//                  for the integrator; counts as a jump (energy_watch.h)
 //   one-sided      friction exactly 0, equal coefficients in the mixing rule, an edge of a force's
 //                  window on a step's boundary: only where derivatives with respect to these
 //                  numbers are wanted; and with event stepping a contact that touches as the run

@@ -78,8 +78,7 @@ bool EventStepper::AddInstant(const Model<double>& model, double t, EventKind ki
   segment.before = *state;
   segment.event_number = -1;
   segment.at_once = false;
-  // Penetration is decided with the step's length, so that rounding does not count.
-  if (!ChooseModes(model, t, t, model.structure->settings.dt, state, outcome, &segment)) {
+  if (!ChooseModes(model, *state, outcome, &segment)) {
     record_.num_parts = parts;
     outcome->message.clear();
     return true;  // no conclusion without accelerations

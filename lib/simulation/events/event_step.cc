@@ -5,6 +5,7 @@
 #include <cmath>
 #include <utility>
 
+#include "tangible/simulation/events/ellipse_motion.h"
 #include "tangible/simulation/events/tolerances.h"
 
 namespace tangible {
@@ -17,6 +18,10 @@ constexpr double kForcedSlip = 1e4;
 constexpr int kMostHalvings = 14;
 // How many such shortened motions a step may have. Those of a stiff body would not end.
 constexpr int kMostShortened = 50;
+// The same of motions that ellipses shorten, and how many a contact may have in a step: a flat side
+// of 1e-9 of the length of an ellipse takes 2000.
+constexpr int kMostEllipseHalvings = 40;
+constexpr int kMostEllipseMotions = 10000;
 // After more than this many times max_events_per_step events a step is given up.
 constexpr int kGiveUp = 3;
 
@@ -74,6 +79,17 @@ std::vector<Edge> EdgesWithin(const Model<double>& model, double from, double to
   std::stable_sort(edges.begin(), edges.end(),
                    [](const Edge& x, const Edge& y) { return x.time < y.time; });
   return edges;
+}
+
+// Sets the event of a segment that ended at a given time: a fraction of the rest of the step, which
+// is an instant like a signal's corner; an edge; or else the end of the step. Returns how many
+// events that is.
+int EndAtGivenTime(bool is_shortened, const Edge* edge, Segment* segment) {
+  if (!is_shortened && edge == nullptr) return 0;
+  segment->event = EventKind::kEdge;
+  if (is_shortened) return 0;
+  segment->event_number = edge->number;
+  return 1;
 }
 
 // Keeps the contacts that the modes hold closed.
@@ -387,10 +403,39 @@ void EventStepper::GuessModes(const std::vector<ActiveContact>& contacts,
   }
 }
 
-bool EventStepper::ChooseModes(const Model<double>& model, double t, double middle, double length,
-                               State<double>* state, EventOutcome* outcome, Segment* segment) {
+void EventStepper::ShortenAtEllipses(const Model<double>& model,
+                                     const ContactSolution<double>& accelerations,
+                                     EventOutcome* outcome, Segment* segment) {
+  const EllipseMotion motion =
+      LongestEllipseMotion(model, segment->before, segment->contacts, accelerations);
+  if (!(segment->length > motion.longest)) return;
+  const double dt = model.structure->settings.dt;
+  double spacing = dt;
+  for (int k = 1; k <= kMostEllipseHalvings && spacing > motion.longest; ++k) {
+    spacing = std::ldexp(dt, -k);
+  }
+  const double next = (std::floor(segment->time / spacing + kSameInstant) + 1.0) * spacing;
+  const double length = next - segment->time;
+  if (length >= segment->length - kSameInstant * spacing) return;
+  ++outcome->ellipse_motions;
+  const ActiveContact& contact = segment->contacts[motion.contact];
+  if (length > 0.0) {
+    segment->length = length;
+    segment->middle = segment->time + 0.5 * length;
+  }
+  if (shortened_.Add(contact) > kMostEllipseMotions || !(length > 0.0)) {
+    outcome->message = "more than " + std::to_string(kMostEllipseMotions) +
+                       " motions in a step, so short because an ellipse turns over its flat side "
+                       "or tip: the " +
+                       NameOfContact(*model.structure, {contact}, 0) +
+                       " needs a smaller dt or a less slender ellipse";
+  }
+}
+
+bool EventStepper::ChooseModes(const Model<double>& model, const State<double>& state,
+                               EventOutcome* outcome, Segment* segment) {
   const SimulationSettings& settings = model.structure->settings;
-  const double slow = SlowSpeed(model, *state);
+  const double slow = SlowSpeed(model, state);
   segment->contacts.clear();
   segment->friction.clear();
   segment->modes.clear();
@@ -413,8 +458,8 @@ bool EventStepper::ChooseModes(const Model<double>& model, double t, double midd
     return true;
   }
   ContactProblem<double> problem;
-  AssembleAcceleration(model, *state, t, middle, segment->contacts, segment->friction, &assembly_,
-                       &problem);
+  AssembleAcceleration(model, state, segment->time, segment->middle, segment->contacts,
+                       segment->friction, &assembly_, &problem);
   ContactSolution<double> solution;
   GuessModes(segment->contacts, slip, slow, &problem, &solution);
   const ContactSolverReport solved = solver_.Solve(problem, SolverOptionsOf(settings), &solution);
@@ -429,6 +474,9 @@ bool EventStepper::ChooseModes(const Model<double>& model, double t, double midd
   }
   last_contacts_ = segment->contacts;
   last_modes_ = solution.modes;
+  ShortenAtEllipses(model, solution, outcome, segment);
+  // In an instant penetration is decided with the step's length, so that rounding does not count.
+  const double length = segment->length > 0.0 ? segment->length : settings.dt;
   KeepClosed(solution.modes, settings.recovery_speed * length, slow, &slip, segment);
   return true;
 }
@@ -562,6 +610,7 @@ EventOutcome EventStepper::Advance(const Model<double>& model, double t, double 
   EventOutcome outcome;
   record_.Clear();
   counts_.Clear();
+  shortened_.Clear();
   search_.StartStep();
   const std::vector<Edge> edges = EdgesWithin(model, t, t + h);
   const double end = t + h;
@@ -586,10 +635,11 @@ EventOutcome EventStepper::Advance(const Model<double>& model, double t, double 
     const auto edge = std::find_if(edges.begin(), edges.end(),
                                    [&](const Edge& e) { return e.time > now + kTimeRounding * h; });
     const bool to_edge = edge != edges.end();
-    const double until = now + std::ldexp((to_edge ? edge->time : end) - now, -halvings);
+    const double goal = to_edge ? edge->time : end;
+    const double until = now + std::ldexp(goal - now, -halvings);
     const int parts = record_.num_parts;
     Segment& segment = BeginSegment(now, until, *state);
-    if (!ChooseModes(model, now, segment.middle, until - now, state, &outcome, &segment)) {
+    if (!ChooseModes(model, *state, &outcome, &segment)) {
       record_.num_parts = parts;
       if (std::exchange(impulses_tried, true) ||
           !SolveByShortStep(model, now, h, state, &outcome)) {
@@ -597,6 +647,9 @@ EventOutcome EventStepper::Advance(const Model<double>& model, double t, double 
       }
       outcome.message.clear();
       continue;
+    }
+    if (!outcome.message.empty()) {
+      return fail(outcome.message);
     }
     std::string message;
     const bool moved = search_.Run(model, touching_.contacts, &segment, &message);
@@ -616,21 +669,12 @@ EventOutcome EventStepper::Advance(const Model<double>& model, double t, double 
     impulses_tried = false;
     *state = segment.after;
     at_given_time = segment.event == EventKind::kStepEnd;
+    halvings = 0;
     if (at_given_time) {
-      now = until;
-      if (halvings > 0) {
-        // The end is at a given fraction of the rest of the step, an instant like a signal's
-        // corner.
-        segment.event = EventKind::kEdge;
-        halvings = 0;
-      } else if (to_edge) {
-        segment.event = EventKind::kEdge;
-        segment.event_number = edge->number;
-        ++outcome.events;
-      }
+      now = segment.length < until - now ? now + segment.length : until;
+      outcome.events += EndAtGivenTime(now < goal, to_edge ? &*edge : nullptr, &segment);
       continue;
     }
-    halvings = 0;
     now += segment.length;
     if (!TakeEvent(model, now, h, segment, state, &outcome)) {
       return fail(outcome.message);

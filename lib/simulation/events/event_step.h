@@ -61,6 +61,7 @@ struct EventOutcome {
   ContactFallbacks solver;  ///< fallbacks of its solves and motions
   int newton_stages = 0;    ///< implicit stages whose iteration does not contract
   int halved_motions = 0;   ///< that could not be integrated over the rest of the step
+  int ellipse_motions = 0;  ///< shortened because an ellipse turns over its contact point
   int pairs_compared = 0;   ///< boxes compared by the broad phase of its last search for events
   int pairs_near = 0;       ///< pairs whose boxes overlap, in that search
 };
@@ -151,8 +152,13 @@ class EventStepper {
   void GuessModes(const std::vector<ActiveContact>& contacts, const std::vector<double>& slip,
                   double slow, ContactProblem<double>* problem,
                   ContactSolution<double>* solution) const;
-  bool ChooseModes(const Model<double>& model, double t, double middle, double length,
-                   State<double>* state, EventOutcome* outcome, Segment* segment);
+  bool ChooseModes(const Model<double>& model, const State<double>& state, EventOutcome* outcome,
+                   Segment* segment);
+  /// Shortens a motion to what the contacts of ellipses allow (ellipse_motion.h): to the next
+  /// multiple of dt / 2^k. Near states have the same k, so that its end is a given instant and
+  /// derivatives are exact.
+  void ShortenAtEllipses(const Model<double>& model, const ContactSolution<double>& accelerations,
+                         EventOutcome* outcome, Segment* segment);
   bool AddInstant(const Model<double>& model, double t, EventKind kind,
                   const ActiveContact* contact, State<double>* state, EventOutcome* outcome);
   /// Whether a pair has had so many events in this step that its slow impacts count as a rattle (an
@@ -192,6 +198,7 @@ class EventStepper {
   std::vector<ActiveContact> last_contacts_;
   std::vector<ContactMode> last_modes_;
   EventCounts counts_;     ///< of this step
+  EventCounts shortened_;  ///< motions shortened at ellipses in this step
   CoupledBodies coupled_;  ///< at this instant
   std::vector<double>
       struck_;  ///< for each body: approach before its last impact at this instant; 0: none

@@ -39,6 +39,12 @@ inline constexpr double kLocatedOfSize = 8.0 * std::numeric_limits<double>::epsi
 /// Of the coordinate x: gaps are located to it where that is larger, because a pose has no more
 /// digits.
 inline constexpr double kLocatedOfCoordinate = std::numeric_limits<double>::epsilon();
+/// Rad, times h / a: the direction in which an ellipse touches turns by no more in a motion. The
+/// error of a motion of fourth order is about its fifth power, 3e-8, of what it changes.
+inline constexpr double kEllipseTurn = 1.0 / 32.0;
+/// Rad: the phase by which an ellipse rocks on its flat side in a motion, whose error is about its
+/// fifth power over 72, so that rocking loses 1e-5 of its energy in a radian.
+inline constexpr double kEllipsePhase = 0.25;
 /// Of the time of an event, since the start of a segment: brackets of that time are not narrowed
 /// further.
 inline constexpr double kBracket = 4.0 * std::numeric_limits<double>::epsilon();

@@ -132,7 +132,6 @@ class RolloutWorker {
   /// Warnings about joints, coordinates and energy at the end of the last run (run_warnings.h).
   std::vector<std::string> Warnings(const RolloutReport& report, const State<double>& final) const {
     RunWarnings warnings(model_, initial_);
-    if (f_.num_controls() > 0) warnings.SetControlled();
     return warnings.Finish(model_, report, final);
   }
   /// The certificate of the derivatives with respect to parameters, controls and, where the input

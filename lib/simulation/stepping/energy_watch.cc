@@ -6,6 +6,7 @@
 #include <cstdio>
 
 #include "tangible/simulation/stepping/invariants.h"
+#include "tangible/simulation/stepping/tolerances.h"
 
 namespace tangible {
 namespace {
@@ -70,6 +71,32 @@ std::string EnergyWatch::Exploded(const Model<double>& model, const State<double
                 "the energy grew from %.3g J to %.3g J, though nothing drives the scene: dt is too "
                 "large",
                 start_, energy);
+  return text;
+}
+
+std::string EnergyGrown(const Model<double>& model, const State<double>& initial,
+                        const State<double>& final, double by_impacts, double depth) {
+  if (model.structure->settings.stepping != Stepping::kEvent || IsDriven(model, initial)) {
+    return "";
+  }
+  const double kinetic[2] = {KineticEnergy(model, initial), KineticEnergy(model, final)};
+  const double start = kinetic[0] + PotentialEnergy(model, initial);
+  const double end = kinetic[1] + PotentialEnergy(model, final);
+  double weight = 0.0;
+  for (const int body : model.structure->moving) {
+    weight += model.parameters[model.structure->bodies[body].mass] *
+              std::hypot(model.parameters[kGravityX], model.parameters[kGravityY]);
+  }
+  if (!(end - start >
+        kEnergyGrowth * (kinetic[0] + kinetic[1]) + by_impacts + 2.0 * weight * depth)) {
+    return "";
+  }
+  char text[320];
+  std::snprintf(text, sizeof text,
+                "the energy grew from %.4g J to %.4g J, though nothing drives the scene: expected "
+                "a smaller \"dt\" in \"simulation\", which follows the motion (a stiff spring, a "
+                "fast turn), got %g s",
+                start, end, model.structure->settings.dt);
   return text;
 }
 

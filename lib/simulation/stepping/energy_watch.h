@@ -29,4 +29,10 @@ class EnergyWatch {
   double allowed_ = 0.0;  ///< J
 };
 
+/// Empty, or a line that the energy of a run by events has grown, though nothing drives the scene:
+/// a step that is too long for the motion. `by_impacts`: J, what impacts may have added (Newton's
+/// law with friction); `depth`: m, the penetration out of which bodies may have been lifted.
+std::string EnergyGrown(const Model<double>& model, const State<double>& initial,
+                        const State<double>& final, double by_impacts, double depth);
+
 }  // namespace tangible

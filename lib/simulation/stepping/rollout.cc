@@ -23,6 +23,16 @@ StepReport Watched(const EnergyWatch& watch, const Model<double>& model, const S
   return step;
 }
 
+// Adds to a run's report whether its energy has grown without a cause.
+template <typename T>
+void LookAtEnergy(const ControlledModel<T>& controlled, const Model<double>& model,
+                  const State<double>& initial, const State<double>& final, RolloutReport* report) {
+  if (controlled.is_controlled()) return;
+  report->energy_grown = EnergyGrown(
+      model, initial, final, static_cast<double>(report->events) * report->impact_energy_gain_max,
+      report->penetration_max);
+}
+
 // The largest difference between two states, relative to the larger of 1 and the values.
 template <typename T>
 double ValueDifference(const State<T>& jets, const State<double>& state) {
@@ -75,6 +85,7 @@ void RolloutReport::Add(const StepReport& step) {
   solver.Add(step.solver);
   newton_stages += step.newton_stages;
   halved_motions += step.halved_motions;
+  ellipse_motions += step.ellipse_motions;
   damped_projections += step.damped_projections;
   mode_switches += step.mode_switches;
   factorisations += step.factorisations;
@@ -112,6 +123,7 @@ RolloutReport Rollout(ControlledModel<double>* model, const State<double>& initi
       observer(k + 1, report.time, state, stepper);
     }
   }
+  LookAtEnergy(*model, model->At(0), initial, state, &report);
   *final = std::move(state);
   return report;
 }
@@ -183,6 +195,7 @@ RolloutReport RolloutJets(ControlledModel<T>* model, const State<T>& initial, Je
       observer(k + 1, report.time, jets);
     }
   }
+  LookAtEnergy(*model, values, ValuesOf(initial), state, &report);
   *final = std::move(jets);
   return report;
 }

@@ -33,17 +33,20 @@ struct RolloutReport {
   long solved_by_guess = 0;
   long solved_by_interior_point = 0;
   long solved_by_lemke = 0;
-  long events = 0;          ///< located within steps (event stepping)
-  EventFallbacks given_up;  ///< event stepping: what it gave up of its own rules
-  ContactFallbacks solver;  ///< what solves leaned on beyond the guess
-  long newton_stages = 0;   ///< event stepping: implicit stages whose iteration does not contract
-  long halved_motions = 0;  ///< event stepping: that could not be integrated as a whole
+  long events = 0;           ///< located within steps (event stepping)
+  EventFallbacks given_up;   ///< event stepping: what it gave up of its own rules
+  ContactFallbacks solver;   ///< what solves leaned on beyond the guess
+  long newton_stages = 0;    ///< event stepping: implicit stages whose iteration does not contract
+  long halved_motions = 0;   ///< event stepping: that could not be integrated as a whole
+  long ellipse_motions = 0;  ///< event stepping: shortened where an ellipse touches
   long damped_projections = 0;  ///< steps of the joint projection that Newton's method could not do
   long mode_switches = 0;
   long factorisations = 0;
   double residual_max = 0.0;
   double penetration_max = 0.0;         ///< m
   double impact_energy_gain_max = 0.0;  ///< J
+  /// Event stepping: empty, or a line that the energy has grown though nothing drives the scene.
+  std::string energy_grown;
 
   /// Adds a step's report.
   void Add(const StepReport& step);

@@ -36,9 +36,6 @@ class RunWarnings {
     return coordinates_.Message(model);
   }
 
-  /// Controls drive the scene, so that its energy may grow.
-  void SetControlled() { is_controlled_ = true; }
-
   /// All lines, without a file's name. `final` is the state at the report's time.
   std::vector<std::string> Finish(const Model<double>& model, const RolloutReport& report,
                                   const State<double>& final);
@@ -49,16 +46,10 @@ class RunWarnings {
   JointWatch joints_;
   CoordinateWatch coordinates_;
   State<double> initial_;
-  bool is_controlled_ = false;
 };
 
 /// Empty, or a line on the loss of accuracy by `semi_implicit_euler` with event stepping.
 std::string FirstOrderByEvents(const Model<double>& model, const State<double>& initial,
                                const State<double>& final);
-
-/// Empty, or a line that the energy of a run by events has grown, though nothing drives the scene:
-/// a step that is too long for the motion.
-std::string EnergyGrown(const Model<double>& model, const RolloutReport& report,
-                        const State<double>& initial, const State<double>& final);
 
 }  // namespace tangible

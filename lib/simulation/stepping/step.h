@@ -49,6 +49,7 @@ struct StepReport {
   ContactFallbacks solver;  ///< what its solves leaned on beyond the guess
   int newton_stages = 0;    ///< event stepping: implicit stages whose iteration does not contract
   int halved_motions = 0;   ///< event stepping: that could not be integrated as a whole
+  int ellipse_motions = 0;  ///< event stepping: shortened where an ellipse touches
   int damped_projections = 0;  ///< steps of the joint projection that Newton's method could not do
   int mode_switches = 0;       ///< contacts whose mode differs from the last step's
   double residual = 0.0;       ///< scaled natural residual

@@ -124,6 +124,7 @@ StepReport Stepper::StepByEvents(const Model<double>& model, double t, double h,
   report.solver = outcome.solver;
   report.newton_stages = outcome.newton_stages;
   report.halved_motions = outcome.halved_motions;
+  report.ellipse_motions = outcome.ellipse_motions;
   report.pairs_compared = outcome.pairs_compared;
   report.pairs_near = outcome.pairs_near;
   report.factorisations = outcome.factorisations;
