@@ -44,8 +44,8 @@ const char* NameOf(FitApproach approach);
 struct FitOptions {
   DerivativeMethod derivatives = DerivativeMethod::kTangent;
   double huber = 0.0;  ///< b, in multiples of sigma; 0: plain squares
-  /// If a start does not reach the minimum by it, it is also minimised plainly, after kSegments with
-  /// growing windows as well, and the best minimum is taken.
+  /// If a start does not reach the minimum by it, it is also minimised plainly, after kSegments
+  /// with growing windows as well, and the best minimum is taken.
   FitApproach approach = FitApproach::kAuto;
   int segments = 1;         ///< of multiple shooting
   int starts = 1;           ///< further starts are drawn within the bounds

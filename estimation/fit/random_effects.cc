@@ -23,8 +23,6 @@ constexpr int kGrid = 41;
 constexpr int kBits = 24;
 constexpr int kMostSweeps = 50;
 constexpr int kBisections = 100;
-// A spread of logarithms, −ln ε: one recording's value would be rounding beside another's.
-const double kLargestLogSpread = -std::log(std::numeric_limits<double>::epsilon());
 
 /// The sum of ln |diagonal entry| of a triangular matrix over the columns that are determined.
 double LogDiagonal(const Eigen::MatrixXd& factor, const Eigen::VectorXd& lengths,
@@ -212,7 +210,7 @@ ConfidenceInterval IntervalOf(const SpreadLikelihood& likelihood, size_t effect,
 /// Above this a spread is as good as infinite.
 double LargestSpread(const RandomEffect& effect, const ParameterEntry& mean,
                      const Eigen::VectorXd& estimate) {
-  if (effect.kind == PriorKind::kLogNormal) return kLargestLogSpread;
+  if (effect.kind == PriorKind::kLogNormal) return kUnlimitedLogSpread;
   double largest = std::max(mean.scale, std::abs(estimate[effect.mean]));
   for (const int own : effect.own) {
     if (own >= 0) largest = std::max(largest, std::abs(estimate[own]));

@@ -85,6 +85,9 @@ inline constexpr double kLargestSpread = 1e3;
 /// magnitude: the observations do not limit a larger spread. Two recordings limit it to some 30
 /// times what is seen.
 inline constexpr double kUnlimitedSpread = 1e3;
+/// Of 1: the same of a spread of logarithms, −ln ε: the value of one recording would be rounding
+/// beside that of another.
+inline constexpr double kUnlimitedLogSpread = 36.0;
 /// Of 1, for ln τ: smaller changes do not count, because a maximum is flat.
 inline constexpr double kSettledLogarithm = 1e-6;
 /// Of the upper end of the range: a spread as good as infinite: the recordings then say nothing

@@ -27,8 +27,8 @@ using NextLog = std::function<FitLog*()>;
 /// Fits recordings and estimates the components for which this is requested; it is a single fit
 /// where none is. At the end the observations and effects of `problem` have the estimated values.
 /// Costs are in multiples of the sigma of their fit, and iterations are those of all fits. If a fit
-/// does not converge, or the components still change after 20 fits, the status says so, no estimated
-/// spread has an interval, and a warning gives the reason.
+/// does not converge, or the components still change after 20 fits, the status says so, no
+/// estimated spread has an interval, and a warning gives the reason.
 FitResult FitWithComponents(const FitOptions& options, RecordingsProblem* problem,
                             const FitProgress& progress, VarianceComponents* components,
                             const NextLog& next_log = {});

@@ -19,7 +19,8 @@ struct RecordingPart {
 
 /// One run from JSON, with its scene and that part of its observations. `name` begins messages,
 /// each "name: /json/pointer: what, expected, got"; files are looked for in `folder`. Keys that a
-/// file has for all its recordings (`recordings`, and of parameters `per` and `varies`) are left out.
+/// file has for all its recordings (`recordings`, and of parameters `per` and `varies`) are left
+/// out.
 bool ReadRun(const Json& json, const std::string& name, const std::string& folder,
              const RecordingPart& part, FitProblem* problem, std::string* error);
 

@@ -11,11 +11,10 @@
 #include "tangible/estimation/vision/png.h"
 #include "tangible/render/html.h"
 #include "tangible/render/plot.h"
+#include "tangible/scene/json_writer.h"
 
 namespace tangible {
 namespace {
-
-using Json = nlohmann::ordered_json;
 
 template <typename... Values>
 std::string Line(const char* format, Values... values) {
@@ -29,15 +28,16 @@ std::string Seen(const std::optional<double>& error) {
   return error ? Line("%6.3f", *error) : "     -";
 }
 
-bool IsOf(const Json& cell, const char* kind) {
+bool IsOf(const OrderedJson& cell, const char* kind) {
   return cell["cell"].get<std::string>().rfind(kind, 0) == 0;
 }
 
-std::string SimbTable(const std::vector<Json>& cells) {
+std::string SimbTable(const std::vector<OrderedJson>& cells) {
   std::string text;
-  const auto row = [&](const std::string& name, std::optional<double> seen, const Json& score) {
-    const Json& near = score["near"];
-    const Json& far = score["far"];
+  const auto row = [&](const std::string& name, std::optional<double> seen,
+                       const OrderedJson& score) {
+    const OrderedJson& near = score["near"];
+    const OrderedJson& far = score["far"];
     text +=
         Line("%-26s %s  %7.3f %7.3f %7.3f %7.3f  %7.2f %7.2f %7.2f %7.2f\n", name.c_str(),
              Seen(seen).c_str(), near["mean"].get<double>(), near["lower_quartile"].get<double>(),
@@ -45,8 +45,8 @@ std::string SimbTable(const std::vector<Json>& cells) {
              far["mean"].get<double>(), far["lower_quartile"].get<double>(),
              far["median"].get<double>(), far["upper_quartile"].get<double>());
   };
-  const Json* any = nullptr;
-  for (const Json& cell : cells) {
+  const OrderedJson* any = nullptr;
+  for (const OrderedJson& cell : cells) {
     if (!cell.contains("simb")) continue;
     if (any == nullptr) {
       text +=
@@ -65,18 +65,19 @@ std::string SimbTable(const std::vector<Json>& cells) {
   return text + "\n";
 }
 
-std::string BilliardTable(const std::vector<Json>& cells) {
+std::string BilliardTable(const std::vector<OrderedJson>& cells) {
   std::string text;
   const std::vector<int> frames = {1, 2, 3, 5, 7, 10};
-  const auto row = [&](const std::string& name, std::optional<double> seen, const Json& errors) {
+  const auto row = [&](const std::string& name, std::optional<double> seen,
+                       const OrderedJson& errors) {
     text += Line("%-34s %s ", name.c_str(), Seen(seen).c_str());
     for (const int k : frames) text += Line(" %8.3f", errors["position"][k - 1].get<double>());
     text += " ";
     for (const int k : frames) text += Line(" %8.3f", 1e3 * errors["picture"][k - 1].get<double>());
     text += "\n";
   };
-  const Json* any = nullptr;
-  for (const Json& cell : cells) {
+  const OrderedJson* any = nullptr;
+  for (const OrderedJson& cell : cells) {
     if (!IsOf(cell, "billiards") || !cell.contains("ahead")) continue;
     if (any == nullptr) {
       text +=
@@ -94,13 +95,13 @@ std::string BilliardTable(const std::vector<Json>& cells) {
   return text + "\n";
 }
 
-std::string ParameterTable(const std::vector<Json>& cells) {
+std::string ParameterTable(const std::vector<OrderedJson>& cells) {
   std::string text;
-  for (const Json& cell : cells) {
+  for (const OrderedJson& cell : cells) {
     if (!cell.contains("parameters")) continue;
     if (text.empty()) text += "Physical parameters, estimate (truth)\n";
     text += Line("%-34s", cell["cell"].get<std::string>().c_str());
-    for (const Json& parameter : cell["parameters"]) {
+    for (const OrderedJson& parameter : cell["parameters"]) {
       text += Line("  %s %.4f (%g)", parameter["name"].get<std::string>().c_str(),
                    parameter["estimate"].get<double>(), parameter["truth"].get<double>());
     }
@@ -110,10 +111,10 @@ std::string ParameterTable(const std::vector<Json>& cells) {
 }
 
 // The CPU time of the trainings that were not interrupted.
-std::string TrainingLine(const std::vector<Json>& cells) {
+std::string TrainingLine(const std::vector<OrderedJson>& cells) {
   double least = HUGE_VAL, most = 0.0, sum = 0.0;
   int count = 0;
-  for (const Json& cell : cells) {
+  for (const OrderedJson& cell : cells) {
     if (cell.value("iterations_now", 0L) < cell.value("iterations", 1L)) continue;
     const double seconds = cell["cpu_seconds"];
     least = std::min(least, seconds);
@@ -144,11 +145,11 @@ std::string Base64(const std::string& bytes) {
 
 }  // namespace
 
-std::string StudyTables(const std::vector<Json>& cells) {
+std::string StudyTables(const std::vector<OrderedJson>& cells) {
   return SimbTable(cells) + BilliardTable(cells) + ParameterTable(cells) + TrainingLine(cells);
 }
 
-std::string TimingLine(const Json& timing) {
+std::string TimingLine(const OrderedJson& timing) {
   return Line(
       "physics layer, forward and backward, batch %d x %d frames: %.1f ms; training iteration "
       "%.1f ms; share %.1f %%\n",
@@ -157,9 +158,9 @@ std::string TimingLine(const Json& timing) {
       1e3 * timing["iteration_seconds"].get<double>(), 1e2 * timing["share"].get<double>());
 }
 
-std::string ErrorByFrameSvg(const std::vector<Json>& cells) {
+std::string ErrorByFrameSvg(const std::vector<OrderedJson>& cells) {
   std::vector<PlotSeries> series;
-  for (const Json& cell : cells) {
+  for (const OrderedJson& cell : cells) {
     const std::string name = cell["cell"];
     // Other seeds than the first would lie upon it.
     if (!IsOf(cell, "billiards") || !cell.contains("ahead") || !name.ends_with("_0")) continue;
@@ -178,9 +179,9 @@ std::string ErrorByFrameSvg(const std::vector<Json>& cells) {
                  series);
 }
 
-std::string ErrorByLabelsSvg(const std::vector<Json>& cells) {
+std::string ErrorByLabelsSvg(const std::vector<OrderedJson>& cells) {
   std::map<std::string, std::map<double, std::pair<double, int>>> sums;
-  for (const Json& cell : cells) {
+  for (const OrderedJson& cell : cells) {
     if (!IsOf(cell, "billiards") || !cell.contains("ahead")) continue;
     const std::string name = cell["cell"];
     const size_t labels_at = name.rfind('_', name.rfind('_') - 1);  // MODEL_LABELS_SEED

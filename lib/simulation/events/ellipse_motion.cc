@@ -3,15 +3,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
+#include "tangible/math/scalar.h"
 #include "tangible/simulation/events/segment_flow.h"
 #include "tangible/simulation/events/tolerances.h"
 
 namespace tangible {
 namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 // One of the two shapes of a contact.
 struct Side {

@@ -9,7 +9,7 @@
 // and the time t + τ at which the next segment starts moves with it, so that the segment that ends
 // the step has τ̇ = −ṫ. In the limit of small segments this is the saltation matrix of hybrid
 // systems (Leine, Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical Systems, 2004, ch.
-// 7), which for an event g and an impact x⁺ = R(x⁻) that do not depend on time is
+// 7), which for an event g and an impact x⁺ = R(x⁻) that do not depend on time is:
 //   Ξ = R_x + (f⁺ − R_x f⁻) ∇gᵀ / (∇g · f⁻)
 // Here ∇g is EventGradient, f⁻ the column S_τ, R_x ImpulsesTangent, and f⁺ comes from the later
 // start of the next segment. The adjoint is the transpose.

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <cstdio>
 
+#include "tangible/dynamics/model/lengths.h"
+#include "tangible/dynamics/model/tolerances.h"
 #include "tangible/simulation/stepping/invariants.h"
 #include "tangible/simulation/stepping/tolerances.h"
 
@@ -82,13 +84,18 @@ std::string EnergyGrown(const Model<double>& model, const State<double>& initial
   const double kinetic[2] = {KineticEnergy(model, initial), KineticEnergy(model, final)};
   const double start = kinetic[0] + PotentialEnergy(model, initial);
   const double end = kinetic[1] + PotentialEnergy(model, final);
-  double weight = 0.0;
+  const double g = std::hypot(model.parameters[kGravityX], model.parameters[kGravityY]);
+  const Lengths lengths(model);
+  double lifted = 0.0;
+  double rounding = kTouchShare * (std::abs(start) + std::abs(end));
   for (const int body : model.structure->moving) {
-    weight += model.parameters[model.structure->bodies[body].mass] *
-              std::hypot(model.parameters[kGravityX], model.parameters[kGravityY]);
+    const double mass = model.parameters[model.structure->bodies[body].mass];
+    const double touch = lengths.Touch(final, body, body);
+    const double speed = touch / model.structure->settings.dt;
+    lifted += 2.0 * mass * g * depth;
+    rounding += mass * (g * (touch + kTouchShare * PlaceOf(final, body, body)) + speed * speed);
   }
-  if (!(end - start >
-        kEnergyGrowth * (kinetic[0] + kinetic[1]) + by_impacts + 2.0 * weight * depth)) {
+  if (!(end - start > kEnergyGrowth * (kinetic[0] + kinetic[1]) + by_impacts + lifted + rounding)) {
     return "";
   }
   char text[320];

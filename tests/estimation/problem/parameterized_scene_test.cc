@@ -113,7 +113,8 @@ TEST(ParameterizedSceneTest, ValuesThatANumberMayNotTakeAreRefused) {
   EXPECT_TRUE(scene.Set(Eigen::VectorXd::Constant(1, 1.0)));
 }
 
-// Radii beyond the ratio that a scene may have make an evaluation fail, from which a fit steps back.
+// Radii beyond the ratio that a scene may have make an evaluation fail, from which a fit steps
+// back.
 TEST(ParameterizedSceneTest, RadiiAreCheckedAsWhenASceneIsRead) {
   Scene scene = MakeScene(kFallingBall);
   scene.bodies[0].shape = {ShapeType::kEllipse, {1.0, 2.0}};

@@ -9,13 +9,13 @@
 namespace tangible {
 namespace {
 
-constexpr int kFitEvery = 50;          // steps, while it plays at random and a while after
-constexpr int kFitUntil = 2000;        // steps
-constexpr int kServeAfter = 2;         // pictures without a ball
-constexpr int kMostUseless = 40;       // returns that break nothing, then options are drawn
-constexpr double kFarFrames = 1000.0;  // of a prediction
-constexpr double kReachSpeed = 5.0;    // pixels a frame: of the paddle, whether an option is near
-constexpr double kSafeEdge = 2.0;      // pixels
+constexpr int kFitEvery = 50;                // steps, while it plays at random and a while after
+constexpr int kFitUntil = 2000;              // steps
+constexpr int kServeAfter = 2;               // pictures without a ball
+constexpr int kMostUseless = 40;             // returns that break nothing, then options are drawn
+constexpr double kPredictedFrames = 1000.0;  // of a prediction
+constexpr double kReachSpeed = 5.0;  // pixels a frame: of the paddle, whether an option is near
+constexpr double kSafeEdge = 2.0;    // pixels
 
 }  // namespace
 
@@ -103,7 +103,7 @@ void Agent::Predict(const Sight& sight) {
   const bool below = ball.v.y() > 0.0 && ball.at.y() > last.y + last.height;
   const bool stale = !flight_ || tracker_->surprised() || tracker_->returned() || left_ < 0.0;
   if (!stale && (aim_ || !below)) return;
-  flight_ = flights_->Predict(ball, sight.bricks, kFarFrames);
+  flight_ = flights_->Predict(ball, sight.bricks, kPredictedFrames);
   left_ = flight_->frames;
   aim_.reset();
   if (!below || !flight_->arrives) return;

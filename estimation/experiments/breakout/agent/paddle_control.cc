@@ -18,7 +18,7 @@ constexpr double kPressed = 0.5;   // a planned press beyond it becomes one
 // the ball is met.
 constexpr double kOutside = 25.0, kPress = 0.05, kMoving = 0.1;
 // The factor by which each later step reduces the uncertainty of a step, because it can correct it.
-constexpr double kCorrected = 0.4;
+constexpr double kUncertaintyLeft = 0.4;
 // Weights of a plan: of the distance at the end, of that on the way, and of a press.
 constexpr double kEndWeight = 1.0, kWayWeight = 0.05, kPressWeight = 20.0;
 
@@ -70,7 +70,7 @@ PaddleControl::Best PaddleControl::Compare(const PaddleState& state, const Paddl
     const PaddleState after = model_->After(state, direction, std::min(frames, kFrameSkip));
     const int later = (frames - 1) / kFrameSkip;  // steps
     double cost = kPress * std::abs(direction) +
-                  std::pow(kCorrected, later) * model_->Variance(state, direction);
+                  std::pow(kUncertaintyLeft, later) * model_->Variance(state, direction);
     if (frames > kFrameSkip) {
       cost += Compare(after, goal, frames - kFrameSkip).cost;
     } else {
