@@ -30,10 +30,11 @@ class EnergyWatch {
 };
 
 /// Empty, or a line that the energy of a run by events has grown, though nothing drives the scene:
-/// a step that is too long for the motion. `by_impacts`: J, what impacts may have added (Newton's
-/// law with friction); `depth`: m, the penetration out of which bodies may have been lifted. Energy
-/// that belongs to displacements by the touching tolerance (lengths.h), or by that within a step,
-/// is rounding.
+/// a step that is too long for the motion. Empty for semi-implicit Euler steps, whose energy
+/// varies and which have a warning of their own. `by_impacts`: J, what impacts may have added
+/// (Newton's law with friction); `depth`: m, the penetration out of which bodies may have been
+/// lifted. Energy that belongs to displacements by the touching tolerance (lengths.h), or by that
+/// within a step, is rounding.
 std::string EnergyGrown(const Model<double>& model, const State<double>& initial,
                         const State<double>& final, double by_impacts, double depth);
 

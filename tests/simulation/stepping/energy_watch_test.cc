@@ -61,15 +61,15 @@ TEST(EnergyWatchTest, WhatDrivesAndWhatRestsIsNotWatched) {
 TEST(EnergyWatchTest, RoundingOfBodiesAtRestIsNoGrowth) {
   for (const char* parts :
        {R"("bodies": [{"name": "box", "mass": 1, "shape": {"box": {"size": [0.3, 0.7]}},
-           "position": [0.1, 0.35]}, {"name": "floor", "type": "static",
+           "position": [0.1, 0.35]}, {"name": "floor", "static": true,
            "shape": {"half_plane": {"normal": [0, 1]}}}])",
         R"("bodies": [{"name": "rod", "mass": 1.3, "inertia": 0.1, "position": [0.1, -0.3]}],
            "joints": [{"name": "pin", "type": "revolute", "bodies": ["rod", "world"],
-                       "anchors": [[0, 0.3], [0.1, 0]]}])",
+                       "anchor": [0.1, 0]}])",
         R"("gravity": [0, 0], "bodies": [{"name": "arm", "mass": 1, "inertia": 1,
            "position": [1, 0]}],
            "joints": [{"name": "pin", "type": "revolute", "bodies": ["arm", "world"],
-                       "anchors": [[-1, 0], [0, 0]], "limits": [0, 1]}])"}) {
+                       "anchor": [0, 0], "limits": [0, 1]}])"}) {
     const Scene scene = test_scenes::SceneOf(std::string("{") + parts +
                                              R"(, "simulation": {"dt": 0.01, "duration": 1,
                                                  "stepping": "event"}})");
