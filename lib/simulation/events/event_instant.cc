@@ -110,6 +110,28 @@ double EventStepper::ReturnSpeed(const Model<double>& model, const State<double>
   return std::sqrt(2.0 * acceleration * search_.TouchTolerance(model, state, contact));
 }
 
+void CountSolve(const ContactSolverReport& solved, EventOutcome* outcome) {
+  outcome->factorisations += solved.factorisations;
+  outcome->iterations += solved.iterations;
+  outcome->solver.Add(solved.fallbacks);
+  outcome->residual = std::max(outcome->residual, solved.solved ? solved.residual : 0.0);
+  outcome->by_guess = outcome->by_guess && solved.solved_by != SolvedBy::kInteriorPoint &&
+                      solved.solved_by != SolvedBy::kLemke;
+  outcome->by_lemke = outcome->by_lemke || solved.solved_by == SolvedBy::kLemke;
+}
+
+std::string NameOfContact(const ModelStructure& structure,
+                          const std::vector<ActiveContact>& contacts, int index) {
+  if (index < 0) {
+    return "joints";
+  }
+  const ActiveContact& contact = contacts[index];
+  return contact.IsJointFriction() ? "friction in joint " + structure.joints[contact.joint].name
+         : contact.joint >= 0      ? "limit of joint " + structure.joints[contact.joint].name
+                                   : "contact of " + structure.bodies[contact.a].name + " and " +
+                                    structure.bodies[contact.b].name;
+}
+
 std::string WhatIsUnsolved(const ModelStructure& structure, const Impulses& impulses,
                            const ContactSolverReport& solved) {
   if (solved.worst_contact >= 0) {
