@@ -46,7 +46,8 @@ double CutByPoses(const Model<double>& model, const Segment& motion, double leng
 }  // namespace
 
 // Between two states of a pair `length` apart in time: whether neither turns by more than a third
-// of a radian nor moves by more than the smaller one's size.
+// of a radian nor moves by more than the smaller one's size. The height of an ellipse changes its
+// course within an angle of b / a, which takes the place of a radian.
 bool EventSearch::MovesLittle(const Model<double>& model, const State<double>& before,
                               const State<double>& after, double length, int a, int b) const {
   constexpr double kLittle = 0.3;
@@ -55,7 +56,12 @@ bool EventSearch::MovesLittle(const Model<double>& model, const State<double>& b
         std::max(std::abs(before.twist[3 * body + 2]), std::abs(after.twist[3 * body + 2]));
     const BodyIndex& index = model.structure->bodies[body];
     const bool is_circle = index.shape == ShapeType::kCircle && index.num_contact_points == 0;
-    if (!is_circle && omega * length > kLittle) {
+    double little = kLittle;
+    if (index.shape == ShapeType::kEllipse) {
+      const double* radii = model.Shape(body).numbers;
+      little *= std::min(radii[0], radii[1]) / std::max(radii[0], radii[1]);
+    }
+    if (!is_circle && omega * length > little) {
       return false;
     }
   }

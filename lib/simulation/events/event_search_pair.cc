@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "tangible/dynamics/model/tolerances.h"
 #include "tangible/math/scalar.h"
@@ -110,6 +111,8 @@ class EventSearch::PairSearch {
   Course CourseOver(double from, double fa, double to, double fb, double allowed, Counts counts);
   // Searches for the first time at which gap + allowed closes, and sets the event to it.
   void SearchFrom(double from, double allowed, Counts counts);
+  // The acceleration of the gap that the turning of an ellipse gives, m/s²; 0 where neither is one.
+  double TurningAcceleration(const State<double>& end) const;
   // Searches for the return of contacts that touch and open; false where one returns at once.
   bool SearchTouching();
   // The closed contact whose feature is no longer the closest, or nullptr.
@@ -305,6 +308,28 @@ void EventSearch::PairSearch::SearchFrom(double from, double allowed, Counts cou
   }
 }
 
+// The height of an ellipse with semi-axes a ≥ b has a second derivative of at most a² / b with
+// respect to the direction, which turns with both bodies and as they pass each other.
+double EventSearch::PairSearch::TurningAcceleration(const State<double>& end) const {
+  double height = 0.0;
+  for (const auto& [body, part] : {std::pair(a_, parts_.a), std::pair(b_, parts_.b)}) {
+    const ShapeView<double> shape = model_.Shape(body, part);
+    if (shape.type != ShapeType::kEllipse) continue;
+    const auto [small, large] = std::minmax(shape.numbers[0], shape.numbers[1]);
+    height += large * (large / small);
+  }
+  if (height == 0.0) return 0.0;
+  double turning = 0.0;
+  for (const State<double>* state : {&segment_.before, &end}) {
+    const double* a = &state->twist[3 * a_];
+    const double* b = &state->twist[3 * b_];
+    turning =
+        std::max(turning, std::abs(a[2]) + std::abs(b[2]) +
+                              std::hypot(a[0] - b[0], a[1] - b[1]) / search_.lengths_.Size(a_, b_));
+  }
+  return 2.0 * turning * turning * height;
+}
+
 bool EventSearch::PairSearch::SearchTouching() {
   double from = kInfinity;
   double allowed = touch_;
@@ -322,7 +347,8 @@ bool EventSearch::PairSearch::SearchTouching() {
     const double speed = SpeedsOf(model_, segment_.before, contact).normal;
     const double change =
         end.good ? std::abs(SpeedsOf(model_, end.motion.after, contact).normal - speed) : 0.0;
-    from = std::min(from, search_.TouchStart(speed, 2.0 * change / event_.length));
+    from = std::min(from, search_.TouchStart(speed, 2.0 * change / event_.length +
+                                                        TurningAcceleration(end.motion.after)));
     allowed = std::max(allowed, touch_ - contact.gap);
   }
   SearchFrom(from, allowed, Counts::kAll);

@@ -243,6 +243,29 @@ TEST(EllipseMotionTest, ALimitOfMotionsIsAnErrorWithAName) {
       << run.report.message;
 }
 
+// An impact with friction makes the ellipse turn by radians within the step: its next side hits the
+// floor in the same one, though the speeds of the contact at both ends of the motion may be equal.
+TEST(EllipseMotionTest, AnEllipseThatTurnsFastHitsTheFloorAgainWithinAStep) {
+  for (int k = 0; k < 31; ++k) {
+    const double angle = 0.1 * k;
+    Model<double> model;
+    State<double> state, last;
+    BuildModel(SceneOf(R"({"bodies": [
+        {"name": "e", "shape": {"ellipse": {"radii": [0.3, 0.1]}}, "mass": 1, "position": [0, 0.8],
+         "velocity": [0, -14], "friction": 0.3, "restitution": 0.5, "angle": )" +
+                       Text(angle) + R"(},
+        {"name": "floor", "static": true, "shape": {"half_plane": {"normal": [0, 1]}},
+         "friction": 0.3, "restitution": 0.5}],
+        "simulation": {"stepping": "event", "dt": 0.1, "duration": 0.5}})"),
+               &model, &state);
+    const auto above = [&](long, double t, const State<double>& at, Stepper*) {
+      const double height = std::hypot(0.3 * std::sin(at.pose[2]), 0.1 * std::cos(at.pose[2]));
+      EXPECT_GT(at.pose[1] - height, -1e-9) << angle << " at " << t;
+    };
+    EXPECT_EQ(Rollout(model, state, above, &last).status, StepStatus::kDone) << angle;
+  }
+}
+
 // A body on a spring that is too stiff for the step: the energy grows, and no derivative is called
 // trustworthy.
 TEST(EllipseMotionTest, GrownEnergyIsNotTrustworthy) {
