@@ -82,21 +82,26 @@ void FinishCell(size_t first, std::string* text) {
 }
 
 /// The text with its cells separated by commas and numbers with points. A line break in a quoted
-/// cell becomes a space, and a blank line follows, so that lines keep their numbers.
-std::string WithCommas(std::string_view text) {
+/// cell becomes a space, and a blank line follows, so that lines keep their numbers. `open_line`:
+/// the line of a quote that is not closed, 0 where there is none.
+std::string WithCommas(std::string_view text, int* open_line) {
   const char separator = SeparatorOf(text);
   std::string commas;
   commas.reserve(text.size());
   size_t first = 0;  // of the cell
   int breaks = 0;
+  int line = 1;
   bool quoted = false;
+  *open_line = 0;
   for (size_t i = 0; i < text.size(); ++i) {
     const char c = text[i];
+    line += c == '\n' ? 1 : 0;
     if (c == '"') {
       // It opens at a cell's beginning, or is the second one of two; elsewhere it is no quote.
       const bool begins = commas.find_first_not_of(" \t", first) == std::string::npos;
       if (!quoted && !begins && text[i - 1] != '"') continue;
       quoted = !quoted;
+      *open_line = quoted ? line : 0;
       commas += c;
     } else if (!quoted && (c == separator || c == '\n')) {
       if (separator != ',') FinishCell(first, &commas);
@@ -541,7 +546,13 @@ bool ParseTableRecording(const std::string& text, const std::string& file,
                          const TableOptions& options, TableRecording* recording,
                          std::string* error) {
   *recording = TableRecording();
-  const std::string commas = WithCommas(WithoutByteOrderMark(text));
+  int open_line = 0;
+  const std::string commas = WithCommas(WithoutByteOrderMark(text), &open_line);
+  if (open_line > 0) {
+    *error = file + ": line " + std::to_string(open_line) +
+             ": expected a closing quote of the cell, got the end of the file";
+    return false;
+  }
   CsvTable table;
   Layout layout;
   const bool read = options.format == TableFormat::kDeepLabCut

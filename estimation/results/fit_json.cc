@@ -237,6 +237,7 @@ class Reader {
                         std::string* error) {
     if (!reader.Has("values")) return true;
     const JsonReader values = reader.At("values");
+    if (!values.IsObject()) values.FailExpected("an object of numbers by path");
     for (const std::string& path : values.Keys()) {
       ParameterPath parameter;
       const double value = values.At(path).Number();

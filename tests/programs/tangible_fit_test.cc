@@ -160,6 +160,7 @@ TEST_F(TangibleFitTest, MistakesInRecordingsNameThem) {
   expect({{"start", 0.3}, {"end", 0.2}}, "/recordings/1/end: expected a time after start");
   expect({{"weight", 0}}, "/recordings/1/weight: expected a number > 0");
   expect({{"values", {{"bodies/ball/mass", -1}}}}, "recording 'b': /values: bodies/ball/mass");
+  expect({{"values", 5}}, "/recordings/1/values: expected an object");
   expect({{"initial", {{"sped", 1}}}}, "/recordings/1/initial/sped: expected the name");
   // A shared parameter starts where the file says.
   expect({{"initial", {{"g", 1}}}},

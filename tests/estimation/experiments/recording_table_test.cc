@@ -163,6 +163,8 @@ TEST(RecordingTableTest, MistakesAreOneLine) {
   EXPECT_EQ(Import("t [s],th1,om1,th2\n0,2,3,4\n0,2,3,4\n", Mapped(kWide)).error,
             "r.csv: line 3: time: expected one after 0 s, got 0: the clock stands still or runs "
             "backwards");
+  EXPECT_EQ(Import("t [s],th1,om1,th2\n0,2,3,4\n0.5,\"5,3,4\n1,2,3,4\n", Mapped(kWide)).error,
+            "r.csv: line 3: expected a closing quote of the cell, got the end of the file");
   EXPECT_EQ(Import("t,th1,om1,th2\n0,2,3,4\n", Mapped(kWide)).error,
             "m.json: /time: expected the name of a column of r.csv (t, th1, om1, th2), got \"t "
             "[s]\"");
