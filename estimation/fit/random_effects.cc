@@ -7,7 +7,6 @@
 #include <boost/math/tools/minima.hpp>
 #include <cmath>
 #include <functional>
-#include <limits>
 #include <utility>
 
 #include "tangible/estimation/fit/tolerances.h"

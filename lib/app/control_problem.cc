@@ -177,8 +177,7 @@ class Reader {
           .At(i)
           .Fail(
               "expected low and high with a surrogate, whose deviation is a share of their range, "
-              "got "
-              "a control without both");
+              "got a control without both");
     }
     if (json.Has("seed")) {
       surrogate.seed = static_cast<unsigned>(json.At("seed").Integer(0, 1000000000));

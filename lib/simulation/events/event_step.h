@@ -138,10 +138,10 @@ class EventStepper {
   /// "…: more than 303 events in a step of contact of a and b, max_events_per_step is 100".
   static std::string EventsDoNotEnd(const Model<double>& model, const char* what,
                                     const ActiveContact& contact);
-  /// Where a segment ends because a contact stops sliding, other contacts that stop at the same
-  /// instant and whose bodies are not coupled to it get separate events.
   bool TakeEvent(const Model<double>& model, double now, double h, const Segment& segment,
                  State<double>* state, EventOutcome* outcome);
+  /// Where a segment ends because a contact stops sliding, other contacts that stop at the same
+  /// instant and whose bodies are not coupled to it get separate events.
   bool EndOtherSlips(const Model<double>& model, double t, const Segment& segment,
                      State<double>* state, EventOutcome* outcome);
   bool SolveImpact(const Model<double>& model, Impulses* impact, State<double>* state,
