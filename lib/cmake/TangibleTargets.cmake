@@ -63,7 +63,8 @@ endif()
 
 # One precompiled header for all targets: most files read Eigen and ceres/jet.h, two seconds each.
 if(TANGIBLE_PRECOMPILE_HEADERS)
-  file(WRITE "${PROJECT_BINARY_DIR}/precompiled.cc" "// Carries the precompiled header.\n")
+  # CONFIGURE leaves a file alone that has this content, so that configuring again rebuilds nothing.
+  file(CONFIGURE OUTPUT "${PROJECT_BINARY_DIR}/precompiled.cc" CONTENT "// Carries the precompiled header.\n")
   add_library(tangible_precompiled OBJECT "${PROJECT_BINARY_DIR}/precompiled.cc")
   target_compile_features(tangible_precompiled PRIVATE cxx_std_20)
   target_link_libraries(tangible_precompiled PRIVATE tangible_flags Eigen3::Eigen)
