@@ -184,7 +184,7 @@ class RunReader {
     if (!LoadScene(scene_file, &problem_->scene, error_)) {
       return false;
     }
-    if (!CheckSettings(problem_->scene.simulation, error_)) {
+    if (!CheckSettings(problem_->scene, error_)) {
       *error_ = scene_file + ": " + *error_;
       return false;
     }

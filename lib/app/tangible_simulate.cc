@@ -143,7 +143,7 @@ void EndStepsAtObservations(SimulationSettings* settings) {
 void Prepare(const std::string& file, Job* job) {
   if (!LoadScene(file, &job->scene, &job->error)) return;
   std::string why;
-  if (!CheckSettings(job->scene.simulation, &why)) {
+  if (!CheckSettings(job->scene, &why)) {
     job->error = file + ": " + why;
     return;
   }
@@ -258,7 +258,7 @@ int RunRows(const std::string& file) {
   BatchTable table;
   std::string error;
   if (!LoadScene(file, &scene, &error)) return ReportError(error);
-  if (!CheckSettings(scene.simulation, &error)) return ReportError(error.insert(0, file + ": "));
+  if (!CheckSettings(scene, &error)) return ReportError(error.insert(0, file + ": "));
   if (!ReadBatch(FLAGS_batch, scene, &table, &error)) return ReportError(error);
   BatchResult batch;
   {

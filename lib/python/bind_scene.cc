@@ -99,7 +99,7 @@ struct Wanted {
 
 Run Simulate(const Scene& scene, long every, Wanted wanted, SignalWatch* watch) {
   std::string error;
-  if (!CheckSettings(scene.simulation, &error)) throw Error(error);
+  if (!CheckSettings(scene, &error)) throw Error(error);
   Model<double> model;
   State<double> initial;
   BuildModel(scene, &model, &initial);

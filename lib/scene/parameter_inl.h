@@ -124,10 +124,10 @@ class NumberList {
     if (!prismatic && joint->type != JointType::kRevolute) return;
     if (prismatic) AddVector("axis/", Dimension::kNone, &joint->axis);
     const Dimension coordinate = prismatic ? Dimension::kLength : Dimension::kAngle;
+    const Dimension speed = prismatic ? Dimension::kVelocity : Dimension::kAngularVelocity;
     if (movable) {
       Add(prismatic ? "displacement" : "angle", kFree, coordinate, &joint->angle);
-      Add("rate", kFree, prismatic ? Dimension::kVelocity : Dimension::kAngularVelocity,
-          &joint->rate);
+      Add("rate", kFree, speed, &joint->rate);
     }
     Add("damping", kNonNegative, prismatic ? Dimension::kLinearDamping : Dimension::kAngularDamping,
         &joint->damping);
@@ -135,9 +135,11 @@ class NumberList {
       Add("limits/0", kFree, coordinate, &joint->limits->first);
       Add("limits/1", kFree, coordinate, &joint->limits->second);
     }
-    if (joint->friction) {
-      Add("friction", kNonNegative, prismatic ? Dimension::kForce : Dimension::kTorque,
-          &*joint->friction);
+    const Dimension effort = prismatic ? Dimension::kForce : Dimension::kTorque;
+    if (joint->friction) Add("friction", kNonNegative, effort, &*joint->friction);
+    if (joint->kinetic_friction) {
+      Add("kinetic_friction", kNonNegative, effort, &*joint->kinetic_friction);
+      Add("stribeck_speed", kPositive, speed, &joint->stribeck_speed);
     }
     if (joint->stiffness) {
       Add("stiffness", kNonNegative,
@@ -145,7 +147,7 @@ class NumberList {
       Add(prismatic ? "rest_displacement" : "rest_angle", kFree, coordinate, &joint->rest);
     }
     if (!joint->effort_signal) {
-      Add("effort", kFree, prismatic ? Dimension::kForce : Dimension::kTorque, &joint->effort);
+      Add("effort", kFree, effort, &joint->effort);
     }
   }
 
@@ -230,6 +232,8 @@ BasicJoint<T> CastJoint(const BasicJoint<double>& from) {
   if (from.limits) joint.limits = {T(from.limits->first), T(from.limits->second)};
   joint.stiffness = CastOptional<T>(from.stiffness);
   joint.friction = CastOptional<T>(from.friction);
+  joint.kinetic_friction = CastOptional<T>(from.kinetic_friction);
+  joint.stribeck_speed = T(from.stribeck_speed);
   joint.rest = T(from.rest);
   joint.effort = T(from.effort);
   joint.effort_signal = from.effort_signal;

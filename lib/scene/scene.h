@@ -89,7 +89,10 @@ struct BasicJoint {
   std::optional<std::pair<T, T>> limits;
   std::optional<T> stiffness;  ///< of a spring along the coordinate: −k (coordinate − rest)
   T rest{0.0};                 ///< rad or m; only with a stiffness
-  std::optional<T> friction;   ///< Coulomb's: the torque or force at which it slides, ≥ 0
+  std::optional<T> friction;   ///< the torque or force at which it slides, ≥ 0
+  /// Of Stribeck's decay, ≥ 0: the friction far above `stribeck_speed`. None: Coulomb's friction.
+  std::optional<T> kinetic_friction;
+  T stribeck_speed{1.0};  ///< rad/s or m/s, > 0; only with a kinetic friction
   T effort{0.0};
   std::optional<Signal> effort_signal;  ///< replaces effort
   bool contact = false;                 ///< whether the joined bodies may collide

@@ -231,7 +231,8 @@ void SceneReader::ReadJoint(const JsonReader& item) {
   if (prismatic) keys.emplace_back("axis");
   if (revolute || prismatic) {
     keys.insert(keys.end(), {displacement, "rate", "damping", "friction", "limits", "effort",
-                             "stiffness", prismatic ? "rest_displacement" : "rest_angle"});
+                             "kinetic_friction", "stribeck_speed", "stiffness",
+                             prismatic ? "rest_displacement" : "rest_angle"});
   }
   item.ExpectKeys(keys, " of a " + NameOf(joint.type, kJointTypeNames) + " joint");
   if (!item.ok()) return;
@@ -271,6 +272,14 @@ void SceneReader::ReadMotor(const JsonReader& item, const char* displacement,
   const char* const rest = prismatic ? "rest_displacement" : "rest_angle";
   if (item.Has("friction")) {
     joint->friction = item.At("friction").Number(NumberKind::kNonNegative);
+  }
+  if (item.Has("kinetic_friction") && joint->friction) {
+    joint->kinetic_friction = item.At("kinetic_friction").Number(NumberKind::kNonNegative);
+    joint->stribeck_speed = item.At("stribeck_speed").Number(NumberKind::kPositive);
+  } else if (item.Has("kinetic_friction")) {
+    item.At("friction").Fail("missing, expected a number >= 0 with kinetic_friction");
+  } else if (item.Has("stribeck_speed")) {
+    item.At("kinetic_friction").Fail("missing, expected a number >= 0 with stribeck_speed");
   }
   if (item.Has("stiffness")) {
     joint->stiffness = item.At("stiffness").Number(NumberKind::kNonNegative);

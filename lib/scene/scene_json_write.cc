@@ -130,6 +130,10 @@ class SceneWriter {
         json["limits"] = OrderedJson::array({joint.limits->first, joint.limits->second});
       }
       if (joint.friction) json["friction"] = *joint.friction;
+      if (joint.kinetic_friction) {
+        json["kinetic_friction"] = *joint.kinetic_friction;
+        json["stribeck_speed"] = joint.stribeck_speed;
+      }
       if (joint.stiffness) {
         json["stiffness"] = *joint.stiffness;
         json[prismatic ? "rest_displacement" : "rest_angle"] = joint.rest;

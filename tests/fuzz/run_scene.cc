@@ -48,7 +48,7 @@ void RunFewSteps(Scene scene, Stepping stepping) {
   // An event costs up to a thousand evaluations of the motion.
   scene.simulation.max_events_per_step = std::min(scene.simulation.max_events_per_step, 5);
   std::string why;
-  if (!CheckSettings(scene.simulation, &why)) {
+  if (!CheckSettings(scene, &why)) {
     Expect(!why.empty() && why.find('\n') == std::string::npos, "one line", why);
     return;
   }

@@ -95,6 +95,10 @@ TEST(BadSceneTest, Bodies) {
       {"/bodies/0/quadratic_drag", "-1",
        "/bodies/0/quadratic_drag: expected a number >= 0, got -1"},
       {"/joints/0/friction", "-2", "/joints/0/friction: expected a number >= 0, got -2"},
+      {"/joints/0/kinetic_friction", "1",
+       "/joints/0/friction: missing, expected a number >= 0 with kinetic_friction"},
+      {"/joints/0/stribeck_speed", "1",
+       "/joints/0/kinetic_friction: missing, expected a number >= 0 with stribeck_speed"},
       {"/joints/0/stiffness", "-2", "/joints/0/stiffness: expected a number >= 0, got -2"},
       {"/joints/0/rest_angle", "0.1",
        "/joints/0/stiffness: missing, expected a number >= 0 with rest_angle"},
@@ -212,12 +216,12 @@ TEST(BadSceneTest, Joints) {
        "/joints/0/type: missing, expected one of revolute, prismatic, weld, distance, fixed_angle"},
       {"/joints/0/displacement", "0",
        "/joints/0/displacement: unknown key of a revolute joint, expected one of name, type, "
-       "bodies, contact, anchor, angle, rate, damping, friction, limits, effort, stiffness, "
-       "rest_angle, got \"displacement\""},
+       "bodies, contact, anchor, angle, rate, damping, friction, limits, effort, "
+       "kinetic_friction, stribeck_speed, stiffness, rest_angle, got \"displacement\""},
       {"/joints/1/angle", "0",
        "/joints/1/angle: unknown key of a prismatic joint, expected one of name, type, bodies, "
-       "contact, anchor, axis, displacement, rate, damping, friction, limits, effort, stiffness, "
-       "rest_displacement, got \"angle\""},
+       "contact, anchor, axis, displacement, rate, damping, friction, limits, effort, "
+       "kinetic_friction, stribeck_speed, stiffness, rest_displacement, got \"angle\""},
       {"/joints/2/damping", "0",
        "/joints/2/damping: unknown key of a weld joint, expected one of name, type, bodies, "
        "contact, anchor, got \"damping\""},

@@ -68,6 +68,19 @@ TEST(SceneToJsonTest, RoundTripBitForBit) {
   EXPECT_EQ(SceneToJson(back), SceneToJson(scene));
 }
 
+TEST(SceneToJsonTest, FrictionInJointsReadsBack) {
+  const std::string text =
+      R"({"bodies": [{"name": "b", "mass": 1, "inertia": 1, "position": [0, 0]}],
+      "joints": [{"name": "h", "type": "revolute", "bodies": ["b", "world"], "anchor": [0, 0],
+                  "friction": 2, "kinetic_friction": 0.5, "stribeck_speed": 5e-324}]})";
+  Scene scene = Parsed(text);
+  Scene back = Parsed(SceneToJson(scene));
+  EXPECT_EQ(back.joints[0].friction, 2.0);
+  EXPECT_EQ(back.joints[0].kinetic_friction, 0.5);
+  EXPECT_EQ(back.joints[0].stribeck_speed, 5e-324);
+  EXPECT_EQ(Bits(&scene), Bits(&back));
+}
+
 TEST(SceneToJsonTest, EllipsesAndContactPointsReadBack) {
   const std::string text =
       R"({"bodies": [{"name": "foot", "shape": {"ellipse": {"radii": [0.1, 0.3]}},

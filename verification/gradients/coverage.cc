@@ -66,6 +66,7 @@ void CoverForces(const Scene& scene, Coverage* coverage) {
     cover(joint.damping > 0.0, "damping of a joint");
     cover(joint.stiffness.has_value(), "spring of a joint");
     cover(joint.friction.has_value(), "friction in a joint");
+    cover(joint.kinetic_friction.has_value(), "friction that decays");
   }
   cover(!scene.springs.empty(), "spring");
   cover(scene.gravity.isZero(), "no gravity");
@@ -159,6 +160,7 @@ std::vector<std::string> ExpectedCoverage() {
                            "damping of a body",
                            "spring of a joint",
                            "friction in a joint",
+                           "friction that decays",
                            "point fixed in a body",
                            "drag of a body",
                            "spring",

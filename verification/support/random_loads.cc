@@ -162,6 +162,10 @@ void SceneMaker::Mechanisms() {
         joint.type == JointType::kRevolute || joint.type == JointType::kPrismatic;
     if (has_coordinate && random.Chance(0.5)) {
       joint.friction = random.Chance(0.1) ? 0.0 : std::pow(10.0, random.Uniform(-2.0, 1.0));
+      if (options_.stepping == Stepping::kEvent && random.Chance(0.5)) {
+        joint.kinetic_friction = *joint.friction * random.Uniform(0.2, 1.1);
+        joint.stribeck_speed = std::pow(10.0, random.Uniform(-1.0, 1.0));
+      }
     }
   }
 }

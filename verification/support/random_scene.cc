@@ -272,19 +272,6 @@ void SceneMaker::Obstacles() {
 
 }  // namespace internal
 
-std::vector<Stepping> AvailableSteppings() {
-  std::vector<Stepping> available;
-  for (const auto& [name, stepping] : kSteppingNames) {
-    SimulationSettings settings;
-    settings.stepping = stepping;
-    std::string error;
-    if (CheckSettings(settings, &error)) {
-      available.push_back(stepping);
-    }
-  }
-  return available;
-}
-
 Scene RandomScene(unsigned seed, const RandomSceneOptions& options) {
   return internal::SceneMaker(seed, options).Make();
 }

@@ -37,9 +37,6 @@ struct RandomSceneOptions {
   Stepping stepping = Stepping::kFixed;
 };
 
-/// The ways to step that the engine has (simulation/settings.h).
-std::vector<Stepping> AvailableSteppings();
-
 /// A valid scene. Bodies are apart or touch at their start, except for those meant to start in
 /// penetration; loops of joints are consistent; the edges of force windows do not coincide with the
 /// ends of steps.

@@ -39,7 +39,7 @@ std::string Sample(const Scene& scene, int samples, SampledRun* run) {
 SampledRun RunSampled(const Scene& scene, const std::vector<ParameterPath>& parameters,
                       GradientMethod method, const SampleOptions& options) {
   SampledRun run;
-  if (!CheckSettings(scene.simulation, &run.message)) return run;
+  if (!CheckSettings(scene, &run.message)) return run;
   run.message = Sample(scene, options.samples, &run);
   if (!run.done()) return run;
   GradientOptions gradient;

@@ -75,12 +75,13 @@ std::string Number(double value) {
   return text;
 }
 
-// Adds the settings, or says why not.
-void Add(const SimulationSettings& settings, Sweep* sweep) {
+// Adds the scene's settings, or says why not.
+void Add(const Scene& scene, Sweep* sweep) {
+  const SimulationSettings& settings = scene.simulation;
   std::string why;
   if (settings.stepping == Stepping::kEvent && settings.smoothing > 0.0) {
     AddOnce("event stepping with smoothing: its impacts are solved exactly", &sweep->left_out);
-  } else if (!CheckSettings(settings, &why)) {
+  } else if (!CheckSettings(scene, &why)) {
     AddOnce(NameOf(settings.stepping, kSteppingNames) + " stepping with " +
                 NameOf(IntegratorOf(settings), kIntegratorNames) + ": " + why,
             &sweep->left_out);
@@ -97,6 +98,7 @@ Sweep MakeSweep(const Scene& scene, SweepKind kind) {
   const SimulationSettings& own = scene.simulation;
   const bool touches = MayTouch(*BuildStructure(scene));
   Sweep sweep;
+  Scene with = scene;
   for (const auto& stepping : kSteppingNames) {
     for (const auto& integrator : kIntegratorNames) {
       for (const auto& correction : kJointCorrectionNames) {
@@ -105,14 +107,14 @@ Sweep MakeSweep(const Scene& scene, SweepKind kind) {
         const std::vector<Solving> solvings = SolvingsOf(own, touches, kind);
         for (size_t i = 0; i < solvings.size(); ++i) {
           if (i > 0 && !own_correction && kind == SweepKind::kStar) continue;
-          SimulationSettings settings = own;
+          SimulationSettings& settings = with.simulation;
           settings.stepping = stepping.second;
           settings.integrator = integrator.second;
           settings.joint_correction = correction.second;
           settings.solver = solvings[i].solver;
           settings.lcp_tolerance = solvings[i].tolerance;
           settings.smoothing = solvings[i].smoothing;
-          Add(settings, &sweep);
+          Add(with, &sweep);
         }
       }
     }

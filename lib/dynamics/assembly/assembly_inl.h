@@ -92,6 +92,7 @@ class ProblemBuilder {
     for (size_t j = 0; j < s_.joints.size(); ++j) {
       equations_.Joint(static_cast<int>(j));
       equations_.JointSpring(static_cast<int>(j));
+      equations_.JointFrictionDecay(static_cast<int>(j));
     }
   }
 
@@ -165,6 +166,10 @@ class ProblemBuilder {
       const T speed = RelativeSpeed(state_, a, row_a, b, row_b);
       Push(a, row_a, b, row_b, T(push - damping * speed));
     }
+  }
+
+  void Decay(int a, const RowPart<T>& row_a, int b, const RowPart<T>& row_b, const T numbers[3]) {
+    Push(a, row_a, b, row_b, FrictionDecay(numbers, RelativeSpeed(state_, a, row_a, b, row_b)));
   }
 
   void Joint(int j, const JointRows<T>& rows, const T rhs[3]) {

@@ -23,6 +23,7 @@
 //   Push(a, row_a, b, row_b, amount)          load += rowᵀ amount
 //   AddForce(body, value)                     the same of a force or impulse on one body
 //   Along(a, row_a, b, row_b, push, damping)  load += rowᵀ (push − damping · speed)
+//   Decay(a, row_a, b, row_b, numbers)        load += rowᵀ FrictionDecay(numbers, speed)
 //   Joint(j, rows, rhs)                       row · x = rhs − prescribed speed
 //   Contact(i, contact, rows, c_n, c_t)       n · x + c_n, t · x + c_t
 
@@ -123,13 +124,28 @@ class Equations {
     }
     b_.Begin();
     JointRows<T> rows;
-    T buffer[7];
-    EvaluateJoint<T>(joint.type, b_.PoseOf(joint.a), b_.PoseOf(joint.b),
-                     b_.Numbers(joint.geometry, joint.num_geometry, buffer), &rows);
+    EvaluateAtPoses(joint, &rows);
     T spring[2];
     const T* k = b_.Numbers(joint.stiffness, 2, spring);
     b_.Push(joint.a, rows.coordinate_a, joint.b, rows.coordinate_b,
             T(-Weight() * k[0] * (rows.coordinate - k[1])));
+  }
+
+  /// What the friction of a joint that slides is below that at rest. Steps of a fixed size do not
+  /// have it (settings.h).
+  void JointFrictionDecay(int j) {
+    if constexpr (kLevel == Level::kAcceleration) {
+      const JointIndex& joint = s_.joints[j];
+      if (!joint.has_decay) {
+        return;
+      }
+      b_.Begin();
+      JointRows<T> rows;
+      EvaluateAtPoses(joint, &rows);
+      T friction[3];
+      b_.Decay(joint.a, rows.coordinate_a, joint.b, rows.coordinate_b,
+               b_.Numbers(joint.friction, 3, friction));
+    }
   }
 
   /// Effort and damping along a joint's coordinate.
@@ -216,18 +232,23 @@ class Equations {
   }
 
   void EvaluateRows(const JointIndex& joint, JointRows<T>* rows, JointRates<T>* rates) {
-    T buffer[7];
     if constexpr (kLevel == Level::kAcceleration) {
+      T buffer[7];
       const MovingPose<T> a = b_.Moving(joint.a);
       const MovingPose<T> b = b_.Moving(joint.b);
       EvaluateJointRates(joint.type, a, b, b_.Numbers(joint.geometry, joint.num_geometry, buffer),
                          joint.num_geometry, rows, rates);
     } else {
-      const auto& a = b_.PoseOf(joint.a);
-      const auto& b = b_.PoseOf(joint.b);
-      EvaluateJoint<T>(joint.type, a, b, b_.Numbers(joint.geometry, joint.num_geometry, buffer),
-                       rows);
+      EvaluateAtPoses(joint, rows);
     }
+  }
+
+  void EvaluateAtPoses(const JointIndex& joint, JointRows<T>* rows) {
+    T buffer[7];
+    const auto& a = b_.PoseOf(joint.a);
+    const auto& b = b_.PoseOf(joint.b);
+    EvaluateJoint<T>(joint.type, a, b, b_.Numbers(joint.geometry, joint.num_geometry, buffer),
+                     rows);
   }
 
   void Limit(const ActiveContact& contact, ContactRows<T>* rows, ContactRates<T>* rates) {

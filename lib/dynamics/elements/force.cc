@@ -98,6 +98,7 @@ void ForceAt(const ModelStructure& structure, const ForceIndex& force, const T& 
   template T SignalAt<T>(const Signal&, const std::vector<double>&, const T&, double);             \
   template void ForceAt<T>(const ModelStructure&, const ForceIndex&, const T&, const T*, const T*, \
                            const T*, const T&, double, T[3]);                                      \
+  template T FrictionDecay<T>(const T[3], const T&);                                               \
   template void EvaluateSpring<T>(const Pose<T>&, const Pose<T>&, const T*, SpringRow<T>*);
 #define TANGIBLE_INSTANTIATE_JET(N) TANGIBLE_INSTANTIATE(Jet<N>)
 TANGIBLE_INSTANTIATE(double)

@@ -8,6 +8,10 @@
 //            exact
 //   spring   −h k (ℓ − L0) u on a's anchor, u = (p_a − p_b)/ℓ, at the poses of the step's start;
 //            its damping is implicit: a damper with the row of u and weight h c
+//   decay    of the friction F of a joint that slides at speed v (Armstrong-Hélouvry, Dupont,
+//            Canudas de Wit 1994, Automatica 30, eq. 5): the contact of its friction holds it, and
+//            slows it, with F (contact.h), of which this force takes off
+//            sgn v (F − F_kinetic) (1 − exp(−(v / v_Stribeck)²)), whose slope at v = 0 is 0
 
 #include "tangible/dynamics/elements/joint.h"
 
@@ -43,6 +47,11 @@ void ForceAt(const ModelStructure& structure, const ForceIndex& force, const T& 
 
 /// The mean effort (N m, N) of a joint's signal over a step.
 double MeanEffort(const ModelStructure& structure, const JointIndex& joint, double t, double h);
+
+/// By how much the friction of a joint that slides is below that at rest, with the sign of the speed
+/// (N, N m). `numbers` are the friction at rest, the kinetic friction and Stribeck's speed.
+template <typename T>
+T FrictionDecay(const T numbers[3], const T& speed);
 
 template <typename T>
 struct SpringRow {

@@ -76,6 +76,19 @@ void ForceImpulse(const ModelStructure& structure, const ForceIndex& force, doub
 }
 
 template <typename T>
+T FrictionDecay(const T numbers[3], const T& speed) {
+  using std::exp;
+  const T ratio = speed / numbers[2];
+  T decay = numbers[0] - numbers[1];
+  // exp(−700) = 1e-304, while the derivatives of a ratio that overflows are not finite.
+  constexpr double kVanished = 700.0;
+  if (ValueOf(ratio) * ValueOf(ratio) < kVanished) {
+    decay *= T(1.0) - exp(-ratio * ratio);
+  }
+  return ValueOf(speed) < 0.0 ? T(-decay) : decay;
+}
+
+template <typename T>
 void EvaluateSpring(const Pose<T>& pose_a, const Pose<T>& pose_b, const T* numbers,
                     SpringRow<T>* out) {
   using std::sqrt;

@@ -71,6 +71,7 @@ class EntryBuilder : private internal::LocalEntries<Sink> {
         equations_.Joint(j);
       }
       equations_.JointSpring(j);
+      equations_.JointFrictionDecay(j);
     }
     for (size_t i = 0; i < solved_.contacts->size(); ++i) {
       const ActiveContact& contact = (*solved_.contacts)[i];
@@ -147,13 +148,16 @@ class EntryBuilder : private internal::LocalEntries<Sink> {
              const LocalJet& push, const LocalJet& damping) {
     const LocalJet speed = RowTimes(damped_, a, row_a, b, row_b);
     EmitMomentum(locals_, a, row_a, b, row_b, damping * speed - push);
-    const auto by_twist = [&](int body, const RowPart<LocalJet>& part) {
-      for (int i = 0; i < 3 && SpeedsReadTwist(body); ++i) {
-        EmitRowTimesVariable(a, row_a, b, row_b, s_.TwistVariable(body, i), damping.a * part[i].a);
-      }
-    };
-    by_twist(a, row_a);
-    by_twist(b, row_b);
+    EmitByTwists(a, row_a, b, row_b, damping.a);
+  }
+
+  void Decay(int a, const RowPart<LocalJet>& row_a, int b, const RowPart<LocalJet>& row_b,
+             const LocalJet numbers[3]) {
+    const LocalJet speed = RowTimes(damped_, a, row_a, b, row_b);
+    EmitMomentum(locals_, a, row_a, b, row_b, -FrictionDecay(numbers, speed));
+    const LocalJet fixed[3] = {LocalJet(numbers[0].a), LocalJet(numbers[1].a),
+                               LocalJet(numbers[2].a)};
+    EmitByTwists(a, row_a, b, row_b, -FrictionDecay(fixed, LocalJet(speed.a, 0)).v[0]);
   }
 
   void Joint(int j, const JointRows<LocalJet>& rows, const LocalJet rhs[3]) {
@@ -237,6 +241,18 @@ class EntryBuilder : private internal::LocalEntries<Sink> {
     const Motion motion = s_.bodies[body].motion;
     return kLevel == Level::kAcceleration ? motion != Motion::kStatic
                                           : motion == Motion::kKinematic;
+  }
+
+  // Momentum rows += rowᵀ slope · row: the derivative of a force along a row by the speed along it.
+  void EmitByTwists(int a, const RowPart<LocalJet>& row_a, int b, const RowPart<LocalJet>& row_b,
+                    double slope) {
+    const auto by_twist = [&](int body, const RowPart<LocalJet>& part) {
+      for (int i = 0; i < 3 && SpeedsReadTwist(body); ++i) {
+        EmitRowTimesVariable(a, row_a, b, row_b, s_.TwistVariable(body, i), slope * part[i].a);
+      }
+    };
+    by_twist(a, row_a);
+    by_twist(b, row_b);
   }
 
   // A constraint row of velocities reads the twist of a body with prescribed motion.

@@ -105,7 +105,8 @@ void AddJoints(const BasicScene<T>& scene, Places* places, ModelStructure* struc
         index.high = places->Take(1);
       }
       index.stiffness = joint.stiffness ? places->Take(2) : -1;
-      index.friction = joint.friction ? places->Take(1) : -1;
+      index.has_decay = joint.friction && joint.kinetic_friction;
+      index.friction = joint.friction ? places->Take(index.has_decay ? 3 : 1) : -1;
     }
     if (joint.effort_signal) {
       index.effort_signal = static_cast<int>(structure->signals.size());
@@ -246,6 +247,10 @@ void FillJoints(const BasicScene<T>& scene, const State<T>& drawn, int world,
       }
       if (joint.friction) {
         numbers->push_back(*joint.friction);
+        if (joint.kinetic_friction) {
+          numbers->push_back(*joint.kinetic_friction);
+          numbers->push_back(joint.stribeck_speed);
+        }
       }
     }
   }

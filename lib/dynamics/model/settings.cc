@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tangible/dynamics/model/settings.h"
 
+#include <algorithm>
 #include <sstream>
 
 #include "tangible/scene/scene_names.h"
@@ -15,24 +16,36 @@ std::string NeedsEvents(const std::string& key, const std::string& have, const s
          " \"stepping\": \"event\"), got \"" + got + "\"";
 }
 
+std::string TextOf(double number) {
+  std::ostringstream text;
+  text << number;
+  return text.str();
+}
+
 }  // namespace
 
-bool CheckSettings(const SimulationSettings& settings, std::string* error) {
+bool CheckSettings(const Scene& scene, std::string* error) {
+  const SimulationSettings& settings = scene.simulation;
   const bool fixed = settings.stepping == Stepping::kFixed;
+  const auto decays = std::find_if(scene.joints.begin(), scene.joints.end(), [](const auto& joint) {
+    return joint.kinetic_friction.has_value();
+  });
   if (fixed && IntegratorOf(settings) != Integrator::kSemiImplicitEuler) {
     *error = NeedsEvents("integrator", "semi_implicit_euler", "others need",
                          NameOf(IntegratorOf(settings), kIntegratorNames));
   } else if (fixed && settings.impact_law != ImpactLaw::kNewton) {
     *error = NeedsEvents("impact_law", "newton", "other needs",
                          NameOf(settings.impact_law, kImpactLawNames));
+  } else if (fixed && decays != scene.joints.end()) {
+    *error = "/joints/" + std::to_string(decays - scene.joints.begin()) +
+             "/kinetic_friction: expected none with fixed stepping (friction that decays with the "
+             "speed needs \"stepping\": \"event\"), got " +
+             TextOf(*decays->kinetic_friction);
   } else if (!fixed && settings.smoothing != 0.0) {
-    std::ostringstream got;
-    got << settings.smoothing;
     *error =
         "/simulation/smoothing: expected 0 with event stepping (others need \"stepping\": "
-        "\"fixed\"), "
-        "got " +
-        got.str();
+        "\"fixed\"), got " +
+        TextOf(settings.smoothing);
   } else {
     return true;
   }

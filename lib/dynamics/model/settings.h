@@ -10,9 +10,9 @@
 
 namespace tangible {
 
-/// Whether the engine can run these settings; if not, `error` gets one line without the file's
-/// name: "/simulation/stepping: expected \"fixed\", got \"event\"".
-bool CheckSettings(const SimulationSettings& settings, std::string* error);
+/// Whether the engine can run a scene with its settings; if not, `error` gets one line without the
+/// file's name: "/simulation/stepping: expected \"fixed\", got \"event\"".
+bool CheckSettings(const Scene& scene, std::string* error);
 
 /// The contact solver's options that follow from a scene's settings.
 ContactSolverOptions SolverOptionsOf(const SimulationSettings& settings);

@@ -247,7 +247,7 @@ GradientResult Differentiate(const GradientProblem& problem, const GradientOptio
   result.outputs = OutputNames(*problem.structure);
   result.method = options.method;
   std::string error;
-  if (!CheckSettings(problem.scene.simulation, &error)) {
+  if (!CheckSettings(problem.scene, &error)) {
     result.message = (problem.scene.path.empty() ? "" : problem.scene.path + ": ") + error;
     return result;
   }

@@ -91,7 +91,7 @@ std::string RolloutFunction::Create(const Scene& scene, const std::vector<std::s
   *this = RolloutFunction();
   scene_ = scene;
   std::string error;
-  if (!CheckSettings(scene_.simulation, &error)) return error;
+  if (!CheckSettings(scene_, &error)) return error;
   structure_ = BuildStructure(scene_);
   outputs_ = OutputVariables(*structure_);
   for (const std::string& path : parameters) {

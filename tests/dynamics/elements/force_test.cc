@@ -119,6 +119,29 @@ TEST(ForceTest, SpringRowIsTheDerivativeOfItsLengthAndFiniteAtZero) {
   EXPECT_TRUE(row.row_a[0].v.allFinite());
 }
 
+// F_k + (F − F_k) e^{−(v/v_s)²} is what is left; the decay is odd, and smooth where the joint stands.
+TEST(ForceTest, FrictionDecaysWithTheSpeedEitherWay) {
+  const LocalJet numbers[3] = {LocalJet(2.0, 0), LocalJet(0.5, 1), LocalJet(0.3, 2)};
+  const LocalJet forward = FrictionDecay(numbers, LocalJet(0.6, 3));
+  const LocalJet back = FrictionDecay(numbers, LocalJet(-0.6, 3));
+  const double left = std::exp(-4.0);
+  EXPECT_NEAR(forward.a, 1.5 * (1.0 - left), 1e-15);
+  EXPECT_EQ(back.a, -forward.a);
+  const double by[4] = {1.0 - left, left - 1.0, -1.5 * left * 8.0 / 0.3, 1.5 * left * 4.0 / 0.3};
+  for (int i = 0; i < 4; ++i) {
+    EXPECT_NEAR(forward.v[i], by[i], 1e-14);
+    EXPECT_NEAR(back.v[i], i == 3 ? by[i] : -by[i], 1e-14);
+  }
+  const LocalJet still = FrictionDecay(numbers, LocalJet(0.0, 3));
+  EXPECT_EQ(still.a, 0.0);
+  EXPECT_EQ(still.v.cwiseAbs().maxCoeff(), 0.0);
+  const LocalJet at_once[3] = {LocalJet(2.0, 0), LocalJet(0.5, 1), LocalJet(5e-324, 2)};
+  const LocalJet gone = FrictionDecay(at_once, LocalJet(0.6, 3));
+  EXPECT_EQ(gone.a, 1.5);
+  EXPECT_EQ(gone.v[0], 1.0);
+  EXPECT_EQ(gone.v[2], 0.0);
+}
+
 TEST(SignalAtTest, KeepsThePieceThatWasChosen) {
   Signal signal;
   signal.time = {0.0, 1.0, 2.0};

@@ -8,51 +8,66 @@ namespace {
 
 TEST(CheckSettings, AcceptsTheDefaults) {
   std::string error;
-  EXPECT_TRUE(CheckSettings(SimulationSettings(), &error));
+  EXPECT_TRUE(CheckSettings(Scene(), &error));
   EXPECT_EQ(error, "");
 }
 
 TEST(CheckSettings, AcceptsEventSteppingWithEachIntegrator) {
   std::string error;
-  SimulationSettings settings;
+  Scene scene;
+  SimulationSettings& settings = scene.simulation;
   settings.stepping = Stepping::kEvent;
   for (const Integrator integrator :
        {Integrator::kSemiImplicitEuler, Integrator::kTrapezoidal, Integrator::kRungeKutta4}) {
     settings.integrator = integrator;
-    EXPECT_TRUE(CheckSettings(settings, &error)) << error;
+    EXPECT_TRUE(CheckSettings(scene, &error)) << error;
   }
 }
 
 TEST(CheckSettings, AcceptsBothImpactLawsWithEventStepping) {
   std::string error;
-  SimulationSettings settings;
+  Scene scene;
+  SimulationSettings& settings = scene.simulation;
   settings.stepping = Stepping::kEvent;
   for (const ImpactLaw law : {ImpactLaw::kNewton, ImpactLaw::kPoisson}) {
     settings.impact_law = law;
-    EXPECT_TRUE(CheckSettings(settings, &error)) << error;
+    EXPECT_TRUE(CheckSettings(scene, &error)) << error;
   }
 }
 
 TEST(CheckSettings, NamesWhatIsMissing) {
   std::string error;
-  SimulationSettings settings;
+  Scene scene;
+  SimulationSettings& settings = scene.simulation;
   settings.integrator = Integrator::kTrapezoidal;
-  EXPECT_FALSE(CheckSettings(settings, &error));
+  EXPECT_FALSE(CheckSettings(scene, &error));
   EXPECT_EQ(error.find("/simulation/integrator: "), 0u) << error;
   EXPECT_NE(error.find("\"stepping\": \"event\""), std::string::npos) << error;
   settings = SimulationSettings();
   settings.impact_law = ImpactLaw::kPoisson;
-  EXPECT_FALSE(CheckSettings(settings, &error));
+  EXPECT_FALSE(CheckSettings(scene, &error));
   EXPECT_EQ(error,
             "/simulation/impact_law: expected \"newton\" with fixed stepping (the other needs "
             "\"stepping\": \"event\"), got \"poisson\"");
   settings = SimulationSettings();
   settings.stepping = Stepping::kEvent;
   settings.smoothing = 1e-4;
-  EXPECT_FALSE(CheckSettings(settings, &error));
+  EXPECT_FALSE(CheckSettings(scene, &error));
   EXPECT_EQ(error,
             "/simulation/smoothing: expected 0 with event stepping (others need \"stepping\": "
             "\"fixed\"), got 0.0001");
+  settings = SimulationSettings();
+  BasicJoint<double> joint;
+  joint.friction = 2.0;
+  scene.joints = {joint, joint};
+  EXPECT_TRUE(CheckSettings(scene, &error));
+  scene.joints[1].kinetic_friction = 1.5;
+  EXPECT_FALSE(CheckSettings(scene, &error));
+  EXPECT_EQ(error,
+            "/joints/1/kinetic_friction: expected none with fixed stepping (friction that decays "
+            "with the speed needs \"stepping\": \"event\"), got 1.5");
+  settings.stepping = Stepping::kEvent;
+  EXPECT_TRUE(CheckSettings(scene, &error));
 }
 
 }  // namespace

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Drag, joint springs and dry friction in joints: motions and derivatives against closed forms, by
-// every method.
+// Drag, joint springs and dry friction in joints, Coulomb's and with Stribeck's decay: motions and
+// derivatives against closed forms, by every method.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -112,6 +112,104 @@ TEST(MechanismsTest, FrictionAtAHingeStopsAWheel) {
   // It stops after 2/3 s, within a step.
   Expect(wheel("event", 0.1, 1.5), paths, 2, stops, 1e-12);
   Expect(wheel("fixed", 0.001, 1.5), paths, 2, stops, 5e-3);
+}
+
+// The friction F(ω) = F_k + (F_s − F_k) exp(−(ω / ω_s)²) slows a wheel: the time
+//   t = I ∫ dω / F(ω)  over [ω_1, ω_0]
+// gives ω_1, found by Newton's method on Simpson's rule; at fixed t, with the same integral,
+//   ∂ω_1/∂ω_0 = F(ω_1) / F(ω_0),  ∂ω_1/∂p = −F(ω_1) ∫ (∂F/∂p) / F² dω,  ∂ω_1/∂I = −F(ω_1) t / I².
+struct DecayingFriction {
+  double at_rest = 1.5, kinetic = 0.4, speed = 1.2, inertia = 0.5;
+
+  double At(double omega) const {
+    return kinetic + (at_rest - kinetic) * std::exp(-std::pow(omega / speed, 2));
+  }
+  template <typename F>
+  static double Integral(double from, double to, const F& f) {
+    constexpr int kHalves = 2000;
+    const double h = (to - from) / (2 * kHalves);
+    double sum = f(from) + f(to);
+    for (int i = 1; i < 2 * kHalves; ++i) sum += (i % 2 == 1 ? 4.0 : 2.0) * f(from + i * h);
+    return sum * h / 3.0;
+  }
+  double After(double omega, double t) const {
+    double end = omega;
+    for (int k = 0; k < 50; ++k) {
+      const double took = inertia * Integral(end, omega, [&](double w) { return 1.0 / At(w); });
+      end += (took - t) * At(end) / inertia;
+    }
+    return end;
+  }
+  /// By the friction at rest, the kinetic friction, Stribeck's speed, the first speed, the inertia.
+  std::vector<double> Derivatives(double omega, double t) const {
+    const double end = After(omega, t);
+    const auto decayed = [&](double w) { return std::exp(-std::pow(w / speed, 2)); };
+    const auto by = [&](const auto& slope) {
+      return -At(end) *
+             Integral(end, omega, [&](double w) { return slope(w) / std::pow(At(w), 2); });
+    };
+    const double by_speed = by([&](double w) {
+      return (at_rest - kinetic) * decayed(w) * 2.0 * w * w / std::pow(speed, 3);
+    });
+    return {by(decayed), by([&](double w) { return 1.0 - decayed(w); }), by_speed,
+            At(end) / At(omega), At(end) * t / (inertia * inertia)};
+  }
+};
+
+// A wheel that slows by friction with Stribeck's decay, either way round, while it turns; and once
+// it stands, at the angle where it stopped.
+TEST(MechanismsTest, DecayingFrictionSlowsAWheel) {
+  const DecayingFriction friction;
+  const std::vector<std::string> paths = {"joints/h/friction", "joints/h/kinetic_friction",
+                                          "joints/h/stribeck_speed", "joints/h/rate",
+                                          "bodies/b/inertia"};
+  const auto wheel = [&](double rate) {
+    return SceneOf(R"({"gravity": [0, -9.81], "bodies": [
+      {"name": "b", "mass": 2, "inertia": 0.5, "position": [0, 0]}],
+    "joints": [{"name": "h", "type": "revolute", "bodies": ["b", "world"], "anchor": [0, 0],
+                "friction": 1.5, "kinetic_friction": 0.4, "stribeck_speed": 1.2, "rate": )" +
+                   std::to_string(rate) + "}], " + Simulation("event", 0.002));
+  };
+  Expected slows = {friction.After(3.0, 1.0), friction.Derivatives(3.0, 1.0)};
+  Expect(wheel(3.0), paths, 5, slows, 1e-10);
+  slows.value = -slows.value;
+  for (size_t k : {0, 1, 2, 4}) slows.derivatives[k] = -slows.derivatives[k];
+  Expect(wheel(-3.0), paths, 5, slows, 1e-10);
+  // θ = I ∫ ω dω / F(ω) over [0, ω_0], whose derivatives follow under the integral.
+  const auto stops_at = [&](const auto& slope) {
+    return DecayingFriction::Integral(0.0, 1.0, slope);
+  };
+  Expected stops;
+  stops.value = friction.inertia * stops_at([&](double w) { return w / friction.At(w); });
+  const auto by = [&](const auto& slope) {
+    return -friction.inertia *
+           stops_at([&](double w) { return w * slope(w) / std::pow(friction.At(w), 2); });
+  };
+  const auto decayed = [](double w) { return std::exp(-std::pow(w / 1.2, 2)); };
+  stops.derivatives = {by(decayed), by([&](double w) { return 1.0 - decayed(w); }),
+                       by([&](double w) { return 1.1 * decayed(w) * 2.0 * w * w / 1.728; }),
+                       0.5 / friction.At(1.0), stops.value / 0.5};
+  Expect(wheel(1.0), paths, 2, stops, 1e-9);
+}
+
+// A slider pulled along by a spring whose far end moves: it sticks, breaks loose at the friction at
+// rest, and sticks again below it, several times (stick-slip), and the methods agree.
+TEST(MechanismsTest, DecayingFrictionSticksAndSlips) {
+  const Scene scene = SceneOf(R"({"gravity": [0, -9.81], "bodies": [
+      {"name": "b", "mass": 1, "inertia": 0.1, "position": [0, 0]},
+      {"name": "hand", "kinematic": true, "position": [1, 0], "velocity": [0.5, 0]}],
+    "joints": [{"name": "s", "type": "prismatic", "bodies": ["b", "world"], "anchor": [0, 0],
+                "axis": [1, 0.2], "friction": 5, "kinetic_friction": 2, "stribeck_speed": 0.3}],
+    "springs": [{"name": "pull", "bodies": ["hand", "b"], "anchors": [[1, 0], [0, 0]],
+                 "stiffness": 40, "rest_length": 1}],
+    "simulation": {"duration": 2, "dt": 0.005, "stepping": "event"}})");
+  const std::vector<std::string> paths = {"joints/s/friction",       "joints/s/kinetic_friction",
+                                          "joints/s/stribeck_speed", "springs/pull/stiffness",
+                                          "joints/s/axis/y",         "bodies/b/mass",
+                                          "bodies/hand/velocity/x"};
+  const GradientResult result = Jacobian(scene, paths, GradientMethod::kAdjoint);
+  EXPECT_EQ(result.certificate.verdict, "trustworthy");
+  testing::ExpectOthersAgree(scene, paths, result);
 }
 
 // A force below the limit moves nothing, to the bit, and no parameter changes that; once it exceeds

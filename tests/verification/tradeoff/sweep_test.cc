@@ -24,7 +24,9 @@ TEST(SweepTest, TriesAllThatTheEngineHasOnceAndSaysWhatItHasNot) {
     std::set<double> smoothings;
     std::string error;
     for (const SimulationSettings& settings : sweep.settings) {
-      EXPECT_TRUE(CheckSettings(settings, &error)) << error;
+      Scene with = scene;
+      with.simulation = settings;
+      EXPECT_TRUE(CheckSettings(with, &error)) << error;
       EXPECT_TRUE(names.insert(NameOf(settings, scene.simulation)).second);
       smoothings.insert(settings.smoothing);
       EXPECT_EQ(settings.duration, scene.simulation.duration);
