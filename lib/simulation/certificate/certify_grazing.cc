@@ -52,7 +52,8 @@ class GrazeFinder {
       : model_(model), search_(model), most_(most), grazes_(*grazes) {}
 
   void Add(const Segment& segment) {
-    if (segment.event == EventKind::kTouch && segment.event_contact.joint < 0) {
+    if (segment.event == EventKind::kTouch && segment.event_contact.joint < 0 &&
+        !TakesOver(segment)) {
       AddTouch(segment);
     }
     const double reach = segment.length * FastestApproach(segment);
@@ -81,6 +82,25 @@ class GrazeFinder {
       }
     }
     return 2.0 * fastest;
+  }
+
+  // Whether the touch is that of a feature at the point where another one of the same shapes has
+  // touched until now, as the corner at the end of a face: nothing new touches, and its speed is 0.
+  // Its gap is within the tolerance of the touch where the points of both are √(2 size tolerance)
+  // apart along a curve.
+  bool TakesOver(const Segment& segment) const {
+    const ActiveContact& next = segment.event_contact;
+    const double same = std::sqrt(2.0 * search_.lengths().Size(next.a, next.b) *
+                                  search_.TouchTolerance(model_, segment.after, next));
+    const auto point = [&](const ActiveContact& contact) {
+      ContactRows<double> rows;
+      EvaluateContactRows(model_, segment.after, contact, &rows);
+      return rows.geometry.point;
+    };
+    return std::any_of(
+        segment.contacts.begin(), segment.contacts.end(), [&](const ActiveContact& closed) {
+          return next.IsOfTheSameShapes(closed) && (point(closed) - point(next)).norm() <= same;
+        });
   }
 
   void AddTouch(const Segment& segment) {

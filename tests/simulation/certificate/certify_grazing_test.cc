@@ -47,6 +47,23 @@ TEST(CertifyGrazingTest, AThrowThatJustReachesTheCeilingIsNearAKink) {
   }
 }
 
+// A disc that slides off a table: the corner at the end of the face takes over from the face, at no
+// approach speed, within a step. Nothing new touches, and the derivative has no kink there.
+TEST(CertifyGrazingTest, TheCornerAtTheEndOfAFaceDoesNotGraze) {
+  for (const double speed : {0.4, 0.7, 1.3}) {
+    Scene scene = test_scenes::SceneOf(R"({"gravity": [0, -9.81], "bodies": [
+        {"name": "disc", "shape": {"circle": {"radius": 0.1}}, "mass": 1, "position": [0.2, 0.6],
+         "friction": 0},
+        {"name": "table", "static": true, "shape": {"box": {"size": [1, 1]}}, "position": [0, 0]}],
+      "simulation": {"dt": 0.01, "duration": 1, "stepping": "event"}})");
+    scene.bodies[0].velocity.x() = speed;
+    Model<double> model;
+    State<double> initial;
+    BuildModel(scene, &model, &initial);
+    EXPECT_EQ(CertifyRollout(model, initial).verdict, "trustworthy") << speed;
+  }
+}
+
 TEST(CertifyGrazingTest, MarginsAreThoseOfTheHeight) {
   Model<double> model;
   State<double> before;
