@@ -296,15 +296,10 @@ std::string View(const BreakoutStudyOptions& options, const BreakoutResults& res
 }
 
 std::string CheckFlags(BreakoutStudyOptions* options) {
-  if (FLAGS_games < 1 || FLAGS_games > 10000) {
-    return "--games: expected a number from 1 to 10000, got " + std::to_string(FLAGS_games);
-  }
-  for (const auto& [name, value] :
-       {std::pair<const char*, int>{"--seed", FLAGS_seed}, {"--threads", FLAGS_threads}}) {
-    if (value < 0) {
-      return std::string(name) + ": expected a number >= 0, got " + std::to_string(value);
-    }
-  }
+  const std::string outside = FirstOutside({{"--games", FLAGS_games, 1, 10000},
+                                            {"--seed", FLAGS_seed, 0},
+                                            {"--threads", FLAGS_threads, 0, kMostThreads}});
+  if (!outside.empty()) return outside;
   if (!(FLAGS_sticky >= 0.0 && FLAGS_sticky < 1.0)) {
     return "--sticky: expected a number >= 0 and < 1, got " + FormatNumber(FLAGS_sticky);
   }

@@ -291,15 +291,12 @@ std::string CheckFlags(CartPoleStudyOptions* options) {
     return "--plant: expected equations or mujoco, got " + FLAGS_plant;
   }
   options->plant = FLAGS_plant == "mujoco" ? PlantKind::kMujoco : PlantKind::kEquations;
-  if (FLAGS_seeds < 1) return "--seeds: expected a number >= 1, got " + std::to_string(FLAGS_seeds);
-  for (const auto& [name, value] : {std::pair<const char*, int>{"--coverage", FLAGS_coverage},
-                                    {"--swing_ups", FLAGS_swing_ups},
-                                    {"--seed", FLAGS_seed},
-                                    {"--threads", FLAGS_threads}}) {
-    if (value < 0) {
-      return std::string(name) + ": expected a number >= 0, got " + std::to_string(value);
-    }
-  }
+  const std::string outside = FirstOutside({{"--seeds", FLAGS_seeds, 1},
+                                            {"--coverage", FLAGS_coverage, 0},
+                                            {"--swing_ups", FLAGS_swing_ups, 0},
+                                            {"--seed", FLAGS_seed, 0},
+                                            {"--threads", FLAGS_threads, 0, kMostThreads}});
+  if (!outside.empty()) return outside;
   const std::vector<int> samples = WholeNumbersAtCommas(FLAGS_samples, 20, 100000);
   if (samples.empty() ||
       std::adjacent_find(samples.begin(), samples.end(), std::greater_equal<>()) != samples.end()) {

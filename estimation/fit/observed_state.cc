@@ -10,6 +10,7 @@
 #include <string>
 #include <utility>
 
+#include "tangible/dynamics/elements/contact.h"
 #include "tangible/dynamics/elements/joint.h"
 #include "tangible/estimation/fit/minimise.h"
 #include "tangible/estimation/fit/tolerances.h"
@@ -194,11 +195,8 @@ class StateProblem : public LeastSquaresProblem {
       EvaluateJoint(joint.type, state.PoseOf(joint.a), state.PoseOf(joint.b),
                     &model_.parameters[joint.geometry], &equations);
       for (int k = 0; k < equations.rows; ++k) {
-        double rate = 0.0;
-        for (int j = 0; j < 3; ++j) {
-          rate += equations.row_a[k][j] * state.twist[3 * joint.a + j] +
-                  equations.row_b[k][j] * state.twist[3 * joint.b + j];
-        }
+        const double rate =
+            RelativeSpeed(state, joint.a, equations.row_a[k], joint.b, equations.row_b[k]);
         (*rows)[*row + 2 * k] = weight_ / smallest_ * equations.error[k];
         (*rows)[*row + 2 * k + 1] = weight_ / smallest_ * rate;
       }

@@ -9,6 +9,7 @@
 #include <array>
 #include <cerrno>
 #include <charconv>
+#include <cmath>
 #include <csignal>
 #include <cstdio>
 #include <cstring>
@@ -362,6 +363,19 @@ std::vector<int> WholeNumbersAtCommas(const std::string& text, int least, int mo
     numbers.push_back(number);
   }
   return numbers;
+}
+
+std::string FirstOutside(std::initializer_list<FlagRange> flags) {
+  for (const FlagRange& flag : flags) {
+    if (std::isfinite(flag.value) && flag.value >= flag.least && flag.value <= flag.most) continue;
+    std::array<char, 80> expected{};
+    std::snprintf(expected.data(), expected.size(),
+                  std::isfinite(flag.most) ? "from %.15g to %.15g" : ">= %.15g", flag.least,
+                  flag.most);
+    return std::string(flag.flag) + ": expected a number " + expected.data() + ", got " +
+           FormatNumber(flag.value);
+  }
+  return "";
 }
 
 bool PrintBound(bool holds, const std::string& what) {

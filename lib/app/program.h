@@ -19,6 +19,8 @@
 //   int main(int argc, char** argv) { return tangible::RunMain(&Main, argc, argv); }
 
 #include <functional>
+#include <initializer_list>
+#include <limits>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -68,6 +70,21 @@ int ReportError(std::string_view message, int exit_status = kExitFailed);
 std::vector<std::string> SplitAtCommas(const std::string& text);
 /// The same for whole numbers from `least` to `most`; empty where a value is none.
 std::vector<int> WholeNumbersAtCommas(const std::string& text, int least, int most);
+
+/// A flag "--name" with its value and the range that it may have.
+struct FlagRange {
+  template <typename Number>
+  FlagRange(const char* flag_, Number value_, double least_,
+            double most_ = std::numeric_limits<double>::infinity())
+      : flag(flag_), value(static_cast<double>(value_)), least(least_), most(most_) {}
+  const char* flag;
+  double value, least, most;
+};
+/// The first of several flags whose value is not finite or outside its range, as one line: "--games:
+/// expected a number from 1 to 100, got 0", or "... a number >= 1, got 0"; empty if none is.
+std::string FirstOutside(std::initializer_list<FlagRange> flags);
+/// The most threads that a program starts.
+inline constexpr int kMostThreads = 256;
 
 /// Prints "what: holds" or "what: DOES NOT HOLD" on stdout at once; returns `holds`.
 bool PrintBound(bool holds, const std::string& what);

@@ -38,9 +38,8 @@ namespace tangible {
 namespace {
 
 std::string CheckFlags() {
-  if (!(FLAGS_budget_ms >= 0.0 && std::isfinite(FLAGS_budget_ms))) {
-    return "--budget_ms: expected a number >= 0, got " + FormatNumber(FLAGS_budget_ms);
-  }
+  const std::string outside = FirstOutside({{"--budget_ms", FLAGS_budget_ms, 0}});
+  if (!outside.empty()) return outside;
   if (!FLAGS_mpc && !FLAGS_plant.empty()) return "--plant: needs --mpc";
   if (!FLAGS_mpc && FLAGS_budget_ms > 0.0) return "--budget_ms: needs --mpc";
   return "";

@@ -76,13 +76,8 @@ std::string CheckFlags(GradientOptions* options) {
       options->method != GradientMethod::kAuto) {
     return "--side: expected --method=tangent or auto with it, got '" + FLAGS_method + "'";
   }
-  if (!(FLAGS_step >= 0.0 && std::isfinite(FLAGS_step))) {
-    return "--step: expected a number >= 0, got " + FormatNumber(FLAGS_step);
-  }
-  if (FLAGS_repeat < 1) {
-    return "--repeat: expected a number >= 1, got " + std::to_string(FLAGS_repeat);
-  }
-  std::string wrong;
+  std::string wrong = FirstOutside({{"--step", FLAGS_step, 0}, {"--repeat", FLAGS_repeat, 1}});
+  if (!wrong.empty()) return wrong;
   if (!ParseCheckpointing(FLAGS_checkpoint, &options->checkpointing, &wrong)) {
     return "--checkpoint: " + wrong;
   }

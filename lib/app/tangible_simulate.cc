@@ -48,16 +48,10 @@ double WallSeconds() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
-constexpr int kMostThreads = 256;
-
 bool IsDefault(const char* flag) { return gflags::GetCommandLineFlagInfoOrDie(flag).is_default; }
 
 // The same for the flags of batches.
 std::string CheckBatchFlags() {
-  if (FLAGS_threads < 0 || FLAGS_threads > kMostThreads) {
-    return "--threads: expected a number from 0 to " + std::to_string(kMostThreads) + ", got " +
-           std::to_string(FLAGS_threads);
-  }
   if (FLAGS_batch.empty()) return "";
   for (const char* name :
        {"every", "contacts", "initial", "view", "summary", "certify", "observe"}) {
@@ -71,15 +65,11 @@ constexpr double kMaxNoise = 1e150;
 
 // Empty, or one line about a flag's value.
 std::string CheckFlags() {
-  if (FLAGS_every < 1) {
-    return "--every: expected a number >= 1, got " + std::to_string(FLAGS_every);
-  }
-  if (!(FLAGS_noise >= 0.0 && FLAGS_noise <= kMaxNoise)) {
-    return "--noise: expected a number from 0 to 1e150, got " + FormatNumber(FLAGS_noise);
-  }
-  if (!(FLAGS_rate >= 0.0 && std::isfinite(FLAGS_rate))) {
-    return "--rate: expected a number >= 0, got " + FormatNumber(FLAGS_rate);
-  }
+  const std::string outside = FirstOutside({{"--every", FLAGS_every, 1},
+                                            {"--noise", FLAGS_noise, 0, kMaxNoise},
+                                            {"--rate", FLAGS_rate, 0},
+                                            {"--threads", FLAGS_threads, 0, kMostThreads}});
+  if (!outside.empty()) return outside;
   if (FLAGS_certify && FLAGS_summary.empty()) {
     return "--certify: needs --summary";
   }

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <bit>
+#include <cmath>
 #include <cstdint>
 #include <cstdio>
 #include <limits>
@@ -47,6 +48,19 @@ TEST(WholeNumbersAtCommasTest, AreAllOrNone) {
                            "99999999999999999999"}) {
     EXPECT_EQ(WholeNumbersAtCommas(text, 20, 25), Numbers{}) << text;
   }
+}
+
+TEST(FirstOutsideTest, NamesTheFirstFlagThatIsOutsideItsRange) {
+  EXPECT_EQ(FirstOutside({{"--a", 1, 1, 1}, {"--b", 0.5, 0}}), "");
+  EXPECT_EQ(FirstOutside({{"--a", 1, 1, 2}, {"--b", -1, 0}, {"--c", 9, 0, 1}}),
+            "--b: expected a number >= 0, got -1");
+  EXPECT_EQ(FirstOutside({{"--c", 257, 0, 256}}), "--c: expected a number from 0 to 256, got 257");
+  EXPECT_EQ(FirstOutside({{"--c", -2, 0, 1e150}}),
+            "--c: expected a number from 0 to 1e+150, got -2");
+  const double infinite = std::numeric_limits<double>::infinity();
+  EXPECT_EQ(FirstOutside({{"--d", infinite, 0}}), "--d: expected a number >= 0, got inf");
+  EXPECT_EQ(FirstOutside({{"--d", std::nan(""), 0, 1}}),
+            "--d: expected a number from 0 to 1, got nan");
 }
 
 }  // namespace

@@ -26,21 +26,12 @@ namespace tangible {
 namespace {
 
 constexpr int kMostProblems = 100000;
-constexpr int kMostThreads = 256;
 
 std::string CheckFlags() {
-  const auto outside = [](const char* flag, int value, int low, int high) -> std::string {
-    if (value >= low && value <= high) return "";
-    return std::string(flag) + ": expected a number from " + std::to_string(low) + " to " +
-           std::to_string(high) + ", got " + std::to_string(value);
-  };
-  for (const std::string& wrong : {outside("--problems", FLAGS_problems, 1, kMostProblems),
-                                   outside("--seed", FLAGS_seed, 0, 2147483647),
-                                   outside("--iterations", FLAGS_iterations, 1, kMostProblems),
-                                   outside("--threads", FLAGS_threads, 0, kMostThreads)}) {
-    if (!wrong.empty()) return wrong;
-  }
-  return "";
+  return FirstOutside({{"--problems", FLAGS_problems, 1, kMostProblems},
+                       {"--seed", FLAGS_seed, 0},
+                       {"--iterations", FLAGS_iterations, 1, kMostProblems},
+                       {"--threads", FLAGS_threads, 0, kMostThreads}});
 }
 
 // Of one method over all problems.

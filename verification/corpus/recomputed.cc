@@ -41,20 +41,9 @@ class Balance {
       left[i] = momentum - carried;
       terms[i] = std::abs(momentum) + std::abs(carried);
     }
-    for (size_t j = 0; j < problem.joints.size(); ++j) {
-      const JointBlock<double>& joint = problem.joints[j];
-      for (int r = 0; r < joint.rows; ++r) {
-        Push(joint.a, joint.row_a[r], x.joint_impulse[3 * j + r]);
-        Push(joint.b, joint.row_b[r], x.joint_impulse[3 * j + r]);
-      }
-    }
-    for (size_t i = 0; i < problem.contacts.size(); ++i) {
-      const ContactBlock<double>& c = problem.contacts[i];
-      Push(c.a, c.normal_a, x.normal_impulse[i]);
-      Push(c.b, c.normal_b, x.normal_impulse[i]);
-      Push(c.a, c.tangent_a, x.tangent_impulse[i]);
-      Push(c.b, c.tangent_b, x.tangent_impulse[i]);
-    }
+    ForEachImpulse(problem, x, [&](int body, const RowPart<double>& row, double impulse) {
+      Push(body, row, impulse);
+    });
   }
 
   Vector left, terms;

@@ -27,25 +27,19 @@ DEFINE_string(out, "", "file of all figures (JSON)");
 namespace tangible {
 namespace {
 
-constexpr int kMostThreads = 256;
 constexpr int kMostRandom = 1000000;
 constexpr int kMostContacts = 1000;
 
 // Empty, or one line about a flag's value.
 std::string CheckFlags() {
-  const auto outside = [](const char* flag, int value, int low, int high) -> std::string {
-    if (value >= low && value <= high) return "";
-    return std::string("--") + flag + ": expected a number from " + std::to_string(low) + " to " +
-           std::to_string(high) + ", got " + std::to_string(value);
-  };
-  for (const std::string& wrong :
-       {outside("random", FLAGS_random, 0, kMostRandom), outside("seed", FLAGS_seed, 0, 2147483647),
-        outside("first", FLAGS_first, 0, 2147483647 - kMostRandom),
-        outside("contacts", FLAGS_contacts, 1, kMostContacts),
-        outside("dense_contacts", FLAGS_dense_contacts, 0, kMostContacts),
-        outside("threads", FLAGS_threads, 0, kMostThreads)}) {
-    if (!wrong.empty()) return wrong;
-  }
+  const std::string outside =
+      FirstOutside({{"--random", FLAGS_random, 0, kMostRandom},
+                    {"--seed", FLAGS_seed, 0},
+                    {"--first", FLAGS_first, 0, 2147483647.0 - kMostRandom},
+                    {"--contacts", FLAGS_contacts, 1, kMostContacts},
+                    {"--dense_contacts", FLAGS_dense_contacts, 0, kMostContacts},
+                    {"--threads", FLAGS_threads, 0, kMostThreads}});
+  if (!outside.empty()) return outside;
   if (FLAGS_random == 0 && FLAGS_problems.empty()) {
     return "--random: expected a number > 0 where there are no --problems, got 0";
   }

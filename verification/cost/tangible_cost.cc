@@ -88,10 +88,8 @@ std::string CheckFlags(CostOptions* options, CostBounds* bounds) {
   if (!ReadList<long>(FLAGS_steps, kMostSteps, &options->steps)) {
     return expected("--steps", kMostSteps, FLAGS_steps);
   }
-  if (FLAGS_long_run < 1 || FLAGS_long_run > kMostSteps) {
-    return "--long_run: expected a number from 1 to " + std::to_string(kMostSteps) + ", got " +
-           std::to_string(FLAGS_long_run);
-  }
+  const std::string outside = FirstOutside({{"--long_run", FLAGS_long_run, 1, kMostSteps}});
+  if (!outside.empty()) return outside;
   const std::pair<const char*, double> positive[] = {
       {"--budget_seconds", FLAGS_budget_seconds}, {"--budget_mib", FLAGS_budget_mib},
       {"--repeat_seconds", FLAGS_repeat_seconds}, {"--adjoint_bound", FLAGS_adjoint_bound},

@@ -30,8 +30,6 @@ namespace {
 using extremes::CaseResult;
 using extremes::ExtremeCase;
 
-constexpr int kMostThreads = 256;
-
 // The groups' names, each once, separated by commas.
 std::string GroupNames(const std::vector<ExtremeCase>& cases) {
   std::string names, last;
@@ -45,10 +43,8 @@ std::string GroupNames(const std::vector<ExtremeCase>& cases) {
 
 // Empty, or one line about a flag's value.
 std::string ChooseCases(std::vector<ExtremeCase>* cases) {
-  if (FLAGS_threads < 0 || FLAGS_threads > kMostThreads) {
-    return "--threads: expected a number from 0 to " + std::to_string(kMostThreads) + ", got " +
-           std::to_string(FLAGS_threads);
-  }
+  const std::string outside = FirstOutside({{"--threads", FLAGS_threads, 0, kMostThreads}});
+  if (!outside.empty()) return outside;
   if (!FLAGS_stepping.empty() && FLAGS_stepping != "fixed" && FLAGS_stepping != "event") {
     return "--stepping: expected fixed or event, got '" + FLAGS_stepping + "'";
   }

@@ -40,7 +40,6 @@ DEFINE_string(report, "", "file of a report for people (HTML)");
 namespace tangible {
 namespace {
 
-constexpr int kMostThreads = 256;
 constexpr int kMostRandom = 1000000;
 constexpr int kDefaultRandom = 100;
 constexpr int kDefaultStarts = 10;
@@ -60,21 +59,13 @@ std::vector<Stepping> Steppings(std::string* error) {
 
 // Empty, or one line about a flag's value.
 std::string CheckFlags(const std::vector<std::string>& files) {
-  if (FLAGS_random < -1 || FLAGS_random > kMostRandom) {
-    return "--random: expected a number from 0 to " + std::to_string(kMostRandom) + ", got " +
-           std::to_string(FLAGS_random);
-  }
-  if (FLAGS_starts < -1 || FLAGS_starts > kMostRandom) {
-    return "--starts: expected a number from 0 to " + std::to_string(kMostRandom) + ", got " +
-           std::to_string(FLAGS_starts);
-  }
-  if (FLAGS_seed < 0) {
-    return "--seed: expected a number >= 0, got " + std::to_string(FLAGS_seed);
-  }
-  if (FLAGS_threads < 0 || FLAGS_threads > kMostThreads) {
-    return "--threads: expected a number from 0 to " + std::to_string(kMostThreads) + ", got " +
-           std::to_string(FLAGS_threads);
-  }
+  // Of −1, the default, the numbers follow below.
+  const std::string outside =
+      FirstOutside({{"--random", FLAGS_random == -1 ? 0.0 : FLAGS_random, 0, kMostRandom},
+                    {"--starts", FLAGS_starts == -1 ? 0.0 : FLAGS_starts, 0, kMostRandom},
+                    {"--seed", FLAGS_seed, 0},
+                    {"--threads", FLAGS_threads, 0, kMostThreads}});
+  if (!outside.empty()) return outside;
   if (!FLAGS_parameters.empty() && files.empty()) {
     return "--parameters: of given scenes; random scenes choose theirs by their seed";
   }

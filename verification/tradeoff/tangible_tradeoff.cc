@@ -43,7 +43,6 @@ using tradeoff::Target;
 using tradeoff::Tradeoff;
 using tradeoff::TradeoffOptions;
 
-constexpr int kMostThreads = 256;
 constexpr int kMostScenes = 8;
 constexpr double kMostSteps = 1e6;
 constexpr double kLeastFactor = 1e-6;
@@ -73,10 +72,8 @@ std::string CheckFlags(size_t scenes, TradeoffOptions* options, Target* target) 
     return "--target_error: expected a number > 0 and <= 1e6, got " +
            FormatNumber(FLAGS_target_error);
   }
-  if (FLAGS_threads < 1 || FLAGS_threads > kMostThreads) {
-    return "--threads: expected a number from 1 to " + std::to_string(kMostThreads) + ", got " +
-           std::to_string(FLAGS_threads);
-  }
+  const std::string outside = FirstOutside({{"--threads", FLAGS_threads, 1, kMostThreads}});
+  if (!outside.empty()) return outside;
   if (FLAGS_target != "both" && FLAGS_target != "trajectory" && FLAGS_target != "gradient") {
     return "--target: expected trajectory, gradient or both, got '" + FLAGS_target + "'";
   }
