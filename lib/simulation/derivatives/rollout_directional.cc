@@ -70,6 +70,12 @@ StepDirectional::Status StepDirectional::SolveColumns(const Model<double>& model
   v_dot->resize(3 * record.problem.num_bodies, columns);
   std::vector<double> found;
   for (int c = 0; c < columns; ++c) {
+    const double driven = driven_.Of(first_column_ + c, record.problem, rhs.data() + c,
+                                     static_cast<int>(rhs.rows()), columns);
+    if (driven == 0.0 && friction_.col(c).isZero(0.0)) {
+      v_dot->col(c).setZero();
+      continue;
+    }
     const VectorX<double> r = rhs.col(c);
     const VectorX<double> friction = friction_.col(c);
     const Status status = directional_.Solve(std::vector<double>(r.begin(), r.end()),
@@ -195,10 +201,12 @@ bool StepDirectional::Apply(const Model<double>& model, Stepper* stepper, RowMat
     }
   }
   RowMatrixXd v_dot;
+  first_column_ = 0;
   Status status = SolveColumns(model, record, record.solution, *w_dot, &v_dot);
   if (status == Status::kContradiction) {
     for (Eigen::Index c = 0; c < w_dot->cols(); ++c) {
       RowMatrixXd one;
+      first_column_ = static_cast<int>(c);
       status = SolveOne(model, record, w_dot->col(c), &one);
       if (status != Status::kSolved) {
         break;

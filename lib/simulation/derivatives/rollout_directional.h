@@ -54,6 +54,8 @@ class StepDirectional {
                  ContactProblem<double>* problem);
 
   StepTangent tangent_;
+  DrivenSpeeds driven_;
+  int first_column_ = 0;  // of those that SolveColumns receives
   ContactDirectional directional_;
   ContactSolver solver_;
   std::vector<ContactKink> kinks_;

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tangible/simulation/derivatives/tolerances.h"
+
 namespace tangible {
 
 void AdvanceTangent(const Model<double>& model, Stepper* stepper, const double* twists,
@@ -23,6 +25,19 @@ void AdvanceTangent(const Model<double>& model, Stepper* stepper, const double* 
   if (JointCorrectionOf(s.settings) == JointCorrection::kProjection && !s.joints.empty()) {
     stepper->projection().Tangent(model, w_dot->data(), columns);
   }
+}
+
+double DrivenSpeeds::Of(int column, const ContactProblem<double>& problem, const double* rhs,
+                        int rows, int stride) {
+  double driven = 0.0;
+  for (int row = 0; row < rows; ++row) {
+    const double value = std::abs(rhs[static_cast<size_t>(row) * stride]);
+    const bool is_body = static_cast<size_t>(row) < problem.mass.size();
+    driven = std::max(driven, is_body ? value / problem.mass[row] : value);
+  }
+  most_.resize(std::max(most_.size(), static_cast<size_t>(column) + 1), 0.0);
+  most_[column] = std::max(most_[column], driven);
+  return driven <= kAbsorbed * most_[column] ? 0.0 : driven;
 }
 
 void StepTangent::Vary(const ModelStructure& structure, const std::vector<int>& numbers) {
@@ -69,22 +84,16 @@ double StepTangent::ApplyAndMeasure(const Model<double>& model, Stepper* stepper
   const ContactProblem<double>& problem = stepper->record().problem;
   const int columns = static_cast<int>(w_dot->cols());
   Assemble(model, stepper, *w_dot);
-  // The speeds that the perturbation drives, of bodies and of constraints.
-  const auto speed = [&](size_t row, int column) {
-    const double value = std::abs(rhs_[row * columns + column]);
-    return row < problem.mass.size() ? value / problem.mass[row] : value;
-  };
-  const size_t rows = rhs_.size() / std::max(1, columns);
+  const int rows = static_cast<int>(rhs_.size()) / std::max(1, columns);
   std::vector<double> driven(columns, 0.0);
-  for (size_t row = 0; row < rows; ++row) {
-    for (int c = 0; c < columns; ++c) {
-      driven[c] = std::max(driven[c], speed(row, c));
-    }
+  for (int c = 0; c < columns; ++c) {
+    driven[c] = driven_.Of(c, problem, rhs_.data() + c, rows, columns);
   }
   Finish(model, stepper, w_dot);
   double worst = 0.0;
   const std::vector<int>& block_of = stepper->system().contact_block();
   for (int c = 0; c < columns; ++c) {
+    if (driven[c] == 0.0) continue;
     double impulse = 0.0;
     for (size_t i = 0; i < problem.contacts.size(); ++i) {
       if (block_of[i] >= 0) {
@@ -99,9 +108,7 @@ double StepTangent::ApplyAndMeasure(const Model<double>& model, Stepper* stepper
     for (size_t row = 0; row < problem.mass.size(); ++row) {
       driven[c] = std::max(driven[c], std::abs(rhs_[row * columns + c]));
     }
-    if (driven[c] > 0.0) {
-      worst = std::max(worst, impulse / driven[c]);
-    }
+    worst = std::max(worst, impulse / driven[c]);
   }
   return worst;
 }

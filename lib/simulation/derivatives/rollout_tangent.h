@@ -40,6 +40,20 @@ RolloutReport RolloutTangent(ControlledModel<double>* model, const State<double>
 void AdvanceTangent(const Model<double>& model, Stepper* stepper, const double* twists,
                     RowMatrixXd* w_dot);
 
+/// The speeds that the columns of directions drive in the steps of a rollout. What is left of a
+/// direction that the first steps have absorbed is rounding, in which nothing can be recognised.
+class DrivenSpeeds {
+ public:
+  /// The largest speed that a column drives in a step; 0 where it is rounding of what the column
+  /// drove before. `rhs` points to its first number of `rows`, which lie `stride` apart: momenta of
+  /// bodies, then speeds of constraints.
+  double Of(int column, const ContactProblem<double>& problem, const double* rhs, int rows,
+            int stride);
+
+ private:
+  std::vector<double> most_;
+};
+
 /// The tangent of the step that the stepper has just done.
 class StepTangent {
  public:
@@ -61,6 +75,7 @@ class StepTangent {
   double Finish(const Model<double>& model, Stepper* stepper, RowMatrixXd* w_dot);
 
   std::vector<double> rhs_;
+  DrivenSpeeds driven_;
   std::vector<char> fixed_;  ///< 1: no column varies the variable; empty: unknown
   LocalJacobianScratch scratch_;
 };

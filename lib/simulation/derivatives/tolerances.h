@@ -12,6 +12,9 @@ inline constexpr double kDegenerateTolerance = 1e-10;
 /// Of speeds that the step changes: how far a step's linearised problem is moved along a direction,
 /// to choose among impulses that are not unique.
 inline constexpr double kLinearisedWay = 1e-6;
+/// Of the speeds that a direction has driven in earlier steps of a rollout: what it drives now is
+/// rounding, as once a contact that holds a body has absorbed a change of its speed.
+inline constexpr double kAbsorbed = 1e-13;
 /// Of the scaled natural residual: impulses chosen in that way solve the step as well.
 inline constexpr double kHoldsAsWell = 1e-9;
 
