@@ -64,6 +64,9 @@ int ImportTable(const std::string& file, TableFormat format) {
     return Usage(
         "expected --from <= --to, --frame_rate > 0, --scale > 0 and --likelihood a number");
   }
+  if (format == TableFormat::kDeepLabCut && FLAGS_frame_rate == 0.0) {
+    return Usage("--frame_rate: expected that of the film, as files of deeplabcut have no times");
+  }
   std::string text;
   std::string error;
   if (format == TableFormat::kTable) {

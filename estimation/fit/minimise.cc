@@ -412,11 +412,6 @@ class Minimiser : public ceres::IterationCallback {
     const bool converged = summary.termination_type == ceres::CONVERGENCE ||
                            summary.termination_type == ceres::USER_SUCCESS;
     minimum_.status = converged ? FitStatus::kConverged : FitStatus::kNotConverged;
-    if (!std::isfinite(summary.final_cost)) {
-      // Ceres reports that the cost does not change any more.
-      minimum_.status = FitStatus::kNotConverged;
-      minimum_.message = "the cost is not finite: an observation or its sigma is beyond all bounds";
-    }
     shared_.Update();
   }
 

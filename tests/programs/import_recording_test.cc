@@ -59,8 +59,8 @@ TEST_F(ImportRecordingTest, TablesOfOthers) {
   // Nothing has been written over.
   EXPECT_EQ(Read(Path("o.csv")), "time,point,x,y\n0,tip,10,-20\n1,tip,12,-22\n");
   ExpectOneLine(Run("tangible-import-recording", table + " --kind=table" + out), 2, "--mapping");
-  ExpectOneLine(Run("tangible-import-recording", dlc + " --kind=deeplabcut" + out), 1,
-                "expected a frame rate");
+  ExpectOneLine(Run("tangible-import-recording", dlc + " --kind=deeplabcut" + out), 2,
+                "--frame_rate");
   ExpectOneLine(Run("tangible-import-recording", of_table + out + " --scale=0"), 2, "--scale");
   ExpectOneLine(Run("tangible-import-recording", of_table + " --out=" + mapping), 2, "--out");
 }

@@ -75,6 +75,13 @@ TEST(RecordingTableTest, QuotedNamesMayHoldSeparatorsQuotesAndLineBreaks) {
   // Other lines keep their numbers.
   EXPECT_EQ(Import("\"t, s\",\"the \"\"tip\"\", x\",\"y\nof it\"\n0.5,2.5,z\n", options).error,
             "r.csv: line 3: \"y of it\": expected a number, got \"z\"");
+  // A mapping may name a column, or a body in it, with its line breaks.
+  imported = Import("t,\"LED\r\nno\",\"x\n(m)\"\n1,\"a\nb\",2\n",
+                    Mapped(R"m({"time": "t", "target": "point", "name": "LED\r\nno",
+                               "names": {"a\nb": "tip"},
+                               "columns": [{"column": "x\n(m)", "coordinate": "x"}]})m"));
+  ASSERT_TRUE(imported.ok) << imported.error;
+  EXPECT_EQ(imported.csv, "time,point,x\n1,tip,2\n");
 }
 
 TEST(RecordingTableTest, LongTablesByAMapping) {
@@ -106,7 +113,8 @@ TEST(RecordingTableTest, DeepLabCutOfOneAnimal) {
             "0.06,left_eye,32,-42\n");
   EXPECT_EQ(imported.recording.missing, 4);
   options.frame_rate = 0.0;
-  EXPECT_EQ(Import(text, options).error, "r.csv: expected a frame rate, as the file has no times");
+  EXPECT_EQ(Import(text, options).error,
+            "r.csv: expected a column of times or a frame rate, got neither");
 }
 
 TEST(RecordingTableTest, DeepLabCutOfSeveralAnimals) {
