@@ -402,7 +402,7 @@ int ApplyFlags(Prepared* prepared) {
       return ReportError("tangible-fit: --derivatives: " + error, kExitUsage);
     }
   }
-  if (std::isfinite(FLAGS_predict_from)) {
+  if (FLAGS_predict_from < INFINITY) {
     const std::string error = HoldBack(prepared);
     if (!error.empty()) {
       return ReportError("tangible-fit: --predict_from: " + error, kExitUsage);

@@ -276,6 +276,9 @@ class MappingReader {
       layout_->target_column = root_.At("target").Choice(kTargets);
       if (root_.Has("names")) {
         const JsonReader names = root_.At("names");
+        if (!names.IsObject()) {
+          names.FailExpected("an object of names");
+        }
         for (const std::string& name : names.Keys()) {
           layout_->names[InOneLine(name)] = NameAt(names.At(name));
         }

@@ -383,6 +383,7 @@ TEST_F(TangibleFitTest, WritesTheFittedSceneAndItsPredictions) {
 
   ExpectOneLine(Fit(Problem(), "--predict_from=0.5"), 2, "none after it");
   ExpectOneLine(Fit(Problem(), "--predict_from=-1"), 2, "none up to it");
+  ExpectOneLine(Fit(Problem(), "--predict_from=-inf"), 2, "none up to it");
   ExpectOneLine(Fit(Problem(), "--predict_from=nan"), 2, "--predict_from");
   ExpectOneLine(Fit(Problem(), "--scene_out='" + Path("o.csv") + "'"), 2, "--scene_out");
   ExpectOneLine(Fit(Problem(), "--predictions='" + Path("none/p.csv") + "'"), 1, "none/p.csv");

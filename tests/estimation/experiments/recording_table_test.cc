@@ -75,6 +75,11 @@ TEST(RecordingTableTest, QuotedNamesMayHoldSeparatorsQuotesAndLineBreaks) {
   // Other lines keep their numbers.
   EXPECT_EQ(Import("\"t, s\",\"the \"\"tip\"\", x\",\"y\nof it\"\n0.5,2.5,z\n", options).error,
             "r.csv: line 3: \"y of it\": expected a number, got \"z\"");
+  // What separates cells is what stands outside of quotes.
+  imported = Import("t,\"x;\tm\"\n1,2\n", Mapped(R"m({"time": "t", "columns": [
+      {"column": "x;\tm", "point": "tip", "coordinate": "x"}]})m"));
+  ASSERT_TRUE(imported.ok) << imported.error;
+  EXPECT_EQ(imported.csv, "time,point,x\n1,tip,2\n");
   // A mapping may name a column, or a body in it, with its line breaks.
   imported = Import("t,\"LED\r\nno\",\"x\n(m)\"\n1,\"a\nb\",2\n",
                     Mapped(R"m({"time": "t", "target": "point", "name": "LED\r\nno",
@@ -195,6 +200,8 @@ TEST(RecordingTableTest, MistakesAreOneLine) {
                        {"column": "th2", "body": "a", "coordinate": "angle"})"),
             "r.csv: line 2: expected angle of a once, got it twice");
   EXPECT_EQ(mapping(""), "m.json: /columns: expected at least one column, got none");
+  EXPECT_EQ(mapping("", R"(, "name": "th1", "target": "body", "names": ["a"])"),
+            "m.json: /names: expected an object of names, got an array of 1");
   EXPECT_NE(mapping(R"({"column": "th1", "body": "a", "coordinate": "angle"})", R"(, "step": 1)")
                 .find("m.json: /step: unknown key of a mapping"),
             std::string::npos);
