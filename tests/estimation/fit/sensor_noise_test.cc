@@ -113,6 +113,7 @@ TEST(SensorNoiseTest, WhatIsSeenWithoutNoiseHasNoSigma) {
   EXPECT_EQ(result.message,
             "the sigma of sensor \"rough\" cannot be estimated: its observations leave no "
             "residuals");
+  EXPECT_EQ(noise_components.noise[0].factor, 1.0);
 }
 
 TEST(SensorNoiseTest, ASensorWithoutResidualsIsSaid) {
