@@ -573,8 +573,9 @@ bool ParseTableRecording(const std::string& text, const std::string& file,
   if (!read) {
     return false;
   }
-  if (layout.time < 0 && !(options.frame_rate > 0.0)) {
-    *error = file + ": expected a column of times or a frame rate, got neither";
+  if ((layout.time >= 0) == (options.frame_rate > 0.0)) {
+    *error = file + ": expected a column of times or a frame rate, got " +
+             (layout.time >= 0 ? "both" : "neither");
     return false;
   }
   recording->target_column = layout.target_column;

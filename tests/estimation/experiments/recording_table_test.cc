@@ -120,6 +120,10 @@ TEST(RecordingTableTest, DeepLabCutOfOneAnimal) {
   options.frame_rate = 0.0;
   EXPECT_EQ(Import(text, options).error,
             "r.csv: expected a column of times or a frame rate, got neither");
+  TableOptions both = Mapped(kWide);
+  both.frame_rate = 50.0;
+  EXPECT_EQ(Import("t [s],th1,om1,th2\n0,2,3,4\n", both).error,
+            "r.csv: expected a column of times or a frame rate, got both");
 }
 
 TEST(RecordingTableTest, DeepLabCutOfSeveralAnimals) {
@@ -223,7 +227,7 @@ TEST(RecordingTableTest, MistakesAreOneLine) {
     for (const char* text : {"", "\n", ",\n,\n,\n", "scorer\nbodyparts\ncoords\n", "#multi:\n"}) {
       TableOptions options = Mapped(kWide);
       options.format = format;
-      options.frame_rate = 1.0;
+      options.frame_rate = format == TableFormat::kDeepLabCut ? 1.0 : 0.0;
       const Imported imported = Import(text, options);
       EXPECT_FALSE(imported.ok) << text;
       EXPECT_NE(imported.error, "");
