@@ -178,6 +178,12 @@ TEST_F(FaultsTest, ACostThatIsNotFiniteHasNotConverged) {
                   "the cost is not finite");
     EXPECT_EQ(json::parse(Read(Path("r.json")))["status"], "failed");
   }
+  // Huber's loss is finite where the plain squares that lead to its optimum are not.
+  json fit = json::parse(Read(Path("fit.json")));
+  fit["loss"] = {{"huber", 2}};
+  Write("fit.json", fit.dump());
+  const ProgramRun run = RunIn("", {"tangible-fit", "fit.json", {}}, "", "> /dev/null");
+  EXPECT_LE(std::count(run.error.begin(), run.error.end(), '\n'), 1) << run.error;
 }
 
 TEST_F(FaultsTest, AStdoutThatTakesNothing) {
