@@ -35,6 +35,28 @@ int Usage(const std::string& what) {
   return ReportError("tangible-import-recording: " + what, kExitUsage);
 }
 
+/// The flags that only some kinds take, and these kinds.
+constexpr std::pair<const char*, const char*> kFlagsOfKinds[] = {
+    {"mapping", "table"},
+    {"frame_rate", "table or deeplabcut"},
+    {"likelihood", "deeplabcut"},
+    {"scale", "table, deeplabcut or tracker"},
+    {"y_down", "table, deeplabcut or tracker"},
+    {"rate", "ibm_double_pendulum"},
+    {"length", "ibm_double_pendulum"}};
+
+/// What is wrong with a flag of another kind, or empty.
+std::string FlagOfAnotherKind() {
+  for (const auto& [flag, kinds] : kFlagsOfKinds) {
+    if (!gflags::GetCommandLineFlagInfoOrDie(flag).is_default &&
+        std::string(kinds).find(FLAGS_kind) == std::string::npos) {
+      return std::string("--").append(flag).append(": goes with --kind=").append(kinds) +
+             ", got it with " + FLAGS_kind;
+    }
+  }
+  return "";
+}
+
 /// The format or kind that --kind names, if it is in the list.
 template <typename Kind, size_t N>
 std::optional<Kind> FindKind(const std::pair<const char*, Kind> (&names)[N]) {
@@ -63,6 +85,9 @@ int ImportTable(const std::string& file, TableFormat format) {
       std::isnan(FLAGS_likelihood)) {
     return Usage(
         "expected --from <= --to, --frame_rate > 0, --scale > 0 and --likelihood a number");
+  }
+  if (format == TableFormat::kDeepLabCut && FLAGS_frame_rate == 0.0) {
+    return Usage("--frame_rate: expected that of the film, as files of deeplabcut have no times");
   }
   std::string text;
   std::string error;
@@ -97,15 +122,20 @@ int Import(const std::string& file) {
   if (FLAGS_out.empty()) {
     return Usage("--out: expected a file");
   }
-  if (const std::optional<TableFormat> format = FindKind(kTableFormatNames)) {
-    return ImportTable(file, *format);
-  }
+  const std::optional<TableFormat> format = FindKind(kTableFormatNames);
   const std::optional<RecordingKind> kind = FindKind(kRecordingKindNames);
-  if (!kind) {
+  if (!format && !kind) {
     return Usage(
         "--kind: expected table, deeplabcut, tracker, ibm_double_pendulum or multiarm_single, got "
         "'" +
         FLAGS_kind + "'");
+  }
+  const std::string other = FlagOfAnotherKind();
+  if (!other.empty()) {
+    return Usage(other);
+  }
+  if (format) {
+    return ImportTable(file, *format);
   }
   if (!(FLAGS_from <= FLAGS_to) || !(FLAGS_rate > 0.0) || !(FLAGS_length > 0.0)) {
     return Usage("expected --from <= --to, --rate > 0 and --length > 0");

@@ -402,7 +402,7 @@ int ApplyFlags(Prepared* prepared) {
       return ReportError("tangible-fit: --derivatives: " + error, kExitUsage);
     }
   }
-  if (std::isfinite(FLAGS_predict_from)) {
+  if (FLAGS_predict_from < INFINITY) {
     const std::string error = HoldBack(prepared);
     if (!error.empty()) {
       return ReportError("tangible-fit: --predict_from: " + error, kExitUsage);
@@ -501,15 +501,29 @@ std::string WriteFiles(const Prepared& prepared, const FitResult& result,
   return writer.error();
 }
 
+/// "; --report not written: there is no estimate" of the files that need one, or empty.
+std::string NotWritten(const FitResult& result) {
+  std::string flags;
+  for (const auto& [flag, path] : {std::pair("--report", &FLAGS_report),
+                                   {"--predictions", &FLAGS_predictions},
+                                   {"--scene_out", &FLAGS_scene_out}}) {
+    if (path->empty() || result.estimate.size() > 0) continue;
+    flags.append(flags.empty() ? "; " : ", ").append(flag);
+  }
+  return flags.empty() ? "" : flags + " not written: there is no estimate";
+}
+
 /// The exit status of a fit whose results are written, after a line about what is wrong.
 int Conclude(const Prepared& prepared, const FitResult& result, const FitFindings& findings) {
   const std::string& file = prepared.fit.path;
   if (result.status == FitStatus::kNoEffect) {
     const int index = prepared.problem->IndexInRecording(result.parameter);
-    return ReportError(file + ": /parameters/" + std::to_string(index) + ": " + result.message);
+    return ReportError(file + ": /parameters/" + std::to_string(index) + ": " + result.message +
+                       NotWritten(result));
   }
   if (result.status != FitStatus::kConverged) {
-    return ReportError(file + ": " + NameOf(result.status) + ": " + result.message);
+    return ReportError(file + ": " + NameOf(result.status) + ": " + result.message +
+                       NotWritten(result));
   }
   const DiscretisationCheck* const check = findings.check;
   if (check != nullptr && check->status != FitStatus::kConverged) {

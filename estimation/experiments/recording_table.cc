@@ -52,6 +52,13 @@ std::string Cleaned(const std::string& name) {
   return clean;
 }
 
+/// The name with each line break as a space, which is how WithCommas leaves it in a cell.
+std::string InOneLine(std::string name) {
+  name.erase(std::remove(name.begin(), name.end(), '\r'), name.end());
+  std::replace(name.begin(), name.end(), '\n', ' ');
+  return name;
+}
+
 /// What separates the cells of a text: what its first lines have outside of quotes.
 char SeparatorOf(std::string_view text) {
   bool quoted = false;
@@ -269,8 +276,11 @@ class MappingReader {
       layout_->target_column = root_.At("target").Choice(kTargets);
       if (root_.Has("names")) {
         const JsonReader names = root_.At("names");
+        if (!names.IsObject()) {
+          names.FailExpected("an object of names");
+        }
         for (const std::string& name : names.Keys()) {
-          layout_->names[name] = NameAt(names.At(name));
+          layout_->names[InOneLine(name)] = NameAt(names.At(name));
         }
       }
     } else if (root_.Has("target") || root_.Has("names")) {
@@ -293,7 +303,7 @@ class MappingReader {
 
   int ColumnOf(const JsonReader& json) const {
     const std::string name = json.String();
-    const int column = table_.Column(name);
+    const int column = table_.Column(InOneLine(name));
     if (column < 0 && json.IsString()) {
       std::string names;
       for (const std::string& other : table_.columns) {
@@ -563,8 +573,9 @@ bool ParseTableRecording(const std::string& text, const std::string& file,
   if (!read) {
     return false;
   }
-  if (layout.time < 0 && !(options.frame_rate > 0.0)) {
-    *error = file + ": expected a frame rate, as the file has no times";
+  if ((layout.time >= 0) == (options.frame_rate > 0.0)) {
+    *error = file + ": expected a column of times or a frame rate, got " +
+             (layout.time >= 0 ? "both" : "neither");
     return false;
   }
   recording->target_column = layout.target_column;

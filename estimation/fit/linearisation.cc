@@ -254,7 +254,10 @@ bool Linearizer::Compute(const Eigen::VectorXd& q, const HuberBounds& huber,
     pack.Add(block);
   }
   *numbers = pack.numbers();
-  return true;
+  if (!numbers->allFinite()) {
+    message_ = "the cost is not finite: an observation, a prior or a sigma is beyond all bounds";
+  }
+  return message_.empty();
 }
 
 bool Linearizer::Logged(const Eigen::VectorXd& q, const HuberBounds& huber,

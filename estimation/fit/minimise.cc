@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tangible/estimation/fit/minimise.h"
 
+#include <glog/logging.h>
+
 #include <algorithm>
 #include <cmath>
 #include <memory>
@@ -138,6 +140,18 @@ class FactorCostFunction : public ceres::CostFunction {
  private:
   const SharedLinearisation* shared_;
   int block_;
+};
+
+/// Ceres logs failures that its summary reports as well; programs print one line about them.
+class QuietLog {
+ public:
+  QuietLog() : before_(FLAGS_minloglevel) { FLAGS_minloglevel = google::GLOG_FATAL; }
+  ~QuietLog() { FLAGS_minloglevel = before_; }
+  QuietLog(const QuietLog&) = delete;
+  QuietLog& operator=(const QuietLog&) = delete;
+
+ private:
+  int before_;
 };
 
 class Minimiser : public ceres::IterationCallback {
@@ -388,6 +402,11 @@ class Minimiser : public ceres::IterationCallback {
       minimum_.message = "every parameter is at a bound";
       return;
     }
+    if (!shared_.ok()) {  // with this bound of the loss
+      minimum_.status = FitStatus::kNotConverged;
+      minimum_.message = linearizer_.message();
+      return;
+    }
     ceres::Problem::Options problem_options;
     problem_options.evaluation_callback = &shared_;
     ceres::Problem problem(problem_options);
@@ -407,16 +426,12 @@ class Minimiser : public ceres::IterationCallback {
     solver.update_state_every_iteration = true;
     solver.callbacks.push_back(this);
     ceres::Solver::Summary summary;
+    const QuietLog quiet;
     ceres::Solve(solver, &problem, &summary);
     minimum_.message = summary.message;
     const bool converged = summary.termination_type == ceres::CONVERGENCE ||
                            summary.termination_type == ceres::USER_SUCCESS;
     minimum_.status = converged ? FitStatus::kConverged : FitStatus::kNotConverged;
-    if (!std::isfinite(summary.final_cost)) {
-      // Ceres reports that the cost does not change any more.
-      minimum_.status = FitStatus::kNotConverged;
-      minimum_.message = "the cost is not finite: an observation or its sigma is beyond all bounds";
-    }
     shared_.Update();
   }
 

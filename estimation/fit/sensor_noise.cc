@@ -124,7 +124,8 @@ bool UpdateNoise(const FitOptions& options, const FitResult& result, RecordingsP
       one.redundancy -= leverages.size() > 0 ? leverages[row] : 0.0;
     }
     const double sum = SquareSum(result.residuals, rows[s], options.huber);
-    if (!(one.redundancy > kLeastRedundancy) || !(sum > 0.0)) {
+    const double exact = kExactFit * kExactFit * static_cast<double>(one.count);
+    if (!(one.redundancy > kLeastRedundancy) || !(sum > exact)) {
       *message = "the sigma of sensor \"" + one.name +
                  "\" cannot be estimated: its observations leave no residuals";
       return false;

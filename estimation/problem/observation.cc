@@ -76,7 +76,7 @@ class RowReader {
       observation.coordinate = static_cast<Coordinate>(i);
       observation.sigma = sigma.Of(observation.coordinate);
       if (observation.coordinate == Coordinate::kDistance && channel.to_body < 0) {
-        return Fail(row, "distance: expected relative_to to name a body or point, got none");
+        return Fail(row, "distance: expected relative_to to name a body or point, got the world");
       }
       if (!ReadCell(table_, row, column, &observation.value, error_)) {
         return false;

@@ -7,7 +7,7 @@
 
 #include "tangible/math/scalar.h"
 #include "tangible/scene/parameter.h"
-#include "tangible/scene/shape_json.h"
+#include "tangible/scene/set_parameters.h"
 #include "tangible/simulation/stepping/step.h"
 
 namespace tangible {
@@ -127,7 +127,10 @@ bool ParameterizedScene::Create(const Scene& scene, const std::vector<BodyPoint>
   }
   structure_ = BuildStructure(scene_);
   if (!Set(Initial())) {
-    *error = {-1, -1, "", "the initial values give a number that is not allowed"};
+    const std::string reason = depends_on_others_ ? CheckNumbers(scene_) : "";
+    *error = {-1, -1, "",
+              "the initial values give a number that is not allowed" +
+                  (reason.empty() ? "" : ": " + reason)};
     return false;
   }
   return true;
@@ -337,6 +340,7 @@ void ParameterizedScene::CollectTargets() {
   const auto numbers = EnumerateNumbers(&scene_);
   const std::vector<InstrumentNumber> measured = MeasurementNumbers();
   targets_.clear();
+  depends_on_others_ = false;
   for (size_t i = 0; i < numbers_.size(); ++i) {
     const NumberSet& set = numbers_[i];
     auto target = std::find_if(targets_.begin(), targets_.end(),
@@ -344,6 +348,8 @@ void ParameterizedScene::CollectTargets() {
     if (target == targets_.end()) {
       const int other = set.number - num_scene_numbers_;
       const double own = other < 0 ? *numbers[set.number].value : *measured[other].value;
+      depends_on_others_ =
+          depends_on_others_ || (other < 0 && DependsOnOthers(numbers[set.number].path));
       target = targets_.insert(target, {set.number, set.kind, own, {}});
     }
     target->sets.push_back(static_cast<int>(i));
@@ -370,10 +376,8 @@ bool ParameterizedScene::Set(const Eigen::VectorXd& p) {
       *measured[target.number - num_scene_numbers_].value = value;
     }
   }
-  for (const auto& body : scene_.bodies) {
-    if (body.shape.type == ShapeType::kEllipse && !CheckRadii(body.shape.numbers).empty()) {
-      return false;
-    }
+  if (depends_on_others_ && !CheckNumbers(scene_).empty()) {
+    return false;
   }
   BuildModelWithStructure(scene_, structure_, &model_, &state_);
   return true;

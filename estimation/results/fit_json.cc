@@ -47,7 +47,7 @@ class Reader {
     if (!ReadRun(common_, file_, FolderOf(file_), {}, &only.problem, error)) return false;
     out_.scopes.resize(only.problem.parameters.size());
     CheckSensors();
-    if (FromObservations(root_)) StartFromObservations(&only.problem);
+    if (FromObservations(root_)) StartFromObservations(root_.At("initial"), &only.problem);
     return true;
   }
 
@@ -172,10 +172,10 @@ class Reader {
       if (!ConcernsRecording(reader, label, *error)) error->replace(0, label.size(), file_);
       return false;
     }
-    if (!SetValues(reader, label, &entry.problem, error)) return false;
-    if (FromObservations(reader.Has("initial") ? reader : root_)) {
-      StartFromObservations(&entry.problem);
-    }
+    SetValues(reader, &entry.problem);
+    if (!reader.ok()) return true;
+    const JsonReader& starts = reader.Has("initial") ? reader : root_;
+    if (FromObservations(starts)) StartFromObservations(starts.At("initial"), &entry.problem);
     out_.recordings.push_back(std::move(entry));
     return true;
   }
@@ -232,31 +232,41 @@ class Reader {
   }
 
   // Numbers of the scene that are others in this recording, and that no parameter sets: {path:
-  // value}.
-  static bool SetValues(const JsonReader& reader, const std::string& label, FitProblem* problem,
-                        std::string* error) {
-    if (!reader.Has("values")) return true;
+  // value}. They are set together, because some are allowed only beside others.
+  static void SetValues(const JsonReader& reader, FitProblem* problem) {
+    if (!reader.Has("values")) return;
     const JsonReader values = reader.At("values");
     if (!values.IsObject()) values.FailExpected("an object of numbers by path");
+    std::vector<ParameterPath> paths;
+    std::vector<double> numbers;
     for (const std::string& path : values.Keys()) {
-      ParameterPath parameter;
-      const double value = values.At(path).Number();
       std::string wrong;
-      if (ResolveParameter(problem->scene, path, &parameter, &wrong)) {
-        const std::string owner = ParameterThatSets(parameter, *problem);
-        wrong = owner.empty() ? SetParameters({parameter}, &value, &problem->scene)
-                              : ExpectedUnset(path, owner);
+      numbers.push_back(values.At(path).Number());
+      if (!ResolveParameter(problem->scene, path, &paths.emplace_back(), &wrong)) {
+        values.At(path).Fail(wrong);
       }
-      if (!wrong.empty()) {
-        *error = OneLine(wrong.insert(0, ": /values: ").insert(0, label));
-        return false;
-      }
+      const std::string owner = ParameterThatSets(paths.back(), *problem);
+      if (!owner.empty()) values.At(path).Fail(ExpectedUnset(owner));
     }
-    return true;
+    std::string wrong;
+    if (!reader.ok()) return;
+    if (CheckApart(problem->scene, paths, &wrong)) {
+      wrong = SetParameters(paths, numbers.data(), &problem->scene);
+    }
+    if (!wrong.empty()) FailAtPath(values, wrong);
   }
 
-  static std::string ExpectedUnset(const std::string& path, const std::string& owner) {
-    return path + ": expected a number that no parameter sets, got one that \"" + owner +
+  // Records "path: what" at the value of that path, and what concerns several at all of them.
+  static void FailAtPath(const JsonReader& values, const std::string& wrong) {
+    for (const std::string& path : values.Keys()) {
+      const std::string start = path + ": ";
+      if (wrong.rfind(start, 0) == 0) values.At(path).Fail(wrong.substr(start.size()));
+    }
+    values.Fail(wrong);
+  }
+
+  static std::string ExpectedUnset(const std::string& owner) {
+    return "expected a number that no parameter sets, got one that \"" + owner +
            "\" sets (initial says where its value in a recording begins)";
   }
 
@@ -288,8 +298,8 @@ class Reader {
   }
 
   // The initial values of what is a pose or twist at the start, of several recordings those that
-  // each has for itself.
-  void StartFromObservations(FitProblem* problem) const {
+  // each has for itself. `reader` is of the key that asks for it.
+  void StartFromObservations(const JsonReader& reader, FitProblem* problem) const {
     ParameterizedScene scene;
     ParameterError fault;
     if (!scene.Create(problem->scene, problem->points, problem->parameters, &fault,
@@ -300,6 +310,12 @@ class Reader {
     for (size_t i = 0; i < problem->parameters.size(); ++i) {
       const bool own = out_.scopes[i].kind != ParameterScope::Kind::kShared;
       free.push_back((own || !has_recordings_) && IsOfInitialState(problem->parameters[i]));
+    }
+    if (std::find(free.begin(), free.end(), true) == free.end()) {
+      reader.Fail(
+          "expected parameters that set nothing but initial poses, twists, joint angles or rates" +
+          std::string(has_recordings_ ? ", each per recording" : "") + ", got none");
+      return;
     }
     const Eigen::VectorXd found = ParametersFromObservations(
         RolloutResiduals(std::move(scene), problem->observations, problem->channels), free);

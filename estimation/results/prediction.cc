@@ -8,6 +8,7 @@
 
 #include "tangible/estimation/results/residual_summary.h"
 #include "tangible/estimation/results/tolerances.h"
+#include "tangible/scene/csv.h"
 
 namespace tangible {
 namespace {
@@ -68,13 +69,6 @@ class ErrorSum {
   long count_ = 0;
   PerUnit length_, angle_;
 };
-
-/// A name as a cell; tables have no quoting.
-std::string CsvCell(std::string name) {
-  std::replace_if(
-      name.begin(), name.end(), [](char c) { return c == ',' || c == '\n'; }, '_');
-  return name;
-}
 
 void AppendCell(double x, std::string* row) {
   char text[32];

@@ -108,7 +108,7 @@ std::vector<std::string> SplitCsvLine(std::string_view line) {
 }
 
 std::string CsvCell(const std::string& cell) {
-  if (cell.find_first_of(",\"") == std::string::npos) return cell;
+  if (cell.find_first_of(",\"\n") == std::string::npos) return cell;
   std::string quoted = "\"";
   for (const char c : cell) {
     quoted += c;

@@ -36,7 +36,7 @@ bool ParseCsv(const std::string& text, const std::string& file,
 /// The cells of one line.
 std::vector<std::string> SplitCsvLine(std::string_view line);
 
-/// A cell as SplitCsvLine reads it: in quotes where it has commas or quotes.
+/// A cell as SplitCsvLine reads it: in quotes where it has commas, quotes or line breaks.
 std::string CsvCell(const std::string& cell);
 
 /// A finite number that fills the whole text; decimal point whatever the locale.

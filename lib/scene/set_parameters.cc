@@ -7,9 +7,6 @@
 #include "tangible/scene/scene_json.h"
 
 namespace tangible {
-namespace {
-
-// Whether the allowed values of a number depend on other numbers, and not only on its kind.
 bool DependsOnOthers(const std::string& path) {
   const auto has = [&path](const char* part) { return path.find(part) != std::string::npos; };
   return has("/vertices/") || has("/normal/") || has("/axis/") || has("/limits/") ||
@@ -17,7 +14,13 @@ bool DependsOnOthers(const std::string& path) {
          (path.rfind("forces/", 0) == 0 && (has("/start") || has("/end")));
 }
 
-}  // namespace
+std::string CheckNumbers(const Scene& scene) {
+  Scene same;
+  std::string error;
+  ParseScene(SceneToJson(scene), "the scene with these values", FolderOf(scene.path), &same,
+             &error);
+  return error;
+}
 
 bool CheckApart(const Scene& scene, const std::vector<ParameterPath>& parameters,
                 std::string* error) {
@@ -51,12 +54,7 @@ std::string SetParameters(const std::vector<ParameterPath>& parameters, const do
       read_again = read_again || DependsOnOthers(numbers[i].path);
     }
   }
-  if (!read_again) return "";
-  Scene same;
-  std::string error;
-  ParseScene(SceneToJson(*scene), "the scene with these values", FolderOf(scene->path), &same,
-             &error);
-  return error;
+  return read_again ? CheckNumbers(*scene) : "";
 }
 
 }  // namespace tangible

@@ -96,8 +96,10 @@ void ReadEllipse(const JsonReader& reader, std::vector<double>* numbers) {
   reader.ExpectKeys({"radii"}, " of an ellipse");
   ReadLengths(reader, "radii", "an array of 2 numbers > 0, the semi-axes along x and y", numbers);
   if (!reader.ok()) return;
-  const std::string wrong = CheckRadii(*numbers);
-  if (!wrong.empty()) reader.At("radii").Fail(wrong);
+  const auto [least, most] = std::minmax((*numbers)[0], (*numbers)[1]);
+  if (least >= kSlenderEllipse * most) return;
+  reader.At("radii").Fail("expected two radii of a ratio of at most 1e9, got " +
+                          Describe(Json((*numbers)[0])) + " and " + Describe(Json((*numbers)[1])));
 }
 
 void ReadHalfPlane(const JsonReader& reader, std::vector<double>* numbers) {
@@ -149,12 +151,6 @@ void ReadShape(const JsonReader& reader, BasicShape<double>* shape) {
     case ShapeType::kNone:
       break;
   }
-}
-
-std::string CheckRadii(const std::vector<double>& radii) {
-  if (std::min(radii[0], radii[1]) >= kSlenderEllipse * std::max(radii[0], radii[1])) return "";
-  return "expected two radii of a ratio of at most 1e9, got " + Describe(Json(radii[0])) + " and " +
-         Describe(Json(radii[1]));
 }
 
 bool IsCentred(const BasicShape<double>& shape) {

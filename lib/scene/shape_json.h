@@ -3,9 +3,6 @@
 //
 // Reading and checking the shape of a body.
 
-#include <string>
-#include <vector>
-
 #include "tangible/scene/json_reader.h"
 #include "tangible/scene/scene.h"
 
@@ -14,10 +11,6 @@ namespace tangible {
 /// Reads {"circle": {...}} and so on into `shape`. Polygons must be strictly convex,
 /// counter-clockwise and go around once.
 void ReadShape(const JsonReader& reader, BasicShape<double>* shape);
-
-/// What is wrong with the semi-axes of an ellipse, each > 0: "expected two radii of a ratio of at
-/// most 1e9, got 1 and 1e10"; or empty.
-std::string CheckRadii(const std::vector<double>& radii);
 
 /// Whether the uniform shape's centre of mass is the origin of the body's frame, so that its
 /// inertia about the origin is known: always, except that the centroid of polygons may differ from

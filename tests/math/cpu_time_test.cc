@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <ctime>
 #include <thread>
 
 namespace tangible {
@@ -23,6 +24,15 @@ TEST(ThreadCpuSecondsTest, CountsTheWorkOfThisThreadAlone) {
   EXPECT_LT(of_another, 0.5 * kWork);
   Work();
   EXPECT_GE(ThreadCpuSeconds() - start, kWork);
+}
+
+// The time of the only thread is that of the process.
+TEST(ThreadCpuSecondsTest, CountsSeconds) {
+  const std::clock_t process = std::clock();
+  const double start = ThreadCpuSeconds();
+  Work();
+  const double seconds = static_cast<double>(std::clock() - process) / CLOCKS_PER_SEC;
+  EXPECT_NEAR(ThreadCpuSeconds() - start, seconds, 0.1 * seconds);
 }
 
 }  // namespace

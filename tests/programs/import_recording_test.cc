@@ -59,9 +59,13 @@ TEST_F(ImportRecordingTest, TablesOfOthers) {
   // Nothing has been written over.
   EXPECT_EQ(Read(Path("o.csv")), "time,point,x,y\n0,tip,10,-20\n1,tip,12,-22\n");
   ExpectOneLine(Run("tangible-import-recording", table + " --kind=table" + out), 2, "--mapping");
-  ExpectOneLine(Run("tangible-import-recording", dlc + " --kind=deeplabcut" + out), 1,
-                "expected a frame rate");
+  ExpectOneLine(Run("tangible-import-recording", dlc + " --kind=deeplabcut" + out), 2,
+                "--frame_rate");
   ExpectOneLine(Run("tangible-import-recording", of_table + out + " --scale=0"), 2, "--scale");
+  ExpectOneLine(Run("tangible-import-recording", of_table + out + " --rate=100"), 2,
+                "--rate: goes with --kind=ibm_double_pendulum, got it with table");
+  ExpectOneLine(Run("tangible-import-recording", of_table + out + " --frame_rate=100"), 1,
+                "expected a column of times or a frame rate, got both");
   ExpectOneLine(Run("tangible-import-recording", of_table + " --out=" + mapping), 2, "--out");
 }
 

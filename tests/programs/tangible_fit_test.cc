@@ -159,7 +159,8 @@ TEST_F(TangibleFitTest, MistakesInRecordingsNameThem) {
   expect({{"start", 3}}, "recording 'b': /observations: expected some from start to end, got none");
   expect({{"start", 0.3}, {"end", 0.2}}, "/recordings/1/end: expected a time after start");
   expect({{"weight", 0}}, "/recordings/1/weight: expected a number > 0");
-  expect({{"values", {{"bodies/ball/mass", -1}}}}, "recording 'b': /values: bodies/ball/mass");
+  expect({{"values", {{"bodies/ball/mass", -1}}}},
+         "/recordings/1/values/bodies~1ball~1mass: expected a number > 0, got -1.0");
   expect({{"values", 5}}, "/recordings/1/values: expected an object");
   expect({{"initial", {{"sped", 1}}}}, "/recordings/1/initial/sped: expected the name");
   // A shared parameter starts where the file says.
@@ -293,6 +294,22 @@ TEST_F(TangibleFitTest, ASingleRunBeginsWhereTheObservationsSay) {
   EXPECT_NEAR(initial[3].get<double>(), 1.0, 1e-9);
   fit["initial"] = "from_nothing";
   ExpectOneLine(Fit(fit), 1, "/initial: expected one of from_observations");
+  fit = Problem({{"initial", "from_observations"}});
+  fit["parameters"].erase(1);
+  ExpectOneLine(Fit(fit), 1,
+                "fit.json: /initial: expected parameters that set nothing but initial poses, "
+                "twists, joint angles or rates, got none");
+}
+
+TEST_F(TangibleFitTest, WithoutAnEstimateWhatNeedsOneIsNotWritten) {
+  json fit = Problem();
+  fit["parameters"].push_back({{"name", "m"}, {"path", "bodies/ball/mass"}});
+  const ProgramRun run = Fit(fit, "--out='" + Path("r.json") + "' --report='" + Path("r.html") +
+                                      "' --scene_out='" + Path("s.json") + "'");
+  ExpectOneLine(run, 1, "; --report, --scene_out not written: there is no estimate");
+  EXPECT_EQ(json::parse(Read(Path("r.json")))["status"], "no_effect");
+  EXPECT_FALSE(std::filesystem::exists(Path("r.html")));
+  EXPECT_EQ(Fit(fit).error.find("not written"), std::string::npos);
 }
 
 TEST_F(TangibleFitTest, FitsAndWritesResultAndReport) {
@@ -366,6 +383,7 @@ TEST_F(TangibleFitTest, WritesTheFittedSceneAndItsPredictions) {
 
   ExpectOneLine(Fit(Problem(), "--predict_from=0.5"), 2, "none after it");
   ExpectOneLine(Fit(Problem(), "--predict_from=-1"), 2, "none up to it");
+  ExpectOneLine(Fit(Problem(), "--predict_from=-inf"), 2, "none up to it");
   ExpectOneLine(Fit(Problem(), "--predict_from=nan"), 2, "--predict_from");
   ExpectOneLine(Fit(Problem(), "--scene_out='" + Path("o.csv") + "'"), 2, "--scene_out");
   ExpectOneLine(Fit(Problem(), "--predictions='" + Path("none/p.csv") + "'"), 1, "none/p.csv");

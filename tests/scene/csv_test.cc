@@ -47,6 +47,7 @@ TEST(CsvTest, QuotedCellsHoldCommasAndQuotes) {
     EXPECT_EQ(SplitCsvLine("a," + CsvCell(cell) + ",b"),
               (std::vector<std::string>{"a", cell, "b"}));
   }
+  EXPECT_EQ(CsvCell("a\nb"), "\"a\nb\"");
   // A quote that is not closed ends with its line.
   EXPECT_FALSE(ParseCsv("a,b\n1,2\n\"3,4\n5,6\n", "t.csv", {}, {}, &table, &error));
   EXPECT_EQ(error, "t.csv: line 3: expected 2 cells, got 1");

@@ -75,6 +75,18 @@ TEST(RecordingTableTest, QuotedNamesMayHoldSeparatorsQuotesAndLineBreaks) {
   // Other lines keep their numbers.
   EXPECT_EQ(Import("\"t, s\",\"the \"\"tip\"\", x\",\"y\nof it\"\n0.5,2.5,z\n", options).error,
             "r.csv: line 3: \"y of it\": expected a number, got \"z\"");
+  // What separates cells is what stands outside of quotes.
+  imported = Import("t,\"x;\tm\"\n1,2\n", Mapped(R"m({"time": "t", "columns": [
+      {"column": "x;\tm", "point": "tip", "coordinate": "x"}]})m"));
+  ASSERT_TRUE(imported.ok) << imported.error;
+  EXPECT_EQ(imported.csv, "time,point,x\n1,tip,2\n");
+  // A mapping may name a column, or a body in it, with its line breaks.
+  imported = Import("t,\"LED\r\nno\",\"x\n(m)\"\n1,\"a\nb\",2\n",
+                    Mapped(R"m({"time": "t", "target": "point", "name": "LED\r\nno",
+                               "names": {"a\nb": "tip"},
+                               "columns": [{"column": "x\n(m)", "coordinate": "x"}]})m"));
+  ASSERT_TRUE(imported.ok) << imported.error;
+  EXPECT_EQ(imported.csv, "time,point,x\n1,tip,2\n");
 }
 
 TEST(RecordingTableTest, LongTablesByAMapping) {
@@ -106,7 +118,12 @@ TEST(RecordingTableTest, DeepLabCutOfOneAnimal) {
             "0.06,left_eye,32,-42\n");
   EXPECT_EQ(imported.recording.missing, 4);
   options.frame_rate = 0.0;
-  EXPECT_EQ(Import(text, options).error, "r.csv: expected a frame rate, as the file has no times");
+  EXPECT_EQ(Import(text, options).error,
+            "r.csv: expected a column of times or a frame rate, got neither");
+  TableOptions both = Mapped(kWide);
+  both.frame_rate = 50.0;
+  EXPECT_EQ(Import("t [s],th1,om1,th2\n0,2,3,4\n", both).error,
+            "r.csv: expected a column of times or a frame rate, got both");
 }
 
 TEST(RecordingTableTest, DeepLabCutOfSeveralAnimals) {
@@ -187,6 +204,8 @@ TEST(RecordingTableTest, MistakesAreOneLine) {
                        {"column": "th2", "body": "a", "coordinate": "angle"})"),
             "r.csv: line 2: expected angle of a once, got it twice");
   EXPECT_EQ(mapping(""), "m.json: /columns: expected at least one column, got none");
+  EXPECT_EQ(mapping("", R"(, "name": "th1", "target": "body", "names": ["a"])"),
+            "m.json: /names: expected an object of names, got an array of 1");
   EXPECT_NE(mapping(R"({"column": "th1", "body": "a", "coordinate": "angle"})", R"(, "step": 1)")
                 .find("m.json: /step: unknown key of a mapping"),
             std::string::npos);
@@ -208,7 +227,7 @@ TEST(RecordingTableTest, MistakesAreOneLine) {
     for (const char* text : {"", "\n", ",\n,\n,\n", "scorer\nbodyparts\ncoords\n", "#multi:\n"}) {
       TableOptions options = Mapped(kWide);
       options.format = format;
-      options.frame_rate = 1.0;
+      options.frame_rate = format == TableFormat::kDeepLabCut ? 1.0 : 0.0;
       const Imported imported = Import(text, options);
       EXPECT_FALSE(imported.ok) << text;
       EXPECT_NE(imported.error, "");

@@ -108,6 +108,21 @@ TEST(LinearizerTest, TheFirstBlockThatFailsIsNamed) {
   EXPECT_EQ(linearizer.message(), "block 1: fails");
 }
 
+// The square of a residual may be beyond a double where the residual is not.
+TEST(LinearizerTest, ACostThatIsNotFiniteIsAFailure) {
+  DecayProblem problem(2, 1);
+  problem.observed()[1][3] = 1e200;
+  Linearizer linearizer(&problem, DerivativeMethod::kTangent, 1, nullptr);
+  const Eigen::VectorXd q = ToInternal(problem.entries(), InitialOf(problem.entries()));
+  Linearisation model;
+  Linearisation target;
+  EXPECT_FALSE(linearizer.Linearise(q, {0.0, 0.0}, &model, &target));
+  EXPECT_EQ(linearizer.message(),
+            "the cost is not finite: an observation, a prior or a sigma is beyond all bounds");
+  // Huber's loss is linear there.
+  EXPECT_TRUE(linearizer.Linearise(q, {3.0, 3.0}, &model, &target));
+}
+
 TEST(ForEachOnThreadsTest, EachIsDoneOnce) {
   std::vector<std::atomic<int>> counts(100);
   ForEachOnThreads(4, 100, [&](int i) { ++counts[i]; });

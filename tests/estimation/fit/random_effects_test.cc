@@ -34,40 +34,65 @@ class MeansProblem : public LeastSquaresProblem {
   std::vector<ParameterEntry> entries_;
 };
 
-// ln L(τ) = −(B − 1)/2 ln v − S / (2 v) + a constant, v = τ² + σ², S the sum of squares about the
-// mean; the contrasts are S / v. The point at which the problem is linearised does not matter.
+// With v_b = τ² + s_b² of each block's value z_b, and their mean m weighed by 1 / v_b,
+//
+//   ln L(τ) = −½ Σ ln v_b − ½ ln Σ 1 / v_b − ½ Σ (z_b − m)² / v_b + a constant
+//
+// Gaussian: z_b is what is seen and s_b its deviation, wherever the problem is linearised.
+// Log-normal: z_b = ln θ_b + (seen − θ_b) / θ_b and s_b is relative to θ_b, in the linear problem.
 TEST(SpreadLikelihoodTest, IsThatOfTheMeansOfGroups) {
-  const std::vector<double> seen = {1.0, 3.5, 2.0, -0.5, 4.0, 2.5};
-  const double count = static_cast<double>(seen.size());
-  double mean = 0.0;
-  for (const double y : seen) mean += y / count;
-  double squares = 0.0;
-  for (const double y : seen) squares += (y - mean) * (y - mean);
-  MeansProblem problem(seen);
-  RandomEffect effect{"x", PriorKind::kGaussian, 0, {1, 2, 3, 4, 5, 6}};
-  Eigen::VectorXd at = Eigen::VectorXd::LinSpaced(7, 1.5, -2.0);
-  std::vector<BlockFactor> factors;
-  for (int b = 0; b < problem.num_blocks(); ++b) {
-    BlockEvaluation block;
-    problem.EvaluateBlock(b, Eigen::Vector2d(at[0], at[b + 1]), DerivativeMethod::kTangent,
-                          BlockDerivatives::kCompute, &block);
-    factors.push_back(Reduce(block, Eigen::Vector2d::Ones(), 1, 1, 1.0, 0.0));
+  for (const PriorKind kind : {PriorKind::kGaussian, PriorKind::kLogNormal}) {
+    const bool gaussian = kind == PriorKind::kGaussian;
+    const std::vector<double> seen = {1.0, 3.5, 2.0, -0.5, 4.0, 2.5};
+    const Eigen::VectorXd at = Eigen::VectorXd::LinSpaced(7, 1.5, gaussian ? -2.0 : 4.0);
+    MeansProblem problem(seen);
+    RandomEffect effect{"x", kind, 0, {1, 2, 3, 4, 5, 6}};
+    std::vector<BlockFactor> factors;
+    std::vector<double> values;
+    std::vector<double> deviations;
+    for (int b = 0; b < problem.num_blocks(); ++b) {
+      BlockEvaluation block;
+      problem.EvaluateBlock(b, Eigen::Vector2d(at[0], at[b + 1]), DerivativeMethod::kTangent,
+                            BlockDerivatives::kCompute, &block);
+      factors.push_back(Reduce(block, Eigen::Vector2d::Ones(), 1, 1, 1.0, 0.0));
+      const double scale = gaussian ? 1.0 : at[b + 1];
+      const double origin = gaussian ? at[b + 1] : std::log(at[b + 1]);
+      values.push_back(origin + (seen[b] - at[b + 1]) / scale);
+      deviations.push_back(MeansProblem::kSigma / scale);
+    }
+    const SpreadLikelihood likelihood(BlockLayout(problem), factors, {effect}, at,
+                                      std::vector<bool>(7, true));
+    const auto exact = [&](double spread) {
+      double weights = 0.0;
+      double weighed = 0.0;
+      double logarithms = 0.0;
+      for (size_t b = 0; b < values.size(); ++b) {
+        const double v = spread * spread + deviations[b] * deviations[b];
+        weights += 1.0 / v;
+        weighed += values[b] / v;
+        logarithms += std::log(v);
+      }
+      SpreadLikelihood::Value value;
+      for (size_t b = 0; b < values.size(); ++b) {
+        value.twice_cost += std::pow(values[b] - weighed / weights, 2) /
+                            (spread * spread + deviations[b] * deviations[b]);
+      }
+      value.likelihood = -0.5 * (logarithms + std::log(weights) + value.twice_cost);
+      return value;
+    };
+    const double shift = likelihood.At({1.0}).likelihood - exact(1.0).likelihood;
+    const double infinite = likelihood.At({1e8}).twice_cost;
+    for (const double spread : {1e-3, 0.1, 0.7, 1.5, 20.0}) {
+      const SpreadLikelihood::Value value = likelihood.At({spread});
+      const SpreadLikelihood::Value wanted = exact(spread);
+      EXPECT_NEAR(value.likelihood - shift, wanted.likelihood, 1e-8 * std::abs(wanted.likelihood))
+          << spread;
+      EXPECT_NEAR(value.twice_cost - infinite, wanted.twice_cost, 1e-8 * wanted.twice_cost)
+          << spread;
+    }
+    std::sort(deviations.begin(), deviations.end());
+    EXPECT_NEAR(likelihood.RangeOf(0).first, 1e-3 * deviations[3], 1e-12);
   }
-  const SpreadLikelihood likelihood(BlockLayout(problem), factors, {effect}, at,
-                                    std::vector<bool>(7, true));
-  const auto exact = [&](double spread) {
-    const double v = spread * spread + MeansProblem::kSigma * MeansProblem::kSigma;
-    return -0.5 * (count - 1.0) * std::log(v) - 0.5 * squares / v;
-  };
-  const double shift = likelihood.At({1.0}).likelihood - exact(1.0);
-  const double infinite = likelihood.At({1e8}).twice_cost;
-  for (const double spread : {1e-3, 0.1, 0.7, 1.5, 20.0}) {
-    const SpreadLikelihood::Value value = likelihood.At({spread});
-    EXPECT_NEAR(value.likelihood - shift, exact(spread), 1e-8 * std::abs(exact(spread))) << spread;
-    const double v = spread * spread + MeansProblem::kSigma * MeansProblem::kSigma;
-    EXPECT_NEAR(value.twice_cost - infinite, squares / v, 1e-8 * squares / v) << spread;
-  }
-  EXPECT_NEAR(likelihood.RangeOf(0).first, 1e-3 * MeansProblem::kSigma, 1e-12);
 }
 
 constexpr double kSpeed = 2.0;
@@ -111,6 +136,29 @@ FitResult FitThrows(RecordingsProblem* problem, VarianceComponents* components) 
 
 bool Contains(const ConfidenceInterval& interval, double x) {
   return interval && interval->first <= x && x <= interval->second;
+}
+
+// Speeds that are each seen with a deviation s have S = Σ (y_b − mean)² = (τ² + s²) χ², with B − 1
+// degrees of freedom: τ² + s² is S over their number, and its ends are S over quantiles of χ².
+TEST(RandomEffectsTest, ASpreadAndItsIntervalAreThoseOfChiSquare) {
+  constexpr int kCount = 10;
+  constexpr double kQuantiles[] = {19.0227678, 2.7003895};  // of 0.975 and 0.025, for 9
+  VarianceComponents components;
+  RecordingsProblem wide = Throws(kCount, kSpread, 9, 1e6);
+  const FitResult alone = FitThrows(&wide, &components);
+  const Eigen::ArrayXd seen = alone.estimate.tail(kCount).array();
+  const double sum = (seen - seen.mean()).square().sum();
+  const double s = alone.uncertainty.standard_deviation[1];
+  RecordingsProblem problem = Throws(kCount, kSpread, 9);
+  FitThrows(&problem, &components);
+  const SpreadEstimate& spread = components.spreads[0];
+  ASSERT_TRUE(spread.interval);
+  // What a fit leaves at convergence is a thousandth of τ.
+  EXPECT_NEAR(spread.spread, std::sqrt(sum / (kCount - 1) - s * s), 1e-3 * spread.spread);
+  EXPECT_NEAR(spread.interval->first, std::sqrt(sum / kQuantiles[0] - s * s),
+              1e-3 * spread.interval->first);
+  EXPECT_NEAR(spread.interval->second, std::sqrt(sum / kQuantiles[1] - s * s),
+              1e-3 * spread.interval->second);
 }
 
 // The bounds are four standard deviations of a count below 95 % (100 replicas: 2.2 each).

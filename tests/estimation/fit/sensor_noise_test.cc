@@ -99,6 +99,23 @@ TEST(SensorNoiseTest, OutliersDoNotMoveItWithHubersLoss) {
   EXPECT_NEAR(noise[1].factor, 0.1, 0.05);
 }
 
+// Residuals that are rounding show no noise.
+TEST(SensorNoiseTest, WhatIsSeenWithoutNoiseHasNoSigma) {
+  TwoSensors problem(1);
+  size_t i = 0;
+  for (const Observation& exact : Observe(problem.scene, 2, 0.0, 1)) {
+    if (exact.coordinate != Coordinate::kAngle) problem.observations[i++].value = exact.value;
+  }
+  RecordingsProblem residuals = problem.Residuals();
+  VarianceComponents noise_components;
+  const FitResult result = FitWithComponents(FitOptions(), &residuals, {}, &noise_components);
+  EXPECT_EQ(result.status, FitStatus::kNotConverged);
+  EXPECT_EQ(result.message,
+            "the sigma of sensor \"rough\" cannot be estimated: its observations leave no "
+            "residuals");
+  EXPECT_EQ(noise_components.noise[0].factor, 1.0);
+}
+
 TEST(SensorNoiseTest, ASensorWithoutResidualsIsSaid) {
   TwoSensors problem(1);
   problem.observations.resize(2);

@@ -110,7 +110,7 @@ TEST(ObservationTest, VelocitiesAndDistances) {
   EXPECT_EQ(parsed.channels[1].to_body, 0);
   EXPECT_EQ(parsed.channels[1].to_point, 0);
   EXPECT_EQ(ParseRecorded("time,body,distance\n0,ball,1\n", {}).error,
-            "o.csv: line 2: distance: expected relative_to to name a body or point, got none");
+            "o.csv: line 2: distance: expected relative_to to name a body or point, got the world");
   EXPECT_EQ(ParseRecorded("time,body,relative_to,x\n0,ball,bal,1\n", {}).error,
             "o.csv: line 2: relative_to: expected the name of a body (ball) or point (tip), got "
             "\"bal\"");

@@ -127,7 +127,27 @@ TEST(ParameterizedSceneTest, RadiiAreCheckedAsWhenASceneIsRead) {
   EXPECT_FALSE(fitted.Set(Eigen::VectorXd::Constant(1, 2.1e9)));
   EXPECT_FALSE(fitted.Set(Eigen::VectorXd::Constant(1, 1.9e-9)));
   EXPECT_FALSE(fitted.Create(scene, {}, {Parameter("bodies/ball/shape/radii/x", 1e11)}, &error));
-  EXPECT_EQ(error.what, "the initial values give a number that is not allowed");
+  EXPECT_EQ(error.what,
+            "the initial values give a number that is not allowed: the scene with these values: "
+            "/bodies/0/shape/ellipse/radii: expected two radii of a ratio of at most 1e9, got "
+            "100000000000.0 and 2.0");
+}
+
+TEST(ParameterizedSceneTest, LimitsAndOutlinesAreCheckedAsWhenASceneIsRead) {
+  Scene scene = MakeScene(kPendulum);
+  scene.joints[0].limits = {-1.5, 1.5};
+  ParameterizedScene fitted;
+  ParameterError error;
+  const FitParameter low = Parameter("joints/pin/limits/0", -1.2);
+  ASSERT_TRUE(fitted.Create(scene, {}, {low}, &error)) << error.what;
+  EXPECT_TRUE(fitted.Set(Eigen::VectorXd::Constant(1, 0.9)));
+  EXPECT_FALSE(fitted.Set(Eigen::VectorXd::Constant(1, 1.6)));
+  scene.bodies[0].shape = {ShapeType::kPolygon, {-1.0, -1.0, 1.0, -1.0, 0.0, 2.0}};
+  scene.bodies[0].inertia = 1.0;
+  ASSERT_TRUE(fitted.Create(scene, {}, {Parameter("bodies/bob/shape/vertices/2/y", 2.0)}, &error))
+      << error.what;
+  EXPECT_TRUE(fitted.Set(Eigen::VectorXd::Constant(1, -0.9)));
+  EXPECT_FALSE(fitted.Set(Eigen::VectorXd::Constant(1, -1.1)));
 }
 
 TEST(ParameterizedSceneTest, ParametersThatAddShareANumber) {

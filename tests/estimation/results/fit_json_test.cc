@@ -219,8 +219,23 @@ TEST_F(FitJsonTest, MistakesInRecordingsNameTheRecordingOnlyWhereItHasThem) {
   // Values that a parameter sets would be those of the parameter; what is added to them is not.
   EXPECT_EQ(message({{"parameters", {{{"name", "g"}, {"path", "gravity/*"}}}}},
                     {{"values", {{"gravity/y", -9}}}}),
-            "recording 'b': /values: gravity/y: expected a number that no parameter sets, got one "
+            "/recordings/1/values/gravity~1y: expected a number that no parameter sets, got one "
             "that \"g\" sets (initial says where its value in a recording begins)");
+  EXPECT_EQ(message(none, {{"values", {{"bodies/ball/mass", 2}, {"bodies/*/mass", 3}}}}),
+            "/recordings/1/values/bodies~1ball~1mass: expected numbers that no other parameter "
+            "sets, got bodies/ball/mass, which bodies/*/mass sets");
+  EXPECT_EQ(message(none, {{"values", {{"bodies/ball/mass", 0}}}}),
+            "/recordings/1/values/bodies~1ball~1mass: expected a number > 0, got 0.0");
+  EXPECT_EQ(message(none, {{"values", {{"bodies/bal/mass", 0}}}})
+                .find("/recordings/1/values/bodies~1bal~1mass: parameter bodies/bal/mass: matches"),
+            0u);
+  EXPECT_EQ(
+      message({{"initial", "from_observations"}, {"parameters", {"bodies/ball/velocity/x"}}}, none),
+      "/initial: expected parameters that set nothing but initial poses, twists, joint "
+      "angles or rates, each per recording, got none");
+  EXPECT_EQ(message(none, {{"initial", "from_observations"}}),
+            "/recordings/1/initial: expected parameters that set nothing but initial poses, "
+            "twists, joint angles or rates, each per recording, got none");
   const auto spread = [&](const Json& value) {
     return message({{"parameters",
                      {{{"path", "gravity/y"},
@@ -245,6 +260,31 @@ TEST_F(FitJsonTest, ValuesThatAParameterAddsToAreThoseOfTheRecording) {
                        folder_ + "fit.json", &fit, &error))
       << error;
   EXPECT_EQ(fit.run().scene.gravity.y(), -9.0);
+}
+
+// The range of a joint moves beyond itself: one end alone would be on the wrong side of the other.
+TEST_F(FitJsonTest, ValuesAreSetTogether) {
+  Json scene = Json::parse(kFallingBall);
+  scene["joints"] = {{{"name", "j"},
+                      {"type", "revolute"},
+                      {"bodies", {"ball", "world"}},
+                      {"anchor", {0, 0}},
+                      {"limits", {-1, 1}}}};
+  std::ofstream(folder_ + "scene.json") << scene;
+  const auto fit_with = [this](double low, double high, std::string* error) {
+    Json json = Json::parse(R"({"scene": "scene.json", "parameters": ["gravity/y"],
+        "recordings": [{"name": "a", "observations": [{"file": "seen.csv", "sigma": 0.01}]}]})");
+    json["recordings"][0]["values"] = {{"joints/j/limits/0", low}, {"joints/j/limits/1", high}};
+    FitFile fit;
+    return ParseFit(json.dump(), folder_ + "fit.json", &fit, error) ? fit.run().scene.joints[0]
+                                                                    : Scene().joints.emplace_back();
+  };
+  std::string error;
+  EXPECT_EQ(fit_with(2.0, 3.0, &error).limits->first, 2.0) << error;
+  fit_with(3.0, 2.0, &error);
+  EXPECT_EQ(error.find(folder_ + "fit.json: /recordings/0/values: the scene with these values: "),
+            0u)
+      << error;
 }
 
 TEST_F(FitJsonTest, ASensorWhoseSigmaIsEstimatedNeedsObservations) {

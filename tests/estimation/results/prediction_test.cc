@@ -68,15 +68,27 @@ TEST(PredictionTest, WhatIsFittedPredictsWhatFollows) {
       PredictionCsv(RecordingsProblem(std::move(residuals)), result.residuals, &all);
   EXPECT_EQ(
       csv.rfind("time,target,relative_to,coordinate,file,sensor,used,sigma,observed,predicted,"
-                "residual,residual_in_sigma\n0,ball,,x,fall_1.csv,,fit,0.001,0,0,0,0\n",
+                "residual,residual_in_sigma\n0,ball,,x,\"fall,1.csv\",,fit,0.001,0,0,0,0\n",
                 0),
       0u)
       << csv;
-  EXPECT_NE(csv.find("\n1,ball,,angle,fall_1.csv,,prediction,0.001,0.25,0,-0.25,-250\n"),
+  EXPECT_NE(csv.find("\n1,ball,,angle,\"fall,1.csv\",,prediction,0.001,0.25,0,-0.25,-250\n"),
             std::string::npos)
       << csv;
   EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'),
             static_cast<long>(1 + problem.observations.size() + later.size()));
+}
+
+TEST(PredictionTest, NamesWithCommasAreQuoted) {
+  const Scene scene = MakeScene(kFallingBall);
+  std::vector<RecordedRun> runs;
+  runs.push_back(
+      {"a, \"b\"", 1.0,
+       MakeResiduals(scene, {}, {Parameter("gravity/y", -9.0)}, Observe(scene, 10, 0.0, 1))});
+  const RecordingsProblem problem(std::move(runs), {ParameterScope()});
+  const std::string csv =
+      PredictionCsv(problem, Eigen::VectorXd::Zero(problem.num_rows(0)), nullptr);
+  EXPECT_NE(csv.find("\n\"a, \"\"b\"\"\",0,ball,"), std::string::npos) << csv;
 }
 
 TEST(PredictionTest, ARunThatFailsIsSaid) {
