@@ -78,8 +78,7 @@ function(tangible_precompile target)
   endif()
 endfunction()
 
-# With TANGIBLE_UNITY up to eight sources of a target are compiled as one. For files that have names of their own in
-# common (the groups of tangible-extremes) it is not called.
+# With TANGIBLE_UNITY up to eight sources of a target are compiled as one.
 function(tangible_unite target)
   get_target_property(sources ${target} SOURCES)
   list(FILTER sources INCLUDE REGEX "\\.cc$")
