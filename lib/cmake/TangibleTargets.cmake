@@ -78,6 +78,17 @@ function(tangible_precompile target)
   endif()
 endfunction()
 
+# With TANGIBLE_UNITY up to eight sources of a target are compiled as one.
+function(tangible_unite target)
+  get_target_property(sources ${target} SOURCES)
+  list(FILTER sources INCLUDE REGEX "\\.cc$")
+  list(LENGTH sources num_sources)
+  if(TANGIBLE_UNITY AND num_sources GREATER 1)
+    set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 8
+      UNITY_BUILD_CODE_BEFORE_INCLUDE "#undef TANGIBLE_INSTANTIATE\n#undef TANGIBLE_INSTANTIATE_JET")
+  endif()
+endfunction()
+
 # Everything that the tests labelled unit or program need, and nothing else.
 add_custom_target(tangible_unit_and_program_tests)
 
@@ -113,11 +124,7 @@ function(tangible_module name)
       tangible_precompile(${target})
     endif()
     add_dependencies(tangible_unit_and_program_tests ${target})
-    # Sources of verification have names of their own in common, as each is a list of cases.
-    if(TANGIBLE_UNITY AND NOT CMAKE_CURRENT_SOURCE_DIR MATCHES "/verification")
-      set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 8
-        UNITY_BUILD_CODE_BEFORE_INCLUDE "#undef TANGIBLE_INSTANTIATE\n#undef TANGIBLE_INSTANTIATE_JET")
-    endif()
+    tangible_unite(${target})
   else()
     add_library(${target} INTERFACE)
     set(scope INTERFACE)
@@ -157,6 +164,7 @@ function(tangible_program name)
   cmake_parse_arguments(PROGRAM "NO_PRECOMPILE" "" "SOURCES;LINK" ${ARGN})
   add_executable(${name} ${PROGRAM_SOURCES})
   target_link_libraries(${name} PRIVATE tangible_flags ${PROGRAM_LINK})
+  tangible_unite(${name})
   if(NOT PROGRAM_NO_PRECOMPILE)
     tangible_precompile(${name})
   endif()
@@ -176,12 +184,14 @@ endfunction()
 set(TANGIBLE_TEST_OPTIONS $<$<CONFIG:Release>:-O1>)
 
 # tangible_test(<name> [NO_PRECOMPILE] SOURCES file... LINK target... [LABELS label...] [TIMEOUT seconds]): one
-# test program, one ctest entry. NO_PRECOMPILE: what it links brings compiler options of its own.
+# test program, one ctest entry. The tests of a folder are one program, but for those that take long, are labelled
+# otherwise or count allocations. NO_PRECOMPILE: what it links brings compiler options of its own.
 function(tangible_test name)
   cmake_parse_arguments(TEST "NO_PRECOMPILE" "TIMEOUT" "SOURCES;LINK;LABELS" ${ARGN})
   add_executable(${name} ${TEST_SOURCES})
   target_link_libraries(${name} PRIVATE tangible_flags ${TEST_LINK} GTest::gtest_main)
   target_compile_options(${name} PRIVATE ${TANGIBLE_TEST_OPTIONS})
+  tangible_unite(${name})
   if(TANGIBLE_PRECOMPILE_HEADERS AND NOT TEST_NO_PRECOMPILE)
     target_precompile_headers(${name} REUSE_FROM tangible_precompiled_tests)
   endif()
@@ -206,6 +216,7 @@ function(tangible_benchmark name)
   find_package(benchmark REQUIRED)
   add_executable(${name} ${BENCHMARK_SOURCES})
   target_link_libraries(${name} PRIVATE tangible_flags ${BENCHMARK_LINK} benchmark::benchmark_main)
+  tangible_unite(${name})
   target_compile_definitions(${name} PRIVATE TANGIBLE_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
   set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY "${PROJECT_BINARY_DIR}/benchmarks")
 endfunction()

@@ -4,11 +4,10 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <numbers>
 
 namespace tangible {
 namespace {
-
-constexpr double kPi = 3.14159265358979323846;
 
 Cost EveryKind(bool at_end) {
   std::vector<CostTerm> terms(4);
@@ -78,9 +77,10 @@ TEST(Cost, GaussNewtonHasNoNegativeCurvature) {
 }
 
 TEST(Cost, WholeTurnsDoNotCount) {
-  const Cost cost(6, 1, 0.01, {{CostTerm::Kind::kAngle, 2, 0, {0, 0}, kPi, 1.0, true}});
+  const Cost cost(6, 1, 0.01,
+                  {{CostTerm::Kind::kAngle, 2, 0, {0, 0}, std::numbers::pi, 1.0, true}});
   VectorX<double> x = VectorX<double>::Zero(6);
-  x[2] = -kPi;
+  x[2] = -std::numbers::pi;
   EXPECT_NEAR(cost.EndValue(x), 0.0, 1e-30);
   x[2] = 0.0;
   EXPECT_NEAR(cost.EndValue(x), 2.0, 1e-12);
@@ -101,12 +101,12 @@ TEST(Cost, KnowsAnAngleHalfATurnFromItsTarget) {
     states << first, last;
     return cost.HasAngleAtMaximum(states);
   };
-  EXPECT_TRUE(has(0.0, 1.0 + 3.0 * kPi, true, 1.0));
-  EXPECT_TRUE(has(1.0 - kPi, 0.0, false, 1.0));
-  EXPECT_FALSE(has(1.0 - kPi, 0.0, true, 1.0));         // not at the end
-  EXPECT_FALSE(has(0.0, 1.0 + kPi, false, 1.0));        // not in a step
-  EXPECT_FALSE(has(0.0, 1.0 + kPi, true, 0.0));         // costs nothing
-  EXPECT_FALSE(has(0.0, 1.0 + kPi + 0.01, true, 1.0));  // its gradient is not zero
+  EXPECT_TRUE(has(0.0, 1.0 + 3.0 * std::numbers::pi, true, 1.0));
+  EXPECT_TRUE(has(1.0 - std::numbers::pi, 0.0, false, 1.0));
+  EXPECT_FALSE(has(1.0 - std::numbers::pi, 0.0, true, 1.0));         // not at the end
+  EXPECT_FALSE(has(0.0, 1.0 + std::numbers::pi, false, 1.0));        // not in a step
+  EXPECT_FALSE(has(0.0, 1.0 + std::numbers::pi, true, 0.0));         // costs nothing
+  EXPECT_FALSE(has(0.0, 1.0 + std::numbers::pi + 0.01, true, 1.0));  // its gradient is not zero
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 
 #include <Eigen/Cholesky>
 #include <cmath>
+#include <numbers>
 #include <random>
 
 #include "../support/scenes.h"
@@ -15,8 +16,6 @@ namespace tangible {
 namespace {
 
 using test_scenes::SceneOf;
-
-constexpr double kPi = 3.14159265358979323846;
 
 // x⁺ = A x + B u.
 class Linear : public StepMap {
@@ -67,7 +66,7 @@ class Pendulum : public StepMap {
 Cost SwingUp() {
   return Cost(2, 1, Pendulum::kStep,
               {{CostTerm::Kind::kControl, 0, 0, {0, 0}, 0.0, 0.1, false},
-               {CostTerm::Kind::kState, 0, 0, {0, 0}, kPi, 100.0, true},
+               {CostTerm::Kind::kState, 0, 0, {0, 0}, std::numbers::pi, 100.0, true},
                {CostTerm::Kind::kState, 1, 0, {0, 0}, 0.0, 100.0, true}});
 }
 
@@ -132,7 +131,7 @@ TEST(Ilqr, SwingsAPendulumUpWithinItsBounds) {
     const IlqrResult found =
         SolveIlqr(problem, RowMatrixXd::Constant(150, 1, 0.5), {.max_iterations = 500});
     EXPECT_EQ(found.status, IlqrStatus::kConverged) << found.message;
-    EXPECT_NEAR(found.plan.states(150, 0), kPi, 0.2);
+    EXPECT_NEAR(found.plan.states(150, 0), std::numbers::pi, 0.2);
     EXPECT_LE(found.plan.controls.cwiseAbs().maxCoeff(), bound);
     if (bound == 4.0) {
       EXPECT_EQ(found.plan.controls.cwiseAbs().maxCoeff(), bound);
@@ -299,13 +298,13 @@ TEST(Ilqr, LeavesTheMaximumOfAnAngleThatWraps) {
   Pendulum map;
   const Cost cost(2, 1, Pendulum::kStep,
                   {{CostTerm::Kind::kControl, 0, 0, {0, 0}, 0.0, 0.01, false},
-                   {CostTerm::Kind::kAngle, 0, 0, {0, 0}, kPi, 100.0, true},
+                   {CostTerm::Kind::kAngle, 0, 0, {0, 0}, std::numbers::pi, 100.0, true},
                    {CostTerm::Kind::kState, 1, 0, {0, 0}, 0.0, 10.0, true}});
   ControlProblem problem = ProblemOf(&map, &cost, VectorX<double>::Zero(2), 20.0);
   IlqrResult found = SolveIlqr(problem, RowMatrixXd::Zero(100, 1), {.max_iterations = 500});
   EXPECT_TRUE(found.left_maximum);
   EXPECT_EQ(found.status, IlqrStatus::kConverged) << found.message;
-  EXPECT_NEAR(std::abs(found.plan.states(100, 0)), kPi, 0.1);
+  EXPECT_NEAR(std::abs(found.plan.states(100, 0)), std::numbers::pi, 0.1);
   // Controls at their upper bound are offset downwards.
   problem.high[0] = 0.0;
   found = SolveIlqr(problem, RowMatrixXd::Zero(100, 1), {.max_iterations = 500});

@@ -10,9 +10,6 @@
 namespace tangible::testing {
 namespace {
 
-/// Rounding of coordinates below 10.
-constexpr double kTolerance = 1e-14;
-
 TEST(CollideHalfPlaneRandom, LowestVerticesInBothOrders) {
   std::mt19937 random(20240501);
   for (int sample = 0; sample < 5000; ++sample) {

@@ -12,9 +12,6 @@
 namespace tangible::testing {
 namespace {
 
-/// A few roundings of coordinates of order 1.
-constexpr double kTolerance = 1e-14;
-
 struct Expected {
   ContactFeature feature;
   double gap;

@@ -14,9 +14,6 @@ using internal::ConvexCore;
 using internal::CoreEdge;
 using internal::CoreFace;
 
-/// Rounding of coordinates of order 1.
-constexpr double kTolerance = 1e-15 * 4.0;
-
 TEST(ConvexCore, EdgesGoRoundWithTheirNormalsOutward) {
   const TestShape box = Box(2, 4);
   const ConvexCore core(box.View(), At(1, 1, 0.5 * std::numbers::pi), Vector2<double>(1, 1));

@@ -15,6 +15,9 @@
 
 namespace tangible::testing {
 
+/// A few roundings of coordinates of order 1.
+inline constexpr double kTolerance = 1e-14;
+
 template <typename T>
 struct OwnedShape {
   ShapeType type;

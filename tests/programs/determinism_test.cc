@@ -17,6 +17,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
+#include "../support/sanitizers.h"
 #include "extreme_scenes.h"
 #include "run_program.h"
 #include "tangible/dynamics/model/settings.h"
@@ -32,11 +33,6 @@ using nlohmann::json;
 constexpr char kFolder[] = TANGIBLE_SOURCE_DIR;
 constexpr char kList[] = TANGIBLE_SOURCE_DIR "/tests/programs/golden_hashes.txt";
 constexpr char kListTo[] = "TANGIBLE_GOLDEN_OUT";
-#ifdef __SANITIZE_ADDRESS__
-constexpr bool kSanitized = true;  // ten times slower: once, and against the list
-#else
-constexpr bool kSanitized = false;
-#endif
 constexpr int kMostSteps = 60;
 constexpr int kMostStepsByEvents = 4;
 
@@ -209,7 +205,7 @@ TEST_F(DeterminismTest, TheSameBitsOverThreadsRepeatsProcessesAndTheList) {
   }
   const std::string mine = TextOf(HashesWith(2));
   ASSERT_GE(std::count(mine.begin(), mine.end(), '\n'), 50);
-  if (!kSanitized) {
+  if (!testing::kSanitized) {  // ten times slower: once, and against the list
     EXPECT_EQ(Missing(mine, TextOf(HashesWith(1))), "") << "with one thread";
     const std::string own = std::filesystem::read_symlink("/proc/self/exe").string();
     const std::string command = "TMPDIR='" + Path("") + "' " + kListTo + "='" + Path("other.txt") +

@@ -23,10 +23,10 @@ struct ProgramRun {
 };
 
 /// A folder of its own for each test, removed with it.
-class ProgramTest : public testing::Test {
+class ProgramTest : public ::testing::Test {
  protected:
   void SetUp() override {
-    const auto* info = testing::UnitTest::GetInstance()->current_test_info();
+    const auto* info = ::testing::UnitTest::GetInstance()->current_test_info();
     // With the process in it: another build's tests may run at the same time.
     std::string name = std::string(info->test_suite_name()) + "." + info->name() + "." +
                        std::to_string(::getpid());

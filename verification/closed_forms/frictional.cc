@@ -16,7 +16,7 @@ constexpr char kBlockAndPlane[] = R"({"bodies": [
   {"name": "plane", "static": true, "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}}],
   "pairs": [{"bodies": ["block", "plane"], "friction": 0.5}]})";
 
-constexpr char kDiscAndPlane[] = R"({"bodies": [
+constexpr char kDiscOnPlane[] = R"({"bodies": [
   {"name": "disc", "shape": {"circle": {"radius": 0.1}}, "mass": 1, "inertia": 0.005,
    "position": [0, 0.1]},
   {"name": "plane", "static": true, "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}}],
@@ -204,7 +204,7 @@ ClosedForm SlideToRoll(const std::string& name, const Inputs& inputs) {
                   Take(inputs, {"x0", "th0", "v0", "w0", "mu", "g", "m", "r", "I", "T"}),
                   {"x_T", "th_T", "v_T", "w_T"},
                   &ExactSlideToRoll,
-                  kDiscAndPlane,
+                  kDiscOnPlane,
                   {},
                   {}};
   form.numbers = [](const NumberMap& p) {
@@ -227,7 +227,7 @@ ClosedForm Rolling(const std::string& name, const Inputs& inputs) {
                   Take(inputs, {"s0", "th0", "v0", "w0", "alpha", "mu", "g", "m", "r", "I", "T"}),
                   {"s_T", "th_T", "v_T", "w_T"},
                   &ExactRolling,
-                  kDiscAndPlane,
+                  kDiscOnPlane,
                   {},
                   {}};
   form.numbers = [](const NumberMap& p) {

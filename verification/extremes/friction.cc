@@ -12,8 +12,7 @@
 namespace tangible::extremes {
 namespace {
 
-constexpr char kGroup[] = "friction";
-constexpr double kGravity = 9.81;
+constexpr char kFrictionGroup[] = "friction";
 
 // A disc that spins at 10 rad/s on the floor: it ends at v = ω R / 3 whatever the friction > 0.
 Finding SpinningDisc(const std::string& stepping, double friction) {
@@ -114,13 +113,13 @@ void AddFriction(std::vector<ExtremeCase>* cases) {
     for (const double friction : {0.0, 1.0, 1e3, 1e12}) {
       char text[32];
       std::snprintf(text, sizeof(text), ", mu %g", friction);
-      cases->push_back({kGroup, std::string("spinning disc") + text, stepping,
+      cases->push_back({kFrictionGroup, std::string("spinning disc") + text, stepping,
                         [=](Length) { return SpinningDisc(stepping, friction); }});
-      cases->push_back({kGroup, std::string("sliding block") + text, stepping,
+      cases->push_back({kFrictionGroup, std::string("sliding block") + text, stepping,
                         [=](Length) { return SlidingBlock(stepping, friction); }});
-      cases->push_back({kGroup, std::string("slope of 40 degrees") + text, stepping,
+      cases->push_back({kFrictionGroup, std::string("slope of 40 degrees") + text, stepping,
                         [=](Length) { return Slope(stepping, friction); }});
-      cases->push_back({kGroup, std::string("pulled stack of 5") + text, stepping,
+      cases->push_back({kFrictionGroup, std::string("pulled stack of 5") + text, stepping,
                         [=](Length) { return PulledStack(stepping, friction); }});
     }
   }

@@ -13,7 +13,7 @@
 namespace tangible::extremes {
 namespace {
 
-constexpr char kGroup[] = "geometry";
+constexpr char kGeometryGroup[] = "geometry";
 
 // Two bodies that overlap, without gravity: they separate no faster than recovery_speed.
 Finding Part(Scene scene, const std::vector<std::string>& parameters) {
@@ -183,7 +183,7 @@ void AddGeometry(std::vector<ExtremeCase>* cases) {
                                          "bodies/a/friction"};
   for (const std::string stepping : kSteppings) {
     const auto add = [&](const std::string& name, const std::function<Finding()>& run) {
-      cases->push_back({kGroup, name, stepping, [run](Length) { return run(); }});
+      cases->push_back({kGeometryGroup, name, stepping, [run](Length) { return run(); }});
     };
     add("boxes half in each other", [=] { return Part(TwoBoxes(stepping, 1.0, 0.5, 0.01), pair); });
     add("box inside a box", [=] { return Part(TwoBoxes(stepping, 0.2, 0.1, 0.03), pair); });

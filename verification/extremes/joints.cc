@@ -12,7 +12,7 @@
 namespace tangible::extremes {
 namespace {
 
-constexpr char kGroup[] = "joints";
+constexpr char kJointsGroup[] = "joints";
 
 // A parallelogram: two cranks of 1 m and a coupler of 2 m; `duplicates` more copies of each hinge.
 Scene FourBar(const std::string& stepping, double dt, double duration, int duplicates) {
@@ -162,7 +162,7 @@ Finding LockedByLimits(const std::string& stepping) {
 void AddJoints(std::vector<ExtremeCase>* cases) {
   for (const std::string stepping : kSteppings) {
     const auto add = [&](const std::string& name, const std::function<Finding(Length)>& run) {
-      cases->push_back({kGroup, name, stepping, run});
+      cases->push_back({kJointsGroup, name, stepping, run});
     };
     for (const double dt : {0.1, 0.05, 0.01, 0.005}) {
       char text[32];

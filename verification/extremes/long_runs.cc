@@ -12,7 +12,7 @@
 namespace tangible::extremes {
 namespace {
 
-constexpr char kGroup[] = "long run";
+constexpr char kLongRunGroup[] = "long run";
 constexpr double kRounding = 2.3e-16;
 
 void AddConserved(const MeasuredRun& run, double steps, Finding* finding) {
@@ -99,13 +99,13 @@ Finding SpinningDiscLands(const std::string& stepping) {
 
 void AddLongRuns(std::vector<ExtremeCase>* cases) {
   for (const std::string stepping : kSteppings) {
-    cases->push_back({kGroup, "free box, 1e6 steps", stepping,
+    cases->push_back({kLongRunGroup, "free box, 1e6 steps", stepping,
                       [=](Length length) { return FreeFlight(stepping, 3.0, length); }});
-    cases->push_back({kGroup, "free box at 1e4 rad/s, 1e6 steps", stepping,
+    cases->push_back({kLongRunGroup, "free box at 1e4 rad/s, 1e6 steps", stepping,
                       [=](Length length) { return FreeFlight(stepping, 1e4, length); }});
-    cases->push_back({kGroup, "flywheels at 1e4 rad/s on a bar", stepping,
+    cases->push_back({kLongRunGroup, "flywheels at 1e4 rad/s on a bar", stepping,
                       [=](Length length) { return Flywheels(stepping, length); }});
-    cases->push_back({kGroup, "disc at 1e4 rad/s on the floor", stepping,
+    cases->push_back({kLongRunGroup, "disc at 1e4 rad/s on the floor", stepping,
                       [=](Length) { return SpinningDiscLands(stepping); }});
   }
 }

@@ -14,8 +14,7 @@
 namespace tangible::extremes {
 namespace {
 
-constexpr char kGroup[] = "mass ratio";
-constexpr double kGravity = 9.81;
+constexpr char kMassRatioGroup[] = "mass ratio";
 
 std::string Power(int exponent) { return "1e" + std::to_string(exponent); }
 
@@ -139,27 +138,27 @@ void AddMassRatios(std::vector<ExtremeCase>* cases) {
   for (const std::string stepping : kSteppings) {
     for (const int exponent : {3, 6, 9}) {
       const double ratio = std::pow(10.0, exponent);
-      cases->push_back({kGroup, "box " + Power(exponent) + " on box 1", stepping,
+      cases->push_back({kMassRatioGroup, "box " + Power(exponent) + " on box 1", stepping,
                         [=](Length length) { return TwoBoxes(stepping, 1.0, ratio, length); }});
-      cases->push_back({kGroup, "box 1 on box " + Power(exponent), stepping,
+      cases->push_back({kMassRatioGroup, "box 1 on box " + Power(exponent), stepping,
                         [=](Length length) { return TwoBoxes(stepping, ratio, 1.0, length); }});
-      cases->push_back({kGroup, "100 links hang, end " + Power(exponent), stepping,
+      cases->push_back({kMassRatioGroup, "100 links hang, end " + Power(exponent), stepping,
                         [=](Length length) { return HangingChain(stepping, ratio, length); }});
       cases->push_back(
-          {kGroup, "20 links swing, end " + Power(exponent), stepping, [=](Length length) {
+          {kMassRatioGroup, "20 links swing, end " + Power(exponent), stepping, [=](Length length) {
              return SwingingChain(stepping, ratio, Waves::kResolved, length);
            }});
       cases->push_back(
-          {kGroup, "ball " + Power(exponent) + " against chain of 1", stepping,
+          {kMassRatioGroup, "ball " + Power(exponent) + " against chain of 1", stepping,
            [=](Length length) { return BallAgainstChain(stepping, ratio, 1.0, length); }});
       cases->push_back(
-          {kGroup, "ball 1 against chain of " + Power(exponent), stepping,
+          {kMassRatioGroup, "ball 1 against chain of " + Power(exponent), stepping,
            [=](Length length) { return BallAgainstChain(stepping, 1.0, ratio, length); }});
     }
     for (const int exponent : {2, 4, 6}) {
       const double ratio = std::pow(10.0, exponent);
       cases->push_back(
-          {kGroup, "10 links swing, end " + Power(exponent), stepping,
+          {kMassRatioGroup, "10 links swing, end " + Power(exponent), stepping,
            [=](Length length) { return SwingingChain(stepping, ratio, Waves::kNot, length); }});
     }
   }

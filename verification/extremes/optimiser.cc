@@ -18,7 +18,7 @@
 namespace tangible::extremes {
 namespace {
 
-constexpr char kGroup[] = "optimiser";
+constexpr char kOptimiserGroup[] = "optimiser";
 
 std::string Format(const char* format, double value) {
   char text[64];
@@ -157,14 +157,14 @@ void AddOptimiser(std::vector<ExtremeCase>* cases) {
       for (const double mass : {1e-12, 1e12}) {
         char text[64];
         std::snprintf(text, sizeof(text), "%s of %g kg", body, mass);
-        cases->push_back({kGroup, text, stepping, [=, name = std::string(body)](Length) {
+        cases->push_back({kOptimiserGroup, text, stepping, [=, name = std::string(body)](Length) {
                             return AbsurdMass(stepping, name, mass);
                           }});
       }
     }
-    cases->push_back({kGroup, "every number NaN, infinite, 1.7e308", stepping,
+    cases->push_back({kOptimiserGroup, "every number NaN, infinite, 1.7e308", stepping,
                       [=](Length) { return NotNumbers(stepping); }});
-    cases->push_back({kGroup, "1e5 gradients in a row", stepping,
+    cases->push_back({kOptimiserGroup, "1e5 gradients in a row", stepping,
                       [=](Length length) { return ManyRollouts(stepping, length); }});
   }
 }

@@ -13,8 +13,7 @@
 namespace tangible::extremes {
 namespace {
 
-constexpr char kGroup[] = "paradox";
-constexpr double kGravity = 9.81;
+constexpr char kParadoxGroup[] = "paradox";
 
 std::string Twist(const MeasuredRun& run, const std::string& body) {
   char text[120];
@@ -200,7 +199,7 @@ Finding Groove(const std::string& stepping, double friction) {
 void AddParadoxes(std::vector<ExtremeCase>* cases) {
   for (const std::string stepping : kSteppings) {
     const auto add = [&](const std::string& name, const std::function<Finding()>& run) {
-      cases->push_back({kGroup, name, stepping, [run](Length) { return run(); }});
+      cases->push_back({kParadoxGroup, name, stepping, [run](Length) { return run(); }});
     };
     add("Painleve, inconsistent, h 1e-2", [=] { return RodSticks(stepping, 1e-2, 2.0); });
     add("Painleve, inconsistent, h 1e-6", [=] { return RodSticks(stepping, 1e-6, 2.0); });

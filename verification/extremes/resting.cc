@@ -12,8 +12,7 @@
 namespace tangible::extremes {
 namespace {
 
-constexpr char kGroup[] = "rest";
-constexpr double kGravity = 9.81;
+constexpr char kRestGroup[] = "rest";
 
 Scene Pyramid(const std::string& stepping, int base, double duration) {
   Scene scene = NewScene("pyramid", stepping, 0.01, duration);
@@ -162,22 +161,22 @@ Finding Cards(const std::string& stepping, Length length) {
 void AddResting(std::vector<ExtremeCase>* cases) {
   for (const std::string stepping : kSteppings) {
     for (const int count : {10, 50}) {
-      cases->push_back({kGroup, "stack of " + std::to_string(count), stepping,
+      cases->push_back({kRestGroup, "stack of " + std::to_string(count), stepping,
                         [=](Length length) {
                           return AtRest(Stack(stepping, count), length, count < 20 ? 5.0 : 1.0,
                                         count < 20 ? 10 : 3, "box0");
                         },
                         60.0});
     }
-    cases->push_back({kGroup, "pyramid, base 20", stepping,
+    cases->push_back({kRestGroup, "pyramid, base 20", stepping,
                       [=](Length length) {
                         return AtRest(Pyramid(stepping, 20, 1.0), length,
                                       stepping == "fixed" ? 0.2 : 0.02, 1, "box0_0");
                       },
                       60.0});
     for (const double mass : {300.0, 1e6}) {
-      cases->push_back({kGroup, mass < 1e3 ? "pyramid, top of 300 kg" : "pyramid, top of 1e6 kg",
-                        stepping,
+      cases->push_back({kRestGroup,
+                        mass < 1e3 ? "pyramid, top of 300 kg" : "pyramid, top of 1e6 kg", stepping,
                         [=](Length length) {
                           return AtRest(HeavyTop(stepping, mass), length,
                                         stepping == "fixed" ? 1.0 : 0.1, 1, "box0_0");
@@ -185,17 +184,17 @@ void AddResting(std::vector<ExtremeCase>* cases) {
                         60.0});
     }
     cases->push_back(
-        {kGroup, "box of 400 kg on two of 1 kg", stepping,
+        {kRestGroup, "box of 400 kg on two of 1 kg", stepping,
          [=](Length length) { return AtRest(HeavyOnTwo(stepping), length, 5.0, 10, "box0"); },
          60.0});
     cases->push_back(
-        {kGroup, "arch of 15 wedges, 0.15 thick", stepping,
+        {kRestGroup, "arch of 15 wedges, 0.15 thick", stepping,
          [=](Length length) { return AtRest(Arch(stepping, 0.15), length, 1.0, 3, "wedge0"); },
          60.0});
-    cases->push_back({kGroup, "arch of 15 wedges, 0.05 thick", stepping,
+    cases->push_back({kRestGroup, "arch of 15 wedges, 0.05 thick", stepping,
                       [=](Length) { return ArchFalls(stepping); }});
-    cases->push_back(
-        {kGroup, "two cards", stepping, [=](Length length) { return Cards(stepping, length); }});
+    cases->push_back({kRestGroup, "two cards", stepping,
+                      [=](Length length) { return Cards(stepping, length); }});
   }
 }
 

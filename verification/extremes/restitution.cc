@@ -12,8 +12,7 @@
 namespace tangible::extremes {
 namespace {
 
-constexpr char kGroup[] = "restitution";
-constexpr double kGravity = 9.81;
+constexpr char kRestitutionGroup[] = "restitution";
 
 Finding RestingContacts(const std::string& stepping, double restitution) {
   const double dt = 0.01;
@@ -164,19 +163,19 @@ Finding SpacedCradle(const std::string& stepping, int count) {
 
 void AddRestitution(std::vector<ExtremeCase>* cases) {
   for (const std::string stepping : kSteppings) {
-    cases->push_back({kGroup, "stack of 5 at rest, e 0", stepping,
+    cases->push_back({kRestitutionGroup, "stack of 5 at rest, e 0", stepping,
                       [=](Length) { return RestingContacts(stepping, 0.0); }});
-    cases->push_back({kGroup, "stack of 5 at rest, e 1", stepping,
+    cases->push_back({kRestitutionGroup, "stack of 5 at rest, e 1", stepping,
                       [=](Length) { return RestingContacts(stepping, 1.0); }});
-    cases->push_back({kGroup, "ball comes to rest (Zeno)", stepping,
+    cases->push_back({kRestitutionGroup, "ball comes to rest (Zeno)", stepping,
                       [=](Length) { return ZenoBall(stepping); }});
-    cases->push_back({kGroup, "elastic ball", stepping,
+    cases->push_back({kRestitutionGroup, "elastic ball", stepping,
                       [=](Length length) { return ElasticBall(stepping, length); }});
-    cases->push_back({kGroup, "cradle of 3 that touch", stepping,
+    cases->push_back({kRestitutionGroup, "cradle of 3 that touch", stepping,
                       [=](Length) { return TouchingCradle(stepping); }});
     for (const int count : {3, 10}) {
-      cases->push_back({kGroup, "cradle of " + std::to_string(count) + " with gaps", stepping,
-                        [=](Length) { return SpacedCradle(stepping, count); }});
+      cases->push_back({kRestitutionGroup, "cradle of " + std::to_string(count) + " with gaps",
+                        stepping, [=](Length) { return SpacedCradle(stepping, count); }});
     }
   }
 }

@@ -12,8 +12,7 @@
 namespace tangible::extremes {
 namespace {
 
-constexpr char kGroup[] = "scale";
-constexpr double kGravity = 9.81;
+constexpr char kScaleGroup[] = "scale";
 
 std::string Short(double x) {
   char text[32];
@@ -160,18 +159,19 @@ Finding HugeGravity(const std::string& stepping) {
 void AddScales(std::vector<ExtremeCase>* cases) {
   for (const std::string stepping : kSteppings) {
     for (const double dt : {1e-6, 1e-4, 1e-1, 1.0}) {
-      cases->push_back({kGroup, "dt " + Short(dt) + " s", stepping,
+      cases->push_back({kScaleGroup, "dt " + Short(dt) + " s", stepping,
                         [=](Length) { return TimeStep(stepping, dt); }});
     }
     for (const double scale : {1e-6, 1e-3, 1e3, 1e6}) {
-      cases->push_back({kGroup, "m, kg, g and settings times " + Short(scale), stepping,
+      cases->push_back({kScaleGroup, "m, kg, g and settings times " + Short(scale), stepping,
                         [=](Length) { return Rescaled(stepping, scale, scale); }});
-      cases->push_back({kGroup, "box of " + Short(scale) + " m and kg slides", stepping,
+      cases->push_back({kScaleGroup, "box of " + Short(scale) + " m and kg slides", stepping,
                         [=](Length) { return PlainSettings(stepping, scale); }});
     }
-    cases->push_back({kGroup, "gravity 0", stepping, [=](Length) { return NoGravity(stepping); }});
     cases->push_back(
-        {kGroup, "gravity 1e6", stepping, [=](Length) { return HugeGravity(stepping); }});
+        {kScaleGroup, "gravity 0", stepping, [=](Length) { return NoGravity(stepping); }});
+    cases->push_back(
+        {kScaleGroup, "gravity 1e6", stepping, [=](Length) { return HugeGravity(stepping); }});
   }
 }
 

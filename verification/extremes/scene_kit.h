@@ -15,7 +15,9 @@ namespace tangible::extremes {
 /// "fixed" with semi_implicit_euler, "event" with trapezoidal.
 inline constexpr const char* kSteppings[] = {"fixed", "event"};
 
-/// An empty scene without friction; gravity 9.81 downwards.
+inline constexpr double kGravity = 9.81;  ///< m/s²
+
+/// An empty scene without friction; gravity downwards.
 Scene NewScene(const std::string& name, const std::string& stepping, double dt, double duration);
 
 BasicBody<double>& AddBody(Scene* scene, const std::string& name, BasicShape<double> shape,

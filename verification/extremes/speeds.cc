@@ -12,7 +12,7 @@
 namespace tangible::extremes {
 namespace {
 
-constexpr char kGroup[] = "speed";
+constexpr char kSpeedGroup[] = "speed";
 constexpr double kWall = 1e-3;  // m, thickness
 
 enum class Flyer { kDisc, kSpinningBox, kNeedle };
@@ -90,17 +90,17 @@ void AddSpeeds(std::vector<ExtremeCase>* cases) {
       for (const double restitution : {0.0, 0.5}) {
         std::string name = "disc" + at;
         name += restitution > 0.0 ? ", e 0.5" : ", e 0";
-        cases->push_back({kGroup, name, stepping, [=](Length) {
+        cases->push_back({kSpeedGroup, name, stepping, [=](Length) {
                             return AgainstWall(stepping, Flyer::kDisc, speed, restitution);
                           }});
       }
-      cases->push_back({kGroup, "spinning box" + at, stepping, [=](Length) {
+      cases->push_back({kSpeedGroup, "spinning box" + at, stepping, [=](Length) {
                           return AgainstWall(stepping, Flyer::kSpinningBox, speed, 0.0);
                         }});
-      cases->push_back({kGroup, "needle" + at, stepping,
+      cases->push_back({kSpeedGroup, "needle" + at, stepping,
                         [=](Length) { return AgainstWall(stepping, Flyer::kNeedle, speed, 0.0); }});
-      cases->push_back(
-          {kGroup, "two discs" + at, stepping, [=](Length) { return HeadOn(stepping, speed); }});
+      cases->push_back({kSpeedGroup, "two discs" + at, stepping,
+                        [=](Length) { return HeadOn(stepping, speed); }});
     }
   }
 }

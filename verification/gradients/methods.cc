@@ -9,7 +9,6 @@
 namespace tangible {
 namespace {
 
-constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 const char* const kTrustworthy = "trustworthy";
 
 class MethodRun {

@@ -5,6 +5,7 @@
 // the certificate (computed before any of them is compared), the discrete choices of the run, the
 // sum of contributions to each entry, the error estimate of the differences.
 
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -29,6 +30,9 @@ enum Method {
 
 /// "tangent", "adjoint", ...
 const char* NameOf(Method method);
+
+/// An entry that a method did not compute.
+inline constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
 struct MethodJacobians {
   bool done = false;    ///< the run at the scene's own values

@@ -17,7 +17,6 @@ namespace {
 constexpr double kRounding = 1e-13;  // of the contributions
 constexpr double kShareOfColumn = 0.1;
 constexpr double kInteriorPointEnd = 1e-14;
-constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
 std::string Short(double x) {
   char text[32];

@@ -81,7 +81,7 @@ std::string ZeroColumns(const VerifyResult& result) {
   return out.str().empty() ? "" : "parameters on which nothing depends\n" + out.str() + "\n";
 }
 
-std::string Worst(const VerifyResult& result) {
+std::string WorstEntries(const VerifyResult& result) {
   std::ostringstream out;
   out << "worst entries, by error over bound\n";
   for (const auto& [scene, entry] : result.worst) {
@@ -180,7 +180,7 @@ std::string SummaryText(const VerifyResult& result, bool random) {
   if (random) {
     out << CoverageText(result.coverage);
   }
-  out << Worst(result) << result.scenes.size() << " scenes, " << result.not_run << " not run; "
+  out << WorstEntries(result) << result.scenes.size() << " scenes, " << result.not_run << " not run; "
       << result.total.entries << " entries, " << result.exceptions_named << " named exceptions, "
       << result.exceptions_unexplained << " unexplained\n";
   return out.str();

@@ -8,21 +8,10 @@
 #include "tangible/dynamics/model/parameter_map.h"
 #include "tangible/simulation/derivatives/rollout_adjoint.h"
 #include "tangible/simulation/derivatives/rollout_tangent.h"
+#include "tangible/verification/support/outputs.h"
 
 namespace tangible {
 namespace {
-
-// Calls visit(output, variable) in the order of the outputs.
-template <typename Visit>
-void ForEachOutput(const ModelStructure& structure, const Visit& visit) {
-  int output = 0;
-  for (const int body : structure.moving) {
-    for (int i = 0; i < 6; ++i) {
-      visit(output++,
-            i < 3 ? structure.PoseVariable(body, i) : structure.TwistVariable(body, i - 3));
-    }
-  }
-}
 
 // Sets the seeds of all outputs at the last state.
 void SeedOutputs(const ModelStructure& structure, RowMatrixXd* w_bar) {

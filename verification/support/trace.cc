@@ -5,23 +5,12 @@
 #include <tuple>
 
 #include "tangible/simulation/certificate/certify.h"
+#include "tangible/verification/support/outputs.h"
 
 namespace tangible {
 namespace {
 
 constexpr double kDegenerate = 1e-7;
-
-// Calls visit(output, variable) in the order of the outputs.
-template <typename Visit>
-void ForEachOutput(const ModelStructure& structure, const Visit& visit) {
-  int output = 0;
-  for (const int body : structure.moving) {
-    for (int i = 0; i < 6; ++i) {
-      visit(output++,
-            i < 3 ? structure.PoseVariable(body, i) : structure.TwistVariable(body, i - 3));
-    }
-  }
-}
 
 template <typename T>
 const T& VariableOf(const State<T>& state, int variable) {

@@ -5,26 +5,14 @@
 
 #include <cmath>
 
+#include "joint_cases.h"
+
 namespace tangible {
 namespace {
 
-constexpr JointType kTypes[] = {JointType::kRevolute, JointType::kPrismatic, JointType::kWeld,
-                                JointType::kDistance, JointType::kFixedAngle};
-constexpr double kPoses[6] = {0.3, -0.2, 0.7, -0.4, 0.5, -1.1};
-
-// Geometry by type; the axis is a unit vector of b's frame.
-std::vector<double> Geometry(JointType type) {
-  const double x = std::cos(0.6);
-  const double y = std::sin(0.6);
-  switch (type) {
-    case JointType::kPrismatic:
-      return {0.11, -0.23, 0.31, 0.17, x, y, 0.4};
-    case JointType::kFixedAngle:
-      return {0.4};
-    default:
-      return {0.11, -0.23, 0.31, 0.17, 0.4};
-  }
-}
+using testing::Geometry;
+using testing::kPoses;
+using testing::kTypes;
 
 JointRows<LocalJet> Evaluate(JointType type) {
   Pose<LocalJet> a(Vector2<LocalJet>(LocalJet(kPoses[0], 0), LocalJet(kPoses[1], 1)),

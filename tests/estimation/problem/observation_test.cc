@@ -8,7 +8,7 @@
 namespace tangible {
 namespace {
 
-const std::vector<BodyPoint> kPoints = {{"tip", 0, {0.5, 0.0}}};
+const std::vector<BodyPoint> kTip = {{"tip", 0, {0.5, 0.0}}};
 
 struct Parsed {
   bool ok = false;
@@ -18,7 +18,7 @@ struct Parsed {
 
 Parsed Parse(const std::string& text) {
   Parsed parsed;
-  parsed.ok = ParseObservations(text, "o.csv", MakeScene(kFallingBall), kPoints, {0.1, 0.2, 0.3},
+  parsed.ok = ParseObservations(text, "o.csv", MakeScene(kFallingBall), kTip, {0.1, 0.2, 0.3},
                                 &parsed.observations, &parsed.error);
   return parsed;
 }
@@ -89,8 +89,8 @@ Recorded ParseRecorded(const std::string& text, const ObservationOptions& option
   Instruments instruments;
   instruments.sensors = {{"encoder", 0.25}};
   instruments.clocks = {{"fast", 0.5, 0.25}};
-  parsed.ok = ParseObservations(text, "o.csv", ObservedScene{scene, kPoints, instruments}, {},
-                                options, &parsed.channels, &parsed.observations, &parsed.error);
+  parsed.ok = ParseObservations(text, "o.csv", ObservedScene{scene, kTip, instruments}, {}, options,
+                                &parsed.channels, &parsed.observations, &parsed.error);
   return parsed;
 }
 

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "../../support/contact_problems.h"
+#include "../../support/sanitizers.h"
 #include "../../support/step_cases.h"
 
 namespace tangible {
@@ -142,7 +143,7 @@ TEST(ContactSolverTest, AllChoicesFindTheSameTwistOfRandomProblems) {
 TEST(ContactSolverTest, WhatASolveLeansOnIsCounted) {
   std::mt19937_64 random(7);
   ContactFallbacks sum;
-  for (int trial = 0; trial < 30; ++trial) {
+  for (int trial = 0; trial < (testing::kSanitized ? 10 : 30); ++trial) {
     ContactProblem<double> p = testing::RandomContactProblem(&random, 6, 16);
     for (ContactBlock<double>& contact : p.contacts) contact.friction *= 15.0;
     ContactSolution<double> solution;

@@ -98,7 +98,7 @@ void RunCases(const LcpOptions& options, const std::set<std::string>& may_stay_u
     EXPECT_TRUE(std::isfinite(solution.residual));
   }
   std::cout << solved << " of " << solvable << " solvable problems solved\n";
-  testing::Test::RecordProperty("solved", solved);
+  ::testing::Test::RecordProperty("solved", solved);
 }
 
 TEST(SolverTest, PublishedProblems) { RunCases({}, {}); }

@@ -4,17 +4,13 @@
 #include <gtest/gtest.h>
 
 #include "../../support/scenes.h"
+#include "active_contact.h"
 #include "tangible/dynamics/model/model.h"
 
 namespace tangible {
 namespace {
 
-ActiveContact Contact(int a, int b) {
-  ActiveContact contact;
-  contact.a = a;
-  contact.b = b;
-  return contact;
-}
+using testing::Contact;
 
 // Links 0 and 1 are hinged to each other, 2 and 3 touch, 4 stands alone on the floor (5), as 0 and
 // 3 do; a spring connects 1 and 4.

@@ -3,16 +3,12 @@
 
 #include <gtest/gtest.h>
 
+#include "active_contact.h"
+
 namespace tangible {
 namespace {
 
-ActiveContact Contact(int a, int b, int joint = -1) {
-  ActiveContact contact;
-  contact.a = a;
-  contact.b = b;
-  contact.joint = joint;
-  return contact;
-}
+using testing::Contact;
 
 TEST(EventCountsTest, CountsPairsAndJointsApart) {
   EventCounts counts;

@@ -8,23 +8,15 @@
 #include <limits>
 #include <random>
 
-#include "../../support/scenes.h"
+#include "../../support/built.h"
 #include "tangible/geometry/collide.h"
 #include "tangible/simulation/stepping/rollout.h"
 
 namespace tangible {
 namespace {
 
-struct Built {
-  Model<double> model;
-  State<double> state;
-};
-
-Built Build(const std::string& text) {
-  Built built;
-  BuildModel(test_scenes::SceneOf(text), &built.model, &built.state);
-  return built;
-}
+using testing::Build;
+using testing::Built;
 
 constexpr double kRounding = 1e-14;
 

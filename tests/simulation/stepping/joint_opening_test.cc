@@ -7,30 +7,23 @@
 #include <limits>
 #include <string>
 
-#include "../../support/scenes.h"
+#include "../../support/built.h"
 #include "tangible/simulation/stepping/rollout.h"
 #include "tangible/simulation/stepping/tolerances.h"
 
 namespace tangible {
 namespace {
 
-using test_scenes::SceneOf;
-
-struct Built {
-  Model<double> model;
-  State<double> state;
-};
+using testing::Build;
+using testing::Built;
 
 // A rod of 2 m without a shape and a box of 0.6 m by 0.8 m, joined; `joint` has the type's keys.
-Built Build(const std::string& joint, const std::string& simulation = "{}") {
-  Built built;
-  BuildModel(SceneOf(R"({"bodies": [
+Built RodAndBox(const std::string& joint, const std::string& simulation = "{}") {
+  return Build(R"({"bodies": [
       {"name": "rod", "mass": 3, "inertia": 1, "position": [0, 0]},
       {"name": "box", "shape": {"box": {"size": [0.6, 0.8]}}, "mass": 1, "position": [1, 0]}],
     "joints": [{"name": "j", "bodies": ["rod", "box"], )" +
-                     joint + R"(}], "simulation": )" + simulation + "}"),
-             &built.model, &built.state);
-  return built;
+               joint + R"(}], "simulation": )" + simulation + "}");
 }
 
 constexpr char kHinge[] = R"("type": "revolute", "anchor": [0.5, 0])";
@@ -42,7 +35,7 @@ double OpeningOf(const Built& built) {
 }
 
 TEST(JointWatch, MeasuresAHingeBesideTheSmallerBody) {
-  Built built = Build(kHinge);
+  Built built = RodAndBox(kHinge);
   EXPECT_EQ(OpeningOf(built), 0.0);
   // The box is 1 m from corner to corner, the rod √(12 · 1 / 3) = 2 m long.
   built.state.pose[0] += 0.03;
@@ -53,7 +46,7 @@ TEST(JointWatch, MeasuresAHingeBesideTheSmallerBody) {
 TEST(JointWatch, MeasuresAngles) {
   for (const char* joint : {R"("type": "weld", "anchor": [0.5, 0])", R"("type": "fixed_angle")",
                             R"("type": "prismatic", "anchor": [0, 0], "axis": [1, 0])"}) {
-    Built built = Build(joint);
+    Built built = RodAndBox(joint);
     EXPECT_EQ(OpeningOf(built), 0.0) << joint;
     // About the anchor: the points stay together but for what a circle falls short of its tangent.
     built.state.pose[2] += 0.02;
@@ -68,10 +61,10 @@ TEST(JointWatch, MeasuresAngles) {
 }
 
 TEST(JointWatch, MeasuresDistancesAndWhatIsAcrossASlider) {
-  Built distance = Build(R"("type": "distance", "anchors": [[0, 0], [1, 0]])");
+  Built distance = RodAndBox(R"("type": "distance", "anchors": [[0, 0], [1, 0]])");
   distance.state.pose[0] -= 0.03;
   EXPECT_NEAR(OpeningOf(distance), 0.03, 1e-15);
-  Built slider = Build(R"("type": "prismatic", "anchor": [0, 0], "axis": [1, 0])");
+  Built slider = RodAndBox(R"("type": "prismatic", "anchor": [0, 0], "axis": [1, 0])");
   slider.state.pose[0] += 0.4;
   EXPECT_NEAR(OpeningOf(slider), 0.0, 1e-15);
   slider.state.pose[1] += 0.03;
@@ -79,7 +72,7 @@ TEST(JointWatch, MeasuresDistancesAndWhatIsAcrossASlider) {
 }
 
 TEST(JointWatch, KeepsTheWidestOfARunAndSaysOneLineFromAHundredthOn) {
-  Built built = Build(kHinge);
+  Built built = RodAndBox(kHinge);
   JointWatch watch(built.model);
   EXPECT_TRUE(watch.watches());
   EXPECT_EQ(watch.Message(built.model), "");
@@ -102,11 +95,13 @@ TEST(JointWatch, KeepsTheWidestOfARunAndSaysOneLineFromAHundredthOn) {
 }
 
 TEST(JointWatch, DoesNotWatchWhatIsKeptClosed) {
-  EXPECT_FALSE(JointWatch(Build(kHinge, R"({"joint_correction": "projection"})").model).watches());
-  EXPECT_FALSE(JointWatch(Build(kHinge, R"({"stepping": "event"})").model).watches());
-  EXPECT_TRUE(JointWatch(Build(kHinge, R"({"joint_correction": "baumgarte"})").model).watches());
+  EXPECT_FALSE(
+      JointWatch(RodAndBox(kHinge, R"({"joint_correction": "projection"})").model).watches());
+  EXPECT_FALSE(JointWatch(RodAndBox(kHinge, R"({"stepping": "event"})").model).watches());
   EXPECT_TRUE(
-      JointWatch(Build(kHinge, R"({"stepping": "event", "joint_correction": "none"})").model)
+      JointWatch(RodAndBox(kHinge, R"({"joint_correction": "baumgarte"})").model).watches());
+  EXPECT_TRUE(
+      JointWatch(RodAndBox(kHinge, R"({"stepping": "event", "joint_correction": "none"})").model)
           .watches());
 }
 
@@ -115,13 +110,14 @@ TEST(JointWatch, SeesAChainThatComesApart) {
   std::string text = test_scenes::HeavyEnd("1", R"("dt": 0.01, "duration": 8)");
   const std::string projection = R"("joint_correction": "projection", )";
   text.erase(text.find(projection), projection.size());
-  Model<double> model;
-  State<double> state;
-  BuildModel(SceneOf(text), &model, &state);
+  auto [model, state] = Build(text);
   JointWatch watch(model);
   const RolloutReport report = Rollout(
       model, state,
-      [&](long, double t, const State<double>& at, Stepper*) { watch.Look(model, at, t); }, &state);
+      [&, &model = model](long, double t, const State<double>& at, Stepper*) {
+        watch.Look(model, at, t);
+      },
+      &state);
   ASSERT_EQ(report.status, StepStatus::kDone);
   EXPECT_GT(watch.opening(), kOpenJoint);
 }

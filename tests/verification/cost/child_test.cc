@@ -9,15 +9,14 @@
 #include <ctime>
 #include <stdexcept>
 
+#include "../../support/sanitizers.h"
+
 namespace tangible::cost {
 namespace {
 
 constexpr size_t kMebibyte = 1u << 20;
-#if defined(__SANITIZE_ADDRESS__)
-constexpr double kOverhead = 0.2;  // a byte of shadow to eight, and what is kept of freed memory
-#else
-constexpr double kOverhead = 0.02;
-#endif
+// With sanitizers a byte of shadow to eight, and what is kept of freed memory.
+constexpr double kOverhead = testing::kSanitized ? 0.2 : 0.02;
 
 // Written and read again, so that it is there.
 double Fill(size_t bytes) {
