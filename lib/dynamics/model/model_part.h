@@ -65,8 +65,8 @@ struct ModelPart {
 /// joints + springs + forces + pairs of the whole).
 ModelPart TakePart(const ModelStructure& whole, const std::vector<int>& bodies);
 
-/// Whether the part of all bodies has all numbers: a kind of number that TakePart did not know would
-/// be missing, and parts would be wrong.
+/// Whether the part of all bodies has all numbers. A kind of number that TakePart did not know
+/// would be missing, and parts would be wrong.
 bool IsDivisible(const ModelStructure& whole);
 
 }  // namespace tangible

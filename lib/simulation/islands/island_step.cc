@@ -48,7 +48,7 @@ EventOutcome IslandStepper::Step(const Model<double>& model, double t, double h,
     next_guess_ = guess_;
     next_state_ = *state;
     const AtEvent at_event = guess_.connected ? AtEvent::kGoOn : AtEvent::kStopAtSecond;
-    const EventOutcome outcome = StepWhole(model, t, h, at_event, &next_state_);
+    EventOutcome outcome = StepWhole(model, t, h, at_event, &next_state_);
     if (!outcome.stopped) {
       std::swap(*state, next_state_);
       return outcome;

@@ -28,7 +28,7 @@ inline std::string BallOfRow(int i) {
          R"(, "friction": 0.3, "restitution": 0.7})";
 }
 
-/// These balls of the row above a floor and a belt that moves along it beneath the first two of them.
+/// These balls of the row above a floor and a belt, which moves along it beneath the first two.
 inline std::string Row(const std::vector<int>& balls, double duration) {
   std::string bodies =
       R"({"name": "floor", "static": true, "shape": {"half_plane": {"normal": [0, 1]}},
