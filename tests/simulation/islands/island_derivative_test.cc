@@ -19,8 +19,11 @@ using testing::Jacobian;
 constexpr double kDuration = 0.75;
 
 // Of all balls' bodies and of what they share: floor, belt, gravity.
-const std::vector<std::string> kShared = {"gravity/y", "bodies/floor/restitution",
-                                          "bodies/belt/position/y", "bodies/belt/velocity/x",
+const std::vector<std::string> kShared = {"gravity/y",
+                                          "bodies/floor/restitution",
+                                          "bodies/belt/position/y",
+                                          "bodies/belt/velocity/x",
+                                          "bodies/belt/velocity/y",
                                           "bodies/ball*/friction"};
 
 std::vector<std::string> Of(int ball) {
@@ -91,6 +94,39 @@ TEST(IslandDerivative, TheCertificateCountsTheEventsOfAll) {
   }
   EXPECT_EQ(together.certificate.events, events);
   EXPECT_EQ(together.certificate.verdict, "trustworthy");
+}
+
+// Discs that slide and stop within the first step, which is divided: what their contacts at the
+// start do to a derivative is found for each as for the disc alone.
+TEST(IslandDerivative, TheStartIsCertifiedForEachIsland) {
+  const auto scene = [](const std::vector<int>& discs) {
+    std::string bodies =
+        R"({"name": "floor", "static": true, "shape": {"half_plane": {"normal": [0, 1]}}, "friction": 0.3})";
+    for (const int i : discs) {
+      bodies += R"(, {"name": "disc)" + std::to_string(i) +
+                R"(", "shape": {"circle": {"radius": 0.1}}, "mass": 1, "position": [)" +
+                test_scenes::Number(i) + R"(, 0.1], "velocity": [)" +
+                test_scenes::Number(0.01 + 0.003 * i) + R"(, 0], "friction": 0.3})";
+    }
+    return SceneOf(R"({"bodies": [)" + bodies +
+                   R"(], "simulation": {"stepping": "event", "dt": 0.01, "duration": 0.05}})");
+  };
+  Model<double> model;
+  State<double> state;
+  BuildModel(scene({0, 1, 2}), &model, &state);
+  Stepper stepper(model);
+  EXPECT_EQ(stepper.Step(model, 0.0, 0.01, &state).islands, 3);
+  for (const char* path : {"bodies/disc1/position/y", "bodies/disc1/velocity/y",
+                           "bodies/disc1/velocity/x", "bodies/floor/shape/offset"}) {
+    const Certificate together =
+        Jacobian(scene({0, 1, 2}), {path}, GradientMethod::kTangent).certificate;
+    const Certificate alone = Jacobian(scene({1}), {path}, GradientMethod::kTangent).certificate;
+    EXPECT_EQ(together.verdict.substr(0, 9), alone.verdict.substr(0, 9)) << path;
+  }
+  EXPECT_EQ(
+      Jacobian(scene({0, 1, 2}), {"bodies/disc1/position/y"}, GradientMethod::kTangent)
+          .certificate.one_sided,
+      "contact of floor and disc1 touches at the start, bodies/disc1/position/y changes its gap");
 }
 
 }  // namespace

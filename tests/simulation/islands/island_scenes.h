@@ -28,13 +28,13 @@ inline std::string BallOfRow(int i) {
          R"(, "friction": 0.3, "restitution": 0.7})";
 }
 
-/// These balls of the row above a floor and a belt, which moves along it beneath the first two.
+/// These balls of the row above a floor and a belt, which moves and rises beneath the first two.
 inline std::string Row(const std::vector<int>& balls, double duration) {
   std::string bodies =
       R"({"name": "floor", "static": true, "shape": {"half_plane": {"normal": [0, 1]}},
           "friction": 0.3, "restitution": 0.7},
          {"name": "belt", "kinematic": true, "shape": {"box": {"size": [6, 0.1]}},
-          "position": [0, -0.02], "velocity": [-0.2, 0], "friction": 0.3, "restitution": 0.7})";
+          "position": [0, -0.02], "velocity": [-0.2, 0.01], "friction": 0.3, "restitution": 0.7})";
   for (const int ball : balls) {
     bodies += ", " + BallOfRow(ball);
   }

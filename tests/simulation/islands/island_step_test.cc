@@ -78,6 +78,7 @@ TEST(IslandStep, EachBallMovesAsAlone) {
   EXPECT_EQ(together.report.events, events);
   EXPECT_GT(events, 5 * kBalls);
   EXPECT_NEAR(together.final.pose[3], -0.2 * kDuration, kRounding);
+  EXPECT_NEAR(together.final.pose[4], -0.02 + 0.01 * kDuration, kRounding);
   EXPECT_EQ(together.final.twist[3], -0.2);
 }
 
