@@ -131,15 +131,21 @@ bool EngineStep::StepBack(long k, const VectorX<double>& next, const VectorX<dou
 void EngineStep::FindImpacts() {
   impacts_.clear();
   if (!stepper_.by_events()) return;
-  const EventRecord& record = stepper_.events().record();
+  const IslandRecords& records = stepper_.events().record();
+  for (int k = 0; k < records.num_islands; ++k) {
+    AddImpacts(*records.islands[k]);
+  }
+}
+
+void EngineStep::AddImpacts(const IslandRecord& island) {
   const double threshold = model_.structure->settings.restitution_threshold;
-  for (int i = 0; i < record.num_parts; ++i) {
-    const EventPart& part = *record.parts[i];
+  for (int i = 0; i < island.events.num_parts; ++i) {
+    const EventPart& part = *island.events.parts[i];
     if (!part.is_impulses || !Jumps(part.impulses, threshold)) continue;
     const Impulses& impulses = part.impulses;
     std::vector<Meeting> kind;
     for (size_t c = 0; c < impulses.contacts.size(); ++c) {
-      const ActiveContact& contact = impulses.contacts[c];
+      const ActiveContact contact = island.InWhole(impulses.contacts[c]);
       if (contact.IsJointFriction() || impulses.solution.normal_impulse[c] <= 0.0) continue;
       kind.push_back({contact.a, contact.b, contact.joint});
     }

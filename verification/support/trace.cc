@@ -156,12 +156,9 @@ void TraceSegment(const Segment& segment, const EventPart* next, long step, RunT
   }
 }
 
-void TraceStep(Stepper* stepper, long step, RunTrace* trace) {
-  if (!stepper->by_events()) {
-    TraceImpulses(stepper->record(), step, trace);
-    return;
-  }
-  const EventRecord& record = stepper->events().record();
+void TraceIsland(const IslandRecord& island, long step, RunTrace* trace) {
+  const EventRecord& record = island.events;
+  const size_t first = trace->steps.size();
   for (int k = 0; k < record.num_parts; ++k) {
     const EventPart& part = *record.parts[k];
     if (part.is_impulses) {
@@ -170,6 +167,22 @@ void TraceStep(Stepper* stepper, long step, RunTrace* trace) {
       TraceSegment(part.segment, k + 1 < record.num_parts ? record.parts[k + 1].get() : nullptr,
                    step, trace);
     }
+  }
+  for (size_t k = first; k < trace->steps.size(); ++k) {
+    for (ContactTrace& contact : trace->steps[k]) {
+      contact.contact = island.InWhole(contact.contact);
+    }
+  }
+}
+
+void TraceStep(Stepper* stepper, long step, RunTrace* trace) {
+  if (!stepper->by_events()) {
+    TraceImpulses(stepper->record(), step, trace);
+    return;
+  }
+  const IslandRecords& records = stepper->events().record();
+  for (int k = 0; k < records.num_islands; ++k) {
+    TraceIsland(*records.islands[k], step, trace);
   }
 }
 

@@ -77,6 +77,7 @@ const char* ModeName(ContactMode mode) {
 }
 
 bool RolloutCertifier::Wanted(int number) const {
+  if (island_ != nullptr) number = island_->NumberInWhole(number);
   return number >= 0 &&
          std::binary_search(options_.numbers.begin(), options_.numbers.end(), number);
 }
@@ -129,19 +130,24 @@ void RolloutCertifier::AddControls(const ModelStructure& structure, const Contro
     return controls.values.row(before) != controls.values.row(after);
   };
   const StepRecord& record = stepper->record();
-  const EventRecord& events = stepper->events().record();
-  for (int p = 0; p < events.num_parts; ++p) {
-    const EventPart& part = *events.parts[p];
-    if (part.is_impulses || !part.segment.IsEventLocated()) continue;
-    const Segment& segment = part.segment;
+  const auto add = [&](const Segment& segment, const ActiveContact& contact) {
     const double time = segment.time + segment.length;
-    const Place place{&structure, step, time, 0, &segment.event_contact, ContactMode::kOpen};
+    const Place place{&structure, step, time, 0, &contact, ContactMode::kOpen};
     for (const long boundary : {step, step + 1}) {
       const double edge = record.time + static_cast<double>(boundary - step) * record.h;
       const double distance = std::abs(time - edge) / record.h;
       if (distance < kBesideControls && changes(boundary)) {
         AddMargin(distance, place, "an event as controls change");
       }
+    }
+  };
+  const IslandRecords& records = stepper->events().record();
+  for (int k = 0; k < records.num_islands; ++k) {
+    const IslandRecord& island = *records.islands[k];
+    for (int p = 0; p < island.events.num_parts; ++p) {
+      const EventPart& part = *island.events.parts[p];
+      if (part.is_impulses || !part.segment.IsEventLocated()) continue;
+      add(part.segment, island.InWhole(part.segment.event_contact));
     }
   }
 }

@@ -66,6 +66,10 @@ class RolloutCertifier {
   void AddMargin(double margin, const Place& place, const std::string& what);
   void AddJump(double margin, const Place& place, const std::string& what);
   void AddEventStep(const Model<double>& model, long step, Stepper* stepper);
+  void AddIsland(const Model<double>& model, long step, EventDerivative* derivative,
+                 IslandRecord* island);
+  void EnterIsland(const ModelStructure& whole, const IslandRecord& island);
+  void LeaveIsland(const IslandRecord& island);
   void AddStart(const Model<double>& model, const EventRecord& record);
   void ProbeStarts(const Model<double>& model, const State<double>& start,
                    const std::vector<const ActiveContact*>& touching, const Segment* first);
@@ -92,6 +96,10 @@ class RolloutCertifier {
   void AddLinearSystem(const StepRecord& record, ContactSystem* system);
   void AddForceWindows(const Model<double>& model);
   bool Wanted(int number) const;
+  /// The directions of the variables of the island that is looked at.
+  const RowMatrixXd& Directions() const {
+    return island_ != nullptr ? own_directions_ : options_.directions;
+  }
   void OneSided(const std::string& reason);
 
   CertifyOptions options_;
@@ -108,6 +116,11 @@ class RolloutCertifier {
   // when.
   std::vector<ActiveContact> loaded_;
   std::vector<double> struck_at_;  ///< for each body: the time of its last impact, s
+  // The three of all islands, while closed_, loaded_ and struck_at_ are those of one.
+  std::vector<ActiveContact> all_closed_, all_loaded_;
+  std::vector<double> all_struck_at_;
+  const IslandRecord* island_ = nullptr;  ///< whose bodies and numbers are looked at
+  RowMatrixXd own_directions_;            ///< the directions of its variables
 };
 
 /// Runs the rollout and certifies it. A rollout that fails is certified up to the failure, which

@@ -118,7 +118,6 @@ void RolloutCertifier::AddSimultaneous(const Model<double>& model, long step,
       }
     }
   }
-  struck_at_.resize(s.bodies.size(), -std::numeric_limits<double>::infinity());
   for (const size_t i : approaching) {
     const double last =
         std::max(struck_at_[impact.contacts[i].a], struck_at_[impact.contacts[i].b]);
@@ -331,9 +330,72 @@ void RolloutCertifier::AddSegment(const Model<double>& model, long step,
   AddQuality(start.problem, segment->modes, &start.system);
 }
 
+// Contacts and impacts of earlier steps, as the island's: its bodies may have been in several.
+void RolloutCertifier::EnterIsland(const ModelStructure& whole, const IslandRecord& island) {
+  const auto of_island = [&](const std::vector<ActiveContact>& all,
+                             std::vector<ActiveContact>* own) {
+    own->clear();
+    for (const ActiveContact& contact : all) {
+      own->push_back(island.InIsland(contact));
+      if (own->back().a < 0 || own->back().b < 0) own->pop_back();
+    }
+  };
+  island_ = &island;
+  own_directions_.resize(0, 0);
+  if (options_.directions.cols() > 0) {
+    GatherRows(whole, *island.part, options_.directions, &own_directions_);
+  }
+  of_island(all_closed_, &closed_);
+  of_island(all_loaded_, &loaded_);
+  struck_at_.clear();
+  for (const int body : island.part->bodies) {
+    struck_at_.push_back(all_struck_at_[body]);
+  }
+}
+
+void RolloutCertifier::LeaveIsland(const IslandRecord& island) {
+  island_ = nullptr;
+  for (size_t k = 0; k < struck_at_.size(); ++k) {
+    all_struck_at_[island.part->bodies[k]] = struck_at_[k];
+  }
+  for (ActiveContact& contact : closed_) {
+    contact = island.InWhole(contact);
+  }
+  for (ActiveContact& contact : loaded_) {
+    contact = island.InWhole(contact);
+  }
+}
+
 void RolloutCertifier::AddEventStep(const Model<double>& model, long step, Stepper* stepper) {
-  EventRecord& record = stepper->events().mutable_record();
-  if (step == 0 && options_.directions.cols() > 0) {
+  IslandRecords& records = stepper->events().mutable_record();
+  EventDerivative& derivative = stepper->event_derivative().of_island();
+  struck_at_.resize(model.structure->bodies.size(), -std::numeric_limits<double>::infinity());
+  if (records.IsWhole()) {
+    AddIsland(model, step, &derivative, records.islands[0].get());
+    return;
+  }
+  all_closed_ = closed_;
+  all_loaded_ = loaded_;
+  all_struck_at_ = struck_at_;
+  std::vector<ActiveContact> closed, loaded;
+  Model<double> memory;
+  for (int k = 0; k < records.num_islands; ++k) {
+    IslandRecord& island = *records.islands[k];
+    EnterIsland(*model.structure, island);
+    AddIsland(island.ModelOf(model, &memory), step, &derivative, &island);
+    LeaveIsland(island);
+    closed.insert(closed.end(), closed_.begin(), closed_.end());
+    loaded.insert(loaded.end(), loaded_.begin(), loaded_.end());
+  }
+  closed_.swap(closed);
+  loaded_.swap(loaded);
+  struck_at_.swap(all_struck_at_);
+}
+
+void RolloutCertifier::AddIsland(const Model<double>& model, long step, EventDerivative* derivative,
+                                 IslandRecord* island) {
+  EventRecord& record = island->events;
+  if (step == 0 && Directions().cols() > 0) {
     AddStart(model, record);
   }
   const Segment* last = nullptr;  // ended by the last event of the pair with the most events
@@ -345,7 +407,7 @@ void RolloutCertifier::AddEventStep(const Model<double>& model, long step, Stepp
       AddImpact(model, step, &part.impulses);
       continue;
     }
-    AddSegment(model, step, &stepper->event_derivative(), &part.segment);
+    AddSegment(model, step, derivative, &part.segment);
     if (part.segment.IsEventLocated()) {
       const int count = located.Add(part.segment.event_contact);
       last = count > most ? &part.segment : last;

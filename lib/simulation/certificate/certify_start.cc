@@ -128,10 +128,10 @@ std::vector<ActiveContact> ThatMayJam(const Model<double>& model, const State<do
 
 bool RolloutCertifier::KeepsSide(const Model<double>& model, const ActiveContact& contact,
                                  EventDerivative* derivative, Segment* segment) const {
-  if (!segment->starts || !contact.IsJointFriction() || options_.directions.cols() == 0) {
+  if (!segment->starts || !contact.IsJointFriction() || Directions().cols() == 0) {
     return false;
   }
-  const RowMatrixXd after = derivative->AlongSegment(model, segment, options_.directions);
+  const RowMatrixXd after = derivative->AlongSegment(model, segment, Directions());
   LocalJacobianScratch scratch;
   std::vector<JacobianEntry> slip;
   AddSlipGradient(model, segment->after, contact, &scratch, &slip);
@@ -205,17 +205,15 @@ void RolloutCertifier::AddStart(const Model<double>& model, const EventRecord& r
     if (k >= loaded && !rests) {
       continue;
     }
-    for (Eigen::Index c = 0; c < options_.directions.cols(); ++c) {
+    for (Eigen::Index c = 0; c < Directions().cols(); ++c) {
       // There is an event soon after the start, on one side or on both: a body whose twist is
       // changed lifts off and lands, or slides and stops. The physics does not change by it, but it
       // splits the step for all bodies.
       const bool splits_here = splits && rests && k < loaded;
       const char* what =
-          contact->gap > -meant && Moves(gap, options_.directions, c) ? " changes its gap"
-          : pushed && Moves(approach, options_.directions, c)
-              ? " changes the speed at which it opens"
-          : splits_here &&
-                  (Moves(approach, options_.directions, c) || Moves(slip, options_.directions, c))
+          contact->gap > -meant && Moves(gap, Directions(), c) ? " changes its gap"
+          : pushed && Moves(approach, Directions(), c) ? " changes the speed at which it opens"
+          : splits_here && (Moves(approach, Directions(), c) || Moves(slip, Directions(), c))
               ? " lets an event split the first step"
               : nullptr;
       if (what != nullptr) {
@@ -244,7 +242,7 @@ void RolloutCertifier::ProbeStarts(const Model<double>& model, const State<doubl
   const std::vector<ActiveContact> may_jam = ThatMayJam(model, start, resting);
   const double acceleration = Acceleration(model, first);
   LocalJacobianScratch scratch;
-  for (Eigen::Index c = 0; c < options_.directions.cols(); ++c) {
+  for (Eigen::Index c = 0; c < Directions().cols(); ++c) {
     std::vector<ActiveContact> moved;
     for (const ActiveContact& contact : resting) {
       std::vector<JacobianEntry> approach, slip;
@@ -259,15 +257,15 @@ void RolloutCertifier::ProbeStarts(const Model<double>& model, const State<doubl
           MixedFriction(model, contact.a, contact.b).value > 0.0) {
         AddSlipGradient(model, start, contact, &scratch, &slip);
       }
-      if (Moves(approach, options_.directions, c) || Moves(slip, options_.directions, c)) {
+      if (Moves(approach, Directions(), c) || Moves(slip, Directions(), c)) {
         moved.push_back(contact);
       }
     }
     if (moved.empty()) {
       continue;
     }
-    const StartFinding found = ProbeStart(model, start, moved, options_.directions.col(c),
-                                          acceleration, options_.names[static_cast<size_t>(c)]);
+    const StartFinding found = ProbeStart(model, start, moved, Directions().col(c), acceleration,
+                                          options_.names[static_cast<size_t>(c)]);
     const Place place{model.structure.get(), 0, 0.0, 0, &found.contact, ContactMode::kOpen};
     if (found.kind == StartKind::kJump) {
       AddJump(0.0, place, found.what);

@@ -61,14 +61,12 @@ class Course {
 
   /// Whether the pair of a contact is closed as the last step ends.
   bool HasClosed(const ActiveContact& contact) {
-    const EventRecord& record = stepper_.events().record();
-    for (int p = record.num_parts - 1; p >= 0; --p) {
-      const EventPart& part = *record.parts[p];
-      if (part.is_impulses || !(part.segment.length > 0.0)) continue;
-      return std::any_of(part.segment.contacts.begin(), part.segment.contacts.end(),
-                         [&](const ActiveContact& other) {
-                           return other.joint < 0 && other.a == contact.a && other.b == contact.b;
-                         });
+    const IslandRecords& records = stepper_.events().record();
+    for (int k = 0; k < records.num_islands; ++k) {
+      const IslandRecord& island = *records.islands[k];
+      const ActiveContact own = island.InIsland(contact);
+      if (own.a < 0 || own.b < 0) continue;
+      if (HasClosed(island.events, own)) return true;
     }
     return false;
   }
@@ -83,10 +81,30 @@ class Course {
   }
 
  private:
-  void Watch() {
-    const EventRecord& record = stepper_.events().record();
-    for (int p = 0; p < record.num_parts; ++p) {
+  static bool HasClosed(const EventRecord& record, const ActiveContact& contact) {
+    for (int p = record.num_parts - 1; p >= 0; --p) {
       const EventPart& part = *record.parts[p];
+      if (part.is_impulses || !(part.segment.length > 0.0)) continue;
+      return std::any_of(part.segment.contacts.begin(), part.segment.contacts.end(),
+                         [&](const ActiveContact& other) {
+                           return other.joint < 0 && other.a == contact.a && other.b == contact.b;
+                         });
+    }
+    return false;
+  }
+
+  void Watch() {
+    const IslandRecords& records = stepper_.events().record();
+    Model<double> memory;
+    for (int k = 0; k < records.num_islands; ++k) {
+      const IslandRecord& island = *records.islands[k];
+      Watch(island.ModelOf(model_, &memory), island);
+    }
+  }
+
+  void Watch(const Model<double>& model, const IslandRecord& island) {
+    for (int p = 0; p < island.events.num_parts; ++p) {
+      const EventPart& part = *island.events.parts[p];
       if (!part.is_impulses && part.segment.length > 0.0) continue;
       const State<double>& before = part.is_impulses ? part.impulses.before : part.segment.before;
       State<double> after = before;
@@ -94,9 +112,9 @@ class Course {
       for (const ActiveContact& contact :
            part.is_impulses ? part.impulses.contacts : part.segment.contacts) {
         if (contact.joint >= 0) continue;
-        const double slip = std::abs(SpeedsOf(model_, before, contact).slip);
-        if (std::abs(SpeedsOf(model_, after, contact).slip) <= kStops * slip) {
-          jams_.emplace_back(contact, slip);
+        const double slip = std::abs(SpeedsOf(model, before, contact).slip);
+        if (std::abs(SpeedsOf(model, after, contact).slip) <= kStops * slip) {
+          jams_.emplace_back(island.InWhole(contact), slip);
         }
       }
     }

@@ -82,7 +82,7 @@ class RolloutTape {
     StepRecord record;
     ContactSystem system;
     std::unique_ptr<JointProjection> projection;  ///< where the scene asks for it
-    EventRecord events;  ///< event stepping: the step, in place of all of the above
+    IslandRecords events;  ///< event stepping: the step, in place of all of the above
     bool has_factors = false;
     size_t counted = 0;  ///< its bytes as contained in the tape's sums
     size_t bytes() const;

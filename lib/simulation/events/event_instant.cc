@@ -73,7 +73,7 @@ bool EventStepper::AddInstant(const Model<double>& model, double t, EventKind ki
   Segment& segment = part->segment;
   segment.time = t;
   segment.length = 0.0;
-  segment.starts = starts_;
+  segment.starts = guess_.starts;
   segment.middle = t;
   segment.before = *state;
   segment.event_number = -1;
@@ -239,8 +239,8 @@ bool EventStepper::LocateTouch(const Model<double>& model, double t, double slow
     }
   }
   const auto was_closed = [&](const ActiveContact& contact) {
-    for (size_t i = 0; i < last_contacts_.size(); ++i) {
-      if (last_contacts_[i].SameAs(contact)) return last_modes_[i] != ContactMode::kOpen;
+    for (size_t i = 0; i < guess_.contacts.size(); ++i) {
+      if (guess_.contacts[i].SameAs(contact)) return guess_.modes[i] != ContactMode::kOpen;
     }
     return false;
   };

@@ -25,6 +25,13 @@ double SpeedOf(const double* twist, double radius) {
 }  // namespace
 
 EventSearch::EventSearch(const Model<double>& model) : lengths_(model), flow_(model) {
+  Retarget(model);
+}
+
+void EventSearch::Retarget(const Model<double>& model) {
+  lengths_ = Lengths(model);
+  flow_.Retarget(model);
+  num_samples_ = 0;
   closing_.resize(model.structure->bodies.size());
   boxes_.resize(model.structure->bodies.size());
 }
@@ -232,7 +239,7 @@ void EventSearch::FindPairs(const Model<double>& model) {
     const double before = SpeedOf(&segment_->before.twist[3 * body], lengths_.radius(body));
     const double after =
         end.good ? SpeedOf(&end.motion.after.twist[3 * body], lengths_.radius(body)) : before;
-    closing_[body] = 1.02 * std::max(before, after) + 0.25 * std::abs(after - before);
+    closing_[body] = BoundOnSpeed(before, after);
     const double reach = closing_[body] * segment_->length +
                          kWiderBoxes * lengths_.smallest_radius() +
                          lengths_.Rounding(segment_->before, body, body);

@@ -13,6 +13,7 @@
 // Forces and sliding speeds are sampled at the segment's middle and end.
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <string>
 #include <utility>
@@ -24,9 +25,16 @@
 
 namespace tangible {
 
+/// A bound on the speed of a body's points over a motion, from its speeds at both ends, m/s.
+inline double BoundOnSpeed(double before, double after) {
+  return 1.02 * std::max(before, after) + 0.25 * std::abs(after - before);
+}
+
 class EventSearch {
  public:
   explicit EventSearch(const Model<double>& model);
+  /// Continues with another model.
+  void Retarget(const Model<double>& model);
 
   /// Starts the searches of one step, whose evaluations of the motion are bounded in number.
   void StartStep() {

@@ -131,24 +131,29 @@ int MostEvents(const Model<double>& model) {
 
 EventStepper::EventStepper(const Model<double>& model) : search_(model), flow_(model) {}
 
-void EventStepper::ClearGuess() {
-  starts_ = true;
-  broken_limits_.clear();
-  last_contacts_.clear();
-  last_modes_.clear();
+void EventStepper::Retarget(const Model<double>& model) {
+  search_.Retarget(model);
+  flow_.Retarget(model);
 }
 
-void EventStepper::SetGuess(const EventGuess& guess) {
-  broken_limits_.clear();
-  last_contacts_ = guess.contacts;
-  last_modes_ = guess.modes;
-  starts_ = guess.starts;
+void EventGuess::Clear() {
+  contacts.clear();
+  modes.clear();
+  broken_limits.clear();
+  starts = true;
+  located = 0;
+  connected = false;
+}
+
+size_t EventGuess::bytes() const {
+  return sizeof(ActiveContact) * contacts.capacity() + sizeof(ContactMode) * modes.capacity() +
+         sizeof(BrokenLimit) * broken_limits.capacity();
 }
 
 ContactMode EventStepper::GuessOf(const ActiveContact& contact) const {
-  for (size_t i = 0; i < last_contacts_.size(); ++i) {
-    if (last_contacts_[i].SameAs(contact)) {
-      return last_modes_[i];
+  for (size_t i = 0; i < guess_.contacts.size(); ++i) {
+    if (guess_.contacts[i].SameAs(contact)) {
+      return guess_.modes[i];
     }
   }
   return ContactMode::kSticking;
@@ -453,8 +458,8 @@ bool EventStepper::ChooseModes(const Model<double>& model, const State<double>& 
     }
   }
   if (segment->contacts.empty()) {
-    last_contacts_.clear();
-    last_modes_.clear();
+    guess_.contacts.clear();
+    guess_.modes.clear();
     return true;
   }
   ContactProblem<double> problem;
@@ -472,8 +477,8 @@ bool EventStepper::ChooseModes(const Model<double>& model, const State<double>& 
     }
     return false;
   }
-  last_contacts_ = segment->contacts;
-  last_modes_ = solution.modes;
+  guess_.contacts = segment->contacts;
+  guess_.modes = solution.modes;
   ShortenAtEllipses(model, solution, outcome, segment);
   // In an instant penetration is decided with the step's length, so that rounding does not count.
   const double length = segment->length > 0.0 ? segment->length : settings.dt;
@@ -482,18 +487,18 @@ bool EventStepper::ChooseModes(const Model<double>& model, const State<double>& 
 }
 
 void EventStepper::SwitchMode(const Segment& segment) {
-  for (size_t i = 0; i < last_contacts_.size(); ++i) {
+  for (size_t i = 0; i < guess_.contacts.size(); ++i) {
     // A body that stops does so at all its contacts; the speed of a contact tells whether it still
     // slides.
-    if (segment.event == EventKind::kSlipEnds && SlidingSign(last_modes_[i]) != 0.0) {
-      last_modes_[i] = ContactMode::kSticking;
+    if (segment.event == EventKind::kSlipEnds && SlidingSign(guess_.modes[i]) != 0.0) {
+      guess_.modes[i] = ContactMode::kSticking;
     }
-    if (segment.event == EventKind::kLiftOff && last_contacts_[i].SameAs(segment.event_contact)) {
-      last_modes_[i] = ContactMode::kOpen;
-    } else if (segment.event == EventKind::kSlipBegins && last_modes_[i] != ContactMode::kOpen &&
-               last_contacts_[i].IsBetweenTheSame(segment.event_contact)) {
+    if (segment.event == EventKind::kLiftOff && guess_.contacts[i].SameAs(segment.event_contact)) {
+      guess_.modes[i] = ContactMode::kOpen;
+    } else if (segment.event == EventKind::kSlipBegins && guess_.modes[i] != ContactMode::kOpen &&
+               guess_.contacts[i].IsBetweenTheSame(segment.event_contact)) {
       // Both ends of a face slide against the force that was at its limit.
-      last_modes_[i] =
+      guess_.modes[i] =
           segment.event_sign > 0.0 ? ContactMode::kSlidingNegative : ContactMode::kSlidingPositive;
     }
   }
@@ -525,9 +530,9 @@ bool EventStepper::EndOtherSlips(const Model<double>& model, double t, const Seg
     std::erase_if(ending_, [&](const EndingSlip& ending) {
       return coupled_.GroupOf(ending.contact) == ends;
     });
-    for (size_t i = 0; i < last_contacts_.size(); ++i) {
-      if (SlidingSign(last_modes_[i]) != 0.0 && coupled_.GroupOf(last_contacts_[i]) == ends) {
-        last_modes_[i] = ContactMode::kSticking;
+    for (size_t i = 0; i < guess_.contacts.size(); ++i) {
+      if (SlidingSign(guess_.modes[i]) != 0.0 && coupled_.GroupOf(guess_.contacts[i]) == ends) {
+        guess_.modes[i] = ContactMode::kSticking;
       }
     }
   }
@@ -536,10 +541,10 @@ bool EventStepper::EndOtherSlips(const Model<double>& model, double t, const Seg
 }
 
 EventOutcome EventStepper::Step(const Model<double>& model, double t, double h,
-                                State<double>* state) {
+                                State<double>* state, AtEvent at_event) {
   const FlowCounts own = flow_.counts();
   const FlowCounts searched = search_.flow_counts();
-  EventOutcome outcome = Advance(model, t, h, state);
+  EventOutcome outcome = Advance(model, t, h, at_event, state);
   outcome.solver.whole_system += flow_.counts().whole_system - own.whole_system +
                                  search_.flow_counts().whole_system - searched.whole_system;
   outcome.newton_stages =
@@ -554,7 +559,7 @@ bool EventStepper::SolveInstant(const Model<double>& model, double now, double h
   if (!SolveImpacts(model, now, state, outcome)) {
     return false;
   }
-  if ((starts_ || at_end) &&
+  if ((guess_.starts || at_end) &&
       !AddInstant(model, now, EventKind::kStepEnd, nullptr, state, outcome)) {
     return false;
   }
@@ -566,12 +571,12 @@ bool EventStepper::SolveInstant(const Model<double>& model, double now, double h
       return false;
     }
   }
-  if (starts_ && !at_end) {
+  if (guess_.starts && !at_end) {
     // The projection has changed twists that the joints do not allow, so that other contacts may
     // slide, or in other directions.
     FindTouching(model, *state);
   }
-  starts_ = false;
+  guess_.starts = false;
   return true;
 }
 
@@ -605,10 +610,11 @@ bool EventStepper::TakeEvent(const Model<double>& model, double now, double h,
   return EndOtherSlips(model, now, segment, state, outcome);
 }
 
-EventOutcome EventStepper::Advance(const Model<double>& model, double t, double h,
+EventOutcome EventStepper::Advance(const Model<double>& model, double t, double h, AtEvent at_event,
                                    State<double>* state) {
   EventOutcome outcome;
   record_.Clear();
+  guess_.located = 0;
   counts_.Clear();
   shortened_.Clear();
   search_.StartStep();
@@ -667,6 +673,11 @@ EventOutcome EventStepper::Advance(const Model<double>& model, double t, double 
       continue;
     }
     impulses_tried = false;
+    guess_.located += IsLocated(segment.event) ? 1 : 0;
+    outcome.stopped = at_event == AtEvent::kStopAtSecond && guess_.located > 1;
+    if (outcome.stopped) {
+      break;
+    }
     *state = segment.after;
     at_given_time = segment.event == EventKind::kStepEnd;
     halvings = 0;

@@ -64,13 +64,31 @@ struct EventOutcome {
   int ellipse_motions = 0;  ///< shortened because an ellipse turns over its contact point
   int pairs_compared = 0;   ///< boxes compared by the broad phase of its last search for events
   int pairs_near = 0;       ///< pairs whose boxes overlap, in that search
+  int islands = 0;          ///< stepped apart; 0: all bodies are one
+  bool stopped = false;     ///< before its end (AtEvent::kStopAtSecond)
+};
+
+/// Whether a step goes on however many events end its segments, or stops at the second one.
+enum class AtEvent { kGoOn, kStopAtSecond };
+
+/// A joint limit that is violated although recovery should move it.
+struct BrokenLimit {
+  ActiveContact limit;
+  int steps = 0;  ///< during which it has stayed unchanged
 };
 
 /// The data of the last event step that the next one uses, besides the state.
 struct EventGuess {
   std::vector<ActiveContact> contacts;
   std::vector<ContactMode> modes;
+  std::vector<BrokenLimit> broken_limits;
   bool starts = true;  ///< the next step is a run's first
+  int located = 0;     ///< events that ended segments of the last step
+  /// All bodies were one island when the islands were last looked for (islands/island_step.h).
+  bool connected = false;
+
+  void Clear();
+  size_t bytes() const;
 };
 
 /// Adds a solve to the report of a step.
@@ -87,18 +105,20 @@ std::string WhatIsUnsolved(const ModelStructure& structure, const Impulses& impu
 class EventStepper {
  public:
   explicit EventStepper(const Model<double>& model);
+  /// Continues with another model, for which the memory is used again.
+  void Retarget(const Model<double>& model);
 
-  EventOutcome Step(const Model<double>& model, double t, double h, State<double>* state);
+  EventOutcome Step(const Model<double>& model, double t, double h, State<double>* state,
+                    AtEvent at_event = AtEvent::kGoOn);
   /// The record of the last step.
   const EventRecord& record() const { return record_; }
   EventRecord& mutable_record() { return record_; }
-  /// Forgets the contacts' modes.
-  void ClearGuess();
-  void SaveGuess(EventGuess* guess) const { *guess = {last_contacts_, last_modes_, starts_}; }
-  void SetGuess(const EventGuess& guess);
+  const EventGuess& guess() const { return guess_; }
+  EventGuess& mutable_guess() { return guess_; }
 
  private:
-  EventOutcome Advance(const Model<double>& model, double t, double h, State<double>* state);
+  EventOutcome Advance(const Model<double>& model, double t, double h, AtEvent at_event,
+                       State<double>* state);
   struct Touching {
     std::vector<ActiveContact> contacts;
     std::vector<CoefficientSource> friction, restitution;
@@ -112,10 +132,6 @@ class EventStepper {
   void FindTouching(const Model<double>& model, const State<double>& state);
   void AddTouching(const Model<double>& model, const State<double>& state,
                    const ActiveContact& contact);
-  struct BrokenLimit {
-    ActiveContact limit;
-    int steps = 0;  ///< during which it has stayed unchanged
-  };
   /// At the start of a step: a joint limit among the touching contacts that has been violated for
   /// some steps without moving, although recovery would move it by `moved` in each; −1: none.
   int StuckLimit(const Model<double>& model, const State<double>& state, double moved);
@@ -186,17 +202,13 @@ class EventStepper {
 
   EventSearch search_;
   SegmentFlow flow_;
-  bool starts_ = true;  ///< the next step is a run's first
   ContactSolver solver_;
   EventRecord record_;
   AssemblyScratch<double> assembly_;
   Touching touching_;
-  std::vector<BrokenLimit> broken_limits_;
   std::vector<bool> rebounds_;  ///< of the last impact's contacts
   DecompressionSolver decompression_;
-  // The last modes, which are the next guess.
-  std::vector<ActiveContact> last_contacts_;
-  std::vector<ContactMode> last_modes_;
+  EventGuess guess_;
   EventCounts counts_;     ///< of this step
   EventCounts shortened_;  ///< motions shortened at ellipses in this step
   CoupledBodies coupled_;  ///< at this instant

@@ -83,7 +83,7 @@ int EventStepper::StuckLimit(const Model<double>& model, const State<double>& st
       continue;
     }
     int steps = 0;
-    for (const BrokenLimit& last : broken_limits_) {
+    for (const BrokenLimit& last : guess_.broken_limits) {
       if (last.limit.SameAs(limit) && std::abs(last.limit.gap - limit.gap) <= kStuckLimit * moved) {
         steps = last.steps + 1;
       }
@@ -91,7 +91,7 @@ int EventStepper::StuckLimit(const Model<double>& model, const State<double>& st
     stuck = moved > 0.0 && steps > kMostSteps ? static_cast<int>(i) : stuck;
     broken.push_back({limit, steps});
   }
-  broken_limits_.swap(broken);
+  guess_.broken_limits.swap(broken);
   return stuck;
 }
 

@@ -86,6 +86,8 @@ struct FlowCounts {
 class SegmentFlow {
  public:
   explicit SegmentFlow(const Model<double>& model) : lengths_(model) {}
+  /// Continues with another model.
+  void Retarget(const Model<double>& model) { lengths_ = Lengths(model); }
 
   /// Fills stages, corrections, projection and `after` of a segment whose time, length, middle,
   /// before, contacts, friction and modes are set. False with a message where it fails.

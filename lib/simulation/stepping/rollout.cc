@@ -5,7 +5,7 @@
 #include <cmath>
 #include <sstream>
 
-#include "tangible/simulation/events/event_jets.h"
+#include "tangible/simulation/islands/island_jets.h"
 #include "tangible/simulation/stepping/energy_watch.h"
 #include "tangible/simulation/stepping/tolerances.h"
 
@@ -173,7 +173,7 @@ RolloutReport RolloutJets(ControlledModel<T>* model, const State<T>& initial, Je
     }
     const State<T> before = jets;
     if (stepper.by_events()) {
-      EventStepInJets(now, values, route, &stepper.events().mutable_record(), &jets);
+      IslandStepInJets(now, values, route, &stepper.events().mutable_record(), &jets);
     } else if (route == JetRoute::kImplicit) {
       StepImplicit(now, &stepper, state, &jets);
     } else if (!StepUnrolled(now, stepper.record(), &jets)) {

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "tangible/simulation/events/event_jets.h"
+#include "tangible/simulation/islands/island_jets.h"
 #include "tangible/simulation/stepping/controlled_model.h"
 #include "tangible/simulation/stepping/step.h"
 

@@ -110,7 +110,7 @@ Stepper::Stepper(const Model<double>& model, int threads)
     : search_(model), islands_(std::make_unique<IslandSolver>(threads)) {
   const ModelStructure& s = *model.structure;
   if (s.settings.stepping == Stepping::kEvent) {
-    events_ = std::make_unique<EventStepper>(model);
+    events_ = std::make_unique<IslandStepper>(model);
     return;
   }
   int shaped = 0;
@@ -158,7 +158,7 @@ void Stepper::SetGuess(const StepRecord& record) {
 
 void Stepper::SaveGuess(StepperGuess* guess) const {
   if (events_) {
-    events_->SaveGuess(&guess->events);
+    guess->events = events_->guess();
     return;
   }
   guess->contacts = last_contacts_;
@@ -178,8 +178,7 @@ void Stepper::SetGuess(const StepperGuess& guess) {
 }
 
 size_t StepperGuess::bytes() const {
-  return sizeof(ActiveContact) * (contacts.capacity() + events.contacts.capacity()) +
-         sizeof(ContactMode) * events.modes.capacity() + solution.bytes();
+  return sizeof(ActiveContact) * contacts.capacity() + events.bytes() + solution.bytes();
 }
 
 ContactMode Stepper::InitialMode(const ContactBlock<double>& contact) const {

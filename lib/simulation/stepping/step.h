@@ -20,8 +20,8 @@
 #include "tangible/dynamics/assembly/contact_search.h"
 #include "tangible/lcp/contact/contact_islands.h"
 #include "tangible/lcp/contact/contact_solver.h"
-#include "tangible/simulation/events/event_derivative.h"
-#include "tangible/simulation/events/event_step.h"
+#include "tangible/simulation/islands/island_derivative.h"
+#include "tangible/simulation/islands/island_step.h"
 #include "tangible/simulation/stepping/joint_projection.h"
 
 namespace tangible {
@@ -41,7 +41,7 @@ struct StepReport {
   int beyond_reach = 0;     ///< of these, without rows: out of reach in this step (fixed stepping)
   int single_rows = 0;      ///< contacts and limits that have one row in place of three
   int angles_left_out = 0;  ///< bodies that have rows, but none that turns them
-  int islands = 0;          ///< with contacts, solved apart; 0: all that moves was solved together
+  int islands = 0;          ///< with contacts, or by events, solved apart; 0: all is one
   int factorisations = 0;   ///< of the island that took the most
   int iterations = 0;       ///< of the island that took the most
   int events = 0;           ///< located within the step (event stepping)
@@ -83,8 +83,8 @@ class Stepper {
   /// Whether steps are event steps; then events() made the last one, and derivatives use its
   /// record.
   bool by_events() const { return events_ != nullptr; }
-  EventStepper& events() { return *events_; }
-  EventDerivative& event_derivative() { return event_derivative_; }
+  IslandStepper& events() { return *events_; }
+  IslandDerivative& event_derivative() { return event_derivative_; }
   /// The mode system, factorised with the last step's modes.
   ContactSystem& system();
   JointProjection& projection() { return projection_; }
@@ -123,8 +123,8 @@ class Stepper {
                   StepReport* report);
   void Describe(const Model<double>& model, int contact, StepReport* report) const;
 
-  std::unique_ptr<EventStepper> events_;  ///< event stepping only
-  EventDerivative event_derivative_;
+  std::unique_ptr<IslandStepper> events_;  ///< event stepping only
+  IslandDerivative event_derivative_;
   ContactSearch search_;
   ContactSolver solver_;
   std::unique_ptr<IslandSolver> islands_;

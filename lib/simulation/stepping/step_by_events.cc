@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The stepper's event step: it runs event_step.h and reports the result like any other step.
+// The stepper's event step: it runs island_step.h and reports the result like any other step.
 #include <algorithm>
 #include <cmath>
 
@@ -9,10 +9,10 @@
 namespace tangible {
 namespace {
 
-// The place of a contact in the record of the whole step.
+// The place of a contact in the record of the whole step; `first` is that of its island's first.
 size_t PlaceOf(const ActiveContact& contact, const CoefficientSource& friction,
-               const CoefficientSource& restitution, StepRecord* record) {
-  for (size_t i = 0; i < record->contacts.size(); ++i) {
+               const CoefficientSource& restitution, size_t first, StepRecord* record) {
+  for (size_t i = first; i < record->contacts.size(); ++i) {
     if (record->contacts[i].SameAs(contact)) {
       return i;
     }
@@ -27,43 +27,55 @@ size_t PlaceOf(const ActiveContact& contact, const CoefficientSource& friction,
 }
 
 // Number of bodies that the rows of some part push but that no rows turn.
-int AnglesLeftOut(const EventRecord& record, std::vector<Turning>* scratch) {
-  scratch->clear();
-  for (int p = 0; p < record.num_parts; ++p) {
-    const EventPart& part = *record.parts[p];
-    if (part.is_impulses) {
-      AddTurning(part.impulses.problem, scratch);
-    } else if (part.segment.num_stages > 0) {
-      AddTurning(part.segment.stages[0].problem, scratch);
+int AnglesLeftOut(const IslandRecords& records, std::vector<Turning>* scratch) {
+  int count = 0;
+  for (int k = 0; k < records.num_islands; ++k) {
+    const EventRecord& record = records.islands[k]->events;
+    scratch->clear();
+    for (int p = 0; p < record.num_parts; ++p) {
+      const EventPart& part = *record.parts[p];
+      if (part.is_impulses) {
+        AddTurning(part.impulses.problem, scratch);
+      } else if (part.segment.num_stages > 0) {
+        AddTurning(part.segment.stages[0].problem, scratch);
+      }
     }
+    count += CountAnglesLeftOut(*scratch);
   }
-  return CountAnglesLeftOut(*scratch);
+  return count;
 }
 
-}  // namespace
+// A coefficient of an island's contact, by the numbers of the whole model.
+CoefficientSource InWhole(const IslandRecord& island, CoefficientSource source) {
+  for (int& number : source.numbers) {
+    number = island.NumberInWhole(number);
+  }
+  return source;
+}
 
-// Forces are integrated to impulses with the integrator's own weights.
-void Stepper::SumImpulses(const Model<double>& model) {
-  StepRecord& r = record_;
-  r.contacts.clear();
-  r.friction.clear();
-  r.restitution.clear();
-  r.solution = ContactSolution<double>();
-  r.solution.joint_impulse.assign(3 * model.structure->joints.size(), 0.0);
-  const EventRecord& events = events_->record();
-  const NystromTableau& tableau = NystromTableau::Of(IntegratorOf(model.structure->settings));
+// Adds the impulses of an island. Forces are integrated to impulses with the integrator's own
+// weights.
+void AddImpulses(const IslandRecord& island, const NystromTableau& tableau, StepRecord* record) {
+  StepRecord& r = *record;
+  const size_t first = r.contacts.size();
   const auto add_joints = [&](double weight, const std::vector<double>& impulses) {
     for (size_t k = 0; k < impulses.size(); ++k) {
-      r.solution.joint_impulse[k] += weight * impulses[k];
+      const size_t joint = island.JointInWhole(static_cast<int>(k / 3));
+      r.solution.joint_impulse[3 * joint + k % 3] += weight * impulses[k];
     }
   };
-  for (int p = 0; p < events.num_parts; ++p) {
-    const EventPart& part = *events.parts[p];
+  const auto place_of = [&](const ActiveContact& contact, const CoefficientSource& friction,
+                            const CoefficientSource& restitution) {
+    return PlaceOf(island.InWhole(contact), InWhole(island, friction), InWhole(island, restitution),
+                   first, &r);
+  };
+  for (int p = 0; p < island.events.num_parts; ++p) {
+    const EventPart& part = *island.events.parts[p];
     if (part.is_impulses) {
       const Impulses& impulses = part.impulses;
       for (size_t i = 0; i < impulses.contacts.size(); ++i) {
         const size_t at =
-            PlaceOf(impulses.contacts[i], impulses.friction[i], impulses.restitution[i], &r);
+            place_of(impulses.contacts[i], impulses.friction[i], impulses.restitution[i]);
         r.solution.normal_impulse[at] += impulses.solution.normal_impulse[i];
         r.solution.tangent_impulse[at] += impulses.solution.tangent_impulse[i];
         r.solution.modes[at] = impulses.solution.modes[i];
@@ -73,7 +85,7 @@ void Stepper::SumImpulses(const Model<double>& model) {
     }
     const Segment& segment = part.segment;
     for (size_t i = 0; i < segment.contacts.size(); ++i) {
-      const size_t at = PlaceOf(segment.contacts[i], segment.friction[i], CoefficientSource(), &r);
+      const size_t at = place_of(segment.contacts[i], segment.friction[i], CoefficientSource());
       for (int k = 0; k < segment.num_stages; ++k) {
         const double weight = segment.length * tableau.b[k];
         r.solution.normal_impulse[at] += weight * segment.stages[k].solution.normal_impulse[i];
@@ -84,6 +96,22 @@ void Stepper::SumImpulses(const Model<double>& model) {
     for (int k = 0; k < segment.num_stages; ++k) {
       add_joints(segment.length * tableau.b[k], segment.stages[k].solution.joint_impulse);
     }
+  }
+}
+
+}  // namespace
+
+void Stepper::SumImpulses(const Model<double>& model) {
+  StepRecord& r = record_;
+  r.contacts.clear();
+  r.friction.clear();
+  r.restitution.clear();
+  r.solution = ContactSolution<double>();
+  r.solution.joint_impulse.assign(3 * model.structure->joints.size(), 0.0);
+  const IslandRecords& records = events_->record();
+  const NystromTableau& tableau = NystromTableau::Of(IntegratorOf(model.structure->settings));
+  for (int k = 0; k < records.num_islands; ++k) {
+    AddImpulses(*records.islands[k], tableau, &r);
   }
 }
 
@@ -108,6 +136,7 @@ StepReport Stepper::StepByEvents(const Model<double>& model, double t, double h,
   report.factorisations = outcome.factorisations;
   report.iterations = outcome.iterations;
   report.residual = outcome.residual;
+  report.islands = outcome.islands;
   report.impact_energy_gain = outcome.impact_energy_gain;
   report.gap_min = HUGE_VAL;
   const auto finite = [](const std::vector<double>& x) {
@@ -129,15 +158,20 @@ StepReport Stepper::StepByEvents(const Model<double>& model, double t, double h,
                      : outcome.by_guess ? SolvedBy::kGuess
                                         : SolvedBy::kInteriorPoint;
   report.contacts = static_cast<int>(r.contacts.size());
+  size_t next = 0;
   for (size_t i = 0; i < r.contacts.size(); ++i) {
     report.gap_min = std::min(report.gap_min, r.contacts[i].gap);
     report.closed += r.solution.modes[i] != ContactMode::kOpen ? 1 : 0;
     report.lcp_rows += r.friction[i].value > 0.0 ? 3 : 1;
     report.single_rows += r.friction[i].value > 0.0 ? 0 : 1;
+    // Most contacts follow each other as in the last step.
     ContactMode last = ContactMode::kOpen;
     for (size_t k = 0; k < last_contacts_.size(); ++k) {
-      if (last_contacts_[k].SameAs(r.contacts[i])) {
-        last = last_solution_.modes[k];
+      const size_t at = (next + k) % last_contacts_.size();
+      if (last_contacts_[at].SameAs(r.contacts[i])) {
+        last = last_solution_.modes[at];
+        next = at + 1;
+        break;
       }
     }
     report.mode_switches += last != r.solution.modes[i] ? 1 : 0;

@@ -114,12 +114,15 @@ Course RunIn(const Scene& scene, const Units& units) {
           course.events += std::to_string(closed) + " ";
           return;
         }
-        const EventRecord& record = stepper->events().record();
-        for (int p = 0; p < record.num_parts; ++p) {
-          const EventPart& part = *record.parts[p];
-          const bool named = !part.is_impulses && part.segment.event != EventKind::kStepEnd;
-          course.events += part.is_impulses ? "impact " : named ? NameOf(part.segment.event) : "";
-          course.events += named ? ", " : "";
+        const IslandRecords& records = stepper->events().record();
+        for (int k = 0; k < records.num_islands; ++k) {
+          const EventRecord& record = records.islands[k]->events;
+          for (int p = 0; p < record.num_parts; ++p) {
+            const EventPart& part = *record.parts[p];
+            const bool named = !part.is_impulses && part.segment.event != EventKind::kStepEnd;
+            course.events += part.is_impulses ? "impact " : named ? NameOf(part.segment.event) : "";
+            course.events += named ? ", " : "";
+          }
         }
       },
       &course.final);

@@ -135,7 +135,8 @@ bool FlightModel::FirstMeeting(const BallState& ball, const Bricks& bricks, doub
   ++num_steps_;
   const StepReport report = stepper_->Step(model_, 0.0, length, &state_);
   if (report.status != StepStatus::kDone) return false;
-  const EventRecord& record = stepper_->events().record();
+  // One body moves, so that there is one island.
+  const EventRecord& record = stepper_->events().record().islands[0]->events;
   *when = 0.0;
   for (int i = 0; i < record.num_parts; ++i) {
     const EventPart& part = *record.parts[i];
