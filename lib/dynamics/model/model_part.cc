@@ -86,7 +86,7 @@ class PartTaker {
       TakeOne(&index.low);
       TakeOne(&index.high);
       TakeNumbers(2, &index.stiffness);
-      TakeOne(&index.friction);
+      TakeNumbers(index.has_decay ? 3 : 1, &index.friction);
       TakeSignal(&index.effort_signal);
     }
     to_->joint_loops = whole_.joint_loops && !to_->joints.empty();

@@ -35,7 +35,7 @@ Scene Everything() {
       {"name": "k0", "type": "prismatic", "bodies": ["p", "world"], "anchor": [9, 1],
        "axis": [0, 1], "damping": 0.3, "effort": 2},
       {"name": "j1", "type": "revolute", "bodies": ["b", "a"], "anchor": [0.05, -1],
-       "friction": 0.02},
+       "friction": 0.02, "kinetic_friction": 0.01, "stribeck_speed": 0.3},
       {"name": "k1", "type": "distance", "bodies": ["q", "p"], "anchors": [[9, 3], [9, 1]]}],
     "springs": [
       {"name": "s0", "bodies": ["q", "world"], "anchors": [[9, 3], [9, 5]], "stiffness": 10,
