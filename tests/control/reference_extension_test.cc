@@ -30,7 +30,7 @@ Scene FallingBall() {
     "simulation": {"dt": 0.01, "duration": 0.5, "stepping": "event"}})");
 }
 
-class ReferenceExtensionTest : public testing::Test {
+class ReferenceExtensionTest : public ::testing::Test {
  protected:
   void SetUp() override {
     ASSERT_EQ(function_.Create(FallingBall(), {}, {"forces/push/force/y"}, {}), "");

@@ -32,7 +32,7 @@ class Cubic : public StepMap {
   double limit = std::numeric_limits<double>::infinity();
 };
 
-class SampledSurrogateTest : public testing::Test {
+class SampledSurrogateTest : public ::testing::Test {
  protected:
   SampledSurrogateTest() : cost_(1, 1, 1.0, {}) {
     const VectorX<double> bound = VectorX<double>::Constant(1, 5.0);

@@ -70,7 +70,7 @@ std::vector<ParameterPath> AllNumbers(Scene scene) {
   return all;
 }
 
-class DataSceneTest : public testing::TestWithParam<std::string> {
+class DataSceneTest : public ::testing::TestWithParam<std::string> {
  protected:
   void SetUp() override {
     scene_ = Load(GetParam());
@@ -190,7 +190,7 @@ TEST_P(DataSceneTest, DifferencesAgree) {
   EXPECT_GE(nonzero, judged / 4);
 }
 
-INSTANTIATE_TEST_SUITE_P(Scenes, DataSceneTest, testing::ValuesIn(SceneFiles()),
+INSTANTIATE_TEST_SUITE_P(Scenes, DataSceneTest, ::testing::ValuesIn(SceneFiles()),
                          [](const auto& info) {
                            std::string name = info.param;
                            std::replace(name.begin(), name.end(), '-', '_');

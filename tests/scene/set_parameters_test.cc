@@ -19,7 +19,7 @@ constexpr char kScene[] = R"({"bodies": [
               "limits": [-1, 1]}],
   "forces": [{"name": "f", "body": "a", "force": [1, 0], "start": 0.1, "end": 0.2}]})";
 
-class SetParametersTest : public testing::Test {
+class SetParametersTest : public ::testing::Test {
  protected:
   void SetUp() override {
     std::string error;

@@ -16,7 +16,7 @@
 namespace tangible {
 namespace {
 
-class ReadTextFileTest : public testing::Test {
+class ReadTextFileTest : public ::testing::Test {
  protected:
   void SetUp() override {
     folder_ =

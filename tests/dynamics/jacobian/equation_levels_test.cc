@@ -60,7 +60,7 @@ struct Case {
   JacobianRoute route;
 };
 
-class EquationLevelsTest : public testing::TestWithParam<Case> {
+class EquationLevelsTest : public ::testing::TestWithParam<Case> {
  protected:
   void SetUp() override {
     BuildModel(test_scenes::SceneOf(Everything()), &model_, &state_);
@@ -251,12 +251,12 @@ TEST_P(EquationLevelsTest, EntriesAreTheDifferencesOfTheResidual) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Levels, EquationLevelsTest,
-                         testing::Values(Case{Level::kVelocity, JacobianRoute::kByHand},
-                                         Case{Level::kVelocity, JacobianRoute::kGeneric},
-                                         Case{Level::kAcceleration, JacobianRoute::kByHand},
-                                         Case{Level::kAcceleration, JacobianRoute::kGeneric},
-                                         Case{Level::kCorrection, JacobianRoute::kByHand},
-                                         Case{Level::kCorrection, JacobianRoute::kGeneric}),
+                         ::testing::Values(Case{Level::kVelocity, JacobianRoute::kByHand},
+                                           Case{Level::kVelocity, JacobianRoute::kGeneric},
+                                           Case{Level::kAcceleration, JacobianRoute::kByHand},
+                                           Case{Level::kAcceleration, JacobianRoute::kGeneric},
+                                           Case{Level::kCorrection, JacobianRoute::kByHand},
+                                           Case{Level::kCorrection, JacobianRoute::kGeneric}),
                          [](const auto& kind) {
                            const Level level = kind.param.level;
                            const std::string name = level == Level::kVelocity       ? "velocity"

@@ -15,14 +15,14 @@ namespace {
 
 const std::string kRecordings = TANGIBLE_SOURCE_DIR "/../shared/data";
 
-class PendulumsTest : public testing::Test {
+class PendulumsTest : public ::testing::Test {
  protected:
   void SetUp() override {
     if (!std::filesystem::exists(kRecordings)) {
       GTEST_SKIP() << "no recordings in " << kRecordings;
     }
     // The fit files look for scenes and observations beside their own folder.
-    const auto* info = testing::UnitTest::GetInstance()->current_test_info();
+    const auto* info = ::testing::UnitTest::GetInstance()->current_test_info();
     folder_ = std::filesystem::temp_directory_path() /
               (std::string("pendulums_") + info->name() + "." + std::to_string(::getpid()));
     std::filesystem::remove_all(folder_);

@@ -12,11 +12,11 @@
 namespace tangible {
 namespace {
 
-class FitJsonTest : public testing::Test {
+class FitJsonTest : public ::testing::Test {
  protected:
   void SetUp() override {
-    const auto* info = testing::UnitTest::GetInstance()->current_test_info();
-    folder_ = testing::TempDir() + "fit_json_" + info->name() + "/";
+    const auto* info = ::testing::UnitTest::GetInstance()->current_test_info();
+    folder_ = ::testing::TempDir() + "fit_json_" + info->name() + "/";
     std::filesystem::create_directories(folder_);
     std::ofstream(folder_ + "scene.json") << kFallingBall;
     std::ofstream(folder_ + "seen.csv") << "time,body,x,y\n0.5,ball,0.5,10.3\n1,ball,,8\n";

@@ -37,7 +37,7 @@ VectorX<double> ByAdjoint(const LcpDerivative& derivative, const MixedLcp<double
   return column;
 }
 
-class StepCaseTest : public testing::TestWithParam<SolverChoice> {};
+class StepCaseTest : public ::testing::TestWithParam<SolverChoice> {};
 
 TEST_P(StepCaseTest, ValuesAndTwoSidedDerivatives) {
   if (!CasesArePresent()) GTEST_SKIP() << "../shared/cases is not there";
@@ -127,8 +127,8 @@ TEST_P(StepCaseTest, CertificateTellsKinksFromMereRedundancy) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Solvers, StepCaseTest,
-                         testing::Values(SolverChoice::kAuto, SolverChoice::kInteriorPoint,
-                                         SolverChoice::kLemke));
+                         ::testing::Values(SolverChoice::kAuto, SolverChoice::kInteriorPoint,
+                                           SolverChoice::kLemke));
 
 // All seven blocks against central differences of the solver, by tangent and by adjoint.
 TEST(DerivativeTest, EveryDatumAgainstDifferences) {

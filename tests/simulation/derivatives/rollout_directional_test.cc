@@ -176,7 +176,7 @@ VectorX<double> Difference(const Scene& scene, const ParameterPath& parameter, d
          (2.0 * h);
 }
 
-class OneSidedTest : public testing::TestWithParam<Case> {};
+class OneSidedTest : public ::testing::TestWithParam<Case> {};
 
 TEST_P(OneSidedTest, AgreesWithOneSidedDifferences) {
   const Case& test = GetParam();
@@ -217,8 +217,8 @@ TEST_P(OneSidedTest, AgreesWithOneSidedDifferences) {
   EXPECT_TRUE(kink) << "the sides are alike: no test of a kink";
 }
 
-INSTANTIATE_TEST_SUITE_P(Kinks, OneSidedTest, testing::ValuesIn(Cases()),
-                         [](const testing::TestParamInfo<Case>& info) {
+INSTANTIATE_TEST_SUITE_P(Kinks, OneSidedTest, ::testing::ValuesIn(Cases()),
+                         [](const ::testing::TestParamInfo<Case>& info) {
                            std::string name = info.param.name;
                            for (char& c : name) {
                              c = std::isalnum(static_cast<unsigned char>(c)) ? c : '_';

@@ -42,7 +42,7 @@ Scene MixtureOf(Stepping stepping) {
   return scene;
 }
 
-class BatchTest : public testing::TestWithParam<Stepping> {
+class BatchTest : public ::testing::TestWithParam<Stepping> {
  protected:
   Scene scene_ = MixtureOf(GetParam());
   // Radii and masses: what a stepper might keep from row to row.
@@ -52,7 +52,7 @@ class BatchTest : public testing::TestWithParam<Stepping> {
   RowMatrixXd values_ = RowsAbout(parameters_, 9);
 };
 
-INSTANTIATE_TEST_SUITE_P(Stepping, BatchTest, testing::Values(Stepping::kFixed, Stepping::kEvent),
+INSTANTIATE_TEST_SUITE_P(Stepping, BatchTest, ::testing::Values(Stepping::kFixed, Stepping::kEvent),
                          [](const auto& info) {
                            return info.param == Stepping::kFixed ? "Fixed" : "Event";
                          });

@@ -8,7 +8,7 @@
 namespace tangible::bounce {
 namespace {
 
-class BounceStudyTest : public testing::Test {
+class BounceStudyTest : public ::testing::Test {
  protected:
   void SetUp() override {
     std::string error;

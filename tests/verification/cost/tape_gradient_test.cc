@@ -29,7 +29,7 @@ constexpr char kMixture[] = R"({"bodies": [
   "forces": [{"name": "push", "body": "box", "force": [1, 0.2], "start": 0.013, "end": 0.087}],
   "simulation": {"dt": 0.01, "duration": 0.2}})";
 
-class TapeGradientTest : public testing::Test {
+class TapeGradientTest : public ::testing::Test {
  protected:
   void SetUp() override {
     if (!TapeIsBuilt()) GTEST_SKIP() << "built without ADOL-C";

@@ -13,7 +13,7 @@ namespace {
 
 double RelativeError(double a, double b) { return std::abs(a - b) / std::abs(b); }
 
-class ErrataTest : public testing::Test {
+class ErrataTest : public ::testing::Test {
  protected:
   const SlidingBody body_ = ExampleBody();
   const std::vector<double> differences_ = GradientByDifferences(body_, Misprint::kNone);

@@ -14,7 +14,7 @@ struct GroupCase {
   const char* name;
 };
 
-class GroupsTest : public testing::TestWithParam<GroupCase> {};
+class GroupsTest : public ::testing::TestWithParam<GroupCase> {};
 
 TEST_P(GroupsTest, ACheapCaseHolds) {
   std::vector<ExtremeCase> cases;
@@ -33,18 +33,18 @@ TEST_P(GroupsTest, ACheapCaseHolds) {
   EXPECT_EQ(found, 2);  // both steppings
 }
 
-INSTANTIATE_TEST_SUITE_P(Groups, GroupsTest,
-                         testing::Values(GroupCase{&AddMassRatios, "box 1 on box 1e3"},
-                                         GroupCase{&AddResting, "two cards"},
-                                         GroupCase{&AddScales, "gravity 0"},
-                                         GroupCase{&AddSpeeds, "two discs at 1e4 m/s"},
-                                         GroupCase{&AddGeometry, "discs with one centre"},
-                                         GroupCase{&AddFriction, "slope of 40 degrees, mu 1e+12"},
-                                         GroupCase{&AddRestitution, "cradle of 3 that touch"},
-                                         GroupCase{&AddParadoxes, "Painleve, inconsistent, h 1e-6"},
-                                         GroupCase{&AddJoints, "welded loop falls"},
-                                         GroupCase{&AddLongRuns, "flywheels at 1e4 rad/s on a bar"},
-                                         GroupCase{&AddOptimiser, "ball of 1e+12 kg"}));
+INSTANTIATE_TEST_SUITE_P(
+    Groups, GroupsTest,
+    ::testing::Values(GroupCase{&AddMassRatios, "box 1 on box 1e3"},
+                      GroupCase{&AddResting, "two cards"}, GroupCase{&AddScales, "gravity 0"},
+                      GroupCase{&AddSpeeds, "two discs at 1e4 m/s"},
+                      GroupCase{&AddGeometry, "discs with one centre"},
+                      GroupCase{&AddFriction, "slope of 40 degrees, mu 1e+12"},
+                      GroupCase{&AddRestitution, "cradle of 3 that touch"},
+                      GroupCase{&AddParadoxes, "Painleve, inconsistent, h 1e-6"},
+                      GroupCase{&AddJoints, "welded loop falls"},
+                      GroupCase{&AddLongRuns, "flywheels at 1e4 rad/s on a bar"},
+                      GroupCase{&AddOptimiser, "ball of 1e+12 kg"}));
 
 }  // namespace
 }  // namespace tangible::extremes

@@ -16,7 +16,7 @@ constexpr char kThrow[] = R"({"gravity": [0, -10], "bodies": [
      "velocity": [3, 4], "angular_velocity": 2}],
   "simulation": {"dt": 0.1, "duration": 1, "stepping": "event", "integrator": "trapezoidal"}})";
 
-class SampledRunTest : public testing::Test {
+class SampledRunTest : public ::testing::Test {
  protected:
   void SetUp() override {
     std::string error;
