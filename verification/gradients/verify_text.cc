@@ -180,9 +180,9 @@ std::string SummaryText(const VerifyResult& result, bool random) {
   if (random) {
     out << CoverageText(result.coverage);
   }
-  out << WorstEntries(result) << result.scenes.size() << " scenes, " << result.not_run << " not run; "
-      << result.total.entries << " entries, " << result.exceptions_named << " named exceptions, "
-      << result.exceptions_unexplained << " unexplained\n";
+  out << WorstEntries(result) << result.scenes.size() << " scenes, " << result.not_run
+      << " not run; " << result.total.entries << " entries, " << result.exceptions_named
+      << " named exceptions, " << result.exceptions_unexplained << " unexplained\n";
   return out.str();
 }
 
