@@ -14,7 +14,7 @@ namespace {
 using test_scenes::SceneOf;
 
 // Two mechanisms and a free body, with every kind of number that a scene can have, interleaved.
-Scene Everything() {
+Scene ManyKinds() {
   return SceneOf(R"({"bodies": [
       {"name": "wall", "static": true, "position": [5, 0], "shape": {"box": {"size": [1, 2]}},
        "friction": 0.4},
@@ -54,7 +54,7 @@ Scene Everything() {
 TEST(ModelPart, ThePartOfAllBodiesIsTheModel) {
   Model<double> model;
   State<double> state;
-  BuildModel(Everything(), &model, &state);
+  BuildModel(ManyKinds(), &model, &state);
   const ModelStructure& whole = *model.structure;
   std::vector<int> bodies(static_cast<size_t>(whole.world()));
   std::iota(bodies.begin(), bodies.end(), 0);
@@ -73,7 +73,7 @@ TEST(ModelPart, ThePartOfAllBodiesIsTheModel) {
 TEST(ModelPart, APartAcceleratesAsTheWhole) {
   Model<double> model;
   State<double> state;
-  BuildModel(Everything(), &model, &state);
+  BuildModel(ManyKinds(), &model, &state);
   const auto named = [&](int body) { return model.structure->bodies[body].name; };
   const auto assemble = [](const Model<double>& of, const State<double>& at) {
     ContactProblem<double> problem;
