@@ -80,8 +80,9 @@ struct FlagRange {
   const char* flag;
   double value, least, most;
 };
-/// The first of several flags whose value is not finite or outside its range, as one line: "--games:
-/// expected a number from 1 to 100, got 0", or "... a number >= 1, got 0"; empty if none is.
+/// The first of several flags whose value is not finite or outside its range, as one line:
+/// "--games: expected a number from 1 to 100, got 0", or "... a number >= 1, got 0"; empty if none
+/// is.
 std::string FirstOutside(std::initializer_list<FlagRange> flags);
 /// The most threads that a program starts.
 inline constexpr int kMostThreads = 256;

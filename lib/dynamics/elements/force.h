@@ -48,8 +48,8 @@ void ForceAt(const ModelStructure& structure, const ForceIndex& force, const T& 
 /// The mean effort (N m, N) of a joint's signal over a step.
 double MeanEffort(const ModelStructure& structure, const JointIndex& joint, double t, double h);
 
-/// By how much the friction of a joint that slides is below that at rest, with the sign of the speed
-/// (N, N m). `numbers` are the friction at rest, the kinetic friction and Stribeck's speed.
+/// By how much the friction of a joint that slides is below that at rest, with the sign of the
+/// speed (N, N m). `numbers` are the friction at rest, the kinetic friction and Stribeck's speed.
 template <typename T>
 T FrictionDecay(const T numbers[3], const T& speed);
 

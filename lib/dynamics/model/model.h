@@ -71,8 +71,8 @@ struct JointIndex {
   int num_geometry = 0;
   int damping = -1, effort = -1, low = -1, high = -1;  ///< −1: none of this type, or no limits
   int stiffness = -1;  ///< then the coordinate at rest; −1: no spring
-  /// The force or torque at which it slides; −1: none. With Stribeck's decay the kinetic friction and
-  /// Stribeck's speed follow.
+  /// The force or torque at which it slides; −1: none. With Stribeck's decay the kinetic friction
+  /// and Stribeck's speed follow.
   int friction = -1;
   bool has_decay = false;
   int effort_signal = -1;  ///< into signals; replaces effort

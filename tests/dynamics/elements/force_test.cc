@@ -119,7 +119,8 @@ TEST(ForceTest, SpringRowIsTheDerivativeOfItsLengthAndFiniteAtZero) {
   EXPECT_TRUE(row.row_a[0].v.allFinite());
 }
 
-// F_k + (F − F_k) e^{−(v/v_s)²} is what is left; the decay is odd, and smooth where the joint stands.
+// F_k + (F − F_k) e^{−(v/v_s)²} is what is left; the decay is odd, and smooth where the joint
+// stands.
 TEST(ForceTest, FrictionDecaysWithTheSpeedEitherWay) {
   const LocalJet numbers[3] = {LocalJet(2.0, 0), LocalJet(0.5, 1), LocalJet(0.3, 2)};
   const LocalJet forward = FrictionDecay(numbers, LocalJet(0.6, 3));

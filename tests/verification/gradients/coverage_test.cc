@@ -59,7 +59,7 @@ TEST(CoverageTest, RandomScenesHaveEverything) {
   RandomSceneOptions by_events;
   by_events.stepping = Stepping::kEvent;
   by_events.max_bodies = 3;
-  for (unsigned seed = 1; seed <= 10; ++seed) {
+  for (unsigned seed = 1; seed <= 40; ++seed) {
     const Scene scene = RandomScene(seed, by_events);
     Add(CoverageOf(scene, TraceRun(scene)), &sum);
   }
