@@ -66,7 +66,7 @@ TEST(CoverageTest, RandomScenesHaveEverything) {
   // Friction that decays with the speed, which fixed steps do not have.
   RandomSceneOptions of_mechanism;
   of_mechanism.stepping = Stepping::kEvent;
-  const Scene mechanism = RandomScene(8, of_mechanism);
+  const Scene mechanism = RandomScene(32, of_mechanism);
   Add(CoverageOf(mechanism, TraceRun(mechanism)), &sum);
   for (const std::string& what : MissingCoverage(sum)) ADD_FAILURE() << what;
   // Of two of six shapes, in either order, but for two half-planes.
