@@ -296,9 +296,9 @@ std::string View(const BreakoutStudyOptions& options, const BreakoutResults& res
 }
 
 std::string CheckFlags(BreakoutStudyOptions* options) {
-  const std::string outside = FirstOutside({{"--games", FLAGS_games, 1, 10000},
-                                            {"--seed", FLAGS_seed, 0},
-                                            {"--threads", FLAGS_threads, 0, kMostThreads}});
+  std::string outside = FirstOutside({{"--games", FLAGS_games, 1, 10000},
+                                      {"--seed", FLAGS_seed, 0},
+                                      {"--threads", FLAGS_threads, 0, kMostThreads}});
   if (!outside.empty()) return outside;
   if (!(FLAGS_sticky >= 0.0 && FLAGS_sticky < 1.0)) {
     return "--sticky: expected a number >= 0 and < 1, got " + FormatNumber(FLAGS_sticky);

@@ -291,11 +291,11 @@ std::string CheckFlags(CartPoleStudyOptions* options) {
     return "--plant: expected equations or mujoco, got " + FLAGS_plant;
   }
   options->plant = FLAGS_plant == "mujoco" ? PlantKind::kMujoco : PlantKind::kEquations;
-  const std::string outside = FirstOutside({{"--seeds", FLAGS_seeds, 1},
-                                            {"--coverage", FLAGS_coverage, 0},
-                                            {"--swing_ups", FLAGS_swing_ups, 0},
-                                            {"--seed", FLAGS_seed, 0},
-                                            {"--threads", FLAGS_threads, 0, kMostThreads}});
+  std::string outside = FirstOutside({{"--seeds", FLAGS_seeds, 1},
+                                      {"--coverage", FLAGS_coverage, 0},
+                                      {"--swing_ups", FLAGS_swing_ups, 0},
+                                      {"--seed", FLAGS_seed, 0},
+                                      {"--threads", FLAGS_threads, 0, kMostThreads}});
   if (!outside.empty()) return outside;
   const std::vector<int> samples = WholeNumbersAtCommas(FLAGS_samples, 20, 100000);
   if (samples.empty() ||

@@ -38,7 +38,7 @@ namespace tangible {
 namespace {
 
 std::string CheckFlags() {
-  const std::string outside = FirstOutside({{"--budget_ms", FLAGS_budget_ms, 0}});
+  std::string outside = FirstOutside({{"--budget_ms", FLAGS_budget_ms, 0}});
   if (!outside.empty()) return outside;
   if (!FLAGS_mpc && !FLAGS_plant.empty()) return "--plant: needs --mpc";
   if (!FLAGS_mpc && FLAGS_budget_ms > 0.0) return "--budget_ms: needs --mpc";

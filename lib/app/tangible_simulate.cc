@@ -65,10 +65,10 @@ constexpr double kMaxNoise = 1e150;
 
 // Empty, or one line about a flag's value.
 std::string CheckFlags() {
-  const std::string outside = FirstOutside({{"--every", FLAGS_every, 1},
-                                            {"--noise", FLAGS_noise, 0, kMaxNoise},
-                                            {"--rate", FLAGS_rate, 0},
-                                            {"--threads", FLAGS_threads, 0, kMostThreads}});
+  std::string outside = FirstOutside({{"--every", FLAGS_every, 1},
+                                      {"--noise", FLAGS_noise, 0, kMaxNoise},
+                                      {"--rate", FLAGS_rate, 0},
+                                      {"--threads", FLAGS_threads, 0, kMostThreads}});
   if (!outside.empty()) return outside;
   if (FLAGS_certify && FLAGS_summary.empty()) {
     return "--certify: needs --summary";

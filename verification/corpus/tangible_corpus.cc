@@ -32,13 +32,12 @@ constexpr int kMostContacts = 1000;
 
 // Empty, or one line about a flag's value.
 std::string CheckFlags() {
-  const std::string outside =
-      FirstOutside({{"--random", FLAGS_random, 0, kMostRandom},
-                    {"--seed", FLAGS_seed, 0},
-                    {"--first", FLAGS_first, 0, 2147483647.0 - kMostRandom},
-                    {"--contacts", FLAGS_contacts, 1, kMostContacts},
-                    {"--dense_contacts", FLAGS_dense_contacts, 0, kMostContacts},
-                    {"--threads", FLAGS_threads, 0, kMostThreads}});
+  std::string outside = FirstOutside({{"--random", FLAGS_random, 0, kMostRandom},
+                                      {"--seed", FLAGS_seed, 0},
+                                      {"--first", FLAGS_first, 0, 2147483647.0 - kMostRandom},
+                                      {"--contacts", FLAGS_contacts, 1, kMostContacts},
+                                      {"--dense_contacts", FLAGS_dense_contacts, 0, kMostContacts},
+                                      {"--threads", FLAGS_threads, 0, kMostThreads}});
   if (!outside.empty()) return outside;
   if (FLAGS_random == 0 && FLAGS_problems.empty()) {
     return "--random: expected a number > 0 where there are no --problems, got 0";

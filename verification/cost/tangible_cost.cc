@@ -88,7 +88,7 @@ std::string CheckFlags(CostOptions* options, CostBounds* bounds) {
   if (!ReadList<long>(FLAGS_steps, kMostSteps, &options->steps)) {
     return expected("--steps", kMostSteps, FLAGS_steps);
   }
-  const std::string outside = FirstOutside({{"--long_run", FLAGS_long_run, 1, kMostSteps}});
+  std::string outside = FirstOutside({{"--long_run", FLAGS_long_run, 1, kMostSteps}});
   if (!outside.empty()) return outside;
   const std::pair<const char*, double> positive[] = {
       {"--budget_seconds", FLAGS_budget_seconds}, {"--budget_mib", FLAGS_budget_mib},

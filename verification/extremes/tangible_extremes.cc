@@ -43,7 +43,7 @@ std::string GroupNames(const std::vector<ExtremeCase>& cases) {
 
 // Empty, or one line about a flag's value.
 std::string ChooseCases(std::vector<ExtremeCase>* cases) {
-  const std::string outside = FirstOutside({{"--threads", FLAGS_threads, 0, kMostThreads}});
+  std::string outside = FirstOutside({{"--threads", FLAGS_threads, 0, kMostThreads}});
   if (!outside.empty()) return outside;
   if (!FLAGS_stepping.empty() && FLAGS_stepping != "fixed" && FLAGS_stepping != "event") {
     return "--stepping: expected fixed or event, got '" + FLAGS_stepping + "'";

@@ -60,7 +60,7 @@ std::vector<Stepping> Steppings(std::string* error) {
 // Empty, or one line about a flag's value.
 std::string CheckFlags(const std::vector<std::string>& files) {
   // Of −1, the default, the numbers follow below.
-  const std::string outside =
+  std::string outside =
       FirstOutside({{"--random", FLAGS_random == -1 ? 0.0 : FLAGS_random, 0, kMostRandom},
                     {"--starts", FLAGS_starts == -1 ? 0.0 : FLAGS_starts, 0, kMostRandom},
                     {"--seed", FLAGS_seed, 0},

@@ -72,7 +72,7 @@ std::string CheckFlags(size_t scenes, TradeoffOptions* options, Target* target) 
     return "--target_error: expected a number > 0 and <= 1e6, got " +
            FormatNumber(FLAGS_target_error);
   }
-  const std::string outside = FirstOutside({{"--threads", FLAGS_threads, 1, kMostThreads}});
+  std::string outside = FirstOutside({{"--threads", FLAGS_threads, 1, kMostThreads}});
   if (!outside.empty()) return outside;
   if (FLAGS_target != "both" && FLAGS_target != "trajectory" && FLAGS_target != "gradient") {
     return "--target: expected trajectory, gradient or both, got '" + FLAGS_target + "'";
