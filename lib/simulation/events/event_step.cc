@@ -635,9 +635,7 @@ EventOutcome EventStepper::Advance(const Model<double>& model, double t, double 
     if (!SolveInstant(model, now, h, std::exchange(begins, false), at_end, state, &outcome)) {
       return fail(outcome.message);
     }
-    if (at_end) {
-      break;
-    }
+    if (at_end) break;
     const auto edge = std::find_if(edges.begin(), edges.end(),
                                    [&](const Edge& e) { return e.time > now + kTimeRounding * h; });
     const bool to_edge = edge != edges.end();
@@ -675,9 +673,7 @@ EventOutcome EventStepper::Advance(const Model<double>& model, double t, double 
     impulses_tried = false;
     guess_.located += IsLocated(segment.event) ? 1 : 0;
     outcome.stopped = at_event == AtEvent::kStopAtSecond && guess_.located > 1;
-    if (outcome.stopped) {
-      break;
-    }
+    if (outcome.stopped) break;
     *state = segment.after;
     at_given_time = segment.event == EventKind::kStepEnd;
     halvings = 0;
