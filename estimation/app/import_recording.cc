@@ -6,6 +6,7 @@
 
 #include <cmath>
 #include <cstdio>
+#include <limits>
 #include <optional>
 #include <string>
 #include <utility>
@@ -13,16 +14,21 @@
 #include "tangible/app/program.h"
 #include "tangible/estimation/experiments/recording.h"
 #include "tangible/estimation/experiments/recording_table.h"
+#include "tangible/scene/csv.h"
 #include "tangible/scene/text_file.h"
 
 DEFINE_string(kind, "ibm_double_pendulum",
               "table, deeplabcut, tracker, ibm_double_pendulum or multiarm_single");
 DEFINE_string(out, "", "file of the observations (CSV); required");
 DEFINE_string(mapping, "", "of a table: file (JSON) that says which columns are what");
-DEFINE_double(from, 0.0, "s: start, which becomes time 0");
+DEFINE_double(
+    from, 0.0,
+    "s: start, which becomes time 0; of a table or tracker by default the first row, if it "
+    "is later than 1e4 s");
 DEFINE_double(to, 0.5, "s: end, included; of table, deeplabcut and tracker by default all");
 DEFINE_double(frame_rate, 0.0, "Hz, of a recording whose rows are frames without times");
-DEFINE_double(likelihood, 0.0, "of deeplabcut: points that are less likely are missing data");
+DEFINE_double(likelihood, 0.0,
+              "from 0 to 1, of deeplabcut: points that are less likely are missing data");
 DEFINE_double(scale, 1.0, "m a unit of length of a table, deeplabcut or tracker");
 DEFINE_bool(y_down, false, "y counts downwards, as in images: y and angles change sign");
 DEFINE_double(rate, 400.0, "Hz, of ibm_double_pendulum");
@@ -68,11 +74,34 @@ std::optional<Kind> FindKind(const std::pair<const char*, Kind> (&names)[N]) {
   return std::nullopt;
 }
 
+bool IsGiven(const char* flag) { return !gflags::GetCommandLineFlagInfoOrDie(flag).is_default; }
+
+/// What is wrong with the numbers of flags, or empty. `to`: the window's end.
+std::string WrongNumber(double to) {
+  const auto got = [](double value) { return ", got " + FormatNumber(value); };
+  if (!std::isfinite(FLAGS_from)) {
+    return "--from: expected a finite number of seconds" + got(FLAGS_from);
+  }
+  if (!(FLAGS_from <= to)) return "--to: expected a number >= --from" + got(to);
+  const std::pair<const char*, double> positive[] = {{"rate", FLAGS_rate},
+                                                     {"length", FLAGS_length},
+                                                     {"scale", FLAGS_scale},
+                                                     {"frame_rate", FLAGS_frame_rate}};
+  for (const auto& [flag, value] : positive) {
+    if (IsGiven(flag) && !(value > 0.0 && std::isfinite(value))) {
+      return std::string("--").append(flag) + ": expected a finite number > 0" + got(value);
+    }
+  }
+  return FirstOutside({{"--likelihood", FLAGS_likelihood, 0.0, 1.0}});
+}
+
 int ImportTable(const std::string& file, TableFormat format) {
   TableOptions options;
   options.format = format;
-  options.from = FLAGS_from;
-  if (!gflags::GetCommandLineFlagInfoOrDie("to").is_default) {
+  if (IsGiven("from")) {
+    options.from = FLAGS_from;
+  }
+  if (IsGiven("to")) {
     options.to = FLAGS_to;
   }
   options.frame_rate = FLAGS_frame_rate;
@@ -80,12 +109,6 @@ int ImportTable(const std::string& file, TableFormat format) {
   options.scale = FLAGS_scale;
   options.y_down = FLAGS_y_down;
   options.mapping_file = FLAGS_mapping;
-  if (!(options.from <= options.to) || !(FLAGS_frame_rate >= 0.0) || !(FLAGS_scale > 0.0) ||
-      !std::isfinite(FLAGS_scale) || !std::isfinite(FLAGS_frame_rate) ||
-      std::isnan(FLAGS_likelihood)) {
-    return Usage(
-        "expected --from <= --to, --frame_rate > 0, --scale > 0 and --likelihood a number");
-  }
   if (format == TableFormat::kDeepLabCut && FLAGS_frame_rate == 0.0) {
     return Usage("--frame_rate: expected that of the film, as files of deeplabcut have no times");
   }
@@ -109,6 +132,12 @@ int ImportTable(const std::string& file, TableFormat format) {
     return ReportError(error);
   }
   std::printf("%zu rows, %ld coordinates missing\n", recording.rows.size(), recording.missing);
+  if (recording.start != 0.0) {
+    const std::string start = CsvNumber(recording.start);
+    std::printf("times count from %s s of the recording\n", start.c_str());
+    ReportError(file + ": the first time is " + start +
+                " s, a clock's: times are shifted to begin at 0 (--from=0 keeps them)");
+  }
   for (const TableRecording::Noise& noise : recording.noise) {
     if (std::isfinite(noise.value)) {
       std::printf("noise of %s %s: %.3g %s\n", noise.name.c_str(), NameOf(noise.coordinate),
@@ -134,11 +163,13 @@ int Import(const std::string& file) {
   if (!other.empty()) {
     return Usage(other);
   }
+  const std::string wrong =
+      WrongNumber(format && !IsGiven("to") ? std::numeric_limits<double>::infinity() : FLAGS_to);
+  if (!wrong.empty()) {
+    return Usage(wrong);
+  }
   if (format) {
     return ImportTable(file, *format);
-  }
-  if (!(FLAGS_from <= FLAGS_to) || !(FLAGS_rate > 0.0) || !(FLAGS_length > 0.0)) {
-    return Usage("expected --from <= --to, --rate > 0 and --length > 0");
   }
   RecordingOptions options;
   options.kind = *kind;

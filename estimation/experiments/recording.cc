@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tangible/estimation/experiments/recording.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
 #include <numbers>
-#include <sstream>
+#include <string>
 
 #include "tangible/estimation/experiments/tolerances.h"
 #include "tangible/scene/csv.h"
@@ -102,6 +103,7 @@ bool ParseAngles(const std::string& text, const std::string& file, const Recordi
   }
   recording->target_column = "body";
   RecordedSeries series{"pendulum", "angle", {}, 0.0};
+  double last = 0.0;
   for (int i = 0; i < static_cast<int>(table.rows.size()); ++i) {
     double time = 0.0;
     double angle = 0.0;
@@ -109,6 +111,13 @@ bool ParseAngles(const std::string& text, const std::string& file, const Recordi
         !ReadCell(table, i, table.Column("th1"), &angle, error)) {
       return false;
     }
+    if (i > 0 && !(time > last)) {
+      *error = file + ": line " + std::to_string(table.lines[i]) + ": t: expected one after " +
+               CsvNumber(last) + " s, got " + CsvNumber(time) +
+               ": the clock stands still or runs backwards";
+      return false;
+    }
+    last = time;
     if (time >= options.from - kWindowRounding && time <= options.to + kWindowRounding) {
       recording->times.push_back(time - options.from);
       series.values.push_back(angle - std::numbers::pi);
@@ -143,12 +152,18 @@ bool ParseRecording(const std::string& text, const std::string& file,
     return false;
   }
   if (recording->times.size() < 5) {
-    *error = file + ": expected at least 5 rows from " + std::to_string(options.from) + " to " +
-             std::to_string(options.to) + " s, got " + std::to_string(recording->times.size());
+    *error = file + ": expected at least 5 rows from " + CsvNumber(options.from) + " to " +
+             CsvNumber(options.to) + " s, got " + std::to_string(recording->times.size());
     return false;
   }
   double sum = 0.0;
   for (RecordedSeries& series : recording->series) {
+    if (!std::all_of(series.values.begin(), series.values.end(),
+                     [](double x) { return std::isfinite(x); })) {
+      *error = file + ": expected coordinates of " + series.target +
+               " that a double can hold, got larger ones: markers or the length are too large";
+      return false;
+    }
     series.noise = NoiseFromFourthDifferences(series.values);
     sum += series.noise * series.noise;
   }
@@ -163,26 +178,24 @@ bool ReadRecording(const std::string& file, const RecordingOptions& options, Rec
 }
 
 std::string ObservationCsv(const Recording& recording) {
-  std::ostringstream csv;
-  csv.precision(10);
-  csv << "time," << recording.target_column;
+  std::string csv = "time," + recording.target_column;
   // The series of one target follow each other, and all targets have the same coordinates.
   size_t coordinates = 0;
   while (coordinates < recording.series.size() &&
          recording.series[coordinates].target == recording.series.front().target) {
-    csv << "," << recording.series[coordinates++].coordinate;
+    csv += "," + recording.series[coordinates++].coordinate;
   }
-  csv << "\n";
+  csv += "\n";
   for (size_t k = 0; k < recording.times.size(); ++k) {
     for (size_t s = 0; s < recording.series.size(); s += coordinates) {
-      csv << recording.times[k] << "," << recording.series[s].target;
+      csv += CsvNumber(recording.times[k]) + "," + recording.series[s].target;
       for (size_t c = 0; c < coordinates; ++c) {
-        csv << "," << recording.series[s + c].values[k];
+        csv += "," + CsvNumber(recording.series[s + c].values[k]);
       }
-      csv << "\n";
+      csv += "\n";
     }
   }
-  return csv.str();
+  return csv;
 }
 
 }  // namespace tangible

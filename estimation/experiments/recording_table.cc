@@ -2,9 +2,11 @@
 #include "tangible/estimation/experiments/recording_table.h"
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <map>
 #include <sstream>
+#include <system_error>
 #include <utility>
 
 #include "tangible/estimation/experiments/recording.h"
@@ -76,9 +78,10 @@ char SeparatorOf(std::string_view text) {
 }
 
 /// The last cell of a text, from `first` on, whose commas are none that separate cells: a decimal
-/// comma becomes a point, others are put in quotes.
-void FinishCell(size_t first, std::string* text) {
-  if (text->find(',', first) == std::string::npos) return;
+/// comma becomes a point, others are put in quotes. `ends_quoted`: a quoted cell ends with its
+/// closing quote; another one is refused later.
+void FinishCell(size_t first, bool ends_quoted, std::string* text) {
+  if (!ends_quoted || text->find(',', first) == std::string::npos) return;
   const std::string raw = text->substr(first);
   const bool quoted = raw[raw.find_first_not_of(" \t")] == '"';
   const std::string cell = SplitCsvLine(quoted ? raw : CsvCell(raw))[0];
@@ -89,42 +92,76 @@ void FinishCell(size_t first, std::string* text) {
 }
 
 /// The text with its cells separated by commas and numbers with points. A line break in a quoted
-/// cell becomes a space, and a blank line follows, so that lines keep their numbers. `open_line`:
-/// the line of a quote that is not closed, 0 where there is none.
-std::string WithCommas(std::string_view text, int* open_line) {
-  const char separator = SeparatorOf(text);
-  std::string commas;
-  commas.reserve(text.size());
-  size_t first = 0;  // of the cell
-  int breaks = 0;
-  int line = 1;
-  bool quoted = false;
-  *open_line = 0;
-  for (size_t i = 0; i < text.size(); ++i) {
-    const char c = text[i];
-    line += c == '\n' ? 1 : 0;
+/// cell becomes a space, and a blank line follows, so that lines keep their numbers. A quote inside
+/// a cell that does not begin with one is a character.
+class CommaText {
+ public:
+  explicit CommaText(std::string_view text) : separator_(SeparatorOf(text)) {
+    commas_.reserve(text.size());
+    for (const char c : text) Take(c);
+    EndCell();
+  }
+  std::string& commas() { return commas_; }
+  /// What is wrong with the quotes of a cell and its line, or empty.
+  std::string mistake() const {
+    if (open_line_ > 0) {
+      return "line " + std::to_string(open_line_) +
+             ": expected a closing quote of the cell, got the end of the file";
+    }
+    return bad_line_ == 0 ? ""
+                          : "line " + std::to_string(bad_line_) +
+                                ": expected the cell's end behind its closing quote, got more";
+  }
+
+ private:
+  void Take(char c) {
+    line_ += c == '\n' ? 1 : 0;
     if (c == '"') {
-      // It opens at a cell's beginning, or is the second one of two; elsewhere it is no quote.
-      const bool begins = commas.find_first_not_of(" \t", first) == std::string::npos;
-      if (!quoted && !begins && text[i - 1] != '"') continue;
-      quoted = !quoted;
-      *open_line = quoted ? line : 0;
-      commas += c;
-    } else if (!quoted && (c == separator || c == '\n')) {
-      if (separator != ',') FinishCell(first, &commas);
-      commas += c == separator ? ',' : c;
-      if (c == '\n') commas.append(static_cast<size_t>(std::exchange(breaks, 0)), c);
-      first = commas.size();
+      TakeQuote();
+    } else if (!quoted_ && (c == separator_ || c == '\n')) {
+      EndCell();
+      commas_ += c == separator_ ? ',' : c;
+      if (c == '\n') commas_.append(static_cast<size_t>(std::exchange(breaks_, 0)), c);
+      first_ = commas_.size();
+      closed_ = false;
     } else if (c == '\n') {
-      commas += ' ';
-      ++breaks;
+      commas_ += ' ';
+      ++breaks_;
     } else if (c != '\r') {
-      commas += c;
+      const bool blank = c == ' ' || c == '\t';
+      if (closed_ && !quoted_ && !blank && bad_line_ == 0) bad_line_ = line_;
+      commas_ += c;
     }
   }
-  if (separator != ',') FinishCell(first, &commas);
-  return commas;
-}
+
+  void TakeQuote() {
+    // It opens at a cell's beginning, or is the second one of two.
+    const bool begins = commas_.find_first_not_of(" \t", first_) == std::string::npos;
+    const bool second = closed_ && commas_.back() == '"';
+    if (quoted_ || begins || second) {
+      quoted_ = !quoted_;
+      closed_ = !quoted_;
+      open_line_ = quoted_ ? line_ : 0;
+    } else if (closed_ && bad_line_ == 0) {
+      bad_line_ = line_;
+    }
+    commas_ += '"';
+  }
+
+  void EndCell() {
+    if (separator_ != ',') FinishCell(first_, bad_line_ == 0, &commas_);
+  }
+
+  char separator_;
+  std::string commas_;
+  size_t first_ = 0;  ///< of the cell
+  int breaks_ = 0;
+  int line_ = 1;
+  int open_line_ = 0;  ///< of the quote that is open
+  int bad_line_ = 0;
+  bool quoted_ = false;
+  bool closed_ = false;  ///< the cell's quote has been closed
+};
 
 /// The first lines of a text, and what follows them.
 std::vector<std::string> TakeLines(size_t count, std::string* text) {
@@ -145,13 +182,9 @@ bool ParseRows(const std::string& rows, const std::string& file, size_t width, i
   for (size_t i = 0; i < width; ++i) {
     header += (i == 0 ? "" : ",") + std::to_string(i);
   }
-  if (!ParseCsv(header + "\n" + rows, file, {}, {}, table, error)) {
-    return false;
-  }
-  for (int& line : table->lines) {
-    line += header_lines - 1;
-  }
-  return true;
+  // Blank lines, so that lines keep their numbers.
+  const std::string above(static_cast<size_t>(header_lines - 1), '\n');
+  return ParseCsv(above + header + "\n" + rows, file, {}, {}, table, error);
 }
 
 bool ReadDeepLabCut(std::string text, const std::string& file, CsvTable* table, Layout* layout,
@@ -406,6 +439,44 @@ bool IsLength(Coordinate coordinate) {
   return coordinate != Coordinate::kAngle && coordinate != Coordinate::kOmega;
 }
 
+/// A number of a clock as its whole part and the rest: in one double, times since 1970 are multiples
+/// of 2.4e-7 s.
+struct ClockNumber {
+  long double whole = 0.0L;
+  long double part = 0.0L;
+
+  long double Since(const ClockNumber& other) const {
+    return (whole - other.whole) + (part - other.part);
+  }
+};
+
+/// The number in a cell that reads as `rounded`.
+ClockNumber ReadClock(const std::string& cell, double rounded) {
+  const bool has_plus = !cell.empty() && cell[0] == '+';
+  const char* const begin = cell.data() + (has_plus ? 1 : 0);
+  const char* const end = cell.data() + cell.size();
+  const char* const point = std::find(begin, end, '.');
+  ClockNumber number{rounded, 0.0L};
+  const auto whole = std::from_chars(begin, point, number.whole);
+  if (whole.ec != std::errc() || whole.ptr != point) return {rounded, 0.0L};
+  const std::string rest = "0" + std::string(point, end);
+  const auto part = std::from_chars(rest.data(), rest.data() + rest.size(), number.part);
+  // Not 1.5e9, whose exponent is that of both parts.
+  if (part.ec != std::errc() || rest.find_first_of("eE") != std::string::npos) {
+    return {rounded, 0.0L};
+  }
+  if (*begin == '-') number.part = -number.part;
+  return number;
+}
+
+/// The number as it was written: 1e-9, of which a double has 16 digits.
+long double AsWritten(double value) {
+  const std::string digits = CsvNumber(value);
+  long double written = value;
+  std::from_chars(digits.data(), digits.data() + digits.size(), written);
+  return written;
+}
+
 bool TurnsWithY(Coordinate coordinate) {
   return coordinate == Coordinate::kY || coordinate == Coordinate::kVy ||
          coordinate == Coordinate::kAngle || coordinate == Coordinate::kOmega;
@@ -419,18 +490,19 @@ class RowCollector {
       : table_(table), layout_(layout), options_(options), recording_(recording), error_(error) {}
 
   bool Collect() {
+    std::vector<Moment> moments;
     for (int row = 0; row < static_cast<int>(table_.rows.size()); ++row) {
-      double time = 0.0;
-      std::string name;
-      if (!ReadTime(row, &time) || !ReadName(row, &name) || !CheckClock(row, time, name)) {
+      Moment moment{row, 0.0, {}, ""};
+      if (!ReadTime(&moment) || !ReadName(row, &moment.name) || !CheckClock(moment)) {
         return false;
       }
-      const bool wanted = layout_.name < 0 || !name.empty();
-      if (!wanted || time < options_.from - kWindowRounding ||
-          time > options_.to + kWindowRounding) {
-        continue;
-      }
-      if (!ReadValues(row, time - options_.from, name)) {
+      const bool wanted = layout_.name < 0 || !moment.name.empty();
+      if (wanted && IsWithin(moment.time)) moments.push_back(moment);
+    }
+    const Moment* const start = FindStart(moments);
+    for (const Moment& moment : moments) {
+      const double time = TimeOf(moment, start);
+      if (!CheckApart(moment, time) || !ReadValues(moment.row, time, moment.name)) {
         return false;
       }
     }
@@ -438,23 +510,67 @@ class RowCollector {
   }
 
  private:
+  /// When and whose a row is.
+  struct Moment {
+    int row;
+    double time;        ///< s
+    ClockNumber clock;  ///< in the file's unit
+    std::string name;
+  };
+
   bool Fail(int row, const std::string& what) {
     *error_ = OneLine(table_.file + ": line " + std::to_string(table_.lines[row]) + ": " + what);
     return false;
   }
 
-  bool ReadTime(int row, double* time) {
-    if (layout_.time >= 0) {
-      const bool read = ReadCell(table_, row, layout_.time, time, error_);
-      *time = layout_.time_scale * *time + layout_.time_offset;
-      return read;
+  bool IsWithin(double time) const {
+    // The edge and the scale of times are rounded too.
+    const auto rounding = [](double edge) {
+      constexpr double kTwice = 2.0 * std::numeric_limits<double>::epsilon();
+      return kWindowRounding + (std::isfinite(edge) ? kTwice * std::abs(edge) : 0.0);
+    };
+    return time >= options_.from.value_or(0.0) - rounding(options_.from.value_or(0.0)) &&
+           time <= options_.to + rounding(options_.to);
+  }
+
+  /// The moment whose time becomes 0 where times are those of a clock, else none.
+  const Moment* FindStart(const std::vector<Moment>& moments) {
+    if (options_.from || moments.empty()) return nullptr;
+    const auto first = std::min_element(
+        moments.begin(), moments.end(),
+        [](const Moment& a, const Moment& b) { return a.clock.Since(b.clock) < 0.0L; });
+    if (first->time < kClockTime) return nullptr;
+    recording_->start = first->time;
+    return &*first;
+  }
+
+  /// The time from the start of the window, s.
+  double TimeOf(const Moment& moment, const Moment* start) const {
+    if (start != nullptr) {
+      return static_cast<double>(scale_ * moment.clock.Since(start->clock));
     }
-    double frame = row;
-    if (layout_.frame >= 0 && !ReadCell(table_, row, layout_.frame, &frame, error_)) {
+    const double from = options_.from.value_or(0.0);
+    if (from == 0.0 && layout_.time_offset == 0.0) return moment.time;
+    // The numbers as they were written: 0.3 − 0.3 is 0, though 0.3 has more bits than a double.
+    const ClockNumber before = ReadClock(CsvNumber(-layout_.time_offset), -layout_.time_offset);
+    const ClockNumber scaled{scale_ * moment.clock.whole, scale_ * moment.clock.part};
+    const ClockNumber shifted{scaled.whole - before.whole, scaled.part - before.part};
+    return static_cast<double>(shifted.Since(ReadClock(CsvNumber(from), from)));
+  }
+
+  bool ReadTime(Moment* moment) {
+    double cell = moment->row;
+    const int column = layout_.time >= 0 ? layout_.time : layout_.frame;
+    if (column >= 0 && !ReadCell(table_, moment->row, column, &cell, error_)) {
       return false;
     }
-    *time = frame / options_.frame_rate;
-    return true;
+    moment->clock =
+        column >= 0 ? ReadClock(table_.rows[moment->row][column], cell) : ClockNumber{cell, 0.0L};
+    moment->time = layout_.time >= 0 ? layout_.time_scale * cell + layout_.time_offset
+                                     : cell / options_.frame_rate;
+    return std::isfinite(moment->time) ||
+           Fail(moment->row, "time: expected a finite number of seconds, got " + CsvNumber(cell) +
+                                 " with a scale that is too large");
   }
 
   bool ReadName(int row, std::string* name) {
@@ -469,14 +585,24 @@ class RowCollector {
     return !layout_.names.empty() || !written.empty() || Fail(row, "expected a name, got none");
   }
 
-  bool CheckClock(int row, double time, const std::string& name) {
-    const auto [last, first] = last_time_.try_emplace(name, time);
+  bool CheckClock(const Moment& moment) {
+    const auto [last, first] = last_moment_.try_emplace(moment.name, moment);
+    if (!first && !(moment.clock.Since(last->second.clock) > 0.0L)) {
+      return Fail(moment.row, "time: expected one after " + CsvNumber(last->second.time) +
+                                  " s, got " + CsvNumber(moment.time) +
+                                  ": the clock stands still or runs backwards");
+    }
+    last->second = moment;
+    return true;
+  }
+
+  /// Whether the times of a name stay apart as they are written.
+  bool CheckApart(const Moment& moment, double time) {
+    const auto [last, first] = last_written_.try_emplace(moment.name, time);
     if (!first && !(time > last->second)) {
-      std::ostringstream what;
-      what.precision(10);
-      what << "time: expected one after " << last->second << " s, got " << time
-           << ": the clock stands still or runs backwards";
-      return Fail(row, what.str());
+      return Fail(moment.row, "time: expected one that differs from the last as a double, got " +
+                                  CsvNumber(time) +
+                                  " s again: let times count from a later --from");
     }
     last->second = time;
     return true;
@@ -499,22 +625,18 @@ class RowCollector {
     const size_t first = recording_->rows.size();
     for (const ValueColumn& column : layout_.values) {
       double likelihood = 1.0;
-      if (column.likelihood >= 0 && !table_.rows[row][column.likelihood].empty() &&
-          !ReadCell(table_, row, column.likelihood, &likelihood, error_)) {
+      const std::string& cell = table_.rows[row][column.column];
+      if (!ReadLikelihood(row, column.likelihood, &likelihood)) {
         return false;
       }
-      const std::string& cell = table_.rows[row][column.column];
       if (cell.empty() || cell == "nan" || cell == "NaN" || likelihood < options_.likelihood) {
         ++recording_->missing;
         continue;
       }
       double value = 0.0;
-      if (!ReadCell(table_, row, column.column, &value, error_)) {
+      if (!ReadValue(row, column, &value)) {
         return false;
       }
-      value = column.scale * value + column.offset;
-      value *= IsLength(column.coordinate) ? options_.scale : 1.0;
-      value *= options_.y_down && TurnsWithY(column.coordinate) ? -1.0 : 1.0;
       TableRow* const to =
           RowOf(time, column.name.empty() ? name : column.name, column.relative_to, first);
       double& place = to->values[static_cast<size_t>(column.coordinate)];
@@ -527,12 +649,36 @@ class RowCollector {
     return true;
   }
 
+  bool ReadLikelihood(int row, int column, double* likelihood) {
+    if (column < 0 || table_.rows[row][column].empty()) return true;
+    return ReadCell(table_, row, column, likelihood, error_) &&
+           ((*likelihood >= 0.0 && *likelihood <= 1.0) ||
+            Fail(row, "likelihood: expected a number from 0 to 1, got " + CsvNumber(*likelihood)));
+  }
+
+  bool ReadValue(int row, const ValueColumn& column, double* value) {
+    double cell = 0.0;
+    if (!ReadCell(table_, row, column.column, &cell, error_)) {
+      return false;
+    }
+    *value = column.scale * cell + column.offset;
+    *value *= IsLength(column.coordinate) ? options_.scale : 1.0;
+    *value *= options_.y_down && TurnsWithY(column.coordinate) ? -1.0 : 1.0;
+    return std::isfinite(*value) ||
+           Fail(row, std::string(NameOf(column.coordinate)) +
+                         ": expected a finite number after its scale and offset, got " +
+                         CsvNumber(cell) + " with a scale that is too large");
+  }
+
   const CsvTable& table_;
   const Layout& layout_;
   const TableOptions& options_;
   TableRecording* recording_;
   std::string* error_;
-  std::map<std::string, double> last_time_;
+  long double scale_ =
+      layout_.time >= 0 ? AsWritten(layout_.time_scale) : 1.0L / options_.frame_rate;
+  std::map<std::string, Moment> last_moment_;
+  std::map<std::string, double> last_written_;
 };
 
 void EstimateNoise(TableRecording* recording) {
@@ -556,13 +702,14 @@ bool ParseTableRecording(const std::string& text, const std::string& file,
                          const TableOptions& options, TableRecording* recording,
                          std::string* error) {
   *recording = TableRecording();
-  int open_line = 0;
-  const std::string commas = WithCommas(WithoutByteOrderMark(text), &open_line);
-  if (open_line > 0) {
-    *error = file + ": line " + std::to_string(open_line) +
-             ": expected a closing quote of the cell, got the end of the file";
+  std::string mistake = WhyNotText(text);
+  CommaText comma_text(mistake.empty() ? WithoutByteOrderMark(text) : "");
+  if (mistake.empty()) mistake = comma_text.mistake();
+  if (!mistake.empty()) {
+    *error = file + ": " + mistake;
     return false;
   }
+  const std::string& commas = comma_text.commas();
   CsvTable table;
   Layout layout;
   const bool read = options.format == TableFormat::kDeepLabCut
@@ -583,10 +730,9 @@ bool ParseTableRecording(const std::string& text, const std::string& file,
     return false;
   }
   if (recording->rows.empty()) {
-    std::ostringstream what;
-    what << file << ": expected at least one measured coordinate from " << options.from << " to "
-         << options.to << " s, got none";
-    *error = what.str();
+    *error = file + ": expected at least one measured coordinate from " +
+             CsvNumber(options.from.value_or(0.0)) + " to " + CsvNumber(options.to) +
+             " s, got none";
     return false;
   }
   EstimateNoise(recording);
@@ -602,29 +748,24 @@ std::string ObservationCsv(const TableRecording& recording) {
       used[i] = used[i] || std::isfinite(row.values[i]);
     }
   }
-  std::ostringstream csv;
-  csv.precision(10);
-  csv << "time," << recording.target_column << (relative ? ",relative_to" : "");
+  std::string csv = "time," + recording.target_column + (relative ? ",relative_to" : "");
   for (size_t i = 0; i < used.size(); ++i) {
-    csv << (used[i] ? std::string(",") + NameOf(static_cast<Coordinate>(i)) : "");
+    if (used[i]) csv += std::string(",") + NameOf(static_cast<Coordinate>(i));
   }
-  csv << "\n";
+  csv += "\n";
   for (const TableRow& row : recording.rows) {
-    csv << row.time << "," << row.name;
+    csv += CsvNumber(row.time) + "," + row.name;
     if (relative) {
-      csv << "," << row.relative_to;
+      csv += "," + row.relative_to;
     }
     for (size_t i = 0; i < used.size(); ++i) {
-      if (used[i]) {
-        csv << ",";
-      }
-      if (std::isfinite(row.values[i])) {
-        csv << row.values[i];
-      }
+      if (!used[i]) continue;
+      csv += ",";
+      if (std::isfinite(row.values[i])) csv += CsvNumber(row.values[i]);
     }
-    csv << "\n";
+    csv += "\n";
   }
-  return csv.str();
+  return csv;
 }
 
 }  // namespace tangible

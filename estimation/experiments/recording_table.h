@@ -25,6 +25,7 @@
 
 #include <array>
 #include <limits>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -41,12 +42,14 @@ inline constexpr std::pair<const char*, TableFormat> kTableFormatNames[] = {
 
 struct TableOptions {
   TableFormat format = TableFormat::kTable;
-  std::string mapping;                                  ///< of kTable: JSON text
-  std::string mapping_file;                             ///< for messages
-  double from = 0.0;                                    ///< s; times count from here
+  std::string mapping;       ///< of kTable: JSON text
+  std::string mapping_file;  ///< for messages
+  /// s: rows before are left out, and times count from here. Without it rows before 0 are left out,
+  /// and times count from 0, or from the first row where that is one of a clock (kClockTime).
+  std::optional<double> from{};
   double to = std::numeric_limits<double>::infinity();  ///< s, included
   double frame_rate = 0.0;  ///< Hz, where the file has no times; 0: it must have them
-  double likelihood = 0.0;  ///< points below are missing data
+  double likelihood = 0.0;  ///< from 0 to 1: points below are missing data
   double scale = 1.0;       ///< m a unit of length of the file
   bool y_down = false;      ///< y, and with it angles, are counted downwards: they change sign
 };
@@ -62,6 +65,7 @@ struct TableRow {
 struct TableRecording {
   std::string target_column;  ///< "body" or "point"
   std::vector<TableRow> rows;
+  double start = 0.0;  ///< s of the file: from here times count where they were those of a clock
   /// The standard deviation of the noise of each series, by fourth differences (recording.h).
   struct Noise {
     std::string name;
@@ -73,12 +77,13 @@ struct TableRecording {
 };
 
 /// Reads a recording from text. On failure sets one line "file: line 3: what, expected, got": an
-/// unknown column, times that run backwards, a scale of 0, no row in the window.
+/// unknown column, times that run backwards, a scale of 0 or one that overflows, a likelihood outside
+/// [0, 1], no row in the window.
 bool ParseTableRecording(const std::string& text, const std::string& file,
                          const TableOptions& options, TableRecording* recording,
                          std::string* error);
 
-/// The observations as a file.
+/// The observations as a file; its numbers read back to the same doubles.
 std::string ObservationCsv(const TableRecording& recording);
 
 }  // namespace tangible

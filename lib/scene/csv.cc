@@ -2,6 +2,7 @@
 #include "tangible/scene/csv.h"
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <cmath>
 #include <cstddef>
@@ -22,18 +23,45 @@ std::string_view Trim(std::string_view text) {
 }
 
 // The text of a cell that begins with a quote; `line` is left with what follows the closing one.
-std::string TakeQuoted(std::string_view* line) {
-  std::string text;
+// False where none closes it.
+bool TakeQuoted(std::string_view* line, std::string* text) {
   std::size_t i = 1;
   for (; i < line->size(); ++i) {
     if ((*line)[i] == '"') {
       if (i + 1 == line->size() || (*line)[i + 1] != '"') break;
       ++i;
     }
-    text += (*line)[i];
+    *text += (*line)[i];
   }
+  const bool closed = i < line->size();
   line->remove_prefix(std::min(i + 1, line->size()));
-  return text;
+  return closed;
+}
+
+// What is wrong with the quotes of a line, or empty; appends its cells.
+std::string SplitLine(std::string_view line, std::vector<std::string>* cells) {
+  std::string wrong;
+  while (true) {
+    std::string quoted;
+    const std::size_t first = line.find_first_not_of(" \t");
+    const bool quotes = first != std::string_view::npos && line[first] == '"';
+    bool closed = true;
+    if (quotes) {
+      line.remove_prefix(first);
+      closed = TakeQuoted(&line, &quoted);
+    }
+    const std::size_t comma = line.find(',');
+    const std::string_view rest = Trim(line.substr(0, comma));
+    if (wrong.empty() && !closed) {
+      wrong = "expected a closing quote of the cell, got the line's end";
+    } else if (wrong.empty() && quotes && !rest.empty()) {
+      wrong = "expected a comma or the line's end behind a cell's closing quote, got " +
+              Describe(std::string(rest));
+    }
+    cells->emplace_back(quoted.empty() ? rest : Trim(quoted.append(rest)));
+    if (comma == std::string_view::npos) return wrong;
+    line.remove_prefix(comma + 1);
+  }
 }
 
 bool Contains(const std::vector<std::string>& names, const std::string& name) {
@@ -92,18 +120,19 @@ int CsvTable::Column(const std::string& name) const {
 
 std::vector<std::string> SplitCsvLine(std::string_view line) {
   std::vector<std::string> cells;
-  while (true) {
-    std::string quoted;
-    const std::size_t first = line.find_first_not_of(" \t");
-    if (first != std::string_view::npos && line[first] == '"') {
-      line.remove_prefix(first);
-      quoted = TakeQuoted(&line);
-    }
-    const std::size_t comma = line.find(',');
-    const std::string_view rest = Trim(line.substr(0, comma));
-    cells.emplace_back(quoted.empty() ? rest : Trim(quoted.append(rest)));
-    if (comma == std::string_view::npos) return cells;
-    line.remove_prefix(comma + 1);
+  static_cast<void>(SplitLine(line, &cells));
+  return cells;
+}
+
+std::string CsvNumber(double value) {
+  std::array<char, 32> digits{};
+  for (int count = 15;; ++count) {
+    const std::to_chars_result end = std::to_chars(digits.data(), digits.data() + digits.size(),
+                                                   value, std::chars_format::general, count);
+    double read = 0.0;
+    std::from_chars(digits.data(), end.ptr, read);
+    // 17 digits are enough for any double.
+    if (read == value || count == 17) return {digits.data(), end.ptr};
   }
 }
 
@@ -123,6 +152,11 @@ bool ParseCsv(const std::string& text_of_file, const std::string& file,
   const std::string_view text = WithoutByteOrderMark(text_of_file);
   *table = CsvTable();
   table->file = file;
+  const std::string no_text = WhyNotText(text);
+  if (!no_text.empty()) {
+    *error = OneLine(file + ": " + no_text);
+    return false;
+  }
   int line_number = 0;
   for (std::size_t begin = 0; begin < text.size();) {
     const std::size_t end = std::min(text.find('\n', begin), text.size());
@@ -130,9 +164,11 @@ bool ParseCsv(const std::string& text_of_file, const std::string& file,
     begin = end + 1;
     ++line_number;
     if (line.empty()) continue;
-    std::vector<std::string> cells = SplitCsvLine(line);
-    std::string what;
-    if (table->columns.empty()) {
+    std::vector<std::string> cells;
+    std::string what = SplitLine(line, &cells);
+    if (!what.empty()) {
+      // Its cells are not what they seem.
+    } else if (table->columns.empty()) {
       what = CheckHeader(cells, required, allowed);
       table->columns = std::move(cells);
       table->header_line = line_number;

@@ -4,7 +4,9 @@
 // Tables in text files: a header line with the names of the columns, then one row on each line,
 // with cells separated by commas. A cell in double quotes may hold commas, and quotes as "" (RFC
 // 4180, but for line breaks); spaces around cells, blank lines, carriage returns and a byte-order
-// mark (UTF-8) before the header are ignored.
+// mark (UTF-8) before the header are ignored. A cell that does not begin with a quote has the quotes
+// in it as characters. What follows a closing quote, a quote that is not closed and NUL bytes are
+// mistakes.
 
 #include <string>
 #include <string_view>
@@ -35,6 +37,9 @@ bool ParseCsv(const std::string& text, const std::string& file,
 
 /// The cells of one line.
 std::vector<std::string> SplitCsvLine(std::string_view line);
+
+/// A number with the digits, from 15 to 17, that it takes to read the same double.
+std::string CsvNumber(double value);
 
 /// A cell as SplitCsvLine reads it: in quotes where it has commas, quotes or line breaks.
 std::string CsvCell(const std::string& cell);

@@ -158,11 +158,9 @@ bool ParseJson(const std::string& text, const std::string& name_for_messages, Js
   JsonErrors errors(name_for_messages);
   *json = nullptr;
   // The parser treats a NUL byte as the end, whatever follows it.
-  if (const size_t nul = text.find('\0'); nul != std::string::npos) {
-    const auto end = text.begin() + static_cast<std::ptrdiff_t>(nul);
-    const size_t line_start = text.rfind('\n', nul) + 1;  // 0 on the first line
-    errors.Add("", "line " + std::to_string(1 + std::count(text.begin(), end, '\n')) + ", column " +
-                       std::to_string(1 + nul - line_start) + ": malformed JSON: a NUL byte");
+  const std::string no_text = WhyNotText(text);
+  if (!no_text.empty()) {
+    errors.Add("", no_text);
     *error = errors.message();
     return false;
   }

@@ -148,6 +148,22 @@ std::string_view WithoutByteOrderMark(std::string_view text) {
   return text.substr(0, kMark.size()) == kMark ? text.substr(kMark.size()) : text;
 }
 
+std::string WhyNotText(std::string_view bytes) {
+  const auto begins = [&](std::string_view mark) { return bytes.substr(0, mark.size()) == mark; };
+  const std::size_t nul = bytes.find('\0');
+  const bool beside_letter = nul == 0 || (nul == 1 && bytes[0] != '\0');
+  const bool wide =
+      beside_letter && bytes.size() > 3 && bytes.size() % 2 == 0 && bytes[2 + nul % 2] == '\0';
+  if (begins("\xff\xfe") || begins("\xfe\xff") || begins({"\0\0\xfe\xff", 4}) || wide) {
+    return "expected text in UTF-8, got UTF-16 or UTF-32: save it as UTF-8";
+  }
+  if (nul == std::string_view::npos) return "";
+  const std::string_view before = bytes.substr(0, nul);
+  return "line " + std::to_string(1 + std::count(before.begin(), before.end(), '\n')) +
+         ", column " + std::to_string(nul - (before.rfind('\n') + 1) + 1) +
+         ": expected text, got a NUL byte";
+}
+
 std::string FolderOf(const std::string& file) {
   const std::size_t slash = file.rfind('/');
   return slash == std::string::npos ? "" : file.substr(0, slash + 1);

@@ -29,6 +29,11 @@ std::vector<std::string> FilesRead();
 /// The text after the byte-order mark of UTF-8, which some editors and spreadsheets write first.
 std::string_view WithoutByteOrderMark(std::string_view text);
 
+/// Why bytes are no text that the readers of CSV and JSON take, or empty: "line 3: expected text,
+/// got a NUL byte", or that it is UTF-16 or UTF-32, by its byte-order mark or by the NUL bytes that
+/// these have beside each letter.
+std::string WhyNotText(std::string_view bytes);
+
 /// The folder of a file as a prefix of relative paths: "a/b.json" gives "a/", "b.json" gives "".
 std::string FolderOf(const std::string& file);
 

@@ -23,7 +23,10 @@ TEST_F(ImportRecordingTest, WritesObservationsAndTheNoise) {
   EXPECT_NE(run.out.find("1 mm a pixel, length ratio 1.6667"), std::string::npos) << run.out;
   EXPECT_NE(run.out.find("noise of tip y: 0.0000 mm"), std::string::npos) << run.out;
   const std::string csv = Read(Path("o.csv"));
-  EXPECT_EQ(csv.rfind("time,point,x,y\n0,joint,0,-0.1\n0,tip,0.06,-0.1\n0.0025,joint,", 0), 0u)
+  EXPECT_EQ(
+      csv.rfind("time,point,x,y\n0,joint,0,-0.1\n0,tip,0.060000000000000005,-0.1\n0.0025,joint,",
+                0),
+      0u)
       << csv;
 }
 
@@ -67,6 +70,50 @@ TEST_F(ImportRecordingTest, TablesOfOthers) {
   ExpectOneLine(Run("tangible-import-recording", of_table + out + " --frame_rate=100"), 1,
                 "expected a column of times or a frame rate, got both");
   ExpectOneLine(Run("tangible-import-recording", of_table + " --out=" + mapping), 2, "--out");
+}
+
+TEST_F(ImportRecordingTest, ShiftsTheTimesOfAClockAndSaysSo) {
+  const std::string mapping = Write(
+      "m.json", R"({"time": "t", "columns": [{"column": "a", "body": "b", "coordinate": "x"}]})");
+  const std::string table = Write("t.csv", "t,a\n1600000000.25,1\n1600000000.26,2\n");
+  const std::string run_of =
+      table + " --kind=table --mapping=" + mapping + " --out=" + Path("o.csv");
+  ProgramRun run = Run("tangible-import-recording", run_of);
+  EXPECT_EQ(run.exit_status, 0);
+  EXPECT_EQ(run.error, table +
+                           ": the first time is 1600000000.25 s, a clock's: times are shifted "
+                           "to begin at 0 (--from=0 keeps them)\n");
+  EXPECT_NE(run.out.find("times count from 1600000000.25 s of the recording\n"), std::string::npos);
+  EXPECT_EQ(Read(Path("o.csv")), "time,body,x\n0,b,1\n0.01,b,2\n");
+  run = Run("tangible-import-recording", run_of + " --from=0");
+  EXPECT_EQ(run.exit_status, 0);
+  EXPECT_EQ(run.error, "");
+  EXPECT_EQ(Read(Path("o.csv")), "time,body,x\n1600000000.25,b,1\n1600000000.26,b,2\n");
+}
+
+TEST_F(ImportRecordingTest, RefusesNumbersOfFlagsThatAreNone) {
+  const std::string table = Write("t.csv", "t,a\n0,1\n1,2\n");
+  const std::string mapping = Write(
+      "m.json", R"({"time": "t", "columns": [{"column": "a", "body": "b", "coordinate": "x"}]})");
+  const std::string out = " --out=" + Path("o.csv");
+  const std::string of_table = table + " --kind=table --mapping=" + mapping + out;
+  for (const char* from : {"-inf", "inf", "nan"}) {
+    ExpectOneLine(Run("tangible-import-recording", of_table + " --from=" + from), 2, "--from");
+    ExpectOneLine(Run("tangible-import-recording", table + out + " --from=" + from), 2, "--from");
+  }
+  EXPECT_EQ(Run("tangible-import-recording", of_table + " --from=0.75").exit_status, 0);
+  ExpectOneLine(Run("tangible-import-recording", of_table + " --from=3 --to=2"), 2, "--to");
+  ExpectOneLine(Run("tangible-import-recording", of_table + " --scale=inf"), 2, "--scale");
+  const std::string dlc =
+      Write("d.csv", "scorer,n,n,n\nbodyparts,a,a,a\ncoords,x,y,likelihood\n0,1,2,1\n");
+  for (const char* likelihood : {"1.5", "-0.1", "nan"}) {
+    ExpectOneLine(
+        Run("tangible-import-recording",
+            dlc + out + " --kind=deeplabcut --frame_rate=2 " + "--likelihood=" + likelihood),
+        2, "--likelihood: expected a number from 0 to 1");
+  }
+  ExpectOneLine(Run("tangible-import-recording", dlc + out + " --kind=deeplabcut --frame_rate=-2"),
+                2, "--frame_rate");
 }
 
 }  // namespace

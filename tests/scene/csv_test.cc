@@ -3,6 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <cstring>
+#include <random>
 #include <string>
 
 namespace tangible {
@@ -48,9 +51,48 @@ TEST(CsvTest, QuotedCellsHoldCommasAndQuotes) {
               (std::vector<std::string>{"a", cell, "b"}));
   }
   EXPECT_EQ(CsvCell("a\nb"), "\"a\nb\"");
-  // A quote that is not closed ends with its line.
-  EXPECT_FALSE(ParseCsv("a,b\n1,2\n\"3,4\n5,6\n", "t.csv", {}, {}, &table, &error));
-  EXPECT_EQ(error, "t.csv: line 3: expected 2 cells, got 1");
+}
+
+// Cells would be read as other numbers.
+TEST(CsvTest, RefusesQuotesThatAreNotClosedOrEndWithinACell) {
+  const std::string open = "expected a closing quote of the cell, got the line's end";
+  EXPECT_EQ(CsvError("time,x\n1,2\n\"3,4\n5,6\n"), "t.csv: line 3: " + open);
+  EXPECT_EQ(CsvError("time,x\n1,\"2\n"), "t.csv: line 2: " + open);
+  EXPECT_EQ(CsvError("time,\"x\n"), "t.csv: line 1: " + open);
+  const std::string behind = "expected a comma or the line's end behind a cell's closing quote";
+  EXPECT_EQ(CsvError("time,x\n0,\"1\"2\n"), "t.csv: line 2: " + behind + ", got \"2\"");
+  EXPECT_EQ(CsvError("time,x\n\"7\" \"8\",1\n"),
+            "t.csv: line 2: " + behind + ", got \"\\\"8\\\"\"");
+  // Behind a cell's first character a quote is a character, which no number has.
+  CsvTable table;
+  std::string error;
+  double value = 0.0;
+  ASSERT_TRUE(ParseCsv("x,y\n1\"2,3\n", "t.csv", {}, {}, &table, &error)) << error;
+  EXPECT_FALSE(ReadCell(table, 0, 0, &value, &error));
+  EXPECT_EQ(error, "t.csv: line 2: x: expected a number, got \"1\\\"2\"");
+}
+
+TEST(CsvTest, RefusesWhatIsNoText) {
+  EXPECT_EQ(CsvError(std::string("time,x\n0,\0001\n", 12)),
+            "t.csv: line 2, column 3: expected text, got a NUL byte");
+  EXPECT_NE(CsvError(std::string("t\0i\0", 4)).find("UTF-16"), std::string::npos);
+}
+
+TEST(CsvNumberTest, ReadsBackToTheSameDouble) {
+  EXPECT_EQ(CsvNumber(0.1), "0.1");
+  EXPECT_EQ(CsvNumber(0.1 + 0.2), "0.30000000000000004");
+  EXPECT_EQ(CsvNumber(-3.0), "-3");
+  EXPECT_EQ(CsvNumber(1714476519.681239), "1714476519.681239");
+  EXPECT_EQ(CsvNumber(5e-324), "4.94065645841247e-324");
+  std::mt19937_64 random(3);
+  for (int k = 0; k < 20000; ++k) {
+    const auto bits = random();
+    double number = 0.0, read = 0.0;
+    std::memcpy(&number, &bits, sizeof number);
+    if (!std::isfinite(number)) continue;
+    ASSERT_TRUE(ParseNumber(CsvNumber(number), &read)) << CsvNumber(number);
+    ASSERT_EQ(read, number) << CsvNumber(number);
+  }
 }
 
 TEST(CsvTest, TakesAnyColumnsWhereNoneAreNamed) {

@@ -45,7 +45,7 @@ TEST(ParseJsonTest, MalformedTextSaysLineAndColumn) {
   EXPECT_LT(ParseError("[\"" + std::string(100000, 'a')).size(), 300u)
       << "an open string is quoted";
   EXPECT_EQ(ParseError(std::string("{}\n{}") + '\0' + "garbage"),
-            "f.json: line 2, column 3: malformed JSON: a NUL byte");
+            "f.json: line 2, column 3: expected text, got a NUL byte");
   EXPECT_EQ(ParseError("[1] x").rfind("f.json: line 1, column 5: malformed JSON: ", 0), 0u);
   EXPECT_EQ(ParseError("{\"a\": \"\xff\"}").rfind("f.json: line 1, column ", 0), 0u);
 }

@@ -109,6 +109,28 @@ TEST(ByteOrderMarkTest, StandsAtTheBeginning) {
   EXPECT_EQ(WithoutByteOrderMark(""), "");
 }
 
+TEST(WhyNotTextTest, NamesOtherEncodingsAndTheFirstNulByte) {
+  EXPECT_EQ(WhyNotText(""), "");
+  EXPECT_EQ(WhyNotText("\xef\xbb\xbf a\xc3\xa9"), "");
+  const auto bytes = [](const char* text, size_t size) {
+    return WhyNotText(std::string(text, size));
+  };
+  const std::string wide = "expected text in UTF-8, got UTF-16 or UTF-32: save it as UTF-8";
+  // "ab", little and big endian, of 16 and 32 bits, with and without a mark.
+  EXPECT_EQ(bytes("\xff\xfe"
+                  "a\0b\0",
+                  6),
+            wide);
+  EXPECT_EQ(bytes("\xfe\xff\0a\0b", 6), wide);
+  EXPECT_EQ(bytes("a\0b\0", 4), wide);
+  EXPECT_EQ(bytes("\0a\0b", 4), wide);
+  EXPECT_EQ(bytes("\xff\xfe\0\0a\0\0\0b\0\0\0", 12), wide);
+  EXPECT_EQ(bytes("\0\0\xfe\xff\0\0\0a\0\0\0b", 12), wide);
+  EXPECT_EQ(bytes("a\0\0\0b\0\0\0", 8), wide);
+  EXPECT_EQ(bytes("a\nbc\0", 5), "line 2, column 3: expected text, got a NUL byte");
+  EXPECT_EQ(bytes("a\0bc", 4), "line 1, column 2: expected text, got a NUL byte");
+}
+
 TEST(PathTest, FoldersAndRelativePaths) {
   EXPECT_EQ(FolderOf("a/b/c.json"), "a/b/");
   EXPECT_EQ(FolderOf("c.json"), "");

@@ -4,6 +4,9 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <random>
+
+#include "tangible/scene/csv.h"
 
 namespace tangible {
 namespace {
@@ -170,6 +173,146 @@ TEST(RecordingTableTest, NoiseIsThatOfFourthDifferences) {
   EXPECT_EQ(imported.recording.noise[2].coordinate, Coordinate::kOmega);
   // ±1: each fourth difference is 16.
   EXPECT_NEAR(imported.recording.noise[2].value, 16.0 / std::sqrt(70.0), 1e-12);
+}
+
+constexpr char kOne[] = R"({"time": "t", "columns": [
+    {"column": "x", "body": "b", "coordinate": "x"}]})";
+
+// A double has 2.4e-7 s at these times, and the cells say more.
+TEST(RecordingTableTest, TimesOfAClockCountFromTheFirst) {
+  const std::string cells = "t,x\n1714476519.6812390123,1\n1714476519.6861827,2\n1714476520,3\n";
+  Imported imported = Import(cells, Mapped(kOne));
+  ASSERT_TRUE(imported.ok) << imported.error;
+  EXPECT_EQ(imported.recording.start, 1714476519.6812390123);
+  ASSERT_EQ(imported.recording.rows.size(), 3u);
+  // One rounding to a double at the end, and two to a long double of less than 1.
+  const double rounding = 1e-17;
+  EXPECT_EQ(imported.recording.rows[0].time, 0.0);
+  EXPECT_NEAR(imported.recording.rows[1].time, 0.0049436877, rounding);
+  EXPECT_NEAR(imported.recording.rows[2].time, 0.3187609877, 1e-16);
+  // From a given time on, which a double does not have either.
+  TableOptions from = Mapped(kOne);
+  from.from = 1714476519.6;
+  imported = Import(cells, from);
+  ASSERT_TRUE(imported.ok) << imported.error;
+  EXPECT_EQ(imported.recording.start, 0.0);
+  EXPECT_NEAR(imported.recording.rows[1].time, 0.0861827, 1e-16);
+  // Kept where they are asked for, with all digits of a double.
+  from.from = 0.0;
+  imported = Import(cells, from);
+  ASSERT_TRUE(imported.ok) << imported.error;
+  EXPECT_EQ(imported.csv,
+            "time,body,x\n1714476519.6812391,b,1\n1714476519.6861827,b,2\n1714476520,b,3\n");
+  // An offset does the same, and times of a run stay as they are.
+  imported = Import("t,x\n1e9,0\n", Mapped(kOne));
+  EXPECT_EQ(imported.recording.start, 1e9);
+  imported = Import(cells, Mapped(R"({"time": {"column": "t", "offset": -1714476519.5},
+      "columns": [{"column": "x", "body": "b", "coordinate": "x"}]})"));
+  ASSERT_TRUE(imported.ok) << imported.error;
+  EXPECT_EQ(imported.recording.start, 0.0);
+  EXPECT_NEAR(imported.recording.rows[1].time, 0.1861827, 1e-16);
+  imported = Import("t,x\n5.25,0\n", Mapped(kOne));
+  EXPECT_EQ(imported.csv, "time,body,x\n5.25,b,0\n");
+}
+
+// Whole numbers of nanoseconds, of which a double has every 256th; and several bodies in turn, the
+// earliest last.
+TEST(RecordingTableTest, ClocksInNanosecondsAndOfSeveralBodies) {
+  const Imported imported = Import(
+      "ns,who,x\n1714476519681239100,a,1\n1714476519681239101,a,2\n1714476519681239000,b,3\n",
+      Mapped(R"({"time": {"column": "ns", "scale": 1e-9}, "target": "body", "name": "who",
+                 "columns": [{"column": "x", "coordinate": "x"}]})"));
+  ASSERT_TRUE(imported.ok) << imported.error;
+  EXPECT_EQ(imported.csv, "time,body,x\n1e-07,a,1\n1.01e-07,a,2\n0,b,3\n");
+  TableOptions kept = Mapped(R"({"time": {"column": "ns", "scale": 1e-9}, "columns": [
+      {"column": "x", "body": "b", "coordinate": "x"}]})");
+  kept.from = 0.0;
+  const std::string error =
+      Import("ns,x\n1714476519681239000,1\n1714476519681239001,2\n", kept).error;
+  EXPECT_EQ(
+      error.rfind("r.csv: line 3: time: expected one that differs from the last as a double", 0),
+      0u)
+      << error;
+}
+
+// All that is written reads back to the doubles that were read.
+TEST(RecordingTableTest, WritesAllDigits) {
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> uniform(-1.0, 1.0);
+  std::string text = "t,x\n";
+  std::vector<double> times, values;
+  for (int k = 0; k < 200; ++k) {
+    times.push_back(10.0 * k + uniform(random));
+    values.push_back(std::ldexp(uniform(random), k - 100));
+    text += CsvNumber(times.back() + 1.0) + "," + CsvNumber(values.back()) + "\n";
+    times.back() += 1.0;
+  }
+  const Imported imported = Import(text, Mapped(kOne));
+  ASSERT_TRUE(imported.ok) << imported.error;
+  CsvTable table;
+  std::string error;
+  ASSERT_TRUE(ParseCsv(imported.csv, "o.csv", {}, {}, &table, &error)) << error;
+  ASSERT_EQ(table.rows.size(), times.size());
+  for (int k = 0; k < 200; ++k) {
+    double time = 0.0, value = 0.0;
+    ASSERT_TRUE(ReadCell(table, k, 0, &time, &error) && ReadCell(table, k, 2, &value, &error));
+    EXPECT_EQ(time, times[k]);
+    EXPECT_EQ(value, values[k]);
+  }
+}
+
+TEST(RecordingTableTest, RefusesNumbersThatOverflowAndUnlikelyLikelihoods) {
+  const auto scaled = [](const std::string& rest, double scale = 1.0) {
+    TableOptions options = Mapped(R"({"time": "t", "columns": [
+        {"column": "x", "body": "b", "coordinate": "x")" +
+                                  rest + "}]}");
+    options.scale = scale;
+    return Import("t,x\n0,2\n1,-1e300\n", options);
+  };
+  const std::string error =
+      "r.csv: line 3: x: expected a finite number after its scale and offset, got -1e+300 with a "
+      "scale that is too large";
+  EXPECT_EQ(scaled(R"(, "scale": 1e10)").error, error);
+  EXPECT_EQ(scaled("", 1e9).error, error);
+  EXPECT_TRUE(scaled(R"(, "scale": 1e7)").ok);
+  EXPECT_EQ(Import("t,x\n0,2\n1e20,1\n", Mapped(R"({"time": {"column": "t", "scale": 1e300},
+      "columns": [{"column": "x", "body": "b", "coordinate": "x"}]})"))
+                .error,
+            "r.csv: line 3: time: expected a finite number of seconds, got 1e+20 with a scale that "
+            "is too large");
+  TableOptions dlc;
+  dlc.format = TableFormat::kDeepLabCut;
+  dlc.frame_rate = 10.0;
+  const std::string header = "scorer,n,n,n\nbodyparts,a,a,a\ncoords,x,y,likelihood\n";
+  for (const char* likelihood : {"1.0000001", "-0.25", "37"}) {
+    EXPECT_EQ(
+        Import(header + "0,1,2,1\n1,1,2," + likelihood + "\n", dlc).error,
+        "r.csv: line 5: likelihood: expected a number from 0 to 1, got " + std::string(likelihood));
+  }
+  EXPECT_TRUE(Import(header + "0,1,2,1\n1,1,2,0\n2,1,2,\n", dlc).ok);
+  // Rows below headers without names have their own lines.
+  EXPECT_EQ(Import(header + "0,1,2,1\n1,2,3\n", dlc).error,
+            "r.csv: line 5: expected 4 cells, got 3");
+}
+
+TEST(RecordingTableTest, RefusesQuotesInsideCellsAndWhatIsNoText) {
+  const auto error = [](const std::string& text) { return Import(text, Mapped(kOne)).error; };
+  EXPECT_EQ(error("t,x\n0,1\"2\n"), "r.csv: line 2: x: expected a number, got \"1\\\"2\"");
+  EXPECT_EQ(error("t;x\n0;3\"4,5\n"), "r.csv: line 2: x: expected a number, got \"3\\\"4,5\"");
+  const std::string behind = ": expected the cell's end behind its closing quote, got more";
+  for (const char* const cell : {"\"1\"2", "\"1\" \"2\"", "\"1\"2\"", " \"1\" 2"}) {
+    EXPECT_EQ(error(std::string("t,x\n0,1\n1,") + cell + "\n2,3\n"), "r.csv: line 3" + behind)
+        << cell;
+    EXPECT_EQ(error(std::string("t;x\n0;1\n1;") + cell + ",5\n2;3\n"), "r.csv: line 3" + behind)
+        << cell;
+  }
+  TableOptions tracker;
+  tracker.format = TableFormat::kTracker;
+  EXPECT_EQ(Import("a\nt,x\n0,\"1\"2\n", tracker).error, "r.csv: line 3" + behind);
+  EXPECT_EQ(error(std::string("t,x\n0,1\0\n", 9)),
+            "r.csv: line 2, column 4: expected text, got a NUL byte");
+  EXPECT_NE(error(std::string("\xff\xfet\0,\0x\0\n\0", 10)).find("UTF-16"), std::string::npos);
+  EXPECT_TRUE(Import("\xef\xbb\xbft,x\n0,1\n", Mapped(kOne)).ok);
 }
 
 TEST(RecordingTableTest, MistakesAreOneLine) {

@@ -64,7 +64,8 @@ TEST(RecordingTest, MarkersAreRelativeToThePivotInMetres) {
   EXPECT_NEAR(recording.noise, 0.0, 1e-15);
   ASSERT_EQ(recording.series.size(), 4u);
   const std::string csv = ObservationCsv(recording);
-  EXPECT_EQ(csv.substr(0, csv.find("0.0025")), "time,point,x,y\n0,joint,0,-0.1\n0,tip,0.06,-0.1\n");
+  EXPECT_EQ(csv.substr(0, csv.find("0.0025")),
+            "time,point,x,y\n0,joint,0,-0.1\n0,tip,0.060000000000000005,-0.1\n");
 }
 
 TEST(RecordingTest, AnglesAreMeasuredFromHanging) {
@@ -94,6 +95,36 @@ TEST(RecordingTest, SaysWhatIsWrong) {
   EXPECT_FALSE(ParseRecording("1,2,1,2,5,6\n", "m.csv", options, &recording, &error));
   EXPECT_NE(error.find("apart"), std::string::npos) << error;
   EXPECT_FALSE(ReadRecording("/nonexistent.csv", options, &recording, &error));
+}
+
+TEST(RecordingTest, NumbersKeepTheirDigitsAndMistakesAreOneLine) {
+  RecordingOptions options;
+  options.kind = RecordingKind::kMultiarmSingle;
+  options.to = 1.0;
+  const auto parse = [&](const std::string& last, Recording* recording) {
+    std::string error;
+    std::string text = "t,th1,om1\n";
+    for (const char* time : {"0.1", "0.2000000000001", "0.3", "0.4"}) {
+      text += std::string(time) + ",3.00000000000001,0\n";
+    }
+    ParseRecording(text + last, "a.csv", options, recording, &error);
+    return error;
+  };
+  Recording recording;
+  ASSERT_EQ(parse("0.5,0,0\n", &recording), "");
+  const std::string csv = ObservationCsv(recording);
+  EXPECT_NE(csv.find("\n0.2000000000001,pendulum,-0.14159265358978"), std::string::npos) << csv;
+  EXPECT_EQ(parse("0.4,0,0\n", &recording),
+            "a.csv: line 6: t: expected one after 0.4 s, got 0.4: the clock stands still or runs "
+            "backwards");
+  options.kind = RecordingKind::kIbmDoublePendulum;
+  options.first_length = 1e308;
+  std::string error;
+  EXPECT_FALSE(
+      ParseRecording(MarkerFile(20) + "0,0,0,0,0,100000\n", "m.csv", options, &recording, &error));
+  EXPECT_NE(error.find("m.csv: expected coordinates of tip that a double can hold"),
+            std::string::npos)
+      << error;
 }
 
 }  // namespace
