@@ -54,7 +54,7 @@ std::string Cleaned(const std::string& name) {
   return clean;
 }
 
-/// The name with each line break as a space, which is how WithCommas leaves it in a cell.
+/// The name with each line break as a space, which is how CommaText leaves it in a cell.
 std::string InOneLine(std::string name) {
   name.erase(std::remove(name.begin(), name.end(), '\r'), name.end());
   std::replace(name.begin(), name.end(), '\n', ' ');
@@ -66,9 +66,12 @@ char SeparatorOf(std::string_view text) {
   bool quoted = false;
   bool semicolon = false;
   int lines = 0;
+  char before = '\n';  // this character, without blanks
   // Tracker's first line may be a name alone.
   for (size_t i = 0; i < text.size() && lines < 2; ++i) {
-    quoted = quoted != (text[i] == '"');
+    const bool may_open = before == '"' || before == ',' || before == ';' || before == '\n';
+    if (text[i] == '"' && (quoted || may_open)) quoted = !quoted;
+    if (text[i] != ' ') before = text[i];
     if (quoted) continue;
     if (text[i] == '\t') return '\t';
     semicolon = semicolon || text[i] == ';';
@@ -439,8 +442,8 @@ bool IsLength(Coordinate coordinate) {
   return coordinate != Coordinate::kAngle && coordinate != Coordinate::kOmega;
 }
 
-/// A number of a clock as its whole part and the rest: in one double, times since 1970 are multiples
-/// of 2.4e-7 s.
+/// A number of a clock as its whole part and the rest: in one double, times since 1970 are
+/// multiples of 2.4e-7 s.
 struct ClockNumber {
   long double whole = 0.0L;
   long double part = 0.0L;
@@ -524,13 +527,12 @@ class RowCollector {
   }
 
   bool IsWithin(double time) const {
-    // The edge and the scale of times are rounded too.
-    const auto rounding = [](double edge) {
-      constexpr double kTwice = 2.0 * std::numeric_limits<double>::epsilon();
-      return kWindowRounding + (std::isfinite(edge) ? kTwice * std::abs(edge) : 0.0);
-    };
-    return time >= options_.from.value_or(0.0) - rounding(options_.from.value_or(0.0)) &&
-           time <= options_.to + rounding(options_.to);
+    const double from = options_.from.value_or(0.0);
+    return time >= from - Rounding(from) && time <= options_.to + Rounding(options_.to);
+  }
+
+  static double Rounding(double end) {
+    return kWindowRounding + (std::isfinite(end) ? kEndRounding * std::abs(end) : 0.0);
   }
 
   /// The moment whose time becomes 0 where times are those of a clock, else none.

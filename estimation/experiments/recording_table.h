@@ -77,8 +77,8 @@ struct TableRecording {
 };
 
 /// Reads a recording from text. On failure sets one line "file: line 3: what, expected, got": an
-/// unknown column, times that run backwards, a scale of 0 or one that overflows, a likelihood outside
-/// [0, 1], no row in the window.
+/// unknown column, times that run backwards, a scale of 0 or one that overflows, a likelihood
+/// outside [0, 1], no row in the window.
 bool ParseTableRecording(const std::string& text, const std::string& file,
                          const TableOptions& options, TableRecording* recording,
                          std::string* error);

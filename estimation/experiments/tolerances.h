@@ -9,9 +9,12 @@ namespace tangible {
 /// Absolute, s: a row whose time is beyond an end of the window by less belongs to the window,
 /// because it differs by rounding.
 inline constexpr double kWindowRounding = 1e-9;
-/// Absolute, s: a recording whose first time is later has the times of a clock that began elsewhere
-/// (in 1970, or when the computer was started), and they are counted from its first one. No run
-/// begins with three hours without a row.
+/// Of an end of the window, beside kWindowRounding: the end and the scale of a table's times are
+/// rounded to doubles, by a quarter of this each.
+inline constexpr double kEndRounding = 4.5e-16;
+/// Absolute, s: a recording whose first time is later has the times of a clock that began
+/// elsewhere (in 1970, or when the computer was started), and they are counted from its first one.
+/// No run begins with three hours without a row.
 inline constexpr double kClockTime = 1e4;
 /// Of one sample: a number of samples that is smaller than a whole number by less is that whole
 /// number.

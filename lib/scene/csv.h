@@ -4,9 +4,9 @@
 // Tables in text files: a header line with the names of the columns, then one row on each line,
 // with cells separated by commas. A cell in double quotes may hold commas, and quotes as "" (RFC
 // 4180, but for line breaks); spaces around cells, blank lines, carriage returns and a byte-order
-// mark (UTF-8) before the header are ignored. A cell that does not begin with a quote has the quotes
-// in it as characters. What follows a closing quote, a quote that is not closed and NUL bytes are
-// mistakes.
+// mark (UTF-8) before the header are ignored. A cell that does not begin with a quote has the
+// quotes in it as characters. What follows a closing quote, a quote that is not closed and NUL
+// bytes are mistakes.
 
 #include <string>
 #include <string_view>

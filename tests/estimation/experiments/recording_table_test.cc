@@ -75,6 +75,11 @@ TEST(RecordingTableTest, QuotedNamesMayHoldSeparatorsQuotesAndLineBreaks) {
   imported = Import("t, s;\"the \"\"tip\"\", x\";y of it\n\"0,5\";2,5;-3\n1; 4,0 ;5\n", options);
   ASSERT_TRUE(imported.ok) << imported.error;
   EXPECT_EQ(imported.csv, wanted);
+  // Within a cell that does not begin with it a quote is a character.
+  imported = Import("t;5\" disc\n0,5;2,5\n", Mapped(R"({"time": "t", "columns": [
+      {"column": "5\" disc", "point": "tip", "coordinate": "x"}]})"));
+  ASSERT_TRUE(imported.ok) << imported.error;
+  EXPECT_EQ(imported.csv, "time,point,x\n0.5,tip,2.5\n");
   // Other lines keep their numbers.
   EXPECT_EQ(Import("\"t, s\",\"the \"\"tip\"\", x\",\"y\nof it\"\n0.5,2.5,z\n", options).error,
             "r.csv: line 3: \"y of it\": expected a number, got \"z\"");
