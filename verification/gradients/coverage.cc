@@ -5,6 +5,7 @@
 
 #include "tangible/scene/scene_names.h"
 #include "tangible/simulation/stepping/step.h"
+#include "tangible/verification/support/coincidences.h"
 
 namespace tangible {
 namespace {
@@ -175,9 +176,19 @@ std::vector<std::string> ExpectedCoverage() {
   return expected;
 }
 
+bool HasCoincidences(const Coverage& coverage) {
+  const auto first = coverage.lower_bound(kCoincidencePrefix);
+  return first != coverage.end() && first->first.rfind(kCoincidencePrefix, 0) == 0;
+}
+
 std::vector<std::string> MissingCoverage(const Coverage& coverage) {
   std::vector<std::string> missing;
-  for (std::string& what : ExpectedCoverage()) {
+  std::vector<std::string> expected = ExpectedCoverage();
+  if (HasCoincidences(coverage)) {
+    const std::vector<std::string>& kinds = CoincidenceKinds();
+    expected.insert(expected.end(), kinds.begin(), kinds.end());
+  }
+  for (std::string& what : expected) {
     if (coverage.count(what) == 0) {
       missing.push_back(std::move(what));
     }

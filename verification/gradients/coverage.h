@@ -22,10 +22,16 @@ Coverage CoverageOf(const Scene& scene, const RunTrace& run);
 /// sum += one.
 void Add(const Coverage& one, Coverage* sum);
 
+/// How the names of coincidences (support/coincidences.h) begin.
+inline constexpr char kCoincidencePrefix[] = "coincidence: ";
+/// Whether any of the scenes was one.
+bool HasCoincidences(const Coverage& coverage);
+
 /// Everything that random scenes are meant to have.
 std::vector<std::string> ExpectedCoverage();
 
-/// Those of ExpectedCoverage that are missing.
+/// Those of ExpectedCoverage that are missing, and of CoincidenceKinds if there were
+/// coincidences.
 std::vector<std::string> MissingCoverage(const Coverage& coverage);
 
 }  // namespace tangible

@@ -10,11 +10,20 @@ namespace tangible {
 namespace {
 
 const char* const kTrustworthy = "trustworthy";
+// What stands before the verdict where the derivative is that of fixed steps.
+const char* const kOfTheDiscreteMap = "of the discrete map: ";
+
+bool IsTrustworthy(const Certificate& certificate) {
+  const std::string prefix = kOfTheDiscreteMap;
+  const bool has_prefix = certificate.verdict.rfind(prefix, 0) == 0;
+  return certificate.verdict.substr(has_prefix ? prefix.size() : 0) == kTrustworthy;
+}
 
 class MethodRun {
  public:
-  MethodRun(const Scene& scene, const std::vector<ParameterPath>& parameters)
-      : scene_(scene), parameters_(parameters) {}
+  MethodRun(const Scene& scene, const std::vector<ParameterPath>& parameters,
+            const std::optional<ClosedFormJacobian>& known)
+      : scene_(scene), parameters_(parameters), known_(known) {}
 
   MethodJacobians Run() {
     // The certificate is computed with the first method, before anything is compared.
@@ -42,8 +51,10 @@ class MethodRun {
 
  private:
   GradientResult Differentiate(const std::vector<ParameterPath>& parameters, GradientMethod method,
-                               Factorisations factorisations, CertificatePass certificate) const {
+                               Factorisations factorisations, CertificatePass certificate,
+                               DerivativeSide side = DerivativeSide::kBoth) const {
     GradientOptions options;
+    options.side = side;
     options.method = method;
     options.factorisations = factorisations;
     options.certificate = certificate;
@@ -53,13 +64,13 @@ class MethodRun {
   // Some reasons (equal coefficients in the mixing rule, friction 0) concern only some parameters.
   void NameKinks() {
     r_.named.resize(parameters_.size());
-    if (r_.certificate.verdict == kTrustworthy) {
+    if (IsTrustworthy(r_.certificate)) {
       return;
     }
     for (size_t k = 0; k < parameters_.size(); ++k) {
       const GradientResult one = Differentiate({parameters_[k]}, GradientMethod::kTangent,
                                                Factorisations::kKeep, CertificatePass::kRun);
-      r_.named[k] = one.certificate.verdict == kTrustworthy ? "" : one.certificate.verdict;
+      r_.named[k] = IsTrustworthy(one.certificate) ? "" : one.certificate.verdict;
     }
   }
 
@@ -103,16 +114,36 @@ class MethodRun {
   }
 
   void AddClosedForm() {
-    std::optional<ClosedFormJacobian> known = FindClosedForm(scene_, parameters_);
+    std::optional<ClosedFormJacobian> known = known_ ? known_ : FindClosedForm(scene_, parameters_);
     if (known && known->jacobian.rows() == r_.contributions.sum.rows() &&
         known->jacobian.cols() == r_.contributions.sum.cols()) {
       r_.jacobian[kByClosedForm] = std::move(known->jacobian);
       r_.closed_form_tolerance = known->tolerance;
+      r_.known_values = std::move(known->values);
+      if (known->plus.size() > 0) {
+        AddSide(DerivativeSide::kPlus, kByPlus);
+        AddSide(DerivativeSide::kMinus, kByMinus);
+        r_.jacobian[kByClosedPlus] = std::move(known->plus);
+        r_.jacobian[kByClosedMinus] = std::move(known->minus);
+      }
+    }
+  }
+
+  // One-sided derivatives of the parameters that the certificate has named.
+  void AddSide(DerivativeSide side, Method place) {
+    r_.jacobian[place].setConstant(static_cast<Eigen::Index>(r_.outputs.size()),
+                                   static_cast<Eigen::Index>(parameters_.size()), kUnknown);
+    for (size_t k = 0; k < parameters_.size(); ++k) {
+      if (r_.named[k].empty()) continue;
+      const GradientResult one = Differentiate({parameters_[k]}, GradientMethod::kTangent,
+                                               Factorisations::kKeep, CertificatePass::kRun, side);
+      if (one.done) r_.jacobian[place].col(static_cast<Eigen::Index>(k)) = one.jacobian.col(0);
     }
   }
 
   const Scene& scene_;
   const std::vector<ParameterPath>& parameters_;
+  const std::optional<ClosedFormJacobian>& known_;
   MethodJacobians r_;
 };
 
@@ -138,14 +169,23 @@ const char* NameOf(Method method) {
       return "Ridders";
     case kByClosedForm:
       return "closed form";
+    case kByPlus:
+      return "plus side";
+    case kByMinus:
+      return "minus side";
+    case kByClosedPlus:
+      return "closed form, plus side";
+    case kByClosedMinus:
+      return "closed form, minus side";
     case kNumMethods:
       break;
   }
   return "";
 }
 
-MethodJacobians RunMethods(const Scene& scene, const std::vector<ParameterPath>& parameters) {
-  return MethodRun(scene, parameters).Run();
+MethodJacobians RunMethods(const Scene& scene, const std::vector<ParameterPath>& parameters,
+                           const std::optional<ClosedFormJacobian>& known) {
+  return MethodRun(scene, parameters, known).Run();
 }
 
 }  // namespace tangible

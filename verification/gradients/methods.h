@@ -6,10 +6,12 @@
 // sum of contributions to each entry, the error estimate of the differences.
 
 #include <limits>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "tangible/simulation/gradient/gradient.h"
+#include "tangible/verification/gradients/closed_form.h"
 #include "tangible/verification/support/compare.h"
 #include "tangible/verification/support/differences.h"
 
@@ -25,6 +27,10 @@ enum Method {
   kByFineDifference,    ///< central, of kPlainSteps[1]
   kByRidders,           ///< extrapolated, with an error estimate
   kByClosedForm,
+  kByPlus,        ///< the derivative for growing parameters, of those that are named
+  kByMinus,       ///< for shrinking ones
+  kByClosedPlus,  ///< both in closed form
+  kByClosedMinus,
   kNumMethods
 };
 
@@ -48,9 +54,11 @@ struct MethodJacobians {
   long unrolled_fallbacks = 0;                ///< steps solved by the implicit method instead
   std::vector<DifferenceColumn> differences;  ///< for each parameter
   double closed_form_tolerance = 0.0;
+  VectorX<double> known_values;  ///< of the outputs in closed form; may be empty
 };
 
-/// Runs all of them.
-MethodJacobians RunMethods(const Scene& scene, const std::vector<ParameterPath>& parameters);
+/// Runs all of them. `known`: the closed form, if there is one; else that of FindClosedForm.
+MethodJacobians RunMethods(const Scene& scene, const std::vector<ParameterPath>& parameters,
+                           const std::optional<ClosedFormJacobian>& known = std::nullopt);
 
 }  // namespace tangible

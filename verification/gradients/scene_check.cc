@@ -17,6 +17,8 @@ namespace {
 constexpr double kRounding = 1e-13;  // of the contributions
 constexpr double kShareOfColumn = 0.1;
 constexpr double kInteriorPointEnd = 1e-14;
+// Of the column: the rounding of a coincidence, over the step of the closed form's differences.
+constexpr double kSideRounding = 1e-9;
 
 std::string Short(double x) {
   char text[32];
@@ -33,6 +35,7 @@ class Judge {
       : run_(run), parameters_(parameters), check_(*check) {}
 
   void JudgeAll() {
+    JudgeValues();
     std::map<std::string, KindRow> rows;
     for (int p = 0; p < static_cast<int>(parameters_.size()); ++p) {
       KindRow row;
@@ -46,6 +49,7 @@ class Judge {
       for (int pair = 0; pair < kNumPairs; ++pair) {
         JudgeColumn(p, pair, &row);
       }
+      JudgeSides(p, &row);
       auto [found, is_new] = rows.try_emplace(row.kind, row);
       if (!is_new) {
         found->second.Add(row);
@@ -59,6 +63,20 @@ class Judge {
   }
 
  private:
+  // Whether the run ends where the closed form ends.
+  void JudgeValues() {
+    const VectorX<double>& known = run_.known_values;
+    if (known.size() == 0 || known.size() != run_.trace.values.size()) return;
+    const auto apart = (known - run_.trace.values).cwiseAbs();
+    Eigen::Index output = 0;
+    const double most = apart.maxCoeff(&output);
+    if (most > run_.closed_form_tolerance * std::max(1.0, known.cwiseAbs().maxCoeff())) {
+      check_.wrong_value = run_.outputs[static_cast<size_t>(output)] + " ends at " +
+                           Short(run_.trace.values[output]) + ", in closed form at " +
+                           Short(known[output]);
+    }
+  }
+
   void CountCoarse(int p, KindRow* row) const {
     if (run_.differences[p].status != DifferenceStatus::kJudged) {
       return;
@@ -90,7 +108,7 @@ class Judge {
       if (!methods.bounded && std::isnan(entry.error)) {
         continue;  // no quotient of this step, as choices differ
       }
-      if (methods.a == kByClosedForm && std::isnan(run_.jacobian[kByClosedForm](o, p))) {
+      if (IsKnownMethod(methods.a) && std::isnan(run_.jacobian[methods.a](o, p))) {
         continue;
       }
       if (!methods.bounded || entry.ratio <= 1.0) {
@@ -113,6 +131,34 @@ class Judge {
     }
     if (exception.entries > 0) {
       Except(p, pair, exception.entries, exception.error, exception.what, row);
+    }
+  }
+
+  static bool IsOfASide(Method method) { return method == kByPlus || method == kByMinus; }
+  // Entries of these may be unknown.
+  static bool IsKnownMethod(Method method) { return method == kByClosedForm || IsOfASide(method); }
+
+  // Whether the certificate names a kink where the closed form has one, and only there.
+  void JudgeSides(int p, KindRow* row) {
+    if (run_.jacobian[kByClosedPlus].size() == 0) return;
+    const auto apart =
+        (run_.jacobian[kByClosedPlus].col(p) - run_.jacobian[kByClosedMinus].col(p)).cwiseAbs();
+    Eigen::Index output = 0;
+    const double most = apart.maxCoeff(&output);
+    const bool has_kink = most > run_.closed_form_tolerance * ScaleOfColumn(p);
+    if (!has_kink && !run_.named[p].empty()) {
+      check_.false_alarms.push_back(parameters_[p].path + ": " + run_.named[p]);
+    }
+    if (has_kink && run_.named[p].empty()) {
+      const auto closed = static_cast<int>(
+          std::find_if(std::begin(kMethodPairs), std::end(kMethodPairs),
+                       [](const MethodPair& pair) { return pair.a == kByClosedForm; }) -
+          std::begin(kMethodPairs));
+      Except(p, closed, 1, most / ScaleOfColumn(p),
+             run_.outputs[static_cast<size_t>(output)] + ": a kink that is not named, " +
+                 Short(run_.jacobian[kByClosedMinus](output, p)) + " below and " +
+                 Short(run_.jacobian[kByClosedPlus](output, p)) + " above",
+             row);
     }
   }
 
@@ -145,6 +191,7 @@ class Judge {
                               ? run_.differences[p].errors[o]
                               : kUnknown;
     double estimate = kMethodPairs[pair].a == kByRidders ? entry.ridders_error : 0.0;
+    if (IsOfASide(kMethodPairs[pair].a)) estimate = kSideRounding * ScaleOfColumn(p);
     if (kMethodPairs[pair].a == kByUnrolledJets) {
       entry.contributions = ScaleOfColumn(p);
       const double error = InteriorPointError();
@@ -179,8 +226,12 @@ class Judge {
     return std::max(run_.contributions.column[p], run_.trace.values.cwiseAbs().maxCoeff() / size);
   }
 
-  // The certificate's verdict that explains an exception; empty if there is none.
+  // The certificate's verdict that explains an exception; empty if there is none. One-sided
+  // derivatives, and entries on whose derivative both sides agree, have no kink.
   std::string Reason(int p, int pair) const {
+    const Method method = kMethodPairs[pair].a;
+    const bool is_unique = IsKnownMethod(method) && run_.jacobian[kByClosedPlus].size() > 0;
+    if (is_unique) return "";
     if (!run_.named[p].empty()) {
       return run_.named[p];
     }
@@ -299,7 +350,7 @@ bool IsCoarse(double value, double estimate, double largest_of_column) {
 }
 
 SceneCheck CheckScene(const Scene& scene, const std::vector<ParameterPath>& parameters,
-                      KeepJacobians keep) {
+                      KeepJacobians keep, const std::optional<ClosedFormJacobian>& known) {
   SceneCheck check;
   check.name = scene.path.empty() ? scene.name : scene.path;
   check.stepping = scene.simulation.stepping;
@@ -309,7 +360,7 @@ SceneCheck CheckScene(const Scene& scene, const std::vector<ParameterPath>& para
                     [](const auto& body) { return body.motion == Motion::kMoving; }));
   check.parameters = static_cast<int>(parameters.size());
   check.steps = NumSteps(scene.simulation);
-  MethodJacobians run = RunMethods(scene, parameters);
+  MethodJacobians run = RunMethods(scene, parameters, known);
   check.done = run.done;
   check.message = run.message;
   if (!run.done) {

@@ -59,7 +59,9 @@ inline constexpr MethodPair kMethodPairs[] = {
     {kByRidders, kByTangent, "Ridders", 1e-5, true},
     {kByCoarseDifference, kByTangent, "difference 1e-4", 1e-5, false},
     {kByFineDifference, kByTangent, "difference 6e-6", 1e-5, false},
-    {kByClosedForm, kByTangent, "closed form", 0.0, true}};  // its tolerance is its own
+    {kByClosedForm, kByTangent, "closed form", 0.0, true},  // its tolerance is its own
+    {kByPlus, kByClosedPlus, "plus side", 1e-5, true},
+    {kByMinus, kByClosedMinus, "minus side", 1e-5, true}};
 inline constexpr int kNumPairs = static_cast<int>(std::size(kMethodPairs));
 
 /// One entry with the value of every method.
@@ -118,6 +120,10 @@ struct SceneCheck {
   KindRow total;
   std::vector<CheckedEntry> worst;  ///< by ratio, of bounded pairs, at most kMostWorst
   std::vector<CheckedException> exceptions;
+  std::string wrong_value;  ///< empty, or the output that differs most from its closed form
+  /// Parameters that the certificate names although both sides have the same derivative in closed
+  /// form, with its verdict.
+  std::vector<std::string> false_alarms;
   /// Filled only on request: outputs, parameters and every method's Jacobian.
   std::vector<std::string> outputs, parameter_paths;
   MatrixX<double> jacobian[kNumMethods], contributions, ridders_error;
@@ -137,8 +143,9 @@ double EntryError(double a, double b, double tolerance, double contributions, do
 /// (if that is not 0).
 bool IsCoarse(double value, double estimate, double largest_of_column);
 
-/// Checks a scene with respect to the parameters.
+/// Checks a scene with respect to the parameters; `known` as for RunMethods.
 SceneCheck CheckScene(const Scene& scene, const std::vector<ParameterPath>& parameters,
-                      KeepJacobians keep);
+                      KeepJacobians keep,
+                      const std::optional<ClosedFormJacobian>& known = std::nullopt);
 
 }  // namespace tangible

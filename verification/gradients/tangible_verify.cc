@@ -29,6 +29,9 @@ DEFINE_int32(random, -1,
 DEFINE_int32(starts, -1,
              "number of random scenes that start in contact, near what contacts can do; -1: 10 if "
              "neither scenes nor --random are given, else 0");
+DEFINE_int32(coincidences, 0,
+             "number of random scenes in which something happens exactly on a step's end, at the "
+             "start or the end, or twice at one instant");
 DEFINE_int32(seed, 1, "of the first random scene of each kind; the next have the next seeds");
 DEFINE_string(stepping, "", "of random scenes: fixed, event or both; empty: all that there is");
 DEFINE_int32(threads, 0, "how many scenes are checked at the same time; 0: one a core");
@@ -63,21 +66,23 @@ std::string CheckFlags(const std::vector<std::string>& files) {
   std::string outside =
       FirstOutside({{"--random", FLAGS_random == -1 ? 0.0 : FLAGS_random, 0, kMostRandom},
                     {"--starts", FLAGS_starts == -1 ? 0.0 : FLAGS_starts, 0, kMostRandom},
+                    {"--coincidences", FLAGS_coincidences, 0, kMostRandom},
                     {"--seed", FLAGS_seed, 0},
                     {"--threads", FLAGS_threads, 0, kMostThreads}});
   if (!outside.empty()) return outside;
   if (!FLAGS_parameters.empty() && files.empty()) {
     return "--parameters: of given scenes; random scenes choose theirs by their seed";
   }
-  const bool is_asked = !files.empty() || FLAGS_random != -1 || FLAGS_starts != -1;
+  const bool is_asked =
+      !files.empty() || FLAGS_random != -1 || FLAGS_starts != -1 || FLAGS_coincidences > 0;
   if (FLAGS_random == -1) {
     FLAGS_random = is_asked ? 0 : kDefaultRandom;
   }
   if (FLAGS_starts == -1) {
     FLAGS_starts = is_asked ? 0 : kDefaultStarts;
   }
-  if (FLAGS_random == 0 && FLAGS_starts == 0 && files.empty() && !FLAGS_errata) {
-    return "expected scenes, --random > 0 or --starts > 0, got none";
+  if (FLAGS_random + FLAGS_starts + FLAGS_coincidences == 0 && files.empty() && !FLAGS_errata) {
+    return "expected scenes, --random > 0, --starts > 0 or --coincidences > 0, got none";
   }
   if (FLAGS_errata && (!files.empty() || !FLAGS_out.empty() || !FLAGS_report.empty())) {
     return "--errata: takes no scenes and writes no files";
@@ -131,8 +136,9 @@ int Run(const std::vector<std::string>& files, const std::vector<Stepping>& step
     const std::string error = AddFile(file, &jobs);
     if (!error.empty()) return ReportError(error);
   }
-  for (const auto& [list, count] : {std::pair(RandomList::kScenes, FLAGS_random),
-                                    std::pair(RandomList::kStarts, FLAGS_starts)}) {
+  for (const auto& [list, count] :
+       {std::pair(RandomList::kScenes, FLAGS_random), std::pair(RandomList::kStarts, FLAGS_starts),
+        std::pair(RandomList::kCoincidences, FLAGS_coincidences)}) {
     for (VerifyJob& job : RandomJobs(list, static_cast<unsigned>(FLAGS_seed), count, steppings)) {
       jobs.push_back(std::move(job));
     }
@@ -143,6 +149,9 @@ int Run(const std::vector<std::string>& files, const std::vector<Stepping>& step
   }
   if (FLAGS_starts > 0) {
     std::cout << FLAGS_starts << " random starts from seed " << FLAGS_seed << "\n";
+  }
+  if (FLAGS_coincidences > 0) {
+    std::cout << FLAGS_coincidences << " random coincidences from seed " << FLAGS_seed << "\n";
   }
   std::cout << std::endl;
   Progress progress("scenes", static_cast<long>(jobs.size()));
@@ -162,14 +171,13 @@ int Main(int argc, char** argv) {
   const CommandLine line = ParseCommandLine(
       argc, argv,
       {.name = "tangible-verify",
-       .synopsis = "[SCENE.json ...] [--parameters=P1,P2] [--random=N] [--starts=N] [--seed=S] "
-                   "[--threads=T] "
+       .synopsis = "[SCENE.json ...] [--parameters=P1,P2] [--random=N] [--starts=N] "
+                   "[--coincidences=N] [--seed=S] [--threads=T] "
                    "[--out=R.json] [--report=R.html]",
        .description =
            "Differentiates the final state of scenes by adjoint, tangent, Jets and differences, "
-           "and compares them\nentry by entry. Without scenes: 100 random ones and 10 starts. Exit "
-           "status 1 "
-           "where a bound does not hold.",
+           "and compares them\nentry by entry. Without scenes: 100 random ones and 10 starts. "
+           "Exit status 1 where a bound does not hold.",
        .version = TANGIBLE_VERSION,
        .source_file = __FILE__,
        .num_positional = 0,

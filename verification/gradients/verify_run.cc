@@ -11,6 +11,7 @@
 #include "tangible/lcp/contact/worker_pool.h"
 #include "tangible/scene/scene_json.h"
 #include "tangible/scene/scene_names.h"
+#include "tangible/verification/support/coincidences.h"
 #include "tangible/verification/support/random_scene.h"
 #include "tangible/verification/support/random_starts.h"
 
@@ -19,6 +20,8 @@ namespace {
 
 constexpr int kMostRandomParameters = 24;
 constexpr int kMostOfEventRuns = 10;  // which take longer
+// Of the entry: rounding of the engine's moments, and of the known sides, by two orders.
+constexpr double kCoincidenceTolerance = 1e-9;
 
 struct Checked {
   SceneCheck check;
@@ -28,14 +31,52 @@ struct Checked {
 std::string Replay(const VerifyJob& job) {
   if (job.seed) {
     return std::string("tangible-verify ") +
-           (job.list == RandomList::kStarts ? "--starts=1" : "--random=1") +
+           (job.list == RandomList::kStarts         ? "--starts=1"
+            : job.list == RandomList::kCoincidences ? "--coincidences=1"
+                                                    : "--random=1") +
            " --seed=" + std::to_string(*job.seed) +
            " --stepping=" + NameOf(job.stepping, kSteppingNames);
   }
   return "tangible-verify " + job.scene.path;
 }
 
+// The derivatives of a coincidence, where its motion is known: of both sides, and where they agree.
+std::optional<ClosedFormJacobian> KnownOf(const Coincidence& coincidence) {
+  KnownSides sides = SidesOf(coincidence);
+  if (sides.plus.size() == 0) return std::nullopt;
+  ClosedFormJacobian known;
+  known.tolerance = kCoincidenceTolerance;
+  known.jacobian = 0.5 * (sides.plus + sides.minus);
+  for (Eigen::Index p = 0; p < known.jacobian.cols(); ++p) {
+    const double largest =
+        std::max(sides.plus.col(p).cwiseAbs().maxCoeff(), sides.minus.col(p).cwiseAbs().maxCoeff());
+    for (Eigen::Index o = 0; o < known.jacobian.rows(); ++o) {
+      const double apart = std::abs(sides.plus(o, p) - sides.minus(o, p));
+      if (apart > kCoincidenceTolerance * largest) known.jacobian(o, p) = kUnknown;
+    }
+  }
+  known.values = std::move(sides.values);
+  known.plus = std::move(sides.plus);
+  known.minus = std::move(sides.minus);
+  return known;
+}
+
+Checked CheckCoincidence(const VerifyJob& job, KeepJacobians keep) {
+  Checked checked;
+  const Coincidence coincidence = RandomCoincidence(*job.seed, job.stepping);
+  checked.check = CheckScene(coincidence.scene, coincidence.parameters, keep, KnownOf(coincidence));
+  checked.check.replay = Replay(job);
+  if (checked.check.done) {
+    checked.coverage = CoverageOf(coincidence.scene, TraceRun(coincidence.scene));
+    for (const std::string& kind : coincidence.kinds) {
+      checked.coverage[kind] = 1;
+    }
+  }
+  return checked;
+}
+
 Checked Check(const VerifyJob& job, KeepJacobians keep) {
+  if (job.seed && job.list == RandomList::kCoincidences) return CheckCoincidence(job, keep);
   Checked checked;
   const Scene scene = SceneOf(job);
   const std::vector<ParameterPath> parameters = !job.seed ? job.parameters
@@ -67,6 +108,9 @@ void AddWorst(const SceneCheck& check, int scene,
 Scene SceneOf(const VerifyJob& job) {
   if (!job.seed) {
     return job.scene;
+  }
+  if (job.list == RandomList::kCoincidences) {
+    return RandomCoincidence(*job.seed, job.stepping).scene;
   }
   if (job.list == RandomList::kStarts) {
     return RandomStart(*job.seed, job.stepping);
@@ -168,6 +212,11 @@ VerifyResult RunVerification(const std::vector<VerifyJob>& jobs, int threads, Ke
 
 std::string BrokenBound(const std::vector<VerifyJob>& jobs, const VerifyResult& result) {
   std::ostringstream line;
+  for (const SceneCheck& scene : result.scenes) {
+    if (!scene.wrong_value.empty()) {
+      return scene.name + ": " + scene.wrong_value + " (" + scene.replay + ")";
+    }
+  }
   for (const SceneCheck& scene : result.scenes) {
     for (const CheckedException& exception : scene.exceptions) {
       if (exception.unexplained()) {

@@ -15,8 +15,8 @@
 
 namespace tangible {
 
-/// The list to which a random scene belongs: random_scene.h, or random_starts.h.
-enum class RandomList { kScenes, kStarts };
+/// The list to which a random scene belongs: random_scene.h, random_starts.h or coincidences.h.
+enum class RandomList { kScenes, kStarts, kCoincidences };
 
 /// A scene to be checked: a random one by its seed, or one of the user's.
 struct VerifyJob {

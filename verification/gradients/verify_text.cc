@@ -15,8 +15,8 @@ namespace {
 constexpr size_t kKindWidth = 26;
 constexpr size_t kErrorWidth = 9;
 // Headers of kMethodPairs' columns.
-const char* const kHeads[] = {"adjoint", "recomp.",  "implicit", "impl-adj", "unrolled",
-                              "Ridders", "diff1e-4", "diff6e-6", "closed"};
+const char* const kHeads[] = {"adjoint",  "recomp.",  "implicit", "impl-adj", "unrolled", "Ridders",
+                              "diff1e-4", "diff6e-6", "closed",   "plus",     "minus"};
 static_assert(std::size(kHeads) == kNumPairs);
 
 std::string Left(std::string text, size_t width) {
@@ -66,6 +66,25 @@ std::string Exceptions(const VerifyResult& result) {
   return out.str().empty() ? "" : "exceptions\n" + out.str() + "\n";
 }
 
+std::string WrongValues(const VerifyResult& result) {
+  std::string text;
+  for (const SceneCheck& scene : result.scenes) {
+    if (scene.wrong_value.empty()) continue;
+    text += "UNEXPLAINED " + scene.name + ", " + scene.wrong_value + " (" + scene.replay + ")\n";
+  }
+  return text.empty() ? "" : "motions that differ from the known ones\n" + text + "\n";
+}
+
+std::string FalseAlarms(const VerifyResult& result) {
+  std::ostringstream out;
+  for (const SceneCheck& scene : result.scenes) {
+    for (const std::string& alarm : scene.false_alarms) {
+      out << scene.name << " (" << scene.replay << "), " << alarm << "\n";
+    }
+  }
+  return out.str().empty() ? "" : "kinks that are named and are none\n" + out.str() + "\n";
+}
+
 std::string ZeroColumns(const VerifyResult& result) {
   std::ostringstream out;
   for (const SceneCheck& scene : result.scenes) {
@@ -96,10 +115,12 @@ std::string WorstEntries(const VerifyResult& result) {
   return out.str();
 }
 
-std::string CoverageText(const Coverage& coverage) {
+// Of random scenes, and of coincidences, whose features have names of their own.
+std::string CoverageText(const Coverage& coverage, bool random) {
   std::string text = "scenes that had\n";
   std::string line = " ";
   for (const auto& [what, count] : coverage) {
+    if (!random && what.rfind(kCoincidencePrefix, 0) != 0) continue;
     const std::string item = " " + what + ": " + std::to_string(count) + ";";
     if (line.size() + item.size() > 110) {
       text += line + "\n";
@@ -110,6 +131,7 @@ std::string CoverageText(const Coverage& coverage) {
   text += line + "\n";
   const std::vector<std::string> missing = MissingCoverage(coverage);
   for (const std::string& what : missing) {
+    if (!random && what.rfind(kCoincidencePrefix, 0) != 0) continue;
     text += "  not covered: " + what + "\n";
   }
   return text;
@@ -161,7 +183,8 @@ std::string TableText(const VerifyResult& result) {
 std::string SummaryText(const VerifyResult& result, bool random) {
   const std::vector<int> pairs = PairsShown(result);
   std::ostringstream out;
-  out << Exceptions(result) << ZeroColumns(result) << Head(pairs, "", 0);
+  out << WrongValues(result) << Exceptions(result) << FalseAlarms(result) << ZeroColumns(result)
+      << Head(pairs, "", 0);
   for (const KindRow& row : result.kinds) {
     out << RowText(row, pairs);
   }
@@ -177,8 +200,8 @@ std::string SummaryText(const VerifyResult& result, bool random) {
   }
   out << "closed contacts " << closed << ": sliding " << sliding << ", sticking " << sticking
       << ", limits " << limits << ", impacts " << impacts << ", recovering " << recoveries << "\n";
-  if (random) {
-    out << CoverageText(result.coverage);
+  if (random || HasCoincidences(result.coverage)) {
+    out << CoverageText(result.coverage, random);
   }
   out << WorstEntries(result) << result.scenes.size() << " scenes, " << result.not_run
       << " not run; " << result.total.entries << " entries, " << result.exceptions_named

@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/verification/support/coincidences.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <map>
+
+#include "tangible/scene/scene_json.h"
+#include "tangible/verification/support/trace.h"
+
+namespace tangible {
+namespace {
+
+bool Has(const Coincidence& coincidence, const std::string& kind) {
+  return std::find(coincidence.kinds.begin(), coincidence.kinds.end(), "coincidence: " + kind) !=
+         coincidence.kinds.end();
+}
+
+// The seed of the first coincidence of a kind that happens at a step's end, alone in its scene.
+unsigned FirstAtAStepsEnd(const std::string& kind, Stepping stepping) {
+  for (unsigned seed = 1; seed < 2000; ++seed) {
+    const Coincidence one = RandomCoincidence(seed, stepping);
+    if (one.kinds.size() == 2 && Has(one, kind) && Has(one, "at a step's end")) return seed;
+  }
+  ADD_FAILURE() << kind;
+  return 0;
+}
+
+TEST(CoincidencesTest, ASeedIsAScene) {
+  EXPECT_EQ(SceneToJson(RandomCoincidence(5, Stepping::kEvent).scene),
+            SceneToJson(RandomCoincidence(5, Stepping::kEvent).scene));
+  Scene other = RandomCoincidence(6, Stepping::kEvent).scene;
+  other.name = "coincidence 5";
+  EXPECT_NE(SceneToJson(RandomCoincidence(5, Stepping::kEvent).scene), SceneToJson(other));
+}
+
+TEST(CoincidencesTest, EveryKindIsDrawn) {
+  std::map<std::string, int> count;
+  for (unsigned seed = 1; seed <= 400; ++seed) {
+    for (const std::string& kind : RandomCoincidence(seed, Stepping::kEvent).kinds) ++count[kind];
+  }
+  for (const std::string& kind : CoincidenceKinds()) EXPECT_GE(count[kind], 4) << kind;
+  EXPECT_EQ(count.size(), CoincidenceKinds().size());
+}
+
+// Where nothing changes between the steps of fixed stepping, runs end where the known motion ends.
+TEST(CoincidencesTest, FixedStepsEndWhereTheKnownMotionEnds) {
+  int checked = 0;
+  for (unsigned seed = 1; seed <= 150; ++seed) {
+    const Coincidence one = RandomCoincidence(seed, Stepping::kFixed);
+    if (Has(one, "feature change")) continue;
+    ASSERT_TRUE(one.outputs) << seed;
+    const RunTrace run = TraceRun(one.scene);
+    ASSERT_TRUE(run.done) << seed << " " << run.message;
+    const VectorX<double> known = SidesOf(one).values;
+    // The solver's residual, scaled, is below 1e-10; a chain of steps keeps it.
+    EXPECT_LE((run.values - known).cwiseAbs().maxCoeff(),
+              1e-10 * std::max(1.0, known.cwiseAbs().maxCoeff()))
+        << seed;
+    ++checked;
+  }
+  EXPECT_GT(checked, 100);
+}
+
+TEST(CoincidencesTest, EventsEndWhereTheKnownMotionEnds) {
+  for (const char* kind : {"slip ends", "reversal", "rolling", "touch", "touch with a face"}) {
+    const unsigned seed = FirstAtAStepsEnd(kind, Stepping::kEvent);
+    const Coincidence one = RandomCoincidence(seed, Stepping::kEvent);
+    const RunTrace run = TraceRun(one.scene);
+    ASSERT_TRUE(run.done) << kind << " " << run.message;
+    const VectorX<double> known = SidesOf(one).values;
+    EXPECT_LE((run.values - known).cwiseAbs().maxCoeff(),
+              1e-12 * std::max(1.0, known.cwiseAbs().maxCoeff()))
+        << kind << " " << seed;
+  }
+}
+
+// A block that stops: x = x0 + v²/(2 μ g) on both sides.
+TEST(CoincidencesTest, BothSidesAgreeWhereABlockStops) {
+  const Coincidence one =
+      RandomCoincidence(FirstAtAStepsEnd("slip ends", Stepping::kEvent), Stepping::kEvent);
+  const KnownSides sides = SidesOf(one);
+  for (size_t k = 0; k < one.parameters.size(); ++k) {
+    if (one.parameters[k].path.find("velocity/x") == std::string::npos) continue;
+    const auto column = static_cast<Eigen::Index>(k);
+    EXPECT_GT(std::abs(sides.plus(0, column)), 1e-3);
+    EXPECT_NEAR(sides.plus(0, column), sides.minus(0, column),
+                1e-10 * std::abs(sides.plus(0, column)));
+  }
+  // With fixed steps it slides for another step on one side.
+  const Coincidence fixed =
+      RandomCoincidence(FirstAtAStepsEnd("slip ends", Stepping::kFixed), Stepping::kFixed);
+  const KnownSides apart = SidesOf(fixed);
+  EXPECT_GT((apart.plus - apart.minus).cwiseAbs().maxCoeff(), 1e-3);
+}
+
+}  // namespace
+}  // namespace tangible

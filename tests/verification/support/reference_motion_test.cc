@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/verification/support/reference_motion.h"
+
+#include <gtest/gtest.h>
+
+namespace tangible {
+namespace {
+
+Course By(Stepping stepping, Real dt, int steps) {
+  Course course;
+  course.stepping = stepping;
+  course.dt = dt;
+  course.duration = steps * dt;
+  course.steps = steps;
+  return course;
+}
+
+constexpr double kRounding = 1e-15;  // of numbers of size 1
+
+// Up a slope with a deceleration of 6 + 8 μ, and down with 6 − 8 μ.
+TEST(ReferenceMotionTest, ABlockTurnsBackOnASlope) {
+  Load pull;
+  pull.constant = -6.0L;
+  const Coordinate end =
+      Slide({0.0L, 4.0L}, 1.0L, 0.25L * 8.0L, pull, By(Stepping::kEvent, 0.01L, 90));
+  EXPECT_NEAR(static_cast<double>(end.position), 16.0 / 16.0 - 2.0 * 0.4 * 0.4, kRounding);
+  EXPECT_NEAR(static_cast<double>(end.speed), -4.0 * 0.4, kRounding);
+}
+
+TEST(ReferenceMotionTest, ABlockStopsAndStays) {
+  const Coordinate end =
+      Slide({0.0L, -1.0L}, 2.0L, 2.0L * 0.2L * 10.0L, Load(), By(Stepping::kEvent, 0.01L, 70));
+  EXPECT_NEAR(static_cast<double>(end.position), -0.25, kRounding);
+  EXPECT_EQ(end.speed, 0.0L);
+}
+
+// x = 10/6 (1 − t0)³ from t0 = 0.5 on.
+TEST(ReferenceMotionTest, ARampBreaksABlockLoose) {
+  Load ramp;
+  ramp.times = {0.0L, 2.0L};
+  ramp.values = {0.0L, 20.0L};
+  const Coordinate end = Slide({0.0L, 0.0L}, 1.0L, 5.0L, ramp, By(Stepping::kEvent, 0.01L, 100));
+  EXPECT_NEAR(static_cast<double>(end.position), 10.0 / 48.0, kRounding);
+  EXPECT_NEAR(static_cast<double>(end.speed), 1.25, kRounding);
+}
+
+TEST(ReferenceMotionTest, AFixedStepHasTheImpulseOfAWindowsOverlap) {
+  Load push;
+  push.windows = {{0.05L, 0.25L, 3.0L}};
+  const Course course = By(Stepping::kFixed, 0.1L, 4);
+  const Coordinate end = Slide({0.0L, 0.0L}, 1.0L, 1.0L, push, course);
+  // Impulses 0.15, 0.3, 0.15, 0 less friction of 0.1 a step, while it moves.
+  EXPECT_NEAR(static_cast<double>(end.speed), 0.2, kRounding);
+  EXPECT_NEAR(static_cast<double>(end.position), 0.1 * (0.05 + 0.25 + 0.3 + 0.2), kRounding);
+}
+
+TEST(ReferenceMotionTest, ADiscLandsTwiceAndRolls) {
+  Surface floor;
+  floor.restitution = 0.5L;
+  Disc disc;
+  disc.along.speed = 3.0L;
+  disc.gap = {1.25L, 0.0L};
+  // It lands at 0.5 s with 5 m/s, at 1 s with 2.5 m/s: impulses 7.5 and 3.75 of friction 0.1. The
+  // slip falls by three times those.
+  const Disc end =
+      FallAndRoll(disc, 0.2L, 1.0L, 0.02L, 0.1L, 10.0L, floor, By(Stepping::kEvent, 0.1L, 11));
+  EXPECT_NEAR(static_cast<double>(end.along.speed), 2.0, kRounding);
+  EXPECT_NEAR(static_cast<double>(end.turn.speed), -10.0, 10.0 * kRounding);
+  EXPECT_NEAR(static_cast<double>(end.gap.speed), 1.25 - 1.0, kRounding);
+}
+
+TEST(ReferenceMotionTest, AFixedStepLandsOnTheSurfaceAndReboundsFromIt) {
+  Load weight;
+  weight.constant = -10.0L;
+  Surface floor;
+  const Course course = By(Stepping::kFixed, 0.1L, 2);
+  const Coordinate lands = Bounce({0.15L, -1.0L}, 1.0L, floor, weight, course);
+  EXPECT_NEAR(static_cast<double>(lands.position), 0.0, kRounding);
+  floor.restitution = 0.5L;
+  // In the first step the gap of 0.15 is closed by −2 m/s: it rebounds with 0.5 m/s.
+  const Coordinate rebounds = Bounce({0.15L, -1.0L}, 1.0L, floor, weight, course);
+  EXPECT_NEAR(static_cast<double>(rebounds.speed), -0.5, kRounding);
+  EXPECT_NEAR(static_cast<double>(rebounds.position), 0.15, kRounding);
+}
+
+TEST(ReferenceMotionTest, ALimitIsLeftAsTheForceTurns) {
+  Load drive;
+  drive.windows = {{-1.0L, 0.5L, -2.0L}, {0.5L, 10.0L, 4.0L}};
+  const Coordinate end =
+      Bounce({0.09L, 0.0L}, 1.0L, Surface(), drive, By(Stepping::kEvent, 0.1L, 7));
+  EXPECT_NEAR(static_cast<double>(end.position), 2.0 * 0.04, kRounding);
+  EXPECT_NEAR(static_cast<double>(end.speed), 0.8, kRounding);
+}
+
+}  // namespace
+}  // namespace tangible

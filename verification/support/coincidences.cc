@@ -1,0 +1,207 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/verification/support/coincidences.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "tangible/verification/support/coincidence_maker.h"
+
+namespace tangible {
+namespace {
+
+constexpr char kAtAStepsEnd[] = "coincidence: at a step's end";
+constexpr char kAtTheStart[] = "coincidence: at the start";
+constexpr char kAtTheEndOfTheRun[] = "coincidence: at the end of the run";
+constexpr char kSymmetric[] = "coincidence: two at one instant, symmetric";
+constexpr char kOfTwoKinds[] = "coincidence: two at one instant, of two kinds";
+
+// Of the parameter: the longest step of the differences below. The next kink is a step away.
+constexpr Real kLongestStep = 1e-4L;
+constexpr Real kSmallest = 0.1L;  // size of a parameter
+constexpr int kExtrapolated = 5;
+
+using Map = std::map<std::string, Real>;
+
+Map NumbersOf(const Scene& scene) {
+  Scene copy = scene;
+  Map numbers;
+  for (const SceneNumber<double>& number : EnumerateNumbers(&copy)) {
+    numbers[number.path] = *number.value;
+  }
+  return numbers;
+}
+
+std::vector<Real> Outputs(const Coincidence& coincidence, const Map& numbers) {
+  return coincidence.outputs([&](const std::string& path) { return numbers.at(path); });
+}
+
+// The derivative on one side, by extrapolation of quotients to a step of 0.
+VectorX<double> Side(const Coincidence& coincidence, const Map& at, const std::string& path,
+                     Real sign) {
+  const std::vector<Real> base = Outputs(coincidence, at);
+  std::vector<std::vector<Real>> table;
+  Real step = sign * kLongestStep * std::max(std::abs(at.at(path)), kSmallest);
+  for (int k = 0; k < kExtrapolated; ++k, step /= 2.0L) {
+    Map beside = at;
+    beside[path] += step;
+    std::vector<Real> row = Outputs(coincidence, beside);
+    for (size_t i = 0; i < row.size(); ++i) {
+      row[i] = (row[i] - base[i]) / step;
+    }
+    table.push_back(std::move(row));
+  }
+  Real power = 2.0L;
+  for (int order = 1; order < kExtrapolated; ++order, power *= 2.0L) {
+    for (int k = kExtrapolated - 1; k >= order; --k) {
+      for (size_t i = 0; i < base.size(); ++i) {
+        table[k][i] += (table[k][i] - table[k - 1][i]) / (power - 1.0L);
+      }
+    }
+  }
+  VectorX<double> side(static_cast<Eigen::Index>(base.size()));
+  for (size_t i = 0; i < base.size(); ++i) {
+    side[static_cast<Eigen::Index>(i)] = static_cast<double>(table.back()[i]);
+  }
+  return side;
+}
+
+}  // namespace
+
+namespace internal {
+
+CoincidenceMaker::CoincidenceMaker(unsigned seed, Stepping stepping)
+    : random_(0xc01dULL + 0x9e3779b97f4a7c15ULL * seed) {
+  made_.scene.name = "coincidence " + std::to_string(seed);
+  made_.scene.simulation.stepping = stepping;
+}
+
+Coincidence CoincidenceMaker::Make() {
+  Settings();
+  const std::vector<Element>& elements = ElementsOf(group_);
+  const auto draw = [&] { return random_.Integer(0, static_cast<int>(elements.size()) - 1); };
+  const int first = draw();
+  const RandomNumbers before = random_;
+  Add(elements[first]);
+  if (random_.Chance(0.25)) {
+    random_ = before;
+    mirror_ = -1.0;
+    Add(elements[first]);
+    made_.kinds.emplace_back(kSymmetric);
+  } else if (random_.Chance(0.35)) {
+    Add(elements[draw()]);
+    made_.kinds.emplace_back(kOfTwoKinds);
+  }
+  made_.kinds.emplace_back(count_ == 0   ? kAtTheStart
+                           : after_ == 0 ? kAtTheEndOfTheRun
+                                         : kAtAStepsEnd);
+  if (made_.scene.simulation.stepping == Stepping::kEvent && !has_ramp_ && random_.Chance(0.3)) {
+    made_.scene.simulation.integrator = Integrator::kTrapezoidal;
+  }
+  std::sort(made_.kinds.begin(), made_.kinds.end());
+  made_.kinds.erase(std::unique(made_.kinds.begin(), made_.kinds.end()), made_.kinds.end());
+  Finish();
+  return std::move(made_);
+}
+
+void CoincidenceMaker::Settings() {
+  SimulationSettings& s = made_.scene.simulation;
+  s.dt = Pick({0.25, 0.125, 0.1, 0.05, 0.02, 0.01});
+  count_ = random_.Chance(0.12) ? 0 : random_.Integer(1, 5);
+  after_ = count_ > 0 && random_.Chance(0.12) ? 0 : random_.Integer(1, 6);
+  at_ = count_ * s.dt;
+  s.duration = (count_ + after_) * s.dt;
+  if (after_ > 1 && random_.Chance(0.2)) s.duration -= 0.4 * s.dt;
+  course_.stepping = s.stepping;
+  course_.dt = s.dt;
+  course_.duration = s.duration;
+  course_.steps = count_ + after_;
+  group_ = static_cast<Group>(random_.Integer(0, 3));
+  gravity_ = group_ == Group::kNoGravity ? 0.0 : Pick({10.0, 8.0, 5.0, 2.0});
+  made_.scene.gravity = Vector2<double>(0.0, -gravity_);
+  if (is_slope()) {
+    friction_ = Pick({0.25, 0.5, 0.1, 0.2});
+    made_.scene.gravity.x() = (group_ == Group::kSteep ? 2.0 : 0.5) * friction_ * gravity_;
+  }
+  if (group_ != Group::kNoGravity) {
+    BasicBody<double> floor;
+    floor.name = "floor";
+    floor.motion = Motion::kStatic;
+    floor.shape = {ShapeType::kHalfPlane, {0.0, 1.0, 0.0}};
+    made_.scene.bodies.push_back(floor);
+    paths_.emplace_back("gravity/y");
+  }
+  if (is_slope()) paths_.emplace_back("gravity/x");
+}
+
+void CoincidenceMaker::Add(const Element& element) {
+  made_.kinds.push_back(std::string("coincidence: ") + element.kind);
+  place_ = 10.0 * number_;
+  (this->*element.add)();
+  ++number_;
+}
+
+void CoincidenceMaker::Finish() {
+  for (const std::string& path : paths_) {
+    std::string error;
+    ParameterPath parameter;
+    if (ResolveParameter(made_.scene, path, &parameter, &error)) {
+      made_.parameters.push_back(std::move(parameter));
+    }
+  }
+  if (unknown_) return;
+  made_.outputs = [parts = parts_](const NumberAt& at) {
+    std::vector<Real> all;
+    for (const auto& part : parts) {
+      const std::vector<Real> outputs = part(at);
+      all.insert(all.end(), outputs.begin(), outputs.end());
+    }
+    return all;
+  };
+}
+
+}  // namespace internal
+
+Coincidence RandomCoincidence(unsigned seed, Stepping stepping) {
+  return internal::CoincidenceMaker(seed, stepping).Make();
+}
+
+const std::vector<std::string>& CoincidenceKinds() {
+  static const std::vector<std::string> kinds = [] {
+    std::vector<std::string> all = {kAtAStepsEnd, kAtTheStart, kAtTheEndOfTheRun,
+                                    kSymmetric,   kOfTwoKinds, "coincidence: Poisson's phases"};
+    for (const auto group : {internal::Group::kLevel, internal::Group::kSteep,
+                             internal::Group::kShallow, internal::Group::kNoGravity}) {
+      for (const auto& element : internal::CoincidenceMaker::ElementsOf(group)) {
+        all.push_back(std::string("coincidence: ") + element.kind);
+      }
+    }
+    std::sort(all.begin(), all.end());
+    all.erase(std::unique(all.begin(), all.end()), all.end());
+    return all;
+  }();
+  return kinds;
+}
+
+KnownSides SidesOf(const Coincidence& coincidence) {
+  KnownSides sides;
+  if (!coincidence.outputs) return sides;
+  const Map numbers = NumbersOf(coincidence.scene);
+  const std::vector<Real> values = Outputs(coincidence, numbers);
+  const auto rows = static_cast<Eigen::Index>(values.size());
+  sides.values.resize(rows);
+  for (Eigen::Index i = 0; i < rows; ++i) {
+    sides.values[i] = static_cast<double>(values[static_cast<size_t>(i)]);
+  }
+  const auto columns = static_cast<Eigen::Index>(coincidence.parameters.size());
+  sides.plus.resize(rows, columns);
+  sides.minus.resize(rows, columns);
+  for (Eigen::Index k = 0; k < columns; ++k) {
+    const std::string& path = coincidence.parameters[static_cast<size_t>(k)].path;
+    sides.plus.col(k) = Side(coincidence, numbers, path, 1.0L);
+    sides.minus.col(k) = Side(coincidence, numbers, path, -1.0L);
+  }
+  return sides;
+}
+
+}  // namespace tangible

@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// Motions of one coordinate, and of a disc on a level floor, that are known exactly: in continuous
+// time (event stepping), and of fixed steps (lib/dynamics/elements/contact.h). They take every
+// number in long double, and are analytic between values at which an event changes places with
+// another event or with an end; so their differences on one side are one-sided derivatives.
+
+#include <vector>
+
+#include "tangible/scene/scene.h"
+
+namespace tangible {
+
+using Real = long double;
+
+/// A force that is piecewise linear in time.
+struct Load {
+  struct Window {
+    Real start, end, force;
+  };
+  Real constant = 0.0L;
+  std::vector<Window> windows;
+  /// A signal with linear interpolation, its ends held; or none.
+  std::vector<Real> times, values;
+
+  /// The value at `time`, by the piece that contains `middle`, and its slope.
+  Real At(Real time, Real middle, Real* slope) const;
+  /// The integral over [from, to].
+  Real Impulse(Real from, Real to) const;
+  /// The times in (from, to) at which a piece ends, `from` and `to`, ascending.
+  std::vector<Real> Pieces(Real from, Real to) const;
+};
+
+/// When a run ends, and how it is stepped.
+struct Course {
+  Stepping stepping = Stepping::kFixed;
+  Real dt = 0.01L;
+  Real duration = 1.0L;
+  int steps = 100;  ///< of fixed stepping; the last ends with the duration
+};
+
+struct Coordinate {
+  Real position = 0.0L;
+  Real speed = 0.0L;
+};
+
+/// A mass (or an inertia) that dry friction of at most `friction` (N, N m) holds or slows.
+Coordinate Slide(Coordinate at, Real mass, Real friction, const Load& load, const Course& course);
+
+struct Surface {
+  Real restitution = 0.0L;
+  Real threshold = 1e-3L;      ///< of the approach speed, below which an impact is inelastic
+  Real margin = 1e-4L;         ///< m, of fixed steps
+  Real recovery_speed = 3.0L;  ///< m/s, of fixed steps
+};
+
+/// A gap of a mass from a surface that it cannot enter. While the load changes with time the mass
+/// must not fall back onto the surface.
+Coordinate Bounce(Coordinate gap, Real mass, const Surface& surface, const Load& load,
+                  const Course& course);
+
+struct Disc {
+  Coordinate along;  ///< the centre, along the floor
+  Coordinate gap;
+  Coordinate turn;  ///< angle and angular velocity
+};
+
+/// A disc above a level floor: it falls, bounces, slides and rolls under the weight and no other
+/// force.
+Disc FallAndRoll(Disc disc, Real radius, Real mass, Real inertia, Real friction, Real gravity,
+                 const Surface& surface, const Course& course);
+
+}  // namespace tangible
