@@ -19,13 +19,13 @@ namespace tangible {
 struct ClosedFormJacobian {
   /// Outputs (simulation/gradient.h) x parameters, SI units; NaN where it is not known.
   MatrixX<double> jacobian;
-  /// The same for growing and for shrinking parameters, where they are known; `jacobian` is then
-  /// known where they agree.
-  MatrixX<double> plus, minus;
-  VectorX<double> values;  ///< of the outputs, where they are known
   /// The allowed relative error of the computed derivative: 1e-9 for the derivative of the discrete
   /// map, more for that of the motion in continuous time.
   double tolerance = 1e-9;
+  /// The same for growing and for shrinking parameters, where they are known; `jacobian` is then
+  /// known where they agree.
+  MatrixX<double> plus{}, minus{};
+  VectorX<double> values{};  ///< of the outputs, where they are known
 };
 
 /// Returns nothing for a scene that it does not know.
