@@ -37,7 +37,7 @@ void Print(const PendulumResult& result) {
     std::printf("  noise %.2g rad, residual rms %.2g rad\n", result.recording.noise,
                 result.residual_rms);
   }
-  if (result.fit.certificate.verdict != "trustworthy") {
+  if (!IsTrustworthyMap(result.fit.certificate)) {
     std::printf("  warning: not trustworthy at the estimate: %s\n",
                 result.fit.certificate.verdict.c_str());
   }

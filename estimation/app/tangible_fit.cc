@@ -19,6 +19,7 @@
 #include "tangible/app/certificate_json.h"
 #include "tangible/app/program.h"
 #include "tangible/estimation/fit/fit_checkpoint.h"
+#include "tangible/estimation/fit/motion_check.h"
 #include "tangible/estimation/fit/variance_components.h"
 #include "tangible/estimation/results/fit_json.h"
 #include "tangible/estimation/results/fitted_scene.h"
@@ -43,6 +44,9 @@ DEFINE_string(checkpoint, "",
               "is done");
 DEFINE_bool(discretisation_check, false,
             "fit at dt / 2 too and report the difference as the bias of the step");
+DEFINE_bool(compare_motion, false,
+            "of scenes with fixed steps: say how far the derivatives at the estimate are from the "
+            "motion's, by one run by events beside it");
 DEFINE_string(derivatives, "",
               "tangent, adjoint, jet, jet_implicit or finite_difference, instead of the file's");
 DEFINE_string(initial, "", "other initial values: name=value, separated by commas");
@@ -458,6 +462,11 @@ int Prepare(const std::string& text, const std::string& file, Prepared* prepared
   if (prepared->problem == nullptr) {
     return ReportError(error);
   }
+  if (FLAGS_compare_motion && !HasFixedSteps(prepared->fit.input)) {
+    return ReportError(file +
+                       ": --compare_motion: expected a scene with fixed steps, got event "
+                       "stepping, whose derivatives are those of the motion");
+  }
   error = OutputOverInput({"out", "report", "scene_out", "predictions", "checkpoint"});
   if (error.empty()) {
     error = SceneOverOther(*prepared->problem);
@@ -469,9 +478,21 @@ int Prepare(const std::string& text, const std::string& file, Prepared* prepared
   return error.empty() ? kExitDone : ReportError(error);
 }
 
+OrderedJson Describe(const std::vector<ParameterEntry>& entries, const MotionCheck& check) {
+  if (!check.message.empty()) return {{"message", check.message}};
+  OrderedJson differences = OrderedJson::array();
+  for (size_t k = 0; k < entries.size(); ++k) {
+    differences.push_back({{"parameter", entries[k].name},
+                           {"difference", check.difference[static_cast<Eigen::Index>(k)]}});
+  }
+  return {{"differences", differences},
+          {"difference_max", check.difference.size() == 0 ? 0.0 : check.difference.maxCoeff()},
+          {"verdict", check.verdict}};
+}
+
 /// Returns what went wrong or empty.
 std::string WriteFiles(const Prepared& prepared, const FitResult& result,
-                       const FitFindings& findings) {
+                       const FitFindings& findings, const MotionCheck* motion) {
   const RecordingsProblem& problem = *prepared.problem;
   const bool estimated = result.estimate.size() > 0;
   ResultWriter writer;
@@ -479,6 +500,7 @@ std::string WriteFiles(const Prepared& prepared, const FitResult& result,
     OrderedJson json = ResultToJson(problem, result, findings);
     json["certificate"] =
         result.certificate.verdict.empty() ? OrderedJson(nullptr) : ToJson(result.certificate);
+    if (motion != nullptr) json["motion"] = Describe(problem.entries(), *motion);
     return JsonText(json);
   });
   if (!estimated) {
@@ -555,9 +577,15 @@ void PrintResult(const Prepared& prepared, const FitResult& result,
   PrintEstimates(prepared.problem->entries(), result);
   PrintComponents(components);
   PrintOutliers(SummarizeResiduals(*prepared.problem, result.residuals));
-  const std::string& verdict = result.certificate.verdict;
-  if (!verdict.empty() && verdict != "trustworthy") {
-    ReportError(prepared.fit.path + ": warning: not trustworthy at the estimate: " + verdict);
+  const Certificate& certificate = result.certificate;
+  if (certificate.verdict.empty()) return;
+  const std::string warning = prepared.fit.path + ": warning: ";
+  const bool impact = !certificate.discrete_impact.empty();
+  if (!IsTrustworthyMap(certificate)) {
+    ReportError(warning + "not trustworthy at the estimate: " + certificate.verdict +
+                (impact ? std::string("; ") + kMotionInstead : ""));
+  } else if (impact) {
+    ReportError(warning + AdviceOf(certificate));
   }
 }
 
@@ -569,6 +597,17 @@ DiscretisationCheck CheckStep(const Prepared& prepared, const FitResult& result)
   }
   FitLog* const log = prepared.checkpoint ? prepared.checkpoint->Next() : nullptr;
   return CheckDiscretisation(prepared.fit.input, spreads, result, log);
+}
+
+/// How far the derivatives at the estimate are from the motion's, with a line that says so.
+MotionCheck CompareMotion(const Prepared& prepared, const FitResult& result) {
+  MotionCheck check = CheckMotion(prepared.fit.input, result.estimate, prepared.problem.get());
+  if (check.message.empty()) {
+    std::cout << "derivatives at the estimate differ from the motion's by up to "
+              << Cell(check.difference.size() == 0 ? 0.0 : check.difference.maxCoeff(), 3)
+              << " of a parameter's; the motion's: " << check.verdict << "\n";
+  }
+  return check;
 }
 
 int Run(const std::string& text, const std::string& file) {
@@ -617,7 +656,12 @@ int Run(const std::string& text, const std::string& file) {
   if (checkpoint != nullptr && !checkpoint->error().empty()) {
     ReportError(checkpoint->error() + ": the fit went on without its checkpoint");
   }
-  error = WriteFiles(prepared, result, findings);
+  std::optional<MotionCheck> motion;
+  if (FLAGS_compare_motion && estimated) motion = CompareMotion(prepared, result);
+  error = WriteFiles(prepared, result, findings, motion ? &*motion : nullptr);
+  if (error.empty() && motion && !motion->message.empty()) {
+    error = file + ": --compare_motion: by events: " + motion->message;
+  }
   return error.empty() ? Conclude(prepared, result, findings) : ReportError(error);
 }
 
@@ -625,9 +669,10 @@ int Main(int argc, char** argv) {
   const CommandLine line = ParseCommandLine(
       argc, argv,
       {.name = "tangible-fit",
-       .synopsis = "FIT.json [--out=R.json] [--report=R.html] [--scene_out=S.json]\n"
-                   "                    [--predictions=P.csv] [--predict_from=T]\n"
-                   "                    [--discretisation_check] [--checkpoint=C.json]",
+       .synopsis =
+           "FIT.json [--out=R.json] [--report=R.html] [--scene_out=S.json]\n"
+           "                    [--predictions=P.csv] [--predict_from=T]\n"
+           "                    [--discretisation_check] [--compare_motion] [--checkpoint=C.json]",
        .description =
            "Identifies parameters of a scene from observed positions by nonlinear least squares.\n"
            "Prints each iteration and, for each parameter, the estimate, its standard deviation\n"

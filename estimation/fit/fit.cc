@@ -486,10 +486,18 @@ void Certify(LeastSquaresProblem* problem, FitResult* result) {
     return;
   }
   result->certificate = *certificate;
-  if (result->certificate.verdict != "trustworthy") {
+  const std::string& impact = result->certificate.discrete_impact;
+  const std::string instead = impact.empty() ? "" : std::string("; ") + kMotionInstead;
+  if (IsTrustworthyMap(result->certificate) && !impact.empty()) {
+    result->uncertainty.warnings.push_back(
+        "the derivatives at the estimate, and with them the intervals, are those of the discrete "
+        "map and may be far from the motion's: " +
+        impact + instead);
+  }
+  if (!IsTrustworthyMap(result->certificate)) {
     const std::string warning =
         "the derivatives at the estimate, and with them the intervals, are not trustworthy: " +
-        result->certificate.verdict;
+        result->certificate.verdict + instead;
     result->uncertainty.warnings.push_back(warning);
     result->message += (result->message.empty() ? "" : "; ") + warning;
   }

@@ -133,19 +133,22 @@ std::string CombinationTable(const Uncertainty& uncertainty) {
 std::string SummaryTable(const FitResult& result) {
   const Uncertainty& uncertainty = result.uncertainty;
   const std::string& verdict = result.certificate.verdict;
-  return HtmlTable({"", ""},
-                   {{"status", NameOf(result.status)},
-                    {"message", result.message},
-                    {"measured coordinates", std::to_string(result.residuals.size())},
-                    {"cost at the initial values", CompactNumber(result.initial_cost)},
-                    {"cost at the estimate", CompactNumber(result.final_cost)},
-                    {"residual rms (sigma)", CompactNumber(uncertainty.residual_rms, 4)},
-                    {"reduced chi-square", CompactNumber(uncertainty.reduced_chi_square, 4)},
-                    {"condition of the Jacobian", CompactNumber(uncertainty.condition, 3)},
-                    {"derivatives at the estimate", verdict.empty() ? "not examined" : verdict},
-                    {"iterations", std::to_string(result.iterations.size() - 1)},
-                    {"rollouts", std::to_string(result.rollouts)},
-                    {"seconds", CompactNumber(result.seconds, 3)}});
+  std::vector<std::vector<std::string>> rows = {
+      {"status", NameOf(result.status)},
+      {"message", result.message},
+      {"measured coordinates", std::to_string(result.residuals.size())},
+      {"cost at the initial values", CompactNumber(result.initial_cost)},
+      {"cost at the estimate", CompactNumber(result.final_cost)},
+      {"residual rms (sigma)", CompactNumber(uncertainty.residual_rms, 4)},
+      {"reduced chi-square", CompactNumber(uncertainty.reduced_chi_square, 4)},
+      {"condition of the Jacobian", CompactNumber(uncertainty.condition, 3)},
+      {"derivatives at the estimate", verdict.empty() ? "not examined" : verdict},
+      {"iterations", std::to_string(result.iterations.size() - 1)},
+      {"rollouts", std::to_string(result.rollouts)},
+      {"seconds", CompactNumber(result.seconds, 3)}};
+  const std::string advice = AdviceOf(result.certificate);
+  if (!advice.empty()) rows.push_back({"advice", advice});
+  return HtmlTable({"", ""}, rows);
 }
 
 std::string Warnings(const Uncertainty& uncertainty) {

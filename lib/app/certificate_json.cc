@@ -13,6 +13,8 @@ OrderedJson ToJson(const Certificate& certificate) {
           {"mode_switches", certificate.mode_switches},
           {"events", certificate.events},
           {"fallbacks", certificate.fallbacks},
+          {"discrete_map", !certificate.discrete_map.empty()},
+          {"advice", AdviceOf(certificate)},
           {"verdict", certificate.verdict}};
 }
 

@@ -218,6 +218,13 @@ void WarnOfMaximum(const std::string& path) {
       FormatNumber(kStartOffset) + " of their ranges");
 }
 
+void WarnOfDiscreteMap(const std::string& path, const Certificate& certificate) {
+  const std::string advice = AdviceOf(certificate);
+  if (!advice.empty()) {
+    ReportError(path + ": warning: a plan may exploit when its steps have impacts: " + advice);
+  }
+}
+
 int Plan(const std::string& path, const ControlFile& file) {
   RolloutFunction function;
   std::string error = function.Create(file.scene, {}, file.paths, {});
@@ -240,6 +247,7 @@ int Plan(const std::string& path, const ControlFile& file) {
     ReportError(warning.insert(0, ": warning: ").insert(0, path));
   }
   const Certificate certificate = worker.Certify(input);
+  WarnOfDiscreteMap(path, certificate);
   OrderedJson json = {
       {"status", NameOf(result.status)},
       {"message", result.message},
@@ -348,6 +356,15 @@ PredictiveRun RunPredictive(const ControlFile& file, EngineStep* map, EngineStep
   return run;
 }
 
+// Of the model's run with the controls that were played, which is about what the plans were for.
+Certificate CertifyPlayed(const ControlFile& file, const Played& played) {
+  Scene scene = file.scene;
+  scene.simulation.duration = static_cast<double>(played.controls.rows()) * scene.simulation.dt;
+  RolloutFunction function;
+  if (!function.Create(scene, {}, file.paths, {}).empty()) return {};
+  return RolloutWorker(function).Certify({VectorX<double>(), VectorX<double>(), played.controls});
+}
+
 int Predict(const std::string& path, const ControlFile& file) {
   if (!(file.run_duration > 0.0)) {
     return ReportError(path + ": /mpc: missing, expected an object with duration and horizon");
@@ -368,6 +385,8 @@ int Predict(const std::string& path, const ControlFile& file) {
     return ReportError((FLAGS_plant.empty() ? file.scene_path : FLAGS_plant) + ": " + run.error);
   }
   if (run.left_maximum) WarnOfMaximum(path);
+  const Certificate certificate = CertifyPlayed(file, run.played);
+  WarnOfDiscreteMap(path, certificate);
   std::vector<double> sorted = run.seconds;
   std::sort(sorted.begin(), sorted.end());
   OrderedJson json = {
@@ -376,6 +395,7 @@ int Predict(const std::string& path, const ControlFile& file) {
       {"final_state", FinalState(of_plant, run.played.states)},
       {"plans", run.seconds.size()},
       {"plans_failed", run.failed},
+      {"certificate", ToJson(certificate)},
       {"cpu_seconds_median", sorted[sorted.size() / 2]},
       {"cpu_seconds_max", sorted.back()},
       {"controls", DescribeControls(file, run.played.controls, file.scene.simulation.dt)}};

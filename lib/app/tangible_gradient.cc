@@ -17,6 +17,7 @@
 #include "tangible/scene/json_writer.h"
 #include "tangible/scene/scene_json.h"
 #include "tangible/scene/scene_names.h"
+#include "tangible/simulation/gradient/compare_motion.h"
 #include "tangible/simulation/gradient/gradient.h"
 
 DEFINE_string(parameters, "", "paths of the parameters, separated by commas");
@@ -28,6 +29,9 @@ DEFINE_string(side, "both",
               "derivatives for growing (plus) or shrinking (minus) parameters; by the tangent");
 DEFINE_double(step, 0.0, "of finite differences, in the parameter's unit; 0: 6e-6 max(|p|, scale)");
 DEFINE_string(loss, "", "file of a scalar loss (JSON) to differentiate instead of the final state");
+DEFINE_bool(compare_motion, false,
+            "of a scene with fixed steps: differentiates its motion by events too, and says how "
+            "far the derivative of the fixed steps is from that");
 DEFINE_int32(repeat, 1, "runs, of which the best times are reported");
 DEFINE_string(factorisations, "keep", "of the adjoint's steps: keep, or recompute to save memory");
 DEFINE_string(
@@ -131,6 +135,33 @@ OrderedJson ToJson(const VectorX<double>& values) {
   return std::vector<double>(values.data(), values.data() + values.size());
 }
 
+// The loss and its gradient, or the Jacobian, as keys of the object.
+void AddDerivative(const GradientResult& result, OrderedJson* text) {
+  if (!FLAGS_loss.empty()) {
+    (*text)["loss"] = result.loss;
+    (*text)["gradient"] = ToJson(result.gradient);
+    return;
+  }
+  OrderedJson& rows = (*text)["jacobian"] = OrderedJson::array();
+  for (Eigen::Index i = 0; i < result.jacobian.rows(); ++i) {
+    rows.push_back(ToJson(VectorX<double>(result.jacobian.row(i).transpose())));
+  }
+}
+
+OrderedJson Describe(const MotionComparison& comparison) {
+  if (!comparison.done) return {{"message", comparison.message}};
+  OrderedJson text = {{"values", ToJson(comparison.motion.values)}};
+  AddDerivative(comparison.motion, &text);
+  text["difference_max"] = comparison.difference_max;
+  if (!comparison.parameter.empty()) {
+    OrderedJson& at = text["difference_at"] = OrderedJson::object();
+    if (!comparison.output.empty()) at["output"] = comparison.output;
+    at["parameter"] = comparison.parameter;
+  }
+  text["verdict"] = comparison.motion.certificate.verdict;
+  return text;
+}
+
 OrderedJson Describe(const GradientResult& result) {
   OrderedJson text = {{"method", NameOfMethod(result.method)},
                       {"requested_method", FLAGS_method},
@@ -145,15 +176,7 @@ OrderedJson Describe(const GradientResult& result) {
     text["tape_bytes"] = result.tape_bytes;
     text["steps_again"] = result.steps_again;
   }
-  if (!FLAGS_loss.empty()) {
-    text["loss"] = result.loss;
-    text["gradient"] = ToJson(result.gradient);
-    return text;
-  }
-  OrderedJson& rows = text["jacobian"] = OrderedJson::array();
-  for (Eigen::Index i = 0; i < result.jacobian.rows(); ++i) {
-    rows.push_back(ToJson(VectorX<double>(result.jacobian.row(i).transpose())));
-  }
+  AddDerivative(result, &text);
   return text;
 }
 
@@ -175,11 +198,16 @@ int Run(const std::string& file, const GradientOptions& options) {
       return ReportError(error.insert(0, ": ").insert(0, file));
     }
   }
+  if (FLAGS_compare_motion && scene.simulation.stepping == Stepping::kEvent) {
+    return ReportError(file +
+                       ": /simulation/stepping: expected fixed with --compare_motion, got "
+                       "event, whose derivative is that of the motion");
+  }
   GradientResult result;
+  std::vector<LossTerm> terms;
   if (FLAGS_loss.empty()) {
     result = FinalStateJacobian(scene, parameters, options);
   } else {
-    std::vector<LossTerm> terms;
     error = ReadLoss(FLAGS_loss, OutputNames(*BuildStructure(scene)), &terms);
     if (!error.empty()) return ReportError(error);
     result = LossGradient(scene, parameters, terms, options);
@@ -187,10 +215,18 @@ int Run(const std::string& file, const GradientOptions& options) {
   if (!result.done) return ReportError(result.message);
   error = CheckFinite(file, result);
   if (!error.empty()) return ReportError(error);
-  error = WriteResult(FLAGS_out, JsonText(Describe(result)));
+  OrderedJson text = Describe(result);
+  std::string failed;
+  if (FLAGS_compare_motion) {
+    const MotionComparison comparison =
+        CompareWithMotion(scene, parameters, terms, options, result);
+    text["motion"] = Describe(comparison);
+    if (!comparison.done) failed = "--compare_motion: by events: " + comparison.message;
+  }
+  error = WriteResult(FLAGS_out, JsonText(text));
   if (!error.empty()) return ReportError(error);
   if (!result.open_joint.empty()) ReportError(file + ": warning: " + result.open_joint);
-  return kExitDone;
+  return failed.empty() ? kExitDone : ReportError(failed);
 }
 
 int Main(int argc, char** argv) {
@@ -199,7 +235,7 @@ int Main(int argc, char** argv) {
       {.name = "tangible-gradient",
        .synopsis = "SCENE.json --parameters=P1,P2 "
                    "[--method=auto|adjoint|tangent|jet|jet_implicit|finite_difference] [--step=H] "
-                   "[--side=plus|minus] [--loss=L.json] [--out=G.json]",
+                   "[--side=plus|minus] [--loss=L.json] [--compare_motion] [--out=G.json]",
        .description = "Differentiates the final state of every moving body, or with --loss a "
                       "scalar of it, with respect to\nparameters of the scene, and certifies the "
                       "result.",

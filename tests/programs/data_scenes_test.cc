@@ -119,7 +119,7 @@ TEST_P(DataSceneTest, ItsDerivativesAreTrustworthy) {
   const GradientResult adjoint =
       Jacobian(GradientMethod::kAdjoint, parameters_, CertificatePass::kRun);
   ASSERT_TRUE(adjoint.done) << adjoint.message;
-  EXPECT_EQ(adjoint.certificate.verdict.rfind("trustworthy", 0), 0u) << adjoint.certificate.verdict;
+  EXPECT_TRUE(IsTrustworthyMap(adjoint.certificate)) << adjoint.certificate.verdict;
 }
 
 TEST_P(DataSceneTest, AnalyticMethodsAgree) {

@@ -110,6 +110,39 @@ TEST_F(TangibleControlTest, LabelsASurrogate) {
   EXPECT_EQ(result["iterations"][0]["jacobians"], "surrogate");
 }
 
+// A ball that bounces beside the cart: by fixed steps derivatives are those of the discrete map.
+TEST_F(TangibleControlTest, WarnsOnceOfTheDiscreteMap) {
+  const auto scene = [](const std::string& stepping, const std::string& y) {
+    std::string text = kCart;
+    text.replace(text.find("],"), 1, R"(,
+      {"name": "ball", "shape": {"circle": {"radius": 0.1}}, "mass": 1, "restitution": 0.5,
+       "position": [9, )" + y + R"(]},
+      {"name": "floor", "static": true, "restitution": 0.5,
+       "shape": {"half_plane": {"normal": [0, 1], "offset": -5}}}])");
+    text.insert(text.rfind("\"dt\""), "\"stepping\": \"" + stepping + "\", ");
+    return text;
+  };
+  const std::string problem = Problem(kEffort, R"(, "mpc": {"duration": 0.8, "horizon": 0.4})");
+  const std::string file = "'" + Write("problem.json", problem) + "'";
+  for (const char* flags : {"", " --mpc"}) {
+    Write("cart.json", scene("fixed", "-4"));
+    const ProgramRun fixed = Run("tangible-control", file + flags);
+    ExpectOneLine(fixed, 0, "contact of ball and floor, an impact with restitution");
+    EXPECT_NE(fixed.error.find(R"("stepping": "event")"), std::string::npos) << fixed.error;
+    const json certificate = json::parse(fixed.out)["certificate"];
+    EXPECT_EQ(certificate["verdict"], "of the discrete map: trustworthy") << flags;
+    EXPECT_EQ(certificate["discrete_map"], true);
+    for (const auto& [stepping, y] : {std::pair("event", "-4"), std::pair("fixed", "9")}) {
+      Write("cart.json", scene(stepping, y));
+      const ProgramRun none = Run("tangible-control", file + flags);
+      EXPECT_EQ(none.exit_status, 0);
+      EXPECT_EQ(none.error, "");
+      EXPECT_EQ(json::parse(none.out)["certificate"]["discrete_map"], false);
+      EXPECT_EQ(json::parse(none.out)["certificate"]["advice"], "");
+    }
+  }
+}
+
 TEST_F(TangibleControlTest, MistakesAreOneLine) {
   ExpectOneLine(Control(Problem(R"({"path": "joints/rail/effort", "low": 2, "high": 1})")), 1,
                 "/controls/0/high: expected a number >= low, got 1");

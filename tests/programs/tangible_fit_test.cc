@@ -455,6 +455,61 @@ TEST_F(TangibleFitTest, AllParametersAreVisibleWhileItRuns) {
   }
 }
 
+// A ball is dropped from the height H = 1 m onto a floor and bounces elastically, at t = v / g with
+// v = √(2 g H). After that dy/dH = 2 g s / v − 1 with s = t − v / g, and of the map 1, as before.
+TEST_F(TangibleFitTest, WarnsOfDerivativesThroughAnImpactAndComparesThem) {
+  const auto fit = [&](const std::string& stepping, const std::string& flags) {
+    Write("scene.json", R"({"bodies": [
+        {"name": "ball", "shape": {"circle": {"radius": 0.25}}, "mass": 2, "position": [0, 1.25],
+         "restitution": 1},
+        {"name": "floor", "static": true, "restitution": 1,
+         "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}}],
+        "simulation": {"dt": 0.01, "duration": 0.56, "stepping": ")" +
+                            stepping + R"("}})");
+    const ProgramRun observed =
+        Run("tangible-simulate", "'" + Path("scene.json") + "' --noise=0 --seed=1 --rate=12.5" +
+                                     " --observe='" + Path("o.csv") + "'");
+    EXPECT_EQ(observed.exit_status, 0) << observed.error;
+    return Fit(json::parse(R"({"scene": "scene.json",
+        "observations": [{"file": "o.csv", "sigma": 0.01}],
+        "parameters": [{"name": "height", "initial": 1.27, "lower": 1.1, "upper": 1.5,
+                        "sets": [{"path": "bodies/ball/position/y"}]}]})"),
+               "--out='" + Path("r.json") + "' --report='" + Path("r.html") + "' " + flags);
+  };
+  const ProgramRun fixed = fit("fixed", "--compare_motion");
+  ExpectOneLine(fixed, 0, "warning: the derivative is that of the discrete map");
+  EXPECT_NE(fixed.error.find("contact of ball and floor, an impact with restitution"),
+            std::string::npos)
+      << fixed.error;
+  json result = json::parse(Read(Path("r.json")));
+  EXPECT_EQ(result["certificate"]["verdict"], "of the discrete map: trustworthy");
+  EXPECT_NE(result["warnings"].dump().find("those of the discrete map"), std::string::npos);
+  EXPECT_NE(Read(Path("r.html")).find("differentiates the motion"), std::string::npos);
+  const double g = 9.81, v = std::sqrt(2.0 * g);
+  double apart = 0.0, of_motion = 0.0;
+  for (int k = 0; k < 8; ++k) {
+    const double s = 0.08 * k - v / g;
+    const double motion = s < 0.0 ? 1.0 : 2.0 * g * s / v - 1.0;
+    apart += (1.0 - motion) * (1.0 - motion);
+    of_motion += motion * motion;
+  }
+  const double expected = std::sqrt(apart / std::max(8.0, of_motion));
+  ASSERT_GT(expected, 0.8);
+  // The estimate is 1.25 to the fit's tolerance, and there are the closed forms.
+  EXPECT_NEAR(result["motion"]["difference_max"], expected, 1e-6);
+  EXPECT_EQ(result["motion"]["differences"][0]["parameter"], "height");
+  EXPECT_EQ(result["motion"]["verdict"], "trustworthy");
+
+  const ProgramRun event = fit("event", "");
+  EXPECT_EQ(event.exit_status, 0);
+  EXPECT_EQ(event.error, "");
+  result = json::parse(Read(Path("r.json")));
+  EXPECT_EQ(result["certificate"]["verdict"], "trustworthy");
+  EXPECT_EQ(result["certificate"]["discrete_map"], false);
+  EXPECT_FALSE(result.contains("motion"));
+  ExpectOneLine(fit("event", "--compare_motion"), 1, "expected a scene with fixed steps");
+}
+
 // The ball lands in the last step, in which its twist has derivatives of order 1 / dt.
 TEST_F(TangibleFitTest, WarnsWhereDerivativesAreNotTrustworthy) {
   const auto fit = [&](const std::string& duration) {
@@ -479,11 +534,15 @@ TEST_F(TangibleFitTest, WarnsWhereDerivativesAreNotTrustworthy) {
   };
   const ProgramRun landing = fit("0.1");
   EXPECT_EQ(landing.exit_status, 0) << landing.error;
-  ExpectOneLine(landing, 0, "warning: not trustworthy at the estimate: discontinuous: landing");
+  ExpectOneLine(landing, 0,
+                "warning: not trustworthy at the estimate: of the discrete map: discontinuous: "
+                "landing");
   json result = json::parse(Read(Path("r.json")));
   EXPECT_NEAR(result["parameters"][0]["estimate"], 9.5, 1e-6);
   const std::string verdict = result["certificate"]["verdict"];
-  EXPECT_EQ(verdict.find("discontinuous: landing in the last step"), 0u) << verdict;
+  EXPECT_EQ(verdict.find("of the discrete map: discontinuous: landing in the last step"), 0u)
+      << verdict;
+  EXPECT_NE(landing.error.find(R"("stepping": "event")"), std::string::npos) << landing.error;
   EXPECT_NE(result["message"].get<std::string>().find("discontinuous: landing"), std::string::npos);
   EXPECT_NE(Read(Path("r.html")).find("discontinuous: landing"), std::string::npos);
 
@@ -491,7 +550,9 @@ TEST_F(TangibleFitTest, WarnsWhereDerivativesAreNotTrustworthy) {
   EXPECT_EQ(later.exit_status, 0) << later.error;
   EXPECT_EQ(later.error, "");
   result = json::parse(Read(Path("r.json")));
-  EXPECT_EQ(result["certificate"]["verdict"], "trustworthy");
+  EXPECT_EQ(result["certificate"]["verdict"], "of the discrete map: trustworthy");
+  EXPECT_EQ(result["certificate"]["discrete_map"], true);
+  EXPECT_NE(Read(Path("r.html")).find("of the discrete map: trustworthy"), std::string::npos);
   for (const char* key : {"margin_min", "margin_where", "degenerate_rows", "redundant_rows",
                           "condition", "linear_residual", "mode_switches", "events"}) {
     EXPECT_TRUE(result["certificate"].contains(key)) << key;

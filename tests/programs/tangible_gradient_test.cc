@@ -48,7 +48,10 @@ TEST_F(TangibleGradientTest, AllMethodsWriteTheSameJacobian) {
     EXPECT_EQ(result["values"].size(), 18u);
     EXPECT_GT(result["seconds"], 0.0);
     EXPECT_GT(result["rollout_seconds"], 0.0);
-    EXPECT_EQ(result["certificate"]["verdict"], "trustworthy");
+    EXPECT_EQ(result["certificate"]["verdict"], "of the discrete map: trustworthy");
+    EXPECT_EQ(result["certificate"]["discrete_map"], true);
+    EXPECT_NE(result["certificate"]["advice"].get<std::string>().find(R"("stepping": "event")"),
+              std::string::npos);
     if (reference.is_null()) reference = result["jacobian"];
     ASSERT_EQ(result["jacobian"].size(), 18u);
     for (size_t i = 0; i < 18; ++i) {
@@ -258,6 +261,76 @@ TEST_F(TangibleGradientTest, WrongFlagsAreUsage) {
     ExpectOneLine(Differentiate(parameters + "--checkpoint='" + checkpoint + "'"), 2,
                   "--checkpoint");
   }
+}
+
+// A ball of radius r is dropped from the height H above the floor and bounces elastically: with
+// v = √(2 g H) and s = T − v / g the motion ends at r + v s − g s² / 2.
+std::string Bounce(const std::string& simulation) {
+  return R"({"bodies": [
+      {"name": "ball", "shape": {"circle": {"radius": 0.25}}, "mass": 2, "position": [0, 1.25],
+       "restitution": 1},
+      {"name": "floor", "static": true, "restitution": 1,
+       "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}}], "simulation": {)" +
+         simulation + "}}";
+}
+
+TEST_F(TangibleGradientTest, SaysHowFarTheMapIsFromTheMotion) {
+  const double g = 9.81, v = std::sqrt(2.0 * g), s = 0.56 - v / g;
+  const double exact = g / v * s - (v - g * s) / v;
+  ASSERT_LT(exact, -0.1);
+  const double relative = (1.0 - exact) / std::max(1.0, -exact);
+  for (const char* method : {"adjoint", "tangent", "jet_implicit", "finite_difference"}) {
+    if (!HaveJets() && std::string(method).find("jet") == 0) continue;
+    const ProgramRun run = Differentiate(
+        std::string("--parameters=bodies/ball/position/y --compare_motion --method=") + method,
+        Bounce(R"("dt": 0.01, "duration": 0.56)"));
+    ASSERT_EQ(run.exit_status, 0) << run.error;
+    EXPECT_EQ(run.error, "");
+    const json result = json::parse(run.out);
+    EXPECT_EQ(result["certificate"]["verdict"], "of the discrete map: trustworthy");
+    // The tolerance of differences of a smooth motion (lib/simulation).
+    EXPECT_NEAR(result["jacobian"][1][0], 1.0, 1e-6) << method;
+    const json& motion = result["motion"];
+    EXPECT_NEAR(motion["jacobian"][1][0], exact, 1e-6) << method;
+    EXPECT_EQ(motion["verdict"], "trustworthy");
+    // The speed after the bounce: 0 of the map, and of the motion dv/dH − g ds/dH = 2 g / v.
+    EXPECT_GE(motion["difference_max"].get<double>(), relative - 1e-6) << method;
+    EXPECT_LE(motion["difference_max"].get<double>(), 2.0) << method;
+    EXPECT_EQ(motion["difference_at"]["parameter"], "bodies/ball/position/y");
+  }
+}
+
+TEST_F(TangibleGradientTest, ComparesTheGradientOfALossWithTheMotions) {
+  const std::string loss = Write("loss.json", R"({"terms": [{"output": "ball/y"}]})");
+  const std::string flags =
+      "--parameters=bodies/ball/position/y --compare_motion --loss='" + loss + "'";
+  const ProgramRun run = Differentiate(flags, Bounce(R"("dt": 0.01, "duration": 0.56)"));
+  ASSERT_EQ(run.exit_status, 0) << run.error;
+  const json result = json::parse(run.out);
+  const double map = result["gradient"][0], motion = result["motion"]["gradient"][0];
+  EXPECT_GT(map, 0.0);
+  EXPECT_LT(motion, 0.0);
+  EXPECT_NEAR(result["motion"]["difference_max"],
+              (map - motion) / std::max(std::abs(map), std::abs(motion)), 1e-12);
+  EXPECT_FALSE(result["motion"]["difference_at"].contains("output"));
+  // Without contact the map's derivative is the motion's, to the first order of a step.
+  const ProgramRun falls = Differentiate(flags, Bounce(R"("dt": 0.01, "duration": 0.3)"));
+  EXPECT_LT(json::parse(falls.out)["motion"]["difference_max"].get<double>(), 0.02);
+  EXPECT_EQ(json::parse(falls.out)["certificate"]["discrete_map"], false);
+}
+
+TEST_F(TangibleGradientTest, SaysWhyThereIsNoMotionToCompare) {
+  const std::string flags = "--parameters=bodies/ball/mass --compare_motion";
+  ExpectOneLine(
+      Differentiate(flags, Bounce(R"("dt": 0.01, "duration": 0.56, "stepping": "event")")), 1,
+      "/simulation/stepping: expected fixed with --compare_motion");
+  // What event stepping refuses.
+  const ProgramRun run =
+      Differentiate(flags, Bounce(R"("dt": 0.01, "duration": 0.56, "smoothing": 1e-6)"));
+  ExpectOneLine(run, 1, "--compare_motion: by events: ");
+  const json result = json::parse(run.out);
+  EXPECT_EQ(result["jacobian"].size(), 6u);
+  EXPECT_NE(result["motion"]["message"], "");
 }
 
 }  // namespace

@@ -288,14 +288,14 @@ TEST_F(TangibleSimulateTest, CertifiesOnRequest) {
   const std::string motion = Read(Path("t.csv"));
   const json certificate = run(test_scenes::Mixture(), "--certify").at("certificate");
   EXPECT_EQ(Read(Path("t.csv")), motion);
-  EXPECT_EQ(certificate.at("verdict"), "trustworthy");
+  EXPECT_EQ(certificate.at("verdict"), "of the discrete map: trustworthy");
   EXPECT_GT(certificate.at("mode_switches"), 0);
   const json landing =
       run(test_scenes::FallingBall(0.05, R"({"dt": 0.01, "duration": 0.1})"), "--certify");
   EXPECT_EQ(landing.at("certificate")
                 .at("verdict")
                 .get<std::string>()
-                .find("discontinuous: landing in the last step"),
+                .find("of the discrete map: discontinuous: landing in the last step"),
             0u);
   ExpectOneLine(Simulate(test_scenes::Mixture(), "--certify"), 2, "--certify");
 }

@@ -40,6 +40,34 @@ def test_the_gradient_of_a_bounce_is_that_of_the_physics(scene: dict[str, Any]) 
         assert found.certificate["verdict"] == "trustworthy"
 
 
+def test_derivatives_of_the_discrete_map_say_so() -> None:
+    by_steps = tangible.Rollout(ball("fixed"), ["bodies/ball/position/y"])
+    p = by_steps.default_parameters
+    for method in METHODS:
+        found = by_steps.jacobian(method=method).certificate
+        assert isinstance(found, tangible.Certificate) and isinstance(found, dict)
+        assert found["verdict"] == found.verdict == "of the discrete map: trustworthy"
+        assert found["discrete_map"] is True and found.discrete_map
+        assert not found and not found.trustworthy
+        assert found.verdict_of_map == "trustworthy"
+        assert '"stepping": "event"' in found.advice and "contact of ball and floor" in found.advice
+    falls = by_steps.certificate(p + 9.0)
+    assert falls and falls.trustworthy and not falls.discrete_map and falls.advice == ""
+    rows = by_steps.certificates(np.array([p, p + 9.0]))
+    assert [bool(row) for row in rows] == [False, True]
+    # `kinks` acts on the verdict of the map: an impact is no kink.
+    _, pull = by_steps.vjp(p, kinks="raise")
+    _, plain = by_steps.vjp(p)
+    _, smoothed = by_steps.vjp(p, kinks="smoothed")
+    bar = np.ones(6)
+    assert np.array_equal(pull(bar)[0], plain(bar)[0])
+    assert np.array_equal(smoothed(bar)[0], plain(bar)[0])
+    by_events = tangible.Rollout(ball(), ["bodies/ball/position/y"]).certificate()
+    assert by_events and by_events.trustworthy and not by_events["discrete_map"]
+    run = tangible.simulate(ball("fixed"), certify=True)
+    assert run.certificate is not None and run.certificate.discrete_map and not run.certificate
+
+
 @pytest.mark.parametrize("records", [None, [0, 20, 60]])
 def test_products_agree_with_the_jacobian(records: list[int] | None) -> None:
     rollout, at = driven(records=records)

@@ -65,6 +65,18 @@ def test_kinks_raise_if_asked() -> None:
         rollout(function, p, kinks="soft")
 
 
+def test_an_impact_of_fixed_steps_is_no_kink() -> None:
+    function = tangible.Rollout(ball("fixed"), ["bodies/ball/position/y"])
+    assert function.certificate()["verdict"].startswith("of the discrete map: ")
+    gradients = []
+    for kinks in ("element", "raise", "smoothed"):
+        p = torch.tensor(function.default_parameters, requires_grad=True)
+        rollout(function, p, kinks=kinks)[1].backward()
+        assert p.grad is not None
+        gradients.append(p.grad)
+    assert torch.equal(gradients[0], gradients[1]) and torch.equal(gradients[0], gradients[2])
+
+
 def test_the_smoothed_surrogate_is_used_at_kinks_alone() -> None:
     # A box that is pushed with F moves by max(0, F - mu m g) (steps of h: h^2 n (n + 1) / 2m).
     scene = tangible.Scene(simulation={"dt": 0.01, "duration": 0.5})

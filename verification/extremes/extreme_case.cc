@@ -7,7 +7,6 @@
 #include <cstdlib>
 #include <nlohmann/json.hpp>
 
-#include "tangible/lcp/dense/certificate.h"
 #include "tangible/verification/extremes/groups.h"
 #include "tangible/verification/extremes/known.h"
 

@@ -19,6 +19,8 @@
 #include <string>
 #include <vector>
 
+#include "tangible/lcp/dense/certificate.h"
+
 namespace tangible::extremes {
 
 inline constexpr double kNotMeasured = std::numeric_limits<double>::quiet_NaN();
@@ -44,7 +46,7 @@ struct GradientFinding {
   std::string verdict;                ///< the certificate's
   double condition = 1.0;             ///< the certificate's
 
-  bool trustworthy() const { return verdict == "trustworthy"; }
+  bool trustworthy() const { return WithoutDiscreteMap(verdict) == kTrustworthy; }
   double adjoint_bound() const;
   bool holds() const;
 };

@@ -45,8 +45,10 @@ std::string Bound(const Figure& figure) {
   return figure.bound == kReported ? "none" : Format("%.3g", figure.bound);
 }
 
+// The kind of the verdict, without its reasons.
 std::string ShortVerdict(const std::string& verdict) {
-  return verdict.substr(0, verdict.find(':'));
+  const std::string own = WithoutDiscreteMap(verdict);
+  return verdict.substr(0, verdict.size() - own.size()) + own.substr(0, own.find(':'));
 }
 
 std::string GradientColumns(const GradientFinding& gradient) {

@@ -9,16 +9,6 @@
 namespace tangible {
 namespace {
 
-const char* const kTrustworthy = "trustworthy";
-// What stands before the verdict where the derivative is that of fixed steps.
-const char* const kOfTheDiscreteMap = "of the discrete map: ";
-
-bool IsTrustworthy(const Certificate& certificate) {
-  const std::string prefix = kOfTheDiscreteMap;
-  const bool has_prefix = certificate.verdict.rfind(prefix, 0) == 0;
-  return certificate.verdict.substr(has_prefix ? prefix.size() : 0) == kTrustworthy;
-}
-
 class MethodRun {
  public:
   MethodRun(const Scene& scene, const std::vector<ParameterPath>& parameters,
@@ -64,13 +54,13 @@ class MethodRun {
   // Some reasons (equal coefficients in the mixing rule, friction 0) concern only some parameters.
   void NameKinks() {
     r_.named.resize(parameters_.size());
-    if (IsTrustworthy(r_.certificate)) {
+    if (IsTrustworthyMap(r_.certificate)) {
       return;
     }
     for (size_t k = 0; k < parameters_.size(); ++k) {
       const GradientResult one = Differentiate({parameters_[k]}, GradientMethod::kTangent,
                                                Factorisations::kKeep, CertificatePass::kRun);
-      r_.named[k] = IsTrustworthy(one.certificate) ? "" : one.certificate.verdict;
+      r_.named[k] = IsTrustworthyMap(one.certificate) ? "" : one.certificate.verdict;
     }
   }
 

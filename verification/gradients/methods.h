@@ -44,7 +44,8 @@ struct MethodJacobians {
   bool done = false;    ///< the run at the scene's own values
   std::string message;  ///< why not
   std::vector<std::string> outputs;
-  /// For each parameter the certificate's verdict; empty where that is "trustworthy".
+  /// For each parameter the certificate's verdict; empty where that is "trustworthy", of the
+  /// discrete map too: all methods differentiate the same map.
   std::vector<std::string> named;
   Certificate certificate;  ///< with respect to all parameters
   RunTrace trace;

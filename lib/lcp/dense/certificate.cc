@@ -64,6 +64,8 @@ void Merge(const Certificate& other, Certificate& certificate) {
   if (certificate.smoothed.empty()) certificate.smoothed = other.smoothed;
   if (certificate.one_sided.empty()) certificate.one_sided = other.one_sided;
   if (certificate.discontinuous.empty()) certificate.discontinuous = other.discontinuous;
+  if (certificate.discrete_map.empty()) certificate.discrete_map = other.discrete_map;
+  if (certificate.discrete_impact.empty()) certificate.discrete_impact = other.discrete_impact;
   certificate.verdict.clear();
 }
 
@@ -77,7 +79,23 @@ void SetVerdict(Certificate& certificate) {
   add("discontinuous: ", certificate.discontinuous);
   add("near a kink: ", kink);
   add("one-sided: ", certificate.one_sided);
-  if (certificate.verdict.empty()) certificate.verdict = "trustworthy";
+  if (certificate.verdict.empty()) certificate.verdict = kTrustworthy;
+  if (!certificate.discrete_map.empty()) certificate.verdict.insert(0, kOfTheDiscreteMap);
+}
+
+std::string WithoutDiscreteMap(const std::string& verdict) {
+  const std::string prefix = kOfTheDiscreteMap;
+  return verdict.compare(0, prefix.size(), prefix) == 0 ? verdict.substr(prefix.size()) : verdict;
+}
+
+bool IsTrustworthyMap(const Certificate& certificate) {
+  return WithoutDiscreteMap(certificate.verdict) == kTrustworthy;
+}
+
+std::string AdviceOf(const Certificate& certificate) {
+  if (certificate.discrete_map.empty()) return "";
+  return "the derivative is that of the discrete map and not of the motion, from " +
+         certificate.discrete_map + "; " + kMotionInstead;
 }
 
 }  // namespace tangible

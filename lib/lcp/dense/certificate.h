@@ -40,8 +40,23 @@ struct Certificate {
   std::string smoothed{};
   std::string one_sided{};      ///< why the derivative is one-sided or a mean of two; else empty
   std::string discontinuous{};  ///< what makes the value itself jump nearby; else empty
-  std::string verdict{};        ///< written by SetVerdict
+  /// Where by fixed steps a restitution first acted, or a contact was first made or broken: from
+  /// there on the derivative is that of the discrete map and not of the motion, because the time of
+  /// the event, a multiple of dt, does not follow the parameters. Else empty.
+  std::string discrete_map{};
+  /// Of these, where dt does not matter, so that a smaller one does not help: the first impact with
+  /// restitution, or a contact that is made in the last step. Else empty.
+  std::string discrete_impact{};
+  std::string verdict{};  ///< written by SetVerdict
 };
+
+/// What the verdict of a derivative of the discrete map begins with.
+inline constexpr char kOfTheDiscreteMap[] = "of the discrete map: ";
+/// What gives the derivative of the motion instead, the end of a message.
+inline constexpr char kMotionInstead[] =
+    "\"stepping\": \"event\" in the scene's simulation differentiates the motion";
+/// The verdict of a derivative that can be trusted.
+inline constexpr char kTrustworthy[] = "trustworthy";
 
 /// Adds `other` (another step of a rollout): the worse margin, condition and residual, the sum of
 /// the counts, the first reasons. The verdict is cleared.
@@ -50,7 +65,17 @@ void Merge(const Certificate& other, Certificate& certificate);
 /// Writes `verdict`: those that apply of "discontinuous: …", "near a kink: …" (coordinates that are
 /// too large, smoothing, degenerate rows, a margin below kNearKinkMargin, or a linear system that
 /// was not solved or whose condition number exceeds kConditionLimit) and "one-sided: …", the worst
-/// first, joined by "; "; if none applies, "trustworthy".
+/// first, joined by "; "; if none applies, "trustworthy". All this follows kOfTheDiscreteMap where
+/// the derivative is that of the discrete map.
 void SetVerdict(Certificate& certificate);
+
+/// The verdict without kOfTheDiscreteMap: that of the derivative as one of the map which the steps
+/// compute. What asks whether methods agree, or whether there is a kink, asks this one.
+std::string WithoutDiscreteMap(const std::string& verdict);
+/// Whether it is kTrustworthy.
+bool IsTrustworthyMap(const Certificate& certificate);
+
+/// One line on what gives the derivative of the motion; empty where this is it.
+std::string AdviceOf(const Certificate& certificate);
 
 }  // namespace tangible

@@ -15,12 +15,14 @@ Units are SI, angles are in radians, x points right and y up.
 """
 
 from ._core import TangibleError, __version__
+from ._certificate import Certificate
 from ._fit import FitResult, Residuals, fit
 from ._rollout import Jacobian, Rollout, Smoothing
 from ._scene import Scene
 from ._trajectory import Contacts, Events, Trajectory, simulate
 
 __all__ = [
+    "Certificate",
     "Contacts",
     "Events",
     "FitResult",

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _core
+from ._certificate import Certificate
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -96,6 +97,7 @@ class FitResult:
         status: "converged", "not_converged", "failed" or "no_effect".
         message: Why.
         estimates: {name: estimate}.
+        certificate: Of the derivatives at the estimate; None where there is no estimate.
         data: The whole result as `tangible-fit --out` writes it.
     """
 
@@ -104,6 +106,8 @@ class FitResult:
         self._page = page
         self.status: str = data["status"]
         self.message: str = data["message"]
+        found = data.get("certificate")
+        self.certificate: Certificate | None = None if found is None else Certificate(found)
         self.estimates: dict[str, float] = {
             p["name"]: p["estimate"] for p in data["parameters"] if p["estimate"] is not None
         }

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _core
+from ._certificate import Certificate
 from ._scene import Scene, SceneLike
 
 Floats = NDArray[np.float64]
-Certificate = dict[str, Any]
 
 
 @dataclass(frozen=True)
@@ -27,7 +25,7 @@ class Jacobian:
         initial_state: d states / d initial state, shape (..., S, S).
         controls: d states / d controls, shape (..., S, steps, C).
         method: The method that was used.
-        certificate: How far the derivatives can be trusted; `certificate["verdict"]` first.
+        certificate: How far the derivatives can be trusted: true where fully; see `Certificate`.
     """
 
     states: Floats
@@ -261,15 +259,15 @@ class Rollout:
 
         Args:
             parameters, initial_state, controls, on_failure: As in a call.
-            kinks: What stands for derivatives that are not `trustworthy`: "element" is one element
-                of the generalised Jacobian (`certificates` says where); "raise" an error;
+            kinks: What stands for derivatives at a kink or jump, whether of the motion or of the
+                discrete map (`Certificate.verdict_of_map`): "element" is one element of the generalised Jacobian (`certificates` says where); "raise" an error;
                 "smoothed" the mean of the Jacobians around (`Smoothing`), in those rows alone. The
                 states are those of the rollout in each case.
             smoothing: Of "smoothed"; absent: its defaults.
 
         Raises:
             TangibleError: As a call; or with "raise" the verdict of the first row that is not
-                trustworthy; or no sample of "smoothed" could be run.
+                trustworthy as one of the map; or no sample of "smoothed" could be run.
         """
         if kinks not in ("element", "raise", "smoothed"):
             raise ValueError(f"kinks: expected element, raise or smoothed, got {kinks}")
@@ -304,12 +302,16 @@ class Rollout:
     def _rows_at_kinks(
         self, p: Floats, x: Floats | None, u: Floats, statuses: list[str]
     ) -> list[tuple[int, str]]:
-        """Rows that ended well and whose derivatives are not trustworthy, with their verdicts."""
-        verdicts = [json.loads(text)["verdict"] for text in self._core.certify(p, x, u, self.threads)]
+        """Rows that ended well and whose derivatives are at a kink or jump, with their verdicts.
+
+        That they are those of the discrete map alone is none: no other derivative is nearby.
+        """
+        texts = self._core.certify(p, x, u, self.threads)
+        certificates = [Certificate.of_json(text) for text in texts]
         return [
-            (row, verdict)
-            for row, (status, verdict) in enumerate(zip(statuses, verdicts))
-            if status == "done" and verdict != "trustworthy"
+            (row, certificate.verdict)
+            for row, (status, certificate) in enumerate(zip(statuses, certificates))
+            if status == "done" and certificate.verdict_of_map != "trustworthy"
         ]
 
     def _average(
@@ -383,14 +385,14 @@ class Rollout:
     ) -> Certificate:
         """How far the derivatives at these inputs can be trusted.
 
-        `verdict` is "trustworthy", or names a kink, a jump or a side. The initial state counts as an
-        input only where it is given. Of a batch, see `certificates`.
+        `verdict` is "trustworthy", or names a kink, a jump or a side; of a run by fixed steps in
+        which a contact was made or broken it begins with "of the discrete map: ". The initial state
+        counts as an input only where it is given. Of a batch, see `certificates`.
         """
         p, x, u, batched = self._inputs(parameters, initial_state, controls)
         if batched:
             raise ValueError("certificate: expected arguments without a batch's axis")
-        found: Certificate = json.loads(self._core.certify(p, x, u, self.threads)[0])
-        return found
+        return Certificate.of_json(self._core.certify(p, x, u, self.threads)[0])
 
     def certificates(
         self,
@@ -400,7 +402,7 @@ class Rollout:
     ) -> list[Certificate]:
         """The certificate of each row of a batch."""
         p, x, u, _ = self._inputs(parameters, initial_state, controls)
-        return [json.loads(text) for text in self._core.certify(p, x, u, self.threads)]
+        return [Certificate.of_json(text) for text in self._core.certify(p, x, u, self.threads)]
 
     def __repr__(self) -> str:
         return (

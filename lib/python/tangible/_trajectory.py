@@ -102,8 +102,8 @@ class Trajectory:
         self.events = Events(events["time"], pairs(events), events["kind"])
         self.summary: dict[str, Any] = json.loads(raw["summary"])
         self.warnings: list[str] = raw["warnings"]
-        self.certificate: dict[str, Any] | None = (
-            json.loads(raw["certificate"]) if raw["certificate"] else None
+        self.certificate: Certificate | None = (
+            Certificate.of_json(raw["certificate"]) if raw["certificate"] else None
         )
 
     def __getitem__(self, name: str) -> Floats:

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "tangible/lcp/system/contact_conditioning.h"
+#include "tangible/simulation/certificate/approach_inl.h"
 #include "tangible/simulation/certificate/certify_place_inl.h"
 #include "tangible/simulation/certificate/duality.h"
 #include "tangible/simulation/certificate/feature_ties.h"
@@ -20,31 +21,6 @@ namespace {
 
 // With more unknowns than this the rank is determined anew only where modes change.
 constexpr size_t kRankEachStep = 150;
-
-// The speed n·v before the step, and after a free motion without contacts and joints.
-struct Approach {
-  double before = 0.0;
-  double free = 0.0;
-};
-
-Approach ApproachOf(const ModelStructure& s, const StepRecord& r, size_t i) {
-  const ActiveContact& contact = r.contacts[i];
-  const ContactBlock<double>& block = r.problem.contacts[i];
-  Approach approach;
-  const auto add = [&](int body, const RowPart<double>& row) {
-    const int moving = s.bodies[body].block;
-    for (int k = 0; k < 3; ++k) {
-      const double twist = r.before.twist[3 * body + k];
-      approach.before += row[k] * twist;
-      approach.free +=
-          row[k] *
-          (moving < 0 ? twist : r.problem.load[3 * moving + k] / r.problem.mass[3 * moving + k]);
-    }
-  };
-  add(contact.a, block.normal_a);
-  add(contact.b, block.normal_b);
-  return approach;
-}
 
 }  // namespace
 
@@ -256,6 +232,23 @@ void RolloutCertifier::AddFeatures(const Model<double>& model, const StepRecord&
   }
 }
 
+void RolloutCertifier::AddDiscreteMap(const Model<double>& model, long step,
+                                      const StepRecord& record) {
+  made_last_.clear();
+  if (!discrete_map_) discrete_map_.emplace(model);
+  for (const ContactChange& change : discrete_map_->AddStep(model, record)) {
+    const Place place{model.structure.get(), step, record.time, 0, &change.contact, {}};
+    const std::string text = place.Text() + ", " + NameOf(change.kind);
+    if (certificate_.discrete_map.empty()) certificate_.discrete_map = text;
+    if (change.kind == ContactChange::Kind::kRestitution && certificate_.discrete_impact.empty()) {
+      certificate_.discrete_impact = text;
+    }
+    if (change.kind == ContactChange::Kind::kMade && made_last_.empty()) {
+      made_last_ = text + " in the last step";
+    }
+  }
+}
+
 void RolloutCertifier::AddStep(const Model<double>& model, long step, Stepper* stepper) {
   if (!coordinates_) coordinates_.emplace(model);
   step_margin_ = std::numeric_limits<double>::infinity();
@@ -266,6 +259,7 @@ void RolloutCertifier::AddStep(const Model<double>& model, long step, Stepper* s
     AddEventStep(model, step, stepper);
     return;
   }
+  AddDiscreteMap(model, step, at);
   const StepRecord& record = stepper->record();
   const ModelStructure& s = *model.structure;
   landing_.clear();
@@ -353,6 +347,7 @@ Certificate RolloutCertifier::Finish(const Model<double>& model, const RolloutRe
                             "), and these are the derivatives of its contacts' modes";
   }
   if (coordinates_) certificate_.coordinates = coordinates_->Message(model);
+  if (certificate_.discrete_impact.empty()) certificate_.discrete_impact = made_last_;
   Certificate finished = certificate_;
   SetVerdict(finished);
   return finished;

@@ -23,6 +23,8 @@
 //   coordinates    so large that their rounding exceeds kLargeCoordinates of the size of a body
 //                  that has contacts or joints (coordinate_watch.h): its modes may be determined by
 //                  rounding
+//   discrete map   by fixed steps, where a restitution acted or a contact was made or broken
+//                  (discrete_map.h)
 //   linear systems redundant rows, condition, residual (contact_conditioning.h), of every step
 
 #include <optional>
@@ -30,6 +32,7 @@
 #include <vector>
 
 #include "tangible/lcp/dense/certificate.h"
+#include "tangible/simulation/certificate/discrete_map.h"
 #include "tangible/simulation/stepping/coordinate_watch.h"
 #include "tangible/simulation/stepping/rollout.h"
 
@@ -65,6 +68,7 @@ class RolloutCertifier {
   struct Place;
   void AddMargin(double margin, const Place& place, const std::string& what);
   void AddJump(double margin, const Place& place, const std::string& what);
+  void AddDiscreteMap(const Model<double>& model, long step, const StepRecord& record);
   void AddEventStep(const Model<double>& model, long step, Stepper* stepper);
   void AddIsland(const Model<double>& model, long step, EventDerivative* derivative,
                  IslandRecord* island);
@@ -104,7 +108,9 @@ class RolloutCertifier {
 
   CertifyOptions options_;
   Certificate certificate_;
-  std::optional<CoordinateWatch> coordinates_;  ///< from the first step on
+  std::optional<CoordinateWatch> coordinates_;    ///< from the first step on
+  std::optional<DiscreteMapWatch> discrete_map_;  ///< from the first fixed step on
+  std::string made_last_;  ///< of the last step; empty if no contact was made in it
   double step_margin_ = std::numeric_limits<double>::infinity();
   double jump_margin_ = std::numeric_limits<double>::infinity();
   std::string jump_where_;

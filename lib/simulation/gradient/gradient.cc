@@ -114,7 +114,7 @@ bool ByAdjoint(const GradientProblem& problem, const TapeOptions& options,
 
 bool ByTangent(const GradientProblem& problem, DerivativeSide side, GradientResult* result) {
   const bool by_events = problem.structure->settings.stepping == Stepping::kEvent;
-  if (by_events && side != DerivativeSide::kBoth && result->certificate.verdict != "trustworthy") {
+  if (by_events && side != DerivativeSide::kBoth && !IsTrustworthyMap(result->certificate)) {
     return internal::JacobianBySides(problem, side, result);
   }
   RowMatrixXd w_dot =
@@ -224,7 +224,7 @@ std::string CheckSide(const GradientProblem& problem, const GradientOptions& opt
 void JudgeSide(const GradientProblem& problem, const GradientOptions& options,
                GradientResult* result) {
   const Certificate& certificate = result->certificate;
-  if (options.side == DerivativeSide::kBoth || certificate.verdict == "trustworthy" ||
+  if (options.side == DerivativeSide::kBoth || IsTrustworthyMap(certificate) ||
       problem.structure->settings.stepping == Stepping::kEvent) {
     return;
   }
@@ -233,7 +233,7 @@ void JudgeSide(const GradientProblem& problem, const GradientOptions& options,
   if (!resolved || !certificate.discontinuous.empty() ||
       (!certificate.one_sided.empty() && certificate.one_sided != kContradictingRows)) {
     result->notes.push_back("one-sided derivatives resolve contacts at a kink alone, not: " +
-                            certificate.verdict);
+                            WithoutDiscreteMap(certificate.verdict));
   }
 }
 

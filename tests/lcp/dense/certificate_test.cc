@@ -90,5 +90,34 @@ TEST(CertificateTest, ALinearSystemThatWasNotSolvedIsNotTrusted) {
             "near a kink: linear systems that were not solved");
 }
 
+// The prefix is no class of verdicts: what follows it is the verdict of the same reasons.
+TEST(CertificateTest, TheDiscreteMapIsAPrefix) {
+  for (const Certificate& own :
+       {Certificate{}, Certificate{.discontinuous = "a corner"},
+        Certificate{.margin_min = 1e-7, .margin_where = "row 2", .one_sided = "an impact"}}) {
+    Certificate of_map = own;
+    of_map.discrete_map = "step 3, t = 0.3 s: contact of a and b, made";
+    EXPECT_EQ(VerdictOf(of_map), "of the discrete map: " + VerdictOf(own));
+    EXPECT_EQ(WithoutDiscreteMap(VerdictOf(of_map)), VerdictOf(own));
+    EXPECT_EQ(WithoutDiscreteMap(VerdictOf(own)), VerdictOf(own));
+    SetVerdict(of_map);
+    EXPECT_EQ(IsTrustworthyMap(of_map), VerdictOf(own) == "trustworthy");
+    EXPECT_EQ(AdviceOf(own), "");
+    EXPECT_NE(AdviceOf(of_map).find("step 3, t = 0.3 s"), std::string::npos);
+    EXPECT_NE(AdviceOf(of_map).find(R"("stepping": "event")"), std::string::npos);
+  }
+}
+
+TEST(CertificateTest, MergedStepsAreOfTheDiscreteMapIfOneIs) {
+  Certificate total;
+  Merge({.discrete_map = "step 3", .discrete_impact = "step 4"}, total);
+  Merge({.discrete_map = "step 5"}, total);
+  Merge({}, total);
+  SetVerdict(total);
+  EXPECT_EQ(total.discrete_map, "step 3");
+  EXPECT_EQ(total.discrete_impact, "step 4");
+  EXPECT_EQ(total.verdict, "of the discrete map: trustworthy");
+}
+
 }  // namespace
 }  // namespace tangible

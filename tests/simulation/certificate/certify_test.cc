@@ -87,13 +87,14 @@ TEST(CertifyRollout, ATouchWithoutForceIsAKinkThoughItsTermsAreAllRounding) {
 
 TEST(CertifyRollout, LandingInTheLastStepIsFlaggedAndOneStepLaterNot) {
   const Certificate landing = Certify(FallingBall(0.05, R"({"dt": 0.01, "duration": 0.1})"));
-  EXPECT_TRUE(StartsWith(landing.verdict, "discontinuous: landing in the last step"))
+  EXPECT_TRUE(
+      StartsWith(landing.verdict, "of the discrete map: discontinuous: landing in the last step"))
       << landing.verdict;
   EXPECT_NE(landing.verdict.find("step 9, t = 0.09 s: contact of ball and floor"),
             std::string::npos)
       << landing.verdict;
   const Certificate later = Certify(FallingBall(0.05, R"({"dt": 0.01, "duration": 0.11})"));
-  EXPECT_EQ(later.verdict, "trustworthy");
+  EXPECT_EQ(later.verdict, "of the discrete map: trustworthy");
   EXPECT_EQ(later.mode_switches, 1);
   EXPECT_NE(later.margin_where.find("contact of ball and floor, sticking"), std::string::npos)
       << later.margin_where;
@@ -170,20 +171,20 @@ std::string Impact(double speed, double restitution) {
 }
 
 TEST(CertifyRollout, RestitutionDecisionsAreJumps) {
-  EXPECT_EQ(Certify(Impact(1.5, 0.5)).verdict, "trustworthy");
-  EXPECT_EQ(Certify(Impact(0.8, 0.5)).verdict, "trustworthy");
+  EXPECT_EQ(Certify(Impact(1.5, 0.5)).verdict, "of the discrete map: trustworthy");
+  EXPECT_EQ(Certify(Impact(0.8, 0.5)).verdict, "of the discrete map: trustworthy");
   for (const double off : {-1e-8, 1e-8}) {
     const std::string verdict = Certify(Impact(1.0 + off, 0.5)).verdict;
-    EXPECT_TRUE(StartsWith(verdict, "discontinuous: ")) << verdict;
+    EXPECT_TRUE(StartsWith(verdict, "of the discrete map: discontinuous: ")) << verdict;
     EXPECT_NE(verdict.find("threshold"), std::string::npos) << verdict;
   }
-  EXPECT_EQ(Certify(Impact(1.0 + 1e-8, 0.0)).verdict, "trustworthy");
+  EXPECT_EQ(Certify(Impact(1.0 + 1e-8, 0.0)).verdict, "of the discrete map: trustworthy");
 }
 
 TEST(CertifyRollout, RestitutionThatLeavesZeroIsAJumpWhereItIsWanted) {
-  EXPECT_EQ(Certify(Impact(1.5, 0.0)).verdict, "trustworthy");
+  EXPECT_EQ(Certify(Impact(1.5, 0.0)).verdict, "of the discrete map: trustworthy");
   const std::string verdict = Certify(Impact(1.5, 0.0), {"restitution"}).verdict;
-  EXPECT_TRUE(StartsWith(verdict, "discontinuous: ")) << verdict;
+  EXPECT_TRUE(StartsWith(verdict, "of the discrete map: discontinuous: ")) << verdict;
 }
 
 TEST(CertifyRollout, CountsRedundantRows) {

@@ -79,7 +79,7 @@ TEST(FinalStateJacobian, MethodsAgree) {
   const GradientResult adjoint =
       FinalStateJacobian(scene, parameters, Method(GradientMethod::kAdjoint));
   ASSERT_TRUE(adjoint.done) << adjoint.message;
-  EXPECT_EQ(adjoint.certificate.verdict, "trustworthy");
+  EXPECT_EQ(adjoint.certificate.verdict, "of the discrete map: trustworthy");
   EXPECT_GT(adjoint.certificate.mode_switches, 4);
   for (Eigen::Index c = 0; c < adjoint.jacobian.cols(); ++c) {
     EXPECT_GT(adjoint.jacobian.col(c).cwiseAbs().maxCoeff(), 1e-6) << kMixtureParameters[c];

@@ -89,7 +89,7 @@ TEST_P(RolloutFunctionTest, TheFiveMethodsAgree) {
   Create({7, 20});
   RolloutWorker worker(function_);
   const RolloutInput input = InputOf(function_, 3);
-  EXPECT_EQ(worker.Certify(input).verdict, "trustworthy");
+  EXPECT_TRUE(IsTrustworthyMap(worker.Certify(input))) << worker.Certify(input).verdict;
   RowMatrixXd adjoint;
   GradientMethod used;
   const RolloutOutput output = worker.Jacobian(input, GradientMethod::kAdjoint,

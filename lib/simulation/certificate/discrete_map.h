@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// Where the derivative of a run by fixed steps is that of the discrete map x_k+1 = F(x_k, p) and not
+// of the motion: where a restitution acts, or a contact or limit is made or broken.
+//
+// The motion has the event at a time t*(p), and the derivative of the positions jumps there by
+// (v⁻ − v⁺) dt*/dp. The discrete map has it at a step, which does not follow p. After an impact with
+// restitution e the two differ by (1 + e) (n·v) dt*/dp, whatever dt: a ball that falls from the
+// height h and bounces with e = 1 has dy/dh = +1 in the map where the motion has −1 at first. After
+// a landing without restitution the next step, which sets the gap to 0, makes up for the jump along
+// the normal, to first order in dt, but not for that of a slip which the landing ends.
+//
+// A contact that exists from the start, without a gap and without approaching, is not made; where a
+// face and a corner of the same shapes continue one another without an impact nothing is made or
+// broken; and a slip that ends changes no contact.
+
+#include <vector>
+
+#include "tangible/dynamics/model/lengths.h"
+#include "tangible/simulation/stepping/step.h"
+
+namespace tangible {
+
+struct ContactChange {
+  enum class Kind : unsigned char { kMade, kBroken, kRestitution };
+  Kind kind = Kind::kMade;
+  ActiveContact contact;
+};
+
+/// "made", "broken", "an impact with restitution".
+const char* NameOf(ContactChange::Kind kind);
+
+/// Looks at fixed steps one after another.
+class DiscreteMapWatch {
+ public:
+  explicit DiscreteMapWatch(const Model<double>& model) : lengths_(model) {}
+
+  /// The changes in this step, valid until the next call. Costs O(n log n) for n contacts.
+  const std::vector<ContactChange>& AddStep(const Model<double>& model, const StepRecord& record);
+
+ private:
+  // A contact that carries an impulse or touches without one, and whether it continues.
+  struct Touch {
+    ActiveContact contact;
+    bool continues = false;
+  };
+  Touch* FindLast(const ActiveContact& contact);
+  // A contact of the last step, of the same shapes, that does not continue otherwise.
+  Touch* FindReplaced(const ActiveContact& contact);
+  bool ExistsAtStart(const Model<double>& model, const StepRecord& record, size_t contact) const;
+
+  Lengths lengths_;
+  bool first_ = true;
+  std::vector<Touch> last_, now_;     // ordered by their bodies
+  std::vector<size_t> without_last_;  // closed contacts of this step that were not in the last
+  std::vector<ContactChange> changes_;
+};
+
+}  // namespace tangible

@@ -1,0 +1,212 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/simulation/certificate/discrete_map.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdio>
+#include <string>
+
+#include "../../support/gradients.h"
+#include "../../support/scenes.h"
+#include "tangible/simulation/certificate/certify.h"
+
+namespace tangible {
+namespace {
+
+using test_scenes::SceneOf;
+
+std::string Exact(double x) {
+  char text[32];
+  std::snprintf(text, sizeof(text), "%.17g", x);
+  return text;
+}
+
+// A ball of radius 0.125 beside a floor, with what else is given of the two and of the scene.
+struct Ball {
+  double y = 0.125, speed = 0.0;
+  const char* ball = "";
+  const char* floor = "";
+  const char* more = "";
+  const char* simulation = R"("dt": 0.01, "duration": 0.3)";
+
+  std::string Text() const {
+    return R"({"bodies": [{"name": "ball", "shape": {"circle": {"radius": 0.125}}, "mass": 2,
+        "position": [0, )" +
+           Exact(y) + R"(], "velocity": [0.5, )" + Exact(speed) + "]" + ball +
+           R"(}, {"name": "floor", "static": true,
+        "shape": {"half_plane": {"normal": [0, 1], "offset": 0}})" +
+           floor + "}]" + more + R"(, "simulation": {)" + simulation + "}}";
+  }
+};
+
+Certificate CertificateOf(const std::string& text) {
+  Model<double> model;
+  State<double> initial;
+  BuildModel(SceneOf(text), &model, &initial);
+  return CertifyRollout(model, initial);
+}
+
+// The certificate of a run whose first change is `kind` in the given step.
+void ExpectChange(const std::string& text, const std::string& what, long step) {
+  const Certificate c = CertificateOf(text);
+  EXPECT_EQ(c.verdict.rfind("of the discrete map: ", 0), 0u) << c.verdict << text;
+  EXPECT_EQ(c.discrete_map.rfind("step " + std::to_string(step) + ", t = ", 0), 0u)
+      << c.discrete_map << text;
+  EXPECT_EQ(c.discrete_map.substr(c.discrete_map.rfind(", ") + 2), what) << text;
+}
+
+void ExpectNone(const std::string& text) {
+  const Certificate c = CertificateOf(text);
+  EXPECT_EQ(c.discrete_map, "") << text;
+  EXPECT_EQ(c.discrete_impact, "") << text;
+  EXPECT_NE(c.verdict.rfind("of the discrete map: ", 0), 0u) << c.verdict;
+}
+
+TEST(DiscreteMapTest, ABallThatFliesRestsSlidesOrRollsIsNoChange) {
+  ExpectNone(Ball{.y = 5.0}.Text());
+  ExpectNone(Ball{.y = 5.0, .ball = R"(, "restitution": 1)"}.Text());
+  ExpectNone(Ball{}.Text());
+  ExpectNone(Ball{.ball = R"(, "restitution": 0.5)", .floor = R"(, "restitution": 0.5)"}.Text());
+  // The slip ends within the run: rolling is no change of the contact.
+  const Ball rolls{.ball = R"(, "friction": 0.5)", .floor = R"(, "friction": 0.5)"};
+  ExpectNone(rolls.Text());
+  ExpectNone(Ball{.y = 0.125 + 1e-14}.Text());
+  // It is thrown up: the contact never closes.
+  ExpectNone(Ball{.speed = 2.0}.Text());
+  ExpectNone(Ball{.simulation = R"("dt": 0.01, "duration": 0)"}.Text());
+}
+
+TEST(DiscreteMapTest, ByEventsThereIsNone) {
+  for (const char* e : {"0", "0.7"}) {
+    const std::string restitution = std::string(R"(, "restitution": )") + e;
+    ExpectNone(Ball{.y = 0.2,
+                    .ball = restitution.c_str(),
+                    .floor = restitution.c_str(),
+                    .simulation = R"("dt": 0.01, "duration": 0.3, "stepping": "event")"}
+                   .Text());
+  }
+}
+
+// Free fall from 0.05 m takes 9.6 steps of 0.01 s.
+TEST(DiscreteMapTest, ALandingIsAContactThatIsMade) {
+  ExpectNone(Ball{.y = 0.175, .simulation = R"("dt": 0.01, "duration": 0.09)"}.Text());
+  ExpectChange(Ball{.y = 0.175, .simulation = R"("dt": 0.01, "duration": 0.1)"}.Text(), "made", 9);
+  ExpectChange(Ball{.y = 0.175}.Text(), "made", 9);
+  ExpectChange(Ball{.y = 0.1251}.Text(), "made", 0);
+  // An impact at the start: the contact was not there before.
+  ExpectChange(Ball{.speed = -1.0}.Text(), "made", 0);
+}
+
+// Where a step ends on the surface to the last bit, the contact is made in the next one.
+TEST(DiscreteMapTest, ALandingOnAStepsEndIsMadeInTheNextStep) {
+  const Ball ball{.y = 1.125,
+                  .speed = -1.0,
+                  .more = R"(, "gravity": [0, 0])",
+                  .simulation = R"("dt": 0.125, "duration": 2)"};
+  ExpectChange(ball.Text(), "made", 8);
+}
+
+TEST(DiscreteMapTest, AnImpactWithRestitution) {
+  const char* e = R"(, "restitution": 0.5)";
+  ExpectChange(Ball{.y = 0.325, .ball = e, .floor = e}.Text(), "an impact with restitution", 19);
+  ExpectChange(Ball{.speed = -2.0, .ball = e, .floor = e}.Text(), "an impact with restitution", 0);
+  // Below the threshold it lands.
+  ExpectChange(Ball{.y = 0.1251, .ball = e, .floor = e}.Text(), "made", 0);
+}
+
+TEST(DiscreteMapTest, AContactThatOpensIsBroken) {
+  ExpectChange(Ball{.more = R"(, "forces": [{"name": "f", "body": "ball", "force": [0, 40],
+                                             "start": 0.1, "end": 0.2}])"}
+                   .Text(),
+               "broken", 10);
+}
+
+std::string Arm(const char* limits) {
+  return std::string(R"({"bodies": [{"name": "arm", "shape": {"box": {"size": [1, 0.1]}}, "mass": 1,
+      "position": [0.5, 0]}], "joints": [{"name": "hinge", "type": "revolute",
+      "bodies": ["arm", "world"], "anchor": [0, 0], "limits": )") +
+         limits + R"(}], "simulation": {"dt": 0.01, "duration": 0.5}})";
+}
+
+// φ'' = −(3 / 2) g / l: −0.5 rad after 0.26 s.
+TEST(DiscreteMapTest, ALimitThatIsReachedIsMadeAndOneThatCarriesFromTheStartNot) {
+  ExpectChange(Arm("[-0.5, 0.5]"), "made", 25);
+  ExpectNone(Arm("[0, 0.5]"));
+  ExpectNone(Arm("[-3, 3]"));
+}
+
+std::string Boxes(double offset, const char* velocity) {
+  std::string text = R"({"bodies": [)";
+  for (int k = 0; k < 4; ++k) {
+    text +=
+        R"({"name": "box)" + std::to_string(k) +
+        R"(", "shape": {"box": {"size": [0.4, 0.2]}}, "mass": 1, "friction": 0.2, "position": [)" +
+        Exact(k * offset) + ", " + Exact(0.1 + 0.2 * k) + R"(], "velocity": )" + velocity + "},";
+  }
+  return text + R"({"name": "floor", "static": true, "friction": 0.2,
+      "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}}],
+      "simulation": {"dt": 0.01, "duration": 0.5}})";
+}
+
+// With this friction a stack that slides does not tip. Rows of boxes at rest are redundant, and of equal boxes the corners of either can be the ends of
+// a face: which row carries nothing, or which corner is taken, is no change of the contact.
+TEST(DiscreteMapTest, StacksAtRestOrSlidingAreNoChange) {
+  for (const double offset : {0.0, 0.03}) {
+    ExpectNone(Boxes(offset, "[0, 0]"));
+    ExpectNone(Boxes(offset, "[0.7, 0]"));
+  }
+}
+
+// A box whose middle passes the edge of a table turns: its corner leaves the table's face.
+TEST(DiscreteMapTest, ABoxThatTipsOverAnEdgeBreaksAContact) {
+  const std::string text = R"({"bodies": [
+      {"name": "box", "shape": {"box": {"size": [0.4, 0.2]}}, "mass": 1, "position": [0, 0.1],
+       "velocity": [1, 0]},
+      {"name": "table", "static": true, "shape": {"box": {"size": [0.6, 0.2]}},
+       "position": [0, -0.1]}], "simulation": {"dt": 0.01, "duration": )";
+  ExpectNone(text + "0.27}}");
+  EXPECT_NE(CertificateOf(text + "0.4}}").discrete_map, "");
+}
+
+// A fit warns where the restitution acts, or where the last step makes a contact.
+TEST(DiscreteMapTest, WhereASmallerStepDoesNotHelp) {
+  const char* e = R"(, "restitution": 0.5)";
+  const Certificate bounces = CertificateOf(Ball{.y = 0.325, .ball = e, .floor = e}.Text());
+  EXPECT_EQ(bounces.discrete_impact, bounces.discrete_map);
+  EXPECT_EQ(CertificateOf(Ball{.y = 0.175}.Text()).discrete_impact, "");
+  const Certificate last =
+      CertificateOf(Ball{.y = 0.175, .simulation = R"("dt": 0.01, "duration": 0.1)"}.Text());
+  EXPECT_NE(last.discrete_impact.find("made in the last step"), std::string::npos)
+      << last.discrete_impact;
+}
+
+// What the prefix is for. A ball is dropped from the height H above the floor and bounces with
+// e = 1: at T the motion has y = r + v s − g s² / 2 with v = √(2 g H), s = T − √(2 H / g), of which
+// the derivative is negative just after the impact. The map's is +1, by every method.
+TEST(DiscreteMapTest, TheMapsDerivativeThroughABounceHasTheOtherSign) {
+  const char* e = R"(, "restitution": 1)";
+  Ball ball{.y = 1.125, .ball = e, .floor = e};
+  ball.simulation = R"("dt": 0.01, "duration": 0.6)";
+  Ball motion = ball;
+  motion.simulation = R"("dt": 0.01, "duration": 0.6, "stepping": "event")";
+  const double g = 9.81, height = 1.0, v = std::sqrt(2.0 * g * height);
+  const double fall = v / g, s = 0.6 - fall;
+  const double exact = g / v * s - (v - g * s) / v;
+  for (const auto& [name, method] : kGradientMethodNames) {
+    if (!testing::HaveJets() && std::string(name).find("jet") == 0) continue;
+    const GradientResult map =
+        testing::Jacobian(SceneOf(ball.Text()), {"bodies/ball/position/y"}, method);
+    const GradientResult event =
+        testing::Jacobian(SceneOf(motion.Text()), {"bodies/ball/position/y"}, method);
+    ASSERT_TRUE(map.done && event.done) << map.message << event.message;
+    EXPECT_EQ(map.certificate.verdict, "of the discrete map: trustworthy") << name;
+    EXPECT_EQ(event.certificate.verdict, "trustworthy") << name;
+    // The tolerance of the unrolled Jets, which are as exact as the interior point.
+    EXPECT_NEAR(map.jacobian(1, 0), 1.0, 1e-6) << name;
+    EXPECT_NEAR(event.jacobian(1, 0), exact, 1e-6) << name;
+  }
+}
+
+}  // namespace
+}  // namespace tangible
