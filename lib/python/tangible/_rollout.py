@@ -259,10 +259,11 @@ class Rollout:
 
         Args:
             parameters, initial_state, controls, on_failure: As in a call.
-            kinks: What stands for derivatives at a kink or jump, whether of the motion or of the
-                discrete map (`Certificate.verdict_of_map`): "element" is one element of the generalised Jacobian (`certificates` says where); "raise" an error;
-                "smoothed" the mean of the Jacobians around (`Smoothing`), in those rows alone. The
-                states are those of the rollout in each case.
+            kinks: What stands for derivatives at a kink or jump, of the motion or of the discrete
+                map (`Certificate.verdict_of_map`): "element" is one element of the generalised
+                Jacobian (`certificates` says where); "raise" an error; "smoothed" the mean of the
+                Jacobians around (`Smoothing`), in those rows alone. The states are those of the
+                rollout in each case.
             smoothing: Of "smoothed"; absent: its defaults.
 
         Raises:
