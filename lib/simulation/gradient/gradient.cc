@@ -138,7 +138,8 @@ bool ByTangent(const GradientProblem& problem, DerivativeSide side, GradientResu
   for (size_t i = 0; i < problem.output_variables.size(); ++i) {
     result->jacobian.row(static_cast<Eigen::Index>(i)) = w_dot.row(problem.output_variables[i]);
   }
-  return true;
+  return by_events || side == DerivativeSide::kBoth ||
+         internal::EdgesBySides(problem, side, result);
 }
 
 // All methods except the adjoint: they compute the whole Jacobian, with which the gradient of a
@@ -227,6 +228,9 @@ void JudgeSide(const GradientProblem& problem, const GradientOptions& options,
   if (options.side == DerivativeSide::kBoth || IsTrustworthyMap(certificate) ||
       problem.structure->settings.stepping == Stepping::kEvent) {
     return;
+  }
+  if (!result->notes.empty()) {
+    return;  // of ends of force windows
   }
   const bool resolved =
       certificate.degenerate_rows > 0 || certificate.one_sided == kContradictingRows;

@@ -31,6 +31,9 @@ bool JacobianByDifferences(const GradientProblem& problem, double step, Gradient
 /// Uses tangents at parameters beside those of the scene: for event stepping, at a kink. Reads the
 /// certificate.
 bool JacobianBySides(const GradientProblem& problem, DerivativeSide side, GradientResult* result);
+/// Of fixed steps, whose directional derivatives do not resolve them: replaces the columns of
+/// parameters that are an end of a force's window on a step's end by those from tangents beside.
+bool EdgesBySides(const GradientProblem& problem, DerivativeSide side, GradientResult* result);
 bool JacobianByJets(const GradientProblem& problem, JetRoute route, GradientResult* result);
 
 }  // namespace tangible::internal

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// One-sided derivatives of event stepping at a kink: limits of the derivative on one side,
+// One-sided derivatives of event stepping at a kink, and of fixed steps where a force's window ends
+// on a step's end: limits of the derivative on one side,
 //
 //   lim D(p + τ) for τ → 0 from one side,     D(p + τ): the tangent at p + τ, exact there
 //
@@ -16,6 +17,7 @@
 #include <cmath>
 #include <sstream>
 
+#include "tangible/dynamics/model/tolerances.h"
 #include "tangible/simulation/derivatives/rollout_tangent.h"
 #include "tangible/simulation/gradient/gradient_methods.h"
 #include "tangible/simulation/gradient/tolerances.h"
@@ -74,7 +76,9 @@ class OneSided {
     const double size =
         std::max(column->cwiseAbs().maxCoeff(), kNoDerivative * kSideWay * values / first_way);
     const double apart = (first - *column).cwiseAbs().maxCoeff();
-    if (!(apart <= kSidesConverged * size)) {
+    // Where bodies rest and nothing depends on the parameter, the derivatives are rounding.
+    const double rounding = kValueRounding * kSideWay * values / first_way;
+    if (!(apart <= kSidesConverged * size + rounding)) {
       return Fail(parameter, "derivatives beside it do not converge: its largest is " + Text(size) +
                                  " or differs by " + Text(apart));
     }
@@ -142,7 +146,37 @@ class OneSided {
   double apart_ = 0.0;
 };
 
+// Whether a parameter sets an end of a force's window that is an end of a step.
+bool IsEdgeOnAStep(const GradientProblem& problem, const ParameterPath& parameter) {
+  const SimulationSettings& settings = problem.structure->settings;
+  Scene scene = problem.scene;
+  const std::vector<SceneNumber<double>> numbers = EnumerateNumbers(&scene);
+  return std::any_of(parameter.numbers.begin(), parameter.numbers.end(), [&](int number) {
+    const std::string& path = numbers[number].path;
+    const std::string last = path.substr(path.rfind('/') + 1);
+    if (path.rfind("forces/", 0) != 0 || (last != "start" && last != "end")) return false;
+    const double time = *numbers[number].value;
+    const double nearest =
+        std::clamp(std::round(time / settings.dt), 0.0, static_cast<double>(NumSteps(settings)));
+    return std::abs(time - StepTime(settings, std::lround(nearest))) <= kSameTime * settings.dt;
+  });
+}
+
 }  // namespace
+
+bool EdgesBySides(const GradientProblem& problem, DerivativeSide side, GradientResult* result) {
+  OneSided sides(problem, side == DerivativeSide::kPlus ? 1.0 : -1.0, result);
+  for (size_t k = 0; k < problem.parameters.size(); ++k) {
+    if (!IsEdgeOnAStep(problem, problem.parameters[k])) continue;
+    VectorX<double> column;
+    if (!sides.Column(k, &column)) return false;
+    result->jacobian.col(static_cast<Eigen::Index>(k)) = column;
+    result->notes.push_back(problem.parameters[k].path +
+                            " is a step's end: its one-sided derivative is the limit of those "
+                            "beside it, extrapolated");
+  }
+  return true;
+}
 
 bool JacobianBySides(const GradientProblem& problem, DerivativeSide side, GradientResult* result) {
   State<double> final;

@@ -17,7 +17,7 @@ inline constexpr double kSidesConverged = 1e-6;
 /// Of the change over the first distance: the allowed error of the integral of the derivative,
 /// because a touch at zero speed is located to 1e-7 m/s.
 inline constexpr double kContinuous = 0.05;
-/// Of the values: rounding, added to the above.
+/// Of the values (over the parameter's size, of derivatives): rounding, added to both of the above.
 inline constexpr double kValueRounding = 1e-11;
 /// Of the values over the parameter's size: smaller derivatives count as 0.
 inline constexpr double kNoDerivative = 1e-9;

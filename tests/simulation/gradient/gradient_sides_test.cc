@@ -2,6 +2,9 @@
 // One-sided derivatives of event stepping, against closed forms, and where there are none.
 #include <gtest/gtest.h>
 
+#include <string>
+#include <tuple>
+
 #include "../../support/gradients.h"
 #include "../../support/scenes.h"
 #include "../../support/starts.h"
@@ -52,6 +55,65 @@ TEST(GradientSidesTest, ABoxPushedWithItsFriction) {
   EXPECT_NEAR(Plus(scene, "bodies/*/friction", 3), 0.0, 1e-10);
   EXPECT_NEAR(Minus(scene, "bodies/*/friction", 3), -8.0 * kTime, 1e-10);
   EXPECT_NEAR(Plus(scene, "forces/push/force/x", 0), 0.5 * kTime * kTime, 1e-10);
+}
+
+// The friction of a box at rest is 4 N, so that a push which begins a little before a step holds it
+// for that step.
+TEST(GradientSidesTest, AForceThatBeginsOrEndsOnAFixedStepsEnd) {
+  Scene scene = Of(R"({"name": "box", "shape": {"box": {"size": [1, 0.5]}}, "mass": 1,
+      "position": [0, 0.25], "friction": 0.5})",
+                   R"(, "forces": [{"name": "push", "body": "box", "force": [8, 0],
+                        "start": 0.015625, "end": 0.03125}])");
+  scene.simulation.stepping = Stepping::kFixed;
+  scene.simulation.integrator.reset();
+  const double h = scene.simulation.dt;
+  // Two steps of the push, which accelerate by 4 m/s², two more until friction has stopped it: the
+  // last of those ends at rest.
+  for (const auto& [path, side, x] :
+       {std::tuple("forces/push/start", DerivativeSide::kPlus, -8.0 * 3.0 * h),
+        std::tuple("forces/push/start", DerivativeSide::kMinus, 0.0),
+        std::tuple("forces/push/end", DerivativeSide::kPlus, 8.0 * 2.0 * h),
+        std::tuple("forces/push/end", DerivativeSide::kMinus, 8.0 * 2.0 * h)}) {
+    const GradientResult result = Sided(scene, path, side);
+    ASSERT_TRUE(result.done) << path << " " << result.message;
+    GradientOptions differences;
+    differences.method = GradientMethod::kFiniteDifference;
+    const double sign = side == DerivativeSide::kPlus ? 1.0 : -1.0;
+    const double way = 1e-4 * h;
+    Scene beside = scene;
+    (std::string(path) == "forces/push/start" ? *beside.forces[0].start : *beside.forces[0].end) +=
+        sign * way;
+    const VectorX<double> moved =
+        FinalStateJacobian(beside, testing::Resolve(beside, {path}), differences).values;
+    EXPECT_NEAR((moved[0] - result.values[0]) / (sign * way), x, 1e-9) << path;
+    EXPECT_NEAR(result.jacobian(0, 0), x, 1e-9) << path;
+  }
+}
+
+// Ten boxes at rest, four in the lowest row, whose two in the third row a spring pulls together:
+// redundant contacts share their friction in many ways, one of which is at its limit.
+TEST(GradientSidesTest, NothingMovesAPileAtRest) {
+  std::string bodies;
+  int number = 0;
+  for (int row = 0; row < 4; ++row) {
+    for (int i = 0; i < 4 - row; ++i) {
+      bodies += (number > 0 ? ", " : "") + std::string(R"({"name": "b)") + std::to_string(number) +
+                R"(", "shape": {"box": {"size": [0.3, 0.2]}}, "mass": 1, "friction": 0.5,
+                    "position": [)" +
+                std::to_string(0.35 * i + 0.175 * row) + ", " + std::to_string(0.1 + 0.2 * row) +
+                "]}";
+      ++number;
+    }
+  }
+  const Scene scene = Of(bodies, R"(, "springs": [{"name": "s", "bodies": ["b7", "b8"],
+      "anchors": [[0.35, 0.5], [0.7, 0.5]], "stiffness": 10, "rest_length": 0.25}])");
+  for (const char* path : {"bodies/b7/velocity/x", "bodies/b7/mass", "gravity/y"}) {
+    for (const DerivativeSide side : {DerivativeSide::kPlus, DerivativeSide::kMinus}) {
+      const GradientResult result = Sided(scene, path, side);
+      ASSERT_TRUE(result.done) << path << " " << result.message;
+      EXPECT_LE(result.jacobian.cwiseAbs().maxCoeff(), 1e-9) << path;
+    }
+  }
 }
 
 TEST(GradientSidesTest, ADiscPulledUpWithItsWeight) {
