@@ -5,8 +5,9 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
-#include <thread>
 #include <utility>
+
+#include "tangible/lcp/contact/worker_pool.h"
 
 namespace tangible {
 namespace {
@@ -158,25 +159,11 @@ BlockFactor Reduce(const BlockEvaluation& evaluation, const Eigen::VectorXd& q_s
   return {factor.Factor(), curved.Factor(), std::sqrt(remainder)};
 }
 
-int NumThreads(int threads) {
-  return threads > 0 ? threads : std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
-}
-
 void ForEachOnThreads(int threads, int count, const std::function<void(int)>& function) {
-  std::atomic<int> next{0};
-  const auto work = [&] {
-    for (int i = next++; i < count; i = next++) {
-      function(i);
-    }
-  };
-  std::vector<std::thread> others;
-  for (int i = 1; i < std::min(NumThreads(threads), count); ++i) {
-    others.emplace_back(work);
-  }
-  work();
-  for (std::thread& other : others) {
-    other.join();
-  }
+  const int used = std::min(NumThreads(threads), count);
+  WorkerPool pool(used);
+  pool.Run(static_cast<size_t>(count), used,
+           [&function](size_t i, int) { function(static_cast<int>(i)); });
 }
 
 Linearizer::Linearizer(LeastSquaresProblem* problem, DerivativeMethod method, int threads,

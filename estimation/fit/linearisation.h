@@ -62,10 +62,8 @@ double RobustCost(const Eigen::VectorXd& residuals, double huber);
 BlockFactor Reduce(const BlockEvaluation& evaluation, const Eigen::VectorXd& q_scale, int num_own,
                    int num_observation_rows, double weight, double huber);
 
-/// The number of threads for an option `threads`: 0 means one for each core.
-int NumThreads(int threads);
-
-/// Calls `function` with 0 .. count − 1 on the given number of threads.
+/// Calls `function` with 0 .. count − 1 on the given number of threads (0: one for each core). An
+/// exception ends the work and is passed on.
 void ForEachOnThreads(int threads, int count, const std::function<void(int)>& function);
 
 /// Evaluates a problem at points q.

@@ -124,6 +124,9 @@ void SamplePlan::ForEachRate(const SimulationSettings& settings, const Use& use)
     return;
   }
   const long steps = NumSteps(settings);
+  if (steps == 0) {  // there is no second state, and nothing moves
+    return;
+  }
   for (int i = 0; i < num_samples(); ++i) {
     long from = std::min(samples_[i].step, steps - 1);
     long to = from + 1;

@@ -45,7 +45,7 @@ struct SampleShare {
 /// The quantities that are read at each sample.
 struct SampleOptions {
   bool twists = false;  ///< velocities are observed
-  bool rates = false;   ///< the times of observations depend on parameters
+  bool rates = false;   ///< the times of observations depend on parameters; 0 in a run of no steps
 };
 
 class SamplePlan {

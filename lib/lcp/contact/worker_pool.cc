@@ -1,7 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tangible/lcp/contact/worker_pool.h"
 
+#include <string>
+#include <system_error>
+
 namespace tangible {
+
+int NumThreads(int threads) {
+  return threads > 0 ? threads : std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+}
 
 WorkerPool::~WorkerPool() {
   {
@@ -22,6 +29,7 @@ void WorkerPool::TakeTasks(int thread) {
   } catch (...) {
     const std::lock_guard<std::mutex> lock(mutex_);
     error_ = error_ ? error_ : std::current_exception();
+    next_ = count_;
   }
 }
 
@@ -46,7 +54,14 @@ void WorkerPool::Wait(int thread) {
 
 void WorkerPool::Start() {
   while (static_cast<int>(threads_.size()) < threads_wanted_ - 1) {
-    threads_.emplace_back([this, thread = static_cast<int>(threads_.size()) + 1] { Wait(thread); });
+    const int thread = static_cast<int>(threads_.size()) + 1;
+    try {
+      threads_.emplace_back([this, thread] { Wait(thread); });
+    } catch (const std::system_error& error) {
+      throw std::system_error(error.code(), "thread " + std::to_string(thread + 1) + " of " +
+                                                std::to_string(threads_wanted_) +
+                                                " cannot be started");
+    }
   }
 }
 

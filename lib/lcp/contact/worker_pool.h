@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// Threads that wait for work between calls, because the islands of a step take too little time to
-// start threads for them.
+// The one class that starts threads: what a task throws and what keeps a thread from starting reach
+// the caller as exceptions. The threads wait for work between calls, because the islands of a step
+// take too little time to start threads for them.
 
 #include <algorithm>
 #include <atomic>
@@ -15,6 +16,9 @@
 #include <vector>
 
 namespace tangible {
+
+/// The number of threads for an option `threads`: 0 or less means one for each core.
+int NumThreads(int threads);
 
 /// Runs the indices of a loop on several threads, the caller's included.
 class WorkerPool {
@@ -29,7 +33,8 @@ class WorkerPool {
 
   /// task(0, ·) ... task(count − 1, ·), each once, in any order, the second argument the number of
   /// the thread; returns when all are done. With `threads` 1 the caller runs them in turn. If tasks
-  /// throw, the first exception is rethrown here.
+  /// throw, no further ones begin, and the first exception is rethrown here. If a thread cannot be
+  /// started, no task begins, and std::system_error is thrown; a later call tries again.
   void Run(size_t count, int threads, const std::function<void(size_t, int)>& task);
 
  private:

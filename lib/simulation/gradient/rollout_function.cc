@@ -3,12 +3,10 @@
 
 #include <algorithm>
 #include <atomic>
-#include <exception>
-#include <mutex>
 #include <set>
-#include <thread>
 
 #include "tangible/dynamics/model/settings.h"
+#include "tangible/lcp/contact/worker_pool.h"
 #include "tangible/scene/set_parameters.h"
 #include "tangible/simulation/gradient/tolerances.h"
 
@@ -306,6 +304,7 @@ RolloutOutput RolloutWorker::Tangent(const RolloutInput& input,
     states.col(d) = directions[d].state;
   }
   const auto set_controls = [&](long k, RowMatrixXd* w_dot) {
+    if (f_.num_steps() == 0) return;  // no control acts
     const long row = std::min(k, f_.num_steps() - 1);
     for (size_t j = 0; j < controls_.numbers.size(); ++j) {
       for (Eigen::Index d = 0; d < columns; ++d) {
@@ -644,28 +643,14 @@ void RolloutWorker::JacobianByDifferences(const RolloutInput& input, RowMatrixXd
 
 void ForEachRollout(const RolloutFunction& function, long count, int threads,
                     const std::function<void(RolloutWorker* worker, long i)>& work) {
-  const auto cores = static_cast<long>(std::thread::hardware_concurrency());
-  const long used =
-      std::clamp(threads > 0 ? threads : std::max(1L, cores), 1L, std::max(1L, count));
-  std::atomic<long> next{0};
-  std::mutex mutex;
-  std::exception_ptr thrown;
-  const auto run = [&] {
-    try {
-      RolloutWorker worker(function);
-      for (long i = next++; i < count; i = next++) work(&worker, i);
-    } catch (...) {  // reported by the caller's thread
-      const std::lock_guard<std::mutex> lock(mutex);
-      thrown = std::current_exception();
-      next = count;
-    }
-  };
-  {
-    std::vector<std::jthread> others;
-    for (long i = 1; i < used; ++i) others.emplace_back(run);
-    run();
-  }
-  if (thrown) std::rethrow_exception(thrown);
+  const int used = static_cast<int>(std::min<long>(NumThreads(threads), std::max(1L, count)));
+  WorkerPool pool(used);
+  std::vector<std::optional<RolloutWorker>> workers(static_cast<size_t>(used));
+  pool.Run(static_cast<size_t>(count), used, [&](size_t i, int thread) {
+    std::optional<RolloutWorker>& worker = workers[static_cast<size_t>(thread)];
+    if (!worker) worker.emplace(function);
+    work(&*worker, static_cast<long>(i));
+  });
 }
 
 std::vector<RolloutOutput> RolloutBatch::Run(const std::vector<RolloutInput>& inputs) const {

@@ -97,6 +97,33 @@ TEST(SamplingTest, RatesAreHowASampleChangesWithItsTime) {
             0.51 * kRateStep * settings.dt);
 }
 
+// With no step there is no second state: neither a step before the first is read, nor a difference
+// over no time.
+TEST(SamplingTest, ARunOfNoStepsHasStatesAndNoRates) {
+  for (const Stepping stepping : {Stepping::kFixed, Stepping::kEvent}) {
+    for (const bool twists : {false, true}) {
+      SimulationSettings settings;
+      settings.duration = 0.0;
+      settings.stepping = stepping;
+      const SampleOptions options{.twists = twists, .rates = true};
+      AddStepTimes(SplitTimes({0.0}, settings, options), &settings);
+      ASSERT_EQ(NumSteps(settings), 0);
+      const SamplePlan plan({At(0.0, 0), At(0.0, 1)}, {0.0, 0.0}, {Channel()}, {-1}, settings,
+                            options);
+      EXPECT_EQ(plan.last_step(), 0);
+      std::vector<double> numbers(2 * static_cast<size_t>(plan.width()), 0.0);
+      std::vector<double> rates = numbers;
+      plan.Add(0, {{1.0, 2.0, 3.0, 4.0, 5.0, 6.0}, {7.0, 8.0, 9.0, 0.0, 0.0, 0.0}}, &numbers,
+               &rates);
+      EXPECT_EQ(numbers[0], 1.0);
+      EXPECT_EQ(numbers[static_cast<size_t>(plan.width())], 4.0);
+      for (const double rate : rates) EXPECT_TRUE(std::isfinite(rate));
+      // By events the rate of a place is the twist, which is known.
+      EXPECT_EQ(rates[0], stepping == Stepping::kEvent ? 7.0 : 0.0);
+    }
+  }
+}
+
 TEST(SamplingTest, WhatAnObservationIsRelativeToIsSampledToo) {
   Channel relative;
   relative.to_body = 2;

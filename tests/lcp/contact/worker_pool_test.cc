@@ -2,8 +2,15 @@
 #include "tangible/lcp/contact/worker_pool.h"
 
 #include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <unistd.h>
 
+#include <chrono>
+#include <fstream>
+#include <new>
 #include <stdexcept>
+#include <string>
+#include <system_error>
 
 namespace tangible {
 namespace {
@@ -45,6 +52,61 @@ TEST(WorkerPoolTest, WhatATaskThrowsReachesTheCallerAndThePoolGoesOn) {
   pool.Run(10, 2, [&](size_t, int) { ++done; });
   EXPECT_EQ(done, 10);
 }
+
+TEST(WorkerPoolTest, AfterAnExceptionNoFurtherTaskBegins) {
+  WorkerPool pool(4);
+  std::atomic<int> begun = 0;
+  // The other threads would take a second for all.
+  EXPECT_THROW(pool.Run(3000, 4,
+                        [&](size_t k, int) {
+                          if (k == 0) throw std::bad_alloc();
+                          ++begun;
+                          std::this_thread::sleep_for(std::chrono::milliseconds(1));
+                        }),
+               std::bad_alloc);
+  EXPECT_LT(begun, 2000);
+}
+
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+// The address space that this process has, and a little: no room for the stacks of many threads.
+class NoRoomForThreads {
+ public:
+  NoRoomForThreads() {
+    ::getrlimit(RLIMIT_AS, &before_);
+    long pages = 0;
+    std::ifstream("/proc/self/statm") >> pages;
+    rlimit now = before_;
+    now.rlim_cur = static_cast<rlim_t>(pages) * static_cast<rlim_t>(::getpagesize()) + (1U << 22U);
+    ::setrlimit(RLIMIT_AS, &now);
+  }
+  ~NoRoomForThreads() { ::setrlimit(RLIMIT_AS, &before_); }
+  NoRoomForThreads(const NoRoomForThreads&) = delete;
+  NoRoomForThreads& operator=(const NoRoomForThreads&) = delete;
+
+ private:
+  rlimit before_{};
+};
+
+TEST(WorkerPoolTest, AThreadThatCannotStartIsAnExceptionAndLaterCallsTryAgain) {
+  // More stacks than the few that the C library keeps of threads that have ended.
+  WorkerPool pool(100);
+  std::atomic<int> done = 0;
+  const auto task = [&](size_t, int) { ++done; };
+  {
+    const NoRoomForThreads limit;
+    try {
+      pool.Run(1000, 100, task);
+      ADD_FAILURE() << "expected an exception";
+    } catch (const std::system_error& error) {
+      const std::string what = error.what();
+      EXPECT_NE(what.find(" of 100 cannot be started"), std::string::npos) << what;
+    }
+  }
+  EXPECT_EQ(done, 0);
+  pool.Run(1000, 100, task);
+  EXPECT_EQ(done, 1000);
+}
+#endif
 
 }  // namespace
 }  // namespace tangible

@@ -285,6 +285,38 @@ TEST(RolloutFunctionTest, AnEventAsControlsChangeIsAKink) {
   EXPECT_EQ(worker.Certify(input).verdict, "trustworthy");
 }
 
+// No control acts, so that there are none, and nothing is read of a step before the first.
+TEST_P(RolloutFunctionTest, ARunOfNoStepsEndsWhereItBegins) {
+  Scene scene = Driven(GetParam());
+  scene.simulation.duration = 0.0;
+  ASSERT_EQ(function_.Create(scene, kParameters, kControls, {0}), "");
+  RolloutWorker worker(function_);
+  const RolloutInput input = function_.Defaults();
+  ASSERT_EQ(input.controls.rows(), 0);
+  EXPECT_EQ(worker.Run(input).states.row(0).transpose(), input.state);
+  InputDirection direction{VectorX<double>::Unit(4, 2), VectorX<double>::Unit(12, 0),
+                           RowMatrixXd(0, 3)};
+  std::vector<RowMatrixXd> tangents;
+  ASSERT_EQ(worker.Tangent(input, {direction}, &tangents).status, RolloutStatus::kDone);
+  EXPECT_EQ(tangents[0](0, 0), 1.0);  // the state's own
+  ASSERT_EQ(worker.Record(input).status, RolloutStatus::kDone);
+  const InputDirection bar = worker.Adjoint({RowMatrixXd::Ones(1, 12)})[0];
+  EXPECT_EQ(bar.state, VectorX<double>::Ones(12));
+  EXPECT_EQ(bar.controls.size(), 0);
+  for (const GradientMethod method :
+       {GradientMethod::kTangent, GradientMethod::kAdjoint, GradientMethod::kJet,
+        GradientMethod::kJetImplicit, GradientMethod::kFiniteDifference}) {
+    RowMatrixXd jacobian;
+    GradientMethod used;
+    ASSERT_EQ(worker.Jacobian(input, method, RolloutWorker::Inputs::kAll, &jacobian, &used).status,
+              RolloutStatus::kDone);
+    ASSERT_EQ(jacobian.cols(), 16);
+    // Differences of numbers near 1 with a step of about 1e-6 are right to 1e-9.
+    EXPECT_LT((jacobian.rightCols(12) - RowMatrixXd::Identity(12, 12)).norm(), 1e-8);
+  }
+  EXPECT_FALSE(worker.Certify(input).verdict.empty());
+}
+
 TEST(RolloutFunctionErrorsTest, OneLineEach) {
   RolloutFunction function;
   const Scene scene = Driven("fixed");
