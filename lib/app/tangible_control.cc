@@ -314,6 +314,7 @@ struct PredictiveRun {
   Played played;
   std::vector<double> seconds;  // of each plan, CPU
   long failed = 0;
+  std::string failure;        // of the first plan that failed: where and why
   bool left_maximum = false;  // in any plan
   std::string error;
 };
@@ -345,7 +346,9 @@ PredictiveRun RunPredictive(const ControlFile& file, EngineStep* map, EngineStep
     const VectorX<double> u = controller.Control(k, x);
     run.seconds.push_back(static_cast<double>(std::clock() - began) / CLOCKS_PER_SEC);
     run.left_maximum |= controller.last().left_maximum;
-    run.failed += controller.last().status == IlqrStatus::kFailed ? 1 : 0;
+    if (controller.last().status == IlqrStatus::kFailed && run.failed++ == 0) {
+      run.failure = "in step " + std::to_string(k) + ": " + controller.last().message;
+    }
     if (!plant->Step(k, x, u, &next, &run.error)) return run;
     run.played.cost += cost.Value(x, u);
     run.played.controls.row(k) = u.transpose();
@@ -365,6 +368,21 @@ Certificate CertifyPlayed(const ControlFile& file, const Played& played) {
   return RolloutWorker(function).Certify({VectorX<double>(), VectorX<double>(), played.controls});
 }
 
+std::string FailedPlans(const PredictiveRun& run) {
+  return std::to_string(run.failed) + " of " + std::to_string(run.seconds.size()) + " plans failed";
+}
+
+// What keeps a run from having a result, or empty.
+std::string WhyNoResult(const PredictiveRun& run, const ControlFile& file) {
+  const std::string plant = FLAGS_plant.empty() ? file.scene_path : FLAGS_plant;
+  if (!run.error.empty()) return plant + ": " + run.error;
+  if (run.failed == static_cast<long>(run.seconds.size())) {
+    return FailedPlans(run) + ", the first " + run.failure;
+  }
+  if (!std::isfinite(run.played.cost)) return "the cost of the run is not finite";
+  return "";
+}
+
 int Predict(const std::string& path, const ControlFile& file) {
   if (!(file.run_duration > 0.0)) {
     return ReportError(path + ": /mpc: missing, expected an object with duration and horizon");
@@ -381,8 +399,11 @@ int Predict(const std::string& path, const ControlFile& file) {
                    NumRunSteps(file));
   if (!error.empty()) return ReportError(path + ": " + error);
   const PredictiveRun run = RunPredictive(file, &map, &plant);
-  if (!run.error.empty()) {
-    return ReportError((FLAGS_plant.empty() ? file.scene_path : FLAGS_plant) + ": " + run.error);
+  error = WhyNoResult(run, file);
+  if (!error.empty()) return ReportError(run.error.empty() ? path + ": " + error : error);
+  if (run.failed > 0) {
+    ReportError(path + ": warning: " + FailedPlans(run) +
+                ", where the plans before them were continued; the first " + run.failure);
   }
   if (run.left_maximum) WarnOfMaximum(path);
   const Certificate certificate = CertifyPlayed(file, run.played);
@@ -424,6 +445,8 @@ int Main(int argc, char** argv) {
   ControlFile file;
   std::string error;
   if (!LoadControlFile(line.positional[0], &file, &error)) return ReportError(error);
+  const std::string over = OutputOverInput({"out", "plan", "trajectory", "view"});
+  if (!over.empty()) return ReportError("tangible-control: " + over, kExitUsage);
   return FLAGS_mpc ? Predict(line.positional[0], file) : Plan(line.positional[0], file);
 }
 

@@ -96,6 +96,39 @@ TEST_F(TangibleControlTest, RecedingHorizonsBringAHeavierPlantToTheMark) {
   EXPECT_NEAR(json::parse(timed.out)["final_state"]["cart/x"].get<double>(), 1.0, 0.05);
 }
 
+// A run without a plan, or without a cost, has no result: a speed at which the cost overflows, and
+// one whose square is finite over a step and not over the run.
+TEST_F(TangibleControlTest, ARunWithoutPlansOrCostIsAnError) {
+  const auto at_speed = [this](const std::string& speed) {
+    std::string fast = kCart;
+    const std::string position = "\"position\": [0, 0]";
+    fast.replace(fast.find(position), position.size(),
+                 position + ", \"velocity\": [" + speed + ", 0]");
+    Write("fast.json", fast);
+    return Control(R"({"scene": "fast.json", "controls": [)" + kBounded + R"(], "cost": [
+        {"state": "cart/x", "target": 1, "at": "end"}],
+        "mpc": {"duration": 0.5, "horizon": 0.25}})",
+                   "--mpc --out='" + Path("r.json") + "'");
+  };
+  for (const std::string speed : {"1e200", "-1e170"}) {
+    ExpectOneLine(at_speed(speed), 1,
+                  "problem.json: 10 of 10 plans failed, the first in step 0: the cost of the "
+                  "initial controls is not finite");
+    EXPECT_FALSE(std::filesystem::exists(Path("r.json")));
+  }
+  // x²/2 overflows above 1.896e154 m. A plan that begins at t ends 0.25 s later, the run at 0.5 s: at
+  // 4e154 m/s the plans to 0.2 s can be made, and the run has no cost.
+  ExpectOneLine(at_speed("4e154"), 1, "problem.json: the cost of the run is not finite");
+  EXPECT_FALSE(std::filesystem::exists(Path("r.json")));
+  // At 3e154 m/s it has one, and the plans from 0.4 s on, steps 8 and 9, cannot be made.
+  ExpectOneLine(at_speed("3e154"), 0,
+                "problem.json: warning: 2 of 10 plans failed, where the plans before them were "
+                "continued; the first in step 8: ");
+  const json result = json::parse(Read(Path("r.json")));
+  EXPECT_EQ(result["plans_failed"], 2);
+  EXPECT_TRUE(result["cost"].is_number()) << result["cost"];
+}
+
 // A surrogate is named as such, and the plan ends with exact Jacobians: of a linear system in one
 // iteration of each.
 TEST_F(TangibleControlTest, LabelsASurrogate) {
@@ -244,6 +277,18 @@ TEST_F(TangibleControlTest, SaysThatItLeavesAMaximum) {
   const json result = json::parse(run.out);
   EXPECT_EQ(result["status"], "converged") << result["message"];
   EXPECT_NEAR(std::cos(result["final_state"]["rod/angle"].get<double>()), -1.0, 1e-2);
+}
+
+// A file that the problem names is an input as well, which is found before the work.
+TEST_F(TangibleControlTest, OutputsOverTheProblemsSceneAreWrongUsage) {
+  for (const char* flag : {"out", "plan", "trajectory", "view"}) {
+    for (const char* file : {"cart.json", "problem.json"}) {
+      const ProgramRun run =
+          Control(Problem(kEffort), "--" + std::string(flag) + "='" + Path(file) + "'");
+      ExpectOneLine(run, 2, "expected a file of its own");
+    }
+  }
+  EXPECT_EQ(Read(Path("cart.json")), kCart);
 }
 
 // An output that cannot be written leaves the others as they were.

@@ -1,0 +1,147 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Nulls in the results of programs: none where a status says that there is a result, but for those
+// that lib/app/README.md lists.
+#include <nlohmann/json.hpp>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "run_program.h"
+
+namespace tangible {
+namespace {
+
+using nlohmann::json;
+
+const std::set<std::string> kMayBeNull = {"margin_min",
+                                          "condition",
+                                          "undetermined_end",
+                                          "impulses",
+                                          "motions",
+                                          "farkas",
+                                          "confidence_95",
+                                          "confidence_95_robust",
+                                          "standard_deviation",
+                                          "standard_deviation_robust",
+                                          "degrees_of_freedom",
+                                          "covariance",
+                                          "bandwidth",
+                                          "residual_correlation",
+                                          "whiteness_p_value",
+                                          "reduced_chi_square",
+                                          "product",
+                                          "plain_cost",
+                                          "tried_cost",
+                                          "interval",
+                                          "rms_in_sigma",
+                                          "rms_length",
+                                          "max_length",
+                                          "rms_angle",
+                                          "max_angle",
+                                          "prediction_rms",
+                                          "energy_start",
+                                          "energy_end"};
+
+bool IsDone(const json& object) {
+  static const std::set<std::string> good = {"done", "solved", "converged"};
+  return !object.contains("status") || !object["status"].is_string() ||
+         good.count(object["status"].get<std::string>()) > 0;
+}
+
+/// Adds the keys below which something is null, but shall not be. What says that it failed (one
+/// start of several) may have any.
+void FindNulls(const json& value, const std::string& key, std::vector<std::string>* found) {
+  if (value.is_null()) {
+    if (kMayBeNull.count(key) == 0) found->push_back(key);
+  } else if (value.is_array()) {
+    for (const json& item : value) FindNulls(item, key, found);
+  } else if (value.is_object() && IsDone(value)) {
+    for (const auto& [name, item] : value.items()) FindNulls(item, name, found);
+  }
+}
+
+class NullsTest : public ProgramTest {
+ protected:
+  /// Status 0 comes with a result that has no other nulls, and any other status with one line.
+  void Check(const std::string& program, const std::string& arguments, const std::string& out) {
+    SCOPED_TRACE(program + " " + arguments);
+    std::filesystem::remove(Path("r.json"));
+    const ProgramRun run = Run(program, arguments + " --" + out + "='" + Path("r.json") + "'");
+    if (!std::filesystem::exists(Path("r.json"))) {
+      ExpectOneLine(run, 1, "");
+      return;
+    }
+    const json result = json::parse(Read(Path("r.json")));
+    EXPECT_EQ(run.exit_status == 0, IsDone(result)) << run.error << result["status"];
+    std::vector<std::string> found;
+    FindNulls(result, "", &found);
+    EXPECT_EQ(found, std::vector<std::string>());
+  }
+};
+
+const std::string kData = TANGIBLE_SOURCE_DIR "/data/";
+
+TEST_F(NullsTest, ThoseOfShippedScenes) {
+  for (const char* scene : {"bouncing_ball", "chain", "double_pendulum", "driven_slider",
+                            "recording_single_pendulum", "sliding_box"}) {
+    const std::string file = "'" + kData + "scenes/" + scene + ".json'";
+    Check("tangible-simulate", file + " --certify --every=1000", "summary");
+    Check("tangible-gradient", file + " --parameters=gravity/y", "out");
+  }
+}
+
+TEST_F(NullsTest, ThoseOfShippedFitsAndPlans) {
+  Check("tangible-fit", "'" + kData + "fits/chain.json'", "out");
+  for (const char* plan : {"pushed_box_to_mark", "two_link_throw"}) {
+    Check("tangible-control", "'" + kData + "control/" + plan + ".json'", "out");
+  }
+}
+
+// Numbers near the ends of their range, and runs of next to nothing.
+TEST_F(NullsTest, ThoseOfExtremeNumbers) {
+  int file = 0;
+  for (const char* stepping : {"fixed", "event"}) {
+    for (const char* speed : {"0", "1e-200", "1e100", "1e154", "1e200", "1e308"}) {
+      for (const char* duration : {"0", "0.01", "0.5"}) {
+        json scene = json::parse(R"({"gravity": [0, 0], "bodies": [
+            {"name": "b", "shape": {"circle": {"radius": 0.1}}, "mass": 1, "position": [0, 0]}],
+          "forces": [{"name": "f", "body": "b", "force": [0, 0]}],
+          "simulation": {"dt": 0.01}})");
+        scene["bodies"][0]["velocity"] = {json::parse(speed), 0};
+        scene["simulation"]["duration"] = json::parse(duration);
+        scene["simulation"]["stepping"] = stepping;
+        const std::string name = "s" + std::to_string(file++) + ".json";
+        const std::string path = "'" + Write(name, scene.dump()) + "'";
+        Check("tangible-simulate", path + " --certify", "summary");
+        Check("tangible-gradient", path + " --parameters=bodies/b/mass,forces/f/force/x", "out");
+        const json plan = {{"scene", name},
+                           {"horizon", 0.05},
+                           {"controls", {{{"path", "forces/f/force/x"}, {"low", -1}, {"high", 1}}}},
+                           {"cost",
+                            {{{"state", "b/x"}, {"target", 1}, {"at", "end"}},
+                             {{"control", "forces/f/force/x"}, {"weight", 0.1}}}},
+                           {"mpc", {{"duration", 0.05}, {"horizon", 0.03}}}};
+        const std::string problem = "'" + Write("p.json", plan.dump()) + "'";
+        Check("tangible-control", problem, "out");
+        Check("tangible-control", problem + " --mpc", "out");
+        Write("o.csv", "time,body,x,y\n0,b,0.01,0\n");
+        const json fit = {{"scene", name},
+                          {"observations", {{{"file", "o.csv"}, {"sigma", 0.01}}}},
+                          {"parameters", {"bodies/b/position/x"}}};
+        Check("tangible-fit", "'" + Write("f.json", fit.dump()) + "'", "out");
+      }
+    }
+  }
+}
+
+TEST_F(NullsTest, ThoseOfLinearComplementarity) {
+  for (const char* problem :
+       {R"({"F": [[2, 1], [1, 2]], "c": [-5, -6]})", R"({"F": [[0]], "c": [-1]})",
+        R"({"F": [[1e-300]], "c": [-1e200]})", R"({"F": [[1e300]], "c": [1e300]})"}) {
+    Check("tangible-lcp", "'" + Write("l.json", problem) + "'", "out");
+  }
+}
+
+}  // namespace
+}  // namespace tangible
