@@ -77,8 +77,9 @@ class RolloutCertifier {
   void AddStart(const Model<double>& model, const EventRecord& record);
   void ProbeStarts(const Model<double>& model, const State<double>& start,
                    const std::vector<const ActiveContact*>& touching, const Segment* first);
-  /// Whether friction in a joint that is at rest as the run starts, and slides at once, keeps its
-  /// direction: no direction of the parameters changes the rate, or the twists of other bodies that
+  /// Whether friction that is at rest as a segment starts, and slides at once, keeps its direction:
+  /// at an instant after an event, which has decided it; and as the run starts where no direction of
+  /// the parameters changes the rate of the contact or joint, or the twists of other bodies that
   /// joints transmit.
   bool KeepsSide(const Model<double>& model, const ActiveContact& contact,
                  EventDerivative* derivative, Segment* segment) const;

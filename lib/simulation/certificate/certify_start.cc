@@ -128,9 +128,9 @@ std::vector<ActiveContact> ThatMayJam(const Model<double>& model, const State<do
 
 bool RolloutCertifier::KeepsSide(const Model<double>& model, const ActiveContact& contact,
                                  EventDerivative* derivative, Segment* segment) const {
-  if (!segment->starts || !contact.IsJointFriction() || Directions().cols() == 0) {
-    return false;
-  }
+  // At an instant that an event precedes the contact does not move yet: the next motion tells.
+  if (segment->length == 0.0 && !segment->starts) return true;
+  if (!segment->starts || Directions().cols() == 0) return false;
   const RowMatrixXd after = derivative->AlongSegment(model, segment, Directions());
   LocalJacobianScratch scratch;
   std::vector<JacobianEntry> slip;

@@ -184,6 +184,13 @@ void EventSearch::SearchClosed(const Model<double>& model, Event* event) {
           *event = trial;
           return;
         }
+        // At the end of the motion the function has reached 0 to rounding: the event is there. The
+        // next motion could not find it, because its function would start at 0.
+        if (share == 1.0 && fb <= tolerance && event->kind != trial.kind) {
+          trial.length = b;
+          *event = trial;
+          return;
+        }
         a = b;
         fa = std::max(fb, 0.0);
       }
