@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import _core
+from ._certificate import Certificate
 from ._scene import Scene, SceneLike
 
 if TYPE_CHECKING:

@@ -12,8 +12,8 @@
 namespace tangible {
 namespace {
 
-// Whether the contact closes without an impact: it does not approach, apart from rounding of a speed
-// of which the normal part is 0.
+// Whether the contact closes without an impact: it does not approach, apart from rounding of a
+// speed of which the normal part is 0.
 bool ClosesGently(const Model<double>& model, const StepRecord& record, size_t i) {
   const Approach approach = ApproachOf(*model.structure, record, i);
   return record.contacts[i].law != ContactLaw::kRestitution &&

@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// Where the derivative of a run by fixed steps is that of the discrete map x_k+1 = F(x_k, p) and not
-// of the motion: where a restitution acts, or a contact or limit is made or broken.
+// Where the derivative of a run by fixed steps is that of the discrete map x_k+1 = F(x_k, p) and
+// not of the motion: where a restitution acts, or a contact or limit is made or broken.
 //
 // The motion has the event at a time t*(p), and the derivative of the positions jumps there by
-// (v⁻ − v⁺) dt*/dp. The discrete map has it at a step, which does not follow p. After an impact with
-// restitution e the two differ by (1 + e) (n·v) dt*/dp, whatever dt: a ball that falls from the
-// height h and bounces with e = 1 has dy/dh = +1 in the map where the motion has −1 at first. After
-// a landing without restitution the next step, which sets the gap to 0, makes up for the jump along
-// the normal, to first order in dt, but not for that of a slip which the landing ends.
+// (v⁻ − v⁺) dt*/dp. The discrete map has it at a step, which does not follow p. After an impact
+// with restitution e the two differ by (1 + e) (n·v) dt*/dp, whatever dt: a ball that falls from
+// the height h and bounces with e = 1 has dy/dh = +1 in the map where the motion has −1 at first.
+// After a landing without restitution the next step, which sets the gap to 0, makes up for the jump
+// along the normal, to first order in dt, but not for that of a slip which the landing ends.
 //
 // A contact that exists from the start, without a gap and without approaching, is not made; where a
 // face and a corner of the same shapes continue one another without an impact nothing is made or

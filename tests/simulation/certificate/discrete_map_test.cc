@@ -149,8 +149,9 @@ std::string Boxes(double offset, const char* velocity) {
       "simulation": {"dt": 0.01, "duration": 0.5}})";
 }
 
-// With this friction a stack that slides does not tip. Rows of boxes at rest are redundant, and of equal boxes the corners of either can be the ends of
-// a face: which row carries nothing, or which corner is taken, is no change of the contact.
+// With this friction a stack that slides does not tip. Rows of boxes at rest are redundant, and of
+// equal boxes the corners of either can be the ends of a face: which row carries nothing, or which
+// corner is taken, is no change of the contact.
 TEST(DiscreteMapTest, StacksAtRestOrSlidingAreNoChange) {
   for (const double offset : {0.0, 0.03}) {
     ExpectNone(Boxes(offset, "[0, 0]"));
