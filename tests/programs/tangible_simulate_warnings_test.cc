@@ -80,6 +80,28 @@ TEST_F(WarningsTest, EnergyThatGrowsByEventsIsOneLine) {
   EXPECT_EQ(Simulate(spring("1e3")).error, "");
 }
 
+// Discs at one place are pushed apart, each by those on top of it: by 3 m/s a disc.
+TEST_F(WarningsTest, OverlapThatThrowsBodiesIsOneLine) {
+  const auto discs = [](int count, double apart) {
+    json scene = {{"simulation", {{"dt", 0.01}, {"duration", 0.1}}}, {"bodies", json::array()}};
+    for (int i = 0; i < count; ++i) {
+      scene["bodies"].push_back({{"name", "d" + std::to_string(i)},
+                                 {"shape", {{"circle", {{"radius", 0.1}}}}},
+                                 {"mass", 1},
+                                 {"position", {apart * i, 1}}});
+    }
+    return scene.dump();
+  };
+  for (const double apart : {0.0, 1e-9}) {
+    ExpectOneLine(Simulate(discs(60, apart)), 0, "as bodies that overlap, by up to 0.2 m");
+    EXPECT_EQ(summary_["warnings"].size(), 1u);
+    EXPECT_GT(EnergyGain(), 1e4);
+  }
+  // Two that overlap come apart at recovery_speed; the others have no reason to.
+  EXPECT_EQ(Simulate(discs(2, 0.1)).error, "");
+  EXPECT_EQ(Simulate(discs(60, 0.21)).error, "");
+}
+
 // The contact point of a slender ellipse runs from one tip to the other within a step; motions are
 // so short that its energy does not grow.
 TEST_F(WarningsTest, ASlenderEllipseKeepsItsEnergy) {

@@ -76,6 +76,25 @@ std::string EnergyWatch::Exploded(const Model<double>& model, const State<double
   return text;
 }
 
+double EnergyWatch::Excess(const Model<double>& model, const State<double>& state) const {
+  if (!watches_) return 0.0;
+  const double energy = KineticEnergy(model, state) + PotentialEnergy(model, state);
+  return std::max(0.0, energy - start_ - allowed_ / kExploded);
+}
+
+std::string EnergyOfOverlap(const Model<double>& model, const State<double>& initial,
+                            const State<double>& final, double depth) {
+  if (model.structure->settings.stepping == Stepping::kEvent || !(depth > 0.0)) return "";
+  const EnergyWatch watch(model, initial);
+  if (!(watch.Excess(model, final) > 0.0)) return "";
+  char text[320];
+  std::snprintf(text, sizeof text,
+                "the energy grew from %.4g J to %.4g J as bodies that overlap, by up to %.3g m, "
+                "were pushed apart: expected a start at which no bodies overlap",
+                watch.start(), KineticEnergy(model, final) + PotentialEnergy(model, final), depth);
+  return text;
+}
+
 std::string EnergyGrown(const Model<double>& model, const State<double>& initial,
                         const State<double>& final, double by_impacts, double depth) {
   const SimulationSettings& settings = model.structure->settings;

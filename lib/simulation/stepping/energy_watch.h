@@ -22,12 +22,21 @@ class EnergyWatch {
   /// scene: dt is too large". Always empty where something drives the scene (forces, efforts,
   /// kinematic bodies), or where the energy at the start is not finite.
   std::string Exploded(const Model<double>& model, const State<double>& state) const;
+  /// J, by which the energy is above all that the scene had to give; 0 where nothing is examined.
+  double Excess(const Model<double>& model, const State<double>& state) const;
+  double start() const { return start_; }  ///< J
 
  private:
   bool watches_ = false;
   double start_ = 0.0;    ///< J
   double allowed_ = 0.0;  ///< J
 };
+
+/// Empty, or a line that fixed steps have pushed overlapping bodies apart with more energy than the
+/// scene had to give: its own, and that of each body at `recovery_speed`. Bodies of a stack take
+/// over the speeds of those before them. `depth`: m, the largest penetration.
+std::string EnergyOfOverlap(const Model<double>& model, const State<double>& initial,
+                            const State<double>& final, double depth);
 
 /// Empty, or a line that the energy of a run by events has grown, though nothing drives the scene:
 /// a step that is too long for the motion. Empty for semi-implicit Euler steps, whose energy

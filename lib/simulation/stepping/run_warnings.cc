@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <utility>
 
+#include "tangible/simulation/stepping/energy_watch.h"
 #include "tangible/simulation/stepping/invariants.h"
 
 namespace tangible {
@@ -39,6 +40,7 @@ std::vector<std::string> RunWarnings::Finish(const Model<double>& model,
   std::vector<std::string> lines;
   std::string energy = FirstOrderByEvents(model, initial_, final);
   if (energy.empty()) energy = report.energy_grown;
+  if (energy.empty()) energy = EnergyOfOverlap(model, initial_, final, report.penetration_max);
   for (std::string line :
        {coordinates_.Message(model), joints_.Message(model), std::move(energy)}) {
     if (!line.empty()) lines.push_back(std::move(line));
