@@ -13,8 +13,8 @@ namespace tangible {
 /// Larger files are refused: 1 GiB.
 inline constexpr std::size_t kMaxFileSize = std::size_t{1} << 30;
 
-/// Longer messages are cut in the middle.
-inline constexpr std::size_t kMaxMessage = 8192;
+/// Longer messages are cut in the middle: the beginning says where and what, the end what was got.
+inline constexpr std::size_t kMaxMessage = 1000;
 
 /// Reads a whole file; false and "file: cannot be read: why" if that fails. All inputs of all
 /// programs are read here. Only regular files of at most kMaxFileSize are read: a pipe, a device, a
