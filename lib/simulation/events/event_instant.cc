@@ -6,6 +6,7 @@
 //   a touch at the start of a step   the search of the step before ended on it. Its time still
 //                                    depends on the state: it is an event (kTouch) like others
 //   an event at the end of a step    the next segment starts at a given time, not at the event
+//   a window's edge at a step's start   the motion up to it has the forces from before (event_edges.h)
 //   the start of a run               a change of the initial twist that breaks a rolling contact or
 //                                    a joint acts as the impulse that restores it, at once and not
 //                                    after the first segment; one that lifts a contact or makes it
@@ -14,6 +15,9 @@
 // time. Settle ends that.
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <string>
+#include <utility>
 
 #include "tangible/lcp/system/contact_residual.h"
 #include "tangible/simulation/events/event_step.h"
@@ -78,6 +82,8 @@ bool EventStepper::AddInstant(const Model<double>& model, double t, EventKind ki
   segment.before = *state;
   segment.event_number = -1;
   segment.at_once = false;
+  segment.first_edge = -1;
+  segment.further_edges.clear();
   if (!ChooseModes(model, *state, outcome, &segment)) {
     record_.num_parts = parts;
     outcome->message.clear();
@@ -93,6 +99,38 @@ bool EventStepper::AddInstant(const Model<double>& model, double t, EventKind ki
   }
   *state = segment.after;
   return true;
+}
+
+void EventStepper::AddEdgesAtStart(const Model<double>& model, double t, const State<double>& state,
+                                   EventOutcome* outcome) {
+  EdgeGroup edges = EdgesAt(model, t);
+  if (!edges.any) return;
+  const EventGuess guess = guess_;
+  const int parts = record_.num_parts;
+  Segment& segment = BeginSegment(t, t, state);
+  segment.middle =
+      std::nextafter(std::min(edges.time, t) - kShortestPart * model.structure->settings.dt,
+                     -std::numeric_limits<double>::max());
+  FindTouching(model, state);
+  // The motion up to here did not have contacts that only now approach.
+  const double slow = SlowSpeed(model, state);
+  for (double& approach : touching_.approach) {
+    if (approach < -slow) approach = HUGE_VAL;
+  }
+  std::string message;
+  const bool good = ChooseModes(model, state, outcome, &segment) &&
+                    flow_.RunUncorrected(model, &segment, &message);
+  outcome->message.clear();
+  guess_ = guess;
+  if (!good) {
+    // No conclusion without accelerations.
+    record_.num_parts = parts;
+    return;
+  }
+  segment.event = EventKind::kEdge;
+  segment.event_number = edges.window.number;
+  segment.event_index = -1;
+  passed_ = std::move(edges);
 }
 
 bool EventStepper::Rattles(const Model<double>& model, const ActiveContact& contact) const {

@@ -27,7 +27,8 @@ size_t BytesOf(const Segment& segment) {
   return BytesOf(segment.before) + BytesOf(segment.after) +
          sizeof(ActiveContact) * segment.contacts.capacity() +
          sizeof(CoefficientSource) * segment.friction.capacity() +
-         sizeof(ContactMode) * segment.modes.capacity() + BytesOf(segment.stages) +
+         sizeof(ContactMode) * segment.modes.capacity() +
+         sizeof(WindowEdge) * segment.further_edges.capacity() + BytesOf(segment.stages) +
          BytesOf(segment.corrections) + BytesOf(segment.projection) + BytesOf(segment.end);
 }
 

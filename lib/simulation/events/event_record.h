@@ -65,6 +65,13 @@ const char* NameOf(EventKind event);
 /// Whether an event's time is found from an equation (and not given).
 bool IsLocated(EventKind kind);
 
+/// An end of a force's window: the parameter that is its time, −1: none.
+struct WindowEdge {
+  int number = -1;
+  int force = -1;
+  double side = 0.0;  ///< −1: the window opens there, 1: it closes
+};
+
 /// Smooth motion over [time, time + length] with modes held, then the event that ended it.
 struct Segment {
   double time = 0.0;
@@ -72,6 +79,10 @@ struct Segment {
   /// At the start of a run: contacts that the initial twists approach act with friction.
   bool starts = false;
   double middle = 0.0;  ///< the time at which forces and pieces of signals are chosen
+  /// Where it starts at edges of several windows: the parameter whose edge ended the segment
+  /// before, and the other edges (event_edges.h).
+  int first_edge = -1;
+  std::vector<WindowEdge> further_edges;
   State<double> before, after;
   std::vector<ActiveContact> contacts;  ///< those closed; law kRecovery: pushed out of penetration
   std::vector<CoefficientSource> friction;

@@ -8,6 +8,7 @@
 
 #include "tangible/math/scalar.h"
 #include "tangible/simulation/events/event_search_inl.h"
+#include "tangible/simulation/events/load_speed.h"
 #include "tangible/simulation/events/tolerances.h"
 
 namespace tangible {
@@ -22,6 +23,25 @@ double SpeedOf(const double* twist, double radius) {
   return std::hypot(twist[0], twist[1]) + std::abs(twist[2]) * radius;
 }
 
+// What turns the acceleration of a contact's points (m/s²) into its force, kg, or into the torque of
+// friction in a joint that turns, kg m. A force that changes a speed within a step only by rounding
+// counts as 0: where no force acts (no gravity, bodies that coast side by side) all computed forces
+// are rounding.
+double Inert(const Model<double>& model, const Lengths& lengths, const ActiveContact& contact) {
+  const bool turns = contact.IsJointFriction() &&
+                     model.structure->joints[contact.joint].type != JointType::kPrismatic;
+  double inert = 0.0;
+  for (const int body : {contact.a, contact.b}) {
+    const BodyIndex& index = model.structure->bodies[body];
+    if (index.block < 0) continue;
+    const double size = lengths.size(body);
+    inert = std::max(inert, !turns       ? model.parameters[index.mass]
+                            : size > 0.0 ? model.parameters[index.inertia] / size
+                                         : 0.0);
+  }
+  return inert;
+}
+
 }  // namespace
 
 EventSearch::EventSearch(const Model<double>& model) : lengths_(model), flow_(model) {
@@ -34,6 +54,13 @@ void EventSearch::Retarget(const Model<double>& model) {
   num_samples_ = 0;
   closing_.resize(model.structure->bodies.size());
   boxes_.resize(model.structure->bodies.size());
+}
+
+void EventSearch::StartStep(const Model<double>& model, double t, double h,
+                            const State<double>& state) {
+  evaluations_ = 0;
+  AllowEventsOf(1);
+  load_speed_ = LoadSpeed(model, lengths_, t, h, state);
 }
 
 double EventSearch::SpeedTolerance(const Model<double>& model, const State<double>& state) const {
@@ -51,7 +78,7 @@ double EventSearch::SpeedTolerance(const Model<double>& model, const State<doubl
       rounding = std::max(rounding, turned * own);
     }
   }
-  return kSlowShare * speed + rounding + kLeastSpeed;
+  return std::max(kSlowShare * speed, kLoadShare * load_speed_) + rounding + kLeastSpeed;
 }
 
 void EventSearch::FindContacts(const Model<double>& model, const State<double>& state, double reach,
@@ -214,16 +241,9 @@ void EventSearch::SearchClosed(const Model<double>& model, Event* event) {
         scale = std::max(scale, std::abs(start.normal_impulse[k]));
       }
     }
-    // A force that changes a speed within a step only by rounding counts as 0: where no force acts
-    // (no gravity, bodies that coast side by side) all computed forces are rounding.
-    double mass = 0.0;
-    for (const int body : {segment_->contacts[i].a, segment_->contacts[i].b}) {
-      if (model.structure->bodies[body].block >= 0) {
-        mass = std::max(mass, model.parameters[model.structure->bodies[body].mass]);
-      }
-    }
     const double tolerance =
-        std::max(kForceTolerance * scale, mass * slow_ / model.structure->settings.dt);
+        std::max(kForceTolerance * scale, Inert(model, lengths_, segment_->contacts[i]) * slow_ /
+                                              model.structure->settings.dt);
     if (!segment_->contacts[i].IsJointFriction()) {
       trial.kind = EventKind::kLiftOff;
       try_function(start.normal_impulse[i], tolerance);

@@ -36,11 +36,9 @@ class EventSearch {
   /// Continues with another model.
   void Retarget(const Model<double>& model);
 
-  /// Starts the searches of one step, whose evaluations of the motion are bounded in number.
-  void StartStep() {
-    evaluations_ = 0;
-    AllowEventsOf(1);
-  }
+  /// Starts the searches of the step [t, t + h], whose evaluations of the motion are bounded in
+  /// number.
+  void StartStep(const Model<double>& model, double t, double h, const State<double>& state);
   /// The bound is a multiple of max_events_per_step for each of this many pairs.
   void AllowEventsOf(int num_pairs) { num_pairs_with_events_ = std::max(1, num_pairs); }
   /// Shortens the segment to its first event, sets the kind of the event, and runs the segment up
@@ -59,6 +57,8 @@ class EventSearch {
   }
   /// Speed below which a touching contact neither approaches nor slides, m/s.
   double SpeedTolerance(const Model<double>& model, const State<double>& state) const;
+  /// What loads other than gravity accelerate bodies to in a time step, m/s (load_speed.h).
+  double load_speed() const { return load_speed_; }
   /// All contacts of a pair within `reach`; gap set.
   void FindContacts(const Model<double>& model, const State<double>& state, double reach,
                     std::vector<ActiveContact>* contacts);
@@ -119,6 +119,7 @@ class EventSearch {
   SegmentFlow flow_;
   Segment* segment_ = nullptr;
   const std::vector<ActiveContact>* touching_ = nullptr;
+  double load_speed_ = 0.0;      ///< by loads in a time step (load_speed.h), m/s
   double slow_ = 0.0;            ///< the speed tolerance as the segment starts, m/s
   std::vector<double> closing_;  ///< bound on the speed of each body's points over the segment
   std::vector<Sample> samples_;

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "tangible/simulation/events/ellipse_motion.h"
+#include "tangible/simulation/events/load_speed.h"
 #include "tangible/simulation/events/tolerances.h"
 
 namespace tangible {
@@ -14,6 +15,9 @@ namespace {
 // The shift of a sliding contact's tangential acceleration that keeps its direction of sliding, as
 // a multiple of the accelerations that the acting forces cause.
 constexpr double kForcedSlip = 1e4;
+// How often it is made that many times larger where a light body between heavy ones is accelerated
+// more by the friction of its contacts.
+constexpr int kMostForced = 3;
 // How often a motion is halved that cannot be integrated over the rest of a step.
 constexpr int kMostHalvings = 14;
 // How many such shortened motions a step may have. Those of a stiff body would not end.
@@ -43,52 +47,14 @@ void SizeGuess(const ContactProblem<double>& problem, ContactSolution<double>* g
   guess->joint_impulse.assign(3 * problem.joints.size(), 0.0);
 }
 
-// Times within (from, to) at which a force's window opens or closes or a signal has a corner.
-struct Edge {
-  double time;
-  int number;
-};
-std::vector<Edge> EdgesWithin(const Model<double>& model, double from, double to) {
-  std::vector<Edge> edges;
-  const double near = kShortestPart * (to - from);
-  const auto add = [&](double time, int number) {
-    if (time > from + near && time < to - near) {
-      edges.push_back({time, number});
-    }
-  };
-  const ModelStructure& structure = *model.structure;
-  const auto add_signal = [&](int index) {
-    if (index >= 0) {
-      for (const double time : structure.signals[index].time) {
-        add(time, -1);
-      }
-    }
-  };
-  for (const ForceIndex& force : structure.forces) {
-    for (const int number : {force.start, force.end}) {
-      if (number >= 0) {
-        add(model.parameters[number], number);
-      }
-    }
-    add_signal(force.force_signal);
-    add_signal(force.torque_signal);
-  }
-  for (const JointIndex& joint : structure.joints) {
-    add_signal(joint.effort_signal);
-  }
-  std::stable_sort(edges.begin(), edges.end(),
-                   [](const Edge& x, const Edge& y) { return x.time < y.time; });
-  return edges;
-}
-
 // Sets the event of a segment that ended at a given time: a fraction of the rest of the step, which
 // is an instant like a signal's corner; an edge; or else the end of the step. Returns how many
 // events that is.
-int EndAtGivenTime(bool is_shortened, const Edge* edge, Segment* segment) {
-  if (!is_shortened && edge == nullptr) return 0;
+int EndAtGivenTime(bool is_shortened, const EdgeGroup& edges, Segment* segment) {
+  if (!is_shortened && !edges.any) return 0;
   segment->event = EventKind::kEdge;
   if (is_shortened) return 0;
-  segment->event_number = edge->number;
+  segment->event_number = edges.window.number;
   return 1;
 }
 
@@ -120,6 +86,18 @@ void KeepClosed(const std::vector<ContactMode>& modes, double recovered, double 
       }
     }
   }
+}
+
+// Whether all contacts that slide have modes in which friction opposes that, or open.
+bool OpposesSlips(const ContactProblem<double>& problem, const std::vector<ContactMode>& modes,
+                  const std::vector<double>& slip, double slow) {
+  for (size_t i = 0; i < modes.size(); ++i) {
+    if (problem.contacts[i].has_friction && std::abs(slip[i]) > slow &&
+        modes[i] != ContactMode::kOpen && !(SlidingSign(modes[i]) * slip[i] > 0.0)) {
+      return false;
+    }
+  }
+  return true;
 }
 
 // Number of events after which a step is given up.
@@ -390,6 +368,8 @@ void EventStepper::GuessModes(const std::vector<ActiveContact>& contacts,
   for (const ContactBlock<double>& contact : problem->contacts) {
     scale = std::max({scale, std::abs(contact.c_n), std::abs(contact.c_t)});
   }
+  // The friction of a joint accelerates bodies by itself.
+  scale = std::max(scale, LimitAcceleration(*problem));
   SizeGuess(*problem, solution);
   for (size_t i = 0; i < problem->contacts.size(); ++i) {
     ContactBlock<double>& contact = problem->contacts[i];
@@ -467,8 +447,24 @@ bool EventStepper::ChooseModes(const Model<double>& model, const State<double>& 
                        segment->friction, &assembly_, &problem);
   ContactSolution<double> solution;
   GuessModes(segment->contacts, slip, slow, &problem, &solution);
-  const ContactSolverReport solved = solver_.Solve(problem, SolverOptionsOf(settings), &solution);
+  ContactSolverReport solved = solver_.Solve(problem, SolverOptionsOf(settings), &solution);
   CountSolve(solved, outcome);
+  double forced = 1.0;
+  for (int k = 0;
+       k < kMostForced && solved.solved && !OpposesSlips(problem, solution.modes, slip, slow);
+       ++k) {
+    forced *= kForcedSlip;
+    AssembleAcceleration(model, state, segment->time, segment->middle, segment->contacts,
+                         segment->friction, &assembly_, &problem);
+    ContactProblem<double> own = problem;
+    GuessModes(segment->contacts, slip, slow, &problem, &solution);
+    for (size_t i = 0; i < problem.contacts.size(); ++i) {
+      const double c_t = own.contacts[i].c_t;
+      problem.contacts[i].c_t = c_t + forced * (problem.contacts[i].c_t - c_t);
+    }
+    solved = solver_.Solve(problem, SolverOptionsOf(settings), &solution);
+    CountSolve(solved, outcome);
+  }
   if (!solved.solved) {
     outcome->message = "accelerations";
     if (solved.worst_contact >= 0) {
@@ -592,6 +588,8 @@ Segment& EventStepper::BeginSegment(double now, double until, const State<double
   segment.before = state;
   segment.event_number = -1;
   segment.at_once = false;
+  segment.first_edge = passed_.window.number;
+  segment.further_edges = passed_.further;
   return segment;
 }
 
@@ -617,7 +615,9 @@ EventOutcome EventStepper::Advance(const Model<double>& model, double t, double 
   guess_.located = 0;
   counts_.Clear();
   shortened_.Clear();
-  search_.StartStep();
+  search_.StartStep(model, t, h, *state);
+  passed_ = EdgeGroup();
+  if (!guess_.starts) AddEdgesAtStart(model, t, *state, &outcome);
   const std::vector<Edge> edges = EdgesWithin(model, t, t + h);
   const double end = t + h;
   double now = t;
@@ -636,10 +636,8 @@ EventOutcome EventStepper::Advance(const Model<double>& model, double t, double 
       return fail(outcome.message);
     }
     if (at_end) break;
-    const auto edge = std::find_if(edges.begin(), edges.end(),
-                                   [&](const Edge& e) { return e.time > now + kTimeRounding * h; });
-    const bool to_edge = edge != edges.end();
-    const double goal = to_edge ? edge->time : end;
+    const EdgeGroup next = NextEdges(edges, now, kTimeRounding * h);
+    const double goal = next.any ? next.time : end;
     const double until = now + std::ldexp(goal - now, -halvings);
     const int parts = record_.num_parts;
     Segment& segment = BeginSegment(now, until, *state);
@@ -675,11 +673,13 @@ EventOutcome EventStepper::Advance(const Model<double>& model, double t, double 
     outcome.stopped = at_event == AtEvent::kStopAtSecond && guess_.located > 1;
     if (outcome.stopped) break;
     *state = segment.after;
+    passed_ = EdgeGroup();
     at_given_time = segment.event == EventKind::kStepEnd;
     halvings = 0;
     if (at_given_time) {
       now = segment.length < until - now ? now + segment.length : until;
-      outcome.events += EndAtGivenTime(now < goal, to_edge ? &*edge : nullptr, &segment);
+      outcome.events += EndAtGivenTime(now < goal, next, &segment);
+      if (!(now < goal)) passed_ = next;
       continue;
     }
     now += segment.length;

@@ -24,6 +24,7 @@
 #include "tangible/lcp/contact/contact_solver.h"
 #include "tangible/simulation/events/coupled_bodies.h"
 #include "tangible/simulation/events/event_counts.h"
+#include "tangible/simulation/events/event_edges.h"
 #include "tangible/simulation/events/event_search.h"
 
 namespace tangible {
@@ -177,6 +178,9 @@ class EventStepper {
                          EventOutcome* outcome, Segment* segment);
   bool AddInstant(const Model<double>& model, double t, EventKind kind,
                   const ActiveContact* contact, State<double>* state, EventOutcome* outcome);
+  /// The segment of zero length for edges of windows on the step's start.
+  void AddEdgesAtStart(const Model<double>& model, double t, const State<double>& state,
+                       EventOutcome* outcome);
   /// Whether a pair has had so many events in this step that its slow impacts count as a rattle (an
   /// infinite sequence of ever smaller impacts).
   bool Rattles(const Model<double>& model, const ActiveContact& contact) const;
@@ -212,6 +216,7 @@ class EventStepper {
   EventCounts counts_;     ///< of this step
   EventCounts shortened_;  ///< motions shortened at ellipses in this step
   CoupledBodies coupled_;  ///< at this instant
+  EdgeGroup passed_;       ///< edges at which the next segment starts
   std::vector<double>
       struck_;  ///< for each body: approach before its last impact at this instant; 0: none
   std::vector<EndingSlip> ending_;  ///< contacts that slide until a separate event

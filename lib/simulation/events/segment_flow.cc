@@ -6,6 +6,7 @@
 #include <cstdio>
 
 #include "tangible/lcp/system/contact_residual.h"
+#include "tangible/simulation/events/load_speed.h"
 #include "tangible/simulation/events/tolerances.h"
 
 namespace tangible {
@@ -459,9 +460,12 @@ bool SegmentFlow::ProjectTwists(const Model<double>& model, Segment* segment,
     fastest = std::max({fastest, std::abs(v[3 * block]), std::abs(v[3 * block + 1]),
                         std::abs(v[3 * block + 2]) * lever(block)});
   }
+  // Where friction in joints has stopped all bodies, and no force acts, speeds are rounding.
+  const double rest = kLoadShare * segment->length *
+                      LimitAcceleration(segment->stages[segment->num_stages - 1].problem);
   for (size_t k = 0; k < terms_.size(); ++k) {
     const double speed = k % 3 == 2 ? fastest / lever(k / 3) : fastest;
-    terms_[k] = segment->length * terms_[k] + std::abs(v[k]) + kSpeedOfTerms * speed;
+    terms_[k] = segment->length * terms_[k] + std::abs(v[k]) + kSpeedOfTerms * speed + rest;
   }
   const int joint =
       segment->length > 0.0
@@ -489,6 +493,13 @@ bool SegmentFlow::Project(const Model<double>& model, Impulses* impulses) {
   std::swap(node.system, projection.system);
   projection.solution = std::move(node.solution);
   return solved;
+}
+
+bool SegmentFlow::RunUncorrected(const Model<double>& model, Segment* segment,
+                                 std::string* message) {
+  segment->num_corrections = 0;
+  segment->projects_twists = false;
+  return Integrate(model, segment, message);
 }
 
 bool SegmentFlow::Run(const Model<double>& model, Segment* segment, std::string* message) {

@@ -93,6 +93,9 @@ class SegmentFlow {
   /// before, contacts, friction and modes are set. False with a message where it fails.
   bool Run(const Model<double>& model, Segment* segment, std::string* message);
 
+  /// The same without corrections, for a segment of zero length: `after` is `before`.
+  bool RunUncorrected(const Model<double>& model, Segment* segment, std::string* message);
+
   /// The accelerations at a state of the segment, with its modes.
   bool Accelerate(const Model<double>& model, const Segment& segment, const State<double>& state,
                   double time, SolvedNode* node);

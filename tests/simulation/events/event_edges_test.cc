@@ -1,0 +1,164 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Derivatives with respect to the edges of forces' windows that fall on the boundary of two steps,
+// or on each other, against closed forms: T is the end of a run, F the force, m = 1 kg.
+#include "tangible/simulation/events/event_edges.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdio>
+#include <string>
+#include <vector>
+
+#include "../../support/gradients.h"
+#include "../../support/scenes.h"
+
+namespace tangible {
+namespace {
+
+using test_scenes::SceneOf;
+using testing::ExpectOthersAgree;
+using testing::Jacobian;
+
+constexpr double kEnd = 1.0;
+// Row 0 is x and row 3 its speed.
+constexpr int kX = 0, kSpeed = 3;
+
+std::string Text(double x) {
+  char text[32];
+  std::snprintf(text, sizeof(text), "%.17g", x);
+  return text;
+}
+
+struct Window {
+  double force, start, end;  ///< N, s, s; not given where they are no numbers
+};
+
+Scene Pushed(const std::vector<Window>& windows, double dt, double friction = 0.0,
+             const std::string& more = R"("stepping": "event")", double speed = 0.0) {
+  std::string forces;
+  for (size_t i = 0; i < windows.size(); ++i) {
+    const Window& window = windows[i];
+    forces += (i > 0 ? ", " : "") + std::string(R"({"name": "f)") + std::to_string(i) +
+              R"(", "body": "box", "force": [)" + Text(window.force) + ", 0]" +
+              (std::isnan(window.start) ? "" : R"(, "start": )" + Text(window.start)) +
+              (std::isnan(window.end) ? "" : R"(, "end": )" + Text(window.end)) + "}";
+  }
+  return SceneOf(R"({"gravity": [0, -10], "bodies": [
+      {"name": "box", "shape": {"box": {"size": [0.5, 0.25]}}, "mass": 1, "position": [0, 0.125],
+       "velocity": [)" +
+                 Text(speed) + R"(, 0], "friction": )" + Text(friction) + R"(},
+      {"name": "floor", "static": true, "friction": )" +
+                 Text(friction) + R"(, "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}}],
+      "forces": [)" +
+                 forces + R"(], "simulation": {"duration": 1, "dt": )" + Text(dt) + ", " + more +
+                 "}}");
+}
+
+// The derivatives of the place and the speed with respect to an edge at s where the force and what
+// it changes accelerate by `jump` more after it.
+void ExpectEdge(const GradientResult& result, int column, double jump, double s) {
+  EXPECT_NEAR(result.jacobian(kX, column), -jump * (kEnd - s), 1e-9) << s;
+  EXPECT_NEAR(result.jacobian(kSpeed, column), -jump, 1e-9) << s;
+}
+
+// Values of dt that divide the edges, in decimals and binary, and one that does not.
+struct Boundary {
+  double start, end, dt;
+};
+const Boundary kBoundaries[] = {{0.5, 0.75, 0.01},  {0.5, 0.75, 0.25},    {0.43, 0.71, 0.01},
+                                {0.3, 0.9, 0.1},    {0.125, 0.5, 0.0625}, {0.07, 0.14, 0.07},
+                                {0.01, 0.99, 0.01}, {0.503, 0.7501, 0.01}};
+
+TEST(EventEdgesTest, AWindowOnTheBoundariesOfSteps) {
+  for (const char* integrator : {"runge_kutta_4", "trapezoidal"}) {
+    for (const Boundary& b : kBoundaries) {
+      const Scene scene =
+          Pushed({{4.0, b.start, b.end}}, b.dt, 0.0,
+                 std::string(R"("stepping": "event", "integrator": ")") + integrator + '"');
+      const std::vector<std::string> paths = {"forces/f0/start", "forces/f0/end"};
+      const GradientResult result = Jacobian(scene, paths, GradientMethod::kAdjoint);
+      ExpectEdge(result, 0, 4.0, b.start);
+      ExpectEdge(result, 1, -4.0, b.end);
+      ExpectOthersAgree(scene, paths, result);
+    }
+  }
+}
+
+TEST(EventEdgesTest, AWindowThatOpensWhileTheBoxSlides) {
+  for (const Boundary& b : kBoundaries) {
+    const Scene scene = Pushed({{4.0, b.start, b.end}}, b.dt, 0.25, R"("stepping": "event")", 6.0);
+    const std::vector<std::string> paths = {"forces/f0/start", "forces/f0/end"};
+    const GradientResult result = Jacobian(scene, paths, GradientMethod::kAdjoint);
+    ExpectEdge(result, 0, 4.0, b.start);
+    ExpectEdge(result, 1, -4.0, b.end);
+    ExpectOthersAgree(scene, paths, result);
+  }
+}
+
+// Friction holds the box before the edge and acts against the force after it.
+TEST(EventEdgesTest, AWindowThatMovesABoxFromRest) {
+  for (const Boundary& b : kBoundaries) {
+    const Scene scene = Pushed({{4.0, b.start, NAN}}, b.dt, 0.25);
+    const GradientResult result = Jacobian(scene, {"forces/f0/start"}, GradientMethod::kAdjoint);
+    ExpectEdge(result, 0, 4.0 - 2.5, b.start);
+    ExpectOthersAgree(scene, {"forces/f0/start"}, result);
+  }
+}
+
+TEST(EventEdgesTest, WindowsThatFollowEachOther) {
+  for (const Boundary& b : kBoundaries) {
+    const Scene scene =
+        Pushed({{4.0, NAN, b.start}, {-3.0, b.start, b.end}, {2.0, b.end, NAN}}, b.dt);
+    const std::vector<std::string> paths = {"forces/f0/end", "forces/f1/start", "forces/f1/end",
+                                            "forces/f2/start"};
+    const GradientResult result = Jacobian(scene, paths, GradientMethod::kAdjoint);
+    ExpectEdge(result, 0, -4.0, b.start);
+    ExpectEdge(result, 1, -3.0, b.start);
+    ExpectEdge(result, 2, 3.0, b.end);
+    ExpectEdge(result, 3, 2.0, b.end);
+    ExpectOthersAgree(scene, paths, result);
+  }
+}
+
+TEST(EventEdgesTest, BeforeAStartTheWindowDoesNotAct) {
+  const Scene scene = Pushed({{4.0, -0.25, 0.5}}, 0.01);
+  const std::vector<std::string> paths = {"forces/f0/start", "forces/f0/end"};
+  const GradientResult result = Jacobian(scene, paths, GradientMethod::kAdjoint);
+  ExpectEdge(result, 0, 0.0, 0.0);
+  ExpectEdge(result, 1, -4.0, 0.5);
+  ExpectOthersAgree(scene, paths, result);
+}
+
+// A fixed step's map has the mean of both sides, which differ by dt / 2 in the place.
+TEST(EventEdgesTest, FixedStepsHaveTheMeanOfBothSides) {
+  for (const Boundary& b : kBoundaries) {
+    const Scene scene = Pushed({{4.0, b.start, b.end}}, b.dt, 0.0, R"("stepping": "fixed")");
+    const std::vector<std::string> paths = {"forces/f0/start", "forces/f0/end"};
+    const GradientResult result = Jacobian(scene, paths, GradientMethod::kAdjoint);
+    EXPECT_NEAR(result.jacobian(kSpeed, 0), -4.0, 1e-9);
+    EXPECT_NEAR(result.jacobian(kSpeed, 1), 4.0, 1e-9);
+    EXPECT_NEAR(result.jacobian(kX, 0), -4.0 * (kEnd - b.start), 4.0 * b.dt);
+    EXPECT_NEAR(result.jacobian(kX, 1), 4.0 * (kEnd - b.end), 4.0 * b.dt);
+    ExpectOthersAgree(scene, paths, result);
+  }
+}
+
+TEST(EventEdgesTest, EdgesAtOneInstantAreOneGroup) {
+  const std::vector<Edge> edges = {{0.25, {3, 0, -1.0}},
+                                   {0.5, {}},
+                                   {0.5, {4, 0, 1.0}},
+                                   {0.5 + 1e-17, {5, 1, -1.0}},
+                                   {0.75, {6, 1, 1.0}}};
+  const EdgeGroup group = NextEdges(edges, 0.25, 1e-16);
+  EXPECT_TRUE(group.any);
+  EXPECT_EQ(group.time, 0.5);
+  EXPECT_EQ(group.window.number, 4);
+  ASSERT_EQ(group.further.size(), 1u);
+  EXPECT_EQ(group.further[0].number, 5);
+  EXPECT_FALSE(NextEdges(edges, 0.75, 1e-16).any);
+}
+
+}  // namespace
+}  // namespace tangible
