@@ -302,12 +302,20 @@ void RolloutCertifier::AddForceWindows(const Model<double>& model) {
         return;
       }
       const double time = model.parameters[number];
+      const std::string which =
+          std::string(edge) + " of force " + force.name + " at " + Short(time);
+      // Before the start of a run, and after its end, there is no motion that the edge changes.
+      if (same(time, 0.0) || same(time, settings.duration)) {
+        OneSided(which +
+                 (same(time, 0.0) ? " s is the start of the run" : " s is the end of the run"));
+        return;
+      }
+      // By events both sides agree; the places that fixed steps reach differ by a step's length.
       const double k =
           std::clamp(std::round(time / settings.dt), 0.0, static_cast<double>(NumSteps(settings)));
-      const double boundary = StepTime(settings, static_cast<long>(k));
-      if (same(time, boundary) || same(time, settings.duration)) {
-        OneSided(std::string(edge) + " of force " + force.name + " at " + Short(time) +
-                 " s is on a step's boundary");
+      if (settings.stepping == Stepping::kFixed &&
+          same(time, StepTime(settings, static_cast<long>(k)))) {
+        OneSided(which + " s is on a step's boundary");
       }
     };
     check(force.start, "start");

@@ -14,7 +14,8 @@
 //   energy         that has grown by events though nothing drives the scene: motions were too long
 //                  for the integrator; counts as a jump (energy_watch.h)
 //   one-sided      friction exactly 0, equal coefficients in the mixing rule, an edge of a force's
-//                  window on a step's boundary: only where derivatives with respect to these
+//                  window at the start or the end of the run, or with fixed stepping on any step's
+//                  boundary: only where derivatives with respect to these
 //                  numbers are wanted; and with event stepping a contact that touches as the run
 //                  starts, where a direction opens or closes its gap: on one side the body falls
 //                  and lands, on the other it is pushed out

@@ -103,6 +103,8 @@ bool EventStepper::AddInstant(const Model<double>& model, double t, EventKind ki
 
 void EventStepper::AddEdgesAtStart(const Model<double>& model, double t, const State<double>& state,
                                    EventOutcome* outcome) {
+  passed_ = EdgeGroup();
+  if (guess_.starts) return;  // there is no motion before
   EdgeGroup edges = EdgesAt(model, t);
   if (!edges.any) return;
   const EventGuess guess = guess_;

@@ -616,8 +616,7 @@ EventOutcome EventStepper::Advance(const Model<double>& model, double t, double 
   counts_.Clear();
   shortened_.Clear();
   search_.StartStep(model, t, h, *state);
-  passed_ = EdgeGroup();
-  if (!guess_.starts) AddEdgesAtStart(model, t, *state, &outcome);
+  AddEdgesAtStart(model, t, *state, &outcome);
   const std::vector<Edge> edges = EdgesWithin(model, t, t + h);
   const double end = t + h;
   double now = t;

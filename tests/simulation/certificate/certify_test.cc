@@ -237,6 +237,26 @@ TEST(CertifyRollout, EdgesOfForceWindowsOnStepsCountOnlyWhereTheyAreWanted) {
   EXPECT_TRUE(StartsWith(verdict, "one-sided: start of force push at 0.03 s")) << verdict;
 }
 
+// By events both sides of a boundary of two steps agree; at the run's ends there is only one.
+TEST(CertifyRollout, ByEventsAnEdgeIsAKinkAtTheRunsEnds) {
+  const auto verdict = [](const std::string& window, const std::string& wanted) {
+    return Certify(R"({"bodies": [{"name": "a", "mass": 1, "inertia": 1, "position": [0, 0]}],
+        "forces": [{"name": "f", "body": "a", "force": [1, 0], )" +
+                       window + R"(}], "simulation": {"dt": 0.01, "duration": 0.1,
+        "stepping": "event"}})",
+                   {wanted})
+        .verdict;
+  };
+  EXPECT_EQ(verdict(R"("start": 0.05)", "start"), "trustworthy");
+  EXPECT_EQ(verdict(R"("start": 0.05, "end": 0.07)", "end"), "trustworthy");
+  EXPECT_TRUE(StartsWith(verdict(R"("start": 0)", "start"),
+                         "one-sided: start of force f at 0 s is the start of the run"));
+  EXPECT_TRUE(StartsWith(verdict(R"("end": 0.1)", "end"),
+                         "one-sided: end of force f at 0.1 s is the end of the run"));
+  EXPECT_TRUE(StartsWith(verdict(R"("start": 0.05, "end": 0.05)", "end"),
+                         "one-sided: the window of force f is empty"));
+}
+
 // What counts as on a step's boundary is a share of the step: of a microsecond's steps a half of a
 // thousandth is beside it, of a second's a hundredth of a millionth is on it.
 TEST(CertifyRollout, AWindowsEdgeIsOnAStepsBoundaryByAShareOfTheStep) {
