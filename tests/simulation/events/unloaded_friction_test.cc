@@ -26,7 +26,7 @@ std::string Text(double x) {
   return text;
 }
 
-State<double> Run(const Scene& scene) {
+State<double> StateAfter(const Scene& scene) {
   Model<double> model;
   State<double> state;
   BuildModel(scene, &model, &state);
@@ -87,7 +87,7 @@ TEST(UnloadedFrictionTest, AFlywheelWithoutAShape) {
         "inertia": 0.005, "position": [0, 0], "angular_velocity": 5}], "joints": [{"name": "p",
         "type": "revolute", "bodies": ["w", "world"], "anchor": [0, 0], "friction": 0.04}])" +
                                 Tail(1.0));
-    const State<double> rollout = Run(scene);
+    const State<double> rollout = StateAfter(scene);
     EXPECT_NEAR(rollout.pose[2], 0.5 * 25.0 / 8.0, 1e-10) << gravity;
     EXPECT_NEAR(rollout.twist[2], 0.0, 1e-12) << gravity;
   }
@@ -132,9 +132,9 @@ TEST(UnloadedFrictionTest, ASliderWithAnArm) {
         "no_contact": [["a", "c"]], "simulation": {"stepping": ")" +
                    stepping + R"(", "duration": 1.5, "dt": )" + Text(dt) + "}}");
   };
-  const State<double> fixed = Run(arm(0.0, "fixed", 1e-4));
+  const State<double> fixed = StateAfter(arm(0.0, "fixed", 1e-4));
   for (const double gravity : kGravities) {
-    const State<double> rollout = Run(arm(gravity, "event", 0.01));
+    const State<double> rollout = StateAfter(arm(gravity, "event", 0.01));
     for (size_t i = 0; i < 6; ++i) {
       // The fixed steps are of first order, and the arm falls in small gravity.
       EXPECT_NEAR(rollout.pose[i], fixed.pose[i], 1e-3 + 4.0 * gravity) << gravity << ", " << i;
@@ -183,8 +183,8 @@ TEST(UnloadedFrictionTest, FreeLinksWithAnElbow) {
                    Text(dt) + R"(, "stepping": ")" + stepping + "\"}}");
   };
   for (const double friction : {0.01, 0.2}) {
-    const State<double> fixed = Run(links("fixed", 1e-4, friction));
-    const State<double> rollout = Run(links("event", 0.01, friction));
+    const State<double> fixed = StateAfter(links("fixed", 1e-4, friction));
+    const State<double> rollout = StateAfter(links("event", 0.01, friction));
     for (size_t i = 0; i < 6; ++i) {
       EXPECT_NEAR(rollout.pose[i], fixed.pose[i], 1e-3) << i;
       EXPECT_NEAR(rollout.twist[i], fixed.twist[i], 1e-3) << i;
@@ -215,8 +215,8 @@ TEST(UnloadedFrictionTest, AFlywheelWithStribecksDecay) {
       return Flywheel(gravity, 5.0, friction, 0.1, duration, "",
                       R"(, "kinetic_friction": 0.01, "stribeck_speed": 1)");
     };
-    EXPECT_NEAR(Run(wheel(2.0)).twist[2], speed, 1e-6) << gravity;
-    EXPECT_NEAR(Run(wheel(3.0)).twist[2], 0.0, 1e-12) << gravity;
+    EXPECT_NEAR(StateAfter(wheel(2.0)).twist[2], speed, 1e-6) << gravity;
+    EXPECT_NEAR(StateAfter(wheel(3.0)).twist[2], 0.0, 1e-12) << gravity;
   }
 }
 
