@@ -6,7 +6,8 @@
 //   a touch at the start of a step   the search of the step before ended on it. Its time still
 //                                    depends on the state: it is an event (kTouch) like others
 //   an event at the end of a step    the next segment starts at a given time, not at the event
-//   a window's edge at a step's start   the motion up to it has the forces from before (event_edges.h)
+//   an edge at the start of a step   the motion up to it has the forces from before
+//                                    (event_edges.h)
 //   the start of a run               a change of the initial twist that breaks a rolling contact or
 //                                    a joint acts as the impulse that restores it, at once and not
 //                                    after the first segment; one that lifts a contact or makes it

@@ -11,8 +11,8 @@
 namespace tangible {
 
 /// The largest over bodies of dt |F| / m and dt |τ| r / (I + m r²), m/s, of the forces and efforts
-/// that act within [t, t + h], the springs at `state`, and the friction of joints at its limit; r is
-/// the body's size.
+/// that act within [t, t + h], the springs at `state`, and the friction of joints at its limit; r
+/// is the body's size.
 double LoadSpeed(const Model<double>& model, const Lengths& lengths, double t, double h,
                  const State<double>& state);
 

@@ -69,9 +69,9 @@ inline constexpr double kLeftBehind = 1e-9;
 /// Of the speed of the fastest point, with gravity's in a step: below it a touching contact counts
 /// as neither approaching nor leaving nor sliding; turned faces add to it.
 inline constexpr double kSlowShare = 1e-11;
-/// Of the speed to which loads and the friction of joints accelerate a body in a time step: the same
-/// below it. Where nothing but friction acts, a body that it has stopped has no other scale, and its
-/// speed is the rounding, some 1e-15, of what it lost.
+/// Of the speed to which loads and the friction of joints accelerate a body in a time step: the
+/// same below it. Where nothing but friction acts, a body that it has stopped has no other scale,
+/// and its speed is the rounding, some 1e-15, of what it lost.
 inline constexpr double kLoadShare = 1e-13;
 /// Of a body's size in a time step: friction counts in that speed up to this one, because the
 /// friction of a locked joint may have any size.
