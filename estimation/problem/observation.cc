@@ -99,9 +99,10 @@ class RowReader {
     const double in_run = RunTime(scene_.instruments, channel, *time);
     if (in_run < -slack || in_run > duration + slack) {
       std::ostringstream what;
-      what << "time: expected a time within the run, [0, " << duration << "] s, got " << *time;
+      what << "time: expected a time within the run, [0, " << CsvNumber(duration) << "] s, got "
+           << CsvNumber(*time);
       if (in_run != *time) {
-        what << ", which is " << in_run << " of the run by clock and delay";
+        what << ", which is " << CsvNumber(in_run) << " of the run by clock and delay";
       }
       return Fail(row, what.str());
     }

@@ -1,30 +1,28 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <zlib.h>
-
+#include <algorithm>
+#include <cmath>
 #include <cstring>
-#include <fstream>
-#include <iterator>
-#include <sstream>
+#include <string_view>
 
+#include "tangible/estimation/vision/checksum.h"
 #include "tangible/estimation/vision/disc_data.h"
 #include "tangible/scene/json_reader.h"
+#include "tangible/scene/text_file.h"
 
 namespace tangible {
 namespace {
 
-constexpr char kMagic[] = "tangible discs 1\n";
+constexpr char kMagic[] = "tangible discs 2\n";
+constexpr char kMagicOfFirstVersion[] = "tangible discs 1\n";
 constexpr int kMostFrames = 100000;
 constexpr int kMostSequences = 1000000;
 
-std::uint32_t Checksum(const char* bytes, size_t size) {
-  uLong sum = crc32(0L, Z_NULL, 0);
-  // crc32 counts in 32 bits.
-  constexpr size_t kPart = size_t{1} << 30;
-  for (size_t at = 0; at < size; at += kPart) {
-    sum = crc32(sum, reinterpret_cast<const Bytef*>(bytes + at),
-                static_cast<uInt>(std::min(kPart, size - at)));
-  }
-  return static_cast<std::uint32_t>(sum);
+constexpr char kChecksumKey[] = "crc32";
+
+// The checksum of the header without it, and of the body.
+std::uint32_t ChecksumOf(Json header, std::string_view body) {
+  header.erase(kChecksumKey);
+  return Checksum({header.dump(-1, ' ', false, Json::error_handler_t::replace), "\n", body});
 }
 
 template <typename T>
@@ -38,33 +36,44 @@ class Body {
   Body(const std::string& bytes, size_t at) : bytes_(bytes), at_(at) {}
   template <typename T>
   bool Read(size_t count, T* values) {
-    if (count * sizeof(T) > bytes_.size() - at_) return false;
+    if (count > left() / sizeof(T)) return false;
     std::memcpy(values, bytes_.data() + at_, count * sizeof(T));
     at_ += count * sizeof(T);
     return true;
   }
   bool Read(size_t count, std::string* text) {
-    if (count > bytes_.size() - at_) return false;
+    if (count > left()) return false;
     text->assign(bytes_, at_, count);
     at_ += count;
     return true;
   }
-  bool ended() const { return at_ == bytes_.size(); }
+  size_t left() const { return bytes_.size() - at_; }
 
  private:
   const std::string& bytes_;
   size_t at_;
 };
 
-bool ReadSequence(Body* body, const DiscData& data, DiscSequence* sequence) {
-  sequence->states.resize(static_cast<size_t>(data.frames) * 4 * data.world.size());
+// What is wrong with the next sequence, or empty.
+std::string ReadSequence(Body* body, const DiscData& data, DiscSequence* sequence) {
+  constexpr char kEnds[] = "the file ends within it";
+  const size_t numbers = static_cast<size_t>(data.frames) * 4 * data.world.size();
+  // A forged header may claim more than memory holds.
+  if (numbers * sizeof(double) > body->left()) return kEnds;
+  sequence->states.resize(numbers);
   sequence->pictures.resize(data.frames);
-  if (!body->Read(sequence->states.size(), sequence->states.data())) return false;
+  if (!body->Read(numbers, sequence->states.data())) return kEnds;
+  const auto finite = [](double x) { return std::isfinite(x); };
+  if (!std::all_of(sequence->states.begin(), sequence->states.end(), finite)) {
+    return "expected finite states";
+  }
+  std::vector<unsigned char> pixels(kPictureBytes);
   for (std::string& picture : sequence->pictures) {
     std::uint32_t size = 0;
-    if (!body->Read(1, &size) || !body->Read(size, &picture)) return false;
+    if (!body->Read(1, &size) || !body->Read(size, &picture)) return kEnds;
+    if (!Decompress(picture, pixels.data())) return "expected pictures, got one that is damaged";
   }
-  return true;
+  return "";
 }
 
 }  // namespace
@@ -79,9 +88,12 @@ std::string SerializeDiscData(const DiscData& data) {
       body += picture;
     }
   }
-  const Json header = {{"kind", NameOf(data.kind)}, {"seed", data.seed},
-                       {"frames", data.frames},     {"sequences", data.num_sequences()},
-                       {"bytes", body.size()},      {"crc32", Checksum(body.data(), body.size())}};
+  Json header = {{"kind", NameOf(data.kind)},
+                 {"seed", data.seed},
+                 {"frames", data.frames},
+                 {"sequences", data.num_sequences()},
+                 {"bytes", body.size()}};
+  header[kChecksumKey] = ChecksumOf(header, body);
   return kMagic + header.dump() + "\n" + body;
 }
 
@@ -92,6 +104,9 @@ bool ParseDiscData(const std::string& bytes, const std::string& name_for_message
     return false;
   };
   const size_t magic = sizeof(kMagic) - 1;
+  if (bytes.compare(0, magic, kMagicOfFirstVersion) == 0) {
+    return fail("expected a data set of version 2, got one of version 1: make it again");
+  }
   if (bytes.compare(0, magic, kMagic) != 0) {
     return fail("expected a data set that tangible-vision made, got another file");
   }
@@ -102,7 +117,7 @@ bool ParseDiscData(const std::string& bytes, const std::string& name_for_message
   const auto whole = [&](const char* key) {
     return json.is_object() && json.contains(key) && json[key].is_number_unsigned();
   };
-  for (const char* key : {"seed", "frames", "sequences", "bytes", "crc32"}) {
+  for (const char* key : {"seed", "frames", "sequences", "bytes", kChecksumKey}) {
     if (!whole(key)) return fail(std::string("header: /") + key + ": expected a whole number >= 0");
   }
   const std::string kind = json.value("kind", Json()).is_string() ? json["kind"] : Json("");
@@ -115,7 +130,8 @@ bool ParseDiscData(const std::string& bytes, const std::string& name_for_message
     return fail("expected " + std::to_string(size) + " bytes behind the header, got " +
                 std::to_string(found));
   }
-  if (Checksum(bytes.data() + end + 1, found) != json["crc32"].get<std::uint64_t>()) {
+  const std::string_view behind = std::string_view(bytes).substr(end + 1);
+  if (ChecksumOf(json, behind) != json[kChecksumKey].get<std::uint64_t>()) {
     return fail("the file is damaged: its checksum is another one");
   }
   const auto frames = json["frames"].get<std::uint64_t>();
@@ -130,23 +146,17 @@ bool ParseDiscData(const std::string& bytes, const std::string& name_for_message
   Body body(bytes, end + 1);
   for (std::uint64_t s = 0; s < sequences; ++s) {
     DiscSequence sequence;
-    if (!ReadSequence(&body, *data, &sequence)) {
-      return fail("sequence " + std::to_string(s) + ": the file ends within it");
-    }
+    const std::string wrong = ReadSequence(&body, *data, &sequence);
+    if (!wrong.empty()) return fail("sequence " + std::to_string(s) + ": " + wrong);
     data->sequences.push_back(std::move(sequence));
   }
-  if (!body.ended()) return fail("expected the file's end behind its sequences, got more");
+  if (body.left() > 0) return fail("expected the file's end behind its sequences, got more");
   return true;
 }
 
 bool LoadDiscData(const std::string& file, DiscData* data, std::string* error) {
-  std::ifstream stream(file, std::ios::binary);
-  if (!stream) {
-    *error = file + ": expected a data set, got a file that cannot be read";
-    return false;
-  }
-  const std::string bytes{std::istreambuf_iterator<char>(stream), {}};
-  return ParseDiscData(bytes, file, data, error);
+  std::string bytes;
+  return ReadTextFile(file, &bytes, error) && ParseDiscData(bytes, file, data, error);
 }
 
 }  // namespace tangible

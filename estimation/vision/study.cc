@@ -185,8 +185,7 @@ CellResult RunCell(const StudyCell& cell, const StudyData& data, const CellHooks
     trainer = std::make_unique<Trainer>(data.train, cell.training);
   }
   CellResult result;
-  if (!hooks.checkpoint.empty() &&
-      !trainer->Load(hooks.checkpoint, cell.name + ": checkpoint", error)) {
+  if (hooks.checkpoint && !trainer->Load(*hooks.checkpoint, cell.name + ": checkpoint", error)) {
     return result;
   }
   Curve curve(cell.training.iterations);

@@ -6,6 +6,7 @@
 
 #include <functional>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -35,7 +36,7 @@ StudyData MakeStudyData(DiscKind kind, std::uint64_t seed);
 
 /// The interface of a training to the program.
 struct CellHooks {
-  std::string checkpoint{};  ///< bytes to go on from; empty: from the start
+  std::optional<std::string> checkpoint{};  ///< bytes to go on from; none: from the start
   std::function<void(long iteration, const std::string& bytes)> save{};
   long save_every = 200;
   std::function<void(long iteration)> progress{};

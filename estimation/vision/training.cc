@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tangible/estimation/vision/training.h"
 
-#include <zlib.h>
-
 #include <algorithm>
 #include <cmath>
 #include <sstream>
 #include <stdexcept>
 
 #include "tangible/estimation/vision/tolerances.h"
+#include "tangible/estimation/vision/training_file.h"
+#include "tangible/scene/text_file.h"
 
 namespace tangible {
 namespace {
@@ -218,6 +218,7 @@ TrainingLoss Trainer::Step() {
 
 std::string Trainer::Fingerprint() const {
   std::ostringstream text;
+  text.precision(17);
   text << NameOf(data_.kind) << ' ' << data_.seed << ' ' << data_.num_sequences() << ' '
        << data_.frames << ' ' << NameOf(options_.dynamics) << ' '
        << static_cast<int>(options_.decoder) << ' ' << options_.labels << ' '
@@ -241,50 +242,80 @@ std::string Trainer::Save() {
   archive.write("adam", adam);
   std::ostringstream stream;
   archive.save_to(stream);
-  const std::string body = stream.str();
-  const auto sum =
-      crc32(0L, reinterpret_cast<const Bytef*>(body.data()), static_cast<uInt>(body.size()));
-  return "tangible training 1\n" + Fingerprint() + "\n" + std::to_string(iteration_) + " " +
-         std::to_string(sum) + "\n" + body;
+  return SerializeTraining({Fingerprint(), iteration_, stream.str()});
 }
 
 bool Trainer::Load(const std::string& bytes, const std::string& name_for_messages,
                    std::string* error) {
-  std::istringstream stream(bytes);
-  std::string magic, fingerprint, numbers;
-  std::getline(stream, magic);
-  std::getline(stream, fingerprint);
-  std::getline(stream, numbers);
-  long iteration = 0;
-  uLong sum = 0;
-  std::istringstream(numbers) >> iteration >> sum;
-  const std::string body(std::istreambuf_iterator<char>(stream), {});
-  if (magic != "tangible training 1" || iteration < 1) {
-    *error = name_for_messages + ": expected a training's checkpoint, got another file";
+  TrainingFile file;
+  if (!ParseTraining(bytes, name_for_messages, &file, error)) return false;
+  if (file.fingerprint != Fingerprint()) {
+    *error = OneLine(name_for_messages + ": expected the checkpoint of this training (" +
+                     Fingerprint() + "), got that of another one (" + file.fingerprint + ")");
     return false;
   }
-  if (fingerprint != Fingerprint()) {
-    *error = name_for_messages + ": expected the checkpoint of this training (" + Fingerprint() +
-             "), got that of another one (" + fingerprint + ")";
+  const std::string wrong = file.iteration > options_.iterations
+                                ? "an iteration behind the last one"
+                                : LoadWeights(file.weights);
+  if (!wrong.empty()) {
+    *error = name_for_messages + ": expected the weights of this training, got " + wrong;
     return false;
   }
-  if (crc32(0L, reinterpret_cast<const Bytef*>(body.data()), static_cast<uInt>(body.size())) !=
-      sum) {
-    *error = name_for_messages + ": the checkpoint is damaged: its checksum is another one";
-    return false;
-  }
-  torch::serialize::InputArchive archive, encoder, decoder, dynamics, adam;
-  archive.load_from(body.data(), body.size());
-  archive.read("encoder", encoder);
-  archive.read("decoder", decoder);
-  archive.read("dynamics", dynamics);
-  archive.read("adam", adam);
-  encoder_->load(encoder);
-  decoder_->load(decoder);
-  dynamics_->load(dynamics);
-  adam_->load(adam);
-  iteration_ = iteration;
+  iteration_ = file.iteration;
   return true;
+}
+
+// Torch throws with a stack of calls where an archive is none, and takes weights of any sizes.
+std::string Trainer::LoadWeights(const std::string& weights) {
+  const auto shapes = [this] {
+    std::vector<std::pair<std::vector<int64_t>, at::ScalarType>> all;
+    for (auto* module :
+         std::initializer_list<nn::Module*>{encoder_.get(), decoder_.get(), dynamics_.get()}) {
+      for (const at::Tensor& tensor : module->parameters()) {
+        all.emplace_back(tensor.sizes().vec(), tensor.scalar_type());
+      }
+    }
+    return all;
+  };
+  const auto before = shapes();
+  try {
+    torch::serialize::InputArchive archive, encoder, decoder, dynamics, adam;
+    archive.load_from(weights.data(), weights.size());
+    archive.read("encoder", encoder);
+    archive.read("decoder", decoder);
+    archive.read("dynamics", dynamics);
+    archive.read("adam", adam);
+    encoder_->load(encoder);
+    decoder_->load(decoder);
+    dynamics_->load(dynamics);
+    adam_->load(adam);
+  } catch (const c10::Error& exception) {
+    return "others: " + OneLine(exception.what_without_backtrace());
+  } catch (const std::exception& exception) {
+    return "others: " + OneLine(exception.what());
+  }
+  return shapes() == before ? WrongMoments() : "some of other sizes";
+}
+
+// What is wrong with the moments of Adam, which torch takes with any sizes, or empty.
+std::string Trainer::WrongMoments() const {
+  const auto fits = [](const at::Tensor& moment, const at::Tensor& parameter) {
+    return moment.defined() && moment.sizes() == parameter.sizes() &&
+           moment.scalar_type() == parameter.scalar_type();
+  };
+  const auto& states = adam_->state();
+  for (const torch::optim::OptimizerParamGroup& group : adam_->param_groups()) {
+    for (const at::Tensor& parameter : group.params()) {
+      const auto found = states.find(c10::guts::to_string(parameter.unsafeGetTensorImpl()));
+      // A parameter without a gradient has none.
+      if (found == states.end()) continue;
+      const auto& state = static_cast<const torch::optim::AdamParamState&>(*found->second);
+      if (!fits(state.exp_avg(), parameter) || !fits(state.exp_avg_sq(), parameter)) {
+        return "moments of other sizes";
+      }
+    }
+  }
+  return "";
 }
 
 }  // namespace tangible

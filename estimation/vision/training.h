@@ -49,6 +49,9 @@ class Trainer {
   Batch Draw() const;
   TrainingLoss Loss(const Batch& batch, at::Tensor* total);
   std::string Fingerprint() const;
+  /// Both return what is wrong, or empty.
+  std::string LoadWeights(const std::string& weights);
+  std::string WrongMoments() const;
 
   const DiscData& data_;
   TrainingOptions options_;

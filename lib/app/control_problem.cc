@@ -219,8 +219,14 @@ std::string CheckControls(const Scene& scene, const std::vector<std::string>& pa
 }
 
 bool LoadControlFile(const std::string& file, ControlFile* problem, std::string* error) {
+  std::string text;
+  return ReadTextFile(file, &text, error) && ParseControlFile(text, file, problem, error);
+}
+
+bool ParseControlFile(const std::string& text, const std::string& file, ControlFile* problem,
+                      std::string* error) {
   Json json;
-  if (!ParseJsonFile(file, &json, error)) return false;
+  if (!ParseJson(text, file, &json, error)) return false;
   JsonErrors errors(file);
   const JsonReader root(json, &errors);
   root.ExpectKeys({"name", "scene", "controls", "cost", "horizon", "max_iterations",

@@ -31,4 +31,8 @@ std::string CheckControls(const Scene& scene, const std::vector<std::string>& pa
 /// Reads a problem and its scene, and resolves names. On failure sets a message of one line.
 bool LoadControlFile(const std::string& file, ControlFile* problem, std::string* error);
 
+/// The same from text; the scene's path is relative to the folder of `file`.
+bool ParseControlFile(const std::string& text, const std::string& file, ControlFile* problem,
+                      std::string* error);
+
 }  // namespace tangible

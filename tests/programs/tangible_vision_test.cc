@@ -1,4 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <sys/stat.h>
+
+#include <filesystem>
+#include <utility>
+
 #include "run_program.h"
 
 namespace tangible {
@@ -27,6 +32,17 @@ TEST_F(TangibleVisionTest, DataAreMadeFromASeedAndChecked) {
   bytes[bytes.size() - 30] ^= 4;
   ExpectOneLine(Run("tangible-vision", "--check=" + Write("c.bin", bytes)), 1, "damaged");
   ExpectOneLine(Run("tangible-vision", "--check=" + Path("none.bin")), 1, "none.bin");
+  // Its kind and its seed are part of what is checked.
+  for (const auto& [from, to] : {std::pair("\"seed\":4", "\"seed\":5"),
+                                 std::pair("\"kind\":\"simb\"", "\"kind\":\"billiards\"")}) {
+    std::string other = Read(Path("a.bin"));
+    other.replace(other.find(from), std::string(from).size(), to);
+    ExpectOneLine(Run("tangible-vision", "--check=" + Write("d.bin", other)), 1, "damaged");
+  }
+  ASSERT_EQ(::mkfifo(Path("pipe").c_str(), 0600), 0);
+  ExpectOneLine(Run("tangible-vision", "--check=" + Path("pipe")), 1, "got a pipe");
+  ExpectOneLine(Run("tangible-vision", "--check=/dev/zero"), 1, "got a device");
+  ExpectOneLine(Run("tangible-vision", "--check=" + Path("")), 1, "directory");
 }
 
 TEST_F(TangibleVisionTest, WrongFlagsAreOneLine) {
@@ -41,8 +57,20 @@ TEST_F(TangibleVisionTest, WrongFlagsAreOneLine) {
   ExpectOneLine(Run("tangible-vision", "--cells=parameters_0 --folder=" + Write("file", "")), 1,
                 "expected a folder");
   Write("parameters_0.json", "{}");
-  ExpectOneLine(Run("tangible-vision", "--cells=parameters_0 --folder=" + Path("")), 1,
-                "remove it");
+  const std::string cell = "--cells=parameters_0 --folder=" + Path("");
+  ExpectOneLine(Run("tangible-vision", cell), 1, "remove it");
+  std::filesystem::remove(Path("parameters_0.json"));
+  ASSERT_EQ(::mkfifo(Path("parameters_0.json").c_str(), 0600), 0);
+  ExpectOneLine(Run("tangible-vision", cell), 1, "parameters_0.json");
+  std::filesystem::remove(Path("parameters_0.json"));
+  // What is no checkpoint is no reason to begin again.
+  for (const char* bytes : {"", "{}", "tangible training 2\nbilliards\n5 7\nx"}) {
+    Write("parameters_0.checkpoint", bytes);
+    ExpectOneLine(Run("tangible-vision", cell), 1, "parameters_0.checkpoint");
+  }
+  std::filesystem::remove(Path("parameters_0.checkpoint"));
+  ASSERT_EQ(::mkfifo(Path("parameters_0.checkpoint").c_str(), 0600), 0);
+  ExpectOneLine(Run("tangible-vision", cell), 1, "got a pipe");
 }
 
 }  // namespace

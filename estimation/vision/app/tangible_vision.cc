@@ -10,17 +10,17 @@
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
-#include <fstream>
 #include <iostream>
-#include <iterator>
 #include <map>
 #include <mutex>
 #include <thread>
+#include <utility>
 
 #include "tangible/app/program.h"
 #include "tangible/estimation/vision/png.h"
 #include "tangible/estimation/vision/report.h"
 #include "tangible/estimation/vision/study.h"
+#include "tangible/estimation/vision/training_file.h"
 #include "tangible/scene/json_writer.h"
 #include "tangible/scene/text_file.h"
 
@@ -49,11 +49,6 @@ namespace tangible {
 namespace {
 
 namespace fs = std::filesystem;
-
-std::string ReadBytes(const std::string& path) {
-  std::ifstream stream(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(stream), {}};
-}
 
 // Shows the iterations done of all cells and the remaining time, in place on a terminal.
 class Watch {
@@ -104,6 +99,8 @@ class Study {
         std::string error;
         try {
           error = Make(cells_[k], &watch);
+        } catch (const c10::Error& exception) {
+          error = cells_[k].name + ": " + OneLine(exception.what_without_backtrace());
         } catch (const std::exception& exception) {
           error = cells_[k].name + ": " + OneLine(exception.what());
         }
@@ -121,12 +118,18 @@ class Study {
     return error_;
   }
 
-  std::vector<OrderedJson> Results() const {
-    std::vector<OrderedJson> results;
+  /// Of all cells; false, with one line, where a file has none.
+  bool ReadResults(std::vector<OrderedJson>* results, std::string* error) const {
     for (const StudyCell& cell : cells_) {
-      results.push_back(OrderedJson::parse(ReadBytes(File(cell, ".json")), nullptr, false));
+      const std::string file = File(cell, ".json");
+      std::string text;
+      if (!ReadTextFile(file, &text, error)) return false;
+      OrderedJson& result = results->emplace_back(OrderedJson::parse(text, nullptr, false));
+      if (result.is_object() && result.contains("cell")) continue;
+      *error = file + ": expected a cell's result, got something else: remove it";
+      return false;
     }
-    return results;
+    return true;
   }
   std::string File(const StudyCell& cell, const char* ending) const {
     return FLAGS_folder + "/" + cell.name + ending;
@@ -146,7 +149,16 @@ class Study {
     if (fs::exists(done)) return "";
     CellHooks hooks;
     std::string error, saving;
-    hooks.checkpoint = ReadBytes(checkpoint);
+    if (fs::exists(fs::symlink_status(checkpoint))) {
+      TrainingFile training;
+      std::string bytes;
+      // What is no checkpoint is refused before the data are made.
+      if (!ReadTextFile(checkpoint, &bytes, &error) ||
+          !ParseTraining(bytes, checkpoint, &training, &error)) {
+        return error;
+      }
+      hooks.checkpoint = std::move(bytes);
+    }
     hooks.progress = [&, first = true](long iteration) mutable {
       if (first) watch->Skip(iteration - 1);
       first = false;
@@ -176,22 +188,31 @@ class Study {
   std::string error_;
 };
 
-// Rows of pictures of the first cells that have some: the true ones once, then those of each cell.
-std::vector<std::vector<std::string>> PictureRowsOf(const Study& study) {
-  std::vector<std::vector<std::string>> rows;
+// Rows of pictures of the cells that have some: the true ones once, then those of each cell. False,
+// with one line, where a file has none.
+bool ReadPictureRows(const Study& study, std::vector<std::vector<std::string>>* rows,
+                     std::string* error) {
   for (const StudyCell& cell : study.cells()) {
-    const std::string bytes = ReadBytes(study.File(cell, ".pictures"));
+    const std::string file = study.File(cell, ".pictures");
+    if (!fs::exists(fs::symlink_status(file))) continue;
+    std::string bytes;
+    if (!ReadTextFile(file, &bytes, error)) return false;
     const size_t count = bytes.size() / kPictureBytes / 2;
-    if (count == 0) continue;
+    if (count == 0 || bytes.size() != 2 * count * kPictureBytes) {
+      *error = file + ": expected pairs of pictures of " + std::to_string(kPictureBytes) +
+               " bytes each, got " + std::to_string(bytes.size()) +
+               " bytes: remove it and the cell's result";
+      return false;
+    }
     for (const size_t first : {size_t{0}, count}) {
-      if (first == 0 && !rows.empty()) continue;
-      std::vector<std::string>& row = rows.emplace_back();
+      if (first == 0 && !rows->empty()) continue;
+      std::vector<std::string>& row = rows->emplace_back();
       for (size_t k = first; k < first + count; ++k) {
         row.push_back(bytes.substr(k * kPictureBytes, kPictureBytes));
       }
     }
   }
-  return rows;
+  return true;
 }
 
 int RunStudy() {
@@ -209,16 +230,13 @@ int RunStudy() {
   Study study(std::move(cells));
   std::string error = study.Run();
   if (!error.empty()) return ReportError(error);
-  std::vector<OrderedJson> results = study.Results();
-  for (size_t k = 0; k < results.size(); ++k) {
-    if (!results[k].is_object() || !results[k].contains("cell")) {
-      return ReportError(study.File(study.cells()[k], ".json") +
-                         ": expected a cell's result, got something else: remove it");
-    }
+  std::vector<OrderedJson> results;
+  std::vector<std::vector<std::string>> rows;
+  if (!study.ReadResults(&results, &error) || !ReadPictureRows(study, &rows, &error)) {
+    return ReportError(error);
   }
   const OrderedJson timing = TimePhysics();
   std::cout << StudyTables(results) << TimingLine(timing);
-  const std::vector<std::vector<std::string>> rows = PictureRowsOf(study);
   ResultWriter writer;
   writer.Write(FLAGS_out, [&] {
     return JsonText({{"cells", OrderedJson(results)}, {"timing", timing}});
@@ -248,7 +266,13 @@ int MakeData() {
                     .sequences = FLAGS_sequences,
                     .frames = FLAGS_frames,
                     .seed = static_cast<std::uint64_t>(FLAGS_seed)});
-  const std::string error = WriteFileAtomically(FLAGS_out, SerializeDiscData(data));
+  const std::string bytes = SerializeDiscData(data);
+  if (bytes.size() > kMaxFileSize) {
+    return ReportError("--sequences and --frames: expected a file of at most " +
+                       std::to_string(kMaxFileSize >> 20) + " MiB, got " +
+                       std::to_string(bytes.size() >> 20));
+  }
+  const std::string error = WriteFileAtomically(FLAGS_out, bytes);
   return error.empty() ? kExitDone : ReportError(error);
 }
 

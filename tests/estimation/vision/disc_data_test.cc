@@ -2,13 +2,19 @@
 #include "tangible/estimation/vision/disc_data.h"
 
 #include <gtest/gtest.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <nlohmann/json.hpp>
 #include <set>
 #include <string>
+#include <string_view>
 #include <vector>
+
+#include "tangible/estimation/vision/checksum.h"
 
 namespace tangible {
 namespace {
@@ -184,13 +190,73 @@ TEST(DiscDataTest, AFileReadsBackAndADamagedOneIsOneLine) {
     std::string other = bytes;
     return other.replace(other.find(from), from.size(), to);
   };
-  refuse(replaced("simb", "sumo"), "/kind");
-  refuse(replaced("\"frames\":3", "\"frames\":4"), "ends within it");
-  refuse(replaced("\"sequences\":2", "\"sequences\":1"), "expected the file's end");
-  refuse(replaced("\"frames\":3", "\"frames\":-3"), "/frames");
-  refuse(replaced("\"frames\":3", "\"frames\":0"), "expected 1 to");
-  refuse(replaced("\"frames\":3", "\"fr\":3"), "/frames");
+  // The checksum is that of the header too.
+  refuse(replaced("\"simb\"", "\"billiards\""), "damaged");
+  refuse(replaced("\"seed\":5", "\"seed\":6"), "damaged");
+  refuse(replaced("\"frames\":3", "\"frames\":4"), "damaged");
+  refuse(replaced("\"sequences\":2", "\"sequences\":1"), "damaged");
+  refuse(replaced("\"seed\":5", "\"seed\":5,\"more\":1"), "damaged");
+  refuse(replaced("\"bytes\":", "\"bytes\":1"), "bytes behind the header");
+  refuse(replaced("discs 2", "discs 1"), "make it again");
   EXPECT_FALSE(LoadDiscData("/no/such/file", &read, &error));
+}
+
+// Files with a right checksum whose contents are not those of a data set.
+TEST(DiscDataTest, AForgedFileIsOneLine) {
+  const DiscData data =
+      MakeDiscData({.kind = DiscKind::kSimb, .sequences = 2, .frames = 3, .seed = 5});
+  DiscData read;
+  std::string error;
+  // The bytes with a change of the header and the checksum of these.
+  const auto forged = [&](const std::string& from, const std::string& to) {
+    std::string bytes = SerializeDiscData(data);
+    bytes.replace(bytes.find(from), from.size(), to);
+    const size_t end = bytes.find('\n', bytes.find('\n') + 1), begin = bytes.find('\n') + 1;
+    nlohmann::json header = nlohmann::json::parse(bytes.substr(begin, end - begin));
+    header.erase("crc32");
+    header["crc32"] = Checksum({header.dump(), "\n", std::string_view(bytes).substr(end + 1)});
+    return bytes.substr(0, begin) + header.dump() + bytes.substr(end);
+  };
+  const auto refuse = [&](const std::string& bytes, const std::string& what) {
+    error.clear();
+    EXPECT_FALSE(ParseDiscData(bytes, "d.bin", &read, &error));
+    EXPECT_EQ(error.rfind("d.bin: ", 0), 0U) << error;
+    EXPECT_NE(error.find(what), std::string::npos) << error;
+    EXPECT_EQ(error.find('\n'), std::string::npos);
+  };
+  EXPECT_TRUE(ParseDiscData(forged("\"seed\":5", "\"seed\":6"), "d.bin", &read, &error)) << error;
+  refuse(forged("simb", "sumo"), "/kind");
+  refuse(forged("\"frames\":3", "\"frames\":4"), "ends within it");
+  refuse(forged("\"frames\":3", "\"frames\":100000"), "ends within it");
+  refuse(forged("\"frames\":3", "\"frames\":100001"), "expected 1 to");
+  refuse(forged("\"sequences\":2", "\"sequences\":1"), "expected the file's end");
+  refuse(forged("\"frames\":3", "\"frames\":-3"), "/frames");
+  refuse(forged("\"frames\":3", "\"frames\":0"), "expected 1 to");
+  refuse(forged("\"frames\":3", "\"fr\":3"), "/frames");
+  DiscData bad = data;
+  bad.sequences[1].states[7] = NAN;
+  refuse(SerializeDiscData(bad), "sequence 1: expected finite states");
+  bad = data;
+  bad.sequences[0].pictures[2][20] ^= 4;
+  refuse(SerializeDiscData(bad), "sequence 0: expected pictures, got one that is damaged");
+  bad.sequences[0].pictures[2].clear();
+  refuse(SerializeDiscData(bad), "sequence 0: expected pictures, got one that is damaged");
+}
+
+// Each of these would keep a program waiting, or fill its memory.
+TEST(DiscDataTest, OnlyRegularFilesAreRead) {
+  DiscData read;
+  for (const char* file : {"/dev/zero", "/dev/null", "/"}) {
+    std::string error;
+    EXPECT_FALSE(LoadDiscData(file, &read, &error));
+    EXPECT_NE(error.find("cannot be read"), std::string::npos) << error;
+  }
+  const std::string pipe = ::testing::TempDir() + "disc_data_pipe." + std::to_string(::getpid());
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  std::string error;
+  EXPECT_FALSE(LoadDiscData(pipe, &read, &error));
+  EXPECT_NE(error.find("got a pipe"), std::string::npos) << error;
+  ::unlink(pipe.c_str());
 }
 
 }  // namespace

@@ -4,10 +4,13 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <sstream>
+#include <string>
 #include <vector>
 
 #include "tangible/estimation/vision/evaluation.h"
 #include "tangible/estimation/vision/simb_score.h"
+#include "tangible/estimation/vision/training_file.h"
 
 namespace tangible {
 namespace {
@@ -161,11 +164,79 @@ TEST(TrainerTest, AnInterruptedTrainingEndsWithTheSameBits) {
   EXPECT_NE(error.find("c: the checkpoint is damaged"), std::string::npos) << error;
   EXPECT_FALSE(resumed.Load("what else", "c", &error));
   EXPECT_NE(error.find("another file"), std::string::npos) << error;
+  EXPECT_FALSE(resumed.Load("", "c", &error));
+  EXPECT_NE(error.find("empty file"), std::string::npos) << error;
   TrainingOptions other = Small();
   other.seed = 1;
   Trainer elsewhere(data, other);
   EXPECT_FALSE(elsewhere.Load(checkpoint, "c", &error));
   EXPECT_NE(error.find("another one"), std::string::npos) << error;
+}
+
+// The archive of a trainer with the moments of Adam of other tensors, one number each.
+std::string WithSmallMoments(Trainer* trainer) {
+  std::vector<at::Tensor> networks, physical;
+  for (const at::Tensor& weight : WeightsOf(trainer)) {
+    (weight.scalar_type() == torch::kDouble ? physical : networks)
+        .push_back(torch::ones({1}, weight.options()).requires_grad_());
+  }
+  std::vector<torch::optim::OptimizerParamGroup> groups{
+      torch::optim::OptimizerParamGroup(networks)};
+  if (!physical.empty()) groups.emplace_back(physical);
+  torch::optim::Adam adam(groups, torch::optim::AdamOptions(0.1));
+  for (const at::Tensor& tensor : networks) tensor.mutable_grad() = torch::ones_like(tensor);
+  for (const at::Tensor& tensor : physical) tensor.mutable_grad() = torch::ones_like(tensor);
+  adam.step();
+  torch::serialize::OutputArchive archive, encoder, decoder, dynamics, moments;
+  trainer->encoder()->save(encoder);
+  trainer->decoder()->save(decoder);
+  trainer->dynamics()->save(dynamics);
+  adam.save(moments);
+  archive.write("encoder", encoder);
+  archive.write("decoder", decoder);
+  archive.write("dynamics", dynamics);
+  archive.write("adam", moments);
+  std::ostringstream stream;
+  archive.save_to(stream);
+  return stream.str();
+}
+
+// Checkpoints with a right checksum whose weights are none, or those of another network.
+TEST(TrainerTest, ForgedWeightsAreOneLine) {
+  const DiscData& data = DataOf(DiscKind::kBilliards);
+  TrainingOptions with_network = Small();
+  with_network.dynamics = DynamicsKind::kPerceptron;
+  Trainer trainer(data, Small()), other(data, with_network);
+  trainer.Step();
+  other.Step();
+  std::string error;
+  TrainingFile mine, others;
+  ASSERT_TRUE(ParseTraining(trainer.Save(), "c", &mine, &error)) << error;
+  ASSERT_TRUE(ParseTraining(other.Save(), "c", &others, &error)) << error;
+  const auto refuse = [&](TrainingFile forged) {
+    forged.fingerprint = mine.fingerprint;
+    error.clear();
+    EXPECT_FALSE(Trainer(data, Small()).Load(SerializeTraining(forged), "c", &error))
+        << forged.iteration << ", " << forged.weights.size() << " bytes";
+    EXPECT_EQ(error.rfind("c: expected the weights of this training, got ", 0), 0U) << error;
+    EXPECT_EQ(error.find('\n'), std::string::npos);
+    EXPECT_EQ(error.find("frame #"), std::string::npos) << error;
+    EXPECT_LT(error.size(), 1000U);
+  };
+  refuse(others);
+  refuse({"", 1, "no archive"});
+  refuse({"", 1, ""});
+  refuse({"", 1, mine.weights.substr(0, mine.weights.size() / 2)});
+  refuse({"", 9, mine.weights});
+  // A wider encoder's weights have the right names.
+  TrainingOptions longer = Small();
+  longer.seen = 4;
+  Trainer wider(data, longer);
+  wider.Step();
+  ASSERT_TRUE(ParseTraining(wider.Save(), "c", &others, &error)) << error;
+  refuse(others);
+  refuse({"", 1, WithSmallMoments(&trainer)});
+  EXPECT_TRUE(Trainer(data, Small()).Load(SerializeTraining(mine), "c", &error)) << error;
 }
 
 // Labels that are not to be used are NaN.
