@@ -5,6 +5,7 @@
 #include <cmath>
 #include <sstream>
 #include <stdexcept>
+#include <utility>
 
 #include "tangible/estimation/vision/tolerances.h"
 #include "tangible/estimation/vision/training_file.h"
