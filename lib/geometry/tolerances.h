@@ -26,5 +26,16 @@ inline constexpr double kTip = 1e-3;
 inline constexpr double kUnbent = 4.0 * std::numeric_limits<double>::epsilon();
 /// Rad: two directions that differ by a smaller angle are the same up to rounding.
 inline constexpr double kTurnRounding = 2.0 * std::numeric_limits<double>::epsilon();
+/// M: shapes at rest that are no farther apart touch, and a step up of that height between faces of
+/// equal normal counts as flush: it is more than the rounding of coordinates within 1e6 m, and less
+/// than any step that is built.
+inline constexpr double kFlushStep = 1e-8;
+/// Of the coordinate: the rounding of the place of one shape relative to another.
+inline constexpr double kSeamRounding = 64.0 * std::numeric_limits<double>::epsilon();
+/// Of the rounding of the place of one shape relative to another: a face that is lower than its
+/// neighbour begins farther from the seam, twice as far as the higher one reaches.
+inline constexpr double kBehindStep = 4.0;
+/// Rad: faces that turn by a smaller angle have equal normals.
+inline constexpr double kFlushTurn = 1e-9;
 
 }  // namespace tangible

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "tangible/dynamics/model/tolerances.h"
+#include "tangible/geometry/tolerances.h"
 
 namespace tangible {
 namespace {
@@ -27,6 +28,41 @@ double CoordinateRate(const JointIndex& joint, const JointRows<double>& rows, co
 // Whether the recovery speed limits the constant of the gap.
 ContactLaw GapLaw(double gap, double h, const SimulationSettings& settings) {
   return gap / h < -settings.recovery_speed ? ContactLaw::kRecovery : ContactLaw::kGap;
+}
+
+// Removes the contacts from `first` on of a body that is exactly above a seam, where it touches the
+// other body of the seam already: its force is one, and how two contacts shared it would be left
+// open.
+void RemoveSecondOwners(const Model<double>& model, const AssemblyScratch<double>& scratch,
+                        size_t first, std::vector<ActiveContact>* contacts) {
+  const auto has_seams = [&](const ActiveContact& contact, int body) {
+    return model.SeamsOf(body, body == contact.a ? contact.feature.part_a
+                                                 : contact.feature.part_b) != nullptr;
+  };
+  const auto geometry_of = [&](const ActiveContact& contact) {
+    ContactRows<double> rows;
+    EvaluateContactRows(model, scratch.poses, contact, &rows);
+    return rows.geometry;
+  };
+  const auto is_second = [&](const ActiveContact& contact) {
+    const int moving = has_seams(contact, contact.a) ? contact.b : contact.a;
+    const int other = moving == contact.a ? contact.b : contact.a;
+    return has_seams(contact, other) &&
+           std::any_of(contacts->begin(), contacts->begin() + static_cast<std::ptrdiff_t>(first),
+                       [&](const ActiveContact& earlier) {
+                         const bool is_first = earlier.a == moving;
+                         if (!is_first && earlier.b != moving) return false;
+                         if (!has_seams(earlier, is_first ? earlier.b : earlier.a)) return false;
+                         const ContactGeometry<double> x = geometry_of(earlier);
+                         const ContactGeometry<double> y = geometry_of(contact);
+                         const double sign = is_first == (contact.a == moving) ? 1.0 : -1.0;
+                         return (x.point - y.point).norm() <= 2.0 * kFlushStep &&
+                                (x.normal - sign * y.normal).norm() <= kFlushTurn;
+                       });
+  };
+  contacts->erase(std::remove_if(contacts->begin() + static_cast<std::ptrdiff_t>(first),
+                                 contacts->end(), is_second),
+                  contacts->end());
 }
 
 }  // namespace
@@ -228,6 +264,9 @@ void ContactSearch::Find(const Model<double>& model, const State<double>& state,
     model.structure->ForEachPartPair(contact.a, contact.b, [&](PartPair parts) {
       FindContacts(model, state, h, scratch, contact, parts, contacts);
     });
+    if (model.seams != nullptr) {
+      RemoveSecondOwners(model, scratch, friction->size(), contacts);
+    }
     if (contacts->size() == friction->size()) {
       ++beyond_reach_;
       continue;

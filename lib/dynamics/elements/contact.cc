@@ -49,6 +49,22 @@ CoefficientSource Mix(const Model<double>& model, int first, int second, Mixing 
 
 }  // namespace
 
+int FindFeaturesAtSeams(const Model<double>& model, int a, const Pose<double>& pose_a, int b,
+                        const Pose<double>& pose_b, PartPair parts, double max_gap,
+                        ContactFeature features[2]) {
+  const ShapeView<double> shape_a = model.Shape(a, parts.a);
+  const ShapeView<double> shape_b = model.Shape(b, parts.b);
+  if (const ShapeSeams* seams = model.SeamsOf(a, parts.a); seams != nullptr) {
+    return FindContactFeaturesAtSeams(shape_a, pose_a, shape_b, pose_b, *seams, SeamSide::kFirst,
+                                      max_gap, features);
+  }
+  if (const ShapeSeams* seams = model.SeamsOf(b, parts.b); seams != nullptr) {
+    return FindContactFeaturesAtSeams(shape_a, pose_a, shape_b, pose_b, *seams, SeamSide::kSecond,
+                                      max_gap, features);
+  }
+  return FindContactFeatures(shape_a, pose_a, shape_b, pose_b, max_gap, features);
+}
+
 CoefficientSource MixedFriction(const Model<double>& model, int a, int b) {
   const ModelStructure& structure = *model.structure;
   const PairIndex* pair = structure.FindPair(a, b);

@@ -59,12 +59,19 @@ struct ActiveContact {
   }
 };
 
-/// FindContactFeatures for one part of each of two bodies.
+/// FindFeatures where one of the shapes has seams.
+int FindFeaturesAtSeams(const Model<double>& model, int a, const Pose<double>& pose_a, int b,
+                        const Pose<double>& pose_b, PartPair parts, double max_gap,
+                        ContactFeature features[2]);
+
+/// FindContactFeatures for one part of each of two bodies, without what seams hide.
 inline int FindFeatures(const Model<double>& model, int a, const Pose<double>& pose_a, int b,
                         const Pose<double>& pose_b, PartPair parts, double max_gap,
                         ContactFeature features[2]) {
-  const int count = FindContactFeatures(model.Shape(a, parts.a), pose_a, model.Shape(b, parts.b),
-                                        pose_b, max_gap, features);
+  const int count = model.seams != nullptr
+                        ? FindFeaturesAtSeams(model, a, pose_a, b, pose_b, parts, max_gap, features)
+                        : FindContactFeatures(model.Shape(a, parts.a), pose_a,
+                                              model.Shape(b, parts.b), pose_b, max_gap, features);
   for (int k = 0; k < count; ++k) {
     features[k].part_a = parts.a;
     features[k].part_b = parts.b;

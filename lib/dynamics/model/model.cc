@@ -3,8 +3,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <type_traits>
 
 #include "tangible/dynamics/model/initial_state_inl.h"
+#include "tangible/dynamics/model/model_seams.h"
 #include "tangible/geometry/mass_properties.h"
 
 namespace tangible {
@@ -363,6 +365,9 @@ void BuildModelWithStructure(const BasicScene<T>& scene,
   FillJoints(scene, *state, world, &model->parameters);
   FillForcesAndPairs(scene, *state, world, &model->parameters);
   ApplyInitialJoints(scene, state);
+  if constexpr (std::is_same_v<T, double>) {
+    FindModelSeams(*state, model);
+  }
 }
 
 template <typename T>

@@ -17,6 +17,7 @@
 #include <vector>
 
 #include "tangible/dynamics/model/state.h"
+#include "tangible/geometry/seams.h"
 #include "tangible/geometry/shape.h"
 #include "tangible/scene/scene.h"
 
@@ -146,15 +147,28 @@ struct ModelStructure {
 inline constexpr int kGravityX = 0;
 inline constexpr int kGravityY = 1;
 
+/// The seams of bodies that do not move, or that move alike (model_seams.h).
+struct ModelSeams {
+  std::vector<ShapeSeams> shapes;
+  FlushSteps steps;
+};
+
 template <typename T>
 struct Model {
   std::shared_ptr<const ModelStructure> structure;
   std::vector<T> parameters;
+  std::shared_ptr<const ModelSeams> seams{};  ///< of a model in double; null: there are none
+  std::vector<int> seams_of{};  ///< of each body the place in seams->shapes; −1: it has none
 
   ShapeView<T> Shape(int body, int part = 0) const {
     const PartIndex index = structure->bodies[body].Part(part);
     return {index.type, parameters.data() + (index.num_numbers > 0 ? index.numbers : 0),
             index.num_numbers};
+  }
+  /// The seams of a shape, or nullptr. Contact points have none.
+  const ShapeSeams* SeamsOf(int body, int part) const {
+    return seams == nullptr || part != 0 || seams_of[body] < 0 ? nullptr
+                                                               : &seams->shapes[seams_of[body]];
   }
 };
 

@@ -33,6 +33,19 @@ struct ModelPart {
       (*own)[i] = whole[numbers[i]];
     }
   }
+  /// The part's model out of the whole one. What bodies outside of the part hide stays hidden.
+  template <typename T>
+  void GatherModel(const Model<T>& whole, Model<T>* own) const {
+    own->structure = structure;
+    GatherNumbers(whole.parameters, &own->parameters);
+    own->seams = whole.seams;
+    if (whole.seams != nullptr) {
+      own->seams_of.resize(bodies.size());
+      for (size_t k = 0; k < bodies.size(); ++k) {
+        own->seams_of[k] = whole.seams_of[bodies[k]];
+      }
+    }
+  }
   /// The part's state out of the whole one.
   template <typename T>
   void GatherState(const State<T>& whole, State<T>* own) const {

@@ -12,6 +12,90 @@
 namespace tangible {
 namespace {
 
+// The continuation of a contact at a flush seam: one of the same moving body with a neighbour of
+// the body whose shape has seams, with the same normal, friction and restitution.
+class NextDoor {
+ public:
+  // `from`: the contact, where the first body is at `first`, which is then moved to `moved`.
+  NextDoor(const Model<double>& model, const State<double>& state, const ActiveContact& contact,
+           const Pose<double>& first, const Pose<double>& moved,
+           const ContactGeometry<double>& from)
+      : model_(model),
+        state_(state),
+        contact_(contact),
+        tiled_is_first_(model.SeamsOf(contact.a, contact.feature.part_a) != nullptr),
+        tiled_(tiled_is_first_ ? contact.a : contact.b),
+        moving_(tiled_is_first_ ? contact.b : contact.a),
+        first_(first),
+        moved_(moved),
+        from_(from) {}
+
+  bool HasContact(double near) const {
+    const ModelStructure& s = *model_.structure;
+    const int part = tiled_is_first_ ? contact_.feature.part_a : contact_.feature.part_b;
+    if (model_.SeamsOf(tiled_, part) == nullptr) {
+      return false;
+    }
+    for (int body = 0; body < s.num_bodies(); ++body) {
+      if (body != tiled_ && s.bodies[body].block < 0 && s.bodies[body].shape != ShapeType::kNone &&
+          s.MayCollide(moving_, body) && MovesAsTiled(body) && IsAlike(body) &&
+          HasContactOf(body, near)) {
+        return true;
+      }
+    }
+    return false;
+  }
+
+ private:
+  bool MovesAsTiled(int body) const {
+    return std::equal(&state_.twist[3 * body], &state_.twist[3 * body] + 3,
+                      &state_.twist[3 * tiled_]);
+  }
+  bool IsAlike(int body) const {
+    return MixedFriction(model_, moving_, body).value ==
+               MixedFriction(model_, moving_, tiled_).value &&
+           MixedRestitution(model_, moving_, body).value ==
+               MixedRestitution(model_, moving_, tiled_).value;
+  }
+  bool HasContactOf(int body, double near) const {
+    Pose<double> neighbour = state_.PoseOf(body);
+    if (tiled_is_first_) {
+      // The neighbour moves with the first body.
+      neighbour = Pose<double>(moved_ * first_.Inverse(neighbour.position),
+                               neighbour.angle + moved_.angle - first_.angle);
+    }
+    ActiveContact other;
+    other.a = std::min(moving_, body);
+    other.b = std::max(moving_, body);
+    const Pose<double> mover = tiled_is_first_ ? state_.PoseOf(moving_) : moved_;
+    const bool neighbour_is_first = other.a == body;
+    const Pose<double>& pose_a = neighbour_is_first ? neighbour : mover;
+    const Pose<double>& pose_b = neighbour_is_first ? mover : neighbour;
+    const int part = tiled_is_first_ ? contact_.feature.part_b : contact_.feature.part_a;
+    const PartPair parts = neighbour_is_first ? PartPair{0, part} : PartPair{part, 0};
+    ContactFeature features[2];
+    const int count =
+        FindFeatures(model_, other.a, pose_a, other.b, pose_b, parts, kInfinity, features);
+    const double sign = neighbour_is_first == tiled_is_first_ ? 1.0 : -1.0;
+    return std::any_of(features, features + count, [&](const ContactFeature& feature) {
+      other.feature = feature;
+      const ContactGeometry<double> to = EvaluateContact(feature, ShapeOfA(model_, other), pose_a,
+                                                         ShapeOfB(model_, other), pose_b);
+      return (to.point - from_.point).norm() <= near && std::abs(to.gap - from_.gap) <= near &&
+             (sign * to.normal - from_.normal).norm() <= kTurned;
+    });
+  }
+
+  const Model<double>& model_;
+  const State<double>& state_;
+  const ActiveContact& contact_;
+  const bool tiled_is_first_;
+  const int tiled_, moving_;
+  const Pose<double>& first_;
+  const Pose<double>& moved_;
+  const ContactGeometry<double>& from_;
+};
+
 class PairTies {
  public:
   PairTies(const Model<double>& model, const StepRecord& record, size_t first, size_t last,
@@ -94,11 +178,19 @@ class PairTies {
   bool Changes() const {
     for (size_t i = first_; i < last_; ++i) {
       const ContactFeature& feature = record_.contacts[i].feature;
-      if (Closed(i) && (!Found(feature) || Turns(feature))) {
+      if (Closed(i) && (!Found(feature) || Turns(feature)) && !GoesOnNextDoor(i)) {
         return true;
       }
     }
     return false;
+  }
+
+  bool GoesOnNextDoor(size_t i) const {
+    const ActiveContact& contact = record_.contacts[i];
+    const ContactGeometry<double> from = Rows(record_.before, contact.feature).geometry;
+    return NextDoor(model_, record_.before, contact, record_.before.PoseOf(a_), moved_.PoseOf(a_),
+                    from)
+        .HasContact(kContinues * kFeatureMargin * size_);
   }
 
   // The feature found that continues a contact; false where none does.
@@ -166,7 +258,7 @@ class PairTies {
     std::vector<std::pair<size_t, ContactFeature>> changed;
     for (size_t i = first_; i < last_; ++i) {
       const ContactFeature& feature = record_.contacts[i].feature;
-      if (!Closed(i) || (Found(feature) && !Turns(feature))) {
+      if (!Closed(i) || (Found(feature) && !Turns(feature)) || GoesOnNextDoor(i)) {
         continue;
       }
       ContactFeature now;
@@ -254,12 +346,13 @@ bool MeetsACorner(const Model<double>& model, const State<double>& state,
     }
     size = std::min(size, RadiusOf(model, body));
   }
-  const auto normal = [&](const Pose<double>& pose_a, const ContactFeature& feature) {
+  const auto evaluate = [&](const Pose<double>& pose_a, const ContactFeature& feature) {
     return EvaluateContact(feature, ShapeOfA(model, contact), pose_a, ShapeOfB(model, contact),
-                           state.PoseOf(b))
-        .normal;
+                           state.PoseOf(b));
   };
-  const Vector2<double> n = normal(state.PoseOf(a), contact.feature);
+  const Pose<double> first = state.PoseOf(a);
+  const ContactGeometry<double> from = evaluate(first, contact.feature);
+  const Vector2<double> n = from.normal;
   const Vector2<double> along(n.y(), -n.x());
   for (const Vector2<double>& direction : {along, Vector2<double>(-along), Vector2<double>(-n)}) {
     Pose<double> moved = state.PoseOf(a);
@@ -268,9 +361,10 @@ bool MeetsACorner(const Model<double>& model, const State<double>& state,
     const int count =
         FindFeatures(model, a, moved, b, state.PoseOf(b), contact.Parts(), kInfinity, features);
     const bool continues = std::any_of(features, features + count, [&](const auto& feature) {
-      return (normal(moved, feature) - n).norm() <= kTurned;
+      return (evaluate(moved, feature).normal - n).norm() <= kTurned;
     });
-    if (!continues) {
+    if (!continues && !NextDoor(model, state, contact, first, moved, from)
+                           .HasContact(kContinues * kFeatureMargin * size)) {
       return true;
     }
   }

@@ -74,7 +74,8 @@ class EventSearch::PairSearch {
         touch_(search->lengths_.Touch(segment_.before, a, b)),
         located_(search->GapTolerance(segment_.before, a, b)),
         closed_(std::any_of(segment_.contacts.begin(), segment_.contacts.end(),
-                            [&](const ActiveContact& c) { return IsOfPair(c); })) {}
+                            [&](const ActiveContact& c) { return IsOfPair(c); })),
+        may_hide_(model.seams != nullptr && !RestsAtSeams()) {}
 
   void Run() {
     SearchFrom(0.0, 0.0, Counts::kUntouched);
@@ -104,6 +105,13 @@ class EventSearch::PairSearch {
       return other.gap < -kDeepTouches * touch_ && other.SameAs(contact);
     });
   }
+  // Whether one of the pair's bodies rests beside a seam of the other one, on which it may go on.
+  bool RestsAtSeams() const;
+  // The distance of a pair whose nearest features seams hide, which bounds the gaps that it has
+  // before and after; sets nearest_.
+  double HiddenGap(const State<double>& state);
+  // Makes a contact the nearest.
+  void TakeNearest(const ActiveContact& contact, const ContactGeometry<double>& geometry);
   // The smallest gap of the contacts that count; sets nearest_.
   double Gap(const Sample& sample, Counts counts, bool handed_over = false);
   // Bound on how fast the gap closes over an interval.
@@ -136,6 +144,7 @@ class EventSearch::PairSearch {
   ActiveContact nearest_;
   Vector2<double> normal_{0.0, 0.0};
   bool on_face_ = false;  ///< the normal is a face's, not that of the line between two points
+  const bool may_hide_;   ///< a gap that ends at a seam counts
 };
 
 void EventSearch::SearchPair(const Model<double>& model, int a, int b, PartPair parts,
@@ -179,6 +188,45 @@ bool EventSearch::PairSearch::Continues(const State<double>& state, const Active
   });
 }
 
+bool EventSearch::PairSearch::RestsAtSeams() const {
+  const bool first = model_.SeamsOf(a_, parts_.a) != nullptr;
+  if (!first && model_.SeamsOf(b_, parts_.b) == nullptr) {
+    return true;
+  }
+  const int moving = first ? b_ : a_;
+  return std::any_of(segment_.contacts.begin(), segment_.contacts.end(), [&](const auto& contact) {
+    return contact.joint < 0 && ((contact.a == moving && model_.SeamsOf(contact.b, 0) != nullptr) ||
+                                 (contact.b == moving && model_.SeamsOf(contact.a, 0) != nullptr));
+  });
+}
+
+void EventSearch::PairSearch::TakeNearest(const ActiveContact& contact,
+                                          const ContactGeometry<double>& geometry) {
+  nearest_ = contact;
+  nearest_.gap = geometry.gap;
+  normal_ = geometry.normal;
+  on_face_ = contact.feature.kind != FeatureKind::kVertexVertex;
+}
+
+double EventSearch::PairSearch::HiddenGap(const State<double>& state) {
+  ActiveContact contact;
+  contact.a = a_;
+  contact.b = b_;
+  ContactFeature features[2];
+  if (FindContactFeatures(model_.Shape(a_, parts_.a), state.PoseOf(a_), model_.Shape(b_, parts_.b),
+                          state.PoseOf(b_), kInfinity, features) == 0) {
+    return kInfinity;
+  }
+  contact.feature = features[0];
+  contact.feature.part_a = parts_.a;
+  contact.feature.part_b = parts_.b;
+  ContactRows<double> rows;
+  EvaluateContactRows(model_, state, contact, &rows);
+  TakeNearest(contact, rows.geometry);
+  // What is hidden does not close.
+  return std::max(rows.geometry.gap, touch_);
+}
+
 double EventSearch::PairSearch::Gap(const Sample& sample, Counts counts, bool handed_over) {
   if (!sample.good) {
     return std::numeric_limits<double>::quiet_NaN();
@@ -205,13 +253,10 @@ double EventSearch::PairSearch::Gap(const Sample& sample, Counts counts, bool ha
         (counts == Counts::kAll ? !IsDeep(contact) : !Contains(touching_, contact)) &&
         !(hands_over && std::abs(gap) <= touch_ && !Contains(touching_, contact))) {
       smallest = gap;
-      nearest_ = contact;
-      nearest_.gap = gap;
-      normal_ = rows.geometry.normal;
-      on_face_ = contact.feature.kind != FeatureKind::kVertexVertex;
+      TakeNearest(contact, rows.geometry);
     }
   }
-  return smallest;
+  return features.count == 0 && may_hide_ ? HiddenGap(state) : smallest;
 }
 
 // The bound is the speed of all points; where both ends have the same face, the speed along its

@@ -29,8 +29,7 @@ struct IslandRecord {
   template <typename T>
   const Model<T>& ModelOf(const Model<T>& whole, Model<T>* memory) const {
     if (!part) return whole;
-    memory->structure = part->structure;
-    part->GatherNumbers(whole.parameters, &memory->parameters);
+    part->GatherModel(whole, memory);
     return *memory;
   }
 };

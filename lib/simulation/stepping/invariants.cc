@@ -106,8 +106,8 @@ double DeepestPenetration(const Model<double>& model, const State<double>& state
       const ShapeView<double> shape_b = model.Shape(b, parts.b);
       const Pose<double> pose_a = state.PoseOf(a);
       const Pose<double> pose_b = state.PoseOf(b);
-      const int count = FindContactFeatures(shape_a, pose_a, shape_b, pose_b,
-                                            std::numeric_limits<double>::infinity(), features);
+      const int count = FindFeatures(model, a, pose_a, b, pose_b, parts,
+                                     std::numeric_limits<double>::infinity(), features);
       for (int k = 0; k < count; ++k) {
         const double gap = EvaluateContact(features[k], shape_a, pose_a, shape_b, pose_b).gap;
         deepest = std::max(deepest, -gap);

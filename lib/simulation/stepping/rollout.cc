@@ -5,6 +5,7 @@
 #include <cmath>
 #include <sstream>
 
+#include "tangible/dynamics/model/model_seams.h"
 #include "tangible/simulation/islands/island_jets.h"
 #include "tangible/simulation/stepping/energy_watch.h"
 #include "tangible/simulation/stepping/tolerances.h"
@@ -157,8 +158,9 @@ RolloutReport RolloutJets(ControlledModel<T>* model, const State<T>& initial, Je
     observer(0, 0.0, jets);
   }
   const SimulationSettings& settings = model->structure().settings;
-  Stepper stepper(values);
   State<double> state = ValuesOf(initial);
+  FindModelSeams(state, &values);
+  Stepper stepper(values);
   RolloutReport report;
   for (long k = 0; k < NumSteps(settings); ++k) {
     const double t = StepTime(settings, k);

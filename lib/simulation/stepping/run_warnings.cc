@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <utility>
 
+#include "tangible/geometry/tolerances.h"
 #include "tangible/simulation/stepping/energy_watch.h"
 #include "tangible/simulation/stepping/invariants.h"
 
@@ -12,6 +13,17 @@ namespace {
 
 double Energy(const Model<double>& model, const State<double>& state) {
   return KineticEnergy(model, state) + PotentialEnergy(model, state);
+}
+
+// Empty, or the line that says which steps between bodies at rest count as flush.
+std::string FlushStepsMessage(const Model<double>& model) {
+  if (model.seams == nullptr || model.seams->steps.count == 0) return "";
+  char text[192];
+  std::snprintf(text, sizeof text,
+                "%d steps of at most %.3g m between faces of static bodies count as flush (up to "
+                "%.0e m): what goes over them moves as on one face",
+                model.seams->steps.count, model.seams->steps.highest, kFlushStep);
+  return text;
 }
 
 }  // namespace
@@ -41,8 +53,8 @@ std::vector<std::string> RunWarnings::Finish(const Model<double>& model,
   std::string energy = FirstOrderByEvents(model, initial_, final);
   if (energy.empty()) energy = report.energy_grown;
   if (energy.empty()) energy = EnergyOfOverlap(model, initial_, final, report.penetration_max);
-  for (std::string line :
-       {coordinates_.Message(model), joints_.Message(model), std::move(energy)}) {
+  for (std::string line : {coordinates_.Message(model), joints_.Message(model),
+                           FlushStepsMessage(model), std::move(energy)}) {
     if (!line.empty()) lines.push_back(std::move(line));
   }
   return lines;

@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/dynamics/model/model_seams.h"
+
+#include <algorithm>
+#include <memory>
+#include <utility>
+
+#include "tangible/geometry/broad_phase.h"
+#include "tangible/geometry/tolerances.h"
+#include "tangible/math/scalar.h"
+
+namespace tangible {
+namespace {
+
+bool MoveAlike(const State<double>& state, int a, int b) {
+  return std::equal(&state.twist[3 * a], &state.twist[3 * a] + 3, &state.twist[3 * b]) &&
+         (state.twist[3 * a + 2] == 0.0);
+}
+
+// Whether whatever touches one of two bodies may touch the other one too. Only then one of them
+// hides what is inside of both.
+bool TouchTheSame(const ModelStructure& structure, int a, int b) {
+  if (structure.no_contact.empty() && structure.joined.empty()) {
+    return true;
+  }
+  return std::all_of(structure.moving.begin(), structure.moving.end(), [&](int body) {
+    return !structure.bodies[body].HasContacts() ||
+           structure.MayCollide(body, a) == structure.MayCollide(body, b);
+  });
+}
+
+// The pairs of bodies that touch and keep their places relative to each other.
+std::vector<std::pair<int, int>> FindNeighbours(const Model<double>& model,
+                                                const State<double>& state,
+                                                const std::vector<bool>& may_have_seams) {
+  const ModelStructure& structure = *model.structure;
+  std::vector<Aabb> boxes(structure.bodies.size(), {kInfinity, kInfinity, -kInfinity, -kInfinity});
+  for (int body = 0; body < structure.num_bodies(); ++body) {
+    if (may_have_seams[body]) {
+      const Pose<double> pose = state.PoseOf(body);
+      const double rounding = kSeamRounding * pose.position.cwiseAbs().maxCoeff();
+      boxes[body] = ComputeAabb(model.Shape(body), pose, kFlushStep + rounding);
+    }
+  }
+  std::vector<std::pair<int, int>> pairs;
+  BroadPhase().FindPairs(
+      boxes,
+      [&](int a, int b) {
+        return may_have_seams[a] && may_have_seams[b] && MoveAlike(state, a, b) &&
+               TouchTheSame(structure, a, b);
+      },
+      &pairs);
+  return pairs;
+}
+
+}  // namespace
+
+void FindModelSeams(const State<double>& state, Model<double>* model) {
+  model->seams = nullptr;
+  model->seams_of.clear();
+  const ModelStructure& structure = *model->structure;
+  std::vector<bool> may_have_seams(structure.bodies.size(), false);
+  int count = 0;
+  for (int body = 0; body < structure.num_bodies(); ++body) {
+    const BodyIndex& index = structure.bodies[body];
+    if (index.block < 0 && index.shape != ShapeType::kNone && MayHaveSeams(model->Shape(body))) {
+      may_have_seams[body] = true;
+      ++count;
+    }
+  }
+  if (count < 2) {
+    return;
+  }
+  std::vector<std::vector<PlacedShape>> neighbours(structure.bodies.size());
+  const auto placed = [&](int body) -> PlacedShape {
+    return {model->Shape(body), state.PoseOf(body)};
+  };
+  for (const auto& [a, b] : FindNeighbours(*model, state, may_have_seams)) {
+    neighbours[a].push_back(placed(b));
+    neighbours[b].push_back(placed(a));
+  }
+  ModelSeams seams;
+  std::vector<int> seams_of(structure.bodies.size(), -1);
+  for (int body = 0; body < structure.num_bodies(); ++body) {
+    ShapeSeams own;
+    if (!neighbours[body].empty() && structure.bodies[body].shape != ShapeType::kHalfPlane &&
+        FindSeams(placed(body), neighbours[body], &own, &seams.steps)) {
+      seams_of[body] = static_cast<int>(seams.shapes.size());
+      seams.shapes.push_back(std::move(own));
+    }
+  }
+  if (!seams.shapes.empty()) {
+    model->seams = std::make_shared<const ModelSeams>(std::move(seams));
+    model->seams_of = std::move(seams_of);
+  }
+}
+
+}  // namespace tangible

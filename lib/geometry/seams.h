@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// Seams: where shapes that do not move relative to each other touch, such as the flush tiles of a
+// floor. What is inside of their union is no surface, so that some features of a shape are no
+// contacts.
+//
+// A contact has a normal n, from the shape T to the body that touches it, at a point x of T.
+//   1. Of an edge, the part whose points x + ε n lie in a neighbour is hidden.
+//   2. A vertex v within a neighbour U is a contact only with a normal that both leave free,
+//          n ∈ N_T(v) ∩ N_U(v),
+//      where N(v) is the cone between the normals of the edges at v, the normal alone within an
+//      edge, and empty inside. At a flush seam the cone is one direction, which the edges have, so
+//      that there is neither a corner nor an end of a face. Where the union is concave it is empty.
+// A point counts as in a neighbour where it is at most kFlushStep outside, so that a step of that
+// height counts as flush. All places are in the frame of T.
+
+#include <vector>
+
+#include "tangible/geometry/collide.h"
+#include "tangible/math/planar.h"
+
+namespace tangible {
+
+struct SeamVertex {
+  bool is_bounded = false;  ///< a neighbour contains it
+  bool is_open = true;      ///< contacts with a normal of the cone exist
+  /// The cone, counter-clockwise; without neighbours that of the shape.
+  Vector2<double> first{0.0, 0.0}, last{0.0, 0.0};
+  /// M: how far the edges reach beyond a bounded vertex. At a step the higher face reaches to the
+  /// neighbour and the lower one begins behind it, so that no body rests on both at one place.
+  double beyond = 0.0;
+};
+
+/// From the edge's start, m.
+struct FreePart {
+  double from, to;
+};
+
+struct SeamEdge {
+  Vector2<double> start{0.0, 0.0}, tangent{0.0, 0.0}, normal{0.0, 0.0};
+  double length = 0.0;
+  bool is_whole = true;         ///< nothing of it is hidden
+  std::vector<FreePart> parts;  ///< that are not hidden, where it is not whole
+};
+
+/// What the neighbours of a polygon or box leave of it; vertex i is the start of edge i.
+struct ShapeSeams {
+  std::vector<SeamVertex> vertices;
+  std::vector<SeamEdge> edges;
+};
+
+/// A shape at rest, or one of several that move alike.
+struct PlacedShape {
+  ShapeView<double> shape;
+  Pose<double> pose;
+};
+
+/// Whether a shape may be part of a seam: a box, polygon or half-plane with an area.
+bool MayHaveSeams(const ShapeView<double>& shape);
+
+/// The steps that count as flush.
+struct FlushSteps {
+  int count = 0;
+  double highest = 0.0;  ///< m
+};
+
+/// Sets what the neighbours leave of a box or polygon, and returns whether they take anything. Adds
+/// the steps down from it that exceed rounding to `steps`.
+bool FindSeams(const PlacedShape& placed, const std::vector<PlacedShape>& neighbours,
+               ShapeSeams* seams, FlushSteps* steps);
+
+/// Says which shape of a pair has seams.
+enum class SeamSide { kFirst, kSecond };
+
+/// FindContactFeatures for a pair of which one shape has seams. Where nothing that is hidden is
+/// nearest the result is the same.
+int FindContactFeaturesAtSeams(const ShapeView<double>& shape_a, const Pose<double>& pose_a,
+                               const ShapeView<double>& shape_b, const Pose<double>& pose_b,
+                               const ShapeSeams& seams, SeamSide side, double max_gap,
+                               ContactFeature features[2]);
+
+}  // namespace tangible
