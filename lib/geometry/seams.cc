@@ -99,7 +99,6 @@ class SeamFinder {
     seams_.edges.assign(n, SeamEdge());
     seams_.vertices.assign(n, SeamVertex());
     hidden_.resize(n);
-    is_lower_.assign(n, false);
     for (int i = 0; i < n; ++i) {
       SeamEdge& edge = seams_.edges[i];
       edge.start = Vertex(placed.shape, i);
@@ -180,14 +179,9 @@ class SeamFinder {
       } else if (height > rounding_ && own.high - own.low > kFlushTurn) {
         ++steps_.count;
         steps_.highest = std::max(steps_.highest, height);
-      } else if (height < -rounding_) {
-        is_lower_[i] = true;
       }
     }
     vertex.beyond = std::max(vertex.beyond, reach);
-    if (is_lower_[i]) {
-      vertex.beyond = -kBehindStep * rounding_;
-    }
   }
 
   /// Adds the part of edge i that a neighbour hides. Along the edge the neighbour must reach beyond
@@ -196,7 +190,6 @@ class SeamFinder {
     const SeamEdge& edge = seams_.edges[i];
     double from = 0.0;
     double to = edge.length;
-    bool below_step = false;
     for (const Line& line : lines) {
       const double height = line.Height(edge.start);
       const double slope = line.normal.dot(edge.tangent);
@@ -205,7 +198,6 @@ class SeamFinder {
         if (height > (outward > 0.0 ? -rounding_ : within_)) {
           return;
         }
-        below_step = below_step || outward > 0.0;
       } else if (slope > 0.0) {
         to = std::min(to, -height / slope);
       } else {
@@ -213,8 +205,7 @@ class SeamFinder {
       }
     }
     if (to > from) {
-      const double more = below_step ? kBehindStep * rounding_ : 0.0;
-      hidden_[i].push_back({std::max(from - more, 0.0), std::min(to + more, edge.length)});
+      hidden_[i].push_back({from, to});
     }
   }
 
@@ -239,7 +230,6 @@ class SeamFinder {
   FlushSteps& steps_;
   std::vector<Cone> cones_;
   std::vector<std::vector<FreePart>> hidden_;
-  std::vector<bool> is_lower_;
   double rounding_ = 0.0, within_ = 0.0;
 };
 

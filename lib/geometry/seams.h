@@ -27,8 +27,8 @@ struct SeamVertex {
   bool is_open = true;      ///< contacts with a normal of the cone exist
   /// The cone, counter-clockwise; without neighbours that of the shape.
   Vector2<double> first{0.0, 0.0}, last{0.0, 0.0};
-  /// M: how far the edges reach beyond a bounded vertex. At a step the higher face reaches to the
-  /// neighbour and the lower one begins behind it, so that no body rests on both at one place.
+  /// M: how far the edges reach beyond a bounded vertex: to the neighbour, and by rounding, so that
+  /// each place has an owner. Where it has two, one of the contacts acts (seam_contacts.h).
   double beyond = 0.0;
 };
 

@@ -32,9 +32,6 @@ inline constexpr double kTurnRounding = 2.0 * std::numeric_limits<double>::epsil
 inline constexpr double kFlushStep = 1e-8;
 /// Of the coordinate: the rounding of the place of one shape relative to another.
 inline constexpr double kSeamRounding = 64.0 * std::numeric_limits<double>::epsilon();
-/// Of the rounding of the place of one shape relative to another: a face that is lower than its
-/// neighbour begins farther from the seam, twice as far as the higher one reaches.
-inline constexpr double kBehindStep = 4.0;
 /// Rad: faces that turn by a smaller angle have equal normals.
 inline constexpr double kFlushTurn = 1e-9;
 

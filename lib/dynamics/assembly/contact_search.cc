@@ -5,8 +5,8 @@
 #include <cmath>
 #include <limits>
 
+#include "tangible/dynamics/elements/seam_contacts.h"
 #include "tangible/dynamics/model/tolerances.h"
-#include "tangible/geometry/tolerances.h"
 
 namespace tangible {
 namespace {
@@ -35,34 +35,18 @@ ContactLaw GapLaw(double gap, double h, const SimulationSettings& settings) {
 // open.
 void RemoveSecondOwners(const Model<double>& model, const AssemblyScratch<double>& scratch,
                         size_t first, std::vector<ActiveContact>* contacts) {
-  const auto has_seams = [&](const ActiveContact& contact, int body) {
-    return model.SeamsOf(body, body == contact.a ? contact.feature.part_a
-                                                 : contact.feature.part_b) != nullptr;
-  };
   const auto geometry_of = [&](const ActiveContact& contact) {
     ContactRows<double> rows;
     EvaluateContactRows(model, scratch.poses, contact, &rows);
     return rows.geometry;
   };
+  const auto begin = contacts->begin() + static_cast<std::ptrdiff_t>(first);
   const auto is_second = [&](const ActiveContact& contact) {
-    const int moving = has_seams(contact, contact.a) ? contact.b : contact.a;
-    const int other = moving == contact.a ? contact.b : contact.a;
-    return has_seams(contact, other) &&
-           std::any_of(contacts->begin(), contacts->begin() + static_cast<std::ptrdiff_t>(first),
-                       [&](const ActiveContact& earlier) {
-                         const bool is_first = earlier.a == moving;
-                         if (!is_first && earlier.b != moving) return false;
-                         if (!has_seams(earlier, is_first ? earlier.b : earlier.a)) return false;
-                         const ContactGeometry<double> x = geometry_of(earlier);
-                         const ContactGeometry<double> y = geometry_of(contact);
-                         const double sign = is_first == (contact.a == moving) ? 1.0 : -1.0;
-                         return (x.point - y.point).norm() <= 2.0 * kFlushStep &&
-                                (x.normal - sign * y.normal).norm() <= kFlushTurn;
-                       });
+    return std::any_of(contacts->begin(), begin, [&](const ActiveContact& earlier) {
+      return AreOfOneSeam(model, earlier, geometry_of(earlier), contact, geometry_of(contact));
+    });
   };
-  contacts->erase(std::remove_if(contacts->begin() + static_cast<std::ptrdiff_t>(first),
-                                 contacts->end(), is_second),
-                  contacts->end());
+  contacts->erase(std::remove_if(begin, contacts->end(), is_second), contacts->end());
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "tangible/dynamics/elements/contacts_ahead.h"
+#include "tangible/dynamics/elements/seam_contacts.h"
 #include "tangible/simulation/events/event_step.h"
 #include "tangible/simulation/events/tolerances.h"
 
@@ -26,6 +27,32 @@ void EventStepper::AddTouching(const Model<double>& model, const State<double>& 
   touching_.slip.push_back(speeds.slip);
 }
 
+namespace {
+
+// Keeps the nearest of the contacts of a body that is exactly above a seam: on both sides of a step
+// that counts as flush it cannot rest.
+void KeepOneOwner(const Model<double>& model, const State<double>& state,
+                  std::vector<ActiveContact>* contacts) {
+  const auto geometry_of = [&](const ActiveContact& contact) {
+    ContactRows<double> rows;
+    EvaluateContactRows(model, state, contact, &rows);
+    return rows.geometry;
+  };
+  for (size_t i = contacts->size(); i-- > 0;) {
+    const ActiveContact& contact = (*contacts)[i];
+    const ContactGeometry<double> own = geometry_of(contact);
+    const bool is_second =
+        std::any_of(contacts->begin(), contacts->end(), [&](const ActiveContact& other) {
+          const bool is_nearer =
+              other.gap < contact.gap || (other.gap == contact.gap && &other < &contact);
+          return is_nearer && AreOfOneSeam(model, other, geometry_of(other), contact, own);
+        });
+    if (is_second) contacts->erase(contacts->begin() + static_cast<std::ptrdiff_t>(i));
+  }
+}
+
+}  // namespace
+
 void EventStepper::FindTouching(const Model<double>& model, const State<double>& state) {
   const ModelStructure& structure = *model.structure;
   const Lengths& lengths = search_.lengths();
@@ -36,6 +63,7 @@ void EventStepper::FindTouching(const Model<double>& model, const State<double>&
   }
   std::vector<ActiveContact> found;
   search_.FindContacts(model, state, reach, &found);
+  if (model.seams != nullptr) KeepOneOwner(model, state, &found);
   const double slow = search_.SpeedTolerance(model, state);
   for (const ActiveContact& contact : found) {
     const double touch = lengths.Touch(state, contact.a, contact.b);
