@@ -24,6 +24,13 @@ DEFINE_int32(seed, 1, "of starts and noise");
 namespace tangible {
 namespace {
 
+// Starts are drawn in logarithms; observations are kept, a number each; and residuals are divided
+// by sigma.
+constexpr double kMostRange = 1e9;
+constexpr double kLeastRate = 1e-3;
+constexpr double kMostRate = 1e6;
+constexpr double kLeastSigma = 1e-12;
+
 // What must hold: of the starts, and of the 95 % intervals pooled and of each link.
 constexpr double kLeastReached = 0.95;
 constexpr double kPooled[] = {0.935, 0.965};
@@ -87,16 +94,13 @@ int Main(int argc, char** argv) {
   if (line.exit_status) {
     return *line.exit_status;
   }
-  const auto wrong = [](const char* flag, const char* expected, double got) {
-    return ReportError("tangible-chain-study: --" + std::string(flag) + ": expected " + expected +
-                           ", got " + std::to_string(got),
-                       kExitUsage);
-  };
-  if (FLAGS_starts < 0) return wrong("starts", "a number >= 0", FLAGS_starts);
-  if (FLAGS_replicas < 0) return wrong("replicas", "a number >= 0", FLAGS_replicas);
-  if (!(FLAGS_range >= 1.0)) return wrong("range", "a number >= 1", FLAGS_range);
-  if (!(FLAGS_rate > 0.0)) return wrong("rate", "a number > 0", FLAGS_rate);
-  if (!(FLAGS_sigma > 0.0)) return wrong("sigma", "a number > 0", FLAGS_sigma);
+  const std::string wrong = FirstOutside({{"--starts", FLAGS_starts, 0},
+                                          {"--replicas", FLAGS_replicas, 0},
+                                          {"--range", FLAGS_range, 1, kMostRange},
+                                          {"--rate", FLAGS_rate, kLeastRate, kMostRate},
+                                          {"--sigma", FLAGS_sigma, kLeastSigma},
+                                          {"--seed", FLAGS_seed, 0}});
+  if (!wrong.empty()) return ReportError("tangible-chain-study: " + wrong, kExitUsage);
   Scene scene;
   std::string error;
   if (!LoadScene(line.positional[0], &scene, &error)) {

@@ -12,6 +12,7 @@
 #include <memory>
 #include <numeric>
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -57,6 +58,7 @@ namespace {
 
 /// "chain mass=20,friction=0.1" into the parameters; returns what is wrong or empty.
 std::string OverrideInitial(const std::string& text, std::vector<FitParameter>* parameters) {
+  std::set<std::string> given;
   size_t begin = 0;
   while (begin < text.size()) {
     const size_t end = std::min(text.find(',', begin), text.size());
@@ -67,15 +69,19 @@ std::string OverrideInitial(const std::string& text, std::vector<FitParameter>* 
     if (equal == std::string::npos || !ParseNumber(item.substr(equal + 1), &value)) {
       return "expected name=value, got '" + item + "'";
     }
+    const std::string name = item.substr(0, equal);
     bool known = false;
     for (FitParameter& parameter : *parameters) {
-      if (parameter.name == item.substr(0, equal)) {
+      if (parameter.name == name) {
         parameter.initial = value;
         known = true;
       }
     }
     if (!known) {
-      return "expected the name of a parameter, got '" + item.substr(0, equal) + "'";
+      return "expected the name of a parameter, got '" + name + "'";
+    }
+    if (!given.insert(name).second) {
+      return "expected one value of each parameter, got two of '" + name + "'";
     }
   }
   return "";

@@ -370,6 +370,22 @@ void Finish(FitRun* run, FitResult* result) {
   if (best.status == FitStatus::kFailed) {
     return;
   }
+  Linearizer linearizer(run->problem, run->options.derivatives, run->options.threads, nullptr);
+  std::vector<BlockEvaluation> blocks;
+  if (!linearizer.Rows(best.parameters, BlockDerivatives::kCompute, &blocks)) {
+    result->status = FitStatus::kFailed;
+    result->message = "the run at the estimate fails: " + linearizer.message();
+    return;
+  }
+  run->rollouts += linearizer.rollouts();
+  const Eigen::VectorXd residuals = ObservationResiduals(*run->problem, blocks);
+  if (!std::isfinite(residuals.squaredNorm())) {  // Huber's loss may be finite all the same
+    result->status = FitStatus::kFailed;
+    result->message =
+        "the squares of the residuals are not finite: an observation or a sigma is beyond all "
+        "bounds";
+    return;
+  }
   result->estimate = best.parameters;
   result->iterations = best.iterations;
   if (!std::isfinite(result->initial_cost)) {
@@ -379,15 +395,7 @@ void Finish(FitRun* run, FitResult* result) {
   if (best.approach != FitApproach::kPlain) {
     result->message += std::string(result->message.empty() ? "" : "; ") + DescribeApproach(best);
   }
-  Linearizer linearizer(run->problem, run->options.derivatives, run->options.threads, nullptr);
-  std::vector<BlockEvaluation> blocks;
-  if (!linearizer.Rows(best.parameters, BlockDerivatives::kCompute, &blocks)) {
-    result->status = FitStatus::kFailed;
-    result->message = "the run at the estimate fails: " + linearizer.message();
-    return;
-  }
-  run->rollouts += linearizer.rollouts();
-  result->residuals = ObservationResiduals(*run->problem, blocks);
+  result->residuals = residuals;
   UncertaintyOptions uncertainty;
   uncertainty.leverages = run->options.leverages;
   uncertainty.huber = run->options.huber;

@@ -228,6 +228,11 @@ class Minimiser : public ceres::IterationCallback {
       const bool hold = PushedOut(k);
       change = change || hold != held_[k];
       held_[k] = hold;
+      // A logarithm that has passed the least value would have as far a way back.
+      if (hold && entries_[k].logarithmic) {
+        double& q = q_[static_cast<Eigen::Index>(k)];
+        q = std::max(q, ToInternal(entries_[k], LeastOf(entries_[k])));
+      }
       pushed_[k] = 0;
     }
     return change;

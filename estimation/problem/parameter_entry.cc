@@ -32,7 +32,12 @@ double ToInternal(const ParameterEntry& entry, double p) {
 double ToParameter(const ParameterEntry& entry, double q) {
   const double p = entry.logarithmic ? entry.initial * std::exp(q) : q * entry.scale;
   // exp(ln(upper / p_0)) p_0 may pass the bound by a rounding.
-  return std::clamp(p, entry.lower, entry.upper);
+  return std::clamp(p, LeastOf(entry), entry.upper);
+}
+
+double LeastOf(const ParameterEntry& entry) {
+  const bool open = entry.logarithmic && entry.lower == 0.0;
+  return open ? kVanished * entry.initial : entry.lower;
 }
 
 double ParameterByInternal(const ParameterEntry& entry, double p) {
@@ -41,8 +46,9 @@ double ParameterByInternal(const ParameterEntry& entry, double p) {
 
 bool IsAtBound(const ParameterEntry& entry, double p) {
   const double slack = kBoundRounding * std::max(std::abs(p), entry.scale);
-  const bool open = entry.logarithmic && entry.lower == 0.0;
-  return (!open && p <= entry.lower + slack) || p >= entry.upper - slack;
+  const double least = LeastOf(entry);
+  return p <= least + (least > entry.lower ? kBoundRounding * least : slack) ||
+         p >= entry.upper - slack;
 }
 
 Eigen::VectorXd InitialOf(const std::vector<ParameterEntry>& entries) {

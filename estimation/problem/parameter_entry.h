@@ -36,8 +36,11 @@ double ToParameter(const ParameterEntry& entry, double q);
 /// dp/dq at p.
 double ParameterByInternal(const ParameterEntry& entry, double p);
 
-/// Whether p lies on a bound, up to rounding. A lower bound of 0 of a logarithmic parameter is
-/// never reached.
+/// The least value that p takes: its lower bound; where that is 0 and the variable a logarithm,
+/// which never reaches it, kVanished of the initial value.
+double LeastOf(const ParameterEntry& entry);
+
+/// Whether p lies on a bound, up to rounding, or is the least value that it takes.
 bool IsAtBound(const ParameterEntry& entry, double p);
 
 /// The same for vectors of parameters, one for each entry.

@@ -16,6 +16,10 @@ inline constexpr double kRateStep = 1e-3;
 /// bound, because exp(ln bound) and the projection of the minimiser reach a bound within this
 /// error.
 inline constexpr double kBoundRounding = 1e-13;
+/// Of the initial value: a logarithmic parameter whose lower bound is 0 becomes no smaller, and is
+/// then at that bound. A parameter that the observations determine is not started ten decades from
+/// its value, and a body of so small an inertia is still larger than the rounding of its place.
+inline constexpr double kVanished = 1e-10;
 /// Of the observed value: the rounding of a run and the errors that its projections leave; smaller
 /// residuals carry no information.
 inline constexpr double kPredictionRounding = 1e-9;

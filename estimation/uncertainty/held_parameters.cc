@@ -151,7 +151,9 @@ bool TestOne(const ParameterEntry& entry, const Eigen::VectorXd& column, const E
   held->value = entry.initial;
   held->change = -score / square;
   held->cost_share = score * score / (square * residuals.squaredNorm());
-  return std::isfinite(held->change) && !(entry.initial <= entry.lower && held->change < 0.0) &&
+  const double largest = kLargestChange * std::max(std::abs(entry.initial), entry.scale);
+  return std::abs(held->change) <= largest &&
+         !(entry.initial <= entry.lower && held->change < 0.0) &&
          !(entry.initial >= entry.upper && held->change > 0.0);
 }
 

@@ -23,6 +23,9 @@ inline constexpr double kSmallWeight = 1e-6;
 /// Of the column of a held parameter: a held parameter cannot be distinguished from the free
 /// parameters if these reproduce all but a smaller part of its column.
 inline constexpr double kSeparable = 1e-5;
+/// Of a held value, at least its typical magnitude: a larger change to first order is an
+/// extrapolation of a value that has next to no effect, and no cause of what the model misses.
+inline constexpr double kLargestChange = 1e3;
 /// Of the standard deviation: the quantile of 0.975 of the normal distribution: half of a 95 %
 /// interval.
 inline constexpr double kNormalQuantile = 1.959963984540054;

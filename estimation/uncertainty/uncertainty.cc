@@ -108,8 +108,9 @@ class Estimator {
         continue;
       }
       const bool lower = estimate < 0.5 * (entries_[k].lower + entries_[k].upper);
-      result_.messages[k] =
-          std::string("at its ") + (lower ? "lower" : "upper") + " bound: no interval";
+      result_.messages[k] = std::string("at its ") + (lower ? "lower" : "upper") + " bound" +
+                            (lower && LeastOf(entries_[k]) > entries_[k].lower ? " 0" : "") +
+                            ": no interval";
       result_.warnings.push_back("'" + entries_[k].name + "' is " + result_.messages[k]);
     }
     for (int k = 0; k < layout_.num_shared(); ++k) {

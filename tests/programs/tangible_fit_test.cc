@@ -567,10 +567,102 @@ TEST_F(TangibleFitTest, FlagsOverrideTheFile) {
   EXPECT_NE(run.out.find("g = 9.5"), std::string::npos) << run.out;
   EXPECT_EQ(Fit(Problem(), "--derivatives=guess").exit_status, 2);
   EXPECT_EQ(Fit(Problem(), "--initial=mass=1").exit_status, 2);
+  ExpectOneLine(Fit(Problem(), "--initial=g=1,speed=3,g=2"), 2,
+                "expected one value of each parameter, got two of 'g'");
   EXPECT_EQ(Fit(Problem(), "--max_iterations=0").exit_status, 2);
   EXPECT_EQ(Run("tangible-fit", "").exit_status, 2);
   EXPECT_EQ(Run("tangible-fit", "--no_such_flag x.json").exit_status, 2);
   EXPECT_EQ(Run("tangible-fit", "--help").exit_status, 0);
+}
+
+// A run of no steps, or the last instant of a run, with a delay or a clock that moves the times of
+// observations: nothing moves there, so that the parameter has no effect.
+TEST_F(TangibleFitTest, ATimeThatMovesInARunOfNoStepsIsOneLine) {
+  for (const std::string stepping : {"fixed", "event"}) {
+    for (const std::string duration : {"0", "1"}) {
+      Write("still.json", R"({"gravity": [0, 0], "bodies": [
+          {"name": "b", "shape": {"circle": {"radius": 0.1}}, "mass": 1, "position": [0, 0]}],
+        "simulation": {"dt": 0.01, "stepping": ")" +
+                              stepping + R"(", "duration": )" + duration + "}}");
+      for (const bool of_clock : {true, false}) {
+        SCOPED_TRACE(stepping + duration + (of_clock ? " clock" : " delay"));
+        json fit = {{"scene", "still.json"}, {"parameters", {"bodies/b/position/x"}}};
+        json observation = {{"file", "one.csv"}, {"sigma", 0.001}};
+        if (of_clock) {
+          fit["clocks"] = {{"c", json::object()}};
+          observation["clock"] = "c";
+          fit["parameters"].push_back(
+              {{"name", "rate"}, {"path", "clocks/c/rate"}, {"lower", 0.9}, {"upper", 1.1}});
+        } else {
+          fit["sensors"] = {{"c", json::object()}};
+          observation["sensor"] = "c";
+          fit["parameters"].push_back(
+              {{"name", "delay"}, {"path", "sensors/c/delay"}, {"initial", 0}});
+        }
+        Write("one.csv", "time,body,x,y\n0,b,0.01,0\n");
+        fit["observations"] = {observation};
+        ExpectOneLine(Fit(fit), 1, "has no effect on any residual");
+        if (duration == "0" || !of_clock) continue;
+        fit.erase("observations");
+        Write("one.csv", "time,body,x,y\n0.5,b,0.01,0\n1,b,0.01,0\n");
+        fit["recordings"] = {{{"name", "r"}, {"start", 1}, {"observations", {observation}}}};
+        ExpectOneLine(Fit(fit), 1, "has no effect on any residual");
+      }
+    }
+  }
+}
+
+// Small swings of a rod whose inertia about its pivot is 0.9 m c², of which the scene's c alone
+// makes m c²: the best inertia about the centre of mass is its bound, 0, which a logarithm does not
+// reach, and c is what drives it there.
+TEST_F(TangibleFitTest, AnInertiaThatRunsToZeroIsAtItsBound) {
+  Write("rod.json", R"({"bodies": [{"name": "rod", "mass": 0.2, "inertia": 0.01,
+                                   "position": [0, -0.5]}],
+      "joints": [{"name": "pin", "type": "revolute", "bodies": ["rod", "world"], "anchor": [0, 0],
+                  "angle": 0.1}],
+      "simulation": {"dt": 0.01, "duration": 2, "stepping": "event"}})");
+  const double omega = std::sqrt(9.81 / (0.9 * 0.5));
+  std::string text = "time,body,x\n";
+  for (int k = 0; k <= 40; ++k) {
+    const double angle = 0.1 * std::cos(omega * 0.05 * k);
+    text += json(0.05 * k).dump() + ",rod," + json(0.5 * std::sin(angle)).dump() + "\n";
+  }
+  Write("swings.csv", text);
+  for (const double initial : {0.01, 0.5}) {
+    const ProgramRun run =
+        Fit({{"scene", "rod.json"},
+             {"observations", {{{"file", "swings.csv"}, {"sigma", 0.001}}}},
+             {"parameters",
+              {{{"name", "inertia"}, {"path", "bodies/rod/inertia"}, {"initial", initial}}}}},
+            "--out='" + Path("r.json") + "'");
+    ASSERT_EQ(run.exit_status, 0) << run.error;
+    EXPECT_NE(run.out.find("(at its lower bound 0: no interval)"), std::string::npos) << run.out;
+    EXPECT_EQ(run.error.find("coordinates are too large"), std::string::npos) << run.error;
+    const json result = json::parse(Read(Path("r.json")));
+    EXPECT_EQ(result["status"], "converged");
+    EXPECT_NEAR(result["parameters"][0]["estimate"], 1e-10 * initial, 1e-16 * initial);
+    EXPECT_TRUE(result["parameters"][0]["confidence_95"].is_null());
+    bool blamed = false;
+    for (const json& held : result["held_parameters"]) {
+      blamed = blamed || held["path"] == "bodies/rod/position/y";
+      // To first order: no more than some times what the scene has.
+      EXPECT_LT(std::abs(held["change"].get<double>()), 1e4) << held;
+    }
+    EXPECT_TRUE(blamed) << result["held_parameters"];
+  }
+}
+
+// Huber's loss of a value is finite where its square is not, which all that is said of a fit needs.
+TEST_F(TangibleFitTest, AValueWhoseSquareOverflowsIsAnError) {
+  json fit = Problem({{"loss", {{"huber", 2}}}});
+  for (const std::string value : {"1e300", "-1e160"}) {
+    Write("o.csv", Observations() + "0.25,ball,0.5," + value + "\n");
+    ExpectOneLine(Fit(fit), 1, "are not finite");
+  }
+  Write("o.csv", Observations() + "0.25,ball,0.5,1e100\n");
+  const ProgramRun run = Fit(fit, "--out='" + Path("r.json") + "'");
+  EXPECT_EQ(run.exit_status, 0) << run.error;
+  EXPECT_TRUE(json::parse(Read(Path("r.json")))["reduced_chi_square"].is_number());
 }
 
 // The chain's fit by event stepping (data/README.md): no bias of the step, the interval holds the

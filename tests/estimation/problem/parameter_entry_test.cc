@@ -5,6 +5,7 @@
 
 #include <cmath>
 
+#include "tangible/estimation/problem/tolerances.h"
 #include "tangible/math/scalar.h"
 
 namespace tangible {
@@ -37,8 +38,27 @@ TEST(ParameterEntryTest, ABoundIsReachedWithinRounding) {
   EXPECT_TRUE(IsAtBound(kMass, 20.0));
   EXPECT_FALSE(IsAtBound(kMass, 0.5 + 1e-9));
   EXPECT_TRUE(IsAtBound(kLength, -1.0));
-  const ParameterEntry positive{"positive", 1.0, 0.0, kInfinity, true, 1.0};
-  EXPECT_FALSE(IsAtBound(positive, 1e-300));
+}
+
+// A logarithm never reaches 0. What runs there is at its bound, at a value that a run can have; ten
+// decades below the start nothing is determined. The scale, whatever it is, has no part in it.
+TEST(ParameterEntryTest, ALogarithmThatRunsToZeroIsAtItsBound) {
+  for (const double initial : {1.0, 0.01, 3e7}) {
+    for (const double scale : {1e-6, 1.0, 1e6}) {
+      const ParameterEntry positive{"positive", initial, 0.0, kInfinity, true, scale};
+      for (const double q : {-25.0, -395.0, -1e6, -kInfinity}) {
+        const double p = ToParameter(positive, q);
+        EXPECT_EQ(p, kVanished * initial);
+        EXPECT_TRUE(IsAtBound(positive, p));
+      }
+      EXPECT_FALSE(IsAtBound(positive, 1.001 * kVanished * initial));
+      EXPECT_EQ(ToParameter(positive, -20.0), initial * std::exp(-20.0));
+    }
+  }
+  // A bound of one's own may be lower.
+  const ParameterEntry bounded{"bounded", 1.0, 1e-20, kInfinity, true, 1e-20};
+  EXPECT_EQ(ToParameter(bounded, -100.0), 1e-20);
+  EXPECT_FALSE(IsAtBound(bounded, 1e-12));
 }
 
 }  // namespace
