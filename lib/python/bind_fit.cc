@@ -15,7 +15,7 @@
 namespace tangible::python {
 namespace {
 
-// A fit file of one run or several recordings, read. Calls change its memory: one at a time.
+// A fit file of one run or several recordings, read. Calls change its memory, and take turns.
 class FitProblemOf {
  public:
   FitProblemOf(const std::string& text, const std::string& file) {
@@ -53,7 +53,7 @@ class FitProblemOf {
     Eigen::VectorXd values(layout.num_rows());
     RowMatrixXd jacobian = RowMatrixXd::Zero(with_jacobian ? layout.num_rows() : 0, count);
     const std::string error = WithoutLock(
-        [&](SignalWatch* watch) { return EvaluateBlocks(layout, p, watch, &values, &jacobian); });
+        [&] { return turns_.Take([&] { return EvaluateBlocks(layout, p, &values, &jacobian); }); });
     if (!error.empty()) throw Error(error);
     const auto rows = static_cast<py::ssize_t>(values.size());
     return py::make_tuple(
@@ -63,35 +63,36 @@ class FitProblemOf {
 
   // (the result as tangible-fit writes it, the report as a page)
   py::tuple Run(int max_iterations) {
-    fit_.run().options.max_iterations = max_iterations;
-    std::string json;
-    std::string report;
-    WithoutLock([&](SignalWatch* watch) {
-      const FitProgress progress = [watch](int, int, const FitIteration&) { watch->CheckNow(); };
-      VarianceComponents components;
-      const FitResult result =
-          FitWithComponents(fit_.input.options(), problem_.get(), progress, &components);
-      OrderedJson all = ResultToJson(*problem_, result, {&components});
-      const bool any = result.estimate.size() > 0;
-      all["certificate"] = any ? ToJson(result.certificate) : OrderedJson(nullptr);
-      json = all.dump();
-      if (any) report = FitReport(fit_.path, *problem_, result, {&components});
-      return 0;
-    });
+    const auto [json, report] =
+        WithoutLock([&] { return turns_.Take([&] { return Texts(max_iterations); }); });
     return py::make_tuple(json, report);
   }
 
  private:
   RecordingsProblem& problem() { return *problem_; }
 
+  // What Run returns.
+  std::pair<std::string, std::string> Texts(int max_iterations) {
+    fit_.run().options.max_iterations = max_iterations;
+    const FitProgress progress = [](int, int, const FitIteration&) { CheckInterrupt(); };
+    VarianceComponents components;
+    const FitResult result =
+        FitWithComponents(fit_.input.options(), problem_.get(), progress, &components);
+    OrderedJson all = ResultToJson(*problem_, result, {&components});
+    const bool any = result.estimate.size() > 0;
+    all["certificate"] = any ? ToJson(result.certificate) : OrderedJson(nullptr);
+    return {all.dump(),
+            any ? FitReport(fit_.path, *problem_, result, {&components}) : std::string()};
+  }
+
   // Rows of all blocks, each times the root of its weight; what is wrong, or empty. No Jacobian
   // where that has no rows.
   std::string EvaluateBlocks(const BlockLayout& layout, const Eigen::VectorXd& p,
-                             SignalWatch* watch, Eigen::VectorXd* values, RowMatrixXd* jacobian) {
+                             Eigen::VectorXd* values, RowMatrixXd* jacobian) {
     const auto derivatives =
         jacobian->rows() > 0 ? BlockDerivatives::kCompute : BlockDerivatives::kSkip;
     for (int b = 0; b < layout.num_blocks(); ++b) {
-      watch->CheckNow();
+      CheckInterrupt();
       BlockEvaluation block;
       if (!problem().EvaluateBlock(b, layout.Local(b, p), fit_.input.options().derivatives,
                                    derivatives, &block)) {
@@ -110,6 +111,7 @@ class FitProblemOf {
 
   FitFile fit_;
   std::unique_ptr<RecordingsProblem> problem_;
+  Turns turns_;
 };
 
 }  // namespace

@@ -53,7 +53,6 @@ class Workers {
     return worker;
   }
   void Keep(std::unique_ptr<RolloutWorker> worker) {
-    worker->SetInterrupt({});
     const std::lock_guard<std::mutex> lock(mutex_);
     free_.push_back(std::move(worker));
   }
@@ -155,17 +154,15 @@ class Rollout {
 
   py::tuple Run(const Inputs& in, int threads) const {
     const std::vector<RolloutInput> inputs = Read(in);
-    return Outputs(WithoutLock([&](SignalWatch* watch) {
+    return Outputs(WithoutLock([&] {
       if (inputs.size() == 1) {
         std::unique_ptr<RolloutWorker> worker = workers_.Take(function_);
-        worker->SetInterrupt([watch] { watch->Check(); });
         std::vector<RolloutOutput> outputs;
         outputs.push_back(worker->Run(inputs[0]));
         workers_.Keep(std::move(worker));
         return outputs;
       }
       RolloutBatch batch(function_, threads);
-      batch.SetInterrupt([watch] { watch->Check(); });
       return batch.Run(inputs);
     }));
   }
@@ -174,9 +171,8 @@ class Rollout {
     const std::vector<RolloutInput> inputs = Read(in);
     const std::vector<InputDirection> directions = Read(direction, "tangent of ");
     std::vector<RowMatrixXd> tangents;
-    py::tuple outputs = Outputs(WithoutLock([&](SignalWatch* watch) {
+    py::tuple outputs = Outputs(WithoutLock([&] {
       RolloutBatch batch(function_, threads);
-      batch.SetInterrupt([watch] { watch->Check(); });
       return batch.Tangent(inputs, directions, &tangents);
     }));
     return py::make_tuple(outputs[0], outputs[1], outputs[2], States(tangents));
@@ -196,9 +192,8 @@ class Rollout {
     }
     RowMatrixXd jacobian;
     GradientMethod used = GradientMethod::kAuto;
-    const RolloutOutput output = WithoutLock([&](SignalWatch* watch) {
+    const RolloutOutput output = WithoutLock([&] {
       RolloutWorker worker(function_);
-      worker.SetInterrupt([watch] { watch->Check(); });
       return worker.Jacobian(inputs.at(0), found->second, RolloutWorker::Inputs::kAll, &jacobian,
                              &used);
     });
@@ -216,7 +211,7 @@ class Rollout {
   std::vector<std::string> Certify(const Inputs& in, int threads) const {
     const std::vector<RolloutInput> inputs = Read(in);
     const std::vector<Certificate> certificates =
-        WithoutLock([&](SignalWatch*) { return RolloutBatch(function_, threads).Certify(inputs); });
+        WithoutLock([&] { return RolloutBatch(function_, threads).Certify(inputs); });
     std::vector<std::string> texts;
     texts.reserve(certificates.size());
     for (const Certificate& certificate : certificates) {
@@ -237,20 +232,16 @@ class Recorded {
       : rollout_(rollout), batch_(rollout->function(), threads) {
     std::vector<RolloutInput> inputs = rollout->Read(in);
     rows_ = inputs.size();
-    outputs_ = rollout->Outputs(WithoutLock([&](SignalWatch* watch) {
-      batch_.SetInterrupt([watch] { watch->Check(); });
-      auto outputs = batch_.Record(std::move(inputs));
-      batch_.SetInterrupt({});
-      return outputs;
-    }));
+    outputs_ = rollout->Outputs(WithoutLock([&] { return batch_.Record(std::move(inputs)); }));
   }
 
   const py::tuple& outputs() const { return outputs_; }
 
+  // The sweeps of several calls would share the tapes' memory.
   py::tuple Adjoint(const Array& bars) {
     const std::vector<RowMatrixXd> rows = rollout_->ReadStates("cotangent", bars, rows_);
     const std::vector<InputDirection> adjoints =
-        WithoutLock([&](SignalWatch*) { return batch_.Adjoint(rows); });
+        WithoutLock([&] { return turns_.Take([&] { return batch_.Adjoint(rows); }); });
     const Inputs out = rollout_->Write(adjoints);
     return py::make_tuple(out.parameters, *out.states, out.controls);
   }
@@ -258,6 +249,7 @@ class Recorded {
  private:
   std::shared_ptr<Rollout> rollout_;
   RolloutBatch batch_;
+  Turns turns_;
   size_t rows_ = 0;
   py::tuple outputs_;
 };

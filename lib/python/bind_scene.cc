@@ -113,7 +113,7 @@ struct Wanted {
   bool html = false;
 };
 
-Run Simulate(const Scene& scene, long every, Wanted wanted, SignalWatch* watch) {
+Run Simulate(const Scene& scene, long every, Wanted wanted) {
   std::string error;
   if (!CheckSettings(scene, &error)) throw Error(error);
   Model<double> model;
@@ -134,7 +134,6 @@ Run Simulate(const Scene& scene, long every, Wanted wanted, SignalWatch* watch) 
   const RolloutReport report = Rollout(
       model, initial,
       [&](long k, double t, const State<double>& state, Stepper* done) {
-        watch->Check();
         summary.Keep(model, state, done);
         if (summary.IsFull()) summary.EvaluateKept(model);
         warnings.Add(model, k, t, state, done);
@@ -197,9 +196,8 @@ py::dict SimulateToDict(const Scene& scene, long every, bool certify, bool html)
   if (every < 1) {
     throw py::value_error("every: expected a number >= 1, got " + std::to_string(every));
   }
-  const Run run = WithoutLock([&](SignalWatch* watch) {
-    return Simulate(scene, every, {.certificate = certify, .html = html}, watch);
-  });
+  const Run run =
+      WithoutLock([&] { return Simulate(scene, every, {.certificate = certify, .html = html}); });
   const auto rows = static_cast<py::ssize_t>(run.times.size());
   const auto bodies = static_cast<py::ssize_t>(run.bodies.size());
   py::dict out;

@@ -189,3 +189,68 @@ def test_ctrl_c_ends_a_long_run() -> None:
     with pytest.raises(KeyboardInterrupt):
         long()
     assert time.monotonic() - start < 5.0
+
+
+def test_a_rollout_keeps_its_scene() -> None:
+    scene = tangible.Scene(ball())
+    rollout = tangible.Rollout(scene, PARAMETERS)
+    text, states = repr(rollout), rollout()
+    scene.add_body("late", shape={"circle": {"radius": 1}}, mass=1, position=[9, 9])
+    assert repr(rollout) == text and np.array_equal(rollout(), states)
+    assert "bodies/late/mass" not in rollout.scene.parameters()
+    assert "bodies/late/mass" in tangible.Rollout(scene, PARAMETERS).scene.parameters()
+
+
+@pytest.mark.parametrize("wrong", [
+    np.array([True, False, True]), [True, False, True], np.ones(3, dtype=complex), [1.0, None, 1.0],
+    ["1", "2", "3"], np.array([1, 2, 3], dtype="datetime64[s]"), [b"1", b"2", b"3"],
+])
+def test_what_are_no_real_numbers_is_refused(wrong: Any) -> None:
+    rollout, at = driven()
+    one_state = [*wrong, *wrong]
+    with pytest.raises(TypeError, match="^parameters: expected real numbers, got"):
+        rollout(wrong)
+    with pytest.raises(TypeError, match="^initial_state: expected real numbers, got"):
+        rollout.vjp(initial_state=one_state)
+    with pytest.raises(TypeError, match="^controls: expected real numbers, got"):
+        rollout.jacobian(controls=[[x, x] for x in wrong])
+    with pytest.raises(TypeError, match="^tangent of parameters: expected real numbers, got"):
+        rollout.jvp((None, None, None), (wrong, None, None))
+    with pytest.raises(TypeError, match="^cotangent: expected real numbers, got"):
+        rollout.vjp()[1](one_state)
+
+
+def test_arrays_of_any_layout_give_the_same_bits() -> None:
+    rollout, at = driven()
+    random = np.random.default_rng(3)
+    p = at["parameters"] * (1.0 + 0.01 * random.normal(size=(4, 3)))
+    u = 0.3 * random.normal(size=(4, 60, 2))
+    bars = random.normal(size=(4, 6))
+    states, pull = rollout.vjp(p, None, u)
+    expected = [states, *pull(bars)]
+
+    def strided(a: Any) -> Any:
+        wide = np.full((*a.shape[:-1], 2 * a.shape[-1]), np.nan)
+        wide[..., ::2] = a
+        return wide[..., ::2]
+
+    def frozen(a: Any) -> Any:
+        copy = a.copy()
+        copy.flags.writeable = False
+        return copy
+
+    layouts = [np.asfortranarray, strided, frozen, lambda a: a[::-1].copy()[::-1],
+               lambda a: a.astype(">f8"), lambda a: a.tolist(), lambda a: a.astype(np.longdouble)]
+    for layout in layouts:
+        states, pull = rollout.vjp(layout(p), None, layout(u))
+        assert all(np.array_equal(a, b) for a, b in zip([states, *pull(layout(bars))], expected))
+    # What is given may be changed afterwards: a tape has copies.
+    q = p.copy()
+    _, pull = rollout.vjp(q, None, u)
+    q[:] = np.nan
+    assert all(np.array_equal(a, b) for a, b in zip(pull(bars), expected[1:]))
+    # Whole numbers are exact, and results are never whole numbers.
+    whole = rollout(np.array([2, 1, 3]))
+    assert whole.dtype == np.float64 and np.array_equal(whole, rollout([2.0, 1.0, 3.0]))
+    single = rollout(np.array([1.1, 0.3, 1.2], dtype=np.float32))
+    assert np.array_equal(single, rollout([float(np.float32(x)) for x in (1.1, 0.3, 1.2)]))

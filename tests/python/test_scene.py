@@ -9,6 +9,8 @@ from typing import Any
 import pytest
 import tangible
 
+from conftest import ball
+
 
 def test_a_dict_a_file_and_keywords_are_the_same_scene(scene: dict[str, Any], tmp_path: Path) -> None:
     file = tmp_path / "scene.json"
@@ -55,3 +57,25 @@ def test_what_is_given_is_not_changed(scene: dict[str, Any]) -> None:
     assert json.dumps(scene) == before
     assert built.to_dict()["gravity"] == [0, -1]
     assert tangible.Scene(scene).to_dict() == scene
+
+
+@pytest.mark.parametrize("from_file", [False, True])
+def test_settings_that_are_not_given_are_kept(from_file: bool, tmp_path: Path) -> None:
+    scene = ball("event", dt=0.02, duration=1.0)
+    (tmp_path / "ball.json").write_text(json.dumps(scene))
+    given = tmp_path / "ball.json" if from_file else scene
+    changed = tangible.Scene(given, simulation={"duration": 0.5})
+    assert changed.to_dict()["simulation"] == {"dt": 0.02, "duration": 0.5, "stepping": "event"}
+    assert tangible.simulate(changed).times[1] == 0.02
+    # Those that are given replace the file's, also to what is no default; others are added.
+    fixed = tangible.Scene(given, simulation={"stepping": "fixed", "recovery_speed": 0.5})
+    assert fixed.to_dict()["simulation"] == {
+        "dt": 0.02, "duration": 1.0, "stepping": "fixed", "recovery_speed": 0.5}
+    assert scene["simulation"] == {"dt": 0.02, "duration": 1.0, "stepping": "event"}
+    with pytest.raises(tangible.TangibleError, match="/simulation/durations"):
+        tangible.Scene(given, simulation={"durations": 0.5}).to_json()
+    # Other keys are replaced as a whole.
+    assert tangible.Scene(given, gravity=[0, -1]).to_dict()["gravity"] == [0, -1]
+    assert tangible.Scene(given, forces=[]).to_dict()["forces"] == []
+    bare = {"bodies": scene["bodies"]}
+    assert tangible.Scene(bare, simulation={"dt": 0.1}).to_dict()["simulation"] == {"dt": 0.1}

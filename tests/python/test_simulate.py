@@ -105,3 +105,28 @@ def test_plots_have_a_curve_a_coordinate() -> None:
     matplotlib.use("Agg")
     axes = tangible.simulate(ball("fixed")).plot("ball/y", "ball/vy")
     assert len(axes.lines) == 2 and axes.get_xlabel() == "time (s)"
+
+
+@pytest.mark.parametrize("parameters", [None, {"bodies/ball/mass": 2.0}])
+def test_a_trajectory_keeps_its_scene(scene: dict[str, Any], parameters: dict[str, float] | None) -> None:
+    built = tangible.Scene(scene)
+    run = tangible.simulate(built, parameters)
+    before, text = run.html(), run.scene.to_json()
+    for changed in (built, run.scene):
+        changed.add_body("intruder", shape={"box": {"size": [1, 1]}}, mass=5, position=[0, 3])
+        assert "intruder" in changed.to_json()
+        assert run.html() == before and run._repr_html_().count("intruder") == 0
+    again = tangible.simulate(tangible.Scene(scene), parameters)
+    assert again.scene.to_json() == text and again.html() == before
+    assert "intruder" in tangible.simulate(built).html()
+
+
+def test_a_trajectory_of_a_file_keeps_what_it_has_read(scene: dict[str, Any], tmp_path: Path) -> None:
+    (tmp_path / "push.csv").write_text("time,x,y\n0,1,0\n1,2,0\n")
+    scene["forces"] = [{"name": "p", "body": "ball", "force": {"file": "push.csv"}}]
+    built = tangible.Scene(scene, folder=tmp_path)
+    run = tangible.simulate(built)
+    before = run.html()
+    (tmp_path / "push.csv").write_text("time,x,y\n0,-9,0\n1,-9,0\n")
+    built.add_body("late", shape={"circle": {"radius": 0.1}}, mass=1, position=[9, 9])
+    assert run.html() == before

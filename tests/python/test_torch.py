@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
@@ -137,3 +138,106 @@ def test_a_layer_learns_and_its_parameters_stay_physical() -> None:
     with torch.no_grad():
         heavy.q -= 50.0
     assert 0.0 < float(heavy.values()) < 1e-20
+
+
+@pytest.mark.parametrize("rows", [None, 3])
+@pytest.mark.parametrize("which", [(0,), (1,), (2,), (0, 1, 2)])
+def test_a_second_derivative_raises_where_it_is_asked_for(which: tuple[int, ...], rows: int | None) -> None:
+    function = tangible.Rollout(ball(), PATHS, ["forces/push/force/x"])
+    given = inputs(function, rows)
+    asked = [given[k] for k in which]
+    arguments = [g if k in which else g.detach() for k, g in enumerate(given)]
+    # The cotangent is a constant, or depends on the states.
+    for loss in (lambda s: s[..., 0].sum(), lambda s: (s**2).sum()):
+        states = rollout(function, *arguments)
+        first = torch.autograd.grad(loss(states), asked, retain_graph=True)
+        again = torch.autograd.grad(loss(states), asked, create_graph=True)
+        assert all(torch.equal(a, b) for a, b in zip(first, again))
+        penalty = sum((g**2).sum() for g in again)
+        with pytest.raises(NotImplementedError, match="rollout: expected first derivatives"):
+            (asked[0].sum() + penalty).backward()
+    with pytest.raises(NotImplementedError, match="second one"):
+        torch.autograd.functional.hessian(
+            lambda x: rollout(function, *[x if k == which[0] else a for k, a in enumerate(arguments)])
+            .sum(), asked[0].detach())
+    assert all(g.grad is None for g in given)
+
+
+def test_what_needs_no_second_derivative_does_not_raise() -> None:
+    """A graph may be made, and another variable's derivative be taken through the gradient."""
+    function = tangible.Rollout(ball(), PATHS)
+    p = torch.tensor(function.default_parameters, requires_grad=True)
+    factor = torch.tensor(2.0, dtype=torch.float64, requires_grad=True)
+    gradient = torch.autograd.grad(rollout(function, p).sum(), p, create_graph=True)[0]
+    product = (factor * gradient).sum()
+    found = torch.autograd.grad(product, factor, retain_graph=True)[0]
+    assert found.item() == pytest.approx(gradient.sum().item())
+    with pytest.raises(NotImplementedError):
+        torch.autograd.grad(product, p)
+    # Constants of a penalty: the gradient is cut off from the graph.
+    (rollout(function, p).sum() * gradient.detach().sum()).backward()
+    assert p.grad is not None and p.grad.abs().max() > 0.0
+
+
+def test_inputs_may_change_between_forward_and_backward() -> None:
+    """The tape holds the values of the forward pass, as it always has; only a graph of the backward
+    pass, which would need the inputs, is refused by torch."""
+    scene = tangible.Scene(ball())
+    function = tangible.Rollout(scene, PATHS)
+    p = torch.tensor(function.default_parameters, requires_grad=True)
+    states = rollout(function, p)
+    expected = torch.autograd.grad(states.sum(), p, retain_graph=True)[0]
+    with torch.no_grad():
+        p *= 1.1
+    scene.add_body("late", shape={"circle": {"radius": 0.1}}, mass=1.0, position=[5, 5])
+    assert torch.equal(torch.autograd.grad(states.sum(), p, retain_graph=True)[0], expected)
+    with pytest.raises(RuntimeError, match="modified by an inplace operation"):
+        torch.autograd.grad(states.sum(), p, create_graph=True)
+
+
+@pytest.mark.parametrize("dtype", ["int8", "int32", "int64", "uint8", "bool", "complex64", "complex128"])
+@pytest.mark.parametrize("which", [0, 1, 2])
+def test_tensors_without_fractions_are_refused(dtype: str, which: int) -> None:
+    function = tangible.Rollout(ball(), PATHS, ["forces/push/force/x"])
+    given = [g.detach() for g in inputs(function, None)]
+    given[which] = torch.ones(given[which].shape, dtype=getattr(torch, dtype))
+    name = ("parameters", "initial_state", "controls")[which]
+    message = f"^{name}: expected a tensor of floating-point numbers, got torch.{dtype}$"
+    with pytest.raises(TypeError, match=message):
+        rollout(function, *given)
+    alone = [given[which] if k == which else None for k in range(3)]
+    with pytest.raises(TypeError, match=message):
+        rollout(function, *alone)
+    with pytest.raises(TypeError, match=f"^{name}: expected a tensor, got ndarray$"):
+        rollout(function, *[None if a is None else a.numpy() for a in alone])
+
+
+@pytest.mark.parametrize("dtype", ["float16", "bfloat16", "float32", "float64"])
+def test_states_have_the_dtype_of_the_first_that_is_given(dtype: str) -> None:
+    function = tangible.Rollout(ball(), PATHS)
+    p = torch.tensor(function.default_parameters, dtype=getattr(torch, dtype), requires_grad=True)
+    x = torch.tensor(function.default_initial_state, requires_grad=True)
+    states = rollout(function, p, x)
+    # Computed in double precision, and rounded at the end.
+    exact = torch.tensor(function(p.detach().to(torch.float64).numpy(), x.detach().numpy()))
+    assert states.dtype == p.dtype and torch.equal(states, exact.to(p.dtype))
+    states.sum().backward()
+    assert p.grad is not None and p.grad.dtype == p.dtype
+    assert x.grad is not None and x.grad.dtype == torch.float64
+
+
+def test_threads_share_a_layer() -> None:
+    layer = RolloutLayer(ball(), PATHS)
+    # Whatever the threads add up, it is the same number of the same gradients.
+    layer().sum().backward()
+    expected = layer.q.grad.clone()
+    graph = layer().sum()
+
+    def work(k: int) -> list[Any]:
+        own = torch.autograd.grad(layer().sum(), layer.q)[0]
+        shared = torch.autograd.grad(graph, layer.q, retain_graph=True)[0]
+        return [own, shared]
+
+    with ThreadPoolExecutor(6) as pool:
+        for found in pool.map(work, range(60)):
+            assert all(torch.equal(g, expected) for g in found)

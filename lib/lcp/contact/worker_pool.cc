@@ -1,10 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tangible/lcp/contact/worker_pool.h"
 
+#include <chrono>
 #include <string>
 #include <system_error>
 
+#include "tangible/math/interrupt.h"
+
 namespace tangible {
+namespace {
+
+constexpr std::chrono::milliseconds kBetweenChecks(20);
+
+}  // namespace
 
 int NumThreads(int threads) {
   return threads > 0 ? threads : std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
@@ -65,6 +73,7 @@ void WorkerPool::Start() {
   }
 }
 
+// The caller's check for interrupts is that of all threads, and is called while the caller waits.
 void WorkerPool::Run(size_t count, int threads, const std::function<void(size_t, int)>& task) {
   if (std::min(threads, threads_wanted_) == 1 || count <= 1) {
     for (size_t k = 0; k < count; ++k) {
@@ -73,9 +82,14 @@ void WorkerPool::Run(size_t count, int threads, const std::function<void(size_t,
     return;
   }
   Start();
+  const std::function<void()>* const check = InterruptScope::Current();
+  const std::function<void(size_t, int)> checked = [&](size_t k, int thread) {
+    const InterruptScope scope(check);
+    task(k, thread);
+  };
   {
     const std::lock_guard<std::mutex> lock(mutex_);
-    task_ = &task;
+    task_ = check == nullptr ? &task : &checked;
     count_ = count;
     next_ = 0;
     error_ = nullptr;
@@ -85,7 +99,20 @@ void WorkerPool::Run(size_t count, int threads, const std::function<void(size_t,
   work_.notify_all();
   TakeTasks(0);
   std::unique_lock<std::mutex> lock(mutex_);
-  done_.wait(lock, [&] { return busy_ == 0; });
+  while (!done_.wait_for(lock, kBetweenChecks, [&] { return busy_ == 0; })) {
+    if (error_) continue;
+    lock.unlock();
+    std::exception_ptr thrown;
+    try {
+      CheckInterrupt();
+    } catch (...) {
+      thrown = std::current_exception();
+    }
+    lock.lock();
+    if (!thrown) continue;
+    error_ = error_ ? error_ : thrown;
+    next_ = count_;
+  }
   if (error_) {
     std::rethrow_exception(error_);
   }

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import _core
 from ._certificate import Certificate
+from ._rollout import floats
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -53,7 +54,7 @@ class Residuals:
 
         scipy.optimize.least_squares(r, r.initial, jac=r.jacobian, bounds=r.bounds)
 
-    Residuals are in multiples of their standard deviation; one object serves one thread.
+    Residuals are in multiples of their standard deviation. Calls from several threads take turns.
 
     Args:
         problem: A fit file, or a dict of its JSON (README of `estimation`).
@@ -81,11 +82,11 @@ class Residuals:
 
     def __call__(self, parameters: ArrayLike) -> Floats:
         """The residuals, shape (R,)."""
-        return self._core.evaluate(np.asarray(parameters, dtype=np.float64), False)[0]
+        return self._core.evaluate(floats(parameters, "parameters"), False)[0]
 
     def jacobian(self, parameters: ArrayLike) -> Floats:
         """Their derivatives with respect to the parameters, shape (R, P)."""
-        found = self._core.evaluate(np.asarray(parameters, dtype=np.float64), True)[1]
+        found = self._core.evaluate(floats(parameters, "parameters"), True)[1]
         assert found is not None
         return found
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from numbers import Real
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -69,8 +70,19 @@ class Smoothing:
         return np.ascontiguousarray(around.reshape(rows * self.samples, *shape))
 
 
+def floats(values: ArrayLike, name: str) -> Floats:
+    """The numbers as an array of the engine's. What is no real number is refused: numpy would turn
+    True into 1, None into NaN, and drop the imaginary part of complex numbers."""
+    array = np.asarray(values)
+    if array.dtype.kind == "O" and all(isinstance(x, Real) for x in array.flat):
+        pass  # fractions, whole numbers of more than 64 bits
+    elif array.dtype.kind not in "fiu":
+        raise TypeError(f"{name}: expected real numbers, got an array of {array.dtype}")
+    return np.ascontiguousarray(array, dtype=np.float64)
+
+
 def _array(values: ArrayLike, name: str, axes: int) -> Floats:
-    array = np.ascontiguousarray(values, dtype=np.float64)
+    array = floats(values, name)
     if array.ndim not in (axes, axes + 1):
         raise ValueError(f"{name}: expected {axes} axes, or one more for a batch, got {array.ndim}")
     return array
@@ -102,11 +114,13 @@ class Rollout:
         records: Sequence[int] | None = None,
         threads: int = 0,
     ) -> None:
-        self.scene = Scene.of(scene)
+        read = Scene.of(scene)
+        core = read.core
+        self.scene = read._copy()  # of which later changes of the scene are no part
         self.threads = int(threads)
         self._single = records is None
         self._core = _core.Rollout(
-            self.scene.core, list(parameters), list(controls), list(records or [])
+            core, list(parameters), list(controls), list(records or [])
         )
         self._defaults = self._core.defaults()
 
@@ -255,7 +269,7 @@ class Rollout:
 
         The function maps d loss / d states (their shape) to the derivatives with respect to
         parameters, initial state and controls. It holds the tapes of this call alone and may be
-        called often. Rows that failed have NaN derivatives.
+        called often, also from several threads, whose calls take turns. Rows that failed have NaN derivatives.
 
         Args:
             parameters, initial_state, controls, on_failure: As in a call.
@@ -285,7 +299,7 @@ class Rollout:
         average = self._average(p, x, u, rows, smoothing or Smoothing()) if rows else None
 
         def pull(cotangent: ArrayLike) -> tuple[Floats, Floats, Floats]:
-            bars = np.ascontiguousarray(cotangent, dtype=np.float64)
+            bars = floats(cotangent, "cotangent")
             if bars.shape != result.shape:
                 raise ValueError(f"cotangent: expected shape {result.shape}, got {bars.shape}")
             rows_of_bars = bars.reshape(states.shape)

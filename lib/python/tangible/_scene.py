@@ -23,7 +23,9 @@ class Scene:
     Args:
         scene: A file, or the JSON of one as a dict; absent: a scene without bodies.
         folder: Where files that a dict names (signals) are looked for.
-        **keys: Top-level keys that replace those of `scene`: `name`, `gravity`, `simulation`, ...
+        **keys: Top-level keys that replace those of `scene`: `name`, `gravity`, ...; of `simulation`
+            those alone that are given, so that a file keeps its `stepping` and `dt` where a
+            `duration` is given.
     """
 
     def __init__(
@@ -49,13 +51,27 @@ class Scene:
             else:
                 self._data = {}
         if keys:
-            self._data.update(copy.deepcopy(keys))
+            for key, value in copy.deepcopy(keys).items():
+                before = self._data.get(key)
+                if isinstance(before, Mapping) and isinstance(value, Mapping):
+                    self._data[key] = {**before, **value}
+                else:
+                    self._data[key] = value
             self._read = None
 
     @staticmethod
     def of(scene: SceneLike) -> Scene:
         """The scene itself, or one made from a file's name or a dict."""
         return scene if isinstance(scene, Scene) else Scene(scene)
+
+    def _copy(self) -> Scene:
+        """The scene as it is now, whatever is added to this one later."""
+        same = Scene.__new__(Scene)
+        same._name = self._name
+        same._folder = self._folder
+        same._data = copy.deepcopy(self._data)
+        same._read = self._read  # which never changes
+        return same
 
     def _add(self, kind: str, name: str | None, keys: dict[str, Any]) -> None:
         data = self.to_dict()

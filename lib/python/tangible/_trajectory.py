@@ -59,7 +59,7 @@ class Trajectory:
     """The motion of a scene's moving and kinematic bodies.
 
     Attributes:
-        scene: The scene that was run, with its parameters set.
+        scene: A copy of the scene that was run, with its parameters set.
         status: "done", "unsolved" or "diverged".
         message: Empty, or why the run ended early.
         bodies: Names, in the order of the scene.
@@ -81,7 +81,8 @@ class Trajectory:
         def pairs(table: dict[str, Any]) -> list[tuple[str, str]]:
             return [(names[i], names[j]) for i, j in zip(table["first"], table["second"])]
 
-        self.scene = scene
+        self.scene = scene._copy()
+        self._ran = scene.core
         self.status: str = raw["status"]
         self.message: str = raw["message"]
         self.bodies = [names[i] for i in raw["bodies"]]
@@ -129,7 +130,7 @@ class Trajectory:
 
     def html(self) -> str:
         """The animated view as one self-contained page."""
-        page: str = _core.simulate(self.scene.core, 1, False, True)["html"]
+        page: str = _core.simulate(self._ran, 1, False, True)["html"]
         return page
 
     def show(self, file: str | os.PathLike[str] | None = None) -> None:

@@ -1,7 +1,8 @@
 """Rollouts as a differentiable function of torch tensors; the adjoint is the backward pass.
 
 Tensors keep their dtype and device outside; inside everything is computed in double precision on the
-CPU. torch is imported with this module, not with `tangible`.
+CPU. Derivatives are first ones; a second one raises `NotImplementedError` where it is asked for, and
+is never left out. torch is imported with this module, not with `tangible`.
 """
 
 from __future__ import annotations
@@ -23,6 +24,36 @@ def _numpy(tensor: torch.Tensor | None) -> np.ndarray[Any, Any] | None:
     return None if tensor is None else tensor.detach().to("cpu", torch.float64).numpy()
 
 
+class _Gradients(torch.autograd.Function):
+    """The backward pass, as a node that has the inputs as its own: a second derivative, which goes
+    back through it, is refused. Without the node torch would take the gradients for constants
+    wherever the cotangent is one."""
+
+    @staticmethod
+    def forward(  # type: ignore[override]
+        ctx: Any, of: Any, bar: torch.Tensor, *inputs: torch.Tensor | None
+    ) -> tuple[torch.Tensor | None, ...]:
+        found = of.pull(_numpy(bar))
+        gradients: list[torch.Tensor | None] = []
+        for value, entry, needed in zip(found, of.inputs, of.needs_input_grad[4:]):
+            if entry is None or not needed:
+                gradients.append(None)
+                continue
+            shape, dtype, device = entry
+            # An argument without the batch's axis is one for all rows: their derivatives add up.
+            if of.batched and value.ndim > len(shape):
+                value = value.sum(axis=0)
+            gradients.append(torch.as_tensor(value).to(device=device, dtype=dtype))
+        return tuple(gradients)
+
+    @staticmethod
+    def backward(ctx: Any, *bars: torch.Tensor) -> Any:
+        raise NotImplementedError(
+            "rollout: expected first derivatives, got a second one, which the engine does not have; "
+            "differences of gradients give it"
+        )
+
+
 class _Function(torch.autograd.Function):
     @staticmethod
     def forward(  # type: ignore[override]
@@ -39,22 +70,14 @@ class _Function(torch.autograd.Function):
         states, ctx.pull = function.vjp(*arrays, kinks=of_kinks, smoothing=smoothing)
         ctx.inputs = [None if t is None else (t.shape, t.dtype, t.device) for t in inputs]
         ctx.batched = states.ndim > (1 if function._single else 2)
+        ctx.save_for_backward(*inputs)
         return torch.as_tensor(states).to(device=like.device, dtype=like.dtype)
 
     @staticmethod
     def backward(ctx: Any, bar: torch.Tensor) -> Any:  # type: ignore[override]
-        found = ctx.pull(_numpy(bar))
-        gradients: list[torch.Tensor | None] = []
-        for value, entry, needed in zip(found, ctx.inputs, ctx.needs_input_grad[4:]):
-            if entry is None or not needed:
-                gradients.append(None)
-                continue
-            shape, dtype, device = entry
-            # An argument without the batch's axis is one for all rows: their derivatives add up.
-            if ctx.batched and value.ndim > len(shape):
-                value = value.sum(axis=0)
-            gradients.append(torch.as_tensor(value).to(device=device, dtype=dtype))
-        return (None, None, None, None, *gradients)
+        # Inputs that have changed since do not matter to the tape, but to a second derivative.
+        inputs = ctx.saved_tensors if torch.is_grad_enabled() else ()
+        return (None, None, None, None, *_Gradients.apply(ctx, bar, *inputs))
 
 
 def rollout(
@@ -76,8 +99,15 @@ def rollout(
             takes one element of the generalised Jacobian (`function.certificates` says where),
             "raise" an error, "smoothed" the mean of the Jacobians around.
     """
-    given = [t for t in (parameters, initial_state, controls) if t is not None]
-    like = given[0] if given else torch.empty(0, dtype=torch.float64)
+    named = {"parameters": parameters, "initial_state": initial_state, "controls": controls}
+    given = {name: tensor for name, tensor in named.items() if tensor is not None}
+    for name, tensor in given.items():
+        if not isinstance(tensor, torch.Tensor):
+            raise TypeError(f"{name}: expected a tensor, got {type(tensor).__name__}")
+        if not tensor.is_floating_point():
+            # States, and gradients, of its dtype would be cut to whole numbers.
+            raise TypeError(f"{name}: expected a tensor of floating-point numbers, got {tensor.dtype}")
+    like = next(iter(given.values()), torch.empty(0, dtype=torch.float64))
     result: torch.Tensor = _Function.apply(
         function, kinks, smoothing, like, parameters, initial_state, controls
     )

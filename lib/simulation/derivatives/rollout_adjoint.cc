@@ -5,6 +5,8 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "tangible/math/interrupt.h"
+
 namespace tangible {
 namespace {
 
@@ -361,6 +363,7 @@ void RolloutTape::AdjointFrom(ControlledModel<double>* model, long last, int num
     if (sink) sink(step, controls_bar);
   };
   for (long k = std::min(last, steps()); k > 0; --k) {
+    CheckInterrupt();
     seed(k, w_bar);
     const long step = k - 1;
     if (step < first_ || step >= first_ + static_cast<long>(used_)) {

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <utility>
 
+#include "tangible/math/interrupt.h"
 #include "tangible/simulation/events/ellipse_motion.h"
 #include "tangible/simulation/events/load_speed.h"
 #include "tangible/simulation/events/tolerances.h"
@@ -578,6 +579,7 @@ bool EventStepper::SolveInstant(const Model<double>& model, double now, double h
 
 // A new part of the record: motion from `now`, at most to `until`.
 Segment& EventStepper::BeginSegment(double now, double until, const State<double>& state) {
+  CheckInterrupt();
   EventPart* part = record_.Add();
   part->is_impulses = false;
   Segment& segment = part->segment;

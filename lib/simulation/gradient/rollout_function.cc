@@ -221,7 +221,6 @@ void RolloutWorker::RunAs(const Runner& run, RolloutOutput* output) {
   size_t next = 0;
   const int poses = static_cast<int>(initial_.pose.size());
   const StateObserver keep = [&](long k, double, const State<double>& state, Stepper*) {
-    if (interrupt_) interrupt_();
     if (next < f_.records_.size() && f_.records_[next] == k) {
       for (int i = 0; i < f_.num_states(); ++i) {
         const int variable = f_.outputs_[i];
@@ -656,10 +655,7 @@ void ForEachRollout(const RolloutFunction& function, long count, int threads,
 std::vector<RolloutOutput> RolloutBatch::Run(const std::vector<RolloutInput>& inputs) const {
   std::vector<RolloutOutput> outputs(inputs.size());
   ForEachRollout(function_, static_cast<long>(inputs.size()), threads_,
-                 [&](RolloutWorker* worker, long i) {
-                   worker->SetInterrupt(interrupt_);
-                   outputs[i] = worker->Run(inputs[i]);
-                 });
+                 [&](RolloutWorker* worker, long i) { outputs[i] = worker->Run(inputs[i]); });
   return outputs;
 }
 
@@ -671,7 +667,6 @@ std::vector<RolloutOutput> RolloutBatch::Tangent(const std::vector<RolloutInput>
   ForEachRollout(function_, static_cast<long>(inputs.size()), threads_,
                  [&](RolloutWorker* worker, long i) {
                    std::vector<RowMatrixXd> one;
-                   worker->SetInterrupt(interrupt_);
                    outputs[i] = worker->Tangent(inputs[i], {directions[i]}, &one);
                    (*tangents)[i] = std::move(one[0]);
                  });
@@ -687,14 +682,12 @@ std::vector<RolloutOutput> RolloutBatch::Record(std::vector<RolloutInput> inputs
                  [&](RolloutWorker* worker, long i) {
                    if (bytes >= kTapeBudget) {
                      tapes_[i].reset();
-                     worker->SetInterrupt(interrupt_);
                      outputs[i] = worker->Run(inputs_[i]);
                      return;
                    }
                    if (tapes_[i] == nullptr) {
                      tapes_[i] = std::make_unique<RolloutWorker>(function_);
                    }
-                   tapes_[i]->SetInterrupt(interrupt_);
                    outputs[i] = tapes_[i]->Record(inputs_[i]);
                    bytes += tapes_[i]->tape_bytes();
                  });
@@ -715,10 +708,7 @@ std::vector<InputDirection> RolloutBatch::Adjoint(const std::vector<RowMatrixXd>
                                                      inputs_[i].controls.cols(), kNan);
                      return;
                    }
-                   if (tapes_[i] == nullptr) {
-                     worker->SetInterrupt(interrupt_);
-                     worker->Record(inputs_[i]);
-                   }
+                   if (tapes_[i] == nullptr) worker->Record(inputs_[i]);
                    RolloutWorker* const recorded = tapes_[i] == nullptr ? worker : tapes_[i].get();
                    results[i] = recorded->Adjoint({bars[i]})[0];
                  });

@@ -108,9 +108,6 @@ class RolloutWorker {
  public:
   explicit RolloutWorker(const RolloutFunction& function);
 
-  /// Called in each step of runs (not of reverse sweeps); an exception that it throws ends the run.
-  void SetInterrupt(std::function<void()> check) { interrupt_ = std::move(check); }
-
   /// Runs the rollout; the input's sizes must be right (CheckSizes).
   RolloutOutput Run(const RolloutInput& input);
   /// The same with products of derivatives along directions. `tangents[d]`: num_records x
@@ -177,11 +174,11 @@ class RolloutWorker {
   std::optional<Eigen::SparseMatrix<double>> parameter_jacobian_;
   std::optional<Stepper> stepper_;
   RolloutTape tape_;
-  std::function<void()> interrupt_;
 };
 
 /// Runs `work(worker, i)` for i in [0, count) on `threads` threads (0: one for each core) including
-/// the caller's, each with a separate worker. An exception ends the work and is passed on.
+/// the caller's, each with a separate worker. An exception ends the work and is passed on
+/// (worker_pool.h); one of the caller's interrupt check (interrupt.h) ends the runs too.
 void ForEachRollout(const RolloutFunction& function, long count, int threads,
                     const std::function<void(RolloutWorker* worker, long i)>& work);
 
@@ -191,7 +188,6 @@ class RolloutBatch {
   /// `threads` 0: one for each core. The function must outlive this object.
   RolloutBatch(const RolloutFunction& function, int threads)
       : function_(function), threads_(threads) {}
-  void SetInterrupt(std::function<void()> check) { interrupt_ = std::move(check); }
 
   std::vector<RolloutOutput> Run(const std::vector<RolloutInput>& inputs) const;
   /// One direction for each row.
@@ -211,7 +207,6 @@ class RolloutBatch {
  private:
   const RolloutFunction& function_;
   int threads_;
-  std::function<void()> interrupt_;
   std::vector<RolloutInput> inputs_;
   std::vector<RolloutStatus> statuses_;
   std::vector<std::unique_ptr<RolloutWorker>> tapes_;  ///< null: to be run again

@@ -7,6 +7,7 @@
 
 #include "tangible/dynamics/model/tolerances.h"
 #include "tangible/lcp/system/contact_residual.h"
+#include "tangible/math/interrupt.h"
 #include "tangible/simulation/events/segment_flow.h"
 
 namespace tangible {
@@ -394,6 +395,7 @@ ContactSolverReport Stepper::SolveWithContacts(const Model<double>& model,
 }
 
 StepReport Stepper::Step(const Model<double>& model, double t, double h, State<double>* state) {
+  CheckInterrupt();
   if (events_) {
     return StepByEvents(model, t, h, state);
   }

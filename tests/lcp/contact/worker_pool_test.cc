@@ -12,6 +12,8 @@
 #include <string>
 #include <system_error>
 
+#include "tangible/math/interrupt.h"
+
 namespace tangible {
 namespace {
 
@@ -107,6 +109,42 @@ TEST(WorkerPoolTest, AThreadThatCannotStartIsAnExceptionAndLaterCallsTryAgain) {
   EXPECT_EQ(done, 1000);
 }
 #endif
+
+// The caller's own task ends at once; it checks for interrupts while it waits, and the other
+// threads have the same check.
+TEST(WorkerPoolTest, TheCallerChecksForInterruptsWhileItWaits) {
+  struct Interrupted {};
+  const std::thread::id caller = std::this_thread::get_id();
+  std::atomic<bool> interrupted{false};
+  std::atomic<int> of_others{0};
+  const std::function<void()> check = [&] {
+    if (std::this_thread::get_id() == caller) {
+      interrupted = true;
+      throw Interrupted();
+    }
+    ++of_others;
+  };
+  WorkerPool pool(3);
+  const InterruptScope scope(&check);
+  const auto work = [&](size_t, int thread) {
+    while (thread != 0 && (!interrupted || of_others == 0)) {
+      CheckInterrupt();
+      std::this_thread::yield();
+    }
+    // The others must have begun.
+    while (thread == 0 && of_others == 0) std::this_thread::yield();
+  };
+  EXPECT_THROW(pool.Run(3, 3, work), Interrupted);
+  EXPECT_GT(of_others, 0);
+  // It can be used again, without a check.
+  const InterruptScope none(nullptr);
+  std::atomic<int> done{0};
+  pool.Run(10, 3, [&](size_t, int) {
+    CheckInterrupt();
+    ++done;
+  });
+  EXPECT_EQ(done, 10);
+}
 
 }  // namespace
 }  // namespace tangible

@@ -233,16 +233,49 @@ TEST_P(RolloutFunctionTest, ABatchRecordsAgain) {
   }
 }
 
-TEST_P(RolloutFunctionTest, AnInterruptEndsTheRun) {
+// Runs, sweeps over their tapes, every method of a Jacobian, and certificates; what was interrupted
+// gives the same bits afterwards.
+TEST_P(RolloutFunctionTest, AnInterruptEndsEachComputation) {
   Create({});
   struct Interrupted {};
+  const std::vector<RolloutInput> inputs(50, InputOf(function_, 1));
+  const std::vector<RowMatrixXd> bars(
+      50, RowMatrixXd::Ones(function_.num_records(), function_.num_states()));
   RolloutBatch batch(function_, 2);
-  std::atomic<int> steps{0};
-  batch.SetInterrupt([&] {
-    if (++steps > 30) throw Interrupted();
-  });
-  EXPECT_THROW(batch.Run(std::vector<RolloutInput>(50, InputOf(function_, 1))), Interrupted);
-  EXPECT_LT(steps, 100);
+  RolloutBatch recorded(function_, 2);
+  recorded.Record(inputs);
+  const std::vector<InputDirection> adjoints = recorded.Adjoint(bars);
+  std::vector<RowMatrixXd> tangents;
+  RowMatrixXd jacobian;
+  GradientMethod used = GradientMethod::kAuto;
+  RolloutWorker worker(function_);
+  std::vector<std::function<void()>> computations{
+      [&] { batch.Run(inputs); },
+      [&] { batch.Tangent(inputs, inputs, &tangents); },
+      [&] { RolloutBatch(function_, 2).Record(inputs); },
+      [&] { recorded.Adjoint(bars); },
+      [&] { batch.Certify(inputs); },
+  };
+  for (const auto& [name, method] : kGradientMethodNames) {
+    computations.emplace_back([&, method = method] {
+      worker.Jacobian(inputs[0], method, RolloutWorker::Inputs::kAll, &jacobian, &used);
+    });
+  }
+  for (const std::function<void()>& compute : computations) {
+    std::atomic<int> checks{0};
+    const std::function<void()> check = [&] {
+      if (++checks > 5) throw Interrupted();
+    };
+    const InterruptScope scope(&check);
+    EXPECT_THROW(compute(), Interrupted);
+    EXPECT_LT(checks, 12);  // at most a few of each thread
+  }
+  const std::vector<InputDirection> again = recorded.Adjoint(bars);
+  for (size_t i = 0; i < again.size(); ++i) {
+    EXPECT_EQ(again[i].parameters, adjoints[i].parameters);
+    EXPECT_EQ(again[i].state, adjoints[i].state);
+    EXPECT_EQ(again[i].controls, adjoints[i].controls);
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(Stepping, RolloutFunctionTest, ::testing::Values("fixed", "event"));
