@@ -17,14 +17,16 @@ import tangible
 from conftest import ball
 
 FITS = Path(__file__).resolve().parents[2] / "data" / "fits"
-LATEST = 0.5  # s, that it may take; signals are looked for every 50 ms, at the end of a step
+# s of CPU time that it may take, which other work on the machine does not change: half a second of two
+# threads; signals are looked for every 50 ms.
+LATEST = 1.0
 ROWS = 20000  # of a batch: more than can be done before the signal
 
 
 def crowd(stepping: str, duration: float) -> dict[str, Any]:
     """Boxes that fall on one another: steps that take long."""
     boxes = [
-        {"name": f"box {k}", "shape": {"box": {"size": [0.2, 0.2]}}, "mass": 1 + 0.1 * k,
+        {"name": f"box_{k}", "shape": {"box": {"size": [0.2, 0.2]}}, "mass": 1 + 0.1 * k,
          "position": [0.01 * (k % 3), 0.12 + 0.25 * k], "friction": 0.4}
         for k in range(12)
     ]
@@ -39,7 +41,7 @@ def interrupted(work: Callable[[], Any], after: float = 0.4) -> None:
     sent: list[float] = []
 
     def send() -> None:
-        sent.append(time.monotonic())
+        sent.append(time.process_time())
         os.kill(os.getpid(), signal.SIGINT)
 
     timer = threading.Timer(after, send)
@@ -50,7 +52,7 @@ def interrupted(work: Callable[[], Any], after: float = 0.4) -> None:
             # What ends before the signal shows nothing.
             timer.cancel()
             pytest.fail(f"the work ended before the signal, or ignored it: {sent}")
-        took = time.monotonic() - sent[0]
+        took = time.process_time() - sent[0]
         assert took < LATEST, f"{took:.2f} s after the signal"
     finally:
         timer.cancel()
@@ -123,7 +125,7 @@ def test_pull_which_is_right_afterwards(stepping: str, threads: int) -> None:
     assert all(np.array_equal(a, b) for a, b in zip(pull(bars), expected))
 
 
-# One sweep alone takes longer than the signal may.
+# One sweep alone takes longer than an interruption may.
 def test_a_single_long_pull() -> None:
     rollout = tangible.Rollout(crowd("event", 1.0), ["bodies/*/mass"])
     states, pull = rollout.vjp(np.tile(rollout.default_parameters, (60, 1)))
