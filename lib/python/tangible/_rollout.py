@@ -269,7 +269,8 @@ class Rollout:
 
         The function maps d loss / d states (their shape) to the derivatives with respect to
         parameters, initial state and controls. It holds the tapes of this call alone and may be
-        called often, also from several threads, whose calls take turns. Rows that failed have NaN derivatives.
+        called often, also from several threads, whose calls take turns. Rows that failed have NaN
+        derivatives.
 
         Args:
             parameters, initial_state, controls, on_failure: As in a call.
