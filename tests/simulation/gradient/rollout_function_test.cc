@@ -8,6 +8,7 @@
 
 #include "../../support/gradients.h"
 #include "../../support/scenes.h"
+#include "tangible/math/interrupt.h"
 
 namespace tangible {
 namespace {
