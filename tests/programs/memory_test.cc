@@ -42,7 +42,7 @@ class MemoryTest : public ProgramTest {
                   run.error.find("cannot be started") != std::string::npos)
           << run.error;
     }
-    EXPECT_GT(failed, 3);
+    EXPECT_GT(failed, 0);
   }
 };
 
