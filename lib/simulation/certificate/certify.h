@@ -21,6 +21,8 @@
 //                  and lands, on the other it is pushed out
 //   controls       an event at the boundary of two steps whose controls differ: different forces
 //                  act before and after it, and its derivative differs on each side
+//   end of the run an event by events at its last instant: beside it the event has happened or not,
+//                  so that a twist jumps (a touch) or has another derivative (an end of sliding)
 //   coordinates    so large that their rounding exceeds kLargeCoordinates of the size of a body
 //                  that has contacts or joints (coordinate_watch.h): its modes may be determined by
 //                  rounding
@@ -88,6 +90,9 @@ class RolloutCertifier {
   void AddOtherSlips(const Model<double>& model, const Segment& segment, const Place& place);
   void AddSegment(const Model<double>& model, long step, EventDerivative* derivative,
                   Segment* segment);
+  void AddFriction(const CoefficientSource& friction, const Place& place);
+  void AddEnd(const Model<double>& model, long step, const EventRecord& record);
+  void AddTouchesAtEnd(const Model<double>& model, long step, const Segment& last);
   void AddClosedAtOnce(const ModelStructure& s, long step, const Segment& segment);
   void AddQuality(const ContactProblem<double>& problem, const std::vector<ContactMode>& modes,
                   ContactSystem* system);

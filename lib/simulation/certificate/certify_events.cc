@@ -248,6 +248,15 @@ void RolloutCertifier::AddOtherSlips(const Model<double>& model, const Segment& 
   }
 }
 
+void RolloutCertifier::AddFriction(const CoefficientSource& friction, const Place& place) {
+  if (!Wanted(friction.numbers[0]) && !Wanted(friction.numbers[1])) return;
+  if (friction.tie && place.mode != ContactMode::kSticking) {
+    OneSided("mixed friction is at a kink of the mixing rule, " + place.Text());
+  } else if (friction.value == 0.0) {
+    OneSided("friction is 0, " + place.Text());
+  }
+}
+
 void RolloutCertifier::AddSegment(const Model<double>& model, long step,
                                   EventDerivative* derivative, Segment* segment) {
   const ModelStructure& s = *model.structure;
@@ -259,6 +268,9 @@ void RolloutCertifier::AddSegment(const Model<double>& model, long step,
       largest = std::max(largest, start.solution.normal_impulse[i]);
     }
   }
+  // The motion that follows an instant starts with the same forces, and knows which contacts at
+  // their limit it releases.
+  const bool motion_follows = segment->length == 0.0 && segment->event == EventKind::kStepEnd;
   for (size_t i = 0; i < segment->contacts.size(); ++i) {
     const ActiveContact& contact = segment->contacts[i];
     const Place place{&s, step, segment->time, i, &contact, segment->modes[i]};
@@ -269,7 +281,7 @@ void RolloutCertifier::AddSegment(const Model<double>& model, long step,
       certificate_.degenerate_rows += margin < kDegenerateTolerance ? 1 : 0;
     };
     if (!contact.IsJointFriction()) {
-      add_margin(largest > 0.0 ? normal / largest : 0.0, "normal force");
+      if (!motion_follows) add_margin(largest > 0.0 ? normal / largest : 0.0, "normal force");
       if (normal > kLoaded * largest) {
         loaded_.push_back(contact);
       }
@@ -294,19 +306,14 @@ void RolloutCertifier::AddSegment(const Model<double>& model, long step,
         add_margin(0.0, "friction limit");
       }
     }
-    if (place.mode == ContactMode::kSticking && !segment->SticksWithEarlier(i)) {
+    if (place.mode == ContactMode::kSticking && !segment->SticksWithEarlier(i) && !motion_follows) {
       const double above = segment->FrictionLeft(i, friction.value, 1.0, start.solution);
       const double below = segment->FrictionLeft(i, friction.value, -1.0, start.solution);
       if (above + below > 0.0) {
         add_margin(2.0 * std::min(above, below) / (above + below), "friction limit");
       }
     }
-    const bool wanted = Wanted(friction.numbers[0]) || Wanted(friction.numbers[1]);
-    if (wanted && friction.tie && place.mode != ContactMode::kSticking) {
-      OneSided("mixed friction is at a kink of the mixing rule, " + place.Text());
-    } else if (wanted && friction.value == 0.0) {
-      OneSided("friction is 0, " + place.Text());
-    }
+    AddFriction(friction, place);
   }
   if (!segment->starts && (step > 0 || segment->time > 0.0)) {
     AddClosedAtOnce(s, step, *segment);
@@ -328,6 +335,76 @@ void RolloutCertifier::AddSegment(const Model<double>& model, long step,
     }
   }
   AddQuality(start.problem, segment->modes, &start.system);
+}
+
+// Touches at the end of the run's last motion, or just behind it.
+void RolloutCertifier::AddTouchesAtEnd(const Model<double>& model, long step, const Segment& last) {
+  const ModelStructure& s = *model.structure;
+  EventSearch search(model);
+  double reach = 0.0;
+  for (int body = 0; body < s.num_bodies(); ++body) {
+    const double* twist = &last.after.twist[3 * static_cast<size_t>(body)];
+    const double speed =
+        std::hypot(twist[0], twist[1]) + std::abs(twist[2]) * search.lengths().radius(body);
+    reach = std::max(reach, search.lengths().Touch(last.after, body, body) +
+                                2.0 * kNearJumpMargin * s.settings.dt * speed);
+  }
+  std::vector<ActiveContact> near;
+  search.FindContacts(model, last.after, reach, &near);
+  AppendLimits(model, &near);
+  for (const ActiveContact& contact : near) {
+    const bool is_closed = std::any_of(last.contacts.begin(), last.contacts.end(),
+                                       [&](const ActiveContact& c) { return c.SameAs(contact); });
+    const double speed = SpeedsOf(model, last.after, contact).normal;
+    if (is_closed || !(speed < -Negligible(model, speed))) continue;
+    ContactRows<double> rows;
+    EvaluateActiveRows(model, last.after, contact, &rows);
+    const double margin = std::max(rows.geometry.gap, 0.0) / (-speed * s.settings.dt);
+    if (margin < kNearJumpMargin) {
+      AddJump(margin, {&s, step, last.time + last.length, 0, &contact, ContactMode::kOpen},
+              "the run ends as it touches");
+    }
+  }
+}
+
+// Events at the run's last instant, or just before or behind it: beside it they have happened or
+// not, which is another derivative of twists, or other twists. Positions have the same on both
+// sides, as do all where forces change gradually (a start of sliding, a lift-off).
+void RolloutCertifier::AddEnd(const Model<double>& model, long step, const EventRecord& record) {
+  const ModelStructure& s = *model.structure;
+  const double dt = s.settings.dt;
+  const double end = StepTime(s.settings, step + 1);
+  const Segment* last = nullptr;
+  const auto add = [&](double time, const ActiveContact& contact) {
+    const double margin = std::abs(end - time) / dt;
+    if (margin < kNearKinkMargin) {
+      AddMargin(margin, {&s, step, time, 0, &contact, ContactMode::kOpen},
+                "the run ends as it stops sliding");
+    }
+  };
+  for (int p = 0; p < record.num_parts; ++p) {
+    if (record.parts[p]->is_impulses) continue;
+    const Segment& segment = record.parts[p]->segment;
+    const double time = segment.time + segment.length;
+    last = segment.length > 0.0 ? &segment : last;
+    if (segment.event == EventKind::kSlipEnds) add(time, segment.event_contact);
+    if (segment.event == EventKind::kTouch && end - time < kNearJumpMargin * dt) {
+      const double speed = SpeedsOf(model, segment.after, segment.event_contact).normal;
+      if (speed < -Negligible(model, speed)) {
+        AddJump((end - time) / dt, {&s, step, time, 0, &segment.event_contact, ContactMode::kOpen},
+                "the run ends as it touches");
+      }
+    }
+  }
+  if (last == nullptr) return;
+  for (size_t i = 0; i < last->contacts.size(); ++i) {
+    const double before = SlipOf(model, last->before, last->contacts[i]);
+    const double after = SlipOf(model, last->after, last->contacts[i]);
+    if (SlidingSign(last->modes[i]) != 0.0 && after < before) {
+      add(last->time + last->length * (before / (before - after)), last->contacts[i]);
+    }
+  }
+  AddTouchesAtEnd(model, step, *last);
 }
 
 // Contacts and impacts of earlier steps, as the island's: its bodies may have been in several.
@@ -414,6 +491,7 @@ void RolloutCertifier::AddIsland(const Model<double>& model, long step, EventDer
       most = std::max(most, count);
     }
   }
+  if (step + 1 == NumSteps(model.structure->settings)) AddEnd(model, step, record);
   // Infinitely many impacts in a finite time (Zeno): rounding decides how many of them are
   // computed.
   if (2 * most > model.structure->settings.max_events_per_step) {

@@ -101,6 +101,18 @@ bool OpposesSlips(const ContactProblem<double>& problem, const std::vector<Conta
   return true;
 }
 
+// Where contacts nearly jam accelerations change so fast with poses that only a short motion can be
+// integrated: it is halved.
+struct Halvings {
+  int of_motion = 0;
+  int motions = 0;
+  // Whether the motion may be halved once more.
+  bool Again() {
+    motions += of_motion == 0 ? 1 : 0;
+    return ++of_motion <= kMostHalvings && motions <= kMostShortened;
+  }
+};
+
 // Number of events after which a step is given up.
 int MostEvents(const Model<double>& model) {
   return kGiveUp * model.structure->settings.max_events_per_step + kGiveUp;
@@ -418,6 +430,31 @@ void EventStepper::ShortenAtEllipses(const Model<double>& model,
   }
 }
 
+double EventStepper::SlipAtStart(size_t i, double slow, bool* is_open) const {
+  double slip = touching_.slip[i];
+  for (const std::vector<EndingSlip>* list : {&ending_, &released_}) {
+    for (const EndingSlip& ending : *list) {
+      if (!ending.contact.SameAs(touching_.contacts[i])) continue;
+      *is_open = *is_open || ending.sign == 0.0;
+      // The speed is set above the tolerance, because the contact does not slide yet against its
+      // own friction.
+      slip = 2.0 * slow * ending.sign;
+    }
+  }
+  return slip;
+}
+
+void EventStepper::Release(const Segment& segment) {
+  const bool opens = segment.event == EventKind::kLiftOff;
+  for (const ActiveContact& contact : segment.contacts) {
+    if (opens ? contact.SameAs(segment.event_contact)
+              : contact.IsBetweenTheSame(segment.event_contact)) {
+      released_.push_back({contact, opens ? 0.0 : -segment.event_sign});
+    }
+  }
+  --record_.num_parts;
+}
+
 bool EventStepper::ChooseModes(const Model<double>& model, const State<double>& state,
                                EventOutcome* outcome, Segment* segment) {
   const SimulationSettings& settings = model.structure->settings;
@@ -427,15 +464,12 @@ bool EventStepper::ChooseModes(const Model<double>& model, const State<double>& 
   segment->modes.clear();
   std::vector<double> slip;
   for (size_t i = 0; i < touching_.contacts.size(); ++i) {
-    if (touching_.approach[i] <= slow) {
+    bool is_open = touching_.approach[i] > slow;
+    const double counted = SlipAtStart(i, slow, &is_open);
+    if (!is_open) {
       segment->contacts.push_back(touching_.contacts[i]);
       segment->friction.push_back(touching_.friction[i]);
-      slip.push_back(touching_.slip[i]);
-      for (const EndingSlip& ending : ending_) {
-        // The speed is set above the tolerance, because the contact does not slide yet against its
-        // own friction.
-        if (ending.contact.SameAs(touching_.contacts[i])) slip.back() = 2.0 * slow * ending.sign;
-      }
+      slip.push_back(counted);
     }
   }
   if (segment->contacts.empty()) {
@@ -615,6 +649,7 @@ EventOutcome EventStepper::Advance(const Model<double>& model, double t, double 
   EventOutcome outcome;
   record_.Clear();
   guess_.located = 0;
+  released_.clear();
   counts_.Clear();
   shortened_.Clear();
   search_.StartStep(model, t, h, *state);
@@ -623,7 +658,7 @@ EventOutcome EventStepper::Advance(const Model<double>& model, double t, double 
   const double end = t + h;
   double now = t;
   bool impulses_tried = false;
-  int halvings = 0, shortened = 0;
+  Halvings halvings;
   const auto fail = [&](const std::string& message) {
     outcome.done = false;
     outcome.message = message;
@@ -639,7 +674,7 @@ EventOutcome EventStepper::Advance(const Model<double>& model, double t, double 
     if (at_end) break;
     const EdgeGroup next = NextEdges(edges, now, kTimeRounding * h);
     const double goal = next.any ? next.time : end;
-    const double until = now + std::ldexp(goal - now, -halvings);
+    const double until = now + std::ldexp(goal - now, -halvings.of_motion);
     const int parts = record_.num_parts;
     Segment& segment = BeginSegment(now, until, *state);
     if (!ChooseModes(model, *state, &outcome, &segment)) {
@@ -659,16 +694,16 @@ EventOutcome EventStepper::Advance(const Model<double>& model, double t, double 
     outcome.pairs_compared = search_.num_compared();
     outcome.pairs_near = search_.num_pairs();
     if (!moved) {
-      // Where contacts nearly jam accelerations change so fast with poses that only a short motion
-      // can be integrated.
-      shortened += halvings == 0 ? 1 : 0;
       ++outcome.halved_motions;
       record_.num_parts = parts;
-      if (++halvings > kMostHalvings || shortened > kMostShortened) {
-        return fail(message);
-      }
+      if (!halvings.Again()) return fail(message);
       continue;
     }
+    if (search_.ends_at_start()) {
+      Release(segment);
+      continue;
+    }
+    released_.clear();
     impulses_tried = false;
     guess_.located += IsLocated(segment.event) ? 1 : 0;
     outcome.stopped = at_event == AtEvent::kStopAtSecond && guess_.located > 1;
@@ -676,7 +711,7 @@ EventOutcome EventStepper::Advance(const Model<double>& model, double t, double 
     *state = segment.after;
     passed_ = EdgeGroup();
     at_given_time = segment.event == EventKind::kStepEnd;
-    halvings = 0;
+    halvings.of_motion = 0;
     if (at_given_time) {
       now = segment.length < until - now ? now + segment.length : until;
       outcome.events += EndAtGivenTime(now < goal, next, &segment);
