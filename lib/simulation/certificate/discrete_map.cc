@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "tangible/geometry/tolerances.h"
 #include "tangible/simulation/certificate/approach_inl.h"
 #include "tangible/simulation/certificate/certify_place_inl.h"
 #include "tangible/simulation/derivatives/rollout_directional.h"
@@ -18,6 +19,14 @@ bool ClosesGently(const Model<double>& model, const StepRecord& record, size_t i
   const Approach approach = ApproachOf(*model.structure, record, i);
   return record.contacts[i].law != ContactLaw::kRestitution &&
          approach.before >= -Negligible(model, approach.terms);
+}
+
+// The normal of a contact towards the body that forces move, of two such bodies the first.
+Vector2<double> NormalOf(const Model<double>& model, const StepRecord& record, size_t i) {
+  const ContactBlock<double>& block = record.problem.contacts[i];
+  const bool first_moves = model.structure->bodies[record.contacts[i].a].block >= 0;
+  const RowPart<double>& row = first_moves ? block.normal_a : block.normal_b;
+  return {row[0], row[1]};
 }
 
 bool IsBefore(const ActiveContact& x, const ActiveContact& y) {
@@ -44,6 +53,24 @@ DiscreteMapWatch::Touch* DiscreteMapWatch::FindLast(const ActiveContact& contact
       [](const Touch& touch, const ActiveContact& c) { return IsBefore(touch.contact, c); });
   for (; found != last_.end() && !IsBefore(contact, found->contact); ++found) {
     if (found->contact.SameAs(contact)) return &*found;
+  }
+  return nullptr;
+}
+
+DiscreteMapWatch::Touch* DiscreteMapWatch::FindHandedOver(const Model<double>& model,
+                                                          const Touch& touch) {
+  if (model.seams == nullptr || touch.contact.joint >= 0) return nullptr;
+  const std::vector<BodyIndex>& bodies = model.structure->bodies;
+  const auto moving = [&](const ActiveContact& c) { return bodies[c.a].block >= 0 ? c.a : c.b; };
+  const auto driven = [&](const ActiveContact& c) { return bodies[c.a].block >= 0 ? c.b : c.a; };
+  const int body = moving(touch.contact);
+  if (bodies[driven(touch.contact)].block >= 0) return nullptr;
+  for (Touch& last : last_) {
+    if (!last.continues && last.contact.joint < 0 && moving(last.contact) == body &&
+        bodies[driven(last.contact)].block < 0 &&
+        (last.normal - touch.normal).norm() <= kFlushTurn) {
+      return &last;
+    }
   }
   return nullptr;
 }
@@ -86,10 +113,13 @@ const std::vector<ContactChange>& DiscreteMapWatch::AddStep(const Model<double>&
     if (last != nullptr) last->continues = true;
     if (!exists && closed) without_last_.push_back(i);
     // One that reaches the surface as the step ends, without an impulse, is made in the next step.
-    if (exists || closed) now_.push_back({contact});
+    if (exists || closed) now_.push_back({contact, NormalOf(model, record, i)});
   }
   for (const size_t i : without_last_) {
-    Touch* const replaced = FindReplaced(record.contacts[i]);
+    Touch* replaced = FindReplaced(record.contacts[i]);
+    if (replaced == nullptr) {
+      replaced = FindHandedOver(model, {record.contacts[i], NormalOf(model, record, i)});
+    }
     if (replaced != nullptr && ClosesGently(model, record, i)) {
       replaced->continues = true;
     } else {

@@ -13,7 +13,8 @@
 //
 // A contact that exists from the start, without a gap and without approaching, is not made; where a
 // face and a corner of the same shapes continue one another without an impact nothing is made or
-// broken; and a slip that ends changes no contact.
+// broken, nor where a body passes from one flush face to another of the same normal, which are one
+// surface; and a slip that ends changes no contact.
 
 #include <vector>
 
@@ -43,11 +44,15 @@ class DiscreteMapWatch {
   // A contact that carries an impulse or touches without one, and whether it continues.
   struct Touch {
     ActiveContact contact;
+    Vector2<double> normal;
     bool continues = false;
   };
   Touch* FindLast(const ActiveContact& contact);
   // A contact of the last step, of the same shapes, that does not continue otherwise.
   Touch* FindReplaced(const ActiveContact& contact);
+  // In a model with seams, a contact of the last step of the same body with another one that no
+  // force moves, of the same normal, that does not continue otherwise.
+  Touch* FindHandedOver(const Model<double>& model, const Touch& touch);
   bool ExistsAtStart(const Model<double>& model, const StepRecord& record, size_t contact) const;
 
   Lengths lengths_;

@@ -171,6 +171,25 @@ TEST(DiscreteMapTest, ABoxThatTipsOverAnEdgeBreaksAContact) {
 }
 
 // A fit warns where the restitution acts, or where the last step makes a contact.
+// Two flush tiles are one surface; from one tile a ball or box falls onto a lower one.
+TEST(DiscreteMapTest, FromTileToFlushTileNothingIsMadeOrBroken) {
+  const auto on_tiles = [](const std::string& shape, double y, double height) {
+    const std::string tile =
+        R"(, "static": true, "friction": 0.5, "shape": {"box": {"size": [1, 0.25]}}, "position": )";
+    return R"({"bodies": [{"name": "left")" + tile + R"([-0.5, -0.125]}, {"name": "right")" + tile +
+           "[0.5, " + Exact(height - 0.125) + R"(]}, {"name": "body", "shape": )" + shape +
+           R"(, "mass": 2, "friction": 0.5, "position": [-0.3125, )" + Exact(y) +
+           R"(], "velocity": [2, 0]}], "simulation": {"dt": 0.01, "duration": 0.3}})";
+  };
+  for (const char* shape :
+       {R"({"circle": {"radius": 0.125}})", R"({"box": {"size": [0.25, 0.25]}})"}) {
+    ExpectNone(on_tiles(shape, 0.125, 0.0));
+    EXPECT_EQ(
+        CertificateOf(on_tiles(shape, 0.125, -0.01)).verdict.rfind("of the discrete map: ", 0), 0u)
+        << shape;
+  }
+}
+
 TEST(DiscreteMapTest, WhereASmallerStepDoesNotHelp) {
   const char* e = R"(, "restitution": 0.5)";
   const Certificate bounces = CertificateOf(Ball{.y = 0.325, .ball = e, .floor = e}.Text());
