@@ -27,9 +27,9 @@ namespace {
 // Starts are drawn in logarithms; observations are kept, a number each; and residuals are divided
 // by sigma.
 constexpr double kMostRange = 1e9;
-constexpr double kLeastRate = 1e-3;
+constexpr double kLeastRate = 0.001;
 constexpr double kMostRate = 1e6;
-constexpr double kLeastSigma = 1e-12;
+constexpr double kLeastSigma = 1.0 / 1e12;
 
 // What must hold: of the starts, and of the 95 % intervals pooled and of each link.
 constexpr double kLeastReached = 0.95;

@@ -116,8 +116,8 @@ TEST_F(TangibleControlTest, ARunWithoutPlansOrCostIsAnError) {
                   "initial controls is not finite");
     EXPECT_FALSE(std::filesystem::exists(Path("r.json")));
   }
-  // x²/2 overflows above 1.896e154 m. A plan that begins at t ends 0.25 s later, the run at 0.5 s: at
-  // 4e154 m/s the plans to 0.2 s can be made, and the run has no cost.
+  // x²/2 overflows above 1.896e154 m. A plan that begins at t ends 0.25 s later, the run at 0.5 s:
+  // at 4e154 m/s the plans to 0.2 s can be made, and the run has no cost.
   ExpectOneLine(at_speed("4e154"), 1, "problem.json: the cost of the run is not finite");
   EXPECT_FALSE(std::filesystem::exists(Path("r.json")));
   // At 3e154 m/s it has one, and the plans from 0.4 s on, steps 8 and 9, cannot be made.

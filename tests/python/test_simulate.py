@@ -94,7 +94,7 @@ def test_plots_of_energies_contacts_and_margins() -> None:
     assert [line.get_label() for line in contacts] == ["ball on floor"]
     assert sum(contacts[0].get_ydata()) == pytest.approx(run.contacts.normal_impulse.sum())
     margins = run.plot_margins()
-    assert margins.get_title() == "trustworthy"
+    assert margins.get_title() == "of the discrete map: trustworthy"
     assert min(margins.lines[0].get_ydata()) == pytest.approx(run.margins.min())
     with pytest.raises(ValueError, match="certify=True"):
         tangible.simulate(ball("fixed")).plot_margins()

@@ -2,8 +2,8 @@
 #pragma once
 //
 // The maker behind RandomCoincidence. An element is a body with what acts on it, for which
-// something happens at `at_`, a number of steps after the start; a scene has one or two of them. Not
-// for other users.
+// something happens at `at_`, a number of steps after the start; a scene has one or two of them.
+// Not for other users.
 
 #include <initializer_list>
 #include <string>

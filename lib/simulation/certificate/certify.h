@@ -21,8 +21,9 @@
 //                  and lands, on the other it is pushed out
 //   controls       an event at the boundary of two steps whose controls differ: different forces
 //                  act before and after it, and its derivative differs on each side
-//   end of the run an event by events at its last instant: beside it the event has happened or not,
-//                  so that a twist jumps (a touch) or has another derivative (an end of sliding)
+//   end            by events, an event at the last instant of the run: beside it the event has
+//                  happened or not, so that a twist jumps (a touch) or has another derivative (an
+//                  end of sliding)
 //   coordinates    so large that their rounding exceeds kLargeCoordinates of the size of a body
 //                  that has contacts or joints (coordinate_watch.h): its modes may be determined by
 //                  rounding
@@ -81,8 +82,8 @@ class RolloutCertifier {
   void ProbeStarts(const Model<double>& model, const State<double>& start,
                    const std::vector<const ActiveContact*>& touching, const Segment* first);
   /// Whether friction that is at rest as a segment starts, and slides at once, keeps its direction:
-  /// at an instant after an event, which has decided it; and as the run starts where no direction of
-  /// the parameters changes the rate of the contact or joint, or the twists of other bodies that
+  /// at an instant after an event, which has decided it; and as the run starts where no direction
+  /// of the parameters changes the rate of the contact or joint, or the twists of other bodies that
   /// joints transmit.
   bool KeepsSide(const Model<double>& model, const ActiveContact& contact,
                  EventDerivative* derivative, Segment* segment) const;

@@ -268,9 +268,6 @@ void RolloutCertifier::AddSegment(const Model<double>& model, long step,
       largest = std::max(largest, start.solution.normal_impulse[i]);
     }
   }
-  // The motion that follows an instant starts with the same forces, and knows which contacts at
-  // their limit it releases.
-  const bool motion_follows = segment->length == 0.0 && segment->event == EventKind::kStepEnd;
   for (size_t i = 0; i < segment->contacts.size(); ++i) {
     const ActiveContact& contact = segment->contacts[i];
     const Place place{&s, step, segment->time, i, &contact, segment->modes[i]};
@@ -281,7 +278,7 @@ void RolloutCertifier::AddSegment(const Model<double>& model, long step,
       certificate_.degenerate_rows += margin < kDegenerateTolerance ? 1 : 0;
     };
     if (!contact.IsJointFriction()) {
-      if (!motion_follows) add_margin(largest > 0.0 ? normal / largest : 0.0, "normal force");
+      add_margin(largest > 0.0 ? normal / largest : 0.0, "normal force");
       if (normal > kLoaded * largest) {
         loaded_.push_back(contact);
       }
@@ -306,7 +303,7 @@ void RolloutCertifier::AddSegment(const Model<double>& model, long step,
         add_margin(0.0, "friction limit");
       }
     }
-    if (place.mode == ContactMode::kSticking && !segment->SticksWithEarlier(i) && !motion_follows) {
+    if (place.mode == ContactMode::kSticking && !segment->SticksWithEarlier(i)) {
       const double above = segment->FrictionLeft(i, friction.value, 1.0, start.solution);
       const double below = segment->FrictionLeft(i, friction.value, -1.0, start.solution);
       if (above + below > 0.0) {

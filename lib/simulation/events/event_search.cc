@@ -186,18 +186,13 @@ double EventSearch::ModeValue(const Model<double>& model, Sample* sample, const 
 }
 
 void EventSearch::SearchClosed(const Model<double>& model, Event* event) {
-  for (size_t i = 0; i < segment_->contacts.size() && !event->at_start; ++i) {
+  for (size_t i = 0; i < segment_->contacts.size(); ++i) {
     const ContactMode mode = segment_->modes[i];
     Event trial;
     trial.index = static_cast<int>(i);
     trial.contact = segment_->contacts[i];
     const auto try_function = [&](double at_start, double tolerance) {
       if (at_start <= tolerance) {
-        trial.at_start = trial.kind != EventKind::kSlipEnds &&
-                         ModeValue(model, At(model, event->length), trial) < -tolerance &&
-                         ModeValue(model, At(model, 0.5 * event->length), trial) < -tolerance;
-        trial.length = event->length;
-        if (trial.at_start) *event = trial;
         return;
       }
       double a = 0.0;
@@ -256,7 +251,6 @@ void EventSearch::SearchClosed(const Model<double>& model, Event* event) {
     if (mode == ContactMode::kSticking && !segment_->SticksWithEarlier(i)) {
       trial.kind = EventKind::kSlipBegins;
       for (const double sign : {1.0, -1.0}) {
-        if (event->at_start) break;
         trial.sign = sign;
         try_function(segment_->FrictionLeft(i, segment_->friction[i].value, sign, start),
                      tolerance);
@@ -343,8 +337,8 @@ bool EventSearch::Run(const Model<double>& model, const std::vector<ActiveContac
   if (event.kind != EventKind::kAtOnce) {
     SearchClosed(model, &event);
   }
-  ends_at_start_ = event.at_start;
-  segment->length = event.length;
+  const double length = event.length;
+  segment->length = length;
   segment->event = event.kind;
   segment->event_contact = event.contact;
   segment->event_index = event.index;
@@ -353,16 +347,15 @@ bool EventSearch::Run(const Model<double>& model, const std::vector<ActiveContac
   if (event.kind == EventKind::kSlipBegins) {
     segment->event_friction = segment->friction[event.index];
   }
-  At(model, segment->length);
+  At(model, length);
   // If a motion could not be integrated, the events that it would have met are unknown.
   if (!all_good_) {
     *message = message_;
     return false;
   }
-  TakeMotion(At(model, segment->length), segment);
+  TakeMotion(At(model, length), segment);
   if (event.kind == EventKind::kSlipBegins || event.kind == EventKind::kLiftOff) {
-    return flow_.Accelerate(model, *segment, segment->after, segment->time + segment->length,
-                            &segment->end);
+    return flow_.Accelerate(model, *segment, segment->after, segment->time + length, &segment->end);
   }
   return true;
 }

@@ -89,29 +89,18 @@ void KeepClosed(const std::vector<ContactMode>& modes, double recovered, double 
   }
 }
 
-// Whether all contacts that slide have modes in which friction opposes that, or open.
+// Whether friction opposes the sliding of all joints that slide. That of a contact depends on its
+// normal force, so that where it jams no shift makes it slide on.
 bool OpposesSlips(const ContactProblem<double>& problem, const std::vector<ContactMode>& modes,
                   const std::vector<double>& slip, double slow) {
   for (size_t i = 0; i < modes.size(); ++i) {
-    if (problem.contacts[i].has_friction && std::abs(slip[i]) > slow &&
+    if (problem.contacts[i].limit_given && std::abs(slip[i]) > slow &&
         modes[i] != ContactMode::kOpen && !(SlidingSign(modes[i]) * slip[i] > 0.0)) {
       return false;
     }
   }
   return true;
 }
-
-// Where contacts nearly jam accelerations change so fast with poses that only a short motion can be
-// integrated: it is halved.
-struct Halvings {
-  int of_motion = 0;
-  int motions = 0;
-  // Whether the motion may be halved once more.
-  bool Again() {
-    motions += of_motion == 0 ? 1 : 0;
-    return ++of_motion <= kMostHalvings && motions <= kMostShortened;
-  }
-};
 
 // Number of events after which a step is given up.
 int MostEvents(const Model<double>& model) {
@@ -430,31 +419,6 @@ void EventStepper::ShortenAtEllipses(const Model<double>& model,
   }
 }
 
-double EventStepper::SlipAtStart(size_t i, double slow, bool* is_open) const {
-  double slip = touching_.slip[i];
-  for (const std::vector<EndingSlip>* list : {&ending_, &released_}) {
-    for (const EndingSlip& ending : *list) {
-      if (!ending.contact.SameAs(touching_.contacts[i])) continue;
-      *is_open = *is_open || ending.sign == 0.0;
-      // The speed is set above the tolerance, because the contact does not slide yet against its
-      // own friction.
-      slip = 2.0 * slow * ending.sign;
-    }
-  }
-  return slip;
-}
-
-void EventStepper::Release(const Segment& segment) {
-  const bool opens = segment.event == EventKind::kLiftOff;
-  for (const ActiveContact& contact : segment.contacts) {
-    if (opens ? contact.SameAs(segment.event_contact)
-              : contact.IsBetweenTheSame(segment.event_contact)) {
-      released_.push_back({contact, opens ? 0.0 : -segment.event_sign});
-    }
-  }
-  --record_.num_parts;
-}
-
 bool EventStepper::ChooseModes(const Model<double>& model, const State<double>& state,
                                EventOutcome* outcome, Segment* segment) {
   const SimulationSettings& settings = model.structure->settings;
@@ -464,12 +428,15 @@ bool EventStepper::ChooseModes(const Model<double>& model, const State<double>& 
   segment->modes.clear();
   std::vector<double> slip;
   for (size_t i = 0; i < touching_.contacts.size(); ++i) {
-    bool is_open = touching_.approach[i] > slow;
-    const double counted = SlipAtStart(i, slow, &is_open);
-    if (!is_open) {
+    if (touching_.approach[i] <= slow) {
       segment->contacts.push_back(touching_.contacts[i]);
       segment->friction.push_back(touching_.friction[i]);
-      slip.push_back(counted);
+      slip.push_back(touching_.slip[i]);
+      for (const EndingSlip& ending : ending_) {
+        // The speed is set above the tolerance, because the contact does not slide yet against its
+        // own friction.
+        if (ending.contact.SameAs(touching_.contacts[i])) slip.back() = 2.0 * slow * ending.sign;
+      }
     }
   }
   if (segment->contacts.empty()) {
@@ -649,7 +616,6 @@ EventOutcome EventStepper::Advance(const Model<double>& model, double t, double 
   EventOutcome outcome;
   record_.Clear();
   guess_.located = 0;
-  released_.clear();
   counts_.Clear();
   shortened_.Clear();
   search_.StartStep(model, t, h, *state);
@@ -658,7 +624,7 @@ EventOutcome EventStepper::Advance(const Model<double>& model, double t, double 
   const double end = t + h;
   double now = t;
   bool impulses_tried = false;
-  Halvings halvings;
+  int halvings = 0, shortened = 0;
   const auto fail = [&](const std::string& message) {
     outcome.done = false;
     outcome.message = message;
@@ -674,7 +640,7 @@ EventOutcome EventStepper::Advance(const Model<double>& model, double t, double 
     if (at_end) break;
     const EdgeGroup next = NextEdges(edges, now, kTimeRounding * h);
     const double goal = next.any ? next.time : end;
-    const double until = now + std::ldexp(goal - now, -halvings.of_motion);
+    const double until = now + std::ldexp(goal - now, -halvings);
     const int parts = record_.num_parts;
     Segment& segment = BeginSegment(now, until, *state);
     if (!ChooseModes(model, *state, &outcome, &segment)) {
@@ -694,16 +660,16 @@ EventOutcome EventStepper::Advance(const Model<double>& model, double t, double 
     outcome.pairs_compared = search_.num_compared();
     outcome.pairs_near = search_.num_pairs();
     if (!moved) {
+      // Where contacts nearly jam accelerations change so fast with poses that only a short motion
+      // can be integrated.
+      shortened += halvings == 0 ? 1 : 0;
       ++outcome.halved_motions;
       record_.num_parts = parts;
-      if (!halvings.Again()) return fail(message);
+      if (++halvings > kMostHalvings || shortened > kMostShortened) {
+        return fail(message);
+      }
       continue;
     }
-    if (search_.ends_at_start()) {
-      Release(segment);
-      continue;
-    }
-    released_.clear();
     impulses_tried = false;
     guess_.located += IsLocated(segment.event) ? 1 : 0;
     outcome.stopped = at_event == AtEvent::kStopAtSecond && guess_.located > 1;
@@ -711,7 +677,7 @@ EventOutcome EventStepper::Advance(const Model<double>& model, double t, double 
     *state = segment.after;
     passed_ = EdgeGroup();
     at_given_time = segment.event == EventKind::kStepEnd;
-    halvings.of_motion = 0;
+    halvings = 0;
     if (at_given_time) {
       now = segment.length < until - now ? now + segment.length : until;
       outcome.events += EndAtGivenTime(now < goal, next, &segment);

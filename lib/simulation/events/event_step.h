@@ -125,7 +125,7 @@ class EventStepper {
     std::vector<CoefficientSource> friction, restitution;
     std::vector<double> approach, slip;  ///< n v and t v, m/s
   };
-  /// A contact at rest that counts as sliding, with its direction; 0: as open.
+  /// A contact at rest that counts as sliding.
   struct EndingSlip {
     ActiveContact contact;
     double sign = 0.0;
@@ -203,11 +203,6 @@ class EventStepper {
                         EventOutcome* outcome);
   ContactMode GuessOf(const ActiveContact& contact) const;
   void SwitchMode(const Segment& segment);
-  /// Takes back the last segment, which its event ends at its start (EventSearch::ends_at_start),
-  /// and releases the event's contact, with its like (SwitchMode), in the next one.
-  void Release(const Segment& segment);
-  /// The slip with which contact i of touching_ counts, and whether it may be closed.
-  double SlipAtStart(size_t i, double slow, bool* is_open) const;
 
   EventSearch search_;
   SegmentFlow flow_;
@@ -225,9 +220,6 @@ class EventStepper {
   std::vector<double>
       struck_;  ///< for each body: approach before its last impact at this instant; 0: none
   std::vector<EndingSlip> ending_;  ///< contacts that slide until a separate event
-  /// Contacts at their limit as the next motion starts, beyond which they would go in it: the
-  /// accelerations at the start do not tell that they slide or open.
-  std::vector<EndingSlip> released_;
 };
 
 }  // namespace tangible

@@ -436,8 +436,8 @@ TEST(SeamsTest, StepsUpAreWallsAndStepsDownAreFalls) {
 }
 
 // A disc slides without friction from 60 degrees in a bowl of facets. Each corner takes the speed
-// across the next facet's normal, so that the highest angle on the other side tends to 60 degrees as
-// facets get finer, at first order.
+// across the next facet's normal, so that the highest angle on the other side tends to 60 degrees
+// as facets get finer, at first order.
 TEST(SeamsTest, ABowlOfFacetsTendsToTheSmoothOne) {
   const auto highest = [](int facets, Stepping stepping) {
     std::string bodies;

@@ -70,6 +70,8 @@ Scene SceneOf(const Arena& arena) {
 FlightModel::FlightModel(const Arena& arena, const Responses* responses)
     : arena_(arena), responses_(responses) {
   BuildModel(SceneOf(arena), &model_, &home_);
+  // The bricks wait in one place, where they would hide each other; a flight sets their poses.
+  model_.seams = nullptr;
   state_ = home_;
   stepper_ = std::make_unique<Stepper>(model_);
 }
