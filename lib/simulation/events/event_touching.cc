@@ -29,23 +29,44 @@ void EventStepper::AddTouching(const Model<double>& model, const State<double>& 
 
 namespace {
 
-// Keeps the nearest of the contacts of a body that is exactly above a seam: on both sides of a step
-// that counts as flush it cannot rest.
-void KeepOneOwner(const Model<double>& model, const State<double>& state,
+// Whether a body moves from the tile of one contact to that of the other one. The tiles are convex
+// and lie side by side, so that the way between their origins tells on which side each is.
+bool GoesOnTo(const Model<double>& model, const State<double>& state, const ActiveContact& from,
+              const ActiveContact& to) {
+  const std::vector<BodyIndex>& bodies = model.structure->bodies;
+  const auto tile = [&](const ActiveContact& c) { return bodies[c.a].block >= 0 ? c.b : c.a; };
+  const int body = bodies[from.a].block >= 0 ? from.a : from.b;
+  double along = 0.0;
+  for (int k = 0; k < 2; ++k) {
+    along += (state.pose[3 * tile(to) + k] - state.pose[3 * tile(from) + k]) *
+             (state.twist[3 * body + k] - state.twist[3 * tile(from) + k]);
+  }
+  return along > 0.0;
+}
+
+// Keeps one of the contacts of a body that is exactly above a seam: the nearest, because on both
+// sides of a step that counts as flush it cannot rest; and of two whose gaps differ by rounding the
+// one onto which the body moves, because the other one would be lost at once.
+void KeepOneOwner(const Model<double>& model, const State<double>& state, const Lengths& lengths,
                   std::vector<ActiveContact>* contacts) {
   const auto geometry_of = [&](const ActiveContact& contact) {
     ContactRows<double> rows;
     EvaluateContactRows(model, state, contact, &rows);
     return rows.geometry;
   };
+  const auto is_preferred = [&](const ActiveContact& other, const ActiveContact& contact) {
+    const double rounding = kLeftAlone * lengths.Rounding(state, contact.a, contact.b);
+    if (std::abs(other.gap - contact.gap) > rounding) return other.gap < contact.gap;
+    const bool goes_on = GoesOnTo(model, state, contact, other);
+    return goes_on == GoesOnTo(model, state, other, contact) ? &other < &contact : goes_on;
+  };
   for (size_t i = contacts->size(); i-- > 0;) {
     const ActiveContact& contact = (*contacts)[i];
     const ContactGeometry<double> own = geometry_of(contact);
     const bool is_second =
         std::any_of(contacts->begin(), contacts->end(), [&](const ActiveContact& other) {
-          const bool is_nearer =
-              other.gap < contact.gap || (other.gap == contact.gap && &other < &contact);
-          return is_nearer && AreOfOneSeam(model, other, geometry_of(other), contact, own);
+          return AreOfOneSeam(model, other, geometry_of(other), contact, own) &&
+                 is_preferred(other, contact);
         });
     if (is_second) contacts->erase(contacts->begin() + static_cast<std::ptrdiff_t>(i));
   }
@@ -63,7 +84,7 @@ void EventStepper::FindTouching(const Model<double>& model, const State<double>&
   }
   std::vector<ActiveContact> found;
   search_.FindContacts(model, state, reach, &found);
-  if (model.seams != nullptr) KeepOneOwner(model, state, &found);
+  if (model.seams != nullptr) KeepOneOwner(model, state, lengths, &found);
   const double slow = search_.SpeedTolerance(model, state);
   for (const ActiveContact& contact : found) {
     const double touch = lengths.Touch(state, contact.a, contact.b);

@@ -25,6 +25,7 @@ Certificate Certify(const std::string& text, const std::vector<std::string>& wan
   for (const std::string& name : wanted) {
     options.numbers.push_back(name == "friction"      ? body.friction
                               : name == "restitution" ? body.restitution
+                              : name == "end"         ? model.structure->forces[0].end
                                                       : model.structure->forces[0].start);
   }
   RolloutReport report;
