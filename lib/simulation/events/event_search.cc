@@ -191,6 +191,8 @@ void EventSearch::SearchClosed(const Model<double>& model, Event* event) {
     Event trial;
     trial.index = static_cast<int>(i);
     trial.contact = segment_->contacts[i];
+    // Values are located to their rounding: that of the fastest point, or of the largest force.
+    double located = kLocatedOfSize / kSlowShare * slow_;
     const auto try_function = [&](double at_start, double tolerance) {
       if (at_start <= tolerance) {
         return;
@@ -205,7 +207,8 @@ void EventSearch::SearchClosed(const Model<double>& model, Event* event) {
         }
         if (fb < -tolerance) {
           const auto f = [&](Sample& sample) { return ModeValue(model, &sample, trial); };
-          trial.length = Refine(model, f, kLocatedOfSize * at_start, a, fa, b, fb);
+          trial.length =
+              Refine(model, f, std::max(kLocatedOfSize * at_start, located), a, fa, b, fb);
           trial.at_once =
               trial.length < kShortestPart * b && f(*At(model, trial.length)) < -tolerance;
           *event = trial;
@@ -241,6 +244,7 @@ void EventSearch::SearchClosed(const Model<double>& model, Event* event) {
         scale = std::max(scale, std::abs(start.normal_impulse[k]));
       }
     }
+    located = kLocatedOfSize * scale;
     const double tolerance =
         std::max(kForceTolerance * scale, Inert(model, lengths_, segment_->contacts[i]) * slow_ /
                                               model.structure->settings.dt);
@@ -278,6 +282,49 @@ void EventSearch::FindPairs(const Model<double>& model) {
   }
   broad_phase_.FindPairs(
       boxes_, [&](int i, int j) { return structure.MayCollide(i, j); }, &pairs_);
+  if (pairs_.size() > 1) SortPairs(model);
+}
+
+// Sorts pairs by the time at which the parabola through their gap and its rate at the start, and
+// their gap at the end, closes: once the first event is found, the others are dismissed by its
+// instant alone.
+void EventSearch::SortPairs(const Model<double>& model) {
+  const double h = segment_->length;
+  const Sample& end = *At(model, h);
+  if (!end.good) return;
+  const auto closes_at = [&](int a, int b) {
+    double first = kInfinity;
+    model.structure->ForEachPartPair(a, b, [&](PartPair parts) {
+      ContactFeature features[2];
+      if (FindFeatures(model, a, segment_->before.PoseOf(a), b, segment_->before.PoseOf(b), parts,
+                       kInfinity, features) == 0) {
+        return;
+      }
+      ActiveContact contact;
+      contact.a = a;
+      contact.b = b;
+      contact.feature = features[0];
+      ContactRows<double> rows;
+      EvaluateContactRows(model, segment_->before, contact, &rows);
+      const double gap = rows.geometry.gap;
+      const double rate = RelativeSpeed(segment_->before, a, rows.normal_a, b, rows.normal_b);
+      EvaluateContactRows(model, end.motion.after, contact, &rows);
+      const double last = rows.geometry.gap;
+      if (!(last < 0.0)) return;
+      // gap + rate h x + c x² = 0 for x in (0, 1).
+      const double c = last - gap - rate * h;
+      const double root = std::sqrt(std::max(rate * h * rate * h - 4.0 * gap * c, 0.0));
+      const double q = -0.5 * (rate * h + std::copysign(root, rate));
+      for (const double x : {q != 0.0 ? gap / q : 0.0, c != 0.0 ? q / c : 0.0}) {
+        if (x > 0.0) first = std::min(first, x);
+      }
+    });
+    return first;
+  };
+  order_.clear();
+  for (const auto& [a, b] : pairs_) order_.push_back({closes_at(a, b), {a, b}});
+  std::sort(order_.begin(), order_.end());
+  for (size_t i = 0; i < order_.size(); ++i) pairs_[i] = order_[i].second;
 }
 
 bool EventSearch::Run(const Model<double>& model, const std::vector<ActiveContact>& touching,

@@ -88,6 +88,7 @@ class EventSearch {
   Sample* At(const Model<double>& model, double length);
   void TakeMotion(Sample* sample, Segment* segment);
   void FindPairs(const Model<double>& model);
+  void SortPairs(const Model<double>& model);
   void SearchPair(const Model<double>& model, int a, int b, PartPair parts, Event* event);
   // Searches for the time at which a contact that opens in penetration approaches again, if it has
   // not left by then.
@@ -128,6 +129,7 @@ class EventSearch {
   int num_pairs_with_events_ = 1;
   bool all_good_ = true;  ///< all samples of this search could be integrated
   std::vector<std::pair<int, int>> pairs_;
+  std::vector<std::pair<double, std::pair<int, int>>> order_;  ///< pairs and when they close
   std::vector<Aabb> boxes_;
   BroadPhase broad_phase_;
   std::string message_;

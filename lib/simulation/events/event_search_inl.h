@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 #include <vector>
 
 #include "tangible/simulation/events/event_search.h"
@@ -19,25 +20,56 @@ inline bool Contains(const std::vector<ActiveContact>& contacts, const ActiveCon
 
 inline constexpr int kMostBisections = 1000;
 inline constexpr int kMostRefinements = 200;
+// A function that jumps is halved after so many steps.
+inline constexpr int kMostSecants = 12;
+// Of the last value: a root's search converges whose value falls below it.
+inline constexpr double kConverges = 0.1;
 
-// Illinois' variant of the secant method within a bracket, with halving where three steps have not
-// halved it: until |f| ≤ tolerance, or to the last bit that changes the value.
+// The root within (low, high) of the parabola through three values of a function, or NaN.
+inline double RootOfParabola(double a, double fa, double b, double fb, double c, double fc,
+                             double low, double high) {
+  const double slope = (fb - fa) / (b - a);
+  const double curvature = ((fc - fb) / (c - b) - slope) / (c - a);
+  // About b: fb + rate (x − b) + curvature (x − b)².
+  const double rate = slope + curvature * (b - a);
+  const double square = rate * rate - 4.0 * curvature * fb;
+  if (!(square >= 0.0)) return std::numeric_limits<double>::quiet_NaN();
+  // The smaller root without cancellation, and the other one.
+  const double q = -0.5 * (rate + std::copysign(std::sqrt(square), rate));
+  for (const double x : {b + fb / q, b + q / curvature}) {
+    if (x > low && x < high) return x;
+  }
+  return std::numeric_limits<double>::quiet_NaN();
+}
+
+// Muller's method within a bracket (gaps are nearly parabolas), with Illinois' variant of the secant
+// method where the parabola has no root there, and halving where three steps have not halved the
+// bracket and the last value did not fall: until |f| ≤ tolerance, or to the last bit that changes
+// the value.
 template <typename Function>
 double EventSearch::Refine(const Model<double>& model, const Function& f, double tolerance,
                            double a, double fa, double b, double fb) {
   int same_side = 0;  // > 0: a was moved last, < 0: b
   double last_width = b - a;
+  // The values of the ends, which Illinois' variant halves, and the last end that was replaced.
+  double true_a = fa, true_b = fb;
+  double old = std::numeric_limits<double>::quiet_NaN(), f_old = old;
+  bool converges = false;
+  double last = HUGE_VAL;
   for (int k = 1; k <= kMostRefinements && fb != 0.0; ++k) {
     const double width = b - a;
     if (width <= kBracket * b) {
       break;
     }
-    bool halve = false;
+    bool halve = k > kMostSecants && !converges;
     if (k % 3 == 0) {
-      halve = width > 0.5 * last_width;
+      halve = halve || (width > 0.5 * last_width && !converges);
       last_width = width;
     }
-    double m = halve ? 0.5 * (a + b) : b - fb * width / (fb - fa);
+    double m = halve ? 0.5 * (a + b) : RootOfParabola(old, f_old, a, true_a, b, true_b, a, b);
+    if (!(m > a && m < b)) {
+      m = b - fb * width / (fb - fa);
+    }
     if (!(m > a && m < b)) {
       m = 0.5 * (a + b);
     }
@@ -51,13 +83,17 @@ double EventSearch::Refine(const Model<double>& model, const Function& f, double
     if (std::abs(fm) <= tolerance) {
       return m;
     }
+    converges = std::abs(fm) <= kConverges * last;
+    last = std::abs(fm);
     if (fm > 0.0) {
-      a = m;
+      old = std::exchange(a, m);
+      f_old = std::exchange(true_a, fm);
       fa = fm;
       if (same_side > 0) fb *= 0.5;
       same_side = 1;
     } else {
-      b = m;
+      old = std::exchange(b, m);
+      f_old = std::exchange(true_b, fm);
       fb = fm;
       if (same_side < 0) fa *= 0.5;
       same_side = -1;

@@ -177,7 +177,7 @@ TEST(StepReportTest, SystemsThatDoNotRefineCondensedAreSeen) {
   EXPECT_EQ(refined.report.status, StepStatus::kDone);
   EXPECT_EQ(refined.report.solver.whole_system, 0);
   // Beyond what a double adds: 1 kg is nothing to it.
-  const Ran spread(HeavyOnLight(1e16, "event"));
+  const Ran spread(HeavyOnLight(1e17, "event"));
   EXPECT_EQ(spread.report.status, StepStatus::kDone);
   EXPECT_GT(spread.report.solver.whole_system, 0);
 }
