@@ -138,9 +138,8 @@ std::optional<Certificate> RecordingsProblem::Certify(const Eigen::VectorXd& p) 
   for (int block = 0; block < num_blocks(); ++block) {
     std::optional<Certificate> one = recordings_[block].residuals.Certify(ParametersOf(block, p));
     if (!one) continue;
-    for (std::string* reason :
-         {&one->margin_where, &one->coordinates, &one->smoothed, &one->one_sided,
-          &one->discontinuous, &one->discrete_map, &one->discrete_impact}) {
+    for (std::string* reason : {&one->margin_where, &one->coordinates, &one->one_sided,
+                                &one->discontinuous, &one->discrete_map, &one->discrete_impact}) {
       if (!reason->empty()) *reason = BlockName(block) + *reason;
     }
     if (all) {

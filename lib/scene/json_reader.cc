@@ -218,10 +218,12 @@ std::vector<std::string> JsonReader::Keys() const {
   return keys;
 }
 
-void JsonReader::ExpectKeys(const std::vector<std::string>& keys, const std::string& where) const {
+void JsonReader::ExpectKeys(const std::vector<std::string>& keys, const std::string& where,
+                            const std::vector<std::string>& withdrawn) const {
   if (!IsObject()) return FailExpected("an object");
   for (const std::string& key : Keys()) {
     if (std::find(keys.begin(), keys.end(), key) != keys.end()) continue;
+    if (std::find(withdrawn.begin(), withdrawn.end(), key) != withdrawn.end()) continue;
     At(key).Fail("unknown key" + where + ", expected one of " + Join(keys) + ", got " +
                  Quoted(key));
   }

@@ -78,6 +78,7 @@ class JsonReader {
   bool IsArray() const { return value_ != nullptr && value_->is_array(); }
   bool IsString() const { return value_ != nullptr && value_->is_string(); }
   bool IsNumber() const { return value_ != nullptr && value_->is_number(); }
+  bool Is(const Json& value) const { return value_ != nullptr && *value_ == value; }
 
   /// Records "file: pointer: what".
   void Fail(const std::string& what) const { errors_->Add(pointer_, what); }
@@ -96,8 +97,9 @@ class JsonReader {
   std::vector<std::string> Keys() const;
 
   /// Fails unless this is an object whose keys are all among these. `where` ends the message on an
-  /// unknown key, e.g. " of a weld joint".
-  void ExpectKeys(const std::vector<std::string>& keys, const std::string& where = "") const;
+  /// unknown key, e.g. " of a weld joint". The message does not name `withdrawn`, which pass.
+  void ExpectKeys(const std::vector<std::string>& keys, const std::string& where = "",
+                  const std::vector<std::string>& withdrawn = {}) const;
   /// Fails unless this is an array; returns its size.
   int ExpectArray(const std::string& expected) const;
 

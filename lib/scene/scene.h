@@ -15,7 +15,6 @@
 
 #include "tangible/math/scalar.h"
 #include "tangible/math/shape_type.h"
-#include "tangible/math/solver_choice.h"
 
 namespace tangible {
 
@@ -133,8 +132,8 @@ struct BasicPair {
 
 enum class Stepping { kFixed, kEvent };
 enum class Integrator { kSemiImplicitEuler, kTrapezoidal, kRungeKutta4 };
-enum class JointCorrection { kNone, kBaumgarte, kProjection };
-enum class Mixing { kAverage, kGeometricMean, kMinimum, kMaximum };
+enum class JointCorrection { kNone, kProjection };
+enum class Mixing { kAverage, kGeometricMean };
 enum class ImpactLaw { kNewton, kPoisson };
 
 /// How the scene is simulated; none of its numbers is a parameter.
@@ -151,7 +150,6 @@ struct SimulationSettings {
   std::optional<Integrator> integrator;
   std::optional<JointCorrection> joint_correction;
   double joint_tolerance = 1e-10;  ///< m or rad, of `projection`
-  double baumgarte = 0.2;          ///< fraction of the joint drift corrected in a step
   Mixing friction_mixing = Mixing::kAverage;
   Mixing restitution_mixing = Mixing::kAverage;
   ImpactLaw impact_law = ImpactLaw::kNewton;
@@ -159,14 +157,13 @@ struct SimulationSettings {
   double recovery_speed = 3.0;          ///< m/s, at most, out of penetration
   double contact_margin = 1e-4;         ///< m
   int max_events_per_step = 100;
-  SolverChoice solver = SolverChoice::kAuto;
   double lcp_tolerance = 1e-10;  ///< scaled natural residual
   int lcp_max_iterations = 100;
-  double smoothing = 0.0;  ///< complementarity κ at which the interior point stops; 0: exact
 };
 
 /// The integrator of a run: the one that is set, else `semi_implicit_euler` with fixed stepping and
-/// `runge_kutta_4` with event stepping (by events the former gains energy without bound).
+/// `runge_kutta_4` with event stepping (by events the former would gain energy without bound, and
+/// is refused).
 inline Integrator IntegratorOf(const SimulationSettings& settings) {
   return settings.integrator.value_or(settings.stepping == Stepping::kEvent
                                           ? Integrator::kRungeKutta4

@@ -39,6 +39,31 @@ void ReadDirection(const JsonReader& reader, Vector2<double>* value) {
   }
 }
 
+// Fails on settings that earlier scenes could have and no scene needs. A file that writes out the
+// value that every run has is read.
+void RefuseWithdrawn(const JsonReader& simulation) {
+  const struct {
+    const char* key;
+    Json of_every_run;
+    const char* expected;
+  } keys[] = {
+      {"baumgarte", 0.2, "no such key (\"joint_correction\": \"projection\" closes joints)"},
+      {"solver", "auto", "no such key (a step is solved by the first method that can)"},
+      {"smoothing", 0.0, "no such key (every step is solved to \"lcp_tolerance\")"}};
+  for (const auto& [key, of_every_run, expected] : keys) {
+    const JsonReader value = simulation.At(key);
+    if (value.exists() && !value.Is(of_every_run)) value.FailExpected(expected);
+  }
+  const JsonReader correction = simulation.At("joint_correction");
+  if (correction.Is("baumgarte")) correction.FailExpected("\"projection\", which closes joints");
+  for (const char* key : {"friction_mixing", "restitution_mixing"}) {
+    const JsonReader mixing = simulation.At(key);
+    if (mixing.Is("minimum") || mixing.Is("maximum")) {
+      mixing.FailExpected("average, geometric_mean, or the pair's own value in \"pairs\"");
+    }
+  }
+}
+
 class SceneReader {
  public:
   SceneReader(std::string folder, Scene* scene) : folder_(std::move(folder)), scene_(scene) {}
@@ -421,12 +446,12 @@ void SceneReader::ReadNoContact(const JsonReader& item) {
 }
 
 void SceneReader::ReadSimulation(const JsonReader& reader) {
-  reader.ExpectKeys(
-      {"dt", "duration", "stepping", "integrator", "joint_correction", "joint_tolerance",
-       "baumgarte", "friction_mixing", "restitution_mixing", "impact_law", "restitution_threshold",
-       "recovery_speed", "contact_margin", "max_events_per_step", "solver", "lcp_tolerance",
-       "lcp_max_iterations", "smoothing"},
-      " of simulation");
+  reader.ExpectKeys({"dt", "duration", "stepping", "integrator", "joint_correction",
+                     "joint_tolerance", "friction_mixing", "restitution_mixing", "impact_law",
+                     "restitution_threshold", "recovery_speed", "contact_margin",
+                     "max_events_per_step", "lcp_tolerance", "lcp_max_iterations"},
+                    " of simulation", {"baumgarte", "solver", "smoothing"});
+  RefuseWithdrawn(reader);
   if (!reader.ok()) return;
   constexpr int kMostIterations = 1000000;
   SimulationSettings& settings = scene_->simulation;
@@ -440,7 +465,6 @@ void SceneReader::ReadSimulation(const JsonReader& reader) {
   ReadChoice(reader, "integrator", kIntegratorNames, &settings.integrator);
   ReadChoice(reader, "joint_correction", kJointCorrectionNames, &settings.joint_correction);
   ReadNumber(reader, "joint_tolerance", NumberKind::kPositive, &settings.joint_tolerance);
-  ReadNumber(reader, "baumgarte", NumberKind::kFraction, &settings.baumgarte);
   ReadChoice(reader, "friction_mixing", kMixingNames, &settings.friction_mixing);
   ReadChoice(reader, "restitution_mixing", kMixingNames, &settings.restitution_mixing);
   ReadChoice(reader, "impact_law", kImpactLawNames, &settings.impact_law);
@@ -451,12 +475,10 @@ void SceneReader::ReadSimulation(const JsonReader& reader) {
   if (reader.Has("max_events_per_step")) {
     settings.max_events_per_step = reader.At("max_events_per_step").Integer(0, kMostIterations);
   }
-  ReadChoice(reader, "solver", kSolverNames, &settings.solver);
   ReadNumber(reader, "lcp_tolerance", NumberKind::kPositive, &settings.lcp_tolerance);
   if (reader.Has("lcp_max_iterations")) {
     settings.lcp_max_iterations = reader.At("lcp_max_iterations").Integer(1, kMostIterations);
   }
-  ReadNumber(reader, "smoothing", NumberKind::kNonNegative, &settings.smoothing);
 }
 
 }  // namespace

@@ -177,7 +177,6 @@ class SceneWriter {
       json["joint_correction"] = NameOf(*settings.joint_correction, kJointCorrectionNames);
     }
     json["joint_tolerance"] = settings.joint_tolerance;
-    json["baumgarte"] = settings.baumgarte;
     json["friction_mixing"] = NameOf(settings.friction_mixing, kMixingNames);
     json["restitution_mixing"] = NameOf(settings.restitution_mixing, kMixingNames);
     json["impact_law"] = NameOf(settings.impact_law, kImpactLawNames);
@@ -185,10 +184,8 @@ class SceneWriter {
     json["recovery_speed"] = settings.recovery_speed;
     json["contact_margin"] = settings.contact_margin;
     json["max_events_per_step"] = settings.max_events_per_step;
-    json["solver"] = NameOf(settings.solver, kSolverNames);
     json["lcp_tolerance"] = settings.lcp_tolerance;
     json["lcp_max_iterations"] = settings.lcp_max_iterations;
-    json["smoothing"] = settings.smoothing;
     return json;
   }
 

@@ -30,20 +30,11 @@ inline constexpr std::pair<const char*, Integrator> kIntegratorNames[] = {
     {"trapezoidal", Integrator::kTrapezoidal},
     {"runge_kutta_4", Integrator::kRungeKutta4}};
 inline constexpr std::pair<const char*, JointCorrection> kJointCorrectionNames[] = {
-    {"none", JointCorrection::kNone},
-    {"baumgarte", JointCorrection::kBaumgarte},
-    {"projection", JointCorrection::kProjection}};
+    {"none", JointCorrection::kNone}, {"projection", JointCorrection::kProjection}};
 inline constexpr std::pair<const char*, Mixing> kMixingNames[] = {
-    {"average", Mixing::kAverage},
-    {"geometric_mean", Mixing::kGeometricMean},
-    {"minimum", Mixing::kMinimum},
-    {"maximum", Mixing::kMaximum}};
+    {"average", Mixing::kAverage}, {"geometric_mean", Mixing::kGeometricMean}};
 inline constexpr std::pair<const char*, ImpactLaw> kImpactLawNames[] = {
     {"newton", ImpactLaw::kNewton}, {"poisson", ImpactLaw::kPoisson}};
-inline constexpr std::pair<const char*, SolverChoice> kSolverNames[] = {
-    {"auto", SolverChoice::kAuto},
-    {"interior_point", SolverChoice::kInteriorPoint},
-    {"lemke", SolverChoice::kLemke}};
 
 /// The word of an enumerator; "" if the table lacks it.
 template <typename Enum, std::size_t N>

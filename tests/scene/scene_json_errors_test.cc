@@ -358,10 +358,10 @@ TEST(BadSceneTest, Simulation) {
   Check({
       {place + "step", "1",
        place + "step: unknown key of simulation, expected one of dt, duration, stepping, "
-               "integrator, joint_correction, joint_tolerance, baumgarte, friction_mixing, "
+               "integrator, joint_correction, joint_tolerance, friction_mixing, "
                "restitution_mixing, impact_law, restitution_threshold, recovery_speed, "
-               "contact_margin, max_events_per_step, solver, lcp_tolerance, lcp_max_iterations, "
-               "smoothing, got \"step\""},
+               "contact_margin, max_events_per_step, lcp_tolerance, lcp_max_iterations, got "
+               "\"step\""},
       {place + "dt", "0", place + "dt: expected a number > 0, got 0"},
       {place + "duration", "-1", place + "duration: expected a number >= 0, got -1"},
       {place + "dt", "1e-10",
@@ -374,15 +374,12 @@ TEST(BadSceneTest, Simulation) {
        place + "integrator: expected one of semi_implicit_euler, trapezoidal, runge_kutta_4, got "
                "\"euler\""},
       {place + "joint_correction", "null",
-       place + "joint_correction: expected one of none, baumgarte, projection, got null"},
+       place + "joint_correction: expected one of none, projection, got null"},
       {place + "joint_tolerance", "0", place + "joint_tolerance: expected a number > 0, got 0"},
-      {place + "baumgarte", "1.5", place + "baumgarte: expected a number in [0, 1], got 1.5"},
       {place + "friction_mixing", "\"mean\"",
-       place + "friction_mixing: expected one of average, geometric_mean, minimum, maximum, got "
-               "\"mean\""},
+       place + "friction_mixing: expected one of average, geometric_mean, got \"mean\""},
       {place + "restitution_mixing", "\"mean\"",
-       place + "restitution_mixing: expected one of average, geometric_mean, minimum, maximum, "
-               "got \"mean\""},
+       place + "restitution_mixing: expected one of average, geometric_mean, got \"mean\""},
       {place + "impact_law", "\"huygens\"",
        place + "impact_law: expected one of newton, poisson, got \"huygens\""},
       {place + "restitution_threshold", "-1",
@@ -391,12 +388,31 @@ TEST(BadSceneTest, Simulation) {
       {place + "contact_margin", "-1", place + "contact_margin: expected a number >= 0, got -1"},
       {place + "max_events_per_step", "1.5",
        place + "max_events_per_step: expected an integer in [0, 1000000], got 1.5"},
-      {place + "solver", "\"simplex\"",
-       place + "solver: expected one of auto, interior_point, lemke, got \"simplex\""},
       {place + "lcp_tolerance", "0", place + "lcp_tolerance: expected a number > 0, got 0"},
       {place + "lcp_max_iterations", "0",
        place + "lcp_max_iterations: expected an integer in [1, 1000000], got 0"},
-      {place + "smoothing", "-1", place + "smoothing: expected a number >= 0, got -1"},
+  });
+}
+
+TEST(BadSceneTest, WithdrawnSettingsSayWhatToWriteInstead) {
+  const std::string place = "/simulation/";
+  const std::string pair = "expected average, geometric_mean, or the pair's own value in \"pairs\"";
+  Check({
+      {place + "joint_correction", "\"baumgarte\"",
+       place + "joint_correction: expected \"projection\", which closes joints, got \"baumgarte\""},
+      {place + "baumgarte", "0.3",
+       place + "baumgarte: expected no such key (\"joint_correction\": \"projection\" closes "
+               "joints), got 0.3"},
+      {place + "friction_mixing", "\"minimum\"",
+       place + "friction_mixing: " + pair + ", got \"minimum\""},
+      {place + "restitution_mixing", "\"maximum\"",
+       place + "restitution_mixing: " + pair + ", got \"maximum\""},
+      {place + "solver", "\"lemke\"",
+       place + "solver: expected no such key (a step is solved by the first method that can), got "
+               "\"lemke\""},
+      {place + "smoothing", "1e-6",
+       place + "smoothing: expected no such key (every step is solved to \"lcp_tolerance\"), got "
+               "1e-06"},
   });
 }
 

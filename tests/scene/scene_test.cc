@@ -83,9 +83,9 @@ TEST(SimulationSettingsTest, WhatIsNotSetFollowsTheSteppingWheneverThatIsSet) {
   settings.stepping = Stepping::kEvent;
   EXPECT_EQ(IntegratorOf(settings), Integrator::kRungeKutta4);
   EXPECT_EQ(JointCorrectionOf(settings), JointCorrection::kProjection);
-  settings.integrator = Integrator::kSemiImplicitEuler;
+  settings.integrator = Integrator::kTrapezoidal;
   settings.joint_correction = JointCorrection::kNone;
-  EXPECT_EQ(IntegratorOf(settings), Integrator::kSemiImplicitEuler);
+  EXPECT_EQ(IntegratorOf(settings), Integrator::kTrapezoidal);
   EXPECT_EQ(JointCorrectionOf(settings), JointCorrection::kNone);
 }
 

@@ -51,11 +51,10 @@ inline constexpr char kFullScene[] = R"({
   "no_contact": [["ball", "rod"], ["paddle", "*"]],
   "simulation": {
     "dt": 0.002, "duration": 3, "stepping": "event", "integrator": "trapezoidal",
-    "joint_correction": "projection", "joint_tolerance": 1e-9, "baumgarte": 0.1,
-    "friction_mixing": "geometric_mean", "restitution_mixing": "maximum", "impact_law": "poisson",
+    "joint_correction": "projection", "joint_tolerance": 1e-9,
+    "friction_mixing": "average", "restitution_mixing": "geometric_mean", "impact_law": "poisson",
     "restitution_threshold": 0.01, "recovery_speed": 2, "contact_margin": 0.001,
-    "max_events_per_step": 7, "solver": "lemke", "lcp_tolerance": 1e-11, "lcp_max_iterations": 50,
-    "smoothing": 1e-12}
+    "max_events_per_step": 7, "lcp_tolerance": 1e-11, "lcp_max_iterations": 50}
 })";
 
 }  // namespace tangible

@@ -106,7 +106,6 @@ double LargestError(const std::vector<Entry>& entries, Errors* errors) {
 
 std::vector<Scheme> AllSchemes() {
   return {{"fixed", Stepping::kFixed, Integrator::kSemiImplicitEuler},
-          {"event, semi_implicit_euler", Stepping::kEvent, Integrator::kSemiImplicitEuler},
           {"event, trapezoidal", Stepping::kEvent, Integrator::kTrapezoidal},
           {"event, runge_kutta_4", Stepping::kEvent, Integrator::kRungeKutta4}};
 }

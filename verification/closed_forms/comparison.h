@@ -18,7 +18,7 @@ struct Scheme {
   Integrator integrator = Integrator::kSemiImplicitEuler;
 };
 
-/// fixed; event with semi_implicit_euler, trapezoidal, runge_kutta_4.
+/// fixed; event with trapezoidal, runge_kutta_4.
 std::vector<Scheme> AllSchemes();
 
 enum class Method { kAdjoint, kTangent };

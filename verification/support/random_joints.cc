@@ -108,9 +108,7 @@ int SceneMaker::Loop() {
     scene_.bodies.push_back(body);
     return static_cast<int>(scene_.bodies.size()) - 1;
   };
-  // Drift makes redundant rows contradict each other under Baumgarte's correction.
-  const bool redundant =
-      scene_.simulation.joint_correction != JointCorrection::kBaumgarte && random_.Chance(0.4);
+  const bool redundant = random_.Chance(0.4);
   if (redundant) {
     const int first = bar(at, at + Vector2<double>(0.3, 0.0));
     const int second = bar(at + Vector2<double>(0.0, -0.2), at + Vector2<double>(0.3, -0.15));

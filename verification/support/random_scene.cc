@@ -70,9 +70,8 @@ Scene SceneMaker::Make() {
   Pairs();
   Rarities();
   if (options_.stepping == Stepping::kEvent) {
-    const Integrator integrators[] = {Integrator::kSemiImplicitEuler, Integrator::kTrapezoidal,
-                                      Integrator::kRungeKutta4};
-    scene_.simulation.integrator = integrators[random_.Integer(0, 2)];
+    scene_.simulation.integrator =
+        random_.Chance(0.5) ? Integrator::kTrapezoidal : Integrator::kRungeKutta4;
     if (random_.Chance(0.25)) {
       scene_.simulation.impact_law = ImpactLaw::kPoisson;
     }
@@ -97,18 +96,15 @@ void SceneMaker::Settings() {
                         : random_.Integer(short_run, options_.max_steps);
   // Every fifth run ends within a step.
   s.duration = s.dt * (random_.Chance(0.2) ? count - 0.4 : count);
-  const JointCorrection corrections[] = {JointCorrection::kNone, JointCorrection::kBaumgarte,
-                                         JointCorrection::kProjection};
-  s.joint_correction = corrections[random_.Integer(0, 2)];
-  const Mixing mixings[] = {Mixing::kAverage, Mixing::kGeometricMean, Mixing::kMinimum,
-                            Mixing::kMaximum};
+  s.joint_correction = random_.Chance(0.5) ? JointCorrection::kNone : JointCorrection::kProjection;
+  const Mixing mixings[] = {Mixing::kAverage, Mixing::kGeometricMean};
   bounces_ = random_.Chance(0.4);
   // Regimes of a whole scene: none, little, ordinary, large.
   const double frictions[] = {0.0, 0.05, 0.5, 3.0};
   friction_ = frictions[random_.Integer(0, 3)];
   // Coefficients that are all 0 are at a kink of every rule but the average.
-  s.friction_mixing = mixings[friction_ > 0.0 || random_.Chance(0.2) ? random_.Integer(0, 3) : 0];
-  s.restitution_mixing = mixings[bounces_ || random_.Chance(0.2) ? random_.Integer(0, 3) : 0];
+  s.friction_mixing = mixings[friction_ > 0.0 || random_.Chance(0.2) ? random_.Integer(0, 1) : 0];
+  s.restitution_mixing = mixings[bounces_ || random_.Chance(0.2) ? random_.Integer(0, 1) : 0];
   if (random_.Chance(0.3)) {
     scene_.gravity = Vector2<double>(U(-4.0, 4.0), U(-12.0, -6.0));
   }

@@ -60,10 +60,7 @@ class StartMaker {
     const double law = U(0.0, 1.0);
     slope_ = random_.Chance(0.3) ? U(-0.4, 0.4) : 0.0;
     if (s.stepping == Stepping::kEvent) {
-      // With the first-order integrator the certificate names split steps in any case.
-      s.integrator = kind < 0.6   ? Integrator::kRungeKutta4
-                     : kind < 0.9 ? Integrator::kTrapezoidal
-                                  : Integrator::kSemiImplicitEuler;
+      s.integrator = kind < 0.6 ? Integrator::kRungeKutta4 : Integrator::kTrapezoidal;
       s.impact_law = law < 0.25 ? ImpactLaw::kPoisson : ImpactLaw::kNewton;
     }
   }

@@ -13,7 +13,6 @@ namespace tangible::tradeoff {
 namespace {
 
 constexpr double kCoarseTolerance = 1e-6;
-constexpr double kSmoothings[] = {1e-8, 1e-4};
 
 // Whether a step may have complementarity rows.
 bool MayTouch(const ModelStructure& structure) {
@@ -26,43 +25,6 @@ bool MayTouch(const ModelStructure& structure) {
     }
   }
   return false;
-}
-
-// How the contacts' problem is solved.
-struct Solving {
-  SolverChoice solver;
-  double tolerance;
-  double smoothing;
-};
-
-std::vector<Solving> SolvingsOf(const SimulationSettings& own, bool touches, SweepKind kind) {
-  const Solving first{own.solver, own.lcp_tolerance, own.smoothing};
-  std::vector<Solving> all = {first};
-  if (!touches) return all;
-  std::vector<SolverChoice> solvers = {own.solver};
-  for (const auto& entry : kSolverNames) {
-    if (entry.second != own.solver) solvers.push_back(entry.second);
-  }
-  std::vector<double> tolerances = {own.lcp_tolerance};
-  if (own.lcp_tolerance != kCoarseTolerance) tolerances.push_back(kCoarseTolerance);
-  std::vector<double> smoothings = {0.0};
-  smoothings.insert(smoothings.end(), std::begin(kSmoothings), std::end(kSmoothings));
-  if (std::find(smoothings.begin(), smoothings.end(), own.smoothing) == smoothings.end()) {
-    smoothings.insert(smoothings.begin(), own.smoothing);
-  }
-  for (const SolverChoice solver : solvers) {
-    for (const double tolerance : tolerances) {
-      for (const double smoothing : smoothings) {
-        const int differ = (solver != first.solver ? 1 : 0) +
-                           (tolerance != first.tolerance ? 1 : 0) +
-                           (smoothing != first.smoothing ? 1 : 0);
-        if (differ == 1 || (differ > 1 && kind == SweepKind::kFull)) {
-          all.push_back({solver, tolerance, smoothing});
-        }
-      }
-    }
-  }
-  return all;
 }
 
 void AddOnce(const std::string& line, std::vector<std::string>* lines) {
@@ -79,14 +41,10 @@ std::string Number(double value) {
 void Add(const Scene& scene, Sweep* sweep) {
   const SimulationSettings& settings = scene.simulation;
   std::string why;
-  if (settings.stepping == Stepping::kEvent && settings.smoothing > 0.0) {
-    AddOnce("event stepping with smoothing: its impacts are solved exactly", &sweep->left_out);
-  } else if (!CheckSettings(scene, &why)) {
+  if (!CheckSettings(scene, &why)) {
     AddOnce(NameOf(settings.stepping, kSteppingNames) + " stepping with " +
                 NameOf(IntegratorOf(settings), kIntegratorNames) + ": " + why,
             &sweep->left_out);
-  } else if (settings.smoothing > 0.0 && settings.solver == SolverChoice::kLemke) {
-    AddOnce("lemke with smoothing: only the interior point stops early", &sweep->left_out);
   } else {
     sweep->settings.push_back(settings);
   }
@@ -97,6 +55,8 @@ void Add(const Scene& scene, Sweep* sweep) {
 Sweep MakeSweep(const Scene& scene, SweepKind kind) {
   const SimulationSettings& own = scene.simulation;
   const bool touches = MayTouch(*BuildStructure(scene));
+  std::vector<double> tolerances = {own.lcp_tolerance};
+  if (touches && own.lcp_tolerance != kCoarseTolerance) tolerances.push_back(kCoarseTolerance);
   Sweep sweep;
   Scene with = scene;
   for (const auto& stepping : kSteppingNames) {
@@ -104,16 +64,14 @@ Sweep MakeSweep(const Scene& scene, SweepKind kind) {
       for (const auto& correction : kJointCorrectionNames) {
         const bool own_correction = correction.second == JointCorrectionOf(own);
         if (scene.joints.empty() && !own_correction) continue;
-        const std::vector<Solving> solvings = SolvingsOf(own, touches, kind);
-        for (size_t i = 0; i < solvings.size(); ++i) {
-          if (i > 0 && !own_correction && kind == SweepKind::kStar) continue;
+        for (const double tolerance : tolerances) {
+          const bool own_tolerance = tolerance == own.lcp_tolerance;
+          if (!own_tolerance && !own_correction && kind == SweepKind::kStar) continue;
           SimulationSettings& settings = with.simulation;
           settings.stepping = stepping.second;
           settings.integrator = integrator.second;
           settings.joint_correction = correction.second;
-          settings.solver = solvings[i].solver;
-          settings.lcp_tolerance = solvings[i].tolerance;
-          settings.smoothing = solvings[i].smoothing;
+          settings.lcp_tolerance = tolerance;
           Add(with, &sweep);
         }
       }
@@ -121,8 +79,7 @@ Sweep MakeSweep(const Scene& scene, SweepKind kind) {
   }
   if (scene.joints.empty()) sweep.left_out.push_back("joint corrections: the scene has no joints");
   if (!touches) {
-    sweep.left_out.push_back(
-        "solvers, tolerances and smoothing: nothing may touch and no joint has limits");
+    sweep.left_out.push_back("tolerances: nothing may touch and no joint has limits");
   }
   return sweep;
 }
@@ -144,12 +101,8 @@ std::string NameOf(const SimulationSettings& settings, const SimulationSettings&
   std::string name = NameOf(settings.stepping, kSteppingNames) + " " +
                      NameOf(IntegratorOf(settings), kIntegratorNames) + ", " +
                      NameOf(JointCorrectionOf(settings), kJointCorrectionNames);
-  if (settings.solver != of_scene.solver) name += ", " + NameOf(settings.solver, kSolverNames);
   if (settings.lcp_tolerance != of_scene.lcp_tolerance) {
     name += ", tolerance " + Number(settings.lcp_tolerance);
-  }
-  if (settings.smoothing != of_scene.smoothing) {
-    name += ", smoothing " + Number(settings.smoothing);
   }
   return name;
 }

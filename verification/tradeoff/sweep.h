@@ -13,8 +13,8 @@
 namespace tangible::tradeoff {
 
 enum class SweepKind {
-  /// Every stepping and integrator with every joint correction; and with the scene's own correction
-  /// each other solver, tolerance and smoothing separately.
+  /// Every stepping and integrator with every joint correction; the other tolerance with the
+  /// scene's own correction alone.
   kStar,
   kFull,  ///< every combination
 };
@@ -24,8 +24,8 @@ struct Sweep {
   std::vector<std::string> left_out;         ///< kinds of combinations not tried, a line each
 };
 
-/// The settings beside dt. Joint corrections are tried where there are joints; solvers, tolerances
-/// and smoothing where something may touch or a joint has limits.
+/// The settings beside dt. Joint corrections are tried where there are joints; tolerances
+/// where something may touch or a joint has limits.
 Sweep MakeSweep(const Scene& scene, SweepKind kind);
 
 /// Step lengths, descending: about the scene's dt times each factor, each so that a multiple of

@@ -176,8 +176,8 @@ int Main(int argc, char** argv) {
                    "[--out=R.json] [--report=R.html] [--picture=P.svg]",
        .description =
            "Errors of a scene's trajectory and of the gradient of its final state against CPU "
-           "time, over time step,\nstepping, integrator, joint correction, solver, tolerance and "
-           "smoothing; with a target the cheapest simulation\nblock that meets it.",
+           "time, over time step,\nstepping, integrator, joint correction and tolerance; with a "
+           "target the cheapest simulation\nblock that meets it.",
        .version = TANGIBLE_VERSION,
        .source_file = __FILE__,
        .most_positional = kMostScenes,

@@ -92,9 +92,7 @@ OrderedJson SettingsJson(const SimulationSettings& settings) {
           {"stepping", NameOf(settings.stepping, kSteppingNames)},
           {"integrator", NameOf(IntegratorOf(settings), kIntegratorNames)},
           {"joint_correction", NameOf(JointCorrectionOf(settings), kJointCorrectionNames)},
-          {"solver", NameOf(settings.solver, kSolverNames)},
-          {"lcp_tolerance", settings.lcp_tolerance},
-          {"smoothing", settings.smoothing}};
+          {"lcp_tolerance", settings.lcp_tolerance}};
 }
 
 OrderedJson CellJson(const Tradeoff& tradeoff, const LeastSeconds& least, const Cell& cell) {

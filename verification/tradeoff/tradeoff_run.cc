@@ -75,9 +75,7 @@ std::string MakeReference(const Scene& scene, const std::vector<ParameterPath>& 
   settings.integrator = Integrator::kRungeKutta4;
   settings.joint_correction = JointCorrection::kProjection;
   settings.joint_tolerance = std::min(settings.joint_tolerance, kReferenceJointTolerance);
-  settings.solver = SolverChoice::kAuto;
   settings.lcp_tolerance = std::min(settings.lcp_tolerance, SimulationSettings().lcp_tolerance);
-  settings.smoothing = 0.0;
   std::string note;
   if (!Halve(copy, parameters, options, reference)) {
     note = "fixed stepping, as event stepping does not run: " + reference->note;

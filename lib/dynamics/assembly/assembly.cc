@@ -29,15 +29,9 @@ void AssembleCorrection(const Model<T>& model, const State<T>& state,
   builder.AssembleContacts(contacts, friction, nullptr);
 }
 
-double JointCorrectionShare(const SimulationSettings& settings) {
-  return JointCorrectionOf(settings) == JointCorrection::kNone        ? 0.0
-         : JointCorrectionOf(settings) == JointCorrection::kBaumgarte ? settings.baumgarte
-                                                                      : 1.0;
-}
-
 #define TANGIBLE_INSTANTIATE(T)                                                              \
   template void AssembleFree<T>(const Model<T>&, const State<T>&, double, double,            \
-                                ContactProblem<T>*, AssemblyScratch<T>*, bool);              \
+                                ContactProblem<T>*, AssemblyScratch<T>*);                    \
   template void AssembleContacts<T>(                                                         \
       const Model<T>&, const State<T>&, double, const std::vector<ActiveContact>&,           \
       const std::vector<CoefficientSource>&, const std::vector<CoefficientSource>&,          \

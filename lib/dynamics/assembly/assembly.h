@@ -6,7 +6,7 @@
 //   velocity       M v⁺ − Aᵀ y − Σ rᵀ λ = p     a step of length h at t, or an impact (h = 0)
 //                  M = diag(m, m, I) + h diag(c, c, c_θ) + h Σ dampers       damping is implicit
 //                  p = diag(m, m, I) v + h m g + impulses of springs, forces, efforts at t
-//                  A v⁺ = b,  b = 0, or −(β/h) C(q) with Baumgarte's correction
+//                  A v⁺ = b,  b the prescribed twists' part
 //                  contacts: rows and constants of contact.h
 //   acceleration   M a − Aᵀ y − Σ rᵀ λ = f(q, v, t),  M = diag(m, m, I)      damping is a part of f
 //                  A a = −Ȧ v
@@ -32,9 +32,8 @@ enum class Level : unsigned char { kVelocity, kAcceleration, kCorrection };
 /// accelerations.
 template <typename T>
 struct Instant {
-  double t = 0.0, h = 0.0;     ///< velocity: the step's start and length, s
-  bool corrects_drift = true;  ///< velocity: with Baumgarte's term, if the scene has it
-  T time{0.0};                 ///< acceleration, s
+  double t = 0.0, h = 0.0;  ///< velocity: the step's start and length, s
+  T time{0.0};              ///< acceleration, s
   /// Acceleration: the time at which windows of forces and pieces of signals are chosen, so that
   /// the choice is the same over a segment.
   double middle = 0.0;
@@ -53,12 +52,10 @@ struct AssemblyScratch {
 
 /// Adds the bodies, springs, forces, dampers and joints of a step to a problem without contacts.
 /// With h = 0 the problem is that of an impact: an instant in which no force, spring or damper
-/// acts. Without `correct_drift` Baumgarte's term is left out. Allocates nothing once its vectors
-/// have grown.
+/// acts. Allocates nothing once its vectors have grown.
 template <typename T>
 void AssembleFree(const Model<T>& model, const State<T>& state, double t, double h,
-                  ContactProblem<T>* problem, AssemblyScratch<T>* scratch,
-                  bool correct_drift = true);
+                  ContactProblem<T>* problem, AssemblyScratch<T>* scratch);
 
 /// Adds the blocks of the contacts, with the given coefficients (one source for each contact).
 /// `scratch` is that of AssembleFree at the same state.
@@ -83,9 +80,6 @@ void AssembleCorrection(const Model<T>& model, const State<T>& state,
                         const std::vector<ActiveContact>& contacts,
                         const std::vector<CoefficientSource>& friction, const T& recovery,
                         AssemblyScratch<T>* scratch, ContactProblem<T>* problem);
-
-/// The fraction of the joints' drift that a correction removes: 0, Baumgarte's fraction, or 1.
-double JointCorrectionShare(const SimulationSettings& settings);
 
 /// The constant c_n of a contact's law, s_n = n·v⁺ + c_n (contact.h); `approach` is n·v of both
 /// bodies before the step.

@@ -231,11 +231,10 @@ class ProblemBuilder {
 
 template <typename T>
 void AssembleFree(const Model<T>& model, const State<T>& state, double t, double h,
-                  ContactProblem<T>* problem, AssemblyScratch<T>* scratch, bool correct_drift) {
+                  ContactProblem<T>* problem, AssemblyScratch<T>* scratch) {
   Instant<T> instant;
   instant.t = t;
   instant.h = h;
-  instant.corrects_drift = correct_drift;
   internal::ProblemBuilder<Level::kVelocity, T>(model, state, instant, scratch, problem)
       .AssembleElements();
 }

@@ -204,17 +204,11 @@ class Equations {
     return kLevel == Level::kVelocity ? at_.h : kLevel == Level::kAcceleration ? 1.0 : 0.0;
   }
 
-  /// The factor of the joints' position errors, which steps correct and impacts do not.
+  /// The factor of the joints' position errors, which corrections of poses remove.
   double DriftShare() const {
-    if constexpr (kLevel == Level::kCorrection) {
-      return JointCorrectionShare(s_.settings);
-    } else if constexpr (kLevel == Level::kVelocity) {
-      const bool corrects = at_.corrects_drift && at_.h > 0.0 &&
-                            JointCorrectionOf(s_.settings) == JointCorrection::kBaumgarte;
-      return corrects ? s_.settings.baumgarte / at_.h : 0.0;
-    } else {
-      return 0.0;
-    }
+    const bool corrects = kLevel == Level::kCorrection &&
+                          JointCorrectionOf(s_.settings) == JointCorrection::kProjection;
+    return corrects ? 1.0 : 0.0;
   }
 
  private:

@@ -34,15 +34,6 @@ CoefficientSource Mix(const Model<double>& model, int first, int second, Mixing 
       d[0] = source.tie ? 0.0 : 0.5 * y / source.value;
       d[1] = source.tie ? 0.0 : 0.5 * x / source.value;
       break;
-    case Mixing::kMinimum:
-    case Mixing::kMaximum: {
-      const bool first_counts = mixing == Mixing::kMinimum ? x < y : x > y;
-      source.tie = x == y;
-      source.value = first_counts ? x : y;
-      d[0] = source.tie ? 0.5 : first_counts ? 1.0 : 0.0;
-      d[1] = 1.0 - d[0];
-      break;
-    }
   }
   return source;
 }

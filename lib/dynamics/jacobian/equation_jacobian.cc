@@ -30,7 +30,6 @@ class EntryBuilder : private internal::LocalEntries<Sink> {
         equations_(s_, at_, this) {
     at_.t = solved.instant.t;
     at_.h = solved.instant.h;
-    at_.corrects_drift = solved.instant.corrects_drift;
     at_.middle = solved.instant.middle;
     if constexpr (kLevel == Level::kVelocity) {
       unknown_ = solved.new_twist->data();
@@ -299,7 +298,7 @@ class EntryBuilder : private internal::LocalEntries<Sink> {
   // Two rows p_a − p_b with arms r = R(θ) anchor; only the arms depend on variables,
   //   ∂r/∂θ = r⊥,  ∂r/∂anchor = R(θ),
   // and a side's rows are ±(ẋ + turn r⊥ + along r) with ẋ the unknown of the position, turn that of
-  // the angle, and along = β/h, −ω² or the correction's share.
+  // the angle, and along = −ω² or the correction's share.
   void RevoluteByHand(int j) {
     const JointIndex& joint = s_.joints[j];
     const double* y = &solved_.solution->joint_impulse[3 * static_cast<size_t>(j)];

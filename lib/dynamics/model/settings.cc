@@ -33,6 +33,10 @@ bool CheckSettings(const Scene& scene, std::string* error) {
   if (fixed && IntegratorOf(settings) != Integrator::kSemiImplicitEuler) {
     *error = NeedsEvents("integrator", "semi_implicit_euler", "others need",
                          NameOf(IntegratorOf(settings), kIntegratorNames));
+  } else if (!fixed && IntegratorOf(settings) == Integrator::kSemiImplicitEuler) {
+    *error =
+        "/simulation/integrator: expected \"runge_kutta_4\" or \"trapezoidal\" with event stepping "
+        "(semi_implicit_euler gains energy without bound there), got \"semi_implicit_euler\"";
   } else if (fixed && settings.impact_law != ImpactLaw::kNewton) {
     *error = NeedsEvents("impact_law", "newton", "other needs",
                          NameOf(settings.impact_law, kImpactLawNames));
@@ -41,11 +45,6 @@ bool CheckSettings(const Scene& scene, std::string* error) {
              "/kinetic_friction: expected none with fixed stepping (friction that decays with the "
              "speed needs \"stepping\": \"event\"), got " +
              TextOf(*decays->kinetic_friction);
-  } else if (!fixed && settings.smoothing != 0.0) {
-    *error =
-        "/simulation/smoothing: expected 0 with event stepping (others need \"stepping\": "
-        "\"fixed\"), got " +
-        TextOf(settings.smoothing);
   } else {
     return true;
   }
@@ -56,11 +55,6 @@ ContactSolverOptions SolverOptionsOf(const SimulationSettings& settings) {
   ContactSolverOptions options;
   options.tolerance = settings.lcp_tolerance;
   options.max_iterations = settings.lcp_max_iterations;
-  options.smoothing = settings.smoothing;
-  options.choice = settings.solver == SolverChoice::kInteriorPoint
-                       ? ContactSolverChoice::kInteriorPoint
-                   : settings.solver == SolverChoice::kLemke ? ContactSolverChoice::kLemke
-                                                             : ContactSolverChoice::kAuto;
   return options;
 }
 

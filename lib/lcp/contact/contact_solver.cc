@@ -237,17 +237,6 @@ bool ContactSolver::SolveByInteriorPoint(const ContactProblem<double>& problem,
                                          ContactSolverReport* report) {
   ContactInteriorPointOptions interior_point;
   interior_point.max_iterations = options.max_iterations;
-  if (options.smoothing > 0.0) {
-    // The options ask for a smoothed solution, which is not exact and is not polished. The system
-    // of its modes is still factorised, for the derivative.
-    interior_point.complementarity = options.smoothing;
-    const InteriorPointOutcome outcome =
-        SolveContactsByInteriorPoint(problem, interior_point, &interior_point_, solution);
-    report->iterations += outcome.iterations;
-    report->residual = NaturalResidual(problem, *solution, &report->worst_contact);
-    report->rung = Rung::kInteriorPoint;
-    return system_.Factor(problem, solution->modes) && outcome.converged;
-  }
   // Most modes can be read early. Where margins are small the modes become visible later, if
   // rounding lets the iteration go on.
   for (const double goal : kInteriorPointGoals) {
@@ -361,9 +350,8 @@ ContactSolverReport ContactSolver::RunPortfolio(const ContactProblem<double>& pr
     }
     return failed();
   }
-  const bool exact = options.smoothing == 0.0;
   entry_ = *solution;
-  const bool any = options.choice == ContactSolverChoice::kAuto && exact;
+  const bool any = options.choice == ContactSolverChoice::kAuto;
   if (any && SolveByModeChanges(problem, options, solution, &report)) {
     return done(Rung::kModeChanges);
   }
@@ -383,7 +371,7 @@ ContactSolverReport ContactSolver::RunPortfolio(const ContactProblem<double>& pr
       SolveByInteriorPoint(problem, options, solution, &report)) {
     return done(report.rung);
   }
-  if (options.choice != ContactSolverChoice::kInteriorPoint && exact) {
+  if (options.choice != ContactSolverChoice::kInteriorPoint) {
     *solution = entry_;
     report.fallbacks.lemke += any ? 1 : 0;
     if (SolveByPivoting(problem, options, ContactPivoting::From::kOpen,
@@ -392,7 +380,7 @@ ContactSolverReport ContactSolver::RunPortfolio(const ContactProblem<double>& pr
       return done(Rung::kPivotingFromOpen);
     }
   }
-  if (options.choice != ContactSolverChoice::kInteriorPoint && exact &&
+  if (options.choice != ContactSolverChoice::kInteriorPoint &&
       SolveByLemke(problem, options, solution, &report)) {
     return done(report.rung);
   }

@@ -64,8 +64,6 @@ struct ContactSolverOptions {
   ContactSolverChoice choice = ContactSolverChoice::kAuto;
   double tolerance = kLcpTolerance;  ///< largest scaled natural residual
   int max_iterations = 100;          ///< limit of iterations of the interior point
-  double smoothing = 0.0;  ///< relative complementarity at which the interior point stops, without
-                           ///< polish; 0: exact
 };
 
 /// Counts of the methods that were needed beyond changes of the guess's modes. A method that the

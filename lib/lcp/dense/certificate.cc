@@ -24,9 +24,6 @@ std::string Kink(const Certificate& certificate) {
   if (!certificate.coordinates.empty()) {
     return certificate.coordinates;
   }
-  if (!certificate.smoothed.empty()) {
-    return certificate.smoothed;
-  }
   if (certificate.degenerate_rows > 0) {
     return "kink of " + std::to_string(certificate.degenerate_rows) + " rows" + At(certificate);
   }
@@ -61,7 +58,6 @@ void Merge(const Certificate& other, Certificate& certificate) {
   certificate.events += other.events;
   certificate.fallbacks += other.fallbacks;
   if (certificate.coordinates.empty()) certificate.coordinates = other.coordinates;
-  if (certificate.smoothed.empty()) certificate.smoothed = other.smoothed;
   if (certificate.one_sided.empty()) certificate.one_sided = other.one_sided;
   if (certificate.discontinuous.empty()) certificate.discontinuous = other.discontinuous;
   if (certificate.discrete_map.empty()) certificate.discrete_map = other.discrete_map;

@@ -34,11 +34,8 @@ struct Certificate {
   int events = 0;         ///< over a rollout: impacts and other events
   int fallbacks = 0;      ///< over a rollout: steps not solved by the first solver
   std::string
-      coordinates{};  ///< where they round so coarsely that modes may be rounding; else empty
-  /// Where the solution is smoothed so much that its derivatives differ from those of the contact
-  /// modes; else empty.
-  std::string smoothed{};
-  std::string one_sided{};      ///< why the derivative is one-sided or a mean of two; else empty
+      coordinates{};        ///< where they round so coarsely that modes may be rounding; else empty
+  std::string one_sided{};  ///< why the derivative is one-sided or a mean of two; else empty
   std::string discontinuous{};  ///< what makes the value itself jump nearby; else empty
   /// Where by fixed steps a restitution first acted, or a contact was first made or broken: from
   /// there on the derivative is that of the discrete map and not of the motion, because the time of
@@ -63,7 +60,7 @@ inline constexpr char kTrustworthy[] = "trustworthy";
 void Merge(const Certificate& other, Certificate& certificate);
 
 /// Writes `verdict`: those that apply of "discontinuous: …", "near a kink: …" (coordinates that are
-/// too large, smoothing, degenerate rows, a margin below kNearKinkMargin, or a linear system that
+/// too large, degenerate rows, a margin below kNearKinkMargin, or a linear system that
 /// was not solved or whose condition number exceeds kConditionLimit) and "one-sided: …", the worst
 /// first, joined by "; "; if none applies, "trustworthy". All this follows kOfTheDiscreteMap where
 /// the derivative is that of the discrete map.

@@ -331,12 +331,8 @@ Certificate RolloutCertifier::Finish(const Model<double>& model, const RolloutRe
   AddForceWindows(model);
   certificate_.mode_switches = static_cast<int>(report.mode_switches);
   certificate_.events = static_cast<int>(report.events);
-  // A solver that the scene asks for does not count as a fallback.
-  certificate_.fallbacks =
-      static_cast<int>(report.given_up.total()) +
-      (model.structure->settings.solver == SolverChoice::kAuto
-           ? static_cast<int>(report.solved_by_interior_point + report.solved_by_lemke)
-           : 0);
+  certificate_.fallbacks = static_cast<int>(
+      report.given_up.total() + report.solved_by_interior_point + report.solved_by_lemke);
   if (jump_margin_ < kNearJumpMargin) {
     certificate_.discontinuous = jump_where_;
   } else {
@@ -348,12 +344,6 @@ Certificate RolloutCertifier::Finish(const Model<double>& model, const RolloutRe
         "by rounding; dt is too large";
   }
   if (certificate_.discontinuous.empty()) certificate_.discontinuous = report.energy_grown;
-  const double smoothing = model.structure->settings.smoothing;
-  const double margin = certificate_.margin_min;
-  if (smoothing > kSmoothedDerivative * margin * margin) {
-    certificate_.smoothed = "the motion is smoothed (smoothing " + Short(smoothing) +
-                            "), and these are the derivatives of its contacts' modes";
-  }
   if (coordinates_) certificate_.coordinates = coordinates_->Message(model);
   if (certificate_.discrete_impact.empty()) certificate_.discrete_impact = made_last_;
   Certificate finished = certificate_;

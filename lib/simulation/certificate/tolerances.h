@@ -9,9 +9,6 @@ namespace tangible {
 /// Of the margin's own scale: relative distances to a jump below it make the verdict
 /// `discontinuous`.
 inline constexpr double kNearJumpMargin = 1e-6;
-/// Of the square of the smallest margin: the relative change of a derivative by smoothing is about
-/// the complementarity over that square.
-inline constexpr double kSmoothedDerivative = 1e-8;
 /// Of a step: an event that is nearer to a change of the controls gets a margin for it.
 inline constexpr double kBesideControls = 1e-3;
 /// Of the largest impulse or force: a contact with less carries no load.

@@ -73,7 +73,6 @@ size_t StepRecord::bytes() const {
 
 SolvedEquations Impulses::View() const {
   SolvedEquations view = StepRecord::View(system.contact_block());
-  view.instant.corrects_drift = false;
   return view;
 }
 

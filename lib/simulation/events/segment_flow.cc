@@ -14,14 +14,6 @@ namespace {
 
 constexpr int kMostCorrections = 12;
 
-NystromTableau SemiImplicitEuler() {
-  NystromTableau t;
-  t.stages = 1;
-  t.b[0] = 1.0;
-  t.b_hat[0] = 1.0;
-  return t;
-}
-
 NystromTableau Trapezoidal() {
   NystromTableau t;
   t.stages = 2;
@@ -131,12 +123,9 @@ bool ThrowsOut(const SolvedNode& node, double error) {
 }  // namespace
 
 const NystromTableau& NystromTableau::Of(Integrator integrator) {
-  static const NystromTableau kEuler = SemiImplicitEuler();
   static const NystromTableau kTrapezoidal = Trapezoidal();
   static const NystromTableau kRungeKutta = RungeKutta4();
-  return integrator == Integrator::kSemiImplicitEuler ? kEuler
-         : integrator == Integrator::kTrapezoidal     ? kTrapezoidal
-                                                      : kRungeKutta;
+  return integrator == Integrator::kTrapezoidal ? kTrapezoidal : kRungeKutta;
 }
 
 std::string NameOfContradicted(const ModelStructure& structure, int joint) {
@@ -146,8 +135,7 @@ std::string NameOfContradicted(const ModelStructure& structure, int joint) {
 
 void AssembleImpulses(const Model<double>& model, AssemblyScratch<double>* scratch,
                       Impulses* impulses) {
-  AssembleFree(model, impulses->before, impulses->time, impulses->h, &impulses->problem, scratch,
-               false);
+  AssembleFree(model, impulses->before, impulses->time, impulses->h, &impulses->problem, scratch);
   AssembleContacts(model, impulses->before, impulses->h, impulses->contacts, impulses->friction,
                    impulses->restitution, scratch, &impulses->problem);
 }
@@ -359,7 +347,6 @@ bool SegmentFlow::CorrectPoses(const Model<double>& model, Segment* segment, std
   if (segment->contacts.empty() && !joints) {
     return true;
   }
-  const bool once = joints && JointCorrectionOf(settings) == JointCorrection::kBaumgarte;
   // A body that recovers from penetration may move another contact off its surface; that error
   // remains.
   bool recovers = false;
@@ -391,7 +378,7 @@ bool SegmentFlow::CorrectPoses(const Model<double>& model, Segment* segment, std
     const PoseErrors errors = ErrorsOf(model, *segment, node);
     // Newton's method squares the error; an error that is small and no longer falls is rounding.
     const bool shrinks = errors.share <= 0.1 * last;
-    if (k > 0 && (once || errors.settled || (!shrinks && (recovers || errors.share <= 1.0)))) {
+    if (k > 0 && (errors.settled || (!shrinks && (recovers || errors.share <= 1.0)))) {
       break;
     }
     if (k + 1 == kMostCorrections || (k > 0 && errors.share >= last)) {

@@ -7,10 +7,9 @@
 // Integrators are Nyström tableaux: with stages A_i = a(Q_i, V_i, t + c_i τ),
 //   Q_i = q + c_i τ v + τ² Σ â_ij A_j,   V_i = v + τ Σ a_ij A_j
 //   q⁺ = q + τ v + τ² Σ b̂_j A_j,          v⁺ = v + τ Σ b_j A_j
-//   semi_implicit_euler   c = 0, b = 1, b̂ = 1:   q⁺ = q + τ v⁺
 //   trapezoidal           the implicit trapezoidal rule, solved to rounding: order 2
 //   runge_kutta_4         the classical rule: order 4
-// The latter two are exact for constant accelerations. Hairer, Nørsett, Wanner, Solving Ordinary
+// Both are exact for constant accelerations. Hairer, Nørsett, Wanner, Solving Ordinary
 // Differential Equations I, II.1 and II.14.
 
 #include <algorithm>

@@ -78,7 +78,7 @@ double IslandPartition::SpeedOf(int body, const double* twist) const {
 void IslandPartition::FindReach(const Model<double>& model, const State<double>& state, double t,
                                 double h) {
   const ModelStructure& structure = *model.structure;
-  AssembleFree(model, state, t, h, &free_, &scratch_, false);
+  AssembleFree(model, state, t, h, &free_, &scratch_);
   for (int body = 0; body < structure.num_bodies(); ++body) {
     double speed = SpeedOf(body, &state.twist[3 * body]);
     if (const int block = structure.bodies[body].block; block >= 0) {

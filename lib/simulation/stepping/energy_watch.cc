@@ -98,10 +98,7 @@ std::string EnergyOfOverlap(const Model<double>& model, const State<double>& ini
 std::string EnergyGrown(const Model<double>& model, const State<double>& initial,
                         const State<double>& final, double by_impacts, double depth) {
   const SimulationSettings& settings = model.structure->settings;
-  if (settings.stepping != Stepping::kEvent ||
-      IntegratorOf(settings) == Integrator::kSemiImplicitEuler || IsDriven(model, initial)) {
-    return "";
-  }
+  if (settings.stepping != Stepping::kEvent || IsDriven(model, initial)) return "";
   const double kinetic[2] = {KineticEnergy(model, initial), KineticEnergy(model, final)};
   const double start = kinetic[0] + PotentialEnergy(model, initial);
   const double end = kinetic[1] + PotentialEnergy(model, final);

@@ -183,7 +183,7 @@ RolloutReport RolloutJets(ControlledModel<T>* model, const State<T>& initial, Je
       jets = before;
       StepImplicit(now, &stepper, state, &jets);
     }
-    if (ValueDifference(jets, state) > kBranchTolerance && settings.smoothing == 0.0) {
+    if (ValueDifference(jets, state) > kBranchTolerance) {
       report.status = StepStatus::kUnsolved;
       report.message = "step " + std::to_string(k) +
                        ": different branch: the unrolled solver found another solution";

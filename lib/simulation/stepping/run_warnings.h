@@ -48,8 +48,4 @@ class RunWarnings {
   State<double> initial_;
 };
 
-/// Empty, or a line on the loss of accuracy by `semi_implicit_euler` with event stepping.
-std::string FirstOrderByEvents(const Model<double>& model, const State<double>& initial,
-                               const State<double>& final);
-
 }  // namespace tangible

@@ -326,7 +326,6 @@ void Stepper::FillReport(const Model<double>& model, const ContactSolverReport& 
 ContactSolverReport Stepper::SolveContacts(const ContactSolverOptions& options, int* islands) {
   ContactSolverReport report;
   const bool apart = record_.problem.contacts.size() >= kLeastContactsApart &&
-                     options.smoothing == 0.0 &&
                      islands_->Partition(record_.problem) >= kLeastIslands;
   *islands = 0;
   factored_ = true;

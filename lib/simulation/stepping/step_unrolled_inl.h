@@ -43,8 +43,7 @@ bool SolveUnrolled(const Model<T>& model, const StepRecord& record, State<T>* st
   InteriorPointWorkspace<T> workspace;
   ContactSolution<T> solution;
   ContactInteriorPointOptions options;
-  options.complementarity =
-      s.settings.smoothing > 0.0 ? s.settings.smoothing : kUnrolledComplementarity;
+  options.complementarity = kUnrolledComplementarity;
   const InteriorPointOutcome outcome =
       SolveContactsByInteriorPoint(problem, options, &workspace, &solution);
   SpreadTwists(s, solution.motion, &state->twist);

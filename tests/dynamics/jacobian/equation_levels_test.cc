@@ -52,7 +52,7 @@ std::string Everything() {
     "springs": [{"name": "s", "bodies": ["rod", "tip"], "anchors": [[1.5, 0.9], [1.6, 1.1]],
                  "stiffness": 5, "damping": 0.3, "rest_length": 0.1}],
     "forces": [{"name": "push", "body": "crate", "force": [1, 0.2], "torque": 0.01, "at": [0.1, 0.02]}],
-    "simulation": {"joint_correction": "baumgarte"}})";
+    "simulation": {"joint_correction": "projection"}})";
 }
 
 struct Case {

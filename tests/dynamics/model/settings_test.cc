@@ -17,8 +17,7 @@ TEST(CheckSettings, AcceptsEventSteppingWithEachIntegrator) {
   Scene scene;
   SimulationSettings& settings = scene.simulation;
   settings.stepping = Stepping::kEvent;
-  for (const Integrator integrator :
-       {Integrator::kSemiImplicitEuler, Integrator::kTrapezoidal, Integrator::kRungeKutta4}) {
+  for (const Integrator integrator : {Integrator::kTrapezoidal, Integrator::kRungeKutta4}) {
     settings.integrator = integrator;
     EXPECT_TRUE(CheckSettings(scene, &error)) << error;
   }
@@ -44,18 +43,19 @@ TEST(CheckSettings, NamesWhatIsMissing) {
   EXPECT_EQ(error.find("/simulation/integrator: "), 0u) << error;
   EXPECT_NE(error.find("\"stepping\": \"event\""), std::string::npos) << error;
   settings = SimulationSettings();
+  settings.stepping = Stepping::kEvent;
+  settings.integrator = Integrator::kSemiImplicitEuler;
+  EXPECT_FALSE(CheckSettings(scene, &error));
+  EXPECT_EQ(error,
+            "/simulation/integrator: expected \"runge_kutta_4\" or \"trapezoidal\" with event "
+            "stepping (semi_implicit_euler gains energy without bound there), got "
+            "\"semi_implicit_euler\"");
+  settings = SimulationSettings();
   settings.impact_law = ImpactLaw::kPoisson;
   EXPECT_FALSE(CheckSettings(scene, &error));
   EXPECT_EQ(error,
             "/simulation/impact_law: expected \"newton\" with fixed stepping (the other needs "
             "\"stepping\": \"event\"), got \"poisson\"");
-  settings = SimulationSettings();
-  settings.stepping = Stepping::kEvent;
-  settings.smoothing = 1e-4;
-  EXPECT_FALSE(CheckSettings(scene, &error));
-  EXPECT_EQ(error,
-            "/simulation/smoothing: expected 0 with event stepping (others need \"stepping\": "
-            "\"fixed\"), got 0.0001");
   settings = SimulationSettings();
   BasicJoint<double> joint;
   joint.friction = 2.0;

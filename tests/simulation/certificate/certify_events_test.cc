@@ -88,7 +88,7 @@ TEST(CertifyEventsTest, ABallThatComesToRestAloneIsNoDiscontinuity) {
        "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}},
       {"name": "ball", "shape": {"circle": {"radius": 0.1}}, "mass": 1, "position": [0, 0.15],
        "velocity": [1, 0], "restitution": 0.3}])",
-                                      1.0, "", "semi_implicit_euler");
+                                      1.0, "", "trapezoidal");
   EXPECT_EQ(c.verdict.find("discontinuous"), std::string::npos) << c.verdict;
 }
 

@@ -94,7 +94,7 @@ TEST(EventSearchGapsTest, ATipThatLeavesAnEdgeMeetsItsEnd) {
 }
 
 // A slider on a spinning guide, pulled to its lower limit until it spins fast enough. It leaves
-// without speed, and the Euler step's poses cut the corner: no touch.
+// without speed, and where the step's poses cut the corner there is no touch.
 TEST(EventSearchGapsTest, ALimitThatIsLeftIsTouchedOnlyByApproaching) {
   const Scene scene = test_scenes::SceneOf(R"({"gravity": [0, 0], "bodies": [
       {"name": "a", "mass": 1, "inertia": 0.1, "position": [0, 0], "velocity": [0, -0.9],
@@ -104,7 +104,7 @@ TEST(EventSearchGapsTest, ALimitThatIsLeftIsTouchedOnlyByApproaching) {
     "joints": [{"name": "slide", "type": "prismatic", "bodies": ["b", "a"], "anchor": [0.3, 0],
                 "axis": [1, 0], "displacement": 0, "limits": [0, 0.1], "effort": -5.5}],
     "forces": [{"name": "spin", "body": "a", "torque": 0.5}],
-    "simulation": {"stepping": "event", "integrator": "semi_implicit_euler", "dt": 0.005,
+    "simulation": {"stepping": "event", "integrator": "trapezoidal", "dt": 0.005,
                    "duration": 0.2, "joint_correction": "none"}})");
   Model<double> model;
   State<double> state;

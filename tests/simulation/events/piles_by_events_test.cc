@@ -16,8 +16,7 @@
 namespace tangible {
 namespace {
 
-constexpr Integrator kIntegrators[] = {Integrator::kSemiImplicitEuler, Integrator::kTrapezoidal,
-                                       Integrator::kRungeKutta4};
+constexpr Integrator kIntegrators[] = {Integrator::kTrapezoidal, Integrator::kRungeKutta4};
 
 BasicBody<double> Moving(const std::string& name, const BasicShape<double>& shape, double x,
                          double y) {

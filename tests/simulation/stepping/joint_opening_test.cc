@@ -99,8 +99,6 @@ TEST(JointWatch, DoesNotWatchWhatIsKeptClosed) {
       JointWatch(RodAndBox(kHinge, R"({"joint_correction": "projection"})").model).watches());
   EXPECT_FALSE(JointWatch(RodAndBox(kHinge, R"({"stepping": "event"})").model).watches());
   EXPECT_TRUE(
-      JointWatch(RodAndBox(kHinge, R"({"joint_correction": "baumgarte"})").model).watches());
-  EXPECT_TRUE(
       JointWatch(RodAndBox(kHinge, R"({"stepping": "event", "joint_correction": "none"})").model)
           .watches());
 }

@@ -33,7 +33,7 @@ Tradeoff Example() {
   cell.run_seconds = 3e-3;
   cell.both_seconds = 8e-3;
   tradeoff.cells.push_back(cell);
-  cell.settings.solver = SolverChoice::kLemke;
+  cell.settings.lcp_tolerance = 1e-6;
   cell.instead = "step 3: unsolved";
   cell.failed = true;
   tradeoff.cells.push_back(cell);
@@ -49,7 +49,7 @@ TEST(TradeoffTableTest, ShowsTheFrontsAndWhatIsMissing) {
   for (const char* expected :
        {"2 cells measured, 1 over their budget, 1 failed", "its own errors: trajectory 1.0e-09",
         "reference: did not come within its bound",
-        "failed 1: event runge_kutta_4, projection, lemke",
+        "failed 1: event runge_kutta_4, projection, tolerance 1e-06",
         "left out: fixed stepping with trapezoidal: why", "TG fixed semi_implicit_euler, none ",
         "0.02   1.0e-02   3.0e-02          1    1.00",
         "0.02  5.0e-10*   1.0e-06          3    3.00          8    4.00"}) {

@@ -58,7 +58,7 @@ Scene SceneOf(const Arena& arena) {
   scene.joints = {upright};
   scene.simulation.stepping = Stepping::kEvent;
   // Without forces the ball flies straight and does not rotate, so that any integrator is exact.
-  scene.simulation.integrator = Integrator::kSemiImplicitEuler;
+  scene.simulation.integrator = Integrator::kTrapezoidal;
   scene.simulation.joint_correction = JointCorrection::kNone;
   scene.simulation.dt = kFarFrames;
   scene.simulation.duration = kFarFrames;
