@@ -14,6 +14,7 @@
 #include "tangible/app/progress.h"
 #include "tangible/estimation/experiments/breakout/breakout_study.h"
 #include "tangible/estimation/experiments/breakout/replay.h"
+#include "tangible/math/median.h"
 #include "tangible/render/plot.h"
 #include "tangible/scene/json_writer.h"
 
@@ -61,13 +62,6 @@ std::string NameOfCase(const BreakoutCase& one) {
   if (one.kind == PlayerKind::kLearned) name += " after " + std::to_string(one.random_frames);
   if (one.sticky > 0.0) name += ", sticky " + FormatNumber(one.sticky);
   return name;
-}
-
-double MedianOf(std::vector<double> values) {
-  if (values.empty()) return NAN;
-  std::sort(values.begin(), values.end());
-  const size_t half = values.size() / 2;
-  return values.size() % 2 == 1 ? values[half] : 0.5 * (values[half - 1] + values[half]);
 }
 
 // The last point of a curve at or before so many frames.
@@ -130,7 +124,7 @@ LearningLine PrintLearningLine(const char* what, const std::vector<BreakoutResul
     high.push_back(value(*point));
     settled.push_back(value(game.curve.back()));
   }
-  const LearningLine line{MedianOf(start), MedianOf(high), MedianOf(end), MedianOf(settled)};
+  const LearningLine line{Median(start), Median(high), Median(end), Median(settled)};
   std::printf("  %-46s %8.3g ", what, line.start);
   if (high.empty()) {
     std::printf("%8s", "-");
@@ -262,7 +256,7 @@ std::string LearningPlot(const BreakoutStudyOptions& options, const BreakoutResu
       std::vector<double> values;
       values.reserve(games.size());
       for (const BreakoutResult& game : games) values.push_back(value(At(game, frames)));
-      one.y.push_back(MedianOf(std::move(values)));
+      one.y.push_back(Median(std::move(values)));
     }
     return one;
   };

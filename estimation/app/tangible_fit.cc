@@ -91,9 +91,9 @@ std::string OverrideDerivatives(FitOptions* options) {
   if (FLAGS_derivatives.empty()) {
     return "";
   }
-  for (const DerivativeMethod method :
-       {DerivativeMethod::kTangent, DerivativeMethod::kAdjoint, DerivativeMethod::kJet,
-        DerivativeMethod::kJetImplicit, DerivativeMethod::kFiniteDifference}) {
+  for (const GradientMethod method :
+       {GradientMethod::kTangent, GradientMethod::kAdjoint, GradientMethod::kJet,
+        GradientMethod::kJetImplicit, GradientMethod::kFiniteDifference}) {
     if (FLAGS_derivatives == NameOf(method) && IsAvailable(method)) {
       options->derivatives = method;
       return "";

@@ -58,7 +58,7 @@ ChainStudy::ChainStudy(const Scene& scene, double rate, const ChainStudyOptions&
   // The predictions at the truth are the residuals of observations that are 0.
   RolloutResiduals residuals = ResidualsOf(exact_);
   Eigen::VectorXd predicted;
-  residuals.Evaluate(residuals.scene().Initial(), DerivativeMethod::kTangent, &predicted, nullptr);
+  residuals.Evaluate(residuals.scene().Initial(), GradientMethod::kTangent, &predicted, nullptr);
   for (size_t i = 0; i < exact_.observations.size(); ++i) {
     exact_.observations[i].value = options.sigma * predicted[static_cast<Eigen::Index>(i)];
   }

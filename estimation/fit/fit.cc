@@ -399,7 +399,7 @@ void Finish(FitRun* run, FitResult* result) {
   UncertaintyOptions uncertainty;
   uncertainty.leverages = run->options.leverages;
   uncertainty.huber = run->options.huber;
-  uncertainty.rank_tolerance = run->options.derivatives == DerivativeMethod::kFiniteDifference
+  uncertainty.rank_tolerance = run->options.derivatives == GradientMethod::kFiniteDifference
                                    ? kDifferencesRank
                                    : kJacobianRank;
   result->uncertainty = EstimateUncertainty(*run->problem, best.parameters, blocks, uncertainty);

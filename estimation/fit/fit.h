@@ -42,7 +42,7 @@ enum class FitApproach {
 const char* NameOf(FitApproach approach);
 
 struct FitOptions {
-  DerivativeMethod derivatives = DerivativeMethod::kTangent;
+  GradientMethod derivatives = GradientMethod::kTangent;
   double huber = 0.0;  ///< b, in multiples of sigma; 0: plain squares
   /// If a start does not reach the minimum by it, it is also minimised plainly, after kSegments
   /// with growing windows as well, and the best minimum is taken.

@@ -166,7 +166,7 @@ void ForEachOnThreads(int threads, int count, const std::function<void(int)>& fu
            [&function](size_t i, int) { function(static_cast<int>(i)); });
 }
 
-Linearizer::Linearizer(LeastSquaresProblem* problem, DerivativeMethod method, int threads,
+Linearizer::Linearizer(LeastSquaresProblem* problem, GradientMethod method, int threads,
                        EvaluationLog* log)
     : problem_(problem), layout_(*problem), method_(method), threads_(threads), log_(log) {}
 

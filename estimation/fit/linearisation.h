@@ -70,8 +70,7 @@ void ForEachOnThreads(int threads, int count, const std::function<void(int)>& fu
 class Linearizer {
  public:
   /// `log` may be null. The problem and the log must outlive this object.
-  Linearizer(LeastSquaresProblem* problem, DerivativeMethod method, int threads,
-             EvaluationLog* log);
+  Linearizer(LeastSquaresProblem* problem, GradientMethod method, int threads, EvaluationLog* log);
 
   const BlockLayout& layout() const { return layout_; }
   const std::vector<ParameterEntry>& entries() const { return problem_->entries(); }
@@ -106,7 +105,7 @@ class Linearizer {
 
   LeastSquaresProblem* problem_;
   BlockLayout layout_;
-  DerivativeMethod method_;
+  GradientMethod method_;
   int threads_;
   EvaluationLog* log_;
   long rollouts_ = 0;

@@ -11,6 +11,7 @@
 #include "tangible/estimation/fit/block_system.h"
 #include "tangible/estimation/fit/linearisation.h"
 #include "tangible/estimation/fit/tolerances.h"
+#include "tangible/math/median.h"
 #include "tangible/math/scalar.h"
 
 namespace tangible {
@@ -265,9 +266,7 @@ class Minimiser : public ceres::IterationCallback {
         sizes.push_back(std::abs(blocks[b].residuals[i]));
       }
     }
-    const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
-    std::nth_element(sizes.begin(), middle, sizes.end());
-    return sizes.empty() ? 0.0 : *middle;
+    return sizes.empty() ? 0.0 : UpperMedian(std::move(sizes));
   }
 
   /// Minimises with the bound `huber` of the loss; goes back where that does not lower the robust

@@ -12,7 +12,7 @@ namespace {
 
 // Of one block; false with a message.
 bool Differentiate(const BlockLayout& layout, int block, const Eigen::VectorXd& p,
-                   DerivativeMethod method, RecordingsProblem* problem, BlockEvaluation* evaluation,
+                   GradientMethod method, RecordingsProblem* problem, BlockEvaluation* evaluation,
                    std::string* message) {
   if (problem->EvaluateBlock(block, layout.Local(block, p), method, BlockDerivatives::kCompute,
                              evaluation)) {
@@ -47,7 +47,7 @@ MotionCheck CheckMotion(const FitInput& input, const Eigen::VectorXd& estimate,
     return check;
   }
   const BlockLayout layout(*problem);
-  const DerivativeMethod method = input.options().derivatives;
+  const GradientMethod method = input.options().derivatives;
   Eigen::VectorXd apart = Eigen::VectorXd::Zero(layout.num_parameters());
   Eigen::VectorXd of_map = apart, of_motion = apart;
   for (int b = 0; b < layout.num_blocks(); ++b) {

@@ -122,7 +122,7 @@ class StateProblem : public LeastSquaresProblem {
   }
   std::vector<RowPlace> Places(int /*block*/) const override { return {}; }
 
-  bool EvaluateBlock(int /*block*/, const Eigen::VectorXd& p, DerivativeMethod /*method*/,
+  bool EvaluateBlock(int /*block*/, const Eigen::VectorXd& p, GradientMethod /*method*/,
                      BlockDerivatives derivatives, BlockEvaluation* evaluation) override {
     if (!Rows(p, &evaluation->residuals)) {
       evaluation->message = "there is no such state";
@@ -221,7 +221,7 @@ void TakeTurnsBack(StateProblem* problem, Eigen::VectorXd* x) {
   BlockEvaluation rows;
   const auto cost = [&](const Eigen::VectorXd& at) {
     const bool done =
-        problem->EvaluateBlock(0, at, DerivativeMethod::kTangent, BlockDerivatives::kSkip, &rows);
+        problem->EvaluateBlock(0, at, GradientMethod::kTangent, BlockDerivatives::kSkip, &rows);
     return done ? rows.residuals.squaredNorm() : HUGE_VAL;
   };
   double least = cost(*x);

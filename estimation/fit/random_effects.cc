@@ -11,6 +11,7 @@
 
 #include "tangible/estimation/fit/tolerances.h"
 #include "tangible/estimation/problem/problem_with_priors.h"
+#include "tangible/math/median.h"
 
 namespace tangible {
 namespace {
@@ -144,9 +145,8 @@ std::pair<double, double> SpreadLikelihood::RangeOf(int effect) const {
     }
   }
   if (deviations.empty()) return {kLeastSpread * of.spread, kLargestSpread * of.spread};
-  const auto middle = deviations.begin() + static_cast<std::ptrdiff_t>(deviations.size() / 2);
-  std::nth_element(deviations.begin(), middle, deviations.end());
-  return {kLeastSpread * *middle, kLargestSpread * std::max(*middle, of.spread)};
+  const double middle = UpperMedian(std::move(deviations));
+  return {kLeastSpread * middle, kLargestSpread * std::max(middle, of.spread)};
 }
 
 namespace {

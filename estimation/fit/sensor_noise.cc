@@ -8,6 +8,7 @@
 
 #include "tangible/estimation/fit/tolerances.h"
 #include "tangible/estimation/uncertainty/tolerances.h"
+#include "tangible/math/median.h"
 
 namespace tangible {
 namespace {
@@ -20,9 +21,7 @@ double SquareSum(const Eigen::VectorXd& residuals, const std::vector<int>& rows,
     for (const int i : rows) {
       sizes.push_back(std::abs(residuals[i]));
     }
-    const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
-    std::nth_element(sizes.begin(), middle, sizes.end());
-    const double deviation = kDeviationByMedian * *middle;
+    const double deviation = kDeviationByMedian * UpperMedian(std::move(sizes));
     return static_cast<double>(rows.size()) * deviation * deviation;
   }
   double sum = 0.0;

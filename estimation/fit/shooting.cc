@@ -11,6 +11,7 @@
 #include "tangible/estimation/fit/observed_state.h"
 #include "tangible/estimation/fit/tolerances.h"
 #include "tangible/estimation/problem/problem_with_priors.h"
+#include "tangible/math/median.h"
 #include "tangible/simulation/derivatives/rollout_tangent.h"
 
 namespace tangible {
@@ -43,8 +44,7 @@ double MedianSigma(const std::vector<Observation>& observations) {
   for (const Observation& observation : observations) {
     sigmas.push_back(observation.sigma);
   }
-  std::nth_element(sigmas.begin(), sigmas.begin() + sigmas.size() / 2, sigmas.end());
-  return sigmas[sigmas.size() / 2];
+  return UpperMedian(std::move(sigmas));
 }
 
 }  // namespace
@@ -380,9 +380,8 @@ void ShootingProblem::SetJumpSigma(double sigma) {
   }
 }
 
-bool ShootingProblem::EvaluateBlock(int block, const Eigen::VectorXd& p,
-                                    DerivativeMethod /*method*/, BlockDerivatives derivatives,
-                                    BlockEvaluation* evaluation) {
+bool ShootingProblem::EvaluateBlock(int block, const Eigen::VectorXd& p, GradientMethod /*method*/,
+                                    BlockDerivatives derivatives, BlockEvaluation* evaluation) {
   ShootingResiduals& run = runs_[block];
   const Eigen::Index states = run.num_states();
   const Eigen::VectorXd ordered = problem_->Ordered(p.head(p.size() - states));

@@ -110,7 +110,7 @@ class ShootingProblem : public LeastSquaresProblem {
   int num_observation_rows(int block) const override { return problem_->num_rows(block); }
   double weight(int block) const override { return problem_->weight(block); }
   std::vector<RowPlace> Places(int block) const override { return problem_->Places(block); }
-  bool EvaluateBlock(int block, const Eigen::VectorXd& p, DerivativeMethod method,
+  bool EvaluateBlock(int block, const Eigen::VectorXd& p, GradientMethod method,
                      BlockDerivatives derivatives, BlockEvaluation* evaluation) override;
   std::string BlockName(int block) const override { return problem_->BlockName(block); }
 

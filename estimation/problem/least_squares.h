@@ -18,10 +18,10 @@
 #include <string>
 #include <vector>
 
-#include "tangible/estimation/problem/derivative_method.h"
 #include "tangible/estimation/problem/parameter_entry.h"
-#include "tangible/lcp/dense/certificate.h"
+#include "tangible/lcp/certificate/certificate.h"
 #include "tangible/math/scalar.h"
+#include "tangible/simulation/gradient/derivative_method.h"
 
 namespace tangible {
 
@@ -69,7 +69,7 @@ class LeastSquaresProblem {
   /// False, with a message, where a run fails, a value is not allowed, or a residual or derivative
   /// is not finite. The same p gives the same bits. Calls for different blocks may run at the same
   /// time; calls for one block may not.
-  virtual bool EvaluateBlock(int block, const Eigen::VectorXd& p, DerivativeMethod method,
+  virtual bool EvaluateBlock(int block, const Eigen::VectorXd& p, GradientMethod method,
                              BlockDerivatives derivatives, BlockEvaluation* evaluation) = 0;
 
   /// The certificate of the derivatives at p (all parameters); empty where nothing is certified.
@@ -79,7 +79,7 @@ class LeastSquaresProblem {
   /// numbers of its scene that no parameter sets; empty where there are none, more than `most`, or
   /// a run fails.
   virtual HeldColumns EvaluateHeld(int /*block*/, const Eigen::VectorXd& /*p*/,
-                                   DerivativeMethod /*method*/, int /*most*/) {
+                                   GradientMethod /*method*/, int /*most*/) {
     return {};
   }
 

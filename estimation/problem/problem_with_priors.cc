@@ -81,7 +81,7 @@ std::string ProblemWithPriors::BlockName(int block) const {
 }
 
 HeldColumns ProblemWithPriors::EvaluateHeld(int block, const Eigen::VectorXd& p,
-                                            DerivativeMethod method, int most) {
+                                            GradientMethod method, int most) {
   return IsOfPriors(block) ? HeldColumns() : problem_->EvaluateHeld(block, p, method, most);
 }
 
@@ -110,7 +110,7 @@ PriorResidual ProblemWithPriors::Evaluate(const PriorRow& row, const Eigen::Vect
   return EvaluatePrior(prior, p[row.parameter]);
 }
 
-bool ProblemWithPriors::EvaluateBlock(int block, const Eigen::VectorXd& p, DerivativeMethod method,
+bool ProblemWithPriors::EvaluateBlock(int block, const Eigen::VectorXd& p, GradientMethod method,
                                       BlockDerivatives derivatives, BlockEvaluation* evaluation) {
   *evaluation = BlockEvaluation();
   if (!IsOfPriors(block) && !problem_->EvaluateBlock(block, p, method, derivatives, evaluation)) {

@@ -51,12 +51,12 @@ class ProblemWithPriors : public LeastSquaresProblem {
   int num_observation_rows(int block) const override;
   double weight(int block) const override;
   std::vector<RowPlace> Places(int block) const override;
-  bool EvaluateBlock(int block, const Eigen::VectorXd& p, DerivativeMethod method,
+  bool EvaluateBlock(int block, const Eigen::VectorXd& p, GradientMethod method,
                      BlockDerivatives derivatives, BlockEvaluation* evaluation) override;
   std::optional<Certificate> Certify(const Eigen::VectorXd& p) override {
     return problem_->Certify(p);
   }
-  HeldColumns EvaluateHeld(int block, const Eigen::VectorXd& p, DerivativeMethod method,
+  HeldColumns EvaluateHeld(int block, const Eigen::VectorXd& p, GradientMethod method,
                            int most) override;
   std::vector<std::string> FindInconsistencies(const Eigen::VectorXd& p) override {
     return problem_->FindInconsistencies(p);

@@ -115,7 +115,7 @@ std::vector<RowPlace> RecordingsProblem::Places(int block) const {
   return recordings_[block].residuals.Places(0);
 }
 
-bool RecordingsProblem::EvaluateBlock(int block, const Eigen::VectorXd& p, DerivativeMethod method,
+bool RecordingsProblem::EvaluateBlock(int block, const Eigen::VectorXd& p, GradientMethod method,
                                       BlockDerivatives derivatives, BlockEvaluation* evaluation) {
   if (!recordings_[block].residuals.EvaluateBlock(0, Ordered(p), method, derivatives, evaluation)) {
     return false;
@@ -153,7 +153,7 @@ std::optional<Certificate> RecordingsProblem::Certify(const Eigen::VectorXd& p) 
 }
 
 HeldColumns RecordingsProblem::EvaluateHeld(int block, const Eigen::VectorXd& p,
-                                            DerivativeMethod method, int most) {
+                                            GradientMethod method, int most) {
   return recordings_[block].residuals.EvaluateHeld(0, Ordered(p), method, most);
 }
 

@@ -79,10 +79,10 @@ class RecordingsProblem : public LeastSquaresProblem {
   int num_rows(int block) const override { return recordings_[block].residuals.num_residuals(); }
   double weight(int block) const override { return recordings_[block].weight; }
   std::vector<RowPlace> Places(int block) const override;
-  bool EvaluateBlock(int block, const Eigen::VectorXd& p, DerivativeMethod method,
+  bool EvaluateBlock(int block, const Eigen::VectorXd& p, GradientMethod method,
                      BlockDerivatives derivatives, BlockEvaluation* evaluation) override;
   std::optional<Certificate> Certify(const Eigen::VectorXd& p) override;
-  HeldColumns EvaluateHeld(int block, const Eigen::VectorXd& p, DerivativeMethod method,
+  HeldColumns EvaluateHeld(int block, const Eigen::VectorXd& p, GradientMethod method,
                            int most) override;
   std::vector<std::string> FindInconsistencies(const Eigen::VectorXd& p) override;
   std::unique_ptr<LeastSquaresProblem> Window(double part) const override;

@@ -141,9 +141,8 @@ std::unique_ptr<LeastSquaresProblem> RolloutResiduals::Window(double part) const
   return std::make_unique<RolloutResiduals>(FirstPart(part));
 }
 
-bool RolloutResiduals::EvaluateBlock(int /*block*/, const Eigen::VectorXd& p,
-                                     DerivativeMethod method, BlockDerivatives derivatives,
-                                     BlockEvaluation* evaluation) {
+bool RolloutResiduals::EvaluateBlock(int /*block*/, const Eigen::VectorXd& p, GradientMethod method,
+                                     BlockDerivatives derivatives, BlockEvaluation* evaluation) {
   const long before = rollouts_;
   const bool done =
       Evaluate(p, method, &evaluation->residuals,
@@ -168,7 +167,7 @@ std::optional<Certificate> RolloutResiduals::Certify(const Eigen::VectorXd& p) {
                            names, sizes);
 }
 
-bool RolloutResiduals::Evaluate(const Eigen::VectorXd& p, DerivativeMethod method,
+bool RolloutResiduals::Evaluate(const Eigen::VectorXd& p, GradientMethod method,
                                 Eigen::VectorXd* residuals, RowMatrixXd* jacobian) {
   if (!SetParameters(p)) {
     return false;
@@ -176,14 +175,14 @@ bool RolloutResiduals::Evaluate(const Eigen::VectorXd& p, DerivativeMethod metho
   bool done = false;
   if (jacobian == nullptr) {
     done = Plain();
-  } else if (method == DerivativeMethod::kTangent) {
+  } else if (method == GradientMethod::kTangent) {
     done = Tangent(jacobian);
-  } else if (method == DerivativeMethod::kAdjoint) {
+  } else if (method == GradientMethod::kAdjoint) {
     done = Adjoint(jacobian);
-  } else if (method == DerivativeMethod::kFiniteDifference) {
+  } else if (method == GradientMethod::kFiniteDifference) {
     done = FiniteDifferences(p, jacobian) && SetParameters(p) && Plain();
   } else {
-    const bool implicit = method == DerivativeMethod::kJetImplicit;
+    const bool implicit = method == GradientMethod::kJetImplicit;
     done = Plain() && Jets(implicit ? JetRoute::kImplicit : JetRoute::kUnrolled, jacobian);
   }
   if (!done) {
@@ -498,7 +497,7 @@ RowMatrixXd RolloutResiduals::FromSampleDerivatives(const std::vector<double>& s
 }
 
 HeldColumns RolloutResiduals::EvaluateHeld(int /*block*/, const Eigen::VectorXd& p,
-                                           DerivativeMethod method, int most) {
+                                           GradientMethod method, int most) {
   HeldColumns held;
   if (!SetParameters(p)) {
     return held;

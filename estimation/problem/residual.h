@@ -58,10 +58,10 @@ class RolloutResiduals : public LeastSquaresProblem {
   int num_own(int /*block*/) const override { return 0; }
   int num_rows(int /*block*/) const override { return num_residuals(); }
   std::vector<RowPlace> Places(int block) const override;
-  bool EvaluateBlock(int block, const Eigen::VectorXd& p, DerivativeMethod method,
+  bool EvaluateBlock(int block, const Eigen::VectorXd& p, GradientMethod method,
                      BlockDerivatives derivatives, BlockEvaluation* evaluation) override;
   std::optional<Certificate> Certify(const Eigen::VectorXd& p) override;
-  HeldColumns EvaluateHeld(int block, const Eigen::VectorXd& p, DerivativeMethod method,
+  HeldColumns EvaluateHeld(int block, const Eigen::VectorXd& p, GradientMethod method,
                            int most) override;
   std::vector<std::string> FindInconsistencies(const Eigen::VectorXd& p) override;
   std::unique_ptr<LeastSquaresProblem> Window(double part) const override;
@@ -71,7 +71,7 @@ class RolloutResiduals : public LeastSquaresProblem {
   /// The residuals at p and, unless `jacobian` is null, their derivatives by `method`. False where
   /// the run fails or p sets a number to a value that it may not take; message() says which.
   /// Deterministic: the same p gives the same bits.
-  bool Evaluate(const Eigen::VectorXd& p, DerivativeMethod method, Eigen::VectorXd* residuals,
+  bool Evaluate(const Eigen::VectorXd& p, GradientMethod method, Eigen::VectorXd* residuals,
                 RowMatrixXd* jacobian);
   const std::string& message() const { return message_; }
 

@@ -6,6 +6,7 @@
 
 #include "tangible/estimation/results/tolerances.h"
 #include "tangible/estimation/uncertainty/tolerances.h"
+#include "tangible/math/median.h"
 
 namespace tangible {
 namespace {
@@ -20,11 +21,9 @@ std::vector<std::vector<double>> BySeries(const ObservationSeries& index,
   return all;
 }
 
-/// The size above which a residual of a series is an outlier. Reorders `sizes`.
-double OutlierBound(std::vector<double>* sizes) {
-  const auto middle = sizes->begin() + static_cast<std::ptrdiff_t>(sizes->size() / 2);
-  std::nth_element(sizes->begin(), middle, sizes->end());
-  return kOutlierDeviations * std::max(1.0, kDeviationByMedian * *middle);
+/// The size above which a residual of a series is an outlier.
+double OutlierBound(const std::vector<double>& sizes) {
+  return kOutlierDeviations * std::max(1.0, kDeviationByMedian * UpperMedian(sizes));
 }
 
 }  // namespace
@@ -89,7 +88,7 @@ void Append(const RecordedRun& recording, const Eigen::VectorXd& values, Residua
   const size_t before = summary->series.size();
   std::vector<double> bounds;
   for (std::vector<double>& sizes : BySeries(index, values)) {
-    bounds.push_back(OutlierBound(&sizes));
+    bounds.push_back(OutlierBound(sizes));
   }
   for (const int first : index.first) {
     summary->series.push_back(Describe(recording.residuals, recording.name, observations[first]));

@@ -18,12 +18,12 @@ namespace {
 constexpr int kMaxSegments = 1000;
 constexpr int kMaxStarts = 10000;
 
-constexpr std::pair<const char*, DerivativeMethod> kMethods[] = {
-    {"tangent", DerivativeMethod::kTangent},
-    {"adjoint", DerivativeMethod::kAdjoint},
-    {"jet", DerivativeMethod::kJet},
-    {"jet_implicit", DerivativeMethod::kJetImplicit},
-    {"finite_difference", DerivativeMethod::kFiniteDifference}};
+constexpr std::pair<const char*, GradientMethod> kMethods[] = {
+    {"tangent", GradientMethod::kTangent},
+    {"adjoint", GradientMethod::kAdjoint},
+    {"jet", GradientMethod::kJet},
+    {"jet_implicit", GradientMethod::kJetImplicit},
+    {"finite_difference", GradientMethod::kFiniteDifference}};
 
 // Multiple shooting is asked for by its segments.
 constexpr std::pair<const char*, FitApproach> kApproaches[] = {{"auto", FitApproach::kAuto},

@@ -38,7 +38,7 @@ struct HeldParameter {
 };
 
 struct HeldOptions {
-  DerivativeMethod derivatives = DerivativeMethod::kTangent;
+  GradientMethod derivatives = GradientMethod::kTangent;
   double least_share = 0.1;       ///< of the cost, for a number that releases no parameter
   double least_deviations = 5.0;  ///< ũᵀ r over that of independent residuals of their own size
   int most = 5;                   ///< numbers that are reported

@@ -11,6 +11,7 @@
 
 #include "tangible/estimation/uncertainty/decomposition.h"
 #include "tangible/estimation/uncertainty/tolerances.h"
+#include "tangible/math/median.h"
 #include "tangible/math/scalar.h"
 
 namespace tangible {
@@ -81,12 +82,10 @@ double Bandwidth(const TimeSeries& series) {
     spacing.push_back(series.times[t + 1] - series.times[t]);
   }
   // The spacing is the median, which gaps in a recording do not change.
-  const auto middle = spacing.begin() + static_cast<std::ptrdiff_t>(spacing.size() / 2);
-  std::nth_element(spacing.begin(), middle, spacing.end());
   const double samples = static_cast<double>(series.times.size());
   const double width = kAndrewsFactor * std::cbrt(AutoregressiveAlpha(series) * samples);
   const double duration = series.times.back() - series.times.front();
-  return std::min(width * *middle, kLargestBandwidth * duration);
+  return std::min(width * UpperMedian(std::move(spacing)), kLargestBandwidth * duration);
 }
 
 /// Σ k_tt' u_t u_t'ᵀ. Bartlett's kernel is the overlap of two windows of width S: the sum is 1/S

@@ -10,6 +10,7 @@
 #include "tangible/estimation/vision/tolerances.h"
 #include "tangible/estimation/vision/training.h"
 #include "tangible/math/cpu_time.h"
+#include "tangible/math/median.h"
 
 namespace tangible {
 namespace {
@@ -18,11 +19,6 @@ using OrderedJson = nlohmann::ordered_json;
 
 constexpr int kCurvePoints = 40;  // of a loss over a training
 constexpr int kTestStride = 3;    // frames between windows that billiards are tested on
-
-double Median(std::vector<double> values) {
-  std::sort(values.begin(), values.end());
-  return values[values.size() / 2];
-}
 
 std::string Format(const char* format, double value) {
   char text[64];
@@ -247,9 +243,9 @@ nlohmann::ordered_json TimePhysics() {
   }
   return {{"batch", options.batch},
           {"frames", options.ahead},
-          {"physics_seconds", Median(physics)},
-          {"iteration_seconds", Median(iterations)},
-          {"share", Median(physics) / Median(iterations)}};
+          {"physics_seconds", UpperMedian(physics)},
+          {"iteration_seconds", UpperMedian(iterations)},
+          {"share", UpperMedian(physics) / UpperMedian(iterations)}};
 }
 
 namespace {

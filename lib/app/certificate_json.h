@@ -3,7 +3,7 @@
 //
 // The certificate of a derivative as JSON, as in the results of the programs.
 
-#include "tangible/lcp/dense/certificate.h"
+#include "tangible/lcp/certificate/certificate.h"
 #include "tangible/scene/json_writer.h"
 
 namespace tangible {

@@ -31,7 +31,7 @@ OrderedJson ReductionsJson(const RolloutReport& report) {
           {"lcp_rows", report.lcp_rows},
           {"single_rows", report.single_rows},
           {"angles_left_out", report.angles_left_out},
-          {"steps_without_lcp", report.solved_directly}};
+          {"steps_without_lcp", report.SolvedBy(Rung::kDirect, Rung::kDirect)}};
 }
 
 OrderedJson FallbacksJson(const RolloutReport& report) {
@@ -80,7 +80,7 @@ OrderedJson UndeterminedJson(const Model<double>& model, const State<double>& at
                              const StepRecord& step) {
   ContactProblem<double> problem;
   AssemblyScratch<double> scratch;
-  AssembleFree(model, at, step.time, step.h, &problem, &scratch);
+  AssembleWithoutContacts(model, at, step.time, step.h, &problem, &scratch);
   AssembleContacts(model, at, step.h, step.contacts, step.friction, step.restitution, &scratch,
                    &problem);
   const UndeterminedCounts counts =
@@ -194,33 +194,34 @@ OrderedJson RunSummary::ToJson(const Model<double>& model, const RolloutReport& 
     // its end.
     undetermined = UndeterminedJson(model, by_events_ ? last : last_step_.before, last_step_);
   }
-  return {{"status", ToString(report.status)},
-          {"message", report.message},
-          {"steps", report.steps},
-          {"seconds", nullptr},
-          {"cpu_seconds", nullptr},
-          {"bodies", model.structure->world()},
-          {"contacts_max", report.contacts_max},
-          {"lcp_rows_max", report.lcp_rows_max},
-          {"islands_max", islands_max_},
-          {"events", report.events},
-          {"ellipse_motions", report.ellipse_motions},
-          {"fallbacks", SumOf(fallbacks)},
-          {"solver",
-           {{"guess", report.solved_by_guess},
-            {"interior_point", report.solved_by_interior_point},
-            {"lemke", report.solved_by_lemke}}},
-          {"fallback_kinds", fallbacks},
-          {"reductions", ReductionsJson(report)},
-          {"undetermined_end", undetermined},
-          {"residual_max", report.residual_max},
-          {"penetration_max", penetration},
-          {"joint_drift_max", joint_drift_max_},
-          {"impact_energy_gain_max", report.impact_energy_gain_max},
-          {"energy_start", Energy(model, first_)},
-          {"energy_end", Energy(model, last)},
-          {"momentum_start", MomentumJson(model, first_)},
-          {"momentum_end", MomentumJson(model, last)}};
+  return {
+      {"status", ToString(report.status)},
+      {"message", report.message},
+      {"steps", report.steps},
+      {"seconds", nullptr},
+      {"cpu_seconds", nullptr},
+      {"bodies", model.structure->world()},
+      {"contacts_max", report.contacts_max},
+      {"lcp_rows_max", report.lcp_rows_max},
+      {"islands_max", islands_max_},
+      {"events", report.events},
+      {"ellipse_motions", report.ellipse_motions},
+      {"fallbacks", SumOf(fallbacks)},
+      {"solver",
+       {{"guess", report.SolvedBy(Rung::kModeChanges, Rung::kPivotingFromGuess)},
+        {"interior_point", report.SolvedBy(Rung::kInteriorPoint, Rung::kPivotingFromInteriorPoint)},
+        {"lemke", report.SolvedBy(Rung::kPivotingFromOpen, Rung::kLemke)}}},
+      {"fallback_kinds", fallbacks},
+      {"reductions", ReductionsJson(report)},
+      {"undetermined_end", undetermined},
+      {"residual_max", report.residual_max},
+      {"penetration_max", penetration},
+      {"joint_drift_max", joint_drift_max_},
+      {"impact_energy_gain_max", report.impact_energy_gain_max},
+      {"energy_start", Energy(model, first_)},
+      {"energy_end", Energy(model, last)},
+      {"momentum_start", MomentumJson(model, first_)},
+      {"momentum_end", MomentumJson(model, last)}};
 }
 
 }  // namespace tangible

@@ -18,6 +18,7 @@
 #include "tangible/app/trajectory_csv.h"
 #include "tangible/app/view_recorder.h"
 #include "tangible/control/model_predictive.h"
+#include "tangible/math/median.h"
 #include "tangible/render/html.h"
 #include "tangible/render/plot.h"
 #include "tangible/scene/json_writer.h"
@@ -408,8 +409,6 @@ int Predict(const std::string& path, const ControlFile& file) {
   if (run.left_maximum) WarnOfMaximum(path);
   const Certificate certificate = CertifyPlayed(file, run.played);
   WarnOfDiscreteMap(path, certificate);
-  std::vector<double> sorted = run.seconds;
-  std::sort(sorted.begin(), sorted.end());
   OrderedJson json = {
       {"status", "done"},
       {"cost", run.played.cost},
@@ -417,8 +416,8 @@ int Predict(const std::string& path, const ControlFile& file) {
       {"plans", run.seconds.size()},
       {"plans_failed", run.failed},
       {"certificate", ToJson(certificate)},
-      {"cpu_seconds_median", sorted[sorted.size() / 2]},
-      {"cpu_seconds_max", sorted.back()},
+      {"cpu_seconds_median", UpperMedian(run.seconds)},
+      {"cpu_seconds_max", *std::max_element(run.seconds.begin(), run.seconds.end())},
       {"controls", DescribeControls(file, run.played.controls, file.scene.simulation.dt)}};
   error = WriteResults(file, plant_scene, run.played, {}, json);
   return error.empty() ? kExitDone : ReportError(error);

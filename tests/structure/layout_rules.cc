@@ -34,7 +34,8 @@ bool Contains(const std::string& text, const std::string& part) {
 const std::map<std::string, std::set<std::string>>& DirectDependencies() {
   static const std::map<std::string, std::set<std::string>> direct = {
       {"math", {}},
-      {"lcp/dense", {"math"}},
+      {"lcp/certificate", {"math"}},
+      {"lcp/dense", {"lcp/certificate"}},
       {"lcp/system", {"math"}},
       {"lcp/contact", {"lcp/dense", "lcp/system"}},
       {"geometry", {"math"}},
@@ -51,6 +52,7 @@ const std::map<std::string, std::set<std::string>>& DirectDependencies() {
       {"simulation/gradient", {"simulation/certificate"}},
       {"control", {"simulation/gradient"}},
       {"render", {"simulation/gradient"}},
+      {"tangible.h", {"control", "render"}},
       {"estimation/problem", {"control", "render"}},
       {"estimation/uncertainty", {"estimation/problem"}},
       {"estimation/fit", {"estimation/uncertainty"}},
@@ -387,6 +389,17 @@ std::vector<std::string> UndocumentedTolerances(const std::string& header,
     }
   }
   return missing;
+}
+
+std::vector<std::string> NamesInTables(const std::string& readme) {
+  std::vector<std::string> names;
+  std::istringstream lines(readme);
+  const std::string start = "| `k";
+  for (std::string line; std::getline(lines, line);) {
+    if (!StartsWith(line, start) || std::islower(line[start.size()]) != 0) continue;
+    names.push_back(line.substr(start.size() - 1, line.find('`', start.size()) - start.size() + 1));
+  }
+  return names;
 }
 
 namespace {

@@ -46,6 +46,9 @@ std::vector<Tolerance> TolerancesOf(const std::string& header);
 std::vector<std::string> UndocumentedTolerances(const std::string& header,
                                                 const std::string& readme);
 
+/// The names that rows of a README's tables begin with, "| `kName` | ...".
+std::vector<std::string> NamesInTables(const std::string& readme);
+
 /// What is wrong with the rows of the table "equation | file | function" of lib/README.md: a file
 /// that `read` knows no text of, or a function or class that none of the row's files has. In the
 /// table `.cc` stands for the last file's name with that extension, a file without a folder is in

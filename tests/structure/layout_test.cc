@@ -191,6 +191,10 @@ TEST(LayoutRules, TolerancesHaveAHeaderAndATable) {
                   .empty());
   EXPECT_EQ(UndocumentedTolerances(header, "| `kA` | 1e-8 |\n| `kB` | 1e-6, 1e-9 |\n"),
             (std::vector<std::string>{"kA"}));
+  EXPECT_EQ(
+      NamesInTables(
+          "| name | of `kC` |\n| `kinematic` | x |\n| `kA` | 1e-8 |\nx\n| `kBc` | of `kA` |\n"),
+      (std::vector<std::string>{"kA", "kBc"}));
 }
 
 TEST(LayoutRules, RowsOfTheIndexNameWhatIsThere) {
@@ -248,6 +252,7 @@ fs::path ReadmeOfTolerances(const fs::path& header) {
 TEST(Layout, EveryToleranceStandsInTheTable) {
   int headers = 0;
   std::map<std::string, fs::path> headers_of;
+  std::set<fs::path> tables;
   for (const fs::path& path : Files({".h"})) {
     const fs::path header = path.lexically_relative(kTop);
     if (header.filename() != "tolerances.h") {
@@ -255,6 +260,7 @@ TEST(Layout, EveryToleranceStandsInTheTable) {
     }
     ++headers;
     const fs::path table = ReadmeOfTolerances(header);
+    tables.insert(table);
     const std::string text = ReadText(path);
     const std::vector<Tolerance> tolerances = TolerancesOf(text);
     ASSERT_FALSE(tolerances.empty()) << header;
@@ -265,6 +271,12 @@ TEST(Layout, EveryToleranceStandsInTheTable) {
       const auto [first, is_new] = headers_of.emplace(tolerance.name, header);
       EXPECT_TRUE(is_new) << tolerance.name << " stands in " << first->second << " and in "
                           << header;
+    }
+  }
+  for (const fs::path& table : tables) {
+    for (const std::string& name : NamesInTables(ReadText(kTop / table))) {
+      EXPECT_EQ(headers_of.count(name), 1U)
+          << table << " has a row for " << name << ", which no tolerances.h has";
     }
   }
   EXPECT_GE(headers, 20);

@@ -69,7 +69,7 @@ class DecayProblem : public LeastSquaresProblem {
     return "block " + std::to_string(block) + ": ";
   }
 
-  bool EvaluateBlock(int block, const Eigen::VectorXd& p, DerivativeMethod /*method*/,
+  bool EvaluateBlock(int block, const Eigen::VectorXd& p, GradientMethod /*method*/,
                      BlockDerivatives derivatives, BlockEvaluation* evaluation) override {
     evaluation->rollouts = 1;
     if (std::find(failing.begin(), failing.end(), block) != failing.end()) {

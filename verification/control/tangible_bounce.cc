@@ -11,6 +11,7 @@
 
 #include "tangible/app/program.h"
 #include "tangible/app/progress.h"
+#include "tangible/math/median.h"
 #include "tangible/scene/json_writer.h"
 #include "tangible/scene/scene_json.h"
 #include "tangible/verification/control/bounce_study.h"
@@ -40,11 +41,6 @@ struct Column {
   double distance = 0.0, believed = 0.0, iterations = 0.0, seconds = 0.0;
 };
 
-double MedianOf(std::vector<double> values) {
-  std::sort(values.begin(), values.end());
-  return values[values.size() / 2];
-}
-
 Column ColumnOf(const std::vector<bounce::Row>& rows, size_t method) {
   Column column;
   std::vector<double> distance, believed, iterations, seconds;
@@ -62,10 +58,10 @@ Column ColumnOf(const std::vector<bounce::Row>& rows, size_t method) {
     iterations.push_back(outcome.iterations);
     seconds.push_back(outcome.cpu_seconds);
   }
-  column.distance = MedianOf(distance);
-  column.believed = MedianOf(believed);
-  column.iterations = MedianOf(iterations);
-  column.seconds = MedianOf(seconds);
+  column.distance = UpperMedian(distance);
+  column.believed = UpperMedian(believed);
+  column.iterations = UpperMedian(iterations);
+  column.seconds = UpperMedian(seconds);
   return column;
 }
 

@@ -11,6 +11,7 @@
 #include "tangible/lcp/contact/worker_pool.h"
 #include "tangible/lcp/dense/solver.h"
 #include "tangible/math/cpu_time.h"
+#include "tangible/math/median.h"
 #include "tangible/verification/corpus/plain_case.h"
 #include "tangible/verification/corpus/recomputed.h"
 
@@ -111,13 +112,6 @@ void Add(const Answer& answer, Row* row) {
   if (!answer.right()) row->missed.push_back(answer.name);
 }
 
-double Median(std::vector<double> values) {
-  if (values.empty()) return 0.0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 // Rows in the order in which their kinds come, the ways of a kind together.
 std::vector<Row> Collect(const std::vector<std::vector<Answer>>& answers) {
   std::vector<Row> rows;
@@ -134,7 +128,7 @@ std::vector<Row> Collect(const std::vector<std::vector<Answer>>& answers) {
       seconds[at].push_back(answer.seconds);
     }
   }
-  for (size_t i = 0; i < rows.size(); ++i) rows[i].seconds_median = Median(seconds[i]);
+  for (size_t i = 0; i < rows.size(); ++i) rows[i].seconds_median = UpperMedian(seconds[i]);
   std::stable_sort(rows.begin(), rows.end(),
                    [](const Row& a, const Row& b) { return a.kind == b.kind && a.way < b.way; });
   return rows;

@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <set>
 
+#include "tangible/math/median.h"
 #include "tangible/render/plot.h"
 
 namespace tangible::cost {

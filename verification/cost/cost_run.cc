@@ -5,6 +5,7 @@
 #include <cmath>
 #include <sstream>
 
+#include "tangible/math/median.h"
 #include "tangible/simulation/gradient/gradient.h"
 #include "tangible/verification/cost/cost_scene.h"
 #include "tangible/verification/cost/tape_gradient.h"
@@ -160,15 +161,6 @@ int WidestJetBuilt() {
 
 double Least(const std::vector<double>& values) {
   return values.empty() ? std::nan("") : *std::min_element(values.begin(), values.end());
-}
-
-double Median(std::vector<double> values) {
-  if (values.empty()) {
-    return std::nan("");
-  }
-  std::sort(values.begin(), values.end());
-  const size_t half = values.size() / 2;
-  return values.size() % 2 == 1 ? values[half] : 0.5 * (values[half - 1] + values[half]);
 }
 
 double CostCell::ratio() const { return Least(seconds) / Least(rollout_seconds); }

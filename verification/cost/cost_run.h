@@ -80,6 +80,5 @@ double GradientDifference(const std::vector<double>& a, const std::vector<double
 int WidestJetBuilt();
 
 double Least(const std::vector<double>& values);
-double Median(std::vector<double> values);
 
 }  // namespace tangible::cost

@@ -9,6 +9,7 @@
 #include <random>
 
 #include "tangible/lcp/dense/solver.h"
+#include "tangible/math/median.h"
 
 namespace tangible {
 namespace {
@@ -148,15 +149,6 @@ std::vector<double> Printed(const SlidingBody& body, Misprint misprint) {
   return misprint == Misprint::kSignOfQ || misprint == Misprint::kSignOfF
              ? GradientByDifferences(body, misprint)
              : GradientByFormulas(body, misprint);
-}
-
-double Median(std::vector<double> values) {
-  if (values.empty()) {
-    return 0.0;
-  }
-  const auto middle = values.begin() + static_cast<long>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 std::string Cell(const char* format, double value) {
@@ -303,7 +295,7 @@ ErrataTable ComputeErrata() {
   }
   for (size_t i = 0; i < kMisprints.size(); ++i) {
     table.wrong[i] = static_cast<long>(errors[i].size());
-    table.median_printed[i] = Median(errors[i]);
+    table.median_printed[i] = UpperMedian(errors[i]);
   }
   return table;
 }

@@ -19,7 +19,7 @@
 #include <string>
 #include <vector>
 
-#include "tangible/lcp/dense/certificate.h"
+#include "tangible/lcp/certificate/certificate.h"
 
 namespace tangible::extremes {
 

@@ -121,10 +121,4 @@ double GradientError(const ErrorScale& scale, const SampledRun& run, const Sampl
   return std::isnan(apart) ? HUGE_VAL : apart / size;
 }
 
-double LowerMedian(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>((values.size() - 1) / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 }  // namespace tangible::tradeoff

@@ -58,8 +58,4 @@ double TrajectoryError(const ErrorScale& scale, const SampledRun& run, const Sam
 /// NaN where the reference's Jacobian is 0: nothing depends on the parameters.
 double GradientError(const ErrorScale& scale, const SampledRun& run, const SampledRun& reference);
 
-/// The median: for an odd number of values the middle one, for an even number the lower of the two
-/// in the middle; `values` must not be empty.
-double LowerMedian(std::vector<double> values);
-
 }  // namespace tangible::tradeoff

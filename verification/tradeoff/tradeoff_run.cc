@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "tangible/lcp/contact/worker_pool.h"
+#include "tangible/math/median.h"
 
 namespace tangible::tradeoff {
 namespace {
@@ -24,7 +25,7 @@ constexpr double kBetter = 0.9;
 constexpr double kSameTime = 1.1;
 
 double CostOf(const SampledRun& run) {
-  return LowerMedian(run.run_seconds) + LowerMedian(run.both_seconds);
+  return UpperMedian(run.run_seconds) + UpperMedian(run.both_seconds);
 }
 
 // Halves the step as the header says. False, with the last run's message, where no two successive
@@ -119,8 +120,8 @@ void RunGroup(const Scene& scene, const std::vector<ParameterPath>& parameters,
       if (run.done()) {
         cell.trajectory_error = TrajectoryError(tradeoff.scale, run, tradeoff.reference.run);
         cell.gradient_error = GradientError(tradeoff.scale, run, tradeoff.reference.run);
-        cell.run_seconds = LowerMedian(run.run_seconds);
-        cell.both_seconds = LowerMedian(run.both_seconds);
+        cell.run_seconds = UpperMedian(run.run_seconds);
+        cell.both_seconds = UpperMedian(run.both_seconds);
         cell.repeats = static_cast<int>(run.both_seconds.size());
         cell.steps = run.steps;
         predicted = cell.both_seconds;

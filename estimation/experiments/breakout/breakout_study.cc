@@ -5,6 +5,7 @@
 #include <mutex>
 
 #include "tangible/estimation/fit/linearisation.h"
+#include "tangible/math/median.h"
 #include "tangible/math/random.h"
 
 namespace tangible {
@@ -130,12 +131,10 @@ BreakoutResults RunBreakout(const BreakoutStudyOptions& options,
 
 double MedianScore(const std::vector<BreakoutResult>& games) {
   if (games.empty()) return 0.0;
-  std::vector<int> scores;
+  std::vector<double> scores;
   scores.reserve(games.size());
   for (const BreakoutResult& game : games) scores.push_back(game.score);
-  std::sort(scores.begin(), scores.end());
-  const size_t half = scores.size() / 2;
-  return scores.size() % 2 == 1 ? scores[half] : 0.5 * (scores[half - 1] + scores[half]);
+  return Median(std::move(scores));
 }
 
 double MeanScore(const std::vector<BreakoutResult>& games) {

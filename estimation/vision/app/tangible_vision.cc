@@ -6,14 +6,14 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <atomic>
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
+#include <functional>
 #include <iostream>
 #include <map>
 #include <mutex>
-#include <thread>
+#include <stdexcept>
 #include <utility>
 
 #include "tangible/app/program.h"
@@ -21,6 +21,7 @@
 #include "tangible/estimation/vision/report.h"
 #include "tangible/estimation/vision/study.h"
 #include "tangible/estimation/vision/training_file.h"
+#include "tangible/lcp/contact/worker_pool.h"
 #include "tangible/scene/json_writer.h"
 #include "tangible/scene/text_file.h"
 
@@ -92,30 +93,26 @@ class Study {
       if (!fs::exists(File(cell, ".json"))) total += cell.training.iterations;
     }
     Watch watch(total);
-    std::atomic<size_t> next{0};
-    const auto work = [&] {
+    WorkerPool pool(FLAGS_jobs);
+    const std::function<void(size_t, int)> work = [&](size_t k, int /*thread*/) {
       at::set_num_threads(1);
-      for (size_t k = next++; k < cells_.size(); k = next++) {
-        std::string error;
-        try {
-          error = Make(cells_[k], &watch);
-        } catch (const c10::Error& exception) {
-          error = cells_[k].name + ": " + OneLine(exception.what_without_backtrace());
-        } catch (const std::exception& exception) {
-          error = cells_[k].name + ": " + OneLine(exception.what());
-        }
-        if (error.empty()) continue;
-        const std::lock_guard<std::mutex> lock(mutex_);
-        if (error_.empty()) error_ = error;
-        next = cells_.size();
+      std::string error;
+      try {
+        error = Make(cells_[k], &watch);
+      } catch (const c10::Error& exception) {
+        error = cells_[k].name + ": " + OneLine(exception.what_without_backtrace());
+      } catch (const std::exception& exception) {
+        error = cells_[k].name + ": " + OneLine(exception.what());
       }
+      if (!error.empty()) throw std::runtime_error(error);
     };
-    {
-      std::vector<std::jthread> others;
-      for (int k = 1; k < FLAGS_jobs; ++k) others.emplace_back(work);
-      work();
+    // After an error no further cell is begun.
+    try {
+      pool.Run(cells_.size(), FLAGS_jobs, work);
+    } catch (const std::exception& exception) {
+      return exception.what();
     }
-    return error_;
+    return "";
   }
 
   /// Of all cells; false, with one line, where a file has none.
@@ -184,8 +181,7 @@ class Study {
 
   std::vector<StudyCell> cells_;
   std::map<DiscKind, StudyData> data_;
-  std::mutex mutex_, data_mutex_;
-  std::string error_;
+  std::mutex data_mutex_;
 };
 
 // Rows of pictures of the cells that have some: the true ones once, then those of each cell. False,

@@ -30,8 +30,8 @@ void AssembleCorrection(const Model<T>& model, const State<T>& state,
 }
 
 #define TANGIBLE_INSTANTIATE(T)                                                              \
-  template void AssembleFree<T>(const Model<T>&, const State<T>&, double, double,            \
-                                ContactProblem<T>*, AssemblyScratch<T>*);                    \
+  template void AssembleWithoutContacts<T>(const Model<T>&, const State<T>&, double, double, \
+                                           ContactProblem<T>*, AssemblyScratch<T>*);         \
   template void AssembleContacts<T>(                                                         \
       const Model<T>&, const State<T>&, double, const std::vector<ActiveContact>&,           \
       const std::vector<CoefficientSource>&, const std::vector<CoefficientSource>&,          \

@@ -54,11 +54,11 @@ struct AssemblyScratch {
 /// With h = 0 the problem is that of an impact: an instant in which no force, spring or damper
 /// acts. Allocates nothing once its vectors have grown.
 template <typename T>
-void AssembleFree(const Model<T>& model, const State<T>& state, double t, double h,
-                  ContactProblem<T>* problem, AssemblyScratch<T>* scratch);
+void AssembleWithoutContacts(const Model<T>& model, const State<T>& state, double t, double h,
+                             ContactProblem<T>* problem, AssemblyScratch<T>* scratch);
 
 /// Adds the blocks of the contacts, with the given coefficients (one source for each contact).
-/// `scratch` is that of AssembleFree at the same state.
+/// `scratch` is that of AssembleWithoutContacts at the same state.
 template <typename T>
 void AssembleContacts(const Model<T>& model, const State<T>& state, double h,
                       const std::vector<ActiveContact>& contacts,

@@ -230,8 +230,8 @@ class ProblemBuilder {
 }  // namespace internal
 
 template <typename T>
-void AssembleFree(const Model<T>& model, const State<T>& state, double t, double h,
-                  ContactProblem<T>* problem, AssemblyScratch<T>* scratch) {
+void AssembleWithoutContacts(const Model<T>& model, const State<T>& state, double t, double h,
+                             ContactProblem<T>* problem, AssemblyScratch<T>* scratch) {
   Instant<T> instant;
   instant.t = t;
   instant.h = h;

@@ -125,8 +125,7 @@ T EvaluateCoefficient(const CoefficientSource& source, const std::vector<T>& num
   return value;
 }
 
-/// Geometry and rows of a contact at a state, with c_n and c_t; `h` is the step. The twists of
-/// bodies that forces do not move enter c.
+/// Geometry of a contact at a state, and its rows on the twists of both bodies.
 template <typename T>
 struct ContactRows {
   ContactGeometry<T> geometry;

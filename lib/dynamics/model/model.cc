@@ -8,6 +8,7 @@
 #include "tangible/dynamics/model/initial_state_inl.h"
 #include "tangible/dynamics/model/model_seams.h"
 #include "tangible/geometry/mass_properties.h"
+#include "tangible/math/disjoint_sets.h"
 
 namespace tangible {
 namespace {
@@ -122,21 +123,11 @@ void AddJoints(const BasicScene<T>& scene, Places* places, ModelStructure* struc
   std::sort(structure->joined.begin(), structure->joined.end());
   // All fixed bodies are one node of the graph; a joint that closes a cycle may have dependent
   // rows.
-  std::vector<int> root(structure->num_bodies());
-  for (int i = 0; i < structure->num_bodies(); ++i) {
-    root[i] = structure->bodies[i].block >= 0 ? i : world;
-  }
-  const auto find = [&](int i) {
-    while (root[i] != i) {
-      i = root[i];
-    }
-    return i;
-  };
+  DisjointSets nodes;
+  nodes.AddAll(structure->bodies.size());
+  const auto node = [&](int body) { return structure->bodies[body].block >= 0 ? body : world; };
   for (const JointIndex& joint : structure->joints) {
-    const int a = find(joint.a);
-    const int b = find(joint.b);
-    structure->joint_loops = structure->joint_loops || a == b;
-    root[a] = b;
+    if (!nodes.Join(node(joint.a), node(joint.b))) structure->joint_loops = true;
   }
 }
 

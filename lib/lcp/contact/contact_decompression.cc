@@ -104,7 +104,6 @@ ContactSolverReport DecompressionSolver::Solve(const ContactSolverOptions& optio
   if (SolveByModeChanges(options, problem, solution, &report)) {
     report.solved = true;
     report.rung = Rung::kModeChanges;
-    report.solved_by = MethodOf(report.rung);
     return finish();
   }
   report.fallbacks.dense += FitsDensePortfolio(*problem) ? 1 : 0;
@@ -116,7 +115,6 @@ ContactSolverReport DecompressionSolver::Solve(const ContactSolverOptions& optio
     if (SolveByModeChanges(options, problem, solution, &report)) {
       report.solved = true;
       report.rung = Rung::kDense;
-      report.solved_by = MethodOf(report.rung);
     }
   }
   return finish();

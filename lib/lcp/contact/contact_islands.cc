@@ -18,43 +18,21 @@ IslandSolver::IslandSolver(int threads) : pool_(threads) {
   }
 }
 
-int IslandSolver::Root(int body) {
-  while (parent_[body] != body) {
-    parent_[body] = parent_[parent_[body]];
-    body = parent_[body];
-  }
-  return body;
-}
-
-// The smaller root remains the root, so that an island's root is its first body.
-void IslandSolver::Join(int a, int b) {
-  if (a < 0 || b < 0) {
-    return;
-  }
-  const int root_a = Root(a);
-  const int root_b = Root(b);
-  parent_[std::max(root_a, root_b)] = std::min(root_a, root_b);
-}
-
 int IslandSolver::Partition(const ContactProblem<double>& problem) {
   const int n = problem.num_bodies;
-  parent_.resize(n);
-  for (int i = 0; i < n; ++i) {
-    parent_[i] = i;
-  }
-  for (const DamperBlock<double>& damper : problem.dampers) {
-    Join(damper.a, damper.b);
-  }
-  for (const JointBlock<double>& joint : problem.joints) {
-    Join(joint.a, joint.b);
-  }
-  for (const ContactBlock<double>& contact : problem.contacts) {
-    Join(contact.a, contact.b);
-  }
+  bodies_.AddAll(n);
+  const auto join = [&](const auto& blocks) {
+    for (const auto& block : blocks) {
+      if (block.a >= 0 && block.b >= 0) bodies_.Join(block.a, block.b);
+    }
+  };
+  join(problem.dampers);
+  join(problem.joints);
+  join(problem.contacts);
   has_contact_.assign(n, 0);
   count_ = 0;
   for (const ContactBlock<double>& contact : problem.contacts) {
-    char& has = has_contact_[Root(std::max(contact.a, contact.b))];
+    char& has = has_contact_[bodies_.Root(std::max(contact.a, contact.b))];
     count_ += has == 0 ? 1 : 0;
     has = 1;
   }
@@ -69,7 +47,7 @@ void IslandSolver::Clear(Island* island) {
 }
 
 IslandSolver::Island* IslandSolver::IslandOf(int a, int b) {
-  const int root = Root(std::max(a, b));
+  const int root = bodies_.Root(std::max(a, b));
   return has_contact_[root] != 0 ? island_of_first_[root].get() : &rest_;
 }
 
@@ -82,7 +60,7 @@ void IslandSolver::ListIslands(const ContactProblem<double>& problem) {
   islands_.clear();
   Clear(&rest_);
   for (int body = 0; body < n; ++body) {
-    if (Root(body) == body && has_contact_[body] != 0) {
+    if (bodies_.Root(body) == body && has_contact_[body] != 0) {
       if (!island_of_first_[body]) {
         island_of_first_[body] = std::make_unique<Island>();
       }
@@ -200,7 +178,7 @@ bool IslandSolver::Solve(const ContactProblem<double>& problem, const ContactSol
   for (const Island* island : islands_) {
     const ContactSolverReport& of = island->report;
     report->solved = report->solved && of.solved;
-    report->solved_by = std::max(report->solved_by, of.solved_by);
+    report->rung = std::max(report->rung, of.rung);
     report->factorisations = std::max(report->factorisations, of.factorisations);
     report->iterations = std::max(report->iterations, of.iterations);
     report->fallbacks.Add(of.fallbacks);

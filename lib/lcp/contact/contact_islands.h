@@ -14,6 +14,7 @@
 
 #include "tangible/lcp/contact/contact_solver.h"
 #include "tangible/lcp/contact/worker_pool.h"
+#include "tangible/math/disjoint_sets.h"
 
 namespace tangible {
 
@@ -45,8 +46,6 @@ class IslandSolver {
     ContactSolver solver;
   };
 
-  int Root(int body);
-  void Join(int a, int b);
   Island* IslandOf(int a, int b);
   static void Clear(Island* island);
   void ListIslands(const ContactProblem<double>& problem);
@@ -57,7 +56,7 @@ class IslandSolver {
   WorkerPool pool_;
   std::vector<std::unique_ptr<Worker>> workers_;
   int count_ = 0;
-  std::vector<int> parent_;
+  DisjointSets bodies_;
   std::vector<char> has_contact_;  // for each root
   std::vector<int> place_;         // index of each body within its island
   std::vector<std::unique_ptr<Island>> island_of_first_;

@@ -54,23 +54,6 @@ const char* NameOf(Rung rung) {
   return "none";
 }
 
-SolvedBy MethodOf(Rung rung) {
-  switch (rung) {
-    case Rung::kNone:
-      return SolvedBy::kNothing;
-    case Rung::kDirect:
-      return SolvedBy::kDirect;
-    case Rung::kModeChanges:
-    case Rung::kPivotingFromGuess:
-      return SolvedBy::kGuess;
-    case Rung::kInteriorPoint:
-    case Rung::kPivotingFromInteriorPoint:
-      return SolvedBy::kInteriorPoint;
-    default:
-      return SolvedBy::kLemke;
-  }
-}
-
 void ContactFallbacks::Add(const ContactFallbacks& other) {
   pivoting += other.pivoting;
   interior_point += other.interior_point;
@@ -284,7 +267,7 @@ bool ContactSolver::SolveByLemke(const ContactProblem<double>& problem,
                                  const ContactSolverOptions& options,
                                  ContactSolution<double>* solution, ContactSolverReport* report) {
   int iterations = 0;
-  if (options.choice == ContactSolverChoice::kLemke) {
+  if (options.choice == SolverChoice::kLemke) {
     const bool by_lemke = SolveContactsByLemke(problem, solution, &iterations);
     report->iterations += iterations;
     if (!by_lemke) {
@@ -331,7 +314,6 @@ ContactSolverReport ContactSolver::RunPortfolio(const ContactProblem<double>& pr
   const auto done = [&](Rung rung) {
     report.solved = true;
     report.rung = rung;
-    report.solved_by = MethodOf(rung);
     return report;
   };
   const auto failed = [&] {
@@ -351,7 +333,7 @@ ContactSolverReport ContactSolver::RunPortfolio(const ContactProblem<double>& pr
     return failed();
   }
   entry_ = *solution;
-  const bool any = options.choice == ContactSolverChoice::kAuto;
+  const bool any = options.choice == SolverChoice::kAuto;
   if (any && SolveByModeChanges(problem, options, solution, &report)) {
     return done(Rung::kModeChanges);
   }
@@ -367,11 +349,11 @@ ContactSolverReport ContactSolver::RunPortfolio(const ContactProblem<double>& pr
     *solution = entry_;
     ++report.fallbacks.interior_point;
   }
-  if (options.choice != ContactSolverChoice::kLemke &&
+  if (options.choice != SolverChoice::kLemke &&
       SolveByInteriorPoint(problem, options, solution, &report)) {
     return done(report.rung);
   }
-  if (options.choice != ContactSolverChoice::kInteriorPoint) {
+  if (options.choice != SolverChoice::kInteriorPoint) {
     *solution = entry_;
     report.fallbacks.lemke += any ? 1 : 0;
     if (SolveByPivoting(problem, options, ContactPivoting::From::kOpen,
@@ -380,7 +362,7 @@ ContactSolverReport ContactSolver::RunPortfolio(const ContactProblem<double>& pr
       return done(Rung::kPivotingFromOpen);
     }
   }
-  if (options.choice != ContactSolverChoice::kInteriorPoint &&
+  if (options.choice != SolverChoice::kInteriorPoint &&
       SolveByLemke(problem, options, solution, &report)) {
     return done(report.rung);
   }

@@ -30,6 +30,7 @@
 #include "tangible/lcp/contact/contact_interior_point.h"
 #include "tangible/lcp/contact/contact_pivoting.h"
 #include "tangible/lcp/contact/tolerances.h"
+#include "tangible/lcp/dense/solver_choice.h"
 #include "tangible/lcp/dense/tolerances.h"
 #include "tangible/lcp/system/contact_problem.h"
 #include "tangible/lcp/system/contact_residual.h"
@@ -38,10 +39,7 @@
 
 namespace tangible {
 
-enum class ContactSolverChoice { kAuto, kInteriorPoint, kLemke };
-enum class SolvedBy : unsigned char { kNothing, kDirect, kGuess, kInteriorPoint, kLemke };
-
-/// The part of the portfolio that solved a problem.
+/// The part of the portfolio that solved a problem, in the order in which they are tried.
 enum class Rung : unsigned char {
   kNone,
   kDirect,                     ///< no contacts: one linear system
@@ -54,14 +52,13 @@ enum class Rung : unsigned char {
   kDense,                      ///< the dense portfolio
   kLemke                       ///< Lemke's method on the dense form, where it is asked for
 };
+inline constexpr size_t kNumRungs = static_cast<size_t>(Rung::kLemke) + 1;
 
 /// "pivoting_from_guess", ...; "none".
 const char* NameOf(Rung rung);
-/// The method under which summaries count a rung.
-SolvedBy MethodOf(Rung rung);
 
 struct ContactSolverOptions {
-  ContactSolverChoice choice = ContactSolverChoice::kAuto;
+  SolverChoice choice = SolverChoice::kAuto;
   double tolerance = kLcpTolerance;  ///< largest scaled natural residual
   int max_iterations = 100;          ///< limit of iterations of the interior point
 };
@@ -84,7 +81,6 @@ struct ContactFallbacks {
 
 struct ContactSolverReport {
   bool solved = false;
-  SolvedBy solved_by = SolvedBy::kNothing;
   Rung rung = Rung::kNone;
   int factorisations = 0;  ///< number of factorised mode systems
   int iterations = 0;      ///< number of iterations of the interior point or Lemke

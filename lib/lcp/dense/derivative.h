@@ -24,7 +24,7 @@
 // contracted with such perturbations. At a kink the derivative is the element of the generalised
 // Jacobian that the central path selects. The certificate reports both cases.
 
-#include "tangible/lcp/dense/certificate.h"
+#include "tangible/lcp/certificate/certificate.h"
 #include "tangible/lcp/dense/mode_system.h"
 #include "tangible/lcp/dense/problem.h"
 #include "tangible/lcp/dense/row_modes.h"

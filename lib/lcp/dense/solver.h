@@ -10,8 +10,8 @@
 // recomputed from the data (problem.h).
 
 #include "tangible/lcp/dense/problem.h"
+#include "tangible/lcp/dense/solver_choice.h"
 #include "tangible/lcp/dense/tolerances.h"
-#include "tangible/math/solver_choice.h"
 
 namespace tangible {
 

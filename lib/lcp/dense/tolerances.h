@@ -41,12 +41,6 @@ inline constexpr double kSingularMatrix = 1e-14;
 inline constexpr double kRankTolerance = 1e-12;
 /// Of the largest pivot: rank decisions in the elimination of (v, y), which is refined once.
 inline constexpr double kReducedRank = 1e-13;
-/// Of the scale of the row: margins below it are reported as near a kink.
-inline constexpr double kNearKinkMargin = 1e-6;
-/// Of the largest entry: derivatives whose tangent and adjoint differ by more are not trustworthy:
-/// the error of an entry may be ten times the difference of the whole, and each entry has to be
-/// right to 1e-9.
-inline constexpr double kLinearResidualLimit = 1e-10;
 /// Of the right-hand side: equations with a larger residual contradict each other.
 inline constexpr double kConsistent = 1e-9;
 /// Of the norm of the matrix times that of its target: a gradient below it counts as 0.

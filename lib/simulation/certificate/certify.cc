@@ -331,8 +331,8 @@ Certificate RolloutCertifier::Finish(const Model<double>& model, const RolloutRe
   AddForceWindows(model);
   certificate_.mode_switches = static_cast<int>(report.mode_switches);
   certificate_.events = static_cast<int>(report.events);
-  certificate_.fallbacks = static_cast<int>(
-      report.given_up.total() + report.solved_by_interior_point + report.solved_by_lemke);
+  certificate_.fallbacks = static_cast<int>(report.given_up.total() +
+                                            report.SolvedBy(Rung::kInteriorPoint, Rung::kLemke));
   if (jump_margin_ < kNearJumpMargin) {
     certificate_.discontinuous = jump_where_;
   } else {

@@ -35,7 +35,7 @@
 #include <string>
 #include <vector>
 
-#include "tangible/lcp/dense/certificate.h"
+#include "tangible/lcp/certificate/certificate.h"
 #include "tangible/simulation/certificate/discrete_map.h"
 #include "tangible/simulation/stepping/coordinate_watch.h"
 #include "tangible/simulation/stepping/rollout.h"

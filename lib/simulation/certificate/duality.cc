@@ -54,7 +54,7 @@ class RunExtents {
 void RunExtents::Add(long k, double t, const State<double>& state, const RowMatrixXd& w_dot) {
   const ModelStructure& s = *model_.structure;
   if (k < NumSteps(s.settings)) {
-    AssembleFree(model_, state, t, StepLength(s.settings, k), &problem_, &scratch_);
+    AssembleWithoutContacts(model_, state, t, StepLength(s.settings, k), &problem_, &scratch_);
   }
   for (size_t block = 0; block < radius_.size(); ++block) {
     const int body = s.moving[block];

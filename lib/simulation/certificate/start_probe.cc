@@ -113,7 +113,7 @@ class Course {
            part.is_impulses ? part.impulses.contacts : part.segment.contacts) {
         if (contact.joint >= 0) continue;
         const double slip = std::abs(SpeedsOf(model, before, contact).slip);
-        if (std::abs(SpeedsOf(model, after, contact).slip) <= kStops * slip) {
+        if (std::abs(SpeedsOf(model, after, contact).slip) <= kEndedSlip * slip) {
           jams_.emplace_back(island.InWhole(contact), slip);
         }
       }
@@ -167,7 +167,8 @@ class Probe {
     StartFinding found;
     const double speed = std::max(kLeaves * std::sqrt(2.0 * acceleration_ * touch_),
                                   kOfStep * acceleration_ * model_.structure->settings.dt);
-    if (!(acceleration_ > 0.0) || !(speed_ > kThrows * fastest_) || !Allowed(speed / speed_)) {
+    if (!(acceleration_ > 0.0) || !(speed_ > kOpeningSpeed * fastest_) ||
+        !Allowed(speed / speed_)) {
       return found;
     }
     for (const double sign : {1.0, -1.0}) {
@@ -244,7 +245,7 @@ class Probe {
                                  of_whole.cwiseAbs().maxCoeff() / std::abs(shift));
     const double noise =
         kNoise * (touch_ / time + kSpeedRounding * base.cwiseAbs().maxCoeff()) / std::abs(shift);
-    if (!(apart > std::max(kApart * size, noise))) {
+    if (!(apart > std::max(kLeastKink * size, noise))) {
       return {};
     }
     const bool jumps = of_half.cwiseAbs().maxCoeff() > kJumps * of_whole.cwiseAbs().maxCoeff();

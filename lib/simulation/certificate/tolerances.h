@@ -54,7 +54,7 @@ inline constexpr double kAtRest = 1e-6;
 inline constexpr double kOfStep = 1e-3;
 /// Of the largest entry of the derivative: the error allowed in extrapolated quotients of a smooth
 /// map: smaller kinks are not detected.
-inline constexpr double kApart = 1e-2;
+inline constexpr double kLeastKink = 1e-2;
 /// Of the touching tolerance over the time, and rounding: the noise of poses that end within the
 /// tolerance.
 inline constexpr double kNoise = 3.0;
@@ -62,10 +62,10 @@ inline constexpr double kNoise = 3.0;
 inline constexpr double kSpeedRounding = 1e-13;
 /// Of the speed of the fastest body: a direction that changes a contact's speed by a smaller
 /// fraction of this does not open it.
-inline constexpr double kThrows = 1e-4;
+inline constexpr double kOpeningSpeed = 1e-4;
 /// Of the parameter, at least 1: the largest change of a parameter.
 inline constexpr double kOfParameter = 1e-3;
 /// Of the slip as it was: a smaller slip counts as ended.
-inline constexpr double kStops = 1e-6;
+inline constexpr double kEndedSlip = 1e-6;
 
 }  // namespace tangible

@@ -10,6 +10,7 @@
 
 #include <vector>
 
+#include "tangible/math/disjoint_sets.h"
 #include "tangible/simulation/events/event_record.h"
 
 namespace tangible {
@@ -21,17 +22,14 @@ class CoupledBodies {
   void Connect(const ModelStructure& structure, const std::vector<ActiveContact>& contacts);
 
   /// The same number for all bodies that are connected; −1 for those that no impulse moves.
-  int GroupOf(int body) { return parent_[body] < 0 ? -1 : Root(body); }
+  int GroupOf(int body) { return moving_.Has(body) ? moving_.Root(body) : -1; }
   /// The group of the contact's bodies, of which at least one moves.
   int GroupOf(const ActiveContact& contact) {
-    return parent_[contact.a] >= 0 ? Root(contact.a) : GroupOf(contact.b);
+    return GroupOf(moving_.Has(contact.a) ? contact.a : contact.b);
   }
 
  private:
-  int Root(int body);
-  void Join(int a, int b);
-
-  std::vector<int> parent_;  ///< −1: fixed or kinematic
+  DisjointSets moving_;
 };
 
 }  // namespace tangible

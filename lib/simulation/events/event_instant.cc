@@ -156,9 +156,7 @@ void CountSolve(const ContactSolverReport& solved, EventOutcome* outcome) {
   outcome->iterations += solved.iterations;
   outcome->solver.Add(solved.fallbacks);
   outcome->residual = std::max(outcome->residual, solved.solved ? solved.residual : 0.0);
-  outcome->by_guess = outcome->by_guess && solved.solved_by != SolvedBy::kInteriorPoint &&
-                      solved.solved_by != SolvedBy::kLemke;
-  outcome->by_lemke = outcome->by_lemke || solved.solved_by == SolvedBy::kLemke;
+  outcome->rung = std::max(outcome->rung, solved.rung);
 }
 
 std::string NameOfContact(const ModelStructure& structure,

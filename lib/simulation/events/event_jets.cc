@@ -103,7 +103,7 @@ class EventReplay {
                      ContactSolution<T>* solution) {
     ContactProblem<T> problem;
     AssemblyScratch<T> scratch;
-    AssembleFree(model_, state, impulses->time, impulses->h, &problem, &scratch);
+    AssembleWithoutContacts(model_, state, impulses->time, impulses->h, &problem, &scratch);
     AssembleContacts(model_, state, impulses->h, impulses->contacts, impulses->friction,
                      impulses->restitution, &scratch, &problem);
     if (impulses->decompression) {

@@ -270,7 +270,7 @@ void EventSearch::FindPairs(const Model<double>& model) {
     const double before = SpeedOf(&segment_->before.twist[3 * body], lengths_.radius(body));
     const double after =
         end.good ? SpeedOf(&end.motion.after.twist[3 * body], lengths_.radius(body)) : before;
-    closing_[body] = BoundOnSpeed(before, after);
+    closing_[body] = LargestSpeedBetween(before, after);
     const double reach = closing_[body] * segment_->length +
                          kWiderBoxes * lengths_.smallest_radius() +
                          lengths_.Rounding(segment_->before, body, body);

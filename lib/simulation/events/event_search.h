@@ -25,8 +25,11 @@
 
 namespace tangible {
 
-/// A bound on the speed of a body's points over a motion, from its speeds at both ends, m/s.
-inline double BoundOnSpeed(double before, double after) {
+/// The speed within which a body's points are taken to stay over a motion, from their speeds at
+/// both ends, m/s. With a constant acceleration it is the larger of them; a quarter of their
+/// difference and 2 % are added for one that changes. Motions that are faster in between exist, so
+/// that it is no bound: islands are checked by the distance travelled too (island_step.cc).
+inline double LargestSpeedBetween(double before, double after) {
   return 1.02 * std::max(before, after) + 0.25 * std::abs(after - before);
 }
 

@@ -57,16 +57,15 @@ struct EventOutcome {
   int iterations = 0;
   double residual = 0.0;
   double impact_energy_gain = 0.0;  ///< J, the largest of an impact
-  bool by_guess = true;             ///< whether the modes of the last segment were right everywhere
-  bool by_lemke = false;
-  ContactFallbacks solver;  ///< fallbacks of its solves and motions
-  int newton_stages = 0;    ///< implicit stages whose iteration does not contract
-  int halved_motions = 0;   ///< that could not be integrated over the rest of the step
-  int ellipse_motions = 0;  ///< shortened because an ellipse turns over its contact point
-  int pairs_compared = 0;   ///< boxes compared by the broad phase of its last search for events
-  int pairs_near = 0;       ///< pairs whose boxes overlap, in that search
-  int islands = 0;          ///< stepped apart; 0: all bodies are one
-  bool stopped = false;     ///< before its end (AtEvent::kStopAtSecond)
+  Rung rung = Rung::kNone;          ///< the last in order that any of its solves needed
+  ContactFallbacks solver;          ///< fallbacks of its solves and motions
+  int newton_stages = 0;            ///< implicit stages whose iteration does not contract
+  int halved_motions = 0;           ///< that could not be integrated over the rest of the step
+  int ellipse_motions = 0;          ///< shortened because an ellipse turns over its contact point
+  int pairs_compared = 0;  ///< boxes compared by the broad phase of its last search for events
+  int pairs_near = 0;      ///< pairs whose boxes overlap, in that search
+  int islands = 0;         ///< stepped apart; 0: all bodies are one
+  bool stopped = false;    ///< before its end (AtEvent::kStopAtSecond)
 };
 
 /// Whether a step goes on however many events end its segments, or stops at the second one.

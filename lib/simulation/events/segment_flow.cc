@@ -135,7 +135,8 @@ std::string NameOfContradicted(const ModelStructure& structure, int joint) {
 
 void AssembleImpulses(const Model<double>& model, AssemblyScratch<double>* scratch,
                       Impulses* impulses) {
-  AssembleFree(model, impulses->before, impulses->time, impulses->h, &impulses->problem, scratch);
+  AssembleWithoutContacts(model, impulses->before, impulses->time, impulses->h, &impulses->problem,
+                          scratch);
   AssembleContacts(model, impulses->before, impulses->h, impulses->contacts, impulses->friction,
                    impulses->restitution, scratch, &impulses->problem);
 }

@@ -22,20 +22,11 @@
 #include <vector>
 
 #include "tangible/dynamics/model/parameter_map.h"
-#include "tangible/lcp/dense/certificate.h"
+#include "tangible/lcp/certificate/certificate.h"
 #include "tangible/simulation/derivatives/rollout_adjoint.h"
+#include "tangible/simulation/gradient/derivative_method.h"
 
 namespace tangible {
-
-enum class GradientMethod { kAuto, kAdjoint, kTangent, kJet, kJetImplicit, kFiniteDifference };
-
-inline constexpr std::pair<const char*, GradientMethod> kGradientMethodNames[] = {
-    {"auto", GradientMethod::kAuto},
-    {"adjoint", GradientMethod::kAdjoint},
-    {"tangent", GradientMethod::kTangent},
-    {"jet", GradientMethod::kJet},
-    {"jet_implicit", GradientMethod::kJetImplicit},
-    {"finite_difference", GradientMethod::kFiniteDifference}};
 
 enum class CertificatePass { kRun, kSkip };
 

@@ -18,7 +18,6 @@ constexpr double kRoom = 1.5;
 
 IslandPartition::IslandPartition(const Model<double>& model) : lengths_(model), islands_(1) {
   const ModelStructure& structure = *model.structure;
-  parent_.resize(structure.bodies.size());
   busy_.resize(structure.bodies.size());
   expects_.resize(structure.bodies.size());
   island_of_.resize(structure.bodies.size(), -1);
@@ -27,41 +26,30 @@ IslandPartition::IslandPartition(const Model<double>& model) : lengths_(model), 
   Connect(structure);
   bool is_apart = false;
   for (const int body : structure.moving) {
-    is_apart = is_apart || Root(body) != Root(structure.moving[0]);
+    is_apart = is_apart || moving_.Root(body) != moving_.Root(structure.moving[0]);
   }
   may_divide_ = is_apart && IsDivisible(structure);
-}
-
-int IslandPartition::Root(int body) {
-  while (parent_[body] != body) {
-    parent_[body] = parent_[parent_[body]];
-    body = parent_[body];
-  }
-  return body;
 }
 
 // Connects two bodies of which at least one moves.
 void IslandPartition::Join(int a, int b) {
   for (const int body : {a, b}) {
-    if (parent_[body] >= 0) busy_[body] = 1;
+    if (moving_.Has(body)) busy_[body] = 1;
   }
-  if (parent_[a] < 0 || parent_[b] < 0) {
-    if (parent_[a] >= 0 || parent_[b] >= 0) {
-      given_.emplace_back(parent_[a] >= 0 ? a : b, parent_[a] >= 0 ? b : a);
-    }
-    return;
+  if (moving_.Has(a) && moving_.Has(b)) {
+    moving_.Join(a, b);
+  } else if (moving_.Has(a) || moving_.Has(b)) {
+    given_.emplace_back(moving_.Has(a) ? a : b, moving_.Has(a) ? b : a);
   }
-  a = Root(a);
-  b = Root(b);
-  parent_[std::max(a, b)] = std::min(a, b);
 }
 
 // Connects the bodies of joints and springs.
 void IslandPartition::Connect(const ModelStructure& structure) {
   given_.clear();
   std::fill(busy_.begin(), busy_.end(), 0);
-  for (int body = 0; body < structure.num_bodies(); ++body) {
-    parent_[body] = structure.bodies[body].block >= 0 ? body : -1;
+  moving_.Clear(structure.bodies.size());
+  for (const int body : structure.moving) {
+    moving_.Add(body);
   }
   for (const JointIndex& joint : structure.joints) {
     Join(joint.a, joint.b);
@@ -78,7 +66,7 @@ double IslandPartition::SpeedOf(int body, const double* twist) const {
 void IslandPartition::FindReach(const Model<double>& model, const State<double>& state, double t,
                                 double h) {
   const ModelStructure& structure = *model.structure;
-  AssembleFree(model, state, t, h, &free_, &scratch_);
+  AssembleWithoutContacts(model, state, t, h, &free_, &scratch_);
   for (int body = 0; body < structure.num_bodies(); ++body) {
     double speed = SpeedOf(body, &state.twist[3 * body]);
     if (const int block = structure.bodies[body].block; block >= 0) {
@@ -119,9 +107,9 @@ void IslandPartition::Divide(const Model<double>& model, const State<double>& st
   }
   std::fill(expects_.begin(), expects_.end(), 0);
   for (const auto& [a, b] : pairs_) {
-    const int body = parent_[a] >= 0 ? a : b;
+    const int body = moving_.Has(a) ? a : b;
     if (!std::binary_search(closed_.begin(), closed_.end(), std::make_pair(a, b))) {
-      expects_[Root(body)] = 1;
+      expects_[moving_.Root(body)] = 1;
     }
   }
 }
@@ -130,7 +118,7 @@ void IslandPartition::List(const ModelStructure& structure, Together together) {
   num_islands_ = 1;
   islands_[0].clear();
   for (const int body : structure.moving) {
-    const int root = Root(body);
+    const int root = moving_.Root(body);
     if (root == body) {  // the first body of its island
       const bool is_apart = together == Together::kWithout ? busy_[body] != 0 : expects_[body] != 0;
       island_of_[body] = is_apart ? num_islands_++ : 0;

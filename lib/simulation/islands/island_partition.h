@@ -21,6 +21,7 @@
 #include "tangible/dynamics/assembly/assembly.h"
 #include "tangible/dynamics/model/lengths.h"
 #include "tangible/geometry/broad_phase.h"
+#include "tangible/math/disjoint_sets.h"
 #include "tangible/simulation/events/event_step.h"
 
 namespace tangible {
@@ -58,7 +59,6 @@ class IslandPartition {
   int num_compared() const { return broad_phase_.num_compared(); }
 
  private:
-  int Root(int body);
   void Join(int a, int b);
   void Connect(const ModelStructure& structure);
 
@@ -66,7 +66,8 @@ class IslandPartition {
   bool may_divide_ = false;
   int num_islands_ = 0;
   std::vector<std::vector<int>> islands_;
-  std::vector<int> island_of_, parent_;
+  std::vector<int> island_of_;
+  DisjointSets moving_;
   // Of each body: whether something can touch it, or a joint or spring holds it; and whether, in
   // its island, something may touch that does not touch now.
   std::vector<char> busy_, expects_;

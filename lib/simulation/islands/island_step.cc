@@ -20,8 +20,7 @@ void AddOutcome(const EventOutcome& island, EventOutcome* sum) {
   sum->iterations += island.iterations;
   sum->residual = std::max(sum->residual, island.residual);
   sum->impact_energy_gain = std::max(sum->impact_energy_gain, island.impact_energy_gain);
-  sum->by_guess = sum->by_guess && island.by_guess;
-  sum->by_lemke = sum->by_lemke || island.by_lemke;
+  sum->rung = std::max(sum->rung, island.rung);
   sum->solver.Add(island.solver);
   sum->newton_stages += island.newton_stages;
   sum->halved_motions += island.halved_motions;
@@ -222,10 +221,11 @@ bool IslandStepper::KeepsReach(const IslandRecord& island) {
       for (int i = 0; i < 3; ++i) {
         moved[i] = segment.after.pose[3 * k + i] - segment.before.pose[3 * k + i];
       }
-      travelled_[k] += std::max(
-          partition_.SpeedOf(body, moved),
-          segment.length * BoundOnSpeed(partition_.SpeedOf(body, &segment.before.twist[3 * k]),
-                                        partition_.SpeedOf(body, &segment.after.twist[3 * k])));
+      travelled_[k] +=
+          std::max(partition_.SpeedOf(body, moved),
+                   segment.length *
+                       LargestSpeedBetween(partition_.SpeedOf(body, &segment.before.twist[3 * k]),
+                                           partition_.SpeedOf(body, &segment.after.twist[3 * k])));
     }
   }
   for (const int k : part.structure->moving) {

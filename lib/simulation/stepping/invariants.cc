@@ -4,12 +4,12 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numeric>
 
 #include "tangible/dynamics/elements/force.h"
 #include "tangible/dynamics/model/lengths.h"
 #include "tangible/geometry/broad_phase.h"
 #include "tangible/geometry/collide.h"
+#include "tangible/math/disjoint_sets.h"
 #include "tangible/simulation/stepping/tolerances.h"
 
 namespace tangible {
@@ -127,19 +127,11 @@ void AddClosedContacts(const StepRecord& record, std::vector<std::pair<int, int>
 
 int CountIslands(const ModelStructure& structure, const std::pair<int, int>* closed,
                  size_t num_closed) {
-  std::vector<int> parent(structure.num_blocks());
-  std::iota(parent.begin(), parent.end(), 0);
-  const auto root = [&](int i) {
-    while (parent[i] != i) {
-      parent[i] = parent[parent[i]];
-      i = parent[i];
-    }
-    return i;
-  };
+  DisjointSets blocks;
+  blocks.AddAll(structure.num_blocks());
+  int islands = structure.num_blocks();
   const auto join = [&](int a, int b) {
-    if (a >= 0 && b >= 0) {
-      parent[root(a)] = root(b);
-    }
+    if (a >= 0 && b >= 0 && blocks.Join(a, b)) --islands;
   };
   for (const SpringIndex& spring : structure.springs) {
     join(structure.bodies[spring.a].block, structure.bodies[spring.b].block);
@@ -149,10 +141,6 @@ int CountIslands(const ModelStructure& structure, const std::pair<int, int>* clo
   }
   for (size_t i = 0; i < num_closed; ++i) {
     join(structure.bodies[closed[i].first].block, structure.bodies[closed[i].second].block);
-  }
-  int islands = 0;
-  for (int i = 0; i < structure.num_blocks(); ++i) {
-    islands += parent[i] == i ? 1 : 0;
   }
   return islands;
 }

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <sstream>
 
 #include "tangible/dynamics/model/model_seams.h"
@@ -77,10 +78,7 @@ void RolloutReport::Add(const StepReport& step) {
   pairs_compared += step.pairs_compared;
   pairs_near += step.pairs_near;
   beyond_reach += step.beyond_reach;
-  solved_directly += step.solved_by == SolvedBy::kDirect ? 1 : 0;
-  solved_by_guess += step.solved_by == SolvedBy::kGuess ? 1 : 0;
-  solved_by_interior_point += step.solved_by == SolvedBy::kInteriorPoint ? 1 : 0;
-  solved_by_lemke += step.solved_by == SolvedBy::kLemke ? 1 : 0;
+  ++solved_by[static_cast<size_t>(step.rung)];
   events += step.events;
   given_up.Add(step.given_up);
   solver.Add(step.solver);
@@ -93,6 +91,11 @@ void RolloutReport::Add(const StepReport& step) {
   residual_max = std::max(residual_max, step.residual);
   penetration_max = std::max(penetration_max, -step.gap_min);
   impact_energy_gain_max = std::max(impact_energy_gain_max, step.impact_energy_gain);
+}
+
+long RolloutReport::SolvedBy(Rung first, Rung last) const {
+  return std::accumulate(&solved_by[static_cast<size_t>(first)],
+                         &solved_by[static_cast<size_t>(last)] + 1, 0L);
 }
 
 RolloutReport Rollout(ControlledModel<double>* model, const State<double>& initial,

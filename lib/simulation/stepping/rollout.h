@@ -3,6 +3,7 @@
 //
 // Rollouts: many steps from an initial state.
 
+#include <array>
 #include <functional>
 #include <string>
 #include <vector>
@@ -29,13 +30,10 @@ struct RolloutReport {
   long pairs_near = 0;       ///< pairs whose boxes overlap
   long beyond_reach = 0;     ///< of these, without rows (fixed stepping)
   int fixed_numbers = 0;     ///< of the model: with a tangent, those that no column varies
-  long solved_directly = 0;  ///< steps without an inequality, so without an LCP
-  long solved_by_guess = 0;
-  long solved_by_interior_point = 0;
-  long solved_by_lemke = 0;
-  long events = 0;           ///< located within steps (event stepping)
-  EventFallbacks given_up;   ///< event stepping: what it gave up of its own rules
-  ContactFallbacks solver;   ///< what solves leaned on beyond the guess
+  std::array<long, kNumRungs> solved_by{};  ///< steps, by the rung that solved them
+  long events = 0;                          ///< located within steps (event stepping)
+  EventFallbacks given_up;                  ///< event stepping: what it gave up of its own rules
+  ContactFallbacks solver;                  ///< what solves leaned on beyond the guess
   long newton_stages = 0;    ///< event stepping: implicit stages whose iteration does not contract
   long halved_motions = 0;   ///< event stepping: that could not be integrated as a whole
   long ellipse_motions = 0;  ///< event stepping: shortened where an ellipse touches
@@ -50,6 +48,8 @@ struct RolloutReport {
 
   /// Adds a step's report.
   void Add(const StepReport& step);
+  /// Steps that one of these rungs solved, the first and the last included.
+  long SolvedBy(Rung first, Rung last) const;
 };
 
 /// Called with the state at each recorded time: after k steps, at time t. The stepper holds the

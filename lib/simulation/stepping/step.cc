@@ -273,7 +273,7 @@ void Stepper::Describe(const Model<double>& model, int contact, StepReport* repo
 
 void Stepper::FillReport(const Model<double>& model, const ContactSolverReport& solved,
                          StepReport* report) {
-  report->solved_by = solved.solved_by;
+  report->rung = solved.rung;
   report->factorisations = solved.factorisations;
   report->iterations = solved.iterations;
   report->residual = solved.residual;
@@ -406,7 +406,7 @@ StepReport Stepper::Step(const Model<double>& model, double t, double h, State<d
   r.h = h;
   r.before.pose.assign(state->pose.begin(), state->pose.end());
   r.before.twist.assign(state->twist.begin(), state->twist.end());
-  AssembleFree(model, *state, t, h, &r.problem, &scratch_);
+  AssembleWithoutContacts(model, *state, t, h, &r.problem, &scratch_);
   if (!AllFinite(r.problem.load) || !AllFinite(r.problem.mass)) {
     report.status = StepStatus::kDiverged;
     report.message = "a force or momentum is not finite";
@@ -455,7 +455,8 @@ void Stepper::TakeRecord(StepRecord* record, ContactSystem* system) {
 }
 
 bool Stepper::Refactor(const Model<double>& model, StepRecord* record) {
-  AssembleFree(model, record->before, record->time, record->h, &record->problem, &scratch_);
+  AssembleWithoutContacts(model, record->before, record->time, record->h, &record->problem,
+                          &scratch_);
   AssembleContacts(model, record->before, record->h, record->contacts, record->friction,
                    record->restitution, &scratch_, &record->problem);
   factored_ = true;

@@ -31,10 +31,10 @@ enum class StepStatus { kDone, kUnsolved, kDiverged };
 /// The report of a step; the caller sums over the run.
 struct StepReport {
   StepStatus status = StepStatus::kDone;
-  SolvedBy solved_by = SolvedBy::kNothing;
-  int contacts = 0;  ///< contacts and limits listed
-  int closed = 0;    ///< of these, with an impulse
-  int lcp_rows = 0;  ///< complementarity rows: 1 for a frictionless contact or limit, else 3
+  Rung rung = Rung::kNone;  ///< by events: the last in order that any of its solves needed
+  int contacts = 0;         ///< contacts and limits listed
+  int closed = 0;           ///< of these, with an impulse
+  int lcp_rows = 0;         ///< complementarity rows: 1 for a frictionless contact or limit, else 3
   // Counts of what the step left out, in the last search for contacts.
   int pairs_compared = 0;   ///< pairs of boxes that the broad phase compared
   int pairs_near = 0;       ///< pairs whose boxes overlap

@@ -153,10 +153,7 @@ StepReport Stepper::StepByEvents(const Model<double>& model, double t, double h,
   SumImpulses(model);
   r.new_twist = state->twist;
   report.angles_left_out = AnglesLeftOut(events_->record(), &turning_);
-  report.solved_by = r.contacts.empty() ? SolvedBy::kDirect
-                     : outcome.by_lemke ? SolvedBy::kLemke
-                     : outcome.by_guess ? SolvedBy::kGuess
-                                        : SolvedBy::kInteriorPoint;
+  report.rung = r.contacts.empty() ? Rung::kDirect : std::max(outcome.rung, Rung::kModeChanges);
   report.contacts = static_cast<int>(r.contacts.size());
   size_t next = 0;
   for (size_t i = 0; i < r.contacts.size(); ++i) {

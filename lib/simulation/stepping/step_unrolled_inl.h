@@ -16,7 +16,7 @@ template <typename T>
 void AssembleAll(const Model<T>& model, const StepRecord& record, const State<T>& state,
                  ContactProblem<T>* problem) {
   AssemblyScratch<T> scratch;
-  AssembleFree(model, state, record.time, record.h, problem, &scratch);
+  AssembleWithoutContacts(model, state, record.time, record.h, problem, &scratch);
   AssembleContacts(model, state, record.h, record.contacts, record.friction, record.restitution,
                    &scratch, problem);
 }

@@ -21,7 +21,7 @@ struct Assembled {
 Assembled Assemble(const Scene& scene, double t, double h) {
   Assembled a;
   BuildModel(scene, &a.model, &a.state);
-  AssembleFree(a.model, a.state, t, h, &a.problem, &a.scratch);
+  AssembleWithoutContacts(a.model, a.state, t, h, &a.problem, &a.scratch);
   return a;
 }
 
@@ -66,7 +66,7 @@ TEST(AssemblyTest, JointsWithPrescribedTwistsAndDrives) {
                 "damping": 0.4, "effort": 7}]})");
   Assembled a = Assemble(scene, 0.0, 0.1);
   a.state.pose[0] += 0.01;  // drift, which a step does not correct
-  AssembleFree(a.model, a.state, 0.0, 0.1, &a.problem, &a.scratch);
+  AssembleWithoutContacts(a.model, a.state, 0.0, 0.1, &a.problem, &a.scratch);
   const JointBlock<double>& joint = a.problem.joints[0];
   // The anchor of k moves at (0.5, 0.25) + 2 (0, 0.5).
   EXPECT_NEAR(joint.rhs[0], 0.5, 1e-15);

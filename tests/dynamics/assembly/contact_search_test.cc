@@ -22,7 +22,7 @@ Search Find(const Scene& scene) {
   Search s;
   BuildModel(scene, &s.model, &s.state);
   const double h = scene.simulation.dt;
-  AssembleFree(s.model, s.state, 0.0, h, &s.problem, &s.scratch);
+  AssembleWithoutContacts(s.model, s.state, 0.0, h, &s.problem, &s.scratch);
   ContactSearch search(s.model);
   search.SetBounds(s.model, s.state, s.problem, s.scratch);
   search.Find(s.model, s.state, h, s.scratch, &s.contacts, &s.friction, &s.restitution);

@@ -104,7 +104,7 @@ class EquationLevelsTest : public ::testing::TestWithParam<Case> {
     model.parameters.assign(w.begin() + 2 * n, w.end() - 1);
     AssemblyScratch<double> scratch;
     if (GetParam().level == Level::kVelocity) {
-      AssembleFree(model, state, 0.5, kStep, problem, &scratch);
+      AssembleWithoutContacts(model, state, 0.5, kStep, problem, &scratch);
       AssembleContacts(model, state, kStep, contacts_, friction_, restitution_, &scratch, problem);
     } else if (GetParam().level == Level::kCorrection) {
       AssembleCorrection(model, state, contacts_, friction_, 1.0, &scratch, problem);

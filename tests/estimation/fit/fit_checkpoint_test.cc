@@ -206,7 +206,7 @@ TEST(FitCheckpointTest, RefusesWhatIsDamagedOrOfAnotherFit) {
   others[3].observations[3].value += 1e-15;
   others[4].observations.pop_back();
   others[5].options.starts = 4;
-  others[6].options.derivatives = DerivativeMethod::kAdjoint;
+  others[6].options.derivatives = GradientMethod::kAdjoint;
   for (const FitProblem& other : others) {
     const std::string error = refused(text, other);
     EXPECT_NE(error.find("c.json: /problem: a checkpoint of another fit"), std::string::npos)

@@ -31,9 +31,9 @@ TEST(FitTest, RecoversGravityAndDampingOfAFallingBall) {
 TEST(FitTest, RecoversFrictionByEveryMethod) {
   const Scene scene = MakeScene(kSlidingBox);
   const std::vector<Observation> observations = Observe(scene, 5, 0.0, 1);
-  for (const DerivativeMethod method :
-       {DerivativeMethod::kTangent, DerivativeMethod::kAdjoint, DerivativeMethod::kJet,
-        DerivativeMethod::kJetImplicit, DerivativeMethod::kFiniteDifference}) {
+  for (const GradientMethod method :
+       {GradientMethod::kTangent, GradientMethod::kAdjoint, GradientMethod::kJet,
+        GradientMethod::kJetImplicit, GradientMethod::kFiniteDifference}) {
     if (!IsAvailable(method)) {
       continue;
     }
@@ -268,7 +268,7 @@ TEST(FitTest, InstrumentsAreFoundBesideThePhysics) {
   RolloutResiduals exact = residuals_of(truth, {Parameter("joints/pin/damping", 0.05)});
   Eigen::VectorXd predicted;
   ASSERT_TRUE(
-      exact.Evaluate(exact.scene().Initial(), DerivativeMethod::kTangent, &predicted, nullptr))
+      exact.Evaluate(exact.scene().Initial(), GradientMethod::kTangent, &predicted, nullptr))
       << exact.message();
   for (size_t i = 0; i < observations.size(); ++i) {
     observations[i].value = predicted[static_cast<Eigen::Index>(i)] * observations[i].sigma;

@@ -72,7 +72,7 @@ TEST(LinearizerTest, TheGradientIsThatOfTheCostAndTheBitsAreThoseOfOneThread) {
   const HuberBounds huber{2.0, 1.0};
   Linearisation models[2][2];
   for (int i = 0; i < 2; ++i) {
-    Linearizer linearizer(&problem, DerivativeMethod::kTangent, i == 0 ? 1 : 5, nullptr);
+    Linearizer linearizer(&problem, GradientMethod::kTangent, i == 0 ? 1 : 5, nullptr);
     ASSERT_TRUE(linearizer.Linearise(q, huber, &models[i][0], &models[i][1]));
     EXPECT_EQ(linearizer.rollouts(), problem.num_blocks());
   }
@@ -81,7 +81,7 @@ TEST(LinearizerTest, TheGradientIsThatOfTheCostAndTheBitsAreThoseOfOneThread) {
     EXPECT_EQ(models[0][i].gradient, models[1][i].gradient);
   }
   EXPECT_NE(models[0][0].cost, models[0][1].cost);
-  Linearizer linearizer(&problem, DerivativeMethod::kTangent, 0, nullptr);
+  Linearizer linearizer(&problem, GradientMethod::kTangent, 0, nullptr);
   for (Eigen::Index k = 0; k < q.size(); ++k) {
     Eigen::VectorXd current[2];
     double target[2];
@@ -102,7 +102,7 @@ TEST(LinearizerTest, TheGradientIsThatOfTheCostAndTheBitsAreThoseOfOneThread) {
 TEST(LinearizerTest, TheFirstBlockThatFailsIsNamed) {
   DecayProblem problem(5, 1);
   problem.failing = {3, 1};
-  Linearizer linearizer(&problem, DerivativeMethod::kTangent, 3, nullptr);
+  Linearizer linearizer(&problem, GradientMethod::kTangent, 3, nullptr);
   std::vector<BlockEvaluation> blocks;
   EXPECT_FALSE(linearizer.Rows(InitialOf(problem.entries()), BlockDerivatives::kSkip, &blocks));
   EXPECT_EQ(linearizer.message(), "block 1: fails");
@@ -112,7 +112,7 @@ TEST(LinearizerTest, TheFirstBlockThatFailsIsNamed) {
 TEST(LinearizerTest, ACostThatIsNotFiniteIsAFailure) {
   DecayProblem problem(2, 1);
   problem.observed()[1][3] = 1e200;
-  Linearizer linearizer(&problem, DerivativeMethod::kTangent, 1, nullptr);
+  Linearizer linearizer(&problem, GradientMethod::kTangent, 1, nullptr);
   const Eigen::VectorXd q = ToInternal(problem.entries(), InitialOf(problem.entries()));
   Linearisation model;
   Linearisation target;

@@ -198,7 +198,7 @@ class TwoParameters : public LeastSquaresProblem {
   std::vector<RowPlace> Places(int) const override {
     return std::vector<RowPlace>(static_cast<size_t>(rows_));
   }
-  bool EvaluateBlock(int, const Eigen::VectorXd& p, DerivativeMethod, BlockDerivatives,
+  bool EvaluateBlock(int, const Eigen::VectorXd& p, GradientMethod, BlockDerivatives,
                      BlockEvaluation* evaluation) override {
     evaluation->residuals.resize(rows_);
     evaluation->jacobian.resize(rows_, 2);

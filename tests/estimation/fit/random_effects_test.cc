@@ -22,7 +22,7 @@ class MeansProblem : public LeastSquaresProblem {
   int num_own(int) const override { return 1; }
   int num_rows(int) const override { return 1; }
   std::vector<RowPlace> Places(int) const override { return {{}}; }
-  bool EvaluateBlock(int block, const Eigen::VectorXd& p, DerivativeMethod, BlockDerivatives,
+  bool EvaluateBlock(int block, const Eigen::VectorXd& p, GradientMethod, BlockDerivatives,
                      BlockEvaluation* evaluation) override {
     evaluation->residuals = Eigen::VectorXd::Constant(1, (p[1] - seen_[block]) / kSigma);
     evaluation->jacobian = Eigen::RowVector2d(0.0, 1.0 / kSigma);
@@ -52,7 +52,7 @@ TEST(SpreadLikelihoodTest, IsThatOfTheMeansOfGroups) {
     std::vector<double> deviations;
     for (int b = 0; b < problem.num_blocks(); ++b) {
       BlockEvaluation block;
-      problem.EvaluateBlock(b, Eigen::Vector2d(at[0], at[b + 1]), DerivativeMethod::kTangent,
+      problem.EvaluateBlock(b, Eigen::Vector2d(at[0], at[b + 1]), GradientMethod::kTangent,
                             BlockDerivatives::kCompute, &block);
       factors.push_back(Reduce(block, Eigen::Vector2d::Ones(), 1, 1, 1.0, 0.0));
       const double scale = gaussian ? 1.0 : at[b + 1];

@@ -23,7 +23,7 @@ TEST(ShootingTest, AWholeRunCutInPiecesIsTheSameRun) {
   Eigen::VectorXd whole;
   ASSERT_TRUE(shooting.Evaluate(x, &pieces, nullptr));
   ASSERT_TRUE(
-      residuals.Evaluate(residuals.scene().Initial(), DerivativeMethod::kTangent, &whole, nullptr));
+      residuals.Evaluate(residuals.scene().Initial(), GradientMethod::kTangent, &whole, nullptr));
   // A segment starts without the last step's modes as a guess: equal to the solver's rounding, in
   // sigmas of 1 mm.
   EXPECT_LT((pieces.head(whole.size()) - whole).cwiseAbs().maxCoeff(), 1e-8);

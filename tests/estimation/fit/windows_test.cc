@@ -42,9 +42,9 @@ TEST(WindowsTest, AWindowHasTheFirstObservationsAndAllParameters) {
   BlockEvaluation part;
   BlockEvaluation whole;
   ASSERT_TRUE(
-      window->EvaluateBlock(0, p, DerivativeMethod::kTangent, BlockDerivatives::kCompute, &part));
-  ASSERT_TRUE(residuals.EvaluateBlock(0, p, DerivativeMethod::kTangent, BlockDerivatives::kCompute,
-                                      &whole));
+      window->EvaluateBlock(0, p, GradientMethod::kTangent, BlockDerivatives::kCompute, &part));
+  ASSERT_TRUE(
+      residuals.EvaluateBlock(0, p, GradientMethod::kTangent, BlockDerivatives::kCompute, &whole));
   EXPECT_EQ(part.residuals, whole.residuals.head(51 * 3));
   EXPECT_EQ(part.jacobian, whole.jacobian.topRows(51 * 3));
 }

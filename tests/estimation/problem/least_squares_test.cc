@@ -20,7 +20,7 @@ class ThreeBlocks : public LeastSquaresProblem {
   std::vector<RowPlace> Places(int block) const override {
     return std::vector<RowPlace>(static_cast<size_t>(num_rows(block)));
   }
-  bool EvaluateBlock(int, const Eigen::VectorXd&, DerivativeMethod, BlockDerivatives,
+  bool EvaluateBlock(int, const Eigen::VectorXd&, GradientMethod, BlockDerivatives,
                      BlockEvaluation*) override {
     return false;
   }
@@ -56,10 +56,10 @@ TEST(LeastSquaresTest, ARunIsOneBlockOfSharedParameters) {
   Eigen::VectorXd values;
   RowMatrixXd jacobian;
   const Eigen::VectorXd p = InitialOf(residuals.entries());
-  ASSERT_TRUE(residuals.Evaluate(p, DerivativeMethod::kTangent, &values, &jacobian));
+  ASSERT_TRUE(residuals.Evaluate(p, GradientMethod::kTangent, &values, &jacobian));
   BlockEvaluation block;
-  ASSERT_TRUE(residuals.EvaluateBlock(0, p, DerivativeMethod::kTangent, BlockDerivatives::kCompute,
-                                      &block));
+  ASSERT_TRUE(
+      residuals.EvaluateBlock(0, p, GradientMethod::kTangent, BlockDerivatives::kCompute, &block));
   EXPECT_EQ(block.residuals, values);
   EXPECT_EQ(block.jacobian, jacobian);
   EXPECT_EQ(block.rollouts, 1);

@@ -24,7 +24,7 @@ class TwoBlocks : public LeastSquaresProblem {
   int num_rows(int /*block*/) const override { return 2; }
   double weight(int block) const override { return block == 0 ? 1.0 : 4.0; }
   std::vector<RowPlace> Places(int /*block*/) const override { return {{0, 0.0}, {1, 0.0}}; }
-  bool EvaluateBlock(int block, const Eigen::VectorXd& p, DerivativeMethod /*method*/,
+  bool EvaluateBlock(int block, const Eigen::VectorXd& p, GradientMethod /*method*/,
                      BlockDerivatives derivatives, BlockEvaluation* evaluation) override {
     evaluation->residuals = Eigen::Vector2d(p[0] - block, p[2] * p[0]);
     if (derivatives == BlockDerivatives::kCompute) {
@@ -61,13 +61,13 @@ TEST(ProblemWithPriorsTest, RowsAndDerivativesOfPriorsAndEffects) {
     EXPECT_EQ(problem.num_observation_rows(2), 0);
     EXPECT_EQ(problem.num_own(2), 0);
     BlockEvaluation evaluation;
-    ASSERT_TRUE(problem.EvaluateBlock(2, Eigen::Vector2d(4.0, 7.0), DerivativeMethod::kTangent,
+    ASSERT_TRUE(problem.EvaluateBlock(2, Eigen::Vector2d(4.0, 7.0), GradientMethod::kTangent,
                                       BlockDerivatives::kCompute, &evaluation));
     EXPECT_EQ(evaluation.residuals[0], -0.5);
     EXPECT_EQ(evaluation.jacobian, RowMatrixXd(Eigen::RowVector2d(0.5, 0.0)));
 
     const Eigen::Vector3d p(4.0, 0.8, 1.25);
-    ASSERT_TRUE(problem.EvaluateBlock(1, p, DerivativeMethod::kTangent, BlockDerivatives::kCompute,
+    ASSERT_TRUE(problem.EvaluateBlock(1, p, GradientMethod::kTangent, BlockDerivatives::kCompute,
                                       &evaluation));
     // The block's weight of 4 is taken out of them.
     const double effect = kind == PriorKind::kGaussian ? 0.45 : std::log(1.25 / 0.8);
@@ -79,15 +79,15 @@ TEST(ProblemWithPriorsTest, RowsAndDerivativesOfPriorsAndEffects) {
       plus[k] += h;
       minus[k] -= h;
       BlockEvaluation after, before;
-      ASSERT_TRUE(problem.EvaluateBlock(1, plus, DerivativeMethod::kTangent,
-                                        BlockDerivatives::kSkip, &after));
-      ASSERT_TRUE(problem.EvaluateBlock(1, minus, DerivativeMethod::kTangent,
-                                        BlockDerivatives::kSkip, &before));
+      ASSERT_TRUE(problem.EvaluateBlock(1, plus, GradientMethod::kTangent, BlockDerivatives::kSkip,
+                                        &after));
+      ASSERT_TRUE(problem.EvaluateBlock(1, minus, GradientMethod::kTangent, BlockDerivatives::kSkip,
+                                        &before));
       const Eigen::VectorXd difference = (after.residuals - before.residuals) / (2.0 * h);
       EXPECT_LT((difference - evaluation.jacobian.col(k)).norm(), 1e-8) << k;
     }
     problem.SetSpread(0, 0.2);
-    ASSERT_TRUE(problem.EvaluateBlock(1, p, DerivativeMethod::kTangent, BlockDerivatives::kSkip,
+    ASSERT_TRUE(problem.EvaluateBlock(1, p, GradientMethod::kTangent, BlockDerivatives::kSkip,
                                       &evaluation));
     EXPECT_NEAR(evaluation.residuals[3], 0.5 * effect / 0.2, 1e-13);
   }

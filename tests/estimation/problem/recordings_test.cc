@@ -51,8 +51,8 @@ TEST(RecordingsTest, DerivativesAreThoseOfTheRows) {
   const Eigen::VectorXd p = Eigen::Vector3d(-9.3, 0.2, 0.45);
   for (int block = 0; block < 3; ++block) {
     BlockEvaluation at;
-    ASSERT_TRUE(problem.EvaluateBlock(block, p, DerivativeMethod::kTangent,
-                                      BlockDerivatives::kCompute, &at));
+    ASSERT_TRUE(
+        problem.EvaluateBlock(block, p, GradientMethod::kTangent, BlockDerivatives::kCompute, &at));
     ASSERT_EQ(at.jacobian.cols(), 3);
     ASSERT_EQ(at.residuals.size(), problem.num_rows(block));
     for (int i = 0; i < 3; ++i) {
@@ -60,10 +60,10 @@ TEST(RecordingsTest, DerivativesAreThoseOfTheRows) {
         BlockEvaluation plus, minus;
         Eigen::VectorXd moved = p;
         moved[i] += h;
-        ASSERT_TRUE(problem.EvaluateBlock(block, moved, DerivativeMethod::kTangent,
+        ASSERT_TRUE(problem.EvaluateBlock(block, moved, GradientMethod::kTangent,
                                           BlockDerivatives::kSkip, &plus));
         moved[i] -= 2.0 * h;
-        ASSERT_TRUE(problem.EvaluateBlock(block, moved, DerivativeMethod::kTangent,
+        ASSERT_TRUE(problem.EvaluateBlock(block, moved, GradientMethod::kTangent,
                                           BlockDerivatives::kSkip, &minus));
         const Eigen::VectorXd difference = (plus.residuals - minus.residuals) / (2.0 * h);
         EXPECT_GT(difference.norm(), 1e-3);
@@ -102,7 +102,7 @@ TEST(RecordingsTest, WhatVariesHasASharedValueToo) {
   EXPECT_EQ(problem.RecordingOf(1), -1);
   EXPECT_EQ(problem.RecordingOf(3), 1);
   BlockEvaluation block;
-  ASSERT_TRUE(problem.EvaluateBlock(1, Eigen::Vector3d(7.0, -9.5, 0.6), DerivativeMethod::kTangent,
+  ASSERT_TRUE(problem.EvaluateBlock(1, Eigen::Vector3d(7.0, -9.5, 0.6), GradientMethod::kTangent,
                                     BlockDerivatives::kCompute, &block));
   EXPECT_EQ(block.jacobian.col(0).norm(), 0.0);
   EXPECT_GT(block.jacobian.col(2).norm(), 1.0);
@@ -117,10 +117,10 @@ TEST(RecordingsTest, AFailureNamesItsRecording) {
   RecordingsProblem problem = Throws();
   BlockEvaluation evaluation;
   EXPECT_FALSE(problem.EvaluateBlock(1, Eigen::Vector3d(std::nan(""), 0.0, 0.0),
-                                     DerivativeMethod::kTangent, BlockDerivatives::kSkip,
+                                     GradientMethod::kTangent, BlockDerivatives::kSkip,
                                      &evaluation));
   EXPECT_NE(evaluation.message, "");
-  Linearizer linearizer(&problem, DerivativeMethod::kTangent, 1, nullptr);
+  Linearizer linearizer(&problem, GradientMethod::kTangent, 1, nullptr);
   std::vector<BlockEvaluation> blocks;
   Eigen::VectorXd p = InitialOf(problem.entries());
   p[3] = std::nan("");

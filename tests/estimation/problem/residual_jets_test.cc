@@ -12,12 +12,12 @@ namespace {
 using testing::WidestJet;
 
 TEST(ResidualJets, AreAvailableWhereAWidthIsBuilt) {
-  EXPECT_EQ(IsAvailable(DerivativeMethod::kJet), WidestJet() > 0);
-  EXPECT_EQ(IsAvailable(DerivativeMethod::kJetImplicit), WidestJet() > 0);
-  EXPECT_TRUE(IsAvailable(DerivativeMethod::kTangent));
+  EXPECT_EQ(IsAvailable(GradientMethod::kJet), WidestJet() > 0);
+  EXPECT_EQ(IsAvailable(GradientMethod::kJetImplicit), WidestJet() > 0);
+  EXPECT_TRUE(IsAvailable(GradientMethod::kTangent));
 }
 
-RowMatrixXd Jacobian(const std::vector<FitParameter>& parameters, DerivativeMethod method,
+RowMatrixXd Jacobian(const std::vector<FitParameter>& parameters, GradientMethod method,
                      long* rollouts) {
   const Scene scene = MakeScene(kSmallChain);
   RolloutResiduals residuals =
@@ -42,7 +42,7 @@ TEST(ResidualJets, EveryPassFillsItsColumns) {
     parameters.push_back(Parameter(path, 0.7));
     parameters.back().initial.reset();
   }
-  for (const DerivativeMethod method : {DerivativeMethod::kJet, DerivativeMethod::kJetImplicit}) {
+  for (const GradientMethod method : {GradientMethod::kJet, GradientMethod::kJetImplicit}) {
     long rollouts = 0;
     const RowMatrixXd all = Jacobian(parameters, method, &rollouts);
     long of_one = 0;

@@ -23,17 +23,15 @@ void ExpectMethodsAgree(RolloutResiduals residuals) {
   const Eigen::VectorXd p = residuals.scene().Initial();
   Eigen::VectorXd r;
   RowMatrixXd tangent;
-  ASSERT_TRUE(residuals.Evaluate(p, DerivativeMethod::kTangent, &r, &tangent))
-      << residuals.message();
+  ASSERT_TRUE(residuals.Evaluate(p, GradientMethod::kTangent, &r, &tangent)) << residuals.message();
   for (Eigen::Index k = 0; k < tangent.cols(); ++k) {
     EXPECT_GT(tangent.col(k).norm(), 1e-3) << residuals.scene().entries()[k].name;
   }
   // Tolerances of the methods as README states them.
-  const std::pair<DerivativeMethod, double> methods[] = {
-      {DerivativeMethod::kAdjoint, 1e-9},
-      {DerivativeMethod::kJetImplicit, 1e-9},
-      {DerivativeMethod::kJet, 1e-6},
-      {DerivativeMethod::kFiniteDifference, 1e-5}};
+  const std::pair<GradientMethod, double> methods[] = {{GradientMethod::kAdjoint, 1e-9},
+                                                       {GradientMethod::kJetImplicit, 1e-9},
+                                                       {GradientMethod::kJet, 1e-6},
+                                                       {GradientMethod::kFiniteDifference, 1e-5}};
   for (const auto& [method, tolerance] : methods) {
     if (!IsAvailable(method)) {
       continue;
@@ -44,7 +42,7 @@ void ExpectMethodsAgree(RolloutResiduals residuals) {
         << NameOf(method) << ": " << residuals.message();
     EXPECT_EQ(r, other) << NameOf(method);
     EXPECT_LT(ColumnError(jacobian, tangent), tolerance) << NameOf(method);
-    if (method == DerivativeMethod::kFiniteDifference) {
+    if (method == GradientMethod::kFiniteDifference) {
       EXPECT_GT(ColumnError(jacobian, tangent), 0.0);
     }
   }
@@ -76,7 +74,7 @@ TEST(ResidualTest, IsTheDifferenceInSigmas) {
       MakeResiduals(scene, {}, {Parameter("gravity/y", -9.81)}, observations);
   Eigen::VectorXd r;
   ASSERT_TRUE(
-      residuals.Evaluate(residuals.scene().Initial(), DerivativeMethod::kTangent, &r, nullptr));
+      residuals.Evaluate(residuals.scene().Initial(), GradientMethod::kTangent, &r, nullptr));
   ASSERT_EQ(r.size(), static_cast<Eigen::Index>(observations.size()));
   for (const double x : r) {
     EXPECT_NEAR(x, 6.0, 1e-12);
@@ -97,7 +95,7 @@ TEST(ResidualTest, BetweenStepsPositionsAreLinear) {
   RolloutResiduals residuals = MakeResiduals(scene, {}, {Parameter("gravity/y", -9.81)}, between);
   Eigen::VectorXd r;
   ASSERT_TRUE(
-      residuals.Evaluate(residuals.scene().Initial(), DerivativeMethod::kTangent, &r, nullptr));
+      residuals.Evaluate(residuals.scene().Initial(), GradientMethod::kTangent, &r, nullptr));
   // Rounding of positions of order 1 in sigmas of 1e-3.
   EXPECT_LT(r.cwiseAbs().maxCoeff(), 1e-11);
 }
@@ -150,7 +148,7 @@ TEST(ResidualTest, TheRunEndsWithTheLastObservation) {
       MakeResiduals(scene, {}, {Parameter("gravity/y", -9.81)}, {observation});
   Eigen::VectorXd r;
   ASSERT_TRUE(
-      residuals.Evaluate(residuals.scene().Initial(), DerivativeMethod::kTangent, &r, nullptr));
+      residuals.Evaluate(residuals.scene().Initial(), GradientMethod::kTangent, &r, nullptr));
   EXPECT_EQ(residuals.scene().scene().simulation.duration, 0.02);
 }
 
@@ -159,8 +157,8 @@ TEST(ResidualTest, AValueThatANumberMayNotTakeIsAFailure) {
   RolloutResiduals residuals =
       MakeResiduals(scene, {}, {Parameter("bodies/ball/mass", 1.0)}, Observe(scene, 10, 0.0, 1));
   Eigen::VectorXd r;
-  EXPECT_FALSE(residuals.Evaluate(Eigen::VectorXd::Constant(1, -1.0), DerivativeMethod::kTangent,
-                                  &r, nullptr));
+  EXPECT_FALSE(residuals.Evaluate(Eigen::VectorXd::Constant(1, -1.0), GradientMethod::kTangent, &r,
+                                  nullptr));
   EXPECT_FALSE(residuals.message().empty());
 }
 
@@ -224,13 +222,12 @@ TEST(ResidualTest, MethodsAgreeOnAllInstrumentsByEvents) {
   const Eigen::VectorXd p = residuals.scene().Initial();
   Eigen::VectorXd r;
   RowMatrixXd tangent;
-  ASSERT_TRUE(residuals.Evaluate(p, DerivativeMethod::kTangent, &r, &tangent))
-      << residuals.message();
+  ASSERT_TRUE(residuals.Evaluate(p, GradientMethod::kTangent, &r, &tangent)) << residuals.message();
   for (Eigen::Index k = 0; k < tangent.cols(); ++k) {
     EXPECT_GT(tangent.col(k).norm(), 1e-3) << residuals.scene().entries()[k].name;
   }
-  for (const auto& [method, tolerance] : {std::pair(DerivativeMethod::kAdjoint, 1e-9),
-                                          std::pair(DerivativeMethod::kFiniteDifference, 1e-5)}) {
+  for (const auto& [method, tolerance] : {std::pair(GradientMethod::kAdjoint, 1e-9),
+                                          std::pair(GradientMethod::kFiniteDifference, 1e-5)}) {
     Eigen::VectorXd other;
     RowMatrixXd jacobian;
     ASSERT_TRUE(residuals.Evaluate(p, method, &other, &jacobian)) << residuals.message();
@@ -252,12 +249,12 @@ TEST(ResidualTest, ATimeThatLeavesTheRunIsAFailure) {
       << error.what;
   RolloutResiduals residuals(parameterized, {{0.05, 0, -1, Coordinate::kX, 0.0, 1.0}}, {channel});
   Eigen::VectorXd r;
-  ASSERT_TRUE(residuals.Evaluate(Eigen::VectorXd::Constant(1, 0.05), DerivativeMethod::kTangent, &r,
-                                 nullptr))
+  ASSERT_TRUE(
+      residuals.Evaluate(Eigen::VectorXd::Constant(1, 0.05), GradientMethod::kTangent, &r, nullptr))
       << residuals.message();
   EXPECT_NEAR(r[0], 0.0, 1e-15);
-  EXPECT_FALSE(residuals.Evaluate(Eigen::VectorXd::Constant(1, 0.06), DerivativeMethod::kTangent,
-                                  &r, nullptr));
+  EXPECT_FALSE(residuals.Evaluate(Eigen::VectorXd::Constant(1, 0.06), GradientMethod::kTangent, &r,
+                                  nullptr));
   EXPECT_NE(residuals.message().find("recorded at 0.05 s is of the time -0.01 s"),
             std::string::npos)
       << residuals.message();

@@ -59,7 +59,7 @@ TEST_F(FitJsonTest, ReadsWhatIsWritten) {
   EXPECT_EQ(problem.parameters[1].sets[0].mode, SetMode::kAssign);
   EXPECT_EQ(problem.parameters[1].sets[1].mode, SetMode::kAdd);
   EXPECT_EQ(problem.parameters[2].name, "points/rim/at/x");
-  EXPECT_EQ(problem.options.derivatives, DerivativeMethod::kAdjoint);
+  EXPECT_EQ(problem.options.derivatives, GradientMethod::kAdjoint);
   EXPECT_EQ(problem.options.huber, 1.5);
   EXPECT_EQ(problem.options.segments, 4);
   EXPECT_EQ(problem.options.starts, 3);

@@ -25,7 +25,7 @@ class Rows : public LeastSquaresProblem {
     }
     return places;
   }
-  bool EvaluateBlock(int /*block*/, const Eigen::VectorXd& /*p*/, DerivativeMethod /*method*/,
+  bool EvaluateBlock(int /*block*/, const Eigen::VectorXd& /*p*/, GradientMethod /*method*/,
                      BlockDerivatives /*derivatives*/, BlockEvaluation* /*evaluation*/) override {
     return false;
   }

@@ -46,7 +46,7 @@ class RowsProblem : public LeastSquaresProblem {
     return places_[block].empty() ? num_rows(block) : static_cast<int>(places_[block].size());
   }
   std::vector<RowPlace> Places(int block) const override { return places_[block]; }
-  bool EvaluateBlock(int, const Eigen::VectorXd&, DerivativeMethod, BlockDerivatives,
+  bool EvaluateBlock(int, const Eigen::VectorXd&, GradientMethod, BlockDerivatives,
                      BlockEvaluation*) override {
     return false;
   }

@@ -150,7 +150,7 @@ TEST(DecompressionSolverTest, RandomProblemsAreSolvedAsByTheDenseForm) {
     ExpectSolution({{}, problem, dense});
     const Solved s = Decompress(problem, ContactMode::kOpen);
     ExpectSolution(s);
-    by_dense += s.report.solved_by == SolvedBy::kLemke ? 1 : 0;
+    by_dense += s.report.rung == Rung::kDense ? 1 : 0;
     double difference = 0.0;
     for (size_t i = 0; i < dense.motion.size(); ++i) {
       difference = std::max(difference, std::abs(dense.motion[i] - s.solution.motion[i]));

@@ -129,12 +129,12 @@ TEST(ContactLemkeTest, AProblemTooLargeForItIsUnsolvedAndMeasured) {
   p.contacts.push_back(FloorContact(7, 0.0, 0.0, 0.3, -1.0));
   p.contacts.back().normal_a = {0.0, -1.0, 0.0};
   ContactSolverOptions options;
-  options.choice = ContactSolverChoice::kLemke;
+  options.choice = SolverChoice::kLemke;
   ContactSolution<double> solution = testing::EmptySolution(p);
   ContactSolver solver;
   const ContactSolverReport report = solver.Solve(p, options, &solution);
   EXPECT_FALSE(report.solved);
-  EXPECT_EQ(report.solved_by, SolvedBy::kNothing);
+  EXPECT_EQ(report.rung, Rung::kNone);
   EXPECT_GE(report.worst_contact, 0);
   EXPECT_GT(report.residual, 0.1);
   EXPECT_EQ(report.fallbacks.dense + report.fallbacks.restarts, 0);

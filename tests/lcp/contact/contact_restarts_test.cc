@@ -28,7 +28,7 @@ TEST(ContactRestartsTest, SolvesWhatOnePathDoesNot) {
     ContactSolver solver;
     const ContactSolverReport report = solver.Solve(one.problem, {}, &solution);
     EXPECT_TRUE(report.solved) << one.name;
-    EXPECT_EQ(report.solved_by, SolvedBy::kLemke) << one.name;
+    EXPECT_EQ(report.rung, Rung::kRestarts) << one.name;
     EXPECT_LE(corpus::RecomputedResidual(one.problem, solution), 1e-10) << one.name;
   }
 }

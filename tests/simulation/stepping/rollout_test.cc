@@ -75,7 +75,7 @@ TEST(RolloutTest, AResumedRunHasTheSameBits) {
 TEST(RolloutTest, ReportsAddUp) {
   RolloutReport report;
   StepReport step;
-  step.solved_by = SolvedBy::kGuess;
+  step.rung = Rung::kPivotingFromGuess;
   step.closed = 3;
   step.gap_min = -0.2;
   step.mode_switches = 2;
@@ -83,12 +83,14 @@ TEST(RolloutTest, ReportsAddUp) {
   step.solver.whole_system = 5;
   step.pairs_compared = 2000000000;
   report.Add(step);
-  step.solved_by = SolvedBy::kLemke;
+  step.rung = Rung::kRestarts;
   step.closed = 1;
   step.gap_min = 0.1;
   report.Add(step);
-  EXPECT_EQ(report.solved_by_guess, 1);
-  EXPECT_EQ(report.solved_by_lemke, 1);
+  EXPECT_EQ(report.SolvedBy(Rung::kNone, Rung::kModeChanges), 0);
+  EXPECT_EQ(report.SolvedBy(Rung::kModeChanges, Rung::kPivotingFromGuess), 1);
+  EXPECT_EQ(report.SolvedBy(Rung::kInteriorPoint, Rung::kPivotingFromOpen), 0);
+  EXPECT_EQ(report.SolvedBy(Rung::kNone, Rung::kLemke), 2);
   EXPECT_EQ(report.contacts_max, 3);
   EXPECT_EQ(report.mode_switches, 4);
   EXPECT_EQ(report.penetration_max, 0.2);

@@ -129,12 +129,12 @@ TEST(StepReportTest, WithoutAnInequalityThereIsNoLcp) {
   ball.position = {-3.0, 0.0};
   scene.bodies.push_back(ball);
   const Ran reduced(scene);
-  EXPECT_EQ(reduced.report.solved_directly, reduced.report.steps);
+  EXPECT_EQ(reduced.report.SolvedBy(Rung::kDirect, Rung::kDirect), reduced.report.steps);
   EXPECT_EQ(reduced.report.lcp_rows, 0);
   scene.simulation.contact_margin = 100.0;
   const Ran full(scene);
-  EXPECT_EQ(full.report.solved_directly, 0);
-  EXPECT_EQ(full.report.solved_by_guess, full.report.steps);
+  EXPECT_EQ(full.report.SolvedBy(Rung::kDirect, Rung::kDirect), 0);
+  EXPECT_EQ(full.report.SolvedBy(Rung::kModeChanges, Rung::kModeChanges), full.report.steps);
   EXPECT_GT(full.report.lcp_rows, 0);
   EXPECT_LT(Apart(reduced.final, full.final), 1e-9);
 }

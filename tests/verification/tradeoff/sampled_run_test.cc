@@ -92,12 +92,5 @@ TEST_F(SampledRunTest, FailuresAreTold) {
   EXPECT_EQ(Run().message.find("/simulation/integrator"), 0u);
 }
 
-TEST(LowerMedianTest, IsTheMiddleOne) {
-  EXPECT_EQ(LowerMedian({3.0}), 3.0);
-  EXPECT_EQ(LowerMedian({3.0, 1.0}), 1.0);
-  EXPECT_EQ(LowerMedian({9.0, 1.0, 4.0}), 4.0);
-  EXPECT_EQ(LowerMedian({9.0, 1.0, 4.0, 5.0}), 4.0);
-}
-
 }  // namespace
 }  // namespace tangible::tradeoff

@@ -77,7 +77,7 @@ class PaddleWays : public LeastSquaresProblem {
     for (int i = 0; i < model_.num_steps(); ++i) places.push_back({0, kFrameSkip / 60.0 * i, 0.0});
     return places;
   }
-  bool EvaluateBlock(int /*block*/, const Eigen::VectorXd& p, DerivativeMethod /*method*/,
+  bool EvaluateBlock(int /*block*/, const Eigen::VectorXd& p, GradientMethod /*method*/,
                      BlockDerivatives /*derivatives*/, BlockEvaluation* evaluation) override {
     using Number = Jet<kNumPaddleNumbers>;
     const Law<Number> law = {Number(p[0], 0), Number(p[1], 1),      Number(p[2], 2),

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// Which solver a step's LCP is given to: shared by scene (what the user wrote) and lcp (what it
-// means), which do not know each other.
+// Which method an LCP is given to: one of them alone, or each after the other.
 
 namespace tangible {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "tangible/lcp/dense/certificate.h"
+#include "tangible/lcp/certificate/certificate.h"
 
 #include <algorithm>
 #include <array>

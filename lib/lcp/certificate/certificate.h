@@ -11,7 +11,7 @@
 #include <limits>
 #include <string>
 
-#include "tangible/lcp/dense/tolerances.h"
+#include "tangible/lcp/certificate/tolerances.h"
 
 namespace tangible {
 
