@@ -87,7 +87,7 @@ TEST(BoxQuadratic, WithoutBoundsIsNewtonsStep) {
   EXPECT_EQ(found.free.size(), 4u);
 }
 
-TEST(BoxQuadratic, ACurvatureThatIsNotPositiveIsTold) {
+TEST(BoxQuadratic, ACurvatureThatIsNotPositiveIsReported) {
   const VectorX<double> zero = VectorX<double>::Zero(1);
   const VectorX<double> one = VectorX<double>::Ones(1);
   const MatrixX<double> h = -MatrixX<double>::Ones(1, 1);

@@ -8,6 +8,7 @@
 #include <numbers>
 #include <random>
 
+#include "../support/random_matrix.h"
 #include "../support/scenes.h"
 #include "tangible/control/engine_step.h"
 #include "tangible/math/scalar.h"
@@ -146,7 +147,7 @@ TEST(Ilqr, GradientIsThatOfTheCost) {
   Pendulum map;
   const Cost cost = SwingUp();
   const ControlProblem problem = ProblemOf(&map, &cost, VectorX<double>::Zero(2), kInfinity);
-  const RowMatrixXd controls = RowMatrixXd::Random(30, 1);
+  const RowMatrixXd controls = testing::RandomMatrix(30, 1, 1);
   const auto value = [&](const RowMatrixXd& u) {
     VectorX<double> x = problem.initial, next;
     double sum = 0.0;

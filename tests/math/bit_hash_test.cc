@@ -29,7 +29,7 @@ TEST(BitHashTest, IsFnv1a) {
   EXPECT_EQ(hash.value(), expected);
 }
 
-TEST(BitHashTest, TellsEveryBitAndTheOrder) {
+TEST(BitHashTest, ChangesWithEveryBitAndTheOrder) {
   EXPECT_NE(HashOf(0.0), HashOf(-0.0));
   EXPECT_NE(HashOf(1.0), HashOf(std::nextafter(1.0, 2.0)));
   EXPECT_NE(HashOf(1.0, 2.0), HashOf(2.0, 1.0));

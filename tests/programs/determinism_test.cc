@@ -243,7 +243,7 @@ TEST_F(DeterminismTest, TheProgramsTableIsTheSameForAnyNumberOfThreads) {
 }
 
 // A hash that stayed the same whatever the numbers would compare nothing.
-TEST_F(DeterminismTest, TheHashesTellAChangeOfOneBit) {
+TEST_F(DeterminismTest, TheHashesChangeWithOneBit) {
   std::vector<NamedScene> scenes = AllScenes();
   Scene& scene = scenes.front().scene;
   const std::string trajectory = TrajectoryHash(scene);

@@ -103,7 +103,7 @@ TEST_F(TangibleSimulateBatchTest, ThreadsOfIslandsDoNotChangeABit) {
   }
 }
 
-TEST_F(TangibleSimulateBatchTest, RowsThatFailAreToldAndTheOthersWritten) {
+TEST_F(TangibleSimulateBatchTest, RowsThatFailAreReportedAndTheOthersWritten) {
   const std::string press = R"({"bodies": [
       {"name": "ball", "shape": {"circle": {"radius": 0.5}}, "mass": 1, "position": [0, 0.5]},
       {"name": "plate", "kinematic": true, "shape": {"box": {"size": [1, 0.2]}},

@@ -126,7 +126,7 @@ TEST_F(TangibleTradeoffTest, ScenesOfTheReadmeRun) {
   EXPECT_NE(Read(Path("p.svg")).find("billiards"), std::string::npos);
 }
 
-TEST_F(TangibleTradeoffTest, BothErrorsCountUnlessToldOtherwise) {
+TEST_F(TangibleTradeoffTest, BothErrorsCountUnlessOneIsNamed) {
   // At 0.05 the trajectory of a fixed step is right, its gradient never.
   const ProgramRun both = Tradeoff("--target_error=0.05");
   ASSERT_EQ(both.exit_status, 0) << both.error;

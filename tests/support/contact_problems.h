@@ -6,6 +6,7 @@
 #include <random>
 #include <vector>
 
+#include "random_matrix.h"
 #include "tangible/lcp/contact/contact_solver.h"
 
 namespace tangible::testing {
@@ -172,7 +173,7 @@ inline std::vector<ContactMode> RandomModes(const ContactProblem<double>& proble
 
 /// Right-hand sides of a DenseSystem, 0 in unused rows, as the engine's are.
 inline RowMatrixXd RightHandSide(const MatrixX<double>& K) {
-  RowMatrixXd rhs = RowMatrixXd::Random(K.rows(), 2);
+  RowMatrixXd rhs = RandomMatrix(K.rows(), 2, 1);
   for (int i = 0; i < K.rows(); ++i) {
     VectorX<double> row = K.row(i);
     VectorX<double> column = K.col(i);

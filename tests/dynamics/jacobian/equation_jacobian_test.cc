@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include "../../support/random_matrix.h"
 #include "../../support/scenes.h"
 #include "tangible/simulation/stepping/step.h"
 #include "tangible/verification/support/random_scene.h"
@@ -67,7 +68,7 @@ TEST(LocalJacobianTest, OneColumnOfTheAdjointIsThatOfSeveral) {
   int contacts = 0;
   ForEachStep(5, [&](unsigned seed, const Model<double>& model, Stepper* stepper) {
     const int rows = 3 * stepper->system().num_blocks();
-    const VectorX<double> u = VectorX<double>::Random(rows);
+    const VectorX<double> u = testing::RandomMatrix(rows, 1, seed);
     const SolvedEquations step = stepper->record().View(stepper->system().contact_block());
     LocalJacobianScratch scratch;
     VectorX<double> one = VectorX<double>::Zero(model.structure->num_variables());

@@ -6,6 +6,7 @@
 #include <Eigen/QR>
 
 #include "../../support/block_problem.h"
+#include "../../support/random_matrix.h"
 
 namespace tangible {
 namespace {
@@ -14,8 +15,8 @@ namespace {
 struct RandomSystem {
   RandomSystem() : problem(3, 1), layout(problem) {
     for (int b = 0; b < layout.num_blocks(); ++b) {
-      blocks.emplace_back(RowMatrixXd::Random(4, layout.num_local(b)));
-      c.emplace_back(Eigen::VectorXd::Random(4));
+      blocks.emplace_back(testing::RandomMatrix(4, layout.num_local(b), b));
+      c.emplace_back(testing::RandomMatrix(4, 1, 10 + b));
     }
   }
   /// Own parameters come first in a block, shared ones first in all.

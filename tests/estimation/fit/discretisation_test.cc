@@ -29,7 +29,7 @@ FitResult FitOf(const FitProblem& problem) {
   return Fit(problem.options, &residuals, {});
 }
 
-TEST(DiscretisationTest, HalvingTheStepTellsTheBias) {
+TEST(DiscretisationTest, HalvingTheStepGivesTheBias) {
   const FitProblem problem = FreeFall();
   const FitResult result = FitOf(problem);
   ASSERT_EQ(result.status, FitStatus::kConverged) << result.message;

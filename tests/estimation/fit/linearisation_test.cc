@@ -6,6 +6,7 @@
 #include <atomic>
 
 #include "../../support/block_problem.h"
+#include "../../support/random_matrix.h"
 
 namespace tangible {
 namespace {
@@ -20,8 +21,8 @@ TEST(RobustCostTest, IsQuadraticWithinTheBoundAndLinearBeyond) {
 /// 200 rows, so that several chunks are gathered; the last 20 are priors.
 BlockEvaluation RandomBlock() {
   BlockEvaluation block;
-  block.residuals = 4.0 * Eigen::VectorXd::Random(200);
-  block.jacobian = RowMatrixXd::Random(200, 3);
+  block.residuals = 4.0 * testing::RandomMatrix(200, 1, 1);
+  block.jacobian = testing::RandomMatrix(200, 3, 2);
   return block;
 }
 

@@ -29,7 +29,7 @@ End MinimiseFrom(const std::vector<FitParameter>& parameters, const FitOptions& 
   return end;
 }
 
-TEST(MinimiseTest, EndsAtTheMinimumAndTellsEveryIteration) {
+TEST(MinimiseTest, EndsAtTheMinimumAndReportsEveryIteration) {
   int reports = 0;
   const End minimum = MinimiseFrom({Parameter("gravity/y", -5.0)}, {},
                                    Observe(MakeScene(kFallingBall), 5, 0.01, 1), &reports);

@@ -12,7 +12,7 @@ bool Has(const std::string& html, const std::string& part) {
   return html.find(part) != std::string::npos;
 }
 
-TEST(ReportTest, TellsEstimatesIntervalsAndWarnings) {
+TEST(ReportTest, ShowsEstimatesIntervalsAndWarnings) {
   const std::string html = FitReport("a <b> & c", HandMadeProblem(), HandMadeResult());
   EXPECT_TRUE(Has(html, "Fit: a &lt;b&gt; &amp; c"));
   EXPECT_FALSE(Has(html, "a <b> & c"));

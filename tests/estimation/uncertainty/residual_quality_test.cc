@@ -41,7 +41,7 @@ ResidualQuality Judge(const Eigen::VectorXd& residuals) {
   return JudgeResiduals(Rows(static_cast<int>(residuals.size())), {block}, 2);
 }
 
-TEST(ResidualQualityTest, TellsNoiseFromAMissingModel) {
+TEST(ResidualQualityTest, DistinguishesNoiseFromAMissingModel) {
   std::mt19937 random(1);
   std::normal_distribution<double> normal(0.0, 1.0);
   Eigen::VectorXd noise(300);

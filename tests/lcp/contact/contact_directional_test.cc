@@ -174,7 +174,7 @@ TEST(ContactDirectionalTest, FindsNoKinkInsideAMode) {
   EXPECT_NEAR(sliding.Solve({1.0, -1.0})[0], (1.0 - 0.5) / kMass, 1e-12);
 }
 
-TEST(ContactDirectionalTest, TellsAContradiction) {
+TEST(ContactDirectionalTest, ReportsAContradiction) {
   // Of two floors under one point only one rises.
   const ContactProblem<double> problem = Point(0.0, -4.0, 0.0, 2);
   const ContactSolution<double> solution = SolutionOf(problem, 1.0, 4.0, 0.0, ContactMode::kClosed);

@@ -51,7 +51,7 @@ TEST(ContactLemkeTest, JointsAreKept) {
   EXPECT_NEAR(solution.motion[4], 0.0, 1e-13);
 }
 
-TEST(ContactLemkeTest, ContradictoryJointsAreTold) {
+TEST(ContactLemkeTest, ContradictoryJointsAreReported) {
   ContactProblem<double> p = FreeBodies({0.0, -1.0, 0.0});
   for (int k = 0; k < 2; ++k) {
     JointBlock<double> joint;

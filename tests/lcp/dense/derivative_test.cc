@@ -105,7 +105,7 @@ TEST_P(StepCaseTest, OneSidedTangentsAreExact) {
   }
 }
 
-TEST_P(StepCaseTest, CertificateTellsKinksFromMereRedundancy) {
+TEST_P(StepCaseTest, CertificateDistinguishesKinksFromRedundancy) {
   if (!CasesArePresent()) GTEST_SKIP() << "../shared/cases is not there";
   for (const StepCase& step : StepCases()) {
     SCOPED_TRACE(step.id());

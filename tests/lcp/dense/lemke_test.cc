@@ -60,7 +60,7 @@ TEST(LemkeTest, FromABasisItEndsAtTheSameSolutionByAShortPath) {
   EXPECT_GT(shorter, 40);
 }
 
-TEST(LemkeTest, ASingularBasisIsTold) {
+TEST(LemkeTest, ASingularBasisIsReported) {
   const MatrixX<double> W = MatrixX<double>::Zero(2, 2);
   const LemkeResult result =
       SolveLemkeFrom(VectorX<double>{{1.0, 1.0}}, W, VectorX<double>{{-1.0, 1.0}});

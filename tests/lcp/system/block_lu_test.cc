@@ -7,6 +7,7 @@
 
 #include "../../support/allocation_counter.h"
 #include "../../support/contact_problems.h"
+#include "../../support/random_matrix.h"
 
 namespace tangible {
 namespace {
@@ -67,7 +68,7 @@ TEST(BlockLuTest, SolvesAsTheDenseMatrix) {
     const Case c = RandomCase(&random, 2 + trial % 7, trial % 5);
     const MatrixX<double> dense = Fill(c, &random, &lu);
     ASSERT_TRUE(lu.Factor());
-    const RowMatrixXd rhs = RowMatrixXd::Random(3 * c.blocks, 3);
+    const RowMatrixXd rhs = testing::RandomMatrix(3 * c.blocks, 3, trial);
     RowMatrixXd x = rhs;
     lu.Solve(x.data(), 3);
     RowMatrixXd y = rhs;
@@ -154,7 +155,7 @@ TEST(BlockLuTest, NarrowBlocksAreSolvedAsFullOnes) {
     ASSERT_TRUE(full.Factor());
     ASSERT_TRUE(narrow.Factor());
     for (const int columns : {1, 3}) {
-      const RowMatrixXd rhs = RowMatrixXd::Random(3 * c.blocks, columns);
+      const RowMatrixXd rhs = testing::RandomMatrix(3 * c.blocks, columns, trial);
       RowMatrixXd x = rhs, y = rhs, x_full = rhs, y_full = rhs;
       narrow.Solve(x.data(), columns);
       narrow.SolveTransposed(y.data(), columns);
@@ -175,7 +176,7 @@ TEST(BlockLuTest, NarrowBlocksAreSolvedAsFullOnes) {
   }
 }
 
-TEST(BlockLuTest, SingularBlockIsToldAndNaNToo) {
+TEST(BlockLuTest, ASingularBlockIsReportedAndNaNToo) {
   BlockLu<double> lu;
   lu.SetPattern(1, 1, {});
   lu.SetZero();

@@ -6,6 +6,7 @@
 #include <Eigen/LU>
 
 #include "../../support/contact_problems.h"
+#include "../../support/random_matrix.h"
 #include "tangible/lcp/system/contact_system.h"
 
 namespace tangible {
@@ -66,7 +67,7 @@ TEST(ContactCondensationTest, RightHandSideAndImpulsesAreThoseOfElimination) {
         if (!(k == 0 && p.contacts[i].driven)) K(at, at) += delta[at];
       }
     }
-    VectorX<double> rhs = VectorX<double>::Random(size);
+    VectorX<double> rhs = testing::RandomMatrix(size, 1, 1);
     for (size_t i = 0; i < block.size(); ++i) {
       for (int k = modes[i] == ContactMode::kSticking ? 2 : 1; k < 3; ++k)
         rhs[3 * block[i] + k] = 0;

@@ -79,7 +79,7 @@ INSTANTIATE_TEST_SUITE_P(Masses, ContactSystemConjugateTest,
 
 // Redundant rows that contradict each other have no solution: what is left of the contradiction is
 // told, and the rest solved.
-TEST(ContactSystemConjugateTest, AContradictionIsTold) {
+TEST(ContactSystemConjugateTest, AContradictionIsReported) {
   ContactProblem<double> p = HingedOnAHeldOne(1.0, 1e12);
   p.contacts.push_back(p.contacts[0]);
   const std::vector<ContactMode> modes(3, ContactMode::kSticking);

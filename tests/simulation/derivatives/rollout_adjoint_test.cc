@@ -19,6 +19,7 @@ double Weight(long k, int variable) { return std::sin(1.7 * k + 0.9 * variable);
 
 TEST(RolloutAdjointTest, LossesAlongTheRunAgreeWithTheTangent) {
   double largest = 0.0;
+  int done = 0;
   for (unsigned seed = 1; seed <= 30; ++seed) {
     RandomSceneOptions options;
     options.max_steps = 25;
@@ -61,7 +62,9 @@ TEST(RolloutAdjointTest, LossesAlongTheRunAgreeWithTheTangent) {
     magnitude += w_bar.cwiseAbs().sum();
     EXPECT_NEAR(actual, expected, 1e-11 * magnitude) << seed;
     largest = std::max(largest, std::abs(actual));
+    ++done;
   }
+  EXPECT_EQ(done, 30);
   EXPECT_GT(largest, 1.0);
 }
 

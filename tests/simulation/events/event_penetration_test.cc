@@ -260,7 +260,7 @@ TEST(EventPenetrationTest, WhatACorrectionTurnsReturnsAtOnce) {
 
 // Two hinges of the same bodies whose limits leave no angle: what moves one out of its limit holds
 // the other one beyond its own.
-TEST(EventPenetrationTest, LimitsThatContradictEachOtherAreTold) {
+TEST(EventPenetrationTest, LimitsThatContradictEachOtherAreReported) {
   const auto status_of =
       [](const char* low, const char* high, std::string* message) {
         Model<double> model;

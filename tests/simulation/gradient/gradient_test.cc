@@ -187,7 +187,7 @@ TEST(FinalStateJacobian, DifferencesBelowOneAreOneSidedAndOfSecondOrder) {
   EXPECT_NEAR(result.jacobian(4, 0), exact.jacobian(4, 0), 1e-8);
 }
 
-TEST(FinalStateJacobian, DifferencesTellOfChangedModes) {
+TEST(FinalStateJacobian, DifferencesReportChangedModes) {
   const Scene scene = SceneOf(test_scenes::FallingBall(0.05, R"({"dt": 0.01, "duration": 0.11})"));
   GradientOptions options = Method(GradientMethod::kFiniteDifference);
   options.step = 0.02;  // m: lands a step or two earlier or later
@@ -366,7 +366,7 @@ TEST(GradientTest, AllMethodsAgreeThroughLargeProjections) {
 }
 
 // A program may set what a file may not hold.
-TEST(GradientTest, NumbersThatAreNotFiniteAreTold) {
+TEST(GradientTest, NumbersThatAreNotFiniteAreAnError) {
   Scene scene;
   std::string error;
   ASSERT_TRUE(ParseScene(R"({"bodies": [{"name": "ball", "shape": {"circle": {"radius": 0.1}},

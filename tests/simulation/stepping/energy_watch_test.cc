@@ -28,7 +28,7 @@ constexpr char kByEvents[] =
 
 // ω h = 2.2 in a symplectic step, λ h = 8 in an explicit one, ω h = 7 by Runge and Kutta: each
 // amplifies by a factor a step.
-TEST(EnergyWatchTest, StepsBeyondStabilityAreToldAsDiverged) {
+TEST(EnergyWatchTest, StepsBeyondStabilityAreReportedAsDiverged) {
   for (const RolloutReport& report : {RunBody(kSpring, R"({"dt": 0.01, "duration": 2})"),
                                       RunBody(R"(, "linear_damping": 800}])", kByEvents),
                                       RunBody(kSpring, R"({"dt": 0.03, "duration": 2,

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "../../support/drift.h"
+#include "../../support/random_matrix.h"
 #include "../../support/rescaled.h"
 #include "../../support/scenes.h"
 #include "tangible/simulation/stepping/rollout.h"
@@ -59,13 +60,13 @@ TEST(JointProjectionTest, TangentIsTheDifferenceAndAdjointItsTranspose) {
     if (s.joints.empty() || s.joint_loops) continue;
     ++compared;
     const int n = s.num_variables();
-    RowMatrixXd w_dot = RowMatrixXd::Random(n, 2);
+    RowMatrixXd w_dot = testing::RandomMatrix(n, 2, seed);
     const RowMatrixXd direction = w_dot;
     State<double> projected = state;
     JointProjection projection;
     projection.Project(model, projected.pose, &projected);
     projection.Tangent(model, w_dot.data(), 2);
-    RowMatrixXd w_bar = RowMatrixXd::Random(n, 2);
+    RowMatrixXd w_bar = testing::RandomMatrix(n, 2, 100 + seed);
     const RowMatrixXd seedling = w_bar;
     projection.Adjoint(model, w_bar.data(), 2);
     // ⟨w̄⁺, ẇ⁺⟩ = ⟨w̄, ẇ⟩
@@ -114,10 +115,8 @@ TEST(JointProjectionTest, InLoopsTheAdjointIsTheTransposeToRounding) {
     RowMatrixXd w_dot = RowMatrixXd::Zero(s.num_variables(), 2);
     RowMatrixXd w_bar = w_dot;
     for (const int body : s.moving) {
-      for (int i = 0; i < 3; ++i) {
-        w_dot.row(s.PoseVariable(body, i)).setRandom();
-        w_bar.row(s.PoseVariable(body, i)).setRandom();
-      }
+      w_dot.middleRows(s.PoseVariable(body, 0), 3) = testing::RandomMatrix(3, 2, seed + body);
+      w_bar.middleRows(s.PoseVariable(body, 0), 3) = testing::RandomMatrix(3, 2, 500 + seed + body);
     }
     const RowMatrixXd direction = w_dot;
     const RowMatrixXd seedling = w_bar;
@@ -179,7 +178,7 @@ TEST(JointProjectionTest, AChainThatWhipsHolds) {
   EXPECT_GT(drift, 2e-3);
 }
 
-TEST(JointProjectionTest, JointsThatCannotHoldAreTold) {
+TEST(JointProjectionTest, JointsThatCannotHoldAreReported) {
   Scene scene = test_scenes::SceneOf(R"({"bodies": [
       {"name": "a", "mass": 2, "inertia": 1, "position": [0, 0]}],
     "joints": [{"name": "j", "type": "distance", "bodies": ["a", "world"],
@@ -212,7 +211,7 @@ TEST(JointProjectionTest, FarFromTheOriginJointsHoldToRounding) {
 }
 
 // Anchors so far away that the first matrix cannot be factorised: no step was there to try.
-TEST(JointProjectionTest, ArmsBeyondAllMeasureAreTold) {
+TEST(JointProjectionTest, ArmsBeyondAllMeasureAreReported) {
   const Scene scene = test_scenes::SceneOf(R"({"bodies": [
       {"name": "a", "mass": 0.8, "inertia": 0.01, "position": [0, -0.2], "angle": -1.57},
       {"name": "b", "mass": 0.4, "inertia": 0.01, "position": [0, -0.55], "angle": -1.57}],

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "../../support/drift.h"
+#include "../../support/random_matrix.h"
 #include "../../support/scenes.h"
 #include "tangible/simulation/stepping/joint_projection.h"
 #include "tangible/simulation/stepping/rollout.h"
@@ -98,7 +99,7 @@ TEST(ProjectionDescentTest, DerivativesAreThoseOfTheMinimum) {
     }
     RowMatrixXd w_dot = RowMatrixXd::Zero(s.num_variables(), 1);
     for (const int body : s.moving) {
-      w_dot.middleRows(s.PoseVariable(body, 0), 3).setRandom();
+      w_dot.middleRows(s.PoseVariable(body, 0), 3) = testing::RandomMatrix(3, 1, body);
     }
     const RowMatrixXd direction = w_dot;
     State<double> projected = state;

@@ -16,7 +16,7 @@ std::vector<Study> TwoCases() {
   return studies;
 }
 
-TEST(Report, TellsBrokenBounds) {
+TEST(Report, NamesBrokenBounds) {
   std::vector<Study> studies = TwoCases();
   EXPECT_TRUE(BrokenBounds(studies).empty());
   studies[2].errors[1].over_bound = 3.0;  // drop, trapezoidal

@@ -119,7 +119,7 @@ TEST(RunInChildTest, FilesAreNoMemory) {
   EXPECT_EQ(outcome.status, ChildStatus::kOverBytes);
 }
 
-TEST(RunInChildTest, TellsWhatFailed) {
+TEST(RunInChildTest, NamesWhatFailed) {
   const ChildOutcome refused = RunInChild({}, [](const ChildLimits&, std::string* error) {
     *error = "no such scene";
     return std::vector<double>{1.0};

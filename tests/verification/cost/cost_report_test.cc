@@ -38,7 +38,7 @@ TEST(CostTextTest, ShowsTimesMemoryAndWhatIsOver) {
   EXPECT_EQ(text.find("170"), std::string::npos);
 }
 
-TEST(CostTextTest, TellsCrossoversAndBounds) {
+TEST(CostTextTest, ListsCrossoversAndBounds) {
   const std::string crossovers =
       CrossoverText({{100, CostMethod::kAdjoint, CostMethod::kDifferences, 1.0, true},
                      {100, CostMethod::kTape, CostMethod::kDifferences, std::nan(""), false},

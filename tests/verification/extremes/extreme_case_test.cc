@@ -18,7 +18,7 @@ TEST(FigureTest, HoldsWithinItsBoundOnBothSides) {
   EXPECT_FALSE((Figure{"x", 1e-300, 0.0, "m", ""}.holds()));
 }
 
-TEST(FigureTest, WhatIsToldMustBeFinite) {
+TEST(FigureTest, AReportedFigureMustBeFinite) {
   EXPECT_TRUE((Figure{"x", 1e300, kReported, "m", ""}.holds()));
   EXPECT_FALSE((Figure{"x", std::nan(""), kReported, "m", ""}.holds()));
   EXPECT_FALSE((Figure{"x", HUGE_VAL, kReported, "m", ""}.holds()));

@@ -82,7 +82,7 @@ TEST(AddGradientTest, MethodsAgreeOnAFall) {
   EXPECT_TRUE(finding.gradient.holds());
 }
 
-TEST(AddGradientTest, AnUnknownParameterIsTold) {
+TEST(AddGradientTest, AnUnknownParameterIsAnError) {
   Finding finding;
   AddGradient(FallingDisc(10.0), 5, {"bodies/nobody/mass"}, Differences::kSkip, &finding);
   EXPECT_NE(finding.gradient.message, "");

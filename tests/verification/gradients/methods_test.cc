@@ -45,7 +45,7 @@ TEST(MethodsTest, TheCertificateNamesTheParameterAtAKink) {
   EXPECT_EQ(run.named[1], "");
 }
 
-TEST(MethodsTest, ARunThatFailsIsTold) {
+TEST(MethodsTest, ARunThatFailsHasAMessage) {
   const Scene scene = PressedBox();
   const MethodJacobians run = RunMethods(scene, {PathTo(scene, "bodies/box/mass")});
   EXPECT_FALSE(run.done);

@@ -39,7 +39,7 @@ TEST(DifferencesTest, StepsOfOneSizeAreGivenWithTheirModes) {
   }
 }
 
-TEST(DifferencesTest, AKinkAtTheValueIsToldAndItsContactNamed) {
+TEST(DifferencesTest, AKinkAtTheValueIsReportedWithItsContact) {
   // A box that neither slides nor is pushed sticks; with friction it slides at any speed.
   Scene scene = SlidingBox("0.3");
   scene.bodies[0].velocity.x() = 0.3 * 9.81 * 0.01;  // stops exactly at the end of its first step

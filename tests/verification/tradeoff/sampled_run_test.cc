@@ -87,7 +87,7 @@ TEST_F(SampledRunTest, NothingDependsOnWhatDoesNotMatter) {
   EXPECT_TRUE(std::isnan(GradientError(ScaleOf(scene_, parameters_, run), run, run)));
 }
 
-TEST_F(SampledRunTest, FailuresAreTold) {
+TEST_F(SampledRunTest, FailuresHaveAMessage) {
   scene_.simulation.stepping = Stepping::kFixed;
   EXPECT_EQ(Run().message.find("/simulation/integrator"), 0u);
 }
