@@ -3,6 +3,7 @@ include(CMakePackageConfigHelpers)
 
 install(FILES "${TANGIBLE_INCLUDE_DIR}/tangible/config/jet_widths.h"
         DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/tangible/config)
+install(FILES "${PROJECT_SOURCE_DIR}/lib/tangible.h" DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/tangible)
 install(EXPORT tangible_targets FILE tangibleTargets.cmake NAMESPACE tangible::
         DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/tangible)
 configure_package_config_file("${PROJECT_SOURCE_DIR}/lib/cmake/tangibleConfig.cmake.in"

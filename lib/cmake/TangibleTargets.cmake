@@ -5,6 +5,7 @@ include(GNUInstallDirs)
 # links in the build tree gives each module its installed name.
 set(TANGIBLE_INCLUDE_DIR "${PROJECT_BINARY_DIR}/include")
 file(MAKE_DIRECTORY "${TANGIBLE_INCLUDE_DIR}/tangible/config")
+file(CREATE_LINK "${PROJECT_SOURCE_DIR}/lib/tangible.h" "${TANGIBLE_INCLUDE_DIR}/tangible/tangible.h" SYMBOLIC)
 
 # The scalar list: a macro that applies X to each Jet width.
 set(TANGIBLE_JET_LIST "")

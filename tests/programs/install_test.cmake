@@ -25,12 +25,28 @@ foreach(header IN LISTS headers)
 endforeach()
 file(WRITE "${WORK_DIR}/all_headers.cc" "${includes}")
 
+# The README's program in C++ is built and run too, from the top of the tree.
+cmake_path(GET SOURCE_DIR PARENT_PATH top)
+cmake_path(GET top PARENT_PATH top)
+cmake_path(GET top PARENT_PATH top)
+file(READ "${top}/README.md" readme)
+string(REGEX MATCH "```cpp\n([^`]*)```" block "${readme}")
+set(program "${CMAKE_MATCH_1}")
+string(REGEX MATCH "// (-[^\n]*)\n" comment "${program}")
+set(printed "${CMAKE_MATCH_1}")
+file(WRITE "${WORK_DIR}/readme.cc" "${program}")
+
 run("${CMAKE_COMMAND}" -S "${SOURCE_DIR}" -B "${WORK_DIR}/build" -G Ninja "-DCMAKE_PREFIX_PATH=${prefix}"
-    "-DCONSUMER_MORE_SOURCES=${WORK_DIR}/all_headers.cc"
+    "-DCONSUMER_MORE_SOURCES=${WORK_DIR}/all_headers.cc" "-DREADME_SOURCE=${WORK_DIR}/readme.cc"
     "-DCMAKE_BUILD_TYPE=${BUILD_TYPE}" "-DCMAKE_CXX_COMPILER=${CXX}" "-DCMAKE_CXX_FLAGS=${CXX_FLAGS}")
 run("${CMAKE_COMMAND}" --build "${WORK_DIR}/build")
 run("${WORK_DIR}/build/consumer")
 message(STATUS "${output}")
+run("${CMAKE_COMMAND}" -E chdir "${top}" "${WORK_DIR}/build/readme")
+string(STRIP "${output}" output)
+if(printed STREQUAL "" OR NOT output STREQUAL printed)
+  message(FATAL_ERROR "README.md: its program in C++ prints '${output}', and its comment says '${printed}'")
+endif()
 
 # Nothing that is installed may point back into the trees it came from.
 file(GLOB_RECURSE configs "${prefix}/lib*/cmake/*.cmake")

@@ -1,4 +1,4 @@
-"""The README's code prints what stands behind it."""
+"""The code of the READMEs prints what stands behind it."""
 
 from __future__ import annotations
 
@@ -7,11 +7,14 @@ import io
 import re
 from pathlib import Path
 
-README = Path(__file__).resolve().parents[2] / "lib" / "python" / "README.md"
+import pytest
+
+TOP = Path(__file__).resolve().parents[2]
 
 
-def test_code_prints_its_comments() -> None:
-    blocks = re.findall(r"```python\n(.*?)```", README.read_text(encoding="utf-8"), re.DOTALL)
+@pytest.mark.parametrize("readme", ["README.md", "lib/python/README.md"])
+def test_code_prints_its_comments(readme: str) -> None:
+    blocks = re.findall(r"```python\n(.*?)```", (TOP / readme).read_text(encoding="utf-8"), re.DOTALL)
     assert blocks
     names: dict[str, object] = {}
     for block in blocks:
@@ -19,5 +22,5 @@ def test_code_prints_its_comments() -> None:
         assert expected
         output = io.StringIO()
         with contextlib.redirect_stdout(output):
-            exec(compile(block, str(README), "exec"), names)
+            exec(compile(block, readme, "exec"), names)
         assert output.getvalue().splitlines() == expected
