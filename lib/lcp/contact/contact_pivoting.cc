@@ -14,6 +14,8 @@ namespace {
 
 // Maximum number of rounds in which sliding contacts that would pull are opened before the start.
 constexpr int kMaxStartRounds = 30;
+// From this number of contacts on refinement costs a path more than digits that it does not need.
+constexpr size_t kLeastContactsUnrefined = 12;
 
 bool Slides(ContactMode mode) {
   return mode == ContactMode::kSlidingPositive || mode == ContactMode::kSlidingNegative;
@@ -91,7 +93,11 @@ bool ContactPivoting::SolveSystem() {
       x_[2 * row + 3] = -shift.a_t;
     }
   }
-  system_->SolveRegularised(p, modes_, x_.data(), 2);
+  if (regularisation_ > kUnrefined && modes_.size() >= kLeastContactsUnrefined) {
+    system_->SolveUnrefined(p, modes_, x_.data(), 2);
+  } else {
+    system_->SolveRegularised(p, modes_, x_.data(), 2);
+  }
   return std::all_of(x_.begin(), x_.end(), [](double x) { return std::isfinite(x); });
 }
 

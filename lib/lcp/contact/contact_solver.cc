@@ -25,6 +25,10 @@ constexpr size_t kFewContacts = 8;
 constexpr int kMaxProximalRounds = 40;
 // Contacts whose modes have been changed this often are changed one at a time, the worst first.
 constexpr int kMaxChangesTogether = 3;
+// From this number of contacts on a guess of which more than a few impulses are beyond their limits
+// is given up for a descent. With fewer contacts pivots are as fast.
+constexpr size_t kLeastContactsOfDescent = 12;
+constexpr int kFewBeyond = 4;
 
 }  // namespace
 
@@ -34,6 +38,10 @@ const char* NameOf(Rung rung) {
       return "direct";
     case Rung::kModeChanges:
       return "mode_changes";
+    case Rung::kDescent:
+      return "descent";
+    case Rung::kPivotingFromDescent:
+      return "pivoting_from_descent";
     case Rung::kPivotingFromGuess:
       return "pivoting_from_guess";
     case Rung::kInteriorPoint:
@@ -71,6 +79,7 @@ void ContactSolver::Reserve(int num_bodies, int num_joints, int num_contacts) {
   const int edges = 2 * (num_joints + num_contacts) + num_joints;
   system_.Reserve(blocks, edges);
   interior_point_.lu.Reserve(blocks, edges);
+  descent_.Reserve(num_bodies, num_joints, num_contacts);
   pivoting_.Reserve(blocks, num_contacts);
   interior_point_.edges.reserve(edges);
   for (std::vector<double>* x :
@@ -101,26 +110,27 @@ void ContactSolver::SetCentre(const ContactSolution<double>& solution) {
 }
 
 bool ContactSolver::SolveWithModes(const ContactProblem<double>& problem,
-                                   ContactSolution<double>* solution, ContactSolverReport* report) {
+                                   ContactSolution<double>* solution, ContactSolverReport* report,
+                                   int most_beyond) {
   ++report->factorisations;
   // The solve starts from the last impulses where impulses may not be unique.
   const auto open = std::count(solution->modes.begin(), solution->modes.end(), ContactMode::kOpen);
   const bool choice = static_cast<long>(solution->modes.size()) - open > 1 ||
                       (problem.redundant_joints && !problem.joints.empty());
-  return mode_solve_.Solve(problem, choice ? &centre_ : nullptr, &system_, solution);
+  return mode_solve_.Solve(problem, choice ? &centre_ : nullptr, &system_, solution, most_beyond);
 }
 
 bool ContactSolver::SolveByModeChanges(const ContactProblem<double>& problem,
                                        const ContactSolverOptions& options,
                                        ContactSolution<double>* solution,
-                                       ContactSolverReport* report) {
+                                       ContactSolverReport* report, int most_beyond) {
   const size_t num_contacts = problem.contacts.size();
   changes_.assign(num_contacts, 0);
   SetCentre(*solution);
   int last_contradicted = static_cast<int>(num_contacts);
   double last_residual = HUGE_VAL;
   for (int round = 0; round < kMaxRounds; ++round) {
-    if (!SolveWithModes(problem, solution, report)) {
+    if (!SolveWithModes(problem, solution, report, most_beyond)) {
       return false;
     }
     scales_.Compute(problem, *solution);
@@ -166,6 +176,23 @@ bool ContactSolver::SolveByModeChanges(const ContactProblem<double>& problem,
     last_contradicted = contradicted > 0 ? contradicted : static_cast<int>(num_contacts);
   }
   return false;
+}
+
+bool ContactSolver::SolveByDescent(const ContactProblem<double>& problem,
+                                   const ContactSolverOptions& options,
+                                   ContactSolution<double>* solution, ContactSolverReport* report) {
+  *solution = entry_;
+  descent_.Solve(problem, &system_, solution, &report->factorisations);
+  trial_ = *solution;
+  report->rung = Rung::kDescent;
+  if (SolveByModeChanges(problem, options, &trial_, report)) {
+    std::swap(*solution, trial_);
+    return true;
+  }
+  ++report->fallbacks.pivoting;
+  report->rung = Rung::kPivotingFromDescent;
+  return SolveByPivoting(problem, options, ContactPivoting::From::kModes, kPivotsFromGuess,
+                         kMaxProximalRounds, solution, report);
 }
 
 bool ContactSolver::Polish(const ContactProblem<double>& problem,
@@ -334,8 +361,13 @@ ContactSolverReport ContactSolver::RunPortfolio(const ContactProblem<double>& pr
   }
   entry_ = *solution;
   const bool any = options.choice == SolverChoice::kAuto;
-  if (any && SolveByModeChanges(problem, options, solution, &report)) {
+  const bool many = problem.contacts.size() >= kLeastContactsOfDescent;
+  const int most_beyond = many ? kFewBeyond : std::numeric_limits<int>::max();
+  if (any && SolveByModeChanges(problem, options, solution, &report, most_beyond)) {
     return done(Rung::kModeChanges);
+  }
+  if (any && many && SolveByDescent(problem, options, solution, &report)) {
+    return done(report.rung);
   }
   const int num_contacts = static_cast<int>(problem.contacts.size());
   if (any) {

@@ -8,9 +8,10 @@
 //    solved again, as long as fewer are contradicted from round to round. Where rows are redundant
 //    each solve is a proximal step from the last impulses, which change as little as the data
 //    require.
-// 2. Pivoting from the guess (contact_pivoting.h) with a bounded number of pivots: it searches
-//    among the impulses of redundant rows where the guess is nearly right. It counts as part of the
-//    guess.
+// 2. Where there are many contacts, a descent from the guess (contact_descent.h), which changes many
+//    modes at a time, and pivoting (contact_pivoting.h) from where it ends; then pivoting from the
+//    guess. Both have a bounded number of pivots: they search among the impulses of redundant rows
+//    where modes are nearly right. All count as part of the guess.
 // 3. Mehrotra's interior point (contact_interior_point.h), and pivoting from its modes where
 //    margins are too small to read the modes from it.
 // 4. Pivoting from all contacts open; for problems that are not proved infeasible pivoting from
@@ -25,8 +26,10 @@
 // decide between them: the impulses are extrapolated along their last change until one reaches its
 // limit.
 
+#include <limits>
 #include <vector>
 
+#include "tangible/lcp/contact/contact_descent.h"
 #include "tangible/lcp/contact/contact_interior_point.h"
 #include "tangible/lcp/contact/contact_pivoting.h"
 #include "tangible/lcp/contact/tolerances.h"
@@ -44,6 +47,8 @@ enum class Rung : unsigned char {
   kNone,
   kDirect,                     ///< no contacts: one linear system
   kModeChanges,                ///< the guess's modes, changed where they are contradicted
+  kDescent,                    ///< sweeps and subspace solves from the guess
+  kPivotingFromDescent,        ///< pivots from where these end
   kPivotingFromGuess,          ///< pivots from the guess
   kInteriorPoint,              ///< the interior point, polished
   kPivotingFromInteriorPoint,  ///< pivots from its modes
@@ -105,11 +110,18 @@ class ContactSolver {
                                    ContactSolution<double>* solution);
   // The proximal step from the centre's impulses with the solution's modes.
   bool SolveWithModes(const ContactProblem<double>& problem, ContactSolution<double>* solution,
-                      ContactSolverReport* report);
+                      ContactSolverReport* report,
+                      int most_beyond = std::numeric_limits<int>::max());
   void SetCentre(const ContactSolution<double>& solution);
+  // False at once where more than `most_beyond` impulses are plainly beyond their limits in the
+  // solution of the given modes.
   bool SolveByModeChanges(const ContactProblem<double>& problem,
                           const ContactSolverOptions& options, ContactSolution<double>* solution,
-                          ContactSolverReport* report);
+                          ContactSolverReport* report,
+                          int most_beyond = std::numeric_limits<int>::max());
+  // A descent, then pivots from where it ends.
+  bool SolveByDescent(const ContactProblem<double>& problem, const ContactSolverOptions& options,
+                      ContactSolution<double>* solution, ContactSolverReport* report);
   bool SolveByInteriorPoint(const ContactProblem<double>& problem,
                             const ContactSolverOptions& options, ContactSolution<double>* solution,
                             ContactSolverReport* report);
@@ -130,6 +142,7 @@ class ContactSolver {
               ContactSolution<double>* solution, ContactSolverReport* report);
 
   ContactSystem system_;
+  ContactDescent descent_;
   ContactPivoting pivoting_;
   InteriorPointWorkspace<double> interior_point_;
   ModeSolve mode_solve_;

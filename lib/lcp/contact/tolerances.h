@@ -58,4 +58,15 @@ inline constexpr double kInteriorPointGoals[] = {1e-10, 1e-14, 1e-18, 1e-22,
 /// alternate with one value settle with another.
 inline constexpr double kRegularisationAgainstCycling[] = {1e-9, 1e-10, kLeastRegularisation};
 
+/// Of the r M⁻¹ rᵀ of the row: δ of the first subspace solves of a descent.
+inline constexpr double kDescentRegularisation = 1e-2;
+/// Of the r M⁻¹ rᵀ of the row: δ of the active-set steps that follow; with the last one rows that
+/// contradict each other by rounding are decided.
+inline constexpr double kSettlingRegularisation[] = {1e-4, 1e-7, 1e-10};
+/// Of the r M⁻¹ rᵀ of the row: with a larger δ a solve has enough digits for modes without
+/// refinement.
+inline constexpr double kUnrefined = 5e-8;
+/// Of the fastest body's speed, over δ: rounding of the speeds of a solve without refinement.
+inline constexpr double kSolveRounding = 1e-15;
+
 }  // namespace tangible

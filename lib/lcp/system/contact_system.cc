@@ -365,13 +365,17 @@ double ContactSystem::SolveRegularised(const ContactProblem<double>& problem,
 }
 
 double ContactSystem::SolveProximal(const ContactProblem<double>& problem,
-                                    const std::vector<ContactMode>& modes, double* x, int columns) {
+                                    const std::vector<ContactMode>& modes, double* x, int columns,
+                                    const std::function<bool()>& hopeless) {
   if (!regularised_) {
     return Solve(problem, modes, x, columns);
   }
   const size_t size = 3 * static_cast<size_t>(num_blocks()) * columns;
   rhs_.assign(x, x + size);
   SolveOnce<false>(problem, modes, x, columns);
+  if (hopeless && hopeless()) {
+    return HUGE_VAL;
+  }
   const FreeMomenta free = {problem.scale_load().data(), 1};
   const double left =
       Refine<false>(problem, modes, Regularisation::kLeftOut, free, x, columns, kResidualGoal);

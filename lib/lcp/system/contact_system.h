@@ -29,6 +29,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <utility>
 #include <vector>
 
@@ -87,11 +88,17 @@ class ContactSystem {
   /// contradict each other. Returns as Solve does.
   double SolveRegularised(const ContactProblem<double>& problem,
                           const std::vector<ContactMode>& modes, double* x, int columns);
+  /// The same without refinement: for modes that are still guesses.
+  void SolveUnrefined(const ContactProblem<double>& problem, const std::vector<ContactMode>& modes,
+                      double* x, int columns) const {
+    SolveOnce<false>(problem, modes, x, columns);
+  }
   /// The proximal step, and further ones as long as each halves the residual that δ causes: this
   /// gives the solution of K without δ where there is one, the regularised solution where redundant
-  /// rows contradict each other. Returns as Solve does.
+  /// rows contradict each other. Returns as Solve does. `hopeless`, if given, sees x before it is
+  /// refined; where it returns true the solve ends there, with an infinite residual.
   double SolveProximal(const ContactProblem<double>& problem, const std::vector<ContactMode>& modes,
-                       double* x, int columns);
+                       double* x, int columns, const std::function<bool()>& hopeless = {});
   /// δ of every row, 3 num_blocks; 0 but on rows of closed contacts and of joints in loops.
   const std::vector<double>& regularisation() const { return regularisation_; }
 

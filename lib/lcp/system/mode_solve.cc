@@ -2,6 +2,8 @@
 #include "tangible/lcp/system/mode_solve.h"
 
 #include <algorithm>
+#include <cmath>
+#include <functional>
 
 namespace tangible {
 
@@ -11,8 +13,37 @@ void ModeSolve::Reserve(size_t rows) {
   }
 }
 
+// The contacts whose impulses start_ + x_ are plainly beyond their limits.
+int ModeSolve::CountBeyond(const ContactProblem<double>& problem,
+                           const std::vector<ContactMode>& modes,
+                           const std::vector<int>& block_of) const {
+  const auto normal_of = [&](size_t i) {
+    const size_t row = 3 * static_cast<size_t>(block_of[i]);
+    return start_[row] + x_[row];
+  };
+  double largest = 0.0;
+  for (size_t i = 0; i < modes.size(); ++i) {
+    largest = block_of[i] < 0 ? largest : std::max(largest, std::abs(normal_of(i)));
+  }
+  const double plainly = kPlainlyBeyond * largest;
+  int beyond = 0;
+  for (size_t i = 0; i < modes.size(); ++i) {
+    if (block_of[i] < 0) {
+      continue;
+    }
+    const size_t row = 3 * static_cast<size_t>(block_of[i]);
+    const double normal = normal_of(i);
+    const bool pulls = normal < -plainly;
+    const bool slips =
+        modes[i] == ContactMode::kSticking &&
+        std::abs(start_[row + 1] + x_[row + 1]) > problem.contacts[i].friction * normal + plainly;
+    beyond += pulls || slips ? 1 : 0;
+  }
+  return beyond;
+}
+
 bool ModeSolve::Solve(const ContactProblem<double>& problem, const ContactSolution<double>* centre,
-                      ContactSystem* system, ContactSolution<double>* solution) {
+                      ContactSystem* system, ContactSolution<double>* solution, int most_beyond) {
   const std::vector<ContactMode>& modes = solution->modes;
   if (!system->Factor(problem, modes)) {
     return false;
@@ -51,7 +82,11 @@ bool ModeSolve::Solve(const ContactProblem<double>& problem, const ContactSoluti
     // The solution is x0 + K⁻¹ (rhs − K x0).
     x_.resize(rhs_.size());
     system->Residual<false>(problem, modes, rhs_.data(), start_.data(), 1, x_.data());
-    system->SolveProximal(problem, modes, x_.data(), 1);
+    const auto hopeless = [&] { return CountBeyond(problem, modes, block_of) > most_beyond; };
+    const double left = system->SolveProximal(problem, modes, x_.data(), 1, std::cref(hopeless));
+    if (std::isinf(left)) {
+      return false;
+    }
     for (size_t i = 0; i < x_.size(); ++i) {
       x_[i] += start_[i];
     }

@@ -38,4 +38,8 @@ inline constexpr double kRowRank = 1e-10;
 /// the error of poses.
 inline constexpr double kPushRank = 1e-7;
 
+/// Of the largest normal impulse: a guess of which many impulses exceed their limits by more is
+/// given up before its solve is refined.
+inline constexpr double kPlainlyBeyond = 1e-3;
+
 }  // namespace tangible

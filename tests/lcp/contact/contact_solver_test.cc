@@ -156,7 +156,8 @@ TEST(ContactSolverTest, WhatASolveLeansOnIsCounted) {
     if (report.solved) {
       EXPECT_EQ(report.rung > Rung::kPivotingFromGuess, f.interior_point > 0) << trial;
       EXPECT_EQ(report.rung > Rung::kPivotingFromInteriorPoint, f.lemke > 0) << trial;
-      EXPECT_EQ(report.rung == Rung::kModeChanges, f.pivoting == 0) << NameOf(report.rung);
+      EXPECT_EQ(report.rung == Rung::kModeChanges || report.rung == Rung::kDescent, f.pivoting == 0)
+          << NameOf(report.rung);
     } else {
       EXPECT_EQ(report.rung, Rung::kNone) << NameOf(report.rung);
     }
@@ -166,7 +167,7 @@ TEST(ContactSolverTest, WhatASolveLeansOnIsCounted) {
     EXPECT_EQ(Solve(p, SolverChoice::kInteriorPoint, &solution).fallbacks.interior_point, 0);
     EXPECT_EQ(Solve(p, SolverChoice::kLemke, &solution).fallbacks.lemke, 0);
   }
-  EXPECT_LT(sum.pivoting, 60);
+  EXPECT_LT(sum.pivoting, 90);  // at most three paths a problem
   EXPECT_LT(sum.interior_point, sum.pivoting);
   EXPECT_GT(sum.dense, 0);
   EXPECT_GT(sum.extrapolation, 0);
