@@ -10,7 +10,6 @@
 #include "tangible/scene/scene_names.h"
 #include "tangible/simulation/certificate/certify.h"
 #include "tangible/simulation/derivatives/rollout_directional.h"
-#include "tangible/simulation/derivatives/rollout_tangent.h"
 #include "tangible/simulation/gradient/gradient_methods.h"
 #include "tangible/simulation/stepping/joint_opening.h"
 
@@ -59,7 +58,13 @@ std::string CheckNumbers(const GradientProblem& problem) {
 using OutputSeed = std::function<MatrixX<double>(const VectorX<double>& values)>;
 
 GradientProblem MakeProblem(const Scene& scene, const std::vector<ParameterPath>& parameters) {
-  GradientProblem problem{scene, parameters, {}, BuildStructure(scene), {}, {}, {}};
+  GradientProblem problem{scene, parameters, {}, BuildStructure(scene),
+                          {},    {},         {}, RolloutFunction::OfFinalState(scene, parameters),
+                          {}};
+  problem.input.parameters.resize(static_cast<Eigen::Index>(parameters.size()));
+  for (size_t i = 0; i < parameters.size(); ++i) {
+    problem.input.parameters[static_cast<Eigen::Index>(i)] = parameters[i].value;
+  }
   BuildModelWithStructure(scene, problem.structure, &problem.model, &problem.initial);
   for (const ParameterPath& parameter : parameters) {
     problem.directions.push_back(DirectionOf(parameter));
@@ -84,51 +89,64 @@ bool ReportTape(const Checkpointing& checkpointing, const RolloutTape& tape,
   return true;
 }
 
-// Derivatives of the losses with respect to the parameters: losses x parameters.
-bool ByAdjoint(const GradientProblem& problem, const TapeOptions& options,
-               const OutputSeed& output_seed, RolloutTape* tape, GradientResult* result,
-               RowMatrixXd* derivative) {
-  const Eigen::SparseMatrix<double> map =
-      VariableJacobian(problem.scene, problem.structure, problem.directions);
-  State<double> final;
-  const RolloutReport report = tape->Record(problem.model, problem.initial, options, {}, &final);
-  result->message = FailureOf(problem, report);
-  if (!result->message.empty()) {
-    return false;
+// The rollout of the one function (rollout_function.h), at the scene's own values: takes its
+// message, values and fallbacks; false where it failed.
+bool Take(const GradientProblem& problem, const RolloutOutput& output, GradientResult* result) {
+  result->message = FailureOf(problem, output.report);
+  if (result->message.empty()) result->message = output.message;
+  if (!result->message.empty()) return false;
+  result->values = output.states.row(0).transpose();
+  result->fallbacks = output.fallbacks;
+  if (output.fallbacks > 0) {
+    result->notes.push_back(
+        std::to_string(output.fallbacks) +
+        " steps by the implicit derivative: the unrolled interior point failed");
   }
-  result->values = problem.Outputs(final);
-  const MatrixX<double> at_outputs = output_seed(result->values);
-  const long steps = tape->steps();
-  RowMatrixXd w_bar;
-  tape->Adjoint(
-      problem.model, static_cast<int>(at_outputs.cols()),
-      [&](long k, RowMatrixXd* bar) {
-        for (size_t i = 0; k == steps && i < problem.output_variables.size(); ++i) {
-          bar->row(problem.output_variables[i]) += at_outputs.row(static_cast<Eigen::Index>(i));
-        }
-      },
-      &w_bar);
-  *derivative = (map.transpose() * w_bar).transpose();
-  return ReportTape(options.checkpointing, *tape, result);
+  return true;
 }
 
-bool ByTangent(const GradientProblem& problem, DerivativeSide side, GradientResult* result) {
-  const bool by_events = problem.structure->settings.stepping == Stepping::kEvent;
-  if (by_events && side != DerivativeSide::kBoth && !IsTrustworthyMap(result->certificate)) {
-    return internal::JacobianBySides(problem, side, result);
+// Derivatives of the losses with respect to the parameters: losses x parameters.
+bool ByAdjoint(const GradientProblem& problem, const TapeOptions& options,
+               const OutputSeed& output_seed, RolloutWorker* worker, GradientResult* result,
+               RowMatrixXd* derivative) {
+  if (!Take(problem, worker->Record(problem.input, options), result)) return false;
+  const MatrixX<double> at_outputs = output_seed(result->values);
+  std::vector<RowMatrixXd> bars;
+  for (const auto& bar : at_outputs.colwise()) bars.emplace_back(bar.transpose());
+  const std::vector<InputDirection> adjoints = worker->Adjoint(bars);
+  derivative->resize(static_cast<Eigen::Index>(bars.size()), problem.input.parameters.size());
+  for (size_t i = 0; i < bars.size(); ++i) {
+    derivative->row(static_cast<Eigen::Index>(i)) = adjoints[i].parameters.transpose();
+  }
+  return ReportTape(options.checkpointing, worker->tape(), result);
+}
+
+bool ByRollouts(const GradientProblem& problem, GradientMethod method, RolloutWorker* worker,
+                GradientResult* result) {
+  GradientMethod used = method;
+  return Take(problem,
+              worker->Jacobian(problem.input, method, RolloutWorker::Inputs::kParameters,
+                               &result->jacobian, &used),
+              result);
+}
+
+bool ByTangent(const GradientProblem& problem, DerivativeSide side, RolloutWorker* worker,
+               GradientResult* result) {
+  if (side == DerivativeSide::kBoth) {
+    return ByRollouts(problem, GradientMethod::kTangent, worker, result);
+  }
+  if (problem.structure->settings.stepping == Stepping::kEvent) {
+    return IsTrustworthyMap(result->certificate)
+               ? ByRollouts(problem, GradientMethod::kTangent, worker, result)
+               : internal::JacobianBySides(problem, side, result);
   }
   RowMatrixXd w_dot =
       VariableJacobian(problem.scene, problem.structure, problem.directions).toDense();
   State<double> final;
-  RolloutReport report;
-  if (side == DerivativeSide::kBoth || by_events) {
-    report = RolloutTangent(problem.model, problem.initial, {}, &w_dot, &final);
-  } else {
-    const double sign = side == DerivativeSide::kPlus ? 1.0 : -1.0;
-    w_dot *= sign;
-    report = RolloutDirectional(problem.model, problem.initial, &w_dot, &final);
-    w_dot = (sign * w_dot).array() + 0.0;  // no −0
-  }
+  const double sign = side == DerivativeSide::kPlus ? 1.0 : -1.0;
+  w_dot *= sign;
+  const RolloutReport report = RolloutDirectional(problem.model, problem.initial, &w_dot, &final);
+  w_dot = (sign * w_dot).array() + 0.0;  // no −0
   result->message = FailureOf(problem, report);
   if (!result->message.empty()) {
     return false;
@@ -138,36 +156,34 @@ bool ByTangent(const GradientProblem& problem, DerivativeSide side, GradientResu
   for (size_t i = 0; i < problem.output_variables.size(); ++i) {
     result->jacobian.row(static_cast<Eigen::Index>(i)) = w_dot.row(problem.output_variables[i]);
   }
-  return by_events || side == DerivativeSide::kBoth ||
-         internal::EdgesBySides(problem, side, result);
+  return internal::EdgesBySides(problem, side, result);
 }
 
 // All methods except the adjoint: they compute the whole Jacobian, with which the gradient of a
 // loss is multiplied.
 bool ByColumns(const GradientProblem& problem, const GradientOptions& options,
-               GradientResult* result) {
+               RolloutWorker* worker, GradientResult* result) {
   result->notes.clear();
   result->fallbacks = 0;
   switch (options.method) {
     case GradientMethod::kTangent:
-      return ByTangent(problem, options.side, result);
+      return ByTangent(problem, options.side, worker, result);
     case GradientMethod::kJet:
-      return internal::JacobianByJets(problem, JetRoute::kUnrolled, result);
     case GradientMethod::kJetImplicit:
-      return internal::JacobianByJets(problem, JetRoute::kImplicit, result);
+      return ByRollouts(problem, options.method, worker, result);
     default:
       return internal::JacobianByDifferences(problem, options.step, result);
   }
 }
 
 bool RunMethod(const GradientProblem& problem, const GradientOptions& options,
-               const OutputSeed& output_seed, RolloutTape* tape, GradientResult* result,
+               const OutputSeed& output_seed, RolloutWorker* worker, GradientResult* result,
                RowMatrixXd* derivative) {
   if (options.method == GradientMethod::kAdjoint) {
-    return ByAdjoint(problem, {options.factorisations, options.checkpointing}, output_seed, tape,
+    return ByAdjoint(problem, {options.factorisations, options.checkpointing}, output_seed, worker,
                      result, derivative);
   }
-  if (!ByColumns(problem, options, result)) {
+  if (!ByColumns(problem, options, worker, result)) {
     return false;
   }
   *derivative = output_seed(result->values).transpose() * result->jacobian;
@@ -267,14 +283,14 @@ GradientResult Differentiate(const GradientProblem& problem, const GradientOptio
   if (sides) {
     result.certificate = CertificateOf(problem);
   }
-  RolloutTape tape;
+  RolloutWorker worker(problem.function);
   Stepper stepper(problem.model);
   for (int i = 0; i < std::max(1, options.repeat); ++i) {
     if (!TimeRollout(problem, &stepper, &result)) {
       return result;
     }
     const double start = ThreadCpuSeconds();
-    if (!RunMethod(problem, options, output_seed, &tape, &result, derivative)) {
+    if (!RunMethod(problem, options, output_seed, &worker, &result, derivative)) {
       return result;
     }
     result.all_seconds.push_back(ThreadCpuSeconds() - start);

@@ -6,7 +6,7 @@
 #include <functional>
 #include <memory>
 
-#include "tangible/simulation/gradient/gradient.h"
+#include "tangible/simulation/gradient/rollout_function.h"
 
 namespace tangible::internal {
 
@@ -19,6 +19,8 @@ struct GradientProblem {
   Model<double> model;
   State<double> initial;
   std::vector<int> output_variables;  ///< pose and twist variables, in the order of the outputs
+  RolloutFunction function;
+  RolloutInput input;  ///< the scene's own
 
   VectorX<double> Outputs(const State<double>& state) const;
 };
@@ -34,6 +36,5 @@ bool JacobianBySides(const GradientProblem& problem, DerivativeSide side, Gradie
 /// Of fixed steps, whose directional derivatives do not resolve them: replaces the columns of
 /// parameters that are an end of a force's window on a step's end by those from tangents beside.
 bool EdgesBySides(const GradientProblem& problem, DerivativeSide side, GradientResult* result);
-bool JacobianByJets(const GradientProblem& problem, JetRoute route, GradientResult* result);
 
 }  // namespace tangible::internal

@@ -115,6 +115,20 @@ std::string RolloutFunction::Create(const Scene& scene, const std::vector<std::s
   return "";
 }
 
+RolloutFunction RolloutFunction::OfFinalState(const Scene& scene,
+                                              const std::vector<ParameterPath>& parameters) {
+  RolloutFunction function;
+  function.scene_ = scene;
+  function.structure_ = BuildStructure(scene);
+  function.outputs_ = OutputVariables(*function.structure_);
+  function.parameters_ = parameters;
+  for (const ParameterPath& parameter : parameters) {
+    function.directions_.push_back(DirectionOf(parameter));
+  }
+  function.records_ = {function.num_steps()};
+  return function;
+}
+
 std::vector<double> RolloutFunction::record_times() const {
   std::vector<double> times;
   for (const long k : records_) times.push_back(StepTime(structure_->settings, k));
@@ -325,12 +339,12 @@ RolloutOutput RolloutWorker::Tangent(const RolloutInput& input,
   return output;
 }
 
-RolloutOutput RolloutWorker::Record(const RolloutInput& input) {
+RolloutOutput RolloutWorker::Record(const RolloutInput& input, const TapeOptions& options) {
   RolloutOutput output;
   if (Set(input, &output)) {
     RunAs(
         [&](ControlledModel<double>* model, const StateObserver& keep) {
-          return tape_.Record(model, initial_, TapeOptions{}, keep, &output.final);
+          return tape_.Record(model, initial_, options, keep, &output.final);
         },
         &output);
   }
@@ -567,6 +581,7 @@ bool RolloutWorker::JetPass(JetRoute route, Eigen::Index first, RowMatrixXd* jac
   State<Jet<N>> final;
   output->report = RolloutJets<Jet<N>>(f_.num_controls() == 0 ? &plain : &controlled, state, route,
                                        keep, &final, &fallbacks);
+  output->fallbacks += fallbacks;
   output->final = ValuesOf(final);
   output->status = StatusOf(output->report.status);
   output->message = output->report.message;
@@ -581,7 +596,9 @@ void RolloutWorker::JacobianByJets(JetRoute route, RowMatrixXd* jacobian, Rollou
         "methods jet and jet_implicit: no width of Jets was built (TANGIBLE_JET_WIDTHS is empty)";
   } else {
     bool good = true;
-    for (Eigen::Index first = 0; good && first < jacobian->cols(); first += kWidth) {
+    // Without columns one pass gives the states.
+    for (Eigen::Index first = 0; good && (first == 0 || first < jacobian->cols());
+         first += kWidth) {
       good = JetPass<kWidth>(route, first, jacobian, output);
     }
   }
@@ -689,7 +706,7 @@ std::vector<RolloutOutput> RolloutBatch::Record(std::vector<RolloutInput> inputs
                      tapes_[i] = std::make_unique<RolloutWorker>(function_);
                    }
                    outputs[i] = tapes_[i]->Record(inputs_[i]);
-                   bytes += tapes_[i]->tape_bytes();
+                   bytes += tapes_[i]->tape().bytes();
                  });
   statuses_.clear();
   for (const RolloutOutput& output : outputs) statuses_.push_back(output.status);

@@ -53,6 +53,7 @@ struct RolloutOutput {
   RowMatrixXd states;   ///< rows of steps that were not reached are NaN
   State<double> final;  ///< of all bodies: the last good state; the start's where nothing was run
   RolloutReport report;
+  long fallbacks = 0;  ///< of unrolled Jets: steps that took the implicit derivative
 };
 
 /// The definition of the function, which does not change with the input.
@@ -64,6 +65,10 @@ class RolloutFunction {
   /// a file, settings that the engine does not support, a step beyond the run.
   std::string Create(const Scene& scene, const std::vector<std::string>& parameters,
                      const std::vector<std::string>& controls, const std::vector<long>& records);
+  /// The final state as a function of resolved parameters, of which two may set the same number.
+  /// Nothing is checked.
+  static RolloutFunction OfFinalState(const Scene& scene,
+                                      const std::vector<ParameterPath>& parameters);
 
   const Scene& scene() const { return scene_; }
   const ModelStructure& structure() const { return *structure_; }
@@ -116,9 +121,9 @@ class RolloutWorker {
                         std::vector<RowMatrixXd>* tangents);
   /// Record records a run; Adjoint may then be called repeatedly until the next call of any other
   /// member, and returns one adjoint for each of `bars` (num_records x num_states).
-  RolloutOutput Record(const RolloutInput& input);
-  /// Memory of the tape that Record keeps, bytes.
-  size_t tape_bytes() const { return tape_.bytes(); }
+  RolloutOutput Record(const RolloutInput& input, const TapeOptions& options = {});
+  /// What Record keeps.
+  const RolloutTape& tape() const { return tape_; }
   std::vector<InputDirection> Adjoint(const std::vector<RowMatrixXd>& bars);
   enum class Inputs { kParameters, kAll };
   /// The Jacobian has a row for each output, num_records num_states in all; columns for parameters
