@@ -15,6 +15,7 @@
 #include "tangible/simulation/derivatives/rollout_directional.h"
 #include "tangible/simulation/derivatives/tolerances.h"
 #include "tangible/simulation/events/tolerances.h"
+#include "tangible/simulation/stepping/tolerances.h"
 
 namespace tangible {
 namespace {
@@ -260,6 +261,7 @@ void RolloutCertifier::AddStep(const Model<double>& model, long step, Stepper* s
     return;
   }
   AddDiscreteMap(model, step, at);
+  stepper->ChooseImpulses();
   const StepRecord& record = stepper->record();
   const ModelStructure& s = *model.structure;
   landing_.clear();

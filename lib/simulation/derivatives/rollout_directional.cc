@@ -9,6 +9,7 @@
 #include "tangible/lcp/contact/tolerances.h"
 #include "tangible/lcp/system/contact_residual.h"
 #include "tangible/simulation/derivatives/tolerances.h"
+#include "tangible/simulation/stepping/tolerances.h"
 
 namespace tangible {
 
@@ -192,6 +193,7 @@ StepDirectional::Status StepDirectional::SolveOne(const Model<double>& model,
 
 bool StepDirectional::Apply(const Model<double>& model, Stepper* stepper, RowMatrixXd* w_dot,
                             std::string* message) {
+  stepper->ChooseImpulses();
   const StepRecord& record = stepper->record();
   if (!FindKinks(model, record, record.solution, *w_dot)) {
     RowMatrixXd smooth = *w_dot;

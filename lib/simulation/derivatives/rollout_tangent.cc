@@ -58,6 +58,7 @@ int StepTangent::FixNumbers(const ModelStructure& s, const RowMatrixXd& w_dot) {
 }
 
 void StepTangent::Assemble(const Model<double>& model, Stepper* stepper, const RowMatrixXd& w_dot) {
+  stepper->ChooseImpulses();
   const StepRecord& record = stepper->record();
   ContactSystem& system = stepper->system();
   const int columns = static_cast<int>(w_dot.cols());

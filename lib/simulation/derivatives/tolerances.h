@@ -6,9 +6,6 @@
 
 namespace tangible {
 
-/// Of the scales of impulse and slack: impulses and slacks below it count as 0; it lies two orders
-/// of magnitude above the error of a solve.
-inline constexpr double kDegenerateTolerance = 1e-10;
 /// Of speeds that the step changes: how far a step's linearised problem is moved along a direction,
 /// to choose among impulses that are not unique.
 inline constexpr double kLinearisedWay = 1e-6;

@@ -9,6 +9,7 @@
 #include "tangible/lcp/system/contact_residual.h"
 #include "tangible/math/interrupt.h"
 #include "tangible/simulation/events/segment_flow.h"
+#include "tangible/simulation/stepping/tolerances.h"
 
 namespace tangible {
 namespace {
@@ -342,6 +343,14 @@ ContactSolverReport Stepper::SolveContacts(const ContactSolverOptions& options, 
   return report;
 }
 
+void Stepper::ChooseImpulses() {
+  if (chosen_ || events_) return;
+  chosen_ = true;
+  if (inner_impulses_.Choose(record_.problem, kDegenerateTolerance, &record_.solution)) {
+    factored_ = false;
+  }
+}
+
 ContactSystem& Stepper::system() {
   if (!factored_) {
     solver_.system().Factor(record_.problem, record_.solution.modes);
@@ -404,6 +413,7 @@ StepReport Stepper::Step(const Model<double>& model, double t, double h, State<d
   StepRecord& r = record_;
   r.time = t;
   r.h = h;
+  chosen_ = false;
   r.before.pose.assign(state->pose.begin(), state->pose.end());
   r.before.twist.assign(state->twist.begin(), state->twist.end());
   AssembleWithoutContacts(model, *state, t, h, &r.problem, &scratch_);
@@ -443,10 +453,12 @@ StepReport Stepper::Step(const Model<double>& model, double t, double h, State<d
 }
 
 void Stepper::TakeRecord(StepRecord* record, ContactSystem* system) {
+  ChooseImpulses();
   if (system != nullptr) {
     this->system().MoveFactorsTo(system);
   }
   factored_ = true;
+  chosen_ = true;
   std::swap(*record, record_);
   if (system == nullptr || !system->needs_problem()) {
     std::swap(record->problem, record_.problem);

@@ -18,6 +18,7 @@
 #include <vector>
 
 #include "tangible/dynamics/assembly/contact_search.h"
+#include "tangible/lcp/contact/contact_inner_impulses.h"
 #include "tangible/lcp/contact/contact_islands.h"
 #include "tangible/lcp/contact/contact_solver.h"
 #include "tangible/simulation/islands/island_derivative.h"
@@ -85,6 +86,11 @@ class Stepper {
   bool by_events() const { return events_ != nullptr; }
   IslandStepper& events() { return *events_; }
   IslandDerivative& event_derivative() { return event_derivative_; }
+  /// Among the last step's impulses, which redundant contacts may share in many ways, chooses a
+  /// share with the fewest contacts at a limit (contact_inner_impulses.h); the motion keeps its bits, and so
+  /// does the next step. Derivatives use it: call it before record() and system(). Nothing by
+  /// events.
+  void ChooseImpulses();
   /// The mode system, factorised with the last step's modes.
   ContactSystem& system();
   JointProjection& projection() { return projection_; }
@@ -129,6 +135,8 @@ class Stepper {
   ContactSolver solver_;
   std::unique_ptr<IslandSolver> islands_;
   bool factored_ = true;  ///< whether solver_.system() is that of record_
+  bool chosen_ = true;    ///< whether ChooseImpulses was done for record_
+  InnerImpulses inner_impulses_;
   JointProjection projection_;
   AssemblyScratch<double> scratch_;
   StepRecord record_;

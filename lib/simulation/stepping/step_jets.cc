@@ -42,6 +42,7 @@ template <typename T>
 void StepImplicit(const Model<T>& model, Stepper* stepper, const State<double>& after,
                   State<T>* state) {
   constexpr int kWidth = NumDerivatives<T>::value;
+  stepper->ChooseImpulses();
   const StepRecord& record = stepper->record();
   const ModelStructure& s = *model.structure;
   ContactProblem<T> problem;

@@ -4,6 +4,8 @@
 
 #include <string>
 #include <tuple>
+#include <utility>
+#include <vector>
 
 #include "../../support/gradients.h"
 #include "../../support/scenes.h"
@@ -90,28 +92,64 @@ TEST(GradientSidesTest, AForceThatBeginsOrEndsOnAFixedStepsEnd) {
   }
 }
 
-// Ten boxes at rest, four in the lowest row, whose two in the third row a spring pulls together:
-// redundant contacts share their friction in many ways, one of which is at its limit.
-TEST(GradientSidesTest, NothingMovesAPileAtRest) {
+// Rows of `lowest`, `lowest` − 1, ... boxes at rest, of which a spring pulls two of the last row but
+// one together.
+Scene PileOf(int lowest, const char* friction, Stepping stepping) {
   std::string bodies;
-  int number = 0;
-  for (int row = 0; row < 4; ++row) {
-    for (int i = 0; i < 4 - row; ++i) {
-      bodies += (number > 0 ? ", " : "") + std::string(R"({"name": "b)") + std::to_string(number) +
-                R"(", "shape": {"box": {"size": [0.3, 0.2]}}, "mass": 1, "friction": 0.5,
-                    "position": [)" +
-                std::to_string(0.35 * i + 0.175 * row) + ", " + std::to_string(0.1 + 0.2 * row) +
-                "]}";
-      ++number;
+  std::vector<std::string> centres;
+  for (int row = 0; row < lowest; ++row) {
+    for (int i = 0; i < lowest - row; ++i) {
+      centres.push_back(std::to_string(0.35 * i + 0.175 * row) + ", " +
+                        std::to_string(0.1 + 0.2 * row));
+      bodies += (centres.size() > 1 ? ", " : "") + std::string(R"({"name": "b)") +
+                std::to_string(centres.size() - 1) +
+                R"(", "shape": {"box": {"size": [0.3, 0.2]}}, "mass": 1, "friction": )" + friction +
+                R"(, "position": [)" + centres.back() + "]}";
     }
   }
-  const Scene scene = Of(bodies, R"(, "springs": [{"name": "s", "bodies": ["b7", "b8"],
-      "anchors": [[0.35, 0.5], [0.7, 0.5]], "stiffness": 10, "rest_length": 0.25}])");
-  for (const char* path : {"bodies/b7/velocity/x", "bodies/b7/mass", "gravity/y"}) {
-    for (const DerivativeSide side : {DerivativeSide::kPlus, DerivativeSide::kMinus}) {
-      const GradientResult result = Sided(scene, path, side);
-      ASSERT_TRUE(result.done) << path << " " << result.message;
-      EXPECT_LE(result.jacobian.cwiseAbs().maxCoeff(), 1e-9) << path;
+  const size_t count = centres.size();
+  Scene scene =
+      Of(bodies, R"(, "springs": [{"name": "s", "bodies": ["b)" + std::to_string(count - 3) +
+                     R"(", "b)" + std::to_string(count - 2) + R"("], "anchors": [[)" +
+                     centres[count - 3] + "], [" + centres[count - 2] +
+                     R"(]], "stiffness": 10, "rest_length": 0.25}])");
+  scene.simulation.stepping = stepping;
+  if (stepping == Stepping::kFixed) scene.simulation.integrator.reset();
+  return scene;
+}
+
+// Redundant contacts share their friction in many ways, one of which is at its limit.
+TEST(GradientSidesTest, NothingMovesAPileAtRest) {
+  for (const Stepping stepping : {Stepping::kEvent, Stepping::kFixed}) {
+    const Scene scene = PileOf(4, "0.5", stepping);
+    for (const char* path : {"bodies/b7/velocity/x", "bodies/b7/mass", "gravity/y"}) {
+      for (const DerivativeSide side : {DerivativeSide::kPlus, DerivativeSide::kMinus}) {
+        const GradientResult result = Sided(scene, path, side);
+        ASSERT_TRUE(result.done) << path << " " << result.message;
+        EXPECT_LE(result.jacobian.cwiseAbs().maxCoeff(), 1e-9) << path;
+      }
+    }
+  }
+}
+
+// What both sides agree on is the derivative, by every method and without an alarm.
+TEST(GradientSidesTest, APileAtRestHasNoKinks) {
+  for (const auto& [lowest, friction] :
+       {std::pair(4, "0.5"), std::pair(4, "0.3"), std::pair(5, "0.25"), std::pair(3, "0.8")}) {
+    const Scene scene = PileOf(lowest, friction, Stepping::kFixed);
+    const std::vector<std::string> paths = {"bodies/b4/velocity/x", "bodies/b4/mass", "gravity/y",
+                                            "bodies/*/friction", "springs/s/stiffness"};
+    for (const GradientMethod method : {GradientMethod::kTangent, GradientMethod::kAdjoint,
+                                        GradientMethod::kJet, GradientMethod::kJetImplicit}) {
+      GradientOptions options;
+      options.method = method;
+      const GradientResult result =
+          FinalStateJacobian(scene, testing::Resolve(scene, paths), options);
+      ASSERT_TRUE(result.done) << result.message;
+      EXPECT_LE(result.jacobian.cwiseAbs().maxCoeff(), 1e-12)
+          << lowest << " boxes in the lowest row, friction " << friction << ", "
+          << static_cast<int>(method);
+      EXPECT_EQ(result.certificate.verdict, "trustworthy") << lowest << ", " << friction;
     }
   }
 }
