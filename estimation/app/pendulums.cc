@@ -78,6 +78,8 @@ int Main(int argc, char** argv) {
     Print(result);
     all.push_back(PendulumToJson(result));
   }
+  const std::string over = OutputOverInput();
+  if (!over.empty()) return ReportError(over, kExitUsage);
   if (!FLAGS_out.empty()) {
     const std::string error = WriteFileAtomically(FLAGS_out, all.dump(2) + "\n");
     if (!error.empty()) {

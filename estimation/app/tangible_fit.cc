@@ -473,13 +473,10 @@ int Prepare(const std::string& text, const std::string& file, Prepared* prepared
                        ": --compare_motion: expected a scene with fixed steps, got event "
                        "stepping, whose derivatives are those of the motion");
   }
-  error = OutputOverInput({"out", "report", "scene_out", "predictions", "checkpoint"});
-  if (error.empty()) {
-    error = SceneOverOther(*prepared->problem);
-  }
-  if (!error.empty()) {
-    return ReportError("tangible-fit: " + error, kExitUsage);
-  }
+  error = OutputOverInput();
+  if (!error.empty()) return ReportError(error, kExitUsage);
+  error = SceneOverOther(*prepared->problem);
+  if (!error.empty()) return ReportError("tangible-fit: " + error, kExitUsage);
   error = OpenCheckpoint(prepared->fit.input, &prepared->checkpoint);
   return error.empty() ? kExitDone : ReportError(error);
 }

@@ -94,6 +94,12 @@ std::string CompleteFlag(int argc, char** argv, const ProgramInfo& info, FlagTex
   return "";
 }
 
+// What ParseCommandLine was called with.
+ProgramInfo& Parsed() {
+  static ProgramInfo info;
+  return info;
+}
+
 // A file that the command line names, and the argument that names it.
 struct NamedFile {
   std::string word;
@@ -266,6 +272,7 @@ std::string PendingFile::Commit() {
 }  // namespace
 
 CommandLine ParseCommandLine(int argc, char** argv, const ProgramInfo& info) {
+  Parsed() = info;
   CommandLine line;
   bool only_positional = false;
   for (int i = 1; i < argc; ++i) {
@@ -413,15 +420,15 @@ bool IsSameFile(const std::string& a, const std::string& b) {
   return !error_a && !error_b && canonical_a == canonical_b;
 }
 
-std::string OutputOverInput(const std::vector<std::string>& flags) {
+std::string OutputOverInput() {
   const std::vector<std::string> inputs = FilesRead();
-  for (const std::string& flag : flags) {
+  for (const std::string& flag : Parsed().outputs) {
     std::string path;
     if (!gflags::GetCommandLineOption(flag.c_str(), &path) || path.empty()) continue;
     for (const std::string& input : inputs) {
       if (IsSameFile(path, input)) {
-        return "--" + flag +
-               std::string(": expected a file of its own, got that of an input, ").append(path);
+        return Parsed().name + ": --" + flag +
+               ": expected a file of its own, got that of an input, " + path;
       }
     }
   }

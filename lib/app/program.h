@@ -109,10 +109,10 @@ std::string WriteFileAtomically(const std::string& path, std::string_view text,
 /// Whether two paths are of one file, there or not.
 bool IsSameFile(const std::string& a, const std::string& b);
 
-/// "--report: expected a file of its own, got that of an input, PATH" where a flag names a file
-/// that was read; empty where none does. To be called before the work, after all inputs have been
-/// read.
-std::string OutputOverInput(const std::vector<std::string>& flags);
+/// "tangible-fit: --report: expected a file of its own, got that of an input, PATH" where one of the
+/// program's outputs names a file that was read, also one that another input names; empty where
+/// none does. To be called before the work, after all inputs have been read; status kExitUsage.
+std::string OutputOverInput();
 
 /// Writes a result to `out_path`, or to stdout if that is empty. Returns an error or empty.
 std::string WriteResult(const std::string& out_path, std::string_view text);

@@ -444,8 +444,8 @@ int Main(int argc, char** argv) {
   ControlFile file;
   std::string error;
   if (!LoadControlFile(line.positional[0], &file, &error)) return ReportError(error);
-  const std::string over = OutputOverInput({"out", "plan", "trajectory", "view"});
-  if (!over.empty()) return ReportError("tangible-control: " + over, kExitUsage);
+  const std::string over = OutputOverInput();
+  if (!over.empty()) return ReportError(over, kExitUsage);
   return FLAGS_mpc ? Predict(line.positional[0], file) : Plan(line.positional[0], file);
 }
 

@@ -203,8 +203,8 @@ int Run(const std::string& file, const GradientOptions& options) {
                        ": /simulation/stepping: expected fixed with --compare_motion, got "
                        "event, whose derivative is that of the motion");
   }
-  error = OutputOverInput({"out"});
-  if (!error.empty()) return ReportError("tangible-gradient: " + error, kExitUsage);
+  error = OutputOverInput();
+  if (!error.empty()) return ReportError(error, kExitUsage);
   GradientResult result;
   std::vector<LossTerm> terms;
   if (FLAGS_loss.empty()) {

@@ -189,8 +189,8 @@ int Run(const std::string& file) {
   Job job;
   Prepare(file, &job);
   if (!job.error.empty()) return ReportError(job.error);
-  const std::string over = OutputOverInput({"out", "contacts", "view", "summary", "observe"});
-  if (!over.empty()) return ReportError("tangible-simulate: " + over, kExitUsage);
+  const std::string over = OutputOverInput();
+  if (!over.empty()) return ReportError(over, kExitUsage);
   Done run;
   RunWarnings warnings(job.model, job.initial);
   run.start = WallSeconds();

@@ -12,6 +12,7 @@
 #include <cstring>
 #include <mutex>
 #include <set>
+#include <vector>
 
 namespace tangible {
 namespace {
@@ -175,23 +176,45 @@ std::string JoinPath(const std::string& folder, const std::string& path) {
 }
 
 std::string OneLine(std::string_view text) {
-  if (text.size() > kMaxMessage) {
-    constexpr std::size_t kHalf = kMaxMessage / 2;
-    return OneLine(text.substr(0, kHalf)) + " ... " + OneLine(text.substr(text.size() - kHalf));
-  }
-  std::string line;
-  while (!text.empty()) {
-    const Character character = FirstOf(text);
-    if (character.code >= '\t' && character.code <= '\r') {
-      line += ' ';
-    } else if (!character.valid || IsControl(character.code)) {
-      line += Escaped(character);
-    } else {
-      line += text.substr(0, character.size);
+  // Both ends are written as they will be read: an escaped character has up to six bytes.
+  constexpr std::string_view kLeftOut = " … ";
+  constexpr std::size_t kHalf = (kMaxMessage - kLeftOut.size()) / 2;
+  const auto written = [](std::string_view part) {
+    std::vector<std::string> characters;
+    while (!part.empty()) {
+      const Character character = FirstOf(part);
+      const bool space = character.code >= '\t' && character.code <= '\r';
+      const bool shown = character.valid && !IsControl(character.code);
+      characters.push_back(space   ? " "
+                           : shown ? std::string(part.substr(0, character.size))
+                                   : Escaped(character));
+      part.remove_prefix(character.size);
     }
-    text.remove_prefix(character.size);
+    return characters;
+  };
+  const auto joined = [](auto begin, auto end) {
+    std::string line;
+    for (; begin != end; ++begin) line += *begin;
+    return line;
+  };
+  const bool is_long = text.size() > kMaxMessage;
+  std::vector<std::string> head = written(is_long ? text.substr(0, kHalf + 4) : text);
+  if (std::string line = joined(head.begin(), head.end()); !is_long && line.size() <= kMaxMessage) {
+    return line;
   }
-  return line;
+  std::size_t from = is_long ? text.size() - kHalf : 0;
+  for (int k = 0; k < 3 && (static_cast<unsigned char>(text[from]) & 0xc0U) == 0x80U; ++k) ++from;
+  const std::vector<std::string> tail = written(text.substr(from));
+  std::size_t size = 0;
+  const auto fits = [&size](const std::string& character) {
+    size += character.size();
+    return size <= kHalf;
+  };
+  const auto first_left_out = std::find_if_not(head.begin(), head.end(), fits);
+  size = 0;
+  const auto last_left_out = std::find_if_not(tail.rbegin(), tail.rend(), fits).base();
+  return joined(head.begin(), first_left_out) + std::string(kLeftOut) +
+         joined(last_left_out, tail.end());
 }
 
 }  // namespace tangible

@@ -14,7 +14,7 @@ namespace tangible {
 inline constexpr std::size_t kMaxFileSize = std::size_t{1} << 30;
 
 /// Longer messages are cut in the middle: the beginning says where and what, the end what was got.
-inline constexpr std::size_t kMaxMessage = 1000;
+inline constexpr std::size_t kMaxMessage = 500;
 
 /// Reads a whole file; false and "file: cannot be read: why" if that fails. All inputs of all
 /// programs are read here. Only regular files of at most kMaxFileSize are read: a pipe, a device, a
@@ -42,7 +42,8 @@ std::string JoinPath(const std::string& folder, const std::string& path);
 
 /// The text as a terminal can show it on one line. Line breaks and tabs become spaces; other
 /// control characters, characters that change the direction of writing, and bytes that are not
-/// UTF-8 are written as \x1b, \u202e and \xff. Beyond kMaxMessage bytes it is cut in the middle.
+/// UTF-8 are written as \x1b, \u202e and \xff. The middle of a line of more than kMaxMessage bytes, as
+/// written, is left out (…).
 std::string OneLine(std::string_view text);
 
 }  // namespace tangible

@@ -11,6 +11,7 @@
 #include <nlohmann/json.hpp>
 #include <random>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -161,6 +162,46 @@ TEST_F(FaultsTest, OutputsOverInputsThatAFileNames) {
           "expected a file of its own, got that of an input");
       EXPECT_EQ(Read(Path(file)), before);
     }
+  }
+}
+
+// A signal's file that the scene names, in every program that reads a scene.
+TEST_F(FaultsTest, OutputsOverAFileThatTheSceneNames) {
+  Write("push.csv", "time,x,y\n0,0,0\n1,0.1,0\n");
+  json struck =
+      json::parse(Read(std::string(TANGIBLE_SOURCE_DIR) + "/data/control/struck_ball.json"));
+  struck["forces"] = {{{"name", "wind"}, {"body", "ball"}, {"force", {{"file", "push.csv"}}}}};
+  Write("struck.json", struck.dump());
+  json ball = json::parse(kBall);
+  ball["forces"] = {{{"name", "wind"}, {"body", "ball"}, {"force", {{"file", "push.csv"}}}}};
+  Write("blown.json", ball.dump());
+  for (const auto& [program, arguments, flags] :
+       {std::tuple("tangible-verify", "blown.json", std::vector<std::string>{"out", "report"}),
+        std::tuple("tangible-tradeoff", "blown.json",
+                   std::vector<std::string>{"out", "report", "picture"}),
+        std::tuple("tangible-bounce", "struck.json", std::vector<std::string>{"out"}),
+        std::tuple("tangible-gradient", "blown.json --parameters=gravity/y",
+                   std::vector<std::string>{"out"}),
+        std::tuple("tangible-simulate", "blown.json", std::vector<std::string>{"out", "view"})}) {
+    for (const std::string& flag : flags) {
+      SCOPED_TRACE(std::string(program) + " --" + flag);
+      ExpectOneLine(RunIn("", {program, arguments, {}}, "--" + flag + "=push.csv", "> /dev/null"),
+                    2,
+                    std::string(program) + ": --" + flag +
+                        ": expected a file of its own, got that of an input, push.csv");
+      EXPECT_EQ(Read(Path("push.csv")).rfind("time,x,y", 0), 0u);
+    }
+  }
+}
+
+TEST_F(FaultsTest, FlagsOfTheChainStudyOutsideTheirRange) {
+  const std::string chain = "'" + std::string(TANGIBLE_SOURCE_DIR) + "/data/scenes/chain.json'";
+  for (const char* flag : {"--seed=-1", "--rate=1e300", "--rate=0", "--rate=nan", "--sigma=0",
+                           "--sigma=-1", "--range=0.5", "--starts=-1", "--replicas=-1"}) {
+    SCOPED_TRACE(flag);
+    const std::string name = std::string(flag).substr(0, std::string(flag).find('='));
+    ExpectOneLine(RunIn("", {"tangible-chain-study", chain, {}}, flag, "> /dev/null"), 2,
+                  "tangible-chain-study: " + name + ": expected a number");
   }
 }
 

@@ -164,10 +164,22 @@ TEST(OneLineTest, KeepsTextAndWritesOutWhatATerminalWouldObey) {
   EXPECT_EQ(OneLine("\xf5\x80\x80\x80"), "\\xf5\\x80\\x80\\x80");
   const std::string once = OneLine("\x1b\xff\n");
   EXPECT_EQ(OneLine(once), once);
-  const std::string cut = OneLine("begin" + std::string(1000000, 'x') + "end");
-  EXPECT_LE(cut.size(), kMaxMessage + 8);
-  EXPECT_EQ(cut.find("begin"), 0u);
-  EXPECT_EQ(cut.substr(cut.size() - 3), "end");
+  // Long ones, also where only the escapes are, and characters at the cut stay whole.
+  for (const std::string middle : {std::string(1000000, 'x'), std::string(400, '\x1b'),
+                                   std::string(1000, '\x80'), std::string(1000, '\0')}) {
+    const std::string cut = OneLine("begin" + middle + "end");
+    EXPECT_LE(cut.size(), kMaxMessage);
+    EXPECT_GT(cut.size(), kMaxMessage - 20);
+    EXPECT_EQ(cut.find("begin"), 0u);
+    EXPECT_NE(cut.find(" … "), std::string::npos);
+    EXPECT_EQ(cut.substr(cut.size() - 3), "end");
+    EXPECT_EQ(OneLine(cut), cut);
+  }
+  for (int shift = 0; shift < 4; ++shift) {
+    std::string text(static_cast<size_t>(shift), 'a');
+    for (int k = 0; k < 300; ++k) text += "∇🙂";
+    EXPECT_EQ(OneLine(text).find('\\'), std::string::npos) << shift;
+  }
 }
 
 }  // namespace

@@ -120,6 +120,8 @@ int Main(int argc, char** argv) {
   if (!LoadScene(line.positional[0], &scene, &error)) return ReportError(error);
   error = bounce::CheckScene(scene);
   if (!error.empty()) return ReportError(line.positional[0] + ": " + error);
+  error = OutputOverInput();
+  if (!error.empty()) return ReportError(error, kExitUsage);
   const int cores = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
   Progress progress("problems", FLAGS_problems);
   const std::vector<bounce::Row> rows = bounce::Run(

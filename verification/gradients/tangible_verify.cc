@@ -136,6 +136,8 @@ int Run(const std::vector<std::string>& files, const std::vector<Stepping>& step
     const std::string error = AddFile(file, &jobs);
     if (!error.empty()) return ReportError(error);
   }
+  const std::string over = OutputOverInput();
+  if (!over.empty()) return ReportError(over, kExitUsage);
   for (const auto& [list, count] :
        {std::pair(RandomList::kScenes, FLAGS_random), std::pair(RandomList::kStarts, FLAGS_starts),
         std::pair(RandomList::kCoincidences, FLAGS_coincidences)}) {

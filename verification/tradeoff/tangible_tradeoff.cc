@@ -141,6 +141,8 @@ int Run(const std::vector<std::string>& files, const TradeoffOptions& options, T
     const std::string error = Load(files[i], options, &scenes[i], &parameters[i]);
     if (!error.empty()) return ReportError(error);
   }
+  const std::string over = OutputOverInput();
+  if (!over.empty()) return ReportError(over, kExitUsage);
   if (table) std::cout << ProvenanceLine() << "\n" << std::flush;
   std::vector<Tradeoff> tradeoffs;
   for (size_t i = 0; i < files.size(); ++i) {
