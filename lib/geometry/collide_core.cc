@@ -52,16 +52,9 @@ FaceQuery QueryFaces(const ConvexCore& faces, const ConvexCore& points) {
     if (!(edge.length > 0.0)) {
       continue;
     }
-    FaceQuery query{i, 0, kInfinity, edge};
-    for (int j = 0; j < points.Size(); ++j) {
-      const double height = edge.Height(points.VertexAt(j));
-      if (height < query.separation) {
-        query.vertex = j;
-        query.separation = height;
-      }
-    }
-    if (best.edge < 0 || query.separation > best.separation) {
-      best = query;
+    const auto [vertex, separation] = points.DeepestOver(edge);
+    if (best.edge < 0 || separation > best.separation) {
+      best = {i, vertex, separation, edge};
     }
   }
   return best;

@@ -253,15 +253,7 @@ void SeamPair::TryEdgeOfTiled(int i) {
   if (!(edge.length > 0.0) || (!seams_.edges[i].is_whole && seams_.edges[i].parts.empty())) {
     return;
   }
-  int deepest = 0;
-  double separation = kInfinity;
-  for (int j = 0; j < other_.Size(); ++j) {
-    const double height = edge.Height(other_.VertexAt(j));
-    if (height < separation) {
-      deepest = j;
-      separation = height;
-    }
-  }
+  const auto [deepest, separation] = other_.DeepestOver(edge);
   num_found_ = 0;
   AddEnds(FaceOfEdge(tiled_, i, edge), FaceAgainst(other_, deepest, edge.Normal()));
   const double along = edge.tangent.dot(other_.VertexAt(deepest) - edge.start);
@@ -276,15 +268,7 @@ void SeamPair::TryEdgeOfOther(int i) {
   if (!(edge.length > 0.0)) {
     return;
   }
-  int deepest = 0;
-  double separation = kInfinity;
-  for (int j = 0; j < tiled_.Size(); ++j) {
-    const double height = edge.Height(tiled_.VertexAt(j));
-    if (height < separation) {
-      deepest = j;
-      separation = height;
-    }
-  }
+  const auto [deepest, separation] = tiled_.DeepestOver(edge);
   num_found_ = 0;
   const CoreFace face = FaceOfEdge(other_, i, edge);
   AddEnds(FaceAgainst(tiled_, deepest, edge.Normal()), face);

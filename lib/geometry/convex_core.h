@@ -8,6 +8,7 @@
 // common origin near the pair, so that little is lost to rounding far from the world's origin.
 
 #include <cmath>
+#include <limits>
 
 #include "tangible/geometry/shape.h"
 
@@ -55,6 +56,20 @@ class ConvexCore {
       edge.tangent = along / edge.length;
     }
     return edge;
+  }
+
+  struct Deepest {
+    int vertex = 0;
+    double height = std::numeric_limits<double>::infinity();
+  };
+  /// The vertex of the least height above an edge's line, the first of equals.
+  Deepest DeepestOver(const CoreEdge& edge) const {
+    Deepest deepest;
+    for (int j = 0; j < size_; ++j) {
+      const double height = edge.Height(VertexAt(j));
+      if (height < deepest.height) deepest = {j, height};
+    }
+    return deepest;
   }
 
  private:

@@ -5,31 +5,23 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <cstdio>
-#include <cstdlib>
 #include <string>
 
+#include "expect.h"
 #include "run_scene.h"
 #include "tangible/app/control_problem.h"
 #include "tangible/control/model_predictive.h"
 
 namespace {
 
+using tangible::testing::Expect;
+using tangible::testing::ExpectOneLine;
+
 using tangible::ControlFile;
 using tangible::IlqrStatus;
 
 constexpr int kSteps = 4;
 constexpr int kIterations = 2;
-
-void Expect(bool holds, const char* what, const std::string& message) {
-  if (holds) return;
-  std::fprintf(stderr, "expected %s: %s\n", what, message.c_str());
-  std::abort();
-}
-
-void ExpectOneLine(const std::string& message) {
-  Expect(!message.empty() && message.find('\n') == std::string::npos, "one line", message);
-}
 
 void Shorten(ControlFile* file) {
   tangible::SimulationSettings& settings = file->scene.simulation;

@@ -4,22 +4,17 @@
 // as observations that read back to the same doubles, in ascending times for each name.
 #include <cmath>
 #include <cstdint>
-#include <cstdio>
-#include <cstdlib>
 #include <map>
 #include <string>
 
+#include "expect.h"
 #include "tangible/estimation/experiments/recording.h"
 #include "tangible/estimation/experiments/recording_table.h"
 #include "tangible/scene/csv.h"
 
 namespace {
 
-void Expect(bool holds, const char* what, const std::string& message) {
-  if (holds) return;
-  std::fprintf(stderr, "expected %s: %s\n", what, message.c_str());
-  std::abort();
-}
+using tangible::testing::Expect;
 
 void ExpectReadable(const std::string& csv, size_t least_rows) {
   tangible::CsvTable table;

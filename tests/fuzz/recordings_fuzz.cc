@@ -7,15 +7,16 @@
 
 #include <cmath>
 #include <cstdint>
-#include <cstdio>
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <string>
 
+#include "expect.h"
 #include "tangible/estimation/results/fit_json.h"
 
 namespace {
+
+using tangible::testing::Expect;
 
 constexpr char kBall[] = R"({
   "gravity": [0, -10],
@@ -24,12 +25,6 @@ constexpr char kBall[] = R"({
      "velocity": [0.5, -1], "restitution": 0.5, "friction": 0.2},
     {"name": "floor", "static": true, "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}}],
   "simulation": {"dt": 0.02, "duration": 0.1, "stepping": "event"}})";
-
-void Expect(bool holds, const char* what, const std::string& message) {
-  if (holds) return;
-  std::fprintf(stderr, "expected %s: %s\n", what, message.c_str());
-  std::abort();
-}
 
 // A folder with the scene, which is removed at exit.
 class Folder {

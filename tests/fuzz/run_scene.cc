@@ -3,10 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
-#include <cstdlib>
 #include <string>
 
+#include "expect.h"
 #include "tangible/dynamics/model/model.h"
 #include "tangible/dynamics/model/settings.h"
 #include "tangible/simulation/stepping/rollout.h"
@@ -17,12 +16,6 @@ namespace {
 constexpr size_t kMostBodies = 12;
 constexpr size_t kMostNumbers = 64;
 constexpr int kSteps = 4;
-
-void Expect(bool holds, const char* what, const std::string& message) {
-  if (holds) return;
-  std::fprintf(stderr, "expected %s: %s\n", what, message.c_str());
-  std::abort();
-}
 
 bool Finite(const State<double>& state) {
   const auto finite = [](double x) { return std::isfinite(x); };

@@ -3,11 +3,10 @@
 // they are or with the checksum that they should have: refused with one line, or read; what is read
 // is written and read again as the same bytes.
 #include <cstdint>
-#include <cstdio>
-#include <cstdlib>
 #include <string>
 #include <string_view>
 
+#include "expect.h"
 #include "tangible/estimation/vision/checksum.h"
 #include "tangible/estimation/vision/disc_data.h"
 #include "tangible/estimation/vision/training_file.h"
@@ -15,15 +14,8 @@
 
 namespace {
 
-void Expect(bool holds, const char* what, const std::string& message) {
-  if (holds) return;
-  std::fprintf(stderr, "expected %s: %s\n", what, message.c_str());
-  std::abort();
-}
-
-void ExpectOneLine(const std::string& message) {
-  Expect(!message.empty() && message.find('\n') == std::string::npos, "one line", message);
-}
+using tangible::testing::Expect;
+using tangible::testing::ExpectOneLine;
 
 // The bytes of a data set with the size and the checksum of its body.
 std::string WithChecksum(const std::string& bytes) {

@@ -24,14 +24,13 @@
 
 DEFINE_string(parameters, "",
               "paths of the parameters of the given scenes, separated by commas; empty: all");
-DEFINE_int32(random, -1,
-             "number of random scenes; -1: 100 if neither scenes nor --starts are given, else 0");
+DEFINE_int32(random, -1, "number of random scenes; -1: 100 if nothing else is given, else 0");
 DEFINE_int32(starts, -1,
              "number of random scenes that start in contact, near what contacts can do; -1: 10 if "
-             "neither scenes nor --random are given, else 0");
-DEFINE_int32(coincidences, 0,
+             "nothing else is given, else 0");
+DEFINE_int32(coincidences, -1,
              "number of random scenes in which something happens exactly on a step's end, at the "
-             "start or the end, or twice at one instant");
+             "start or the end, or twice at one instant; -1: 10 if nothing else is given, else 0");
 DEFINE_int32(seed, 1, "of the first random scene of each kind; the next have the next seeds");
 DEFINE_string(stepping, "", "of random scenes: fixed, event or both; empty: all that there is");
 DEFINE_int32(threads, 0, "how many scenes are checked at the same time; 0: one a core");
@@ -46,6 +45,7 @@ namespace {
 constexpr int kMostRandom = 1000000;
 constexpr int kDefaultRandom = 100;
 constexpr int kDefaultStarts = 10;
+constexpr int kDefaultCoincidences = 10;
 
 // The steppings named by --stepping; empty with a line if there is none of this name.
 std::vector<Stepping> Steppings(std::string* error) {
@@ -63,23 +63,22 @@ std::vector<Stepping> Steppings(std::string* error) {
 // Empty, or one line about a flag's value.
 std::string CheckFlags(const std::vector<std::string>& files) {
   // Of −1, the default, the numbers follow below.
-  std::string outside =
-      FirstOutside({{"--random", FLAGS_random == -1 ? 0.0 : FLAGS_random, 0, kMostRandom},
-                    {"--starts", FLAGS_starts == -1 ? 0.0 : FLAGS_starts, 0, kMostRandom},
-                    {"--coincidences", FLAGS_coincidences, 0, kMostRandom},
-                    {"--seed", FLAGS_seed, 0},
-                    {"--threads", FLAGS_threads, 0, kMostThreads}});
+  std::string outside = FirstOutside(
+      {{"--random", FLAGS_random == -1 ? 0.0 : FLAGS_random, 0, kMostRandom},
+       {"--starts", FLAGS_starts == -1 ? 0.0 : FLAGS_starts, 0, kMostRandom},
+       {"--coincidences", FLAGS_coincidences == -1 ? 0.0 : FLAGS_coincidences, 0, kMostRandom},
+       {"--seed", FLAGS_seed, 0},
+       {"--threads", FLAGS_threads, 0, kMostThreads}});
   if (!outside.empty()) return outside;
   if (!FLAGS_parameters.empty() && files.empty()) {
     return "--parameters: of given scenes; random scenes choose theirs by their seed";
   }
   const bool is_asked =
-      !files.empty() || FLAGS_random != -1 || FLAGS_starts != -1 || FLAGS_coincidences > 0;
-  if (FLAGS_random == -1) {
-    FLAGS_random = is_asked ? 0 : kDefaultRandom;
-  }
-  if (FLAGS_starts == -1) {
-    FLAGS_starts = is_asked ? 0 : kDefaultStarts;
+      !files.empty() || FLAGS_random != -1 || FLAGS_starts != -1 || FLAGS_coincidences != -1;
+  for (const auto& [number, usual] :
+       {std::pair(&FLAGS_random, kDefaultRandom), std::pair(&FLAGS_starts, kDefaultStarts),
+        std::pair(&FLAGS_coincidences, kDefaultCoincidences)}) {
+    if (*number == -1) *number = is_asked ? 0 : usual;
   }
   if (FLAGS_random + FLAGS_starts + FLAGS_coincidences == 0 && files.empty() && !FLAGS_errata) {
     return "expected scenes, --random > 0, --starts > 0 or --coincidences > 0, got none";

@@ -67,10 +67,15 @@ class RolloutCertifier {
   double step_margin() const { return step_margin_; }
   /// Smallest relative distance to a decision at which values jump; infinite if there was none.
   double jump_margin() const { return jump_margin_; }
+  /// After Finish: leaves out of a certificate the contacts that are exactly at a kink, fixed steps
+  /// only. For directions that move none of them.
+  void LeaveOutKinks(Certificate* certificate) const;
 
  private:
   struct Place;
-  void AddMargin(double margin, const Place& place, const std::string& what);
+  enum class AtKink { kNo, kYes };
+  void AddMargin(double margin, const Place& place, const std::string& what,
+                 AtKink at_kink = AtKink::kNo);
   void AddJump(double margin, const Place& place, const std::string& what);
   void AddDiscreteMap(const Model<double>& model, long step, const StepRecord& record);
   void AddEventStep(const Model<double>& model, long step, Stepper* stepper);
@@ -120,6 +125,8 @@ class RolloutCertifier {
   std::optional<DiscreteMapWatch> discrete_map_;  ///< from the first fixed step on
   std::string made_last_;  ///< of the last step; empty if no contact was made in it
   double step_margin_ = std::numeric_limits<double>::infinity();
+  double margin_beside_ = std::numeric_limits<double>::infinity();  ///< without contacts at a kink
+  std::string beside_where_;
   double jump_margin_ = std::numeric_limits<double>::infinity();
   std::string jump_where_;
   std::string landing_;                ///< of the last step; empty if nothing landed in it
@@ -156,7 +163,9 @@ inline constexpr char kUndeterminedMotion[] =
     "redundant contacts that slide with different friction leave the motion undetermined";
 
 /// The certificate of the derivatives along `directions` (num_variables x columns, named; `sizes`
-/// as in DualityGap). It covers the rollout and, where rows are redundant (a box on a box), whether
+/// as in DualityGap). Contacts at a kink that no direction moves are left out: by fixed steps, where
+/// the derivatives along and against each direction and the tangent are the same after every step
+/// (a run with three tangents). It covers the rollout and, where rows are redundant (a box on a box), whether
 /// each direction is consistent with them (two rollouts). Where masses are very different, rows
 /// redundant, a system ill-conditioned or events many, `linear_residual` is at least the gap
 /// between tangent and adjoint (duality.h), both of which are run.

@@ -206,6 +206,47 @@ TEST(CertifyDerivativeTest, SaysThatADirectionContradictsRedundantRows) {
   }
 }
 
+// A box that is pushed with exactly its friction, beside one that slides.
+TEST(CertifyDerivativeTest, AKinkThatNoDirectionMovesIsLeftOut) {
+  const Scene scene = SceneOf(R"({"gravity": [0, -8], "bodies": [
+      {"name": "still", "shape": {"box": {"size": [0.5, 0.25]}}, "mass": 1,
+       "position": [0, 0.125], "friction": 0.5},
+      {"name": "slides", "shape": {"box": {"size": [0.5, 0.25]}}, "mass": 1,
+       "position": [2, 0.125], "velocity": [1, 0], "friction": 0.25},
+      {"name": "floor", "static": true, "friction": 0,
+       "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}}],
+    "pairs": [{"bodies": ["still", "floor"], "friction": 0.5},
+              {"bodies": ["slides", "floor"], "friction": 0.25}],
+    "forces": [{"name": "push", "body": "still", "force": [4, 0]}],
+    "simulation": {"dt": 0.0625, "duration": 0.25}})");
+  const auto certify = [&scene](const std::string& path) {
+    ParameterPath parameter;
+    std::string error;
+    EXPECT_TRUE(ResolveParameter(scene, path, &parameter, &error)) << error;
+    Model<double> model;
+    State<double> initial;
+    BuildModel(scene, &model, &initial);
+    return CertifyDerivative(
+        model, initial,
+        RowMatrixXd(VariableJacobian(scene, model.structure, {DirectionOf(parameter)})), {path},
+        {1.0});
+  };
+  for (const char* path : {"bodies/slides/velocity/x", "pairs/slides:floor/friction",
+                           "bodies/slides/mass", "bodies/still/position/x"}) {
+    const Certificate c = certify(path);
+    EXPECT_EQ(c.verdict, "trustworthy") << path;
+    EXPECT_EQ(c.degenerate_rows, 0) << path;
+    EXPECT_GT(c.margin_min, 1e-3) << path;
+  }
+  for (const char* path : {"forces/push/force/x", "bodies/still/velocity/x", "bodies/still/mass",
+                           "pairs/still:floor/friction", "gravity/y"}) {
+    const Certificate c = certify(path);
+    EXPECT_TRUE(StartsWith(c.verdict, "near a kink: kink of ")) << path << ": " << c.verdict;
+    EXPECT_GT(c.degenerate_rows, 0) << path;
+    EXPECT_LT(c.margin_min, 1e-9) << path;
+  }
+}
+
 TEST(CertifyRollout, EdgesOfForceWindowsOnStepsCountOnlyWhereTheyAreWanted) {
   const auto scene = [](double start) {
     return R"({"bodies": [{"name": "a", "mass": 1, "inertia": 1, "position": [0, 0]}],
