@@ -165,7 +165,7 @@ TEST(OneLineTest, KeepsTextAndWritesOutWhatATerminalWouldObey) {
   const std::string once = OneLine("\x1b\xff\n");
   EXPECT_EQ(OneLine(once), once);
   // Long ones, also where only the escapes are, and characters at the cut stay whole.
-  for (const std::string middle : {std::string(1000000, 'x'), std::string(400, '\x1b'),
+  for (const std::string& middle : {std::string(1000000, 'x'), std::string(400, '\x1b'),
                                    std::string(1000, '\x80'), std::string(1000, '\0')}) {
     const std::string cut = OneLine("begin" + middle + "end");
     EXPECT_LE(cut.size(), kMaxMessage);

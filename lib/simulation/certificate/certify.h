@@ -121,6 +121,7 @@ class RolloutCertifier {
 
   CertifyOptions options_;
   Certificate certificate_;
+  InnerImpulses inner_impulses_;
   std::optional<CoordinateWatch> coordinates_;    ///< from the first step on
   std::optional<DiscreteMapWatch> discrete_map_;  ///< from the first fixed step on
   std::string made_last_;  ///< of the last step; empty if no contact was made in it

@@ -261,18 +261,21 @@ void RolloutCertifier::AddFriction(const CoefficientSource& friction, const Plac
 void RolloutCertifier::AddSegment(const Model<double>& model, long step,
                                   EventDerivative* derivative, Segment* segment) {
   const ModelStructure& s = *model.structure;
+  // Of the shares that redundant contacts can have of the forces, one with the fewest at a limit.
   SolvedNode& start = segment->stages[0];
+  ContactSolution<double> share = start.solution;
+  inner_impulses_.Choose(start.problem, kDegenerateTolerance, &share);
   loaded_.clear();
   double largest = 0.0;
   for (size_t i = 0; i < segment->contacts.size(); ++i) {
     if (!segment->contacts[i].IsJointFriction()) {
-      largest = std::max(largest, start.solution.normal_impulse[i]);
+      largest = std::max(largest, share.normal_impulse[i]);
     }
   }
   for (size_t i = 0; i < segment->contacts.size(); ++i) {
     const ActiveContact& contact = segment->contacts[i];
     const Place place{&s, step, segment->time, i, &contact, segment->modes[i]};
-    const double normal = start.solution.normal_impulse[i];
+    const double normal = share.normal_impulse[i];
     const CoefficientSource& friction = segment->friction[i];
     const auto add_margin = [&](double margin, const char* what) {
       AddMargin(margin, place, what);
@@ -296,7 +299,8 @@ void RolloutCertifier::AddSegment(const Model<double>& model, long step,
                  segment->modes[&other - segment->contacts.data()] == ContactMode::kSticking;
         });
     const bool ends_at_once = segment->length == 0.0 && segment->event == EventKind::kSlipEnds;
-    if (SlidingSign(place.mode) != 0.0 && !shared && !ends_at_once &&
+    const bool sticks = share.modes[i] == ContactMode::kSticking;
+    if (SlidingSign(place.mode) != 0.0 && !sticks && !shared && !ends_at_once &&
         !KeepsSide(model, contact, derivative, segment)) {
       const double slip =
           std::max(SlipOf(model, segment->before, contact), SlipOf(model, segment->after, contact));
@@ -305,8 +309,8 @@ void RolloutCertifier::AddSegment(const Model<double>& model, long step,
       }
     }
     if (place.mode == ContactMode::kSticking && !segment->SticksWithEarlier(i)) {
-      const double above = segment->FrictionLeft(i, friction.value, 1.0, start.solution);
-      const double below = segment->FrictionLeft(i, friction.value, -1.0, start.solution);
+      const double above = segment->FrictionLeft(i, friction.value, 1.0, share);
+      const double below = segment->FrictionLeft(i, friction.value, -1.0, share);
       if (above + below > 0.0) {
         add_margin(2.0 * std::min(above, below) / (above + below), "friction limit");
       }
