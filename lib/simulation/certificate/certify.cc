@@ -15,7 +15,6 @@
 #include "tangible/simulation/derivatives/rollout_directional.h"
 #include "tangible/simulation/derivatives/tolerances.h"
 #include "tangible/simulation/events/tolerances.h"
-#include "tangible/simulation/stepping/tolerances.h"
 
 namespace tangible {
 namespace {

@@ -19,7 +19,6 @@
 #include "tangible/simulation/events/event_search.h"
 #include "tangible/simulation/events/segment_flow.h"
 #include "tangible/simulation/events/tolerances.h"
-#include "tangible/simulation/stepping/tolerances.h"
 
 namespace tangible {
 namespace {

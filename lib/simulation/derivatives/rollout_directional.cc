@@ -9,7 +9,7 @@
 #include "tangible/lcp/contact/tolerances.h"
 #include "tangible/lcp/system/contact_residual.h"
 #include "tangible/simulation/derivatives/tolerances.h"
-#include "tangible/simulation/stepping/tolerances.h"
+#include "tangible/simulation/events/tolerances.h"
 
 namespace tangible {
 

@@ -475,6 +475,13 @@ bool EventStepper::ChooseModes(const Model<double>& model, const State<double>& 
     }
     return false;
   }
+  // A contact without slip that slides by one share of the forces may stick by another.
+  for (size_t i = 0; i < slip.size(); ++i) {
+    if (SlidingSign(solution.modes[i]) != 0.0 && std::abs(slip[i]) <= slow) {
+      inner_impulses_.Choose(problem, kDegenerateTolerance, &solution);
+      break;
+    }
+  }
   guess_.contacts = segment->contacts;
   guess_.modes = solution.modes;
   ShortenAtEllipses(model, solution, outcome, segment);

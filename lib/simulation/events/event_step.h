@@ -21,6 +21,7 @@
 #include "tangible/dynamics/assembly/contact_search.h"
 #include "tangible/dynamics/model/settings.h"
 #include "tangible/lcp/contact/contact_decompression.h"
+#include "tangible/lcp/contact/contact_inner_impulses.h"
 #include "tangible/lcp/contact/contact_solver.h"
 #include "tangible/simulation/events/coupled_bodies.h"
 #include "tangible/simulation/events/event_counts.h"
@@ -206,6 +207,7 @@ class EventStepper {
   EventSearch search_;
   SegmentFlow flow_;
   ContactSolver solver_;
+  InnerImpulses inner_impulses_;
   EventRecord record_;
   AssemblyScratch<double> assembly_;
   Touching touching_;

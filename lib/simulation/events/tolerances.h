@@ -143,5 +143,8 @@ inline constexpr double kUnrolledComplementarity = 1e-17;
 inline constexpr double kUnrolledAgrees = 1e-9;
 /// Of the derivatives: Newton's iteration for an event's time ends where it changes them by less.
 inline constexpr double kLocatedDerivative = 1e-12;
+/// Of the scales of impulse and slack: impulses and slacks below it count as 0; it lies two orders
+/// of magnitude above the error of a solve.
+inline constexpr double kDegenerateTolerance = 1e-10;
 
 }  // namespace tangible

@@ -9,7 +9,7 @@
 #include "tangible/lcp/system/contact_residual.h"
 #include "tangible/math/interrupt.h"
 #include "tangible/simulation/events/segment_flow.h"
-#include "tangible/simulation/stepping/tolerances.h"
+#include "tangible/simulation/events/tolerances.h"
 
 namespace tangible {
 namespace {

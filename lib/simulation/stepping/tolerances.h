@@ -45,8 +45,4 @@ inline constexpr double kCoupledBeyond = 1e-5;
 /// Of the coordinates of a box: rounding, added to the above.
 inline constexpr double kCoupledRounding = 16.0 * std::numeric_limits<double>::epsilon();
 
-/// Of the scales of impulse and slack: impulses and slacks below it count as 0; it lies two orders
-/// of magnitude above the error of a solve.
-inline constexpr double kDegenerateTolerance = 1e-10;
-
 }  // namespace tangible

@@ -198,7 +198,7 @@ TEST(GradientSidesTest, WhereAGapJustClosesThereIsNoneOnTheSideOfTheImpact) {
 TEST(GradientSidesTest, AParametersRangeMayEndBeforeTheSideBegins) {
   Scene scene = Of(R"({"name": "box", "shape": {"box": {"size": [1, 0.5]}}, "mass": 1,
       "position": [0, 0.25], "friction": 0.5})",
-                   R"(, "forces": [{"name": "push", "body": "box", "force": [0, 0]}])");
+                   R"(, "forces": [{"name": "push", "body": "box", "force": [8e-9, 0]}])");
   for (BasicBody<double>& body : scene.bodies) {
     body.friction = 1e-9;
   }
