@@ -271,6 +271,9 @@ void RolloutCertifier::AddSegment(const Model<double>& model, long step,
       largest = std::max(largest, share.normal_impulse[i]);
     }
   }
+  // The motion that follows an instant starts with the same forces, and knows which contacts at
+  // their limit it releases.
+  const bool motion_follows = segment->length == 0.0 && segment->event == EventKind::kStepEnd;
   for (size_t i = 0; i < segment->contacts.size(); ++i) {
     const ActiveContact& contact = segment->contacts[i];
     const Place place{&s, step, segment->time, i, &contact, segment->modes[i]};
@@ -281,7 +284,7 @@ void RolloutCertifier::AddSegment(const Model<double>& model, long step,
       certificate_.degenerate_rows += margin < kDegenerateTolerance ? 1 : 0;
     };
     if (!contact.IsJointFriction()) {
-      add_margin(largest > 0.0 ? normal / largest : 0.0, "normal force");
+      if (!motion_follows) add_margin(largest > 0.0 ? normal / largest : 0.0, "normal force");
       if (normal > kLoaded * largest) {
         loaded_.push_back(contact);
       }
@@ -307,7 +310,7 @@ void RolloutCertifier::AddSegment(const Model<double>& model, long step,
         add_margin(0.0, "friction limit");
       }
     }
-    if (place.mode == ContactMode::kSticking && !segment->SticksWithEarlier(i)) {
+    if (place.mode == ContactMode::kSticking && !segment->SticksWithEarlier(i) && !motion_follows) {
       const double above = segment->FrictionLeft(i, friction.value, 1.0, share);
       const double below = segment->FrictionLeft(i, friction.value, -1.0, share);
       if (above + below > 0.0) {
@@ -320,6 +323,11 @@ void RolloutCertifier::AddSegment(const Model<double>& model, long step,
     AddClosedAtOnce(s, step, *segment);
   }
   closed_ = segment->contacts;
+  if (Wanted(segment->edge_before) ||
+      (segment->edge_before >= 0 && Wanted(segment->event_number))) {
+    OneSided("windows of two forces open or close at " + Short(segment->time) +
+             " s, where their order matters");
+  }
   const EventDerivative::Rate rate = derivative->EventRate(model, segment);
   certificate_.linear_residual = std::max(certificate_.linear_residual, rate.residual);
   if (segment->IsEventLocated() && rate.terms > 0.0) {

@@ -256,7 +256,6 @@ double EventDerivative::Tangent(const Model<double>& model, EventRecord* record,
     }
     Segment& segment = part.segment;
     x.col(columns).setZero();
-    residual = std::max(residual, FurtherEdgesTangent(model, &segment, &x));
     const Row start = x.row(time);
     residual = std::max(residual, SegmentTangent(model, &segment, &x, length_seed));
     Row tau_dot = Row::Zero(columns + 1);
@@ -381,7 +380,6 @@ void EventDerivative::SegmentAdjoint(const Model<double>& model, Segment* segmen
     NodeAdjoint(model, *segment, &node, true, &seed, w_bar);
   }
   StagesAdjoint(model, segment, w_bar);
-  FurtherEdgesAdjoint(model, segment, w_bar);
 }
 
 void EventDerivative::Adjoint(const Model<double>& model, EventRecord* record, RowMatrixXd* w_bar) {

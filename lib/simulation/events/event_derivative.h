@@ -51,9 +51,6 @@ class EventDerivative {
   void SegmentAdjoint(const Model<double>& model, Segment* segment, bool starts_anywhere,
                       RowMatrixXd* w_bar);
   void StagesAdjoint(const Model<double>& model, Segment* segment, RowMatrixXd* w_bar);
-  /// Both return or use the state as the segment starts (event_edges.h).
-  double FurtherEdgesTangent(const Model<double>& model, Segment* segment, RowMatrixXd* x);
-  void FurtherEdgesAdjoint(const Model<double>& model, Segment* segment, RowMatrixXd* w_bar);
   void KeepCompression(const Impulses& impulses);
   void AddOffsetsTangent(const Impulses& impulses);
   void KeepOffsetsAdjoint(const Impulses& impulses);

@@ -87,16 +87,22 @@ EdgeGroup EdgesAt(const Model<double>& model, double time) {
   return group;
 }
 
-void EdgeLoad(const Model<double>& model, const Segment& segment, const WindowEdge& window,
-              double load[3]) {
-  const ForceIndex& force = model.structure->forces[window.force];
-  // Signals are read on the side of the edge on which the force acts.
-  const double inside = window.side < 0.0 ? segment.middle : 2.0 * segment.time - segment.middle;
-  const double* none = nullptr;
-  ForceAt(*model.structure, force, segment.before.pose[3 * force.body + 2],
-          &model.parameters[force.numbers], none, none, segment.time, inside, load);
-  for (int i = 0; i < 3; ++i) {
-    load[i] *= window.side;
+void AddEdgesToCome(const Model<double>& model, const Segment& segment,
+                    ContactProblem<double>* problem) {
+  const ModelStructure& s = *model.structure;
+  for (const WindowEdge& window : segment.further_edges) {
+    const ForceIndex& force = s.forces[window.force];
+    const int block = s.bodies[force.body].block;
+    if (block < 0) continue;
+    // Signals are read on the side of the edge on which the force acts.
+    const double inside = window.side < 0.0 ? segment.middle : 2.0 * segment.time - segment.middle;
+    const double* none = nullptr;
+    double load[3];
+    ForceAt(s, force, segment.before.pose[3 * force.body + 2], &model.parameters[force.numbers],
+            none, none, segment.time, inside, load);
+    for (int i = 0; i < 3; ++i) {
+      problem->load[3 * block + i] += window.side * load[i];
+    }
   }
 }
 

@@ -12,9 +12,9 @@
 // (AddEdgesAtStart), with the forces from before the edge: the state there does not change, but its
 // derivative does. At the start of a run there is no motion before, and at its end none after: the
 // derivatives of both sides differ, and no segment is added. Where several windows' edges s₁ ≤ s₂ …
-// fall on one instant, the segments have the time s₁, and of each further force F the impulse that
-// its delay lacks, −F (ṡᵢ − ṡ₁) where it opens and +F (ṡᵢ − ṡ₁) where it closes, acts on the bodies
-// with the modes that follow.
+// fall on one instant, there is a segment of zero length between each two of them, with the modes
+// that contacts have between them (AddFurtherEdges). If another order gives other accelerations the
+// derivative differs on each side, and the segment names the edge at its start.
 
 #include <vector>
 
@@ -47,9 +47,9 @@ EdgeGroup NextEdges(const std::vector<Edge>& edges, double now, double rounding)
 /// The edges of windows on the boundary of two steps at `time`.
 EdgeGroup EdgesAt(const Model<double>& model, double time);
 
-/// The load (N, N, N m) by which the edge at the start of a segment changes when it is later: −F
-/// where a window opens, F where it closes.
-void EdgeLoad(const Model<double>& model, const Segment& segment, const WindowEdge& window,
-              double load[3]);
+/// Adds to accelerations at a segment's state the loads (N, N, N m) by which its edges still to come
+/// differ from those passed: −F where a window opens, F where it closes.
+void AddEdgesToCome(const Model<double>& model, const Segment& segment,
+                    ContactProblem<double>* problem);
 
 }  // namespace tangible

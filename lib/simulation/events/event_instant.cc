@@ -67,6 +67,12 @@ bool SlidesFreely(const ModelStructure& structure, const Impulses& impact, size_
                      });
 }
 
+// The time at which signals and windows are read for a motion that ends at t.
+double JustBefore(const Model<double>& model, double t) {
+  return std::nextafter(t - kShortestPart * model.structure->settings.dt,
+                        -std::numeric_limits<double>::max());
+}
+
 }  // namespace
 
 bool EventStepper::AddInstant(const Model<double>& model, double t, EventKind kind,
@@ -79,12 +85,13 @@ bool EventStepper::AddInstant(const Model<double>& model, double t, EventKind ki
   segment.time = t;
   segment.length = 0.0;
   segment.starts = guess_.starts;
-  segment.middle = t;
+  // An edge at the end of the step comes after it.
+  segment.middle = guess_.starts || kind == EventKind::kTouch ? t : JustBefore(model, t);
   segment.before = *state;
   segment.event_number = -1;
   segment.at_once = false;
-  segment.first_edge = -1;
   segment.further_edges.clear();
+  segment.edge_before = -1;
   if (!ChooseModes(model, *state, outcome, &segment)) {
     record_.num_parts = parts;
     outcome->message.clear();
@@ -102,18 +109,14 @@ bool EventStepper::AddInstant(const Model<double>& model, double t, EventKind ki
   return true;
 }
 
-void EventStepper::AddEdgesAtStart(const Model<double>& model, double t, const State<double>& state,
-                                   EventOutcome* outcome) {
-  passed_ = EdgeGroup();
-  if (guess_.starts) return;  // there is no motion before
-  EdgeGroup edges = EdgesAt(model, t);
-  if (!edges.any) return;
+Segment* EventStepper::AddEdge(const Model<double>& model, double t, double middle,
+                               std::vector<WindowEdge> to_come, const State<double>& state,
+                               EventOutcome* outcome) {
   const EventGuess guess = guess_;
   const int parts = record_.num_parts;
   Segment& segment = BeginSegment(t, t, state);
-  segment.middle =
-      std::nextafter(std::min(edges.time, t) - kShortestPart * model.structure->settings.dt,
-                     -std::numeric_limits<double>::max());
+  segment.middle = middle;
+  segment.further_edges = std::move(to_come);
   FindTouching(model, state);
   // The motion up to here did not have contacts that only now approach.
   const double slow = SlowSpeed(model, state);
@@ -128,12 +131,59 @@ void EventStepper::AddEdgesAtStart(const Model<double>& model, double t, const S
   if (!good) {
     // No conclusion without accelerations.
     record_.num_parts = parts;
-    return;
+    return nullptr;
   }
   segment.event = EventKind::kEdge;
-  segment.event_number = edges.window.number;
   segment.event_index = -1;
-  passed_ = std::move(edges);
+  return &segment;
+}
+
+void EventStepper::AddEdgesAtStart(const Model<double>& model, double t, const State<double>& state,
+                                   EventOutcome* outcome) {
+  if (guess_.starts) return;  // there is no motion before
+  const EdgeGroup edges = EdgesAt(model, t);
+  if (!edges.any) return;
+  Segment* segment =
+      AddEdge(model, t, JustBefore(model, std::min(edges.time, t)), {}, state, outcome);
+  if (segment == nullptr) return;
+  segment->event_number = edges.window.number;
+  AddFurtherEdges(model, t, edges, state, outcome);
+}
+
+void EventStepper::AddFurtherEdges(const Model<double>& model, double t, const EdgeGroup& edges,
+                                   const State<double>& state, EventOutcome* outcome) {
+  const double after =
+      std::nextafter(t + 2.0 * kShortestPart * model.structure->settings.dt, HUGE_VAL);
+  const auto accelerations = [&](std::vector<WindowEdge> to_come) {
+    const Segment* segment = AddEdge(model, t, after, std::move(to_come), state, outcome);
+    if (segment == nullptr) return std::vector<double>();
+    --record_.num_parts;
+    return segment->stages[0].solution.motion;
+  };
+  WindowEdge last = edges.window;
+  for (auto next = edges.further.begin(); next != edges.further.end(); ++next) {
+    const std::vector<WindowEdge> rest(next + 1, edges.further.end());
+    const auto with = [&](std::vector<WindowEdge> few) {
+      few.insert(few.end(), rest.begin(), rest.end());
+      return few;
+    };
+    // Where a contact changes its mode between the edges the motion depends on their order.
+    const std::vector<double> none = accelerations(with({last, *next}));
+    const std::vector<double> other = accelerations(with({last}));
+    const std::vector<double> both = accelerations(rest);
+    Segment* segment = AddEdge(model, t, after, with({*next}), state, outcome);
+    if (segment == nullptr || none.empty() || other.empty() || both.empty()) return;
+    segment->event_number = next->number;
+    const std::vector<double>& one = segment->stages[0].solution.motion;
+    for (size_t i = 0; i < one.size(); ++i) {
+      const double size =
+          std::max({std::abs(none[i]), std::abs(one[i]), std::abs(other[i]), std::abs(both[i])});
+      if (std::abs(none[i] - one[i] - other[i] + both[i]) > kNoRate * size) {
+        segment->edge_before = last.number;
+      }
+    }
+    last = *next;
+  }
 }
 
 bool EventStepper::Rattles(const Model<double>& model, const ActiveContact& contact) const {

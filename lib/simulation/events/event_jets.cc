@@ -5,7 +5,6 @@
 #include <cmath>
 
 #include "tangible/lcp/contact/contact_interior_point.h"
-#include "tangible/simulation/events/event_edges.h"
 #include "tangible/simulation/events/implicit_residual_inl.h"
 #include "tangible/simulation/events/implicit_stage.h"
 #include "tangible/simulation/events/mode_elimination_inl.h"
@@ -329,32 +328,20 @@ class EventReplay {
     }
   }
 
-  // The impulses of further edges at the segment's start (event_edges.h), whose values are 0.
-  void PassFurtherEdges(Segment* segment, State<T>* state) const {
-    if (segment->further_edges.empty()) return;
-    SolvedNode& node = segment->stages[0];
-    RowMatrixXd rhs =
-        RowMatrixXd::Zero(3 * static_cast<Eigen::Index>(node.system.num_blocks()), kWidth);
-    for (const WindowEdge& window : segment->further_edges) {
-      const int block = s_.bodies[s_.forces[window.force].body].block;
-      if (block < 0) continue;
-      double load[3];
-      EdgeLoad(values_, *segment, window, load);
-      const T later = model_.parameters[window.number] - model_.parameters[segment->first_edge];
-      for (int i = 0; i < 3; ++i) {
-        rhs.row(3 * block + i) += load[i] * later.v.transpose();
-      }
+  // Between two edges at one instant: x⁺ = x + (v, a) τ with the accelerations that are known.
+  void PassEdge(const Segment& segment, const T& tau, State<T>* state) const {
+    for (size_t i = 0; i < state->pose.size(); ++i) {
+      state->pose[i].v += segment.before.twist[i] * tau.v;
     }
-    node.system.Solve(node.problem, node.solution.modes, rhs.data(), kWidth);
+    const std::vector<double>& a = segment.stages[0].solution.motion;
     for (int k = 0; k < s_.num_blocks(); ++k) {
       for (int i = 0; i < 3; ++i) {
-        state->twist[3 * s_.moving[k] + i].v += rhs.row(3 * k + i).transpose();
+        state->twist[3 * s_.moving[k] + i].v += a[3 * k + i] * tau.v;
       }
     }
   }
 
   void RunSegment(Segment* segment, T* now, State<T>* state) {
-    PassFurtherEdges(segment, state);
     const double end = segment->time + segment->length;
     T tau(segment->length);
     State<T> after;
@@ -367,7 +354,12 @@ class EventReplay {
         tau = end - *now;
       }
       tau.a = segment->length;
-      Map(segment, *state, *now, tau, &after);
+      if (segment->further_edges.empty()) {
+        Map(segment, *state, *now, tau, &after);
+      } else {
+        after = *state;
+        PassEdge(*segment, tau, &after);
+      }
     }
     *now += tau;
     now->a = end;

@@ -79,10 +79,11 @@ struct Segment {
   /// At the start of a run: contacts that the initial twists approach act with friction.
   bool starts = false;
   double middle = 0.0;  ///< the time at which forces and pieces of signals are chosen
-  /// Where it starts at edges of several windows: the parameter whose edge ended the segment
-  /// before, and the other edges (event_edges.h).
-  int first_edge = -1;
+  /// Of a segment of zero length between edges of windows at one instant: the edges that are still
+  /// to come, of which the first ends it (event_edges.h).
   std::vector<WindowEdge> further_edges;
+  /// The number of the edge at its start, where the order of the two edges matters; otherwise −1.
+  int edge_before = -1;
   State<double> before, after;
   std::vector<ActiveContact> contacts;  ///< those closed; law kRecovery: pushed out of penetration
   std::vector<CoefficientSource> friction;

@@ -59,6 +59,7 @@ void EventSearch::Retarget(const Model<double>& model) {
 void EventSearch::StartStep(const Model<double>& model, double t, double h,
                             const State<double>& state) {
   evaluations_ = 0;
+  keeps_starts_ = false;
   AllowEventsOf(1);
   load_speed_ = LoadSpeed(model, lengths_, t, h, state);
 }
@@ -185,8 +186,56 @@ double EventSearch::ModeValue(const Model<double>& model, Sample* sample, const 
                              node.solution);
 }
 
+// Whether the force of an event's function is determined at the start of a motion; the share of a
+// redundant contact is not.
+bool EventSearch::IsDetermined(const Event& event, SolvedNode* node) const {
+  std::vector<double> seed(3 * static_cast<size_t>(node->system.num_blocks()), 0.0);
+  const std::vector<int>& block_of = node->system.contact_block();
+  const auto add = [&](size_t i, double of_normal, double of_tangent) {
+    seed[3 * static_cast<size_t>(block_of[i])] = of_normal;
+    seed[3 * static_cast<size_t>(block_of[i]) + 1] = of_tangent;
+  };
+  if (event.kind == EventKind::kLiftOff) {
+    add(static_cast<size_t>(event.index), 1.0, 0.0);
+  }
+  for (size_t i = 0; event.kind == EventKind::kSlipBegins && i < segment_->contacts.size(); ++i) {
+    if (segment_->SticksWith(i, static_cast<size_t>(event.index))) {
+      add(i, segment_->friction[event.index].value, -event.sign);
+    }
+  }
+  return node->system.SolveTransposed(node->problem, node->solution.modes, seed.data(), 1) <=
+         kDetermined;
+}
+
+// A force that is 0, or friction that is at its limit, as the motion starts. Where it goes beyond
+// in all of the motion the mode ends at the start, which its value there cannot tell.
+void EventSearch::TryStart(const Model<double>& model, double tolerance, Event trial,
+                           Event* event) {
+  if (trial.kind == EventKind::kSlipEnds || keeps_starts_) return;
+  // The last stage tells it for nearly all contacts that stay at their limit.
+  const Segment& motion = At(model, event->length)->motion;
+  const ContactSolution<double>& late = motion.stages[motion.num_stages - 1].solution;
+  const double last =
+      trial.kind == EventKind::kLiftOff
+          ? late.normal_impulse[trial.index]
+          : motion.FrictionLeft(trial.index, motion.friction[trial.index].value, trial.sign, late);
+  if (motion.num_stages > 1 && !(last < -tolerance)) return;
+  double at_end = 0.0, value = 0.0;
+  for (const double share : {1.0, 0.5, 0.125, 0x1p-6, 0x1p-9}) {
+    value = ModeValue(model, At(model, share * event->length), trial);
+    if (!(value < (share > 0.1 ? -tolerance : tolerance))) return;
+    at_end = share == 1.0 ? value : at_end;
+  }
+  // A value that jumps at the start is rounding of bodies whose masses are far apart.
+  if (value < 0.5 * at_end) return;
+  if (!IsDetermined(trial, &At(model, event->length)->motion.stages[0])) return;
+  trial.at_start = true;
+  trial.length = event->length;
+  *event = trial;
+}
+
 void EventSearch::SearchClosed(const Model<double>& model, Event* event) {
-  for (size_t i = 0; i < segment_->contacts.size(); ++i) {
+  for (size_t i = 0; i < segment_->contacts.size() && !event->at_start; ++i) {
     const ContactMode mode = segment_->modes[i];
     Event trial;
     trial.index = static_cast<int>(i);
@@ -195,6 +244,7 @@ void EventSearch::SearchClosed(const Model<double>& model, Event* event) {
     double located = kLocatedOfSize / kSlowShare * slow_;
     const auto try_function = [&](double at_start, double tolerance) {
       if (at_start <= tolerance) {
+        TryStart(model, tolerance, trial, event);
         return;
       }
       double a = 0.0;
@@ -255,6 +305,7 @@ void EventSearch::SearchClosed(const Model<double>& model, Event* event) {
     if (mode == ContactMode::kSticking && !segment_->SticksWithEarlier(i)) {
       trial.kind = EventKind::kSlipBegins;
       for (const double sign : {1.0, -1.0}) {
+        if (event->at_start) break;
         trial.sign = sign;
         try_function(segment_->FrictionLeft(i, segment_->friction[i].value, sign, start),
                      tolerance);
@@ -384,8 +435,8 @@ bool EventSearch::Run(const Model<double>& model, const std::vector<ActiveContac
   if (event.kind != EventKind::kAtOnce) {
     SearchClosed(model, &event);
   }
-  const double length = event.length;
-  segment->length = length;
+  ends_at_start_ = event.at_start;
+  segment->length = event.length;
   segment->event = event.kind;
   segment->event_contact = event.contact;
   segment->event_index = event.index;
@@ -394,15 +445,16 @@ bool EventSearch::Run(const Model<double>& model, const std::vector<ActiveContac
   if (event.kind == EventKind::kSlipBegins) {
     segment->event_friction = segment->friction[event.index];
   }
-  At(model, length);
+  At(model, segment->length);
   // If a motion could not be integrated, the events that it would have met are unknown.
   if (!all_good_) {
     *message = message_;
     return false;
   }
-  TakeMotion(At(model, length), segment);
+  TakeMotion(At(model, segment->length), segment);
   if (event.kind == EventKind::kSlipBegins || event.kind == EventKind::kLiftOff) {
-    return flow_.Accelerate(model, *segment, segment->after, segment->time + length, &segment->end);
+    return flow_.Accelerate(model, *segment, segment->after, segment->time + segment->length,
+                            &segment->end);
   }
   return true;
 }

@@ -50,6 +50,13 @@ class EventSearch {
   bool Run(const Model<double>& model, const std::vector<ActiveContact>& touching, Segment* segment,
            std::string* message);
 
+  /// Whether the last search has found that the segment's event_contact does not keep its mode: its
+  /// normal force is 0 at the start (kLiftOff), or its friction at the limit (kSlipBegins), and
+  /// would go on beyond.
+  bool ends_at_start() const { return ends_at_start_; }
+  /// Whether the next search keeps the modes of such contacts.
+  void KeepStarts(bool keeps) { keeps_starts_ = keeps; }
+
   /// The sizes of bodies and the tolerances on gaps that follow from them.
   const Lengths& lengths() const { return lengths_; }
   /// The gap below which a contact touches (m), or a joint is at its limit (m or rad).
@@ -86,6 +93,7 @@ class EventSearch {
     int index = -1;
     double sign = 0.0;
     bool at_once = false;
+    bool at_start = false;
   };
   class PairSearch;  ///< event_search_pair.cc
   Sample* At(const Model<double>& model, double length);
@@ -106,6 +114,8 @@ class EventSearch {
                  const CourseOver& course_over, double tolerance, double from, double to,
                  double* root);
   void SearchClosed(const Model<double>& model, Event* event);
+  bool IsDetermined(const Event& event, SolvedNode* node) const;
+  void TryStart(const Model<double>& model, double tolerance, Event trial, Event* event);
   template <typename Function>
   double Refine(const Model<double>& model, const Function& f, double tolerance, double a,
                 double fa, double b, double fb);
@@ -130,6 +140,8 @@ class EventSearch {
   int num_samples_ = 0;
   long evaluations_ = 0;  ///< of the motion, in this step
   int num_pairs_with_events_ = 1;
+  bool ends_at_start_ = false;
+  bool keeps_starts_ = false;
   bool all_good_ = true;  ///< all samples of this search could be integrated
   std::vector<std::pair<int, int>> pairs_;
   std::vector<std::pair<double, std::pair<int, int>>> order_;  ///< pairs and when they close

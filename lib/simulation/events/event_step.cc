@@ -102,6 +102,18 @@ bool OpposesSlips(const ContactProblem<double>& problem, const std::vector<Conta
   return true;
 }
 
+// Where contacts nearly jam accelerations change so fast with poses that only a short motion can be
+// integrated: it is halved.
+struct Halvings {
+  int of_motion = 0;
+  int motions = 0;
+  // Whether the motion may be halved once more.
+  bool Again() {
+    motions += of_motion == 0 ? 1 : 0;
+    return ++of_motion <= kMostHalvings && motions <= kMostShortened;
+  }
+};
+
 // Number of events after which a step is given up.
 int MostEvents(const Model<double>& model) {
   return kGiveUp * model.structure->settings.max_events_per_step + kGiveUp;
@@ -419,6 +431,43 @@ void EventStepper::ShortenAtEllipses(const Model<double>& model,
   }
 }
 
+double EventStepper::SlipAtStart(size_t i, double slow, bool* is_open) const {
+  double slip = touching_.slip[i];
+  for (const std::vector<EndingSlip>* list : {&ending_, &released_}) {
+    for (const EndingSlip& ending : *list) {
+      if (!ending.contact.SameAs(touching_.contacts[i])) continue;
+      *is_open = *is_open || ending.sign == 0.0;
+      // The speed is set above the tolerance, because the contact does not slide yet against its
+      // own friction.
+      slip = 2.0 * slow * ending.sign;
+    }
+  }
+  return slip;
+}
+
+bool EventStepper::Releases(const Model<double>& model, const Segment& segment) {
+  if (search_.ends_at_start()) {
+    const bool opens = segment.event == EventKind::kLiftOff;
+    for (const ActiveContact& contact : segment.contacts) {
+      if (opens ? contact.SameAs(segment.event_contact)
+                : contact.IsBetweenTheSame(segment.event_contact)) {
+        released_.push_back({contact, opens ? 0.0 : -segment.event_sign});
+      }
+    }
+  } else {
+    const double slow = search_.SpeedTolerance(model, segment.after);
+    const bool all_go = std::all_of(released_.begin(), released_.end(), [&](const EndingSlip& one) {
+      const ContactSpeeds speeds = SpeedsOf(model, segment.after, one.contact);
+      return (one.sign == 0.0 ? speeds.normal : one.sign * speeds.slip) >= -slow;
+    });
+    released_.clear();
+    search_.KeepStarts(!all_go);
+    if (all_go) return false;
+  }
+  --record_.num_parts;
+  return true;
+}
+
 bool EventStepper::ChooseModes(const Model<double>& model, const State<double>& state,
                                EventOutcome* outcome, Segment* segment) {
   const SimulationSettings& settings = model.structure->settings;
@@ -428,15 +477,12 @@ bool EventStepper::ChooseModes(const Model<double>& model, const State<double>& 
   segment->modes.clear();
   std::vector<double> slip;
   for (size_t i = 0; i < touching_.contacts.size(); ++i) {
-    if (touching_.approach[i] <= slow) {
+    bool is_open = touching_.approach[i] > slow;
+    const double counted = SlipAtStart(i, slow, &is_open);
+    if (!is_open) {
       segment->contacts.push_back(touching_.contacts[i]);
       segment->friction.push_back(touching_.friction[i]);
-      slip.push_back(touching_.slip[i]);
-      for (const EndingSlip& ending : ending_) {
-        // The speed is set above the tolerance, because the contact does not slide yet against its
-        // own friction.
-        if (ending.contact.SameAs(touching_.contacts[i])) slip.back() = 2.0 * slow * ending.sign;
-      }
+      slip.push_back(counted);
     }
   }
   if (segment->contacts.empty()) {
@@ -447,6 +493,7 @@ bool EventStepper::ChooseModes(const Model<double>& model, const State<double>& 
   ContactProblem<double> problem;
   AssembleAcceleration(model, state, segment->time, segment->middle, segment->contacts,
                        segment->friction, &assembly_, &problem);
+  AddEdgesToCome(model, *segment, &problem);
   ContactSolution<double> solution;
   GuessModes(segment->contacts, slip, slow, &problem, &solution);
   ContactSolverReport solved = solver_.Solve(problem, SolverOptionsOf(settings), &solution);
@@ -458,6 +505,7 @@ bool EventStepper::ChooseModes(const Model<double>& model, const State<double>& 
     forced *= kForcedSlip;
     AssembleAcceleration(model, state, segment->time, segment->middle, segment->contacts,
                          segment->friction, &assembly_, &problem);
+    AddEdgesToCome(model, *segment, &problem);
     ContactProblem<double> own = problem;
     GuessModes(segment->contacts, slip, slow, &problem, &solution);
     for (size_t i = 0; i < problem.contacts.size(); ++i) {
@@ -598,8 +646,8 @@ Segment& EventStepper::BeginSegment(double now, double until, const State<double
   segment.before = state;
   segment.event_number = -1;
   segment.at_once = false;
-  segment.first_edge = passed_.window.number;
-  segment.further_edges = passed_.further;
+  segment.further_edges.clear();
+  segment.edge_before = -1;
   return segment;
 }
 
@@ -623,6 +671,7 @@ EventOutcome EventStepper::Advance(const Model<double>& model, double t, double 
   EventOutcome outcome;
   record_.Clear();
   guess_.located = 0;
+  released_.clear();
   counts_.Clear();
   shortened_.Clear();
   search_.StartStep(model, t, h, *state);
@@ -631,7 +680,7 @@ EventOutcome EventStepper::Advance(const Model<double>& model, double t, double 
   const double end = t + h;
   double now = t;
   bool impulses_tried = false;
-  int halvings = 0, shortened = 0;
+  Halvings halvings;
   const auto fail = [&](const std::string& message) {
     outcome.done = false;
     outcome.message = message;
@@ -647,10 +696,21 @@ EventOutcome EventStepper::Advance(const Model<double>& model, double t, double 
     if (at_end) break;
     const EdgeGroup next = NextEdges(edges, now, kTimeRounding * h);
     const double goal = next.any ? next.time : end;
-    const double until = now + std::ldexp(goal - now, -halvings);
+    const double until = now + std::ldexp(goal - now, -halvings.of_motion);
     const int parts = record_.num_parts;
     Segment& segment = BeginSegment(now, until, *state);
-    if (!ChooseModes(model, *state, &outcome, &segment)) {
+    const auto keep_starts = [&] {
+      record_.num_parts = parts;
+      search_.KeepStarts(true);
+      outcome.message.clear();
+      released_.clear();
+    };
+    const bool has_modes = ChooseModes(model, *state, &outcome, &segment);
+    if (!has_modes && !released_.empty()) {
+      keep_starts();
+      continue;
+    }
+    if (!has_modes) {
       record_.num_parts = parts;
       if (std::exchange(impulses_tried, true) ||
           !SolveByShortStep(model, now, h, state, &outcome)) {
@@ -666,29 +726,29 @@ EventOutcome EventStepper::Advance(const Model<double>& model, double t, double 
     const bool moved = search_.Run(model, touching_.contacts, &segment, &message);
     outcome.pairs_compared = search_.num_compared();
     outcome.pairs_near = search_.num_pairs();
-    if (!moved) {
-      // Where contacts nearly jam accelerations change so fast with poses that only a short motion
-      // can be integrated.
-      shortened += halvings == 0 ? 1 : 0;
-      ++outcome.halved_motions;
-      record_.num_parts = parts;
-      if (++halvings > kMostHalvings || shortened > kMostShortened) {
-        return fail(message);
-      }
+    if (!moved && !released_.empty()) {
+      keep_starts();
       continue;
     }
+    if (!moved) {
+      ++outcome.halved_motions;
+      record_.num_parts = parts;
+      if (!halvings.Again()) return fail(message);
+      search_.KeepStarts(true);  // contacts that jam keep their modes
+      continue;
+    }
+    if (Releases(model, segment)) continue;
     impulses_tried = false;
     guess_.located += IsLocated(segment.event) ? 1 : 0;
     outcome.stopped = at_event == AtEvent::kStopAtSecond && guess_.located > 1;
     if (outcome.stopped) break;
     *state = segment.after;
-    passed_ = EdgeGroup();
     at_given_time = segment.event == EventKind::kStepEnd;
-    halvings = 0;
+    halvings.of_motion = 0;
     if (at_given_time) {
       now = segment.length < until - now ? now + segment.length : until;
       outcome.events += EndAtGivenTime(now < goal, next, &segment);
-      if (!(now < goal)) passed_ = next;
+      if (!(now < goal)) AddFurtherEdges(model, now, next, *state, &outcome);
       continue;
     }
     now += segment.length;

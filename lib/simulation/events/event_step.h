@@ -125,7 +125,7 @@ class EventStepper {
     std::vector<CoefficientSource> friction, restitution;
     std::vector<double> approach, slip;  ///< n v and t v, m/s
   };
-  /// A contact at rest that counts as sliding.
+  /// A contact at rest that counts as sliding, with its direction; 0: as open.
   struct EndingSlip {
     ActiveContact contact;
     double sign = 0.0;
@@ -178,9 +178,17 @@ class EventStepper {
                          EventOutcome* outcome, Segment* segment);
   bool AddInstant(const Model<double>& model, double t, EventKind kind,
                   const ActiveContact* contact, State<double>* state, EventOutcome* outcome);
-  /// The segment of zero length for edges of windows on the step's start.
+  /// A segment of zero length up to an edge, with the forces at `middle` and edges of windows that
+  /// are still to come; null where there are no accelerations.
+  Segment* AddEdge(const Model<double>& model, double t, double middle,
+                   std::vector<WindowEdge> to_come, const State<double>& state,
+                   EventOutcome* outcome);
+  /// Those for edges of windows on the step's start.
   void AddEdgesAtStart(const Model<double>& model, double t, const State<double>& state,
                        EventOutcome* outcome);
+  /// Those between the first and the further edges of a group that has been reached.
+  void AddFurtherEdges(const Model<double>& model, double t, const EdgeGroup& edges,
+                       const State<double>& state, EventOutcome* outcome);
   /// Whether a pair has had so many events in this step that its slow impacts count as a rattle (an
   /// infinite sequence of ever smaller impacts).
   bool Rattles(const Model<double>& model, const ActiveContact& contact) const;
@@ -203,6 +211,13 @@ class EventStepper {
                         EventOutcome* outcome);
   ContactMode GuessOf(const ActiveContact& contact) const;
   void SwitchMode(const Segment& segment);
+  /// Where the last segment's event ends it at its start (EventSearch::ends_at_start): takes it back
+  /// and releases the event's contact, with its like (SwitchMode), in the next one. Takes a segment
+  /// back too in which a released contact closes or slides the other way (contacts that jam): then
+  /// none is released. Whether it has taken the segment back.
+  bool Releases(const Model<double>& model, const Segment& segment);
+  /// The slip with which contact i of touching_ counts, and whether it may be closed.
+  double SlipAtStart(size_t i, double slow, bool* is_open) const;
 
   EventSearch search_;
   SegmentFlow flow_;
@@ -217,10 +232,12 @@ class EventStepper {
   EventCounts counts_;     ///< of this step
   EventCounts shortened_;  ///< motions shortened at ellipses in this step
   CoupledBodies coupled_;  ///< at this instant
-  EdgeGroup passed_;       ///< edges at which the next segment starts
   std::vector<double>
       struck_;  ///< for each body: approach before its last impact at this instant; 0: none
   std::vector<EndingSlip> ending_;  ///< contacts that slide until a separate event
+  /// Contacts at their limit as the next motion starts, beyond which they would go in it: the
+  /// accelerations at the start do not tell that they slide or open.
+  std::vector<EndingSlip> released_;
 };
 
 }  // namespace tangible

@@ -6,6 +6,7 @@
 #include <cstdio>
 
 #include "tangible/lcp/system/contact_residual.h"
+#include "tangible/simulation/events/event_edges.h"
 #include "tangible/simulation/events/load_speed.h"
 #include "tangible/simulation/events/tolerances.h"
 
@@ -156,6 +157,7 @@ bool SegmentFlow::Accelerate(const Model<double>& model, const Segment& segment,
   node->time = time;
   AssembleAcceleration(model, state, time, segment.middle, segment.contacts, segment.friction,
                        &assembly_, &node->problem);
+  AddEdgesToCome(model, segment, &node->problem);
   return Solve(segment.modes, node);
 }
 

@@ -94,6 +94,9 @@ inline constexpr double kNoScale = 1e-300;
 /// Of the forces at work: a force that is negative by more counts as negative, and friction that
 /// exceeds its limit by more as exceeded.
 inline constexpr double kForceTolerance = 1e-10;
+/// Relative residual of a transposed solve: a force at which rows leave no more is determined by
+/// them, while the share of a redundant contact leaves a part of order 1.
+inline constexpr double kDetermined = 1e-6;
 /// Of the largest acceleration, or terms that cancel in it: an implicit stage has converged; a
 /// thousand times this is enough where rounding prevents the last digits.
 inline constexpr double kImplicitStage = 1e-14;

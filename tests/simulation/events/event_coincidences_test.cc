@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Events that fall exactly on the end of a step: values and derivatives are those of closed forms,
-// by all methods and from both sides, for steps that divide the event's time and for steps that do
-// not.
+// Events that fall exactly on the end of a step, or on the start of a run: values and derivatives
+// are those of closed forms, by all methods and from both sides, for steps that divide the event's
+// time and for steps that do not.
 
 #include <gtest/gtest.h>
 
@@ -139,6 +139,27 @@ TEST(EventCoincidencesTest, ABlockBreaksLoose) {
   const Scene scene = Of("[0, -10]", Box("b", 0.0, 0.0, 0.5) + "," + Floor(0.5), 1.0, kForce);
   ExpectExact(WithRamp(scene, 0.0, 10.0, false), {"bodies/*/friction", "bodies/b/mass"},
               {{0, 10.0 / 48.0, {-1.25, -10.0 / 48.0 - 0.625}}, {3, 1.25, {-5.0, -3.75}}});
+  // The force is at the limit as the run starts, and at once beyond: x = k T³ / (6 m).
+  ExpectExact(WithRamp(scene, 5.0, 10.0, false), {"bodies/*/friction", "bodies/b/mass"},
+              {{0, 10.0 / 6.0, {-5.0, -2.5 - 10.0 / 6.0}}, {3, 5.0, {-10.0, -10.0}}});
+}
+
+// Two blocks at rest, pushed with 2 μ m g from the same instant s on: x = μ g (T − s)² / 2, and the
+// start of the one's force does not move the other.
+TEST(EventCoincidencesTest, TwoWindowsOpenAtOneInstant) {
+  const Scene scene = Of(
+      "[0, -10]", Box("b", 0.0, 0.0, 0.5) + "," + Box("c", 3.0, 0.0, 0.5) + "," + Floor(0.5), 1.0,
+      R"(, "forces": [{"name": "f", "body": "b", "force": [10, 0], "start": 0.5, "end": 9},
+                         {"name": "g", "body": "c", "force": [10, 0], "start": 0.5, "end": 9}])");
+  ExpectExact(scene, {"forces/f/start", "forces/g/start"},
+              {{0, 0.625, {-2.5, 0.0}}, {6, 3.625, {0.0, -2.5}}, {9, 2.5, {0.0, -5.0}}});
+}
+
+// k t reaches m g at t0: y = r + k (T − t0)³ / (6 m).
+TEST(EventCoincidencesTest, ADiscIsLiftedOff) {
+  const Scene scene = Of("[0, -10]", Disc("b", 0.0, 0.1, 0.0, 0.5) + "," + Floor(0.5), 1.0, kForce);
+  ExpectExact(WithRamp(scene, 0.0, 20.0, true), {"bodies/b/mass"},
+              {{1, 0.1 + 20.0 / 48.0, {-20.0 / 48.0 - 1.25}}, {4, 2.5, {-7.5}}});
 }
 
 // A disc dropped from h above the floor bounces as a block stops elsewhere, t0 = √(2 h / g):
@@ -159,6 +180,36 @@ TEST(EventCoincidencesTest, ASliderMeetsItsLimit) {
          0.75, R"(, "joints": [{"name": "j", "type": "prismatic", "bodies": ["b", "world"],
              "anchor": [0, 0], "axis": [1, 0], "limits": [-1, 0.625]}])"),
       {"bodies/b/velocity/x"}, {{0, 0.625, {0.0}}, {3, 0.0, {0.0}}});
+}
+
+// An event at the end of the run: positions are differentiable, the speed has another derivative on
+// each side, which the verdict says.
+TEST(EventCoincidencesTest, TheLastInstantOfARunIsAKink) {
+  Scene scene = Of("[-6, -8]", Box("b", 0.0, 4.0, 0.25) + "," + Floor(0.25), 0.5);
+  for (const double dt : {0.5, 0.25, 0.01, 0.007}) {
+    scene.simulation.dt = dt;
+    const std::vector<std::string> paths = {"bodies/b/velocity/x"};
+    const GradientResult both = testing::Jacobian(scene, paths, GradientMethod::kTangent);
+    EXPECT_NE(both.certificate.verdict.find("the run ends as it stops sliding"), std::string::npos)
+        << both.certificate.verdict;
+    EXPECT_NEAR(both.jacobian(0, 0), 0.5, kOfDerivative) << dt;
+    for (const DerivativeSide side : {DerivativeSide::kPlus, DerivativeSide::kMinus}) {
+      const GradientResult one =
+          FinalStateJacobian(scene, testing::Resolve(scene, paths),
+                             {.method = GradientMethod::kTangent, .side = side});
+      ASSERT_TRUE(one.done) << one.message;
+      EXPECT_NEAR(one.jacobian(0, 0), 0.5, kOfDerivative) << dt;
+      EXPECT_NEAR(one.jacobian(3, 0), side == DerivativeSide::kPlus ? 1.0 : 0.5, kOfDerivative);
+    }
+  }
+  Scene ball = Of("[0, -10]", Disc("b", 0.0, 1.35, 0.0, 0.0) + "," + Floor(0.0), 0.5);
+  for (const double dt : {0.5, 0.25, 0.01, 0.007}) {
+    ball.simulation.dt = dt;
+    const GradientResult both =
+        testing::Jacobian(ball, {"bodies/b/position/y"}, GradientMethod::kTangent);
+    EXPECT_NE(both.certificate.verdict.find("discontinuous"), std::string::npos)
+        << both.certificate.verdict;
+  }
 }
 
 }  // namespace

@@ -155,12 +155,13 @@ TEST(StepReportTest, TheBroadPhaseComparesFewerThanAllPairs) {
 }
 
 // Boxes on each other, the upper one of `ratio` times the mass, which slides the lower one along.
+// With a friction of 0.5 it would be about to tip over it.
 Scene HeavyOnLight(double ratio, const std::string& stepping) {
   Scene scene = test_scenes::SceneOf(R"({"bodies": [
       {"name": "light", "shape": {"box": {"size": [1, 1]}}, "mass": 1, "position": [0, 0.5],
-       "velocity": [0.3, 0], "friction": 0.5},
+       "velocity": [0.3, 0], "friction": 0.4},
       {"name": "heavy", "shape": {"box": {"size": [1, 1]}}, "mass": 1, "position": [0, 1.5],
-       "velocity": [0.3, 0], "friction": 0.5},
+       "velocity": [0.3, 0], "friction": 0.4},
       {"name": "floor", "static": true, "friction": 0.5,
        "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}}],
     "simulation": {"dt": 0.01, "duration": 0.05, "stepping": ")" +
