@@ -42,10 +42,10 @@ inline double RootOfParabola(double a, double fa, double b, double fb, double c,
   return std::numeric_limits<double>::quiet_NaN();
 }
 
-// Muller's method within a bracket (gaps are nearly parabolas), with Illinois' variant of the secant
-// method where the parabola has no root there, and halving where three steps have not halved the
-// bracket and the last value did not fall: until |f| ≤ tolerance, or to the last bit that changes
-// the value.
+// Muller's method within a bracket (gaps are nearly parabolas), with Illinois' variant of the
+// secant method where the parabola has no root there, and halving where three steps have not halved
+// the bracket and the last value did not fall: until |f| ≤ tolerance, or to the last bit that
+// changes the value.
 template <typename Function>
 double EventSearch::Refine(const Model<double>& model, const Function& f, double tolerance,
                            double a, double fa, double b, double fb) {
