@@ -30,7 +30,7 @@ DEFINE_int32(starts, -1,
              "nothing else is given, else 0");
 DEFINE_int32(coincidences, -1,
              "number of random scenes in which something happens exactly on a step's end, at the "
-             "start or the end, or twice at one instant; -1: 10 if nothing else is given, else 0");
+             "start or the end, or twice at one instant; -1: 2 if nothing else is given, else 0");
 DEFINE_int32(seed, 1, "of the first random scene of each kind; the next have the next seeds");
 DEFINE_string(stepping, "", "of random scenes: fixed, event or both; empty: all that there is");
 DEFINE_int32(threads, 0, "how many scenes are checked at the same time; 0: one a core");
@@ -45,7 +45,7 @@ namespace {
 constexpr int kMostRandom = 1000000;
 constexpr int kDefaultRandom = 100;
 constexpr int kDefaultStarts = 10;
-constexpr int kDefaultCoincidences = 10;
+constexpr int kDefaultCoincidences = 2;
 
 // The steppings named by --stepping; empty with a line if there is none of this name.
 std::vector<Stepping> Steppings(std::string* error) {

@@ -80,7 +80,7 @@ bool InnerImpulses::Choose(const ContactProblem<double>& problem, double toleran
   shares_.tangent_impulse.assign(rays_.size(), 0.0);
   shares_.modes.assign(rays_.size(), ContactMode::kOpen);
   ContactSolverOptions options;
-  options.choice = ContactSolverChoice::kInteriorPoint;
+  options.choice = SolverChoice::kInteriorPoint;
   if (!solver_.Solve(by_rays_, options, &shares_).solved) return false;
   chosen_ = *solution;
   TakeRays(problem);

@@ -499,9 +499,8 @@ Certificate CertifyDerivative(const Model<double>& model, const State<double>& i
   RolloutCertifier certifier({NumbersOf(*model.structure, directions), directions, names});
   ControlledModel<double> plain(model);
   Certificate certificate = Certify(&plain, initial, &certifier, &report);
-  const SimulationSettings& settings = model.structure->settings;
-  if (certificate.degenerate_rows > 0 && settings.stepping == Stepping::kFixed &&
-      settings.smoothing == 0.0 && report.status == StepStatus::kDone &&
+  if (certificate.degenerate_rows > 0 && report.status == StepStatus::kDone &&
+      model.structure->settings.stepping == Stepping::kFixed &&
       HasOneDerivative(model, initial, directions, sizes)) {
     certifier.LeaveOutKinks(&certificate);
   }
