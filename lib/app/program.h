@@ -109,8 +109,8 @@ std::string WriteFileAtomically(const std::string& path, std::string_view text,
 /// Whether two paths are of one file, there or not.
 bool IsSameFile(const std::string& a, const std::string& b);
 
-/// "tangible-fit: --report: expected a file of its own, got that of an input, PATH" where one of the
-/// program's outputs names a file that was read, also one that another input names; empty where
+/// "tangible-fit: --report: expected a file of its own, got that of an input, PATH" where one of
+/// the program's outputs names a file that was read, also one that another input names; empty where
 /// none does. To be called before the work, after all inputs have been read; status kExitUsage.
 std::string OutputOverInput();
 

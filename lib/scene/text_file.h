@@ -42,8 +42,8 @@ std::string JoinPath(const std::string& folder, const std::string& path);
 
 /// The text as a terminal can show it on one line. Line breaks and tabs become spaces; other
 /// control characters, characters that change the direction of writing, and bytes that are not
-/// UTF-8 are written as \x1b, \u202e and \xff. The middle of a line of more than kMaxMessage bytes, as
-/// written, is left out (…).
+/// UTF-8 are written as \x1b, \u202e and \xff. The middle of a line of more than kMaxMessage bytes,
+/// as written, is left out (…).
 std::string OneLine(std::string_view text);
 
 }  // namespace tangible

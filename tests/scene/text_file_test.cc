@@ -166,7 +166,7 @@ TEST(OneLineTest, KeepsTextAndWritesOutWhatATerminalWouldObey) {
   EXPECT_EQ(OneLine(once), once);
   // Long ones, also where only the escapes are, and characters at the cut stay whole.
   for (const std::string& middle : {std::string(1000000, 'x'), std::string(400, '\x1b'),
-                                   std::string(1000, '\x80'), std::string(1000, '\0')}) {
+                                    std::string(1000, '\x80'), std::string(1000, '\0')}) {
     const std::string cut = OneLine("begin" + middle + "end");
     EXPECT_LE(cut.size(), kMaxMessage);
     EXPECT_GT(cut.size(), kMaxMessage - 20);

@@ -15,7 +15,8 @@ namespace {
 constexpr int kSweeps = 10;
 constexpr int kRounds = 2;
 constexpr int kMaxCycles = 20;
-// A round of cycles ends once sweeps change no more modes than this after a solve within the limits.
+// A round of cycles ends once sweeps change no more modes than this after a solve within the
+// limits.
 constexpr int kFewChanges = 1;
 // Limits of solves: of all together, to which a fraction of the number of contacts is added, of a
 // cycle, and of the active-set method with one δ.
@@ -348,8 +349,8 @@ ContactDescent::Outcome ContactDescent::Subspace(double delta) {
   return Outcome::kBlocked;
 }
 
-// Changes modes that the speeds of the solved modes contradict; returns how many, −1 where that goes
-// in a cycle.
+// Changes modes that the speeds of the solved modes contradict; returns how many, −1 where that
+// goes in a cycle.
 int ContactDescent::ChangeContradicted(double delta) {
   const ContactProblem<double>& p = *problem_;
   v_.assign(x_.begin(), x_.begin() + 3 * static_cast<std::ptrdiff_t>(p.num_bodies));

@@ -11,8 +11,9 @@
 // kinds of step lower it in turn, and both keep λ within its limits:
 //
 //   sweep      projected Gauss-Seidel: each contact's impulses become those with which it alone
-//              would satisfy its conditions. A sweep costs a fraction of a factorisation. It changes
-//              modes freely, but what happens at one end of a pile reaches the other end slowly.
+//              would satisfy its conditions. A sweep costs a fraction of a factorisation. It
+//              changes modes freely, but what happens at one end of a pile reaches the other end
+//              slowly.
 //   subspace   the modes of the impulses are kept, and the linear system of these modes is solved,
 //              with a compliance δ around the present impulses (contact_system.h), without
 //              refinement. The impulses move towards its solution as far as q falls along the
@@ -20,8 +21,8 @@
 //              its mode.
 //
 // Once sweeps change no modes, δ falls to the size at which redundant rows that contradict each
-// other by little more than rounding decide which of them carry force, and the modes are those of an
-// active-set method: the first contact at its limit changes its mode, and where none is, those
+// other by little more than rounding decide which of them carry force, and the modes are those of
+// an active-set method: the first contact at its limit changes its mode, and where none is, those
 // contacts whose speeds contradict their mode do.
 //
 // Joints and dampers are rows without limits, a damper's with the compliance 1 / weight.

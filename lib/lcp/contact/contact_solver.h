@@ -8,9 +8,9 @@
 //    solved again, as long as fewer are contradicted from round to round. Where rows are redundant
 //    each solve is a proximal step from the last impulses, which change as little as the data
 //    require.
-// 2. Where there are many contacts, a descent from the guess (contact_descent.h), which changes many
-//    modes at a time, and pivoting (contact_pivoting.h) from where it ends; then pivoting from the
-//    guess. Both have a bounded number of pivots: they search among the impulses of redundant rows
+// 2. Where there are many contacts, a descent from the guess (contact_descent.h), which changes
+//    many modes at a time, and pivoting (contact_pivoting.h) from where it ends; then pivoting from
+//    the guess. Both have a bounded number of pivots: they search among the impulses of redundant rows
 //    where modes are nearly right. All count as part of the guess.
 // 3. Mehrotra's interior point (contact_interior_point.h), and pivoting from its modes where
 //    margins are too small to read the modes from it.

@@ -18,8 +18,8 @@ class ModeSolve {
   /// Factorises `system` with the modes of `solution` and fills in the rest of it; false where the
   /// system is singular. With `centre`, whose impulses are given, the solve is a proximal step from
   /// these: of the impulses that give the same motion it finds those nearest to them. `centre` may
-  /// be `solution`. False too where, before refinement, more than `most_beyond` impulses of contacts
-  /// plainly exceed their limits (kPlainlyBeyond); only proximal steps look at that.
+  /// be `solution`. False too where, before refinement, more than `most_beyond` impulses of
+  /// contacts plainly exceed their limits (kPlainlyBeyond); only proximal steps look at that.
   bool Solve(const ContactProblem<double>& problem, const ContactSolution<double>* centre,
              ContactSystem* system, ContactSolution<double>* solution,
              int most_beyond = std::numeric_limits<int>::max());

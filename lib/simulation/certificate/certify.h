@@ -164,12 +164,12 @@ inline constexpr char kUndeterminedMotion[] =
     "redundant contacts that slide with different friction leave the motion undetermined";
 
 /// The certificate of the derivatives along `directions` (num_variables x columns, named; `sizes`
-/// as in DualityGap). Contacts at a kink that no direction moves are left out: by fixed steps, where
-/// the derivatives along and against each direction and the tangent are the same after every step
-/// (a run with three tangents). It covers the rollout and, where rows are redundant (a box on a box), whether
-/// each direction is consistent with them (two rollouts). Where masses are very different, rows
-/// redundant, a system ill-conditioned or events many, `linear_residual` is at least the gap
-/// between tangent and adjoint (duality.h), both of which are run.
+/// as in DualityGap). Contacts at a kink that no direction moves are left out: by fixed steps,
+/// where the derivatives along and against each direction and the tangent are the same after every
+/// step (a run with three tangents). It covers the rollout and, where rows are redundant (a box on
+/// a box), whether each direction is consistent with them (two rollouts). Where masses are very
+/// different, rows redundant, a system ill-conditioned or events many, `linear_residual` is at
+/// least the gap between tangent and adjoint (duality.h), both of which are run.
 Certificate CertifyDerivative(const Model<double>& model, const State<double>& initial,
                               const RowMatrixXd& directions, const std::vector<std::string>& names,
                               const std::vector<double>& sizes = {});

@@ -67,8 +67,8 @@ inline constexpr double kOpeningSpeed = 1e-4;
 inline constexpr double kOfParameter = 1e-3;
 /// Of the slip as it was: a smaller slip counts as ended.
 inline constexpr double kEndedSlip = 1e-6;
-/// Of the largest entry of a direction's derivative: derivatives along and against it that differ by
-/// less are the same.
+/// Of the largest entry of a direction's derivative: derivatives along and against it that differ
+/// by less are the same.
 inline constexpr double kSameSides = 1e-8;
 /// Of the places and speeds of bodies at the start, over the parameter's size: smaller derivatives
 /// count as 0 in that comparison.

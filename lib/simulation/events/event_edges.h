@@ -47,8 +47,8 @@ EdgeGroup NextEdges(const std::vector<Edge>& edges, double now, double rounding)
 /// The edges of windows on the boundary of two steps at `time`.
 EdgeGroup EdgesAt(const Model<double>& model, double time);
 
-/// Adds to accelerations at a segment's state the loads (N, N, N m) by which its edges still to come
-/// differ from those passed: −F where a window opens, F where it closes.
+/// Adds to accelerations at a segment's state the loads (N, N, N m) by which its edges still to
+/// come differ from those passed: −F where a window opens, F where it closes.
 void AddEdgesToCome(const Model<double>& model, const Segment& segment,
                     ContactProblem<double>* problem);
 

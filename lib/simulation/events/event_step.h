@@ -211,10 +211,10 @@ class EventStepper {
                         EventOutcome* outcome);
   ContactMode GuessOf(const ActiveContact& contact) const;
   void SwitchMode(const Segment& segment);
-  /// Where the last segment's event ends it at its start (EventSearch::ends_at_start): takes it back
-  /// and releases the event's contact, with its like (SwitchMode), in the next one. Takes a segment
-  /// back too in which a released contact closes or slides the other way (contacts that jam): then
-  /// none is released. Whether it has taken the segment back.
+  /// Where the last segment's event ends it at its start (EventSearch::ends_at_start): takes it
+  /// back and releases the event's contact, with its like (SwitchMode), in the next one. Takes a
+  /// segment back too in which a released contact closes or slides the other way (contacts that
+  /// jam): then none is released. Whether it has taken the segment back.
   bool Releases(const Model<double>& model, const Segment& segment);
   /// The slip with which contact i of touching_ counts, and whether it may be closed.
   double SlipAtStart(size_t i, double slow, bool* is_open) const;

@@ -87,9 +87,9 @@ class Stepper {
   IslandStepper& events() { return *events_; }
   IslandDerivative& event_derivative() { return event_derivative_; }
   /// Among the last step's impulses, which redundant contacts may share in many ways, chooses a
-  /// share with the fewest contacts at a limit (contact_inner_impulses.h); the motion keeps its bits, and so
-  /// does the next step. Derivatives use it: call it before record() and system(). Nothing by
-  /// events.
+  /// share with the fewest contacts at a limit (contact_inner_impulses.h); the motion keeps its
+  /// bits, and so does the next step. Derivatives use it: call it before record() and system().
+  /// Nothing by events.
   void ChooseImpulses();
   /// The mode system, factorised with the last step's modes.
   ContactSystem& system();

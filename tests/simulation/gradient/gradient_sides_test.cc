@@ -92,8 +92,8 @@ TEST(GradientSidesTest, AForceThatBeginsOrEndsOnAFixedStepsEnd) {
   }
 }
 
-// Rows of `lowest`, `lowest` − 1, ... boxes at rest, of which a spring pulls two of the last row but
-// one together.
+// Rows of `lowest`, `lowest` − 1, ... boxes at rest, of which a spring pulls two of the last row
+// but one together.
 Scene PileOf(int lowest, const char* friction, Stepping stepping) {
   std::string bodies;
   std::vector<std::string> centres;
