@@ -34,7 +34,7 @@ constexpr double kFactorOfMoved = 0.7;
 constexpr double kFactorOfBlocked = 4.0;
 // Contacts whose modes have been changed this often with one δ are changed one at a time, the worst
 // first; one that is changed this often moves in a cycle.
-constexpr int kMaxChangesTogether = 2;
+constexpr int kMostChangesOfOne = 2;
 constexpr int kMaxChanges = 4;
 
 double Limited(double value, double limit) { return std::min(std::max(value, -limit), limit); }
@@ -385,7 +385,7 @@ int ContactDescent::ChangeContradicted(double delta) {
       continue;
     }
     ++changed;
-    if (changes_[i] < kMaxChangesTogether) {
+    if (changes_[i] < kMostChangesOfOne) {
       ++changes_[i];
       modes_[i] = next;
     } else if (violation > worst) {

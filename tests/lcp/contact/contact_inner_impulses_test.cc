@@ -10,11 +10,11 @@
 namespace tangible {
 namespace {
 
-constexpr double kTolerance = 1e-10;
+constexpr double kClosed = 1e-10;
 
 // Mass 2 kg, gyration 1, weight impulse 4 N s, pushed with `push` N s at the height of the floor;
 // feet at x = −1 and 1.
-ContactProblem<double> Box(double push, double friction) {
+ContactProblem<double> SupportedBox(double push, double friction) {
   ContactProblem<double> problem;
   problem.num_bodies = 1;
   problem.mass = {2.0, 2.0, 2.0};
@@ -45,10 +45,10 @@ ContactSolution<double> FirstAtItsLimit(double push, double friction) {
 }
 
 TEST(InnerImpulsesTest, BothFeetAreInsideTheirConesWhereThatIsPossible) {
-  const ContactProblem<double> problem = Box(1.5, 0.5);
+  const ContactProblem<double> problem = SupportedBox(1.5, 0.5);
   ContactSolution<double> solution = FirstAtItsLimit(1.5, 0.5);
   InnerImpulses inner;
-  ASSERT_TRUE(inner.Choose(problem, kTolerance, &solution));
+  ASSERT_TRUE(inner.Choose(problem, kClosed, &solution));
   for (int i = 0; i < 2; ++i) {
     EXPECT_EQ(solution.modes[i], ContactMode::kSticking);
     EXPECT_NEAR(solution.normal_impulse[i], 2.0, 1e-12);
@@ -59,28 +59,28 @@ TEST(InnerImpulsesTest, BothFeetAreInsideTheirConesWhereThatIsPossible) {
 }
 
 TEST(InnerImpulsesTest, NothingChangesWhereTheSumIsAtItsLimit) {
-  const ContactProblem<double> problem = Box(2.0, 0.5);
+  const ContactProblem<double> problem = SupportedBox(2.0, 0.5);
   ContactSolution<double> solution = FirstAtItsLimit(2.0, 0.5);
   solution.modes[1] = ContactMode::kSlidingPositive;
   const ContactSolution<double> before = solution;
   InnerImpulses inner;
-  EXPECT_FALSE(inner.Choose(problem, kTolerance, &solution));
+  EXPECT_FALSE(inner.Choose(problem, kClosed, &solution));
   EXPECT_EQ(solution.modes, before.modes);
   EXPECT_EQ(solution.tangent_impulse, before.tangent_impulse);
 }
 
 TEST(InnerImpulsesTest, NothingIsSearchedWhereNoContactIsAtALimit) {
-  const ContactProblem<double> problem = Box(1.5, 0.5);
+  const ContactProblem<double> problem = SupportedBox(1.5, 0.5);
   ContactSolution<double> solution = FirstAtItsLimit(1.5, 0.5);
   solution.tangent_impulse = {-0.75, -0.75};
   solution.modes[0] = ContactMode::kSticking;
   InnerImpulses inner;
-  EXPECT_FALSE(inner.Choose(problem, kTolerance, &solution));
+  EXPECT_FALSE(inner.Choose(problem, kClosed, &solution));
 }
 
 // A third foot between them that bears nothing, and need not.
 TEST(InnerImpulsesTest, AFootWithoutLoadGetsItsShare) {
-  ContactProblem<double> problem = Box(0.0, 0.0);
+  ContactProblem<double> problem = SupportedBox(0.0, 0.0);
   problem.contacts.push_back(problem.contacts[0]);
   problem.contacts[2].normal_a = {0.0, 1.0, 0.5};
   ContactSolution<double> solution;
@@ -89,7 +89,7 @@ TEST(InnerImpulsesTest, AFootWithoutLoadGetsItsShare) {
   solution.tangent_impulse = {0.0, 0.0, 0.0};
   solution.modes = {ContactMode::kClosed, ContactMode::kClosed, ContactMode::kOpen};
   InnerImpulses inner;
-  ASSERT_TRUE(inner.Choose(problem, kTolerance, &solution));
+  ASSERT_TRUE(inner.Choose(problem, kClosed, &solution));
   double torque = 0.0;
   for (int i = 0; i < 3; ++i) {
     EXPECT_EQ(solution.modes[i], ContactMode::kClosed);
@@ -101,7 +101,7 @@ TEST(InnerImpulsesTest, AFootWithoutLoadGetsItsShare) {
 
 // Sliding contacts keep their friction: the two feet share a slip of 0.25 m/s.
 TEST(InnerImpulsesTest, AContactThatSlidesStaysAtItsLimit) {
-  ContactProblem<double> problem = Box(2.5, 0.5);
+  ContactProblem<double> problem = SupportedBox(2.5, 0.5);
   problem.contacts.push_back(problem.contacts[0]);
   problem.contacts[2].normal_a = {0.0, 1.0, 0.0};
   ContactSolution<double> solution;
@@ -110,7 +110,7 @@ TEST(InnerImpulsesTest, AContactThatSlidesStaysAtItsLimit) {
   solution.tangent_impulse = {-1.0, -1.0, 0.0};
   solution.modes.assign(3, ContactMode::kSlidingPositive);
   InnerImpulses inner;
-  ASSERT_TRUE(inner.Choose(problem, kTolerance, &solution));
+  ASSERT_TRUE(inner.Choose(problem, kClosed, &solution));
   for (int i = 0; i < 3; ++i) {
     EXPECT_EQ(solution.modes[i], ContactMode::kSlidingPositive);
     EXPECT_GT(solution.normal_impulse[i], 0.01);
