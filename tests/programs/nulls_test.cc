@@ -48,7 +48,7 @@ const std::set<std::string> kMayBeNull = {"margin_min",
 const std::map<std::string, std::set<std::string>> kMayBeNullIn = {
     {"closed_forms", {"value_order", "derivative_order"}},
     {"cost", {"parameters", "measured", "holds"}},
-    {"verify", {"error"}},
+    {"verify", {"error", "ridders_error"}},
     {"extremes", {"differences", "bound", "gradient"}},
     {"cartpole", {"low", "high"}}};
 
@@ -93,7 +93,7 @@ class NullsTest : public ProgramTest {
       return;
     }
     const json result = json::parse(Read(Path("r.json")));
-    EXPECT_EQ(run.exit_status == 0, IsDone(result)) << run.error << result["status"];
+    EXPECT_EQ(run.exit_status == 0, IsDone(result)) << run.error << result.value("status", "");
     EXPECT_EQ(NullsOf(result, program.substr(program.find('-') + 1)), std::vector<std::string>());
   }
 };
@@ -163,7 +163,7 @@ TEST_F(NullsTest, ThoseOfStudies) {
   }
   Check("tangible-tradeoff", "'" + kData + "scenes/bouncing_ball.json' --repeat_seconds=0.001",
         "out");
-  Check("tangible-verify", "--random=1 --starts=1 --coincidences=1 --seed=8", "out");
+  Check("tangible-verify", "--random=1 --starts=1 --coincidences=1 --seed=2", "out");
   Check("tangible-bounce", "'" + kData + "control/struck_ball.json' --problems=2 --iterations=3",
         "out");
   Check("tangible-closed-forms", "", "out");

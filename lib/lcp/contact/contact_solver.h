@@ -10,8 +10,8 @@
 //    require.
 // 2. Where there are many contacts, a descent from the guess (contact_descent.h), which changes
 //    many modes at a time, and pivoting (contact_pivoting.h) from where it ends; then pivoting from
-//    the guess. Both have a bounded number of pivots: they search among the impulses of redundant rows
-//    where modes are nearly right. All count as part of the guess.
+//    the guess. Both have a bounded number of pivots: they search among the impulses of redundant
+//    rows where modes are nearly right. All count as part of the guess.
 // 3. Mehrotra's interior point (contact_interior_point.h), and pivoting from its modes where
 //    margins are too small to read the modes from it.
 // 4. Pivoting from all contacts open; for problems that are not proved infeasible pivoting from
