@@ -10,8 +10,7 @@
 namespace tangible {
 namespace {
 
-// Sweeps of a cycle, twice as many in the second round: with 5 a fifth more solves are needed, with
-// 20 the sweeps cost as much as the solves.
+// Sweeps of a cycle, twice as many in the second round.
 constexpr int kSweeps = 10;
 constexpr int kRounds = 2;
 constexpr int kMaxCycles = 20;
@@ -147,8 +146,10 @@ int ContactDescent::Sweep(int count) {
   SetSpeeds();
   for (int sweep = 0; sweep < count; ++sweep) {
     for (Bilateral& b : bilaterals_) {
-      const double change =
-          -(Speed(b.row) + b.compliance * b.impulse) / (b.row.mobility + b.compliance);
+      const double yields = b.row.mobility + b.compliance;
+      // A row that moves nothing has no impulse of its own.
+      if (!(yields > 0.0)) continue;
+      const double change = -(Speed(b.row) + b.compliance * b.impulse) / yields;
       b.impulse += change;
       Push(b.row, change);
     }
