@@ -427,8 +427,12 @@ std::string OutputOverInput() {
     if (!gflags::GetCommandLineOption(flag.c_str(), &path) || path.empty()) continue;
     for (const std::string& input : inputs) {
       if (IsSameFile(path, input)) {
-        return Parsed().name + ": --" + flag +
-               ": expected a file of its own, got that of an input, " + path;
+        std::string message = Parsed().name;
+        message += ": --";
+        message += flag;
+        message += ": expected a file of its own, got that of an input, ";
+        message += path;
+        return message;
       }
     }
   }

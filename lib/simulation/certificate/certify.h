@@ -94,6 +94,8 @@ class RolloutCertifier {
                  EventDerivative* derivative, Segment* segment) const;
   void AddImpact(const Model<double>& model, long step, Impulses* impact);
   void AddOtherSlips(const Model<double>& model, const Segment& segment, const Place& place);
+  void AddEventOf(const Model<double>& model, long step, EventDerivative* derivative,
+                  Segment* segment);
   void AddSegment(const Model<double>& model, long step, EventDerivative* derivative,
                   Segment* segment);
   void AddFriction(const CoefficientSource& friction, const Place& place);

@@ -257,6 +257,27 @@ void RolloutCertifier::AddFriction(const CoefficientSource& friction, const Plac
   }
 }
 
+// The event at the segment's end: whether it grazes, and what happens with it at once.
+void RolloutCertifier::AddEventOf(const Model<double>& model, long step,
+                                  EventDerivative* derivative, Segment* segment) {
+  const EventDerivative::Rate rate = derivative->EventRate(model, segment);
+  certificate_.linear_residual = std::max(certificate_.linear_residual, rate.residual);
+  if (segment->IsEventLocated() && rate.terms > 0.0) {
+    const Place place{model.structure.get(),           step,
+                      segment->time + segment->length, 0,
+                      &segment->event_contact,         ContactMode::kOpen};
+    AddMargin(std::abs(rate.value) / rate.terms, place,
+              std::string("grazing: rate of the ") + NameOf(segment->event));
+    if (segment->event == EventKind::kSlipEnds) {
+      AddOtherSlips(model, *segment, place);
+    }
+    if (EndsInMeeting(model, *segment) &&
+        MeetsACorner(model, segment->after, segment->event_contact)) {
+      AddJump(0.0, place, "a corner meets a corner");
+    }
+  }
+}
+
 void RolloutCertifier::AddSegment(const Model<double>& model, long step,
                                   EventDerivative* derivative, Segment* segment) {
   const ModelStructure& s = *model.structure;
@@ -328,21 +349,7 @@ void RolloutCertifier::AddSegment(const Model<double>& model, long step,
     OneSided("windows of two forces open or close at " + Short(segment->time) +
              " s, where their order matters");
   }
-  const EventDerivative::Rate rate = derivative->EventRate(model, segment);
-  certificate_.linear_residual = std::max(certificate_.linear_residual, rate.residual);
-  if (segment->IsEventLocated() && rate.terms > 0.0) {
-    const Place place{
-        &s, step, segment->time + segment->length, 0, &segment->event_contact, ContactMode::kOpen};
-    AddMargin(std::abs(rate.value) / rate.terms, place,
-              std::string("grazing: rate of the ") + NameOf(segment->event));
-    if (segment->event == EventKind::kSlipEnds) {
-      AddOtherSlips(model, *segment, place);
-    }
-    if (EndsInMeeting(model, *segment) &&
-        MeetsACorner(model, segment->after, segment->event_contact)) {
-      AddJump(0.0, place, "a corner meets a corner");
-    }
-  }
+  AddEventOf(model, step, derivative, segment);
   AddQuality(start.problem, segment->modes, &start.system);
 }
 

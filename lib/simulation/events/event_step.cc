@@ -102,18 +102,6 @@ bool OpposesSlips(const ContactProblem<double>& problem, const std::vector<Conta
   return true;
 }
 
-// Where contacts nearly jam accelerations change so fast with poses that only a short motion can be
-// integrated: it is halved.
-struct Halvings {
-  int of_motion = 0;
-  int motions = 0;
-  // Whether the motion may be halved once more.
-  bool Again() {
-    motions += of_motion == 0 ? 1 : 0;
-    return ++of_motion <= kMostHalvings && motions <= kMostShortened;
-  }
-};
-
 // Number of events after which a step is given up.
 int MostEvents(const Model<double>& model) {
   return kGiveUp * model.structure->settings.max_events_per_step + kGiveUp;
@@ -666,6 +654,52 @@ bool EventStepper::TakeEvent(const Model<double>& model, double now, double h,
   return EndOtherSlips(model, now, segment, state, outcome);
 }
 
+bool EventStepper::Tries::Halve() {
+  halved_motions += halvings == 0 ? 1 : 0;
+  return ++halvings <= kMostHalvings && halved_motions <= kMostShortened;
+}
+
+// Chooses the modes of `segment`, the last part of the record, and moves along it. What cannot be
+// moved is taken out of the record again and tried in another way: with the contacts that a start
+// has released kept closed, after a short step with impulses, or over half the time.
+EventStepper::Tried EventStepper::TryMotion(const Model<double>& model, double now, double h,
+                                            State<double>* state, Tries* tries,
+                                            EventOutcome* outcome, Segment* segment) {
+  const int parts = record_.num_parts - 1;
+  const auto keep_starts = [&] {
+    record_.num_parts = parts;
+    search_.KeepStarts(true);
+    outcome->message.clear();
+    released_.clear();
+    return Tried::kAgain;
+  };
+  if (!ChooseModes(model, *state, outcome, segment)) {
+    if (!released_.empty()) return keep_starts();
+    record_.num_parts = parts;
+    if (std::exchange(tries->short_step, true) ||
+        !SolveByShortStep(model, now, h, state, outcome)) {
+      return Tried::kFailed;
+    }
+    outcome->message.clear();
+    return Tried::kAgain;
+  }
+  if (!outcome->message.empty()) return Tried::kFailed;
+  std::string message;
+  const bool moved = search_.Run(model, touching_.contacts, segment, &message);
+  outcome->pairs_compared = search_.num_compared();
+  outcome->pairs_near = search_.num_pairs();
+  if (moved) return Tried::kMoved;
+  if (!released_.empty()) return keep_starts();
+  ++outcome->halved_motions;
+  record_.num_parts = parts;
+  if (!tries->Halve()) {
+    outcome->message = message;
+    return Tried::kFailed;
+  }
+  search_.KeepStarts(true);  // contacts that jam keep their modes
+  return Tried::kAgain;
+}
+
 EventOutcome EventStepper::Advance(const Model<double>& model, double t, double h, AtEvent at_event,
                                    State<double>* state) {
   EventOutcome outcome;
@@ -679,11 +713,9 @@ EventOutcome EventStepper::Advance(const Model<double>& model, double t, double 
   const std::vector<Edge> edges = EdgesWithin(model, t, t + h);
   const double end = t + h;
   double now = t;
-  bool impulses_tried = false;
-  Halvings halvings;
-  const auto fail = [&](const std::string& message) {
+  Tries tries;
+  const auto fail = [&] {
     outcome.done = false;
-    outcome.message = message;
     return outcome;
   };
   bool at_given_time = true;
@@ -691,60 +723,24 @@ EventOutcome EventStepper::Advance(const Model<double>& model, double t, double 
   while (end - now > kTimeRounding * h || !at_given_time) {
     const bool at_end = end - now <= kTimeRounding * h;
     if (!SolveInstant(model, now, h, std::exchange(begins, false), at_end, state, &outcome)) {
-      return fail(outcome.message);
+      return fail();
     }
     if (at_end) break;
     const EdgeGroup next = NextEdges(edges, now, kTimeRounding * h);
     const double goal = next.any ? next.time : end;
-    const double until = now + std::ldexp(goal - now, -halvings.of_motion);
-    const int parts = record_.num_parts;
+    const double until = now + std::ldexp(goal - now, -tries.halvings);
     Segment& segment = BeginSegment(now, until, *state);
-    const auto keep_starts = [&] {
-      record_.num_parts = parts;
-      search_.KeepStarts(true);
-      outcome.message.clear();
-      released_.clear();
-    };
-    const bool has_modes = ChooseModes(model, *state, &outcome, &segment);
-    if (!has_modes && !released_.empty()) {
-      keep_starts();
-      continue;
-    }
-    if (!has_modes) {
-      record_.num_parts = parts;
-      if (std::exchange(impulses_tried, true) ||
-          !SolveByShortStep(model, now, h, state, &outcome)) {
-        return fail(outcome.message);
-      }
-      outcome.message.clear();
-      continue;
-    }
-    if (!outcome.message.empty()) {
-      return fail(outcome.message);
-    }
-    std::string message;
-    const bool moved = search_.Run(model, touching_.contacts, &segment, &message);
-    outcome.pairs_compared = search_.num_compared();
-    outcome.pairs_near = search_.num_pairs();
-    if (!moved && !released_.empty()) {
-      keep_starts();
-      continue;
-    }
-    if (!moved) {
-      ++outcome.halved_motions;
-      record_.num_parts = parts;
-      if (!halvings.Again()) return fail(message);
-      search_.KeepStarts(true);  // contacts that jam keep their modes
-      continue;
-    }
+    const Tried tried = TryMotion(model, now, h, state, &tries, &outcome, &segment);
+    if (tried == Tried::kFailed) return fail();
+    if (tried == Tried::kAgain) continue;
     if (Releases(model, segment)) continue;
-    impulses_tried = false;
+    tries.short_step = false;
     guess_.located += IsLocated(segment.event) ? 1 : 0;
     outcome.stopped = at_event == AtEvent::kStopAtSecond && guess_.located > 1;
     if (outcome.stopped) break;
     *state = segment.after;
     at_given_time = segment.event == EventKind::kStepEnd;
-    halvings.of_motion = 0;
+    tries.halvings = 0;
     if (at_given_time) {
       now = segment.length < until - now ? now + segment.length : until;
       outcome.events += EndAtGivenTime(now < goal, next, &segment);
@@ -753,7 +749,7 @@ EventOutcome EventStepper::Advance(const Model<double>& model, double t, double 
     }
     now += segment.length;
     if (!TakeEvent(model, now, h, segment, state, &outcome)) {
-      return fail(outcome.message);
+      return fail();
     }
   }
   return outcome;

@@ -166,6 +166,17 @@ class EventStepper {
   bool SolveInstant(const Model<double>& model, double now, double h, bool begins, bool at_end,
                     State<double>* state, EventOutcome* outcome);
   Segment& BeginSegment(double now, double until, const State<double>& state);
+  /// What has been tried to go on in a step. Where contacts nearly jam accelerations change so fast
+  /// with poses that only a short motion can be integrated: it is halved.
+  struct Tries {
+    int halvings = 0;        ///< of the next motion
+    int halved_motions = 0;  ///< so far in the step
+    bool short_step = false;
+    bool Halve();  ///< whether the motion may be halved once more
+  };
+  enum class Tried { kMoved, kAgain, kFailed };
+  Tried TryMotion(const Model<double>& model, double now, double h, State<double>* state,
+                  Tries* tries, EventOutcome* outcome, Segment* segment);
   void GuessModes(const std::vector<ActiveContact>& contacts, const std::vector<double>& slip,
                   double slow, ContactProblem<double>* problem,
                   ContactSolution<double>* solution) const;
