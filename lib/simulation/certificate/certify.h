@@ -36,6 +36,7 @@
 #include <vector>
 
 #include "tangible/lcp/certificate/certificate.h"
+#include "tangible/simulation/certificate/contact_coupling.h"
 #include "tangible/simulation/certificate/discrete_map.h"
 #include "tangible/simulation/stepping/coordinate_watch.h"
 #include "tangible/simulation/stepping/rollout.h"
@@ -101,11 +102,16 @@ class RolloutCertifier {
   void AddFriction(const CoefficientSource& friction, const Place& place);
   void AddEnd(const Model<double>& model, long step, const EventRecord& record);
   void AddTouchesAtEnd(const Model<double>& model, long step, const Segment& last);
-  void AddClosedAtOnce(const ModelStructure& s, long step, const Segment& segment);
+  void AddClosedAtOnce(const Model<double>& model, long step, const Segment& segment);
   void AddQuality(const ContactProblem<double>& problem, const std::vector<ContactMode>& modes,
                   ContactSystem* system);
   void AddUnloaded(const Model<double>& model, long step, const Impulses& impact);
+  bool StaysUnloaded(const Model<double>& model, const Impulses& impact, size_t i) const;
   void AddSimultaneous(const Model<double>& model, long step, const Impulses& impact);
+  double SinceLastStrike(const ModelStructure& s, const Impulses& impact,
+                         const std::vector<size_t>& approaching) const;
+  Coupling CouplingWithStrikes(const Model<double>& model, const Impulses& impact) const;
+  void AddStrikes(const ModelStructure& s, const Impulses& impact);
   void AddContact(const Model<double>& model, const StepRecord& record, const ContactScales& scales,
                   const Place& place);
   void AddLaw(const Model<double>& model, const StepRecord& record, const Place& place);
@@ -140,6 +146,12 @@ class RolloutCertifier {
   // when.
   std::vector<ActiveContact> loaded_;
   std::vector<double> struck_at_;  ///< for each body: the time of its last impact, s
+  /// A contact, of the whole model, of an impact at a time (s).
+  struct Strike {
+    ActiveContact contact;
+    double time = 0.0;
+  };
+  std::vector<Strike> strikes_;  ///< of the last impact, and of those shortly before it
   // The three of all islands, while closed_, loaded_ and struck_at_ are those of one.
   std::vector<ActiveContact> all_closed_, all_loaded_;
   std::vector<double> all_struck_at_;

@@ -23,34 +23,6 @@
 namespace tangible {
 namespace {
 
-// Bodies that an impact's impulses move, with those joined to them, which are added one by one.
-std::vector<bool> Struck(const ModelStructure& s, const Impulses& impact) {
-  std::vector<bool> struck(s.bodies.size(), false);
-  const auto moves = [&](int body) { return s.bodies[body].block >= 0; };
-  for (size_t i = 0; i < impact.contacts.size(); ++i) {
-    if (impact.solution.normal_impulse[i] > 0.0) {
-      for (const int body : {impact.contacts[i].a, impact.contacts[i].b}) {
-        struck[body] = struck[body] || moves(body);
-      }
-    }
-  }
-  for (bool more = true; more;) {
-    more = false;
-    for (const JointIndex& joint : s.joints) {
-      if (moves(joint.a) && moves(joint.b) && struck[joint.a] != struck[joint.b]) {
-        struck[joint.a] = struck[joint.b] = more = true;
-      }
-    }
-  }
-  return struck;
-}
-
-bool HasPair(const std::vector<ActiveContact>& contacts, const ActiveContact& contact) {
-  return std::any_of(contacts.begin(), contacts.end(), [&](const ActiveContact& other) {
-    return other.joint < 0 && other.a == contact.a && other.b == contact.b;
-  });
-}
-
 // Whether a segment ends because two bodies that were apart touch.
 bool EndsInMeeting(const Model<double>& model, const Segment& segment) {
   const ActiveContact& contact = segment.event_contact;
@@ -81,86 +53,6 @@ void RolloutCertifier::AddQuality(const ContactProblem<double>& problem,
   certificate_.linear_residual = std::max(certificate_.linear_residual, quality.residual);
 }
 
-// Impacts on the same bodies at (nearly) the same time: the result depends on their order. Impacts
-// of bodies that are not coupled may be in any order, and are separate impacts
-// (events/coupled_bodies.h).
-void RolloutCertifier::AddSimultaneous(const Model<double>& model, long step,
-                                       const Impulses& impact) {
-  const ModelStructure& s = *model.structure;
-  const std::vector<bool> struck = Struck(s, impact);
-  std::vector<size_t> approaching;
-  for (size_t i = 0; i < impact.contacts.size(); ++i) {
-    const ActiveContact& c = impact.contacts[i];
-    const ContactBlock<double>& block = impact.problem.contacts[i];
-    const double before = RelativeSpeed(impact.before, c.a, block.normal_a, c.b, block.normal_b);
-    if (before < -Negligible(model, before)) {
-      approaching.push_back(i);
-    }
-  }
-  if (approaching.empty()) {
-    return;
-  }
-  const ActiveContact& first = impact.contacts[approaching[0]];
-  const Place place{
-      &s, step, impact.time, approaching[0], &first, impact.solution.modes[approaching[0]]};
-  // Several contacts approach at once, and the impulse of one moves bodies of another.
-  for (size_t k = 0; k < approaching.size(); ++k) {
-    for (size_t l = 0; l < k; ++l) {
-      const ActiveContact& x = impact.contacts[approaching[k]];
-      const ActiveContact& y = impact.contacts[approaching[l]];
-      if (impact.time > 0.0 && (x.a != y.a || x.b != y.b || x.joint >= 0 || y.joint >= 0)) {
-        AddMargin(0.0, place, "two contacts touch at the same time");
-      }
-      for (const int body : {x.a, x.b}) {
-        if (s.bodies[body].block >= 0 && (body == y.a || body == y.b)) {
-          AddJump(0.0, place, "two contacts of " + s.bodies[body].name + " touch at once");
-        }
-      }
-    }
-  }
-  for (const size_t i : approaching) {
-    const double last =
-        std::max(struck_at_[impact.contacts[i].a], struck_at_[impact.contacts[i].b]);
-    if (std::isfinite(last)) {
-      AddJump((impact.time - last) / s.settings.dt, place,
-              "impacts follow each other within " + Short(impact.time - last) + " s");
-    }
-  }
-  for (size_t body = 0; body < struck.size(); ++body) {
-    struck_at_[body] = struck[body] ? impact.time : struck_at_[body];
-  }
-}
-
-// A contact that only touches, without force, takes part in the impact of another contact: with a
-// gap, however small, it would have a separate impact later.
-void RolloutCertifier::AddUnloaded(const Model<double>& model, long step, const Impulses& impact) {
-  double largest = 0.0;
-  for (const double normal : impact.solution.normal_impulse) {
-    largest = std::max(largest, normal);
-  }
-  // The impact of another contact; one that approaches by rounding alone does not count.
-  const auto speed = [&](size_t i) {
-    const ActiveContact& c = impact.contacts[i];
-    const ContactBlock<double>& block = impact.problem.contacts[i];
-    return RelativeSpeed(impact.before, c.a, block.normal_a, c.b, block.normal_b);
-  };
-  bool any = false;
-  for (size_t i = 0; i < impact.contacts.size(); ++i) {
-    any = any || speed(i) < -Negligible(model, speed(i));
-  }
-  for (size_t i = 0; any && i < impact.contacts.size(); ++i) {
-    const ActiveContact& c = impact.contacts[i];
-    const double before = speed(i);
-    const bool loaded = std::any_of(loaded_.begin(), loaded_.end(),
-                                    [&](const ActiveContact& l) { return l.SameAs(c); });
-    if (!loaded && impact.solution.normal_impulse[i] > kLoaded * largest &&
-        before >= -Negligible(model, before)) {
-      const Place place{model.structure.get(), step, impact.time, i, &c, impact.solution.modes[i]};
-      AddJump(0.0, place, "it only touches when another impact moves it");
-    }
-  }
-}
-
 void RolloutCertifier::AddImpact(const Model<double>& model, long step, Impulses* impact) {
   const ModelStructure& s = *model.structure;
   const double threshold = s.settings.restitution_threshold;
@@ -175,10 +67,12 @@ void RolloutCertifier::AddImpact(const Model<double>& model, long step, Impulses
         RelativeSpeed(impact->before, contact.a, block.normal_a, contact.b, block.normal_b);
     const ContactMargin margin =
         MarginOfContact(impact->problem, impact->solution, scales, static_cast<int>(i));
-    AddMargin(margin.value, place,
-              std::string(impact->decompression ? "decompression, " : "impact, ") +
-                  (block.driven ? "driven and " : "") + ModeName(place.mode));
-    certificate_.degenerate_rows += margin.value < kDegenerateTolerance ? 1 : 0;
+    if (!(margin.value < kDegenerateTolerance) || !StaysUnloaded(model, *impact, i)) {
+      AddMargin(margin.value, place,
+                std::string(impact->decompression ? "decompression, " : "impact, ") +
+                    (block.driven ? "driven and " : "") + ModeName(place.mode));
+      certificate_.degenerate_rows += margin.value < kDegenerateTolerance ? 1 : 0;
+    }
     const CoefficientSource& friction = impact->friction[i];
     if (place.mode != ContactMode::kOpen && friction.value == 0.0 &&
         (Wanted(friction.numbers[0]) || Wanted(friction.numbers[1]))) {
@@ -202,32 +96,6 @@ void RolloutCertifier::AddImpact(const Model<double>& model, long step, Impulses
     AddUnloaded(model, step, *impact);
   }
   AddQuality(impact->problem, impact->solution.modes, &impact->system);
-}
-
-// Contacts of different pairs that begin to support a body at the same time: if one were earlier,
-// it would support the body alone until the other closes.
-void RolloutCertifier::AddClosedAtOnce(const ModelStructure& s, long step, const Segment& segment) {
-  std::vector<size_t> begun;
-  for (size_t i = 0; i < segment.contacts.size(); ++i) {
-    const ActiveContact& contact = segment.contacts[i];
-    const bool is_loaded = std::any_of(loaded_.begin(), loaded_.end(),
-                                       [&](const auto& l) { return l.SameAs(contact); });
-    if (contact.joint >= 0 || !is_loaded || HasPair(closed_, contact)) {
-      continue;
-    }
-    for (const size_t k : begun) {
-      const ActiveContact& other = segment.contacts[k];
-      for (const int body : {contact.a, contact.b}) {
-        const bool shares = body == other.a || body == other.b;
-        if (shares && s.bodies[body].block >= 0 &&
-            !(contact.a == other.a && contact.b == other.b)) {
-          AddMargin(0.0, {&s, step, segment.time, i, &contact, segment.modes[i]},
-                    "two contacts of " + s.bodies[body].name + " close at once");
-        }
-      }
-    }
-    begun.push_back(i);
-  }
 }
 
 // Coupled bodies that stop sliding at the same time: the derivative of the time is that of only one
@@ -341,7 +209,7 @@ void RolloutCertifier::AddSegment(const Model<double>& model, long step,
     AddFriction(friction, place);
   }
   if (!segment->starts && (step > 0 || segment->time > 0.0)) {
-    AddClosedAtOnce(s, step, *segment);
+    AddClosedAtOnce(model, step, *segment);
   }
   closed_ = segment->contacts;
   if (Wanted(segment->edge_before) ||

@@ -2,9 +2,11 @@
 #pragma once
 // Where in a rollout a certificate's figure was taken. Included by certify*.cc alone.
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <string>
+#include <vector>
 
 #include "tangible/dynamics/model/tolerances.h"
 #include "tangible/simulation/certificate/certify.h"
@@ -22,6 +24,13 @@ inline double Negligible(const Model<double>& model, double speed) {
   return kNoApproach *
          (std::abs(speed) + model.structure->settings.dt * std::hypot(model.parameters[kGravityX],
                                                                       model.parameters[kGravityY]));
+}
+
+// Whether one of the contacts is between the shapes of the same two bodies.
+inline bool HasPair(const std::vector<ActiveContact>& contacts, const ActiveContact& contact) {
+  return std::any_of(contacts.begin(), contacts.end(), [&](const ActiveContact& other) {
+    return other.joint < 0 && other.a == contact.a && other.b == contact.b;
+  });
 }
 
 struct RolloutCertifier::Place {

@@ -318,12 +318,10 @@ bool EventStepper::LocateTouch(const Model<double>& model, double t, double slow
                                State<double>* state, EventOutcome* outcome) {
   if (record_.num_parts > 0) {
     const EventPart& last = *record_.parts[record_.num_parts - 1];
-    const bool is_first =
-        std::all_of(struck_.begin(), struck_.end(), [](double speed) { return speed == 0.0; });
     if (last.is_impulses
-            ? is_first
+            ? !impacts_.any_struck()
             : last.segment.event != EventKind::kStepEnd && last.segment.event != EventKind::kEdge &&
-                  coupled_.GroupOf(last.segment.event_contact) == group) {
+                  impacts_.Of(last.segment.event_contact) == group) {
       return true;
     }
   }
@@ -339,7 +337,7 @@ bool EventStepper::LocateTouch(const Model<double>& model, double t, double slow
     const ActiveContact& candidate = touching_.contacts[i];
     const bool on_surface = candidate.gap >= -search_.TouchTolerance(model, *state, candidate);
     if (touching_.approach[i] < -slow && on_surface && !was_closed(candidate) &&
-        coupled_.GroupOf(candidate) == group) {
+        impacts_.Of(i) == group) {
       touch = &touching_.contacts[i];
     }
   }

@@ -139,12 +139,10 @@ ContactMode EventStepper::GuessOf(const ActiveContact& contact) const {
   return ContactMode::kSticking;
 }
 
-double EventStepper::ApproachOf(int group) {
+double EventStepper::ApproachOf(int group) const {
   double approach = 0.0;
   for (size_t i = 0; i < touching_.contacts.size(); ++i) {
-    if (coupled_.GroupOf(touching_.contacts[i]) == group) {
-      approach = std::max(approach, -touching_.approach[i]);
-    }
+    if (impacts_.Of(i) == group) approach = std::max(approach, -touching_.approach[i]);
   }
   return approach;
 }
@@ -156,12 +154,11 @@ int EventStepper::NextToStrike(double slow) {
       last != nullptr && !last->is_impulses && last->segment.event == EventKind::kTouch;
   int next = -1;
   for (size_t i = 0; i < touching_.contacts.size(); ++i) {
-    const ActiveContact& contact = touching_.contacts[i];
     if (!(touching_.approach[i] < -slow)) {
       continue;
     }
-    const int group = coupled_.GroupOf(contact);
-    const double struck = struck_[group];
+    const int group = impacts_.Of(i);
+    const double struck = impacts_.Struck(group);
     if (struck > 0.0) {
       const double approach = ApproachOf(group);
       // A residual approach speed below the tolerance of the impact's solve must not start another
@@ -169,11 +166,10 @@ int EventStepper::NextToStrike(double slow) {
       if (approach >= 0.5 * struck && approach <= kSolvedApproach * slow) {
         continue;
       }
-      return group;
+      return static_cast<int>(i);
     }
-    const bool ended_segment =
-        ends_in_touch && coupled_.GroupOf(last->segment.event_contact) == group;
-    next = next < 0 || ended_segment ? group : next;
+    const bool ended_segment = ends_in_touch && impacts_.Of(last->segment.event_contact) == group;
+    next = next < 0 || ended_segment ? static_cast<int>(i) : next;
   }
   return next;
 }
@@ -195,7 +191,7 @@ bool EventStepper::CountImpact(const Model<double>& model, double slow, int grou
     const ActiveContact& contact = touching_.contacts[i];
     const bool same_pair = last != nullptr && last->a == contact.a && last->b == contact.b &&
                            last->joint == contact.joint;
-    if (!(touching_.approach[i] < -slow) || coupled_.GroupOf(contact) != group || same_pair) {
+    if (!(touching_.approach[i] < -slow) || impacts_.Of(i) != group || same_pair) {
       continue;
     }
     last = &contact;
@@ -216,31 +212,31 @@ bool EventStepper::SolveImpacts(const Model<double>& model, double t, State<doub
                                 EventOutcome* outcome) {
   const auto find_touching = [&] {
     FindTouching(model, *state);
-    coupled_.Connect(*model.structure, touching_.contacts);
-    for (const int body : model.structure->moving) {
-      double& of_group = struck_[coupled_.GroupOf(body)];
-      of_group = std::max(of_group, struck_[body]);
-    }
-  };
-  struck_.assign(model.structure->bodies.size(), 0.0);
-  for (;;) {
-    find_touching();
     const double slow = SlowSpeed(model, *state);
-    int group = NextToStrike(slow);
-    if (group < 0) {
+    impacts_.Connect(
+        model, *state, t,
+        {touching_.contacts, touching_.friction, touching_.restitution, touching_.approach}, slow);
+    return slow;
+  };
+  impacts_.Begin(*model.structure);
+  for (;;) {
+    const double slow = find_touching();
+    const int next = NextToStrike(slow);
+    if (next < 0) {
       return true;
     }
+    int group = impacts_.Of(static_cast<size_t>(next));
     const double approach = ApproachOf(group);
-    if (struck_[group] == 0.0) {
+    if (impacts_.Struck(group) == 0.0) {
+      const ActiveContact first = touching_.contacts[next];
       if (!LocateTouch(model, t, slow, group, state, outcome)) {
         return false;
       }
       find_touching();
-      group = coupled_.GroupOf(group);
+      group = impacts_.Of(first);
+      if (group < 0) continue;
     }
-    for (const int body : model.structure->moving) {
-      if (coupled_.GroupOf(body) == group) struck_[body] = approach;
-    }
+    impacts_.SetStruck(group, approach);
     if (!CountImpact(model, slow, group, outcome)) {
       return false;
     }
@@ -266,17 +262,17 @@ Impulses* EventStepper::ListImpact(const Model<double>& model, double t, double 
   impact.friction.clear();
   impact.restitution.clear();
   rebounds_.clear();
-  const auto in_group = [&](const ActiveContact& c) { return coupled_.GroupOf(c) == group; };
-  const bool rattles =
-      std::any_of(touching_.contacts.begin(), touching_.contacts.end(),
-                  [&](const ActiveContact& c) { return in_group(c) && Rattles(model, c); });
+  bool rattles = false;
+  for (size_t i = 0; i < touching_.contacts.size(); ++i) {
+    rattles = rattles || (impacts_.Of(i) == group && Rattles(model, touching_.contacts[i]));
+  }
   for (size_t i = 0; i < touching_.contacts.size(); ++i) {
     // In a rattle contacts that leave slowly are held with the others, because they would return at
     // once.
     const double leaves =
         rattles ? std::max(slow, ReturnSpeed(model, state, touching_.contacts[i])) : slow;
     // Friction in a joint is a force, which does nothing at an instant.
-    if (touching_.approach[i] > leaves || !in_group(touching_.contacts[i]) ||
+    if (touching_.approach[i] > leaves || impacts_.Of(i) != group ||
         touching_.contacts[i].IsJointFriction()) {
       continue;
     }

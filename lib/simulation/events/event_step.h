@@ -27,6 +27,7 @@
 #include "tangible/simulation/events/event_counts.h"
 #include "tangible/simulation/events/event_edges.h"
 #include "tangible/simulation/events/event_search.h"
+#include "tangible/simulation/events/impact_groups.h"
 
 namespace tangible {
 
@@ -142,15 +143,15 @@ class EventStepper {
   /// the impulse of its compression (event_decompression.cc).
   bool Decompress(const Model<double>& model, const Impulses& compression, State<double>* state,
                   EventOutcome* outcome);
-  /// An impact of the group `group` of coupled_.
+  /// An impact of the group `group` of impacts_.
   Impulses* ListImpact(const Model<double>& model, double t, double slow, int group,
                        const State<double>& state);
-  /// A body of the group whose impact is the next one at this instant: the one that has begun, or
-  /// else that of the event that ended the last segment, or else that of the first contact that
-  /// approaches; −1: none approaches faster than `slow`, m/s.
+  /// A touching contact that approaches, of the group whose impact is the next one at this instant:
+  /// the one that has begun, or else that of the event that ended the last segment, or else that of
+  /// the first contact that approaches; −1: none approaches faster than `slow`, m/s.
   int NextToStrike(double slow);
   /// The fastest approach of a group's contacts, m/s.
-  double ApproachOf(int group);
+  double ApproachOf(int group) const;
   bool CountImpact(const Model<double>& model, double slow, int group, EventOutcome* outcome);
   /// "…: more than 303 events in a step of contact of a and b, max_events_per_step is 100".
   static std::string EventsDoNotEnd(const Model<double>& model, const char* what,
@@ -240,11 +241,10 @@ class EventStepper {
   std::vector<bool> rebounds_;  ///< of the last impact's contacts
   DecompressionSolver decompression_;
   EventGuess guess_;
-  EventCounts counts_;     ///< of this step
-  EventCounts shortened_;  ///< motions shortened at ellipses in this step
-  CoupledBodies coupled_;  ///< at this instant
-  std::vector<double>
-      struck_;  ///< for each body: approach before its last impact at this instant; 0: none
+  EventCounts counts_;              ///< of this step
+  EventCounts shortened_;           ///< motions shortened at ellipses in this step
+  ImpactGroups impacts_;            ///< of this instant
+  CoupledBodies coupled_;           ///< as contacts stop sliding
   std::vector<EndingSlip> ending_;  ///< contacts that slide until a separate event
   /// Contacts at their limit as the next motion starts, beyond which they would go in it: the
   /// accelerations at the start do not tell that they slide or open.

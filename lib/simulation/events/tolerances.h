@@ -118,6 +118,9 @@ inline constexpr double kSpeedOfTerms = 1e-6;
 /// about an unsolved impact.
 inline constexpr double kNamedJoint = 1e-9;
 
+/// Of √(g g'), the changes of two rows' speeds by a unit impulse along each: where an impulse along
+/// one changes the speed along the other by less, that is rounding, and they are not coupled.
+inline constexpr double kUncoupled = 1e-12;
 /// The norm of the difference of two normals: below it two contacts of a vertex above a vertex are
 /// the same, where rounding decides which of the two is found.
 inline constexpr double kSameNormal = 1e-7;

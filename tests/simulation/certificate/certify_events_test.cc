@@ -67,6 +67,46 @@ TEST(CertifyEventsTest, EventsOfCoupledBodiesAtTheSameTimeAreNamed) {
   EXPECT_NE(slip.find("two contacts stop sliding at the same time"), std::string::npos) << slip;
 }
 
+// A disc that meets a floor and a wall at once: without friction neither impact acts on the other;
+// with friction at the floor the order decides in which direction that acts.
+TEST(CertifyEventsTest, AFloorAndAWallMetAtOnceAreNamedWhereTheyActOnEachOther) {
+  const auto verdict = [](const char* friction) {
+    return CertificateOf(
+               std::string(R"("gravity": [0, 0], "bodies": [{"name": "disc",
+        "shape": {"circle": {"radius": 0.125}}, "mass": 1, "restitution": 0.5,
+        "position": [0, 0.625], "velocity": [1, -1]}, )") +
+                   Floor() +
+                   R"(, {"name": "wall", "static": true, "shape": {"box": {"size": [1, 4]}},
+        "position": [1.125, 0]}], "pairs": [
+        {"bodies": ["disc", "wall"], "friction": 0, "restitution": 0.5},
+        {"bodies": ["disc", "floor"], "friction": )" +
+                   friction + R"(, "restitution": 0.8}])",
+               0.7)
+        .verdict;
+  };
+  EXPECT_EQ(verdict("0"), "trustworthy");
+  EXPECT_NE(verdict("0.3").find("discontinuous"), std::string::npos) << verdict("0.3");
+}
+
+// A ball that meets two others at right angles: in another place the angle is another one, and the
+// order of the impacts matters.
+TEST(CertifyEventsTest, BallsMetAtRightAnglesAreAKink) {
+  const auto ball = [](const char* name, const char* place) {
+    return R"({"name": ")" + std::string(name) +
+           R"(", "shape": {"circle": {"radius": 0.125}}, "mass": 1, "restitution": 0.5, )" + place +
+           "}";
+  };
+  const std::string verdict =
+      CertificateOf(R"("gravity": [0, 0], "bodies": [)" +
+                        ball("a", R"("position": [0, 0], "velocity": [1, 1])") + ", " +
+                        ball("b", R"("position": [0.75, 0.5])") + ", " +
+                        ball("c", R"("position": [0.5, 0.75])") + "]",
+                    0.7)
+          .verdict;
+  EXPECT_EQ(verdict.find("discontinuous"), std::string::npos) << verdict;
+  EXPECT_NE(verdict.find("two contacts touch at the same time"), std::string::npos) << verdict;
+}
+
 // A ball on a floor whose bounces follow each other ever faster: most of them within one step.
 TEST(CertifyEventsTest, ASeriesThatRoundingEndsIsNamed) {
   const auto of = [](const char* more) {

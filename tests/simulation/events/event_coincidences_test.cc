@@ -7,7 +7,9 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <sstream>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "../../support/gradients.h"
@@ -180,6 +182,180 @@ TEST(EventCoincidencesTest, ASliderMeetsItsLimit) {
          0.75, R"(, "joints": [{"name": "j", "type": "prismatic", "bodies": ["b", "world"],
              "anchor": [0, 0], "axis": [1, 0], "limits": [-1, 0.625]}])"),
       {"bodies/b/velocity/x"}, {{0, 0.625, {0.0}}, {3, 0.0, {0.0}}});
+}
+
+// A gap that closes under a constant acceleration and bounces once, and what changes it.
+struct Rebound {
+  enum { kGap, kSpeed, kAcceleration, kRestitution, kCount };
+
+  Rebound(double gap, double speed, double a, double e, double duration) {
+    const double impact = -std::sqrt(speed * speed - 2.0 * a * gap);
+    const double t = (impact - speed) / a;
+    const double rest = duration - t;
+    // Without rebound the gap stays closed.
+    const double after = e == 0.0 ? 0.0 : a;
+    value = -e * impact * rest + 0.5 * after * rest * rest;
+    rate = -e * impact + after * rest;
+    const double own[kCount] = {1.0, t, 0.5 * t * t, 0.0};
+    for (int k = 0; k < kCount; ++k) {
+      const double dt = -own[k] / impact;
+      const double d_impact = (k == kSpeed ? 1.0 : k == kAcceleration ? t : 0.0) + a * dt;
+      const double d_after = k == kAcceleration && e != 0.0 ? 1.0 : 0.0;
+      const double de = k == kRestitution ? 1.0 : 0.0;
+      d_rate[k] = -de * impact - e * d_impact + d_after * rest - after * dt;
+      d_value[k] = (-de * impact - e * d_impact) * rest + e * impact * dt +
+                   0.5 * d_after * rest * rest - after * rest * dt;
+    }
+  }
+  double value = 0.0, rate = 0.0;
+  double d_value[kCount], d_rate[kCount];
+};
+
+// A disc without friction that meets the floor and a wall at the same instant, 0.5 s, in axes that
+// are turned by an angle.
+Scene Corner(double e_wall, double e_floor, double angle, const std::string& law) {
+  std::ostringstream text;
+  text.precision(17);
+  const auto turned = [&](double x, double y) {
+    text << "[" << std::cos(angle) * x - std::sin(angle) * y << ", "
+         << std::sin(angle) * x + std::cos(angle) * y << "]";
+  };
+  text << R"({"gravity": )";
+  turned(0.4, -10.0);
+  text << R"(, "bodies": [{"name": "b", "shape": {"circle": {"radius": 0.125}}, "mass": 1,
+      "angular_velocity": 3, "position": )";
+  turned(0.0, 0.875);
+  text << R"(, "velocity": )";
+  turned(1.65, 1.0);
+  text
+      << R"(}, {"name": "floor", "static": true, "shape": {"half_plane": {"offset": 0, "normal": )";
+  turned(0.0, 1.0);
+  text
+      << R"(}}}, {"name": "wall", "static": true, "shape": {"half_plane": {"offset": -1, "normal": )";
+  turned(-1.0, 0.0);
+  text << R"(}}}], "pairs": [{"bodies": ["b", "floor"], "friction": 0, "restitution": )" << e_floor
+       << R"(}, {"bodies": ["b", "wall"], "friction": 0, "restitution": )" << e_wall
+       << R"(}], "simulation": {"stepping": "event", "duration": 0.75, "impact_law": ")" << law
+       << R"("}})";
+  return SceneOf(text.str());
+}
+
+// Each impact changes the speed along its own normal alone, so that both coordinates are motions of
+// their own, whichever impact is first.
+void ExpectCorner(double e_wall, double e_floor, double angle, const std::string& law) {
+  SCOPED_TRACE(law + ", wall " + std::to_string(e_wall) + ", floor " + std::to_string(e_floor) +
+               ", angle " + std::to_string(angle));
+  const Rebound x(0.875, -1.65, -0.4, e_wall, 0.75);
+  const Rebound y(0.75, 1.0, -10.0, e_floor, 0.75);
+  // Rows x, y, vx, vy; columns positions, velocities, gravity, restitutions.
+  Eigen::Matrix<double, 4, 8> jacobian = Eigen::Matrix<double, 4, 8>::Zero();
+  for (int k = 0; k < 3; ++k) {
+    jacobian(0, 2 * k) = x.d_value[k];
+    jacobian(2, 2 * k) = x.d_rate[k];
+    jacobian(1, 2 * k + 1) = y.d_value[k];
+    jacobian(3, 2 * k + 1) = y.d_rate[k];
+  }
+  jacobian(0, 6) = -x.d_value[Rebound::kRestitution];
+  jacobian(2, 6) = -x.d_rate[Rebound::kRestitution];
+  jacobian(1, 7) = y.d_value[Rebound::kRestitution];
+  jacobian(3, 7) = y.d_rate[Rebound::kRestitution];
+  Eigen::Vector4d values(1.0 - 0.125 - x.value, 0.125 + y.value, -x.rate, y.rate);
+  Eigen::Matrix2d turn;
+  turn << std::cos(angle), -std::sin(angle), std::sin(angle), std::cos(angle);
+  for (int k = 0; k < 4; k += 2) {
+    values.segment<2>(k) = (turn * values.segment<2>(k)).eval();
+    jacobian.middleRows<2>(k) = (turn * jacobian.middleRows<2>(k)).eval();
+  }
+  for (int k = 0; k < 6; k += 2) {
+    jacobian.middleCols<2>(k) = (jacobian.middleCols<2>(k) * turn.transpose()).eval();
+  }
+  // At 0 a restitution has one derivative alone.
+  std::vector<std::string> paths = {"bodies/b/position/x", "bodies/b/position/y",
+                                    "bodies/b/velocity/x", "bodies/b/velocity/y",
+                                    "gravity/x",           "gravity/y"};
+  if (e_wall > 0.0) paths.emplace_back("pairs/b:wall/restitution");
+  if (e_floor > 0.0) paths.emplace_back("pairs/b:floor/restitution");
+  std::vector<Exact> exact;
+  for (int row = 0; row < 4; ++row) {
+    Exact e{row < 2 ? row : row + 1, values[row], {}};
+    for (int k = 0; k < 8; ++k) {
+      if ((k == 6 && e_wall == 0.0) || (k == 7 && e_floor == 0.0)) continue;
+      e.derivatives.push_back(jacobian(row, k));
+    }
+    exact.push_back(e);
+  }
+  ExpectExact(Corner(e_wall, e_floor, angle, law), paths, exact);
+}
+
+// Each impact changes the speed along its own normal alone, so that both coordinates are motions of
+// their own, whichever impact is first.
+TEST(EventCoincidencesTest, ADiscMeetsAFloorAndAWall) {
+  ExpectCorner(0.5, 0.8, 0.0, "newton");
+  ExpectCorner(0.8, 0.0, 0.0, "newton");
+  ExpectCorner(0.0, 0.5, 0.3, "newton");
+  ExpectCorner(0.0, 0.0, 0.0, "newton");
+  ExpectCorner(0.5, 0.8, 0.3, "poisson");
+}
+
+// A carriage on a rail with a cross slide, whose limits are met at one instant: each limit stops
+// its own coordinate through the joints.
+TEST(EventCoincidencesTest, TwoSlidersMeetTheirLimits) {
+  ExpectExact(
+      Of("[2, 2]",
+         R"({"name": "a", "mass": 2, "inertia": 1, "position": [0, 0], "velocity": [0.75, 0]},
+            {"name": "b", "mass": 1, "inertia": 1, "position": [0, 0], "velocity": [0.75, 0.75]})",
+         0.75, R"(, "joints": [{"name": "j", "type": "prismatic", "bodies": ["a", "world"],
+             "anchor": [0, 0], "axis": [1, 0], "limits": [-1, 0.625]},
+             {"name": "k", "type": "prismatic", "bodies": ["b", "a"],
+             "anchor": [0, 0], "axis": [0, 1], "limits": [-1, 0.625]}])"),
+      {"bodies/b/velocity/y", "gravity/y"},
+      {{0, 0.625, {0.0, 0.0}},
+       {3, 0.0, {0.0, 0.0}},
+       {7, 0.625, {0.0, 0.0}},
+       {10, 0.0, {0.0, 0.0}}});
+}
+
+// A disc on two slides at right angles, the first of which carries the other: a wall and the limit
+// of the second slide do not act on each other through the joints.
+TEST(EventCoincidencesTest, ADiscOnSlidesMeetsAWallAndALimit) {
+  const double e = 0.5;
+  const Rebound x(0.875, -1.65, -0.4, e, 0.75);
+  ExpectExact(
+      Of("[0.4, 2]",
+         R"({"name": "a", "mass": 2, "inertia": 1, "position": [0, 0], "velocity": [1.65, 0]},
+            {"name": "b", "mass": 1, "position": [0, 0], "velocity": [1.65, 0.75],
+             "restitution": 0.25, "shape": {"circle": {"radius": 0.125}}},
+            {"name": "wall", "static": true, "restitution": 0.75,
+             "shape": {"half_plane": {"normal": [-1, 0], "offset": -1}}})",
+         0.75, R"(, "joints": [{"name": "j", "type": "prismatic", "bodies": ["a", "world"],
+             "anchor": [0, 0], "axis": [1, 0]},
+             {"name": "k", "type": "prismatic", "bodies": ["b", "a"],
+             "anchor": [0, 0], "axis": [0, 1], "limits": [-1, 0.625]}])"),
+      {"bodies/wall/restitution", "gravity/x", "gravity/y"},
+      {{0,
+        0.875 - x.value,
+        {-0.5 * x.d_value[Rebound::kRestitution], x.d_value[Rebound::kAcceleration], 0.0}},
+       {7, 0.625, {0.0, 0.0, 0.0}},
+       {9,
+        -x.rate,
+        {-0.5 * x.d_rate[Rebound::kRestitution], x.d_rate[Rebound::kAcceleration], 0.0}},
+       {10, 0.0, {0.0, 0.0, 0.0}}});
+}
+
+// A disc that rolls on a floor meets a wall without friction, which leaves its load and its spin as
+// they are: x = W − e v τ + μ g τ² / 2 for τ after the impact, while it slides back.
+TEST(EventCoincidencesTest, ADiscThatRollsMeetsAWall) {
+  ExpectExact(
+      Of("[0, -10]",
+         R"({"name": "b", "shape": {"circle": {"radius": 0.125}}, "mass": 1, "friction": 0.1,
+             "position": [0, 0.125], "velocity": [1.75, 0], "angular_velocity": -14},
+            {"name": "wall", "static": true,
+             "shape": {"half_plane": {"normal": [-1, 0], "offset": -1}}}, )" +
+             Floor(0.1),
+         0.75, R"(, "pairs": [{"bodies": ["b", "wall"], "friction": 0, "restitution": 0.5}])"),
+      {"bodies/b/position/x", "pairs/b:wall/restitution", "bodies/b/friction"},
+      {{0, 0.875 - 0.21875 + 0.03125, {-0.5 + 0.25 / 1.75, -0.4375, 0.15625}},
+       {3, -0.875 + 0.25, {1.0 / 1.75, -1.75, 1.25}}});
 }
 
 // An event at the end of the run: positions are differentiable, the speed has another derivative on

@@ -16,7 +16,7 @@ namespace {
 
 using test_scenes::SceneOf;
 
-constexpr double kG = 9.81;
+constexpr double kGravity = 9.81;
 
 struct Rolled {
   RolloutReport report;
@@ -57,12 +57,12 @@ std::string Ball(double height, double speed, double spin, double e, double mu) 
 
 TEST(EventStepTest, BouncesAsTheFormulaSays) {
   const Rolled run = Simulate("{" + Ball(1.0, 0, 0, 0.8, 0) + Settings("trapezoidal", 1.5) + "}");
-  const double u = std::sqrt(2.0 * kG);
-  const double t1 = u / kG;
-  const double t2 = t1 + 2.0 * 0.8 * u / kG;
+  const double u = std::sqrt(2.0 * kGravity);
+  const double t1 = u / kGravity;
+  const double t2 = t1 + 2.0 * 0.8 * u / kGravity;
   const double left = 1.5 - t2;
-  EXPECT_NEAR(run.final.pose[1], 0.1 + 0.64 * u * left - 0.5 * kG * left * left, 1e-12);
-  EXPECT_NEAR(run.final.twist[1], 0.64 * u - kG * left, 1e-12);
+  EXPECT_NEAR(run.final.pose[1], 0.1 + 0.64 * u * left - 0.5 * kGravity * left * left, 1e-12);
+  EXPECT_NEAR(run.final.twist[1], 0.64 * u - kGravity * left, 1e-12);
   EXPECT_EQ(run.report.events, 2);
   EXPECT_EQ(run.report.given_up.total(), 0);
 }
@@ -130,10 +130,11 @@ TEST(EventStepTest, ABodyTooStiffForItsIntegratorIsRefusedSoon) {
 TEST(EventStepTest, ASlidingDiscRolls) {
   // v = v0 − μ g t until v = r ω: t = v0 / (3 μ g), v = 2 v0 / 3.
   const Rolled run = Simulate("{" + Ball(0, 2, 0, 0, 0.3) + Settings("trapezoidal", 0.8) + "}");
-  const double t = 2.0 / (3.0 * 0.3 * kG);
+  const double t = 2.0 / (3.0 * 0.3 * kGravity);
   EXPECT_NEAR(run.final.twist[0], 4.0 / 3.0, 1e-13);
   EXPECT_NEAR(run.final.twist[2], -40.0 / 3.0, 1e-12);
-  EXPECT_NEAR(run.final.pose[0], 2.0 * t - 0.5 * 0.3 * kG * t * t + 4.0 / 3.0 * (0.8 - t), 1e-13);
+  EXPECT_NEAR(run.final.pose[0], 2.0 * t - 0.5 * 0.3 * kGravity * t * t + 4.0 / 3.0 * (0.8 - t),
+              1e-13);
   EXPECT_EQ(run.report.events, 1);
 }
 
@@ -144,7 +145,7 @@ TEST(EventStepTest, ABlockStopsWhereItsEnergyIsSpent) {
       {"name": "floor", "static": true, "friction": 0.4,
        "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}}], )" +
                               Settings("runge_kutta_4", 1.0) + "}");
-  EXPECT_NEAR(run.final.pose[0], 4.0 / (2.0 * 0.4 * kG), 1e-13);
+  EXPECT_NEAR(run.final.pose[0], 4.0 / (2.0 * 0.4 * kGravity), 1e-13);
   EXPECT_NEAR(run.final.pose[1], 0.1, 1e-14);
   EXPECT_NEAR(run.final.pose[2], 0.0, 1e-14);
   EXPECT_NEAR(run.final.twist[0], 0.0, 1e-14);
@@ -170,7 +171,7 @@ TEST(EventStepTest, ARampOfForceStartsASlideWhereFrictionEnds) {
   BuildModel(scene, &model, &state);
   const RolloutReport report = Rollout(model, state, nullptr, &state);
   ASSERT_EQ(report.status, StepStatus::kDone) << report.message;
-  const double start = 0.4 * 2.0 * kG / 5.0;
+  const double start = 0.4 * 2.0 * kGravity / 5.0;
   const double left = 2.0 - start;
   EXPECT_NEAR(state.twist[0], 5.0 * left * left / 4.0, 1e-12);
   EXPECT_NEAR(state.pose[0], 5.0 * left * left * left / 12.0, 1e-12);
