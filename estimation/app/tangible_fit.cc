@@ -23,6 +23,7 @@
 #include "tangible/estimation/fit/motion_check.h"
 #include "tangible/estimation/fit/variance_components.h"
 #include "tangible/estimation/results/fit_json.h"
+#include "tangible/estimation/results/fit_schema.h"
 #include "tangible/estimation/results/fitted_scene.h"
 #include "tangible/estimation/results/prediction.h"
 #include "tangible/estimation/results/report.h"
@@ -682,7 +683,8 @@ int Main(int argc, char** argv) {
            "and 95 % interval.",
        .version = TANGIBLE_VERSION,
        .source_file = __FILE__,
-       .outputs = {"out", "report", "scene_out", "predictions", "checkpoint"}});
+       .outputs = {"out", "report", "scene_out", "predictions", "checkpoint"},
+       .schema = [] { return JsonText(FitSchema()); }});
   if (line.exit_status) return *line.exit_status;
   if (FLAGS_max_iterations < 1) {
     return ReportError("tangible-fit: --max_iterations: expected a number >= 1, got " +

@@ -7,7 +7,7 @@
 
 #include "tangible/math/scalar.h"
 #include "tangible/scene/parameter.h"
-#include "tangible/scene/set_parameters.h"
+#include "tangible/scene/validate.h"
 #include "tangible/simulation/stepping/step.h"
 
 namespace tangible {
@@ -127,7 +127,7 @@ bool ParameterizedScene::Create(const Scene& scene, const std::vector<BodyPoint>
   }
   structure_ = BuildStructure(scene_);
   if (!Set(Initial())) {
-    const std::string reason = depends_on_others_ ? CheckNumbers(scene_) : "";
+    const std::string reason = Validate(scene_, "the scene with these values");
     *error = {-1, -1, "",
               "the initial values give a number that is not allowed" +
                   (reason.empty() ? "" : ": " + reason)};
@@ -340,7 +340,6 @@ void ParameterizedScene::CollectTargets() {
   const auto numbers = EnumerateNumbers(&scene_);
   const std::vector<InstrumentNumber> measured = MeasurementNumbers();
   targets_.clear();
-  depends_on_others_ = false;
   for (size_t i = 0; i < numbers_.size(); ++i) {
     const NumberSet& set = numbers_[i];
     auto target = std::find_if(targets_.begin(), targets_.end(),
@@ -348,8 +347,6 @@ void ParameterizedScene::CollectTargets() {
     if (target == targets_.end()) {
       const int other = set.number - num_scene_numbers_;
       const double own = other < 0 ? *numbers[set.number].value : *measured[other].value;
-      depends_on_others_ =
-          depends_on_others_ || (other < 0 && DependsOnOthers(numbers[set.number].path));
       target = targets_.insert(target, {set.number, set.kind, own, {}});
     }
     target->sets.push_back(static_cast<int>(i));
@@ -376,7 +373,7 @@ bool ParameterizedScene::Set(const Eigen::VectorXd& p) {
       *measured[target.number - num_scene_numbers_].value = value;
     }
   }
-  if (depends_on_others_ && !CheckNumbers(scene_).empty()) {
+  if (!Validate(scene_, "").empty()) {
     return false;
   }
   BuildModelWithStructure(scene_, structure_, &model_, &state_);

@@ -149,7 +149,6 @@ class ParameterizedScene {
   RowMatrixXd point_derivatives_;
   RowMatrixXd instrument_derivatives_;
   bool moves_times_ = false;
-  bool depends_on_others_ = false;  ///< whether some number's allowed values depend on others
   int num_scene_numbers_ = 0;
   std::shared_ptr<const ModelStructure> structure_;
   Model<double> model_;

@@ -8,30 +8,13 @@
 
 #include "tangible/dynamics/model/settings.h"
 #include "tangible/estimation/problem/tolerances.h"
+#include "tangible/estimation/results/fit_names.h"
 #include "tangible/estimation/results/instruments_json.h"
 #include "tangible/render/html.h"
 #include "tangible/scene/scene_json.h"
 
 namespace tangible {
 namespace {
-
-constexpr int kMaxSegments = 1000;
-constexpr int kMaxStarts = 10000;
-
-constexpr std::pair<const char*, GradientMethod> kMethods[] = {
-    {"tangent", GradientMethod::kTangent},
-    {"adjoint", GradientMethod::kAdjoint},
-    {"jet", GradientMethod::kJet},
-    {"jet_implicit", GradientMethod::kJetImplicit},
-    {"finite_difference", GradientMethod::kFiniteDifference}};
-
-// Multiple shooting is asked for by its segments.
-constexpr std::pair<const char*, FitApproach> kApproaches[] = {{"auto", FitApproach::kAuto},
-                                                               {"plain", FitApproach::kPlain},
-                                                               {"windows", FitApproach::kWindows}};
-
-constexpr std::pair<const char*, ParameterScale> kScales[] = {
-    {"linear", ParameterScale::kLinear}, {"log", ParameterScale::kLogarithmic}};
 
 ParameterSet ReadSet(const JsonReader& json) {
   json.ExpectKeys({"path", "scale", "offset", "add"}, " of a set");

@@ -41,7 +41,8 @@ std::string Help(const ProgramInfo& info) {
     out << "  --" << flag.name << " (" << flag.type << ", default " << quote << flag.default_value
         << quote << "): " << flag.description << "\n";
   }
-  out << "  --help, --version\n\n"
+  out << (info.schema ? "  --schema prints the JSON Schema of the input\n" : "")
+      << "  --help, --version\n\n"
       << "Exit status: 0 done, 1 the job could not be done, 2 wrong usage of flags.\n";
   return out.str();
 }
@@ -289,6 +290,10 @@ CommandLine ParseCommandLine(int argc, char** argv, const ProgramInfo& info) {
       return line;
     } else if (flag.name == "version") {
       std::cout << info.name << " " << info.version << "\n";
+      line.exit_status = kExitDone;
+      return line;
+    } else if (flag.name == "schema" && info.schema) {
+      std::cout << info.schema();
       line.exit_status = kExitDone;
       return line;
     } else {

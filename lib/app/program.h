@@ -44,6 +44,8 @@ struct ProgramInfo {
   /// over an input; a missing folder is reported before the work begins.
   std::vector<std::string> outputs = {"out"};
   std::vector<std::string> inputs{};
+  /// The JSON Schema of the program's input, which --schema prints; none if empty.
+  std::function<std::string()> schema{};
 };
 
 struct CommandLine {

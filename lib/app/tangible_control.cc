@@ -14,6 +14,7 @@
 
 #include "tangible/app/certificate_json.h"
 #include "tangible/app/control_problem.h"
+#include "tangible/app/control_schema.h"
 #include "tangible/app/program.h"
 #include "tangible/app/trajectory_csv.h"
 #include "tangible/app/view_recorder.h"
@@ -437,7 +438,8 @@ int Main(int argc, char** argv) {
        .version = TANGIBLE_VERSION,
        .source_file = __FILE__,
        .outputs = {"out", "plan", "trajectory", "view"},
-       .inputs = {"plant"}});
+       .inputs = {"plant"},
+       .schema = [] { return JsonText(ControlSchema()); }});
   if (line.exit_status) return *line.exit_status;
   const std::string wrong = CheckFlags();
   if (!wrong.empty()) return ReportError("tangible-control: " + wrong, kExitUsage);

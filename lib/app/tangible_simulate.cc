@@ -20,6 +20,7 @@
 #include "tangible/dynamics/model/settings.h"
 #include "tangible/scene/json_writer.h"
 #include "tangible/scene/scene_json.h"
+#include "tangible/scene/scene_schema.h"
 #include "tangible/simulation/stepping/run_warnings.h"
 
 DEFINE_string(out, "",
@@ -284,7 +285,8 @@ int Main(int argc, char** argv) {
        .version = TANGIBLE_VERSION,
        .source_file = __FILE__,
        .outputs = {"out", "contacts", "view", "summary", "observe"},
-       .inputs = {"initial", "points", "batch"}});
+       .inputs = {"initial", "points", "batch"},
+       .schema = [] { return JsonText(SceneSchema()); }});
   if (line.exit_status) return *line.exit_status;
   const std::string wrong = CheckFlags();
   if (!wrong.empty()) {

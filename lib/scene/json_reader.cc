@@ -196,6 +196,10 @@ void JsonReader::FailExpected(const std::string& expected) const {
   }
 }
 
+void JsonReader::FailExpected(const std::string& expected, double number) const {
+  Fail("expected " + expected + ", got " + Describe(value_ == nullptr ? Json(number) : *value_));
+}
+
 bool JsonReader::Has(const std::string& key) const { return IsObject() && value_->contains(key); }
 
 JsonReader JsonReader::At(const std::string& key) const {

@@ -70,6 +70,9 @@ class JsonReader {
   /// The whole document.
   JsonReader(const Json& root, JsonErrors* errors) : value_(&root), errors_(errors) {}
 
+  /// Of no document: the places of values in memory, for messages on them.
+  static JsonReader Nothing(JsonErrors* errors) { return JsonReader(nullptr, "", errors); }
+
   bool ok() const { return errors_->ok(); }
   const std::string& pointer() const { return pointer_; }
   /// Whether the value is there at all.
@@ -84,6 +87,8 @@ class JsonReader {
   void Fail(const std::string& what) const { errors_->Add(pointer_, what); }
   /// Records "file: pointer: expected X, got Y", or "missing, expected X" if it does not exist.
   void FailExpected(const std::string& expected) const;
+  /// The same of a number that may be in memory alone.
+  void FailExpected(const std::string& expected, double number) const;
 
   /// Whether this is an object with that key.
   bool Has(const std::string& key) const;

@@ -4,23 +4,9 @@
 #include <algorithm>
 
 #include "tangible/scene/json_reader.h"
-#include "tangible/scene/scene_json.h"
+#include "tangible/scene/validate.h"
 
 namespace tangible {
-bool DependsOnOthers(const std::string& path) {
-  const auto has = [&path](const char* part) { return path.find(part) != std::string::npos; };
-  return has("/vertices/") || has("/normal/") || has("/axis/") || has("/limits/") ||
-         has("/anchors/") || has("/radii/") ||
-         (path.rfind("forces/", 0) == 0 && (has("/start") || has("/end")));
-}
-
-std::string CheckNumbers(const Scene& scene) {
-  Scene same;
-  std::string error;
-  ParseScene(SceneToJson(scene), "the scene with these values", FolderOf(scene.path), &same,
-             &error);
-  return error;
-}
 
 bool CheckApart(const Scene& scene, const std::vector<ParameterPath>& parameters,
                 std::string* error) {
@@ -43,7 +29,6 @@ bool CheckApart(const Scene& scene, const std::vector<ParameterPath>& parameters
 std::string SetParameters(const std::vector<ParameterPath>& parameters, const double* values,
                           Scene* scene) {
   const std::vector<SceneNumber<double>> numbers = EnumerateNumbers(scene);
-  bool read_again = false;
   for (std::size_t k = 0; k < parameters.size(); ++k) {
     for (const int i : parameters[k].numbers) {
       if (!IsAllowed(numbers[i].kind, values[k])) {
@@ -51,10 +36,9 @@ std::string SetParameters(const std::vector<ParameterPath>& parameters, const do
                        Describe(Json(values[k])));
       }
       *numbers[i].value = values[k];
-      read_again = read_again || DependsOnOthers(numbers[i].path);
     }
   }
-  return read_again ? CheckNumbers(*scene) : "";
+  return Validate(*scene, "the scene with these values");
 }
 
 }  // namespace tangible

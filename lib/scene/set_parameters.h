@@ -15,17 +15,10 @@ namespace tangible {
 bool CheckApart(const Scene& scene, const std::vector<ParameterPath>& parameters,
                 std::string* error);
 
-/// Whether the values that a number of the scene may have depend on other numbers, and not only on
-/// its kind.
-bool DependsOnOthers(const std::string& path);
-
-/// Empty, or one line that says why the scene could not be read with the numbers that it has (a
-/// polygon that is not convex any longer, limits that cross).
-std::string CheckNumbers(const Scene& scene);
-
 /// Sets all numbers of each parameter to its value, values[k] that of parameters[k]. Returns empty,
 /// or one line "bodies/ball/mass: expected a number > 0, got -1", the scene then half set: where a
-/// value is not allowed, or where CheckNumbers refuses the scene.
+/// value is not allowed, or the scene with all of them (a polygon that is not convex any longer,
+/// limits that cross).
 std::string SetParameters(const std::vector<ParameterPath>& parameters, const double* values,
                           Scene* scene);
 

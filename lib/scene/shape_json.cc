@@ -7,6 +7,8 @@
 #include <vector>
 
 #include "tangible/math/planar.h"
+#include "tangible/scene/field_reader.h"
+#include "tangible/scene/scene_fields.h"
 #include "tangible/scene/scene_names.h"
 #include "tangible/scene/tolerances.h"
 
@@ -71,45 +73,11 @@ void CheckPolygon(const JsonReader& vertices, const std::vector<double>& numbers
   if (turn > 3.0 * kPi) vertices.Fail("expected a convex polygon, got one that crosses itself");
 }
 
-void ReadPolygon(const JsonReader& reader, std::vector<double>* numbers) {
-  reader.ExpectKeys({"vertices"}, " of a polygon");
-  const JsonReader vertices = reader.At("vertices");
-  const int size = vertices.ExpectArray("an array of at least 3 points");
-  if (size < 3) return vertices.FailExpected("an array of at least 3 points");
-  for (int i = 0; i < size; ++i) {
-    const Vector2<double> vertex = vertices.At(i).Point();
-    numbers->push_back(vertex.x());
-    numbers->push_back(vertex.y());
-  }
-  if (reader.ok()) CheckPolygon(vertices, *numbers);
-}
-
-// Two lengths, as a box's size and an ellipse's radii are.
-void ReadLengths(const JsonReader& reader, const char* key, const char* expected,
-                 std::vector<double>* numbers) {
-  const JsonReader lengths = reader.At(key);
-  if (lengths.Size() != 2) return lengths.FailExpected(expected);
-  for (int i = 0; i < 2; ++i) numbers->push_back(lengths.At(i).Number(NumberKind::kPositive));
-}
-
-void ReadEllipse(const JsonReader& reader, std::vector<double>* numbers) {
-  reader.ExpectKeys({"radii"}, " of an ellipse");
-  ReadLengths(reader, "radii", "an array of 2 numbers > 0, the semi-axes along x and y", numbers);
-  if (!reader.ok()) return;
-  const auto [least, most] = std::minmax((*numbers)[0], (*numbers)[1]);
+void CheckEllipse(const JsonReader& radii, const std::vector<double>& numbers) {
+  const auto [least, most] = std::minmax(numbers[0], numbers[1]);
   if (least >= kSlenderEllipse * most) return;
-  reader.At("radii").Fail("expected two radii of a ratio of at most 1e9, got " +
-                          Describe(Json((*numbers)[0])) + " and " + Describe(Json((*numbers)[1])));
-}
-
-void ReadHalfPlane(const JsonReader& reader, std::vector<double>* numbers) {
-  reader.ExpectKeys({"normal", "offset"}, " of a half_plane");
-  const Vector2<double> normal = reader.At("normal").Point();
-  if (reader.ok() && normal.norm() == 0.0) {
-    reader.At("normal").Fail("expected a direction, got the zero vector");
-  }
-  const JsonReader offset = reader.At("offset");
-  numbers->assign({normal.x(), normal.y(), offset.exists() ? offset.Number() : 0.0});
+  radii.Fail("expected two radii of a ratio of at most 1e9, got " + Describe(Json(numbers[0])) +
+             " and " + Describe(Json(numbers[1])));
 }
 
 }  // namespace
@@ -127,29 +95,34 @@ void ReadShape(const JsonReader& reader, BasicShape<double>* shape) {
   for (const auto& entry : kShapeTypeNames) {
     if (keys[0] == entry.first) shape->type = entry.second;
   }
-  const JsonReader body = reader.At(keys[0]);
-  switch (shape->type) {
-    case ShapeType::kCircle:
-      body.ExpectKeys({"radius"}, " of a circle");
-      shape->numbers = {body.At("radius").Number(NumberKind::kPositive)};
-      break;
+  shape->numbers.assign(static_cast<std::size_t>(NumNumbers(shape->type)), 0.0);
+  FieldKeys fields;
+  VisitShape(*shape, &fields);
+  const JsonReader item = reader.At(keys[0]);
+  const char* const article = shape->type == ShapeType::kEllipse ? " of an " : " of a ";
+  item.ExpectKeys(fields.keys(), article + keys[0]);
+  if (!item.ok()) return;
+  FieldReader numbers(item);
+  VisitShape(*shape, &numbers);
+  if (reader.ok()) CheckShape(*shape, reader);
+}
+
+void CheckShape(const BasicShape<double>& shape, const JsonReader& place) {
+  switch (shape.type) {
     case ShapeType::kEllipse:
-      return ReadEllipse(body, &shape->numbers);
-    case ShapeType::kBox:
-      body.ExpectKeys({"size"}, " of a box");
-      return ReadLengths(body, "size", "an array of 2 numbers > 0 [width, height]",
-                         &shape->numbers);
-    case ShapeType::kCapsule:
-      body.ExpectKeys({"length", "radius"}, " of a capsule");
-      shape->numbers = {body.At("length").Number(NumberKind::kPositive),
-                        body.At("radius").Number(NumberKind::kPositive)};
-      break;
+      return CheckEllipse(place.At("ellipse").At("radii"), shape.numbers);
     case ShapeType::kPolygon:
-      return ReadPolygon(body, &shape->numbers);
+      return CheckPolygon(place.At("polygon").At("vertices"), shape.numbers);
     case ShapeType::kHalfPlane:
-      return ReadHalfPlane(body, &shape->numbers);
+      if (shape.numbers[0] == 0.0 && shape.numbers[1] == 0.0) {
+        place.At("half_plane").At("normal").Fail("expected a direction, got the zero vector");
+      }
+      return;
     case ShapeType::kNone:
-      break;
+    case ShapeType::kCircle:
+    case ShapeType::kBox:
+    case ShapeType::kCapsule:
+      return;
   }
 }
 

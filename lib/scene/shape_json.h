@@ -8,9 +8,12 @@
 
 namespace tangible {
 
-/// Reads {"circle": {...}} and so on into `shape`. Polygons must be strictly convex,
-/// counter-clockwise and go around once.
+/// Reads {"circle": {...}} and so on into `shape`, and checks it.
 void ReadShape(const JsonReader& reader, BasicShape<double>* shape);
+
+/// Polygons must be strictly convex, counter-clockwise and go around once, ellipses no needles, and
+/// normals have a direction. `place`: that of the shape, whose value is not looked at.
+void CheckShape(const BasicShape<double>& shape, const JsonReader& place);
 
 /// Whether the uniform shape's centre of mass is the origin of the body's frame, so that its
 /// inertia about the origin is known: always, except that the centroid of polygons may differ from

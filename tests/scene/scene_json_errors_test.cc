@@ -216,12 +216,12 @@ TEST(BadSceneTest, Joints) {
        "/joints/0/type: missing, expected one of revolute, prismatic, weld, distance, fixed_angle"},
       {"/joints/0/displacement", "0",
        "/joints/0/displacement: unknown key of a revolute joint, expected one of name, type, "
-       "bodies, contact, anchor, angle, rate, damping, friction, limits, effort, "
-       "kinetic_friction, stribeck_speed, stiffness, rest_angle, got \"displacement\""},
+       "bodies, contact, anchor, angle, rate, damping, limits, friction, "
+       "kinetic_friction, stribeck_speed, stiffness, rest_angle, effort, got \"displacement\""},
       {"/joints/1/angle", "0",
        "/joints/1/angle: unknown key of a prismatic joint, expected one of name, type, bodies, "
-       "contact, anchor, axis, displacement, rate, damping, friction, limits, effort, "
-       "kinetic_friction, stribeck_speed, stiffness, rest_displacement, got \"angle\""},
+       "contact, anchor, axis, displacement, rate, damping, limits, friction, "
+       "kinetic_friction, stribeck_speed, stiffness, rest_displacement, effort, got \"angle\""},
       {"/joints/2/damping", "0",
        "/joints/2/damping: unknown key of a weld joint, expected one of name, type, bodies, "
        "contact, anchor, got \"damping\""},

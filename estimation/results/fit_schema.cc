@@ -1,0 +1,127 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/estimation/results/fit_schema.h"
+
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "tangible/estimation/problem/observation.h"
+#include "tangible/estimation/results/fit_names.h"
+#include "tangible/scene/json_schema.h"
+
+namespace tangible {
+namespace {
+
+constexpr NumberKind kFree = NumberKind::kFree;
+constexpr NumberKind kPositive = NumberKind::kPositive;
+
+OrderedJson Free(const std::string& unit = "") { return SchemaOfNumber(kFree, unit); }
+OrderedJson Positive(const std::string& unit = "") { return SchemaOfNumber(kPositive, unit); }
+
+// {"gaussian": {...}} or {"log_normal": {...}}
+OrderedJson DistributionSchema(const OrderedJson& gaussian, const OrderedJson& log_normal) {
+  OrderedJson schema = SchemaOfObject({{"gaussian", gaussian}, {"log_normal", log_normal}}, {});
+  schema["minProperties"] = 1;
+  schema["maxProperties"] = 1;
+  return schema;
+}
+
+OrderedJson ParameterSchema() {
+  const OrderedJson spread = SchemaOfObject(
+      {{"spread", SchemaOfAny({SchemaOfWords({"estimate"}), Positive()})}}, {"spread"});
+  const OrderedJson set = SchemaOfObject(
+      {{"path", SchemaOfText()}, {"scale", Free()}, {"offset", Free()}, {"add", SchemaOfFlag()}},
+      {"path"});
+  OrderedJson parameter = SchemaOfObject(
+      {{"name", SchemaOfText()},
+       {"initial", Free()},
+       {"lower", Free()},
+       {"upper", Free()},
+       {"sets", SchemaOfArray(set, 0)},
+       {"path", SchemaOfText()},
+       {"scale", SchemaOfWords(WordsOf(kScales))},
+       {"prior",
+        DistributionSchema(
+            SchemaOfObject({{"mean", Free()}, {"sigma", Positive()}}, {"mean", "sigma"}),
+            SchemaOfObject({{"median", Positive()}, {"sigma", Positive()}}, {"median", "sigma"}))},
+       {"per", SchemaOfWords({"recording"})},
+       {"varies", DistributionSchema(spread, spread)}},
+      {});
+  parameter["oneOf"] =
+      OrderedJson::array({{{"required", {"path"}}}, {{"required", {"name", "sets"}}}});
+  return SchemaOfAny({SchemaOfText(), parameter});
+}
+
+OrderedJson SigmaSchema() {
+  OrderedJson coordinates = OrderedJson::object();
+  for (int i = 0; i < kCoordinates; ++i) {
+    coordinates[NameOf(static_cast<Coordinate>(i))] = Positive();
+  }
+  return SchemaOfAny({Positive(), SchemaOfObject(coordinates, {})});
+}
+
+OrderedJson ObservationsSchema() {
+  return SchemaOfArray(SchemaOfObject({{"file", SchemaOfText()},
+                                       {"sigma", SigmaSchema()},
+                                       {"sensor", SchemaOfName()},
+                                       {"camera", SchemaOfName()},
+                                       {"clock", SchemaOfName()},
+                                       {"relative_to", SchemaOfName()},
+                                       {"unwrap", SchemaOfFlag()}},
+                                      {"file"}),
+                       1);
+}
+
+// What a recording may have for itself as well as the file for all.
+OrderedJson SharedKeys() {
+  return {
+      {"scene", SchemaOfText()},
+      {"observations", ObservationsSchema()},
+      {"points", SchemaByName(SchemaOfObject({{"body", SchemaOfName()}, {"at", SchemaOfPoint("m")}},
+                                             {"body"}))},
+      {"sensors", SchemaByName(SchemaOfObject({{"delay", Free("s")},
+                                               {"gain", Free()},
+                                               {"bias", Free()},
+                                               {"sigma", Positive()},
+                                               {"estimate_sigma", SchemaOfFlag()}},
+                                              {}))},
+      {"cameras", SchemaByName(SchemaOfObject({{"scale", Positive()},
+                                               {"rotation", Free("rad")},
+                                               {"origin", SchemaOfPoint("m")},
+                                               {"marker", SchemaOfName()}},
+                                              {}))},
+      {"clocks", SchemaByName(SchemaOfObject({{"rate", Positive()}, {"offset", Free("s")}}, {}))}};
+}
+
+OrderedJson RecordingSchema() {
+  OrderedJson properties = {{"name", SchemaOfText()}};
+  properties.update(SharedKeys());
+  const OrderedJson numbers = {{"type", "object"}, {"additionalProperties", Free()}};
+  properties["start"] = SchemaOfNumber(NumberKind::kNonNegative, "s");
+  properties["end"] = Free("s");
+  properties["weight"] = Positive();
+  properties["values"] = numbers;
+  properties["initial"] = SchemaOfAny({SchemaOfWords({"from_observations"}), numbers});
+  return SchemaOfObject(properties, {"name", "observations"});
+}
+
+}  // namespace
+
+OrderedJson FitSchema() {
+  OrderedJson properties = SharedKeys();
+  properties["recordings"] = SchemaOfArray(RecordingSchema(), 1);
+  properties["initial"] = SchemaOfWords({"from_observations"});
+  properties["parameters"] = SchemaOfArray(ParameterSchema(), 0);
+  properties["derivatives"] = SchemaOfWords(WordsOf(kMethods));
+  properties["loss"] = SchemaOfObject({{"huber", Positive()}}, {"huber"});
+  properties["approach"] = SchemaOfWords(WordsOf(kApproaches));
+  properties["segments"] = SchemaOfInteger(1, kMaxSegments);
+  properties["starts"] = SchemaOfInteger(1, kMaxStarts);
+  properties["seed"] = SchemaOfInteger(0, std::numeric_limits<int>::max());
+  OrderedJson schema = SchemaOfObject(properties, {"parameters"});
+  schema["oneOf"] = OrderedJson::array(
+      {{{"required", {"recordings"}}}, {{"required", {"scene", "observations"}}}});
+  return SchemaOfFile("a fit", schema);
+}
+
+}  // namespace tangible

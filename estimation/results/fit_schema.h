@@ -1,0 +1,13 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// The JSON Schema of fit files, from which editors complete keys and mark mistakes.
+
+#include "tangible/scene/json_writer.h"
+
+namespace tangible {
+
+/// A schema that every fit file that is read satisfies (json_schema.h).
+OrderedJson FitSchema();
+
+}  // namespace tangible

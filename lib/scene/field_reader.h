@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// The visitor that reads the fields of an item (scene_fields.h) from a scene file.
+
+#include <cstddef>
+#include <functional>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "tangible/scene/json_reader.h"
+#include "tangible/scene/scene_fields.h"
+#include "tangible/scene/signal.h"
+
+namespace tangible {
+
+/// Reads a signal that a field names by {"file": ...}.
+using SignalReader = std::function<Signal(const JsonReader&, SignalColumns)>;
+
+/// Absent keys leave the default.
+class FieldReader {
+ public:
+  explicit FieldReader(const JsonReader& item, SignalReader signal = nullptr)
+      : item_(item), signal_(std::move(signal)) {}
+
+  void Number(const Field& field, double& value) {
+    if (IsRead(field)) value = item_.At(field.key).Number(field.kind);
+  }
+  void Optional(const Field& field, std::optional<double>& value) {
+    if (IsRead(field)) value = item_.At(field.key).Number(field.kind);
+  }
+  void Point(const Field& field, Vector2<double>& value) {
+    if (IsRead(field)) value = item_.At(field.key).Point();
+  }
+  void Points(const Field& field, std::vector<Vector2<double>>& values) {
+    if (!IsRead(field)) return;
+    const JsonReader points = item_.At(field.key);
+    const int size = points.ExpectArray("an array of points [x, y]");
+    for (int i = 0; i < size; ++i) values.push_back(points.At(i).Point());
+  }
+  void Anchors(const Field& field, Vector2<double> (&anchors)[2]) {
+    const JsonReader reader = item_.At(field.key);
+    if (reader.Size() != 2) return reader.FailExpected("an array of 2 points [[x, y], [x, y]]");
+    for (int i = 0; i < 2; ++i) anchors[i] = reader.At(i).Point();
+  }
+  void Interval(const Field& field, std::optional<std::pair<double, double>>& value) {
+    if (!IsRead(field)) return;
+    const JsonReader reader = item_.At(field.key);
+    if (reader.Size() != 2) return reader.FailExpected("an array of 2 numbers [low, high]");
+    value = {reader.At(0).Number(field.kind), reader.At(1).Number(field.kind)};
+  }
+  void Numbers(const Field& field, double& first, double& second) {
+    const JsonReader reader = item_.At(field.key);
+    if (reader.Size() != 2) {
+      const char* const range = field.kind == NumberKind::kPositive ? " > 0" : "";
+      return reader.FailExpected(std::string("an array of 2 numbers") + range + field.form);
+    }
+    first = reader.At(0).Number(field.kind);
+    second = reader.At(1).Number(field.kind);
+  }
+  void Vertices(const Field& field, std::vector<double>& numbers) {
+    const JsonReader vertices = item_.At(field.key);
+    const int size = vertices.Size();
+    if (size < 3) return vertices.FailExpected("an array of at least 3 points");
+    for (int i = 0; i < size; ++i) {
+      const Vector2<double> vertex = vertices.At(i).Point();
+      numbers.insert(numbers.end(), {vertex.x(), vertex.y()});
+    }
+  }
+  void NumberOrSignal(const Field& field, double& value, std::optional<Signal>& signal) {
+    if (!IsRead(field)) return;
+    const JsonReader reader = item_.At(field.key);
+    if (reader.IsObject()) {
+      signal = signal_(reader, SignalColumns::kValue);
+    } else if (reader.IsNumber()) {
+      value = reader.Number(field.kind);
+    } else {
+      reader.FailExpected("a number or {\"file\": ...}");
+    }
+  }
+  void PointOrSignal(const Field& field, Vector2<double>& value, std::optional<Signal>& signal) {
+    if (!IsRead(field)) return;
+    const JsonReader reader = item_.At(field.key);
+    if (reader.IsObject()) {
+      signal = signal_(reader, SignalColumns::kForce);
+    } else if (reader.IsArray()) {
+      value = reader.Point();
+    } else {
+      reader.FailExpected("[x, y] or {\"file\": ...}");
+    }
+  }
+  /// `Value` is the enumeration, or an optional of it, which an absent key leaves empty.
+  template <typename Enum, std::size_t N, typename Value>
+  void Choice(const char* key, const std::pair<const char*, Enum> (&table)[N], Value& value) {
+    if (item_.Has(key)) value = item_.At(key).Choice(table);
+  }
+  void Flag(const char* key, bool& value) {
+    if (item_.Has(key)) value = item_.At(key).Boolean();
+  }
+  void Count(const char* key, int low, int high, int& value) {
+    if (item_.Has(key)) value = item_.At(key).Integer(low, high);
+  }
+
+ private:
+  bool IsRead(const Field& field) const {
+    const bool written = item_.Has(field.key);
+    if (!field.present && written) {
+      item_.At(field.with).Fail(std::string("missing, expected a number >= 0 with ") + field.key);
+    }
+    return field.present && (written || field.required);
+  }
+
+  const JsonReader& item_;
+  SignalReader signal_;
+};
+
+}  // namespace tangible

@@ -1,0 +1,280 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// The fields of a scene file, each said once: its key, range, unit, and when it is there.
+//
+// For each kind of item a function visits its fields in the order of their parameters. The reader,
+// the writer, paths, casts, the checks of values in memory and the JSON Schema are visitors. A
+// visitor has a function for each form in which numbers are written:
+//
+//   Number          1.5
+//   Optional        the same, or absent
+//   Point           [x, y]
+//   Points          [[x, y], ...]
+//   Anchors         [[x, y], [x, y]]
+//   Interval        [low, high], or absent
+//   Numbers         two or more numbers of a shape: [w, h]
+//   Vertices        numbers of a polygon: [[x, y], ...]
+//   NumberOrSignal  1.5 or {"file": ...}
+//   PointOrSignal   [x, y] or {"file": ...}
+//   Choice, Flag, Count   settings that are no parameters
+//
+// What is no number by itself (names, bodies, the type of a joint or shape) is read and written
+// where the items are.
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "tangible/scene/parameter.h"
+#include "tangible/scene/scene.h"
+#include "tangible/scene/scene_names.h"
+
+namespace tangible {
+
+struct Field {
+  const char* key;
+  NumberKind kind = NumberKind::kFree;
+  Dimension dimension = Dimension::kNone;
+  bool required = false;
+  /// Whether a path can name it, where it is present.
+  bool parameter = true;
+  /// The field without which it has no meaning, and whether that one is there.
+  const char* with = nullptr;
+  bool present = true;
+  /// What messages say of two numbers.
+  const char* form = " [x, y]";
+};
+
+inline constexpr Field kGravityField{"gravity", NumberKind::kFree, Dimension::kAcceleration};
+
+template <typename Shape, typename Visitor>
+void VisitShape(Shape& shape, Visitor* visitor) {
+  auto& numbers = shape.numbers;
+  const auto length = [](const char* key, const char* form = "") {
+    Field field{key, NumberKind::kPositive, Dimension::kLength, true};
+    field.form = form;
+    return field;
+  };
+  switch (shape.type) {
+    case ShapeType::kNone:
+      break;
+    case ShapeType::kCircle:
+      visitor->Number(length("radius"), numbers[0]);
+      break;
+    case ShapeType::kEllipse:
+      visitor->Numbers(length("radii", ", the semi-axes along x and y"), numbers[0], numbers[1]);
+      break;
+    case ShapeType::kBox:
+      visitor->Numbers(length("size", " [width, height]"), numbers[0], numbers[1]);
+      break;
+    case ShapeType::kCapsule:
+      visitor->Number(length("length"), numbers[0]);
+      visitor->Number(length("radius"), numbers[1]);
+      break;
+    case ShapeType::kPolygon:
+      visitor->Vertices({"vertices", NumberKind::kFree, Dimension::kLength, true}, numbers);
+      break;
+    case ShapeType::kHalfPlane:
+      visitor->Numbers({"normal", NumberKind::kFree, Dimension::kNone, true}, numbers[0],
+                       numbers[1]);
+      visitor->Number({"offset", NumberKind::kFree, Dimension::kLength}, numbers[2]);
+      break;
+  }
+}
+
+/// How many numbers a shape has; 0: any, as a polygon.
+inline int NumNumbers(ShapeType type) {
+  switch (type) {
+    case ShapeType::kNone:
+    case ShapeType::kPolygon:
+      return 0;
+    case ShapeType::kCircle:
+      return 1;
+    case ShapeType::kEllipse:
+    case ShapeType::kBox:
+    case ShapeType::kCapsule:
+      return 2;
+    case ShapeType::kHalfPlane:
+      return 3;
+  }
+  return 0;
+}
+
+/// The fields of a body but its shape.
+template <typename Body, typename Visitor>
+void VisitBody(Body& body, Visitor* visitor) {
+  constexpr NumberKind kPositive = NumberKind::kPositive;
+  constexpr NumberKind kNonNegative = NumberKind::kNonNegative;
+  const bool moves = body.motion == Motion::kMoving;
+  const bool has_velocity = body.motion != Motion::kStatic;
+  visitor->Number({"mass", kPositive, Dimension::kMass, moves, moves}, body.mass);
+  visitor->Optional({"inertia", kPositive, Dimension::kInertia, false, moves}, body.inertia);
+  visitor->Point({"position", NumberKind::kFree, Dimension::kLength, moves}, body.position);
+  visitor->Number({"angle", NumberKind::kFree, Dimension::kAngle}, body.angle);
+  visitor->Point({"velocity", NumberKind::kFree, Dimension::kVelocity, false, has_velocity},
+                 body.velocity);
+  visitor->Number(
+      {"angular_velocity", NumberKind::kFree, Dimension::kAngularVelocity, false, has_velocity},
+      body.angular_velocity);
+  visitor->Number({"friction", kNonNegative}, body.friction);
+  visitor->Number({"restitution", NumberKind::kFraction}, body.restitution);
+  visitor->Number({"linear_damping", kNonNegative, Dimension::kLinearDamping, false, moves},
+                  body.linear_damping);
+  visitor->Number({"angular_damping", kNonNegative, Dimension::kAngularDamping, false, moves},
+                  body.angular_damping);
+  visitor->Optional({"quadratic_drag", kNonNegative, Dimension::kQuadraticDrag, false, moves},
+                    body.quadratic_drag);
+}
+
+template <typename Body, typename Visitor>
+void VisitContactPoints(Body& body, Visitor* visitor) {
+  visitor->Points({"contact_points", NumberKind::kFree, Dimension::kLength}, body.contact_points);
+}
+
+/// `turns`: whether the joint may start turned or moved (joint_graph.h).
+template <typename Joint, typename Visitor>
+void VisitJoint(Joint& joint, bool turns, Visitor* visitor) {
+  constexpr NumberKind kFree = NumberKind::kFree;
+  constexpr NumberKind kNonNegative = NumberKind::kNonNegative;
+  const bool slides = joint.type == JointType::kPrismatic;
+  if (joint.type == JointType::kDistance) {
+    visitor->Anchors({"anchors", kFree, Dimension::kLength, true}, joint.anchors);
+  } else if (joint.type != JointType::kFixedAngle) {
+    visitor->Point({"anchor", kFree, Dimension::kLength, true}, joint.anchors[0]);
+  }
+  if (slides) visitor->Point({"axis", kFree, Dimension::kNone, true}, joint.axis);
+  if (!slides && joint.type != JointType::kRevolute) return;
+  const Dimension coordinate = slides ? Dimension::kLength : Dimension::kAngle;
+  const Dimension speed = slides ? Dimension::kVelocity : Dimension::kAngularVelocity;
+  const Dimension effort = slides ? Dimension::kForce : Dimension::kTorque;
+  visitor->Number({slides ? "displacement" : "angle", kFree, coordinate, false, turns},
+                  joint.angle);
+  visitor->Number({"rate", kFree, speed, false, turns}, joint.rate);
+  visitor->Number(
+      {"damping", kNonNegative, slides ? Dimension::kLinearDamping : Dimension::kAngularDamping},
+      joint.damping);
+  visitor->Interval({"limits", kFree, coordinate}, joint.limits);
+  visitor->Optional({"friction", kNonNegative, effort}, joint.friction);
+  visitor->Optional({"kinetic_friction", kNonNegative, effort, false, true, "friction",
+                     joint.friction.has_value()},
+                    joint.kinetic_friction);
+  visitor->Number({"stribeck_speed", NumberKind::kPositive, speed, true, true, "kinetic_friction",
+                   joint.kinetic_friction.has_value()},
+                  joint.stribeck_speed);
+  visitor->Optional(
+      {"stiffness", kNonNegative, slides ? Dimension::kStiffness : Dimension::kAngularStiffness},
+      joint.stiffness);
+  visitor->Number({slides ? "rest_displacement" : "rest_angle", kFree, coordinate, false, true,
+                   "stiffness", joint.stiffness.has_value()},
+                  joint.rest);
+  visitor->NumberOrSignal({"effort", kFree, effort}, joint.effort, joint.effort_signal);
+}
+
+template <typename Spring, typename Visitor>
+void VisitSpring(Spring& spring, Visitor* visitor) {
+  constexpr NumberKind kNonNegative = NumberKind::kNonNegative;
+  visitor->Anchors({"anchors", NumberKind::kFree, Dimension::kLength, true}, spring.anchors);
+  visitor->Number({"stiffness", kNonNegative, Dimension::kStiffness, true}, spring.stiffness);
+  visitor->Number({"damping", kNonNegative, Dimension::kLinearDamping}, spring.damping);
+  visitor->Number({"rest_length", kNonNegative, Dimension::kLength, true}, spring.rest_length);
+}
+
+template <typename Force, typename Visitor>
+void VisitForce(Force& force, Visitor* visitor) {
+  constexpr NumberKind kFree = NumberKind::kFree;
+  visitor->PointOrSignal({"force", kFree, Dimension::kForce}, force.force, force.force_signal);
+  visitor->NumberOrSignal({"torque", kFree, Dimension::kTorque}, force.torque, force.torque_signal);
+  visitor->Point({"at", kFree, Dimension::kLength}, force.at);
+  visitor->Optional({"start", kFree, Dimension::kTime}, force.start);
+  visitor->Optional({"end", kFree, Dimension::kTime}, force.end);
+}
+
+template <typename Pair, typename Visitor>
+void VisitPair(Pair& pair, Visitor* visitor) {
+  visitor->Optional({"friction", NumberKind::kNonNegative}, pair.friction);
+  visitor->Optional({"restitution", NumberKind::kFraction}, pair.restitution);
+}
+
+template <typename Settings, typename Visitor>
+void VisitSettings(Settings& settings, Visitor* visitor) {
+  constexpr NumberKind kPositive = NumberKind::kPositive;
+  constexpr NumberKind kNonNegative = NumberKind::kNonNegative;
+  constexpr int kMost = 1000000;
+  visitor->Number({"dt", kPositive, Dimension::kTime}, settings.dt);
+  visitor->Number({"duration", kNonNegative, Dimension::kTime}, settings.duration);
+  visitor->Choice("stepping", kSteppingNames, settings.stepping);
+  visitor->Choice("integrator", kIntegratorNames, settings.integrator);
+  visitor->Choice("joint_correction", kJointCorrectionNames, settings.joint_correction);
+  visitor->Number({"joint_tolerance", kPositive, Dimension::kLength}, settings.joint_tolerance);
+  visitor->Choice("friction_mixing", kMixingNames, settings.friction_mixing);
+  visitor->Choice("restitution_mixing", kMixingNames, settings.restitution_mixing);
+  visitor->Choice("impact_law", kImpactLawNames, settings.impact_law);
+  visitor->Number({"restitution_threshold", kNonNegative, Dimension::kVelocity},
+                  settings.restitution_threshold);
+  visitor->Number({"recovery_speed", kNonNegative, Dimension::kVelocity}, settings.recovery_speed);
+  visitor->Number({"contact_margin", kNonNegative, Dimension::kLength}, settings.contact_margin);
+  visitor->Count("max_events_per_step", 0, kMost, settings.max_events_per_step);
+  visitor->Number({"lcp_tolerance", kPositive}, settings.lcp_tolerance);
+  visitor->Count("lcp_max_iterations", 1, kMost, settings.lcp_max_iterations);
+}
+
+/// Keeps the keys alone, in order.
+class FieldKeys {
+ public:
+  explicit FieldKeys(std::vector<std::string> keys = {}) : keys_(std::move(keys)) {}
+  const std::vector<std::string>& keys() const { return keys_; }
+
+  template <typename T>
+  void Number(const Field& field, const T&) {
+    Add(field.key);
+  }
+  template <typename T>
+  void Optional(const Field& field, const T&) {
+    Add(field.key);
+  }
+  template <typename V>
+  void Point(const Field& field, const V&) {
+    Add(field.key);
+  }
+  template <typename V>
+  void Points(const Field& field, const V&) {
+    Add(field.key);
+  }
+  template <typename V>
+  void Anchors(const Field& field, const V&) {
+    Add(field.key);
+  }
+  template <typename T>
+  void Interval(const Field& field, const T&) {
+    Add(field.key);
+  }
+  template <typename T>
+  void Numbers(const Field& field, const T&, const T&) {
+    Add(field.key);
+  }
+  template <typename T>
+  void Vertices(const Field& field, const T&) {
+    Add(field.key);
+  }
+  template <typename T, typename S>
+  void NumberOrSignal(const Field& field, const T&, const S&) {
+    Add(field.key);
+  }
+  template <typename V, typename S>
+  void PointOrSignal(const Field& field, const V&, const S&) {
+    Add(field.key);
+  }
+  template <typename Table, typename Value>
+  void Choice(const char* key, const Table&, const Value&) {
+    Add(key);
+  }
+  void Flag(const char* key, bool) { Add(key); }
+  void Count(const char* key, int, int, int) { Add(key); }
+
+ private:
+  void Add(const char* key) { keys_.emplace_back(key); }
+  std::vector<std::string> keys_;
+};
+
+}  // namespace tangible

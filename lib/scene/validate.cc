@@ -1,0 +1,190 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/scene/validate.h"
+
+#include <cstddef>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "tangible/scene/joint_graph.h"
+#include "tangible/scene/scene_fields.h"
+#include "tangible/scene/scene_json.h"
+#include "tangible/scene/shape_json.h"
+
+namespace tangible {
+namespace {
+
+// The visitor that checks the ranges of an item's numbers.
+class RangeCheck {
+ public:
+  explicit RangeCheck(const JsonReader& item) : item_(item) {}
+
+  void Number(const Field& field, double value) {
+    if (field.present && field.parameter) Check(field.kind, value, [&] { return Place(field); });
+  }
+  void Optional(const Field& field, const std::optional<double>& value) {
+    if (value) Number(field, *value);
+  }
+  void Point(const Field& field, const Vector2<double>& value) {
+    if (field.parameter) CheckPoint(field, value, [&] { return Place(field); });
+  }
+  void Points(const Field& field, const std::vector<Vector2<double>>& values) {
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      CheckPoint(field, values[i], [&] { return Place(field).At(static_cast<int>(i)); });
+    }
+  }
+  void Anchors(const Field& field, const Vector2<double> (&anchors)[2]) {
+    for (int i = 0; i < 2; ++i) CheckPoint(field, anchors[i], [&] { return Place(field).At(i); });
+  }
+  void Interval(const Field& field, const std::optional<std::pair<double, double>>& value) {
+    if (value) Numbers(field, value->first, value->second);
+  }
+  void Numbers(const Field& field, double first, double second) {
+    Check(field.kind, first, [&] { return Place(field).At(0); });
+    Check(field.kind, second, [&] { return Place(field).At(1); });
+  }
+  void Vertices(const Field& field, const std::vector<double>& numbers) {
+    for (std::size_t i = 0; i < numbers.size(); ++i) {
+      Check(field.kind, numbers[i],
+            [&] { return Place(field).At(static_cast<int>(i / 2)).At(static_cast<int>(i % 2)); });
+    }
+  }
+  void NumberOrSignal(const Field& field, double value, const std::optional<Signal>& signal) {
+    if (!signal) Number(field, value);
+  }
+  void PointOrSignal(const Field& field, const Vector2<double>& value,
+                     const std::optional<Signal>& signal) {
+    if (!signal) Point(field, value);
+  }
+
+ private:
+  JsonReader Place(const Field& field) const { return item_.At(field.key); }
+
+  // Places are text, which is made where it is needed.
+  template <typename PlaceOf>
+  void CheckPoint(const Field& field, const Vector2<double>& value, const PlaceOf& place) {
+    Check(field.kind, value.x(), [&] { return place().At(0); });
+    Check(field.kind, value.y(), [&] { return place().At(1); });
+  }
+  template <typename PlaceOf>
+  void Check(NumberKind kind, double value, const PlaceOf& place) {
+    if (IsAllowed(kind, value)) return;
+    place().FailExpected(Describe(kind), value);
+  }
+
+  const JsonReader& item_;
+};
+
+}  // namespace
+
+void CheckBody(const BasicBody<double>& body, const JsonReader& place) {
+  const bool is_static = body.motion == Motion::kStatic;
+  const bool moves = body.motion == Motion::kMoving;
+  if (moves && body.shape.type == ShapeType::kHalfPlane) {
+    place.At("shape")
+        .At("half_plane")
+        .Fail("expected a static or kinematic body, got a moving one");
+  }
+  if (moves && !body.inertia && body.shape.type == ShapeType::kNone) {
+    place.At("inertia").Fail("missing, expected a number > 0 for a body without a shape");
+  } else if (moves && !body.inertia && !IsCentred(body.shape)) {
+    place.At("inertia").Fail(
+        "missing, expected a number > 0 for a polygon whose centroid is not the origin");
+  }
+  if (is_static && body.velocity != Vector2<double>(0.0, 0.0)) {
+    place.At("velocity").Fail("expected [0, 0] of a static body, got a velocity (kinematic moves)");
+  }
+  if (is_static && body.angular_velocity != 0.0) {
+    place.At("angular_velocity")
+        .FailExpected("0 of a static body (kinematic moves)", body.angular_velocity);
+  }
+}
+
+void CheckJoint(const BasicJoint<double>& joint, const JsonReader& place) {
+  if (joint.type == JointType::kDistance && (joint.anchors[0] - joint.anchors[1]).norm() == 0.0) {
+    place.At("anchors").Fail("expected two points apart, got a distance of 0");
+  }
+  if (joint.type == JointType::kPrismatic && joint.axis.norm() == 0.0) {
+    place.At("axis").Fail("expected a direction, got the zero vector");
+  }
+  if (joint.limits && joint.limits->first > joint.limits->second) {
+    place.At("limits").Fail("expected [low, high] with low <= high, got [" +
+                            Json(joint.limits->first).dump() + ", " +
+                            Json(joint.limits->second).dump() + "]");
+  }
+}
+
+void CheckForce(const BasicForce<double>& force, const JsonReader& place) {
+  if (force.start && force.end && *force.start > *force.end) {
+    place.At("end").FailExpected("a number >= start, which is " + Json(*force.start).dump(),
+                                 *force.end);
+  }
+}
+
+void CheckSettings(const SimulationSettings& settings, const JsonReader& place) {
+  if (settings.duration / settings.dt > kMaxSteps) {
+    place.Fail("expected at most 1e9 steps, got duration / dt = " + Json(settings.duration).dump() +
+               " / " + Json(settings.dt).dump());
+  }
+}
+
+void CheckInitialAngles(const Scene& scene, const JsonReader& joints) {
+  const std::vector<JointPlace> places = ClassifyJoints(scene);
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    const BasicJoint<double>& joint = scene.joints[i];
+    if (places[i] == JointPlace::kTree || (joint.angle == 0.0 && joint.rate == 0.0)) continue;
+    const char* const angle = joint.type == JointType::kPrismatic ? "displacement" : "angle";
+    const bool turned = joint.angle != 0.0;
+    joints.At(static_cast<int>(i))
+        .At(turned ? angle : "rate")
+        .FailExpected(places[i] == JointPlace::kLoop
+                          ? "0 of a joint in a closed loop (write the bodies' poses and twists)"
+                          : "0 of a joint whose bodies[0] side is attached to the world or to a "
+                            "static or kinematic body (swap the two bodies)",
+                      turned ? joint.angle : joint.rate);
+  }
+}
+
+std::string Validate(const Scene& scene, const std::string& name) {
+  JsonErrors errors(name);
+  const JsonReader root = JsonReader::Nothing(&errors);
+  const auto each = [&](const char* list, const auto& items, const auto& check) {
+    const JsonReader place = root.At(list);
+    for (std::size_t i = 0; i < items.size() && errors.ok(); ++i) {
+      const JsonReader item = place.At(static_cast<int>(i));
+      RangeCheck ranges(item);
+      check(items[i], item, &ranges);
+    }
+  };
+  RangeCheck(root).Point(kGravityField, scene.gravity);
+  each("bodies", scene.bodies, [](const auto& body, const JsonReader& item, RangeCheck* ranges) {
+    if (body.shape.type != ShapeType::kNone) {
+      const JsonReader shape = item.At("shape");
+      const JsonReader numbers = shape.At(NameOf(body.shape.type, kShapeTypeNames));
+      RangeCheck of_shape(numbers);
+      VisitShape(body.shape, &of_shape);
+      if (item.ok()) CheckShape(body.shape, shape);
+    }
+    VisitContactPoints(body, ranges);
+    VisitBody(body, ranges);
+    if (item.ok()) CheckBody(body, item);
+  });
+  each("joints", scene.joints, [](const auto& joint, const JsonReader& item, RangeCheck* ranges) {
+    VisitJoint(joint, true, ranges);
+    CheckJoint(joint, item);
+  });
+  if (errors.ok()) CheckInitialAngles(scene, root.At("joints"));
+  each("springs", scene.springs, [](const auto& spring, const JsonReader&, RangeCheck* ranges) {
+    VisitSpring(spring, ranges);
+  });
+  each("forces", scene.forces, [](const auto& force, const JsonReader& item, RangeCheck* ranges) {
+    VisitForce(force, ranges);
+    CheckForce(force, item);
+  });
+  each("pairs", scene.pairs,
+       [](const auto& pair, const JsonReader&, RangeCheck* ranges) { VisitPair(pair, ranges); });
+  if (errors.ok()) CheckSettings(scene.simulation, root.At("simulation"));
+  return errors.message();
+}
+
+}  // namespace tangible

@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// Which scenes are allowed: the checks of a scene that concern several of its values at once, and,
+// for one in memory, the ranges of its numbers.
+//
+// `place`: the item in the scene's file. Its value is not looked at, so that it may be a place of
+// nothing (JsonReader::Nothing); messages take the values from the scene.
+
+#include <string>
+
+#include "tangible/scene/json_reader.h"
+#include "tangible/scene/scene.h"
+
+namespace tangible {
+
+void CheckBody(const BasicBody<double>& body, const JsonReader& place);
+void CheckJoint(const BasicJoint<double>& joint, const JsonReader& place);
+void CheckForce(const BasicForce<double>& force, const JsonReader& place);
+void CheckSettings(const SimulationSettings& settings, const JsonReader& place);
+
+/// Whether joints that may not start turned or moved (joint_graph.h) do.
+void CheckInitialAngles(const Scene& scene, const JsonReader& joints);
+
+/// All of these, and that every parameter is in its range. Returns "" or one line that begins with
+/// `name` and names the first value that is not allowed as its place in a scene file.
+std::string Validate(const Scene& scene, const std::string& name);
+
+}  // namespace tangible
