@@ -67,7 +67,8 @@ class FieldWriter {
   void Choice(const char* key, const std::pair<const char*, Enum> (&table)[N], Enum value) {
     json_[key] = NameOf(value, table);
   }
-  // A setting that is not set is not written, so that it follows the stepping when the file is read.
+  // A setting that is not set is not written, so that it follows the stepping when the file is
+  // read.
   template <typename Enum, std::size_t N>
   void Choice(const char* key, const std::pair<const char*, Enum> (&table)[N],
               const std::optional<Enum>& value) {

@@ -12,6 +12,8 @@
 #include "tangible/app/program.h"
 #include "tangible/app/progress.h"
 #include "tangible/verification/corpus/corpus_report.h"
+#include "tangible/verification/corpus/crowd_run.h"
+#include "tangible/verification/corpus/crowd_scene.h"
 #include "tangible/verification/support/provenance.h"
 
 DEFINE_string(problems, "", "folder of problem files, all of which are solved");
@@ -21,6 +23,9 @@ DEFINE_int32(first, 0, "number of the first random problem of each kind");
 DEFINE_string(kind, "", "random problems of this kind only");
 DEFINE_int32(contacts, 100, "largest number of contacts in a random problem");
 DEFINE_int32(dense_contacts, 30, "the general solver takes random problems of up to so many");
+DEFINE_int32(crowds, 0, "random scenes of each kind of crowd, run by fixed steps");
+DEFINE_int32(crowd_steps, 1000, "of each");
+DEFINE_int32(crowd_bodies, 400, "largest number of bodies in a crowd");
 DEFINE_int32(threads, 0, "how many problems are solved at the same time; 0: one a core");
 DEFINE_string(out, "", "file of all figures (JSON)");
 
@@ -37,10 +42,13 @@ std::string CheckFlags() {
                                       {"--first", FLAGS_first, 0, 2147483647.0 - kMostRandom},
                                       {"--contacts", FLAGS_contacts, 1, kMostContacts},
                                       {"--dense_contacts", FLAGS_dense_contacts, 0, kMostContacts},
+                                      {"--crowds", FLAGS_crowds, 0, kMostRandom},
+                                      {"--crowd_steps", FLAGS_crowd_steps, 1, kMostRandom},
+                                      {"--crowd_bodies", FLAGS_crowd_bodies, 20, kMostContacts},
                                       {"--threads", FLAGS_threads, 0, kMostThreads}});
   if (!outside.empty()) return outside;
-  if (FLAGS_random == 0 && FLAGS_problems.empty()) {
-    return "--random: expected a number > 0 where there are no --problems, got 0";
+  if (FLAGS_random == 0 && FLAGS_problems.empty() && FLAGS_crowds == 0) {
+    return "--random: expected a number > 0 where there are no --problems or --crowds, got 0";
   }
   const std::vector<std::string>& kinds = corpus::RandomKinds();
   if (FLAGS_kind.empty() || std::find(kinds.begin(), kinds.end(), FLAGS_kind) != kinds.end()) {
@@ -72,14 +80,29 @@ int Run() {
                                 .progress = [&](long done) { progress.Show(done); }});
   std::cout << ProvenanceLine() << "; seed " << FLAGS_seed << "\n\n"
             << corpus::TableText(result) << std::flush;
+  std::vector<corpus::CrowdRow> crowds;
+  if (FLAGS_crowds > 0) {
+    Progress scenes(
+        "scenes", static_cast<long>(FLAGS_crowds) * static_cast<long>(corpus::CrowdKinds().size()));
+    crowds = corpus::RunCrowds({.scenes = FLAGS_crowds,
+                                .seed = static_cast<std::uint64_t>(FLAGS_seed),
+                                .first = FLAGS_first,
+                                .steps = FLAGS_crowd_steps,
+                                .most_bodies = FLAGS_crowd_bodies,
+                                .threads = FLAGS_threads > 0 ? FLAGS_threads : cores,
+                                .progress = [&](long done) { scenes.Show(done); }});
+    std::cout << corpus::TableText(crowds) << std::flush;
+  }
   if (!FLAGS_out.empty()) {
     OrderedJson json = {{"provenance", OrderedJson::object()}, {"seed", FLAGS_seed}};
     for (const auto& [what, value] : Provenance()) json["provenance"][what] = value;
     json.update(corpus::ToJson(result));
+    if (FLAGS_crowds > 0) json["crowds"] = corpus::ToJson(crowds);
     error = WriteResult(FLAGS_out, JsonText(json));
     if (!error.empty()) return ReportError(error);
   }
-  const std::string failure = corpus::FirstFailure(result);
+  std::string failure = corpus::FirstFailure(result);
+  if (failure.empty()) failure = corpus::FirstFailure(crowds);
   return failure.empty() ? kExitDone : ReportError("tangible-corpus: " + failure);
 }
 
@@ -87,11 +110,12 @@ int Main(int argc, char** argv) {
   const CommandLine line = ParseCommandLine(
       argc, argv,
       {.name = "tangible-corpus",
-       .synopsis = "[--problems=FOLDER] [--random=N] [--seed=S] [--out=R.json]",
+       .synopsis = "[--problems=FOLDER] [--random=N] [--crowds=N] [--seed=S] [--out=R.json]",
        .description =
            "Solves problems of which the answer is known, files and random contact problems, by "
            "every solver; judges each\nanswer from the data. Exit status 1 where an answer is "
-           "wrong, or fewer are solved than should be.",
+           "wrong, or fewer are solved than should be. With --crowds runs random scenes of many "
+           "contacts.",
        .version = TANGIBLE_VERSION,
        .source_file = __FILE__,
        .num_positional = 0});

@@ -10,6 +10,7 @@
 #include "tangible/math/interrupt.h"
 #include "tangible/simulation/events/segment_flow.h"
 #include "tangible/simulation/events/tolerances.h"
+#include "tangible/simulation/stepping/crush.h"
 
 namespace tangible {
 namespace {
@@ -294,6 +295,10 @@ void Stepper::FillReport(const Model<double>& model, const ContactSolverReport& 
       residual << " (speeds or impulses beyond what numbers hold)";
     }
     report->message += residual.str();
+    const std::string who =
+        WhoCannotYield(*model.structure, record_.contacts, record_.problem, solved.worst_contact,
+                       SolverOptionsOf(model.structure->settings));
+    if (!who.empty()) report->message += ": " + who;
     return;
   }
   bool impact = false;
