@@ -247,7 +247,7 @@ class Judge {
   std::string Reason(int p, int pair) const {
     const Method method = kMethodPairs[pair].a;
     const bool is_unique = IsKnownMethod(method) && run_.jacobian[kByClosedPlus].size() > 0;
-    if (is_unique) return "";
+    if (is_unique && (IsOfASide(method) || !IsEdgeOfFixedSteps(p))) return "";
     if (!run_.named[p].empty()) {
       return run_.named[p];
     }
@@ -261,6 +261,14 @@ class Judge {
              run_.certificate.margin_where;
     }
     return "";
+  }
+
+  // Whether the certificate has named a parameter as an edge of a force's window on a step's end.
+  // The derivative of fixed steps there is the mean of those of two steps, each of which may pass
+  // another kink on its own side: neither side need have the mean, even if both have the same.
+  bool IsEdgeOfFixedSteps(int p) const {
+    return check_.stepping == Stepping::kFixed &&
+           run_.named[p].find("on a step's boundary") != std::string::npos;
   }
 
   void Except(int p, int pair, long entries, double error, const std::string& what, KindRow* row) {

@@ -16,10 +16,9 @@ constexpr char kAtTheEndOfTheRun[] = "coincidence: at the end of the run";
 constexpr char kSymmetric[] = "coincidence: two at one instant, symmetric";
 constexpr char kOfTwoKinds[] = "coincidence: two at one instant, of two kinds";
 
-// Of the parameter: the longest step of the differences below. The next kink is a step away.
-constexpr Real kLongestStep = 1e-4L;
-constexpr Real kSmallest = 0.1L;  // size of a parameter
-constexpr int kExtrapolated = 5;
+// Of the parameter: the longest way to where derivatives are taken. The next kink is a step away.
+constexpr long double kWay = 1e-6L;
+constexpr long double kSmallest = 0.1L;  // size of a parameter
 
 using Map = std::map<std::string, Real>;
 
@@ -36,32 +35,26 @@ std::vector<Real> Outputs(const Coincidence& coincidence, const Map& numbers) {
   return coincidence.outputs([&](const std::string& path) { return numbers.at(path); });
 }
 
-// The derivative on one side, by extrapolation of quotients to a step of 0.
+// The derivative on one side: those beside the parameter, extrapolated to it by a parabola.
 VectorX<double> Side(const Coincidence& coincidence, const Map& at, const std::string& path,
-                     Real sign) {
-  const std::vector<Real> base = Outputs(coincidence, at);
-  std::vector<std::vector<Real>> table;
-  Real step = sign * kLongestStep * std::max(std::abs(at.at(path)), kSmallest);
-  for (int k = 0; k < kExtrapolated; ++k, step /= 2.0L) {
+                     long double sign) {
+  const Real value = at.at(path);
+  const long double way = sign * kWay * std::max(std::abs(value.value), kSmallest);
+  constexpr long double kPoints[3] = {1.0L, 0.5L, 0.25L};
+  constexpr long double kWeights[3] = {1.0L / 3.0L, -2.0L, 8.0L / 3.0L};
+  std::vector<long double> sum;
+  for (int k = 0; k < 3; ++k) {
     Map beside = at;
-    beside[path] += step;
-    std::vector<Real> row = Outputs(coincidence, beside);
-    for (size_t i = 0; i < row.size(); ++i) {
-      row[i] = (row[i] - base[i]) / step;
-    }
-    table.push_back(std::move(row));
-  }
-  Real power = 2.0L;
-  for (int order = 1; order < kExtrapolated; ++order, power *= 2.0L) {
-    for (int k = kExtrapolated - 1; k >= order; --k) {
-      for (size_t i = 0; i < base.size(); ++i) {
-        table[k][i] += (table[k][i] - table[k - 1][i]) / (power - 1.0L);
-      }
+    beside[path] = Real(value.value + kPoints[k] * way, 1.0L);
+    const std::vector<Real> outputs = Outputs(coincidence, beside);
+    sum.resize(outputs.size(), 0.0L);
+    for (size_t i = 0; i < outputs.size(); ++i) {
+      sum[i] += kWeights[k] * outputs[i].rate;
     }
   }
-  VectorX<double> side(static_cast<Eigen::Index>(base.size()));
-  for (size_t i = 0; i < base.size(); ++i) {
-    side[static_cast<Eigen::Index>(i)] = static_cast<double>(table.back()[i]);
+  VectorX<double> side(static_cast<Eigen::Index>(sum.size()));
+  for (size_t i = 0; i < sum.size(); ++i) {
+    side[static_cast<Eigen::Index>(i)] = static_cast<double>(sum[i]);
   }
   return side;
 }

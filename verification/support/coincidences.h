@@ -39,7 +39,7 @@ Coincidence RandomCoincidence(unsigned seed, Stepping stepping);
 const std::vector<std::string>& CoincidenceKinds();
 
 /// The derivatives of the known outputs for growing and for shrinking parameters, outputs x
-/// parameters; empty where the outputs are not known. They are exact to 1e-11 of their column's
+/// parameters; empty where the outputs are not known. They are exact to 1e-16 of their column's
 /// largest.
 struct KnownSides {
   MatrixX<double> plus, minus;

@@ -84,15 +84,22 @@ class Differences {
     }
     AddNoiseOfParameter();
     BestTable(&column);
-    if (column.status == DifferenceStatus::kChoicesDiffer && side_ == 0.0 &&
-        choices_differ == ChoicesDiffer::kCompareSides) {
+    // Steps at which choices do not differ may be too short for a table that converges.
+    if (side_ == 0.0 && choices_differ == ChoicesDiffer::kCompareSides && !HasConverged(column) &&
+        column.status != DifferenceStatus::kRunFailed) {
+      DifferenceColumn sides;
       const VectorX<double> noise = noise_;
       noise_ = noise + TouchNoise(scene_, *at_.structure, Uncertain::kPoses);
-      if (!CompareSides(&column)) {
+      bool agree = CompareSides(&sides);
+      if (!agree && column.status != DifferenceStatus::kJudged) {
         noise_ = noise + TouchNoise(scene_, *at_.structure, Uncertain::kPosesAndTwists);
-        CompareSides(&column);
+        agree = CompareSides(&sides);
       }
       noise_ = noise;
+      if (agree && (column.status != DifferenceStatus::kJudged ||
+                    sides.errors.maxCoeff() < column.errors.maxCoeff())) {
+        column = std::move(sides);
+      }
     }
     for (size_t k = 0; k < 2; ++k) {
       column.plain[k] = Plain(Bounded(kPlainSteps[k]));
@@ -108,6 +115,11 @@ class Differences {
   static constexpr double kConverged = 1e-6;  // of the column's largest
   static constexpr double kRatio = 2.0;
   static constexpr double kSidesAgree = 1e-5;
+
+  static bool HasConverged(const DifferenceColumn& column) {
+    return column.status == DifferenceStatus::kJudged &&
+           column.errors.maxCoeff() <= kConverged * column.values.cwiseAbs().maxCoeff();
+  }
 
   void BestTable(DifferenceColumn* best) {
     DifferenceColumn& column = *best;
@@ -130,9 +142,7 @@ class Differences {
       if (tables == 1 || next.errors.maxCoeff() < column.errors.maxCoeff()) {
         column = std::move(next);
       }
-      if (column.errors.maxCoeff() <= kConverged * column.values.cwiseAbs().maxCoeff()) {
-        break;
-      }
+      if (HasConverged(column)) break;
     }
   }
 

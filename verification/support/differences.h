@@ -41,7 +41,8 @@ struct DifferenceColumn {
   PlainDifference plain[2];
 };
 
-/// What to do where runs on both sides never make the same choices.
+/// What to do where runs on both sides never make the same choices, or only so near the parameter
+/// that the differences do not converge.
 enum class ChoicesDiffer {
   kGiveUp,
   /// Take differences of each side separately (a body at rest that is thrown up falls down again,

@@ -10,7 +10,7 @@
 namespace tangible {
 namespace {
 
-constexpr Real kNever = std::numeric_limits<Real>::infinity();
+constexpr Real kNever = std::numeric_limits<long double>::infinity();
 constexpr int kMostEvents = 1000;
 
 Real Sign(Real x) { return x > 0.0L ? 1.0L : x < 0.0L ? -1.0L : 0.0L; }
@@ -23,7 +23,7 @@ Real FallsThroughZero(Real a, Real b, Real c) {
   const Real square = b * b - 4.0L * a * c;
   if (square < 0.0L) return kNever;
   // The root at which the slope is −√square.
-  const Real root = std::sqrt(square);
+  const Real root = sqrt(square);
   if (b > 0.0L) return c < 0.0L ? (-b - root) / (2.0L * c) : kNever;
   const Real below = -b + root;
   return below > 0.0L ? 2.0L * a / below : kNever;
@@ -54,13 +54,13 @@ void Advance(Real acceleration, Real slope, Real time, Coordinate* at) {
 // In which direction a mass at rest begins to slide at once; 0: friction holds it.
 Real SlidesAtOnce(Real force, Real slope, Real friction) {
   const Real side = force != 0.0L ? Sign(force) : Sign(slope);
-  const Real excess = std::abs(force) - friction;
+  const Real excess = abs(force) - friction;
   return excess > 0.0L || (excess == 0.0L && side * slope > 0.0L) ? side : 0.0L;
 }
 
 // Until friction no longer holds a mass at rest.
 Real BreaksLooseAfter(Real force, Real slope, Real friction) {
-  return slope == 0.0L ? kNever : (friction - Sign(slope) * force) / std::abs(slope);
+  return slope == 0.0L ? kNever : (friction - Sign(slope) * force) / abs(slope);
 }
 
 void SlidePiece(Piece piece, Real mass, Real friction, Coordinate* at) {
@@ -108,8 +108,9 @@ void BouncePiece(Piece piece, Real mass, const Surface& surface, Coordinate* gap
     time = std::min(left, touches);
     Advance(acceleration, piece.slope / mass, time, gap);
     if (touches <= left) {
-      gap->position = 0.0L;
       gap->speed = gap->speed < -surface.threshold ? -surface.restitution * gap->speed : 0.0L;
+      // In the surface as the run starts, it leaves from where it is, or is pushed out.
+      if (gap->speed == 0.0L || gap->position > 0.0L || time > 0.0L) gap->position = 0.0L;
     }
     piece.from += time;
     piece.force += time * piece.slope;
@@ -136,7 +137,7 @@ void Rub(Real most, Real arm, Real mass, Real inertia, Disc* disc) {
   const Real impulse = std::clamp(-holds, -most, most);
   disc->along.speed += impulse / mass;
   disc->turn.speed += arm * impulse / inertia;
-  if (std::abs(holds) <= most) disc->along.speed = -arm * disc->turn.speed;
+  if (abs(holds) <= most) disc->along.speed = -arm * disc->turn.speed;
 }
 
 Disc FallByEvents(Disc disc, Real radius, Real mass, Real inertia, Real friction, Real gravity,
@@ -147,8 +148,8 @@ Disc FallByEvents(Disc disc, Real radius, Real mass, Real inertia, Real friction
     const Real slip = disc.along.speed + radius * disc.turn.speed;
     const Real pull = rests ? -Sign(slip) * friction * gravity : 0.0L;  // m/s²
     const Real turning = pull * mass * radius / inertia;
-    const Real slowing = std::abs(pull) + radius * std::abs(turning);
-    const Real ends = rests ? (slowing > 0.0L ? std::abs(slip) / slowing : kNever)
+    const Real slowing = abs(pull) + radius * abs(turning);
+    const Real ends = rests ? (slowing > 0.0L ? abs(slip) / slowing : kNever)
                             : FallsThroughZero(disc.gap.position, disc.gap.speed, -gravity / 2.0L);
     const Real time = std::min(left, ends);
     Advance(pull, 0.0L, time, &disc.along);
@@ -224,7 +225,7 @@ Coordinate Slide(Coordinate at, Real mass, Real friction, const Load& load, cons
     const Real from = StepEnd(course, k);
     const Real h = StepEnd(course, k + 1) - from;
     const Real free = at.speed + load.Impulse(from, from + h) / mass;
-    at.speed = Sign(free) * std::max(std::abs(free) - friction * h / mass, 0.0L);
+    at.speed = Sign(free) * std::max(abs(free) - friction * h / mass, Real());
     at.position += h * at.speed;
   }
   return at;

@@ -3,16 +3,53 @@
 //
 // Motions of one coordinate, and of a disc on a level floor, that are known exactly: in continuous
 // time (event stepping), and of fixed steps (lib/dynamics/elements/contact.h). They take every
-// number in long double, and are analytic between values at which an event changes places with
-// another event or with an end; so their differences on one side are one-sided derivatives.
+// number in long double with its derivative, and are analytic between values at which an event
+// changes places with another event or with an end; so their derivatives beside such a value tend
+// to the one-sided ones at it.
 
+#include <cmath>
+#include <compare>
 #include <vector>
 
 #include "tangible/scene/scene.h"
 
 namespace tangible {
 
-using Real = long double;
+/// A number with its derivative by one parameter.
+struct Real {
+  long double value = 0.0L;
+  long double rate = 0.0L;
+
+  constexpr Real() = default;
+  constexpr Real(long double v, long double r = 0.0L)  // NOLINT(google-explicit-constructor)
+      : value(v), rate(r) {}
+  explicit operator double() const { return static_cast<double>(value); }
+
+  Real& operator+=(const Real& y) { return *this = *this + y; }
+  Real& operator-=(const Real& y) { return *this = *this - y; }
+  friend Real operator-(const Real& x) { return {-x.value, -x.rate}; }
+  friend Real operator+(const Real& x, const Real& y) {
+    return {x.value + y.value, x.rate + y.rate};
+  }
+  friend Real operator-(const Real& x, const Real& y) {
+    return {x.value - y.value, x.rate - y.rate};
+  }
+  friend Real operator*(const Real& x, const Real& y) {
+    return {x.value * y.value, x.rate * y.value + x.value * y.rate};
+  }
+  friend Real operator/(const Real& x, const Real& y) {
+    const long double ratio = x.value / y.value;
+    return {ratio, (x.rate - ratio * y.rate) / y.value};
+  }
+  friend bool operator==(const Real& x, const Real& y) { return x.value == y.value; }
+  friend auto operator<=>(const Real& x, const Real& y) { return x.value <=> y.value; }
+  friend Real abs(const Real& x) { return x.value < 0.0L ? -x : x; }
+  /// At 0 the rate is that of a number that stays 0.
+  friend Real sqrt(const Real& x) {
+    const long double root = std::sqrt(x.value);
+    return {root, root > 0.0L ? x.rate / (2.0L * root) : 0.0L};
+  }
+};
 
 /// A force that is piecewise linear in time.
 struct Load {

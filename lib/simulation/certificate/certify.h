@@ -21,6 +21,8 @@
 //                  and lands, on the other it is pushed out
 //   controls       an event at the boundary of two steps whose controls differ: different forces
 //                  act before and after it, and its derivative differs on each side
+//   split          by events, an event on the end of a step, where the motion before or behind it
+//                  has an integrator's error: beside it the event splits one step or the other
 //   end            by events, an event at the last instant of the run: beside it the event has
 //                  happened or not, so that a twist jumps (a touch) or has another derivative (an
 //                  end of sliding)
@@ -93,6 +95,11 @@ class RolloutCertifier {
   /// joints transmit.
   bool KeepsSide(const Model<double>& model, const ActiveContact& contact,
                  EventDerivative* derivative, Segment* segment) const;
+  bool LeavesLimitAtStart(const Model<double>& model, const Segment& motion, size_t contact,
+                          EventDerivative* derivative) const;
+  bool SlidesAtLimit(const Model<double>& model, ContactMode by_share, size_t contact,
+                     EventDerivative* derivative, Segment* segment) const;
+  void AddSplits(const Model<double>& model, long step, const Segment& segment);
   void AddImpact(const Model<double>& model, long step, Impulses* impact);
   void AddOtherSlips(const Model<double>& model, const Segment& segment, const Place& place);
   void AddEventOf(const Model<double>& model, long step, EventDerivative* derivative,
@@ -151,7 +158,14 @@ class RolloutCertifier {
     ActiveContact contact;
     double time = 0.0;
   };
-  std::vector<Strike> strikes_;  ///< of the last impact, and of those shortly before it
+  std::vector<Strike> strikes_;     ///< of the last impact, and of those shortly before it
+  const Segment* start_ = nullptr;  ///< the instant at which the run starts, until the first motion
+  /// A located event near a step's end, of contacts of the whole model.
+  struct Boundary {
+    ActiveContact contact;
+    double distance = 0.0;  ///< steps
+  };
+  std::vector<Boundary> boundaries_;  ///< whose next motion is still to come
   // The three of all islands, while closed_, loaded_ and struck_at_ are those of one.
   std::vector<ActiveContact> all_closed_, all_loaded_;
   std::vector<double> all_struck_at_;

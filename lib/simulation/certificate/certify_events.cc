@@ -11,6 +11,7 @@
 #include "tangible/simulation/certificate/certify_grazing.h"
 #include "tangible/simulation/certificate/certify_place_inl.h"
 #include "tangible/simulation/certificate/feature_ties.h"
+#include "tangible/simulation/certificate/split_error.h"
 #include "tangible/simulation/certificate/tolerances.h"
 #include "tangible/simulation/derivatives/rollout_directional.h"
 #include "tangible/simulation/derivatives/tolerances.h"
@@ -146,6 +147,27 @@ void RolloutCertifier::AddEventOf(const Model<double>& model, long step,
   }
 }
 
+// Whether a sliding contact slides at zero speed, so that friction stays at its limit, which no
+// event has decided. Beside a sticking contact of the same bodies this only determines how they
+// share the load. `by_share`: its mode by a share of the forces.
+bool RolloutCertifier::SlidesAtLimit(const Model<double>& model, ContactMode by_share,
+                                     size_t contact, EventDerivative* derivative,
+                                     Segment* segment) const {
+  const ActiveContact& slides = segment->contacts[contact];
+  if (segment->length > 0.0 && LeavesLimitAtStart(model, *segment, contact, derivative)) {
+    return true;
+  }
+  const bool ends_at_once = segment->length == 0.0 && segment->event == EventKind::kSlipEnds;
+  if (by_share == ContactMode::kSticking || ends_at_once) return false;
+  for (size_t i = 0; i < segment->contacts.size(); ++i) {
+    if (i != contact && segment->SticksWith(i, contact)) return false;
+  }
+  if (KeepsSide(model, slides, derivative, segment)) return false;
+  const double slip =
+      std::max(SlipOf(model, segment->before, slides), SlipOf(model, segment->after, slides));
+  return slip <= Negligible(model, slip);
+}
+
 void RolloutCertifier::AddSegment(const Model<double>& model, long step,
                                   EventDerivative* derivative, Segment* segment) {
   const ModelStructure& s = *model.structure;
@@ -182,22 +204,9 @@ void RolloutCertifier::AddSegment(const Model<double>& model, long step,
         MeetsACorner(model, segment->before, contact)) {
       AddJump(0.0, place, "a corner meets a corner");
     }
-    // The contact slides at zero speed: friction stays at its limit. Beside a sticking contact of
-    // the same bodies this only determines how they share the load.
-    const bool shared = std::any_of(
-        segment->contacts.begin(), segment->contacts.end(), [&](const ActiveContact& other) {
-          return &other != &contact && other.IsBetweenTheSame(contact) &&
-                 segment->modes[&other - segment->contacts.data()] == ContactMode::kSticking;
-        });
-    const bool ends_at_once = segment->length == 0.0 && segment->event == EventKind::kSlipEnds;
-    const bool sticks = share.modes[i] == ContactMode::kSticking;
-    if (SlidingSign(place.mode) != 0.0 && !sticks && !shared && !ends_at_once &&
-        !KeepsSide(model, contact, derivative, segment)) {
-      const double slip =
-          std::max(SlipOf(model, segment->before, contact), SlipOf(model, segment->after, contact));
-      if (slip <= Negligible(model, slip)) {
-        add_margin(0.0, "friction limit");
-      }
+    if (SlidingSign(place.mode) != 0.0 &&
+        SlidesAtLimit(model, share.modes[i], i, derivative, segment)) {
+      add_margin(0.0, "friction limit");
     }
     if (place.mode == ContactMode::kSticking && !segment->SticksWithEarlier(i) && !motion_follows) {
       const double above = segment->FrictionLeft(i, friction.value, 1.0, share);
@@ -208,6 +217,12 @@ void RolloutCertifier::AddSegment(const Model<double>& model, long step,
     }
     AddFriction(friction, place);
   }
+  if (segment->starts && segment->length == 0.0) {
+    start_ = segment;
+  } else if (segment->length > 0.0) {
+    start_ = nullptr;
+  }
+  AddSplits(model, step, *segment);
   if (!segment->starts && (step > 0 || segment->time > 0.0)) {
     AddClosedAtOnce(model, step, *segment);
   }
@@ -219,6 +234,42 @@ void RolloutCertifier::AddSegment(const Model<double>& model, long step,
   }
   AddEventOf(model, step, derivative, segment);
   AddQuality(start.problem, segment->modes, &start.system);
+}
+
+// An event on the end of a step: beside it, it splits the motion before that end or the one behind
+// it. This changes a motion by the integrator's error.
+void RolloutCertifier::AddSplits(const Model<double>& model, long step, const Segment& segment) {
+  const SimulationSettings& settings = model.structure->settings;
+  const auto in_whole = [&](const ActiveContact& contact) {
+    return island_ != nullptr ? island_->InWhole(contact) : contact;
+  };
+  const auto in_island = [&](const ActiveContact& contact) {
+    return island_ != nullptr ? island_->InIsland(contact) : contact;
+  };
+  const bool moves = segment.length > 0.0;
+  double error = -1.0;
+  const auto add = [&](const Boundary& boundary, const ActiveContact& contact) {
+    error = error < 0.0 ? SplitError(model, segment) : error;
+    if (!(error > kSplitMatters)) return;
+    AddMargin(boundary.distance,
+              {model.structure.get(), step, segment.time, 0, &contact, ContactMode::kOpen},
+              "an event at a step's end splits either step, which changes the integrator's error");
+  };
+  std::erase_if(boundaries_, [&](const Boundary& boundary) {
+    const ActiveContact contact = in_island(boundary.contact);
+    if (!moves || contact.a < 0 || contact.b < 0) return false;
+    add(boundary, contact);
+    return true;
+  });
+  if (!segment.IsEventLocated()) return;
+  const double end = segment.time + segment.length;
+  // Nothing moves before the run's start.
+  const double since = step > 0 ? std::abs(end - StepTime(settings, step)) : HUGE_VAL;
+  const double distance =
+      std::min(since, std::abs(end - StepTime(settings, step + 1))) / settings.dt;
+  if (!(distance < kNearKinkMargin)) return;
+  boundaries_.push_back({in_whole(segment.event_contact), distance});
+  if (moves) add(boundaries_.back(), segment.event_contact);
 }
 
 // Touches at the end of the run's last motion, or just behind it.
@@ -356,6 +407,7 @@ void RolloutCertifier::AddEventStep(const Model<double>& model, long step, Stepp
 void RolloutCertifier::AddIsland(const Model<double>& model, long step, EventDerivative* derivative,
                                  IslandRecord* island) {
   EventRecord& record = island->events;
+  start_ = nullptr;
   if (step == 0 && Directions().cols() > 0) {
     AddStart(model, record);
   }

@@ -7,6 +7,7 @@
 
 #include "tangible/dynamics/jacobian/contact_gradient.h"
 #include "tangible/simulation/certificate/certify_place_inl.h"
+#include "tangible/simulation/certificate/split_error.h"
 #include "tangible/simulation/certificate/start_probe.h"
 #include "tangible/simulation/certificate/tolerances.h"
 #include "tangible/simulation/events/event_search.h"
@@ -15,45 +16,6 @@
 
 namespace tangible {
 namespace {
-
-// The difference that a motion gets if an event splits it in two parts, as a fraction of the
-// motion: the integrator's error, which occurs once in each part.
-double SplitError(const Model<double>& model, const Segment& segment) {
-  SegmentFlow flow(model);
-  std::string message;
-  Segment whole;
-  whole.time = segment.time;
-  whole.middle = segment.middle;
-  whole.before = segment.before;
-  whole.contacts = segment.contacts;
-  whole.friction = segment.friction;
-  whole.modes = segment.modes;
-  whole.length = 0.5 * segment.length;
-  Segment half = whole;
-  whole.length = segment.length;
-  if (!flow.Run(model, &whole, &message) || !flow.Run(model, &half, &message)) {
-    return 0.0;
-  }
-  Segment rest = half;
-  rest.time += half.length;
-  rest.before = half.after;
-  if (!flow.Run(model, &rest, &message)) {
-    return 0.0;
-  }
-  const auto share = [&](const std::vector<double>& before, const std::vector<double>& one,
-                         const std::vector<double>& two) {
-    double apart = 0.0;
-    double moved = 0.0;
-    for (size_t i = 0; i < one.size(); ++i) {
-      apart = std::max(apart, std::abs(one[i] - two[i]));
-      moved = std::max({moved, std::abs(one[i] - before[i]), kAtRest * std::abs(one[i])});
-    }
-    const double gravity = std::hypot(model.parameters[kGravityX], model.parameters[kGravityY]);
-    return apart > 0.0 ? apart / (moved + kAtRest * gravity * segment.length) : 0.0;
-  };
-  return std::max(share(segment.before.pose, whole.after.pose, rest.after.pose),
-                  share(segment.before.twist, whole.after.twist, rest.after.twist));
-}
 
 // Whether a contact of two bodies sticks over a segment, if there is one.
 bool Sticks(const Segment* segment, const ActiveContact& contact) {
@@ -146,6 +108,26 @@ bool RolloutCertifier::KeepsSide(const Model<double>& model, const ActiveContact
     if (std::abs(rate) > kUnmoved * size * after.col(c).cwiseAbs().maxCoeff()) return false;
   }
   return true;
+}
+
+// Whether a contact sticks at its limit as the run starts, slides in the first motion, and either
+// some direction changes its slip at the start, which slides at once in either direction; or beside
+// the start it begins to slide a little later, and the event splits the motion.
+bool RolloutCertifier::LeavesLimitAtStart(const Model<double>& model, const Segment& motion,
+                                          size_t contact, EventDerivative* derivative) const {
+  const ActiveContact& slides = motion.contacts[contact];
+  for (size_t i = 0; start_ != nullptr && i < start_->contacts.size(); ++i) {
+    if (start_->modes[i] != ContactMode::kSticking || !start_->contacts[i].SameAs(slides)) {
+      continue;
+    }
+    if (SplitError(model, motion) > kSplitMatters) return true;
+    Segment sliding = *start_;
+    sliding.modes[i] = motion.modes[contact];
+    SegmentFlow flow(model);
+    std::string message;
+    return flow.Run(model, &sliding, &message) && !KeepsSide(model, slides, derivative, &sliding);
+  }
+  return false;
 }
 
 // Contacts that touch as the run starts: in the impacts of its first instant and in the first

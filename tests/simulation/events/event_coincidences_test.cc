@@ -358,6 +358,58 @@ TEST(EventCoincidencesTest, ADiscThatRollsMeetsAWall) {
        {3, -0.875 + 0.25, {1.0 / 1.75, -1.75, 1.25}}});
 }
 
+// A wheel whose friction is just overcome as the run starts, by an effort that grows by k: ω = k T² /
+// (2 I) for any friction nearby. Turned forwards it keeps its speed, turned back it first stops, at a
+// deceleration of twice the friction.
+TEST(EventCoincidencesTest, AWheelThatBreaksLooseAtTheStart) {
+  Scene scene = Of("[0, 0]", R"({"name": "b", "mass": 1, "inertia": 2, "position": [0, 0]})", 0.5,
+                   R"(, "joints": [{"name": "j", "type": "revolute", "bodies": ["b", "world"],
+             "anchor": [0, 0], "friction": 3}])");
+  Signal ramp;
+  ramp.interpolation = Signal::Interpolation::kLinear;
+  ramp.time = {0.0, 10.0};
+  ramp.value = {3.0, 83.0};
+  scene.joints[0].effort_signal = ramp;
+  ExpectExact(scene, {"joints/j/friction"}, {{5, 0.5, {-0.25}}});
+  const std::vector<std::string> paths = {"bodies/b/angular_velocity"};
+  const GradientResult both = testing::Jacobian(scene, paths, GradientMethod::kTangent);
+  EXPECT_NE(both.certificate.verdict.find("friction limit"), std::string::npos)
+      << both.certificate.verdict;
+  for (const DerivativeSide side : {DerivativeSide::kPlus, DerivativeSide::kMinus}) {
+    const GradientResult one = FinalStateJacobian(
+        scene, testing::Resolve(scene, paths), {.method = GradientMethod::kTangent, .side = side});
+    ASSERT_TRUE(one.done) << one.message;
+    EXPECT_NEAR(one.jacobian(5, 0), side == DerivativeSide::kPlus ? 1.0 : 0.0, 1e-6);
+  }
+}
+
+// Where friction falls with the speed a motion has an integrator's error, in which an event on a
+// step's end is a kink: beside it the event splits the one step or the other.
+TEST(EventCoincidencesTest, AnEventOnAStepsEndSplitsEitherStep) {
+  Scene scene = Of(
+      "[0, 0]", R"({"name": "b", "mass": 1, "inertia": 0.5, "position": [0, 0]})", 0.3,
+      R"(, "joints": [{"name": "j", "type": "prismatic", "bodies": ["b", "world"], "axis": [1, 0],
+             "anchor": [0, 0], "friction": 2, "kinetic_friction": 1, "stribeck_speed": 0.5}])");
+  Signal ramp;
+  ramp.interpolation = Signal::Interpolation::kLinear;
+  ramp.time = {0.0, 10.0};
+  ramp.value = {0.0, 200.0};  // reaches the friction at 0.1 s
+  scene.joints[0].effort_signal = ramp;
+  const std::vector<std::string> paths = {"joints/j/friction"};
+  for (const double dt : {0.05, 0.03}) {
+    scene.simulation.dt = dt;
+    const std::string verdict =
+        testing::Jacobian(scene, paths, GradientMethod::kTangent).certificate.verdict;
+    const bool is_named = verdict.find("splits either step") != std::string::npos;
+    EXPECT_EQ(is_named, dt == 0.05) << verdict;
+    EXPECT_EQ(verdict == "trustworthy", dt != 0.05) << verdict;
+  }
+  scene.joints[0].kinetic_friction.reset();
+  scene.simulation.dt = 0.05;
+  EXPECT_EQ(testing::Jacobian(scene, paths, GradientMethod::kTangent).certificate.verdict,
+            "trustworthy");
+}
+
 // An event at the end of the run: positions are differentiable, the speed has another derivative on
 // each side, which the verdict says.
 TEST(EventCoincidencesTest, TheLastInstantOfARunIsAKink) {

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 
 #include "tangible/scene/scene_json.h"
@@ -93,6 +94,44 @@ TEST(CoincidencesTest, BothSidesAgreeWhereABlockStops) {
       RandomCoincidence(FirstAtAStepsEnd("slip ends", Stepping::kFixed), Stepping::kFixed);
   const KnownSides apart = SidesOf(fixed);
   EXPECT_GT((apart.plus - apart.minus).cwiseAbs().maxCoeff(), 1e-3);
+}
+
+// x = x0 + v²/(2 μ g), with all its derivatives to rounding.
+TEST(CoincidencesTest, KnownDerivativesAreExact) {
+  unsigned seed = 1;
+  const auto is_on_a_level = [](const Coincidence& one) {
+    return one.kinds.size() == 2 && Has(one, "slip ends") && Has(one, "at a step's end") &&
+           one.scene.gravity.x() == 0.0;
+  };
+  while (!is_on_a_level(RandomCoincidence(seed, Stepping::kEvent))) ++seed;
+  const Coincidence one = RandomCoincidence(seed, Stepping::kEvent);
+  const auto number = [&](const std::string& end) {
+    for (const ParameterPath& path : one.parameters) {
+      if (path.path.size() >= end.size() &&
+          path.path.compare(path.path.size() - end.size(), end.size(), end) == 0) {
+        return path.value;
+      }
+    }
+    ADD_FAILURE() << end;
+    return 0.0;
+  };
+  const KnownSides sides = SidesOf(one);
+  const double v = number("velocity/x");
+  const double mu = number("floor/friction");
+  const double g = -number("gravity/y");
+  const double way = std::abs(v) * v / (2.0 * mu * g);
+  for (size_t k = 0; k < one.parameters.size(); ++k) {
+    const std::string& path = one.parameters[k].path;
+    const double expected = path.find("velocity/x") != std::string::npos   ? 2.0 * way / v
+                            : path.find("friction") != std::string::npos   ? -way / mu
+                            : path.find("gravity/y") != std::string::npos  ? way / g
+                            : path.find("position/x") != std::string::npos ? 1.0
+                                                                           : 0.0;
+    for (const double side : {sides.plus(0, static_cast<Eigen::Index>(k)),
+                              sides.minus(0, static_cast<Eigen::Index>(k))}) {
+      EXPECT_NEAR(side, expected, 4e-16 * std::max(1.0, std::abs(expected))) << path;
+    }
+  }
 }
 
 }  // namespace

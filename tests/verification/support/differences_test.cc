@@ -5,6 +5,7 @@
 
 #include <cmath>
 
+#include "../../support/scenes.h"
 #include "sliding_box.h"
 
 namespace tangible {
@@ -72,6 +73,28 @@ TEST(DifferencesTest, SidesWithChoicesOfTheirOwnMayAgree) {
                               ChoicesDiffer::kCompareSides)
                 .status,
             DifferenceStatus::kChoicesDiffer);
+}
+
+// A block that turns on a slope, on a step's end: runs beside it make other choices until they are
+// so near that differences are rounding, and both sides have the same derivative.
+TEST(DifferencesTest, ACoincidenceIsNotLeftToTheShortestSteps) {
+  const Scene scene = test_scenes::SceneOf(R"({"gravity": [1.6, -8], "bodies": [
+      {"name": "floor", "static": true, "shape": {"half_plane": {"normal": [0, 1]}}},
+      {"name": "box", "shape": {"box": {"size": [0.2, 0.1]}}, "mass": 1, "position": [0, 0.05],
+       "velocity": [-0.3, 0]}],
+      "pairs": [{"bodies": ["box", "floor"], "friction": 0.1}],
+      "simulation": {"stepping": "event", "dt": 0.125, "duration": 0.875}})");
+  const RunTrace trace = TraceRun(scene);
+  const DifferenceColumn column =
+      FiniteDifferences(scene, trace, RoundingNoise(scene, trace), PathTo(scene, "gravity/y"),
+                        ChoicesDiffer::kCompareSides);
+  ASSERT_EQ(column.status, DifferenceStatus::kJudged);
+  // v = 0.3 stops after t = v / (1.6 + 8 μ) and s = v t / 2: it returns by (1.6 − 8 μ) (T − t)² / 2.
+  const double dt = -0.3 * 0.1 / (2.4 * 2.4);  // by g = 8
+  const double expected = 0.5 * 0.3 * dt;
+  const double back = -0.5 * 0.1 * 0.75 * 0.75 - 0.8 * 0.75 * dt;
+  EXPECT_NEAR(column.values[0], -(back - expected), column.errors[0] + 1e-9);
+  EXPECT_LT(column.errors[0], 1e-6);
 }
 
 TEST(DifferencesTest, ATwistThatGapsSetIsAsUncertainAsThey) {

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 namespace tangible {
 namespace {
 
@@ -81,6 +83,29 @@ TEST(ReferenceMotionTest, AFixedStepLandsOnTheSurfaceAndReboundsFromIt) {
   const Coordinate rebounds = Bounce({0.15L, -1.0L}, 1.0L, floor, weight, course);
   EXPECT_NEAR(static_cast<double>(rebounds.speed), -0.5, kRounding);
   EXPECT_NEAR(static_cast<double>(rebounds.position), 0.15, kRounding);
+}
+
+// In a surface as the run starts, without a force: it rebounds from where it is, or is pushed out.
+TEST(ReferenceMotionTest, ASunkGapReboundsWhereItIs) {
+  Surface surface;
+  const Course course = By(Stepping::kEvent, 0.1L, 5);
+  const Coordinate out = Bounce({-0.01L, -1.0L}, 1.0L, surface, Load(), course);
+  EXPECT_EQ(static_cast<double>(out.position), 0.0);
+  surface.restitution = 0.5L;
+  const Coordinate leaves = Bounce({-0.01L, -1.0L}, 1.0L, surface, Load(), course);
+  EXPECT_NEAR(static_cast<double>(leaves.position), -0.01 + 0.5 * 0.5, kRounding);
+}
+
+// sqrt and quotients with their rates.
+TEST(ReferenceMotionTest, NumbersHaveRates) {
+  const Real x(2.0L, 1.0L);
+  const Real y = sqrt(x) * x / (x - 1.0L);
+  const long double root = std::sqrt(2.0L);
+  EXPECT_NEAR(static_cast<double>(y.value), 2.0 * root, kRounding);
+  // 1.5 √x / (x − 1) − √x x / (x − 1)².
+  EXPECT_NEAR(static_cast<double>(y.rate), 1.5 * root - 2.0 * root, kRounding);
+  EXPECT_EQ(abs(-x).rate, 1.0L);
+  EXPECT_LT(-x, x);
 }
 
 TEST(ReferenceMotionTest, ALimitIsLeftAsTheForceTurns) {
