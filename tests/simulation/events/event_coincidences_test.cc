@@ -358,9 +358,9 @@ TEST(EventCoincidencesTest, ADiscThatRollsMeetsAWall) {
        {3, -0.875 + 0.25, {1.0 / 1.75, -1.75, 1.25}}});
 }
 
-// A wheel whose friction is just overcome as the run starts, by an effort that grows by k: ω = k T² /
-// (2 I) for any friction nearby. Turned forwards it keeps its speed, turned back it first stops, at a
-// deceleration of twice the friction.
+// A wheel whose friction is just overcome as the run starts, by an effort that grows by k:
+// ω = k T² / (2 I), as for any friction nearby. Turned forwards it keeps its speed, turned back it
+// first stops, at a deceleration of twice the friction.
 TEST(EventCoincidencesTest, AWheelThatBreaksLooseAtTheStart) {
   Scene scene = Of("[0, 0]", R"({"name": "b", "mass": 1, "inertia": 2, "position": [0, 0]})", 0.5,
                    R"(, "joints": [{"name": "j", "type": "revolute", "bodies": ["b", "world"],

@@ -89,7 +89,8 @@ TEST(DifferencesTest, ACoincidenceIsNotLeftToTheShortestSteps) {
       FiniteDifferences(scene, trace, RoundingNoise(scene, trace), PathTo(scene, "gravity/y"),
                         ChoicesDiffer::kCompareSides);
   ASSERT_EQ(column.status, DifferenceStatus::kJudged);
-  // v = 0.3 stops after t = v / (1.6 + 8 μ) and s = v t / 2: it returns by (1.6 − 8 μ) (T − t)² / 2.
+  // v = 0.3 stops after t = v / (1.6 + 8 μ) and s = v t / 2; then it returns by
+  // (1.6 − 8 μ) (T − t)² / 2.
   const double dt = -0.3 * 0.1 / (2.4 * 2.4);  // by g = 8
   const double expected = 0.5 * 0.3 * dt;
   const double back = -0.5 * 0.1 * 0.75 * 0.75 - 0.8 * 0.75 * dt;
