@@ -28,7 +28,7 @@ struct CrowdRow {
   int scenes = 0;
   long steps = 0;             ///< done, of all scenes
   int contacts_max = 0;       ///< with an impulse in a step
-  double residual_max = 0.0;  ///< scaled, of all steps
+  double residual_max = 0.0;  ///< scaled, of all steps of solved scenes
   double seconds_mean = 0.0;  ///< of CPU time, of a step
   double seconds_late = 0.0;  ///< that one step in a hundred exceeds
   int crushed = 0;            ///< scenes in which a body that cannot yield crushes another one
