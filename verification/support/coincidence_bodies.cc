@@ -294,11 +294,25 @@ void CoincidenceMaker::Lands() {
   disc.angular_velocity = mirror_ * Pick({0.0, 0.0, 4.0, -2.0});
   disc.position.y() += 0.5 * gravity_ * at_ * at_ - speed * at_;
   AddPair(name, Pick({0.0, 0.1, 0.5}), Pick({0.0, 0.5, 0.8, 1.0}));
+  MayLandAtTheEnd(gravity_ * at_ - speed);
   if (course_.stepping == Stepping::kEvent && random_.Chance(0.3)) {
     made_.scene.simulation.impact_law = ImpactLaw::kPoisson;
     made_.kinds.emplace_back("coincidence: Poisson's phases");
   }
   RollDisc(name);
+}
+
+void CoincidenceMaker::MayLandAtTheEnd(double speed) {
+  constexpr int kMostLandings = 100;
+  constexpr double kSameMoment = 1e-9;
+  const double end = made_.scene.simulation.duration;
+  const double restitution = *made_.scene.pairs.back().restitution;
+  double time = at_;
+  for (int k = 0; k < kMostLandings && time < end - kSameMoment; ++k) {
+    speed *= restitution;
+    time += 2.0 * speed / gravity_;
+  }
+  if (course_.stepping == Stepping::kEvent && std::abs(time - end) <= kSameMoment) unknown_ = true;
 }
 
 void CoincidenceMaker::LandsFlat() {
@@ -314,6 +328,7 @@ void CoincidenceMaker::LandsFlat() {
     paths_.push_back(body + "velocity/y");
   }
   AddPair(box.name, 0.0, Pick({0.0, 0.5, 0.8}));
+  MayLandAtTheEnd(gravity_ * at_ - speed);
   parts_.emplace_back([=, course = course_](const NumberAt& at) {
     Surface surface;
     surface.restitution = at(pair + "restitution");

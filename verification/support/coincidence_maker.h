@@ -40,6 +40,9 @@ class CoincidenceMaker {
   void JumpsAt() {
     if (after_ == 0 && course_.stepping == Stepping::kEvent) unknown_ = true;
   }
+  /// The same for a body that meets the floor at `speed` (> 0) at `at_`, and may land again as the
+  /// run ends. After its pair is added.
+  void MayLandAtTheEnd(double speed);
   void Finish();
   bool is_slope() const { return group_ == Group::kSteep || group_ == Group::kShallow; }
 

@@ -73,20 +73,33 @@ double JustBefore(const Model<double>& model, double t) {
                         -std::numeric_limits<double>::max());
 }
 
+// Whether the forces of an instant that follows the record are those behind an edge at it: the step
+// begins there, or the last motion has ended at an edge and not at an event of its own.
+bool FollowsEdges(const EventRecord& record) {
+  for (int p = record.num_parts - 1; p >= 0; --p) {
+    const EventPart& part = *record.parts[p];
+    if (part.is_impulses) continue;
+    if (part.segment.event == EventKind::kEdge) return true;
+    if (part.segment.length > 0.0) return false;
+  }
+  return true;
+}
+
 }  // namespace
 
 bool EventStepper::AddInstant(const Model<double>& model, double t, EventKind kind,
                               const ActiveContact* contact, State<double>* state,
                               EventOutcome* outcome) {
   const int parts = record_.num_parts;
+  // An edge at the end of the step comes after it, and one at a touch that has ended a motion.
+  const bool is_after_edges = guess_.starts || (kind == EventKind::kTouch && FollowsEdges(record_));
   EventPart* part = record_.Add();
   part->is_impulses = false;
   Segment& segment = part->segment;
   segment.time = t;
   segment.length = 0.0;
   segment.starts = guess_.starts;
-  // An edge at the end of the step comes after it.
-  segment.middle = guess_.starts || kind == EventKind::kTouch ? t : JustBefore(model, t);
+  segment.middle = is_after_edges ? t : JustBefore(model, t);
   segment.before = *state;
   segment.event_number = -1;
   segment.at_once = false;

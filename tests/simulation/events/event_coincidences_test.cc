@@ -297,6 +297,26 @@ TEST(EventCoincidencesTest, ADiscMeetsAFloorAndAWall) {
   ExpectCorner(0.5, 0.8, 0.3, "poisson");
 }
 
+// A force on a box begins as a disc elsewhere meets a floor and a wall: whatever delays the disc
+// leaves the box as it is.
+TEST(EventCoincidencesTest, AForceBeginsAsADiscMeetsAFloorAndAWall) {
+  ExpectExact(
+      Of("[0, 0]",
+         R"({"name": "disc", "shape": {"circle": {"radius": 0.125}}, "mass": 1, "restitution": 0.5,
+             "position": [0, 0.625], "velocity": [1.75, -1]}, )" +
+             Floor(0.0) +
+             R"(, {"name": "wall", "static": true, "restitution": 0.5,
+                  "shape": {"half_plane": {"normal": [-1, 0], "offset": -1}}},
+                 {"name": "b", "mass": 2, "inertia": 1, "position": [9, 9]})",
+         0.75,
+         R"(, "forces": [{"name": "f", "body": "b", "force": [16, 0], "start": 0.5, "end": 9}])"),
+      {"bodies/disc/velocity/x", "bodies/disc/position/y", "forces/f/start"},
+      {{1, 0.125 + 0.125, {0.0, -0.5, 0.0}},
+       {3, -0.875, {-0.5, 0.0, 0.0}},
+       {6, 9.25, {0.0, 0.0, -2.0}},
+       {9, 2.0, {0.0, 0.0, -8.0}}});
+}
+
 // A carriage on a rail with a cross slide, whose limits are met at one instant: each limit stops
 // its own coordinate through the joints.
 TEST(EventCoincidencesTest, TwoSlidersMeetTheirLimits) {
