@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tangible/verification/gradients/methods.h"
 
+#include <algorithm>
+#include <cmath>
 #include <limits>
 #include <utility>
 
@@ -8,6 +10,42 @@
 
 namespace tangible {
 namespace {
+
+// MethodJacobians::friction_share. V is that of the start, the end and what efforts cause in a
+// step; 1 where all are 0, as in the interior point.
+double FrictionShare(const Scene& scene) {
+  Model<double> model;
+  State<double> state;
+  BuildModel(scene, &model, &state);
+  const ModelStructure& s = *model.structure;
+  const double h = scene.simulation.dt;
+  const auto mobility = [&](const JointIndex& joint) {
+    double sum = 0.0;
+    for (const int body : {joint.a, joint.b}) {
+      const BodyIndex& index = s.bodies[body];
+      if (index.block < 0) continue;
+      sum +=
+          1.0 / model.parameters[joint.type == JointType::kRevolute ? index.inertia : index.mass];
+    }
+    return sum;
+  };
+  double speed = h * scene.gravity.norm();
+  for (const double v : state.twist) speed = std::max(speed, std::abs(v));
+  State<double> final;
+  Rollout(model, state, {}, &final);
+  for (const double v : final.twist) speed = std::max(speed, std::abs(v));
+  for (const JointIndex& joint : s.joints) {
+    if (joint.friction < 0 || joint.effort < 0 || joint.effort_signal >= 0) continue;
+    speed = std::max(speed, h * std::abs(model.parameters[joint.effort]) * mobility(joint));
+  }
+  if (speed == 0.0) speed = 1.0;
+  double share = 1.0;
+  for (const JointIndex& joint : s.joints) {
+    if (joint.friction < 0 || !(model.parameters[joint.friction] > 0.0)) continue;
+    share = std::min(share, h * model.parameters[joint.friction] * mobility(joint) / speed);
+  }
+  return share;
+}
 
 class MethodRun {
  public:
@@ -30,6 +68,7 @@ class MethodRun {
     r_.jacobian[kByTangent] = tangent.jacobian;
     r_.trace = TraceRun(scene_);
     r_.contributions = ContributionsOf(scene_, parameters_);
+    if (scene_.simulation.stepping == Stepping::kFixed) r_.friction_share = FrictionShare(scene_);
     Add(kByAdjoint, GradientMethod::kAdjoint, Factorisations::kKeep);
     Add(kByAdjointRecomputed, GradientMethod::kAdjoint, Factorisations::kRecompute);
     Add(kByImplicitJets, GradientMethod::kJetImplicit, Factorisations::kKeep);

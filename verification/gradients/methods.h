@@ -56,6 +56,10 @@ struct MethodJacobians {
   std::vector<DifferenceColumn> differences;  ///< for each parameter
   double closed_form_tolerance = 0.0;
   VectorX<double> known_values;  ///< of the outputs in closed form; may be empty
+  /// The least share r μ h / V that the friction of a joint can change in a step, r the mobility
+  /// along it, of the largest speed V; 1 if there is none. With it the complementarity κ at which
+  /// the interior point ends leaves a compliance of κ / share² of r where it sticks.
+  double friction_share = 1.0;
 };
 
 /// Runs all of them. `known`: the closed form, if there is one; else that of FindClosedForm.

@@ -229,9 +229,10 @@ class Judge {
     return entry;
   }
 
-  // 10 κ / margin²: the relative remaining influence of inactive rows.
+  // 10 κ / margin²: the relative remaining influence of inactive rows. The margin of friction in a
+  // joint is relative to its own limit, which may be a small share of what κ is relative to.
   double InteriorPointError() const {
-    const double margin = run_.certificate.margin_min;
+    const double margin = std::min(run_.certificate.margin_min, run_.friction_share);
     return 10.0 * kInteriorPointEnd / (margin * margin);
   }
 
@@ -257,8 +258,10 @@ class Judge {
              " redundant rows, whose modes are not unique";
     }
     if (kMethodPairs[pair].a == kByUnrolledJets && InteriorPointError() > Tolerance(pair)) {
-      return "margin " + Short(run_.certificate.margin_min) + " at " +
-             run_.certificate.margin_where;
+      return run_.friction_share < run_.certificate.margin_min
+                 ? "friction in a joint changes a speed by " + Short(run_.friction_share) + " of it"
+                 : "margin " + Short(run_.certificate.margin_min) + " at " +
+                       run_.certificate.margin_where;
     }
     return "";
   }

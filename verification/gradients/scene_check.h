@@ -17,7 +17,8 @@
 //   Ridders        from the table of differences (support/differences.h), with rounding
 //   unrolled Jets  (10 κ / margin²) N C after N steps, or 0 if that factor is above the tolerance;
 //                  κ = 1e-14 is the complementarity at which the interior point ends, margin the
-//                  certificate's smallest. Here S = C, as all bodies are solved at once.
+//                  certificate's smallest, or the share of a speed that the friction of a joint
+//                  can change in a step (methods.h). Here S = C, as all bodies are solved at once.
 //
 // There is no absolute tolerance. The reported error of an entry is the tolerance at which (1)
 // would just hold if S and e shrank with it, tolerance |a − b| / (the right-hand side); it has to
