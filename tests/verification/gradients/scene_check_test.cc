@@ -3,8 +3,11 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <string>
 
+#include "../../support/scenes.h"
 #include "../support/sliding_box.h"
 #include "tangible/verification/gradients/closed_form.h"
 #include "tangible/verification/gradients/verify_run.h"
@@ -43,6 +46,28 @@ TEST(SceneCheckTest, TheErrorOfAnEntryIsTheToleranceAtWhichItWouldHold) {
   EXPECT_NEAR(EntryError(1.0 + 1e-5, 1.0, 1e-5, 0.0, 1e-6), 1e-5, 1e-15);
   EXPECT_EQ(EntryError(NAN, 1.0, 1e-9, 1.0, 0.0), HUGE_VAL);
   EXPECT_EQ(EntryError(1.0, NAN, 1e-9, 1.0, 0.0), HUGE_VAL);
+}
+
+// A wheel at rest whose friction can change a speed by 2e-5 of the interior point's unit: what
+// that leaves of other derivatives is its own error. With more friction nothing is left.
+TEST(SceneCheckTest, SmallFrictionInAJointIsWithinTheErrorOfTheInteriorPoint) {
+  for (const char* friction : {"0.001", "10"}) {
+    const Scene scene = test_scenes::SceneOf(R"({"gravity": [0, 0],
+        "bodies": [{"name": "wheel", "mass": 2, "inertia": 0.5, "position": [0, 3]}],
+        "joints": [{"name": "axle", "type": "revolute", "bodies": ["wheel", "world"],
+                    "anchor": [0, 3], "friction": )" +
+                                             std::string(friction) + R"(}],
+        "simulation": {"stepping": "fixed", "dt": 0.01, "duration": 0.06}})");
+    const MethodJacobians run = RunMethods(scene, {PathTo(scene, "joints/axle/effort")});
+    EXPECT_DOUBLE_EQ(run.friction_share, std::min(1.0, 0.02 * std::stod(friction)));
+    const SceneCheck check =
+        CheckScene(scene, {PathTo(scene, "joints/axle/effort")}, KeepJacobians::kNo);
+    ASSERT_TRUE(check.done) << check.message;
+    for (const CheckedException& exception : check.exceptions) {
+      EXPECT_FALSE(exception.unexplained()) << exception.what;
+    }
+    EXPECT_EQ(check.total.named > 0, run.friction_share < 0.01);
+  }
 }
 
 TEST(SceneCheckTest, KindsArePathsWithoutNamesAndIndices) {
