@@ -54,6 +54,9 @@ struct RolloutOutput {
   State<double> final;  ///< of all bodies: the last good state; the start's where nothing was run
   RolloutReport report;
   long fallbacks = 0;  ///< of unrolled Jets: steps that took the implicit derivative
+
+  /// Sets the report, and status and message from it.
+  void SetReport(RolloutReport run);
 };
 
 /// The definition of the function, which does not change with the input.

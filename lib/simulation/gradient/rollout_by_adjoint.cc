@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Reverse mode: a recorded run, and sweeps with a column for each loss.
+#include "tangible/simulation/gradient/rollout_function.h"
+
+namespace tangible {
+
+RolloutOutput RolloutWorker::Record(const RolloutInput& input, const TapeOptions& options) {
+  RolloutOutput output;
+  if (Set(input, &output)) {
+    RunAs(
+        [&](ControlledModel<double>* model, const StateObserver& keep) {
+          return tape_.Record(model, initial_, options, keep, &output.final);
+        },
+        &output);
+  }
+  return output;
+}
+
+RowMatrixXd RolloutWorker::Sweep(int columns, const Bars& bars,
+                                 const RolloutTape::ControlSink& sink) {
+  RowMatrixXd w_bar;
+  RowMatrixXd own(f_.num_states(), columns);
+  int next = f_.num_records() - 1;
+  const auto seed = [&](long k, RowMatrixXd* bar) {
+    if (next < 0 || f_.records_[next] != k) return;
+    own.setZero();
+    bars(next--, &own);
+    for (int i = 0; i < f_.num_states(); ++i) bar->row(f_.outputs_[i]) += own.row(i);
+  };
+  if (f_.num_controls() == 0) {
+    ControlledModel<double> model(model_);
+    tape_.AdjointFrom(&model, f_.records_.back(), columns, seed, sink, &w_bar);
+  } else {
+    ControlledModel<double> model(model_, controls_);
+    tape_.AdjointFrom(&model, f_.records_.back(), columns, seed, sink, &w_bar);
+  }
+  return w_bar;
+}
+
+// (num_parameters x columns)
+RowMatrixXd RolloutWorker::ParameterBars(const RowMatrixXd& w_bar) {
+  if (!own_state_) return ParameterJacobian().transpose() * w_bar;
+  RowMatrixXd without_state = w_bar;
+  for (const int variable : f_.outputs_) without_state.row(variable).setZero();
+  return ParameterJacobian().transpose() * without_state;
+}
+
+std::vector<InputDirection> RolloutWorker::Adjoint(const std::vector<RowMatrixXd>& bars) {
+  const auto columns = static_cast<int>(bars.size());
+  std::vector<InputDirection> results(bars.size());
+  for (InputDirection& result : results) {
+    result.controls.setZero(f_.num_controls() == 0 ? 0 : f_.num_steps(), f_.num_controls());
+  }
+  const RowMatrixXd w_bar = Sweep(
+      columns,
+      [&](int record, RowMatrixXd* own) {
+        for (int d = 0; d < columns; ++d) own->col(d) = bars[d].row(record).transpose();
+      },
+      [&](long k, const RowMatrixXd& controls_bar) {
+        for (Eigen::Index j = 0; j < controls_bar.rows(); ++j) {
+          for (int d = 0; d < columns; ++d) {
+            results[d].controls(k, f_.control_of_number_[j]) += controls_bar(j, d);
+          }
+        }
+      });
+  const RowMatrixXd parameters = ParameterBars(w_bar);
+  for (int d = 0; d < columns; ++d) {
+    results[d].parameters = parameters.col(d);
+    results[d].state.resize(f_.num_states());
+    for (int i = 0; i < f_.num_states(); ++i) results[d].state[i] = w_bar(f_.outputs_[i], d);
+  }
+  return results;
+}
+
+void RolloutWorker::JacobianByAdjoint(RowMatrixXd* jacobian, RolloutOutput* output) {
+  RunAs(
+      [&](ControlledModel<double>* model, const StateObserver& keep) {
+        return tape_.Record(model, initial_, TapeOptions{}, keep, &output->final);
+      },
+      output);
+  if (output->status != RolloutStatus::kDone) return;
+  const Eigen::Index first_control = f_.num_parameters() + f_.num_states();
+  const bool all = jacobian->cols() > f_.num_parameters();
+  jacobian->setZero();
+  const RowMatrixXd w_bar = Sweep(
+      static_cast<int>(jacobian->rows()),
+      [&](int record, RowMatrixXd* own) {
+        own->middleCols(static_cast<Eigen::Index>(record) * f_.num_states(), f_.num_states())
+            .setIdentity();
+      },
+      [&](long k, const RowMatrixXd& controls_bar) {
+        for (Eigen::Index j = 0; all && j < controls_bar.rows(); ++j) {
+          jacobian->col(first_control + k * f_.num_controls() + f_.control_of_number_[j]) +=
+              controls_bar.row(j).transpose();
+        }
+      });
+  jacobian->leftCols(f_.num_parameters()) = ParameterBars(w_bar).transpose();
+  for (int i = 0; all && i < f_.num_states(); ++i) {
+    jacobian->col(f_.num_parameters() + i) = w_bar.row(f_.outputs_[i]).transpose();
+  }
+}
+
+}  // namespace tangible

@@ -1,0 +1,176 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+
+#include "tangible/scene/set_parameters.h"
+#include "tangible/simulation/gradient/rollout_function.h"
+
+namespace tangible {
+
+RolloutWorker::RolloutWorker(const RolloutFunction& function) : f_(function), scene_(f_.scene_) {
+  BuildModelWithStructure(scene_, f_.structure_, &model_, &scene_state_);
+  stepper_.emplace(model_);
+  controls_.numbers = f_.control_numbers_;
+  parameters_ = f_.Defaults().parameters;
+}
+
+bool RolloutWorker::SetParameters(const VectorX<double>& values, RolloutOutput* output) {
+  if (values.size() == parameters_.size() && values == parameters_) {
+    return true;
+  }
+  parameters_.resize(0);
+  parameter_jacobian_.reset();
+  output->message = tangible::SetParameters(f_.parameters_, values.data(), &scene_);
+  if (!output->message.empty()) {
+    scene_ = f_.scene_;
+    BuildModelWithStructure(scene_, f_.structure_, &model_, &scene_state_);
+    output->status = RolloutStatus::kRefused;
+    output->final = scene_state_;
+    if (f_.num_parameters() > 0) parameters_ = f_.Defaults().parameters;
+    return false;
+  }
+  BuildModelWithStructure(scene_, f_.structure_, &model_, &scene_state_);
+  parameters_ = values;
+  return true;
+}
+
+bool RolloutWorker::Set(const RolloutInput& input, RolloutOutput* output) {
+  output->states = RowMatrixXd::Constant(f_.num_records(), f_.num_states(),
+                                         std::numeric_limits<double>::quiet_NaN());
+  if (!SetParameters(input.parameters, output)) {
+    return false;
+  }
+  initial_ = scene_state_;
+  own_state_ = input.state.size() > 0;
+  const int poses = static_cast<int>(initial_.pose.size());
+  for (Eigen::Index i = 0; i < input.state.size(); ++i) {
+    const int variable = f_.outputs_[i];
+    (variable < poses ? initial_.pose[variable] : initial_.twist[variable - poses]) =
+        input.state[i];
+  }
+  controls_.values.resize(input.controls.rows(),
+                          static_cast<Eigen::Index>(controls_.numbers.size()));
+  for (size_t j = 0; j < controls_.numbers.size(); ++j) {
+    controls_.values.col(static_cast<Eigen::Index>(j)) =
+        input.controls.col(f_.control_of_number_[j]);
+  }
+  if (!input.state.allFinite() || !input.controls.allFinite()) {
+    output->status = RolloutStatus::kRefused;
+    output->message = std::string(input.state.allFinite() ? "controls" : "initial_state") +
+                      ": expected finite numbers";
+    output->final = scene_state_;
+    return false;
+  }
+  return true;
+}
+
+void RolloutWorker::RunAs(const Runner& run, RolloutOutput* output) {
+  size_t next = 0;
+  const int poses = static_cast<int>(initial_.pose.size());
+  const StateObserver keep = [&](long k, double, const State<double>& state, Stepper*) {
+    if (next < f_.records_.size() && f_.records_[next] == k) {
+      for (int i = 0; i < f_.num_states(); ++i) {
+        const int variable = f_.outputs_[i];
+        output->states(static_cast<Eigen::Index>(next), i) =
+            variable < poses ? state.pose[variable] : state.twist[variable - poses];
+      }
+      ++next;
+    }
+  };
+  if (f_.num_controls() == 0) {
+    ControlledModel<double> model(model_);
+    output->SetReport(run(&model, keep));
+  } else {
+    ControlledModel<double> model(model_, controls_);
+    output->SetReport(run(&model, keep));
+  }
+}
+
+RolloutOutput RolloutWorker::Run(const RolloutInput& input) {
+  RolloutOutput output;
+  if (Set(input, &output)) {
+    RunAs(
+        [&](ControlledModel<double>* model, const StateObserver& keep) {
+          return Rollout(model, initial_, keep, &*stepper_, &output.final);
+        },
+        &output);
+  }
+  return output;
+}
+
+const Eigen::SparseMatrix<double>& RolloutWorker::ParameterJacobian() {
+  if (!parameter_jacobian_) {
+    parameter_jacobian_ = VariableJacobian(scene_, f_.structure_, f_.directions_);
+  }
+  return *parameter_jacobian_;
+}
+
+RowMatrixXd RolloutWorker::VariableDirections(const RowMatrixXd& parameters,
+                                              const RowMatrixXd& states) {
+  RowMatrixXd w_dot = ParameterJacobian() * parameters;
+  for (int i = 0; i < f_.num_states(); ++i) {
+    if (own_state_) w_dot.row(f_.outputs_[i]).setZero();
+    w_dot.row(f_.outputs_[i]) += states.row(i);
+  }
+  return w_dot;
+}
+
+Certificate RolloutWorker::Certify(const RolloutInput& input) {
+  RolloutOutput output;
+  if (!Set(input, &output)) return {};
+  const int states = own_state_ ? f_.num_states() : 0;
+  const int columns = f_.num_parameters() + states;
+  RowMatrixXd of_parameters = RowMatrixXd::Zero(f_.num_parameters(), columns);
+  of_parameters.leftCols(f_.num_parameters()).setIdentity();
+  RowMatrixXd of_states = RowMatrixXd::Zero(f_.num_states(), columns);
+  of_states.rightCols(states).topRows(states).setIdentity();
+  std::vector<std::string> names;
+  for (const ParameterPath& parameter : f_.parameters_) names.push_back(parameter.path);
+  const std::vector<std::string> outputs = OutputNames(*f_.structure_);
+  names.insert(names.end(), outputs.begin(), outputs.begin() + states);
+  const RowMatrixXd directions = VariableDirections(of_parameters, of_states);
+  if (f_.num_controls() == 0) {
+    return CertifyDerivative(model_, initial_, directions, names);
+  }
+  CertifyOptions options{controls_.numbers, directions, names};
+  for (int i = 0; i < f_.structure_->num_parameters; ++i) {
+    if (!directions.row(f_.structure_->ParameterVariable(i)).isZero(0.0)) {
+      options.numbers.push_back(i);
+    }
+  }
+  std::sort(options.numbers.begin(), options.numbers.end());
+  RolloutReport report;
+  ControlledModel<double> model(model_, controls_);
+  return CertifyRollout(&model, initial_, options, &report);
+}
+
+RolloutOutput RolloutWorker::Jacobian(const RolloutInput& input, GradientMethod method,
+                                      Inputs inputs, RowMatrixXd* jacobian, GradientMethod* used) {
+  RolloutOutput output;
+  const long rows = static_cast<long>(f_.num_records()) * f_.num_states();
+  const long others = f_.num_states() + f_.num_steps() * f_.num_controls();
+  const long columns = f_.num_parameters() + (inputs == Inputs::kAll ? others : 0);
+  *used = MethodOf({.method = method}, Differentiated::kFinalState, columns, rows);
+  jacobian->setConstant(rows, columns, std::numeric_limits<double>::quiet_NaN());
+  if (!Set(input, &output)) return output;
+  switch (*used) {
+    case GradientMethod::kAuto:
+    case GradientMethod::kTangent:
+      JacobianByTangent(jacobian, &output);
+      break;
+    case GradientMethod::kAdjoint:
+      JacobianByAdjoint(jacobian, &output);
+      break;
+    case GradientMethod::kJet:
+      JacobianByJets(JetRoute::kUnrolled, jacobian, &output);
+      break;
+    case GradientMethod::kJetImplicit:
+      JacobianByJets(JetRoute::kImplicit, jacobian, &output);
+      break;
+    case GradientMethod::kFiniteDifference:
+      JacobianByDifferences(input, jacobian, &output);
+      break;
+  }
+  return output;
+}
+
+}  // namespace tangible
