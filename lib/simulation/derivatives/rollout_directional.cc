@@ -226,18 +226,20 @@ bool StepDirectional::Apply(const Model<double>& model, Stepper* stepper, RowMat
   return true;
 }
 
-RolloutReport RolloutDirectional(const Model<double>& model, const State<double>& initial,
+RolloutReport RolloutDirectional(ControlledModel<double>* model, const State<double>& initial,
+                                 const TangentObserver& observer, Stepper* stepper,
                                  RowMatrixXd* w_dot, State<double>* final) {
   StepDirectional directional;
   std::ostringstream failure;
-  const StateObserver each = [&](long, double t, const State<double>&, Stepper* stepper) {
+  const StateObserver each = [&](long k, double t, const State<double>& state, Stepper* done) {
     std::string message;
-    if (stepper != nullptr && failure.str().empty() &&
-        !directional.Apply(model, stepper, w_dot, &message)) {
+    if (done != nullptr && failure.str().empty() &&
+        !directional.Apply(model->At(k - 1), done, w_dot, &message)) {
       failure << "t = " << t << " s: no one-sided derivative: " << message;
     }
+    if (observer) observer(k, t, state, *w_dot);
   };
-  RolloutReport report = Rollout(model, initial, each, final);
+  RolloutReport report = Rollout(model, initial, each, stepper, final);
   if (report.status == StepStatus::kDone && !failure.str().empty()) {
     report.status = StepStatus::kUnsolved;
     report.message = failure.str();

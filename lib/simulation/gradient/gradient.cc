@@ -9,46 +9,55 @@
 #include "tangible/math/cpu_time.h"
 #include "tangible/scene/scene_names.h"
 #include "tangible/simulation/certificate/certify.h"
-#include "tangible/simulation/derivatives/rollout_directional.h"
 #include "tangible/simulation/gradient/gradient_methods.h"
 #include "tangible/simulation/stepping/joint_opening.h"
 
 namespace tangible {
-namespace internal {
+namespace {
 
-VectorX<double> GradientProblem::Outputs(const State<double>& state) const {
-  VectorX<double> outputs(static_cast<Eigen::Index>(output_variables.size()));
-  const int poses = 3 * structure->num_bodies();
-  for (size_t i = 0; i < output_variables.size(); ++i) {
-    const int variable = output_variables[i];
-    outputs[static_cast<Eigen::Index>(i)] =
-        variable < poses ? state.pose[variable] : state.twist[variable - poses];
-  }
-  return outputs;
+// The message, with the scene's file in front if it has one.
+std::string InFile(const Scene& scene, const std::string& message) {
+  return (scene.path.empty() ? "" : scene.path + ": ") + message;
 }
 
-std::string FailureOf(const GradientProblem& problem, const RolloutReport& report) {
-  if (report.status == StepStatus::kDone) {
-    return "";
+}  // namespace
+
+namespace internal {
+
+std::string FailureOf(const GradientProblem& problem, const RolloutOutput& output) {
+  const bool ran =
+      output.status == RolloutStatus::kUnsolved || output.status == RolloutStatus::kDiverged;
+  return ran ? InFile(problem.scene(), output.message) : output.message;
+}
+
+bool Take(const GradientProblem& problem, const RolloutOutput& output, GradientResult* result) {
+  result->message = FailureOf(problem, output);
+  if (output.status != RolloutStatus::kDone) return false;
+  result->values = output.states.row(0).transpose();
+  result->fallbacks = output.fallbacks;
+  result->notes.insert(result->notes.end(), output.notes.begin(), output.notes.end());
+  if (output.fallbacks > 0) {
+    result->notes.push_back(
+        std::to_string(output.fallbacks) +
+        " steps by the implicit derivative: the unrolled interior point failed");
   }
-  return (problem.scene.path.empty() ? "" : problem.scene.path + ": ") + report.message;
+  return true;
 }
 
 }  // namespace internal
 
 namespace {
 
-using internal::FailureOf;
 using internal::GradientProblem;
+using internal::Take;
 
 // Empty, or one line: the first number of the scene that is not finite. A program, for example an
 // optimiser, can set values that a file may not contain.
-std::string CheckNumbers(const GradientProblem& problem) {
-  Scene scene = problem.scene;
+std::string CheckFinite(Scene scene) {
   for (const SceneNumber<double>& number : EnumerateNumbers(&scene)) {
     if (!std::isfinite(*number.value)) {
-      return (scene.path.empty() ? "" : scene.path + ": ") + number.path +
-             ": expected a finite number, got " + std::to_string(*number.value);
+      return InFile(
+          scene, number.path + ": expected a finite number, got " + std::to_string(*number.value));
     }
   }
   return "";
@@ -58,18 +67,11 @@ std::string CheckNumbers(const GradientProblem& problem) {
 using OutputSeed = std::function<MatrixX<double>(const VectorX<double>& values)>;
 
 GradientProblem MakeProblem(const Scene& scene, const std::vector<ParameterPath>& parameters) {
-  GradientProblem problem{scene, parameters, {}, BuildStructure(scene),
-                          {},    {},         {}, RolloutFunction::OfFinalState(scene, parameters),
-                          {}};
-  problem.input.parameters.resize(static_cast<Eigen::Index>(parameters.size()));
-  for (size_t i = 0; i < parameters.size(); ++i) {
-    problem.input.parameters[static_cast<Eigen::Index>(i)] = parameters[i].value;
+  GradientProblem problem{RolloutFunction::OfFinalState(scene, parameters), {}};
+  problem.input.parameters.resize(problem.num_parameters());
+  for (int k = 0; k < problem.num_parameters(); ++k) {
+    problem.input.parameters[k] = parameters[static_cast<size_t>(k)].value;
   }
-  BuildModelWithStructure(scene, problem.structure, &problem.model, &problem.initial);
-  for (const ParameterPath& parameter : parameters) {
-    problem.directions.push_back(DirectionOf(parameter));
-  }
-  problem.output_variables = OutputVariables(*problem.structure);
   return problem;
 }
 
@@ -85,22 +87,6 @@ bool ReportTape(const Checkpointing& checkpointing, const RolloutTape& tape,
                       std::to_string(checkpointing.budget) +
                       " bytes: " + std::to_string(result->tape_bytes);
     return false;
-  }
-  return true;
-}
-
-// The rollout of the one function (rollout_function.h), at the scene's own values: takes its
-// message, values and fallbacks; false where it failed.
-bool Take(const GradientProblem& problem, const RolloutOutput& output, GradientResult* result) {
-  result->message = FailureOf(problem, output.report);
-  if (result->message.empty()) result->message = output.message;
-  if (!result->message.empty()) return false;
-  result->values = output.states.row(0).transpose();
-  result->fallbacks = output.fallbacks;
-  if (output.fallbacks > 0) {
-    result->notes.push_back(
-        std::to_string(output.fallbacks) +
-        " steps by the implicit derivative: the unrolled interior point failed");
   }
   return true;
 }
@@ -121,59 +107,31 @@ bool ByAdjoint(const GradientProblem& problem, const TapeOptions& options,
   return ReportTape(options.checkpointing, worker->tape(), result);
 }
 
-bool ByRollouts(const GradientProblem& problem, GradientMethod method, RolloutWorker* worker,
-                GradientResult* result) {
-  GradientMethod used = method;
+// All methods except the adjoint: they compute the whole Jacobian, with which the gradient of a
+// loss is multiplied.
+bool ByRollouts(const GradientProblem& problem, const GradientOptions& options,
+                RolloutWorker* worker, GradientResult* result) {
+  GradientMethod used = options.method;
   return Take(problem,
-              worker->Jacobian(problem.input, method, RolloutWorker::Inputs::kParameters,
-                               &result->jacobian, &used),
+              worker->Jacobian(problem.input, options.method, RolloutWorker::Inputs::kParameters,
+                               &result->jacobian, &used, options.step),
               result);
 }
 
-bool ByTangent(const GradientProblem& problem, DerivativeSide side, RolloutWorker* worker,
-               GradientResult* result) {
-  if (side == DerivativeSide::kBoth) {
-    return ByRollouts(problem, GradientMethod::kTangent, worker, result);
+bool BySide(const GradientProblem& problem, DerivativeSide side, RolloutWorker* worker,
+            GradientResult* result) {
+  const bool by_events = problem.settings().stepping == Stepping::kEvent;
+  if (by_events && !IsTrustworthyMap(result->certificate)) {
+    return internal::JacobianBySides(problem, side, worker, result);
   }
-  if (problem.structure->settings.stepping == Stepping::kEvent) {
-    return IsTrustworthyMap(result->certificate)
-               ? ByRollouts(problem, GradientMethod::kTangent, worker, result)
-               : internal::JacobianBySides(problem, side, result);
+  if (by_events) {
+    return ByRollouts(problem, {.method = GradientMethod::kTangent}, worker, result);
   }
-  RowMatrixXd w_dot =
-      VariableJacobian(problem.scene, problem.structure, problem.directions).toDense();
-  State<double> final;
-  const double sign = side == DerivativeSide::kPlus ? 1.0 : -1.0;
-  w_dot *= sign;
-  const RolloutReport report = RolloutDirectional(problem.model, problem.initial, &w_dot, &final);
-  w_dot = (sign * w_dot).array() + 0.0;  // no −0
-  result->message = FailureOf(problem, report);
-  if (!result->message.empty()) {
-    return false;
-  }
-  result->values = problem.Outputs(final);
-  result->jacobian.resize(result->values.size(), w_dot.cols());
-  for (size_t i = 0; i < problem.output_variables.size(); ++i) {
-    result->jacobian.row(static_cast<Eigen::Index>(i)) = w_dot.row(problem.output_variables[i]);
-  }
-  return internal::EdgesBySides(problem, side, result);
-}
-
-// All methods except the adjoint: they compute the whole Jacobian, with which the gradient of a
-// loss is multiplied.
-bool ByColumns(const GradientProblem& problem, const GradientOptions& options,
-               RolloutWorker* worker, GradientResult* result) {
-  result->notes.clear();
-  result->fallbacks = 0;
-  switch (options.method) {
-    case GradientMethod::kTangent:
-      return ByTangent(problem, options.side, worker, result);
-    case GradientMethod::kJet:
-    case GradientMethod::kJetImplicit:
-      return ByRollouts(problem, options.method, worker, result);
-    default:
-      return internal::JacobianByDifferences(problem, options.step, result);
-  }
+  return Take(problem,
+              worker->OneSidedJacobian(problem.input, side == DerivativeSide::kPlus ? 1.0 : -1.0,
+                                       &result->jacobian),
+              result) &&
+         internal::EdgesBySides(problem, side, worker, result);
 }
 
 bool RunMethod(const GradientProblem& problem, const GradientOptions& options,
@@ -183,34 +141,30 @@ bool RunMethod(const GradientProblem& problem, const GradientOptions& options,
     return ByAdjoint(problem, {options.factorisations, options.checkpointing}, output_seed, worker,
                      result, derivative);
   }
-  if (!ByColumns(problem, options, worker, result)) {
-    return false;
-  }
+  result->notes.clear();
+  const bool done = options.side == DerivativeSide::kBoth
+                        ? ByRollouts(problem, options, worker, result)
+                        : BySide(problem, options.side, worker, result);
+  if (!done) return false;
   *derivative = output_seed(result->values).transpose() * result->jacobian;
   return true;
 }
 
-bool TimeRollout(const GradientProblem& problem, Stepper* stepper, GradientResult* result) {
-  State<double> final;
+bool TimeRollout(const GradientProblem& problem, RolloutWorker* worker, GradientResult* result) {
   const double start = ThreadCpuSeconds();
-  const RolloutReport report = Rollout(problem.model, problem.initial, {}, stepper, &final);
+  const RolloutOutput output = worker->Run(problem.input);
   result->all_rollout_seconds.push_back(ThreadCpuSeconds() - start);
-  result->message = FailureOf(problem, report);
-  result->open_joint = OpenJointOf(problem.model, final, report.time);
+  result->message = internal::FailureOf(problem, output);
+  result->open_joint = OpenJointOf(worker->model(), output.final, output.report.time);
   return result->message.empty();
 }
 
-Certificate CertificateOf(const GradientProblem& problem) {
-  std::vector<std::string> names;
+Certificate CertificateOf(const GradientProblem& problem, RolloutWorker* worker) {
   std::vector<double> sizes;
-  for (const ParameterPath& parameter : problem.parameters) {
-    names.push_back(parameter.path);
+  for (const ParameterPath& parameter : problem.function.parameters()) {
     sizes.push_back(std::max(std::abs(parameter.value), parameter.scale));
   }
-  return CertifyDerivative(
-      problem.model, problem.initial,
-      RowMatrixXd(VariableJacobian(problem.scene, problem.structure, problem.directions)), names,
-      sizes);
+  return worker->Certify(problem.input, sizes);
 }
 
 // Empty, or one line: why the derivative has no such side.
@@ -221,11 +175,11 @@ std::string CheckSide(const GradientProblem& problem, const GradientOptions& opt
   if (options.method != GradientMethod::kTangent) {
     return "one-sided derivatives: expected the method tangent";
   }
-  Scene scene = problem.scene;
+  Scene scene = problem.scene();
   const std::vector<SceneNumber<double>> numbers = EnumerateNumbers(&scene);
   const bool plus = options.side == DerivativeSide::kPlus;
   const double towards = plus ? HUGE_VAL : -HUGE_VAL;
-  for (const ParameterPath& parameter : problem.parameters) {
+  for (const ParameterPath& parameter : problem.function.parameters()) {
     for (const int number : parameter.numbers) {
       if (!IsAllowed(numbers[number].kind, std::nextafter(*numbers[number].value, towards))) {
         return "parameter " + parameter.path + ": it has no derivative from " +
@@ -242,7 +196,7 @@ void JudgeSide(const GradientProblem& problem, const GradientOptions& options,
                GradientResult* result) {
   const Certificate& certificate = result->certificate;
   if (options.side == DerivativeSide::kBoth || IsTrustworthyMap(certificate) ||
-      problem.structure->settings.stepping == Stepping::kEvent) {
+      problem.settings().stepping == Stepping::kEvent) {
     return;
   }
   if (!result->notes.empty()) {
@@ -261,17 +215,16 @@ GradientResult Differentiate(const GradientProblem& problem, const GradientOptio
                              Differentiated what, const OutputSeed& output_seed,
                              RowMatrixXd* derivative) {
   GradientOptions options = asked;
-  options.method = MethodOf(asked, what, static_cast<long>(problem.parameters.size()),
-                            static_cast<long>(problem.output_variables.size()));
+  options.method = MethodOf(asked, what, problem.num_parameters(), problem.function.num_states());
   GradientResult result;
-  result.outputs = OutputNames(*problem.structure);
+  result.outputs = OutputNames(problem.function.structure());
   result.method = options.method;
   std::string error;
-  if (!CheckSettings(problem.scene, &error)) {
-    result.message = (problem.scene.path.empty() ? "" : problem.scene.path + ": ") + error;
+  if (!CheckSettings(problem.scene(), &error)) {
+    result.message = InFile(problem.scene(), error);
     return result;
   }
-  result.message = CheckNumbers(problem);
+  result.message = CheckFinite(problem.scene());
   if (result.message.empty()) {
     result.message = CheckSide(problem, options);
   }
@@ -280,13 +233,12 @@ GradientResult Differentiate(const GradientProblem& problem, const GradientOptio
   }
   // Event stepping needs the certificate to find out whether the two sides differ.
   const bool sides = options.side != DerivativeSide::kBoth;
-  if (sides) {
-    result.certificate = CertificateOf(problem);
-  }
   RolloutWorker worker(problem.function);
-  Stepper stepper(problem.model);
+  if (sides) {
+    result.certificate = CertificateOf(problem, &worker);
+  }
   for (int i = 0; i < std::max(1, options.repeat); ++i) {
-    if (!TimeRollout(problem, &stepper, &result)) {
+    if (!TimeRollout(problem, &worker, &result)) {
       return result;
     }
     const double start = ThreadCpuSeconds();
@@ -299,14 +251,15 @@ GradientResult Differentiate(const GradientProblem& problem, const GradientOptio
     return *std::min_element(times.begin(), times.end());
   };
   if (!result.values.allFinite() || !derivative->allFinite()) {
-    result.message = (problem.scene.path.empty() ? "" : problem.scene.path + ": ") +
-                     "the derivative is not finite: it overflows, or the scene is too badly scaled";
+    result.message =
+        InFile(problem.scene(),
+               "the derivative is not finite: it overflows, or the scene is too badly scaled");
     return result;
   }
   result.seconds = best(result.all_seconds);
   result.rollout_seconds = best(result.all_rollout_seconds);
   if (!sides && options.certificate == CertificatePass::kRun) {
-    result.certificate = CertificateOf(problem);
+    result.certificate = CertificateOf(problem, &worker);
   }
   JudgeSide(problem, options, &result);
   if (!result.open_joint.empty()) result.notes.push_back(result.open_joint);
@@ -367,7 +320,7 @@ GradientResult FinalStateJacobian(const Scene& scene, const std::vector<Paramete
 GradientResult LossGradient(const Scene& scene, const std::vector<ParameterPath>& parameters,
                             const std::vector<LossTerm>& terms, const GradientOptions& options) {
   const GradientProblem problem = MakeProblem(scene, parameters);
-  const std::vector<std::string> outputs = OutputNames(*problem.structure);
+  const std::vector<std::string> outputs = OutputNames(problem.function.structure());
   std::vector<Eigen::Index> places;
   for (const LossTerm& term : terms) {
     const auto found = std::find(outputs.begin(), outputs.end(), term.output);

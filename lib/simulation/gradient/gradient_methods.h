@@ -3,38 +3,40 @@
 //
 // Types and functions that the methods of gradient.h share; not for other users.
 
-#include <functional>
-#include <memory>
+#include <string>
 
 #include "tangible/simulation/gradient/rollout_function.h"
 
 namespace tangible::internal {
 
-/// The parts of a gradient problem that do not depend on the method.
+/// The final state as a function of the parameters, and the scene's own values of these.
 struct GradientProblem {
-  const Scene& scene;
-  const std::vector<ParameterPath>& parameters;
-  std::vector<ParameterDirection> directions;
-  std::shared_ptr<const ModelStructure> structure;
-  Model<double> model;
-  State<double> initial;
-  std::vector<int> output_variables;  ///< pose and twist variables, in the order of the outputs
   RolloutFunction function;
-  RolloutInput input;  ///< the scene's own
+  RolloutInput input;
 
-  VectorX<double> Outputs(const State<double>& state) const;
+  const Scene& scene() const { return function.scene(); }
+  const SimulationSettings& settings() const { return function.structure().settings; }
+  const ParameterPath& parameter(int k) const {
+    return function.parameters()[static_cast<size_t>(k)];
+  }
+  int num_parameters() const { return function.num_parameters(); }
 };
 
-/// The message of a rollout that failed, empty if it did not.
-std::string FailureOf(const GradientProblem& problem, const RolloutReport& report);
+/// The message about a run, with the scene's file if it failed; empty if it did not.
+std::string FailureOf(const GradientProblem& problem, const RolloutOutput& output);
 
-/// Fills values and jacobian; false with a message where a rollout fails.
-bool JacobianByDifferences(const GradientProblem& problem, double step, GradientResult* result);
+/// Takes the message, values, notes and fallbacks of a run at the scene's own values; false where
+/// it failed.
+bool Take(const GradientProblem& problem, const RolloutOutput& output, GradientResult* result);
+
+/// Fills values and jacobian; false with a message where a rollout fails or no side has a limit.
 /// Uses tangents at parameters beside those of the scene: for event stepping, at a kink. Reads the
 /// certificate.
-bool JacobianBySides(const GradientProblem& problem, DerivativeSide side, GradientResult* result);
+bool JacobianBySides(const GradientProblem& problem, DerivativeSide side, RolloutWorker* worker,
+                     GradientResult* result);
 /// Of fixed steps, whose directional derivatives do not resolve them: replaces the columns of
 /// parameters that are an end of a force's window on a step's end by those from tangents beside.
-bool EdgesBySides(const GradientProblem& problem, DerivativeSide side, GradientResult* result);
+bool EdgesBySides(const GradientProblem& problem, DerivativeSide side, RolloutWorker* worker,
+                  GradientResult* result);
 
 }  // namespace tangible::internal

@@ -18,7 +18,6 @@
 #include <sstream>
 
 #include "tangible/dynamics/model/tolerances.h"
-#include "tangible/simulation/derivatives/rollout_tangent.h"
 #include "tangible/simulation/gradient/gradient_methods.h"
 #include "tangible/simulation/gradient/tolerances.h"
 
@@ -28,20 +27,25 @@ namespace {
 constexpr double kFarther = 8.0;  // factor of each further attempt
 constexpr int kMostWays = 3;
 
-struct Beside {
+// The outputs at p + τ, and their derivative.
+struct AtSide {
   VectorX<double> values;
   VectorX<double> derivative;
 };
 
 class OneSided {
  public:
-  OneSided(const GradientProblem& problem, double sign, GradientResult* result)
-      : problem_(problem), sign_(sign), result_(*result) {}
+  OneSided(const GradientProblem& problem, DerivativeSide side, RolloutWorker* worker,
+           GradientResult* result)
+      : problem_(problem),
+        sign_(side == DerivativeSide::kPlus ? 1.0 : -1.0),
+        worker_(worker),
+        result_(*result) {}
 
   // The derivative with respect to a parameter; false with a message where there is none from this
   // side.
-  bool Column(size_t k, VectorX<double>* column) {
-    const ParameterPath& parameter = problem_.parameters[k];
+  bool Column(int k, VectorX<double>* column) {
+    const ParameterPath& parameter = problem_.parameter(k);
     const double first = kSideWay * std::max(std::abs(parameter.value), parameter.scale);
     std::string message;
     for (int i = 0; i < kMostWays; ++i) {
@@ -61,10 +65,10 @@ class OneSided {
 
  private:
   // Extrapolates from p + τ, p + τ / 2, p + τ / 4 with τ = `times` the first distance.
-  bool Extrapolate(size_t k, double first_way, double times, VectorX<double>* column) {
-    const ParameterPath& parameter = problem_.parameters[k];
+  bool Extrapolate(int k, double first_way, double times, VectorX<double>* column) {
+    const ParameterPath& parameter = problem_.parameter(k);
     const double way = sign_ * times * first_way;
-    std::array<Beside, 3> at;
+    std::array<AtSide, 3> at;
     for (int i = 0; i < 3; ++i) {
       if (!Evaluate(k, way / (1 << i), &at[i])) {
         return false;
@@ -109,47 +113,33 @@ class OneSided {
     return false;
   }
 
-  bool Evaluate(size_t k, double shift, Beside* beside) {
-    const ParameterPath& parameter = problem_.parameters[k];
-    Scene scene = problem_.scene;
-    const std::vector<SceneNumber<double>> numbers = EnumerateNumbers(&scene);
-    for (const int number : parameter.numbers) {
-      if (!IsAllowed(numbers[number].kind, *numbers[number].value + shift)) {
-        return Fail(parameter, "its range ends within " + Text(std::abs(shift)) + ", expected " +
-                                   Describe(parameter.kind));
-      }
-      *numbers[number].value += shift;
+  bool Evaluate(int k, double shift, AtSide* at) {
+    const ParameterPath& parameter = problem_.parameter(k);
+    const RolloutOutput output = worker_->TangentBeside(problem_.input, k, shift, &at->derivative);
+    if (output.status == RolloutStatus::kRefused) {
+      return Fail(parameter, "its range ends within " + Text(std::abs(shift)) + ", expected " +
+                                 Describe(parameter.kind));
     }
-    Model<double> model;
-    State<double> initial;
-    BuildModelWithStructure(scene, problem_.structure, &model, &initial);
-    RowMatrixXd w_dot =
-        VariableJacobian(scene, problem_.structure, {problem_.directions[k]}).toDense();
-    State<double> final;
-    const RolloutReport report = RolloutTangent(model, initial, {}, &w_dot, &final);
-    result_.message = FailureOf(problem_, report);
+    result_.message = FailureOf(problem_, output);
     if (!result_.message.empty()) {
       result_.message += ", with " + parameter.path + " changed by " + Text(shift);
       return false;
     }
-    beside->values = problem_.Outputs(final);
-    beside->derivative.resize(beside->values.size());
-    for (size_t i = 0; i < problem_.output_variables.size(); ++i) {
-      beside->derivative[static_cast<Eigen::Index>(i)] = w_dot(problem_.output_variables[i], 0);
-    }
+    at->values = output.states.row(0).transpose();
     return true;
   }
 
   const GradientProblem& problem_;
   double sign_;
+  RolloutWorker* worker_;
   GradientResult& result_;
   double apart_ = 0.0;
 };
 
 // Whether a parameter sets an end of a force's window that is an end of a step.
 bool IsEdgeOnAStep(const GradientProblem& problem, const ParameterPath& parameter) {
-  const SimulationSettings& settings = problem.structure->settings;
-  Scene scene = problem.scene;
+  const SimulationSettings& settings = problem.settings();
+  Scene scene = problem.scene();
   const std::vector<SceneNumber<double>> numbers = EnumerateNumbers(&scene);
   return std::any_of(parameter.numbers.begin(), parameter.numbers.end(), [&](int number) {
     const std::string& path = numbers[number].path;
@@ -164,37 +154,31 @@ bool IsEdgeOnAStep(const GradientProblem& problem, const ParameterPath& paramete
 
 }  // namespace
 
-bool EdgesBySides(const GradientProblem& problem, DerivativeSide side, GradientResult* result) {
-  OneSided sides(problem, side == DerivativeSide::kPlus ? 1.0 : -1.0, result);
-  for (size_t k = 0; k < problem.parameters.size(); ++k) {
-    if (!IsEdgeOnAStep(problem, problem.parameters[k])) continue;
+bool EdgesBySides(const GradientProblem& problem, DerivativeSide side, RolloutWorker* worker,
+                  GradientResult* result) {
+  OneSided sides(problem, side, worker, result);
+  for (int k = 0; k < problem.num_parameters(); ++k) {
+    const ParameterPath& parameter = problem.parameter(k);
+    if (!IsEdgeOnAStep(problem, parameter)) continue;
     VectorX<double> column;
     if (!sides.Column(k, &column)) return false;
-    result->jacobian.col(static_cast<Eigen::Index>(k)) = column;
-    result->notes.push_back(problem.parameters[k].path +
+    result->jacobian.col(k) = column;
+    result->notes.push_back(parameter.path +
                             " is a step's end: its one-sided derivative is the limit of those "
                             "beside it, extrapolated");
   }
   return true;
 }
 
-bool JacobianBySides(const GradientProblem& problem, DerivativeSide side, GradientResult* result) {
-  State<double> final;
-  const RolloutReport report = Rollout(problem.model, problem.initial, {}, &final);
-  result->message = FailureOf(problem, report);
-  if (!result->message.empty()) {
-    return false;
-  }
-  result->values = problem.Outputs(final);
-  result->jacobian.resize(result->values.size(),
-                          static_cast<Eigen::Index>(problem.parameters.size()));
-  OneSided sides(problem, side == DerivativeSide::kPlus ? 1.0 : -1.0, result);
-  for (size_t k = 0; k < problem.parameters.size(); ++k) {
+bool JacobianBySides(const GradientProblem& problem, DerivativeSide side, RolloutWorker* worker,
+                     GradientResult* result) {
+  if (!Take(problem, worker->Run(problem.input), result)) return false;
+  result->jacobian.resize(result->values.size(), problem.num_parameters());
+  OneSided sides(problem, side, worker, result);
+  for (int k = 0; k < problem.num_parameters(); ++k) {
     VectorX<double> column;
-    if (!sides.Column(k, &column)) {
-      return false;
-    }
-    result->jacobian.col(static_cast<Eigen::Index>(k)) = column;
+    if (!sides.Column(k, &column)) return false;
+    result->jacobian.col(k) = column;
   }
   std::ostringstream note;
   note << "one-sided derivatives are limits of those beside the kink, extrapolated; orders of "

@@ -1,64 +1,135 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Finite differences.
+// Finite differences (difference_column.h).
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 
-#include "tangible/simulation/gradient/rollout_function.h"
+#include "tangible/simulation/gradient/difference_column.h"
+#include "tangible/simulation/gradient/rollout_beside.h"
 #include "tangible/simulation/gradient/tolerances.h"
 
 namespace tangible {
+namespace {
 
-// Central differences; where one side is refused, one-sided ones of second order on the other side.
-void RolloutWorker::JacobianByDifferences(const RolloutInput& input, RowMatrixXd* jacobian,
+// A hash of the contacts and modes of a run (FNV-1a), to find out whether those of two runs differ.
+class Signature {
+ public:
+  void Add(const StepRecord& record, long step) {
+    for (size_t i = 0; i < record.contacts.size(); ++i) {
+      const ActiveContact& c = record.contacts[i];
+      const ContactMode mode = record.solution.modes[i];
+      if (mode == ContactMode::kOpen) {
+        continue;
+      }
+      for (const long x :
+           {step, static_cast<long>(c.a), static_cast<long>(c.b), static_cast<long>(c.feature.kind),
+            static_cast<long>(c.feature.a), static_cast<long>(c.feature.b),
+            static_cast<long>(c.feature.part_a), static_cast<long>(c.feature.part_b),
+            static_cast<long>(c.joint), static_cast<long>(c.side), static_cast<long>(c.law),
+            static_cast<long>(mode)}) {
+        hash_ = (hash_ ^ static_cast<std::uint64_t>(x)) * 1099511628211ULL;
+      }
+    }
+  }
+  friend bool operator==(const Signature&, const Signature&) = default;
+
+ private:
+  std::uint64_t hash_ = 14695981039346656037ULL;
+};
+
+VectorX<double> Flat(const RowMatrixXd& states) {
+  return Eigen::Map<const VectorX<double>>(states.data(), states.size());
+}
+
+// A column of the Jacobian of all inputs.
+struct Input {
+  std::string name;
+  double value = 0.0;
+  double scale = 1.0;
+  NumberKind kind = NumberKind::kFree;
+};
+
+Input InputOf(const RolloutFunction& f, Eigen::Index column, const VectorX<double>& parameters,
+              const VectorX<double>& state, const Controls& controls) {
+  if (column < f.num_parameters()) {
+    const ParameterPath& parameter = f.parameters()[static_cast<size_t>(column)];
+    return {parameter.path, parameters[column], parameter.scale, parameter.kind};
+  }
+  column -= f.num_parameters();
+  if (column < f.num_states()) {
+    return {OutputNames(f.structure())[static_cast<size_t>(column)], state[column]};
+  }
+  column -= f.num_states();
+  const auto control = static_cast<int>(column % f.num_controls());
+  const std::vector<int>& of_number = f.control_of_number();
+  const auto number = std::find(of_number.begin(), of_number.end(), control) - of_number.begin();
+  return {f.controls()[static_cast<size_t>(control)].path,
+          controls.values(column / f.num_controls(), number)};
+}
+
+// A step that is exactly representable, so that the distance of p + h and p − h equals the divisor.
+double StepOf(const Input& input, double wanted) {
+  const double h =
+      wanted > 0.0 ? wanted : kRelativeStep * std::max(std::abs(input.value), input.scale);
+  const volatile double moved = input.value + h;
+  return moved - input.value;
+}
+
+}  // namespace
+
+void RolloutWorker::JacobianByDifferences(double step, RowMatrixXd* jacobian,
                                           RolloutOutput* output) {
-  const RolloutOutput base = Run(input);
-  *output = base;
-  if (base.status != RolloutStatus::kDone) return;
-  const RolloutInput defaults = [&] {
-    RolloutInput own = input;
-    own.state.resize(f_.num_states());
-    const int poses = static_cast<int>(initial_.pose.size());
-    for (int i = 0; i < f_.num_states(); ++i) {
-      const int variable = f_.outputs_[i];
-      own.state[i] = variable < poses ? initial_.pose[variable] : initial_.twist[variable - poses];
-    }
-    return own;
-  }();
+  const auto run = [this](RolloutOutput* result) {
+    Signature signature;
+    RunAs(
+        [&](ControlledModel<double>* model, const StateObserver& keep) {
+          const StateObserver sign = [&](long k, double t, const State<double>& state,
+                                         Stepper* stepper) {
+            keep(k, t, state, stepper);
+            if (stepper != nullptr) signature.Add(stepper->record(), k);
+          };
+          return Rollout(model, initial_, sign, &*stepper_, &result->final);
+        },
+        result);
+    return signature;
+  };
+  const Signature at_centre = run(output);
+  if (output->status != RolloutStatus::kDone) return;
+  const VectorX<double> centre = Flat(output->states);
   for (Eigen::Index column = 0; column < jacobian->cols(); ++column) {
-    const bool of_parameter = column < f_.num_parameters();
-    const Eigen::Index state = column - f_.num_parameters();
-    const Eigen::Index control = state - f_.num_states();
-    const auto value_of = [&](RolloutInput* moved) -> double& {
-      if (of_parameter) return moved->parameters[column];
-      if (control < 0) return moved->state[state];
-      return moved->controls(control / f_.num_controls(), control % f_.num_controls());
+    const Input input = InputOf(f_, column, parameters_, f_.StateOf(initial_), controls_);
+    bool same_contacts = true;
+    const auto evaluate = [&](double shift, VectorX<double>* values) {
+      const Beside beside(this, column, shift);
+      if (beside.is_refused()) return Evaluated::kRefused;
+      RolloutOutput moved;
+      same_contacts = run(&moved) == at_centre && same_contacts;
+      if (moved.status == RolloutStatus::kDone) {
+        *values = Flat(moved.states);
+        return Evaluated::kDone;
+      }
+      moved.message += ", with " + input.name + " changed by " + std::to_string(shift);
+      *output = std::move(moved);
+      return Evaluated::kFailed;
     };
-    const RolloutInput& from = !of_parameter && control < 0 ? defaults : input;
-    RolloutInput moved = from;
-    const double scale = of_parameter ? f_.parameters_[column].scale : 1.0;
-    const double h = kRelativeStep * std::max(std::abs(value_of(&moved)), scale);
-    const auto run = [&](double by) {
-      moved = from;
-      value_of(&moved) += by;
-      return Run(moved);
-    };
-    const RolloutOutput plus = run(h);
-    const RolloutOutput minus = run(-h);
-    RowMatrixXd slope;
-    if (plus.status == RolloutStatus::kDone && minus.status == RolloutStatus::kDone) {
-      slope = (plus.states - minus.states) / (2.0 * h);
-    } else if (plus.status == RolloutStatus::kRefused || minus.status == RolloutStatus::kRefused) {
-      const bool forwards = minus.status == RolloutStatus::kRefused;
-      const double side = forwards ? h : -h;
-      const RolloutOutput further = run(2.0 * side);
-      slope = (-3.0 * base.states + 4.0 * (forwards ? plus : minus).states - further.states) /
-              (2.0 * side);
-    } else {
-      *output = plus.status == RolloutStatus::kDone ? minus : plus;
-      return;
+    const DifferenceColumn difference = Difference(StepOf(input, step), centre, evaluate);
+    if (difference.status == Evaluated::kRefused) {
+      output->status = RolloutStatus::kRefused;
+      output->message = "parameter " + input.name +
+                        ": no finite difference fits into its range, expected " +
+                        Describe(input.kind);
     }
-    jacobian->col(column) = Eigen::Map<const VectorX<double>>(slope.data(), slope.size());
+    if (difference.status != Evaluated::kDone) return;
+    if (difference.side != 0.0) {
+      output->notes.push_back("one-sided difference " +
+                              std::string(difference.side > 0.0 ? "above " : "below ") +
+                              input.name + ": the other side is outside its range");
+    }
+    if (!same_contacts) {
+      output->notes.push_back("contacts or modes change within the difference in " + input.name);
+    }
+    jacobian->col(column) = difference.values;
   }
 }
 

@@ -2,24 +2,37 @@
 //
 // Forward mode: a column for each direction.
 #include <algorithm>
+#include <utility>
 
-#include "tangible/simulation/gradient/rollout_function.h"
+#include "tangible/simulation/derivatives/rollout_directional.h"
+#include "tangible/simulation/gradient/rollout_beside.h"
 
 namespace tangible {
 
-void RolloutWorker::RunTangent(
-    const ControlDirections& directions, RowMatrixXd w_dot,
-    const std::function<void(int record, const RowMatrixXd& w_dot)>& keep, RolloutOutput* output) {
-  int next = 0;
+TangentObserver RolloutWorker::KeepTangents(const StateObserver& keep_state,
+                                            const TangentKeeper& keep) const {
+  return [this, keep_state, keep, next = 0](long k, double t, const State<double>& state,
+                                            const RowMatrixXd& w_dot) mutable {
+    keep_state(k, t, state, nullptr);
+    if (next < f_.num_records() && f_.records_[next] == k) keep(next++, w_dot);
+  };
+}
+
+RolloutWorker::TangentKeeper RolloutWorker::KeepRows(RowMatrixXd* jacobian) const {
+  return [this, jacobian](int record, const RowMatrixXd& w_dot) {
+    for (int i = 0; i < f_.num_states(); ++i) {
+      jacobian->row(static_cast<Eigen::Index>(record) * f_.num_states() + i) =
+          w_dot.row(f_.outputs_[i]);
+    }
+  };
+}
+
+void RolloutWorker::RunTangent(const ControlDirections& directions, RowMatrixXd w_dot,
+                               const TangentKeeper& keep, RolloutOutput* output) {
   RunAs(
       [&](ControlledModel<double>* model, const StateObserver& keep_state) {
-        return RolloutTangent(
-            model, initial_, directions,
-            [&](long k, double t, const State<double>& state, const RowMatrixXd& now) {
-              keep_state(k, t, state, nullptr);
-              if (next < f_.num_records() && f_.records_[next] == k) keep(next++, now);
-            },
-            &*stepper_, &w_dot, &output->final);
+        return RolloutTangent(model, initial_, directions, KeepTangents(keep_state, keep),
+                              &*stepper_, &w_dot, &output->final);
       },
       output);
 }
@@ -30,8 +43,7 @@ RolloutOutput RolloutWorker::Tangent(const RolloutInput& input,
   RolloutOutput output;
   const auto columns = static_cast<Eigen::Index>(directions.size());
   tangents->assign(directions.size(),
-                   RowMatrixXd::Constant(f_.num_records(), f_.num_states(),
-                                         std::numeric_limits<double>::quiet_NaN()));
+                   RowMatrixXd::Constant(f_.num_records(), f_.num_states(), kNaN));
   if (!Set(input, &output)) return output;
   RowMatrixXd parameters(f_.num_parameters(), columns);
   RowMatrixXd states(f_.num_states(), columns);
@@ -78,15 +90,45 @@ void RolloutWorker::JacobianByTangent(RowMatrixXd* jacobian, RolloutOutput* outp
       }
     }
   };
-  RunTangent(
-      set_controls, VariableDirections(parameters, states),
-      [&](int record, const RowMatrixXd& w_dot) {
-        for (int i = 0; i < f_.num_states(); ++i) {
-          jacobian->row(static_cast<Eigen::Index>(record) * f_.num_states() + i) =
-              w_dot.row(f_.outputs_[i]);
-        }
+  RunTangent(set_controls, VariableDirections(parameters, states), KeepRows(jacobian), output);
+}
+
+RolloutOutput RolloutWorker::OneSidedJacobian(const RolloutInput& input, double sign,
+                                              RowMatrixXd* jacobian) {
+  RolloutOutput output;
+  const int parameters = f_.num_parameters();
+  jacobian->setConstant(static_cast<Eigen::Index>(f_.num_records()) * f_.num_states(), parameters,
+                        kNaN);
+  if (!Set(input, &output)) return output;
+  RowMatrixXd w_dot = sign * VariableDirections(RowMatrixXd::Identity(parameters, parameters),
+                                                RowMatrixXd::Zero(f_.num_states(), parameters));
+  RunAs(
+      [&](ControlledModel<double>* model, const StateObserver& keep_state) {
+        return RolloutDirectional(model, initial_, KeepTangents(keep_state, KeepRows(jacobian)),
+                                  &*stepper_, &w_dot, &output.final);
       },
-      output);
+      &output);
+  *jacobian = (sign * *jacobian).array() + 0.0;  // no −0
+  return output;
+}
+
+RolloutOutput RolloutWorker::TangentBeside(const RolloutInput& input, int parameter, double shift,
+                                           VectorX<double>* tangent) {
+  RolloutOutput output;
+  if (!Set(input, &output)) return output;
+  const Beside beside(this, parameter, shift);
+  if (beside.is_refused()) {
+    output.status = RolloutStatus::kRefused;
+    return output;
+  }
+  RowMatrixXd w_dot =
+      VariableJacobian(scene_, f_.structure_, {f_.directions_[static_cast<size_t>(parameter)]});
+  for (int i = 0; own_state_ && i < f_.num_states(); ++i) w_dot.row(f_.outputs_[i]).setZero();
+  RowMatrixXd column =
+      RowMatrixXd::Constant(static_cast<Eigen::Index>(f_.num_records()) * f_.num_states(), 1, kNaN);
+  RunTangent({}, std::move(w_dot), KeepRows(&column), &output);
+  *tangent = column;
+  return output;
 }
 
 }  // namespace tangible

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "tangible/dynamics/model/settings.h"
+#include "tangible/dynamics/model/state_variable.h"
 #include "tangible/scene/set_parameters.h"
 
 namespace tangible {
@@ -138,6 +139,16 @@ std::vector<double> RolloutFunction::record_times() const {
   return times;
 }
 
+VectorX<double> RolloutFunction::StateOf(const State<double>& state) const {
+  VectorX<double> values(num_states());
+  for (int i = 0; i < num_states(); ++i) values[i] = StateNumber(state, outputs_[i]);
+  return values;
+}
+
+void RolloutFunction::SetState(const VectorX<double>& values, State<double>* state) const {
+  for (int i = 0; i < num_states(); ++i) StateNumber(state, outputs_[i]) = values[i];
+}
+
 RolloutInput RolloutFunction::Defaults() const {
   RolloutInput input;
   input.parameters.resize(num_parameters());
@@ -147,12 +158,7 @@ RolloutInput RolloutFunction::Defaults() const {
   Model<double> model;
   State<double> state;
   BuildModelWithStructure(scene_, structure_, &model, &state);
-  input.state.resize(num_states());
-  const int poses = static_cast<int>(state.pose.size());
-  for (int i = 0; i < num_states(); ++i) {
-    input.state[i] =
-        outputs_[i] < poses ? state.pose[outputs_[i]] : state.twist[outputs_[i] - poses];
-  }
+  input.state = StateOf(state);
   return input;
 }
 

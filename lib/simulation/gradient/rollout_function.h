@@ -54,6 +54,8 @@ struct RolloutOutput {
   State<double> final;  ///< of all bodies: the last good state; the start's where nothing was run
   RolloutReport report;
   long fallbacks = 0;  ///< of unrolled Jets: steps that took the implicit derivative
+  /// Of finite differences: which are one-sided, and within which contacts or modes change.
+  std::vector<std::string> notes;
 
   /// Sets the report, and status and message from it.
   void SetReport(RolloutReport run);
@@ -90,6 +92,9 @@ class RolloutFunction {
   const std::vector<int>& control_of_number() const { return control_of_number_; }
   /// The pose or twist variable of each entry of a state.
   const std::vector<int>& output_variables() const { return outputs_; }
+  /// The part of a state that belongs to moving bodies, and its inverse.
+  VectorX<double> StateOf(const State<double>& state) const;
+  void SetState(const VectorX<double>& values, State<double>* state) const;
   /// The scene's own values: parameters, the initial state, and controls that are the same in all
   /// steps.
   RolloutInput Defaults() const;
@@ -131,19 +136,31 @@ class RolloutWorker {
   enum class Inputs { kParameters, kAll };
   /// The Jacobian has a row for each output, num_records num_states in all; columns for parameters
   /// or, if all inputs are asked for, for parameters, initial state, controls (step by step). Auto
-  /// selects tangent or adjoint, whichever needs fewer columns.
+  /// selects tangent or adjoint, whichever needs fewer columns. `step` is that of finite
+  /// differences, in the unit of the input; 0: kRelativeStep of it.
   RolloutOutput Jacobian(const RolloutInput& input, GradientMethod method, Inputs inputs,
-                         RowMatrixXd* jacobian, GradientMethod* used);
+                         RowMatrixXd* jacobian, GradientMethod* used, double step = 0.0);
+  /// The derivatives for growing (sign 1) or shrinking (−1) parameters, each alone, by fixed steps
+  /// (rollout_directional.h).
+  RolloutOutput OneSidedJacobian(const RolloutInput& input, double sign, RowMatrixXd* jacobian);
+  /// The tangent with respect to one parameter where all its numbers are moved by `shift`; refused
+  /// where they may not be there.
+  RolloutOutput TangentBeside(const RolloutInput& input, int parameter, double shift,
+                              VectorX<double>* tangent);
   /// Warnings about joints, coordinates and energy at the end of the last run (run_warnings.h).
   std::vector<std::string> Warnings(const RolloutReport& report, const State<double>& final) const {
     RunWarnings warnings(model_, initial_);
     return warnings.Finish(model_, report, final);
   }
   /// The certificate of the derivatives with respect to parameters, controls and, where the input
-  /// has one, the initial state; empty where the input is refused.
-  Certificate Certify(const RolloutInput& input);
+  /// has one, the initial state; empty where the input is refused. `sizes` of parameters, without
+  /// controls or initial state, as in DualityGap.
+  Certificate Certify(const RolloutInput& input, const std::vector<double>& sizes = {});
+  /// The model of the last input.
+  const Model<double>& model() const { return model_; }
 
  private:
+  class Beside;
   /// Sets the input; false and a refused output where a value is not allowed.
   bool Set(const RolloutInput& input, RolloutOutput* output);
   bool SetParameters(const VectorX<double>& values, RolloutOutput* output);
@@ -154,10 +171,14 @@ class RolloutWorker {
   /// Directions of [poses | twists | parameters] from those of parameters and initial states, one
   /// in each column.
   RowMatrixXd VariableDirections(const RowMatrixXd& parameters, const RowMatrixXd& states);
-  /// Runs with tangents; `keep` gets the record's index and all columns' derivatives.
-  void RunTangent(const ControlDirections& directions, RowMatrixXd w_dot,
-                  const std::function<void(int record, const RowMatrixXd& w_dot)>& keep,
+  /// Observers of tangents that keep the recorded states, and call `keep` with the record's index
+  /// and all columns' derivatives.
+  using TangentKeeper = std::function<void(int record, const RowMatrixXd& w_dot)>;
+  TangentObserver KeepTangents(const StateObserver& keep_state, const TangentKeeper& keep) const;
+  /// Runs with tangents.
+  void RunTangent(const ControlDirections& directions, RowMatrixXd w_dot, const TangentKeeper& keep,
                   RolloutOutput* output);
+  TangentKeeper KeepRows(RowMatrixXd* jacobian) const;
   /// Runs the reverse sweep over the tape; `seed(record, row, ·)` gives a state's derivatives for
   /// each column.
   using Bars = std::function<void(int record, RowMatrixXd* bars)>;
@@ -169,8 +190,7 @@ class RolloutWorker {
   /// Columns [first, first + N); false where the run fails.
   template <int N>
   bool JetPass(JetRoute route, Eigen::Index first, RowMatrixXd* jacobian, RolloutOutput* output);
-  void JacobianByDifferences(const RolloutInput& input, RowMatrixXd* jacobian,
-                             RolloutOutput* output);
+  void JacobianByDifferences(double step, RowMatrixXd* jacobian, RolloutOutput* output);
 
   const RolloutFunction& f_;
   Scene scene_;

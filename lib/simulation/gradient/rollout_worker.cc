@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 
+#include "tangible/dynamics/model/state_variable.h"
 #include "tangible/scene/set_parameters.h"
 #include "tangible/simulation/gradient/rollout_function.h"
 
@@ -34,19 +35,13 @@ bool RolloutWorker::SetParameters(const VectorX<double>& values, RolloutOutput* 
 }
 
 bool RolloutWorker::Set(const RolloutInput& input, RolloutOutput* output) {
-  output->states = RowMatrixXd::Constant(f_.num_records(), f_.num_states(),
-                                         std::numeric_limits<double>::quiet_NaN());
+  output->states.setConstant(f_.num_records(), f_.num_states(), kNaN);
   if (!SetParameters(input.parameters, output)) {
     return false;
   }
   initial_ = scene_state_;
   own_state_ = input.state.size() > 0;
-  const int poses = static_cast<int>(initial_.pose.size());
-  for (Eigen::Index i = 0; i < input.state.size(); ++i) {
-    const int variable = f_.outputs_[i];
-    (variable < poses ? initial_.pose[variable] : initial_.twist[variable - poses]) =
-        input.state[i];
-  }
+  if (own_state_) f_.SetState(input.state, &initial_);
   controls_.values.resize(input.controls.rows(),
                           static_cast<Eigen::Index>(controls_.numbers.size()));
   for (size_t j = 0; j < controls_.numbers.size(); ++j) {
@@ -64,14 +59,12 @@ bool RolloutWorker::Set(const RolloutInput& input, RolloutOutput* output) {
 }
 
 void RolloutWorker::RunAs(const Runner& run, RolloutOutput* output) {
+  output->states.setConstant(f_.num_records(), f_.num_states(), kNaN);
   size_t next = 0;
-  const int poses = static_cast<int>(initial_.pose.size());
   const StateObserver keep = [&](long k, double, const State<double>& state, Stepper*) {
     if (next < f_.records_.size() && f_.records_[next] == k) {
       for (int i = 0; i < f_.num_states(); ++i) {
-        const int variable = f_.outputs_[i];
-        output->states(static_cast<Eigen::Index>(next), i) =
-            variable < poses ? state.pose[variable] : state.twist[variable - poses];
+        output->states(static_cast<Eigen::Index>(next), i) = StateNumber(state, f_.outputs_[i]);
       }
       ++next;
     }
@@ -114,7 +107,7 @@ RowMatrixXd RolloutWorker::VariableDirections(const RowMatrixXd& parameters,
   return w_dot;
 }
 
-Certificate RolloutWorker::Certify(const RolloutInput& input) {
+Certificate RolloutWorker::Certify(const RolloutInput& input, const std::vector<double>& sizes) {
   RolloutOutput output;
   if (!Set(input, &output)) return {};
   const int states = own_state_ ? f_.num_states() : 0;
@@ -129,7 +122,7 @@ Certificate RolloutWorker::Certify(const RolloutInput& input) {
   names.insert(names.end(), outputs.begin(), outputs.begin() + states);
   const RowMatrixXd directions = VariableDirections(of_parameters, of_states);
   if (f_.num_controls() == 0) {
-    return CertifyDerivative(model_, initial_, directions, names);
+    return CertifyDerivative(model_, initial_, directions, names, sizes);
   }
   CertifyOptions options{controls_.numbers, directions, names};
   for (int i = 0; i < f_.structure_->num_parameters; ++i) {
@@ -144,13 +137,14 @@ Certificate RolloutWorker::Certify(const RolloutInput& input) {
 }
 
 RolloutOutput RolloutWorker::Jacobian(const RolloutInput& input, GradientMethod method,
-                                      Inputs inputs, RowMatrixXd* jacobian, GradientMethod* used) {
+                                      Inputs inputs, RowMatrixXd* jacobian, GradientMethod* used,
+                                      double step) {
   RolloutOutput output;
   const long rows = static_cast<long>(f_.num_records()) * f_.num_states();
   const long others = f_.num_states() + f_.num_steps() * f_.num_controls();
   const long columns = f_.num_parameters() + (inputs == Inputs::kAll ? others : 0);
   *used = MethodOf({.method = method}, Differentiated::kFinalState, columns, rows);
-  jacobian->setConstant(rows, columns, std::numeric_limits<double>::quiet_NaN());
+  jacobian->setConstant(rows, columns, kNaN);
   if (!Set(input, &output)) return output;
   switch (*used) {
     case GradientMethod::kAuto:
@@ -167,7 +161,7 @@ RolloutOutput RolloutWorker::Jacobian(const RolloutInput& input, GradientMethod 
       JacobianByJets(JetRoute::kImplicit, jacobian, &output);
       break;
     case GradientMethod::kFiniteDifference:
-      JacobianByDifferences(input, jacobian, &output);
+      JacobianByDifferences(step, jacobian, &output);
       break;
   }
   return output;
