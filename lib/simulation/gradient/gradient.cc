@@ -68,10 +68,7 @@ using OutputSeed = std::function<MatrixX<double>(const VectorX<double>& values)>
 
 GradientProblem MakeProblem(const Scene& scene, const std::vector<ParameterPath>& parameters) {
   GradientProblem problem{RolloutFunction::OfFinalState(scene, parameters), {}};
-  problem.input.parameters.resize(problem.num_parameters());
-  for (int k = 0; k < problem.num_parameters(); ++k) {
-    problem.input.parameters[k] = parameters[static_cast<size_t>(k)].value;
-  }
+  problem.input.parameters = problem.function.OwnParameters();
   return problem;
 }
 

@@ -20,13 +20,10 @@ RolloutOutput RolloutWorker::Record(const RolloutInput& input, const TapeOptions
 RowMatrixXd RolloutWorker::Sweep(int columns, const Bars& bars,
                                  const RolloutTape::ControlSink& sink) {
   RowMatrixXd w_bar;
-  RowMatrixXd own(f_.num_states(), columns);
-  int next = f_.num_records() - 1;
-  const auto seed = [&](long k, RowMatrixXd* bar) {
-    if (next < 0 || f_.records_[next] != k) return;
-    own.setZero();
-    bars(next--, &own);
-    for (int i = 0; i < f_.num_states(); ++i) bar->row(f_.outputs_[i]) += own.row(i);
+  const auto seed = [&](long k, RowMatrixXd* w_bar_k) {
+    f_.samples_.ForEachBar(k, *f_.structure_, [&](int row, double weight, int variable) {
+      for (int c = 0; c < columns; ++c) (*w_bar_k)(variable, c) += weight * bars(row, c);
+    });
   };
   if (f_.num_controls() == 0) {
     ControlledModel<double> model(model_);
@@ -53,10 +50,7 @@ std::vector<InputDirection> RolloutWorker::Adjoint(const std::vector<RowMatrixXd
     result.controls.setZero(f_.num_controls() == 0 ? 0 : f_.num_steps(), f_.num_controls());
   }
   const RowMatrixXd w_bar = Sweep(
-      columns,
-      [&](int record, RowMatrixXd* own) {
-        for (int d = 0; d < columns; ++d) own->col(d) = bars[d].row(record).transpose();
-      },
+      columns, [&](int row, int d) { return bars[static_cast<size_t>(d)].data()[row]; },
       [&](long k, const RowMatrixXd& controls_bar) {
         for (Eigen::Index j = 0; j < controls_bar.rows(); ++j) {
           for (int d = 0; d < columns; ++d) {
@@ -85,10 +79,7 @@ void RolloutWorker::JacobianByAdjoint(RowMatrixXd* jacobian, RolloutOutput* outp
   jacobian->setZero();
   const RowMatrixXd w_bar = Sweep(
       static_cast<int>(jacobian->rows()),
-      [&](int record, RowMatrixXd* own) {
-        own->middleCols(static_cast<Eigen::Index>(record) * f_.num_states(), f_.num_states())
-            .setIdentity();
-      },
+      [](int row, int column) { return row == column ? 1.0 : 0.0; },
       [&](long k, const RowMatrixXd& controls_bar) {
         for (Eigen::Index j = 0; all && j < controls_bar.rows(); ++j) {
           jacobian->col(first_control + k * f_.num_controls() + f_.control_of_number_[j]) +=

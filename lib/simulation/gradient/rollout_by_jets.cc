@@ -1,23 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Jets, in passes of the widest that is built.
+// Jets, in passes of their width.
 #include <algorithm>
 
+#include "tangible/dynamics/model/state_variable.h"
+#include "tangible/simulation/gradient/jet_passes.h"
 #include "tangible/simulation/gradient/rollout_function.h"
 
 namespace tangible {
-
-namespace {
-
-constexpr int WidestJet() {
-  int widest = 0;
-#define TANGIBLE_WIDER(N) widest = N > widest ? N : widest;
-  TANGIBLE_FOR_EACH_JET_WIDTH(TANGIBLE_WIDER)
-#undef TANGIBLE_WIDER
-  return widest;
-}
-
-}  // namespace
 
 template <int N>
 bool RolloutWorker::JetPass(JetRoute route, Eigen::Index first, RowMatrixXd* jacobian,
@@ -32,13 +22,9 @@ bool RolloutWorker::JetPass(JetRoute route, Eigen::Index first, RowMatrixXd* jac
   const auto seed = [&](Eigen::Index column, Jet<N>* value) {
     if (column >= first && column < first + N) value->v[column - first] += 1.0;
   };
-  const int poses = static_cast<int>(state.pose.size());
   for (int i = 0; i < f_.num_states(); ++i) {
-    const int variable = f_.outputs_[i];
-    Jet<N>& value = variable < poses ? state.pose[variable] : state.twist[variable - poses];
-    if (own_state_) {
-      value = Jet<N>(variable < poses ? initial_.pose[variable] : initial_.twist[variable - poses]);
-    }
+    Jet<N>& value = StateNumber(&state, f_.outputs_[i]);
+    if (own_state_) value = Jet<N>(StateNumber(initial_, f_.outputs_[i]));
     seed(f_.num_parameters() + i, &value);
   }
   BasicControls<Jet<N>> controls{controls_.numbers, controls_.values.template cast<Jet<N>>()};
@@ -50,18 +36,10 @@ bool RolloutWorker::JetPass(JetRoute route, Eigen::Index first, RowMatrixXd* jac
   }
   ControlledModel<Jet<N>> plain(model);
   ControlledModel<Jet<N>> controlled(model, controls);
-  size_t next = 0;
+  StartRows(&output->states);
   const JetObserver<Jet<N>> keep = [&](long k, double, const State<Jet<N>>& now) {
-    if (next == f_.records_.size() || f_.records_[next] != k) return;
-    for (int i = 0; i < f_.num_states(); ++i) {
-      const int variable = f_.outputs_[i];
-      const Jet<N>& x = variable < poses ? now.pose[variable] : now.twist[variable - poses];
-      output->states(static_cast<Eigen::Index>(next), i) = x.a;
-      for (int d = 0; d < N && first + d < jacobian->cols(); ++d) {
-        (*jacobian)(static_cast<Eigen::Index>(next) * f_.num_states() + i, first + d) = x.v[d];
-      }
-    }
-    ++next;
+    f_.samples_.Add(k, now, output->states.data());
+    f_.samples_.AddJets(k, now, first, jacobian);
   };
   long fallbacks = 0;
   State<Jet<N>> final;
@@ -69,23 +47,22 @@ bool RolloutWorker::JetPass(JetRoute route, Eigen::Index first, RowMatrixXd* jac
                                         keep, &final, &fallbacks));
   output->fallbacks += fallbacks;
   output->final = ValuesOf(final);
+  FinishRows(output->report, &output->states);
   return output->status == RolloutStatus::kDone;
 }
 
 void RolloutWorker::JacobianByJets(JetRoute route, RowMatrixXd* jacobian, RolloutOutput* output) {
-  constexpr int kWidth = WidestJet();
-  if constexpr (kWidth == 0) {
+  if (JetWidthFor(jacobian->cols()) == 0) {
     output->status = RolloutStatus::kRefused;
     output->message =
         "methods jet and jet_implicit: no width of Jets was built (TANGIBLE_JET_WIDTHS is empty)";
-  } else {
-    bool good = true;
-    // Without columns one pass gives the states.
-    for (Eigen::Index first = 0; good && (first == 0 || first < jacobian->cols());
-         first += kWidth) {
-      good = JetPass<kWidth>(route, first, jacobian, output);
-    }
+    return;
   }
+  StartRows(jacobian);
+  ForEachJetPass(jacobian->cols(), [&](auto width, Eigen::Index first) {
+    return JetPass<width.value>(route, first, jacobian, output);
+  });
+  FinishRows(output->report, jacobian);
 }
 
 }  // namespace tangible

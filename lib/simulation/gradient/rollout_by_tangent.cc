@@ -9,32 +9,24 @@
 
 namespace tangible {
 
-TangentObserver RolloutWorker::KeepTangents(const StateObserver& keep_state,
-                                            const TangentKeeper& keep) const {
-  return [this, keep_state, keep, next = 0](long k, double t, const State<double>& state,
-                                            const RowMatrixXd& w_dot) mutable {
-    keep_state(k, t, state, nullptr);
-    if (next < f_.num_records() && f_.records_[next] == k) keep(next++, w_dot);
-  };
-}
-
-RolloutWorker::TangentKeeper RolloutWorker::KeepRows(RowMatrixXd* jacobian) const {
-  return [this, jacobian](int record, const RowMatrixXd& w_dot) {
-    for (int i = 0; i < f_.num_states(); ++i) {
-      jacobian->row(static_cast<Eigen::Index>(record) * f_.num_states() + i) =
-          w_dot.row(f_.outputs_[i]);
-    }
-  };
+TangentObserver RolloutWorker::KeepTangents(const StateObserver& keep, RowMatrixXd* rows) const {
+  StartRows(rows);
+  return
+      [this, keep, rows](long k, double t, const State<double>& state, const RowMatrixXd& w_dot) {
+        keep(k, t, state, nullptr);
+        f_.samples_.AddTangent(k, *f_.structure_, w_dot, rows);
+      };
 }
 
 void RolloutWorker::RunTangent(const ControlDirections& directions, RowMatrixXd w_dot,
-                               const TangentKeeper& keep, RolloutOutput* output) {
+                               RowMatrixXd* rows, RolloutOutput* output) {
   RunAs(
-      [&](ControlledModel<double>* model, const StateObserver& keep_state) {
-        return RolloutTangent(model, initial_, directions, KeepTangents(keep_state, keep),
-                              &*stepper_, &w_dot, &output->final);
+      [&](ControlledModel<double>* model, const StateObserver& keep) {
+        return RolloutTangent(model, initial_, directions, KeepTangents(keep, rows), &*stepper_,
+                              &w_dot, &output->final);
       },
       output);
+  FinishRows(output->report, rows);
 }
 
 RolloutOutput RolloutWorker::Tangent(const RolloutInput& input,
@@ -61,16 +53,11 @@ RolloutOutput RolloutWorker::Tangent(const RolloutInput& input,
       }
     }
   };
-  RunTangent(
-      set_controls, VariableDirections(parameters, states),
-      [&](int record, const RowMatrixXd& w_dot) {
-        for (Eigen::Index d = 0; d < columns; ++d) {
-          for (int i = 0; i < f_.num_states(); ++i) {
-            (*tangents)[d](record, i) = w_dot(f_.outputs_[i], d);
-          }
-        }
-      },
-      &output);
+  RowMatrixXd rows(f_.num_outputs(), columns);
+  RunTangent(set_controls, VariableDirections(parameters, states), &rows, &output);
+  for (Eigen::Index d = 0; d < columns; ++d) {
+    VectorX<double>::Map((*tangents)[d].data(), rows.rows()) = rows.col(d);
+  }
   return output;
 }
 
@@ -90,24 +77,24 @@ void RolloutWorker::JacobianByTangent(RowMatrixXd* jacobian, RolloutOutput* outp
       }
     }
   };
-  RunTangent(set_controls, VariableDirections(parameters, states), KeepRows(jacobian), output);
+  RunTangent(set_controls, VariableDirections(parameters, states), jacobian, output);
 }
 
 RolloutOutput RolloutWorker::OneSidedJacobian(const RolloutInput& input, double sign,
                                               RowMatrixXd* jacobian) {
   RolloutOutput output;
   const int parameters = f_.num_parameters();
-  jacobian->setConstant(static_cast<Eigen::Index>(f_.num_records()) * f_.num_states(), parameters,
-                        kNaN);
+  jacobian->setConstant(f_.num_outputs(), parameters, kNaN);
   if (!Set(input, &output)) return output;
   RowMatrixXd w_dot = sign * VariableDirections(RowMatrixXd::Identity(parameters, parameters),
                                                 RowMatrixXd::Zero(f_.num_states(), parameters));
   RunAs(
-      [&](ControlledModel<double>* model, const StateObserver& keep_state) {
-        return RolloutDirectional(model, initial_, KeepTangents(keep_state, KeepRows(jacobian)),
-                                  &*stepper_, &w_dot, &output.final);
+      [&](ControlledModel<double>* model, const StateObserver& keep) {
+        return RolloutDirectional(model, initial_, KeepTangents(keep, jacobian), &*stepper_, &w_dot,
+                                  &output.final);
       },
       &output);
+  FinishRows(output.report, jacobian);
   *jacobian = (sign * *jacobian).array() + 0.0;  // no −0
   return output;
 }
@@ -124,9 +111,8 @@ RolloutOutput RolloutWorker::TangentBeside(const RolloutInput& input, int parame
   RowMatrixXd w_dot =
       VariableJacobian(scene_, f_.structure_, {f_.directions_[static_cast<size_t>(parameter)]});
   for (int i = 0; own_state_ && i < f_.num_states(); ++i) w_dot.row(f_.outputs_[i]).setZero();
-  RowMatrixXd column =
-      RowMatrixXd::Constant(static_cast<Eigen::Index>(f_.num_records()) * f_.num_states(), 1, kNaN);
-  RunTangent({}, std::move(w_dot), KeepRows(&column), &output);
+  RowMatrixXd column(f_.num_outputs(), 1);
+  RunTangent({}, std::move(w_dot), &column, &output);
   *tangent = column;
   return output;
 }

@@ -116,7 +116,21 @@ std::string RolloutFunction::Create(const Scene& scene, const std::vector<std::s
              ", got " + std::to_string(records_[i]);
     }
   }
+  ReadRecords();
   return "";
+}
+
+void RolloutFunction::ReadRecords() {
+  samples_ = StateSamples([this](const auto& use) {
+    int row = 0;
+    for (const long k : records_) {
+      for (const int body : structure_->moving) {
+        use(k, StateShare{row, body, StatePart::kPose});
+        use(k, StateShare{row + 3, body, StatePart::kTwist});
+        row += 6;
+      }
+    }
+  });
 }
 
 RolloutFunction RolloutFunction::OfFinalState(const Scene& scene,
@@ -130,6 +144,7 @@ RolloutFunction RolloutFunction::OfFinalState(const Scene& scene,
     function.directions_.push_back(DirectionOf(parameter));
   }
   function.records_ = {function.num_steps()};
+  function.ReadRecords();
   return function;
 }
 
@@ -149,10 +164,15 @@ void RolloutFunction::SetState(const VectorX<double>& values, State<double>* sta
   for (int i = 0; i < num_states(); ++i) StateNumber(state, outputs_[i]) = values[i];
 }
 
+VectorX<double> RolloutFunction::OwnParameters() const {
+  VectorX<double> values(num_parameters());
+  for (int i = 0; i < num_parameters(); ++i) values[i] = parameters_[i].value;
+  return values;
+}
+
 RolloutInput RolloutFunction::Defaults() const {
   RolloutInput input;
-  input.parameters.resize(num_parameters());
-  for (int i = 0; i < num_parameters(); ++i) input.parameters[i] = parameters_[i].value;
+  input.parameters = OwnParameters();
   input.controls.resize(num_controls() == 0 ? 0 : num_steps(), num_controls());
   for (int i = 0; i < num_controls(); ++i) input.controls.col(i).setConstant(controls_[i].value);
   Model<double> model;

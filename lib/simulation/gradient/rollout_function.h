@@ -27,6 +27,7 @@
 #include "tangible/simulation/certificate/certify.h"
 #include "tangible/simulation/derivatives/rollout_tangent.h"
 #include "tangible/simulation/gradient/gradient.h"
+#include "tangible/simulation/gradient/state_samples.h"
 #include "tangible/simulation/stepping/run_warnings.h"
 
 namespace tangible {
@@ -81,6 +82,10 @@ class RolloutFunction {
   int num_controls() const { return static_cast<int>(controls_.size()); }
   int num_states() const { return static_cast<int>(outputs_.size()); }
   int num_records() const { return static_cast<int>(records_.size()); }
+  /// The entries of all recorded states, those of one record after those of another.
+  Eigen::Index num_outputs() const {
+    return static_cast<Eigen::Index>(num_records()) * num_states();
+  }
   long num_steps() const { return NumSteps(structure_->settings); }
   const std::vector<long>& records() const { return records_; }
   std::vector<double> record_times() const;
@@ -95,6 +100,8 @@ class RolloutFunction {
   /// The part of a state that belongs to moving bodies, and its inverse.
   VectorX<double> StateOf(const State<double>& state) const;
   void SetState(const VectorX<double>& values, State<double>* state) const;
+  /// The scene's own values of the parameters, each of its first number.
+  VectorX<double> OwnParameters() const;
   /// The scene's own values: parameters, the initial state, and controls that are the same in all
   /// steps.
   RolloutInput Defaults() const;
@@ -104,6 +111,7 @@ class RolloutFunction {
  private:
   friend class RolloutWorker;
   std::string AddControl(const std::string& path);
+  void ReadRecords();
 
   Scene scene_;
   std::shared_ptr<const ModelStructure> structure_;
@@ -113,6 +121,7 @@ class RolloutFunction {
   std::vector<int> control_of_number_;
   std::vector<long> records_;
   std::vector<int> outputs_;  ///< pose and twist variables
+  StateSamples samples_;      ///< a row for each output of each record
 };
 
 /// Evaluates one function on one thread; keeps memory from call to call. The function must outlive
@@ -164,6 +173,7 @@ class RolloutWorker {
   /// Sets the input; false and a refused output where a value is not allowed.
   bool Set(const RolloutInput& input, RolloutOutput* output);
   bool SetParameters(const VectorX<double>& values, RolloutOutput* output);
+  void UseOwnScene();
   /// Runs with an observer that keeps the recorded states; `run` is a rollout of some kind.
   using Runner = std::function<RolloutReport(ControlledModel<double>*, const StateObserver&)>;
   void RunAs(const Runner& run, RolloutOutput* output);
@@ -171,17 +181,17 @@ class RolloutWorker {
   /// Directions of [poses | twists | parameters] from those of parameters and initial states, one
   /// in each column.
   RowMatrixXd VariableDirections(const RowMatrixXd& parameters, const RowMatrixXd& states);
-  /// Observers of tangents that keep the recorded states, and call `keep` with the record's index
-  /// and all columns' derivatives.
-  using TangentKeeper = std::function<void(int record, const RowMatrixXd& w_dot)>;
-  TangentObserver KeepTangents(const StateObserver& keep_state, const TangentKeeper& keep) const;
-  /// Runs with tangents.
-  void RunTangent(const ControlDirections& directions, RowMatrixXd w_dot, const TangentKeeper& keep,
+  /// Rows, of outputs or of their derivatives, to which the samples are added: −0 + x is x, for −0
+  /// too. Afterwards those of steps that were not reached become NaN.
+  void StartRows(RowMatrixXd* rows) const { rows->setConstant(-0.0); }
+  void FinishRows(const RolloutReport& report, RowMatrixXd* rows) const;
+  TangentObserver KeepTangents(const StateObserver& keep, RowMatrixXd* rows) const;
+  /// Runs with tangents; `rows` has a row for each output, a column for each direction.
+  void RunTangent(const ControlDirections& directions, RowMatrixXd w_dot, RowMatrixXd* rows,
                   RolloutOutput* output);
-  TangentKeeper KeepRows(RowMatrixXd* jacobian) const;
-  /// Runs the reverse sweep over the tape; `seed(record, row, ·)` gives a state's derivatives for
-  /// each column.
-  using Bars = std::function<void(int record, RowMatrixXd* bars)>;
+  /// Runs the reverse sweep over the tape; `bars(row, column)` is the derivative of the column's
+  /// loss with respect to an output.
+  using Bars = std::function<double(int row, int column)>;
   RowMatrixXd Sweep(int columns, const Bars& bars, const RolloutTape::ControlSink& sink);
   RowMatrixXd ParameterBars(const RowMatrixXd& w_bar);
   void JacobianByTangent(RowMatrixXd* jacobian, RolloutOutput* output);

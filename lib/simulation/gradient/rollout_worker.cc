@@ -1,17 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 
-#include "tangible/dynamics/model/state_variable.h"
 #include "tangible/scene/set_parameters.h"
 #include "tangible/simulation/gradient/rollout_function.h"
 
 namespace tangible {
 
-RolloutWorker::RolloutWorker(const RolloutFunction& function) : f_(function), scene_(f_.scene_) {
-  BuildModelWithStructure(scene_, f_.structure_, &model_, &scene_state_);
+RolloutWorker::RolloutWorker(const RolloutFunction& function) : f_(function) {
+  UseOwnScene();
   stepper_.emplace(model_);
   controls_.numbers = f_.control_numbers_;
-  parameters_ = f_.Defaults().parameters;
+}
+
+void RolloutWorker::UseOwnScene() {
+  scene_ = f_.scene_;
+  BuildModelWithStructure(scene_, f_.structure_, &model_, &scene_state_);
+  parameters_ = f_.OwnParameters();
 }
 
 bool RolloutWorker::SetParameters(const VectorX<double>& values, RolloutOutput* output) {
@@ -20,13 +24,16 @@ bool RolloutWorker::SetParameters(const VectorX<double>& values, RolloutOutput* 
   }
   parameters_.resize(0);
   parameter_jacobian_.reset();
+  if (values == f_.OwnParameters()) {
+    // A path may match numbers that differ.
+    UseOwnScene();
+    return true;
+  }
   output->message = tangible::SetParameters(f_.parameters_, values.data(), &scene_);
   if (!output->message.empty()) {
-    scene_ = f_.scene_;
-    BuildModelWithStructure(scene_, f_.structure_, &model_, &scene_state_);
+    UseOwnScene();
     output->status = RolloutStatus::kRefused;
     output->final = scene_state_;
-    if (f_.num_parameters() > 0) parameters_ = f_.Defaults().parameters;
     return false;
   }
   BuildModelWithStructure(scene_, f_.structure_, &model_, &scene_state_);
@@ -59,15 +66,10 @@ bool RolloutWorker::Set(const RolloutInput& input, RolloutOutput* output) {
 }
 
 void RolloutWorker::RunAs(const Runner& run, RolloutOutput* output) {
-  output->states.setConstant(f_.num_records(), f_.num_states(), kNaN);
-  size_t next = 0;
+  output->states.resize(f_.num_records(), f_.num_states());
+  StartRows(&output->states);
   const StateObserver keep = [&](long k, double, const State<double>& state, Stepper*) {
-    if (next < f_.records_.size() && f_.records_[next] == k) {
-      for (int i = 0; i < f_.num_states(); ++i) {
-        output->states(static_cast<Eigen::Index>(next), i) = StateNumber(state, f_.outputs_[i]);
-      }
-      ++next;
-    }
+    f_.samples_.Add(k, state, output->states.data());
   };
   if (f_.num_controls() == 0) {
     ControlledModel<double> model(model_);
@@ -76,6 +78,14 @@ void RolloutWorker::RunAs(const Runner& run, RolloutOutput* output) {
     ControlledModel<double> model(model_, controls_);
     output->SetReport(run(&model, keep));
   }
+  FinishRows(output->report, &output->states);
+}
+
+void RolloutWorker::FinishRows(const RolloutReport& report, RowMatrixXd* rows) const {
+  const auto reached =
+      std::upper_bound(f_.records_.begin(), f_.records_.end(), report.steps) - f_.records_.begin();
+  const Eigen::Index unreached = f_.num_records() - reached;
+  rows->bottomRows(rows->rows() / f_.num_records() * unreached).setConstant(kNaN);
 }
 
 RolloutOutput RolloutWorker::Run(const RolloutInput& input) {
@@ -140,7 +150,7 @@ RolloutOutput RolloutWorker::Jacobian(const RolloutInput& input, GradientMethod 
                                       Inputs inputs, RowMatrixXd* jacobian, GradientMethod* used,
                                       double step) {
   RolloutOutput output;
-  const long rows = static_cast<long>(f_.num_records()) * f_.num_states();
+  const long rows = f_.num_outputs();
   const long others = f_.num_states() + f_.num_steps() * f_.num_controls();
   const long columns = f_.num_parameters() + (inputs == Inputs::kAll ? others : 0);
   *used = MethodOf({.method = method}, Differentiated::kFinalState, columns, rows);
