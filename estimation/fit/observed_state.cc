@@ -12,8 +12,10 @@
 
 #include "tangible/dynamics/elements/contact.h"
 #include "tangible/dynamics/elements/joint.h"
+#include "tangible/dynamics/model/state_variable.h"
 #include "tangible/estimation/fit/minimise.h"
 #include "tangible/estimation/fit/tolerances.h"
+#include "tangible/simulation/gradient/gradient.h"
 #include "tangible/simulation/stepping/invariants.h"
 
 namespace tangible {
@@ -295,27 +297,22 @@ std::vector<SmoothedSeries> SmoothAt(const RolloutResiduals& residuals, double t
 
 State<double> StateFromObservations(const RolloutResiduals& residuals, double time,
                                     const State<double>& guess) {
-  const ModelStructure& structure = *residuals.scene().model().structure;
-  // Component i of the states of the moving bodies.
-  const auto number = [&structure](int i, State<double>* state) -> double& {
-    const size_t body = static_cast<size_t>(structure.moving[i / 6]);
-    return i % 6 < 3 ? state->pose[3 * body + i % 6] : state->twist[3 * body + i % 6 - 3];
-  };
+  const std::vector<int> variables = OutputVariables(*residuals.scene().model().structure);
   State<double> found = guess;
   std::vector<ParameterEntry> entries;
-  for (int i = 0; i < 6 * structure.num_blocks(); ++i) {
-    const double initial = number(i, &found);
+  for (const int variable : variables) {
+    const double initial = StateNumber(found, variable);
     entries.push_back({"", initial, -HUGE_VAL, HUGE_VAL, false, std::max(1.0, std::abs(initial))});
   }
   const auto state_of = [&](const Eigen::VectorXd& x, State<double>* state) {
     *state = guess;
-    for (int i = 0; i < static_cast<int>(x.size()); ++i) number(i, state) = x[i];
+    for (int i = 0; i < static_cast<int>(x.size()); ++i) StateNumber(state, variables[i]) = x[i];
     return true;
   };
   StateProblem problem(residuals, residuals.scene().model(), SmoothAt(residuals, time), entries,
                        state_of);
   const Eigen::VectorXd x = Solve(&problem);
-  for (int i = 0; i < static_cast<int>(x.size()); ++i) number(i, &found) = x[i];
+  for (int i = 0; i < static_cast<int>(x.size()); ++i) StateNumber(&found, variables[i]) = x[i];
   return found;
 }
 

@@ -6,6 +6,7 @@
 
 #include "tangible/dynamics/elements/joint.h"
 #include "tangible/dynamics/jacobian/equation_jacobian.h"
+#include "tangible/dynamics/model/state_variable.h"
 #include "tangible/estimation/fit/linearisation.h"
 #include "tangible/estimation/fit/minimise.h"
 #include "tangible/estimation/fit/observed_state.h"
@@ -13,6 +14,7 @@
 #include "tangible/estimation/problem/problem_with_priors.h"
 #include "tangible/math/median.h"
 #include "tangible/simulation/derivatives/rollout_tangent.h"
+#include "tangible/simulation/gradient/gradient.h"
 
 namespace tangible {
 namespace {
@@ -24,19 +26,6 @@ constexpr int kTimesPerSegment = 2;
 // Numbers of the states at the cuts of a run, at most: they are columns of a dense factorisation,
 // which takes 2 · 1200² operations a row.
 constexpr int kMostStateNumbers = 1200;
-
-/// The row of unknown i of the states of moving bodies in w = [poses | twists | parameters].
-int StateRow(const ModelStructure& s, int i) {
-  const int body = s.moving[i / 6];
-  const int component = i % 6;
-  return component < 3 ? s.PoseVariable(body, component) : s.TwistVariable(body, component - 3);
-}
-
-double& StateNumber(const ModelStructure& s, int i, State<double>* state) {
-  const int component = i % 6;
-  const size_t body = static_cast<size_t>(s.moving[i / 6]);
-  return component < 3 ? state->pose[3 * body + component] : state->twist[3 * body + component - 3];
-}
 
 double MedianSigma(const std::vector<Observation>& observations) {
   std::vector<double> sigmas;
@@ -86,7 +75,8 @@ ShootingResiduals::ShootingResiduals(int segments, RolloutResiduals* residuals)
     cuts_.push_back(last * j / count);
   }
   num_parameters_ = scene.size();
-  state_size_ = 6 * scene.model().structure->num_blocks();
+  variables_ = OutputVariables(*scene.model().structure);
+  state_size_ = static_cast<int>(variables_.size());
   segment_seconds_ = StepTime(scene.scene().simulation, last) / static_cast<double>(count);
 }
 
@@ -108,9 +98,8 @@ bool ShootingResiduals::StatesOfRun(const Eigen::VectorXd& p, Eigen::VectorXd* s
     if (segment >= num_segments() || k != cuts_[segment]) {
       return;
     }
-    State<double> copy = state;
     for (int i = 0; i < state_size_; ++i) {
-      (*states)[(segment - 1) * state_size_ + i] = StateNumber(*model.structure, i, &copy);
+      (*states)[(segment - 1) * state_size_ + i] = StateNumber(state, variables_[i]);
     }
     ++segment;
   };
@@ -125,81 +114,68 @@ void ShootingResiduals::StatesFromObservations(const Eigen::VectorXd& p, Eigen::
   for (int segment = 1; segment < num_segments(); ++segment) {
     const Eigen::Index first = static_cast<Eigen::Index>(segment - 1) * state_size_;
     for (int i = 0; i < state_size_ && runs; ++i) {
-      StateNumber(*scene.model().structure, i, &state) = (*states)[first + i];
+      StateNumber(&state, variables_[i]) = (*states)[first + i];
     }
     // Where the run fails the state before it is the best known approximation.
     const double time = StepTime(scene.scene().simulation, cuts_[segment]);
     state = StateFromObservations(*residuals_, time, state);
     for (int i = 0; i < state_size_; ++i) {
-      (*states)[first + i] = StateNumber(*scene.model().structure, i, &state);
+      (*states)[first + i] = StateNumber(state, variables_[i]);
     }
   }
 }
 
-void ShootingResiduals::AddShares(int segment, long k, Run* run) const {
+void ShootingResiduals::AddShares(int segment, long k, const State<double>& state, Run* run) const {
   const SamplePlan& plan = residuals_->plan();
-  for (const SampleShare& share : plan.SharesAt(k)) {
-    const Sample& sample = plan.samples()[share.sample];
+  const ModelStructure& structure = *residuals_->scene().model().structure;
+  for (const StateShare& share : plan.numbers().At(k)) {
+    const int sample = share.row / plan.width();
     // At a cut, samples that began before it use the end of the segment, and those after it the
     // start of the next one.
-    const bool begins_here = sample.step == k;
+    const bool begins_here = plan.samples()[sample].step == k;
     const bool at_end = k == cuts_[segment + 1] && segment + 1 < num_segments();
     if (begins_here ? at_end : k == cuts_[segment]) {
       continue;
     }
-    run->segment_of_sample[share.sample] = segment;
-    const int width = plan.width();
-    const ModelStructure& structure = *residuals_->scene().model().structure;
-    for (int i = 0; i < width; ++i) {
-      const std::vector<double>& numbers = i < 3 ? run->state.pose : run->state.twist;
-      run->samples[static_cast<size_t>(width) * share.sample + i] +=
-          share.weight * numbers[3 * static_cast<size_t>(sample.body) + i % 3];
-      if (run->jacobian != nullptr) {
-        const int row = i < 3 ? structure.PoseVariable(sample.body, i)
-                              : structure.TwistVariable(sample.body, i - 3);
-        run->sample_derivatives.row(width * share.sample + i) += share.weight * run->w_dot.row(row);
-      }
+    run->segment_of_sample[sample] = segment;
+    share.Add(state, run->samples.data());
+    if (run->jacobian != nullptr) {
+      share.AddTangent(structure, run->w_dot, &run->sample_derivatives);
     }
   }
 }
 
 bool ShootingResiduals::RunSegment(int segment, Run* run) {
   const Model<double>& model = residuals_->scene().model();
-  const SimulationSettings& settings = model.structure->settings;
+  ControlledModel<double> plain(model);
   Stepper stepper(model);
-  StepTangent tangent;
-  AddShares(segment, cuts_[segment], run);
-  for (long k = cuts_[segment]; k < cuts_[segment + 1]; ++k) {
-    const StepReport report =
-        stepper.Step(model, StepTime(settings, k), StepLength(settings, k), &run->state);
-    if (report.status != StepStatus::kDone) {
-      return false;
-    }
-    if (run->jacobian != nullptr) {
-      tangent.Apply(model, &stepper, &run->w_dot);
-    }
-    AddShares(segment, k + 1, run);
-  }
-  return true;
+  const StepRange steps{cuts_[segment], cuts_[segment + 1]};
+  const auto add = [&](long k, double, const State<double>& state, const auto&) {
+    AddShares(segment, k, state, run);
+  };
+  const RolloutReport report =
+      run->jacobian == nullptr
+          ? Rollout(&plain, run->state, add, &stepper, &run->state, steps)
+          : RolloutTangent(&plain, run->state, {}, add, &stepper, &run->w_dot, &run->state, steps);
+  return report.status == StepStatus::kDone;
 }
 
 /// Adds the jump at the end of a segment and sets the start of the next one: moving bodies get its
 /// own state, everything else continues.
 void ShootingResiduals::Meet(int segment, Run* run) const {
-  const ModelStructure& structure = *residuals_->scene().model().structure;
   const int first_row = num_observations() + segment * state_size_;
   const int own = num_parameters_ + (segment - 1) * state_size_;
   const int next = num_parameters_ + segment * state_size_;
   for (int i = 0; i < state_size_; ++i) {
     const double weight = JumpWeight(i);
-    double& number = StateNumber(structure, i, &run->state);
+    double& number = StateNumber(&run->state, variables_[i]);
     (*run->residuals)[first_row + i] = weight * (number - (*run->unknowns)[next + i]);
     number = (*run->unknowns)[next + i];
     if (run->jacobian == nullptr) {
       continue;
     }
     auto row = run->jacobian->row(first_row + i);
-    const auto dots = run->w_dot.row(StateRow(structure, i));
+    const auto dots = run->w_dot.row(variables_[i]);
     row.head(num_parameters_) = weight * dots.head(num_parameters_);
     if (segment > 0) {
       row.segment(own, state_size_) = weight * dots.tail(state_size_);
@@ -209,9 +185,8 @@ void ShootingResiduals::Meet(int segment, Run* run) const {
   if (run->jacobian != nullptr) {
     run->w_dot.rightCols(state_size_).setZero();
     for (int i = 0; i < state_size_; ++i) {
-      const int row = StateRow(structure, i);
-      run->w_dot.row(row).setZero();
-      run->w_dot(row, num_parameters_ + i) = 1.0;
+      run->w_dot.row(variables_[i]).setZero();
+      run->w_dot(variables_[i], num_parameters_ + i) = 1.0;
     }
   }
 }

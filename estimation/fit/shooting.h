@@ -68,7 +68,7 @@ class ShootingResiduals {
  private:
   struct Run;
   bool RunSegment(int segment, Run* run);
-  void AddShares(int segment, long k, Run* run) const;
+  void AddShares(int segment, long k, const State<double>& state, Run* run) const;
   void Meet(int segment, Run* run) const;
   int num_joint_rows() const;
   void AddJoints(int segment, Run* run) const;
@@ -78,6 +78,7 @@ class ShootingResiduals {
   RolloutResiduals* residuals_;
   std::vector<long> cuts_;  ///< steps 0 = cuts[0] < … < cuts[S] = last
   int num_parameters_ = 0;
+  std::vector<int> variables_;  ///< of the states of moving bodies
   int state_size_ = 0;
   double segment_seconds_ = 0.0;
   double jump_sigma_ = 1.0;

@@ -11,6 +11,7 @@
 #include "tangible/scene/parameter.h"
 #include "tangible/simulation/certificate/certify.h"
 #include "tangible/simulation/derivatives/rollout_tangent.h"
+#include "tangible/simulation/gradient/difference_column.h"
 #include "tangible/simulation/gradient/tolerances.h"
 
 namespace tangible {
@@ -180,7 +181,7 @@ bool RolloutResiduals::Evaluate(const Eigen::VectorXd& p, GradientMethod method,
   } else if (method == GradientMethod::kAdjoint) {
     done = Adjoint(jacobian);
   } else if (method == GradientMethod::kFiniteDifference) {
-    done = FiniteDifferences(p, jacobian) && SetParameters(p) && Plain();
+    done = FiniteDifferences(p, jacobian);
   } else {
     const bool implicit = method == GradientMethod::kJetImplicit;
     done = Plain() && Jets(implicit ? JetRoute::kImplicit : JetRoute::kUnrolled, jacobian);
@@ -205,8 +206,7 @@ bool RolloutResiduals::SetParameters(const Eigen::VectorXd& p) {
   if (scene_.MovesTimes() && !UpdateTimes()) {
     return false;
   }
-  samples_.assign(static_cast<size_t>(plan_.width()) * static_cast<size_t>(plan_.num_samples()),
-                  0.0);
+  samples_.assign(static_cast<size_t>(num_sample_rows()), 0.0);
   rates_.assign(plan_.has_rates() ? samples_.size() : 0, 0.0);
   return true;
 }
@@ -229,23 +229,12 @@ bool RolloutResiduals::Plain() {
 
 bool RolloutResiduals::Tangent(RowMatrixXd* jacobian) {
   RowMatrixXd w_dot = scene_.VariableDerivatives();
-  const int width = plan_.width();
-  const ModelStructure& structure = *scene_.model().structure;
-  RowMatrixXd sample_derivatives =
-      RowMatrixXd::Zero(width * static_cast<Eigen::Index>(plan_.num_samples()), num_parameters());
+  RowMatrixXd sample_derivatives = RowMatrixXd::Zero(num_sample_rows(), num_parameters());
   State<double> final;
   const TangentObserver observer = [&](long k, double, const State<double>& state,
                                        const RowMatrixXd& dots) {
     plan_.Add(k, state, &samples_, &rates_);
-    for (const SampleShare& share : plan_.SharesAt(k)) {
-      const int body = plan_.samples()[share.sample].body;
-      sample_derivatives.middleRows(width * share.sample, 3) +=
-          share.weight * dots.middleRows(structure.PoseVariable(body, 0), 3);
-      if (width > 3) {
-        sample_derivatives.middleRows(width * share.sample + 3, 3) +=
-            share.weight * dots.middleRows(structure.TwistVariable(body, 0), 3);
-      }
-    }
+    plan_.numbers().AddTangent(k, *scene_.model().structure, dots, &sample_derivatives);
   };
   if (!Accept(RolloutTangent(scene_.model(), scene_.initial_state(), observer, &w_dot, &final))) {
     return false;
@@ -300,53 +289,44 @@ void RolloutResiduals::AdjointBlock(int first, int count, const RowMatrixXd& var
   }
   const ModelStructure& structure = *scene_.model().structure;
   const auto seed = [&](long k, RowMatrixXd* w_bar) {
-    for (const SampleShare& share : plan_.SharesAt(k)) {
-      const int body = plan_.samples()[share.sample].body;
-      for (const Reader& reader : readers[share.sample]) {
-        for (int j = 0; j < 3; ++j) {
-          (*w_bar)(structure.PoseVariable(body, j), reader.loss) +=
-              share.weight * reader.by_state[j];
-          (*w_bar)(structure.TwistVariable(body, j), reader.loss) +=
-              share.weight * reader.by_state[3 + j];
-        }
+    plan_.numbers().ForEachBar(k, structure, [&](int row, double weight, int variable) {
+      for (const Reader& reader : readers[row / plan_.width()]) {
+        (*w_bar)(variable, reader.loss) += weight * reader.by_state[row % plan_.width()];
       }
-    }
+    });
   };
   RowMatrixXd w_bar;
   tape_.AdjointFrom(scene_.model(), last, count, seed, &w_bar);
   jacobian->middleRows(first, count) += w_bar.transpose() * variables;
 }
 
-bool RolloutResiduals::ResidualsAt(const Eigen::VectorXd& p, Eigen::VectorXd* residuals) {
-  if (!SetParameters(p) || !Plain()) {
-    return false;
-  }
-  *residuals = FromSamples(samples_);
-  return true;
-}
-
 bool RolloutResiduals::FiniteDifferences(const Eigen::VectorXd& p, RowMatrixXd* jacobian) {
+  if (!Plain()) return false;
+  const std::vector<double> samples = samples_;
+  const std::vector<double> rates = rates_;
+  const Eigen::VectorXd centre = FromSamples(samples);
   jacobian->resize(num_residuals(), num_parameters());
-  Eigen::VectorXd at[3];
   for (int k = 0; k < num_parameters(); ++k) {
     const ParameterizedScene::Entry& entry = scene_.entries()[k];
     const double h = kRelativeStep * std::max(std::abs(p[k]), entry.scale);
-    // The difference is forward or backward where a central one would leave the bounds.
-    const double side = p[k] - h < entry.lower ? 1.0 : (p[k] + h > entry.upper ? -1.0 : 0.0);
-    const double offsets[3] = {side == 0.0 ? -h : 0.0, side == 0.0 ? h : side * h, 2.0 * side * h};
-    for (int i = 0; i < (side == 0.0 ? 2 : 3); ++i) {
+    const bool at_lower = p[k] - h < entry.lower;
+    const auto evaluate = [&](double shift, Eigen::VectorXd* residuals) {
+      // The difference is forward or backward where a central one would leave the bounds.
+      const bool outside = at_lower ? shift < 0.0 : shift == h && p[k] + h > entry.upper;
+      if (outside) return Evaluated::kRefused;
       Eigen::VectorXd moved = p;
-      moved[k] += offsets[i];
-      if (!ResidualsAt(moved, &at[i])) {
-        return false;
-      }
-    }
-    if (side == 0.0) {
-      jacobian->col(k) = (at[1] - at[0]) / (2.0 * h);
-    } else {
-      jacobian->col(k) = side * (-3.0 * at[0] + 4.0 * at[1] - at[2]) / (2.0 * h);
-    }
+      moved[k] += shift;
+      if (!SetParameters(moved) || !Plain()) return Evaluated::kFailed;
+      *residuals = FromSamples(samples_);
+      return Evaluated::kDone;
+    };
+    const DifferenceColumn difference = Difference(h, centre, evaluate);
+    if (difference.status != Evaluated::kDone) return false;
+    jacobian->col(k) = difference.values;
   }
+  SetParameters(p);
+  samples_ = samples;
+  rates_ = rates;
   return true;
 }
 

@@ -105,6 +105,9 @@ class RolloutResiduals : public LeastSquaresProblem {
                                     const Eigen::VectorXd& p_by_q) const;
 
  private:
+  Eigen::Index num_sample_rows() const {
+    return plan_.width() * static_cast<Eigen::Index>(plan_.num_samples());
+  }
   bool Accept(const RolloutReport& report);
   bool Plain();
   bool Tangent(RowMatrixXd* jacobian);
@@ -112,9 +115,8 @@ class RolloutResiduals : public LeastSquaresProblem {
   void AdjointBlock(int first, int count, const RowMatrixXd& variables, RowMatrixXd* jacobian);
   bool FiniteDifferences(const Eigen::VectorXd& p, RowMatrixXd* jacobian);
   bool Jets(JetRoute route, RowMatrixXd* jacobian);
-  template <typename T>
+  template <int N>
   bool JetPass(int first, JetRoute route, RowMatrixXd* sample_derivatives);
-  bool ResidualsAt(const Eigen::VectorXd& p, Eigen::VectorXd* residuals);
   /// Updates the ends of steps and the samples for the times that the parameters give; false where
   /// a time is outside the run.
   bool UpdateTimes();

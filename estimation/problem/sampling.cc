@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <map>
-#include <numeric>
 
 #include "tangible/estimation/problem/tolerances.h"
 #include "tangible/simulation/stepping/step.h"
@@ -40,17 +39,6 @@ void Locate(const SimulationSettings& settings, Sample* sample) {
 }
 
 }  // namespace
-
-template <typename ForEach>
-void SamplePlan::Shares::Fill(long last, const ForEach& for_each) {
-  // `first` is first the number of each step, then the index of its first entry.
-  first.assign(static_cast<size_t>(last) + 2, 0);
-  for_each([this](long step, const SampleShare&) { ++first[step + 1]; });
-  std::partial_sum(first.begin(), first.end(), first.begin());
-  all.resize(first.back());
-  std::vector<size_t> next(first.begin(), first.end() - 1);
-  for_each([&](long step, const SampleShare& share) { all[next[step]++] = share; });
-}
 
 SamplePlan::SamplePlan(const std::vector<Observation>& observations,
                        const SimulationSettings& settings)
@@ -92,22 +80,10 @@ SamplePlan::SamplePlan(const std::vector<Observation>& observations,
     }
   }
   samples_.shrink_to_fit();
-  const auto for_each_share = [this](const auto& use) {
-    for (int i = 0; i < num_samples(); ++i) {
-      const Sample& one = samples_[i];
-      use(one.step, SampleShare{i, 1.0 - one.part});
-      if (one.part > 0.0) {
-        use(one.step + 1, SampleShare{i, one.part});
-      }
-    }
-  };
-  const auto for_each_rate = [&](const auto& use) { ForEachRate(settings, use); };
-  long last = 0;
-  const auto reach = [&last](long step, const SampleShare&) { last = std::max(last, step); };
-  for_each_share(reach);
-  for_each_rate(reach);
-  shares_.Fill(last, for_each_share);
-  rate_shares_.Fill(last, for_each_rate);
+  numbers_ = StateSamples([this](const auto& use) { ForEachShare(use); });
+  if (options_.rates) {
+    rates_ = StateSamples([&](const auto& use) { ForEachRate(settings, use); });
+  }
 }
 
 int SamplePlan::AddSample(int body, double time, const SimulationSettings& settings) {
@@ -117,11 +93,35 @@ int SamplePlan::AddSample(int body, double time, const SimulationSettings& setti
   return num_samples() - 1;
 }
 
-/// Calls use(step, share) for the differences that form the rates.
+/// Calls use(step, share) for a sample's numbers, with twists as far as they are read.
+template <typename Use>
+void SamplePlan::UseState(int sample, long step, double weight, bool with_pose,
+                          const Use& use) const {
+  const StateShare pose{width() * sample, samples_[sample].body, StatePart::kPose, weight};
+  if (with_pose) use(step, pose);
+  if (options_.twists) use(step, StateShare{pose.row + 3, pose.body, StatePart::kTwist, weight});
+}
+
+/// Calls use(step, share) for the states that the samples read.
+template <typename Use>
+void SamplePlan::ForEachShare(const Use& use) const {
+  for (int i = 0; i < num_samples(); ++i) {
+    const Sample& one = samples_[i];
+    UseState(i, one.step, 1.0 - one.part, true, use);
+    if (one.part > 0.0) UseState(i, one.step + 1, one.part, true, use);
+  }
+}
+
+/// Calls use(step, share) for what forms the rates: twists, and differences.
 template <typename Use>
 void SamplePlan::ForEachRate(const SimulationSettings& settings, const Use& use) const {
-  if (!options_.rates || (by_events_ && !options_.twists)) {
-    return;
+  if (by_events_) {
+    ForEachShare([&](long step, StateShare share) {
+      if (share.part == StatePart::kTwist) return;
+      share.part = StatePart::kTwist;
+      use(step, share);
+    });
+    if (!options_.twists) return;
   }
   const long steps = NumSteps(settings);
   if (steps == 0) {  // there is no second state, and nothing moves
@@ -140,44 +140,15 @@ void SamplePlan::ForEachRate(const SimulationSettings& settings, const Use& use)
       to = around.step;
     }
     const double span = StepTime(settings, to) - StepTime(settings, from);
-    use(from, SampleShare{i, -1.0 / span});
-    use(to, SampleShare{i, 1.0 / span});
+    UseState(i, from, -1.0 / span, !by_events_, use);
+    UseState(i, to, 1.0 / span, !by_events_, use);
   }
 }
 
 void SamplePlan::Add(long k, const State<double>& state, std::vector<double>* numbers,
                      std::vector<double>* rates) const {
-  for (const SampleShare& share : shares_.At(k)) {
-    const size_t body = 3 * static_cast<size_t>(samples_[share.sample].body);
-    const size_t first = static_cast<size_t>(width()) * static_cast<size_t>(share.sample);
-    for (size_t i = 0; i < 3; ++i) {
-      (*numbers)[first + i] += share.weight * state.pose[body + i];
-    }
-    for (size_t i = 0; i < 3 && options_.twists; ++i) {
-      (*numbers)[first + 3 + i] += share.weight * state.twist[body + i];
-    }
-    for (size_t i = 0; i < 3 && options_.rates && by_events_; ++i) {
-      (*rates)[first + i] += share.weight * state.twist[body + i];
-    }
-  }
-  if (!options_.rates) {
-    return;
-  }
-  for (const SampleShare& share : rate_shares_.At(k)) {
-    AddRate(share, state, rates);
-  }
-}
-
-void SamplePlan::AddRate(const SampleShare& share, const State<double>& state,
-                         std::vector<double>* rates) const {
-  const size_t body = 3 * static_cast<size_t>(samples_[share.sample].body);
-  const size_t first = static_cast<size_t>(width()) * static_cast<size_t>(share.sample);
-  for (size_t i = 0; i < 3 && !by_events_; ++i) {
-    (*rates)[first + i] += share.weight * state.pose[body + i];
-  }
-  for (size_t i = 0; i < 3 && options_.twists; ++i) {
-    (*rates)[first + 3 + i] += share.weight * state.twist[body + i];
-  }
+  numbers_.Add(k, state, numbers->data());
+  rates_.Add(k, state, rates->data());
 }
 
 std::vector<double> SplitTimes(const std::vector<double>& times, const SimulationSettings& settings,

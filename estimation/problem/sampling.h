@@ -19,12 +19,11 @@
 // which steps end there too. Moving the ends of steps changes the motion only by the integrator's
 // error, so that this derivative is right to the order of the step.
 
-#include <span>
-#include <utility>
+#include <algorithm>
 #include <vector>
 
-#include "tangible/dynamics/model/state.h"
 #include "tangible/estimation/problem/observation.h"
+#include "tangible/simulation/gradient/state_samples.h"
 
 namespace tangible {
 
@@ -34,12 +33,6 @@ struct Sample {
   double time = 0.0;  ///< s, of the run
   long step = 0;      ///< k
   double part = 0.0;  ///< a in [0, 1)
-};
-
-/// The weight of a state in a sample.
-struct SampleShare {
-  int sample = -1;
-  double weight = 0.0;
 };
 
 /// The quantities that are read at each sample.
@@ -72,9 +65,9 @@ class SamplePlan {
                              : others_[2 * static_cast<size_t>(observation) + place - 1];
   }
   /// The last step whose state is needed.
-  long last_step() const { return static_cast<long>(shares_.first.size()) - 2; }
-  /// The samples to which the state after k steps contributes.
-  std::span<const SampleShare> SharesAt(long k) const { return shares_.At(k); }
+  long last_step() const { return std::max(numbers_.last_step(), rates_.last_step()); }
+  /// The samples' numbers, width() rows each, as rows of the states of the run, and their rates.
+  const StateSamples& numbers() const { return numbers_; }
 
   /// Adds the contribution of the state after k steps to the samples' numbers, and to their rates,
   /// width() numbers for each sample.
@@ -82,30 +75,21 @@ class SamplePlan {
            std::vector<double>* rates) const;
 
  private:
-  /// Shares by step.
-  struct Shares {
-    std::vector<size_t> first = {0, 0};  ///< of each step, then the end of the last
-    std::vector<SampleShare> all;
-
-    std::span<const SampleShare> At(long k) const {
-      return {all.data() + first[k], first[k + 1] - first[k]};
-    }
-    template <typename ForEach>
-    void Fill(long last, const ForEach& for_each);
-  };
   int AddSample(int body, double time, const SimulationSettings& settings);
   template <typename Use>
+  void UseState(int sample, long step, double weight, bool with_pose, const Use& use) const;
+  template <typename Use>
+  void ForEachShare(const Use& use) const;
+  template <typename Use>
   void ForEachRate(const SimulationSettings& settings, const Use& use) const;
-  void AddRate(const SampleShare& share, const State<double>& state,
-               std::vector<double>* rates) const;
 
   SampleOptions options_;
   bool by_events_ = false;
   std::vector<Sample> samples_;
   std::vector<int> sample_of_;
   std::vector<int> others_;  ///< two for each observation; empty where no channel has any
-  Shares shares_;
-  Shares rate_shares_;
+  StateSamples numbers_;
+  StateSamples rates_;
 };
 
 /// The times at which steps must end for these samples with event stepping.

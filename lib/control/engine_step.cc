@@ -61,11 +61,7 @@ State<double> EngineStep::StateOf(long k, const VectorX<double>& x) const {
   const double t = static_cast<double>(k) * s.settings.dt;
   // Bodies of prescribed motion keep their speed.
   for (size_t i = 0; i < state.pose.size(); ++i) state.pose[i] += t * state.twist[i];
-  const int poses = static_cast<int>(state.pose.size());
-  for (int i = 0; i < num_states(); ++i) {
-    const int variable = function_.output_variables()[i];
-    (variable < poses ? state.pose[variable] : state.twist[variable - poses]) = x[i];
-  }
+  function_.SetState(x, &state);
   return state;
 }
 
@@ -77,16 +73,6 @@ bool EngineStep::Set(long k, const VectorX<double>& x, const VectorX<double>& u,
   if (x.allFinite() && u.allFinite()) return true;
   *error = "step " + std::to_string(k) + ": expected finite states and controls";
   return false;
-}
-
-VectorX<double> EngineStep::PartOf(const State<double>& state) const {
-  VectorX<double> x(num_states());
-  const int poses = static_cast<int>(state.pose.size());
-  for (int i = 0; i < num_states(); ++i) {
-    const int variable = function_.output_variables()[i];
-    x[i] = variable < poses ? state.pose[variable] : state.twist[variable - poses];
-  }
-  return x;
 }
 
 bool EngineStep::Advance(long k, const VectorX<double>& x, const VectorX<double>& u,
@@ -102,7 +88,7 @@ bool EngineStep::Advance(long k, const VectorX<double>& x, const VectorX<double>
     return false;
   }
   FindImpacts();
-  *next = PartOf(state);
+  *next = function_.StateOf(state);
   return true;
 }
 
@@ -124,7 +110,7 @@ bool EngineStep::StepBack(long k, const VectorX<double>& next, const VectorX<dou
   const StepReport report = stepper_.Step(turned, static_cast<double>(k) * h, h, &state);
   if (report.status != StepStatus::kDone) return false;
   turn_twists(&state);
-  *x = PartOf(state);
+  *x = function_.StateOf(state);
   return true;
 }
 

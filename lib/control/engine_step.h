@@ -51,8 +51,6 @@ class EngineStep : public StepMap {
  private:
   /// Sets the controls; false where they or the state are not finite.
   bool Set(long k, const VectorX<double>& x, const VectorX<double>& u, std::string* error);
-  /// The part of the state that belongs to moving bodies.
-  VectorX<double> PartOf(const State<double>& state) const;
   bool Advance(long k, const VectorX<double>& x, const VectorX<double>& u, VectorX<double>* next,
                std::string* error);
   void FindImpacts();

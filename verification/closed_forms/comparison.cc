@@ -6,8 +6,10 @@
 #include <limits>
 
 #include "tangible/dynamics/model/parameter_map.h"
+#include "tangible/dynamics/model/state_variable.h"
 #include "tangible/simulation/derivatives/rollout_adjoint.h"
 #include "tangible/simulation/derivatives/rollout_tangent.h"
+#include "tangible/simulation/gradient/gradient.h"
 
 namespace tangible::closed_forms {
 namespace {
@@ -25,16 +27,6 @@ Outcome FromNumbers(const ClosedForm& form, const std::vector<Number>& outputs) 
     outcome.jacobian.row(i) = outputs[i].v.head(cols).transpose();
   }
   return outcome;
-}
-
-// Variables of the final state from which outputs are computed, in the order of FinalState.
-std::vector<int> StateVariables(const ModelStructure& structure) {
-  std::vector<int> variables;
-  for (const int body : structure.moving) {
-    for (int i = 0; i < 3; ++i) variables.push_back(structure.PoseVariable(body, i));
-    for (int i = 0; i < 3; ++i) variables.push_back(structure.TwistVariable(body, i));
-  }
-  return variables;
 }
 
 struct Run {
@@ -130,7 +122,7 @@ Outcome Simulate(const ClosedForm& form, const Scheme& scheme, int steps, Method
   State<double> initial;
   BuildModelWithStructure(prepared.scene, structure, &model, &initial);
   const Eigen::SparseMatrix<double> map = VariableJacobian(prepared.scene, structure, directions);
-  const std::vector<int> variables = StateVariables(*structure);
+  const std::vector<int> variables = OutputVariables(*structure);
   const Run run =
       (method == Method::kAdjoint ? RunAdjoint : RunTangent)(model, initial, variables, map);
   if (!run.message.empty()) {
@@ -139,10 +131,8 @@ Outcome Simulate(const ClosedForm& form, const Scheme& scheme, int steps, Method
     return failed;
   }
   FinalState state(variables.size());
-  const int poses = 3 * structure->num_bodies();
   for (size_t i = 0; i < variables.size(); ++i) {
-    const int variable = variables[i];
-    state[i].a = variable < poses ? run.final.pose[variable] : run.final.twist[variable - poses];
+    state[i].a = StateNumber(run.final, variables[i]);
     state[i].v.setZero();
     state[i].v.head(map.cols()) = run.jacobian.row(static_cast<Eigen::Index>(i)).transpose();
   }

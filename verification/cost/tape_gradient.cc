@@ -33,6 +33,7 @@ struct Eigen::NumTraits<adouble> : Eigen::NumTraits<double> {
 #include "tangible/dynamics/assembly/assembly_inl.h"
 #include "tangible/dynamics/elements/force_inl.h"
 #include "tangible/dynamics/elements/joint_inl.h"
+#include "tangible/dynamics/model/state_variable.h"
 #include "tangible/geometry/contact_geometry_inl.h"
 #include "tangible/lcp/contact/contact_interior_point_iteration_inl.h"
 #include "tangible/lcp/system/block_lu_inl.h"
@@ -109,11 +110,8 @@ class TapedRollout {
       *message = report.message;
     }
     adouble sum = 0.0;
-    const int poses = static_cast<int>(state.pose.size());
     for (size_t i = 0; i < terms_.size(); ++i) {
-      const int place = places_[i];
-      const adouble error =
-          (place < poses ? state.pose[place] : state.twist[place - poses]) - terms_[i].target;
+      const adouble error = StateNumber(state, places_[i]) - terms_[i].target;
       sum += terms_[i].weight * error * error;
     }
     sum >>= *loss;

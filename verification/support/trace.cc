@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <tuple>
 
+#include "tangible/dynamics/model/state_variable.h"
 #include "tangible/simulation/certificate/certify.h"
 #include "tangible/verification/support/outputs.h"
 
@@ -12,16 +13,10 @@ namespace {
 
 constexpr double kDegenerate = 1e-7;
 
-template <typename T>
-const T& VariableOf(const State<T>& state, int variable) {
-  const int poses = static_cast<int>(state.pose.size());
-  return variable < poses ? state.pose[variable] : state.twist[variable - poses];
-}
-
 VectorX<double> OutputsOf(const ModelStructure& structure, const State<double>& state) {
   VectorX<double> values(6 * structure.num_blocks());
   ForEachOutput(structure,
-                [&](int output, int variable) { values[output] = VariableOf(state, variable); });
+                [&](int output, int variable) { values[output] = StateNumber(state, variable); });
   return values;
 }
 

@@ -124,7 +124,8 @@ double StepTangent::Finish(const Model<double>& model, Stepper* stepper, RowMatr
 
 RolloutReport RolloutTangent(ControlledModel<double>* model, const State<double>& initial,
                              const ControlDirections& directions, const TangentObserver& observer,
-                             Stepper* stepper, RowMatrixXd* w_dot, State<double>* final) {
+                             Stepper* stepper, RowMatrixXd* w_dot, State<double>* final,
+                             const StepRange& range) {
   StepTangent tangent;
   const int fixed_numbers = tangent.FixNumbers(model->structure(), *w_dot);
   if (model->is_controlled()) {
@@ -141,7 +142,7 @@ RolloutReport RolloutTangent(ControlledModel<double>* model, const State<double>
       directions(k, w_dot);
     }
   };
-  RolloutReport report = Rollout(model, initial, each, stepper, final);
+  RolloutReport report = Rollout(model, initial, each, stepper, final, range);
   report.fixed_numbers = fixed_numbers;
   return report;
 }

@@ -33,7 +33,8 @@ using ControlDirections = std::function<void(long k, RowMatrixXd* w_dot)>;
 /// step.
 RolloutReport RolloutTangent(ControlledModel<double>* model, const State<double>& initial,
                              const ControlDirections& directions, const TangentObserver& observer,
-                             Stepper* stepper, RowMatrixXd* w_dot, State<double>* final);
+                             Stepper* stepper, RowMatrixXd* w_dot, State<double>* final,
+                             const StepRange& range = {});
 
 /// Turns the derivatives of the new twists of moving blocks (3 num_blocks x columns, row-major)
 /// into those of the state after the step: poses move with the twists, and are projected.

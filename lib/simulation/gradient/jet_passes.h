@@ -26,12 +26,11 @@ inline int JetWidthFor(Eigen::Index columns) {
   return best;
 }
 
-/// Calls pass(std::integral_constant<int, N>(), first) for the columns [first, first + N) until one
-/// returns false; once where there are no columns. Returns what the last one did; false where no
-/// width is built.
+/// Calls pass(std::integral_constant<int, N>(), first) for the columns [first, first + N), N =
+/// `width`, until one returns false; once where there are no columns. Returns what the last one
+/// did; false without a width.
 template <typename Pass>
-bool ForEachJetPass(Eigen::Index columns, [[maybe_unused]] const Pass& pass) {
-  const int width = JetWidthFor(columns);
+bool ForEachJetPass(int width, Eigen::Index columns, [[maybe_unused]] const Pass& pass) {
   bool done = width > 0;
   for (Eigen::Index first = 0; done && (first == 0 || first < columns); first += width) {
 #define TANGIBLE_PASS_IF_WIDTH(N) \

@@ -2,6 +2,7 @@
 //
 // Jets, in passes of their width.
 #include <algorithm>
+#include <limits>
 
 #include "tangible/dynamics/model/state_variable.h"
 #include "tangible/simulation/gradient/jet_passes.h"
@@ -52,15 +53,17 @@ bool RolloutWorker::JetPass(JetRoute route, Eigen::Index first, RowMatrixXd* jac
 }
 
 void RolloutWorker::JacobianByJets(JetRoute route, RowMatrixXd* jacobian, RolloutOutput* output) {
-  if (JetWidthFor(jacobian->cols()) == 0) {
+  // The widest, for all numbers of columns: what is solved for several at once has other rounding.
+  const int width = JetWidthFor(std::numeric_limits<Eigen::Index>::max());
+  if (width == 0) {
     output->status = RolloutStatus::kRefused;
     output->message =
         "methods jet and jet_implicit: no width of Jets was built (TANGIBLE_JET_WIDTHS is empty)";
     return;
   }
   StartRows(jacobian);
-  ForEachJetPass(jacobian->cols(), [&](auto width, Eigen::Index first) {
-    return JetPass<width.value>(route, first, jacobian, output);
+  ForEachJetPass(width, jacobian->cols(), [&](auto widest, Eigen::Index first) {
+    return JetPass<widest.value>(route, first, jacobian, output);
   });
   FinishRows(output->report, jacobian);
 }

@@ -99,18 +99,20 @@ long RolloutReport::SolvedBy(Rung first, Rung last) const {
 }
 
 RolloutReport Rollout(ControlledModel<double>* model, const State<double>& initial,
-                      const StateObserver& observer, Stepper* stepper, State<double>* final) {
+                      const StateObserver& observer, Stepper* stepper, State<double>* final,
+                      const StepRange& range) {
   const SimulationSettings& settings = model->structure().settings;
   RolloutReport report;
   State<double> state = initial;
   stepper->ClearGuess();
-  const long steps = NumSteps(settings);
+  const long steps = range.last < 0 ? NumSteps(settings) : range.last;
   EnergyWatch watch;
-  if (!model->is_controlled()) watch = EnergyWatch(model->At(0), initial);
+  if (!model->is_controlled()) watch = EnergyWatch(model->At(range.first), initial);
+  report.time = StepTime(settings, range.first);
   if (observer) {
-    observer(0, 0.0, state, nullptr);
+    observer(range.first, report.time, state, nullptr);
   }
-  for (long k = 0; k < steps; ++k) {
+  for (long k = range.first; k < steps; ++k) {
     const double t = StepTime(settings, k);
     const Model<double>& now = model->At(k);
     const StepReport step = Watched(watch, now, state, k, steps,

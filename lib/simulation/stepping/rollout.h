@@ -66,9 +66,15 @@ RolloutReport Rollout(const Model<double>& model, const State<double>& initial,
 /// first.
 RolloutReport Rollout(const Model<double>& model, const State<double>& initial,
                       const StateObserver& observer, Stepper* stepper, State<double>* final);
-/// The same for a model with controls.
+/// Steps first, first + 1, ... before last; a negative last is the end of the run.
+struct StepRange {
+  long first = 0;
+  long last = -1;
+};
+/// The same for a model with controls, from `initial` before the first step of a range.
 RolloutReport Rollout(ControlledModel<double>* model, const State<double>& initial,
-                      const StateObserver& observer, Stepper* stepper, State<double>* final);
+                      const StateObserver& observer, Stepper* stepper, State<double>* final,
+                      const StepRange& range = {});
 
 template <typename T>
 using JetObserver = std::function<void(long k, double t, const State<T>& state)>;

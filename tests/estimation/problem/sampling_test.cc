@@ -39,8 +39,9 @@ TEST(SamplingTest, TimesOnStepsReadOneStateAndOthersTwo) {
   EXPECT_EQ(plan.samples()[4].step, 3);
   double sums[5] = {};
   for (long k = 0; k <= plan.last_step(); ++k) {
-    for (const SampleShare& share : plan.SharesAt(k)) {
-      sums[share.sample] += share.weight;
+    for (const StateShare& share : plan.numbers().At(k)) {
+      EXPECT_EQ(share.part, StatePart::kPose);
+      sums[share.row / plan.width()] += share.weight;
     }
   }
   for (const double sum : sums) {
