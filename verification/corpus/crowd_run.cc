@@ -41,7 +41,7 @@ void AddTo(CrowdRow* row, const CrowdResult& result, const std::string& name) {
   row->steps += report.steps;
   row->contacts_max = std::max(row->contacts_max, report.contacts_max);
   if (report.status == StepStatus::kDone) {
-    row->residual_max = std::max(row->residual_max, report.residual_max);
+    row->residual_max = std::max(row->residual_max, report.residual);
     return;
   }
   if (report.message.find("cannot yield") != std::string::npos) {

@@ -28,46 +28,16 @@
 #include "tangible/simulation/events/event_edges.h"
 #include "tangible/simulation/events/event_search.h"
 #include "tangible/simulation/events/impact_groups.h"
+#include "tangible/simulation/events/step_counts.h"
 
 namespace tangible {
 
-/// How often event stepping had to relax its own rules.
-struct EventFallbacks {
-  /// Accelerations that do not exist (Painlevé) and are replaced by impulses of a very short step.
-  long short_steps = 0;
-  /// Pairs beyond max_events_per_step in a step, whose further impacts in it are inelastic.
-  long rebounds_given_up = 0;
-  /// Impacts after which contacts are held closed because they leave so slowly that they would
-  /// return at once.
-  long held_contacts = 0;
-
-  void Add(const EventFallbacks& other) {
-    short_steps += other.short_steps;
-    rebounds_given_up += other.rebounds_given_up;
-    held_contacts += other.held_contacts;
-  }
-  long total() const { return short_steps + rebounds_given_up + held_contacts; }
-};
-
 /// The report of an event step, besides its record.
-struct EventOutcome {
+struct EventOutcome : StepCounts {
   bool done = true;
-  std::string message;  ///< empty unless it failed
-  int events = 0;
-  EventFallbacks given_up;
-  int factorisations = 0;
-  int iterations = 0;
-  double residual = 0.0;
-  double impact_energy_gain = 0.0;  ///< J, the largest of an impact
-  Rung rung = Rung::kNone;          ///< the last in order that any of its solves needed
-  ContactFallbacks solver;          ///< fallbacks of its solves and motions
-  int newton_stages = 0;            ///< implicit stages whose iteration does not contract
-  int halved_motions = 0;           ///< that could not be integrated over the rest of the step
-  int ellipse_motions = 0;          ///< shortened because an ellipse turns over its contact point
-  int pairs_compared = 0;  ///< boxes compared by the broad phase of its last search for events
-  int pairs_near = 0;      ///< pairs whose boxes overlap, in that search
-  int islands = 0;         ///< stepped apart; 0: all bodies are one
-  bool stopped = false;    ///< before its end (AtEvent::kStopAtSecond)
+  std::string message;   ///< empty unless it failed
+  int islands = 0;       ///< stepped apart; 0: all bodies are one
+  bool stopped = false;  ///< before its end (AtEvent::kStopAtSecond)
 };
 
 /// Whether a step goes on however many events end its segments, or stops at the second one.

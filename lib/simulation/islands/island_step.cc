@@ -13,22 +13,6 @@ constexpr int kMostDivisions = 3;
 // The reach after that, as a multiple of how far the body has moved.
 constexpr double kNewReach = 1.5;
 
-void AddOutcome(const EventOutcome& island, EventOutcome* sum) {
-  sum->events += island.events;
-  sum->given_up.Add(island.given_up);
-  sum->factorisations += island.factorisations;
-  sum->iterations += island.iterations;
-  sum->residual = std::max(sum->residual, island.residual);
-  sum->impact_energy_gain = std::max(sum->impact_energy_gain, island.impact_energy_gain);
-  sum->rung = std::max(sum->rung, island.rung);
-  sum->solver.Add(island.solver);
-  sum->newton_stages += island.newton_stages;
-  sum->halved_motions += island.halved_motions;
-  sum->ellipse_motions += island.ellipse_motions;
-  sum->pairs_compared += island.pairs_compared;
-  sum->pairs_near += island.pairs_near;
-}
-
 }  // namespace
 
 IslandStepper::IslandStepper(const Model<double>& model)
@@ -161,7 +145,7 @@ IslandStepper::Result IslandStepper::StepIslands(const Model<double>& model, dou
         StepIsland(model, t, h, island, island == 0 ? at_event : AtEvent::kGoOn, state);
     if (!own.done) return Result::kFailed;
     if (own.stopped) return Result::kStopped;
-    AddOutcome(own, outcome);
+    outcome->Add(own);
     keeps_reach = KeepsReach(*record_.islands[record_.num_islands - 1]) && keeps_reach;
   }
   outcome->islands = record_.num_islands;

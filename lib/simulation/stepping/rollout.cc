@@ -31,7 +31,7 @@ void LookAtEnergy(const ControlledModel<T>& controlled, const Model<double>& mod
                   const State<double>& initial, const State<double>& final, RolloutReport* report) {
   if (controlled.is_controlled()) return;
   report->energy_grown = EnergyGrown(
-      model, initial, final, static_cast<double>(report->events) * report->impact_energy_gain_max,
+      model, initial, final, static_cast<double>(report->events) * report->impact_energy_gain,
       report->penetration_max);
 }
 
@@ -69,28 +69,11 @@ std::string FailureMessage(const StepReport& step, double t, long k) {
 }
 
 void RolloutReport::Add(const StepReport& step) {
+  StepCounts::Add(step);
   contacts_max = std::max(contacts_max, step.closed);
   lcp_rows_max = std::max(lcp_rows_max, step.lcp_rows);
-  contacts += step.contacts;
-  lcp_rows += step.lcp_rows;
-  single_rows += step.single_rows;
-  angles_left_out += step.angles_left_out;
-  pairs_compared += step.pairs_compared;
-  pairs_near += step.pairs_near;
-  beyond_reach += step.beyond_reach;
   ++solved_by[static_cast<size_t>(step.rung)];
-  events += step.events;
-  given_up.Add(step.given_up);
-  solver.Add(step.solver);
-  newton_stages += step.newton_stages;
-  halved_motions += step.halved_motions;
-  ellipse_motions += step.ellipse_motions;
-  damped_projections += step.damped_projections;
-  mode_switches += step.mode_switches;
-  factorisations += step.factorisations;
-  residual_max = std::max(residual_max, step.residual);
   penetration_max = std::max(penetration_max, -step.gap_min);
-  impact_energy_gain_max = std::max(impact_energy_gain_max, step.impact_energy_gain);
 }
 
 long RolloutReport::SolvedBy(Rung first, Rung last) const {

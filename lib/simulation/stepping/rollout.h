@@ -15,34 +15,16 @@
 namespace tangible {
 
 /// The report of a run: sums and extremes of the steps' reports.
-struct RolloutReport {
+struct RolloutReport : StepCounts {
   StepStatus status = StepStatus::kDone;
   std::string message;   ///< empty unless it failed: when, where, what
   long steps = 0;        ///< done
   double time = 0.0;     ///< s, reached
   int contacts_max = 0;  ///< contacts with an impulse in a step
-  int lcp_rows_max = 0;
-  long contacts = 0;  ///< listed, over all steps; the following counts too
-  long lcp_rows = 0;
-  long single_rows = 0;      ///< contacts and limits that have one row in place of three
-  long angles_left_out = 0;  ///< bodies that have rows, but none that turns them
-  long pairs_compared = 0;   ///< pairs of boxes that the broad phase compared
-  long pairs_near = 0;       ///< pairs whose boxes overlap
-  long beyond_reach = 0;     ///< of these, without rows (fixed stepping)
-  int fixed_numbers = 0;     ///< of the model: with a tangent, those that no column varies
+  long lcp_rows_max = 0;
+  int fixed_numbers = 0;  ///< of the model: with a tangent, those that no column varies
   std::array<long, kNumRungs> solved_by{};  ///< steps, by the rung that solved them
-  long events = 0;                          ///< located within steps (event stepping)
-  EventFallbacks given_up;                  ///< event stepping: what it gave up of its own rules
-  ContactFallbacks solver;                  ///< what solves leaned on beyond the guess
-  long newton_stages = 0;    ///< event stepping: implicit stages whose iteration does not contract
-  long halved_motions = 0;   ///< event stepping: that could not be integrated as a whole
-  long ellipse_motions = 0;  ///< event stepping: shortened where an ellipse touches
-  long damped_projections = 0;  ///< steps of the joint projection that Newton's method could not do
-  long mode_switches = 0;
-  long factorisations = 0;
-  double residual_max = 0.0;
-  double penetration_max = 0.0;         ///< m
-  double impact_energy_gain_max = 0.0;  ///< J
+  double penetration_max = 0.0;             ///< m
   /// Event stepping: empty, or a line that the energy has grown though nothing drives the scene.
   std::string energy_grown;
 

@@ -279,7 +279,7 @@ void Stepper::FillReport(const Model<double>& model, const ContactSolverReport& 
   report->factorisations = solved.factorisations;
   report->iterations = solved.iterations;
   report->residual = solved.residual;
-  report->contacts = static_cast<int>(record_.contacts.size());
+  report->contacts = static_cast<long>(record_.contacts.size());
   report->pairs_compared = search_.num_compared();
   report->pairs_near = search_.num_pairs();
   report->beyond_reach = search_.num_beyond_reach();

@@ -30,34 +30,12 @@ namespace tangible {
 enum class StepStatus { kDone, kUnsolved, kDiverged };
 
 /// The report of a step; the caller sums over the run.
-struct StepReport {
+struct StepReport : StepCounts {
   StepStatus status = StepStatus::kDone;
-  Rung rung = Rung::kNone;  ///< by events: the last in order that any of its solves needed
-  int contacts = 0;         ///< contacts and limits listed
-  int closed = 0;           ///< of these, with an impulse
-  int lcp_rows = 0;         ///< complementarity rows: 1 for a frictionless contact or limit, else 3
-  // Counts of what the step left out, in the last search for contacts.
-  int pairs_compared = 0;   ///< pairs of boxes that the broad phase compared
-  int pairs_near = 0;       ///< pairs whose boxes overlap
-  int beyond_reach = 0;     ///< of these, without rows: out of reach in this step (fixed stepping)
-  int single_rows = 0;      ///< contacts and limits that have one row in place of three
-  int angles_left_out = 0;  ///< bodies that have rows, but none that turns them
-  int islands = 0;          ///< with contacts, or by events, solved apart; 0: all is one
-  int factorisations = 0;   ///< of the island that took the most
-  int iterations = 0;       ///< of the island that took the most
-  int events = 0;           ///< located within the step (event stepping)
-  EventFallbacks given_up;  ///< event stepping: what it gave up of its own rules
-  ContactFallbacks solver;  ///< what its solves leaned on beyond the guess
-  int newton_stages = 0;    ///< event stepping: implicit stages whose iteration does not contract
-  int halved_motions = 0;   ///< event stepping: that could not be integrated as a whole
-  int ellipse_motions = 0;  ///< event stepping: shortened where an ellipse touches
-  int damped_projections = 0;  ///< steps of the joint projection that Newton's method could not do
-  int mode_switches = 0;       ///< contacts whose mode differs from the last step's
-  double residual = 0.0;       ///< scaled natural residual
-  double gap_min = 0.0;        ///< m, the smallest at the start; infinite where no contact is near
-  double impact_energy_gain =
-      0.0;              ///< J, what the impulses of a step with impacts did; > 0: energy was gained
-  std::string message;  ///< empty unless it failed: names the contact or joint
+  int closed = 0;        ///< contacts with an impulse
+  int islands = 0;       ///< with contacts, or by events, solved apart; 0: all is one
+  double gap_min = 0.0;  ///< m, the smallest at the start; infinite where no contact is near
+  std::string message;   ///< empty unless it failed: names the contact or joint
 };
 
 /// What a step uses of earlier steps besides the state: modes and impulses to start from.

@@ -125,19 +125,9 @@ StepReport Stepper::StepByEvents(const Model<double>& model, double t, double h,
   last_contacts_ = r.contacts;
   last_solution_.modes = r.solution.modes;
   const EventOutcome outcome = events_->Step(model, t, h, state);
-  report.events = outcome.events;
-  report.given_up = outcome.given_up;
-  report.solver = outcome.solver;
-  report.newton_stages = outcome.newton_stages;
-  report.halved_motions = outcome.halved_motions;
-  report.ellipse_motions = outcome.ellipse_motions;
-  report.pairs_compared = outcome.pairs_compared;
-  report.pairs_near = outcome.pairs_near;
-  report.factorisations = outcome.factorisations;
-  report.iterations = outcome.iterations;
-  report.residual = outcome.residual;
+  static_cast<StepCounts&>(report) = outcome;
+  report.rung = Rung::kNone;
   report.islands = outcome.islands;
-  report.impact_energy_gain = outcome.impact_energy_gain;
   report.gap_min = HUGE_VAL;
   const auto finite = [](const std::vector<double>& x) {
     return std::all_of(x.begin(), x.end(), [](double y) { return std::isfinite(y); });
@@ -154,7 +144,7 @@ StepReport Stepper::StepByEvents(const Model<double>& model, double t, double h,
   r.new_twist = state->twist;
   report.angles_left_out = AnglesLeftOut(events_->record(), &turning_);
   report.rung = r.contacts.empty() ? Rung::kDirect : std::max(outcome.rung, Rung::kModeChanges);
-  report.contacts = static_cast<int>(r.contacts.size());
+  report.contacts = static_cast<long>(r.contacts.size());
   size_t next = 0;
   for (size_t i = 0; i < r.contacts.size(); ++i) {
     report.gap_min = std::min(report.gap_min, r.contacts[i].gap);

@@ -127,9 +127,9 @@ TEST(EventDecompressionTest, TheRodGainsEnergyByNewtonsLawAndNotByPoissons) {
   const Rolled poisson = Simulate(SceneOf(Rod("poisson", 1.0, 0.5)));
   constexpr double kBefore = 0.625;  // J
   EXPECT_NEAR(newton.energy_gain / kBefore, 0.175, 0.02);
-  EXPECT_NEAR(newton.report.impact_energy_gain_max, newton.energy_gain, 1e-14);
+  EXPECT_NEAR(newton.report.impact_energy_gain, newton.energy_gain, 1e-14);
   EXPECT_LT(poisson.energy_gain, -0.01 * kBefore);
-  EXPECT_EQ(poisson.report.impact_energy_gain_max, 0.0);
+  EXPECT_EQ(poisson.report.impact_energy_gain, 0.0);
 }
 
 TEST(EventDecompressionTest, ASingleContactNeverGains) {
@@ -138,7 +138,7 @@ TEST(EventDecompressionTest, ASingleContactNeverGains) {
       for (const char* velocity : {"[-2, -1]", "[-0.3, -1]", "[0.4, -1]", "[1.5, -1]"}) {
         const Rolled run = Simulate(SceneOf(Rod("poisson", e, friction, velocity)));
         EXPECT_LT(run.energy_gain, 1e-14) << e << " " << friction << " " << velocity;
-        EXPECT_LT(run.report.impact_energy_gain_max, 1e-14);
+        EXPECT_LT(run.report.impact_energy_gain, 1e-14);
       }
     }
   }

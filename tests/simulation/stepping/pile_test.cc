@@ -125,7 +125,7 @@ RolloutReport RunChecked(const Scene& scene, State<double>* final) {
       },
       final);
   EXPECT_EQ(report.status, StepStatus::kDone) << report.message;
-  EXPECT_LE(report.residual_max, kTolerance);
+  EXPECT_LE(report.residual, kTolerance);
   return report;
 }
 

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// What a step counts: that of an island, of a step, and their sums over a run.
+
+#include "tangible/lcp/contact/contact_solver.h"
+
+namespace tangible {
+
+/// How often event stepping had to relax its own rules.
+struct EventFallbacks {
+  /// Accelerations that do not exist (Painlevé) and are replaced by impulses of a very short step.
+  long short_steps = 0;
+  /// Pairs beyond max_events_per_step in a step, whose further impacts in it are inelastic.
+  long rebounds_given_up = 0;
+  /// Impacts after which contacts are held closed because they leave so slowly that they would
+  /// return at once.
+  long held_contacts = 0;
+
+  void Add(const EventFallbacks& other) {
+    short_steps += other.short_steps;
+    rebounds_given_up += other.rebounds_given_up;
+    held_contacts += other.held_contacts;
+  }
+  long total() const { return short_steps + rebounds_given_up + held_contacts; }
+};
+
+struct StepCounts {
+  Rung rung = Rung::kNone;  ///< by events: the last in order that any of its solves needed
+  long contacts = 0;        ///< contacts and limits listed
+  long lcp_rows = 0;        ///< complementarity rows: 1 for a frictionless contact or limit, else 3
+  long single_rows = 0;     ///< contacts and limits that have one row in place of three
+  long angles_left_out = 0;  ///< bodies that have rows, but none that turns them
+  // Of the last search for contacts, or by events for events.
+  long pairs_compared = 0;   ///< pairs of boxes that the broad phase compared
+  long pairs_near = 0;       ///< pairs whose boxes overlap
+  long beyond_reach = 0;     ///< of these, without rows: out of reach in this step (fixed stepping)
+  long factorisations = 0;   ///< of a fixed step: of the island that took the most
+  long iterations = 0;       ///< of a fixed step: of the island that took the most
+  long events = 0;           ///< located within the step (event stepping)
+  EventFallbacks given_up;   ///< event stepping: what it gave up of its own rules
+  ContactFallbacks solver;   ///< what its solves leaned on beyond the guess
+  long newton_stages = 0;    ///< event stepping: implicit stages whose iteration does not contract
+  long halved_motions = 0;   ///< event stepping: that could not be integrated as a whole
+  long ellipse_motions = 0;  ///< event stepping: shortened where an ellipse touches
+  long damped_projections = 0;  ///< steps of the joint projection that Newton's method could not do
+  long mode_switches = 0;       ///< contacts whose mode differs from the last step's
+  double residual = 0.0;        ///< scaled natural residual, the largest
+  /// J, what the impulses of a step with impacts, or of an impact, did, the largest; > 0: energy
+  /// was gained.
+  double impact_energy_gain = 0.0;
+
+  /// Adds counts; of `rung`, `residual` and `impact_energy_gain` the largest remains.
+  void Add(const StepCounts& other);
+};
+
+}  // namespace tangible
