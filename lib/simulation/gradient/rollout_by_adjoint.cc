@@ -25,13 +25,8 @@ RowMatrixXd RolloutWorker::Sweep(int columns, const Bars& bars,
       for (int c = 0; c < columns; ++c) (*w_bar_k)(variable, c) += weight * bars(row, c);
     });
   };
-  if (f_.num_controls() == 0) {
-    ControlledModel<double> model(model_);
-    tape_.AdjointFrom(&model, f_.records_.back(), columns, seed, sink, &w_bar);
-  } else {
-    ControlledModel<double> model(model_, controls_);
-    tape_.AdjointFrom(&model, f_.records_.back(), columns, seed, sink, &w_bar);
-  }
+  ControlledModel<double> model = Controlled();
+  tape_.AdjointFrom(&model, f_.records_.back(), columns, seed, sink, &w_bar);
   return w_bar;
 }
 

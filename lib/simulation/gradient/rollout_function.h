@@ -174,6 +174,11 @@ class RolloutWorker {
   bool Set(const RolloutInput& input, RolloutOutput* output);
   bool SetParameters(const VectorX<double>& values, RolloutOutput* output);
   void UseOwnScene();
+  /// The model of the input, for one run.
+  ControlledModel<double> Controlled() const {
+    return f_.num_controls() == 0 ? ControlledModel<double>(model_)
+                                  : ControlledModel<double>(model_, controls_);
+  }
   /// Runs with an observer that keeps the recorded states; `run` is a rollout of some kind.
   using Runner = std::function<RolloutReport(ControlledModel<double>*, const StateObserver&)>;
   void RunAs(const Runner& run, RolloutOutput* output);

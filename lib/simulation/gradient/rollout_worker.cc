@@ -71,13 +71,8 @@ void RolloutWorker::RunAs(const Runner& run, RolloutOutput* output) {
   const StateObserver keep = [&](long k, double, const State<double>& state, Stepper*) {
     f_.samples_.Add(k, state, output->states.data());
   };
-  if (f_.num_controls() == 0) {
-    ControlledModel<double> model(model_);
-    output->SetReport(run(&model, keep));
-  } else {
-    ControlledModel<double> model(model_, controls_);
-    output->SetReport(run(&model, keep));
-  }
+  ControlledModel<double> model = Controlled();
+  output->SetReport(run(&model, keep));
   FinishRows(output->report, &output->states);
 }
 
@@ -142,7 +137,7 @@ Certificate RolloutWorker::Certify(const RolloutInput& input, const std::vector<
   }
   std::sort(options.numbers.begin(), options.numbers.end());
   RolloutReport report;
-  ControlledModel<double> model(model_, controls_);
+  ControlledModel<double> model = Controlled();
   return CertifyRollout(&model, initial_, options, &report);
 }
 
