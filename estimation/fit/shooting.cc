@@ -147,7 +147,6 @@ void ShootingResiduals::AddShares(int segment, long k, const State<double>& stat
 
 bool ShootingResiduals::RunSegment(int segment, Run* run) {
   const Model<double>& model = residuals_->scene().model();
-  ControlledModel<double> plain(model);
   Stepper stepper(model);
   const StepRange steps{cuts_[segment], cuts_[segment + 1]};
   const auto add = [&](long k, double, const State<double>& state, const auto&) {
@@ -155,8 +154,8 @@ bool ShootingResiduals::RunSegment(int segment, Run* run) {
   };
   const RolloutReport report =
       run->jacobian == nullptr
-          ? Rollout(&plain, run->state, add, &stepper, &run->state, steps)
-          : RolloutTangent(&plain, run->state, {}, add, &stepper, &run->w_dot, &run->state, steps);
+          ? Rollout(model, run->state, add, &stepper, &run->state, steps)
+          : RolloutTangent(model, run->state, {}, add, &stepper, &run->w_dot, &run->state, steps);
   return report.status == StepStatus::kDone;
 }
 

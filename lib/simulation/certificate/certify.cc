@@ -367,40 +367,31 @@ void RolloutCertifier::LeaveOutKinks(Certificate* certificate) const {
 
 namespace {
 
-Certificate Certify(ControlledModel<double>* model, const State<double>& initial,
+Certificate Certify(ControlledModel<double> model, const State<double>& initial,
                     RolloutCertifier* certifier, RolloutReport* report) {
-  Stepper stepper(model->At(0));
+  Stepper stepper(model.At(0));
   State<double> final;
   *report = Rollout(
       model, initial,
       [&](long k, double, const State<double>&, Stepper* done) {
         if (done != nullptr) {
-          certifier->AddStep(model->At(k - 1), k - 1, done);
-          if (model->is_controlled())
-            certifier->AddControls(model->structure(), *model->controls(), k - 1, done);
+          certifier->AddStep(model.At(k - 1), k - 1, done);
+          if (model.is_controlled()) {
+            certifier->AddControls(model.structure(), *model.controls(), k - 1, done);
+          }
         }
       },
       &stepper, &final);
-  return certifier->Finish(model->At(0), *report);
+  return certifier->Finish(model.At(0), *report);
 }
 
 }  // namespace
 
-Certificate CertifyRollout(ControlledModel<double>* model, const State<double>& initial,
+Certificate CertifyRollout(const ControlledModel<double>& model, const State<double>& initial,
                            const CertifyOptions& options, RolloutReport* report) {
+  RolloutReport own;
   RolloutCertifier certifier(options);
-  return Certify(model, initial, &certifier, report);
-}
-
-Certificate CertifyRollout(const Model<double>& model, const State<double>& initial,
-                           const CertifyOptions& options, RolloutReport* report) {
-  ControlledModel<double> plain(model);
-  return CertifyRollout(&plain, initial, options, report);
-}
-
-Certificate CertifyRollout(const Model<double>& model, const State<double>& initial) {
-  RolloutReport report;
-  return CertifyRollout(model, initial, {}, &report);
+  return Certify(model, initial, &certifier, report == nullptr ? &own : report);
 }
 
 namespace {
@@ -497,8 +488,7 @@ Certificate CertifyDerivative(const Model<double>& model, const State<double>& i
   constexpr double kMostExceeded = 1e6;
   RolloutReport report;
   RolloutCertifier certifier({NumbersOf(*model.structure, directions), directions, names});
-  ControlledModel<double> plain(model);
-  Certificate certificate = Certify(&plain, initial, &certifier, &report);
+  Certificate certificate = Certify(model, initial, &certifier, &report);
   if (certificate.degenerate_rows > 0 && report.status == StepStatus::kDone &&
       model.structure->settings.stepping == Stepping::kFixed &&
       HasOneDerivative(model, initial, directions, sizes)) {

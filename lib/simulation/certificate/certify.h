@@ -174,13 +174,9 @@ class RolloutCertifier {
 };
 
 /// Runs the rollout and certifies it. A rollout that fails is certified up to the failure, which
-/// `report` describes.
-Certificate CertifyRollout(const Model<double>& model, const State<double>& initial,
-                           const CertifyOptions& options, RolloutReport* report);
-/// The same for a model with controls.
-Certificate CertifyRollout(ControlledModel<double>* model, const State<double>& initial,
-                           const CertifyOptions& options, RolloutReport* report);
-Certificate CertifyRollout(const Model<double>& model, const State<double>& initial);
+/// `report` describes unless it is null.
+Certificate CertifyRollout(const ControlledModel<double>& model, const State<double>& initial,
+                           const CertifyOptions& options = {}, RolloutReport* report = nullptr);
 
 /// The reason for a verdict `one-sided` where a direction contradicts redundant rows: one contact
 /// would open or slip and the others not.

@@ -53,22 +53,15 @@ void RolloutTape::Start(const Model<double>& model, const TapeOptions& options) 
   }
 }
 
-RolloutReport RolloutTape::Record(const Model<double>& model, const State<double>& initial,
+RolloutReport RolloutTape::Record(ControlledModel<double> model, const State<double>& initial,
                                   const TapeOptions& options, const StateObserver& observer,
                                   State<double>* final) {
-  ControlledModel<double> plain(model);
-  return Record(&plain, initial, options, observer, final);
-}
-
-RolloutReport RolloutTape::Record(ControlledModel<double>* model, const State<double>& initial,
-                                  const TapeOptions& options, const StateObserver& observer,
-                                  State<double>* final) {
-  Start(model->At(0), options);
+  Start(model.At(0), options);
   const StateObserver record = [&](long k, double t, const State<double>& state, Stepper* stepper) {
     if (observer) {
       observer(k, t, state, stepper);
     }
-    RecordStep(model->At(std::max(0L, k - 1)), k, state);
+    RecordStep(model.At(std::max(0L, k - 1)), k, state);
   };
   return Rollout(model, initial, record, stepper_.get(), final);
 }
@@ -335,25 +328,14 @@ void RolloutTape::StepAdjoint(const Model<double>& model, const StepRecord& reco
   }
 }
 
-void RolloutTape::Adjoint(const Model<double>& model, int num_losses, const Seed& seed,
-                          RowMatrixXd* w_bar) {
-  AdjointFrom(model, steps(), num_losses, seed, w_bar);
-}
-
-void RolloutTape::AdjointFrom(const Model<double>& model, long last, int num_losses,
-                              const Seed& seed, RowMatrixXd* w_bar) {
-  ControlledModel<double> plain(model);
-  AdjointFrom(&plain, last, num_losses, seed, {}, w_bar);
-}
-
-void RolloutTape::AdjointFrom(ControlledModel<double>* model, long last, int num_losses,
-                              const Seed& seed, const ControlSink& sink, RowMatrixXd* w_bar) {
-  const ModelStructure& structure = model->structure();
+void RolloutTape::AdjointFrom(ControlledModel<double> model, long last, int num_losses,
+                              const Seed& seed, RowMatrixXd* w_bar, const ControlSink& sink) {
+  const ModelStructure& structure = model.structure();
   w_bar->setZero(structure.num_variables(), num_losses);
   RowMatrixXd controls_bar;
   const auto hand_over = [&](long step) {
-    if (!model->is_controlled()) return;
-    const std::vector<int>& numbers = model->controls()->numbers;
+    if (!model.is_controlled()) return;
+    const std::vector<int>& numbers = model.controls()->numbers;
     controls_bar.resize(static_cast<Eigen::Index>(numbers.size()), num_losses);
     for (size_t j = 0; j < numbers.size(); ++j) {
       auto row = w_bar->row(structure.ParameterVariable(numbers[j]));
@@ -367,10 +349,10 @@ void RolloutTape::AdjointFrom(ControlledModel<double>* model, long last, int num
     seed(k, w_bar);
     const long step = k - 1;
     if (step < first_ || step >= first_ + static_cast<long>(used_)) {
-      RunAgain(model, k);
+      RunAgain(&model, k);
     }
     Entry& entry = *entries_[static_cast<size_t>(step - first_)];
-    const Model<double>& now = model->At(step);
+    const Model<double>& now = model.At(step);
     if (stepper_->by_events()) {
       stepper_->event_derivative().Adjoint(now, &entry.events, w_bar);
     } else if (entry.has_factors) {

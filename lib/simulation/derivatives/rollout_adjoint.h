@@ -28,26 +28,19 @@ enum class Factorisations {
 };
 
 struct TapeOptions {
-  Factorisations factorisations = Factorisations::kKeep;
+  // NOLINTNEXTLINE(google-explicit-constructor): what is kept is often all that is asked for
+  TapeOptions(Factorisations kept = Factorisations::kKeep, Checkpointing checkpoints = {})
+      : factorisations(kept), checkpointing(checkpoints) {}
+
+  Factorisations factorisations;
   /// With a budget, factorisations are kept as long as memory remains for them.
-  Checkpointing checkpointing = {};
+  Checkpointing checkpointing;
 };
 
 class RolloutTape {
  public:
   /// Runs and records. The observer is called as in Rollout.
-  RolloutReport Record(const Model<double>& model, const State<double>& initial,
-                       const TapeOptions& options, const StateObserver& observer,
-                       State<double>* final);
-  /// The same without checkpoints.
-  RolloutReport Record(const Model<double>& model, const State<double>& initial,
-                       Factorisations factorisations, const StateObserver& observer,
-                       State<double>* final) {
-    return Record(model, initial, TapeOptions{factorisations, {}}, observer, final);
-  }
-
-  /// The same for a model with controls.
-  RolloutReport Record(ControlledModel<double>* model, const State<double>& initial,
+  RolloutReport Record(ControlledModel<double> model, const State<double>& initial,
                        const TapeOptions& options, const StateObserver& observer,
                        State<double>* final);
 
@@ -55,20 +48,21 @@ class RolloutTape {
   /// from the last k to 0. Rows of poses and twists are those of that state.
   using Seed = std::function<void(long k, RowMatrixXd* w_bar)>;
 
-  /// The reverse sweep: w_bar, num_variables x num_losses, gets the derivatives with respect to the
-  /// initial poses, twists and the numbers. Chain with VariableJacobian(...)ᵀ w_bar for user
-  /// parameters. `model` has the numbers of the recorded run.
-  void Adjoint(const Model<double>& model, int num_losses, const Seed& seed, RowMatrixXd* w_bar);
-  /// The same, starting from the state after `last` steps, for losses that depend on no later
-  /// state.
-  void AdjointFrom(const Model<double>& model, long last, int num_losses, const Seed& seed,
-                   RowMatrixXd* w_bar);
   /// Called with step k and the derivatives with respect to the controls' values in it: a row for
   /// each entry of Controls::numbers, a column for each loss.
   using ControlSink = std::function<void(long k, const RowMatrixXd& controls_bar)>;
-  /// The same for a model with controls; the rows of their parameters in w_bar are 0 on return.
-  void AdjointFrom(ControlledModel<double>* model, long last, int num_losses, const Seed& seed,
-                   const ControlSink& sink, RowMatrixXd* w_bar);
+
+  /// The reverse sweep from the state after `last` steps, for losses that depend on no later state:
+  /// w_bar, num_variables x num_losses, gets the derivatives with respect to the initial poses,
+  /// twists and the numbers; the rows of controls' parameters are 0. Chain with
+  /// VariableJacobian(...)ᵀ w_bar for user parameters. `model` has the numbers of the recorded run.
+  void AdjointFrom(ControlledModel<double> model, long last, int num_losses, const Seed& seed,
+                   RowMatrixXd* w_bar, const ControlSink& sink = {});
+  /// The same from the end.
+  void Adjoint(const ControlledModel<double>& model, int num_losses, const Seed& seed,
+               RowMatrixXd* w_bar) {
+    AdjointFrom(model, steps(), num_losses, seed, w_bar);
+  }
 
   /// Memory of the tape now, and its maximum since Record began, bytes.
   size_t bytes() const;

@@ -226,7 +226,7 @@ bool StepDirectional::Apply(const Model<double>& model, Stepper* stepper, RowMat
   return true;
 }
 
-RolloutReport RolloutDirectional(ControlledModel<double>* model, const State<double>& initial,
+RolloutReport RolloutDirectional(ControlledModel<double> model, const State<double>& initial,
                                  const TangentObserver& observer, Stepper* stepper,
                                  RowMatrixXd* w_dot, State<double>* final) {
   StepDirectional directional;
@@ -234,7 +234,7 @@ RolloutReport RolloutDirectional(ControlledModel<double>* model, const State<dou
   const StateObserver each = [&](long k, double t, const State<double>& state, Stepper* done) {
     std::string message;
     if (done != nullptr && failure.str().empty() &&
-        !directional.Apply(model->At(k - 1), done, w_dot, &message)) {
+        !directional.Apply(model.At(k - 1), done, w_dot, &message)) {
       failure << "t = " << t << " s: no one-sided derivative: " << message;
     }
     if (observer) observer(k, t, state, *w_dot);

@@ -65,7 +65,7 @@ class StepDirectional {
 
 /// Runs the rollout with its directions. A derivative that does not exist fails it, with the
 /// message of StepDirectional and the time.
-RolloutReport RolloutDirectional(ControlledModel<double>* model, const State<double>& initial,
+RolloutReport RolloutDirectional(ControlledModel<double> model, const State<double>& initial,
                                  const TangentObserver& observer, Stepper* stepper,
                                  RowMatrixXd* w_dot, State<double>* final);
 

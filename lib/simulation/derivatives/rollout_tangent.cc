@@ -122,18 +122,18 @@ double StepTangent::Finish(const Model<double>& model, Stepper* stepper, RowMatr
   return left;
 }
 
-RolloutReport RolloutTangent(ControlledModel<double>* model, const State<double>& initial,
+RolloutReport RolloutTangent(ControlledModel<double> model, const State<double>& initial,
                              const ControlDirections& directions, const TangentObserver& observer,
                              Stepper* stepper, RowMatrixXd* w_dot, State<double>* final,
                              const StepRange& range) {
   StepTangent tangent;
-  const int fixed_numbers = tangent.FixNumbers(model->structure(), *w_dot);
-  if (model->is_controlled()) {
-    tangent.Vary(model->structure(), model->controls()->numbers);
+  const int fixed_numbers = tangent.FixNumbers(model.structure(), *w_dot);
+  if (model.is_controlled()) {
+    tangent.Vary(model.structure(), model.controls()->numbers);
   }
   const StateObserver each = [&](long k, double t, const State<double>& state, Stepper* done) {
     if (done != nullptr) {
-      tangent.Apply(model->At(k - 1), done, w_dot);
+      tangent.Apply(model.At(k - 1), done, w_dot);
     }
     if (observer) {
       observer(k, t, state, *w_dot);
@@ -148,17 +148,10 @@ RolloutReport RolloutTangent(ControlledModel<double>* model, const State<double>
 }
 
 RolloutReport RolloutTangent(const Model<double>& model, const State<double>& initial,
-                             const TangentObserver& observer, Stepper* stepper, RowMatrixXd* w_dot,
-                             State<double>* final) {
-  ControlledModel<double> plain(model);
-  return RolloutTangent(&plain, initial, {}, observer, stepper, w_dot, final);
-}
-
-RolloutReport RolloutTangent(const Model<double>& model, const State<double>& initial,
                              const TangentObserver& observer, RowMatrixXd* w_dot,
                              State<double>* final) {
   Stepper stepper(model);
-  return RolloutTangent(model, initial, observer, &stepper, w_dot, final);
+  return RolloutTangent(model, initial, {}, observer, &stepper, w_dot, final);
 }
 
 }  // namespace tangible

@@ -17,24 +17,20 @@ namespace tangible {
 using TangentObserver =
     std::function<void(long k, double t, const State<double>& state, const RowMatrixXd& w_dot)>;
 
-/// Runs the rollout with its tangent. `w_dot` holds the directions on entry (VariableJacobian of
-/// parameter_map.h, dense) and the final state's derivatives on return.
-RolloutReport RolloutTangent(const Model<double>& model, const State<double>& initial,
-                             const TangentObserver& observer, RowMatrixXd* w_dot,
-                             State<double>* final);
-/// The same with the caller's stepper, which keeps its memory from run to run.
-RolloutReport RolloutTangent(const Model<double>& model, const State<double>& initial,
-                             const TangentObserver& observer, Stepper* stepper, RowMatrixXd* w_dot,
-                             State<double>* final);
-
 /// Sets the rows of the controls' parameters to the directions of their values in step k.
 using ControlDirections = std::function<void(long k, RowMatrixXd* w_dot)>;
-/// The same for a model with controls. On return the rows of their parameters are those of the last
-/// step.
-RolloutReport RolloutTangent(ControlledModel<double>* model, const State<double>& initial,
+
+/// Runs the rollout with its tangent. `w_dot` holds the directions on entry (VariableJacobian of
+/// parameter_map.h, dense) and the final state's derivatives on return, when the rows of controls'
+/// parameters are those of the last step.
+RolloutReport RolloutTangent(ControlledModel<double> model, const State<double>& initial,
                              const ControlDirections& directions, const TangentObserver& observer,
                              Stepper* stepper, RowMatrixXd* w_dot, State<double>* final,
                              const StepRange& range = {});
+/// The same without controls, with a stepper of its own.
+RolloutReport RolloutTangent(const Model<double>& model, const State<double>& initial,
+                             const TangentObserver& observer, RowMatrixXd* w_dot,
+                             State<double>* final);
 
 /// Turns the derivatives of the new twists of moving blocks (3 num_blocks x columns, row-major)
 /// into those of the state after the step: poses move with the twists, and are projected.

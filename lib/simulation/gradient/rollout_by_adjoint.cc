@@ -9,7 +9,7 @@ RolloutOutput RolloutWorker::Record(const RolloutInput& input, const TapeOptions
   RolloutOutput output;
   if (Set(input, &output)) {
     RunAs(
-        [&](ControlledModel<double>* model, const StateObserver& keep) {
+        [&](const ControlledModel<double>& model, const StateObserver& keep) {
           return tape_.Record(model, initial_, options, keep, &output.final);
         },
         &output);
@@ -25,8 +25,7 @@ RowMatrixXd RolloutWorker::Sweep(int columns, const Bars& bars,
       for (int c = 0; c < columns; ++c) (*w_bar_k)(variable, c) += weight * bars(row, c);
     });
   };
-  ControlledModel<double> model = Controlled();
-  tape_.AdjointFrom(&model, f_.records_.back(), columns, seed, sink, &w_bar);
+  tape_.AdjointFrom(Controlled(), f_.records_.back(), columns, seed, &w_bar, sink);
   return w_bar;
 }
 
@@ -64,7 +63,7 @@ std::vector<InputDirection> RolloutWorker::Adjoint(const std::vector<RowMatrixXd
 
 void RolloutWorker::JacobianByAdjoint(RowMatrixXd* jacobian, RolloutOutput* output) {
   RunAs(
-      [&](ControlledModel<double>* model, const StateObserver& keep) {
+      [&](const ControlledModel<double>& model, const StateObserver& keep) {
         return tape_.Record(model, initial_, TapeOptions{}, keep, &output->final);
       },
       output);

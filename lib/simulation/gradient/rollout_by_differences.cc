@@ -83,7 +83,7 @@ void RolloutWorker::JacobianByDifferences(double step, RowMatrixXd* jacobian,
   const auto run = [this](RolloutOutput* result) {
     Signature signature;
     RunAs(
-        [&](ControlledModel<double>* model, const StateObserver& keep) {
+        [&](const ControlledModel<double>& model, const StateObserver& keep) {
           const StateObserver sign = [&](long k, double t, const State<double>& state,
                                          Stepper* stepper) {
             keep(k, t, state, stepper);

@@ -21,7 +21,7 @@ TangentObserver RolloutWorker::KeepTangents(const StateObserver& keep, RowMatrix
 void RolloutWorker::RunTangent(const ControlDirections& directions, RowMatrixXd w_dot,
                                RowMatrixXd* rows, RolloutOutput* output) {
   RunAs(
-      [&](ControlledModel<double>* model, const StateObserver& keep) {
+      [&](const ControlledModel<double>& model, const StateObserver& keep) {
         return RolloutTangent(model, initial_, directions, KeepTangents(keep, rows), &*stepper_,
                               &w_dot, &output->final);
       },
@@ -89,7 +89,7 @@ RolloutOutput RolloutWorker::OneSidedJacobian(const RolloutInput& input, double 
   RowMatrixXd w_dot = sign * VariableDirections(RowMatrixXd::Identity(parameters, parameters),
                                                 RowMatrixXd::Zero(f_.num_states(), parameters));
   RunAs(
-      [&](ControlledModel<double>* model, const StateObserver& keep) {
+      [&](const ControlledModel<double>& model, const StateObserver& keep) {
         return RolloutDirectional(model, initial_, KeepTangents(keep, jacobian), &*stepper_, &w_dot,
                                   &output.final);
       },

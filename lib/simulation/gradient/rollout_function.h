@@ -180,7 +180,7 @@ class RolloutWorker {
                                   : ControlledModel<double>(model_, controls_);
   }
   /// Runs with an observer that keeps the recorded states; `run` is a rollout of some kind.
-  using Runner = std::function<RolloutReport(ControlledModel<double>*, const StateObserver&)>;
+  using Runner = std::function<RolloutReport(const ControlledModel<double>&, const StateObserver&)>;
   void RunAs(const Runner& run, RolloutOutput* output);
   const Eigen::SparseMatrix<double>& ParameterJacobian();
   /// Directions of [poses | twists | parameters] from those of parameters and initial states, one

@@ -71,8 +71,7 @@ void RolloutWorker::RunAs(const Runner& run, RolloutOutput* output) {
   const StateObserver keep = [&](long k, double, const State<double>& state, Stepper*) {
     f_.samples_.Add(k, state, output->states.data());
   };
-  ControlledModel<double> model = Controlled();
-  output->SetReport(run(&model, keep));
+  output->SetReport(run(Controlled(), keep));
   FinishRows(output->report, &output->states);
 }
 
@@ -87,7 +86,7 @@ RolloutOutput RolloutWorker::Run(const RolloutInput& input) {
   RolloutOutput output;
   if (Set(input, &output)) {
     RunAs(
-        [&](ControlledModel<double>* model, const StateObserver& keep) {
+        [&](const ControlledModel<double>& model, const StateObserver& keep) {
           return Rollout(model, initial_, keep, &*stepper_, &output.final);
         },
         &output);
@@ -136,9 +135,7 @@ Certificate RolloutWorker::Certify(const RolloutInput& input, const std::vector<
     }
   }
   std::sort(options.numbers.begin(), options.numbers.end());
-  RolloutReport report;
-  ControlledModel<double> model = Controlled();
-  return CertifyRollout(&model, initial_, options, &report);
+  return CertifyRollout(Controlled(), initial_, options);
 }
 
 RolloutOutput RolloutWorker::Jacobian(const RolloutInput& input, GradientMethod method,

@@ -29,8 +29,11 @@ using Controls = BasicControls<double>;
 template <typename T>
 class ControlledModel {
  public:
-  /// A model that is the same in all steps; it must outlive this object.
-  explicit ControlledModel(const Model<T>& model) : model_(&model) {}
+  /// A model that is the same in all steps; it must outlive this object. What runs a model with
+  /// controls runs one without.
+  ControlledModel(const Model<T>& model)  // NOLINT(google-explicit-constructor): see above
+      : model_(&model) {}
+  ControlledModel(Model<T>&& model) = delete;
   ControlledModel(const Model<T>& model, const BasicControls<T>& controls)
       : model_(&model), controls_(&controls), own_(model) {}
 

@@ -81,23 +81,23 @@ long RolloutReport::SolvedBy(Rung first, Rung last) const {
                          &solved_by[static_cast<size_t>(last)] + 1, 0L);
 }
 
-RolloutReport Rollout(ControlledModel<double>* model, const State<double>& initial,
+RolloutReport Rollout(ControlledModel<double> model, const State<double>& initial,
                       const StateObserver& observer, Stepper* stepper, State<double>* final,
                       const StepRange& range) {
-  const SimulationSettings& settings = model->structure().settings;
+  const SimulationSettings& settings = model.structure().settings;
   RolloutReport report;
   State<double> state = initial;
   stepper->ClearGuess();
   const long steps = range.last < 0 ? NumSteps(settings) : range.last;
   EnergyWatch watch;
-  if (!model->is_controlled()) watch = EnergyWatch(model->At(range.first), initial);
+  if (!model.is_controlled()) watch = EnergyWatch(model.At(range.first), initial);
   report.time = StepTime(settings, range.first);
   if (observer) {
     observer(range.first, report.time, state, nullptr);
   }
   for (long k = range.first; k < steps; ++k) {
     const double t = StepTime(settings, k);
-    const Model<double>& now = model->At(k);
+    const Model<double>& now = model.At(k);
     const StepReport step = Watched(watch, now, state, k, steps,
                                     stepper->Step(now, t, StepLength(settings, k), &state));
     report.Add(step);
@@ -112,15 +112,9 @@ RolloutReport Rollout(ControlledModel<double>* model, const State<double>& initi
       observer(k + 1, report.time, state, stepper);
     }
   }
-  LookAtEnergy(*model, model->At(0), initial, state, &report);
+  LookAtEnergy(model, model.At(0), initial, state, &report);
   *final = std::move(state);
   return report;
-}
-
-RolloutReport Rollout(const Model<double>& model, const State<double>& initial,
-                      const StateObserver& observer, Stepper* stepper, State<double>* final) {
-  ControlledModel<double> plain(model);
-  return Rollout(&plain, initial, observer, stepper, final);
 }
 
 RolloutReport Rollout(const Model<double>& model, const State<double>& initial,

@@ -39,24 +39,21 @@ struct RolloutReport : StepCounts {
 using StateObserver =
     std::function<void(long k, double t, const State<double>& state, Stepper* stepper)>;
 
-/// Runs the scene's duration. `final` (may be the initial state itself) gets the last good state;
-/// the observer may be empty.
-RolloutReport Rollout(const Model<double>& model, const State<double>& initial,
-                      const StateObserver& observer, State<double>* final);
-
-/// The same with the caller's stepper, which keeps its memory from run to run; its guess is cleared
-/// first.
-RolloutReport Rollout(const Model<double>& model, const State<double>& initial,
-                      const StateObserver& observer, Stepper* stepper, State<double>* final);
 /// Steps first, first + 1, ... before last; a negative last is the end of the run.
 struct StepRange {
   long first = 0;
   long last = -1;
 };
-/// The same for a model with controls, from `initial` before the first step of a range.
-RolloutReport Rollout(ControlledModel<double>* model, const State<double>& initial,
+
+/// Runs the scene's duration, or from `initial` before the first step of a range. `final` (may be
+/// the initial state itself) gets the last good state; the observer may be empty. The stepper keeps
+/// its memory from run to run; its guess is cleared first.
+RolloutReport Rollout(ControlledModel<double> model, const State<double>& initial,
                       const StateObserver& observer, Stepper* stepper, State<double>* final,
                       const StepRange& range = {});
+/// The same with a stepper of its own.
+RolloutReport Rollout(const Model<double>& model, const State<double>& initial,
+                      const StateObserver& observer, State<double>* final);
 
 template <typename T>
 using JetObserver = std::function<void(long k, double t, const State<T>& state)>;

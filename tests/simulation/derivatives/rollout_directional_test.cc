@@ -261,9 +261,8 @@ TEST(OneSidedTest, IsNotLinearInItsDirection) {
   // μ m g grows by 8 a unit of friction: the push wins where it grows by more.
   for (const double push : {0.0, 4.0, 8.0, 12.0}) {
     RowMatrixXd w_dot = one.col(0) + push * one.col(1);
-    ControlledModel<double> plain(model);
     Stepper stepper(model);
-    const RolloutReport report = RolloutDirectional(&plain, initial, {}, &stepper, &w_dot, &final);
+    const RolloutReport report = RolloutDirectional(model, initial, {}, &stepper, &w_dot, &final);
     ASSERT_EQ(report.status, StepStatus::kDone) << report.message;
     EXPECT_NEAR(w_dot(model.structure->TwistVariable(0, 0), 0), std::max(0.0, push - 8.0) / 16.0,
                 1e-13)
