@@ -140,7 +140,6 @@ void RunSummary::Keep(const Model<double>& model, const State<double>& state,
     AddClosedContacts(record, &closed_);
     closed_ends_.push_back(closed_.size());
     stepped_ = true;
-    by_events_ = stepper->by_events();
     last_step_.time = record.time;
     last_step_.h = record.h;
     last_step_.before = record.before;
@@ -192,7 +191,8 @@ OrderedJson RunSummary::ToJson(const Model<double>& model, const RolloutReport& 
   if (stepped_) {
     // The rows of a fixed step are those at its start; the last ones of event stepping are those at
     // its end.
-    undetermined = UndeterminedJson(model, by_events_ ? last : last_step_.before, last_step_);
+    undetermined =
+        UndeterminedJson(model, RunsByEvents(model) ? last : last_step_.before, last_step_);
   }
   return {
       {"status", ToString(report.status)},

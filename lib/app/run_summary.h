@@ -32,7 +32,6 @@ class RunSummary {
   // The last step, without its problem.
   StepRecord last_step_;
   bool stepped_ = false;
-  bool by_events_ = false;
 
   // The kept data: the poses of states one after the other, where the scene has joints or runs by
   // events, and for each step the bodies in contact and the position in `closed_` where they end.

@@ -68,8 +68,6 @@ class RolloutCertifier {
   Certificate Finish(const Model<double>& model, const RolloutReport& report);
   /// Smallest margin of the last step that was added; infinite if nothing was near.
   double step_margin() const { return step_margin_; }
-  /// Smallest relative distance to a decision at which values jump; infinite if there was none.
-  double jump_margin() const { return jump_margin_; }
   /// After Finish: leaves out of a certificate the contacts that are exactly at a kink, fixed steps
   /// only. For directions that move none of them.
   void LeaveOutKinks(Certificate* certificate) const;

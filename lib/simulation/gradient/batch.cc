@@ -13,17 +13,16 @@ namespace {
 // One row: values(r, :) of the parameters.
 class Row {
  public:
-  Row(const BatchOptions& options, const std::vector<int>& loss_outputs, BatchDerivative derivative)
-      : options_(options), loss_outputs_(loss_outputs), derivative_(derivative) {}
+  /// `loss` is null where the derivative is that of the final state.
+  Row(const OutputLoss* loss, BatchDerivative derivative) : loss_(loss), derivative_(derivative) {}
 
   void Run(const VectorX<double>& parameters, RolloutWorker* worker, BatchRow* result) const {
     const RolloutInput input{parameters, {}, {}};
-    const bool of_loss = !loss_outputs_.empty();
     RolloutOutput output;
     GradientMethod used = GradientMethod::kAuto;
     if (derivative_ == BatchDerivative::kNone) {
       output = worker->Run(input);
-    } else if (of_loss && derivative_ == BatchDerivative::kAdjoint) {
+    } else if (loss_ != nullptr && derivative_ == BatchDerivative::kAdjoint) {
       output = worker->Record(input);
       if (output.status == RolloutStatus::kDone) {
         result->gradient = worker->Adjoint({Seed(output.states)})[0].parameters;
@@ -44,8 +43,8 @@ class Row {
       return;
     }
     result->warnings = worker->Warnings(result->report, result->final);
-    if (!of_loss) return;
-    result->loss = Loss(output.states);
+    if (loss_ == nullptr) return;
+    result->loss = loss_->Value(output.states.row(0).transpose());
     if (result->jacobian.size() > 0) {
       result->gradient = (Seed(output.states) * result->jacobian).transpose();
       result->jacobian.resize(0, 0);
@@ -53,29 +52,12 @@ class Row {
   }
 
  private:
-  double Loss(const RowMatrixXd& states) const {
-    double loss = 0.0;
-    for (size_t i = 0; i < loss_outputs_.size(); ++i) {
-      const LossTerm& term = options_.loss[i];
-      const double error = states(0, loss_outputs_[i]) - term.target;
-      loss += term.weight * error * error;
-    }
-    return loss;
-  }
-
   // Derivatives of the loss with respect to the outputs, as a row.
   RowMatrixXd Seed(const RowMatrixXd& states) const {
-    RowMatrixXd seed = RowMatrixXd::Zero(1, states.cols());
-    for (size_t i = 0; i < loss_outputs_.size(); ++i) {
-      const LossTerm& term = options_.loss[i];
-      const int output = loss_outputs_[i];
-      seed(0, output) += 2.0 * term.weight * (states(0, output) - term.target);
-    }
-    return seed;
+    return loss_->Derivative(states.row(0).transpose()).transpose();
   }
 
-  const BatchOptions& options_;
-  const std::vector<int>& loss_outputs_;
+  const OutputLoss* loss_;
   BatchDerivative derivative_;
 };
 
@@ -106,17 +88,10 @@ BatchResult RunBatch(const Scene& scene, const std::vector<ParameterPath>& param
   result.message = function.Create(scene, paths, {}, {});
   if (!result.message.empty()) return result;
   result.derivative = DerivativeOf(options, function);
-  std::vector<int> loss_outputs;  // of each term
-  const std::vector<std::string> names = OutputNames(function.structure());
-  for (const LossTerm& term : options.loss) {
-    const auto found = std::find(names.begin(), names.end(), term.output);
-    if (found == names.end()) {
-      result.message = "output " + term.output + ": no such output of the scene";
-      return result;
-    }
-    loss_outputs.push_back(static_cast<int>(found - names.begin()));
-  }
-  const Row row(options, loss_outputs, result.derivative);
+  OutputLoss loss;
+  result.message = loss.Create(function.structure(), options.loss);
+  if (!result.message.empty()) return result;
+  const Row row(options.loss.empty() ? nullptr : &loss, result.derivative);
   result.rows.resize(static_cast<size_t>(values.rows()));
   std::mutex mutex;
   long done = 0;

@@ -314,39 +314,52 @@ GradientResult FinalStateJacobian(const Scene& scene, const std::vector<Paramete
   return result;
 }
 
+std::string OutputLoss::Create(const ModelStructure& structure,
+                               const std::vector<LossTerm>& terms) {
+  const std::vector<std::string> outputs = OutputNames(structure);
+  terms_ = terms;
+  places_.clear();
+  for (const LossTerm& term : terms) {
+    const auto found = std::find(outputs.begin(), outputs.end(), term.output);
+    if (found == outputs.end()) return "output " + term.output + ": no such output of the scene";
+    places_.push_back(found - outputs.begin());
+  }
+  return "";
+}
+
+double OutputLoss::Value(const VectorX<double>& outputs) const {
+  double loss = 0.0;
+  for (size_t i = 0; i < terms_.size(); ++i) {
+    const double error = outputs[places_[i]] - terms_[i].target;
+    loss += terms_[i].weight * error * error;
+  }
+  return loss;
+}
+
+VectorX<double> OutputLoss::Derivative(const VectorX<double>& outputs) const {
+  VectorX<double> derivative = VectorX<double>::Zero(outputs.size());
+  for (size_t i = 0; i < terms_.size(); ++i) {
+    derivative[places_[i]] += 2.0 * terms_[i].weight * (outputs[places_[i]] - terms_[i].target);
+  }
+  return derivative;
+}
+
 GradientResult LossGradient(const Scene& scene, const std::vector<ParameterPath>& parameters,
                             const std::vector<LossTerm>& terms, const GradientOptions& options) {
   const GradientProblem problem = MakeProblem(scene, parameters);
-  const std::vector<std::string> outputs = OutputNames(problem.function.structure());
-  std::vector<Eigen::Index> places;
-  for (const LossTerm& term : terms) {
-    const auto found = std::find(outputs.begin(), outputs.end(), term.output);
-    if (found == outputs.end()) {
-      GradientResult result;
-      result.message = "output " + term.output + ": no such output of the scene";
-      return result;
-    }
-    places.push_back(found - outputs.begin());
-  }
+  GradientResult result;
+  OutputLoss loss;
+  result.message = loss.Create(problem.function.structure(), terms);
+  if (!result.message.empty()) return result;
   const auto seed = [&](const VectorX<double>& values) {
-    MatrixX<double> bar = MatrixX<double>::Zero(values.size(), 1);
-    for (size_t i = 0; i < terms.size(); ++i) {
-      bar(places[i], 0) += 2.0 * terms[i].weight * (values[places[i]] - terms[i].target);
-    }
-    return bar;
+    return MatrixX<double>(loss.Derivative(values));
   };
   RowMatrixXd derivative;
-  GradientResult result = Differentiate(problem, options, Differentiated::kLoss, seed, &derivative);
-  if (!result.done) {
-    return result;
-  }
+  result = Differentiate(problem, options, Differentiated::kLoss, seed, &derivative);
+  if (!result.done) return result;
   result.jacobian.resize(0, 0);
   result.gradient = derivative.row(0).transpose();
-  result.loss = 0.0;
-  for (size_t i = 0; i < terms.size(); ++i) {
-    const double error = result.values[places[i]] - terms[i].target;
-    result.loss += terms[i].weight * error * error;
-  }
+  result.loss = loss.Value(result.values);
   return result;
 }
 

@@ -69,6 +69,19 @@ struct LossTerm {
   double weight = 1.0;
 };
 
+/// The same with its outputs found among those of a scene.
+class OutputLoss {
+ public:
+  /// Empty, or one line: an output that the scene does not have.
+  std::string Create(const ModelStructure& structure, const std::vector<LossTerm>& terms);
+  double Value(const VectorX<double>& outputs) const;
+  VectorX<double> Derivative(const VectorX<double>& outputs) const;
+
+ private:
+  std::vector<LossTerm> terms_;
+  std::vector<Eigen::Index> places_;  ///< of the terms' outputs
+};
+
 struct GradientResult {
   bool done = false;
   GradientMethod method = GradientMethod::kAuto;  ///< the one used; kAuto before one was chosen
