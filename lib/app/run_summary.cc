@@ -114,18 +114,6 @@ bool RunsByEvents(const Model<double>& model) {
 
 }  // namespace
 
-const char* ToString(StepStatus status) {
-  switch (status) {
-    case StepStatus::kDone:
-      return "done";
-    case StepStatus::kUnsolved:
-      return "unsolved";
-    case StepStatus::kDiverged:
-      return "diverged";
-  }
-  return "";
-}
-
 void RunSummary::Keep(const Model<double>& model, const State<double>& state,
                       const Stepper* stepper) {
   if (!started_) {
@@ -195,7 +183,7 @@ OrderedJson RunSummary::ToJson(const Model<double>& model, const RolloutReport& 
         UndeterminedJson(model, RunsByEvents(model) ? last : last_step_.before, last_step_);
   }
   return {
-      {"status", ToString(report.status)},
+      {"status", NameOf(report.status)},
       {"message", report.message},
       {"steps", report.steps},
       {"seconds", nullptr},

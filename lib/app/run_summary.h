@@ -41,7 +41,4 @@ class RunSummary {
   State<double> at_;  // the state whose joints and gaps are measured
 };
 
-/// "done", "unsolved" or "diverged".
-const char* ToString(StepStatus status);
-
 }  // namespace tangible

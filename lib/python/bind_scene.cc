@@ -157,7 +157,7 @@ Run Simulate(const Scene& scene, long every, Wanted wanted) {
       },
       &stepper, &last);
   summary.EvaluateKept(model);
-  run.status = ToString(report.status);
+  run.status = NameOf(report.status);
   run.message = report.message;
   run.summary = summary.ToJson(model, report, last).dump();
   run.warnings = warnings.Finish(model, report, last);

@@ -11,18 +11,6 @@
 namespace tangible {
 namespace {
 
-RolloutStatus StatusOf(StepStatus status) {
-  switch (status) {
-    case StepStatus::kDone:
-      return RolloutStatus::kDone;
-    case StepStatus::kUnsolved:
-      return RolloutStatus::kUnsolved;
-    case StepStatus::kDiverged:
-      return RolloutStatus::kDiverged;
-  }
-  return RolloutStatus::kUnsolved;
-}
-
 bool EndsWith(const std::string& text, const std::string& end) {
   return text.size() >= end.size() && text.compare(text.size() - end.size(), end.size(), end) == 0;
 }
@@ -43,22 +31,8 @@ std::string SizeError(const char* what, const std::string& expected, const std::
 
 void RolloutOutput::SetReport(RolloutReport run) {
   report = std::move(run);
-  status = StatusOf(report.status);
+  status = report.status;
   message = report.message;
-}
-
-const char* NameOf(RolloutStatus status) {
-  switch (status) {
-    case RolloutStatus::kDone:
-      return "done";
-    case RolloutStatus::kUnsolved:
-      return "unsolved";
-    case RolloutStatus::kDiverged:
-      return "diverged";
-    case RolloutStatus::kRefused:
-      return "refused";
-  }
-  return "";
 }
 
 std::string RolloutFunction::AddControl(const std::string& path) {

@@ -42,13 +42,9 @@ struct RolloutInput {
 /// filled in either case.
 using InputDirection = RolloutInput;
 
-enum class RolloutStatus { kDone, kUnsolved, kDiverged, kRefused };
-
-/// "done", "unsolved", "diverged", "refused".
-const char* NameOf(RolloutStatus status);
+using RolloutStatus = StepStatus;
 
 struct RolloutOutput {
-  /// kRefused: a parameter has a value that is not allowed; nothing was run.
   RolloutStatus status = RolloutStatus::kDone;
   std::string message;  ///< empty unless it failed: when, where, what
   RowMatrixXd states;   ///< rows of steps that were not reached are NaN

@@ -109,6 +109,20 @@ void AddStepTimes(const std::vector<double>& times, SimulationSettings* settings
   settings->step_times = std::move(merged);
 }
 
+const char* NameOf(StepStatus status) {
+  switch (status) {
+    case StepStatus::kDone:
+      return "done";
+    case StepStatus::kUnsolved:
+      return "unsolved";
+    case StepStatus::kDiverged:
+      return "diverged";
+    case StepStatus::kRefused:
+      return "refused";
+  }
+  return "";
+}
+
 Stepper::Stepper(const Model<double>& model, int threads)
     : search_(model), islands_(std::make_unique<IslandSolver>(threads)) {
   const ModelStructure& s = *model.structure;

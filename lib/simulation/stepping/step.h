@@ -27,7 +27,11 @@
 
 namespace tangible {
 
-enum class StepStatus { kDone, kUnsolved, kDiverged };
+/// Of a step or a run. kRefused: a parameter has a value that is not allowed; nothing was run.
+enum class StepStatus { kDone, kUnsolved, kDiverged, kRefused };
+
+/// "done", "unsolved", "diverged", "refused".
+const char* NameOf(StepStatus status);
 
 /// The report of a step; the caller sums over the run.
 struct StepReport : StepCounts {
