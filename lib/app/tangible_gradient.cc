@@ -43,18 +43,6 @@ DEFINE_string(out, "", "file of the result; empty: stdout");
 namespace tangible {
 namespace {
 
-std::string NameOfMethod(GradientMethod method) { return NameOf(method, kGradientMethodNames); }
-
-bool FindMethod(const std::string& name, GradientMethod* method) {
-  for (const auto& [known, value] : kGradientMethodNames) {
-    if (name == known) {
-      *method = value;
-      return true;
-    }
-  }
-  return false;
-}
-
 // Whether a flag is given that only the adjoint uses, whatever its value.
 bool AsksForTheAdjoint() {
   const auto written = [](const char* flag) {
@@ -163,7 +151,7 @@ OrderedJson Describe(const MotionComparison& comparison) {
 }
 
 OrderedJson Describe(const GradientResult& result) {
-  OrderedJson text = {{"method", NameOfMethod(result.method)},
+  OrderedJson text = {{"method", NameOf(result.method)},
                       {"requested_method", FLAGS_method},
                       {"parameters", SplitAtCommas(FLAGS_parameters)},
                       {"outputs", result.outputs},

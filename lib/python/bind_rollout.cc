@@ -181,10 +181,8 @@ class Rollout {
   // Of one input: (states, status, message, method, jacobian with all columns).
   py::tuple Jacobian(const Inputs& in, const std::string& method) const {
     const std::vector<RolloutInput> inputs = Read(in);
-    const auto* found =
-        std::find_if(std::begin(kGradientMethodNames), std::end(kGradientMethodNames),
-                     [&](const auto& entry) { return method == entry.first; });
-    if (found == std::end(kGradientMethodNames)) {
+    GradientMethod wanted = GradientMethod::kAuto;
+    if (!FindMethod(method, &wanted)) {
       throw py::value_error(
           "method: expected auto, adjoint, tangent, jet, jet_implicit or "
           "finite_difference, got " +
@@ -194,16 +192,11 @@ class Rollout {
     GradientMethod used = GradientMethod::kAuto;
     const RolloutOutput output = WithoutLock([&] {
       RolloutWorker worker(function_);
-      return worker.Jacobian(inputs.at(0), found->second, RolloutWorker::Inputs::kAll, &jacobian,
-                             &used);
+      return worker.Jacobian(inputs.at(0), wanted, RolloutWorker::Inputs::kAll, &jacobian, &used);
     });
-    const char* name = "";
-    for (const auto& [text, value] : kGradientMethodNames) {
-      if (value == used) name = text;
-    }
     return py::make_tuple(
         ToArray(output.states, {function_.num_records(), function_.num_states()}),
-        NameOf(output.status), output.message, name,
+        NameOf(output.status), output.message, NameOf(used),
         ToArray(jacobian, {function_.num_records(), function_.num_states(), jacobian.cols()}));
   }
 

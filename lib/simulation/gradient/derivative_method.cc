@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tangible/simulation/gradient/derivative_method.h"
 
-#include "tangible/math/scalar.h"
+#include "tangible/simulation/gradient/jet_passes.h"
 
 namespace tangible {
 
@@ -9,13 +9,19 @@ const char* NameOf(GradientMethod method) {
   return kGradientMethodNames[static_cast<int>(method)].first;
 }
 
+bool FindMethod(const std::string& name, GradientMethod* method) {
+  for (const auto& [known, value] : kGradientMethodNames) {
+    if (name == known) {
+      *method = value;
+      return true;
+    }
+  }
+  return false;
+}
+
 bool IsAvailable(GradientMethod method) {
-  int num_widths = 0;
-#define TANGIBLE_COUNT_WIDTH(N) ++num_widths;
-  TANGIBLE_FOR_EACH_JET_WIDTH(TANGIBLE_COUNT_WIDTH)
-#undef TANGIBLE_COUNT_WIDTH
   return (method != GradientMethod::kJet && method != GradientMethod::kJetImplicit) ||
-         num_widths > 0;
+         JetWidthFor(1) > 0;
 }
 
 }  // namespace tangible

@@ -3,6 +3,7 @@
 //
 // The ways to differentiate a run; gradient.h compares them.
 
+#include <string>
 #include <utility>
 
 namespace tangible {
@@ -19,6 +20,8 @@ inline constexpr std::pair<const char*, GradientMethod> kGradientMethodNames[] =
 
 /// "adjoint", ...
 const char* NameOf(GradientMethod method);
+/// False where no method has this name.
+bool FindMethod(const std::string& name, GradientMethod* method);
 
 /// Whether this build has the method: Jets need a width in TANGIBLE_JET_WIDTHS.
 bool IsAvailable(GradientMethod method);
