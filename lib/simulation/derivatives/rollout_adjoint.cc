@@ -8,14 +8,6 @@
 #include "tangible/math/interrupt.h"
 
 namespace tangible {
-namespace {
-
-bool Projects(const ModelStructure& structure) {
-  return JointCorrectionOf(structure.settings) == JointCorrection::kProjection &&
-         !structure.joints.empty();
-}
-
-}  // namespace
 
 size_t RolloutTape::Entry::bytes() const {
   return sizeof(Entry) + record.bytes() + system.bytes() + events.bytes() +
@@ -174,7 +166,7 @@ void RolloutTape::Take(const Model<double>& model, long remaining) {
       DropFactors(&entry);
     }
   }
-  if (Projects(*model.structure)) {
+  if (ProjectsOntoJoints(*model.structure)) {
     if (!entry.projection) {
       entry.projection = std::make_unique<JointProjection>();
     }
@@ -297,7 +289,7 @@ void RolloutTape::StepAdjoint(const Model<double>& model, const StepRecord& reco
                               RowMatrixXd* w_bar) {
   const ModelStructure& s = *model.structure;
   const int columns = static_cast<int>(w_bar->cols());
-  if (Projects(s)) {
+  if (ProjectsOntoJoints(s)) {
     projection->Adjoint(model, w_bar->data(), columns);
   }
   double* w = w_bar->data();

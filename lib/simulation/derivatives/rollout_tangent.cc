@@ -22,7 +22,7 @@ void AdvanceTangent(const Model<double>& model, Stepper* stepper, const double* 
           stepper->record().h * w_dot->row(s.TwistVariable(body, i));
     }
   }
-  if (JointCorrectionOf(s.settings) == JointCorrection::kProjection && !s.joints.empty()) {
+  if (ProjectsOntoJoints(s)) {
     stepper->projection().Tangent(model, w_dot->data(), columns);
   }
 }

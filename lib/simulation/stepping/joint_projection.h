@@ -17,6 +17,12 @@
 
 namespace tangible {
 
+/// Whether steps of the model project poses onto joints.
+inline bool ProjectsOntoJoints(const ModelStructure& structure) {
+  return JointCorrectionOf(structure.settings) == JointCorrection::kProjection &&
+         !structure.joints.empty();
+}
+
 class JointProjection {
  public:
   /// Projects the poses of the state; false (with the state's last iterate) where the tolerance is

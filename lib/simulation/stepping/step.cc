@@ -428,7 +428,6 @@ StepReport Stepper::Step(const Model<double>& model, double t, double h, State<d
   }
   StepReport report;
   const ModelStructure& structure = *model.structure;
-  const SimulationSettings& settings = structure.settings;
   StepRecord& r = record_;
   r.time = t;
   r.h = h;
@@ -453,8 +452,7 @@ StepReport Stepper::Step(const Model<double>& model, double t, double h, State<d
   }
   last_contacts_.assign(r.contacts.begin(), r.contacts.end());
   last_solution_ = r.solution;
-  const bool projects =
-      JointCorrectionOf(settings) == JointCorrection::kProjection && !structure.joints.empty();
+  const bool projects = ProjectsOntoJoints(structure);
   const bool met = !projects || projection_.Project(model, r.before.pose, state);
   report.damped_projections = projects ? projection_.damped_steps() : 0;
   if (!met) {

@@ -63,7 +63,7 @@ void StepImplicit(const Model<T>& model, Stepper* stepper, const State<double>& 
     }
   }
   internal::MovePoses(s, record.h, state);
-  if (JointCorrectionOf(s.settings) == JointCorrection::kProjection && !s.joints.empty()) {
+  if (ProjectsOntoJoints(s)) {
     ProjectImplicit(model, &stepper->projection(), after, state);
   }
 }
@@ -72,7 +72,7 @@ template <typename T>
 bool StepUnrolled(const Model<T>& model, const StepRecord& record, State<T>* state) {
   const ModelStructure& s = *model.structure;
   const bool converged = SolveUnrolled(model, record, state);
-  if (JointCorrectionOf(s.settings) == JointCorrection::kProjection && !s.joints.empty()) {
+  if (ProjectsOntoJoints(s)) {
     JointProjection::ProjectUnrolled(model, record.before.pose, state);
   }
   return converged;
