@@ -54,6 +54,33 @@ TEST(RolloutTest, ObserverSeesEveryStateWithItsRecord) {
   EXPECT_LE(report.residual, 1e-10);
 }
 
+// Only the guess is missing where the second range begins.
+TEST(RolloutTest, TwoRangesAreTheWholeRun) {
+  const Scene scene = test_scenes::SceneOf(test_scenes::Mixture());
+  Model<double> model;
+  State<double> initial, whole, halfway, end;
+  BuildModel(scene, &model, &initial);
+  Stepper stepper(model);
+  const RolloutReport all = Rollout(model, initial, {}, &stepper, &whole);
+  std::vector<long> seen;
+  const StateObserver note = [&](long k, double t, const State<double>&, Stepper*) {
+    EXPECT_EQ(t, StepTime(scene.simulation, k));
+    seen.push_back(k);
+  };
+  const RolloutReport first = Rollout(model, initial, note, &stepper, &halfway, {0, 30});
+  const RolloutReport second = Rollout(model, halfway, note, &stepper, &end, {30, -1});
+  EXPECT_EQ(first.steps, 30);
+  EXPECT_EQ(first.steps + second.steps, all.steps);
+  EXPECT_EQ(second.time, all.time);
+  EXPECT_EQ(seen.size(), 31u + 34u);
+  EXPECT_EQ(seen[31], 30);
+  EXPECT_FALSE(halfway == whole);
+  for (size_t i = 0; i < whole.pose.size(); ++i) {
+    EXPECT_NEAR(end.pose[i], whole.pose[i], 1e-12) << i;
+    EXPECT_NEAR(end.twist[i], whole.twist[i], 1e-10) << i;
+  }
+}
+
 TEST(RolloutTest, AResumedRunHasTheSameBits) {
   // Modes and impulses are part of the state: with them the second half is the same.
   const Scene scene = test_scenes::SceneOf(test_scenes::Mixture());
