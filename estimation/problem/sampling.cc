@@ -127,9 +127,19 @@ void SamplePlan::ForEachRate(const SimulationSettings& settings, const Use& use)
   if (steps == 0) {  // there is no second state, and nothing moves
     return;
   }
+  const auto add = [&](int i, long from, long to, double weight) {
+    const double slope = weight / (StepTime(settings, to) - StepTime(settings, from));
+    UseState(i, from, -slope, !by_events_, use);
+    UseState(i, to, slope, !by_events_, use);
+  };
   for (int i = 0; i < num_samples(); ++i) {
     long from = std::min(samples_[i].step, steps - 1);
     long to = from + 1;
+    if (!by_events_ && samples_[i].part == 0.0 && from > 0 && samples_[i].step == from) {
+      add(i, from - 1, from, 0.5);
+      add(i, from, to, 0.5);
+      continue;
+    }
     if (by_events_) {
       Sample around = samples_[i];
       around.time = std::max(0.0, samples_[i].time - kRateStep * settings.dt);
@@ -139,9 +149,7 @@ void SamplePlan::ForEachRate(const SimulationSettings& settings, const Use& use)
       Locate(settings, &around);
       to = around.step;
     }
-    const double span = StepTime(settings, to) - StepTime(settings, from);
-    UseState(i, from, -1.0 / span, !by_events_, use);
-    UseState(i, to, 1.0 / span, !by_events_, use);
+    add(i, from, to, 1.0);
   }
 }
 

@@ -13,11 +13,12 @@
 // event. A point moves with the interpolated pose: r = (x, y) + R(angle) at.
 //
 // Where delays or clocks are parameters, the times move with them, and a sample has a rate: with
-// fixed steps it is (q_{k+1} − q_k) / h of the interval, the derivative of the interpolation (at a
-// step: that of the interval after it). With event stepping the rate of a pose is the twist at that
-// time, and that of a twist the mean acceleration over twice kRateStep of a step around it, for
-// which steps end there too. Moving the ends of steps changes the motion only by the integrator's
-// error, so that this derivative is right to the order of the step.
+// fixed steps it is (q_{k+1} − q_k) / h of the interval, the derivative of the interpolation. At a
+// step between two intervals, where the interpolation has a kink, it is the mean of both slopes, as
+// central differences have it. With event stepping the rate of a pose is the twist at that time,
+// and that of a twist the mean acceleration over twice kRateStep of a step around it, for which
+// steps end there too. Moving the ends of steps changes the motion only by the integrator's error,
+// so that this derivative is right to the order of the step.
 
 #include <algorithm>
 #include <vector>

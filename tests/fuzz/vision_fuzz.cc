@@ -34,24 +34,25 @@ std::string WithChecksum(const std::string& bytes) {
   return magic + text() + "\n" + std::string(body);
 }
 
-void ReadData(const std::string& bytes) {
-  tangible::DiscData data, again;
+// What is read is written, and read again as the same bytes.
+template <typename File>
+void ReadTwice(const std::string& bytes,
+               bool (*parse)(const std::string&, const std::string&, File*, std::string*),
+               std::string (*serialize)(const File&)) {
+  File file, again;
   std::string error;
-  if (!tangible::ParseDiscData(bytes, "d", &data, &error)) return ExpectOneLine(error);
-  const std::string written = tangible::SerializeDiscData(data);
-  Expect(tangible::ParseDiscData(written, "d", &again, &error), "what was written", error);
-  Expect(tangible::SerializeDiscData(again) == written, "the same bytes", "");
+  if (!parse(bytes, "f", &file, &error)) return ExpectOneLine(error);
+  const std::string written = serialize(file);
+  Expect(parse(written, "f", &again, &error), "what was written", error);
+  Expect(serialize(again) == written, "the same bytes", "");
+}
+
+void ReadData(const std::string& bytes) {
+  ReadTwice<tangible::DiscData>(bytes, &tangible::ParseDiscData, &tangible::SerializeDiscData);
 }
 
 void ReadTraining(const std::string& bytes) {
-  tangible::TrainingFile training, again;
-  std::string error;
-  if (!tangible::ParseTraining(bytes, "c", &training, &error)) return ExpectOneLine(error);
-  const std::string written = tangible::SerializeTraining(training);
-  Expect(tangible::ParseTraining(written, "c", &again, &error), "what was written", error);
-  Expect(again.weights == training.weights && again.iteration == training.iteration &&
-             again.fingerprint == training.fingerprint,
-         "the same training", "");
+  ReadTwice<tangible::TrainingFile>(bytes, &tangible::ParseTraining, &tangible::SerializeTraining);
 }
 
 }  // namespace

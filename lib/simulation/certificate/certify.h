@@ -106,6 +106,7 @@ class RolloutCertifier {
                   Segment* segment);
   void AddFriction(const CoefficientSource& friction, const Place& place);
   void AddEnd(const Model<double>& model, long step, const EventRecord& record);
+  void AddHandOversAtEnd(const Model<double>& model, long step, const Segment& last);
   void AddTouchesAtEnd(const Model<double>& model, long step, const Segment& last);
   void AddClosedAtOnce(const Model<double>& model, long step, const Segment& segment);
   void AddQuality(const ContactProblem<double>& problem, const std::vector<ContactMode>& modes,

@@ -5,6 +5,7 @@
 // a change where they start.
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "tangible/dynamics/jacobian/contact_gradient.h"
 #include "tangible/lcp/system/contact_conditioning.h"
@@ -302,6 +303,38 @@ void RolloutCertifier::AddTouchesAtEnd(const Model<double>& model, long step, co
   }
 }
 
+// A disc's contact that is handed over from a face to its end, or back, at the end of the run's
+// last motion, or just before or behind it: from there on the disc turns about a corner, or no
+// longer.
+void RolloutCertifier::AddHandOversAtEnd(const Model<double>& model, long step,
+                                         const Segment& last) {
+  const ModelStructure& s = *model.structure;
+  const auto beside = [&](int body, double time) {
+    Pose<double> pose = last.after.PoseOf(body);
+    const double* twist = &last.after.twist[3 * static_cast<size_t>(body)];
+    pose.position.x() += time * twist[0];
+    pose.position.y() += time * twist[1];
+    pose.angle += time * twist[2];
+    return pose;
+  };
+  for (const ActiveContact& contact : last.contacts) {
+    if (contact.joint >= 0 || (ShapeOfA(model, contact).type != ShapeType::kCircle &&
+                               ShapeOfB(model, contact).type != ShapeType::kCircle)) {
+      continue;
+    }
+    for (const double time : {-kNearKinkMargin * s.settings.dt, kNearKinkMargin * s.settings.dt}) {
+      ContactFeature features[2];
+      const int count = FindFeatures(model, contact.a, beside(contact.a, time), contact.b,
+                                     beside(contact.b, time), contact.Parts(),
+                                     std::numeric_limits<double>::infinity(), features);
+      if (count > 0 && std::find(features, features + count, contact.feature) == features + count) {
+        AddMargin(0.0, {&s, step, last.time + last.length, 0, &contact, ContactMode::kOpen},
+                  "the run ends as another corner or edge takes over");
+      }
+    }
+  }
+}
+
 // Events at the run's last instant, or just before or behind it: beside it they have happened or
 // not, which is another derivative of twists, or other twists. Positions have the same on both
 // sides, as do all where forces change gradually (a start of sliding, a lift-off).
@@ -340,6 +373,7 @@ void RolloutCertifier::AddEnd(const Model<double>& model, long step, const Event
     }
   }
   AddTouchesAtEnd(model, step, *last);
+  AddHandOversAtEnd(model, step, *last);
 }
 
 // Contacts and impacts of earlier steps, as the island's: its bodies may have been in several.

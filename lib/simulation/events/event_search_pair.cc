@@ -127,6 +127,11 @@ class EventSearch::PairSearch {
   const ActiveContact* LostAt(const State<double>& state) const;
   void SearchHandOver();
   double AlignedWithin() const;
+  // Whether one of the shapes is a disc, which has no ends that could be aligned with others.
+  bool HasDisc() const {
+    return model_.Shape(a_, parts_.a).type == ShapeType::kCircle ||
+           model_.Shape(b_, parts_.b).type == ShapeType::kCircle;
+  }
   bool HasPassed(const State<double>& state) const;
   bool Continues(const State<double>& state, const ActiveContact& contact,
                  const Features& features) const;
@@ -178,7 +183,7 @@ bool EventSearch::PairSearch::Continues(const State<double>& state, const Active
   ContactRows<double> rows;
   EvaluateContactRows(model_, state, contact, &rows);
   const ContactGeometry<double> of_closed = rows.geometry;
-  const double within = AlignedWithin();
+  const double within = HasDisc() ? 0.0 : AlignedWithin();
   return std::any_of(features.of, features.of + features.count, [&](const ContactFeature& feature) {
     ActiveContact other = contact;
     other.feature = feature;

@@ -236,6 +236,89 @@ TEST(ResidualTest, MethodsAgreeOnAllInstrumentsByEvents) {
   }
 }
 
+/// One sample at 0.5 s of the run, of a body's x or y, by a sensor that may be late and a clock
+/// that may be wrong; all three numbers of them are parameters, and `path`.
+RolloutResiduals OneSample(const Scene& scene, Coordinate coordinate, const std::string& path,
+                           double value) {
+  Instruments instruments;
+  instruments.sensors = {{"late", 0.25}};
+  instruments.clocks = {{"clock", 2.0, 0.25}};
+  std::vector<Channel> channels(1);
+  channels[0].sensor = 0;
+  channels[0].clock = 0;
+  Observation observation;
+  observation.time = 0.25;
+  observation.body = 0;
+  observation.coordinate = coordinate;
+  observation.sigma = 1.0;
+  const std::vector<FitParameter> parameters = {
+      Parameter("sensors/late/delay", 0.25), Parameter("clocks/clock/rate", 2.0),
+      Parameter("clocks/clock/offset", 0.25), Parameter(path, value)};
+  ParameterizedScene parameterized;
+  ParameterError error;
+  EXPECT_TRUE(parameterized.Create(scene, {}, parameters, &error, instruments)) << error.what;
+  return RolloutResiduals(parameterized, {observation}, channels);
+}
+
+/// The residual moves with the sample's time by `speed`, and with the parameter by `by_path`.
+void ExpectMovesWithItsTime(RolloutResiduals residuals, double speed, double by_path,
+                            const std::vector<GradientMethod>& methods) {
+  const Eigen::VectorXd p = residuals.scene().Initial();
+  const double expected[] = {-speed, 0.25 * speed, speed, by_path};
+  for (const GradientMethod method : methods) {
+    if (!IsAvailable(method)) continue;
+    Eigen::VectorXd r;
+    RowMatrixXd jacobian;
+    ASSERT_TRUE(residuals.Evaluate(p, method, &r, &jacobian)) << residuals.message();
+    const double tolerance = method == GradientMethod::kFiniteDifference ? 3e-5 : 1e-9;
+    for (int k = 0; k < 4; ++k) {
+      EXPECT_NEAR(jacobian(0, k), expected[k], tolerance) << NameOf(method) << ", parameter " << k;
+    }
+  }
+}
+
+// Sampled on the end of a step: v_k = v − g t_k, positions with the new speeds, so that the slopes
+// before and after it are v_k and v_{k+1}.
+TEST(ResidualTest, ASampleOnAStepsEndMovesWithTheMeanOfBothSlopes) {
+  Scene scene = MakeScene(kFallingBall);
+  scene.bodies[0].linear_damping = 0.0;
+  scene.gravity.y() = -10.0;
+  for (const double dt : {0.25, 0.1, 0.05}) {
+    scene.simulation.dt = dt;
+    const double before = 3.0 - 10.0 * 0.5;
+    ExpectMovesWithItsTime(
+        OneSample(scene, Coordinate::kY, "bodies/ball/velocity/y", 3.0), before - 0.5 * 10.0 * dt,
+        0.5,
+        {GradientMethod::kTangent, GradientMethod::kAdjoint, GradientMethod::kJetImplicit,
+         GradientMethod::kJet, GradientMethod::kFiniteDifference});
+  }
+}
+
+// By events, sampled as a box comes to rest, which is not a kink of its position: x = v² / (2 μ g);
+// and as a force begins to push it.
+TEST(ResidualTest, ASampleOnAnEventMovesWithTheSpeedThere) {
+  Scene scene = MakeScene(kSlidingBox);
+  scene.simulation.stepping = Stepping::kEvent;
+  scene.simulation.duration = 1.0;
+  scene.gravity.y() = -10.0;
+  scene.bodies[0].friction = scene.bodies[1].friction = 0.25;
+  const std::vector<GradientMethod> methods = {GradientMethod::kTangent, GradientMethod::kAdjoint,
+                                               GradientMethod::kFiniteDifference};
+  for (const double dt : {0.5, 0.25, 0.1, 0.07}) {
+    scene.simulation.dt = dt;
+    scene.forces[0].force = Vector2<double>(0.0, 0.0);
+    scene.bodies[0].velocity.x() = 0.25 * 10.0 * 0.5;
+    ExpectMovesWithItsTime(OneSample(scene, Coordinate::kX, "bodies/box/velocity/x", 1.25), 0.0,
+                           0.5, methods);
+    scene.forces[0].force = Vector2<double>(20.0, 0.0);
+    scene.forces[0].start = 0.5;
+    scene.forces[0].end = 2.0;
+    scene.bodies[0].velocity.x() = 2.5;
+    ExpectMovesWithItsTime(OneSample(scene, Coordinate::kX, "bodies/box/velocity/x", 2.5), 1.25,
+                           0.5, methods);
+  }
+}
+
 TEST(ResidualTest, ATimeThatLeavesTheRunIsAFailure) {
   Scene scene = MakeScene(kFallingBall);
   Instruments instruments;

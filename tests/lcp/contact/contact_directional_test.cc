@@ -7,6 +7,8 @@
 
 #include <cmath>
 
+#include "../../support/contact_problems.h"
+
 namespace tangible {
 namespace {
 
@@ -21,16 +23,7 @@ ContactProblem<double> Point(double px, double py, double friction, int floors =
   problem.mass = {kMass, kMass, 1.0};
   problem.load = {px, py, 0.0};
   for (int i = 0; i < floors; ++i) {
-    problem.contacts.push_back({0,
-                                -1,
-                                {0.0, 1.0, 0.0},
-                                {0.0, 0.0, 0.0},
-                                {1.0, 0.0, 0.0},
-                                {0.0, 0.0, 0.0},
-                                0.0,
-                                0.0,
-                                friction,
-                                friction > 0.0});
+    problem.contacts.push_back(testing::FloorContact(0, 0.0, 0.0, friction));
   }
   return problem;
 }

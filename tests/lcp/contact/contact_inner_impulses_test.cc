@@ -7,6 +7,8 @@
 
 #include <cmath>
 
+#include "../../support/contact_problems.h"
+
 namespace tangible {
 namespace {
 
@@ -20,16 +22,7 @@ ContactProblem<double> SupportedBox(double push, double friction) {
   problem.mass = {2.0, 2.0, 2.0};
   problem.load = {push, -4.0, 0.0};
   for (const double x : {-1.0, 1.0}) {
-    problem.contacts.push_back({0,
-                                -1,
-                                {0.0, 1.0, x},
-                                {0.0, 0.0, 0.0},
-                                {1.0, 0.0, 0.0},
-                                {0.0, 0.0, 0.0},
-                                0.0,
-                                0.0,
-                                friction,
-                                friction > 0.0});
+    problem.contacts.push_back(testing::FloorContact(0, x, 0.0, friction));
   }
   return problem;
 }
@@ -42,6 +35,15 @@ ContactSolution<double> FirstAtItsLimit(double push, double friction) {
   solution.tangent_impulse = {-2.0 * friction, 2.0 * friction - push};
   solution.modes = {ContactMode::kSlidingPositive, ContactMode::kSticking};
   return solution;
+}
+
+// A third foot at `x` that bears nothing.
+void AddIdleFoot(double x, double friction, ContactMode mode, ContactProblem<double>* problem,
+                 ContactSolution<double>* solution) {
+  problem->contacts.push_back(testing::FloorContact(0, x, 0.0, friction));
+  solution->normal_impulse.push_back(0.0);
+  solution->tangent_impulse.push_back(0.0);
+  solution->modes.push_back(mode);
 }
 
 TEST(InnerImpulsesTest, BothFeetAreInsideTheirConesWhereThatIsPossible) {
@@ -81,13 +83,9 @@ TEST(InnerImpulsesTest, NothingIsSearchedWhereNoContactIsAtALimit) {
 // A third foot between them that bears nothing, and need not.
 TEST(InnerImpulsesTest, AFootWithoutLoadGetsItsShare) {
   ContactProblem<double> problem = SupportedBox(0.0, 0.0);
-  problem.contacts.push_back(problem.contacts[0]);
-  problem.contacts[2].normal_a = {0.0, 1.0, 0.5};
-  ContactSolution<double> solution;
-  solution.motion = {0.0, 0.0, 0.0};
-  solution.normal_impulse = {2.0, 2.0, 0.0};
-  solution.tangent_impulse = {0.0, 0.0, 0.0};
-  solution.modes = {ContactMode::kClosed, ContactMode::kClosed, ContactMode::kOpen};
+  ContactSolution<double> solution = FirstAtItsLimit(0.0, 0.0);
+  solution.modes = {ContactMode::kClosed, ContactMode::kClosed};
+  AddIdleFoot(0.5, 0.0, ContactMode::kOpen, &problem, &solution);
   InnerImpulses inner;
   ASSERT_TRUE(inner.Choose(problem, kClosed, &solution));
   double torque = 0.0;
@@ -102,13 +100,10 @@ TEST(InnerImpulsesTest, AFootWithoutLoadGetsItsShare) {
 // Sliding contacts keep their friction: the two feet share a slip of 0.25 m/s.
 TEST(InnerImpulsesTest, AContactThatSlidesStaysAtItsLimit) {
   ContactProblem<double> problem = SupportedBox(2.5, 0.5);
-  problem.contacts.push_back(problem.contacts[0]);
-  problem.contacts[2].normal_a = {0.0, 1.0, 0.0};
-  ContactSolution<double> solution;
+  ContactSolution<double> solution = FirstAtItsLimit(2.0, 0.5);
   solution.motion = {0.25, 0.0, 0.0};
-  solution.normal_impulse = {2.0, 2.0, 0.0};
-  solution.tangent_impulse = {-1.0, -1.0, 0.0};
-  solution.modes.assign(3, ContactMode::kSlidingPositive);
+  solution.modes[1] = ContactMode::kSlidingPositive;
+  AddIdleFoot(0.0, 0.5, ContactMode::kSlidingPositive, &problem, &solution);
   InnerImpulses inner;
   ASSERT_TRUE(inner.Choose(problem, kClosed, &solution));
   for (int i = 0; i < 3; ++i) {

@@ -50,7 +50,8 @@ TEST(CertifyGrazingTest, AThrowThatJustReachesTheCeilingIsNearAKink) {
 // A disc that slides off a table: the corner at the end of the face takes over from the face, at no
 // approach speed, within a step. Nothing new touches, and the derivative has no kink there.
 TEST(CertifyGrazingTest, TheCornerAtTheEndOfAFaceDoesNotGraze) {
-  for (const double speed : {0.4, 0.7, 1.3}) {
+  // At 0.4 m/s it would be there on a step's end, which the verdict names for another reason.
+  for (const double speed : {0.41, 0.7, 1.3}) {
     Scene scene = test_scenes::SceneOf(R"({"gravity": [0, -9.81], "bodies": [
         {"name": "disc", "shape": {"circle": {"radius": 0.1}}, "mass": 1, "position": [0.2, 0.6],
          "friction": 0},

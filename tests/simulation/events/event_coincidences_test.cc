@@ -85,14 +85,15 @@ void ExpectRows(const GradientResult& result, const std::vector<Exact>& exact, d
 
 // By every method and from both sides, with steps of which most divide 0.5.
 void ExpectExact(Scene scene, const std::vector<std::string>& paths,
-                 const std::vector<Exact>& exact) {
+                 const std::vector<Exact>& exact,
+                 const std::vector<double>& steps = {0.5, 0.25, 0.1, 0.02, 0.01, 0.03, 0.007}) {
   std::vector<GradientMethod> methods = {GradientMethod::kAdjoint, GradientMethod::kTangent,
                                          GradientMethod::kFiniteDifference};
   if (testing::HaveJets()) {
     methods.push_back(GradientMethod::kJetImplicit);
     methods.push_back(GradientMethod::kJet);
   }
-  for (const double dt : {0.5, 0.25, 0.1, 0.02, 0.01, 0.03, 0.007}) {
+  for (const double dt : steps) {
     scene.simulation.dt = dt;
     const std::string with = ", dt " + std::to_string(dt);
     for (const GradientMethod method : methods) {
@@ -428,6 +429,55 @@ TEST(EventCoincidencesTest, AnEventOnAStepsEndSplitsEitherStep) {
   scene.simulation.dt = 0.05;
   EXPECT_EQ(testing::Jacobian(scene, paths, GradientMethod::kTangent).certificate.verdict,
             "trustworthy");
+}
+
+// Friction F e^(−(v / u)²) stops a mass after ∫ m e^(v²) / F dv = 0.5 s, at
+// x = m u² (e^((v0 / u)²) − 1) / (2 F). The steps are those whose error is rounding here.
+TEST(EventCoincidencesTest, StribecksFrictionStopsASlider) {
+  const double mass = 0.5 / 0.5449871041836222;
+  const double e = std::exp(0.25);
+  const double x = 0.5 * mass * (e - 1.0);
+  Scene scene = Of("[0, 0]", R"({"name": "b", "mass": 1, "inertia": 1, "position": [0, 0],
+                                 "velocity": [0.5, 0]})",
+                   0.75, R"(, "joints": [{"name": "j", "type": "prismatic",
+      "bodies": ["b", "world"], "anchor": [0, 0], "axis": [1, 0], "friction": 1,
+      "kinetic_friction": 0, "stribeck_speed": 1}])");
+  scene.bodies[0].mass = mass;
+  ExpectExact(
+      scene,
+      {"bodies/b/velocity/x", "bodies/b/mass", "joints/j/friction", "joints/j/stribeck_speed"},
+      {{0, x, {mass * 0.5 * e, x / mass, -x, 2.0 * x - mass * 0.25 * e}}}, {0.01, 0.005, 0.007});
+}
+
+// A disc slides off the end of a face and falls from there: y = y0 − g (T − t0)² / 2 with
+// t0 = s / v. A face counts as longer by a share of its length, but not for a disc.
+TEST(EventCoincidencesTest, ADiscSlidesOffAFace) {
+  ExpectExact(Of("[0, -10]",
+                 Disc("b", 0.0, 0.1, 2.0, 0.0) +
+                     R"(, {"name": "face", "static": true, "shape": {"box": {"size": [4, 0.5]}},
+                           "position": [-1, -0.25]})",
+                 0.75),
+              {"bodies/b/velocity/x", "bodies/b/position/x", "gravity/y"},
+              {{1, 0.1 - 0.3125, {-0.625, -1.25, 0.03125}}, {4, -2.5, {-2.5, -5.0, 0.25}}});
+}
+
+// The run ends as the disc reaches the end of the face, beyond which its speed falls; elsewhere on
+// the face it does not, nor where the disc rests there.
+TEST(EventCoincidencesTest, TheEndOfAFaceAtTheLastInstantIsAKink) {
+  for (const auto& [speed, is_kink] : {std::pair(2.0, true), {1.9, false}, {0.0, false}}) {
+    Scene scene = Of("[0, -10]",
+                     Disc("b", speed == 0.0 ? 1.0 : 0.0, 0.1, speed, 0.0) +
+                         R"(, {"name": "face", "static": true, "shape": {"box": {"size": [4, 0.5]}},
+                               "position": [-1, -0.25]})",
+                     0.5);
+    for (const double dt : {0.5, 0.25, 0.01, 0.007}) {
+      scene.simulation.dt = dt;
+      const std::string verdict =
+          testing::Jacobian(scene, {"gravity/y"}, GradientMethod::kTangent).certificate.verdict;
+      EXPECT_EQ(verdict.find("another corner or edge takes over") != std::string::npos, is_kink)
+          << verdict << ", dt " << dt << ", speed " << speed;
+    }
+  }
 }
 
 // An event at the end of the run: positions are differentiable, the speed has another derivative on
