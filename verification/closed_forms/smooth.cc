@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "tangible/verification/closed_forms/closed_form.h"
-#include "tangible/verification/closed_forms/extrapolation.h"
+#include "tangible/verification/support/extrapolation.h"
 
 namespace tangible::closed_forms {
 namespace {

@@ -35,10 +35,13 @@ const std::vector<CoincidenceMaker::Element>& CoincidenceMaker::ElementsOf(Group
                                              {"touch", &Maker::Lands},
                                              {"touch with a face", &Maker::LandsFlat},
                                              {"lift-off", &Maker::LiftsOff},
+                                             {"slip ends in an impact", &Maker::SlipEndsInAnImpact},
                                              {"feature change", &Maker::PassesASeam},
+                                             {"feature change, off a face", &Maker::LeavesAFace},
                                              {"joint friction ends", &Maker::JointStops},
                                              {"Stribeck, begins", &Maker::StribeckBreaksLoose},
-                                             {"Stribeck, ends", &Maker::StribeckStops}};
+                                             {"Stribeck, ends", &Maker::StribeckStops},
+                                             {"slow Stribeck, ends", &Maker::SlowStribeckStops}};
   static const std::vector<Element> steep = {{"reversal", &Maker::SlipEnds},
                                              {"slip begins at once", &Maker::SlipStartsAtOnce}};
   static const std::vector<Element> shallow = {{"slip ends", &Maker::SlipEnds}};
@@ -49,7 +52,9 @@ const std::vector<CoincidenceMaker::Element>& CoincidenceMaker::ElementsOf(Group
       {"joint limit", &Maker::JointReachesItsLimit},
       {"force window", &Maker::FreeForceWindow},
       {"corner of a signal", &Maker::SignalCorner},
+      {"corner of a joint's signal", &Maker::JointSignalCorner},
       {"touch", &Maker::HitsAWall},
+      {"touch with a corner", &Maker::StrikesAtACorner},
       {"two touches of one disc", &Maker::HitsACorner}};
   return group == Group::kLevel     ? level
          : group == Group::kSteep   ? steep
@@ -179,7 +184,7 @@ void CoincidenceMaker::SlipBegins() {
   force.force_signal->x = ramp.value;
   force.force_signal->y.assign(ramp.value.size(), 0.0);
   force.force_signal->value.clear();
-  has_ramp_ = true;
+  varies_ = true;
   SlideBox(name, &ramp);
 }
 
@@ -238,7 +243,7 @@ void CoincidenceMaker::SignalCorner() {
   signal.x = {0.0, force, -force};
   signal.y.assign(3, 0.0);
   push.force_signal = signal;
-  has_ramp_ = true;
+  varies_ = true;
   const Load load = LoadOf(signal, signal.x);
   parts_.emplace_back([=, course = course_](const NumberAt& at) {
     const Coordinate end = Slide({at(body + "position/x"), at(body + "velocity/x")},
@@ -287,6 +292,7 @@ void CoincidenceMaker::Rolls() {
 
 void CoincidenceMaker::Lands() {
   JumpsAt();
+  NameLaw();
   BasicBody<double>& disc = AddDisc();
   const std::string name = disc.name;
   const double speed = count_ == 0 ? -1.0 : Pick({0.0, -1.0, -0.5});
@@ -295,10 +301,6 @@ void CoincidenceMaker::Lands() {
   disc.position.y() += 0.5 * gravity_ * at_ * at_ - speed * at_;
   AddPair(name, Pick({0.0, 0.1, 0.5}), Pick({0.0, 0.5, 0.8, 1.0}));
   MayLandAtTheEnd(gravity_ * at_ - speed);
-  if (course_.stepping == Stepping::kEvent && random_.Chance(0.3)) {
-    made_.scene.simulation.impact_law = ImpactLaw::kPoisson;
-    made_.kinds.emplace_back("coincidence: Poisson's phases");
-  }
   RollDisc(name);
 }
 
@@ -317,6 +319,7 @@ void CoincidenceMaker::MayLandAtTheEnd(double speed) {
 
 void CoincidenceMaker::LandsFlat() {
   JumpsAt();
+  NameLaw();
   BasicBody<double>& box = AddBox();
   const std::string body = "bodies/" + box.name + "/";
   const std::string pair = "pairs/" + box.name + ":floor/";
@@ -358,7 +361,7 @@ void CoincidenceMaker::LiftsOff() {
   force.force_signal->y = ramp.value;
   force.force_signal->x.assign(ramp.value.size(), 0.0);
   force.force_signal->value.clear();
-  has_ramp_ = true;
+  varies_ = true;
   const Load signal = LoadOf(ramp, ramp.value);
   parts_.emplace_back([=, course = course_](const NumberAt& at) {
     const Real mass = at(body + "mass");
@@ -388,6 +391,7 @@ void CoincidenceMaker::AddWall(const char* name, int axis, double face) {
 
 void CoincidenceMaker::HitsAWall() {
   JumpsAt();
+  NameLaw();
   BasicBody<double>& disc = AddDisc();
   const std::string body = "bodies/" + disc.name + "/";
   disc.restitution = Pick({0.0, 0.5, 0.8, 1.0});
@@ -413,6 +417,7 @@ void CoincidenceMaker::HitsAWall() {
 
 void CoincidenceMaker::HitsACorner() {
   JumpsAt();
+  NameLaw();
   BasicBody<double>& disc = AddDisc();
   const std::string body = "bodies/" + disc.name + "/";
   disc.restitution = Pick({0.0, 0.5, 0.8, 1.0});

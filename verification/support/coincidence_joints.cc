@@ -1,10 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // Coincidences of wheels on an axle and sliders on a rail.
+#include <algorithm>
+#include <cmath>
+
 #include "tangible/verification/support/coincidence_maker.h"
 
 namespace tangible::internal {
 namespace {
+
+constexpr double kSlowest = 0.1;  // m/s, rad/s: for the decay of what stays at rest
 
 // Poses and twists of a wheel or slider whose coordinate is known.
 std::vector<Real> OutputsOf(bool is_wheel, Real x, Real y, const Coordinate& at) {
@@ -34,6 +39,11 @@ CoincidenceMaker::Jointed CoincidenceMaker::AddJointed() {
   return made;
 }
 
+double& CoincidenceMaker::MassOf(const Jointed& of) {
+  BasicBody<double>& body = made_.scene.bodies.back();
+  return of.is_wheel ? *body.inertia : body.mass;
+}
+
 double& CoincidenceMaker::SpeedOf(const Jointed& of) {
   BasicBody<double>& body = made_.scene.bodies.back();
   return of.is_wheel ? body.angular_velocity : body.velocity.x();
@@ -61,15 +71,17 @@ void CoincidenceMaker::SlideJointed(const Jointed& of) {
   });
 }
 
+void CoincidenceMaker::StopJointed(const Jointed& of, double friction, double share) {
+  made_.scene.joints.back().friction = friction;
+  SpeedOf(of) = mirror_ * share * friction * at_ / MassOf(of);
+  SlideJointed(of);
+}
+
 void CoincidenceMaker::JointStops() {
   const Jointed of = AddJointed();
-  const BasicBody<double>& body = made_.scene.bodies.back();
   const double friction = Pick({0.5, 0.001, 2.0});
-  made_.scene.joints.back().friction = friction;
   // Every fourth one goes on beyond the end.
-  const double share = random_.Chance(0.25) ? 10.0 : 1.0;
-  SpeedOf(of) = mirror_ * share * friction * at_ / (of.is_wheel ? *body.inertia : body.mass);
-  SlideJointed(of);
+  StopJointed(of, friction, random_.Chance(0.25) ? 10.0 : 1.0);
 }
 
 void CoincidenceMaker::JointBreaksLoose() {
@@ -78,19 +90,17 @@ void CoincidenceMaker::JointBreaksLoose() {
   BasicJoint<double>& joint = made_.scene.joints.back();
   joint.friction = friction;
   joint.effort_signal = Ramp(mirror_ * friction);
-  has_ramp_ = true;
+  varies_ = true;
   SlideJointed(of);
 }
 
 void CoincidenceMaker::JointTurns() {
   const Jointed of = AddJointed();
-  const BasicBody<double>& body = made_.scene.bodies.back();
   const double friction = Pick({0.5, 1.0});
   BasicJoint<double>& joint = made_.scene.joints.back();
   joint.friction = friction;
   joint.effort = -mirror_ * Pick({2.0, 3.0}) * friction;
-  SpeedOf(of) = mirror_ * (friction - mirror_ * joint.effort) * at_ /
-                (of.is_wheel ? *body.inertia : body.mass);
+  SpeedOf(of) = mirror_ * (friction - mirror_ * joint.effort) * at_ / MassOf(of);
   SlideJointed(of);
 }
 
@@ -99,8 +109,7 @@ void CoincidenceMaker::JointReachesItsLimit() {
   const Jointed of = AddJointed();
   const double speed = Pick({0.5, 1.0, 0.0});
   const double dt = made_.scene.simulation.dt;
-  const BasicBody<double>& made = made_.scene.bodies.back();
-  const double mass = of.is_wheel ? *made.inertia : made.mass;
+  const double mass = MassOf(of);
   // An effort drives it against the limit, and then, from a step's end on, away from it.
   const double acceleration = Pick({1.0, 2.0, 4.0});
   SpeedOf(of) = mirror_ * speed;
@@ -142,36 +151,85 @@ void CoincidenceMaker::JointReachesItsLimit() {
       });
 }
 
+void CoincidenceMaker::JointSignalCorner() {
+  const Jointed of = AddJointed();
+  const double dt = made_.scene.simulation.dt;
+  const double effort = mirror_ * Pick({1.0, 2.0, 4.0});
+  BasicJoint<double>& joint = made_.scene.joints.back();
+  const double friction = 0.5;
+  joint.friction = friction;
+  Signal signal;
+  signal.file = Named("corner") + ".csv";
+  signal.interpolation = Signal::Interpolation::kLinear;
+  signal.time = {at_, at_ + dt, at_ + 3.0 * dt};
+  signal.value = {0.0, effort, -effort};
+  joint.effort_signal = signal;
+  varies_ = true;
+  SpeedOf(of) = mirror_ * Pick({0.0, 10.0}) * friction * at_ / MassOf(of);
+  SlideJointed(of);
+}
+
+void CoincidenceMaker::AddStribeck(const Jointed& of, double friction, double speed) {
+  BasicJoint<double>& joint = made_.scene.joints.back();
+  joint.friction = friction;
+  if (course_.stepping != Stepping::kEvent) return;
+  joint.kinetic_friction = 0.5 * friction;
+  joint.stribeck_speed = speed;
+  paths_.push_back("joints/" + of.joint + "/kinetic_friction");
+}
+
+void CoincidenceMaker::StopByStribeck(const Jointed& of) {
+  const std::string body = "bodies/" + of.body + "/";
+  const std::string joint = "joints/" + of.joint + "/";
+  paths_.push_back(joint + "friction");
+  paths_.push_back(joint + "stribeck_speed");
+  parts_.emplace_back([=, course = course_, is_wheel = of.is_wheel](const NumberAt& at) {
+    const Stribeck law = {at(joint + "friction"), at(joint + "kinetic_friction"),
+                          at(joint + "stribeck_speed")};
+    const Real speed = at(body + (is_wheel ? "angular_velocity" : "velocity/x"));
+    const Coordinate end = SlideByStribeck(
+        {0.0L, speed}, at(body + (is_wheel ? "inertia" : "mass")), law, Load(), course.duration);
+    return OutputsOf(is_wheel, at(body + "position/x"), at(body + "position/y"), end);
+  });
+}
+
 void CoincidenceMaker::StribeckBreaksLoose() {
   const Jointed of = AddJointed();
   const double friction = Pick({1.0, 2.0});
-  BasicJoint<double>& joint = made_.scene.joints.back();
-  joint.friction = friction;
-  if (course_.stepping == Stepping::kEvent) {
-    joint.kinetic_friction = 0.5 * friction;
-    joint.stribeck_speed = Pick({0.05, 0.5});
-    paths_.push_back("joints/" + of.joint + "/kinetic_friction");
-    unknown_ = true;
-  }
-  joint.effort_signal = Ramp(mirror_ * friction);
-  has_ramp_ = true;
+  AddStribeck(of, friction, Pick({0.05, 0.5}));
+  unknown_ = unknown_ || course_.stepping == Stepping::kEvent;
+  made_.scene.joints.back().effort_signal = Ramp(mirror_ * friction);
+  varies_ = true;
   SlideJointed(of);
 }
 
 void CoincidenceMaker::StribeckStops() {
   const Jointed of = AddJointed();
-  const BasicBody<double>& body = made_.scene.bodies.back();
   const double friction = Pick({0.5, 1.0});
-  BasicJoint<double>& joint = made_.scene.joints.back();
-  joint.friction = friction;
-  if (course_.stepping == Stepping::kEvent) {
-    joint.kinetic_friction = 0.5 * friction;
-    joint.stribeck_speed = Pick({0.05, 0.5});
-    paths_.push_back("joints/" + of.joint + "/kinetic_friction");
-    unknown_ = true;
+  AddStribeck(of, friction, Pick({0.05, 0.5}));
+  unknown_ = unknown_ || course_.stepping == Stepping::kEvent;
+  StopJointed(of, friction, 1.0);
+}
+
+void CoincidenceMaker::SlowStribeckStops() {
+  const Jointed of = AddJointed();
+  const double friction = Pick({0.5, 1.0});
+  if (course_.stepping != Stepping::kEvent) {
+    StopJointed(of, friction, 1.0);
+    return;
   }
-  SpeedOf(of) = mirror_ * friction * at_ / (of.is_wheel ? *body.inertia : body.mass);
-  SlideJointed(of);
+  varies_ = true;
+  const double speed = count_ == 0 ? 0.0 : Pick({0.5, 1.0});
+  AddStribeck(of, friction, Pick({500.0, 600.0}) * std::max(speed, kSlowest));
+  SpeedOf(of) = mirror_ * speed;
+  if (count_ > 0) {
+    const BasicJoint<double>& joint = made_.scene.joints.back();
+    const Stribeck law = {friction, *joint.kinetic_friction, joint.stribeck_speed};
+    MassOf(of) = static_cast<double>(at_ / TimeToStop(1.0L, law, speed));
+  }
+  // At the run's end the decay's share of a speed is less than what kinks are named for.
+  if (count_ > 0 && after_ == 0) unknown_ = true;
+  StopByStribeck(of);
 }
 
 }  // namespace tangible::internal

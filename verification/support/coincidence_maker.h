@@ -5,7 +5,9 @@
 // something happens at `at_`, a number of steps after the start; a scene has one or two of them.
 // Not for other users.
 
+#include <functional>
 #include <initializer_list>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -13,6 +15,9 @@
 #include "tangible/verification/support/random_scene.h"
 
 namespace tangible::internal {
+
+/// All numbers of a scene by path.
+std::map<std::string, Real> NumbersOf(const Scene& scene);
 
 /// What pulls at the bodies of a scene.
 enum class Group { kLevel, kSteep, kShallow, kNoGravity };
@@ -74,6 +79,15 @@ class CoincidenceMaker {
   void HitsACorner();
   void PassesASeam();
 
+  // coincidence_strikes.cc: impacts with friction, and the end of a face.
+  /// Adds the kind that a scene with Poisson's law and an impact has.
+  void NameLaw();
+  /// Makes a body's inertia greater until `is_clear` holds.
+  void KeepClear(const std::string& body, const std::function<bool(const NumberAt&)>& is_clear);
+  void SlipEndsInAnImpact();
+  void StrikesAtACorner();
+  void LeavesAFace();
+
   // coincidence_joints.cc: wheels and sliders.
   struct Jointed {
     std::string body, joint;
@@ -83,12 +97,23 @@ class CoincidenceMaker {
   double& SpeedOf(const Jointed& of);
   /// The motion against friction alone, with parameters.
   void SlideJointed(const Jointed& of);
+  /// Its mass or inertia.
+  double& MassOf(const Jointed& of);
+  /// A speed from which friction alone, without Stribeck's decay, stops it at `at_`; times `share`.
+  void StopJointed(const Jointed& of, double friction, double share);
+  /// Friction that falls with the speed, by events.
+  void AddStribeck(const Jointed& of, double friction, double speed);
+  /// The motion against such friction alone, at speeds far below `stribeck_speed`, with parameters.
+  void StopByStribeck(const Jointed& of);
+  void JointSignalCorner();
   void JointStops();
   void JointBreaksLoose();
   void JointTurns();
   void JointReachesItsLimit();
   void StribeckBreaksLoose();
   void StribeckStops();
+  /// The same with a decay so slow that the integrator's error is rounding: of known motion.
+  void SlowStribeckStops();
 
   RandomNumbers random_;
   Coincidence made_;
@@ -102,8 +127,9 @@ class CoincidenceMaker {
   double mirror_ = 1.0;    ///< −1 of the second of two symmetric elements
   double place_ = 0.0;     ///< x of the element
   int number_ = 0;         ///< of the element
-  bool has_ramp_ = false;  ///< a force that changes with time
-  bool unknown_ = false;   ///< the motion is not known
+  /// Whether a force changes with time or a speed: then the trapezoidal rule is not exact.
+  bool varies_ = false;
+  bool unknown_ = false;  ///< the motion is not known
   std::vector<std::string> paths_;
   std::vector<Part> parts_;
 };

@@ -14,6 +14,7 @@ constexpr char kAtAStepsEnd[] = "coincidence: at a step's end";
 constexpr char kAtTheStart[] = "coincidence: at the start";
 constexpr char kAtTheEndOfTheRun[] = "coincidence: at the end of the run";
 constexpr char kSymmetric[] = "coincidence: two at one instant, symmetric";
+constexpr char kPoisson[] = "coincidence: Poisson's phases";
 constexpr char kOfTwoKinds[] = "coincidence: two at one instant, of two kinds";
 
 // Of the parameter: the longest way to where derivatives are taken. The next kink is a step away.
@@ -21,15 +22,6 @@ constexpr long double kWay = 1e-6L;
 constexpr long double kSmallest = 0.1L;  // size of a parameter
 
 using Map = std::map<std::string, Real>;
-
-Map NumbersOf(const Scene& scene) {
-  Scene copy = scene;
-  Map numbers;
-  for (const SceneNumber<double>& number : EnumerateNumbers(&copy)) {
-    numbers[number.path] = *number.value;
-  }
-  return numbers;
-}
 
 std::vector<Real> Outputs(const Coincidence& coincidence, const Map& numbers) {
   return coincidence.outputs([&](const std::string& path) { return numbers.at(path); });
@@ -63,6 +55,15 @@ VectorX<double> Side(const Coincidence& coincidence, const Map& at, const std::s
 
 namespace internal {
 
+Map NumbersOf(const Scene& scene) {
+  Scene copy = scene;
+  Map numbers;
+  for (const SceneNumber<double>& number : EnumerateNumbers(&copy)) {
+    numbers[number.path] = *number.value;
+  }
+  return numbers;
+}
+
 CoincidenceMaker::CoincidenceMaker(unsigned seed, Stepping stepping)
     : random_(0xc01dULL + 0x9e3779b97f4a7c15ULL * seed) {
   made_.scene.name = "coincidence " + std::to_string(seed);
@@ -88,7 +89,7 @@ Coincidence CoincidenceMaker::Make() {
   made_.kinds.emplace_back(count_ == 0   ? kAtTheStart
                            : after_ == 0 ? kAtTheEndOfTheRun
                                          : kAtAStepsEnd);
-  if (made_.scene.simulation.stepping == Stepping::kEvent && !has_ramp_ && random_.Chance(0.3)) {
+  if (made_.scene.simulation.stepping == Stepping::kEvent && !varies_ && random_.Chance(0.3)) {
     made_.scene.simulation.integrator = Integrator::kTrapezoidal;
   }
   std::sort(made_.kinds.begin(), made_.kinds.end());
@@ -109,6 +110,7 @@ void CoincidenceMaker::Settings() {
   course_.dt = s.dt;
   course_.duration = s.duration;
   course_.steps = count_ + after_;
+  if (s.stepping == Stepping::kEvent && random_.Chance(0.25)) s.impact_law = ImpactLaw::kPoisson;
   group_ = static_cast<Group>(random_.Integer(0, 3));
   gravity_ = group_ == Group::kNoGravity ? 0.0 : Pick({10.0, 8.0, 5.0, 2.0});
   made_.scene.gravity = Vector2<double>(0.0, -gravity_);
@@ -132,6 +134,21 @@ void CoincidenceMaker::Add(const Element& element) {
   place_ = 10.0 * number_;
   (this->*element.add)();
   ++number_;
+}
+
+void CoincidenceMaker::NameLaw() {
+  if (made_.scene.simulation.impact_law == ImpactLaw::kPoisson) made_.kinds.emplace_back(kPoisson);
+}
+
+void CoincidenceMaker::KeepClear(const std::string& body,
+                                 const std::function<bool(const NumberAt&)>& is_clear) {
+  Map numbers = NumbersOf(made_.scene);
+  Real& inertia = numbers.at(body + "inertia");
+  const auto at = [&numbers](const std::string& path) { return numbers.at(path); };
+  while (!is_clear(at)) inertia = 2.0L * inertia;
+  for (BasicBody<double>& one : made_.scene.bodies) {
+    if ("bodies/" + one.name + "/" == body) one.inertia = static_cast<double>(inertia);
+  }
 }
 
 void CoincidenceMaker::Finish() {
@@ -162,7 +179,7 @@ Coincidence RandomCoincidence(unsigned seed, Stepping stepping) {
 const std::vector<std::string>& CoincidenceKinds() {
   static const std::vector<std::string> kinds = [] {
     std::vector<std::string> all = {kAtAStepsEnd, kAtTheStart, kAtTheEndOfTheRun,
-                                    kSymmetric,   kOfTwoKinds, "coincidence: Poisson's phases"};
+                                    kSymmetric,   kOfTwoKinds, kPoisson};
     for (const auto group : {internal::Group::kLevel, internal::Group::kSteep,
                              internal::Group::kShallow, internal::Group::kNoGravity}) {
       for (const auto& element : internal::CoincidenceMaker::ElementsOf(group)) {
@@ -179,7 +196,7 @@ const std::vector<std::string>& CoincidenceKinds() {
 KnownSides SidesOf(const Coincidence& coincidence) {
   KnownSides sides;
   if (!coincidence.outputs) return sides;
-  const Map numbers = NumbersOf(coincidence.scene);
+  const Map numbers = internal::NumbersOf(coincidence.scene);
   const std::vector<Real> values = Outputs(coincidence, numbers);
   const auto rows = static_cast<Eigen::Index>(values.size());
   sides.values.resize(rows);

@@ -6,12 +6,14 @@
 #include <limits>
 
 #include "tangible/scene/scene_names.h"
+#include "tangible/verification/support/extrapolation.h"
 
 namespace tangible {
 namespace {
 
 constexpr Real kNever = std::numeric_limits<long double>::infinity();
 constexpr int kMostEvents = 1000;
+constexpr int kStribeckSteps = 8;  // of order 16, of speeds far below those at which friction falls
 
 Real Sign(Real x) { return x > 0.0L ? 1.0L : x < 0.0L ? -1.0L : 0.0L; }
 
@@ -27,11 +29,6 @@ Real FallsThroughZero(Real a, Real b, Real c) {
   if (b > 0.0L) return c < 0.0L ? (-b - root) / (2.0L * c) : kNever;
   const Real below = -b + root;
   return below > 0.0L ? 2.0L * a / below : kNever;
-}
-
-// The length of step k of fixed stepping.
-Real StepEnd(const Course& course, int k) {
-  return k >= course.steps ? course.duration : std::min(k * course.dt, course.duration);
 }
 
 // A piece of the load, and a motion in it.
@@ -119,14 +116,7 @@ void BouncePiece(Piece piece, Real mass, const Surface& surface, Coordinate* gap
 
 // The new speed of a gap in a fixed step of length h.
 Real SpeedAfterStep(const Coordinate& gap, Real free, Real h, const Surface& surface) {
-  const bool rebounds = surface.restitution > 0.0L && gap.speed < -surface.threshold &&
-                        gap.position + h * free < surface.margin;
-  Real constant = std::max(gap.position / h, -surface.recovery_speed);
-  if (rebounds) {
-    const Real rebound = surface.restitution * gap.speed;
-    constant = gap.position >= 0.0L ? rebound : std::min(rebound, constant);
-  }
-  return std::max(free, -constant);
+  return std::max(free, LeastSpeed(gap, free, h, surface));
 }
 
 // The impulse of friction on the slip of a disc, at most `most`; `arm`: from the centre to where it
@@ -167,7 +157,67 @@ Disc FallByEvents(Disc disc, Real radius, Real mass, Real inertia, Real friction
   return disc;
 }
 
+// A mass that moves with speed v ≥ 0 along a load of `force` + `slope` t, for `time`.
+Coordinate DriveByStribeck(Real v, Real mass, const Stribeck& law, Real force, Real slope,
+                           Real time) {
+  const auto rates = [&](const std::vector<Real>& y) {  // position, speed, t
+    return std::vector<Real>{y[1], (force + slope * y[2] - law.ForceAt(y[1])) / mass, 1.0L};
+  };
+  const std::vector<Real> end = Extrapolate<Real>(rates, {0.0L, v, 0.0L}, time, kStribeckSteps);
+  return {end[0], end[1]};
+}
+
+struct Stop {
+  Real time, way;
+};
+
+// Where and when it stops without a load.
+Stop StopByStribeck(Real v, Real mass, const Stribeck& law) {
+  const auto rates = [&](const std::vector<Real>& y) {  // speed, time, way over v − speed
+    const Real slows = law.ForceAt(y[0]) / mass;
+    return std::vector<Real>{-v, v / slows, v * y[0] / slows};
+  };
+  const std::vector<Real> end = Extrapolate<Real>(rates, {v, 0.0L, 0.0L}, 1.0L, kStribeckSteps);
+  return {end[1], end[2]};
+}
+
 }  // namespace
+
+Real Course::StepEnd(int k) const { return k >= steps ? duration : std::min(k * dt, duration); }
+
+Real LeastSpeed(const Coordinate& gap, Real free, Real h, const Surface& surface) {
+  const bool rebounds = surface.restitution > 0.0L && gap.speed < -surface.threshold &&
+                        gap.position + h * free < surface.margin;
+  const Real constant = std::max(gap.position / h, -surface.recovery_speed);
+  if (!rebounds) return -constant;
+  const Real rebound = surface.restitution * gap.speed;
+  return -(gap.position >= 0.0L ? rebound : std::min(rebound, constant));
+}
+
+Real Stribeck::ForceAt(Real v) const {
+  return kinetic + (friction - kinetic) * exp(-(v / speed) * (v / speed));
+}
+
+Real TimeToStop(Real mass, const Stribeck& law, Real v) {
+  return StopByStribeck(v, mass, law).time;
+}
+
+Coordinate SlideByStribeck(Coordinate at, Real mass, const Stribeck& law, const Load& load,
+                           Real duration) {
+  Real slope = 0.0L;
+  const Real force = load.At(0.0L, 0.5L * duration, &slope);
+  const Real side = at.speed != 0.0L ? Sign(at.speed) : Sign(slope);
+  if (at.speed != 0.0L) {
+    const Stop stop = StopByStribeck(abs(at.speed), mass, law);
+    if (stop.time <= duration) return {at.position + side * stop.way, 0.0L};
+  }
+  const Real holds =
+      at.speed != 0.0L ? 0.0L : std::max(BreaksLooseAfter(force, slope, law.friction), Real());
+  if (holds >= duration) return at;
+  const Coordinate moved = DriveByStribeck(abs(at.speed), mass, law, side * (force + slope * holds),
+                                           abs(slope), duration - holds);
+  return {at.position + side * moved.position, side * moved.speed};
+}
 
 Real Load::At(Real time, Real middle, Real* slope) const {
   Real force = constant;
@@ -222,8 +272,8 @@ Coordinate Slide(Coordinate at, Real mass, Real friction, const Load& load, cons
     return at;
   }
   for (int k = 0; k < course.steps; ++k) {
-    const Real from = StepEnd(course, k);
-    const Real h = StepEnd(course, k + 1) - from;
+    const Real from = course.StepEnd(k);
+    const Real h = course.StepEnd(k + 1) - from;
     const Real free = at.speed + load.Impulse(from, from + h) / mass;
     at.speed = Sign(free) * std::max(abs(free) - friction * h / mass, Real());
     at.position += h * at.speed;
@@ -241,8 +291,8 @@ Coordinate Bounce(Coordinate gap, Real mass, const Surface& surface, const Load&
     return gap;
   }
   for (int k = 0; k < course.steps; ++k) {
-    const Real from = StepEnd(course, k);
-    const Real h = StepEnd(course, k + 1) - from;
+    const Real from = course.StepEnd(k);
+    const Real h = course.StepEnd(k + 1) - from;
     const Real free = gap.speed + load.Impulse(from, from + h) / mass;
     gap.speed = SpeedAfterStep(gap, free, h, surface);
     gap.position += h * gap.speed;
@@ -256,7 +306,7 @@ Disc FallAndRoll(Disc disc, Real radius, Real mass, Real inertia, Real friction,
     return FallByEvents(disc, radius, mass, inertia, friction, gravity, surface, course.duration);
   }
   for (int k = 0; k < course.steps; ++k) {
-    const Real h = StepEnd(course, k + 1) - StepEnd(course, k);
+    const Real h = course.StepEnd(k + 1) - course.StepEnd(k);
     const Real free = disc.gap.speed - gravity * h;
     // Friction acts in the middle of the gap as the step starts.
     const Real arm = radius + 0.5L * disc.gap.position;

@@ -49,6 +49,13 @@ struct Real {
     const long double root = std::sqrt(x.value);
     return {root, root > 0.0L ? x.rate / (2.0L * root) : 0.0L};
   }
+  friend Real sin(const Real& x) { return {std::sin(x.value), std::cos(x.value) * x.rate}; }
+  friend Real cos(const Real& x) { return {std::cos(x.value), -std::sin(x.value) * x.rate}; }
+  friend Real exp(const Real& x) {
+    const long double power = std::exp(x.value);
+    return {power, power * x.rate};
+  }
+  friend Real hypot(const Real& x, const Real& y) { return sqrt(x * x + y * y); }
 };
 
 /// A force that is piecewise linear in time.
@@ -75,6 +82,9 @@ struct Course {
   Real dt = 0.01L;
   Real duration = 1.0L;
   int steps = 100;  ///< of fixed stepping; the last ends with the duration
+
+  /// When step k of fixed stepping starts, and the one before it ends.
+  Real StepEnd(int k) const;
 };
 
 struct Coordinate {
@@ -92,10 +102,29 @@ struct Surface {
   Real recovery_speed = 3.0L;  ///< m/s, of fixed steps
 };
 
+/// Friction that falls with the speed v to kinetic + (friction − kinetic) exp(−(v / speed)²).
+struct Stribeck {
+  Real friction, kinetic, speed;
+
+  Real ForceAt(Real v) const;
+};
+
+/// The time in which such friction alone stops a mass that moves with speed v.
+Real TimeToStop(Real mass, const Stribeck& law, Real v);
+
+/// The same as Slide in continuous time: from speed v without a load, or from rest by a load that
+/// grows in proportion to time beyond what holds, on either side.
+Coordinate SlideByStribeck(Coordinate at, Real mass, const Stribeck& law, const Load& load,
+                           Real duration);
+
 /// A gap of a mass from a surface that it cannot enter. While the load changes with time the mass
 /// must not fall back onto the surface.
 Coordinate Bounce(Coordinate gap, Real mass, const Surface& surface, const Load& load,
                   const Course& course);
+
+/// The least speed of a gap that a fixed step of length h leaves, from a speed of `free` without
+/// the contact.
+Real LeastSpeed(const Coordinate& gap, Real free, Real h, const Surface& surface);
 
 struct Disc {
   Coordinate along;  ///< the centre, along the floor

@@ -38,7 +38,7 @@ TEST(CoincidencesTest, ASeedIsAScene) {
 
 TEST(CoincidencesTest, EveryKindIsDrawn) {
   std::map<std::string, int> count;
-  for (unsigned seed = 1; seed <= 400; ++seed) {
+  for (unsigned seed = 1; seed <= 600; ++seed) {
     for (const std::string& kind : RandomCoincidence(seed, Stepping::kEvent).kinds) ++count[kind];
   }
   for (const std::string& kind : CoincidenceKinds()) EXPECT_GE(count[kind], 4) << kind;
@@ -65,7 +65,9 @@ TEST(CoincidencesTest, FixedStepsEndWhereTheKnownMotionEnds) {
 }
 
 TEST(CoincidencesTest, EventsEndWhereTheKnownMotionEnds) {
-  for (const char* kind : {"slip ends", "reversal", "rolling", "touch", "touch with a face"}) {
+  for (const char* kind : {"slip ends", "reversal", "rolling", "touch", "touch with a face",
+                           "touch with a corner", "slip ends in an impact", "slow Stribeck, ends",
+                           "corner of a joint's signal", "feature change, off a face"}) {
     const unsigned seed = FirstAtAStepsEnd(kind, Stepping::kEvent);
     const Coincidence one = RandomCoincidence(seed, Stepping::kEvent);
     const RunTrace run = TraceRun(one.scene);

@@ -105,6 +105,11 @@ TEST(ReferenceMotionTest, NumbersHaveRates) {
   // 1.5 √x / (x − 1) − √x x / (x − 1)².
   EXPECT_NEAR(static_cast<double>(y.rate), 1.5 * root - 2.0 * root, kRounding);
   EXPECT_EQ(abs(-x).rate, 1.0L);
+  EXPECT_NEAR(static_cast<double>((sin(x) * sin(x) + cos(x) * cos(x)).value), 1.0, kRounding);
+  EXPECT_NEAR(static_cast<double>(sin(x).rate), std::cos(2.0), kRounding);
+  EXPECT_NEAR(static_cast<double>(cos(x).rate), -std::sin(2.0), kRounding);
+  EXPECT_NEAR(static_cast<double>(exp(0.5L * x).rate), 0.5 * std::exp(1.0), kRounding);
+  EXPECT_NEAR(static_cast<double>(hypot(x, Real(1.5L)).rate), 0.8, kRounding);
   EXPECT_LT(-x, x);
 }
 
@@ -115,6 +120,44 @@ TEST(ReferenceMotionTest, ALimitIsLeftAsTheForceTurns) {
       Bounce({0.09L, 0.0L}, 1.0L, Surface(), drive, By(Stepping::kEvent, 0.1L, 7));
   EXPECT_NEAR(static_cast<double>(end.position), 2.0 * 0.04, kRounding);
   EXPECT_NEAR(static_cast<double>(end.speed), 0.8, kRounding);
+}
+
+// With F_k = F it is Coulomb's friction, and a decay of that of e^(−v²) alone has the closed form
+// T = ∫ e^(v²) dv, x = ∫ v e^(v²) dv = (e^(v0²) − 1) / 2.
+TEST(ReferenceMotionTest, StribecksDecayDelaysAStop) {
+  const Stribeck coulomb = {0.5L, 0.5L, 1.0L};
+  EXPECT_NEAR(static_cast<double>(TimeToStop(2.0L, coulomb, 0.25L)), 1.0, kRounding);
+  const Stribeck law = {1.0L, 0.0L, 1.0L};
+  const Coordinate end = SlideByStribeck({0.0L, -0.5L}, 1.0L, law, Load(), 2.0L);
+  EXPECT_NEAR(static_cast<double>(end.position), -0.5 * std::expm1(0.25), kRounding);
+  EXPECT_EQ(end.speed, 0.0L);
+  EXPECT_NEAR(static_cast<double>(TimeToStop(1.0L, law, 0.5L)), 0.5449871041836222, kRounding);
+  EXPECT_NEAR(static_cast<double>(TimeToStop(1.0L, law, Real(0.5L, 1.0L)).rate), std::exp(0.25),
+              kRounding);
+}
+
+// Shortly before the stop it moves as shortly before, and just after.
+TEST(ReferenceMotionTest, StribecksMotionIsOneOnBothSidesOfItsStop) {
+  const Stribeck law = {1.0L, 0.5L, 2.0L};
+  const Real stops = TimeToStop(1.0L, law, 0.5L);
+  const Coordinate at = SlideByStribeck({0.0L, 0.5L}, 1.0L, law, Load(), stops);
+  const Coordinate before = SlideByStribeck({0.0L, 0.5L}, 1.0L, law, Load(), stops - 1e-3L);
+  EXPECT_NEAR(static_cast<double>(before.speed), 1e-3, 1e-10);
+  EXPECT_NEAR(static_cast<double>(at.position - before.position), 0.5e-6, 1e-12);
+}
+
+// The load is beyond friction by 2 τ: v ≈ τ² until the decay of friction adds to it.
+TEST(ReferenceMotionTest, StribecksFrictionIsBrokenByARamp) {
+  Load ramp;
+  ramp.times = {0.0L, 10.0L};
+  ramp.values = {0.0L, -20.0L};
+  const Stribeck slow = {1.0L, 0.5L, 1e6L};
+  const Coordinate end = SlideByStribeck({0.0L, 0.0L}, 1.0L, slow, ramp, 1.5L);
+  EXPECT_NEAR(static_cast<double>(end.speed), -1.0, 1e-12);
+  EXPECT_NEAR(static_cast<double>(end.position), -1.0 / 3.0, 1e-12);
+  const Stribeck fast = {1.0L, 0.5L, 0.5L};
+  EXPECT_LT(SlideByStribeck({0.0L, 0.0L}, 1.0L, fast, ramp, 1.5L).speed, -1.1L);
+  EXPECT_EQ(SlideByStribeck({0.0L, 0.0L}, 1.0L, fast, ramp, 0.5L).speed, 0.0L);
 }
 
 }  // namespace

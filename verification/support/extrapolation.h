@@ -8,7 +8,7 @@
 #include <functional>
 #include <vector>
 
-namespace tangible::closed_forms {
+namespace tangible {
 
 /// y(large) by an even number of steps of the midpoint rule, the first one Euler's.
 template <typename T>
@@ -54,4 +54,4 @@ std::vector<T> Extrapolate(const std::function<std::vector<T>(const std::vector<
   return y;
 }
 
-}  // namespace tangible::closed_forms
+}  // namespace tangible

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "tangible/verification/closed_forms/extrapolation.h"
+#include "tangible/verification/support/extrapolation.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-namespace tangible::closed_forms {
+namespace tangible {
 namespace {
 
 std::vector<double> Oscillator(const std::vector<double>& y) { return {y[1], -y[0]}; }
@@ -24,4 +24,4 @@ TEST(Extrapolation, IsOfHighOrder) {
 }
 
 }  // namespace
-}  // namespace tangible::closed_forms
+}  // namespace tangible
