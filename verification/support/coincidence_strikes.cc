@@ -47,12 +47,15 @@ void CoincidenceMaker::SlipEndsInAnImpact() {
   // The slip falls by three times friction's share of the normal speed's change: it ends with the
   // compression, or with the impact.
   const double phase = random_.Chance(0.5) ? 1.0 : 1.0 + restitution;
-  disc.angular_velocity = mirror_ * Pick({0.0, 2.0});
+  // It is fast: away from another body.
+  const double away = number_ == 0 ? -1.0 : 1.0;
+  disc.angular_velocity = away * Pick({0.0, 2.0});
   disc.velocity = Vector2<double>(
-      mirror_ * 3.0 * friction * phase * approach - disc.angular_velocity * disc.shape.numbers[0],
+      away * 3.0 * friction * phase * approach - disc.angular_velocity * disc.shape.numbers[0],
       speed);
   disc.position.y() += 0.5 * gravity_ * at_ * at_ - speed * at_;
   AddPair(name, friction, restitution);
+  MayLandAtTheEnd(approach);
   RollDisc(name);
 }
 
@@ -122,9 +125,10 @@ void CoincidenceMaker::LeavesAFace() {
   ledge.motion = Motion::kStatic;
   ledge.shape = {ShapeType::kBox, {10.0, 0.5}};
   // By fixed steps it passes the edge within a step: where two features tie as a step starts, the
-  // engine's derivative of either side is that of one of them.
-  const bool is_fixed = course_.stepping == Stepping::kFixed;
-  const double leaves = at_ + (is_fixed ? 0.5 * made_.scene.simulation.dt : 0.0);
+  // engine's derivative of either side is that of one of them. So it does by events on an edge as
+  // the run starts.
+  const bool is_within = course_.stepping == Stepping::kFixed || count_ == 0;
+  const double leaves = at_ + (is_within ? 0.5 * made_.scene.simulation.dt : 0.0);
   const double edge = place_ + mirror_ * speed * leaves;
   ledge.position = Vector2<double>(edge - 5.0 * mirror_, kFaceTop - 0.25);
   made_.scene.bodies.push_back(ledge);
