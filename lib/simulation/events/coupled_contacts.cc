@@ -57,7 +57,7 @@ std::vector<bool> CoupledContacts::ReachedBy(const ContactProblem<double>& probl
 std::vector<int> GroupsOfContacts(const ContactProblem<double>& problem,
                                   const std::vector<bool>& wanted) {
   const size_t count = problem.contacts.size();
-  const std::vector<int> one(count, 0);
+  std::vector<int> one(count, 0);
   CoupledContacts coupled;
   if (!coupled.Start(problem)) return one;
   // Those whose reach is still to be found come last in `found`; wanted ones first of all.
