@@ -84,13 +84,15 @@ class CrowdMaker {
     for (int i = 0; i < count; ++i) {
       BasicBody<double>& body = Add("b" + std::to_string(i), ShapeOf(shapes));
       const double x = (i % columns + 0.5) * width_ / columns - 0.5 * width_;
-      const double y = floor + (2 * (i / columns) + 1) * kHalfCell;
+      const int row = i / columns;
+      const double y = floor + (2 * row + 1) * kHalfCell;
       body.mass = random_.Uniform(0.1, 3.0);
       body.angle = round_ ? 0.0 : random_.Uniform(-3.0, 3.0);
       body.position = {x + random_.Uniform(0.0, 0.01), y + random_.Uniform(0.0, 0.01)};
       body.velocity = {random_.Uniform(-1.0, 1.0), 0.0};
     }
-    return floor + 2 * (count / columns + 1) * kHalfCell;
+    const int rows = count / columns + 1;
+    return floor + 2 * rows * kHalfCell;
   }
 
   // A board in a vertical guide that a force presses down and then releases.
