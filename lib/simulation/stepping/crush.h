@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "tangible/dynamics/elements/contact.h"
 #include "tangible/dynamics/model/model.h"
 #include "tangible/lcp/contact/contact_solver.h"
 
