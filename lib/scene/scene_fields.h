@@ -13,11 +13,11 @@
 //   Points          [[x, y], ...]
 //   Anchors         [[x, y], [x, y]]
 //   Interval        [low, high], or absent
-//   Numbers         two or more numbers of a shape: [w, h]
+//   Numbers         two numbers of a shape: [w, h]
 //   Vertices        numbers of a polygon: [[x, y], ...]
 //   NumberOrSignal  1.5 or {"file": ...}
 //   PointOrSignal   [x, y] or {"file": ...}
-//   Choice, Flag, Count   settings that are no parameters
+//   Choice, Count   settings that are no parameters
 //
 // What is no number by itself (names, bodies, the type of a joint or shape) is read and written
 // where the items are.
@@ -269,7 +269,6 @@ class FieldKeys {
   void Choice(const char* key, const Table&, const Value&) {
     Add(key);
   }
-  void Flag(const char* key, bool) { Add(key); }
   void Count(const char* key, int, int, int) { Add(key); }
 
  private:
