@@ -295,5 +295,25 @@ TEST_F(ParameterTest, JetsHaveTheSameNumbersInTheSameOrder) {
 #undef TANGIBLE_CHECK
 }
 
+// The first body of `fixed` is held by the world: neither its angle nor its rate can be chosen.
+TEST(JointThatMayNotStartTurnedTest, HasNeitherAngleNorRate) {
+  Scene scene;
+  std::string error;
+  ASSERT_TRUE(ParseScene(R"({"bodies": [
+      {"name": "a", "mass": 1, "inertia": 1, "position": [0, 0]},
+      {"name": "b", "mass": 1, "inertia": 1, "position": [2, 0]}],
+    "joints": [
+      {"name": "free", "type": "revolute", "bodies": ["a", "world"], "anchor": [0, 0]},
+      {"name": "fixed", "type": "revolute", "bodies": ["world", "b"], "anchor": [2, 0]}]})",
+                         "s.json", "", &scene, &error))
+      << error;
+  std::set<std::string> paths;
+  for (const auto& number : EnumerateNumbers(&scene)) paths.insert(number.path);
+  for (const std::string number : {"angle", "rate"}) {
+    EXPECT_EQ(paths.count("joints/free/" + number), 1u);
+    EXPECT_EQ(paths.count("joints/fixed/" + number), 0u);
+  }
+}
+
 }  // namespace
 }  // namespace tangible
