@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// The published and exact problems of ../shared/cases, read at run time where they are present.
+// Problems with known solutions in tests/lcp/data (README.md there).
 
-#include <algorithm>
-#include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -14,14 +13,9 @@
 
 namespace tangible {
 
-inline std::filesystem::path CaseFolder() {
-  return std::filesystem::path(TANGIBLE_SOURCE_DIR) / ".." / "shared" / "cases";
-}
-
-inline bool CasesArePresent() { return std::filesystem::exists(CaseFolder() / "lcp"); }
-
-inline nlohmann::json ReadJson(const std::filesystem::path& path) {
-  std::ifstream file(path);
+/// The list in a file of tests/lcp/data.
+inline nlohmann::json ReadCases(const std::string& name) {
+  std::ifstream file(std::string(TANGIBLE_SOURCE_DIR) + "/tests/lcp/data/" + name);
   return nlohmann::json::parse(file);
 }
 
@@ -38,25 +32,23 @@ inline MatrixX<double> ToMatrix(const nlohmann::json& rows, Eigen::Index cols) {
   return matrix;
 }
 
-/// The plain LCP of a file in cases/lcp, its z and w named as in problem.h.
+/// The plain LCPs w = M z + q ≥ 0, z ≥ 0, zᵀ w = 0.
+inline nlohmann::json PlainCases() { return ReadCases("problems.json"); }
+
+inline nlohmann::json PlainCase(const std::string& name) {
+  for (const nlohmann::json& data : PlainCases()) {
+    if (data["name"] == name) return data;
+  }
+  throw std::invalid_argument("no problem " + name);
+}
+
+/// A plain LCP, its z and w named as in problem.h.
 inline MixedLcp<double> PlainProblem(const nlohmann::json& data) {
   MixedLcp<double> problem;
   problem.c = ToVector(data["q"]);
   problem.F = ToMatrix(data["M"], problem.c.size());
   ConformEmptyBlocks(problem);
   return problem;
-}
-
-/// All files of cases/lcp, by name.
-inline std::vector<nlohmann::json> PlainCases() {
-  std::vector<std::filesystem::path> paths;
-  for (const auto& entry : std::filesystem::directory_iterator(CaseFolder() / "lcp")) {
-    if (entry.path().extension() == ".json") paths.push_back(entry.path());
-  }
-  std::sort(paths.begin(), paths.end());
-  std::vector<nlohmann::json> cases;
-  for (const auto& path : paths) cases.push_back(ReadJson(path));
-  return cases;
 }
 
 }  // namespace tangible

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// The time steps of cases/lcp_step_cases.json as mixed LCPs, and their data's derivatives with
-// respect to the physical parameters, from the formulas the file states:
+// The time steps of tests/lcp/data/time_steps.json as mixed LCPs, and their data's derivatives with
+// respect to the physical parameters:
 //
 //   p = M v + h f,  c = (e ∘ (Jc v); 0; 0)
 //   row of Jc: the normal n acting on body b at r_b and −n on body a at r_a
@@ -21,23 +21,25 @@ class StepCase {
  public:
   explicit StepCase(const nlohmann::json& data)
       : data_(data), v_(ToVector(data["v"])), f_(ToVector(data["f"])), dt_(data["dt"]) {
-    const auto& matrices = data["matrices"];
-    const Eigen::Index nv = v_.size();
-    num_contacts_ = static_cast<Eigen::Index>(matrices["Jc"].size());
-    num_friction_ = static_cast<Eigen::Index>(matrices["Jf"].size());
+    if (!data_.contains("one_sided")) data_["one_sided"] = nlohmann::json::object();
+    const nlohmann::json& contacts = data["contacts"];
+    num_contacts_ = static_cast<Eigen::Index>(contacts.size());
+    for (const nlohmann::json& contact : contacts) {
+      if (contact["mu"] > 0.0) num_friction_ = 2 * num_contacts_;
+    }
     problem_ = Zero();
-    problem_.M = ToMatrix(matrices["M"], nv);
-    problem_.p = ToVector(matrices["q"]);
-    const MatrixX<double> Jc = ToMatrix(matrices["Jc"], nv);
-    problem_.G.topRows(num_contacts_) = Jc;
-    problem_.G.middleRows(num_contacts_, num_friction_) = ToMatrix(matrices["Jf"], nv);
-    problem_.c.head(num_contacts_) = ToVector(matrices["e"]).cwiseProduct(Jc * v_);
-    if (num_friction_ > 0) {
-      const MatrixX<double> E = ToMatrix(matrices["E"], num_contacts_);
-      problem_.F.block(num_contacts_, gamma(0), num_friction_, num_contacts_) = E;
-      problem_.F.block(gamma(0), num_contacts_, num_contacts_, num_friction_) = -E.transpose();
-      for (Eigen::Index k = 0; k < num_contacts_; ++k) {
-        problem_.F(gamma(k), k) = matrices["mu"][k].get<double>();
+    for (Eigen::Index i = 0; i < v_.size(); ++i) {
+      problem_.M(i, i) = data["bodies"][i / 3][i % 3 < 2 ? "m" : "I"];
+    }
+    problem_.p = problem_.M * v_ + dt_ * f_;
+    for (Eigen::Index k = 0; k < num_contacts_; ++k) {
+      AddContact("", k, problem_);
+      problem_.c[k] = restitution(k) * problem_.G.row(k).dot(v_);
+      if (num_friction_ == 0) continue;
+      problem_.F(gamma(k), k) = contacts[k]["mu"];
+      for (Eigen::Index row = num_contacts_ + 2 * k; row < num_contacts_ + 2 * k + 2; ++row) {
+        problem_.F(row, gamma(k)) = 1.0;
+        problem_.F(gamma(k), row) = -1.0;
       }
     }
   }
@@ -80,8 +82,12 @@ class StepCase {
     return zero;
   }
 
-  static Vector2d Pair(const nlohmann::json& list) {
-    return list.is_null() ? Vector2d(0.0, 0.0) : Vector2d(list[0], list[1]);
+  double restitution(Eigen::Index contact) const { return data_["contacts"][contact]["e"]; }
+
+  // A vector of a contact; (0, 0) for a point of the world.
+  static Vector2d Pair(const nlohmann::json& contact, const char* name) {
+    return contact.contains(name) ? Vector2d(contact[name][0], contact[name][1])
+                                  : Vector2d(0.0, 0.0);
   }
 
   // Adds to the row the derivative of (d, r x d) on a body, for a change of d and of r.
@@ -94,9 +100,12 @@ class StepCase {
 
   void AddContact(const std::string& name, Eigen::Index k, MixedLcp<double>& change) const {
     const auto& contact = data_["contacts"][k];
-    const Vector2d n = Pair(contact["n"]);
+    const Vector2d n = Pair(contact, "n");
     const Vector2d t(n.y(), -n.x());
-    const Vector2d dn = name == "n_theta" ? Vector2d(-n.y(), n.x()) : Vector2d(0.0, 0.0);
+    // Without a name the rows themselves, whose derivative along (n, 0) they are.
+    const Vector2d dn = name.empty()        ? n
+                        : name == "n_theta" ? Vector2d(-n.y(), n.x())
+                                            : Vector2d(0.0, 0.0);
     const Vector2d dt(dn.y(), -dn.x());
     const auto moved = [&name](const char* which) {
       return Vector2d(name == std::string(which) + "_x" ? 1.0 : 0.0,
@@ -106,15 +115,15 @@ class StepCase {
     VectorX<double> tangent_row = normal_row;
     for (const auto& [body, r, which, sign] :
          {std::tuple{"b", "rb", "rb", 1.0}, std::tuple{"a", "ra", "ra", -1.0}}) {
-      AddRow(contact[body], n, dn, Pair(contact[r]), moved(which), sign, normal_row);
-      AddRow(contact[body], t, dt, Pair(contact[r]), moved(which), sign, tangent_row);
+      AddRow(contact[body], n, dn, Pair(contact, r), moved(which), sign, normal_row);
+      AddRow(contact[body], t, dt, Pair(contact, r), moved(which), sign, tangent_row);
     }
     change.G.row(k) += normal_row.transpose();
     if (num_friction_ > 0) {
       change.G.row(num_contacts_ + 2 * k) += tangent_row.transpose();
       change.G.row(num_contacts_ + 2 * k + 1) -= tangent_row.transpose();
     }
-    change.c[k] += data_["matrices"]["e"][k].get<double>() * normal_row.dot(v_);
+    change.c[k] += restitution(k) * normal_row.dot(v_);
   }
 
   void Add(const std::string& name, Eigen::Index k, MixedLcp<double>& change) const {
@@ -126,7 +135,7 @@ class StepCase {
     } else if (name == "v") {
       change.p += problem_.M.col(k);
       for (Eigen::Index row = 0; row < num_contacts_; ++row) {
-        change.c[row] += data_["matrices"]["e"][row].get<double>() * problem_.G(row, k);
+        change.c[row] += restitution(row) * problem_.G(row, k);
       }
     } else if (name == "f") {
       change.p[k] += dt_;
@@ -151,9 +160,8 @@ class StepCase {
 };
 
 inline std::vector<StepCase> StepCases() {
-  const nlohmann::json file = ReadJson(CaseFolder() / "lcp_step_cases.json");
   std::vector<StepCase> cases;
-  for (const auto& data : file["cases"]) cases.emplace_back(data);
+  for (const nlohmann::json& data : ReadCases("time_steps.json")) cases.emplace_back(data);
   return cases;
 }
 

@@ -92,11 +92,10 @@ TEST(LemkeTest, HonoursThePivotLimit) {
 }
 
 TEST(LemkeTest, PathsOfPublishedLength) {
-  if (!CasesArePresent()) GTEST_SKIP() << "../shared/cases is not there";
   // Murty's problem takes 2¹² pivots; Klee and Minty's, Beale's and Chvatal's cycle without a rule.
   for (const char* name : {"murty_n12", "lp_kleeminty3", "lp_beale", "lp_chvatal",
                            "cycle_psd4_largest", "sic_exp_murty2"}) {
-    const auto data = ReadJson(CaseFolder() / "lcp" / (std::string(name) + ".json"));
+    const nlohmann::json data = PlainCase(name);
     const MixedLcp<double> problem = PlainProblem(data);
     const LemkeResult result = SolveLemke(problem.F, problem.c);
     EXPECT_EQ(result.status, LemkeStatus::kSolved) << name;
