@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Independent values and derivatives, derived elsewhere with 45 digits:
-// ../shared/cases/closed_form, read at run time where it is present. The formulas and the engine
-// are compared with every variant.
+// Independent values and derivatives, derived elsewhere by hand, with 45 digits and by integration
+// with saltation matrices (published_cases.json). The formulas and the engine are compared with
+// every variant.
 
 #include <algorithm>
-#include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
 
@@ -16,11 +15,7 @@ namespace {
 
 using Maker = ClosedForm (*)(const std::string&, const Inputs&);
 
-std::filesystem::path Folder() {
-  return std::filesystem::path(TANGIBLE_SOURCE_DIR) / ".." / "shared" / "cases" / "closed_form";
-}
-
-/// What a file says of a variant, in the rows and columns of `form`; NaN where it says nothing.
+/// What is published of a variant, in the rows and columns of `form`; NaN where it says nothing.
 Outcome Published(const ClosedForm& form, const nlohmann::json& variant) {
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
   Outcome outcome;
@@ -69,7 +64,7 @@ int ExpectPublished(const ClosedForm& form, const Outcome& published, const Outc
   for (Eigen::Index i = 0; i < published.values.size(); ++i) {
     expect(got.values[i], published.values[i], largest(published.values), form.outputs[i]);
     for (Eigen::Index k = 0; k < published.jacobian.cols(); ++k) {
-      // Neither the engine nor a formula with a kink has all that a file may have.
+      // Neither the engine nor a formula with a kink has all that is published.
       if (std::isnan(got.jacobian(i, k))) continue;
       expect(got.jacobian(i, k), published.jacobian(i, k), largest(published.jacobian),
              "d " + form.outputs[i] + " / d " + form.parameters[k].first);
@@ -78,18 +73,16 @@ int ExpectPublished(const ClosedForm& form, const Outcome& published, const Outc
   return compared;
 }
 
-void CompareFile(const std::string& file, Maker maker, int at_least) {
-  const std::filesystem::path path = Folder() / file;
-  if (!std::filesystem::exists(path)) {
-    GTEST_SKIP() << "../shared/cases/closed_form/" << file << " is not there";
-  }
-  std::ifstream stream(path);
-  const nlohmann::json data = nlohmann::json::parse(stream);
+void CompareForm(const std::string& of, Maker maker, int at_least) {
+  std::ifstream stream(std::string(TANGIBLE_SOURCE_DIR) +
+                       "/tests/verification/closed_forms/published_cases.json");
+  const nlohmann::json variants = nlohmann::json::parse(stream);
   int compared = 0;
-  for (const nlohmann::json& variant : data["variants"]) {
+  for (const nlohmann::json& variant : variants) {
+    if (variant["form"] != of) continue;
     Inputs inputs;
     for (const auto& [key, value] : variant["inputs"].items()) inputs[key] = value;
-    const std::string name = file + ", " + variant["name"].get<std::string>();
+    const std::string name = of + ", " + variant["name"].get<std::string>();
     const ClosedForm form = maker(name, inputs);
     const Outcome published = Published(form, variant);
     const bool smooth = form.kind == Kind::kSmooth;
@@ -97,7 +90,7 @@ void CompareFile(const std::string& file, Maker maker, int at_least) {
     // round, which differs between machines (1e-10 of an entry was seen).
     compared +=
         ExpectPublished(form, published, Exact(form), smooth ? 1e-9 : 1e-11, name + ", formula");
-    // Without derivatives: on a kink, of which the file has the sides. The engine's value counts.
+    // Without derivatives: on a kink, whose sides are published. The engine's value counts.
     const int steps = form.instant > 0.0 ? 1 : smooth ? 2000 : 40;
     const Outcome got = Simulate(form, kRungeKutta, steps, Method::kAdjoint);
     compared += ExpectPublished(form, published, got, smooth ? 1e-8 : 1e-9, name + ", engine");
@@ -105,25 +98,19 @@ void CompareFile(const std::string& file, Maker maker, int at_least) {
   EXPECT_GE(compared, at_least);
 }
 
-TEST(PublishedCases, Drop) { CompareFile("a_ball_drop.json", &Drop, 60); }
-TEST(PublishedCases, ObliqueWall) { CompareFile("b_oblique_wall.json", &ObliqueWall, 80); }
-TEST(PublishedCases, TwoDiscs) { CompareFile("c_two_discs.json", &TwoDiscs, 300); }
-TEST(PublishedCases, SlidingBlock) { CompareFile("d_block_stop.json", &SlidingBlock, 20); }
-TEST(PublishedCases, Incline) { CompareFile("e_incline.json", &Incline, 50); }
-TEST(PublishedCases, SlideToRoll) { CompareFile("f_disc_slide_to_roll.json", &SlideToRoll, 100); }
-TEST(PublishedCases, Rolling) { CompareFile("g_disc_incline.json", &Rolling, 100); }
-TEST(PublishedCases, PhysicalPendulum) {
-  CompareFile("h_physical_pendulum.json", &PhysicalPendulum, 40);
-}
-TEST(PublishedCases, DoublePendulum) {
-  CompareFile("i_double_pendulum.json", &DoublePendulum, 100);
-}
-TEST(PublishedCases, ThreeBalls) { CompareFile("j_three_ball_chain.json", &ThreeBalls, 200); }
-TEST(PublishedCases, FrictionalImpact) {
-  CompareFile("k_impact_friction.json", &FrictionalImpact, 300);
-}
-TEST(PublishedCases, BoxPush) { CompareFile("l_box_tip_slide.json", &BoxPush, 80); }
-TEST(PublishedCases, BoxTip) { CompareFile("l2_box_tip_motion.json", &BoxTip, 30); }
+TEST(PublishedCases, Drop) { CompareForm("ball_drop", &Drop, 60); }
+TEST(PublishedCases, ObliqueWall) { CompareForm("oblique_wall", &ObliqueWall, 80); }
+TEST(PublishedCases, TwoDiscs) { CompareForm("two_discs", &TwoDiscs, 300); }
+TEST(PublishedCases, SlidingBlock) { CompareForm("block_stop", &SlidingBlock, 20); }
+TEST(PublishedCases, Incline) { CompareForm("incline", &Incline, 50); }
+TEST(PublishedCases, SlideToRoll) { CompareForm("disc_slide_to_roll", &SlideToRoll, 100); }
+TEST(PublishedCases, Rolling) { CompareForm("disc_incline", &Rolling, 100); }
+TEST(PublishedCases, PhysicalPendulum) { CompareForm("physical_pendulum", &PhysicalPendulum, 40); }
+TEST(PublishedCases, DoublePendulum) { CompareForm("double_pendulum", &DoublePendulum, 100); }
+TEST(PublishedCases, ThreeBalls) { CompareForm("three_ball_chain", &ThreeBalls, 200); }
+TEST(PublishedCases, FrictionalImpact) { CompareForm("impact_friction", &FrictionalImpact, 300); }
+TEST(PublishedCases, BoxPush) { CompareForm("box_tip_slide", &BoxPush, 80); }
+TEST(PublishedCases, BoxTip) { CompareForm("box_tip_motion", &BoxTip, 30); }
 
 }  // namespace
 }  // namespace tangible::closed_forms
