@@ -118,7 +118,9 @@ void CoincidenceMaker::LeavesAFace() {
   const double radius = disc.shape.numbers[0];
   // Faster than √(g r): it leaves the corner at once.
   const double speed = Pick({2.0, 3.0});
-  disc.position.y() = kFaceTop + radius;
+  // Not at the height of another ledge, onto which it would pass.
+  const double top = kFaceTop * (1.0 + number_);
+  disc.position.y() = top + radius;
   disc.velocity.x() = mirror_ * speed;
   BasicBody<double> ledge;
   ledge.name = Named("ledge");
@@ -130,7 +132,7 @@ void CoincidenceMaker::LeavesAFace() {
   const bool is_within = course_.stepping == Stepping::kFixed || count_ == 0;
   const double leaves = at_ + (is_within ? 0.5 * made_.scene.simulation.dt : 0.0);
   const double edge = place_ + mirror_ * speed * leaves;
-  ledge.position = Vector2<double>(edge - 5.0 * mirror_, kFaceTop - 0.25);
+  ledge.position = Vector2<double>(edge - 5.0 * mirror_, top - 0.25);
   made_.scene.bodies.push_back(ledge);
   const std::string face = "bodies/" + ledge.name + "/position/x";
   paths_.push_back(face);
@@ -140,7 +142,7 @@ void CoincidenceMaker::LeavesAFace() {
         {side * at(body + "position/x"), side * at(body + "velocity/x")}, {radius_now, 0.0L},
         radius_now, side * at(face) + 5.0L, -at("gravity/y"), Surface(), course);
     return std::vector<Real>{side * end.x.position,
-                             kFaceTop + end.y.position,
+                             top + end.y.position,
                              0.0L,
                              side * end.x.speed,
                              end.y.speed,

@@ -19,7 +19,10 @@ constexpr char kOfTwoKinds[] = "coincidence: two at one instant, of two kinds";
 
 // Of the parameter: the longest way to where derivatives are taken. The next kink is a step away.
 constexpr long double kWay = 1e-6L;
-constexpr long double kSmallest = 0.1L;  // size of a parameter
+// The size of a parameter is at least this: where a coincidence moves with the square of the way
+// (that of the speed at the top of a fall), the square must exceed the rounding of the scene's
+// numbers.
+constexpr long double kSmallest = 1.0L;
 
 using Map = std::map<std::string, Real>;
 

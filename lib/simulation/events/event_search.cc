@@ -234,6 +234,46 @@ void EventSearch::TryStart(const Model<double>& model, double tolerance, Event t
   *event = trial;
 }
 
+// The rate of a sliding speed in its friction's direction where bodies have given accelerations,
+// without what turning directions add.
+double EventSearch::SlipRate(const Model<double>& model, const State<double>& state,
+                             const std::vector<double>& accelerations, const Event& event) {
+  rates_ = state;
+  std::fill(rates_.twist.begin(), rates_.twist.end(), 0.0);
+  SpreadTwists(*model.structure, accelerations, &rates_.twist);
+  return SlidingSign(segment_->modes[event.index]) *
+         SpeedsOf(model, rates_, segment_->contacts[event.index]).slip;
+}
+
+// Where a sliding speed that is positive at a and b falls below 0 between them, or may do so, by
+// the cubic through its values and rates; else b. A joint that friction would stop may be set in
+// motion again by an effort that grows within the motion.
+double EventSearch::FindDip(const Model<double>& model, const Event& event, double a, double fa,
+                            double b, double fb) {
+  const double width = b - a;
+  // The last stage is evaluated at the end of its motion.
+  const auto rate_at_end = [&](double length) {
+    const Segment& motion = At(model, length)->motion;
+    return width * SlipRate(model, motion.after,
+                            motion.stages[motion.num_stages - 1].solution.motion, event);
+  };
+  const double ra = a > 0.0
+                        ? rate_at_end(a)
+                        : width * SlipRate(model, segment_->before,
+                                           At(model, b)->motion.stages[0].solution.motion, event);
+  if (!(ra < 0.0)) return b;
+  const double rb = rate_at_end(b);
+  if (!(rb > 0.0)) return b;
+  // fa + ra x + c2 x² + c3 x³, whose rate vanishes at the later of two places.
+  const double c2 = 3.0 * (fb - fa) - 2.0 * ra - rb;
+  const double c3 = 2.0 * (fa - fb) + ra + rb;
+  const double root = std::sqrt(std::max(c2 * c2 - 3.0 * c3 * ra, 0.0));
+  const double x = c2 > 0.0 ? -ra / (c2 + root) : (root - c2) / (3.0 * c3);
+  if (!(x > 0.0 && x < 1.0)) return b;
+  const double least = fa + (ra + (c2 + c3 * x) * x) * x;
+  return least < kDipMargin * (rb - ra) ? a + x * width : b;
+}
+
 void EventSearch::SearchClosed(const Model<double>& model, Event* event) {
   for (size_t i = 0; i < segment_->contacts.size() && !event->at_start; ++i) {
     const ContactMode mode = segment_->modes[i];
@@ -247,6 +287,13 @@ void EventSearch::SearchClosed(const Model<double>& model, Event* event) {
         TryStart(model, tolerance, trial, event);
         return;
       }
+      const auto f = [&](Sample& sample) { return ModeValue(model, &sample, trial); };
+      const auto ends_between = [&](double a, double fa, double b, double fb) {
+        trial.length = Refine(model, f, std::max(kLocatedOfSize * at_start, located), a, fa, b, fb);
+        trial.at_once =
+            trial.length < kShortestPart * b && f(*At(model, trial.length)) < -tolerance;
+        *event = trial;
+      };
       double a = 0.0;
       double fa = at_start;
       for (const double share : {0.5, 1.0}) {
@@ -256,12 +303,13 @@ void EventSearch::SearchClosed(const Model<double>& model, Event* event) {
           return;
         }
         if (fb < -tolerance) {
-          const auto f = [&](Sample& sample) { return ModeValue(model, &sample, trial); };
-          trial.length =
-              Refine(model, f, std::max(kLocatedOfSize * at_start, located), a, fa, b, fb);
-          trial.at_once =
-              trial.length < kShortestPart * b && f(*At(model, trial.length)) < -tolerance;
-          *event = trial;
+          ends_between(a, fa, b, fb);
+          return;
+        }
+        const double dip =
+            trial.kind == EventKind::kSlipEnds ? FindDip(model, trial, a, fa, b, fb) : b;
+        if (const double least = dip < b ? f(*At(model, dip)) : 0.0; least < -tolerance) {
+          ends_between(a, fa, dip, least);
           return;
         }
         // At the end of the motion the function has reached 0 to rounding: the event is there. The

@@ -114,6 +114,10 @@ class EventSearch {
                  const CourseOver& course_over, double tolerance, double from, double to,
                  double* root);
   void SearchClosed(const Model<double>& model, Event* event);
+  double SlipRate(const Model<double>& model, const State<double>& state,
+                  const std::vector<double>& accelerations, const Event& event);
+  double FindDip(const Model<double>& model, const Event& event, double a, double fa, double b,
+                 double fb);
   bool IsDetermined(const Event& event, SolvedNode* node) const;
   void TryStart(const Model<double>& model, double tolerance, Event trial, Event* event);
   template <typename Function>
@@ -137,6 +141,7 @@ class EventSearch {
   double slow_ = 0.0;            ///< the speed tolerance as the segment starts, m/s
   std::vector<double> closing_;  ///< bound on the speed of each body's points over the segment
   std::vector<Sample> samples_;
+  State<double> rates_;  ///< scratch: poses with accelerations in the place of twists
   int num_samples_ = 0;
   long evaluations_ = 0;  ///< of the motion, in this step
   int num_pairs_with_events_ = 1;

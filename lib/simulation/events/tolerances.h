@@ -54,6 +54,9 @@ inline constexpr double kWiderBoxes = 1e-9;
 /// Of the step or segment: a smaller rest of a step counts as none; the instant at which a feature
 /// hands over to the next is found to this accuracy.
 inline constexpr double kTimeRounding = 1e-14;
+/// Of the change of a sliding speed's rate over a motion: where the speed falls and rises again and
+/// the cubic through its ends comes nearer to 0, it is evaluated there.
+inline constexpr double kDipMargin = 1e-3;
 /// Of the step: a shorter segment that ends with a contact touching counts as an event, of which a
 /// pair may have `max_events_per_step`.
 inline constexpr double kNoMotion = 1e-13;

@@ -250,5 +250,73 @@ TEST(UnloadedFrictionTest, ABoxThatOnlyAForcePresses) {
   }
 }
 
+// Friction stops a wheel, and an effort that grows at the rate k sets it in motion again within the
+// same step, or just before it would have stopped:
+//
+//   I ω = I ω0 − F t + k t² / 2, which falls to 0 if ω0 < F² / (2 k I);   from rest at t = F / k
+TEST(UnloadedFrictionTest, AGrowingEffortMovesAWheelAgain) {
+  constexpr double kFriction = 0.5, kRate = 8.0, kInertia = 0.005, kEnd = 0.25;
+  for (const double speed : {1e-6, 1e-3, 1.0, 3.0, 3.12, 3.13, 4.0}) {
+    for (const double dt : {0.25, 0.125, 0.05}) {
+      SCOPED_TRACE(Text(speed) + " rad/s, dt " + Text(dt));
+      Scene scene = Flywheel(0.0, speed, kFriction, std::sqrt(2.0 * kInertia), kEnd);
+      scene.simulation.dt = dt;
+      Signal effort;
+      effort.file = "effort.csv";
+      effort.interpolation = Signal::Interpolation::kLinear;
+      effort.time = {0.0, 1.0};
+      effort.value = {0.0, kRate};
+      scene.joints[0].effort_signal = effort;
+      const double root = kFriction * kFriction - 2.0 * kRate * kInertia * speed;
+      const double stops =
+          root > 0.0 ? 2.0 * kInertia * speed / (kFriction + std::sqrt(root)) : 0.0;
+      const double moves = kEnd - kFriction / kRate;
+      const double angle =
+          root > 0.0
+              ? speed * stops + (kRate * stops / 6.0 - 0.5 * kFriction) * stops * stops / kInertia +
+                    kRate * moves * moves * moves / (6.0 * kInertia)
+              : speed * kEnd + (kRate * kEnd / 6.0 - 0.5 * kFriction) * kEnd * kEnd / kInertia;
+      const std::vector<std::string> paths = {"bodies/w/angular_velocity"};
+      const GradientResult result = Jacobian(scene, paths, GradientMethod::kAdjoint);
+      EXPECT_NEAR(result.values[2], angle, 1e-12);
+      EXPECT_NEAR(result.values[5],
+                  root > 0.0 ? 0.5 * kRate * moves * moves / kInertia
+                             : speed + (0.5 * kRate * kEnd - kFriction) * kEnd / kInertia,
+                  1e-11);
+      EXPECT_NEAR(result.jacobian(2, 0), root > 0.0 ? stops : kEnd, 1e-9);
+      EXPECT_NEAR(result.jacobian(5, 0), root > 0.0 ? 0.0 : 1.0, 1e-9);
+      if (speed == 1.0 || speed == 4.0) ExpectOthersAgree(scene, paths, result);
+    }
+  }
+}
+
+// The same of a box on a floor that a growing force pushes.
+TEST(UnloadedFrictionTest, AGrowingForceMovesABoxAgain) {
+  for (const double speed : {1e-5, 0.01, 0.3}) {
+    SCOPED_TRACE(Text(speed) + " m/s");
+    Scene scene = SceneOf(Head(10.0) + R"("bodies": [
+        {"name": "b", "mass": 1, "shape": {"box": {"size": [0.5, 0.25]}},
+         "position": [0, 0.125], "velocity": [)" +
+                          Text(speed) + R"(, 0], "friction": 0.5},
+        {"name": "floor", "static": true, "friction": 0.5,
+         "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}}],
+        "forces": [{"name": "f", "body": "b", "force": [0, 0], "at": [0, -0.125]}])" +
+                          Tail(0.5));
+    scene.simulation.dt = 0.5;
+    Signal force;
+    force.file = "force.csv";
+    force.interpolation = Signal::Interpolation::kLinear;
+    force.time = {0.0, 1.0};
+    force.x = {0.0, 40.0};
+    force.y = {0.0, 0.0};
+    scene.forces[0].force_signal = force;
+    const GradientResult result =
+        Jacobian(scene, {"bodies/b/velocity/x"}, GradientMethod::kTangent);
+    EXPECT_NEAR(result.values[3], 20.0 * 0.375 * 0.375, 1e-10);
+    EXPECT_NEAR(result.jacobian(3, 0), 0.0, 1e-9);
+    EXPECT_NEAR(result.jacobian(0, 0), (5.0 - std::sqrt(25.0 - 80.0 * speed)) / 40.0, 1e-9);
+  }
+}
+
 }  // namespace
 }  // namespace tangible
