@@ -208,6 +208,8 @@ class Judge {
                               : kUnknown;
     double estimate = kMethodPairs[pair].a == kByRidders ? entry.ridders_error : 0.0;
     if (IsOfASide(kMethodPairs[pair].a)) estimate = kSideRounding * ScaleOfColumn(p);
+    // The contributions do not include what moves an event's time, which cancels in other bodies.
+    if (kMethodPairs[pair].a == kByClosedForm) estimate = kRounding * ScaleOfColumn(p);
     if (kMethodPairs[pair].a == kByUnrolledJets) {
       entry.contributions = ScaleOfColumn(p);
       const double error = InteriorPointError();

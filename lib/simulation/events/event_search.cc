@@ -314,7 +314,9 @@ void EventSearch::SearchClosed(const Model<double>& model, Event* event) {
         }
         // At the end of the motion the function has reached 0 to rounding: the event is there. The
         // next motion could not find it, because its function would start at 0.
-        if (share == 1.0 && fb <= tolerance && event->kind != trial.kind) {
+        // Of two such events the end of a slip counts, where accelerations jump.
+        if (share == 1.0 && fb <= tolerance && event->kind != trial.kind &&
+            event->kind != EventKind::kSlipEnds) {
           trial.length = b;
           *event = trial;
           return;
@@ -498,6 +500,10 @@ bool EventSearch::Run(const Model<double>& model, const std::vector<ActiveContac
   if (!all_good_) {
     *message = message_;
     return false;
+  }
+  hand_overs_.clear();
+  if (IsLocated(event.kind) && !event.at_start && !segment->contacts.empty()) {
+    FindHandOvers(model, &event);
   }
   TakeMotion(At(model, segment->length), segment);
   if (event.kind == EventKind::kSlipBegins || event.kind == EventKind::kLiftOff) {

@@ -57,6 +57,14 @@ class EventSearch {
   /// Whether the next search keeps the modes of such contacts.
   void KeepStarts(bool keeps) { keeps_starts_ = keeps; }
 
+  /// A closed contact whose feature another one of its pair replaces.
+  struct HandOver {
+    ActiveContact lost, next;
+  };
+  /// Contacts of other pairs than the event's that are handed over at the instant of the event that
+  /// the last search found.
+  const std::vector<HandOver>& hand_overs() const { return hand_overs_; }
+
   /// The sizes of bodies and the tolerances on gaps that follow from them.
   const Lengths& lengths() const { return lengths_; }
   /// The gap below which a contact touches (m), or a joint is at its limit (m or rad).
@@ -106,6 +114,7 @@ class EventSearch {
   void SearchReturn(const Model<double>& model, const ActiveContact& contact, double touch,
                     Event* event);
   void SearchLimit(const Model<double>& model, int joint, double side, Event* event);
+  void FindHandOvers(const Model<double>& model, Event* event);
   /// The first crossing of gap from above 0 within [from, to]; rate_over(a, b) bounds how fast it
   /// closes between; course_over(a, gap(a), b, gap(b)) tells what else is known about it. The
   /// crossing is found to |gap| ≤ tolerance, or as near as doubles allow.
@@ -140,6 +149,7 @@ class EventSearch {
   double load_speed_ = 0.0;      ///< by loads in a time step (load_speed.h), m/s
   double slow_ = 0.0;            ///< the speed tolerance as the segment starts, m/s
   std::vector<double> closing_;  ///< bound on the speed of each body's points over the segment
+  std::vector<HandOver> hand_overs_;
   std::vector<Sample> samples_;
   State<double> rates_;  ///< scratch: poses with accelerations in the place of twists
   int num_samples_ = 0;

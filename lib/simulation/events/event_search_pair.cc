@@ -19,8 +19,8 @@ namespace {
 // the vertex there, not when the gap of the next feature is reached, whose edge has another end:
 // this returns the contact of these two vertices. It returns `next` where the pair has none, or
 // where rounded corners continue the contact smoothly.
-ActiveContact HandOver(const Model<double>& model, const State<double>& state,
-                       const ActiveContact& lost, const ActiveContact& next) {
+ActiveContact NextAt(const Model<double>& model, const State<double>& state,
+                     const ActiveContact& lost, const ActiveContact& next) {
   const bool of_first = lost.feature.kind == FeatureKind::kVertexEdge;
   if (!of_first && lost.feature.kind != FeatureKind::kEdgeVertex) {
     return next;
@@ -77,6 +77,13 @@ class EventSearch::PairSearch {
                             [&](const ActiveContact& c) { return IsOfPair(c); })),
         may_hide_(model.seams != nullptr && !RestsAtSeams()) {}
 
+  /// The pair's contact that is handed over where the event is, if there is one.
+  void AddHandOver(std::vector<HandOver>* found) {
+    const Sample& sample = *search_.At(model_, event_.length);
+    if (const ActiveContact* lost = LostAt(sample.motion.after)) {
+      found->push_back({*lost, NextOf(sample)});
+    }
+  }
   void Run() {
     SearchFrom(0.0, 0.0, Counts::kUntouched);
     if (SearchTouching() && closed_) {
@@ -125,6 +132,8 @@ class EventSearch::PairSearch {
   bool SearchTouching();
   // The closed contact whose feature is no longer the closest, or nullptr.
   const ActiveContact* LostAt(const State<double>& state) const;
+  // The contact that replaces it.
+  ActiveContact NextOf(const Sample& sample);
   void SearchHandOver();
   double AlignedWithin() const;
   // Whether one of the shapes is a disc, which has no ends that could be aligned with others.
@@ -437,10 +446,24 @@ void EventSearch::PairSearch::SearchHandOver() {
   if (high < event_.length) {
     event_.kind = EventKind::kTouch;
     event_.length = high;
-    const Sample& sample = *search_.At(model_, high);
-    const bool next = std::isfinite(Gap(sample, Counts::kAll, true));
-    const ActiveContact lost = *LostAt(sample.motion.after);
-    event_.contact = HandOver(model_, sample.motion.after, lost, next ? nearest_ : lost);
+    event_.contact = NextOf(*search_.At(model_, high));
+  }
+}
+
+ActiveContact EventSearch::PairSearch::NextOf(const Sample& sample) {
+  const bool next = std::isfinite(Gap(sample, Counts::kAll, true));
+  const ActiveContact lost = *LostAt(sample.motion.after);
+  return NextAt(model_, sample.motion.after, lost, next ? nearest_ : lost);
+}
+
+// Of the pairs other than the event's.
+void EventSearch::FindHandOvers(const Model<double>& model, Event* event) {
+  for (const auto& [first, second] : pairs_) {
+    const int a = first, b = second;
+    if (event->contact.joint < 0 && event->contact.a == a && event->contact.b == b) continue;
+    model.structure->ForEachPartPair(a, b, [&](PartPair parts) {
+      PairSearch(this, model, a, b, parts, event).AddHandOver(&hand_overs_);
+    });
   }
 }
 

@@ -543,18 +543,28 @@ void EventStepper::SwitchMode(const Segment& segment) {
 
 bool EventStepper::EndOtherSlips(const Model<double>& model, double t, const Segment& segment,
                                  State<double>* state, EventOutcome* outcome) {
-  if (segment.event != EventKind::kSlipEnds) {
-    return true;
+  const bool ends_slip = segment.event == EventKind::kSlipEnds;
+  const double was_slow = search_.SpeedTolerance(model, segment.before);
+  const auto ends = [&](size_t i, double slow) {
+    const double sign = SlidingSign(segment.modes[i]);
+    const ActiveContact& contact = segment.contacts[i];
+    return sign != 0.0 && std::abs(SpeedsOf(model, *state, contact).slip) <= slow &&
+           (ends_slip || sign * SpeedsOf(model, segment.before, contact).slip > was_slow);
+  };
+  if (!ends_slip) {
+    // Few motions end with another event, and nearly none of these with a slip of 0.
+    const double slow = search_.SpeedTolerance(model, *state);
+    bool any = false;
+    for (size_t i = 0; i < segment.contacts.size(); ++i) any = any || ends(i, slow);
+    if (!any) return true;
   }
   FindTouching(model, *state);
   coupled_.Connect(*model.structure, touching_.contacts);
   const double slow = SlowSpeed(model, *state);
   const int group = coupled_.GroupOf(segment.event_contact);
   for (size_t i = 0; i < segment.contacts.size(); ++i) {
-    const double sign = SlidingSign(segment.modes[i]);
-    if (sign != 0.0 && coupled_.GroupOf(segment.contacts[i]) != group &&
-        std::abs(SpeedsOf(model, *state, segment.contacts[i]).slip) <= slow) {
-      ending_.push_back({segment.contacts[i], sign});
+    if (coupled_.GroupOf(segment.contacts[i]) != group && ends(i, slow)) {
+      ending_.push_back({segment.contacts[i], SlidingSign(segment.modes[i])});
     }
   }
   bool good = true;
@@ -575,6 +585,34 @@ bool EventStepper::EndOtherSlips(const Model<double>& model, double t, const Seg
   }
   ending_.clear();
   return good;
+}
+
+bool EventStepper::AddHandOvers(const Model<double>& model, double t, const Segment& segment,
+                                State<double>* state, EventOutcome* outcome) {
+  if (search_.hand_overs().empty()) return true;
+  FindTouching(model, *state);
+  coupled_.Connect(*model.structure, touching_.contacts);
+  std::vector<EventSearch::HandOver> others = search_.hand_overs();
+  std::erase_if(others, [&](const EventSearch::HandOver& one) {
+    return coupled_.GroupOf(one.lost) == coupled_.GroupOf(segment.event_contact);
+  });
+  for (size_t k = 0; k < others.size(); ++k) {
+    // The motion up to here had the contacts of before.
+    FindTouching(model, *state);
+    for (size_t j = k; j < others.size(); ++j) {
+      for (size_t i = 0; i < touching_.contacts.size(); ++i) {
+        const ActiveContact& contact = touching_.contacts[i];
+        if (contact.IsBetweenTheSame(others[j].lost) && !contact.SameAs(others[j].lost)) {
+          touching_.approach[i] = HUGE_VAL;
+        }
+      }
+      AddTouching(model, *state, others[j].lost);
+    }
+    ++outcome->events;
+    counts_.Add(others[k].next);
+    if (!AddInstant(model, t, EventKind::kTouch, &others[k].next, state, outcome)) return false;
+  }
+  return true;
 }
 
 EventOutcome EventStepper::Step(const Model<double>& model, double t, double h,
@@ -647,7 +685,8 @@ bool EventStepper::TakeEvent(const Model<double>& model, double now, double h,
     }
     search_.AllowEventsOf(counts_.num_pairs());
   }
-  return EndOtherSlips(model, now, segment, state, outcome);
+  return EndOtherSlips(model, now, segment, state, outcome) &&
+         AddHandOvers(model, now, segment, state, outcome);
 }
 
 bool EventStepper::Tries::Halve() {

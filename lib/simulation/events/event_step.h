@@ -132,6 +132,9 @@ class EventStepper {
   /// instant and whose bodies are not coupled to it get separate events.
   bool EndOtherSlips(const Model<double>& model, double t, const Segment& segment,
                      State<double>* state, EventOutcome* outcome);
+  /// The same of contacts that are handed over to another feature at the instant of an event.
+  bool AddHandOvers(const Model<double>& model, double t, const Segment& segment,
+                    State<double>* state, EventOutcome* outcome);
   bool SolveImpact(const Model<double>& model, Impulses* impact, State<double>* state,
                    EventOutcome* outcome);
   bool SolveInstant(const Model<double>& model, double now, double h, bool begins, bool at_end,
