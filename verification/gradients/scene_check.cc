@@ -17,6 +17,9 @@ namespace {
 constexpr double kRounding = 1e-13;  // of the contributions
 constexpr double kShareOfColumn = 0.1;
 constexpr double kInteriorPointEnd = 1e-14;
+// Of that: derivatives in Jets are those of the last iteration but one, whose products z s are
+// larger by two orders.
+constexpr double kLagOfJets = 100.0;
 // Of the column: the rounding of a coincidence, over the step of the closed form's differences.
 constexpr double kSideRounding = 1e-9;
 // Of the column's contributions: plain quotients that differ from the tangent by less confirm it.
@@ -111,7 +114,8 @@ class Judge {
       if (!methods.bounded && std::isnan(entry.error)) {
         continue;  // no quotient of this step, as choices differ
       }
-      if (IsKnownMethod(methods.a) && std::isnan(run_.jacobian[methods.a](o, p))) {
+      if ((IsKnownMethod(methods.a) && std::isnan(run_.jacobian[methods.a](o, p))) ||
+          (IsOfASide(methods.a) && std::isnan(run_.jacobian[methods.b](o, p)))) {
         continue;
       }
       if (!methods.bounded || entry.ratio <= 1.0) {
@@ -157,8 +161,11 @@ class Judge {
   // Whether the certificate names a kink where the closed form has one, and only there.
   void JudgeSides(int p, KindRow* row) {
     if (run_.jacobian[kByClosedPlus].size() == 0) return;
-    const auto apart =
-        (run_.jacobian[kByClosedPlus].col(p) - run_.jacobian[kByClosedMinus].col(p)).cwiseAbs();
+    // Where an output jumps on a side, its derivative there is NaN.
+    const VectorX<double> difference =
+        run_.jacobian[kByClosedPlus].col(p) - run_.jacobian[kByClosedMinus].col(p);
+    const VectorX<double> apart =
+        difference.array().isNaN().select(kInfinity, difference.array().abs()).matrix();
     Eigen::Index output = 0;
     const double most = apart.maxCoeff(&output);
     const bool has_kink = most > run_.closed_form_tolerance * ScaleOfColumn(p);
@@ -214,7 +221,7 @@ class Judge {
       entry.contributions = ScaleOfColumn(p);
       const double error = InteriorPointError();
       estimate = error <= Tolerance(pair)
-                     ? error * static_cast<double>(check_.steps) * entry.contributions
+                     ? kLagOfJets * error * static_cast<double>(check_.steps) * entry.contributions
                      : 0.0;
     }
     if (!kMethodPairs[pair].bounded) {

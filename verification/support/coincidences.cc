@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "tangible/verification/support/coincidence_maker.h"
@@ -24,24 +25,29 @@ constexpr long double kWay = 1e-6L;
 // numbers.
 constexpr long double kSmallest = 1.0L;
 
+// Of the output: what is left after the derivative over that way is a jump.
+constexpr long double kJump = 1e-8L;
+
 using Map = std::map<std::string, Real>;
 
 std::vector<Real> Outputs(const Coincidence& coincidence, const Map& numbers) {
   return coincidence.outputs([&](const std::string& path) { return numbers.at(path); });
 }
 
-// The derivative on one side: those beside the parameter, extrapolated to it by a parabola.
-VectorX<double> Side(const Coincidence& coincidence, const Map& at, const std::string& path,
-                     long double sign) {
+// The derivative on one side: those beside the parameter, extrapolated to it by a parabola. NaN
+// where an output jumps at the parameter.
+VectorX<double> Side(const Coincidence& coincidence, const Map& at, const std::vector<Real>& values,
+                     const std::string& path, long double sign) {
   const Real value = at.at(path);
   const long double way = sign * kWay * std::max(std::abs(value.value), kSmallest);
   constexpr long double kPoints[3] = {1.0L, 0.5L, 0.25L};
   constexpr long double kWeights[3] = {1.0L / 3.0L, -2.0L, 8.0L / 3.0L};
   std::vector<long double> sum;
+  std::vector<Real> outputs;  // in the end those of the nearest point
   for (int k = 0; k < 3; ++k) {
     Map beside = at;
     beside[path] = Real(value.value + kPoints[k] * way, 1.0L);
-    const std::vector<Real> outputs = Outputs(coincidence, beside);
+    outputs = Outputs(coincidence, beside);
     sum.resize(outputs.size(), 0.0L);
     for (size_t i = 0; i < outputs.size(); ++i) {
       sum[i] += kWeights[k] * outputs[i].rate;
@@ -49,7 +55,11 @@ VectorX<double> Side(const Coincidence& coincidence, const Map& at, const std::s
   }
   VectorX<double> side(static_cast<Eigen::Index>(sum.size()));
   for (size_t i = 0; i < sum.size(); ++i) {
-    side[static_cast<Eigen::Index>(i)] = static_cast<double>(sum[i]);
+    const long double expected = values[i].value + kPoints[2] * way * sum[i];
+    const bool jumps =
+        std::abs(outputs[i].value - expected) > kJump * std::max(1.0L, std::abs(values[i].value));
+    side[static_cast<Eigen::Index>(i)] =
+        jumps ? std::numeric_limits<double>::quiet_NaN() : static_cast<double>(sum[i]);
   }
   return side;
 }
@@ -211,8 +221,8 @@ KnownSides SidesOf(const Coincidence& coincidence) {
   sides.minus.resize(rows, columns);
   for (Eigen::Index k = 0; k < columns; ++k) {
     const std::string& path = coincidence.parameters[static_cast<size_t>(k)].path;
-    sides.plus.col(k) = Side(coincidence, numbers, path, 1.0L);
-    sides.minus.col(k) = Side(coincidence, numbers, path, -1.0L);
+    sides.plus.col(k) = Side(coincidence, numbers, values, path, 1.0L);
+    sides.minus.col(k) = Side(coincidence, numbers, values, path, -1.0L);
   }
   return sides;
 }

@@ -40,7 +40,7 @@ const std::vector<std::string>& CoincidenceKinds();
 
 /// The derivatives of the known outputs for growing and for shrinking parameters, outputs x
 /// parameters; empty where the outputs are not known. They are exact to 1e-16 of their column's
-/// largest.
+/// largest; NaN where an output jumps.
 struct KnownSides {
   MatrixX<double> plus, minus;
   VectorX<double> values;  ///< of the outputs
