@@ -73,6 +73,24 @@ double JustBefore(const Model<double>& model, double t) {
                         -std::numeric_limits<double>::max());
 }
 
+// The largest acceleration that loads alone give a body, of points m/s² and at the distance of a
+// radius of gyration rad/s², for each component: what friction cancels leaves their rounding.
+std::vector<double> FreeAccelerations(const ContactProblem<double>& problem) {
+  double fastest = 0.0;
+  const auto arm = [&](size_t k) {
+    return std::sqrt(problem.mass[3 * k + 2] / problem.mass[3 * k]);
+  };
+  for (size_t i = 0; i < problem.load.size(); ++i) {
+    const double acceleration = std::abs(problem.load[i]) / problem.mass[i];
+    fastest = std::max(fastest, i % 3 == 2 ? arm(i / 3) * acceleration : acceleration);
+  }
+  std::vector<double> of_components;
+  for (size_t i = 0; i < problem.load.size(); ++i) {
+    of_components.push_back(i % 3 == 2 ? fastest / arm(i / 3) : fastest);
+  }
+  return of_components;
+}
+
 // Whether the forces of an instant that follows the record are those behind an edge at it: the step
 // begins there, or the last motion has ended at an edge and not at an event of its own.
 bool FollowsEdges(const EventRecord& record) {
@@ -188,9 +206,10 @@ void EventStepper::AddFurtherEdges(const Model<double>& model, double t, const E
     if (segment == nullptr || none.empty() || other.empty() || both.empty()) return;
     segment->event_number = next->number;
     const std::vector<double>& one = segment->stages[0].solution.motion;
+    const std::vector<double> free = FreeAccelerations(segment->stages[0].problem);
     for (size_t i = 0; i < one.size(); ++i) {
-      const double size =
-          std::max({std::abs(none[i]), std::abs(one[i]), std::abs(other[i]), std::abs(both[i])});
+      const double size = std::max(
+          {std::abs(none[i]), std::abs(one[i]), std::abs(other[i]), std::abs(both[i]), free[i]});
       if (std::abs(none[i] - one[i] - other[i] + both[i]) > kNoRate * size) {
         segment->edge_before = last.number;
       }

@@ -142,6 +142,35 @@ TEST(EventEdgesTest, FixedStepsHaveTheMeanOfBothSides) {
   }
 }
 
+// Two forces that begin at one instant move a box that each of them would leave at rest: its motion
+// begins with the later one, whichever that is.
+TEST(EventEdgesTest, TheOrderOfTwoWindowsThatMatters) {
+  for (const double start : {0.5, 0.52}) {
+    for (const double force : {3.0, 2.0}) {
+      Scene scene = SceneOf(R"({"gravity": [0, -10], "bodies": [
+          {"name": "box", "mass": 1, "shape": {"box": {"size": [0.5, 0.25]}},
+           "position": [0, 0.125], "friction": 0.5},
+          {"name": "floor", "static": true, "friction": 0.5,
+           "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}}],
+          "forces": [{"name": "p", "body": "box", "force": [0, 0], "at": [0, -0.125], "start": 0},
+                     {"name": "q", "body": "box", "force": [0, 0], "at": [0, -0.125], "start": 0}],
+          "simulation": {"stepping": "event", "dt": 0.05, "duration": 1}})");
+      for (BasicForce<double>& one : scene.forces) {
+        one.force.x() = force;
+        one.start = start;
+      }
+      const std::string verdict =
+          Jacobian(scene, {"forces/p/start", "forces/q/start"}, GradientMethod::kTangent)
+              .certificate.verdict;
+      if (force == 3.0) {
+        EXPECT_NE(verdict.find("one-sided: windows of two forces"), std::string::npos) << verdict;
+      } else {
+        EXPECT_EQ(verdict, "trustworthy");
+      }
+    }
+  }
+}
+
 TEST(EventEdgesTest, EdgesAtOneInstantAreOneGroup) {
   const std::vector<Edge> edges = {{0.25, {3, 0, -1.0}},
                                    {0.5, {}},

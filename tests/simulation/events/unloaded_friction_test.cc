@@ -318,5 +318,62 @@ TEST(UnloadedFrictionTest, AGrowingForceMovesABoxAgain) {
   }
 }
 
+// A heavy wheel of small inertia on a cart that moves: what counts as rounding of the friction's
+// torque follows from the inertia, not from the mass. It breaks loose at t = F / k.
+TEST(UnloadedFrictionTest, AHeavyWheelOfSmallInertiaBreaksLoose) {
+  for (const double friction : {5e-6, 5.05e-6}) {
+    for (const double mass : {1.0, 1e3, 1e6}) {
+      Scene scene = SceneOf(R"({"gravity": [0, 0], "bodies": [
+          {"name": "cart", "mass": 1, "inertia": 1e-3, "position": [0, 0], "velocity": [10, 0]},
+          {"name": "wheel", "mass": )" +
+                            Text(mass) + R"(, "inertia": 1e-3, "shape": {"circle": {"radius": 0.1}},
+           "position": [0, 0], "velocity": [10, 0]}],
+          "joints": [
+          {"name": "level", "type": "fixed_angle", "bodies": ["cart", "world"]},
+          {"name": "axle", "type": "revolute", "bodies": ["wheel", "cart"], "anchor": [0, 0],
+           "friction": )" + Text(friction) +
+                            "}]" + Tail(1.0));
+      Signal effort;
+      effort.file = "effort.csv";
+      effort.interpolation = Signal::Interpolation::kLinear;
+      effort.time = {0.0, 1.0};
+      effort.value = {0.0, 1e-5};
+      scene.joints[1].effort_signal = effort;
+      const double moves = 1.0 - friction / 1e-5;
+      EXPECT_NEAR(StateAfter(scene).twist[5], 1e-5 * moves * moves / 2e-3, 1e-13)
+          << friction << " N m, " << mass << " kg";
+    }
+  }
+}
+
+// Links that coast without any load until the friction of their joints has stopped them, whatever
+// rounding is left of their speeds.
+TEST(UnloadedFrictionTest, LinksCoastToRest) {
+  for (const double turn : {1.0, 2.0}) {
+    for (const double friction : {0.1, 1.0}) {
+      for (const double dt : {0.01, 0.05}) {
+        Scene scene = SceneOf(R"({"gravity": [0, 0], "bodies": [
+            {"name": "a", "mass": 1, "inertia": 0.1, "position": [0, 0], "angular_velocity": )" +
+                              Text(turn) + R"(},
+            {"name": "b", "mass": 0.5, "inertia": 1e-4, "position": [0.5, 0],
+             "angular_velocity": -1},
+            {"name": "c", "mass": 1e-3, "inertia": 0.01, "position": [1, 0]}],
+            "joints": [
+            {"name": "pin", "type": "revolute", "bodies": ["a", "world"], "anchor": [-0.25, 0],
+             "friction": 0.1},
+            {"name": "elbow", "type": "revolute", "bodies": ["a", "b"], "anchor": [0.25, 0],
+             "friction": )" + Text(friction) +
+                              R"(},
+            {"name": "wrist", "type": "revolute", "bodies": ["b", "c"], "anchor": [0.75, 0],
+             "friction": 0.01}])" +
+                              Tail(12.0));
+        scene.simulation.dt = dt;
+        SCOPED_TRACE(Text(turn) + " rad/s, " + Text(friction) + " N m, dt " + Text(dt));
+        for (const double speed : StateAfter(scene).twist) EXPECT_NEAR(speed, 0.0, 1e-12);
+      }
+    }
+  }
+}
+
 }  // namespace
 }  // namespace tangible
