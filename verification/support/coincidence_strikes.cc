@@ -127,9 +127,8 @@ void CoincidenceMaker::LeavesAFace() {
   ledge.motion = Motion::kStatic;
   ledge.shape = {ShapeType::kBox, {10.0, 0.5}};
   // By fixed steps it passes the edge within a step: where two features tie as a step starts, the
-  // engine's derivative of either side is that of one of them. So it does by events on an edge as
-  // the run starts.
-  const bool is_within = course_.stepping == Stepping::kFixed || count_ == 0;
+  // engine's derivative of either side is that of one of them.
+  const bool is_within = course_.stepping == Stepping::kFixed;
   const double leaves = at_ + (is_within ? 0.5 * made_.scene.simulation.dt : 0.0);
   const double edge = place_ + mirror_ * speed * leaves;
   ledge.position = Vector2<double>(edge - 5.0 * mirror_, top - 0.25);
@@ -141,12 +140,8 @@ void CoincidenceMaker::LeavesAFace() {
     const PlanarMotion end = SlideOffFace(
         {side * at(body + "position/x"), side * at(body + "velocity/x")}, {radius_now, 0.0L},
         radius_now, side * at(face) + 5.0L, -at("gravity/y"), Surface(), course);
-    return std::vector<Real>{side * end.x.position,
-                             top + end.y.position,
-                             0.0L,
-                             side * end.x.speed,
-                             end.y.speed,
-                             0.0L};
+    return std::vector<Real>{side * end.x.position, top + end.y.position, 0.0L,
+                             side * end.x.speed,    end.y.speed,          0.0L};
   });
 }
 

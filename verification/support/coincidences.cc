@@ -20,11 +20,9 @@ constexpr char kOfTwoKinds[] = "coincidence: two at one instant, of two kinds";
 
 // Of the parameter: the longest way to where derivatives are taken. The next kink is a step away.
 constexpr long double kWay = 1e-6L;
-// The size of a parameter is at least this: where a coincidence moves with the square of the way
-// (that of the speed at the top of a fall), the square must exceed the rounding of the scene's
-// numbers.
-constexpr long double kSmallest = 1.0L;
-
+// The size of a parameter that is 0: where a coincidence moves with the square of the way (that of
+// the speed at the top of a fall), the square must exceed the rounding of the scene's numbers.
+constexpr long double kSizeOfZero = 1.0L;
 // Of the output: what is left after the derivative over that way is a jump.
 constexpr long double kJump = 1e-8L;
 
@@ -39,7 +37,8 @@ std::vector<Real> Outputs(const Coincidence& coincidence, const Map& numbers) {
 VectorX<double> Side(const Coincidence& coincidence, const Map& at, const std::vector<Real>& values,
                      const std::string& path, long double sign) {
   const Real value = at.at(path);
-  const long double way = sign * kWay * std::max(std::abs(value.value), kSmallest);
+  const long double size = value.value != 0.0L ? std::abs(value.value) : kSizeOfZero;
+  const long double way = sign * kWay * size;
   constexpr long double kPoints[3] = {1.0L, 0.5L, 0.25L};
   constexpr long double kWeights[3] = {1.0L / 3.0L, -2.0L, 8.0L / 3.0L};
   std::vector<long double> sum;

@@ -106,6 +106,8 @@ class RolloutCertifier {
                   Segment* segment);
   void AddFriction(const CoefficientSource& friction, const Place& place);
   void AddEnd(const Model<double>& model, long step, const EventRecord& record);
+  void AddHandOversAtStart(const Model<double>& model, const State<double>& start,
+                           const std::vector<const ActiveContact*>& touching);
   void AddHandOversAtEnd(const Model<double>& model, long step, const Segment& last);
   void AddTouchesAtEnd(const Model<double>& model, long step, const Segment& last);
   void AddClosedAtOnce(const Model<double>& model, long step, const Segment& segment);

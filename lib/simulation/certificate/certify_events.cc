@@ -309,28 +309,10 @@ void RolloutCertifier::AddTouchesAtEnd(const Model<double>& model, long step, co
 void RolloutCertifier::AddHandOversAtEnd(const Model<double>& model, long step,
                                          const Segment& last) {
   const ModelStructure& s = *model.structure;
-  const auto beside = [&](int body, double time) {
-    Pose<double> pose = last.after.PoseOf(body);
-    const double* twist = &last.after.twist[3 * static_cast<size_t>(body)];
-    pose.position.x() += time * twist[0];
-    pose.position.y() += time * twist[1];
-    pose.angle += time * twist[2];
-    return pose;
-  };
   for (const ActiveContact& contact : last.contacts) {
-    if (contact.joint >= 0 || (ShapeOfA(model, contact).type != ShapeType::kCircle &&
-                               ShapeOfB(model, contact).type != ShapeType::kCircle)) {
-      continue;
-    }
-    for (const double time : {-kNearKinkMargin * s.settings.dt, kNearKinkMargin * s.settings.dt}) {
-      ContactFeature features[2];
-      const int count = FindFeatures(model, contact.a, beside(contact.a, time), contact.b,
-                                     beside(contact.b, time), contact.Parts(),
-                                     std::numeric_limits<double>::infinity(), features);
-      if (count > 0 && std::find(features, features + count, contact.feature) == features + count) {
-        AddMargin(0.0, {&s, step, last.time + last.length, 0, &contact, ContactMode::kOpen},
-                  "the run ends as another corner or edge takes over");
-      }
+    if (IsHandedOver(model, last.after, contact, kNearKinkMargin * s.settings.dt)) {
+      AddMargin(0.0, {&s, step, last.time + last.length, 0, &contact, ContactMode::kOpen},
+                "the run ends as another corner or edge takes over");
     }
   }
 }

@@ -7,6 +7,7 @@
 
 #include "tangible/dynamics/jacobian/contact_gradient.h"
 #include "tangible/simulation/certificate/certify_place_inl.h"
+#include "tangible/simulation/certificate/feature_ties.h"
 #include "tangible/simulation/certificate/split_error.h"
 #include "tangible/simulation/certificate/start_probe.h"
 #include "tangible/simulation/certificate/tolerances.h"
@@ -204,8 +205,33 @@ void RolloutCertifier::AddStart(const Model<double>& model, const EventRecord& r
       }
     }
   }
+  if (start != nullptr) AddHandOversAtStart(model, *start, touching);
   if (start != nullptr && certificate_.one_sided.empty()) {
     ProbeStarts(model, *start, touching, first);
+  }
+}
+
+// A disc that starts exactly at the end of a face, or just beside it, and moves along: on one side
+// it leaves the face later. A direction that changes its speed alone does not change where it is.
+void RolloutCertifier::AddHandOversAtStart(const Model<double>& model, const State<double>& start,
+                                           const std::vector<const ActiveContact*>& touching) {
+  const ModelStructure& s = *model.structure;
+  for (const ActiveContact* contact : touching) {
+    if (!IsHandedOver(model, start, *contact, kNearKinkMargin * s.settings.dt)) continue;
+    for (Eigen::Index c = 0; c < Directions().cols(); ++c) {
+      bool moves = false;
+      for (const int body : {contact->a, contact->b}) {
+        moves = moves || !Directions().col(c).segment<3>(s.PoseVariable(body, 0)).isZero(0.0);
+        const BodyIndex& index = s.bodies[body];
+        for (int k = 0; k < index.num_shape_numbers; ++k) {
+          moves = moves || Directions()(s.ParameterVariable(index.shape_numbers + k), c) != 0.0;
+        }
+      }
+      if (moves) {
+        OneSided(ContactName(s, *contact) + " is at the end of a face at the start, " +
+                 options_.names[static_cast<size_t>(c)] + " moves it");
+      }
+    }
   }
 }
 

@@ -371,4 +371,29 @@ bool MeetsACorner(const Model<double>& model, const State<double>& state,
   return false;
 }
 
+bool IsHandedOver(const Model<double>& model, const State<double>& state,
+                  const ActiveContact& contact, double time) {
+  if (contact.joint >= 0 || (ShapeOfA(model, contact).type != ShapeType::kCircle &&
+                             ShapeOfB(model, contact).type != ShapeType::kCircle)) {
+    return false;
+  }
+  const auto beside = [&](int body, double after) {
+    Pose<double> pose = state.PoseOf(body);
+    const double* twist = &state.twist[3 * static_cast<size_t>(body)];
+    pose.position.x() += after * twist[0];
+    pose.position.y() += after * twist[1];
+    pose.angle += after * twist[2];
+    return pose;
+  };
+  for (const double after : {-time, time}) {
+    ContactFeature features[2];
+    const int count = FindFeatures(model, contact.a, beside(contact.a, after), contact.b,
+                                   beside(contact.b, after), contact.Parts(), kInfinity, features);
+    if (count > 0 && std::find(features, features + count, contact.feature) == features + count) {
+      return true;
+    }
+  }
+  return false;
+}
+
 }  // namespace tangible

@@ -264,5 +264,24 @@ TEST(CertifyEventsTest, FrictionAtItsLimitIsAKink) {
   EXPECT_GT(c.degenerate_rows, 0);
 }
 
+// A disc slides off the end of a face as the run starts: placed farther back it leaves it later.
+TEST(CertifyEventsTest, ADiscAtTheEndOfAFaceAtTheStartIsOneSided) {
+  const auto disc = [](double x) {
+    return R"("bodies": [{"name": "disc", "shape": {"circle": {"radius": 0.25}}, "mass": 1,
+        "position": [)" +
+           std::to_string(x) + R"(, 0.25], "velocity": [3, 0]}, {"name": "ledge", "static": true,
+        "shape": {"box": {"size": [10, 0.5]}}, "position": [-5, -0.25]}])";
+  };
+  for (const char* path :
+       {"bodies/disc/position/x", "bodies/ledge/position/x", "bodies/ledge/shape/size/x"}) {
+    EXPECT_EQ(CertificateFor(disc(0.0), {path})
+                  .verdict.find("one-sided: contact of disc and ledge is at the end of a face"),
+              0u)
+        << path << ": " << CertificateFor(disc(0.0), {path}).verdict;
+    EXPECT_EQ(CertificateFor(disc(-0.01), {path}).verdict, "trustworthy") << path;
+  }
+  EXPECT_EQ(CertificateFor(disc(0.0), {"bodies/disc/velocity/x"}).verdict, "trustworthy");
+}
+
 }  // namespace
 }  // namespace tangible
