@@ -116,18 +116,9 @@ bool EngineStep::StepBack(long k, const VectorX<double>& next, const VectorX<dou
 
 void EngineStep::FindImpacts() {
   impacts_.clear();
-  if (!stepper_.by_events()) return;
-  const IslandRecords& records = stepper_.events().record();
-  for (int k = 0; k < records.num_islands; ++k) {
-    AddImpacts(*records.islands[k]);
-  }
-}
-
-void EngineStep::AddImpacts(const IslandRecord& island) {
   const double threshold = model_.structure->settings.restitution_threshold;
-  for (int i = 0; i < island.events.num_parts; ++i) {
-    const EventPart& part = *island.events.parts[i];
-    if (!part.is_impulses || !Jumps(part.impulses, threshold)) continue;
+  stepper_.parts().ForEachPart([&](const IslandRecord& island, const EventPart& part) {
+    if (!part.is_impulses || !Jumps(part.impulses, threshold)) return;
     const Impulses& impulses = part.impulses;
     std::vector<Meeting> kind;
     for (size_t c = 0; c < impulses.contacts.size(); ++c) {
@@ -136,13 +127,13 @@ void EngineStep::AddImpacts(const IslandRecord& island) {
       kind.push_back({contact.a, contact.b, contact.joint});
     }
     // The decompression belongs to the same impact as the compression.
-    if (kind.empty() || impulses.decompression) continue;
+    if (kind.empty() || impulses.decompression) return;
     std::sort(kind.begin(), kind.end());
     kind.erase(std::unique(kind.begin(), kind.end()), kind.end());
     const auto found = std::find(kinds_.begin(), kinds_.end(), kind);
     impacts_.push_back(static_cast<int>(found - kinds_.begin()));
     if (found == kinds_.end()) kinds_.push_back(kind);
-  }
+  });
 }
 
 StepMap* EngineStep::Without(int impact) {

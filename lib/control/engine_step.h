@@ -54,7 +54,6 @@ class EngineStep : public StepMap {
   bool Advance(long k, const VectorX<double>& x, const VectorX<double>& u, VectorX<double>* next,
                std::string* error);
   void FindImpacts();
-  void AddImpacts(const IslandRecord& island);
 
   /// Two bodies, or a joint whose limit was reached (−1: none).
   struct Meeting {

@@ -79,24 +79,18 @@ void AddContacts(double t, const Stepper& stepper, Table* table) {
 }
 
 void AddEvents(Stepper* stepper, Table* table) {
-  if (!stepper->by_events()) return;
-  const IslandRecords& records = stepper->events().record();
   struct Event {
     double time;
     ActiveContact contact;
     EventKind kind;
   };
   std::vector<Event> events;  // of the islands, one after another
-  for (int k = 0; k < records.num_islands; ++k) {
-    const IslandRecord& island = *records.islands[k];
-    for (int p = 0; p < island.events.num_parts; ++p) {
-      const EventPart& part = *island.events.parts[p];
-      if (part.is_impulses || !IsLocated(part.segment.event)) continue;
-      const Segment& segment = part.segment;
-      events.push_back(
-          {segment.time + segment.length, island.InWhole(segment.event_contact), segment.event});
-    }
-  }
+  stepper->parts().ForEachPart([&](const IslandRecord& island, const EventPart& part) {
+    const Segment& segment = part.segment;
+    if (part.is_impulses || !IsLocated(segment.event)) return;
+    events.push_back(
+        {segment.time + segment.length, island.InWhole(segment.event_contact), segment.event});
+  });
   std::stable_sort(events.begin(), events.end(),
                    [](const Event& x, const Event& y) { return x.time < y.time; });
   for (const Event& event : events) {

@@ -175,7 +175,7 @@ void TraceStep(Stepper* stepper, long step, RunTrace* trace) {
     TraceImpulses(stepper->record(), step, trace);
     return;
   }
-  const IslandRecords& records = stepper->events().record();
+  const IslandRecords& records = stepper->parts();
   for (int k = 0; k < records.num_islands; ++k) {
     TraceIsland(*records.islands[k], step, trace);
   }

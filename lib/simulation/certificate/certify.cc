@@ -104,7 +104,7 @@ void RolloutCertifier::AddContact(const Model<double>& model, const StepRecord& 
 
 void RolloutCertifier::AddControls(const ModelStructure& structure, const Controls& controls,
                                    long step, Stepper* stepper) {
-  if (!stepper->by_events() || controls.values.rows() == 0) return;
+  if (controls.values.rows() == 0) return;
   const auto changes = [&controls](long k) {
     const Eigen::Index last = controls.values.rows() - 1;
     const Eigen::Index before = std::clamp<Eigen::Index>(k - 1, 0, last);
@@ -123,15 +123,10 @@ void RolloutCertifier::AddControls(const ModelStructure& structure, const Contro
       }
     }
   };
-  const IslandRecords& records = stepper->events().record();
-  for (int k = 0; k < records.num_islands; ++k) {
-    const IslandRecord& island = *records.islands[k];
-    for (int p = 0; p < island.events.num_parts; ++p) {
-      const EventPart& part = *island.events.parts[p];
-      if (part.is_impulses || !part.segment.IsEventLocated()) continue;
-      add(part.segment, island.InWhole(part.segment.event_contact));
-    }
-  }
+  stepper->parts().ForEachPart([&](const IslandRecord& island, const EventPart& part) {
+    if (part.is_impulses || !part.segment.IsEventLocated()) return;
+    add(part.segment, island.InWhole(part.segment.event_contact));
+  });
 }
 
 // The choice of the constant in the contact law: it causes kinks where the constant is continuous,

@@ -395,8 +395,8 @@ void RolloutCertifier::LeaveIsland(const IslandRecord& island) {
 }
 
 void RolloutCertifier::AddEventStep(const Model<double>& model, long step, Stepper* stepper) {
-  IslandRecords& records = stepper->events().mutable_record();
-  EventDerivative& derivative = stepper->event_derivative().of_island();
+  IslandRecords& records = stepper->mutable_parts();
+  EventDerivative& derivative = stepper->event_derivative();
   struck_at_.resize(model.structure->bodies.size(), -std::numeric_limits<double>::infinity());
   if (records.IsWhole()) {
     AddIsland(model, step, &derivative, records.islands[0].get());

@@ -61,7 +61,7 @@ class Course {
 
   /// Whether the pair of a contact is closed as the last step ends.
   bool HasClosed(const ActiveContact& contact) {
-    const IslandRecords& records = stepper_.events().record();
+    const IslandRecords& records = stepper_.parts();
     for (int k = 0; k < records.num_islands; ++k) {
       const IslandRecord& island = *records.islands[k];
       const ActiveContact own = island.InIsland(contact);
@@ -94,7 +94,7 @@ class Course {
   }
 
   void Watch() {
-    const IslandRecords& records = stepper_.events().record();
+    const IslandRecords& records = stepper_.parts();
     Model<double> memory;
     for (int k = 0; k < records.num_islands; ++k) {
       const IslandRecord& island = *records.islands[k];

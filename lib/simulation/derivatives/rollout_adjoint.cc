@@ -9,11 +9,6 @@
 
 namespace tangible {
 
-size_t RolloutTape::Entry::bytes() const {
-  return sizeof(Entry) + record.bytes() + system.bytes() + events.bytes() +
-         (projection ? sizeof(JointProjection) + projection->bytes() : 0);
-}
-
 void RolloutTape::Start(const Model<double>& model, const TapeOptions& options) {
   options_ = options;
   total_ = NumSteps(model.structure->settings);
@@ -151,38 +146,15 @@ void RolloutTape::Take(const Model<double>& model, long remaining) {
     entries_.push_back(std::make_unique<Entry>());
   }
   Entry& entry = *entries_[used_++];
-  if (stepper_->by_events()) {
-    std::swap(entry.events, stepper_->events().mutable_record());
-    Count(&entry);
-    return;
-  }
-  entry.has_factors = options_.factorisations == Factorisations::kKeep &&
-                      (!by_budget() || HasRoomForFactors(remaining));
-  if (entry.has_factors) {
-    stepper_->TakeRecord(&entry.record, &entry.system);
-  } else {
-    stepper_->TakeRecord(&entry.record, nullptr);
-    if (by_budget()) {
-      DropFactors(&entry);
-    }
-  }
-  if (ProjectsOntoJoints(*model.structure)) {
-    if (!entry.projection) {
-      entry.projection = std::make_unique<JointProjection>();
-    }
-    *entry.projection = stepper_->projection();
-  }
+  stepper_->Take(model,
+                 options_.factorisations == Factorisations::kKeep &&
+                     (!by_budget() || HasRoomForFactors(remaining)),
+                 &entry);
+  if (!entry.has_factors && by_budget()) entry.DropFactors();
   Count(&entry);
   if (entry.has_factors) {
     KeepWithinBudget(&entry);
   }
-}
-
-// The sweep will factorise anew.
-void RolloutTape::DropFactors(Entry* entry) {
-  entry->has_factors = false;
-  entry->system = ContactSystem();
-  entry->record.problem = ContactProblem<double>();
 }
 
 // The entry may exceed the plan: a step with more contacts than those before it, or whose factors
@@ -193,7 +165,7 @@ void RolloutTape::KeepWithinBudget(Entry* entry) {
   }
   Recount(entry);
   if (held_bytes() > budget()) {
-    DropFactors(entry);
+    entry->DropFactors();  // the sweep will factorise anew
     Recount(entry);
   }
 }
@@ -284,42 +256,6 @@ void RolloutTape::RunAgain(ControlledModel<double>* model, long last) {
   }
 }
 
-void RolloutTape::StepAdjoint(const Model<double>& model, const StepRecord& record,
-                              ContactSystem* system, JointProjection* projection,
-                              RowMatrixXd* w_bar) {
-  const ModelStructure& s = *model.structure;
-  const int columns = static_cast<int>(w_bar->cols());
-  if (ProjectsOntoJoints(s)) {
-    projection->Adjoint(model, w_bar->data(), columns);
-  }
-  double* w = w_bar->data();
-  for (int body = 0; body < s.num_bodies(); ++body) {
-    if (s.bodies[body].motion == Motion::kStatic) {
-      continue;
-    }
-    const double* pose = w + static_cast<size_t>(s.PoseVariable(body, 0)) * columns;
-    double* twist = w + static_cast<size_t>(s.TwistVariable(body, 0)) * columns;
-    for (int i = 0; i < 3 * columns; ++i) {
-      twist[i] += record.h * pose[i];
-    }
-  }
-  u_.assign(3 * static_cast<size_t>(system->num_blocks()) * columns, 0.0);
-  for (int k = 0; k < s.num_blocks(); ++k) {
-    double* twist = w_bar->data() + static_cast<size_t>(s.TwistVariable(s.moving[k], 0)) * columns;
-    std::copy_n(twist, 3 * columns, &u_[3 * static_cast<size_t>(k) * columns]);
-    std::fill_n(twist, 3 * columns, 0.0);
-  }
-  system->SolveTransposed(record.problem, record.solution.modes, u_.data(), columns);
-  const SolvedEquations step = record.View(system->contact_block());
-  if (columns == 1) {
-    VisitJacobian(model, step, JacobianRoute::kByHand, &scratch_,
-                  SingleAdjointSink{u_.data(), w_bar->data()});
-  } else {
-    VisitJacobian(model, step, JacobianRoute::kByHand, &scratch_,
-                  AdjointSink{u_.data(), w_bar->data(), columns});
-  }
-}
-
 void RolloutTape::AdjointFrom(ControlledModel<double> model, long last, int num_losses,
                               const Seed& seed, RowMatrixXd* w_bar, const ControlSink& sink) {
   const ModelStructure& structure = model.structure();
@@ -345,17 +281,8 @@ void RolloutTape::AdjointFrom(ControlledModel<double> model, long last, int num_
     }
     Entry& entry = *entries_[static_cast<size_t>(step - first_)];
     const Model<double>& now = model.At(step);
-    if (stepper_->by_events()) {
-      stepper_->event_derivative().Adjoint(now, &entry.events, w_bar);
-    } else if (entry.has_factors) {
-      StepAdjoint(now, entry.record, &entry.system, entry.projection.get(), w_bar);
-      KeepWithinBudget(&entry);
-    } else {
-      std::swap(entry.record.problem, refactored_);
-      stepper_->Refactor(now, &entry.record);
-      StepAdjoint(now, entry.record, &stepper_->system(), entry.projection.get(), w_bar);
-      std::swap(entry.record.problem, refactored_);
-    }
+    stepper_->Adjoint(now, &entry, w_bar);
+    if (entry.has_factors) KeepWithinBudget(&entry);
     ReleaseSwept(step);
     hand_over(step);
   }

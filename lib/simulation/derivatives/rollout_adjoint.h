@@ -72,15 +72,8 @@ class RolloutTape {
   long steps_again() const { return steps_again_; }
 
  private:
-  struct Entry {
-    StepRecord record;
-    ContactSystem system;
-    std::unique_ptr<JointProjection> projection;  ///< where the scene asks for it
-    IslandRecords events;  ///< event stepping: the step, in place of all of the above
-    bool has_factors = false;
+  struct Entry : StepTape {
     size_t counted = 0;  ///< its bytes as contained in the tape's sums
-    size_t bytes() const;
-    size_t factor_bytes() const { return system.bytes() + record.problem.bytes(); }
   };
   enum class Origin : unsigned char { kRun, kSplit };
   bool by_budget() const { return options_.checkpointing.kind == Checkpointing::Kind::kBudget; }
@@ -95,15 +88,12 @@ class RolloutTape {
   void RemoveCheckpoints(const std::function<bool(long step, Origin origin)>& which);
   void Take(const Model<double>& model, long remaining);
   bool HasRoomForFactors(long remaining) const;
-  static void DropFactors(Entry* entry);
   void KeepWithinBudget(Entry* entry);
   void ReleaseSwept(long step);
   void Recount(Entry* entry);
   void Count(Entry* entry);
   void ReleaseEntries(size_t keep);
   void RunAgain(ControlledModel<double>* model, long last);
-  void StepAdjoint(const Model<double>& model, const StepRecord& record, ContactSystem* system,
-                   JointProjection* projection, RowMatrixXd* w_bar);
 
   TapeOptions options_;
   long total_ = 0;                               ///< steps of a whole run
@@ -120,9 +110,6 @@ class RolloutTape {
   size_t last_record_bytes_ = 0, last_factor_bytes_ = 0, most_record_bytes_ = 0;
   std::unique_ptr<Stepper> stepper_;
   std::shared_ptr<const ModelStructure> structure_;  ///< of stepper_ and the entries
-  ContactProblem<double> refactored_;  ///< memory of the problem that is assembled anew
-  std::vector<double> u_;
-  LocalJacobianScratch scratch_;
 };
 
 }  // namespace tangible

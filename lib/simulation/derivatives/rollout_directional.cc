@@ -222,7 +222,7 @@ bool StepDirectional::Apply(const Model<double>& model, Stepper* stepper, RowMat
                    : "the contacts at a kink have no rates along the direction";
     return false;
   }
-  AdvanceTangent(model, stepper, v_dot.data(), w_dot);
+  stepper->AdvanceTangent(model, v_dot.data(), w_dot);
   return true;
 }
 

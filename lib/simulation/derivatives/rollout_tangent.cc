@@ -8,25 +8,6 @@
 
 namespace tangible {
 
-void AdvanceTangent(const Model<double>& model, Stepper* stepper, const double* twists,
-                    RowMatrixXd* w_dot) {
-  const ModelStructure& s = *model.structure;
-  const int columns = static_cast<int>(w_dot->cols());
-  for (int k = 0; k < s.num_blocks(); ++k) {
-    std::copy_n(twists + 3 * static_cast<size_t>(k) * columns, 3 * columns,
-                w_dot->data() + static_cast<size_t>(s.TwistVariable(s.moving[k], 0)) * columns);
-  }
-  for (int body = 0; body < s.num_bodies(); ++body) {
-    for (int i = 0; i < 3 && s.bodies[body].motion != Motion::kStatic; ++i) {
-      w_dot->row(s.PoseVariable(body, i)) +=
-          stepper->record().h * w_dot->row(s.TwistVariable(body, i));
-    }
-  }
-  if (ProjectsOntoJoints(s)) {
-    stepper->projection().Tangent(model, w_dot->data(), columns);
-  }
-}
-
 double DrivenSpeeds::Of(int column, const ContactProblem<double>& problem, const double* rhs,
                         int rows, int stride) {
   double driven = 0.0;
@@ -57,69 +38,46 @@ int StepTangent::FixNumbers(const ModelStructure& s, const RowMatrixXd& w_dot) {
   return count;
 }
 
-void StepTangent::Assemble(const Model<double>& model, Stepper* stepper, const RowMatrixXd& w_dot) {
-  stepper->ChooseImpulses();
-  const StepRecord& record = stepper->record();
-  ContactSystem& system = stepper->system();
-  const int columns = static_cast<int>(w_dot.cols());
-  rhs_.assign(3 * static_cast<size_t>(system.num_blocks()) * columns, 0.0);
-  VisitJacobian(
-      model, record.View(system.contact_block()), JacobianRoute::kByHand, &scratch_,
-      TangentSink{w_dot.data(), rhs_.data(), columns, fixed_.empty() ? nullptr : fixed_.data()});
-}
-
 double StepTangent::Apply(const Model<double>& model, Stepper* stepper, RowMatrixXd* w_dot) {
-  if (stepper->by_events()) {
-    return stepper->event_derivative().Tangent(model, &stepper->events().mutable_record(), w_dot);
-  }
-  Assemble(model, stepper, *w_dot);
-  return Finish(model, stepper, w_dot);
+  return stepper->Tangent(model, fixed_, w_dot);
 }
 
 double StepTangent::ApplyAndMeasure(const Model<double>& model, Stepper* stepper,
                                     RowMatrixXd* w_dot) {
-  if (stepper->by_events()) {
-    Apply(model, stepper, w_dot);
-    return 0.0;
-  }
-  const ContactProblem<double>& problem = stepper->record().problem;
-  const int columns = static_cast<int>(w_dot->cols());
-  Assemble(model, stepper, *w_dot);
-  const int rows = static_cast<int>(rhs_.size()) / std::max(1, columns);
-  std::vector<double> driven(columns, 0.0);
-  for (int c = 0; c < columns; ++c) {
-    driven[c] = driven_.Of(c, problem, rhs_.data() + c, rows, columns);
-  }
-  Finish(model, stepper, w_dot);
+  std::vector<double> driven(static_cast<size_t>(w_dot->cols()), 0.0);
   double worst = 0.0;
-  const std::vector<int>& block_of = stepper->system().contact_block();
-  for (int c = 0; c < columns; ++c) {
-    if (driven[c] == 0.0) continue;
+  const auto measure = [&](int c, const ContactProblem<double>& problem,
+                           const std::vector<int>& block_of, const SolveDerivative::Rates& rates) {
     double impulse = 0.0;
     for (size_t i = 0; i < problem.contacts.size(); ++i) {
-      if (block_of[i] >= 0) {
-        const ContactBlock<double>& contact = problem.contacts[i];
-        const double mobility =
-            RowMobility(problem.mass, contact.a, contact.normal_a, contact.b, contact.normal_b);
-        const size_t row = 3 * static_cast<size_t>(block_of[i]);
-        impulse = std::max({impulse, mobility * std::abs(rhs_[row * columns + c]),
-                            mobility * std::abs(rhs_[(row + 1) * columns + c])});
-      }
+      if (block_of[i] < 0) continue;
+      const ContactBlock<double>& contact = problem.contacts[i];
+      const double mobility =
+          RowMobility(problem.mass, contact.a, contact.normal_a, contact.b, contact.normal_b);
+      const Eigen::Index row = 3 * static_cast<Eigen::Index>(block_of[i]);
+      impulse = std::max(
+          {impulse, mobility * std::abs(rates(row, c)), mobility * std::abs(rates(row + 1, c))});
     }
     for (size_t row = 0; row < problem.mass.size(); ++row) {
-      driven[c] = std::max(driven[c], std::abs(rhs_[row * columns + c]));
+      driven[c] = std::max(driven[c], std::abs(rates(static_cast<Eigen::Index>(row), c)));
     }
     worst = std::max(worst, impulse / driven[c]);
-  }
+  };
+  const SolveObserver observer = [&](SolveStage stage, const ContactProblem<double>& problem,
+                                     const ContactSystem& system,
+                                     const SolveDerivative::Rates& rates) {
+    const int columns = static_cast<int>(rates.cols());
+    for (int c = 0; c < columns; ++c) {
+      if (stage == SolveStage::kAssembled) {
+        driven[c] =
+            driven_.Of(c, problem, rates.data() + c, static_cast<int>(rates.rows()), columns);
+      } else if (driven[c] != 0.0) {
+        measure(c, problem, system.contact_block(), rates);
+      }
+    }
+  };
+  stepper->Tangent(model, fixed_, w_dot, observer);
   return worst;
-}
-
-double StepTangent::Finish(const Model<double>& model, Stepper* stepper, RowMatrixXd* w_dot) {
-  const StepRecord& record = stepper->record();
-  const double left = stepper->system().Solve(record.problem, record.solution.modes, rhs_.data(),
-                                              static_cast<int>(w_dot->cols()));
-  AdvanceTangent(model, stepper, rhs_.data(), w_dot);
-  return left;
 }
 
 RolloutReport RolloutTangent(ControlledModel<double> model, const State<double>& initial,

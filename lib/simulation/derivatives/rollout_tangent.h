@@ -32,11 +32,6 @@ RolloutReport RolloutTangent(const Model<double>& model, const State<double>& in
                              const TangentObserver& observer, RowMatrixXd* w_dot,
                              State<double>* final);
 
-/// Turns the derivatives of the new twists of moving blocks (3 num_blocks x columns, row-major)
-/// into those of the state after the step: poses move with the twists, and are projected.
-void AdvanceTangent(const Model<double>& model, Stepper* stepper, const double* twists,
-                    RowMatrixXd* w_dot);
-
 /// The speeds that the columns of directions drive in the steps of a rollout. What is left of a
 /// direction that the first steps have absorbed is rounding, in which nothing can be recognised.
 class DrivenSpeeds {
@@ -64,17 +59,12 @@ class StepTangent {
   /// The same; it also measures how far the derivatives of the contacts' impulses exceed the speeds
   /// that the perturbation drives: the largest over columns of |λ̇| mobility / max(|ṗ| / m, |ċ|,
   /// |v̇|). The usual values are 1 to 1e3; above 1e6 the perturbation contradicts redundant rows
-  /// (it breaks one contact and not the other), and no derivative exists.
+  /// (it breaks one contact and not the other), and no derivative exists. By events it is 0.
   double ApplyAndMeasure(const Model<double>& model, Stepper* stepper, RowMatrixXd* w_dot);
 
  private:
-  void Assemble(const Model<double>& model, Stepper* stepper, const RowMatrixXd& w_dot);
-  double Finish(const Model<double>& model, Stepper* stepper, RowMatrixXd* w_dot);
-
-  std::vector<double> rhs_;
   DrivenSpeeds driven_;
   std::vector<char> fixed_;  ///< 1: no column varies the variable; empty: unknown
-  LocalJacobianScratch scratch_;
 };
 
 }  // namespace tangible

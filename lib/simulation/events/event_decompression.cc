@@ -48,7 +48,7 @@ std::vector<bool> Reached(const ModelStructure& s, const Impulses& compression,
 }  // namespace
 
 bool EventStepper::Decompress(const Model<double>& model, const Impulses& compression,
-                              State<double>* state, EventOutcome* outcome) {
+                              State<double>* state, StepReport* outcome) {
   const ModelStructure& s = *model.structure;
   const std::vector<bool> reached = Reached(s, compression, rebounds_);
   if (std::none_of(reached.begin(), reached.end(), [](bool x) { return x; })) {

@@ -17,6 +17,7 @@
 #include "tangible/math/scalar.h"
 #include "tangible/simulation/events/event_record.h"
 #include "tangible/simulation/events/implicit_stage.h"
+#include "tangible/simulation/events/solve_derivative.h"
 
 namespace tangible {
 
@@ -76,7 +77,7 @@ class EventDerivative {
   const SolvedNode* listed_ = nullptr;
   std::vector<JacobianEntry> entries_;
   ImplicitStage implicit_;
-  RowMatrixXd rhs_;
+  SolveDerivative solve_;
   // For Poisson's law, between an impact's two parts: derivatives of the compression's normal
   // impulses, and of the losses with respect to them; a row for each contact of the compression.
   RowMatrixXd compression_dot_, compression_bar_;

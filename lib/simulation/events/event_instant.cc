@@ -107,7 +107,7 @@ bool FollowsEdges(const EventRecord& record) {
 
 bool EventStepper::AddInstant(const Model<double>& model, double t, EventKind kind,
                               const ActiveContact* contact, State<double>* state,
-                              EventOutcome* outcome) {
+                              StepReport* outcome) {
   const int parts = record_.num_parts;
   // An edge at the end of the step comes after it, and one at a touch that has ended a motion.
   const bool is_after_edges = guess_.starts || (kind == EventKind::kTouch && FollowsEdges(record_));
@@ -142,7 +142,7 @@ bool EventStepper::AddInstant(const Model<double>& model, double t, EventKind ki
 
 Segment* EventStepper::AddEdge(const Model<double>& model, double t, double middle,
                                std::vector<WindowEdge> to_come, const State<double>& state,
-                               EventOutcome* outcome) {
+                               StepReport* outcome) {
   const EventGuess guess = guess_;
   const int parts = record_.num_parts;
   Segment& segment = BeginSegment(t, t, state);
@@ -170,7 +170,7 @@ Segment* EventStepper::AddEdge(const Model<double>& model, double t, double midd
 }
 
 void EventStepper::AddEdgesAtStart(const Model<double>& model, double t, const State<double>& state,
-                                   EventOutcome* outcome) {
+                                   StepReport* outcome) {
   if (guess_.starts) return;  // there is no motion before
   const EdgeGroup edges = EdgesAt(model, t);
   if (!edges.any) return;
@@ -182,7 +182,7 @@ void EventStepper::AddEdgesAtStart(const Model<double>& model, double t, const S
 }
 
 void EventStepper::AddFurtherEdges(const Model<double>& model, double t, const EdgeGroup& edges,
-                                   const State<double>& state, EventOutcome* outcome) {
+                                   const State<double>& state, StepReport* outcome) {
   const double after =
       std::nextafter(t + 2.0 * kShortestPart * model.structure->settings.dt, HUGE_VAL);
   const auto accelerations = [&](std::vector<WindowEdge> to_come) {
@@ -233,7 +233,7 @@ double EventStepper::ReturnSpeed(const Model<double>& model, const State<double>
   return std::sqrt(2.0 * acceleration * search_.TouchTolerance(model, state, contact));
 }
 
-void CountSolve(const ContactSolverReport& solved, EventOutcome* outcome) {
+void CountSolve(const ContactSolverReport& solved, StepReport* outcome) {
   outcome->factorisations += solved.factorisations;
   outcome->iterations += solved.iterations;
   outcome->solver.Add(solved.fallbacks);
@@ -281,7 +281,7 @@ double EventStepper::SlowSpeed(const Model<double>& model, const State<double>& 
 // sets a contact sliding, which opens another contact that returns, where this has repeated many
 // times.
 bool EventStepper::Settle(const Model<double>& model, const Impulses& impact, State<double>* state,
-                          EventOutcome* outcome) {
+                          StepReport* outcome) {
   const SimulationSettings& settings = model.structure->settings;
   const double slow = search_.SpeedTolerance(model, *state);
   Segment held;
@@ -347,7 +347,7 @@ bool EventStepper::Settle(const Model<double>& model, const Impulses& impact, St
 }
 
 bool EventStepper::LocateTouch(const Model<double>& model, double t, double slow, int group,
-                               State<double>* state, EventOutcome* outcome) {
+                               State<double>* state, StepReport* outcome) {
   if (record_.num_parts > 0) {
     const EventPart& last = *record_.parts[record_.num_parts - 1];
     if (last.is_impulses

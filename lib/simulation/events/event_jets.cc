@@ -4,11 +4,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include "tangible/lcp/contact/contact_interior_point.h"
-#include "tangible/simulation/events/implicit_residual_inl.h"
 #include "tangible/simulation/events/implicit_stage.h"
 #include "tangible/simulation/events/mode_elimination_inl.h"
 #include "tangible/simulation/events/segment_flow.h"
+#include "tangible/simulation/events/solve_jets_inl.h"
 #include "tangible/simulation/events/tolerances.h"
 
 namespace tangible {
@@ -50,33 +49,7 @@ class EventReplay {
       ModeElimination<T>::Solve(problem, solution.modes, out);
       return;
     }
-    std::vector<double> rhs(3 * static_cast<size_t>(system->num_blocks()) * kWidth, 0.0);
-    const std::vector<int>& block_of = system->contact_block();
-    ImplicitResidual<T>(problem, solution, signs, block_of, &rhs).Fill();
-    system->Solve(in_double, solution.modes, rhs.data(), kWidth);
-    const auto jet = [&](double value, size_t row) {
-      T x(value);
-      for (int d = 0; d < kWidth; ++d) {
-        x.v[d] = rhs[row * kWidth + d];
-      }
-      return x;
-    };
-    const size_t bodies = solution.motion.size();
-    out->motion.resize(bodies);
-    for (size_t i = 0; i < bodies; ++i) {
-      out->motion[i] = jet(solution.motion[i], i);
-    }
-    out->normal_impulse.assign(problem.contacts.size(), T(0.0));
-    out->tangent_impulse.assign(problem.contacts.size(), T(0.0));
-    for (size_t i = 0; i < problem.contacts.size(); ++i) {
-      if (block_of[i] >= 0) {
-        const size_t row = 3 * static_cast<size_t>(block_of[i]);
-        out->normal_impulse[i] = jet(solution.normal_impulse[i], row);
-        if (solution.modes[i] == ContactMode::kSticking) {
-          out->tangent_impulse[i] = jet(solution.tangent_impulse[i], row + 1);
-        }
-      }
-    }
+    SolveImplicitly(problem, in_double, solution, signs, system, out);
   }
 
   void RunImpulses(Impulses* impulses, State<T>* state, bool is_impact = true) {
@@ -101,18 +74,11 @@ class EventReplay {
   void SolveImpulses(Impulses* impulses, const State<T>& state, bool is_impact,
                      ContactSolution<T>* solution) {
     ContactProblem<T> problem;
-    AssemblyScratch<T> scratch;
-    AssembleWithoutContacts(model_, state, impulses->time, impulses->h, &problem, &scratch);
-    AssembleContacts(model_, state, impulses->h, impulses->contacts, impulses->friction,
-                     impulses->restitution, &scratch, &problem);
+    AssembleInJets(model_, *impulses, state, &problem);
     if (impulses->decompression) {
       SetOffsets(*impulses, &problem);
     } else if (route_ == JetRoute::kUnrolled && is_impact) {
-      InteriorPointWorkspace<T> workspace;
-      ContactInteriorPointOptions options;
-      options.complementarity = kUnrolledComplementarity;
-      const bool converged =
-          SolveContactsByInteriorPoint(problem, options, &workspace, solution).converged;
+      const bool converged = SolveUnrolled(problem, solution);
       double difference = 0.0;
       double size = 0.0;
       for (size_t i = 0; i < impulses->solution.motion.size(); ++i) {

@@ -71,11 +71,6 @@ size_t StepRecord::bytes() const {
          problem.bytes() + solution.bytes();
 }
 
-SolvedEquations Impulses::View() const {
-  SolvedEquations view = StepRecord::View(system.contact_block());
-  return view;
-}
-
 const char* NameOf(EventKind event) {
   switch (event) {
     case EventKind::kStepEnd:

@@ -44,8 +44,6 @@ struct Impulses : StepRecord {
   ContactSystem system;
   bool decompression = false;   ///< of the impulses found by the part before
   std::vector<int> compressed;  ///< decompression: each contact's index in that part
-
-  SolvedEquations View() const;
 };
 
 enum class EventKind : unsigned char {

@@ -184,7 +184,7 @@ std::string EventStepper::EventsDoNotEnd(const Model<double>& model, const char*
 
 // Counts the contacts of the group that approach, each pair of bodies once.
 bool EventStepper::CountImpact(const Model<double>& model, double slow, int group,
-                               EventOutcome* outcome) {
+                               StepReport* outcome) {
   ++outcome->events;
   const ActiveContact* last = nullptr;
   for (size_t i = 0; i < touching_.contacts.size(); ++i) {
@@ -209,7 +209,7 @@ bool EventStepper::CountImpact(const Model<double>& model, double slow, int grou
 }
 
 bool EventStepper::SolveImpacts(const Model<double>& model, double t, State<double>* state,
-                                EventOutcome* outcome) {
+                                StepReport* outcome) {
   const auto find_touching = [&] {
     FindTouching(model, *state);
     const double slow = SlowSpeed(model, *state);
@@ -291,7 +291,7 @@ Impulses* EventStepper::ListImpact(const Model<double>& model, double t, double 
 }
 
 bool EventStepper::SolveImpact(const Model<double>& model, Impulses* impact, State<double>* state,
-                               EventOutcome* outcome) {
+                               StepReport* outcome) {
   const SimulationSettings& settings = model.structure->settings;
   AssembleImpulses(model, &assembly_, impact);
   SizeGuess(impact->problem, &impact->solution);
@@ -320,7 +320,7 @@ bool EventStepper::SolveImpact(const Model<double>& model, Impulses* impact, Sta
 }
 
 bool EventStepper::SolveByShortStep(const Model<double>& model, double t, double dt,
-                                    State<double>* state, EventOutcome* outcome) {
+                                    State<double>* state, StepReport* outcome) {
   EventPart* part = record_.Add();
   part->is_impulses = true;
   Impulses& impulses = part->impulses;
@@ -388,7 +388,7 @@ void EventStepper::GuessModes(const std::vector<ActiveContact>& contacts,
 
 void EventStepper::ShortenAtEllipses(const Model<double>& model,
                                      const ContactSolution<double>& accelerations,
-                                     EventOutcome* outcome, Segment* segment) {
+                                     StepReport* outcome, Segment* segment) {
   const EllipseMotion motion =
       LongestEllipseMotion(model, segment->before, segment->contacts, accelerations);
   if (!(segment->length > motion.longest)) return;
@@ -453,7 +453,7 @@ bool EventStepper::Releases(const Model<double>& model, const Segment& segment) 
 }
 
 bool EventStepper::ChooseModes(const Model<double>& model, const State<double>& state,
-                               EventOutcome* outcome, Segment* segment) {
+                               StepReport* outcome, Segment* segment) {
   const SimulationSettings& settings = model.structure->settings;
   const double slow = SlowSpeed(model, state);
   segment->contacts.clear();
@@ -542,7 +542,7 @@ void EventStepper::SwitchMode(const Segment& segment) {
 }
 
 bool EventStepper::EndOtherSlips(const Model<double>& model, double t, const Segment& segment,
-                                 State<double>* state, EventOutcome* outcome) {
+                                 State<double>* state, StepReport* outcome) {
   const bool ends_slip = segment.event == EventKind::kSlipEnds;
   const double was_slow = search_.SpeedTolerance(model, segment.before);
   const auto ends = [&](size_t i, double slow) {
@@ -588,7 +588,7 @@ bool EventStepper::EndOtherSlips(const Model<double>& model, double t, const Seg
 }
 
 bool EventStepper::AddHandOvers(const Model<double>& model, double t, const Segment& segment,
-                                State<double>* state, EventOutcome* outcome) {
+                                State<double>* state, StepReport* outcome) {
   if (search_.hand_overs().empty()) return true;
   FindTouching(model, *state);
   coupled_.Connect(*model.structure, touching_.contacts);
@@ -615,11 +615,11 @@ bool EventStepper::AddHandOvers(const Model<double>& model, double t, const Segm
   return true;
 }
 
-EventOutcome EventStepper::Step(const Model<double>& model, double t, double h,
-                                State<double>* state, AtEvent at_event) {
+StepReport EventStepper::Step(const Model<double>& model, double t, double h, State<double>* state,
+                              AtEvent at_event) {
   const FlowCounts own = flow_.counts();
   const FlowCounts searched = search_.flow_counts();
-  EventOutcome outcome = Advance(model, t, h, at_event, state);
+  StepReport outcome = Advance(model, t, h, at_event, state);
   outcome.solver.whole_system += flow_.counts().whole_system - own.whole_system +
                                  search_.flow_counts().whole_system - searched.whole_system;
   outcome.newton_stages =
@@ -630,7 +630,7 @@ EventOutcome EventStepper::Step(const Model<double>& model, double t, double h,
 // Solves an instant: impacts, and corrections at the start of a run and the end of a step.
 // `begins`: the step's start.
 bool EventStepper::SolveInstant(const Model<double>& model, double now, double h, bool begins,
-                                bool at_end, State<double>* state, EventOutcome* outcome) {
+                                bool at_end, State<double>* state, StepReport* outcome) {
   if (!SolveImpacts(model, now, state, outcome)) {
     return false;
   }
@@ -675,7 +675,7 @@ Segment& EventStepper::BeginSegment(double now, double until, const State<double
 
 // The event that has ended `segment` at `now`: the modes after it, and its count, which is limited.
 bool EventStepper::TakeEvent(const Model<double>& model, double now, double h,
-                             const Segment& segment, State<double>* state, EventOutcome* outcome) {
+                             const Segment& segment, State<double>* state, StepReport* outcome) {
   SwitchMode(segment);
   if (segment.event != EventKind::kTouch || segment.length <= kNoMotion * h) {
     ++outcome->events;
@@ -698,8 +698,8 @@ bool EventStepper::Tries::Halve() {
 // moved is taken out of the record again and tried in another way: with the contacts that a start
 // has released kept closed, after a short step with impulses, or over half the time.
 EventStepper::Tried EventStepper::TryMotion(const Model<double>& model, double now, double h,
-                                            State<double>* state, Tries* tries,
-                                            EventOutcome* outcome, Segment* segment) {
+                                            State<double>* state, Tries* tries, StepReport* outcome,
+                                            Segment* segment) {
   const int parts = record_.num_parts - 1;
   const auto keep_starts = [&] {
     record_.num_parts = parts;
@@ -735,9 +735,9 @@ EventStepper::Tried EventStepper::TryMotion(const Model<double>& model, double n
   return Tried::kAgain;
 }
 
-EventOutcome EventStepper::Advance(const Model<double>& model, double t, double h, AtEvent at_event,
-                                   State<double>* state) {
-  EventOutcome outcome;
+StepReport EventStepper::Advance(const Model<double>& model, double t, double h, AtEvent at_event,
+                                 State<double>* state) {
+  StepReport outcome;
   record_.Clear();
   guess_.located = 0;
   released_.clear();
@@ -750,7 +750,7 @@ EventOutcome EventStepper::Advance(const Model<double>& model, double t, double 
   double now = t;
   Tries tries;
   const auto fail = [&] {
-    outcome.done = false;
+    outcome.status = StepStatus::kUnsolved;
     return outcome;
   };
   bool at_given_time = true;

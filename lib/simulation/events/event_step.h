@@ -28,17 +28,9 @@
 #include "tangible/simulation/events/event_edges.h"
 #include "tangible/simulation/events/event_search.h"
 #include "tangible/simulation/events/impact_groups.h"
-#include "tangible/simulation/events/step_counts.h"
+#include "tangible/simulation/events/step_report.h"
 
 namespace tangible {
-
-/// The report of an event step, besides its record.
-struct EventOutcome : StepCounts {
-  bool done = true;
-  std::string message;   ///< empty unless it failed
-  int islands = 0;       ///< stepped apart; 0: all bodies are one
-  bool stopped = false;  ///< before its end (AtEvent::kStopAtSecond)
-};
 
 /// Whether a step goes on however many events end its segments, or stops at the second one.
 enum class AtEvent { kGoOn, kStopAtSecond };
@@ -64,7 +56,7 @@ struct EventGuess {
 };
 
 /// Adds a solve to the report of a step.
-void CountSolve(const ContactSolverReport& solved, EventOutcome* outcome);
+void CountSolve(const ContactSolverReport& solved, StepReport* outcome);
 /// "contact of ball and floor", "limit of joint hinge"; index −1: "joints".
 std::string NameOfContact(const ModelStructure& structure,
                           const std::vector<ActiveContact>& contacts, int index);
@@ -80,8 +72,8 @@ class EventStepper {
   /// Continues with another model, for which the memory is used again.
   void Retarget(const Model<double>& model);
 
-  EventOutcome Step(const Model<double>& model, double t, double h, State<double>* state,
-                    AtEvent at_event = AtEvent::kGoOn);
+  StepReport Step(const Model<double>& model, double t, double h, State<double>* state,
+                  AtEvent at_event = AtEvent::kGoOn);
   /// The record of the last step.
   const EventRecord& record() const { return record_; }
   EventRecord& mutable_record() { return record_; }
@@ -89,8 +81,8 @@ class EventStepper {
   EventGuess& mutable_guess() { return guess_; }
 
  private:
-  EventOutcome Advance(const Model<double>& model, double t, double h, AtEvent at_event,
-                       State<double>* state);
+  StepReport Advance(const Model<double>& model, double t, double h, AtEvent at_event,
+                     State<double>* state);
   struct Touching {
     std::vector<ActiveContact> contacts;
     std::vector<CoefficientSource> friction, restitution;
@@ -108,11 +100,11 @@ class EventStepper {
   /// some steps without moving, although recovery would move it by `moved` in each; −1: none.
   int StuckLimit(const Model<double>& model, const State<double>& state, double moved);
   bool SolveImpacts(const Model<double>& model, double t, State<double>* state,
-                    EventOutcome* outcome);
+                    StepReport* outcome);
   /// Poisson's law: after the compression each contact that rebounds pushes with at least e times
   /// the impulse of its compression (event_decompression.cc).
   bool Decompress(const Model<double>& model, const Impulses& compression, State<double>* state,
-                  EventOutcome* outcome);
+                  StepReport* outcome);
   /// An impact of the group `group` of impacts_.
   Impulses* ListImpact(const Model<double>& model, double t, double slow, int group,
                        const State<double>& state);
@@ -122,23 +114,23 @@ class EventStepper {
   int NextToStrike(double slow);
   /// The fastest approach of a group's contacts, m/s.
   double ApproachOf(int group) const;
-  bool CountImpact(const Model<double>& model, double slow, int group, EventOutcome* outcome);
+  bool CountImpact(const Model<double>& model, double slow, int group, StepReport* outcome);
   /// "…: more than 303 events in a step of contact of a and b, max_events_per_step is 100".
   static std::string EventsDoNotEnd(const Model<double>& model, const char* what,
                                     const ActiveContact& contact);
   bool TakeEvent(const Model<double>& model, double now, double h, const Segment& segment,
-                 State<double>* state, EventOutcome* outcome);
+                 State<double>* state, StepReport* outcome);
   /// Where a segment ends because a contact stops sliding, other contacts that stop at the same
   /// instant and whose bodies are not coupled to it get separate events.
   bool EndOtherSlips(const Model<double>& model, double t, const Segment& segment,
-                     State<double>* state, EventOutcome* outcome);
+                     State<double>* state, StepReport* outcome);
   /// The same of contacts that are handed over to another feature at the instant of an event.
   bool AddHandOvers(const Model<double>& model, double t, const Segment& segment,
-                    State<double>* state, EventOutcome* outcome);
+                    State<double>* state, StepReport* outcome);
   bool SolveImpact(const Model<double>& model, Impulses* impact, State<double>* state,
-                   EventOutcome* outcome);
+                   StepReport* outcome);
   bool SolveInstant(const Model<double>& model, double now, double h, bool begins, bool at_end,
-                    State<double>* state, EventOutcome* outcome);
+                    State<double>* state, StepReport* outcome);
   Segment& BeginSegment(double now, double until, const State<double>& state);
   /// What has been tried to go on in a step. Where contacts nearly jam accelerations change so fast
   /// with poses that only a short motion can be integrated: it is halved.
@@ -150,30 +142,30 @@ class EventStepper {
   };
   enum class Tried { kMoved, kAgain, kFailed };
   Tried TryMotion(const Model<double>& model, double now, double h, State<double>* state,
-                  Tries* tries, EventOutcome* outcome, Segment* segment);
+                  Tries* tries, StepReport* outcome, Segment* segment);
   void GuessModes(const std::vector<ActiveContact>& contacts, const std::vector<double>& slip,
                   double slow, ContactProblem<double>* problem,
                   ContactSolution<double>* solution) const;
-  bool ChooseModes(const Model<double>& model, const State<double>& state, EventOutcome* outcome,
+  bool ChooseModes(const Model<double>& model, const State<double>& state, StepReport* outcome,
                    Segment* segment);
   /// Shortens a motion to what the contacts of ellipses allow (ellipse_motion.h): to the next
   /// multiple of dt / 2^k. Near states have the same k, so that its end is a given instant and
   /// derivatives are exact.
   void ShortenAtEllipses(const Model<double>& model, const ContactSolution<double>& accelerations,
-                         EventOutcome* outcome, Segment* segment);
+                         StepReport* outcome, Segment* segment);
   bool AddInstant(const Model<double>& model, double t, EventKind kind,
-                  const ActiveContact* contact, State<double>* state, EventOutcome* outcome);
+                  const ActiveContact* contact, State<double>* state, StepReport* outcome);
   /// A segment of zero length up to an edge, with the forces at `middle` and edges of windows that
   /// are still to come; null where there are no accelerations.
   Segment* AddEdge(const Model<double>& model, double t, double middle,
                    std::vector<WindowEdge> to_come, const State<double>& state,
-                   EventOutcome* outcome);
+                   StepReport* outcome);
   /// Those for edges of windows on the step's start.
   void AddEdgesAtStart(const Model<double>& model, double t, const State<double>& state,
-                       EventOutcome* outcome);
+                       StepReport* outcome);
   /// Those between the first and the further edges of a group that has been reached.
   void AddFurtherEdges(const Model<double>& model, double t, const EdgeGroup& edges,
-                       const State<double>& state, EventOutcome* outcome);
+                       const State<double>& state, StepReport* outcome);
   /// Whether a pair has had so many events in this step that its slow impacts count as a rattle (an
   /// infinite sequence of ever smaller impacts).
   bool Rattles(const Model<double>& model, const ActiveContact& contact) const;
@@ -189,11 +181,11 @@ class EventStepper {
   /// sliding, m/s.
   double SlowSpeed(const Model<double>& model, const State<double>& state) const;
   bool Settle(const Model<double>& model, const Impulses& impact, State<double>* state,
-              EventOutcome* outcome);
+              StepReport* outcome);
   bool LocateTouch(const Model<double>& model, double t, double slow, int group,
-                   State<double>* state, EventOutcome* outcome);
+                   State<double>* state, StepReport* outcome);
   bool SolveByShortStep(const Model<double>& model, double t, double dt, State<double>* state,
-                        EventOutcome* outcome);
+                        StepReport* outcome);
   ContactMode GuessOf(const ActiveContact& contact) const;
   void SwitchMode(const Segment& segment);
   /// Where the last segment's event ends it at its start (EventSearch::ends_at_start): takes it

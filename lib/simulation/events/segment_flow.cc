@@ -47,10 +47,6 @@ NystromTableau RungeKutta4() {
   return t;
 }
 
-bool AllFinite(const std::vector<double>& values) {
-  return std::all_of(values.begin(), values.end(), [](double x) { return std::isfinite(x); });
-}
-
 constexpr char kSingularStage[] = "accelerations with the contacts' modes held are singular";
 
 // The state at which a segment's stage i is evaluated, from the first `terms` stages.

@@ -13,6 +13,7 @@
 // Differential Equations I, II.1 and II.14.
 
 #include <algorithm>
+#include <cmath>
 #include <string>
 #include <vector>
 
@@ -36,6 +37,10 @@ struct NystromTableau {
   static const NystromTableau& Of(Integrator integrator);
 };
 
+inline bool AllFinite(const std::vector<double>& values) {
+  return std::all_of(values.begin(), values.end(), [](double x) { return std::isfinite(x); });
+}
+
 /// x += factor · solved: adds 3 numbers for each moving body to the poses or twists of all bodies.
 template <typename T>
 void AddBodies(const ModelStructure& structure, const T& factor, const std::vector<T>& solved,
@@ -53,6 +58,16 @@ void SpreadTwists(const ModelStructure& structure, const std::vector<T>& solved,
                   std::vector<T>* twist) {
   for (int k = 0; k < structure.num_blocks(); ++k) {
     std::copy_n(&solved[3 * k], 3, &(*twist)[3 * structure.moving[k]]);
+  }
+}
+
+/// q += h v of all bodies that move: a motion without accelerations.
+template <typename T>
+void MovePoses(const ModelStructure& structure, double h, State<T>* state) {
+  for (int body = 0; body < structure.num_bodies(); ++body) {
+    for (int i = 0; i < 3 && structure.bodies[body].motion != Motion::kStatic; ++i) {
+      state->pose[3 * body + i] += h * state->twist[3 * body + i];
+    }
   }
 }
 

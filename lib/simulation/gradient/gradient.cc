@@ -115,9 +115,13 @@ bool ByRollouts(const GradientProblem& problem, const GradientOptions& options,
               result);
 }
 
+bool IsByEvents(const GradientProblem& problem) {
+  return problem.settings().stepping == Stepping::kEvent;
+}
+
 bool BySide(const GradientProblem& problem, DerivativeSide side, RolloutWorker* worker,
             GradientResult* result) {
-  const bool by_events = problem.settings().stepping == Stepping::kEvent;
+  const bool by_events = IsByEvents(problem);
   if (by_events && !IsTrustworthyMap(result->certificate)) {
     return internal::JacobianBySides(problem, side, worker, result);
   }
@@ -193,7 +197,7 @@ void JudgeSide(const GradientProblem& problem, const GradientOptions& options,
                GradientResult* result) {
   const Certificate& certificate = result->certificate;
   if (options.side == DerivativeSide::kBoth || IsTrustworthyMap(certificate) ||
-      problem.settings().stepping == Stepping::kEvent) {
+      IsByEvents(problem)) {
     return;
   }
   if (!result->notes.empty()) {

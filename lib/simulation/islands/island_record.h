@@ -42,6 +42,15 @@ struct IslandRecords {
 
   void Clear() { num_islands = 0; }
   IslandRecord* Add();
+  /// Calls visit(island, part) for the parts of all islands.
+  template <typename Visit>
+  void ForEachPart(const Visit& visit) const {
+    for (int k = 0; k < num_islands; ++k) {
+      for (int p = 0; p < islands[k]->events.num_parts; ++p) {
+        visit(*islands[k], *islands[k]->events.parts[p]);
+      }
+    }
+  }
   /// Whether the whole model is one island.
   bool IsWhole() const { return num_islands == 1 && islands[0]->part == nullptr; }
   /// Memory, bytes, without the structures of the parts, which many steps share.

@@ -21,8 +21,8 @@ IslandStepper::IslandStepper(const Model<double>& model)
   travelled_.resize(model.structure->bodies.size());
 }
 
-EventOutcome IslandStepper::Step(const Model<double>& model, double t, double h,
-                                 State<double>* state) {
+StepReport IslandStepper::Step(const Model<double>& model, double t, double h,
+                               State<double>* state) {
   record_.h = h;
   if (!partition_.MayDivide()) {
     return StepWhole(model, t, h, AtEvent::kGoOn, state);
@@ -31,7 +31,7 @@ EventOutcome IslandStepper::Step(const Model<double>& model, double t, double h,
     next_guess_ = guess_;
     next_state_ = *state;
     const AtEvent at_event = guess_.connected ? AtEvent::kGoOn : AtEvent::kStopAtSecond;
-    EventOutcome outcome = StepWhole(model, t, h, at_event, &next_state_);
+    StepReport outcome = StepWhole(model, t, h, at_event, &next_state_);
     if (!outcome.stopped) {
       std::swap(*state, next_state_);
       return outcome;
@@ -41,8 +41,8 @@ EventOutcome IslandStepper::Step(const Model<double>& model, double t, double h,
   return StepDivided(model, t, h, state);
 }
 
-EventOutcome IslandStepper::StepDivided(const Model<double>& model, double t, double h,
-                                        State<double>* state) {
+StepReport IslandStepper::StepDivided(const Model<double>& model, double t, double h,
+                                      State<double>* state) {
   using Together = IslandPartition::Together;
   partition_.FindReach(model, *state, t, h);
   Together together = Together::kWithoutExpected;
@@ -55,7 +55,7 @@ EventOutcome IslandStepper::StepDivided(const Model<double>& model, double t, do
     }
     guess_.connected = !partition_.IsDivided();
     if (guess_.connected) break;
-    EventOutcome outcome;
+    StepReport outcome;
     next_state_ = *state;
     const AtEvent at_event =
         together == Together::kWithout ? AtEvent::kGoOn : AtEvent::kStopAtSecond;
@@ -74,8 +74,8 @@ EventOutcome IslandStepper::StepDivided(const Model<double>& model, double t, do
   return StepWhole(model, t, h, AtEvent::kGoOn, state);
 }
 
-EventOutcome IslandStepper::StepWhole(const Model<double>& model, double t, double h,
-                                      AtEvent at_event, State<double>* state) {
+StepReport IslandStepper::StepWhole(const Model<double>& model, double t, double h,
+                                    AtEvent at_event, State<double>* state) {
   if (!std::exchange(is_whole_, true)) {
     large_.Retarget(model);
   }
@@ -83,7 +83,7 @@ EventOutcome IslandStepper::StepWhole(const Model<double>& model, double t, doub
   IslandRecord* island = record_.Add();
   std::swap(large_.mutable_guess(), guess_);
   std::swap(large_.mutable_record(), island->events);
-  EventOutcome outcome = large_.Step(model, t, h, state, at_event);
+  StepReport outcome = large_.Step(model, t, h, state, at_event);
   std::swap(large_.mutable_record(), island->events);
   std::swap(large_.mutable_guess(), guess_);
   return outcome;
@@ -132,7 +132,7 @@ void IslandStepper::DistributeGuess() {
 // Steps every island, island 0 first, which stops if `at_event` says so.
 IslandStepper::Result IslandStepper::StepIslands(const Model<double>& model, double t, double h,
                                                  AtEvent at_event, State<double>* state,
-                                                 EventOutcome* outcome) {
+                                                 StepReport* outcome) {
   record_.Clear();
   next_guess_.Clear();
   next_guess_.starts = false;
@@ -141,9 +141,9 @@ IslandStepper::Result IslandStepper::StepIslands(const Model<double>& model, dou
   bool keeps_reach = true;
   for (int island = 0; island < partition_.num_islands(); ++island) {
     if (partition_.bodies(island).empty()) continue;
-    const EventOutcome own =
+    const StepReport own =
         StepIsland(model, t, h, island, island == 0 ? at_event : AtEvent::kGoOn, state);
-    if (!own.done) return Result::kFailed;
+    if (own.status != StepStatus::kDone) return Result::kFailed;
     if (own.stopped) return Result::kStopped;
     outcome->Add(own);
     keeps_reach = KeepsReach(*record_.islands[record_.num_islands - 1]) && keeps_reach;
@@ -152,8 +152,8 @@ IslandStepper::Result IslandStepper::StepIslands(const Model<double>& model, dou
   return keeps_reach ? Result::kDone : Result::kTooFar;
 }
 
-EventOutcome IslandStepper::StepIsland(const Model<double>& model, double t, double h, int island,
-                                       AtEvent at_event, State<double>* state) {
+StepReport IslandStepper::StepIsland(const Model<double>& model, double t, double h, int island,
+                                     AtEvent at_event, State<double>* state) {
   IslandRecord* record = record_.Add();
   record->part = PartOf(*model.structure, island);
   const Model<double>& own = record->ModelOf(model, &model_);
@@ -171,7 +171,7 @@ EventOutcome IslandStepper::StepIsland(const Model<double>& model, double t, dou
   }
   std::swap(stepper.mutable_guess(), guess);
   std::swap(stepper.mutable_record(), record->events);
-  EventOutcome outcome = stepper.Step(own, t, h, &own_state_, at_event);
+  StepReport outcome = stepper.Step(own, t, h, &own_state_, at_event);
   std::swap(stepper.mutable_record(), record->events);
   std::swap(stepper.mutable_guess(), guess);
   for (size_t i = 0; i < guess.contacts.size(); ++i) {

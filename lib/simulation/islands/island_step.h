@@ -25,7 +25,7 @@ class IslandStepper {
  public:
   explicit IslandStepper(const Model<double>& model);
 
-  EventOutcome Step(const Model<double>& model, double t, double h, State<double>* state);
+  StepReport Step(const Model<double>& model, double t, double h, State<double>* state);
   /// The record of the last step.
   const IslandRecords& record() const { return record_; }
   IslandRecords& mutable_record() { return record_; }
@@ -36,16 +36,16 @@ class IslandStepper {
   void SetGuess(const EventGuess& guess) { guess_ = guess; }
 
  private:
-  EventOutcome StepWhole(const Model<double>& model, double t, double h, AtEvent at_event,
-                         State<double>* state);
-  EventOutcome StepDivided(const Model<double>& model, double t, double h, State<double>* state);
+  StepReport StepWhole(const Model<double>& model, double t, double h, AtEvent at_event,
+                       State<double>* state);
+  StepReport StepDivided(const Model<double>& model, double t, double h, State<double>* state);
   void DistributeGuess();
   std::shared_ptr<const ModelPart> PartOf(const ModelStructure& structure, int island);
   enum class Result { kDone, kFailed, kStopped, kTooFar };
   Result StepIslands(const Model<double>& model, double t, double h, AtEvent at_event,
-                     State<double>* state, EventOutcome* outcome);
-  EventOutcome StepIsland(const Model<double>& model, double t, double h, int island,
-                          AtEvent at_event, State<double>* state);
+                     State<double>* state, StepReport* outcome);
+  StepReport StepIsland(const Model<double>& model, double t, double h, int island,
+                        AtEvent at_event, State<double>* state);
   bool KeepsReach(const IslandRecord& island);
 
   IslandPartition partition_;

@@ -7,7 +7,6 @@
 #include <sstream>
 
 #include "tangible/dynamics/model/model_seams.h"
-#include "tangible/simulation/islands/island_jets.h"
 #include "tangible/simulation/stepping/energy_watch.h"
 #include "tangible/simulation/stepping/tolerances.h"
 
@@ -155,16 +154,7 @@ RolloutReport RolloutJets(ControlledModel<T>* model, const State<T>& initial, Je
       report.message = FailureMessage(step, t, k);
       break;
     }
-    const State<T> before = jets;
-    if (stepper.by_events()) {
-      IslandStepInJets(now, values, route, &stepper.events().mutable_record(), &jets);
-    } else if (route == JetRoute::kImplicit) {
-      StepImplicit(now, &stepper, state, &jets);
-    } else if (!StepUnrolled(now, stepper.record(), &jets)) {
-      ++*fallbacks;
-      jets = before;
-      StepImplicit(now, &stepper, state, &jets);
-    }
+    *fallbacks += StepInJets(now, values, route, state, &stepper, &jets) ? 0 : 1;
     if (ValueDifference(jets, state) > kBranchTolerance) {
       report.status = StepStatus::kUnsolved;
       report.message = "step " + std::to_string(k) +

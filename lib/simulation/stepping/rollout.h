@@ -8,7 +8,6 @@
 #include <string>
 #include <vector>
 
-#include "tangible/simulation/islands/island_jets.h"
 #include "tangible/simulation/stepping/controlled_model.h"
 #include "tangible/simulation/stepping/step.h"
 

@@ -58,10 +58,6 @@ double ImpulseWork(const StepRecord& r) {
   return work;
 }
 
-bool AllFinite(const std::vector<double>& values) {
-  return std::all_of(values.begin(), values.end(), [](double x) { return std::isfinite(x); });
-}
-
 }  // namespace
 
 long NumSteps(const SimulationSettings& settings) {
@@ -107,20 +103,6 @@ void AddStepTimes(const std::vector<double>& times, SimulationSettings* settings
       std::unique(merged.begin(), merged.end(), [&](double x, double y) { return y - x <= near; }),
       merged.end());
   settings->step_times = std::move(merged);
-}
-
-const char* NameOf(StepStatus status) {
-  switch (status) {
-    case StepStatus::kDone:
-      return "done";
-    case StepStatus::kUnsolved:
-      return "unsolved";
-    case StepStatus::kDiverged:
-      return "diverged";
-    case StepStatus::kRefused:
-      return "refused";
-  }
-  return "";
 }
 
 Stepper::Stepper(const Model<double>& model, int threads)
@@ -444,12 +426,8 @@ StepReport Stepper::Step(const Model<double>& model, double t, double h, State<d
   if (report.status != StepStatus::kDone) {
     return report;
   }
-  for (int body = 0; body < structure.num_bodies(); ++body) {
-    for (int i = 0; i < 3 && structure.bodies[body].motion != Motion::kStatic; ++i) {
-      state->twist[3 * body + i] = r.new_twist[3 * body + i];
-      state->pose[3 * body + i] += h * r.new_twist[3 * body + i];
-    }
-  }
+  state->twist.assign(r.new_twist.begin(), r.new_twist.end());
+  MovePoses(structure, h, state);
   last_contacts_.assign(r.contacts.begin(), r.contacts.end());
   last_solution_ = r.solution;
   const bool projects = ProjectsOntoJoints(structure);
@@ -469,27 +447,13 @@ StepReport Stepper::Step(const Model<double>& model, double t, double h, State<d
   return report;
 }
 
-void Stepper::TakeRecord(StepRecord* record, ContactSystem* system) {
-  ChooseImpulses();
-  if (system != nullptr) {
-    this->system().MoveFactorsTo(system);
-  }
-  factored_ = true;
-  chosen_ = true;
-  std::swap(*record, record_);
-  if (system == nullptr || !system->needs_problem()) {
-    std::swap(record->problem, record_.problem);
-    record->problem.Clear();  // its content belongs to another step
-  }
-}
-
-bool Stepper::Refactor(const Model<double>& model, StepRecord* record) {
+void Stepper::Refactor(const Model<double>& model, StepRecord* record) {
   AssembleWithoutContacts(model, record->before, record->time, record->h, &record->problem,
                           &scratch_);
   AssembleContacts(model, record->before, record->h, record->contacts, record->friction,
                    record->restitution, &scratch_, &record->problem);
   factored_ = true;
-  return solver_.system().Factor(record->problem, record->solution.modes);
+  solver_.system().Factor(record->problem, record->solution.modes);
 }
 
 }  // namespace tangible

@@ -13,6 +13,7 @@
 //   unrolled   every operation of the interior point in Jets, from the same contacts
 // After its first call a step in double allocates memory only if it has more contacts than before.
 
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -22,25 +23,11 @@
 #include "tangible/lcp/contact/contact_islands.h"
 #include "tangible/lcp/contact/contact_solver.h"
 #include "tangible/simulation/islands/island_derivative.h"
+#include "tangible/simulation/islands/island_jets.h"
 #include "tangible/simulation/islands/island_step.h"
 #include "tangible/simulation/stepping/joint_projection.h"
 
 namespace tangible {
-
-/// Of a step or a run. kRefused: a parameter has a value that is not allowed; nothing was run.
-enum class StepStatus { kDone, kUnsolved, kDiverged, kRefused };
-
-/// "done", "unsolved", "diverged", "refused".
-const char* NameOf(StepStatus status);
-
-/// The report of a step; the caller sums over the run.
-struct StepReport : StepCounts {
-  StepStatus status = StepStatus::kDone;
-  int closed = 0;        ///< contacts with an impulse
-  int islands = 0;       ///< with contacts, or by events, solved apart; 0: all is one
-  double gap_min = 0.0;  ///< m, the smallest at the start; infinite where no contact is near
-  std::string message;   ///< empty unless it failed: names the contact or joint
-};
 
 /// What a step uses of earlier steps besides the state: modes and impulses to start from.
 struct StepperGuess {
@@ -50,6 +37,27 @@ struct StepperGuess {
 
   size_t bytes() const;
 };
+
+/// What the adjoint of a step needs.
+struct StepTape {
+  StepRecord record;
+  ContactSystem system;
+  std::unique_ptr<JointProjection> projection;  ///< where the scene asks for it
+  IslandRecords parts;  ///< event stepping: the step, in place of all of the above
+  bool has_factors = false;
+
+  /// Memory, also of the factors alone; they include the problem, which their solves may need.
+  size_t bytes() const;
+  size_t factor_bytes() const { return system.bytes() + record.problem.bytes(); }
+  void DropFactors();
+};
+
+/// Called with the right-hand sides of a fixed step's tangent, and then with their solution: 3 rows
+/// a block of the system, a column for each direction.
+enum class SolveStage { kAssembled, kSolved };
+using SolveObserver =
+    std::function<void(SolveStage stage, const ContactProblem<double>& problem,
+                       const ContactSystem& system, const SolveDerivative::Rates& rates)>;
 
 class Stepper {
  public:
@@ -63,11 +71,13 @@ class Stepper {
   /// The record of the last step. With event stepping: its contacts, with the sums of their
   /// impulses and their modes at the end.
   const StepRecord& record() const { return record_; }
-  /// Whether steps are event steps; then events() made the last one, and derivatives use its
-  /// record.
+  /// Whether steps are event steps, which parts() hold; derivatives use them.
   bool by_events() const { return events_ != nullptr; }
-  IslandStepper& events() { return *events_; }
-  IslandDerivative& event_derivative() { return event_derivative_; }
+  /// The parts of the last event step; none by fixed steps.
+  const IslandRecords& parts() const { return events_ ? events_->record() : no_parts_; }
+  IslandRecords& mutable_parts() { return events_ ? events_->mutable_record() : no_parts_; }
+  /// The derivative of one island of an event step.
+  EventDerivative& event_derivative() { return event_derivative_.of_island(); }
   /// Among the last step's impulses, which redundant contacts may share in many ways, chooses a
   /// share with the fewest contacts at a limit (contact_inner_impulses.h); the motion keeps its
   /// bits, and so does the next step. Derivatives use it: call it before record() and system().
@@ -76,13 +86,21 @@ class Stepper {
   /// The mode system, factorised with the last step's modes.
   ContactSystem& system();
   JointProjection& projection() { return projection_; }
-  /// Moves the last step's record and, unless null, its factorisation to the arguments; a tape uses
-  /// this to avoid copies. Until the next step record() and system() are not valid. The record's
-  /// problem is moved only where the solves of the factorisation need it.
-  void TakeRecord(StepRecord* record, ContactSystem* system);
-  /// Assembles and factorises a recorded step anew, so that system() is that step's; its problem is
-  /// filled in.
-  bool Refactor(const Model<double>& model, StepRecord* record);
+
+  /// The tangent of the last step: w_dot, num_variables x columns, of the state before it on entry
+  /// and after it on return. `fixed`: 1 for a variable that no column varies; empty: unknown.
+  /// Returns the largest relative residual of the linear solves.
+  double Tangent(const Model<double>& model, const std::vector<char>& fixed, RowMatrixXd* w_dot,
+                 const SolveObserver& observer = {});
+  /// Turns the derivatives of the new twists of moving blocks (3 num_blocks x columns, row-major)
+  /// into those of the state after a fixed step: poses move with the twists, and are projected.
+  void AdvanceTangent(const Model<double>& model, const double* twists, RowMatrixXd* w_dot);
+  /// Moves to a tape what the adjoint of the last step needs, with the factorisation if it is to be
+  /// kept. Until the next step the stepper's record is not valid.
+  void Take(const Model<double>& model, bool keep_factors, StepTape* tape);
+  /// The adjoint of a step on a tape: w_bar, num_variables x columns, of the state after it on
+  /// entry and before it on return. A step without factors is assembled and factorised anew.
+  void Adjoint(const Model<double>& model, StepTape* tape, RowMatrixXd* w_bar);
 
   /// Forgets the last step's modes and impulses: the next step starts without a guess.
   void ClearGuess();
@@ -94,6 +112,10 @@ class Stepper {
   void SetGuess(const StepperGuess& guess);
 
  private:
+  // Assembles and factorises a recorded step anew in system(); its problem is filled in.
+  void Refactor(const Model<double>& model, StepRecord* record);
+  void SolveAdjoint(const Model<double>& model, StepTape* tape, ContactSystem* system,
+                    RowMatrixXd* w_bar);
   StepReport StepByEvents(const Model<double>& model, double t, double h, State<double>* state);
   void SumImpulses(const Model<double>& model);
   enum class Guess { kLastStep, kSameStep };
@@ -113,6 +135,9 @@ class Stepper {
 
   std::unique_ptr<IslandStepper> events_;  ///< event stepping only
   IslandDerivative event_derivative_;
+  IslandRecords no_parts_;
+  SolveDerivative solve_derivative_;
+  ContactProblem<double> refactored_;  ///< memory of the problem that is assembled anew
   ContactSearch search_;
   ContactSolver solver_;
   std::unique_ptr<IslandSolver> islands_;
@@ -131,16 +156,12 @@ class Stepper {
   std::vector<Turning> turning_;  // scratch
 };
 
-/// The implicit derivative part of a step in Jets: `stepper` has just done the same step in double;
-/// model and state are the Jets whose values that step had. Returns the state after.
+/// The step in Jets that `stepper` has just done in double, from the state's values to `after`; the
+/// numbers of `values` are those of `model`. False where the interior point of an unrolled step
+/// fails and the implicit derivative is given instead.
 template <typename T>
-void StepImplicit(const Model<T>& model, Stepper* stepper, const State<double>& after,
-                  State<T>* state);
-
-/// The unrolled step in Jets, with the contacts of the double step; false where the interior point
-/// fails.
-template <typename T>
-bool StepUnrolled(const Model<T>& model, const StepRecord& record, State<T>* state);
+bool StepInJets(const Model<T>& model, const Model<double>& values, JetRoute route,
+                const State<double>& after, Stepper* stepper, State<T>* state);
 
 /// Number of steps: ceil(duration / dt − kSameTime).
 long NumSteps(const SimulationSettings& settings);

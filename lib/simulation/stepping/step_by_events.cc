@@ -3,7 +3,9 @@
 // The stepper's event step: it runs island_step.h and reports the result like any other step.
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
+#include "tangible/simulation/events/segment_flow.h"
 #include "tangible/simulation/stepping/step.h"
 
 namespace tangible {
@@ -117,33 +119,26 @@ void Stepper::SumImpulses(const Model<double>& model) {
 
 StepReport Stepper::StepByEvents(const Model<double>& model, double t, double h,
                                  State<double>* state) {
-  StepReport report;
   StepRecord& r = record_;
   r.time = t;
   r.h = h;
   r.before = *state;
   last_contacts_ = r.contacts;
   last_solution_.modes = r.solution.modes;
-  const EventOutcome outcome = events_->Step(model, t, h, state);
-  static_cast<StepCounts&>(report) = outcome;
-  report.rung = Rung::kNone;
-  report.islands = outcome.islands;
+  StepReport report = events_->Step(model, t, h, state);
+  const Rung rung = std::exchange(report.rung, Rung::kNone);
   report.gap_min = HUGE_VAL;
-  const auto finite = [](const std::vector<double>& x) {
-    return std::all_of(x.begin(), x.end(), [](double y) { return std::isfinite(y); });
+  const auto finite = [](const State<double>& x) {
+    return AllFinite(x.pose) && AllFinite(x.twist);
   };
-  if (!outcome.done) {
-    report.status = StepStatus::kUnsolved;
-    report.message = outcome.message;
-    if (!finite(state->pose) || !finite(state->twist)) {
-      *state = r.before;
-    }
+  if (report.status != StepStatus::kDone) {
+    if (!finite(*state)) *state = r.before;
     return report;
   }
   SumImpulses(model);
   r.new_twist = state->twist;
   report.angles_left_out = AnglesLeftOut(events_->record(), &turning_);
-  report.rung = r.contacts.empty() ? Rung::kDirect : std::max(outcome.rung, Rung::kModeChanges);
+  report.rung = r.contacts.empty() ? Rung::kDirect : std::max(rung, Rung::kModeChanges);
   report.contacts = static_cast<long>(r.contacts.size());
   size_t next = 0;
   for (size_t i = 0; i < r.contacts.size(); ++i) {
@@ -163,7 +158,7 @@ StepReport Stepper::StepByEvents(const Model<double>& model, double t, double h,
     }
     report.mode_switches += last != r.solution.modes[i] ? 1 : 0;
   }
-  if (!finite(state->pose) || !finite(state->twist)) {
+  if (!finite(*state)) {
     report.status = StepStatus::kDiverged;
     report.message = "a pose or twist is not finite";
   }

@@ -3,7 +3,6 @@
 // Steps in Jets: implicit (through K of the double step) and unrolled (through every operation).
 #include <cmath>
 
-#include "tangible/simulation/events/implicit_residual_inl.h"
 #include "tangible/simulation/stepping/step_unrolled_inl.h"
 
 namespace tangible {
@@ -36,52 +35,53 @@ void ProjectImplicit(const Model<T>& model, JointProjection* projection, const S
   }
 }
 
-}  // namespace
-
 template <typename T>
 void StepImplicit(const Model<T>& model, Stepper* stepper, const State<double>& after,
                   State<T>* state) {
-  constexpr int kWidth = NumDerivatives<T>::value;
   stepper->ChooseImpulses();
   const StepRecord& record = stepper->record();
-  const ModelStructure& s = *model.structure;
   ContactProblem<T> problem;
-  internal::AssembleAll(model, record, *state, &problem);
-  ContactSystem& system = stepper->system();
-  std::vector<double> rhs(3 * static_cast<size_t>(system.num_blocks()) * kWidth, 0.0);
-  ImplicitResidual<T>(problem, record.solution, SlidingSigns(record.problem, record.solution),
-                      system.contact_block(), &rhs)
-      .Fill();
-  system.Solve(record.problem, record.solution.modes, rhs.data(), kWidth);
-  for (int k = 0; k < s.num_blocks(); ++k) {
-    for (int i = 0; i < 3; ++i) {
-      T& twist = state->twist[3 * s.moving[k] + i];
-      twist.a = record.solution.motion[3 * k + i];
-      for (int d = 0; d < kWidth; ++d) {
-        twist.v[d] = rhs[(3 * k + i) * kWidth + d];
-      }
-    }
-  }
-  internal::MovePoses(s, record.h, state);
-  if (ProjectsOntoJoints(s)) {
+  AssembleInJets(model, record, *state, &problem);
+  ContactSolution<T> solution;
+  SolveImplicitly(problem, record.problem, record.solution,
+                  SlidingSigns(record.problem, record.solution), &stepper->system(), &solution);
+  SpreadTwists(*model.structure, solution.motion, &state->twist);
+  MovePoses(*model.structure, record.h, state);
+  if (ProjectsOntoJoints(*model.structure)) {
     ProjectImplicit(model, &stepper->projection(), after, state);
   }
 }
 
 template <typename T>
 bool StepUnrolled(const Model<T>& model, const StepRecord& record, State<T>* state) {
-  const ModelStructure& s = *model.structure;
   const bool converged = SolveUnrolled(model, record, state);
-  if (ProjectsOntoJoints(s)) {
+  if (ProjectsOntoJoints(*model.structure)) {
     JointProjection::ProjectUnrolled(model, record.before.pose, state);
   }
   return converged;
 }
 
-#define TANGIBLE_INSTANTIATE_JET(N)                                                        \
-  template void StepImplicit<Jet<N>>(const Model<Jet<N>>&, Stepper*, const State<double>&, \
-                                     State<Jet<N>>*);                                      \
-  template bool StepUnrolled<Jet<N>>(const Model<Jet<N>>&, const StepRecord&, State<Jet<N>>*);
+}  // namespace
+
+template <typename T>
+bool StepInJets(const Model<T>& model, const Model<double>& values, JetRoute route,
+                const State<double>& after, Stepper* stepper, State<T>* state) {
+  if (stepper->by_events()) {
+    IslandStepInJets(model, values, route, &stepper->mutable_parts(), state);
+    return true;
+  }
+  if (route == JetRoute::kUnrolled) {
+    const State<T> before = *state;
+    if (StepUnrolled(model, stepper->record(), state)) return true;
+    *state = before;
+  }
+  StepImplicit(model, stepper, after, state);
+  return route == JetRoute::kImplicit;
+}
+
+#define TANGIBLE_INSTANTIATE_JET(N)                                                      \
+  template bool StepInJets<Jet<N>>(const Model<Jet<N>>&, const Model<double>&, JetRoute, \
+                                   const State<double>&, Stepper*, State<Jet<N>>*);
 TANGIBLE_FOR_EACH_JET_WIDTH(TANGIBLE_INSTANTIATE_JET)
 
 }  // namespace tangible

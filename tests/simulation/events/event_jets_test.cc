@@ -37,7 +37,7 @@ State<Jet<N>> StepInJets(const std::string& text, JetRoute route, const Seed& se
     state.twist.push_back(Jet<N>(start.twist[i]));
   }
   seed(&jets, &state);
-  IslandStepInJets(jets, model, route, &stepper.events().mutable_record(), &state);
+  IslandStepInJets(jets, model, route, &stepper.mutable_parts(), &state);
   for (size_t i = 0; i < start.pose.size(); ++i) {
     EXPECT_NEAR(state.pose[i].a, after.pose[i], 1e-9) << i;
     EXPECT_NEAR(state.twist[i].a, after.twist[i], 1e-9) << i;

@@ -81,7 +81,7 @@ TEST(EventPenetrationTest, TheReturnIsAnEventOfItsOwn) {
   BuildModel(scene, &model, &state);
   Stepper stepper(model);
   ASSERT_EQ(stepper.Step(model, 0.0, 0.005, &state).status, StepStatus::kDone);
-  const EventRecord& record = stepper.events().record().islands[0]->events;
+  const EventRecord& record = stepper.parts().islands[0]->events;
   int returns = 0;
   for (int p = 0; p < record.num_parts; ++p) {
     const EventPart& part = *record.parts[p];
@@ -246,7 +246,7 @@ TEST(EventPenetrationTest, WhatACorrectionTurnsReturnsAtOnce) {
   int at_once = 0;
   for (int k = 0; k < 2; ++k) {
     ASSERT_EQ(stepper.Step(model, 0.01 * k, 0.01, &state).status, StepStatus::kDone);
-    const EventRecord& record = stepper.events().record().islands[0]->events;
+    const EventRecord& record = stepper.parts().islands[0]->events;
     for (int p = 0; p < record.num_parts; ++p) {
       const EventPart& part = *record.parts[p];
       if (!part.is_impulses && part.segment.event == EventKind::kAtOnce) {

@@ -114,7 +114,7 @@ Course RunIn(const Scene& scene, const Units& units) {
           course.events += std::to_string(closed) + " ";
           return;
         }
-        const IslandRecords& records = stepper->events().record();
+        const IslandRecords& records = stepper->parts();
         for (int k = 0; k < records.num_islands; ++k) {
           const EventRecord& record = records.islands[k]->events;
           for (int p = 0; p < record.num_parts; ++p) {

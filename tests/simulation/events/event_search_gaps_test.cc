@@ -113,7 +113,7 @@ TEST(EventSearchGapsTest, ALimitThatIsLeftIsTouchedOnlyByApproaching) {
   int left = 0;
   for (int k = 0; k < 40; ++k) {
     ASSERT_EQ(stepper.Step(model, 0.005 * k, 0.005, &state).status, StepStatus::kDone);
-    const EventRecord& record = stepper.events().record().islands[0]->events;
+    const EventRecord& record = stepper.parts().islands[0]->events;
     for (int p = 0; p < record.num_parts; ++p) {
       if (!record.parts[p]->is_impulses) {
         left += record.parts[p]->segment.event == EventKind::kLiftOff ? 1 : 0;

@@ -33,7 +33,7 @@ TEST(IslandJets, AgreeWithTheTangent) {
     RowMatrixXd w_dot = RowMatrixXd::Zero(s.num_variables(), 1);
     w_dot(s.TwistVariable(1, 0), 0) = 1.0;
     w_dot(s.TwistVariable(2, 1), 0) = 0.5;
-    stepper.event_derivative().Tangent(model, &stepper.events().mutable_record(), &w_dot);
+    stepper.Tangent(model, {}, &w_dot);
     for (const JetRoute route : {JetRoute::kImplicit, JetRoute::kUnrolled}) {
       const auto jets_of = [](const std::vector<double>& values) {
         return std::vector<Jet<kWidth>>(values.begin(), values.end());
@@ -42,7 +42,7 @@ TEST(IslandJets, AgreeWithTheTangent) {
       State<Jet<kWidth>> at{jets_of(before.pose), jets_of(before.twist)};
       at.twist[3].v[0] = 1.0;
       at.twist[7].v[0] = 0.5;
-      IslandStepInJets(jets, model, route, &stepper.events().mutable_record(), &at);
+      IslandStepInJets(jets, model, route, &stepper.mutable_parts(), &at);
       for (int i = 0; i < static_cast<int>(at.pose.size()); ++i) {
         EXPECT_NEAR(at.pose[i].v[0], w_dot(s.PoseVariable(0, i), 0), 1e-9) << k << " " << i;
         EXPECT_NEAR(at.twist[i].v[0], w_dot(s.TwistVariable(0, i), 0), 1e-9) << k << " " << i;

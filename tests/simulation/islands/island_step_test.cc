@@ -34,7 +34,7 @@ Course Simulate(const std::string& text) {
       model, state,
       [&](long k, double, const State<double>&, Stepper* stepper) {
         if (k < 2) return;
-        const IslandRecords& records = stepper->events().record();
+        const IslandRecords& records = stepper->parts();
         run.most_islands = std::max(run.most_islands, records.num_islands);
         for (int i = 0; i < records.num_islands; ++i) {
           const EventRecord& events = records.islands[i]->events;
@@ -122,7 +122,7 @@ TEST(IslandStep, BodiesThatMeetAreOneIsland) {
       model, state,
       [&](long k, double, const State<double>&, Stepper* stepper) {
         if (k < 2) return;
-        const IslandRecords& records = stepper->events().record();
+        const IslandRecords& records = stepper->parts();
         islands.push_back(records.num_islands);
         const IslandRecord& last = *records.islands[records.num_islands - 1];
         bodies_of_last.push_back(last.part ? last.part->structure->num_blocks() : 5);
@@ -161,7 +161,7 @@ TEST(IslandStep, ABodyThatIsThrownOutOfItsIslandIsFound) {
       model, state,
       [&](long k, double, const State<double>&, Stepper* stepper) {
         if (k < 2) return;
-        const IslandRecords& records = stepper->events().record();
+        const IslandRecords& records = stepper->parts();
         for (int i = 0; i < records.num_islands && !records.IsWhole(); ++i) {
           most_blocks = std::max(most_blocks, records.islands[i]->part->structure->num_blocks());
         }

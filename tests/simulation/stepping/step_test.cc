@@ -240,22 +240,27 @@ TEST(StepTest, TimesAreNotAccumulated) {
   EXPECT_EQ(NumSteps(settings), 0);
 }
 
-TEST(StepTest, RefactorGivesTheSameSystem) {
+TEST(StepTest, AnAdjointWithoutFactorsHasTheSameBits) {
   Scene scene = SceneOf(test_scenes::FallingBall(0.0, R"({"dt": 0.01})"));
   scene.bodies[0].velocity.x() = 1.0;
   Model<double> model;
-  State<double> state;
-  BuildModel(scene, &model, &state);
-  Stepper stepper(model), other(model);
-  stepper.Step(model, 0.0, 0.01, &state);
-  StepRecord record = stepper.record();
-  record.problem = ContactProblem<double>();
-  ASSERT_TRUE(other.Refactor(model, &record));
-  std::vector<double> x(3 * stepper.system().num_blocks(), 1.0), y = x;
-  x[5] = y[5] = 0.0;
-  stepper.system().SolveTransposed(stepper.record().problem, record.solution.modes, x.data(), 1);
-  other.system().SolveTransposed(record.problem, record.solution.modes, y.data(), 1);
-  EXPECT_EQ(x, y);
+  RowMatrixXd w_bar[2];
+  for (const bool keeps : {true, false}) {
+    State<double> state;
+    BuildModel(scene, &model, &state);
+    Stepper stepper(model);
+    stepper.Step(model, 0.0, 0.01, &state);
+    StepTape tape;
+    stepper.Take(model, keeps, &tape);
+    EXPECT_EQ(tape.has_factors, keeps);
+    if (!keeps) {
+      EXPECT_TRUE(tape.record.problem.contacts.empty() && tape.record.problem.load.empty());
+    }
+    w_bar[keeps ? 0 : 1].setOnes(model.structure->num_variables(), 2);
+    stepper.Adjoint(model, &tape, &w_bar[keeps ? 0 : 1]);
+  }
+  EXPECT_EQ(w_bar[0], w_bar[1]);
+  EXPECT_NE(w_bar[0], RowMatrixXd::Ones(w_bar[0].rows(), w_bar[0].cols()));
 }
 
 }  // namespace

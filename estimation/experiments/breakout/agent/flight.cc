@@ -138,7 +138,7 @@ bool FlightModel::FirstMeeting(const BallState& ball, const Bricks& bricks, doub
   const StepReport report = stepper_->Step(model_, 0.0, length, &state_);
   if (report.status != StepStatus::kDone) return false;
   // One body moves, so that there is one island.
-  const EventRecord& record = stepper_->events().record().islands[0]->events;
+  const EventRecord& record = stepper_->parts().islands[0]->events;
   *when = 0.0;
   for (int i = 0; i < record.num_parts; ++i) {
     const EventPart& part = *record.parts[i];

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "tangible/simulation/events/step_counts.h"
+#include "tangible/simulation/events/step_report.h"
 
 #include <algorithm>
 
@@ -26,6 +26,20 @@ void StepCounts::Add(const StepCounts& other) {
   mode_switches += other.mode_switches;
   residual = std::max(residual, other.residual);
   impact_energy_gain = std::max(impact_energy_gain, other.impact_energy_gain);
+}
+
+const char* NameOf(StepStatus status) {
+  switch (status) {
+    case StepStatus::kDone:
+      return "done";
+    case StepStatus::kUnsolved:
+      return "unsolved";
+    case StepStatus::kDiverged:
+      return "diverged";
+    case StepStatus::kRefused:
+      return "refused";
+  }
+  return "";
 }
 
 }  // namespace tangible

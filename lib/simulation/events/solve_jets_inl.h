@@ -1,12 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// The residual of a contact problem in Jets at the solution in double, the right-hand side of the
-// implicit derivative K ẋ = −Ṙ. Included only by the files that step in Jets.
+// A solve in Jets beside that in double: of a fixed step, an impact, or accelerations. Implicit:
+// the residual R of the problem in Jets at the solution in double, and K ẋ = −Ṙ; unrolled: every
+// operation of the interior point. Included only by the files that step in Jets.
 
 #include <vector>
 
-#include "tangible/lcp/system/contact_problem.h"
+#include "tangible/dynamics/assembly/assembly.h"
+#include "tangible/lcp/contact/contact_interior_point.h"
+#include "tangible/simulation/events/event_record.h"
+#include "tangible/simulation/events/tolerances.h"
 
 namespace tangible {
 
@@ -93,6 +97,60 @@ inline std::vector<double> SlidingSigns(const ContactProblem<double>& problem,
                    : SlidingSign(solution.modes[i]);
   }
   return signs;
+}
+
+/// The problem of a recorded step at a state in Jets.
+template <typename T>
+void AssembleInJets(const Model<T>& model, const StepRecord& record, const State<T>& state,
+                    ContactProblem<T>* problem) {
+  AssemblyScratch<T> scratch;
+  AssembleWithoutContacts(model, state, record.time, record.h, problem, &scratch);
+  AssembleContacts(model, state, record.h, record.contacts, record.friction, record.restitution,
+                   &scratch, problem);
+}
+
+/// The implicit derivative: motion, and normal and sticking impulses, with the values of the
+/// solution in double. `signs` as for ImplicitResidual.
+template <typename T>
+void SolveImplicitly(const ContactProblem<T>& problem, const ContactProblem<double>& in_double,
+                     const ContactSolution<double>& solution, const std::vector<double>& signs,
+                     ContactSystem* system, ContactSolution<T>* out) {
+  constexpr int kWidth = NumDerivatives<T>::value;
+  std::vector<double> rhs(3 * static_cast<size_t>(system->num_blocks()) * kWidth, 0.0);
+  const std::vector<int>& block_of = system->contact_block();
+  ImplicitResidual<T>(problem, solution, signs, block_of, &rhs).Fill();
+  system->Solve(in_double, solution.modes, rhs.data(), kWidth);
+  const auto jet = [&](double value, size_t row) {
+    T x(value);
+    for (int d = 0; d < kWidth; ++d) {
+      x.v[d] = rhs[row * kWidth + d];
+    }
+    return x;
+  };
+  out->motion.resize(solution.motion.size());
+  for (size_t i = 0; i < solution.motion.size(); ++i) {
+    out->motion[i] = jet(solution.motion[i], i);
+  }
+  out->normal_impulse.assign(problem.contacts.size(), T(0.0));
+  out->tangent_impulse.assign(problem.contacts.size(), T(0.0));
+  for (size_t i = 0; i < problem.contacts.size(); ++i) {
+    if (block_of[i] >= 0) {
+      const size_t row = 3 * static_cast<size_t>(block_of[i]);
+      out->normal_impulse[i] = jet(solution.normal_impulse[i], row);
+      if (solution.modes[i] == ContactMode::kSticking) {
+        out->tangent_impulse[i] = jet(solution.tangent_impulse[i], row + 1);
+      }
+    }
+  }
+}
+
+/// Every operation of the interior point; false where it does not converge.
+template <typename T>
+bool SolveUnrolled(const ContactProblem<T>& problem, ContactSolution<T>* solution) {
+  InteriorPointWorkspace<T> workspace;
+  ContactInteriorPointOptions options;
+  options.complementarity = kUnrolledComplementarity;
+  return SolveContactsByInteriorPoint(problem, options, &workspace, solution).converged;
 }
 
 }  // namespace tangible

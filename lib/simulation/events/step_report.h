@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// What a step counts: that of an island, of a step, and their sums over a run.
+// The report of a step, or of an island of it: what came of it and what it counts, with the sums
+// over a run.
+
+#include <string>
 
 #include "tangible/lcp/contact/contact_solver.h"
 
@@ -52,6 +55,22 @@ struct StepCounts {
 
   /// Adds counts; of `rung`, `residual` and `impact_energy_gain` the largest remains.
   void Add(const StepCounts& other);
+};
+
+/// Of a step or a run. kRefused: a parameter has a value that is not allowed; nothing was run.
+enum class StepStatus { kDone, kUnsolved, kDiverged, kRefused };
+
+/// "done", "unsolved", "diverged", "refused".
+const char* NameOf(StepStatus status);
+
+/// The report of a step; the caller sums over the run.
+struct StepReport : StepCounts {
+  StepStatus status = StepStatus::kDone;
+  int closed = 0;        ///< contacts with an impulse
+  int islands = 0;       ///< with contacts, or by events, solved apart; 0: all is one
+  double gap_min = 0.0;  ///< m, the smallest at the start; infinite where no contact is near
+  std::string message;   ///< empty unless it failed: names the contact or joint
+  bool stopped = false;  ///< by events: before its end (AtEvent::kStopAtSecond)
 };
 
 }  // namespace tangible
