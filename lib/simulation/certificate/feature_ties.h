@@ -33,9 +33,9 @@ double FeatureChangeMargin(const Model<double>& model, const StepRecord& record,
 bool MeetsACorner(const Model<double>& model, const State<double>& state,
                   const ActiveContact& contact);
 
-/// Whether a disc's contact is handed over from a face to its end, or back, within `time`, s, before
-/// or after a state, as the bodies move with their twists: there the disc begins to turn about a
-/// corner, or ends to. False where neither shape is a disc.
+/// Whether a disc's contact is handed over from a face to its end, or back, within `time`, s,
+/// before or after a state, as the bodies move with their twists: there the disc begins to turn
+/// about a corner, or ends to. False where neither shape is a disc.
 bool IsHandedOver(const Model<double>& model, const State<double>& state,
                   const ActiveContact& contact, double time);
 
