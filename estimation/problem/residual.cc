@@ -8,8 +8,10 @@
 
 #include "tangible/estimation/problem/consistency.h"
 #include "tangible/estimation/problem/tolerances.h"
+#include "tangible/lcp/certificate/tolerances.h"
 #include "tangible/scene/parameter.h"
 #include "tangible/simulation/certificate/certify.h"
+#include "tangible/simulation/certificate/impact_times.h"
 #include "tangible/simulation/derivatives/rollout_tangent.h"
 #include "tangible/simulation/gradient/difference_column.h"
 #include "tangible/simulation/gradient/tolerances.h"
@@ -164,8 +166,33 @@ std::optional<Certificate> RolloutResiduals::Certify(const Eigen::VectorXd& p) {
     sizes.push_back(std::max(std::abs(p[static_cast<Eigen::Index>(names.size())]), entry.scale));
     names.push_back(entry.name);
   }
-  return CertifyDerivative(scene_.model(), scene_.initial_state(), scene_.VariableDerivatives(),
-                           names, sizes);
+  Certificate certificate = CertifyDerivative(scene_.model(), scene_.initial_state(),
+                                              scene_.VariableDerivatives(), names, sizes);
+  NameSamplesOnImpacts(&certificate);
+  return certificate;
+}
+
+// An observation at the end of a step at which its body is struck: by an earlier impact it is one of
+// the motion behind it, by a later one of that before it. A velocity jumps.
+void RolloutResiduals::NameSamplesOnImpacts(Certificate* certificate) const {
+  const Model<double>& model = scene_.model();
+  const SimulationSettings& settings = model.structure->settings;
+  if (settings.stepping != Stepping::kEvent) return;
+  for (const BodyImpact& impact : FindImpacts(model, scene_.initial_state())) {
+    for (const Sample& sample : plan_.samples()) {
+      if (sample.body != impact.body || sample.part != 0.0 ||
+          std::abs(sample.time - impact.time) > kNearKinkMargin * settings.dt) {
+        continue;
+      }
+      std::ostringstream what;
+      what << "an observation of " << model.structure->bodies[sample.body].name << " at "
+           << sample.time << " s falls on an impact";
+      std::string& reason = plan_.width() > 3 ? certificate->discontinuous : certificate->one_sided;
+      if (reason.empty()) reason = what.str();
+      SetVerdict(*certificate);
+      return;
+    }
+  }
 }
 
 bool RolloutResiduals::Evaluate(const Eigen::VectorXd& p, GradientMethod method,

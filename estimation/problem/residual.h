@@ -105,6 +105,7 @@ class RolloutResiduals : public LeastSquaresProblem {
                                     const Eigen::VectorXd& p_by_q) const;
 
  private:
+  void NameSamplesOnImpacts(Certificate* certificate) const;
   Eigen::Index num_sample_rows() const {
     return plan_.width() * static_cast<Eigen::Index>(plan_.num_samples());
   }

@@ -343,5 +343,35 @@ TEST(ResidualTest, ATimeThatLeavesTheRunIsAFailure) {
       << residuals.message();
 }
 
+// A ball lands after 0.2 s, the end of a step: what is observed then is the motion before the impact
+// or behind it.
+TEST(ResidualTest, AnObservationOnAnImpactIsNamed) {
+  const Scene scene = MakeScene(R"({"gravity": [0, -10], "bodies": [
+      {"name": "ball", "shape": {"circle": {"radius": 0.25}}, "mass": 1, "position": [0, 0.45],
+       "restitution": 0.5},
+      {"name": "floor", "static": true, "restitution": 0.5,
+       "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}}],
+      "simulation": {"stepping": "event", "dt": 0.05, "duration": 0.4}})");
+  const auto verdict = [&](double time, Coordinate coordinate) {
+    Observation observation;
+    observation.time = time;
+    observation.body = 0;
+    observation.coordinate = coordinate;
+    observation.value = 0.3;
+    observation.sigma = 0.01;
+    RolloutResiduals residuals =
+        MakeResiduals(scene, {}, {Parameter("bodies/ball/position/y", 0.45)}, {observation});
+    return residuals.Certify(residuals.scene().Initial())->verdict;
+  };
+  EXPECT_EQ(verdict(0.2, Coordinate::kY),
+            "one-sided: an observation of ball at 0.2 s falls on an impact");
+  EXPECT_EQ(verdict(0.2, Coordinate::kVy),
+            "discontinuous: an observation of ball at 0.2 s falls on an impact");
+  for (const double time : {0.15, 0.25, 0.3}) {
+    EXPECT_EQ(verdict(time, Coordinate::kY), "trustworthy") << time;
+    EXPECT_EQ(verdict(time, Coordinate::kVy), "trustworthy") << time;
+  }
+}
+
 }  // namespace
 }  // namespace tangible
