@@ -8,7 +8,6 @@ namespace tangible {
 std::vector<BodyImpact> FindImpacts(const Model<double>& model, const State<double>& initial) {
   std::vector<BodyImpact> impacts;
   const std::vector<BodyIndex>& bodies = model.structure->bodies;
-  if (model.structure->settings.stepping != Stepping::kEvent) return impacts;
   const auto add = [&](const IslandRecord& island, const Impulses& impact) {
     for (size_t i = 0; i < impact.contacts.size(); ++i) {
       if (!(impact.solution.normal_impulse[i] > 0.0)) continue;
@@ -23,7 +22,7 @@ std::vector<BodyImpact> FindImpacts(const Model<double>& model, const State<doub
       model, initial,
       [&](long, double, const State<double>&, Stepper* stepper) {
         if (stepper == nullptr) return;
-        const IslandRecords& records = stepper->events().mutable_record();
+        const IslandRecords& records = stepper->parts();  // none by fixed steps
         for (int k = 0; k < records.num_islands; ++k) {
           const EventRecord& events = records.islands[k]->events;
           for (int p = 0; p < events.num_parts; ++p) {
