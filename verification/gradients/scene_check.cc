@@ -20,11 +20,10 @@ constexpr double kInteriorPointEnd = 1e-14;
 // Of that: derivatives in Jets are those of the last iteration but one, whose products z s are
 // larger by two orders.
 constexpr double kLagOfJets = 100.0;
-// Of the column: the rounding of a coincidence, over the step of the closed form's differences.
-constexpr double kSideRounding = 1e-9;
-// Of the column: contributions do not include what moves an event's time, which cancels in other
-// bodies; and a disc that leaves a face is located some 1e-12 of its size late.
-constexpr double kMomentRounding = 1e-11;
+// Of the column: the rounding of a coincidence, over the step of the closed form's differences; the
+// engine's moments, which are located to 1e-10 of forces and 1e-12 of sizes, and contributions,
+// which do not include what moves an event's time and cancels in other bodies.
+constexpr double kCoincidenceRounding = 1e-9;
 // Of the column's contributions: plain quotients that differ from the tangent by less confirm it.
 constexpr double kConfirmedByQuotients = 1e-5;
 
@@ -217,8 +216,7 @@ class Judge {
                               ? run_.differences[p].errors[o]
                               : kUnknown;
     double estimate = kMethodPairs[pair].a == kByRidders ? entry.ridders_error : 0.0;
-    if (IsOfASide(kMethodPairs[pair].a)) estimate = kSideRounding * ScaleOfColumn(p);
-    if (kMethodPairs[pair].a == kByClosedForm) estimate = kMomentRounding * ScaleOfColumn(p);
+    if (IsKnownMethod(kMethodPairs[pair].a)) estimate = kCoincidenceRounding * ScaleOfColumn(p);
     if (kMethodPairs[pair].a == kByUnrolledJets) {
       entry.contributions = ScaleOfColumn(p);
       const double error = InteriorPointError();
