@@ -5,6 +5,7 @@
 #include <cmath>
 #include <sstream>
 
+#include "tangible/dynamics/model/lengths.h"
 #include "tangible/dynamics/model/tolerances.h"
 #include "tangible/lcp/system/contact_residual.h"
 #include "tangible/math/interrupt.h"
@@ -130,6 +131,7 @@ Stepper::Stepper(const Model<double>& model, int threads)
   record_.restitution.reserve(contacts);
   record_.problem.contacts.reserve(contacts);
   turning_.reserve(s.num_blocks());
+  held_.reserve(contacts);
   record_.problem.dampers.reserve(s.joints.size() + s.springs.size());
   record_.problem.joints.reserve(s.joints.size());
   for (ContactSolution<double>* solution :
@@ -299,6 +301,7 @@ void Stepper::FillReport(const Model<double>& model, const ContactSolverReport& 
   }
   bool impact = false;
   size_t from = 0;
+  held_.assign(record_.contacts.size(), ContactMode::kOpen);
   report->gap_min = HUGE_VAL;
   for (size_t i = 0; i < record_.contacts.size(); ++i) {
     const ContactBlock<double>& block = record_.problem.contacts[i];
@@ -311,6 +314,7 @@ void Stepper::FillReport(const Model<double>& model, const ContactSolverReport& 
     for (size_t k = from; k < last_contacts_.size(); ++k) {
       if (last_contacts_[k].SameAs(record_.contacts[i])) {
         last = last_solution_.modes[k];
+        if (last_solution_.normal_impulse[k] > 0.0) held_[i] = last;
         from = k;
         break;
       }
@@ -344,9 +348,33 @@ ContactSolverReport Stepper::SolveContacts(const ContactSolverOptions& options, 
   return report;
 }
 
+void Stepper::KeepHeld() {
+  bool any = false;
+  for (size_t i = 0; i < record_.contacts.size(); ++i) {
+    const ContactBlock<double>& c = record_.problem.contacts[i];
+    if (record_.solution.modes[i] != ContactMode::kOpen || held_[i] == ContactMode::kOpen ||
+        c.limit_given || (held_[i] == ContactMode::kClosed) == c.has_friction) {
+      continue;
+    }
+    const double place = PlaceOf(record_.before, record_.contacts[i].a, record_.contacts[i].b);
+    const double rounding = kCoordinateRounding * place / record_.h;
+    const double* v = record_.solution.motion.data();
+    const bool rests = std::abs(RowDot(c.a, c.normal_a, c.b, c.normal_b, v) + c.c_n) <= rounding;
+    if (!rests) continue;
+    const double slip = RowDot(c.a, c.tangent_a, c.b, c.tangent_b, v) + c.c_t;
+    record_.solution.modes[i] = !c.has_friction              ? ContactMode::kClosed
+                                : std::abs(slip) <= rounding ? ContactMode::kSticking
+                                : slip > 0.0                 ? ContactMode::kSlidingPositive
+                                                             : ContactMode::kSlidingNegative;
+    any = true;
+  }
+  if (any) factored_ = false;
+}
+
 void Stepper::ChooseImpulses() {
   if (chosen_ || events_) return;
   chosen_ = true;
+  KeepHeld();
   if (inner_impulses_.Choose(record_.problem, kDegenerateTolerance, &record_.solution)) {
     factored_ = false;
   }

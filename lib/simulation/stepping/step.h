@@ -132,6 +132,10 @@ class Stepper {
   void FillReport(const Model<double>& model, const ContactSolverReport& solved,
                   StepReport* report);
   void Describe(const Model<double>& model, int contact, StepReport* report) const;
+  // Closes the contacts at rest that carried an impulse in the last step and carry none in this one.
+  // That step stopped whatever approached, so that a derivative in which this one is open would let
+  // a body go that a wall has stopped.
+  void KeepHeld();
 
   std::unique_ptr<IslandStepper> events_;  ///< event stepping only
   IslandDerivative event_derivative_;
@@ -154,6 +158,8 @@ class Stepper {
   ContactSolution<double> narrow_solution_;
   std::vector<CoefficientSource> wider_friction_, wider_restitution_;
   std::vector<Turning> turning_;  // scratch
+  // The modes in the last step of this step's contacts that carried an impulse there; else open.
+  std::vector<ContactMode> held_;
 };
 
 /// The step in Jets that `stepper` has just done in double, from the state's values to `after`; the
