@@ -132,7 +132,7 @@ class Stepper {
   void FillReport(const Model<double>& model, const ContactSolverReport& solved,
                   StepReport* report);
   void Describe(const Model<double>& model, int contact, StepReport* report) const;
-  // Closes the contacts at rest that carried an impulse in the last step and carry none in this one.
+  // Closes the contacts at rest that carried an impulse in the last step and carry none in this.
   // That step stopped whatever approached, so that a derivative in which this one is open would let
   // a body go that a wall has stopped.
   void KeepHeld();
