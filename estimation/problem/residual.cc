@@ -172,8 +172,8 @@ std::optional<Certificate> RolloutResiduals::Certify(const Eigen::VectorXd& p) {
   return certificate;
 }
 
-// An observation at the end of a step at which its body is struck: by an earlier impact it is one of
-// the motion behind it, by a later one of that before it. A velocity jumps.
+// An observation at the end of a step at which its body is struck is one of the motion before the
+// impact or behind it. A velocity jumps.
 void RolloutResiduals::NameSamplesOnImpacts(Certificate* certificate) const {
   const Model<double>& model = scene_.model();
   const SimulationSettings& settings = model.structure->settings;

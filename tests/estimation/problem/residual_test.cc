@@ -343,8 +343,7 @@ TEST(ResidualTest, ATimeThatLeavesTheRunIsAFailure) {
       << residuals.message();
 }
 
-// A ball lands after 0.2 s, the end of a step: what is observed then is the motion before the impact
-// or behind it.
+// A ball lands after 0.2 s, the end of a step.
 TEST(ResidualTest, AnObservationOnAnImpactIsNamed) {
   const Scene scene = MakeScene(R"({"gravity": [0, -10], "bodies": [
       {"name": "ball", "shape": {"circle": {"radius": 0.25}}, "mass": 1, "position": [0, 0.45],
