@@ -42,6 +42,21 @@ double Inert(const Model<double>& model, const Lengths& lengths, const ActiveCon
   return inert;
 }
 
+// The largest of the loads and normal forces at the start of a motion, N.
+double LargestForce(const Segment& motion) {
+  const SolvedNode& start = motion.stages[0];
+  double scale = 0.0;
+  for (const double load : start.problem.load) {
+    scale = std::max(scale, std::abs(load));
+  }
+  for (size_t k = 0; k < start.solution.normal_impulse.size(); ++k) {
+    if (!motion.contacts[k].IsJointFriction()) {
+      scale = std::max(scale, std::abs(start.solution.normal_impulse[k]));
+    }
+  }
+  return scale;
+}
+
 }  // namespace
 
 EventSearch::EventSearch(const Model<double>& model) : lengths_(model), flow_(model) {
@@ -299,9 +314,7 @@ void EventSearch::SearchClosed(const Model<double>& model, Event* event) {
       for (const double share : {0.5, 1.0}) {
         const double b = share * event->length;
         const double fb = ModeValue(model, At(model, b), trial);
-        if (std::isnan(fb)) {
-          return;
-        }
+        if (std::isnan(fb)) return;
         if (fb < -tolerance) {
           ends_between(a, fa, b, fb);
           return;
@@ -331,19 +344,9 @@ void EventSearch::SearchClosed(const Model<double>& model, Event* event) {
           SlidingSign(mode) * SpeedsOf(model, segment_->before, segment_->contacts[i]).slip, slow_);
     }
     const Sample& end = *At(model, event->length);
-    if (!end.good) {
-      return;
-    }
+    if (!end.good) return;
     const ContactSolution<double>& start = end.motion.stages[0].solution;
-    double scale = 0.0;
-    for (const double load : end.motion.stages[0].problem.load) {
-      scale = std::max(scale, std::abs(load));
-    }
-    for (size_t k = 0; k < start.normal_impulse.size(); ++k) {
-      if (!segment_->contacts[k].IsJointFriction()) {
-        scale = std::max(scale, std::abs(start.normal_impulse[k]));
-      }
-    }
+    const double scale = LargestForce(end.motion);
     located = kLocatedOfSize * scale;
     const double tolerance =
         std::max(kForceTolerance * scale, Inert(model, lengths_, segment_->contacts[i]) * slow_ /
@@ -475,16 +478,12 @@ bool EventSearch::Run(const Model<double>& model, const std::vector<ActiveContac
     }
   }
   for (size_t j = 0; j < model.structure->joints.size(); ++j) {
-    if (model.structure->joints[j].low >= 0 && event.kind != EventKind::kAtOnce) {
-      SearchLimit(model, static_cast<int>(j), 1.0, &event);
-      if (event.kind != EventKind::kAtOnce) {
-        SearchLimit(model, static_cast<int>(j), -1.0, &event);
-      }
+    if (model.structure->joints[j].low < 0) continue;
+    for (const double side : {1.0, -1.0}) {
+      if (event.kind != EventKind::kAtOnce) SearchLimit(model, static_cast<int>(j), side, &event);
     }
   }
-  if (event.kind != EventKind::kAtOnce) {
-    SearchClosed(model, &event);
-  }
+  if (event.kind != EventKind::kAtOnce) SearchClosed(model, &event);
   ends_at_start_ = event.at_start;
   segment->length = event.length;
   segment->event = event.kind;
