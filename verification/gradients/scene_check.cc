@@ -216,7 +216,9 @@ class Judge {
                               ? run_.differences[p].errors[o]
                               : kUnknown;
     double estimate = kMethodPairs[pair].a == kByRidders ? entry.ridders_error : 0.0;
-    if (IsKnownMethod(kMethodPairs[pair].a)) estimate = kCoincidenceRounding * ScaleOfColumn(p);
+    if (IsKnownMethod(kMethodPairs[pair].a) && run_.jacobian[kByClosedPlus].size() > 0) {
+      estimate = kCoincidenceRounding * ScaleOfColumn(p);
+    }
     if (kMethodPairs[pair].a == kByUnrolledJets) {
       entry.contributions = ScaleOfColumn(p);
       const double error = InteriorPointError();

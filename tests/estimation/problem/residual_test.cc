@@ -358,8 +358,10 @@ TEST(ResidualTest, AnObservationOnAnImpactIsNamed) {
     observation.coordinate = coordinate;
     observation.value = 0.3;
     observation.sigma = 0.01;
+    Observation last = observation;  // without it the run would end at the impact
+    last.time = 0.4;
     RolloutResiduals residuals =
-        MakeResiduals(scene, {}, {Parameter("bodies/ball/position/y", 0.45)}, {observation});
+        MakeResiduals(scene, {}, {Parameter("bodies/ball/position/y", 0.45)}, {observation, last});
     return residuals.Certify(residuals.scene().Initial())->verdict;
   };
   EXPECT_EQ(verdict(0.2, Coordinate::kY),
