@@ -252,12 +252,18 @@ void EventSearch::TryStart(const Model<double>& model, double tolerance, Event t
 // The rate of a sliding speed in its friction's direction where bodies have given accelerations,
 // without what turning directions add.
 double EventSearch::SlipRate(const Model<double>& model, const State<double>& state,
-                             const std::vector<double>& accelerations, const Event& event) {
-  rates_ = state;
-  std::fill(rates_.twist.begin(), rates_.twist.end(), 0.0);
-  SpreadTwists(*model.structure, accelerations, &rates_.twist);
-  return SlidingSign(segment_->modes[event.index]) *
-         SpeedsOf(model, rates_, segment_->contacts[event.index]).slip;
+                             const std::vector<double>& accelerations, const Event& event) const {
+  const ActiveContact& contact = segment_->contacts[event.index];
+  ContactRows<double> rows;
+  EvaluateActiveRows(model, state, contact, &rows);
+  double rate = 0.0;
+  const auto add = [&](int body, const RowPart<double>& row) {
+    const int block = model.structure->bodies[body].block;
+    for (int i = 0; block >= 0 && i < 3; ++i) rate += row[i] * accelerations[3 * block + i];
+  };
+  add(contact.a, rows.tangent_a);
+  add(contact.b, rows.tangent_b);
+  return SlidingSign(segment_->modes[event.index]) * rate;
 }
 
 // Where a sliding speed that is positive at a and b falls below 0 between them, or may do so, by

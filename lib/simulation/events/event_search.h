@@ -124,7 +124,7 @@ class EventSearch {
                  double* root);
   void SearchClosed(const Model<double>& model, Event* event);
   double SlipRate(const Model<double>& model, const State<double>& state,
-                  const std::vector<double>& accelerations, const Event& event);
+                  const std::vector<double>& accelerations, const Event& event) const;
   double FindDip(const Model<double>& model, const Event& event, double a, double fa, double b,
                  double fb);
   bool IsDetermined(const Event& event, SolvedNode* node) const;
@@ -151,7 +151,6 @@ class EventSearch {
   std::vector<double> closing_;  ///< bound on the speed of each body's points over the segment
   std::vector<HandOver> hand_overs_;
   std::vector<Sample> samples_;
-  State<double> rates_;  ///< scratch: poses with accelerations in the place of twists
   int num_samples_ = 0;
   long evaluations_ = 0;  ///< of the motion, in this step
   int num_pairs_with_events_ = 1;

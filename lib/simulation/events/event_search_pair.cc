@@ -79,6 +79,7 @@ class EventSearch::PairSearch {
 
   /// The pair's contact that is handed over where the event is, if there is one.
   void AddHandOver(std::vector<HandOver>* found) {
+    if (!closed_) return;
     const Sample& sample = *search_.At(model_, event_.length);
     if (const ActiveContact* lost = LostAt(sample.motion.after)) {
       found->push_back({*lost, NextOf(sample)});

@@ -120,8 +120,8 @@ class EventStepper {
                                     const ActiveContact& contact);
   bool TakeEvent(const Model<double>& model, double now, double h, const Segment& segment,
                  State<double>* state, StepReport* outcome);
-  /// Where a segment ends because a contact stops sliding, other contacts that stop at the same
-  /// instant and whose bodies are not coupled to it get separate events.
+  /// Contacts that stop sliding at the instant of the event that ends a segment, and whose bodies
+  /// are not coupled to those of the event, get separate events.
   bool EndOtherSlips(const Model<double>& model, double t, const Segment& segment,
                      State<double>* state, StepReport* outcome);
   /// The same of contacts that are handed over to another feature at the instant of an event.

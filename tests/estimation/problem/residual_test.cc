@@ -359,7 +359,7 @@ TEST(ResidualTest, AnObservationOnAnImpactIsNamed) {
     observation.value = 0.3;
     observation.sigma = 0.01;
     Observation last = observation;  // without it the run would end at the impact
-    last.time = 0.4;
+    last.time = 0.35;
     RolloutResiduals residuals =
         MakeResiduals(scene, {}, {Parameter("bodies/ball/position/y", 0.45)}, {observation, last});
     return residuals.Certify(residuals.scene().Initial())->verdict;
