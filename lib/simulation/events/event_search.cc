@@ -333,9 +333,7 @@ void EventSearch::SearchClosed(const Model<double>& model, Event* event) {
         }
         // At the end of the motion the function has reached 0 to rounding: the event is there. The
         // next motion could not find it, because its function would start at 0.
-        // Of two such events the end of a slip counts, where accelerations jump.
-        if (share == 1.0 && fb <= tolerance && event->kind != trial.kind &&
-            event->kind != EventKind::kSlipEnds) {
+        if (share == 1.0 && fb <= tolerance && event->kind != trial.kind) {
           trial.length = b;
           *event = trial;
           return;
