@@ -18,11 +18,14 @@ namespace {
 // A fit file of one run or several recordings, read. Calls change its memory, and take turns.
 class FitProblemOf {
  public:
-  FitProblemOf(const std::string& text, const std::string& file) {
+  FitProblemOf(const std::string& text, const std::string& file) : text_(text), file_(file) {
     std::string error;
     if (ParseFit(text, file, &fit_, &error)) problem_ = MakeProblem(fit_, &error);
     if (problem_ == nullptr) throw Error(error);
   }
+
+  const std::string& text() const { return text_; }
+  const std::string& file() const { return file_; }
 
   std::vector<std::string> names() {
     std::vector<std::string> names;
@@ -109,6 +112,7 @@ class FitProblemOf {
     return "";
   }
 
+  std::string text_, file_;
   FitFile fit_;
   std::unique_ptr<RecordingsProblem> problem_;
   Turns turns_;
@@ -119,6 +123,12 @@ class FitProblemOf {
 void BindFit(py::module_* module) {
   py::class_<FitProblemOf>(*module, "Fit")
       .def(py::init<const std::string&, const std::string&>())
+      .def(
+          py::pickle([](const FitProblemOf& fit) { return py::make_tuple(fit.text(), fit.file()); },
+                     [](const py::tuple& state) {
+                       return std::make_unique<FitProblemOf>(state[0].cast<std::string>(),
+                                                             state[1].cast<std::string>());
+                     }))
       .def_property_readonly("names", &FitProblemOf::names)
       .def("ranges", &FitProblemOf::Ranges)
       .def("evaluate", &FitProblemOf::Evaluate)

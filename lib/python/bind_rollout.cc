@@ -270,6 +270,17 @@ void BindRollout(py::module_* module) {
                              [paths](const Rollout& r) { return paths(r.function().controls()); })
       .def_property_readonly("records", [](const Rollout& r) { return r.function().records(); })
       .def_property_readonly("times", [](const Rollout& r) { return r.function().record_times(); })
+      .def(py::pickle(
+          [paths](const Rollout& r) {
+            const RolloutFunction& f = r.function();
+            return py::make_tuple(py::cast(f.scene()), paths(f.parameters()), paths(f.controls()),
+                                  f.records());
+          },
+          [](const py::tuple& state) {
+            return std::make_shared<Rollout>(
+                state[0].cast<const Scene&>(), state[1].cast<std::vector<std::string>>(),
+                state[2].cast<std::vector<std::string>>(), state[3].cast<std::vector<long>>());
+          }))
       .def("defaults",
            [](const Rollout& r) {
              const Inputs in = r.Write({r.function().Defaults()});

@@ -219,6 +219,14 @@ void BindScene(py::module_* module) {
       .def_static("parse", &Parse)
       .def_static("load", &Load)
       .def("to_json", &SceneToJson)
+      .def("to_whole_json", &SceneWithSignalsToJson)
+      .def(py::pickle(
+          [](const Scene& scene) {
+            return py::make_tuple(SceneWithSignalsToJson(scene), scene.path);
+          },
+          [](const py::tuple& state) {
+            return Parse(state[0].cast<std::string>(), state[1].cast<std::string>(), "");
+          }))
       .def("with_parameters", &WithParameters)
       .def_property_readonly("body_names",
                              [](const Scene& scene) {

@@ -144,6 +144,7 @@ class SceneReader {
   void ReadPatterns(const JsonReader& reader, std::string* first, std::string* second);
   void ReadSimulation(const JsonReader& reader);
   Signal ReadSignalOf(const JsonReader& reader, SignalColumns columns);
+  Signal ReadSeriesOf(const JsonReader& reader, SignalColumns columns);
   SignalReader Signals() {
     return [this](const JsonReader& reader, SignalColumns columns) {
       return ReadSignalOf(reader, columns);
@@ -227,6 +228,7 @@ void SceneReader::ReadForce(const JsonReader& item) {
 }
 
 Signal SceneReader::ReadSignalOf(const JsonReader& reader, SignalColumns columns) {
+  if (reader.Has("time")) return ReadSeriesOf(reader, columns);
   Signal signal;
   reader.ExpectKeys({"file", "interpolation"});
   signal.file = reader.At("file").String();
@@ -236,6 +238,44 @@ Signal SceneReader::ReadSignalOf(const JsonReader& reader, SignalColumns columns
   if (!ReadSignal(JoinPath(folder_, signal.file), columns, &signal, &error)) {
     reader.At("file").Fail(error);
   }
+  return signal;
+}
+
+// A signal whose series stands in the scene itself, with the keys of a file's columns.
+Signal SceneReader::ReadSeriesOf(const JsonReader& reader, SignalColumns columns) {
+  Signal signal;
+  const bool force = columns == SignalColumns::kForce;
+  std::vector<std::string> keys = {"time", "interpolation"};
+  if (force) {
+    keys.insert(keys.begin() + 1, {"x", "y"});
+  } else {
+    keys.insert(keys.begin() + 1, "value");
+  }
+  reader.ExpectKeys(keys);
+  FieldReader(reader).Choice("interpolation", kInterpolationNames, signal.interpolation);
+  const JsonReader times = reader.At("time");
+  const auto read = [&](const JsonReader& column) {
+    const VectorX<double> values = column.Vector();
+    if (column.ok() && column.Size() != times.Size()) {
+      column.FailExpected(std::to_string(times.Size()) + " numbers, one for each time");
+    }
+    return std::vector<double>(values.begin(), values.end());
+  };
+  signal.time = read(times);
+  if (signal.time.empty()) times.FailExpected("an array of at least one time");
+  for (std::size_t i = 1; i < signal.time.size(); ++i) {
+    if (signal.time[i] > signal.time[i - 1]) continue;
+    times.At(static_cast<int>(i))
+        .FailExpected("a number > " + Json(signal.time[i - 1]).dump() + " (the time before)");
+  }
+  if (!force) {
+    signal.value = read(reader.At("value"));
+    return signal;
+  }
+  if (!reader.Has("x") && !reader.Has("y")) reader.Fail("missing x or y beside time");
+  const std::vector<double> zeros(signal.time.size(), 0.0);
+  signal.x = reader.Has("x") ? read(reader.At("x")) : zeros;
+  signal.y = reader.Has("y") ? read(reader.At("y")) : zeros;
   return signal;
 }
 

@@ -27,7 +27,9 @@ bool ParseScene(const std::string& text, const std::string& name_for_messages,
 
 /// The scene as text that ParseScene reads back bit for bit (every key but those that are absent,
 /// so also an integrator and a correction of joints that follow the stepping); signals as the name
-/// of their file.
+/// of their file, or as their series where that stands in the scene.
 std::string SceneToJson(const Scene& scene);
+/// The same with the series of all signals: it can be read in any folder.
+std::string SceneWithSignalsToJson(Scene scene);
 
 }  // namespace tangible

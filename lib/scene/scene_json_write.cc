@@ -19,8 +19,17 @@ OrderedJson PointJson(const Vector2<double>& point) {
 }
 
 OrderedJson SignalJson(const Signal& signal) {
-  return {{"file", signal.file},
-          {"interpolation", NameOf(signal.interpolation, kInterpolationNames)}};
+  OrderedJson json = OrderedJson::object();
+  if (!signal.file.empty()) {
+    json["file"] = signal.file;
+  } else {
+    json["time"] = signal.time;
+    if (!signal.x.empty()) json["x"] = signal.x;
+    if (!signal.y.empty()) json["y"] = signal.y;
+    if (!signal.value.empty()) json["value"] = signal.value;
+  }
+  json["interpolation"] = NameOf(signal.interpolation, kInterpolationNames);
+  return json;
 }
 
 // Writes the fields of an item. A number that is no parameter and outside its range is that of an
@@ -153,5 +162,16 @@ class SceneWriter {
 }  // namespace
 
 std::string SceneToJson(const Scene& scene) { return JsonText(SceneWriter(scene).Write()); }
+
+std::string SceneWithSignalsToJson(Scene scene) {
+  for (auto& joint : scene.joints) {
+    if (joint.effort_signal) joint.effort_signal->file.clear();
+  }
+  for (auto& force : scene.forces) {
+    if (force.force_signal) force.force_signal->file.clear();
+    if (force.torque_signal) force.torque_signal->file.clear();
+  }
+  return SceneToJson(scene);
+}
 
 }  // namespace tangible

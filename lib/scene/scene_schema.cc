@@ -21,6 +21,16 @@ OrderedJson SignalSchema() {
       {"file"});
 }
 
+// A signal whose series stands in the scene: `time` and these columns.
+OrderedJson SeriesSchema(const std::vector<std::string>& columns,
+                         const std::vector<std::string>& required) {
+  const OrderedJson numbers = SchemaOfArray(SchemaOfNumber(NumberKind::kFree), 1);
+  OrderedJson properties = {{"time", numbers},
+                            {"interpolation", SchemaOfWords(WordsOf(kInterpolationNames))}};
+  for (const std::string& column : columns) properties[column] = numbers;
+  return SchemaOfObject(properties, required);
+}
+
 // The visitor that describes the fields of an item.
 class FieldSchema {
  public:
@@ -58,11 +68,13 @@ class FieldSchema {
   }
   template <typename T, typename S>
   void NumberOrSignal(const Field& field, const T&, const S&) {
-    Add(field, SchemaOfAny({NumberSchema(field), SignalSchema()}));
+    Add(field, SchemaOfAny({NumberSchema(field), SignalSchema(),
+                            SeriesSchema({"value"}, {"time", "value"})}));
   }
   template <typename V, typename S>
   void PointOrSignal(const Field& field, const V&, const S&) {
-    Add(field, SchemaOfAny({PointSchema(field), SignalSchema()}));
+    Add(field,
+        SchemaOfAny({PointSchema(field), SignalSchema(), SeriesSchema({"x", "y"}, {"time"})}));
   }
   template <typename Table, typename Value>
   void Choice(const char* key, const Table& table, const Value&) {

@@ -325,6 +325,16 @@ TEST(BadSceneTest, Signals) {
       {"/forces/0/torque", R"({})", "/forces/0/torque/file: missing, expected a string"},
       {"/forces/0/torque", R"({"file": "x.csv", "scale": 1})",
        "/forces/0/torque/scale: unknown key, expected one of file, interpolation, got \"scale\""},
+      {"/forces/0/torque", R"({"time": [0, 1], "value": [1]})",
+       "/forces/0/torque/value: expected 2 numbers, one for each time, got an array of 1"},
+      {"/forces/0/torque", R"({"time": [0, 0], "value": [1, 1]})",
+       "/forces/0/torque/time/1: expected a number > 0.0 (the time before), got 0"},
+      {"/forces/0/force", R"({"time": []})",
+       "/forces/0/force/time: expected an array of at least one time, got an array of 0"},
+      {"/forces/0/force", R"({"time": [0]})", "/forces/0/force: missing x or y beside time"},
+      {"/forces/0/force", R"({"time": [0], "value": [1]})",
+       "/forces/0/force/value: unknown key, expected one of time, x, y, interpolation, got "
+       "\"value\""},
   });
 }
 

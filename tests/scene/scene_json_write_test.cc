@@ -139,6 +139,13 @@ TEST(SceneToJsonTest, SignalsAreWrittenAsTheirFile) {
   EXPECT_EQ(back.forces[0].force_signal->x, std::vector<double>{1.0});
   ASSERT_TRUE(back.forces[0].torque_signal.has_value());
   EXPECT_EQ(back.forces[0].torque_signal->value, std::vector<double>{2.0});
+  const std::string whole = SceneWithSignalsToJson(back);
+  EXPECT_EQ(whole.find("tangible_signal.csv"), std::string::npos);
+  const Scene moved = Parsed(whole);
+  EXPECT_EQ(moved.forces[0].force_signal->x, std::vector<double>{1.0});
+  EXPECT_EQ(moved.forces[0].force_signal->interpolation, Signal::Interpolation::kLinear);
+  EXPECT_EQ(moved.forces[0].torque_signal->value, std::vector<double>{2.0});
+  EXPECT_EQ(SceneToJson(moved), whole);
 }
 
 }  // namespace

@@ -14,6 +14,13 @@ from . import _core
 SceneLike = Union["Scene", Mapping[str, Any], str, "os.PathLike[str]"]
 
 
+def _names_file(data: Any) -> bool:
+    """Whether a scene's JSON names a file of a signal anywhere."""
+    if isinstance(data, Mapping):
+        return "file" in data or any(_names_file(value) for value in data.values())
+    return isinstance(data, list) and any(_names_file(value) for value in data)
+
+
 class Scene:
     """A scene: bodies, joints, springs, forces, and how they are simulated.
 
@@ -72,6 +79,19 @@ class Scene:
         same._data = copy.deepcopy(self._data)
         same._read = self._read  # which never changes
         return same
+
+    __copy__ = _copy
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Scene:
+        return self._copy()
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What pickle keeps: the series of signals too, as their files may not be there later."""
+        state = dict(self.__dict__)
+        if _names_file(self._data):
+            state["_read"] = self.core
+            state["_data"] = {}
+        return state
 
     def _add(self, kind: str, name: str | None, keys: dict[str, Any]) -> None:
         data = self.to_dict()

@@ -171,6 +171,13 @@ class RolloutLayer(torch.nn.Module):
         share = torch.where(self._bounded, (start - low) / (high - low), torch.full_like(start, 0.5))
         self.q = torch.nn.Parameter(torch.where(self._bounded, torch.logit(share), 0.0 * start))
 
+    def extra_repr(self) -> str:
+        """What `print` shows of the layer."""
+        values = self.values().tolist()
+        return ", ".join(
+            f"{path}={value:.6g}" for path, value in zip(self.function.parameters, values)
+        )
+
     def values(self) -> torch.Tensor:
         """The parameters p, shape (P,), in SI units."""
         positive = self.start * torch.exp(torch.where(self._positive, self.q, 0.0 * self.q))
