@@ -20,6 +20,7 @@ from ._fit import FitResult, Residuals, fit
 from ._rollout import Jacobian, Rollout, Smoothing
 from ._scene import Scene
 from ._trajectory import Contacts, Events, Trajectory, simulate
+from ._warning import TangibleWarning
 
 __all__ = [
     "Certificate",
@@ -32,6 +33,7 @@ __all__ = [
     "Scene",
     "Smoothing",
     "TangibleError",
+    "TangibleWarning",
     "Trajectory",
     "__version__",
     "fit",

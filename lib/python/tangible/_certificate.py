@@ -3,9 +3,27 @@
 from __future__ import annotations
 
 import json
+import re
 from typing import Any
 
 OF_THE_DISCRETE_MAP = "of the discrete map: "
+# How the engine names a place, one text for all: certify_place_inl.h.
+_PLACE = re.compile(r"step (?P<step>\d+)(?:, t = (?P<time>[-+.0-9e]+) s)?")
+_BODIES = re.compile(r"contact of (?P<first>[\w.-]+) and (?P<second>[\w.-]+)")
+_JOINT = re.compile(r"joint (?P<name>[\w.-]+)")
+_KINDS = (
+    ("discontinuous: ", "discontinuous"),
+    ("near a kink: ", "near_kink"),
+    ("one-sided: ", "one_sided"),
+)
+_ADVICE = {
+    "discontinuous": "the motion jumps here, so no derivative describes it: move the input, or the "
+    "end of the run, away from the place, or compare runs on both sides",
+    "near_kink": "derivatives on both sides differ: move the input away from the place, or take "
+    "vjp(kinks=\"smoothed\"), the mean of the derivatives around",
+    "one_sided": "the derivative holds for a change to one side alone: compare a difference to "
+    "that side, or start from a value inside the range",
+}
 
 
 class Certificate(dict[str, Any]):
@@ -13,7 +31,7 @@ class Certificate(dict[str, Any]):
 
     In an `if` it is true where the derivatives are those of the motion and can be trusted, so not
     where it has `discrete_map`: by fixed steps the derivatives after an impact, or a contact that is
-    made or broken, are those of the map which the steps compute.
+    made or broken, are those of the map which the steps compute. `print` shows it in words.
     """
 
     @classmethod
@@ -43,9 +61,86 @@ class Certificate(dict[str, Any]):
         return verdict[len(OF_THE_DISCRETE_MAP) :] if self.discrete_map else verdict
 
     @property
+    def kind(self) -> str:
+        """The worst that applies: "discontinuous", "near_kink", "one_sided", "discrete_map", or
+        "trustworthy"."""
+        verdict = self.verdict_of_map
+        for start, kind in _KINDS:
+            if verdict.startswith(start):
+                return kind
+        return "discrete_map" if self.discrete_map else "trustworthy"
+
+    @property
+    def _reason(self) -> str:
+        """The text of the worst that applies, which names its place."""
+        if self.kind == "discrete_map":
+            return str(self["advice"])
+        reason = self.verdict_of_map
+        for start, _ in _KINDS[1:]:
+            reason = reason.split(f"; {start}")[0]
+        return "" if self.trustworthy else reason
+
+    @property
+    def step(self) -> int | None:
+        """The step, from 0, of what `kind` names; None where it has none."""
+        found = _PLACE.search(self._reason)
+        return None if found is None else int(found["step"])
+
+    @property
+    def time(self) -> float | None:
+        """Its time, s, with the six digits of the verdict; None where it has none."""
+        found = _PLACE.search(self._reason)
+        return None if found is None or found["time"] is None else float(found["time"])
+
+    @property
+    def bodies(self) -> tuple[str, ...]:
+        """The two bodies of the contact that `kind` is about; empty where it is none of a contact."""
+        found = _BODIES.search(self._reason)
+        return () if found is None else (found["first"], found["second"])
+
+    @property
+    def joint(self) -> str | None:
+        """The joint whose limit or friction `kind` is about."""
+        found = _JOINT.search(self._reason)
+        return None if found is None else found["name"]
+
+    @property
     def advice(self) -> str:
-        """What gives the derivative of the motion; empty where this is it."""
-        return str(self["advice"])
+        """What to try, in a sentence; empty where the derivatives can be trusted."""
+        parts = [str(self["advice"])] if self["advice"] else []
+        kind = self.kind
+        if "coordinates are too large" in self._reason:
+            parts.append("contacts are decided by rounding: move the scene nearer to the origin")
+        elif "linear system" in self._reason:
+            parts.append("the equations of a step are nearly singular: take masses and stiffnesses "
+                         "that differ less, or leave out supports that others make redundant")
+        elif kind in _ADVICE:
+            parts.append(_ADVICE[kind])
+        return "; ".join(parts)
+
+    @property
+    def words(self) -> str:
+        """The verdict in plain words."""
+        if self.trustworthy:
+            return "trustworthy: the derivative of the motion, away from kinks and jumps"
+        rows = re.match(r"near a kink: kink of (\d+) rows", self.verdict_of_map)
+        if rows is None:
+            return self.verdict
+        place = self["margin_where"]
+        count = int(rows[1])
+        times = "once" if count == 1 else f"{count} times"
+        prefix = OF_THE_DISCRETE_MAP if self.discrete_map else ""
+        return (
+            f"{prefix}near a kink: during the run a contact or limit is {times} exactly where it "
+            f"changes (between resting, sliding and parting), at {place}"
+        )
 
     def __bool__(self) -> bool:
         return self.trustworthy
+
+    def __str__(self) -> str:
+        advice = self.advice
+        return f"{self.words} ({advice})" if advice else self.words
+
+    def __repr__(self) -> str:
+        return f"Certificate({self.verdict!r})"

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from . import _core
 from ._certificate import Certificate
 from ._rollout import floats
+from ._warning import warn
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -134,6 +135,14 @@ class FitResult:
         raise KeyError(f"{name}: expected one of {', '.join(self.names)}")
 
     @property
+    def warnings(self) -> list[str]:
+        """What `tangible-fit` warns of, such as intervals that mean little."""
+        lines = [str(line) for line in self.data.get("warnings") or []]
+        if self.certificate is not None and self.certificate.verdict_of_map != "trustworthy":
+            lines.append(f"not trustworthy at the estimate: {self.certificate}")
+        return lines
+
+    @property
     def covariance(self) -> Floats:
         """Shape (P, P), from the stated sigma; NaN where it is not determined."""
         rows = self.data["covariance"]
@@ -186,6 +195,9 @@ def fit(
 
     Raises:
         TangibleError: A mistake in the problem; a fit that has not converged.
+
+    Warns:
+        TangibleWarning: Of what `FitResult.warnings` lists.
     """
     if on_failure not in ("raise", "return"):
         raise ValueError(f"on_failure: expected raise or return, got {on_failure}")
@@ -195,4 +207,5 @@ def fit(
     result = FitResult(json.loads(text), page)
     if result.status != "converged" and on_failure == "raise":
         raise _core.TangibleError(f"{result.status}: {result.message}")
+    warn(result.warnings)
     return result

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from . import _core
 from ._certificate import Certificate
 from ._scene import Scene, SceneLike
+from ._warning import warn
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -72,7 +73,7 @@ class Trajectory:
         certificate: How near the run is to kinks and jumps; None unless asked for.
         margins: Of each step the smallest relative distance to a change of contact modes, infinite
             where nothing is near, shape (steps,); empty unless the certificate is asked for.
-        warnings: What the programs would warn of.
+        warnings: What the programs would warn of; `simulate` warns of it too.
     """
 
     def __init__(self, scene: Scene, raw: dict[str, Any]) -> None:
@@ -258,6 +259,9 @@ def simulate(
 
     Raises:
         TangibleError: A mistake in the scene or a value that is not allowed; a run that ended early.
+
+    Warns:
+        TangibleWarning: Of what `Trajectory.warnings` lists.
     """
     if on_failure not in ("raise", "return"):
         raise ValueError(f"on_failure: expected raise or return, got {on_failure}")
@@ -267,4 +271,5 @@ def simulate(
     trajectory = Trajectory(read, _core.simulate(read.core, every, certify, False))
     if trajectory.status != "done" and on_failure == "raise":
         raise _core.TangibleError(trajectory.message)
+    warn(trajectory.warnings)
     return trajectory

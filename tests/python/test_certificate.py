@@ -1,0 +1,99 @@
+"""Certificates say what is wrong, where, and what to try; runs and fits warn."""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import tangible
+
+from conftest import ball
+
+FRICTION = "pairs/box:floor/friction"
+
+
+def pushed_box(stepping: str = "event", force: float = 4.0) -> tangible.Scene:
+    """A box on a floor that a force pushes; it slides where the friction is below 4 / 9.81."""
+    scene = tangible.Scene(simulation={"stepping": stepping, "dt": 0.02, "duration": 1.0})
+    scene.add_body("box", shape={"box": {"size": [0.2, 0.2]}}, mass=1, position=[0, 0.1])
+    scene.add_body("floor", static=True, shape={"half_plane": {"normal": [0, 1], "offset": 0}})
+    scene.add_pair("box", "floor", friction=0.6)
+    scene.add_force("push", body="box", force=[force, 0])
+    return scene
+
+
+def test_a_kink_is_told_in_words() -> None:
+    found = tangible.Rollout(pushed_box(), [FRICTION]).certificate([4.0 / 9.81])
+    assert not found and found.kind == "near_kink" and not found.trustworthy
+    assert found["verdict"].startswith("near a kink: kink of 50 rows at step 0")
+    assert (found.step, found.time, found.bodies, found.joint) == (0, 0.0, ("box", "floor"), None)
+    assert 'kinks="smoothed"' in found.advice
+    assert "50 times" in str(found) and "rows" not in str(found) and found.advice in str(found)
+    assert "box and floor" in found.words and "friction limit" in found.words
+
+
+def test_what_can_be_trusted_names_no_place() -> None:
+    for friction in (0.3, 0.6):
+        found = tangible.Rollout(pushed_box(), [FRICTION]).certificate([friction])
+        assert found and found.kind == "trustworthy" and found.advice == ""
+        assert (found.step, found.time, found.bodies) == (None, None, ())
+        assert repr(found) == "Certificate('trustworthy')" and str(found).startswith("trustworthy: ")
+
+
+def test_the_discrete_map_is_a_kind() -> None:
+    found = tangible.Rollout(ball("fixed"), ["bodies/ball/position/y"]).certificate()
+    assert found.kind == "discrete_map" and not found
+    # It falls 1 m, which takes 0.4515 s: an impact with restitution, in step 45.
+    assert found.step in (44, 45) and found.time == pytest.approx(0.01 * found.step)
+    assert found.bodies == ("ball", "floor") and '"stepping": "event"' in found.advice
+
+
+def test_jumps_and_sides_are_kinds() -> None:
+    fallen = np.sqrt(2.0 / 9.81)
+    at_end = tangible.Rollout(ball("event", duration=fallen), ["bodies/ball/position/y"]).certificate()
+    assert at_end.kind == "discontinuous" and at_end.bodies == ("ball", "floor")
+    assert at_end.time == pytest.approx(fallen, abs=1e-5) and "jumps" in at_end.advice
+    slides = pushed_box("fixed")
+    side = tangible.Rollout(slides, [FRICTION]).certificate([0.0])
+    assert side.kind == "one_sided" and side.bodies == ("box", "floor") and "one side" in side.advice
+    worst = tangible.Certificate(
+        verdict="of the discrete map: discontinuous: step 3, t = 0.5 s: low limit of joint a; near "
+        "a kink: step 9, t = 2 s: contact of b and c", advice="x", discrete_map=True)
+    assert (worst.kind, worst.step, worst.joint, worst.bodies) == ("discontinuous", 3, "a", ())
+    assert worst.advice.startswith("x; ")
+
+
+def stretched() -> dict[str, Any]:
+    """A pendulum that steps of this length, without a correction, pull out of its joint."""
+    return {
+        "bodies": [{"name": "a", "mass": 1, "inertia": 1, "position": [1, 0]}],
+        "joints": [{"name": "pin", "type": "revolute", "bodies": ["a", "world"], "anchor": [0, 0]}],
+        "simulation": {"dt": 0.05, "duration": 20, "stepping": "fixed"},
+    }
+
+
+def test_runs_warn_where_programs_do() -> None:
+    with pytest.warns(tangible.TangibleWarning, match="joint") as caught:
+        run = tangible.simulate(stretched())
+    assert [str(w.message) for w in caught] == run.warnings
+    assert {Path(w.filename).name for w in caught} == {"test_certificate.py"}
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        tangible.simulate(ball())
+    with warnings.catch_warnings(record=True) as seen:
+        warnings.simplefilter("default")
+        for _ in range(5):
+            tangible.simulate(stretched())
+    assert len(seen) == len(run.warnings)
+
+
+def test_fits_warn_of_their_certificate() -> None:
+    result = tangible.FitResult(
+        {"status": "converged", "message": "", "parameters": [], "warnings": ["few data"],
+         "certificate": {"verdict": "near a kink: margin 1e-9 at step 3, t = 0.1 s: contact of a and b",
+                         "advice": "", "discrete_map": False, "margin_where": ""}}, "")
+    assert result.warnings[0] == "few data"
+    assert result.warnings[1].startswith("not trustworthy at the estimate: near a kink")
