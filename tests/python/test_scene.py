@@ -28,7 +28,7 @@ def test_a_dict_a_file_and_keywords_are_the_same_scene(scene: dict[str, Any], tm
 
 def test_a_mistake_is_one_line_with_its_place(scene: dict[str, Any], tmp_path: Path) -> None:
     scene["bodies"][0]["mass"] = -1
-    with pytest.raises(tangible.TangibleError, match=r"^scene: /bodies/0/mass: expected a number > 0, got -1$"):
+    with pytest.raises(tangible.TangibleError, match=r"^ball: /bodies/0/mass: expected a number > 0, got -1$"):
         tangible.simulate(scene)
     with pytest.raises(tangible.TangibleError, match="nothing.json"):
         tangible.Scene(tmp_path / "nothing.json")

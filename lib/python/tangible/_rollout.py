@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from numbers import Real
+from typing import Union
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _core
 from ._certificate import Certificate
+from ._plain import integers, paths
 from ._scene import Scene, SceneLike
 
 Floats = NDArray[np.float64]
+# Numbers as an array, or by their names: {name: value}.
+Numbers = Union[ArrayLike, Mapping[str, ArrayLike]]
 
 
 @dataclass(frozen=True)
@@ -81,10 +85,53 @@ def floats(values: ArrayLike, name: str) -> Floats:
     return np.ascontiguousarray(array, dtype=np.float64)
 
 
-def _array(values: ArrayLike, name: str, axes: int) -> Floats:
+def _by_name(
+    values: Mapping[str, ArrayLike], name: str, names: Sequence[str], base: Floats
+) -> Floats:
+    """`base`, whose last axis has these names, with other values of some of them."""
+    columns: dict[int, Floats] = {}
+    for key, value in values.items():
+        if key not in names:
+            raise ValueError(f"{name}: expected one of {', '.join(names) or 'none'}, got {key!r}")
+        columns[list(names).index(key)] = floats(value, f"{name} {key}").reshape(np.shape(value))
+    axes = base.ndim - 1
+    for k, column in columns.items():
+        if column.ndim > axes + 1:
+            raise ValueError(
+                f"{name} {names[k]}: expected at most {axes + 1} axes, got {column.ndim}"
+            )
+    # A value with one axis more is a batch.
+    sizes = {column.shape[0] for column in columns.values() if column.ndim > axes}
+    if len(sizes) > 1:
+        raise ValueError(f"{name}: expected leading axes of one length, got {sorted(sizes)}")
+    shape = (*sizes, *base.shape)
+    array = np.array(np.broadcast_to(base, shape))
+    for k, column in columns.items():
+        try:
+            array[..., k] = column
+        except ValueError:
+            raise ValueError(
+                f"{name} {names[k]}: expected shape {shape[:-1]}, got {column.shape}"
+            ) from None
+    return array
+
+
+def _array(
+    values: Numbers, name: str, names: Sequence[str], base: Floats
+) -> Floats:
+    """An array of the shape of `base`, or with one more, leading axis."""
+    if isinstance(values, Mapping):
+        return _by_name(values, name, names, base)
     array = floats(values, name)
-    if array.ndim not in (axes, axes + 1):
-        raise ValueError(f"{name}: expected {axes} axes, or one more for a batch, got {array.ndim}")
+    if array.ndim not in (base.ndim, base.ndim + 1):
+        raise ValueError(
+            f"{name}: expected {base.ndim} axes, or one more for a batch, got {array.ndim}"
+        )
+    if array.shape[array.ndim - base.ndim :] != base.shape:
+        batch = ("N",) if array.ndim > base.ndim else ()
+        expected = ", ".join(str(n) for n in (*batch, *base.shape))
+        comma = "," if len(batch) + base.ndim == 1 else ""
+        raise ValueError(f"{name}: expected shape ({expected}{comma}), got {array.shape}")
     return array
 
 
@@ -111,7 +158,7 @@ class Rollout:
         parameters: Sequence[str] = (),
         controls: Sequence[str] = (),
         *,
-        records: Sequence[int] | None = None,
+        records: Iterable[int] | None = None,
         threads: int = 0,
     ) -> None:
         read = Scene.of(scene)
@@ -119,8 +166,11 @@ class Rollout:
         self.scene = read._copy()  # of which later changes of the scene are no part
         self.threads = int(threads)
         self._single = records is None
+        steps = [] if records is None else integers(records, "records")
+        if records is not None and not steps:
+            raise ValueError("records: expected at least one step, got none; absent: the end")
         self._core = _core.Rollout(
-            core, list(parameters), list(controls), list(records or [])
+            core, paths(parameters, "parameters"), paths(controls, "controls"), steps
         )
         self._defaults = self._core.defaults()
 
@@ -166,14 +216,19 @@ class Rollout:
 
     def _inputs(
         self,
-        parameters: ArrayLike | None,
-        initial_state: ArrayLike | None,
-        controls: ArrayLike | None,
+        parameters: Numbers | None,
+        initial_state: Numbers | None,
+        controls: Numbers | None,
     ) -> tuple[Floats, Floats | None, Floats, bool]:
         """Arrays with a leading axis, and whether there was one."""
-        p = self._defaults[0][0] if parameters is None else _array(parameters, "parameters", 1)
-        x = None if initial_state is None else _array(initial_state, "initial_state", 1)
-        u = self._defaults[2][0] if controls is None else _array(controls, "controls", 2)
+        own_p, own_x, own_u = (values[0] for values in self._defaults)
+        p, x, u = own_p, None, own_u
+        if parameters is not None:
+            p = _array(parameters, "parameters", self.parameters, own_p)
+        if initial_state is not None:
+            x = _array(initial_state, "initial_state", self.outputs, own_x)
+        if controls is not None:
+            u = _array(controls, "controls", self.controls, own_u)
         batched = p.ndim == 2 or u.ndim == 3 or (x is not None and x.ndim == 2)
         sizes = {a.shape[0] for a, axes in ((p, 1), (x, 1), (u, 2)) if a is not None and a.ndim > axes}
         if len(sizes) > 1:
@@ -201,16 +256,17 @@ class Rollout:
 
     def __call__(
         self,
-        parameters: ArrayLike | None = None,
-        initial_state: ArrayLike | None = None,
-        controls: ArrayLike | None = None,
+        parameters: Numbers | None = None,
+        initial_state: Numbers | None = None,
+        controls: Numbers | None = None,
         *,
         on_failure: str = "raise",
     ) -> Floats:
         """The states, shape (S,); (R, S) with `records`; (N, ...) of a batch.
 
         Args:
-            parameters: Shape (P,), SI units; absent: the scene's.
+            parameters: Shape (P,), SI units; absent: the scene's. This and the others may be dicts,
+                {path or name of an output: value}, of which what is left out is the scene's.
             initial_state: Shape (S,); absent: the scene's, as its parameters make it.
             controls: Shape (steps, C), N or N m; absent: the scene's values in all steps.
             on_failure: "raise", or "nan" in states that were not reached.
@@ -225,8 +281,8 @@ class Rollout:
 
     def jvp(
         self,
-        primals: tuple[ArrayLike | None, ArrayLike | None, ArrayLike | None],
-        tangents: tuple[ArrayLike | None, ArrayLike | None, ArrayLike | None],
+        primals: tuple[Numbers | None, Numbers | None, Numbers | None],
+        tangents: tuple[Numbers | None, Numbers | None, Numbers | None],
         *,
         on_failure: str = "raise",
     ) -> tuple[Floats, Floats]:
@@ -237,19 +293,18 @@ class Rollout:
         p, x, u, batched = self._inputs(*primals)
         rows = p.shape[0]
 
-        def direction(value: ArrayLike | None, shape: tuple[int, ...], name: str) -> Floats:
-            if value is None:
-                return np.zeros((rows, *shape))
-            array = _array(value, name, len(shape))
-            return np.ascontiguousarray(np.broadcast_to(array, (rows, *shape)))
+        def direction(k: int, name: str, names: Sequence[str]) -> Floats:
+            value, zeros = tangents[k], np.zeros(self._defaults[k].shape[1:])
+            array = zeros if value is None else _array(value, f"tangent of {name}", names, zeros)
+            return np.ascontiguousarray(np.broadcast_to(array, (rows, *zeros.shape)))
 
         states, statuses, messages, along = self._core.tangent(
             p,
             x,
             u,
-            direction(tangents[0], p.shape[1:], "tangent of parameters"),
-            direction(tangents[1], (self._core.num_states,), "tangent of initial_state"),
-            direction(tangents[2], u.shape[1:], "tangent of controls"),
+            direction(0, "parameters", self.parameters),
+            direction(1, "initial_state", self.outputs),
+            direction(2, "controls", self.controls),
             self.threads,
         )
         self._check(statuses, messages, batched, on_failure)
@@ -257,9 +312,9 @@ class Rollout:
 
     def vjp(
         self,
-        parameters: ArrayLike | None = None,
-        initial_state: ArrayLike | None = None,
-        controls: ArrayLike | None = None,
+        parameters: Numbers | None = None,
+        initial_state: Numbers | None = None,
+        controls: Numbers | None = None,
         *,
         on_failure: str = "raise",
         kinks: str = "element",
@@ -364,9 +419,9 @@ class Rollout:
 
     def jacobian(
         self,
-        parameters: ArrayLike | None = None,
-        initial_state: ArrayLike | None = None,
-        controls: ArrayLike | None = None,
+        parameters: Numbers | None = None,
+        initial_state: Numbers | None = None,
+        controls: Numbers | None = None,
         *,
         method: str = "auto",
     ) -> Jacobian:
@@ -395,9 +450,9 @@ class Rollout:
 
     def certificate(
         self,
-        parameters: ArrayLike | None = None,
-        initial_state: ArrayLike | None = None,
-        controls: ArrayLike | None = None,
+        parameters: Numbers | None = None,
+        initial_state: Numbers | None = None,
+        controls: Numbers | None = None,
     ) -> Certificate:
         """How far the derivatives at these inputs can be trusted.
 
@@ -412,9 +467,9 @@ class Rollout:
 
     def certificates(
         self,
-        parameters: ArrayLike | None = None,
-        initial_state: ArrayLike | None = None,
-        controls: ArrayLike | None = None,
+        parameters: Numbers | None = None,
+        initial_state: Numbers | None = None,
+        controls: Numbers | None = None,
     ) -> list[Certificate]:
         """The certificate of each row of a batch."""
         p, x, u, _ = self._inputs(parameters, initial_state, controls)

@@ -7,11 +7,18 @@ import json
 import os
 from collections.abc import Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, Union
 
 from . import _core
+from ._plain import plain
 
 SceneLike = Union["Scene", Mapping[str, Any], str, "os.PathLike[str]"]
+
+
+def _name_in(data: Mapping[str, Any]) -> str:
+    name = data.get("name")
+    return name if isinstance(name, str) and name else "scene"
 
 
 def _names_file(data: Any) -> bool:
@@ -28,8 +35,10 @@ class Scene:
     `TangibleError` with one line that says where it is, what was expected and what was found.
 
     Args:
-        scene: A file, or the JSON of one as a dict; absent: a scene without bodies.
-        folder: Where files that a dict names (signals) are looked for.
+        scene: A file, the JSON of one as a dict, or another `Scene`, which is copied; absent: a
+            scene without bodies. Numbers may be numpy's, and lists arrays.
+        folder: Where files that a dict names (signals) are looked for; of a file or a `Scene` it is
+            theirs.
         **keys: Top-level keys that replace those of `scene`: `name`, `gravity`, ...; of `simulation`
             those alone that are given, so that a file keeps its `stepping` and `dt` where a
             `duration` is given.
@@ -37,34 +46,40 @@ class Scene:
 
     def __init__(
         self,
-        scene: Mapping[str, Any] | str | os.PathLike[str] | None = None,
+        scene: Scene | Mapping[str, Any] | str | os.PathLike[str] | None = None,
         *,
         folder: str | os.PathLike[str] = ".",
         **keys: Any,
     ) -> None:
-        self._name = "scene"
+        self._file = ""  # where it was read, which errors name
         self._folder = os.fspath(folder)
         self._read: _core.Scene | None = None
-        if scene is None:
-            self._data: dict[str, Any] = {"bodies": []}
+        self._data: dict[str, Any] = {"bodies": []}
+        if isinstance(scene, Scene):
+            self._file, self._folder, self._read = scene._file, scene._folder, scene._read
+            self._data = scene.to_dict() if keys else copy.deepcopy(scene._data)
         elif isinstance(scene, Mapping):
-            self._data = copy.deepcopy(dict(scene))
-        else:
-            self._name = os.fspath(scene)
-            self._folder = str(Path(self._name).parent)
-            self._read = _core.Scene.load(self._name)
+            self._data = plain(scene, _name_in(scene))
+        elif scene is not None:
+            self._file = os.fspath(scene)
+            self._folder = str(Path(self._file).parent)
+            self._read = _core.Scene.load(self._file)
+            self._data = {}
             if keys:
-                self._data = json.loads(Path(self._name).read_text(encoding="utf-8-sig"))
-            else:
-                self._data = {}
+                self._data = json.loads(Path(self._file).read_text(encoding="utf-8-sig"))
         if keys:
-            for key, value in copy.deepcopy(keys).items():
+            for key, value in plain(keys, _name_in(keys)).items():
                 before = self._data.get(key)
                 if isinstance(before, Mapping) and isinstance(value, Mapping):
                     self._data[key] = {**before, **value}
                 else:
                     self._data[key] = value
             self._read = None
+
+    @property
+    def name(self) -> str:
+        """Its file, or else its own name, or else "scene": what errors begin with."""
+        return self._file or _name_in(self._data)
 
     @staticmethod
     def of(scene: SceneLike) -> Scene:
@@ -74,7 +89,7 @@ class Scene:
     def _copy(self) -> Scene:
         """The scene as it is now, whatever is added to this one later."""
         same = Scene.__new__(Scene)
-        same._name = self._name
+        same._file = self._file
         same._folder = self._folder
         same._data = copy.deepcopy(self._data)
         same._read = self._read  # which never changes
@@ -94,10 +109,11 @@ class Scene:
         return state
 
     def _add(self, kind: str, name: str | None, keys: dict[str, Any]) -> None:
-        data = self.to_dict()
-        entry = {"name": name, **keys} if name is not None else dict(keys)
-        data.setdefault(kind, []).append(copy.deepcopy(entry))
-        self._data = data
+        if not self._data:
+            self._data = self.to_dict()
+        entries = self._data.setdefault(kind, [])
+        entry = {"name": name, **keys} if name is not None else keys
+        entries.append(plain(entry, self.name, f"/{kind}/{len(entries)}"))
         self._read = None
 
     def add_body(self, name: str, **keys: Any) -> None:
@@ -125,7 +141,7 @@ class Scene:
         """What the engine has read; raises `TangibleError` where it cannot."""
         if self._read is None:
             text = json.dumps(self._data)
-            self._read = _core.Scene.parse(text, self._name, self._folder)
+            self._read = _core.Scene.parse(text, self.name, self._folder)
         return self._read
 
     def to_dict(self) -> dict[str, Any]:
@@ -140,18 +156,46 @@ class Scene:
         return self.core.to_json()
 
     def save(self, file: str | os.PathLike[str]) -> None:
-        """Writes a scene file."""
-        Path(file).write_text(self.to_json() + "\n", encoding="utf-8")
+        """Writes a scene file, with the series of its signals: it can be read in any folder."""
+        Path(file).write_text(self.core.to_whole_json() + "\n", encoding="utf-8")
 
     def with_parameters(self, parameters: Mapping[str, float]) -> Scene:
         """The scene with other values of parameters: {path: value in SI units}."""
         changed = Scene.__new__(Scene)
-        changed._name = self._name
+        changed._file = self._file
         changed._folder = self._folder
         changed._data = {}
-        values = [float(value) for value in parameters.values()]
-        changed._read = self.core.with_parameters(list(parameters), values)
+        values = [plain(value, self.name, f" {path}") for path, value in parameters.items()]
+        for path, value in zip(parameters, values):
+            if isinstance(value, bool) or not isinstance(value, (int, float)):
+                raise TypeError(f"{path}: expected a number, got {value!r}")
+        changed._read = self.core.with_parameters(list(parameters), [float(v) for v in values])
         return changed
+
+    def _items(self, kind: str) -> Mapping[str, Mapping[str, Any]]:
+        read = json.loads(self.core.to_json()).get(kind, [])
+        return MappingProxyType({item["name"]: MappingProxyType(item) for item in read})
+
+    @property
+    def bodies(self) -> Mapping[str, Mapping[str, Any]]:
+        """The bodies to look at, {name: {key: value}}, with all defaults; to change one, change a
+        parameter, or the dict of `to_dict`."""
+        return self._items("bodies")
+
+    @property
+    def joints(self) -> Mapping[str, Mapping[str, Any]]:
+        """The joints to look at, as `bodies`."""
+        return self._items("joints")
+
+    @property
+    def springs(self) -> Mapping[str, Mapping[str, Any]]:
+        """The springs to look at, as `bodies`."""
+        return self._items("springs")
+
+    @property
+    def forces(self) -> Mapping[str, Mapping[str, Any]]:
+        """The forces to look at, as `bodies`."""
+        return self._items("forces")
 
     def parameters(self) -> dict[str, float]:
         """Every parameter that a path can name, with its value (SI)."""
@@ -166,4 +210,11 @@ class Scene:
         return self.core.value(path)
 
     def __repr__(self) -> str:
-        return f"Scene({self._name!r}, bodies={self.core.body_names})"
+        if not self._data:
+            return f"Scene({self.name!r}, bodies={self.core.body_names})"
+        bodies = self._data.get("bodies")  # which may be anything until it is read
+        names = [
+            str(body.get("name", "?")) if isinstance(body, Mapping) else "?"
+            for body in (bodies if isinstance(bodies, list) else [])
+        ]
+        return f"Scene({self.name!r}, bodies={names})"

@@ -7,7 +7,7 @@ is never left out. torch is imported with this module, not with `tangible`.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -140,7 +140,7 @@ class RolloutLayer(torch.nn.Module):
         parameters: Sequence[str],
         controls: Sequence[str] = (),
         *,
-        records: Sequence[int] | None = None,
+        records: Iterable[int] | None = None,
         positive: Sequence[str] | None = None,
         bounds: Mapping[str, tuple[float, float]] | None = None,
         kinks: str = "element",
