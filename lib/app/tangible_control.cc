@@ -19,6 +19,7 @@
 #include "tangible/app/trajectory_csv.h"
 #include "tangible/app/view_recorder.h"
 #include "tangible/control/model_predictive.h"
+#include "tangible/control/replay.h"
 #include "tangible/math/median.h"
 #include "tangible/render/html.h"
 #include "tangible/render/plot.h"
@@ -55,6 +56,22 @@ std::vector<double> ToVector(const VectorX<double>& values) {
 struct Played {
   RowMatrixXd states, controls;
   double cost = 0.0;
+};
+
+// A plan's status and message: the optimiser's own, or why the plan does not hold.
+struct Verdict {
+  std::string status, message;
+  bool holds = true;
+};
+
+// A plan, and what became of it in the motion.
+struct Judged {
+  IlqrResult result;
+  double seconds = 0.0;  // CPU
+  Replay replay;
+  double cost_of_nothing = 0.0;
+  Verdict verdict;
+  Certificate certificate;
 };
 
 // Adds the largest entries of the columns of B, a control each.
@@ -155,9 +172,9 @@ std::string CostPlot(const std::vector<IlqrIteration>& iterations) {
 }
 
 // Writes the result and what else is asked for: the controls as a table, the motion as a table and
-// as a view.
+// as a view, with `below` under it.
 std::string WriteResults(const ControlFile& file, Scene scene, const Played& played,
-                         const std::vector<IlqrIteration>& iterations, const OrderedJson& result) {
+                         const std::string& below, const OrderedJson& result) {
   const double dt = scene.simulation.dt;
   std::vector<OutputFile> files = {{FLAGS_out, JsonText(result)}};
   if (!FLAGS_plan.empty()) files.push_back({FLAGS_plan, PlanCsv(file, played.controls, dt)});
@@ -182,8 +199,7 @@ std::string WriteResults(const ControlFile& file, Scene scene, const Played& pla
   if (!FLAGS_trajectory.empty()) files.push_back({FLAGS_trajectory, trajectory.Finish()});
   if (!FLAGS_view.empty()) {
     ViewOptions options;
-    options.below =
-        ControlPlot(file, played.controls, dt) + (iterations.empty() ? "" : CostPlot(iterations));
+    options.below = below + ControlPlot(file, played.controls, dt);
     files.push_back({FLAGS_view, ViewHtml(view.data(), options)});
   }
   return WriteAllOrNone(files);
@@ -206,10 +222,71 @@ OrderedJson DescribeIterations(const std::vector<IlqrIteration>& iterations, lon
 OrderedJson FinalState(const RolloutFunction& function, const RowMatrixXd& states) {
   const std::vector<std::string> names = OutputNames(function.structure());
   OrderedJson json = OrderedJson::object();
+  if (states.rows() == 0) return json;
   for (size_t i = 0; i < names.size(); ++i) {
     json[names[i]] = states(states.rows() - 1, static_cast<Eigen::Index>(i));
   }
   return json;
+}
+
+// The cost of the motion with controls of 0, or of the bounds nearest to it; not finite where there
+// is no such motion.
+double CostOfNothing(const ControlFile& file, const Cost& cost, long steps) {
+  const VectorX<double> none =
+      VectorX<double>::Zero(file.low.size()).cwiseMax(file.low).cwiseMin(file.high);
+  return ReplayByEvents(file.scene, file.paths, cost, none.transpose().replicate(steps, 1)).cost;
+}
+
+Verdict VerdictOf(const IlqrResult& result, const Replay& replay, double cost_of_nothing) {
+  if (!DiffersFromMotion(result.plan.cost, replay, cost_of_nothing)) {
+    return {NameOf(result.status), result.message, true};
+  }
+  const std::string why = replay.done ? "the plan's cost is " + CompactNumber(result.plan.cost) +
+                                            ", and that of its replay by events " +
+                                            CompactNumber(replay.cost)
+                                      : "the plan's replay by events failed: " + replay.message;
+  return {"differs_from_motion", why, false};
+}
+
+// Rows of planned numbers beside those of the replay: the cost, then the final state.
+std::vector<std::vector<std::string>> PlannedBesideMotion(const RolloutFunction& function,
+                                                          const IlqrResult& result,
+                                                          const Replay& replay) {
+  constexpr int kDigits = 8;
+  const std::vector<std::string> names = OutputNames(function.structure());
+  const auto text = [](double value) {
+    return std::isfinite(value) ? CompactNumber(value, kDigits) : std::string("none");
+  };
+  std::vector<std::vector<std::string>> rows = {
+      {"cost", text(result.plan.cost), text(replay.cost)}};
+  const Eigen::Index last = result.plan.states.rows() - 1;
+  for (size_t i = 0; i < names.size(); ++i) {
+    const auto j = static_cast<Eigen::Index>(i);
+    const double moved = replay.states.rows() > last ? replay.states(last, j) : std::nan("");
+    rows.push_back({names[i], text(result.plan.states(last, j)), text(moved)});
+  }
+  return rows;
+}
+
+// The same on a terminal, where the result goes to a file.
+void PrintBesideMotion(const Verdict& verdict, const std::vector<std::vector<std::string>>& rows) {
+  constexpr size_t kMostRows = 31;
+  std::printf("%s\n%-28s %16s %16s\n", verdict.status.c_str(), "", "planned", "by events");
+  for (size_t i = 0; i < std::min(rows.size(), kMostRows); ++i) {
+    std::printf("%-28s %16s %16s\n", rows[i][0].c_str(), rows[i][1].c_str(), rows[i][2].c_str());
+  }
+  if (rows.size() > kMostRows) {
+    std::printf("... (%zu more numbers in the result)\n", rows.size() - kMostRows);
+  }
+}
+
+std::string PageOfPlan(const Verdict& verdict, const IlqrResult& result,
+                       const std::vector<std::vector<std::string>>& rows) {
+  return "<p>Status: <b>" + HtmlEscape(verdict.status) + "</b>" +
+         (verdict.message.empty() ? "" : ", " + HtmlEscape(verdict.message)) +
+         ". The animation shows the planned motion.</p>" +
+         HtmlTable({"at the end", "planned", "replayed by events"}, rows) +
+         CostPlot(result.iterations);
 }
 
 void WarnOfMaximum(const std::string& path) {
@@ -227,7 +304,51 @@ void WarnOfDiscreteMap(const std::string& path, const Certificate& certificate) 
   }
 }
 
-int Plan(const std::string& path, const ControlFile& file) {
+OrderedJson DescribePlan(const ControlFile& file, const RolloutFunction& function,
+                         const Judged& plan) {
+  const IlqrResult& result = plan.result;
+  OrderedJson json = {
+      {"status", plan.verdict.status},
+      {"message", plan.verdict.message},
+      {"planned_status", NameOf(result.status)},
+      {"cost", result.plan.cost},
+      {"gradient", result.gradient},
+      {"final_state", FinalState(function, result.plan.states)},
+      {"motion",
+       {{"cost", plan.replay.cost},
+        {"message", plan.replay.message},
+        {"final_state", FinalState(function, plan.replay.states)},
+        {"cost_of_nothing", plan.cost_of_nothing}}},
+      {"certificate", ToJson(plan.certificate)},
+      {"rollouts", result.rollouts},
+      {"linearisations", result.linearisations},
+      {"cpu_seconds", plan.seconds},
+      {"iterations", DescribeIterations(result.iterations, result.surrogate_iterations)},
+      {"controls", DescribeControls(file, result.plan.controls, file.scene.simulation.dt)}};
+  if (file.options.surrogate.samples > 0) {
+    json["surrogate"] = {{"samples", file.options.surrogate.samples},
+                         {"deviation", file.options.surrogate.deviation},
+                         {"seed", file.options.surrogate.seed},
+                         {"iterations", result.surrogate_iterations}};
+  }
+  return json;
+}
+
+// Writes what was asked for, and says on stderr where the plan does not hold.
+int FinishPlan(const std::string& path, const ControlFile& file, const RolloutFunction& function,
+               const Judged& plan) {
+  const auto rows = PlannedBesideMotion(function, plan.result, plan.replay);
+  const tangible::Plan& planned = plan.result.plan;
+  const std::string error =
+      WriteResults(file, file.scene, {planned.states, planned.controls, planned.cost},
+                   PageOfPlan(plan.verdict, plan.result, rows), DescribePlan(file, function, plan));
+  if (!error.empty()) return ReportError(error);
+  if (!FLAGS_out.empty()) PrintBesideMotion(plan.verdict, rows);
+  if (plan.verdict.holds) return kExitDone;
+  return ReportError(path + ": " + plan.verdict.status + ": " + plan.verdict.message);
+}
+
+int MakePlan(const std::string& path, const ControlFile& file) {
   RolloutFunction function;
   std::string error = function.Create(file.scene, {}, file.paths, {});
   if (!error.empty()) return ReportError(path + ": " + error);
@@ -237,41 +358,27 @@ int Plan(const std::string& path, const ControlFile& file) {
   error = FindIdle(problem, file, function, function.num_steps());
   if (!error.empty()) return ReportError(path + ": " + error);
   const RowMatrixXd start = file.initial.transpose().replicate(function.num_steps(), 1);
+  Judged plan;
   const std::clock_t began = std::clock();
-  const IlqrResult result = SolveIlqr(problem, start, file.options);
-  const double seconds = static_cast<double>(std::clock() - began) / CLOCKS_PER_SEC;
-  if (result.status == IlqrStatus::kFailed) return ReportError(path + ": " + result.message);
-  if (result.left_maximum) WarnOfMaximum(path);
-  RolloutInput input{VectorX<double>(), VectorX<double>(), result.plan.controls};
+  plan.result = SolveIlqr(problem, start, file.options);
+  plan.seconds = static_cast<double>(std::clock() - began) / CLOCKS_PER_SEC;
+  const RowMatrixXd& controls = plan.result.plan.controls;
+  if (plan.result.status == IlqrStatus::kFailed) {
+    return ReportError(path + ": " + plan.result.message);
+  }
+  if (plan.result.left_maximum) WarnOfMaximum(path);
+  RolloutInput input{VectorX<double>(), VectorX<double>(), controls};
   RolloutWorker worker(function);
   const RolloutOutput run = worker.Run(input);
   for (std::string& warning : worker.Warnings(run.report, run.final)) {
     ReportError(warning.insert(0, ": warning: ").insert(0, path));
   }
-  const Certificate certificate = worker.Certify(input);
-  WarnOfDiscreteMap(path, certificate);
-  OrderedJson json = {
-      {"status", NameOf(result.status)},
-      {"message", result.message},
-      {"cost", result.plan.cost},
-      {"gradient", result.gradient},
-      {"final_state", FinalState(function, result.plan.states)},
-      {"certificate", ToJson(certificate)},
-      {"rollouts", result.rollouts},
-      {"linearisations", result.linearisations},
-      {"cpu_seconds", seconds},
-      {"iterations", DescribeIterations(result.iterations, result.surrogate_iterations)},
-      {"controls", DescribeControls(file, result.plan.controls, file.scene.simulation.dt)}};
-  if (file.options.surrogate.samples > 0) {
-    json["surrogate"] = {{"samples", file.options.surrogate.samples},
-                         {"deviation", file.options.surrogate.deviation},
-                         {"seed", file.options.surrogate.seed},
-                         {"iterations", result.surrogate_iterations}};
-  }
-  error =
-      WriteResults(file, file.scene, {result.plan.states, result.plan.controls, result.plan.cost},
-                   result.iterations, json);
-  return error.empty() ? kExitDone : ReportError(error);
+  plan.certificate = worker.Certify(input);
+  WarnOfDiscreteMap(path, plan.certificate);
+  plan.replay = ReplayByEvents(file.scene, file.paths, cost, controls);
+  plan.cost_of_nothing = CostOfNothing(file, cost, controls.rows());
+  plan.verdict = VerdictOf(plan.result, plan.replay, plan.cost_of_nothing);
+  return FinishPlan(path, file, function, plan);
 }
 
 std::vector<std::string> MovingBodies(const Scene& scene) {
@@ -420,7 +527,7 @@ int Predict(const std::string& path, const ControlFile& file) {
       {"cpu_seconds_median", UpperMedian(run.seconds)},
       {"cpu_seconds_max", *std::max_element(run.seconds.begin(), run.seconds.end())},
       {"controls", DescribeControls(file, run.played.controls, file.scene.simulation.dt)}};
-  error = WriteResults(file, plant_scene, run.played, {}, json);
+  error = WriteResults(file, plant_scene, run.played, "", json);
   return error.empty() ? kExitDone : ReportError(error);
 }
 
@@ -448,7 +555,7 @@ int Main(int argc, char** argv) {
   if (!LoadControlFile(line.positional[0], &file, &error)) return ReportError(error);
   const std::string over = OutputOverInput();
   if (!over.empty()) return ReportError(over, kExitUsage);
-  return FLAGS_mpc ? Predict(line.positional[0], file) : Plan(line.positional[0], file);
+  return FLAGS_mpc ? Predict(line.positional[0], file) : MakePlan(line.positional[0], file);
 }
 
 }  // namespace

@@ -38,5 +38,11 @@ inline constexpr double kMovesNothing = 1e-12;
 inline constexpr double kRedundantShare = 1e-9;
 /// Of the variable, at least 1: step of central differences of exact Jacobians: cube root of ε.
 inline constexpr double kSecondDifference = 6e-6;
+/// Of the planned cost: a plan whose motion costs more than this above it does not hold. The
+/// integration errors of fixed steps that do hold are below it.
+inline constexpr double kMotionShare = 0.05;
+/// Of the cost of doing nothing: a smaller excess does not matter, whatever it is a share of. A
+/// plan that meets its target has a cost of rounding.
+inline constexpr double kNothingShare = 1e-6;
 
 }  // namespace tangible

@@ -266,6 +266,9 @@ void CompareBest(int steps, double dt, int random_starts) {
   std::string error;
   ASSERT_TRUE(LoadScene(TANGIBLE_SOURCE_DIR "/data/control/pendulum.json", &scene, &error))
       << error;
+  // By fixed steps: both solve the same discrete map, and Ipopt needs many more of its steps.
+  scene.simulation.stepping = Stepping::kFixed;
+  scene.simulation.joint_correction = JointCorrection::kProjection;
   scene.simulation.dt = dt;
   scene.simulation.duration = steps * dt;
   RolloutFunction function;

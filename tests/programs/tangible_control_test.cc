@@ -251,6 +251,7 @@ TEST_F(TangibleControlTest, AForceThatEndsBeforeTheHorizonIsPlanned) {
   std::string scene = kCart;
   const std::string force = "\"force\": [0, 0]";
   scene.replace(scene.find(force), force.size(), force + ", \"start\": 0, \"end\": 0.5");
+  scene.insert(scene.find("\"dt\""), "\"stepping\": \"event\", ");
   const std::string early = Write("early.json", scene);
   const ProgramRun run = Control(R"({"scene": "early.json", "controls": [
       {"path": "forces/push/force/x", "initial": 0.5}], "cost": [
@@ -268,7 +269,7 @@ TEST_F(TangibleControlTest, SaysThatItLeavesAMaximum) {
   Write("rod.json", R"({"bodies": [
       {"name": "rod", "shape": {"box": {"size": [0.05, 1]}}, "mass": 1, "position": [0, -0.5]}],
     "joints": [{"name": "motor", "type": "revolute", "bodies": ["rod", "world"], "anchor": [0, 0]}],
-    "simulation": {"dt": 0.05, "duration": 1, "joint_correction": "projection"}})");
+    "simulation": {"dt": 0.02, "duration": 1, "stepping": "event"}})");
   const ProgramRun run = Control(R"({"scene": "rod.json", "controls": [
       {"path": "joints/motor/effort", "low": -20, "high": 20}], "cost": [
       {"state": "rod/angle", "target": 3.141592653589793, "wrap": true, "weight": 100, "at": "end"},
@@ -277,6 +278,46 @@ TEST_F(TangibleControlTest, SaysThatItLeavesAMaximum) {
   const json result = json::parse(run.out);
   EXPECT_EQ(result["status"], "converged") << result["message"];
   EXPECT_NEAR(std::cos(result["final_state"]["rod/angle"].get<double>()), -1.0, 1e-2);
+}
+
+// A rod that is swung up by fixed steps does not end there in the motion: exit 1 with one line, the
+// result, the terminal and the page name both costs, and the optimiser's status is kept. The same
+// plan by events holds.
+TEST_F(TangibleControlTest, AFixedStepPlanThatFailsInTheMotionSaysSo) {
+  const auto rod = [this](const std::string& stepping) {
+    Write("rod.json", R"({"bodies": [
+        {"name": "rod", "shape": {"box": {"size": [0.05, 1]}}, "mass": 1, "position": [0, -0.5]}],
+      "joints": [{"name": "motor", "type": "revolute", "bodies": ["rod", "world"], "anchor": [0, 0]}],
+      "simulation": {"dt": 0.05, "duration": 1, )" +
+                          stepping + "}}");
+    return Control(R"({"scene": "rod.json", "controls": [
+        {"path": "joints/motor/effort", "low": -20, "high": 20, "initial": 1}], "cost": [
+        {"state": "rod/angle", "target": 3.141592653589793, "weight": 100, "at": "end"},
+        {"state": "rod/omega", "weight": 10, "at": "end"},
+        {"control": "joints/motor/effort", "weight": 0.01}]})",
+                   "--out='" + Path("r.json") + "' --view='" + Path("v.html") + "'");
+  };
+  const ProgramRun fixed = rod(R"("joint_correction": "projection")");
+  ExpectOneLine(fixed, 1, "problem.json: differs_from_motion: the plan's cost is ");
+  json result = json::parse(Read(Path("r.json")));
+  EXPECT_EQ(result["status"], "differs_from_motion");
+  EXPECT_EQ(result["planned_status"], "converged");
+  EXPECT_GT(result["motion"]["cost"].get<double>(), 1.05 * result["cost"].get<double>());
+  EXPECT_GT(std::abs(result["motion"]["final_state"]["rod/angle"].get<double>() -
+                     result["final_state"]["rod/angle"].get<double>()),
+            0.01);
+  EXPECT_NE(fixed.out.find("differs_from_motion"), std::string::npos) << fixed.out;
+  EXPECT_NE(fixed.out.find("rod/angle"), std::string::npos) << fixed.out;
+  EXPECT_NE(Read(Path("v.html")).find("differs_from_motion"), std::string::npos);
+  EXPECT_NE(Read(Path("v.html")).find("replayed by events"), std::string::npos);
+
+  const ProgramRun events = rod(R"("stepping": "event")");
+  EXPECT_EQ(events.exit_status, 0) << events.error;
+  result = json::parse(Read(Path("r.json")));
+  EXPECT_EQ(result["status"], "converged");
+  EXPECT_EQ(result["planned_status"], "converged");
+  EXPECT_NEAR(result["motion"]["cost"].get<double>(), result["cost"].get<double>(),
+              0.01 * result["cost"].get<double>());
 }
 
 // A file that the problem names is an input as well, which is found before the work.

@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/control/replay.h"
+
+#include <cmath>
+
+#include "tangible/control/tolerances.h"
+#include "tangible/simulation/gradient/compare_motion.h"
+#include "tangible/simulation/gradient/rollout_function.h"
+
+namespace tangible {
+namespace {
+
+// Steps of a replay in each step of a plan: the errors of the default integrator, of fourth order,
+// are 256 times smaller than the plan's.
+constexpr Eigen::Index kReplayParts = 4;
+
+}  // namespace
+
+Replay ReplayByEvents(const Scene& scene, const std::vector<std::string>& paths, const Cost& cost,
+                      const RowMatrixXd& controls) {
+  Replay replay;
+  const Eigen::Index steps = controls.rows();
+  Scene events = scene.simulation.stepping == Stepping::kEvent ? scene : ByEvents(scene);
+  events.simulation.duration = static_cast<double>(steps) * events.simulation.dt;
+  events.simulation.dt /= kReplayParts;
+  std::vector<long> records;
+  RowMatrixXd held(steps * kReplayParts, controls.cols());
+  for (Eigen::Index k = 0; k <= steps; ++k) records.push_back(k * kReplayParts);
+  for (Eigen::Index k = 0; k < held.rows(); ++k) held.row(k) = controls.row(k / kReplayParts);
+  RolloutFunction function;
+  replay.message = function.Create(events, {}, paths, records);
+  if (!replay.message.empty()) return replay;
+  const RolloutOutput run =
+      RolloutWorker(function).Run({VectorX<double>(), VectorX<double>(), held});
+  replay.message = run.message;
+  replay.states = run.states;
+  if (run.status != RolloutStatus::kDone) return replay;
+  replay.cost = cost.EndValue(replay.states.row(steps));
+  for (Eigen::Index k = 0; k < steps; ++k) {
+    replay.cost += cost.Value(replay.states.row(k), controls.row(k));
+  }
+  replay.done = std::isfinite(replay.cost);
+  if (!replay.done) replay.message = "the cost of the motion is not finite";
+  return replay;
+}
+
+bool DiffersFromMotion(double planned, const Replay& replay, double cost_of_nothing) {
+  if (!replay.done) return true;
+  const double excess = replay.cost - planned;
+  const double least = std::isfinite(cost_of_nothing) ? kNothingShare * cost_of_nothing : 0.0;
+  return excess > kMotionShare * std::abs(planned) && excess > least;
+}
+
+}  // namespace tangible
