@@ -98,7 +98,23 @@ class Reader {
     const JsonReader list = root_.At("cost");
     const int count = list.ExpectArray("an array of terms");
     if (count == 0) list.Fail("expected at least one term, got none");
-    for (int i = 0; i < count && root_.ok(); ++i) ReadTerm(list.At(i));
+    for (int i = 0; i < count && root_.ok(); ++i) {
+      ReadTerm(list.At(i));
+      if (root_.ok()) NameTerms("/cost/" + std::to_string(i));
+    }
+  }
+
+  // Names the terms that the place has added.
+  void NameTerms(const std::string& place) {
+    while (problem_.term_names.size() < problem_.terms.size()) {
+      const CostTerm& term = problem_.terms[problem_.term_names.size()];
+      const bool control = term.kind == CostTerm::Kind::kControl;
+      std::string of = control ? problem_.paths[term.index] : outputs_[term.index];
+      if (term.kind == CostTerm::Kind::kPoint) {
+        of = (term.axis == 0 ? "x" : "y") + (" of a point of " + of.substr(0, of.size() - 2));
+      }
+      problem_.term_names.push_back(place + " (" + of + ")");
+    }
   }
 
   // The index of a name, or 0 and a failure that lists some.

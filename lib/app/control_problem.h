@@ -17,6 +17,7 @@ struct ControlFile {
   std::vector<std::string> paths;  ///< of the controls
   VectorX<double> low, high, initial;
   std::vector<CostTerm> terms;
+  std::vector<std::string> term_names;  ///< of each: its place in the file, and what it is of
   IlqrOptions options;
   /// Receding horizon: the duration of the plant's run, s, and of each plan, s.
   double run_duration = 0.0;

@@ -20,6 +20,7 @@
 #include "tangible/app/view_recorder.h"
 #include "tangible/control/model_predictive.h"
 #include "tangible/control/replay.h"
+#include "tangible/control/unreached_targets.h"
 #include "tangible/math/median.h"
 #include "tangible/render/html.h"
 #include "tangible/render/plot.h"
@@ -237,15 +238,29 @@ double CostOfNothing(const ControlFile& file, const Cost& cost, long steps) {
   return ReplayByEvents(file.scene, file.paths, cost, none.transpose().replicate(steps, 1)).cost;
 }
 
-Verdict VerdictOf(const IlqrResult& result, const Replay& replay, double cost_of_nothing) {
-  if (!DiffersFromMotion(result.plan.cost, replay, cost_of_nothing)) {
-    return {NameOf(result.status), result.message, true};
+std::string NamesOf(const ControlFile& file, const std::vector<int>& terms) {
+  std::string names;
+  for (const int term : terms) names += (names.empty() ? "" : ", ") + file.term_names[term];
+  return names;
+}
+
+Verdict VerdictOf(const ControlFile& file, const Judged& plan, const UnreachedTargets& unreached) {
+  const IlqrResult& result = plan.result;
+  const Replay& replay = plan.replay;
+  if (DiffersFromMotion(result.plan.cost, replay, plan.cost_of_nothing)) {
+    const std::string why = replay.done ? "the plan's cost is " + CompactNumber(result.plan.cost) +
+                                              ", and that of its replay by events " +
+                                              CompactNumber(replay.cost)
+                                        : "the plan's replay by events failed: " + replay.message;
+    return {"differs_from_motion", why, false};
   }
-  const std::string why = replay.done ? "the plan's cost is " + CompactNumber(result.plan.cost) +
-                                            ", and that of its replay by events " +
-                                            CompactNumber(replay.cost)
-                                      : "the plan's replay by events failed: " + replay.message;
-  return {"differs_from_motion", why, false};
+  if (unreached.all) {
+    return {"no_effect_on_target",
+            "the controls have no effect on " + NamesOf(file, unreached.terms) +
+                " from where the plan is; try another initial of the controls, or a surrogate",
+            false};
+  }
+  return {NameOf(result.status), result.message, true};
 }
 
 // Rows of planned numbers beside those of the replay: the cost, then the final state.
@@ -377,7 +392,12 @@ int MakePlan(const std::string& path, const ControlFile& file) {
   WarnOfDiscreteMap(path, plan.certificate);
   plan.replay = ReplayByEvents(file.scene, file.paths, cost, controls);
   plan.cost_of_nothing = CostOfNothing(file, cost, controls.rows());
-  plan.verdict = VerdictOf(plan.result, plan.replay, plan.cost_of_nothing);
+  const UnreachedTargets unreached = FindUnreachedTargets(problem, plan.result.plan);
+  plan.verdict = VerdictOf(file, plan, unreached);
+  if (plan.verdict.holds && !unreached.terms.empty()) {
+    ReportError(path + ": warning: the controls have no effect on " +
+                NamesOf(file, unreached.terms) + " from where the plan is");
+  }
   return FinishPlan(path, file, function, plan);
 }
 

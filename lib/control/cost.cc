@@ -51,6 +51,18 @@ void CostExpansion::SetZero(int num_states, int num_controls) {
   uu.setZero(num_controls, num_controls);
 }
 
+double ResidualOf(const CostTerm& term, const VectorX<double>& x, const VectorX<double>& u) {
+  return Evaluate(term, x, u).value;
+}
+
+VectorX<double> ChangesOf(const CostTerm& term, const VectorX<double>& x,
+                          const MatrixX<double>& changes) {
+  if (term.kind == CostTerm::Kind::kControl) return VectorX<double>::Zero(changes.cols());
+  if (term.kind != CostTerm::Kind::kPoint) return changes.row(term.index);
+  const double by_angle = Evaluate(term, x, VectorX<double>()).by_angle;
+  return changes.row(term.index + term.axis) + by_angle * changes.row(term.index + 2);
+}
+
 Cost::Cost(int num_states, int num_controls, double step_length, std::vector<CostTerm> terms)
     : n_(num_states), m_(num_controls), h_(step_length), terms_(std::move(terms)) {}
 

@@ -40,6 +40,14 @@ struct CostTerm {
   bool at_end = false;           ///< only at the end; else in each step
 };
 
+/// The term's residual at a state and controls (of a term of the end: no controls).
+double ResidualOf(const CostTerm& term, const VectorX<double>& x, const VectorX<double>& u);
+/// The changes of what a term compares with its target along changes of the state, its columns;
+/// of an angle that wraps those of the angle, which the residual does not show half a turn away.
+/// A term of a control has none.
+VectorX<double> ChangesOf(const CostTerm& term, const VectorX<double>& x,
+                          const MatrixX<double>& changes);
+
 class Cost {
  public:
   Cost(int num_states, int num_controls, double step_length, std::vector<CostTerm> terms);

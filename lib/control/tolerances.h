@@ -44,5 +44,11 @@ inline constexpr double kMotionShare = 0.05;
 /// Of the cost of doing nothing: a smaller excess does not matter, whatever it is a share of. A
 /// plan that meets its target has a cost of rounding.
 inline constexpr double kNothingShare = 1e-6;
+/// Of a target, at least 1: a target is met within it. Plans weigh targets against efforts, and
+/// joints and contacts hold what they hold to less.
+inline constexpr double kMetTarget = 1e-6;
+/// Of the largest effect of the controls on a number of the state: a smaller one is rounding, as of
+/// a rail on what is across it.
+inline constexpr double kWithoutEffect = 1e-11;
 
 }  // namespace tangible

@@ -320,6 +320,32 @@ TEST_F(TangibleControlTest, AFixedStepPlanThatFailsInTheMotionSaysSo) {
               0.01 * result["cost"].get<double>());
 }
 
+// A puck that the cart never touches: no effort changes where it ends, whatever the optimiser says
+// of a gradient of zero. Beside a target of the cart it is a warning.
+TEST_F(TangibleControlTest, ATargetThatNoControlChangesIsNamed) {
+  std::string scene = kCart;
+  scene.replace(scene.find("],"), 1, R"(,
+    {"name": "puck", "shape": {"circle": {"radius": 0.1}}, "mass": 1, "position": [9, 5]}])");
+  scene.insert(scene.find("\"dt\""), "\"stepping\": \"event\", ");
+  Write("puck.json", scene);
+  const auto problem = [](const std::string& more) {
+    return R"({"scene": "puck.json", "controls": [{"path": "joints/rail/effort", "low": -9,
+        "high": 9, "initial": 1}], "cost": [{"control": "joints/rail/effort"}, )" +
+           more + R"({"point": {"body": "puck"}, "target": [8, 0.5], "at": "end"}]})";
+  };
+  const ProgramRun none = Control(problem(""));
+  ExpectOneLine(none, 1,
+                "problem.json: no_effect_on_target: the controls have no effect on /cost/1 (x of a "
+                "point of puck), /cost/1 (y of a point of puck)");
+  json result = json::parse(none.out);
+  EXPECT_EQ(result["status"], "no_effect_on_target");
+  EXPECT_EQ(result["planned_status"], "converged");
+  const ProgramRun one =
+      Control(problem(R"({"state": "cart/x", "target": 0.01, "weight": 100, "at": "end"}, )"));
+  ExpectOneLine(one, 0, "warning: the controls have no effect on /cost/2 (x of a point of puck)");
+  EXPECT_EQ(json::parse(one.out)["status"], "converged");
+}
+
 // A file that the problem names is an input as well, which is found before the work.
 TEST_F(TangibleControlTest, OutputsOverTheProblemsSceneAreWrongUsage) {
   for (const char* flag : {"out", "plan", "trajectory", "view"}) {
