@@ -9,6 +9,8 @@ PYBIND11_MODULE(_core, module) {
   py::register_exception<tangible::python::Error>(module, "TangibleError", PyExc_ValueError);
   module.attr("__version__") = TANGIBLE_VERSION;
   tangible::python::BindScene(&module);
+  tangible::python::BindSimulate(&module);
   tangible::python::BindRollout(&module);
+  tangible::python::BindSimulation(&module);
   tangible::python::BindFit(&module);
 }

@@ -19,7 +19,7 @@ from ._certificate import Certificate
 from ._fit import FitResult, Residuals, fit
 from ._rollout import Jacobian, Rollout, Smoothing
 from ._scene import Scene
-from ._trajectory import Contacts, Events, Trajectory, simulate
+from ._trajectory import Contacts, Events, Joints, Trajectory, simulate
 from ._warning import TangibleWarning
 
 __all__ = [
@@ -28,6 +28,7 @@ __all__ = [
     "Events",
     "FitResult",
     "Jacobian",
+    "Joints",
     "Residuals",
     "Rollout",
     "Scene",

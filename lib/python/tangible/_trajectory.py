@@ -9,21 +9,24 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Union
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from . import _core
 from ._certificate import Certificate
+from ._rollout import Numbers, Rollout
 from ._scene import Scene, SceneLike
 from ._warning import warn
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from pandas import DataFrame
 
 Floats = NDArray[np.float64]
 COMPONENTS = ("x", "y", "angle", "vx", "vy", "omega")
+UNITS = dict(zip(COMPONENTS, ("m", "m", "rad", "m/s", "m/s", "rad/s")))
 
 
 @dataclass(frozen=True)
@@ -37,6 +40,7 @@ class Contacts:
         normal_impulse: Along the normal, from the second body to the first, N s.
         tangential_impulse: Along the tangent (n_y, -n_x), N s.
         mode: "open", "closed", "sticking", "sliding_left" or "sliding_right".
+        length: Of the step, s.
     """
 
     time: Floats
@@ -45,6 +49,41 @@ class Contacts:
     normal_impulse: Floats
     tangential_impulse: Floats
     mode: list[str]
+    length: Floats
+
+    @property
+    def normal_force(self) -> Floats:
+        """The mean over the step, with the impulses of impacts in it, N."""
+        return np.asarray(self.normal_impulse / self.length)
+
+    @property
+    def tangential_force(self) -> Floats:
+        """The mean over the step along the tangent, N."""
+        return np.asarray(self.tangential_impulse / self.length)
+
+
+@dataclass(frozen=True)
+class Joints:
+    """Joints over time: J of them.
+
+    Attributes:
+        names: In the order of the scene.
+        units: Of their coordinates: "rad", "m", or "" of types that have none.
+        coordinates: Angle or displacement of bodies[0] against bodies[1], 0 as drawn, shape (T, J);
+            NaN where the type has none.
+        rates: Of the coordinates, per second, shape (T, J).
+        time: Ends of the steps, s, shape (steps,).
+        forces: With which bodies[1] holds bodies[0]: the mean over each step of the force along x
+            and y (N, world) and of the torque about the anchor (N m), shape (steps, J, 3). Limits,
+            efforts, springs and friction of the joint are no part of it.
+    """
+
+    names: list[str]
+    units: list[str]
+    coordinates: Floats
+    rates: Floats
+    time: Floats
+    forces: Floats
 
 
 @dataclass(frozen=True)
@@ -68,7 +107,7 @@ class Trajectory:
         poses: x (m), y (m), angle (rad), shape (T, bodies, 3).
         twists: vx, vy (m/s), omega (rad/s), shape (T, bodies, 3).
         energies: Kinetic and potential energy (of gravity and springs), J, shape (T, 2).
-        contacts, events: See `Contacts`, `Events`.
+        contacts, events, joints: See `Contacts`, `Events`, `Joints`.
         summary: The figures of `tangible-simulate --summary`.
         certificate: How near the run is to kinks and jumps; None unless asked for.
         margins: Of each step the smallest relative distance to a change of contact modes, infinite
@@ -83,7 +122,7 @@ class Trajectory:
             return [(names[i], names[j]) for i, j in zip(table["first"], table["second"])]
 
         self.scene = scene._copy()
-        self._ran = scene.core
+        self._view: _core.View = raw["view"]
         self.status: str = raw["status"]
         self.message: str = raw["message"]
         self.bodies = [names[i] for i in raw["bodies"]]
@@ -100,6 +139,15 @@ class Trajectory:
             contacts["normal_impulse"],
             contacts["tangential_impulse"],
             contacts["mode"],
+            contacts["length"],
+        )
+        self.joints = Joints(
+            raw["joints"],
+            raw["units"],
+            raw["coordinates"][:, :, 0],
+            raw["coordinates"][:, :, 1],
+            raw["step_ends"],
+            raw["joint_forces"],
         )
         events = raw["events"]
         self.events = Events(events["time"], pairs(events), events["kind"])
@@ -110,15 +158,65 @@ class Trajectory:
         )
 
     def __getitem__(self, name: str) -> Floats:
-        """A coordinate over time, shape (T,): "ball/x", "ball/angle", "ball/vy", ..."""
-        body, _, component = name.rpartition("/")
-        if body not in self.bodies or component not in COMPONENTS:
-            raise KeyError(
-                f"{name}: expected BODY/COMPONENT with a body of {', '.join(self.bodies)} "
-                f"and a component of {', '.join(COMPONENTS)}"
-            )
-        i, k = self.bodies.index(body), COMPONENTS.index(component)
-        return self.poses[:, i, k] if k < 3 else self.twists[:, i, k - 3]
+        """A coordinate over time, shape (T,): "ball/x", "ball/angle", "ball/vy", and of joints
+        "hinge/coordinate", "hinge/rate"."""
+        owner, _, component = name.rpartition("/")
+        if owner in self.bodies and component in COMPONENTS:
+            i, k = self.bodies.index(owner), COMPONENTS.index(component)
+            return self.poses[:, i, k] if k < 3 else self.twists[:, i, k - 3]
+        if owner in self.joints.names and component in ("coordinate", "rate"):
+            i = self.joints.names.index(owner)
+            if self.joints.units[i]:
+                return (self.joints.coordinates if component == "coordinate" else self.joints.rates)[:, i]
+        raise KeyError(
+            f"{name}: expected BODY/COMPONENT with a body of {', '.join(self.bodies)} and a component "
+            f"of {', '.join(COMPONENTS)}, or JOINT/coordinate, JOINT/rate with a joint of "
+            f"{', '.join(self._turning()) or 'none'}"
+        )
+
+    def _turning(self) -> list[str]:
+        """Joints that have a coordinate."""
+        return [name for name, unit in zip(self.joints.names, self.joints.units) if unit]
+
+    @property
+    def names(self) -> list[str]:
+        """Of all that `run[name]` gives: coordinates of bodies, then of joints."""
+        return [f"{body}/{component}" for body in self.bodies for component in COMPONENTS] + [
+            f"{joint}/{component}" for joint in self._turning() for component in ("coordinate", "rate")
+        ]
+
+    def unit(self, name: str) -> str:
+        """The unit of a coordinate: "m", "rad", "m/s", "rad/s"."""
+        owner, _, component = name.rpartition("/")
+        if component in UNITS:
+            return UNITS[component]
+        unit = self.joints.units[self.joints.names.index(owner)]
+        return unit if component == "coordinate" else f"{unit}/s"
+
+    def to_dataframe(self, *, long: bool = False) -> DataFrame:
+        """The run as a table of pandas.
+
+        Args:
+            long: False: a column a coordinate, `names`, with the time (s) as index. True: the
+                columns of a trajectory file, `time`, `body`, `x`, ..., a row a body and time.
+        """
+        import pandas as pd
+
+        if not long:
+            index = pd.Index(self.times, name="time")
+            return pd.DataFrame({name: self[name] for name in self.names}, index=index)
+        count = len(self.bodies)
+        values = np.concatenate([self.poses, self.twists], axis=2).reshape(-1, 6)
+        table = {"time": np.repeat(self.times, count), "body": list(self.bodies) * len(self.times)}
+        return pd.DataFrame({**table, **dict(zip(COMPONENTS, values.T))})
+
+    def to_csv(self, file: str | os.PathLike[str]) -> None:
+        """Writes a trajectory file, as `tangible-simulate --out` does: 17 digits, the same bits."""
+        rows = ["time,body," + ",".join(COMPONENTS)]
+        for time, poses, twists in zip(self.times, self.poses, self.twists):
+            for body, numbers in zip(self.bodies, np.concatenate([poses, twists], axis=1)):
+                rows.append(",".join([f"{time:.17g}", body, *(f"{x:.17g}" for x in numbers)]))
+        Path(file).write_text("\n".join(rows) + "\n", encoding="utf-8")
 
     @property
     def final(self) -> dict[str, float]:
@@ -130,9 +228,8 @@ class Trajectory:
         }
 
     def html(self) -> str:
-        """The animated view as one self-contained page."""
-        page: str = _core.simulate(self._ran, 1, False, True)["html"]
-        return page
+        """The animated view of the recorded times as one self-contained page."""
+        return self._view.html()
 
     def show(self, file: str | os.PathLike[str] | None = None) -> None:
         """Plays the animated view in a notebook, or writes it to a file for a browser.
@@ -165,15 +262,29 @@ class Trajectory:
         import matplotlib.pyplot as plt
 
         axes: Axes = ax if ax is not None else plt.subplots()[1]
-        for name in names or [f"{body}/{k}" for body in self.bodies for k in ("x", "y")]:
-            axes.plot(self.times, self[name], label=name)
-        step = float(self.summary["steps"] and self.times[-1] / self.summary["steps"])
-        borne = np.unique(self.contacts.time[self.contacts.normal_impulse > 0.0])
-        for time in borne:
-            axes.axvspan(time - step, time, color="0.85", lw=0, zorder=0)
+        shown = list(names) or [f"{body}/{k}" for body in self.bodies for k in ("x", "y")]
+        units = list(dict.fromkeys(self.unit(name) for name in shown if self[name] is not None))
+        for name in shown:
+            label = name if len(units) == 1 else f"{name} ({self.unit(name)})"
+            axes.plot(self.times, self[name], label=label)
+        axes.broken_barh(
+            self._borne(), (0.0, 1.0), transform=axes.get_xaxis_transform(), color="0.85", lw=0, zorder=0
+        )
         axes.set_xlabel("time (s)")
-        axes.legend()
+        axes.set_ylabel(", ".join(units))
+        axes.legend(loc="upper right")  # to look for the best place takes long for many points
         return axes
+
+    def _borne(self) -> list[tuple[float, float]]:
+        """(start, length) in s of the spans in which a contact bears an impulse."""
+        bears = self.contacts.normal_impulse > 0.0
+        ends, first = np.unique(self.contacts.time[bears], return_index=True)
+        starts = ends - self.contacts.length[bears][first]
+        # Steps one after another are one span, to rounding of their times.
+        tolerance = 1e-9 * np.abs(ends).max(initial=1.0)
+        begins = np.flatnonzero(np.diff(ends, prepend=-np.inf) > (ends - starts) + tolerance)
+        lasts = np.append(begins[1:], len(ends)) - 1
+        return [(float(starts[i]), float(ends[k] - starts[i])) for i, k in zip(begins, lasts)] if len(ends) else []
 
     def plot_energies(self, ax: Axes | None = None) -> Axes:
         """Plots kinetic and potential energy and their sum (J) over time. Returns the axes."""
@@ -229,7 +340,7 @@ class Trajectory:
         axes.semilogy(steps[near], np.maximum(self.margins[near], 1e-16), ".")
         axes.axhline(1e-6, color="0.6", lw=1)
         axes.set_xlabel("time (s)")
-        axes.set_ylabel("margin")
+        axes.set_ylabel("margin (relative)")
         axes.set_title(str(self.certificate["verdict"]))
         return axes
 
@@ -240,10 +351,25 @@ class Trajectory:
         )
 
 
+State = Union[Numbers, Trajectory]
+
+
+def _initial_state(rollout: Rollout, given: State) -> Floats:
+    if not isinstance(given, Trajectory):
+        return rollout._inputs(None, given, None)[1]  # type: ignore[return-value]
+    final = given.final
+    missing = [name for name in rollout.outputs if name not in final]
+    if missing:
+        raise ValueError(f"initial_state: expected a run with {missing[0]}, got {given!r}")
+    return np.array([final[name] for name in rollout.outputs])
+
+
 def simulate(
     scene: SceneLike,
     parameters: Mapping[str, float] | None = None,
     *,
+    initial_state: State | None = None,
+    controls: Mapping[str, ArrayLike] | None = None,
     every: int = 1,
     certify: bool = False,
     on_failure: str = "raise",
@@ -253,12 +379,18 @@ def simulate(
     Args:
         scene: A `Scene`, a scene file, or a dict of its JSON.
         parameters: Values that replace the scene's: {"bodies/ball/mass": 2.0}, SI units.
+        initial_state: Of the moving bodies, as a `Rollout` orders it, shape (S,); a dict of what
+            differs from the scene's, {"ball/x": 0.3}; or a run, from whose end this one goes on.
+        controls: Forces, torques and efforts that have a value of their own in each step, N or N m:
+            {"forces/push/force/x": shape (steps,)}, or one number for all steps. The motion has the
+            bits of a `Rollout` with the same controls.
         every: Record one state in so many steps; the first and the last are always recorded.
         certify: Whether the certificate of the run's derivatives is computed too.
         on_failure: "raise", or "return" the trajectory up to a step that failed.
 
     Raises:
         TangibleError: A mistake in the scene or a value that is not allowed; a run that ended early.
+        ValueError: A shape, or a name that the scene does not have.
 
     Warns:
         TangibleWarning: Of what `Trajectory.warnings` lists.
@@ -268,7 +400,20 @@ def simulate(
     read = Scene.of(scene)
     if parameters:
         read = read.with_parameters(parameters)
-    trajectory = Trajectory(read, _core.simulate(read.core, every, certify, False))
+    state: Floats | None = None
+    values: Floats | None = None
+    paths = list(controls or {})
+    if initial_state is not None or controls:
+        rollout = Rollout(read, [], paths)
+        values = rollout._inputs(None, None, controls)[2]
+        if values.shape[0] != 1:
+            raise ValueError(f"controls: expected one run, got a batch of {values.shape[0]}")
+        values = values[0]
+        if initial_state is not None:
+            state = _initial_state(rollout, initial_state).reshape(-1)
+            if state.shape != (len(rollout.outputs),):
+                raise ValueError("initial_state: expected the state of one run, got a batch")
+    trajectory = Trajectory(read, _core.simulate(read.core, every, certify, state, paths, values))
     if trajectory.status != "done" and on_failure == "raise":
         raise _core.TangibleError(trajectory.message)
     warn(trajectory.warnings)
