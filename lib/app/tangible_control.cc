@@ -443,6 +443,9 @@ struct PredictiveRun {
   Played played;
   std::vector<double> seconds;  // of each plan, CPU
   long failed = 0;
+  // States of the plant that are not on the model's joints, and the largest error of one, m or rad.
+  long projected = 0;
+  double joint_error = 0.0;
   std::string failure;        // of the first plan that failed: where and why
   bool left_maximum = false;  // in any plan
   std::string error;
@@ -472,7 +475,13 @@ PredictiveRun RunPredictive(const ControlFile& file, EngineStep* map, EngineStep
   VectorX<double> next;
   for (long k = 0; k < steps; ++k) {
     const std::clock_t began = std::clock();
-    const VectorX<double> u = controller.Control(k, x);
+    VectorX<double> seen = x;
+    double error = 0.0;
+    if (map->ProjectOntoJoints(k, &seen, &error) != JointState::Outcome::kOnJoints) {
+      ++run.projected;
+      run.joint_error = std::max(run.joint_error, error);
+    }
+    const VectorX<double> u = controller.Control(k, seen);
     run.seconds.push_back(static_cast<double>(std::clock() - began) / CLOCKS_PER_SEC);
     run.left_maximum |= controller.last().left_maximum;
     if (controller.last().status == IlqrStatus::kFailed && run.failed++ == 0) {
@@ -543,6 +552,8 @@ int Predict(const std::string& path, const ControlFile& file) {
       {"final_state", FinalState(of_plant, run.played.states)},
       {"plans", run.seconds.size()},
       {"plans_failed", run.failed},
+      {"states_projected", run.projected},
+      {"joint_error_max", run.joint_error},
       {"certificate", ToJson(certificate)},
       {"cpu_seconds_median", UpperMedian(run.seconds)},
       {"cpu_seconds_max", *std::max_element(run.seconds.begin(), run.seconds.end())},

@@ -45,7 +45,7 @@ struct EngineStep::Reduced {
 };
 
 EngineStep::EngineStep(const RolloutFunction& function)
-    : function_(function), model_(ModelOf(function, &start_)), stepper_(model_) {
+    : function_(function), model_(ModelOf(function, &start_)), stepper_(model_), joints_(model_) {
   const ModelStructure& s = *model_.structure;
   controls_.setZero(s.num_variables(), num_controls());
   for (size_t j = 0; j < function.control_numbers().size(); ++j) {
@@ -155,6 +155,14 @@ StepMap* EngineStep::Without(int impact) {
     }
   }
   return reduced->step.get();
+}
+
+JointState::Outcome EngineStep::ProjectOntoJoints(long k, VectorX<double>* x, double* error) {
+  State<double> state = StateOf(k, *x);
+  const JointState::Outcome outcome = joints_.Project(&state);
+  *error = joints_.error();
+  if (outcome == JointState::Outcome::kProjected) *x = function_.StateOf(state);
+  return outcome;
 }
 
 bool EngineStep::Step(long k, const VectorX<double>& x, const VectorX<double>& u,

@@ -11,6 +11,7 @@
 #include <map>
 #include <memory>
 
+#include "tangible/control/joint_state.h"
 #include "tangible/control/step_map.h"
 #include "tangible/simulation/derivatives/rollout_tangent.h"
 #include "tangible/simulation/gradient/rollout_function.h"
@@ -43,6 +44,10 @@ class EngineStep : public StepMap {
   bool StepBack(long k, const VectorX<double>& next, const VectorX<double>& u,
                 VectorX<double>* x) override;
 
+  /// Moves a state that was observed of another plant onto this scene's joints (joint_state.h).
+  /// `error`: the joints' largest before, m or rad. One that cannot be moved there stays.
+  JointState::Outcome ProjectOntoJoints(long k, VectorX<double>* x, double* error);
+
   /// The initial state of the scene.
   VectorX<double> initial() const { return function_.Defaults().state; }
   /// The state of all bodies, including those of prescribed motion.
@@ -67,6 +72,7 @@ class EngineStep : public StepMap {
   Model<double> model_;
   Stepper stepper_;
   StepTangent tangent_;
+  JointState joints_;
   RowMatrixXd controls_, w_dot_;             ///< of the variables: unit vectors of controls
   std::vector<std::vector<Meeting>> kinds_;  ///< of impacts: all that meet at once, ascending
   std::vector<int> impacts_;

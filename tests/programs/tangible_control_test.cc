@@ -96,6 +96,47 @@ TEST_F(TangibleControlTest, RecedingHorizonsBringAHeavierPlantToTheMark) {
   EXPECT_NEAR(json::parse(timed.out)["final_state"]["cart/x"].get<double>(), 1.0, 0.05);
 }
 
+// A pole that is 20 % longer in the plant: its states are not on the model's joints, and by events
+// no step could be made from them. They are projected, which the result counts, and it stands.
+TEST_F(TangibleControlTest, StatesOfALongerPoleAreProjectedOntoTheModelsJoints) {
+  const auto scene = [this](const std::string& name, double length) {
+    return Write(name, R"({"bodies": [
+        {"name": "cart", "shape": {"box": {"size": [0.4, 0.2]}}, "mass": 1, "position": [0, 0]},
+        {"name": "pole", "shape": {"box": {"size": [0.05, )" +
+                           std::to_string(length) + R"(]}}, "mass": 0.2, "position": [0, )" +
+                           std::to_string(length / 2) +
+                           R"(]}],
+      "joints": [{"name": "rail", "type": "prismatic", "bodies": ["cart", "world"], "anchor": [0, 0],
+                  "axis": [1, 0]},
+                 {"name": "pin", "type": "revolute", "bodies": ["pole", "cart"], "anchor": [0, 0],
+                  "angle": 0.4}],
+      "no_contact": [["cart", "pole"]],
+      "simulation": {"dt": 0.02, "duration": 1, "stepping": "event"}})");
+  };
+  scene("model.json", 1.0);
+  const std::string problem = R"({"scene": "model.json", "controls": [
+      {"path": "joints/rail/effort", "low": -20, "high": 20}], "cost": [
+      {"control": "joints/rail/effort", "weight": 0.01}, {"state": "pole/angle", "weight": 10},
+      {"state": "pole/omega", "weight": 0.1}, {"state": "cart/x", "weight": 1},
+      {"state": "pole/angle", "weight": 100, "at": "end"}, {"state": "pole/omega", "at": "end"},
+      {"state": "cart/x", "weight": 10, "at": "end"}, {"state": "cart/vx", "weight": 10, "at": "end"}],
+    "mpc": {"duration": 2, "horizon": 0.8}})";
+  const ProgramRun longer = Control(problem, "--mpc --plant='" + scene("longer.json", 1.2) + "'");
+  ASSERT_EQ(longer.exit_status, 0) << longer.error;
+  json result = json::parse(longer.out);
+  EXPECT_EQ(result["plans"], 100);
+  EXPECT_EQ(result["plans_failed"], 0);
+  EXPECT_EQ(result["states_projected"], 100);
+  EXPECT_NEAR(result["joint_error_max"].get<double>(), 0.1, 1e-6);
+  EXPECT_NEAR(result["final_state"]["pole/angle"].get<double>(), 0.0, 0.1);
+  EXPECT_NEAR(result["final_state"]["pole/omega"].get<double>(), 0.0, 0.5);
+  const ProgramRun same = Control(problem, "--mpc");
+  ASSERT_EQ(same.exit_status, 0) << same.error;
+  result = json::parse(same.out);
+  EXPECT_EQ(result["states_projected"], 0);
+  EXPECT_EQ(result["joint_error_max"], 0.0);
+}
+
 // A run without a plan, or without a cost, has no result: a speed at which the cost overflows, and
 // one whose square is finite over a step and not over the run.
 TEST_F(TangibleControlTest, ARunWithoutPlansOrCostIsAnError) {
