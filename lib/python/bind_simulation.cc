@@ -8,6 +8,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -29,7 +30,8 @@ class Simulation {
       : scene_(scene), pool_(NumThreads(threads)), rows_(static_cast<size_t>(rows)) {
     SimulationSettings& settings = scene_.simulation;
     settings.duration = std::max(settings.duration, settings.dt * kEndlessSteps);
-    const std::string error = function_.Create(scene_, parameters, controls, {});
+    // Of one record: the endless run must not be counted step by step.
+    const std::string error = function_.Create(scene_, parameters, controls, {0});
     if (!error.empty()) throw Error((scene.path.empty() ? "" : scene.path + ": ") + error);
     structure_ = BuildStructure(scene_);
   }
@@ -89,6 +91,23 @@ class Simulation {
       }
     }
     return array;
+  }
+
+  // Of each row the contacts that carried an impulse in its last step: both bodies, and the normal
+  // impulse (N s).
+  std::vector<std::vector<std::tuple<int, int, double>>> Touches() const {
+    std::vector<std::vector<std::tuple<int, int, double>>> touches(rows_.size());
+    for (size_t i = 0; i < rows_.size(); ++i) {
+      if (rows_[i].stepper == nullptr || rows_[i].failed || rows_[i].steps == 0) continue;
+      const StepRecord& record = rows_[i].stepper->record();
+      for (size_t c = 0; c < record.contacts.size(); ++c) {
+        const double impulse = record.solution.normal_impulse[c];
+        const ActiveContact& contact = record.contacts[c];
+        if (contact.joint < 0 && impulse > 0.0)
+          touches[i].emplace_back(contact.a, contact.b, impulse);
+      }
+    }
+    return touches;
   }
 
   std::vector<long> StepsDone() const {
@@ -185,6 +204,7 @@ void BindSimulation(py::module_* module) {
       .def("reset", &Simulation::Reset)
       .def("step", &Simulation::Step)
       .def("states", &Simulation::States)
+      .def("touches", &Simulation::Touches)
       .def("steps_done", &Simulation::StepsDone);
 }
 

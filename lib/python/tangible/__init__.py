@@ -19,6 +19,7 @@ from ._certificate import Certificate
 from ._fit import FitResult, Residuals, fit
 from ._rollout import Jacobian, Rollout, Smoothing
 from ._scene import Scene
+from ._simulation import Simulation
 from ._trajectory import Contacts, Events, Joints, Trajectory, simulate
 from ._warning import TangibleWarning
 
@@ -32,6 +33,7 @@ __all__ = [
     "Residuals",
     "Rollout",
     "Scene",
+    "Simulation",
     "Smoothing",
     "TangibleError",
     "TangibleWarning",

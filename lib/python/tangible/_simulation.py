@@ -1,0 +1,234 @@
+"""Simulations that go on a step at a time, one or many side by side."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping, Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from . import _core
+from ._plain import integers, paths
+from ._rollout import Numbers, Rollout, _array, floats
+from ._scene import Scene, SceneLike
+
+Floats = NDArray[np.float64]
+
+
+class Simulation:
+    """A scene that goes on a step at a time, for as long as one likes.
+
+        simulation = tangible.Simulation(scene, controls=["joints/motor/effort"])
+        state = simulation.reset(seed=0)
+        while state[1] > 0:
+            state = simulation.step([policy(state)])
+
+    Steps are those of a long run, bit for bit: `dt`, stepping and all else are the scene's, but its
+    duration is no end. With `batch` there are N of them, which run on all cores; states, actions and
+    parameters have a leading axis then.
+
+    Args:
+        scene: A `Scene`, a scene file, or a dict of its JSON.
+        controls: C paths of forces, torques or efforts that an action sets.
+        parameters: P paths of parameters that `reset` may set.
+        batch: N; absent: one simulation, without the axis.
+        noise: {name of an output, or path of a parameter: standard deviation}: Gaussian noise of the
+            initial state, or of parameters, which `reset` draws anew. Bodies with joints are moved
+            by "joints/pin/angle" or "joints/pin/rate", which keep the joints closed.
+        domains: Values of parameters, {path: shape (D,)}: `reset` draws one of the D for each row,
+            all its values together. Its paths are added to `parameters`.
+        on_failure: "raise", or "nan" in states of rows that have failed, until they are reset.
+        threads: Of batches; 0: one a core. Results have the same bits for any number.
+    """
+
+    def __init__(
+        self,
+        scene: SceneLike,
+        controls: Sequence[str] = (),
+        *,
+        parameters: Sequence[str] = (),
+        batch: int | None = None,
+        noise: Mapping[str, float] | None = None,
+        domains: Mapping[str, ArrayLike] | None = None,
+        on_failure: str = "raise",
+        threads: int = 0,
+    ) -> None:
+        if batch is not None and batch < 1:
+            raise ValueError(f"batch: expected a number >= 1, got {batch}")
+        if on_failure not in ("raise", "nan"):
+            raise ValueError(f"on_failure: expected raise or nan, got {on_failure}")
+        read = Scene.of(scene)
+        self.scene = read._copy()
+        self.batch = batch
+        self.on_failure = on_failure
+        outputs = Rollout(read).outputs
+        moved = [name for name in noise or {} if name not in outputs]
+        names = list(dict.fromkeys([*paths(parameters, "parameters"), *(domains or {}), *moved]))
+        # It checks the paths and knows the scene's own values.
+        self._rollout = Rollout(read, names, controls)
+        self._rows = 1 if batch is None else batch
+        self._core = _core.Simulation(
+            read.core, names, self._rollout.controls, self._rows, threads if self._rows > 1 else 1
+        )
+        self._own = np.array([read[path] for path in self.controls])
+        self._noise = np.zeros(len(outputs))
+        self._spread_of_parameters = np.zeros(len(names))
+        for name, deviation in (noise or {}).items():
+            if name in outputs:
+                self._noise[outputs.index(name)] = float(deviation)
+            else:
+                self._spread_of_parameters[names.index(name)] = float(deviation)
+        self._dt = float(json.loads(read.core.to_json())["simulation"]["dt"])
+        self._domains = self._read_domains(domains or {})
+        self._generator = np.random.default_rng()
+
+    def _read_domains(self, domains: Mapping[str, ArrayLike]) -> Floats | None:
+        columns = {path: floats(values, f"domains {path}") for path, values in domains.items()}
+        sizes = {column.shape for column in columns.values()}
+        if len(sizes) > 1 or any(len(size) != 1 for size in sizes):
+            raise ValueError(f"domains: expected arrays of one shape (D,), got {sorted(sizes)}")
+        if not columns:
+            return None
+        table = np.tile(self._rollout.default_parameters, (*sizes.pop(), 1))
+        for path, column in columns.items():
+            table[:, self.parameters.index(path)] = column
+        return table
+
+    @property
+    def outputs(self) -> list[str]:
+        """Names of the S numbers of a state, as of a `Rollout`."""
+        return self._rollout.outputs
+
+    @property
+    def controls(self) -> list[str]:
+        """Paths of the C numbers of an action."""
+        return self._rollout.controls
+
+    @property
+    def parameters(self) -> list[str]:
+        """Paths of the P parameters."""
+        return self._rollout.parameters
+
+    @property
+    def state(self) -> Floats:
+        """Shape (S,), or (N, S) of a batch; NaN before the first reset."""
+        states = self._core.states()
+        return states if self.batch is not None else np.asarray(states[0])
+
+    @property
+    def steps(self) -> NDArray[np.int64]:
+        """Steps since the reset: one number, or shape (N,) of a batch."""
+        steps = np.array(self._core.steps_done(), dtype=np.int64)
+        return steps if self.batch is not None else np.asarray(steps[0])
+
+    @property
+    def time(self) -> Floats:
+        """s since the reset: one number, or shape (N,) of a batch."""
+        return np.asarray(self.steps * self.dt)
+
+    @property
+    def dt(self) -> float:
+        """The length of a step, s."""
+        return self._dt
+
+    @property
+    def touches(self) -> list[dict[tuple[str, str], float]]:
+        """The contacts that carried an impulse in the last step: {(body, body): normal impulse in
+        N s}; a dict for each row."""
+        names = self.scene.core.body_names
+        found: list[dict[tuple[str, str], float]] = []
+        for row in self._core.touches():
+            impulses: dict[tuple[str, str], float] = {}
+            for first, second, impulse in row:
+                pair = names[first], names[second]
+                impulses[pair] = impulses.get(pair, 0.0) + impulse
+            found.append(impulses)
+        return found
+
+    def _spread(self, values: Numbers, name: str, names: Sequence[str], base: Floats, rows: int) -> Floats:
+        array = _array(values, name, names, base)
+        if array.ndim > base.ndim and self.batch is None:
+            raise ValueError(f"{name}: expected shape {base.shape}, got {array.shape}")
+        if array.ndim > base.ndim and array.shape[0] != rows:
+            raise ValueError(f"{name}: expected shape {(rows, *base.shape)}, got {array.shape}")
+        return np.ascontiguousarray(np.broadcast_to(array, (rows, *base.shape)))
+
+    def reset(
+        self,
+        state: Numbers | None = None,
+        seed: int | None = None,
+        *,
+        parameters: Numbers | None = None,
+        rows: Iterable[int] | None = None,
+    ) -> Floats:
+        """Starts anew; returns the state.
+
+        Args:
+            state: Shape (S,), or one for each row that is reset, or a dict of what differs from the
+                scene's; `noise` is added to it. Absent: the scene's, as its parameters make it.
+            seed: Of `noise` and `domains` from now on; absent: they go on.
+            parameters: Shape (P,), or one for each row, or a dict; absent: drawn from `domains`, or
+                the scene's.
+            rows: Which of a batch; absent: all. The others keep their state.
+
+        Raises:
+            TangibleError: A value that is not allowed.
+        """
+        if seed is not None:
+            self._generator = np.random.default_rng(seed)
+        chosen = list(range(self._rows)) if rows is None else integers(rows, "rows")
+        if any(not 0 <= row < self._rows for row in chosen):
+            raise ValueError(f"rows: expected numbers from 0 to {self._rows - 1}, got {chosen}")
+        count = len(chosen)
+        own = self._rollout.default_parameters
+        if parameters is not None:
+            p = self._spread(parameters, "parameters", self.parameters, own, count)
+        elif self._domains is not None:
+            p = self._domains[self._generator.integers(len(self._domains), size=count)]
+        else:
+            p = np.tile(own, (count, 1))
+        if self._spread_of_parameters.any():
+            shape = (count, len(self.parameters))
+            p = p + self._spread_of_parameters * self._generator.standard_normal(shape)
+        x: Floats | None = None
+        if state is not None:
+            base = self._rollout.default_initial_state
+            x = self._spread(state, "state", self.outputs, base, count)
+        self._check(self._core.reset(chosen, np.ascontiguousarray(p), x), chosen)
+        if self._noise.any():
+            # The state is known now, also where parameters make it.
+            drawn = self._noise * self._generator.standard_normal((count, len(self._noise)))
+            x = np.ascontiguousarray(self._core.states()[chosen] + drawn)
+            self._check(self._core.reset(chosen, np.ascontiguousarray(p), x), chosen)
+        return self.state
+
+    def step(self, action: Numbers | None = None, *, steps: int = 1) -> Floats:
+        """Goes on by a step; returns the state.
+
+        Args:
+            action: Shape (C,), N or N m, or one for each row, or a dict {path: value}; absent: the
+                scene's own values.
+            steps: So many, with the action held.
+
+        Raises:
+            TangibleError: A step that failed; a value that is not finite; no reset before.
+        """
+        if steps < 1:
+            raise ValueError(f"steps: expected a number >= 1, got {steps}")
+        own = self._own
+        u = own if action is None else action
+        values = self._spread(u, "action", self.controls, own, self._rows)
+        self._check(self._core.step(values, steps), range(self._rows))
+        return self.state
+
+    def _check(self, messages: list[str], rows: Iterable[int]) -> None:
+        if self.on_failure == "nan":
+            return
+        for row, message in zip(rows, messages):
+            if message:
+                raise _core.TangibleError(message if self.batch is None else f"row {row}: {message}")
+
+    def __repr__(self) -> str:
+        batch = "" if self.batch is None else f", batch={self.batch}"
+        return f"Simulation({self.scene!r}, controls={self.controls}{batch})"

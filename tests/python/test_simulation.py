@@ -1,0 +1,135 @@
+"""A step at a time has the bits of a long run, one row or many."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+import tangible
+
+from conftest import ball
+
+PUSH = "forces/push/force/x"
+DATA = Path(__file__).resolve().parents[2] / "data"
+
+
+@pytest.mark.parametrize("stepping", ["fixed", "event"])
+def test_the_bits_of_a_long_run(stepping: str) -> None:
+    scene = ball(stepping, dt=0.007)
+    rollout = tangible.Rollout(scene, ["bodies/ball/mass"], [PUSH], records=range(87))
+    controls = np.random.default_rng(0).normal(size=(86, 1))
+    states = rollout([1.5], {"ball/x": 0.2}, controls)
+    simulation = tangible.Simulation(scene, [PUSH], parameters=["bodies/ball/mass"])
+    for _ in range(2):  # a reset begins anew
+        found = [simulation.reset({"ball/x": 0.2}, parameters=[1.5])]
+        found += [simulation.step(u) for u in controls]
+        # The run's last step is shorter: 0.6 s are no multiple of 7 ms.
+        assert np.array_equal(found[:-1], states[:-1])
+        assert simulation.steps == 86 and simulation.time == pytest.approx(86 * 0.007)
+    simulation.reset(parameters={"bodies/ball/mass": 1.5}, state={"ball/x": 0.2})
+    assert np.array_equal(simulation.step({PUSH: 0.0}, steps=10), [
+        simulation.reset({"ball/x": 0.2}, parameters=[1.5]), *[simulation.step() for _ in range(10)]][-1])
+    assert simulation.outputs == rollout.outputs and simulation.controls == [PUSH]
+
+
+@pytest.mark.parametrize("file", ["scenes/chain.json", "event_scenes/chain.json", "scenes/bouncing_ball.json"])
+def test_scenes_of_the_repository(file: str) -> None:
+    rollout = tangible.Rollout(DATA / file, records=range(0, 101, 10))
+    simulation = tangible.Simulation(DATA / file)
+    simulation.reset()
+    for state in rollout()[1:]:
+        assert np.array_equal(simulation.step(steps=10), state)
+
+
+def test_it_goes_on_beyond_the_duration() -> None:
+    simulation = tangible.Simulation(ball("event", duration=0.1))
+    simulation.reset()
+    assert np.array_equal(simulation.step(steps=60), tangible.Rollout(ball("event"))())
+
+
+def test_a_batch_has_the_bits_of_single_ones() -> None:
+    actions = np.random.default_rng(1).normal(size=(20, 5, 1))
+    starts = np.tile(tangible.Rollout(ball()).default_initial_state, (5, 1))
+    starts[:, 1] += np.arange(5) * 0.1
+    single = tangible.Simulation(ball(), [PUSH])
+    for threads in (1, 2):
+        many = tangible.Simulation(ball(), [PUSH], batch=5, threads=threads)
+        assert np.isnan(many.state).all() and many.state.shape == (5, 6)
+        many.reset(starts)
+        for action in actions:
+            states = many.step(action)
+        for row in range(5):
+            single.reset(starts[row])
+            for action in actions:
+                state = single.step(action[row])
+            assert np.array_equal(states[row], state)
+        # Some rows begin anew, the others go on.
+        many.reset(rows=[1, 3])
+        assert many.steps.tolist() == [20, 0, 20, 0, 20]
+        assert np.array_equal(many.state[0], states[0])
+        assert many.state[1, 1] == 1.1
+        # One action for all.
+        assert many.step([0.5]).shape == (5, 6)
+
+
+def test_seeds_noise_and_domains() -> None:
+    masses = np.array([1.0, 2.0, 3.0])
+    simulation = tangible.Simulation(
+        ball(), [PUSH], batch=200, noise={"ball/vx": 0.1, "bodies/ball/restitution": 0.01},
+        domains={"bodies/ball/mass": masses, "bodies/ball/position/y": masses})
+    first = simulation.reset(seed=4).copy()
+    assert set(first[:, 1]) == {1.0, 2.0, 3.0} and np.std(first[:, 3]) == pytest.approx(0.1, rel=0.2)
+    assert first[:, 3].mean() == pytest.approx(0.5, abs=0.03) and (first[:, 4] == 0).all()
+    other = simulation.reset().copy()
+    assert not np.array_equal(other, first)
+    assert np.array_equal(simulation.reset(seed=4), first)
+    # A domain's values go together: a push moves those that begin lower faster.
+    speeds = simulation.step([10.0])[:, 3] - first[:, 3]
+    assert speeds == pytest.approx(0.1 / first[:, 1])
+
+
+def test_touches_are_the_contacts_of_the_step() -> None:
+    simulation = tangible.Simulation(ball("event"))
+    simulation.reset()
+    assert simulation.touches == [{}]
+    simulation.step(steps=45)
+    assert simulation.touches == [{}]
+    simulation.step()
+    (pair, impulse), = simulation.touches[0].items()
+    assert pair == ("ball", "floor") and impulse == pytest.approx(1.2 * 1.8 * np.sqrt(2 * 9.81))
+
+
+def test_mistakes_are_said() -> None:
+    simulation = tangible.Simulation(ball(), [PUSH])
+    with pytest.raises(tangible.TangibleError, match="expected a reset before a step"):
+        simulation.step()
+    simulation.reset()
+    for wrong, said in [([1.0, 2.0], r"action: expected shape \(1,\)"), ({"x": 1.0}, "expected one of forces/push"),
+                        ([np.nan], "action: expected finite numbers"), ([[1.0]], r"action: expected shape \(1,\)")]:
+        with pytest.raises(ValueError, match=said):
+            simulation.step(wrong)
+    with pytest.raises(ValueError, match="state: expected finite numbers"):
+        simulation.reset({"ball/x": np.inf})
+    with pytest.raises(tangible.TangibleError, match="noise|matches no number"):
+        tangible.Simulation(ball(), noise={"ball/z": 1.0})
+    with pytest.raises(ValueError, match=r"domains: expected arrays of one shape \(D,\)"):
+        tangible.Simulation(ball(), domains={"bodies/ball/mass": [1.0], "bodies/ball/friction": [0.1, 0.2]})
+    many = tangible.Simulation(ball(), parameters=["bodies/ball/mass"], batch=2, on_failure="nan")
+    states = many.reset(parameters=[[1.0], [-1.0]])
+    assert np.isfinite(states[0]).all() and np.isnan(states[1]).all()
+    assert np.isnan(many.step()[1]).all() and np.isfinite(many.reset()).all()
+
+
+def test_a_step_is_cheap() -> None:
+    simulation = tangible.Simulation(ball("fixed"), [PUSH])
+    simulation.reset()
+
+    def seconds() -> float:
+        start = time.process_time()
+        for _ in range(500):
+            simulation.step([0.1])
+        return (time.process_time() - start) / 500
+
+    assert min(seconds() for _ in range(5)) < 60e-6
