@@ -6,6 +6,9 @@
 #include <filesystem>
 #include <limits>
 
+#include "tangible/app/program.h"
+#include "tangible/app/tolerances.h"
+#include "tangible/scene/csv.h"
 #include "tangible/scene/json_reader.h"
 #include "tangible/scene/scene_json.h"
 #include "tangible/scene/scene_names.h"
@@ -15,6 +18,9 @@ namespace {
 
 // Steps of a plan or a run: each has controls, and a plan has Jacobians of each.
 constexpr double kMostSteps = 1e7;
+// Each start is a plan in memory, each sample its controls.
+constexpr int kMostStarts = 10000, kMostSamples = 100000;
+constexpr int kDefaultSamples = 64;
 
 // The duration of a problem, which is rounded up to whole steps of dt, s.
 double ReadHorizon(const JsonReader& json, double dt) {
@@ -32,10 +38,72 @@ double ReadSpan(const JsonReader& json, double dt) {
   return span;
 }
 
+// The path of a file is relative to the folder of the problem's file, unless it is absolute.
+std::string Beside(const std::string& file, const std::string& path) {
+  return (std::filesystem::path(file).parent_path() / path).string();
+}
+
+// A plan's controls, a row a step, as --plan writes them.
+class InitialTable {
+ public:
+  InitialTable(const std::string& file, ControlFile* problem) : file_(file), problem_(*problem) {}
+
+  /// Empty, or what is wrong with the file, one line.
+  std::string Read() {
+    std::vector<std::string> columns = {"time"};
+    columns.insert(columns.end(), problem_.paths.begin(), problem_.paths.end());
+    std::string error;
+    if (!ReadCsv(file_, columns, columns, &table_, &error)) return error;
+    const long steps = NumSteps(problem_.scene.simulation);
+    if (static_cast<long>(table_.rows.size()) != steps) {
+      return file_ + ": expected a row for each of the horizon's " + std::to_string(steps) +
+             " steps, got " + std::to_string(table_.rows.size());
+    }
+    problem_.initial_table.resize(steps, static_cast<Eigen::Index>(problem_.paths.size()));
+    for (long k = 0; k < steps && error.empty(); ++k) error = ReadRow(static_cast<int>(k));
+    return error;
+  }
+
+ private:
+  std::string Expected(int row, const std::string& column, const std::string& what,
+                       double got) const {
+    return file_ + ": line " + std::to_string(table_.lines[row]) + ": " + column + ": expected " +
+           what + ", got " + FormatNumber(got);
+  }
+
+  std::string ReadRow(int row) {
+    std::string error;
+    double value = 0.0;
+    const double dt = problem_.scene.simulation.dt;
+    if (!ReadCell(table_, row, table_.Column("time"), &value, &error)) return error;
+    if (!(std::abs(value - row * dt) <= kSameStep * dt)) {
+      return Expected(row, "time", "the start of the step, " + FormatNumber(row * dt), value);
+    }
+    for (size_t i = 0; i < problem_.paths.size(); ++i) {
+      const std::string& path = problem_.paths[i];
+      const auto control = static_cast<Eigen::Index>(i);
+      if (!ReadCell(table_, row, table_.Column(path), &value, &error)) return error;
+      if (!(value >= problem_.low[control] && value <= problem_.high[control])) {
+        return Expected(row, path, "a number from low to high", value);
+      }
+      problem_.initial_table(row, control) = value;
+    }
+    return "";
+  }
+
+  const std::string file_;
+  ControlFile& problem_;
+  CsvTable table_;
+};
+
 // Reads the parts of a problem whose scene is known.
 class Reader {
  public:
-  Reader(const JsonReader& root, ControlFile* problem) : root_(root), problem_(*problem) {}
+  Reader(const JsonReader& root, const std::string& file, ControlFile* problem)
+      : root_(root), file_(file), problem_(*problem) {}
+
+  /// What is wrong with a file that the problem names, one line; empty: nothing.
+  const std::string& error() const { return error_; }
 
   void Read() {
     ReadControls();
@@ -60,6 +128,9 @@ class Reader {
       }
     }
     if (root_.Has("surrogate")) ReadSurrogate(root_.At("surrogate"));
+    if (root_.Has("starts")) ReadStarts(root_.At("starts"));
+    if (root_.Has("sampling")) ReadSampling(root_.At("sampling"));
+    if (root_.Has("initial")) ReadInitial(root_.At("initial"));
     if (root_.Has("mpc")) ReadPredictive(root_.At("mpc"));
   }
 
@@ -187,17 +258,54 @@ class Reader {
     if (json.Has("deviation")) {
       surrogate.deviation = json.At("deviation").Number(NumberKind::kPositive);
     }
+    NeedBounds("a surrogate, whose deviation is a share of their range");
+    ReadSeed(json, &surrogate.seed);
+  }
+
+  void NeedBounds(const std::string& with) const {
     for (int i = 0; i < static_cast<int>(problem_.paths.size()); ++i) {
       if (std::isfinite(problem_.low[i]) && std::isfinite(problem_.high[i])) continue;
       root_.At("controls")
           .At(i)
-          .Fail(
-              "expected low and high with a surrogate, whose deviation is a share of their range, "
-              "got a control without both");
+          .Fail("expected low and high with " + with + ", got a control without both");
     }
-    if (json.Has("seed")) {
-      surrogate.seed = static_cast<unsigned>(json.At("seed").Integer(0, 1000000000));
+  }
+
+  static void ReadSeed(const JsonReader& json, unsigned* seed) {
+    if (json.Has("seed")) *seed = static_cast<unsigned>(json.At("seed").Integer(0, 1000000000));
+  }
+
+  // A number of starts, or an object.
+  void ReadStarts(const JsonReader& json) {
+    StartOptions& starts = problem_.starts;
+    if (json.IsNumber()) {
+      starts.count = json.Integer(1, kMostStarts);
+    } else {
+      json.ExpectKeys({"count", "pieces", "seed"}, " of starts");
+      starts.count = json.At("count").Integer(1, kMostStarts);
+      if (json.Has("pieces")) starts.pieces = json.At("pieces").Integer(1, 1000000);
+      ReadSeed(json, &starts.seed);
     }
+    if (starts.count > 1) NeedBounds("starts, which are drawn between them");
+  }
+
+  void ReadSampling(const JsonReader& json) {
+    json.ExpectKeys({"method", "samples", "iterations", "seed"}, " of sampling");
+    SamplingOptions& sampling = problem_.sampling;
+    sampling.method = json.At("method").Choice({"cross_entropy", "mppi"}) == 0
+                          ? SamplingMethod::kCrossEntropy
+                          : SamplingMethod::kMppi;
+    sampling.samples =
+        json.Has("samples") ? json.At("samples").Integer(2, kMostSamples) : kDefaultSamples;
+    if (json.Has("iterations")) sampling.iterations = json.At("iterations").Integer(1, 10000);
+    ReadSeed(json, &sampling.seed);
+    NeedBounds("sampling, which draws between them");
+  }
+
+  void ReadInitial(const JsonReader& json) {
+    json.ExpectKeys({"file"}, " of initial");
+    const std::string path = json.At("file").String();
+    if (root_.ok()) error_ = InitialTable(Beside(file_, path), &problem_).Read();
   }
 
   void ReadPredictive(const JsonReader& json) {
@@ -211,15 +319,11 @@ class Reader {
   }
 
   const JsonReader& root_;
+  const std::string& file_;
   ControlFile& problem_;
   std::vector<std::string> outputs_;
+  std::string error_;
 };
-
-// The path of a scene's file is relative to the folder of the problem's file, unless it is
-// absolute.
-std::string Beside(const std::string& file, const std::string& path) {
-  return (std::filesystem::path(file).parent_path() / path).string();
-}
 
 }  // namespace
 
@@ -232,6 +336,15 @@ std::string CheckControls(const Scene& scene, const std::vector<std::string>& pa
     error = function.Create(scene, {}, {paths.begin(), paths.begin() + *which + 1}, {});
   }
   return error;
+}
+
+RowMatrixXd ControlFile::InitialControls(long steps) const {
+  if (initial_table.rows() == 0) return initial.transpose().replicate(steps, 1);
+  RowMatrixXd controls(steps, initial_table.cols());
+  for (long k = 0; k < steps; ++k) {
+    controls.row(k) = initial_table.row(std::min<Eigen::Index>(k, initial_table.rows() - 1));
+  }
+  return controls;
 }
 
 bool LoadControlFile(const std::string& file, ControlFile* problem, std::string* error) {
@@ -247,7 +360,7 @@ bool ParseControlFile(const std::string& text, const std::string& file, ControlF
   const JsonReader root(json, &errors);
   root.ExpectKeys({"name", "scene", "controls", "cost", "horizon", "max_iterations",
                    "gradient_tolerance", "second_order", "reference_extension", "surrogate",
-                   "mpc"});
+                   "starts", "sampling", "initial", "mpc"});
   if (root.Has("name")) root.At("name").String();
   const std::string scene = root.At("scene").String();
   if (errors.ok()) {
@@ -262,7 +375,12 @@ bool ParseControlFile(const std::string& text, const std::string& file, ControlF
     // Controls are held over whole steps.
     SimulationSettings& settings = problem->scene.simulation;
     settings.duration = static_cast<double>(NumSteps(settings)) * settings.dt;
-    Reader(root, problem).Read();
+    Reader reader(root, file, problem);
+    reader.Read();
+    if (errors.ok() && !reader.error().empty()) {
+      *error = reader.error();
+      return false;
+    }
   }
   *error = errors.message();
   return errors.ok();

@@ -8,6 +8,7 @@
 
 #include "tangible/control/engine_step.h"
 #include "tangible/control/ilqr.h"
+#include "tangible/control/plan_search.h"
 
 namespace tangible {
 
@@ -15,7 +16,11 @@ struct ControlFile {
   Scene scene;  ///< its duration is the horizon's
   std::string scene_path;
   std::vector<std::string> paths;  ///< of the controls
-  VectorX<double> low, high, initial;
+  VectorX<double> low, high;
+  VectorX<double> initial;    ///< of each control, in all steps
+  RowMatrixXd initial_table;  ///< of each step, in place of `initial`; empty: none
+  StartOptions starts;
+  SamplingOptions sampling;
   std::vector<CostTerm> terms;
   std::vector<std::string> term_names;  ///< of each: its place in the file, and what it is of
   IlqrOptions options;
@@ -23,6 +28,9 @@ struct ControlFile {
   double run_duration = 0.0;
   double plan_horizon = 0.0;
   int plan_iterations = 5;
+
+  /// The initial controls of so many steps; a table that ends before holds its last row.
+  RowMatrixXd InitialControls(long steps) const;
 };
 
 /// What is wrong with the paths of controls in a scene, one line, and which path it is (-1: none,

@@ -6,7 +6,7 @@
 namespace tangible {
 namespace {
 
-constexpr int kMost = 1000000;
+constexpr int kMost = 1000000, kMostStarts = 10000;
 
 OrderedJson ControlSchemaOfOne() {
   const OrderedJson number = SchemaOfNumber(NumberKind::kFree);
@@ -34,27 +34,40 @@ OrderedJson TermSchema() {
 
 OrderedJson ControlSchema() {
   const OrderedJson positive = SchemaOfNumber(NumberKind::kPositive);
+  const OrderedJson seed = SchemaOfInteger(0, 1000000000);
   const OrderedJson seconds = SchemaOfNumber(NumberKind::kPositive, "s");
   return SchemaOfFile(
       "a control problem",
-      SchemaOfObject({{"name", SchemaOfText()},
-                      {"scene", SchemaOfText()},
-                      {"controls", SchemaOfArray(ControlSchemaOfOne(), 1)},
-                      {"cost", SchemaOfArray(TermSchema(), 1)},
-                      {"horizon", seconds},
-                      {"max_iterations", SchemaOfInteger(1, kMost)},
-                      {"gradient_tolerance", positive},
-                      {"second_order", SchemaOfFlag()},
-                      {"reference_extension", SchemaOfFlag()},
-                      {"surrogate", SchemaOfObject({{"samples", SchemaOfInteger(2, kMost)},
-                                                    {"deviation", positive},
-                                                    {"seed", SchemaOfInteger(0, 1000000000)}},
-                                                   {"samples"})},
-                      {"mpc", SchemaOfObject({{"duration", seconds},
-                                              {"horizon", seconds},
-                                              {"iterations", SchemaOfInteger(1, kMost)}},
-                                             {"duration", "horizon"})}},
-                     {"scene", "controls", "cost"}));
+      SchemaOfObject(
+          {{"name", SchemaOfText()},
+           {"scene", SchemaOfText()},
+           {"controls", SchemaOfArray(ControlSchemaOfOne(), 1)},
+           {"cost", SchemaOfArray(TermSchema(), 1)},
+           {"horizon", seconds},
+           {"max_iterations", SchemaOfInteger(1, kMost)},
+           {"gradient_tolerance", positive},
+           {"second_order", SchemaOfFlag()},
+           {"reference_extension", SchemaOfFlag()},
+           {"surrogate",
+            SchemaOfObject(
+                {{"samples", SchemaOfInteger(2, kMost)}, {"deviation", positive}, {"seed", seed}},
+                {"samples"})},
+           {"starts", SchemaOfAny({SchemaOfInteger(1, kMostStarts),
+                                   SchemaOfObject({{"count", SchemaOfInteger(1, kMostStarts)},
+                                                   {"pieces", SchemaOfInteger(1, kMost)},
+                                                   {"seed", seed}},
+                                                  {"count"})})},
+           {"sampling", SchemaOfObject({{"method", SchemaOfWords({"cross_entropy", "mppi"})},
+                                        {"samples", SchemaOfInteger(2, 100000)},
+                                        {"iterations", SchemaOfInteger(1, 10000)},
+                                        {"seed", seed}},
+                                       {"method"})},
+           {"initial", SchemaOfObject({{"file", SchemaOfText()}}, {"file"})},
+           {"mpc", SchemaOfObject({{"duration", seconds},
+                                   {"horizon", seconds},
+                                   {"iterations", SchemaOfInteger(1, kMost)}},
+                                  {"duration", "horizon"})}},
+          {"scene", "controls", "cost"}));
 }
 
 }  // namespace tangible

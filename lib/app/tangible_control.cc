@@ -19,6 +19,7 @@
 #include "tangible/app/trajectory_csv.h"
 #include "tangible/app/view_recorder.h"
 #include "tangible/control/model_predictive.h"
+#include "tangible/control/plan_search.h"
 #include "tangible/control/replay.h"
 #include "tangible/control/unreached_targets.h"
 #include "tangible/math/median.h"
@@ -33,6 +34,8 @@ DEFINE_string(plant, "", "with --mpc: the scene that is controlled; empty: the p
 DEFINE_double(budget_ms, 0.0,
               "with --mpc: time of each plan, ms; 0: a number of iterations, with the same result "
               "on any machine");
+DEFINE_int32(threads, 0,
+             "of starts and sampling; 0: one a core; results do not depend on their number");
 DEFINE_string(out, "", "file of the result (JSON); empty: stdout");
 DEFINE_string(plan, "", "file of the controls, a row a step (CSV)");
 DEFINE_string(trajectory, "", "file of the motion (CSV)");
@@ -42,7 +45,8 @@ namespace tangible {
 namespace {
 
 std::string CheckFlags() {
-  std::string outside = FirstOutside({{"--budget_ms", FLAGS_budget_ms, 0}});
+  std::string outside = FirstOutside(
+      {{"--budget_ms", FLAGS_budget_ms, 0}, {"--threads", FLAGS_threads, 0, kMostThreads}});
   if (!outside.empty()) return outside;
   if (!FLAGS_mpc && !FLAGS_plant.empty()) return "--plant: needs --mpc";
   if (!FLAGS_mpc && FLAGS_budget_ms > 0.0) return "--budget_ms: needs --mpc";
@@ -73,6 +77,7 @@ struct Judged {
   double cost_of_nothing = 0.0;
   Verdict verdict;
   Certificate certificate;
+  SearchResult search;  // without `best`, which is the result
 };
 
 // Adds the largest entries of the columns of B, a control each.
@@ -80,11 +85,12 @@ void AddEffect(const MatrixX<double>& b, VectorX<double>* effect) {
   *effect += b.cwiseAbs().colwise().maxCoeff().transpose();
 }
 
-// Finds a control that moves nothing in any step of the motion with the initial controls, and with
-// a surrogate in none of its samples either. Empty, or an error of one line. Where a step cannot be
+// Finds a control that moves nothing in any step of the motion with these controls, and with a
+// surrogate in none of its samples either. Empty, or an error of one line. Where a step cannot be
 // made only those before it count.
 std::string FindIdle(const ControlProblem& problem, const ControlFile& file,
-                     const RolloutFunction& function, long steps) {
+                     const RolloutFunction& function, const RowMatrixXd& controls) {
+  const long steps = controls.rows();
   Model<double> model;
   State<double> state;
   BuildModel(function.scene(), &model, &state);
@@ -99,13 +105,13 @@ std::string FindIdle(const ControlProblem& problem, const ControlFile& file,
   MatrixX<double> a, b;
   std::string error;
   for (long k = 0; k < steps && effect.minCoeff() <= least; ++k) {
-    if (!problem.map->Linearise(k, x, file.initial, &next, &a, &b, &error)) return "";
+    if (!problem.map->Linearise(k, x, controls.row(k), &next, &a, &b, &error)) return "";
     AddEffect(b, &effect);
     x = next;
   }
   if (effect.minCoeff() <= least && file.options.surrogate.samples > 0) {
     Plan plan;
-    plan.controls = file.initial.transpose().replicate(steps, 1);
+    plan.controls = controls;
     plan.states = problem.initial.transpose();
     std::vector<MatrixX<double>> mean_a(steps, a), mean_b(steps, MatrixX<double>(0.0 * b));
     AverageJacobians(problem, plan, file.options.surrogate, &mean_a, &mean_b);
@@ -257,7 +263,7 @@ Verdict VerdictOf(const ControlFile& file, const Judged& plan, const UnreachedTa
   if (unreached.all) {
     return {"no_effect_on_target",
             "the controls have no effect on " + NamesOf(file, unreached.terms) +
-                " from where the plan is; try another initial of the controls, or a surrogate",
+                " from where the plan is; try starts or sampling, another initial, or a surrogate",
             false};
   }
   return {NameOf(result.status), result.message, true};
@@ -319,6 +325,10 @@ void WarnOfDiscreteMap(const std::string& path, const Certificate& certificate) 
   }
 }
 
+SearchOptions SearchOf(const ControlFile& file) {
+  return {file.starts, file.sampling, file.options, FLAGS_threads};
+}
+
 OrderedJson DescribePlan(const ControlFile& file, const RolloutFunction& function,
                          const Judged& plan) {
   const IlqrResult& result = plan.result;
@@ -340,6 +350,21 @@ OrderedJson DescribePlan(const ControlFile& file, const RolloutFunction& functio
       {"cpu_seconds", plan.seconds},
       {"iterations", DescribeIterations(result.iterations, result.surrogate_iterations)},
       {"controls", DescribeControls(file, result.plan.controls, file.scene.simulation.dt)}};
+  if (file.starts.count > 1 || file.sampling.samples > 0) {
+    json["starts"] = {{"count", plan.search.start_costs.size()},
+                      {"pieces", file.starts.pieces},
+                      {"seed", file.starts.seed},
+                      {"drawn", plan.search.drawn},
+                      {"chosen", plan.search.chosen},
+                      {"costs", plan.search.start_costs},
+                      {"polished_costs", plan.search.polished_costs}};
+  }
+  if (file.sampling.samples > 0) {
+    json["sampling"] = {{"method", NameOf(file.sampling.method)},
+                        {"samples", file.sampling.samples},
+                        {"iterations", file.sampling.iterations},
+                        {"seed", file.sampling.seed}};
+  }
   if (file.options.surrogate.samples > 0) {
     json["surrogate"] = {{"samples", file.options.surrogate.samples},
                          {"deviation", file.options.surrogate.deviation},
@@ -370,17 +395,22 @@ int MakePlan(const std::string& path, const ControlFile& file) {
   EngineStep map(function);
   const Cost cost(map.num_states(), map.num_controls(), file.scene.simulation.dt, file.terms);
   const ControlProblem problem{&map, &cost, map.initial(), file.low, file.high, 0};
-  error = FindIdle(problem, file, function, function.num_steps());
-  if (!error.empty()) return ReportError(path + ": " + error);
-  const RowMatrixXd start = file.initial.transpose().replicate(function.num_steps(), 1);
+  const RowMatrixXd start = file.InitialControls(function.num_steps());
+  const SearchOptions search = SearchOf(file);
+  const std::string idle = FindIdle(problem, file, function, start);
+  if (!idle.empty() && !search.searches()) return ReportError(path + ": " + idle);
   Judged plan;
   const std::clock_t began = std::clock();
-  plan.result = SolveIlqr(problem, start, file.options);
+  plan.search = SearchPlan({&function, &cost, file.low, file.high}, start, search);
+  plan.result = std::move(plan.search.best);
   plan.seconds = static_cast<double>(std::clock() - began) / CLOCKS_PER_SEC;
   const RowMatrixXd& controls = plan.result.plan.controls;
   if (plan.result.status == IlqrStatus::kFailed) {
     return ReportError(path + ": " + plan.result.message);
   }
+  // What moves nothing at first may in the plan from another start.
+  if (!idle.empty()) error = FindIdle(problem, file, function, controls);
+  if (!error.empty()) return ReportError(path + ": " + error);
   if (plan.result.left_maximum) WarnOfMaximum(path);
   RolloutInput input{VectorX<double>(), VectorX<double>(), controls};
   RolloutWorker worker(function);
@@ -457,6 +487,18 @@ long NumRunSteps(const ControlFile& file) {
   return NumSteps(whole);
 }
 
+// Where the first plan begins: with starts or sampling at the plan that they find.
+RowMatrixXd FirstControls(const ControlFile& file, const Cost& cost, long horizon) {
+  const RowMatrixXd initial = file.InitialControls(horizon);
+  const SearchOptions search = SearchOf(file);
+  Scene scene = file.scene;
+  scene.simulation.duration = static_cast<double>(horizon) * scene.simulation.dt;
+  RolloutFunction function;
+  if (!search.searches() || !function.Create(scene, {}, file.paths, {}).empty()) return initial;
+  const IlqrResult best = SearchPlan({&function, &cost, file.low, file.high}, initial, search).best;
+  return best.status == IlqrStatus::kFailed ? initial : best.plan.controls;
+}
+
 PredictiveRun RunPredictive(const ControlFile& file, EngineStep* map, EngineStep* plant) {
   PredictiveRun run;
   const double dt = file.scene.simulation.dt;
@@ -467,7 +509,7 @@ PredictiveRun RunPredictive(const ControlFile& file, EngineStep* map, EngineStep
   options.ilqr.max_iterations = file.plan_iterations;
   if (FLAGS_budget_ms > 0.0) options.ilqr.max_iterations = file.options.max_iterations;
   PredictiveController controller({map, &cost, map->initial(), file.low, file.high, 0},
-                                  file.initial.transpose().replicate(horizon, 1), options);
+                                  FirstControls(file, cost, horizon), options);
   VectorX<double> x = plant->initial();
   run.played.states.resize(steps + 1, x.size());
   run.played.controls.resize(steps, map->num_controls());
@@ -534,7 +576,7 @@ int Predict(const std::string& path, const ControlFile& file) {
   if (!error.empty()) return ReportError(path + ": " + error);
   EngineStep map(function), plant(of_plant);
   error = FindIdle({&map, nullptr, map.initial(), file.low, file.high}, file, function,
-                   NumRunSteps(file));
+                   file.InitialControls(NumRunSteps(file)));
   if (!error.empty()) return ReportError(path + ": " + error);
   const PredictiveRun run = RunPredictive(file, &map, &plant);
   error = WhyNoResult(run, file);
@@ -568,7 +610,7 @@ int Main(int argc, char** argv) {
       {.name = "tangible-control",
        .synopsis =
            "PROBLEM.json [--out=R.json] [--plan=U.csv] [--trajectory=T.csv] [--view=V.html] "
-           "[--mpc [--plant=SCENE.json] [--budget_ms=T]]",
+           "[--threads=N] [--mpc [--plant=SCENE.json] [--budget_ms=T]]",
        .description =
            "Plans forces and efforts of a scene, within bounds, so that a cost is least: "
            "iLQR over the\nengine's exact step derivatives. With --mpc controls a plant "

@@ -10,5 +10,7 @@ namespace tangible {
 inline constexpr double kSymmetric = 1e-9;
 /// Of the number of rows times the largest eigenvalue: smaller eigenvalues count as 0.
 inline constexpr double kDefiniteRounding = 1e-15;
+/// Of a step: the times in a table of controls may be off by it, as they are written in decimals.
+inline constexpr double kSameStep = 1e-6;
 
 }  // namespace tangible

@@ -14,13 +14,13 @@ TEST_F(TangibleBounceTest, PrintsATableAndWritesOutcomes) {
   const ProgramRun run = Run(
       "tangible-bounce", kScene + " --problems=2 --iterations=3 --out='" + Path("r.json") + "'");
   ASSERT_EQ(run.exit_status, 0) << run.error;
-  for (const char* name : {"exact", "extended", "surrogate", "fixed"}) {
+  for (const char* name : {"exact", "extended", "surrogate", "starts", "sampling", "fixed"}) {
     EXPECT_NE(run.out.find(name), std::string::npos) << name;
   }
   const auto json = nlohmann::json::parse(Read(Path("r.json")));
   EXPECT_EQ(json["problems"], 2);
-  ASSERT_EQ(json["methods"].size(), 4U);
-  EXPECT_EQ(json["methods"][3]["outcomes"].size(), 2U);
+  ASSERT_EQ(json["methods"].size(), 6U);
+  EXPECT_EQ(json["methods"][5]["outcomes"].size(), 2U);
 }
 
 TEST_F(TangibleBounceTest, MistakesAreOneLine) {

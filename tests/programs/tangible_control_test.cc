@@ -217,6 +217,90 @@ TEST_F(TangibleControlTest, WarnsOnceOfTheDiscreteMap) {
   }
 }
 
+// Starts and samples are named in the result, which does not depend on the number of threads.
+TEST_F(TangibleControlTest, StartsAndSamplingAreOfTheProblem) {
+  const std::string problem = Problem(kBounded, R"(, "starts": {"count": 3, "pieces": 2, "seed": 5},
+        "sampling": {"method": "mppi", "samples": 8, "iterations": 2, "seed": 4})");
+  const ProgramRun run = Control(problem, "--threads=1");
+  ASSERT_EQ(run.exit_status, 0) << run.error;
+  json result = json::parse(run.out);
+  EXPECT_EQ(result["status"], "converged");
+  EXPECT_NEAR(result["cost"].get<double>(), 24.0, 0.2);
+  EXPECT_EQ(result["starts"]["count"], 3);
+  EXPECT_EQ(result["starts"]["costs"].size(), 3u);
+  EXPECT_EQ(result["starts"]["polished_costs"].size(), 3u);
+  EXPECT_GT(result["starts"]["drawn"].get<int>(), 16);
+  EXPECT_EQ(result["sampling"]["method"], "mppi");
+  json other = json::parse(Control(problem, "--threads=4").out);
+  result.erase("cpu_seconds");
+  other.erase("cpu_seconds");
+  EXPECT_EQ(result, other);
+  const ProgramRun number = Control(Problem(kBounded, R"(, "starts": 2)"));
+  ASSERT_EQ(number.exit_status, 0) << number.error;
+  EXPECT_EQ(json::parse(number.out)["starts"]["count"], 2);
+  ExpectOneLine(Control(Problem(kBounded), "--threads=-1"), 2, "--threads: expected a number");
+  const ProgramRun horizons = Control(
+      Problem(kBounded, R"(, "starts": 3, "mpc": {"duration": 0.2, "horizon": 0.5})"), "--mpc");
+  EXPECT_EQ(horizons.exit_status, 0) << horizons.error;
+}
+
+// A plan is where another begins: it has converged there. In a receding horizon its first steps
+// are, and its last one is held beyond its end.
+TEST_F(TangibleControlTest, APlanFileContinues) {
+  const std::string plan = Path("plan.csv");
+  const ProgramRun first = Control(Problem(kBounded), "--plan='" + plan + "'");
+  ASSERT_EQ(first.exit_status, 0) << first.error;
+  const std::string table = R"(, "initial": {"file": "plan.csv"})";
+  const ProgramRun second = Control(Problem(kBounded, table));
+  ASSERT_EQ(second.exit_status, 0) << second.error;
+  const json a = json::parse(first.out), b = json::parse(second.out);
+  EXPECT_EQ(a["iterations"].size(), 1u);
+  EXPECT_EQ(b["iterations"].size(), 0u);
+  EXPECT_EQ(a["controls"], b["controls"]);
+  EXPECT_EQ(a["cost"], b["cost"]);
+  const std::string mpc = R"(, "mpc": {"duration": 0.2, "horizon": 1.5})";
+  EXPECT_EQ(Control(Problem(kBounded, table + mpc), "--mpc").exit_status, 0);
+
+  const std::string good = Read(plan);
+  const auto with = [&](const std::string& text) {
+    Write("plan.csv", text);
+    return Control(Problem(kBounded, table));
+  };
+  ExpectOneLine(with(good.substr(0, good.rfind('\n', good.size() - 2) + 1)), 1,
+                "plan.csv: expected a row for each of the horizon's 20 steps, got 19");
+  std::string late = good;
+  late.replace(late.find("\n0,"), 3, "\n0.01,");
+  ExpectOneLine(with(late), 1,
+                "plan.csv: line 2: time: expected the start of the step, 0, got 0.01");
+  std::string large = good;
+  const size_t at = large.find("\n0,") + 3;
+  large.replace(at, large.find('\n', at) - at, "1001");
+  ExpectOneLine(
+      with(large), 1,
+      "plan.csv: line 2: joints/rail/effort: expected a number from low to high, got 1001");
+  ExpectOneLine(with("time,joints/rail/efort\n0,1\n"), 1, "plan.csv: ");
+  std::filesystem::remove(plan);
+  ExpectOneLine(Control(Problem(kBounded, table)), 1, "plan.csv: ");
+}
+
+TEST_F(TangibleControlTest, MistakesOfSearchesAreOneLine) {
+  ExpectOneLine(Control(Problem(kEffort, R"(, "starts": 2)")), 1,
+                "/controls/0: expected low and high with starts, which are drawn between them");
+  ExpectOneLine(Control(Problem(kEffort, R"(, "sampling": {"method": "mppi"})")), 1,
+                "/controls/0: expected low and high with sampling");
+  ExpectOneLine(Control(Problem(kBounded, R"(, "starts": 0)")), 1, "/starts: expected");
+  ExpectOneLine(Control(Problem(kBounded, R"(, "starts": {"pieces": 2})")), 1, "/starts/count");
+  ExpectOneLine(Control(Problem(kBounded, R"(, "starts": {"count": 2, "pieces": 0})")), 1,
+                "/starts/pieces: expected");
+  ExpectOneLine(Control(Problem(kBounded, R"(, "starts": "many")")), 1, "/starts: expected");
+  ExpectOneLine(Control(Problem(kBounded, R"(, "sampling": {"method": "annealing"})")), 1,
+                "/sampling/method: expected");
+  ExpectOneLine(Control(Problem(kBounded, R"(, "sampling": {"method": "mppi", "samples": 1})")), 1,
+                "/sampling/samples: expected");
+  ExpectOneLine(Control(Problem(kBounded, R"(, "initial": {"fil": "x"})")), 1, "unknown key");
+  ExpectOneLine(Control(Problem(kBounded, R"(, "initial": 3)")), 1, "/initial: expected");
+}
+
 TEST_F(TangibleControlTest, MistakesAreOneLine) {
   ExpectOneLine(Control(Problem(R"({"path": "joints/rail/effort", "low": 2, "high": 1})")), 1,
                 "/controls/0/high: expected a number >= low, got 1");

@@ -12,6 +12,7 @@
 
 #include "tangible/control/engine_step.h"
 #include "tangible/control/ilqr.h"
+#include "tangible/control/plan_search.h"
 #include "tangible/estimation/fit/linearisation.h"
 #include "tangible/math/cpu_time.h"
 #include "tangible/math/random.h"
@@ -24,6 +25,8 @@ constexpr double kEffortWeight = 1e-3, kCupWeight = 100.0;
 // Of the surrogate: its deviation is a share of the range of efforts.
 constexpr int kSamples = 8;
 constexpr double kDeviation = 0.05;
+// Of the search for a start.
+constexpr int kSamplesOfRound = 32, kRounds = 4;
 // Of problems: a ball that comes so far, m, was struck; so many are drawn for one, at most.
 constexpr double kStruck = 0.8;
 constexpr int kMostDraws = 100;
@@ -61,6 +64,7 @@ class Planned {
   }
 
   const ControlProblem& control() const { return control_; }
+  SearchProblem search() const { return {&function_, cost_.get(), control_.low, control_.high}; }
   RowMatrixXd Start() const {
     return RowMatrixXd::Constant(function_.num_steps(), 1, problem_.effort);
   }
@@ -93,6 +97,16 @@ class Planned {
   int ball_ = 0;
 };
 
+// Efforts that are constant in pieces of equal length, uniform within the bounds.
+void DrawPieces(int pieces, std::mt19937_64* random, RowMatrixXd* efforts) {
+  for (int piece = 0; piece < pieces; ++piece) {
+    const double effort = Uniform(-kLargestEffort, kLargestEffort, random);
+    const Eigen::Index first = piece * efforts->rows() / pieces;
+    const Eigen::Index last = (piece + 1) * efforts->rows() / pieces;
+    efforts->middleRows(first, last - first).setConstant(effort);
+  }
+}
+
 // Empty where it has none.
 RowMatrixXd GradientAtStart(Planned* planned) {
   Plan plan;
@@ -116,7 +130,7 @@ std::string CheckScene(const Scene& scene) {
   return "/joints: expected a prismatic joint slider, got none";
 }
 
-Problem Draw(const Scene& scene, unsigned seed, unsigned number) {
+Problem Draw(const Scene& scene, unsigned seed, unsigned number, int pieces) {
   std::mt19937_64 random = Generator(seed, number);
   Problem problem;
   problem.scene = scene;
@@ -129,8 +143,10 @@ Problem Draw(const Scene& scene, unsigned seed, unsigned number) {
     ball.velocity[0] = speed + Uniform(-0.1, 0.1, &random);
     problem.effort = Uniform(4.0, 14.0, &random);
     Planned planned(problem, Stepping::kEvent);
+    RowMatrixXd efforts = planned.Start();
+    if (pieces > 1) DrawPieces(pieces, &random, &efforts);
     Plan plan;
-    if (!planned.Play(planned.Start(), &plan)) continue;
+    if (!planned.Play(efforts, &plan)) continue;
     problem.cup = planned.BallAtEnd(plan);
     if (problem.cup.x() > ball.position[0] + kStruck) break;
   }
@@ -146,13 +162,17 @@ const char* NameOf(Method method) {
       return "extended";
     case Method::kSurrogate:
       return "surrogate";
+    case Method::kStarts:
+      return "starts";
+    case Method::kSampling:
+      return "sampling";
     case Method::kFixed:
       return "fixed";
   }
   return "";
 }
 
-Outcome Solve(const Problem& problem, Method method, int iterations) {
+Outcome Solve(const Problem& problem, Method method, int iterations, int starts) {
   Planned own(problem, method == Method::kFixed ? Stepping::kFixed : Stepping::kEvent);
   IlqrOptions options;
   options.max_iterations = iterations;
@@ -162,7 +182,15 @@ Outcome Solve(const Problem& problem, Method method, int iterations) {
   }
   Outcome outcome;
   const double began = ThreadCpuSeconds();
-  const IlqrResult result = SolveIlqr(own.control(), own.Start(), options);
+  SearchOptions search;
+  search.ilqr = options;
+  search.threads = 1;
+  if (method == Method::kStarts) search.starts.count = starts;
+  if (method == Method::kSampling) {
+    search.sampling.samples = kSamplesOfRound;
+    search.sampling.iterations = kRounds;
+  }
+  const IlqrResult result = SearchPlan(own.search(), own.Start(), search).best;
   outcome.cpu_seconds = ThreadCpuSeconds() - began;
   outcome.iterations = static_cast<int>(result.iterations.size());
   outcome.distance = outcome.believed = std::numeric_limits<double>::infinity();
@@ -185,15 +213,16 @@ Direction OfFixedGradient(const Problem& problem) {
   return product > 0.0 ? Direction::kDown : product < 0.0 ? Direction::kUp : Direction::kNothing;
 }
 
-std::vector<Row> Run(const Scene& scene, unsigned seed, int count, int iterations, int threads,
+std::vector<Row> Run(const Scene& scene, const StudyOptions& options,
                      const std::function<void(long)>& progress) {
-  std::vector<Row> rows(count);
+  std::vector<Row> rows(options.problems);
   std::mutex mutex;
   long done = 0;
-  ForEachOnThreads(threads, count, [&](int i) {
-    const Problem problem = Draw(scene, seed, static_cast<unsigned>(i));
-    for (size_t method = 0; method < std::size(kMethods); ++method) {
-      rows[i].outcomes[method] = Solve(problem, kMethods[method], iterations);
+  ForEachOnThreads(options.threads, options.problems, [&](int i) {
+    const Problem problem = Draw(scene, options.seed, static_cast<unsigned>(i), options.pieces);
+    for (const Method method : options.methods) {
+      rows[i].outcomes[static_cast<size_t>(method)] =
+          Solve(problem, method, options.iterations, options.starts);
     }
     rows[i].fixed = OfFixedGradient(problem);
     const std::lock_guard<std::mutex> lock(mutex);

@@ -19,6 +19,11 @@
 
 DEFINE_int32(problems, 100, "random problems");
 DEFINE_int32(seed, 1, "of the problems");
+DEFINE_int32(
+    pieces, 1,
+    "pieces of the efforts that bring the ball to the cup: 1: held, in the strokes' range");
+DEFINE_string(methods, "exact,extended,surrogate,starts,sampling,fixed", "those that plan");
+DEFINE_int32(starts, 8, "of the method starts");
 DEFINE_int32(iterations, 60, "of each plan, at most");
 DEFINE_int32(threads, 0, "problems at the same time; 0: one a core; results do not depend on it");
 DEFINE_string(out, "", "file of all outcomes (JSON)");
@@ -28,9 +33,28 @@ namespace {
 
 constexpr int kMostProblems = 100000;
 
+// Those that --methods names; false where it names another.
+bool ReadMethods(std::vector<bounce::Method>* methods) {
+  for (const std::string& name : SplitAtCommas(FLAGS_methods)) {
+    const auto* found =
+        std::find_if(std::begin(bounce::kMethods), std::end(bounce::kMethods),
+                     [&](bounce::Method method) { return name == bounce::NameOf(method); });
+    if (found == std::end(bounce::kMethods)) return false;
+    methods->push_back(*found);
+  }
+  return true;
+}
+
 std::string CheckFlags() {
+  std::vector<bounce::Method> methods;
+  if (!ReadMethods(&methods)) {
+    return "--methods: expected some of exact, extended, surrogate, starts, sampling, fixed, got " +
+           FLAGS_methods;
+  }
   return FirstOutside({{"--problems", FLAGS_problems, 1, kMostProblems},
                        {"--seed", FLAGS_seed, 0},
+                       {"--pieces", FLAGS_pieces, 1, 100},
+                       {"--starts", FLAGS_starts, 2, 1000},
                        {"--iterations", FLAGS_iterations, 1, kMostProblems},
                        {"--threads", FLAGS_threads, 0, kMostThreads}});
 }
@@ -65,7 +89,8 @@ Column ColumnOf(const std::vector<bounce::Row>& rows, size_t method) {
   return column;
 }
 
-OrderedJson Print(const std::vector<bounce::Row>& rows) {
+OrderedJson Print(const std::vector<bounce::Row>& rows,
+                  const std::vector<bounce::Method>& methods) {
   int up = 0, nothing = 0;
   for (const bounce::Row& row : rows) {
     up += row.fixed == bounce::Direction::kUp ? 1 : 0;
@@ -78,9 +103,10 @@ OrderedJson Print(const std::vector<bounce::Row>& rows) {
   std::printf("%-10s %10s %18s %12s %12s %11s %10s\n", "method", "successes", "of those led away",
               "distance (m)", "believed (m)", "iterations", "CPU (s)");
   OrderedJson list = OrderedJson::array();
-  for (size_t method = 0; method < std::size(bounce::kMethods); ++method) {
+  for (const bounce::Method of : methods) {
+    const auto method = static_cast<size_t>(of);
     const Column column = ColumnOf(rows, method);
-    const char* name = bounce::NameOf(bounce::kMethods[method]);
+    const char* name = bounce::NameOf(of);
     std::printf("%-10s %10d %11d of %3d %12.4f %12.4f %11.0f %10.2f\n", name, column.successes,
                 column.successes_away, column.away, column.distance, column.believed,
                 column.iterations, column.seconds);
@@ -103,11 +129,13 @@ int Main(int argc, char** argv) {
   const CommandLine line = ParseCommandLine(
       argc, argv,
       {.name = "tangible-bounce",
-       .synopsis = "SCENE.json [--problems=N] [--seed=S] [--iterations=K] [--out=R.json]",
+       .synopsis =
+           "SCENE.json [--problems=N] [--seed=S] [--pieces=P] [--iterations=K] [--out=R.json]",
        .description =
            "Plans how a hammer strikes a falling ball so that it bounces into a cup, from random "
            "starts: with exact\nJacobians of event steps, with the reference extended across "
-           "impacts, with a sampled surrogate, with fixed steps.\nThe scene has bodies hammer and "
+           "impacts, with a sampled surrogate, from several starts, from a sampled one, with fixed "
+           "steps.\nThe scene has bodies hammer and "
            "ball and a joint slider, as data/control/struck_ball.json.",
        .version = TANGIBLE_VERSION,
        .source_file = __FILE__,
@@ -124,12 +152,24 @@ int Main(int argc, char** argv) {
   if (!error.empty()) return ReportError(error, kExitUsage);
   const int cores = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
   Progress progress("problems", FLAGS_problems);
-  const std::vector<bounce::Row> rows = bounce::Run(
-      scene, static_cast<unsigned>(FLAGS_seed), FLAGS_problems, FLAGS_iterations,
-      FLAGS_threads > 0 ? FLAGS_threads : cores, [&](long done) { progress.Show(done); });
-  std::cout << ProvenanceLine() << "; seed " << FLAGS_seed << "\n\n" << std::flush;
-  OrderedJson json = Print(rows);
+  std::vector<bounce::Method> methods;
+  ReadMethods(&methods);
+  const std::vector<bounce::Row> rows =
+      bounce::Run(scene,
+                  {.seed = static_cast<unsigned>(FLAGS_seed),
+                   .problems = FLAGS_problems,
+                   .pieces = FLAGS_pieces,
+                   .iterations = FLAGS_iterations,
+                   .starts = FLAGS_starts,
+                   .threads = FLAGS_threads > 0 ? FLAGS_threads : cores,
+                   .methods = methods},
+                  [&](long done) { progress.Show(done); });
+  std::cout << ProvenanceLine() << "; seed " << FLAGS_seed << ", cups by efforts of "
+            << FLAGS_pieces << (FLAGS_pieces == 1 ? " piece" : " pieces") << "\n\n"
+            << std::flush;
+  OrderedJson json = Print(rows, methods);
   json["seed"] = FLAGS_seed;
+  json["pieces"] = FLAGS_pieces;
   if (!FLAGS_out.empty()) error = WriteResult(FLAGS_out, JsonText(json));
   return error.empty() ? kExitDone : ReportError(error);
 }

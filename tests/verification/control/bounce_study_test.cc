@@ -39,10 +39,12 @@ TEST_F(BounceStudyTest, FixedStepsBelieveInAnotherMotion) {
 }
 
 TEST_F(BounceStudyTest, ResultsDoNotDependOnThreads) {
-  const std::vector<Row> one = bounce::Run(scene_, 2, 2, 3, 1, {});
-  const std::vector<Row> two = bounce::Run(scene_, 2, 2, 3, 2, {});
+  StudyOptions options{.seed = 2, .problems = 2, .iterations = 3, .threads = 1};
+  const std::vector<Row> one = bounce::Run(scene_, options, {});
+  options.threads = 2;
+  const std::vector<Row> two = bounce::Run(scene_, options, {});
   for (int i = 0; i < 2; ++i) {
-    for (int method = 0; method < 4; ++method) {
+    for (size_t method = 0; method < std::size(kMethods); ++method) {
       EXPECT_EQ(one[i].outcomes[method].distance, two[i].outcomes[method].distance);
     }
     EXPECT_EQ(one[i].fixed, two[i].fixed);
