@@ -21,6 +21,7 @@
 #include "tangible/app/program.h"
 #include "tangible/estimation/fit/fit_checkpoint.h"
 #include "tangible/estimation/fit/motion_check.h"
+#include "tangible/estimation/fit/profile.h"
 #include "tangible/estimation/fit/variance_components.h"
 #include "tangible/estimation/results/fit_json.h"
 #include "tangible/estimation/results/fit_schema.h"
@@ -53,6 +54,9 @@ DEFINE_string(derivatives, "",
               "tangent, adjoint, jet, jet_implicit or finite_difference, instead of the file's");
 DEFINE_string(initial, "", "other initial values: name=value, separated by commas");
 DEFINE_int32(max_iterations, 50, "of each start");
+DEFINE_string(profile, "",
+              "names of parameters, separated by commas, whose intervals are found by profiles: "
+              "the cost with the parameter held, the others minimised");
 
 namespace tangible {
 namespace {
@@ -84,6 +88,23 @@ std::string OverrideInitial(const std::string& text, std::vector<FitParameter>* 
     if (!given.insert(name).second) {
       return "expected one value of each parameter, got two of '" + name + "'";
     }
+  }
+  return "";
+}
+
+/// --profile into the options; returns what is wrong or empty.
+std::string ReadProfiles(const std::string& text, const RecordingsProblem& problem,
+                         FitOptions* options) {
+  for (size_t begin = 0; begin < text.size();) {
+    const size_t end = std::min(text.find(',', begin), text.size());
+    const std::string name = text.substr(begin, end - begin);
+    begin = end + 1;
+    const std::vector<ParameterEntry>& entries = problem.entries();
+    if (std::none_of(entries.begin(), entries.end(),
+                     [&name](const ParameterEntry& entry) { return entry.name == name; })) {
+      return "expected names of parameters, separated by commas, got '" + name + "'";
+    }
+    options->profiles.push_back(name);
   }
   return "";
 }
@@ -196,34 +217,49 @@ class IterationPrinter {
   std::vector<double> last_;
 };
 
-/// "± 0.01 (95 %: 1 to 2" or empty.
-std::string IntervalText(double deviation, const ConfidenceInterval& interval) {
-  return interval ? "± " + Cell(deviation, 3) + " (95 %: " + Cell(interval->first, 8) + " to " +
-                        Cell(interval->second, 8)
-                  : "";
-}
-
-/// The robust interval first, then the one that trusts sigma.
+/// The interval that counts, with the standard deviation that belongs to it.
 std::string EstimateLine(const std::string& name, int k, const FitResult& result) {
   const Uncertainty& uncertainty = result.uncertainty;
-  const std::string robust =
-      IntervalText(uncertainty.standard_deviation_robust[k], uncertainty.confidence_95_robust[k]);
-  const std::string trusting =
-      IntervalText(uncertainty.standard_deviation[k], uncertainty.confidence_95[k]);
+  const FinalInterval& interval = result.intervals[static_cast<size_t>(k)];
   std::string line = name + " = " + Cell(result.estimate[k], 10);
-  if (!robust.empty()) {
-    line += " " + robust + ", " + Cell(uncertainty.degrees_of_freedom[k], 3) +
-            " degrees of freedom); from sigma alone";
+  const bool robust = std::isfinite(uncertainty.standard_deviation_robust[k]);
+  const double deviation = robust ? uncertainty.standard_deviation_robust[k]
+                                  : uncertainty.standard_deviation[k];
+  if (std::isfinite(deviation)) {
+    line += " ± " + Cell(deviation, 3);
   }
-  if (!trusting.empty()) {
-    line += " " + trusting + ")";
+  const std::string& why = uncertainty.messages[k];
+  if (!interval.exists) {
+    line += " (" + (why.empty() ? "no interval" : why) + ")";
   } else {
-    line += " (" + uncertainty.messages[k] + ")";
+    line += " (95 %: " + Describe(interval);
+    if (interval.method == "robust") {
+      line += ", " + Cell(uncertainty.degrees_of_freedom[k], 3) + " degrees of freedom";
+    } else {
+      line += interval.method == "profile" ? ", by its profile" : ", from sigma alone";
+    }
+    line += why.empty() ? ")" : "; " + why + ")";
   }
   if (uncertainty.prior_share[k] > 0.0) {
     line += ", " + Cell(100.0 * uncertainty.prior_share[k], 3) + " % of this by priors";
   }
   return line;
+}
+
+/// The profiles in one line each, and the pieces of those that have several.
+void PrintProfiles(const std::vector<ParameterizedScene::Entry>& entries,
+                   const FitResult& result) {
+  for (const Profile& profile : result.profiles) {
+    std::cout << "profile of " << entries[static_cast<size_t>(profile.parameter)].name << " ("
+              << profile.why << "): " << profile.points.size() << " values, cost up to "
+              << Cell(profile.rise) << " above the minimum at";
+    for (size_t i = 0; i < profile.branches.size(); ++i) {
+      const ProfileBranch& branch = profile.branches[i];
+      std::cout << (i == 0 ? " " : " and ")
+                << Describe(FinalInterval{true, branch.low, branch.high, "profile"});
+    }
+    std::cout << "\n";
+  }
 }
 
 /// What led to the minimum, where that was not the plain fit alone.
@@ -260,7 +296,11 @@ void PrintEstimates(const std::vector<ParameterizedScene::Entry>& entries,
     std::cout << line << "\n";
   }
   std::cout << DescribeRobust(uncertainty) << "\n";
+  PrintProfiles(entries, result);
   PrintApproach(result);
+  if (!result.agreement.empty()) {
+    std::cout << result.agreement << "\n";
+  }
   std::cout << "cost " << Cell(result.initial_cost) << " -> " << Cell(result.final_cost)
             << ", residual rms " << Cell(uncertainty.residual_rms, 4)
             << " sigma, reduced chi-square " << Cell(uncertainty.reduced_chi_square, 4) << ", "
@@ -469,6 +509,9 @@ int Prepare(const std::string& text, const std::string& file, Prepared* prepared
   if (prepared->problem == nullptr) {
     return ReportError(error);
   }
+  error = ReadProfiles(FLAGS_profile, *prepared->problem,
+                       &prepared->fit.input.recordings.front().problem.options);
+  if (!error.empty()) return ReportError("tangible-fit: --profile: " + error, kExitUsage);
   if (FLAGS_compare_motion && !HasFixedSteps(prepared->fit.input)) {
     return ReportError(file +
                        ": --compare_motion: expected a scene with fixed steps, got event "
@@ -676,7 +719,8 @@ int Main(int argc, char** argv) {
        .synopsis =
            "FIT.json [--out=R.json] [--report=R.html] [--scene_out=S.json]\n"
            "                    [--predictions=P.csv] [--predict_from=T]\n"
-           "                    [--discretisation_check] [--compare_motion] [--checkpoint=C.json]",
+           "                    [--discretisation_check] [--compare_motion] [--checkpoint=C.json]\n"
+           "                    [--profile=P1,P2]",
        .description =
            "Identifies parameters of a scene from observed positions by nonlinear least squares.\n"
            "Prints each iteration and, for each parameter, the estimate, its standard deviation\n"

@@ -35,6 +35,7 @@ ChainStudy::ChainStudy(const Scene& scene, double rate, const ChainStudyOptions&
   exact_.options.max_iterations = options.max_iterations;
   exact_.options.certificate = CertificatePass::kSkip;
   exact_.options.held_test = HeldTest::kSkip;
+  exact_.options.profile_pass = ProfilePass::kSkip;
   for (size_t body = 0; body < scene.bodies.size(); ++body) {
     const BasicBody<double>& link = scene.bodies[body];
     if (link.motion == Motion::kMoving && link.name.rfind("link", 0) == 0) {

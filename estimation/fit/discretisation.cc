@@ -45,6 +45,8 @@ bool HalveSteps(FitInput* input, DiscretisationCheck* check) {
     options.approach = FitApproach::kPlain;
     options.certificate = CertificatePass::kSkip;
     options.held_test = HeldTest::kSkip;
+    options.profile_pass = ProfilePass::kSkip;
+    options.profiles.clear();
   }
   return true;
 }

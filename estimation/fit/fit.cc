@@ -10,17 +10,30 @@
 
 #include "tangible/estimation/fit/block_system.h"
 #include "tangible/estimation/fit/fit_checkpoint.h"
+#include "tangible/estimation/fit/held_refit.h"
 #include "tangible/estimation/fit/linearisation.h"
 #include "tangible/estimation/fit/minimise.h"
+#include "tangible/estimation/fit/profile.h"
 #include "tangible/estimation/fit/shooting.h"
 #include "tangible/estimation/fit/tolerances.h"
 #include "tangible/estimation/fit/windows.h"
 #include "tangible/estimation/problem/problem_with_priors.h"
 #include "tangible/estimation/uncertainty/residual_quality.h"
 #include "tangible/estimation/uncertainty/tolerances.h"
+#include "tangible/render/html.h"
 
 namespace tangible {
 namespace {
+
+// Further starts are made by default of fits with at most so many recordings.
+constexpr int kMostBlocksOfStarts = 30;
+// Profiles that nobody asked for take as many runs as the fit, or this many of each recording.
+constexpr long kLeastProfileRuns = 200;
+// Profiles may find a better minimum, from which everything is judged anew, so many times.
+constexpr int kMostBetter = 3;
+
+// Far from the minimum the first iterations of a fit that gets there gain the most.
+constexpr int kTrialIterations = 5;
 
 /// A start drawn within the bounds, evenly in the minimiser's coordinates; where there is no bound,
 /// within a factor of ten, or a typical magnitude, of the initial value.
@@ -76,6 +89,10 @@ FitStart Describe(const Eigen::VectorXd& initial, const Minimum& minimum) {
   start.approach_iterations = minimum.approach_iterations;
   start.message = minimum.approach_message;
   start.iterations = std::max(0, static_cast<int>(minimum.iterations.size()) - 1);
+  if (minimum.status != FitStatus::kFailed) {
+    start.estimate.assign(minimum.parameters.data(),
+                          minimum.parameters.data() + minimum.parameters.size());
+  }
   start.cost = minimum.status == FitStatus::kFailed ? std::numeric_limits<double>::quiet_NaN()
                                                     : minimum.cost;
   return start;
@@ -211,7 +228,8 @@ struct FitRun {
 /// The minimum that this approach leads to; none where the whole run is the first window.
 std::optional<Minimum> Reach(const Eigen::VectorXd& start, FitApproach approach, FitRun* run) {
   FitLog* const log = run->log;
-  const bool led = approach != FitApproach::kPlain;
+  const bool trial = approach == FitApproach::kTrial;
+  const bool led = !trial && approach != FitApproach::kPlain;
   if (led && !log->shot) {
     log->shot = approach == FitApproach::kSegments
                     ? run->shooting(start, run->LogOfStart())
@@ -231,9 +249,10 @@ std::optional<Minimum> Reach(const Eigen::VectorXd& start, FitApproach approach,
         }
       };
   Minimum minimum = Minimise(run->options, led ? log->shot->parameters : start, run->elapsed,
-                             report, run->problem, run->LogOfStart());
+                             report, run->problem, run->LogOfStart(),
+                             trial ? Patience{kTrialIterations, kNoProgress} : Patience());
   run->rollouts += minimum.rollouts;
-  minimum.approach = approach;
+  minimum.approach = trial && !minimum.gave_up ? FitApproach::kPlain : approach;
   minimum.approach_iterations = led ? log->shot->iterations : 0;
   minimum.approach_message = led ? log->shot->message : "";
   log->shot.reset();
@@ -260,17 +279,20 @@ bool MayBeLocal(const Minimum& minimum, FitRun* run) {
 }
 
 /// The approaches to one minimum, each made where those before it may have led to another one. The
-/// plain fit is always among them, so that none ends worse.
+/// plain fit is always among them, so that none ends worse; where its first iterations show no
+/// progress it comes last, and is not made at all where windows explain the observations.
 std::vector<FitApproach> ApproachesOf(FitApproach asked) {
   switch (asked) {
     case FitApproach::kAuto:
-      return {FitApproach::kPlain, FitApproach::kWindows};
+      return {FitApproach::kTrial, FitApproach::kWindows, FitApproach::kPlain};
     case FitApproach::kPlain:
       return {FitApproach::kPlain};
     case FitApproach::kWindows:
       return {FitApproach::kWindows, FitApproach::kPlain};
     case FitApproach::kSegments:
       return {FitApproach::kSegments, FitApproach::kPlain, FitApproach::kWindows};
+    case FitApproach::kTrial:
+      return {FitApproach::kTrial};
   }
   return {};
 }
@@ -288,15 +310,21 @@ size_t BestOf(const std::vector<Minimum>& reached) {
 }
 
 /// What was made of a start: the best minimum, and what `told` says of the others.
-Minimum BestFrom(const Eigen::VectorXd& start, FitRun* run, FitStart* told) {
+Minimum BestFrom(const Eigen::VectorXd& start, FitApproach approach, FitRun* run, FitStart* told) {
   std::vector<Minimum>& reached = run->log->reached;
-  const std::vector<FitApproach> approaches = ApproachesOf(run->options.approach);
+  const std::vector<FitApproach> approaches = ApproachesOf(approach);
+  const auto is_plain = [](const Minimum& one) { return one.approach == FitApproach::kPlain; };
   // Those up to the last one that is kept were made, or had nothing to do, before an interruption.
   auto next = approaches.begin();
   if (!reached.empty()) {
-    next = std::find(next, approaches.end(), reached.back().approach) + 1;
+    const bool trial = reached.size() == 1 && approaches.front() == FitApproach::kTrial;
+    next = trial ? next + 1 : std::find(next, approaches.end(), reached.back().approach) + 1;
   }
   for (; next != approaches.end(); ++next) {
+    // A trial that did not give up was the plain fit.
+    if (*next == FitApproach::kPlain && std::any_of(reached.begin(), reached.end(), is_plain)) {
+      continue;
+    }
     // Where an approach has led somewhere this was asked before an interruption.
     const bool decided = reached.empty() || run->log->shot;
     if (!decided && !MayBeLocal(reached[BestOf(reached)], run)) break;
@@ -315,26 +343,44 @@ Minimum BestFrom(const Eigen::VectorXd& start, FitRun* run, FitStart* told) {
     const double cost = cost_of(reached[i]);
     if (reached[i].approach == FitApproach::kPlain) {
       told->plain_cost = cost;
-    } else if (i != best && !(cost > told->tried_cost)) {
+    } else if (i != best && reached[i].approach != FitApproach::kTrial &&
+               !(cost > told->tried_cost)) {
       told->tried = NameOf(reached[i].approach);
       told->tried_cost = cost;
       told->message = reached[i].approach_message;
     }
   }
   Minimum result = std::move(reached[best]);
+  if (result.approach == FitApproach::kTrial) {  // no other approach has led anywhere
+    result.approach = FitApproach::kPlain;
+  }
   reached.clear();
   return result;
 }
 
+/// A start was moved to where each parameter has an effect, and led to a minimum that costs more than
+/// the initial values themselves: the plain fit from these is taken, where some parameter stays.
+void KeepInitial(const Eigen::VectorXd& initial, FitRun* run, Minimum* minimum) {
+  const Minimum other = Minimise(
+      run->options, initial, run->elapsed, {}, run->problem, run->LogOfStart());
+  run->rollouts += other.rollouts;
+  if (IsBetter(other, *minimum)) {
+    *minimum = other;
+  }
+}
+
 /// Minimises from `start` and keeps in the log how that ended. The first start also describes the
 /// initial values where it begins elsewhere.
-void RunStart(const Eigen::VectorXd& start, double gradient_norm, double initial_cost,
-              FitRun* run) {
+void RunStart(const Eigen::VectorXd& start, FitApproach approach, double gradient_norm,
+              double initial_cost, FitRun* run) {
   FitLog* const log = run->log;
   const bool is_first = log->starts.empty();
   FitStart told;
-  Minimum minimum = BestFrom(start, run, &told);
+  Minimum minimum = BestFrom(start, approach, run, &told);
   const Eigen::VectorXd initial = InitialOf(run->problem->entries());
+  if (is_first && start != initial && minimum.cost > initial_cost) {
+    KeepInitial(initial, run, &minimum);
+  }
   const bool elsewhere = start != initial || minimum.approach != FitApproach::kPlain;
   if (is_first && elsewhere && !minimum.iterations.empty() && std::isfinite(initial_cost)) {
     minimum.iterations.insert(
@@ -362,9 +408,8 @@ std::string DescribeApproach(const Minimum& minimum) {
          " led to this minimum in " + std::to_string(minimum.approach_iterations) + " iterations";
 }
 
-/// Residuals, intervals and warnings of the best start.
-void Finish(FitRun* run, FitResult* result) {
-  const Minimum& best = run->log->best;
+/// Residuals, intervals and warnings of a minimum.
+void Finish(const Minimum& best, FitRun* run, FitResult* result) {
   result->status = best.status;
   result->message = best.message;
   if (best.status == FitStatus::kFailed) {
@@ -405,6 +450,72 @@ void Finish(FitRun* run, FitResult* result) {
   result->uncertainty = EstimateUncertainty(*run->problem, best.parameters, blocks, uncertainty);
 }
 
+/// Whether the cost may have several minima: through impacts, where something sticks, and with a
+/// robust loss. Fits of many recordings, which take long, have few: recordings average them out.
+bool MayHaveOthers(FitRun* run) {
+  const Minimum& best = run->log->best;
+  if (best.status == FitStatus::kFailed || run->problem->num_blocks() > kMostBlocksOfStarts) {
+    return false;
+  }
+  if (run->options.huber > 0.0) {
+    return true;
+  }
+  const std::optional<Certificate> certificate = run->problem->Certify(best.parameters);
+  run->rollouts += run->problem->num_blocks();
+  return certificate && (certificate->events > 0 || certificate->mode_switches > 0 ||
+                         !certificate->discrete_map.empty());
+}
+
+/// Another start: an estimate with restitution and friction shifted up or down; where no parameter
+/// is one of these, with all of them shifted by less.
+Eigen::VectorXd Shifted(const std::vector<ParameterEntry>& entries,
+                        const std::vector<double>& estimate, double side) {
+  const bool any = std::any_of(entries.begin(), entries.end(),
+                               [](const ParameterEntry& entry) { return entry.of_contact; });
+  Eigen::VectorXd p(static_cast<Eigen::Index>(entries.size()));
+  for (size_t k = 0; k < entries.size(); ++k) {
+    const ParameterEntry& entry = entries[k];
+    const double shift = side * (!any ? kShiftOfAll : entry.of_contact ? kShift : 0.0);
+    const double bound = side > 0.0 ? entry.upper : entry.lower;
+    double value = estimate[k];
+    if (entry.logarithmic) {
+      value *= std::exp(shift);
+    } else if (entry.of_contact && std::isfinite(bound)) {
+      value += std::abs(shift) * (bound - value);
+    } else {
+      value += shift * std::max(std::abs(value), entry.scale);
+    }
+    p[static_cast<Eigen::Index>(k)] = std::clamp(value, entry.lower, entry.upper);
+  }
+  return p;
+}
+
+/// "2 of 3 starts agree; the other ends at a cost of 12.3"; empty of one start.
+std::string DescribeAgreement(const std::vector<FitStart>& starts, double best) {
+  if (starts.size() < 2) {
+    return "";
+  }
+  std::string others;
+  size_t agree = 0;
+  for (const FitStart& start : starts) {
+    if (start.cost <= best * (1.0 + kSameCost) + kAgree) {
+      ++agree;
+    } else {
+      others += (others.empty() ? "" : ", ") +
+                (std::isfinite(start.cost) ? CompactNumber(start.cost, 6) : "none");
+    }
+  }
+  const size_t count = starts.size();
+  std::string text = (agree == count ? "all " : std::to_string(agree) + " of ") +
+                     std::to_string(count) + " starts " + (agree == 1 ? "ends" : "agree");
+  if (agree == 1) {
+    text = "1 of " + std::to_string(count) + " starts ends at the lowest cost";
+  }
+  return text + (others.empty() ? ""
+                 : agree + 1 == count ? "; the other ends at a cost of " + others
+                                      : "; the others end at costs of " + others);
+}
+
 /// All starts, with the log's evaluations if there is one.
 void RunStarts(FitRun* run, FitResult* result) {
   FitLog* const log = run->log;
@@ -421,14 +532,27 @@ void RunStarts(FitRun* run, FitResult* result) {
     run->rollouts = log->rollouts;
   }
   std::mt19937 random(run->options.seed);
-  for (int i = 0; i < run->options.starts; ++i) {
+  const auto is_done = [log](int i) {  // before an interruption
+    return i < static_cast<int>(log->starts.size());
+  };
+  for (int i = 0; i < std::max(1, run->options.starts); ++i) {
     const Eigen::VectorXd start = i == 0 ? first.parameters : DrawStart(entries, &random);
-    if (i >= static_cast<int>(log->starts.size())) {  // else finished before an interruption
-      RunStart(start, first.gradient_norm, result->initial_cost, run);
+    if (!is_done(i)) {
+      RunStart(start, run->options.approach, first.gradient_norm, result->initial_cost, run);
+    }
+  }
+  if (run->options.starts == 0 && (log->starts.size() > 1 || MayHaveOthers(run))) {
+    for (const double side : {1.0, -1.0}) {
+      if (!is_done(side > 0.0 ? 1 : 2)) {
+        // It is one more look, and no search: without progress it ends at once.
+        RunStart(Shifted(entries, log->starts.front().estimate, side), FitApproach::kTrial,
+                 first.gradient_norm, result->initial_cost, run);
+      }
     }
   }
   result->starts = log->starts;
-  Finish(run, result);
+  result->agreement = DescribeAgreement(log->starts, log->best.cost);
+  Finish(log->best, run, result);
 }
 
 // Where the model does not fit, or a parameter is at its bound, the cause may be a held parameter
@@ -446,7 +570,8 @@ void TestHeld(const FitOptions& options, LeastSquaresProblem* problem, FitResult
   }
   HeldOptions held;
   held.derivatives = options.derivatives;
-  result->held = FindHeldParameters(result->estimate, held, problem);
+  result->held = ConfirmHeld(options, held, FindHeldParameters(result->estimate, held, problem),
+                             problem, result);
   for (const HeldParameter& parameter : result->held) {
     uncertainty.warnings.push_back(Describe(parameter));
   }
@@ -470,6 +595,8 @@ const char* NameOf(FitApproach approach) {
       return "windows";
     case FitApproach::kSegments:
       return "segments";
+    case FitApproach::kTrial:
+      return "trial";
   }
   return "";
 }
@@ -511,6 +638,86 @@ void Certify(LeastSquaresProblem* problem, FitResult* result) {
   }
 }
 
+namespace {
+
+/// The profiles that are asked for or needed; the lowest point of one where that costs less than
+/// the estimate, else empty.
+Eigen::VectorXd MakeProfiles(FitRun* run, FitResult* result) {
+  result->profiles.clear();
+  Eigen::VectorXd better;
+  const long most = std::max(kLeastProfileRuns * run->problem->num_blocks(), result->rollouts);
+  const long end = result->rollouts + most;
+  for (const auto& [parameter, why] :
+       NeedProfiles(run->options, *result, run->problem, &result->rollouts)) {
+    const bool asked = why == kAskedFor;
+    const long budget = asked ? std::numeric_limits<long>::max() : end - result->rollouts;
+    Profile profile = MakeProfile(run->options, *result, parameter, budget, run->problem, &better,
+                                  &result->rollouts);
+    if (better.size() > 0) {
+      break;
+    }
+    if (profile.branches.empty()) {
+      const std::string& name = run->problem->entries()[static_cast<size_t>(parameter)].name;
+      result->uncertainty.warnings.push_back("the interval of '" + name +
+                                             "' may be wrong (" + why +
+                                             "): its profile takes long; --profile makes it");
+      continue;
+    }
+    profile.why = why;
+    result->profiles.push_back(std::move(profile));
+  }
+  return better;
+}
+
+/// What is said of an estimate beside its intervals by derivatives. Where a profile finds a better
+/// minimum it becomes the estimate.
+void Judge(FitRun* run, FitResult* result) {
+  const FitOptions& options = run->options;
+  for (int round = 0;; ++round) {
+    CheckBodies(run->problem, result);
+    if (options.held_test == HeldTest::kRun) {
+      TestHeld(options, run->problem, result);
+    }
+    if (options.certificate == CertificatePass::kRun) {
+      Certify(run->problem, result);
+    }
+    const Eigen::VectorXd better = MakeProfiles(run, result);
+    if (better.size() == 0 || round == kMostBetter) {
+      break;
+    }
+    Minimum minimum = Minimise(options, better, run->elapsed, {}, run->problem);
+    result->rollouts += minimum.rollouts;
+    if (minimum.status == FitStatus::kFailed || !(minimum.cost < result->final_cost)) {
+      break;
+    }
+    minimum.iterations.insert(minimum.iterations.begin(), result->iterations.begin(),
+                              result->iterations.end());
+    const std::string told = "a profile found a minimum of cost " +
+                             CompactNumber(minimum.cost, 6) + " beside one of " +
+                             CompactNumber(result->final_cost, 6);
+    Finish(minimum, run, result);
+    result->message += (result->message.empty() ? "" : "; ") + told;
+    if (result->estimate.size() == 0) return;
+  }
+  result->intervals = FinalIntervals(run->problem->entries(), *result);
+  // What has an interval by its profile is not said to have none.
+  for (const Profile& profile : result->profiles) {
+    std::string& message = result->uncertainty.messages[static_cast<size_t>(profile.parameter)];
+    const size_t at = message.rfind(": no interval");
+    if (at == std::string::npos || profile.branches.empty()) continue;
+    for (std::string& warning : result->uncertainty.warnings) {
+      if (warning.size() > message.size() &&
+          warning.compare(warning.size() - message.size(), message.size(), message) == 0) {
+        warning.erase(warning.rfind(": no interval"));
+        break;
+      }
+    }
+    message.erase(at);
+  }
+}
+
+}  // namespace
+
 FitResult Fit(const FitOptions& options, LeastSquaresProblem* problem, const FitProgress& progress,
               FitLog* log, const FitShooting& shooting) {
   using Clock = std::chrono::steady_clock;
@@ -532,13 +739,7 @@ FitResult Fit(const FitOptions& options, LeastSquaresProblem* problem, const Fit
   result.rollouts = run.rollouts;
   result.seconds = run.elapsed();
   if (result.estimate.size() > 0) {
-    CheckBodies(problem, &result);
-  }
-  if (result.estimate.size() > 0 && options.held_test == HeldTest::kRun) {
-    TestHeld(options, problem, &result);
-  }
-  if (result.estimate.size() > 0 && options.certificate == CertificatePass::kRun) {
-    Certify(problem, &result);
+    Judge(&run, &result);
   }
   return result;
 }

@@ -32,14 +32,20 @@ namespace tangible {
 
 /// The method that leads a start to the minimum where minimising the whole run at once does not.
 enum class FitApproach {
-  kAuto,      ///< growing windows, where the plain fit does not explain the observations
+  kAuto,      ///< growing windows, where the plain fit does not explain the observations or makes
+              ///< no progress at first
   kPlain,     ///< nothing
   kWindows,   ///< growing windows (windows.h)
   kSegments,  ///< multiple shooting (shooting.h), with FitOptions::segments
+  kTrial,     ///< of kAuto: kPlain, which gives up where its first iterations show no progress
 };
 
 /// "auto", "plain", "windows", "segments".
 const char* NameOf(FitApproach approach);
+
+/// Whether profiles (profile.h) are made that nobody asks for, of parameters whose intervals by
+/// derivatives may be wrong.
+enum class ProfilePass { kWhereNeeded, kSkip };
 
 struct FitOptions {
   GradientMethod derivatives = GradientMethod::kTangent;
@@ -48,7 +54,9 @@ struct FitOptions {
   /// with growing windows as well, and the best minimum is taken.
   FitApproach approach = FitApproach::kAuto;
   int segments = 1;         ///< of multiple shooting
-  int starts = 1;           ///< further starts are drawn within the bounds
+  /// Further starts are drawn within the bounds. 0: one, and where impacts or sticking act or the
+  /// loss is robust two more, at the estimate with restitution and friction shifted up and down.
+  int starts = 1;
   unsigned seed = 0;        ///< of these draws
   int max_iterations = 50;  ///< of each start
   int threads = 0;  ///< that evaluate blocks; 0: one a core. The result does not depend on it
@@ -58,6 +66,8 @@ struct FitOptions {
   /// Whether held parameters of the scene are tested where the model does not fit or a parameter is
   /// at its bound, which takes one more run with a column for each of them.
   HeldTest held_test = HeldTest::kRun;
+  ProfilePass profile_pass = ProfilePass::kWhereNeeded;
+  std::vector<std::string> profiles;  ///< names of parameters whose profiles are made in any case
   /// Whether each residual's leverage is computed (Uncertainty::leverages).
   Leverages leverages = Leverages::kSkip;
 };
@@ -115,6 +125,32 @@ struct FitStart {
   std::string tried;  ///< another approach that was made but not taken: "windows", ...; or empty
   double tried_cost = NAN;  ///< where it led; NaN: it failed
   std::string message;      ///< of what led to it, where that ended early
+  std::vector<double> estimate;  ///< where it ended; empty where it failed
+};
+
+struct ProfilePoint {
+  double value = 0.0;
+  double cost = 0.0;  ///< infinite where no run is possible
+};
+
+/// Values of a parameter in one piece; an end that is none is not limited on that side.
+struct ProfileBranch {
+  std::optional<double> low, high;
+};
+
+struct Profile {
+  int parameter = -1;
+  std::string why;                      ///< it was made
+  double rise = 0.0;                    ///< of the cost at the ends
+  std::vector<ProfilePoint> points;     ///< by value
+  std::vector<ProfileBranch> branches;  ///< by value, at least one
+};
+
+/// The 95 % interval that is printed first.
+struct FinalInterval {
+  bool exists = false;
+  std::optional<double> low, high;  ///< within the range; none: not limited on that side
+  std::string method;               ///< "robust", "profile", or where there is neither "sigma"
 };
 
 enum class FitStatus {
@@ -135,7 +171,8 @@ struct Minimum {
   double cost = 0.0;
   std::vector<FitIteration> iterations;
   long rollouts = 0;
-  FitApproach approach = FitApproach::kPlain;  ///< what led to where it began
+  FitApproach approach = FitApproach::kPlain;  ///< what led to where it began; kTrial: gave up
+  bool gave_up = false;  ///< for lack of progress
   int approach_iterations = 0;
   std::string approach_message;  ///< why that ended early, or empty
 };
@@ -151,6 +188,9 @@ struct FitResult {
   double final_cost = 0.0;
   std::vector<FitIteration> iterations;  ///< of the best start; begins with the initial point
   std::vector<FitStart> starts;
+  std::string agreement;               ///< of several starts, one sentence; else empty
+  std::vector<Profile> profiles;       ///< those that were asked for or needed
+  std::vector<FinalInterval> intervals;  ///< of each parameter; empty without an estimate
   Eigen::VectorXd residuals;  ///< of the observations at the estimate, in multiples of sigma
   long rollouts = 0;          ///< without the certificate's
   double seconds = 0.0;       ///< without the certificate's

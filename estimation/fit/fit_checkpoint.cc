@@ -10,7 +10,7 @@
 namespace tangible {
 namespace {
 
-constexpr char kFormat[] = "tangible-fit checkpoint 6";
+constexpr char kFormat[] = "tangible-fit checkpoint 7";
 // A write waits for this multiple of the duration of the last write.
 constexpr int kWait = 10;
 
@@ -66,7 +66,8 @@ Json ToJson(const FitStart& start) {
           {"iterations", start.iterations}, {"approach_iterations", start.approach_iterations},
           {"status", start.status},         {"approach", start.approach},
           {"plain_cost", start.plain_cost}, {"tried", start.tried},
-          {"tried_cost", start.tried_cost}, {"message", start.message}};
+          {"tried_cost", start.tried_cost}, {"message", start.message},
+          {"estimate", start.estimate}};
 }
 
 FitStart ReadStart(const Json& json) {
@@ -74,7 +75,8 @@ FitStart ReadStart(const Json& json) {
           json.at("iterations"), json.at("approach_iterations"),
           json.at("status"),     json.at("approach"),
           json.at("plain_cost"), json.at("tried"),
-          json.at("tried_cost"), json.at("message")};
+          json.at("tried_cost"), json.at("message"),
+          json.at("estimate")};
 }
 
 Json ToJson(const Minimum& minimum) {

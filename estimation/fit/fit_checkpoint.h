@@ -4,7 +4,7 @@
 // A checkpoint of a fit: the data with which a fit continues after an interruption and ends with
 // the same bits.
 //
-//   "tangible-fit checkpoint 6 <hash of the content>\n", then in CBOR
+//   "tangible-fit checkpoint 7 <hash of the content>\n", then in CBOR
 //   {"problem": hash, "fits": [the first fit, the next, ...]}
 //
 // Fits follow each other where standard deviations of noise or spreads are estimated

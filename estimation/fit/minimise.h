@@ -19,10 +19,17 @@
 // with ε = kRelativeOffset = 1e-3. Residuals that are rounding count as converged. (1) is the
 // relative offset of Bates and Watts, independent of the parameters' scales and of the number of
 // residuals. (1) implies (2) unless a direction that is left out of the step has a gradient. If a
-// test fails, the status is `not_converged`, and the message says which.
+// test fails, the status is `not_converged`, and the message says which. Where both hold at the
+// limit of iterations the minimum counts as converged too.
+//
+// At a kink, where an impact falls on an observation or something just sticks, neither test need
+// hold at a minimum. There the costs around it decide (AcceptKink), and the message says so.
+//
+// With large residuals Gauss-Newton converges by a constant factor. Where the gains of iterations
+// show that, Ceres ends and the final steps go on with Anderson's acceleration.
 //
 // Reference: D. M. Bates and D. G. Watts, A relative offset orthogonality convergence criterion for
-// nonlinear least squares, Technometrics 23 (1981) 179.
+// nonlinear least squares, Technometrics 23 (1981) 179; D. G. Anderson, J. ACM 12 (1965) 547.
 
 #include <ceres/ceres.h>
 
@@ -35,12 +42,20 @@
 
 namespace tangible {
 
+/// When a minimisation gives up: not converged, where after this many accepted iterations more than
+/// this part of the first cost is left. 0: never.
+struct Patience {
+  int iterations = 0;
+  double part = 1.0;
+};
+
 /// Minimises from `start`. `elapsed` gives the seconds since the fit began; `progress` may be
 /// empty; evaluations go through `log` unless it is null.
 Minimum Minimise(const FitOptions& options, const Eigen::VectorXd& start,
                  const std::function<double()>& elapsed,
                  const std::function<void(int iteration, const FitIteration&)>& progress,
-                 LeastSquaresProblem* problem, EvaluationLog* log = nullptr);
+                 LeastSquaresProblem* problem, EvaluationLog* log = nullptr,
+                 const Patience& patience = {});
 
 /// Sets the bounds of entries first ... first + size − 1 as those of the parameter block `x`, which
 /// is moved into them.

@@ -34,6 +34,42 @@ inline constexpr double kExactFit = 1e-8;
 /// Of the standard deviation of a parameter: a shorter Gauss-Newton step is left at convergence (ε
 /// of minimise.h; Bates and Watts).
 inline constexpr double kRelativeOffset = 1e-3;
+/// Of the cost: iterations that each gain less may be the slow tail of a convergence by a constant
+/// factor.
+inline constexpr double kSlowGain = 1e-3;
+/// Of the gain or step of the iteration before: an iteration that gains less converges faster than
+/// by a constant factor worth an acceleration.
+inline constexpr double kSlowRatio = 0.2;
+/// Of the first cost: a plain fit that has more left after its first iterations has made no
+/// progress, and growing windows are tried first.
+inline constexpr double kNoProgress = 0.5;
+/// Of the cost, at least 1 σ²: a profile that falls below the estimate's cost by more has found a
+/// better minimum; values whose costs differ by less are level.
+inline constexpr double kEqualProfile = 1e-4;
+/// Of the deviation, or of the root of the rise: an end of a profile is no more exact than this.
+inline constexpr double kProfileEnd = 1e-3;
+/// Of 1 for a logarithm, else the scale of a parameter: the first step of the profile of a
+/// parameter that has no standard deviation.
+inline constexpr double kBlindStep = 1e-3;
+/// Of the same: a profile is followed to a bound that is no farther off, whatever lies between.
+inline constexpr double kNearBound = 10.0;
+/// Of the same: a profile that is level so far has no end. An inertia at its bound 0, which is 1e-10
+/// of its initial value, is level for 18.
+inline constexpr double kLevelFor = 30.0;
+/// Of the rise of a parabola at the ends of an interval: where the cost rises by more than this
+/// factor more or less, the interval by derivatives is not to be trusted.
+inline constexpr double kParabola = 1.5;
+/// Of 1 σ²: starts whose costs differ by less are equally good, and agree.
+inline constexpr double kAgree = 1e-2;
+/// Of the way to a bound, or of 1 for a logarithm or the scale of a parameter where there is none:
+/// the shift of restitution and friction from which further starts begin.
+inline constexpr double kShift = 0.5;
+/// Of 1 for a logarithm, else the scale of a parameter: the same shift of all parameters where none
+/// is a restitution or friction; a larger one leaves the neighbourhood of what was found.
+inline constexpr double kShiftOfAll = 0.05;
+/// Of the residuals' deviation, along a parameter: the distances from a minimum at a kink at which the
+/// cost has to be higher.
+inline constexpr double kKinkSteps[] = {1e-2, 1e-4};
 /// Of the length of q: a shorter final step is rounding.
 inline constexpr double kPolishedStep = 1e-13;
 /// Of the cost: costs that differ by less do not show which of two points is better.

@@ -92,6 +92,8 @@ FitResult FitWithComponents(const FitOptions& options, RecordingsProblem* proble
   FitOptions search = options;
   search.certificate = CertificatePass::kSkip;
   search.held_test = HeldTest::kSkip;
+  search.profile_pass = ProfilePass::kSkip;
+  search.profiles.clear();
   search.leverages = components->noise.empty() ? Leverages::kSkip : Leverages::kCompute;
   FitResult result = fit(search, progress, &same);
   search.starts = 1;
@@ -107,6 +109,8 @@ FitResult FitWithComponents(const FitOptions& options, RecordingsProblem* proble
     if (settled) {
       search.certificate = options.certificate;
       search.held_test = options.held_test;
+      search.profile_pass = options.profile_pass;
+      search.profiles = options.profiles;
     }
     FitResult next = fit(search, {}, &same);
     if (next.estimate.size() == 0 && same) {

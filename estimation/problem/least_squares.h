@@ -83,6 +83,13 @@ class LeastSquaresProblem {
     return {};
   }
 
+  /// The problem with one more parameter, the last of the shared ones: the number at `path`, which
+  /// no parameter sets and has the same value in all blocks. Null where there is none. This problem
+  /// must outlive it.
+  virtual std::unique_ptr<LeastSquaresProblem> Released(const std::string& /*path*/) const {
+    return nullptr;
+  }
+
   /// Physical inconsistencies at p (all parameters), a line each (consistency.h).
   virtual std::vector<std::string> FindInconsistencies(const Eigen::VectorXd& /*p*/) { return {}; }
 

@@ -27,6 +27,7 @@ struct ParameterEntry {
   bool logarithmic = false;  ///< the variable is ln(p / initial)
   double scale = 1.0;        ///< typical magnitude, > 0
   std::optional<Prior> prior = std::nullopt;
+  bool of_contact = false;  ///< it sets a restitution or a friction
 };
 
 /// q of p.

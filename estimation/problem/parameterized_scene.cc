@@ -107,6 +107,28 @@ bool ParameterizedScene::Create(const Scene& scene, const std::vector<BodyPoint>
     return false;
   }
   CollectTargets();
+  return Finish(error);
+}
+
+bool ParameterizedScene::Add(const FitParameter& parameter, ParameterError* error) {
+  // The numbers of the scene are those of the last Set by now, and no base for what adds to them.
+  const std::vector<Target> before = targets_;
+  if (!AddParameter(parameter, error)) {
+    return false;
+  }
+  CollectTargets();
+  for (Target& target : targets_) {
+    for (const Target& old : before) {
+      if (old.number == target.number) {
+        target.base = old.base;
+      }
+    }
+  }
+  return Finish(error);
+}
+
+/// Derivatives and structure of what was added, and the model at the initial values.
+bool ParameterizedScene::Finish(ParameterError* error) {
   directions_.assign(entries_.size(), {});
   const std::vector<InstrumentNumber> measured = MeasurementNumbers();
   const int num_point_numbers = 2 * static_cast<int>(points_.size());
@@ -161,6 +183,11 @@ bool ParameterizedScene::AddParameter(const FitParameter& parameter, ParameterEr
     if (!AddSet(set, &set_value, &set_scale, error)) {
       return false;
     }
+    const auto ends_in = [&set](const std::string& key) {
+      return set.path.size() >= key.size() &&
+             set.path.compare(set.path.size() - key.size(), key.size(), key) == 0;
+    };
+    entry.of_contact = entry.of_contact || ends_in("/restitution") || ends_in("/friction");
     if (i == 0) {
       value = set.mode == SetMode::kAdd ? 0.0 : (set_value - set.offset) / set.scale;
       entry.scale = set_scale / std::abs(set.scale);

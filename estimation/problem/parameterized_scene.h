@@ -76,6 +76,10 @@ class ParameterizedScene {
               const std::vector<FitParameter>& parameters, ParameterError* error,
               const Instruments& instruments = {});
 
+  /// One more parameter after the others; false and `error` as in Create, and the scene is then of
+  /// no use.
+  bool Add(const FitParameter& parameter, ParameterError* error);
+
   int size() const { return static_cast<int>(entries_.size()); }
   /// Which of the scene's numbers (EnumerateNumbers) some parameter sets or adds to.
   std::vector<bool> NumbersSet() const;
@@ -129,6 +133,7 @@ class ParameterizedScene {
     std::vector<int> sets;  ///< indices into numbers_
   };
   bool AddParameter(const FitParameter& parameter, ParameterError* error);
+  bool Finish(ParameterError* error);
   bool AddSet(const ParameterSet& set, double* value, double* scale, ParameterError* error);
   bool AddNumber(int number, NumberKind kind, const std::string& path, const ParameterSet& set,
                  ParameterError* error);

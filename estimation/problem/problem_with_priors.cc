@@ -91,7 +91,23 @@ std::unique_ptr<LeastSquaresProblem> ProblemWithPriors::Window(double part) cons
     return nullptr;
   }
   auto with_priors = std::make_unique<ProblemWithPriors>(window.get(), effects_);
-  with_priors->window_ = std::move(window);
+  with_priors->owned_ = std::move(window);
+  return with_priors;
+}
+
+std::unique_ptr<LeastSquaresProblem> ProblemWithPriors::Released(const std::string& path) const {
+  std::unique_ptr<LeastSquaresProblem> released = problem_->Released(path);
+  if (released == nullptr) {
+    return nullptr;
+  }
+  std::vector<RandomEffect> effects = effects_;
+  for (RandomEffect& effect : effects) {  // own parameters follow the shared ones
+    for (int& own : effect.own) {
+      own += own < 0 ? 0 : 1;
+    }
+  }
+  auto with_priors = std::make_unique<ProblemWithPriors>(released.get(), std::move(effects));
+  with_priors->owned_ = std::move(released);
   return with_priors;
 }
 

@@ -62,6 +62,7 @@ class ProblemWithPriors : public LeastSquaresProblem {
     return problem_->FindInconsistencies(p);
   }
   std::unique_ptr<LeastSquaresProblem> Window(double part) const override;
+  std::unique_ptr<LeastSquaresProblem> Released(const std::string& path) const override;
   std::string BlockName(int block) const override;
 
  private:
@@ -80,7 +81,7 @@ class ProblemWithPriors : public LeastSquaresProblem {
   }
 
   LeastSquaresProblem* problem_;
-  std::unique_ptr<LeastSquaresProblem> window_;  ///< the problem of a window, if this is one
+  std::unique_ptr<LeastSquaresProblem> owned_;  ///< the problem of a window, if this is one
   std::vector<RandomEffect> effects_;
   std::vector<std::vector<PriorRow>> own_;  ///< of each block of `problem`
   std::vector<PriorRow> shared_;

@@ -178,4 +178,27 @@ std::unique_ptr<LeastSquaresProblem> RecordingsProblem::Window(double part) cons
   return std::make_unique<RecordingsProblem>(std::move(early), scopes_);
 }
 
+std::unique_ptr<LeastSquaresProblem> RecordingsProblem::Released(const std::string& path) const {
+  std::vector<RecordedRun> runs;
+  for (const RecordedRun& recording : recordings_) {
+    std::optional<RolloutResiduals> with = recording.residuals.With(path);
+    if (!with) {
+      return nullptr;
+    }
+    // One shared parameter would change a number that differs from recording to recording.
+    if (!runs.empty() && with->entries().back().initial !=
+                             runs.front().residuals.entries().back().initial) {
+      return nullptr;
+    }
+    runs.push_back({recording.name, recording.weight, std::move(*with)});
+  }
+  std::vector<ParameterScope> scopes = scopes_;
+  scopes.emplace_back();
+  auto released = std::make_unique<RecordingsProblem>(std::move(runs), std::move(scopes));
+  for (size_t e = 0; e < effects_.size(); ++e) {
+    released->SetSpread(static_cast<int>(e), effects_[e].spread);
+  }
+  return released;
+}
+
 }  // namespace tangible

@@ -86,6 +86,7 @@ class RecordingsProblem : public LeastSquaresProblem {
                            int most) override;
   std::vector<std::string> FindInconsistencies(const Eigen::VectorXd& p) override;
   std::unique_ptr<LeastSquaresProblem> Window(double part) const override;
+  std::unique_ptr<LeastSquaresProblem> Released(const std::string& path) const override;
   std::string BlockName(int block) const override {
     return IsNamed() ? "recording '" + recordings_[block].name + "': " : "";
   }

@@ -524,6 +524,25 @@ HeldColumns RolloutResiduals::EvaluateHeld(int /*block*/, const Eigen::VectorXd&
   return held;
 }
 
+std::optional<RolloutResiduals> RolloutResiduals::With(const std::string& path) const {
+  FitParameter added;
+  added.name = path;
+  added.sets = {{path}};
+  ParameterizedScene scene = scene_;
+  ParameterError error;
+  if (!scene.Add(added, &error)) {
+    return std::nullopt;
+  }
+  RolloutResiduals with(std::move(scene), observations_, channels_);
+  with.SetFiles(files_);
+  return with;
+}
+
+std::unique_ptr<LeastSquaresProblem> RolloutResiduals::Released(const std::string& path) const {
+  std::optional<RolloutResiduals> with = With(path);
+  return with ? std::make_unique<RolloutResiduals>(std::move(*with)) : nullptr;
+}
+
 std::vector<std::string> RolloutResiduals::FindInconsistencies(const Eigen::VectorXd& p) {
   return SetParameters(p) ? FindInconsistentBodies(scene_.scene()) : std::vector<std::string>();
 }

@@ -17,6 +17,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <functional>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -65,6 +66,9 @@ class RolloutResiduals : public LeastSquaresProblem {
                            int most) override;
   std::vector<std::string> FindInconsistencies(const Eigen::VectorXd& p) override;
   std::unique_ptr<LeastSquaresProblem> Window(double part) const override;
+  std::unique_ptr<LeastSquaresProblem> Released(const std::string& path) const override;
+  /// The same as residuals; none where the number cannot be a parameter.
+  std::optional<RolloutResiduals> With(const std::string& path) const;
   /// The residuals of the observations in the first `part` of the time.
   RolloutResiduals FirstPart(double part) const;
 

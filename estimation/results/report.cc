@@ -5,6 +5,7 @@
 #include <cmath>
 #include <vector>
 
+#include "tangible/estimation/fit/profile.h"
 #include "tangible/estimation/results/residual_summary.h"
 #include "tangible/render/html.h"
 #include "tangible/render/plot.h"
@@ -81,36 +82,62 @@ std::vector<Series> CollectSeries(const RecordingsProblem& problem, const FitRes
 }
 
 std::string EstimateTable(const std::vector<ParameterEntry>& entries, const FitResult& result) {
-  const auto end = [](const ConfidenceInterval& interval,
-                      double std::pair<double, double>::*which) {
-    return interval ? CompactNumber((*interval).*which, 8) : std::string();
-  };
   const auto number = [](double x) {
     return std::isfinite(x) ? CompactNumber(x, 3) : std::string();
   };
   std::vector<std::vector<std::string>> rows;
   const Uncertainty& uncertainty = result.uncertainty;
-  using Ends = std::pair<double, double>;
   for (size_t k = 0; k < entries.size(); ++k) {
-    const ConfidenceInterval& robust = uncertainty.confidence_95_robust[k];
-    const ConfidenceInterval& interval = uncertainty.confidence_95[k];
     const Eigen::Index i = static_cast<Eigen::Index>(k);
-    rows.push_back({entries[k].name, CompactNumber(result.starts.front().initial[k], 6),
-                    CompactNumber(result.estimate[i], 9),
-                    number(uncertainty.standard_deviation_robust[i]), end(robust, &Ends::first),
-                    end(robust, &Ends::second), number(uncertainty.degrees_of_freedom[i]),
-                    number(uncertainty.standard_deviation[i]), end(interval, &Ends::first),
-                    end(interval, &Ends::second),
-                    uncertainty.prior_share[i] > 0.0
-                        ? CompactNumber(100.0 * uncertainty.prior_share[i], 2) + " %"
-                        : "",
-                    uncertainty.messages[k]});
+    const FinalInterval interval =
+        k < result.intervals.size() ? result.intervals[k] : FinalInterval();
+    const double robust = uncertainty.standard_deviation_robust[i];
+    rows.push_back(
+        {entries[k].name, CompactNumber(result.starts.front().initial[k], 6),
+         CompactNumber(result.estimate[i], 9),
+         number(std::isfinite(robust) ? robust : uncertainty.standard_deviation[i]),
+         interval.exists ? Describe(interval) : "",
+         interval.method, number(uncertainty.degrees_of_freedom[i]),
+         uncertainty.prior_share[i] > 0.0
+             ? CompactNumber(100.0 * uncertainty.prior_share[i], 2) + " %"
+             : "",
+         uncertainty.messages[k]});
   }
-  return HtmlTable({"parameter", "initial", "estimate", "robust standard deviation", "95 % from",
-                    "to", "degrees of freedom", "standard deviation from sigma", "95 % from", "to",
-                    "by priors", ""},
+  return HtmlTable({"parameter", "initial", "estimate", "standard deviation", "95 % interval",
+                    "method", "degrees of freedom", "by priors", ""},
                    rows) +
          "<p>" + HtmlEscape(DescribeRobust(uncertainty)) + ".</p>\n";
+}
+
+/// The cost by the value of each parameter that has a profile, up to some rises above the minimum.
+std::string ProfilePlots(const std::vector<ParameterEntry>& entries, const FitResult& result) {
+  std::string html;
+  for (const Profile& profile : result.profiles) {
+    constexpr double kHighest = 6.0;  // of the rise: higher costs would flatten the rest
+    std::vector<double> values, costs;
+    for (const ProfilePoint& point : profile.points) {
+      if (point.cost <= result.final_cost + kHighest * profile.rise) {
+        values.push_back(point.value);
+        costs.push_back(point.cost);
+      }
+    }
+    if (values.size() < 2) {
+      continue;
+    }
+    const double limit = result.final_cost + profile.rise;
+    const std::string& name = entries[static_cast<size_t>(profile.parameter)].name;
+    html += PlotSvg({.title = name + " (" + profile.why + ")",
+                     .x_label = name,
+                     .y_label = "cost",
+                     .height = 260},
+                    {{"profile", values, costs, PlotStyle::kLineAndPoints, {}},
+                     {"95 %",
+                      {values.front(), values.back()},
+                      {limit, limit},
+                      PlotStyle::kLine,
+                      {}}});
+  }
+  return html.empty() ? "" : "<h2>Profiles</h2>\n" + html;
 }
 
 /// The combinations that are determined of parameters that are not determined individually.
@@ -368,7 +395,26 @@ std::string StartTable(const FitResult& result) {
                     CompactNumber(start.plain_cost), std::to_string(start.iterations), start.tried,
                     start.tried.empty() ? "" : CompactNumber(start.tried_cost), start.message});
   }
-  return "<h2>Starts</h2>\n" +
+  std::vector<double> rank, cost;
+  for (const FitStart& start : result.starts) {
+    if (std::isfinite(start.cost)) {
+      cost.push_back(start.cost);
+      rank.push_back(static_cast<double>(cost.size()));
+    }
+  }
+  std::sort(cost.begin(), cost.end());
+  const std::string waterfall =
+      cost.size() < 2
+          ? ""
+          : PlotSvg({.title = "costs of the starts, in their order",
+                     .x_label = "rank",
+                     .y_label = "cost",
+                     .y_scale = AxisScale::kLogarithmic,
+                     .height = 260},
+                    {{"", rank, cost, PlotStyle::kLineAndPoints, {}}});
+  const std::string agreement =
+      result.agreement.empty() ? "" : "<p>" + HtmlEscape(result.agreement) + ".</p>\n";
+  return "<h2>Starts</h2>\n" + agreement + waterfall +
          HtmlTable({"initial", "approach", "status", "cost", "cost of the plain fit", "iterations",
                     "also tried", "its cost", ""},
                    rows);
@@ -434,6 +480,7 @@ std::string FitReport(const std::string& title, const RecordingsProblem& problem
   const PredictionScore* const score = findings.later == nullptr ? nullptr : &findings.later->score;
   return HtmlPage(heading, "<h1>" + HtmlEscape(heading) + "</h1>\n<h2>Estimates</h2>\n" +
                                EstimateTable(entries, result) + Warnings(result.uncertainty) +
+                               ProfilePlots(entries, result) +
                                CombinationTable(result.uncertainty) +
                                SpreadTable(findings.components) + SummaryTable(result) +
                                RecordingTable(problem, result) + NoiseTable(findings.components) +

@@ -38,6 +38,17 @@ OrderedJson ParametersToJson(const RecordingsProblem& problem, const FitResult& 
         {"degrees_of_freedom", Number(uncertainty.degrees_of_freedom[k])},
         {"standard_deviation", Number(uncertainty.standard_deviation[k])},
         {"confidence_95", IntervalToJson(uncertainty.confidence_95[k])}};
+    const FinalInterval interval = static_cast<size_t>(k) < result.intervals.size()
+                                       ? result.intervals[static_cast<size_t>(k)]
+                                       : FinalInterval();
+    if (interval.exists) {
+      parameter["interval_95"] = {interval.low ? OrderedJson(*interval.low) : OrderedJson(nullptr),
+                                  interval.high ? OrderedJson(*interval.high)
+                                                : OrderedJson(nullptr)};
+      parameter["interval_method"] = interval.method;
+    } else {
+      parameter["interval_95"] = nullptr;
+    }
     if (uncertainty.prior_share[k] > 0.0) {
       parameter["prior_share"] = Number(uncertainty.prior_share[k]);
     }
@@ -89,7 +100,12 @@ OrderedJson HeldToJson(const FitResult& result) {
                    {"held_at", Number(held.value)},
                    {"change", Number(held.change)},
                    {"cost_share", Number(held.cost_share)},
+                   {"refitted", held.refitted},
                    {"releases", held.releases}});
+    if (held.refitted) {
+      all.back()["refitted_value"] = Number(held.refitted_value);
+      all.back()["refitted_cost_share"] = Number(held.refitted_share);
+    }
   }
   return all;
 }
@@ -122,7 +138,8 @@ OrderedJson StartsToJson(const FitResult& result) {
                       {"iterations", start.iterations},
                       {"approach", start.approach},
                       {"approach_iterations", start.approach_iterations},
-                      {"plain_cost", Number(start.plain_cost)}});
+                      {"plain_cost", Number(start.plain_cost)},
+                      {"estimate", start.estimate}});
     if (!start.tried.empty()) {
       starts.back().update({{"tried", start.tried}, {"tried_cost", Number(start.tried_cost)}});
     }
@@ -131,6 +148,30 @@ OrderedJson StartsToJson(const FitResult& result) {
     }
   }
   return starts;
+}
+
+OrderedJson ProfilesToJson(const std::vector<ParameterEntry>& entries, const FitResult& result) {
+  OrderedJson all = OrderedJson::array();
+  for (const Profile& profile : result.profiles) {
+    OrderedJson values = OrderedJson::array();
+    OrderedJson costs = OrderedJson::array();
+    for (const ProfilePoint& point : profile.points) {
+      values.push_back(Number(point.value));
+      costs.push_back(Number(point.cost));
+    }
+    OrderedJson branches = OrderedJson::array();
+    for (const ProfileBranch& branch : profile.branches) {
+      branches.push_back({branch.low ? OrderedJson(*branch.low) : OrderedJson(nullptr),
+                          branch.high ? OrderedJson(*branch.high) : OrderedJson(nullptr)});
+    }
+    all.push_back({{"name", entries[static_cast<size_t>(profile.parameter)].name},
+                   {"why", profile.why},
+                   {"rise", Number(profile.rise)},
+                   {"values", values},
+                   {"costs", costs},
+                   {"branches", branches}});
+  }
+  return all;
 }
 
 /// Root mean squares in m and rad.
@@ -310,6 +351,8 @@ OrderedJson EstimatesToJson(const RecordingsProblem& problem, const FitResult& r
           {"condition", when(uncertainty.condition)},
           {"iterations", IterationsToJson(result)},
           {"starts", StartsToJson(result)},
+          {"agreement", result.agreement},
+          {"profiles", ProfilesToJson(problem.entries(), result)},
           {"rollouts", result.rollouts},
           {"seconds", result.seconds},
           {"warnings", uncertainty.warnings},

@@ -125,9 +125,7 @@ FitOptions ReadOptions(const JsonReader& root) {
     }
     options.approach = FitApproach::kSegments;
   }
-  if (root.Has("starts")) {
-    options.starts = root.At("starts").Integer(1, kMaxStarts);
-  }
+  options.starts = root.Has("starts") ? root.At("starts").Integer(1, kMaxStarts) : 0;
   if (root.Has("seed")) {
     options.seed =
         static_cast<unsigned>(root.At("seed").Integer(0, std::numeric_limits<int>::max()));

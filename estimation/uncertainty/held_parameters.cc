@@ -212,9 +212,15 @@ std::vector<HeldParameter> FindHeldParameters(const Eigen::VectorXd& estimate,
 
 std::string Describe(const HeldParameter& held) {
   std::string text = "the observations contradict '" + held.path + "', which is held at " +
-                     CompactNumber(held.value, 3) + ": released, it would change by " +
-                     CompactNumber(held.change, 3) + " to first order and the cost fall by " +
-                     CompactNumber(100.0 * held.cost_share, 3) + " %";
+                     CompactNumber(held.value, 3);
+  if (held.refitted) {
+    text += ": fitted with the others it becomes " + CompactNumber(held.refitted_value, 3) +
+            " and the cost falls by " + CompactNumber(100.0 * held.refitted_share, 3) + " %";
+  } else {
+    text += ": released, it would change by " + CompactNumber(held.change, 3) +
+            " to first order and the cost fall by " + CompactNumber(100.0 * held.cost_share, 3) +
+            " %";
+  }
   for (size_t i = 0; i < held.releases.size(); ++i) {
     text += (i == 0 ? ", and it drives '" : ", '") + held.releases[i] + "'";
   }

@@ -35,6 +35,10 @@ struct HeldParameter {
   double change = 0.0;                ///< Δθ
   double cost_share = 0.0;            ///< (2) over the cost, 0 to 1
   std::vector<std::string> releases;  ///< parameters that would leave their bounds
+  /// Whether it was fitted with the others (held_refit.h); `releases` are then those that did.
+  bool refitted = false;
+  double refitted_value = 0.0;
+  double refitted_share = 0.0;  ///< of the cost, by which it fell
 };
 
 struct HeldOptions {

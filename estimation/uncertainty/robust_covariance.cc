@@ -392,7 +392,8 @@ RobustCovariance EstimateRobustCovariance(const std::vector<RecordingRows>& reco
   const RowMatrixXd normal = Decomposition(stacked, options.rank_tolerance).Covariance();
   const double rows = static_cast<double>(stacked_rows);
   const double factor = rows / (rows - static_cast<double>(parameters));
-  if (static_cast<int>(recordings.size()) < kFewRecordings ||
+  // Without shared parameters leaving a recording out moves nothing.
+  if (size == 0 || static_cast<int>(recordings.size()) < kFewRecordings ||
       !Jackknife(reduced, recordings, normal, information, options, &result)) {
     SumOverTime(recordings, reduced, normal, factor, &result);
   }

@@ -525,7 +525,7 @@ TEST_F(FaultsTest, AKilledFitGoesOnFromItsCheckpointToTheSameBits) {
   };
   expect_refused("", "");
   expect_refused(text.substr(0, text.size() / 2), "damaged: ");
-  expect_refused(std::string(1'000'000, '\x81') + "\n", "expected a \"tangible-fit checkpoint 6\"");
+  expect_refused(std::string(1'000'000, '\x81') + "\n", "expected a \"tangible-fit checkpoint 7\"");
   std::string flipped = text;
   flipped[text.find("cost") + 6] ^= 1;  // within the number
   expect_refused(flipped, "damaged: ");

@@ -44,6 +44,7 @@ inline FitResult HandMadeResult() {
   result.uncertainty.standard_deviation_robust = Eigen::Vector2d(0.5, kNone);
   result.uncertainty.degrees_of_freedom = Eigen::Vector2d(6.5, kNone);
   result.uncertainty.confidence_95_robust = {std::pair(-11.0, -8.625), std::nullopt};
+  result.intervals = {{true, -11.0, -8.625, "robust"}, {}};
   result.uncertainty.robust_method = RobustMethod::kTime;
   result.uncertainty.bandwidth = 0.25;
   result.uncertainty.prior_share = Eigen::Vector2d::Zero();

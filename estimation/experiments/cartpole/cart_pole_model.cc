@@ -207,6 +207,7 @@ CartPoleEstimate EstimateCartPole(const CartPoleRecording& recording) {
   FitOptions options;
   options.certificate = CertificatePass::kSkip;
   options.held_test = HeldTest::kSkip;
+  options.profile_pass = ProfilePass::kSkip;
   options.threads = 1;
   estimate.fit = Fit(options, &residuals, {});
   estimate.names = {"cart mass", "pole mass", "length", "cart damping", "pole damping"};

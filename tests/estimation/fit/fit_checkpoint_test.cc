@@ -89,6 +89,7 @@ TEST(FitCheckpointTest, EndsAtTheSameBitsWhereverItWasInterrupted) {
 TEST(FitCheckpointTest, WhatIsDoneIsNotDoneAgain) {
   FitProblem problem = PendulumProblem();
   problem.options.certificate = CertificatePass::kSkip;
+  problem.options.profile_pass = ProfilePass::kSkip;
   FitLog log;
   RolloutResiduals residuals = ResidualsOf(problem);
   const FitResult whole = Fit(problem.options, &residuals, {}, &log);
@@ -195,7 +196,7 @@ TEST(FitCheckpointTest, RefusesWhatIsDamagedOrOfAnotherFit) {
   const std::string deep(1'000'000, '\x81');
   for (const std::string& other :
        {std::string("{}"), std::string("[]"), std::string(), std::string("\xff\xff"), deep}) {
-    EXPECT_EQ(refused(other, problem).rfind("c.json: expected a \"tangible-fit checkpoint 6\"", 0),
+    EXPECT_EQ(refused(other, problem).rfind("c.json: expected a \"tangible-fit checkpoint 7\"", 0),
               0U);
   }
 

@@ -71,6 +71,48 @@ TEST(MinimiseTest, TheLimitOfIterationsIsKept) {
                    options, Observe(MakeScene(kFallingBall), 5, 0.01, 1), &reports);
   EXPECT_EQ(minimum.status, FitStatus::kNotConverged);
   EXPECT_EQ(minimum.iterations.size(), 3u);
+  EXPECT_EQ(minimum.message, "the limit of 2 iterations is reached before the minimum");
+}
+
+/// r = (x, −1 + 0.45 x²) / σ, of a minimum far from zero: near x = 0 a Gauss-Newton step goes a tenth
+/// of the way to it.
+class FarFromZero : public LeastSquaresProblem {
+ public:
+  FarFromZero() { entries_ = {{"x", 0.4, -10.0, 10.0, false, 1.0}}; }
+  const std::vector<ParameterEntry>& entries() const override { return entries_; }
+  int num_shared() const override { return 1; }
+  int num_blocks() const override { return 1; }
+  int num_own(int /*block*/) const override { return 0; }
+  int num_rows(int /*block*/) const override { return 2; }
+  std::vector<RowPlace> Places(int /*block*/) const override { return {{0, 0.0}, {0, 1.0}}; }
+  bool EvaluateBlock(int /*block*/, const Eigen::VectorXd& p, GradientMethod /*method*/,
+                     BlockDerivatives /*derivatives*/, BlockEvaluation* evaluation) override {
+    evaluation->residuals = 1e3 * Eigen::Vector2d(p[0], -1.0 + 0.45 * p[0] * p[0]);
+    evaluation->jacobian = 1e3 * Eigen::Vector2d(1.0, 0.9 * p[0]);
+    return true;
+  }
+
+ private:
+  std::vector<ParameterEntry> entries_;
+};
+
+TEST(MinimiseTest, AConvergenceByAConstantFactorIsAccelerated) {
+  FarFromZero problem;
+  const Minimum minimum = Minimise(
+      {}, Eigen::VectorXd::Constant(1, 0.4), [] { return 0.0; }, {}, &problem);
+  EXPECT_EQ(minimum.status, FitStatus::kConverged) << minimum.message;
+  EXPECT_NEAR(minimum.parameters[0], 0.0, 1e-6);
+  // Steps that each leave 0.9 of the way would take 130 to get there.
+  EXPECT_LT(minimum.iterations.size(), 25U);
+}
+
+TEST(MinimiseTest, GivesUpWhereTheFirstIterationsGainLittle) {
+  FarFromZero problem;
+  const Minimum minimum = Minimise(
+      {}, Eigen::VectorXd::Constant(1, 0.4), [] { return 0.0; }, {}, &problem, nullptr, {2, 0.1});
+  EXPECT_EQ(minimum.status, FitStatus::kNotConverged);
+  EXPECT_TRUE(minimum.gave_up);
+  EXPECT_EQ(minimum.iterations.size(), 3U);
 }
 
 TEST(MinimiseTest, AStartThatCannotBeRunFails) {

@@ -38,6 +38,12 @@ TEST(HeldParametersTest, FindsTheNumberThatIsHeldAtAWrongValue) {
   EXPECT_NEAR(damping->change, 0.01, 0.001);
   EXPECT_GT(damping->cost_share, 0.85);  // the rest is noise
   EXPECT_LE(damping->cost_share, 1.0 + 1e-12);
+  // The real fit has no curvature left.
+  EXPECT_TRUE(damping->refitted);
+  EXPECT_NEAR(damping->refitted_value, 0.05, 2e-4);
+  EXPECT_NEAR(damping->refitted_share, damping->cost_share, 0.1);
+  EXPECT_NE(Describe(*damping).find("fitted with the others it becomes 0.05"), std::string::npos)
+      << Describe(*damping);
   EXPECT_TRUE(std::any_of(result.uncertainty.warnings.begin(), result.uncertainty.warnings.end(),
                           [](const std::string& warning) {
                             return warning.find(

@@ -224,5 +224,23 @@ TEST(DecompositionTest, IsThatOfTheWholeMatrix) {
   EXPECT_EQ(Decomposition(RowMatrixXd::Ones(1, 3), 1e-6).rank(), 1);
 }
 
+TEST(RobustCovarianceTest, RecordingsThatShareNothingHaveTheirOwnIntervals) {
+  std::vector<RecordingRows> recordings(6);
+  for (RecordingRows& rows : recordings) {
+    rows.times = {0.0, 1.0, 2.0, 3.0};
+    rows.residuals = Eigen::Vector4d(1.0, -1.0, 1.0, -1.0);
+    rows.shared = RowMatrixXd(4, 0);
+    rows.own = RowMatrixXd::Ones(4, 1);
+    rows.prior_residuals = Eigen::VectorXd(0);
+    rows.prior_shared = RowMatrixXd(0, 0);
+    rows.prior_own = RowMatrixXd(0, 1);
+  }
+  const RobustCovariance robust =
+      EstimateRobustCovariance(recordings, RowMatrixXd(0, 0), RobustOptions());
+  EXPECT_EQ(robust.method, RobustMethod::kTime);
+  ASSERT_EQ(robust.own.size(), 6U);
+  EXPECT_GT(robust.own[0](0, 0), 0.0);
+}
+
 }  // namespace
 }  // namespace tangible

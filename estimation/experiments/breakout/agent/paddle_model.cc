@@ -206,6 +206,7 @@ bool PaddleModel::Fit() {
   options.approach = FitApproach::kPlain;
   options.certificate = CertificatePass::kSkip;
   options.held_test = HeldTest::kSkip;
+  options.profile_pass = ProfilePass::kSkip;
   options.threads = 1;
   const FitResult fit = tangible::Fit(options, &problem, {});
   if (fit.estimate.size() != kNumPaddleNumbers || !fit.estimate.allFinite()) return false;
