@@ -2,15 +2,23 @@
 //
 // Fits: what tangible-fit does, and the residuals and Jacobians that it minimises.
 #include <cmath>
+#include <filesystem>
+#include <fstream>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "tangible/app/certificate_json.h"
+#include "tangible/estimation/fit/fit_checkpoint.h"
 #include "tangible/estimation/results/fit_json.h"
+#include "tangible/estimation/results/fitted_scene.h"
+#include "tangible/estimation/results/prediction.h"
 #include "tangible/estimation/results/report.h"
 #include "tangible/python/binding.h"
+#include "tangible/scene/scene_json.h"
+#include "tangible/scene/text_file.h"
 
 namespace tangible::python {
 namespace {
@@ -18,14 +26,11 @@ namespace {
 // A fit file of one run or several recordings, read. Calls change its memory, and take turns.
 class FitProblemOf {
  public:
-  FitProblemOf(const std::string& text, const std::string& file) : text_(text), file_(file) {
+  FitProblemOf(const std::string& text, const std::string& file) {
     std::string error;
     if (ParseFit(text, file, &fit_, &error)) problem_ = MakeProblem(fit_, &error);
     if (problem_ == nullptr) throw Error(error);
   }
-
-  const std::string& text() const { return text_; }
-  const std::string& file() const { return file_; }
 
   std::vector<std::string> names() {
     std::vector<std::string> names;
@@ -64,28 +69,153 @@ class FitProblemOf {
         with_jacobian ? py::object(ToArray(jacobian, {rows, count})) : py::object(py::none()));
   }
 
-  // (the result as tangible-fit writes it, the report as a page)
-  py::tuple Run(int max_iterations) {
-    const auto [json, report] =
-        WithoutLock([&] { return turns_.Take([&] { return Texts(max_iterations); }); });
-    return py::make_tuple(json, report);
+  struct Wanted {
+    int max_iterations = 50;
+    double predict_from = INFINITY;  // s; infinite: all observations are fitted
+    bool discretisation_check = false;
+    std::string checkpoint;   // a file, or empty
+    py::object on_iteration;  // called with a dict, or None
+  };
+
+  // The result as tangible-fit writes it, the report as a page, the predictions as a table, and the
+  // fitted scene of each recording; all but the first are empty where there is no estimate.
+  py::tuple Run(const Wanted& wanted) {
+    Found found = WithoutLock([&] { return turns_.Take([&] { return Do(wanted); }); });
+    return py::make_tuple(found.json, found.report, found.predictions, found.scenes);
   }
 
  private:
   RecordingsProblem& problem() { return *problem_; }
 
-  // What Run returns.
-  std::pair<std::string, std::string> Texts(int max_iterations) {
-    fit_.run().options.max_iterations = max_iterations;
-    const FitProgress progress = [](int, int, const FitIteration&) { CheckInterrupt(); };
+  struct Found {
+    std::string json, report, predictions;
+    std::vector<Scene> scenes;
+  };
+
+  Found Do(const Wanted& wanted) {
+    fit_.run().options.max_iterations = wanted.max_iterations;
+    std::vector<std::vector<Observation>> held_back = HoldBack(wanted.predict_from);
+    const std::unique_ptr<FitCheckpoint> checkpoint = Open(wanted.checkpoint);
+    const NextLog next_log =
+        checkpoint == nullptr ? NextLog() : NextLog([&] { return checkpoint->Next(); });
     VarianceComponents components;
-    const FitResult result =
-        FitWithComponents(fit_.input.options(), problem_.get(), progress, &components);
-    OrderedJson all = ResultToJson(*problem_, result, {&components});
+    const FitResult result = FitWithComponents(fit_.input.options(), problem_.get(),
+                                               ProgressOf(wanted), &components, next_log);
+    Scale(components.noise, &held_back);
+    CheckSameFit(checkpoint.get());
+    FitFindings findings{&components};
+    std::optional<DiscretisationCheck> check;
+    if (wanted.discretisation_check && result.status == FitStatus::kConverged) {
+      std::vector<double> spreads;
+      for (const RandomEffect& effect : problem_->effects()) spreads.push_back(effect.spread);
+      FitLog* const log = checkpoint ? checkpoint->Next() : nullptr;
+      findings.check = &check.emplace(CheckDiscretisation(fit_.input, spreads, result, log));
+      CheckSameFit(checkpoint.get());
+    }
     const bool any = result.estimate.size() > 0;
+    std::optional<PredictedRecordings> later;
+    if (!held_back.empty() && any) {
+      findings.later = &later.emplace(PredictLater(fit_.input, *problem_, result.estimate,
+                                                   wanted.predict_from, std::move(held_back)));
+    }
+    OrderedJson all = ResultToJson(*problem_, result, findings);
     all["certificate"] = any ? ToJson(result.certificate) : OrderedJson(nullptr);
-    return {all.dump(),
-            any ? FitReport(fit_.path, *problem_, result, {&components}) : std::string()};
+    Found found{all.dump(), "", "", {}};
+    if (!any) return found;
+    found.report = FitReport(fit_.path, *problem_, result, findings);
+    found.predictions = PredictionCsv(*problem_, result.residuals, findings.later);
+    for (int b = 0; b < problem_->num_blocks(); ++b) found.scenes.push_back(SceneOf(b, result));
+    return found;
+  }
+
+  Scene SceneOf(int b, const FitResult& result) {
+    const std::string folder = FolderOf(fit_.path);
+    std::string text;
+    std::string error;
+    Scene scene;
+    if (!FittedScene(fit_.input.recordings[b].problem, problem_->ParametersOf(b, result.estimate),
+                     folder, &text, &error) ||
+        !ParseScene(text, "fitted scene", folder, &scene, &error)) {
+      throw Error(problem_->BlockName(b) + error);
+    }
+    return scene;
+  }
+
+  // Moves what each recording has after a time out of the fit.
+  std::vector<std::vector<Observation>> HoldBack(double from) {
+    std::vector<std::vector<Observation>> later;
+    if (!(from < INFINITY)) return later;
+    bool any = false;
+    for (RecordingInput& recording : fit_.input.recordings) {
+      std::vector<Observation>& observations = recording.problem.observations;
+      later.push_back(TakeLater(from, &observations));
+      any = any || !later.back().empty();
+      if (observations.empty()) throw Error("predict_from: expected observations up to this time");
+    }
+    if (!any) throw Error("predict_from: expected observations after this time");
+    std::string error;
+    problem_ = MakeProblem(fit_, &error);
+    if (problem_ == nullptr) throw Error(error);
+    return later;
+  }
+
+  void Scale(const std::vector<SensorNoise>& noise,
+             std::vector<std::vector<Observation>>* held_back) {
+    for (size_t b = 0; b < fit_.input.recordings.size(); ++b) {
+      FitProblem& run = fit_.input.recordings[b].problem;
+      ScaleSigma(noise, run.instruments, run.channels, &run.observations);
+      if (!held_back->empty()) {
+        ScaleSigma(noise, run.instruments, run.channels, &(*held_back)[b]);
+      }
+    }
+  }
+
+  // The checkpoint in its file, with what that holds already; null without one.
+  std::unique_ptr<FitCheckpoint> Open(const std::string& file) {
+    if (file.empty()) return nullptr;
+    auto checkpoint = std::make_unique<FitCheckpoint>(fit_.input, [file](const std::string& text) {
+      // Renamed when it is whole, so that an interruption leaves the last one.
+      const std::string beside = file + ".new";
+      const bool written = bool(std::ofstream(beside, std::ios::binary) << text << std::flush);
+      std::error_code failed;
+      if (written) std::filesystem::rename(beside, file, failed);
+      return written && !failed ? std::string() : file + ": cannot be written";
+    });
+    std::string error;
+    std::string text;
+    if (!std::filesystem::exists(file)) {
+      error = checkpoint->Write();
+    } else if (ReadTextFile(file, &text, &error)) {
+      error = checkpoint->Restore(text, file);
+    }
+    if (!error.empty()) throw Error(error);
+    return checkpoint;
+  }
+
+  static void CheckSameFit(const FitCheckpoint* checkpoint) {
+    if (checkpoint == nullptr) return;
+    if (checkpoint->mismatch() != 0) throw Error("checkpoint: expected that of this fit");
+    if (!checkpoint->error().empty()) throw Error(checkpoint->error());
+  }
+
+  FitProgress ProgressOf(const Wanted& wanted) {
+    return [this, &wanted](int start, int iteration, const FitIteration& values) {
+      CheckInterrupt();
+      if (wanted.on_iteration.is_none()) return;
+      const py::gil_scoped_acquire gil;
+      py::dict parameters;
+      for (size_t k = 0; k < values.parameters.size(); ++k) {
+        parameters[py::str(problem().entries()[k].name)] = values.parameters[k];
+      }
+      py::dict said;
+      said["start"] = start;
+      said["iteration"] = iteration;
+      said["cost"] = values.cost;
+      said["gradient_norm"] = values.gradient_norm;
+      said["parameters"] = parameters;
+      said["seconds"] = values.seconds;
+      wanted.on_iteration(said);
+    };
   }
 
   // Rows of all blocks, each times the root of its weight; what is wrong, or empty. No Jacobian
@@ -112,7 +242,6 @@ class FitProblemOf {
     return "";
   }
 
-  std::string text_, file_;
   FitFile fit_;
   std::unique_ptr<RecordingsProblem> problem_;
   Turns turns_;
@@ -123,16 +252,15 @@ class FitProblemOf {
 void BindFit(py::module_* module) {
   py::class_<FitProblemOf>(*module, "Fit")
       .def(py::init<const std::string&, const std::string&>())
-      .def(
-          py::pickle([](const FitProblemOf& fit) { return py::make_tuple(fit.text(), fit.file()); },
-                     [](const py::tuple& state) {
-                       return std::make_unique<FitProblemOf>(state[0].cast<std::string>(),
-                                                             state[1].cast<std::string>());
-                     }))
       .def_property_readonly("names", &FitProblemOf::names)
       .def("ranges", &FitProblemOf::Ranges)
       .def("evaluate", &FitProblemOf::Evaluate)
-      .def("run", &FitProblemOf::Run);
+      .def("run",
+           [](FitProblemOf& fit, int max_iterations, double predict_from, bool discretisation_check,
+              const std::string& checkpoint, const py::object& on_iteration) {
+             return fit.Run(
+                 {max_iterations, predict_from, discretisation_check, checkpoint, on_iteration});
+           });
 }
 
 }  // namespace tangible::python

@@ -22,7 +22,7 @@ def test_the_chain_has_its_mass(tmp_path: Path) -> None:
     page = result.report(tmp_path / "report.html")
     assert "chain mass" in page and (tmp_path / "report.html").read_text() == page
     pytest.importorskip("matplotlib")
-    assert len(result.plot().lines) == 1
+    assert len(result.plot("cost").lines) == 1
 
 
 def test_scipy_finds_the_same() -> None:

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import csv
+import html
+import io
 import json
+import math
 import os
-from collections.abc import Mapping
+import sys
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Union
 
@@ -13,7 +18,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import _core
 from ._certificate import Certificate
+from ._problem import Problem, make, of_data
 from ._rollout import floats
+from ._scene import Scene
 from ._warning import warn
 
 if TYPE_CHECKING:
@@ -21,33 +28,32 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 FitLike = Union[Mapping[str, Any], str, "os.PathLike[str]"]
+# A table: a dict of arrays, or a DataFrame of pandas, which is never imported here.
+Table = Any
+Parameters = Union[Sequence[Any], Mapping[str, Any]]
 
 
-def _text(
-    problem: FitLike, folder: str | os.PathLike[str], initial: Mapping[str, float] | None
-) -> tuple[str, str]:
-    """The text of a fit file and its name, which places what it names."""
-    if isinstance(problem, Mapping):
-        data: dict[str, Any] = json.loads(json.dumps(problem))
-        name = str(Path(folder) / "fit")
-    else:
-        name = os.fspath(problem)
-        try:
-            text = Path(name).read_text(encoding="utf-8-sig")
-        except OSError as error:
-            raise _core.TangibleError(f"{name}: cannot be read: {error.strerror}") from None
-        if not initial:
-            return text, name
-        data = json.loads(text)
-    for key, value in (initial or {}).items():
-        for k, parameter in enumerate(data.get("parameters", [])):
-            entry = {"name": parameter, "path": parameter} if isinstance(parameter, str) else parameter
-            if entry.get("name", entry.get("path")) == key:
-                data["parameters"][k] = {**entry, "initial": float(value)}
-                break
-        else:
-            raise _core.TangibleError(f"initial: no parameter of the fit is named {key}")
-    return json.dumps(data), name
+def _problem(
+    problem: FitLike | Scene,
+    data: Table | None,
+    parameters: Parameters | None,
+    sigma: float | Mapping[str, float] | None,
+    points: Mapping[str, Any] | None,
+    recordings: Sequence[Any] | Mapping[str, Any] | None,
+    folder: str | os.PathLike[str],
+    initial: Mapping[str, float] | None,
+    keys: Mapping[str, Any],
+) -> Problem:
+    if data is not None or recordings is not None:
+        whole = of_data(problem, data, parameters, sigma, points, recordings, keys)
+        return make(whole, folder, initial)
+    if isinstance(problem, Scene):
+        raise TypeError("data: expected a dict of arrays or a DataFrame with a scene, got None")
+    given = {"parameters": parameters, "sigma": sigma, "points": points, **keys}
+    for name, value in given.items():
+        if value is not None:
+            raise TypeError(f"{name}: expected in the fit file, or beside data")
+    return make(problem, folder, initial)
 
 
 class Residuals:
@@ -56,10 +62,10 @@ class Residuals:
         scipy.optimize.least_squares(r, r.initial, jac=r.jacobian, bounds=r.bounds)
 
     Residuals are in multiples of their standard deviation. Calls from several threads take turns.
+    Pickled, they keep what was in memory; files are read again.
 
     Args:
-        problem: A fit file, or a dict of its JSON (README of `estimation`).
-        folder: Where files that a dict names are looked for.
+        problem, data, parameters, sigma, points, recordings, folder, keys: As of `fit`.
         initial: Initial values that replace the file's: {name: value}.
 
     Attributes:
@@ -70,16 +76,35 @@ class Residuals:
 
     def __init__(
         self,
-        problem: FitLike,
+        problem: FitLike | Scene,
+        data: Table | None = None,
+        parameters: Parameters | None = None,
         *,
+        sigma: float | Mapping[str, float] | None = None,
+        points: Mapping[str, Any] | None = None,
+        recordings: Sequence[Any] | Mapping[str, Any] | None = None,
         folder: str | os.PathLike[str] = ".",
         initial: Mapping[str, float] | None = None,
+        **keys: Any,
     ) -> None:
-        self._core = _core.Fit(*_text(problem, folder, initial))
+        self._open(
+            _problem(problem, data, parameters, sigma, points, recordings, folder, initial, keys)
+        )
+
+    def _open(self, problem: Problem) -> None:
+        self._problem = problem
+        with problem.read() as core:
+            self._core = core
         ranges = self._core.ranges()
         self.names = self._core.names
         self.initial: Floats = np.array(ranges[:, 0])
         self.bounds: tuple[Floats, Floats] = (np.array(ranges[:, 1]), np.array(ranges[:, 2]))
+
+    def __getstate__(self) -> Problem:
+        return self._problem
+
+    def __setstate__(self, problem: Problem) -> None:
+        self._open(problem)
 
     def __call__(self, parameters: ArrayLike) -> Floats:
         """The residuals, shape (R,)."""
@@ -100,12 +125,26 @@ class FitResult:
         message: Why.
         estimates: {name: estimate}.
         certificate: Of the derivatives at the estimate; None where there is no estimate.
+        scenes: {name of the recording: fitted scene}; "" names the only one. Empty where there is no
+            estimate, as `predictions` is.
+        predictions: A column each of the table of all observations beside their predictions: `time`
+            (s), `target`, `coordinate`, `used` ("fit" or "prediction"), `sigma`, `observed`,
+            `predicted`, `residual` (predicted - observed), `residual_in_sigma`, and more.
+            `pandas.DataFrame(result.predictions)` is a table.
         data: The whole result as `tangible-fit --out` writes it.
     """
 
-    def __init__(self, data: dict[str, Any], page: str) -> None:
+    def __init__(
+        self,
+        data: dict[str, Any],
+        page: str,
+        predictions: str = "",
+        scenes: Iterable[_core.Scene] = (),
+        parameters: Sequence[Any] = (),
+    ) -> None:
         self.data = data
         self._page = page
+        self._parameters = list(parameters)
         self.status: str = data["status"]
         self.message: str = data["message"]
         found = data.get("certificate")
@@ -113,6 +152,57 @@ class FitResult:
         self.estimates: dict[str, float] = {
             p["name"]: p["estimate"] for p in data["parameters"] if p["estimate"] is not None
         }
+        self.predictions = _read_predictions(predictions)
+        names = list(dict.fromkeys(self.predictions.get("recording", np.array([""])).tolist()))
+        self.scenes = {name: Scene._of_core(core) for name, core in zip(names, scenes)}
+
+    @property
+    def scene(self) -> Scene:
+        """The fitted scene; of several recordings that of the first."""
+        if not self.scenes:
+            raise ValueError(f"scene: expected a fit with an estimate, got one that is {self.status}")
+        return next(iter(self.scenes.values()))
+
+    @property
+    def residuals(self) -> Floats:
+        """Of the observations that were fitted, predicted - observed in multiples of sigma."""
+        used = self.predictions.get("used", np.array([])) == "fit"
+        return np.asarray(self.predictions["residual_in_sigma"][used]) if used.any() else np.zeros(0)
+
+    @property
+    def standard_deviations(self) -> dict[str, float]:
+        """{name: standard deviation}, from the stated sigma; NaN where it is not determined."""
+        found = {p["name"]: p.get("standard_deviation") for p in self.data["parameters"]}
+        return {name: math.nan if value is None else float(value) for name, value in found.items()}
+
+    def domains(self, count: int, seed: int = 0) -> dict[str, Floats]:
+        """Scenes that the observations leave possible, for `Simulation(domains=...)`.
+
+        Draws from the Gaussian of estimates and covariance, each kept within its range: {path of the
+        scene: shape (count,)}. Parameters of single recordings are left out.
+        """
+        names = self.names
+        mean = np.array([self.estimates[name] for name in names])
+        covariance = self.covariance
+        known = np.isfinite(np.diag(covariance))
+        drawn = np.tile(mean, (count, 1))
+        drawn[:, known] = np.random.default_rng(seed).multivariate_normal(
+            mean[known], covariance[np.ix_(known, known)], size=count, method="eigh"
+        )
+        values: dict[str, Floats] = {}
+        for entry in self._parameters:
+            given = {"path": entry} if isinstance(entry, str) else entry
+            name = given.get("name", given.get("path"))
+            if name not in names:
+                continue
+            low = -math.inf if given.get("lower") is None else float(given["lower"])
+            high = math.inf if given.get("upper") is None else float(given["upper"])
+            column = np.clip(drawn[:, names.index(name)], low, high)
+            for one in given.get("sets", [{"path": given.get("path")}]):
+                path = str(one["path"])
+                if path.startswith(("bodies/", "joints/", "springs/", "forces/", "pairs/", "gravity/")):
+                    values[path] = one.get("scale", 1.0) * column + one.get("offset", 0.0)
+        return values
 
     def __getitem__(self, name: str) -> float:
         """The estimate of a parameter."""
@@ -161,40 +251,147 @@ class FitResult:
             Path(file).write_text(self._page, encoding="utf-8")
         return self._page
 
-    def plot(self, *, ax: Axes | None = None) -> Axes:
-        """Plots the cost by iteration with matplotlib; returns the axes."""
+    def _repr_html_(self) -> str:
+        """What a notebook shows: the report in a frame of its own."""
+        if not self._page:
+            return f"<pre>{html.escape(repr(self))}</pre>"
+        return (
+            f'<iframe srcdoc="{html.escape(self._page)}" width="100%" height="640" '
+            'style="border:0"></iframe>'
+        )
+
+    def plot(self, what: str = "data", *, ax: Axes | None = None) -> Axes:
+        """Plots with matplotlib; returns the axes.
+
+        Args:
+            what: "data": observations and their predictions over time; "residuals": in multiples of
+                sigma over time; "cost": by iteration.
+        """
         import matplotlib.pyplot as plt
 
+        if what not in ("data", "residuals", "cost"):
+            raise ValueError(f"what: expected data, residuals or cost, got {what}")
         axes: Axes = ax if ax is not None else plt.subplots()[1]
-        axes.semilogy([iteration["cost"] for iteration in self.data["iterations"]], marker="o")
-        axes.set_xlabel("iteration")
-        axes.set_ylabel("cost")
+        if what == "cost":
+            axes.semilogy([iteration["cost"] for iteration in self.data["iterations"]], marker="o")
+            axes.set_xlabel("iteration")
+            axes.set_ylabel("cost")
+            return axes
+        table, units = self.predictions, []
+        for k, (label, coordinate, rows) in enumerate(self._series()):
+            time, color = table["time"][rows], f"C{k % 10}"
+            units.append(_UNITS.get(coordinate, ""))
+            if what == "data":
+                axes.plot(time, table["observed"][rows], ".", color=color, ms=4, label=label)
+                axes.plot(time, table["predicted"][rows], "-", color=color, lw=1)
+            else:
+                axes.plot(time, table["residual_in_sigma"][rows], ".", color=color, ms=4, label=label)
+        if what == "residuals":
+            axes.axhspan(-2.0, 2.0, color="0.9", zorder=0)
+        axes.set_xlabel("time (s)")
+        axes.set_ylabel("residual (sigma)" if what == "residuals" else ", ".join(dict.fromkeys(units)))
+        if units:
+            axes.legend(loc="upper right")
         return axes
 
+    def _series(self) -> list[tuple[str, str, NDArray[np.intp]]]:
+        """(label, coordinate, rows by time) of each coordinate that was measured."""
+        rows: dict[tuple[str, ...], list[int]] = {}
+        keys = [self.predictions[k] for k in ("recording", "target", "coordinate") if k in self.predictions]
+        for i, key in enumerate(zip(*keys)):
+            rows.setdefault(tuple(str(part) for part in key), []).append(i)
+        return [("/".join(part for part in key if part), key[-1], np.array(found)) for key, found in rows.items()]
+
     def __repr__(self) -> str:
-        values = ", ".join(f"{name}={value:.6g}" for name, value in self.estimates.items())
+        deviations = self.standard_deviations
+        values = ", ".join(
+            f"{name}={value:.6g}" + (f"±{deviations[name]:.2g}" if deviations[name] >= 0.0 else "")
+            for name, value in self.estimates.items()
+        )
         return f"FitResult({self.status}, {values})"
 
 
+_UNITS = {"x": "m", "y": "m", "angle": "rad", "vx": "m/s", "vy": "m/s", "omega": "rad/s", "distance": "m"}
+
+
+def _read_predictions(text: str) -> dict[str, NDArray[Any]]:
+    """The columns of the programs' table; an empty number is NaN."""
+    if not text:
+        return {}
+    header, *rows = csv.reader(io.StringIO(text))
+    numbers = ("time", "sigma", "observed", "predicted", "residual", "residual_in_sigma")
+    columns: dict[str, NDArray[Any]] = {}
+    for name, cells in zip(header, zip(*rows)):
+        if name in numbers:
+            columns[name] = np.array([float(cell) if cell else math.nan for cell in cells])
+        else:
+            columns[name] = np.array(cells)
+    return columns
+
+
+def _progress(said: dict[str, Any]) -> None:
+    """One line on stderr that is written over at each iteration."""
+    print(
+        f"\rstart {said['start']}, iteration {said['iteration']}, cost {said['cost']:.6g}, "
+        f"{said['seconds']:.1f} s\033[K", end="", file=sys.stderr, flush=True,
+    )
+
+
 def fit(
-    problem: FitLike,
+    problem: FitLike | Scene,
+    data: Table | None = None,
+    parameters: Parameters | None = None,
     *,
+    sigma: float | Mapping[str, float] | None = None,
+    points: Mapping[str, Any] | None = None,
+    recordings: Sequence[Any] | Mapping[str, Any] | None = None,
     folder: str | os.PathLike[str] = ".",
     initial: Mapping[str, float] | None = None,
     max_iterations: int = 50,
+    predict_from: float | None = None,
+    discretisation_check: bool = False,
+    checkpoint: str | os.PathLike[str] | None = None,
+    callback: Callable[[dict[str, Any]], object] | None = None,
+    progress: bool = False,
     on_failure: str = "raise",
+    **keys: Any,
 ) -> FitResult:
     """Identifies parameters from observations, as `tangible-fit` does.
 
+        tangible.fit(scene, {"time": t, "ball/x": x}, ["bodies/ball/mass"], sigma=0.001)
+        tangible.fit("chain_fit.json")
+
     Args:
-        problem: A fit file, or a dict of its JSON (README of `estimation`).
+        problem: With `data` or `recordings` a scene: a `Scene`, its file, or a dict of its JSON. Else
+            a fit file, or a dict of its JSON (README of `estimation`), in which a scene may stand as
+            a `Scene` or dict, and an observation's table as its `data`, in the place of files.
+        data: What was measured: a dict of arrays of one length, or a DataFrame of pandas. Columns
+            are `time` (s; a DataFrame's index may be it) and either `body` or `point` beside `x`,
+            `y` (m), `angle` (rad), ..., or wide ones like "ball/x". A table of the one moving body
+            needs no names. NaN is what was not measured.
+        parameters: What is to be found: paths, or dicts as in a fit file, or {path or name: initial
+            value or such a dict}.
+        sigma: Standard deviation of what was measured: a number, or {"x": m, "angle": rad, ...}.
+        points: {name: {"body": name, "at": [x, y]}}: points of bodies that `data` may name.
+        recordings: In the place of `data` tables of several runs, as a list or {name: table}; an
+            item may be {"data": table, "initial": {...}, "weight": w, ...} too.
         folder: Where files that a dict names are looked for.
         initial: Initial values that replace the file's: {name: value}.
         max_iterations: Of each start.
+        predict_from: s: observations after it are not fitted but predicted; their errors stand in
+            the report and in `predictions`.
+        discretisation_check: Whether it is fitted with half the step too, which shows its bias.
+        checkpoint: A file that keeps the fit's evaluations: where the fit is interrupted, the same
+            call goes on from it, with the same bits.
+        callback: Called after each iteration with `start`, `iteration`, `cost`, `gradient_norm`,
+            `parameters` and `seconds`; what it raises ends the fit.
+        progress: Whether a line on stderr says how far it is.
         on_failure: "raise", or "return" a result that has not converged.
+        **keys: With `data`, further keys of a fit file: `loss`, `starts`, `seed`, `sensors`, ...
 
     Raises:
         TangibleError: A mistake in the problem; a fit that has not converged.
+        TypeError, ValueError: An argument that is missing, or a table that cannot be read.
 
     Warns:
         TangibleWarning: Of what `FitResult.warnings` lists.
@@ -203,8 +400,30 @@ def fit(
         raise ValueError(f"on_failure: expected raise or return, got {on_failure}")
     if max_iterations < 1:
         raise ValueError(f"max_iterations: expected a number >= 1, got {max_iterations}")
-    text, page = _core.Fit(*_text(problem, folder, initial)).run(max_iterations)
-    result = FitResult(json.loads(text), page)
+    if predict_from is not None and not math.isfinite(predict_from):
+        raise ValueError(f"predict_from: expected a time in s, got {predict_from}")
+
+    def told(said: dict[str, Any]) -> None:
+        if progress:
+            _progress(said)
+        if callback is not None:
+            callback(said)
+
+    made = _problem(problem, data, parameters, sigma, points, recordings, folder, initial, keys)
+    try:
+        with made.read() as core:
+            text, page, predictions, scenes = core.run(
+                max_iterations,
+                math.inf if predict_from is None else float(predict_from),
+                discretisation_check,
+                "" if checkpoint is None else os.fspath(checkpoint),
+                told if progress or callback is not None else None,
+            )
+    finally:
+        if progress:
+            print(file=sys.stderr)
+    listed = json.loads(made.text).get("parameters", [])
+    result = FitResult(json.loads(text), page, predictions, scenes, listed)
     if result.status != "converged" and on_failure == "raise":
         raise _core.TangibleError(f"{result.status}: {result.message}")
     warn(result.warnings)

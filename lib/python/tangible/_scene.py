@@ -86,6 +86,13 @@ class Scene:
         """The scene itself, or one made from a file's name or a dict."""
         return scene if isinstance(scene, Scene) else Scene(scene)
 
+    @staticmethod
+    def _of_core(core: _core.Scene) -> Scene:
+        made = Scene()
+        made._data = {}
+        made._read = core
+        return made
+
     def _copy(self) -> Scene:
         """The scene as it is now, whatever is added to this one later."""
         same = Scene.__new__(Scene)

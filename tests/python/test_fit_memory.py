@@ -1,0 +1,229 @@
+"""Fits from memory are those of files."""
+
+from __future__ import annotations
+
+import json
+import pickle
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import tangible
+
+from conftest import ball
+
+PARAMETERS = ["bodies/ball/velocity/x", "bodies/ball/restitution"]
+TRUE = {"bodies/ball/velocity/x": 0.5, "bodies/ball/restitution": 0.8}
+GUESS = {"bodies/ball/velocity/x": 0.3, "bodies/ball/restitution": 0.7}
+SIGMA = 1e-3
+
+
+def scene() -> dict[str, Any]:
+    data = ball("event")
+    data["bodies"][1]["restitution"] = data["bodies"][0]["restitution"]
+    data["pairs"] = [{"bodies": ["ball", "floor"], "friction": 0.0}]
+    return data
+
+
+def seen(seed: int = 0, **truth: float) -> dict[str, np.ndarray[Any, Any]]:
+    run = tangible.simulate(scene(), {**TRUE, **truth}, every=3)
+    noise = np.random.default_rng(seed).normal(size=(2, len(run.times))) * SIGMA
+    return {"time": run.times, "ball/x": run["ball/x"] + noise[0], "ball/y": run["ball/y"] + noise[1]}
+
+
+def from_files(folder: Path) -> tangible.FitResult:
+    table = seen()
+    rows = [f"{t:.17g},ball,{x:.17g},{y:.17g}" for t, x, y in zip(*table.values())]
+    (folder / "seen.csv").write_text("\n".join(["time,body,x,y", *rows]))
+    (folder / "scene.json").write_text(json.dumps(scene()))
+    return tangible.fit(
+        {"scene": "scene.json", "observations": [{"file": "seen.csv", "sigma": SIGMA}],
+         "parameters": [{"path": path, "initial": GUESS[path]} for path in PARAMETERS]}, folder=folder)
+
+
+@pytest.mark.parametrize("form", ["wide", "long", "nameless", "dataframe", "long dataframe", "entries"])
+def test_tables_of_every_form_give_the_same_bits(form: str, tmp_path: Path) -> None:
+    expected = from_files(tmp_path)
+    assert expected["bodies/ball/restitution"] == pytest.approx(0.8, abs=0.01)
+    table: Any = seen()
+    long = {"time": table["time"], "body": ["ball"] * len(table["time"]), "x": table["ball/x"], "y": table["ball/y"]}
+    if form == "long":
+        table = long
+    if form == "nameless":
+        table = {"time": list(table["time"]), "x": table["ball/x"], "y": table["ball/y"].tolist()}
+    if "dataframe" in form:
+        pandas = pytest.importorskip("pandas")
+        table = pandas.DataFrame(long) if "long" in form else pandas.DataFrame(table).set_index("time")
+    problem: Any = tangible.Scene(scene()) if form != "wide" else scene()
+    if form == "entries":
+        found = tangible.fit({
+            "scene": problem, "parameters": [{"path": path, "initial": GUESS[path]} for path in PARAMETERS],
+            "observations": [{"time": long["time"], "body": "ball", "x": long["x"], "y": long["y"], "sigma": SIGMA}]})
+    else:
+        found = tangible.fit(problem, table, GUESS, sigma=SIGMA)
+    assert found.estimates == expected.estimates
+    assert np.array_equal(found.covariance, expected.covariance)
+
+
+def test_what_was_not_measured_is_nan() -> None:
+    table = seen()
+    table["ball/y"][::2] = np.nan
+    table["ball/x"][4] = table["ball/y"][4] = np.nan
+    found = tangible.fit(scene(), table, GUESS, sigma={"x": SIGMA, "y": 2 * SIGMA})
+    assert len(found.residuals) == 20 + 10
+    kinds = found.predictions["coordinate"]
+    assert set(found.predictions["sigma"][kinds == "y"]) == {2 * SIGMA}
+
+
+def test_a_result_has_all_that_was_found(tmp_path: Path) -> None:
+    found = tangible.fit(tangible.Scene(scene()), seen(), GUESS, sigma=SIGMA)
+    path = "bodies/ball/restitution"
+    assert found.scene[path] == pytest.approx(found[path]) and isinstance(found.scene, tangible.Scene)
+    run = tangible.simulate(found.scene, every=3)
+    table = found.predictions
+    xs = table["coordinate"] == "x"
+    assert table["predicted"][xs] == pytest.approx(run["ball/x"], abs=1e-9)
+    assert table["residual"] == pytest.approx(table["predicted"] - table["observed"], abs=1e-12)
+    assert found.residuals == pytest.approx((table["predicted"] - table["observed"]) / SIGMA, abs=1e-9)
+    assert found.standard_deviations[path] == pytest.approx(np.sqrt(found.covariance[1, 1]))
+    assert f"{path}={found[path]:.6g}±{found.standard_deviations[path]:.2g}" in repr(found)
+    assert found._repr_html_().startswith("<iframe srcdoc=") and found.warnings == []
+    other = pickle.loads(pickle.dumps(found))
+    assert repr(other) == repr(found) and other.scene.to_json() == found.scene.to_json()
+    matplotlib = pytest.importorskip("matplotlib")
+    matplotlib.use("Agg")
+    data = found.plot()
+    assert len(data.lines) == 4 and data.get_ylabel() == "m"
+    assert np.array_equal(data.lines[0].get_ydata(), table["observed"][xs])
+    residuals = found.plot("residuals")
+    assert len(residuals.lines) == 2 and residuals.get_ylabel() == "residual (sigma)"
+
+
+def test_recordings_from_memory() -> None:
+    tables = {"slow": seen(1), "fast": seen(2, **{"bodies/ball/velocity/x": 1.5})}
+    parameters = [
+        {"path": "bodies/ball/restitution", "initial": 0.7},
+        {"name": "vx", "path": "bodies/ball/velocity/x", "initial": 1.0, "per": "recording"},
+    ]
+    found = tangible.fit(scene(), None, parameters, sigma=SIGMA, recordings=tables)
+    assert found["vx of slow"] == pytest.approx(0.5, abs=0.01)
+    assert found["vx of fast"] == pytest.approx(1.5, abs=0.01)
+    assert list(found.scenes) == ["slow", "fast"]
+    assert found.scenes["fast"]["bodies/ball/velocity/x"] == pytest.approx(found["vx of fast"])
+    begun = {"slow": tables["slow"], "fast": {"data": tables["fast"], "initial": {"vx": 1.4}}}
+    residuals = tangible.Residuals(scene(), None, parameters, sigma=SIGMA, recordings=begun)
+    assert residuals.initial.tolist() == [0.7, 1.0, 1.4]
+    listed = tangible.fit(scene(), None, parameters, sigma=SIGMA, recordings=list(tables.values()))
+    assert list(listed.scenes) == ["recording 0", "recording 1"]
+
+
+def test_points_can_be_measured() -> None:
+    run = tangible.simulate(scene(), TRUE)
+    angle = run["ball/angle"]
+    table = {"time": run.times, "dot/x": run["ball/x"] + 0.1 * np.cos(angle), "dot/y": run["ball/y"] + 0.1 * np.sin(angle)}
+    found = tangible.fit(
+        scene(), table, GUESS, sigma=SIGMA, points={"dot": {"body": "ball", "at": np.array([0.1, 0.0])}})
+    assert found["bodies/ball/velocity/x"] == pytest.approx(0.5, abs=1e-6)
+    assert set(found.predictions["target"]) == {"dot"}
+
+
+def test_residuals_of_memory_are_pickled() -> None:
+    residuals = tangible.Residuals(scene(), seen(), GUESS, sigma=SIGMA)
+    assert residuals.initial.tolist() == list(GUESS.values())
+    other = pickle.loads(pickle.dumps(residuals))
+    assert np.array_equal(other([0.4, 0.75]), residuals([0.4, 0.75]))
+    assert np.array_equal(other.jacobian([0.4, 0.75]), residuals.jacobian([0.4, 0.75]))
+
+
+def test_later_observations_are_predicted() -> None:
+    found = tangible.fit(scene(), seen(), {"bodies/ball/velocity/x": 0.3}, sigma=SIGMA, predict_from=0.3)
+    used = found.predictions["used"]
+    assert set(used) == {"fit", "prediction"} and (found.predictions["time"][used == "fit"] <= 0.3).all()
+    assert len(found.residuals) == (used == "fit").sum()
+    with pytest.raises(tangible.TangibleError, match="predict_from: expected observations after"):
+        tangible.fit(scene(), seen(), GUESS, sigma=SIGMA, predict_from=2.0)
+
+
+def test_callbacks_checks_and_checkpoints(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    said: list[dict[str, Any]] = []
+    file = tmp_path / "fit.checkpoint"
+    found = tangible.fit(
+        scene(), seen(), GUESS, sigma=SIGMA, callback=said.append, progress=True, checkpoint=file,
+        discretisation_check=True)
+    assert [s["iteration"] for s in said] == list(range(len(said))) and len(said) > 2
+    assert said[0]["parameters"] == GUESS and said[-1]["cost"] < said[0]["cost"]
+    assert "iteration 2" in capsys.readouterr().err
+    assert any("discretisation" in key for key in found.data)
+    again = tangible.fit(scene(), seen(), GUESS, sigma=SIGMA, checkpoint=file, discretisation_check=True)
+    assert again.estimates == found.estimates
+
+    class Enough(Exception):
+        pass
+
+    def end(_: dict[str, Any]) -> None:
+        raise Enough
+
+    with pytest.raises(Enough):
+        tangible.fit(scene(), seen(), GUESS, sigma=SIGMA, callback=end)
+    assert tangible.fit(scene(), seen(), GUESS, sigma=SIGMA).status == "converged"
+
+
+def test_scenes_that_the_data_leave_possible() -> None:
+    found = tangible.fit(scene(), seen(), [
+        {"path": "bodies/ball/restitution", "initial": 0.7, "upper": 1.0},
+        {"name": "speed", "initial": 3.0, "sets": [{"path": "bodies/ball/velocity/x", "scale": 0.1}]},
+    ], sigma=SIGMA)
+    drawn = found.domains(2000, seed=3)
+    assert list(drawn) == ["bodies/ball/restitution", "bodies/ball/velocity/x"]
+    assert drawn["bodies/ball/velocity/x"].mean() == pytest.approx(0.1 * found["speed"], rel=1e-2)
+    assert drawn["bodies/ball/velocity/x"].std() == pytest.approx(0.1 * found.standard_deviations["speed"], rel=0.1)
+    simulation = tangible.Simulation(found.scene, batch=50, domains=drawn)
+    assert np.std(simulation.reset(seed=0)[:, 3]) == pytest.approx(0.1 * found.standard_deviations["speed"], rel=0.4)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        ({"data": {"x": [1.0]}}, "expected a column time"),
+        ({"data": {"time": [0.0, 0.1], "x": [1.0]}}, r"x: expected shape \(2,\), as time, got \(1,\)"),
+        ({"data": {"time": [0.0], "x": ["a"]}}, "x: expected numbers"),
+        ({"data": {"time": [0.0], "ball/x": [0.0], "y": [1.0]}}, "columns like ball/x, got y"),
+        ({"data": {"time": [0.0], "bal/x": [0.0]}}, "^observations/0: line 2: body: .*bal"),
+        ({"data": {"time": [np.nan], "ball/x": [0.0]}}, "time: expected finite numbers"),
+        ({"data": 3}, "expected a dict of arrays or a DataFrame, got int"),
+        ({"data": None}, "expected a dict of arrays or a DataFrame with a scene"),
+        ({"parameters": None}, "parameters: expected paths"),
+        ({"parameters": "bodies/ball/mass"}, "parameters: expected a list of paths, got the text"),
+        ({"parameters": ["bodies/ball/mas"]}, "/parameters/0"),
+        ({"sigma": None}, "sigma: expected the standard deviation"),
+        ({"recordings": [{}]}, "data: expected None beside recordings"),
+        ({"keys": 1}, "/keys: unknown key"),
+    ],
+)
+def test_mistakes_are_said(arguments: dict[str, Any], said: str) -> None:
+    given: dict[str, Any] = {"data": seen(), "parameters": PARAMETERS, "sigma": SIGMA, **arguments}
+    with pytest.raises((ValueError, TypeError), match=said):
+        tangible.fit(tangible.Scene(scene()), **given)
+    broken = tangible.Scene(scene())
+    broken.add_body("a")
+    with pytest.raises(tangible.TangibleError, match="^ball: /bodies/2/mass"):
+        tangible.fit(broken, seen(), PARAMETERS, sigma=SIGMA)
+    with pytest.raises(TypeError, match="sigma: expected in the fit file, or beside data"):
+        tangible.fit({"scene": "x"}, sigma=1.0)
+
+
+def test_pandas_is_never_imported() -> None:
+    import subprocess
+    import sys
+
+    code = (
+        "import sys, tangible, numpy as np\n"
+        "s = tangible.Scene(simulation={'duration': 0.1})\n"
+        "s.add_body('a', mass=1, inertia=1, position=[0, 0], velocity=[1, 0])\n"
+        "t = np.linspace(0, 0.1, 5)\n"
+        "r = tangible.fit(s, {'time': t, 'x': 2 * t}, ['bodies/a/velocity/x'], sigma=0.1)\n"
+        "assert abs(r['bodies/a/velocity/x'] - 2) < 1e-6\n"
+        "assert not {'pandas', 'matplotlib', 'torch'} & set(sys.modules)"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
