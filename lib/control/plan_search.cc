@@ -268,7 +268,7 @@ SearchResult SearchPlan(const SearchProblem& problem, const RowMatrixXd& initial
   SearchResult failed;
   failed.best.status = IlqrStatus::kFailed;
   for (Eigen::Index i = 0; i < problem.low.size() && options.searches(); ++i) {
-    if (std::isfinite(problem.low[i]) && std::isfinite(problem.high[i])) continue;
+    if (std::isfinite(problem.high[i] - problem.low[i])) continue;
     failed.best.message = "bounds of control " + std::to_string(i) +
                           ": expected finite ones, between which starts are drawn, got none";
     return failed;

@@ -29,6 +29,9 @@ void Shorten(ControlFile* file) {
   settings.max_events_per_step = std::min(settings.max_events_per_step, 5);
   file->options.max_iterations = std::min(file->options.max_iterations, kIterations);
   file->options.surrogate.samples = std::min(file->options.surrogate.samples, 4);
+  file->starts.count = std::min(file->starts.count, 2);
+  file->sampling.samples = std::min(file->sampling.samples, 4);
+  file->sampling.iterations = std::min(file->sampling.iterations, 2);
 }
 
 void Plan(const ControlFile& file) {
@@ -39,8 +42,10 @@ void Plan(const ControlFile& file) {
   const double dt = file.scene.simulation.dt;
   const tangible::Cost cost(map.num_states(), map.num_controls(), dt, file.terms);
   const tangible::ControlProblem problem{&map, &cost, map.initial(), file.low, file.high, 0};
-  const tangible::RowMatrixXd start = file.initial.transpose().replicate(function.num_steps(), 1);
-  const tangible::IlqrResult result = SolveIlqr(problem, start, file.options);
+  const tangible::RowMatrixXd start = file.InitialControls(function.num_steps());
+  const tangible::SearchOptions search{file.starts, file.sampling, file.options, 1};
+  const tangible::IlqrResult result =
+      SearchPlan({&function, &cost, file.low, file.high}, start, search).best;
   if (result.status == IlqrStatus::kFailed) {
     ExpectOneLine(result.message);
   } else {

@@ -151,6 +151,8 @@ Problem Draw(const Scene& scene, unsigned seed, unsigned number, int pieces) {
     if (problem.cup.x() > ball.position[0] + kStruck) break;
   }
   problem.effort = Uniform(3.0, 10.0, &random);
+  problem.ball = ball.position;
+  problem.ball_speed = ball.velocity[0];
   return problem;
 }
 
@@ -224,6 +226,8 @@ std::vector<Row> Run(const Scene& scene, const StudyOptions& options,
       rows[i].outcomes[static_cast<size_t>(method)] =
           Solve(problem, method, options.iterations, options.starts);
     }
+    rows[i].problem = problem;
+    rows[i].problem.scene = Scene();
     rows[i].fixed = OfFixedGradient(problem);
     const std::lock_guard<std::mutex> lock(mutex);
     if (progress) progress(++done);

@@ -23,7 +23,7 @@ DEFINE_int32(
     pieces, 1,
     "pieces of the efforts that bring the ball to the cup: 1: held, in the strokes' range");
 DEFINE_string(methods, "exact,extended,surrogate,starts,sampling,fixed", "those that plan");
-DEFINE_int32(starts, 8, "of the method starts");
+DEFINE_int32(starts, 5, "of the method starts");
 DEFINE_int32(iterations, 60, "of each plan, at most");
 DEFINE_int32(threads, 0, "problems at the same time; 0: one a core; results do not depend on it");
 DEFINE_string(out, "", "file of all outcomes (JSON)");
@@ -119,7 +119,16 @@ OrderedJson Print(const std::vector<bounce::Row>& rows,
     list.push_back(
         {{"method", name}, {"successes", column.successes}, {"outcomes", std::move(outcomes)}});
   }
+  OrderedJson drawn = OrderedJson::array();
+  for (const bounce::Row& row : rows) {
+    const bounce::Problem& one = row.problem;
+    drawn.push_back({{"ball", {one.ball.x(), one.ball.y()}},
+                     {"ball_speed", one.ball_speed},
+                     {"effort", one.effort},
+                     {"cup", {one.cup.x(), one.cup.y()}}});
+  }
   return {{"problems", rows.size()},
+          {"drawn", std::move(drawn)},
           {"fixed_gradient_leads_away", up},
           {"a_gradient_is_zero", nothing},
           {"methods", std::move(list)}};
