@@ -223,8 +223,8 @@ std::string EstimateLine(const std::string& name, int k, const FitResult& result
   const FinalInterval& interval = result.intervals[static_cast<size_t>(k)];
   std::string line = name + " = " + Cell(result.estimate[k], 10);
   const bool robust = std::isfinite(uncertainty.standard_deviation_robust[k]);
-  const double deviation = robust ? uncertainty.standard_deviation_robust[k]
-                                  : uncertainty.standard_deviation[k];
+  const double deviation =
+      robust ? uncertainty.standard_deviation_robust[k] : uncertainty.standard_deviation[k];
   if (std::isfinite(deviation)) {
     line += " ± " + Cell(deviation, 3);
   }
@@ -247,8 +247,7 @@ std::string EstimateLine(const std::string& name, int k, const FitResult& result
 }
 
 /// The profiles in one line each, and the pieces of those that have several.
-void PrintProfiles(const std::vector<ParameterizedScene::Entry>& entries,
-                   const FitResult& result) {
+void PrintProfiles(const std::vector<ParameterizedScene::Entry>& entries, const FitResult& result) {
   for (const Profile& profile : result.profiles) {
     std::cout << "profile of " << entries[static_cast<size_t>(profile.parameter)].name << " ("
               << profile.why << "): " << profile.points.size() << " values, cost up to "

@@ -358,11 +358,11 @@ Minimum BestFrom(const Eigen::VectorXd& start, FitApproach approach, FitRun* run
   return result;
 }
 
-/// A start was moved to where each parameter has an effect, and led to a minimum that costs more than
-/// the initial values themselves: the plain fit from these is taken, where some parameter stays.
+/// A start was moved to where each parameter has an effect and led to a minimum that costs more
+/// than the initial values: the plain fit from these is taken, in which some parameter stays.
 void KeepInitial(const Eigen::VectorXd& initial, FitRun* run, Minimum* minimum) {
-  const Minimum other = Minimise(
-      run->options, initial, run->elapsed, {}, run->problem, run->LogOfStart());
+  const Minimum other =
+      Minimise(run->options, initial, run->elapsed, {}, run->problem, run->LogOfStart());
   run->rollouts += other.rollouts;
   if (IsBetter(other, *minimum)) {
     *minimum = other;
@@ -396,7 +396,10 @@ void RunStart(const Eigen::VectorXd& start, FitApproach approach, double gradien
     described.message = told.message;
   }
   log->starts.push_back(std::move(described));
-  if (is_first || IsBetter(minimum, log->best)) {
+  // Of starts that end at the same minimum the first one is told of.
+  const bool same = !is_first && minimum.status == log->best.status &&
+                    minimum.cost >= log->best.cost * (1.0 - kSameCost);
+  if (is_first || (!same && IsBetter(minimum, log->best))) {
     log->best = std::move(minimum);
   }
   run->EndPart();
@@ -511,7 +514,7 @@ std::string DescribeAgreement(const std::vector<FitStart>& starts, double best) 
   if (agree == 1) {
     text = "1 of " + std::to_string(count) + " starts ends at the lowest cost";
   }
-  return text + (others.empty() ? ""
+  return text + (others.empty()       ? ""
                  : agree + 1 == count ? "; the other ends at a cost of " + others
                                       : "; the others end at costs of " + others);
 }
@@ -658,8 +661,7 @@ Eigen::VectorXd MakeProfiles(FitRun* run, FitResult* result) {
     }
     if (profile.branches.empty()) {
       const std::string& name = run->problem->entries()[static_cast<size_t>(parameter)].name;
-      result->uncertainty.warnings.push_back("the interval of '" + name +
-                                             "' may be wrong (" + why +
+      result->uncertainty.warnings.push_back("the interval of '" + name + "' may be wrong (" + why +
                                              "): its profile takes long; --profile makes it");
       continue;
     }
@@ -692,9 +694,8 @@ void Judge(FitRun* run, FitResult* result) {
     }
     minimum.iterations.insert(minimum.iterations.begin(), result->iterations.begin(),
                               result->iterations.end());
-    const std::string told = "a profile found a minimum of cost " +
-                             CompactNumber(minimum.cost, 6) + " beside one of " +
-                             CompactNumber(result->final_cost, 6);
+    const std::string told = "a profile found a minimum of cost " + CompactNumber(minimum.cost, 6) +
+                             " beside one of " + CompactNumber(result->final_cost, 6);
     Finish(minimum, run, result);
     result->message += (result->message.empty() ? "" : "; ") + told;
     if (result->estimate.size() == 0) return;

@@ -53,7 +53,7 @@ struct FitOptions {
   /// If a start does not reach the minimum by it, it is also minimised plainly, after kSegments
   /// with growing windows as well, and the best minimum is taken.
   FitApproach approach = FitApproach::kAuto;
-  int segments = 1;         ///< of multiple shooting
+  int segments = 1;  ///< of multiple shooting
   /// Further starts are drawn within the bounds. 0: one, and where impacts or sticking act or the
   /// loss is robust two more, at the estimate with restitution and friction shifted up and down.
   int starts = 1;
@@ -123,8 +123,8 @@ struct FitStart {
   std::string approach = "plain";  ///< what led to it: "plain", "windows", "segments"
   double plain_cost = NAN;  ///< of the plain fit from the same point; NaN: not made, or failed
   std::string tried;  ///< another approach that was made but not taken: "windows", ...; or empty
-  double tried_cost = NAN;  ///< where it led; NaN: it failed
-  std::string message;      ///< of what led to it, where that ended early
+  double tried_cost = NAN;       ///< where it led; NaN: it failed
+  std::string message;           ///< of what led to it, where that ended early
   std::vector<double> estimate;  ///< where it ended; empty where it failed
 };
 
@@ -172,7 +172,7 @@ struct Minimum {
   std::vector<FitIteration> iterations;
   long rollouts = 0;
   FitApproach approach = FitApproach::kPlain;  ///< what led to where it began; kTrial: gave up
-  bool gave_up = false;  ///< for lack of progress
+  bool gave_up = false;                        ///< for lack of progress
   int approach_iterations = 0;
   std::string approach_message;  ///< why that ended early, or empty
 };
@@ -188,8 +188,8 @@ struct FitResult {
   double final_cost = 0.0;
   std::vector<FitIteration> iterations;  ///< of the best start; begins with the initial point
   std::vector<FitStart> starts;
-  std::string agreement;               ///< of several starts, one sentence; else empty
-  std::vector<Profile> profiles;       ///< those that were asked for or needed
+  std::string agreement;                 ///< of several starts, one sentence; else empty
+  std::vector<Profile> profiles;         ///< those that were asked for or needed
   std::vector<FinalInterval> intervals;  ///< of each parameter; empty without an estimate
   Eigen::VectorXd residuals;  ///< of the observations at the estimate, in multiples of sigma
   long rollouts = 0;          ///< without the certificate's

@@ -58,8 +58,8 @@ bool Refit(const FitOptions& options, LeastSquaresProblem* problem, FitResult* r
 std::vector<HeldParameter> ConfirmHeld(const FitOptions& options, const HeldOptions& held,
                                        const std::vector<HeldParameter>& found,
                                        LeastSquaresProblem* problem, FitResult* result) {
-  const double chance = held.least_deviations * held.least_deviations /
-                        static_cast<double>(result->residuals.size());
+  const double chance =
+      held.least_deviations * held.least_deviations / static_cast<double>(result->residuals.size());
   std::vector<HeldParameter> confirmed;
   std::vector<HeldParameter> first_order;
   for (HeldParameter one : found) {
@@ -72,12 +72,11 @@ std::vector<HeldParameter> ConfirmHeld(const FitOptions& options, const HeldOpti
       confirmed.push_back(std::move(one));
     }
   }
-  std::stable_sort(confirmed.begin(), confirmed.end(),
-                   [](const HeldParameter& a, const HeldParameter& b) {
-                     return a.releases.empty() != b.releases.empty()
-                                ? b.releases.empty()
-                                : a.refitted_share > b.refitted_share;
-                   });
+  std::stable_sort(
+      confirmed.begin(), confirmed.end(), [](const HeldParameter& a, const HeldParameter& b) {
+        return a.releases.empty() != b.releases.empty() ? b.releases.empty()
+                                                        : a.refitted_share > b.refitted_share;
+      });
   confirmed.insert(confirmed.end(), first_order.begin(), first_order.end());
   return confirmed;
 }

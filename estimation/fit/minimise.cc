@@ -626,16 +626,17 @@ class Minimiser : public ceres::IterationCallback {
     }
     for (Eigen::VectorXd direction :
          {StepOf(FinalSteps::Kind::kGaussNewton),
-          Eigen::VectorXd((lengths.array() > 0.0)
-                              .select(shared_.model().gradient.array() / lengths.array().square(),
-                                      0.0))}) {
+          Eigen::VectorXd(
+              (lengths.array() > 0.0)
+                  .select(shared_.model().gradient.array() / lengths.array().square(), 0.0))}) {
       const double size = direction.cwiseProduct(lengths).norm();
       if (size > 0.0) directions.push_back(unit / size * direction);
     }
     const double cost = shared_.model().cost;
     for (const Eigen::VectorXd& direction : directions) {
       for (const double part : {-kKinkSteps[0], kKinkSteps[0], -kKinkSteps[1], kKinkSteps[1]}) {
-        const Eigen::VectorXd q = ToInternal(entries_, ToParameters(entries_, q_ + part * direction));
+        const Eigen::VectorXd q =
+            ToInternal(entries_, ToParameters(entries_, q_ + part * direction));
         Eigen::VectorXd blocks;
         double target = 0.0;
         const bool done = linearizer_.Cost(q, shared_.huber(), &blocks, &target);
@@ -690,14 +691,14 @@ class Minimiser : public ceres::IterationCallback {
   const std::vector<ParameterEntry>& entries_;
   Eigen::VectorXd q_;
   SharedLinearisation shared_;
-  std::vector<bool> held_;   ///< parameters at a bound, without a part in the steps
-  std::vector<int> pushed_;  ///< iterations in a row that the cost falls beyond the bound
+  std::vector<bool> held_;     ///< parameters at a bound, without a part in the steps
+  std::vector<int> pushed_;    ///< iterations in a row that the cost falls beyond the bound
   std::vector<double> gains_;  ///< of accepted iterations
   double last_cost_ = kInfinity;
   int accepted_ = 0;  ///< iterations, with the initial point
   bool gave_up_ = false;
   bool slow_tail_ = false;  ///< whether Ceres was ended by SlowTail
-  double cost_ = 0.0;  ///< of the fit's own loss, at the last accepted point
+  double cost_ = 0.0;       ///< of the fit's own loss, at the last accepted point
   double gradient_norm_ = 0.0;
   Minimum minimum_;
 };

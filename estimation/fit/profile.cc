@@ -47,8 +47,8 @@ class Profiler {
     const double p = result.estimate[parameter];
     middle_ = ToInternal(entry_, entry_.logarithmic ? std::max(p, LeastOf(entry_)) : p);
     points_[middle_] = {result.final_cost, result.estimate};
-    const double deviation = result.uncertainty.standard_deviation[parameter] /
-                             ParameterByInternal(entry_, p);
+    const double deviation =
+        result.uncertainty.standard_deviation[parameter] / ParameterByInternal(entry_, p);
     const double ratio = std::sqrt(2.0 * profile_.rise) / kNormalQuantile;
     step_ = std::isfinite(deviation) && deviation > 0.0 ? deviation * ratio : kBlindStep;
   }
@@ -114,8 +114,7 @@ class Profiler {
         point = {minimum.cost, held.All(minimum.parameters)};
       }
     }
-    if (point.cost < lowest_ - rounding_ &&
-        (better_.size() == 0 || point.cost < better_cost_)) {
+    if (point.cost < lowest_ - rounding_ && (better_.size() == 0 || point.cost < better_cost_)) {
       better_ = point.all;
       better_cost_ = point.cost;
     }
@@ -206,9 +205,7 @@ class Profiler {
     return 0.5 * (inside + outside);
   }
 
-  double Root(const Point& point) const {
-    return std::sqrt(std::max(0.0, point.cost - lowest_));
-  }
+  double Root(const Point& point) const { return std::sqrt(std::max(0.0, point.cost - lowest_)); }
 
   FitOptions options_;
   long budget_;
@@ -243,8 +240,8 @@ bool IsParabola(const FitOptions& options, const FitResult& result, int k,
     }
     Eigen::VectorXd blocks;
     double cost = 0.0;
-    const bool done = linearizer.Cost(ToInternal(entries, p), {options.huber, options.huber},
-                                      &blocks, &cost);
+    const bool done =
+        linearizer.Cost(ToInternal(entries, p), {options.huber, options.huber}, &blocks, &cost);
     parabola = parabola && done && cost - result.final_cost < rise * kParabola &&
                cost - result.final_cost > rise / kParabola;
     if (!parabola) break;

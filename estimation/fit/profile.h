@@ -3,9 +3,9 @@
 //
 // The profile of a parameter: the cost with the parameter held at a value and the others minimised,
 //
-//   c_k(v) = min over p with p_k = v of cost(p),     interval: {v : c_k(v) − cost(p̂) <= rise}   (1)
-//   rise = 1/2 z²,   z = 1.959964                                                               (2)
-//   rise = 1/2 (t_ν s_k / σ_k)²                        where the model does not fit             (3)
+//   c_k(v) = min { cost(p) : p_k = v },    interval = { v : c_k(v) − cost(p̂) ≤ rise }   (1)
+//   rise = 1/2 z²,    z = 1.959964            where the model fits     (2)
+//   rise = 1/2 (t_ν s_k / σ_k)²               where it does not        (3)
 //
 // (1) is the interval of the likelihood ratio. It needs no derivative by the parameter and holds
 // through kinks, at bounds, and where the cost is flat on one side: then it has no end there. (3)
@@ -82,8 +82,7 @@ Profile MakeProfile(const FitOptions& options, const FitResult& result, int para
 /// meets one, and across whose interval the cost is no parabola.
 std::vector<std::pair<int, std::string>> NeedProfiles(const FitOptions& options,
                                                       const FitResult& result,
-                                                      LeastSquaresProblem* problem,
-                                                      long* rollouts);
+                                                      LeastSquaresProblem* problem, long* rollouts);
 
 /// The intervals to be printed: the robust ones, or where these are missing those from sigma,
 /// within the range of their parameters; of profiles where there are any.

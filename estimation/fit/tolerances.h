@@ -53,8 +53,8 @@ inline constexpr double kProfileEnd = 1e-3;
 inline constexpr double kBlindStep = 1e-3;
 /// Of the same: a profile is followed to a bound that is no farther off, whatever lies between.
 inline constexpr double kNearBound = 10.0;
-/// Of the same: a profile that is level so far has no end. An inertia at its bound 0, which is 1e-10
-/// of its initial value, is level for 18.
+/// Of the same: a profile that is level so far has no end; the profile of an inertia that has
+/// fallen to its bound 0 is level for 18.
 inline constexpr double kLevelFor = 30.0;
 /// Of the rise of a parabola at the ends of an interval: where the cost rises by more than this
 /// factor more or less, the interval by derivatives is not to be trusted.
@@ -67,8 +67,8 @@ inline constexpr double kShift = 0.5;
 /// Of 1 for a logarithm, else the scale of a parameter: the same shift of all parameters where none
 /// is a restitution or friction; a larger one leaves the neighbourhood of what was found.
 inline constexpr double kShiftOfAll = 0.05;
-/// Of the residuals' deviation, along a parameter: the distances from a minimum at a kink at which the
-/// cost has to be higher.
+/// Of the residuals' deviation, along a parameter: the distances from a minimum at a kink at which
+/// the cost has to be higher.
 inline constexpr double kKinkSteps[] = {1e-2, 1e-4};
 /// Of the length of q: a shorter final step is rounding.
 inline constexpr double kPolishedStep = 1e-13;

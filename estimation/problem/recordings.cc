@@ -186,8 +186,8 @@ std::unique_ptr<LeastSquaresProblem> RecordingsProblem::Released(const std::stri
       return nullptr;
     }
     // One shared parameter would change a number that differs from recording to recording.
-    if (!runs.empty() && with->entries().back().initial !=
-                             runs.front().residuals.entries().back().initial) {
+    if (!runs.empty() &&
+        with->entries().back().initial != runs.front().residuals.entries().back().initial) {
       return nullptr;
     }
     runs.push_back({recording.name, recording.weight, std::move(*with)});

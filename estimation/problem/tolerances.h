@@ -12,6 +12,10 @@ inline constexpr double kTimeTolerance = 1e-9;
 /// Of a step: half the time over which an acceleration is averaged in event stepping; steps end at
 /// both ends of that time.
 inline constexpr double kRateStep = 1e-3;
+/// Of 1, a component of a direction: what is smaller is the rounding of a link along an axis.
+inline constexpr double kLinkDirection = 1e-12;
+/// Of the length of a link: a point of its body that is nearer to its end moves with it.
+inline constexpr double kLinkEnd = 1e-6;
 /// Of the parameter, at least its scale: a parameter that differs from a bound by less is at the
 /// bound, because exp(ln bound) and the projection of the minimiser reach a bound within this
 /// error.

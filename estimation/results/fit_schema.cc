@@ -111,6 +111,8 @@ OrderedJson FitSchema() {
   OrderedJson properties = SharedKeys();
   properties["recordings"] = SchemaOfArray(RecordingSchema(), 1);
   properties["initial"] = SchemaOfWords({"from_observations"});
+  properties["links"] = SchemaByName(
+      SchemaOfObject({{"from", SchemaOfName()}, {"to", SchemaOfName()}}, {"from", "to"}));
   properties["parameters"] = SchemaOfArray(ParameterSchema(), 0);
   properties["derivatives"] = SchemaOfWords(WordsOf(kMethods));
   properties["loss"] = SchemaOfObject({{"huber", Positive()}}, {"huber"});

@@ -92,16 +92,15 @@ std::string EstimateTable(const std::vector<ParameterEntry>& entries, const FitR
     const FinalInterval interval =
         k < result.intervals.size() ? result.intervals[k] : FinalInterval();
     const double robust = uncertainty.standard_deviation_robust[i];
-    rows.push_back(
-        {entries[k].name, CompactNumber(result.starts.front().initial[k], 6),
-         CompactNumber(result.estimate[i], 9),
-         number(std::isfinite(robust) ? robust : uncertainty.standard_deviation[i]),
-         interval.exists ? Describe(interval) : "",
-         interval.method, number(uncertainty.degrees_of_freedom[i]),
-         uncertainty.prior_share[i] > 0.0
-             ? CompactNumber(100.0 * uncertainty.prior_share[i], 2) + " %"
-             : "",
-         uncertainty.messages[k]});
+    rows.push_back({entries[k].name, CompactNumber(result.starts.front().initial[k], 6),
+                    CompactNumber(result.estimate[i], 9),
+                    number(std::isfinite(robust) ? robust : uncertainty.standard_deviation[i]),
+                    interval.exists ? Describe(interval) : "", interval.method,
+                    number(uncertainty.degrees_of_freedom[i]),
+                    uncertainty.prior_share[i] > 0.0
+                        ? CompactNumber(100.0 * uncertainty.prior_share[i], 2) + " %"
+                        : "",
+                    uncertainty.messages[k]});
   }
   return HtmlTable({"parameter", "initial", "estimate", "standard deviation", "95 % interval",
                     "method", "degrees of freedom", "by priors", ""},
@@ -126,16 +125,13 @@ std::string ProfilePlots(const std::vector<ParameterEntry>& entries, const FitRe
     }
     const double limit = result.final_cost + profile.rise;
     const std::string& name = entries[static_cast<size_t>(profile.parameter)].name;
-    html += PlotSvg({.title = name + " (" + profile.why + ")",
-                     .x_label = name,
-                     .y_label = "cost",
-                     .height = 260},
-                    {{"profile", values, costs, PlotStyle::kLineAndPoints, {}},
-                     {"95 %",
-                      {values.front(), values.back()},
-                      {limit, limit},
-                      PlotStyle::kLine,
-                      {}}});
+    html +=
+        PlotSvg({.title = name + " (" + profile.why + ")",
+                 .x_label = name,
+                 .y_label = "cost",
+                 .height = 260},
+                {{"profile", values, costs, PlotStyle::kLineAndPoints, {}},
+                 {"95 %", {values.front(), values.back()}, {limit, limit}, PlotStyle::kLine, {}}});
   }
   return html.empty() ? "" : "<h2>Profiles</h2>\n" + html;
 }
@@ -403,15 +399,14 @@ std::string StartTable(const FitResult& result) {
     }
   }
   std::sort(cost.begin(), cost.end());
-  const std::string waterfall =
-      cost.size() < 2
-          ? ""
-          : PlotSvg({.title = "costs of the starts, in their order",
-                     .x_label = "rank",
-                     .y_label = "cost",
-                     .y_scale = AxisScale::kLogarithmic,
-                     .height = 260},
-                    {{"", rank, cost, PlotStyle::kLineAndPoints, {}}});
+  const std::string waterfall = cost.size() < 2
+                                    ? ""
+                                    : PlotSvg({.title = "costs of the starts, in their order",
+                                               .x_label = "rank",
+                                               .y_label = "cost",
+                                               .y_scale = AxisScale::kLogarithmic,
+                                               .height = 260},
+                                              {{"", rank, cost, PlotStyle::kLineAndPoints, {}}});
   const std::string agreement =
       result.agreement.empty() ? "" : "<p>" + HtmlEscape(result.agreement) + ".</p>\n";
   return "<h2>Starts</h2>\n" + agreement + waterfall +
@@ -478,17 +473,16 @@ std::string FitReport(const std::string& title, const RecordingsProblem& problem
   const std::vector<ParameterEntry>& entries = problem.entries();
   const ResidualSummary summary = SummarizeResiduals(problem, result.residuals);
   const PredictionScore* const score = findings.later == nullptr ? nullptr : &findings.later->score;
-  return HtmlPage(heading, "<h1>" + HtmlEscape(heading) + "</h1>\n<h2>Estimates</h2>\n" +
-                               EstimateTable(entries, result) + Warnings(result.uncertainty) +
-                               ProfilePlots(entries, result) +
-                               CombinationTable(result.uncertainty) +
-                               SpreadTable(findings.components) + SummaryTable(result) +
-                               RecordingTable(problem, result) + NoiseTable(findings.components) +
-                               CorrelationTable(entries, result) +
-                               StepTable(entries, findings.check) + PredictionPart(score) +
-                               StartTable(result) + IterationPlots(entries, result) +
-                               ResidualTable(summary) + OutlierTable(summary) +
-                               SeriesPlots(CollectSeries(problem, result), summary.series.size()));
+  return HtmlPage(heading,
+                  "<h1>" + HtmlEscape(heading) + "</h1>\n<h2>Estimates</h2>\n" +
+                      EstimateTable(entries, result) + Warnings(result.uncertainty) +
+                      ProfilePlots(entries, result) + CombinationTable(result.uncertainty) +
+                      SpreadTable(findings.components) + SummaryTable(result) +
+                      RecordingTable(problem, result) + NoiseTable(findings.components) +
+                      CorrelationTable(entries, result) + StepTable(entries, findings.check) +
+                      PredictionPart(score) + StartTable(result) + IterationPlots(entries, result) +
+                      ResidualTable(summary) + OutlierTable(summary) +
+                      SeriesPlots(CollectSeries(problem, result), summary.series.size()));
 }
 
 }  // namespace tangible

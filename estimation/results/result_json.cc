@@ -42,9 +42,9 @@ OrderedJson ParametersToJson(const RecordingsProblem& problem, const FitResult& 
                                        ? result.intervals[static_cast<size_t>(k)]
                                        : FinalInterval();
     if (interval.exists) {
-      parameter["interval_95"] = {interval.low ? OrderedJson(*interval.low) : OrderedJson(nullptr),
-                                  interval.high ? OrderedJson(*interval.high)
-                                                : OrderedJson(nullptr)};
+      parameter["interval_95"] = {
+          interval.low ? OrderedJson(*interval.low) : OrderedJson(nullptr),
+          interval.high ? OrderedJson(*interval.high) : OrderedJson(nullptr)};
       parameter["interval_method"] = interval.method;
     } else {
       parameter["interval_95"] = nullptr;

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "tangible/dynamics/model/settings.h"
+#include "tangible/estimation/problem/links.h"
 #include "tangible/estimation/problem/tolerances.h"
 #include "tangible/estimation/results/fit_names.h"
 #include "tangible/estimation/results/instruments_json.h"
@@ -156,7 +157,7 @@ class RunReader {
   /// the reader's.
   bool Read() {
     root_.ExpectKeys({"scene", "observations", "recordings", "initial", "points", "sensors",
-                      "cameras", "clocks", "parameters", "derivatives", "loss", "approach",
+                      "cameras", "clocks", "links", "parameters", "derivatives", "loss", "approach",
                       "segments", "starts", "seed"});
     const std::string scene_file = JoinPath(folder_, root_.At("scene").String());
     if (!root_.ok()) {
@@ -176,12 +177,63 @@ class RunReader {
     for (int i = 0; i < count; ++i) {
       problem_->parameters.push_back(ReadParameter(parameters.At(i)));
     }
+    ExpandLinks();
     problem_->options = ReadOptions(root_);
     CheckShooting();
     return ReadObservationFiles();
   }
 
  private:
+  /// "links/NAME/length" becomes what it moves.
+  void ExpandLinks() {
+    if (!root_.ok()) return;
+    std::vector<Link> links;
+    for (const std::string& name : root_.At("links").Keys()) {
+      links.push_back(ReadLink(name, root_.At("links").At(name)));
+    }
+    ParameterError error;
+    if (root_.ok() &&
+        !ExpandLengths(problem_->scene, problem_->points, links, &problem_->parameters, &error)) {
+      const JsonReader parameter = root_.At("parameters").At(error.parameter);
+      // A parameter may be its path alone.
+      (parameter.Has("sets")   ? parameter.At("sets").At(error.set).At(error.key)
+       : parameter.Has("path") ? parameter.At("path")
+                               : parameter)
+          .Fail(error.what);
+    }
+  }
+
+  Link ReadLink(const std::string& name, const JsonReader& json) const {
+    json.ExpectKeys({"from", "to"}, " of a link");
+    Link link;
+    link.name = name;
+    const auto find = [](const auto& all, const std::string& wanted) {
+      for (size_t i = 0; i < all.size(); ++i) {
+        if (all[i].name == wanted) return static_cast<int>(i);
+      }
+      return -1;
+    };
+    if (name.empty() || name.find_first_of("/*") != std::string::npos || OneLine(name) != name) {
+      json.Fail("expected a name without / and *");
+      return link;
+    }
+    link.from = find(problem_->scene.joints, json.At("from").String());
+    if (json.At("from").exists() && link.from < 0) {
+      json.At("from").FailExpected("the name of a joint");
+    }
+    const std::string to = json.At("to").String();
+    link.to_joint = find(problem_->scene.joints, to);
+    link.to_point = link.to_joint < 0 ? find(problem_->points, to) : -1;
+    if (json.At("to").exists() && link.to_joint < 0 && link.to_point < 0) {
+      json.At("to").FailExpected("the name of a joint or point");
+    }
+    if (root_.ok()) {
+      const std::string wrong = CheckLink(problem_->scene, problem_->points, link);
+      if (!wrong.empty()) json.Fail(wrong);
+    }
+    return link;
+  }
+
   /// The states at the ends of segments are at times that stand still.
   void CheckShooting() {
     for (const FitParameter& parameter : problem_->parameters) {

@@ -727,6 +727,55 @@ TEST_F(TangibleFitTest, ASensorThatIsPredictedHasNoSigmaToEstimate) {
                 "estimated, up to it, got 0.3 with none");
 }
 
+// One parameter in the place of four hand-written sets: a pendulum whose bob hangs at a point.
+TEST_F(TangibleFitTest, ALengthIsOneParameter) {
+  Write("arm.json",
+        R"({"bodies": [{"name": "rod", "mass": 1, "inertia": 0.1, "position": [0, -0.5]},
+    {"name": "bob", "mass": 2, "inertia": 0.01, "position": [0, -1]}],
+    "joints": [{"name": "pin", "type": "revolute", "bodies": ["rod", "world"], "anchor": [0, 0],
+                "angle": 0.5},
+               {"name": "end", "type": "weld", "bodies": ["bob", "rod"], "anchor": [0, -1]}],
+    "simulation": {"dt": 0.005, "duration": 1}})");
+  // Without a motion: where the bob is at time 0 tells its distance.
+  Write("bob.csv", "time,body,x,y\n0,bob," + json(1.2 * std::sin(0.5)).dump() + "," +
+                       json(-1.2 * std::cos(0.5)).dump() + "\n0.005,bob,,\n");
+  json fit = json::parse(R"({"scene": "arm.json",
+    "observations": [{"file": "bob.csv", "sigma": 0.01}],
+    "links": {"arm": {"from": "pin", "to": "end"}}, "parameters": ["links/arm/length"]})");
+  const ProgramRun run = Fit(fit, "--out='" + Path("r.json") + "'");
+  ASSERT_EQ(run.exit_status, 0) << run.out << run.error;
+  const json result = json::parse(Read(Path("r.json")));
+  EXPECT_NEAR(result["parameters"][0]["estimate"].get<double>(), 1.2, 1e-9);
+  EXPECT_EQ(result["parameters"][0]["name"], "links/arm/length");
+  fit["links"]["arm"]["to"] = "elbow";
+  const ProgramRun wrong = Fit(fit);
+  EXPECT_EQ(wrong.exit_status, 1);
+  EXPECT_NE(wrong.error.find("/links/arm/to: expected the name of a joint or point"),
+            std::string::npos)
+      << wrong.error;
+  fit["links"] = json::object();
+  const ProgramRun none = Fit(fit);
+  EXPECT_NE(none.error.find("/parameters/0: parameter links/arm/length: matches no number"),
+            std::string::npos)
+      << none.error;
+}
+
+// What the intervals are, and what a wrong name is.
+TEST_F(TangibleFitTest, ProfilesAreAskedForByName) {
+  const ProgramRun run = Fit(Problem(), "--profile=g --out='" + Path("r.json") + "'");
+  ASSERT_EQ(run.exit_status, 0) << run.out << run.error;
+  const json result = json::parse(Read(Path("r.json")));
+  EXPECT_EQ(result["parameters"][0]["interval_method"], "profile");
+  EXPECT_EQ(result["profiles"][0]["name"], "g");
+  EXPECT_EQ(result["profiles"][0]["branches"].size(), 1U);
+  EXPECT_NE(run.out.find(", by its profile)"), std::string::npos) << run.out;
+  const ProgramRun wrong = Fit(Problem(), "--profile=g,x");
+  EXPECT_EQ(wrong.exit_status, 2);
+  EXPECT_EQ(
+      wrong.error,
+      "tangible-fit: --profile: expected names of parameters, separated by commas, got 'x'\n");
+}
+
 TEST_F(TangibleFitTest, NoFileIsWrittenTwice) {
   ExpectOneLine(Fit(Problem(), "--out='" + Path("r") + "' --report='" + Path("r") + "'"), 2,
                 "--report: expected a file of its own, got that of --out");

@@ -74,8 +74,8 @@ TEST(MinimiseTest, TheLimitOfIterationsIsKept) {
   EXPECT_EQ(minimum.message, "the limit of 2 iterations is reached before the minimum");
 }
 
-/// r = (x, −1 + 0.45 x²) / σ, of a minimum far from zero: near x = 0 a Gauss-Newton step goes a tenth
-/// of the way to it.
+/// r = (x, −1 + 0.45 x²) / σ, whose minimum is far from zero: near x = 0 a Gauss-Newton step goes a
+/// tenth of the way to it.
 class FarFromZero : public LeastSquaresProblem {
  public:
   FarFromZero() { entries_ = {{"x", 0.4, -10.0, 10.0, false, 1.0}}; }
@@ -108,8 +108,8 @@ TEST(MinimiseTest, AConvergenceByAConstantFactorIsAccelerated) {
 
 TEST(MinimiseTest, GivesUpWhereTheFirstIterationsGainLittle) {
   FarFromZero problem;
-  const Minimum minimum = Minimise(
-      {}, Eigen::VectorXd::Constant(1, 0.4), [] { return 0.0; }, {}, &problem, nullptr, {2, 0.1});
+  const Minimum minimum = Minimise({}, Eigen::VectorXd::Constant(1, 0.4), [] { return 0.0; }, {},
+                                   &problem, nullptr, {2, 0.1});
   EXPECT_EQ(minimum.status, FitStatus::kNotConverged);
   EXPECT_TRUE(minimum.gave_up);
   EXPECT_EQ(minimum.iterations.size(), 3U);

@@ -186,8 +186,8 @@ TEST(ProfileTest, WhereEveryLargerFrictionSticksThereIsNoUpperEnd) {
   const FitResult fit = Fit(FitOptions(), &residuals, {});
   ASSERT_EQ(fit.status, FitStatus::kConverged) << fit.message;
   ASSERT_TRUE(fit.intervals[0].exists);
-  EXPECT_EQ(fit.intervals[0].method, "profile") << fit.estimate[0] << " ± "
-                                                << fit.uncertainty.standard_deviation[0];
+  EXPECT_EQ(fit.intervals[0].method, "profile")
+      << fit.estimate[0] << " ± " << fit.uncertainty.standard_deviation[0];
   EXPECT_FALSE(fit.intervals[0].high) << *fit.intervals[0].high;
   ASSERT_TRUE(fit.intervals[0].low);
   EXPECT_LT(*fit.intervals[0].low, mu);
@@ -226,15 +226,13 @@ struct Drop {
     std::vector<Observation> observations;
     for (int i = 0; i < 18; ++i) {
       const double t = i / 30.0;
-      observations.push_back(
-          {t, 0, -1, Coordinate::kY, Height(t) + normal(random), kSigma});
+      observations.push_back({t, 0, -1, Coordinate::kY, Height(t) + normal(random), kSigma});
     }
     return observations;
   }
   FitResult Run(unsigned seed, double initial) const {
-    RolloutResiduals residuals =
-        MakeResiduals(scene, {}, {Parameter("pairs/ball:floor/restitution", initial)},
-                      Observations(seed));
+    RolloutResiduals residuals = MakeResiduals(
+        scene, {}, {Parameter("pairs/ball:floor/restitution", initial)}, Observations(seed));
     FitOptions options;
     options.starts = 0;
     return Fit(options, &residuals, {});
