@@ -10,6 +10,9 @@
 #include "tangible/app/certificate_json.h"
 #include "tangible/python/binding.h"
 #include "tangible/simulation/gradient/rollout_function.h"
+#ifdef __GLIBC__
+#include <malloc.h>
+#endif
 
 namespace tangible::python {
 namespace {
@@ -61,6 +64,19 @@ class Workers {
   std::mutex mutex_;
   std::vector<std::unique_ptr<RolloutWorker>> free_;
 };
+
+// Gives freed memory back to the system after a call of many rows or steps: the C library keeps
+// what threads have freed, gigabytes after large batches. It takes under a millisecond of a call
+// that has taken tens.
+void ReturnMemory(size_t rows, long steps) {
+#ifdef __GLIBC__
+  constexpr size_t kManySteps = 20'000;
+  if (rows * static_cast<size_t>(steps) >= kManySteps) malloc_trim(0);
+#else
+  (void)rows;
+  (void)steps;
+#endif
+}
 
 class Rollout {
  public:
@@ -222,10 +238,18 @@ class Rollout {
 class Recorded {
  public:
   Recorded(const std::shared_ptr<Rollout>& rollout, const Inputs& in, int threads)
-      : rollout_(rollout), batch_(rollout->function(), threads) {
+      : rollout_(rollout) {
     std::vector<RolloutInput> inputs = rollout->Read(in);
     rows_ = inputs.size();
-    outputs_ = rollout->Outputs(WithoutLock([&] { return batch_.Record(std::move(inputs)); }));
+    batch_ = std::make_unique<RolloutBatch>(rollout->function(), threads);
+    outputs_ = rollout->Outputs(WithoutLock([&] { return batch_->Record(std::move(inputs)); }));
+  }
+
+  Recorded(const Recorded&) = delete;
+  Recorded& operator=(const Recorded&) = delete;
+  ~Recorded() {
+    batch_.reset();
+    ReturnMemory(rows_, rollout_->function().num_steps());
   }
 
   const py::tuple& outputs() const { return outputs_; }
@@ -234,14 +258,14 @@ class Recorded {
   py::tuple Adjoint(const Array& bars) {
     const std::vector<RowMatrixXd> rows = rollout_->ReadStates("cotangent", bars, rows_);
     const std::vector<InputDirection> adjoints =
-        WithoutLock([&] { return turns_.Take([&] { return batch_.Adjoint(rows); }); });
+        WithoutLock([&] { return turns_.Take([&] { return batch_->Adjoint(rows); }); });
     const Inputs out = rollout_->Write(adjoints);
     return py::make_tuple(out.parameters, *out.states, out.controls);
   }
 
  private:
   std::shared_ptr<Rollout> rollout_;
-  RolloutBatch batch_;
+  std::unique_ptr<RolloutBatch> batch_;
   Turns turns_;
   size_t rows_ = 0;
   py::tuple outputs_;

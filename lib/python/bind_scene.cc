@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // Scenes.
+#include <cmath>
+#include <utility>
+
 #include "tangible/python/binding.h"
 #include "tangible/scene/scene_json.h"
 #include "tangible/scene/set_parameters.h"
@@ -31,6 +34,20 @@ std::vector<ParameterPath> Resolve(const Scene& scene, const std::vector<std::st
   }
   if (!CheckApart(scene, resolved, &error)) throw Error(error);
   return resolved;
+}
+
+// The range in which all numbers that a path matches may be.
+std::pair<double, double> RangeOf(const Scene& scene, const std::string& path) {
+  Scene copy = scene;
+  const std::vector<SceneNumber<double>> numbers = EnumerateNumbers(&copy);
+  std::pair<double, double> range(-HUGE_VAL, HUGE_VAL);
+  const std::vector<ParameterPath> resolved = Resolve(scene, {path});
+  for (const int number : resolved[0].numbers) {
+    const NumberKind kind = numbers[static_cast<size_t>(number)].kind;
+    if (kind != NumberKind::kFree) range.first = 0.0;
+    if (kind == NumberKind::kFraction) range.second = 1.0;
+  }
+  return range;
 }
 
 Scene WithParameters(const Scene& scene, const std::vector<std::string>& paths,
@@ -74,6 +91,7 @@ void BindScene(py::module_* module) {
              }
              return all;
            })
+      .def("range", &RangeOf)
       .def("value", [](const Scene& scene, const std::string& path) {
         return Resolve(scene, {path})[0].value;
       });

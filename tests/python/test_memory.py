@@ -39,3 +39,18 @@ def test_ten_thousand_calls_keep_no_memory(capsys: pytest.CaptureFixture[str]) -
     with capsys.disabled():
         print(f"\n10 000 calls: {before:.1f} MB before, {after:.1f} MB after")
     assert after - before < 3.0 and after - middle < 1.0
+
+
+def test_memory_of_large_calls_is_returned() -> None:
+    rollout = tangible.Rollout(ball(), ["bodies/ball/mass"], ["forces/push/force/x"])
+    masses = np.ones((3000, 1))
+    rollout(masses[:2])
+    gc.collect()
+    before = resident()
+    states, pull = rollout.vjp(masses)
+    pull(np.ones_like(states))
+    during = resident()
+    del states, pull
+    gc.collect()
+    assert during - before > 50.0  # else nothing is shown
+    assert resident() - before < 0.2 * (during - before)

@@ -241,3 +241,111 @@ def test_threads_share_a_layer() -> None:
     with ThreadPoolExecutor(6) as pool:
         for found in pool.map(work, range(60)):
             assert all(torch.equal(g, expected) for g in found)
+
+
+def sticking() -> tangible.Rollout:
+    """A box at rest whose friction holds it against 4 N where it is above 4 / 9.81."""
+    scene = tangible.Scene(simulation={"stepping": "event", "dt": 0.1, "duration": 1.0})
+    scene.add_body("box", shape={"box": {"size": [0.2, 0.2]}}, mass=1, position=[0, 0.1])
+    scene.add_body("floor", static=True, shape={"half_plane": {"normal": [0, 1], "offset": 0}})
+    scene.add_pair("box", "floor", friction=0.6)
+    scene.add_force("push", body="box", force=[4.0, 0])
+    return tangible.Rollout(scene, ["pairs/box:floor/friction"])
+
+
+def test_a_box_that_sticks_has_a_derivative_where_it_is_smoothed_everywhere() -> None:
+    function = sticking()
+    everywhere = tangible.Smoothing(deviation=0.1, samples=32, everywhere=True)
+    p = torch.tensor([0.6], dtype=torch.float64, requires_grad=True)
+    optimizer = torch.optim.Adam([p], lr=0.05)
+    for _ in range(60):
+        loss = (rollout(function, p, kinks="smoothed", smoothing=everywhere)[0] - 0.5) ** 2
+        optimizer.zero_grad()
+        loss.backward()
+        optimizer.step()
+    # x = (4 - mu 9.81) / 2 = 0.5.
+    assert p.item() == pytest.approx(3.0 / 9.81, abs=4e-3)
+    # It is the mean of the samples' own derivatives, and the states are those of the rollout.
+    states, pull = function.vjp([0.42], kinks="smoothed", smoothing=everywhere)
+    assert np.array_equal(states, function([0.42]))
+    drawn = everywhere.draw(np.array([[0.42]]), np.random.default_rng(0))
+    own = [function.jacobian(sample).parameters[0, 0] for sample in drawn]
+    assert pull([1.0, 0, 0, 0, 0, 0])[0][0] == pytest.approx(np.mean(own), rel=1e-9)
+    assert -4.9 < np.mean(own) < -0.5
+    # Without the request a row that can be trusted keeps its own derivative.
+    assert function.vjp([0.6], kinks="smoothed")[1](np.ones(6))[0][0] == 0.0
+    batch = function.vjp([[0.42], [0.3]], kinks="smoothed", smoothing=everywhere)
+    assert -4.905 < batch[1](np.eye(6)[[0, 0]])[0][1] < -3.0  # of which few samples stick
+    assert batch[0].shape == (2, 6)
+
+
+def test_a_layer_keeps_to_the_ranges_of_its_scene() -> None:
+    scene = ball()
+    scene["bodies"][0].update(linear_damping=0.0, friction=0.3)
+    paths = ["bodies/ball/friction", "bodies/ball/restitution", "bodies/ball/linear_damping",
+             "bodies/ball/mass", "bodies/ball/velocity/x"]
+    layer = RolloutLayer(scene, paths)
+    start = tangible.Scene(scene)
+    assert layer.values().tolist() == pytest.approx([start[path] for path in paths])
+    assert [start.range(path) for path in paths] == [
+        (0, np.inf), (0, 1), (0, np.inf), (0, np.inf), (-np.inf, np.inf)]
+    for direction in (1.0, -1.0):
+        with torch.no_grad():
+            layer.q += direction * 20.0
+        values = layer.values()
+        assert (values >= 0)[:4].all() and values[1] <= 1
+        layer().sum().backward()
+        assert torch.isfinite(layer.q.grad).all()
+        with torch.no_grad():
+            layer.q -= direction * 20.0
+    # At the end of its range a value can still leave it: the derivative is that inside.
+    with torch.no_grad():
+        layer.q[2] = -0.5
+    layer.q.grad = None
+    layer.values()[2].backward()
+    assert layer.values()[2] == 0 and layer.q.grad[2] == 1
+    box = tangible.Scene(simulation={"stepping": "event", "dt": 0.02, "duration": 0.5})
+    box.add_body("box", shape={"box": {"size": [0.2, 0.2]}}, mass=1, position=[0, 0.1], velocity=[2, 0], friction=0.3)
+    box.add_body("floor", static=True, friction=0.0, shape={"half_plane": {"normal": [0, 1], "offset": 0}})
+    slides = RolloutLayer(box, ["bodies/box/friction"])
+    optimizer = torch.optim.SGD(slides.parameters(), lr=5.0)
+    for _ in range(20):
+        loss = (slides()[0] - 1.0) ** 2  # which no friction reaches
+        optimizer.zero_grad()
+        loss.backward()
+        optimizer.step()
+    assert 0 <= slides.values()[0] < 0.15
+
+
+def test_rows_that_fail_leave_the_others_their_gradients() -> None:
+    function = tangible.Rollout(ball(), PATHS[:1])
+    p = torch.tensor([[1.0], [-1.0], [2.0]], dtype=torch.float64, requires_grad=True)
+    with pytest.raises(tangible.TangibleError, match="row 1"):
+        rollout(function, p)
+    states = rollout(function, p, on_failure="nan")
+    assert torch.isnan(states[1]).all() and torch.isfinite(states[[0, 2]]).all()
+    torch.nanmean(states).backward()
+    assert p.grad is not None and p.grad[1] == 0 and torch.isfinite(p.grad).all()
+    # A value of all rows is not spoilt by one of them.
+    shared = torch.tensor([1.0], dtype=torch.float64, requires_grad=True)
+    starts = torch.as_tensor(np.tile(function.default_initial_state, (2, 1)))
+    starts[1, 1] = np.inf
+    states = rollout(function, shared, starts, on_failure="nan")
+    states[0].sum().backward()
+    assert shared.grad is not None and torch.isfinite(shared.grad).all()
+
+
+def test_nothing_is_recorded_without_a_derivative_to_take(monkeypatch: pytest.MonkeyPatch) -> None:
+    function = tangible.Rollout(ball(), PATHS[:1])
+    p = torch.tensor([[1.0], [2.0]], dtype=torch.float64, requires_grad=True)
+    with_tape = rollout(function, p)
+    from tangible import _core
+
+    monkeypatch.setattr(_core, "Recorded", None)
+    with torch.no_grad():
+        found = rollout(function, p, kinks="raise")
+    assert torch.equal(found, with_tape) and not found.requires_grad
+    assert torch.equal(rollout(function, p.detach()), with_tape.detach())
+    assert rollout(function, p.detach().float()).dtype == torch.float32
+    with pytest.raises(TypeError):
+        rollout(function, p)

@@ -53,11 +53,14 @@ class Smoothing:
         deviation: Standard deviation of each number, as a share of max(|value|, 1).
         samples: Even, at least 2; each costs a rollout and its adjoint.
         seed: Of the samples.
+        everywhere: Whether all rows are smoothed and not those at kinks and jumps alone: a box that
+            sticks has a derivative then where it slides for some of the samples.
     """
 
     deviation: float = 1e-3
     samples: int = 32
     seed: int = 0
+    everywhere: bool = False
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.deviation) and self.deviation > 0.0):
@@ -332,8 +335,8 @@ class Rollout:
             kinks: What stands for derivatives at a kink or jump, of the motion or of the discrete
                 map (`Certificate.verdict_of_map`): "element" is one element of the generalised
                 Jacobian (`certificates` says where); "raise" an error; "smoothed" the mean of the
-                Jacobians around (`Smoothing`), in those rows alone. The states are those of the
-                rollout in each case.
+                Jacobians around (`Smoothing`), in those rows alone, or in all with
+                `Smoothing(everywhere=True)`. The states are those of the rollout in each case.
             smoothing: Of "smoothed"; absent: its defaults.
 
         Raises:
@@ -343,6 +346,9 @@ class Rollout:
         if kinks not in ("element", "raise", "smoothed"):
             raise ValueError(f"kinks: expected element, raise or smoothed, got {kinks}")
         p, x, u, batched = self._inputs(parameters, initial_state, controls)
+        smoothing = smoothing or Smoothing()
+        if kinks == "smoothed" and smoothing.everywhere:
+            return self._vjp_of_mean(p, x, u, batched, on_failure, smoothing)
         recorded = _core.Recorded(self._core, p, x, u, self.threads)
         states, statuses, messages = recorded.outputs
         self._check(statuses, messages, batched, on_failure)
@@ -352,7 +358,7 @@ class Rollout:
             row, verdict = smoothed[0]
             raise _core.TangibleError(f"{f'row {row}: ' if batched else ''}derivative: {verdict}")
         rows = [row for row, _ in smoothed]
-        average = self._average(p, x, u, rows, smoothing or Smoothing()) if rows else None
+        average = self._average(p, x, u, rows, smoothing) if rows else None
 
         def pull(cotangent: ArrayLike) -> tuple[Floats, Floats, Floats]:
             bars = floats(cotangent, "cotangent")
@@ -367,6 +373,33 @@ class Rollout:
             if batched:
                 return by_parameters, by_state, by_controls
             return by_parameters[0], by_state[0], by_controls[0]
+
+        return result, pull
+
+    def _vjp_of_mean(
+        self, p: Floats, x: Floats | None, u: Floats, batched: bool, on_failure: str,
+        smoothing: Smoothing,
+    ) -> tuple[Floats, Callable[[ArrayLike], tuple[Floats, Floats, Floats]]]:
+        """`vjp` with all rows smoothed: their own derivatives are not needed."""
+        states, statuses, messages = self._core.run(p, x, u, self.threads)
+        self._check(statuses, messages, batched, on_failure)
+        result = self._shape(states, batched)
+        done = [row for row, status in enumerate(statuses) if status == "done"]
+        average = self._average(p, x, u, done, smoothing) if done else None
+        shapes = (p.shape, (len(p), self._core.num_states), u.shape)
+
+        def pull(cotangent: ArrayLike) -> tuple[Floats, Floats, Floats]:
+            bars = floats(cotangent, "cotangent")
+            if bars.shape != result.shape:
+                raise ValueError(f"cotangent: expected shape {result.shape}, got {bars.shape}")
+            found = [np.full(shape, np.nan) for shape in shapes]
+            if average is not None:
+                for into, mean in zip(found, average(bars.reshape(states.shape)[done])):
+                    into[done] = mean
+            by_parameters, by_state, by_controls = (
+                found if batched else [values[0] for values in found]
+            )
+            return by_parameters, by_state, by_controls
 
         return result, pull
 

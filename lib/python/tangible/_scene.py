@@ -212,6 +212,11 @@ class Scene:
         """The unit of every parameter, "1" for numbers."""
         return {path: unit for path, _, unit in self.core.parameters()}
 
+    def range(self, path: str) -> tuple[float, float]:
+        """The range that a parameter's values may have: (0, inf) of a mass or a friction, (0, 1) of a
+        restitution, (-inf, inf) of a position."""
+        return self.core.range(path)
+
     def __getitem__(self, path: str) -> float:
         """The value of a parameter; of several that match, of the first."""
         return self.core.value(path)

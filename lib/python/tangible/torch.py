@@ -35,11 +35,14 @@ class _Gradients(torch.autograd.Function):
     ) -> tuple[torch.Tensor | None, ...]:
         found = of.pull(_numpy(bar))
         gradients: list[torch.Tensor | None] = []
-        for value, entry, needed in zip(found, of.inputs, of.needs_input_grad[4:]):
+        for value, entry, needed in zip(found, of.inputs, of.needs_input_grad[_OWN:]):
             if entry is None or not needed:
                 gradients.append(None)
                 continue
             shape, dtype, device = entry
+            # A row that failed has no derivative; it must not spoil the sum over the others.
+            if of.failed.any():
+                value[of.failed] = 0.0
             # An argument without the batch's axis is one for all rows: their derivatives add up.
             if of.batched and value.ndim > len(shape):
                 value = value.sum(axis=0)
@@ -54,6 +57,9 @@ class _Gradients(torch.autograd.Function):
         )
 
 
+_OWN = 5  # arguments of _Function before the inputs
+
+
 class _Function(torch.autograd.Function):
     @staticmethod
     def forward(  # type: ignore[override]
@@ -61,15 +67,19 @@ class _Function(torch.autograd.Function):
         function: _Rollout,
         kinks: str,
         smoothing: Smoothing | None,
+        on_failure: str,
         like: torch.Tensor,
         *inputs: torch.Tensor | None,
     ) -> torch.Tensor:
         arrays = [_numpy(tensor) for tensor in inputs]
-        # Without a derivative to take, a kink is none of the caller's business.
-        of_kinks = kinks if any(ctx.needs_input_grad) else "element"
-        states, ctx.pull = function.vjp(*arrays, kinks=of_kinks, smoothing=smoothing)
+        states, ctx.pull = function.vjp(
+            *arrays, kinks=kinks, smoothing=smoothing, on_failure=on_failure
+        )
         ctx.inputs = [None if t is None else (t.shape, t.dtype, t.device) for t in inputs]
         ctx.batched = states.ndim > (1 if function._single else 2)
+        # Records that a run has not reached are NaN; the last one tells whether it has failed.
+        axes = tuple(range(1 if ctx.batched else 0, states.ndim))
+        ctx.failed = np.isnan(states).any(axis=axes)
         ctx.save_for_backward(*inputs)
         return torch.as_tensor(states).to(device=like.device, dtype=like.dtype)
 
@@ -77,7 +87,7 @@ class _Function(torch.autograd.Function):
     def backward(ctx: Any, bar: torch.Tensor) -> Any:  # type: ignore[override]
         # Inputs that have changed since do not matter to the tape, but to a second derivative.
         inputs = ctx.saved_tensors if torch.is_grad_enabled() else ()
-        return (None, None, None, None, *_Gradients.apply(ctx, bar, *inputs))
+        return (*[None] * _OWN, *_Gradients.apply(ctx, bar, *inputs))
 
 
 def rollout(
@@ -88,6 +98,7 @@ def rollout(
     *,
     kinks: str = "element",
     smoothing: Smoothing | None = None,
+    on_failure: str = "raise",
 ) -> torch.Tensor:
     """States of a `tangible.Rollout` of tensors, with gradients for all that are given.
 
@@ -98,6 +109,8 @@ def rollout(
         kinks, smoothing: As of `Rollout.vjp`: where two-sided derivatives do not exist, "element"
             takes one element of the generalised Jacobian (`function.certificates` says where),
             "raise" an error, "smoothed" the mean of the Jacobians around.
+        on_failure: "raise", or "nan" in states that were not reached: rows that failed have the
+            derivative 0, so that a loss of the others (`torch.nanmean`, or a mask) can be minimised.
     """
     named = {"parameters": parameters, "initial_state": initial_state, "controls": controls}
     given = {name: tensor for name, tensor in named.items() if tensor is not None}
@@ -108,26 +121,35 @@ def rollout(
             # States, and gradients, of its dtype would be cut to whole numbers.
             raise TypeError(f"{name}: expected a tensor of floating-point numbers, got {tensor.dtype}")
     like = next(iter(given.values()), torch.empty(0, dtype=torch.float64))
+    if not torch.is_grad_enabled() or not any(tensor.requires_grad for tensor in given.values()):
+        # Without a derivative to take no tape is needed, and a kink is none of the caller's business.
+        if kinks not in ("element", "raise", "smoothed"):
+            raise ValueError(f"kinks: expected element, raise or smoothed, got {kinks}")
+        arrays = [_numpy(tensor) for tensor in (parameters, initial_state, controls)]
+        states = function(*arrays, on_failure=on_failure)
+        return torch.as_tensor(states).to(device=like.device, dtype=like.dtype)
     result: torch.Tensor = _Function.apply(
-        function, kinks, smoothing, like, parameters, initial_state, controls
+        function, kinks, smoothing, on_failure, like, parameters, initial_state, controls
     )
     return result
 
 
 class RolloutLayer(torch.nn.Module):
-    """A rollout whose scene's parameters are learned, and stay physical.
+    """A rollout whose scene's parameters are learned, and stay in the ranges of the scene.
 
-    Each parameter is kept as a torch parameter q: p = initial exp(q) where it must be positive (a
-    mass, a radius), p = low + (high - low) sigmoid(q) where bounds are given, and p = initial + q
-    otherwise.
+    Each parameter is kept as a torch parameter q, which begins at 0 or in the middle: p = initial
+    exp(q) where it must be positive (a mass, a stiffness) or may not be negative (a friction),
+    p = low + (high - low) sigmoid(q) between two bounds (a restitution), and p = initial + q
+    otherwise. Where the scene's value is itself the end of a range (a friction of 0), p = initial + q
+    is cut off at the range, with the derivative that it has inside, so that it can leave the end.
 
     Args:
         scene: As of `tangible.Rollout`.
         parameters: Paths that are learned; they start at the scene's values.
         controls, records: As of `tangible.Rollout`.
-        positive: Paths that stay above 0; absent: masses, inertias, radii and sizes.
-        bounds: {path: (low, high)}; the scene's value lies between.
-        kinks, smoothing: As of `rollout`.
+        positive: Further paths that stay above 0.
+        bounds: {path: (low, high)}, in the place of the scene's range; its value lies between.
+        kinks, smoothing, on_failure: As of `rollout`.
     """
 
     start: torch.Tensor
@@ -145,31 +167,43 @@ class RolloutLayer(torch.nn.Module):
         bounds: Mapping[str, tuple[float, float]] | None = None,
         kinks: str = "element",
         smoothing: Smoothing | None = None,
+        on_failure: str = "raise",
     ) -> None:
         super().__init__()
         self.function = _Rollout(scene, parameters, controls, records=records)
         self.kinks = kinks
         self.smoothing = smoothing
+        self.on_failure = on_failure
         start = torch.as_tensor(self.function.default_parameters)
-        ends = ("/mass", "/inertia", "/radius", "/size/x", "/size/y", "/length")
-        kept = [p for p in parameters if p.endswith(ends)] if positive is None else list(positive)
         limits = dict(bounds or {})
-        for name in [*kept, *limits]:
+        for name in [*(positive or []), *limits]:
             if name not in parameters:
                 raise ValueError(f"{name}: expected one of {', '.join(parameters)}")
-        self._positive = torch.tensor([p in kept and p not in limits for p in parameters])
-        self._bounded = torch.tensor([p in limits for p in parameters])
-        low = torch.tensor([limits.get(p, (0.0, 1.0))[0] for p in parameters], dtype=torch.float64)
-        high = torch.tensor([limits.get(p, (0.0, 1.0))[1] for p in parameters], dtype=torch.float64)
-        if bool((self._positive & (start <= 0.0)).any()):
+        ranges = [self._range(path, limits, positive or []) for path in parameters]
+        low = torch.tensor([r[0] for r in ranges], dtype=torch.float64)
+        high = torch.tensor([r[1] for r in ranges], dtype=torch.float64)
+        given = torch.tensor([p in limits for p in parameters], dtype=torch.bool)
+        kept = torch.tensor([p in (positive or []) for p in parameters], dtype=torch.bool)
+        if bool((kept & (start <= 0.0)).any()):
             raise ValueError("positive: expected a scene whose values are > 0")
-        if bool((self._bounded & ((start <= low) | (start >= high))).any()):
+        if bool((given & ((start <= low) | (start >= high))).any()):
             raise ValueError("bounds: expected the scene's values between them")
+        inside = (start > low) & (start < high)
+        self._bounded = inside & torch.isfinite(low) & torch.isfinite(high)
+        self._positive = inside & (low == 0.0) & torch.isinf(high)
         self.register_buffer("start", start)
         self.register_buffer("low", low)
         self.register_buffer("high", high)
         share = torch.where(self._bounded, (start - low) / (high - low), torch.full_like(start, 0.5))
         self.q = torch.nn.Parameter(torch.where(self._bounded, torch.logit(share), 0.0 * start))
+
+    def _range(
+        self, path: str, limits: Mapping[str, tuple[float, float]], positive: Sequence[str]
+    ) -> tuple[float, float]:
+        if path in limits:
+            return float(limits[path][0]), float(limits[path][1])
+        low, high = self.function.scene.range(path)
+        return (max(low, 0.0) if path in positive else low), high
 
     def extra_repr(self) -> str:
         """What `print` shows of the layer."""
@@ -181,8 +215,12 @@ class RolloutLayer(torch.nn.Module):
     def values(self) -> torch.Tensor:
         """The parameters p, shape (P,), in SI units."""
         positive = self.start * torch.exp(torch.where(self._positive, self.q, 0.0 * self.q))
-        bounded = self.low + (self.high - self.low) * torch.sigmoid(self.q)
+        low = torch.where(self._bounded, self.low, torch.zeros_like(self.low))
+        high = torch.where(self._bounded, self.high, torch.ones_like(self.high))
+        bounded = low + (high - low) * torch.sigmoid(self.q)
         free = self.start + self.q
+        # The value is cut off at the range, the derivative is not.
+        free = free + (torch.minimum(torch.maximum(free, self.low), self.high) - free).detach()
         return torch.where(self._positive, positive, torch.where(self._bounded, bounded, free))
 
     def forward(
@@ -198,4 +236,5 @@ class RolloutLayer(torch.nn.Module):
             controls,
             kinks=self.kinks,
             smoothing=self.smoothing,
+            on_failure=self.on_failure,
         )
