@@ -67,10 +67,10 @@ class Workers {
 
 // Gives freed memory back to the system after a call of many rows or steps: the C library keeps
 // what threads have freed, gigabytes after large batches. It takes under a millisecond of a call
-// that has taken tens.
+// that has taken a second.
 void ReturnMemory(size_t rows, long steps) {
 #ifdef __GLIBC__
-  constexpr size_t kManySteps = 20'000;
+  constexpr size_t kManySteps = 200'000;
   if (rows * static_cast<size_t>(steps) >= kManySteps) malloc_trim(0);
 #else
   (void)rows;

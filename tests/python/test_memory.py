@@ -43,7 +43,7 @@ def test_ten_thousand_calls_keep_no_memory(capsys: pytest.CaptureFixture[str]) -
 
 def test_memory_of_large_calls_is_returned() -> None:
     rollout = tangible.Rollout(ball(), ["bodies/ball/mass"], ["forces/push/force/x"])
-    masses = np.ones((3000, 1))
+    masses = np.ones((4000, 1))
     rollout(masses[:2])
     gc.collect()
     before = resident()
