@@ -5,9 +5,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
+#include <string>
+#include <vector>
 
 #include "../../support/fit_scenes.h"
 #include "tangible/estimation/fit/fit.h"
+#include "tangible/estimation/fit/held_refit.h"
 
 namespace tangible {
 namespace {
@@ -89,6 +93,68 @@ TEST(HeldParametersTest, ATruthAtTheBoundIsNotBlamedOnOthers) {
     const FitResult result = Fit(FitOptions(), &residuals, {});
     EXPECT_TRUE(result.held.empty()) << seed << ": " << Describe(result.held.front());
   }
+}
+
+/// r_i = a (−1)^i + 1 − 0.02 tanh(50 θ): to first order θ explains all of it, in truth 4 %.
+class SaturatingProblem : public LeastSquaresProblem {
+ public:
+  explicit SaturatingProblem(bool released) {
+    entries_ = {{"a", 0.5, -10.0, 10.0, false, 1.0}};
+    if (released) entries_.push_back({"theta", 0.0, -10.0, 10.0, false, 1.0});
+  }
+  const std::vector<ParameterEntry>& entries() const override { return entries_; }
+  int num_shared() const override { return static_cast<int>(entries_.size()); }
+  int num_blocks() const override { return 1; }
+  int num_own(int /*block*/) const override { return 0; }
+  int num_rows(int /*block*/) const override { return 40; }
+  std::vector<RowPlace> Places(int /*block*/) const override {
+    std::vector<RowPlace> places;
+    for (int i = 0; i < num_rows(0); ++i) places.push_back({0, static_cast<double>(i), 0.0});
+    return places;
+  }
+  bool EvaluateBlock(int /*block*/, const Eigen::VectorXd& p, GradientMethod /*method*/,
+                     BlockDerivatives /*derivatives*/, BlockEvaluation* evaluation) override {
+    evaluation->residuals.resize(num_rows(0));
+    evaluation->jacobian.resize(num_rows(0), p.size());
+    const double moved = p.size() > 1 ? std::tanh(50.0 * p[1]) : 0.0;
+    for (int i = 0; i < num_rows(0); ++i) {
+      const double sign = i % 2 == 0 ? 1.0 : -1.0;
+      evaluation->residuals[i] = p[0] * sign + 1.0 - 0.02 * moved;
+      evaluation->jacobian(i, 0) = sign;
+      if (p.size() > 1) evaluation->jacobian(i, 1) = moved * moved - 1.0;
+    }
+    return true;
+  }
+  HeldColumns EvaluateHeld(int /*block*/, const Eigen::VectorXd& /*p*/, GradientMethod /*method*/,
+                           int /*most*/) override {
+    return {{{"theta", 0.0, -10.0, 10.0, false, 1.0}}, RowMatrixXd::Constant(num_rows(0), 1, -1.0)};
+  }
+  std::unique_ptr<LeastSquaresProblem> Released(const std::string& /*path*/) const override {
+    return std::make_unique<SaturatingProblem>(true);
+  }
+
+ private:
+  std::vector<ParameterEntry> entries_;
+};
+
+TEST(HeldParametersTest, WhatARealFitDoesNotConfirmIsNotClaimed) {
+  SaturatingProblem problem(false);
+  const std::vector<HeldParameter> first_order =
+      FindHeldParameters(Eigen::VectorXd::Zero(1), HeldOptions(), &problem);
+  ASSERT_EQ(first_order.size(), 1U);
+  EXPECT_NEAR(first_order[0].cost_share, 1.0, 1e-12);
+  FitResult result;
+  result.estimate = Eigen::VectorXd::Zero(1);
+  result.residuals = Eigen::VectorXd::Ones(problem.num_rows(0));
+  result.final_cost = 0.5 * problem.num_rows(0);
+  EXPECT_TRUE(ConfirmHeld(FitOptions(), HeldOptions(), first_order, &problem, &result).empty());
+  // A claim of which 4 % is enough is told as what the fit has found.
+  HeldOptions little;
+  little.least_share = 0.03;
+  const std::vector<HeldParameter> confirmed =
+      ConfirmHeld(FitOptions(), little, first_order, &problem, &result);
+  ASSERT_EQ(confirmed.size(), 1U);
+  EXPECT_NEAR(confirmed[0].refitted_share, 1.0 - 0.98 * 0.98, 1e-6);
 }
 
 }  // namespace
