@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // Fits: what tangible-fit does, and the residuals and Jacobians that it minimises.
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -73,8 +74,9 @@ class FitProblemOf {
     int max_iterations = 50;
     double predict_from = INFINITY;  // s; infinite: all observations are fitted
     bool discretisation_check = false;
-    std::string checkpoint;   // a file, or empty
-    py::object on_iteration;  // called with a dict, or None
+    std::string checkpoint;             // a file, or empty
+    py::object on_iteration;            // called with a dict, or None
+    std::vector<std::string> profiles;  // of these parameters
   };
 
   // The result as tangible-fit writes it, the report as a page, the predictions as a table, and the
@@ -94,6 +96,13 @@ class FitProblemOf {
 
   Found Do(const Wanted& wanted) {
     fit_.run().options.max_iterations = wanted.max_iterations;
+    fit_.run().options.profiles = wanted.profiles;
+    for (const std::string& name : wanted.profiles) {
+      const std::vector<std::string> all = names();
+      if (std::find(all.begin(), all.end(), name) == all.end()) {
+        throw Error("profile: expected names of parameters, got " + name);
+      }
+    }
     std::vector<std::vector<Observation>> held_back = HoldBack(wanted.predict_from);
     const std::unique_ptr<FitCheckpoint> checkpoint = Open(wanted.checkpoint);
     const NextLog next_log =
@@ -255,12 +264,12 @@ void BindFit(py::module_* module) {
       .def_property_readonly("names", &FitProblemOf::names)
       .def("ranges", &FitProblemOf::Ranges)
       .def("evaluate", &FitProblemOf::Evaluate)
-      .def("run",
-           [](FitProblemOf& fit, int max_iterations, double predict_from, bool discretisation_check,
-              const std::string& checkpoint, const py::object& on_iteration) {
-             return fit.Run(
-                 {max_iterations, predict_from, discretisation_check, checkpoint, on_iteration});
-           });
+      .def("run", [](FitProblemOf& fit, int max_iterations, double predict_from,
+                     bool discretisation_check, const std::string& checkpoint,
+                     const py::object& on_iteration, const std::vector<std::string>& profiles) {
+        return fit.Run({max_iterations, predict_from, discretisation_check, checkpoint,
+                        on_iteration, profiles});
+      });
 }
 
 }  // namespace tangible::python

@@ -49,9 +49,11 @@ def test_mistakes_are_one_line(tmp_path: Path) -> None:
         tangible.fit({**data, "parameters": ["bodies/nobody/mass"]}, folder=FIT.parent)
     with pytest.raises(tangible.TangibleError, match="no parameter of the fit is named mass"):
         tangible.fit(FIT, initial={"mass": 1.0})
+    plain = {**data, "approach": "plain"}
     with pytest.raises(tangible.TangibleError, match="not_converged"):
-        tangible.fit(FIT, max_iterations=1)
-    assert tangible.fit(FIT, max_iterations=1, on_failure="return").status == "not_converged"
+        tangible.fit(plain, folder=FIT.parent, max_iterations=1)
+    ended = tangible.fit(plain, folder=FIT.parent, max_iterations=1, on_failure="return")
+    assert ended.status == "not_converged"
     with pytest.raises(ValueError, match="parameters: expected 1 values"):
         good([1.0, 2.0])
 

@@ -145,13 +145,30 @@ def test_later_observations_are_predicted() -> None:
         tangible.fit(scene(), seen(), GUESS, sigma=SIGMA, predict_from=2.0)
 
 
+def test_profiles_give_intervals() -> None:
+    path = "bodies/ball/restitution"
+    found = tangible.fit(scene(), seen(), GUESS, sigma=SIGMA, profile=[path])
+    entry, = (p for p in found.data["parameters"] if p["name"] == path)
+    assert entry["interval_method"] == "profile"
+    low, high = found.intervals[path] or (None, None)
+    assert low is not None and high is not None and low < found[path] < high
+    width = 2 * 1.96 * found.standard_deviations[path]
+    assert high - low == pytest.approx(width, rel=0.5)
+    with pytest.raises(tangible.TangibleError, match="profile: expected names of parameters, got x"):
+        tangible.fit(scene(), seen(), GUESS, sigma=SIGMA, profile=["x"])
+    with pytest.raises(TypeError, match="profile: expected a list"):
+        tangible.fit(scene(), seen(), GUESS, sigma=SIGMA, profile=path)
+
+
 def test_callbacks_checks_and_checkpoints(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     said: list[dict[str, Any]] = []
     file = tmp_path / "fit.checkpoint"
     found = tangible.fit(
         scene(), seen(), GUESS, sigma=SIGMA, callback=said.append, progress=True, checkpoint=file,
         discretisation_check=True)
-    assert [s["iteration"] for s in said] == list(range(len(said))) and len(said) > 2
+    for start in {s["start"] for s in said}:
+        iterations = [s["iteration"] for s in said if s["start"] == start]
+        assert iterations == list(range(len(iterations))) and len(iterations) > 2
     assert said[0]["parameters"] == GUESS and said[-1]["cost"] < said[0]["cost"]
     assert "iteration 2" in capsys.readouterr().err
     assert any("discretisation" in key for key in found.data)

@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import _core
 from ._certificate import Certificate
+from ._plain import paths as names
 from ._problem import Problem, make, of_data
 from ._rollout import floats
 from ._scene import Scene
@@ -225,6 +226,16 @@ class FitResult:
         raise KeyError(f"{name}: expected one of {', '.join(self.names)}")
 
     @property
+    def intervals(self) -> dict[str, tuple[float | None, float | None] | None]:
+        """{name: 95 % interval}, of each parameter the one that the programs print first; an end that
+        is None is not determined, an interval that is None neither."""
+        found: dict[str, tuple[float | None, float | None] | None] = {}
+        for parameter in self.data["parameters"]:
+            ends = parameter.get("interval_95")
+            found[parameter["name"]] = None if ends is None else (ends[0], ends[1])
+        return found
+
+    @property
     def warnings(self) -> list[str]:
         """What `tangible-fit` warns of, such as intervals that mean little."""
         lines = [str(line) for line in self.data.get("warnings") or []]
@@ -349,6 +360,7 @@ def fit(
     initial: Mapping[str, float] | None = None,
     max_iterations: int = 50,
     predict_from: float | None = None,
+    profile: Sequence[str] = (),
     discretisation_check: bool = False,
     checkpoint: str | os.PathLike[str] | None = None,
     callback: Callable[[dict[str, Any]], object] | None = None,
@@ -380,6 +392,8 @@ def fit(
         max_iterations: Of each start.
         predict_from: s: observations after it are not fitted but predicted; their errors stand in
             the report and in `predictions`.
+        profile: Names of parameters whose profiles are computed: the fit with the parameter held, at
+            values around; their intervals count where the cost is no parabola.
         discretisation_check: Whether it is fitted with half the step too, which shows its bias.
         checkpoint: A file that keeps the fit's evaluations: where the fit is interrupted, the same
             call goes on from it, with the same bits.
@@ -418,6 +432,7 @@ def fit(
                 discretisation_check,
                 "" if checkpoint is None else os.fspath(checkpoint),
                 told if progress or callback is not None else None,
+                names(profile, "profile"),
             )
     finally:
         if progress:
