@@ -14,6 +14,8 @@ namespace {
 constexpr int kRefitIterations = 20;
 // The best numbers are fitted until so many are confirmed.
 constexpr int kMostConfirmed = 3;
+// Fits of more recordings, which would take several times as long, are told of to first order.
+constexpr int kMostRefitBlocks = 30;
 
 /// `estimate` with the value of the released parameter after the shared ones.
 Eigen::VectorXd With(const Eigen::VectorXd& estimate, int at, double value) {
@@ -60,6 +62,9 @@ std::vector<HeldParameter> ConfirmHeld(const FitOptions& options, const HeldOpti
                                        LeastSquaresProblem* problem, FitResult* result) {
   const double chance =
       held.least_deviations * held.least_deviations / static_cast<double>(result->residuals.size());
+  if (problem->num_blocks() > kMostRefitBlocks) {
+    return found;
+  }
   std::vector<HeldParameter> confirmed;
   std::vector<HeldParameter> first_order;
   for (HeldParameter one : found) {

@@ -16,7 +16,8 @@ namespace tangible {
 
 /// Those of `found` that a fit confirms, at most HeldOptions::most, with `refitted` set: first
 /// those that move parameters out of their bounds, then by the share of the cost. Numbers that
-/// cannot be released (they differ from recording to recording) stay as they are, after the others.
+/// cannot be released (they differ from recording to recording) stay as they are, after the others;
+/// so do all in fits of more than 30 recordings.
 /// `result` is the fit with the numbers held; its `rollouts` grow by those made here.
 std::vector<HeldParameter> ConfirmHeld(const FitOptions& options, const HeldOptions& held,
                                        const std::vector<HeldParameter>& found,
