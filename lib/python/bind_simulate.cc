@@ -115,8 +115,8 @@ void AddCoordinates(const Model<double>& model, const State<double>& state,
   }
 }
 
-// The mean force (N, world) and torque (N m, about the anchor of bodies[0]) over a step with which a
-// joint holds bodies[0]: its impulses along its rows at the step's start.
+// The mean force (N, world) and torque (N m, about the anchor of bodies[0]) over a step with which
+// a joint holds bodies[0]: its impulses along its rows at the step's start.
 void AddJointForces(const Model<double>& model, const StepRecord& record, double length,
                     std::vector<double>* forces) {
   const ModelStructure& s = *model.structure;

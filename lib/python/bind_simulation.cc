@@ -38,8 +38,8 @@ class Simulation {
 
   const RolloutFunction& function() const { return function_; }
 
-  // Starts rows anew: `parameters` (rows x P), and `states` (rows x S), or none for the scene's own.
-  // Returns what is wrong for each row, or empty.
+  // Starts rows anew: `parameters` (rows x P), and `states` (rows x S), or none for the scene's
+  // own. Returns what is wrong for each row, or empty.
   std::vector<std::string> Reset(const std::vector<int>& rows, const Array& parameters,
                                  const std::optional<Array>& states) {
     const auto count = static_cast<py::ssize_t>(rows.size());
