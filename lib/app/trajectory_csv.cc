@@ -62,7 +62,8 @@ void ContactsCsv::Add(const ModelStructure& structure, double t, const StepRecor
     const ActiveContact& contact = record.contacts[i];
     const bool is_friction = contact.IsJointFriction();  // which has no normal impulse
     const std::string names =
-        is_friction          ? ",friction," + structure.joints[contact.joint].name + ",,"
+        contact.is_motor     ? ",motor," + structure.joints[contact.joint].name + ",,"
+        : is_friction        ? ",friction," + structure.joints[contact.joint].name + ",,"
         : contact.joint >= 0 ? ",limit," + structure.joints[contact.joint].name +
                                    (contact.side > 0.0 ? ",low," : ",high,")
                              : ",contact," + structure.bodies[contact.a].name + "," +

@@ -48,6 +48,7 @@ const char* Name(JointType type) {
     case JointType::kWeld:
       return "weld";
     case JointType::kDistance:
+    case JointType::kRope:
       return "distance";
     case JointType::kFixedAngle:
       return "fixed_angle";

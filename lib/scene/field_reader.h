@@ -5,6 +5,7 @@
 
 #include <cstddef>
 #include <functional>
+#include <limits>
 #include <optional>
 #include <string>
 #include <utility>
@@ -49,7 +50,14 @@ class FieldReader {
     if (!IsRead(field)) return;
     const JsonReader reader = item_.At(field.key);
     if (reader.Size() != 2) return reader.FailExpected("an array of 2 numbers [low, high]");
-    value = {reader.At(0).Number(field.kind), reader.At(1).Number(field.kind)};
+    constexpr double kInfinity = std::numeric_limits<double>::infinity();
+    const auto bound = [&](int i, double none) {
+      return reader.At(i).IsNull() ? none : reader.At(i).Number(field.kind);
+    };
+    value = {bound(0, -kInfinity), bound(1, kInfinity)};
+    if (reader.At(0).IsNull() && reader.At(1).IsNull()) {
+      reader.Fail("expected a number at one side at least, got [null, null]");
+    }
   }
   void Numbers(const Field& field, double& first, double& second) {
     const JsonReader reader = item_.At(field.key);
@@ -91,6 +99,18 @@ class FieldReader {
       reader.FailExpected("[x, y] or {\"file\": ...}");
     }
   }
+  template <typename Item, typename Visit>
+  void Part(const Field& field, std::optional<Item>& value, const Visit& visit) {
+    if (!IsRead(field)) return;
+    const JsonReader part = item_.At(field.key);
+    value.emplace();
+    FieldKeys keys;
+    visit(*value, &keys);
+    part.ExpectKeys(keys.keys(), std::string(" of a ") + field.key);
+    if (!part.ok()) return;
+    FieldReader reader(part, signal_);
+    visit(*value, &reader);
+  }
   /// `Value` is the enumeration, or an optional of it, which an absent key leaves empty.
   template <typename Enum, std::size_t N, typename Value>
   void Choice(const char* key, const std::pair<const char*, Enum> (&table)[N], Value& value) {
@@ -107,7 +127,8 @@ class FieldReader {
   bool IsRead(const Field& field) const {
     const bool written = item_.Has(field.key);
     if (!field.present && written) {
-      item_.At(field.with).Fail(std::string("missing, expected a number >= 0 with ") + field.key);
+      item_.At(field.with)
+          .Fail(std::string("missing, expected ") + field.with_form + " with " + field.key);
     }
     return field.present && (written || field.required);
   }

@@ -91,7 +91,10 @@ std::vector<JointPlace> ClassifyJoints(const BasicScene<T>& scene) {
   };
   std::vector<std::array<int, 2>> edges;
   for (const BasicJoint<T>& joint : scene.joints) {
-    edges.push_back({node(joint.bodies[0]), node(joint.bodies[1])});
+    const int first = node(joint.bodies[0]);
+    // A rope holds nothing in its place: it is an edge from a node to itself, which is no bridge.
+    const bool is_rope = joint.type == JointType::kDistance && joint.limits;
+    edges.push_back({first, is_rope ? first : node(joint.bodies[1])});
   }
   const BridgeSearch search(static_cast<int>(scene.bodies.size()) + 1, edges);
   std::vector<JointPlace> places;

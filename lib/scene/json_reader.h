@@ -80,6 +80,7 @@ class JsonReader {
   bool IsObject() const { return value_ != nullptr && value_->is_object(); }
   bool IsArray() const { return value_ != nullptr && value_->is_array(); }
   bool IsString() const { return value_ != nullptr && value_->is_string(); }
+  bool IsNull() const { return value_ != nullptr && value_->is_null(); }
   bool IsNumber() const { return value_ != nullptr && value_->is_number(); }
   bool Is(const Json& value) const { return value_ != nullptr && *value_ == value; }
 

@@ -38,6 +38,7 @@ std::vector<std::string> WordsOf(const std::pair<const char*, Enum> (&table)[N])
   for (const auto& entry : table) words.emplace_back(entry.first);
   return words;
 }
+inline OrderedJson SchemaOfNull() { return {{"type", "null"}}; }
 /// One of several.
 OrderedJson SchemaOfAny(std::initializer_list<OrderedJson> schemas);
 /// [x, y]

@@ -4,6 +4,7 @@
 // Definitions of the templates of parameter.h; included by parameter.cc alone.
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <optional>
 #include <string>
@@ -67,8 +68,8 @@ class NumberList {
   }
   void Interval(const Field& field, std::optional<std::pair<T, T>>& value) {
     if (!value) return;
-    Add(field, "/0", &value->first);
-    Add(field, "/1", &value->second);
+    if (std::isfinite(ValueOf(value->first))) Add(field, "/0", &value->first);
+    if (std::isfinite(ValueOf(value->second))) Add(field, "/1", &value->second);
   }
   void Numbers(const Field& field, T& x, T& y) {
     Add(field, "/x", &x);
@@ -81,6 +82,14 @@ class NumberList {
   }
   void NumberOrSignal(const Field& field, T& value, const std::optional<Signal>& signal) {
     if (!signal) Number(field, value);
+  }
+  template <typename Item, typename Visit>
+  void Part(const Field& field, std::optional<Item>& item, const Visit& visit) {
+    if (!item) return;
+    const std::string outer = prefix_;
+    prefix_ += std::string(field.key) + "/";
+    visit(*item, this);
+    prefix_ = outer;
   }
   void PointOrSignal(const Field& field, Vector2<T>& value, const std::optional<Signal>& signal) {
     if (!signal) Point(field, value);
@@ -132,6 +141,11 @@ class ItemNumbers {
   void NumberOrSignal(const Field& field, double value, const std::optional<Signal>&) {
     Number(field, value);
   }
+  template <typename Item, typename Visit>
+  void Part(const Field& field, const std::optional<Item>& item, const Visit& visit) {
+    Number(field, item ? 1.0 : 0.0);
+    if (item) visit(*item, this);
+  }
   void PointOrSignal(const Field& field, const Vector2<double>& value,
                      const std::optional<Signal>&) {
     Point(field, value);
@@ -178,6 +192,12 @@ class SetNumbers {
   }
   void PointOrSignal(const Field& field, Vector2<T>& value, const std::optional<Signal>&) {
     Point(field, value);
+  }
+  template <typename Item, typename Visit>
+  void Part(const Field&, std::optional<Item>& item, const Visit& visit) {
+    if (!Has()) return;
+    item.emplace();
+    visit(*item, this);
   }
 
  private:

@@ -52,7 +52,8 @@ struct BasicBody {
   std::optional<T> quadratic_drag;  ///< N s²/m², ≥ 0: force −c |v| v
 };
 
-enum class JointType { kRevolute, kPrismatic, kWeld, kDistance, kFixedAngle };
+/// kRope is what a model makes of a distance joint with limits, which keeps no distance.
+enum class JointType { kRevolute, kPrismatic, kWeld, kDistance, kFixedAngle, kRope };
 
 /// A series (time, value) read from a file, which a force, torque or effort follows instead of a
 /// constant.
@@ -65,6 +66,14 @@ struct Signal {
   std::vector<double> value;  ///< N m, or N for a prismatic effort
 };
 
+/// A motor of a hinge or slider: up to `limit` it does what keeps the rate of the coordinate at
+/// `speed`.
+template <typename T>
+struct BasicMotor {
+  T speed{0.0};  ///< rad/s or m/s
+  T limit{0.0};  ///< N m or N, ≥ 0
+};
+
 /// A joint of bodies[0] against bodies[1]; −1 is the world. Anchors are world points at time 0,
 /// before `angle` and `rate` are applied. Which fields a type has:
 ///   kRevolute   anchors[0], angle, rate, damping (N m s), limits (rad), effort (N m),
@@ -73,7 +82,8 @@ struct Signal {
 ///               rate (m/s), damping (N s/m), limits (m), effort (N), stiffness (N/m)
 ///               with rest (m)
 ///   kWeld       anchors[0]
-///   kDistance   anchors[0] on bodies[0], anchors[1] on bodies[1]
+///   kDistance   anchors[0] on bodies[0], anchors[1] on bodies[1]; limits (m) take the place of the
+///               distance as drawn
 ///   kFixedAngle none
 template <typename T>
 struct BasicJoint {
@@ -85,13 +95,15 @@ struct BasicJoint {
   T angle{0.0};
   T rate{0.0};
   T damping{0.0};
-  std::optional<std::pair<T, T>> limits;
+  std::optional<std::pair<T, T>> limits;  ///< an infinite one limits nothing
+  std::optional<T> limit_restitution;     ///< of impacts at the limits, 0 to 1; absent: 0
   std::optional<T> stiffness;  ///< of a spring along the coordinate: −k (coordinate − rest)
   T rest{0.0};                 ///< rad or m; only with a stiffness
   std::optional<T> friction;   ///< the torque or force at which it slides, ≥ 0
   /// Of Stribeck's decay, ≥ 0: the friction far above `stribeck_speed`. None: Coulomb's friction.
   std::optional<T> kinetic_friction;
   T stribeck_speed{1.0};  ///< rad/s or m/s, > 0; only with a kinetic friction
+  std::optional<BasicMotor<T>> motor;
   T effort{0.0};
   std::optional<Signal> effort_signal;  ///< replaces effort
   bool contact = false;                 ///< whether the joined bodies may collide

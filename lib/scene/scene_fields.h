@@ -12,11 +12,12 @@
 //   Point           [x, y]
 //   Points          [[x, y], ...]
 //   Anchors         [[x, y], [x, y]]
-//   Interval        [low, high], or absent
+//   Interval        [low, high], or absent; null: infinite
 //   Numbers         two numbers of a shape: [w, h]
 //   Vertices        numbers of a polygon: [[x, y], ...]
 //   NumberOrSignal  1.5 or {"file": ...}
 //   PointOrSignal   [x, y] or {"file": ...}
+//   Part            an object with fields of its own, or absent
 //   Choice, Count   settings that are no parameters
 //
 // What is no number by itself (names, bodies, the type of a joint or shape) is read and written
@@ -44,6 +45,8 @@ struct Field {
   bool present = true;
   /// What messages say of two numbers.
   const char* form = " [x, y]";
+  /// What messages expect of the field `with`.
+  const char* with_form = "a number >= 0";
 };
 
 inline constexpr Field kGravityField{"gravity", NumberKind::kFree, Dimension::kAcceleration};
@@ -132,6 +135,16 @@ void VisitContactPoints(Body& body, Visitor* visitor) {
   visitor->Points({"contact_points", NumberKind::kFree, Dimension::kLength}, body.contact_points);
 }
 
+template <typename Joint, typename Visitor>
+void VisitLimits(Joint& joint, NumberKind kind, Dimension dimension, Visitor* visitor) {
+  visitor->Interval({"limits", kind, dimension}, joint.limits);
+  Field restitution{"limit_restitution", NumberKind::kFraction};
+  restitution.with = "limits";
+  restitution.with_form = "[low, high]";
+  restitution.present = joint.limits.has_value();
+  visitor->Optional(restitution, joint.limit_restitution);
+}
+
 /// `turns`: whether the joint may start turned or moved (joint_graph.h).
 template <typename Joint, typename Visitor>
 void VisitJoint(Joint& joint, bool turns, Visitor* visitor) {
@@ -140,6 +153,7 @@ void VisitJoint(Joint& joint, bool turns, Visitor* visitor) {
   const bool slides = joint.type == JointType::kPrismatic;
   if (joint.type == JointType::kDistance) {
     visitor->Anchors({"anchors", kFree, Dimension::kLength, true}, joint.anchors);
+    VisitLimits(joint, kNonNegative, Dimension::kLength, visitor);
   } else if (joint.type != JointType::kFixedAngle) {
     visitor->Point({"anchor", kFree, Dimension::kLength, true}, joint.anchors[0]);
   }
@@ -154,7 +168,7 @@ void VisitJoint(Joint& joint, bool turns, Visitor* visitor) {
   visitor->Number(
       {"damping", kNonNegative, slides ? Dimension::kLinearDamping : Dimension::kAngularDamping},
       joint.damping);
-  visitor->Interval({"limits", kFree, coordinate}, joint.limits);
+  VisitLimits(joint, kFree, coordinate, visitor);
   visitor->Optional({"friction", kNonNegative, effort}, joint.friction);
   visitor->Optional({"kinetic_friction", kNonNegative, effort, false, true, "friction",
                      joint.friction.has_value()},
@@ -162,6 +176,10 @@ void VisitJoint(Joint& joint, bool turns, Visitor* visitor) {
   visitor->Number({"stribeck_speed", NumberKind::kPositive, speed, true, true, "kinetic_friction",
                    joint.kinetic_friction.has_value()},
                   joint.stribeck_speed);
+  visitor->Part({"motor"}, joint.motor, [&](auto& motor, auto* fields) {
+    fields->Number({"speed", kFree, speed, true}, motor.speed);
+    fields->Number({"limit", kNonNegative, effort, true}, motor.limit);
+  });
   visitor->Optional(
       {"stiffness", kNonNegative, slides ? Dimension::kStiffness : Dimension::kAngularStiffness},
       joint.stiffness);
@@ -259,6 +277,10 @@ class FieldKeys {
   }
   template <typename T, typename S>
   void NumberOrSignal(const Field& field, const T&, const S&) {
+    Add(field.key);
+  }
+  template <typename T, typename Visit>
+  void Part(const Field& field, const T&, const Visit&) {
     Add(field.key);
   }
   template <typename V, typename S>

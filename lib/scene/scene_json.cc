@@ -58,6 +58,7 @@ class SceneReader {
     ReadAll(root.At("bodies"), "an array of bodies", &SceneReader::ReadBody);
     ReadOptional(root, "joints", &SceneReader::ReadJoint);
     if (root.ok()) CheckInitialAngles(*scene_, root.At("joints"));
+    if (root.ok()) CheckRopes(*scene_, root.At("joints"));
     ReadOptional(root, "springs", &SceneReader::ReadSpring);
     ReadOptional(root, "forces", &SceneReader::ReadForce);
     ReadOptional(root, "pairs", &SceneReader::ReadPair);

@@ -57,6 +57,7 @@ class FieldWriter {
   void Interval(const Field& field, const std::optional<std::pair<double, double>>& value) {
     if (value) Numbers(field, value->first, value->second);
   }
+  // JSON has no infinity: a bound that limits nothing is written as null.
   void Numbers(const Field& field, double first, double second) {
     json_[field.key] = OrderedJson::array({first, second});
   }
@@ -71,6 +72,12 @@ class FieldWriter {
   void PointOrSignal(const Field& field, const Vector2<double>& value,
                      const std::optional<Signal>& signal) {
     json_[field.key] = signal ? SignalJson(*signal) : PointJson(value);
+  }
+  template <typename Item, typename Visit>
+  void Part(const Field& field, const std::optional<Item>& item, const Visit& visit) {
+    if (!item) return;
+    FieldWriter part(&json_[field.key]);
+    visit(*item, &part);
   }
   template <typename Enum, std::size_t N>
   void Choice(const char* key, const std::pair<const char*, Enum> (&table)[N], Enum value) {

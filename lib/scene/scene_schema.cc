@@ -56,7 +56,14 @@ class FieldSchema {
   }
   template <typename T>
   void Interval(const Field& field, const T&) {
-    Add(field, PointSchema(field));
+    Add(field, SchemaOfArray(SchemaOfAny({NumberSchema(field), SchemaOfNull()}), 2, 2));
+  }
+  template <typename Item, typename Visit>
+  void Part(const Field& field, const std::optional<Item>&, const Visit& visit) {
+    FieldSchema fields;
+    Item item;
+    visit(item, &fields);
+    Add(field, fields.Item(OrderedJson::object(), {}));
   }
   template <typename T>
   void Numbers(const Field& field, const T&, const T&) {

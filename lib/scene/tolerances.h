@@ -15,5 +15,8 @@ inline constexpr double kCentred = 1e-9;
 /// Of the larger radius of an ellipse: the smaller one is at least as large: beyond, the curvature
 /// at its ends, of (b / a)² of its size, is below rounding.
 inline constexpr double kSlenderEllipse = 1e-9;
+/// Of the distance of a rope's ends: a rope that starts longer than its limit by less starts taut,
+/// because lengths are written with rounding.
+inline constexpr double kRopeRounding = 1e-9;
 
 }  // namespace tangible

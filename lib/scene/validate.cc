@@ -2,6 +2,7 @@
 #include "tangible/scene/validate.h"
 
 #include <cstddef>
+#include <limits>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -10,6 +11,7 @@
 #include "tangible/scene/scene_fields.h"
 #include "tangible/scene/scene_json.h"
 #include "tangible/scene/shape_json.h"
+#include "tangible/scene/tolerances.h"
 
 namespace tangible {
 namespace {
@@ -37,7 +39,21 @@ class RangeCheck {
     for (int i = 0; i < 2; ++i) CheckPoint(field, anchors[i], [&] { return Place(field).At(i); });
   }
   void Interval(const Field& field, const std::optional<std::pair<double, double>>& value) {
-    if (value) Numbers(field, value->first, value->second);
+    constexpr double kInfinity = std::numeric_limits<double>::infinity();
+    if (!value) return;
+    if (value->first != -kInfinity) {
+      Check(field.kind, value->first, [&] { return Place(field).At(0); });
+    }
+    if (value->second != kInfinity) {
+      Check(field.kind, value->second, [&] { return Place(field).At(1); });
+    }
+  }
+  template <typename Item, typename Visit>
+  void Part(const Field& field, const std::optional<Item>& item, const Visit& visit) {
+    if (!item) return;
+    const JsonReader place = Place(field);
+    RangeCheck part(place);
+    visit(*item, &part);
   }
   void Numbers(const Field& field, double first, double second) {
     Check(field.kind, first, [&] { return Place(field).At(0); });
@@ -101,7 +117,8 @@ void CheckBody(const BasicBody<double>& body, const JsonReader& place) {
 }
 
 void CheckJoint(const BasicJoint<double>& joint, const JsonReader& place) {
-  if (joint.type == JointType::kDistance && (joint.anchors[0] - joint.anchors[1]).norm() == 0.0) {
+  const double apart = (joint.anchors[0] - joint.anchors[1]).norm();
+  if (joint.type == JointType::kDistance && !joint.limits && apart == 0.0) {
     place.At("anchors").Fail("expected two points apart, got a distance of 0");
   }
   if (joint.type == JointType::kPrismatic && joint.axis.norm() == 0.0) {
@@ -111,6 +128,24 @@ void CheckJoint(const BasicJoint<double>& joint, const JsonReader& place) {
     place.At("limits").Fail("expected [low, high] with low <= high, got [" +
                             Json(joint.limits->first).dump() + ", " +
                             Json(joint.limits->second).dump() + "]");
+  }
+}
+
+void CheckRopes(const Scene& scene, const JsonReader& joints) {
+  // Where joints start turned or moved, anchors are not yet where the run starts.
+  for (const BasicJoint<double>& joint : scene.joints) {
+    if (joint.angle != 0.0) return;
+  }
+  for (std::size_t i = 0; i < scene.joints.size(); ++i) {
+    const BasicJoint<double>& joint = scene.joints[i];
+    if (joint.type != JointType::kDistance || !joint.limits) continue;
+    const double apart = (joint.anchors[0] - joint.anchors[1]).norm();
+    const double rounding = kRopeRounding * apart;
+    if (apart < joint.limits->first - rounding || apart > joint.limits->second + rounding) {
+      joints.At(static_cast<int>(i))
+          .At("anchors")
+          .Fail("expected points whose distance is within the limits, got " + Json(apart).dump());
+    }
   }
 }
 

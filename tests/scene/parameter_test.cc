@@ -91,6 +91,7 @@ TEST_F(ParameterTest, EveryNumberOnceInOrder) {
       // joints
       "joints/hinge/anchor/x", "joints/hinge/anchor/y", "joints/hinge/angle", "joints/hinge/rate",
       "joints/hinge/damping", "joints/hinge/limits/0", "joints/hinge/limits/1",
+      "joints/hinge/limit_restitution", "joints/hinge/motor/speed", "joints/hinge/motor/limit",
       "joints/hinge/effort", "joints/slider/anchor/x", "joints/slider/anchor/y",
       "joints/slider/axis/x", "joints/slider/axis/y", "joints/slider/displacement",
       "joints/slider/rate", "joints/slider/damping", "joints/slider/limits/0",

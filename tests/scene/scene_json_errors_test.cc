@@ -216,18 +216,20 @@ TEST(BadSceneTest, Joints) {
        "/joints/0/type: missing, expected one of revolute, prismatic, weld, distance, fixed_angle"},
       {"/joints/0/displacement", "0",
        "/joints/0/displacement: unknown key of a revolute joint, expected one of name, type, "
-       "bodies, contact, anchor, angle, rate, damping, limits, friction, "
-       "kinetic_friction, stribeck_speed, stiffness, rest_angle, effort, got \"displacement\""},
+       "bodies, contact, anchor, angle, rate, damping, limits, limit_restitution, friction, "
+       "kinetic_friction, stribeck_speed, motor, stiffness, rest_angle, effort, got "
+       "\"displacement\""},
       {"/joints/1/angle", "0",
        "/joints/1/angle: unknown key of a prismatic joint, expected one of name, type, bodies, "
-       "contact, anchor, axis, displacement, rate, damping, limits, friction, "
-       "kinetic_friction, stribeck_speed, stiffness, rest_displacement, effort, got \"angle\""},
+       "contact, anchor, axis, displacement, rate, damping, limits, limit_restitution, friction, "
+       "kinetic_friction, stribeck_speed, motor, stiffness, rest_displacement, effort, got "
+       "\"angle\""},
       {"/joints/2/damping", "0",
        "/joints/2/damping: unknown key of a weld joint, expected one of name, type, bodies, "
        "contact, anchor, got \"damping\""},
       {"/joints/3/anchor", "[0, 0]",
        "/joints/3/anchor: unknown key of a distance joint, expected one of name, type, bodies, "
-       "contact, anchors, got \"anchor\""},
+       "contact, anchors, limits, limit_restitution, got \"anchor\""},
       {"/joints/4/anchor", "[0, 0]",
        "/joints/4/anchor: unknown key of a fixed_angle joint, expected one of name, type, bodies, "
        "contact, got \"anchor\""},
@@ -241,11 +243,44 @@ TEST(BadSceneTest, Joints) {
        "/joints/0/limits: expected [low, high] with low <= high, got [1.0, -1.0]"},
       {"/joints/0/limits", "[1]",
        "/joints/0/limits: expected an array of 2 numbers [low, high], got an array of 1"},
+      {"/joints/0/limits", "[null, null]",
+       "/joints/0/limits: expected a number at one side at least, got [null, null]"},
+      {"/joints/0/limits", kRemove,
+       "/joints/0/limits: missing, expected [low, high] with limit_restitution"},
+      {"/joints/0/limit_restitution", "1.5",
+       "/joints/0/limit_restitution: expected a number in [0, 1], got 1.5"},
+      {"/joints/0/motor", "3", "/joints/0/motor: expected an object, got 3"},
+      {"/joints/0/motor/limit", "-1", "/joints/0/motor/limit: expected a number >= 0, got -1"},
+      {"/joints/0/motor/limit", kRemove, "/joints/0/motor/limit: missing, expected a number >= 0"},
+      {"/joints/0/motor/torque", "1",
+       "/joints/0/motor/torque: unknown key of a motor, expected one of speed, limit, got "
+       "\"torque\""},
+      {"/joints/3/limits", "[-1, 20]", "/joints/3/limits/0: expected a number >= 0, got -1"},
       {"/joints/0/damping", "-1", "/joints/0/damping: expected a number >= 0, got -1"},
       {"/joints/0/contact", "0", "/joints/0/contact: expected true or false, got 0"},
       {"/joints/0/effort", "[1]",
        "/joints/0/effort: expected a number or {\"file\": ...}, got an array of 1"},
   });
+}
+
+// Ropes are measured where no joint starts turned.
+TEST(BadSceneTest, ARopeThatStartsBeyondItsLimits) {
+  const auto error_of = [](const std::string& limits) {
+    Scene scene;
+    std::string error;
+    ParseScene(R"({"bodies": [{"name": "m", "mass": 1, "inertia": 1, "position": [3, 4]}],
+        "joints": [{"name": "r", "type": "distance", "bodies": ["m", "world"],
+        "anchors": [[3, 4], [0, 0]], "limits": )" +
+                   limits + "}]}",
+               "bad.json", ::testing::TempDir(), &scene, &error);
+    return error;
+  };
+  const std::string beyond =
+      "bad.json: /joints/0/anchors: expected points whose distance is within the limits, got 5.0";
+  EXPECT_EQ(error_of("[0, 4.9]"), beyond);
+  EXPECT_EQ(error_of("[5.1, null]"), beyond);
+  EXPECT_EQ(error_of("[0, 4.999999999]"), "");  // taut, to rounding
+  EXPECT_EQ(error_of("[5, 5]"), "");
 }
 
 TEST(BadSceneTest, InitialAnglesThatNothingCanTurn) {

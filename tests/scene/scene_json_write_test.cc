@@ -47,6 +47,15 @@ TEST(SceneToJsonTest, AllThatWasReadIsWritten) {
   }
 }
 
+TEST(SceneToJsonTest, ALimitThatLimitsNothingIsNull) {
+  Json text = Json::parse(kFullScene);
+  text["joints"][3]["limits"] = {0.0, nullptr};
+  text["joints"][0]["limits"] = {nullptr, 1.0};
+  const Json after = Json::parse(SceneToJson(Parsed(text.dump())));
+  EXPECT_EQ(after["joints"][3]["limits"], Json::parse("[0.0, null]"));
+  EXPECT_EQ(after["joints"][0]["limits"], Json::parse("[null, 1.0]"));
+}
+
 TEST(SceneToJsonTest, RoundTripBitForBit) {
   Scene scene = Parsed(kFullScene);
   std::mt19937_64 random(3);

@@ -25,7 +25,8 @@ inline constexpr char kFullScene[] = R"({
   ],
   "joints": [
     {"name": "hinge", "type": "revolute", "bodies": ["ball", "world"], "anchor": [0, 2],
-     "angle": 0.1, "rate": -0.2, "damping": 0.3, "limits": [-1, 2], "effort": 0.4},
+     "angle": 0.1, "rate": -0.2, "damping": 0.3, "limits": [-1, 2], "effort": 0.4,
+     "limit_restitution": 0.25, "motor": {"speed": 1.5, "limit": 2}},
     {"name": "slider", "type": "prismatic", "bodies": ["rod", "ball"], "anchor": [1, 0],
      "axis": [3, 4], "displacement": 0.6, "rate": 0.7, "damping": 0.8, "limits": [-0.5, 0.5],
      "effort": 0.9, "contact": true},

@@ -68,6 +68,9 @@ void CoverForces(const Scene& scene, Coverage* coverage) {
     cover(joint.stiffness.has_value(), "spring of a joint");
     cover(joint.friction.has_value(), "friction in a joint");
     cover(joint.kinetic_friction.has_value(), "friction that decays");
+    cover(joint.motor.has_value(), "motor");
+    cover(joint.limit_restitution.has_value(), "restitution of a limit");
+    cover(joint.type == JointType::kDistance && joint.limits, "rope");
   }
   cover(!scene.springs.empty(), "spring");
   cover(scene.gravity.isZero(), "no gravity");

@@ -3,6 +3,7 @@
 // Springs, forces and pairs of random scenes.
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <string>
 
 #include "tangible/verification/support/random_scene_maker.h"
@@ -166,6 +167,31 @@ void SceneMaker::Mechanisms() {
         joint.kinetic_friction = *joint.friction * random.Uniform(0.2, 1.1);
         joint.stribeck_speed = std::pow(10.0, random.Uniform(-1.0, 1.0));
       }
+    }
+  }
+}
+
+void SceneMaker::Drives() {
+  if (seed_ % 4 != 2) {
+    return;
+  }
+  RandomNumbers random(0x6d6f746fULL + 0x9e3779b97f4a7c15ULL * seed_);
+  for (BasicJoint<double>& joint : scene_.joints) {
+    const bool has_coordinate =
+        joint.type == JointType::kRevolute || joint.type == JointType::kPrismatic;
+    if (has_coordinate && random.Chance(0.4)) {
+      joint.motor = {random.Chance(0.2) ? 0.0 : random.Uniform(-3.0, 3.0),
+                     random.Chance(0.1) ? 0.0 : std::pow(10.0, random.Uniform(-2.0, 1.0))};
+    }
+    if (joint.type == JointType::kDistance && random.Chance(0.6)) {
+      const double length = (joint.anchors[0] - joint.anchors[1]).norm();
+      joint.limits = {random.Chance(0.5) ? 0.0 : random.Uniform(0.5, 0.99) * length,
+                      random.Chance(0.2) ? length : random.Uniform(1.0, 1.05) * length};
+    }
+    if (joint.limits && random.Chance(0.6)) {
+      joint.limit_restitution = random.Uniform(0.0, 1.0);
+      constexpr double kInfinity = std::numeric_limits<double>::infinity();
+      if (random.Chance(0.2)) joint.limits->first = -kInfinity;
     }
   }
 }

@@ -77,6 +77,7 @@ Scene SceneMaker::Make() {
     }
   }
   Mechanisms();
+  Drives();
   Outlines();
   return scene_;
 }

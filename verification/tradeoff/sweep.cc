@@ -17,7 +17,7 @@ constexpr double kCoarseTolerance = 1e-6;
 // Whether a step may have complementarity rows.
 bool MayTouch(const ModelStructure& structure) {
   for (const JointIndex& joint : structure.joints) {
-    if (joint.low >= 0) return true;
+    if (joint.HasLimits()) return true;
   }
   for (int i = 0; i < structure.world(); ++i) {
     for (int j = i + 1; j < structure.world(); ++j) {

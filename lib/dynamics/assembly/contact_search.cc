@@ -78,7 +78,7 @@ void ContactSearch::SetBounds(const Model<double>& model, const State<double>& s
   }
   for (size_t j = 0; j < structure.joints.size(); ++j) {
     const JointIndex& joint = structure.joints[j];
-    if (joint.low >= 0) {
+    if (joint.HasLimits()) {
       limit_bound_[j] = std::max(CoordinateRate(joint, scratch.joints[j], state.twist.data()),
                                  CoordinateRate(joint, scratch.joints[j], free_twist_.data()));
     }
@@ -90,7 +90,7 @@ bool ContactSearch::CheckBounds(const Model<double>& model, const std::vector<do
   bool exceeded = false;
   for (size_t j = 0; j < model.structure->joints.size(); ++j) {
     const JointIndex& joint = model.structure->joints[j];
-    if (joint.low < 0) {
+    if (!joint.HasLimits()) {
       continue;
     }
     const double rate = CoordinateRate(joint, scratch.joints[j], twist.data());
@@ -109,7 +109,27 @@ bool ContactSearch::CheckBounds(const Model<double>& model, const std::vector<do
   return exceeded;
 }
 
-void ContactSearch::FindLimits(const Model<double>& model, double h,
+// Whether a contact that approaches faster than the threshold closes in the step, so that it
+// rebounds. In penetration the constant that separates the bodies faster is taken.
+bool ContactSearch::Rebounds(const Model<double>& model, const State<double>& state, double h,
+                             const ActiveContact& contact, const ContactRows<double>& rows) const {
+  const SimulationSettings& settings = model.structure->settings;
+  const double approach = RelativeSpeed(state, contact.a, rows.normal_a, contact.b, rows.normal_b);
+  double free_approach = 0.0;
+  for (int i = 0; i < 3; ++i) {
+    free_approach += rows.normal_a[i] * free_twist_[3 * contact.a + i] +
+                     rows.normal_b[i] * free_twist_[3 * contact.b + i];
+  }
+  if (!(approach < -settings.restitution_threshold) ||
+      !(contact.gap + h * free_approach < settings.contact_margin)) {
+    return false;
+  }
+  const double e = RestitutionOf(model, contact).value;
+  return e > 0.0 &&
+         (contact.gap >= 0.0 || e * approach < std::max(contact.gap / h, -settings.recovery_speed));
+}
+
+void ContactSearch::FindLimits(const Model<double>& model, const State<double>& state, double h,
                                const AssemblyScratch<double>& scratch,
                                std::vector<ActiveContact>* contacts) {
   const ModelStructure& structure = *model.structure;
@@ -121,6 +141,7 @@ void ContactSearch::FindLimits(const Model<double>& model, double h,
     limit.gap = rows.geometry.gap;
     if (limit.gap <= structure.settings.contact_margin + h * limit_bound_[limit.joint]) {
       limit.law = GapLaw(limit.gap, h, structure.settings);
+      if (Rebounds(model, state, h, limit, rows)) limit.law = ContactLaw::kRestitution;
       contacts->push_back(limit);
     }
   }
@@ -214,19 +235,7 @@ void ContactSearch::FindContacts(const Model<double>& model, const State<double>
         continue;
       }
     }
-    double free_approach = 0.0;
-    for (int i = 0; i < 3; ++i) {
-      free_approach +=
-          rows.normal_a[i] * free_twist_[3 * a + i] + rows.normal_b[i] * free_twist_[3 * b + i];
-    }
-    if (approach < -settings.restitution_threshold &&
-        gap + h * free_approach < settings.contact_margin) {
-      const double e = MixedRestitution(model, a, b).value;
-      // In penetration the constant that separates the bodies faster is taken.
-      if (e > 0.0 && (gap >= 0.0 || e * approach < std::max(gap / h, -settings.recovery_speed))) {
-        contact.law = ContactLaw::kRestitution;
-      }
-    }
+    if (Rebounds(model, state, h, contact, rows)) contact.law = ContactLaw::kRestitution;
     contacts->push_back(contact);
   }
 }
@@ -258,8 +267,11 @@ void ContactSearch::Find(const Model<double>& model, const State<double>& state,
     friction->resize(contacts->size(), MixedFriction(model, contact.a, contact.b));
     restitution->resize(contacts->size(), MixedRestitution(model, contact.a, contact.b));
   }
-  FindLimits(model, h, scratch, contacts);
+  FindLimits(model, state, h, scratch, contacts);
   friction->resize(contacts->size());
+  for (size_t i = restitution->size(); i < contacts->size(); ++i) {
+    restitution->push_back(RestitutionOf(model, (*contacts)[i]));
+  }
   AppendJointFriction(model, contacts);
   for (size_t i = friction->size(); i < contacts->size(); ++i) {
     friction->push_back(FrictionOf(model, (*contacts)[i]));

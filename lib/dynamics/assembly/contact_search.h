@@ -49,8 +49,10 @@ class ContactSearch {
   void FindContacts(const Model<double>& model, const State<double>& state, double h,
                     const AssemblyScratch<double>& scratch, ActiveContact contact, PartPair parts,
                     std::vector<ActiveContact>* contacts) const;
-  void FindLimits(const Model<double>& model, double h, const AssemblyScratch<double>& scratch,
-                  std::vector<ActiveContact>* contacts);
+  bool Rebounds(const Model<double>& model, const State<double>& state, double h,
+                const ActiveContact& contact, const ContactRows<double>& rows) const;
+  void FindLimits(const Model<double>& model, const State<double>& state, double h,
+                  const AssemblyScratch<double>& scratch, std::vector<ActiveContact>* contacts);
 
   Lengths lengths_;
   std::vector<double> bound_;          ///< m/s a body

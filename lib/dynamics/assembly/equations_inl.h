@@ -193,6 +193,7 @@ class Equations {
     if constexpr (kLevel == Level::kVelocity) {
       rates.normal = LawConstant(contact.law, rows.geometry.gap, at_.h, b_.Restitution(i),
                                  b_.Approach(contact, rows), s_.settings);
+      if (contact.is_motor) rates.tangent = rows.slide;
     } else if constexpr (kLevel == Level::kCorrection) {
       rates.normal = contact.law == ContactLaw::kRecovery ? T(-at_.recovery) : rows.geometry.gap;
     }
@@ -252,8 +253,9 @@ class Equations {
     if constexpr (!Builder::kKeepsJoints) {
       EvaluateRows(joint, &of_joint, &rates_of_joint);
     }
-    const T limit = contact.IsJointFriction() ? T(0.0) : b_.Number(LimitNumber(joint, contact));
-    EvaluateLimitRows(limit, of_joint, contact, rows);
+    const bool is_friction = contact.IsJointFriction() && !contact.is_motor;
+    const T number = is_friction ? T(0.0) : b_.Number(LimitNumber(joint, contact));
+    EvaluateLimitRows(number, of_joint, contact, rows);
     if constexpr (kLevel == Level::kAcceleration) {
       SetLimitRates(contact, rates_of_joint, rates);
     }

@@ -70,17 +70,16 @@ CoefficientSource FrictionOf(const Model<double>& model, const ActiveContact& co
   if (contact.joint < 0) {
     return MixedFriction(model, contact.a, contact.b);
   }
-  return contact.IsJointFriction() ? Own(model, model.structure->joints[contact.joint].friction)
-                                   : CoefficientSource();
+  const JointIndex& joint = model.structure->joints[contact.joint];
+  if (contact.is_motor) return Own(model, joint.motor + 1);
+  return contact.IsJointFriction() ? Own(model, joint.friction) : CoefficientSource();
 }
 
 void AppendLimits(const Model<double>& model, std::vector<ActiveContact>* contacts) {
   const std::vector<JointIndex>& joints = model.structure->joints;
   for (size_t j = 0; j < joints.size(); ++j) {
-    if (joints[j].low < 0) {
-      continue;
-    }
     for (const double side : {1.0, -1.0}) {
+      if ((side > 0.0 ? joints[j].low : joints[j].high) < 0) continue;
       ActiveContact& limit = contacts->emplace_back();
       limit.a = joints[j].a;
       limit.b = joints[j].b;
@@ -94,14 +93,23 @@ void AppendLimits(const Model<double>& model, std::vector<ActiveContact>* contac
 void AppendJointFriction(const Model<double>& model, std::vector<ActiveContact>* contacts) {
   const std::vector<JointIndex>& joints = model.structure->joints;
   for (size_t j = 0; j < joints.size(); ++j) {
-    if (joints[j].friction >= 0) {
+    for (const bool is_motor : {false, true}) {
+      if ((is_motor ? joints[j].motor : joints[j].friction) < 0) continue;
       ActiveContact& contact = contacts->emplace_back();
       contact.a = joints[j].a;
       contact.b = joints[j].b;
       contact.joint = static_cast<int>(j);
+      contact.is_motor = is_motor;
       contact.law = ContactLaw::kInelastic;
     }
   }
+}
+
+CoefficientSource RestitutionOf(const Model<double>& model, const ActiveContact& contact) {
+  if (contact.joint < 0) return MixedRestitution(model, contact.a, contact.b);
+  const int restitution = model.structure->joints[contact.joint].limit_restitution;
+  return restitution < 0 || contact.IsJointFriction() ? CoefficientSource()
+                                                      : Own(model, restitution);
 }
 
 CoefficientSource MixedRestitution(const Model<double>& model, int a, int b) {

@@ -38,13 +38,15 @@ struct ActiveContact {
   ContactFeature feature;
   int joint = -1;     ///< of a limit or friction in a joint
   double side = 0.0;  ///< of a limit: +1 low, −1 high; 0 of friction in a joint
+  /// Of the motor of a joint, which is friction about its speed (IsJointFriction holds).
+  bool is_motor = false;
   ContactLaw law = ContactLaw::kGap;
   double gap = 0.0;  ///< m (rad for the limit of an angle), at the step's start
   bool IsJointFriction() const { return joint >= 0 && side == 0.0; }
   /// Whether both contacts are between the same bodies, as those at the two ends of a face, or of
   /// the same joint.
   bool IsBetweenTheSame(const ActiveContact& other) const {
-    return a == other.a && b == other.b && joint == other.joint;
+    return a == other.a && b == other.b && joint == other.joint && is_motor == other.is_motor;
   }
   /// Whether both contacts are between the same two shapes.
   bool IsOfTheSameShapes(const ActiveContact& other) const {
@@ -55,7 +57,7 @@ struct ActiveContact {
   /// Whether contacts of two steps are the same.
   bool SameAs(const ActiveContact& other) const {
     return a == other.a && b == other.b && feature == other.feature && joint == other.joint &&
-           side == other.side;
+           side == other.side && is_motor == other.is_motor;
   }
 };
 
@@ -102,6 +104,9 @@ struct CoefficientSource {
 /// the derivative is 0).
 CoefficientSource MixedFriction(const Model<double>& model, int a, int b);
 CoefficientSource MixedRestitution(const Model<double>& model, int a, int b);
+/// The restitution of any active contact: mixed between shapes, or that of a joint's limits;
+/// friction has none.
+CoefficientSource RestitutionOf(const Model<double>& model, const ActiveContact& contact);
 /// The coefficient of any active contact: mixed between shapes, or that of a joint's friction; a
 /// limit has none.
 CoefficientSource FrictionOf(const Model<double>& model, const ActiveContact& contact);
@@ -109,7 +114,7 @@ CoefficientSource FrictionOf(const Model<double>& model, const ActiveContact& co
 /// Both limits of each joint that has limits, the low one first; gaps are not set.
 void AppendLimits(const Model<double>& model, std::vector<ActiveContact>* contacts);
 
-/// The friction of each joint that has friction, which is active at all times.
+/// The friction and motor of each joint that has them, which are active at all times.
 void AppendJointFriction(const Model<double>& model, std::vector<ActiveContact>* contacts);
 
 /// The coefficient as a T, by the chain rule.
@@ -130,6 +135,8 @@ template <typename T>
 struct ContactRows {
   ContactGeometry<T> geometry;
   RowPart<T> normal_a, normal_b, tangent_a, tangent_b;
+  /// Of a motor: minus the speed that it keeps. The sliding speed is t·v + slide.
+  T slide{0.0};
 };
 
 /// Rows of a contact of two shapes from its geometry, with the tangent t = (n_y, −n_x). The normal
@@ -164,6 +171,12 @@ T RelativeSpeed(const State<T>& state, int a, const RowPart<T>& row_a, int b,
   return speed;
 }
 
+/// The sliding speed of a contact, m/s; rad/s of a joint that turns.
+template <typename T>
+T SlipOf(const State<T>& state, const ActiveContact& contact, const ContactRows<T>& rows) {
+  return RelativeSpeed(state, contact.a, rows.tangent_a, contact.b, rows.tangent_b) + rows.slide;
+}
+
 /// The sign of the sliding speed of a contact; 0 where the speed is rounding of its terms.
 template <typename T>
 double SlipSign(const State<double>& state, const ActiveContact& contact,
@@ -176,6 +189,8 @@ double SlipSign(const State<double>& state, const ActiveContact& contact,
     slip += on_a + on_b;
     terms += std::abs(on_a) + std::abs(on_b);
   }
+  slip += ValueOf(rows.slide);
+  terms += std::abs(ValueOf(rows.slide));
   return std::abs(slip) <= kSlipRounding * terms ? 0.0 : slip > 0.0 ? 1.0 : -1.0;
 }
 
@@ -203,13 +218,14 @@ void EvaluateContactRows(const Model<T>& model, const std::vector<Pose<T>>& pose
 
 /// Evaluates a joint limit (the normal row is that of the coordinate times its side, the gap is
 /// side (coordinate − limit), and there is no tangent) or friction in a joint (the tangent row is
-/// that of the coordinate, there is no normal row, and the gap is 0). `limit` is not read for
-/// friction.
+/// that of the coordinate, there is no normal row, and the gap is 0). `number` is the limit, or the
+/// speed of a motor; it is not read for friction.
 template <typename T>
-void EvaluateLimitRows(const T& limit, const JointRows<T>& joint_rows, const ActiveContact& contact,
-                       ContactRows<T>* rows) {
+void EvaluateLimitRows(const T& number, const JointRows<T>& joint_rows,
+                       const ActiveContact& contact, ContactRows<T>* rows) {
   const bool slides = contact.IsJointFriction();
-  rows->geometry.gap = slides ? T(0.0) : T(contact.side * (joint_rows.coordinate - limit));
+  rows->geometry.gap = slides ? T(0.0) : T(contact.side * (joint_rows.coordinate - number));
+  rows->slide = contact.is_motor ? T(-number) : T(0.0);
   rows->geometry.normal = Vector2<T>(T(0.0), T(0.0));
   rows->geometry.point = Vector2<T>(T(0.0), T(0.0));
   for (int i = 0; i < 3; ++i) {
@@ -220,8 +236,10 @@ void EvaluateLimitRows(const T& limit, const JointRows<T>& joint_rows, const Act
   }
 }
 
-/// The parameter of the model that is the limit, or the friction, of a joint.
+/// The parameter of the model that EvaluateLimitRows reads: a limit, or the speed of a motor; of
+/// friction the friction itself.
 inline int LimitNumber(const JointIndex& joint, const ActiveContact& contact) {
+  if (contact.is_motor) return joint.motor;
   return contact.IsJointFriction() ? joint.friction : contact.side > 0.0 ? joint.low : joint.high;
 }
 
@@ -250,7 +268,7 @@ inline ContactSpeeds SpeedsOf(const Model<double>& model, const State<double>& s
   ContactRows<double> rows;
   EvaluateActiveRows(model, state, contact, &rows);
   return {RelativeSpeed(state, contact.a, rows.normal_a, contact.b, rows.normal_b),
-          RelativeSpeed(state, contact.a, rows.tangent_a, contact.b, rows.tangent_b)};
+          SlipOf(state, contact, rows)};
 }
 
 }  // namespace tangible

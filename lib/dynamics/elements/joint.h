@@ -9,8 +9,11 @@
 //   kDistance    C = |p_a − p_b| − L                            (1 row)
 //   kFixedAngle  C = θ_a − θ_b − θ0                             (1 row)
 //
+//   kRope        none                                           (0 rows)
+//
 // p: the anchors of each body. The coordinate of a revolute joint is θ_a − θ_b − θ0, of a prismatic
-// one u·(p_a − p_b); efforts, damping and limits act along its row. One file a type: joint_*_inl.h.
+// one u·(p_a − p_b), of a rope |p_a − p_b|; efforts, damping, friction, motors and limits act along
+// its row. One file a type: joint_*_inl.h.
 
 #include "tangible/dynamics/model/model.h"
 #include "tangible/lcp/system/contact_problem.h"
@@ -22,9 +25,14 @@ struct JointRows {
   int rows = 0;
   RowPart<T> row_a[3], row_b[3];
   T error[3];
-  RowPart<T> coordinate_a, coordinate_b;  ///< revolute and prismatic only
+  RowPart<T> coordinate_a, coordinate_b;  ///< where HasCoordinate
   T coordinate;                           ///< rad or m, 0 as drawn
 };
+
+/// Whether a joint has a coordinate, along which limits act.
+inline bool HasCoordinate(JointType type) {
+  return type == JointType::kRevolute || type == JointType::kPrismatic || type == JointType::kRope;
+}
 
 /// Evaluates a joint at two poses; `numbers` as JointIndex describes its geometry. A distance joint
 /// whose anchors coincide has the row (1, 0), its derivative 0.

@@ -88,6 +88,7 @@ void EvaluateJointCurvature(JointType type, const Pose<T>& pose_a, const Pose<T>
       break;
     }
     case JointType::kFixedAngle:
+    case JointType::kRope:
       break;
   }
 }

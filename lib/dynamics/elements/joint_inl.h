@@ -29,6 +29,9 @@ void EvaluateJoint(JointType type, const Pose<T>& pose_a, const Pose<T>& pose_b,
     case JointType::kDistance:
       EvaluateDistance(pose_a, pose_b, numbers, out);
       break;
+    case JointType::kRope:
+      EvaluateRope(pose_a, pose_b, numbers, out);
+      break;
     case JointType::kFixedAngle:
       EvaluateAngleRow(pose_a, pose_b, numbers[0], 0, out);
       out->rows = 1;

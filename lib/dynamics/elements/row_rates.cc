@@ -63,7 +63,7 @@ void EvaluateJointRates(JointType type, const MovingPose<T>& a, const MovingPose
                     SplitRow(dual.row_b[k], b.twist, &rows->row_b[k]);
     rows->error[k] = dual.error[k].a;
   }
-  if (type == JointType::kRevolute || type == JointType::kPrismatic) {
+  if (HasCoordinate(type)) {
     rates->coordinate = SplitRow(dual.coordinate_a, a.twist, &rows->coordinate_a) +
                         SplitRow(dual.coordinate_b, b.twist, &rows->coordinate_b);
     rows->coordinate = dual.coordinate.a;

@@ -33,6 +33,9 @@ class GradientVisitor : private internal::LocalEntries<EntryListSink> {
       JointRows<LocalJet> rows;
       LocalJointRows(s_.joints[contact.joint], &locals, &rows);
       Speed(contact, locals, rows.coordinate_a, rows.coordinate_b);
+      if (contact.is_motor) {
+        sink_(0, s_.ParameterVariable(s_.joints[contact.joint].motor), -1.0);
+      }
       return;
     }
     ContactRows<LocalJet> rows;

@@ -86,9 +86,9 @@ class Lengths {
   double Touch(const State<double>& state, int a, int b) const {
     return kTouchShare * Size(a, b) + Rounding(state, a, b);
   }
-  /// Distance below which a joint is at its limit, rad or (of a prismatic one) m.
+  /// Distance below which a joint is at its limit, rad, or m where it is a length.
   double LimitTouch(const State<double>& state, const JointIndex& joint) const {
-    return joint.type == JointType::kPrismatic
+    return joint.type != JointType::kRevolute
                ? Touch(state, joint.a, joint.b)
                : kTouchAngle + kCoordinateRounding * AngleOf(state, joint.a, joint.b);
   }

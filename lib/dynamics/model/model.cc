@@ -31,6 +31,8 @@ int NumRows(JointType type) {
     case JointType::kDistance:
     case JointType::kFixedAngle:
       return 1;
+    case JointType::kRope:
+      return 0;
     default:
       return 2;
   }
@@ -88,28 +90,38 @@ void AddBodies(const BasicScene<T>& scene, Places* places, ModelStructure* struc
   structure->bodies.push_back(world);
 }
 
+// Whether a limit can be reached. The distance of a rope's ends is never below 0, and at 0 it has
+// no direction.
+template <typename T>
+bool Limits(const BasicJoint<T>& joint, const T& limit) {
+  const bool is_idle = joint.type == JointType::kDistance && ValueOf(limit) == 0.0;
+  return std::isfinite(ValueOf(limit)) && !is_idle;
+}
+
 template <typename T>
 void AddJoints(const BasicScene<T>& scene, Places* places, ModelStructure* structure) {
   const int world = structure->world();
   for (const BasicJoint<T>& joint : scene.joints) {
     JointIndex index;
     index.name = joint.name;
-    index.type = joint.type;
+    index.type = joint.type == JointType::kDistance && joint.limits ? JointType::kRope : joint.type;
     index.a = joint.bodies[0] < 0 ? world : joint.bodies[0];
     index.b = joint.bodies[1] < 0 ? world : joint.bodies[1];
-    index.rows = NumRows(joint.type);
-    index.num_geometry = NumGeometryNumbers(joint.type);
+    index.rows = NumRows(index.type);
+    index.num_geometry = NumGeometryNumbers(index.type);
     index.geometry = places->Take(index.num_geometry);
     if (joint.type == JointType::kRevolute || joint.type == JointType::kPrismatic) {
       index.damping = places->Take(1);
       index.effort = places->Take(1);
-      if (joint.limits) {
-        index.low = places->Take(1);
-        index.high = places->Take(1);
-      }
       index.stiffness = joint.stiffness ? places->Take(2) : -1;
       index.has_decay = joint.friction && joint.kinetic_friction;
       index.friction = joint.friction ? places->Take(index.has_decay ? 3 : 1) : -1;
+      index.motor = joint.motor ? places->Take(2) : -1;
+    }
+    if (joint.limits) {
+      index.low = Limits(joint, joint.limits->first) ? places->Take(1) : -1;
+      index.high = Limits(joint, joint.limits->second) ? places->Take(1) : -1;
+      index.limit_restitution = joint.limit_restitution ? places->Take(1) : -1;
     }
     if (joint.effort_signal) {
       index.effort_signal = static_cast<int>(structure->signals.size());
@@ -127,7 +139,7 @@ void AddJoints(const BasicScene<T>& scene, Places* places, ModelStructure* struc
   nodes.AddAll(structure->bodies.size());
   const auto node = [&](int body) { return structure->bodies[body].block >= 0 ? body : world; };
   for (const JointIndex& joint : structure->joints) {
-    if (!nodes.Join(node(joint.a), node(joint.b))) structure->joint_loops = true;
+    if (joint.rows > 0 && !nodes.Join(node(joint.a), node(joint.b))) structure->joint_loops = true;
   }
 }
 
@@ -222,7 +234,9 @@ void FillJoints(const BasicScene<T>& scene, const State<T>& drawn, int world,
       const T length = sqrt(joint.axis.squaredNorm());
       Append(Vector2<T>(pose_b.rotation.Inverse(joint.axis) / length), numbers);
     }
-    if (joint.type == JointType::kDistance) {
+    if (joint.type == JointType::kDistance && joint.limits) {
+      numbers->push_back(T(0.0));  // no distance to keep
+    } else if (joint.type == JointType::kDistance) {
       numbers->push_back(sqrt((joint.anchors[0] - joint.anchors[1]).squaredNorm()));
     } else {
       numbers->push_back(pose_a.angle - pose_b.angle);
@@ -230,10 +244,6 @@ void FillJoints(const BasicScene<T>& scene, const State<T>& drawn, int world,
     if (joint.type == JointType::kRevolute || joint.type == JointType::kPrismatic) {
       numbers->push_back(joint.damping);
       numbers->push_back(joint.effort);
-      if (joint.limits) {
-        numbers->push_back(joint.limits->first);
-        numbers->push_back(joint.limits->second);
-      }
       if (joint.stiffness) {
         numbers->push_back(*joint.stiffness);
         numbers->push_back(joint.rest);
@@ -245,6 +255,15 @@ void FillJoints(const BasicScene<T>& scene, const State<T>& drawn, int world,
           numbers->push_back(joint.stribeck_speed);
         }
       }
+      if (joint.motor) {
+        numbers->push_back(joint.motor->speed);
+        numbers->push_back(joint.motor->limit);
+      }
+    }
+    if (joint.limits) {
+      if (Limits(joint, joint.limits->first)) numbers->push_back(joint.limits->first);
+      if (Limits(joint, joint.limits->second)) numbers->push_back(joint.limits->second);
+      if (joint.limit_restitution) numbers->push_back(*joint.limit_restitution);
     }
   }
 }

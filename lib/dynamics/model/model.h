@@ -60,7 +60,7 @@ struct PartPair {
 /// Places of a joint's parameters. Geometry, by type, from `geometry` on:
 ///   kRevolute, kWeld  anchor in a's frame (2), in b's frame (2), angle as drawn
 ///   kPrismatic        anchor in a's frame (2), in b's (2), unit axis in b's (2), angle
-///   kDistance         anchor in a's frame (2), in b's frame (2), length
+///   kDistance, kRope  anchor in a's frame (2), in b's frame (2), length
 ///   kFixedAngle       angle as drawn
 /// The angle as drawn is angle_a − angle_b at time 0, before the joint's initial angle is applied.
 struct JointIndex {
@@ -70,13 +70,17 @@ struct JointIndex {
   int rows = 0;
   int geometry = -1;
   int num_geometry = 0;
-  int damping = -1, effort = -1, low = -1, high = -1;  ///< −1: none of this type, or no limits
-  int stiffness = -1;  ///< then the coordinate at rest; −1: no spring
+  int damping = -1, effort = -1;  ///< −1: none of this type
+  int low = -1, high = -1;        ///< −1: not limited on that side
+  int limit_restitution = -1;     ///< −1: 0
+  int motor = -1;                 ///< its speed, then its limit; −1: none
+  int stiffness = -1;             ///< then the coordinate at rest; −1: no spring
   /// The force or torque at which it slides; −1: none. With Stribeck's decay the kinetic friction
   /// and Stribeck's speed follow.
   int friction = -1;
   bool has_decay = false;
   int effort_signal = -1;  ///< into signals; replaces effort
+  bool HasLimits() const { return low >= 0 || high >= 0; }
 };
 
 /// Local anchors (2 + 2), stiffness, damping, rest length: seven parameters from `numbers` on.

@@ -85,6 +85,8 @@ class PartTaker {
       TakeOne(&index.effort);
       TakeOne(&index.low);
       TakeOne(&index.high);
+      TakeOne(&index.limit_restitution);
+      TakeNumbers(2, &index.motor);
       TakeNumbers(2, &index.stiffness);
       TakeNumbers(index.has_decay ? 3 : 1, &index.friction);
       TakeSignal(&index.effort_signal);

@@ -26,7 +26,8 @@ constexpr size_t kRankEachStep = 150;
 
 std::string ContactName(const ModelStructure& structure, const ActiveContact& contact) {
   if (contact.IsJointFriction()) {
-    return "friction in joint " + structure.joints[contact.joint].name;
+    return (contact.is_motor ? "motor of joint " : "friction in joint ") +
+           structure.joints[contact.joint].name;
   }
   if (contact.joint >= 0) {
     return std::string(contact.side > 0.0 ? "low" : "high") + " limit of joint " +

@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "tangible/dynamics/jacobian/contact_gradient.h"
+#include "tangible/dynamics/model/lengths.h"
 #include "tangible/lcp/system/contact_conditioning.h"
 #include "tangible/simulation/certificate/certify_grazing.h"
 #include "tangible/simulation/certificate/certify_place_inl.h"
@@ -34,6 +35,17 @@ bool EndsInMeeting(const Model<double>& model, const Segment& segment) {
   }
   const double speed = SpeedsOf(model, segment.after, contact).normal;
   return speed < -Negligible(model, speed);
+}
+
+// Whether a contact begins in penetration, because another feature of a body that is being moved out
+// of penetration becomes the nearest: its gap has not passed through 0, and does not tell when.
+bool BeginsInPenetration(const Model<double>& model, const Segment& segment) {
+  const ActiveContact& contact = segment.event_contact;
+  if (segment.event != EventKind::kTouch || contact.joint >= 0) return false;
+  ContactRows<double> rows;
+  EvaluateContactRows(model, segment.after, contact, &rows);
+  const double size = std::max(RadiusOf(model, contact.a), RadiusOf(model, contact.b));
+  return rows.geometry.gap < -kBegunDepth * size;
 }
 
 double SlipOf(const Model<double>& model, const State<double>& state,
@@ -144,6 +156,9 @@ void RolloutCertifier::AddEventOf(const Model<double>& model, long step,
     if (EndsInMeeting(model, *segment) &&
         MeetsACorner(model, segment->after, segment->event_contact)) {
       AddJump(0.0, place, "a corner meets a corner");
+    }
+    if (BeginsInPenetration(model, *segment)) {
+      AddJump(0.0, place, "another feature becomes the nearest in penetration");
     }
   }
 }

@@ -6,6 +6,9 @@
 
 namespace tangible {
 
+/// Of the size of the larger body: a contact that begins with a deeper penetration has not closed,
+/// but has become the nearest of several. Gaps that close are located to 1e-10 of the body.
+inline constexpr double kBegunDepth = 1e-7;
 /// Of the margin's own scale: relative distances to a jump below it make the verdict
 /// `discontinuous`.
 inline constexpr double kNearJumpMargin = 1e-6;

@@ -247,9 +247,10 @@ std::string NameOfContact(const ModelStructure& structure,
     return "joints";
   }
   const ActiveContact& contact = contacts[index];
-  return contact.IsJointFriction() ? "friction in joint " + structure.joints[contact.joint].name
-         : contact.joint >= 0      ? "limit of joint " + structure.joints[contact.joint].name
-                                   : "contact of " + structure.bodies[contact.a].name + " and " +
+  return contact.is_motor            ? "motor of joint " + structure.joints[contact.joint].name
+         : contact.IsJointFriction() ? "friction in joint " + structure.joints[contact.joint].name
+         : contact.joint >= 0        ? "limit of joint " + structure.joints[contact.joint].name
+                                     : "contact of " + structure.bodies[contact.a].name + " and " +
                                     structure.bodies[contact.b].name;
 }
 

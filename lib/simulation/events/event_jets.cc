@@ -206,7 +206,7 @@ class EventReplay {
     return segment->event == EventKind::kTouch ? rows.geometry.gap
            : segment->event == EventKind::kReturn
                ? RelativeSpeed(after, contact.a, rows.normal_a, contact.b, rows.normal_b)
-               : RelativeSpeed(after, contact.a, rows.tangent_a, contact.b, rows.tangent_b);
+               : SlipOf(after, contact, rows);
   }
 
   // The rate at which the event's equation changes with the segment's length, and the sum of the

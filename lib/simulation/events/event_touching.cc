@@ -21,8 +21,7 @@ void EventStepper::AddTouching(const Model<double>& model, const State<double>& 
   const ContactSpeeds speeds = SpeedsOf(model, state, contact);
   touching_.contacts.push_back(contact);
   touching_.friction.push_back(FrictionOf(model, contact));
-  touching_.restitution.push_back(contact.joint < 0 ? MixedRestitution(model, contact.a, contact.b)
-                                                    : CoefficientSource());
+  touching_.restitution.push_back(RestitutionOf(model, contact));
   touching_.approach.push_back(speeds.normal);
   touching_.slip.push_back(speeds.slip);
 }

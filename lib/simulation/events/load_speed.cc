@@ -105,7 +105,8 @@ class LoadScan {
                     &model_.parameters[joint.geometry], &rows);
       acts += std::abs(Number(joint.stiffness) * (rows.coordinate - Number(joint.stiffness + 1)));
     }
-    const double friction = joint.friction >= 0 ? Number(joint.friction) : 0.0;
+    const double friction = (joint.friction >= 0 ? Number(joint.friction) : 0.0) +
+                            (joint.motor >= 0 ? Number(joint.motor + 1) : 0.0);
     const bool slides = joint.type == JointType::kPrismatic;
     for (const int body : {joint.a, joint.b}) {
       Add(body, slides ? acts : 0.0, slides ? 0.0 : acts);

@@ -25,6 +25,7 @@ bool IsDriven(const Model<double>& model, const State<double>& state) {
     return true;
   }
   for (const JointIndex& joint : s.joints) {
+    if (joint.motor >= 0 && model.parameters[joint.motor] != 0.0) return true;
     if (joint.effort_signal >= 0 || (joint.effort >= 0 && model.parameters[joint.effort] != 0.0)) {
       return true;
     }

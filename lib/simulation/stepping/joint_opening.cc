@@ -41,6 +41,8 @@ JointError ErrorOf(JointType type, const JointRows<double>& rows) {
       return {std::abs(c[0]), 0.0};
     case JointType::kFixedAngle:
       return {0.0, std::abs(c[0])};
+    case JointType::kRope:
+      break;
   }
   return {};
 }

@@ -38,7 +38,7 @@ void FullTwist(const ModelStructure& structure, const State<double>& state,
 double ImpulseWork(const StepRecord& r) {
   double work = 0.0;
   for (size_t i = 0; i < r.contacts.size(); ++i) {
-    if (r.solution.modes[i] == ContactMode::kOpen) {
+    if (r.solution.modes[i] == ContactMode::kOpen || r.contacts[i].is_motor) {
       continue;
     }
     const ContactBlock<double>& c = r.problem.contacts[i];

@@ -1,0 +1,222 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Motors of joints, ropes, and limits with restitution, against closed forms.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "../../support/gradients.h"
+#include "../../support/scenes.h"
+#include "tangible/simulation/stepping/rollout.h"
+
+namespace tangible {
+namespace {
+
+using test_scenes::SceneOf;
+using testing::ExpectOthersAgree;
+using testing::Jacobian;
+
+constexpr double kGravity = 9.81;
+
+std::string Tail(const std::string& stepping, double dt, double duration) {
+  return R"(, "simulation": {"stepping": ")" + stepping + R"(", "dt": )" + std::to_string(dt) +
+         R"(, "duration": )" + std::to_string(duration) + "}}";
+}
+
+// A wheel of inertia 0.5 that turns at −1 rad/s.
+Scene Wheel(const std::string& of_joint, const std::string& stepping, double dt = 0.01) {
+  return SceneOf(R"({"bodies": [{"name": "w", "mass": 2, "inertia": 0.5,
+      "shape": {"circle": {"radius": 0.3}}, "position": [0, 0], "angular_velocity": -1}],
+      "joints": [{"name": "h", "type": "revolute", "bodies": ["w", "world"], "anchor": [0, 0], )" +
+                 of_joint + "}]" + Tail(stepping, dt, 1.0));
+}
+
+// The speed grows at L / I to w, which it reaches at t = (w + 1) I / L, and stays there.
+TEST(MotorTest, AWheelReachesItsSpeedAndKeepsIt) {
+  // (5 + 1) / (4 / 0.5) = 0.75 s is the end of a step, 6 / (3.7 / 0.5) is not.
+  for (const double limit : {4.0, 3.7}) {
+    const double w = 5.0;
+    const Scene scene =
+        Wheel(R"("motor": {"speed": 5, "limit": )" + std::to_string(limit) + "}", "event");
+    const std::vector<std::string> paths = {"joints/h/motor/speed", "joints/h/motor/limit",
+                                            "bodies/w/inertia", "bodies/w/angular_velocity"};
+    const GradientResult result = Jacobian(scene, paths, GradientMethod::kAdjoint);
+    const double slope = limit / 0.5;
+    const double t = (w + 1.0) / slope;
+    // θ(1) = w − (w + 1)² / (2 L / I).
+    EXPECT_NEAR(result.values[2], w - 0.5 * (w + 1.0) * t, 1e-10);
+    EXPECT_NEAR(result.values[5], w, 1e-12);
+    EXPECT_NEAR(result.jacobian(2, 0), 1.0 - t, 1e-8);
+    EXPECT_NEAR(result.jacobian(2, 1), 0.5 * (w + 1.0) * t / limit, 1e-8);
+    EXPECT_NEAR(result.jacobian(2, 2), -0.5 * (w + 1.0) * t / 0.5, 1e-8);
+    EXPECT_NEAR(result.jacobian(2, 3), t, 1e-8);
+    EXPECT_EQ(result.certificate.verdict, "trustworthy");
+    ExpectOthersAgree(scene, paths, result);
+  }
+}
+
+TEST(MotorTest, FixedStepsReachTheSpeedToo) {
+  const Scene scene = Wheel(R"("motor": {"speed": 5, "limit": 3.7})", "fixed");
+  const std::vector<std::string> paths = {"joints/h/motor/speed", "joints/h/motor/limit",
+                                          "bodies/w/inertia", "bodies/w/angular_velocity"};
+  const GradientResult result = Jacobian(scene, paths, GradientMethod::kAdjoint);
+  EXPECT_NEAR(result.values[5], 5.0, 1e-12);
+  EXPECT_NEAR(result.values[2], 5.0 - 0.5 * 36.0 / 7.4, 0.05);  // first order in dt
+  EXPECT_NEAR(result.jacobian(5, 0), 1.0, 1e-12);
+  ExpectOthersAgree(scene, paths, result);
+}
+
+// Against friction the motor has what is left; a brake is a motor of speed 0.
+TEST(MotorTest, ActsBesideFriction) {
+  for (const char* stepping : {"event", "fixed"}) {
+    const bool exact = stepping[0] == 'e';
+    const std::vector<std::string> paths = {"joints/h/friction", "joints/h/motor/limit"};
+    const Scene drives = Wheel(R"("friction": 0.8, "motor": {"speed": 5, "limit": 3})", stepping);
+    const GradientResult result = Jacobian(drives, paths, GradientMethod::kAdjoint);
+    // Both slow the wheel from −1 rad/s at 7.6 rad/s²; then 4.4 rad/s² are left.
+    EXPECT_NEAR(result.values[5], 4.4 * (1.0 - 1.0 / 7.6), exact ? 1e-10 : 0.05);
+    ExpectOthersAgree(drives, paths, result);
+    const Scene brakes = Wheel(R"("friction": 0.8, "motor": {"speed": 0, "limit": 3})", stepping);
+    const GradientResult stopped = Jacobian(brakes, paths, GradientMethod::kAdjoint);
+    EXPECT_NEAR(stopped.values[5], 0.0, 1e-12);
+    EXPECT_NEAR(stopped.values[2], -0.5 / 7.6, exact ? 1e-10 : 0.01);
+    for (int column = 0; exact && column < 2; ++column) {
+      EXPECT_NEAR(stopped.jacobian(2, column), 0.5 / 7.6 / 3.8, 1e-8);
+    }
+    ExpectOthersAgree(brakes, paths, stopped);
+  }
+}
+
+// A brake and friction share a load that neither holds alone, and give way to one that both
+// together do not hold.
+TEST(MotorTest, ABrakeAndFrictionHoldALoadTogether) {
+  for (const char* stepping : {"event", "fixed"}) {
+    for (const double effort : {3.5, -3.7, 4.2}) {
+      Scene scene = Wheel(R"("friction": 0.8, "motor": {"speed": 0, "limit": 3}, "effort": )" +
+                              std::to_string(effort),
+                          stepping);
+      scene.bodies[0].angular_velocity = 0.0;
+      Model<double> model;
+      State<double> state;
+      BuildModel(scene, &model, &state);
+      const RolloutReport report = Rollout(model, state, {}, &state);
+      EXPECT_EQ(report.message, "");
+      const double left = std::max(0.0, std::abs(effort) - 3.8) / 0.5;
+      EXPECT_NEAR(state.twist[2], left, 1e-10) << stepping << " " << effort;
+    }
+  }
+}
+
+// A slider that a motor lifts, or that falls because the motor is too weak.
+TEST(MotorTest, LiftsALoad) {
+  for (const double limit : {30.0, 15.0}) {
+    const Scene scene = SceneOf(R"({"bodies": [{"name": "c", "mass": 2,
+        "shape": {"box": {"size": [0.2, 0.2]}}, "position": [0, 0]}],
+        "joints": [{"name": "rail", "type": "prismatic", "bodies": ["c", "world"],
+        "anchor": [0, 0], "axis": [0, 1], "motor": {"speed": 0.5, "limit": )" +
+                                std::to_string(limit) + "}}]" + Tail("event", 0.01, 1.0));
+    const std::vector<std::string> paths = {"joints/rail/motor/speed", "joints/rail/motor/limit",
+                                            "bodies/c/mass"};
+    const GradientResult result = Jacobian(scene, paths, GradientMethod::kAdjoint);
+    const double a = limit / 2.0 - kGravity;
+    const double t = std::min(1.0, a > 0.0 ? 0.5 / a : 1.0);
+    EXPECT_NEAR(result.values[1], 0.5 * a * t * t + a * t * (1.0 - t), 1e-10);
+    EXPECT_NEAR(result.values[4], a * t, 1e-10);
+    ExpectOthersAgree(scene, paths, result);
+  }
+}
+
+Scene Rope(const std::string& limits, const std::string& start, const std::string& stepping,
+           double dt, double duration) {
+  return SceneOf(R"({"bodies": [{"name": "m", "mass": 2, "inertia": 0.5, )" + start +
+                 R"(}], "joints": [{"name": "r", "type": "distance", "bodies": ["m", "world"],
+      "anchors": [[0, 0], [0, 0]], )" +
+                 limits + "}]" + Tail(stepping, dt, duration));
+}
+
+// From where both ends meet the mass falls to the rope's length and rebounds.
+TEST(RopeTest, AFallIsCaught) {
+  const double length = 0.8;
+  const double e = 0.5;
+  const double duration = 0.7;
+  const Scene scene = Rope(R"("limits": [0, 0.8], "limit_restitution": 0.5)",
+                           R"("position": [0, 0])", "event", 0.01, duration);
+  const std::vector<std::string> paths = {"joints/r/limits/1", "joints/r/limit_restitution",
+                                          "joints/r/limits/0", "gravity/y"};
+  const GradientResult result = Jacobian(scene, paths, GradientMethod::kAdjoint);
+  const double v = std::sqrt(2.0 * kGravity * length);
+  const double t = duration - v / kGravity;
+  EXPECT_NEAR(result.values[1], -length + e * v * t - 0.5 * kGravity * t * t, 1e-10);
+  EXPECT_NEAR(result.values[4], e * v - kGravity * t, 1e-10);
+  // dv/dL = g / v, dt/dL = −1 / v.
+  EXPECT_NEAR(result.jacobian(1, 0), -1.0 + e * (kGravity / v * t - 1.0) + kGravity * t / v, 1e-7);
+  EXPECT_NEAR(result.jacobian(1, 1), v * t, 1e-8);
+  EXPECT_NEAR(result.jacobian(1, 2), 0.0, 0.0);
+  EXPECT_EQ(result.certificate.verdict, "trustworthy");
+  ExpectOthersAgree(scene, {paths[0], paths[1], paths[3]},
+                    Jacobian(scene, {paths[0], paths[1], paths[3]}, GradientMethod::kAdjoint));
+}
+
+// Thrown upwards it is slack until it is taut; without restitution only the speed across the rope
+// is left, and the motion goes on as that of a pendulum, whose energy is kept.
+TEST(RopeTest, APendulumGoesSlackAndTaut) {
+  const Scene scene = SceneOf(R"({"bodies": [{"name": "m", "mass": 2, "inertia": 0.5,
+      "position": [0.5, 0]}], "joints": [{"name": "r", "type": "distance",
+      "bodies": ["m", "world"], "anchors": [[0.5, 0], [0, 0]], "limits": [null, 0.8]}])" +
+                              Tail("event", 0.01, 1.0));
+  const std::vector<std::string> paths = {"joints/r/limits/1", "gravity/y", "bodies/m/velocity/x"};
+  const GradientResult result = Jacobian(scene, paths, GradientMethod::kAdjoint);
+  // It falls to y = −√(0.8² − 0.5²) with v² = 2 g |y|, of which the share (0.5 / 0.8)² is left.
+  const double y = -std::sqrt(0.8 * 0.8 - 0.5 * 0.5);
+  const double energy = kGravity * y - kGravity * y * 0.5 * 0.5 / (0.8 * 0.8);
+  const auto& x = result.values;
+  EXPECT_NEAR(std::hypot(x[0], x[1]), 0.8, 1e-9);
+  EXPECT_NEAR(0.5 * (x[3] * x[3] + x[4] * x[4]) + kGravity * x[1], energy, 1e-6);
+  ExpectOthersAgree(scene, paths, result);
+}
+
+// Both ends move: the centre of mass of two balls on a rope flies on, and they turn about it.
+TEST(RopeTest, TwoBallsOnARope) {
+  for (const char* stepping : {"event", "fixed"}) {
+    const Scene scene = SceneOf(R"({"gravity": [0, 0], "bodies": [
+        {"name": "a", "mass": 1, "shape": {"circle": {"radius": 0.05}}, "position": [0, 0],
+         "velocity": [-1, 0.3]},
+        {"name": "b", "mass": 3, "shape": {"circle": {"radius": 0.05}}, "position": [0.4, 0],
+         "velocity": [1, -0.2]}],
+        "joints": [{"name": "r", "type": "distance", "bodies": ["a", "b"],
+        "anchors": [[0, 0], [0.4, 0]], "limits": [0, 0.57], "limit_restitution": 0.6}])" +
+                                Tail(stepping, 0.01, 0.5));
+    const std::vector<std::string> paths = {"joints/r/limits/1", "joints/r/limit_restitution",
+                                            "bodies/a/mass", "bodies/b/velocity/y"};
+    const GradientResult result = Jacobian(scene, paths, GradientMethod::kAdjoint);
+    const auto& x = result.values;
+    EXPECT_NEAR(0.25 * x[0] + 0.75 * x[6], 0.3 + 0.5 * 0.5, 1e-10);
+    EXPECT_NEAR(0.25 * x[3] + 0.75 * x[9], 0.5, 1e-12);
+    ExpectOthersAgree(scene, paths, result);
+  }
+}
+
+// A rod that swings against stops and rebounds; a stop at one side only.
+TEST(LimitTest, RestitutionOfAStop) {
+  for (const char* limits : {"[-0.5, 0.5]", "[null, 0.5]"}) {
+    const Scene scene = SceneOf(R"({"gravity": [0, 0], "bodies": [{"name": "rod", "mass": 1,
+        "shape": {"box": {"size": [0.1, 1]}}, "position": [0, -0.5]}],
+        "joints": [{"name": "h", "type": "revolute", "bodies": ["rod", "world"],
+        "anchor": [0, 0], "rate": 2, "limit_restitution": 0.4, "limits": )" +
+                                std::string(limits) + "}]" + Tail("event", 0.01, 1.0));
+    const std::vector<std::string> paths = {"joints/h/limits/1", "joints/h/limit_restitution",
+                                            "joints/h/rate"};
+    const GradientResult result = Jacobian(scene, paths, GradientMethod::kAdjoint);
+    // 0.25 s to the stop, then back at 0.8 rad/s.
+    EXPECT_NEAR(result.values[2], 0.5 - 0.8 * 0.75, 1e-9);
+    EXPECT_NEAR(result.jacobian(2, 0), 1.0 + 0.8 / 2.0, 1e-7);
+    EXPECT_NEAR(result.jacobian(2, 1), -2.0 * 0.75, 1e-7);
+    EXPECT_NEAR(result.jacobian(2, 2), -0.4 * 0.75 - 0.8 * 0.25 / 2.0, 1e-7);
+    ExpectOthersAgree(scene, paths, result);
+  }
+}
+
+}  // namespace
+}  // namespace tangible
