@@ -29,6 +29,8 @@ ViewJoint MakeJoint(const Model<double>& model, const JointIndex& joint) {
   if (joint.type == JointType::kPrismatic) {
     view.axis = PointAt(model, joint.geometry + 4);
   }
+  if (joint.type == JointType::kRope && joint.high >= 0) view.rope = model.parameters[joint.high];
+  view.has_motor = joint.motor >= 0;
   return view;
 }
 

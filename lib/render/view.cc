@@ -48,8 +48,9 @@ const char* Name(JointType type) {
     case JointType::kWeld:
       return "weld";
     case JointType::kDistance:
-    case JointType::kRope:
       return "distance";
+    case JointType::kRope:
+      return "rope";
     case JointType::kFixedAngle:
       return "fixed_angle";
     default:
@@ -168,6 +169,14 @@ void WriteLinks(const ViewData& data, JsonWriter* json) {
     json->Text(Name(joint.type));
     json->Key("axis");
     WriteVector(joint.axis, json);
+    if (joint.rope > 0.0) {
+      json->Key("rope");
+      json->Number(joint.rope);
+    }
+    if (joint.has_motor) {
+      json->Key("motor");
+      json->Number(1.0);
+    }
     json->Close('}');
   }
   json->Close(']');

@@ -32,6 +32,8 @@ struct ViewJoint {
   int bodies[2] = {-1, -1};
   Vector2<double> anchors[2] = {Vector2<double>::Zero(), Vector2<double>::Zero()};
   Vector2<double> axis = Vector2<double>::UnitX();  ///< prismatic: in the frame of bodies[1]
+  double rope = 0.0;  ///< m, the greatest distance of a rope's ends; 0: no bound
+  bool has_motor = false;
 };
 
 /// A spring; anchors as in ViewJoint.

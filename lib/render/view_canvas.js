@@ -254,16 +254,25 @@ function drawJoint(g, joint, k) {
   if (joint.type === "revolute") {
     if (joint.bodies.some((body) => body < 0)) drawGround(g, a);
     disc(g, a, 3.6); g.fillStyle = colours.panel; g.fill(); g.stroke();
+    if (joint.motor) { disc(g, a, 7); g.stroke(); }
   } else if (joint.type === "weld") {
     g.fillRect(a[0] - 4, a[1] - 4, 8, 8);
   } else if (joint.type === "distance") {
     line(g, a, b);
     for (const p of [a, b]) { disc(g, p, 3); g.fill(); }
+  } else if (joint.type === "rope") {
+    // A slack rope hangs below the line between its ends by about what its length leaves.
+    const d = Math.hypot(b[0] - a[0], b[1] - a[1]), length = (joint.rope || 0) * camera.scale;
+    const sag = length > d ? 0.85 * Math.sqrt(length * length - d * d) : 0;
+    g.beginPath(); g.moveTo(a[0], a[1]);
+    g.quadraticCurveTo((a[0] + b[0]) / 2, (a[1] + b[1]) / 2 + sag, b[0], b[1]); g.stroke();
+    for (const p of [a, b]) { disc(g, p, 2.2); g.fill(); }
   } else if (joint.type === "prismatic") {
     const c = Math.cos(ends.poses[1][2]), s = Math.sin(ends.poses[1][2]);
     const u = [c * joint.axis[0] - s * joint.axis[1], -(s * joint.axis[0] + c * joint.axis[1])];
     g.setLineDash([7, 4]); line(g, [b[0] - 2000 * u[0], b[1] - 2000 * u[1]], [b[0] + 2000 * u[0], b[1] + 2000 * u[1]]);
     g.setLineDash([]); g.strokeRect(a[0] - 5, a[1] - 5, 10, 10);
+    if (joint.motor) { disc(g, a, 7); g.stroke(); }
   } else {
     g.setLineDash([2, 4]);
     line(g, ...ends.poses.map((pose, j) => toScreen(joint.bodies[j] < 0 ? toWorld(ends.poses[1 - j], [0, 0]) : pose)));

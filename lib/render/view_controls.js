@@ -109,6 +109,9 @@ function legend() {
                                       line(g, [1, 9], [29, 9]); },
                   distance: (g) => { g.strokeStyle = g.fillStyle = colours.text; line(g, [5, 9], [25, 9]);
                                      for (const x of [5, 25]) { disc(g, [x, 9], 3); g.fill(); } },
+                  rope: (g) => { g.strokeStyle = g.fillStyle = colours.text; g.beginPath(); g.moveTo(5, 5);
+                                 g.quadraticCurveTo(15, 18, 25, 5); g.stroke();
+                                 for (const x of [5, 25]) { disc(g, [x, 5], 2.2); g.fill(); } },
                   fixed_angle: (g) => { g.strokeStyle = colours.text; g.setLineDash([2, 4]); line(g, [2, 9], [28, 9]); }};
   for (const type of Object.keys(joints)) {
     if (view.joints.some((joint) => joint.type === type)) add(type.replace("_", " ") + " joint", joints[type]);

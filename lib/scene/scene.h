@@ -45,7 +45,10 @@ struct BasicBody {
   T angle{0.0};
   Vector2<T> velocity{T(0.0), T(0.0)};
   T angular_velocity{0.0};
-  T friction{0.0};                  ///< Coulomb coefficient, ≥ 0
+  T friction{0.0};  ///< Coulomb coefficient, ≥ 0
+  /// Of Stribeck's decay, ≥ 0: the coefficient far above `stribeck_speed`. None: Coulomb's friction.
+  std::optional<T> kinetic_friction;
+  T stribeck_speed{1.0};            ///< m/s, > 0; only with a kinetic friction
   T restitution{0.0};               ///< in [0, 1]
   T linear_damping{0.0};            ///< N s/m, ≥ 0: force −c v
   T angular_damping{0.0};           ///< N m s, ≥ 0
@@ -140,6 +143,8 @@ struct BasicPair {
   std::string bodies[2];
   std::optional<T> friction;
   std::optional<T> restitution;
+  std::optional<T> kinetic_friction;  ///< as of a body
+  T stribeck_speed{1.0};
 };
 
 enum class Stepping { kFixed, kEvent };

@@ -104,6 +104,15 @@ inline int NumNumbers(ShapeType type) {
   return 0;
 }
 
+/// Friction that decays with the speed, of a body or pair.
+template <typename Item, typename Visitor>
+void VisitFrictionDecay(Item& item, Visitor* visitor) {
+  visitor->Optional({"kinetic_friction", NumberKind::kNonNegative}, item.kinetic_friction);
+  visitor->Number({"stribeck_speed", NumberKind::kPositive, Dimension::kVelocity, true, true,
+                   "kinetic_friction", item.kinetic_friction.has_value()},
+                  item.stribeck_speed);
+}
+
 /// The fields of a body but its shape.
 template <typename Body, typename Visitor>
 void VisitBody(Body& body, Visitor* visitor) {
@@ -128,6 +137,7 @@ void VisitBody(Body& body, Visitor* visitor) {
                   body.angular_damping);
   visitor->Optional({"quadratic_drag", kNonNegative, Dimension::kQuadraticDrag, false, moves},
                     body.quadratic_drag);
+  VisitFrictionDecay(body, visitor);
 }
 
 template <typename Body, typename Visitor>
@@ -212,6 +222,7 @@ template <typename Pair, typename Visitor>
 void VisitPair(Pair& pair, Visitor* visitor) {
   visitor->Optional({"friction", NumberKind::kNonNegative}, pair.friction);
   visitor->Optional({"restitution", NumberKind::kFraction}, pair.restitution);
+  VisitFrictionDecay(pair, visitor);
 }
 
 template <typename Settings, typename Visitor>

@@ -178,6 +178,7 @@ void SceneReader::ReadBody(const JsonReader& item) {
   VisitContactPoints(body, &reader);
   VisitBody(body, &reader);
   if (item.ok()) CheckBody(body, item);
+  if (item.ok()) CheckFrictionDecay(body.kinetic_friction, body.friction, item);
   body_index_[body.name] = static_cast<int>(scene_->bodies.size());
   scene_->bodies.push_back(std::move(body));
 }
@@ -320,6 +321,9 @@ void SceneReader::ReadPair(const JsonReader& item) {
   names_.insert({name, pair.bodies[1] + ":" + pair.bodies[0]});
   FieldReader reader(item);
   VisitPair(pair, &reader);
+  if (item.ok() && pair.friction) {
+    CheckFrictionDecay(pair.kinetic_friction, *pair.friction, item);
+  }
   scene_->pairs.push_back(std::move(pair));
 }
 

@@ -131,6 +131,13 @@ void CheckJoint(const BasicJoint<double>& joint, const JsonReader& place) {
   }
 }
 
+void CheckFrictionDecay(const std::optional<double>& kinetic, double friction,
+                        const JsonReader& place) {
+  if (!kinetic || *kinetic <= friction) return;
+  place.At("kinetic_friction")
+      .FailExpected("a number <= friction, which is " + Json(friction).dump(), *kinetic);
+}
+
 void CheckRopes(const Scene& scene, const JsonReader& joints) {
   // Where joints start turned or moved, anchors are not yet where the run starts.
   for (const BasicJoint<double>& joint : scene.joints) {

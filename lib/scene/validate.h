@@ -22,11 +22,16 @@ void CheckSettings(const SimulationSettings& settings, const JsonReader& place);
 /// Whether joints that may not start turned or moved (joint_graph.h) do.
 void CheckInitialAngles(const Scene& scene, const JsonReader& joints);
 
+/// Whether a kinetic friction is at most the friction at rest; a fit may move either, so that only
+/// the reader of a scene demands this.
+void CheckFrictionDecay(const std::optional<double>& kinetic, double friction,
+                        const JsonReader& place);
+
 /// Whether ropes (distance joints with limits) start within their limits. A fit may move a limit
 /// beyond the distance at the start, so that only the reader of a scene demands this.
 void CheckRopes(const Scene& scene, const JsonReader& joints);
 
-/// All of these but the last, and that every parameter is in its range. Returns "" or one line that begins with
+/// All of these but the last two, and that every parameter is in its range. Returns "" or one line that begins with
 /// `name` and names the first value that is not allowed as its place in a scene file.
 std::string Validate(const Scene& scene, const std::string& name);
 

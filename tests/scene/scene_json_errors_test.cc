@@ -71,7 +71,12 @@ TEST(BadSceneTest, Bodies) {
        "/bodies/3/masss: unknown key of a body, expected one of name, static, kinematic, shape, "
        "contact_points, mass, inertia, position, angle, velocity, angular_velocity, friction, "
        "restitution, "
-       "linear_damping, angular_damping, quadratic_drag, got \"masss\""},
+       "linear_damping, angular_damping, quadratic_drag, kinetic_friction, stribeck_speed, got "
+       "\"masss\""},
+      {"/bodies/0/kinetic_friction", "0.1",
+       "/bodies/0/stribeck_speed: missing, expected a number > 0"},
+      {"/bodies/0/stribeck_speed", "0.1",
+       "/bodies/0/kinetic_friction: missing, expected a number >= 0 with stribeck_speed"},
       {"/bodies/0/mass", "-1", "/bodies/0/mass: expected a number > 0, got -1"},
       {"/bodies/0/mass", "0", "/bodies/0/mass: expected a number > 0, got 0"},
       {"/bodies/0/mass", "\"1\"", "/bodies/0/mass: expected a number > 0, got \"1\""},
@@ -263,6 +268,17 @@ TEST(BadSceneTest, Joints) {
   });
 }
 
+TEST(BadSceneTest, FrictionThatGrowsWithTheSpeed) {
+  Scene scene;
+  std::string error;
+  ParseScene(R"({"bodies": [{"name": "m", "mass": 1, "inertia": 1, "friction": 0.2,
+      "kinetic_friction": 0.3, "stribeck_speed": 1}]})",
+             "bad.json", ::testing::TempDir(), &scene, &error);
+  EXPECT_EQ(error,
+            "bad.json: /bodies/0/kinetic_friction: expected a number <= friction, which is 0.2, "
+            "got 0.3");
+}
+
 // Ropes are measured where no joint starts turned.
 TEST(BadSceneTest, ARopeThatStartsBeyondItsLimits) {
   const auto error_of = [](const std::string& limits) {
@@ -387,8 +403,8 @@ TEST(BadSceneTest, PairsAndNoContact) {
       {"/pairs/0/friction", "-1", "/pairs/0/friction: expected a number >= 0, got -1"},
       {"/pairs/0/restitution", "2", "/pairs/0/restitution: expected a number in [0, 1], got 2"},
       {"/pairs/0/name", "\"p\"",
-       "/pairs/0/name: unknown key of a pair, expected one of bodies, friction, restitution, got "
-       "\"name\""},
+       "/pairs/0/name: unknown key of a pair, expected one of bodies, friction, restitution, "
+       "kinetic_friction, stribeck_speed, got \"name\""},
       {"/no_contact/0", R"(["ball", "nobody"])",
        "/no_contact/0/1: expected a name or pattern of a body (" + bodies + "), got \"nobody\""},
       {"/no_contact/0", R"("ball")",

@@ -92,6 +92,9 @@ Coverage CoverageOf(const Scene& scene, const RunTrace& run) {
     if (body.quadratic_drag) {
       coverage["drag of a body"] = 1;
     }
+    if (body.kinetic_friction) {
+      coverage["friction of a body that decays"] = 1;
+    }
   }
   coverage["bodies " + std::to_string(moving)] = 1;
   const SimulationSettings& settings = scene.simulation;

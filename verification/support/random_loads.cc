@@ -194,6 +194,12 @@ void SceneMaker::Drives() {
       if (random.Chance(0.2)) joint.limits->first = -kInfinity;
     }
   }
+  for (BasicBody<double>& body : scene_.bodies) {
+    if (options_.stepping == Stepping::kEvent && random.Chance(0.3)) {
+      body.kinetic_friction = body.friction * random.Uniform(0.3, 1.0);
+      body.stribeck_speed = std::pow(10.0, random.Uniform(-1.0, 1.0));
+    }
+  }
 }
 
 void SceneMaker::Outlines() {

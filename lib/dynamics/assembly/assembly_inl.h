@@ -199,6 +199,17 @@ class ProblemBuilder {
     block.tangent_b = rows.tangent_b;
     block.friction = EvaluateCoefficient((*friction_)[i], model_.parameters);
     block.has_friction = (*friction_)[i].value > 0.0;
+    if constexpr (kLevel == Level::kAcceleration) {
+      DecaySource decay;
+      if (contact.joint < 0 && block.has_friction &&
+          MixedDecay(model_, contact.a, contact.b, &decay)) {
+        const T numbers[3] = {block.friction, EvaluateCoefficient(decay.kinetic, model_.parameters),
+                              EvaluateCoefficient(decay.speed, model_.parameters)};
+        const T slip = SlipOf(state_, contact, rows);
+        const T lost = FrictionDecay(numbers, slip);
+        block.friction -= ValueOf(slip) < 0.0 ? T(-lost) : lost;
+      }
+    }
     block.c_n = c_n;
     block.c_t = c_t;
     if (contact.IsJointFriction()) {

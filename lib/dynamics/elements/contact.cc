@@ -4,41 +4,6 @@
 #include <cmath>
 
 namespace tangible {
-namespace {
-
-CoefficientSource Own(const Model<double>& model, int number) {
-  CoefficientSource source;
-  source.numbers[0] = number;
-  source.derivatives[0] = 1.0;
-  source.value = model.parameters[number];
-  return source;
-}
-
-CoefficientSource Mix(const Model<double>& model, int first, int second, Mixing mixing) {
-  CoefficientSource source;
-  source.numbers[0] = first;
-  source.numbers[1] = second;
-  const double x = model.parameters[first];
-  const double y = model.parameters[second];
-  double* d = source.derivatives;
-  switch (mixing) {
-    case Mixing::kAverage:
-      source.value = 0.5 * (x + y);
-      d[0] = d[1] = 0.5;
-      break;
-    case Mixing::kGeometricMean:
-      source.value = std::sqrt(x * y);
-      // The derivative of the geometric mean is infinite where one coefficient is 0 and the other
-      // is not.
-      source.tie = source.value == 0.0;
-      d[0] = source.tie ? 0.0 : 0.5 * y / source.value;
-      d[1] = source.tie ? 0.0 : 0.5 * x / source.value;
-      break;
-  }
-  return source;
-}
-
-}  // namespace
 
 int FindFeaturesAtSeams(const Model<double>& model, int a, const Pose<double>& pose_a, int b,
                         const Pose<double>& pose_b, PartPair parts, double max_gap,
@@ -60,10 +25,10 @@ CoefficientSource MixedFriction(const Model<double>& model, int a, int b) {
   const ModelStructure& structure = *model.structure;
   const PairIndex* pair = structure.FindPair(a, b);
   if (pair != nullptr && pair->friction >= 0) {
-    return Own(model, pair->friction);
+    return OwnCoefficient(model, pair->friction);
   }
-  return Mix(model, structure.bodies[a].friction, structure.bodies[b].friction,
-             structure.settings.friction_mixing);
+  return MixedCoefficient(model, structure.bodies[a].friction, structure.bodies[b].friction,
+                          structure.settings.friction_mixing);
 }
 
 CoefficientSource FrictionOf(const Model<double>& model, const ActiveContact& contact) {
@@ -71,8 +36,8 @@ CoefficientSource FrictionOf(const Model<double>& model, const ActiveContact& co
     return MixedFriction(model, contact.a, contact.b);
   }
   const JointIndex& joint = model.structure->joints[contact.joint];
-  if (contact.is_motor) return Own(model, joint.motor + 1);
-  return contact.IsJointFriction() ? Own(model, joint.friction) : CoefficientSource();
+  if (contact.is_motor) return OwnCoefficient(model, joint.motor + 1);
+  return contact.IsJointFriction() ? OwnCoefficient(model, joint.friction) : CoefficientSource();
 }
 
 void AppendLimits(const Model<double>& model, std::vector<ActiveContact>* contacts) {
@@ -109,17 +74,17 @@ CoefficientSource RestitutionOf(const Model<double>& model, const ActiveContact&
   if (contact.joint < 0) return MixedRestitution(model, contact.a, contact.b);
   const int restitution = model.structure->joints[contact.joint].limit_restitution;
   return restitution < 0 || contact.IsJointFriction() ? CoefficientSource()
-                                                      : Own(model, restitution);
+                                                      : OwnCoefficient(model, restitution);
 }
 
 CoefficientSource MixedRestitution(const Model<double>& model, int a, int b) {
   const ModelStructure& structure = *model.structure;
   const PairIndex* pair = structure.FindPair(a, b);
   if (pair != nullptr && pair->restitution >= 0) {
-    return Own(model, pair->restitution);
+    return OwnCoefficient(model, pair->restitution);
   }
-  return Mix(model, structure.bodies[a].restitution, structure.bodies[b].restitution,
-             structure.settings.restitution_mixing);
+  return MixedCoefficient(model, structure.bodies[a].restitution, structure.bodies[b].restitution,
+                          structure.settings.restitution_mixing);
 }
 
 }  // namespace tangible

@@ -22,6 +22,7 @@
 // law. The map from states to states jumps between kGap and kRestitution; the margins say how near
 // that jump is.
 
+#include <algorithm>
 #include <cmath>
 
 #include "tangible/dynamics/elements/joint.h"
@@ -98,6 +99,74 @@ struct CoefficientSource {
   double value = 0.0;
   bool tie = false;  ///< a kink of the mixing rule: min/max of equal values, geometric mean at 0
 };
+
+/// The coefficient that one number of the model is.
+template <typename T>
+CoefficientSource OwnCoefficient(const Model<T>& model, int number) {
+  CoefficientSource source;
+  source.numbers[0] = number;
+  source.derivatives[0] = 1.0;
+  source.value = ValueOf(model.parameters[number]);
+  return source;
+}
+
+/// The coefficient that two numbers of the model mix to.
+template <typename T>
+CoefficientSource MixedCoefficient(const Model<T>& model, int first, int second, Mixing mixing) {
+  CoefficientSource source;
+  source.numbers[0] = first;
+  source.numbers[1] = second;
+  const double x = ValueOf(model.parameters[first]);
+  const double y = ValueOf(model.parameters[second]);
+  double* d = source.derivatives;
+  switch (mixing) {
+    case Mixing::kAverage:
+      source.value = 0.5 * (x + y);
+      d[0] = d[1] = 0.5;
+      break;
+    case Mixing::kGeometricMean:
+      source.value = std::sqrt(x * y);
+      // The derivative of the geometric mean is infinite where one coefficient is 0 and the other
+      // is not.
+      source.tie = source.value == 0.0;
+      d[0] = source.tie ? 0.0 : 0.5 * y / source.value;
+      d[1] = source.tie ? 0.0 : 0.5 * x / source.value;
+      break;
+  }
+  return source;
+}
+
+/// How the friction of a contact that slides decays with its speed (Stribeck), by events: towards
+/// `kinetic` far above `speed`, m/s.
+struct DecaySource {
+  CoefficientSource kinetic, speed;
+};
+
+/// False where the friction of the two bodies does not decay. A body without a kinetic friction
+/// counts with its friction at rest; a pair that has a friction of its own decays only if it has a
+/// kinetic one too.
+template <typename T>
+bool MixedDecay(const Model<T>& model, int a, int b, DecaySource* decay) {
+  const ModelStructure& structure = *model.structure;
+  if (!structure.friction_decays) return false;
+  const PairIndex* pair = structure.FindPair(a, b);
+  if (pair != nullptr && pair->kinetic_friction >= 0) {
+    decay->kinetic = OwnCoefficient(model, pair->kinetic_friction);
+    decay->speed = OwnCoefficient(model, pair->kinetic_friction + 1);
+    return true;
+  }
+  const BodyIndex& first = structure.bodies[a];
+  const BodyIndex& second = structure.bodies[b];
+  const int of_a = first.kinetic_friction;
+  const int of_b = second.kinetic_friction;
+  if ((pair != nullptr && pair->friction >= 0) || (of_a < 0 && of_b < 0)) return false;
+  const Mixing mixing = structure.settings.friction_mixing;
+  decay->kinetic = MixedCoefficient(model, of_a < 0 ? first.friction : of_a,
+                                    of_b < 0 ? second.friction : of_b, mixing);
+  decay->speed = of_a < 0 || of_b < 0 ? OwnCoefficient(model, std::max(of_a, of_b) + 1)
+                                      : MixedCoefficient(model, of_a + 1, of_b + 1, mixing);
+  return true;
+}
 
 /// The friction (or restitution) of two bodies, by the entry of their pair or by the mixing rule:
 /// average, minimum, maximum (at a tie the derivative is the mean of both), geometric mean (at 0

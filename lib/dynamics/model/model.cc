@@ -83,6 +83,8 @@ void AddBodies(const BasicScene<T>& scene, Places* places, ModelStructure* struc
       index.angular_damping = places->Take(1);
       index.quadratic_drag = body.quadratic_drag ? places->Take(1) : -1;
     }
+    index.kinetic_friction = body.kinetic_friction ? places->Take(2) : -1;
+    structure->friction_decays = structure->friction_decays || body.kinetic_friction;
     structure->bodies.push_back(index);
   }
   BodyIndex world;
@@ -175,6 +177,8 @@ void AddForcesAndPairs(const BasicScene<T>& scene, Places* places, ModelStructur
     index.second = Matches(structure->bodies, pair.bodies[1]);
     index.friction = pair.friction ? places->Take(1) : -1;
     index.restitution = pair.restitution ? places->Take(1) : -1;
+    index.kinetic_friction = pair.kinetic_friction ? places->Take(2) : -1;
+    structure->friction_decays = structure->friction_decays || pair.kinetic_friction;
     structure->pairs.push_back(index);
   }
   for (const auto& [first, second] : scene.no_contact) {
@@ -213,6 +217,10 @@ void FillBodies(const BasicScene<T>& scene, std::vector<T>* numbers) {
       if (body.quadratic_drag) {
         numbers->push_back(*body.quadratic_drag);
       }
+    }
+    if (body.kinetic_friction) {
+      numbers->push_back(*body.kinetic_friction);
+      numbers->push_back(body.stribeck_speed);
     }
   }
 }
@@ -295,6 +303,10 @@ void FillForcesAndPairs(const BasicScene<T>& scene, const State<T>& drawn, int w
       if (coefficient) {
         numbers->push_back(*coefficient);
       }
+    }
+    if (pair.kinetic_friction) {
+      numbers->push_back(*pair.kinetic_friction);
+      numbers->push_back(pair.stribeck_speed);
     }
   }
 }

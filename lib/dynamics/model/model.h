@@ -39,6 +39,7 @@ struct BodyIndex {
   int mass = -1, inertia = -1, linear_damping = -1, angular_damping = -1;
   int quadratic_drag = -1;  ///< −1: none
   int friction = -1, restitution = -1;
+  int kinetic_friction = -1;  ///< then Stribeck's speed; −1: the friction does not decay
   ShapeType shape = ShapeType::kNone;
   int shape_numbers = -1;
   int num_shape_numbers = 0;
@@ -104,9 +105,11 @@ struct ForceIndex {
 struct PairIndex {
   std::vector<bool> first, second;      ///< a body: matches the pattern
   int friction = -1, restitution = -1;  ///< −1: mixed as usual
+  int kinetic_friction = -1;            ///< then Stribeck's speed; −1: none of its own
 };
 
 struct ModelStructure {
+  bool friction_decays = false;  ///< whether the friction of some contact may decay
   std::string scene_name;
   SimulationSettings settings;
   std::vector<BodyIndex> bodies;  ///< in scene order, then the world

@@ -20,6 +20,7 @@ class PartTaker {
   ModelPart Take() {
     to_->scene_name = whole_.scene_name;
     to_->settings = whole_.settings;
+    to_->friction_decays = whole_.friction_decays;
     TakeNumber(kGravityX);
     TakeNumber(kGravityY);
     TakeBodies();
@@ -64,6 +65,7 @@ class PartTaker {
       TakeOne(&index.linear_damping);
       TakeOne(&index.angular_damping);
       TakeOne(&index.quadratic_drag);
+      TakeNumbers(2, &index.kinetic_friction);
     }
   }
 
@@ -133,10 +135,12 @@ class PartTaker {
       return std::find(x.begin(), x.end(), true) != x.end();
     };
     for (const PairIndex& pair : whole_.pairs) {
-      PairIndex index{OfPart(pair.first), OfPart(pair.second), pair.friction, pair.restitution};
+      PairIndex index{OfPart(pair.first), OfPart(pair.second), pair.friction, pair.restitution,
+                      pair.kinetic_friction};
       if (!any(index.first) || !any(index.second)) continue;
       TakeOne(&index.friction);
       TakeOne(&index.restitution);
+      TakeNumbers(2, &index.kinetic_friction);
       to_->pairs.push_back(std::move(index));
     }
     for (const auto& [first, second] : whole_.no_contact) {

@@ -27,9 +27,19 @@ std::string TextOf(double number) {
 bool CheckSettings(const Scene& scene, std::string* error) {
   const SimulationSettings& settings = scene.simulation;
   const bool fixed = settings.stepping == Stepping::kFixed;
-  const auto decays = std::find_if(scene.joints.begin(), scene.joints.end(), [](const auto& joint) {
-    return joint.kinetic_friction.has_value();
-  });
+  const auto decays_in = [](const auto& items) {
+    return std::find_if(items.begin(), items.end(),
+                        [](const auto& item) { return item.kinetic_friction.has_value(); });
+  };
+  const auto refuse = [&](const std::string& place, double got) {
+    *error = place +
+             "/kinetic_friction: expected none with fixed stepping (friction that decays with the "
+             "speed needs \"stepping\": \"event\"), got " +
+             TextOf(got);
+  };
+  const auto joint = decays_in(scene.joints);
+  const auto body = decays_in(scene.bodies);
+  const auto pair = decays_in(scene.pairs);
   if (fixed && IntegratorOf(settings) != Integrator::kSemiImplicitEuler) {
     *error = NeedsEvents("integrator", "semi_implicit_euler", "others need",
                          NameOf(IntegratorOf(settings), kIntegratorNames));
@@ -40,11 +50,12 @@ bool CheckSettings(const Scene& scene, std::string* error) {
   } else if (fixed && settings.impact_law != ImpactLaw::kNewton) {
     *error = NeedsEvents("impact_law", "newton", "other needs",
                          NameOf(settings.impact_law, kImpactLawNames));
-  } else if (fixed && decays != scene.joints.end()) {
-    *error = "/joints/" + std::to_string(decays - scene.joints.begin()) +
-             "/kinetic_friction: expected none with fixed stepping (friction that decays with the "
-             "speed needs \"stepping\": \"event\"), got " +
-             TextOf(*decays->kinetic_friction);
+  } else if (fixed && joint != scene.joints.end()) {
+    refuse("/joints/" + std::to_string(joint - scene.joints.begin()), *joint->kinetic_friction);
+  } else if (fixed && body != scene.bodies.end()) {
+    refuse("/bodies/" + std::to_string(body - scene.bodies.begin()), *body->kinetic_friction);
+  } else if (fixed && pair != scene.pairs.end()) {
+    refuse("/pairs/" + std::to_string(pair - scene.pairs.begin()), *pair->kinetic_friction);
   } else {
     return true;
   }
