@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace tangible {
 namespace {
@@ -143,7 +144,12 @@ StepMap* EngineStep::Without(int impact) {
     Scene scene = function_.scene();
     for (const Meeting& meeting : kinds_[impact]) {
       if (meeting.joint >= 0) {
-        scene.joints[meeting.joint].limits.reset();
+        // A rope without limits would be a rod.
+        BasicJoint<double>& joint = scene.joints[meeting.joint];
+        joint.limits.reset();
+        if (joint.type == JointType::kDistance) {
+          joint.limits = {0.0, std::numeric_limits<double>::infinity()};
+        }
       } else {
         scene.no_contact.emplace_back(scene.bodies[meeting.a].name, scene.bodies[meeting.b].name);
       }

@@ -7,6 +7,7 @@
 
 #include "tangible/dynamics/elements/seam_contacts.h"
 #include "tangible/dynamics/model/tolerances.h"
+#include "tangible/math/disjoint_sets.h"
 
 namespace tangible {
 namespace {
@@ -277,6 +278,29 @@ void ContactSearch::Find(const Model<double>& model, const State<double>& state,
     friction->push_back(FrictionOf(model, (*contacts)[i]));
   }
   restitution->resize(contacts->size());
+}
+
+bool ContactSearch::GiveUpRebounds(const Model<double>& model, double h, int contact,
+                                   std::vector<ActiveContact>* contacts) {
+  const ModelStructure& structure = *model.structure;
+  DisjointSets bodies;
+  bodies.AddAll(structure.bodies.size());
+  const auto join = [&](int a, int b) {
+    if (structure.bodies[a].block >= 0 && structure.bodies[b].block >= 0) bodies.Join(a, b);
+  };
+  for (const JointIndex& joint : structure.joints) join(joint.a, joint.b);
+  for (const ActiveContact& c : *contacts) join(c.a, c.b);
+  const auto set_of = [&](const ActiveContact& c) {
+    return bodies.Root(structure.bodies[c.a].block >= 0 ? c.a : c.b);
+  };
+  const int wanted = contact < 0 ? -1 : set_of((*contacts)[contact]);
+  bool any = false;
+  for (ActiveContact& c : *contacts) {
+    if (c.law != ContactLaw::kRestitution || (wanted >= 0 && set_of(c) != wanted)) continue;
+    c.law = GapLaw(c.gap, h, structure.settings);
+    any = true;
+  }
+  return any;
 }
 
 }  // namespace tangible

@@ -39,6 +39,13 @@ class ContactSearch {
   int num_pairs() const { return static_cast<int>(pairs_.size()); }
   int num_beyond_reach() const { return beyond_reach_; }
 
+  /// Of the bodies that the given contact connects, directly or through others (−1: of all), the
+  /// contacts that rebound no longer do, but land as those without restitution; false where none
+  /// does. Newton's law may ask for speeds that walls do not allow: a ball that fits exactly between
+  /// two would have to rebound from one and may not move towards the other.
+  static bool GiveUpRebounds(const Model<double>& model, double h, int contact,
+                             std::vector<ActiveContact>* contacts);
+
  private:
   ContactsAhead FindPassed(const Model<double>& model, const State<double>& state,
                            const ActiveContact& contact, double approach, double h) const;

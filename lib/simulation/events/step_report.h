@@ -10,11 +10,12 @@
 
 namespace tangible {
 
-/// How often event stepping had to relax its own rules.
+/// How often stepping had to relax its own rules.
 struct EventFallbacks {
   /// Accelerations that do not exist (Painlevé) and are replaced by impulses of a very short step.
   long short_steps = 0;
-  /// Pairs beyond max_events_per_step in a step, whose further impacts in it are inelastic.
+  /// Pairs beyond max_events_per_step in a step, whose further impacts in it are inelastic; of fixed
+  /// steps sets of bodies whose rebounds walls do not allow.
   long rebounds_given_up = 0;
   /// Impacts after which contacts are held closed because they leave so slowly that they would
   /// return at once.
@@ -41,7 +42,7 @@ struct StepCounts {
   long factorisations = 0;   ///< of a fixed step: of the island that took the most
   long iterations = 0;       ///< of a fixed step: of the island that took the most
   long events = 0;           ///< located within the step (event stepping)
-  EventFallbacks given_up;   ///< event stepping: what it gave up of its own rules
+  EventFallbacks given_up;   ///< what it gave up of its own rules
   ContactFallbacks solver;   ///< what its solves leaned on beyond the guess
   long newton_stages = 0;    ///< event stepping: implicit stages whose iteration does not contract
   long halved_motions = 0;   ///< event stepping: that could not be integrated as a whole

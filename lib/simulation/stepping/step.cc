@@ -405,11 +405,23 @@ ContactSolverReport Stepper::SolveWithContacts(const Model<double>& model,
       // the solution.
       CarryGuess(model, wider_contacts_, narrow_solution_, Guess::kSameStep);
     }
-    const ContactSolverReport before = solved;
-    solved = SolveContacts(SolverOptionsOf(structure.settings), &report->islands);
-    solved.factorisations += before.factorisations;
-    solved.iterations += before.iterations;
-    report->solver.Add(solved.fallbacks);
+    const auto solve = [&] {
+      const ContactSolverReport earlier = solved;
+      solved = SolveContacts(SolverOptionsOf(structure.settings), &report->islands);
+      solved.factorisations += earlier.factorisations;
+      solved.iterations += earlier.iterations;
+      report->solver.Add(solved.fallbacks);
+    };
+    solve();
+    // Each set of bodies whose rebounds cannot be is given another chance.
+    while (!solved.solved &&
+           ContactSearch::GiveUpRebounds(model, h, solved.worst_contact, &r.contacts)) {
+      ++report->given_up.rebounds_given_up;
+      AssembleContacts(model, state, h, r.contacts, r.friction, r.restitution, &scratch_,
+                       &r.problem);
+      CarryGuess(model, last_contacts_, last_solution_, Guess::kLastStep);
+      solve();
+    }
     if (!solved.solved) {
       break;
     }

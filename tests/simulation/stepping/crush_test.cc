@@ -35,6 +35,40 @@ TEST(CrushTest, AWallThatCannotYieldIsNamed) {
   }
 }
 
+// Newton's law would have a ball that fits exactly between two walls rebound from one, into the
+// other. It stops instead; a ball elsewhere rebounds all the same.
+TEST(CrushTest, ReboundsThatWallsDoNotAllowAreGivenUp) {
+  for (const int balls : {1, 4}) {
+    std::string bodies;
+    for (int k = 0; k < balls; ++k) {
+      bodies += R"({"name": "b)" + std::to_string(k) +
+                R"(", "shape": {"circle": {"radius": 0.125}}, "mass": 1, "position": [)" +
+                std::to_string(0.125 + 0.25 * k) + R"(, 0], "velocity": [1, 0.5],
+                "friction": 0.1, "restitution": 0.8}, )";
+    }
+    Model<double> model;
+    State<double> state;
+    BuildModel(test_scenes::SceneOf(R"({"gravity": [0, 0], "bodies": [)" + bodies + R"(
+        {"name": "free", "shape": {"circle": {"radius": 0.1}}, "mass": 1, "position": [9, 0],
+         "velocity": [1, 0], "restitution": 0.8},
+        {"name": "left", "static": true, "friction": 0.1, "restitution": 0.8,
+         "shape": {"half_plane": {"normal": [1, 0]}}},
+        {"name": "right", "static": true, "friction": 0.1, "restitution": 0.8,
+         "shape": {"box": {"size": [1, 8]}}, "position": [)" +
+                                    std::to_string(0.25 * balls + 0.5) + R"(, 0]},
+        {"name": "far", "static": true, "restitution": 0.8,
+         "shape": {"half_plane": {"normal": [-1, 0], "offset": -9.105}}}],
+        "no_contact": [["b*", "far"], ["free", "left"], ["free", "right"]],
+        "simulation": {"dt": 0.01, "duration": 0.1}})"),
+               &model, &state);
+    const RolloutReport report = Rollout(model, state, {}, &state);
+    EXPECT_EQ(report.status, StepStatus::kDone) << report.message;
+    EXPECT_EQ(report.given_up.rebounds_given_up, 1) << balls;
+    for (int k = 0; k < balls; ++k) EXPECT_NEAR(state.twist[3 * k], 0.0, 1e-12) << balls;
+    EXPECT_NEAR(state.twist[3 * balls], -0.8, 1e-12);
+  }
+}
+
 // A wedge between a ram and the floor gives way without friction and jams with much of it: the
 // half-plane that pushes leans over by 30 degrees, and a disc jams where μ > tan 15°.
 TEST(CrushTest, FrictionThatJamsIsSaid) {
