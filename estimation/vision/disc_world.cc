@@ -59,7 +59,10 @@ Scene SceneOf(const DiscWorld& world, int frames) {
   wall("end_top", {0.0, 1.0}, world.low);
   wall("end_bottom", {0.0, -1.0}, -world.high);
   const auto pair = [&](const std::string& a, const std::string& b, double restitution) {
-    scene.pairs.push_back({{a, b}, {}, restitution});
+    BasicPair<double>& of_two = scene.pairs.emplace_back();
+    of_two.bodies[0] = a;
+    of_two.bodies[1] = b;
+    of_two.restitution = restitution;
   };
   for (int i = 0; i < world.size(); ++i) {
     const std::string disc = "disc" + std::to_string(i);
