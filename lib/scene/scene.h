@@ -46,7 +46,7 @@ struct BasicBody {
   Vector2<T> velocity{T(0.0), T(0.0)};
   T angular_velocity{0.0};
   T friction{0.0};  ///< Coulomb coefficient, ≥ 0
-  /// Of Stribeck's decay, ≥ 0: the coefficient far above `stribeck_speed`. None: Coulomb's friction.
+  /// Of Stribeck's decay, ≥ 0: the coefficient far above `stribeck_speed`. None: it does not decay.
   std::optional<T> kinetic_friction;
   T stribeck_speed{1.0};            ///< m/s, > 0; only with a kinetic friction
   T restitution{0.0};               ///< in [0, 1]

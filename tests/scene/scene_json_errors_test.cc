@@ -271,7 +271,7 @@ TEST(BadSceneTest, Joints) {
 TEST(BadSceneTest, FrictionThatGrowsWithTheSpeed) {
   Scene scene;
   std::string error;
-  ParseScene(R"({"bodies": [{"name": "m", "mass": 1, "inertia": 1, "friction": 0.2,
+  ParseScene(R"({"bodies": [{"name": "m", "mass": 1, "inertia": 1, "position": [0, 0], "friction": 0.2,
       "kinetic_friction": 0.3, "stribeck_speed": 1}]})",
              "bad.json", ::testing::TempDir(), &scene, &error);
   EXPECT_EQ(error,

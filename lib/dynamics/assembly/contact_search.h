@@ -41,8 +41,8 @@ class ContactSearch {
 
   /// Of the bodies that the given contact connects, directly or through others (−1: of all), the
   /// contacts that rebound no longer do, but land as those without restitution; false where none
-  /// does. Newton's law may ask for speeds that walls do not allow: a ball that fits exactly between
-  /// two would have to rebound from one and may not move towards the other.
+  /// does. Newton's law may ask for speeds that walls do not allow: a ball that fits exactly
+  /// between two would have to rebound from one and may not move towards the other.
   static bool GiveUpRebounds(const Model<double>& model, double h, int contact,
                              std::vector<ActiveContact>* contacts);
 

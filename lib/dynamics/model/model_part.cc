@@ -85,12 +85,12 @@ class PartTaker {
       TakeNumbers(index.num_geometry, &index.geometry);
       TakeOne(&index.damping);
       TakeOne(&index.effort);
+      TakeNumbers(2, &index.stiffness);
+      TakeNumbers(index.has_decay ? 3 : 1, &index.friction);
+      TakeNumbers(2, &index.motor);
       TakeOne(&index.low);
       TakeOne(&index.high);
       TakeOne(&index.limit_restitution);
-      TakeNumbers(2, &index.motor);
-      TakeNumbers(2, &index.stiffness);
-      TakeNumbers(index.has_decay ? 3 : 1, &index.friction);
       TakeSignal(&index.effort_signal);
     }
     to_->joint_loops = whole_.joint_loops && !to_->joints.empty();

@@ -37,8 +37,8 @@ bool EndsInMeeting(const Model<double>& model, const Segment& segment) {
   return speed < -Negligible(model, speed);
 }
 
-// Whether a contact begins in penetration, because another feature of a body that is being moved out
-// of penetration becomes the nearest: its gap has not passed through 0, and does not tell when.
+// Whether a contact begins in penetration, because another feature of a body that is being moved
+// out of it becomes the nearest: its gap has not passed through 0, and does not tell when.
 bool BeginsInPenetration(const Model<double>& model, const Segment& segment) {
   const ActiveContact& contact = segment.event_contact;
   if (segment.event != EventKind::kTouch || contact.joint >= 0) return false;

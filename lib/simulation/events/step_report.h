@@ -14,8 +14,8 @@ namespace tangible {
 struct EventFallbacks {
   /// Accelerations that do not exist (Painlevé) and are replaced by impulses of a very short step.
   long short_steps = 0;
-  /// Pairs beyond max_events_per_step in a step, whose further impacts in it are inelastic; of fixed
-  /// steps sets of bodies whose rebounds walls do not allow.
+  /// Pairs beyond max_events_per_step in a step, whose further impacts in it are inelastic; of
+  /// fixed steps sets of bodies whose rebounds walls do not allow.
   long rebounds_given_up = 0;
   /// Impacts after which contacts are held closed because they leave so slowly that they would
   /// return at once.
