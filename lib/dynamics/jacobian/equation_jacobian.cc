@@ -209,6 +209,8 @@ class EntryBuilder : private internal::LocalEntries<Sink> {
  private:
   using Base = internal::LocalEntries<Sink>;
   using Base::Emit;
+  using Base::EmitDecay;
+  using Base::EmitFriction;
   using Base::EmitMomentum;
   using Base::EmitRowTimesVariable;
   using Base::JointRow;
@@ -651,55 +653,16 @@ class EntryBuilder : private internal::LocalEntries<Sink> {
     // λt = −σ μ λn.
     const double sign = SignOfSliding(i, contact, rows);
     const CoefficientSource& friction = (*solved_.friction)[i];
-    const double share = kLevel == Level::kAcceleration ? EmitDecay(i, contact, rows, sign) : 1.0;
-    EmitFriction(i, contact, rows, friction, sign * share);
-  }
-
-  // The entries of the derivative of a sliding contact's friction with respect to a coefficient,
-  // times a factor.
-  template <typename T>
-  void EmitFriction(int i, const ActiveContact& contact, const ContactRows<T>& rows,
-                    const CoefficientSource& source, double factor) {
-    for (int k = 0; k < 2 && factor != 0.0; ++k) {
-      if (source.numbers[k] >= 0) {
-        EmitRowTimesVariable(contact.a, rows.tangent_a, contact.b, rows.tangent_b,
-                             s_.ParameterVariable(source.numbers[k]),
-                             factor * solved_.solution->normal_impulse[i] * source.derivatives[k]);
+    const double factor = sign * solved_.solution->normal_impulse[i];
+    double share = 1.0;
+    if constexpr (kLevel == Level::kAcceleration && std::is_same_v<T, LocalJet>) {
+      if (sign != 0.0) {
+        const LocalJet slip =
+            RowTimes(before_, contact.a, rows.tangent_a, contact.b, rows.tangent_b);
+        share = EmitDecay(contact, rows, friction.value, slip, locals_, factor);
       }
     }
-  }
-
-  // The entries of a coefficient that decays with the sliding speed, but for those of the friction
-  // at rest, whose share is returned.
-  template <typename T>
-  double EmitDecay(int i, const ActiveContact& contact, const ContactRows<T>& rows, double sign) {
-    DecaySource decay;
-    if (sign == 0.0 || contact.joint >= 0 || !MixedDecay(model_, contact.a, contact.b, &decay)) {
-      return 1.0;
-    }
-    if constexpr (std::is_same_v<T, LocalJet>) {
-      const LocalJet slip = RowTimes(before_, contact.a, rows.tangent_a, contact.b, rows.tangent_b);
-      const LocalJet numbers[3] = {LocalJet((*solved_.friction)[i].value, 0),
-                                   LocalJet(decay.kinetic.value, 1),
-                                   LocalJet(decay.speed.value, 2)};
-      const LocalJet lost = FrictionDecay(numbers, LocalJet(slip.a, 3));
-      const double side = slip.a < 0.0 ? -sign : sign;
-      EmitFriction(i, contact, rows, decay.kinetic, -side * lost.v[1]);
-      EmitFriction(i, contact, rows, decay.speed, -side * lost.v[2]);
-      const auto emit = [&](int variable, double value) {
-        EmitRowTimesVariable(contact.a, rows.tangent_a, contact.b, rows.tangent_b, variable,
-                             -side * lost.v[3] * solved_.solution->normal_impulse[i] * value);
-      };
-      for (int k = 0; k < locals_.count(); ++k) emit(locals_.variable(k), slip.v[k]);
-      for (int k = 0; k < 3; ++k) {
-        for (const auto& [body, row] :
-             {std::pair(contact.a, &rows.tangent_a), std::pair(contact.b, &rows.tangent_b)}) {
-          if (SpeedsReadTwist(body)) emit(s_.TwistVariable(body, k), (*row)[k].a);
-        }
-      }
-      return 1.0 - (slip.a < 0.0 ? -lost.v[0] : lost.v[0]);
-    }
-    return 1.0;
+    EmitFriction(contact, rows, friction, factor * share);
   }
 
   void EmitCoefficient(const CoefficientSource& source, int row, double factor) {

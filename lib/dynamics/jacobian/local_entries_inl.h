@@ -184,6 +184,45 @@ class LocalEntries {
     }
   }
 
+  /// The entries of a sliding contact's friction by a coefficient, times a factor.
+  template <typename T>
+  void EmitFriction(const ActiveContact& contact, const ContactRows<T>& rows,
+                    const CoefficientSource& source, double factor) {
+    for (int k = 0; k < 2 && factor != 0.0; ++k) {
+      if (source.numbers[k] < 0) continue;
+      EmitRowTimesVariable(contact.a, rows.tangent_a, contact.b, rows.tangent_b,
+                           s_.ParameterVariable(source.numbers[k]), factor * source.derivatives[k]);
+    }
+  }
+
+  /// The entries of a coefficient that decays with the sliding speed, but for those of the friction
+  /// at rest, whose share is returned.
+  double EmitDecay(const ActiveContact& contact, const ContactRows<LocalJet>& rows, double rest,
+                   const LocalJet& slip, const Locals& locals, double factor) {
+    DecaySource decay;
+    if (contact.joint >= 0 || !MixedDecay(model_, contact.a, contact.b, &decay)) return 1.0;
+    const LocalJet numbers[3] = {LocalJet(rest, 0), LocalJet(decay.kinetic.value, 1),
+                                 LocalJet(decay.speed.value, 2)};
+    const LocalJet lost = FrictionDecay(numbers, LocalJet(slip.a, 3));
+    const double side = slip.a < 0.0 ? -1.0 : 1.0;
+    EmitFriction(contact, rows, decay.kinetic, -side * factor * lost.v[1]);
+    EmitFriction(contact, rows, decay.speed, -side * factor * lost.v[2]);
+    const auto emit = [&](int variable, double value) {
+      EmitRowTimesVariable(contact.a, rows.tangent_a, contact.b, rows.tangent_b, variable,
+                           -side * factor * lost.v[3] * value);
+    };
+    for (int k = 0; k < locals.count(); ++k) emit(locals.variable(k), slip.v[k]);
+    for (int k = 0; k < 3; ++k) {
+      if (s_.bodies[contact.a].motion != Motion::kStatic) {
+        emit(s_.TwistVariable(contact.a, k), rows.tangent_a[k].a);
+      }
+      if (s_.bodies[contact.b].motion != Motion::kStatic) {
+        emit(s_.TwistVariable(contact.b, k), rows.tangent_b[k].a);
+      }
+    }
+    return 1.0 - side * lost.v[0];
+  }
+
   int JointRow(int joint) const { return 3 * (s_.num_blocks() + joint); }
 
   const Model<double>& model_;
