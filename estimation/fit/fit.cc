@@ -661,8 +661,10 @@ Eigen::VectorXd MakeProfiles(FitRun* run, FitResult* result) {
     }
     if (profile.branches.empty()) {
       const std::string& name = run->problem->entries()[static_cast<size_t>(parameter)].name;
-      result->uncertainty.warnings.push_back("the interval of '" + name + "' may be wrong (" + why +
-                                             "): its profile takes long; --profile makes it");
+      std::string text = "the interval of '";
+      text.append(name).append("' may be wrong (").append(why);
+      text.append("): its profile takes long; --profile makes it");
+      result->uncertainty.warnings.push_back(std::move(text));
       continue;
     }
     profile.why = why;

@@ -624,7 +624,7 @@ class Minimiser : public ceres::IterationCallback {
         directions.push_back(unit / lengths[k] * Eigen::VectorXd::Unit(lengths.size(), k));
       }
     }
-    for (Eigen::VectorXd direction :
+    for (const Eigen::VectorXd& direction :
          {StepOf(FinalSteps::Kind::kGaussNewton),
           Eigen::VectorXd(
               (lengths.array() > 0.0)

@@ -83,7 +83,7 @@ std::string Find(const Scene& scene, const std::vector<BodyPoint>& points, const
     if (moved->body == kWorld) {
       return "expected joints of the same body, got '" + from.name + "' and '" + to.name + "'";
     }
-    const std::string wrong = FindBeyond(scene, link.to_joint, outer, moved);
+    std::string wrong = FindBeyond(scene, link.to_joint, outer, moved);
     if (!wrong.empty()) return wrong;
   } else {
     const BodyPoint& to = points[static_cast<size_t>(link.to_point)];

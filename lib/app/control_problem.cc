@@ -182,9 +182,11 @@ class Reader {
       const bool control = term.kind == CostTerm::Kind::kControl;
       std::string of = control ? problem_.paths[term.index] : outputs_[term.index];
       if (term.kind == CostTerm::Kind::kPoint) {
-        of = (term.axis == 0 ? "x" : "y") + (" of a point of " + of.substr(0, of.size() - 2));
+        of.resize(of.size() - 2);
+        of.insert(0, term.axis == 0 ? "x of a point of " : "y of a point of ");
       }
-      problem_.term_names.push_back(place + " (" + of + ")");
+      std::string& name = problem_.term_names.emplace_back(place);
+      name.append(" (").append(of).append(")");
     }
   }
 
