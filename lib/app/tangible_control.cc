@@ -489,7 +489,7 @@ long NumRunSteps(const ControlFile& file) {
 
 // Where the first plan begins: with starts or sampling at the plan that they find.
 RowMatrixXd FirstControls(const ControlFile& file, const Cost& cost, long horizon) {
-  const RowMatrixXd initial = file.InitialControls(horizon);
+  RowMatrixXd initial = file.InitialControls(horizon);
   const SearchOptions search = SearchOf(file);
   Scene scene = file.scene;
   scene.simulation.duration = static_cast<double>(horizon) * scene.simulation.dt;

@@ -110,6 +110,7 @@ class Searcher {
   void KeepTheBest() {
     const std::vector<size_t> order = Ascending(CostsOf(starts_));
     std::vector<RowMatrixXd> kept;
+    kept.reserve(static_cast<size_t>(o_.starts.count));
     for (int i = 0; i < o_.starts.count; ++i)
       kept.push_back(starts_[order[static_cast<size_t>(i)]]);
     starts_ = std::move(kept);
@@ -192,6 +193,7 @@ class Searcher {
     for (int budget = kFirstIterations; going.size() > 1; budget *= 2) {
       Continue(going, budget);
       std::vector<double> costs;
+      costs.reserve(going.size());
       for (const size_t i : going) costs.push_back(CostOf(i));
       std::vector<size_t> kept;
       const std::vector<size_t> order = Ascending(costs);
