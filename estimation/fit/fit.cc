@@ -656,9 +656,7 @@ Eigen::VectorXd MakeProfiles(FitRun* run, FitResult* result) {
     const long budget = asked ? std::numeric_limits<long>::max() : end - result->rollouts;
     Profile profile = MakeProfile(run->options, *result, parameter, budget, run->problem, &better,
                                   &result->rollouts);
-    if (better.size() > 0) {
-      break;
-    }
+    if (better.size() > 0) break;
     if (profile.branches.empty()) {
       const std::string& name = run->problem->entries()[static_cast<size_t>(parameter)].name;
       std::string text = "the interval of '";
