@@ -646,7 +646,11 @@ class Minimiser : public ceres::IterationCallback {
       }
     }
     minimum_.status = FitStatus::kConverged;
-    minimum_.message = "a minimum at a kink: the cost rises both ways, and its derivative jumps";
+    // A cost with kinks may fall between directions that each rise.
+    minimum_.message =
+        num_free == 1.0
+            ? "a minimum at a kink: the cost rises both ways, and its derivative jumps"
+            : "at a kink: the cost rises both ways along each parameter, and its derivative jumps";
     return true;
   }
 

@@ -79,11 +79,11 @@ struct BasicMotor {
 
 /// A joint of bodies[0] against bodies[1]; −1 is the world. Anchors are world points at time 0,
 /// before `angle` and `rate` are applied. Which fields a type has:
-///   kRevolute   anchors[0], angle, rate, damping (N m s), limits (rad), effort (N m),
-///               stiffness (N m/rad) with rest (rad)
+///   kRevolute   anchors[0], angle, rate, damping (N m s), limits (rad), effort (N m), friction and
+///               motor (N m), stiffness (N m/rad) with rest (rad)
 ///   kPrismatic  anchors[0], axis (world at time 0, fixed in bodies[1]), angle = displacement (m),
-///               rate (m/s), damping (N s/m), limits (m), effort (N), stiffness (N/m)
-///               with rest (m)
+///               rate (m/s), damping (N s/m), limits (m), effort (N), friction and motor (N),
+///               stiffness (N/m) with rest (m)
 ///   kWeld       anchors[0]
 ///   kDistance   anchors[0] on bodies[0], anchors[1] on bodies[1]; limits (m) take the place of the
 ///               distance as drawn

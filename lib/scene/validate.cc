@@ -124,6 +124,10 @@ void CheckJoint(const BasicJoint<double>& joint, const JsonReader& place) {
   if (joint.type == JointType::kPrismatic && joint.axis.norm() == 0.0) {
     place.At("axis").Fail("expected a direction, got the zero vector");
   }
+  if (joint.type == JointType::kDistance && joint.limits && joint.limits->second == 0.0) {
+    place.At("limits").At(1).FailExpected("a number > 0 (a revolute joint holds points together)",
+                                          0.0);
+  }
   if (joint.limits && joint.limits->first > joint.limits->second) {
     place.At("limits").Fail("expected [low, high] with low <= high, got [" +
                             Json(joint.limits->first).dump() + ", " +

@@ -260,6 +260,8 @@ TEST(BadSceneTest, Joints) {
       {"/joints/0/motor/torque", "1",
        "/joints/0/motor/torque: unknown key of a motor, expected one of speed, limit, got "
        "\"torque\""},
+      {"/joints/3/limits", "[0, 0]",
+       "/joints/3/limits/1: expected a number > 0 (a revolute joint holds points together), got 0"},
       {"/joints/3/limits", "[-1, 20]", "/joints/3/limits/0: expected a number >= 0, got -1"},
       {"/joints/0/damping", "-1", "/joints/0/damping: expected a number >= 0, got -1"},
       {"/joints/0/contact", "0", "/joints/0/contact: expected true or false, got 0"},
@@ -271,9 +273,10 @@ TEST(BadSceneTest, Joints) {
 TEST(BadSceneTest, FrictionThatGrowsWithTheSpeed) {
   Scene scene;
   std::string error;
-  ParseScene(R"({"bodies": [{"name": "m", "mass": 1, "inertia": 1, "position": [0, 0], "friction": 0.2,
+  ParseScene(
+      R"({"bodies": [{"name": "m", "mass": 1, "inertia": 1, "position": [0, 0], "friction": 0.2,
       "kinetic_friction": 0.3, "stribeck_speed": 1}]})",
-             "bad.json", ::testing::TempDir(), &scene, &error);
+      "bad.json", ::testing::TempDir(), &scene, &error);
   EXPECT_EQ(error,
             "bad.json: /bodies/0/kinetic_friction: expected a number <= friction, which is 0.2, "
             "got 0.3");

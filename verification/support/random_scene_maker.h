@@ -67,7 +67,7 @@ class SceneMaker {
   /// Drag and joint springs, in every fourth scene. They use separate random numbers, so that the
   /// rest of the scene of a seed does not change.
   void Mechanisms();
-  /// Motors, ropes and restitution of limits, likewise.
+  /// Motors, ropes, restitution of limits and friction that decays, likewise.
   void Drives();
   /// Ellipses in the place of other shapes, and contact points, in every fourth scene; with random
   /// numbers of their own as well.

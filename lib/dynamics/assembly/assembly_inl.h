@@ -200,15 +200,7 @@ class ProblemBuilder {
     block.friction = EvaluateCoefficient((*friction_)[i], model_.parameters);
     block.has_friction = (*friction_)[i].value > 0.0;
     if constexpr (kLevel == Level::kAcceleration) {
-      DecaySource decay;
-      if (contact.joint < 0 && block.has_friction &&
-          MixedDecay(model_, contact.a, contact.b, &decay)) {
-        const T numbers[3] = {block.friction, EvaluateCoefficient(decay.kinetic, model_.parameters),
-                              EvaluateCoefficient(decay.speed, model_.parameters)};
-        const T slip = SlipOf(state_, contact, rows);
-        const T lost = FrictionDecay(numbers, slip);
-        block.friction -= ValueOf(slip) < 0.0 ? T(-lost) : lost;
-      }
+      if (contact.joint < 0 && block.has_friction) LetFrictionDecay(contact, rows, &block);
     }
     block.c_n = c_n;
     block.c_t = c_t;
@@ -227,6 +219,18 @@ class ProblemBuilder {
   }
 
  private:
+  // The coefficient of a contact at its sliding speed (DecaySource).
+  void LetFrictionDecay(const ActiveContact& contact, const ContactRows<T>& rows,
+                        ContactBlock<T>* block) const {
+    DecaySource decay;
+    if (!MixedDecay(model_, contact.a, contact.b, &decay)) return;
+    const T numbers[3] = {block->friction, EvaluateCoefficient(decay.kinetic, model_.parameters),
+                          EvaluateCoefficient(decay.speed, model_.parameters)};
+    const T slip = SlipOf(state_, contact, rows);
+    const T lost = FrictionDecay(numbers, slip);
+    block->friction -= ValueOf(slip) < 0.0 ? T(-lost) : lost;
+  }
+
   const Model<T>& model_;
   const ModelStructure& s_;
   const State<T>& state_;

@@ -56,7 +56,7 @@ ContactSearch::ContactSearch(const Model<double>& model) : lengths_(model) {
   const ModelStructure& structure = *model.structure;
   const size_t n = structure.bodies.size();
   bound_.assign(n, 0.0);
-  AppendLimits(model, &limits_);
+  limits_.reserve(2 * structure.joints.size());
   limit_bound_.assign(structure.joints.size(), 0.0);
   boxes_.resize(n);
   free_twist_.assign(3 * n, 0.0);
@@ -116,15 +116,13 @@ bool ContactSearch::Rebounds(const Model<double>& model, const State<double>& st
                              const ActiveContact& contact, const ContactRows<double>& rows) const {
   const SimulationSettings& settings = model.structure->settings;
   const double approach = RelativeSpeed(state, contact.a, rows.normal_a, contact.b, rows.normal_b);
+  if (!(approach < -settings.restitution_threshold)) return false;
   double free_approach = 0.0;
   for (int i = 0; i < 3; ++i) {
     free_approach += rows.normal_a[i] * free_twist_[3 * contact.a + i] +
                      rows.normal_b[i] * free_twist_[3 * contact.b + i];
   }
-  if (!(approach < -settings.restitution_threshold) ||
-      !(contact.gap + h * free_approach < settings.contact_margin)) {
-    return false;
-  }
+  if (!(contact.gap + h * free_approach < settings.contact_margin)) return false;
   const double e = RestitutionOf(model, contact).value;
   return e > 0.0 &&
          (contact.gap >= 0.0 || e * approach < std::max(contact.gap / h, -settings.recovery_speed));
@@ -134,6 +132,8 @@ void ContactSearch::FindLimits(const Model<double>& model, const State<double>& 
                                const AssemblyScratch<double>& scratch,
                                std::vector<ActiveContact>* contacts) {
   const ModelStructure& structure = *model.structure;
+  limits_.clear();
+  AppendLimits(model, &limits_);
   for (ActiveContact limit : limits_) {
     const JointIndex& joint = structure.joints[limit.joint];
     ContactRows<double> rows;

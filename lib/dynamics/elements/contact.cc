@@ -44,7 +44,7 @@ void AppendLimits(const Model<double>& model, std::vector<ActiveContact>* contac
   const std::vector<JointIndex>& joints = model.structure->joints;
   for (size_t j = 0; j < joints.size(); ++j) {
     for (const double side : {1.0, -1.0}) {
-      if ((side > 0.0 ? joints[j].low : joints[j].high) < 0) continue;
+      if (!HasLimit(model, joints[j], side)) continue;
       ActiveContact& limit = contacts->emplace_back();
       limit.a = joints[j].a;
       limit.b = joints[j].b;

@@ -14,9 +14,10 @@
 //
 // A contact has an impact where e > 0, n·v < −threshold and gap + h n·v_free < margin; in
 // penetration the smaller of both constants is taken. A joint limit is a row like a contact without
-// friction or restitution, its gap the coordinate's distance from the limit. Dry friction in a
-// joint is a contact without a normal row that is always closed: its tangent row is that of the
-// coordinate, and the force or torque at which it slides takes the place of μ (contact_problem.h).
+// friction, its gap the coordinate's distance from the limit. Dry friction in a joint is a contact
+// without a normal row that is always closed: its tangent row is that of the coordinate, and the
+// force or torque at which it slides takes the place of μ (contact_problem.h). A motor is friction
+// about the speed that it keeps.
 //
 // The law is a discrete choice that is made in double, and the derivative is that of the chosen
 // law. The map from states to states jumps between kGap and kRestitution; the margins say how near
@@ -136,8 +137,9 @@ CoefficientSource MixedCoefficient(const Model<T>& model, int first, int second,
   return source;
 }
 
-/// How the friction of a contact that slides decays with its speed (Stribeck), by events: towards
-/// `kinetic` far above `speed`, m/s.
+/// How the friction of a contact decays with its sliding speed w (Stribeck), by events, with μk =
+/// `kinetic` and vs = `speed`, m/s:
+///   |λt| = (μk + (μ − μk) exp(−(w / vs)²)) λn
 struct DecaySource {
   CoefficientSource kinetic, speed;
 };
@@ -180,7 +182,15 @@ CoefficientSource RestitutionOf(const Model<double>& model, const ActiveContact&
 /// limit has none.
 CoefficientSource FrictionOf(const Model<double>& model, const ActiveContact& contact);
 
-/// Both limits of each joint that has limits, the low one first; gaps are not set.
+/// Whether a joint has a limit on a side (+1 low, −1 high) that it can reach: the distance of a
+/// rope's ends is never below 0, and at 0 it has no direction.
+inline bool HasLimit(const Model<double>& model, const JointIndex& joint, double side) {
+  const int limit = side > 0.0 ? joint.low : joint.high;
+  return limit >= 0 &&
+         (joint.type != JointType::kRope || side < 0.0 || model.parameters[limit] > 0.0);
+}
+
+/// The limits of all joints (HasLimit), of a joint the low one first; gaps are not set.
 void AppendLimits(const Model<double>& model, std::vector<ActiveContact>* contacts);
 
 /// The friction and motor of each joint that has them, which are active at all times.

@@ -195,8 +195,8 @@ class LocalEntries {
     }
   }
 
-  /// The entries of a coefficient that decays with the sliding speed, but for those of the friction
-  /// at rest, whose share is returned.
+  /// The entries of a coefficient that decays with the sliding speed (DecaySource), times a factor,
+  /// but for those of the friction at rest, whose share is returned.
   double EmitDecay(const ActiveContact& contact, const ContactRows<LocalJet>& rows, double rest,
                    const LocalJet& slip, const Locals& locals, double factor) {
     DecaySource decay;

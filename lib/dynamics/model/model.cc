@@ -92,12 +92,10 @@ void AddBodies(const BasicScene<T>& scene, Places* places, ModelStructure* struc
   structure->bodies.push_back(world);
 }
 
-// Whether a limit can be reached. The distance of a rope's ends is never below 0, and at 0 it has
-// no direction.
+// An infinite limit limits nothing.
 template <typename T>
-bool Limits(const BasicJoint<T>& joint, const T& limit) {
-  const bool is_idle = joint.type == JointType::kDistance && ValueOf(limit) == 0.0;
-  return std::isfinite(ValueOf(limit)) && !is_idle;
+bool Limits(const T& limit) {
+  return std::isfinite(ValueOf(limit));
 }
 
 template <typename T>
@@ -121,8 +119,8 @@ void AddJoints(const BasicScene<T>& scene, Places* places, ModelStructure* struc
       index.motor = joint.motor ? places->Take(2) : -1;
     }
     if (joint.limits) {
-      index.low = Limits(joint, joint.limits->first) ? places->Take(1) : -1;
-      index.high = Limits(joint, joint.limits->second) ? places->Take(1) : -1;
+      index.low = Limits(joint.limits->first) ? places->Take(1) : -1;
+      index.high = Limits(joint.limits->second) ? places->Take(1) : -1;
       index.limit_restitution = joint.limit_restitution ? places->Take(1) : -1;
     }
     if (joint.effort_signal) {
@@ -269,8 +267,8 @@ void FillJoints(const BasicScene<T>& scene, const State<T>& drawn, int world,
       }
     }
     if (joint.limits) {
-      if (Limits(joint, joint.limits->first)) numbers->push_back(joint.limits->first);
-      if (Limits(joint, joint.limits->second)) numbers->push_back(joint.limits->second);
+      if (Limits(joint.limits->first)) numbers->push_back(joint.limits->first);
+      if (Limits(joint.limits->second)) numbers->push_back(joint.limits->second);
       if (joint.limit_restitution) numbers->push_back(*joint.limit_restitution);
     }
   }

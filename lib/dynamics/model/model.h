@@ -109,7 +109,6 @@ struct PairIndex {
 };
 
 struct ModelStructure {
-  bool friction_decays = false;  ///< whether the friction of some contact may decay
   std::string scene_name;
   SimulationSettings settings;
   std::vector<BodyIndex> bodies;  ///< in scene order, then the world
@@ -122,6 +121,7 @@ struct ModelStructure {
   std::vector<std::pair<int, int>> joined;  ///< bodies with a joint without contact, ascending
   std::vector<int> moving;                  ///< body of each block
   bool joint_loops = false;
+  bool friction_decays = false;  ///< whether the friction of some contact may (contact.h)
   int num_parameters = 0;
 
   int num_bodies() const { return static_cast<int>(bodies.size()); }

@@ -484,7 +484,7 @@ bool EventSearch::Run(const Model<double>& model, const std::vector<ActiveContac
   for (size_t j = 0; j < model.structure->joints.size(); ++j) {
     const JointIndex& joint = model.structure->joints[j];
     for (const double side : {1.0, -1.0}) {
-      if ((side > 0.0 ? joint.low : joint.high) < 0) continue;
+      if (!HasLimit(model, joint, side)) continue;
       if (event.kind != EventKind::kAtOnce) SearchLimit(model, static_cast<int>(j), side, &event);
     }
   }

@@ -9,6 +9,7 @@
 
 #include "../../support/gradients.h"
 #include "../../support/scenes.h"
+#include "tangible/simulation/gradient/batch.h"
 #include "tangible/simulation/stepping/rollout.h"
 
 namespace tangible {
@@ -109,6 +110,24 @@ TEST(MotorTest, ABrakeAndFrictionHoldALoadTogether) {
   }
 }
 
+// A motor that is at its speed from the start, one that can do nothing, and no gravity.
+TEST(MotorTest, NothingToDo) {
+  for (const char* stepping : {"event", "fixed"}) {
+    for (const char* motor :
+         {R"("motor": {"speed": -1, "limit": 4})", R"("motor": {"speed": 5, "limit": 0})"}) {
+      Scene scene = Wheel(motor, stepping);
+      for (const double gravity : {-9.81, 0.0}) {
+        scene.gravity.y() = gravity;
+        const std::vector<std::string> paths = {"bodies/w/inertia"};
+        const GradientResult result = Jacobian(scene, paths, GradientMethod::kAdjoint);
+        EXPECT_NEAR(result.values[2], -1.0, 1e-12) << stepping << motor;
+        EXPECT_NEAR(result.values[5], -1.0, 1e-12) << stepping << motor;
+        EXPECT_NEAR(result.jacobian(2, 0), 0.0, 1e-12) << stepping << motor;
+      }
+    }
+  }
+}
+
 // A slider that a motor lifts, or that falls because the motor is too weak.
 TEST(MotorTest, LiftsALoad) {
   for (const double limit : {30.0, 15.0}) {
@@ -175,6 +194,62 @@ TEST(RopeTest, APendulumGoesSlackAndTaut) {
   EXPECT_NEAR(std::hypot(x[0], x[1]), 0.8, 1e-9);
   EXPECT_NEAR(0.5 * (x[3] * x[3] + x[4] * x[4]) + kGravity * x[1], energy, 1e-6);
   ExpectOthersAgree(scene, paths, result);
+}
+
+// What stands exactly at a boundary: a rope that becomes taut at the end of a step, or starts taut.
+TEST(RopeTest, BecomesTautAtTheEndOfAStep) {
+  const double length = 0.5 * kGravity * 0.4 * 0.4;  // after 0.4 s
+  for (const double e : {0.0, 0.5}) {
+    const Scene scene = Rope(R"("limits": [0, 0.7848], "limit_restitution": )" + std::to_string(e),
+                             R"("position": [0, 0])", "event", 0.01, 0.5);
+    const std::vector<std::string> paths = {"joints/r/limits/1", "gravity/y"};
+    const GradientResult result = Jacobian(scene, paths, GradientMethod::kAdjoint);
+    const double v = kGravity * 0.4;
+    const double t = 0.1;
+    const bool rebounds = e > 0.0;
+    EXPECT_NEAR(result.values[1], rebounds ? -length + e * v * t - 0.5 * kGravity * t * t : -length,
+                1e-9);
+    EXPECT_NEAR(result.jacobian(1, 0),
+                rebounds ? -1.0 + e * (kGravity / v * t - 1.0) + kGravity * t / v : -1.0, 1e-7);
+    ExpectOthersAgree(scene, paths, result);
+  }
+}
+
+TEST(RopeTest, HangsStillWhereItStartsTaut) {
+  for (const char* stepping : {"event", "fixed"}) {
+    const Scene scene = SceneOf(R"({"bodies": [{"name": "m", "mass": 2, "inertia": 0.5,
+        "position": [0, -0.8]}], "joints": [{"name": "r", "type": "distance",
+        "bodies": ["m", "world"], "anchors": [[0, -0.8], [0, 0]], "limits": [0, 0.8],
+        "limit_restitution": 1}])" +
+                                Tail(stepping, 0.01, 0.3));
+    const GradientResult result =
+        Jacobian(scene, {"joints/r/limits/1", "bodies/m/mass"}, GradientMethod::kAdjoint);
+    EXPECT_NEAR(result.values[1], -0.8, 1e-15) << stepping;
+    EXPECT_NEAR(result.values[4], 0.0, 1e-15) << stepping;
+    EXPECT_NEAR(result.jacobian(1, 1), 0.0, 1e-12) << stepping;
+  }
+}
+
+// A low limit of 0 cannot be reached; as a parameter it may become one that can.
+TEST(RopeTest, ALowLimitGrowsFromZero) {
+  const Scene scene = SceneOf(R"({"gravity": [0, 0], "bodies": [{"name": "m", "mass": 2,
+      "inertia": 0.5, "position": [0.5, 0], "velocity": [-1, 0]}],
+      "joints": [{"name": "r", "type": "distance", "bodies": ["m", "world"],
+      "anchors": [[0.5, 0], [0, 0]], "limits": [0, 0.8], "limit_restitution": 0.5}])" +
+                              Tail("event", 0.01, 0.4));
+  RowMatrixXd values(3, 1);
+  values << 0.0, 0.3, 0.0;
+  for (const Stepping stepping : {Stepping::kEvent, Stepping::kFixed}) {
+    Scene stepped = scene;
+    stepped.simulation.stepping = stepping;
+    const BatchResult batch =
+        RunBatch(stepped, testing::Resolve(stepped, {"joints/r/limits/0"}), values, {.threads = 1});
+    ASSERT_EQ(batch.message, "");
+    const double error = stepping == Stepping::kFixed ? 0.02 : 1e-9;
+    EXPECT_NEAR(batch.rows[0].final.pose[0], 0.1, error);
+    EXPECT_NEAR(batch.rows[1].final.pose[0], 0.3 + 0.5 * 0.2, error);
+    EXPECT_EQ(batch.rows[2].final.pose[0], batch.rows[0].final.pose[0]);
+  }
 }
 
 // Both ends move: the centre of mass of two balls on a rope flies on, and they turn about it.
