@@ -53,6 +53,16 @@ TEST(ClassifyJointsTest, Loops) {
             (std::vector<P>{P::kLoop, P::kLoop}));
 }
 
+TEST(ClassifyJointsTest, ARopeClosesNoLoop) {
+  Scene scene = SceneOf({kM, kM}, {{0, -1}, {1, 0}, {1, -1}});
+  scene.joints[2].type = JointType::kDistance;
+  EXPECT_EQ(ClassifyJoints(scene), (std::vector<P>{P::kLoop, P::kLoop, P::kLoop}));
+  scene.joints[2].limits = {0.0, 1.0};
+  const std::vector<P> places = ClassifyJoints(scene);
+  EXPECT_EQ(places[0], P::kTree);
+  EXPECT_EQ(places[1], P::kTree);
+}
+
 TEST(ClassifyJointsTest, EverythingFixedIsOneNode) {
   // From the world over a body to a static one: a loop, as from a kinematic body to the world.
   EXPECT_EQ(ClassifyJoints(SceneOf({kM, kS}, {{0, -1}, {0, 1}})),

@@ -37,6 +37,23 @@ TEST(CertifyEventsTest, ABounceIsTrustworthy) {
   EXPECT_EQ(c.events, 1);
 }
 
+// A box that is moved out of penetration turns until its other lower corner is the nearest, in
+// penetration as well: its gap does not tell when, so that the derivative is not that of the motion.
+TEST(CertifyEventsTest, ACornerThatBecomesTheNearestInPenetrationIsNamed) {
+  const auto verdict = [](double duration) {
+    return CertificateOf(R"("bodies": [{"name": "box", "mass": 0.8, "friction": 0.1,
+        "restitution": 0.5, "shape": {"box": {"size": [0.05, 0.24]}}, "position": [0, -0.096],
+        "angle": -0.8223, "angular_velocity": -2.302}, )" +
+                             Floor() + "]",
+                         duration, "", "runge_kutta_4")
+        .verdict;
+  };
+  EXPECT_EQ(verdict(0.038), "trustworthy");
+  EXPECT_NE(verdict(0.0395).find("another feature becomes the nearest in penetration"),
+            std::string::npos)
+      << verdict(0.0395);
+}
+
 // Two discs dropped from one height, or sliding at one speed. By themselves each has events of its
 // own; a strut between them makes their impacts one, and an end of sliding that of both.
 TEST(CertifyEventsTest, EventsOfCoupledBodiesAtTheSameTimeAreNamed) {

@@ -41,6 +41,23 @@ TEST(EnergyWatchTest, StepsBeyondStabilityAreReportedAsDiverged) {
   }
 }
 
+// A motor may bring any energy into a scene that starts nearly at rest; a brake brings none.
+TEST(EnergyWatchTest, AMotorDrives) {
+  const auto is_driven =
+      [](const std::string& speed) {
+        Model<double> model;
+        State<double> state;
+        BuildModel(test_scenes::SceneOf(R"({"gravity": [0, 0], "bodies": [{"name": "w", "mass": 1,
+        "inertia": 1, "position": [0, 0], "angular_velocity": 1e-3}], "joints": [{"name": "h",
+        "type": "revolute", "bodies": ["w", "world"], "anchor": [0, 0],
+        "motor": {"speed": )" + speed + R"(, "limit": 9}}]})"),
+                   &model, &state);
+        return IsDriven(model, state);
+      };
+  EXPECT_TRUE(is_driven("10"));
+  EXPECT_FALSE(is_driven("0"));
+}
+
 TEST(EnergyWatchTest, StepsThatResolveTheSpringAreDone) {
   for (const char* settings :
        {R"({"dt": 0.005, "duration": 2})",
