@@ -55,6 +55,25 @@ TEST(ModelTest, NumbersStandWhereTheIndexSays) {
   EXPECT_FALSE(s.joint_loops);
 }
 
+// A rod from the chain's end to the world closes a loop of rows; a rope, which has a limit and no
+// row, does not.
+TEST(ModelTest, RowsCloseLoopsAndRopesDoNot) {
+  for (const bool rope : {false, true}) {
+    Scene scene = Chain("", "", "");
+    const Scene more = SceneOf(R"({"bodies": [{"name": "c", "mass": 1,
+        "shape": {"circle": {"radius": 0.1}}, "position": [0.3, -1.8]}],
+        "joints": [{"name": "r", "type": "distance", "bodies": ["c", "world"],
+        "anchors": [[0.3, -1.8], [1, 0]])" +
+                               std::string(rope ? R"(, "limits": [0, 3])" : "") + "}]}");
+    scene.joints.push_back(more.joints[0]);
+    scene.joints.back().bodies[0] = 2;
+    Model<double> model;
+    State<double> state;
+    BuildModel(scene, &model, &state);
+    EXPECT_EQ(model.structure->joint_loops, !rope);
+  }
+}
+
 TEST(ModelTest, InertiaFollowsMassAndShapeInValueAndDerivative) {
   const Scene scene = Chain("", "", "");
   BasicScene<LocalJet> jets = CastScene<LocalJet>(scene);

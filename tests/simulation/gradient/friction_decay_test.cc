@@ -139,5 +139,41 @@ TEST(FrictionDecayTest, OnABelt) {
   }
 }
 
+// Blocks that do not meet are islands of their own, each with its friction.
+TEST(FrictionDecayTest, BlocksApart) {
+  const std::string both = R"("friction": 0.5, "kinetic_friction": 0.2, "stribeck_speed": 0.4)";
+  Scene scene = Block(both, both, "", 0.2);
+  for (int k = 0; k < 11; ++k) {
+    scene.bodies.push_back(scene.bodies[1]);
+    scene.bodies.back().name = "b" + std::to_string(k);
+    scene.bodies.back().position.x() += 2.0 * (k + 1);
+  }
+  const std::vector<std::string> paths = {"bodies/*/stribeck_speed"};
+  const GradientResult result = Jacobian(scene, paths, GradientMethod::kAdjoint);
+  const double x = Slide({0.5, 0.2, 0.4}, 1.5, 0.2).first;
+  const double h = 1e-5;
+  const double slope =
+      (Slide({0.5, 0.2, 0.4 + h}, 1.5, 0.2).first - Slide({0.5, 0.2, 0.4 - h}, 1.5, 0.2).first) /
+      (2.0 * h);
+  for (int k = 0; k < 12; ++k) {
+    EXPECT_NEAR(result.values[6 * k], 2.0 * k - x, 1e-8) << k;
+    EXPECT_NEAR(result.jacobian(6 * k, 0), -slope, 1e-7) << k;
+  }
+}
+
+// A tilted box slides on a corner, whose speed along the floor depends on the angle.
+TEST(FrictionDecayTest, ACornerTurnsAsItSlides) {
+  const std::string both = R"("friction": 0.5, "kinetic_friction": 0.2, "stribeck_speed": 0.4)";
+  Scene scene = Block(both, both, "", 0.1);
+  scene.bodies[1].position.y() = 0.2 * std::sin(0.3) + 0.05 * std::cos(0.3) + 0.001;
+  scene.bodies[1].angle = 0.3;
+  scene.bodies[1].angular_velocity = 4.0;
+  const std::vector<std::string> paths = {"bodies/b/angle", "bodies/b/angular_velocity",
+                                          "bodies/*/stribeck_speed"};
+  const GradientResult result = Jacobian(scene, paths, GradientMethod::kAdjoint);
+  EXPECT_EQ(result.certificate.verdict, "trustworthy");
+  ExpectOthersAgree(scene, paths, result);
+}
+
 }  // namespace
 }  // namespace tangible

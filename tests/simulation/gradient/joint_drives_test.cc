@@ -147,6 +147,46 @@ TEST(MotorTest, LiftsALoad) {
   }
 }
 
+// The motor's speed is not in the state at the step's start, and is counted where a step looks for
+// what may touch: from rest the slider meets a wall within one step, and is held against it.
+TEST(MotorTest, MeetsAWallWithinAStep) {
+  const Scene scene = SceneOf(R"({"gravity": [0, 0], "bodies": [
+      {"name": "c", "mass": 1, "shape": {"box": {"size": [0.2, 0.2]}}, "position": [0, 0]},
+      {"name": "wall", "static": true, "shape": {"box": {"size": [0.02, 1]}},
+       "position": [0.16, 0]}],
+      "joints": [{"name": "rail", "type": "prismatic", "bodies": ["c", "world"],
+      "anchor": [0, 0], "axis": [1, 0], "motor": {"speed": 50, "limit": 2000}}])" +
+                              Tail("event", 0.1, 0.1));
+  const std::vector<std::string> paths = {"bodies/wall/position/x", "joints/rail/motor/limit"};
+  const GradientResult result = Jacobian(scene, paths, GradientMethod::kAdjoint);
+  EXPECT_NEAR(result.values[0], 0.05, 1e-10);
+  EXPECT_NEAR(result.values[3], 0.0, 1e-12);
+  EXPECT_NEAR(result.jacobian(0, 0), 1.0, 1e-9);
+  EXPECT_NEAR(result.jacobian(0, 1), 0.0, 1e-9);
+  ExpectOthersAgree(scene, paths, result);
+}
+
+// A ball rebounds while a motor beside it does work, which is none of the impact's.
+TEST(MotorTest, ItsWorkIsNotAnImpacts) {
+  const Scene scene = SceneOf(R"({"bodies": [
+      {"name": "floor", "static": true, "restitution": 0.5,
+       "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}},
+      {"name": "ball", "mass": 1, "restitution": 0.5, "shape": {"circle": {"radius": 0.1}},
+       "position": [0, 0.2]},
+      {"name": "w", "mass": 2, "inertia": 0.5, "position": [3, 3]}],
+      "joints": [{"name": "h", "type": "revolute", "bodies": ["w", "world"], "anchor": [3, 3],
+      "motor": {"speed": 500, "limit": 40}}])" +
+                              Tail("fixed", 0.01, 0.2));
+  Model<double> model;
+  State<double> state;
+  BuildModel(scene, &model, &state);
+  const RolloutReport report = Rollout(model, state, {}, &state);
+  EXPECT_EQ(report.message, "");
+  EXPECT_NEAR(state.twist[8], 40.0 / 0.5 * 0.2, 1e-9);
+  EXPECT_GT(state.twist[4], 0.0);  // it has rebounded
+  EXPECT_LE(report.impact_energy_gain, 0.0);
+}
+
 Scene Rope(const std::string& limits, const std::string& start, const std::string& stepping,
            double dt, double duration) {
   return SceneOf(R"({"bodies": [{"name": "m", "mass": 2, "inertia": 0.5, )" + start +
@@ -249,6 +289,26 @@ TEST(RopeTest, ALowLimitGrowsFromZero) {
     EXPECT_NEAR(batch.rows[0].final.pose[0], 0.1, error);
     EXPECT_NEAR(batch.rows[1].final.pose[0], 0.3 + 0.5 * 0.2, error);
     EXPECT_EQ(batch.rows[2].final.pose[0], batch.rows[0].final.pose[0]);
+  }
+}
+
+// The ends of a rope may meet and part again, also where they meet on a step's end.
+TEST(RopeTest, PassesThroughItsAnchor) {
+  for (const char* stepping : {"event", "fixed"}) {
+    for (const double dt : {0.01, 0.0075}) {
+      const Scene scene = SceneOf(R"({"gravity": [0, 0], "bodies": [{"name": "m", "mass": 2,
+          "inertia": 0.5, "position": [0.5, 0], "velocity": [-1, 0]}],
+          "joints": [{"name": "r", "type": "distance", "bodies": ["m", "world"],
+          "anchors": [[0.5, 0], [0, 0]], "limits": [0, 0.8], "limit_restitution": 0.5}])" +
+                                  Tail(stepping, dt, 1.0));
+      const std::vector<std::string> paths = {"bodies/m/velocity/x", "bodies/m/position/x"};
+      const GradientResult result = Jacobian(scene, paths, GradientMethod::kAdjoint);
+      EXPECT_NEAR(result.values[0], -0.5, 1e-12) << stepping << dt;
+      EXPECT_EQ(result.values[3], -1.0) << stepping << dt;
+      EXPECT_NEAR(result.jacobian(0, 0), 1.0, 1e-12) << stepping << dt;
+      EXPECT_NEAR(result.jacobian(3, 0), 1.0, 1e-12) << stepping << dt;
+      ExpectOthersAgree(scene, paths, result);
+    }
   }
 }
 
