@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "tangible/math/planar.h"
@@ -43,13 +44,80 @@ double DoubleArea(const Points& points) {
   return area;
 }
 
+// On which side of the line from a to b the point is: 1 left, -1 right, and 0 where its distance
+// cannot be distinguished from rounding. The points are scaled, so the bound is a share of the
+// extent.
+int SideOf(const Vector2<double>& a, const Vector2<double>& b, const Vector2<double>& point) {
+  const double area = Cross(Vector2<double>(b - a), Vector2<double>(point - a));
+  const double bound = kStraightCorner * (b - a).norm();
+  return (area > bound ? 1 : 0) - (area < -bound ? 1 : 0);
+}
+
+// Whether the segments from a to b and from c to d have a point in common.
+bool SegmentsMeet(const Vector2<double>& a, const Vector2<double>& b, const Vector2<double>& c,
+                  const Vector2<double>& d) {
+  const int c_side = SideOf(a, b, c), d_side = SideOf(a, b, d);
+  const int a_side = SideOf(c, d, a), b_side = SideOf(c, d, b);
+  if (c_side * d_side < 0 && a_side * b_side < 0) return true;
+  const auto between = [](const Vector2<double>& from, const Vector2<double>& to,
+                          const Vector2<double>& point) {
+    return (point - from).dot(point - to) <= 0.0;
+  };
+  return (c_side == 0 && between(a, b, c)) || (d_side == 0 && between(a, b, d)) ||
+         (a_side == 0 && between(c, d, a)) || (b_side == 0 && between(c, d, b));
+}
+
+// Two edges of the outline, neighbours excepted, that cross or touch, the lower one first, or
+// {-1, -1}. Edge i goes from vertex i to the next one. Edges are sorted by their left ends, and
+// each is compared with those alone that begin before it ends: a crossing is looked for in faulty
+// outlines only, but these may be large too. Of several pairs it is the first in that order.
+std::pair<int, int> CrossingEdges(const Points& points) {
+  const int size = static_cast<int>(points.size());
+  const auto start = [&points](int edge) { return points[static_cast<std::size_t>(edge)]; };
+  const auto end = [&](int edge) { return start((edge + 1) % size); };
+  std::vector<std::pair<double, int>> by_left;
+  for (int i = 0; i < size; ++i) by_left.emplace_back(std::min(start(i).x(), end(i).x()), i);
+  std::sort(by_left.begin(), by_left.end());
+  for (std::size_t i = 0; i < by_left.size(); ++i) {
+    const int edge = by_left[i].second;
+    const double right = std::max(start(edge).x(), end(edge).x()) + kStraightCorner;
+    for (std::size_t j = i + 1; j < by_left.size() && by_left[j].first <= right; ++j) {
+      const auto [low, high] = std::minmax(edge, by_left[j].second);
+      if (high - low == 1 || high - low == size - 1) continue;
+      if (SegmentsMeet(start(low), end(low), start(high), end(high))) return {low, high};
+    }
+  }
+  return {-1, -1};
+}
+
+// Refuses an outline that is not what a polygon must be: with the two edges that cross where there
+// are such, because then neither the direction of the vertices nor a corner is what is wrong; else
+// with the message at `place`.
+void RefuseOutline(const JsonReader& vertices, const Points& points, const JsonReader& place,
+                   const std::string& message) {
+  const auto [low, high] = CrossingEdges(points);
+  if (low < 0) return place.Fail(message);
+  const auto name = [&points](int edge) {
+    const int next = (edge + 1) % static_cast<int>(points.size());
+    return "the edge of vertices " + std::to_string(edge) + " and " + std::to_string(next);
+  };
+  vertices.Fail("expected an outline that does not cross or touch itself, got " + name(low) +
+                " that meets " + name(high));
+}
+
 // A polygon is convex and counter-clockwise if every corner turns left and all turns add up to one
-// full turn (a pentagram's add up to two). Linear in the vertices.
+// full turn (a pentagram's add up to two). Linear in the vertices where nothing is wrong.
 void CheckPolygon(const JsonReader& vertices, const std::vector<double>& numbers) {
   const Points points = Scaled(numbers);
   const std::size_t size = points.size();
+  for (std::size_t i = 0; i < size; ++i) {
+    if (points[i] != points[(i + size - 1) % size]) continue;
+    return vertices.At(static_cast<int>(i))
+        .Fail("expected a convex polygon, got the same vertex twice");
+  }
   if (DoubleArea(points) < -kStraightCorner) {
-    return vertices.Fail("expected counter-clockwise vertices, got clockwise ones");
+    return RefuseOutline(vertices, points, vertices,
+                         "expected counter-clockwise vertices, got clockwise ones");
   }
   double turn = 0.0;
   for (std::size_t i = 0; i < size; ++i) {
@@ -58,19 +126,19 @@ void CheckPolygon(const JsonReader& vertices, const std::vector<double>& numbers
     const double sine = Cross(in, out);
     const double bound = kStraightCorner * in.norm() * out.norm();
     const JsonReader corner = vertices.At(static_cast<int>(i));
-    if (in.norm() == 0.0 || out.norm() == 0.0) {
-      const JsonReader second = in.norm() == 0.0 ? corner : vertices.At(static_cast<int>(i + 1));
-      return second.Fail("expected a convex polygon, got the same vertex twice");
-    }
     if (sine < -bound) {
-      return corner.Fail("expected a convex polygon, got a corner that turns inward");
+      return RefuseOutline(vertices, points, corner,
+                           "expected a convex polygon, got a corner that turns inward");
     }
     if (sine <= bound) {
       return corner.Fail("expected a convex polygon, got a vertex on the line of its neighbours");
     }
     turn += std::atan2(sine, in.dot(out));
   }
-  if (turn > 3.0 * kPi) vertices.Fail("expected a convex polygon, got one that crosses itself");
+  if (turn > 3.0 * kPi) {
+    RefuseOutline(vertices, points, vertices,
+                  "expected a convex polygon, got one that goes around more than once");
+  }
 }
 
 void CheckEllipse(const JsonReader& radii, const std::vector<double>& numbers) {

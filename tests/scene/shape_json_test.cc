@@ -83,9 +83,71 @@ TEST(ReadShapeTest, BadPolygons) {
             place + "/0: expected a convex polygon, got the same vertex twice");
   EXPECT_EQ(PolygonMessage({{0, 0}, {1, 1}, {2, 2}}),
             place + "/0: expected a convex polygon, got a vertex on the line of its neighbours");
-  // A pentagram: every corner turns left.
-  EXPECT_EQ(PolygonMessage(RegularPolygon(5, 2, 1.0, 0.0)),
-            place + ": expected a convex polygon, got one that crosses itself");
+  // Vertices that are the same are said before their direction is.
+  EXPECT_EQ(PolygonMessage({{0, 0}, {0, 1}, {0, 1}, {1, 0}}),
+            place + "/2: expected a convex polygon, got the same vertex twice");
+}
+
+std::string Crossing(int a, int a_next, int b, int b_next) {
+  const auto edge = [](int from, int to) {
+    return "the edge of vertices " + std::to_string(from) + " and " + std::to_string(to);
+  };
+  return "f: /polygon/vertices: expected an outline that does not cross or touch itself, got " +
+         edge(a, a_next) + " that meets " + edge(b, b_next);
+}
+
+TEST(ReadShapeTest, AnOutlineThatCrossesItselfNamesTheTwoEdges) {
+  // A bow tie of area 0; one whose clockwise loop is the larger one; one with the other larger.
+  EXPECT_EQ(PolygonMessage({{0, 0}, {1, 1}, {1, 0}, {0, 1}}), Crossing(0, 1, 2, 3));
+  EXPECT_EQ(PolygonMessage({{0, 0}, {3, 2}, {3, 0}, {0, 1}}), Crossing(0, 1, 2, 3));
+  EXPECT_EQ(PolygonMessage({{0, 0}, {3, 1}, {3, 0}, {0, 2}}), Crossing(0, 1, 2, 3));
+  EXPECT_EQ(PolygonMessage({{0, 0}, {4, 0}, {4, 4}, {2, -1}}), Crossing(0, 1, 2, 3));
+  EXPECT_EQ(PolygonMessage({{0, 0}, {4, -1}, {4, 4}, {3, 4}, {3.5, -2}}), Crossing(0, 1, 3, 4));
+  // A vertex on another edge, and an edge along another one. Several pairs meet there, of which the
+  // one is named whose edges begin further to the left.
+  EXPECT_EQ(PolygonMessage({{0, 0}, {4, 0}, {4, 4}, {2, 0}, {0, 4}}), Crossing(0, 1, 3, 4));
+  EXPECT_EQ(PolygonMessage({{0, 0}, {4, 0}, {4, 4}, {3, 0}, {1, 0}, {0, 4}}), Crossing(0, 1, 4, 5));
+}
+
+TEST(ReadShapeTest, CrossingsAreFoundWhateverTheFirstVertexIsAndTheSize) {
+  // A pentagram: every corner turns left, and each edge meets two others.
+  EXPECT_NE(PolygonMessage(RegularPolygon(5, 2, 1.0, 0.0)).find(" that meets the edge of "),
+            std::string::npos);
+  // The edges from (0, 0) to (3, 1) and from (3, 0) to (0, 2) cross.
+  const std::vector<std::vector<double>> bow_tie = {{0, 0}, {3, 1}, {3, 0}, {0, 2}};
+  for (const double size : {1e-200, 1.0, 1e200}) {
+    for (std::size_t shift = 0; shift < 4; ++shift) {
+      std::vector<std::vector<double>> vertices;
+      for (std::size_t i = 0; i < 4; ++i) {
+        const std::vector<double>& vertex = bow_tie[(i + shift) % 4];
+        vertices.push_back({size * vertex[0], size * vertex[1]});
+      }
+      const int first = shift % 2 == 0 ? 0 : 1;
+      EXPECT_EQ(PolygonMessage(vertices), Crossing(first, first + 1, first + 2, (first + 3) % 4))
+          << size << " " << shift;
+    }
+  }
+  // A triangle that is drawn twice lies on itself.
+  EXPECT_NE(PolygonMessage({{0, 0}, {1, 0}, {0, 1}, {0, 0}, {1, 0}, {0, 1}}).find(" that meets "),
+            std::string::npos);
+}
+
+// An outline of a concave polygon crosses nothing: a comb of n teeth is refused for its first
+// inward corner, and one with a notch that reaches through the back for the edges that cross.
+TEST(ReadShapeTest, ACombIsNoCrossing) {
+  for (const int teeth : {2, 3, 2000}) {
+    std::vector<std::vector<double>> comb = {{0, -1}, {2.0 * teeth, -1}};
+    for (int i = teeth; i > 0; --i) {
+      comb.push_back({2.0 * i - 0.5, 1});
+      comb.push_back({2.0 * i - 1.5, 0});
+    }
+    EXPECT_EQ(PolygonMessage(comb),
+              "f: /polygon/vertices/3: expected a convex polygon, got a corner that turns inward");
+    // The notch that reaches through the back is the rightmost one. Both of its edges meet the back;
+    // the one that is named begins further to the left.
+    comb[3][1] = -2;
+    EXPECT_EQ(PolygonMessage(comb), Crossing(0, 1, 3, 4)) << teeth;
+  }
 }
 
 TEST(IsCentredTest, PolygonsAboutTheOriginAndOff) {
