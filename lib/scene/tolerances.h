@@ -7,8 +7,8 @@
 namespace tangible {
 
 /// The sine of the turn, or area of the polygon over its extent squared: a corner of a polygon that
-/// turns by less counts as straight, because it cannot be distinguished from rounding. A vertex that
-/// is nearer to an edge than this share of the extent touches it.
+/// turns by less counts as straight, because it cannot be distinguished from rounding. A vertex
+/// that is nearer to an edge than this share of the extent touches it.
 inline constexpr double kStraightCorner = 1e-12;
 /// Of the extent of a polygon: a centroid nearer to the origin counts as the origin, so that the
 /// inertia about the origin is known.

@@ -143,8 +143,8 @@ TEST(ReadShapeTest, ACombIsNoCrossing) {
     }
     EXPECT_EQ(PolygonMessage(comb),
               "f: /polygon/vertices/3: expected a convex polygon, got a corner that turns inward");
-    // The notch that reaches through the back is the rightmost one. Both of its edges meet the back;
-    // the one that is named begins further to the left.
+    // The notch that reaches through the back is the rightmost one. Both of its edges meet the
+    // back; the one that is named begins further to the left.
     comb[3][1] = -2;
     EXPECT_EQ(PolygonMessage(comb), Crossing(0, 1, 3, 4)) << teeth;
   }
