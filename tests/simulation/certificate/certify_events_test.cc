@@ -38,7 +38,8 @@ TEST(CertifyEventsTest, ABounceIsTrustworthy) {
 }
 
 // A box that is moved out of penetration turns until its other lower corner is the nearest, in
-// penetration as well: its gap does not tell when, so that the derivative is not that of the motion.
+// penetration as well: its gap does not tell when, so that the derivative is not that of the
+// motion.
 TEST(CertifyEventsTest, ACornerThatBecomesTheNearestInPenetrationIsNamed) {
   const auto verdict = [](double duration) {
     return CertificateOf(R"("bodies": [{"name": "box", "mass": 0.8, "friction": 0.1,
