@@ -6,6 +6,13 @@
 #include <functional>
 
 namespace tangible {
+namespace {
+
+// From this number of closed contacts on a solve for values is refined to rounding and no further:
+// the rounds beyond, which serve sums of derivatives, are a large part of the time of a pile.
+constexpr long kLeastContactsToRounding = 12;
+
+}  // namespace
 
 void ModeSolve::Reserve(size_t rows) {
   for (std::vector<double>* x : {&rhs_, &start_, &x_}) {
@@ -90,6 +97,9 @@ bool ModeSolve::Solve(const ContactProblem<double>& problem, const ContactSoluti
     for (size_t i = 0; i < x_.size(); ++i) {
       x_[i] += start_[i];
     }
+  } else if (std::count_if(block_of.begin(), block_of.end(), [](int block) { return block >= 0; }) >=
+             kLeastContactsToRounding) {
+    system->SolveProximal(problem, modes, x_.data(), 1);
   } else {
     system->Solve(problem, modes, x_.data(), 1);
   }
