@@ -97,8 +97,8 @@ bool ModeSolve::Solve(const ContactProblem<double>& problem, const ContactSoluti
     for (size_t i = 0; i < x_.size(); ++i) {
       x_[i] += start_[i];
     }
-  } else if (std::count_if(block_of.begin(), block_of.end(), [](int block) { return block >= 0; }) >=
-             kLeastContactsToRounding) {
+  } else if (std::count_if(block_of.begin(), block_of.end(),
+                           [](int block) { return block >= 0; }) >= kLeastContactsToRounding) {
     system->SolveProximal(problem, modes, x_.data(), 1);
   } else {
     system->Solve(problem, modes, x_.data(), 1);

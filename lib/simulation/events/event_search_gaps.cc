@@ -186,8 +186,8 @@ void EventSearch::SearchLimit(const Model<double>& model, int joint, double side
     const bool is_gap = evaluate(At(model, x)->motion.after, &rate_x) + allowed == fx &&
                         evaluate(At(model, y)->motion.after, &rate_y) + allowed == fy;
     return is_gap && MovesLittle(model, segment_->before, after, y - x, limit.a, limit.b)
-               ? CourseOf(y - x, fx, rate_x, fy, rate_y)
-               : Course::kUnknown;
+               ? KnownCourse{CourseOf(y - x, fx, rate_x, fy, rate_y), rate_x, rate_y}
+               : KnownCourse();
   };
   double root;
   if (from < event->length &&

@@ -123,6 +123,74 @@ inline Course CourseOf(double length, double fa, double rate_a, double fb, doubl
   return fa + rate_a * at > kSlack * std::min(fa, fb) ? Course::kNoRoot : Course::kUnknown;
 }
 
+// The conclusion, and the rates at both ends where they are known.
+struct KnownCourse {
+  Course course = Course::kUnknown;
+  double rate_a = std::numeric_limits<double>::quiet_NaN();
+  double rate_b = std::numeric_limits<double>::quiet_NaN();
+};
+
+// From this number of closed contacts on a motion costs so much that the rates at the ends of a
+// bracket are used, which save evaluations of it; fewer keep the bits that they have had.
+inline constexpr size_t kLeastContactsByRates = 12;
+
+// The cubic through the values and rates at both ends of [0, length].
+class HermiteCubic {
+ public:
+  HermiteCubic(double length, double fa, double rate_a, double fb, double rate_b)
+      : length_(length),
+        fa_(fa),
+        linear_(length * rate_a),
+        square_(3.0 * (fb - fa) - length * (2.0 * rate_a + rate_b)),
+        cube_(2.0 * (fa - fb) + length * (rate_a + rate_b)) {}
+  double At(double x) const {
+    const double u = x / length_;
+    return fa_ + u * (linear_ + u * (square_ + u * cube_));
+  }
+  double RateAt(double x) const {
+    const double u = x / length_;
+    return (linear_ + u * (2.0 * square_ + 3.0 * u * cube_)) / length_;
+  }
+  // Its root, where it is positive at 0 and not at the other end, by halving.
+  double Root() const {
+    double low = 0.0, high = length_;
+    for (int k = 0; k < 60; ++k) {
+      const double middle = 0.5 * (low + high);
+      (At(middle) > 0.0 ? low : high) = middle;
+    }
+    return high;
+  }
+
+ private:
+  double length_, fa_, linear_, square_, cube_;
+};
+
+// Narrows the bracket [a, b] of a root of f by the root of the cubic through its ends and Newton's
+// steps with the cubic's rates, as long as each takes nine tenths of the value away. Whether |f| ≤
+// tolerance is met, at `root`.
+template <typename Function>
+bool NarrowByRates(const Function& f, const KnownCourse& known, double tolerance, double* a,
+                   double* fa, double* b, double* fb, double* root) {
+  const double start = *a;
+  const HermiteCubic cubic(*b - *a, *fa, known.rate_a, *fb, known.rate_b);
+  double at = start + cubic.Root();
+  double last = kConverges * std::max(*fa, -*fb);
+  for (int k = 0; k < kMostSecants && at > *a && at < *b; ++k) {
+    const double value = f(at);
+    if (std::isnan(value)) return false;
+    if (std::abs(value) <= tolerance) {
+      *root = at;
+      return true;
+    }
+    (value > 0.0 ? *a : *b) = at;
+    (value > 0.0 ? *fa : *fb) = value;
+    if (!(std::abs(value) <= last)) return false;
+    last = kConverges * std::abs(value);
+    at -= value / cubic.RateAt(at - start);
+  }
+  return false;
+}
+
 template <typename Gap, typename Rate, typename CourseOver>
 bool EventSearch::FirstRoot(const Model<double>& model, const Gap& gap, const Rate& rate_over,
                             const CourseOver& course_over, double tolerance, double from, double to,
@@ -144,6 +212,7 @@ bool EventSearch::FirstRoot(const Model<double>& model, const Gap& gap, const Ra
     *root = from;
     return true;
   }
+  const bool by_rates = segment_->contacts.size() >= kLeastContactsByRates;
   std::vector<Interval> open = {{from, first, to, gap(*At(model, to))}};
   Interval crossing = open.back();  // the shortest known to hold a crossing
   for (int k = 0; !open.empty(); ++k) {
@@ -162,12 +231,17 @@ bool EventSearch::FirstRoot(const Model<double>& model, const Gap& gap, const Ra
     if (i.fb > 0.0 && (i.fa + i.fb > reach || i.b - i.a <= smallest)) {
       continue;
     }
-    const Course course = course_over(i.a, i.fa, i.b, i.fb);
-    if (course == Course::kNoRoot) {
+    const KnownCourse known = course_over(i.a, i.fa, i.b, i.fb);
+    if (known.course == Course::kNoRoot) {
       continue;
     }
-    if (course == Course::kOneRoot) {
-      *root = Refine(model, gap, tolerance, i.a, i.fa, i.b, i.fb);
+    if (known.course == Course::kOneRoot) {
+      Interval in = i;
+      const auto value = [&](double at) { return gap(*At(model, at)); };
+      if (!(by_rates && i.fb < 0.0 && std::isfinite(known.rate_a) &&
+            NarrowByRates(value, known, tolerance, &in.a, &in.fa, &in.b, &in.fb, root))) {
+        *root = Refine(model, gap, tolerance, in.a, in.fa, in.b, in.fb);
+      }
       return true;
     }
     // Where the gap closes by more than half of what the bound allows it does not open in between:

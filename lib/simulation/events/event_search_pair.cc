@@ -124,7 +124,8 @@ class EventSearch::PairSearch {
   double Gap(const Sample& sample, Counts counts, bool handed_over = false);
   // Bound on how fast the gap closes over an interval.
   double ClosingSpeed(double from, double to, Counts counts);
-  Course CourseOver(double from, double fa, double to, double fb, double allowed, Counts counts);
+  KnownCourse CourseOver(double from, double fa, double to, double fb, double allowed,
+                         Counts counts);
   // Searches for the first time at which gap + allowed closes, and sets the event to it.
   void SearchFrom(double from, double allowed, Counts counts);
   // The acceleration of the gap that the turning of an ellipse gives, m/s²; 0 where neither is one.
@@ -315,12 +316,12 @@ double EventSearch::PairSearch::ClosingSpeed(double from, double to, Counts coun
 
 // Where the same features are closest at both ends and the bodies turn and move little between them
 // the gap's rate changes monotonically.
-Course EventSearch::PairSearch::CourseOver(double from, double fa, double to, double fb,
-                                           double allowed, Counts counts) {
+KnownCourse EventSearch::PairSearch::CourseOver(double from, double fa, double to, double fb,
+                                                double allowed, Counts counts) {
   // Without a gap at both ends there is no contact whose rate could be used.
   Sample* const first = search_.At(model_, from);
   if (!std::isfinite(fa) || !std::isfinite(fb) || Gap(*first, counts) + allowed != fa) {
-    return Course::kUnknown;
+    return {};
   }
   const ActiveContact start = nearest_;
   const double rate_a = SpeedsOf(model_, first->motion.after, start).normal;
@@ -328,9 +329,10 @@ Course EventSearch::PairSearch::CourseOver(double from, double fa, double to, do
   Sample* const last = search_.At(model_, to);
   if (Gap(*last, counts) + allowed != fb || !(nearest_.feature == start.feature) ||
       !search_.MovesLittle(model_, before, last->motion.after, to - from, a_, b_)) {
-    return Course::kUnknown;
+    return {};
   }
-  return CourseOf(to - from, fa, rate_a, fb, SpeedsOf(model_, last->motion.after, nearest_).normal);
+  const double rate_b = SpeedsOf(model_, last->motion.after, nearest_).normal;
+  return {CourseOf(to - from, fa, rate_a, fb, rate_b), rate_a, rate_b};
 }
 
 void EventSearch::PairSearch::SearchFrom(double from, double allowed, Counts counts) {
