@@ -116,6 +116,9 @@ function legend() {
   for (const type of Object.keys(joints)) {
     if (view.joints.some((joint) => joint.type === type)) add(type.replace("_", " ") + " joint", joints[type]);
   }
+  if (view.joints.some((joint) => joint.motor)) {
+    add("motor", (g) => { g.strokeStyle = colours.text; disc(g, [15, 9], 7); g.stroke(); });
+  }
   if (view.springs.length) {
     add("spring", (g) => {
       g.strokeStyle = colours.series[5]; g.lineWidth = 1.6; g.beginPath(); g.moveTo(1, 9);
