@@ -70,18 +70,23 @@ bool SegmentsMeet(const Vector2<double>& a, const Vector2<double>& b, const Vect
 // Two edges of the outline, neighbours excepted, that cross or touch, the lower one first, or
 // {-1, -1}. Edge i goes from vertex i to the next one. Edges are sorted by their left ends, and
 // each is compared with those alone that begin before it ends: a crossing is looked for in faulty
-// outlines only, but these may be large too. Of several pairs it is the first in that order.
+// outlines only, but these may be large too. Of several pairs it is the first in that order. After
+// kMostComparisons none is named, so that a file of a million edges is refused in a moment.
 std::pair<int, int> CrossingEdges(const Points& points) {
   const int size = static_cast<int>(points.size());
   const auto start = [&points](int edge) { return points[static_cast<std::size_t>(edge)]; };
   const auto end = [&](int edge) { return start((edge + 1) % size); };
   std::vector<std::pair<double, int>> by_left;
+  by_left.reserve(points.size());
   for (int i = 0; i < size; ++i) by_left.emplace_back(std::min(start(i).x(), end(i).x()), i);
   std::sort(by_left.begin(), by_left.end());
+  constexpr long kMostComparisons = 20'000'000;
+  long comparisons = 0;
   for (std::size_t i = 0; i < by_left.size(); ++i) {
     const int edge = by_left[i].second;
     const double right = std::max(start(edge).x(), end(edge).x()) + kStraightCorner;
     for (std::size_t j = i + 1; j < by_left.size() && by_left[j].first <= right; ++j) {
+      if (++comparisons > kMostComparisons) return {-1, -1};
       const auto [low, high] = std::minmax(edge, by_left[j].second);
       if (high - low == 1 || high - low == size - 1) continue;
       if (SegmentsMeet(start(low), end(low), start(high), end(high))) return {low, high};
