@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "tangible/math/interrupt.h"
-#include "tangible/simulation/events/ellipse_motion.h"
 #include "tangible/simulation/events/load_speed.h"
 #include "tangible/simulation/events/tolerances.h"
 
@@ -23,10 +22,6 @@ constexpr int kMostForced = 3;
 constexpr int kMostHalvings = 14;
 // How many such shortened motions a step may have. Those of a stiff body would not end.
 constexpr int kMostShortened = 50;
-// The same of motions that ellipses shorten, and how many a contact may have in a step: a flat side
-// of 1e-9 of the length of an ellipse takes 2000.
-constexpr int kMostEllipseHalvings = 40;
-constexpr int kMostEllipseMotions = 10000;
 // After more than this many times max_events_per_step events a step is given up.
 constexpr int kGiveUp = 3;
 
@@ -100,6 +95,18 @@ bool OpposesSlips(const ContactProblem<double>& problem, const std::vector<Conta
     }
   }
   return true;
+}
+
+// Where no accelerations are found, as of balls that just fit between two walls, contacts that do
+// not slide stick and the others slide on.
+void HoldSlow(const ContactProblem<double>& problem, const std::vector<double>& slip, double slow,
+              std::vector<ContactMode>* modes) {
+  for (size_t i = 0; i < modes->size(); ++i) {
+    (*modes)[i] = !problem.contacts[i].has_friction ? ContactMode::kClosed
+                  : std::abs(slip[i]) <= slow       ? ContactMode::kSticking
+                  : slip[i] > 0.0                   ? ContactMode::kSlidingPositive
+                                                    : ContactMode::kSlidingNegative;
+  }
 }
 
 // Number of events after which a step is given up.
@@ -302,6 +309,7 @@ bool EventStepper::SolveImpact(const Model<double>& model, Impulses* impact, Sta
   const ContactSolverReport solved =
       solver_.Solve(impact->problem, SolverOptionsOf(settings), &impact->solution);
   CountSolve(solved, outcome);
+  if (!solved.solved && HoldsSlow(model, impact, state, outcome)) return true;
   if (!solved.solved) {
     outcome->residual = solved.residual;
     outcome->message = "impact: " + WhatIsUnsolved(*model.structure, *impact, solved);
@@ -383,35 +391,6 @@ void EventStepper::GuessModes(const std::vector<ActiveContact>& contacts,
       guess = ContactMode::kSticking;
     }
     solution->modes[i] = guess;
-  }
-}
-
-void EventStepper::ShortenAtEllipses(const Model<double>& model,
-                                     const ContactSolution<double>& accelerations,
-                                     StepReport* outcome, Segment* segment) {
-  const EllipseMotion motion =
-      LongestEllipseMotion(model, segment->before, segment->contacts, accelerations);
-  if (!(segment->length > motion.longest)) return;
-  const double dt = model.structure->settings.dt;
-  double spacing = dt;
-  for (int k = 1; k <= kMostEllipseHalvings && spacing > motion.longest; ++k) {
-    spacing = std::ldexp(dt, -k);
-  }
-  const double next = (std::floor(segment->time / spacing + kSameInstant) + 1.0) * spacing;
-  const double length = next - segment->time;
-  if (length >= segment->length - kSameInstant * spacing) return;
-  ++outcome->ellipse_motions;
-  const ActiveContact& contact = segment->contacts[motion.contact];
-  if (length > 0.0) {
-    segment->length = length;
-    segment->middle = segment->time + 0.5 * length;
-  }
-  if (shortened_.Add(contact) > kMostEllipseMotions || !(length > 0.0)) {
-    outcome->message = "more than " + std::to_string(kMostEllipseMotions) +
-                       " motions in a step, so short because an ellipse turns over its flat side "
-                       "or tip: the " +
-                       NameOfContact(*model.structure, {contact}, 0) +
-                       " needs a smaller dt or a less slender ellipse";
   }
 }
 
@@ -499,7 +478,14 @@ bool EventStepper::ChooseModes(const Model<double>& model, const State<double>& 
     solved = solver_.Solve(problem, SolverOptionsOf(settings), &solution);
     CountSolve(solved, outcome);
   }
-  if (!solved.solved) {
+  const bool holds_unsolved = holds_ == Holds::kUnsolved && !solved.solved &&
+                              solved.worst_contact >= 0 &&
+                              std::abs(slip[solved.worst_contact]) <= HeldSpeed(model);
+  if (holds_ == Holds::kAll || holds_unsolved) {
+    HoldSlow(problem, slip, HeldSpeed(model), &solution.modes);
+    search_.KeepStarts(true);
+    ++outcome->given_up.held_contacts;
+  } else if (!solved.solved) {
     outcome->message = "accelerations";
     if (solved.worst_contact >= 0) {
       outcome->message +=
@@ -708,19 +694,31 @@ EventStepper::Tried EventStepper::TryMotion(const Model<double>& model, double n
     released_.clear();
     return Tried::kAgain;
   };
-  if (!ChooseModes(model, *state, outcome, segment)) {
+  holds_ = tries->held ? Holds::kAll : tries->short_step ? Holds::kUnsolved : Holds::kNone;
+  const bool chosen = ChooseModes(model, *state, outcome, segment);
+  holds_ = Holds::kNone;
+  if (!chosen) {
     if (!released_.empty()) return keep_starts();
     record_.num_parts = parts;
-    if (std::exchange(tries->short_step, true) ||
-        !SolveByShortStep(model, now, h, state, outcome)) {
+    if (std::exchange(tries->short_step, true)) {
+      if (!tries->unsolved.empty()) outcome->message = tries->unsolved;
       return Tried::kFailed;
     }
     outcome->message.clear();
+    if (!SolveByShortStep(model, now, h, state, outcome)) {
+      record_.num_parts = parts;
+      tries->unsolved.swap(outcome->message);
+      outcome->message.clear();
+    }
     return Tried::kAgain;
   }
   if (!outcome->message.empty()) return Tried::kFailed;
   std::string message;
-  const bool moved = search_.Run(model, touching_.contacts, segment, &message);
+  bool moved = search_.Run(model, touching_.contacts, segment, &message);
+  if (moved && GainsEnergy(model, *segment)) {
+    moved = false;
+    message = "a motion gains energy that no load gives it: dt is too large";
+  }
   outcome->pairs_compared = search_.num_compared();
   outcome->pairs_near = search_.num_pairs();
   if (moved) return Tried::kMoved;
@@ -729,7 +727,11 @@ EventStepper::Tried EventStepper::TryMotion(const Model<double>& model, double n
   record_.num_parts = parts;
   if (!tries->Halve()) {
     outcome->message = message;
-    return Tried::kFailed;
+    const bool again =
+        !std::exchange(tries->held, true) && HoldsTouching(model, now, state, outcome);
+    tries->halvings = again ? 0 : tries->halvings;
+    tries->halved_motions = 0;
+    return again ? Tried::kAgain : Tried::kFailed;
   }
   search_.KeepStarts(true);  // contacts that jam keep their modes
   return Tried::kAgain;
@@ -770,6 +772,8 @@ StepReport EventStepper::Advance(const Model<double>& model, double t, double h,
     if (tried == Tried::kAgain) continue;
     if (Releases(model, segment)) continue;
     tries.short_step = false;
+    tries.held = false;
+    tries.unsolved.clear();
     guess_.located += IsLocated(segment.event) ? 1 : 0;
     outcome.stopped = at_event == AtEvent::kStopAtSecond && guess_.located > 1;
     if (outcome.stopped) break;
@@ -783,6 +787,7 @@ StepReport EventStepper::Advance(const Model<double>& model, double t, double h,
       continue;
     }
     now += segment.length;
+    tries.halved_motions = 0;
     if (!TakeEvent(model, now, h, segment, state, &outcome)) {
       return fail();
     }

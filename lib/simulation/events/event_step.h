@@ -138,7 +138,9 @@ class EventStepper {
     int halvings = 0;        ///< of the next motion
     int halved_motions = 0;  ///< so far in the step
     bool short_step = false;
-    bool Halve();  ///< whether the motion may be halved once more
+    bool held = false;     ///< what touches has been held
+    std::string unsolved;  ///< why the short step has no solution either
+    bool Halve();          ///< whether the motion may be halved once more
   };
   enum class Tried { kMoved, kAgain, kFailed };
   Tried TryMotion(const Model<double>& model, double now, double h, State<double>* state,
@@ -180,6 +182,16 @@ class EventStepper {
   /// The speed below which a touching contact counts as neither approaching nor leaving nor
   /// sliding, m/s.
   double SlowSpeed(const Model<double>& model, const State<double>& state) const;
+  /// The speed below which contacts of a problem without a solution are held, m/s.
+  static double HeldSpeed(const Model<double>& model);
+  /// In the place of an impact without a solution, all of whose contacts approach more slowly than
+  /// that: they are held, with friction. Whether it was done.
+  bool HoldsSlow(const Model<double>& model, Impulses* impact, State<double>* state,
+                 StepReport* outcome);
+  /// The same of all contacts that touch and do not leave, where no motion from here can be
+  /// integrated, as a new part of the record.
+  bool HoldsTouching(const Model<double>& model, double t, State<double>* state,
+                     StepReport* outcome);
   bool Settle(const Model<double>& model, const Impulses& impact, State<double>* state,
               StepReport* outcome);
   bool LocateTouch(const Model<double>& model, double t, double slow, int group,
@@ -211,6 +223,10 @@ class EventStepper {
   ImpactGroups impacts_;            ///< of this instant
   CoupledBodies coupled_;           ///< as contacts stop sliding
   std::vector<EndingSlip> ending_;  ///< contacts that slide until a separate event
+  /// Whether slow contacts hold in the next motion whatever the accelerations: where these have no
+  /// solution, or always.
+  enum class Holds { kNone, kUnsolved, kAll };
+  Holds holds_ = Holds::kNone;
   /// Contacts at their limit as the next motion starts, beyond which they would go in it: the
   /// accelerations at the start do not tell that they slide or open.
   std::vector<EndingSlip> released_;

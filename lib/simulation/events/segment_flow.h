@@ -139,6 +139,11 @@ class SegmentFlow {
   FlowCounts counts_;
 };
 
+/// Whether a motion has gained more energy than its loads can have given, as rows that depend on
+/// each other to rounding may do: contacts that stay closed, joints and friction do no work. False
+/// where motors or bodies of given motion drive the scene.
+bool GainsEnergy(const Model<double>& model, const Segment& segment);
+
 /// Sets up a segment's twist projection at a state: contacts act without rebound, sliding ones
 /// without friction (with friction at the start of a run, where a contact that approaches lands).
 void SetUpProjection(const Segment& segment, const State<double>& state, Impulses* projection);
