@@ -123,6 +123,15 @@ void FromRow(const Json& json, T* value) {
   }
 }
 
+/// Each row as ToRow has it.
+template <typename T>
+std::vector<Json> ToRows(const std::vector<T>& values) {
+  std::vector<Json> rows;
+  rows.reserve(values.size());
+  for (const T& value : values) rows.push_back(ToRow(value));
+  return rows;
+}
+
 /// The rows of all shards; false with one line where they hold something else.
 template <typename T>
 bool FromRows(const std::vector<Json>& rows, std::vector<T>* values, std::string* error) {

@@ -2,6 +2,8 @@
 //
 // Arrays of jobs: the files of all shards, merged, are the output of the run in one.
 #include <algorithm>
+#include <nlohmann/json.hpp>
+#include <regex>
 #include <string>
 #include <vector>
 
@@ -216,6 +218,126 @@ TEST_F(ShardsOfBatchesTest, ShardsOfOtherInputsAreNamed) {
   ExpectOneLine(Run(work_.program, work_.arguments + " --merge='" + Path("part1.csv") + "," +
                                        Path("other.csv") + "'"),
                 1, "other.csv: /shard/inputs: expected ");
+}
+
+/// Texts that programs print, without the line that says when and where they ran, and without
+/// times.
+std::string WithoutTimes(const std::string& printed, const std::string& time) {
+  std::string text = std::regex_replace(printed, std::regex("; date [^;\n]*"), "");
+  return std::regex_replace(text, std::regex(time), "TIME");
+}
+
+class ShardsOfStudiesTest : public ShardsTest {
+ protected:
+  /// --out of the run in one and merged, and what both print.
+  struct Both {
+    ProgramRun one, merged;
+    nlohmann::ordered_json one_out, merged_out;
+    std::string files;
+  };
+  /// `report` is a further output of both, if any: --report=one.html and --report=merged.html.
+  Both Compare(const Divided& work, int count, const std::string& report = "") const {
+    const auto with = [&](const char* name) {
+      return report.empty() ? "" : report + "=" + File(std::string(name) + ".html");
+    };
+    Both both;
+    both.one = RunTo(work, with("one"), "all.json");
+    both.files = RunShards(work, count);
+    both.merged = RunTo(work, with("merged") + " --merge='" + both.files + "'", "merged.json");
+    EXPECT_EQ(both.merged.exit_status, both.one.exit_status) << both.merged.error;
+    EXPECT_EQ(both.merged.error, both.one.error);
+    both.one_out = nlohmann::ordered_json::parse(Read(Path("all.json")));
+    both.merged_out = nlohmann::ordered_json::parse(Read(Path("merged.json")));
+    return both;
+  }
+
+  /// Flags and files that are not as they must be, after two shards of the work were run.
+  void ExpectMistakesAreNamed(const Divided& work, const Divided& other) const {
+    const auto run = [&](const std::string& flags) {
+      return Run(work.program, work.arguments + " " + flags);
+    };
+    ExpectOneLine(run("--shard=2/2 --out=" + File("x")), 2, "--shard: expected I/N");
+    ExpectOneLine(run("--shard=x --out=" + File("x")), 2, "--shard: expected I/N");
+    ExpectOneLine(run("--shard=0/2"), 2, "--shard: needs --out");
+    ExpectOneLine(run("--shard=0/2 --merge=a --out=" + File("x")), 2, "--shard: not with --merge");
+    ExpectOneLine(run("--merge=" + File("part0.json")), 1, "shard 1 of 2 is missing");
+    ExpectOneLine(run("--merge='" + Path("part1.json") + "," + Path("part1.json") + "'"), 1,
+                  "part1.json: shard 1 of 2 is given twice");
+    ASSERT_EQ(RunTo(other, "--shard=1/2", "other.json").exit_status, 0);
+    ExpectOneLine(run("--merge='" + Path("part0.json") + "," + Path("other.json") + "'"), 1,
+                  "other.json: /shard/flags/seed: expected ");
+    ExpectOneLine(run("--merge='" + Path("part0.json") + "," + Path("all.json") + "'"), 1,
+                  "all.json: expected a file that --shard wrote");
+  }
+};
+
+const std::string kStruckBall = "'" TANGIBLE_SOURCE_DIR "/data/control/struck_ball.json'";
+
+TEST_F(ShardsOfStudiesTest, OfBounceAreTheStudyInOne) {
+  const Divided work = {"tangible-bounce",
+                        kStruckBall + " --problems=5 --iterations=3 --methods=exact,fixed"};
+  const Both both = Compare(work, 2);
+  EXPECT_EQ(Read(Path("merged.json")), Read(Path("all.json")));
+  EXPECT_EQ(both.one_out["drawn"].size(), 5U);
+  // The last column is CPU time: that of the shards.
+  const std::string time = "[0-9.]+\n";
+  EXPECT_EQ(WithoutTimes(both.merged.out, time), WithoutTimes(both.one.out, time));
+  const auto part = nlohmann::json::parse(Read(Path("part1.json")));
+  ASSERT_EQ(part["drawn"].size(), 2U);
+  EXPECT_EQ(part["drawn"][1], nlohmann::json(both.one_out["drawn"][3])) << "its rows are 1 and 3";
+  ExpectMistakesAreNamed(work, {work.program, work.arguments + " --seed=2"});
+}
+
+constexpr char kChain[] = R"({"bodies": [
+    {"name": "link0", "mass": 1, "inertia": 0.1, "position": [0.5, 0], "velocity": [0, 0]},
+    {"name": "link1", "mass": 1, "inertia": 0.1, "position": [1.5, 0]}],
+  "joints": [{"name": "a", "type": "revolute", "bodies": ["link0", "world"], "anchor": [0, 0]},
+             {"name": "b", "type": "revolute", "bodies": ["link1", "link0"], "anchor": [1, 0]}],
+  "springs": [{"name": "s", "bodies": ["link1", "world"], "anchors": [[1.5, 0], [1, 2]],
+               "stiffness": 10, "rest_length": 1}],
+  "simulation": {"dt": 0.01, "duration": 0.5}})";
+
+TEST_F(ShardsOfStudiesTest, OfChainsAreTheStudyInOne) {
+  const Divided work = {"tangible-chain-study", "'" + Write("chain.json", kChain) +
+                                                    "' --starts=4 --range=2 --replicas=7 "
+                                                    "--rate=50"};
+  for (const int count : {2, 3}) {
+    Both both = Compare(work, count);
+    const std::string time = " +[0-9]+\\.[0-9][0-9]\n";
+    EXPECT_EQ(WithoutTimes(both.merged.out, time), WithoutTimes(both.one.out, time));
+    EXPECT_NE(both.one.out.find("7 replicas"), std::string::npos) << both.one.out;
+    ASSERT_EQ(both.one_out["starts"].size(), 4U);
+    EXPECT_EQ(both.one_out["replicas"], 7);
+    EXPECT_GT(both.one_out["covered"][0], 0);
+    for (nlohmann::ordered_json* json : {&both.one_out, &both.merged_out}) {
+      for (auto& start : (*json)["starts"]) start.erase("seconds");
+    }
+    EXPECT_EQ(both.merged_out.dump(), both.one_out.dump());
+  }
+  // A shard judges nothing: rows 0, 2, 4, ... are two of the starts and four replicas.
+  RunShards(work, 2);
+  const auto part = nlohmann::json::parse(Read(Path("part0.json")));
+  EXPECT_EQ(part["starts"].size(), 2U);
+  EXPECT_EQ(part["starts"][1]["start"], 2);
+  EXPECT_EQ(part["replicas"], 4);
+  EXPECT_FALSE(part.contains("holds"));
+  ExpectMistakesAreNamed(work, {work.program, work.arguments + " --seed=2"});
+}
+
+TEST_F(ShardsOfStudiesTest, OfVerificationAreTheCheckInOne) {
+  const Divided work = {"tangible-verify",
+                        "--random=2 --starts=1 --coincidences=1 --seed=3 --jacobians"};
+  Both both = Compare(work, 2, "--report");
+  ExpectMistakesAreNamed(work, {work.program,
+                                "--random=2 --starts=1 --coincidences=1 --seed=4 "
+                                "--jacobians --stepping=fixed"});
+  EXPECT_EQ(WithoutTimes(both.merged.out, "x^"), WithoutTimes(both.one.out, "x^"));
+  EXPECT_EQ(WithoutTimes(Read(Path("merged.html")), "x^"),
+            WithoutTimes(Read(Path("one.html")), "x^"));
+  EXPECT_EQ(both.one_out["scenes"].size(), 8U);
+  both.one_out.erase("provenance");
+  both.merged_out.erase("provenance");
+  EXPECT_EQ(both.merged_out.dump(), both.one_out.dump());
 }
 
 }  // namespace
