@@ -324,6 +324,81 @@ TEST_F(ShardsOfStudiesTest, OfChainsAreTheStudyInOne) {
   ExpectMistakesAreNamed(work, {work.program, work.arguments + " --seed=2"});
 }
 
+class ShardsOfFitsTest : public ShardsOfStudiesTest {
+ protected:
+  /// A fit of the ball's speed and radius of bouncing to its own positions, moved by hand.
+  Divided Fit(const std::string& keys, const std::string& flags = "") const {
+    Write("scene.json", kThrow);
+    EXPECT_EQ(
+        Run("tangible-simulate", File("scene.json") + " --out=" + File("t.csv") +
+                                     " --observe=" + File("o.csv") + " --noise=0.001 --seed=4")
+            .exit_status,
+        0);
+    return {"tangible-fit", "'" +
+                                Write("fit.json", R"({"scene": "scene.json",
+              "observations": [{"file": "o.csv", "sigma": 0.001}],
+              "parameters": [
+                {"name": "speed", "initial": 0.7, "lower": 0.1, "upper": 3,
+                 "sets": [{"path": "bodies/ball/velocity/x"}]},
+                {"name": "fall", "initial": 9, "lower": 5, "upper": 15,
+                 "sets": [{"path": "gravity/y", "scale": -1}]}])" +
+                                                      keys + "}") +
+                                "' " + flags};
+  }
+
+  /// Without measured times: the column of seconds, and those of the first estimate's line.
+  static std::string Printed(const ProgramRun& run) {
+    const std::string text = std::regex_replace(run.out, std::regex(" +[0-9.]+\n"), "\n");
+    return std::regex_replace(text, std::regex(", [0-9.e-]+ s\n"), "\n");
+  }
+  static nlohmann::ordered_json WithoutSeconds(nlohmann::ordered_json json) {
+    json.erase("seconds");
+    for (auto& iteration : json["iterations"]) iteration.erase("seconds");
+    return json;
+  }
+};
+
+TEST_F(ShardsOfFitsTest, AreTheFitInOne) {
+  const std::pair<std::string, std::string> fits[] = {
+      {R"(, "starts": 5, "seed": 2)", ""},
+      {R"(, "starts": 3, "loss": {"huber": 2})", "--profile=fall"},
+      {"", "--profile=speed,fall"},
+      {"", "--profile=fall --predict_from=0.15"}};
+  for (const auto& [keys, flags] : fits) {
+    const Divided work = Fit(keys, flags);
+    const Both both = Compare(work, 2, "--predictions");
+    EXPECT_EQ(both.one.exit_status, 0) << both.one.error;
+    EXPECT_EQ(Printed(both.merged), Printed(both.one)) << keys << flags;
+    EXPECT_EQ(WithoutSeconds(both.merged_out).dump(), WithoutSeconds(both.one_out).dump());
+    EXPECT_EQ(Read(Path("merged.html")), Read(Path("one.html"))) << "the predictions";
+  }
+}
+
+TEST_F(ShardsOfFitsTest, MistakesAreOneLine) {
+  const Divided plain = Fit("");
+  ExpectOneLine(RunTo(plain, "--shard=0/2", "x.json"), 1,
+                "--shard: expected a fit with \"starts\" above 1, or --profile");
+  const Divided work = Fit(R"(, "starts": 3)");
+  RunShards(work, 2);
+  EXPECT_EQ(nlohmann::json::parse(Read(Path("part0.json")))["starts"].size(), 2U);
+  const auto run = [&](const std::string& flags) {
+    return Run(work.program, work.arguments + " " + flags);
+  };
+  ExpectOneLine(run("--shard=2/2 --out=" + File("x")), 2, "--shard: expected I/N");
+  ExpectOneLine(run("--shard=0/2"), 2, "--shard: needs --out");
+  ExpectOneLine(run("--shard=0/2 --merge=a --out=" + File("x")), 2, "--shard: not with --merge");
+  ExpectOneLine(run("--shard=0/2 --report=r.html --out=" + File("x")), 2,
+                "--report: not with --shard");
+  ExpectOneLine(run("--merge=a --checkpoint=" + File("c")), 2, "--checkpoint: not with --shard");
+  ExpectOneLine(run("--merge=" + File("part0.json")), 1, "shard 1 of 2 is missing");
+  ExpectOneLine(run("--max_iterations=9 --merge=" + File("part0.json")), 1,
+                "part0.json: /shard/flags/max_iterations: expected 9, got the default");
+  const Divided other = Fit(R"(, "starts": 3, "seed": 9)");
+  ExpectOneLine(Run(other.program, other.arguments + " --merge='" + Path("part0.json") + "," +
+                                       Path("part1.json") + "'"),
+                1, "part0.json: /shard/inputs: expected ");
+}
+
 TEST_F(ShardsOfStudiesTest, OfVerificationAreTheCheckInOne) {
   const Divided work = {"tangible-verify",
                         "--random=2 --starts=1 --coincidences=1 --seed=3 --jacobians"};

@@ -85,6 +85,78 @@ def test_processes_do_the_work() -> None:
     assert [len(arguments[3][0]) for arguments in sent] == [12, 13] * 4
 
 
+BALL_PARAMETERS = [
+    {"name": "speed", "initial": 0.6, "lower": 0.1, "upper": 2.0,
+     "sets": [{"path": "bodies/ball/velocity/x"}]},
+    {"name": "restitution", "initial": 0.6, "lower": 0.1, "upper": 1.0,
+     "sets": [{"path": "bodies/*/restitution"}]},
+]
+
+
+def table() -> dict[str, Any]:
+    rollout = tangible.Rollout(ball(), records=range(61))
+    states = rollout()
+    noise = 1e-3 * np.random.default_rng(2).normal(size=(61, 2))
+    return {"time": rollout.times, "ball/x": states[:, 0] + noise[:, 0], "ball/y": states[:, 1] + noise[:, 1]}
+
+
+def without_times(data: Any) -> Any:
+    if isinstance(data, dict):
+        return {key: without_times(item) for key, item in data.items() if key not in ("seconds", "file")}
+    return [without_times(item) for item in data] if isinstance(data, list) else data
+
+
+def fitted(**more: Any) -> tuple[tangible.FitResult, list[Any]]:
+    said: list[Any] = []
+    result = tangible.fit(
+        ball(), table(), BALL_PARAMETERS, sigma=1e-3,
+        callback=lambda now: said.append(without_times(now)), **more,
+    )
+    return result, said
+
+
+@pytest.mark.parametrize(
+    "how",
+    [
+        {"starts": 4, "seed": 3},
+        {"profile": ["restitution", "speed"]},
+        {"starts": 3, "profile": ["speed"], "predict_from": 0.5},
+        {"profile": ["speed"], "loss": {"huber": 2}},
+    ],
+)
+def test_fits_have_the_same_bits(executor: Executor, how: dict[str, Any]) -> None:
+    alone, told = fitted(**how)
+    shared, told_by_others = fitted(**how, executor=executor)
+    assert shared.status == "converged"
+    assert without_times(shared.data) == without_times(alone.data)
+    assert told_by_others == told and len(told) > how.get("starts", 1)
+    assert len(shared.data["starts"]) >= how.get("starts", 1)
+    assert len(shared.data.get("profiles") or []) >= len(how.get("profile", []))
+    assert shared.scene.to_json() == alone.scene.to_json()
+
+
+def test_fits_send_starts_and_profiles() -> None:
+    sent: list[tuple[Any, ...]] = []
+
+    class Watched(ThreadPoolExecutor):
+        def submit(self, *arguments: Any, **names: Any) -> Future[Any]:  # type: ignore[override]
+            sent.append(arguments)
+            return super().submit(*arguments, **names)
+
+    with Watched(2) as pool:
+        fitted(starts=3, profile=["speed", "restitution"], executor=pool)
+        assert [arguments[2] for arguments in sent] == [0, 1, 2, "speed", "restitution"]
+        sent.clear()
+        fitted(executor=pool)
+        assert not sent
+        with pytest.raises(tangible.TangibleError, match="profile: expected names"):
+            fitted(profile=["mass"], executor=pool)
+        with pytest.raises(ValueError, match="checkpoint: not with executor"):
+            fitted(checkpoint="c.json", executor=pool)
+    with pytest.raises(TypeError, match="executor: expected"):
+        fitted(executor=2)
+
+
 class Broken(Executor):
     """Fails at the third part; the others are never begun."""
 
