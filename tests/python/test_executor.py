@@ -190,12 +190,14 @@ def test_what_is_no_executor_is_refused() -> None:
 MPI = """
 import numpy, tangible
 from mpi4py.futures import MPIPoolExecutor
-from test_executor import PARAMETERS, ball, values
+from test_executor import PARAMETERS, ball, fitted, values, without_times
 
 if __name__ == "__main__":
     rollout = tangible.Rollout(ball(), PARAMETERS)
     with MPIPoolExecutor() as executor:
         found = rollout(values(50), executor=executor)
+        fit, said = fitted(starts=3, profile=["speed"], executor=executor)
+    assert without_times(fit.data) == without_times(fitted(starts=3, profile=["speed"])[0].data)
     assert numpy.array_equal(found, rollout(values(50)))
     print("the same bits")
 """
