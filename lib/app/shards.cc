@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <charconv>
 #include <map>
+#include <memory>
 #include <optional>
 #include <system_error>
 #include <utility>
@@ -81,8 +82,8 @@ std::string NamesOf(const std::vector<long>& shards) {
 /// A file of --merge.
 struct ShardFile {
   std::string name;
-  std::string text;  ///< before "# shard"
-  Json content;      ///< of the key "shard"
+  std::string text;                                          ///< before "# shard"
+  std::shared_ptr<Json> content = std::make_shared<Json>();  ///< of the key "shard"
   Shard shard;
 };
 
@@ -91,23 +92,23 @@ std::string ReadShardFile(const std::string& name, ShardFile* file) {
   file->name = name;
   std::string error;
   if (!ReadTextFile(name, &file->text, &error)) return error;
-  const std::string none =
+  std::string none =
       name + ": expected a file that --shard wrote, got another one, or one that is cut off";
   Json json;
   const std::size_t begin = file->text.rfind("\n" + std::string(kMark));
   if (begin != std::string::npos && file->text.back() == '\n') {
     const std::string line = file->text.substr(begin + 1 + kMark.size());
     file->text.resize(begin + 1);
-    if (!ParseJson(line, name, &file->content, &error)) return none;
+    if (!ParseJson(line, name, file->content.get(), &error)) return none;
   } else {
     if (!ParseJson(file->text, name, &json, &error) || !json.is_object() ||
         !json.contains("shard")) {
       return none;
     }
     file->text.clear();
-    file->content = std::move(json["shard"]);
+    *file->content = std::move(json["shard"]);
   }
-  if (!file->content.is_object()) return none;
+  if (!file->content->is_object()) return none;
   return "";
 }
 
@@ -118,11 +119,12 @@ std::string Differs(const ShardFile& file, const std::string& what, const std::s
 
 /// An error unless the flags are those of this run.
 std::string CheckFlagsOf(const ShardFile& file) {
-  const auto got = file.content.at("flags").get<std::map<std::string, std::string>>();
+  const auto got = file.content->at("flags").get<std::map<std::string, std::string>>();
   const std::map<std::string, std::string> expected = FlagsOfRun();
   std::map<std::string, std::string> all = expected;
   all.insert(got.begin(), got.end());
-  for (const auto& [name, ignored] : all) {
+  for (const auto& flag : all) {
+    const std::string& name = flag.first;
     const auto value = [&name](const std::map<std::string, std::string>& values) {
       const auto found = values.find(name);
       return found == values.end() ? std::string("the default") : found->second;
@@ -137,7 +139,7 @@ std::string CheckFlagsOf(const ShardFile& file) {
 
 /// An error unless the inputs have the content of those of this run; their names may differ.
 std::string CheckInputsOf(const ShardFile& file) {
-  const auto got = file.content.at("inputs").get<std::map<std::string, std::string>>();
+  const auto got = file.content->at("inputs").get<std::map<std::string, std::string>>();
   std::vector<std::string> hashes;
   for (const auto& [name, hash] : got) hashes.push_back(hash);
   for (const auto& [name, hash] : HashesOfInputs()) {
@@ -155,7 +157,7 @@ std::string CheckInputsOf(const ShardFile& file) {
 
 /// An error unless the header is of this run, with as many shards as `first` has.
 std::string CheckHeader(const ShardFile& first, long rows_in_all, ShardFile* file) {
-  const Json& header = file->content;
+  const Json& header = *file->content;
   const ProgramInfo& info = ParsedProgram();
   for (const auto& [what, expected] :
        {std::pair<std::string, std::string>("program", info.name), {"version", info.version}}) {
@@ -167,8 +169,8 @@ std::string CheckHeader(const ShardFile& first, long rows_in_all, ShardFile* fil
   if (!error.empty()) return error;
   file->shard = {header.at("index"), header.at("of")};
   const Shard& shard = file->shard;
-  if (shard.count != first.content.at("of").get<long>()) {
-    return Differs(*file, "of", first.content.at("of").dump() + " as in " + first.name,
+  if (shard.count != first.content->at("of").get<long>()) {
+    return Differs(*file, "of", first.content->at("of").dump() + " as in " + first.name,
                    std::to_string(shard.count));
   }
   if (header.at("rows_in_all") != rows_in_all) {
@@ -262,7 +264,7 @@ std::string MergeShards(const ShardPlan& plan, long rows_in_all, MergedShards* m
       return file.name + ": shard " + std::to_string(file.shard.index) + " of " +
              std::to_string(file.shard.count) + " is given twice, first by " + place->second->name;
     }
-    Json& rows = file.content["rows"];
+    Json& rows = (*file.content)["rows"];
     for (std::size_t r = 0; r < rows.size(); ++r) {
       merged->rows[static_cast<std::size_t>(file.shard.RowOf(static_cast<long>(r)))] =
           std::move(rows[r]);
