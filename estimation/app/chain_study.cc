@@ -10,8 +10,11 @@
 #include <cmath>
 #include <cstdio>
 #include <string>
+#include <vector>
 
 #include "tangible/app/program.h"
+#include "tangible/app/row_archive.h"
+#include "tangible/app/shards.h"
 #include "tangible/scene/scene_json.h"
 
 DEFINE_int32(starts, 20, "starts without noise, each link's mass log-uniform");
@@ -20,8 +23,30 @@ DEFINE_int32(replicas, 0, "fits of observations with noise, from the truth");
 DEFINE_double(rate, 100.0, "observations of all bodies a second");
 DEFINE_double(sigma, 0.001, "standard deviation of the noise, m");
 DEFINE_int32(seed, 1, "of starts and noise");
+DEFINE_string(out, "", "file of all starts and of how often intervals hold the truth (JSON)");
+TANGIBLE_DEFINE_SHARD_FLAGS();
 
 namespace tangible {
+
+// What a shard keeps of a row. That no field is left out the compiler checks.
+template <typename Visitor>
+void VisitFields(ChainStart& start, const Visitor& visit) {
+  auto& [status, initial_cost, final_cost, error, seconds] = start;
+  visit("status", status);
+  visit("initial_cost", initial_cost);
+  visit("final_cost", final_cost);
+  visit("error", error);
+  visit("seconds", seconds);
+}
+
+template <typename Visitor>
+void VisitFields(ChainReplica& replica, const Visitor& visit) {
+  auto& [converged, covered, covered_robust] = replica;
+  visit("converged", converged);
+  visit("covered", covered);
+  visit("covered_robust", covered_robust);
+}
+
 namespace {
 
 // Starts are drawn in logarithms; observations are kept, a number each; and residuals are divided
@@ -36,16 +61,74 @@ constexpr double kLeastReached = 0.95;
 constexpr double kPooled[] = {0.935, 0.965};
 constexpr double kEach[] = {0.92, 0.98};
 
-bool PrintStarts(const ChainStudy& study) {
+/// The rows of a study, or of one shard of it: the starts, then the replicas.
+class Rows {
+ public:
+  explicit Rows(const ShardPlan& plan) : plan_(plan) {}
+
+  static long InAll() { return static_cast<long>(FLAGS_starts) + FLAGS_replicas; }
+
+  /// Reads all rows from the shards; an error or empty.
+  std::string Merge() {
+    MergedShards merged;
+    std::string error = MergeShards(plan_, InAll(), &merged);
+    if (!error.empty()) return error;
+    const auto middle = merged.rows.begin() + FLAGS_starts;
+    if (FromRows<ChainStart>({merged.rows.begin(), middle}, &starts_, &error)) {
+      FromRows<ChainReplica>({middle, merged.rows.end()}, &replicas_, &error);
+    }
+    return error;
+  }
+
+  /// Start i, which is run unless it was read; by number.
+  const ChainStart& Start(const ChainStudy& study, int number) {
+    if (!plan_.IsMerge()) starts_.push_back(study.RunStart(number));
+    return plan_.IsMerge() ? starts_[static_cast<size_t>(number)] : starts_.back();
+  }
+  bool HasStart(int number) const { return plan_.shard.Has(number); }
+
+  const std::vector<ChainReplica>& Replicas(const ChainStudy& study) {
+    if (!plan_.IsMerge()) {
+      replicas_ = study.RunReplicas(
+          [this](int number) { return plan_.shard.Has(static_cast<long>(FLAGS_starts) + number); });
+    }
+    return replicas_;
+  }
+
+  /// Of a shard no bound is judged: that is for all rows.
+  bool IsPart() const { return plan_.IsShard(); }
+
+  OrderedJson ToJson() const {
+    std::vector<Json> rows = ToRows(starts_);
+    for (Json& row : ToRows(replicas_)) rows.push_back(std::move(row));
+    return ShardJson(plan_.shard, InAll(), rows);
+  }
+
+ private:
+  const ShardPlan& plan_;
+  std::vector<ChainStart> starts_;
+  std::vector<ChainReplica> replicas_;
+};
+
+bool PrintStarts(const ChainStudy& study, Rows* rows, OrderedJson* json) {
   int reached = 0;
   std::printf("start  status           initial cost     final cost   largest error  seconds\n");
   for (int i = 0; i < FLAGS_starts; ++i) {
-    const ChainStart start = study.RunStart(i);
+    if (!rows->HasStart(i)) continue;
+    const ChainStart& start = rows->Start(study, i);
     reached += start.error < ChainStudyOptions().reached ? 1 : 0;
     std::printf("%5d  %-14s %14.6g %14.6g %15.3g %8.2f\n", i, NameOf(start.status),
                 start.initial_cost, start.final_cost, start.error, start.seconds);
     std::fflush(stdout);
+    (*json)["starts"].push_back({{"start", i},
+                                 {"status", NameOf(start.status)},
+                                 {"initial_cost", start.initial_cost},
+                                 {"final_cost", start.final_cost},
+                                 {"largest_error", start.error},
+                                 {"seconds", start.seconds}});
   }
+  (*json)["reached"] = reached;
+  if (rows->IsPart()) return true;
   const bool enough = reached >= kLeastReached * FLAGS_starts;
   std::printf("%d of %d starts reach the true masses to %g (expected at least %g): %s\n", reached,
               FLAGS_starts, ChainStudyOptions().reached, kLeastReached * FLAGS_starts,
@@ -68,12 +151,17 @@ bool PrintCoverage(const char* name, const ChainCoverage& coverage,
   return holds;
 }
 
-bool PrintReplicas(const ChainStudy& study) {
-  const ChainCoverage coverage = study.RunCoverage({});
+bool PrintReplicas(const ChainStudy& study, Rows* rows, OrderedJson* json) {
+  const ChainCoverage coverage = study.CoverageOf(rows->Replicas(study));
   std::printf("%d replicas with noise of %g m, %d not converged\n", coverage.replicas, FLAGS_sigma,
               coverage.failed);
   const bool holds = PrintCoverage("confidence_95", coverage, coverage.covered);
   PrintCoverage("confidence_95_robust", coverage, coverage.covered_robust);
+  (*json)["replicas"] = coverage.replicas;
+  (*json)["not_converged"] = coverage.failed;
+  (*json)["covered"] = coverage.covered;
+  (*json)["covered_robust"] = coverage.covered_robust;
+  if (rows->IsPart()) return true;
   std::printf("confidence_95 expected: pooled %g to %g %%, each link %g to %g %%: %s\n",
               100.0 * kPooled[0], 100.0 * kPooled[1], 100.0 * kEach[0], 100.0 * kEach[1],
               holds ? "holds" : "DOES NOT HOLD");
@@ -84,7 +172,8 @@ int Main(int argc, char** argv) {
   const CommandLine line = ParseCommandLine(
       argc, argv,
       {.name = "tangible-chain-study",
-       .synopsis = "SCENE.json [--starts=20] [--replicas=1000]",
+       .synopsis = "SCENE.json [--starts=20] [--replicas=1000] [--out=R.json] "
+                   "[--shard=I/N | --merge=R0.json,R1.json,...]",
        .description =
            "Estimates the masses of all bodies named link* at once from positions that the scene\n"
            "itself predicts: from far starts without noise, and with noise to count how many 95 %\n"
@@ -94,12 +183,15 @@ int Main(int argc, char** argv) {
   if (line.exit_status) {
     return *line.exit_status;
   }
-  const std::string wrong = FirstOutside({{"--starts", FLAGS_starts, 0},
-                                          {"--replicas", FLAGS_replicas, 0},
-                                          {"--range", FLAGS_range, 1, kMostRange},
-                                          {"--rate", FLAGS_rate, kLeastRate, kMostRate},
-                                          {"--sigma", FLAGS_sigma, kLeastSigma},
-                                          {"--seed", FLAGS_seed, 0}});
+  ShardPlan plan;
+  std::string wrong = ReadShardFlags(FLAGS_shard, FLAGS_merge, FLAGS_out, &plan);
+  if (!wrong.empty()) return ReportError("tangible-chain-study: " + wrong, kExitUsage);
+  wrong = FirstOutside({{"--starts", FLAGS_starts, 0},
+                        {"--replicas", FLAGS_replicas, 0},
+                        {"--range", FLAGS_range, 1, kMostRange},
+                        {"--rate", FLAGS_rate, kLeastRate, kMostRate},
+                        {"--sigma", FLAGS_sigma, kLeastSigma},
+                        {"--seed", FLAGS_seed, 0}});
   if (!wrong.empty()) return ReportError("tangible-chain-study: " + wrong, kExitUsage);
   Scene scene;
   std::string error;
@@ -116,8 +208,23 @@ int Main(int argc, char** argv) {
   if (study.num_links() == 0) {
     return ReportError(line.positional[0] + ": /bodies: expected bodies named link*, got none");
   }
-  const bool starts = FLAGS_starts == 0 || PrintStarts(study);
-  const bool replicas = FLAGS_replicas == 0 || PrintReplicas(study);
+  if (plan.part != ShardPlan::Part::kAll) error = HashInputs();
+  if (!error.empty()) return ReportError(error);
+  error = OutputOverInput();
+  if (!error.empty()) return ReportError(error, kExitUsage);
+  Rows rows(plan);
+  if (plan.IsMerge()) error = rows.Merge();
+  if (!error.empty()) return ReportError(error);
+  OrderedJson json = {{"links", study.num_links()}, {"starts", OrderedJson::array()}};
+  const bool starts = FLAGS_starts == 0 || PrintStarts(study, &rows, &json);
+  const bool replicas = FLAGS_replicas == 0 || PrintReplicas(study, &rows, &json);
+  if (plan.IsShard()) {
+    json["shard"] = rows.ToJson();
+  } else {
+    json["holds"] = starts && replicas;
+  }
+  if (!FLAGS_out.empty()) error = WriteResult(FLAGS_out, JsonText(json));
+  if (!error.empty()) return ReportError(error);
   return starts && replicas ? kExitDone : kExitFailed;
 }
 

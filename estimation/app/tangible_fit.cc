@@ -19,6 +19,8 @@
 
 #include "tangible/app/certificate_json.h"
 #include "tangible/app/program.h"
+#include "tangible/app/shards.h"
+#include "tangible/estimation/app/fit_shards.h"
 #include "tangible/estimation/fit/fit_checkpoint.h"
 #include "tangible/estimation/fit/motion_check.h"
 #include "tangible/estimation/fit/profile.h"
@@ -57,6 +59,7 @@ DEFINE_int32(max_iterations, 50, "of each start");
 DEFINE_string(profile, "",
               "names of parameters, separated by commas, whose intervals are found by profiles: "
               "the cost with the parameter held, the others minimised");
+TANGIBLE_DEFINE_SHARD_FLAGS();
 
 namespace tangible {
 namespace {
@@ -656,7 +659,7 @@ MotionCheck CompareMotion(const Prepared& prepared, const FitResult& result) {
   return check;
 }
 
-int Run(const std::string& text, const std::string& file) {
+int Run(const std::string& text, const std::string& file, const ShardPlan& plan) {
   Prepared prepared;
   const int status = Prepare(text, file, &prepared);
   if (status != kExitDone) {
@@ -664,17 +667,27 @@ int Run(const std::string& text, const std::string& file) {
   }
   FitCheckpoint* const checkpoint = prepared.checkpoint.get();
   const FitOptions& options = prepared.fit.input.options();
+  std::string error = plan.part != ShardPlan::Part::kAll ? HashInputs() : "";
+  if (error.empty() && plan.IsShard()) {
+    error = WriteFitShard(options, plan, FLAGS_out, prepared.problem.get());
+    return error.empty() ? kExitDone : ReportError(error);
+  }
+  FitParts parts;
+  FitPartLogs logs(&parts);
+  if (error.empty() && plan.IsMerge()) error = MergeFitShards(options, plan, &parts);
+  if (!error.empty()) return ReportError(error);
   IterationPrinter printer(prepared.problem->entries());
   const FitProgress progress = [&](int start, int iteration, const FitIteration& values) {
     printer.Print(start, iteration, values);
   };
-  const NextLog next_log =
-      checkpoint == nullptr ? NextLog() : NextLog([checkpoint] { return checkpoint->Next(); });
+  NextLog next_log;
+  if (checkpoint != nullptr) next_log = [checkpoint] { return checkpoint->Next(); };
+  if (plan.IsMerge()) next_log = [&logs] { return logs.Next(); };
   VarianceComponents components;
   const FitResult result =
       FitWithComponents(options, prepared.problem.get(), progress, &components, next_log);
   ScaleObservations(components.noise, &prepared);
-  std::string error = Mismatch(checkpoint);
+  error = Mismatch(checkpoint);
   if (!error.empty()) {
     return ReportError(error);
   }
@@ -711,6 +724,21 @@ int Run(const std::string& text, const std::string& file) {
   return error.empty() ? Conclude(prepared, result, findings) : ReportError(error);
 }
 
+/// Reads --shard and --merge; returns what is wrong with them or empty.
+std::string CheckShardFlags(ShardPlan* plan) {
+  std::string wrong = ReadShardFlags(FLAGS_shard, FLAGS_merge, FLAGS_out, plan);
+  if (!wrong.empty() || plan->part == ShardPlan::Part::kAll) return wrong;
+  if (!FLAGS_checkpoint.empty()) return "--checkpoint: not with --shard or --merge";
+  for (const auto& [flag, path] : {std::pair("--report", &FLAGS_report),
+                                   {"--predictions", &FLAGS_predictions},
+                                   {"--scene_out", &FLAGS_scene_out}}) {
+    if (plan->IsShard() && !path->empty()) {
+      return std::string(flag) + ": not with --shard; --merge writes it";
+    }
+  }
+  return "";
+}
+
 int Main(int argc, char** argv) {
   const CommandLine line = ParseCommandLine(
       argc, argv,
@@ -719,7 +747,7 @@ int Main(int argc, char** argv) {
            "FIT.json [--out=R.json] [--report=R.html] [--scene_out=S.json]\n"
            "                    [--predictions=P.csv] [--predict_from=T]\n"
            "                    [--discretisation_check] [--compare_motion] [--checkpoint=C.json]\n"
-           "                    [--profile=P1,P2]",
+           "                    [--profile=P1,P2] [--shard=I/N | --merge=R0.json,R1.json,...]",
        .description =
            "Identifies parameters of a scene from observed positions by nonlinear least squares.\n"
            "Prints each iteration and, for each parameter, the estimate, its standard deviation\n"
@@ -734,6 +762,9 @@ int Main(int argc, char** argv) {
                            std::to_string(FLAGS_max_iterations),
                        kExitUsage);
   }
+  ShardPlan plan;
+  const std::string wrong = CheckShardFlags(&plan);
+  if (!wrong.empty()) return ReportError("tangible-fit: " + wrong, kExitUsage);
   if (std::isnan(FLAGS_predict_from)) {
     return ReportError("tangible-fit: --predict_from: expected a time in s, got nan", kExitUsage);
   }
@@ -743,7 +774,7 @@ int Main(int argc, char** argv) {
   if (!ReadTextFile(file, &text, &error)) {
     return ReportError(error);
   }
-  return Run(text, file);
+  return Run(text, file, plan);
 }
 
 }  // namespace

@@ -98,28 +98,44 @@ ChainStart ChainStudy::RunStart(int number) const {
   return start;
 }
 
-ChainCoverage ChainStudy::RunCoverage(const std::function<void(int)>& progress) const {
-  ChainCoverage coverage;
-  coverage.replicas = options_.replicas;
-  coverage.covered.assign(truth_.size(), 0);
-  coverage.covered_robust.assign(truth_.size(), 0);
+std::vector<ChainReplica> ChainStudy::RunReplicas(const std::function<bool(int)>& is_wanted) const {
+  std::vector<ChainReplica> replicas;
   std::mt19937_64 random(options_.seed);
-  for (int replica = 0; replica < options_.replicas; ++replica) {
+  for (int number = 0; number < options_.replicas; ++number) {
+    if (!is_wanted(number)) {
+      for (size_t i = 0; i < exact_.observations.size(); ++i) Normal(&random);
+      continue;
+    }
     FitProblem problem = ProblemFrom(truth_);
     for (Observation& observation : problem.observations) {
       observation.value += options_.sigma * Normal(&random);
     }
     const FitResult result = Run(problem);
-    coverage.failed += result.status == FitStatus::kConverged ? 0 : 1;
+    ChainReplica& replica = replicas.emplace_back();
+    replica.converged = result.status == FitStatus::kConverged;
+    replica.covered.assign(truth_.size(), 0);
+    replica.covered_robust.assign(truth_.size(), 0);
     for (size_t k = 0; k < truth_.size() && result.estimate.size() > 0; ++k) {
       const auto contains = [&](const ConfidenceInterval& interval) {
         return interval && interval->first <= truth_[k] && truth_[k] <= interval->second;
       };
-      coverage.covered[k] += contains(result.uncertainty.confidence_95[k]) ? 1 : 0;
-      coverage.covered_robust[k] += contains(result.uncertainty.confidence_95_robust[k]) ? 1 : 0;
+      replica.covered[k] = contains(result.uncertainty.confidence_95[k]) ? 1 : 0;
+      replica.covered_robust[k] = contains(result.uncertainty.confidence_95_robust[k]) ? 1 : 0;
     }
-    if (progress) {
-      progress(replica + 1);
+  }
+  return replicas;
+}
+
+ChainCoverage ChainStudy::CoverageOf(const std::vector<ChainReplica>& replicas) const {
+  ChainCoverage coverage;
+  coverage.replicas = static_cast<int>(replicas.size());
+  coverage.covered.assign(truth_.size(), 0);
+  coverage.covered_robust.assign(truth_.size(), 0);
+  for (const ChainReplica& replica : replicas) {
+    coverage.failed += replica.converged ? 0 : 1;
+    for (size_t k = 0; k < truth_.size(); ++k) {
+      coverage.covered[k] += replica.covered[k];
+      coverage.covered_robust[k] += replica.covered_robust[k];
     }
   }
   return coverage;

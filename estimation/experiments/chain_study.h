@@ -37,6 +37,12 @@ struct ChainStart {
   double seconds = 0.0;
 };
 
+/// One fit of observations with noise.
+struct ChainReplica {
+  bool converged = false;
+  std::vector<int> covered, covered_robust;  ///< of each link: 1 if the interval contains the truth
+};
+
 /// The numbers of intervals that contain the truth, for each link and for all.
 struct ChainCoverage {
   int replicas = 0;
@@ -54,8 +60,11 @@ class ChainStudy {
 
   /// Runs one of the numbered starts, each of which has its own seed.
   ChainStart RunStart(int number) const;
-  /// `progress` is called after each replica, with its number.
-  ChainCoverage RunCoverage(const std::function<void(int)>& progress) const;
+  /// Runs those of the numbered replicas that are wanted. All noise is one sequence, of which each
+  /// replica has its own part, whichever others are run.
+  std::vector<ChainReplica> RunReplicas(const std::function<bool(int)>& is_wanted) const;
+  /// What replicas have in common.
+  ChainCoverage CoverageOf(const std::vector<ChainReplica>& replicas) const;
 
  private:
   FitProblem ProblemFrom(const std::vector<double>& initial) const;

@@ -10,11 +10,13 @@
 
 #include "tangible/estimation/fit/block_system.h"
 #include "tangible/estimation/fit/fit_checkpoint.h"
+#include "tangible/estimation/fit/fit_parts.h"
 #include "tangible/estimation/fit/held_refit.h"
 #include "tangible/estimation/fit/linearisation.h"
 #include "tangible/estimation/fit/minimise.h"
 #include "tangible/estimation/fit/profile.h"
 #include "tangible/estimation/fit/shooting.h"
+#include "tangible/estimation/fit/starts.h"
 #include "tangible/estimation/fit/tolerances.h"
 #include "tangible/estimation/fit/windows.h"
 #include "tangible/estimation/problem/problem_with_priors.h"
@@ -34,31 +36,6 @@ constexpr int kMostBetter = 3;
 
 // Far from the minimum the first iterations of a fit that gets there gain the most.
 constexpr int kTrialIterations = 5;
-
-/// A start drawn within the bounds, evenly in the minimiser's coordinates; where there is no bound,
-/// within a factor of ten, or a typical magnitude, of the initial value.
-Eigen::VectorXd DrawStart(const std::vector<ParameterizedScene::Entry>& entries,
-                          std::mt19937* random) {
-  Eigen::VectorXd p(static_cast<Eigen::Index>(entries.size()));
-  for (size_t k = 0; k < entries.size(); ++k) {
-    const ParameterizedScene::Entry& entry = entries[k];
-    // mt19937 is the same everywhere; the library's distributions are not.
-    const double part = ((*random)() + 0.5) / 4294967296.0;
-    double low = entry.lower;
-    double high = entry.upper;
-    if (entry.logarithmic) {
-      low = std::log(low > 0.0 ? low : std::min(0.1 * entry.initial, high));
-      high = std::log(std::isfinite(high) ? high : std::max(10.0 * entry.initial, entry.lower));
-    } else {
-      low = std::isfinite(low) ? low : std::min(entry.initial - entry.scale, high);
-      high = std::isfinite(high) ? high : std::max(entry.initial + entry.scale, low);
-    }
-    const double drawn = low + part * (high - low);
-    p[static_cast<Eigen::Index>(k)] =
-        std::clamp(entry.logarithmic ? std::exp(drawn) : drawn, entry.lower, entry.upper);
-  }
-  return p;
-}
 
 /// ‖∂r/∂q‖ of each parameter.
 Eigen::VectorXd EffectOf(const BlockLayout& layout, const Linearisation& model) {
@@ -111,31 +88,6 @@ bool IsBetter(const Minimum& a, const Minimum& b) {
     return b.status == FitStatus::kFailed;
   }
   return a.status < b.status ? !IsFarAbove(a.cost, b.cost) : IsFarAbove(b.cost, a.cost);
-}
-
-// A derivative may be 0 at a bound (restitution 0) or by symmetry. These moves into the interior,
-// as fractions of the distance to the other bound or of the scale, then show whether the parameter
-// has an effect. So do moves to the nearer bound: friction above that at which a contact sticks has
-// no effect, and less friction has one.
-struct Nudge {
-  bool inwards;
-  double fraction;
-};
-constexpr Nudge kNudges[] = {{true, 0.1}, {true, 0.01}, {false, 0.5}, {false, 0.9}};
-
-/// `p` with this parameter moved.
-Eigen::VectorXd Nudged(const ParameterizedScene::Entry& entry, int parameter, const Nudge& nudge,
-                       Eigen::VectorXd p) {
-  const double value = p[parameter];
-  const double up = std::isfinite(entry.upper) ? entry.upper - value : HUGE_VAL;
-  const double down = std::isfinite(entry.lower) ? value - entry.lower : HUGE_VAL;
-  const bool upwards = (up >= down) == nudge.inwards;
-  const double room = upwards ? up : down;
-  // A bounded mass may be 10 000 times another one: it is moved by a part of itself.
-  const double span = entry.logarithmic ? value : std::isfinite(room) ? room : entry.scale;
-  const double move = std::min(nudge.fraction * span, room);
-  p[parameter] += upwards ? move : -move;
-  return p;
 }
 
 /// Where the starts begin.
@@ -203,6 +155,14 @@ Eigen::VectorXd ObservationResiduals(const LeastSquaresProblem& problem,
   return residuals;
 }
 
+/// Seconds from now on.
+std::function<double()> Stopwatch() {
+  using Clock = std::chrono::steady_clock;
+  return [began = Clock::now()] {
+    return std::chrono::duration<double>(Clock::now() - began).count();
+  };
+}
+
 /// The state of one fit.
 struct FitRun {
   const FitOptions& options;
@@ -212,6 +172,7 @@ struct FitRun {
   LeastSquaresProblem* problem;
   FitLog* log;
   bool logged;
+  int start = 0;  ///< the number of the one under way
   long rollouts = 0;
 
   /// What the log has of the start under way has become a result of its own.
@@ -241,13 +202,12 @@ std::optional<Minimum> Reach(const Eigen::VectorXd& start, FitApproach approach,
     log->shot.reset();
     return std::nullopt;
   }
-  const int i = static_cast<int>(log->starts.size());
-  const std::function<void(int, const FitIteration&)> report =
-      [run, i](int iteration, const FitIteration& values) {
-        if (run->progress) {
-          run->progress(i, iteration, values);
-        }
-      };
+  const std::function<void(int, const FitIteration&)> report = [run](int iteration,
+                                                                     const FitIteration& values) {
+    if (run->progress) {
+      run->progress(run->start, iteration, values);
+    }
+  };
   Minimum minimum = Minimise(run->options, led ? log->shot->parameters : start, run->elapsed,
                              report, run->problem, run->LogOfStart(),
                              trial ? Patience{kTrialIterations, kNoProgress} : Patience());
@@ -369,14 +329,16 @@ void KeepInitial(const Eigen::VectorXd& initial, FitRun* run, Minimum* minimum) 
   }
 }
 
-/// Minimises from `start` and keeps in the log how that ended. The first start also describes the
-/// initial values where it begins elsewhere.
-void RunStart(const Eigen::VectorXd& start, FitApproach approach, double gradient_norm,
-              double initial_cost, FitRun* run) {
-  FitLog* const log = run->log;
-  const bool is_first = log->starts.empty();
+/// Minimises from `start`. The first start also describes the initial values where it begins
+/// elsewhere.
+FinishedStart MakeStart(int number, const Eigen::VectorXd& start, FitApproach approach,
+                        const FirstPoint& first, double initial_cost, FitRun* run) {
+  const bool is_first = number == 0;
+  const long before = run->rollouts;
+  run->start = number;
   FitStart told;
-  Minimum minimum = BestFrom(start, approach, run, &told);
+  FinishedStart done;
+  Minimum& minimum = done.minimum = BestFrom(start, approach, run, &told);
   const Eigen::VectorXd initial = InitialOf(run->problem->entries());
   if (is_first && start != initial && minimum.cost > initial_cost) {
     KeepInitial(initial, run, &minimum);
@@ -385,22 +347,42 @@ void RunStart(const Eigen::VectorXd& start, FitApproach approach, double gradien
   if (is_first && elsewhere && !minimum.iterations.empty() && std::isfinite(initial_cost)) {
     minimum.iterations.insert(
         minimum.iterations.begin(),
-        {initial_cost, gradient_norm,
+        {initial_cost, first.gradient_norm,
          std::vector<double>(initial.data(), initial.data() + initial.size()), 0.0});
   }
-  FitStart described = Describe(is_first ? initial : start, minimum);
-  described.plain_cost = told.plain_cost;
-  described.tried = told.tried;
-  described.tried_cost = told.tried_cost;
+  done.told = Describe(is_first ? initial : start, minimum);
+  done.told.plain_cost = told.plain_cost;
+  done.told.tried = told.tried;
+  done.told.tried_cost = told.tried_cost;
   if (!told.message.empty()) {
-    described.message = told.message;
+    done.told.message = told.message;
   }
-  log->starts.push_back(std::move(described));
+  done.rollouts = run->rollouts - before;
+  return done;
+}
+
+/// Makes a start, or takes it over from elsewhere, and keeps in the log how it ended.
+void RunStart(const Eigen::VectorXd& start, FitApproach approach, const FirstPoint& first,
+              double initial_cost, FitRun* run) {
+  FitLog* const log = run->log;
+  const int number = static_cast<int>(log->starts.size());
+  FinishedStart done;
+  if (log->parts != nullptr && log->parts->starts.count(number) > 0) {
+    done = log->parts->starts.at(number);
+    run->rollouts += done.rollouts;
+    for (const SaidIteration& said : done.said) {
+      if (run->progress) run->progress(number, said.number, said.values);
+    }
+  } else {
+    done = MakeStart(number, start, approach, first, initial_cost, run);
+  }
+  log->starts.push_back(std::move(done.told));
   // Of starts that end at the same minimum the first one is told of.
-  const bool same = !is_first && minimum.status == log->best.status &&
+  const Minimum& minimum = done.minimum;
+  const bool same = number > 0 && minimum.status == log->best.status &&
                     minimum.cost >= log->best.cost * (1.0 - kSameCost);
-  if (is_first || (!same && IsBetter(minimum, log->best))) {
-    log->best = std::move(minimum);
+  if (number == 0 || (!same && IsBetter(minimum, log->best))) {
+    log->best = std::move(done.minimum);
   }
   run->EndPart();
 }
@@ -469,56 +451,6 @@ bool MayHaveOthers(FitRun* run) {
                          !certificate->discrete_map.empty());
 }
 
-/// Another start: an estimate with restitution and friction shifted up or down; where no parameter
-/// is one of these, with all of them shifted by less.
-Eigen::VectorXd Shifted(const std::vector<ParameterEntry>& entries,
-                        const std::vector<double>& estimate, double side) {
-  const bool any = std::any_of(entries.begin(), entries.end(),
-                               [](const ParameterEntry& entry) { return entry.of_contact; });
-  Eigen::VectorXd p(static_cast<Eigen::Index>(entries.size()));
-  for (size_t k = 0; k < entries.size(); ++k) {
-    const ParameterEntry& entry = entries[k];
-    const double shift = side * (!any ? kShiftOfAll : entry.of_contact ? kShift : 0.0);
-    const double bound = side > 0.0 ? entry.upper : entry.lower;
-    double value = estimate[k];
-    if (entry.logarithmic) {
-      value *= std::exp(shift);
-    } else if (entry.of_contact && std::isfinite(bound)) {
-      value += std::abs(shift) * (bound - value);
-    } else {
-      value += shift * std::max(std::abs(value), entry.scale);
-    }
-    p[static_cast<Eigen::Index>(k)] = std::clamp(value, entry.lower, entry.upper);
-  }
-  return p;
-}
-
-/// "2 of 3 starts agree; the other ends at a cost of 12.3"; empty of one start.
-std::string DescribeAgreement(const std::vector<FitStart>& starts, double best) {
-  if (starts.size() < 2) {
-    return "";
-  }
-  std::string others;
-  size_t agree = 0;
-  for (const FitStart& start : starts) {
-    if (start.cost <= best * (1.0 + kSameCost) + kAgree) {
-      ++agree;
-    } else {
-      others += (others.empty() ? "" : ", ") +
-                (std::isfinite(start.cost) ? CompactNumber(start.cost, 6) : "none");
-    }
-  }
-  const size_t count = starts.size();
-  std::string text = (agree == count ? "all " : std::to_string(agree) + " of ") +
-                     std::to_string(count) + " starts " + (agree == 1 ? "ends" : "agree");
-  if (agree == 1) {
-    text = "1 of " + std::to_string(count) + " starts ends at the lowest cost";
-  }
-  return text + (others.empty()       ? ""
-                 : agree + 1 == count ? "; the other ends at a cost of " + others
-                                      : "; the others end at costs of " + others);
-}
-
 /// All starts, with the log's evaluations if there is one.
 void RunStarts(FitRun* run, FitResult* result) {
   FitLog* const log = run->log;
@@ -541,15 +473,15 @@ void RunStarts(FitRun* run, FitResult* result) {
   for (int i = 0; i < std::max(1, run->options.starts); ++i) {
     const Eigen::VectorXd start = i == 0 ? first.parameters : DrawStart(entries, &random);
     if (!is_done(i)) {
-      RunStart(start, run->options.approach, first.gradient_norm, result->initial_cost, run);
+      RunStart(start, run->options.approach, first, result->initial_cost, run);
     }
   }
   if (run->options.starts == 0 && (log->starts.size() > 1 || MayHaveOthers(run))) {
     for (const double side : {1.0, -1.0}) {
       if (!is_done(side > 0.0 ? 1 : 2)) {
         // It is one more look, and no search: without progress it ends at once.
-        RunStart(Shifted(entries, log->starts.front().estimate, side), FitApproach::kTrial,
-                 first.gradient_norm, result->initial_cost, run);
+        RunStart(Shifted(entries, log->starts.front().estimate, side), FitApproach::kTrial, first,
+                 result->initial_cost, run);
       }
     }
   }
@@ -643,6 +575,20 @@ void Certify(LeastSquaresProblem* problem, FitResult* result) {
 
 namespace {
 
+/// A profile, made or taken over from elsewhere.
+FinishedProfile ProfileOf(const FitRun& run, const FitResult& result, int parameter, long budget) {
+  if (run.log->parts != nullptr) {
+    const auto& known = run.log->parts->profiles;
+    const auto found = known.find(run.problem->entries()[static_cast<size_t>(parameter)].name);
+    if (found != known.end() && found->second.estimate == result.estimate) return found->second;
+  }
+  FinishedProfile done;
+  done.estimate = result.estimate;
+  done.profile = MakeProfile(run.options, result, parameter, budget, run.problem, &done.better,
+                             &done.rollouts);
+  return done;
+}
+
 /// The profiles that are asked for or needed; the lowest point of one where that costs less than
 /// the estimate, else empty.
 Eigen::VectorXd MakeProfiles(FitRun* run, FitResult* result) {
@@ -650,15 +596,24 @@ Eigen::VectorXd MakeProfiles(FitRun* run, FitResult* result) {
   Eigen::VectorXd better;
   const long most = std::max(kLeastProfileRuns * run->problem->num_blocks(), result->rollouts);
   const long end = result->rollouts + most;
+  FitParts* const parts = run->log->parts;
+  const bool part = parts != nullptr && parts->is_wanted;  // others make the rest
   for (const auto& [parameter, why] :
        NeedProfiles(run->options, *result, run->problem, &result->rollouts)) {
+    const std::string& name = run->problem->entries()[static_cast<size_t>(parameter)].name;
+    if (part && !parts->is_wanted(name)) continue;
     const bool asked = why == kAskedFor;
     const long budget = asked ? std::numeric_limits<long>::max() : end - result->rollouts;
-    Profile profile = MakeProfile(run->options, *result, parameter, budget, run->problem, &better,
-                                  &result->rollouts);
+    FinishedProfile done = ProfileOf(*run, *result, parameter, budget);
+    result->rollouts += done.rollouts;
+    if (part) {
+      parts->made[name] = std::move(done);
+      continue;
+    }
+    better = done.better;
+    Profile& profile = done.profile;
     if (better.size() > 0) break;
     if (profile.branches.empty()) {
-      const std::string& name = run->problem->entries()[static_cast<size_t>(parameter)].name;
       std::string text = "the interval of '";
       text.append(name).append("' may be wrong (").append(why);
       text.append("): its profile takes long; --profile makes it");
@@ -721,16 +676,14 @@ void Judge(FitRun* run, FitResult* result) {
 
 FitResult Fit(const FitOptions& options, LeastSquaresProblem* problem, const FitProgress& progress,
               FitLog* log, const FitShooting& shooting) {
-  using Clock = std::chrono::steady_clock;
-  const Clock::time_point began = Clock::now();
   FitLog own;
   FitRun run{options,
              progress,
              shooting,
-             [began] { return std::chrono::duration<double>(Clock::now() - began).count(); },
+             Stopwatch(),
              problem,
              log == nullptr ? &own : log,
-             log != nullptr};
+             log != nullptr && log->parts == nullptr};
   FitResult result;
   try {
     RunStarts(&run, &result);
@@ -745,8 +698,11 @@ FitResult Fit(const FitOptions& options, LeastSquaresProblem* problem, const Fit
   return result;
 }
 
-FitResult Fit(const FitOptions& options, RecordingsProblem* problem, const FitProgress& progress,
-              FitLog* log) {
+namespace {
+
+/// Calls a function with the problem that has the rows of priors too, and its multiple shooting.
+template <typename Function>
+auto WithPriors(const FitOptions& options, RecordingsProblem* problem, const Function& function) {
   const FitShooting shooting = [&options, problem](const Eigen::VectorXd& start,
                                                    EvaluationLog* evaluations) {
     return Shoot(options, start, problem, evaluations);
@@ -754,7 +710,17 @@ FitResult Fit(const FitOptions& options, RecordingsProblem* problem, const FitPr
   ProblemWithPriors with_priors(problem, problem->effects());
   LeastSquaresProblem* const whole =
       with_priors.HasRows() ? static_cast<LeastSquaresProblem*>(&with_priors) : problem;
-  FitResult result = Fit(options, whole, progress, log, shooting);
+  return function(whole, shooting);
+}
+
+}  // namespace
+
+FitResult Fit(const FitOptions& options, RecordingsProblem* problem, const FitProgress& progress,
+              FitLog* log) {
+  FitResult result =
+      WithPriors(options, problem, [&](LeastSquaresProblem* whole, const FitShooting& shooting) {
+        return Fit(options, whole, progress, log, shooting);
+      });
   for (const RandomEffect& effect : problem->effects()) {
     // A shared value is determined only through the values of the recordings, or by a prior.
     if (result.estimate.size() > 0 && !problem->entries()[effect.mean].prior) {
@@ -762,6 +728,36 @@ FitResult Fit(const FitOptions& options, RecordingsProblem* problem, const FitPr
     }
   }
   return result;
+}
+
+std::vector<std::optional<FinishedStart>> MakeStarts(const FitOptions& options,
+                                                     RecordingsProblem* problem,
+                                                     const std::vector<int>& numbers) {
+  std::vector<std::optional<FinishedStart>> starts(numbers.size());
+  std::vector<SaidIteration> said;
+  const FitProgress keep = [&said](int, int iteration, const FitIteration& values) {
+    said.push_back({iteration, values});
+  };
+  WithPriors(options, problem, [&](LeastSquaresProblem* whole, const FitShooting& shooting) {
+    FitLog log;
+    FitRun run{options, keep, shooting, Stopwatch(), whole, &log, false};
+    Linearizer search(whole, options.derivatives, options.threads, nullptr);
+    FirstPoint first;
+    FitResult result;
+    if (!FindStart(options, whole, &search, &first, &result)) return;
+    std::mt19937 random(options.seed);
+    for (int number = 0; number < NumStarts(options); ++number) {
+      const Eigen::VectorXd start =
+          number == 0 ? first.parameters : DrawStart(whole->entries(), &random);
+      const auto wanted = std::find(numbers.begin(), numbers.end(), number);
+      if (wanted == numbers.end()) continue;
+      said.clear();
+      FinishedStart& done = starts[static_cast<size_t>(wanted - numbers.begin())].emplace(
+          MakeStart(number, start, options.approach, first, result.initial_cost, &run));
+      done.said = said;
+    }
+  });
+  return starts;
 }
 
 FitResult Fit(const FitOptions& options, RolloutResiduals* residuals, const FitProgress& progress,

@@ -32,6 +32,8 @@
 
 namespace tangible {
 
+struct FitParts;  // fit_parts.h
+
 /// What is kept of one fit.
 struct FitLog {
   EvaluationLog search;                   ///< of a first point where every parameter does something
@@ -42,6 +44,8 @@ struct FitLog {
   EvaluationLog start;           ///< of the start under way, since the last part of it ended
   long rollouts = 0;             ///< when the last part of a start ended
   std::function<void()> on_end;  ///< called at the end of each part of a start
+  /// What is taken over from elsewhere (fit_parts.h); with it nothing is kept here for a restart.
+  FitParts* parts = nullptr;
 
   /// If not 0, the number of an evaluation that was at another point than that in the log.
   long mismatch() const { return search.mismatch() > 0 ? search.mismatch() : start.mismatch(); }

@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tangible/app/batch_csv.h"
 
+#include <algorithm>
+#include <string_view>
+#include <utility>
+
 #include "tangible/app/program.h"
 #include "tangible/scene/csv.h"
 #include "tangible/scene/set_parameters.h"
@@ -59,7 +63,50 @@ bool ReadBatch(const std::string& file, const Scene& scene, BatchTable* table, s
   return true;
 }
 
-std::string BatchCsv(const ModelStructure& structure, const std::vector<BatchRow>& rows) {
+BatchTable RowsOf(const Shard& shard, BatchTable table) {
+  BatchTable part;
+  part.parameters = std::move(table.parameters);
+  const long rows = shard.NumRows(table.values.rows());
+  part.values.resize(rows, table.values.cols());
+  for (long i = 0; i < rows; ++i) {
+    part.values.row(i) = table.values.row(shard.RowOf(i));
+    part.lines.push_back(table.lines[shard.RowOf(i)]);
+  }
+  return part;
+}
+
+bool MergeBatchCsv(const std::vector<std::string>& shards, long num_rows, std::string* text,
+                   std::string* error) {
+  // The next line of each shard is the next row of the run, one shard after the other.
+  std::vector<std::string_view> left(shards.begin(), shards.end());
+  const auto take = [](std::string_view* lines) {
+    const size_t size = std::min(lines->find('\n'), lines->size() - 1) + 1;
+    const std::string_view line = lines->substr(0, size);
+    lines->remove_prefix(size);
+    return line;
+  };
+  const std::string header(left[0].substr(0, left[0].find('\n') + 1));
+  *text = header;
+  for (std::string_view& lines : left) {
+    if (lines.empty() || take(&lines) != header) {
+      *error = "--merge: expected tables with the same columns, got others";
+      return false;
+    }
+  }
+  for (long row = 0; row < num_rows; ++row) {
+    std::string_view& lines = left[row % static_cast<long>(left.size())];
+    const std::string first = std::to_string(row + 1) + ",";
+    if (lines.substr(0, first.size()) != first) {
+      *error = "--merge: expected row " + std::to_string(row + 1) + ", got none";
+      return false;
+    }
+    text->append(take(&lines));
+  }
+  return true;
+}
+
+std::string BatchCsv(const ModelStructure& structure, const std::vector<BatchRow>& rows,
+                     const Shard& shard) {
   const std::vector<int> bodies = WrittenBodies(structure);
   std::string text = "row,status";
   for (const int body : bodies) {
@@ -69,7 +116,7 @@ std::string BatchCsv(const ModelStructure& structure, const std::vector<BatchRow
   }
   text += "\n";
   for (size_t r = 0; r < rows.size(); ++r) {
-    text += std::to_string(r + 1) + "," + NameOf(rows[r].status);
+    text += std::to_string(shard.RowOf(static_cast<long>(r)) + 1) + "," + NameOf(rows[r].status);
     for (const int body : bodies) {
       for (const std::vector<double>* numbers : {&rows[r].final.pose, &rows[r].final.twist}) {
         for (int i = 0; i < 3; ++i) text += "," + FormatNumber((*numbers)[3 * body + i]);

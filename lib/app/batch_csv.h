@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "tangible/app/shards.h"
 #include "tangible/simulation/gradient/batch.h"
 
 namespace tangible {
@@ -22,8 +23,17 @@ struct BatchTable {
 bool ReadBatch(const std::string& file, const Scene& scene, BatchTable* table, std::string* error);
 
 /// Rows row,status, then x, y, angle, vx, vy, omega of each moving and kinematic body, in scene
-/// order, under names such as ball/x. Rows are counted from 1; one that failed has the last good
-/// state.
-std::string BatchCsv(const ModelStructure& structure, const std::vector<BatchRow>& rows);
+/// order, under names such as ball/x. Rows are counted from 1, those of a shard as in the whole
+/// table; one that failed has the last good state.
+std::string BatchCsv(const ModelStructure& structure, const std::vector<BatchRow>& rows,
+                     const Shard& shard = {});
+
+/// The table of all rows from those of shards 0, 1, ..., each with as many rows as it must have.
+/// Sets one line where the tables are none of the same scene.
+bool MergeBatchCsv(const std::vector<std::string>& shards, long num_rows, std::string* text,
+                   std::string* error);
+
+/// The values of a shard's rows, and their lines.
+BatchTable RowsOf(const Shard& shard, BatchTable table);
 
 }  // namespace tangible

@@ -272,6 +272,8 @@ std::string PendingFile::Commit() {
 
 }  // namespace
 
+const ProgramInfo& ParsedProgram() { return Parsed(); }
+
 CommandLine ParseCommandLine(int argc, char** argv, const ProgramInfo& info) {
   Parsed() = info;
   CommandLine line;

@@ -44,6 +44,8 @@ struct ProgramInfo {
   /// over an input; a missing folder is reported before the work begins.
   std::vector<std::string> outputs = {"out"};
   std::vector<std::string> inputs{};
+  /// Flags that change no bit of the results.
+  std::vector<std::string> without_effect = {"threads"};
   /// The JSON Schema of the program's input, which --schema prints; none if empty.
   std::function<std::string()> schema{};
 };
@@ -59,6 +61,9 @@ struct CommandLine {
 /// from the environment (GLOG_v, GLOG_logtostderr). Prints help or the version on stdout, or one
 /// line about what is wrong on stderr.
 CommandLine ParseCommandLine(int argc, char** argv, const ProgramInfo& info);
+
+/// What ParseCommandLine was called with.
+const ProgramInfo& ParsedProgram();
 
 /// Runs `body`. If memory runs out, an unexpected exception is thrown, or output does not reach
 /// stdout (closed, a full disk, a pipe without a reader), it prints one line on stderr and returns

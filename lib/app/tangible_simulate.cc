@@ -17,6 +17,7 @@
 #include "tangible/app/program.h"
 #include "tangible/app/progress.h"
 #include "tangible/app/run_recorders.h"
+#include "tangible/app/shards.h"
 #include "tangible/dynamics/model/settings.h"
 #include "tangible/scene/json_writer.h"
 #include "tangible/scene/scene_json.h"
@@ -41,6 +42,7 @@ DEFINE_string(batch, "",
               "parameters (CSV: a column a path, a row a rollout); writes final states instead of "
               "a trajectory");
 DEFINE_int32(threads, 0, "of a batch, or of a step's islands; 0: one a core");
+TANGIBLE_DEFINE_SHARD_FLAGS();
 
 namespace tangible {
 namespace {
@@ -52,8 +54,13 @@ double WallSeconds() {
 bool IsDefault(const char* flag) { return gflags::GetCommandLineFlagInfoOrDie(flag).is_default; }
 
 // The same for the flags of batches.
-std::string CheckBatchFlags() {
-  if (FLAGS_batch.empty()) return "";
+std::string CheckBatchFlags(ShardPlan* plan) {
+  std::string wrong = ReadShardFlags(FLAGS_shard, FLAGS_merge, plan);
+  if (!wrong.empty()) return wrong;
+  if (FLAGS_batch.empty()) {
+    if (plan->IsShard()) return "--shard: needs --batch, whose rows it divides";
+    return plan->IsMerge() ? "--merge: needs --batch, whose rows it puts together" : "";
+  }
   for (const char* name :
        {"every", "contacts", "initial", "view", "summary", "certify", "observe"}) {
     if (!IsDefault(name)) return std::string("--") + name + ": not with --batch";
@@ -65,7 +72,7 @@ std::string CheckBatchFlags() {
 constexpr double kMaxNoise = 1e150;
 
 // Empty, or one line about a flag's value.
-std::string CheckFlags() {
+std::string CheckFlags(ShardPlan* plan) {
   std::string outside = FirstOutside({{"--every", FLAGS_every, 1},
                                       {"--noise", FLAGS_noise, 0, kMaxNoise},
                                       {"--rate", FLAGS_rate, 0},
@@ -79,7 +86,7 @@ std::string CheckFlags() {
       if (!IsDefault(name)) return std::string("--") + name + ": needs --observe";
     }
   }
-  return CheckBatchFlags();
+  return CheckBatchFlags(plan);
 }
 
 /// The scene as it is to be run; `error` is one line or empty.
@@ -225,32 +232,99 @@ int Run(const std::string& file) {
   return kExitDone;
 }
 
+// What stderr is told of a row.
+struct RowNotes {
+  int line = 0;         // of the row, in its file
+  std::string message;  // empty unless it failed
+  std::vector<std::string> warnings;
+};
+
 // Prints the warnings of the first row that has any, with the number of other rows that have some.
-void ReportWarnings(const BatchTable& table, const std::vector<BatchRow>& rows) {
-  const BatchRow* first = nullptr;
+void ReportWarnings(const std::vector<RowNotes>& rows) {
+  const RowNotes* first = nullptr;
   int others = 0;
-  for (const BatchRow& row : rows) {
+  for (const RowNotes& row : rows) {
     if (row.warnings.empty()) continue;
     others += first != nullptr ? 1 : 0;
     first = first == nullptr ? &row : first;
   }
   if (first == nullptr) return;
   std::string place = FLAGS_batch + ": line ";
-  place += std::to_string(table.lines[first - rows.data()]) + ": warning: ";
+  place += std::to_string(first->line) + ": warning: ";
   const std::string more = others == 0 ? ""
                                        : " (and " + std::to_string(others) +
                                              (others == 1 ? " more row)" : " more rows)");
   for (std::string line : first->warnings) ReportError(line.insert(0, place).append(more));
 }
 
-// Runs all rows of a table; those that fail are reported, the others written.
-int RunRows(const std::string& file) {
+// Reports what failed, and warnings; returns the exit status.
+int Report(const std::vector<RowNotes>& rows) {
+  int exit_status = kExitDone;
+  for (const RowNotes& row : rows) {
+    if (row.message.empty()) continue;
+    exit_status =
+        ReportError(FLAGS_batch + ": line " + std::to_string(row.line) + ": " + row.message);
+  }
+  ReportWarnings(rows);
+  return exit_status;
+}
+
+std::vector<RowNotes> NotesOf(const BatchTable& table, const std::vector<BatchRow>& rows) {
+  std::vector<RowNotes> notes;
+  for (size_t r = 0; r < rows.size(); ++r) {
+    const bool failed = rows[r].status != RolloutStatus::kDone;
+    notes.push_back({table.lines[r], failed ? rows[r].message : "", rows[r].warnings});
+  }
+  return notes;
+}
+
+// The same in a shard's file, in which the states stand already: [message, warnings...], or null of
+// a row of which nothing is told.
+std::vector<Json> ToJson(const std::vector<RowNotes>& notes) {
+  std::vector<Json> rows;
+  for (const RowNotes& row : notes) {
+    Json told;
+    if (!row.message.empty() || !row.warnings.empty()) {
+      told = Json::array({row.message});
+      for (const std::string& warning : row.warnings) told.push_back(warning);
+    }
+    rows.push_back(std::move(told));
+  }
+  return rows;
+}
+
+// Puts the shards' rows together; nothing is run.
+int MergeRows(const ShardPlan& plan, const BatchTable& table) {
+  MergedShards merged;
+  std::string error = MergeShards(plan, table.values.rows(), &merged);
+  if (!error.empty()) return ReportError(error);
+  std::string text;
+  if (!MergeBatchCsv(merged.texts, table.values.rows(), &text, &error)) return ReportError(error);
+  std::vector<RowNotes> notes;
+  for (const Json& told : merged.rows) {
+    RowNotes row{table.lines[notes.size()], "", {}};
+    for (size_t i = 0; i < told.size(); ++i) {
+      (i == 0 ? row.message : row.warnings.emplace_back()) = told[i].get<std::string>();
+    }
+    notes.push_back(std::move(row));
+  }
+  error = WriteResult(FLAGS_out, text);
+  return error.empty() ? Report(notes) : ReportError(error);
+}
+
+// Runs all rows of a table, or those of a shard; those that fail are reported, the others written.
+int RunRows(const std::string& file, const ShardPlan& plan) {
   Scene scene;
   BatchTable table;
   std::string error;
   if (!LoadScene(file, &scene, &error)) return ReportError(error);
   if (!CheckSettings(scene, &error)) return ReportError(error.insert(0, file + ": "));
   if (!ReadBatch(FLAGS_batch, scene, &table, &error)) return ReportError(error);
+  if (plan.part != ShardPlan::Part::kAll) error = HashInputs();
+  if (!error.empty()) return ReportError(error);
+  if (plan.IsMerge()) return MergeRows(plan, table);
+  const long rows_in_all = table.values.rows();
+  table = RowsOf(plan.shard, std::move(table));
   BatchResult batch;
   {
     Progress progress("rollouts", table.values.rows());
@@ -258,16 +332,13 @@ int RunRows(const std::string& file) {
                      [&progress](long done) { progress.Show(done); });
   }
   if (!batch.message.empty()) return ReportError(error.append(file + ": ").append(batch.message));
-  error = WriteResult(FLAGS_out, BatchCsv(*BuildStructure(scene), batch.rows));
-  if (!error.empty()) return ReportError(error);
-  int exit_status = kExitDone;
-  for (size_t r = 0; r < batch.rows.size(); ++r) {
-    if (batch.rows[r].status == RolloutStatus::kDone) continue;
-    exit_status = ReportError(FLAGS_batch + ": line " + std::to_string(table.lines[r]) + ": " +
-                              batch.rows[r].message);
+  const std::vector<RowNotes> notes = NotesOf(table, batch.rows);
+  std::string text = BatchCsv(*BuildStructure(scene), batch.rows, plan.shard);
+  if (plan.IsShard()) {
+    text = WithShard(std::move(text), plan.shard, rows_in_all, ToJson(notes));
   }
-  ReportWarnings(table, batch.rows);
-  return exit_status;
+  error = WriteResult(FLAGS_out, text);
+  return error.empty() ? Report(notes) : ReportError(error);
 }
 
 int Main(int argc, char** argv) {
@@ -277,7 +348,8 @@ int Main(int argc, char** argv) {
        .synopsis =
            "SCENE.json [--out=T.csv] [--every=K] [--contacts=C.csv] [--initial=T.csv] "
            "[--view=V.html] [--summary=S.json] [--certify] [--observe=O.csv --noise=S --seed=N "
-           "--rate=HZ --points=P.json] | --batch=PARAMETERS.csv [--out=F.csv] [--threads=T]",
+           "--rate=HZ --points=P.json] | --batch=PARAMETERS.csv [--out=F.csv] [--threads=T] "
+           "[--shard=I/N | --merge=F0.csv,F1.csv,...]",
        .description = "Runs a scene and writes the trajectory of its bodies as CSV; on request "
                       "contacts, a summary,\nnoisy observations and an animated view. With "
                       "--batch runs it for each row of a table of parameters and\nwrites the final "
@@ -288,11 +360,12 @@ int Main(int argc, char** argv) {
        .inputs = {"initial", "points", "batch"},
        .schema = [] { return JsonText(SceneSchema()); }});
   if (line.exit_status) return *line.exit_status;
-  const std::string wrong = CheckFlags();
+  ShardPlan plan;
+  const std::string wrong = CheckFlags(&plan);
   if (!wrong.empty()) {
     return ReportError("tangible-simulate: " + wrong, kExitUsage);
   }
-  return FLAGS_batch.empty() ? Run(line.positional[0]) : RunRows(line.positional[0]);
+  return FLAGS_batch.empty() ? Run(line.positional[0]) : RunRows(line.positional[0], plan);
 }
 
 }  // namespace

@@ -12,7 +12,9 @@
 #include <vector>
 
 #include "tangible/app/certificate_json.h"
+#include "tangible/app/row_archive.h"
 #include "tangible/estimation/fit/fit_checkpoint.h"
+#include "tangible/estimation/fit/fit_parts.h"
 #include "tangible/estimation/results/fit_json.h"
 #include "tangible/estimation/results/fitted_scene.h"
 #include "tangible/estimation/results/prediction.h"
@@ -70,6 +72,11 @@ class FitProblemOf {
         with_jacobian ? py::object(ToArray(jacobian, {rows, count})) : py::object(py::none()));
   }
 
+  // What others have done of a fit, as texts: starts in their order, and profiles of these names.
+  struct Parts {
+    std::vector<std::string> starts;
+    std::vector<std::string> names, profiles;
+  };
   struct Wanted {
     int max_iterations = 50;
     double predict_from = INFINITY;  // s; infinite: all observations are fitted
@@ -77,7 +84,37 @@ class FitProblemOf {
     std::string checkpoint;             // a file, or empty
     py::object on_iteration;            // called with a dict, or None
     std::vector<std::string> profiles;  // of these parameters
+    Parts parts;
   };
+
+  int num_starts() const { return NumStarts(fit_.input.options()); }
+
+  // A start as a text that `Wanted::parts` takes; empty where none can be made.
+  std::string MakeStart(int number, int max_iterations, double predict_from, int threads) {
+    return WithoutLock([&] {
+      return turns_.Take([&] {
+        SetOptions(max_iterations, threads);
+        HoldBack(predict_from);
+        const auto starts = MakeStarts(fit_.input.options(), problem_.get(), {number});
+        return starts.front() ? ToRow(*starts.front()).dump() : std::string();
+      });
+    });
+  }
+
+  // The profile of a parameter around the estimate to which the starts lead, likewise.
+  std::string MakeProfile(const std::string& name, int max_iterations, double predict_from,
+                          int threads, const std::vector<std::string>& starts) {
+    return WithoutLock([&] {
+      return turns_.Take([&] {
+        SetOptions(max_iterations, threads);
+        SetProfiles({name});
+        HoldBack(predict_from);
+        const auto made = MakeProfiles(fit_.input.options(), problem_.get(),
+                                       Read({starts, {}, {}}).starts, {name});
+        return made.empty() ? std::string() : ToRow(made.begin()->second).dump();
+      });
+    });
+  }
 
   // The result as tangible-fit writes it, the report as a page, the predictions as a table, and the
   // fitted scene of each recording; all but the first are empty where there is no estimate.
@@ -95,18 +132,18 @@ class FitProblemOf {
   };
 
   Found Do(const Wanted& wanted) {
-    fit_.run().options.max_iterations = wanted.max_iterations;
-    fit_.run().options.profiles = wanted.profiles;
-    for (const std::string& name : wanted.profiles) {
-      const std::vector<std::string> all = names();
-      if (std::find(all.begin(), all.end(), name) == all.end()) {
-        throw Error("profile: expected names of parameters, got " + name);
-      }
-    }
+    SetOptions(wanted.max_iterations, 0);
+    SetProfiles(wanted.profiles);
     std::vector<std::vector<Observation>> held_back = HoldBack(wanted.predict_from);
     const std::unique_ptr<FitCheckpoint> checkpoint = Open(wanted.checkpoint);
-    const NextLog next_log =
-        checkpoint == nullptr ? NextLog() : NextLog([&] { return checkpoint->Next(); });
+    FitParts parts = Read(wanted.parts);
+    FitPartLogs logs(&parts);
+    NextLog next_log;
+    if (!parts.starts.empty() || !parts.profiles.empty()) {
+      next_log = [&logs] { return logs.Next(); };
+    } else if (checkpoint != nullptr) {
+      next_log = [&] { return checkpoint->Next(); };
+    }
     VarianceComponents components;
     const FitResult result = FitWithComponents(fit_.input.options(), problem_.get(),
                                                ProgressOf(wanted), &components, next_log);
@@ -148,6 +185,34 @@ class FitProblemOf {
       throw Error(problem_->BlockName(b) + error);
     }
     return scene;
+  }
+
+  void SetOptions(int max_iterations, int threads) {
+    fit_.run().options.max_iterations = max_iterations;
+    fit_.run().options.threads = threads;
+  }
+
+  void SetProfiles(const std::vector<std::string>& profiles) {
+    fit_.run().options.profiles = profiles;
+    const std::vector<std::string> all = names();
+    for (const std::string& name : profiles) {
+      if (std::find(all.begin(), all.end(), name) == all.end()) {
+        throw Error("profile: expected names of parameters, got " + name);
+      }
+    }
+  }
+
+  static FitParts Read(const Parts& texts) {
+    FitParts parts;
+    for (size_t i = 0; i < texts.starts.size(); ++i) {
+      if (texts.starts[i].empty()) continue;
+      FromRow(Json::parse(texts.starts[i]), &parts.starts[static_cast<int>(i)]);
+    }
+    for (size_t i = 0; i < texts.profiles.size(); ++i) {
+      if (texts.profiles[i].empty()) continue;
+      FromRow(Json::parse(texts.profiles[i]), &parts.profiles[texts.names.at(i)]);
+    }
+    return parts;
   }
 
   // Moves what each recording has after a time out of the fit.
@@ -262,14 +327,24 @@ void BindFit(py::module_* module) {
   py::class_<FitProblemOf>(*module, "Fit")
       .def(py::init<const std::string&, const std::string&>())
       .def_property_readonly("names", &FitProblemOf::names)
+      .def_property_readonly("num_starts", &FitProblemOf::num_starts)
+      .def("start", &FitProblemOf::MakeStart)
+      .def("profile", &FitProblemOf::MakeProfile)
       .def("ranges", &FitProblemOf::Ranges)
       .def("evaluate", &FitProblemOf::Evaluate)
-      .def("run", [](FitProblemOf& fit, int max_iterations, double predict_from,
-                     bool discretisation_check, const std::string& checkpoint,
-                     const py::object& on_iteration, const std::vector<std::string>& profiles) {
-        return fit.Run({max_iterations, predict_from, discretisation_check, checkpoint,
-                        on_iteration, profiles});
-      });
+      .def("run",
+           [](FitProblemOf& fit, int max_iterations, double predict_from, bool discretisation_check,
+              const std::string& checkpoint, const py::object& on_iteration,
+              const std::vector<std::string>& profiles, const std::vector<std::string>& starts_done,
+              const std::vector<std::string>& profiles_done) {
+             return fit.Run({max_iterations,
+                             predict_from,
+                             discretisation_check,
+                             checkpoint,
+                             on_iteration,
+                             profiles,
+                             {starts_done, profiles, profiles_done}});
+           });
 }
 
 }  // namespace tangible::python

@@ -221,7 +221,8 @@ std::vector<Row> Run(const Scene& scene, const StudyOptions& options,
   std::mutex mutex;
   long done = 0;
   ForEachOnThreads(options.threads, options.problems, [&](int i) {
-    const Problem problem = Draw(scene, options.seed, static_cast<unsigned>(i), options.pieces);
+    const auto number = static_cast<unsigned>(options.first + i * options.stride);
+    const Problem problem = Draw(scene, options.seed, number, options.pieces);
     for (const Method method : options.methods) {
       rows[i].outcomes[static_cast<size_t>(method)] =
           Solve(problem, method, options.iterations, options.starts);

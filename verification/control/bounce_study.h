@@ -74,14 +74,16 @@ struct Row {
 };
 struct StudyOptions {
   unsigned seed = 1;
-  int problems = 100;
+  int problems = 100;   ///< how many are run
+  int first = 0;        ///< the number of the first one
+  int stride = 1;       ///< from one number to the next
   int pieces = 1;       ///< of the efforts that draw the cups
   int iterations = 60;  ///< of each plan
   int starts = 5;       ///< of the search from several starts
   int threads = 1;
   std::vector<Method> methods{std::begin(kMethods), std::end(kMethods)};  ///< those that are run
 };
-/// Problems 0, 1, … of the seed; `progress` is told how many are done.
+/// Problems first, first + stride, … of the seed; `progress` is told how many are done.
 std::vector<Row> Run(const Scene& scene, const StudyOptions& options,
                      const std::function<void(long)>& progress);
 

@@ -11,6 +11,8 @@
 
 #include "tangible/app/program.h"
 #include "tangible/app/progress.h"
+#include "tangible/app/row_archive.h"
+#include "tangible/app/shards.h"
 #include "tangible/math/median.h"
 #include "tangible/scene/json_writer.h"
 #include "tangible/scene/scene_json.h"
@@ -27,8 +29,41 @@ DEFINE_int32(starts, 5, "of the method starts");
 DEFINE_int32(iterations, 60, "of each plan, at most");
 DEFINE_int32(threads, 0, "problems at the same time; 0: one a core; results do not depend on it");
 DEFINE_string(out, "", "file of all outcomes (JSON)");
+TANGIBLE_DEFINE_SHARD_FLAGS();
 
 namespace tangible {
+namespace bounce {
+
+// What a shard keeps of a row. That no field is left out the compiler checks.
+template <typename Visitor>
+void VisitFields(Outcome& outcome, const Visitor& visit) {
+  auto& [distance, believed, iterations, cpu_seconds] = outcome;
+  visit("distance", distance);
+  visit("believed", believed);
+  visit("iterations", iterations);
+  visit("cpu_seconds", cpu_seconds);
+}
+
+template <typename Visitor>
+void VisitFields(Problem& problem, const Visitor& visit) {
+  auto& [scene, effort, cup, ball, ball_speed] = problem;
+  static_cast<void>(scene);  // rows have none
+  visit("effort", effort);
+  visit("cup", cup);
+  visit("ball", ball);
+  visit("ball_speed", ball_speed);
+}
+
+template <typename Visitor>
+void VisitFields(Row& row, const Visitor& visit) {
+  auto& [problem, outcomes, fixed] = row;
+  visit("problem", problem);
+  visit("outcomes", outcomes);
+  visit("fixed", fixed);
+}
+
+}  // namespace bounce
+
 namespace {
 
 constexpr int kMostProblems = 100000;
@@ -45,7 +80,9 @@ bool ReadMethods(std::vector<bounce::Method>* methods) {
   return true;
 }
 
-std::string CheckFlags() {
+std::string CheckFlags(ShardPlan* plan) {
+  std::string wrong = ReadShardFlags(FLAGS_shard, FLAGS_merge, FLAGS_out, plan);
+  if (!wrong.empty()) return wrong;
   std::vector<bounce::Method> methods;
   if (!ReadMethods(&methods)) {
     return "--methods: expected some of exact, extended, surrogate, starts, sampling, fixed, got " +
@@ -134,12 +171,40 @@ OrderedJson Print(const std::vector<bounce::Row>& rows,
           {"methods", std::move(list)}};
 }
 
+// Runs the problems of the plan's part, or reads all of them from the shards; an error or empty.
+std::string RowsOf(const Scene& scene, const ShardPlan& plan,
+                   const std::vector<bounce::Method>& methods, std::vector<bounce::Row>* rows) {
+  std::string error;
+  if (plan.IsMerge()) {
+    MergedShards merged;
+    error = MergeShards(plan, FLAGS_problems, &merged);
+    if (error.empty()) FromRows(merged.rows, rows, &error);
+    return error;
+  }
+  const int cores = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+  const long problems = plan.shard.NumRows(FLAGS_problems);
+  Progress progress("problems", problems);
+  *rows = bounce::Run(scene,
+                      {.seed = static_cast<unsigned>(FLAGS_seed),
+                       .problems = static_cast<int>(problems),
+                       .first = static_cast<int>(plan.shard.index),
+                       .stride = static_cast<int>(plan.shard.count),
+                       .pieces = FLAGS_pieces,
+                       .iterations = FLAGS_iterations,
+                       .starts = FLAGS_starts,
+                       .threads = FLAGS_threads > 0 ? FLAGS_threads : cores,
+                       .methods = methods},
+                      [&](long done) { progress.Show(done); });
+  return error;
+}
+
 int Main(int argc, char** argv) {
   const CommandLine line = ParseCommandLine(
       argc, argv,
       {.name = "tangible-bounce",
        .synopsis =
-           "SCENE.json [--problems=N] [--seed=S] [--pieces=P] [--iterations=K] [--out=R.json]",
+           "SCENE.json [--problems=N] [--seed=S] [--pieces=P] [--iterations=K] [--out=R.json] "
+           "[--shard=I/N | --merge=R0.json,R1.json,...]",
        .description =
            "Plans how a hammer strikes a falling ball so that it bounces into a cup, from random "
            "starts: with exact\nJacobians of event steps, with the reference extended across "
@@ -150,35 +215,30 @@ int Main(int argc, char** argv) {
        .source_file = __FILE__,
        .outputs = {"out"}});
   if (line.exit_status) return *line.exit_status;
-  const std::string wrong = CheckFlags();
+  ShardPlan plan;
+  const std::string wrong = CheckFlags(&plan);
   if (!wrong.empty()) return ReportError("tangible-bounce: " + wrong, kExitUsage);
   Scene scene;
   std::string error;
   if (!LoadScene(line.positional[0], &scene, &error)) return ReportError(error);
   error = bounce::CheckScene(scene);
   if (!error.empty()) return ReportError(line.positional[0] + ": " + error);
+  if (plan.part != ShardPlan::Part::kAll) error = HashInputs();
+  if (!error.empty()) return ReportError(error);
   error = OutputOverInput();
   if (!error.empty()) return ReportError(error, kExitUsage);
-  const int cores = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
-  Progress progress("problems", FLAGS_problems);
   std::vector<bounce::Method> methods;
   ReadMethods(&methods);
-  const std::vector<bounce::Row> rows =
-      bounce::Run(scene,
-                  {.seed = static_cast<unsigned>(FLAGS_seed),
-                   .problems = FLAGS_problems,
-                   .pieces = FLAGS_pieces,
-                   .iterations = FLAGS_iterations,
-                   .starts = FLAGS_starts,
-                   .threads = FLAGS_threads > 0 ? FLAGS_threads : cores,
-                   .methods = methods},
-                  [&](long done) { progress.Show(done); });
+  std::vector<bounce::Row> rows;
+  error = RowsOf(scene, plan, methods, &rows);
+  if (!error.empty()) return ReportError(error);
   std::cout << ProvenanceLine() << "; seed " << FLAGS_seed << ", cups by efforts of "
             << FLAGS_pieces << (FLAGS_pieces == 1 ? " piece" : " pieces") << "\n\n"
             << std::flush;
   OrderedJson json = Print(rows, methods);
   json["seed"] = FLAGS_seed;
   json["pieces"] = FLAGS_pieces;
+  if (plan.IsShard()) json["shard"] = ShardJson(plan.shard, FLAGS_problems, ToRows(rows));
   if (!FLAGS_out.empty()) error = WriteResult(FLAGS_out, JsonText(json));
   return error.empty() ? kExitDone : ReportError(error);
 }

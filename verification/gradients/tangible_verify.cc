@@ -13,11 +13,14 @@
 
 #include "tangible/app/program.h"
 #include "tangible/app/progress.h"
+#include "tangible/app/row_archive.h"
+#include "tangible/app/shards.h"
 #include "tangible/scene/scene_json.h"
 #include "tangible/scene/scene_names.h"
 #include "tangible/verification/errata/errata.h"
 #include "tangible/verification/gradients/verify_html.h"
 #include "tangible/verification/gradients/verify_json.h"
+#include "tangible/verification/gradients/verify_rows.h"
 #include "tangible/verification/gradients/verify_text.h"
 #include "tangible/verification/support/provenance.h"
 #include "tangible/verification/support/random_scene.h"
@@ -38,6 +41,7 @@ DEFINE_bool(jacobians, false, "write every method's whole Jacobian to --out");
 DEFINE_bool(errata, false, "instead: the mistakes of the method's published summary as printed");
 DEFINE_string(out, "", "file of all figures (JSON)");
 DEFINE_string(report, "", "file of a report for people (HTML)");
+TANGIBLE_DEFINE_SHARD_FLAGS();
 
 namespace tangible {
 namespace {
@@ -61,7 +65,9 @@ std::vector<Stepping> Steppings(std::string* error) {
 }
 
 // Empty, or one line about a flag's value.
-std::string CheckFlags(const std::vector<std::string>& files) {
+std::string CheckFlags(const std::vector<std::string>& files, ShardPlan* plan) {
+  std::string wrong = ReadShardFlags(FLAGS_shard, FLAGS_merge, FLAGS_out, plan);
+  if (!wrong.empty()) return wrong;
   // Of −1, the default, the numbers follow below.
   std::string outside = FirstOutside(
       {{"--random", FLAGS_random == -1 ? 0.0 : FLAGS_random, 0, kMostRandom},
@@ -86,6 +92,9 @@ std::string CheckFlags(const std::vector<std::string>& files) {
   if (FLAGS_errata && (!files.empty() || !FLAGS_out.empty() || !FLAGS_report.empty())) {
     return "--errata: takes no scenes and writes no files";
   }
+  if (FLAGS_errata && plan->part != ShardPlan::Part::kAll) {
+    return "--errata: not with --shard or --merge, as there is nothing to divide";
+  }
   return "";
 }
 
@@ -108,14 +117,18 @@ std::string AddFile(const std::string& file, std::vector<VerifyJob>* jobs) {
   return "";
 }
 
-std::string Write(const VerifyResult& result, const std::string& verdict) {
+// A shard's file has its rows and no verdict, which is on all scenes.
+std::string Write(const VerifyResult& result, const std::string& verdict,
+                  const OrderedJson& shard) {
   ResultWriter writer;
   writer.Write(FLAGS_out, [&] {
-    OrderedJson json = {{"provenance", OrderedJson::object()}, {"verdict", verdict}};
+    OrderedJson json = {{"provenance", OrderedJson::object()}};
+    if (shard.is_null()) json["verdict"] = verdict;
     for (const auto& [what, value] : Provenance()) {
       json["provenance"][what] = value;
     }
     json.update(ToJson(result));
+    if (!shard.is_null()) json["shard"] = shard;
     return JsonText(json);
   });
   writer.Write(FLAGS_report, [&] { return VerifyReport(result, ProvenanceLine(), verdict); });
@@ -129,10 +142,40 @@ int RunErrata() {
   return broken.empty() ? kExitDone : ReportError(broken);
 }
 
-int Run(const std::vector<std::string>& files, const std::vector<Stepping>& steppings) {
+// Checks the jobs of the plan's part, which are left, or reads all from the shards; an error or
+// empty.
+std::string CheckPart(const ShardPlan& plan, std::vector<VerifyJob>* jobs,
+                      std::vector<CheckedJob>* checked) {
+  std::string error;
+  const auto in_all = static_cast<long>(jobs->size());
+  if (plan.IsMerge()) {
+    MergedShards merged;
+    error = MergeShards(plan, in_all, &merged);
+    if (error.empty()) FromRows(merged.rows, checked, &error);
+    return error;
+  }
+  std::vector<VerifyJob> part;
+  for (long i = 0; i < plan.shard.NumRows(in_all); ++i) {
+    part.push_back(std::move((*jobs)[static_cast<size_t>(plan.shard.RowOf(i))]));
+  }
+  *jobs = std::move(part);
+  Progress progress("scenes", static_cast<long>(jobs->size()));
+  const int cores = std::clamp(static_cast<int>(std::thread::hardware_concurrency()), 1, 16);
+  *checked = CheckJobs(*jobs, FLAGS_threads > 0 ? FLAGS_threads : cores,
+                       FLAGS_jacobians ? KeepJacobians::kYes : KeepJacobians::kNo,
+                       [&](long done) { progress.Show(done); });
+  return error;
+}
+
+int Run(const std::vector<std::string>& files, const std::vector<Stepping>& steppings,
+        const ShardPlan& plan) {
   std::vector<VerifyJob> jobs;
   for (const std::string& file : files) {
     const std::string error = AddFile(file, &jobs);
+    if (!error.empty()) return ReportError(error);
+  }
+  if (plan.part != ShardPlan::Part::kAll) {
+    const std::string error = HashInputs();
     if (!error.empty()) return ReportError(error);
   }
   const std::string over = OutputOverInput();
@@ -155,15 +198,16 @@ int Run(const std::vector<std::string>& files, const std::vector<Stepping>& step
     std::cout << FLAGS_coincidences << " random coincidences from seed " << FLAGS_seed << "\n";
   }
   std::cout << std::endl;
-  Progress progress("scenes", static_cast<long>(jobs.size()));
-  const int cores = std::clamp(static_cast<int>(std::thread::hardware_concurrency()), 1, 16);
-  const VerifyResult result =
-      RunVerification(jobs, FLAGS_threads > 0 ? FLAGS_threads : cores,
-                      FLAGS_jacobians ? KeepJacobians::kYes : KeepJacobians::kNo,
-                      [&](long done) { progress.Show(done); });
-  const std::string verdict = BrokenBound(jobs, result);
+  const auto in_all = static_cast<long>(jobs.size());
+  std::vector<CheckedJob> checked;
+  std::string error = CheckPart(plan, &jobs, &checked);
+  if (!error.empty()) return ReportError(error);
+  OrderedJson shard;
+  if (plan.IsShard()) shard = ShardJson(plan.shard, in_all, ToRows(checked));
+  const VerifyResult result = Summarize(jobs, std::move(checked));
+  const std::string verdict = plan.IsShard() ? "" : BrokenBound(jobs, result);
   std::cout << TableText(result) << "\n" << SummaryText(result, FLAGS_random > 0);
-  const std::string error = Write(result, verdict);
+  error = Write(result, verdict, shard);
   if (!error.empty()) return ReportError(error);
   return verdict.empty() ? kExitDone : ReportError("tangible-verify: " + verdict);
 }
@@ -174,7 +218,7 @@ int Main(int argc, char** argv) {
       {.name = "tangible-verify",
        .synopsis = "[SCENE.json ...] [--parameters=P1,P2] [--random=N] [--starts=N] "
                    "[--coincidences=N] [--seed=S] [--threads=T] "
-                   "[--out=R.json] [--report=R.html]",
+                   "[--out=R.json] [--report=R.html] [--shard=I/N | --merge=R0.json,R1.json,...]",
        .description =
            "Differentiates the final state of scenes by adjoint, tangent, Jets and differences, "
            "and compares them\nentry by entry. Without scenes: 100 random ones, 10 starts and 2 "
@@ -185,11 +229,12 @@ int Main(int argc, char** argv) {
        .most_positional = 1000,
        .outputs = {"out", "report"}});
   if (line.exit_status) return *line.exit_status;
-  std::string wrong = CheckFlags(line.positional);
+  ShardPlan plan;
+  std::string wrong = CheckFlags(line.positional, &plan);
   std::vector<Stepping> steppings;
   if (wrong.empty()) steppings = Steppings(&wrong);
   if (!wrong.empty()) return ReportError("tangible-verify: " + wrong, kExitUsage);
-  return FLAGS_errata ? RunErrata() : Run(line.positional, steppings);
+  return FLAGS_errata ? RunErrata() : Run(line.positional, steppings, plan);
 }
 
 }  // namespace

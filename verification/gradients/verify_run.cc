@@ -23,11 +23,6 @@ constexpr int kMostOfEventRuns = 10;  // which take longer
 // Of the entry: rounding of the engine's moments, and of the known sides, by two orders.
 constexpr double kCoincidenceTolerance = 1e-9;
 
-struct Checked {
-  SceneCheck check;
-  Coverage coverage;
-};
-
 std::string Replay(const VerifyJob& job) {
   if (job.seed) {
     return std::string("tangible-verify ") +
@@ -61,8 +56,8 @@ std::optional<ClosedFormJacobian> KnownOf(const Coincidence& coincidence) {
   return known;
 }
 
-Checked CheckCoincidence(const VerifyJob& job, KeepJacobians keep) {
-  Checked checked;
+CheckedJob CheckCoincidence(const VerifyJob& job, KeepJacobians keep) {
+  CheckedJob checked;
   const Coincidence coincidence = RandomCoincidence(*job.seed, job.stepping);
   checked.check = CheckScene(coincidence.scene, coincidence.parameters, keep, KnownOf(coincidence));
   checked.check.replay = Replay(job);
@@ -75,9 +70,9 @@ Checked CheckCoincidence(const VerifyJob& job, KeepJacobians keep) {
   return checked;
 }
 
-Checked Check(const VerifyJob& job, KeepJacobians keep) {
+CheckedJob Check(const VerifyJob& job, KeepJacobians keep) {
   if (job.seed && job.list == RandomList::kCoincidences) return CheckCoincidence(job, keep);
-  Checked checked;
+  CheckedJob checked;
   const Scene scene = SceneOf(job);
   const std::vector<ParameterPath> parameters = !job.seed ? job.parameters
                                                 : job.list == RandomList::kStarts
@@ -167,9 +162,9 @@ std::vector<ParameterPath> RandomParameters(const Scene& scene, unsigned seed) {
   return chosen;
 }
 
-VerifyResult RunVerification(const std::vector<VerifyJob>& jobs, int threads, KeepJacobians keep,
-                             const std::function<void(long)>& progress) {
-  std::vector<Checked> checked(jobs.size());
+std::vector<CheckedJob> CheckJobs(const std::vector<VerifyJob>& jobs, int threads,
+                                  KeepJacobians keep, const std::function<void(long)>& progress) {
+  std::vector<CheckedJob> checked(jobs.size());
   std::mutex mutex;
   long done = 0;
   WorkerPool pool(threads);
@@ -181,6 +176,10 @@ VerifyResult RunVerification(const std::vector<VerifyJob>& jobs, int threads, Ke
       progress(done);
     }
   });
+  return checked;
+}
+
+VerifyResult Summarize(const std::vector<VerifyJob>& jobs, std::vector<CheckedJob> checked) {
   VerifyResult result;
   result.total.kind = "all";
   std::map<std::string, KindRow> kinds;
@@ -208,6 +207,11 @@ VerifyResult RunVerification(const std::vector<VerifyJob>& jobs, int threads, Ke
   result.exceptions_other = result.total.other_solution;
   result.exceptions_unexplained = result.total.unexplained;
   return result;
+}
+
+VerifyResult RunVerification(const std::vector<VerifyJob>& jobs, int threads, KeepJacobians keep,
+                             const std::function<void(long)>& progress) {
+  return Summarize(jobs, CheckJobs(jobs, threads, keep, progress));
 }
 
 std::string BrokenBound(const std::vector<VerifyJob>& jobs, const VerifyResult& result) {

@@ -56,7 +56,20 @@ struct VerifyResult {
 /// body and a floor that approach each other cannot move.
 inline constexpr double kMostNotRun = 0.03;
 
-/// The same result for any number of threads. `progress` may be empty; it is called from any
+/// What was found of one job.
+struct CheckedJob {
+  SceneCheck check;
+  Coverage coverage;  ///< empty where the scene does not run
+};
+
+/// Checks all jobs, in their order; as RunVerification.
+std::vector<CheckedJob> CheckJobs(const std::vector<VerifyJob>& jobs, int threads,
+                                  KeepJacobians keep, const std::function<void(long)>& progress);
+
+/// The result of jobs that were checked.
+VerifyResult Summarize(const std::vector<VerifyJob>& jobs, std::vector<CheckedJob> checked);
+
+/// Both. The same result for any number of threads. `progress` may be empty; it is called from any
 /// thread, never from two at once, with the number of scenes that are done.
 VerifyResult RunVerification(const std::vector<VerifyJob>& jobs, int threads, KeepJacobians keep,
                              const std::function<void(long)>& progress);

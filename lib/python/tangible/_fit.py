@@ -10,13 +10,14 @@ import math
 import os
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from concurrent.futures import Executor
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Union
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from . import _core
+from . import _core, _executor
 from ._certificate import Certificate
 from ._plain import paths as names
 from ._problem import Problem, make, of_data
@@ -340,6 +341,41 @@ def _read_predictions(text: str) -> dict[str, NDArray[Any]]:
     return columns
 
 
+def _start(problem: Problem, number: int, max_iterations: int, predict_from: float) -> str:
+    """A start of a fit, in a worker's process."""
+    with problem.read() as core:
+        return core.start(number, max_iterations, predict_from, 1)
+
+
+def _profile(
+    problem: Problem, name: str, max_iterations: int, predict_from: float, starts: list[str]
+) -> str:
+    """A profile of a fit with these starts, in a worker's process."""
+    with problem.read() as core:
+        return core.profile(name, max_iterations, predict_from, 1, starts)
+
+
+def _parts(
+    executor: Executor | None, problem: Problem, max_iterations: int, predict_from: float,
+    profiles: list[str],
+) -> tuple[list[str], list[str]]:
+    """Starts and profiles that the executor's workers have made: what a fit takes over."""
+    if executor is None:
+        return [], []
+    with problem.read() as core:
+        count, known = core.num_starts, core.names
+    for name in profiles:
+        if name not in known:
+            raise _core.TangibleError(f"profile: expected names of parameters, got {name}")
+    starts: list[str] = []
+    # The one start of a fit is worth sending where profiles begin from it.
+    if count > 1 or profiles:
+        calls = [(problem, number, max_iterations, predict_from) for number in range(count)]
+        starts = _executor.in_order(executor, _start, calls)
+    around = [(problem, name, max_iterations, predict_from, starts) for name in profiles]
+    return starts, _executor.in_order(executor, _profile, around)
+
+
 def _progress(said: dict[str, Any]) -> None:
     """One line on stderr that is written over at each iteration."""
     print(
@@ -366,6 +402,7 @@ def fit(
     callback: Callable[[dict[str, Any]], object] | None = None,
     progress: bool = False,
     on_failure: str = "raise",
+    executor: Executor | None = None,
     **keys: Any,
 ) -> FitResult:
     """Identifies parameters from observations, as `tangible-fit` does.
@@ -401,6 +438,9 @@ def fit(
             `parameters` and `seconds`; what it raises ends the fit.
         progress: Whether a line on stderr says how far it is.
         on_failure: "raise", or "return" a result that has not converged.
+        executor: One of `concurrent.futures` whose workers, on this machine or others, make the
+            starts (`starts` of the fit) and the profiles that are asked for, one thread each; the
+            bits are those without. Not with `checkpoint`.
         **keys: With `data`, further keys of a fit file: `loss`, `starts`, `seed`, `sensors`, ...
 
     Raises:
@@ -417,6 +457,10 @@ def fit(
     if predict_from is not None and not math.isfinite(predict_from):
         raise ValueError(f"predict_from: expected a time in s, got {predict_from}")
 
+    _executor.check(executor)
+    if executor is not None and checkpoint is not None:
+        raise ValueError("checkpoint: not with executor, whose workers keep none")
+
     def told(said: dict[str, Any]) -> None:
         if progress:
             _progress(said)
@@ -424,15 +468,20 @@ def fit(
             callback(said)
 
     made = _problem(problem, data, parameters, sigma, points, recordings, folder, initial, keys)
+    end = math.inf if predict_from is None else float(predict_from)
+    profiles = names(profile, "profile")
     try:
+        starts_done, profiles_done = _parts(executor, made, max_iterations, end, profiles)
         with made.read() as core:
             text, page, predictions, scenes = core.run(
                 max_iterations,
-                math.inf if predict_from is None else float(predict_from),
+                end,
                 discretisation_check,
                 "" if checkpoint is None else os.fspath(checkpoint),
                 told if progress or callback is not None else None,
-                names(profile, "profile"),
+                profiles,
+                starts_done,
+                profiles_done,
             )
     finally:
         if progress:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from concurrent.futures import Executor
 from dataclasses import dataclass, field
 from numbers import Real
 from typing import Union
@@ -10,7 +11,7 @@ from typing import Union
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from . import _core
+from . import _core, _executor
 from ._certificate import Certificate
 from ._plain import integers, paths
 from ._scene import Scene, SceneLike
@@ -153,6 +154,10 @@ class Rollout:
         records: Steps whose states are returned (0: the start); absent: the state at the end, and
             results have no axis for it.
         threads: Of batches; 0: one a core. Results have the same bits for any number.
+
+    The rows of a batch may be done by the processes of an `executor` of `concurrent.futures`, on this
+    machine or, as those of `mpi4py.futures` and of a dask client, on others, with the same bits. Each
+    worker uses one thread then, or `threads` of them where that is not 0.
     """
 
     def __init__(
@@ -264,6 +269,7 @@ class Rollout:
         controls: Numbers | None = None,
         *,
         on_failure: str = "raise",
+        executor: Executor | None = None,
     ) -> Floats:
         """The states, shape (S,); (R, S) with `records`; (N, ...) of a batch.
 
@@ -273,12 +279,16 @@ class Rollout:
             initial_state: Shape (S,); absent: the scene's, as its parameters make it.
             controls: Shape (steps, C), N or N m; absent: the scene's values in all steps.
             on_failure: "raise", or "nan" in states that were not reached.
+            executor: Whose workers do the rows of a batch; absent: threads of this process.
 
         Raises:
             TangibleError: A value that is not allowed, or a run that ended early.
         """
+        _executor.check(executor)
         p, x, u, batched = self._inputs(parameters, initial_state, controls)
-        states, statuses, messages = self._core.run(p, x, u, self.threads)
+        states, statuses, messages = _executor.of_rows(
+            executor, "run", self._core, (p, x, u), self.threads
+        )
         self._check(statuses, messages, batched, on_failure)
         return self._shape(states, batched)
 
@@ -288,11 +298,14 @@ class Rollout:
         tangents: tuple[Numbers | None, Numbers | None, Numbers | None],
         *,
         on_failure: str = "raise",
+        executor: Executor | None = None,
     ) -> tuple[Floats, Floats]:
         """States and their derivative along a direction of (parameters, initial state, controls).
 
-        None stands for the scene's value among `primals`, and for 0 among `tangents`.
+        None stands for the scene's value among `primals`, and for 0 among `tangents`; `on_failure`
+        and `executor` are those of a call.
         """
+        _executor.check(executor)
         p, x, u, batched = self._inputs(*primals)
         rows = p.shape[0]
 
@@ -301,14 +314,16 @@ class Rollout:
             array = zeros if value is None else _array(value, f"tangent of {name}", names, zeros)
             return np.ascontiguousarray(np.broadcast_to(array, (rows, *zeros.shape)))
 
-        states, statuses, messages, along = self._core.tangent(
+        arrays = (
             p,
             x,
             u,
             direction(0, "parameters", self.parameters),
             direction(1, "initial_state", self.outputs),
             direction(2, "controls", self.controls),
-            self.threads,
+        )
+        states, statuses, messages, along = _executor.of_rows(
+            executor, "tangent", self._core, arrays, self.threads
         )
         self._check(statuses, messages, batched, on_failure)
         return self._shape(states, batched), self._shape(along, batched)
@@ -503,10 +518,14 @@ class Rollout:
         parameters: Numbers | None = None,
         initial_state: Numbers | None = None,
         controls: Numbers | None = None,
+        *,
+        executor: Executor | None = None,
     ) -> list[Certificate]:
-        """The certificate of each row of a batch."""
+        """The certificate of each row of a batch; `executor` as of a call."""
+        _executor.check(executor)
         p, x, u, _ = self._inputs(parameters, initial_state, controls)
-        return [Certificate.of_json(text) for text in self._core.certify(p, x, u, self.threads)]
+        texts = _executor.of_rows(executor, "certify", self._core, (p, x, u), self.threads)
+        return [Certificate.of_json(text) for text in texts]
 
     def __repr__(self) -> str:
         return (
