@@ -19,15 +19,19 @@
 
 #include "tangible/app/certificate_json.h"
 #include "tangible/app/program.h"
+#include "tangible/app/progress.h"
 #include "tangible/app/shards.h"
 #include "tangible/estimation/app/fit_shards.h"
 #include "tangible/estimation/fit/fit_checkpoint.h"
 #include "tangible/estimation/fit/motion_check.h"
+#include "tangible/estimation/fit/posterior.h"
 #include "tangible/estimation/fit/profile.h"
 #include "tangible/estimation/fit/variance_components.h"
 #include "tangible/estimation/results/fit_json.h"
 #include "tangible/estimation/results/fit_schema.h"
 #include "tangible/estimation/results/fitted_scene.h"
+#include "tangible/estimation/results/iteration_printer.h"
+#include "tangible/estimation/results/posterior_output.h"
 #include "tangible/estimation/results/prediction.h"
 #include "tangible/estimation/results/report.h"
 #include "tangible/estimation/results/residual_summary.h"
@@ -60,6 +64,14 @@ DEFINE_string(profile, "",
               "names of parameters, separated by commas, whose intervals are found by profiles: "
               "the cost with the parameter held, the others minimised");
 TANGIBLE_DEFINE_SHARD_FLAGS();
+DEFINE_string(posterior, "", "N: so many draws from the posterior, by Hamiltonian Monte Carlo");
+DEFINE_int32(posterior_chains, 4, "of --posterior, each with a start of its own");
+DEFINE_int32(posterior_warm_up, 200, "transitions of each chain before its draws");
+DEFINE_int32(posterior_seed, 0, "of the draws");
+DEFINE_double(posterior_target, 0.8, "mean acceptance; nearer to 1: shorter steps");
+DEFINE_string(posterior_samples, "", "file of the draws (CSV); empty: none is written");
+DEFINE_string(posterior_scenes, "", "folder of a scene for each draw; empty: none is written");
+DEFINE_string(posterior_bands, "", "file of quantiles of predictions over draws (CSV)");
 
 namespace tangible {
 namespace {
@@ -135,91 +147,6 @@ std::string Cell(double value, int digits = 6) {
   return text;
 }
 
-/// Prints the iterations of a fit as they are done, with all parameters: beside the cost, or below
-/// it where they are many.
-class IterationPrinter {
- public:
-  explicit IterationPrinter(const std::vector<ParameterEntry>& entries) : entries_(entries) {}
-
-  void Print(int start, int iteration, const FitIteration& values) {
-    if (iteration == 0) {
-      if (start > 0) {
-        std::printf("start %d\n", start + 1);
-      }
-      PrintHeader();
-    }
-    std::printf("%4d %13.6e %11.3e", iteration, values.cost, values.gradient_norm);
-    if (InOneLine()) {
-      for (const double value : values.parameters) {
-        std::printf(" %14.9g", value);
-      }
-    }
-    std::printf(" %9.3f\n", values.seconds);
-    if (!InOneLine()) {
-      PrintBelow(values.parameters);
-    }
-    last_ = values.parameters;
-    std::fflush(stdout);
-  }
-
- private:
-  static constexpr size_t kMostColumns = 6;
-  // Of more parameters than this only those are printed that have changed the most.
-  static constexpr size_t kMostPrinted = 60;
-  static constexpr size_t kMostChanged = 24;
-  static constexpr size_t kLineWidth = 110;
-
-  bool InOneLine() const { return entries_.size() <= kMostColumns; }
-
-  void PrintHeader() const {
-    std::printf("%4s %13s %11s", "iter", "cost", "gradient");
-    if (InOneLine()) {
-      for (const ParameterEntry& entry : entries_) {
-        std::printf(" %14.14s", entry.name.c_str());
-      }
-    }
-    std::printf(" %9s\n", "seconds");
-  }
-
-  /// "name value" of the parameters, as many a line as there is room for.
-  void PrintBelow(const std::vector<double>& parameters) const {
-    const std::vector<size_t> shown = Shown(parameters);
-    std::string line = "    ";
-    for (const size_t k : shown) {
-      const std::string item = entries_[k].name + " " + Cell(parameters[k], 9);
-      if (line.size() > 4 && line.size() + 2 + item.size() > kLineWidth) {
-        std::printf("%s\n", line.c_str());
-        line = "    ";
-      }
-      line += (line.size() > 4 ? ", " : "") + item;
-    }
-    if (shown.size() < entries_.size()) {
-      line += "; " + std::to_string(entries_.size() - shown.size()) + " others that changed less";
-    }
-    std::printf("%s\n", line.c_str());
-  }
-
-  std::vector<size_t> Shown(const std::vector<double>& parameters) const {
-    std::vector<size_t> all(entries_.size());
-    std::iota(all.begin(), all.end(), size_t{0});
-    if (all.size() <= kMostPrinted) {
-      return all;
-    }
-    const auto change = [&](size_t k) {
-      const double before = k < last_.size() ? last_[k] : entries_[k].initial;
-      return std::abs(ToInternal(entries_[k], parameters[k]) - ToInternal(entries_[k], before));
-    };
-    std::stable_sort(all.begin(), all.end(),
-                     [&](size_t a, size_t b) { return change(a) > change(b); });
-    all.resize(kMostChanged);
-    std::sort(all.begin(), all.end());
-    return all;
-  }
-
-  const std::vector<ParameterEntry>& entries_;
-  std::vector<double> last_;
-};
-
 /// The interval that counts, with the standard deviation that belongs to it.
 std::string EstimateLine(const std::string& name, int k, const FitResult& result) {
   const Uncertainty& uncertainty = result.uncertainty;
@@ -239,7 +166,9 @@ std::string EstimateLine(const std::string& name, int k, const FitResult& result
     if (interval.method == "robust") {
       line += ", " + Cell(uncertainty.degrees_of_freedom[k], 3) + " degrees of freedom";
     } else {
-      line += interval.method == "profile" ? ", by its profile" : ", from sigma alone";
+      line += interval.method == "profile"     ? ", by its profile"
+              : interval.method == "posterior" ? ", of the posterior"
+                                               : ", from sigma alone";
     }
     line += why.empty() ? ")" : "; " + why + ")";
   }
@@ -409,6 +338,7 @@ std::string Mismatch(const FitCheckpoint* checkpoint) {
 
 /// What a fit needs before it begins.
 struct Prepared {
+  std::optional<PosteriorOptions> sampling;  ///< of --posterior
   FitFile fit;
   std::vector<std::vector<Observation>> held_back;  ///< of each recording, after --predict_from
   std::unique_ptr<RecordingsProblem> problem;
@@ -439,6 +369,32 @@ std::string HoldBack(Prepared* prepared) {
   return any ? ""
              : "expected a time with observations after it, got " + Cell(FLAGS_predict_from, 10) +
                    " with none after it";
+}
+
+/// --posterior and the flags beside it; returns what is wrong or empty.
+std::string ReadPosterior(std::optional<PosteriorOptions>* options) {
+  if (FLAGS_posterior.empty()) {
+    const bool any =
+        !(FLAGS_posterior_samples + FLAGS_posterior_scenes + FLAGS_posterior_bands).empty();
+    return any ? "--posterior: expected a number of draws beside --posterior_samples, "
+                 "--posterior_scenes or --posterior_bands, got none"
+               : "";
+  }
+  const std::vector<int> draws = WholeNumbersAtCommas(FLAGS_posterior, 1, 1000000);
+  if (draws.size() != 1) {
+    return "--posterior: expected a whole number from 1 to 1000000, got '" + FLAGS_posterior + "'";
+  }
+  const std::string error =
+      FirstOutside({{"--posterior_chains", FLAGS_posterior_chains, 1, 64},
+                    {"--posterior_warm_up", FLAGS_posterior_warm_up, 0, 1e6},
+                    {"--posterior_seed", FLAGS_posterior_seed, 0},
+                    {"--posterior_target", FLAGS_posterior_target, 0.01, 0.999}});
+  if (!error.empty()) return error;
+  *options = {draws[0], FLAGS_posterior_chains, FLAGS_posterior_warm_up, FLAGS_posterior_target,
+              static_cast<unsigned>(FLAGS_posterior_seed)};
+  const std::string folder =
+      FLAGS_posterior_scenes.empty() ? "" : CheckSceneFolder(FLAGS_posterior_scenes);
+  return folder.empty() ? "" : "--posterior_scenes: " + folder;
 }
 
 /// The flags' changes of the file; kExitDone, or the status after what is wrong has been printed.
@@ -514,6 +470,8 @@ int Prepare(const std::string& text, const std::string& file, Prepared* prepared
   error = ReadProfiles(FLAGS_profile, *prepared->problem,
                        &prepared->fit.input.recordings.front().problem.options);
   if (!error.empty()) return ReportError("tangible-fit: --profile: " + error, kExitUsage);
+  error = ReadPosterior(&prepared->sampling);
+  if (!error.empty()) return ReportError("tangible-fit: " + error, kExitUsage);
   if (FLAGS_compare_motion && !HasFixedSteps(prepared->fit.input)) {
     return ReportError(file +
                        ": --compare_motion: expected a scene with fixed steps, got event "
@@ -559,6 +517,23 @@ std::string WriteFiles(const Prepared& prepared, const FitResult& result,
                [&] { return FitReport(prepared.fit.path, problem, result, findings); });
   writer.Write(FLAGS_predictions,
                [&] { return PredictionCsv(problem, result.residuals, findings.later); });
+  if (findings.posterior != nullptr) {
+    const Posterior& posterior = *findings.posterior;
+    writer.Write(FLAGS_posterior_samples,
+                 [&] { return PosteriorCsv(problem.entries(), posterior); });
+    writer.Write(FLAGS_posterior_bands, [&] {
+      return PosteriorBandsCsv(prepared.fit.input, posterior, findings.later,
+                               prepared.problem.get());
+    });
+    const std::string error =
+        FLAGS_posterior_scenes.empty()
+            ? ""
+            : WritePosteriorScenes(FLAGS_posterior_scenes, prepared.fit.input, problem, posterior,
+                                   [](const std::string& path, const std::string& text) {
+                                     return WriteFileAtomically(path, text);
+                                   });
+    if (!error.empty()) return error;
+  }
   for (int b = 0; b < problem.num_blocks() && !FLAGS_scene_out.empty(); ++b) {
     std::string text;
     std::string error;
@@ -659,6 +634,26 @@ MotionCheck CompareMotion(const Prepared& prepared, const FitResult& result) {
   return check;
 }
 
+/// Draws from the posterior, whose intervals become those of the result; what is wrong or empty.
+std::string Sample(const Prepared& prepared, FitResult* result,
+                   std::optional<Posterior>* posterior) {
+  const RecordingsProblem& problem = *prepared.problem;
+  const PosteriorOptions& options = *prepared.sampling;
+  Progress progress("transitions", TransitionsOf(options));
+  Posterior made;
+  std::string error;
+  if (!SamplePosterior(
+          options, prepared.fit.input.options(), *result,
+          FreeCoordinates(problem.entries(), problem.effects()),
+          MakerOf(prepared.fit.input, problem), [&progress](long done) { progress.Show(done); },
+          &made, &error)) {
+    return "--posterior: " + error;
+  }
+  TakeIntervals(made, result);
+  *posterior = std::move(made);
+  return "";
+}
+
 int Run(const std::string& text, const std::string& file, const ShardPlan& plan) {
   Prepared prepared;
   const int status = Prepare(text, file, &prepared);
@@ -684,7 +679,7 @@ int Run(const std::string& text, const std::string& file, const ShardPlan& plan)
   if (checkpoint != nullptr) next_log = [checkpoint] { return checkpoint->Next(); };
   if (plan.IsMerge()) next_log = [&logs] { return logs.Next(); };
   VarianceComponents components;
-  const FitResult result =
+  FitResult result =
       FitWithComponents(options, prepared.problem.get(), progress, &components, next_log);
   ScaleObservations(components.noise, &prepared);
   error = Mismatch(checkpoint);
@@ -693,8 +688,15 @@ int Run(const std::string& text, const std::string& file, const ShardPlan& plan)
   }
   FitFindings findings{&components};
   const bool estimated = result.estimate.size() > 0;
+  std::optional<Posterior> posterior;
+  std::string unsampled;
+  if (estimated && prepared.sampling) unsampled = Sample(prepared, &result, &posterior);
   if (estimated) {
     PrintResult(prepared, result, components);
+  }
+  if (posterior) {
+    findings.posterior = &*posterior;
+    std::cout << DescribePosterior(prepared.problem->entries(), *posterior);
   }
   std::optional<DiscretisationCheck> check;
   if (FLAGS_discretisation_check && result.status == FitStatus::kConverged) {
@@ -721,6 +723,7 @@ int Run(const std::string& text, const std::string& file, const ShardPlan& plan)
   if (error.empty() && motion && !motion->message.empty()) {
     error = file + ": --compare_motion: by events: " + motion->message;
   }
+  if (error.empty() && !unsampled.empty()) error = file + ": " + unsampled;
   return error.empty() ? Conclude(prepared, result, findings) : ReportError(error);
 }
 
@@ -747,14 +750,17 @@ int Main(int argc, char** argv) {
            "FIT.json [--out=R.json] [--report=R.html] [--scene_out=S.json]\n"
            "                    [--predictions=P.csv] [--predict_from=T]\n"
            "                    [--discretisation_check] [--compare_motion] [--checkpoint=C.json]\n"
-           "                    [--profile=P1,P2] [--shard=I/N | --merge=R0.json,R1.json,...]",
+           "                    [--profile=P1,P2] [--posterior=N] [--posterior_samples=P.csv]\n"
+           "                    [--posterior_scenes=FOLDER] [--posterior_bands=B.csv]\n"
+            "                    [--shard=I/N | --merge=R0.json,R1.json,...]",
        .description =
            "Identifies parameters of a scene from observed positions by nonlinear least squares.\n"
            "Prints each iteration and, for each parameter, the estimate, its standard deviation\n"
            "and 95 % interval.",
        .version = TANGIBLE_VERSION,
        .source_file = __FILE__,
-       .outputs = {"out", "report", "scene_out", "predictions", "checkpoint"},
+       .outputs = {"out", "report", "scene_out", "predictions", "checkpoint", "posterior_samples",
+                   "posterior_bands"},
        .schema = [] { return JsonText(FitSchema()); }});
   if (line.exit_status) return *line.exit_status;
   if (FLAGS_max_iterations < 1) {

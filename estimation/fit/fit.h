@@ -150,7 +150,7 @@ struct Profile {
 struct FinalInterval {
   bool exists = false;
   std::optional<double> low, high;  ///< within the range; none: not limited on that side
-  std::string method;               ///< "robust", "profile", or where there is neither "sigma"
+  std::string method;  ///< "robust", "profile", "posterior", or where there is none "sigma"
 };
 
 enum class FitStatus {

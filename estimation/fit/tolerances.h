@@ -129,5 +129,8 @@ inline constexpr double kSettledLogarithm = 1e-6;
 /// Of the upper end of the range: a spread as good as infinite: the recordings then say nothing
 /// about each other.
 inline constexpr double kInfiniteSpread = 1e6;
+/// Of the diagonal of an information matrix, scaled to 1: what is added to it first, and more where
+/// that is not enough, so that a direction without information has a finite deviation.
+inline constexpr double kLeastInformation = 1e-12;
 
 }  // namespace tangible

@@ -37,11 +37,14 @@ bool ParseFit(const std::string& text, const std::string& file, FitFile* fit, st
 /// wrong with a parameter.
 std::unique_ptr<RecordingsProblem> MakeProblem(const FitFile& fit, std::string* error);
 
+struct Posterior;  // posterior.h
+
 /// What was found beside the estimates; each may be null.
 struct FitFindings {
   const VarianceComponents* components = nullptr;
   const DiscretisationCheck* check = nullptr;
   const PredictedRecordings* later = nullptr;
+  const Posterior* posterior = nullptr;
 };
 
 /// The result as the program writes it.

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "tangible/estimation/fit/profile.h"
+#include "tangible/estimation/results/posterior_output.h"
 #include "tangible/estimation/results/residual_summary.h"
 #include "tangible/render/html.h"
 #include "tangible/render/plot.h"
@@ -473,16 +474,18 @@ std::string FitReport(const std::string& title, const RecordingsProblem& problem
   const std::vector<ParameterEntry>& entries = problem.entries();
   const ResidualSummary summary = SummarizeResiduals(problem, result.residuals);
   const PredictionScore* const score = findings.later == nullptr ? nullptr : &findings.later->score;
-  return HtmlPage(heading,
-                  "<h1>" + HtmlEscape(heading) + "</h1>\n<h2>Estimates</h2>\n" +
-                      EstimateTable(entries, result) + Warnings(result.uncertainty) +
-                      ProfilePlots(entries, result) + CombinationTable(result.uncertainty) +
-                      SpreadTable(findings.components) + SummaryTable(result) +
-                      RecordingTable(problem, result) + NoiseTable(findings.components) +
-                      CorrelationTable(entries, result) + StepTable(entries, findings.check) +
-                      PredictionPart(score) + StartTable(result) + IterationPlots(entries, result) +
-                      ResidualTable(summary) + OutlierTable(summary) +
-                      SeriesPlots(CollectSeries(problem, result), summary.series.size()));
+  return HtmlPage(
+      heading, "<h1>" + HtmlEscape(heading) + "</h1>\n<h2>Estimates</h2>\n" +
+                   EstimateTable(entries, result) + Warnings(result.uncertainty) +
+                   ProfilePlots(entries, result) +
+                   (findings.posterior ? PosteriorPart(entries, *findings.posterior) : "") +
+                   CombinationTable(result.uncertainty) + SpreadTable(findings.components) +
+                   SummaryTable(result) + RecordingTable(problem, result) +
+                   NoiseTable(findings.components) + CorrelationTable(entries, result) +
+                   StepTable(entries, findings.check) + PredictionPart(score) + StartTable(result) +
+                   IterationPlots(entries, result) + ResidualTable(summary) +
+                   OutlierTable(summary) +
+                   SeriesPlots(CollectSeries(problem, result), summary.series.size()));
 }
 
 }  // namespace tangible

@@ -5,6 +5,7 @@
 #include <map>
 
 #include "tangible/estimation/results/fit_json.h"
+#include "tangible/estimation/results/posterior_output.h"
 #include "tangible/estimation/results/residual_summary.h"
 
 namespace tangible {
@@ -376,6 +377,9 @@ OrderedJson ResultToJson(const RecordingsProblem& problem, const FitResult& resu
   }
   if (findings.later != nullptr) {
     json["prediction"] = PredictionToJson(findings.later->score);
+  }
+  if (findings.posterior != nullptr) {
+    json["posterior"] = PosteriorToJson(problem.entries(), *findings.posterior);
   }
   if (findings.components != nullptr && !findings.components->noise.empty()) {
     json["sensor_noise"] = NoiseToJson(findings.components->noise);

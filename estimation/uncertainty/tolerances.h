@@ -50,5 +50,12 @@ inline constexpr double kLargestAutoregression = 0.97;
 /// Of the cube root of α N: the bandwidth of Bartlett's kernel, in samples (Andrews 1991, equation
 /// 6.2).
 inline constexpr double kAndrewsFactor = 1.1447;
+/// Of 1, the unit of −ln π: a state of a trajectory whose energy is above that of its first one by
+/// more is a divergence; errors of a stable step are of the size of 1.
+inline constexpr double kDivergent = 1000.0;
+/// Of 1: chains with a larger split R-hat have not mixed (Vehtari et al. 2021, section 2).
+inline constexpr double kMixed = 1.01;
+/// Draws: a quantile from fewer effective ones is not to be trusted (the same, for four chains).
+inline constexpr double kLeastEffective = 400.0;
 
 }  // namespace tangible

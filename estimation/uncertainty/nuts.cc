@@ -1,0 +1,328 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/estimation/uncertainty/nuts.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+#include <vector>
+
+#include "tangible/estimation/uncertainty/tolerances.h"
+
+namespace tangible {
+namespace {
+
+constexpr double kInfiniteEnergy = std::numeric_limits<double>::infinity();
+
+/// ln(exp(a) + exp(b)).
+double LogSum(double a, double b) {
+  const double high = std::max(a, b);
+  return std::isinf(high) ? high : high + std::log1p(std::exp(std::min(a, b) - high));
+}
+
+/// A point with what is known of it.
+struct Place {
+  Eigen::VectorXd x;
+  double value = 0.0;  ///< ln π
+  Eigen::VectorXd gradient;
+};
+
+/// A state of (1).
+struct PhasePoint {
+  Place place;
+  Eigen::VectorXd r;
+};
+
+/// States that follow each other in time.
+struct Trajectory {
+  Eigen::VectorXd near;      ///< r of the state where it began
+  Eigen::VectorXd far;       ///< r of the last one
+  Eigen::VectorXd momentum;  ///< Σ r
+  double log_weight = 0.0;   ///< ln Σ exp(H_0 − H)
+  Place proposal;
+};
+
+bool GoesOn(const Eigen::VectorXd& a, const Eigen::VectorXd& b, const Eigen::VectorXd& momentum) {
+  return a.dot(momentum) > 0.0 && b.dot(momentum) > 0.0;
+}
+
+/// (3) of a trajectory from state a_far by a_near and b_near to b_far, where it consists of two
+/// neighbouring ones with these sums of momenta.
+bool GoesOnOver(const Eigen::VectorXd& a_far, const Eigen::VectorXd& a_near,
+                const Eigen::VectorXd& b_near, const Eigen::VectorXd& b_far,
+                const Eigen::VectorXd& a_sum, const Eigen::VectorXd& b_sum) {
+  return GoesOn(a_far, b_far, a_sum + b_sum) && GoesOn(a_far, b_near, a_sum + b_near) &&
+         GoesOn(a_near, b_far, b_sum + a_near);
+}
+
+/// Of Hoffman and Gelman, section 3.2.
+class DualAveraging {
+ public:
+  explicit DualAveraging(double target) : target_(target) {}
+
+  void Restart(double step) {
+    towards_ = std::log(10.0 * step);
+    mean_error_ = 0.0;
+    mean_log_ = 0.0;
+    count_ = 0;
+  }
+  /// The step of the next transition after one with this acceptance.
+  double Learn(double acceptance) {
+    constexpr double kShrinkage = 0.05, kDelay = 10.0, kDecay = 0.75;
+    ++count_;
+    const double share = 1.0 / (count_ + kDelay);
+    mean_error_ = (1.0 - share) * mean_error_ + share * (target_ - std::min(1.0, acceptance));
+    const double logarithm = towards_ - mean_error_ * std::sqrt(count_) / kShrinkage;
+    const double weight = std::pow(count_, -kDecay);
+    mean_log_ = weight * logarithm + (1.0 - weight) * mean_log_;
+    return std::exp(logarithm);
+  }
+  double MeanStep() const { return std::exp(mean_log_); }
+  bool HasLearnt() const { return count_ > 0.0; }
+
+ private:
+  double target_;
+  double towards_ = 0.0, mean_error_ = 0.0, mean_log_ = 0.0, count_ = 0.0;
+};
+
+/// The warm-up's transitions after which L is computed anew: the ends of windows that double, with
+/// the first 15 % and the last 10 % left to the step alone.
+std::vector<int> EndsOfWindows(int warm_up) {
+  constexpr int kLeast = 20, kFirstWindow = 25;
+  if (warm_up < kLeast) return {};
+  const int first = std::min(75, (15 * warm_up) / 100);
+  const int last = warm_up - std::min(50, warm_up / 10);
+  std::vector<int> ends;
+  int at = first;
+  for (int width = kFirstWindow; at < last; width *= 2) {
+    // A window that leaves no room for the next one takes the rest.
+    const int end = at + 3 * width > last ? last : at + width;
+    ends.push_back(end);
+    at = end;
+  }
+  return ends;
+}
+
+class Sampler {
+ public:
+  Sampler(const LogDensity& density, const Eigen::MatrixXd& factor, const NutsOptions& options,
+          RandomStream* random)
+      : density_(density), options_(options), random_(random), factor_(factor) {}
+
+  NutsChain Run(const Eigen::VectorXd& start) {
+    now_.x = start;
+    if (!Evaluate(&now_)) {
+      chain_.message = "the density at the start is 0 or not known";
+      return std::move(chain_);
+    }
+    if (WarmUp()) Draw();
+    return std::move(chain_);
+  }
+
+ private:
+  bool Evaluate(Place* place) {
+    ++chain_.evaluations;
+    return density_(place->x, &place->value, &place->gradient) && std::isfinite(place->value) &&
+           place->gradient.allFinite();
+  }
+
+  static double Energy(const PhasePoint& point) {
+    return 0.5 * point.r.squaredNorm() - point.place.value;
+  }
+
+  /// (2). False where the density is 0.
+  bool Leap(double step, PhasePoint* point) {
+    const auto upper = factor_.transpose().triangularView<Eigen::Upper>();
+    point->r += upper * (0.5 * step * point->place.gradient);
+    point->place.x += factor_.triangularView<Eigen::Lower>() * (step * point->r);
+    if (!Evaluate(&point->place)) return false;
+    point->r += upper * (0.5 * step * point->place.gradient);
+    return true;
+  }
+
+  /// 2^depth further states beyond `edge`, which becomes the last one. False where one diverges or
+  /// they turn back.
+  bool Extend(int depth, double step, PhasePoint* edge, Trajectory* made) {
+    if (depth == 0) {
+      ++steps_;
+      const bool possible = Leap(step, edge);
+      const double rise = possible ? Energy(*edge) - energy_ : kInfiniteEnergy;
+      if (!(rise < kDivergent)) {
+        diverged_ = true;
+        return false;
+      }
+      acceptance_ += std::min(1.0, std::exp(-rise));
+      *made = {edge->r, edge->r, edge->r, -rise, edge->place};
+      return true;
+    }
+    Trajectory second;
+    if (!Extend(depth - 1, step, edge, made) || !Extend(depth - 1, step, edge, &second)) {
+      return false;
+    }
+    const double both = LogSum(made->log_weight, second.log_weight);
+    if (random_->Uniform() < std::exp(second.log_weight - both)) {
+      made->proposal = std::move(second.proposal);
+    }
+    const bool goes_on =
+        GoesOnOver(made->near, made->far, second.near, second.far, made->momentum, second.momentum);
+    made->far = std::move(second.far);
+    made->momentum += second.momentum;
+    made->log_weight = both;
+    return goes_on;
+  }
+
+  /// One transition with this step; `now_` becomes the next draw.
+  void Transition(double step) {
+    PhasePoint ends[2];  // backwards, forwards
+    ends[0] = ends[1] = {now_, random_->Normals(now_.x.size())};
+    energy_ = Energy(ends[0]);
+    Eigen::VectorXd momentum = ends[0].r;
+    double log_weight = 0.0;
+    acceptance_ = 0.0;
+    steps_ = 0;
+    diverged_ = false;
+    depth_ = 0;
+    for (bool goes_on = true; goes_on && depth_ < options_.max_depth; ++depth_) {
+      const int side = random_->Uniform() < 0.5 ? 0 : 1;
+      const Eigen::VectorXd near = ends[side].r;
+      Trajectory half;
+      if (!Extend(depth_, side == 1 ? step : -step, &ends[side], &half)) return;
+      if (random_->Uniform() < std::exp(half.log_weight - log_weight)) {
+        now_ = std::move(half.proposal);
+      }
+      log_weight = LogSum(log_weight, half.log_weight);
+      goes_on = GoesOnOver(ends[1 - side].r, near, half.near, half.far, momentum, half.momentum);
+      momentum += half.momentum;
+    }
+  }
+
+  double Acceptance() const { return steps_ > 0 ? acceptance_ / steps_ : 0.0; }
+
+  /// A step at which one leapfrog step is accepted about as often as wanted, near `step`.
+  double FirstStep(double step) {
+    constexpr int kMostDoublings = 60;
+    double direction = 0.0;
+    for (int i = 0; i < kMostDoublings; ++i) {
+      PhasePoint point{now_, random_->Normals(now_.x.size())};
+      const double before = Energy(point);
+      const double rise = Leap(step, &point) ? Energy(point) - before : kInfiniteEnergy;
+      const double wanted = -rise > std::log(options_.target) ? 1.0 : -1.0;
+      if (direction == 0.0) direction = wanted;
+      if (wanted != direction) break;
+      step *= direction > 0.0 ? 2.0 : 0.5;
+    }
+    return step;
+  }
+
+  /// L from draws of a window: their covariance, with the one before counted as P + 5 draws.
+  void Learn(const std::vector<Eigen::VectorXd>& window) {
+    const auto n = static_cast<Eigen::Index>(window.size());
+    const Eigen::Index size = factor_.rows();
+    if (n < 2) return;
+    Eigen::MatrixXd z(size, n);
+    for (Eigen::Index i = 0; i < n; ++i) z.col(i) = window[static_cast<size_t>(i)];
+    z.colwise() -= z.rowwise().mean().eval();
+    factor_.triangularView<Eigen::Lower>().solveInPlace(z);
+    const double before = static_cast<double>(size) + 5.0;
+    Eigen::MatrixXd covariance = z * z.transpose();
+    covariance.diagonal().array() += before;
+    covariance /= static_cast<double>(n - 1) + before;
+    const Eigen::LLT<Eigen::MatrixXd> cholesky(covariance);
+    if (cholesky.info() != Eigen::Success) return;
+    factor_ = (factor_.triangularView<Eigen::Lower>() * Eigen::MatrixXd(cholesky.matrixL())).eval();
+  }
+
+  /// False where the caller ends it.
+  bool WarmUp() {
+    const std::vector<int> ends = EndsOfWindows(options_.warm_up);
+    DualAveraging averaging(options_.target);
+    double step = FirstStep(1.0);
+    averaging.Restart(step);
+    std::vector<Eigen::VectorXd> window;
+    size_t next = 0;
+    const int first = std::min(75, (15 * options_.warm_up) / 100);
+    for (int i = 0; i < options_.warm_up; ++i) {
+      Transition(step);
+      step = averaging.Learn(Acceptance());
+      if (options_.progress && !options_.progress()) return false;
+      if (i >= first) window.push_back(now_.x);
+      if (next < ends.size() && i + 1 == ends[next]) {
+        Learn(window);
+        window.clear();
+        ++next;
+        step = FirstStep(averaging.MeanStep());
+        averaging.Restart(step);
+      }
+    }
+    chain_.step = averaging.HasLearnt() ? averaging.MeanStep() : step;
+    return true;
+  }
+
+  void Draw() {
+    chain_.draws.resize(options_.draws, now_.x.size());
+    chain_.log_density.resize(options_.draws);
+    int made = 0;
+    while (made < options_.draws) {
+      Transition(chain_.step);
+      chain_.draws.row(made) = now_.x;
+      chain_.log_density[made++] = now_.value;
+      chain_.divergences += diverged_ ? 1 : 0;
+      chain_.saturated += depth_ == options_.max_depth ? 1 : 0;
+      chain_.acceptance += Acceptance();
+      if (options_.progress && !options_.progress()) break;
+    }
+    chain_.draws.conservativeResize(made, Eigen::NoChange);
+    chain_.log_density.conservativeResize(made);
+    chain_.acceptance /= std::max(1, made);
+  }
+
+  const LogDensity& density_;
+  const NutsOptions& options_;
+  RandomStream* random_;
+  Eigen::MatrixXd factor_;
+  Place now_;
+  NutsChain chain_;
+  // Of the transition under way.
+  double energy_ = 0.0, acceptance_ = 0.0;
+  int steps_ = 0, depth_ = 0;
+  bool diverged_ = false;
+};
+
+}  // namespace
+
+RandomStream::RandomStream(std::uint32_t seed, std::uint32_t stream) {
+  std::seed_seq sequence{seed, stream};
+  engine_.seed(sequence);
+}
+
+double RandomStream::Uniform() {
+  // The middles of 2^52 equal parts, which are doubles and neither 0 nor 1.
+  return (static_cast<double>(engine_() >> 12) + 0.5) * 0x1p-52;
+}
+
+double RandomStream::Normal() {
+  if (has_spare_) {
+    has_spare_ = false;
+    return spare_;
+  }
+  const double radius = std::sqrt(-2.0 * std::log(Uniform()));
+  const double angle = 2.0 * M_PI * Uniform();
+  spare_ = radius * std::sin(angle);
+  has_spare_ = true;
+  return radius * std::cos(angle);
+}
+
+Eigen::VectorXd RandomStream::Normals(Eigen::Index size) {
+  Eigen::VectorXd values(size);
+  for (double& value : values) value = Normal();
+  return values;
+}
+
+NutsChain SampleNuts(const LogDensity& density, const Eigen::VectorXd& start,
+                     const Eigen::MatrixXd& factor, const NutsOptions& options,
+                     RandomStream* random) {
+  return Sampler(density, factor, options, random).Run(start);
+}
+
+}  // namespace tangible
