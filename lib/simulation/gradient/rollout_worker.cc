@@ -2,6 +2,7 @@
 #include <algorithm>
 
 #include "tangible/scene/set_parameters.h"
+#include "tangible/simulation/events/event_edges.h"
 #include "tangible/simulation/gradient/rollout_function.h"
 
 namespace tangible {
@@ -63,6 +64,22 @@ bool RolloutWorker::Set(const RolloutInput& input, RolloutOutput* output) {
     return false;
   }
   return true;
+}
+
+bool RolloutWorker::SetForDerivatives(const RolloutInput& input, RolloutOutput* output) {
+  if (!Set(input, output)) return false;
+  const ModelStructure& s = *f_.structure_;
+  if (s.paths.empty() || s.settings.stepping == Stepping::kFixed) return true;
+  std::vector<int> varied;
+  const RowMatrixXd jacobian = ParameterJacobian();
+  for (int number = 0; number < s.num_parameters; ++number) {
+    if (!jacobian.row(s.ParameterVariable(number)).isZero(0.0)) varied.push_back(number);
+  }
+  output->message = CoincidingEdges(model_, varied);
+  if (output->message.empty()) return true;
+  output->status = RolloutStatus::kRefused;
+  output->final = scene_state_;
+  return false;
 }
 
 void RolloutWorker::RunAs(const Runner& run, RolloutOutput* output) {
@@ -147,7 +164,9 @@ RolloutOutput RolloutWorker::Jacobian(const RolloutInput& input, GradientMethod 
   const long columns = f_.num_parameters() + (inputs == Inputs::kAll ? others : 0);
   *used = MethodOf({.method = method}, Differentiated::kFinalState, columns, rows);
   jacobian->setConstant(rows, columns, kNaN);
-  if (!Set(input, &output)) return output;
+  const bool set = *used == GradientMethod::kFiniteDifference ? Set(input, &output)
+                                                              : SetForDerivatives(input, &output);
+  if (!set) return output;
   switch (*used) {
     case GradientMethod::kAuto:
     case GradientMethod::kTangent:
