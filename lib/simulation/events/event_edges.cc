@@ -144,9 +144,9 @@ double JustAfter(const Model<double>& model, double t) {
   return s.paths.empty() ? after : std::max(after, BesideInstant(s, t, PathSide::kAfter));
 }
 
-std::string CoincidingEdges(const Model<double>& model, const std::vector<int>& numbers) {
+std::string CoincidingEdges(const Model<double>& model, const RowMatrixXd& directions) {
   const ModelStructure& s = *model.structure;
-  if (s.paths.empty()) return "";
+  if (s.paths.empty() || s.settings.stepping == Stepping::kFixed) return "";
   std::vector<Edge> edges;
   ForEachKnot(model, 0.0, s.settings.duration, [&](const Edge& edge) {
     if (!edge.gives_way) edges.push_back(edge);
@@ -157,7 +157,7 @@ std::string CoincidingEdges(const Model<double>& model, const std::vector<int>& 
   std::sort(edges.begin(), edges.end(),
             [](const Edge& x, const Edge& y) { return x.time < y.time; });
   const auto varies = [&](const Edge& edge) {
-    return std::find(numbers.begin(), numbers.end(), edge.window.number) != numbers.end();
+    return !directions.row(s.ParameterVariable(edge.window.number)).isZero(0.0);
   };
   for (size_t i = 1; i < edges.size(); ++i) {
     const Edge& a = edges[i - 1];

@@ -54,7 +54,7 @@ struct EdgeGroup {
 /// The first edge after `now` of a sorted list, with those at its instant.
 EdgeGroup NextEdges(const std::vector<Edge>& edges, double now, double rounding);
 
-/// The edges of windows and the knots at which a rate jumps, on the boundary of two steps at `time`.
+/// The edges of windows and the knots at which a rate jumps, on a boundary of steps at `time`.
 EdgeGroup EdgesAt(const Model<double>& model, double time);
 
 /// Adds to accelerations at a segment's state the loads (N, N, N m) by which its edges still to
@@ -69,9 +69,9 @@ bool JumpPullsJoint(const Model<double>& model, double time);
 double JustBefore(const Model<double>& model, double t);
 double JustAfter(const Model<double>& model, double t);
 
-/// Empty, or why derivatives by some of these numbers of the model are refused: the time of a jump
-/// of a path's rate and another edge's are the same, though both vary by numbers of their own, and
-/// what the impacts there do depends on their order.
-std::string CoincidingEdges(const Model<double>& model, const std::vector<int>& numbers);
+/// Empty, or why derivatives along these directions (num_variables x columns) are refused: the time
+/// of a jump of a path's rate and another edge's are the same, though both vary by numbers of their
+/// own, and what the impacts there do depends on their order. Empty for fixed steps.
+std::string CoincidingEdges(const Model<double>& model, const RowMatrixXd& directions);
 
 }  // namespace tangible

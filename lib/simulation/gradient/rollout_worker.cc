@@ -68,14 +68,8 @@ bool RolloutWorker::Set(const RolloutInput& input, RolloutOutput* output) {
 
 bool RolloutWorker::SetForDerivatives(const RolloutInput& input, RolloutOutput* output) {
   if (!Set(input, output)) return false;
-  const ModelStructure& s = *f_.structure_;
-  if (s.paths.empty() || s.settings.stepping == Stepping::kFixed) return true;
-  std::vector<int> varied;
-  const RowMatrixXd jacobian = ParameterJacobian();
-  for (int number = 0; number < s.num_parameters; ++number) {
-    if (!jacobian.row(s.ParameterVariable(number)).isZero(0.0)) varied.push_back(number);
-  }
-  output->message = CoincidingEdges(model_, varied);
+  if (model_.structure->paths.empty()) return true;
+  output->message = CoincidingEdges(model_, RowMatrixXd(ParameterJacobian()));
   if (output->message.empty()) return true;
   output->status = RolloutStatus::kRefused;
   output->final = scene_state_;
