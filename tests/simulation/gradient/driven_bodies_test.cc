@@ -363,6 +363,24 @@ TEST(DrivenBodiesTest, JumpsAtOneInstantAreRefused) {
   EXPECT_TRUE(JacobianOf(scene, {"bodies/a/motion/scale"}, GradientMethod::kAdjoint).done);
 }
 
+// The certificate names the jumps at which the derivative by a delay has two sides.
+TEST(DrivenBodiesTest, JumpsOnGivenTimesAreNamed) {
+  const std::vector<std::string> delay = {"bodies/mallet/motion/delay"};
+  const auto one_sided = [&](const Scene& scene) {
+    return Jacobian(scene, delay, GradientMethod::kTangent).certificate.one_sided;
+  };
+  // Inside of a step, and on a step's end.
+  EXPECT_EQ(one_sided(Struck(0.5, 0.07, "fixed")), "");
+  EXPECT_EQ(one_sided(Struck(0.5, 0.1, "fixed")),
+            "jump of the path of mallet at 0.2 s is on a step's boundary");
+  EXPECT_EQ(one_sided(Struck(0.5, 0.1, "event")), "");
+  Scene scene = Struck(0.5, 0.1);
+  scene.bodies[0].driven->delay = -0.2;
+  EXPECT_EQ(one_sided(scene), "jump of the path of mallet at 0 s is the start of the run");
+  scene.bodies[0].driven->delay = 0.8;
+  EXPECT_EQ(one_sided(scene), "jump of the path of mallet at 1 s is the end of the run");
+}
+
 // The rows of driven bodies in tangent and adjoint are those of Jets.
 TEST(DrivenBodiesTest, FormulasAgreeWithJets) {
   const Scene scene = SceneOf(
