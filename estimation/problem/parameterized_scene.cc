@@ -8,6 +8,7 @@
 #include "tangible/math/scalar.h"
 #include "tangible/scene/parameter.h"
 #include "tangible/scene/validate.h"
+#include "tangible/simulation/events/event_edges.h"
 #include "tangible/simulation/stepping/step.h"
 
 namespace tangible {
@@ -155,7 +156,10 @@ bool ParameterizedScene::Finish(ParameterError* error) {
                   (reason.empty() ? "" : ": " + reason)};
     return false;
   }
-  return true;
+  const std::string refused =
+      structure_->paths.empty() ? "" : CoincidingEdges(model_, VariableDerivatives());
+  if (!refused.empty()) *error = {-1, -1, "", refused};
+  return refused.empty();
 }
 
 bool ParameterizedScene::AddParameter(const FitParameter& parameter, ParameterError* error) {

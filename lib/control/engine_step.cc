@@ -5,6 +5,8 @@
 #include <cmath>
 #include <limits>
 
+#include "tangible/dynamics/model/driven_bodies.h"
+
 namespace tangible {
 namespace {
 
@@ -62,6 +64,11 @@ State<double> EngineStep::StateOf(long k, const VectorX<double>& x) const {
   const double t = static_cast<double>(k) * s.settings.dt;
   // Bodies of prescribed motion keep their speed.
   for (size_t i = 0; i < state.pose.size(); ++i) state.pose[i] += t * state.twist[i];
+  if (s.settings.stepping == Stepping::kFixed) {
+    FollowPathsOverStep(model_, t, s.settings.dt, &state);
+  } else {
+    FollowPaths(model_, t, BesideInstant(s, t, PathSide::kAfter), &state);
+  }
   function_.SetState(x, &state);
   return state;
 }
@@ -96,7 +103,8 @@ bool EngineStep::Advance(long k, const VectorX<double>& x, const VectorX<double>
 bool EngineStep::StepBack(long k, const VectorX<double>& next, const VectorX<double>& u,
                           VectorX<double>* x) {
   std::string error;
-  if (!Set(k, next, u, &error)) return false;
+  // A path leads forwards alone.
+  if (!model_.structure->paths.empty() || !Set(k, next, u, &error)) return false;
   const auto turn_twists = [](State<double>* state) {
     for (double& speed : state->twist) speed = -speed;
   };

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <functional>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <string>
 #include <utility>
@@ -17,14 +18,18 @@
 
 namespace tangible {
 
+/// Reads the path of a body from the object that holds it.
+using PathReader = std::function<std::shared_ptr<const RecordedPath>(const JsonReader&)>;
+
 /// Reads a signal that a field names by {"file": ...}.
 using SignalReader = std::function<Signal(const JsonReader&, SignalColumns)>;
 
 /// Absent keys leave the default.
 class FieldReader {
  public:
-  explicit FieldReader(const JsonReader& item, SignalReader signal = nullptr)
-      : item_(item), signal_(std::move(signal)) {}
+  explicit FieldReader(const JsonReader& item, SignalReader signal = nullptr,
+                       PathReader path = nullptr)
+      : item_(item), signal_(std::move(signal)), path_(std::move(path)) {}
 
   void Number(const Field& field, double& value) {
     if (IsRead(field)) value = item_.At(field.key).Number(field.kind);
@@ -108,9 +113,10 @@ class FieldReader {
     visit(*value, &keys);
     part.ExpectKeys(keys.keys(), std::string(" of a ") + field.key);
     if (!part.ok()) return;
-    FieldReader reader(part, signal_);
+    FieldReader reader(part, signal_, path_);
     visit(*value, &reader);
   }
+  void Path(std::shared_ptr<const RecordedPath>& path) { path = path_(item_); }
   /// `Value` is the enumeration, or an optional of it, which an absent key leaves empty.
   template <typename Enum, std::size_t N, typename Value>
   void Choice(const char* key, const std::pair<const char*, Enum> (&table)[N], Value& value) {
@@ -126,7 +132,10 @@ class FieldReader {
  private:
   bool IsRead(const Field& field) const {
     const bool written = item_.Has(field.key);
-    if (!field.present && written) {
+    if (!field.present && written && field.without != nullptr) {
+      item_.At(field.key).Fail(std::string("expected no ") + field.key + " beside " +
+                               field.without + ", which gives it");
+    } else if (!field.present && written) {
       item_.At(field.with)
           .Fail(std::string("missing, expected ") + field.with_form + " with " + field.key);
     }
@@ -135,6 +144,7 @@ class FieldReader {
 
   const JsonReader& item_;
   SignalReader signal_;
+  PathReader path_;
 };
 
 }  // namespace tangible

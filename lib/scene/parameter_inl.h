@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <memory>
 #include <optional>
 #include <string>
 #include <utility>
@@ -83,6 +84,7 @@ class NumberList {
   void NumberOrSignal(const Field& field, T& value, const std::optional<Signal>& signal) {
     if (!signal) Number(field, value);
   }
+  void Path(const std::shared_ptr<const RecordedPath>&) {}
   template <typename Item, typename Visit>
   void Part(const Field& field, std::optional<Item>& item, const Visit& visit) {
     if (!item) return;
@@ -141,6 +143,7 @@ class ItemNumbers {
   void NumberOrSignal(const Field& field, double value, const std::optional<Signal>&) {
     Number(field, value);
   }
+  void Path(const std::shared_ptr<const RecordedPath>&) {}
   template <typename Item, typename Visit>
   void Part(const Field& field, const std::optional<Item>& item, const Visit& visit) {
     Number(field, item ? 1.0 : 0.0);
@@ -193,10 +196,11 @@ class SetNumbers {
   void PointOrSignal(const Field& field, Vector2<T>& value, const std::optional<Signal>&) {
     Point(field, value);
   }
+  void Path(const std::shared_ptr<const RecordedPath>&) {}
   template <typename Item, typename Visit>
   void Part(const Field&, std::optional<Item>& item, const Visit& visit) {
     if (!Has()) return;
-    item.emplace();
+    if (!item) item.emplace();  // what of it is no number has been copied already
     visit(*item, this);
   }
 
@@ -232,6 +236,7 @@ BasicScene<T> CastScene(const Scene& scene) {
     body.motion = from.motion;
     body.shape.type = from.shape.type;
     body.shape.numbers.resize(from.shape.numbers.size());
+    if (from.driven) body.driven.emplace().path = from.driven->path;
     cast(from, &body, [](auto& item, auto* visitor) {
       VisitShape(item.shape, visitor);
       VisitContactPoints(item, visitor);

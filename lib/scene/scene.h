@@ -9,12 +9,14 @@
 // up; angles counter-clockwise in radians.
 
 #include <limits>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "tangible/math/scalar.h"
 #include "tangible/math/shape_type.h"
+#include "tangible/scene/recorded_path.h"
 
 namespace tangible {
 
@@ -33,6 +35,17 @@ struct BasicShape {
 
 enum class Motion { kMoving, kStatic, kKinematic };
 
+/// The motion of a body along a recorded path: at t it is at offset + scale · path(t − delay), and
+/// its angle is offset_angle + the path's. A coordinate that the path does not have stays as drawn.
+template <typename T>
+struct BasicDrivenMotion {
+  std::shared_ptr<const RecordedPath> path;
+  T delay{0.0};  ///< s
+  T scale{1.0};
+  Vector2<T> offset{T(0.0), T(0.0)};  ///< m
+  T offset_angle{0.0};                ///< rad
+};
+
 template <typename T>
 struct BasicBody {
   std::string name;
@@ -45,6 +58,8 @@ struct BasicBody {
   T angle{0.0};
   Vector2<T> velocity{T(0.0), T(0.0)};
   T angular_velocity{0.0};
+  /// Of a kinematic body, in the place of its velocities: which way it moves.
+  std::optional<BasicDrivenMotion<T>> driven;
   T friction{0.0};  ///< Coulomb coefficient, ≥ 0
   /// Of Stribeck's decay, ≥ 0: the coefficient far above `stribeck_speed`. None: it does not decay.
   std::optional<T> kinetic_friction;

@@ -18,11 +18,13 @@
 //   NumberOrSignal  1.5 or {"file": ...}
 //   PointOrSignal   [x, y] or {"file": ...}
 //   Part            an object with fields of its own, or absent
+//   Path            in such an object: "file" and "interpolation"
 //   Choice, Count   settings that are no parameters
 //
 // What is no number by itself (names, bodies, the type of a joint or shape) is read and written
 // where the items are.
 
+#include <memory>
 #include <string>
 #include <utility>
 #include <vector>
@@ -47,6 +49,8 @@ struct Field {
   const char* form = " [x, y]";
   /// What messages expect of the field `with`.
   const char* with_form = "a number >= 0";
+  /// The field beside which it must not be; then it is not present.
+  const char* without = nullptr;
 };
 
 inline constexpr Field kGravityField{"gravity", NumberKind::kFree, Dimension::kAcceleration};
@@ -113,22 +117,43 @@ void VisitFrictionDecay(Item& item, Visitor* visitor) {
                   item.stribeck_speed);
 }
 
+/// The recorded path of a kinematic body.
+template <typename Body, typename Visitor>
+void VisitDrivenMotion(Body& body, Visitor* visitor) {
+  Field field{"motion"};
+  field.with = "kinematic";
+  field.with_form = "true";
+  field.present = body.motion == Motion::kKinematic;
+  visitor->Part(field, body.driven, [](auto& driven, auto* fields) {
+    constexpr NumberKind kFree = NumberKind::kFree;
+    fields->Path(driven.path);
+    fields->Number({"delay", kFree, Dimension::kTime}, driven.delay);
+    fields->Number({"scale", kFree}, driven.scale);
+    fields->Point({"offset", kFree, Dimension::kLength}, driven.offset);
+    fields->Number({"offset_angle", kFree, Dimension::kAngle}, driven.offset_angle);
+  });
+}
+
 /// The fields of a body but its shape.
 template <typename Body, typename Visitor>
 void VisitBody(Body& body, Visitor* visitor) {
   constexpr NumberKind kPositive = NumberKind::kPositive;
   constexpr NumberKind kNonNegative = NumberKind::kNonNegative;
   const bool moves = body.motion == Motion::kMoving;
-  const bool has_velocity = body.motion != Motion::kStatic;
+  const bool has_velocity = body.motion != Motion::kStatic && !body.driven;
   visitor->Number({"mass", kPositive, Dimension::kMass, moves, moves}, body.mass);
   visitor->Optional({"inertia", kPositive, Dimension::kInertia, false, moves}, body.inertia);
   visitor->Point({"position", NumberKind::kFree, Dimension::kLength, moves}, body.position);
   visitor->Number({"angle", NumberKind::kFree, Dimension::kAngle}, body.angle);
-  visitor->Point({"velocity", NumberKind::kFree, Dimension::kVelocity, false, has_velocity},
-                 body.velocity);
-  visitor->Number(
-      {"angular_velocity", NumberKind::kFree, Dimension::kAngularVelocity, false, has_velocity},
-      body.angular_velocity);
+  VisitDrivenMotion(body, visitor);
+  const auto velocity = [&](const char* key, Dimension dimension) {
+    Field field{key, NumberKind::kFree, dimension, false, has_velocity};
+    field.present = !body.driven.has_value();
+    field.without = "motion";
+    return field;
+  };
+  visitor->Point(velocity("velocity", Dimension::kVelocity), body.velocity);
+  visitor->Number(velocity("angular_velocity", Dimension::kAngularVelocity), body.angular_velocity);
   visitor->Number({"friction", kNonNegative}, body.friction);
   visitor->Number({"restitution", NumberKind::kFraction}, body.restitution);
   visitor->Number({"linear_damping", kNonNegative, Dimension::kLinearDamping, false, moves},
@@ -293,6 +318,9 @@ class FieldKeys {
   template <typename T, typename Visit>
   void Part(const Field& field, const T&, const Visit&) {
     Add(field.key);
+  }
+  void Path(const std::shared_ptr<const RecordedPath>&) {
+    for (const char* key : {"file", "interpolation", "time", "x", "y", "angle"}) Add(key);
   }
   template <typename V, typename S>
   void PointOrSignal(const Field& field, const V&, const S&) {

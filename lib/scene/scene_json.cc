@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <map>
+#include <memory>
 #include <set>
 #include <string>
 #include <utility>
@@ -18,6 +19,30 @@
 
 namespace tangible {
 namespace {
+
+// The times of a series that stands in the scene, which increase.
+std::vector<double> ReadSeriesTimes(const JsonReader& series) {
+  const JsonReader times = series.At("time");
+  const VectorX<double> values = times.Vector();
+  if (values.size() == 0) times.FailExpected("an array of at least one time");
+  for (Eigen::Index i = 1; i < values.size(); ++i) {
+    if (values[i] > values[i - 1]) continue;
+    times.At(static_cast<int>(i))
+        .FailExpected("a number > " + Json(values[i - 1]).dump() + " (the time before)");
+  }
+  return std::vector<double>(values.begin(), values.end());
+}
+
+// A column of it.
+std::vector<double> ReadSeriesColumn(const JsonReader& series, const char* key) {
+  const JsonReader column = series.At(key);
+  const int size = series.At("time").Size();
+  const VectorX<double> values = column.Vector();
+  if (column.ok() && column.Size() != size) {
+    column.FailExpected(std::to_string(size) + " numbers, one for each time");
+  }
+  return std::vector<double>(values.begin(), values.end());
+}
 
 // Fails on settings that earlier scenes could have and no scene needs. A file that writes out the
 // value that every run has is read.
@@ -146,6 +171,7 @@ class SceneReader {
   void ReadSimulation(const JsonReader& reader);
   Signal ReadSignalOf(const JsonReader& reader, SignalColumns columns);
   Signal ReadSeriesOf(const JsonReader& reader, SignalColumns columns);
+  std::shared_ptr<const RecordedPath> ReadPathOf(const JsonReader& reader);
   SignalReader Signals() {
     return [this](const JsonReader& reader, SignalColumns columns) {
       return ReadSignalOf(reader, columns);
@@ -174,10 +200,12 @@ void SceneReader::ReadBody(const JsonReader& item) {
   if (is_static) body.motion = Motion::kStatic;
   if (is_kinematic) body.motion = Motion::kKinematic;
   if (item.Has("shape")) ReadShape(item.At("shape"), &body.shape);
-  FieldReader reader(item);
+  FieldReader reader(item, nullptr,
+                     [this](const JsonReader& motion) { return ReadPathOf(motion); });
   VisitContactPoints(body, &reader);
   VisitBody(body, &reader);
   if (item.ok()) CheckBody(body, item);
+  if (item.ok() && body.driven) CheckPathOffsets(*body.driven, item.At("motion"));
   if (item.ok()) CheckFrictionDecay(body.kinetic_friction, body.friction, item);
   body_index_[body.name] = static_cast<int>(scene_->bodies.size());
   scene_->bodies.push_back(std::move(body));
@@ -255,30 +283,43 @@ Signal SceneReader::ReadSeriesOf(const JsonReader& reader, SignalColumns columns
   }
   reader.ExpectKeys(keys);
   FieldReader(reader).Choice("interpolation", kInterpolationNames, signal.interpolation);
-  const JsonReader times = reader.At("time");
-  const auto read = [&](const JsonReader& column) {
-    const VectorX<double> values = column.Vector();
-    if (column.ok() && column.Size() != times.Size()) {
-      column.FailExpected(std::to_string(times.Size()) + " numbers, one for each time");
-    }
-    return std::vector<double>(values.begin(), values.end());
-  };
-  signal.time = read(times);
-  if (signal.time.empty()) times.FailExpected("an array of at least one time");
-  for (std::size_t i = 1; i < signal.time.size(); ++i) {
-    if (signal.time[i] > signal.time[i - 1]) continue;
-    times.At(static_cast<int>(i))
-        .FailExpected("a number > " + Json(signal.time[i - 1]).dump() + " (the time before)");
-  }
+  signal.time = ReadSeriesTimes(reader);
   if (!force) {
-    signal.value = read(reader.At("value"));
+    signal.value = ReadSeriesColumn(reader, "value");
     return signal;
   }
   if (!reader.Has("x") && !reader.Has("y")) reader.Fail("missing x or y beside time");
   const std::vector<double> zeros(signal.time.size(), 0.0);
-  signal.x = reader.Has("x") ? read(reader.At("x")) : zeros;
-  signal.y = reader.Has("y") ? read(reader.At("y")) : zeros;
+  signal.x = reader.Has("x") ? ReadSeriesColumn(reader, "x") : zeros;
+  signal.y = reader.Has("y") ? ReadSeriesColumn(reader, "y") : zeros;
   return signal;
+}
+
+// A path from a file, or from a series that stands in the scene; null after a failure.
+std::shared_ptr<const RecordedPath> SceneReader::ReadPathOf(const JsonReader& reader) {
+  PathSeries series;
+  if (reader.Has("time") && reader.Has("file")) {
+    reader.At("time").Fail("expected no time beside file, which has the times");
+  } else if (reader.Has("time")) {
+    series.time = ReadSeriesTimes(reader);
+    if (!reader.Has("x") && !reader.Has("y") && !reader.Has("angle")) {
+      reader.Fail("missing x, y or angle beside time");
+    }
+    if (reader.Has("x")) series.x = ReadSeriesColumn(reader, "x");
+    if (reader.Has("y")) series.y = ReadSeriesColumn(reader, "y");
+    if (reader.Has("angle")) series.angle = ReadSeriesColumn(reader, "angle");
+  } else {
+    for (const char* column : {"x", "y", "angle"}) {
+      if (reader.Has(column)) reader.At(column).Fail("expected time beside it, or file alone");
+    }
+    series.file = reader.At("file").String();
+    std::string error;
+    if (reader.ok() && !ReadPath(JoinPath(folder_, series.file), &series, &error)) {
+      reader.At("file").Fail(error);
+    }
+  }
+  FieldReader(reader).Choice("interpolation", kPathInterpolationNames, series.interpolation);
+  return reader.ok() ? std::make_shared<const RecordedPath>(std::move(series)) : nullptr;
 }
 
 // Two names of bodies with `*`; some two different bodies must match them.

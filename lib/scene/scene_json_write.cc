@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cstddef>
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
@@ -46,6 +47,7 @@ class FieldWriter {
     if (value) json_[field.key] = *value;
   }
   void Point(const Field& field, const Vector2<double>& value) {
+    if (!field.present) return;
     json_[field.key] = PointJson(value);
   }
   void Points(const Field& field, const std::vector<Vector2<double>>& values) {
@@ -78,6 +80,18 @@ class FieldWriter {
     if (!item) return;
     FieldWriter part(&json_[field.key]);
     visit(*item, &part);
+  }
+  void Path(const std::shared_ptr<const RecordedPath>& path) {
+    const PathSeries& series = path->series();
+    if (!series.file.empty()) {
+      json_["file"] = series.file;
+    } else {
+      json_["time"] = series.time;
+      if (!series.x.empty()) json_["x"] = series.x;
+      if (!series.y.empty()) json_["y"] = series.y;
+      if (!series.angle.empty()) json_["angle"] = series.angle;
+    }
+    Choice("interpolation", kPathInterpolationNames, series.interpolation);
   }
   template <typename Enum, std::size_t N>
   void Choice(const char* key, const std::pair<const char*, Enum> (&table)[N], Enum value) {
@@ -171,6 +185,12 @@ class SceneWriter {
 std::string SceneToJson(const Scene& scene) { return JsonText(SceneWriter(scene).Write()); }
 
 std::string SceneWithSignalsToJson(Scene scene) {
+  for (auto& body : scene.bodies) {
+    if (!body.driven) continue;
+    PathSeries series = body.driven->path->series();
+    series.file.clear();
+    body.driven->path = std::make_shared<const RecordedPath>(std::move(series));
+  }
   for (auto& joint : scene.joints) {
     if (joint.effort_signal) joint.effort_signal->file.clear();
   }

@@ -23,6 +23,8 @@ inline constexpr std::pair<const char*, ShapeType> kShapeTypeNames[] = {
     {"polygon", ShapeType::kPolygon}, {"half_plane", ShapeType::kHalfPlane}};
 inline constexpr std::pair<const char*, Signal::Interpolation> kInterpolationNames[] = {
     {"constant", Signal::Interpolation::kConstant}, {"linear", Signal::Interpolation::kLinear}};
+inline constexpr std::pair<const char*, PathInterpolation> kPathInterpolationNames[] = {
+    {"linear", PathInterpolation::kLinear}, {"cubic", PathInterpolation::kCubic}};
 inline constexpr std::pair<const char*, Stepping> kSteppingNames[] = {{"fixed", Stepping::kFixed},
                                                                       {"event", Stepping::kEvent}};
 inline constexpr std::pair<const char*, Integrator> kIntegratorNames[] = {

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <memory>
 #include <optional>
 #include <string>
 #include <utility>
@@ -64,6 +65,13 @@ class FieldSchema {
     Item item;
     visit(item, &fields);
     Add(field, fields.Item(OrderedJson::object(), {}));
+  }
+  void Path(const std::shared_ptr<const RecordedPath>&) {
+    properties_["file"] = SchemaOfText();
+    properties_["interpolation"] = SchemaOfWords(WordsOf(kPathInterpolationNames));
+    for (const char* column : {"time", "x", "y", "angle"}) {
+      properties_[column] = SchemaOfArray(SchemaOfNumber(NumberKind::kFree), 1);
+    }
   }
   template <typename T>
   void Numbers(const Field& field, const T&, const T&) {
@@ -159,6 +167,11 @@ OrderedJson BodySchema() {
   schema["if"] = {{"anyOf", OrderedJson::array({is_true("static"), is_true("kinematic")})}};
   schema["then"] = OrderedJson::object();
   schema["else"] = {{"required", moving.required()}};
+  // The path gives the velocities too; it is a file, or a series in the scene.
+  const auto has = [](const char* key) { return OrderedJson{{"required", {key}}}; };
+  schema["dependentSchemas"]["motion"] = {
+      {"not", {{"anyOf", OrderedJson::array({has("velocity"), has("angular_velocity")})}}}};
+  schema["properties"]["motion"]["oneOf"] = OrderedJson::array({has("file"), has("time")});
   return schema;
 }
 

@@ -3,7 +3,9 @@
 
 #include <cstddef>
 #include <limits>
+#include <memory>
 #include <optional>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -55,6 +57,7 @@ class RangeCheck {
     RangeCheck part(place);
     visit(*item, &part);
   }
+  void Path(const std::shared_ptr<const RecordedPath>&) {}
   void Numbers(const Field& field, double first, double second) {
     Check(field.kind, first, [&] { return Place(field).At(0); });
     Check(field.kind, second, [&] { return Place(field).At(1); });
@@ -91,6 +94,18 @@ class RangeCheck {
   const JsonReader& item_;
 };
 
+// What the fields alone do not tell of a recorded path, as a program may have made it too.
+void CheckDrivenMotion(const BasicBody<double>& body, const JsonReader& place) {
+  const auto& driven = *body.driven;
+  if (body.motion != Motion::kKinematic) {
+    place.Fail("expected a kinematic body, got one that is not");
+  } else if (driven.path == nullptr) {
+    place.At("file").Fail("missing, expected the file of a path");
+  } else if (body.velocity != Vector2<double>(0.0, 0.0) || body.angular_velocity != 0.0) {
+    place.Fail("expected no velocity or angular_velocity beside motion, which gives them");
+  }
+}
+
 }  // namespace
 
 void CheckBody(const BasicBody<double>& body, const JsonReader& place) {
@@ -107,12 +122,28 @@ void CheckBody(const BasicBody<double>& body, const JsonReader& place) {
     place.At("inertia").Fail(
         "missing, expected a number > 0 for a polygon whose centroid is not the origin");
   }
+  if (body.driven) CheckDrivenMotion(body, place.At("motion"));
   if (is_static && body.velocity != Vector2<double>(0.0, 0.0)) {
     place.At("velocity").Fail("expected [0, 0] of a static body, got a velocity (kinematic moves)");
   }
   if (is_static && body.angular_velocity != 0.0) {
     place.At("angular_velocity")
         .FailExpected("0 of a static body (kinematic moves)", body.angular_velocity);
+  }
+}
+
+void CheckPathOffsets(const BasicDrivenMotion<double>& driven, const JsonReader& place) {
+  for (int i = 0; i < 2; ++i) {
+    if (driven.path->Has(i) || driven.offset[i] == 0.0) continue;
+    place.At("offset").At(i).FailExpected(std::string("0, for the path has no column ") +
+                                              (i == 0 ? "x" : "y") +
+                                              " (its coordinate is that of position)",
+                                          driven.offset[i]);
+  }
+  if (!driven.path->Has(2) && driven.offset_angle != 0.0) {
+    place.At("offset_angle")
+        .FailExpected("0, for the path has no column angle (its angle is that of the body)",
+                      driven.offset_angle);
   }
 }
 

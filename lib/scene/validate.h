@@ -31,9 +31,13 @@ void CheckFrictionDecay(const std::optional<double>& kinetic, double friction,
 /// beyond the distance at the start, so that only the reader of a scene demands this.
 void CheckRopes(const Scene& scene, const JsonReader& joints);
 
-/// All of these but the last two, and that every parameter is in its range. Returns "" or one line
-/// that begins with `name` and names the first value that is not allowed as its place in a scene
-/// file.
+/// Whether a path has the columns that are offset; only the reader of a scene demands this, because
+/// a number without an effect may be varied.
+void CheckPathOffsets(const BasicDrivenMotion<double>& driven, const JsonReader& place);
+
+/// All of these but the last three, and that every parameter is in its range. Returns "" or one
+/// line that begins with `name` and names the first value that is not allowed as its place in a
+/// scene file.
 std::string Validate(const Scene& scene, const std::string& name);
 
 }  // namespace tangible

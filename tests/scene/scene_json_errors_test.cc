@@ -69,7 +69,8 @@ TEST(BadSceneTest, Bodies) {
       {"/bodies/0", "[]", "/bodies/0: expected an object, got an array of 0"},
       {"/bodies/3/masss", "1",
        "/bodies/3/masss: unknown key of a body, expected one of name, static, kinematic, shape, "
-       "contact_points, mass, inertia, position, angle, velocity, angular_velocity, friction, "
+       "contact_points, mass, inertia, position, angle, motion, velocity, angular_velocity, "
+       "friction, "
        "restitution, "
        "linear_damping, angular_damping, quadratic_drag, kinetic_friction, stribeck_speed, got "
        "\"masss\""},

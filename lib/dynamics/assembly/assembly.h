@@ -16,7 +16,7 @@
 // Each has the form of contact_problem.h, with a (m/s²) or δ (m) in the place of v, and forces or N
 // s² in the place of impulses, so that the same solvers apply. The equations of each element stand
 // in equations_inl.h. Bodies that forces do not move have no unknowns; their prescribed twists
-// enter the constants.
+// enter the constants, and at the level of accelerations those of bodies that follow a path.
 
 #include <vector>
 
@@ -48,6 +48,7 @@ struct AssemblyScratch {
   std::vector<JointRows<T>> joints;
   std::vector<JointRates<T>> rates;
   ContactRateScratch<T> contact;
+  std::vector<T> given;  ///< the accelerations of driven bodies, in scenes that have some
 };
 
 /// Adds the bodies, springs, forces, dampers and joints of a step to a problem without contacts.

@@ -10,26 +10,34 @@
 
 #include "tangible/dynamics/assembly/assembly.h"
 #include "tangible/dynamics/assembly/equations_inl.h"
+#include "tangible/dynamics/model/driven_bodies.h"
 #include "tangible/dynamics/model/tolerances.h"
 #include "tangible/math/scratch.h"
 
 namespace tangible {
 namespace internal {
 
-/// row · twist over those bodies of the row that forces do not move (block < 0).
+/// row · x over those bodies of the row that forces do not move (block < 0).
+template <typename T>
+T PrescribedShare(const ModelStructure& structure, const std::vector<T>& x, int a,
+                  const RowPart<T>& row_a, int b, const RowPart<T>& row_b) {
+  T share(0.0);
+  for (int i = 0; i < 3; ++i) {
+    if (structure.bodies[a].block < 0) {
+      share += row_a[i] * x[3 * a + i];
+    }
+    if (structure.bodies[b].block < 0) {
+      share += row_b[i] * x[3 * b + i];
+    }
+  }
+  return share;
+}
+
+/// The same of their twists.
 template <typename T>
 T PrescribedSpeed(const ModelStructure& structure, const State<T>& state, int a,
                   const RowPart<T>& row_a, int b, const RowPart<T>& row_b) {
-  T speed(0.0);
-  for (int i = 0; i < 3; ++i) {
-    if (structure.bodies[a].block < 0) {
-      speed += row_a[i] * state.twist[3 * a + i];
-    }
-    if (structure.bodies[b].block < 0) {
-      speed += row_b[i] * state.twist[3 * b + i];
-    }
-  }
-  return speed;
+  return PrescribedShare(structure, state.twist, a, row_a, b, row_b);
 }
 
 // The rounding of a gap, m: a few units in the last place of the positions of which it is the
@@ -75,6 +83,7 @@ class ProblemBuilder {
     for (int body = 0; body < s_.num_bodies(); ++body) {
       scratch_.poses.push_back(state_.PoseOf(body));
     }
+    if (IsDriven()) GivenAccelerations(model_, at_.time, at_.middle, &scratch_.given);
     for (int k = 0; k < p_.num_bodies; ++k) {
       equations_.Body(k);
     }
@@ -184,6 +193,9 @@ class ProblemBuilder {
       block.rhs[k] = rhs[k];
       if constexpr (kLevel == Level::kVelocity) {
         block.rhs[k] -= PrescribedSpeed(s_, state_, joint.a, rows.row_a[k], joint.b, rows.row_b[k]);
+      } else if (IsDriven()) {
+        block.rhs[k] -=
+            PrescribedShare(s_, scratch_.given, joint.a, rows.row_a[k], joint.b, rows.row_b[k]);
       }
     }
   }
@@ -215,10 +227,19 @@ class ProblemBuilder {
       if (contact.law == ContactLaw::kGap && contact.joint < 0) {
         block.rounding = PositionRounding(state_, contact.a, contact.b) / at_.h;
       }
+    } else if (IsDriven()) {
+      const auto share = [&](const RowPart<T>& row_a, const RowPart<T>& row_b) {
+        return PrescribedShare(s_, scratch_.given, contact.a, row_a, contact.b, row_b);
+      };
+      block.c_n += share(rows.normal_a, rows.normal_b);
+      block.c_t += share(rows.tangent_a, rows.tangent_b);
     }
   }
 
  private:
+  // Whether some bodies have accelerations of their own.
+  bool IsDriven() const { return kLevel == Level::kAcceleration && !s_.paths.empty(); }
+
   // The coefficient of a contact at its sliding speed (DecaySource).
   void LetFrictionDecay(const ActiveContact& contact, const ContactRows<T>& rows,
                         ContactBlock<T>* block) const {

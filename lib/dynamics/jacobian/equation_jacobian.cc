@@ -31,17 +31,7 @@ class EntryBuilder : private internal::LocalEntries<Sink> {
     at_.t = solved.instant.t;
     at_.h = solved.instant.h;
     at_.middle = solved.instant.middle;
-    if constexpr (kLevel == Level::kVelocity) {
-      unknown_ = solved.new_twist->data();
-    } else {
-      std::vector<double>& all = scratch->unknowns;
-      all.assign(3 * static_cast<size_t>(s_.num_bodies()), 0.0);
-      for (int k = 0; k < s_.num_blocks(); ++k) {
-        std::copy_n(&solved.solution->motion[3 * static_cast<size_t>(k)], 3,
-                    &all[3 * s_.moving[k]]);
-      }
-      unknown_ = all.data();
-    }
+    unknown_ = kLevel == Level::kVelocity ? solved.new_twist->data() : this->SpreadSolved(solved);
     damped_ = kLevel == Level::kAcceleration ? before_ : unknown_;
   }
 
@@ -62,9 +52,12 @@ class EntryBuilder : private internal::LocalEntries<Sink> {
       }
     }
     for (int j = 0; j < static_cast<int>(s_.joints.size()); ++j) {
-      if (s_.joints[j].type == JointType::kRevolute && by_hand_) {
+      const JointType type = s_.joints[j].type;
+      const bool by_hand =
+          by_hand_ && !this->FollowsPath(s_.joints[j].a) && !this->FollowsPath(s_.joints[j].b);
+      if (type == JointType::kRevolute && by_hand) {
         RevoluteByHand(j);
-      } else if (s_.joints[j].type == JointType::kPrismatic && by_hand_) {
+      } else if (type == JointType::kPrismatic && by_hand) {
         PrismaticByHand(j);
       } else {
         equations_.Joint(j);
@@ -211,6 +204,7 @@ class EntryBuilder : private internal::LocalEntries<Sink> {
   using Base::Emit;
   using Base::EmitDecay;
   using Base::EmitFriction;
+  using Base::EmitGiven;
   using Base::EmitMomentum;
   using Base::EmitRowTimesVariable;
   using Base::JointRow;
@@ -256,7 +250,7 @@ class EntryBuilder : private internal::LocalEntries<Sink> {
     by_twist(b, row_b);
   }
 
-  // A constraint row of velocities reads the twist of a body with prescribed motion.
+  // A constraint row reads the twist or acceleration of a body with prescribed motion.
   template <typename T>
   void EmitPrescribed(int a, const RowPart<T>& row_a, int b, const RowPart<T>& row_b, int row) {
     const auto emit = [&](int body, const RowPart<T>& part) {
@@ -267,6 +261,9 @@ class EntryBuilder : private internal::LocalEntries<Sink> {
     if constexpr (kLevel == Level::kVelocity) {
       emit(a, row_a);
       emit(b, row_b);
+    } else if constexpr (kLevel == Level::kAcceleration) {
+      EmitGiven(row, a, row_a, solved_.instant);
+      EmitGiven(row, b, row_b, solved_.instant);
     }
   }
 
@@ -645,6 +642,8 @@ class EntryBuilder : private internal::LocalEntries<Sink> {
         }
         EmitPrescribed(contact.a, rows.normal_a, contact.b, rows.normal_b, row);
       }
+    } else {
+      EmitPrescribed(contact.a, rows.normal_a, contact.b, rows.normal_b, row);
     }
     if (solved_.solution->modes[i] == ContactMode::kSticking) {
       EmitPrescribed(contact.a, rows.tangent_a, contact.b, rows.tangent_b, row + 1);

@@ -24,6 +24,7 @@
 #include <vector>
 
 #include "tangible/dynamics/assembly/assembly.h"
+#include "tangible/dynamics/model/driven_bodies.h"
 
 namespace tangible {
 
@@ -102,6 +103,7 @@ struct LocalJacobianScratch {
   std::vector<LocalJet> numbers_a, numbers_b;
   ContactRateScratch<LocalJet> rates;
   std::vector<double> unknowns;
+  std::vector<GivenEntry> given;
 };
 
 enum class JacobianRoute { kByHand, kGeneric };

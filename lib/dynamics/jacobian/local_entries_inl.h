@@ -4,10 +4,12 @@
 // Shared by equation_jacobian.cc and contact_gradient.cc: the variables of one element as
 // LocalJets, and the entries of its equations.
 
+#include <algorithm>
 #include <cmath>
 #include <vector>
 
 #include "tangible/dynamics/jacobian/equation_jacobian.h"
+#include "tangible/dynamics/model/driven_bodies.h"
 
 namespace tangible::internal {
 
@@ -45,6 +47,21 @@ class LocalEntries {
         sink_(sink) {}
 
  protected:
+  /// The accelerations or displacements of all bodies: the solved ones of moving bodies, the given
+  /// accelerations of driven ones, else 0.
+  const double* SpreadSolved(const SolvedEquations& solved) {
+    std::vector<double>& all = scratch_.unknowns;
+    if (solved.level == Level::kAcceleration) {
+      GivenAccelerations(model_, solved.instant.time, solved.instant.middle, &all);
+    } else {
+      all.assign(3 * static_cast<size_t>(s_.num_bodies()), 0.0);
+    }
+    for (int k = 0; k < s_.num_blocks(); ++k) {
+      std::copy_n(&solved.solution->motion[3 * static_cast<size_t>(k)], 3, &all[3 * s_.moving[k]]);
+    }
+    return all.data();
+  }
+
   LocalJet LocalNumber(int number, Locals* locals) {
     return locals->Add(x_[number], s_.ParameterVariable(number));
   }
@@ -115,6 +132,18 @@ class LocalEntries {
     const ShapeView<LocalJet> shape_b = LocalShapeOfB(contact, locals);
     rows->geometry = EvaluateContact(contact.feature, shape_a, pose_a, shape_b, pose_b);
     RowsFromGeometry(shape_a.type, pose_a.position, shape_b.type, pose_b.position, rows);
+  }
+
+  bool FollowsPath(int body) const { return PathOfBody(s_, body) >= 0; }
+
+  /// A row of accelerations reads that of a driven body.
+  template <typename T>
+  void EmitGiven(int row, int body, const RowPart<T>& part, const Instant<double>& instant) {
+    if (s_.paths.empty()) return;
+    AccelerationEntries(model_, body, instant.time, instant.middle, &scratch_.given);
+    for (const GivenEntry& entry : scratch_.given) {
+      sink_(row, entry.variable, ValueOf(part[entry.component]) * entry.value);
+    }
   }
 
   void Emit(const Locals& locals, int row, const LocalJet& value) {

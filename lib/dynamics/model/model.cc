@@ -5,6 +5,7 @@
 #include <cmath>
 #include <type_traits>
 
+#include "tangible/dynamics/model/driven_bodies.h"
 #include "tangible/dynamics/model/initial_state_inl.h"
 #include "tangible/dynamics/model/model_seams.h"
 #include "tangible/geometry/mass_properties.h"
@@ -85,6 +86,10 @@ void AddBodies(const BasicScene<T>& scene, Places* places, ModelStructure* struc
     }
     index.kinetic_friction = body.kinetic_friction ? places->Take(2) : -1;
     structure->friction_decays = structure->friction_decays || body.kinetic_friction;
+    if (body.driven) {
+      structure->paths.push_back(
+          {structure->num_bodies(), places->Take(kNumPathNumbers), body.driven->path});
+    }
     structure->bodies.push_back(index);
   }
   BodyIndex world;
@@ -220,6 +225,12 @@ void FillBodies(const BasicScene<T>& scene, std::vector<T>* numbers) {
       numbers->push_back(*body.kinetic_friction);
       numbers->push_back(body.stribeck_speed);
     }
+    if (body.driven) {
+      numbers->push_back(body.driven->delay);
+      numbers->push_back(body.driven->scale);
+      Append(body.driven->offset, numbers);
+      numbers->push_back(body.driven->offset_angle);
+    }
   }
 }
 
@@ -323,6 +334,17 @@ State<T> DrawnState(const BasicScene<T>& scene) {
   return state;
 }
 
+// Puts driven bodies where they are at time 0.
+template <typename T>
+void StartPaths(const Model<T>& model, State<T>* state) {
+  const ModelStructure& structure = *model.structure;
+  if (structure.settings.stepping == Stepping::kFixed) {
+    FollowPathsOverStep(model, 0.0, structure.settings.dt, state);
+  } else {
+    FollowPaths(model, T(0.0), BesideInstant(structure, 0.0, PathSide::kAfter), state);
+  }
+}
+
 bool MatchesEither(const std::vector<bool>& first, const std::vector<bool>& second, int i, int j) {
   return (first[i] && second[j]) || (first[j] && second[i]);
 }
@@ -382,6 +404,7 @@ void BuildModelWithStructure(const BasicScene<T>& scene,
   model->parameters.reserve(model->structure->num_parameters);
   Append(scene.gravity, &model->parameters);
   FillBodies(scene, &model->parameters);
+  StartPaths(*model, state);
   FillJoints(scene, *state, world, &model->parameters);
   FillForcesAndPairs(scene, *state, world, &model->parameters);
   ApplyInitialJoints(scene, state);

@@ -108,6 +108,14 @@ struct PairIndex {
   int kinetic_friction = -1;            ///< then Stribeck's speed; −1: none of its own
 };
 
+/// A body that follows a path: delay, scale, offset (2) and offset of the angle from `numbers` on
+/// (driven_bodies.h).
+struct PathIndex {
+  int body = -1;
+  int numbers = -1;
+  std::shared_ptr<const RecordedPath> path;
+};
+
 struct ModelStructure {
   std::string scene_name;
   SimulationSettings settings;
@@ -117,6 +125,7 @@ struct ModelStructure {
   std::vector<ForceIndex> forces;
   std::vector<PairIndex> pairs;
   std::vector<Signal> signals;
+  std::vector<PathIndex> paths;  ///< in ascending order of their bodies
   std::vector<std::pair<std::vector<bool>, std::vector<bool>>> no_contact;
   std::vector<std::pair<int, int>> joined;  ///< bodies with a joint without contact, ascending
   std::vector<int> moving;                  ///< body of each block

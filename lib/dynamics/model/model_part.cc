@@ -3,6 +3,8 @@
 
 #include <numeric>
 
+#include "tangible/dynamics/model/driven_bodies.h"
+
 namespace tangible {
 namespace {
 
@@ -66,6 +68,11 @@ class PartTaker {
       TakeOne(&index.angular_damping);
       TakeOne(&index.quadratic_drag);
       TakeNumbers(2, &index.kinetic_friction);
+      if (const int path = PathOfBody(whole_, body); path >= 0) {
+        PathIndex& own = to_->paths.emplace_back(whole_.paths[path]);
+        own.body = to_->num_bodies() - 1;
+        TakeNumbers(kNumPathNumbers, &own.numbers);
+      }
     }
   }
 

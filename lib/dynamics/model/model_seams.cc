@@ -5,6 +5,7 @@
 #include <memory>
 #include <utility>
 
+#include "tangible/dynamics/model/driven_bodies.h"
 #include "tangible/geometry/broad_phase.h"
 #include "tangible/geometry/tolerances.h"
 #include "tangible/math/scalar.h"
@@ -46,7 +47,8 @@ std::vector<std::pair<int, int>> FindNeighbours(const Model<double>& model,
   BroadPhase().FindPairs(
       boxes,
       [&](int a, int b) {
-        return may_have_seams[a] && may_have_seams[b] && MoveAlike(state, a, b) &&
+        return may_have_seams[a] && may_have_seams[b] && PathOfBody(structure, a) < 0 &&
+               PathOfBody(structure, b) < 0 && MoveAlike(state, a, b) &&
                TouchTheSame(structure, a, b);
       },
       &pairs);

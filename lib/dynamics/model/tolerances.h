@@ -23,6 +23,10 @@ inline constexpr double kCornerRounding = 4.0 * std::numeric_limits<double>::eps
 
 /// Of the step: times that differ by less are the same, because an end of a step is k dt rounded.
 inline constexpr double kSameTime = 1e-9;
+/// Of the step: knots of a body's path that are nearer to the end of a step fall on it.
+inline constexpr double kSameInstantShare = 1e-12;
+/// Of the time: the same where that is more, because knots and ends of steps are rounded sums.
+inline constexpr double kInstantRounding = 4.0 * std::numeric_limits<double>::epsilon();
 /// Of the speeds of the contact: a slower approach counts as none; the tolerance lies an order of
 /// magnitude above the residual of the solver.
 inline constexpr double kNoApproach = 1e-9;

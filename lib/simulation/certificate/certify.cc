@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <utility>
 
+#include "tangible/dynamics/model/driven_bodies.h"
 #include "tangible/lcp/system/contact_conditioning.h"
 #include "tangible/simulation/certificate/approach_inl.h"
 #include "tangible/simulation/certificate/certify_place_inl.h"
@@ -330,8 +331,35 @@ void RolloutCertifier::AddForceWindows(const Model<double>& model) {
   }
 }
 
+// Jumps of a path's rate at which the derivative by its delay has two sides.
+void RolloutCertifier::AddPaths(const Model<double>& model) {
+  const ModelStructure& s = *model.structure;
+  for (const PathIndex& index : s.paths) {
+    if (!Wanted(index.numbers + kPathDelay)) continue;
+    const std::vector<double>& times = index.path->times();
+    for (size_t k = 0; k < times.size(); ++k) {
+      const double time = times[k] + model.parameters[index.numbers + kPathDelay];
+      if (!index.path->JumpsAt(static_cast<int>(k)) || time < -s.settings.dt) continue;
+      const std::string which =
+          "jump of the path of " + s.bodies[index.body].name + " at " + Short(time);
+      const double steps = std::round(time / s.settings.dt);
+      const long step =
+          static_cast<long>(std::clamp(steps, 0.0, static_cast<double>(NumSteps(s.settings))));
+      if (IsSameInstant(s, time, 0.0)) {
+        OneSided(which + " s is the start of the run");
+      } else if (IsSameInstant(s, time, s.settings.duration)) {
+        OneSided(which + " s is the end of the run");
+      } else if (s.settings.stepping == Stepping::kFixed &&
+                 IsSameInstant(s, time, StepTime(s.settings, step))) {
+        OneSided(which + " s is on a step's boundary");
+      }
+    }
+  }
+}
+
 Certificate RolloutCertifier::Finish(const Model<double>& model, const RolloutReport& report) {
   AddForceWindows(model);
+  AddPaths(model);
   certificate_.mode_switches = static_cast<int>(report.mode_switches);
   certificate_.events = static_cast<int>(report.events);
   certificate_.fallbacks = static_cast<int>(report.given_up.total() +

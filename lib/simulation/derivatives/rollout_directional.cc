@@ -5,6 +5,7 @@
 #include <cmath>
 #include <sstream>
 
+#include "tangible/dynamics/model/driven_bodies.h"
 #include "tangible/dynamics/model/lengths.h"
 #include "tangible/lcp/contact/tolerances.h"
 #include "tangible/lcp/system/contact_residual.h"
@@ -195,6 +196,7 @@ bool StepDirectional::Apply(const Model<double>& model, Stepper* stepper, RowMat
                             std::string* message) {
   stepper->ChooseImpulses();
   const StepRecord& record = stepper->record();
+  FollowStepTangent(model, record.time, record.h, w_dot);
   if (!FindKinks(model, record, record.solution, *w_dot)) {
     RowMatrixXd smooth = *w_dot;
     if (tangent_.ApplyAndMeasure(model, stepper, &smooth) < kContradictingRate) {

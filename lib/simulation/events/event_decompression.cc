@@ -58,6 +58,7 @@ bool EventStepper::Decompress(const Model<double>& model, const Impulses& compre
   part->is_impulses = true;
   Impulses& impact = part->impulses;
   impact.time = compression.time;
+  impact.inside = compression.inside;
   impact.h = 0.0;
   impact.decompression = true;
   impact.before = *state;

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "tangible/dynamics/jacobian/contact_gradient.h"
+#include "tangible/dynamics/model/driven_bodies.h"
 #include "tangible/simulation/events/event_rows_inl.h"
 #include "tangible/simulation/events/segment_flow.h"
 #include "tangible/simulation/events/tolerances.h"
@@ -20,9 +21,10 @@ Eigen::Vector3d BlockOf(const std::vector<double>& values, int block) {
 
 // The rows of the state at stage i: the derivatives of x + c τ v + τ² Σ â A and so on. `a_dot[j]`
 // are the stages' derivatives, one for each of `terms`.
-void PlaceTangent(const ModelStructure& s, const Segment& segment, double c, const double* a,
+void PlaceTangent(const Model<double>& model, const Segment& segment, double c, const double* a,
                   const double* a_hat, int terms, const Row& tau_dot, const RowMatrixXd& x,
                   const RowMatrixXd* a_dot, RowMatrixXd* out) {
+  const ModelStructure& s = *model.structure;
   const double tau = segment.length;
   const int time = TimeVariable(s);
   // The model's numbers are the same in all stages.
@@ -51,6 +53,7 @@ void PlaceTangent(const ModelStructure& s, const Segment& segment, double c, con
       }
     }
   }
+  FollowPathsTangent(model, segment.time + c * tau, segment.middle, out);
 }
 
 }  // namespace
@@ -122,8 +125,8 @@ double EventDerivative::SegmentTangent(const Model<double>& model, Segment* segm
   for (int i = 0; i < tableau.stages; ++i) {
     const bool implicit = tableau.last_is_implicit && i + 1 == tableau.stages;
     const auto evaluate = [&](int terms, RowMatrixXd* next) {
-      PlaceTangent(s, *segment, tableau.c[i], tableau.a[i], tableau.a_hat[i], terms, tau_dot, *x,
-                   a_dot, &place);
+      PlaceTangent(model, *segment, tableau.c[i], tableau.a[i], tableau.a_hat[i], terms, tau_dot,
+                   *x, a_dot, &place);
       left =
           std::max(left, NodeTangent(model, *segment, &segment->stages[i], false, place, &solved));
       *next = solved.topRows(3 * s.num_blocks());
@@ -144,7 +147,7 @@ double EventDerivative::SegmentTangent(const Model<double>& model, Segment* segm
     a_dot[i].swap(own);
   }
   List(model, *segment, nullptr);
-  PlaceTangent(s, *segment, 1.0, tableau.b, tableau.b_hat, tableau.stages, tau_dot, *x, a_dot,
+  PlaceTangent(model, *segment, 1.0, tableau.b, tableau.b_hat, tableau.stages, tau_dot, *x, a_dot,
                &place);
   x->swap(place);
   for (int k = 0; k < segment->num_corrections; ++k) {
@@ -250,6 +253,7 @@ double EventDerivative::Tangent(const Model<double>& model, EventRecord* record,
   double residual = 0.0;
   for (int p = 0; p < record->num_parts; ++p) {
     EventPart& part = *record->parts[p];
+    FollowPathsTangent(model, part.time(), part.inside(), &x);
     if (part.is_impulses) {
       residual = std::max(residual, ImpulsesTangent(model, &part.impulses, &x));
       continue;
@@ -289,6 +293,7 @@ void EventDerivative::StagesAdjoint(const Model<double>& model, Segment* segment
   const NystromTableau& tableau = NystromTableau::Of(IntegratorOf(s.settings));
   const Eigen::Index columns = w_bar->cols();
   const double tau = segment->length;
+  FollowPathsAdjoint(model, segment->time + tau, segment->middle, w_bar);
   // Adds the contribution of A_j to the adjoint at q + τ² Σ â_j A_j, v + τ Σ a_j A_j.
   const auto add_share = [&](double a, double a_hat, const RowMatrixXd& from, RowMatrixXd* bar) {
     for (int k = 0; k < s.num_blocks(); ++k) {
@@ -334,6 +339,7 @@ void EventDerivative::StagesAdjoint(const Model<double>& model, Segment* segment
     }
     solve(own, &stage_bar);
     List(model, *segment, nullptr);
+    FollowPathsAdjoint(model, segment->time + tableau.c[i] * tau, segment->middle, &stage_bar);
     for (int j = 0; j < i; ++j) {
       add_share(tableau.a[i][j], tableau.a_hat[i][j], stage_bar, &a_bar[j]);
     }
@@ -401,6 +407,7 @@ void EventDerivative::Adjoint(const Model<double>& model, EventRecord* record, R
     } else {
       SegmentAdjoint(model, &part.segment, p > first_moving, &bar);
     }
+    FollowPathsAdjoint(model, part.time(), part.inside(), &bar);
   }
   *w_bar = bar.topRows(s.num_variables());
 }

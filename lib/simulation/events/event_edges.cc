@@ -3,8 +3,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 
 #include "tangible/dynamics/elements/force.h"
+#include "tangible/dynamics/model/driven_bodies.h"
 #include "tangible/simulation/events/tolerances.h"
 
 namespace tangible {
@@ -13,6 +15,21 @@ namespace {
 // The steps of a run may differ in length; both steps of a boundary see the same edges there.
 double NearAStepsEnd(const Model<double>& model) {
   return kShortestPart * model.structure->settings.dt;
+}
+
+// Calls visit(edge) for the knots of paths within [from, to].
+template <typename Visit>
+void ForEachKnot(const Model<double>& model, double from, double to, const Visit& visit) {
+  for (const PathIndex& index : model.structure->paths) {
+    const int number = index.numbers + kPathDelay;
+    const double delay = model.parameters[number];
+    const std::vector<double>& times = index.path->times();
+    auto knot = std::lower_bound(times.begin(), times.end(), from - delay);
+    for (; knot != times.end() && *knot + delay <= to; ++knot) {
+      const bool jumps = index.path->JumpsAt(static_cast<int>(knot - times.begin()));
+      visit(Edge{*knot + delay, WindowEdge{number}, !jumps});
+    }
+  }
 }
 
 template <typename Visit>
@@ -51,6 +68,11 @@ std::vector<Edge> EdgesWithin(const Model<double>& model, double from, double to
   for (const JointIndex& joint : structure.joints) {
     add_signal(joint.effort_signal);
   }
+  ForEachKnot(model, from, to, [&](const Edge& edge) {
+    if (IsSameInstant(structure, edge.time, from) || IsSameInstant(structure, edge.time, to))
+      return;
+    edges.push_back(edge);
+  });
   std::stable_sort(edges.begin(), edges.end(),
                    [](const Edge& x, const Edge& y) { return x.time < y.time; });
   return edges;
@@ -60,9 +82,10 @@ void EdgeGroup::Add(const Edge& edge) {
   time = any ? std::min(time, edge.time) : edge.time;
   any = true;
   if (edge.window.number < 0) return;
-  if (window.number < 0) {
+  if (window.number < 0 || (gives_way && !edge.gives_way)) {
     window = edge.window;
-  } else {
+    gives_way = edge.gives_way;
+  } else if (edge.window.force >= 0) {
     further.push_back(edge.window);
   }
 }
@@ -84,7 +107,79 @@ EdgeGroup EdgesAt(const Model<double>& model, double time) {
     const double edge = model.parameters[window.number];
     if (std::abs(edge - time) <= near) group.Add({edge, window});
   });
+  const ModelStructure& s = *model.structure;
+  if (s.paths.empty()) return group;
+  ForEachKnot(model, BesideInstant(s, time, PathSide::kBefore),
+              BesideInstant(s, time, PathSide::kAfter), [&](const Edge& edge) {
+                if (!edge.gives_way && IsSameInstant(s, edge.time, time)) group.Add(edge);
+              });
   return group;
+}
+
+bool JumpPullsJoint(const Model<double>& model, double time) {
+  const ModelStructure& s = *model.structure;
+  bool pulls = false;
+  ForEachKnot(model, BesideInstant(s, time, PathSide::kBefore),
+              BesideInstant(s, time, PathSide::kAfter), [&](const Edge& edge) {
+                if (edge.gives_way || !IsSameInstant(s, edge.time, time)) return;
+                for (const PathIndex& path : s.paths) {
+                  if (path.numbers + kPathDelay != edge.window.number) continue;
+                  for (const JointIndex& joint : s.joints) {
+                    pulls = pulls || joint.a == path.body || joint.b == path.body;
+                  }
+                }
+              });
+  return pulls;
+}
+
+double JustBefore(const Model<double>& model, double t) {
+  const ModelStructure& s = *model.structure;
+  const double before = std::nextafter(t - NearAStepsEnd(model), -HUGE_VAL);
+  return s.paths.empty() ? before : std::min(before, BesideInstant(s, t, PathSide::kBefore));
+}
+
+double JustAfter(const Model<double>& model, double t) {
+  const ModelStructure& s = *model.structure;
+  const double after = std::nextafter(t + NearAStepsEnd(model), HUGE_VAL);
+  return s.paths.empty() ? after : std::max(after, BesideInstant(s, t, PathSide::kAfter));
+}
+
+std::string CoincidingEdges(const Model<double>& model, const RowMatrixXd& directions) {
+  const ModelStructure& s = *model.structure;
+  if (s.paths.empty() || s.settings.stepping == Stepping::kFixed) return "";
+  std::vector<Edge> edges;
+  ForEachKnot(model, 0.0, s.settings.duration, [&](const Edge& edge) {
+    if (!edge.gives_way) edges.push_back(edge);
+  });
+  ForEachWindowEdge(s, [&](const WindowEdge& window) {
+    edges.push_back({model.parameters[window.number], window});
+  });
+  std::sort(edges.begin(), edges.end(),
+            [](const Edge& x, const Edge& y) { return x.time < y.time; });
+  const auto varies = [&](const Edge& edge) {
+    return !directions.row(s.ParameterVariable(edge.window.number)).isZero(0.0);
+  };
+  for (size_t i = 1; i < edges.size(); ++i) {
+    const Edge& a = edges[i - 1];
+    const Edge& b = edges[i];
+    if (a.window.number == b.window.number || !IsSameInstant(s, a.time, b.time)) continue;
+    if (a.window.force >= 0 && b.window.force >= 0) continue;
+    if (a.time <= 0.0 || (!varies(a) && !varies(b))) continue;
+    const auto name = [&](const Edge& edge) {
+      if (edge.window.force >= 0) return "the window of force " + s.forces[edge.window.force].name;
+      const auto index = std::find_if(s.paths.begin(), s.paths.end(), [&](const PathIndex& path) {
+        return path.numbers == edge.window.number - kPathDelay;
+      });
+      return "the speed of body " + s.bodies[index->body].name;
+    };
+    char time[40];
+    std::snprintf(time, sizeof time, "%.9g", b.time);
+    return "expected jumps of paths at times of their own where their derivatives are asked for, "
+           "got " +
+           name(a) + " and " + name(b) + ", which both change at t = " + time +
+           " s: the derivative depends on their order (set one delay a little apart)";
+  }
+  return "";
 }
 
 void AddEdgesToCome(const Model<double>& model, const Segment& segment,

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// Edges: the given times at which a force's window opens or closes or a signal has a corner.
+// Edges: the given times at which a force's window opens or closes, or a signal or a body's path
+// has a corner.
 //
 // A segment that ends at an edge s has the length s − t, and the next one starts at s. With S_τ⁻
 // and S_τ⁺ the rates of both motions, which differ by the force and by what it changes,
@@ -15,7 +16,14 @@
 // fall on one instant, there is a segment of zero length between each two of them, with the modes
 // that contacts have between them (AddFurtherEdges). If another order gives other accelerations the
 // derivative differs on each side, and the segment names the edge at its start.
+//
+// A knot of a path is an edge at knot + delay. Where the rate jumps there (driven_bodies.h) the
+// bodies that touch the driven one, or are joined to it, meet its new twist by an impact as soon as
+// the edge has been reached: the jump itself has no impulse. At the other knots of a cubic path
+// nothing jumps but the third derivative; they are edges for the sake of the integrators' order,
+// and give way to others at their instant.
 
+#include <string>
 #include <vector>
 
 #include "tangible/dynamics/model/model.h"
@@ -25,7 +33,8 @@ namespace tangible {
 
 struct Edge {
   double time;
-  WindowEdge window;  ///< window.number −1: a corner of a signal
+  WindowEdge window;       ///< window.number −1: a corner of a signal
+  bool gives_way = false;  ///< a knot at which no rate jumps
 };
 
 /// The edges within (from, to), in their order; those next to an end of the step do not count.
@@ -37,6 +46,7 @@ struct EdgeGroup {
   double time = 0.0;  ///< of the first
   WindowEdge window;  ///< the first whose time is a parameter
   std::vector<WindowEdge> further;
+  bool gives_way = true;  ///< whether `window` is a knot at which no rate jumps
 
   void Add(const Edge& edge);
 };
@@ -44,12 +54,24 @@ struct EdgeGroup {
 /// The first edge after `now` of a sorted list, with those at its instant.
 EdgeGroup NextEdges(const std::vector<Edge>& edges, double now, double rounding);
 
-/// The edges of windows on the boundary of two steps at `time`.
+/// The edges of windows and the knots at which a rate jumps, on a boundary of steps at `time`.
 EdgeGroup EdgesAt(const Model<double>& model, double time);
 
 /// Adds to accelerations at a segment's state the loads (N, N, N m) by which its edges still to
 /// come differ from those passed: −F where a window opens, F where it closes.
 void AddEdgesToCome(const Model<double>& model, const Segment& segment,
                     ContactProblem<double>* problem);
+
+/// Whether the speed of a driven body jumps at `time` to which a joint holds another body.
+bool JumpPullsJoint(const Model<double>& model, double time);
+
+/// Times at which forces, signals and paths are read for a motion that ends or starts at t.
+double JustBefore(const Model<double>& model, double t);
+double JustAfter(const Model<double>& model, double t);
+
+/// Empty, or why derivatives along these directions (num_variables x columns) are refused: the time
+/// of a jump of a path's rate and another edge's are the same, though both vary by numbers of their
+/// own, and what the impacts there do depends on their order. Empty for fixed steps.
+std::string CoincidingEdges(const Model<double>& model, const RowMatrixXd& directions);
 
 }  // namespace tangible

@@ -20,6 +20,7 @@
 #include <string>
 #include <utility>
 
+#include "tangible/dynamics/model/driven_bodies.h"
 #include "tangible/lcp/system/contact_residual.h"
 #include "tangible/simulation/events/ellipse_motion.h"
 #include "tangible/simulation/events/event_step.h"
@@ -72,12 +73,6 @@ bool SlidesFreely(const ModelStructure& structure, const Impulses& impact, size_
                      });
 }
 
-// The time at which signals and windows are read for a motion that ends at t.
-double JustBefore(const Model<double>& model, double t) {
-  return std::nextafter(t - kShortestPart * model.structure->settings.dt,
-                        -std::numeric_limits<double>::max());
-}
-
 // The largest acceleration that loads alone give a body, of points m/s² and at the distance of a
 // radius of gyration rad/s², for each component: what friction cancels leaves their rounding.
 std::vector<double> FreeAccelerations(const ContactProblem<double>& problem) {
@@ -122,7 +117,9 @@ bool EventStepper::AddInstant(const Model<double>& model, double t, EventKind ki
   segment.time = t;
   segment.length = 0.0;
   segment.starts = guess_.starts;
-  segment.middle = is_after_edges ? t : JustBefore(model, t);
+  segment.middle = !is_after_edges                  ? JustBefore(model, t)
+                   : model.structure->paths.empty() ? t
+                                                    : JustAfter(model, t);
   segment.before = *state;
   segment.event_number = -1;
   segment.at_once = false;
@@ -142,6 +139,30 @@ bool EventStepper::AddInstant(const Model<double>& model, double t, EventKind ki
     return false;
   }
   *state = segment.after;
+  return true;
+}
+
+bool EventStepper::FollowAfter(const Model<double>& model, double now, State<double>* state,
+                               StepReport* outcome) {
+  if (model.structure->paths.empty()) return true;
+  inside_ = JustAfter(model, now);
+  FollowPaths(model, now, inside_, state);
+  if (guess_.starts || !JumpPullsJoint(model, now)) return true;
+  // Joints follow a jump by the impulse that restores them; contacts that it makes approach have an
+  // impact after it.
+  Segment pulled;
+  pulled.time = now;
+  pulled.middle = inside_;
+  EventPart* part = record_.Add();
+  part->is_impulses = true;
+  SetUpProjection(pulled, *state, &part->impulses);
+  if (!flow_.Project(model, &part->impulses)) {
+    outcome->message = "twists of joints whose body's path jumps";
+    return false;
+  }
+  ++outcome->events;
+  SpreadTwists(*model.structure, part->impulses.solution.motion, &state->twist);
+  part->impulses.new_twist = state->twist;
   return true;
 }
 
@@ -292,6 +313,7 @@ bool EventStepper::Settle(const Model<double>& model, const Impulses& impact, St
   const double slow = search_.SpeedTolerance(model, *state);
   Segment held;
   held.time = impact.time;
+  held.middle = inside_;
   held.starts = true;  // contacts held while sliding have friction
   bool any = false;
   bool all_slow = true;     // no contact approached faster than it would return

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tangible/dynamics/model/driven_bodies.h"
 #include "tangible/simulation/events/implicit_stage.h"
 #include "tangible/simulation/events/mode_elimination_inl.h"
 #include "tangible/simulation/events/segment_flow.h"
@@ -32,6 +33,7 @@ class EventReplay {
         now = T(part.is_impulses ? part.impulses.time : part.segment.time);
         started = true;
       }
+      FollowPaths(model_, now, part.inside(), state);
       if (part.is_impulses) {
         RunImpulses(&part.impulses, state);
       } else {
@@ -142,6 +144,7 @@ class EventReplay {
       const auto evaluate = [&](int terms, ContactSolution<T>* next) {
         PlaceStage(s_, before, tau, tableau.c[i], tableau.a[i], tableau.a_hat[i], terms, stage,
                    &state);
+        FollowPaths(model_, T(time + tableau.c[i] * tau), segment->middle, &state);
         Accelerate(*segment, state, T(time + tableau.c[i] * tau), &segment->stages[i], next);
       };
       if (!tableau.last_is_implicit || i + 1 < tableau.stages) {
@@ -163,6 +166,7 @@ class EventReplay {
       FromColumns(own, &stages[i].motion);
     }
     PlaceStage(s_, before, tau, 1.0, tableau.b, tableau.b_hat, tableau.stages, stage, after);
+    FollowPaths(model_, T(time + tau), segment->middle, after);
     Correct(segment, tau, after);
     if (segment->projects_twists) {
       RunImpulses(&segment->projection, after, false);

@@ -42,13 +42,14 @@ struct StepRecord {
 /// impact is two parts of the record, its compression and then its decompression.
 struct Impulses : StepRecord {
   ContactSystem system;
+  double inside = 0.0;          ///< the time that tells the pieces on which paths are followed
   bool decompression = false;   ///< of the impulses found by the part before
   std::vector<int> compressed;  ///< decompression: each contact's index in that part
 };
 
 enum class EventKind : unsigned char {
   kStepEnd,     ///< no event: the end of the step
-  kEdge,        ///< a force's window opens or closes, or a signal has a corner
+  kEdge,        ///< a force's window opens or closes, or a signal or path has a corner
   kTouch,       ///< a gap or the distance from a joint limit closes
   kSlipEnds,    ///< a sliding speed reaches 0
   kSlipBegins,  ///< friction reaches its limit (Segment::SticksWith)
@@ -63,10 +64,10 @@ const char* NameOf(EventKind event);
 /// Whether an event's time is found from an equation (and not given).
 bool IsLocated(EventKind kind);
 
-/// An end of a force's window: the parameter that is its time, −1: none.
+/// An end of a force's window or a knot of a path: the parameter that sets its time, −1: none.
 struct WindowEdge {
   int number = -1;
-  int force = -1;
+  int force = -1;  ///< −1: a knot of a path, whose time is that of the knot later by the number
   double side = 0.0;  ///< −1: the window opens there, 1: it closes
 };
 
@@ -141,6 +142,10 @@ struct EventPart {
   bool is_impulses = false;
   Segment segment;
   Impulses impulses;
+
+  double time() const { return is_impulses ? impulses.time : segment.time; }
+  /// The time that tells the pieces on which paths are followed.
+  double inside() const { return is_impulses ? impulses.inside : segment.middle; }
 };
 
 /// The parts in their order; kept from step to step for their memory.

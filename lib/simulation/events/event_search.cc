@@ -6,6 +6,7 @@
 #include <limits>
 #include <string>
 
+#include "tangible/dynamics/model/driven_bodies.h"
 #include "tangible/math/scalar.h"
 #include "tangible/simulation/events/event_search_inl.h"
 #include "tangible/simulation/events/load_speed.h"
@@ -251,7 +252,7 @@ void EventSearch::TryStart(const Model<double>& model, double tolerance, Event t
 
 // The rate of a sliding speed in its friction's direction where bodies have given accelerations,
 // without what turning directions add.
-double EventSearch::SlipRate(const Model<double>& model, const State<double>& state,
+double EventSearch::SlipRate(const Model<double>& model, const State<double>& state, double time,
                              const std::vector<double>& accelerations, const Event& event) const {
   const ActiveContact& contact = segment_->contacts[event.index];
   ContactRows<double> rows;
@@ -263,6 +264,14 @@ double EventSearch::SlipRate(const Model<double>& model, const State<double>& st
   };
   add(contact.a, rows.tangent_a);
   add(contact.b, rows.tangent_b);
+  if (!model.structure->paths.empty()) {
+    std::vector<double> given;
+    GivenAccelerations(model, time, segment_->middle, &given);
+    for (int i = 0; i < 3; ++i) {
+      rate += rows.tangent_a[i] * given[3 * contact.a + i] +
+              rows.tangent_b[i] * given[3 * contact.b + i];
+    }
+  }
   return SlidingSign(segment_->modes[event.index]) * rate;
 }
 
@@ -275,12 +284,12 @@ double EventSearch::FindDip(const Model<double>& model, const Event& event, doub
   // The last stage is evaluated at the end of its motion.
   const auto rate_at_end = [&](double length) {
     const Segment& motion = At(model, length)->motion;
-    return width * SlipRate(model, motion.after,
+    return width * SlipRate(model, motion.after, segment_->time + length,
                             motion.stages[motion.num_stages - 1].solution.motion, event);
   };
   const double ra = a > 0.0
                         ? rate_at_end(a)
-                        : width * SlipRate(model, segment_->before,
+                        : width * SlipRate(model, segment_->before, segment_->time,
                                            At(model, b)->motion.stages[0].solution.motion, event);
   if (!(ra < 0.0)) return b;
   const double rb = rate_at_end(b);
@@ -371,6 +380,11 @@ void EventSearch::SearchClosed(const Model<double>& model, Event* event) {
   }
 }
 
+// A bound on the speed of a driven body within the segment; 0 of others.
+double EventSearch::SpeedAlongPath(const Model<double>& model, int body, double radius) const {
+  return LargestGivenSpeed(model, body, segment_->time, segment_->time + segment_->length, radius);
+}
+
 void EventSearch::FindPairs(const Model<double>& model) {
   const ModelStructure& structure = *model.structure;
   const Sample& end = *At(model, segment_->length);
@@ -379,12 +393,13 @@ void EventSearch::FindPairs(const Model<double>& model) {
     const double after =
         end.good ? SpeedOf(&end.motion.after.twist[3 * body], lengths_.radius(body)) : before;
     closing_[body] = LargestSpeedBetween(before, after);
+    closing_[body] = std::max(closing_[body], SpeedAlongPath(model, body, lengths_.radius(body)));
     const double reach = closing_[body] * segment_->length +
                          kWiderBoxes * lengths_.smallest_radius() +
                          lengths_.Rounding(segment_->before, body, body);
     boxes_[body] = BoxOf(model, body, segment_->before.PoseOf(body), reach);
     if (structure.bodies[body].shape == ShapeType::kHalfPlane &&
-        segment_->before.twist[3 * body + 2] != 0.0) {
+        (segment_->before.twist[3 * body + 2] != 0.0 || TurnsAlongPath(structure, body))) {
       boxes_[body] = {-kInfinity, -kInfinity, kInfinity, kInfinity};
     }
   }
@@ -463,13 +478,17 @@ bool EventSearch::Run(const Model<double>& model, const std::vector<ActiveContac
     for (const int body : {a, b}) {
       if (model.structure->bodies[body].shape == ShapeType::kHalfPlane) {
         const int other = body == a ? b : a;
-        turning = std::abs(segment->before.twist[3 * body + 2]) *
-                  (std::hypot(segment->before.pose[3 * a] - segment->before.pose[3 * b],
-                              segment->before.pose[3 * a + 1] - segment->before.pose[3 * b + 1]) +
-                   lengths_.radius(other));
-        closing_[body] =
-            std::hypot(segment->before.twist[3 * body], segment->before.twist[3 * body + 1]) +
-            turning;
+        const double turn =
+            std::max(std::abs(segment->before.twist[3 * body + 2]),
+                     LargestGivenTurn(model, body, segment->time, segment->time + segment->length));
+        turning =
+            turn * (std::hypot(segment->before.pose[3 * a] - segment->before.pose[3 * b],
+                               segment->before.pose[3 * a + 1] - segment->before.pose[3 * b + 1]) +
+                    lengths_.radius(other));
+        closing_[body] = std::max(std::hypot(segment->before.twist[3 * body],
+                                             segment->before.twist[3 * body + 1]),
+                                  SpeedAlongPath(model, body, 0.0)) +
+                         turning;
       }
     }
     model.structure->ForEachPartPair(a, b, [&](PartPair parts) {

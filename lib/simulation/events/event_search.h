@@ -106,6 +106,7 @@ class EventSearch {
   class PairSearch;  ///< event_search_pair.cc
   Sample* At(const Model<double>& model, double length);
   void TakeMotion(Sample* sample, Segment* segment);
+  double SpeedAlongPath(const Model<double>& model, int body, double radius) const;
   void FindPairs(const Model<double>& model);
   void SortPairs(const Model<double>& model);
   void SearchPair(const Model<double>& model, int a, int b, PartPair parts, Event* event);
@@ -123,7 +124,7 @@ class EventSearch {
                  const CourseOver& course_over, double tolerance, double from, double to,
                  double* root);
   void SearchClosed(const Model<double>& model, Event* event);
-  double SlipRate(const Model<double>& model, const State<double>& state,
+  double SlipRate(const Model<double>& model, const State<double>& state, double time,
                   const std::vector<double>& accelerations, const Event& event) const;
   double FindDip(const Model<double>& model, const Event& event, double a, double fa, double b,
                  double fb);

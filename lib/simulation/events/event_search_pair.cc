@@ -7,6 +7,7 @@
 #include <limits>
 #include <utility>
 
+#include "tangible/dynamics/model/driven_bodies.h"
 #include "tangible/dynamics/model/tolerances.h"
 #include "tangible/math/scalar.h"
 #include "tangible/simulation/events/event_search_inl.h"
@@ -124,6 +125,7 @@ class EventSearch::PairSearch {
   double Gap(const Sample& sample, Counts counts, bool handed_over = false);
   // Bound on how fast the gap closes over an interval.
   double ClosingSpeed(double from, double to, Counts counts);
+  double BeyondEnds(double from, double to) const;
   KnownCourse CourseOver(double from, double fa, double to, double fb, double allowed,
                          Counts counts);
   // Searches for the first time at which gap + allowed closes, and sets the event to it.
@@ -311,7 +313,23 @@ double EventSearch::PairSearch::ClosingSpeed(double from, double to, Counts coun
     closing = std::max(closing, std::abs(along.dot(relative)) + swept);
     turning = std::max(turning, turn);
   }
-  return std::min(any, 1.05 * closing + 1.5 * turning * (to - from) * speed);
+  return std::min(any, 1.05 * closing + 1.5 * turning * (to - from) * speed + BeyondEnds(from, to));
+}
+
+// By how much the speeds of driven bodies may leave the range of those at both ends: their rates
+// are parabolas, which leave the line through two points by an eighth of their slope's change.
+double EventSearch::PairSearch::BeyondEnds(double from, double to) const {
+  const Segment& segment = *search_.segment_;
+  if (model_.structure->paths.empty()) return 0.0;
+  std::vector<double> a, b;
+  GivenAccelerations(model_, segment.time + from, segment.middle, &a);
+  GivenAccelerations(model_, segment.time + to, segment.middle, &b);
+  double change = 0.0;
+  for (const int k : {3 * a_, 3 * b_}) {
+    change += std::hypot(b[k] - a[k], b[k + 1] - a[k + 1]) +
+              std::abs(b[k + 2] - a[k + 2]) * search_.lengths_.radius(k / 3);
+  }
+  return 0.125 * change * (to - from);
 }
 
 // Where the same features are closest at both ends and the bodies turn and move little between them

@@ -262,6 +262,7 @@ Impulses* EventStepper::ListImpact(const Model<double>& model, double t, double 
   part->is_impulses = true;
   Impulses& impact = part->impulses;
   impact.time = t;
+  impact.inside = inside_;
   impact.h = 0.0;
   impact.decompression = false;
   impact.before = state;
@@ -333,6 +334,7 @@ bool EventStepper::SolveByShortStep(const Model<double>& model, double t, double
   part->is_impulses = true;
   Impulses& impulses = part->impulses;
   impulses.time = t;
+  impulses.inside = inside_;
   impulses.h = kPainleveStep * dt;
   impulses.decompression = false;
   impulses.before = *state;
@@ -757,6 +759,7 @@ StepReport EventStepper::Advance(const Model<double>& model, double t, double h,
   };
   bool at_given_time = true;
   bool begins = true;
+  if (!FollowAfter(model, t, state, &outcome)) return fail();
   while (end - now > kTimeRounding * h || !at_given_time) {
     const bool at_end = end - now <= kTimeRounding * h;
     if (!SolveInstant(model, now, h, std::exchange(begins, false), at_end, state, &outcome)) {
@@ -783,7 +786,9 @@ StepReport EventStepper::Advance(const Model<double>& model, double t, double h,
     if (at_given_time) {
       now = segment.length < until - now ? now + segment.length : until;
       outcome.events += EndAtGivenTime(now < goal, next, &segment);
-      if (!(now < goal)) AddFurtherEdges(model, now, next, *state, &outcome);
+      if (now < goal) continue;
+      AddFurtherEdges(model, now, next, *state, &outcome);
+      if (next.any && !FollowAfter(model, now, state, &outcome)) return fail();
       continue;
     }
     now += segment.length;

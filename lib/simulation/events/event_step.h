@@ -131,6 +131,10 @@ class EventStepper {
                    StepReport* outcome);
   bool SolveInstant(const Model<double>& model, double now, double h, bool begins, bool at_end,
                     State<double>* state, StepReport* outcome);
+  /// At a step's start and past an edge: puts driven bodies on the side after it, and takes the
+  /// bodies that joints hold to them along.
+  bool FollowAfter(const Model<double>& model, double now, State<double>* state,
+                   StepReport* outcome);
   Segment& BeginSegment(double now, double until, const State<double>& state);
   /// What has been tried to go on in a step. Where contacts nearly jam accelerations change so fast
   /// with poses that only a short motion can be integrated: it is halved.
@@ -213,6 +217,7 @@ class EventStepper {
   ContactSolver solver_;
   InnerImpulses inner_impulses_;
   EventRecord record_;
+  double inside_ = 0.0;  ///< the time that tells the pieces on which paths are followed
   AssemblyScratch<double> assembly_;
   Touching touching_;
   std::vector<bool> rebounds_;  ///< of the last impact's contacts

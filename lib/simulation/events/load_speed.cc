@@ -7,6 +7,7 @@
 
 #include "tangible/dynamics/elements/force.h"
 #include "tangible/dynamics/elements/joint.h"
+#include "tangible/dynamics/model/driven_bodies.h"
 #include "tangible/simulation/events/tolerances.h"
 
 namespace tangible {
@@ -27,6 +28,7 @@ class LoadScan {
     for (const ForceIndex& force : s_.forces) Force(force);
     for (const SpringIndex& spring : s_.springs) Spring(spring);
     for (const JointIndex& joint : s_.joints) Joint(joint);
+    for (const PathIndex& path : s_.paths) Path(path);
     return fastest_;
   }
 
@@ -46,6 +48,17 @@ class LoadScan {
       largest = std::max(largest, std::abs(column[k]));
     }
     return largest;
+  }
+
+  // A driven body gives the speed that it gains itself.
+  void Path(const PathIndex& path) {
+    for (const double time : {from_, to_}) {
+      const PathSide side = time == from_ ? PathSide::kAfter : PathSide::kBefore;
+      GivenAccelerations(model_, time, BesideInstant(s_, time, side), &given_);
+      const double* a = &given_[3 * path.body];
+      const double turn = std::abs(a[2]) * lengths_.radius(path.body);
+      fastest_ = std::max(fastest_, s_.settings.dt * (std::hypot(a[0], a[1]) + turn));
+    }
   }
 
   // The speed that a force (N) and a torque (N m) give a body.
@@ -123,6 +136,7 @@ class LoadScan {
   const double from_, to_;
   const State<double>& state_;
   double fastest_ = 0.0;
+  std::vector<double> given_;
 };
 
 }  // namespace

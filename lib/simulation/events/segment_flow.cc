@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "tangible/dynamics/model/driven_bodies.h"
 #include "tangible/lcp/system/contact_residual.h"
 #include "tangible/simulation/events/event_edges.h"
 #include "tangible/simulation/events/load_speed.h"
@@ -50,12 +51,14 @@ NystromTableau RungeKutta4() {
 constexpr char kSingularStage[] = "accelerations with the contacts' modes held are singular";
 
 // The state at which a segment's stage i is evaluated, from the first `terms` stages.
-void PlaceStageOf(const ModelStructure& structure, const NystromTableau& tableau,
-                  const Segment& segment, int i, int terms, State<double>* state) {
+void PlaceStageOf(const Model<double>& model, const NystromTableau& tableau, const Segment& segment,
+                  int i, int terms, State<double>* state) {
   PlaceStage(
-      structure, segment.before, segment.length, tableau.c[i], tableau.a[i], tableau.a_hat[i],
-      terms, [&](int j) -> const std::vector<double>& { return segment.stages[j].solution.motion; },
+      *model.structure, segment.before, segment.length, tableau.c[i], tableau.a[i],
+      tableau.a_hat[i], terms,
+      [&](int j) -> const std::vector<double>& { return segment.stages[j].solution.motion; },
       state);
+  FollowPaths(model, segment.time + tableau.c[i] * segment.length, segment.middle, state);
 }
 
 // The sizes, as accelerations, of the terms in each component of
@@ -168,7 +171,7 @@ bool SegmentFlow::SolveImplicitStage(const Model<double>& model, Segment* segmen
   State<double> state;
   const auto evaluate = [&](const std::vector<double>& at, std::vector<double>* next) {
     stage.solution.motion = at;
-    PlaceStageOf(*model.structure, tableau, *segment, i, i + 1, &state);
+    PlaceStageOf(model, tableau, *segment, i, i + 1, &state);
     const bool solved =
         AllFinite(state.pose) && AllFinite(state.twist) &&
         Accelerate(model, *segment, state, segment->time + tableau.c[i] * segment->length, &stage);
@@ -244,7 +247,7 @@ bool SegmentFlow::Integrate(const Model<double>& model, Segment* segment, std::s
       }
       continue;
     }
-    PlaceStageOf(structure, tableau, *segment, i, i, &state);
+    PlaceStageOf(model, tableau, *segment, i, i, &state);
     if (!AllFinite(state.pose) || !AllFinite(state.twist) ||
         !Accelerate(model, *segment, state, segment->time + tableau.c[i] * tau,
                     &segment->stages[i])) {
@@ -256,6 +259,7 @@ bool SegmentFlow::Integrate(const Model<double>& model, Segment* segment, std::s
       structure, segment->before, tau, 1.0, tableau.b, tableau.b_hat, tableau.stages,
       [&](int j) -> const std::vector<double>& { return segment->stages[j].solution.motion; },
       &segment->after);
+  FollowPaths(model, segment->time + tau, segment->middle, &segment->after);
   return true;
 }
 
@@ -416,6 +420,7 @@ bool SegmentFlow::CorrectPoses(const Model<double>& model, Segment* segment, std
 
 void SetUpProjection(const Segment& segment, const State<double>& state, Impulses* projection) {
   projection->time = segment.time + segment.length;
+  projection->inside = segment.middle;
   projection->h = 0.0;
   projection->decompression = false;
   projection->before = state;

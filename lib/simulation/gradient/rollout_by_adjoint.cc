@@ -7,7 +7,7 @@ namespace tangible {
 
 RolloutOutput RolloutWorker::Record(const RolloutInput& input, const TapeOptions& options) {
   RolloutOutput output;
-  if (Set(input, &output)) {
+  if (SetForDerivatives(input, &output)) {
     RunAs(
         [&](const ControlledModel<double>& model, const StateObserver& keep) {
           return tape_.Record(model, initial_, options, keep, &output.final);

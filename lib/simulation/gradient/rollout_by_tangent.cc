@@ -36,7 +36,7 @@ RolloutOutput RolloutWorker::Tangent(const RolloutInput& input,
   const auto columns = static_cast<Eigen::Index>(directions.size());
   tangents->assign(directions.size(),
                    RowMatrixXd::Constant(f_.num_records(), f_.num_states(), kNaN));
-  if (!Set(input, &output)) return output;
+  if (!SetForDerivatives(input, &output)) return output;
   RowMatrixXd parameters(f_.num_parameters(), columns);
   RowMatrixXd states(f_.num_states(), columns);
   for (Eigen::Index d = 0; d < columns; ++d) {

@@ -168,6 +168,8 @@ class RolloutWorker {
   class Beside;
   /// Sets the input; false and a refused output where a value is not allowed.
   bool Set(const RolloutInput& input, RolloutOutput* output);
+  /// The same for derivatives other than differences, which edges at one instant may not have.
+  bool SetForDerivatives(const RolloutInput& input, RolloutOutput* output);
   bool SetParameters(const VectorX<double>& values, RolloutOutput* output);
   void UseOwnScene();
   /// The model of the input, for one run.

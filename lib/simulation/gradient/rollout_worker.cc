@@ -2,6 +2,7 @@
 #include <algorithm>
 
 #include "tangible/scene/set_parameters.h"
+#include "tangible/simulation/events/event_edges.h"
 #include "tangible/simulation/gradient/rollout_function.h"
 
 namespace tangible {
@@ -63,6 +64,16 @@ bool RolloutWorker::Set(const RolloutInput& input, RolloutOutput* output) {
     return false;
   }
   return true;
+}
+
+bool RolloutWorker::SetForDerivatives(const RolloutInput& input, RolloutOutput* output) {
+  if (!Set(input, output)) return false;
+  if (model_.structure->paths.empty()) return true;
+  output->message = CoincidingEdges(model_, RowMatrixXd(ParameterJacobian()));
+  if (output->message.empty()) return true;
+  output->status = RolloutStatus::kRefused;
+  output->final = scene_state_;
+  return false;
 }
 
 void RolloutWorker::RunAs(const Runner& run, RolloutOutput* output) {
@@ -147,7 +158,9 @@ RolloutOutput RolloutWorker::Jacobian(const RolloutInput& input, GradientMethod 
   const long columns = f_.num_parameters() + (inputs == Inputs::kAll ? others : 0);
   *used = MethodOf({.method = method}, Differentiated::kFinalState, columns, rows);
   jacobian->setConstant(rows, columns, kNaN);
-  if (!Set(input, &output)) return output;
+  const bool set = *used == GradientMethod::kFiniteDifference ? Set(input, &output)
+                                                              : SetForDerivatives(input, &output);
+  if (!set) return output;
   switch (*used) {
     case GradientMethod::kAuto:
     case GradientMethod::kTangent:

@@ -61,6 +61,7 @@ double IslandDerivative::Tangent(const Model<double>& model, IslandRecords* reco
   }
   ForEachKinematic(
       s, [&](int pose, int twist) { w_dot->row(pose) += records->h * w_dot->row(twist); });
+  FollowPathsTangent(model, records->end(), records->before_end(s), w_dot);
   return residual;
 }
 
@@ -71,6 +72,7 @@ void IslandDerivative::Adjoint(const Model<double>& model, IslandRecords* record
     return;
   }
   const ModelStructure& s = *model.structure;
+  FollowPathsAdjoint(model, records->end(), records->before_end(s), w_bar);
   ForEachKinematic(
       s, [&](int pose, int twist) { w_bar->row(twist) += records->h * w_bar->row(pose); });
   for (int k = 0; k < records->num_islands; ++k) {

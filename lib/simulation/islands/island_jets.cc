@@ -20,7 +20,7 @@ void IslandStepInJets(const Model<T>& model, const Model<double>& values, JetRou
                     &island.events, &own);
     island.part->ScatterState(own, state);
   }
-  AdvanceKinematic(*model.structure, records->h, state);
+  AdvanceKinematic(model, *records, state);
 }
 
 #define TANGIBLE_INSTANTIATE_JET(N)                                                            \

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tangible/dynamics/model/driven_bodies.h"
 #include "tangible/dynamics/model/model_part.h"
 #include "tangible/math/scalar.h"
 #include "tangible/simulation/events/tolerances.h"
@@ -76,6 +77,7 @@ void IslandPartition::FindReach(const Model<double>& model, const State<double>&
       }
       speed = std::max(speed, SpeedOf(body, after));
     }
+    speed = std::max(speed, LargestGivenSpeed(model, body, t, t + h, lengths_.radius(body)));
     reach_[body] = kRoom * h * speed;
   }
 }
@@ -89,7 +91,8 @@ void IslandPartition::Divide(const Model<double>& model, const State<double>& st
     const double touches =
         lengths_.Touch(state, body, body) + kWiderBoxes * lengths_.smallest_radius();
     boxes_[body] = BoxOf(model, body, state.PoseOf(body), reach_[body] + touches);
-    if (structure.bodies[body].shape == ShapeType::kHalfPlane && state.twist[3 * body + 2] != 0.0) {
+    if (structure.bodies[body].shape == ShapeType::kHalfPlane &&
+        (state.twist[3 * body + 2] != 0.0 || TurnsAlongPath(structure, body))) {
       boxes_[body] = {-kInfinity, -kInfinity, kInfinity, kInfinity};
     }
   }

@@ -6,6 +6,7 @@
 #include <memory>
 #include <vector>
 
+#include "tangible/dynamics/model/driven_bodies.h"
 #include "tangible/dynamics/model/model_part.h"
 #include "tangible/simulation/events/event_record.h"
 
@@ -36,11 +37,17 @@ struct IslandRecord {
 
 /// The islands of a step; kept from step to step for their memory.
 struct IslandRecords {
-  double h = 0.0;  ///< s, the length of the step
+  double time = 0.0;  ///< s, the start of the step
+  double h = 0.0;     ///< s, its length
   std::vector<std::unique_ptr<IslandRecord>> islands;
   int num_islands = 0;
 
   void Clear() { num_islands = 0; }
+  double end() const { return time + h; }
+  /// A time on the last pieces of paths within the step.
+  double before_end(const ModelStructure& structure) const {
+    return BesideInstant(structure, end(), PathSide::kBefore);
+  }
   IslandRecord* Add();
   /// Calls visit(island, part) for the parts of all islands.
   template <typename Visit>
@@ -57,14 +64,18 @@ struct IslandRecords {
   size_t bytes() const;
 };
 
-/// Moves what moves by itself, the kinematic bodies, of which an island has but a copy: q += h v.
+/// Moves what moves by itself, the kinematic bodies, of which an island has but a copy: q += h v,
+/// or along their paths.
 template <typename T>
-void AdvanceKinematic(const ModelStructure& structure, double h, State<T>* state) {
+void AdvanceKinematic(const Model<T>& model, const IslandRecords& records, State<T>* state) {
+  const ModelStructure& structure = *model.structure;
+  const double h = records.h;
   for (int body = 0; body < structure.num_bodies(); ++body) {
     for (int i = 0; i < 3 && structure.bodies[body].motion == Motion::kKinematic; ++i) {
       state->pose[3 * body + i] += h * state->twist[3 * body + i];
     }
   }
+  FollowPaths(model, T(records.end()), records.before_end(structure), state);
 }
 
 }  // namespace tangible

@@ -23,6 +23,7 @@ IslandStepper::IslandStepper(const Model<double>& model)
 
 StepReport IslandStepper::Step(const Model<double>& model, double t, double h,
                                State<double>* state) {
+  record_.time = t;
   record_.h = h;
   if (!partition_.MayDivide()) {
     return StepWhole(model, t, h, AtEvent::kGoOn, state);
@@ -61,7 +62,7 @@ StepReport IslandStepper::StepDivided(const Model<double>& model, double t, doub
         together == Together::kWithout ? AtEvent::kGoOn : AtEvent::kStopAtSecond;
     const Result result = StepIslands(model, t, h, at_event, &next_state_, &outcome);
     if (result == Result::kDone) {
-      AdvanceKinematic(*model.structure, h, &next_state_);
+      AdvanceKinematic(model, record_, &next_state_);
       std::swap(*state, next_state_);
       std::swap(guess_, next_guess_);
       return outcome;

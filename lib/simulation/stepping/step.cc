@@ -5,6 +5,7 @@
 #include <cmath>
 #include <sstream>
 
+#include "tangible/dynamics/model/driven_bodies.h"
 #include "tangible/dynamics/model/lengths.h"
 #include "tangible/dynamics/model/tolerances.h"
 #include "tangible/lcp/system/contact_residual.h"
@@ -454,6 +455,7 @@ StepReport Stepper::Step(const Model<double>& model, double t, double h, State<d
   r.time = t;
   r.h = h;
   chosen_ = false;
+  FollowPathsOverStep(model, t, h, state);
   r.before.pose.assign(state->pose.begin(), state->pose.end());
   r.before.twist.assign(state->twist.begin(), state->twist.end());
   AssembleWithoutContacts(model, *state, t, h, &r.problem, &scratch_);

@@ -4,6 +4,7 @@
 // and the projection onto the joints; or the parts of a step by events.
 #include <algorithm>
 
+#include "tangible/dynamics/model/driven_bodies.h"
 #include "tangible/simulation/stepping/step.h"
 
 namespace tangible {
@@ -22,6 +23,7 @@ void StepTape::DropFactors() {
 double Stepper::Tangent(const Model<double>& model, const std::vector<char>& fixed,
                         RowMatrixXd* w_dot, const SolveObserver& observer) {
   if (events_) return event_derivative_.Tangent(model, &mutable_parts(), w_dot);
+  FollowStepTangent(model, record_.time, record_.h, w_dot);
   ChooseImpulses();
   ContactSystem& solved = system();
   solve_derivative_.Assemble(model, record_, solved, fixed, *w_dot);
@@ -93,6 +95,7 @@ void Stepper::SolveAdjoint(const Model<double>& model, StepTape* tape, ContactSy
   }
   solve_derivative_.GatherRates(s, *system, w_bar);
   solve_derivative_.Apply(model, tape->record, system, w_bar);
+  FollowStepAdjoint(model, tape->record.time, tape->record.h, w_bar);
 }
 
 }  // namespace tangible

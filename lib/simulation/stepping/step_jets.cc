@@ -3,6 +3,7 @@
 // Steps in Jets: implicit (through K of the double step) and unrolled (through every operation).
 #include <cmath>
 
+#include "tangible/dynamics/model/driven_bodies.h"
 #include "tangible/simulation/stepping/step_unrolled_inl.h"
 
 namespace tangible {
@@ -70,6 +71,7 @@ bool StepInJets(const Model<T>& model, const Model<double>& values, JetRoute rou
     IslandStepInJets(model, values, route, &stepper->mutable_parts(), state);
     return true;
   }
+  FollowPathsOverStep(model, stepper->record().time, stepper->record().h, state);
   if (route == JetRoute::kUnrolled) {
     const State<T> before = *state;
     if (StepUnrolled(model, stepper->record(), state)) return true;

@@ -57,7 +57,9 @@ TEST(IslandRecord, KinematicBodiesMoveByThemselves) {
   State<double> state;
   BuildModel(SceneOf(Row({0}, 1.0)), &model, &state);
   const State<double> before = state;
-  AdvanceKinematic(*model.structure, 0.5, &state);
+  IslandRecords records;
+  records.h = 0.5;
+  AdvanceKinematic(model, records, &state);
   EXPECT_EQ(state.pose[3], before.pose[3] - 0.1);
   EXPECT_EQ(state.pose[4], before.pose[4] + 0.005);
   state.pose[3] = before.pose[3];
