@@ -752,7 +752,7 @@ int Main(int argc, char** argv) {
            "                    [--discretisation_check] [--compare_motion] [--checkpoint=C.json]\n"
            "                    [--profile=P1,P2] [--posterior=N] [--posterior_samples=P.csv]\n"
            "                    [--posterior_scenes=FOLDER] [--posterior_bands=B.csv]\n"
-            "                    [--shard=I/N | --merge=R0.json,R1.json,...]",
+           "                    [--shard=I/N | --merge=R0.json,R1.json,...]",
        .description =
            "Identifies parameters of a scene from observed positions by nonlinear least squares.\n"
            "Prints each iteration and, for each parameter, the estimate, its standard deviation\n"

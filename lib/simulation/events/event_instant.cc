@@ -462,6 +462,24 @@ void EventStepper::ShortenAtEllipses(const Model<double>& model,
   }
 }
 
+void EventStepper::SwitchMode(const Segment& segment) {
+  for (size_t i = 0; i < guess_.contacts.size(); ++i) {
+    // A body that stops does so at all its contacts; the speed of a contact tells whether it still
+    // slides.
+    if (segment.event == EventKind::kSlipEnds && SlidingSign(guess_.modes[i]) != 0.0) {
+      guess_.modes[i] = ContactMode::kSticking;
+    }
+    if (segment.event == EventKind::kLiftOff && guess_.contacts[i].SameAs(segment.event_contact)) {
+      guess_.modes[i] = ContactMode::kOpen;
+    } else if (segment.event == EventKind::kSlipBegins && guess_.modes[i] != ContactMode::kOpen &&
+               guess_.contacts[i].IsBetweenTheSame(segment.event_contact)) {
+      // Both ends of a face slide against the force that was at its limit.
+      guess_.modes[i] =
+          segment.event_sign > 0.0 ? ContactMode::kSlidingNegative : ContactMode::kSlidingPositive;
+    }
+  }
+}
+
 bool EventStepper::LocateTouch(const Model<double>& model, double t, double slow, int group,
                                State<double>* state, StepReport* outcome) {
   if (record_.num_parts > 0) {
