@@ -56,6 +56,17 @@ TEST(MassProperties, Polygon) {
   ExpectClose(UniformInertia(box.View(), 7.0), UniformInertia(Box(3, 4).View(), 7.0));
 }
 
+// The sums over edges hold for any simple outline: an L is the sum of the boxes [0, 2] x [0, 1] and
+// [0, 1] x [1, 2], of areas 2 and 1 and second moments about the origin 10/3 and 8/3.
+TEST(MassProperties, ConcaveOutline) {
+  const TestShape outline = Polygon({0, 0, 2, 0, 2, 1, 1, 1, 1, 2, 0, 2});
+  ExpectClose(Area(outline.View()), 3.0);
+  ExpectClose(Centroid(outline.View()).x(), 5.0 / 6.0);
+  ExpectClose(Centroid(outline.View()).y(), 5.0 / 6.0);
+  ExpectClose(UniformInertia(outline.View(), 3.0), 6.0);
+  ExpectClose(BoundingRadius(outline.View()), std::sqrt(5.0));
+}
+
 /// ∫ f over a capsule by the midpoint rule in polar coordinates of its caps and in its rectangle.
 TEST(MassProperties, CapsuleIsTheIntegral) {
   const double length = 1.3;
