@@ -507,7 +507,10 @@ bool GainsEnergy(const Model<double>& model, const Segment& segment) {
     const BodyIndex& index = s.bodies[body];
     const double* v = &segment.before.twist[3 * body];
     const double* w = &segment.after.twist[3 * body];
-    if (index.block < 0 && (v[0] != 0.0 || v[1] != 0.0 || v[2] != 0.0)) return false;
+    const auto moves = [](const double* of) {
+      return of[0] != 0.0 || of[1] != 0.0 || of[2] != 0.0;
+    };
+    if (index.block < 0 && (moves(v) || moves(w))) return false;
     for (int i = 0; i < 3 && index.block >= 0; ++i) {
       const double mass = model.parameters[i < 2 ? index.mass : index.inertia];
       before += 0.5 * mass * v[i] * v[i];
