@@ -126,7 +126,7 @@ TEST(PilesByEventsTest, DiscsThatJustFitBetweenWallsComeToRest) {
        {-0.37814275826126265, 0.55}}};
   for (const auto& positions : starts) {
     const size_t n = positions.size();
-    Scene scene = Empty(IntegratorOf({.stepping = Stepping::kEvent}), 4.0);
+    Scene scene = Empty(Integrator::kRungeKutta4, 4.0);
     scene.bodies.push_back(Wall("left", 1.0, 0.0, -0.1 * static_cast<double>(n)));
     scene.bodies.push_back(Wall("right", -1.0, 0.0, -0.1 * static_cast<double>(n)));
     for (const auto& [x, y] : positions) {
