@@ -230,6 +230,7 @@ void AddObservations(const FitProblem& problem, BitHash* to) {
   for (const Camera& camera : problem.instruments.cameras) {
     hash.Add(camera.marker_body);
     hash.Add(camera.marker_point);
+    hash.Add(camera.radial_length);
   }
   for (const Channel& channel : problem.channels) {
     for (const int number :

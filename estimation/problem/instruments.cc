@@ -17,6 +17,9 @@ std::vector<InstrumentNumber> EnumerateNumbers(Instruments* instruments) {
     numbers.push_back({path + "/rotation", &camera.rotation, NumberKind::kFree});
     numbers.push_back({path + "/origin/x", &camera.origin.x(), NumberKind::kFree});
     numbers.push_back({path + "/origin/y", &camera.origin.y(), NumberKind::kFree});
+    numbers.push_back({path + "/aspect", &camera.aspect, NumberKind::kPositive});
+    numbers.push_back({path + "/radial", &camera.radial, NumberKind::kFree, false,
+                       camera.radial_length > 0.0 ? nullptr : "radial_length"});
   }
   for (Clock& clock : instruments->clocks) {
     const std::string path = "clocks/" + clock.name;

@@ -6,14 +6,17 @@
 //   t = offset + rate τ − delay       time in the run of the value recorded at τ (clock, sensor)
 //   d = r − origin − r_marker         or the position relative to another point
 //   u = scale R(−rotation) d          in the camera's frame
-//   recorded = gain u + bias          by the sensor
+//   w = (aspect u_x, u_y)             by pixels that are not square
+//   image = w (1 + radial |w|² / (scale radial_length)²)   by the lens
+//   recorded = gain image + bias      by the sensor
 //
 // rate is the number of seconds of the run in a second of the clock. A sensor with a delay shows at
 // τ the value at τ − delay. Angles are recorded relative to the camera's rotation, velocities are
-// turned and scaled like positions, and angular velocities are unchanged. Coordinates relative to
-// another body or point need no origin. Every number may be a parameter of a fit:
-// sensors/NAME/delay, gain, bias; cameras/NAME/scale, rotation, origin/x, origin/y;
-// clocks/NAME/rate, offset.
+// those of the image, and angles and angular velocities know of no aspect or lens. Coordinates
+// relative to another body or point are differences of two images, which need no origin unless
+// there is a lens. Every number but radial_length, the distance at which the lens adds the part
+// `radial`, may be a parameter of a fit: sensors/NAME/delay, gain, bias; cameras/NAME/scale,
+// rotation, origin/x, origin/y, aspect, radial; clocks/NAME/rate, offset.
 
 #include <string>
 #include <vector>
@@ -39,7 +42,13 @@ struct Camera {
   Vector2<double> origin{0.0, 0.0};  ///< m: position of the image's (0, 0), from the marker if any
   int marker_body = -1;              ///< −1: none
   int marker_point = -1;             ///< −1: the body's centre of mass
+  double aspect = 1.0;               ///< units along x per unit along y, > 0
+  double radial = 0.0;               ///< what the lens adds at radial_length, as a part
+  double radial_length = 0.0;        ///< m; 0: no lens, and radial is no parameter
 };
+
+/// Scale, rotation, origin/x, origin/y, aspect, radial.
+inline constexpr int kCameraNumbers = 6;
 
 struct Clock {
   std::string name;
@@ -54,7 +63,9 @@ struct Instruments {
 
   /// Index in EnumerateNumbers of the first number of a sensor, camera or clock.
   int SensorNumber(int sensor) const { return 3 * sensor; }
-  int CameraNumber(int camera) const { return 3 * static_cast<int>(sensors.size()) + 4 * camera; }
+  int CameraNumber(int camera) const {
+    return 3 * static_cast<int>(sensors.size()) + kCameraNumbers * camera;
+  }
   int ClockNumber(int clock) const {
     return CameraNumber(static_cast<int>(cameras.size())) + 2 * clock;
   }
@@ -77,11 +88,12 @@ struct InstrumentNumber {
   std::string path;  ///< "sensors/encoder/delay"
   double* value;     ///< points into the instruments
   NumberKind kind;
-  bool moves_time = false;  ///< it changes the observed time of the run
+  bool moves_time = false;      ///< it changes the observed time of the run
+  const char* needs = nullptr;  ///< a key without which it is no parameter, and which is not there
 };
 
-/// Delay, gain, bias of each sensor; scale, rotation, origin/x, origin/y of each camera; rate,
-/// offset of each clock.
+/// Delay, gain, bias of each sensor; scale, rotation, origin/x, origin/y, aspect, radial of each
+/// camera; rate, offset of each clock.
 std::vector<InstrumentNumber> EnumerateNumbers(Instruments* instruments);
 
 /// t, in s of the run, of the value recorded at τ.

@@ -12,7 +12,7 @@ namespace {
 constexpr int kOfPlace = 8;
 constexpr int kSensorAt = kPlaces * kOfPlace;
 constexpr int kCameraAt = kSensorAt + 2;
-using Local = Jet<kCameraAt + 4>;
+using Local = Jet<kCameraAt + kCameraNumbers>;
 
 /// Position, angle and their rates of a point.
 struct Motion6 {
@@ -65,11 +65,26 @@ Motion6 Seen(const Motion6& motion, const Camera& camera, const Motion6& marker,
     from.vy -= marker.vy;
   }
   Motion6 seen = from;
-  seen.x = scale * (c * from.x + s * from.y);
+  const Local scale_x = scale * Local(camera.aspect, kCameraAt + 4);
+  seen.x = scale_x * (c * from.x + s * from.y);
   seen.y = scale * (c * from.y - s * from.x);
-  seen.vx = scale * (c * from.vx + s * from.vy);
+  seen.vx = scale_x * (c * from.vx + s * from.vy);
   seen.vy = scale * (c * from.vy - s * from.vx);
   return seen;
+}
+
+/// What the lens makes of positions and velocities in the image.
+Motion6 ThroughLens(const Motion6& seen, const Camera& camera) {
+  const Local length = Local(camera.scale, kCameraAt) * camera.radial_length;
+  const Local part = Local(camera.radial, kCameraAt + 5) / (length * length);
+  const Local stretch = 1.0 + part * (seen.x * seen.x + seen.y * seen.y);
+  const Local rate = 2.0 * part * (seen.x * seen.vx + seen.y * seen.vy);
+  Motion6 image = seen;
+  image.x = seen.x * stretch;
+  image.y = seen.y * stretch;
+  image.vx = seen.vx * stretch + seen.x * rate;
+  image.vy = seen.vy * stretch + seen.y * rate;
+  return image;
 }
 
 Local Distance(const Motion6& relative) {
@@ -157,10 +172,21 @@ Prediction PredictPlain(Coordinate coordinate, const Place& place) {
 Prediction PredictRecorded(Coordinate coordinate, const ObservedPlaces& places,
                            const Sensor* sensor, const Camera* camera) {
   const bool is_relative = places[1].state != nullptr;
-  Motion6 motion = Less(MotionOf(places[0], 0), MotionOf(places[1], 1));
-  if (camera != nullptr) {
-    motion = Seen(motion, *camera, MotionOf(places[2], 2),
-                  is_relative || coordinate == Coordinate::kDistance);
+  Motion6 motion = MotionOf(places[0], 0);
+  if (camera != nullptr && camera->radial_length > 0.0) {
+    // How far a lens moves a point depends on where it is, so that each has its own image.
+    const Motion6 marker = MotionOf(places[2], 2);
+    motion = ThroughLens(Seen(motion, *camera, marker, false), *camera);
+    if (is_relative) {
+      const Motion6 other = Seen(MotionOf(places[1], 1), *camera, marker, false);
+      motion = Less(motion, ThroughLens(other, *camera));
+    }
+  } else {
+    motion = Less(motion, MotionOf(places[1], 1));
+    if (camera != nullptr) {
+      motion = Seen(motion, *camera, MotionOf(places[2], 2),
+                    is_relative || coordinate == Coordinate::kDistance);
+    }
   }
   Local value = Pick(coordinate, motion);
   if (sensor != nullptr) {
@@ -179,7 +205,7 @@ Prediction PredictRecorded(Coordinate coordinate, const ObservedPlaces& places,
   for (int i = 0; i < 2; ++i) {
     prediction.by_sensor[i] = value.v[kSensorAt + i];
   }
-  for (int i = 0; i < 4; ++i) {
+  for (int i = 0; i < kCameraNumbers; ++i) {
     prediction.by_camera[i] = value.v[kCameraAt + i];
   }
   return prediction;

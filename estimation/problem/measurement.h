@@ -27,10 +27,10 @@ using ObservedPlaces = std::array<Place, kPlaces>;
 /// A predicted coordinate with its derivatives.
 struct Prediction {
   double value = 0.0;
-  double by_state[kPlaces][6] = {};  ///< of each place
-  double by_at[kPlaces][2] = {};     ///< the place of the point in the body
-  double by_sensor[2] = {};          ///< gain, bias
-  double by_camera[4] = {};          ///< scale, rotation, origin x, y
+  double by_state[kPlaces][6] = {};       ///< of each place
+  double by_at[kPlaces][2] = {};          ///< the place of the point in the body
+  double by_sensor[2] = {};               ///< gain, bias
+  double by_camera[kCameraNumbers] = {};  ///< scale, rotation, origin x, y, aspect, radial
 };
 
 /// The coordinate of a body or point without instruments.

@@ -243,6 +243,11 @@ bool ParameterizedScene::AddMeasurementSet(const ParameterSet& set, double* valu
     if (!MatchesPath(set.path, numbers[i].path)) {
       continue;
     }
+    if (numbers[i].needs != nullptr) {
+      error->what = "parameter " + set.path + ": " + numbers[i].path + " needs a " +
+                    numbers[i].needs + " beside it, expected one > 0, got none";
+      return false;
+    }
     if (!matched) {
       *value = *numbers[i].value;
       // The typical size of a time is a step.

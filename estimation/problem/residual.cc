@@ -451,7 +451,7 @@ Eigen::RowVectorXd RolloutResiduals::DirectTerm(int i, const Prediction& predict
     term += -by_time * by_number.row(first) + prediction.by_sensor[0] * by_number.row(first + 1) +
             prediction.by_sensor[1] * by_number.row(first + 2);
   }
-  for (int j = 0; j < 4 && channel.camera >= 0; ++j) {
+  for (int j = 0; j < kCameraNumbers && channel.camera >= 0; ++j) {
     term += prediction.by_camera[j] * by_number.row(instruments.CameraNumber(channel.camera) + j);
   }
   if (channel.clock >= 0) {

@@ -74,6 +74,15 @@ OrderedJson ObservationsSchema() {
 
 // What a recording may have for itself as well as the file for all.
 OrderedJson SharedKeys() {
+  OrderedJson camera = SchemaOfObject({{"scale", Positive()},
+                                       {"rotation", Free("rad")},
+                                       {"origin", SchemaOfPoint("m")},
+                                       {"marker", SchemaOfName()},
+                                       {"aspect", Positive()},
+                                       {"radial", Free()},
+                                       {"radial_length", Positive("m")}},
+                                      {});
+  camera["dependentRequired"] = {{"radial", OrderedJson::array({"radial_length"})}};
   return {
       {"scene", SchemaOfText()},
       {"observations", ObservationsSchema()},
@@ -85,11 +94,7 @@ OrderedJson SharedKeys() {
                                                {"sigma", Positive()},
                                                {"estimate_sigma", SchemaOfFlag()}},
                                               {}))},
-      {"cameras", SchemaByName(SchemaOfObject({{"scale", Positive()},
-                                               {"rotation", Free("rad")},
-                                               {"origin", SchemaOfPoint("m")},
-                                               {"marker", SchemaOfName()}},
-                                              {}))},
+      {"cameras", SchemaByName(camera)},
       {"clocks", SchemaByName(SchemaOfObject({{"rate", Positive()}, {"offset", Free("s")}}, {}))}};
 }
 

@@ -104,7 +104,8 @@ Sensor ReadSensor(const std::string& name, const JsonReader& json) {
 }
 
 Camera ReadCamera(const std::string& name, const JsonReader& json, const ObservedScene& scene) {
-  json.ExpectKeys({"scale", "rotation", "origin", "marker"}, " of a camera");
+  json.ExpectKeys({"scale", "rotation", "origin", "marker", "aspect", "radial", "radial_length"},
+                  " of a camera");
   Camera camera;
   camera.name = name;
   ReadNumber(json, "scale", NumberKind::kPositive, &camera.scale);
@@ -116,6 +117,11 @@ Camera ReadCamera(const std::string& name, const JsonReader& json, const Observe
     const BodyOrPoint marker = ReadTarget(json.At("marker"), scene);
     camera.marker_body = marker.body;
     camera.marker_point = marker.point;
+  }
+  ReadNumber(json, "aspect", NumberKind::kPositive, &camera.aspect);
+  ReadNumber(json, "radial", NumberKind::kFree, &camera.radial);
+  if (json.Has("radial") || json.Has("radial_length")) {
+    camera.radial_length = json.At("radial_length").Number(NumberKind::kPositive);
   }
   return camera;
 }

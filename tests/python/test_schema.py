@@ -55,7 +55,7 @@ FIT: dict[str, Any] = {
             "scene": "scene.json",
             "points": {"tip": {"body": "b0"}},
             "sensors": {"s": {"sigma": 0.1}},
-            "cameras": {"c": {"scale": 1}},
+            "cameras": {"c": {"scale": 1, "aspect": 1.02, "radial": 0.02, "radial_length": 0.5}},
             "clocks": {"k": {"rate": 1}},
             "observations": [{"file": "seen.csv", "sigma": {"x": 0.1, "y": 0.1}}],
         }

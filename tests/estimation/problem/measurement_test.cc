@@ -51,8 +51,12 @@ void ExpectDerivative(double* number, double derivative, const char* what,
       << what;
 }
 
-void ExpectDerivatives(Coordinate coordinate, int count, bool with_instruments) {
+void ExpectDerivatives(Coordinate coordinate, int count, bool with_instruments,
+                       double radial_length = 0.0) {
   Arrangement a;
+  a.camera.aspect = 1.02;
+  a.camera.radial_length = radial_length;
+  a.camera.radial = radial_length > 0.0 ? -0.03 : 0.0;
   const auto predict = [&] {
     return PredictRecorded(coordinate, a.Places(count), with_instruments ? &a.sensor : nullptr,
                            with_instruments ? &a.camera : nullptr);
@@ -72,9 +76,10 @@ void ExpectDerivatives(Coordinate coordinate, int count, bool with_instruments) 
   for (int i = 0; i < 2; ++i) {
     ExpectDerivative(of_sensor[i], prediction.by_sensor[i], "sensor", value);
   }
-  double* const of_camera[4] = {&a.camera.scale, &a.camera.rotation, &a.camera.origin.x(),
-                                &a.camera.origin.y()};
-  for (int i = 0; i < 4; ++i) {
+  double* const of_camera[kCameraNumbers] = {&a.camera.scale,      &a.camera.rotation,
+                                             &a.camera.origin.x(), &a.camera.origin.y(),
+                                             &a.camera.aspect,     &a.camera.radial};
+  for (int i = 0; i < kCameraNumbers; ++i) {
     ExpectDerivative(of_camera[i], prediction.by_camera[i], "camera", value);
   }
 }
@@ -116,6 +121,11 @@ TEST(MeasurementTest, DerivativesAreThoseOfDifferences) {
     ExpectDerivatives(coordinate, 1, true);
     ExpectDerivatives(coordinate, 2, true);
     ExpectDerivatives(coordinate, 4, true);  // a marker that moves
+    for (const int count : {1, 2, 3, 4}) {
+      if (count > 1 || coordinate != Coordinate::kDistance) {
+        ExpectDerivatives(coordinate, count, true, 1.5);
+      }
+    }
   }
 }
 
@@ -138,6 +148,44 @@ TEST(MeasurementTest, ACameraTurnsShiftsAndScales) {
   EXPECT_NEAR(value(Coordinate::kVx, 4, nullptr), 100.0 * (0.3 + 0.7), 1e-12);
   // gain 1.25, bias −0.5
   EXPECT_NEAR(value(Coordinate::kX, 1, &a.sensor), 125.0 - 0.5, 1e-12);
+}
+
+/// The formula by hand: before the lens the image is at (136.5, -40) and moves by (13.65, 5).
+TEST(MeasurementTest, ACameraHasAnAspectAndALens) {
+  Arrangement a;
+  a.at[0] = {0.0, 0.0};
+  a.at[1] = {0.0, 0.0};
+  double states[2][6] = {{1.8, 0.1, 0.7, 0.13, 0.05, 2.5}, {0.5, 1.0, 0.2, 0.0, 0.0, 0.0}};
+  const auto value = [&](Coordinate coordinate, bool relative) {
+    ObservedPlaces places;
+    places[0] = {states[0], 0, a.at[0]};
+    if (relative) places[1] = {states[1], 0, a.at[1]};
+    return PredictRecorded(coordinate, places, nullptr, &a.camera).value;
+  };
+  a.camera = {"c", 100.0, 0.0, {0.5, 0.5}};
+  a.camera.aspect = 1.05;
+  EXPECT_NEAR(value(Coordinate::kX, false), 136.5, 1e-12);
+  EXPECT_NEAR(value(Coordinate::kY, false), -40.0, 1e-12);
+  EXPECT_NEAR(value(Coordinate::kVx, false), 13.65, 1e-12);
+  EXPECT_NEAR(value(Coordinate::kX, true), 136.5, 1e-12);
+  // A lens that adds nothing.
+  a.camera.radial_length = 2.0;
+  EXPECT_NEAR(value(Coordinate::kX, true), 136.5, 1e-12);
+  EXPECT_NEAR(value(Coordinate::kDistance, true), std::hypot(136.5, -90.0), 1e-12);
+  a.camera.radial = 0.1;
+  const double stretch = 1.0 + 0.1 * (136.5 * 136.5 + 40.0 * 40.0) / (200.0 * 200.0);
+  EXPECT_NEAR(value(Coordinate::kX, false), 136.5 * stretch, 1e-12);
+  EXPECT_NEAR(value(Coordinate::kY, false), -40.0 * stretch, 1e-12);
+  const double rate = 0.1 * 2.0 * (136.5 * 13.65 - 40.0 * 5.0) / (200.0 * 200.0);
+  EXPECT_NEAR(value(Coordinate::kVx, false), 13.65 * stretch + 136.5 * rate, 1e-12);
+  EXPECT_NEAR(value(Coordinate::kVy, false), 5.0 * stretch - 40.0 * rate, 1e-12);
+  // The other point's own image is (0, 50) (1 + 0.1 / 16).
+  EXPECT_NEAR(value(Coordinate::kX, true), 136.5 * stretch, 1e-12);
+  EXPECT_NEAR(value(Coordinate::kY, true), -40.0 * stretch - 50.0 * (1.0 + 0.1 / 16.0), 1e-12);
+  // Neither changes an angle.
+  EXPECT_NEAR(value(Coordinate::kAngle, false), 0.7, 1e-15);
+  EXPECT_NEAR(value(Coordinate::kAngle, true), 0.5, 1e-15);
+  EXPECT_NEAR(value(Coordinate::kOmega, false), 2.5, 1e-15);
 }
 
 TEST(MeasurementTest, DistancesHaveADerivativeAt0) {

@@ -174,7 +174,7 @@ RolloutResiduals RecordedChain(Stepping stepping) {
   const std::vector<BodyPoint> points = {{"tip", 2, {0.15, -0.02}}, {"eye", 0, {0.02, 0.03}}};
   Instruments instruments;
   instruments.sensors = {{"late", 0.0033, 1.1, -0.2}};
-  instruments.cameras = {{"camera", 300.0, 0.2, {0.1, 1.0}, 0, 1}};
+  instruments.cameras = {{"camera", 300.0, 0.2, {0.1, 1.0}, 0, 1, 1.02, 0.03, 0.5}};
   instruments.clocks = {{"clock", 0.95, 0.02}};
   std::vector<Channel> channels(6);
   channels[1].sensor = 0;

@@ -324,7 +324,8 @@ TEST_F(FitJsonTest, InstrumentsAreRead) {
                        {"file": "seen.csv", "sigma": {"x": 0.1, "y": 0.2}, "unwrap": true}],
       "points": {"rim": {"body": "ball", "at": [0.1, 0]}},
       "sensors": {"encoder": {"delay": 0.125, "gain": 2, "bias": 0.5, "sigma": 0.25}},
-      "cameras": {"left": {"scale": 700, "rotation": 0.1, "origin": [1, 2], "marker": "rim"}},
+      "cameras": {"left": {"scale": 700, "rotation": 0.1, "origin": [1, 2], "marker": "rim",
+                           "aspect": 1.5, "radial": -0.25, "radial_length": 0.5}},
       "clocks": {"c": {"rate": 0.5, "offset": 0.25}},
       "parameters": ["gravity/y", "sensors/encoder/delay", "cameras/left/scale",
                      {"path": "clocks/*/rate", "lower": 0.25, "upper": 0.75}]})",
@@ -336,6 +337,9 @@ TEST_F(FitJsonTest, InstrumentsAreRead) {
   EXPECT_EQ(problem.instruments.sensors[0].bias, 0.5);
   EXPECT_EQ(problem.instruments.cameras[0].origin.y(), 2.0);
   EXPECT_EQ(problem.instruments.cameras[0].marker_point, 0);
+  EXPECT_EQ(problem.instruments.cameras[0].aspect, 1.5);
+  EXPECT_EQ(problem.instruments.cameras[0].radial, -0.25);
+  EXPECT_EQ(problem.instruments.cameras[0].radial_length, 0.5);
   EXPECT_EQ(problem.instruments.clocks[0].offset, 0.25);
   ASSERT_EQ(problem.channels.size(), 2u);
   EXPECT_EQ(problem.channels[0].sensor, 0);
@@ -371,6 +375,15 @@ TEST_F(FitJsonTest, BadInstrumentsAreOneLine) {
   const std::string none = R"("starts": 1)";
   EXPECT_EQ(message(R"("cameras": {"c": {"scale": 0}})"),
             "/cameras/c/scale: expected a number > 0, got 0");
+  EXPECT_EQ(message(R"("cameras": {"c": {"aspect": 0}})"),
+            "/cameras/c/aspect: expected a number > 0, got 0");
+  EXPECT_EQ(message(R"("cameras": {"c": {"radial": 0.02}})"),
+            "/cameras/c/radial_length: missing, expected a number > 0");
+  EXPECT_EQ(message(R"("cameras": {"c": {"radial_length": -1}})"),
+            "/cameras/c/radial_length: expected a number > 0, got -1");
+  EXPECT_EQ(message(R"("cameras": {"c": {"scale": 2}})", "", "cameras/c/radial"),
+            "/parameters/0/sets/0/path: parameter cameras/c/radial: cameras/c/radial needs a "
+            "radial_length beside it, expected one > 0, got none");
   EXPECT_EQ(message(R"("clocks": {"c": {"rate": -1}})"),
             "/clocks/c/rate: expected a number > 0, got -1");
   EXPECT_EQ(message(R"("sensors": {"s": {"sigma": 0}})"),
