@@ -49,9 +49,16 @@ Motion6 Less(const Motion6& a, const Motion6& b) {
   return {a.x - b.x, a.y - b.y, a.angle - b.angle, a.vx - b.vx, a.vy - b.vy, a.omega - b.omega};
 }
 
+/// What of a motion in the image is read; the rest need not be turned, which is most of the time.
+struct Needed {
+  bool positions = true;
+  bool velocities = true;
+};
+
 /// The motion in the camera's frame. For a relative motion the camera's origin is not subtracted,
 /// nor its rotation from the angle.
-Motion6 Seen(const Motion6& motion, const Camera& camera, const Motion6& marker, bool is_relative) {
+Motion6 Seen(const Motion6& motion, const Camera& camera, const Motion6& marker, bool is_relative,
+             Needed needed) {
   const Local scale(camera.scale, kCameraAt);
   const Local rotation(camera.rotation, kCameraAt + 1);
   const Local c = cos(rotation);
@@ -66,10 +73,14 @@ Motion6 Seen(const Motion6& motion, const Camera& camera, const Motion6& marker,
   }
   Motion6 seen = from;
   const Local scale_x = scale * Local(camera.aspect, kCameraAt + 4);
-  seen.x = scale_x * (c * from.x + s * from.y);
-  seen.y = scale * (c * from.y - s * from.x);
-  seen.vx = scale_x * (c * from.vx + s * from.vy);
-  seen.vy = scale * (c * from.vy - s * from.vx);
+  if (needed.positions) {
+    seen.x = scale_x * (c * from.x + s * from.y);
+    seen.y = scale * (c * from.y - s * from.x);
+  }
+  if (needed.velocities) {
+    seen.vx = scale_x * (c * from.vx + s * from.vy);
+    seen.vy = scale * (c * from.vy - s * from.vx);
+  }
   return seen;
 }
 
@@ -172,20 +183,26 @@ Prediction PredictPlain(Coordinate coordinate, const Place& place) {
 Prediction PredictRecorded(Coordinate coordinate, const ObservedPlaces& places,
                            const Sensor* sensor, const Camera* camera) {
   const bool is_relative = places[1].state != nullptr;
+  const bool has_lens = camera != nullptr && camera->radial_length > 0.0;
+  const bool is_velocity = coordinate == Coordinate::kVx || coordinate == Coordinate::kVy;
+  // The velocity behind a lens depends on the position.
+  const Needed needed{has_lens || !is_velocity, is_velocity};
   Motion6 motion = MotionOf(places[0], 0);
-  if (camera != nullptr && camera->radial_length > 0.0) {
+  if (has_lens) {
     // How far a lens moves a point depends on where it is, so that each has its own image.
     const Motion6 marker = MotionOf(places[2], 2);
-    motion = ThroughLens(Seen(motion, *camera, marker, false), *camera);
+    motion = ThroughLens(Seen(motion, *camera, marker, false, needed), *camera);
     if (is_relative) {
-      const Motion6 other = Seen(MotionOf(places[1], 1), *camera, marker, false);
+      const Motion6 other = Seen(MotionOf(places[1], 1), *camera, marker, false, needed);
       motion = Less(motion, ThroughLens(other, *camera));
     }
   } else {
-    motion = Less(motion, MotionOf(places[1], 1));
+    if (is_relative) {
+      motion = Less(motion, MotionOf(places[1], 1));
+    }
     if (camera != nullptr) {
       motion = Seen(motion, *camera, MotionOf(places[2], 2),
-                    is_relative || coordinate == Coordinate::kDistance);
+                    is_relative || coordinate == Coordinate::kDistance, needed);
     }
   }
   Local value = Pick(coordinate, motion);
