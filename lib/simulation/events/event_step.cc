@@ -699,7 +699,8 @@ EventStepper::Tried EventStepper::TryMotion(const Model<double>& model, double n
   if (!outcome->message.empty()) return Tried::kFailed;
   std::string message;
   bool moved = search_.Run(model, touching_.contacts, segment, &message);
-  if (moved && GainsEnergy(model, *segment)) {
+  // Where motions have to be shortened.
+  if (moved && tries->halvings > 0 && GainsEnergy(model, *segment, HeldSpeed(model))) {
     moved = false;
     message = "a motion gains energy that no load gives it: dt is too large";
   }

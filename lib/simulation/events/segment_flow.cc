@@ -494,7 +494,7 @@ bool SegmentFlow::Project(const Model<double>& model, Impulses* impulses) {
   return solved;
 }
 
-bool GainsEnergy(const Model<double>& model, const Segment& segment) {
+bool GainsEnergy(const Model<double>& model, const Segment& segment, double slow) {
   // Of what the loads give at the larger of the powers at both ends.
   constexpr double kSlack = 4.0;
   const ModelStructure& s = *model.structure;
@@ -502,7 +502,7 @@ bool GainsEnergy(const Model<double>& model, const Segment& segment) {
   for (const JointIndex& joint : s.joints) {
     if (joint.motor >= 0 && model.parameters[joint.motor] != 0.0) return false;
   }
-  double before = 0.0, after = 0.0, power = 0.0;
+  double before = 0.0, after = 0.0, power = 0.0, mass_of_all = 0.0;
   for (int body = 0; body < s.num_bodies(); ++body) {
     const BodyIndex& index = s.bodies[body];
     const double* v = &segment.before.twist[3 * body];
@@ -513,6 +513,7 @@ bool GainsEnergy(const Model<double>& model, const Segment& segment) {
     if (index.block < 0 && (moves(v) || moves(w))) return false;
     for (int i = 0; i < 3 && index.block >= 0; ++i) {
       const double mass = model.parameters[i < 2 ? index.mass : index.inertia];
+      mass_of_all += i == 0 ? mass : 0.0;
       before += 0.5 * mass * v[i] * v[i];
       after += 0.5 * mass * w[i] * w[i];
       for (int stage = 0; stage < segment.num_stages; ++stage) {
@@ -521,7 +522,8 @@ bool GainsEnergy(const Model<double>& model, const Segment& segment) {
       }
     }
   }
-  return after > 2.0 * before + kSlack * segment.length * power;
+  return after > 0.5 * mass_of_all * slow * slow &&
+         after > 2.0 * before + kSlack * segment.length * power;
 }
 
 bool SegmentFlow::RunUncorrected(const Model<double>& model, Segment* segment,
