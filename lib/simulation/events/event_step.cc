@@ -700,7 +700,7 @@ EventStepper::Tried EventStepper::TryMotion(const Model<double>& model, double n
   std::string message;
   bool moved = search_.Run(model, touching_.contacts, segment, &message);
   // Where motions have to be shortened.
-  if (moved && tries->halvings > 0 && GainsEnergy(model, *segment, HeldSpeed(model))) {
+  if (moved && tries->halvings > 0 && GainsEnergy(model, *segment)) {
     moved = false;
     message = "a motion gains energy that no load gives it: dt is too large";
   }

@@ -494,11 +494,14 @@ bool SegmentFlow::Project(const Model<double>& model, Impulses* impulses) {
   return solved;
 }
 
-bool GainsEnergy(const Model<double>& model, const Segment& segment, double slow) {
+bool GainsEnergy(const Model<double>& model, const Segment& segment) {
   // Of what the loads give at the larger of the powers at both ends.
   constexpr double kSlack = 4.0;
   const ModelStructure& s = *model.structure;
   if (segment.contacts.empty()) return false;
+  // What is slower than gravity makes it in a step may be rounding.
+  const double slow =
+      std::hypot(model.parameters[kGravityX], model.parameters[kGravityY]) * s.settings.dt;
   for (const JointIndex& joint : s.joints) {
     if (joint.motor >= 0 && model.parameters[joint.motor] != 0.0) return false;
   }

@@ -141,9 +141,8 @@ class SegmentFlow {
 
 /// Whether a motion has gained more energy than its loads can have given, as rows that depend on
 /// each other to rounding may do: contacts that stay closed, joints and friction do no work. False
-/// where motors or bodies of given motion drive the scene, and where all bodies are slower than
-/// `slow`, m/s.
-bool GainsEnergy(const Model<double>& model, const Segment& segment, double slow);
+/// where motors or bodies of given motion drive the scene.
+bool GainsEnergy(const Model<double>& model, const Segment& segment);
 
 /// Sets up a segment's twist projection at a state: contacts act without rebound, sliding ones
 /// without friction (with friction at the start of a run, where a contact that approaches lands).
