@@ -384,11 +384,10 @@ std::string ReadPosterior(std::optional<PosteriorOptions>* options) {
   if (draws.size() != 1) {
     return "--posterior: expected a whole number from 1 to 1000000, got '" + FLAGS_posterior + "'";
   }
-  const std::string error =
-      FirstOutside({{"--posterior_chains", FLAGS_posterior_chains, 1, 64},
-                    {"--posterior_warm_up", FLAGS_posterior_warm_up, 0, 1e6},
-                    {"--posterior_seed", FLAGS_posterior_seed, 0},
-                    {"--posterior_target", FLAGS_posterior_target, 0.01, 0.999}});
+  std::string error = FirstOutside({{"--posterior_chains", FLAGS_posterior_chains, 1, 64},
+                                    {"--posterior_warm_up", FLAGS_posterior_warm_up, 0, 1e6},
+                                    {"--posterior_seed", FLAGS_posterior_seed, 0},
+                                    {"--posterior_target", FLAGS_posterior_target, 0.01, 0.999}});
   if (!error.empty()) return error;
   *options = {draws[0], FLAGS_posterior_chains, FLAGS_posterior_warm_up, FLAGS_posterior_target,
               static_cast<unsigned>(FLAGS_posterior_seed)};
@@ -525,7 +524,7 @@ std::string WriteFiles(const Prepared& prepared, const FitResult& result,
       return PosteriorBandsCsv(prepared.fit.input, posterior, findings.later,
                                prepared.problem.get());
     });
-    const std::string error =
+    std::string error =
         FLAGS_posterior_scenes.empty()
             ? ""
             : WritePosteriorScenes(FLAGS_posterior_scenes, prepared.fit.input, problem, posterior,

@@ -205,7 +205,7 @@ Eigen::VectorXd StartOf(const Eigen::VectorXd& middle, double highest,
   const Eigen::VectorXd offset = factor * (kDispersion * random->Normals(middle.size()));
   double part = 1.0;
   for (int i = 0; i < kHalvings; ++i, part *= 0.5) {
-    const Eigen::VectorXd start = middle + part * offset;
+    Eigen::VectorXd start = middle + part * offset;
     double value = 0.0;
     Eigen::VectorXd gradient;
     if ((*density)(start, &value, &gradient) && value > highest - most) return start;
@@ -393,6 +393,7 @@ double FreeCoordinate::From(double p) const {
 std::vector<FreeCoordinate> FreeCoordinates(const std::vector<ParameterEntry>& entries,
                                             const std::vector<RandomEffect>& effects) {
   std::vector<FreeCoordinate> coordinates;
+  coordinates.reserve(entries.size() + effects.size());
   for (const ParameterEntry& entry : entries) {
     coordinates.push_back(
         {entry.lower, entry.upper, entry.prior && entry.prior->kind == PriorKind::kLogNormal});

@@ -218,7 +218,7 @@ std::string WritePosteriorScenes(const std::string& folder, const FitInput& inpu
       std::string error;
       if (!FittedScene(input.recordings[static_cast<size_t>(b)].problem,
                        problem.ParametersOf(b, posterior.draws.row(i)), folder, &text, &error)) {
-        return folder + ": draw " + std::to_string(i) + ": " + error;
+        return error.insert(0, folder + ": draw " + std::to_string(i) + ": ");
       }
       const std::string name = "scene_" + Padded(i, count - 1) +
                                (problem.IsNamed() ? "_" + std::to_string(b) : "") + ".json";
