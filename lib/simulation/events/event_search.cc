@@ -58,6 +58,18 @@ double LargestForce(const Segment& motion) {
   return scale;
 }
 
+// The speed at which a half-plane that turns sweeps over another body, by its distance, m/s.
+double SweptSpeed(const Model<double>& model, const Lengths& lengths, const Segment& segment,
+                  int half_plane, int other) {
+  const State<double>& before = segment.before;
+  const double turn =
+      std::max(std::abs(before.twist[3 * half_plane + 2]),
+               LargestGivenTurn(model, half_plane, segment.time, segment.time + segment.length));
+  return turn * (std::hypot(before.pose[3 * half_plane] - before.pose[3 * other],
+                            before.pose[3 * half_plane + 1] - before.pose[3 * other + 1]) +
+                 lengths.radius(other));
+}
+
 }  // namespace
 
 EventSearch::EventSearch(const Model<double>& model) : lengths_(model), flow_(model) {
@@ -474,21 +486,12 @@ bool EventSearch::Run(const Model<double>& model, const std::vector<ActiveContac
   for (const auto& [first, second] : pairs_) {
     const int a = first;
     const int b = second;
-    double turning = 0.0;  // a turning half-plane sweeps by its distance
     for (const int body : {a, b}) {
       if (model.structure->bodies[body].shape == ShapeType::kHalfPlane) {
-        const int other = body == a ? b : a;
-        const double turn =
-            std::max(std::abs(segment->before.twist[3 * body + 2]),
-                     LargestGivenTurn(model, body, segment->time, segment->time + segment->length));
-        turning =
-            turn * (std::hypot(segment->before.pose[3 * a] - segment->before.pose[3 * b],
-                               segment->before.pose[3 * a + 1] - segment->before.pose[3 * b + 1]) +
-                    lengths_.radius(other));
         closing_[body] = std::max(std::hypot(segment->before.twist[3 * body],
                                              segment->before.twist[3 * body + 1]),
                                   SpeedAlongPath(model, body, 0.0)) +
-                         turning;
+                         SweptSpeed(model, lengths_, *segment, body, body == a ? b : a);
       }
     }
     model.structure->ForEachPartPair(a, b, [&](PartPair parts) {
