@@ -390,6 +390,7 @@ bool EventStepper::HoldsSlow(const Model<double>& model, Impulses* impact, State
   const double slow = HeldSpeed(model);
   Segment held;
   held.time = impact->time;
+  held.middle = inside_;
   held.starts = true;
   held.contacts = impact->contacts;
   held.friction = impact->friction;
@@ -415,6 +416,7 @@ bool EventStepper::HoldsTouching(const Model<double>& model, double t, State<dou
   part->is_impulses = true;
   Impulses& impulses = part->impulses;
   impulses.time = t;
+  impulses.inside = inside_;
   impulses.h = 0.0;
   impulses.decompression = false;
   impulses.before = *state;
