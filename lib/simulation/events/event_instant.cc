@@ -22,7 +22,6 @@
 
 #include "tangible/dynamics/model/driven_bodies.h"
 #include "tangible/lcp/system/contact_residual.h"
-#include "tangible/simulation/events/ellipse_motion.h"
 #include "tangible/simulation/events/event_step.h"
 #include "tangible/simulation/events/tolerances.h"
 
@@ -31,10 +30,6 @@ namespace {
 
 // Slow impacts count as a rattle after max_events_per_step divided by this.
 constexpr int kRattling = 4;
-// How often dt is halved for motions that ellipses shorten, and how many a contact may have in a
-// step: a flat side of 1e-9 of the length of an ellipse takes 2000.
-constexpr int kMostEllipseHalvings = 40;
-constexpr int kMostEllipseMotions = 10000;
 
 // Whether contact i of an impact belongs to a body without joints that touches only fixed bodies on
 // parallel faces, and whose friction is far from reversing the contact law,
@@ -372,114 +367,6 @@ bool EventStepper::Settle(const Model<double>& model, const Impulses& impact, St
   SpreadTwists(*model.structure, part->impulses.solution.motion, &state->twist);
   part->impulses.new_twist = state->twist;
   return true;
-}
-
-// An impact that is slower than this loses no more than what gravity gives back within a step.
-double EventStepper::HeldSpeed(const Model<double>& model) {
-  const SimulationSettings& settings = model.structure->settings;
-  const double gravity = std::hypot(model.parameters[kGravityX], model.parameters[kGravityY]);
-  return std::max(settings.restitution_threshold, gravity * settings.dt);
-}
-
-// Balls that just fit between two walls push each other nearly along the line in which they lie, by
-// rows that depend on each other to rounding: no impulses are found to the tolerance, and many
-// exist, because friction holds bodies between faces that are nearly parallel whatever the
-// impulses along the normals are.
-bool EventStepper::HoldsSlow(const Model<double>& model, Impulses* impact, State<double>* state,
-                             StepReport* outcome) {
-  const double slow = HeldSpeed(model);
-  Segment held;
-  held.time = impact->time;
-  held.middle = inside_;
-  held.starts = true;
-  held.contacts = impact->contacts;
-  held.friction = impact->friction;
-  for (size_t i = 0; i < impact->contacts.size(); ++i) {
-    const ActiveContact& contact = impact->contacts[i];
-    const ContactBlock<double>& block = impact->problem.contacts[i];
-    if (RelativeSpeed(*state, contact.a, block.normal_a, contact.b, block.normal_b) < -slow) {
-      return false;
-    }
-    held.modes.push_back(block.has_friction ? ContactMode::kSticking : ContactMode::kClosed);
-  }
-  SetUpProjection(held, *state, impact);
-  if (!flow_.Project(model, impact)) return false;
-  ++outcome->given_up.held_contacts;
-  SpreadTwists(*model.structure, impact->solution.motion, &state->twist);
-  impact->new_twist = state->twist;
-  return true;
-}
-
-bool EventStepper::HoldsTouching(const Model<double>& model, double t, State<double>* state,
-                                 StepReport* outcome) {
-  EventPart* part = record_.Add();
-  part->is_impulses = true;
-  Impulses& impulses = part->impulses;
-  impulses.time = t;
-  impulses.inside = inside_;
-  impulses.h = 0.0;
-  impulses.decompression = false;
-  impulses.before = *state;
-  impulses.contacts.clear();
-  impulses.friction.clear();
-  const double slow = SlowSpeed(model, *state);
-  for (size_t i = 0; i < touching_.contacts.size(); ++i) {
-    if (touching_.approach[i] > slow || touching_.contacts[i].IsJointFriction()) continue;
-    impulses.contacts.push_back(touching_.contacts[i]);
-    impulses.friction.push_back(touching_.friction[i]);
-  }
-  impulses.restitution.assign(impulses.contacts.size(), CoefficientSource());
-  AssembleImpulses(model, &assembly_, &impulses);
-  if (!impulses.contacts.empty() && HoldsSlow(model, &impulses, state, outcome)) return true;
-  --record_.num_parts;
-  return false;
-}
-
-void EventStepper::ShortenAtEllipses(const Model<double>& model,
-                                     const ContactSolution<double>& accelerations,
-                                     StepReport* outcome, Segment* segment) {
-  const EllipseMotion motion =
-      LongestEllipseMotion(model, segment->before, segment->contacts, accelerations);
-  if (!(segment->length > motion.longest)) return;
-  const double dt = model.structure->settings.dt;
-  double spacing = dt;
-  for (int k = 1; k <= kMostEllipseHalvings && spacing > motion.longest; ++k) {
-    spacing = std::ldexp(dt, -k);
-  }
-  const double next = (std::floor(segment->time / spacing + kSameInstant) + 1.0) * spacing;
-  const double length = next - segment->time;
-  if (length >= segment->length - kSameInstant * spacing) return;
-  ++outcome->ellipse_motions;
-  const ActiveContact& contact = segment->contacts[motion.contact];
-  if (length > 0.0) {
-    segment->length = length;
-    segment->middle = segment->time + 0.5 * length;
-  }
-  if (shortened_.Add(contact) > kMostEllipseMotions || !(length > 0.0)) {
-    outcome->message = "more than " + std::to_string(kMostEllipseMotions) +
-                       " motions in a step, so short because an ellipse turns over its flat side "
-                       "or tip: the " +
-                       NameOfContact(*model.structure, {contact}, 0) +
-                       " needs a smaller dt or a less slender ellipse";
-  }
-}
-
-void EventStepper::SwitchMode(const Segment& segment) {
-  for (size_t i = 0; i < guess_.contacts.size(); ++i) {
-    // A body that stops does so at all its contacts; the speed of a contact tells whether it still
-    // slides.
-    if (segment.event == EventKind::kSlipEnds && SlidingSign(guess_.modes[i]) != 0.0) {
-      guess_.modes[i] = ContactMode::kSticking;
-    }
-    if (segment.event == EventKind::kLiftOff && guess_.contacts[i].SameAs(segment.event_contact)) {
-      guess_.modes[i] = ContactMode::kOpen;
-    } else if (segment.event == EventKind::kSlipBegins && guess_.modes[i] != ContactMode::kOpen &&
-               guess_.contacts[i].IsBetweenTheSame(segment.event_contact)) {
-      // Both ends of a face slide against the force that was at its limit.
-      guess_.modes[i] =
-          segment.event_sign > 0.0 ? ContactMode::kSlidingNegative : ContactMode::kSlidingPositive;
-    }
-  }
 }
 
 bool EventStepper::LocateTouch(const Model<double>& model, double t, double slow, int group,

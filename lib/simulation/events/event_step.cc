@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "tangible/math/interrupt.h"
+#include "tangible/simulation/events/ellipse_motion.h"
 #include "tangible/simulation/events/load_speed.h"
 #include "tangible/simulation/events/tolerances.h"
 
@@ -22,6 +23,10 @@ constexpr int kMostForced = 3;
 constexpr int kMostHalvings = 14;
 // How many such shortened motions a step may have. Those of a stiff body would not end.
 constexpr int kMostShortened = 50;
+// How often dt is halved for motions that ellipses shorten, and how many a contact may have in a
+// step: a flat side of 1e-9 of the length of an ellipse takes 2000.
+constexpr int kMostEllipseHalvings = 40;
+constexpr int kMostEllipseMotions = 10000;
 // After more than this many times max_events_per_step events a step is given up.
 constexpr int kGiveUp = 3;
 
@@ -34,13 +39,6 @@ double KineticEnergy(const Model<double>& model, const std::vector<double>& twis
               0.5 * model.parameters[index.inertia] * v[2] * v[2];
   }
   return energy;
-}
-
-void SizeGuess(const ContactProblem<double>& problem, ContactSolution<double>* guess) {
-  guess->modes.assign(problem.contacts.size(), ContactMode::kOpen);
-  guess->normal_impulse.assign(problem.contacts.size(), 0.0);
-  guess->tangent_impulse.assign(problem.contacts.size(), 0.0);
-  guess->joint_impulse.assign(3 * problem.joints.size(), 0.0);
 }
 
 // Sets the event of a segment that ended at a given time: a fraction of the rest of the step, which
@@ -97,24 +95,19 @@ bool OpposesSlips(const ContactProblem<double>& problem, const std::vector<Conta
   return true;
 }
 
-// Where no accelerations are found, as of balls that just fit between two walls, contacts that do
-// not slide stick and the others slide on.
-void HoldSlow(const ContactProblem<double>& problem, const std::vector<double>& slip, double slow,
-              std::vector<ContactMode>* modes) {
-  for (size_t i = 0; i < modes->size(); ++i) {
-    (*modes)[i] = !problem.contacts[i].has_friction ? ContactMode::kClosed
-                  : std::abs(slip[i]) <= slow       ? ContactMode::kSticking
-                  : slip[i] > 0.0                   ? ContactMode::kSlidingPositive
-                                                    : ContactMode::kSlidingNegative;
-  }
-}
-
 // Number of events after which a step is given up.
 int MostEvents(const Model<double>& model) {
   return kGiveUp * model.structure->settings.max_events_per_step + kGiveUp;
 }
 
 }  // namespace
+
+void SizeGuess(const ContactProblem<double>& problem, ContactSolution<double>* guess) {
+  guess->modes.assign(problem.contacts.size(), ContactMode::kOpen);
+  guess->normal_impulse.assign(problem.contacts.size(), 0.0);
+  guess->tangent_impulse.assign(problem.contacts.size(), 0.0);
+  guess->joint_impulse.assign(3 * problem.joints.size(), 0.0);
+}
 
 EventStepper::EventStepper(const Model<double>& model) : search_(model), flow_(model) {}
 
@@ -328,41 +321,6 @@ bool EventStepper::SolveImpact(const Model<double>& model, Impulses* impact, Sta
   return Settle(model, *impact, state, outcome);
 }
 
-bool EventStepper::SolveByShortStep(const Model<double>& model, double t, double dt,
-                                    State<double>* state, StepReport* outcome) {
-  EventPart* part = record_.Add();
-  part->is_impulses = true;
-  Impulses& impulses = part->impulses;
-  impulses.time = t;
-  impulses.inside = inside_;
-  impulses.h = kPainleveStep * dt;
-  impulses.decompression = false;
-  impulses.before = *state;
-  impulses.contacts = touching_.contacts;
-  impulses.friction = touching_.friction;
-  impulses.restitution.assign(touching_.contacts.size(), CoefficientSource());
-  AssembleImpulses(model, &assembly_, &impulses);
-  SizeGuess(impulses.problem, &impulses.solution);
-  const ContactSolverReport solved = solver_.Solve(
-      impulses.problem, SolverOptionsOf(model.structure->settings), &impulses.solution);
-  CountSolve(solved, outcome);
-  ++outcome->given_up.short_steps;
-  ++outcome->events;
-  if (!solved.solved) {
-    outcome->residual = solved.residual;
-    outcome->message = "accelerations and impulses";
-    if (solved.worst_contact >= 0) {
-      outcome->message +=
-          ": " + NameOfContact(*model.structure, impulses.contacts, solved.worst_contact);
-    }
-    return false;
-  }
-  solver_.system().MoveFactorsTo(&impulses.system);
-  SpreadTwists(*model.structure, impulses.solution.motion, &state->twist);
-  impulses.new_twist = state->twist;
-  return true;
-}
-
 // The guess is the last modes; contacts that slide keep sliding, because friction opposes the
 // sliding whatever the accelerations are.
 void EventStepper::GuessModes(const std::vector<ActiveContact>& contacts,
@@ -393,6 +351,35 @@ void EventStepper::GuessModes(const std::vector<ActiveContact>& contacts,
       guess = ContactMode::kSticking;
     }
     solution->modes[i] = guess;
+  }
+}
+
+void EventStepper::ShortenAtEllipses(const Model<double>& model,
+                                     const ContactSolution<double>& accelerations,
+                                     StepReport* outcome, Segment* segment) {
+  const EllipseMotion motion =
+      LongestEllipseMotion(model, segment->before, segment->contacts, accelerations);
+  if (!(segment->length > motion.longest)) return;
+  const double dt = model.structure->settings.dt;
+  double spacing = dt;
+  for (int k = 1; k <= kMostEllipseHalvings && spacing > motion.longest; ++k) {
+    spacing = std::ldexp(dt, -k);
+  }
+  const double next = (std::floor(segment->time / spacing + kSameInstant) + 1.0) * spacing;
+  const double length = next - segment->time;
+  if (length >= segment->length - kSameInstant * spacing) return;
+  ++outcome->ellipse_motions;
+  const ActiveContact& contact = segment->contacts[motion.contact];
+  if (length > 0.0) {
+    segment->length = length;
+    segment->middle = segment->time + 0.5 * length;
+  }
+  if (shortened_.Add(contact) > kMostEllipseMotions || !(length > 0.0)) {
+    outcome->message = "more than " + std::to_string(kMostEllipseMotions) +
+                       " motions in a step, so short because an ellipse turns over its flat side "
+                       "or tip: the " +
+                       NameOfContact(*model.structure, {contact}, 0) +
+                       " needs a smaller dt or a less slender ellipse";
   }
 }
 
@@ -484,7 +471,7 @@ bool EventStepper::ChooseModes(const Model<double>& model, const State<double>& 
                               solved.worst_contact >= 0 &&
                               std::abs(slip[solved.worst_contact]) <= HeldSpeed(model);
   if (holds_ == Holds::kAll || holds_unsolved) {
-    HoldSlow(problem, slip, HeldSpeed(model), &solution.modes);
+    HoldModes(problem, slip, HeldSpeed(model), &solution.modes);
     search_.KeepStarts(true);
     ++outcome->given_up.held_contacts;
   } else if (!solved.solved) {
@@ -509,6 +496,24 @@ bool EventStepper::ChooseModes(const Model<double>& model, const State<double>& 
   const double length = segment->length > 0.0 ? segment->length : settings.dt;
   KeepClosed(solution.modes, settings.recovery_speed * length, slow, &slip, segment);
   return true;
+}
+
+void EventStepper::SwitchMode(const Segment& segment) {
+  for (size_t i = 0; i < guess_.contacts.size(); ++i) {
+    // A body that stops does so at all its contacts; the speed of a contact tells whether it still
+    // slides.
+    if (segment.event == EventKind::kSlipEnds && SlidingSign(guess_.modes[i]) != 0.0) {
+      guess_.modes[i] = ContactMode::kSticking;
+    }
+    if (segment.event == EventKind::kLiftOff && guess_.contacts[i].SameAs(segment.event_contact)) {
+      guess_.modes[i] = ContactMode::kOpen;
+    } else if (segment.event == EventKind::kSlipBegins && guess_.modes[i] != ContactMode::kOpen &&
+               guess_.contacts[i].IsBetweenTheSame(segment.event_contact)) {
+      // Both ends of a face slide against the force that was at its limit.
+      guess_.modes[i] =
+          segment.event_sign > 0.0 ? ContactMode::kSlidingNegative : ContactMode::kSlidingPositive;
+    }
+  }
 }
 
 bool EventStepper::EndOtherSlips(const Model<double>& model, double t, const Segment& segment,

@@ -55,6 +55,8 @@ struct EventGuess {
   size_t bytes() const;
 };
 
+/// Sets a guess of all contacts open, without impulses.
+void SizeGuess(const ContactProblem<double>& problem, ContactSolution<double>* guess);
 /// Adds a solve to the report of a step.
 void CountSolve(const ContactSolverReport& solved, StepReport* outcome);
 /// "contact of ball and floor", "limit of joint hinge"; index −1: "joints".
@@ -188,6 +190,10 @@ class EventStepper {
   double SlowSpeed(const Model<double>& model, const State<double>& state) const;
   /// The speed below which contacts of a problem without a solution are held, m/s.
   static double HeldSpeed(const Model<double>& model);
+  /// The modes of contacts that are held where accelerations are not found: those that slide no
+  /// faster than `slow` (m/s) stick.
+  static void HoldModes(const ContactProblem<double>& problem, const std::vector<double>& slip,
+                        double slow, std::vector<ContactMode>* modes);
   /// In the place of an impact without a solution, all of whose contacts approach more slowly than
   /// that: they are held, with friction. Whether it was done.
   bool HoldsSlow(const Model<double>& model, Impulses* impact, State<double>* state,

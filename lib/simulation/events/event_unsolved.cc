@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// What takes the place of impulses, accelerations and motions that are not found: the impulses of a
+// very short step (Painlevé), and contacts that are held.
+#include <algorithm>
+#include <cmath>
+
+#include "tangible/simulation/events/event_step.h"
+#include "tangible/simulation/events/tolerances.h"
+
+namespace tangible {
+
+bool EventStepper::SolveByShortStep(const Model<double>& model, double t, double dt,
+                                    State<double>* state, StepReport* outcome) {
+  EventPart* part = record_.Add();
+  part->is_impulses = true;
+  Impulses& impulses = part->impulses;
+  impulses.time = t;
+  impulses.inside = inside_;
+  impulses.h = kPainleveStep * dt;
+  impulses.decompression = false;
+  impulses.before = *state;
+  impulses.contacts = touching_.contacts;
+  impulses.friction = touching_.friction;
+  impulses.restitution.assign(touching_.contacts.size(), CoefficientSource());
+  AssembleImpulses(model, &assembly_, &impulses);
+  SizeGuess(impulses.problem, &impulses.solution);
+  const ContactSolverReport solved = solver_.Solve(
+      impulses.problem, SolverOptionsOf(model.structure->settings), &impulses.solution);
+  CountSolve(solved, outcome);
+  ++outcome->given_up.short_steps;
+  ++outcome->events;
+  if (!solved.solved) {
+    outcome->residual = solved.residual;
+    outcome->message = "accelerations and impulses";
+    if (solved.worst_contact >= 0) {
+      outcome->message +=
+          ": " + NameOfContact(*model.structure, impulses.contacts, solved.worst_contact);
+    }
+    return false;
+  }
+  solver_.system().MoveFactorsTo(&impulses.system);
+  SpreadTwists(*model.structure, impulses.solution.motion, &state->twist);
+  impulses.new_twist = state->twist;
+  return true;
+}
+
+// An impact that is slower than this loses no more than what gravity gives back within a step.
+double EventStepper::HeldSpeed(const Model<double>& model) {
+  const SimulationSettings& settings = model.structure->settings;
+  const double gravity = std::hypot(model.parameters[kGravityX], model.parameters[kGravityY]);
+  return std::max(settings.restitution_threshold, gravity * settings.dt);
+}
+
+// Balls that just fit between two walls push each other nearly along the line in which they lie, by
+// rows that depend on each other to rounding: no impulses are found to the tolerance, and many
+// exist, because friction holds bodies between faces that are nearly parallel whatever the
+// impulses along the normals are.
+bool EventStepper::HoldsSlow(const Model<double>& model, Impulses* impact, State<double>* state,
+                             StepReport* outcome) {
+  const double slow = HeldSpeed(model);
+  Segment held;
+  held.time = impact->time;
+  held.middle = inside_;
+  held.starts = true;
+  held.contacts = impact->contacts;
+  held.friction = impact->friction;
+  for (size_t i = 0; i < impact->contacts.size(); ++i) {
+    const ActiveContact& contact = impact->contacts[i];
+    const ContactBlock<double>& block = impact->problem.contacts[i];
+    if (RelativeSpeed(*state, contact.a, block.normal_a, contact.b, block.normal_b) < -slow) {
+      return false;
+    }
+    held.modes.push_back(block.has_friction ? ContactMode::kSticking : ContactMode::kClosed);
+  }
+  SetUpProjection(held, *state, impact);
+  if (!flow_.Project(model, impact)) return false;
+  ++outcome->given_up.held_contacts;
+  SpreadTwists(*model.structure, impact->solution.motion, &state->twist);
+  impact->new_twist = state->twist;
+  return true;
+}
+
+// Contacts that do not slide stick and the others slide on.
+void EventStepper::HoldModes(const ContactProblem<double>& problem, const std::vector<double>& slip,
+                             double slow, std::vector<ContactMode>* modes) {
+  for (size_t i = 0; i < modes->size(); ++i) {
+    (*modes)[i] = !problem.contacts[i].has_friction ? ContactMode::kClosed
+                  : std::abs(slip[i]) <= slow       ? ContactMode::kSticking
+                  : slip[i] > 0.0                   ? ContactMode::kSlidingPositive
+                                                    : ContactMode::kSlidingNegative;
+  }
+}
+
+bool EventStepper::HoldsTouching(const Model<double>& model, double t, State<double>* state,
+                                 StepReport* outcome) {
+  EventPart* part = record_.Add();
+  part->is_impulses = true;
+  Impulses& impulses = part->impulses;
+  impulses.time = t;
+  impulses.inside = inside_;
+  impulses.h = 0.0;
+  impulses.decompression = false;
+  impulses.before = *state;
+  impulses.contacts.clear();
+  impulses.friction.clear();
+  const double slow = SlowSpeed(model, *state);
+  for (size_t i = 0; i < touching_.contacts.size(); ++i) {
+    if (touching_.approach[i] > slow || touching_.contacts[i].IsJointFriction()) continue;
+    impulses.contacts.push_back(touching_.contacts[i]);
+    impulses.friction.push_back(touching_.friction[i]);
+  }
+  impulses.restitution.assign(impulses.contacts.size(), CoefficientSource());
+  AssembleImpulses(model, &assembly_, &impulses);
+  if (!impulses.contacts.empty() && HoldsSlow(model, &impulses, state, outcome)) return true;
+  --record_.num_parts;
+  return false;
+}
+
+}  // namespace tangible
