@@ -47,6 +47,17 @@ struct Camera {
   double radial_length = 0.0;        ///< m; 0: no lens, and radial is no parameter
 };
 
+/// What happens between two bodies (event_times.h).
+enum class ObservedEventKind { kTouch, kLiftOff, kStick, kSlip, kRest };
+
+/// An event whose times are recorded, of two bodies. An instrument records it at
+///   recorded = gain (t + delay − offset) / rate + bias
+struct ObservedEvent {
+  std::string name;
+  int bodies[2] = {-1, -1};
+  ObservedEventKind kind = ObservedEventKind::kTouch;
+};
+
 /// Scale, rotation, origin/x, origin/y, aspect, radial.
 inline constexpr int kCameraNumbers = 6;
 
@@ -60,6 +71,7 @@ struct Instruments {
   std::vector<Sensor> sensors;
   std::vector<Camera> cameras;
   std::vector<Clock> clocks;
+  std::vector<ObservedEvent> events;
 
   /// Index in EnumerateNumbers of the first number of a sensor, camera or clock.
   int SensorNumber(int sensor) const { return 3 * sensor; }

@@ -120,6 +120,8 @@ Local Pick(Coordinate coordinate, const Motion6& motion) {
       return motion.omega;
     case Coordinate::kDistance:
       return Distance(motion);
+    case Coordinate::kTime:  // no coordinate of a motion
+      break;
   }
   return motion.x;
 }
@@ -176,6 +178,8 @@ Prediction PredictPlain(Coordinate coordinate, const Place& place) {
       break;
     case Coordinate::kDistance:
       return PredictRecorded(coordinate, {place}, nullptr, nullptr);
+    case Coordinate::kTime:  // no coordinate of a motion
+      break;
   }
   return prediction;
 }

@@ -10,6 +10,7 @@
 #include <sstream>
 #include <tuple>
 
+#include "tangible/estimation/problem/event_file.h"
 #include "tangible/estimation/problem/tolerances.h"
 #include "tangible/scene/csv.h"
 #include "tangible/scene/json_reader.h"
@@ -17,8 +18,8 @@
 namespace tangible {
 namespace {
 
-constexpr std::array<const char*, kCoordinates> kNames = {"x",  "y",     "angle",   "vx",
-                                                          "vy", "omega", "distance"};
+constexpr std::array<const char*, kCoordinates + 1> kNames = {"x",  "y",     "angle",    "vx",
+                                                              "vy", "omega", "distance", "time"};
 
 // Number of samples whose mean rate predicts the next angle.
 constexpr size_t kUnwrapSamples = 10;
@@ -49,8 +50,8 @@ class RowReader {
                 (by_point_ ? "both" : "neither");
       return false;
     }
-    for (const char* name : kNames) {
-      if (table_.Column(name) >= 0) {
+    for (int i = 0; i < kCoordinates; ++i) {
+      if (table_.Column(kNames[i]) >= 0) {
         return true;
       }
     }
@@ -81,7 +82,7 @@ class RowReader {
       if (!ReadCell(table_, row, column, &observation.value, error_)) {
         return false;
       }
-      observation.channel = NumberOf(channel);
+      observation.channel = FindOrAdd(channel, channels_);
       observations->push_back(observation);
     }
     return true;
@@ -94,22 +95,8 @@ class RowReader {
   }
 
   bool CheckTime(int row, const Channel& channel, double* time) {
-    const double duration = scene_.scene.simulation.duration;
-    const double slack = kTimeTolerance * scene_.scene.simulation.dt;
-    const double in_run = RunTime(scene_.instruments, channel, *time);
-    if (in_run < -slack || in_run > duration + slack) {
-      std::ostringstream what;
-      what << "time: expected a time within the run, [0, " << CsvNumber(duration) << "] s, got "
-           << CsvNumber(*time);
-      if (in_run != *time) {
-        what << ", which is " << CsvNumber(in_run) << " of the run by clock and delay";
-      }
-      return Fail(row, what.str());
-    }
-    if (in_run == *time) {
-      *time = std::clamp(*time, 0.0, duration);
-    }
-    return true;
+    std::string what;
+    return tangible::CheckTime(scene_, channel, time, &what) || Fail(row, what);
   }
 
   bool FindObserved(int row, Observation* observation) {
@@ -144,15 +131,6 @@ class RowReader {
                          ") or point (" + PointNames(scene_.points) + "), got \"" + name + "\"");
   }
 
-  int NumberOf(const Channel& channel) {
-    const auto place = std::find(channels_->begin(), channels_->end(), channel);
-    if (place != channels_->end()) {
-      return static_cast<int>(place - channels_->begin());
-    }
-    channels_->push_back(channel);
-    return static_cast<int>(channels_->size()) - 1;
-  }
-
   const CsvTable& table_;
   const ObservedScene& scene_;
   const ObservationOptions& options_;
@@ -164,7 +142,8 @@ class RowReader {
 
 const std::vector<std::string>& AllowedColumns() {
   static const std::vector<std::string> columns = {
-      "time", "body", "point", "relative_to", "x", "y", "angle", "vx", "vy", "omega", "distance"};
+      "time", "body", "point", "relative_to", "x",     "y",     "angle",
+      "vx",   "vy",   "omega", "distance",    "event", "number"};
   return columns;
 }
 
@@ -203,6 +182,9 @@ void Unwrap(size_t first, std::vector<Observation>* observations) {
 bool FromTable(const CsvTable& table, const ObservedScene& scene, const ObservationSigma& sigma,
                const ObservationOptions& options, std::vector<Channel>* channels,
                std::vector<Observation>* observations, std::string* error) {
+  if (table.Column("event") >= 0 || table.Column("number") >= 0) {
+    return ReadEventTimes(table, scene, sigma, options, channels, observations, error);
+  }
   RowReader reader(table, scene, options, channels, error);
   if (!reader.CheckHeader()) {
     return false;
@@ -240,6 +222,8 @@ const char* UnitOf(Coordinate coordinate) {
       return "m/s";
     case Coordinate::kOmega:
       return "rad/s";
+    case Coordinate::kTime:
+      return "s";
   }
   return "";
 }
@@ -247,6 +231,10 @@ const char* UnitOf(Coordinate coordinate) {
 double ObservationSigma::Of(Coordinate coordinate) const {
   const double all[kCoordinates] = {x, y, angle, vx, vy, omega, distance};
   return all[static_cast<size_t>(coordinate)];
+}
+
+double ObservationSigma::OfEvent(int event) const {
+  return event < static_cast<int>(events.size()) ? events[event] : 1.0;
 }
 
 BodyOrPoint FindTarget(const Scene& scene, const std::vector<BodyPoint>& points,
@@ -268,10 +256,36 @@ std::string PointNames(const std::vector<BodyPoint>& points) { return Names(poin
 
 std::string BodyNames(const Scene& scene) { return Names(scene.bodies); }
 
-std::string TargetName(const Scene& scene, const std::vector<BodyPoint>& points,
-                       const Observation& observation) {
-  return observation.point >= 0 ? points[observation.point].name
-                                : scene.bodies[observation.body].name;
+std::string TargetName(const ObservedScene& scene, const Observation& observation) {
+  return observation.event >= 0   ? scene.instruments.events[observation.event].name
+         : observation.point >= 0 ? scene.points[observation.point].name
+                                  : scene.scene.bodies[observation.body].name;
+}
+
+bool CheckTime(const ObservedScene& scene, const Channel& channel, double* time,
+               std::string* what) {
+  const double duration = scene.scene.simulation.duration;
+  const double slack = kTimeTolerance * scene.scene.simulation.dt;
+  const double in_run = RunTime(scene.instruments, channel, *time);
+  if (in_run < -slack || in_run > duration + slack) {
+    std::ostringstream text;
+    text << "time: expected a time within the run, [0, " << CsvNumber(duration) << "] s, got "
+         << CsvNumber(*time);
+    if (in_run != *time) {
+      text << ", which is " << CsvNumber(in_run) << " of the run by clock and delay";
+    }
+    *what = text.str();
+    return false;
+  }
+  if (in_run == *time) *time = std::clamp(*time, 0.0, duration);
+  return true;
+}
+
+int FindOrAdd(const Channel& channel, std::vector<Channel>* channels) {
+  const auto place = std::find(channels->begin(), channels->end(), channel);
+  if (place != channels->end()) return static_cast<int>(place - channels->begin());
+  channels->push_back(channel);
+  return static_cast<int>(channels->size()) - 1;
 }
 
 std::string ReferenceName(const Scene& scene, const std::vector<BodyPoint>& points,
@@ -284,11 +298,11 @@ std::string ReferenceName(const Scene& scene, const std::vector<BodyPoint>& poin
 ObservationSeries IndexSeries(const std::vector<Observation>& observations) {
   ObservationSeries series;
   series.of.reserve(observations.size());
-  std::map<std::tuple<int, int, int, Coordinate>, int> known;
+  std::map<std::tuple<int, int, int, Coordinate, int>, int> known;
   for (size_t i = 0; i < observations.size(); ++i) {
     const Observation& observation = observations[i];
     const std::tuple key(observation.channel, observation.body, observation.point,
-                         observation.coordinate);
+                         observation.coordinate, observation.event);
     const auto [place, inserted] = known.try_emplace(key, series.size());
     if (inserted) {
       series.first.push_back(static_cast<int>(i));

@@ -9,6 +9,7 @@
 // coordinate that was not measured. Times need not fall on steps nor be sorted; a coordinate may
 // be measured more than once. The angle and angular velocity of a point are those of its body.
 // A relative coordinate is the difference to the other body or point, in the world's directions.
+// A file of event times has the columns `time`, `event` (a name) and `number` (from 1) instead.
 
 #include <string>
 #include <vector>
@@ -18,10 +19,11 @@
 
 namespace tangible {
 
-enum class Coordinate { kX, kY, kAngle, kVx, kVy, kOmega, kDistance };
+/// The time of an event comes after the coordinates, which are columns of a file.
+enum class Coordinate { kX, kY, kAngle, kVx, kVy, kOmega, kDistance, kTime };
 inline constexpr int kCoordinates = 7;
 
-/// "x", "y", "angle", "vx", "vy", "omega", "distance".
+/// "x", "y", "angle", "vx", "vy", "omega", "distance", "time".
 const char* NameOf(Coordinate coordinate);
 
 /// A point fixed in a body: r = position + R(angle) at.
@@ -40,6 +42,8 @@ struct Observation {
   double value = 0.0;  ///< m, rad, m/s or rad/s; through a camera lengths are in its units
   double sigma = 1.0;  ///< the same: standard deviation of its noise
   int channel = 0;     ///< index into the channels
+  int event = -1;      ///< index into the instruments' events; −1: a coordinate is measured
+  int number = 1;      ///< of the event in the run, from 1
 };
 
 /// Observations of the same coordinate of the same body or point by the same channel.
@@ -54,15 +58,17 @@ ObservationSeries IndexSeries(const std::vector<Observation>& observations);
 
 /// Standard deviations by coordinate, > 0; NaN: the coordinate may not be measured.
 struct ObservationSigma {
-  double x = 1.0;         ///< m
-  double y = 1.0;         ///< m
-  double angle = 1.0;     ///< rad
-  double vx = 1.0;        ///< m/s
-  double vy = 1.0;        ///< m/s
-  double omega = 1.0;     ///< rad/s
-  double distance = 1.0;  ///< m
+  double x = 1.0;                   ///< m
+  double y = 1.0;                   ///< m
+  double angle = 1.0;               ///< rad
+  double vx = 1.0;                  ///< m/s
+  double vy = 1.0;                  ///< m/s
+  double omega = 1.0;               ///< rad/s
+  double distance = 1.0;            ///< m
+  std::vector<double> events = {};  ///< s, one for each of the instruments' events
 
   double Of(Coordinate coordinate) const;
+  double OfEvent(int event) const;
 };
 
 /// How the rows of a file were made.
@@ -88,15 +94,11 @@ BodyOrPoint FindTarget(const Scene& scene, const std::vector<BodyPoint>& points,
 std::string PointNames(const std::vector<BodyPoint>& points);
 std::string BodyNames(const Scene& scene);
 
-/// The name of the observed point or body.
-std::string TargetName(const Scene& scene, const std::vector<BodyPoint>& points,
-                       const Observation& observation);
-
 /// The name of the body or point to which it is relative; empty: the world.
 std::string ReferenceName(const Scene& scene, const std::vector<BodyPoint>& points,
                           const Channel& channel);
 
-/// "m", "rad", "m/s" or "rad/s".
+/// "m", "rad", "m/s", "rad/s" or "s".
 const char* UnitOf(Coordinate coordinate);
 
 /// The scene, points and instruments to which observations refer.
@@ -106,9 +108,20 @@ struct ObservedScene {
   const Instruments& instruments;
 };
 
+/// The name of the observed point, body or event.
+std::string TargetName(const ObservedScene& scene, const Observation& observation);
+
+/// False, with one line about it, where a recorded time is outside of the run; a time that the run
+/// misses by rounding is moved into it.
+bool CheckTime(const ObservedScene& scene, const Channel& channel, double* time, std::string* what);
+
+/// The index of a channel, which is added where it is new.
+int FindOrAdd(const Channel& channel, std::vector<Channel>* channels);
+
 /// Reads a file and appends to `observations` and, a new one for each reference, to `channels`. On
 /// failure sets one line "file: line 3: what, expected, got": a name that the scene or the points
-/// do not have, a time outside the run, no measured coordinate at all.
+/// do not have, a time outside the run, no measured coordinate at all. Of an event the numbers have
+/// to increase.
 bool ReadObservations(const std::string& file, const ObservedScene& scene,
                       const ObservationSigma& sigma, const ObservationOptions& options,
                       std::vector<Channel>* channels, std::vector<Observation>* observations,

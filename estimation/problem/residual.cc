@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "tangible/estimation/problem/consistency.h"
+#include "tangible/estimation/problem/residual_events.h"
 #include "tangible/estimation/problem/tolerances.h"
 #include "tangible/lcp/certificate/tolerances.h"
 #include "tangible/scene/parameter.h"
@@ -74,6 +75,10 @@ RolloutResiduals::RolloutResiduals(ParameterizedScene scene, std::vector<Observa
     sample_options_.twists = sample_options_.twists || IsRate(observation.coordinate);
   }
   sample_options_.rates = scene_.MovesTimes();
+  const auto is_event = [](const Observation& one) { return one.event >= 0; };
+  if (std::any_of(observations_.begin(), observations_.end(), is_event)) {
+    event_times_ = EventTimes(scene_.instruments().events, observations_);
+  }
   UpdateTimes();
 }
 
@@ -83,7 +88,8 @@ bool RolloutResiduals::FindTimes(std::vector<double>* times) {
   times->reserve(observations_.size());
   for (const Observation& observation : observations_) {
     const double time = RunTime(scene_.instruments(), ChannelOf(observation), observation.time);
-    if (within && !(time >= -slack && time <= settings_.duration + slack)) {
+    const bool is_event = observation.event >= 0;  // its time is predicted, and nothing is read
+    if (within && !is_event && !(time >= -slack && time <= settings_.duration + slack)) {
       within = false;
       std::ostringstream what;
       what << "what was recorded at " << observation.time << " s is of the time " << time
@@ -101,10 +107,14 @@ bool RolloutResiduals::UpdateTimes() {
   const bool within = FindTimes(&times);
   SimulationSettings settings = settings_;
   if (settings.stepping == Stepping::kEvent) {
-    AddStepTimes(SplitTimes(times, settings, sample_options_), &settings);
+    std::vector<double> sampled;
+    for (size_t i = 0; i < times.size(); ++i) {
+      if (observations_[i].event < 0) sampled.push_back(times[i]);
+    }
+    AddStepTimes(SplitTimes(sampled, settings, sample_options_), &settings);
   }
   plan_ = SamplePlan(observations_, times, channels_, markers_, settings, sample_options_);
-  settings.duration = StepTime(settings, plan_.last_step());
+  if (!HasEvents()) settings.duration = StepTime(settings, plan_.last_step());
   std::vector<double>& ends = settings.step_times;
   ends.erase(std::upper_bound(ends.begin(), ends.end(), settings.duration), ends.end());
   scene_.SetSimulation(settings);
@@ -246,26 +256,37 @@ bool RolloutResiduals::Accept(const RolloutReport& report) {
 
 bool RolloutResiduals::Plain() {
   State<double> final;
-  return Accept(Rollout(
+  event_times_.Start();
+  const bool done = Accept(Rollout(
       scene_.model(), scene_.initial_state(),
-      [this](long k, double, const State<double>& state, Stepper*) {
+      [this](long k, double, const State<double>& state, Stepper* stepper) {
         plan_.Add(k, state, &samples_, &rates_);
+        event_times_.Add(k, stepper);
       },
       &final));
+  if (done) FinishEvents(final);
+  return done;
 }
 
 bool RolloutResiduals::Tangent(RowMatrixXd* jacobian) {
   RowMatrixXd w_dot = scene_.VariableDerivatives();
   RowMatrixXd sample_derivatives = RowMatrixXd::Zero(num_sample_rows(), num_parameters());
   State<double> final;
+  Stepper stepper(scene_.model());
+  event_times_.Start();
   const TangentObserver observer = [&](long k, double, const State<double>& state,
                                        const RowMatrixXd& dots) {
     plan_.Add(k, state, &samples_, &rates_);
     plan_.numbers().AddTangent(k, *scene_.model().structure, dots, &sample_derivatives);
+    event_times_.Add(k, k == 0 ? nullptr : &stepper);
   };
-  if (!Accept(RolloutTangent(scene_.model(), scene_.initial_state(), observer, &w_dot, &final))) {
+  if (!Accept(RolloutTangent(scene_.model(), scene_.initial_state(), {}, observer, &stepper, &w_dot,
+                             &final))) {
     return false;
   }
+  FinishEvents(final);
+  FinishEventDerivatives(
+      0, num_parameters(), [&](int variable) { return w_dot.row(variable); }, &sample_derivatives);
   *jacobian = FromSampleDerivatives(samples_, rates_, sample_derivatives,
                                     Eigen::VectorXd::Ones(num_parameters()));
   return true;
@@ -273,13 +294,17 @@ bool RolloutResiduals::Tangent(RowMatrixXd* jacobian) {
 
 bool RolloutResiduals::Adjoint(RowMatrixXd* jacobian) {
   State<double> final;
-  const StateObserver observer = [this](long k, double, const State<double>& state, Stepper*) {
+  event_times_.Start();
+  const StateObserver observer = [this](long k, double, const State<double>& state,
+                                        Stepper* stepper) {
     plan_.Add(k, state, &samples_, &rates_);
+    event_times_.Add(k, stepper);
   };
   if (!Accept(tape_.Record(scene_.model(), scene_.initial_state(), Factorisations::kKeep, observer,
                            &final))) {
     return false;
   }
+  FinishEvents(final);
   const RowMatrixXd variables = scene_.VariableDerivatives();
   jacobian->resize(num_residuals(), num_parameters());
   for (int first = 0; first < num_residuals(); first += kAdjointColumns) {
@@ -297,7 +322,14 @@ void RolloutResiduals::AdjointBlock(int first, int count, const RowMatrixXd& var
   };
   std::vector<std::vector<Reader>> readers(plan_.num_samples());
   long last = 0;  // the step that is read
+  EventBars events;
   for (int i = 0; i < count; ++i) {
+    if (observations_[first + i].event >= 0) {
+      AddEventBars(first + i, i, &events);
+      const Eigen::Index row = EventRow(event_times_.RowOf(first + i));
+      jacobian->row(first + i) = EventDirectTerm(first + i, samples_[static_cast<size_t>(row)]);
+      continue;
+    }
     const double sigma = observations_[first + i].sigma;
     const Prediction prediction = PredictionOf(first + i, samples_);
     for (int place = 0; place < kPlaces; ++place) {
@@ -315,7 +347,10 @@ void RolloutResiduals::AdjointBlock(int first, int count, const RowMatrixXd& var
     jacobian->row(first + i) = DirectTerm(first + i, prediction, rates_);
   }
   const ModelStructure& structure = *scene_.model().structure;
+  const long end = tape_.steps();
+  last = std::max(last, events.LastStep(end));
   const auto seed = [&](long k, RowMatrixXd* w_bar) {
+    if (k == end) events.AddAtEnd(w_bar);
     plan_.numbers().ForEachBar(k, structure, [&](int row, double weight, int variable) {
       for (const Reader& reader : readers[row / plan_.width()]) {
         (*w_bar)(variable, reader.loss) += weight * reader.by_state[row % plan_.width()];
@@ -323,7 +358,10 @@ void RolloutResiduals::AdjointBlock(int first, int count, const RowMatrixXd& var
     });
   };
   RowMatrixXd w_bar;
-  tape_.AdjointFrom(scene_.model(), last, count, seed, &w_bar);
+  const auto event_seed = [&](long step, IslandRecords* parts) {
+    events.AddIn(step, count, parts);
+  };
+  tape_.AdjointFrom(scene_.model(), last, count, seed, &w_bar, {}, event_seed);
   jacobian->middleRows(first, count) += w_bar.transpose() * variables;
 }
 
@@ -358,7 +396,8 @@ bool RolloutResiduals::FiniteDifferences(const Eigen::VectorXd& p, RowMatrixXd* 
 }
 
 bool RolloutResiduals::IsDirect(int i) const {
-  return observations_[i].point < 0 && !IsRecorded(ChannelOf(observations_[i]));
+  return observations_[i].point < 0 && observations_[i].event < 0 &&
+         !IsRecorded(ChannelOf(observations_[i]));
 }
 
 Eigen::Index RolloutResiduals::DirectNumber(int i) const {
@@ -469,6 +508,12 @@ Eigen::VectorXd RolloutResiduals::FromSamples(const std::vector<double>& samples
       residuals[i] = (predicted - observations_[i].value) / observations_[i].sigma;
       continue;
     }
+    if (observations_[i].event >= 0) {
+      const auto row = static_cast<size_t>(EventRow(event_times_.RowOf(i)));
+      residuals[i] =
+          (RecordedTime(i, samples[row]) - observations_[i].value) / observations_[i].sigma;
+      continue;
+    }
     residuals[i] =
         (PredictionOf(i, samples).value - observations_[i].value) / observations_[i].sigma;
   }
@@ -484,6 +529,13 @@ RowMatrixXd RolloutResiduals::FromSampleDerivatives(const std::vector<double>& s
   for (int i = 0; i < num_residuals(); ++i) {
     if (IsDirect(i)) {
       jacobian.row(i) = sample_derivatives.row(DirectNumber(i)) / observations_[i].sigma;
+      continue;
+    }
+    if (observations_[i].event >= 0) {
+      const Eigen::Index row = EventRow(event_times_.RowOf(i));
+      jacobian.row(i) = EventFactor(i) * sample_derivatives.row(row);
+      jacobian.row(i).head(num_parameters()) +=
+          EventDirectTerm(i, samples[static_cast<size_t>(row)]).cwiseProduct(p_by_q.transpose());
       continue;
     }
     const Prediction prediction = PredictionOf(i, samples);
@@ -544,7 +596,11 @@ std::unique_ptr<LeastSquaresProblem> RolloutResiduals::Released(const std::strin
 }
 
 std::vector<std::string> RolloutResiduals::FindInconsistencies(const Eigen::VectorXd& p) {
-  return SetParameters(p) ? FindInconsistentBodies(scene_.scene()) : std::vector<std::string>();
+  if (!SetParameters(p)) return {};
+  std::vector<std::string> lines = FindInconsistentBodies(scene_.scene());
+  const std::vector<std::string> missing = DescribeMissingEvents();
+  lines.insert(lines.end(), missing.begin(), missing.end());
+  return lines;
 }
 
 }  // namespace tangible

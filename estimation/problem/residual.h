@@ -22,6 +22,7 @@
 #include <utility>
 #include <vector>
 
+#include "tangible/estimation/problem/event_times.h"
 #include "tangible/estimation/problem/least_squares.h"
 #include "tangible/estimation/problem/measurement.h"
 #include "tangible/estimation/problem/parameterized_scene.h"
@@ -34,8 +35,8 @@ namespace tangible {
 /// The residuals of one run: a least-squares problem of one block without own parameters.
 class RolloutResiduals : public LeastSquaresProblem {
  public:
-  /// `scene` is the scene of the run, which ends at the last observation. Without `channels` all
-  /// observations are made directly.
+  /// `scene` is the scene of the run, which ends at the last observation, or as the scene says
+  /// where times of events are observed. Without `channels` all observations are made directly.
   RolloutResiduals(ParameterizedScene scene, std::vector<Observation> observations,
                    std::vector<Channel> channels = {});
 
@@ -49,6 +50,8 @@ class RolloutResiduals : public LeastSquaresProblem {
     return channels_[observation.channel];
   }
   const SamplePlan& plan() const { return plan_; }
+  /// Whether times of events are observed, which only whole runs have.
+  bool HasEvents() const { return event_times_.num_rows() > 0; }
   /// Names of the observations' files, by Channel::file; empty where there are none.
   const std::vector<std::string>& files() const { return files_; }
   void SetFiles(std::vector<std::string> files) { files_ = std::move(files); }
@@ -110,9 +113,21 @@ class RolloutResiduals : public LeastSquaresProblem {
 
  private:
   void NameSamplesOnImpacts(Certificate* certificate) const;
-  Eigen::Index num_sample_rows() const {
-    return plan_.width() * static_cast<Eigen::Index>(plan_.num_samples());
+  /// Those of the samples, then the times of events.
+  Eigen::Index num_sample_rows() const { return EventRow(0) + event_times_.num_rows(); }
+  Eigen::Index EventRow(int row) const {
+    return plan_.width() * static_cast<Eigen::Index>(plan_.num_samples()) + row;
   }
+  void FinishEvents(const State<double>& final);
+  template <typename VariableDot>
+  void FinishEventDerivatives(Eigen::Index first, Eigen::Index count, const VariableDot& dot,
+                              RowMatrixXd* rows) const;
+  struct EventBars;
+  void AddEventBars(int i, int loss, EventBars* bars) const;
+  double EventFactor(int i) const;
+  double RecordedTime(int i, double time) const;
+  Eigen::RowVectorXd EventDirectTerm(int i, double time) const;
+  std::vector<std::string> DescribeMissingEvents();
   bool Accept(const RolloutReport& report);
   bool Plain();
   bool Tangent(RowMatrixXd* jacobian);
@@ -144,6 +159,7 @@ class RolloutResiduals : public LeastSquaresProblem {
   std::vector<int> markers_;  ///< the body of the camera's marker of each channel, or −1
   SampleOptions sample_options_;
   SamplePlan plan_;
+  EventTimes event_times_;
   std::vector<std::string> files_;
   std::vector<double> samples_;  ///< plan_.width() numbers each
   std::vector<double> rates_;    ///< of these; empty without SampleOptions::rates

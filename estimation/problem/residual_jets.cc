@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // Jacobians of the residuals by Jets, in passes of the Jets' width.
-#include "tangible/estimation/problem/residual.h"
+#include "tangible/estimation/problem/residual_events.h"
 #include "tangible/simulation/gradient/jet_passes.h"
 
 namespace tangible {
@@ -12,11 +12,27 @@ bool RolloutResiduals::JetPass(int first, JetRoute route, RowMatrixXd* sample_de
   State<Jet<N>> initial;
   State<Jet<N>> final;
   scene_.SeededModel(first, &model, &initial);
-  const JetObserver<Jet<N>> observer = [&](long k, double, const State<Jet<N>>& state) {
+  event_times_.Start();
+  const JetObserver<Jet<N>> observer = [&](long k, double, const State<Jet<N>>& state,
+                                           Stepper* stepper) {
     plan_.numbers().AddJets(k, state, first, sample_derivatives);
+    event_times_.Add(k, stepper);
   };
   long fallbacks = 0;
-  return Accept(RolloutJets(model, initial, route, observer, &final, &fallbacks));
+  if (!Accept(RolloutJets(model, initial, route, observer, &final, &fallbacks))) return false;
+  FinishEvents(ValuesOf(final));
+  const size_t num_poses = final.pose.size();
+  FinishEventDerivatives(
+      first, N,
+      [&](int variable) -> Eigen::RowVectorXd {
+        const auto index = static_cast<size_t>(variable);
+        const Jet<N>& number = index < num_poses       ? final.pose[index]
+                               : index < 2 * num_poses ? final.twist[index - num_poses]
+                                                       : model.parameters[index - 2 * num_poses];
+        return number.v.transpose();
+      },
+      sample_derivatives);
+  return true;
 }
 
 bool RolloutResiduals::Jets([[maybe_unused]] JetRoute route, RowMatrixXd* jacobian) {

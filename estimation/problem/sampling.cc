@@ -71,6 +71,11 @@ SamplePlan::SamplePlan(const std::vector<Observation>& observations,
       std::any_of(markers.begin(), markers.end(), [](int marker) { return marker >= 0; });
   sample_of_.reserve(observations.size());
   for (size_t i = 0; i < observations.size(); ++i) {
+    if (observations[i].event >= 0) {  // no sample is read
+      sample_of_.push_back(-1);
+      if (any_others) others_.insert(others_.end(), 2, -1);
+      continue;
+    }
     sample_of_.push_back(sample(observations[i].body, times[i]));
     if (any_others) {
       const int to = channels[observations[i].channel].to_body;

@@ -57,7 +57,7 @@ class SamplePlan {
   /// Numbers of a sample: x, y, angle, and with twists vx, vy, omega.
   int width() const { return options_.twists ? 6 : 3; }
   bool has_rates() const { return options_.rates; }
-  /// The index of the sample of each observation's body.
+  /// The index of the sample of each observation's body; −1 for the time of an event.
   const std::vector<int>& sample_of() const { return sample_of_; }
   /// The sample of one of the places (measurement.h) of an observation; −1: it has none.
   int SampleOf(int observation, int place) const {

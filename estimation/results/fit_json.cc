@@ -15,8 +15,8 @@ namespace tangible {
 namespace {
 
 // Keys that a recording has in the place of the file's.
-constexpr const char* kOfFile[] = {"scene",   "observations", "points",
-                                   "sensors", "cameras",      "clocks"};
+constexpr const char* kOfFile[] = {"scene",   "observations", "points", "sensors",
+                                   "cameras", "clocks",       "events"};
 
 class Reader {
  public:
@@ -148,7 +148,7 @@ class Reader {
   bool ReadRecording(const JsonReader& reader, const Json& json, std::set<std::string>* names,
                      std::string* error) {
     reader.ExpectKeys({"name", "scene", "observations", "points", "sensors", "cameras", "clocks",
-                       "start", "end", "weight", "values", "initial"},
+                       "events", "start", "end", "weight", "values", "initial"},
                       " of a recording");
     RecordingInput entry;
     entry.name = reader.At("name").String();

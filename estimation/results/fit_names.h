@@ -28,4 +28,11 @@ inline constexpr std::pair<const char*, FitApproach> kApproaches[] = {
 inline constexpr std::pair<const char*, ParameterScale> kScales[] = {
     {"linear", ParameterScale::kLinear}, {"log", ParameterScale::kLogarithmic}};
 
+inline constexpr std::pair<const char*, ObservedEventKind> kObservedEventKinds[] = {
+    {"touch", ObservedEventKind::kTouch},
+    {"lift_off", ObservedEventKind::kLiftOff},
+    {"stick", ObservedEventKind::kStick},
+    {"slip", ObservedEventKind::kSlip},
+    {"rest", ObservedEventKind::kRest}};
+
 }  // namespace tangible

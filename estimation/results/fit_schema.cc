@@ -57,7 +57,10 @@ OrderedJson SigmaSchema() {
   for (int i = 0; i < kCoordinates; ++i) {
     coordinates[NameOf(static_cast<Coordinate>(i))] = Positive();
   }
-  return SchemaOfAny({Positive(), SchemaOfObject(coordinates, {})});
+  // The other keys are names of events.
+  OrderedJson by_name = SchemaOfObject(coordinates, {});
+  by_name["additionalProperties"] = Positive("s");
+  return SchemaOfAny({Positive(), by_name});
 }
 
 OrderedJson ObservationsSchema() {
@@ -82,6 +85,7 @@ OrderedJson SharedKeys() {
                                        {"radial", Free()},
                                        {"radial_length", Positive("m")}},
                                       {});
+  const OrderedJson bodies = SchemaOfArray(SchemaOfName(), 2, 2);
   camera["dependentRequired"] = {{"radial", OrderedJson::array({"radial_length"})}};
   return {
       {"scene", SchemaOfText()},
@@ -95,7 +99,10 @@ OrderedJson SharedKeys() {
                                                {"estimate_sigma", SchemaOfFlag()}},
                                               {}))},
       {"cameras", SchemaByName(camera)},
-      {"clocks", SchemaByName(SchemaOfObject({{"rate", Positive()}, {"offset", Free("s")}}, {}))}};
+      {"clocks", SchemaByName(SchemaOfObject({{"rate", Positive()}, {"offset", Free("s")}}, {}))},
+      {"events", SchemaByName(SchemaOfObject(
+                     {{"bodies", bodies}, {"kind", SchemaOfWords(WordsOf(kObservedEventKinds))}},
+                     {"bodies", "kind"}))}};
 }
 
 OrderedJson RecordingSchema() {

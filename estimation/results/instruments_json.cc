@@ -3,6 +3,7 @@
 
 #include <limits>
 
+#include "tangible/estimation/results/fit_names.h"
 #include "tangible/scene/scene_names.h"
 
 namespace tangible {
@@ -67,18 +68,29 @@ int ReadIndex(const JsonReader& json, const char* key, const Items& items) {
   return -1;
 }
 
-ObservationSigma ReadSigma(const JsonReader& json) {
+/// One standard deviation of all coordinates and events.
+ObservationSigma SameSigma(double all, const std::vector<ObservedEvent>& events) {
+  ObservationSigma sigma;
+  for (double* value :
+       {&sigma.x, &sigma.y, &sigma.angle, &sigma.vx, &sigma.vy, &sigma.omega, &sigma.distance}) {
+    *value = all;
+  }
+  sigma.events.assign(events.size(), all);
+  return sigma;
+}
+
+ObservationSigma ReadSigma(const JsonReader& json, const std::vector<ObservedEvent>& events) {
+  if (!json.IsObject()) return SameSigma(json.Number(NumberKind::kPositive), events);
   ObservationSigma sigma;
   double* const values[kCoordinates] = {&sigma.x,  &sigma.y,     &sigma.angle,   &sigma.vx,
                                         &sigma.vy, &sigma.omega, &sigma.distance};
-  if (!json.IsObject()) {
-    const double all = json.Number(NumberKind::kPositive);
-    for (double* value : values) {
-      *value = all;
-    }
-    return sigma;
+  std::vector<std::string> keys = {"x", "y", "angle", "vx", "vy", "omega", "distance"};
+  for (const ObservedEvent& event : events) {
+    keys.push_back(event.name);
+    sigma.events.push_back(json.Has(event.name) ? json.At(event.name).Number(NumberKind::kPositive)
+                                                : std::numeric_limits<double>::quiet_NaN());
   }
-  json.ExpectKeys({"x", "y", "angle", "vx", "vy", "omega", "distance"}, " of sigma");
+  json.ExpectKeys(keys, " of sigma");
   for (int i = 0; i < kCoordinates; ++i) {
     const char* const key = NameOf(static_cast<Coordinate>(i));
     // A coordinate without a sigma may not be measured, which NaN marks.
@@ -171,6 +183,39 @@ Instruments ReadInstruments(const JsonReader& root, const Scene& scene,
   return instruments;
 }
 
+std::vector<ObservedEvent> ReadEvents(const JsonReader& json, const Scene& scene) {
+  std::vector<ObservedEvent> events;
+  if (json.exists() && scene.simulation.stepping != Stepping::kEvent) {
+    json.Fail(
+        "expected a scene with \"stepping\": \"event\", which locates events, got fixed steps");
+    return events;
+  }
+  ReadByName(json, "events", [&](const std::string& name, const JsonReader& entry) {
+    entry.ExpectKeys({"bodies", "kind"}, " of an event");
+    ObservedEvent event;
+    event.name = name;
+    const JsonReader bodies = entry.At("bodies");
+    if (bodies.ExpectArray("an array of two names of bodies") != 2 && bodies.exists()) {
+      bodies.Fail("expected the names of two bodies");
+      return;
+    }
+    for (int i = 0; i < 2; ++i) {
+      event.bodies[i] = FindTarget(scene, {}, bodies.At(i).String()).body;
+      if (event.bodies[i] < 0) {
+        bodies.At(i).FailExpected("the name of a body (" + BodyNames(scene) + ")");
+        return;
+      }
+    }
+    if (event.bodies[0] == event.bodies[1]) {
+      bodies.At(1).FailExpected("another body than the first");
+      return;
+    }
+    event.kind = entry.At("kind").Choice(kObservedEventKinds);
+    events.push_back(event);
+  });
+  return events;
+}
+
 ObservationEntry ReadObservationEntry(const JsonReader& json, const ObservedScene& scene) {
   json.ExpectKeys({"file", "sigma", "sensor", "camera", "clock", "relative_to", "unwrap"},
                   " of observations");
@@ -183,9 +228,9 @@ ObservationEntry ReadObservationEntry(const JsonReader& json, const ObservedScen
   const double of_sensor =
       channel.sensor < 0 ? 0.0 : scene.instruments.sensors[channel.sensor].sigma;
   if (of_sensor > 0.0 && !json.Has("sigma")) {
-    entry.sigma = {of_sensor, of_sensor, of_sensor, of_sensor, of_sensor, of_sensor, of_sensor};
+    entry.sigma = SameSigma(of_sensor, scene.instruments.events);
   } else {
-    entry.sigma = ReadSigma(json.At("sigma"));
+    entry.sigma = ReadSigma(json.At("sigma"), scene.instruments.events);
   }
   if (json.Has("relative_to")) {
     const BodyOrPoint target = ReadTarget(json.At("relative_to"), scene);

@@ -19,6 +19,9 @@ std::vector<BodyPoint> ReadPoints(const JsonReader& json, const Scene& scene);
 Instruments ReadInstruments(const JsonReader& root, const Scene& scene,
                             const std::vector<BodyPoint>& points);
 
+/// {"bounce": {"bodies": ["ball", "floor"], "kind": "touch"}}; none where it is absent.
+std::vector<ObservedEvent> ReadEvents(const JsonReader& json, const Scene& scene);
+
 /// One entry of `observations`: {"file", "sigma", "sensor", "camera", "clock", "relative_to",
 /// "unwrap"}.
 struct ObservationEntry {

@@ -170,7 +170,7 @@ void AppendRows(const std::string& prefix, const RolloutResiduals& residuals,
     char time[32];
     csv->append(prefix);
     csv->append(time, std::to_chars(time, time + sizeof time, o.time).ptr);
-    *csv += "," + TargetName(scene, points, o) + "," +
+    *csv += "," + TargetName({scene, points, residuals.scene().instruments()}, o) + "," +
             ReferenceName(scene, points, residuals.ChannelOf(o)) + "," + NameOf(o.coordinate) +
             "," + CsvCell(FileOf(residuals, o)) + "," + SensorOf(residuals, o) +
             (is_later ? ",prediction" : ",fit");

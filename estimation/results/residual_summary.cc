@@ -40,8 +40,8 @@ std::string SensorOf(const RolloutResiduals& residuals, const Observation& obser
 }
 
 std::string UnitOf(const RolloutResiduals& residuals, const Observation& observation) {
-  const bool is_length =
-      observation.coordinate != Coordinate::kAngle && observation.coordinate != Coordinate::kOmega;
+  const bool is_length = observation.coordinate != Coordinate::kAngle &&
+                         observation.coordinate != Coordinate::kOmega && observation.event < 0;
   const bool is_rate =
       observation.coordinate == Coordinate::kVx || observation.coordinate == Coordinate::kVy;
   if (residuals.ChannelOf(observation).camera >= 0 && is_length) {
@@ -55,10 +55,10 @@ std::string SeriesLabel(const RolloutResiduals& residuals, const Observation& ob
   const std::vector<BodyPoint>& points = residuals.scene().points();
   const std::string reference = ReferenceName(scene, points, residuals.ChannelOf(observation));
   const std::string sensor = SensorOf(residuals, observation);
-  const std::string label = TargetName(scene, points, observation) + " " +
-                            NameOf(observation.coordinate) +
-                            (reference.empty() ? "" : " relative to " + reference) +
-                            (sensor.empty() ? "" : " by " + sensor);
+  const std::string label =
+      TargetName({scene, points, residuals.scene().instruments()}, observation) + " " +
+      NameOf(observation.coordinate) + (reference.empty() ? "" : " relative to " + reference) +
+      (sensor.empty() ? "" : " by " + sensor);
   return residuals.files().size() > 1 ? label + " (" + FileOf(residuals, observation) + ")" : label;
 }
 
@@ -70,8 +70,9 @@ SeriesSummary Describe(const RolloutResiduals& residuals, const std::string& rec
   const Scene& scene = residuals.scene().scene();
   series.recording = recording;
   series.file = FileOf(residuals, observation);
-  series.target = TargetName(scene, residuals.scene().points(), observation);
-  series.is_point = observation.point >= 0;
+  series.target =
+      TargetName({scene, residuals.scene().points(), residuals.scene().instruments()}, observation);
+  series.kind = observation.event >= 0 ? "event" : observation.point >= 0 ? "point" : "body";
   series.relative_to =
       ReferenceName(scene, residuals.scene().points(), residuals.ChannelOf(observation));
   series.sensor = SensorOf(residuals, observation);

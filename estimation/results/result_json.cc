@@ -199,8 +199,7 @@ OrderedJson RmsByCoordinate(const RecordingsProblem& problem, const FitResult& r
 
 /// The observed body or point and coordinate, its reference, file and sensor.
 OrderedJson NameToJson(const SeriesSummary& series) {
-  OrderedJson json = {{series.is_point ? "point" : "body", series.target},
-                      {"coordinate", NameOf(series.coordinate)}};
+  OrderedJson json = {{series.kind, series.target}, {"coordinate", NameOf(series.coordinate)}};
   const auto add = [&json](const char* key, const std::string& name) {
     if (!name.empty()) {
       json[key] = name;

@@ -157,8 +157,8 @@ class RunReader {
   /// the reader's.
   bool Read() {
     root_.ExpectKeys({"scene", "observations", "recordings", "initial", "points", "sensors",
-                      "cameras", "clocks", "links", "parameters", "derivatives", "loss", "approach",
-                      "segments", "starts", "seed"});
+                      "cameras", "clocks", "events", "links", "parameters", "derivatives", "loss",
+                      "approach", "segments", "starts", "seed"});
     const std::string scene_file = JoinPath(folder_, root_.At("scene").String());
     if (!root_.ok()) {
       return true;
@@ -172,6 +172,7 @@ class RunReader {
     }
     problem_->points = ReadPoints(root_.At("points"), problem_->scene);
     problem_->instruments = ReadInstruments(root_, problem_->scene, problem_->points);
+    problem_->instruments.events = ReadEvents(root_.At("events"), problem_->scene);
     const JsonReader parameters = root_.At("parameters");
     const int count = parameters.ExpectArray("an array of parameters");
     for (int i = 0; i < count; ++i) {
@@ -251,6 +252,17 @@ class RunReader {
     }
   }
 
+  /// The numbers of events count from the start of the run.
+  void CheckEventsInOneRun() {
+    const auto is_event = [](const Observation& one) { return one.event >= 0; };
+    if (problem_->options.segments > 1 &&
+        std::any_of(problem_->observations.begin(), problem_->observations.end(), is_event)) {
+      root_.At("segments")
+          .Fail("expected 1 where times of events are observed, got " +
+                std::to_string(problem_->options.segments));
+    }
+  }
+
   bool ReadObservationFiles() {
     // Times of a part are checked when it has been cut out.
     Scene observed_scene = problem_->scene;
@@ -279,22 +291,37 @@ class RunReader {
       for (size_t k = before; k < problem_->observations.size(); ++k) {
         const Observation& observation = problem_->observations[k];
         if (!(observation.sigma > 0.0)) {
-          entry.At("sigma").Fail(std::string("expected a sigma of ") +
-                                 NameOf(observation.coordinate) + ", which " + observed.file +
-                                 " has");
+          entry.At("sigma").Fail("expected a sigma of " + SigmaKey(observation) + ", which " +
+                                 observed.file + " has");
           return true;
         }
       }
     }
+    if (root_.ok()) CheckEventsInOneRun();
     if (is_part && root_.ok()) Cut();
     return true;
   }
 
+  std::string SigmaKey(const Observation& observation) const {
+    return observation.event < 0 ? NameOf(observation.coordinate)
+                                 : problem_->instruments.events[observation.event].name;
+  }
+
+  /// Times and numbers of events count from the start of the part.
   void Cut() {
     std::vector<Observation> kept;
+    std::vector<int> earlier(problem_->instruments.events.size(), 0);
+    for (const Observation& observation : problem_->observations) {
+      if (observation.event < 0 || observation.time >= part_.start) continue;
+      earlier[observation.event] = std::max(earlier[observation.event], observation.number);
+    }
     for (Observation observation : problem_->observations) {
       if (observation.time < part_.start || observation.time > part_.end) continue;
       observation.time -= part_.start;
+      if (observation.event >= 0) {
+        observation.value -= part_.start;
+        observation.number -= earlier[observation.event];
+      }
       const double end = problem_->scene.simulation.duration;
       const double slack = kTimeTolerance * problem_->scene.simulation.dt;
       if (observation.time > end && observation.time <= end + slack) observation.time = end;

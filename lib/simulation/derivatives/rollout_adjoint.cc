@@ -257,7 +257,8 @@ void RolloutTape::RunAgain(ControlledModel<double>* model, long last) {
 }
 
 void RolloutTape::AdjointFrom(ControlledModel<double> model, long last, int num_losses,
-                              const Seed& seed, RowMatrixXd* w_bar, const ControlSink& sink) {
+                              const Seed& seed, RowMatrixXd* w_bar, const ControlSink& sink,
+                              const EventSeed& event_seed) {
   const ModelStructure& structure = model.structure();
   w_bar->setZero(structure.num_variables(), num_losses);
   RowMatrixXd controls_bar;
@@ -281,6 +282,7 @@ void RolloutTape::AdjointFrom(ControlledModel<double> model, long last, int num_
     }
     Entry& entry = *entries_[static_cast<size_t>(step - first_)];
     const Model<double>& now = model.At(step);
+    if (event_seed) event_seed(step, &entry.parts);
     stepper_->Adjoint(now, &entry, w_bar);
     if (entry.has_factors) KeepWithinBudget(&entry);
     ReleaseSwept(step);

@@ -52,12 +52,17 @@ class RolloutTape {
   /// each entry of Controls::numbers, a column for each loss.
   using ControlSink = std::function<void(long k, const RowMatrixXd& controls_bar)>;
 
+  /// Called before the sweep through step k by events, whose segments may be given the derivatives
+  /// of the losses with respect to the times of their ends (Segment::end_bar).
+  using EventSeed = std::function<void(long k, IslandRecords* parts)>;
+
   /// The reverse sweep from the state after `last` steps, for losses that depend on no later state:
   /// w_bar, num_variables x num_losses, gets the derivatives with respect to the initial poses,
   /// twists and the numbers; the rows of controls' parameters are 0. Chain with
   /// VariableJacobian(...)ᵀ w_bar for user parameters. `model` has the numbers of the recorded run.
   void AdjointFrom(ControlledModel<double> model, long last, int num_losses, const Seed& seed,
-                   RowMatrixXd* w_bar, const ControlSink& sink = {});
+                   RowMatrixXd* w_bar, const ControlSink& sink = {},
+                   const EventSeed& event_seed = {});
   /// The same from the end.
   void Adjoint(const ControlledModel<double>& model, int num_losses, const Seed& seed,
                RowMatrixXd* w_bar) {

@@ -280,6 +280,7 @@ double EventDerivative::Tangent(const Model<double>& model, EventRecord* record,
     tau_dot(columns) = 0.0;
     // ẋ⁺ = Ṡ|τ + S_τ τ̇
     x += (x.col(columns) * tau_dot).eval();
+    segment.end_dot = x.row(time).head(columns);
   }
   *w_dot = x.topLeftCorner(s.num_variables(), columns);
   return residual;
@@ -353,6 +354,8 @@ void EventDerivative::SegmentAdjoint(const Model<double>& model, Segment* segmen
   const ModelStructure& s = *model.structure;
   const Eigen::Index columns = w_bar->cols();
   const bool located = segment->IsEventLocated();
+  if (segment->end_bar.size() == columns) w_bar->row(TimeVariable(s)) += segment->end_bar;
+  segment->end_bar.resize(0);
   RowMatrixXd by_length = RowMatrixXd::Zero(s.num_variables() + 1, 1);
   Row alpha = Row::Zero(columns);
   if (located || segment->event_number >= 0 || starts_anywhere) {

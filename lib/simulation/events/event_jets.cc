@@ -333,6 +333,7 @@ class EventReplay {
     }
     *now += tau;
     now->a = end;
+    segment->end_dot = now->v.transpose();
     *state = std::move(after);
   }
 

@@ -4,6 +4,7 @@
 // The record of an event step that its derivatives need: segments of smooth motion, each up to an
 // event or to the step's end, and impacts between them.
 
+#include <Eigen/Core>
 #include <memory>
 #include <vector>
 
@@ -104,6 +105,11 @@ struct Segment {
   /// The event's function does not pass through 0 but jumps where poses and twists are corrected at
   /// the start of the segment: the time of the event is that start, whatever varies.
   bool at_once = false;
+
+  /// The tangent of the time of its end, which EventDerivative::Tangent and EventStepInJets set.
+  Eigen::RowVectorXd end_dot;
+  /// The derivatives of losses with respect to that time, which Adjoint takes up; mostly none.
+  Eigen::RowVectorXd end_bar;
 
   /// Whether the event's time is found from an equation.
   bool IsEventLocated() const { return IsLocated(event) && !at_once; }

@@ -38,7 +38,7 @@ bool RolloutWorker::JetPass(JetRoute route, Eigen::Index first, RowMatrixXd* jac
   ControlledModel<Jet<N>> plain(model);
   ControlledModel<Jet<N>> controlled(model, controls);
   StartRows(&output->states);
-  const JetObserver<Jet<N>> keep = [&](long k, double, const State<Jet<N>>& now) {
+  const JetObserver<Jet<N>> keep = [&](long k, double, const State<Jet<N>>& now, Stepper*) {
     f_.samples_.Add(k, now, output->states.data());
     f_.samples_.AddJets(k, now, first, jacobian);
   };

@@ -136,7 +136,7 @@ RolloutReport RolloutJets(ControlledModel<T>* model, const State<T>& initial, Je
   set_values(model->At(0));
   State<T> jets = initial;
   if (observer) {
-    observer(0, 0.0, jets);
+    observer(0, 0.0, jets, nullptr);
   }
   const SimulationSettings& settings = model->structure().settings;
   State<double> state = ValuesOf(initial);
@@ -166,7 +166,7 @@ RolloutReport RolloutJets(ControlledModel<T>* model, const State<T>& initial, Je
     ++report.steps;
     report.time = StepTime(settings, k + 1);
     if (observer) {
-      observer(k + 1, report.time, jets);
+      observer(k + 1, report.time, jets, &stepper);
     }
   }
   LookAtEnergy(*model, values, ValuesOf(initial), state, &report);

@@ -54,8 +54,9 @@ RolloutReport Rollout(ControlledModel<double> model, const State<double>& initia
 RolloutReport Rollout(const Model<double>& model, const State<double>& initial,
                       const StateObserver& observer, State<double>* final);
 
+/// The stepper as for a StateObserver.
 template <typename T>
-using JetObserver = std::function<void(long k, double t, const State<T>& state)>;
+using JetObserver = std::function<void(long k, double t, const State<T>& state, Stepper* stepper)>;
 
 /// A rollout in Jets beside one in double, which makes the discrete choices. `fallbacks` counts
 /// unrolled steps in which the interior point failed and the implicit derivative was used instead;

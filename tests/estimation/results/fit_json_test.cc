@@ -95,7 +95,8 @@ TEST_F(FitJsonTest, BadInputsAreOneLine) {
       {With("scene", "3"), ": /scene: expected a string, got 3"},
       {With("step", "1"),
        ": /step: unknown key, expected one of scene, observations, recordings, initial, points, "
-       "sensors, cameras, clocks, links, parameters, derivatives, loss, approach, segments, "
+       "sensors, cameras, clocks, events, links, parameters, derivatives, loss, approach, "
+       "segments, "
        "starts, seed, "
        "got \"step\""},
       {With("parameters", R"([{"path": "gravity/y", "step": 1}])"),

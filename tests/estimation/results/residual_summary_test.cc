@@ -16,7 +16,7 @@ TEST(ResidualSummaryTest, EachCoordinateHasItsOwnNumbers) {
   ASSERT_EQ(summary.series.size(), 2u);
   const SeriesSummary& x = summary.series[0];
   EXPECT_EQ(x.target, "ball");
-  EXPECT_FALSE(x.is_point);
+  EXPECT_EQ(x.kind, "body");
   EXPECT_EQ(x.file, "a.csv");
   EXPECT_EQ(x.label, "ball x");  // a single file is not told apart
   EXPECT_EQ(x.count, 2);
@@ -49,7 +49,7 @@ TEST(ResidualSummaryTest, FilesAndPointsAreSeriesOfTheirOwn) {
   ASSERT_EQ(summary.series.size(), 3u);
   EXPECT_EQ(summary.series[0].label, "ball x (a.csv)");
   EXPECT_EQ(summary.series[1].label, "edge x (a.csv)");
-  EXPECT_TRUE(summary.series[1].is_point);
+  EXPECT_EQ(summary.series[1].kind, "point");
   EXPECT_EQ(summary.series[2].label, "ball x (b.csv)");
   // Series are told apart in the covariance's autocorrelation too.
   EXPECT_EQ(residuals.Places(0)[2].series, 2);
