@@ -414,7 +414,7 @@ class MappingReader {
         return static_cast<Coordinate>(i);
       }
     }
-    json.FailExpected("x, y, angle, vx, vy, omega or distance");
+    json.FailExpected("x, y, angle, vx, vy, omega, distance, ax, ay or alpha");
     return Coordinate::kX;
   }
 
@@ -439,7 +439,8 @@ bool ReadTable(const std::string& text, const std::string& file, const TableOpti
 }
 
 bool IsLength(Coordinate coordinate) {
-  return coordinate != Coordinate::kAngle && coordinate != Coordinate::kOmega;
+  return coordinate != Coordinate::kAngle && coordinate != Coordinate::kOmega &&
+         coordinate != Coordinate::kAlpha;
 }
 
 /// A number of a clock as its whole part and the rest: in one double, times since 1970 are
@@ -482,7 +483,8 @@ long double AsWritten(double value) {
 
 bool TurnsWithY(Coordinate coordinate) {
   return coordinate == Coordinate::kY || coordinate == Coordinate::kVy ||
-         coordinate == Coordinate::kAngle || coordinate == Coordinate::kOmega;
+         coordinate == Coordinate::kAngle || coordinate == Coordinate::kOmega ||
+         coordinate == Coordinate::kAy || coordinate == Coordinate::kAlpha;
 }
 
 /// Reads the rows of a table with a known layout.

@@ -237,6 +237,9 @@ void AddObservations(const FitProblem& problem, BitHash* to) {
          {channel.sensor, channel.camera, channel.clock, channel.to_body, channel.to_point}) {
       hash.Add(number);
     }
+    if (channel.body_frame || channel.gravity) {
+      hash.Add((channel.body_frame ? 1 : 0) + (channel.gravity ? 2 : 0));
+    }
   }
   for (const Observation& o : problem.observations) {
     hash.Add(o.channel);

@@ -289,7 +289,9 @@ std::vector<SmoothedSeries> SmoothAt(const RolloutResiduals& residuals, double t
   }
   std::vector<SmoothedSeries> all;
   for (size_t i = 0; i < samples.size(); ++i) {
-    if (observations[index.first[i]].event >= 0) continue;  // it says nothing about a state
+    // Events and accelerations say nothing about a state alone.
+    const Observation& one = observations[index.first[i]];
+    if (one.event >= 0 || IsAcceleration(one.coordinate)) continue;
     all.push_back(Smooth(std::move(samples[i])));
     all.back().observation = index.first[i];
   }

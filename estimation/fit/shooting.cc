@@ -52,7 +52,7 @@ struct ShootingResiduals::Run {
 };
 
 int MostSegments(const RolloutResiduals& residuals) {
-  if (residuals.HasEvents()) return 1;
+  if (residuals.NeedsWholeRun()) return 1;
   std::vector<double> times;
   times.reserve(residuals.observations().size());
   for (const Observation& observation : residuals.observations()) {

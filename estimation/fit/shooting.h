@@ -32,7 +32,7 @@ namespace tangible {
 
 /// The most segments into which a run can be cut: each needs a step, observations at two times on
 /// average, and the states at the cuts are not so many that a factorisation takes longer than runs;
-/// 1 where times of events are observed, whose numbers count from the start of the run.
+/// 1 where what is observed needs the whole run.
 int MostSegments(const RolloutResiduals& residuals);
 
 /// The residuals of one run in segments: those of the observations, then the jumps, then the errors

@@ -85,12 +85,14 @@ struct Instruments {
 
 /// How an observation was made: by which instruments, and relative to which body or point.
 struct Channel {
-  int file = 0;       ///< which of the files it is from
-  int sensor = -1;    ///< index into the instruments; −1: none
-  int camera = -1;    ///< the same
-  int clock = -1;     ///< the same
-  int to_body = -1;   ///< relative to this body; −1: to the world
-  int to_point = -1;  ///< and this point of it; −1: its centre of mass
+  int file = 0;             ///< which of the files it is from
+  int sensor = -1;          ///< index into the instruments; −1: none
+  int camera = -1;          ///< the same
+  int clock = -1;           ///< the same
+  int to_body = -1;         ///< relative to this body; −1: to the world
+  int to_point = -1;        ///< and this point of it; −1: its centre of mass
+  bool body_frame = false;  ///< of accelerations: along the body's axes, not the world's
+  bool gravity = false;     ///< of accelerations: a − g is shown
 
   friend bool operator==(const Channel&, const Channel&) = default;
 };

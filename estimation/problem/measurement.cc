@@ -120,6 +120,9 @@ Local Pick(Coordinate coordinate, const Motion6& motion) {
       return motion.omega;
     case Coordinate::kDistance:
       return Distance(motion);
+    case Coordinate::kAx:  // acceleration.h
+    case Coordinate::kAy:
+    case Coordinate::kAlpha:
     case Coordinate::kTime:  // no coordinate of a motion
       break;
   }
@@ -178,6 +181,9 @@ Prediction PredictPlain(Coordinate coordinate, const Place& place) {
       break;
     case Coordinate::kDistance:
       return PredictRecorded(coordinate, {place}, nullptr, nullptr);
+    case Coordinate::kAx:  // acceleration.h
+    case Coordinate::kAy:
+    case Coordinate::kAlpha:
     case Coordinate::kTime:  // no coordinate of a motion
       break;
   }

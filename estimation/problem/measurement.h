@@ -15,25 +15,28 @@ namespace tangible {
 
 /// A body or a point of it at the time of an observation.
 struct Place {
-  const double* state = nullptr;  ///< x, y, angle, vx, vy, omega; null: there is none
-  int point = -1;                 ///< −1: the centre of mass
-  Vector2<double> at{0.0, 0.0};   ///< m, body frame
+  /// x, y, angle, vx, vy, omega, and for accelerations ax, ay, alpha; null: there is none.
+  const double* state = nullptr;
+  int point = -1;                ///< −1: the centre of mass
+  Vector2<double> at{0.0, 0.0};  ///< m, body frame
 };
 
 /// The observed body, the body to which it is relative, and the camera's marker.
 inline constexpr int kPlaces = 3;
+inline constexpr int kPlaceNumbers = 9;
 using ObservedPlaces = std::array<Place, kPlaces>;
 
 /// A predicted coordinate with its derivatives.
 struct Prediction {
   double value = 0.0;
-  double by_state[kPlaces][6] = {};       ///< of each place
-  double by_at[kPlaces][2] = {};          ///< the place of the point in the body
-  double by_sensor[2] = {};               ///< gain, bias
-  double by_camera[kCameraNumbers] = {};  ///< scale, rotation, origin x, y, aspect, radial
+  double by_state[kPlaces][kPlaceNumbers] = {};  ///< of each place
+  double by_at[kPlaces][2] = {};                 ///< the place of the point in the body
+  double by_sensor[2] = {};                      ///< gain, bias
+  double by_gravity[2] = {};                     ///< of accelerations
+  double by_camera[kCameraNumbers] = {};         ///< scale, rotation, origin x, y, aspect, radial
 };
 
-/// The coordinate of a body or point without instruments.
+/// The coordinate, no acceleration, of a body or point without instruments.
 Prediction PredictPlain(Coordinate coordinate, const Place& place);
 
 /// The coordinate as it is recorded; `sensor` and `camera` may be null. At a distance of 0 its

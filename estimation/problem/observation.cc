@@ -18,8 +18,8 @@
 namespace tangible {
 namespace {
 
-constexpr std::array<const char*, kCoordinates + 1> kNames = {"x",  "y",     "angle",    "vx",
-                                                              "vy", "omega", "distance", "time"};
+constexpr std::array<const char*, kCoordinates + 1> kNames = {
+    "x", "y", "angle", "vx", "vy", "omega", "distance", "ax", "ay", "alpha", "time"};
 
 // Number of samples whose mean rate predicts the next angle.
 constexpr size_t kUnwrapSamples = 10;
@@ -55,9 +55,10 @@ class RowReader {
         return true;
       }
     }
-    *error_ =
-        table_.file +
-        ": header: expected a column x, y, angle, vx, vy, omega or distance, got none of them";
+    *error_ = table_.file +
+              ": header: expected a column x, y, angle, vx, vy, omega, distance, ax, ay or alpha, "
+              "got none "
+              "of them";
     return false;
   }
 
@@ -78,6 +79,10 @@ class RowReader {
       observation.sigma = sigma.Of(observation.coordinate);
       if (observation.coordinate == Coordinate::kDistance && channel.to_body < 0) {
         return Fail(row, "distance: expected relative_to to name a body or point, got the world");
+      }
+      if (IsAcceleration(observation.coordinate) && (channel.camera >= 0 || channel.to_body >= 0)) {
+        return Fail(row, std::string(kNames[i]) +
+                             ": expected no camera and no relative_to of an acceleration, got one");
       }
       if (!ReadCell(table_, row, column, &observation.value, error_)) {
         return false;
@@ -142,8 +147,8 @@ class RowReader {
 
 const std::vector<std::string>& AllowedColumns() {
   static const std::vector<std::string> columns = {
-      "time", "body", "point", "relative_to", "x",     "y",     "angle",
-      "vx",   "vy",   "omega", "distance",    "event", "number"};
+      "time", "body",  "point",    "relative_to", "x",  "y",     "angle", "vx",
+      "vy",   "omega", "distance", "ax",          "ay", "alpha", "event", "number"};
   return columns;
 }
 
@@ -222,6 +227,11 @@ const char* UnitOf(Coordinate coordinate) {
       return "m/s";
     case Coordinate::kOmega:
       return "rad/s";
+    case Coordinate::kAx:
+    case Coordinate::kAy:
+      return "m/s^2";
+    case Coordinate::kAlpha:
+      return "rad/s^2";
     case Coordinate::kTime:
       return "s";
   }
@@ -229,7 +239,7 @@ const char* UnitOf(Coordinate coordinate) {
 }
 
 double ObservationSigma::Of(Coordinate coordinate) const {
-  const double all[kCoordinates] = {x, y, angle, vx, vy, omega, distance};
+  const double all[kCoordinates] = {x, y, angle, vx, vy, omega, distance, ax, ay, alpha};
   return all[static_cast<size_t>(coordinate)];
 }
 

@@ -7,9 +7,10 @@
 // `x`, `y` (m), `angle` (rad), `vx`, `vy` (m/s), `omega` (rad/s) and `distance` (m, to the body or
 // point that the column `relative_to` or the options name). A missing row or an empty cell is a
 // coordinate that was not measured. Times need not fall on steps nor be sorted; a coordinate may
-// be measured more than once. The angle and angular velocity of a point are those of its body.
-// A relative coordinate is the difference to the other body or point, in the world's directions.
-// A file of event times has the columns `time`, `event` (a name) and `number` (from 1) instead.
+// be measured more than once. The angle and its rates of a point are those of its body. A relative
+// coordinate is the difference to the other body or point, in the world's directions. Accelerations
+// `ax`, `ay` (m/s²), `alpha` (rad/s²) are measured by what sits there (acceleration.h), without a
+// camera or reference. A file of events has columns `time`, `event` (a name), `number` (from 1).
 
 #include <string>
 #include <vector>
@@ -20,11 +21,16 @@
 namespace tangible {
 
 /// The time of an event comes after the coordinates, which are columns of a file.
-enum class Coordinate { kX, kY, kAngle, kVx, kVy, kOmega, kDistance, kTime };
-inline constexpr int kCoordinates = 7;
+enum class Coordinate { kX, kY, kAngle, kVx, kVy, kOmega, kDistance, kAx, kAy, kAlpha, kTime };
+inline constexpr int kCoordinates = 10;
 
-/// "x", "y", "angle", "vx", "vy", "omega", "distance", "time".
+/// "x", "y", "angle", "vx", "vy", "omega", "distance", "ax", "ay", "alpha", "time".
 const char* NameOf(Coordinate coordinate);
+
+inline bool IsAcceleration(Coordinate coordinate) {
+  return coordinate == Coordinate::kAx || coordinate == Coordinate::kAy ||
+         coordinate == Coordinate::kAlpha;
+}
 
 /// A point fixed in a body: r = position + R(angle) at.
 struct BodyPoint {
@@ -65,6 +71,9 @@ struct ObservationSigma {
   double vy = 1.0;                  ///< m/s
   double omega = 1.0;               ///< rad/s
   double distance = 1.0;            ///< m
+  double ax = 1.0;                  ///< m/s²
+  double ay = 1.0;                  ///< m/s²
+  double alpha = 1.0;               ///< rad/s²
   std::vector<double> events = {};  ///< s, one for each of the instruments' events
 
   double Of(Coordinate coordinate) const;
@@ -98,7 +107,7 @@ std::string BodyNames(const Scene& scene);
 std::string ReferenceName(const Scene& scene, const std::vector<BodyPoint>& points,
                           const Channel& channel);
 
-/// "m", "rad", "m/s", "rad/s" or "s".
+/// "m", "rad", "m/s", "rad/s", "m/s^2", "rad/s^2" or "s".
 const char* UnitOf(Coordinate coordinate);
 
 /// The scene, points and instruments to which observations refer.

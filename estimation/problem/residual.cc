@@ -6,6 +6,7 @@
 #include <sstream>
 #include <utility>
 
+#include "tangible/estimation/problem/acceleration.h"
 #include "tangible/estimation/problem/consistency.h"
 #include "tangible/estimation/problem/residual_events.h"
 #include "tangible/estimation/problem/tolerances.h"
@@ -27,7 +28,7 @@ constexpr int kAdjointColumns = 64;
 /// Whether the coordinate needs a twist.
 bool IsRate(Coordinate coordinate) {
   return coordinate == Coordinate::kVx || coordinate == Coordinate::kVy ||
-         coordinate == Coordinate::kOmega;
+         coordinate == Coordinate::kOmega || IsAcceleration(coordinate);
 }
 
 /// Whether an instrument or another body changes the recorded value.
@@ -73,6 +74,8 @@ RolloutResiduals::RolloutResiduals(ParameterizedScene scene, std::vector<Observa
   }
   for (const Observation& observation : observations_) {
     sample_options_.twists = sample_options_.twists || IsRate(observation.coordinate);
+    sample_options_.accelerations =
+        sample_options_.accelerations || IsAcceleration(observation.coordinate);
   }
   sample_options_.rates = scene_.MovesTimes();
   const auto is_event = [](const Observation& one) { return one.event >= 0; };
@@ -243,6 +246,10 @@ bool RolloutResiduals::SetParameters(const Eigen::VectorXd& p) {
   if (scene_.MovesTimes() && !UpdateTimes()) {
     return false;
   }
+  if (sample_options_.accelerations) {
+    by_gravity_ = scene_.VariableDerivatives().middleRows(
+        scene_.model().structure->ParameterVariable(kGravityX), 2);
+  }
   samples_.assign(static_cast<size_t>(num_sample_rows()), 0.0);
   rates_.assign(plan_.has_rates() ? samples_.size() : 0, 0.0);
   return true;
@@ -318,7 +325,7 @@ void RolloutResiduals::AdjointBlock(int first, int count, const RowMatrixXd& var
   // The losses that depend on each sample: (loss, derivative with respect to the sample's state).
   struct Reader {
     int loss;
-    double by_state[6];
+    double by_state[kPlaceNumbers];
   };
   std::vector<std::vector<Reader>> readers(plan_.num_samples());
   long last = 0;  // the step that is read
@@ -337,9 +344,9 @@ void RolloutResiduals::AdjointBlock(int first, int count, const RowMatrixXd& var
       if (sample < 0) {
         continue;
       }
-      last = std::max(last, plan_.samples()[sample].step + 1);
+      last = std::max(last, plan_.LastStepOf(sample));
       Reader reader{i, {}};
-      for (int j = 0; j < 6; ++j) {
+      for (int j = 0; j < kPlaceNumbers; ++j) {
         reader.by_state[j] = prediction.by_state[place][j] / sigma;
       }
       readers[sample].push_back(reader);
@@ -396,8 +403,9 @@ bool RolloutResiduals::FiniteDifferences(const Eigen::VectorXd& p, RowMatrixXd* 
 }
 
 bool RolloutResiduals::IsDirect(int i) const {
-  return observations_[i].point < 0 && observations_[i].event < 0 &&
-         !IsRecorded(ChannelOf(observations_[i]));
+  const Observation& one = observations_[i];
+  return one.point < 0 && one.event < 0 && !IsAcceleration(one.coordinate) &&
+         !IsRecorded(ChannelOf(one));
 }
 
 Eigen::Index RolloutResiduals::DirectNumber(int i) const {
@@ -407,7 +415,7 @@ Eigen::Index RolloutResiduals::DirectNumber(int i) const {
 
 Prediction RolloutResiduals::PredictionOf(int i, const std::vector<double>& samples) const {
   // Twists that nobody reads are 0.
-  double states[kPlaces][6] = {};
+  double states[kPlaces][kPlaceNumbers] = {};
   ObservedPlaces places;
   for (int place = 0; place < kPlaces; ++place) {
     const int sample = plan_.SampleOf(i, place);
@@ -427,7 +435,7 @@ std::array<int, kPlaces> RolloutResiduals::BodiesOf(int i) const {
 }
 
 Prediction RolloutResiduals::PredictionIn(int i, const State<double>& state) const {
-  double states[kPlaces][6] = {};
+  double states[kPlaces][kPlaceNumbers] = {};
   ObservedPlaces places;
   const std::array<int, kPlaces> bodies = BodiesOf(i);
   for (int place = 0; place < kPlaces; ++place) {
@@ -454,6 +462,13 @@ Prediction RolloutResiduals::PredictAt(int i, ObservedPlaces places) const {
       places[place].point = points[place];
       places[place].at = scene_.points()[points[place]].at;
     }
+  }
+  if (IsAcceleration(observation.coordinate)) {
+    const std::vector<double>& numbers = scene_.model().parameters;
+    return PredictAcceleration(
+        observation.coordinate, places[0],
+        {channel.body_frame, channel.gravity, {numbers[kGravityX], numbers[kGravityY]}},
+        channel.sensor < 0 ? nullptr : &instruments.sensors[channel.sensor]);
   }
   if (channel.sensor < 0 && camera == nullptr && channel.to_body < 0) {
     return PredictPlain(observation.coordinate, places[0]);
@@ -483,6 +498,10 @@ Eigen::RowVectorXd RolloutResiduals::DirectTerm(int i, const Prediction& predict
       by_time +=
           prediction.by_state[place][j] * rates[static_cast<size_t>(plan_.width()) * sample + j];
     }
+  }
+  if (IsAcceleration(observation.coordinate)) {
+    term += prediction.by_gravity[0] * by_gravity_.row(0) +
+            prediction.by_gravity[1] * by_gravity_.row(1);
   }
   const RowMatrixXd& by_number = scene_.instrument_derivatives();
   if (channel.sensor >= 0) {
@@ -540,7 +559,8 @@ RowMatrixXd RolloutResiduals::FromSampleDerivatives(const std::vector<double>& s
     }
     const Prediction prediction = PredictionOf(i, samples);
     jacobian.row(i).setZero();
-    if (observations_[i].point >= 0 || IsRecorded(ChannelOf(observations_[i]))) {
+    if (observations_[i].point >= 0 || IsAcceleration(observations_[i].coordinate) ||
+        IsRecorded(ChannelOf(observations_[i]))) {
       jacobian.row(i).head(num_parameters()) =
           DirectTerm(i, prediction, rates).cwiseProduct(p_by_q.transpose());
     }

@@ -50,8 +50,11 @@ class RolloutResiduals : public LeastSquaresProblem {
     return channels_[observation.channel];
   }
   const SamplePlan& plan() const { return plan_; }
-  /// Whether times of events are observed, which only whole runs have.
+  /// Whether times of events are observed.
   bool HasEvents() const { return event_times_.num_rows() > 0; }
+  /// Whether what is observed needs the whole run: an event's number counts from its start, and an
+  /// acceleration is that between two states.
+  bool NeedsWholeRun() const { return HasEvents() || sample_options_.accelerations; }
   /// Names of the observations' files, by Channel::file; empty where there are none.
   const std::vector<std::string>& files() const { return files_; }
   void SetFiles(std::vector<std::string> files) { files_ = std::move(files); }
@@ -160,6 +163,7 @@ class RolloutResiduals : public LeastSquaresProblem {
   SampleOptions sample_options_;
   SamplePlan plan_;
   EventTimes event_times_;
+  RowMatrixXd by_gravity_;  ///< d gravity / d p, where accelerations are observed
   std::vector<std::string> files_;
   std::vector<double> samples_;  ///< plan_.width() numbers each
   std::vector<double> rates_;    ///< of these; empty without SampleOptions::rates

@@ -38,6 +38,16 @@ void Locate(const SimulationSettings& settings, Sample* sample) {
   }
 }
 
+/// The times center − step, center, center + step between whose twists an acceleration is taken.
+struct AccelerationTimes {
+  double center, step;
+
+  AccelerationTimes(double time, const SimulationSettings& settings)
+      : step(std::min(kRateStep * settings.dt, 0.5 * settings.duration)) {
+    center = std::clamp(time, step, std::max(step, settings.duration - step));
+  }
+};
+
 }  // namespace
 
 SamplePlan::SamplePlan(const std::vector<Observation>& observations,
@@ -85,7 +95,7 @@ SamplePlan::SamplePlan(const std::vector<Observation>& observations,
     }
   }
   samples_.shrink_to_fit();
-  numbers_ = StateSamples([this](const auto& use) { ForEachShare(use); });
+  numbers_ = StateSamples([&](const auto& use) { ForEachShare(settings, use); });
   if (options_.rates) {
     rates_ = StateSamples([&](const auto& use) { ForEachRate(settings, use); });
   }
@@ -98,35 +108,76 @@ int SamplePlan::AddSample(int body, double time, const SimulationSettings& setti
   return num_samples() - 1;
 }
 
-/// Calls use(step, share) for a sample's numbers, with twists as far as they are read.
+/// Calls use(step, share) for a sample's numbers, with twists and accelerations as far as they are
+/// read.
 template <typename Use>
-void SamplePlan::UseState(int sample, long step, double weight, bool with_pose,
-                          const Use& use) const {
+void SamplePlan::UseState(const SimulationSettings& settings, int sample, long step, double weight,
+                          bool with_pose, const Use& use) const {
   const StateShare pose{width() * sample, samples_[sample].body, StatePart::kPose, weight};
   if (with_pose) use(step, pose);
   if (options_.twists) use(step, StateShare{pose.row + 3, pose.body, StatePart::kTwist, weight});
+  if (options_.accelerations && !by_events_) UseAcceleration(settings, sample, step, weight, use);
+}
+
+/// The acceleration of the fixed step that begins at `step`, at the end of the last one.
+template <typename Use>
+void SamplePlan::UseAcceleration(const SimulationSettings& settings, int sample, long step,
+                                 double weight, const Use& use) const {
+  const long steps = NumSteps(settings);
+  if (steps == 0) return;
+  const long from = std::min(step, steps - 1);
+  const double slope = weight / StepLength(settings, from);
+  StateShare share{width() * sample + 6, samples_[sample].body, StatePart::kTwist, slope};
+  use(from + 1, share);
+  share.weight = -slope;
+  use(from, share);
+}
+
+/// Of samples by events the mean acceleration (order 1), or its rate (order 2), from the twists at
+/// three times.
+template <typename Use>
+void SamplePlan::ForEachEventAcceleration(const SimulationSettings& settings, int order,
+                                          const Use& use) const {
+  for (int i = 0; i < num_samples() && options_.accelerations; ++i) {
+    const AccelerationTimes times(samples_[i].time, settings);
+    const double h = times.step;
+    if (!(h > 0.0)) continue;
+    const double outer = order == 1 ? 0.5 / h : 1.0 / (h * h);
+    const double weights[3] = {order == 1 ? -outer : outer, order == 1 ? 0.0 : -2.0 * outer, outer};
+    for (int k = 0; k < 3; ++k) {
+      if (weights[k] == 0.0) continue;
+      Sample at = samples_[i];
+      at.time = times.center + (k - 1) * h;
+      Locate(settings, &at);
+      // The end of a step that stands for several times may miss this one by rounding.
+      use(at.part > 0.5 ? at.step + 1 : at.step,
+          StateShare{width() * i + 6, at.body, StatePart::kTwist, weights[k]});
+    }
+  }
 }
 
 /// Calls use(step, share) for the states that the samples read.
 template <typename Use>
-void SamplePlan::ForEachShare(const Use& use) const {
+void SamplePlan::ForEachShare(const SimulationSettings& settings, const Use& use) const {
   for (int i = 0; i < num_samples(); ++i) {
     const Sample& one = samples_[i];
-    UseState(i, one.step, 1.0 - one.part, true, use);
-    if (one.part > 0.0) UseState(i, one.step + 1, one.part, true, use);
+    UseState(settings, i, one.step, 1.0 - one.part, true, use);
+    if (one.part > 0.0) UseState(settings, i, one.step + 1, one.part, true, use);
   }
+  if (by_events_) ForEachEventAcceleration(settings, 1, use);
 }
 
 /// Calls use(step, share) for what forms the rates: twists, and differences.
 template <typename Use>
 void SamplePlan::ForEachRate(const SimulationSettings& settings, const Use& use) const {
   if (by_events_) {
-    ForEachShare([&](long step, StateShare share) {
+    ForEachShare(settings, [&](long step, StateShare share) {
       if (share.part == StatePart::kTwist) return;
       share.part = StatePart::kTwist;
       use(step, share);
     });
     if (!options_.twists) return;
+    ForEachEventAcceleration(settings, 2, use);
   }
   const long steps = NumSteps(settings);
   if (steps == 0) {  // there is no second state, and nothing moves
@@ -134,8 +185,8 @@ void SamplePlan::ForEachRate(const SimulationSettings& settings, const Use& use)
   }
   const auto add = [&](int i, long from, long to, double weight) {
     const double slope = weight / (StepTime(settings, to) - StepTime(settings, from));
-    UseState(i, from, -slope, !by_events_, use);
-    UseState(i, to, slope, !by_events_, use);
+    UseState(settings, i, from, -slope, !by_events_, use);
+    UseState(settings, i, to, slope, !by_events_, use);
   };
   for (int i = 0; i < num_samples(); ++i) {
     long from = std::min(samples_[i].step, steps - 1);
@@ -167,6 +218,10 @@ void SamplePlan::Add(long k, const State<double>& state, std::vector<double>* nu
 std::vector<double> SplitTimes(const std::vector<double>& times, const SimulationSettings& settings,
                                const SampleOptions& options) {
   std::vector<double> split = times;
+  for (size_t i = 0; i < times.size() && options.accelerations; ++i) {
+    const AccelerationTimes around(times[i], settings);
+    for (const int k : {-1, 0, 1}) split.push_back(around.center + k * around.step);
+  }
   if (options.rates && options.twists) {
     for (const double time : times) {
       split.push_back(time - kRateStep * settings.dt);

@@ -12,13 +12,19 @@
 // observations' times (AddStepTimes), so that nothing is interpolated, in particular not across an
 // event. A point moves with the interpolated pose: r = (x, y) + R(angle) at.
 //
+// The acceleration with fixed steps is that of the step that begins at t_k, (v_{k+1} − v_k) / h, at
+// the run's end that of the last step, and linear between steps too. With event stepping it is the
+// mean over twice kRateStep of a step around the time, for which steps end there; its error is of
+// the square of that. A time nearer to an end of the run has the acceleration as near as that. An
+// impact within that time is part of the mean.
+//
 // Where delays or clocks are parameters, the times move with them, and a sample has a rate: with
 // fixed steps it is (q_{k+1} − q_k) / h of the interval, the derivative of the interpolation. At a
 // step between two intervals, where the interpolation has a kink, it is the mean of both slopes, as
 // central differences have it. With event stepping the rate of a pose is the twist at that time,
-// and that of a twist the mean acceleration over twice kRateStep of a step around it, for which
-// steps end there too. Moving the ends of steps changes the motion only by the integrator's error,
-// so that this derivative is right to the order of the step.
+// that of a twist the mean acceleration as above, and that of an acceleration the second difference
+// of these twists. Moving the ends of steps changes the motion only by the integrator's error, so
+// that this derivative is right to the order of the step.
 
 #include <algorithm>
 #include <vector>
@@ -38,8 +44,9 @@ struct Sample {
 
 /// The quantities that are read at each sample.
 struct SampleOptions {
-  bool twists = false;  ///< velocities are observed
-  bool rates = false;   ///< the times of observations depend on parameters; 0 in a run of no steps
+  bool twists = false;         ///< velocities are observed, or accelerations
+  bool accelerations = false;  ///< which come after the twists
+  bool rates = false;  ///< the times of observations depend on parameters; 0 in a run of no steps
 };
 
 class SamplePlan {
@@ -54,8 +61,8 @@ class SamplePlan {
 
   const std::vector<Sample>& samples() const { return samples_; }
   int num_samples() const { return static_cast<int>(samples_.size()); }
-  /// Numbers of a sample: x, y, angle, and with twists vx, vy, omega.
-  int width() const { return options_.twists ? 6 : 3; }
+  /// Numbers of a sample: x, y, angle, with twists vx, vy, omega, with accelerations ax, ay, alpha.
+  int width() const { return options_.accelerations ? 9 : options_.twists ? 6 : 3; }
   bool has_rates() const { return options_.rates; }
   /// The index of the sample of each observation's body; −1 for the time of an event.
   const std::vector<int>& sample_of() const { return sample_of_; }
@@ -64,6 +71,10 @@ class SamplePlan {
     return place == 0        ? sample_of_[observation]
            : others_.empty() ? -1
                              : others_[2 * static_cast<size_t>(observation) + place - 1];
+  }
+  /// The last step whose state a sample needs.
+  long LastStepOf(int sample) const {
+    return options_.accelerations ? last_step() : samples_[sample].step + 1;
   }
   /// The last step whose state is needed.
   long last_step() const { return std::max(numbers_.last_step(), rates_.last_step()); }
@@ -78,11 +89,18 @@ class SamplePlan {
  private:
   int AddSample(int body, double time, const SimulationSettings& settings);
   template <typename Use>
-  void UseState(int sample, long step, double weight, bool with_pose, const Use& use) const;
+  void UseState(const SimulationSettings& settings, int sample, long step, double weight,
+                bool with_pose, const Use& use) const;
   template <typename Use>
-  void ForEachShare(const Use& use) const;
+  void UseAcceleration(const SimulationSettings& settings, int sample, long step, double weight,
+                       const Use& use) const;
+  template <typename Use>
+  void ForEachShare(const SimulationSettings& settings, const Use& use) const;
   template <typename Use>
   void ForEachRate(const SimulationSettings& settings, const Use& use) const;
+  template <typename Use>
+  void ForEachEventAcceleration(const SimulationSettings& settings, int order,
+                                const Use& use) const;
 
   SampleOptions options_;
   bool by_events_ = false;

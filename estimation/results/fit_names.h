@@ -28,6 +28,9 @@ inline constexpr std::pair<const char*, FitApproach> kApproaches[] = {
 inline constexpr std::pair<const char*, ParameterScale> kScales[] = {
     {"linear", ParameterScale::kLinear}, {"log", ParameterScale::kLogarithmic}};
 
+/// Whether accelerations are along the axes of the body.
+inline constexpr std::pair<const char*, bool> kFrames[] = {{"world", false}, {"body", true}};
+
 inline constexpr std::pair<const char*, ObservedEventKind> kObservedEventKinds[] = {
     {"touch", ObservedEventKind::kTouch},
     {"lift_off", ObservedEventKind::kLiftOff},

@@ -70,7 +70,9 @@ OrderedJson ObservationsSchema() {
                                        {"camera", SchemaOfName()},
                                        {"clock", SchemaOfName()},
                                        {"relative_to", SchemaOfName()},
-                                       {"unwrap", SchemaOfFlag()}},
+                                       {"unwrap", SchemaOfFlag()},
+                                       {"frame", SchemaOfWords(WordsOf(kFrames))},
+                                       {"gravity", SchemaOfFlag()}},
                                       {"file"}),
                        1);
 }

@@ -71,8 +71,8 @@ int ReadIndex(const JsonReader& json, const char* key, const Items& items) {
 /// One standard deviation of all coordinates and events.
 ObservationSigma SameSigma(double all, const std::vector<ObservedEvent>& events) {
   ObservationSigma sigma;
-  for (double* value :
-       {&sigma.x, &sigma.y, &sigma.angle, &sigma.vx, &sigma.vy, &sigma.omega, &sigma.distance}) {
+  for (double* value : {&sigma.x, &sigma.y, &sigma.angle, &sigma.vx, &sigma.vy, &sigma.omega,
+                        &sigma.distance, &sigma.ax, &sigma.ay, &sigma.alpha}) {
     *value = all;
   }
   sigma.events.assign(events.size(), all);
@@ -82,9 +82,11 @@ ObservationSigma SameSigma(double all, const std::vector<ObservedEvent>& events)
 ObservationSigma ReadSigma(const JsonReader& json, const std::vector<ObservedEvent>& events) {
   if (!json.IsObject()) return SameSigma(json.Number(NumberKind::kPositive), events);
   ObservationSigma sigma;
-  double* const values[kCoordinates] = {&sigma.x,  &sigma.y,     &sigma.angle,   &sigma.vx,
-                                        &sigma.vy, &sigma.omega, &sigma.distance};
-  std::vector<std::string> keys = {"x", "y", "angle", "vx", "vy", "omega", "distance"};
+  double* const values[kCoordinates] = {&sigma.x,  &sigma.y,     &sigma.angle,    &sigma.vx,
+                                        &sigma.vy, &sigma.omega, &sigma.distance, &sigma.ax,
+                                        &sigma.ay, &sigma.alpha};
+  std::vector<std::string> keys;
+  for (int i = 0; i < kCoordinates; ++i) keys.emplace_back(NameOf(static_cast<Coordinate>(i)));
   for (const ObservedEvent& event : events) {
     keys.push_back(event.name);
     sigma.events.push_back(json.Has(event.name) ? json.At(event.name).Number(NumberKind::kPositive)
@@ -217,8 +219,9 @@ std::vector<ObservedEvent> ReadEvents(const JsonReader& json, const Scene& scene
 }
 
 ObservationEntry ReadObservationEntry(const JsonReader& json, const ObservedScene& scene) {
-  json.ExpectKeys({"file", "sigma", "sensor", "camera", "clock", "relative_to", "unwrap"},
-                  " of observations");
+  json.ExpectKeys(
+      {"file", "sigma", "sensor", "camera", "clock", "relative_to", "unwrap", "frame", "gravity"},
+      " of observations");
   ObservationEntry entry;
   entry.file = json.At("file").String();
   Channel& channel = entry.options.channel;
@@ -237,6 +240,8 @@ ObservationEntry ReadObservationEntry(const JsonReader& json, const ObservedScen
     channel.to_body = target.body;
     channel.to_point = target.point;
   }
+  channel.body_frame = json.Has("frame") && json.At("frame").Choice(kFrames);
+  channel.gravity = json.Has("gravity") && json.At("gravity").Boolean();
   entry.options.unwrap = json.Has("unwrap") && json.At("unwrap").Boolean();
   return entry;
 }

@@ -23,7 +23,7 @@ Instruments ReadInstruments(const JsonReader& root, const Scene& scene,
 std::vector<ObservedEvent> ReadEvents(const JsonReader& json, const Scene& scene);
 
 /// One entry of `observations`: {"file", "sigma", "sensor", "camera", "clock", "relative_to",
-/// "unwrap"}.
+/// "unwrap", "frame", "gravity"}.
 struct ObservationEntry {
   std::string file;  ///< as written
   ObservationSigma sigma;

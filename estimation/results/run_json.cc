@@ -252,13 +252,15 @@ class RunReader {
     }
   }
 
-  /// The numbers of events count from the start of the run.
-  void CheckEventsInOneRun() {
-    const auto is_event = [](const Observation& one) { return one.event >= 0; };
+  /// As RolloutResiduals::NeedsWholeRun.
+  void CheckWholeRun() {
+    const auto needs_whole = [](const Observation& one) {
+      return one.event >= 0 || IsAcceleration(one.coordinate);
+    };
     if (problem_->options.segments > 1 &&
-        std::any_of(problem_->observations.begin(), problem_->observations.end(), is_event)) {
+        std::any_of(problem_->observations.begin(), problem_->observations.end(), needs_whole)) {
       root_.At("segments")
-          .Fail("expected 1 where times of events are observed, got " +
+          .Fail("expected 1 where times of events or accelerations are observed, got " +
                 std::to_string(problem_->options.segments));
     }
   }
@@ -288,6 +290,15 @@ class RunReader {
                             error_)) {
         return false;
       }
+      const bool any =
+          std::any_of(problem_->observations.begin() + static_cast<std::ptrdiff_t>(before),
+                      problem_->observations.end(),
+                      [](const Observation& one) { return IsAcceleration(one.coordinate); });
+      for (const char* key : {"frame", "gravity"}) {
+        if (!entry.Has(key) || any) continue;
+        entry.At(key).Fail("expected a file with ax, ay or alpha, got " + observed.file);
+        return true;
+      }
       for (size_t k = before; k < problem_->observations.size(); ++k) {
         const Observation& observation = problem_->observations[k];
         if (!(observation.sigma > 0.0)) {
@@ -297,7 +308,7 @@ class RunReader {
         }
       }
     }
-    if (root_.ok()) CheckEventsInOneRun();
+    if (root_.ok()) CheckWholeRun();
     if (is_part && root_.ok()) Cut();
     return true;
   }

@@ -342,7 +342,8 @@ TEST(RecordingTableTest, MistakesAreOneLine) {
   EXPECT_EQ(mapping(R"({"column": "th1", "coordinate": "angle"})"),
             "m.json: /columns/0: expected a body or a point, got both or neither");
   EXPECT_EQ(mapping(R"({"column": "th1", "body": "a", "coordinate": "z"})"),
-            "m.json: /columns/0/coordinate: expected x, y, angle, vx, vy, omega or distance, got "
+            "m.json: /columns/0/coordinate: expected x, y, angle, vx, vy, omega, distance, ax, ay "
+            "or alpha, got "
             "\"z\"");
   EXPECT_EQ(mapping(R"({"column": "th1", "body": "a", "coordinate": "angle"},
                        {"column": "th2", "point": "b", "coordinate": "angle"})"),

@@ -59,7 +59,8 @@ TEST(ObservationTest, MistakesAreOneLineWithFileAndLine) {
       {"time,body,x\n0,ball,\n", "o.csv: expected at least one measured coordinate, got none"},
       {"time,body,x\n", "o.csv: expected at least one measured coordinate, got none"},
       {"time,body\n0,ball\n",
-       "o.csv: header: expected a column x, y, angle, vx, vy, omega or distance, got none of them"},
+       "o.csv: header: expected a column x, y, angle, vx, vy, omega, distance, ax, ay or alpha, "
+       "got none of them"},
       {"time,x\n0,1\n", "o.csv: header: expected a column body or a column point, got neither"},
       {"time,body,point,x\n0,ball,tip,1\n",
        "o.csv: header: expected a column body or a column point, got both"}};
