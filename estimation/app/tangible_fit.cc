@@ -514,8 +514,9 @@ std::string WriteFiles(const Prepared& prepared, const FitResult& result,
   }
   writer.Write(FLAGS_report,
                [&] { return FitReport(prepared.fit.path, problem, result, findings); });
-  writer.Write(FLAGS_predictions,
-               [&] { return PredictionCsv(problem, result.residuals, findings.later); });
+  writer.Write(FLAGS_predictions, [&] {
+    return PredictionCsv(problem, result.residuals, findings.later, findings.held_out);
+  });
   if (findings.posterior != nullptr) {
     const Posterior& posterior = *findings.posterior;
     writer.Write(FLAGS_posterior_samples,
@@ -578,6 +579,10 @@ int Conclude(const Prepared& prepared, const FitResult& result, const FitFinding
   if (findings.later != nullptr && !findings.later->score.message.empty()) {
     return ReportError(file + ": the run after " + Cell(FLAGS_predict_from, 10) +
                        " s fails: " + findings.later->score.message);
+  }
+  if (findings.held_out != nullptr) {
+    const std::string failure = FirstFailure(*findings.held_out);
+    if (!failure.empty()) return ReportError(file + ": " + failure);
   }
   // Said above: what was asked for is not there.
   const FitCheckpoint* const checkpoint = prepared.checkpoint.get();
@@ -712,6 +717,13 @@ int Run(const std::string& text, const std::string& file, const ShardPlan& plan)
         &later.emplace(PredictLater(prepared.fit.input, *prepared.problem, result.estimate,
                                     FLAGS_predict_from, std::move(prepared.held_back)));
     PrintScore(later->score);
+  }
+  std::optional<HeldOutRuns> held_out;
+  if (!prepared.fit.held_out.empty() && estimated) {
+    held_out = PredictHeldOut(prepared.fit.input, *prepared.problem, result.estimate,
+                              components.noise, std::move(prepared.fit.held_out));
+    findings.held_out = &*held_out;
+    std::cout << Describe(*held_out);
   }
   if (checkpoint != nullptr && !checkpoint->error().empty()) {
     ReportError(checkpoint->error() + ": the fit went on without its checkpoint");

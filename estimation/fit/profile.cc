@@ -261,6 +261,19 @@ ProblemWithHeld::ProblemWithHeld(int parameter, double value, LeastSquaresProble
   entries_.erase(entries_.begin() + parameter);
 }
 
+ProblemWithHeld::ProblemWithHeld(int parameter, double value,
+                                 std::unique_ptr<LeastSquaresProblem> problem)
+    : ProblemWithHeld(parameter, value, problem.get()) {
+  owned_ = std::move(problem);
+}
+
+std::unique_ptr<LeastSquaresProblem> ProblemWithHeld::Window(double part) const {
+  std::unique_ptr<LeastSquaresProblem> window = problem_->Window(part);
+  if (window == nullptr) return nullptr;
+  return std::unique_ptr<LeastSquaresProblem>(
+      new ProblemWithHeld(parameter_, value_, std::move(window)));
+}
+
 Eigen::VectorXd ProblemWithHeld::All(const Eigen::VectorXd& left) const {
   Eigen::VectorXd all(left.size() + 1);
   all << left.head(parameter_), value_, left.tail(left.size() - parameter_);

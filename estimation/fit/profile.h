@@ -20,6 +20,7 @@
 // References: D. J. Venzon and S. H. Moolgavkar, Applied Statistics 37 (1988) 87 (intervals by
 // profiles); J. T. Kent, Biometrika 69 (1982) 19 (the ratio where the model is wrong).
 
+#include <memory>
 #include <optional>
 #include <string>
 #include <utility>
@@ -56,13 +57,17 @@ class ProblemWithHeld : public LeastSquaresProblem {
   bool EvaluateBlock(int block, const Eigen::VectorXd& p, GradientMethod method,
                      BlockDerivatives derivatives, BlockEvaluation* evaluation) override;
   std::string BlockName(int block) const override { return problem_->BlockName(block); }
+  std::unique_ptr<LeastSquaresProblem> Window(double part) const override;
 
  private:
+  /// Of a problem that it owns.
+  ProblemWithHeld(int parameter, double value, std::unique_ptr<LeastSquaresProblem> problem);
   /// The held parameter's index in [shared | own] of a block; −1: it is another block's.
   int LocalIndex(int block) const;
 
   int parameter_;
   double value_;
+  std::unique_ptr<LeastSquaresProblem> owned_;  ///< or null
   LeastSquaresProblem* problem_;
   BlockLayout layout_;
   std::vector<ParameterEntry> entries_;

@@ -20,8 +20,13 @@ constexpr const char* kOfFile[] = {"scene",   "observations", "points", "sensors
 
 class Reader {
  public:
-  Reader(const Json& json, std::string file, JsonErrors* errors, FitInput* out)
-      : json_(json), file_(std::move(file)), root_(json, errors), out_(*out), common_(json) {}
+  Reader(const Json& json, std::string file, JsonErrors* errors, FitFile* out)
+      : json_(json),
+        file_(std::move(file)),
+        root_(json, errors),
+        out_(out->input),
+        held_out_(out->held_out),
+        common_(json) {}
 
   // False with an error of a recording's own; errors of the file itself are the reader's.
   bool Read(std::string* error) {
@@ -62,7 +67,10 @@ class Reader {
     for (int i = 0; i < count && root_.ok(); ++i) {
       if (!ReadRecording(list.At(i), json_["recordings"][i], &names, error)) return false;
     }
-    if (root_.ok()) CheckSpreads(count);
+    if (root_.ok() && out_.recordings.empty()) {
+      list.Fail("expected at least one recording of the role identify, got none");
+    }
+    if (root_.ok()) CheckSpreads(static_cast<int>(out_.recordings.size()));
     if (root_.ok()) CheckSensors();
     return true;
   }
@@ -147,9 +155,10 @@ class Reader {
 
   bool ReadRecording(const JsonReader& reader, const Json& json, std::set<std::string>* names,
                      std::string* error) {
-    reader.ExpectKeys({"name", "scene", "observations", "points", "sensors", "cameras", "clocks",
-                       "events", "start", "end", "weight", "values", "initial"},
-                      " of a recording");
+    reader.ExpectKeys(
+        {"name", "scene", "observations", "points", "sensors", "cameras", "clocks", "events",
+         "start", "end", "weight", "values", "initial", "role", "state_from"},
+        " of a recording");
     RecordingInput entry;
     entry.name = reader.At("name").String();
     if (!reader.ok()) return true;
@@ -175,9 +184,52 @@ class Reader {
     SetValues(reader, &entry.problem);
     if (!reader.ok()) return true;
     const JsonReader& starts = reader.Has("initial") ? reader : root_;
-    if (FromObservations(starts)) StartFromObservations(starts.At("initial"), &entry.problem);
-    out_.recordings.push_back(std::move(entry));
+    const bool from_observations = FromObservations(starts);
+    HeldOutRecording held_out;
+    const bool predicts = Predicts(reader);
+    if (predicts) HoldOut(reader, &entry.problem.observations, &held_out);
+    if (predicts) CheckFirstPart(reader, entry.problem);
+    if (!reader.ok()) return true;
+    if (from_observations) StartFromObservations(starts.At("initial"), &entry.problem);
+    if (!predicts) {
+      out_.recordings.push_back(std::move(entry));
+      return true;
+    }
+    held_out.recording = std::move(entry);
+    held_out.from_observations = from_observations;
+    held_out.place = static_cast<int>(names->size()) - 1;
+    held_out_.push_back(std::move(held_out));
     return true;
+  }
+
+  static bool Predicts(const JsonReader& recording) {
+    const bool predicts =
+        recording.Has("role") && recording.At("role").Choice({"identify", "predict"}) == 1;
+    if (!predicts && recording.Has("state_from")) {
+      recording.At("state_from").Fail("expected beside the role predict alone");
+    }
+    return predicts;
+  }
+
+  // Moves what comes after state_from out of the observations.
+  static void HoldOut(const JsonReader& recording, std::vector<Observation>* observations,
+                      HeldOutRecording* held_out) {
+    if (recording.Has("state_from")) {
+      held_out->state_from = recording.At("state_from").Number(NumberKind::kNonNegative);
+    }
+    held_out->later = TakeLater(held_out->state_from, observations);
+    if (held_out->later.empty()) {
+      recording.At("state_from").FailExpected("a time with observations after it");
+    }
+  }
+
+  void CheckFirstPart(const JsonReader& recording, const FitProblem& problem) const {
+    const std::vector<bool> own = OwnStates(problem.parameters, out_.scopes);
+    if (problem.observations.empty() && std::find(own.begin(), own.end(), true) != own.end()) {
+      recording.At("state_from")
+          .FailExpected(
+              "a time with observations up to it, to which the recording's start is fitted");
+    }
   }
 
   // Whether a message of ReadRun is of the recording, not of a key that the file has for all: the
@@ -328,6 +380,7 @@ class Reader {
   std::string file_;
   JsonReader root_;
   FitInput& out_;
+  std::vector<HeldOutRecording>& held_out_;
   Json common_;  // the file without its recordings
   bool has_recordings_ = false;
 };
@@ -336,7 +389,7 @@ bool FitFromJson(const Json& json, const std::string& file, FitFile* fit, std::s
   *fit = FitFile();
   fit->path = file;
   JsonErrors errors(file);
-  const bool read = Reader(json, file, &errors, &fit->input).Read(error);
+  const bool read = Reader(json, file, &errors, fit).Read(error);
   if (!errors.ok()) *error = errors.message();
   return read && errors.ok();
 }
@@ -361,6 +414,14 @@ std::unique_ptr<RecordingsProblem> MakeProblem(const FitFile& fit, std::string* 
     const std::string& name = fit.input.recordings[at].name;
     *error =
         DescribeFault(name.empty() ? fit.path : fit.path + ": recording '" + name + "'", fault);
+    return nullptr;
+  }
+  for (const HeldOutRecording& held_out : fit.held_out) {
+    const FitProblem& run = held_out.recording.problem;
+    ParameterizedScene scene;
+    if (scene.Create(run.scene, run.points, run.parameters, &fault, run.instruments)) continue;
+    *error = DescribeFault(fit.path + ": recording '" + held_out.recording.name + "'", fault);
+    return nullptr;
   }
   return problem;
 }

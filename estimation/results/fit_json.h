@@ -11,6 +11,7 @@
 
 #include "tangible/estimation/fit/discretisation.h"
 #include "tangible/estimation/fit/variance_components.h"
+#include "tangible/estimation/results/held_out.h"
 #include "tangible/estimation/results/prediction.h"
 #include "tangible/scene/json_writer.h"
 
@@ -19,7 +20,8 @@ namespace tangible {
 /// A fit file, read and checked.
 struct FitFile {
   std::string path;
-  FitInput input;  ///< a file without `recordings` has one of no name
+  FitInput input;                          ///< a file without `recordings` has one of no name
+  std::vector<HeldOutRecording> held_out;  ///< those of the role `predict`, in their order
 
   /// The run of a file without `recordings`.
   FitProblem& run() { return input.recordings.front().problem; }
@@ -45,6 +47,7 @@ struct FitFindings {
   const DiscretisationCheck* check = nullptr;
   const PredictedRecordings* later = nullptr;
   const Posterior* posterior = nullptr;
+  const HeldOutRuns* held_out = nullptr;
 };
 
 /// The result as the program writes it.

@@ -116,6 +116,8 @@ OrderedJson RecordingSchema() {
   properties["weight"] = Positive();
   properties["values"] = numbers;
   properties["initial"] = SchemaOfAny({SchemaOfWords({"from_observations"}), numbers});
+  properties["role"] = SchemaOfWords({"identify", "predict"});
+  properties["state_from"] = SchemaOfNumber(NumberKind::kNonNegative, "s");
   return SchemaOfObject(properties, {"name", "observations"});
 }
 

@@ -6,6 +6,7 @@
 #include <numeric>
 #include <utility>
 
+#include "tangible/estimation/results/held_out.h"
 #include "tangible/estimation/results/residual_summary.h"
 #include "tangible/estimation/results/tolerances.h"
 #include "tangible/scene/csv.h"
@@ -87,33 +88,34 @@ std::vector<Observation> TakeLater(double from, std::vector<Observation>* observ
   return taken;
 }
 
-PredictionScore ScorePrediction(double from, const std::vector<PredictedRun>& runs) {
+PredictionScore ScorePrediction(const std::vector<PredictedRun>& runs) {
   PredictionScore score;
-  score.from = from;
-  double last = from;
+  score.from = runs.empty() ? 0.0 : runs.front().from;
+  double reach = 0.0;
   for (const PredictedRun& run : runs) {
+    if (run.from != score.from) score.from = NAN;
     for (const Observation& observation : run.observations) {
-      last = std::max(last, observation.time);
+      reach = std::max(reach, observation.time - run.from);
     }
   }
-  const double width = (last - from) / kHorizons;
+  const double width = reach / kHorizons;
   ErrorSum all;
   std::vector<ErrorSum> bins(kHorizons);
   for (const PredictedRun& run : runs) {
     for (size_t i = 0; i < run.observations.size(); ++i) {
       const Observation& observation = run.observations[i];
       const double residual = run.residuals[static_cast<Eigen::Index>(i)];
-      const double part = (observation.time - from) / (last - from);
+      const double part = (observation.time - run.from) / reach;
       const int bin = std::clamp(static_cast<int>(std::ceil(part * kHorizons - kEdgeRounding)) - 1,
                                  0, kHorizons - 1);
       all.Add(observation, run.channels, residual);
       bins[bin].Add(observation, run.channels, residual);
     }
   }
-  score.all = all.Result(0.0, last - from);
+  score.all = all.Result(0.0, reach);
   for (int bin = 0; bin < kHorizons; ++bin) {
     const HorizonError error =
-        bins[bin].Result(bin * width, bin + 1 == kHorizons ? last - from : (bin + 1) * width);
+        bins[bin].Result(bin * width, bin + 1 == kHorizons ? reach : (bin + 1) * width);
     if (error.count > 0) {
       score.horizons.push_back(error);
     }
@@ -139,7 +141,7 @@ LaterObservations PredictLater(const FitProblem& problem, const Eigen::VectorXd&
     result.residuals.resize(0);
     return result;
   }
-  result.score = ScorePrediction(from, {{result.observations, problem.channels, result.residuals}});
+  result.score = ScorePrediction({{from, result.observations, problem.channels, result.residuals}});
   return result;
 }
 
@@ -149,8 +151,9 @@ constexpr const char* kColumns =
     "time,target,relative_to,coordinate,file,sensor,used,sigma,observed,predicted,residual,"
     "residual_in_sigma\n";
 
-/// The rows of a run, each after `prefix`.
-void AppendRows(const std::string& prefix, const RolloutResiduals& residuals,
+/// The rows of a run, each after `prefix`; `used` says what for the earlier ones are. Cells stay
+/// empty where there are no values.
+void AppendRows(const std::string& prefix, const char* used, const RolloutResiduals& residuals,
                 const Eigen::Ref<const Eigen::VectorXd>& values, const LaterObservations* later,
                 std::string* csv) {
   const std::vector<Observation>& fitted = residuals.observations();
@@ -172,11 +175,11 @@ void AppendRows(const std::string& prefix, const RolloutResiduals& residuals,
     csv->append(time, std::to_chars(time, time + sizeof time, o.time).ptr);
     *csv += "," + TargetName({scene, points, residuals.scene().instruments()}, o) + "," +
             ReferenceName(scene, points, residuals.ChannelOf(o)) + "," + NameOf(o.coordinate) +
-            "," + CsvCell(FileOf(residuals, o)) + "," + SensorOf(residuals, o) +
-            (is_later ? ",prediction" : ",fit");
+            "," + CsvCell(FileOf(residuals, o)) + "," + SensorOf(residuals, o) + "," +
+            (is_later ? "prediction" : used);
     AppendCell(o.sigma, csv);
     AppendCell(o.value, csv);
-    if (is_later && later->residuals.size() == 0) {
+    if ((is_later ? later->residuals.size() : values.size()) == 0) {
       *csv += ",,,\n";
       continue;
     }
@@ -207,25 +210,30 @@ PredictedRecordings PredictLater(const FitInput& input, const RecordingsProblem&
     if (!run.score.message.empty() && result.score.message.empty()) {
       result.score.message = problem.BlockName(block) + run.score.message;
     }
-    runs.push_back({run.observations, recording.problem.channels, run.residuals});
+    runs.push_back({from, run.observations, recording.problem.channels, run.residuals});
   }
   if (result.score.message.empty()) {
-    result.score = ScorePrediction(from, runs);
+    result.score = ScorePrediction(runs);
   }
   result.score.from = from;
   return result;
 }
 
 std::string PredictionCsv(const RecordingsProblem& problem, const Eigen::VectorXd& values,
-                          const PredictedRecordings* later) {
+                          const PredictedRecordings* later, const HeldOutRuns* held_out) {
   std::string csv = std::string(problem.IsNamed() ? "recording," : "") + kColumns;
   Eigen::Index first = 0;
   for (int b = 0; b < problem.num_blocks(); ++b) {
     const RecordedRun& recording = problem.recordings()[b];
     const Eigen::Index rows = recording.residuals.num_residuals();
-    AppendRows(problem.IsNamed() ? CsvCell(recording.name) + "," : "", recording.residuals,
+    AppendRows(problem.IsNamed() ? CsvCell(recording.name) + "," : "", "fit", recording.residuals,
                values.segment(first, rows), later == nullptr ? nullptr : &later->runs[b], &csv);
     first += rows;
+  }
+  if (held_out == nullptr) return csv;
+  for (const HeldOutRun& run : held_out->runs) {
+    if (!run.first_part) continue;
+    AppendRows(CsvCell(run.name) + ",", "state", *run.first_part, run.residuals, &run.later, &csv);
   }
   return csv;
 }

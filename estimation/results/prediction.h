@@ -31,7 +31,7 @@ struct HorizonError {
 
 /// How well a scene that was fitted up to a time predicts later observations.
 struct PredictionScore {
-  double from = 0.0;    ///< T, s
+  double from = 0.0;    ///< T, s; NaN: each run has its own
   std::string message;  ///< why the run after T failed, or empty
   HorizonError all;     ///< over all horizons
   std::vector<HorizonError> horizons;
@@ -51,16 +51,18 @@ std::vector<Observation> TakeLater(double from, std::vector<Observation>* observ
 LaterObservations PredictLater(const FitProblem& problem, const Eigen::VectorXd& estimate,
                                double from, std::vector<Observation> later);
 
-/// The observations of a run after a time, by channels (none: directly), and their residuals in
+/// The observations of a run after T, by channels (none: directly), and their residuals in
 /// multiples of sigma.
 struct PredictedRun {
+  double from;  ///< T, s
   const std::vector<Observation>& observations;
   const std::vector<Channel>& channels;
   const Eigen::VectorXd& residuals;
 };
 
-/// The score of several runs together.
-PredictionScore ScorePrediction(double from, const std::vector<PredictedRun>& runs);
+/// The score of several runs together, the horizons of each from its own T on. `from` of the score
+/// is NaN where the runs differ in it.
+PredictionScore ScorePrediction(const std::vector<PredictedRun>& runs);
 
 /// The later observations of each recording, and the score of all together.
 struct PredictedRecordings {
@@ -71,12 +73,15 @@ PredictedRecordings PredictLater(const FitInput& input, const RecordingsProblem&
                                  const Eigen::VectorXd& estimate, double from,
                                  std::vector<std::vector<Observation>> later);
 
+struct HeldOutRuns;  // held_out.h
+
 /// A row an observation, by time: time, target (body or point), relative_to, coordinate, file,
-/// sensor, used (fit or prediction), sigma, observed, predicted, residual (predicted − observed, in
+/// sensor, used (fit, state or prediction), sigma, observed, predicted, residual (predicted − observed, in
 /// the observation's unit) and residual_in_sigma; the last three are empty where there is no run.
 /// Recordings follow each other, with their names, where they have any, in a first column. `values`
-/// are the residuals of the fit, in multiples of sigma; `later` may be null.
+/// are the residuals of the fit, in multiples of sigma; `later` may be null, and so may
+/// `held_out`, whose rows come last: `used` is `state` for those to which a start was fitted.
 std::string PredictionCsv(const RecordingsProblem& problem, const Eigen::VectorXd& values,
-                          const PredictedRecordings* later);
+                          const PredictedRecordings* later, const HeldOutRuns* held_out);
 
 }  // namespace tangible

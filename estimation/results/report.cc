@@ -314,12 +314,13 @@ std::string SeriesPlots(const std::vector<Series>& all, size_t num_series) {
 }
 
 /// The error of observations that were not fitted, over the horizon of the prediction.
-std::string PredictionPart(const PredictionScore* score) {
+std::string PredictionPart(const std::string& title, const PredictionScore* score) {
   if (score == nullptr) {
     return "";
   }
-  std::string html =
-      "<h2>Prediction</h2>\n<p>Fitted to observations up to " + CompactNumber(score->from) + " s.";
+  std::string html = "<h2>" + title + "</h2>\n<p>Fitted to observations up to " +
+                     (std::isfinite(score->from) ? CompactNumber(score->from) + " s."
+                                                 : "a time of each recording's own.");
   if (!score->message.empty()) {
     return html + " <strong>The run beyond fails:</strong> " + HtmlEscape(score->message) +
            "</p>\n";
@@ -466,6 +467,28 @@ std::string RecordingTable(const RecordingsProblem& problem, const FitResult& re
          HtmlTable({"recording", "observations", "weight", "residual rms (sigma)"}, rows);
 }
 
+std::string HeldOutPart(const HeldOutRuns* held_out) {
+  if (held_out == nullptr) {
+    return "";
+  }
+  const auto text = [](double x) { return std::isfinite(x) ? CompactNumber(x, 4) : ""; };
+  std::vector<std::vector<std::string>> rows;
+  const size_t all = held_out->runs.size();
+  for (size_t i = 0; i < std::min(all, kMostRows); ++i) {
+    const HeldOutRun& run = held_out->runs[i];
+    const HorizonError& error = run.later.score.all;
+    rows.push_back({run.name, CompactNumber(run.state_from, 4),
+                    std::to_string(run.residuals.size()), text(run.residual_rms),
+                    std::to_string(error.count), text(error.rms_in_sigma), text(error.rms_length),
+                    text(error.max_length), text(error.rms_angle), text(error.max_angle),
+                    run.message});
+  }
+  return PredictionPart("Held-out recordings", &held_out->score) + FirstOf(rows.size(), all) +
+         HtmlTable({"recording", "start from (s)", "observations", "rms (sigma)", "predicted",
+                    "rms (sigma)", "rms (m)", "largest (m)", "rms (rad)", "largest (rad)", ""},
+                   rows);
+}
+
 }  // namespace
 
 std::string FitReport(const std::string& title, const RecordingsProblem& problem,
@@ -474,18 +497,19 @@ std::string FitReport(const std::string& title, const RecordingsProblem& problem
   const std::vector<ParameterEntry>& entries = problem.entries();
   const ResidualSummary summary = SummarizeResiduals(problem, result.residuals);
   const PredictionScore* const score = findings.later == nullptr ? nullptr : &findings.later->score;
-  return HtmlPage(
-      heading, "<h1>" + HtmlEscape(heading) + "</h1>\n<h2>Estimates</h2>\n" +
-                   EstimateTable(entries, result) + Warnings(result.uncertainty) +
-                   ProfilePlots(entries, result) +
-                   (findings.posterior ? PosteriorPart(entries, *findings.posterior) : "") +
-                   CombinationTable(result.uncertainty) + SpreadTable(findings.components) +
-                   SummaryTable(result) + RecordingTable(problem, result) +
-                   NoiseTable(findings.components) + CorrelationTable(entries, result) +
-                   StepTable(entries, findings.check) + PredictionPart(score) + StartTable(result) +
-                   IterationPlots(entries, result) + ResidualTable(summary) +
-                   OutlierTable(summary) +
-                   SeriesPlots(CollectSeries(problem, result), summary.series.size()));
+  return HtmlPage(heading,
+                  "<h1>" + HtmlEscape(heading) + "</h1>\n<h2>Estimates</h2>\n" +
+                      EstimateTable(entries, result) + Warnings(result.uncertainty) +
+                      ProfilePlots(entries, result) +
+                      (findings.posterior ? PosteriorPart(entries, *findings.posterior) : "") +
+                      CombinationTable(result.uncertainty) + SpreadTable(findings.components) +
+                      SummaryTable(result) + RecordingTable(problem, result) +
+                      NoiseTable(findings.components) + CorrelationTable(entries, result) +
+                      StepTable(entries, findings.check) + PredictionPart("Prediction", score) +
+                      HeldOutPart(findings.held_out) + StartTable(result) +
+                      IterationPlots(entries, result) + ResidualTable(summary) +
+                      OutlierTable(summary) +
+                      SeriesPlots(CollectSeries(problem, result), summary.series.size()));
 }
 
 }  // namespace tangible

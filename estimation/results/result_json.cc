@@ -257,7 +257,7 @@ OrderedJson PredictionToJson(const PredictionScore& score) {
   for (const HorizonError& error : score.horizons) {
     horizons.push_back(HorizonToJson(error));
   }
-  return {{"from", score.from},
+  return {{"from", Number(score.from)},
           {"message", score.message},
           {"all", HorizonToJson(score.all)},
           {"horizons", horizons}};
@@ -306,8 +306,29 @@ OrderedJson SpreadsToJson(const std::vector<SpreadEstimate>& spreads) {
   return all;
 }
 
+/// The recordings with the role `predict`, beside those that identify.
+OrderedJson HeldOutToJson(const HeldOutRun& run) {
+  OrderedJson start = OrderedJson::array();
+  for (size_t i = 0; i < run.fitted.size() && run.parameters.size() > 0; ++i) {
+    start.push_back({{"name", run.entries[run.fitted[i]].name},
+                     {"estimate", Number(run.parameters[run.fitted[i]])},
+                     {"standard_deviation", Number(run.deviations[static_cast<Eigen::Index>(i)])}});
+  }
+  return {{"name", run.name},
+          {"role", "predict"},
+          {"state_from", run.state_from},
+          {"status", NameOf(run.status)},
+          {"message", run.message},
+          {"state", start},
+          {"residuals", run.residuals.size()},
+          {"residual_rms", Number(run.residual_rms)},
+          {"prediction_rms", Number(run.later.score.all.rms_in_sigma)},
+          {"prediction", PredictionToJson(run.later.score)}};
+}
+
 OrderedJson RecordingsToJson(const RecordingsProblem& problem, const FitResult& result,
-                             const PredictedRecordings* later) {
+                             const FitFindings& findings) {
+  const PredictedRecordings* const later = findings.later;
   OrderedJson all = OrderedJson::array();
   for (int b = 0; b < problem.num_blocks(); ++b) {
     all.push_back({{"name", problem.recordings()[b].name},
@@ -317,6 +338,11 @@ OrderedJson RecordingsToJson(const RecordingsProblem& problem, const FitResult& 
     if (later != nullptr) {
       all.back()["prediction_rms"] = Number(later->runs[b].score.all.rms_in_sigma);
     }
+    if (findings.held_out != nullptr) all.back()["role"] = "identify";
+  }
+  if (findings.held_out == nullptr) return all;
+  for (const HeldOutRun& run : findings.held_out->runs) {
+    all.insert(all.begin() + run.place, HeldOutToJson(run));
   }
   return all;
 }
@@ -369,13 +395,16 @@ OrderedJson ResultToJson(const RecordingsProblem& problem, const FitResult& resu
   json["residuals_by_series"] = SeriesToJson(summary);
   json["outliers"] = OutliersToJson(summary);
   if (problem.IsNamed()) {
-    json["recordings"] = RecordingsToJson(problem, result, findings.later);
+    json["recordings"] = RecordingsToJson(problem, result, findings);
   }
   if (findings.check != nullptr) {
     json["discretisation"] = CheckToJson(problem.entries(), *findings.check);
   }
   if (findings.later != nullptr) {
     json["prediction"] = PredictionToJson(findings.later->score);
+  }
+  if (findings.held_out != nullptr) {
+    json["held_out"] = PredictionToJson(findings.held_out->score);
   }
   if (findings.posterior != nullptr) {
     json["posterior"] = PosteriorToJson(problem.entries(), *findings.posterior);

@@ -164,12 +164,18 @@ class FitProblemOf {
       findings.later = &later.emplace(PredictLater(fit_.input, *problem_, result.estimate,
                                                    wanted.predict_from, std::move(held_back)));
     }
+    std::optional<HeldOutRuns> held_out;
+    if (!fit_.held_out.empty() && any) {
+      findings.held_out = &held_out.emplace(
+          PredictHeldOut(fit_.input, *problem_, result.estimate, components.noise, fit_.held_out));
+    }
     OrderedJson all = ResultToJson(*problem_, result, findings);
     all["certificate"] = any ? ToJson(result.certificate) : OrderedJson(nullptr);
     Found found{all.dump(), "", "", {}};
     if (!any) return found;
     found.report = FitReport(fit_.path, *problem_, result, findings);
-    found.predictions = PredictionCsv(*problem_, result.residuals, findings.later);
+    found.predictions =
+        PredictionCsv(*problem_, result.residuals, findings.later, findings.held_out);
     for (int b = 0; b < problem_->num_blocks(); ++b) found.scenes.push_back(SceneOf(b, result));
     return found;
   }

@@ -6,49 +6,26 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
-#include "run_program.h"
+#include "fit_fixture.h"
 
 namespace tangible {
 namespace {
 
 using nlohmann::json;
 
-constexpr char kScene[] = R"({"bodies": [
-  {"name": "ball", "shape": {"circle": {"radius": 0.1}}, "mass": 1, "inertia": 0.005,
-   "position": [0, 1], "velocity": [2, 3]}],
-  "gravity": [0, -9.5], "simulation": {"dt": 0.01, "duration": 0.5}})";
-
-/// x = 2 t; y of semi-implicit Euler's parabola, 1 + 3 t − g dt² k (k + 1) / 2 with g = 9.5; with
-/// errors of 0.01 in turn.
-std::string Observations() {
-  std::string text = "time,body,x,y\n";
-  for (int k = 0; k <= 50; k += 5) {
-    const double error = (k % 10 == 0 ? 0.01 : -0.01);
-    text += json(0.01 * k).dump() + ",ball," + json(0.02 * k + error).dump() + "," +
-            json(1.0 + 0.03 * k - 9.5 * 0.5e-4 * k * (k + 1) - error).dump() + "\n";
-  }
-  return text;
-}
-
-class TangibleFitPosteriorTest : public ProgramTest {
+class TangibleFitPosteriorTest : public FitProgramTest {
  protected:
-  void SetUp() override {
-    ProgramTest::SetUp();
-    Write("scene.json", kScene);
-    Write("o.csv", Observations());
-  }
-  /// A fit of g and the initial speed; `changes` are merged into it.
-  static json Problem(const json& changes = json::object()) {
-    json fit =
-        json::parse(R"({"scene": "scene.json", "observations": [{"file": "o.csv", "sigma": 0.01}],
-      "parameters": [{"name": "g", "initial": 8, "lower": 1, "upper": 20,
-                      "sets": [{"path": "gravity/y", "scale": -1}]},
-                     {"name": "speed", "initial": 1, "sets": [{"path": "bodies/ball/velocity/x"}]}]})");
-    fit.merge_patch(changes);
-    return fit;
-  }
-  ProgramRun Fit(const json& fit, const std::string& flags = "") const {
-    return Run("tangible-fit", "'" + Write("fit.json", fit.dump()) + "' " + flags);
+  void SetUp() override { SetUpWith(Observations()); }
+
+  /// x = 2 t and the height, with errors of 0.01 in turn.
+  static std::string Observations() {
+    std::string text = "time,body,x,y\n";
+    for (int k = 0; k <= 50; k += 5) {
+      const double error = (k % 10 == 0 ? 0.01 : -0.01);
+      text += json(0.01 * k).dump() + ",ball," + json(0.02 * k + error).dump() + "," +
+              json(Height(k) - error).dump() + "\n";
+    }
+    return text;
   }
   std::string Flag(const std::string& flag, const std::string& name) const {
     return " --" + flag + "='" + Path(name) + "'";

@@ -4,51 +4,24 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
-#include "run_program.h"
+#include "fit_fixture.h"
 
 namespace tangible {
 namespace {
 
 using nlohmann::json;
 
-constexpr char kScene[] = R"({"bodies": [
-  {"name": "ball", "shape": {"circle": {"radius": 0.1}}, "mass": 1, "inertia": 0.005,
-   "position": [0, 1], "velocity": [2, 3]}],
-  "gravity": [0, -9.5], "simulation": {"dt": 0.01, "duration": 0.5}})";
-
-/// y of semi-implicit Euler's parabola at t = k dt: 1 + 3 t - g dt² k (k + 1) / 2, with g = 9.5.
-double Height(int k) { return 1.0 + 0.03 * k - 9.5 * 1e-4 * 0.5 * k * (k + 1); }
-
-std::string Observations() {
-  std::string text = "time,body,x,y\n";
-  for (int k = 0; k <= 50; k += 10) {
-    text += std::to_string(0.01 * k) + ",ball," + (k == 20 ? "" : std::to_string(0.02 * k)) + "," +
-            json(Height(k)).dump() + "\n";
-  }
-  return text;
-}
-
-class TangibleFitTest : public ProgramTest {
+class TangibleFitTest : public FitProgramTest {
  protected:
-  void SetUp() override {
-    ProgramTest::SetUp();
-    Write("scene.json", kScene);
-    Write("o.csv", Observations());
-  }
+  void SetUp() override { SetUpWith(Observations()); }
 
-  /// A fit of g and the initial speed; `changes` are merged into it.
-  static json Problem(const json& changes = json::object()) {
-    json fit =
-        json::parse(R"({"scene": "scene.json", "observations": [{"file": "o.csv", "sigma": 0.01}],
-      "parameters": [{"name": "g", "initial": 8, "lower": 1, "upper": 20,
-                      "sets": [{"path": "gravity/y", "scale": -1}]},
-                     {"name": "speed", "initial": 1, "sets": [{"path": "bodies/ball/velocity/x"}]}]})");
-    fit.merge_patch(changes);
-    return fit;
-  }
-
-  ProgramRun Fit(const json& fit, const std::string& flags = "") const {
-    return Run("tangible-fit", "'" + Write("fit.json", fit.dump()) + "' " + flags);
+  static std::string Observations() {
+    std::string text = "time,body,x,y\n";
+    for (int k = 0; k <= 50; k += 10) {
+      text += std::to_string(0.01 * k) + ",ball," + (k == 20 ? "" : std::to_string(0.02 * k)) +
+              "," + json(Height(k)).dump() + "\n";
+    }
+    return text;
   }
 };
 
