@@ -382,7 +382,8 @@ void CoincidenceMaker::AddWall(const char* name, int axis, double face) {
   BasicBody<double> wall;
   wall.name = Named(name);
   wall.motion = Motion::kStatic;
-  wall.shape = {ShapeType::kBox, {axis == 0 ? 1.0 : 4.0, axis == 0 ? 4.0 : 1.0}};
+  // A roof is as long as the way of what moves along it in any run.
+  wall.shape = {ShapeType::kBox, {axis == 0 ? 1.0 : 8.0, axis == 0 ? 4.0 : 1.0}};
   wall.position =
       axis == 0 ? Vector2<double>(face + 0.5, 0.0) : Vector2<double>(place_, face + 0.5);
   wall.restitution = made_.scene.bodies.back().restitution;

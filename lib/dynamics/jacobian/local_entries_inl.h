@@ -229,7 +229,11 @@ class LocalEntries {
   double EmitDecay(const ActiveContact& contact, const ContactRows<LocalJet>& rows, double rest,
                    const LocalJet& slip, const Locals& locals, double factor) {
     DecaySource decay;
-    if (contact.joint >= 0 || !MixedDecay(model_, contact.a, contact.b, &decay)) return 1.0;
+    // Without friction at rest there is none that slides, whatever the kinetic one is.
+    if (contact.joint >= 0 || rest == 0.0 ||
+        !MixedDecay(model_, contact.a, contact.b, &decay)) {
+      return 1.0;
+    }
     const LocalJet numbers[3] = {LocalJet(rest, 0), LocalJet(decay.kinetic.value, 1),
                                  LocalJet(decay.speed.value, 2)};
     const LocalJet lost = FrictionDecay(numbers, LocalJet(slip.a, 3));

@@ -38,14 +38,15 @@ bool EndsInMeeting(const Model<double>& model, const Segment& segment) {
 }
 
 // Whether a contact begins in penetration, because another feature of a body that is being moved
-// out of it becomes the nearest: its gap has not passed through 0, and does not tell when.
+// out of it becomes the nearest: its gap has not passed through 0, and does not tell when. Just
+// before, that feature may be far from the other body.
 bool BeginsInPenetration(const Model<double>& model, const Segment& segment) {
   const ActiveContact& contact = segment.event_contact;
   if (segment.event != EventKind::kTouch || contact.joint >= 0) return false;
   ContactRows<double> rows;
   EvaluateContactRows(model, segment.after, contact, &rows);
   const double size = std::max(RadiusOf(model, contact.a), RadiusOf(model, contact.b));
-  return rows.geometry.gap < -kBegunDepth * size;
+  return std::abs(rows.geometry.gap) > kBegunDepth * size;
 }
 
 double SlipOf(const Model<double>& model, const State<double>& state,
