@@ -40,6 +40,7 @@ double LargestSquaredGyration(const BasicShape<double>& shape) {
   switch (shape.type) {
     case ShapeType::kNone:
     case ShapeType::kHalfPlane:
+    case ShapeType::kPolyline:
       return std::numeric_limits<double>::infinity();
     case ShapeType::kCircle:
     case ShapeType::kEllipse:

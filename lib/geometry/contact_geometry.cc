@@ -15,7 +15,8 @@ int EdgeNumbers(ShapeType type, int num_numbers, int edge, int numbers[4]) {
     case ShapeType::kCapsule:
       numbers[0] = 1;
       return 1;
-    case ShapeType::kPolygon: {
+    case ShapeType::kPolygon:
+    case ShapeType::kPolyline: {
       const int end = edge + 1 == num_numbers / 2 ? 0 : edge + 1;
       numbers[0] = 2 * edge;
       numbers[1] = 2 * edge + 1;
@@ -43,7 +44,7 @@ int FeatureNumbers(ShapeType type, int num_numbers, bool is_edge, int feature, i
   if (type == ShapeType::kNone) {
     return 0;
   }
-  numbers[0] = type == ShapeType::kPolygon ? 2 * feature : 0;
+  numbers[0] = type == ShapeType::kPolygon || type == ShapeType::kPolyline ? 2 * feature : 0;
   if (type == ShapeType::kCircle) {
     return 1;
   }

@@ -54,6 +54,7 @@ void VertexAdjoint(const ShapeView<double>& shape, int vertex, const Vector& bar
       side->numbers[1] += (vertex >= 2 ? 0.5 : -0.5) * bar.y();
       break;
     case ShapeType::kPolygon:
+    case ShapeType::kPolyline:
       side->numbers[0] += bar.x();
       side->numbers[1] += bar.y();
       break;
@@ -62,10 +63,10 @@ void VertexAdjoint(const ShapeView<double>& shape, int vertex, const Vector& bar
   }
 }
 
-using Line = internal::BoundaryLine<double>;
+using FlatLine = internal::BoundaryLine<double>;
 
 // `bar` is the line's adjoint.
-void EdgeLineAdjoint(const ShapeView<double>& shape, int edge, const Line& bar,
+void EdgeLineAdjoint(const ShapeView<double>& shape, int edge, const FlatLine& bar,
                      ContactSideAdjoint* side) {
   if (shape.type == ShapeType::kBox) {
     side->numbers[0] += 0.5 * bar.offset;
@@ -89,7 +90,7 @@ void EdgeLineAdjoint(const ShapeView<double>& shape, int edge, const Line& bar,
   side->numbers[3] += across_bar.x();
 }
 
-void HalfPlaneLineAdjoint(const ShapeView<double>& shape, const Line& bar,
+void HalfPlaneLineAdjoint(const ShapeView<double>& shape, const FlatLine& bar,
                           ContactSideAdjoint* side) {
   const Vector across(shape.numbers[0], shape.numbers[1]);
   double norm;
@@ -106,10 +107,10 @@ void HalfPlaneLineAdjoint(const ShapeView<double>& shape, const Line& bar,
 }
 
 // This returns the adjoint of the line.
-Line VertexAgainstLineAdjoint(const ShapeView<double>& shape, const Pose<double>& pose, int vertex,
-                              const Line& line, const Pose<double>& line_pose,
-                              const ContactGeometry<double>& bar, ContactSideAdjoint* side,
-                              ContactSideAdjoint* line_side) {
+FlatLine VertexAgainstLineAdjoint(const ShapeView<double>& shape, const Pose<double>& pose,
+                                  int vertex, const FlatLine& line, const Pose<double>& line_pose,
+                                  const ContactGeometry<double>& bar, ContactSideAdjoint* side,
+                                  ContactSideAdjoint* line_side) {
   const Vector arm = pose.rotation * Vertex(shape, vertex);
   const Vector relative(pose.position.x() - line_pose.position.x() + arm.x(),
                         pose.position.y() - line_pose.position.y() + arm.y());
@@ -227,7 +228,7 @@ void EvaluateContactAdjoint(const ContactFeature& feature, const ShapeView<doubl
   }
   switch (feature.kind) {
     case FeatureKind::kVertexEdge: {
-      const Line line = internal::EdgeLine(shape_b, feature.b);
+      const FlatLine line = internal::EdgeLine(shape_b, feature.b);
       EdgeLineAdjoint(
           shape_b, feature.b,
           VertexAgainstLineAdjoint(shape_a, pose_a, feature.a, line, pose_b, bar, a_bar, b_bar),
@@ -235,7 +236,7 @@ void EvaluateContactAdjoint(const ContactFeature& feature, const ShapeView<doubl
       break;
     }
     case FeatureKind::kEdgeVertex: {
-      const Line line = internal::EdgeLine(shape_a, feature.a);
+      const FlatLine line = internal::EdgeLine(shape_a, feature.a);
       EdgeLineAdjoint(shape_a, feature.a,
                       VertexAgainstLineAdjoint(shape_b, pose_b, feature.b, line, pose_a,
                                                internal::Swapped(bar), b_bar, a_bar),
@@ -243,7 +244,7 @@ void EvaluateContactAdjoint(const ContactFeature& feature, const ShapeView<doubl
       break;
     }
     case FeatureKind::kVertexPlane: {
-      const Line line = internal::HalfPlaneLine(shape_b);
+      const FlatLine line = internal::HalfPlaneLine(shape_b);
       HalfPlaneLineAdjoint(
           shape_b,
           VertexAgainstLineAdjoint(shape_a, pose_a, feature.a, line, pose_b, bar, a_bar, b_bar),
@@ -251,7 +252,7 @@ void EvaluateContactAdjoint(const ContactFeature& feature, const ShapeView<doubl
       break;
     }
     case FeatureKind::kPlaneVertex: {
-      const Line line = internal::HalfPlaneLine(shape_a);
+      const FlatLine line = internal::HalfPlaneLine(shape_a);
       HalfPlaneLineAdjoint(shape_a,
                            VertexAgainstLineAdjoint(shape_b, pose_b, feature.b, line, pose_a,
                                                     internal::Swapped(bar), b_bar, a_bar),

@@ -7,7 +7,8 @@
 // counter-clockwise) grown by a radius: circle = point, capsule = segment, box and polygon have
 // radius 0. The half-plane is solid where n·r ≤ d, with n = normal / |normal|, d = offset /
 // |normal|. An ellipse is a point, its centre, grown by a radius that depends on the direction
-// (ellipse.h).
+// (ellipse.h). A polyline is no core: its edges bound a solid to the left of the way along its
+// points (outline.h); where it is closed the first point is repeated at the end.
 
 #include "tangible/math/planar.h"
 #include "tangible/math/scalar.h"
@@ -26,7 +27,7 @@ struct ShapeView {
 };
 
 /// The number of vertices of the core: 1 of a circle or ellipse, 2 of a capsule, 4 of a box, n of a
-/// polygon; 0 of a half-plane and of no shape.
+/// polygon or polyline; 0 of a half-plane and of no shape.
 inline int NumVertices(ShapeType type, int num_numbers) {
   switch (type) {
     case ShapeType::kCircle:
@@ -37,6 +38,7 @@ inline int NumVertices(ShapeType type, int num_numbers) {
     case ShapeType::kBox:
       return 4;
     case ShapeType::kPolygon:
+    case ShapeType::kPolyline:
       return num_numbers / 2;
     default:
       return 0;
@@ -56,6 +58,7 @@ Vector2<T> Vertex(const ShapeView<T>& shape, int i) {
     case ShapeType::kCapsule:
       return Vector2<T>((i == 0 ? -0.5 : 0.5) * shape.numbers[0], T(0.0));
     case ShapeType::kPolygon:
+    case ShapeType::kPolyline:
       return Vector2<T>(shape.numbers[2 * i], shape.numbers[2 * i + 1]);
     default:
       return Vector2<T>(T(0.0), T(0.0));

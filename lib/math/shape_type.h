@@ -6,6 +6,6 @@
 
 namespace tangible {
 
-enum class ShapeType { kNone, kCircle, kBox, kCapsule, kPolygon, kHalfPlane, kEllipse };
+enum class ShapeType { kNone, kCircle, kBox, kCapsule, kPolygon, kHalfPlane, kEllipse, kPolyline };
 
 }  // namespace tangible

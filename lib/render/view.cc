@@ -36,6 +36,8 @@ const char* Name(ShapeType type) {
       return "polygon";
     case ShapeType::kHalfPlane:
       return "half_plane";
+    case ShapeType::kPolyline:
+      return "polyline";
     default:
       return "none";
   }
@@ -123,6 +125,12 @@ void WriteBodies(const ViewData& data, const std::vector<ViewFrame>& frames, Jso
       json->Number(number);
     }
     json->Close(']');
+    if (body.shape.type == ShapeType::kPolyline) {
+      json->Key("closed");
+      json->Number(body.shape.closed ? 1.0 : 0.0);
+      json->Key("solid");
+      json->Number(body.shape.solid == SolidSide::kLeft ? 1.0 : -1.0);
+    }
     if (!body.contact_points.empty()) {
       json->Key("points");
       json->Open('[');

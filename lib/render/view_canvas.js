@@ -53,6 +53,7 @@ function coreOf(body) {
     case "box": return {points: [[-n[0] / 2, -n[1] / 2], [n[0] / 2, -n[1] / 2], [n[0] / 2, n[1] / 2],
                                  [-n[0] / 2, n[1] / 2]], radius: 0};
     case "polygon": return {points: Array.from({length: n.length / 2}, (_, i) => [n[2 * i], n[2 * i + 1]]), radius: 0};
+    case "polyline": return {points: Array.from({length: n.length / 2}, (_, i) => [n[2 * i], n[2 * i + 1]]), radius: 0};
     default: return null;
   }
 }
@@ -63,6 +64,7 @@ function insideBody(body, pose, point) {
   const p = toBody(pose, point);
   if (body.shape === "half_plane") return body.numbers[0] * p[0] + body.numbers[1] * p[1] <= body.numbers[2];
   if (!body.core) return Math.hypot(p[0], p[1]) * camera.scale < 9;
+  if (body.shape === "polyline") return false;
   const {points, radius} = body.core;
   if (points.length > 2) {
     return points.every((a, i) => {
@@ -214,8 +216,29 @@ function drawContactPoints(g, body, pose) {
   g.fillStyle = bodyColour(body);
   for (const point of body.points || []) { disc(g, toScreen(toWorld(pose, point)), 3); g.fill(); }
 }
+// The line, with strokes of equal distance on the side of the solid.
+function drawPolyline(g, body, pose) {
+  const points = body.core.points.map((p) => toScreen(toWorld(pose, p)));
+  if (body.closed) points.push(points[0]);
+  g.strokeStyle = bodyColour(body); g.lineWidth = 1.5; g.beginPath();
+  for (const p of points) g.lineTo(p[0], p[1]);
+  g.stroke();
+  g.lineWidth = 1;
+  let left = 4;
+  for (let i = 1; i < points.length; i++) {
+    const a = points[i - 1], b = points[i], length = Math.hypot(b[0] - a[0], b[1] - a[1]);
+    const t = [(b[0] - a[0]) / length, (b[1] - a[1]) / length];
+    for (; left < length && length < 1e5; left += 8) {
+      const p = [a[0] + left * t[0], a[1] + left * t[1]];
+      // Screens have y downwards, so that left of the way is (t_y, -t_x).
+      line(g, p, [p[0] + 6 * (body.solid * t[1] - t[0]), p[1] - 6 * (body.solid * t[0] + t[1])]);
+    }
+    left = Math.max(left - length, 0);
+  }
+}
 function drawBody(g, body, pose, hovered) {
   if (body.shape === "half_plane") { drawHalfPlane(g, body, pose); return; }
+  if (body.shape === "polyline") { drawPolyline(g, body, pose); return; }
   const colour = bodyColour(body), centre = toScreen([pose[0], pose[1]]);
   g.strokeStyle = colour; g.lineWidth = hovered ? 3 : 1.5;
   if (!body.core) {

@@ -76,7 +76,10 @@ class FieldReader {
   void Vertices(const Field& field, std::vector<double>& numbers) {
     const JsonReader vertices = item_.At(field.key);
     const int size = vertices.Size();
-    if (size < 3) return vertices.FailExpected("an array of at least 3 points");
+    if (size < field.least) {
+      return vertices.FailExpected("an array of at least " + std::to_string(field.least) +
+                                   " points");
+    }
     for (int i = 0; i < size; ++i) {
       const Vector2<double> vertex = vertices.At(i).Point();
       numbers.insert(numbers.end(), {vertex.x(), vertex.y()});

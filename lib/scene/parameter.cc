@@ -162,6 +162,7 @@ double SizeOf(const BasicShape<double>& shape) {
       return shape.numbers[0] + 2.0 * shape.numbers[1];
     case ShapeType::kBox:
     case ShapeType::kPolygon:
+    case ShapeType::kPolyline:
       break;
   }
   double size = 0.0;

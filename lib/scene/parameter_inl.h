@@ -235,6 +235,8 @@ BasicScene<T> CastScene(const Scene& scene) {
     body.name = from.name;
     body.motion = from.motion;
     body.shape.type = from.shape.type;
+    body.shape.closed = from.shape.closed;
+    body.shape.solid = from.shape.solid;
     body.shape.numbers.resize(from.shape.numbers.size());
     if (from.driven) body.driven.emplace().path = from.driven->path;
     cast(from, &body, [](auto& item, auto* visitor) {

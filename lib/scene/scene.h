@@ -20,6 +20,8 @@
 
 namespace tangible {
 
+enum class SolidSide { kLeft, kRight };
+
 /// A shape in the body frame; `numbers` holds, by type:
 ///   kCircle    radius
 ///   kBox       width, height
@@ -27,10 +29,13 @@ namespace tangible {
 ///   kCapsule   length between the cap centres (along body x), radius
 ///   kPolygon   x0, y0, x1, y1, ...: convex, counter-clockwise
 ///   kHalfPlane normal x, normal y, offset: solid where normal·r ≤ offset; not necessarily unit
+///   kPolyline  x0, y0, x1, y1, ...: the points in the order of the file
 template <typename T>
 struct BasicShape {
   ShapeType type = ShapeType::kNone;
   std::vector<T> numbers;
+  bool closed = false;                 ///< of a polyline: the last point is joined to the first
+  SolidSide solid = SolidSide::kLeft;  ///< of a polyline, going along its points
 };
 
 enum class Motion { kMoving, kStatic, kKinematic };

@@ -14,7 +14,7 @@
 //   Anchors         [[x, y], [x, y]]
 //   Interval        [low, high], or absent; null: infinite
 //   Numbers         two numbers of a shape: [w, h]
-//   Vertices        numbers of a polygon: [[x, y], ...]
+//   Vertices        numbers of a polygon or polyline: [[x, y], ...]
 //   NumberOrSignal  1.5 or {"file": ...}
 //   PointOrSignal   [x, y] or {"file": ...}
 //   Part            an object with fields of its own, or absent
@@ -51,6 +51,7 @@ struct Field {
   const char* with_form = "a number >= 0";
   /// The field beside which it must not be; then it is not present.
   const char* without = nullptr;
+  int least = 3;  ///< of points
 };
 
 inline constexpr Field kGravityField{"gravity", NumberKind::kFree, Dimension::kAcceleration};
@@ -82,6 +83,12 @@ void VisitShape(Shape& shape, Visitor* visitor) {
     case ShapeType::kPolygon:
       visitor->Vertices({"vertices", NumberKind::kFree, Dimension::kLength, true}, numbers);
       break;
+    case ShapeType::kPolyline: {
+      Field points{"points", NumberKind::kFree, Dimension::kLength, true};
+      points.least = 2;
+      visitor->Vertices(points, numbers);
+      break;
+    }
     case ShapeType::kHalfPlane:
       visitor->Numbers({"normal", NumberKind::kFree, Dimension::kNone, true}, numbers[0],
                        numbers[1]);
@@ -90,11 +97,12 @@ void VisitShape(Shape& shape, Visitor* visitor) {
   }
 }
 
-/// How many numbers a shape has; 0: any, as a polygon.
+/// How many numbers a shape has; 0: any, as a polygon or polyline.
 inline int NumNumbers(ShapeType type) {
   switch (type) {
     case ShapeType::kNone:
     case ShapeType::kPolygon:
+    case ShapeType::kPolyline:
       return 0;
     case ShapeType::kCircle:
       return 1;

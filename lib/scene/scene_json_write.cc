@@ -116,8 +116,13 @@ OrderedJson BodyJson(const BasicBody<double>& body) {
   if (body.motion == Motion::kStatic) json["static"] = true;
   if (body.motion == Motion::kKinematic) json["kinematic"] = true;
   if (body.shape.type != ShapeType::kNone) {
-    FieldWriter shape(&json["shape"][NameOf(body.shape.type, kShapeTypeNames)]);
+    OrderedJson* const item = &json["shape"][NameOf(body.shape.type, kShapeTypeNames)];
+    FieldWriter shape(item);
     VisitShape(body.shape, &shape);
+    if (body.shape.type == ShapeType::kPolyline) {
+      (*item)["closed"] = body.shape.closed;
+      shape.Choice("solid", kSolidSideNames, body.shape.solid);
+    }
   }
   FieldWriter writer(&json);
   VisitContactPoints(body, &writer);

@@ -18,9 +18,12 @@ inline constexpr std::pair<const char*, JointType> kJointTypeNames[] = {
     {"distance", JointType::kDistance},
     {"fixed_angle", JointType::kFixedAngle}};
 inline constexpr std::pair<const char*, ShapeType> kShapeTypeNames[] = {
-    {"circle", ShapeType::kCircle},   {"ellipse", ShapeType::kEllipse},
-    {"box", ShapeType::kBox},         {"capsule", ShapeType::kCapsule},
-    {"polygon", ShapeType::kPolygon}, {"half_plane", ShapeType::kHalfPlane}};
+    {"circle", ShapeType::kCircle},    {"ellipse", ShapeType::kEllipse},
+    {"box", ShapeType::kBox},          {"capsule", ShapeType::kCapsule},
+    {"polygon", ShapeType::kPolygon},  {"half_plane", ShapeType::kHalfPlane},
+    {"polyline", ShapeType::kPolyline}};
+inline constexpr std::pair<const char*, SolidSide> kSolidSideNames[] = {
+    {"left", SolidSide::kLeft}, {"right", SolidSide::kRight}};
 inline constexpr std::pair<const char*, Signal::Interpolation> kInterpolationNames[] = {
     {"constant", Signal::Interpolation::kConstant}, {"linear", Signal::Interpolation::kLinear}};
 inline constexpr std::pair<const char*, PathInterpolation> kPathInterpolationNames[] = {

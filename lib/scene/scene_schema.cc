@@ -79,7 +79,7 @@ class FieldSchema {
   }
   template <typename T>
   void Vertices(const Field& field, const T&) {
-    Add(field, SchemaOfArray(PointSchema(field), 3));
+    Add(field, SchemaOfArray(PointSchema(field), field.least));
   }
   template <typename T, typename S>
   void NumberOrSignal(const Field& field, const T&, const S&) {
@@ -141,7 +141,11 @@ OrderedJson ShapeSchema() {
     const BasicShape<double> shape{type, std::vector<double>(NumNumbers(type))};
     FieldSchema fields;
     VisitShape(shape, &fields);
-    shapes[name] = fields.Item(OrderedJson::object(), {});
+    OrderedJson flags = OrderedJson::object();
+    if (type == ShapeType::kPolyline) {
+      flags = {{"closed", SchemaOfFlag()}, {"solid", SchemaOfWords(WordsOf(kSolidSideNames))}};
+    }
+    shapes[name] = fields.Item(std::move(flags), {});
   }
   OrderedJson schema = SchemaOfObject(std::move(shapes), {});
   schema["minProperties"] = 1;

@@ -67,15 +67,15 @@ bool SegmentsMeet(const Vector2<double>& a, const Vector2<double>& b, const Vect
          (a_side == 0 && between(c, d, a)) || (b_side == 0 && between(c, d, b));
 }
 
-// Two edges of the outline, neighbours excepted, that cross or touch, the lower one first, or
-// {-1, -1}. Edge i goes from vertex i to the next one. Edges are sorted by their left ends, and
+// Two of the outline's first `size` edges, neighbours excepted, that cross or touch, the lower one
+// first, or {-1, -1}. Edge i goes from vertex i to the next one. Edges are sorted by their left ends, and
 // each is compared with those alone that begin before it ends: a crossing is looked for in faulty
 // outlines only, but these may be large too. Of several pairs it is the first in that order. After
 // kMostComparisons none is named, so that a file of a million edges is refused in a moment.
-std::pair<int, int> CrossingEdges(const Points& points) {
-  const int size = static_cast<int>(points.size());
+std::pair<int, int> CrossingEdges(const Points& points, int size) {
+  const int num_points = static_cast<int>(points.size());
   const auto start = [&points](int edge) { return points[static_cast<std::size_t>(edge)]; };
-  const auto end = [&](int edge) { return start((edge + 1) % size); };
+  const auto end = [&](int edge) { return start((edge + 1) % num_points); };
   std::vector<std::pair<double, int>> by_left;
   by_left.reserve(points.size());
   for (int i = 0; i < size; ++i) by_left.emplace_back(std::min(start(i).x(), end(i).x()), i);
@@ -88,11 +88,26 @@ std::pair<int, int> CrossingEdges(const Points& points) {
     for (std::size_t j = i + 1; j < by_left.size() && by_left[j].first <= right; ++j) {
       if (++comparisons > kMostComparisons) return {-1, -1};
       const auto [low, high] = std::minmax(edge, by_left[j].second);
-      if (high - low == 1 || high - low == size - 1) continue;
+      if (high - low == 1 || (high - low == size - 1 && size == num_points)) {
+        continue;
+      }
       if (SegmentsMeet(start(low), end(low), start(high), end(high))) return {low, high};
     }
   }
   return {-1, -1};
+}
+
+// Refuses an outline of which two edges cross, and returns whether it does.
+bool RefuseCrossing(const JsonReader& vertices, const Points& points, int num_edges) {
+  const auto [low, high] = CrossingEdges(points, num_edges);
+  if (low < 0) return false;
+  const auto name = [&points](int edge) {
+    const int next = (edge + 1) % static_cast<int>(points.size());
+    return "the edge of vertices " + std::to_string(edge) + " and " + std::to_string(next);
+  };
+  vertices.Fail("expected an outline that does not cross or touch itself, got " + name(low) +
+                " that meets " + name(high));
+  return true;
 }
 
 // Refuses an outline that is not what a polygon must be: with the two edges that cross where there
@@ -100,14 +115,7 @@ std::pair<int, int> CrossingEdges(const Points& points) {
 // with the message at `place`.
 void RefuseOutline(const JsonReader& vertices, const Points& points, const JsonReader& place,
                    const std::string& message) {
-  const auto [low, high] = CrossingEdges(points);
-  if (low < 0) return place.Fail(message);
-  const auto name = [&points](int edge) {
-    const int next = (edge + 1) % static_cast<int>(points.size());
-    return "the edge of vertices " + std::to_string(edge) + " and " + std::to_string(next);
-  };
-  vertices.Fail("expected an outline that does not cross or touch itself, got " + name(low) +
-                " that meets " + name(high));
+  if (!RefuseCrossing(vertices, points, static_cast<int>(points.size()))) place.Fail(message);
 }
 
 // A polygon is convex and counter-clockwise if every corner turns left and all turns add up to one
@@ -146,6 +154,37 @@ void CheckPolygon(const JsonReader& vertices, const std::vector<double>& numbers
   }
 }
 
+// The edges of a polyline do not meet but at their common points, and do not turn back there.
+void CheckPolyline(const JsonReader& place, const BasicShape<double>& shape) {
+  const JsonReader points_at = place.At("points");
+  const Points points = Scaled(shape.numbers);
+  const int size = static_cast<int>(points.size());
+  if (size < (shape.closed ? 3 : 2)) {
+    return points_at.Fail("expected at least " + std::to_string(shape.closed ? 3 : 2) +
+                          " points, got " + std::to_string(size));
+  }
+  const int num_edges = shape.closed ? size : size - 1;
+  for (int i = 0; i < num_edges; ++i) {
+    const int next = (i + 1) % size;
+    if (points[i] == points[next]) {
+      return points_at.At(next).Fail("expected another point than the one before, got the same");
+    }
+  }
+  if (!shape.closed && size > 2 && points[0] == points[size - 1]) {
+    return points_at.At(size - 1).Fail(
+        "expected another point than the first, or \"closed\": true without this one");
+  }
+  for (int i = shape.closed ? 0 : 1; i < num_edges; ++i) {
+    const Vector2<double>& at = points[i];
+    const Vector2<double> in = at - points[(i + size - 1) % size];
+    const Vector2<double> out = points[(i + 1) % size] - at;
+    if (in.dot(out) < 0.0 && std::abs(Cross(in, out)) <= kStraightCorner * in.norm() * out.norm()) {
+      return points_at.At(i).Fail("expected a corner that does not turn back by 180 degrees");
+    }
+  }
+  RefuseCrossing(points_at, points, num_edges);
+}
+
 void CheckEllipse(const JsonReader& radii, const std::vector<double>& numbers) {
   const auto [least, most] = std::minmax(numbers[0], numbers[1]);
   if (least >= kSlenderEllipse * most) return;
@@ -162,8 +201,10 @@ void ReadShape(const JsonReader& reader, BasicShape<double>* shape) {
   if (!reader.ok()) return;
   const std::vector<std::string> keys = reader.Keys();
   if (keys.size() != 1) {
-    return reader.Fail("expected one of circle, ellipse, box, capsule, polygon, half_plane, got " +
-                       std::to_string(keys.size()) + " of them");
+    return reader.Fail(
+        "expected one of circle, ellipse, box, capsule, polygon, half_plane, "
+        "polyline, got " +
+        std::to_string(keys.size()) + " of them");
   }
   for (const auto& entry : kShapeTypeNames) {
     if (keys[0] == entry.first) shape->type = entry.second;
@@ -173,10 +214,17 @@ void ReadShape(const JsonReader& reader, BasicShape<double>* shape) {
   VisitShape(*shape, &fields);
   const JsonReader item = reader.At(keys[0]);
   const char* const article = shape->type == ShapeType::kEllipse ? " of an " : " of a ";
-  item.ExpectKeys(fields.keys(), article + keys[0]);
+  std::vector<std::string> expected = fields.keys();
+  const bool is_polyline = shape->type == ShapeType::kPolyline;
+  if (is_polyline) expected.insert(expected.end(), {"closed", "solid"});
+  item.ExpectKeys(expected, article + keys[0]);
   if (!item.ok()) return;
   FieldReader numbers(item);
   VisitShape(*shape, &numbers);
+  if (is_polyline) {
+    numbers.Flag("closed", shape->closed);
+    numbers.Choice("solid", kSolidSideNames, shape->solid);
+  }
   if (reader.ok()) CheckShape(*shape, reader);
 }
 
@@ -186,6 +234,8 @@ void CheckShape(const BasicShape<double>& shape, const JsonReader& place) {
       return CheckEllipse(place.At("ellipse").At("radii"), shape.numbers);
     case ShapeType::kPolygon:
       return CheckPolygon(place.At("polygon").At("vertices"), shape.numbers);
+    case ShapeType::kPolyline:
+      return CheckPolyline(place.At("polyline"), shape);
     case ShapeType::kHalfPlane:
       if (shape.numbers[0] == 0.0 && shape.numbers[1] == 0.0) {
         place.At("half_plane").At("normal").Fail("expected a direction, got the zero vector");

@@ -111,9 +111,10 @@ void CheckDrivenMotion(const BasicBody<double>& body, const JsonReader& place) {
 void CheckBody(const BasicBody<double>& body, const JsonReader& place) {
   const bool is_static = body.motion == Motion::kStatic;
   const bool moves = body.motion == Motion::kMoving;
-  if (moves && body.shape.type == ShapeType::kHalfPlane) {
+  if (moves &&
+      (body.shape.type == ShapeType::kHalfPlane || body.shape.type == ShapeType::kPolyline)) {
     place.At("shape")
-        .At("half_plane")
+        .At(NameOf(body.shape.type, kShapeTypeNames))
         .Fail("expected a static or kinematic body, got a moving one");
   }
   if (moves && !body.inertia && body.shape.type == ShapeType::kNone) {

@@ -151,11 +151,29 @@ TEST(BadSceneTest, Shapes) {
   Check({
       {shape, "\"circle\"", shape + ": expected an object, got \"circle\""},
       {shape, "{}",
-       shape +
-           ": expected one of circle, ellipse, box, capsule, polygon, half_plane, got 0 of them"},
+       shape + ": expected one of circle, ellipse, box, capsule, polygon, half_plane, polyline, "
+               "got 0 of them"},
       {shape, R"({"circle": {"radius": 1}, "box": {"size": [1, 1]}})",
-       shape +
-           ": expected one of circle, ellipse, box, capsule, polygon, half_plane, got 2 of them"},
+       shape + ": expected one of circle, ellipse, box, capsule, polygon, half_plane, polyline, "
+               "got 2 of them"},
+      {shape, R"({"polyline": {"points": [[0, 0]]}})",
+       shape + "/polyline/points: expected an array of at least 2 points, got an array of 1"},
+      {shape, R"({"polyline": {"points": [[0, 0], [1, 0], [1, 0]]}})",
+       shape + "/polyline/points/2: expected another point than the one before, got the same"},
+      {shape, R"({"polyline": {"points": [[0, 0], [1, 0], [1, 1], [0, 0]]}})",
+       shape + "/polyline/points/3: expected another point than the first, or \"closed\": true "
+               "without this one"},
+      {shape, R"({"polyline": {"points": [[0, 0], [1, 0], [0.5, 0]]}})",
+       shape + "/polyline/points/1: expected a corner that does not turn back by 180 degrees"},
+      {shape, R"({"polyline": {"points": [[0, 0], [2, 0], [2, 1], [1, -1]]}})",
+       shape + "/polyline/points: expected an outline that does not cross or touch itself, got the "
+               "edge of vertices 0 and 1 that meets the edge of vertices 2 and 3"},
+      {shape, R"({"polyline": {"points": [[0, 0], [1, 0]], "closed": true}})",
+       shape + "/polyline/points: expected at least 3 points, got 2"},
+      {shape, R"({"polyline": {"points": [[0, 0], [1, 0]], "solid": "up"}})",
+       shape + "/polyline/solid: expected one of left, right, got \"up\""},
+      {shape, R"({"polyline": {"points": [[0, 0], [1, 0]]}})",
+       shape + "/polyline: expected a static or kinematic body, got a moving one"},
       {shape, R"({"disc": {}})",
        shape +
            "/disc: unknown key of a shape, expected one of circle, ellipse, box, capsule, polygon, "

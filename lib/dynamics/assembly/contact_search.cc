@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "tangible/dynamics/elements/part_pairs.h"
 #include "tangible/dynamics/elements/seam_contacts.h"
 #include "tangible/dynamics/model/tolerances.h"
 #include "tangible/math/disjoint_sets.h"
@@ -255,9 +256,12 @@ void ContactSearch::Find(const Model<double>& model, const State<double>& state,
     ActiveContact contact;
     contact.a = pair.first;
     contact.b = pair.second;
-    model.structure->ForEachPartPair(contact.a, contact.b, [&](PartPair parts) {
-      FindContacts(model, state, h, scratch, contact, parts, contacts);
-    });
+    const double reach = 0.5 * model.structure->settings.contact_margin +
+                         h * std::max(bound_[contact.a], bound_[contact.b]);
+    ForEachPartNear(model, contact.a, scratch.poses[contact.a], boxes_[contact.a], contact.b,
+                    scratch.poses[contact.b], boxes_[contact.b], reach, [&](PartPair parts) {
+                      FindContacts(model, state, h, scratch, contact, parts, contacts);
+                    });
     if (model.seams != nullptr) {
       RemoveSecondOwners(model, scratch, friction->size(), contacts);
     }

@@ -10,6 +10,14 @@ int FindFeaturesAtSeams(const Model<double>& model, int a, const Pose<double>& p
                         ContactFeature features[2]) {
   const ShapeView<double> shape_a = model.Shape(a, parts.a);
   const ShapeView<double> shape_b = model.Shape(b, parts.b);
+  if (const Outline* outline = model.OutlineOf(a); outline != nullptr) {
+    return FindOutlineFeatures(*outline, model.structure->bodies[a].RunOfPart(parts.a), shape_a,
+                               pose_a, shape_b, pose_b, SeamSide::kFirst, max_gap, features);
+  }
+  if (const Outline* outline = model.OutlineOf(b); outline != nullptr) {
+    return FindOutlineFeatures(*outline, model.structure->bodies[b].RunOfPart(parts.b), shape_a,
+                               pose_a, shape_b, pose_b, SeamSide::kSecond, max_gap, features);
+  }
   if (const ShapeSeams* seams = model.SeamsOf(a, parts.a); seams != nullptr) {
     return FindContactFeaturesAtSeams(shape_a, pose_a, shape_b, pose_b, *seams, SeamSide::kFirst,
                                       max_gap, features);

@@ -17,7 +17,9 @@ double RadiusOf(const Model<double>& model, int body) {
 }
 
 Aabb BoxOf(const Model<double>& model, int body, const Pose<double>& pose, double margin) {
-  Aabb box = ComputeAabb(model.Shape(body), pose, margin);
+  const Outline* const outline = model.OutlineOf(body);
+  Aabb box = outline != nullptr ? BoxOfOutline(*outline, pose, margin)
+                                : ComputeAabb(model.Shape(body), pose, margin);
   for (int part = 1; part <= model.structure->bodies[body].num_contact_points; ++part) {
     const Aabb point = ComputeAabb(model.Shape(body, part), pose, margin);
     box = {std::min(box.min_x, point.min_x), std::min(box.min_y, point.min_y),

@@ -69,7 +69,8 @@ void AddBodies(const BasicScene<T>& scene, Places* places, ModelStructure* struc
     index.name = body.name;
     index.motion = body.motion;
     index.shape = body.shape.type;
-    index.num_shape_numbers = static_cast<int>(body.shape.numbers.size());
+    index.num_shape_numbers =
+        static_cast<int>(body.shape.numbers.size()) + (body.shape.closed ? 2 : 0);
     index.shape_numbers = places->Take(index.num_shape_numbers);
     index.num_contact_points = static_cast<int>(body.contact_points.size());
     index.contact_points = places->Take(2 * index.num_contact_points);
@@ -201,11 +202,28 @@ ShapeView<T> ViewOf(const BasicShape<T>& shape) {
   return {shape.type, shape.numbers.data(), static_cast<int>(shape.numbers.size())};
 }
 
+// Appends the numbers of a shape. The points of a polyline are ordered so that the solid is to the
+// left, and the first one is repeated where it is closed (geometry/outline.h).
+template <typename T>
+void AppendShape(const BasicShape<T>& shape, std::vector<T>* numbers) {
+  const auto first = static_cast<std::ptrdiff_t>(numbers->size());
+  numbers->insert(numbers->end(), shape.numbers.begin(), shape.numbers.end());
+  if (shape.closed) {
+    numbers->insert(numbers->end(), shape.numbers.begin(), shape.numbers.begin() + 2);
+  }
+  if (shape.solid == SolidSide::kRight) {
+    std::reverse(numbers->begin() + first, numbers->end());
+    for (size_t i = static_cast<size_t>(first); i + 1 < numbers->size(); i += 2) {
+      std::swap((*numbers)[i], (*numbers)[i + 1]);
+    }
+  }
+}
+
 // Appends the parameters of the bodies, in the order of AddBodies.
 template <typename T>
 void FillBodies(const BasicScene<T>& scene, std::vector<T>* numbers) {
   for (const BasicBody<T>& body : scene.bodies) {
-    numbers->insert(numbers->end(), body.shape.numbers.begin(), body.shape.numbers.end());
+    AppendShape(body.shape, numbers);
     for (const Vector2<T>& point : body.contact_points) {
       Append(point, numbers);
     }

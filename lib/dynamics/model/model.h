@@ -17,6 +17,7 @@
 #include <vector>
 
 #include "tangible/dynamics/model/state.h"
+#include "tangible/geometry/outline.h"
 #include "tangible/geometry/seams.h"
 #include "tangible/geometry/shape.h"
 #include "tangible/scene/scene.h"
@@ -31,7 +32,8 @@ struct PartIndex {
 };
 
 /// Places of a body's parameters; −1 where it has none. Part 0 of a body is its shape; the parts
-/// from 1 on are its contact points, each a polygon with one vertex.
+/// from 1 on are its contact points, each a polygon with one vertex. The runs of a polyline
+/// (outline.h) are parts too: the first one is part 0, the others follow the contact points.
 struct BodyIndex {
   std::string name;
   Motion motion = Motion::kStatic;
@@ -47,9 +49,12 @@ struct BodyIndex {
   int num_contact_points = 0;
 
   PartIndex Part(int part) const {
-    return part == 0 ? PartIndex{shape, shape_numbers, num_shape_numbers}
-                     : PartIndex{ShapeType::kPolygon, contact_points + 2 * (part - 1), 2};
+    return part == 0 || part > num_contact_points
+               ? PartIndex{shape, shape_numbers, num_shape_numbers}
+               : PartIndex{ShapeType::kPolygon, contact_points + 2 * (part - 1), 2};
   }
+  int PartOfRun(int run) const { return run == 0 ? 0 : num_contact_points + run; }
+  int RunOfPart(int part) const { return part == 0 ? 0 : part - num_contact_points; }
   bool HasContacts() const { return shape != ShapeType::kNone || num_contact_points > 0; }
 };
 
@@ -163,9 +168,11 @@ struct ModelStructure {
 inline constexpr int kGravityX = 0;
 inline constexpr int kGravityY = 1;
 
-/// The seams of bodies that do not move, or that move alike (model_seams.h).
+/// The seams of bodies that do not move, or that move alike, and the outlines of polylines
+/// (model_seams.h).
 struct ModelSeams {
   std::vector<ShapeSeams> shapes;
+  std::vector<Outline> outlines;
   FlushSteps steps;
 };
 
@@ -174,7 +181,8 @@ struct Model {
   std::shared_ptr<const ModelStructure> structure;
   std::vector<T> parameters;
   std::shared_ptr<const ModelSeams> seams{};  ///< of a model in double; null: there are none
-  std::vector<int> seams_of{};  ///< of each body the place in seams->shapes; −1: it has none
+  /// Of each body the place in seams->shapes, of a polyline in seams->outlines; −1: it has none.
+  std::vector<int> seams_of{};
 
   ShapeView<T> Shape(int body, int part = 0) const {
     const PartIndex index = structure->bodies[body].Part(part);
@@ -183,8 +191,14 @@ struct Model {
   }
   /// The seams of a shape, or nullptr. Contact points have none.
   const ShapeSeams* SeamsOf(int body, int part) const {
-    return seams == nullptr || part != 0 || seams_of[body] < 0 ? nullptr
-                                                               : &seams->shapes[seams_of[body]];
+    return seams == nullptr || part != 0 || seams_of[body] < 0 || IsPolyline(body)
+               ? nullptr
+               : &seams->shapes[seams_of[body]];
+  }
+  bool IsPolyline(int body) const { return structure->bodies[body].shape == ShapeType::kPolyline; }
+  /// The outline of a body that is a polyline, or nullptr.
+  const Outline* OutlineOf(int body) const {
+    return seams == nullptr || !IsPolyline(body) ? nullptr : &seams->outlines[seams_of[body]];
   }
 };
 

@@ -70,7 +70,14 @@ void FindModelSeams(const State<double>& state, Model<double>* model) {
       ++count;
     }
   }
-  if (count < 2) {
+  ModelSeams seams;
+  std::vector<int> seams_of(structure.bodies.size(), -1);
+  for (int body = 0; body < structure.num_bodies(); ++body) {
+    if (!model->IsPolyline(body)) continue;
+    seams_of[body] = static_cast<int>(seams.outlines.size());
+    seams.outlines.emplace_back(model->Shape(body));
+  }
+  if (count < 2 && seams.outlines.empty()) {
     return;
   }
   std::vector<std::vector<PlacedShape>> neighbours(structure.bodies.size());
@@ -81,8 +88,6 @@ void FindModelSeams(const State<double>& state, Model<double>* model) {
     neighbours[a].push_back(placed(b));
     neighbours[b].push_back(placed(a));
   }
-  ModelSeams seams;
-  std::vector<int> seams_of(structure.bodies.size(), -1);
   for (int body = 0; body < structure.num_bodies(); ++body) {
     ShapeSeams own;
     if (!neighbours[body].empty() && structure.bodies[body].shape != ShapeType::kHalfPlane &&
@@ -91,7 +96,7 @@ void FindModelSeams(const State<double>& state, Model<double>* model) {
       seams.shapes.push_back(std::move(own));
     }
   }
-  if (!seams.shapes.empty()) {
+  if (!seams.shapes.empty() || !seams.outlines.empty()) {
     model->seams = std::make_shared<const ModelSeams>(std::move(seams));
     model->seams_of = std::move(seams_of);
   }

@@ -82,6 +82,7 @@ void EventSearch::Retarget(const Model<double>& model) {
   num_samples_ = 0;
   closing_.resize(model.structure->bodies.size());
   boxes_.resize(model.structure->bodies.size());
+  reach_.resize(model.structure->bodies.size());
 }
 
 void EventSearch::StartStep(const Model<double>& model, double t, double h,
@@ -122,7 +123,7 @@ void EventSearch::FindContacts(const Model<double>& model, const State<double>& 
   for (const auto& [first, second] : pairs_) {
     const int a = first;
     const int b = second;
-    structure.ForEachPartPair(a, b, [&](PartPair parts) {
+    const auto visit = [&](PartPair parts) {
       ContactFeature features[2];
       const int count =
           FindFeatures(model, a, state.PoseOf(a), b, state.PoseOf(b), parts, reach, features);
@@ -137,7 +138,9 @@ void EventSearch::FindContacts(const Model<double>& model, const State<double>& 
         contact.gap = rows.geometry.gap;
         contacts->push_back(contact);
       }
-    });
+    };
+    ForEachPartNear(model, a, state.PoseOf(a), boxes_[a], b, state.PoseOf(b), boxes_[b],
+                    0.5 * reach, visit);
   }
 }
 
@@ -409,6 +412,7 @@ void EventSearch::FindPairs(const Model<double>& model) {
     const double reach = closing_[body] * segment_->length +
                          kWiderBoxes * lengths_.smallest_radius() +
                          lengths_.Rounding(segment_->before, body, body);
+    reach_[body] = reach;
     boxes_[body] = BoxOf(model, body, segment_->before.PoseOf(body), reach);
     if (structure.bodies[body].shape == ShapeType::kHalfPlane &&
         (segment_->before.twist[3 * body + 2] != 0.0 || TurnsAlongPath(structure, body))) {
@@ -429,7 +433,7 @@ void EventSearch::SortPairs(const Model<double>& model) {
   if (!end.good) return;
   const auto closes_at = [&](int a, int b) {
     double first = kInfinity;
-    model.structure->ForEachPartPair(a, b, [&](PartPair parts) {
+    ForEachNearPart(model, a, b, [&](PartPair parts) {
       ContactFeature features[2];
       if (FindFeatures(model, a, segment_->before.PoseOf(a), b, segment_->before.PoseOf(b), parts,
                        kInfinity, features) == 0) {
@@ -494,7 +498,7 @@ bool EventSearch::Run(const Model<double>& model, const std::vector<ActiveContac
                          SweptSpeed(model, lengths_, *segment, body, body == a ? b : a);
       }
     }
-    model.structure->ForEachPartPair(a, b, [&](PartPair parts) {
+    ForEachNearPart(model, a, b, [&](PartPair parts) {
       if (event.kind != EventKind::kAtOnce) {
         SearchPair(model, a, b, parts, &event);
       }

@@ -108,6 +108,9 @@ class EventSearch {
   void TakeMotion(Sample* sample, Segment* segment);
   double SpeedAlongPath(const Model<double>& model, int body, double radius) const;
   void FindPairs(const Model<double>& model);
+  /// ForEachPartNear over the segment.
+  template <typename Visit>
+  void ForEachNearPart(const Model<double>& model, int a, int b, const Visit& visit) const;
   void SortPairs(const Model<double>& model);
   void SearchPair(const Model<double>& model, int a, int b, PartPair parts, Event* event);
   // Searches for the time at which a contact that opens in penetration approaches again, if it has
@@ -161,6 +164,7 @@ class EventSearch {
   std::vector<std::pair<int, int>> pairs_;
   std::vector<std::pair<double, std::pair<int, int>>> order_;  ///< pairs and when they close
   std::vector<Aabb> boxes_;
+  std::vector<double> reach_;  ///< by which the boxes over the segment are grown, m
   BroadPhase broad_phase_;
   std::string message_;
 };

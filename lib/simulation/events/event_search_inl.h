@@ -8,10 +8,18 @@
 #include <utility>
 #include <vector>
 
+#include "tangible/dynamics/elements/part_pairs.h"
 #include "tangible/simulation/events/event_search.h"
 #include "tangible/simulation/events/tolerances.h"
 
 namespace tangible {
+
+template <typename Visit>
+void EventSearch::ForEachNearPart(const Model<double>& model, int a, int b,
+                                  const Visit& visit) const {
+  ForEachPartNear(model, a, segment_->before.PoseOf(a), boxes_[a], b, segment_->before.PoseOf(b),
+                  boxes_[b], std::max(reach_[a], reach_[b]), visit);
+}
 
 inline bool Contains(const std::vector<ActiveContact>& contacts, const ActiveContact& contact) {
   return std::any_of(contacts.begin(), contacts.end(),

@@ -76,6 +76,7 @@ class EventSearch::PairSearch {
         located_(search->GapTolerance(segment_.before, a, b)),
         closed_(std::any_of(segment_.contacts.begin(), segment_.contacts.end(),
                             [&](const ActiveContact& c) { return IsOfPair(c); })),
+        outline_(model.OutlineOf(a) != nullptr ? model.OutlineOf(a) : model.OutlineOf(b)),
         may_hide_(model.seams != nullptr && !RestsAtSeams()) {}
 
   /// The pair's contact that is handed over where the event is, if there is one.
@@ -119,6 +120,9 @@ class EventSearch::PairSearch {
   // The distance of a pair whose nearest features seams hide, which bounds the gaps that it has
   // before and after; sets nearest_.
   double HiddenGap(const State<double>& state);
+  // The same for a run of a polyline that the other body is not over; infinite where they touch,
+  // from behind.
+  double HiddenRunGap(const State<double>& state, ActiveContact contact);
   // Makes a contact the nearest.
   void TakeNearest(const ActiveContact& contact, const ContactGeometry<double>& geometry);
   // The smallest gap of the contacts that count; sets nearest_.
@@ -162,7 +166,8 @@ class EventSearch::PairSearch {
   ActiveContact nearest_;
   Vector2<double> normal_{0.0, 0.0};
   bool on_face_ = false;  ///< the normal is a face's, not that of the line between two points
-  const bool may_hide_;   ///< a gap that ends at a seam counts
+  const Outline* const outline_;  ///< of the body that is a polyline; null: neither is
+  const bool may_hide_;           ///< a gap that ends at a seam or a run's end counts
 };
 
 void EventSearch::SearchPair(const Model<double>& model, int a, int b, PartPair parts,
@@ -207,6 +212,10 @@ bool EventSearch::PairSearch::Continues(const State<double>& state, const Active
 }
 
 bool EventSearch::PairSearch::RestsAtSeams() const {
+  if (outline_ != nullptr) {
+    return std::any_of(segment_.contacts.begin(), segment_.contacts.end(),
+                       [&](const auto& c) { return c.joint < 0 && c.a == a_ && c.b == b_; });
+  }
   const bool first = model_.SeamsOf(a_, parts_.a) != nullptr;
   if (!first && model_.SeamsOf(b_, parts_.b) == nullptr) {
     return true;
@@ -230,6 +239,9 @@ double EventSearch::PairSearch::HiddenGap(const State<double>& state) {
   ActiveContact contact;
   contact.a = a_;
   contact.b = b_;
+  if (outline_ != nullptr) {
+    return HiddenRunGap(state, contact);
+  }
   ContactFeature features[2];
   if (FindContactFeatures(model_.Shape(a_, parts_.a), state.PoseOf(a_), model_.Shape(b_, parts_.b),
                           state.PoseOf(b_), kInfinity, features) == 0) {
@@ -243,6 +255,25 @@ double EventSearch::PairSearch::HiddenGap(const State<double>& state) {
   TakeNearest(contact, rows.geometry);
   // What is hidden does not close.
   return std::max(rows.geometry.gap, touch_);
+}
+
+double EventSearch::PairSearch::HiddenRunGap(const State<double>& state, ActiveContact contact) {
+  const bool is_first = model_.OutlineOf(a_) != nullptr;
+  const int run = is_first ? model_.structure->bodies[a_].RunOfPart(parts_.a)
+                           : model_.structure->bodies[b_].RunOfPart(parts_.b);
+  ContactFeature& feature = contact.feature;
+  const double gap =
+      DistanceOfRun(*outline_, run, state.PoseOf(is_first ? a_ : b_),
+                    is_first ? model_.Shape(b_, parts_.b) : model_.Shape(a_, parts_.a),
+                    state.PoseOf(is_first ? b_ : a_), is_first ? &feature.a : &feature.b,
+                    is_first ? &feature.b : &feature.a);
+  if (!(gap > touch_)) return kInfinity;
+  feature.part_a = parts_.a;
+  feature.part_b = parts_.b;
+  ContactRows<double> rows;
+  EvaluateContactRows(model_, state, contact, &rows);
+  TakeNearest(contact, rows.geometry);
+  return gap;
 }
 
 double EventSearch::PairSearch::Gap(const Sample& sample, Counts counts, bool handed_over) {
@@ -482,7 +513,7 @@ void EventSearch::FindHandOvers(const Model<double>& model, Event* event) {
   for (const auto& [first, second] : pairs_) {
     const int a = first, b = second;
     if (event->contact.joint < 0 && event->contact.a == a && event->contact.b == b) continue;
-    model.structure->ForEachPartPair(a, b, [&](PartPair parts) {
+    ForEachNearPart(model, a, b, [&](PartPair parts) {
       PairSearch(this, model, a, b, parts, event).AddHandOver(&hand_overs_);
     });
   }

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "tangible/dynamics/elements/force.h"
+#include "tangible/dynamics/elements/part_pairs.h"
 #include "tangible/dynamics/model/lengths.h"
 #include "tangible/geometry/broad_phase.h"
 #include "tangible/geometry/collide.h"
@@ -100,7 +101,7 @@ double DeepestPenetration(const Model<double>& model, const State<double>& state
   for (const auto& [first, second] : pairs) {
     const int a = first;
     const int b = second;
-    s.ForEachPartPair(a, b, [&](PartPair parts) {
+    const auto visit = [&](PartPair parts) {
       ContactFeature features[2];
       const ShapeView<double> shape_a = model.Shape(a, parts.a);
       const ShapeView<double> shape_b = model.Shape(b, parts.b);
@@ -112,7 +113,8 @@ double DeepestPenetration(const Model<double>& model, const State<double>& state
         const double gap = EvaluateContact(features[k], shape_a, pose_a, shape_b, pose_b).gap;
         deepest = std::max(deepest, -gap);
       }
-    });
+    };
+    ForEachPartNear(model, a, state.PoseOf(a), boxes[a], b, state.PoseOf(b), boxes[b], 0.0, visit);
   }
   return deepest;
 }

@@ -1,0 +1,272 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The features of a run of an outline and another shape, B. All places are in the outline's frame.
+
+#include <algorithm>
+#include <cmath>
+
+#include "tangible/geometry/collide_core.h"
+#include "tangible/geometry/ellipse_inl.h"
+#include "tangible/geometry/mass_properties.h"
+#include "tangible/geometry/outline.h"
+#include "tangible/geometry/tolerances.h"
+#include "tangible/math/scalar.h"
+
+namespace tangible::internal {
+namespace {
+
+Pose<double> RelativeTo(const Pose<double>& frame, const Pose<double>& pose) {
+  Pose<double> relative;
+  relative.position = frame.Inverse(pose.position);
+  relative.angle = pose.angle - frame.angle;
+  relative.rotation.cosine =
+      frame.rotation.cosine * pose.rotation.cosine + frame.rotation.sine * pose.rotation.sine;
+  relative.rotation.sine =
+      frame.rotation.cosine * pose.rotation.sine - frame.rotation.sine * pose.rotation.cosine;
+  return relative;
+}
+
+double DistanceOfSegment(const Vector2<double>& start, const Vector2<double>& end,
+                         const Vector2<double>& x) {
+  const Vector2<double> along = end - start;
+  const double square = along.squaredNorm();
+  const double share = square > 0.0 ? std::clamp(along.dot(x - start) / square, 0.0, 1.0) : 0.0;
+  return (x - start - share * along).norm();
+}
+
+class OutlinePair {
+ public:
+  OutlinePair(const Outline& outline, int run, const ShapeView<double>& other,
+              const Pose<double>& pose, SeamSide side)
+      : outline_(outline),
+        run_(run),
+        of_(outline.run(run)),
+        is_first_(side == SeamSide::kFirst),
+        is_ellipse_(other.type == ShapeType::kEllipse),
+        shape_(other),
+        pose_(pose),
+        other_(other, pose, Vector2<double>(0.0, 0.0)) {}
+
+  int Find(double max_gap, ContactFeature features[2]) {
+    FindOnRun();
+    if (of_.before == OutlineJoint::kEnd || of_.before == OutlineJoint::kConvex) TryStart();
+    if (of_.after == OutlineJoint::kEnd) TryEnd();
+    std::sort(found_, found_ + count_,
+              [](const Candidate& x, const Candidate& y) { return x.gap < y.gap; });
+    return WriteCandidates(found_, std::min(count_, 2), max_gap, features);
+  }
+
+ private:
+  /// The normals of a corner, counter-clockwise.
+  struct Cone {
+    Vector2<double> first, last;
+    bool Contains(const Vector2<double>& direction) const {
+      return Cross(first, direction) >= -kFlushTurn && Cross(direction, last) >= -kFlushTurn &&
+             direction.dot(first + last) > 0.0;
+    }
+  };
+
+  ContactFeature OnEdge(int edge, int vertex) const {
+    return is_first_ ? ContactFeature{FeatureKind::kEdgeVertex, edge, vertex}
+                     : ContactFeature{FeatureKind::kVertexEdge, vertex, edge};
+  }
+  ContactFeature OnCorner(int corner, int vertex) const {
+    return is_first_ ? ContactFeature{FeatureKind::kVertexVertex, corner, vertex}
+                     : ContactFeature{FeatureKind::kVertexVertex, vertex, corner};
+  }
+  ContactFeature CornerOnEdge(int corner, int edge) const {
+    return is_first_ ? ContactFeature{FeatureKind::kVertexEdge, corner, edge}
+                     : ContactFeature{FeatureKind::kEdgeVertex, edge, corner};
+  }
+  /// The point of B over the run: a vertex, or the lowest point of an ellipse.
+  Vector2<double> PointAt(int vertex) const {
+    return is_ellipse_
+               ? Vector2<double>(pose_.position +
+                                 SupportOf(shape_, pose_, 0, Vector2<double>(-of_.normal)).arm)
+               : other_.VertexAt(vertex);
+  }
+  double HeightOf(const Vector2<double>& x) const { return of_.normal.dot(x - of_.start); }
+  void Add(const ContactFeature& feature, double gap) { found_[count_++] = {feature, gap}; }
+
+  void FindOnRun() {
+    double lowest = kInfinity;
+    int at = -1;
+    for (int i = 0; i < other_.Size(); ++i) {
+      const Vector2<double> x = PointAt(i);
+      const double height = HeightOf(x);
+      if (height < lowest && outline_.IsOver(run_, x)) {
+        lowest = height;
+        at = i;
+      }
+    }
+    if (at < 0) return;
+    AddOnRun(at, lowest);
+    int second = -1;
+    for (const int i : {other_.Next(at), other_.Previous(at)}) {
+      const Vector2<double> x = other_.VertexAt(i);
+      if (i != at && (second < 0 || HeightOf(x) < HeightOf(other_.VertexAt(second))) &&
+          x != other_.VertexAt(at) && outline_.IsOver(run_, x)) {
+        second = i;
+      }
+    }
+    if (second >= 0) AddOnRun(second, HeightOf(other_.VertexAt(second)));
+  }
+
+  void AddOnRun(int vertex, double height) {
+    const double s = of_.tangent.dot(PointAt(vertex) - of_.start);
+    foot_[count_] = s;
+    Add(OnEdge(outline_.EdgeAt(run_, s), vertex), height - other_.Radius());
+    num_on_run_ = count_;
+  }
+
+  void TryStart() {
+    const int previous = of_.before == OutlineJoint::kConvex ? outline_.Previous(run_) : -1;
+    const Cone cone{previous >= 0 ? outline_.run(previous).normal : Vector2<double>(-of_.tangent),
+                    of_.normal};
+    Try(of_.first, of_.start, cone, 0.0, [&](const Vector2<double>& x) {
+      const bool is_beyond = of_.tangent.dot(x - of_.start) < 0.0 && HeightOf(x) >= 0.0;
+      return !outline_.IsAfterStart(run_, x) &&
+             (previous >= 0 ? !outline_.IsBeforeEnd(previous, x) : is_beyond);
+    });
+  }
+
+  void TryEnd() {
+    const Vector2<double> end = of_.start + of_.length * of_.tangent;
+    Try(of_.last + 1, end, {of_.normal, of_.tangent}, of_.length, [&](const Vector2<double>& x) {
+      return !outline_.IsBeforeEnd(run_, x) && HeightOf(x) >= 0.0;
+    });
+  }
+
+  /// Adds the contact of the corner v with B. `is_beyond` says whether a point is in the cone: the
+  /// same tests as those of the runs, so that rounding leaves out none and takes none twice.
+  template <typename IsBeyond>
+  void Try(int corner, const Vector2<double>& v, const Cone& cone, double foot,
+           const IsBeyond& is_beyond) {
+    if (is_ellipse_) return TryEllipse(corner, v, cone);
+    if (other_.Size() > 1 && TryFaces(corner, v, cone, foot)) return;
+    int nearest = -1;
+    double best = kInfinity;
+    for (int j = 0; j < other_.Size(); ++j) {
+      const double square = (other_.VertexAt(j) - v).squaredNorm();
+      if (square < best) {
+        best = square;
+        nearest = j;
+      }
+    }
+    if (nearest >= 0 && best > 0.0 && is_beyond(other_.VertexAt(nearest))) {
+      Add(OnCorner(corner, nearest), std::sqrt(best) - other_.Radius());
+    }
+  }
+
+  /// The corner against the face of B that separates them best; where it is in B, the best one whose
+  /// normal the corner has. False where the vertices of B are nearer.
+  bool TryFaces(int corner, const Vector2<double>& v, const Cone& cone, double foot) {
+    int edge = -1, allowed = -1;
+    double height = -kInfinity, of_allowed = -kInfinity;
+    for (int i = 0; i < other_.Size(); ++i) {
+      const CoreEdge line = other_.Edge(i);
+      if (!(line.length > 0.0)) continue;
+      const double own = line.Height(v);
+      if (own > height) {
+        height = own;
+        edge = i;
+      }
+      if (own > of_allowed && cone.Contains(-line.Normal()) && IsOverFace(line, v)) {
+        of_allowed = own;
+        allowed = i;
+      }
+    }
+    if (edge < 0) return false;
+    const bool is_inside = height < 0.0 && other_.Size() > 2;
+    if (!is_inside && edge != allowed) return IsOverFace(other_.Edge(edge), v);
+    if (allowed >= 0 && !IsTaken(foot, other_.Edge(allowed).length)) {
+      Add(CornerOnEdge(corner, allowed), of_allowed - other_.Radius());
+    }
+    return true;
+  }
+
+  static bool IsOverFace(const CoreEdge& line, const Vector2<double>& v) {
+    const double s = line.tangent.dot(v - line.start);
+    const double room = kLengthRounding * line.length;
+    return s >= -room && s <= line.length + room;
+  }
+  /// Whether a vertex of B above the corner is a contact already.
+  bool IsTaken(double foot, double length) const {
+    return std::any_of(foot_, foot_ + num_on_run_, [&](double s) {
+      return std::abs(s - foot) <= kLengthRounding * (of_.length + length);
+    });
+  }
+
+  void TryEllipse(int corner, const Vector2<double>& v, const Cone& cone) {
+    const double point[2] = {v.x(), v.y()};
+    const ShapeView<double> of_corner{ShapeType::kPolygon, point, 2};
+    const ContactGeometry<double> contact = EvaluateContact(
+        ContactFeature{}, shape_, pose_, of_corner, Pose<double>(Vector2<double>(0.0, 0.0), 0.0));
+    const Vector2<double>& n = contact.normal;
+    if (Cross(cone.first, n) > 0.0 && Cross(n, cone.last) > 0.0 &&
+        n.dot(cone.first + cone.last) > 0.0) {
+      Add(OnCorner(corner, 0), contact.gap);
+    }
+  }
+
+  const Outline& outline_;
+  const int run_;
+  const OutlineRun& of_;
+  const bool is_first_, is_ellipse_;
+  const ShapeView<double>& shape_;
+  const Pose<double>& pose_;
+  const ConvexCore other_;
+  Candidate found_[4];
+  double foot_[2] = {0.0, 0.0};  ///< of the contacts on the run
+  int count_ = 0, num_on_run_ = 0;
+};
+
+}  // namespace
+}  // namespace tangible::internal
+
+namespace tangible {
+
+int FindOutlineFeatures(const Outline& outline, int run, const ShapeView<double>& shape_a,
+                        const Pose<double>& pose_a, const ShapeView<double>& shape_b,
+                        const Pose<double>& pose_b, SeamSide side, double max_gap,
+                        ContactFeature features[2]) {
+  const bool is_first = side == SeamSide::kFirst;
+  const ShapeView<double>& other = is_first ? shape_b : shape_a;
+  const Pose<double> relative =
+      internal::RelativeTo(is_first ? pose_a : pose_b, is_first ? pose_b : pose_a);
+  return internal::OutlinePair(outline, run, other, relative, side).Find(max_gap, features);
+}
+
+double DistanceOfRun(const Outline& outline, int run, const Pose<double>& pose,
+                     const ShapeView<double>& shape, const Pose<double>& shape_pose, int* corner,
+                     int* vertex) {
+  const OutlineRun& of = outline.run(run);
+  const Pose<double> relative = internal::RelativeTo(pose, shape_pose);
+  const internal::ConvexCore core(shape, relative, Vector2<double>(0.0, 0.0));
+  const Vector2<double> ends[2] = {of.start, of.start + of.length * of.tangent};
+  double best = kInfinity;
+  double nearest = kInfinity;
+  for (int j = 0; j < core.Size(); ++j) {
+    const Vector2<double> x = core.VertexAt(j);
+    best = std::min(best, internal::DistanceOfSegment(ends[0], ends[1], x));
+    for (int k = 0; k < 2; ++k) {
+      const double square = (x - ends[k]).squaredNorm();
+      if (square < nearest) {
+        nearest = square;
+        *corner = k == 0 ? of.first : of.last + 1;
+        *vertex = j;
+      }
+    }
+    if (core.Size() > 1) {
+      const Vector2<double> next = core.VertexAt(core.Next(j));
+      for (const Vector2<double>& end : ends) {
+        best = std::min(best, internal::DistanceOfSegment(x, next, end));
+      }
+    }
+  }
+  const double radius =
+      shape.type == ShapeType::kEllipse ? BoundingRadius(shape) : CoreRadius(shape);
+  return best - radius;
+}
+
+}  // namespace tangible

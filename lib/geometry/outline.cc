@@ -1,0 +1,158 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/geometry/outline.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "tangible/geometry/tolerances.h"
+#include "tangible/math/scalar.h"
+
+namespace tangible {
+namespace {
+
+/// How far a run reaches beyond its ends, m: the same in all tests, so that each place belongs to
+/// either the run or the corner.
+double RoomOf(const OutlineRun& run) { return kLengthRounding * run.length; }
+
+double FootOver(const OutlineRun& run, const Vector2<double>& x) {
+  return run.tangent.dot(x - run.start);
+}
+double HeightOver(const OutlineRun& run, const Vector2<double>& x) {
+  return run.normal.dot(x - run.start);
+}
+
+void Include(const Vector2<double>& point, Aabb* box) {
+  box->min_x = std::min(box->min_x, point.x());
+  box->min_y = std::min(box->min_y, point.y());
+  box->max_x = std::max(box->max_x, point.x());
+  box->max_y = std::max(box->max_y, point.y());
+}
+
+}  // namespace
+
+Outline::Outline(const ShapeView<double>& polyline) {
+  const int num_edges = NumVertices(polyline.type, polyline.num_numbers) - 1;
+  is_closed_ = Vertex(polyline, 0) == Vertex(polyline, num_edges);
+  along_.resize(static_cast<size_t>(num_edges));
+  for (int i = 0; i < num_edges; ++i) {
+    const Vector2<double> start = Vertex(polyline, i);
+    const Vector2<double> along = Vertex(polyline, i + 1) - start;
+    const double length = std::sqrt(along.squaredNorm());
+    const Vector2<double> tangent = along / length;
+    if (i > 0 && std::abs(Cross(runs_.back().tangent, tangent)) <= kFlushTurn &&
+        runs_.back().tangent.dot(tangent) > 0.0) {
+      OutlineRun& run = runs_.back();
+      along_[static_cast<size_t>(i)] = run.length;
+      run.last = i;
+      run.length += length;
+      continue;
+    }
+    OutlineRun& run = runs_.emplace_back();
+    run.first = run.last = i;
+    run.start = start;
+    run.tangent = tangent;
+    run.normal = Vector2<double>(tangent.y(), -tangent.x());
+    run.length = length;
+    along_[static_cast<size_t>(i)] = 0.0;
+  }
+  SetJoints();
+  BuildTree(polyline);
+}
+
+void Outline::SetJoints() {
+  for (int i = 0; i < num_runs(); ++i) {
+    const int next = Next(i);
+    if (next < 0) continue;
+    OutlineRun& before = runs_[i];
+    OutlineRun& after = runs_[next];
+    const double sine = Cross(before.tangent, after.tangent);
+    const double cosine = before.tangent.dot(after.tangent);
+    const OutlineJoint joint = std::abs(sine) <= kFlushTurn && cosine > 0.0 ? OutlineJoint::kFlush
+                               : sine >= 0.0                                ? OutlineJoint::kConvex
+                                             : OutlineJoint::kConcave;
+    before.after = after.before = joint;
+    if (joint == OutlineJoint::kConvex) {
+      before.bisector_after = after.bisector_before = std::tan(0.5 * std::atan2(sine, cosine));
+    }
+  }
+}
+
+void Outline::BuildTree(const ShapeView<double>& polyline) {
+  while (num_leaves_ < num_runs()) num_leaves_ *= 2;
+  tree_.assign(2 * static_cast<size_t>(num_leaves_),
+               {kInfinity, kInfinity, -kInfinity, -kInfinity});
+  for (int i = 0; i < num_runs(); ++i) {
+    for (int k = runs_[i].first; k <= runs_[i].last + 1; ++k) {
+      Include(Vertex(polyline, k), &tree_[static_cast<size_t>(num_leaves_ + i)]);
+    }
+  }
+  for (int node = num_leaves_ - 1; node > 0; --node) {
+    const Aabb& low = tree_[2 * static_cast<size_t>(node)];
+    const Aabb& high = tree_[2 * static_cast<size_t>(node) + 1];
+    tree_[static_cast<size_t>(node)] = {
+        std::min(low.min_x, high.min_x), std::min(low.min_y, high.min_y),
+        std::max(low.max_x, high.max_x), std::max(low.max_y, high.max_y)};
+  }
+}
+
+int Outline::EdgeAt(int run, double s) const {
+  const OutlineRun& of = runs_[run];
+  const auto first = along_.begin() + of.first;
+  const auto after = std::upper_bound(first + 1, along_.begin() + of.last + 1, s);
+  return of.first + static_cast<int>(after - first) - 1;
+}
+
+bool Outline::IsAfterStart(int run, const Vector2<double>& x) const {
+  const OutlineRun& of = runs_[run];
+  const double s = FootOver(of, x);
+  const double h = HeightOver(of, x);
+  if (s >= -RoomOf(of)) {
+    return h >= 0.0 || s >= -h * of.bisector_before - RoomOf(of);
+  }
+  if (of.before != OutlineJoint::kConcave) return false;
+  const OutlineRun& previous = runs_[Previous(run)];
+  return HeightOver(previous, x) <= 0.0 && FootOver(previous, x) >= 0.0;
+}
+
+bool Outline::IsBeforeEnd(int run, const Vector2<double>& x) const {
+  const OutlineRun& of = runs_[run];
+  const double left = of.length - FootOver(of, x);
+  const double h = HeightOver(of, x);
+  if (left >= -RoomOf(of)) {
+    return h >= 0.0 || left >= -h * of.bisector_after - RoomOf(of);
+  }
+  if (of.after != OutlineJoint::kConcave) return false;
+  const OutlineRun& next = runs_[Next(run)];
+  return HeightOver(next, x) <= 0.0 && FootOver(next, x) <= next.length;
+}
+
+// Whether a point at some depth behind a run is on the free side of another one that is nearer.
+bool Outline::IsBehindFree(int run, const Vector2<double>& x, double depth) const {
+  bool is_free = false;
+  ForEachRun({x.x() - depth, x.y() - depth, x.x() + depth, x.y() + depth}, [&](int i) {
+    if (i == run || is_free) return;
+    const double s = FootOver(runs_[i], x);
+    const double h = HeightOver(runs_[i], x);
+    is_free = h >= 0.0 && h < depth && s >= 0.0 && s <= runs_[i].length;
+  });
+  return is_free;
+}
+
+bool Outline::IsOver(int run, const Vector2<double>& x) const {
+  if (!IsAfterStart(run, x) || !IsBeforeEnd(run, x)) return false;
+  const double h = HeightOver(runs_[run], x);
+  return h >= -kFlushStep || !IsBehindFree(run, x, -h);
+}
+
+Aabb BoxOfOutline(const Outline& outline, const Pose<double>& pose, double margin) {
+  const Aabb& own = outline.box();
+  Aabb box{kInfinity, kInfinity, -kInfinity, -kInfinity};
+  for (const double x : {own.min_x, own.max_x}) {
+    for (const double y : {own.min_y, own.max_y}) {
+      Include(pose * Vector2<double>(x, y), &box);
+    }
+  }
+  return {box.min_x - margin, box.min_y - margin, box.max_x + margin, box.max_y + margin};
+}
+
+}  // namespace tangible

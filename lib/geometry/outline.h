@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+//
+// Polylines: outlines of a solid, which other bodies touch from the free side alone.
+//
+// Going along the points the solid is on the left, so that the normal n of an edge with the tangent
+// t is (t_y, −t_x), as of a counter-clockwise polygon. A joint of two edges is
+//   flush    they turn by at most kFlushTurn: nothing of it is a contact;
+//   convex   the outline turns left: the corner is a contact with the normals between both edges;
+//   concave  it turns right: the corner is none, and bodies touch both edges.
+// An end that nothing follows is a corner with the normals between that of its edge and the
+// direction in which the outline ends there.
+//
+// A *run* is a maximal sequence of edges with flush joints. It is one face, and the part of its
+// body that contacts belong to. A point x has the foot s = t·(x − start) and the height
+// h = n·(x − start) over a run; it is over the run where 0 ≤ s ≤ length, and
+//   behind the run (h < 0) at a convex joint only up to the bisector, s ≥ |h| tan(turn / 2), so that
+//   it is over the nearest one of the two runs;
+//   beyond a concave joint also where it is behind the neighbour, because near the joint both bound
+//   the free side.
+// A point behind a run that is over another run with a smaller height above it is on the free side
+// of a thin solid, and no contact of the first one.
+
+#include <vector>
+
+#include "tangible/geometry/broad_phase.h"
+#include "tangible/geometry/collide.h"
+#include "tangible/geometry/seams.h"
+
+namespace tangible {
+
+enum class OutlineJoint : unsigned char { kEnd, kFlush, kConvex, kConcave };
+
+struct OutlineRun {
+  int first = 0, last = 0;  ///< edges of the polyline
+  Vector2<double> start{0.0, 0.0}, tangent{0.0, 0.0}, normal{0.0, 0.0};
+  double length = 0.0;
+  OutlineJoint before = OutlineJoint::kEnd, after = OutlineJoint::kEnd;
+  double bisector_before = 0.0, bisector_after = 0.0;  ///< tan(turn / 2) of convex joints
+};
+
+/// A polyline in its body's frame.
+class Outline {
+ public:
+  /// O(n) for n points, no two of which that follow each other are equal.
+  explicit Outline(const ShapeView<double>& polyline);
+
+  int num_runs() const { return static_cast<int>(runs_.size()); }
+  const OutlineRun& run(int i) const { return runs_[i]; }
+  /// The box of all edges.
+  const Aabb& box() const { return tree_[1]; }
+  /// The edge of a run at the foot s.
+  int EdgeAt(int run, double s) const;
+  /// Whether a point is over a run at its start, or its end (see above).
+  bool IsAfterStart(int run, const Vector2<double>& x) const;
+  bool IsBeforeEnd(int run, const Vector2<double>& x) const;
+  /// Whether a point is over a run whose solid it may touch.
+  bool IsOver(int run, const Vector2<double>& x) const;
+  /// The run before or after another one; −1: none.
+  int Previous(int run) const { return run > 0 ? run - 1 : is_closed_ ? num_runs() - 1 : -1; }
+  int Next(int run) const { return run + 1 < num_runs() ? run + 1 : is_closed_ ? 0 : -1; }
+
+  /// Calls visit(run) for the runs whose boxes overlap another one, in ascending order.
+  /// O(log n + found).
+  template <typename Visit>
+  void ForEachRun(const Aabb& box, const Visit& visit) const {
+    VisitNode(1, 0, num_leaves_, box, visit);
+  }
+
+ private:
+  template <typename Visit>
+  void VisitNode(int node, int low, int high, const Aabb& box, const Visit& visit) const {
+    const Aabb& own = tree_[node];
+    if (!(own.min_x <= box.max_x && box.min_x <= own.max_x && own.min_y <= box.max_y &&
+          box.min_y <= own.max_y)) {
+      return;
+    }
+    if (high - low == 1) {
+      visit(low);
+      return;
+    }
+    const int middle = (low + high) / 2;
+    VisitNode(2 * node, low, middle, box, visit);
+    VisitNode(2 * node + 1, middle, high, box, visit);
+  }
+  bool IsBehindFree(int run, const Vector2<double>& x, double depth) const;
+  void SetJoints();
+  void BuildTree(const ShapeView<double>& polyline);
+
+  std::vector<OutlineRun> runs_;
+  std::vector<double> along_;  ///< the foot of each edge's start over its run
+  bool is_closed_ = false;
+  int num_leaves_ = 1;      ///< a power of two
+  std::vector<Aabb> tree_;  ///< a heap whose leaves are the boxes of the runs
+};
+
+/// The box of an outline at a pose, grown by `margin`.
+Aabb BoxOfOutline(const Outline& outline, const Pose<double>& pose, double margin);
+
+/// FindContactFeatures for one run of a polyline and another shape, which is no half-plane: the
+/// lowest vertex over the run and its lower neighbour over it, and the corners at which the run
+/// starts or the outline ends. `side`: which one the polyline is.
+int FindOutlineFeatures(const Outline& outline, int run, const ShapeView<double>& shape_a,
+                        const Pose<double>& pose_a, const ShapeView<double>& shape_b,
+                        const Pose<double>& pose_b, SeamSide side, double max_gap,
+                        ContactFeature features[2]);
+
+/// A lower bound of the distance of a run and a shape that do not cross, less the shape's radius,
+/// m; the distance itself unless the shape is an ellipse. Sets the end of the run and the vertex of
+/// the shape that are nearest.
+double DistanceOfRun(const Outline& outline, int run, const Pose<double>& pose,
+                     const ShapeView<double>& shape, const Pose<double>& shape_pose, int* corner,
+                     int* vertex);
+
+}  // namespace tangible
