@@ -145,6 +145,10 @@ bool Outline::IsOver(int run, const Vector2<double>& x) const {
 }
 
 Aabb BoxOfOutline(const Outline& outline, const Pose<double>& pose, double margin) {
+  if (outline.Next(outline.num_runs() - 1) < 0) {
+    // The solid behind a line that is open has no other side.
+    return {-kInfinity, -kInfinity, kInfinity, kInfinity};
+  }
   const Aabb& own = outline.box();
   Aabb box{kInfinity, kInfinity, -kInfinity, -kInfinity};
   for (const double x : {own.min_x, own.max_x}) {

@@ -4,7 +4,9 @@
 // The parts of two bodies that may touch: of a polyline the runs that are near the other body,
 // which its tree finds.
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "tangible/dynamics/model/model.h"
 #include "tangible/geometry/broad_phase.h"
@@ -24,9 +26,33 @@ inline Aabb BoxInFrame(const Pose<double>& frame, const Aabb& box, double margin
   return {at.x() - x, at.y() - y, at.x() + x, at.y() + y};
 }
 
+/// The run of an outline that is nearest to a point of its frame if the point is behind it; else
+/// −1. Boxes about the point are doubled from `size` until they hold a run.
+inline int RunBefore(const Outline& outline, const Vector2<double>& x, double size) {
+  int nearest = -1;
+  double best = std::numeric_limits<double>::infinity();
+  const auto look = [&](double half) {
+    outline.ForEachRun({x.x() - half, x.y() - half, x.x() + half, x.y() + half}, [&](int i) {
+      const OutlineRun& run = outline.run(i);
+      const double s = std::clamp(run.tangent.dot(x - run.start), 0.0, run.length);
+      const double distance = (x - run.start - s * run.tangent).norm();
+      if (distance < best) {
+        best = distance;
+        nearest = i;
+      }
+    });
+  };
+  for (double half = size; nearest < 0 && std::isfinite(half); half *= 2.0) look(half);
+  if (nearest < 0) return -1;
+  look(best);
+  const OutlineRun& run = outline.run(nearest);
+  return run.normal.dot(x - run.start) < 0.0 ? nearest : -1;
+}
+
 /// Calls visit(PartPair) for the parts of two bodies that may touch, as
 /// ModelStructure::ForEachPartPair. The boxes are grown by how far each body may go; `reach` says
-/// by how much that of a polyline is, m.
+/// by how much that of a polyline is, m. A body that no run is near is in the solid where it is
+/// behind the nearest one, which then is its only one.
 template <typename Visit>
 void ForEachPartNear(const Model<double>& model, int a, const Pose<double>& pose_a,
                      const Aabb& box_a, int b, const Pose<double>& pose_b, const Aabb& box_b,
@@ -43,12 +69,21 @@ void ForEachPartNear(const Model<double>& model, int a, const Pose<double>& pose
   const auto visit_both = [&](int of_lined, int of_other) {
     visit(is_first ? PartPair{of_lined, of_other} : PartPair{of_other, of_lined});
   };
-  outline->ForEachRun(BoxInFrame(is_first ? pose_a : pose_b, is_first ? box_b : box_a, reach),
-                      [&](int run) {
-                        for (int k = 0; k <= other.num_contact_points; ++k) {
-                          visit_both(lined.PartOfRun(run), k);
-                        }
-                      });
+  const Aabb box = BoxInFrame(is_first ? pose_a : pose_b, is_first ? box_b : box_a, reach);
+  bool is_near = false;
+  const auto visit_run = [&](int run) {
+    is_near = true;
+    for (int k = 0; k <= other.num_contact_points; ++k) {
+      visit_both(lined.PartOfRun(run), k);
+    }
+  };
+  outline->ForEachRun(box, visit_run);
+  if (!is_near) {
+    const Vector2<double> centre(0.5 * (box.min_x + box.max_x), 0.5 * (box.min_y + box.max_y));
+    const double size = 0.5 * std::max(box.max_x - box.min_x, box.max_y - box.min_y);
+    const int run = size > 0.0 ? RunBefore(*outline, centre, size) : -1;
+    if (run >= 0) visit_run(run);
+  }
   for (int k = 1; k <= lined.num_contact_points; ++k) {
     visit_both(k, 0);
   }

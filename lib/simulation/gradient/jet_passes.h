@@ -12,7 +12,7 @@ namespace tangible {
 /// The smallest width built that takes all columns in one pass, else the largest; 0 where none is.
 inline int JetWidthFor(Eigen::Index columns) {
   int best = 0;
-  const auto consider = [&](int width) {
+  [[maybe_unused]] const auto consider = [&](int width) {
     const bool enough = width >= columns;
     const bool best_enough = best > 0 && best >= columns;
     if (best == 0 || (enough && (!best_enough || width < best)) ||

@@ -197,6 +197,27 @@ TEST(StepTest, NoAllocationInAChainThatWhips) {
   EXPECT_EQ(testing::NumAllocations(), before);
 }
 
+// A disc rolls over joints of a polyline and through its valley.
+TEST(StepTest, NoAllocationOnAPolyline) {
+  Model<double> model;
+  State<double> state;
+  BuildModel(SceneOf(R"({"bodies": [
+      {"name": "disc", "shape": {"circle": {"radius": 0.1}}, "mass": 1, "friction": 0.5,
+       "position": [-1, 0.6]},
+      {"name": "track", "static": true, "friction": 0.5, "shape": {"polyline": {
+       "points": [[-2, 1], [-0.5, 0.25], [-0.4, 0.2], [0, 0], [1, 0.1], [2, 1]],
+       "solid": "right"}}}]})"),
+             &model, &state);
+  Stepper stepper(model);
+  ASSERT_EQ(stepper.Step(model, 0.0, 0.01, &state).status, StepStatus::kDone);
+  const long before = testing::NumAllocations();
+  for (int k = 1; k < 150; ++k) {
+    ASSERT_EQ(stepper.Step(model, 0.01 * k, 0.01, &state).status, StepStatus::kDone);
+  }
+  EXPECT_EQ(testing::NumAllocations(), before);
+  EXPECT_GT(state.pose[0], 0.1);
+}
+
 // Six stacks of two discs: islands, each of which had its memory from its first step on.
 TEST(StepTest, NoAllocationWithIslandsThatRest) {
   std::string bodies;
