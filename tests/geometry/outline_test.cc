@@ -12,21 +12,21 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-struct Found {
+struct RunContacts {
   ContactFeature features[2];
   ContactGeometry<double> contacts[2];
   int count = 0;
 };
 
 /// A shape at a pose against one run of a polyline at rest at the origin, as the second body.
-Found Collide(const std::vector<double>& points, int run, ShapeType type,
-              const std::vector<double>& numbers, double x, double y, double angle = 0.0) {
+RunContacts CollideRun(const std::vector<double>& points, int run, ShapeType type,
+                       const std::vector<double>& numbers, double x, double y, double angle = 0.0) {
   const ShapeView<double> line{ShapeType::kPolyline, points.data(),
                                static_cast<int>(points.size())};
   const ShapeView<double> shape{type, numbers.data(), static_cast<int>(numbers.size())};
   const Pose<double> frame;
   const Pose<double> pose(Vector2<double>(x, y), angle);
-  Found found;
+  RunContacts found;
   found.count = FindOutlineFeatures(Outline(line), run, shape, pose, line, frame, SeamSide::kSecond,
                                     kInfinity, found.features);
   for (int k = 0; k < found.count; ++k) {
@@ -35,17 +35,17 @@ Found Collide(const std::vector<double>& points, int run, ShapeType type,
   return found;
 }
 
-Found Disc(const std::vector<double>& points, int run, double x, double y) {
-  return Collide(points, run, ShapeType::kCircle, {0.1}, x, y);
+RunContacts DiscOver(const std::vector<double>& points, int run, double x, double y) {
+  return CollideRun(points, run, ShapeType::kCircle, {0.1}, x, y);
 }
 
 // Going towards −x the free side is above.
-const std::vector<double> kFloor = {2, 0, 1, 0, 0, 0, -2, 0};
+const std::vector<double> kFloorPoints = {2, 0, 1, 0, 0, 0, -2, 0};
 const std::vector<double> kRidge = {2, -2, 0, 0, -2, -2};
 const std::vector<double> kValley = {2, 2, 0, 0, -2, 2};
 
 TEST(OutlineTest, EdgesThatDoNotTurnAreOneRun) {
-  const ShapeView<double> line{ShapeType::kPolyline, kFloor.data(), 8};
+  const ShapeView<double> line{ShapeType::kPolyline, kFloorPoints.data(), 8};
   const Outline outline(line);
   ASSERT_EQ(outline.num_runs(), 1);
   EXPECT_EQ(outline.run(0).length, 4.0);
@@ -59,7 +59,7 @@ TEST(OutlineTest, EdgesThatDoNotTurnAreOneRun) {
 
 TEST(OutlineTest, ADiscTouchesTheEdgeUnderItsCentreOnBothSides) {
   for (const double y : {0.3, 0.05, -0.7}) {
-    const Found found = Disc(kFloor, 0, -1.5, y);
+    const RunContacts found = DiscOver(kFloorPoints, 0, -1.5, y);
     ASSERT_EQ(found.count, 1);
     EXPECT_EQ(found.features[0], (ContactFeature{FeatureKind::kVertexEdge, 0, 2}));
     EXPECT_NEAR(found.contacts[0].gap, y - 0.1, 1e-15);
@@ -68,13 +68,13 @@ TEST(OutlineTest, ADiscTouchesTheEdgeUnderItsCentreOnBothSides) {
 }
 
 TEST(OutlineTest, AnEndIsACornerOnTheFreeSideAlone) {
-  const Found above = Disc(kFloor, 0, 2.3, 0.4);
+  const RunContacts above = DiscOver(kFloorPoints, 0, 2.3, 0.4);
   ASSERT_EQ(above.count, 1);
   EXPECT_EQ(above.features[0], (ContactFeature{FeatureKind::kVertexVertex, 0, 0}));
   EXPECT_NEAR(above.contacts[0].gap, 0.4, 1e-15);
-  EXPECT_EQ(Disc(kFloor, 0, -2.3, 0.4).count, 1);
-  EXPECT_EQ(Disc(kFloor, 0, 2.3, -0.4).count, 0);
-  EXPECT_EQ(Disc(kFloor, 0, -2.3, -0.4).count, 0);
+  EXPECT_EQ(DiscOver(kFloorPoints, 0, -2.3, 0.4).count, 1);
+  EXPECT_EQ(DiscOver(kFloorPoints, 0, 2.3, -0.4).count, 0);
+  EXPECT_EQ(DiscOver(kFloorPoints, 0, -2.3, -0.4).count, 0);
 }
 
 // Around a ridge each place belongs to one edge or to the corner, as far as its distance says.
@@ -82,8 +82,8 @@ TEST(OutlineTest, EachPlaceAroundARidgeHasOneFeature) {
   for (int i = 0; i < 360; ++i) {
     const double angle = (i + 0.25) * std::acos(-1.0) / 180.0;
     const double x = 0.5 * std::cos(angle), y = 0.5 * std::sin(angle);
-    const Found right = Disc(kRidge, 0, x, y);
-    const Found left = Disc(kRidge, 1, x, y);
+    const RunContacts right = DiscOver(kRidge, 0, x, y);
+    const RunContacts left = DiscOver(kRidge, 1, x, y);
     ASSERT_EQ(right.count + left.count, 1) << i;
     const double h = (std::abs(x) + y) / std::sqrt(2.0);
     const bool is_corner = i >= 45 && i < 135;
@@ -97,7 +97,7 @@ TEST(OutlineTest, BothEdgesOfAValleyHoldADisc) {
   for (const double y : {0.2, -0.3}) {
     const double gap = y / std::sqrt(2.0) - 0.1;
     for (const int run : {0, 1}) {
-      const Found found = Disc(kValley, run, 0.0, y);
+      const RunContacts found = DiscOver(kValley, run, 0.0, y);
       ASSERT_EQ(found.count, 1) << y;
       EXPECT_NE(found.features[0].kind, FeatureKind::kVertexVertex);
       EXPECT_NEAR(found.contacts[0].gap, gap, 1e-15);
@@ -109,29 +109,29 @@ TEST(OutlineTest, TheFarSideOfAThinSolidIsNoContact) {
   const std::vector<double> slab = {-1, -0.02, 1, -0.02, 1, 0, -1, 0, -1, -0.02};
   const ShapeView<double> line{ShapeType::kPolyline, slab.data(), 10};
   ASSERT_EQ(Outline(line).num_runs(), 4);
-  EXPECT_EQ(Disc(slab, 0, 0.0, 0.08).count, 0);
-  const Found top = Disc(slab, 2, 0.0, 0.08);
+  EXPECT_EQ(DiscOver(slab, 0, 0.0, 0.08).count, 0);
+  const RunContacts top = DiscOver(slab, 2, 0.0, 0.08);
   ASSERT_EQ(top.count, 1);
   EXPECT_NEAR(top.contacts[0].gap, -0.02, 1e-15);
   // In the solid the nearer side acts.
-  EXPECT_EQ(Disc(slab, 0, 0.0, -0.015).count, 1);
+  EXPECT_EQ(DiscOver(slab, 0, 0.0, -0.015).count, 1);
 }
 
 // A box beside an end has one corner on the edge, and its face on the end.
 TEST(OutlineTest, ABoxOverAnEnd) {
-  const Found found = Collide(kFloor, 0, ShapeType::kBox, {1.0, 0.2}, 2.1, 0.1);
+  const RunContacts found = CollideRun(kFloorPoints, 0, ShapeType::kBox, {1.0, 0.2}, 2.1, 0.1);
   ASSERT_EQ(found.count, 2);
   EXPECT_NEAR(found.contacts[0].gap, 0.0, 1e-15);
   EXPECT_NEAR(found.contacts[1].gap, 0.0, 1e-15);
   EXPECT_NEAR(found.contacts[0].point.x() + found.contacts[1].point.x(), 1.6 + 2.0, 1e-12);
-  const Found over = Collide(kFloor, 0, ShapeType::kBox, {1.0, 0.2}, 0.1, 0.1);
+  const RunContacts over = CollideRun(kFloorPoints, 0, ShapeType::kBox, {1.0, 0.2}, 0.1, 0.1);
   ASSERT_EQ(over.count, 2);
   EXPECT_EQ(over.features[0].kind, FeatureKind::kVertexEdge);
   EXPECT_EQ(over.features[1].kind, FeatureKind::kVertexEdge);
 }
 
 TEST(OutlineTest, ABoxOnARidgeRestsOnTheCorner) {
-  const Found found = Collide(kRidge, 1, ShapeType::kBox, {1.0, 0.2}, 0.1, 0.09);
+  const RunContacts found = CollideRun(kRidge, 1, ShapeType::kBox, {1.0, 0.2}, 0.1, 0.09);
   ASSERT_GE(found.count, 1);
   EXPECT_EQ(found.features[0].kind, FeatureKind::kEdgeVertex);
   EXPECT_NEAR(found.contacts[0].gap, -0.01, 1e-15);
@@ -139,10 +139,10 @@ TEST(OutlineTest, ABoxOnARidgeRestsOnTheCorner) {
 }
 
 TEST(OutlineTest, EllipsesOverEdgesAndCorners) {
-  const Found over = Collide(kFloor, 0, ShapeType::kEllipse, {0.2, 0.1}, 0.5, 0.3);
+  const RunContacts over = CollideRun(kFloorPoints, 0, ShapeType::kEllipse, {0.2, 0.1}, 0.5, 0.3);
   ASSERT_EQ(over.count, 1);
   EXPECT_NEAR(over.contacts[0].gap, 0.2, 1e-15);
-  const Found corner = Collide(kRidge, 1, ShapeType::kEllipse, {0.2, 0.1}, 0.0, 0.3);
+  const RunContacts corner = CollideRun(kRidge, 1, ShapeType::kEllipse, {0.2, 0.1}, 0.0, 0.3);
   ASSERT_EQ(corner.count, 1);
   EXPECT_EQ(corner.features[0].kind, FeatureKind::kVertexVertex);
   EXPECT_NEAR(corner.contacts[0].gap, 0.2, 1e-12);
@@ -162,7 +162,7 @@ TEST(OutlineTest, TheTreeFindsTheRunsNearABoxInOrder) {
 }
 
 TEST(OutlineTest, TheDistanceOfARunIsThatOfTheNearestPoints) {
-  const ShapeView<double> line{ShapeType::kPolyline, kFloor.data(), 8};
+  const ShapeView<double> line{ShapeType::kPolyline, kFloorPoints.data(), 8};
   const std::vector<double> size = {1.0, 0.2};
   const ShapeView<double> box{ShapeType::kBox, size.data(), 2};
   int corner = -1, vertex = -1;

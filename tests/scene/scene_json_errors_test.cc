@@ -177,7 +177,7 @@ TEST(BadSceneTest, Shapes) {
       {shape, R"({"disc": {}})",
        shape +
            "/disc: unknown key of a shape, expected one of circle, ellipse, box, capsule, polygon, "
-           "half_plane, got \"disc\""},
+           "half_plane, polyline, got \"disc\""},
       {shape, R"({"circle": {"radius": 0}})",
        shape + "/circle/radius: expected a number > 0, got 0"},
       {shape, R"({"circle": {"radius": 1, "size": 1}})",
