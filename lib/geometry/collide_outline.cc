@@ -158,8 +158,8 @@ class OutlinePair {
     }
   }
 
-  /// The corner against the face of B that separates them best; where it is in B, the best one whose
-  /// normal the corner has. False where the vertices of B are nearer.
+  /// The corner against the face of B that separates them best. Where it is in B, it is the best
+  /// one whose normal the corner has. False where the vertices of B are nearer.
   bool TryFaces(int corner, const Vector2<double>& v, const Cone& cone, double foot) {
     int edge = -1, allowed = -1;
     double height = -kInfinity, of_allowed = -kInfinity;

@@ -3,23 +3,21 @@
 //
 // Polylines: outlines of a solid, which other bodies touch from the free side alone.
 //
-// Going along the points the solid is on the left, so that the normal n of an edge with the tangent
-// t is (t_y, −t_x), as of a counter-clockwise polygon. A joint of two edges is
-//   flush    they turn by at most kFlushTurn: nothing of it is a contact;
-//   convex   the outline turns left: the corner is a contact with the normals between both edges;
-//   concave  it turns right: the corner is none, and bodies touch both edges.
-// An end that nothing follows is a corner with the normals between that of its edge and the
-// direction in which the outline ends there.
+// Going along the points the solid is on the left, so that the normal n of an edge with the
+// tangent t is (t_y, −t_x), as of a counter-clockwise polygon. A joint of two edges that turn
+// by at most kFlushTurn is flush, and nothing of it is a contact. Where the outline turns left
+// it is convex, and the corner is a contact with the normals between both edges. Where it
+// turns right it is concave, the corner is none, and bodies touch both edges. An end that
+// nothing follows is a corner with the normals between that of its edge and the direction in
+// which the outline ends there.
 //
-// A *run* is a maximal sequence of edges with flush joints. It is one face, and the part of its
-// body that contacts belong to. A point x has the foot s = t·(x − start) and the height
-// h = n·(x − start) over a run; it is over the run where 0 ≤ s ≤ length, and
-//   behind the run (h < 0) at a convex joint only up to the bisector, s ≥ |h| tan(turn / 2), so that
-//   it is over the nearest one of the two runs;
-//   beyond a concave joint also where it is behind the neighbour, because near the joint both bound
-//   the free side.
-// A point behind a run that is over another run with a smaller height above it is on the free side
-// of a thin solid, and no contact of the first one.
+// A run is a maximal sequence of edges with flush joints. It is one face, and the part of its
+// body that contacts belong to. A point x has the foot s = t·(x − start) and the height n·(x −
+// start) over a run. It is over the run where its foot is. Behind the run it is so at a convex
+// joint only up to the bisector, so that it is over the nearest one of the two runs. Beyond a
+// concave joint it is also where it is behind the neighbour, because near the joint both bound
+// the free side. A point behind a run that is over another run with a smaller height above it
+// is on the free side of a thin solid, and no contact of the first one.
 
 #include <vector>
 

@@ -28,8 +28,8 @@ enum class SolidSide { kLeft, kRight };
 ///   kEllipse   semi-axes along body x and y
 ///   kCapsule   length between the cap centres (along body x), radius
 ///   kPolygon   x0, y0, x1, y1, ...: convex, counter-clockwise
+///   kPolyline  x0, y0, x1, y1, ...: as in the file
 ///   kHalfPlane normal x, normal y, offset: solid where normal·r ≤ offset; not necessarily unit
-///   kPolyline  x0, y0, x1, y1, ...: the points in the order of the file
 template <typename T>
 struct BasicShape {
   ShapeType type = ShapeType::kNone;

@@ -67,11 +67,12 @@ bool SegmentsMeet(const Vector2<double>& a, const Vector2<double>& b, const Vect
          (a_side == 0 && between(c, d, a)) || (b_side == 0 && between(c, d, b));
 }
 
-// Two of the outline's first `size` edges, neighbours excepted, that cross or touch, the lower one
-// first, or {-1, -1}. Edge i goes from vertex i to the next one. Edges are sorted by their left ends, and
-// each is compared with those alone that begin before it ends: a crossing is looked for in faulty
-// outlines only, but these may be large too. Of several pairs it is the first in that order. After
-// kMostComparisons none is named, so that a file of a million edges is refused in a moment.
+// Two of the outline's first `size` edges, neighbours excepted, that cross or touch, the lower
+// one first, or {-1, -1}. Edge i goes from vertex i to the next one. Edges are sorted by their
+// left ends, and each is compared with those alone that begin before it ends: a crossing is
+// looked for in faulty outlines only, but these may be large too. Of several pairs it is the
+// first in that order. After kMostComparisons none is named, so that a file of a million edges
+// is refused in a moment.
 std::pair<int, int> CrossingEdges(const Points& points, int size) {
   const int num_points = static_cast<int>(points.size());
   const auto start = [&points](int edge) { return points[static_cast<std::size_t>(edge)]; };
