@@ -61,7 +61,7 @@ bool Predict(const PendulumJob& job, const FitProblem& problem, PendulumResult* 
     return false;
   }
   const std::unique_ptr<RecordingsProblem> made =
-      MakeProblem({job.name, InputOf(std::move(next))}, error);
+      MakeProblem({job.name, InputOf(std::move(next)), {}}, error);
   if (made == nullptr) {
     return false;
   }

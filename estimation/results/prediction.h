@@ -76,11 +76,12 @@ PredictedRecordings PredictLater(const FitInput& input, const RecordingsProblem&
 struct HeldOutRuns;  // held_out.h
 
 /// A row an observation, by time: time, target (body or point), relative_to, coordinate, file,
-/// sensor, used (fit, state or prediction), sigma, observed, predicted, residual (predicted − observed, in
-/// the observation's unit) and residual_in_sigma; the last three are empty where there is no run.
-/// Recordings follow each other, with their names, where they have any, in a first column. `values`
-/// are the residuals of the fit, in multiples of sigma; `later` may be null, and so may
-/// `held_out`, whose rows come last: `used` is `state` for those to which a start was fitted.
+/// sensor, used (fit, state or prediction), sigma, observed, predicted, residual (predicted −
+/// observed, in the observation's unit) and residual_in_sigma; the last three are empty where there
+/// is no run. Recordings follow each other, with their names, where they have any, in a first
+/// column. `values` are the residuals of the fit, in multiples of sigma; `later` may be null, and
+/// so may `held_out`, whose rows come last: `used` is `state` for those to which a start was
+/// fitted.
 std::string PredictionCsv(const RecordingsProblem& problem, const Eigen::VectorXd& values,
                           const PredictedRecordings* later, const HeldOutRuns* held_out);
 

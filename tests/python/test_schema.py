@@ -81,7 +81,8 @@ def validator(program: str) -> Any:
 def objects(value: Any, place: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
     """The places of all objects in a document whose keys are given ones."""
     if isinstance(value, dict):
-        if not place or place[-1] not in ("points", "sensors", "cameras", "clocks"):
+        # A sigma may also have the names of events.
+        if not place or place[-1] not in ("points", "sensors", "cameras", "clocks", "sigma"):
             yield place
         for key, item in value.items():
             yield from objects(item, (*place, key))

@@ -230,8 +230,7 @@ class LocalEntries {
                    const LocalJet& slip, const Locals& locals, double factor) {
     DecaySource decay;
     // Without friction at rest there is none that slides, whatever the kinetic one is.
-    if (contact.joint >= 0 || rest == 0.0 ||
-        !MixedDecay(model_, contact.a, contact.b, &decay)) {
+    if (contact.joint >= 0 || rest == 0.0 || !MixedDecay(model_, contact.a, contact.b, &decay)) {
       return 1.0;
     }
     const LocalJet numbers[3] = {LocalJet(rest, 0), LocalJet(decay.kinetic.value, 1),

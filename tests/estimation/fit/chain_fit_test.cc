@@ -34,7 +34,7 @@ FitProblem LoadProblem(const std::string& name) {
 
 FitResult RunFit(const FitProblem& problem) {
   std::string error;
-  const std::unique_ptr<RecordingsProblem> made = MakeProblem({"", InputOf(problem)}, &error);
+  const std::unique_ptr<RecordingsProblem> made = MakeProblem({"", InputOf(problem), {}}, &error);
   EXPECT_NE(made, nullptr) << error;
   return Fit(problem.options, made.get(), FitProgress());
 }

@@ -28,7 +28,7 @@ TEST(PredictionTest, ErrorsAreSummedByHorizonAndUnit) {
                                                  {3.0, 0, -1, Coordinate::kAngle, 0.0, 0.5}};
   const std::vector<Channel> direct;
   const Eigen::VectorXd residuals = Eigen::Vector4d(3.0, -4.0, 5.0, 2.0);
-  const PredictionScore score = ScorePrediction(1.0, {{observations, direct, residuals}});
+  const PredictionScore score = ScorePrediction({{1.0, observations, direct, residuals}});
   EXPECT_EQ(score.all.count, 4);
   EXPECT_DOUBLE_EQ(score.all.rms_in_sigma, std::sqrt((9.0 + 16.0 + 25.0 + 4.0) / 4.0));
   EXPECT_DOUBLE_EQ(score.all.max_length, 0.5);
@@ -65,7 +65,7 @@ TEST(PredictionTest, WhatIsFittedPredictsWhatFollows) {
 
   const PredictedRecordings all{{predicted}, predicted.score};
   const std::string csv =
-      PredictionCsv(RecordingsProblem(std::move(residuals)), result.residuals, &all);
+      PredictionCsv(RecordingsProblem(std::move(residuals)), result.residuals, &all, nullptr);
   EXPECT_EQ(
       csv.rfind("time,target,relative_to,coordinate,file,sensor,used,sigma,observed,predicted,"
                 "residual,residual_in_sigma\n0,ball,,x,\"fall,1.csv\",,fit,0.001,0,0,0,0\n",
@@ -87,7 +87,7 @@ TEST(PredictionTest, NamesWithCommasAreQuoted) {
        MakeResiduals(scene, {}, {Parameter("gravity/y", -9.0)}, Observe(scene, 10, 0.0, 1))});
   const RecordingsProblem problem(std::move(runs), {ParameterScope()});
   const std::string csv =
-      PredictionCsv(problem, Eigen::VectorXd::Zero(problem.num_rows(0)), nullptr);
+      PredictionCsv(problem, Eigen::VectorXd::Zero(problem.num_rows(0)), nullptr, nullptr);
   EXPECT_NE(csv.find("\n\"a, \"\"b\"\"\",0,ball,"), std::string::npos) << csv;
 }
 
@@ -106,7 +106,7 @@ TEST(PredictionTest, ARunThatFailsIsSaid) {
       MakeResiduals(problem.scene, problem.points, problem.parameters, problem.observations));
   const PredictedRecordings all{{predicted}, predicted.score};
   const std::string csv =
-      PredictionCsv(residuals, Eigen::VectorXd::Zero(residuals.num_rows(0)), &all);
+      PredictionCsv(residuals, Eigen::VectorXd::Zero(residuals.num_rows(0)), &all, nullptr);
   EXPECT_NE(csv.find("prediction,0.001,0,,,\n"), std::string::npos) << csv;
 }
 

@@ -32,7 +32,7 @@ void CheckSliding(JetRoute route, double tolerance) {
     long fallbacks = 0;
     long calls = 0;
     const RolloutReport report = RolloutJets<Jet<N>>(
-        model, state, route, [&](long, double, const State<Jet<N>>&) { ++calls; }, &state,
+        model, state, route, [&](long, double, const State<Jet<N>>&, Stepper*) { ++calls; }, &state,
         &fallbacks);
     ASSERT_EQ(report.status, StepStatus::kDone) << report.message;
     EXPECT_EQ(fallbacks, 0);
