@@ -86,6 +86,7 @@ ObservationSigma ReadSigma(const JsonReader& json, const std::vector<ObservedEve
                                         &sigma.vy, &sigma.omega, &sigma.distance, &sigma.ax,
                                         &sigma.ay, &sigma.alpha};
   std::vector<std::string> keys;
+  keys.reserve(kCoordinates + events.size());
   for (int i = 0; i < kCoordinates; ++i) keys.emplace_back(NameOf(static_cast<Coordinate>(i)));
   for (const ObservedEvent& event : events) {
     keys.push_back(event.name);
