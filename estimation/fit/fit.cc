@@ -556,6 +556,7 @@ void Certify(LeastSquaresProblem* problem, FitResult* result) {
     return;
   }
   result->certificate = *certificate;
+  problem->AddRadii(result->estimate, &result->certificate);
   const std::string& impact = result->certificate.discrete_impact;
   const std::string instead = impact.empty() ? "" : std::string("; ") + kMotionInstead;
   if (IsTrustworthyMap(result->certificate) && !impact.empty()) {

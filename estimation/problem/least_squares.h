@@ -75,6 +75,11 @@ class LeastSquaresProblem {
   /// The certificate of the derivatives at p (all parameters); empty where nothing is certified.
   virtual std::optional<Certificate> Certify(const Eigen::VectorXd& /*p*/) { return std::nullopt; }
 
+  /// Adds to it how far each parameter that sets numbers of scenes may be changed until another
+  /// discrete choice is made, and the growth of the flow: two runs a parameter and block, and
+  /// nothing where these are more than kMostRadiusRuns.
+  virtual void AddRadii(const Eigen::VectorXd& /*p*/, Certificate* /*certificate*/) {}
+
   /// The derivatives of a block's observation rows at p = [shared | own] with respect to the
   /// numbers of its scene that no parameter sets; empty where there are none, more than `most`, or
   /// a run fails.
@@ -101,6 +106,9 @@ class LeastSquaresProblem {
   /// only one.
   virtual std::string BlockName(int /*block*/) const { return ""; }
 };
+
+/// Of more parameters times blocks the radius of validity is not computed.
+inline constexpr size_t kMostRadiusRuns = 100;
 
 /// The places of the blocks in the vectors of all parameters and of all rows.
 class BlockLayout {

@@ -56,6 +56,9 @@ class ProblemWithPriors : public LeastSquaresProblem {
   std::optional<Certificate> Certify(const Eigen::VectorXd& p) override {
     return problem_->Certify(p);
   }
+  void AddRadii(const Eigen::VectorXd& p, Certificate* certificate) override {
+    problem_->AddRadii(p, certificate);
+  }
   HeldColumns EvaluateHeld(int block, const Eigen::VectorXd& p, GradientMethod method,
                            int most) override;
   std::vector<std::string> FindInconsistencies(const Eigen::VectorXd& p) override {

@@ -152,6 +152,23 @@ std::optional<Certificate> RecordingsProblem::Certify(const Eigen::VectorXd& p) 
   return all;
 }
 
+void RecordingsProblem::AddRadii(const Eigen::VectorXd& p, Certificate* certificate) {
+  if (static_cast<size_t>(num_blocks()) * entries().size() > kMostRadiusRuns) return;
+  for (int block = 0; block < num_blocks(); ++block) {
+    Certificate one;
+    recordings_[block].residuals.AddRadii(ParametersOf(block, p), &one);
+    for (size_t i = 0; i < one.radius.size(); ++i) {
+      ValidityRadius& radius = one.radius[i];
+      radius.parameter = entries_[ParameterOf(block, static_cast<int>(i))].name;
+      for (std::string* where : {&radius.down_where, &radius.up_where}) {
+        if (!where->empty()) *where = BlockName(block) + *where;
+      }
+    }
+    Merge(one, *certificate);
+  }
+  SetVerdict(*certificate);
+}
+
 HeldColumns RecordingsProblem::EvaluateHeld(int block, const Eigen::VectorXd& p,
                                             GradientMethod method, int most) {
   return recordings_[block].residuals.EvaluateHeld(0, Ordered(p), method, most);

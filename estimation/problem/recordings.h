@@ -82,6 +82,7 @@ class RecordingsProblem : public LeastSquaresProblem {
   bool EvaluateBlock(int block, const Eigen::VectorXd& p, GradientMethod method,
                      BlockDerivatives derivatives, BlockEvaluation* evaluation) override;
   std::optional<Certificate> Certify(const Eigen::VectorXd& p) override;
+  void AddRadii(const Eigen::VectorXd& p, Certificate* certificate) override;
   HeldColumns EvaluateHeld(int block, const Eigen::VectorXd& p, GradientMethod method,
                            int most) override;
   std::vector<std::string> FindInconsistencies(const Eigen::VectorXd& p) override;

@@ -14,6 +14,7 @@
 #include "tangible/scene/parameter.h"
 #include "tangible/simulation/certificate/certify.h"
 #include "tangible/simulation/certificate/impact_times.h"
+#include "tangible/simulation/certificate/validity_radius.h"
 #include "tangible/simulation/derivatives/rollout_tangent.h"
 #include "tangible/simulation/gradient/difference_column.h"
 #include "tangible/simulation/gradient/tolerances.h"
@@ -183,6 +184,37 @@ std::optional<Certificate> RolloutResiduals::Certify(const Eigen::VectorXd& p) {
                                               scene_.VariableDerivatives(), names, sizes);
   NameSamplesOnImpacts(&certificate);
   return certificate;
+}
+
+void RolloutResiduals::AddRadii(const Eigen::VectorXd& p, Certificate* certificate) {
+  const std::vector<ParameterEntry>& entries = scene_.entries();
+  if (entries.size() > kMostRadiusRuns || !SetParameters(p)) return;
+  ChoiceList own;
+  if (!ChoicesOf(scene_.model(), nullptr, scene_.initial_state(), &own)) return;
+  Certificate found;
+  for (size_t i = 0; i < entries.size(); ++i) {
+    const ParameterEntry& entry = entries[i];
+    const double value = p[static_cast<Eigen::Index>(i)];
+    const auto beside = [&](double shift, ChoiceList* choices) {
+      Eigen::VectorXd moved = p;
+      moved[static_cast<Eigen::Index>(i)] += shift;
+      const double at = moved[static_cast<Eigen::Index>(i)];
+      return at >= entry.lower && at <= entry.upper && SetParameters(moved) &&
+             ChoicesOf(scene_.model(), nullptr, scene_.initial_state(), choices);
+    };
+    ValidityRadius radius = ValidityRadiusOf(*scene_.model().structure, own, beside,
+                                             std::max(std::abs(value), entry.scale));
+    radius.parameter = entry.name;
+    if (value - radius.down < entry.lower) radius.down = HUGE_VAL;
+    if (value + radius.up > entry.upper) radius.up = HUGE_VAL;
+    if (std::isinf(radius.down)) radius.down_where.clear();
+    if (std::isinf(radius.up)) radius.up_where.clear();
+    found.radius.push_back(std::move(radius));
+  }
+  if (!SetParameters(p)) return;
+  found.growth = GrowthOf(scene_.model(), nullptr, scene_.initial_state());
+  Merge(found, *certificate);
+  SetVerdict(*certificate);
 }
 
 // An observation at the end of a step at which its body is struck is one of the motion before the

@@ -175,6 +175,28 @@ std::string SummaryTable(const FitResult& result) {
   return HtmlTable({"", ""}, rows);
 }
 
+/// How far each parameter may be changed until a contact, an event or its order changes.
+std::string RadiusTable(const Certificate& certificate) {
+  std::vector<std::vector<std::string>> rows;
+  const auto side = [](double distance) {
+    return std::isfinite(distance) ? CompactNumber(distance, 3) : "none in its range";
+  };
+  for (const ValidityRadius& radius : certificate.radius) {
+    rows.push_back(
+        {radius.parameter, side(radius.down), radius.down_where, side(radius.up), radius.up_where});
+  }
+  if (rows.empty()) return "";
+  std::string html =
+      "<h2>Where the derivatives hold</h2>\n<p>A parameter may be changed by so much, "
+      "to first order, until another discrete choice is made.";
+  if (std::isfinite(certificate.growth)) {
+    html += " The run multiplies small changes of its start by at most " +
+            CompactNumber(certificate.growth, 3) + ".";
+  }
+  return html + "</p>\n" +
+         HtmlTable({"parameter", "down", "what changes", "up", "what changes"}, rows);
+}
+
 std::string Warnings(const Uncertainty& uncertainty) {
   std::string html;
   for (const std::string& warning : uncertainty.warnings) {
@@ -497,19 +519,19 @@ std::string FitReport(const std::string& title, const RecordingsProblem& problem
   const std::vector<ParameterEntry>& entries = problem.entries();
   const ResidualSummary summary = SummarizeResiduals(problem, result.residuals);
   const PredictionScore* const score = findings.later == nullptr ? nullptr : &findings.later->score;
-  return HtmlPage(heading,
-                  "<h1>" + HtmlEscape(heading) + "</h1>\n<h2>Estimates</h2>\n" +
-                      EstimateTable(entries, result) + Warnings(result.uncertainty) +
-                      ProfilePlots(entries, result) +
-                      (findings.posterior ? PosteriorPart(entries, *findings.posterior) : "") +
-                      CombinationTable(result.uncertainty) + SpreadTable(findings.components) +
-                      SummaryTable(result) + RecordingTable(problem, result) +
-                      NoiseTable(findings.components) + CorrelationTable(entries, result) +
-                      StepTable(entries, findings.check) + PredictionPart("Prediction", score) +
-                      HeldOutPart(findings.held_out) + StartTable(result) +
-                      IterationPlots(entries, result) + ResidualTable(summary) +
-                      OutlierTable(summary) +
-                      SeriesPlots(CollectSeries(problem, result), summary.series.size()));
+  return HtmlPage(
+      heading, "<h1>" + HtmlEscape(heading) + "</h1>\n<h2>Estimates</h2>\n" +
+                   EstimateTable(entries, result) + Warnings(result.uncertainty) +
+                   ProfilePlots(entries, result) +
+                   (findings.posterior ? PosteriorPart(entries, *findings.posterior) : "") +
+                   CombinationTable(result.uncertainty) + SpreadTable(findings.components) +
+                   SummaryTable(result) + RecordingTable(problem, result) +
+                   NoiseTable(findings.components) + RadiusTable(result.certificate) +
+                   CorrelationTable(entries, result) + StepTable(entries, findings.check) +
+                   PredictionPart("Prediction", score) + HeldOutPart(findings.held_out) +
+                   StartTable(result) + IterationPlots(entries, result) + ResidualTable(summary) +
+                   OutlierTable(summary) +
+                   SeriesPlots(CollectSeries(problem, result), summary.series.size()));
 }
 
 }  // namespace tangible

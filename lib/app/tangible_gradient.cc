@@ -32,6 +32,11 @@ DEFINE_string(loss, "", "file of a scalar loss (JSON) to differentiate instead o
 DEFINE_bool(compare_motion, false,
             "of a scene with fixed steps: differentiates its motion by events too, and says how "
             "far the derivative of the fixed steps is from that");
+DEFINE_string(
+    radius, "auto",
+    "how far each parameter may be changed until another discrete choice is made, and the "
+    "growth of the flow, in the certificate: true, false, or auto: of at most 20 "
+    "parameters, as each takes two runs");
 DEFINE_int32(repeat, 1, "runs, of which the best times are reported");
 DEFINE_string(factorisations, "keep", "of the adjoint's steps: keep, or recompute to save memory");
 DEFINE_string(
@@ -42,6 +47,9 @@ DEFINE_string(out, "", "file of the result; empty: stdout");
 
 namespace tangible {
 namespace {
+
+// Of more parameters the radius is computed only where it is asked for.
+constexpr size_t kParametersWithRadius = 20;
 
 // Whether a flag is given that only the adjoint uses, whatever its value.
 bool AsksForTheAdjoint() {
@@ -68,6 +76,9 @@ std::string CheckFlags(GradientOptions* options) {
       options->method != GradientMethod::kAuto) {
     return "--side: expected --method=tangent or auto with it, got '" + FLAGS_method + "'";
   }
+  if (FLAGS_radius != "auto" && FLAGS_radius != "true" && FLAGS_radius != "false") {
+    return "--radius: expected auto, true or false, got '" + FLAGS_radius + "'";
+  }
   std::string wrong = FirstOutside({{"--step", FLAGS_step, 0}, {"--repeat", FLAGS_repeat, 1}});
   if (!wrong.empty()) return wrong;
   if (!ParseCheckpointing(FLAGS_checkpoint, &options->checkpointing, &wrong)) {
@@ -80,6 +91,9 @@ std::string CheckFlags(GradientOptions* options) {
   if (options->method == GradientMethod::kAuto && FLAGS_side == "both" && AsksForTheAdjoint()) {
     options->method = GradientMethod::kAdjoint;
   }
+  const bool few = paths.size() <= kParametersWithRadius;
+  options->radius = FLAGS_radius == "true" || (FLAGS_radius == "auto" && few) ? RadiusPass::kRun
+                                                                              : RadiusPass::kSkip;
   options->step = FLAGS_step;
   options->side = FLAGS_side == "plus"    ? DerivativeSide::kPlus
                   : FLAGS_side == "minus" ? DerivativeSide::kMinus
@@ -225,7 +239,8 @@ int Main(int argc, char** argv) {
       {.name = "tangible-gradient",
        .synopsis = "SCENE.json --parameters=P1,P2 "
                    "[--method=auto|adjoint|tangent|jet|jet_implicit|finite_difference] [--step=H] "
-                   "[--side=plus|minus] [--loss=L.json] [--compare_motion] [--out=G.json]",
+                   "[--side=plus|minus] [--loss=L.json] [--radius=auto|true|false] "
+                   "[--compare_motion] [--out=G.json]",
        .description = "Differentiates the final state of every moving body, or with --loss a "
                       "scalar of it, with respect to\nparameters of the scene, and certifies the "
                       "result.",

@@ -231,6 +231,19 @@ class Rollout {
     return texts;
   }
 
+  // The radius and the growth of a certificate of one input, as JSON.
+  std::string Radii(const Inputs& in) const {
+    const std::vector<RolloutInput> inputs = Read(in);
+    Certificate certificate;
+    WithoutLock([&] {
+      RolloutWorker worker(function_);
+      certificate.radius = worker.Radii(inputs.at(0));
+      certificate.growth = worker.Growth(inputs.at(0));
+      return 0;
+    });
+    return ToJson(certificate).dump();
+  }
+
  private:
   RolloutFunction function_;
   mutable Workers workers_;
@@ -326,6 +339,10 @@ void BindRollout(py::module_* module) {
            [](const Rollout& r, const Array& p, const std::optional<Array>& x, const Array& u,
               const std::string& method) {
              return r.Jacobian({p, x, u}, method);
+           })
+      .def("radii",
+           [](const Rollout& r, const Array& p, const std::optional<Array>& x, const Array& u) {
+             return r.Radii({p, x, u});
            })
       .def("certify", [](const Rollout& r, const Array& p, const std::optional<Array>& x,
                          const Array& u, int threads) {

@@ -472,6 +472,10 @@ TEST_F(TangibleFitTest, WarnsOfDerivativesThroughAnImpactAndComparesThem) {
   EXPECT_NEAR(result["motion"]["difference_max"], expected, 1e-6);
   EXPECT_EQ(result["motion"]["differences"][0]["parameter"], "height");
   EXPECT_EQ(result["motion"]["verdict"], "trustworthy");
+  // The impact moves to the next step, or the one before, within 4.4 m/s times a step.
+  const json radius = result["certificate"]["radius"]["height"];
+  EXPECT_GT(radius["down"], 0.0);
+  EXPECT_LT(double(radius["down"]) + double(radius["up"]), 2.0 * 0.01 * v);
 
   const ProgramRun event = fit("event", "");
   EXPECT_EQ(event.exit_status, 0);
@@ -479,6 +483,8 @@ TEST_F(TangibleFitTest, WarnsOfDerivativesThroughAnImpactAndComparesThem) {
   result = json::parse(Read(Path("r.json")));
   EXPECT_EQ(result["certificate"]["verdict"], "trustworthy");
   EXPECT_EQ(result["certificate"]["discrete_map"], false);
+  // The impact leaves the run beyond the bounds.
+  EXPECT_TRUE(result["certificate"]["radius"]["height"]["up"].is_null());
   EXPECT_FALSE(result.contains("motion"));
   ExpectOneLine(fit("event", "--compare_motion"), 1, "expected a scene with fixed steps");
 }

@@ -40,6 +40,19 @@ def test_the_gradient_of_a_bounce_is_that_of_the_physics(scene: dict[str, Any]) 
         assert found.certificate["verdict"] == "trustworthy"
 
 
+def test_a_certificate_says_how_far_its_derivative_holds() -> None:
+    rollout = tangible.Rollout(ball(), ["bodies/ball/position/y", "bodies/ball/mass"])
+    assert rollout.certificate().radius == {} and rollout.certificate().growth is None
+    found = rollout.certificate(radius=True)
+    assert set(found.radius) == {"bodies/ball/position/y", "bodies/ball/mass"}
+    # A body that falls alone moves alike with any mass.
+    assert found.radius["bodies/ball/mass"] == {"down": None, "up": None}
+    down = found.radius["bodies/ball/position/y"]["down"]
+    assert down is not None and down > 0.0
+    assert "contact of" in found["radius"]["bodies/ball/position/y"]["down_where"]
+    assert found.growth is not None and found.growth >= 1.0
+
+
 def test_derivatives_of_the_discrete_map_say_so() -> None:
     by_steps = tangible.Rollout(ball("fixed"), ["bodies/ball/position/y"])
     p = by_steps.default_parameters

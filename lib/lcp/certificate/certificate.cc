@@ -62,6 +62,23 @@ void Merge(const Certificate& other, Certificate& certificate) {
   if (certificate.discontinuous.empty()) certificate.discontinuous = other.discontinuous;
   if (certificate.discrete_map.empty()) certificate.discrete_map = other.discrete_map;
   if (certificate.discrete_impact.empty()) certificate.discrete_impact = other.discrete_impact;
+  for (const ValidityRadius& radius : other.radius) {
+    const auto same = [&](const ValidityRadius& r) { return r.parameter == radius.parameter; };
+    const auto own = std::find_if(certificate.radius.begin(), certificate.radius.end(), same);
+    if (own == certificate.radius.end()) {
+      certificate.radius.push_back(radius);
+      continue;
+    }
+    if (radius.down < own->down) {
+      own->down = radius.down;
+      own->down_where = radius.down_where;
+    }
+    if (radius.up < own->up) {
+      own->up = radius.up;
+      own->up_where = radius.up_where;
+    }
+  }
+  if (!(certificate.growth >= other.growth)) certificate.growth = other.growth;
   certificate.verdict.clear();
 }
 

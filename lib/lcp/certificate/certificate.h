@@ -10,6 +10,7 @@
 
 #include <limits>
 #include <string>
+#include <vector>
 
 #include "tangible/lcp/certificate/tolerances.h"
 
@@ -17,6 +18,16 @@ namespace tangible {
 
 /// Above this condition number no digit of a linear system's solution is certain.
 inline constexpr double kConditionLimit = 1e16;
+
+/// How far a parameter may be changed, alone and to first order, until a discrete choice of the run
+/// changes and with it the derivative: a slack over its rate. In the parameter's unit; infinite
+/// where none changes within the parameter's range.
+struct ValidityRadius {
+  std::string parameter;
+  double down = std::numeric_limits<double>::infinity();
+  double up = std::numeric_limits<double>::infinity();
+  std::string down_where{}, up_where{};  ///< the choice that changes first; empty if none does
+};
 
 struct Certificate {
   /// Smallest distance to a change of modes: zᵢ / ζᵢ for active, sᵢ / σᵢ for inactive rows.
@@ -44,6 +55,12 @@ struct Certificate {
   /// Of these, where dt does not matter, so that a smaller one does not help: the first impact with
   /// restitution, or a contact that is made in the last step. Else empty.
   std::string discrete_impact{};
+  /// Of each parameter; empty where they were not asked for.
+  std::vector<ValidityRadius> radius{};
+  /// By which factor the run multiplies the largest of all small changes of its start, with lengths,
+  /// and speeds over the duration, in units of the scene's size: 1.6 for a free flight, exp(λ T)
+  /// with the largest Lyapunov exponent λ where it is chaotic. NaN where it was not asked for.
+  double growth = std::numeric_limits<double>::quiet_NaN();
   std::string verdict{};  ///< written by SetVerdict
 };
 
@@ -56,7 +73,8 @@ inline constexpr char kMotionInstead[] =
 inline constexpr char kTrustworthy[] = "trustworthy";
 
 /// Adds `other` (another step of a rollout): the worse margin, condition and residual, the sum of
-/// the counts, the first reasons. The verdict is cleared.
+/// the counts, the first reasons, the smaller
+/// radii. The verdict is cleared.
 void Merge(const Certificate& other, Certificate& certificate);
 
 /// Writes `verdict`: those that apply of "discontinuous: …", "near a kink: …" (coordinates that are

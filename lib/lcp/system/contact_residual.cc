@@ -304,32 +304,44 @@ void FindDegenerateContacts(const ContactProblem<double>& problem,
   }
 }
 
-ContactMargin MarginOfContact(const ContactProblem<double>& problem,
-                              const ContactSolution<double>& solution, const ContactScales& scales,
-                              int contact) {
-  using Kind = ContactMargin::Kind;
+int SlacksOfContact(const ContactProblem<double>& problem, const ContactSolution<double>& solution,
+                    const ContactScales& scales, int contact, ContactSlack slacks[2]) {
+  using Kind = ContactSlack::Kind;
   const ContactBlock<double>& c = problem.contacts[contact];
   const ContactValues values = Evaluate(problem, scales, c, solution.motion.data());
   const ContactMode mode = solution.modes[contact];
   const double normal = solution.normal_impulse[contact];
-  // 0 / 0 counts as 0: nothing moves and nothing pushes.
-  const auto ratio = [](double x, double scale) { return scale > 0.0 ? x / scale : 0.0; };
   if (mode == ContactMode::kOpen) {
-    return {ratio(values.s_n, values.scale_n), Kind::kClosing};
+    slacks[0] = {Kind::kClosing, values.s_n, values.scale_n};
+    return 1;
   }
   const double zeta = NormalScale(c, values, scales.impulse);
-  const ContactMargin opening =
-      c.driven ? ContactMargin{ratio(values.s_n, values.scale_n), Kind::kClosing}
-               : ContactMargin{ratio(normal - c.offset, zeta), Kind::kOpening};
-  ContactMargin friction = opening;
+  slacks[0] = c.driven ? ContactSlack{Kind::kClosing, values.s_n, values.scale_n}
+                       : ContactSlack{Kind::kOpening, normal - c.offset, zeta};
+  if (mode == ContactMode::kClosed) return 1;
   if (mode == ContactMode::kSticking) {
     const double zeta_t = std::max(zeta * c.friction, values.scale_t / values.mobility_t);
     const double left = c.friction * normal - std::abs(solution.tangent_impulse[contact]);
-    friction = {ratio(left, zeta_t), Kind::kFrictionLimit};
-  } else if (mode != ContactMode::kClosed) {
-    friction = {ratio(SlidingSign(mode) * values.slip, values.scale_t), Kind::kSlidingSpeed};
+    slacks[1] = {Kind::kFrictionLimit, left, zeta_t};
+  } else {
+    slacks[1] = {Kind::kSlidingSpeed, SlidingSign(mode) * values.slip, values.scale_t};
   }
-  return friction.value < opening.value ? friction : opening;
+  return 2;
+}
+
+ContactMargin MarginOfContact(const ContactProblem<double>& problem,
+                              const ContactSolution<double>& solution, const ContactScales& scales,
+                              int contact) {
+  ContactSlack slacks[2];
+  const int count = SlacksOfContact(problem, solution, scales, contact, slacks);
+  // 0 / 0 counts as 0: nothing moves and nothing pushes.
+  const auto margin = [](const ContactSlack& slack) {
+    return ContactMargin{slack.scale > 0.0 ? slack.value / slack.scale : 0.0, slack.kind};
+  };
+  const ContactMargin first = margin(slacks[0]);
+  if (count == 1) return first;
+  const ContactMargin friction = margin(slacks[1]);
+  return friction.value < first.value ? friction : first;
 }
 
 int MostViolatedJoint(const ContactProblem<double>& problem, const std::vector<double>& v,

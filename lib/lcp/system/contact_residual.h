@@ -81,18 +81,28 @@ void FindDegenerateContacts(const ContactProblem<double>& problem,
                             const ContactSolution<double>& solution, double tolerance,
                             std::vector<int>* degenerate);
 
-/// How far a contact is from a change of its mode, in the scales of NaturalResidual: the smallest
-/// of the following:
-///   open       s_n / σ_n
-///   closed     (λ_n − o) / ζ, or where it is driven s_n / σ_n, and
-///     sticking   (μ λ_n − |λ_t|) / ζ_t
-///     sliding    |w| / σ_t
-/// At most about 1; 0 at a kink, and below 0 by no more than the residual.
-struct ContactMargin {
+/// What has to stay above 0 for a contact to keep its mode, in its own unit, with the scale ζ or σ
+/// of NaturalResidual:
+///   open       s_n of σ_n
+///   closed     λ_n − o of ζ, or where it is driven s_n of σ_n, and
+///     sticking   μ λ_n − |λ_t| of ζ_t
+///     sliding    |w| of σ_t
+struct ContactSlack {
   enum class Kind { kOpening, kClosing, kFrictionLimit, kSlidingSpeed };
-  double value = 0.0;
   Kind kind =
       Kind::kOpening;  ///< what changes: kClosing for an open contact, kOpening for a closed one
+  double value = 0.0;
+  double scale = 0.0;
+};
+/// Writes one or two slacks and returns their number.
+int SlacksOfContact(const ContactProblem<double>& problem, const ContactSolution<double>& solution,
+                    const ContactScales& scales, int contact, ContactSlack slacks[2]);
+
+/// How far a contact is from a change of its mode: the smallest of its slacks over their scales. At
+/// most about 1; 0 at a kink, and below 0 by no more than the residual.
+struct ContactMargin {
+  double value = 0.0;
+  ContactSlack::Kind kind = ContactSlack::Kind::kOpening;
 };
 ContactMargin MarginOfContact(const ContactProblem<double>& problem,
                               const ContactSolution<double>& solution, const ContactScales& scales,

@@ -119,6 +119,24 @@ class Certificate(dict[str, Any]):
         return "; ".join(parts)
 
     @property
+    def radius(self) -> dict[str, dict[str, float | None]]:
+        """How far each parameter may be changed, to first order, until a contact, an event or the
+        order of two events is another: `{"bodies/ball/mass": {"down": 0.2, "up": None}}`, None where
+        none changes within the parameter's range. Empty where it was not asked for."""
+        return {
+            path: {side: both[side] for side in ("down", "up")}
+            for path, both in self.get("radius", {}).items()
+        }
+
+    @property
+    def growth(self) -> float | None:
+        """By how much the run multiplies the largest of all small changes of its start, in units of
+        the scene's size: 1.6 for a free flight, very large where the motion is chaotic. None where it
+        was not asked for."""
+        value = self.get("growth")
+        return None if value is None else float(value)
+
+    @property
     def words(self) -> str:
         """The verdict in plain words."""
         if self.trustworthy:

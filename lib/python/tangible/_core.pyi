@@ -69,6 +69,7 @@ class Rollout:
     def certify(
         self, arg0: _Floats, arg1: _Floats | None, arg2: _Floats, arg3: int
     ) -> list[str]: ...
+    def radii(self, arg0: _Floats, arg1: _Floats | None, arg2: _Floats) -> str: ...
 
 class Recorded:
     def __init__(

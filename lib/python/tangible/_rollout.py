@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, field
@@ -501,17 +502,26 @@ class Rollout:
         parameters: Numbers | None = None,
         initial_state: Numbers | None = None,
         controls: Numbers | None = None,
+        *,
+        radius: bool = False,
     ) -> Certificate:
         """How far the derivatives at these inputs can be trusted.
 
         `verdict` is "trustworthy", or names a kink, a jump or a side; of a run by fixed steps in
         which a contact was made or broken it begins with "of the discrete map: ". The initial state
         counts as an input only where it is given. Of a batch, see `certificates`.
+
+        With `radius` it has how far each parameter may be changed, to first order, until another
+        discrete choice is made (two more runs a parameter), and the growth of the flow.
         """
         p, x, u, batched = self._inputs(parameters, initial_state, controls)
         if batched:
             raise ValueError("certificate: expected arguments without a batch's axis")
-        return Certificate.of_json(self._core.certify(p, x, u, self.threads)[0])
+        certificate = Certificate.of_json(self._core.certify(p, x, u, self.threads)[0])
+        if radius:
+            more = json.loads(self._core.radii(p, x, u))
+            certificate.update({key: more[key] for key in ("radius", "growth") if key in more})
+        return certificate
 
     def certificates(
         self,

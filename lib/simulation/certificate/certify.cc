@@ -138,26 +138,18 @@ void RolloutCertifier::AddLaw(const Model<double>& model, const StepRecord& reco
   const SimulationSettings& settings = model.structure->settings;
   const size_t i = place.contact;
   const double gap = place.active->gap;
-  const double gap_speed = gap / record.h;
-  const double recovery = settings.recovery_speed;
-  if (place.mode != ContactMode::kOpen && gap < 0.0 && recovery > 0.0 &&
-      place.active->law != ContactLaw::kRestitution) {
-    AddMargin(std::abs(gap_speed + recovery) / std::max(recovery, -gap_speed), place,
-              "limit of the recovery speed");
+  const LawDistances law = LawDistancesOf(model, record, i);
+  if (place.mode != ContactMode::kOpen && law.has_recovery) {
+    AddMargin(std::abs(law.recovery.relative()), place, "limit of the recovery speed");
   }
   const double e = record.restitution[i].value;
   const bool at_zero = e == 0.0 && (Wanted(record.restitution[i].numbers[0]) ||
                                     Wanted(record.restitution[i].numbers[1]));
-  if (place.active->joint >= 0 || !(e > 0.0 || at_zero)) {
+  if (!law.has_restitution || !(e > 0.0 || at_zero)) {
     return;
   }
-  const Approach approach = ApproachOf(*model.structure, record, i);
-  const double threshold = settings.restitution_threshold;
-  const double fast =
-      (-approach.before - threshold) / std::max({threshold, std::abs(approach.before), kNoScale});
-  const double reach = record.h * approach.free;
-  const double near = (settings.contact_margin - gap - reach) /
-                      (settings.contact_margin + std::abs(gap) + std::abs(reach));
+  const double fast = law.fast.relative();
+  const double near = law.near.relative();
   if (at_zero) {
     if (fast > 0.0 && near > 0.0 && gap > 0.0) {
       AddJump(0.0, place, "its restitution is 0, above which an impact has another law");
@@ -166,8 +158,8 @@ void RolloutCertifier::AddLaw(const Model<double>& model, const StepRecord& reco
   }
   if (gap < 0.0 && fast > 0.0 && near > 0.0) {
     // In penetration the smaller constant holds; the choice is continuous.
-    const double other = std::max(gap_speed, -recovery);
-    const double bounce = e * approach.before;
+    const double other = std::max(gap / record.h, -settings.recovery_speed);
+    const double bounce = e * law.approach.before;
     AddMargin(std::abs(bounce - other) / std::max(std::abs(bounce), std::abs(other)), place,
               "restitution against recovery");
     if (bounce >= other) {
@@ -181,11 +173,11 @@ void RolloutCertifier::AddLaw(const Model<double>& model, const StepRecord& reco
       impact ? std::min(fast, near) : std::max(std::max(-fast, 0.0), std::max(-near, 0.0));
   const bool by_speed = impact ? fast < near : -fast > -near;
   AddJump(distance, place,
-          by_speed
-              ? "approach speed " + Short(-approach.before) + " m/s near the threshold " +
-                    Short(threshold) + " m/s"
-              : "free motion ends " + Short(gap + reach) + " m from the surface, near the margin " +
-                    Short(settings.contact_margin) + " m");
+          by_speed ? "approach speed " + Short(-law.approach.before) + " m/s near the threshold " +
+                         Short(settings.restitution_threshold) + " m/s"
+                   : "free motion ends " + Short(gap + law.reach) +
+                         " m from the surface, near the margin " + Short(settings.contact_margin) +
+                         " m");
 }
 
 void RolloutCertifier::AddCoefficients(const StepRecord& record, const Place& place) {

@@ -115,7 +115,11 @@ class GrazeFinder {
             : 0.0;
     const double scale = std::max(std::abs(start.speed) + std::abs(end.speed), gained);
     const double ratio = scale > 0.0 ? end.speed / scale : 0.0;
-    List(ratio * ratio, segment, segment.event_contact, true);
+    const double turns = segment.length > 0.0 ? (end.speed - start.speed) / segment.length : 0.0;
+    // What would turn around within a step; a parabola tells nothing of a longer way.
+    const bool near = turns > 0.0 && -end.speed <= turns * model_.structure->settings.dt;
+    const double depth = near ? 0.5 * end.speed * end.speed / turns : HUGE_VAL;
+    List({ratio * ratio, 0.0, segment.event_contact, true, depth}, segment);
   }
 
   void AddMiss(const Segment& segment, const ActiveContact& contact) {
@@ -131,13 +135,14 @@ class GrazeFinder {
     const double height =
         std::max(0.5 * start.speed * start.speed / acceleration, 0.5 * acceleration * dt * dt);
     // A minimum just below 0 is rounding: the bodies did not touch.
-    List(std::abs(Least(start, end, segment.length)) / height, segment, contact, false);
+    const double least = std::abs(Least(start, end, segment.length));
+    List({least / height, 0.0, contact, false, least}, segment);
   }
 
-  void List(double margin, const Segment& segment, const ActiveContact& contact, bool touches) {
-    if (margin < most_) {
-      grazes_.push_back({margin, segment.time + segment.length, contact, touches});
-    }
+  void List(Graze graze, const Segment& segment) {
+    if (!(graze.margin < most_)) return;
+    graze.time = segment.time + segment.length;
+    grazes_.push_back(graze);
   }
 
   const Model<double>& model_;

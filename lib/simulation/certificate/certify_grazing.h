@@ -18,6 +18,9 @@ struct Graze {
   double time = 0.0;    ///< s
   ActiveContact contact;
   bool touches = false;
+  /// The height of a miss, or the depth to which bodies that touch would go without the contact, m;
+  /// infinite where they would not turn around.
+  double slack = 0.0;
 };
 
 /// A touch at the end of a segment with ġ1 < 0, after ġ0 at its start: margin (ġ1 / v)², because

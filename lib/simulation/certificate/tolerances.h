@@ -77,4 +77,19 @@ inline constexpr double kSameSides = 1e-8;
 /// count as 0 in that comparison.
 inline constexpr double kNoMovement = 1e-10;
 
+/// Of the parameter, or its scale: the change with which the rates of slacks are measured.
+/// Slacks are smooth and have about 12 digits.
+inline constexpr double kRadiusStep = 1e-6;
+/// Of that change: the smaller one that is tried where the first has other choices.
+inline constexpr double kSmallerStep = 1e-3;
+/// Of the terms of a slack: a change of the slack that is rounding.
+inline constexpr double kSlackRounding = 1e-12;
+/// Of the terms of a slip: a smaller one is 0, as where sliding begins.
+inline constexpr double kNoSlip = 1e-9;
+/// Of the parameter, or its scale: a change to first order that is farther tells nothing.
+inline constexpr double kFarthestRadius = 1e3;
+/// Of the duration: how far behind its end a run by events goes on, to find events that a small
+/// change of a parameter would move into it.
+inline constexpr double kBehindEnd = 0.2;
+
 }  // namespace tangible

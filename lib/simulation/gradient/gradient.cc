@@ -262,6 +262,10 @@ GradientResult Differentiate(const GradientProblem& problem, const GradientOptio
   if (!sides && options.certificate == CertificatePass::kRun) {
     result.certificate = CertificateOf(problem, &worker);
   }
+  if (options.radius == RadiusPass::kRun) {
+    result.certificate.radius = worker.Radii(problem.input);
+    result.certificate.growth = worker.Growth(problem.input);
+  }
   JudgeSide(problem, options, &result);
   if (!result.open_joint.empty()) result.notes.push_back(result.open_joint);
   result.done = true;

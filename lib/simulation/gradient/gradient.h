@@ -29,6 +29,9 @@
 namespace tangible {
 
 enum class CertificatePass { kRun, kSkip };
+/// Whether the certificate has the radius of validity of each parameter, which takes two more runs a
+/// parameter, and the growth of the flow.
+enum class RadiusPass { kRun, kSkip };
 
 /// At a kink: one element of the generalised Jacobian (that of the modes found); or the derivative
 /// for growing parameters (kPlus), or for shrinking ones (kMinus: lim (f(p) − f(p − h)) / h), each
@@ -46,6 +49,7 @@ struct GradientOptions {
   Checkpointing checkpointing{};                          ///< of the adjoint
   int repeat = 1;                                         ///< CPU times are the best of this many
   CertificatePass certificate = CertificatePass::kRun;    ///< one more rollout, not timed
+  RadiusPass radius = RadiusPass::kSkip;
 };
 
 enum class Differentiated { kFinalState, kLoss };

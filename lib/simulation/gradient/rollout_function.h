@@ -25,6 +25,7 @@
 #include <vector>
 
 #include "tangible/simulation/certificate/certify.h"
+#include "tangible/simulation/certificate/choices.h"
 #include "tangible/simulation/derivatives/rollout_tangent.h"
 #include "tangible/simulation/gradient/gradient.h"
 #include "tangible/simulation/gradient/state_samples.h"
@@ -161,6 +162,15 @@ class RolloutWorker {
   /// has one, the initial state; empty where the input is refused. `sizes` of parameters, without
   /// controls or initial state, as in DualityGap.
   Certificate Certify(const RolloutInput& input, const std::vector<double>& sizes = {});
+  /// How far each parameter may be changed until another discrete choice is made
+  /// (validity_radius.h): two runs a parameter, by events up to kBehindEnd beyond the end. Empty
+  /// where the input is refused or the run fails.
+  std::vector<ValidityRadius> Radii(const RolloutInput& input);
+  /// The choices of the run with all numbers of a parameter moved by `shift`; false where they may
+  /// not be there or the run fails.
+  bool Choices(const RolloutInput& input, int parameter, double shift, ChoiceList* choices);
+  /// Certificate::growth, by a tangent with a column for each entry of the state.
+  double Growth(const RolloutInput& input);
   /// The model of the last input.
   const Model<double>& model() const { return model_; }
 
@@ -204,6 +214,8 @@ class RolloutWorker {
   template <int N>
   bool JetPass(JetRoute route, Eigen::Index first, RowMatrixXd* jacobian, RolloutOutput* output);
   void JacobianByDifferences(double step, RowMatrixXd* jacobian, RolloutOutput* output);
+  /// The choices of the input that is set; false where the run fails before its end.
+  bool RunChoices(ChoiceList* choices);
 
   const RolloutFunction& f_;
   Scene scene_;

@@ -11,7 +11,7 @@ namespace tangible {
 namespace {
 
 using testing::FloorContact;
-using Kind = ContactMargin::Kind;
+using Kind = ContactSlack::Kind;
 
 /// A body of mass 1 whose contact is below its centre, at its centre's height: normal and tangent
 /// impulses change v_y and v_x alone.
