@@ -49,10 +49,20 @@ void VisitFields(KindRow& row, const Visitor& visit) {
 }
 
 template <typename Visitor>
+void VisitFields(ValidityRadius& radius, const Visitor& visit) {
+  auto& [parameter, down, up, down_where, up_where] = radius;
+  visit("parameter", parameter);
+  visit("down", down);
+  visit("up", up);
+  visit("down_where", down_where);
+  visit("up_where", up_where);
+}
+
+template <typename Visitor>
 void VisitFields(Certificate& certificate, const Visitor& visit) {
   auto& [margin_min, margin_where, degenerate_rows, redundant_rows, condition, linear_residual,
          mode_switches, events, fallbacks, coordinates, one_sided, discontinuous, discrete_map,
-         discrete_impact, verdict] = certificate;
+         discrete_impact, radius, growth, verdict] = certificate;
   visit("margin_min", margin_min);
   visit("margin_where", margin_where);
   visit("degenerate_rows", degenerate_rows);
@@ -67,6 +77,8 @@ void VisitFields(Certificate& certificate, const Visitor& visit) {
   visit("discontinuous", discontinuous);
   visit("discrete_map", discrete_map);
   visit("discrete_impact", discrete_impact);
+  visit("radius", radius);
+  visit("growth", growth);
   visit("verdict", verdict);
 }
 

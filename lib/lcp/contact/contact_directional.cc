@@ -28,7 +28,7 @@ ContactKink KinkOf(const ContactProblem<double>& problem, const ContactSolution<
   const ContactValues values = Evaluate(problem, scales, c, v);
   const double normal = solution.normal_impulse[i];
   const double normal_scale = NormalScale(c, values, scales.impulse);
-  const bool loaded = c.limit_given || normal > tolerance * normal_scale;
+  const bool loaded = c.limit_given || (!touching && normal > tolerance * normal_scale);
   const double along = values.slip > 0.0 ? 1.0 : -1.0;
   if (!loaded) {
     if (!touching && std::abs(values.s_n) > tolerance * values.scale_n) {

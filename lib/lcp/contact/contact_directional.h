@@ -43,7 +43,8 @@ struct ContactKink {
 };
 
 /// Finds the kink of each contact; `tolerance` is relative to the scales of contact_residual.h, and
-/// `touching[i]` says that an open contact's slack is 0 where all of its terms are rounding.
+/// `touching[i]` says that a contact's slack and impulse are 0 where all of their terms are
+/// rounding.
 /// kFrictionFromZero is a kink only for directions in which μ changes.
 void FindKinks(const ContactProblem<double>& problem, const ContactSolution<double>& solution,
                const std::vector<bool>& touching, double tolerance,

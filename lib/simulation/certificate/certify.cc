@@ -91,7 +91,7 @@ void RolloutCertifier::AddContact(const Model<double>& model, const StepRecord& 
   const ContactMargin margin =
       MarginOfContact(record.problem, record.solution, scales, static_cast<int>(place.contact));
   const bool slides = SlidingSign(place.mode) != 0.0;
-  const bool touches = place.mode == ContactMode::kOpen && JustTouches(record, place.contact);
+  const bool touches = JustTouches(record, place.contact);
   // A scaled margin compares a slack with its own terms, which may all be rounding.
   if (touches && !(margin.value < kDegenerateTolerance)) {
     ++certificate_.degenerate_rows;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tangible/dynamics/elements/force.h"
 #include "tangible/dynamics/jacobian/contact_gradient.h"
 #include "tangible/simulation/certificate/certify_place_inl.h"
 #include "tangible/simulation/certificate/feature_ties.h"
@@ -45,6 +46,19 @@ bool Moves(const std::vector<JacobianEntry>& gradient, const RowMatrixXd& direct
 bool Rests(const Model<double>& model, const State<double>& state, const ActiveContact& contact) {
   const double speed = SpeedsOf(model, state, contact).normal;
   return std::abs(speed) <= Negligible(model, speed);
+}
+
+// Whether the friction of a contact that slides is not that of an impact, which has the friction at
+// rest: after a small lift-off the landing brakes more than the load would have meanwhile.
+bool BrakesMoreAsItLands(const Model<double>& model, const State<double>& state,
+                         const ActiveContact& contact) {
+  DecaySource decay;
+  if (!MixedDecay(model, contact.a, contact.b, &decay)) return false;
+  const double slip = SpeedsOf(model, state, contact).slip;
+  const double numbers[3] = {MixedFriction(model, contact.a, contact.b).value, decay.kinetic.value,
+                             decay.speed.value};
+  return std::abs(slip) > Negligible(model, slip) &&
+         std::abs(FrictionDecay(numbers, slip)) > kNoDecay * numbers[0];
 }
 
 // The acceleration of bodies by forces as a segment starts, m/s².
@@ -254,9 +268,16 @@ void RolloutCertifier::ProbeStarts(const Model<double>& model, const State<doubl
     std::vector<ActiveContact> moved;
     for (const ActiveContact& contact : resting) {
       std::vector<JacobianEntry> approach, slip;
-      if (std::any_of(may_jam.begin(), may_jam.end(),
-                      [&](const ActiveContact& other) { return other.SameAs(contact); })) {
+      const bool brakes = BrakesMoreAsItLands(model, start, contact);
+      if (brakes || std::any_of(may_jam.begin(), may_jam.end(), [&](const ActiveContact& other) {
+            return other.SameAs(contact);
+          })) {
         AddApproachGradient(model, start, contact, &scratch, &approach);
+      }
+      if (brakes && Moves(approach, Directions(), c)) {
+        OneSided(ContactName(*model.structure, contact) + " slides at the start, and " +
+                 options_.names[static_cast<size_t>(c)] +
+                 " opens it: an impact has the friction of a body at rest");
       }
       // A contact that does not slide may begin to slide: friction then reverses the law of the
       // contact, or acts in one direction instead of the other, so that the body tips or does not.

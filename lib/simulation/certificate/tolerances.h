@@ -68,6 +68,8 @@ inline constexpr double kSpeedRounding = 1e-13;
 inline constexpr double kOpeningSpeed = 1e-4;
 /// Of the parameter, at least 1: the largest change of a parameter.
 inline constexpr double kOfParameter = 1e-3;
+/// Of the friction at rest: a smaller loss of friction by sliding is none.
+inline constexpr double kNoDecay = 1e-9;
 /// Of the slip as it was: a smaller slip counts as ended.
 inline constexpr double kEndedSlip = 1e-6;
 /// Of the largest entry of a direction's derivative: derivatives along and against it that differ

@@ -17,10 +17,17 @@ namespace tangible {
 bool JustTouches(const StepRecord& record, size_t i) {
   const ActiveContact& contact = record.contacts[i];
   const ContactBlock<double>& block = record.problem.contacts[i];
+  const double rounding =
+      kCoordinateRounding * PlaceOf(record.before, contact.a, contact.b) / record.h;
   const double slack =
       RowDot(block.a, block.normal_a, block.b, block.normal_b, record.solution.motion.data()) +
       block.c_n;
-  return slack <= kCoordinateRounding * PlaceOf(record.before, contact.a, contact.b) / record.h;
+  if (record.solution.modes[i] == ContactMode::kOpen) return slack <= rounding;
+  // A closed one also carries no more than what stops a speed that is rounding.
+  const double mobility =
+      RowMobility(record.problem.mass, block.a, block.normal_a, block.b, block.normal_b);
+  return !block.limit_given && !block.driven && std::abs(slack) <= rounding &&
+         mobility * (record.solution.normal_impulse[i] - block.offset) <= rounding;
 }
 
 // Finds the kinks of the step; returns whether there are any.
@@ -30,7 +37,9 @@ bool StepDirectional::FindKinks(const Model<double>& model, const StepRecord& re
   std::vector<bool> touching(count);
   friction_.setZero(static_cast<Eigen::Index>(count), w_dot.cols());
   for (size_t i = 0; i < count; ++i) {
-    touching[i] = solution.modes[i] == ContactMode::kOpen && JustTouches(record, i);
+    // The share of redundant impulses that is looked at may have other modes than the record.
+    touching[i] = JustTouches(record, i) && (solution.modes[i] == ContactMode::kOpen ||
+                                             record.solution.modes[i] != ContactMode::kOpen);
     for (int k = 0; k < 2; ++k) {
       if (const int number = record.friction[i].numbers[k]; number >= 0) {
         friction_.row(static_cast<Eigen::Index>(i)) +=

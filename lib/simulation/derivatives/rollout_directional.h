@@ -26,8 +26,9 @@
 
 namespace tangible {
 
-/// Whether an open contact's slack n·v⁺ + c is within the rounding of its gap over h: it touches
-/// without speed, and rounding decides whether it closes.
+/// Whether a contact's slack n·v⁺ + c is within the rounding of its gap over h, and the change of
+/// speed that its impulse causes: it touches without speed or load, and rounding decides whether it
+/// is open or closed.
 bool JustTouches(const StepRecord& record, size_t contact);
 
 /// The directional derivative of the step that the stepper has just done.
