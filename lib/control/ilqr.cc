@@ -154,6 +154,9 @@ class Solver {
     const bool convex = Backward();
     iteration.shift = shift_;
     if (convex) iteration.step = Search();
+    if (options_.progress) {
+      options_.progress(0, static_cast<long>(result_.iterations.size()), iteration);
+    }
     result_.iterations.push_back(iteration);
     if (iteration.step > 0.0) {
       Decrease();
@@ -470,6 +473,13 @@ std::string CheckProblem(const ControlProblem& problem, const RowMatrixXd& contr
   return "";
 }
 
+IlqrProgress ProgressAfter(const IlqrProgress& progress, int start, long done) {
+  if (!progress) return {};
+  return [progress, start, done](int, long number, const IlqrIteration& iteration) {
+    progress(start, done + number, iteration);
+  };
+}
+
 IlqrResult SolveIlqr(const ControlProblem& problem, const RowMatrixXd& controls,
                      const IlqrOptions& options) {
   IlqrResult result;
@@ -492,6 +502,7 @@ IlqrResult SolveIlqr(const ControlProblem& problem, const RowMatrixXd& controls,
     result = first;
   } else {
     exact.max_iterations = std::max(1, options.max_iterations - static_cast<int>(spent));
+    exact.progress = ProgressAfter(options.progress, 0, spent);
     result = Solver(problem, exact).Solve(first.plan.controls);
     result.iterations.insert(result.iterations.begin(), first.iterations.begin(),
                              first.iterations.end());

@@ -40,6 +40,17 @@ struct ControlProblem {
   long first_step = 0;        ///< the system's step that is the plan's step 0
 };
 
+struct IlqrIteration {
+  double cost = 0.0;      ///< before the step
+  double gradient = 0.0;  ///< the fraction that is compared with gradient_tolerance
+  double shift = 0.0;     ///< μ over the largest entry of V
+  double step = 0.0;      ///< α; 0: no step decreased the cost
+};
+
+/// Called after each iteration, with the start that it belongs to (0, or that of a search) and its
+/// number in the plan of that start; of a search by several threads at once.
+using IlqrProgress = std::function<void(int start, long number, const IlqrIteration& iteration)>;
+
 struct IlqrOptions {
   int max_iterations = 200;  ///< >= 1
   /// The plan has converged when moving every control of every step by its range (ControlSizes of
@@ -57,6 +68,7 @@ struct IlqrOptions {
   SampledSurrogate surrogate{};
   /// Called after each iteration; true ends the work with the best plan so far.
   std::function<bool()> stop{};
+  IlqrProgress progress{};
 };
 
 /// Controls and the motion that they cause. States are (steps + 1) x n, controls steps x m; the
@@ -67,13 +79,6 @@ struct Plan {
   double cost = 0.0;
   /// The impacts of each step, as StepMap reports them; empty without reference_extension.
   std::vector<std::vector<int>> impacts{};
-};
-
-struct IlqrIteration {
-  double cost = 0.0;      ///< before the step
-  double gradient = 0.0;  ///< the fraction that is compared with gradient_tolerance
-  double shift = 0.0;     ///< μ over the largest entry of V
-  double step = 0.0;      ///< α; 0: no step decreased the cost
 };
 
 enum class IlqrStatus {
@@ -103,6 +108,10 @@ struct IlqrResult {
 /// Empty, or one line: sizes that differ, a bound below another, no steps, controls out of range or
 /// not finite.
 std::string CheckProblem(const ControlProblem& problem, const RowMatrixXd& controls);
+
+/// Hands on what a solve says as that of another start, after so many iterations; empty of an empty
+/// one.
+IlqrProgress ProgressAfter(const IlqrProgress& progress, int start, long done);
 
 /// Solves the problem from initial controls (steps x m), which are clamped to the bounds.
 IlqrResult SolveIlqr(const ControlProblem& problem, const RowMatrixXd& controls,

@@ -212,12 +212,12 @@ class Searcher {
     ForEachRollout(*p_.function, static_cast<long>(which.size()), o_.threads,
                    [&](RolloutWorker*, long i) {
                      const size_t start = which[static_cast<size_t>(i)];
-                     Continue(starts_[start], budget, &polished_[start]);
+                     Continue(start, budget, &polished_[start]);
                    });
   }
 
   // At most `budget` further iterations of one start.
-  void Continue(const RowMatrixXd& start, int budget, IlqrResult* result) const {
+  void Continue(size_t start, int budget, IlqrResult* result) const {
     const bool begun = result->rollouts > 0;
     if (begun && result->status != IlqrStatus::kIterationLimit) return;
     const int done = static_cast<int>(result->iterations.size());
@@ -225,9 +225,10 @@ class Searcher {
     options.max_iterations = std::min(budget, o_.ilqr.max_iterations - done);
     if (options.max_iterations <= 0) return;
     if (begun) options.surrogate.samples = 0;
+    options.progress = ProgressAfter(o_.ilqr.progress, static_cast<int>(start), done);
     EngineStep map(*p_.function);
     const ControlProblem problem{&map, p_.cost, map.initial(), p_.low, p_.high};
-    IlqrResult more = SolveIlqr(problem, begun ? result->plan.controls : start, options);
+    IlqrResult more = SolveIlqr(problem, begun ? result->plan.controls : starts_[start], options);
     more.iterations.insert(more.iterations.begin(), result->iterations.begin(),
                            result->iterations.end());
     more.rollouts += result->rollouts;

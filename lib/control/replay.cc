@@ -12,26 +12,36 @@ namespace {
 
 // Steps of a replay in each step of a plan: the errors of the default integrator, of fourth order,
 // are 256 times smaller than the plan's.
-constexpr Eigen::Index kReplayParts = 4;
+constexpr int kReplayParts = 4;
 
 }  // namespace
+
+ReplayRun MakeReplay(const Scene& scene, const RowMatrixXd& controls) {
+  ReplayRun run;
+  run.scene = scene.simulation.stepping == Stepping::kEvent ? scene : ByEvents(scene);
+  SimulationSettings& settings = run.scene.simulation;
+  settings.duration = static_cast<double>(controls.rows()) * settings.dt;
+  settings.dt /= kReplayParts;
+  run.parts = kReplayParts;
+  run.controls.resize(controls.rows() * kReplayParts, controls.cols());
+  for (Eigen::Index k = 0; k < run.controls.rows(); ++k) {
+    run.controls.row(k) = controls.row(k / kReplayParts);
+  }
+  return run;
+}
 
 Replay ReplayByEvents(const Scene& scene, const std::vector<std::string>& paths, const Cost& cost,
                       const RowMatrixXd& controls) {
   Replay replay;
   const Eigen::Index steps = controls.rows();
-  Scene events = scene.simulation.stepping == Stepping::kEvent ? scene : ByEvents(scene);
-  events.simulation.duration = static_cast<double>(steps) * events.simulation.dt;
-  events.simulation.dt /= kReplayParts;
+  const ReplayRun replayed = MakeReplay(scene, controls);
   std::vector<long> records;
-  RowMatrixXd held(steps * kReplayParts, controls.cols());
-  for (Eigen::Index k = 0; k <= steps; ++k) records.push_back(k * kReplayParts);
-  for (Eigen::Index k = 0; k < held.rows(); ++k) held.row(k) = controls.row(k / kReplayParts);
+  for (Eigen::Index k = 0; k <= steps; ++k) records.push_back(k * replayed.parts);
   RolloutFunction function;
-  replay.message = function.Create(events, {}, paths, records);
+  replay.message = function.Create(replayed.scene, {}, paths, records);
   if (!replay.message.empty()) return replay;
   const RolloutOutput run =
-      RolloutWorker(function).Run({VectorX<double>(), VectorX<double>(), held});
+      RolloutWorker(function).Run({VectorX<double>(), VectorX<double>(), replayed.controls});
   replay.message = run.message;
   replay.states = run.states;
   if (run.status != RolloutStatus::kDone) return replay;

@@ -23,6 +23,15 @@ struct Replay {
       states;  ///< (steps + 1) x num_states, as EngineStep orders them; NaN beyond a failure
 };
 
+/// What a replay runs.
+struct ReplayRun {
+  Scene scene;           ///< stepped by events, for the duration of the controls
+  int parts = 0;         ///< its steps in each step of the plan
+  RowMatrixXd controls;  ///< of each of its steps
+};
+/// The replay of a plan's controls (steps x m).
+ReplayRun MakeReplay(const Scene& scene, const RowMatrixXd& controls);
+
 /// Plays controls (steps x m, of these paths, each held over a step of the scene's dt) from the
 /// scene's initial state by event stepping. A scene that is stepped by events keeps its settings.
 Replay ReplayByEvents(const Scene& scene, const std::vector<std::string>& paths, const Cost& cost,

@@ -13,4 +13,5 @@ PYBIND11_MODULE(_core, module) {
   tangible::python::BindRollout(&module);
   tangible::python::BindSimulation(&module);
   tangible::python::BindFit(&module);
+  tangible::python::BindControl(&module);
 }

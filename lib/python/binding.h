@@ -123,6 +123,7 @@ inline Array ToArray(const std::vector<double>& values, const std::vector<py::ss
 void BindScene(py::module_* module);
 void BindRollout(py::module_* module);
 void BindFit(py::module_* module);
+void BindControl(py::module_* module);
 void BindSimulate(py::module_* module);
 void BindSimulation(py::module_* module);
 

@@ -17,6 +17,7 @@ Units are SI, angles are in radians, x points right and y up.
 from ._core import TangibleError, __version__
 from ._certificate import Certificate
 from ._fit import FitResult, Residuals, fit
+from ._plan import Motion, MpcResult, Plan, mpc, plan
 from ._rollout import Jacobian, Rollout, Smoothing
 from ._scene import Scene
 from ._simulation import Simulation
@@ -30,6 +31,9 @@ __all__ = [
     "FitResult",
     "Jacobian",
     "Joints",
+    "Motion",
+    "MpcResult",
+    "Plan",
     "Residuals",
     "Rollout",
     "Scene",
@@ -40,5 +44,7 @@ __all__ = [
     "Trajectory",
     "__version__",
     "fit",
+    "mpc",
+    "plan",
     "simulate",
 ]

@@ -1,4 +1,4 @@
-"""Fit problems from memory: scenes, tables and arrays become the files that the engine reads."""
+"""Problems from memory: scenes, tables and arrays become the files that the engine reads."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ import copy
 import json
 import os
 import tempfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,9 +21,11 @@ from ._scene import Scene
 # Columns of an observation file that are no measured coordinate.
 _KEYS = ("time", "body", "point", "relative_to")
 
+Core = TypeVar("Core")
+
 
 class Problem:
-    """The text of a fit file, and of the files that exist in memory alone."""
+    """The text of a problem's file, and of the files that exist in memory alone."""
 
     def __init__(self, text: str, name: str, files: dict[str, str], said: dict[str, str]) -> None:
         self.text = text
@@ -33,9 +35,15 @@ class Problem:
 
     @contextlib.contextmanager
     def read(self) -> Iterator[_core.Fit]:
-        """The engine's problem; files of memory exist as long as the context."""
+        """The engine's fit; files of memory exist as long as the context."""
+        with self.open(_core.Fit) as core:
+            yield core
+
+    @contextlib.contextmanager
+    def open(self, read: Callable[[str, str], Core]) -> Iterator[Core]:
+        """What `read` makes of the text and name; files of memory exist as long as the context."""
         if not self.files:
-            yield _core.Fit(self.text, self.name)
+            yield read(self.text, self.name)
             return
         with tempfile.TemporaryDirectory(prefix="tangible_") as folder:
             for file, text in self.files.items():
@@ -43,7 +51,7 @@ class Problem:
             data = json.loads(self.text)
             _place(data, folder)
             try:
-                yield _core.Fit(json.dumps(data), self.name)
+                yield read(json.dumps(data), self.name)
             except _core.TangibleError as error:
                 message = str(error)
                 for file, said in self.said.items():
@@ -56,19 +64,22 @@ def _place(data: dict[str, Any], folder: str) -> None:
     for part in (data, *data.get("recordings", [])):
         if not isinstance(part, dict):
             continue
-        for owner, key in [(part, "scene"), *((entry, "file") for entry in part.get("observations", [])
-                                              if isinstance(entry, dict))]:
+        entries = [*part.get("observations", []), part.get("initial")]
+        for owner, key in [(part, "scene"), *((entry, "file") for entry in entries if isinstance(entry, dict))]:
             value = owner.get(key)
             if isinstance(value, str) and value.startswith("memory:"):
                 owner[key] = os.path.join(folder, value[len("memory:") :])
 
 
-class _Maker:
+class Maker:
+    """Collects what stands in memory, as files of a problem."""
+
     def __init__(self) -> None:
         self.files: dict[str, str] = {}
         self.said: dict[str, str] = {}
 
     def add(self, kind: str, text: str, said: str) -> str:
+        """The name with which the problem's text calls a file; messages call it `said`."""
         file = f"{kind}{len(self.files)}.{'json' if kind == 'scene' else 'csv'}"
         self.files[file] = text
         self.said[file] = said
@@ -116,20 +127,25 @@ class _Maker:
         return {key: value for key, value in entry.items() if key not in options}
 
 
+def text_of(name: str) -> str:
+    """The text of a problem's file."""
+    try:
+        return Path(name).read_text(encoding="utf-8-sig")
+    except OSError as error:
+        raise _core.TangibleError(f"{name}: cannot be read: {error.strerror}") from None
+
+
 def make(problem: Mapping[str, Any] | str | os.PathLike[str], folder: str | os.PathLike[str],
          initial: Mapping[str, float] | None) -> Problem:
     """A problem from a fit file, or from its JSON, in which scenes and tables may stand."""
     if isinstance(problem, Mapping):
-        maker = _Maker()
+        maker = Maker()
         data = plain(maker.run(dict(problem), None, ""), "fit")
         name = str(Path(folder) / "fit")
     else:
-        maker = _Maker()
+        maker = Maker()
         name = os.fspath(problem)
-        try:
-            text = Path(name).read_text(encoding="utf-8-sig")
-        except OSError as error:
-            raise _core.TangibleError(f"{name}: cannot be read: {error.strerror}") from None
+        text = text_of(name)
         if not initial:
             return Problem(text, name, {}, {})
         data = json.loads(text)

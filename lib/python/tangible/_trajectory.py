@@ -95,6 +95,20 @@ class Events:
     kind: list[str]
 
 
+def display(page: Any, file: str | os.PathLike[str] | None) -> None:
+    """Plays a page in a notebook, or writes it to a file: `show` of what has an `html()`."""
+    if file is not None:
+        Path(file).write_text(page.html(), encoding="utf-8")
+        return
+    try:
+        ipython = importlib.import_module("IPython")
+    except ImportError:
+        ipython = None
+    if ipython is None or ipython.get_ipython() is None:
+        raise RuntimeError("show() plays in a notebook; expected a file outside of one, got none")
+    ipython.display.display(page)
+
+
 class Trajectory:
     """The motion of a scene's moving and kinematic bodies.
 
@@ -236,16 +250,7 @@ class Trajectory:
 
         Without a file and outside a notebook it raises `RuntimeError`.
         """
-        if file is not None:
-            Path(file).write_text(self.html(), encoding="utf-8")
-            return
-        try:
-            ipython = importlib.import_module("IPython")
-        except ImportError:
-            ipython = None
-        if ipython is None or ipython.get_ipython() is None:
-            raise RuntimeError("show() plays in a notebook; expected a file outside of one, got none")
-        ipython.display.display(self)
+        display(self, file)
 
     def _repr_html_(self) -> str:
         """What a notebook shows: the animated view in a frame of its own."""

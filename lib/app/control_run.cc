@@ -1,0 +1,465 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tangible/app/control_run.h"
+
+#include <algorithm>
+#include <cmath>
+#include <ctime>
+#include <utility>
+
+#include "tangible/app/certificate_json.h"
+#include "tangible/app/program.h"
+#include "tangible/app/tolerances.h"
+#include "tangible/control/model_predictive.h"
+#include "tangible/control/plan_search.h"
+#include "tangible/control/unreached_targets.h"
+#include "tangible/math/median.h"
+#include "tangible/render/html.h"
+#include "tangible/scene/scene_names.h"
+
+namespace tangible {
+namespace {
+
+std::vector<double> ToVector(const VectorX<double>& values) {
+  return {values.data(), values.data() + values.size()};
+}
+
+// A plan, and what became of it in the motion.
+struct Judged {
+  IlqrResult result;
+  double seconds = 0.0;  // CPU
+  Replay replay;
+  double cost_of_nothing = 0.0;
+  PlanVerdict verdict;
+  Certificate certificate;
+  SearchResult search;  // without `best`, which is the result
+};
+
+// Adds the largest entries of the columns of B, a control each.
+void AddEffect(const MatrixX<double>& b, VectorX<double>* effect) {
+  *effect += b.cwiseAbs().colwise().maxCoeff().transpose();
+}
+
+// Finds a control that moves nothing in any step of the motion with these controls, and with a
+// surrogate in none of its samples either. Empty, or an error of one line. Where a step cannot be
+// made only those before it count.
+std::string FindIdle(const ControlProblem& problem, const ControlFile& file,
+                     const RolloutFunction& function, const RowMatrixXd& controls) {
+  const long steps = controls.rows();
+  Model<double> model;
+  State<double> state;
+  BuildModel(function.scene(), &model, &state);
+  double heaviest = 0.0;
+  for (const int body : model.structure->moving) {
+    const BodyIndex& index = model.structure->bodies[body];
+    heaviest = std::max({heaviest, model.parameters[index.mass], model.parameters[index.inertia]});
+  }
+  const double least = kMovesNothing * file.scene.simulation.dt / heaviest;
+  VectorX<double> effect = VectorX<double>::Zero(problem.map->num_controls());
+  VectorX<double> x = problem.initial, next;
+  MatrixX<double> a, b;
+  std::string error;
+  for (long k = 0; k < steps && effect.minCoeff() <= least; ++k) {
+    if (!problem.map->Linearise(k, x, controls.row(k), &next, &a, &b, &error)) return "";
+    AddEffect(b, &effect);
+    x = next;
+  }
+  if (effect.minCoeff() <= least && file.options.surrogate.samples > 0) {
+    Plan plan;
+    plan.controls = controls;
+    plan.states = problem.initial.transpose();
+    std::vector<MatrixX<double>> mean_a(steps, a), mean_b(steps, MatrixX<double>(0.0 * b));
+    AverageJacobians(problem, plan, file.options.surrogate, &mean_a, &mean_b);
+    for (const MatrixX<double>& one : mean_b) AddEffect(one, &effect);
+  }
+  Eigen::Index idle = 0;
+  if (effect.minCoeff(&idle) > least) return "";
+  return "/controls/" + std::to_string(idle) +
+         "/path: expected a control that moves something, got " + file.paths[idle] +
+         ", which moves nothing in any step with the initial controls";
+}
+
+OrderedJson DescribeControls(const ControlFile& file, const RowMatrixXd& controls, double dt) {
+  OrderedJson json = {
+      {"paths", file.paths}, {"times", OrderedJson::array()}, {"values", OrderedJson::array()}};
+  for (Eigen::Index k = 0; k < controls.rows(); ++k) {
+    json["times"].push_back(static_cast<double>(k) * dt);
+    json["values"].push_back(ToVector(controls.row(k)));
+  }
+  return json;
+}
+
+// `sampled`: how many of them, at the start, have the surrogate's Jacobians.
+OrderedJson DescribeIterations(const std::vector<IlqrIteration>& iterations, long sampled) {
+  OrderedJson list = OrderedJson::array();
+  for (const IlqrIteration& iteration : iterations) {
+    const bool is_sampled = static_cast<long>(list.size()) < sampled;
+    list.push_back({{"cost", iteration.cost},
+                    {"gradient", iteration.gradient},
+                    {"shift", iteration.shift},
+                    {"step", iteration.step}});
+    if (sampled > 0) list.back()["jacobians"] = is_sampled ? "surrogate" : "exact";
+  }
+  return list;
+}
+
+OrderedJson FinalState(const RolloutFunction& function, const RowMatrixXd& states) {
+  const std::vector<std::string> names = OutputNames(function.structure());
+  OrderedJson json = OrderedJson::object();
+  if (states.rows() == 0) return json;
+  for (size_t i = 0; i < names.size(); ++i) {
+    json[names[i]] = states(states.rows() - 1, static_cast<Eigen::Index>(i));
+  }
+  return json;
+}
+
+// The cost of the motion with controls of 0, or of the bounds nearest to it; not finite where there
+// is no such motion.
+double CostOfNothing(const ControlFile& file, const Cost& cost, long steps) {
+  const VectorX<double> none =
+      VectorX<double>::Zero(file.low.size()).cwiseMax(file.low).cwiseMin(file.high);
+  return ReplayByEvents(file.scene, file.paths, cost, none.transpose().replicate(steps, 1)).cost;
+}
+
+std::string NamesOf(const ControlFile& file, const std::vector<int>& terms) {
+  std::string names;
+  for (const int term : terms) names += (names.empty() ? "" : ", ") + file.term_names[term];
+  return names;
+}
+
+PlanVerdict VerdictOf(const ControlFile& file, const Judged& plan,
+                      const UnreachedTargets& unreached) {
+  const IlqrResult& result = plan.result;
+  const Replay& replay = plan.replay;
+  if (DiffersFromMotion(result.plan.cost, replay, plan.cost_of_nothing)) {
+    const std::string why = replay.done ? "the plan's cost is " + CompactNumber(result.plan.cost) +
+                                              ", and that of its replay by events " +
+                                              CompactNumber(replay.cost)
+                                        : "the plan's replay by events failed: " + replay.message;
+    return {"differs_from_motion", why, false};
+  }
+  if (unreached.all) {
+    return {"no_effect_on_target",
+            "the controls have no effect on " + NamesOf(file, unreached.terms) +
+                " from where the plan is; try starts or sampling, another initial, or a surrogate",
+            false};
+  }
+  return {NameOf(result.status), result.message, true};
+}
+
+// Rows of planned numbers beside those of the replay: the cost, then the final state.
+std::vector<std::vector<std::string>> PlannedBesideMotion(const RolloutFunction& function,
+                                                          const IlqrResult& result,
+                                                          const Replay& replay) {
+  constexpr int kDigits = 8;
+  const std::vector<std::string> names = OutputNames(function.structure());
+  const auto text = [](double value) {
+    return std::isfinite(value) ? CompactNumber(value, kDigits) : std::string("none");
+  };
+  std::vector<std::vector<std::string>> rows = {
+      {"cost", text(result.plan.cost), text(replay.cost)}};
+  const Eigen::Index last = result.plan.states.rows() - 1;
+  for (size_t i = 0; i < names.size(); ++i) {
+    const auto j = static_cast<Eigen::Index>(i);
+    const double moved = replay.states.rows() > last ? replay.states(last, j) : std::nan("");
+    rows.push_back({names[i], text(result.plan.states(last, j)), text(moved)});
+  }
+  return rows;
+}
+
+std::string WarningOfMaximum() {
+  return "with the initial controls the cost has no gradient, as an angle that wraps is half a "
+         "turn from its target, where its cost is largest; they were offset by " +
+         FormatNumber(kStartOffset) + " of their ranges";
+}
+
+void WarnOfDiscreteMap(const Certificate& certificate, std::vector<std::string>* warnings) {
+  const std::string advice = AdviceOf(certificate);
+  if (advice.empty()) return;
+  warnings->push_back("a plan may exploit when its steps have impacts: " + advice);
+}
+
+// The options of all plans, with the progress that is wanted.
+SearchOptions SearchOf(const ControlFile& file, const ControlRunOptions& options) {
+  SearchOptions search{file.starts, file.sampling, file.options, options.threads};
+  search.ilqr.progress = options.progress;
+  return search;
+}
+
+OrderedJson DescribePlan(const ControlFile& file, const RolloutFunction& function,
+                         const Judged& plan) {
+  const IlqrResult& result = plan.result;
+  OrderedJson json = {
+      {"status", plan.verdict.status},
+      {"message", plan.verdict.message},
+      {"planned_status", NameOf(result.status)},
+      {"cost", result.plan.cost},
+      {"gradient", result.gradient},
+      {"final_state", FinalState(function, result.plan.states)},
+      {"motion",
+       {{"cost", plan.replay.cost},
+        {"message", plan.replay.message},
+        {"final_state", FinalState(function, plan.replay.states)},
+        {"cost_of_nothing", plan.cost_of_nothing}}},
+      {"certificate", ToJson(plan.certificate)},
+      {"rollouts", result.rollouts},
+      {"linearisations", result.linearisations},
+      {"cpu_seconds", plan.seconds},
+      {"iterations", DescribeIterations(result.iterations, result.surrogate_iterations)},
+      {"controls", DescribeControls(file, result.plan.controls, file.scene.simulation.dt)}};
+  if (file.starts.count > 1 || file.sampling.samples > 0) {
+    json["starts"] = {{"count", plan.search.start_costs.size()},
+                      {"pieces", file.starts.pieces},
+                      {"seed", file.starts.seed},
+                      {"drawn", plan.search.drawn},
+                      {"chosen", plan.search.chosen},
+                      {"costs", plan.search.start_costs},
+                      {"polished_costs", plan.search.polished_costs}};
+  }
+  if (file.sampling.samples > 0) {
+    json["sampling"] = {{"method", NameOf(file.sampling.method)},
+                        {"samples", file.sampling.samples},
+                        {"iterations", file.sampling.iterations},
+                        {"seed", file.sampling.seed}};
+  }
+  if (file.options.surrogate.samples > 0) {
+    json["surrogate"] = {{"samples", file.options.surrogate.samples},
+                         {"deviation", file.options.surrogate.deviation},
+                         {"seed", file.options.surrogate.seed},
+                         {"iterations", result.surrogate_iterations}};
+  }
+  return json;
+}
+
+}  // namespace
+
+std::string MakePlan(const std::string& name, const ControlFile& file,
+                     const ControlRunOptions& options, ControlRun* run) {
+  RolloutFunction function;
+  std::string error = function.Create(file.scene, {}, file.paths, {});
+  if (!error.empty()) return name + ": " + error;
+  EngineStep map(function);
+  const Cost cost(map.num_states(), map.num_controls(), file.scene.simulation.dt, file.terms);
+  const ControlProblem problem{&map, &cost, map.initial(), file.low, file.high, 0};
+  const RowMatrixXd start = file.InitialControls(function.num_steps());
+  const SearchOptions search = SearchOf(file, options);
+  const std::string idle = FindIdle(problem, file, function, start);
+  if (!idle.empty() && !search.searches()) return name + ": " + idle;
+  Judged plan;
+  const std::clock_t began = std::clock();
+  plan.search = SearchPlan({&function, &cost, file.low, file.high}, start, search);
+  plan.result = std::move(plan.search.best);
+  plan.seconds = static_cast<double>(std::clock() - began) / CLOCKS_PER_SEC;
+  const Plan& planned = plan.result.plan;
+  if (plan.result.status == IlqrStatus::kFailed) return name + ": " + plan.result.message;
+  // What moves nothing at first may in the plan from another start.
+  if (!idle.empty()) error = FindIdle(problem, file, function, planned.controls);
+  if (!error.empty()) return name + ": " + error;
+  if (plan.result.left_maximum) run->warnings.push_back(WarningOfMaximum());
+  const RolloutInput input{VectorX<double>(), VectorX<double>(), planned.controls};
+  RolloutWorker worker(function);
+  const RolloutOutput played = worker.Run(input);
+  for (std::string& warning : worker.Warnings(played.report, played.final)) {
+    run->warnings.push_back(std::move(warning));
+  }
+  plan.certificate = worker.Certify(input);
+  WarnOfDiscreteMap(plan.certificate, &run->warnings);
+  plan.replay = ReplayByEvents(file.scene, file.paths, cost, planned.controls);
+  plan.cost_of_nothing = CostOfNothing(file, cost, planned.controls.rows());
+  const UnreachedTargets unreached = FindUnreachedTargets(problem, planned);
+  plan.verdict = VerdictOf(file, plan, unreached);
+  if (plan.verdict.holds && !unreached.terms.empty()) {
+    run->warnings.push_back("the controls have no effect on " + NamesOf(file, unreached.terms) +
+                            " from where the plan is");
+  }
+  run->result = DescribePlan(file, function, plan);
+  run->beside_motion = PlannedBesideMotion(function, plan.result, plan.replay);
+  run->scene = file.scene;
+  run->states = planned.states;
+  run->controls = planned.controls;
+  run->cost = planned.cost;
+  run->verdict = std::move(plan.verdict);
+  run->replay = std::move(plan.replay);
+  run->iterations = std::move(plan.result.iterations);
+  return "";
+}
+
+namespace {
+
+std::vector<std::string> MovingBodies(const Scene& scene) {
+  std::vector<std::string> names;
+  for (const BasicBody<double>& body : scene.bodies) {
+    if (body.motion == Motion::kMoving) names.push_back(body.name);
+  }
+  return names;
+}
+
+// "a, b", of many the first ones.
+std::string Listed(const std::vector<std::string>& names) {
+  constexpr size_t kMostNames = 5;
+  std::string list;
+  for (size_t i = 0; i < std::min(names.size(), kMostNames); ++i) {
+    list.append(i == 0 ? "" : ", ").append(names[i]);
+  }
+  return list + (names.size() > kMostNames ? ", ... (" + std::to_string(names.size()) + ")" : "");
+}
+
+struct PredictiveRun {
+  RowMatrixXd states, controls;
+  double cost = 0.0;
+  std::vector<double> seconds;  // of each plan, CPU
+  long failed = 0;
+  // States of the plant that are not on the model's joints, and the largest error of one, m or rad.
+  long projected = 0;
+  double joint_error = 0.0;
+  std::string failure;        // of the first plan that failed: where and why
+  bool left_maximum = false;  // in any plan
+  std::string error;
+};
+
+long NumRunSteps(const ControlFile& file) {
+  SimulationSettings whole = file.scene.simulation;
+  whole.duration = file.run_duration;
+  return NumSteps(whole);
+}
+
+// Where the first plan begins: with starts or sampling at the plan that they find.
+RowMatrixXd FirstControls(const ControlFile& file, const Cost& cost, long horizon, int threads) {
+  RowMatrixXd initial = file.InitialControls(horizon);
+  const SearchOptions search = SearchOf(file, {.threads = threads});
+  Scene scene = file.scene;
+  scene.simulation.duration = static_cast<double>(horizon) * scene.simulation.dt;
+  RolloutFunction function;
+  if (!search.searches() || !function.Create(scene, {}, file.paths, {}).empty()) return initial;
+  const IlqrResult best = SearchPlan({&function, &cost, file.low, file.high}, initial, search).best;
+  return best.status == IlqrStatus::kFailed ? initial : best.plan.controls;
+}
+
+PredictiveRun Control(const ControlFile& file, const ControlRunOptions& wanted, EngineStep* map,
+                      EngineStep* plant) {
+  PredictiveRun run;
+  const double dt = file.scene.simulation.dt;
+  const long steps = NumRunSteps(file);
+  const long horizon = std::max(1L, std::lround(file.plan_horizon / dt));
+  const Cost cost(map->num_states(), map->num_controls(), dt, file.terms);
+  PredictiveOptions options{file.options, wanted.budget};
+  options.ilqr.max_iterations = file.plan_iterations;
+  if (wanted.budget > 0.0) options.ilqr.max_iterations = file.options.max_iterations;
+  PredictiveController controller({map, &cost, map->initial(), file.low, file.high, 0},
+                                  FirstControls(file, cost, horizon, wanted.threads), options);
+  VectorX<double> x = plant->initial();
+  run.states.resize(steps + 1, x.size());
+  run.controls.resize(steps, map->num_controls());
+  run.states.row(0) = x.transpose();
+  VectorX<double> next;
+  for (long k = 0; k < steps; ++k) {
+    const std::clock_t began = std::clock();
+    VectorX<double> seen = x;
+    double error = 0.0;
+    if (map->ProjectOntoJoints(k, &seen, &error) != JointState::Outcome::kOnJoints) {
+      ++run.projected;
+      run.joint_error = std::max(run.joint_error, error);
+    }
+    const VectorX<double> u = controller.Control(k, seen);
+    run.seconds.push_back(static_cast<double>(std::clock() - began) / CLOCKS_PER_SEC);
+    run.left_maximum |= controller.last().left_maximum;
+    if (controller.last().status == IlqrStatus::kFailed && run.failed++ == 0) {
+      run.failure = "in step " + std::to_string(k) + ": " + controller.last().message;
+    }
+    if (!plant->Step(k, x, u, &next, &run.error)) return run;
+    run.cost += cost.Value(x, u);
+    run.controls.row(k) = u.transpose();
+    run.states.row(k + 1) = next.transpose();
+    x = next;
+    if (wanted.step_done) wanted.step_done(k, steps, run.cost);
+  }
+  run.cost += cost.EndValue(x);
+  return run;
+}
+
+// Of the model's run with the controls that were played, which is about what the plans were for.
+Certificate CertifyPlayed(const ControlFile& file, const RowMatrixXd& controls) {
+  Scene scene = file.scene;
+  scene.simulation.duration = static_cast<double>(controls.rows()) * scene.simulation.dt;
+  RolloutFunction function;
+  if (!function.Create(scene, {}, file.paths, {}).empty()) return {};
+  return RolloutWorker(function).Certify({VectorX<double>(), VectorX<double>(), controls});
+}
+
+std::string FailedPlans(const PredictiveRun& run) {
+  return std::to_string(run.failed) + " of " + std::to_string(run.seconds.size()) + " plans failed";
+}
+
+// What keeps a run from having a result, or empty.
+std::string WhyNoResult(const PredictiveRun& run, const std::string& name,
+                        const std::string& plant_name) {
+  if (!run.error.empty()) return plant_name + ": " + run.error;
+  if (run.failed == static_cast<long>(run.seconds.size())) {
+    return name + ": " + FailedPlans(run) + ", the first " + run.failure;
+  }
+  if (!std::isfinite(run.cost)) return name + ": the cost of the run is not finite";
+  return "";
+}
+
+}  // namespace
+
+std::string CheckPlant(const ControlFile& file, const Scene& plant, const std::string& name) {
+  if (plant.simulation.dt != file.scene.simulation.dt) {
+    return name + ": /simulation/dt: expected the problem's, " +
+           FormatNumber(file.scene.simulation.dt) + ", got " + FormatNumber(plant.simulation.dt);
+  }
+  const std::vector<std::string> expected = MovingBodies(file.scene), got = MovingBodies(plant);
+  if (got != expected) {
+    return name + ": /bodies: expected the moving bodies of " + file.scene_path + ", " +
+           Listed(expected) + ", got " + Listed(got);
+  }
+  int which = -1;
+  const std::string error = CheckControls(plant, file.paths, &which);
+  return error.empty() ? "" : name + ": " + error;
+}
+
+std::string RunPredictive(const std::string& name, const ControlFile& file, const Scene& plant,
+                          const std::string& plant_name, const ControlRunOptions& options,
+                          ControlRun* run) {
+  if (!(file.run_duration > 0.0)) {
+    return name + ": /mpc: missing, expected an object with duration and horizon";
+  }
+  RolloutFunction function, of_plant;
+  std::string error = function.Create(file.scene, {}, file.paths, {});
+  if (error.empty()) error = of_plant.Create(plant, {}, file.paths, {});
+  if (!error.empty()) return name + ": " + error;
+  EngineStep map(function), plant_step(of_plant);
+  error = FindIdle({&map, nullptr, map.initial(), file.low, file.high}, file, function,
+                   file.InitialControls(NumRunSteps(file)));
+  if (!error.empty()) return name + ": " + error;
+  PredictiveRun made = Control(file, options, &map, &plant_step);
+  error = WhyNoResult(made, name, plant_name);
+  if (!error.empty()) return error;
+  if (made.failed > 0) {
+    run->warnings.push_back(FailedPlans(made) +
+                            ", where the plans before them were continued; the first " +
+                            made.failure);
+  }
+  if (made.left_maximum) run->warnings.push_back(WarningOfMaximum());
+  const Certificate certificate = CertifyPlayed(file, made.controls);
+  WarnOfDiscreteMap(certificate, &run->warnings);
+  run->result = {{"status", "done"},
+                 {"cost", made.cost},
+                 {"final_state", FinalState(of_plant, made.states)},
+                 {"plans", made.seconds.size()},
+                 {"plans_failed", made.failed},
+                 {"states_projected", made.projected},
+                 {"joint_error_max", made.joint_error},
+                 {"certificate", ToJson(certificate)},
+                 {"cpu_seconds_median", UpperMedian(made.seconds)},
+                 {"cpu_seconds_max", *std::max_element(made.seconds.begin(), made.seconds.end())},
+                 {"controls", DescribeControls(file, made.controls, file.scene.simulation.dt)}};
+  run->verdict.status = "done";
+  run->scene = plant;
+  run->scene.simulation.duration = static_cast<double>(made.controls.rows()) * plant.simulation.dt;
+  run->states = std::move(made.states);
+  run->controls = std::move(made.controls);
+  run->cost = made.cost;
+  return "";
+}
+
+}  // namespace tangible
