@@ -12,7 +12,6 @@
 #include <memory>
 #include <numeric>
 #include <optional>
-#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -21,12 +20,14 @@
 #include "tangible/app/program.h"
 #include "tangible/app/progress.h"
 #include "tangible/app/shards.h"
+#include "tangible/estimation/app/fit_overrides.h"
 #include "tangible/estimation/app/fit_shards.h"
 #include "tangible/estimation/fit/fit_checkpoint.h"
 #include "tangible/estimation/fit/motion_check.h"
 #include "tangible/estimation/fit/posterior.h"
 #include "tangible/estimation/fit/profile.h"
 #include "tangible/estimation/fit/variance_components.h"
+#include "tangible/estimation/results/design_output.h"
 #include "tangible/estimation/results/fit_json.h"
 #include "tangible/estimation/results/fit_schema.h"
 #include "tangible/estimation/results/fitted_scene.h"
@@ -35,7 +36,6 @@
 #include "tangible/estimation/results/prediction.h"
 #include "tangible/estimation/results/report.h"
 #include "tangible/estimation/results/residual_summary.h"
-#include "tangible/scene/csv.h"
 #include "tangible/scene/json_reader.h"
 #include "tangible/scene/text_file.h"
 
@@ -63,6 +63,9 @@ DEFINE_int32(max_iterations, 50, "of each start");
 DEFINE_string(profile, "",
               "names of parameters, separated by commas, whose intervals are found by profiles: "
               "the cost with the parameter held, the others minimised");
+DEFINE_string(design, "",
+              "file of candidates for the next experiment (JSON): which would narrow which "
+              "interval by how much");
 TANGIBLE_DEFINE_SHARD_FLAGS();
 DEFINE_string(posterior, "", "N: so many draws from the posterior, by Hamiltonian Monte Carlo");
 DEFINE_int32(posterior_chains, 4, "of --posterior, each with a start of its own");
@@ -75,54 +78,6 @@ DEFINE_string(posterior_bands, "", "file of quantiles of predictions over draws 
 
 namespace tangible {
 namespace {
-
-/// "chain mass=20,friction=0.1" into the parameters; returns what is wrong or empty.
-std::string OverrideInitial(const std::string& text, std::vector<FitParameter>* parameters) {
-  std::set<std::string> given;
-  size_t begin = 0;
-  while (begin < text.size()) {
-    const size_t end = std::min(text.find(',', begin), text.size());
-    const std::string item = text.substr(begin, end - begin);
-    begin = end + 1;
-    const size_t equal = item.rfind('=');
-    double value = 0.0;
-    if (equal == std::string::npos || !ParseNumber(item.substr(equal + 1), &value)) {
-      return "expected name=value, got '" + item + "'";
-    }
-    const std::string name = item.substr(0, equal);
-    bool known = false;
-    for (FitParameter& parameter : *parameters) {
-      if (parameter.name == name) {
-        parameter.initial = value;
-        known = true;
-      }
-    }
-    if (!known) {
-      return "expected the name of a parameter, got '" + name + "'";
-    }
-    if (!given.insert(name).second) {
-      return "expected one value of each parameter, got two of '" + name + "'";
-    }
-  }
-  return "";
-}
-
-/// --profile into the options; returns what is wrong or empty.
-std::string ReadProfiles(const std::string& text, const RecordingsProblem& problem,
-                         FitOptions* options) {
-  for (size_t begin = 0; begin < text.size();) {
-    const size_t end = std::min(text.find(',', begin), text.size());
-    const std::string name = text.substr(begin, end - begin);
-    begin = end + 1;
-    const std::vector<ParameterEntry>& entries = problem.entries();
-    if (std::none_of(entries.begin(), entries.end(),
-                     [&name](const ParameterEntry& entry) { return entry.name == name; })) {
-      return "expected names of parameters, separated by commas, got '" + name + "'";
-    }
-    options->profiles.push_back(name);
-  }
-  return "";
-}
 
 std::string OverrideDerivatives(FitOptions* options) {
   if (FLAGS_derivatives.empty()) {
@@ -339,6 +294,7 @@ std::string Mismatch(const FitCheckpoint* checkpoint) {
 /// What a fit needs before it begins.
 struct Prepared {
   std::optional<PosteriorOptions> sampling;  ///< of --posterior
+  std::optional<DesignRequest> design;       ///< of --design
   FitFile fit;
   std::vector<std::vector<Observation>> held_back;  ///< of each recording, after --predict_from
   std::unique_ptr<RecordingsProblem> problem;
@@ -452,6 +408,16 @@ std::string SceneOverOther(const RecordingsProblem& problem) {
   return "";
 }
 
+/// --design; what is wrong or empty.
+std::string ReadDesign(Prepared* prepared) {
+  std::string text;
+  std::string error;
+  if (FLAGS_design.empty() || !ReadTextFile(FLAGS_design, &text, &error)) return error;
+  ParseDesign(text, FLAGS_design, prepared->fit.input, *prepared->problem,
+              &prepared->design.emplace(), &error);
+  return error;
+}
+
 /// Reads the file and the flags; the same.
 int Prepare(const std::string& text, const std::string& file, Prepared* prepared) {
   std::string error;
@@ -469,6 +435,8 @@ int Prepare(const std::string& text, const std::string& file, Prepared* prepared
   error = ReadProfiles(FLAGS_profile, *prepared->problem,
                        &prepared->fit.input.recordings.front().problem.options);
   if (!error.empty()) return ReportError("tangible-fit: --profile: " + error, kExitUsage);
+  error = ReadDesign(prepared);
+  if (!error.empty()) return ReportError(error);
   error = ReadPosterior(&prepared->sampling);
   if (!error.empty()) return ReportError("tangible-fit: " + error, kExitUsage);
   if (FLAGS_compare_motion && !HasFixedSteps(prepared->fit.input)) {
@@ -582,6 +550,10 @@ int Conclude(const Prepared& prepared, const FitResult& result, const FitFinding
   }
   if (findings.held_out != nullptr) {
     const std::string failure = FirstFailure(*findings.held_out);
+    if (!failure.empty()) return ReportError(file + ": " + failure);
+  }
+  if (findings.design != nullptr) {
+    const std::string failure = FirstFailure(*findings.design);
     if (!failure.empty()) return ReportError(file + ": " + failure);
   }
   // Said above: what was asked for is not there.
@@ -725,6 +697,14 @@ int Run(const std::string& text, const std::string& file, const ShardPlan& plan)
     findings.held_out = &*held_out;
     std::cout << Describe(*held_out);
   }
+  std::optional<Design> design;
+  if (prepared.design && estimated) {
+    error = MakeDesign(prepared.fit.input, *prepared.design, result.estimate,
+                       prepared.problem.get(), &design.emplace());
+    if (!error.empty()) return ReportError(file + ": --design: " + error);
+    findings.design = &*design;
+    std::cout << DescribeDesign(prepared.problem->entries(), *design);
+  }
   if (checkpoint != nullptr && !checkpoint->error().empty()) {
     ReportError(checkpoint->error() + ": the fit went on without its checkpoint");
   }
@@ -761,8 +741,9 @@ int Main(int argc, char** argv) {
            "FIT.json [--out=R.json] [--report=R.html] [--scene_out=S.json]\n"
            "                    [--predictions=P.csv] [--predict_from=T]\n"
            "                    [--discretisation_check] [--compare_motion] [--checkpoint=C.json]\n"
-           "                    [--profile=P1,P2] [--posterior=N] [--posterior_samples=P.csv]\n"
-           "                    [--posterior_scenes=FOLDER] [--posterior_bands=B.csv]\n"
+           "                    [--profile=P1,P2] [--design=D.json] [--posterior=N]\n"
+           "                    [--posterior_samples=P.csv] [--posterior_scenes=FOLDER]\n"
+           "                    [--posterior_bands=B.csv]\n"
            "                    [--shard=I/N | --merge=R0.json,R1.json,...]",
        .description =
            "Identifies parameters of a scene from observed positions by nonlinear least squares.\n"
@@ -772,6 +753,7 @@ int Main(int argc, char** argv) {
        .source_file = __FILE__,
        .outputs = {"out", "report", "scene_out", "predictions", "checkpoint", "posterior_samples",
                    "posterior_bands"},
+       .inputs = {"design"},
        .schema = [] { return JsonText(FitSchema()); }});
   if (line.exit_status) return *line.exit_status;
   if (FLAGS_max_iterations < 1) {

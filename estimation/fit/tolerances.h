@@ -132,5 +132,11 @@ inline constexpr double kInfiniteSpread = 1e6;
 /// Of the diagonal of an information matrix, scaled to 1: what is added to it first, and more where
 /// that is not enough, so that a direction without information has a finite deviation.
 inline constexpr double kLeastInformation = 1e-12;
+/// Of the largest eigenvalue of an information matrix with unit diagonal: directions with a smaller
+/// one are not determined. The matrix is a product of Jacobians whose own bound is 1e-9: what is
+/// below 1e-12 of it is rounding.
+inline constexpr double kDesignRank = 1e-12;
+/// Of the duration of a take: an observation that is later by less is at its end.
+inline constexpr double kSameTakeTime = 1e-9;
 
 }  // namespace tangible

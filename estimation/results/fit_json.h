@@ -39,6 +39,7 @@ bool ParseFit(const std::string& text, const std::string& file, FitFile* fit, st
 /// wrong with a parameter.
 std::unique_ptr<RecordingsProblem> MakeProblem(const FitFile& fit, std::string* error);
 
+struct Design;     // design.h
 struct Posterior;  // posterior.h
 
 /// What was found beside the estimates; each may be null.
@@ -48,6 +49,7 @@ struct FitFindings {
   const PredictedRecordings* later = nullptr;
   const Posterior* posterior = nullptr;
   const HeldOutRuns* held_out = nullptr;
+  const Design* design = nullptr;
 };
 
 /// The result as the program writes it.

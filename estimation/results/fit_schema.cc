@@ -123,6 +123,15 @@ OrderedJson RecordingSchema() {
 
 }  // namespace
 
+OrderedJson DesignSchema() {
+  OrderedJson values = {{"type", "object"}, {"additionalProperties", {{"type", "number"}}}};
+  OrderedJson wanted = {{"type", "object"}, {"additionalProperties", Positive()}};
+  const OrderedJson candidate = SchemaOfObject(
+      {{"values", values}, {"duration", Positive()}, {"camera", SchemaOfName()}}, {});
+  return SchemaOfObject({{"candidates", SchemaOfArray(candidate, 1)}, {"wanted", wanted}},
+                        {"candidates"});
+}
+
 OrderedJson FitSchema() {
   OrderedJson properties = SharedKeys();
   properties["recordings"] = SchemaOfArray(RecordingSchema(), 1);
@@ -139,6 +148,7 @@ OrderedJson FitSchema() {
   OrderedJson schema = SchemaOfObject(properties, {"parameters"});
   schema["oneOf"] = OrderedJson::array(
       {{{"required", {"recordings"}}}, {{"required", {"scene", "observations"}}}});
+  schema["$defs"] = {{"design", DesignSchema()}};
   return SchemaOfFile("a fit", schema);
 }
 

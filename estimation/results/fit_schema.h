@@ -10,4 +10,7 @@ namespace tangible {
 /// A schema that every fit file that is read satisfies (json_schema.h).
 OrderedJson FitSchema();
 
+/// Of the files that --design names; the schema of a fit has it as `$defs/design`.
+OrderedJson DesignSchema();
+
 }  // namespace tangible

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "tangible/estimation/fit/profile.h"
+#include "tangible/estimation/results/design_output.h"
 #include "tangible/estimation/results/posterior_output.h"
 #include "tangible/estimation/results/residual_summary.h"
 #include "tangible/render/html.h"
@@ -524,6 +525,7 @@ std::string FitReport(const std::string& title, const RecordingsProblem& problem
                    EstimateTable(entries, result) + Warnings(result.uncertainty) +
                    ProfilePlots(entries, result) +
                    (findings.posterior ? PosteriorPart(entries, *findings.posterior) : "") +
+                   (findings.design ? DesignPart(entries, *findings.design) : "") +
                    CombinationTable(result.uncertainty) + SpreadTable(findings.components) +
                    SummaryTable(result) + RecordingTable(problem, result) +
                    NoiseTable(findings.components) + RadiusTable(result.certificate) +

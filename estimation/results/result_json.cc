@@ -4,6 +4,7 @@
 #include <cmath>
 #include <map>
 
+#include "tangible/estimation/results/design_output.h"
 #include "tangible/estimation/results/fit_json.h"
 #include "tangible/estimation/results/posterior_output.h"
 #include "tangible/estimation/results/residual_summary.h"
@@ -408,6 +409,9 @@ OrderedJson ResultToJson(const RecordingsProblem& problem, const FitResult& resu
   }
   if (findings.posterior != nullptr) {
     json["posterior"] = PosteriorToJson(problem.entries(), *findings.posterior);
+  }
+  if (findings.design != nullptr) {
+    json["design"] = DesignToJson(problem.entries(), *findings.design);
   }
   if (findings.components != nullptr && !findings.components->noise.empty()) {
     json["sensor_noise"] = NoiseToJson(findings.components->noise);

@@ -15,6 +15,7 @@
 #include "tangible/app/row_archive.h"
 #include "tangible/estimation/fit/fit_checkpoint.h"
 #include "tangible/estimation/fit/fit_parts.h"
+#include "tangible/estimation/results/design_output.h"
 #include "tangible/estimation/results/fit_json.h"
 #include "tangible/estimation/results/fitted_scene.h"
 #include "tangible/estimation/results/prediction.h"
@@ -84,6 +85,7 @@ class FitProblemOf {
     std::string checkpoint;             // a file, or empty
     py::object on_iteration;            // called with a dict, or None
     std::vector<std::string> profiles;  // of these parameters
+    std::string design, design_name;    // a file of candidates as text, or empty
     Parts parts;
   };
 
@@ -135,6 +137,7 @@ class FitProblemOf {
     SetOptions(wanted.max_iterations, 0);
     SetProfiles(wanted.profiles);
     std::vector<std::vector<Observation>> held_back = HoldBack(wanted.predict_from);
+    const DesignRequest request = ReadDesign(wanted);
     const std::unique_ptr<FitCheckpoint> checkpoint = Open(wanted.checkpoint);
     FitParts parts = Read(wanted.parts);
     FitPartLogs logs(&parts);
@@ -168,6 +171,13 @@ class FitProblemOf {
     if (!fit_.held_out.empty() && any) {
       findings.held_out = &held_out.emplace(
           PredictHeldOut(fit_.input, *problem_, result.estimate, components.noise, fit_.held_out));
+    }
+    std::optional<Design> design;
+    if (!request.candidates.empty() && any) {
+      const std::string error =
+          MakeDesign(fit_.input, request, result.estimate, problem_.get(), &design.emplace());
+      if (!error.empty()) throw Error("design: " + error);
+      findings.design = &*design;
     }
     OrderedJson all = ResultToJson(*problem_, result, findings);
     all["certificate"] = any ? ToJson(result.certificate) : OrderedJson(nullptr);
@@ -206,6 +216,16 @@ class FitProblemOf {
         throw Error("profile: expected names of parameters, got " + name);
       }
     }
+  }
+
+  DesignRequest ReadDesign(const Wanted& wanted) {
+    DesignRequest request;
+    std::string error;
+    if (!wanted.design.empty() &&
+        !ParseDesign(wanted.design, wanted.design_name, fit_.input, *problem_, &request, &error)) {
+      throw Error(error);
+    }
+    return request;
   }
 
   static FitParts Read(const Parts& texts) {
@@ -342,13 +362,16 @@ void BindFit(py::module_* module) {
            [](FitProblemOf& fit, int max_iterations, double predict_from, bool discretisation_check,
               const std::string& checkpoint, const py::object& on_iteration,
               const std::vector<std::string>& profiles, const std::vector<std::string>& starts_done,
-              const std::vector<std::string>& profiles_done) {
+              const std::vector<std::string>& profiles_done, const std::string& design,
+              const std::string& design_name) {
              return fit.Run({max_iterations,
                              predict_from,
                              discretisation_check,
                              checkpoint,
                              on_iteration,
                              profiles,
+                             design,
+                             design_name,
                              {starts_done, profiles, profiles_done}});
            });
 }

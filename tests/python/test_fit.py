@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
+import subprocess
 from pathlib import Path
 
 import numpy as np
@@ -100,3 +102,47 @@ def test_recordings_share_what_they_have_in_common(tmp_path: Path) -> None:
         assert np.abs(difference - jacobian[:, k]).max() < 1e-5 * np.abs(jacobian[:, k]).max()
     # The second one weighs twice as much.
     assert np.abs(jacobian[101:, 3]).max() == pytest.approx(2**0.5 * np.abs(jacobian[:101, 1]).max())
+
+
+def test_the_next_experiment_is_designed(tmp_path: Path) -> None:
+    scene = tangible.Scene(simulation={"stepping": "event", "dt": 0.05, "duration": 1.0})
+    scene.add_body("ball", mass=2.0, inertia=1.0, position=[0, 0], velocity=[2, 3])
+    run = tangible.simulate(scene)
+    data = {"time": run.times, "y": run["ball/y"] + 0.01 * np.random.default_rng(0).normal(size=21)}
+    design = {"candidates": [{}, {"duration": 2.0}, {"values": {"bodies/ball/velocity/y": 9.0}}],
+              "wanted": {"gravity/y": 0.005}}
+    found = tangible.fit(scene, data, ["gravity/y"], sigma=0.01, design=design).design
+    # y = v t + g t^2 / 2 is observed: the information is the sum of (t^2 / 2 / sigma)^2.
+    information = [sum((0.5 * (0.05 * k) ** 2 / 0.01) ** 2 for k in range(n)) for n in (21, 21, 41, 21)]
+    widths = [2 * 1.959963984540054 / np.sqrt(information[0] + (one if k else 0.0)) for k, one in enumerate(information)]
+    assert found["widths"]["gravity/y"] == pytest.approx(widths[0])
+    assert [one["widths"]["gravity/y"] for one in found["candidates"]] == pytest.approx(widths[1:])
+    assert found["d_optimal"] == found["a_optimal"] == found["narrowest"]["gravity/y"] == 1
+    needed = ((2 * 1.959963984540054 / 0.005) ** 2 - information[0]) / np.array(information[1:])
+    assert [one["takes"]["gravity/y"] for one in found["candidates"]] == np.ceil(needed).tolist()
+    # The program's file, result, terminal and report.
+    (tmp_path / "design.json").write_text(json.dumps(design), encoding="utf-8")
+    scene.save(tmp_path / "scene.json")
+    rows = ["time,body,y"] + [f"{t:.17g},ball,{y:.17g}" for t, y in zip(data["time"], data["y"])]
+    (tmp_path / "seen.csv").write_text("\n".join(rows) + "\n", encoding="utf-8")
+    fit = {"scene": "scene.json", "parameters": ["gravity/y"], "observations": [{"file": "seen.csv", "sigma": {"y": 0.01}}]}
+    (tmp_path / "fit.json").write_text(json.dumps(fit), encoding="utf-8")
+    from_file = tangible.fit(tmp_path / "fit.json", design=tmp_path / "design.json")
+    assert from_file.design == found and "The next experiment" in from_file.report()
+    program = Path(os.environ.get("TANGIBLE_PROGRAMS", "nowhere")) / "tangible-fit"
+    if program.exists():
+        ran = subprocess.run([program, tmp_path / "fit.json", f"--design={tmp_path / 'design.json'}",
+                              f"--out={tmp_path / 'r.json'}"], capture_output=True, text=True, check=True)
+        assert json.loads((tmp_path / "r.json").read_text(encoding="utf-8"))["design"] == found
+        assert "D-optimal: candidate 1, A-optimal: candidate 1" in ran.stdout
+    for wrong, said in [
+        ({"candidates": []}, "^design: /candidates: expected at least one candidate, got none$"),
+        ({"candidates": [{"duration": -1}]}, "^design: /candidates/0/duration: expected a number > 0, got -1$"),
+        ({"candidates": [{"values": {"bodies/cube/mass": 1}}]}, "^design: /candidates/0: .*bodies/cube/mass"),
+        ({"candidates": [{"values": {"gravity/y": 1}}]}, "^design: /candidates/0: gravity/y: expected a number that is not"),
+        ({"candidates": [{"camera": "c"}]}, "^design: /candidates/0/camera: expected a camera of the fit, which has none"),
+        ({"candidates": [{}], "wanted": {"mass": 1}}, "^design: /wanted/mass: expected the name of a parameter"),
+        ({"candidates": [{"colour": 1}]}, "^design: /candidates/0/colour: unknown key"),
+    ]:
+        with pytest.raises(tangible.TangibleError, match=said):
+            tangible.fit(scene, data, ["gravity/y"], sigma=0.01, design=wrong)

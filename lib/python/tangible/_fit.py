@@ -20,7 +20,8 @@ from numpy.typing import ArrayLike, NDArray
 from . import _core, _executor
 from ._certificate import Certificate
 from ._plain import paths as names
-from ._problem import Problem, make, of_data
+from ._plain import plain
+from ._problem import Problem, make, of_data, text_of
 from ._rollout import floats
 from ._scene import Scene
 from ._warning import warn
@@ -245,6 +246,13 @@ class FitResult:
         return lines
 
     @property
+    def design(self) -> dict[str, Any]:
+        """What the candidates for the next experiment are worth: `widths` now, of each of
+        `candidates` its `widths`, `gain`, `takes`, ..., and which is `d_optimal`, `a_optimal`,
+        `narrowest` of each parameter; empty unless candidates were given."""
+        return dict(self.data.get("design") or {})
+
+    @property
     def covariance(self) -> Floats:
         """Shape (P, P), from the stated sigma; NaN where it is not determined."""
         rows = self.data["covariance"]
@@ -397,6 +405,7 @@ def fit(
     max_iterations: int = 50,
     predict_from: float | None = None,
     profile: Sequence[str] = (),
+    design: FitLike | None = None,
     discretisation_check: bool = False,
     checkpoint: str | os.PathLike[str] | None = None,
     callback: Callable[[dict[str, Any]], object] | None = None,
@@ -431,6 +440,9 @@ def fit(
             the report and in `predictions`.
         profile: Names of parameters whose profiles are computed: the fit with the parameter held, at
             values around; their intervals count where the cost is no parabola.
+        design: Candidates for the next experiment, as `tangible-fit --design` reads them: a file, or
+            {"candidates": [{"values": {path: number}, "duration": s, "camera": name}, ...],
+            "wanted": {parameter: width}}; what each would narrow stands in `FitResult.design`.
         discretisation_check: Whether it is fitted with half the step too, which shows its bias.
         checkpoint: A file that keeps the fit's evaluations: where the fit is interrupted, the same
             call goes on from it, with the same bits.
@@ -470,6 +482,11 @@ def fit(
     made = _problem(problem, data, parameters, sigma, points, recordings, folder, initial, keys)
     end = math.inf if predict_from is None else float(predict_from)
     profiles = names(profile, "profile")
+    candidates = ("", "")
+    if isinstance(design, Mapping):
+        candidates = (json.dumps(plain(design, "design")), "design")
+    elif design is not None:
+        candidates = (text_of(os.fspath(design)), os.fspath(design))
     try:
         starts_done, profiles_done = _parts(executor, made, max_iterations, end, profiles)
         with made.read() as core:
@@ -482,6 +499,7 @@ def fit(
                 profiles,
                 starts_done,
                 profiles_done,
+                *candidates,
             )
     finally:
         if progress:
