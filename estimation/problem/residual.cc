@@ -14,6 +14,7 @@
 #include "tangible/scene/parameter.h"
 #include "tangible/simulation/certificate/certify.h"
 #include "tangible/simulation/certificate/impact_times.h"
+#include "tangible/simulation/certificate/tolerances.h"
 #include "tangible/simulation/certificate/validity_radius.h"
 #include "tangible/simulation/derivatives/rollout_tangent.h"
 #include "tangible/simulation/gradient/difference_column.h"
@@ -205,10 +206,18 @@ void RolloutResiduals::AddRadii(const Eigen::VectorXd& p, Certificate* certifica
     ValidityRadius radius = ValidityRadiusOf(*scene_.model().structure, own, beside,
                                              std::max(std::abs(value), entry.scale));
     radius.parameter = entry.name;
-    if (value - radius.down < entry.lower) radius.down = HUGE_VAL;
-    if (value + radius.up > entry.upper) radius.up = HUGE_VAL;
-    if (std::isinf(radius.down)) radius.down_where.clear();
-    if (std::isinf(radius.up)) radius.up_where.clear();
+    const auto clip = [&](double sign, double* distance, std::string* where) {
+      Eigen::VectorXd moved = p;
+      double* const at = &moved[static_cast<Eigen::Index>(i)];
+      *at += sign * (1.0 + kRangeEnd) * *distance;
+      if (std::isfinite(*at) && *at >= entry.lower && *at <= entry.upper && scene_.Set(moved)) {
+        return;
+      }
+      *distance = HUGE_VAL;
+      where->clear();
+    };
+    clip(-1.0, &radius.down, &radius.down_where);
+    clip(1.0, &radius.up, &radius.up_where);
     found.radius.push_back(std::move(radius));
   }
   if (!SetParameters(p)) return;

@@ -90,6 +90,9 @@ inline constexpr double kSlackRounding = 1e-12;
 inline constexpr double kNoSlip = 1e-9;
 /// Of the parameter, or its scale: a change to first order that is farther tells nothing.
 inline constexpr double kFarthestRadius = 1e3;
+/// Of a radius: one that ends so near the end of the parameter's range is that end, as where a load
+/// vanishes with a mass.
+inline constexpr double kRangeEnd = 1e-6;
 /// Of the duration: how far behind its end a run by events goes on, to find events that a small
 /// change of a parameter would move into it.
 inline constexpr double kBehindEnd = 0.2;

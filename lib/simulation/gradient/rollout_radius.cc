@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tangible/simulation/certificate/tolerances.h"
 #include "tangible/simulation/certificate/validity_radius.h"
 #include "tangible/simulation/gradient/rollout_beside.h"
 
@@ -46,7 +47,10 @@ std::vector<ValidityRadius> RolloutWorker::Radii(const RolloutInput& input) {
         ValidityRadiusOf(*f_.structure_, own, beside, std::max(std::abs(value), parameter.scale));
     radius.parameter = parameter.path;
     const auto clip = [&](double sign, double* distance, std::string* where) {
-      if (std::isinf(*distance) || IsInRange(&scene_, parameter, sign * *distance)) return;
+      if (std::isinf(*distance) ||
+          IsInRange(&scene_, parameter, sign * (1.0 + kRangeEnd) * *distance)) {
+        return;
+      }
       *distance = HUGE_VAL;
       where->clear();
     };
