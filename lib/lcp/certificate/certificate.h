@@ -57,9 +57,9 @@ struct Certificate {
   std::string discrete_impact{};
   /// Of each parameter; empty where they were not asked for.
   std::vector<ValidityRadius> radius{};
-  /// By which factor the run multiplies the largest of all small changes of its start, with lengths,
-  /// and speeds over the duration, in units of the scene's size: 1.6 for a free flight, exp(λ T)
-  /// with the largest Lyapunov exponent λ where it is chaotic. NaN where it was not asked for.
+  /// By which factor the run multiplies the largest of all small changes of its start, with
+  /// lengths, and speeds over the duration, in units of the scene's size: 1.6 for a free flight,
+  /// exp(λ T) with the largest Lyapunov exponent λ where it is chaotic. NaN where not asked for.
   double growth = std::numeric_limits<double>::quiet_NaN();
   std::string verdict{};  ///< written by SetVerdict
 };

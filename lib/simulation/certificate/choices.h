@@ -4,9 +4,9 @@
 // The discrete choices of a run, and how far each is from its change.
 //
 //   fixed steps   the mode and the law of every contact of every step
-//   by events     the events of every contact, their order where bodies transmit impulses, the modes
-//                 of impacts, and that no event happens where none does: forces and slips of closed
-//                 contacts, gaps that turn around above 0
+//   by events     the events of every contact, their order where bodies transmit impulses, the
+//                 modes of impacts, and that no event happens where none does: forces and slips of
+//                 closed contacts, gaps that turn around above 0
 //
 // The derivative of a run is that of its choices: beside a change it is another one. Choices of two
 // runs are compared by their keys; each slack is a smooth function of the parameters as long as

@@ -28,8 +28,8 @@ bool ChoicesOf(const Model<double>& model, const Controls* controls, const State
 /// the run fails.
 using ChoicesAt = std::function<bool(double shift, ChoiceList* choices)>;
 
-/// The radius of one parameter without its name, of the size `size`, without regard to its range. Of a radius beyond
-/// kFarthestRadius of the size nothing is known: infinite.
+/// The radius of one parameter without its name, of the size `size`, without regard to its range.
+/// Of a radius beyond kFarthestRadius of the size nothing is known: infinite.
 ValidityRadius ValidityRadiusOf(const ModelStructure& structure, const ChoiceList& own,
                                 const ChoicesAt& choices_at, double size);
 

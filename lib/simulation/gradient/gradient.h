@@ -29,8 +29,8 @@
 namespace tangible {
 
 enum class CertificatePass { kRun, kSkip };
-/// Whether the certificate has the radius of validity of each parameter, which takes two more runs a
-/// parameter, and the growth of the flow.
+/// Whether the certificate has the radius of validity of each parameter, which takes two more runs
+/// a parameter, and the growth of the flow.
 enum class RadiusPass { kRun, kSkip };
 
 /// At a kink: one element of the generalised Jacobian (that of the modes found); or the derivative
