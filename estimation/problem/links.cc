@@ -135,7 +135,7 @@ std::vector<ParameterSet> SetsOf(const Scene& scene, const std::vector<BodyPoint
       for (const int side : {0, 1}) {
         if (moved.Has(joint.bodies[side])) sets.Move(path + "s/" + std::to_string(side));
       }
-    } else if (joint.type != JointType::kFixedAngle &&
+    } else if (joint.type != JointType::kFixedAngle && joint.type != JointType::kCoupling &&
                (static_cast<int>(j) == link.to_joint || moved.Has(joint.bodies[0]) ||
                 moved.Has(joint.bodies[1]))) {
       sets.Move(path);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tangible/app/view_recorder.h"
 
+#include "tangible/dynamics/elements/joint.h"
 #include "tangible/simulation/certificate/certify.h"
 #include "tangible/simulation/stepping/invariants.h"
 
@@ -22,7 +23,7 @@ ViewJoint MakeJoint(const Model<double>& model, const JointIndex& joint) {
   view.type = joint.type;
   view.bodies[0] = ViewIndex(*model.structure, joint.a);
   view.bodies[1] = ViewIndex(*model.structure, joint.b);
-  if (joint.type != JointType::kFixedAngle) {
+  if (HasAnchors(joint.type)) {
     view.anchors[0] = PointAt(model, joint.geometry);
     view.anchors[1] = PointAt(model, joint.geometry + 2);
   }

@@ -129,7 +129,7 @@ void AddJointForces(const Model<double>& model, const StepRecord& record, double
         wrench[i] += rows.row_a[k][i] * record.solution.joint_impulse[3 * j + k] / length;
       }
     }
-    if (joint.type != JointType::kFixedAngle) {
+    if (HasAnchors(joint.type)) {
       const Pose<double> pose = record.before.PoseOf(joint.a);
       const Vector2<double> anchor(model.parameters[joint.geometry],
                                    model.parameters[joint.geometry + 1]);

@@ -55,6 +55,9 @@ const char* Name(JointType type) {
       return "rope";
     case JointType::kFixedAngle:
       return "fixed_angle";
+    case JointType::kCoupling:
+    case JointType::kLimitedCoupling:
+      return "coupling";
     default:
       return "revolute";
   }

@@ -113,8 +113,9 @@ function legend() {
                                  g.quadraticCurveTo(15, 18, 25, 5); g.stroke();
                                  for (const x of [5, 25]) { disc(g, [x, 5], 2.2); g.fill(); } },
                   fixed_angle: (g) => { g.strokeStyle = colours.text; g.setLineDash([2, 4]); line(g, [2, 9], [28, 9]); }};
+  joints.coupling = joints.fixed_angle;
   for (const type of Object.keys(joints)) {
-    if (view.joints.some((joint) => joint.type === type)) add(type.replace("_", " ") + " joint", joints[type]);
+    if (view.joints.some((joint) => joint.type === type)) add(type === "coupling" ? type : type.replace("_", " ") + " joint", joints[type]);
   }
   if (view.joints.some((joint) => joint.motor)) {
     add("motor", (g) => { g.strokeStyle = colours.text; disc(g, [15, 9], 7); g.stroke(); });

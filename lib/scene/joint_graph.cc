@@ -93,6 +93,7 @@ std::vector<JointPlace> ClassifyJoints(const BasicScene<T>& scene) {
   for (const BasicJoint<T>& joint : scene.joints) {
     const int first = node(joint.bodies[0]);
     // A rope holds nothing in its place: it is an edge from a node to itself, which is no bridge.
+    // So is a coupling, which has no bodies of its own: joints that it couples can be turned.
     const bool is_rope = joint.type == JointType::kDistance && joint.limits;
     edges.push_back({first, is_rope ? first : node(joint.bodies[1])});
   }

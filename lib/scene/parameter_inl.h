@@ -250,6 +250,7 @@ BasicScene<T> CastScene(const Scene& scene) {
     joint.name = from.name;
     joint.type = from.type;
     std::copy_n(from.bodies, 2, joint.bodies);
+    std::copy_n(from.coupled, 2, joint.coupled);
     joint.effort_signal = from.effort_signal;
     joint.contact = from.contact;
     cast(from, &joint, [](auto& item, auto* visitor) { VisitJoint(item, true, visitor); });

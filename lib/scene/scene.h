@@ -75,8 +75,18 @@ struct BasicBody {
   std::optional<T> quadratic_drag;  ///< N s²/m², ≥ 0: force −c |v| v
 };
 
-/// kRope is what a model makes of a distance joint with limits, which keeps no distance.
-enum class JointType { kRevolute, kPrismatic, kWeld, kDistance, kFixedAngle, kRope };
+/// kRope is what a model makes of a distance joint with limits, which keeps no distance, and
+/// kLimitedCoupling what it makes of a coupling with limits.
+enum class JointType {
+  kRevolute,
+  kPrismatic,
+  kWeld,
+  kDistance,
+  kFixedAngle,
+  kCoupling,
+  kRope,
+  kLimitedCoupling
+};
 
 /// A series (time, value) read from a file, which a force, torque or effort follows instead of a
 /// constant.
@@ -108,6 +118,8 @@ struct BasicMotor {
 ///   kDistance   anchors[0] on bodies[0], anchors[1] on bodies[1]; limits (m) take the place of the
 ///               distance as drawn
 ///   kFixedAngle none
+///   kCoupling   coupled and ratio in place of bodies: keeps coordinate(coupled[0]) + ratio ·
+///               coordinate(coupled[1]) as it is at time 0, or within limits of it (coupling.h)
 template <typename T>
 struct BasicJoint {
   std::string name;
@@ -118,6 +130,8 @@ struct BasicJoint {
   T angle{0.0};
   T rate{0.0};
   T damping{0.0};
+  int coupled[2] = {-1, -1};              ///< of a coupling: index into BasicScene::joints
+  T ratio{1.0};                           ///< of a coupling
   std::optional<std::pair<T, T>> limits;  ///< an infinite one limits nothing
   std::optional<T> limit_restitution;     ///< of impacts at the limits, 0 to 1; absent: 0
   std::optional<T> stiffness;  ///< of a spring along the coordinate: −k (coordinate − rest)

@@ -194,7 +194,10 @@ void VisitJoint(Joint& joint, bool turns, Visitor* visitor) {
   constexpr NumberKind kFree = NumberKind::kFree;
   constexpr NumberKind kNonNegative = NumberKind::kNonNegative;
   const bool slides = joint.type == JointType::kPrismatic;
-  if (joint.type == JointType::kDistance) {
+  if (joint.type == JointType::kCoupling) {
+    visitor->Number({"ratio", kFree, Dimension::kNone, true}, joint.ratio);
+    VisitLimits(joint, kFree, Dimension::kNone, visitor);
+  } else if (joint.type == JointType::kDistance) {
     visitor->Anchors({"anchors", kFree, Dimension::kLength, true}, joint.anchors);
     VisitLimits(joint, kNonNegative, Dimension::kLength, visitor);
   } else if (joint.type != JointType::kFixedAngle) {

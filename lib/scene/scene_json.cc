@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tangible/scene/scene_json.h"
 
+#include <algorithm>
 #include <cstddef>
 #include <map>
 #include <memory>
@@ -82,7 +83,10 @@ class SceneReader {
     FieldReader(root).Point(kGravityField, scene_->gravity);
     ReadAll(root.At("bodies"), "an array of bodies", &SceneReader::ReadBody);
     ReadOptional(root, "joints", &SceneReader::ReadJoint);
+    ReadCoupled(root.At("joints"));
     if (root.ok()) CheckInitialAngles(*scene_, root.At("joints"));
+    if (root.ok()) CheckCouplings(*scene_, root.At("joints"));
+    if (root.ok()) CheckCoupledRates(*scene_, root.At("joints"));
     if (root.ok()) CheckRopes(*scene_, root.At("joints"));
     ReadOptional(root, "springs", &SceneReader::ReadSpring);
     ReadOptional(root, "forces", &SceneReader::ReadForce);
@@ -163,6 +167,7 @@ class SceneReader {
 
   void ReadBody(const JsonReader& item);
   void ReadJoint(const JsonReader& item);
+  void ReadCoupled(const JsonReader& joints);
   void ReadSpring(const JsonReader& item);
   void ReadForce(const JsonReader& item);
   void ReadPair(const JsonReader& item);
@@ -216,17 +221,38 @@ void SceneReader::ReadJoint(const JsonReader& item) {
   BasicJoint<double> joint;
   joint.type = item.At("type").Choice(kJointTypeNames);
   if (!item.ok()) return;
-  FieldKeys fields({"name", "type", "bodies", "contact"});
+  const bool couples = joint.type == JointType::kCoupling;
+  FieldKeys fields({"name", "type", couples ? "joints" : "bodies", "contact"});
   VisitJoint(joint, true, &fields);
   item.ExpectKeys(fields.keys(), " of a " + NameOf(joint.type, kJointTypeNames) + " joint");
   if (!item.ok()) return;
   joint.name = ReadName(item);
-  ReadEnds(item, joint.bodies);
+  if (!couples) ReadEnds(item, joint.bodies);
   FieldReader reader(item, Signals());
   VisitJoint(joint, true, &reader);
   reader.Flag("contact", joint.contact);
   if (item.ok()) CheckJoint(joint, item);
   scene_->joints.push_back(std::move(joint));
+}
+
+// The joints that couplings name, which may stand after them.
+void SceneReader::ReadCoupled(const JsonReader& joints) {
+  for (std::size_t i = 0; i < scene_->joints.size() && joints.ok(); ++i) {
+    BasicJoint<double>& coupling = scene_->joints[i];
+    if (coupling.type != JointType::kCoupling) continue;
+    const JsonReader names = joints.At(static_cast<int>(i)).At("joints");
+    if (names.Size() != 2) return names.FailExpected("an array of 2 names of joints");
+    for (int k = 0; k < 2; ++k) {
+      const std::string name = names.At(k).String();
+      if (!names.ok()) return;
+      const auto place = std::find_if(scene_->joints.begin(), scene_->joints.end(),
+                                      [&name](const auto& joint) { return joint.name == name; });
+      if (place == scene_->joints.end()) {
+        return names.At(k).Fail("expected the name of a joint, got " + Describe(Json(name)));
+      }
+      coupling.coupled[k] = static_cast<int>(place - scene_->joints.begin());
+    }
+  }
 }
 
 void SceneReader::ReadSpring(const JsonReader& item) {

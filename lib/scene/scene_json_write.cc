@@ -141,9 +141,13 @@ class SceneWriter {
     json["bodies"] = OrderedJson::array();
     for (const auto& body : scene_.bodies) json["bodies"].push_back(BodyJson(body));
     for (const auto& joint : scene_.joints) {
-      OrderedJson item = {{"name", joint.name},
-                          {"type", NameOf(joint.type, kJointTypeNames)},
-                          {"bodies", EndsJson(joint.bodies)}};
+      OrderedJson item = {{"name", joint.name}, {"type", NameOf(joint.type, kJointTypeNames)}};
+      if (joint.type == JointType::kCoupling) {
+        item["joints"] = {scene_.joints[joint.coupled[0]].name,
+                          scene_.joints[joint.coupled[1]].name};
+      } else {
+        item["bodies"] = EndsJson(joint.bodies);
+      }
       FieldWriter writer(&item);
       VisitJoint(joint, true, &writer);
       item["contact"] = joint.contact;

@@ -16,7 +16,8 @@ inline constexpr std::pair<const char*, JointType> kJointTypeNames[] = {
     {"prismatic", JointType::kPrismatic},
     {"weld", JointType::kWeld},
     {"distance", JointType::kDistance},
-    {"fixed_angle", JointType::kFixedAngle}};
+    {"fixed_angle", JointType::kFixedAngle},
+    {"coupling", JointType::kCoupling}};
 inline constexpr std::pair<const char*, ShapeType> kShapeTypeNames[] = {
     {"circle", ShapeType::kCircle},    {"ellipse", ShapeType::kEllipse},
     {"box", ShapeType::kBox},          {"capsule", ShapeType::kCapsule},

@@ -188,11 +188,12 @@ OrderedJson JointSchema() {
     joint.type = type;
     FieldSchema fields;
     VisitJoint(joint, true, &fields);
+    const char* const ends = type == JointType::kCoupling ? "joints" : "bodies";
     types.push_back(fields.Item({{"name", SchemaOfName()},
                                  {"type", {{"const", name}}},
-                                 {"bodies", EndsSchema()},
+                                 {ends, EndsSchema()},
                                  {"contact", SchemaOfFlag()}},
-                                {"name", "type", "bodies"}));
+                                {"name", "type", ends}));
   }
   return {{"type", "object"}, {"oneOf", types}};
 }

@@ -19,5 +19,8 @@ inline constexpr double kSlenderEllipse = 1e-9;
 /// Of the distance of a rope's ends: a rope that starts longer than its limit by less starts taut,
 /// because lengths are written with rounding.
 inline constexpr double kRopeRounding = 1e-9;
+/// Of the sum of the magnitudes of the rates that a coupling adds: their sum may be off from 0 by
+/// this much, because rates are written with rounding.
+inline constexpr double kCoupledRates = 1e-9;
 
 }  // namespace tangible

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tangible/scene/validate.h"
 
+#include <cmath>
 #include <cstddef>
 #include <limits>
 #include <memory>
@@ -9,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "tangible/scene/coupling.h"
 #include "tangible/scene/joint_graph.h"
 #include "tangible/scene/scene_fields.h"
 #include "tangible/scene/scene_json.h"
@@ -192,6 +194,56 @@ void CheckRopes(const Scene& scene, const JsonReader& joints) {
   }
 }
 
+void CheckCouplings(const Scene& scene, const JsonReader& joints) {
+  const auto names_a_joint = [&scene](int joint) {
+    return joint >= 0 && joint < static_cast<int>(scene.joints.size());
+  };
+  for (std::size_t i = 0; i < scene.joints.size(); ++i) {
+    const BasicJoint<double>& joint = scene.joints[i];
+    if (joint.type != JointType::kCoupling) continue;
+    const JsonReader place = joints.At(static_cast<int>(i)).At("joints");
+    if (!names_a_joint(joint.coupled[0]) || !names_a_joint(joint.coupled[1])) {
+      return place.Fail("expected two joints of the scene, got one that it does not have");
+    }
+    if (joint.coupled[0] == joint.coupled[1]) {
+      return place.Fail("expected two different joints, got " +
+                        scene.joints[joint.coupled[0]].name + " twice");
+    }
+    const std::string fault = FormOf(scene, joint).fault;
+    if (!fault.empty()) return place.Fail(fault);
+  }
+}
+
+void CheckCoupledRates(const Scene& scene, const JsonReader& joints) {
+  for (std::size_t i = 0; i < scene.joints.size(); ++i) {
+    const BasicJoint<double>& coupling = scene.joints[i];
+    if (coupling.type != JointType::kCoupling || coupling.limits) continue;
+    // The rates of coordinates: those of the bodies as drawn, which other joints' rates do not
+    // change, and the joint's own.
+    const CouplingForm<double> form = FormOf(scene, coupling);
+    const double rates[2] = {scene.joints[coupling.coupled[0]].rate,
+                             coupling.ratio * scene.joints[coupling.coupled[1]].rate};
+    double sum = rates[0] + rates[1];
+    double size = std::abs(rates[0]) + std::abs(rates[1]);
+    bool follows_path = false;
+    for (int k = 0; k < 2; ++k) {
+      const BasicBody<double>& body = scene.bodies[form.bodies[k]];
+      follows_path = follows_path || body.driven.has_value();
+      const double twist[3] = {body.velocity.x(), body.velocity.y(), body.angular_velocity};
+      for (int c = 0; c < 3; ++c) {
+        sum += form.row[k][c] * twist[c];
+        size += std::abs(form.row[k][c] * twist[c]);
+      }
+    }
+    if (follows_path || std::abs(sum) <= kCoupledRates * size) continue;
+    joints.At(static_cast<int>(i))
+        .Fail("expected initial rates with rate(" + scene.joints[coupling.coupled[0]].name +
+              ") + ratio * rate(" + scene.joints[coupling.coupled[1]].name + ") = 0, got " +
+              Json(sum).dump());
+    return;
+  }
+}
+
 void CheckForce(const BasicForce<double>& force, const JsonReader& place) {
   if (force.start && force.end && *force.start > *force.end) {
     place.At("end").FailExpected("a number >= start, which is " + Json(*force.start).dump(),
@@ -252,6 +304,7 @@ std::string Validate(const Scene& scene, const std::string& name) {
     CheckJoint(joint, item);
   });
   if (errors.ok()) CheckInitialAngles(scene, root.At("joints"));
+  if (errors.ok()) CheckCouplings(scene, root.At("joints"));
   each("springs", scene.springs, [](const auto& spring, const JsonReader&, RangeCheck* ranges) {
     VisitSpring(spring, ranges);
   });

@@ -30,6 +30,11 @@ void CheckFrictionDecay(const std::optional<double>& kinetic, double friction,
 /// Whether ropes (distance joints with limits) start within their limits. A fit may move a limit
 /// beyond the distance at the start, so that only the reader of a scene demands this.
 void CheckRopes(const Scene& scene, const JsonReader& joints);
+/// Whether each coupling is of two joints that can be coupled (coupling.h).
+void CheckCouplings(const Scene& scene, const JsonReader& joints);
+/// Whether the initial rates obey the couplings that are kept, as CheckRopes where a scene is read:
+/// a fit may move a rate. Bodies that follow a recorded path are not looked at.
+void CheckCoupledRates(const Scene& scene, const JsonReader& joints);
 
 /// Whether a path has the columns that are offset; only the reader of a scene demands this, because
 /// a number without an effect may be varied.

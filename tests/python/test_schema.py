@@ -35,7 +35,8 @@ SCENE: dict[str, Any] = {
         {"name": f"b{i}", "shape": shape, "mass": 1, "position": [3 * i, 0]} for i, shape in enumerate(SHAPES)
     ]
     + [{"name": "floor", "static": True, "shape": {"half_plane": {"normal": [0, 1], "offset": -9}}}],
-    "joints": [{"name": f"j{i}", "bodies": [f"b{i}", "world"], **joint} for i, joint in enumerate(JOINTS)],
+    "joints": [{"name": f"j{i}", "bodies": [f"b{i}", "world"], **joint} for i, joint in enumerate(JOINTS)]
+    + [{"name": "c", "type": "coupling", "joints": ["j0", "j1"], "ratio": 2, "limits": [None, 0.1]}],
     "springs": [
         {"name": "s", "bodies": ["b0", "b1"], "anchors": [[0, 0], [1, 0]], "stiffness": 1, "rest_length": 1}
     ],

@@ -24,19 +24,22 @@ struct BadScene {
   std::string message;  // after "bad.json: "
 };
 
-std::string ErrorOf(const std::string& pointer, const std::string& value) {
-  Json json = Json::parse(kFullScene);
-  const Json::json_pointer place(pointer);
-  if (value == kRemove) {
-    json = json.patch(Json::array({{{"op", "remove"}, {"path", pointer}}}));
+std::string ErrorIn(const char* good, const BadScene& bad) {
+  Json json = Json::parse(good);
+  if (bad.value == kRemove) {
+    json = json.patch(Json::array({{{"op", "remove"}, {"path", bad.pointer}}}));
   } else {
-    json[place] = Json::parse(value);
+    json[Json::json_pointer(bad.pointer)] = Json::parse(bad.value);
   }
   Scene scene;
   std::string error;
   EXPECT_FALSE(ParseScene(json.dump(), "bad.json", ::testing::TempDir(), &scene, &error))
-      << pointer << " " << value;
+      << bad.pointer << " " << bad.value;
   return error;
+}
+
+std::string ErrorOf(const std::string& pointer, const std::string& value) {
+  return ErrorIn(kFullScene, {pointer, value, ""});
 }
 
 void Check(const std::vector<BadScene>& cases) {
@@ -219,6 +222,57 @@ TEST(BadSceneTest, Shapes) {
   });
 }
 
+constexpr char kGears[] = R"({"bodies": [
+    {"name": "a", "mass": 1, "inertia": 1, "position": [0, 0]},
+    {"name": "b", "mass": 1, "inertia": 1, "position": [0, 0]},
+    {"name": "c", "mass": 1, "inertia": 1, "position": [0, 0]}],
+  "joints": [
+    {"name": "gear", "type": "coupling", "joints": ["p", "q"], "ratio": 2},
+    {"name": "p", "type": "revolute", "bodies": ["a", "world"], "anchor": [0, 0], "rate": 1},
+    {"name": "q", "type": "revolute", "bodies": ["b", "world"], "anchor": [0, 0], "rate": -0.5},
+    {"name": "r", "type": "revolute", "bodies": ["c", "b"], "anchor": [0, 0]},
+    {"name": "s", "type": "prismatic", "bodies": ["c", "b"], "anchor": [0, 0], "axis": [1, 0]},
+    {"name": "w", "type": "fixed_angle", "bodies": ["c", "b"]}]})";
+
+TEST(BadSceneTest, Couplings) {
+  Scene scene;
+  std::string error;
+  ASSERT_TRUE(ParseScene(kGears, "gears.json", ::testing::TempDir(), &scene, &error)) << error;
+  EXPECT_EQ(scene.joints[0].coupled[0], 1);
+  EXPECT_EQ(scene.joints[0].coupled[1], 2);
+  EXPECT_EQ(scene.joints[0].ratio, 2.0);
+  const std::vector<BadScene> cases = {
+      {"/joints/0/joints", "[\"p\", \"p\"]",
+       "/joints/0/joints: expected two different joints, got p twice"},
+      {"/joints/0/joints", "[\"p\", \"gear\"]",
+       "/joints/0/joints: expected revolute or prismatic joints, got gear, which is neither"},
+      {"/joints/0/joints", "[\"p\", \"w\"]",
+       "/joints/0/joints: expected revolute or prismatic joints, got w, which is neither"},
+      {"/joints/0/joints", "[\"p\", \"z\"]",
+       "/joints/0/joints/1: expected the name of a joint, got \"z\""},
+      {"/joints/0/joints", "[\"p\"]",
+       "/joints/0/joints: expected an array of 2 names of joints, got an array of 1"},
+      {"/joints/0/joints", kRemove,
+       "/joints/0/joints: missing, expected an array of 2 names of joints"},
+      {"/joints/0/joints", "[\"p\", \"r\"]",
+       "/joints/0/joints: expected joints that hold two moving bodies in all, got three or four"},
+      {"/joints/0/joints", "[\"q\", \"s\"]",
+       "/joints/0/joints: expected sliders against the world or a static body, got s between two "
+       "bodies that move"},
+      {"/joints/2/rate", "0.5",
+       "/joints/0: expected initial rates with rate(p) + ratio * rate(q) = 0, got 2.0"},
+      {"/joints/0/ratio", kRemove, "/joints/0/ratio: missing, expected a number"},
+      {"/joints/0/bodies", "[\"a\", \"b\"]",
+       "/joints/0/bodies: unknown key of a coupling joint, expected one of name, type, joints, "
+       "contact, ratio, limits, limit_restitution, got \"bodies\""}};
+  for (const BadScene& c : cases) EXPECT_EQ(ErrorIn(kGears, c), "bad.json: " + c.message);
+  // Play leaves the rates free.
+  Json play = Json::parse(kGears);
+  play["joints"][2]["rate"] = 3.0;
+  play["joints"][0]["limits"] = {-0.1, 0.1};
+  EXPECT_TRUE(ParseScene(play.dump(), "play.json", ::testing::TempDir(), &scene, &error)) << error;
+}
+
 TEST(BadSceneTest, Joints) {
   Check({
       {"/joints/0/bodies/0", "\"bal\"",
@@ -234,10 +288,12 @@ TEST(BadSceneTest, Joints) {
        "/joints/0/bodies: expected at least one moving body, got two that are static, kinematic or "
        "world"},
       {"/joints/0/type", "\"hinge\"",
-       "/joints/0/type: expected one of revolute, prismatic, weld, distance, fixed_angle, got "
-       "\"hinge\""},
+       "/joints/0/type: expected one of revolute, prismatic, weld, distance, fixed_angle, "
+       "coupling, "
+       "got \"hinge\""},
       {"/joints/0/type", kRemove,
-       "/joints/0/type: missing, expected one of revolute, prismatic, weld, distance, fixed_angle"},
+       "/joints/0/type: missing, expected one of revolute, prismatic, weld, distance, fixed_angle, "
+       "coupling"},
       {"/joints/0/displacement", "0",
        "/joints/0/displacement: unknown key of a revolute joint, expected one of name, type, "
        "bodies, contact, anchor, angle, rate, damping, limits, limit_restitution, friction, "

@@ -9,11 +9,13 @@
 //   kDistance    C = |p_a − p_b| − L                            (1 row)
 //   kFixedAngle  C = θ_a − θ_b − θ0                             (1 row)
 //
-//   kRope        none                                           (0 rows)
+//   kCoupling    C = g_a·q_a + g_b·q_b − c                      (1 row)
+//
+//   kRope, kLimitedCoupling  none                               (0 rows)
 //
 // p: the anchors of each body. The coordinate of a revolute joint is θ_a − θ_b − θ0, of a prismatic
-// one u·(p_a − p_b), of a rope |p_a − p_b|; efforts, damping, friction, motors and limits act along
-// its row. One file a type: joint_*_inl.h.
+// one u·(p_a − p_b), of a rope |p_a − p_b|, of a coupling with limits C; efforts, damping,
+// friction, motors and limits act along its row. One file a type: joint_*_inl.h.
 
 #include "tangible/dynamics/model/model.h"
 #include "tangible/lcp/system/contact_problem.h"
@@ -31,7 +33,14 @@ struct JointRows {
 
 /// Whether a joint has a coordinate, along which limits act.
 inline bool HasCoordinate(JointType type) {
-  return type == JointType::kRevolute || type == JointType::kPrismatic || type == JointType::kRope;
+  return type == JointType::kRevolute || type == JointType::kPrismatic ||
+         type == JointType::kRope || type == JointType::kLimitedCoupling;
+}
+
+/// Whether its geometry begins with an anchor in each body's frame.
+inline bool HasAnchors(JointType type) {
+  return type != JointType::kFixedAngle && type != JointType::kCoupling &&
+         type != JointType::kLimitedCoupling;
 }
 
 /// Evaluates a joint at two poses; `numbers` as JointIndex describes its geometry. A distance joint

@@ -54,7 +54,7 @@ void EvaluateJointCurvature(JointType type, const Pose<T>& pose_a, const Pose<T>
   std::fill_n(out->aa, 9, T(0.0));
   std::fill_n(out->ab, 9, T(0.0));
   std::fill_n(out->bb, 9, T(0.0));
-  if (type == JointType::kFixedAngle) {
+  if (type == JointType::kFixedAngle || type == JointType::kCoupling) {
     return;
   }
   const Vector2<T> arm_a = pose_a.rotation * Vector2<T>(numbers[0], numbers[1]);
@@ -88,7 +88,9 @@ void EvaluateJointCurvature(JointType type, const Pose<T>& pose_a, const Pose<T>
       break;
     }
     case JointType::kFixedAngle:
+    case JointType::kCoupling:
     case JointType::kRope:
+    case JointType::kLimitedCoupling:
       break;
   }
 }

@@ -5,6 +5,7 @@
 // another scalar.
 
 #include "tangible/dynamics/elements/joint.h"
+#include "tangible/dynamics/elements/joint_coupling_inl.h"
 #include "tangible/dynamics/elements/joint_distance_inl.h"
 #include "tangible/dynamics/elements/joint_fixed_angle_inl.h"
 #include "tangible/dynamics/elements/joint_prismatic_inl.h"
@@ -31,6 +32,10 @@ void EvaluateJoint(JointType type, const Pose<T>& pose_a, const Pose<T>& pose_b,
       break;
     case JointType::kRope:
       EvaluateRope(pose_a, pose_b, numbers, out);
+      break;
+    case JointType::kCoupling:
+    case JointType::kLimitedCoupling:
+      EvaluateCoupling(type, pose_a, pose_b, numbers, out);
       break;
     case JointType::kFixedAngle:
       EvaluateAngleRow(pose_a, pose_b, numbers[0], 0, out);

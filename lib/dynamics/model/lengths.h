@@ -56,6 +56,11 @@ inline bool IsAngle(JointType type, int k) {
          (type == JointType::kPrismatic && k == 1);
 }
 
+/// The same of the joint itself: the error of a coupling is of the kind of its coordinate.
+inline bool IsAngle(const JointIndex& joint, int k) {
+  return joint.type == JointType::kCoupling ? joint.is_angular : IsAngle(joint.type, k);
+}
+
 class Lengths {
  public:
   explicit Lengths(const Model<double>& model);
@@ -88,9 +93,8 @@ class Lengths {
   }
   /// Distance below which a joint is at its limit, rad, or m where it is a length.
   double LimitTouch(const State<double>& state, const JointIndex& joint) const {
-    return joint.type != JointType::kRevolute
-               ? Touch(state, joint.a, joint.b)
-               : kTouchAngle + kCoordinateRounding * AngleOf(state, joint.a, joint.b);
+    return !joint.is_angular ? Touch(state, joint.a, joint.b)
+                             : kTouchAngle + kCoordinateRounding * AngleOf(state, joint.a, joint.b);
   }
 
  private:

@@ -10,6 +10,7 @@
 #include "tangible/dynamics/model/model_seams.h"
 #include "tangible/geometry/mass_properties.h"
 #include "tangible/math/disjoint_sets.h"
+#include "tangible/scene/coupling.h"
 
 namespace tangible {
 namespace {
@@ -17,6 +18,8 @@ namespace {
 int NumGeometryNumbers(JointType type) {
   switch (type) {
     case JointType::kPrismatic:
+    case JointType::kCoupling:
+    case JointType::kLimitedCoupling:
       return 7;
     case JointType::kFixedAngle:
       return 1;
@@ -31,8 +34,10 @@ int NumRows(JointType type) {
       return 3;
     case JointType::kDistance:
     case JointType::kFixedAngle:
+    case JointType::kCoupling:
       return 1;
     case JointType::kRope:
+    case JointType::kLimitedCoupling:
       return 0;
     default:
       return 2;
@@ -104,15 +109,54 @@ bool Limits(const T& limit) {
   return std::isfinite(ValueOf(limit));
 }
 
+// The type of a joint in a model.
+template <typename T>
+JointType ModelType(const BasicJoint<T>& joint) {
+  if (!joint.limits) return joint.type;
+  return joint.type == JointType::kDistance   ? JointType::kRope
+         : joint.type == JointType::kCoupling ? JointType::kLimitedCoupling
+                                              : joint.type;
+}
+
+// Whether rows of joints may be dependent. All fixed bodies are one node of a graph in which a
+// joint may close a cycle. Where none does, the coordinates of the joints are independent, and
+// couplings are if they close no cycle among these.
+template <typename T>
+bool HasJointLoops(const BasicScene<T>& scene, const ModelStructure& structure) {
+  DisjointSets nodes, coordinates;
+  nodes.AddAll(structure.bodies.size());
+  coordinates.AddAll(structure.joints.size());
+  const auto node = [&](int body) {
+    return structure.bodies[body].block >= 0 ? body : structure.world();
+  };
+  bool loops = false;
+  for (size_t j = 0; j < structure.joints.size(); ++j) {
+    const JointIndex& joint = structure.joints[j];
+    if (joint.rows == 0) continue;
+    const int* coupled = scene.joints[j].coupled;
+    const bool joins = joint.type == JointType::kCoupling
+                           ? coordinates.Join(coupled[0], coupled[1])
+                           : nodes.Join(node(joint.a), node(joint.b));
+    loops = loops || !joins;
+  }
+  return loops;
+}
+
 template <typename T>
 void AddJoints(const BasicScene<T>& scene, Places* places, ModelStructure* structure) {
   const int world = structure->world();
   for (const BasicJoint<T>& joint : scene.joints) {
     JointIndex index;
     index.name = joint.name;
-    index.type = joint.type == JointType::kDistance && joint.limits ? JointType::kRope : joint.type;
-    index.a = joint.bodies[0] < 0 ? world : joint.bodies[0];
-    index.b = joint.bodies[1] < 0 ? world : joint.bodies[1];
+    index.type = ModelType(joint);
+    index.is_angular = joint.type == JointType::kRevolute;
+    int ends[2] = {joint.bodies[0], joint.bodies[1]};
+    if (joint.type == JointType::kCoupling) {
+      std::copy_n(FormOf(scene, joint).bodies, 2, ends);
+      index.is_angular = scene.joints[joint.coupled[0]].type == JointType::kRevolute;
+    }
+    index.a = ends[0] < 0 ? world : ends[0];
+    index.b = ends[1] < 0 ? world : ends[1];
     index.rows = NumRows(index.type);
     index.num_geometry = NumGeometryNumbers(index.type);
     index.geometry = places->Take(index.num_geometry);
@@ -139,14 +183,7 @@ void AddJoints(const BasicScene<T>& scene, Places* places, ModelStructure* struc
     }
   }
   std::sort(structure->joined.begin(), structure->joined.end());
-  // All fixed bodies are one node of the graph; a joint that closes a cycle may have dependent
-  // rows.
-  DisjointSets nodes;
-  nodes.AddAll(structure->bodies.size());
-  const auto node = [&](int body) { return structure->bodies[body].block >= 0 ? body : world; };
-  for (const JointIndex& joint : structure->joints) {
-    if (joint.rows > 0 && !nodes.Join(node(joint.a), node(joint.b))) structure->joint_loops = true;
-  }
+  structure->joint_loops = HasJointLoops(scene, *structure);
 }
 
 template <typename T>
@@ -252,30 +289,44 @@ void FillBodies(const BasicScene<T>& scene, std::vector<T>* numbers) {
   }
 }
 
+// The geometry of a joint as JointIndex lists it. The value of a coupling at time 0 is set where
+// joints have been turned.
+template <typename T>
+void FillGeometry(const BasicScene<T>& scene, const BasicJoint<T>& joint, const State<T>& drawn,
+                  int world, std::vector<T>* numbers) {
+  using std::sqrt;
+  if (joint.type == JointType::kCoupling) {
+    const CouplingForm<T> form = FormOf(scene, joint);
+    for (const auto& row : form.row) numbers->insert(numbers->end(), row, row + 3);
+    numbers->push_back(T(0.0));
+    return;
+  }
+  const int a = joint.bodies[0] < 0 ? world : joint.bodies[0];
+  const int b = joint.bodies[1] < 0 ? world : joint.bodies[1];
+  const Pose<T> pose_a = drawn.PoseOf(a);
+  const Pose<T> pose_b = drawn.PoseOf(b);
+  if (joint.type != JointType::kFixedAngle) {
+    Append(pose_a.Inverse(joint.anchors[0]), numbers);
+    Append(pose_b.Inverse(joint.anchors[joint.type == JointType::kDistance ? 1 : 0]), numbers);
+  }
+  if (joint.type == JointType::kPrismatic) {
+    const T length = sqrt(joint.axis.squaredNorm());
+    Append(Vector2<T>(pose_b.rotation.Inverse(joint.axis) / length), numbers);
+  }
+  if (joint.type == JointType::kDistance && joint.limits) {
+    numbers->push_back(T(0.0));  // no distance to keep
+  } else if (joint.type == JointType::kDistance) {
+    numbers->push_back(sqrt((joint.anchors[0] - joint.anchors[1]).squaredNorm()));
+  } else {
+    numbers->push_back(pose_a.angle - pose_b.angle);
+  }
+}
+
 template <typename T>
 void FillJoints(const BasicScene<T>& scene, const State<T>& drawn, int world,
                 std::vector<T>* numbers) {
-  using std::sqrt;
   for (const BasicJoint<T>& joint : scene.joints) {
-    const int a = joint.bodies[0] < 0 ? world : joint.bodies[0];
-    const int b = joint.bodies[1] < 0 ? world : joint.bodies[1];
-    const Pose<T> pose_a = drawn.PoseOf(a);
-    const Pose<T> pose_b = drawn.PoseOf(b);
-    if (joint.type != JointType::kFixedAngle) {
-      Append(pose_a.Inverse(joint.anchors[0]), numbers);
-      Append(pose_b.Inverse(joint.anchors[joint.type == JointType::kDistance ? 1 : 0]), numbers);
-    }
-    if (joint.type == JointType::kPrismatic) {
-      const T length = sqrt(joint.axis.squaredNorm());
-      Append(Vector2<T>(pose_b.rotation.Inverse(joint.axis) / length), numbers);
-    }
-    if (joint.type == JointType::kDistance && joint.limits) {
-      numbers->push_back(T(0.0));  // no distance to keep
-    } else if (joint.type == JointType::kDistance) {
-      numbers->push_back(sqrt((joint.anchors[0] - joint.anchors[1]).squaredNorm()));
-    } else {
-      numbers->push_back(pose_a.angle - pose_b.angle);
-    }
+    FillGeometry(scene, joint, drawn, world, numbers);
     if (joint.type == JointType::kRevolute || joint.type == JointType::kPrismatic) {
       numbers->push_back(joint.damping);
       numbers->push_back(joint.effort);
@@ -299,6 +350,20 @@ void FillJoints(const BasicScene<T>& scene, const State<T>& drawn, int world,
       if (Limits(joint.limits->first)) numbers->push_back(joint.limits->first);
       if (Limits(joint.limits->second)) numbers->push_back(joint.limits->second);
       if (joint.limit_restitution) numbers->push_back(*joint.limit_restitution);
+    }
+  }
+}
+
+// The value that a coupling keeps, or that its limits are measured from.
+template <typename T>
+void SetCoupledValues(const State<T>& state, Model<T>* model) {
+  for (const JointIndex& joint : model->structure->joints) {
+    if (joint.type != JointType::kCoupling && joint.type != JointType::kLimitedCoupling) continue;
+    T* const numbers = &model->parameters[joint.geometry];
+    numbers[6] = T(0.0);
+    for (int i = 0; i < 3; ++i) {
+      numbers[6] +=
+          numbers[i] * state.pose[3 * joint.a + i] + numbers[3 + i] * state.pose[3 * joint.b + i];
     }
   }
 }
@@ -426,6 +491,7 @@ void BuildModelWithStructure(const BasicScene<T>& scene,
   FillJoints(scene, *state, world, &model->parameters);
   FillForcesAndPairs(scene, *state, world, &model->parameters);
   ApplyInitialJoints(scene, state);
+  SetCoupledValues(*state, model);
   if constexpr (std::is_same_v<T, double>) {
     FindModelSeams(*state, model);
   }

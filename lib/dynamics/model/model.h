@@ -68,6 +68,7 @@ struct PartPair {
 ///   kPrismatic        anchor in a's frame (2), in b's (2), unit axis in b's (2), angle
 ///   kDistance, kRope  anchor in a's frame (2), in b's frame (2), length
 ///   kFixedAngle       angle as drawn
+///   kCoupling, kLimitedCoupling  row on a's pose (3), on b's (3), value at time 0
 /// The angle as drawn is angle_a − angle_b at time 0, before the joint's initial angle is applied.
 struct JointIndex {
   std::string name;
@@ -85,7 +86,8 @@ struct JointIndex {
   /// and Stribeck's speed follow.
   int friction = -1;
   bool has_decay = false;
-  int effort_signal = -1;  ///< into signals; replaces effort
+  int effort_signal = -1;   ///< into signals; replaces effort
+  bool is_angular = false;  ///< whether its coordinate is an angle, rad; else it is a length, m
   bool HasLimits() const { return low >= 0 || high >= 0; }
 };
 

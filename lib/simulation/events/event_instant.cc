@@ -247,8 +247,7 @@ double EventStepper::ReturnSpeed(const Model<double>& model, const State<double>
                                  const ActiveContact& contact) const {
   double acceleration = std::hypot(model.parameters[kGravityX], model.parameters[kGravityY]);
   const double size = search_.lengths().Size(contact.a, contact.b);
-  if (contact.joint >= 0 && size > 0.0 &&
-      model.structure->joints[contact.joint].type == JointType::kRevolute) {
+  if (contact.joint >= 0 && size > 0.0 && model.structure->joints[contact.joint].is_angular) {
     acceleration /= size;  // rad/s²
   }
   return std::sqrt(2.0 * acceleration * search_.TouchTolerance(model, state, contact));

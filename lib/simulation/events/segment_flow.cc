@@ -301,7 +301,7 @@ SegmentFlow::PoseErrors SegmentFlow::ErrorsOf(const Model<double>& model, const 
     const JointIndex& joint = structure.joints[j];
     const JointBlock<double>& block = node.problem.joints[j];
     for (int k = 0; k < block.rows; ++k) {
-      if (IsAngle(joint.type, k)) {
+      if (IsAngle(joint, k)) {
         add_angle(block.rhs[k], joint.a, joint.b);
       } else {
         add_length(block.rhs[k], joint.a, joint.b);
@@ -311,7 +311,7 @@ SegmentFlow::PoseErrors SegmentFlow::ErrorsOf(const Model<double>& model, const 
   for (size_t i = 0; i < node.problem.contacts.size(); ++i) {
     const ActiveContact& contact = segment.contacts[i];
     const double gap = node.problem.contacts[i].c_n;
-    if (contact.joint >= 0 && structure.joints[contact.joint].type == JointType::kRevolute) {
+    if (contact.joint >= 0 && structure.joints[contact.joint].is_angular) {
       add_angle(gap, contact.a, contact.b);
     } else {
       add_length(gap, contact.a, contact.b);

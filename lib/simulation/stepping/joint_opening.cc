@@ -28,9 +28,11 @@ struct JointError {
   double angle = 0.0;
 };
 
-JointError ErrorOf(JointType type, const JointRows<double>& rows) {
+JointError ErrorOf(const JointIndex& joint, const JointRows<double>& rows) {
   const double* c = rows.error;
-  switch (type) {
+  switch (joint.type) {
+    case JointType::kCoupling:
+      return joint.is_angular ? JointError{0.0, std::abs(c[0])} : JointError{std::abs(c[0]), 0.0};
     case JointType::kRevolute:
       return {std::hypot(c[0], c[1]), 0.0};
     case JointType::kWeld:
@@ -42,6 +44,7 @@ JointError ErrorOf(JointType type, const JointRows<double>& rows) {
     case JointType::kFixedAngle:
       return {0.0, std::abs(c[0])};
     case JointType::kRope:
+    case JointType::kLimitedCoupling:
       break;
   }
   return {};
@@ -66,7 +69,7 @@ void JointWatch::Look(const Model<double>& model, const State<double>& state, do
     JointRows<double> rows;
     EvaluateJoint(joints[j].type, state.PoseOf(joints[j].a), state.PoseOf(joints[j].b),
                   &model.parameters[joints[j].geometry], &rows);
-    const JointError error = ErrorOf(joints[j].type, rows);
+    const JointError error = ErrorOf(joints[j], rows);
     const double opening = std::fmax(error.distance / sizes_[j], error.angle);
     if (!(opening > opening_ && std::isfinite(opening))) continue;
     opening_ = opening;

@@ -1,0 +1,135 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Couplings of joints, kept and limited: motions and derivatives against closed forms, by every
+// method.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "../../support/gradients.h"
+#include "../../support/scenes.h"
+#include "tangible/simulation/gradient/gradient.h"
+
+namespace tangible {
+namespace {
+
+using test_scenes::SceneOf;
+
+struct CoupledMotion {
+  double value = 0.0;
+  std::vector<std::string> paths;
+  std::vector<double> derivatives;
+};
+
+/// A number of the final state and its derivatives; the other methods agree.
+void ExpectMotion(const std::string& mechanism, const char* stepping, double dt, int output,
+                  const CoupledMotion& exact) {
+  const Scene scene = SceneOf(mechanism + R"(, "simulation": {"duration": 1, "stepping": ")" +
+                              stepping + R"(", "dt": )" + std::to_string(dt) + "}}");
+  const GradientResult result = testing::Jacobian(scene, exact.paths, GradientMethod::kAdjoint);
+  EXPECT_EQ(result.certificate.verdict, "trustworthy");
+  EXPECT_NEAR(result.values[output], exact.value, 1e-9) << stepping;
+  for (size_t k = 0; k < exact.paths.size(); ++k) {
+    EXPECT_NEAR(result.jacobian(output, static_cast<Eigen::Index>(k)), exact.derivatives[k], 1e-9)
+        << exact.paths[k] << ' ' << stepping;
+  }
+  testing::ExpectOthersAgree(scene, exact.paths, result);
+}
+
+// Wheels of inertia I_1, I_2 with ω_1 + r ω_2 = 0 and a torque T on the first. Where rates and
+// ratio change on their own, the momentum along the motion that the coupling allows is kept:
+//   J ω_1 = I_1 w_1 − I_2 w_2 / r + T t,    J = I_1 + I_2 / r².
+TEST(CouplingsTest, AGearTrainTurnsAsInTheClosedForm) {
+  const double i1 = 0.5, i2 = 0.2, r = 2.0, torque = 0.7, w1 = 1.0, w2 = -0.5;
+  const std::string gears = R"({"gravity": [0, -9.81], "bodies": [
+      {"name": "first", "mass": 2, "inertia": 0.5, "position": [0, 0]},
+      {"name": "second", "mass": 1, "inertia": 0.2, "position": [1, 0]}],
+    "joints": [
+      {"name": "gear", "type": "coupling", "joints": ["a", "b"], "ratio": 2},
+      {"name": "a", "type": "revolute", "bodies": ["first", "world"], "anchor": [0, 0], "rate": 1,
+       "effort": 0.7},
+      {"name": "b", "type": "revolute", "bodies": ["second", "world"], "anchor": [1, 0],
+       "rate": -0.5}])";
+  const double inertia = i1 + i2 / (r * r);
+  const double omega = (i1 * w1 - i2 * w2 / r + torque) / inertia;
+  const CoupledMotion exact = {
+      omega,
+      {"joints/a/effort", "bodies/first/inertia", "bodies/second/inertia", "joints/gear/ratio",
+       "joints/a/rate", "joints/b/rate"},
+      {1.0 / inertia, (w1 - omega) / inertia, (-w2 / r - omega / (r * r)) / inertia,
+       (i2 * w2 / (r * r) + omega * 2.0 * i2 / (r * r * r)) / inertia, i1 / inertia,
+       -i2 / r / inertia}};
+  ExpectMotion(gears, "event", 0.05, 5, exact);
+  ExpectMotion(gears, "fixed", 0.01, 5, exact);
+}
+
+// A rack of mass m falls and turns a pinion, y + R θ = 0:  ÿ = −m g / (m + I / R²). The joint of
+// the rack is beside its centre of mass, and the pinion is the second body of its joint.
+TEST(CouplingsTest, ARackTurnsAPinion) {
+  const std::string rack = R"({"gravity": [0, -10], "bodies": [
+      {"name": "rack", "mass": 2, "inertia": 0.3, "position": [0, 0]},
+      {"name": "pinion", "mass": 1, "inertia": 0.09, "position": [0.5, 0]},
+      {"name": "frame", "static": true, "position": [0.5, 0], "angle": 0.4}],
+    "joints": [
+      {"name": "rail", "type": "prismatic", "bodies": ["rack", "frame"], "anchor": [0.1, 0.2],
+       "axis": [0, 2]},
+      {"name": "pin", "type": "revolute", "bodies": ["frame", "pinion"], "anchor": [0.5, 0]},
+      {"name": "teeth", "type": "coupling", "joints": ["rail", "pin"], "ratio": -0.3}])";
+  const double m = 2.0, inertia = 0.09, radius = 0.3, g = 10.0;
+  const double sum = m + inertia / (radius * radius);
+  const double a = -m * g / sum;
+  const CoupledMotion exact = {
+      a,
+      {"bodies/rack/mass", "bodies/pinion/inertia", "joints/teeth/ratio", "gravity/y"},
+      {-g / sum - a / sum, -a / (radius * radius) / sum,
+       -a * 2.0 * inertia / (radius * radius * radius) / sum, m / sum}};
+  ExpectMotion(rack, "event", 0.05, 4, exact);
+  ExpectMotion(rack, "fixed", 0.01, 4, exact);
+}
+
+// Two weights on the rope of a pulley, y_1 + y_2 = 0:  ÿ_1 = −g (m_1 − m_2) / (m_1 + m_2).
+TEST(CouplingsTest, APulleyCarriesTwoWeights) {
+  const std::string pulley = R"({"gravity": [0, -10], "bodies": [
+      {"name": "left", "mass": 3, "inertia": 0.1, "position": [0, 0]},
+      {"name": "right", "mass": 1, "inertia": 0.1, "position": [1, 0.5]}],
+    "joints": [
+      {"name": "l", "type": "prismatic", "bodies": ["left", "world"], "anchor": [0, 0],
+       "axis": [0, 1]},
+      {"name": "r", "type": "prismatic", "bodies": ["right", "world"], "anchor": [1, 0.5],
+       "axis": [0, 1]},
+      {"name": "pulley", "type": "coupling", "joints": ["l", "r"], "ratio": 1}])";
+  const CoupledMotion place = {
+      -2.5, {"bodies/left/mass", "bodies/right/mass", "gravity/y"}, {-0.625, 1.875, 0.25}};
+  ExpectMotion(pulley, "event", 0.05, 1, place);
+  const CoupledMotion speed = {
+      -5.0, {"bodies/left/mass", "bodies/right/mass", "gravity/y"}, {-1.25, 3.75, 0.5}};
+  ExpectMotion(pulley, "fixed", 0.01, 4, speed);
+}
+
+// Play between two gears: the first turns freely by H, strikes, and the rate of the coupling is
+// −e times what it was:  θ_1 = H + w (1 − (1 + e) k) (t − H / w),  k = 1 / (1 + r² I_1 / I_2).
+TEST(CouplingsTest, PlayEndsInAnImpact) {
+  const std::string gears = R"({"gravity": [0, 0], "bodies": [
+      {"name": "first", "mass": 2, "inertia": 0.5, "position": [0, 0]},
+      {"name": "second", "mass": 1, "inertia": 0.2, "position": [1, 0]}],
+    "joints": [
+      {"name": "a", "type": "revolute", "bodies": ["first", "world"], "anchor": [0, 0], "rate": 0.8},
+      {"name": "b", "type": "revolute", "bodies": ["second", "world"], "anchor": [1, 0]},
+      {"name": "gear", "type": "coupling", "joints": ["a", "b"], "ratio": 2, "limits": [null, 0.3],
+       "limit_restitution": 0.5}])";
+  const double w = 0.8, h = 0.3, e = 0.5, r = 2.0, i1 = 0.5, i2 = 0.2;
+  const double k = 1.0 / (1.0 + r * r * i1 / i2);
+  const double left = 1.0 - h / w;
+  const double slope = -w * (1.0 + e) * left;  // by k
+  const CoupledMotion exact = {h + w * (1.0 - (1.0 + e) * k) * left,
+                               {"joints/gear/limits/1", "joints/gear/limit_restitution",
+                                "joints/gear/ratio", "bodies/first/inertia"},
+                               {(1.0 + e) * k, -w * k * left, slope * -k * k * 2.0 * r * i1 / i2,
+                                slope * -k * k * r * r / i2}};
+  ExpectMotion(gears, "event", 0.05, 2, exact);
+}
+
+}  // namespace
+}  // namespace tangible
