@@ -47,6 +47,9 @@ ViewRecorder::ViewRecorder(const Scene& scene, const Model<double>& model) {
   for (const JointIndex& joint : s.joints) {
     data_.joints.push_back(MakeJoint(model, joint));
   }
+  for (const ServoIndex& servo : s.servos) {
+    if (servo.joint >= 0) data_.joints[servo.joint].has_servo = true;
+  }
   for (const SpringIndex& spring : s.springs) {
     ViewSpring view;
     view.name = spring.name;

@@ -188,6 +188,10 @@ void WriteLinks(const ViewData& data, JsonWriter* json) {
       json->Key("motor");
       json->Number(1.0);
     }
+    if (joint.has_servo) {
+      json->Key("servo");
+      json->Number(1.0);
+    }
     json->Close('}');
   }
   json->Close(']');

@@ -34,6 +34,7 @@ struct ViewJoint {
   Vector2<double> axis = Vector2<double>::UnitX();  ///< prismatic: in the frame of bodies[1]
   double rope = 0.0;  ///< m, the greatest distance of a rope's ends; 0: no bound
   bool has_motor = false;
+  bool has_servo = false;
 };
 
 /// A spring; anchors as in ViewJoint.

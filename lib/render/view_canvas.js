@@ -269,6 +269,15 @@ function drawGround(g, p) {
   g.beginPath(); g.moveTo(p[0], p[1]); g.lineTo(p[0] - 8, p[1] - 12); g.lineTo(p[0] + 8, p[1] - 12); g.closePath(); g.stroke();
   for (let x = -8; x <= 4; x += 4) line(g, [p[0] + x, p[1] - 12], [p[0] + x + 4, p[1] - 17]);
 }
+// A ring that is open at the top, with an arrow's head at each end.
+function drawServo(g, p) {
+  g.beginPath(); g.arc(p[0], p[1], 9, -0.25 * Math.PI, 1.25 * Math.PI); g.stroke();
+  for (const side of [-1, 1]) {
+    const x = p[0] + side * 6.4, y = p[1] - 6.4;
+    g.beginPath(); g.moveTo(x - side * 3.6, y - 3.6); g.lineTo(x + side * 2.8, y - 2.4); g.lineTo(x - side * 2, y + 2.8);
+    g.closePath(); g.fillStyle = g.strokeStyle; g.fill();
+  }
+}
 function drawJoint(g, joint, k) {
   const ends = linkEnds(joint, k);
   if (!ends) return;
@@ -278,6 +287,7 @@ function drawJoint(g, joint, k) {
     if (joint.bodies.some((body) => body < 0)) drawGround(g, a);
     disc(g, a, 3.6); g.fillStyle = colours.panel; g.fill(); g.stroke();
     if (joint.motor) { disc(g, a, 7); g.stroke(); }
+    if (joint.servo) drawServo(g, a);
   } else if (joint.type === "weld") {
     g.fillRect(a[0] - 4, a[1] - 4, 8, 8);
   } else if (joint.type === "distance") {
@@ -296,6 +306,7 @@ function drawJoint(g, joint, k) {
     g.setLineDash([7, 4]); line(g, [b[0] - 2000 * u[0], b[1] - 2000 * u[1]], [b[0] + 2000 * u[0], b[1] + 2000 * u[1]]);
     g.setLineDash([]); g.strokeRect(a[0] - 5, a[1] - 5, 10, 10);
     if (joint.motor) { disc(g, a, 7); g.stroke(); }
+    if (joint.servo) drawServo(g, a);
   } else {
     g.setLineDash([2, 4]);
     line(g, ...ends.poses.map((pose, j) => toScreen(joint.bodies[j] < 0 ? toWorld(ends.poses[1 - j], [0, 0]) : pose)));

@@ -120,6 +120,9 @@ function legend() {
   if (view.joints.some((joint) => joint.motor)) {
     add("motor", (g) => { g.strokeStyle = colours.text; disc(g, [15, 9], 7); g.stroke(); });
   }
+  if (view.joints.some((joint) => joint.servo)) {
+    add("servo", (g) => { g.strokeStyle = colours.text; drawServo(g, [15, 10]); });
+  }
   if (view.springs.length) {
     add("spring", (g) => {
       g.strokeStyle = colours.series[5]; g.lineWidth = 1.6; g.beginPath(); g.moveTo(1, 9);

@@ -107,17 +107,38 @@ class FieldReader {
       reader.FailExpected("[x, y] or {\"file\": ...}");
     }
   }
+  template <typename Servo>
+  void NumberOrServo(const Field& field, double& value, std::optional<Signal>& signal,
+                     std::optional<Servo>& servo, const ServoFields& visit) {
+    if (!IsRead(field)) return;
+    const JsonReader reader = item_.At(field.key);
+    if (IsServo(reader)) return ReadPart(reader, " of a servo", servo, visit);
+    if (!reader.IsObject() && !reader.IsNumber()) return reader.FailExpected(kNumberOrObject);
+    NumberOrSignal(field, value, signal);
+  }
+  template <typename Servo>
+  void PointOrServos(const Field& field, Vector2<double>& value, std::optional<Signal>& signal,
+                     std::optional<Servo> (&servos)[2], const ServoFields& visit) {
+    if (!IsRead(field)) return;
+    const JsonReader reader = item_.At(field.key);
+    if (!reader.IsArray()) return PointOrSignal(field, value, signal);
+    if (!reader.At(0).IsObject() && !reader.At(1).IsObject()) {
+      value = reader.Point();
+      return;
+    }
+    if (reader.Size() != 2) return reader.FailExpected("[x, y], each a number or a servo");
+    for (int i = 0; i < 2; ++i) {
+      if (reader.At(i).IsObject()) {
+        ReadPart(reader.At(i), " of a servo", servos[i], visit);
+      } else {
+        value[i] = reader.At(i).Number(field.kind);
+      }
+    }
+  }
   template <typename Item, typename Visit>
   void Part(const Field& field, std::optional<Item>& value, const Visit& visit) {
     if (!IsRead(field)) return;
-    const JsonReader part = item_.At(field.key);
-    value.emplace();
-    FieldKeys keys;
-    visit(*value, &keys);
-    part.ExpectKeys(keys.keys(), std::string(" of a ") + field.key);
-    if (!part.ok()) return;
-    FieldReader reader(part, signal_, path_);
-    visit(*value, &reader);
+    ReadPart(item_.At(field.key), std::string(" of a ") + field.key, value, visit);
   }
   void Path(std::shared_ptr<const RecordedPath>& path) { path = path_(item_); }
   /// `Value` is the enumeration, or an optional of it, which an absent key leaves empty.
@@ -133,6 +154,25 @@ class FieldReader {
   }
 
  private:
+  static constexpr char kNumberOrObject[] = "a number, {\"file\": ...} or {\"target\": ...}";
+
+  static bool IsServo(const JsonReader& reader) {
+    return reader.IsObject() && (reader.Has("target") || reader.Has("stiffness") ||
+                                 reader.Has("damping") || reader.Has("limit"));
+  }
+
+  template <typename Item, typename Visit>
+  void ReadPart(const JsonReader& part, const std::string& of, std::optional<Item>& value,
+                const Visit& visit) {
+    value.emplace();
+    FieldKeys keys;
+    visit(*value, &keys);
+    part.ExpectKeys(keys.keys(), of);
+    if (!part.ok()) return;
+    FieldReader reader(part, signal_, path_);
+    visit(*value, &reader);
+  }
+
   bool IsRead(const Field& field) const {
     const bool written = item_.Has(field.key);
     if (!field.present && written && field.without != nullptr) {

@@ -96,6 +96,26 @@ class NumberList {
   void PointOrSignal(const Field& field, Vector2<T>& value, const std::optional<Signal>& signal) {
     if (!signal) Point(field, value);
   }
+  void NumberOrServo(const Field& field, T& value, const std::optional<Signal>& signal,
+                     std::optional<BasicServo<T>>& servo, const ServoFields& visit) {
+    if (servo) return Part(field, servo, visit);
+    NumberOrSignal(field, value, signal);
+  }
+  void PointOrServos(const Field& field, Vector2<T>& value, const std::optional<Signal>& signal,
+                     std::optional<BasicServo<T>> (&servos)[2], const ServoFields& visit) {
+    if (signal) return;
+    const std::string outer = prefix_;
+    for (int i = 0; i < 2; ++i) {
+      const char* const component = i == 0 ? "/x" : "/y";
+      if (!servos[i]) {
+        Add(field, component, &value[i]);
+        continue;
+      }
+      prefix_ += std::string(field.key) + component + "/";
+      visit(*servos[i], this);
+      prefix_ = outer;
+    }
+  }
 
  private:
   void Add(const Field& field, const std::string& component, T* value) {
@@ -153,6 +173,18 @@ class ItemNumbers {
                      const std::optional<Signal>&) {
     Point(field, value);
   }
+  void NumberOrServo(const Field& field, double value, const std::optional<Signal>& signal,
+                     const std::optional<BasicServo<double>>& servo, const ServoFields& visit) {
+    NumberOrSignal(field, value, signal);
+    Part(field, servo, visit);
+  }
+  void PointOrServos(const Field& field, const Vector2<double>& value,
+                     const std::optional<Signal>& signal,
+                     const std::optional<BasicServo<double>> (&servos)[2],
+                     const ServoFields& visit) {
+    PointOrSignal(field, value, signal);
+    for (const auto& servo : servos) Part(field, servo, visit);
+  }
 
   const std::vector<double>& numbers() const { return numbers_; }
 
@@ -196,6 +228,16 @@ class SetNumbers {
   void PointOrSignal(const Field& field, Vector2<T>& value, const std::optional<Signal>&) {
     Point(field, value);
   }
+  void NumberOrServo(const Field& field, T& value, const std::optional<Signal>& signal,
+                     std::optional<BasicServo<T>>& servo, const ServoFields& visit) {
+    NumberOrSignal(field, value, signal);
+    Part(field, servo, visit);
+  }
+  void PointOrServos(const Field& field, Vector2<T>& value, const std::optional<Signal>& signal,
+                     std::optional<BasicServo<T>> (&servos)[2], const ServoFields& visit) {
+    PointOrSignal(field, value, signal);
+    for (auto& servo : servos) Part(field, servo, visit);
+  }
   void Path(const std::shared_ptr<const RecordedPath>&) {}
   template <typename Item, typename Visit>
   void Part(const Field&, std::optional<Item>& item, const Visit& visit) {
@@ -221,6 +263,9 @@ BasicScene<T> CastScene(const Scene& scene) {
   BasicScene<T> result;
   result.name = scene.name;
   result.path = scene.path;
+  const auto copy_series = [](const auto& from, auto* to) {
+    if (from) to->emplace().target_signal = from->target_signal;
+  };
   // What is no number is copied before the fields are visited, because it tells which there are.
   const auto cast = [](const auto& from, auto* to, const auto& visit) {
     internal::ItemNumbers numbers;
@@ -252,6 +297,7 @@ BasicScene<T> CastScene(const Scene& scene) {
     std::copy_n(from.bodies, 2, joint.bodies);
     std::copy_n(from.coupled, 2, joint.coupled);
     joint.effort_signal = from.effort_signal;
+    copy_series(from.effort_servo, &joint.effort_servo);
     joint.contact = from.contact;
     cast(from, &joint, [](auto& item, auto* visitor) { VisitJoint(item, true, visitor); });
   }
@@ -267,6 +313,8 @@ BasicScene<T> CastScene(const Scene& scene) {
     force.body = from.body;
     force.force_signal = from.force_signal;
     force.torque_signal = from.torque_signal;
+    for (int i = 0; i < 2; ++i) copy_series(from.force_servos[i], &force.force_servos[i]);
+    copy_series(from.torque_servo, &force.torque_servo);
     cast(from, &force, [](auto& item, auto* visitor) { VisitForce(item, visitor); });
   }
   for (const auto& from : scene.pairs) {

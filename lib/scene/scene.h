@@ -99,6 +99,19 @@ struct Signal {
   std::vector<double> value;  ///< N m, or N for a prismatic effort
 };
 
+/// In the place of a force, torque or effort: the bounded spring and damper
+///   −stiffness (x − target) − damping (ẋ − the target's rate), within ± limit
+/// about a coordinate x, which is that of the joint, of the force's point along x or y, or the
+/// angle of the torque's body.
+template <typename T>
+struct BasicServo {
+  T target{0.0};                        ///< m or rad
+  std::optional<Signal> target_signal;  ///< replaces target
+  T stiffness{0.0};                     ///< N/m or N m/rad, ≥ 0
+  T damping{0.0};                       ///< N s/m or N m s, ≥ 0
+  std::optional<T> limit;               ///< N or N m, > 0; absent: no bound
+};
+
 /// A motor of a hinge or slider: up to `limit` it does what keeps the rate of the coordinate at
 /// `speed`.
 template <typename T>
@@ -142,8 +155,9 @@ struct BasicJoint {
   T stribeck_speed{1.0};  ///< rad/s or m/s, > 0; only with a kinetic friction
   std::optional<BasicMotor<T>> motor;
   T effort{0.0};
-  std::optional<Signal> effort_signal;  ///< replaces effort
-  bool contact = false;                 ///< whether the joined bodies may collide
+  std::optional<Signal> effort_signal;        ///< replaces effort
+  std::optional<BasicServo<T>> effort_servo;  ///< replaces effort
+  bool contact = false;                       ///< whether the joined bodies may collide
 };
 
 template <typename T>
@@ -164,11 +178,13 @@ struct BasicForce {
   int body = -1;
   Vector2<T> force{T(0.0), T(0.0)};
   T torque{0.0};
-  std::optional<Signal> force_signal;   ///< replaces force
-  std::optional<Signal> torque_signal;  ///< replaces torque
-  Vector2<T> at{T(0.0), T(0.0)};        ///< body frame
-  std::optional<T> start;               ///< s; absent: the whole run
-  std::optional<T> end;                 ///< s; absent: the whole run
+  std::optional<Signal> force_signal;            ///< replaces force
+  std::optional<Signal> torque_signal;           ///< replaces torque
+  std::optional<BasicServo<T>> force_servos[2];  ///< each replaces a component of force
+  std::optional<BasicServo<T>> torque_servo;     ///< replaces torque
+  Vector2<T> at{T(0.0), T(0.0)};                 ///< body frame
+  std::optional<T> start;                        ///< s; absent: the whole run
+  std::optional<T> end;                          ///< s; absent: the whole run
 };
 
 /// Friction and restitution of pairs of bodies; names may contain `*`, which matches within a name.

@@ -17,6 +17,8 @@
 //   Vertices        numbers of a polygon or polyline: [[x, y], ...]
 //   NumberOrSignal  1.5 or {"file": ...}
 //   PointOrSignal   [x, y] or {"file": ...}
+//   NumberOrServo   as NumberOrSignal, or {"target": ..., "stiffness": ...}
+//   PointOrServos   as PointOrSignal, each of x and y a number or such an object
 //   Part            an object with fields of its own, or absent
 //   Path            in such an object: "file" and "interpolation"
 //   Choice, Count   settings that are no parameters
@@ -188,6 +190,28 @@ void VisitLimits(Joint& joint, NumberKind kind, Dimension dimension, Visitor* vi
   visitor->Optional(restitution, joint.limit_restitution);
 }
 
+/// A servo along a coordinate that is a length, or an angle.
+struct ServoFields {
+  bool slides;
+
+  template <typename Servo, typename Visitor>
+  void operator()(Servo& servo, Visitor* visitor) const {
+    constexpr NumberKind kNonNegative = NumberKind::kNonNegative;
+    visitor->NumberOrSignal(
+        {"target", NumberKind::kFree, slides ? Dimension::kLength : Dimension::kAngle, true},
+        servo.target, servo.target_signal);
+    visitor->Number({"stiffness", kNonNegative,
+                     slides ? Dimension::kStiffness : Dimension::kAngularStiffness, true},
+                    servo.stiffness);
+    visitor->Number(
+        {"damping", kNonNegative, slides ? Dimension::kLinearDamping : Dimension::kAngularDamping},
+        servo.damping);
+    visitor->Optional(
+        {"limit", NumberKind::kPositive, slides ? Dimension::kForce : Dimension::kTorque},
+        servo.limit);
+  }
+};
+
 /// `turns`: whether the joint may start turned or moved (joint_graph.h).
 template <typename Joint, typename Visitor>
 void VisitJoint(Joint& joint, bool turns, Visitor* visitor) {
@@ -232,7 +256,8 @@ void VisitJoint(Joint& joint, bool turns, Visitor* visitor) {
   visitor->Number({slides ? "rest_displacement" : "rest_angle", kFree, coordinate, false, true,
                    "stiffness", joint.stiffness.has_value()},
                   joint.rest);
-  visitor->NumberOrSignal({"effort", kFree, effort}, joint.effort, joint.effort_signal);
+  visitor->NumberOrServo({"effort", kFree, effort}, joint.effort, joint.effort_signal,
+                         joint.effort_servo, ServoFields{slides});
 }
 
 template <typename Spring, typename Visitor>
@@ -247,8 +272,10 @@ void VisitSpring(Spring& spring, Visitor* visitor) {
 template <typename Force, typename Visitor>
 void VisitForce(Force& force, Visitor* visitor) {
   constexpr NumberKind kFree = NumberKind::kFree;
-  visitor->PointOrSignal({"force", kFree, Dimension::kForce}, force.force, force.force_signal);
-  visitor->NumberOrSignal({"torque", kFree, Dimension::kTorque}, force.torque, force.torque_signal);
+  visitor->PointOrServos({"force", kFree, Dimension::kForce}, force.force, force.force_signal,
+                         force.force_servos, ServoFields{true});
+  visitor->NumberOrServo({"torque", kFree, Dimension::kTorque}, force.torque, force.torque_signal,
+                         force.torque_servo, ServoFields{false});
   visitor->Point({"at", kFree, Dimension::kLength}, force.at);
   visitor->Optional({"start", kFree, Dimension::kTime}, force.start);
   visitor->Optional({"end", kFree, Dimension::kTime}, force.end);
@@ -335,6 +362,14 @@ class FieldKeys {
   }
   template <typename V, typename S>
   void PointOrSignal(const Field& field, const V&, const S&) {
+    Add(field.key);
+  }
+  template <typename T, typename S, typename Servo>
+  void NumberOrServo(const Field& field, const T&, const S&, const Servo&, const ServoFields&) {
+    Add(field.key);
+  }
+  template <typename V, typename S, typename Servos>
+  void PointOrServos(const Field& field, const V&, const S&, const Servos&, const ServoFields&) {
     Add(field.key);
   }
   template <typename Table, typename Value>

@@ -75,6 +75,24 @@ class FieldWriter {
                      const std::optional<Signal>& signal) {
     json_[field.key] = signal ? SignalJson(*signal) : PointJson(value);
   }
+  void NumberOrServo(const Field& field, double value, const std::optional<Signal>& signal,
+                     const std::optional<BasicServo<double>>& servo, const ServoFields& visit) {
+    if (servo) return Part(field, servo, visit);
+    NumberOrSignal(field, value, signal);
+  }
+  void PointOrServos(const Field& field, const Vector2<double>& value,
+                     const std::optional<Signal>& signal,
+                     const std::optional<BasicServo<double>> (&servos)[2],
+                     const ServoFields& visit) {
+    PointOrSignal(field, value, signal);
+    for (int i = 0; i < 2; ++i) {
+      if (!servos[i]) continue;
+      OrderedJson servo = OrderedJson::object();
+      FieldWriter part(&servo);
+      visit(*servos[i], &part);
+      json_[field.key][static_cast<std::size_t>(i)] = servo;
+    }
+  }
   template <typename Item, typename Visit>
   void Part(const Field& field, const std::optional<Item>& item, const Visit& visit) {
     if (!item) return;
@@ -200,12 +218,18 @@ std::string SceneWithSignalsToJson(Scene scene) {
     series.file.clear();
     body.driven->path = std::make_shared<const RecordedPath>(std::move(series));
   }
+  const auto whole = [](std::optional<BasicServo<double>>* servo) {
+    if (*servo && (*servo)->target_signal) (*servo)->target_signal->file.clear();
+  };
   for (auto& joint : scene.joints) {
     if (joint.effort_signal) joint.effort_signal->file.clear();
+    whole(&joint.effort_servo);
   }
   for (auto& force : scene.forces) {
     if (force.force_signal) force.force_signal->file.clear();
     if (force.torque_signal) force.torque_signal->file.clear();
+    for (auto& servo : force.force_servos) whole(&servo);
+    whole(&force.torque_servo);
   }
   return SceneToJson(scene);
 }

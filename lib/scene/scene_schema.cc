@@ -91,6 +91,19 @@ class FieldSchema {
     Add(field,
         SchemaOfAny({PointSchema(field), SignalSchema(), SeriesSchema({"x", "y"}, {"time"})}));
   }
+  template <typename T, typename S, typename Servo>
+  void NumberOrServo(const Field& field, const T&, const S&, const std::optional<Servo>&,
+                     const ServoFields& visit) {
+    Add(field, SchemaOfAny({NumberSchema(field), SignalSchema(),
+                            SeriesSchema({"value"}, {"time", "value"}), ServoSchema(visit)}));
+  }
+  template <typename V, typename S, typename Servos>
+  void PointOrServos(const Field& field, const V&, const S&, const Servos&,
+                     const ServoFields& visit) {
+    const OrderedJson component = SchemaOfAny({NumberSchema(field), ServoSchema(visit)});
+    Add(field, SchemaOfAny({SchemaOfArray(component, 2, 2), SignalSchema(),
+                            SeriesSchema({"x", "y"}, {"time"})}));
+  }
   template <typename Table, typename Value>
   void Choice(const char* key, const Table& table, const Value&) {
     properties_[key] = SchemaOfWords(WordsOf(table));
@@ -115,6 +128,12 @@ class FieldSchema {
  private:
   static OrderedJson NumberSchema(const Field& field) {
     return SchemaOfNumber(field.kind, UnitOf(field.dimension));
+  }
+  static OrderedJson ServoSchema(const ServoFields& visit) {
+    FieldSchema fields;
+    BasicServo<double> servo;
+    visit(servo, &fields);
+    return fields.Item(OrderedJson::object(), {});
   }
   static OrderedJson PointSchema(const Field& field) {
     return SchemaOfArray(NumberSchema(field), 2, 2);

@@ -77,6 +77,23 @@ class RangeCheck {
                      const std::optional<Signal>& signal) {
     if (!signal) Point(field, value);
   }
+  void NumberOrServo(const Field& field, double value, const std::optional<Signal>& signal,
+                     const std::optional<BasicServo<double>>& servo, const ServoFields& visit) {
+    if (servo) return Part(field, servo, visit);
+    NumberOrSignal(field, value, signal);
+  }
+  void PointOrServos(const Field& field, const Vector2<double>& value,
+                     const std::optional<Signal>& signal,
+                     const std::optional<BasicServo<double>> (&servos)[2],
+                     const ServoFields& visit) {
+    PointOrSignal(field, value, signal);
+    for (int i = 0; i < 2; ++i) {
+      if (!servos[i]) continue;
+      const JsonReader place = Place(field).At(i);
+      RangeCheck part(place);
+      visit(*servos[i], &part);
+    }
+  }
 
  private:
   JsonReader Place(const Field& field) const { return item_.At(field.key); }

@@ -341,7 +341,8 @@ TEST(BadSceneTest, Joints) {
       {"/joints/0/damping", "-1", "/joints/0/damping: expected a number >= 0, got -1"},
       {"/joints/0/contact", "0", "/joints/0/contact: expected true or false, got 0"},
       {"/joints/0/effort", "[1]",
-       "/joints/0/effort: expected a number or {\"file\": ...}, got an array of 1"},
+       "/joints/0/effort: expected a number, {\"file\": ...} or {\"target\": ...}, got an array of "
+       "1"},
   });
 }
 
@@ -429,7 +430,8 @@ TEST(BadSceneTest, SpringsAndForces) {
        "/forces/0/end: expected a number >= start, which is 0.25, got 0.125"},
       {"/forces/0/force", "1", "/forces/0/force: expected [x, y] or {\"file\": ...}, got 1"},
       {"/forces/0/torque", "[1, 2]",
-       "/forces/0/torque: expected a number or {\"file\": ...}, got an array of 2"},
+       "/forces/0/torque: expected a number, {\"file\": ...} or {\"target\": ...}, got an array of "
+       "2"},
       {"/forces/0/when", "1",
        "/forces/0/when: unknown key of a force, expected one of name, body, force, torque, at, "
        "start, end, got \"when\""},
@@ -456,6 +458,26 @@ TEST(BadSceneTest, Signals) {
        "/forces/0/torque/scale: unknown key, expected one of file, interpolation, got \"scale\""},
       {"/forces/0/torque", R"({"time": [0, 1], "value": [1]})",
        "/forces/0/torque/value: expected 2 numbers, one for each time, got an array of 1"},
+      {"/forces/0/torque", R"({"target": 1, "stiffness": -2})",
+       "/forces/0/torque/stiffness: expected a number >= 0, got -2"},
+      {"/joints/0/effort", R"({"target": 1, "stiffness": 2, "damping": -1})",
+       "/joints/0/effort/damping: expected a number >= 0, got -1"},
+      {"/joints/1/effort", R"({"target": 1, "stiffness": 2, "limit": 0})",
+       "/joints/1/effort/limit: expected a number > 0, got 0"},
+      {"/joints/1/effort", R"({"target": 1, "stiffness": 2, "speed": 0})",
+       "/joints/1/effort/speed: unknown key of a servo, expected one of target, stiffness, "
+       "damping, "
+       "limit, got \"speed\""},
+      {"/joints/1/effort", R"({"stiffness": 2})",
+       "/joints/1/effort/target: missing, expected a number or {\"file\": ...}"},
+      {"/forces/0/force", R"([{"target": 1}, 2])",
+       "/forces/0/force/0/stiffness: missing, expected a number >= 0"},
+      {"/forces/0/force", R"([0, {"target": {"file": "none.csv"}, "stiffness": 1}])",
+       "/forces/0/force/1/target/file: " + folder +
+           "none.csv: cannot be read: No such file or "
+           "directory"},
+      {"/forces/0/force", R"([{"target": 1, "stiffness": 1}])",
+       "/forces/0/force: expected [x, y], each a number or a servo, got an array of 1"},
       {"/forces/0/torque", R"({"time": [0, 0], "value": [1, 1]})",
        "/forces/0/torque/time/1: expected a number > 0.0 (the time before), got 0"},
       {"/forces/0/force", R"({"time": []})",

@@ -47,6 +47,41 @@ TEST(SceneToJsonTest, AllThatWasReadIsWritten) {
   }
 }
 
+// Servos of an effort, of one component of a force, and of a torque that follows a series.
+constexpr char kServos[] =
+    R"({"bodies": [{"name": "a", "mass": 1, "inertia": 1, "position": [0, 0]}],
+  "joints": [{"name": "h", "type": "revolute", "bodies": ["a", "world"], "anchor": [0, 0],
+    "effort": {"target": 0.5, "stiffness": 3, "damping": 0.25, "limit": 2}}],
+  "forces": [{"name": "f", "body": "a", "force": [1, {"target": 2, "stiffness": 4}],
+    "torque": {"target": {"time": [0, 1], "value": [0, 2], "interpolation": "linear"},
+               "stiffness": 5}}]})";
+
+TEST(SceneToJsonTest, ServosAreReadAndWritten) {
+  const Scene scene = Parsed(kServos);
+  const Json joint = Json::parse(SceneToJson(scene)).at("joints").at(0);
+  EXPECT_EQ(joint.at("effort"), Json::parse(kServos).at("joints").at(0).at("effort"));
+  const Json force = Json::parse(SceneToJson(scene)).at("forces").at(0);
+  EXPECT_EQ(force.at("force").at(0), 1.0);
+  EXPECT_EQ(force.at("force").at(1),
+            Json::parse(R"({"target": 2.0, "stiffness": 4.0, "damping": 0.0})"));
+  EXPECT_EQ(force.at("torque").at("target"),
+            Json::parse(kServos).at("forces").at(0).at("torque").at("target"));
+  EXPECT_EQ(SceneToJson(Parsed(SceneToJson(scene))), SceneToJson(scene));
+  // A model in Jets has the same numbers, and paths name them.
+  BasicScene<Jet<kLocalJetWidth>> cast = CastScene<Jet<kLocalJetWidth>>(scene);
+  std::vector<std::string> paths;
+  for (const auto& number : EnumerateNumbers(&cast)) {
+    if (number.path.rfind("forces/f/", 0) == 0) paths.push_back(number.path);
+    if (number.path == "joints/h/effort/limit") EXPECT_EQ(number.value->a, 2.0);
+    if (number.path == "forces/f/torque/stiffness") EXPECT_EQ(number.value->a, 5.0);
+  }
+  EXPECT_EQ(paths, (std::vector<std::string>{
+                       "forces/f/force/x", "forces/f/force/y/target", "forces/f/force/y/stiffness",
+                       "forces/f/force/y/damping", "forces/f/torque/stiffness",
+                       "forces/f/torque/damping", "forces/f/at/x", "forces/f/at/y"}));
+  EXPECT_EQ(cast.forces[0].torque_servo->target_signal->value, (std::vector<double>{0.0, 2.0}));
+}
+
 TEST(SceneToJsonTest, ALimitThatLimitsNothingIsNull) {
   Json text = Json::parse(kFullScene);
   text["joints"][3]["limits"] = {0.0, nullptr};

@@ -60,6 +60,7 @@ void CoverForces(const Scene& scene, Coverage* coverage) {
     cover(force.end.has_value(), "end of a force's window");
     cover(force.force_signal.has_value(), "force from a series");
     cover(force.torque_signal.has_value(), "torque from a series");
+    cover(force.force_servos[0] || force.force_servos[1] || force.torque_servo, "servo of a force");
   }
   for (const BasicJoint<double>& joint : scene.joints) {
     cover(joint.effort != 0.0, "effort");
@@ -69,6 +70,7 @@ void CoverForces(const Scene& scene, Coverage* coverage) {
     cover(joint.friction.has_value(), "friction in a joint");
     cover(joint.kinetic_friction.has_value(), "friction that decays");
     cover(joint.motor.has_value(), "motor");
+    cover(joint.effort_servo.has_value(), "servo of a joint");
     cover(joint.limit_restitution.has_value(), "restitution of a limit");
     cover(joint.type == JointType::kDistance && joint.limits, "rope");
   }

@@ -202,6 +202,53 @@ void SceneMaker::Drives() {
   }
 }
 
+BasicServo<double> SceneMaker::Servo(double at, RandomNumbers* random) {
+  BasicServo<double> servo;
+  servo.target = at + random->Uniform(-0.5, 0.5);
+  if (random->Chance(0.3)) {
+    Signal& signal = servo.target_signal.emplace();
+    signal.file = "target.csv";
+    signal.interpolation =
+        random->Chance(0.3) ? Signal::Interpolation::kConstant : Signal::Interpolation::kLinear;
+    for (int k = 0; k < 4; ++k) {
+      signal.time.push_back(scene_.simulation.dt * (4.3 * k + random->Uniform(0.0, 1.0)));
+      signal.value.push_back(at + random->Uniform(-0.3, 0.3));
+    }
+  }
+  servo.stiffness = std::pow(10.0, random->Uniform(-1.0, 1.5));
+  servo.damping = random->Chance(0.3) ? 0.0 : std::pow(10.0, random->Uniform(-2.0, 0.0));
+  if (random->Chance(0.6)) servo.limit = std::pow(10.0, random->Uniform(-1.0, 1.0));
+  return servo;
+}
+
+void SceneMaker::Servos() {
+  if (seed_ % 4 != 3) {
+    return;
+  }
+  RandomNumbers random(0x73657276ULL + 0x9e3779b97f4a7c15ULL * seed_);
+  for (BasicJoint<double>& joint : scene_.joints) {
+    const bool has_coordinate =
+        joint.type == JointType::kRevolute || joint.type == JointType::kPrismatic;
+    if (has_coordinate && random.Chance(0.4)) {
+      joint.effort = 0.0;
+      joint.effort_signal.reset();
+      joint.effort_servo = Servo(joint.angle, &random);
+    }
+  }
+  for (BasicForce<double>& force : scene_.forces) {
+    const BasicBody<double>& body = scene_.bodies[force.body];
+    for (int i = 0; i < 2 && !force.force_signal; ++i) {
+      if (!random.Chance(0.3)) continue;
+      force.force[i] = 0.0;
+      force.force_servos[i] = Servo(body.position[i], &random);
+    }
+    if (!force.torque_signal && random.Chance(0.3)) {
+      force.torque = 0.0;
+      force.torque_servo = Servo(body.angle, &random);
+    }
+  }
+}
+
 void SceneMaker::Outlines() {
   if (seed_ % 4 != 1) {
     return;

@@ -72,6 +72,10 @@ class SceneMaker {
   /// Ellipses in the place of other shapes, and contact points, in every fourth scene; with random
   /// numbers of their own as well.
   void Outlines();
+  /// Servos of joints and forces in every fourth scene, likewise.
+  void Servos();
+  /// A servo whose coordinate starts at `at`.
+  BasicServo<double> Servo(double at, RandomNumbers* random);
 
   RandomNumbers random_;
   const RandomSceneOptions options_;

@@ -23,6 +23,7 @@
 #include "tangible/dynamics/elements/contact.h"
 #include "tangible/dynamics/elements/force.h"
 #include "tangible/dynamics/elements/row_rates.h"
+#include "tangible/dynamics/elements/servo.h"
 
 namespace tangible {
 

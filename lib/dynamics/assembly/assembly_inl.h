@@ -10,6 +10,7 @@
 
 #include "tangible/dynamics/assembly/assembly.h"
 #include "tangible/dynamics/assembly/equations_inl.h"
+#include "tangible/dynamics/elements/servo_inl.h"
 #include "tangible/dynamics/model/driven_bodies.h"
 #include "tangible/dynamics/model/tolerances.h"
 #include "tangible/math/scratch.h"
@@ -103,6 +104,7 @@ class ProblemBuilder {
       equations_.JointSpring(static_cast<int>(j));
       equations_.JointFrictionDecay(static_cast<int>(j));
     }
+    for (size_t k = 0; k < s_.servos.size(); ++k) equations_.Servo(static_cast<int>(k));
   }
 
   /// `restitution` may be null if no contact rebounds.
@@ -142,6 +144,9 @@ class ProblemBuilder {
     return RelativeSpeed(state_, contact.a, rows.normal_a, contact.b, rows.normal_b);
   }
   const T& Time() const { return at_.time; }
+  int ModeOf(int servo, const ServoTime<T>& time) const {
+    return ServoMode(model_, state_, servo, time);
+  }
 
   void Body(int k, const T mass[3], const T load[3]) {
     std::copy_n(mass, 3, &p_.mass[3 * static_cast<size_t>(k)]);

@@ -16,6 +16,7 @@
 //   RowsOf, RatesOf (joint), RateScratch      memory
 //   Restitution(i), Approach(contact, rows)   of contact i: e, and n·v before the step
 //   Time()                                    of accelerations
+//   ModeOf(servo, time)                       of a servo: servo.h
 //
 // and takes
 //
@@ -131,6 +132,39 @@ class Equations {
             T(-Weight() * k[0] * (rows.coordinate - k[1])));
   }
 
+  /// A servo at its bound, or its spring and its damper: each an element of its own, for the same
+  /// reason.
+  void Servo(int k) {
+    if constexpr (kLevel != Level::kCorrection) {
+      if (Weight() == 0.0) return;
+      const ServoIndex& servo = s_.servos[k];
+      ServoTime<T> time;
+      time.h = kLevel == Level::kVelocity ? at_.h : 0.0;
+      time.time = kLevel == Level::kVelocity ? T(at_.t) : T(ValueOf(at_.time));
+      time.middle = at_.middle;
+      const int mode = b_.ModeOf(k, time);
+      b_.Begin();
+      ServoRows<T> rows;
+      EvaluateServo(servo, &rows);
+      const T weight = WeightOf(servo);
+      if (mode != 0) {
+        b_.Push(
+            rows.a, rows.row_a, rows.b, rows.row_b,
+            T(static_cast<double>(mode) * weight * b_.Number(servo.Number(ServoIndex::kLimit))));
+        return;
+      }
+      if constexpr (kLevel == Level::kAcceleration) {
+        if (servo.signal >= 0) time.time = b_.Time();
+      }
+      const T number = servo.signal < 0 ? b_.Number(servo.numbers) : T(0.0);
+      const ServoTarget<T> target = TargetOf(s_, servo, number, time);
+      b_.Push(rows.a, rows.row_a, rows.b, rows.row_b,
+              T(-weight * b_.Number(servo.Number(ServoIndex::kStiffness)) *
+                (rows.coordinate - target.value)));
+      ServoDamper(servo, target.rate);
+    }
+  }
+
   /// What the friction of a joint that slides is below that at rest. Steps of a fixed size do not
   /// have it (settings.h).
   void JointFrictionDecay(int j) {
@@ -213,6 +247,42 @@ class Equations {
   }
 
  private:
+  void ServoDamper(const ServoIndex& servo, double target_rate) {
+    b_.Begin();
+    ServoRows<T> rows;
+    EvaluateServo(servo, &rows);
+    const T damping = WeightOf(servo) * b_.Number(servo.Number(ServoIndex::kDamping));
+    b_.Along(rows.a, rows.row_a, rows.b, rows.row_b, T(damping * target_rate), damping);
+  }
+
+  void EvaluateServo(const ServoIndex& servo, ServoRows<T>* rows) {
+    if (servo.joint < 0) {
+      const ForceIndex& force = s_.forces[servo.force];
+      T buffer[2];
+      const auto& pose = b_.PoseOf(force.body);
+      EvaluateForceServo<T>(servo, force.body, s_.world(), pose,
+                            b_.Numbers(force.numbers, 2, buffer), rows);
+      return;
+    }
+    const JointIndex& joint = s_.joints[servo.joint];
+    JointRows<T> of_joint;
+    EvaluateAtPoses(joint, &of_joint);
+    *rows = {joint.a, joint.b, of_joint.coordinate_a, of_joint.coordinate_b, of_joint.coordinate};
+  }
+
+  /// Weight() of a servo: of a force over its window.
+  T WeightOf(const ServoIndex& servo) {
+    if (servo.joint >= 0) return T(Weight());
+    const ForceIndex& force = s_.forces[servo.force];
+    T start, end;
+    const T* from = force.start >= 0 ? b_.Numbers(force.start, 1, &start) : nullptr;
+    const T* to = force.end >= 0 ? b_.Numbers(force.end, 1, &end) : nullptr;
+    if constexpr (kLevel == Level::kVelocity) return WindowOverlap(at_.t, at_.h, from, to);
+    const bool is_on = !(from != nullptr && ValueOf(*from) > at_.middle) &&
+                       !(to != nullptr && ValueOf(*to) < at_.middle);
+    return T(is_on ? 1.0 : 0.0);
+  }
+
   /// c of the force −c v: the linear damping plus, for quadratic drag, the coefficient times |v|
   /// before the step. The speed |v| of a body at rest has no derivative; that of |v| v is 0 there.
   T LinearDamping(const BodyIndex& index, const T* twist) {

@@ -19,6 +19,17 @@ double SignalValue(const Signal& signal, const std::vector<double>& column, doub
   return column[k] + fraction * (column[k + 1] - column[k]);
 }
 
+double SignalRate(const Signal& signal, const std::vector<double>& column, double time) {
+  const auto& times = signal.time;
+  const auto next = std::upper_bound(times.begin(), times.end(), time);
+  if (next == times.begin() || next == times.end() ||
+      signal.interpolation == Signal::Interpolation::kConstant) {
+    return 0.0;
+  }
+  const size_t k = next - times.begin() - 1;
+  return (column[k + 1] - column[k]) / (times[k + 1] - times[k]);
+}
+
 double Inside(double x, double low, double high) {
   const double near = kSameTime * (high - low);
   return x < low - near || x > high + near ? 0.0 : x < low + near || x > high - near ? 0.5 : 1.0;

@@ -15,6 +15,9 @@ namespace internal {
 /// A column of a signal at a time.
 double SignalValue(const Signal& signal, const std::vector<double>& column, double time);
 
+/// The rate of a column on the piece that contains a time; 0 where the signal is constant.
+double SignalRate(const Signal& signal, const std::vector<double>& column, double time);
+
 /// The derivative of an overlap with respect to an end of the window: 1 inside, 1/2 at an end of
 /// the step, 0 outside. An end of a step is k dt rounded, so times that differ from it by less than
 /// kSameTime of a step count as equal to it, in both steps that share it.

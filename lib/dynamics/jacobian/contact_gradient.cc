@@ -61,7 +61,47 @@ class GradientVisitor : private internal::LocalEntries<EntryListSink> {
     Speed(contact, locals, rows.normal_a, rows.normal_b);
   }
 
+  void Servo(int k, double sign, double time, double middle) {
+    const ServoIndex& servo = s_.servos[k];
+    ServoRows<LocalJet> rows;
+    Locals spring;
+    EvaluateServo(servo, &spring, &rows);
+    const LocalJet number =
+        servo.signal < 0 ? LocalNumber(servo.numbers, &spring) : LocalJet(x_[servo.numbers]);
+    const LocalJet now = servo.signal < 0 ? LocalJet(time) : spring.Add(time, TimeVariable(s_));
+    const ServoTarget<LocalJet> target = TargetOf(s_, servo, number, {now, middle, 0.0});
+    const LocalJet stiffness = LocalNumber(servo.Number(ServoIndex::kStiffness), &spring);
+    Emit(spring, 0, sign * stiffness * (rows.coordinate - target.value));
+    Locals damper;
+    EvaluateServo(servo, &damper, &rows);
+    const LocalJet damping = LocalNumber(servo.Number(ServoIndex::kDamping), &damper);
+    LocalJet rate(-target.rate);
+    for (int i = 0; i < 3; ++i) {
+      rate += rows.row_a[i] * state_.twist[3 * rows.a + i] +
+              rows.row_b[i] * state_.twist[3 * rows.b + i];
+      EmitTwist(rows.a, i, sign * damping.a * rows.row_a[i].a);
+      EmitTwist(rows.b, i, sign * damping.a * rows.row_b[i].a);
+    }
+    Emit(damper, 0, sign * damping * rate);
+    sink_(0, s_.ParameterVariable(servo.Number(ServoIndex::kLimit)), 1.0);
+  }
+
  private:
+  void EvaluateServo(const ServoIndex& servo, Locals* locals, ServoRows<LocalJet>* out) {
+    if (servo.joint < 0) {
+      const ForceIndex& force = s_.forces[servo.force];
+      const Pose<LocalJet> pose = LocalPose(force.body, locals);
+      const LocalJet at[2] = {LocalNumber(force.numbers, locals),
+                              LocalNumber(force.numbers + 1, locals)};
+      EvaluateForceServo(servo, force.body, s_.world(), pose, at, out);
+      return;
+    }
+    const JointIndex& joint = s_.joints[servo.joint];
+    JointRows<LocalJet> rows;
+    LocalJointRows(joint, locals, &rows);
+    *out = {joint.a, joint.b, rows.coordinate_a, rows.coordinate_b, rows.coordinate};
+  }
+
   void Speed(const ActiveContact& contact, const Locals& locals, const RowPart<LocalJet>& row_a,
              const RowPart<LocalJet>& row_b) {
     LocalJet speed(0.0);
@@ -104,6 +144,13 @@ void AddApproachGradient(const Model<double>& model, const State<double>& state,
                          std::vector<JacobianEntry>* entries) {
   const EntryListSink sink{entries};
   GradientVisitor(model, state, scratch, sink).Approach(contact);
+}
+
+void AddServoGradient(const Model<double>& model, const State<double>& state, int servo,
+                      double sign, double time, double middle, LocalJacobianScratch* scratch,
+                      std::vector<JacobianEntry>* entries) {
+  const EntryListSink sink{entries};
+  GradientVisitor(model, state, scratch, sink).Servo(servo, sign, time, middle);
 }
 
 }  // namespace tangible

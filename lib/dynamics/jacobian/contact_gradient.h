@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 //
-// Gradients of the functions whose roots are events: a contact's gap, its sliding speed t v, and
-// the speed n v at which it opens.
+// Gradients of the functions whose roots are events: a contact's gap, its sliding speed t v, the
+// speed n v at which it opens, and what is left to a servo's bound.
 
 #include "tangible/dynamics/jacobian/equation_jacobian.h"
 
@@ -21,5 +21,10 @@ void AddSlipGradient(const Model<double>& model, const State<double>& state,
 void AddApproachGradient(const Model<double>& model, const State<double>& state,
                          const ActiveContact& contact, LocalJacobianScratch* scratch,
                          std::vector<JacobianEntry>* entries);
+
+/// The same for L − sign u of a servo, N or N m (servo.h), of which the time is a variable too.
+void AddServoGradient(const Model<double>& model, const State<double>& state, int servo,
+                      double sign, double time, double middle, LocalJacobianScratch* scratch,
+                      std::vector<JacobianEntry>* entries);
 
 }  // namespace tangible

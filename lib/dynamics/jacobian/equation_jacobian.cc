@@ -31,6 +31,7 @@ class EntryBuilder : private internal::LocalEntries<Sink> {
     at_.t = solved.instant.t;
     at_.h = solved.instant.h;
     at_.middle = solved.instant.middle;
+    at_.time = LocalJet(solved.instant.time);
     unknown_ = kLevel == Level::kVelocity ? solved.new_twist->data() : this->SpreadSolved(solved);
     damped_ = kLevel == Level::kAcceleration ? before_ : unknown_;
   }
@@ -65,6 +66,7 @@ class EntryBuilder : private internal::LocalEntries<Sink> {
       equations_.JointSpring(j);
       equations_.JointFrictionDecay(j);
     }
+    for (int k = 0; k < static_cast<int>(s_.servos.size()); ++k) equations_.Servo(k);
     for (size_t i = 0; i < solved_.contacts->size(); ++i) {
       const ActiveContact& contact = (*solved_.contacts)[i];
       if ((*solved_.contact_block)[i] < 0) {
@@ -83,9 +85,7 @@ class EntryBuilder : private internal::LocalEntries<Sink> {
   void Begin() { locals_ = internal::Locals(); }
   LocalJet Number(int i) { return LocalNumber(i, &locals_); }
   const LocalJet* Numbers(int first, int count, LocalJet* buffer) {
-    for (int i = 0; i < count; ++i) {
-      buffer[i] = LocalNumber(first + i, &locals_);
-    }
+    for (int i = 0; i < count; ++i) buffer[i] = LocalNumber(first + i, &locals_);
     return buffer;
   }
   Pose<LocalJet> PoseOf(int body) { return LocalPose(body, &locals_); }
@@ -116,6 +116,9 @@ class EntryBuilder : private internal::LocalEntries<Sink> {
   LocalJet Restitution(int i) const { return LocalJet((*solved_.restitution)[i].value); }
   LocalJet Approach(const ActiveContact& contact, const ContactRows<LocalJet>& rows) const {
     return RowTimes(before_, contact.a, rows.normal_a, contact.b, rows.normal_b);
+  }
+  int ModeOf(int servo, const ServoTime<LocalJet>& time) const {
+    return ServoMode(model_, state_, servo, {time.time.a, time.middle, time.h});
   }
   LocalJet Time() { return locals_.Add(solved_.instant.time, TimeVariable(s_)); }
 

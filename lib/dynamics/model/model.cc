@@ -67,6 +67,27 @@ class Places {
   int next_ = 0;
 };
 
+// The index of a servo but for what it belongs to.
+template <typename T>
+ServoIndex* AddServo(const BasicServo<T>& servo, Places* places, ModelStructure* structure) {
+  ServoIndex& index = structure->servos.emplace_back();
+  index.has_limit = servo.limit.has_value();
+  index.numbers = places->Take(index.size());
+  if (servo.target_signal) {
+    index.signal = static_cast<int>(structure->signals.size());
+    structure->signals.push_back(*servo.target_signal);
+  }
+  return &index;
+}
+
+// Appends its numbers.
+template <typename T>
+void FillServo(const std::optional<BasicServo<T>>& servo, std::vector<T>* numbers) {
+  if (!servo) return;
+  numbers->insert(numbers->end(), {servo->target, servo->stiffness, servo->damping});
+  if (servo->limit) numbers->push_back(*servo->limit);
+}
+
 template <typename T>
 void AddBodies(const BasicScene<T>& scene, Places* places, ModelStructure* structure) {
   for (const BasicBody<T>& body : scene.bodies) {
@@ -167,6 +188,10 @@ void AddJoints(const BasicScene<T>& scene, Places* places, ModelStructure* struc
       index.has_decay = joint.friction && joint.kinetic_friction;
       index.friction = joint.friction ? places->Take(index.has_decay ? 3 : 1) : -1;
       index.motor = joint.motor ? places->Take(2) : -1;
+      if (joint.effort_servo) {
+        AddServo(*joint.effort_servo, places, structure)->joint =
+            static_cast<int>(structure->joints.size());
+      }
     }
     if (joint.limits) {
       index.low = Limits(joint.limits->first) ? places->Take(1) : -1;
@@ -210,6 +235,15 @@ void AddForcesAndPairs(const BasicScene<T>& scene, Places* places, ModelStructur
     };
     index.force_signal = add_signal(force.force_signal);
     index.torque_signal = add_signal(force.torque_signal);
+    const auto add_servo = [&](const std::optional<BasicServo<T>>& servo, ServoIndex::Axis axis) {
+      if (!servo) return;
+      ServoIndex* const added = AddServo(*servo, places, structure);
+      added->force = static_cast<int>(structure->forces.size());
+      added->axis = axis;
+    };
+    add_servo(force.force_servos[0], ServoIndex::kX);
+    add_servo(force.force_servos[1], ServoIndex::kY);
+    add_servo(force.torque_servo, ServoIndex::kAngle);
     structure->forces.push_back(index);
   }
   for (const BasicPair<T>& pair : scene.pairs) {
@@ -345,6 +379,7 @@ void FillJoints(const BasicScene<T>& scene, const State<T>& drawn, int world,
         numbers->push_back(joint.motor->speed);
         numbers->push_back(joint.motor->limit);
       }
+      FillServo(joint.effort_servo, numbers);
     }
     if (joint.limits) {
       if (Limits(joint.limits->first)) numbers->push_back(joint.limits->first);
@@ -389,6 +424,8 @@ void FillForcesAndPairs(const BasicScene<T>& scene, const State<T>& drawn, int w
         numbers->push_back(*time);
       }
     }
+    for (const auto& servo : force.force_servos) FillServo(servo, numbers);
+    FillServo(force.torque_servo, numbers);
   }
   for (const BasicPair<T>& pair : scene.pairs) {
     for (const std::optional<T>& coefficient : {pair.friction, pair.restitution}) {

@@ -108,6 +108,21 @@ struct ForceIndex {
   int force_signal = -1, torque_signal = -1;  ///< into signals; replace force, torque
 };
 
+/// A servo along the coordinate of a joint, or of a force's point or body: target, stiffness,
+/// damping and, if it has one, limit from `numbers` on (servo.h).
+struct ServoIndex {
+  enum Place { kTarget, kStiffness, kDamping, kLimit };  ///< counted from `numbers`
+  enum Axis { kX, kY, kAngle };
+  int joint = -1;  ///< −1: of a force
+  int force = -1;
+  Axis axis = kX;  ///< of a force
+  int numbers = -1;
+  bool has_limit = false;
+  int signal = -1;  ///< into signals; replaces the target
+  int size() const { return has_limit ? 4 : 3; }
+  int Number(Place place) const { return numbers + place; }
+};
+
 /// A pair's own coefficients, for bodies that match the two patterns.
 struct PairIndex {
   std::vector<bool> first, second;      ///< a body: matches the pattern
@@ -130,6 +145,7 @@ struct ModelStructure {
   std::vector<JointIndex> joints;
   std::vector<SpringIndex> springs;
   std::vector<ForceIndex> forces;
+  std::vector<ServoIndex> servos;
   std::vector<PairIndex> pairs;
   std::vector<Signal> signals;
   std::vector<PathIndex> paths;  ///< in ascending order of their bodies

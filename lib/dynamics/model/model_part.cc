@@ -82,6 +82,17 @@ class PartTaker {
     *place = static_cast<int>(to_->signals.size()) - 1;
   }
 
+  // The servos of a joint or force of the whole; `own` is its place in the part.
+  void TakeServos(int ServoIndex::*owner, size_t of_whole, size_t own) {
+    for (const ServoIndex& servo : whole_.servos) {
+      if (servo.*owner != static_cast<int>(of_whole)) continue;
+      ServoIndex& index = to_->servos.emplace_back(servo);
+      index.*owner = static_cast<int>(own);
+      TakeNumbers(servo.size(), &index.numbers);
+      TakeSignal(&index.signal);
+    }
+  }
+
   void TakeJoints() {
     for (size_t j = 0; j < whole_.joints.size(); ++j) {
       if (!Moves(whole_.joints[j].a) && !Moves(whole_.joints[j].b)) continue;
@@ -99,6 +110,7 @@ class PartTaker {
       TakeOne(&index.high);
       TakeOne(&index.limit_restitution);
       TakeSignal(&index.effort_signal);
+      TakeServos(&ServoIndex::joint, j, to_->joints.size() - 1);
     }
     to_->joint_loops = whole_.joint_loops && !to_->joints.empty();
     for (const auto& [a, b] : whole_.joined) {
@@ -116,7 +128,8 @@ class PartTaker {
       index.b = local_[index.b];
       TakeNumbers(7, &index.numbers);
     }
-    for (const ForceIndex& force : whole_.forces) {
+    for (size_t k = 0; k < whole_.forces.size(); ++k) {
+      const ForceIndex& force = whole_.forces[k];
       if (!Moves(force.body)) continue;
       ForceIndex& index = to_->forces.emplace_back(force);
       index.body = local_[index.body];
@@ -125,6 +138,7 @@ class PartTaker {
       TakeOne(&index.end);
       TakeSignal(&index.force_signal);
       TakeSignal(&index.torque_signal);
+      TakeServos(&ServoIndex::force, k, to_->forces.size() - 1);
     }
   }
 

@@ -16,6 +16,9 @@ template <typename T>
 struct State {
   std::vector<T> pose;
   std::vector<T> twist;
+  /// During a motion without events: of each servo 0, or the sign of the bound at which it is held
+  /// (servo.h). Empty: by its coordinate and rate.
+  std::vector<signed char> servo_modes{};
 
   Pose<T> PoseOf(int body) const {
     return Pose<T>(Vector2<T>(pose[3 * body], pose[3 * body + 1]), pose[3 * body + 2]);
@@ -33,6 +36,7 @@ State<double> ValuesOf(const State<T>& state) {
   for (const T& x : state.twist) {
     values.twist.push_back(ValueOf(x));
   }
+  values.servo_modes = state.servo_modes;
   return values;
 }
 

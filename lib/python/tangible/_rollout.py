@@ -150,8 +150,9 @@ class Rollout:
     Args:
         scene: A `Scene`, a scene file, or a dict of its JSON.
         parameters: P paths of parameters, such as "bodies/ball/mass" or "bodies/*/friction".
-        controls: C paths of forces, torques or efforts that have a value of their own in each step:
-            "forces/push/force/x", "forces/push/torque", "joints/motor/effort".
+        controls: C paths of forces, torques or efforts, or of servos' targets, that have a value of
+            their own in each step: "forces/push/force/x", "joints/motor/effort",
+            "joints/motor/effort/target".
         records: Steps whose states are returned (0: the start); absent: the state at the end, and
             results have no axis for it.
         threads: Of batches; 0: one a core. Results have the same bits for any number.

@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <utility>
 
+#include "tangible/dynamics/elements/servo.h"
 #include "tangible/dynamics/model/driven_bodies.h"
 #include "tangible/lcp/system/contact_conditioning.h"
 #include "tangible/simulation/certificate/approach_inl.h"
@@ -15,6 +16,7 @@
 #include "tangible/simulation/certificate/tolerances.h"
 #include "tangible/simulation/derivatives/rollout_directional.h"
 #include "tangible/simulation/derivatives/tolerances.h"
+#include "tangible/simulation/events/servo_bounds.h"
 #include "tangible/simulation/events/tolerances.h"
 
 namespace tangible {
@@ -26,6 +28,7 @@ constexpr size_t kRankEachStep = 150;
 }  // namespace
 
 std::string ContactName(const ModelStructure& structure, const ActiveContact& contact) {
+  if (contact.is_servo) return NameOfServo(structure, contact);
   if (contact.IsJointFriction()) {
     return (contact.is_motor ? "motor of joint " : "friction in joint ") +
            structure.joints[contact.joint].name;
@@ -227,6 +230,20 @@ void RolloutCertifier::AddFeatures(const Model<double>& model, const StepRecord&
   }
 }
 
+// The mode of a servo is that of its effort at the step's start.
+void RolloutCertifier::AddServos(const Model<double>& model, long step, const StepRecord& record) {
+  const ModelStructure& s = *model.structure;
+  for (int k = 0; k < static_cast<int>(s.servos.size()); ++k) {
+    if (!s.servos[k].has_limit || !IsServoOn(model, k, record.time + 0.5 * record.h)) continue;
+    const double effort =
+        UnboundedEffort(model, record.before, k, {record.time, record.time, record.h});
+    const double limit = model.parameters[s.servos[k].Number(ServoIndex::kLimit)];
+    const ActiveContact contact = ContactOfServo(s, k);
+    AddMargin(std::abs(limit - std::abs(effort)) / (limit + std::abs(effort)),
+              {&s, step, record.time, 0, &contact, ContactMode::kOpen}, "bound of a servo");
+  }
+}
+
 void RolloutCertifier::AddDiscreteMap(const Model<double>& model, long step,
                                       const StepRecord& record) {
   made_last_.clear();
@@ -281,6 +298,7 @@ void RolloutCertifier::AddStep(const Model<double>& model, long step, Stepper* s
   std::vector<int> degenerate;
   FindDegenerateContacts(record.problem, record.solution, kDegenerateTolerance, &degenerate);
   certificate_.degenerate_rows += static_cast<int>(degenerate.size());
+  AddServos(model, step, record);
   AddLinearSystem(record, &stepper->system());
   AddFeatures(model, record, step, &stepper->system());
   last_modes_ = record.solution.modes;

@@ -177,6 +177,9 @@ double EventDerivative::EventGradient(const Model<double>& model, Segment* segme
     AddApproachGradient(model, segment->after, segment->event_contact, &scratch_, &entries);
   } else if (segment->event == EventKind::kSlipEnds) {
     AddSlipGradient(model, segment->after, segment->event_contact, &scratch_, &entries);
+  } else if (segment->event == EventKind::kServoBound) {
+    AddServoGradient(model, segment->after, segment->event_index, segment->event_sign,
+                     segment->time + segment->length, segment->middle, &scratch_, &entries);
   } else {
     // Lift-off has g = λn; slip begins at g = Σ (μ λn − sign λt) over contacts that stick together.
     SolvedNode& node = segment->end;

@@ -6,6 +6,7 @@
 #include <cstdio>
 
 #include "tangible/dynamics/elements/force.h"
+#include "tangible/dynamics/elements/servo.h"
 #include "tangible/dynamics/model/driven_bodies.h"
 #include "tangible/simulation/events/tolerances.h"
 
@@ -68,6 +69,7 @@ std::vector<Edge> EdgesWithin(const Model<double>& model, double from, double to
   for (const JointIndex& joint : structure.joints) {
     add_signal(joint.effort_signal);
   }
+  for (const ServoIndex& servo : structure.servos) add_signal(servo.signal);
   ForEachKnot(model, from, to, [&](const Edge& edge) {
     if (IsSameInstant(structure, edge.time, from) || IsSameInstant(structure, edge.time, to))
       return;
@@ -197,6 +199,11 @@ void AddEdgesToCome(const Model<double>& model, const Segment& segment,
             none, none, segment.time, inside, load);
     for (int i = 0; i < 3; ++i) {
       problem->load[3 * block + i] += window.side * load[i];
+    }
+    for (size_t k = 0; k < s.servos.size(); ++k) {
+      if (s.servos[k].force != window.force) continue;
+      AddServoLoad(model, segment.before, static_cast<int>(k), {segment.time, inside, 0.0},
+                   window.side, &problem->load);
     }
   }
 }

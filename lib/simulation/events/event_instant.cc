@@ -267,7 +267,8 @@ std::string NameOfContact(const ModelStructure& structure,
     return "joints";
   }
   const ActiveContact& contact = contacts[index];
-  return contact.is_motor            ? "motor of joint " + structure.joints[contact.joint].name
+  return contact.is_servo            ? NameOfServo(structure, contact)
+         : contact.is_motor          ? "motor of joint " + structure.joints[contact.joint].name
          : contact.IsJointFriction() ? "friction in joint " + structure.joints[contact.joint].name
          : contact.joint >= 0        ? "limit of joint " + structure.joints[contact.joint].name
                                      : "contact of " + structure.bodies[contact.a].name + " and " +

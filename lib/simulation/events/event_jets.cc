@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tangible/dynamics/elements/servo.h"
 #include "tangible/dynamics/model/driven_bodies.h"
 #include "tangible/simulation/events/implicit_stage.h"
 #include "tangible/simulation/events/mode_elimination_inl.h"
@@ -34,12 +35,15 @@ class EventReplay {
         started = true;
       }
       FollowPaths(model_, now, part.inside(), state);
+      state->servo_modes =
+          (part.is_impulses ? part.impulses.before : part.segment.before).servo_modes;
       if (part.is_impulses) {
         RunImpulses(&part.impulses, state);
       } else {
         RunSegment(&part.segment, &now, state);
       }
     }
+    state->servo_modes.clear();
   }
 
  private:
@@ -195,6 +199,12 @@ class EventReplay {
   // The event's equation at the state after.
   T Equation(Segment* segment, const State<T>& after, const T& time) {
     const ActiveContact& contact = segment->event_contact;
+    if (segment->event == EventKind::kServoBound) {
+      const int k = segment->event_index;
+      const T& limit = model_.parameters[s_.servos[k].Number(ServoIndex::kLimit)];
+      return limit -
+             segment->event_sign * UnboundedEffort(model_, after, k, {time, segment->middle, 0.0});
+    }
     if (segment->event == EventKind::kLiftOff || segment->event == EventKind::kSlipBegins) {
       ContactSolution<T> solution;
       Accelerate(*segment, after, time, &segment->end, &solution);
@@ -269,6 +279,7 @@ class EventReplay {
     State<T> jets;
     jets.pose = JetsOf(state.pose);
     jets.twist = JetsOf(state.twist);
+    jets.servo_modes = state.servo_modes;
     return jets;
   }
 

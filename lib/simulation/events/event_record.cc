@@ -5,7 +5,8 @@ namespace tangible {
 namespace {
 
 size_t BytesOf(const State<double>& state) {
-  return sizeof(double) * (state.pose.capacity() + state.twist.capacity());
+  return sizeof(double) * (state.pose.capacity() + state.twist.capacity()) +
+         state.servo_modes.capacity();
 }
 
 // Bytes without the node itself, which is stored in a vector.
@@ -86,6 +87,8 @@ const char* NameOf(EventKind event) {
       return "start of sliding";
     case EventKind::kLiftOff:
       return "lift-off";
+    case EventKind::kServoBound:
+      return "bound of a servo";
     case EventKind::kReturn:
       return "return into penetration";
     case EventKind::kAtOnce:

@@ -55,6 +55,7 @@ enum class EventKind : unsigned char {
   kSlipEnds,    ///< a sliding speed reaches 0
   kSlipBegins,  ///< friction reaches its limit (Segment::SticksWith)
   kLiftOff,     ///< a normal force reaches 0
+  kServoBound,  ///< a servo reaches or leaves its bound
   kReturn,      ///< the speed at which an open contact leaves penetration reaches 0
   kAtOnce,      ///< the same at the segment's start, where poses and twists are corrected
 };
@@ -98,10 +99,10 @@ struct Segment {
   EventKind event = EventKind::kStepEnd;
   ActiveContact event_contact;
   CoefficientSource event_friction;  ///< of kSlipBegins
-  double event_sign = 0.0;           ///< kSlipBegins: sign of the tangential force
-  int event_number = -1;             ///< kEdge: the number that is the time; −1: a constant
-  SolvedNode end;                    ///< kSlipBegins, kLiftOff: accelerations after the motion
-  int event_index = -1;              ///< the same: which of `contacts`
+  double event_sign = 0.0;  ///< sign of kSlipBegins' tangential force, of kServoBound's bound
+  int event_number = -1;    ///< kEdge: the number that is the time; −1: a constant
+  SolvedNode end;           ///< kSlipBegins, kLiftOff: accelerations after the motion
+  int event_index = -1;     ///< the same: which of `contacts`; kServoBound: the servo
   /// The event's function does not pass through 0 but jumps where poses and twists are corrected at
   /// the start of the segment: the time of the event is that start, whatever varies.
   bool at_once = false;

@@ -515,6 +515,7 @@ bool EventSearch::Run(const Model<double>& model, const std::vector<ActiveContac
     }
   }
   if (event.kind != EventKind::kAtOnce) SearchClosed(model, &event);
+  if (event.kind != EventKind::kAtOnce && !event.at_start) SearchServos(model, &event);
   ends_at_start_ = event.at_start;
   segment->length = event.length;
   segment->event = event.kind;

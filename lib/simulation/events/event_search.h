@@ -2,7 +2,7 @@
 #pragma once
 //
 // Where the next event is: the smallest τ in (0, length] at which a segment's motion closes a gap,
-// ends a slip, reaches the limit of friction or lifts a contact off.
+// ends a slip, reaches the limit of friction, lifts a contact off or takes a servo to its bound.
 //
 // Every candidate motion is the segment's own map at that length, so that the event's equation
 // holds for the state that the segment ends with. Gaps: an interval on which gap(a) + gap(b)
@@ -127,6 +127,8 @@ class EventSearch {
                  const CourseOver& course_over, double tolerance, double from, double to,
                  double* root);
   void SearchClosed(const Model<double>& model, Event* event);
+  void SearchServos(const Model<double>& model, Event* event);  ///< servo_bounds.cc
+  void SearchServo(const Model<double>& model, int servo, double sign, Event* event);
   double SlipRate(const Model<double>& model, const State<double>& state, double time,
                   const std::vector<double>& accelerations, const Event& event) const;
   double FindDip(const Model<double>& model, const Event& event, double a, double fa, double b,

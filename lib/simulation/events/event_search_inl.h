@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Roots of functions of a segment's length. Included by event_search*.cc alone.
+// Roots of functions of a segment's length. Included by event_search*.cc and servo_bounds.cc alone.
 
 #include <algorithm>
 #include <cmath>

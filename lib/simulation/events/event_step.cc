@@ -8,6 +8,7 @@
 #include "tangible/math/interrupt.h"
 #include "tangible/simulation/events/ellipse_motion.h"
 #include "tangible/simulation/events/load_speed.h"
+#include "tangible/simulation/events/servo_bounds.h"
 #include "tangible/simulation/events/tolerances.h"
 
 namespace tangible {
@@ -702,6 +703,7 @@ EventStepper::Tried EventStepper::TryMotion(const Model<double>& model, double n
     return Tried::kAgain;
   }
   if (!outcome->message.empty()) return Tried::kFailed;
+  if (!model.structure->servos.empty()) HoldServos(model, &flow_, segment);
   std::string message;
   bool moved = search_.Run(model, touching_.contacts, segment, &message);
   // Where motions have to be shortened.
@@ -769,6 +771,7 @@ StepReport EventStepper::Advance(const Model<double>& model, double t, double h,
     outcome.stopped = at_event == AtEvent::kStopAtSecond && guess_.located > 1;
     if (outcome.stopped) break;
     *state = segment.after;
+    state->servo_modes.clear();
     at_given_time = segment.event == EventKind::kStepEnd;
     tries.halvings = 0;
     if (at_given_time) {

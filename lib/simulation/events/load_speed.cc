@@ -7,6 +7,7 @@
 
 #include "tangible/dynamics/elements/force.h"
 #include "tangible/dynamics/elements/joint.h"
+#include "tangible/dynamics/elements/servo_inl.h"
 #include "tangible/dynamics/model/driven_bodies.h"
 #include "tangible/simulation/events/tolerances.h"
 
@@ -29,6 +30,7 @@ class LoadScan {
     for (const SpringIndex& spring : s_.springs) Spring(spring);
     for (const JointIndex& joint : s_.joints) Joint(joint);
     for (const PathIndex& path : s_.paths) Path(path);
+    for (int k = 0; k < static_cast<int>(s_.servos.size()); ++k) Servo(k);
     return fastest_;
   }
 
@@ -102,6 +104,19 @@ class LoadScan {
     const double force = std::abs(row.tension);
     Add(spring.a, force, force * std::abs(row.row_a[2]));
     Add(spring.b, force, force * std::abs(row.row_b[2]));
+  }
+
+  // What a servo does at the step's start.
+  void Servo(int k) {
+    const double middle = 0.5 * (from_ + to_);
+    if (!IsServoOn(model_, k, middle)) return;
+    const ServoIndex& servo = s_.servos[k];
+    double acts = std::abs(UnboundedEffort(model_, state_, k, {from_, middle, 0.0}));
+    if (servo.has_limit) acts = std::min(acts, Number(servo.Number(ServoIndex::kLimit)));
+    ServoRows<double> rows;
+    EvaluateServo(model_, state_, servo, &rows);
+    Add(rows.a, acts * std::hypot(rows.row_a[0], rows.row_a[1]), acts * std::abs(rows.row_a[2]));
+    Add(rows.b, acts * std::hypot(rows.row_b[0], rows.row_b[1]), acts * std::abs(rows.row_b[2]));
   }
 
   // Effort, spring and friction along a joint's coordinate.

@@ -36,6 +36,11 @@ inline constexpr double kLeastLeft = 1e-12;
 
 /// Of the size r, or value at the start of an interval: gaps, forces and slips are located to it.
 inline constexpr double kLocatedOfSize = 8.0 * std::numeric_limits<double>::epsilon();
+/// Of the terms of a servo's effort and its limit: its bound is located to it.
+inline constexpr double kServoLocated = 8.0 * std::numeric_limits<double>::epsilon();
+/// Of the same terms: within it a servo is on its bound, and the rate of its effort tells its mode;
+/// it lies well above what locating leaves, and either mode has the same effort there.
+inline constexpr double kServoBound = 1e-11;
 /// Of the coordinate x: gaps are located to it where that is larger, because a pose has no more
 /// digits.
 inline constexpr double kLocatedOfCoordinate = std::numeric_limits<double>::epsilon();

@@ -15,12 +15,16 @@ bool EndsWith(const std::string& text, const std::string& end) {
   return text.size() >= end.size() && text.compare(text.size() - end.size(), end.size(), end) == 0;
 }
 
-// Whether a canonical path is that of a force, a torque or an effort.
+// Whether a canonical path is that of a force, a torque, an effort, or the target of a servo.
 bool MayBeControlled(const std::string& path) {
   const bool of_force = path.rfind("forces/", 0) == 0;
-  return (of_force && (EndsWith(path, "/force/x") || EndsWith(path, "/force/y") ||
-                       EndsWith(path, "/torque"))) ||
-         (path.rfind("joints/", 0) == 0 && EndsWith(path, "/effort"));
+  const bool of_joint = path.rfind("joints/", 0) == 0;
+  const auto is_drive = [&](const std::string& end) {
+    return (of_force && (EndsWith(path, "/force/x" + end) || EndsWith(path, "/force/y" + end) ||
+                         EndsWith(path, "/torque" + end))) ||
+           (of_joint && EndsWith(path, "/effort" + end));
+  };
+  return is_drive("") || is_drive("/target");
 }
 
 std::string SizeError(const char* what, const std::string& expected, const std::string& got) {
@@ -43,7 +47,8 @@ std::string RolloutFunction::AddControl(const std::string& path) {
   for (const int number : control.numbers) {
     if (!MayBeControlled(numbers[number].path)) {
       return "control " + path + ": expected forces/NAME/force/x, forces/NAME/force/y, " +
-             "forces/NAME/torque or joints/NAME/effort, got " + numbers[number].path;
+             "forces/NAME/torque or joints/NAME/effort (or its /target), got " +
+             numbers[number].path;
     }
   }
   // Each is one parameter of the model, with the same value.

@@ -21,7 +21,7 @@ constexpr double kExploded = 1e4;
 
 bool IsDriven(const Model<double>& model, const State<double>& state) {
   const ModelStructure& s = *model.structure;
-  if (!s.forces.empty() || !s.paths.empty()) {
+  if (!s.forces.empty() || !s.paths.empty() || !s.servos.empty()) {
     return true;
   }
   for (const JointIndex& joint : s.joints) {

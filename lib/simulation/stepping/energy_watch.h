@@ -10,7 +10,7 @@
 
 namespace tangible {
 
-/// Whether forces, efforts or bodies of given motion drive the scene.
+/// Whether forces, efforts, servos or bodies of given motion drive the scene.
 bool IsDriven(const Model<double>& model, const State<double>& state);
 
 class EnergyWatch {

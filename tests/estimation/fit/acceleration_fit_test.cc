@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A fit from what a phone shows that swings as a pendulum (acceleration.h).
+// A fit from what a phone shows that swings as a pendulum (acceleration.h), and one of a servo from
+// the angle that it turns by.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <random>
 
@@ -96,6 +98,54 @@ TEST(AccelerationFitTest, APhoneShowsLengthAndDamping) {
                          : "angle",
                 noisy.estimate[i], deviation);
   }
+}
+
+constexpr char kTurned[] = R"({"name": "servo", "bodies": [
+  {"name": "horn", "mass": 1, "inertia": 0.05, "position": [0, 0]}],
+  "joints": [{"name": "axle", "type": "revolute", "bodies": ["horn", "world"], "anchor": [0, 0],
+              "effort": {"target": 1.2, "stiffness": 2, "damping": 0.1, "limit": 1.2}}],
+  "simulation": {"dt": 0.01, "duration": 1, "stepping": "event"}})";
+
+/// I θ'' = −k (θ − 1.2) − d θ' within ± L, by the midpoint rule with steps of 0.1 ms, at 50 Hz.
+std::vector<Observation> Turn(double stiffness, double damping, double limit) {
+  const auto rate = [&](double angle, double omega) {
+    return std::clamp(-stiffness * (angle - 1.2) - damping * omega, -limit, limit) / 0.05;
+  };
+  const double h = 1e-4;
+  double angle = 0.0, omega = 0.0;
+  std::vector<Observation> observations;
+  for (int k = 0; k <= 10000; ++k) {
+    if (k % 200 == 0) {
+      Observation one;
+      one.time = h * k;
+      one.body = 0;
+      one.coordinate = Coordinate::kAngle;
+      one.sigma = 1e-3;
+      one.value = angle;
+      observations.push_back(one);
+    }
+    const double middle_angle = angle + 0.5 * h * omega;
+    const double middle_omega = omega + 0.5 * h * rate(angle, omega);
+    angle += h * middle_omega;
+    omega += h * rate(middle_angle, middle_omega);
+  }
+  return observations;
+}
+
+TEST(ServoFitTest, TheAngleShowsStiffnessDampingAndLimit) {
+  const std::string effort = "joints/axle/effort/";
+  const double truth[3] = {3.0, 0.15, 1.5};
+  ParameterizedScene scene;
+  ParameterError error;
+  ASSERT_TRUE(scene.Create(MakeScene(kTurned), {},
+                           {Parameter(effort + "stiffness", 2.0),
+                            Parameter(effort + "damping", 0.1), Parameter(effort + "limit", 1.2)},
+                           &error))
+      << error.what;
+  RolloutResiduals residuals(scene, Turn(truth[0], truth[1], truth[2]));
+  const FitResult fit = Fit(FitOptions(), &residuals, {});
+  ASSERT_EQ(fit.status, FitStatus::kConverged) << fit.message;
+  for (int i = 0; i < 3; ++i) EXPECT_NEAR(fit.estimate[i], truth[i], 1e-5 * truth[i]) << i;
 }
 
 }  // namespace

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Motors of joints, ropes, and limits with restitution, against closed forms.
+// Motors of joints, servos, ropes, and limits with restitution, against closed forms.
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -185,6 +186,154 @@ TEST(MotorTest, ItsWorkIsNotAnImpacts) {
   EXPECT_NEAR(state.twist[8], 40.0 / 0.5 * 0.2, 1e-9);
   EXPECT_GT(state.twist[4], 0.0);  // it has rebounded
   EXPECT_LE(report.impact_energy_gain, 0.0);
+}
+
+struct Phase {
+  double x = 0.0, v = 0.0;
+};
+
+// An oscillator with damping, m ë = −k e − d ė, about a target that moves at a rate, after a time.
+Phase Oscillate(const Phase& start, double m, double k, double d, double target, double rate,
+                double t) {
+  const double e = start.x - target, w = start.v - rate;
+  const double decay = d / (2.0 * m), omega = std::sqrt(k / m - decay * decay);
+  const double c = std::cos(omega * t), s = std::sin(omega * t) / omega;
+  const double left = std::exp(-decay * t);
+  return {target + rate * t + left * (e * c + (w + decay * e) * s),
+          rate + left * (w * c - (k / m * e + decay * w) * s)};
+}
+
+using Numbers = std::vector<double>;
+using ClosedForm = std::function<Phase(const Numbers&)>;
+
+// Position and speed of coordinate `row` of the first body, and their derivatives, against a closed
+// form at the values of the parameters, and every method against each other.
+void ExpectClosedForm(const Scene& scene, const std::vector<std::string>& paths, int row,
+                      const Numbers& at, const ClosedForm& form) {
+  const GradientResult result = Jacobian(scene, paths, GradientMethod::kAdjoint);
+  EXPECT_NEAR(result.values[row], form(at).x, 1e-9);
+  EXPECT_NEAR(result.values[row + 3], form(at).v, 1e-9);
+  for (size_t i = 0; i < paths.size(); ++i) {
+    const double h = 1e-5;
+    Numbers above = at, below = at;
+    above[i] += h;
+    below[i] -= h;
+    const double by_x = (form(above).x - form(below).x) / (2.0 * h);
+    const double by_v = (form(above).v - form(below).v) / (2.0 * h);
+    EXPECT_NE(by_x, 0.0);
+    EXPECT_NEAR(result.jacobian(row, static_cast<int>(i)), by_x, 1e-7) << paths[i];
+    EXPECT_NEAR(result.jacobian(row + 3, static_cast<int>(i)), by_v, 1e-7) << paths[i];
+  }
+  EXPECT_EQ(result.certificate.verdict, "trustworthy") << result.certificate.margin_where;
+  ExpectOthersAgree(scene, paths, result);
+}
+
+// A body of mass 2 and inertia 0.5 with a force, and one on a rail.
+Scene Pushed(const std::string& force, const std::string& stepping, double dt, double duration) {
+  return SceneOf(R"({"gravity": [0, 0], "bodies": [{"name": "m", "mass": 2, "inertia": 0.5,
+      "position": [0.1, 0], "velocity": [0.4, 0]}],
+      "forces": [{"name": "f", "body": "m", )" +
+                 force + "}]" + Tail(stepping, dt, duration));
+}
+Scene OnRail(const std::string& effort, const std::string& stepping, double dt, double duration) {
+  return SceneOf(R"({"gravity": [0, 0], "bodies": [{"name": "m", "mass": 1, "inertia": 1,
+      "position": [0, 0]}],
+      "joints": [{"name": "r", "type": "prismatic", "bodies": ["m", "world"], "anchor": [0, 0],
+      "axis": [1, 0], "effort": )" +
+                 effort + "}]" + Tail(stepping, dt, duration));
+}
+
+TEST(ServoTest, AMassIsADampedOscillator) {
+  const std::string f = "forces/f/force/x/";
+  ExpectClosedForm(Pushed(R"("force": [{"target": 0.3, "stiffness": 8, "damping": 1.6}, 0])",
+                          "event", 0.005, 0.8),
+                   {f + "target", f + "stiffness", f + "damping", "bodies/m/mass"}, 0,
+                   {0.3, 8.0, 1.6, 2.0}, [](const Numbers& p) {
+                     return Oscillate({0.1, 0.4}, p[3], p[1], p[2], p[0], 0.0, 0.8);
+                   });
+}
+
+// Bounded until −k (x − r) − d v falls to L, at k L t² / 2 m + d L t / m = k r − L.
+Phase OutOfTheBound(const Numbers& p, double duration) {
+  const double r = p[0], k = p[1], d = p[2], limit = p[3];
+  const double a = 0.5 * k * limit, b = d * limit;
+  const double t = (std::sqrt(b * b + 4.0 * a * (k * r - limit)) - b) / (2.0 * a);
+  return Oscillate({0.5 * limit * t * t, limit * t}, 1.0, k, d, r, 0.0, duration - t);
+}
+
+TEST(ServoTest, LeavesItsBound) {
+  const std::string e = "joints/r/effort/";
+  ExpectClosedForm(
+      OnRail(R"({"target": 1, "stiffness": 4, "damping": 0.8, "limit": 2})", "event", 0.005, 1.2),
+      {e + "target", e + "stiffness", e + "damping", e + "limit"}, 0, {1.0, 4.0, 0.8, 2.0},
+      [](const Numbers& p) { return OutOfTheBound(p, 1.2); });
+  // Without damping it comes to the other bound, and the certificate knows of both events.
+  const GradientResult result =
+      Jacobian(OnRail(R"({"target": 1, "stiffness": 4, "limit": 2})", "event", 0.01, 2.0),
+               {e + "limit"}, GradientMethod::kAdjoint);
+  EXPECT_EQ(result.certificate.events, 2);
+}
+
+// It stays on its bound: a constant force, of which neither stiffness nor target are part.
+TEST(ServoTest, OnItsBoundItIsAConstantForce) {
+  const std::string e = "joints/r/effort/";
+  const std::vector<std::string> paths = {e + "target", e + "stiffness", e + "limit"};
+  for (const char* stepping : {"event", "fixed"}) {
+    const Scene scene =
+        OnRail(R"({"target": -9, "stiffness": 40, "damping": 3, "limit": 2})", stepping, 0.01, 0.5);
+    const GradientResult result = Jacobian(scene, paths, GradientMethod::kAdjoint);
+    EXPECT_NEAR(result.values[3], -1.0, 1e-12);
+    EXPECT_NEAR(result.jacobian(3, 0), 0.0, 1e-12);
+    EXPECT_NEAR(result.jacobian(3, 1), 0.0, 1e-12);
+    EXPECT_NEAR(result.jacobian(3, 2), -0.5, 1e-12);
+    ExpectOthersAgree(scene, paths, result);
+  }
+}
+
+// A target that rests, moves at 0.5 rad/s from 0.203 s to 0.603 s and rests again.
+constexpr char kRamp[] =
+    R"({"time": [0.203, 0.603], "value": [0, 0.2], "interpolation": "linear"})";
+
+TEST(ServoTest, FollowsASeries) {
+  const std::string servo =
+      std::string(R"({"target": )") + kRamp + R"(, "stiffness": 6, "damping": 0.7})";
+  const std::string f = "forces/f/torque/";
+  ExpectClosedForm(Pushed(R"("torque": )" + servo, "event", 0.005, 0.9),
+                   {f + "stiffness", f + "damping", "bodies/m/inertia"}, 2, {6.0, 0.7, 0.5},
+                   [](const Numbers& p) {
+                     const auto go = [&](const Phase& from, double target, double rate, double t) {
+                       return Oscillate(from, p[2], p[0], p[1], target, rate, t);
+                     };
+                     return go(go(go({0.0, 0.0}, 0.0, 0.0, 0.203), 0.0, 0.5, 0.4), 0.2, 0.0, 0.297);
+                   });
+}
+
+// All methods agree in either stepping where several servos act, with windows and bounds, and fixed
+// steps come to the motion by events.
+TEST(ServoTest, AllMethodsAgreeAndFixedStepsConverge) {
+  const std::string force = std::string(R"("at": [0.2, 0.1], "start": 0.0513, "end": 0.7571,
+      "force": [{"target": 0.5, "stiffness": 30, "damping": 2, "limit": 3}, 0.5],
+      "torque": {"target": )") +
+                            kRamp + R"(, "stiffness": 6, "damping": 0.4, "limit": 0.3})";
+  const std::vector<std::string> paths = {"forces/f/force/x/target",  "forces/f/force/x/stiffness",
+                                          "forces/f/force/x/damping", "forces/f/force/x/limit",
+                                          "forces/f/force/y",         "forces/f/torque/stiffness",
+                                          "forces/f/torque/limit",    "forces/f/at/x",
+                                          "forces/f/start",           "forces/f/end"};
+  const Scene events = Pushed(force, "event", 0.01, 0.8);
+  const GradientResult exact = Jacobian(events, paths, GradientMethod::kAdjoint);
+  EXPECT_GE(exact.certificate.events, 2);
+  ExpectOthersAgree(events, paths, exact);
+  double last = 0.0;
+  for (const double dt : {0.004, 0.002}) {
+    const Scene fixed = Pushed(force, "fixed", dt, 0.8);
+    const GradientResult result = Jacobian(fixed, paths, GradientMethod::kAdjoint);
+    const double error = (result.values - exact.values).cwiseAbs().maxCoeff();
+    if (last > 0.0) EXPECT_NEAR(error / last, 0.5, 0.2);
+    last = error;
+    if (dt == 0.004) ExpectOthersAgree(fixed, paths, result);
+  }
+  EXPECT_LT(last, 0.05);
 }
 
 Scene Rope(const std::string& limits, const std::string& start, const std::string& stepping,

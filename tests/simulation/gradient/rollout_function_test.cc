@@ -376,6 +376,26 @@ TEST_P(RolloutFunctionTest, ARunOfNoStepsEndsWhereItBegins) {
   EXPECT_FALSE(worker.Certify(input).verdict.empty());
 }
 
+TEST(RolloutFunctionControlsTest, TheTargetOfAServoIsOne) {
+  const auto scene = [](const std::string& target) {
+    return SceneOf(R"({"gravity": [0, 0], "bodies": [
+        {"name": "m", "mass": 1, "inertia": 1, "position": [0, 0]}],
+        "joints": [{"name": "r", "type": "prismatic", "bodies": ["m", "world"], "anchor": [0, 0],
+        "axis": [1, 0], "effort": {"stiffness": 9, "damping": 2, "limit": 3, "target": )" +
+                   target + R"(}}], "simulation": {"dt": 0.01, "duration": 0.3}})");
+  };
+  const std::string path = "joints/r/effort/target";
+  RolloutFunction moved, held;
+  ASSERT_EQ(moved.Create(scene("0"), {}, {path}, {}), "");
+  ASSERT_EQ(held.Create(scene("0.7"), {}, {path}, {}), "");
+  RolloutInput input = moved.Defaults();
+  input.controls.setConstant(0.7);
+  RolloutWorker to(moved), at(held);
+  const RolloutOutput output = to.Run(input);
+  EXPECT_EQ(output.states, at.Run(held.Defaults()).states);
+  EXPECT_GT(output.states(0, 0), 0.05);
+}
+
 TEST(RolloutFunctionErrorsTest, OneLineEach) {
   RolloutFunction function;
   const Scene scene = Driven("fixed");
@@ -387,7 +407,7 @@ TEST(RolloutFunctionErrorsTest, OneLineEach) {
   EXPECT_NE(error({"bodies/disk/mass"}, {}).find("matches no number"), std::string::npos);
   EXPECT_EQ(error({}, {"bodies/disc/mass"}),
             "control bodies/disc/mass: expected forces/NAME/force/x, forces/NAME/force/y, "
-            "forces/NAME/torque or joints/NAME/effort, got bodies/disc/mass");
+            "forces/NAME/torque or joints/NAME/effort (or its /target), got bodies/disc/mass");
   EXPECT_NE(error({"forces/push/force/x"}, {"forces/push/force/x"}), "");
   EXPECT_EQ(error({}, {}, {3, 3}), "records: expected ascending steps from 0 to 20, got 3");
   EXPECT_EQ(error({}, {}, {21}), "records: expected ascending steps from 0 to 20, got 21");
