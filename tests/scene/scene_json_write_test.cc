@@ -72,8 +72,12 @@ TEST(SceneToJsonTest, ServosAreReadAndWritten) {
   std::vector<std::string> paths;
   for (const auto& number : EnumerateNumbers(&cast)) {
     if (number.path.rfind("forces/f/", 0) == 0) paths.push_back(number.path);
-    if (number.path == "joints/h/effort/limit") EXPECT_EQ(number.value->a, 2.0);
-    if (number.path == "forces/f/torque/stiffness") EXPECT_EQ(number.value->a, 5.0);
+    if (number.path == "joints/h/effort/limit") {
+      EXPECT_EQ(number.value->a, 2.0);
+    }
+    if (number.path == "forces/f/torque/stiffness") {
+      EXPECT_EQ(number.value->a, 5.0);
+    }
   }
   EXPECT_EQ(paths, (std::vector<std::string>{
                        "forces/f/force/x", "forces/f/force/y/target", "forces/f/force/y/stiffness",

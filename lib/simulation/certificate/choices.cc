@@ -5,10 +5,12 @@
 #include <cmath>
 #include <limits>
 
+#include "tangible/dynamics/elements/servo.h"
 #include "tangible/simulation/certificate/approach_inl.h"
 #include "tangible/simulation/certificate/certify.h"
 #include "tangible/simulation/certificate/certify_grazing.h"
 #include "tangible/simulation/certificate/tolerances.h"
+#include "tangible/simulation/events/servo_bounds.h"
 
 namespace tangible {
 namespace {
@@ -23,7 +25,10 @@ ChoiceKey KeyOf(ChoiceKind kind, long when, int detail, const ActiveContact& con
   key.a = contact.a;
   key.b = contact.b;
   key.joint = contact.joint;
-  key.side = (contact.side > 0.0 ? 1 : contact.side < 0.0 ? 2 : 0) + (contact.is_motor ? 4 : 0);
+  key.side = (contact.side > 0.0   ? 1
+              : contact.side < 0.0 ? 2
+                                   : 0) +
+             (contact.is_motor ? 4 : 0) + (contact.is_servo ? 8 : 0);
   key.feature = static_cast<int>(contact.feature.kind);
   key.feature_a = contact.feature.a;
   key.feature_b = contact.feature.b;
@@ -228,6 +233,21 @@ void ChoiceWatch::AddFixed(const Model<double>& model, long step, Stepper* stepp
       }
     }
     AddLaw(model, step, record, i);
+  }
+  AddServos(model, step, record);
+}
+
+void ChoiceWatch::AddServos(const Model<double>& model, long step, const StepRecord& record) {
+  for (int k = 0; k < static_cast<int>(model.structure->servos.size()); ++k) {
+    const ServoIndex& servo = model.structure->servos[k];
+    if (!servo.has_limit || !IsServoOn(model, k, record.time + 0.5 * record.h)) continue;
+    const double effort =
+        UnboundedEffort(model, record.before, k, {record.time, record.time, record.h});
+    const double limit = model.parameters[servo.Number(ServoIndex::kLimit)];
+    const int mode = effort > limit ? 1 : effort < -limit ? 2 : 0;
+    const ActiveContact contact = ContactOfServo(*model.structure, k);
+    Push({KeyOf(ChoiceKind::kMode, step, 4 * k + mode, contact), contact, record.time,
+          std::abs(limit - std::abs(effort)), limit + std::abs(effort), true});
   }
 }
 

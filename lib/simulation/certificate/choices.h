@@ -3,7 +3,7 @@
 //
 // The discrete choices of a run, and how far each is from its change.
 //
-//   fixed steps   the mode and the law of every contact of every step
+//   fixed steps   the mode and the law of every contact of every step, the modes of servos
 //   by events     the events of every contact, their order where bodies transmit impulses, the
 //                 modes of impacts, and that no event happens where none does: forces and slips of
 //                 closed contacts, gaps that turn around above 0
@@ -97,6 +97,7 @@ class ChoiceWatch {
     ChoiceList pending;            ///< in the order of time
   };
   void AddFixed(const Model<double>& model, long step, Stepper* stepper);
+  void AddServos(const Model<double>& model, long step, const StepRecord& record);
   void AddLaw(const Model<double>& model, long step, const StepRecord& record, size_t i);
   void AddImpact(const Model<double>& model, const IslandRecord& island, const Impulses& impact);
   void AddSegment(const Model<double>& model, const IslandRecord& island, long step,

@@ -329,7 +329,9 @@ TEST(ServoTest, AllMethodsAgreeAndFixedStepsConverge) {
     const Scene fixed = Pushed(force, "fixed", dt, 0.8);
     const GradientResult result = Jacobian(fixed, paths, GradientMethod::kAdjoint);
     const double error = (result.values - exact.values).cwiseAbs().maxCoeff();
-    if (last > 0.0) EXPECT_NEAR(error / last, 0.5, 0.2);
+    if (last > 0.0) {
+      EXPECT_NEAR(error / last, 0.5, 0.2);
+    }
     last = error;
     if (dt == 0.004) ExpectOthersAgree(fixed, paths, result);
   }
