@@ -40,6 +40,23 @@ T WindowOverlap(double t, double h, const T* start, const T* end) {
 }
 
 template <typename T>
+T SignalAt(const Signal& signal, const std::vector<double>& column, const T& t, double middle) {
+  if (column.empty()) {
+    return T(0.0);
+  }
+  const auto next = std::upper_bound(signal.time.begin(), signal.time.end(), middle);
+  if (next == signal.time.begin()) {
+    return T(column.front());
+  }
+  const size_t k = next - signal.time.begin() - 1;
+  if (next == signal.time.end() || signal.interpolation == Signal::Interpolation::kConstant) {
+    return T(column[k]);
+  }
+  const double rate = (column[k + 1] - column[k]) / (signal.time[k + 1] - signal.time[k]);
+  return column[k] + rate * (t - signal.time[k]);
+}
+
+template <typename T>
 void ForceImpulse(const ModelStructure& structure, const ForceIndex& force, double t, double h,
                   const T& angle, const T* numbers, const T* start, const T* end, T impulse[3]) {
   const T overlap = WindowOverlap(t, h, start, end);
