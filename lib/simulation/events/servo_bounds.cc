@@ -13,9 +13,6 @@
 namespace tangible {
 namespace {
 
-// Over this share of a time step rates of reserves are differences: much more than rounding moves
-// them, while the accelerations stay as they are.
-constexpr double kRateShare = 1e-4;
 // The motion is examined at these shares of its length; where a servo goes beyond its bound from
 // the start on, at powers of two of the first.
 constexpr int kMostHalvings = 20;
@@ -35,7 +32,7 @@ BoundReserve ReserveOf(const Model<double>& model, const State<double>& state, i
 double ReserveRate(const Model<double>& model, const State<double>& state, int servo, double sign,
                    double time, double middle, const std::vector<double>& accelerations) {
   const ModelStructure& s = *model.structure;
-  const double step = kRateShare * s.settings.dt;
+  const double step = kServoRateShare * s.settings.dt;
   State<double> moved = state;
   MovePoses(s, step, &moved);
   AddBodies(s, 0.5 * step * step, accelerations, &moved.pose);

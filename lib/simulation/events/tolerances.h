@@ -41,6 +41,9 @@ inline constexpr double kServoLocated = 8.0 * std::numeric_limits<double>::epsil
 /// Of the same terms: within it a servo is on its bound, and the rate of its effort tells its mode;
 /// it lies well above what locating leaves, and either mode has the same effort there.
 inline constexpr double kServoBound = 1e-11;
+/// Of dt: the rate of a servo's effort is its difference over so short a time, in which
+/// accelerations stay as they are, and which changes it by much more than rounding.
+inline constexpr double kServoRateShare = 1e-4;
 /// Of the coordinate x: gaps are located to it where that is larger, because a pose has no more
 /// digits.
 inline constexpr double kLocatedOfCoordinate = std::numeric_limits<double>::epsilon();
