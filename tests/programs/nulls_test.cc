@@ -21,6 +21,9 @@ using nlohmann::json;
 
 const std::set<std::string> kMayBeNull = {"margin_min",
                                           "condition",
+                                          "down",
+                                          "up",
+                                          "growth",
                                           "undetermined_end",
                                           "impulses",
                                           "motions",

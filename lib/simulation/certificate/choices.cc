@@ -233,8 +233,22 @@ void ChoiceWatch::AddFixed(const Model<double>& model, long step, Stepper* stepp
       }
     }
     AddLaw(model, step, record, i);
+    if (step > 0) AddApproached(model, step, record, i);
   }
+  last_contacts_ = record.contacts;
   AddServos(model, step, record);
+}
+
+void ChoiceWatch::AddApproached(const Model<double>& model, long step, const StepRecord& record,
+                                size_t i) {
+  const ActiveContact& contact = record.contacts[i];
+  const bool is_new = std::none_of(last_contacts_.begin(), last_contacts_.end(),
+                                   [&](const ActiveContact& last) { return last.SameAs(contact); });
+  if (!is_new || contact.IsJointFriction() || !(contact.gap > 0.0)) return;
+  const bool rebounds = contact.law == ContactLaw::kRestitution;
+  const double slack = contact.gap - (rebounds ? model.structure->settings.contact_margin : 0.0);
+  if (!(slack > 0.0)) return;
+  Push({KeyOf(ChoiceKind::kReach, step - 1, 0, contact), contact, record.time, slack, contact.gap});
 }
 
 void ChoiceWatch::AddServos(const Model<double>& model, long step, const StepRecord& record) {

@@ -99,6 +99,8 @@ class ChoiceWatch {
   void AddFixed(const Model<double>& model, long step, Stepper* stepper);
   void AddServos(const Model<double>& model, long step, const StepRecord& record);
   void AddLaw(const Model<double>& model, long step, const StepRecord& record, size_t i);
+  /// A contact that the step before was too far from its surface to look at.
+  void AddApproached(const Model<double>& model, long step, const StepRecord& record, size_t i);
   void AddImpact(const Model<double>& model, const IslandRecord& island, const Impulses& impact);
   void AddSegment(const Model<double>& model, const IslandRecord& island, long step,
                   Segment* segment);
@@ -121,6 +123,7 @@ class ChoiceWatch {
   std::vector<Past> past_;
   std::map<ChoiceKey, Phase> phases_;
   std::map<ChoiceKey, long> counts_;
+  std::vector<ActiveContact> last_contacts_;  ///< of the last fixed step
   std::map<ChoiceKey, double> closed_until_;  ///< s, of each pair
   InnerImpulses inner_impulses_;
 };

@@ -42,8 +42,8 @@ bool Hold(const Model<T>& model, const State<T>& state, const std::vector<JointR
   for (size_t j = 0; j < rows.size(); ++j) {
     const JointIndex& joint = model.structure->joints[j];
     for (int k = 0; k < rows[j].rows; ++k) {
-      const double coordinate = IsAngle(joint, k) ? AngleOf(state, joint.a, joint.b)
-                                                       : PlaceOf(state, joint.a, joint.b);
+      const double coordinate =
+          IsAngle(joint, k) ? AngleOf(state, joint.a, joint.b) : PlaceOf(state, joint.a, joint.b);
       if (!(std::abs(ValueOf(rows[j].error[k])) <= tolerance + kCoordinateRounding * coordinate)) {
         return false;
       }

@@ -132,10 +132,13 @@ TEST(RandomSceneTest, IsAValidFileAndReachesWhatItIsFor) {
     EXPECT_EQ(SceneToJson(scene), SceneToJson(RandomScene(seed)));
     const bool signals =
         std::any_of(scene.forces.begin(), scene.forces.end(),
-                    [](const auto& f) { return f.force_signal || f.torque_signal; }) ||
+                    [](const auto& f) {
+                      return f.force_signal || f.torque_signal || f.force_servos[0] ||
+                             f.force_servos[1] || f.torque_servo;
+                    }) ||
         std::any_of(scene.joints.begin(), scene.joints.end(),
-                    [](const auto& j) { return j.effort_signal.has_value(); });
-    if (!signals) {  // a signal is a file, which is not there
+                    [](const auto& j) { return j.effort_signal || j.effort_servo; });
+    if (!signals) {  // a signal, or a servo's target, is a file, which is not there
       Scene read;
       std::string error;
       EXPECT_TRUE(ParseScene(SceneToJson(scene), "random.json", ".", &read, &error)) << error;
