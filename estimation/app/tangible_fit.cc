@@ -630,6 +630,16 @@ std::string Sample(const Prepared& prepared, FitResult* result,
   return "";
 }
 
+/// Makes and prints the design of the next experiment that is asked for; an error or empty.
+std::string PlanNext(const Prepared& prepared, const FitResult& result,
+                     std::optional<Design>* design) {
+  if (!prepared.design) return "";
+  std::string error = MakeDesign(prepared.fit.input, *prepared.design, result.estimate,
+                                 prepared.problem.get(), &design->emplace());
+  if (error.empty()) std::cout << DescribeDesign(prepared.problem->entries(), **design);
+  return error;
+}
+
 int Run(const std::string& text, const std::string& file, const ShardPlan& plan) {
   Prepared prepared;
   const int status = Prepare(text, file, &prepared);
@@ -698,13 +708,9 @@ int Run(const std::string& text, const std::string& file, const ShardPlan& plan)
     std::cout << Describe(*held_out);
   }
   std::optional<Design> design;
-  if (prepared.design && estimated) {
-    error = MakeDesign(prepared.fit.input, *prepared.design, result.estimate,
-                       prepared.problem.get(), &design.emplace());
-    if (!error.empty()) return ReportError(file + ": --design: " + error);
-    findings.design = &*design;
-    std::cout << DescribeDesign(prepared.problem->entries(), *design);
-  }
+  if (estimated) error = PlanNext(prepared, result, &design);
+  if (!error.empty()) return ReportError(file + ": --design: " + error);
+  findings.design = design ? &*design : nullptr;
   if (checkpoint != nullptr && !checkpoint->error().empty()) {
     ReportError(checkpoint->error() + ": the fit went on without its checkpoint");
   }

@@ -77,7 +77,7 @@ std::string DrawMotion(const ControlFile& file, const ControlRun& run, DrawnMoti
   const Scene& scene = run.scene;
   const double dt = scene.simulation.dt;
   RolloutFunction function;
-  const std::string error = function.Create(scene, {}, file.paths, {});
+  std::string error = function.Create(scene, {}, file.paths, {});
   if (!error.empty()) return error;
   const EngineStep step(function);
   Model<double> model;

@@ -57,12 +57,13 @@ void PrintBesideMotion(const ControlRun& run) {
 // Prints the warnings, and writes the result and what else is asked for: the controls as a table,
 // the motion as a table and as a page.
 std::string WriteRun(const std::string& path, const ControlFile& file, const ControlRun& run) {
-  for (const std::string& warning : run.warnings) ReportError(path + ": warning: " + warning);
+  const std::string start = path + ": warning: ";
+  for (const std::string& warning : run.warnings) ReportError(std::string(start).append(warning));
   std::vector<OutputFile> files = {{FLAGS_out, JsonText(run.result)}};
   if (!FLAGS_plan.empty()) files.push_back({FLAGS_plan, PlanCsv(file, run)});
   if (FLAGS_trajectory.empty() && FLAGS_view.empty()) return WriteAllOrNone(files);
   DrawnMotion drawn;
-  const std::string error = DrawMotion(file, run, &drawn);
+  std::string error = DrawMotion(file, run, &drawn);
   if (!error.empty()) return error;
   if (!FLAGS_trajectory.empty()) files.push_back({FLAGS_trajectory, std::move(drawn.trajectory)});
   if (!FLAGS_view.empty()) files.push_back({FLAGS_view, std::move(drawn.page)});
