@@ -630,6 +630,15 @@ std::string Sample(const Prepared& prepared, FitResult* result,
   return "";
 }
 
+/// Predicts the recordings that are held out, if any, and prints how well.
+void PredictHeld(const FitResult& result, const VarianceComponents& components, Prepared* prepared,
+                 std::optional<HeldOutRuns>* held_out) {
+  if (prepared->fit.held_out.empty()) return;
+  *held_out = PredictHeldOut(prepared->fit.input, *prepared->problem, result.estimate,
+                             components.noise, std::move(prepared->fit.held_out));
+  std::cout << Describe(**held_out);
+}
+
 /// Makes and prints the design of the next experiment that is asked for; an error or empty.
 std::string PlanNext(const Prepared& prepared, const FitResult& result,
                      std::optional<Design>* design) {
@@ -701,12 +710,8 @@ int Run(const std::string& text, const std::string& file, const ShardPlan& plan)
     PrintScore(later->score);
   }
   std::optional<HeldOutRuns> held_out;
-  if (!prepared.fit.held_out.empty() && estimated) {
-    held_out = PredictHeldOut(prepared.fit.input, *prepared.problem, result.estimate,
-                              components.noise, std::move(prepared.fit.held_out));
-    findings.held_out = &*held_out;
-    std::cout << Describe(*held_out);
-  }
+  if (estimated) PredictHeld(result, components, &prepared, &held_out);
+  findings.held_out = held_out ? &*held_out : nullptr;
   std::optional<Design> design;
   if (estimated) error = PlanNext(prepared, result, &design);
   if (!error.empty()) return ReportError(file + ": --design: " + error);
