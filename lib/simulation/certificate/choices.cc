@@ -167,6 +167,8 @@ const Choice* FirstDifference(const ChoiceList& x, const ChoiceList& y) {
 }
 
 void ChoiceWatch::AddStep(const Model<double>& model, long step, Stepper* stepper) {
+  is_full_ = is_full_ || choices_.size() > kMostChoices;
+  if (is_full_) return;
   if (!stepper->by_events()) {
     AddFixed(model, step, stepper);
     return;

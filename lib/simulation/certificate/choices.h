@@ -67,6 +67,9 @@ std::string NameOf(const ModelStructure& structure, const Choice& choice);
 /// smallest slack.
 using ChoiceList = std::vector<Choice>;
 
+/// Of a run that makes more choices, some 250 MB, none are kept: a crowd over many steps.
+inline constexpr size_t kMostChoices = 1000000;
+
 /// The key of a choice that one of the runs makes and the other does not; null if there is none.
 const Choice* FirstDifference(const ChoiceList& x, const ChoiceList& y);
 
@@ -78,6 +81,8 @@ class ChoiceWatch {
   explicit ChoiceWatch(double end) : end_(end) {}
   /// The step that the stepper has just done.
   void AddStep(const Model<double>& model, long step, Stepper* stepper);
+  /// Whether there were more than kMostChoices; the list is then not complete.
+  bool is_full() const { return is_full_; }
   /// After the last step.
   ChoiceList Finish(const Model<double>& model);
 
@@ -119,6 +124,7 @@ class ChoiceWatch {
   void Push(const Choice& choice) { choices_.push_back(choice); }
 
   double end_;
+  bool is_full_ = false;
   ChoiceList choices_;
   std::vector<Past> past_;
   std::map<ChoiceKey, Phase> phases_;

@@ -102,7 +102,7 @@ bool ChoicesOf(const Model<double>& model, const Controls* controls, const State
       &stepper, &final);
   *choices = watch.Finish(longer);
   // It may fail behind the end, which is no part of the run.
-  return report.status == StepStatus::kDone || report.time >= end;
+  return !watch.is_full() && (report.status == StepStatus::kDone || report.time >= end);
 }
 
 ValidityRadius ValidityRadiusOf(const ModelStructure& structure, const ChoiceList& own,
@@ -149,6 +149,7 @@ ValidityRadius ValidityRadiusOf(const ModelStructure& structure, const ChoiceLis
 double GrowthOf(const Model<double>& model, const Controls* controls,
                 const State<double>& initial) {
   const ModelStructure& s = *model.structure;
+  if (s.num_blocks() > kMostGrowthBodies) return kNaN;
   // Entries of the flow: x, y, angle, vx, vy, omega of each moving body.
   std::vector<int> variables;
   for (const int body : s.moving) {

@@ -20,7 +20,7 @@
 namespace tangible {
 
 /// The choices of a run from `initial`, by events those up to kBehindEnd beyond its end too; false
-/// where it fails before its end.
+/// where it fails before its end, or makes more than kMostChoices.
 bool ChoicesOf(const Model<double>& model, const Controls* controls, const State<double>& initial,
                ChoiceList* choices);
 
@@ -33,8 +33,11 @@ using ChoicesAt = std::function<bool(double shift, ChoiceList* choices)>;
 ValidityRadius ValidityRadiusOf(const ModelStructure& structure, const ChoiceList& own,
                                 const ChoicesAt& choices_at, double size);
 
+/// Of more moving bodies the growth, whose tangent has 6 columns a body, is not computed.
+inline constexpr int kMostGrowthBodies = 20;
+
 /// Certificate::growth, by a tangent with a column for each entry of the state; NaN where the run
-/// fails or nothing moves.
+/// fails, nothing moves, or more than kMostGrowthBodies do.
 double GrowthOf(const Model<double>& model, const Controls* controls, const State<double>& initial);
 
 }  // namespace tangible
