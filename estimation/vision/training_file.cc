@@ -12,8 +12,8 @@
 namespace tangible {
 namespace {
 
-constexpr std::string_view kMagic = "tangible training 2\n";
-constexpr std::string_view kMagicOfFirstVersion = "tangible training 1\n";
+constexpr std::string_view kMagicOfTraining = "tangible training 2\n";
+constexpr std::string_view kMagicOfFirstTraining = "tangible training 1\n";
 
 std::string IterationLine(long iteration) { return std::to_string(iteration) + " "; }
 
@@ -39,7 +39,7 @@ bool TakeLine(std::string_view* text, std::string_view* line) {
 std::string SerializeTraining(const TrainingFile& training) {
   const std::string iteration = IterationLine(training.iteration);
   const std::uint32_t sum = Checksum({training.fingerprint, "\n", iteration, training.weights});
-  std::string bytes(kMagic);
+  std::string bytes(kMagicOfTraining);
   bytes += training.fingerprint + "\n" + iteration + std::to_string(sum) + "\n";
   return bytes + training.weights;
 }
@@ -52,13 +52,13 @@ bool ParseTraining(const std::string& bytes, const std::string& name_for_message
   };
   if (bytes.empty()) return fail("expected a training's checkpoint, got an empty file: remove it");
   std::string_view rest = bytes;
-  if (rest.substr(0, kMagicOfFirstVersion.size()) == kMagicOfFirstVersion) {
+  if (rest.substr(0, kMagicOfFirstTraining.size()) == kMagicOfFirstTraining) {
     return fail("expected a checkpoint of version 2, got one of version 1: remove it");
   }
-  if (rest.substr(0, kMagic.size()) != kMagic) {
+  if (rest.substr(0, kMagicOfTraining.size()) != kMagicOfTraining) {
     return fail("expected a training's checkpoint, got another file");
   }
-  rest.remove_prefix(kMagic.size());
+  rest.remove_prefix(kMagicOfTraining.size());
   std::string_view fingerprint, numbers;
   if (!TakeLine(&rest, &fingerprint) || !TakeLine(&rest, &numbers)) {
     return fail("expected a training's checkpoint, got one that ends in its header");

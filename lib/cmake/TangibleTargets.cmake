@@ -79,13 +79,13 @@ function(tangible_precompile target)
   endif()
 endfunction()
 
-# With TANGIBLE_UNITY up to eight sources of a target are compiled as one.
+# With TANGIBLE_UNITY up to sixteen sources of a target are compiled as one.
 function(tangible_unite target)
   get_target_property(sources ${target} SOURCES)
   list(FILTER sources INCLUDE REGEX "\\.cc$")
   list(LENGTH sources num_sources)
   if(TANGIBLE_UNITY AND num_sources GREATER 1)
-    set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 8
+    set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 16
       UNITY_BUILD_CODE_BEFORE_INCLUDE "#undef TANGIBLE_INSTANTIATE\n#undef TANGIBLE_INSTANTIATE_JET")
   endif()
 endfunction()
@@ -184,13 +184,12 @@ endfunction()
 # Tests assert more than they compute: with -O1 they compile in two thirds of the time.
 set(TANGIBLE_TEST_OPTIONS $<$<CONFIG:Release>:-O1>)
 
-# tangible_test(<name> [NO_PRECOMPILE] SOURCES file... LINK target... [LABELS label...] [TIMEOUT seconds]): one
-# test program, one ctest entry. The tests of a folder are one program, but for those that take long, are labelled
-# otherwise or count allocations. NO_PRECOMPILE: what it links brings compiler options of its own.
-function(tangible_test name)
-  cmake_parse_arguments(TEST "NO_PRECOMPILE" "TIMEOUT" "SOURCES;LINK;LABELS" ${ARGN})
+# tangible_test_program(<name> [NO_PRECOMPILE] SOURCES file... LINK target... [LABELS label...]): a program of tests,
+# without entries of ctest. NO_PRECOMPILE: what it links brings compiler options of its own.
+function(tangible_test_program name)
+  cmake_parse_arguments(TEST "NO_PRECOMPILE" "" "SOURCES;LINK;LABELS" ${ARGN})
   add_executable(${name} ${TEST_SOURCES})
-  target_link_libraries(${name} PRIVATE tangible_flags ${TEST_LINK} GTest::gtest_main)
+  target_link_libraries(${name} PRIVATE tangible_flags ${TEST_LINK})
   target_compile_options(${name} PRIVATE ${TANGIBLE_TEST_OPTIONS})
   tangible_unite(${name})
   if(TANGIBLE_PRECOMPILE_HEADERS AND NOT TEST_NO_PRECOMPILE)
@@ -201,11 +200,45 @@ function(tangible_test name)
   endif()
   target_compile_definitions(${name} PRIVATE TANGIBLE_SOURCE_DIR="${PROJECT_SOURCE_DIR}"
                              TANGIBLE_PROGRAM_DIR="${PROJECT_BINARY_DIR}/bin")
+endfunction()
+
+# tangible_test(<name> [NO_PRECOMPILE] SOURCES file... LINK target... [LABELS label...] [TIMEOUT seconds]): one
+# test program, one ctest entry. The tests of a folder are one program, but for those that are labelled otherwise
+# or count allocations.
+function(tangible_test name)
+  cmake_parse_arguments(TEST "NO_PRECOMPILE" "TIMEOUT" "SOURCES;LINK;LABELS" ${ARGN})
+  set(precompile)
+  if(TEST_NO_PRECOMPILE)
+    set(precompile NO_PRECOMPILE)
+  endif()
+  tangible_test_program(${name} ${precompile} SOURCES ${TEST_SOURCES} LINK ${TEST_LINK} GTest::gtest_main
+                        LABELS ${TEST_LABELS})
   add_test(NAME ${name} COMMAND ${name})
   if(NOT TEST_TIMEOUT)
     set(TEST_TIMEOUT 300)
   endif()
   set_tests_properties(${name} PROPERTIES LABELS "${TEST_LABELS}" TIMEOUT ${TEST_TIMEOUT})
+endfunction()
+
+# tangible_tests_by_file(<name> [NO_PRECOMPILE] PREFIX prefix SOURCES file... LINK target... LABELS label...
+#                        [TIMEOUT seconds]): one test program, and an entry of ctest for each file, <prefix>_<file>: for files that take long, which then run beside
+# each other although they are compiled at once.
+function(tangible_tests_by_file name)
+  cmake_parse_arguments(TEST "NO_PRECOMPILE" "PREFIX;TIMEOUT" "SOURCES;LINK;LABELS" ${ARGN})
+  set(precompile)
+  if(TEST_NO_PRECOMPILE)
+    set(precompile NO_PRECOMPILE)
+  endif()
+  tangible_test_program(${name} ${precompile} SOURCES ${TEST_SOURCES} "${PROJECT_SOURCE_DIR}/tests/support/main_by_file.cc"
+                        LINK ${TEST_LINK} GTest::gtest LABELS ${TEST_LABELS})
+  if(NOT TEST_TIMEOUT)
+    set(TEST_TIMEOUT 300)
+  endif()
+  foreach(source IN LISTS TEST_SOURCES)
+    get_filename_component(stem "${source}" NAME_WE)
+    add_test(NAME ${TEST_PREFIX}_${stem} COMMAND ${name} --file=${stem}.cc)
+    set_tests_properties(${TEST_PREFIX}_${stem} PROPERTIES LABELS "${TEST_LABELS}" TIMEOUT ${TEST_TIMEOUT})
+  endforeach()
 endfunction()
 
 # tangible_benchmark(<name> SOURCES file... LINK target...): a Google Benchmark program, not a test.

@@ -42,7 +42,7 @@ class ShardsTest : public ProgramTest {
 };
 
 // A ball that is thrown along the floor.
-constexpr char kThrow[] = R"({"bodies": [
+constexpr char kThrownScene[] = R"({"bodies": [
     {"name": "ball", "shape": {"circle": {"radius": 0.1}}, "mass": 1, "position": [0, 0.5],
      "velocity": [1, 0], "friction": 0.3, "restitution": 0.6},
     {"name": "floor", "static": true, "friction": 0.3, "restitution": 0.6,
@@ -57,7 +57,7 @@ class ShardsOfBatchesTest : public ShardsTest {
     for (int i = 0; i < 11; ++i) {
       table += std::to_string(0.1 * i) + "," + std::to_string(0.1 + 0.002 * i) + "\n";
     }
-    work_ = Batch(Write("scene.json", kThrow), Write("p.csv", table));
+    work_ = Batch(Write("scene.json", kThrownScene), Write("p.csv", table));
   }
   static Divided Batch(const std::string& scene, const std::string& table) {
     return {"tangible-simulate", "'" + scene + "' --batch='" + table + "'", ".csv"};
@@ -208,7 +208,7 @@ TEST_F(ShardsOfBatchesTest, ShardsOfOtherInputsAreNamed) {
   const Divided moved =
       Batch(Write("moved.json", Read(Path("scene.json"))), Write("moved.csv", Read(Path("p.csv"))));
   EXPECT_EQ(Run(moved.program, moved.arguments + " --merge='" + files + "'").exit_status, 0);
-  std::string scene = kThrow;
+  std::string scene = kThrownScene;
   scene.replace(scene.find("0.005"), 5, "0.004");
   const Divided other = Batch(Write("other.json", scene), Path("p.csv"));
   ExpectOneLine(Run(other.program, other.arguments + " --merge='" + files + "'"), 1,
@@ -328,7 +328,7 @@ class ShardsOfFitsTest : public ShardsOfStudiesTest {
  protected:
   /// A fit of the ball's speed and radius of bouncing to its own positions, moved by hand.
   Divided Fit(const std::string& keys, const std::string& flags = "") const {
-    Write("scene.json", kThrow);
+    Write("scene.json", kThrownScene);
     EXPECT_EQ(
         Run("tangible-simulate", File("scene.json") + " --out=" + File("t.csv") +
                                      " --observe=" + File("o.csv") + " --noise=0.001 --seed=4")

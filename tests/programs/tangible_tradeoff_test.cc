@@ -13,19 +13,21 @@ namespace {
 using nlohmann::json;
 
 // A ball that is thrown, bounces twice and rolls.
-constexpr char kBall[] = R"({"bodies": [
+constexpr char kBallScene[] = R"({"bodies": [
     {"name": "ball", "shape": {"circle": {"radius": 0.1}}, "mass": 1, "position": [0, 0.3],
      "velocity": [1, 0], "friction": 0.3, "restitution": 0.5},
     {"name": "floor", "static": true, "shape": {"half_plane": {"normal": [0, 1], "offset": 0}},
      "friction": 0.3, "restitution": 0.5}],
   "simulation": {"dt": 0.01, "duration": 0.6}})";
 
-constexpr char kQuick[] = "--dt_factors=2,1,0.5 --repeat_seconds=1e-6 --reference_error=1e-9 ";
+constexpr char kQuickTradeoff[] =
+    "--dt_factors=2,1,0.5 --repeat_seconds=1e-6 --reference_error=1e-9 ";
 
 class TangibleTradeoffTest : public ProgramTest {
  protected:
-  ProgramRun Tradeoff(const std::string& flags, const std::string& scene = kBall) const {
-    return Run("tangible-tradeoff", "'" + Write("scene.json", scene) + "' " + kQuick + flags);
+  ProgramRun Tradeoff(const std::string& flags, const std::string& scene = kBallScene) const {
+    return Run("tangible-tradeoff",
+               "'" + Write("scene.json", scene) + "' " + kQuickTradeoff + flags);
   }
   std::string Flag(const std::string& name, const std::string& file) const {
     return "--" + name + "='" + Path(file) + "' ";
@@ -81,7 +83,7 @@ TEST_F(TangibleTradeoffTest, PrintsTheFrontsAndWritesAllCells) {
 
 // The block, put into the scene and run again, is as right as was asked for.
 TEST_F(TangibleTradeoffTest, ThePrintedBlockMeetsTheTarget) {
-  json exact = json::parse(kBall);
+  json exact = json::parse(kBallScene);
   exact["simulation"] = {
       {"dt", 0.0005}, {"duration", 0.6}, {"stepping", "event"}, {"integrator", "runge_kutta_4"}};
   const auto reference = Simulate(exact);
@@ -90,7 +92,7 @@ TEST_F(TangibleTradeoffTest, ThePrintedBlockMeetsTheTarget) {
     ASSERT_EQ(run.exit_status, 0) << run.error;
     EXPECT_EQ(run.error, "");
     EXPECT_EQ(run.out.rfind("\"simulation\": {", 0), 0u) << run.out;
-    json scene = json::parse(kBall);
+    json scene = json::parse(kBallScene);
     scene["simulation"] = json::parse("{" + run.out + "}")["simulation"];
     if (target < 1e-3) {
       EXPECT_EQ(scene["simulation"]["stepping"], "event");
@@ -143,10 +145,10 @@ TEST_F(TangibleTradeoffTest, BadInputIsOneLine) {
   ExpectOneLine(Tradeoff("--parameters=bodies/bal/mass"), 1,
                 "scene.json: parameter bodies/bal/mass: matches no number");
   ExpectOneLine(Tradeoff("", R"({"bodies": []})"), 1, "/bodies: expected a moving body, got none");
-  std::string still = kBall;
+  std::string still = kBallScene;
   still.replace(still.find("0.6}"), 4, "0}");
   ExpectOneLine(Tradeoff("", still), 1, "/simulation/duration: expected a number > 0, got 0");
-  std::string fine = kBall;
+  std::string fine = kBallScene;
   fine.replace(fine.find("0.01"), 4, "1e-9");
   ExpectOneLine(Tradeoff("", fine), 1, "/simulation/dt: expected at most 1e6 steps");
   ExpectOneLine(Run("tangible-tradeoff", "/nonexistent.json"), 1, "/nonexistent.json");
@@ -161,7 +163,7 @@ TEST_F(TangibleTradeoffTest, WrongFlagsAreUsage) {
     const std::string name(flag, std::string(flag).find('='));
     ExpectOneLine(Tradeoff(flag), 2, name);
   }
-  const std::string scene = "'" + Write("scene.json", kBall) + "' ";
+  const std::string scene = "'" + Write("scene.json", kBallScene) + "' ";
   ExpectOneLine(Run("tangible-tradeoff", scene + scene + "--target_error=1"), 2, "--target_error");
   ExpectOneLine(Run("tangible-tradeoff", ""), 2, "tangible-tradeoff");
 }

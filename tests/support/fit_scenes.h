@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdlib>
 #include <random>
 #include <string>
 #include <vector>
@@ -15,6 +16,12 @@
 #include "tangible/simulation/stepping/rollout.h"
 
 namespace tangible {
+
+/// Fits of a calibration; 500 where the test is not to be quick.
+inline int NumReplicas() {
+  const char* const text = std::getenv("TANGIBLE_CALIBRATION_REPLICAS");
+  return text == nullptr ? 40 : std::atoi(text);
+}
 
 inline constexpr char kFallingBall[] = R"({"name": "falling ball", "bodies": [
   {"name": "ball", "shape": {"circle": {"radius": 0.1}}, "mass": 2, "position": [0, 10],

@@ -68,4 +68,34 @@ inline void ExpectOthersAgree(const Scene& scene, const std::vector<std::string>
   }
 }
 
+/// Derivatives by all methods, and by differences with two steps; no column is zero.
+inline GradientResult ExpectAllAgree(const Scene& scene, const std::vector<std::string>& paths) {
+  const GradientResult result = Jacobian(scene, paths, GradientMethod::kAdjoint);
+  ExpectOthersAgree(scene, paths, result);
+  for (const double step : {3e-6, 1.5e-6}) {
+    GradientOptions options;
+    options.method = GradientMethod::kFiniteDifference;
+    options.step = step;
+    const GradientResult differences = FinalStateJacobian(scene, Resolve(scene, paths), options);
+    EXPECT_TRUE(differences.done) << differences.message;
+    for (Eigen::Index c = 0; c < result.jacobian.cols(); ++c) {
+      const double size = result.jacobian.col(c).cwiseAbs().maxCoeff();
+      EXPECT_GT(size, 1e-3) << paths[c];
+      // Steps² times third derivatives, and an event's rounding over the step.
+      EXPECT_LT((result.jacobian.col(c) - differences.jacobian.col(c)).cwiseAbs().maxCoeff(),
+                1e-5 * size + 1e-6)
+          << paths[c] << " by a step of " << step;
+    }
+  }
+  return result;
+}
+
+/// The pose and the twist of the first body.
+inline void ExpectNear(const State<double>& a, const State<double>& b, double tolerance) {
+  for (size_t i = 0; i < 3; ++i) {
+    EXPECT_NEAR(a.pose[i], b.pose[i], tolerance) << i;
+    EXPECT_NEAR(a.twist[i], b.twist[i], tolerance) << i;
+  }
+}
+
 }  // namespace tangible::testing

@@ -5,11 +5,21 @@
 
 #include <gtest/gtest.h>
 
+#include <cstdio>
 #include <string>
 
 #include "tangible/scene/scene_json.h"
 
 namespace tangible::test_scenes {
+
+inline constexpr double kGravity = 9.81;  ///< m/s², as scenes have it by default
+
+/// A number that reads back to the same bits.
+inline std::string Text(double x) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.17g", x);
+  return text;
+}
 
 /// The scene of a text that is known to be good.
 inline Scene SceneOf(const std::string& text) {

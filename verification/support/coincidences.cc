@@ -23,6 +23,8 @@ constexpr long double kWay = 1e-6L;
 // The size of a parameter that is 0: where a coincidence moves with the square of the way (that of
 // the speed at the top of a fall), the square must exceed the rounding of the scene's numbers.
 constexpr long double kSizeOfZero = 1.0L;
+// Between two elements, m.
+constexpr double kApart = 100.0;
 // Of the output: what is left after the derivative over that way is a jump.
 constexpr long double kJump = 1e-8L;
 
@@ -143,7 +145,8 @@ void CoincidenceMaker::Settings() {
 
 void CoincidenceMaker::Add(const Element& element) {
   made_.kinds.push_back(std::string("coincidence: ") + element.kind);
-  place_ = 10.0 * number_;
+  // Farther apart than they come in a run, so that one's closed form knows nothing of the other.
+  place_ = kApart * number_;
   (this->*element.add)();
   ++number_;
 }

@@ -9,7 +9,7 @@
 namespace tangible {
 namespace {
 
-constexpr int kMaxRounds = 20;
+constexpr int kMostPhaseRounds = 20;
 
 // Changes a mode that the solution contradicts; returns whether it changed one.
 bool ChangeMode(const ContactValues& values, double normal, double tangent, double impulse_scale,
@@ -54,7 +54,7 @@ bool DecompressionSolver::SolveByModeChanges(const ContactSolverOptions& options
                                              ContactProblem<double>* problem,
                                              ContactSolution<double>* solution,
                                              ContactSolverReport* report) {
-  for (int round = 0; round < kMaxRounds; ++round) {
+  for (int round = 0; round < kMostPhaseRounds; ++round) {
     ++report->factorisations;
     // Where impulses are not unique, those nearest to the given solution's are chosen.
     if (!mode_solve_.Solve(*problem, solution, &system_, solution)) {

@@ -15,7 +15,7 @@ namespace {
 
 // The motion is examined at these shares of its length; where a servo goes beyond its bound from
 // the start on, at powers of two of the first.
-constexpr int kMostHalvings = 20;
+constexpr int kMostServoHalvings = 20;
 
 }  // namespace
 
@@ -125,7 +125,7 @@ void EventSearch::SearchServo(const Model<double>& model, int servo, double sign
     if (!(fa > tolerance)) {
       // On its bound at the start: it comes back to it, or goes beyond it at once.
       double inside = b;
-      for (int k = 0; k < kMostHalvings && !(fa > tolerance); ++k) {
+      for (int k = 0; k < kMostServoHalvings && !(fa > tolerance); ++k) {
         inside *= 0.5;
         fa = value_of(*At(model, inside));
         if (std::isnan(fa)) return;
@@ -155,7 +155,7 @@ void EventSearch::SearchServo(const Model<double>& model, int servo, double sign
       // The least value of the cubic through both ends lies between them.
       const HermiteCubic cubic(b - a, fa, ra, fb, rb);
       double low = 0.0, high = b - a;
-      for (int k = 0; k < kMostHalvings; ++k) {
+      for (int k = 0; k < kMostServoHalvings; ++k) {
         const double m = 0.5 * (low + high);
         (cubic.RateAt(m) < 0.0 ? low : high) = m;
       }

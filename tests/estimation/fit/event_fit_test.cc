@@ -3,7 +3,6 @@
 // Fits from the times of bounces alone (event_times.h).
 #include <gtest/gtest.h>
 
-#include <cstdlib>
 #include <random>
 
 #include "../../support/bouncing_ball.h"
@@ -14,12 +13,6 @@ namespace tangible {
 namespace {
 
 constexpr double kNoise = 1e-3;  // s
-
-/// 500 where the test is not to be quick.
-int NumReplicas() {
-  const char* const text = std::getenv("TANGIBLE_CALIBRATION_REPLICAS");
-  return text == nullptr ? 40 : std::atoi(text);
-}
 
 /// Bounces 1 to `count` of the closed form with noise.
 std::vector<Observation> Record(const Bounces& bounces, int count, double noise, unsigned seed) {

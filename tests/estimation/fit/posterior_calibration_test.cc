@@ -9,7 +9,6 @@
 
 #include <boost/math/distributions/chi_squared.hpp>
 #include <cmath>
-#include <cstdlib>
 #include <vector>
 
 #include "../../support/fit_scenes.h"
@@ -24,12 +23,6 @@ constexpr int kBins = 20;
 constexpr int kRanks = 99;
 constexpr int kThinning = 4;
 constexpr double kLeastProbability = 1e-3;
-
-/// 500 where the test is not to be quick.
-int NumReplicas() {
-  const char* const text = std::getenv("TANGIBLE_CALIBRATION_REPLICAS");
-  return text == nullptr ? 40 : std::atoi(text);
-}
 
 /// A draw from the prior of a parameter: Gaussian or log-normal, or even within its bounds.
 double DrawFromPrior(const FitParameter& parameter, RandomStream* random) {

@@ -7,7 +7,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <cstdio>
 #include <random>
 #include <string>
 #include <vector>
@@ -23,16 +22,10 @@
 namespace tangible {
 namespace {
 
+using test_scenes::kGravity;
 using test_scenes::SceneOf;
+using test_scenes::Text;
 using testing::Jacobian;
-
-constexpr double kG = 9.81;
-
-std::string Text(double x) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.17g", x);
-  return text;
-}
 
 /// The angle of a contact's normal in the frame of a body.
 double DirectionIn(const Model<double>& model, const State<double>& state,
@@ -148,7 +141,7 @@ Scene Slender(double aspect, double angle, double friction, double dt, double du
                  Text(dt) + R"(, "duration": )" + Text(duration) + "}}");
 }
 
-struct Rolled {
+struct RolledEllipse {
   RolloutReport report;
   Model<double> model;
   State<double> start, final;
@@ -158,8 +151,8 @@ struct Rolled {
 };
 
 /// With an angular velocity with which it stays on the floor: y = h(φ), ẏ = h' φ̇.
-Rolled Simulate(const Scene& scene, double omega = 0.0) {
-  Rolled run;
+RolledEllipse RollEllipse(const Scene& scene, double omega = 0.0) {
+  RolledEllipse run;
   BuildModel(scene, &run.model, &run.start);
   const double* radii = &run.model.parameters[run.model.structure->bodies[0].shape_numbers];
   const double phi = run.start.pose[2];
@@ -176,7 +169,7 @@ Rolled Simulate(const Scene& scene, double omega = 0.0) {
 TEST(EllipseMotionTest, SlenderEllipsesKeepTheirEnergy) {
   for (const double aspect : {1.0, 10.0, 100.0, 333.0}) {
     for (const double friction : {0.0, 20.0}) {
-      const Rolled run = Simulate(Slender(aspect, 0.3, friction, 0.005, 2.0));
+      const RolledEllipse run = RollEllipse(Slender(aspect, 0.3, friction, 0.005, 2.0));
       ASSERT_EQ(run.report.status, StepStatus::kDone) << run.report.message;
       EXPECT_EQ(run.report.events, 0) << aspect;
       const double energy = run.Energy(run.start);
@@ -186,7 +179,7 @@ TEST(EllipseMotionTest, SlenderEllipsesKeepTheirEnergy) {
       EXPECT_LT(run.report.ellipse_motions, 3000);
     }
     // From the tip it falls without friction, lies, and rises to the other tip.
-    const Rolled falling = Simulate(Slender(aspect, 1.5, 0.0, 0.005, 2.0), -0.1);
+    const RolledEllipse falling = RollEllipse(Slender(aspect, 1.5, 0.0, 0.005, 2.0), -0.1);
     ASSERT_EQ(falling.report.status, StepStatus::kDone) << falling.report.message;
     const double energy = falling.Energy(falling.start);
     EXPECT_NEAR(falling.Energy(falling.final), energy, 1e-6 * energy) << aspect;
@@ -209,12 +202,12 @@ TEST(EllipseMotionTest, ASlenderEllipseRocksWithItsPeriod) {
     const double fall = (1.0 - kB * kB) * std::sin(kStart - phi) * std::sin(kStart + phi) /
                         (height(kStart) + height(phi));
     period += 4.0 * (0.5 * M_PI / kPoints) * kStart * std::cos(u) *
-              std::sqrt((0.25 * (1.0 + kB * kB) + slope * slope) / (2.0 * kG * fall));
+              std::sqrt((0.25 * (1.0 + kB * kB) + slope * slope) / (2.0 * kGravity * fall));
   }
-  const Rolled run = Simulate(Slender(1.0 / kB, kStart, 0.0, 0.005, 2.0 * period));
+  const RolledEllipse run = RollEllipse(Slender(1.0 / kB, kStart, 0.0, 0.005, 2.0 * period));
   EXPECT_GT(run.report.ellipse_motions, 500);
   // The speed changes by less than 2 g / (1 m) in a second; times are right to 1e-5.
-  EXPECT_NEAR(run.final.twist[2], 0.0, 1e-5 * 2.0 * period * 2.0 * kG);
+  EXPECT_NEAR(run.final.twist[2], 0.0, 1e-5 * 2.0 * period * 2.0 * kGravity);
   EXPECT_NEAR(run.final.pose[2], kStart, 1e-5);
 }
 
@@ -224,8 +217,8 @@ TEST(EllipseMotionTest, SlenderEllipsesHaveTheirDerivatives) {
   for (const double friction : {0.0, 20.0}) {
     Scene scene = Slender(100.0, 0.3, friction, 0.005, 0.4);
     scene.bodies[0].position.y() += 0.01;
-    EXPECT_LT(Simulate(scene).final.pose[2], -0.1);
-    EXPECT_GT(Simulate(scene).report.ellipse_motions, 50);
+    EXPECT_LT(RollEllipse(scene).final.pose[2], -0.1);
+    EXPECT_GT(RollEllipse(scene).report.ellipse_motions, 50);
     const std::vector<std::string> paths = {"bodies/b/shape/radii/x", "bodies/b/shape/radii/y",
                                             "bodies/b/angular_velocity", "gravity/y"};
     const GradientResult result = Jacobian(scene, paths, GradientMethod::kAdjoint);
@@ -236,7 +229,7 @@ TEST(EllipseMotionTest, SlenderEllipsesHaveTheirDerivatives) {
 
 TEST(EllipseMotionTest, ALimitOfMotionsIsAnErrorWithAName) {
   // It would rock at 2e5 rad/s, at any amplitude.
-  const Rolled run = Simulate(Slender(1e9, 0.0, 0.0, 0.1, 0.1));
+  const RolledEllipse run = RollEllipse(Slender(1e9, 0.0, 0.0, 0.1, 0.1));
   EXPECT_EQ(run.report.status, StepStatus::kUnsolved);
   EXPECT_NE(run.report.message.find("motions in a step"), std::string::npos) << run.report.message;
   EXPECT_NE(run.report.message.find("contact of b and floor"), std::string::npos)

@@ -16,17 +16,17 @@ namespace {
 using test_scenes::SceneOf;
 using testing::Jacobian;
 
-struct Rolled {
+struct DecompressedRun {
   RolloutReport report;
   State<double> final;
   double energy_gain = 0.0;  ///< J, of the run
 };
 
-Rolled Simulate(const Scene& scene) {
+DecompressedRun Simulate(const Scene& scene) {
   Model<double> model;
   State<double> state;
   BuildModel(scene, &model, &state);
-  Rolled run;
+  DecompressedRun run;
   run.report = Rollout(model, state, nullptr, &run.final);
   EXPECT_EQ(run.report.status, StepStatus::kDone) << run.report.message;
   run.energy_gain = KineticEnergy(model, run.final) - KineticEnergy(model, state);
@@ -111,7 +111,7 @@ TEST(EventDecompressionTest, TheRodsImpactIsThatByHandInBothPhases) {
     const double compression = contact.normal;
     contact.Decompress(c.e * compression);
     EXPECT_GT(contact.vn, 0.0);
-    const Rolled run = Simulate(SceneOf(Rod("poisson", c.e, c.friction, c.velocity)));
+    const DecompressedRun run = Simulate(SceneOf(Rod("poisson", c.e, c.friction, c.velocity)));
     EXPECT_EQ(run.report.events, 1);
     // The gap is not 0 to the last bit.
     EXPECT_NEAR(run.final.twist[0], c.vx + contact.tangent, 1e-13) << c.e << " " << c.friction;
@@ -123,8 +123,8 @@ TEST(EventDecompressionTest, TheRodsImpactIsThatByHandInBothPhases) {
 }
 
 TEST(EventDecompressionTest, TheRodGainsEnergyByNewtonsLawAndNotByPoissons) {
-  const Rolled newton = Simulate(SceneOf(Rod("newton", 1.0, 0.5)));
-  const Rolled poisson = Simulate(SceneOf(Rod("poisson", 1.0, 0.5)));
+  const DecompressedRun newton = Simulate(SceneOf(Rod("newton", 1.0, 0.5)));
+  const DecompressedRun poisson = Simulate(SceneOf(Rod("poisson", 1.0, 0.5)));
   constexpr double kBefore = 0.625;  // J
   EXPECT_NEAR(newton.energy_gain / kBefore, 0.175, 0.02);
   EXPECT_NEAR(newton.report.impact_energy_gain, newton.energy_gain, 1e-14);
@@ -136,7 +136,7 @@ TEST(EventDecompressionTest, ASingleContactNeverGains) {
   for (const double e : {0.3, 1.0}) {
     for (const double friction : {0.1, 0.5, 1.2}) {
       for (const char* velocity : {"[-2, -1]", "[-0.3, -1]", "[0.4, -1]", "[1.5, -1]"}) {
-        const Rolled run = Simulate(SceneOf(Rod("poisson", e, friction, velocity)));
+        const DecompressedRun run = Simulate(SceneOf(Rod("poisson", e, friction, velocity)));
         EXPECT_LT(run.energy_gain, 1e-14) << e << " " << friction << " " << velocity;
         EXPECT_LT(run.report.impact_energy_gain, 1e-14);
       }
@@ -156,8 +156,8 @@ TEST(EventDecompressionTest, ADiscBouncesAsByNewtonsLaw) {
          "shape": {"half_plane": {"normal": [0.2, 1], "offset": 0}}}], )" +
                      Settings(law, 0.7) + "}");
     };
-    const Rolled newton = Simulate(scene("newton"));
-    const Rolled poisson = Simulate(scene("poisson"));
+    const DecompressedRun newton = Simulate(scene("newton"));
+    const DecompressedRun poisson = Simulate(scene("poisson"));
     EXPECT_EQ(newton.report.events, poisson.report.events);
     EXPECT_GE(poisson.report.events, 1);
     for (int i = 0; i < 3; ++i) {
@@ -169,14 +169,14 @@ TEST(EventDecompressionTest, ADiscBouncesAsByNewtonsLaw) {
 
 TEST(EventDecompressionTest, AContactThatDidNotApproachDoesNotRebound) {
   // A ball falls on a disc that rests: its floor is as rigid, and gives nothing back.
-  const Rolled run = Simulate(SceneOf(R"({"gravity": [0, 0], "bodies": [
+  const DecompressedRun run = Simulate(SceneOf(R"({"gravity": [0, 0], "bodies": [
       {"name": "disc", "shape": {"circle": {"radius": 0.2}}, "mass": 2, "position": [0, 0.2]},
       {"name": "ball", "shape": {"circle": {"radius": 0.1}}, "mass": 1, "position": [0, 0.8],
        "velocity": [0, -1]},
       {"name": "floor", "static": true, "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}}],
     "pairs": [{"bodies": ["disc", "floor"], "restitution": 0.9},
               {"bodies": ["disc", "ball"], "restitution": 0.3}], )" +
-                                      Settings("poisson", 0.5) + "}"));
+                                               Settings("poisson", 0.5) + "}"));
   EXPECT_NEAR(run.final.twist[1], 0.0, 1e-14);
   EXPECT_NEAR(run.final.pose[1], 0.2, 1e-14);
   EXPECT_NEAR(run.final.twist[4], 0.3, 1e-14);
@@ -184,12 +184,13 @@ TEST(EventDecompressionTest, AContactThatDidNotApproachDoesNotRebound) {
 
 TEST(EventDecompressionTest, ABoxThatRocksComesToRest) {
   for (const double e : {0.0, 0.4}) {
-    const Rolled run = Simulate(SceneOf(R"({"bodies": [
+    const DecompressedRun run =
+        Simulate(SceneOf(R"({"bodies": [
       {"name": "box", "shape": {"box": {"size": [0.4, 0.2]}}, "mass": 1.3, "position": [0, 0.16],
        "angle": 0.05},
       {"name": "floor", "static": true, "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}}],
     "pairs": [{"bodies": ["box", "floor"], "friction": 0.4, "restitution": )" +
-                                        Number(e) + "}], " + Settings("poisson", 2.5) + "}"));
+                         Number(e) + "}], " + Settings("poisson", 2.5) + "}"));
     EXPECT_NEAR(run.final.pose[1], 0.1, 1e-10) << e;
     EXPECT_NEAR(run.final.pose[2], 0.0, 1e-10) << e;
     for (int i = 0; i < 3; ++i) {
@@ -259,7 +260,7 @@ TEST(EventDecompressionTest, DrivenOnOneSideAndClosedAgainOnTheOther) {
                              friction + R"(}],
     )" + Settings("poisson", 0.25) +
                              "}";
-    const Rolled run = Simulate(SceneOf(text));
+    const DecompressedRun run = Simulate(SceneOf(text));
     // It goes up along the right wall: closed, its impulse beyond e times that of compression.
     EXPECT_NEAR(-0.86602540378443865 * run.final.twist[0] + 0.5 * run.final.twist[1], 0.0, 1e-12);
     EXPECT_GT(run.final.twist[0], 0.1);
@@ -322,7 +323,7 @@ TEST(EventDecompressionTest, ImpactsElsewhereHaveNoDecompression) {
   const GradientResult poisson =
       Jacobian(scene("poisson"), {"bodies/a/velocity/x"}, GradientMethod::kTangent);
   EXPECT_EQ(poisson.certificate.degenerate_rows, 0);
-  const Rolled run = Simulate(scene("poisson"));
+  const DecompressedRun run = Simulate(scene("poisson"));
   EXPECT_NEAR(run.final.pose[4], 0.1, 1e-12);
   EXPECT_GT(run.final.pose[1], 0.15);
 }

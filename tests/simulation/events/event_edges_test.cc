@@ -7,7 +7,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <cstdio>
 #include <string>
 #include <vector>
 
@@ -18,6 +17,7 @@ namespace tangible {
 namespace {
 
 using test_scenes::SceneOf;
+using test_scenes::Text;
 using testing::ExpectOthersAgree;
 using testing::Jacobian;
 
@@ -25,18 +25,12 @@ constexpr double kEnd = 1.0;
 // Row 0 is x and row 3 its speed.
 constexpr int kX = 0, kSpeed = 3;
 
-std::string Text(double x) {
-  char text[32];
-  std::snprintf(text, sizeof(text), "%.17g", x);
-  return text;
-}
-
 struct Window {
   double force, start, end;  ///< N, s, s; not given where they are no numbers
 };
 
-Scene Pushed(const std::vector<Window>& windows, double dt, double friction = 0.0,
-             const std::string& more = R"("stepping": "event")", double speed = 0.0) {
+Scene PushedInWindows(const std::vector<Window>& windows, double dt, double friction = 0.0,
+                      const std::string& more = R"("stepping": "event")", double speed = 0.0) {
   std::string forces;
   for (size_t i = 0; i < windows.size(); ++i) {
     const Window& window = windows[i];
@@ -75,7 +69,7 @@ const Boundary kBoundaries[] = {{0.5, 0.75, 0.01},  {0.5, 0.75, 0.25},    {0.43,
 void ExpectBothEdges(double friction, const std::string& stepping, double speed) {
   const std::vector<std::string> paths = {"forces/f0/start", "forces/f0/end"};
   for (const Boundary& b : kBoundaries) {
-    const Scene scene = Pushed({{4.0, b.start, b.end}}, b.dt, friction, stepping, speed);
+    const Scene scene = PushedInWindows({{4.0, b.start, b.end}}, b.dt, friction, stepping, speed);
     const GradientResult result = Jacobian(scene, paths, GradientMethod::kAdjoint);
     ExpectEdge(result, 0, 4.0, b.start);
     ExpectEdge(result, 1, -4.0, b.end);
@@ -97,7 +91,7 @@ TEST(EventEdgesTest, AWindowThatOpensWhileTheBoxSlides) {
 // Friction holds the box before the edge and acts against the force after it.
 TEST(EventEdgesTest, AWindowThatMovesABoxFromRest) {
   for (const Boundary& b : kBoundaries) {
-    const Scene scene = Pushed({{4.0, b.start, NAN}}, b.dt, 0.25);
+    const Scene scene = PushedInWindows({{4.0, b.start, NAN}}, b.dt, 0.25);
     const GradientResult result = Jacobian(scene, {"forces/f0/start"}, GradientMethod::kAdjoint);
     ExpectEdge(result, 0, 4.0 - 2.5, b.start);
     ExpectOthersAgree(scene, {"forces/f0/start"}, result);
@@ -107,7 +101,7 @@ TEST(EventEdgesTest, AWindowThatMovesABoxFromRest) {
 TEST(EventEdgesTest, WindowsThatFollowEachOther) {
   for (const Boundary& b : kBoundaries) {
     const Scene scene =
-        Pushed({{4.0, NAN, b.start}, {-3.0, b.start, b.end}, {2.0, b.end, NAN}}, b.dt);
+        PushedInWindows({{4.0, NAN, b.start}, {-3.0, b.start, b.end}, {2.0, b.end, NAN}}, b.dt);
     const std::vector<std::string> paths = {"forces/f0/end", "forces/f1/start", "forces/f1/end",
                                             "forces/f2/start"};
     const GradientResult result = Jacobian(scene, paths, GradientMethod::kAdjoint);
@@ -120,7 +114,7 @@ TEST(EventEdgesTest, WindowsThatFollowEachOther) {
 }
 
 TEST(EventEdgesTest, BeforeAStartTheWindowDoesNotAct) {
-  const Scene scene = Pushed({{4.0, -0.25, 0.5}}, 0.01);
+  const Scene scene = PushedInWindows({{4.0, -0.25, 0.5}}, 0.01);
   const std::vector<std::string> paths = {"forces/f0/start", "forces/f0/end"};
   const GradientResult result = Jacobian(scene, paths, GradientMethod::kAdjoint);
   ExpectEdge(result, 0, 0.0, 0.0);
@@ -131,7 +125,8 @@ TEST(EventEdgesTest, BeforeAStartTheWindowDoesNotAct) {
 // A fixed step's map has the mean of both sides, which differ by dt / 2 in the place.
 TEST(EventEdgesTest, FixedStepsHaveTheMeanOfBothSides) {
   for (const Boundary& b : kBoundaries) {
-    const Scene scene = Pushed({{4.0, b.start, b.end}}, b.dt, 0.0, R"("stepping": "fixed")");
+    const Scene scene =
+        PushedInWindows({{4.0, b.start, b.end}}, b.dt, 0.0, R"("stepping": "fixed")");
     const std::vector<std::string> paths = {"forces/f0/start", "forces/f0/end"};
     const GradientResult result = Jacobian(scene, paths, GradientMethod::kAdjoint);
     EXPECT_NEAR(result.jacobian(kSpeed, 0), -4.0, 1e-9);

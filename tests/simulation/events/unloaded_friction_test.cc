@@ -5,7 +5,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <cstdio>
 #include <string>
 #include <vector>
 
@@ -17,14 +16,9 @@ namespace tangible {
 namespace {
 
 using test_scenes::SceneOf;
+using test_scenes::Text;
 using testing::ExpectOthersAgree;
 using testing::Jacobian;
-
-std::string Text(double x) {
-  char text[32];
-  std::snprintf(text, sizeof(text), "%.17g", x);
-  return text;
-}
 
 State<double> StateAfter(const Scene& scene) {
   Model<double> model;
@@ -38,7 +32,7 @@ State<double> StateAfter(const Scene& scene) {
 const double kGravities[] = {0.0, 1e-12, 1e-9, 1e-7, 1e-5, 1e-4};
 
 std::string Head(double gravity) { return R"({"gravity": [0, )" + Text(-gravity) + "], "; }
-std::string Tail(double duration, const std::string& more = "") {
+std::string ByEventsFor(double duration, const std::string& more = "") {
   return R"(, "simulation": {"stepping": "event", "dt": 0.01, "duration": )" + Text(duration) +
          more + "}}";
 }
@@ -51,7 +45,7 @@ Scene Flywheel(double gravity, double speed, double friction, double radius, dou
                  Text(radius) + R"(}}, "position": [0, 0], "angular_velocity": )" + Text(speed) +
                  R"(}], "joints": [{"name": "p", "type": "revolute", "bodies": ["w", "world"],
       "anchor": [0, 0], "friction": )" +
-                 Text(friction) + of_joint + "}]" + more + Tail(duration));
+                 Text(friction) + of_joint + "}]" + more + ByEventsFor(duration));
 }
 
 // The speed falls at F / I, and the wheel stays where it has stopped.
@@ -87,7 +81,7 @@ TEST(UnloadedFrictionTest, AFlywheelWithoutAShape) {
     const Scene scene = SceneOf(Head(gravity) + R"("bodies": [{"name": "w", "mass": 3,
         "inertia": 0.005, "position": [0, 0], "angular_velocity": 5}], "joints": [{"name": "p",
         "type": "revolute", "bodies": ["w", "world"], "anchor": [0, 0], "friction": 0.04}])" +
-                                Tail(1.0));
+                                ByEventsFor(1.0));
     const State<double> rollout = StateAfter(scene);
     EXPECT_NEAR(rollout.pose[2], 0.5 * 25.0 / 8.0, 1e-10) << gravity;
     EXPECT_NEAR(rollout.twist[2], 0.0, 1e-12) << gravity;
@@ -102,7 +96,7 @@ TEST(UnloadedFrictionTest, ASliderCoastsToRest) {
           "shape": {"box": {"size": [0.2, 0.2]}}, "position": [0, 0], "velocity": [2, 0]}],
           "joints": [{"name": "p", "type": "prismatic", "bodies": ["c", "world"],
           "anchor": [0, 0], "axis": [1, 0], "friction": )" +
-                                  Text(friction) + "}]" + Tail(2.0));
+                                  Text(friction) + "}]" + ByEventsFor(2.0));
       const std::vector<std::string> paths = {"bodies/c/velocity/x", "joints/p/friction",
                                               "bodies/c/mass"};
       const GradientResult result = Jacobian(scene, paths, GradientMethod::kAdjoint);
@@ -234,7 +228,7 @@ TEST(UnloadedFrictionTest, ABoxThatOnlyAForcePresses) {
           {"name": "wall", "static": true, "friction": 0.25,
            "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}}],
           "forces": [{"name": "f", "body": "b", "force": [0, )" +
-                                  Text(-pressure) + "]}]" + Tail(1.0));
+                                  Text(-pressure) + "]}]" + ByEventsFor(1.0));
       const double a = friction * (pressure + gravity);
       SCOPED_TRACE(Text(gravity) + " m/s², " + Text(pressure) + " N");
       const double t = std::min(1.0, speed / a);
@@ -301,7 +295,7 @@ TEST(UnloadedFrictionTest, AGrowingForceMovesABoxAgain) {
         {"name": "floor", "static": true, "friction": 0.5,
          "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}}],
         "forces": [{"name": "f", "body": "b", "force": [0, 0], "at": [0, -0.125]}])" +
-                          Tail(0.5));
+                          ByEventsFor(0.5));
     scene.simulation.dt = 0.5;
     Signal force;
     force.file = "force.csv";
@@ -332,7 +326,7 @@ TEST(UnloadedFrictionTest, AHeavyWheelOfSmallInertiaBreaksLoose) {
           {"name": "level", "type": "fixed_angle", "bodies": ["cart", "world"]},
           {"name": "axle", "type": "revolute", "bodies": ["wheel", "cart"], "anchor": [0, 0],
            "friction": )" + Text(friction) +
-                            "}]" + Tail(1.0));
+                            "}]" + ByEventsFor(1.0));
       Signal effort;
       effort.file = "effort.csv";
       effort.interpolation = Signal::Interpolation::kLinear;
@@ -366,7 +360,7 @@ TEST(UnloadedFrictionTest, LinksCoastToRest) {
                               R"(},
             {"name": "wrist", "type": "revolute", "bodies": ["b", "c"], "anchor": [0.75, 0],
              "friction": 0.01}])" +
-                              Tail(12.0));
+                              ByEventsFor(12.0));
         scene.simulation.dt = dt;
         SCOPED_TRACE(Text(turn) + " rad/s, " + Text(friction) + " N m, dt " + Text(dt));
         for (const double speed : StateAfter(scene).twist) EXPECT_NEAR(speed, 0.0, 1e-12);

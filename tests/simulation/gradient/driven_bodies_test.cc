@@ -18,18 +18,12 @@
 namespace tangible {
 namespace {
 
+using test_scenes::kGravity;
 using test_scenes::SceneOf;
+using test_scenes::Text;
 using testing::ExpectOthersAgree;
 using testing::Jacobian;
 using testing::JacobianOf;
-
-constexpr double kGravity = 9.81;
-
-std::string Text(double x) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.17g", x);
-  return text;
-}
 
 // "time": [...], "x": [...] and so on.
 std::string Series(const std::vector<double>& times,
@@ -44,8 +38,8 @@ std::string Series(const std::vector<double>& times,
   return text;
 }
 
-std::string Tail(const std::string& stepping, double dt, double duration,
-                 const std::string& more = "") {
+std::string DrivenFor(const std::string& stepping, double dt, double duration,
+                      const std::string& more = "") {
   return R"(, "simulation": {"stepping": ")" + stepping + R"(", "dt": )" + Text(dt) +
          R"(, "duration": )" + Text(duration) + more + "}}";
 }
@@ -55,7 +49,7 @@ struct Finished {
   State<double> final;
 };
 
-Finished RunOf(const Scene& scene) {
+Finished DrivenRun(const Scene& scene) {
   Model<double> model;
   State<double> state;
   BuildModel(scene, &model, &state);
@@ -75,7 +69,7 @@ Scene Carried(const std::string& stepping, double dt, const std::string& more = 
                  path + R"(}},
       {"name": "box", "shape": {"box": {"size": [0.2, 0.2]}}, "mass": 2, "position": [0, 0.1],
        "friction": 0.3}])" +
-                 Tail(stepping, dt, 3.5, more));
+                 DrivenFor(stepping, dt, 3.5, more));
 }
 
 // It sticks until s 6 t / 5 = μ g, and slides then:
@@ -108,7 +102,7 @@ TEST(DrivenBodiesTest, FixedStepsOfACarriedBoxConvergeAtFirstOrder) {
   const double x = 0.2 * t * t * t + 0.6 * t * t * rest + 0.5 * a * rest * rest;
   double error[2];
   for (int k = 0; k < 2; ++k) {
-    const Finished run = RunOf(Carried("fixed", k == 0 ? 0.02 : 0.01));
+    const Finished run = DrivenRun(Carried("fixed", k == 0 ? 0.02 : 0.01));
     error[k] = std::abs(run.final.pose[3] - x);
     // The plate is where its path leads.
     EXPECT_NEAR(run.final.pose[0], 0.2 * 3.5 * 3.5 * 3.5, 1e-12);
@@ -135,7 +129,7 @@ Scene Shaken(const std::string& stepping, double dt, const std::string& more = "
        "position": [0, -0.5]}],
       "joints": [{"name": "grip", "type": "revolute", "bodies": ["rod", "hand"], "anchor": [0, 0],
                   "angle": 0.4}])" +
-                 Tail(stepping, dt, 1.5, more));
+                 DrivenFor(stepping, dt, 1.5, more));
 }
 
 // (I + m l²) θ'' = −m l ((g + y'') sin θ + x'' cos θ) by a classical Runge-Kutta rule of its own.
@@ -173,16 +167,16 @@ double ShakenAngle(double end) {
 
 TEST(DrivenBodiesTest, AShakenPendulumByEventsIsOfFourthOrder) {
   const double angle = ShakenAngle(1.5);
-  const double coarse = RunOf(Shaken("event", 0.008)).final.pose[5] - angle;
-  const double fine = RunOf(Shaken("event", 0.004)).final.pose[5] - angle;
+  const double coarse = DrivenRun(Shaken("event", 0.008)).final.pose[5] - angle;
+  const double fine = DrivenRun(Shaken("event", 0.004)).final.pose[5] - angle;
   EXPECT_LT(std::abs(fine), 1e-9);
   EXPECT_LT(std::abs(fine), std::abs(coarse) / 10.0);
 }
 
 TEST(DrivenBodiesTest, AShakenPendulumByFixedStepsIsOfFirstOrder) {
   const double angle = ShakenAngle(1.5);
-  const double coarse = RunOf(Shaken("fixed", 0.002)).final.pose[5] - angle;
-  const double fine = RunOf(Shaken("fixed", 0.001)).final.pose[5] - angle;
+  const double coarse = DrivenRun(Shaken("fixed", 0.002)).final.pose[5] - angle;
+  const double fine = DrivenRun(Shaken("fixed", 0.001)).final.pose[5] - angle;
   EXPECT_LT(std::abs(fine), 5e-3);
   EXPECT_LT(std::abs(fine), 0.6 * std::abs(coarse));
 }
@@ -216,7 +210,7 @@ Scene Struck(double gap, double dt, const std::string& stepping = "event",
                  path + R"(}},
       {"name": "puck", "shape": {"circle": {"radius": 0.1}}, "mass": 0.3, "restitution": 0.5,
        "position": [)" +
-                 Text(0.2 + gap) + ", 0]}]" + Tail(stepping, dt, 1.0, more));
+                 Text(0.2 + gap) + ", 0]}]" + DrivenFor(stepping, dt, 1.0, more));
 }
 
 // The puck leaves with (1 + e) v from the instant at which the mallet has crossed the gap. With no
@@ -264,7 +258,7 @@ TEST(DrivenBodiesTest, AJumpActsThroughAJoint) {
         path + R"(}},
       {"name": "rod", "mass": 1, "inertia": 0.08, "position": [0, -0.5]}],
       "joints": [{"name": "grip", "type": "revolute", "bodies": ["rod", "hand"], "anchor": [0, 0]}])" +
-        Tail("event", dt, 1.0));
+        DrivenFor("event", dt, 1.0));
     const GradientResult result = Jacobian(scene, paths, GradientMethod::kAdjoint);
     // The grip is given V: ω (I + m l²) = −m l V about it.
     const double omega = -0.5 * 0.5 / (0.08 + 0.25);
@@ -295,7 +289,7 @@ TEST(DrivenBodiesTest, AFloorTilts) {
         R"(], "motion": {)" + path + R"(}},
       {"name": "box", "mass": 1, "shape": {"circle": {"radius": 0.1}}, "inertia": 0.01,
        "friction": 0.4, "position": [0.8, 0.35]}])" +
-        Tail("event", 0.01, 1.2));
+        DrivenFor("event", 0.01, 1.2));
     const GradientResult result = Jacobian(scene, paths, GradientMethod::kAdjoint);
     EXPECT_GT(result.jacobian.col(0).cwiseAbs().maxCoeff(), 0.1);
     ExpectOthersAgree(scene, paths, result);
@@ -322,7 +316,7 @@ TEST(DrivenBodiesTest, IslandsFollowTheirPaths) {
               y + "]}";
   }
   const Scene scene =
-      SceneOf(R"({"gravity": [0, 0], "bodies": [)" + bodies + "]" + Tail("event", 0.1, 0.2));
+      SceneOf(R"({"gravity": [0, 0], "bodies": [)" + bodies + "]" + DrivenFor("event", 0.1, 0.2));
   const std::vector<std::string> paths = {"bodies/mallet1/motion/delay",
                                           "bodies/mallet2/motion/scale", "bodies/*/restitution"};
   const GradientResult result = Jacobian(scene, paths, GradientMethod::kAdjoint);
@@ -354,7 +348,7 @@ TEST(DrivenBodiesTest, JumpsAtOneInstantAreRefused) {
   const Scene scene = SceneOf(
       R"({"gravity": [0, 0], "bodies": [)" + mallet("a", 0.0) + mallet("b", 1.0) +
       R"({"name": "puck", "shape": {"circle": {"radius": 0.1}}, "mass": 0.3, "position": [0.3, 0]}])" +
-      Tail("event", 0.05, 1.0));
+      DrivenFor("event", 0.05, 1.0));
   const GradientResult result =
       JacobianOf(scene, {"bodies/a/motion/delay"}, GradientMethod::kAdjoint);
   EXPECT_FALSE(result.done);

@@ -14,11 +14,10 @@
 namespace tangible {
 namespace {
 
+using test_scenes::kGravity;
 using test_scenes::SceneOf;
 using testing::ExpectOthersAgree;
 using testing::Jacobian;
-
-constexpr double kGravity = 9.81;
 
 struct Law {
   double rest, kinetic, speed;

@@ -16,11 +16,10 @@
 namespace tangible {
 namespace {
 
+using test_scenes::kGravity;
 using test_scenes::SceneOf;
 using testing::ExpectOthersAgree;
 using testing::Jacobian;
-
-constexpr double kGravity = 9.81;
 
 std::string Tail(const std::string& stepping, double dt, double duration) {
   return R"(, "simulation": {"stepping": ")" + stepping + R"(", "dt": )" + std::to_string(dt) +

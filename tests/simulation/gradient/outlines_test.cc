@@ -5,7 +5,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <cstdio>
 #include <string>
 #include <vector>
 
@@ -18,27 +17,23 @@
 namespace tangible {
 namespace {
 
+using test_scenes::kGravity;
 using test_scenes::SceneOf;
+using test_scenes::Text;
+using testing::ExpectAllAgree;
+using testing::ExpectNear;
 using testing::Jacobian;
 
-constexpr double kG = 9.81;
-
-std::string Text(double x) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.17g", x);
-  return text;
-}
-
-struct Rolled {
+struct RolledOutline {
   RolloutReport report;
   State<double> start, final;
   double energy_start = 0.0;
   double energy_end = 0.0;
 };
 
-Rolled Simulate(const Scene& scene) {
+RolledOutline RollOutline(const Scene& scene) {
   Model<double> model;
-  Rolled run;
+  RolledOutline run;
   BuildModel(scene, &model, &run.start);
   run.report = Rollout(model, run.start, nullptr, &run.final);
   EXPECT_EQ(run.report.status, StepStatus::kDone) << run.report.message;
@@ -47,37 +42,7 @@ Rolled Simulate(const Scene& scene) {
   return run;
 }
 
-void ExpectNear(const State<double>& a, const State<double>& b, double tolerance) {
-  for (size_t i = 0; i < 3; ++i) {
-    EXPECT_NEAR(a.pose[i], b.pose[i], tolerance) << i;
-    EXPECT_NEAR(a.twist[i], b.twist[i], tolerance) << i;
-  }
-}
-
-/// Derivatives by all methods, and by differences with two steps.
-GradientResult ExpectAllAgree(const Scene& scene, const std::vector<std::string>& paths) {
-  const GradientResult result = Jacobian(scene, paths, GradientMethod::kAdjoint);
-  testing::ExpectOthersAgree(scene, paths, result);
-  for (const double step : {3e-6, 1.5e-6}) {
-    GradientOptions options;
-    options.method = GradientMethod::kFiniteDifference;
-    options.step = step;
-    const GradientResult differences =
-        FinalStateJacobian(scene, testing::Resolve(scene, paths), options);
-    EXPECT_TRUE(differences.done) << differences.message;
-    for (Eigen::Index c = 0; c < result.jacobian.cols(); ++c) {
-      const double size = result.jacobian.col(c).cwiseAbs().maxCoeff();
-      EXPECT_GT(size, 1e-3) << paths[c];
-      // Steps² times third derivatives, and an event's rounding over the step.
-      EXPECT_LT((result.jacobian.col(c) - differences.jacobian.col(c)).cwiseAbs().maxCoeff(),
-                1e-5 * size + 1e-6)
-          << paths[c] << " by a step of " << step;
-    }
-  }
-  return result;
-}
-
-std::string Simulation(const char* stepping, double dt, double duration) {
+std::string OutlinesFor(const char* stepping, double dt, double duration) {
   return std::string(R"("simulation": {"stepping": ")") + stepping + R"(", "dt": )" + Text(dt) +
          R"(, "duration": )" + Text(duration) + "}}";
 }
@@ -97,10 +62,10 @@ TEST(EllipseTest, OfEqualAxesMovesAsACircle) {
        "angular_velocity": 1, "friction": 0.4, "restitution": 0.5},
       {"name": "step", "static": true, "shape": {"box": {"size": [0.4, 0.16]}},
        "position": [1, 0], "friction": 0.4, "restitution": 0.5},)" +
-                     kFloor + Simulation(stepping, 0.005, 1.0));
+                     kFloor + OutlinesFor(stepping, 0.005, 1.0));
     };
-    const Rolled circle = Simulate(scene(R"("circle": {"radius": 0.1})"));
-    const Rolled ellipse = Simulate(scene(R"("ellipse": {"radii": [0.1, 0.1]})"));
+    const RolledOutline circle = RollOutline(scene(R"("circle": {"radius": 0.1})"));
+    const RolledOutline ellipse = RollOutline(scene(R"("ellipse": {"radii": [0.1, 0.1]})"));
     EXPECT_EQ(circle.report.events, ellipse.report.events);
     EXPECT_EQ(circle.report.steps, ellipse.report.steps);
     // Rounding, times what five impacts and a corner make of it.
@@ -117,28 +82,28 @@ Scene Rocker(double angle, const char* stepping, double dt, double duration) {
                  Text(height) + R"(], "angle": )" + Text(angle) + R"(},
       {"name": "floor", "static": true, "friction": 3,
        "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}}], )" +
-                 Simulation(stepping, dt, duration));
+                 OutlinesFor(stepping, dt, duration));
 }
 
 // φ = φ_0 cos(ω t), ω² = m g (a²/b − b) / (I + m b²), to the order of φ_0².
 TEST(EllipseTest, RocksAtItsFrequency) {
   const double inertia = 2.0 * (0.04 + 0.01) / 4.0;
-  const double omega = std::sqrt(2.0 * kG * (0.04 / 0.1 - 0.1) / (inertia + 2.0 * 0.01));
+  const double omega = std::sqrt(2.0 * kGravity * (0.04 / 0.1 - 0.1) / (inertia + 2.0 * 0.01));
   const double at = 0.7;
   const double angle = 1e-3;
   const Scene scene = Rocker(angle, "event", 0.0025, at);
-  const Rolled run = Simulate(scene);
+  const RolledOutline run = RollOutline(scene);
   EXPECT_EQ(run.report.events, 0);
   // By amplitude the frequency falls by about φ_0² of it: after ω t = 8 rad.
   const double off = 4.0 * omega * at * angle * angle * angle;
   EXPECT_NEAR(run.final.pose[2], angle * std::cos(omega * at), off);
   EXPECT_NEAR(run.final.twist[2], -angle * omega * std::sin(omega * at), omega * off);
-  const Rolled fixed = Simulate(Rocker(angle, "fixed", 1e-4, at));
+  const RolledOutline fixed = RollOutline(Rocker(angle, "fixed", 1e-4, at));
   EXPECT_NEAR(fixed.final.pose[2], angle * std::cos(omega * at), 0.02 * angle);
 }
 
 TEST(EllipseTest, RockingKeepsItsEnergy) {
-  const Rolled run = Simulate(Rocker(0.9, "event", 0.002, 3.0));
+  const RolledOutline run = RollOutline(Rocker(0.9, "event", 0.002, 3.0));
   EXPECT_EQ(run.report.events, 0);
   EXPECT_GT(std::abs(run.final.pose[2] - 0.9), 0.1);
   // 1500 steps of fourth order with h ω up to 0.02.
@@ -211,8 +176,8 @@ void ExpectImpact(double mu) {
       {"name": "floor", "static": true, "restitution": 0.5, "friction": )" +
                               Text(mu) + R"(,
        "shape": {"half_plane": {"normal": [0, 1], "offset": 0}}}], )" +
-                              Simulation("event", 0.02, 0.3));
-  const Rolled run = Simulate(scene);
+                              OutlinesFor("event", 0.02, 0.3));
+  const RolledOutline run = RollOutline(scene);
   EXPECT_EQ(run.report.events, 1);
   for (int i = 0; i < 3; ++i) {
     EXPECT_NEAR(run.final.twist[i], v[i], 1e-12) << i;
@@ -248,7 +213,7 @@ TEST(EllipseTest, MeetsOtherShapes) {
        "angular_velocity": 1, "friction": 0.3, "restitution": 0.2},
       {"name": "block", "static": true, "shape": {"box": {"size": [1, 0.2]}}, "friction": 0.3,
        "position": [-0.2, -0.05], "angle": -0.1}], )" +
-                                  Simulation(stepping, 0.01, 0.3));
+                                  OutlinesFor(stepping, 0.01, 0.3));
       SCOPED_TRACE(std::string(stepping) + other);
       ExpectAllAgree(scene, {"bodies/b/shape/radii/x", "bodies/b/angle", "bodies/c/position/x"});
     }
@@ -262,7 +227,7 @@ Scene Square(const char* corners, const char* stepping, const char* ground) {
                  std::string(corners) + R"(, "mass": 2, "inertia": 0.02, "position": [0, 0.3],
        "angle": 0.3, "velocity": [0.5, 0], "friction": 0.3, "restitution": 0.4},
       {"name": "ground", "static": true, "friction": 0.3, "restitution": 0.4, "shape": )" +
-                 ground + "}], " + Simulation(stepping, 0.005, 0.3));
+                 ground + "}], " + OutlinesFor(stepping, 0.005, 0.3));
 }
 
 // What touches by four points touches as a polygon with these corners does, in value and in
@@ -278,8 +243,8 @@ TEST(ContactPointTest, TouchesAsACornerDoes) {
       SCOPED_TRACE(std::string(stepping) + ground);
       const Scene of_points = Square(points, stepping, ground);
       const Scene of_polygon = Square(polygon, stepping, ground);
-      const Rolled by_points = Simulate(of_points);
-      const Rolled by_polygon = Simulate(of_polygon);
+      const RolledOutline by_points = RollOutline(of_points);
+      const RolledOutline by_polygon = RollOutline(of_polygon);
       EXPECT_EQ(by_points.report.events, by_polygon.report.events);
       ExpectNear(by_points.final, by_polygon.final, 1e-12);
       const GradientResult result =
@@ -300,8 +265,8 @@ TEST(ContactPointTest, MeetsAPinThatTheShapeMisses) {
        "position": [-0.5, 0], "velocity": [2, 0], "restitution": 1, "friction": 0.2},
       {"name": "pin", "static": true, "shape": {"circle": {"radius": 0.01}}, "restitution": 1,
        "friction": 0.2, "position": [0, 0.245]}], )" +
-                                std::string(Simulation(stepping, 0.005, 0.4)));
-    const Rolled run = Simulate(scene);
+                                std::string(OutlinesFor(stepping, 0.005, 0.4)));
+    const RolledOutline run = RollOutline(scene);
     EXPECT_LT(run.final.twist[0], 2.0);
     EXPECT_GT(run.final.twist[2], 1.0);  // the pin holds it above its centre
     if (std::string(stepping) == "event") {

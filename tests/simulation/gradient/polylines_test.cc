@@ -5,7 +5,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <cstdio>
 #include <string>
 #include <vector>
 
@@ -17,37 +16,25 @@
 namespace tangible {
 namespace {
 
+using test_scenes::kGravity;
 using test_scenes::SceneOf;
-using testing::Jacobian;
+using test_scenes::Text;
+using testing::ExpectAllAgree;
+using testing::ExpectNear;
 
-constexpr double kG = 9.81;
-
-std::string Text(double x) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.17g", x);
-  return text;
-}
-
-struct Rolled {
+struct RolledOnPolyline {
   RolloutReport report;
   State<double> final;
 };
 
-Rolled Simulate(const Scene& scene) {
+RolledOnPolyline RollOnPolyline(const Scene& scene) {
   Model<double> model;
   State<double> start;
-  Rolled run;
+  RolledOnPolyline run;
   BuildModel(scene, &model, &start);
   run.report = Rollout(model, start, nullptr, &run.final);
   EXPECT_EQ(run.report.status, StepStatus::kDone) << run.report.message;
   return run;
-}
-
-void ExpectNear(const State<double>& a, const State<double>& b, double tolerance) {
-  for (size_t i = 0; i < 3; ++i) {
-    EXPECT_NEAR(a.pose[i], b.pose[i], tolerance) << i;
-    EXPECT_NEAR(a.twist[i], b.twist[i], tolerance) << i;
-  }
 }
 
 /// A body on a polyline or what replaces it.
@@ -66,17 +53,17 @@ const char kFlush[] =
     R"("polyline": {"points": [[-2, 0], [0, 0], [0.3, 0], [0.35, 0], [4, 0]], "solid": "right"})";
 const char kValley[] = R"("polyline": {"points": [[-1, 1], [0, 0], [1, 1]], "solid": "right"})";
 
-std::string Disc(const std::string& more) {
+std::string DiscWith(const std::string& more) {
   return R"("shape": {"circle": {"radius": 0.1}}, )" + more;
 }
 
 // A disc slides, comes to roll, and passes three joints at which the outline does not turn.
 TEST(PolylineTest, RollsOverFlushJointsAsOnAPlane) {
   const std::string body =
-      Disc(R"("position": [-0.3, 0.1], "velocity": [2, 0], "angular_velocity": 3)");
+      DiscWith(R"("position": [-0.3, 0.1], "velocity": [2, 0], "angular_velocity": 3)");
   for (const char* stepping : {"fixed", "event"}) {
-    const Rolled plane = Simulate(On(body, kPlane, stepping, 1.0));
-    const Rolled line = Simulate(On(body, kFlush, stepping, 1.0));
+    const RolledOnPolyline plane = RollOnPolyline(On(body, kPlane, stepping, 1.0));
+    const RolledOnPolyline line = RollOnPolyline(On(body, kFlush, stepping, 1.0));
     EXPECT_GT(line.final.pose[0], 0.5);
     EXPECT_EQ(plane.report.events, line.report.events);
     ExpectNear(plane.final, line.final, stepping[0] == 'f' ? 1e-9 : 1e-11);
@@ -92,8 +79,8 @@ TEST(PolylineTest, OtherShapesSlideOverFlushJointsAsOnAPlane) {
         R"("shape": {)" + std::string(shape) + R"(}, "position": [-0.3, 0.1], "velocity": [2, 0])";
     for (const char* stepping : {"fixed", "event"}) {
       SCOPED_TRACE(shape + std::string(" ") + stepping);
-      const Rolled plane = Simulate(On(body, kPlane, stepping, 0.8, 0.1));
-      const Rolled line = Simulate(On(body, kFlush, stepping, 0.8, 0.1));
+      const RolledOnPolyline plane = RollOnPolyline(On(body, kPlane, stepping, 0.8, 0.1));
+      const RolledOnPolyline line = RollOnPolyline(On(body, kFlush, stepping, 0.8, 0.1));
       EXPECT_GT(line.final.pose[0], 0.5);
       ExpectNear(plane.final, line.final, 1e-9);
     }
@@ -105,8 +92,9 @@ TEST(PolylineTest, ADiscRestsInAValleyOnBothEdges) {
   for (const char* stepping : {"fixed", "event"}) {
     for (const double friction : {0.0, 0.4}) {
       SCOPED_TRACE(stepping + std::string(" ") + Text(friction));
-      const Rolled run = Simulate(On(Disc(R"("position": [0.02, 0.6], "angular_damping": 0.1)"),
-                                     kValley, stepping, 3.0, friction));
+      const RolledOnPolyline run =
+          RollOnPolyline(On(DiscWith(R"("position": [0.02, 0.6], "angular_damping": 0.1)"), kValley,
+                            stepping, 3.0, friction));
       EXPECT_NEAR(run.final.pose[0], 0.0, 1e-6);
       EXPECT_NEAR(run.final.pose[1], 0.1 * std::sqrt(2.0), 1e-6);
       EXPECT_NEAR(run.final.twist[0], 0.0, 1e-6);
@@ -117,23 +105,23 @@ TEST(PolylineTest, ADiscRestsInAValleyOnBothEdges) {
 // Without friction a disc that is faster than √(g r) leaves the end as it comes over it.
 TEST(PolylineTest, FallsOffTheEnd) {
   const char ground[] = R"("polyline": {"points": [[-2, 0], [0, 0]], "solid": "right"})";
-  const Rolled run = Simulate(
-      On(Disc(R"("position": [-0.5, 0.1], "velocity": [2, 0])"), ground, "event", 0.5, 0.0));
+  const RolledOnPolyline run = RollOnPolyline(
+      On(DiscWith(R"("position": [-0.5, 0.1], "velocity": [2, 0])"), ground, "event", 0.5, 0.0));
   EXPECT_NEAR(run.final.pose[0], 0.5, 1e-12);
-  EXPECT_NEAR(run.final.pose[1], 0.1 - 0.5 * kG * 0.25 * 0.25, 1e-9);
-  EXPECT_NEAR(run.final.twist[1], -kG * 0.25, 1e-9);
+  EXPECT_NEAR(run.final.pose[1], 0.1 - 0.5 * kGravity * 0.25 * 0.25, 1e-9);
+  EXPECT_NEAR(run.final.twist[1], -kGravity * 0.25, 1e-9);
 }
 
 // Without friction the speed along the floor becomes its part along the slope of 3 in 4, at once.
 TEST(PolylineTest, AConcaveCornerIsOneEvent) {
   const char ground[] = R"("polyline": {"points": [[-2, 0], [0, 0], [4, 3]], "solid": "right"})";
-  const Rolled run = Simulate(
-      On(Disc(R"("position": [-0.5, 0.1], "velocity": [4, 0])"), ground, "event", 0.4, 0.0));
+  const RolledOnPolyline run = RollOnPolyline(
+      On(DiscWith(R"("position": [-0.5, 0.1], "velocity": [4, 0])"), ground, "event", 0.4, 0.0));
   EXPECT_EQ(run.report.events, 1);
   const double rise = run.final.pose[1] - 0.1;
   EXPECT_GT(rise, 0.1);
   const double speed = std::hypot(run.final.twist[0], run.final.twist[1]);
-  EXPECT_NEAR(speed * speed, 3.2 * 3.2 - 2.0 * kG * rise, 1e-9);
+  EXPECT_NEAR(speed * speed, 3.2 * 3.2 - 2.0 * kGravity * rise, 1e-9);
   EXPECT_NEAR(run.final.twist[1] / run.final.twist[0], 0.75, 1e-9);
 }
 
@@ -142,16 +130,16 @@ TEST(PolylineTest, AConcaveCornerIsOneEvent) {
 TEST(PolylineTest, GoesRoundAConvexCorner) {
   const char ground[] = R"("polyline": {"points": [[-2, 0], [0, 0], [4, -3]], "solid": "right"})";
   const auto lost = [&](double dt) {
-    Scene scene =
-        On(Disc(R"("position": [-0.05, 0.1], "velocity": [0.3, 0])"), ground, "event", 0.5, 0.0);
+    Scene scene = On(DiscWith(R"("position": [-0.05, 0.1], "velocity": [0.3, 0])"), ground, "event",
+                     0.5, 0.0);
     scene.simulation.dt = dt;
-    const Rolled run = Simulate(scene);
+    const RolledOnPolyline run = RollOnPolyline(scene);
     EXPECT_EQ(run.report.events, 2);
     const double x = run.final.pose[0], y = run.final.pose[1];
     EXPECT_GT(x, 0.2);
     EXPECT_NEAR(0.6 * x + 0.8 * y, 0.1, 1e-9);
     const double speed = std::hypot(run.final.twist[0], run.final.twist[1]);
-    return std::abs(0.5 * speed * speed + kG * y - 0.5 * 0.09 - kG * 0.1);
+    return std::abs(0.5 * speed * speed + kGravity * y - 0.5 * 0.09 - kGravity * 0.1);
   };
   const double coarse = lost(0.01);
   EXPECT_LT(coarse, 1e-6);
@@ -161,7 +149,8 @@ TEST(PolylineTest, GoesRoundAConvexCorner) {
 // The centre is behind the line: what is there is in the solid, however deep.
 TEST(PolylineTest, ADeepStartIsPushedOutOnTheFreeSide) {
   const char ground[] = R"("polyline": {"points": [[-2, 0], [2, 0]], "solid": "right"})";
-  const Rolled run = Simulate(On(Disc(R"("position": [0.3, -0.5])"), ground, "fixed", 2.0));
+  const RolledOnPolyline run =
+      RollOnPolyline(On(DiscWith(R"("position": [0.3, -0.5])"), ground, "fixed", 2.0));
   EXPECT_NEAR(run.final.pose[1], 0.1, 1e-6);
 }
 
@@ -170,24 +159,25 @@ TEST(PolylineTest, TheOtherSideOfAThinSolidDoesNotAct) {
   const char slab[] = R"("polyline": {"points": [[-2, -0.02], [2, -0.02], [2, 0], [-2, 0]],
                                       "closed": true})";
   for (const char* stepping : {"fixed", "event"}) {
-    const std::string body = Disc(R"("position": [0.1, 0.1], "velocity": [0.5, 0])");
-    const Rolled line = Simulate(On(body, slab, stepping, 1.0));
-    const Rolled plane = Simulate(On(body, kPlane, stepping, 1.0));
+    const std::string body = DiscWith(R"("position": [0.1, 0.1], "velocity": [0.5, 0])");
+    const RolledOnPolyline line = RollOnPolyline(On(body, slab, stepping, 1.0));
+    const RolledOnPolyline plane = RollOnPolyline(On(body, kPlane, stepping, 1.0));
     ExpectNear(plane.final, line.final, 1e-9);
   }
 }
 
 TEST(PolylineTest, SolidOnTheRightIsThePointsBackwards) {
-  const std::string body = Disc(R"("position": [-0.4, 0.9], "velocity": [0.5, 0])");
+  const std::string body = DiscWith(R"("position": [-0.4, 0.9], "velocity": [0.5, 0])");
   const char right[] = R"("polyline": {"points": [[-1, 1], [0, 0], [1, 1]], "solid": "right"})";
   const char left[] = R"("polyline": {"points": [[1, 1], [0, 0], [-1, 1]]})";
   const char mirror[] = R"("polyline": {"points": [[1, 1], [0, 0], [-1, 1]], "solid": "left"})";
   for (const char* stepping : {"fixed", "event"}) {
-    const Rolled a = Simulate(On(body, right, stepping, 0.7, 0.4, 0.5));
-    const Rolled b = Simulate(On(body, left, stepping, 0.7, 0.4, 0.5));
+    const RolledOnPolyline a = RollOnPolyline(On(body, right, stepping, 0.7, 0.4, 0.5));
+    const RolledOnPolyline b = RollOnPolyline(On(body, left, stepping, 0.7, 0.4, 0.5));
     ExpectNear(a.final, b.final, 0.0);
-    const Rolled c = Simulate(On(Disc(R"("position": [0.4, 0.9], "velocity": [-0.5, 0])"), mirror,
-                                 stepping, 0.7, 0.4, 0.5));
+    const RolledOnPolyline c =
+        RollOnPolyline(On(DiscWith(R"("position": [0.4, 0.9], "velocity": [-0.5, 0])"), mirror,
+                          stepping, 0.7, 0.4, 0.5));
     EXPECT_NEAR(a.final.pose[0], -c.final.pose[0], 1e-9);
     EXPECT_NEAR(a.final.pose[1], c.final.pose[1], 1e-9);
   }
@@ -198,33 +188,13 @@ TEST(PolylineTest, ContactPointsAndKinematicPolylines) {
   for (const char* stepping : {"fixed", "event"}) {
     const std::string body =
         R"("inertia": 1, "contact_points": [[-0.1, -0.1], [0.1, -0.1]], "position": [0, 0.1])";
-    const Rolled run = Simulate(On(body, kFlush, stepping, 0.5));
+    const RolledOnPolyline run = RollOnPolyline(On(body, kFlush, stepping, 0.5));
     EXPECT_NEAR(run.final.pose[1], 0.1, 1e-9);
-    Scene scene = On(Disc(R"("position": [0, 0.1], "velocity": [0, 0.5])"), kFlush, stepping, 1.0);
+    Scene scene =
+        On(DiscWith(R"("position": [0, 0.1], "velocity": [0, 0.5])"), kFlush, stepping, 1.0);
     scene.bodies[1].motion = Motion::kKinematic;
     scene.bodies[1].velocity = Vector2<double>(0.0, 0.5);
-    EXPECT_NEAR(Simulate(scene).final.pose[1], 0.6, 1e-9);
-  }
-}
-
-void ExpectAllAgree(const Scene& scene, const std::vector<std::string>& paths) {
-  const GradientResult result = Jacobian(scene, paths, GradientMethod::kAdjoint);
-  testing::ExpectOthersAgree(scene, paths, result);
-  for (const double step : {3e-6, 1.5e-6}) {
-    GradientOptions options;
-    options.method = GradientMethod::kFiniteDifference;
-    options.step = step;
-    const GradientResult differences =
-        FinalStateJacobian(scene, testing::Resolve(scene, paths), options);
-    EXPECT_TRUE(differences.done) << differences.message;
-    for (Eigen::Index c = 0; c < result.jacobian.cols(); ++c) {
-      const double size = result.jacobian.col(c).cwiseAbs().maxCoeff();
-      EXPECT_GT(size, 1e-3) << paths[c];
-      // Steps² times third derivatives, and an event's rounding over the step.
-      EXPECT_LT((result.jacobian.col(c) - differences.jacobian.col(c)).cwiseAbs().maxCoeff(),
-                1e-5 * size + 1e-6)
-          << paths[c] << " by a step of " << step;
-    }
+    EXPECT_NEAR(RollOnPolyline(scene).final.pose[1], 0.6, 1e-9);
   }
 }
 
@@ -234,11 +204,11 @@ TEST(PolylineTest, DerivativesOfAllMethodsAgree) {
                                         "solid": "right"})";
   for (const char* stepping : {"fixed", "event"}) {
     SCOPED_TRACE(stepping);
-    ExpectAllAgree(
-        On(Disc(R"("position": [-1, 0.9], "velocity": [0.5, 0])"), ground, stepping, 1.1, 0.3, 0.3),
-        {"bodies/b/position/x", "bodies/b/shape/radius", "bodies/ground/shape/points/0/y",
-         "bodies/ground/shape/points/1/x", "bodies/ground/shape/points/1/y",
-         "bodies/ground/shape/points/2/y"});
+    ExpectAllAgree(On(DiscWith(R"("position": [-1, 0.9], "velocity": [0.5, 0])"), ground, stepping,
+                      1.1, 0.3, 0.3),
+                   {"bodies/b/position/x", "bodies/b/shape/radius",
+                    "bodies/ground/shape/points/0/y", "bodies/ground/shape/points/1/x",
+                    "bodies/ground/shape/points/1/y", "bodies/ground/shape/points/2/y"});
   }
 }
 
@@ -248,7 +218,7 @@ TEST(PolylineTest, DerivativesByPointsOfAClosedOutline) {
                                       "closed": true, "solid": "right"})";
   for (const char* stepping : {"fixed", "event"}) {
     SCOPED_TRACE(stepping);
-    ExpectAllAgree(On(Disc(R"("position": [-0.2, 0.6], "velocity": [0.2, 0])"), room, stepping,
+    ExpectAllAgree(On(DiscWith(R"("position": [-0.2, 0.6], "velocity": [0.2, 0])"), room, stepping,
                       0.45, 0.3, 0.2),
                    {"bodies/ground/shape/points/0/x", "bodies/ground/shape/points/0/y",
                     "bodies/ground/shape/points/3/y"});
