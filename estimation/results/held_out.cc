@@ -67,8 +67,8 @@ Eigen::VectorXd KnownValues(const std::vector<ParameterEntry>& entries,
 }
 
 /// Fits the start; false with a message in `run` where there is none.
-bool FitStart(const FitOptions& options, const HeldOutRecording& of, const std::vector<bool>& free,
-              HeldOutRun* run) {
+bool FitTheStart(const FitOptions& options, const HeldOutRecording& of,
+                 const std::vector<bool>& free, HeldOutRun* run) {
   if (of.from_observations) {
     run->first_part->SetInitial(run->parameters);
     run->parameters = ParametersFromObservations(*run->first_part, free);
@@ -110,7 +110,7 @@ HeldOutRun Predict(const FitInput& input, const RecordingsProblem& problem,
   for (size_t k = 0; k < free.size(); ++k) {
     if (free[k]) run.fitted.push_back(static_cast<int>(k));
   }
-  if (!run.fitted.empty() && !FitStart(input.options(), of, free, &run)) {
+  if (!run.fitted.empty() && !FitTheStart(input.options(), of, free, &run)) {
     run.parameters.resize(0);
     run.later.observations = std::move(of.later);
     return run;
