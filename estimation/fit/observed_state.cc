@@ -194,8 +194,7 @@ class StateProblem : public LeastSquaresProblem {
   void AddJoints(const State<double>& state, Eigen::Index* row, Eigen::VectorXd* rows) const {
     for (const JointIndex& joint : model_.structure->joints) {
       JointRows<double> equations;
-      EvaluateJoint(joint.type, state.PoseOf(joint.a), state.PoseOf(joint.b),
-                    &model_.parameters[joint.geometry], &equations);
+      EvaluateJoint(model_, state, joint, &equations);
       for (int k = 0; k < equations.rows; ++k) {
         const double rate =
             RelativeSpeed(state, joint.a, equations.row_a[k], joint.b, equations.row_b[k]);

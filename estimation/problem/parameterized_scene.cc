@@ -156,6 +156,11 @@ bool ParameterizedScene::Finish(ParameterError* error) {
                   (reason.empty() ? "" : ": " + reason)};
     return false;
   }
+  const std::string rates = CoupledRatesFault(scene_, "the scene with the initial values");
+  if (!rates.empty()) {
+    *error = {-1, -1, "", rates};
+    return false;
+  }
   const std::string refused =
       structure_->paths.empty() ? "" : CoincidingEdges(model_, VariableDerivatives());
   if (!refused.empty()) *error = {-1, -1, "", refused};

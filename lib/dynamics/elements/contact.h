@@ -333,8 +333,7 @@ void EvaluateActiveRows(const Model<T>& model, const State<T>& state, const Acti
   }
   const JointIndex& joint = model.structure->joints[contact.joint];
   JointRows<T> joint_rows;
-  EvaluateJoint(joint.type, state.PoseOf(joint.a), state.PoseOf(joint.b),
-                &model.parameters[joint.geometry], &joint_rows);
+  EvaluateJoint(model, state, joint, &joint_rows);
   EvaluateLimitRows(model.parameters[LimitNumber(joint, contact)], joint_rows, contact, rows);
 }
 

@@ -68,12 +68,13 @@ struct PartPair {
 ///   kPrismatic        anchor in a's frame (2), in b's (2), unit axis in b's (2), angle
 ///   kDistance, kRope  anchor in a's frame (2), in b's frame (2), length
 ///   kFixedAngle       angle as drawn
-///   kCoupling, kLimitedCoupling  row on a's pose (3), on b's (3), value at time 0
+///   kCoupling, kLimitedCoupling  ratio, value at time 0
 /// The angle as drawn is angle_a − angle_b at time 0, before the joint's initial angle is applied.
 struct JointIndex {
   std::string name;
   JointType type = JointType::kRevolute;
-  int a = -1, b = -1;  ///< bodies; the world has an index too
+  int a = -1, b = -1;         ///< bodies; the world has an index too
+  int coupled[2] = {-1, -1};  ///< of a coupling: two joints
   int rows = 0;
   int geometry = -1;
   int num_geometry = 0;
@@ -89,6 +90,9 @@ struct JointIndex {
   int effort_signal = -1;   ///< into signals; replaces effort
   bool is_angular = false;  ///< whether its coordinate is an angle, rad; else it is a length, m
   bool HasLimits() const { return low >= 0 || high >= 0; }
+  bool IsCoupling() const {
+    return type == JointType::kCoupling || type == JointType::kLimitedCoupling;
+  }
 };
 
 /// Local anchors (2 + 2), stiffness, damping, rest length: seven parameters from `numbers` on.
