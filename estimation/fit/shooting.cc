@@ -199,7 +199,8 @@ int ShootingResiduals::num_joint_rows() const {
 void ShootingResiduals::AddJoints(int segment, Run* run) const {
   int row = num_observations() + num_states() + segment * num_joint_rows();
   for (const JointIndex& joint : residuals_->scene().model().structure->joints) {
-    for (int k = 0; k < (joint.IsCoupling() ? 2 : 1); ++k) {
+    const bool ends = IsReleased(*residuals_->scene().model().structure, run->state, joint);
+    for (int k = 0; k < (joint.IsCoupling() ? 2 : 1) && !ends; ++k) {
       AddJointShare(joint, k, segment, row, run);
     }
     row += 6;

@@ -161,8 +161,9 @@ bool ParameterizedScene::Finish(ParameterError* error) {
     *error = {-1, -1, "", rates};
     return false;
   }
-  const std::string refused =
-      structure_->paths.empty() ? "" : CoincidingEdges(model_, VariableDerivatives());
+  const std::string refused = structure_->paths.empty() && !structure_->has_releases
+                                  ? ""
+                                  : CoincidingEdges(model_, VariableDerivatives());
   if (!refused.empty()) *error = {-1, -1, "", refused};
   return refused.empty();
 }

@@ -271,7 +271,7 @@ TEST(BadSceneTest, Couplings) {
       {"/joints/0/ratio", kRemove, "/joints/0/ratio: missing, expected a number"},
       {"/joints/0/bodies", "[\"a\", \"b\"]",
        "/joints/0/bodies: unknown key of a coupling joint, expected one of name, type, joints, "
-       "contact, ratio, limits, limit_restitution, got \"bodies\""}};
+       "contact, until, ratio, limits, limit_restitution, got \"bodies\""}};
   for (const BadScene& c : cases) EXPECT_EQ(ErrorIn(kGears, c), "bad.json: " + c.message);
   // Play leaves the rates free.
   Json play = Json::parse(kGears);
@@ -303,23 +303,24 @@ TEST(BadSceneTest, Joints) {
        "coupling"},
       {"/joints/0/displacement", "0",
        "/joints/0/displacement: unknown key of a revolute joint, expected one of name, type, "
-       "bodies, contact, anchor, angle, rate, damping, limits, limit_restitution, friction, "
+       "bodies, contact, until, anchor, angle, rate, damping, limits, limit_restitution, friction, "
        "kinetic_friction, stribeck_speed, motor, stiffness, rest_angle, effort, got "
        "\"displacement\""},
       {"/joints/1/angle", "0",
        "/joints/1/angle: unknown key of a prismatic joint, expected one of name, type, bodies, "
-       "contact, anchor, axis, displacement, rate, damping, limits, limit_restitution, friction, "
+       "contact, until, anchor, axis, displacement, rate, damping, limits, limit_restitution, "
+       "friction, "
        "kinetic_friction, stribeck_speed, motor, stiffness, rest_displacement, effort, got "
        "\"angle\""},
       {"/joints/2/damping", "0",
        "/joints/2/damping: unknown key of a weld joint, expected one of name, type, bodies, "
-       "contact, anchor, got \"damping\""},
+       "contact, until, anchor, got \"damping\""},
       {"/joints/3/anchor", "[0, 0]",
        "/joints/3/anchor: unknown key of a distance joint, expected one of name, type, bodies, "
-       "contact, anchors, limits, limit_restitution, got \"anchor\""},
+       "contact, until, anchors, limits, limit_restitution, got \"anchor\""},
       {"/joints/4/anchor", "[0, 0]",
        "/joints/4/anchor: unknown key of a fixed_angle joint, expected one of name, type, bodies, "
-       "contact, got \"anchor\""},
+       "contact, until, got \"anchor\""},
       {"/joints/0/anchor", kRemove,
        "/joints/0/anchor: missing, expected an array of 2 numbers [x, y]"},
       {"/joints/1/axis", "[0, 0]", "/joints/1/axis: expected a direction, got the zero vector"},

@@ -14,6 +14,7 @@
 //   PoseOf, Angle, TwistOf, Moving (body)     where a body is, and how it moves
 //   ShapeOfA, ShapeOfB (contact)              its shapes
 //   RowsOf, RatesOf (joint), RateScratch      memory
+//   IsReleased(j)                             whether joint j has ended
 //   Restitution(i), Approach(contact, rows)   of contact i: e, and n·v before the step
 //   Time()                                    of accelerations
 //   ModeOf(servo, time)                       of a servo: servo.h
@@ -104,7 +105,9 @@ class Equations {
   void Joint(int j) {
     const JointIndex& joint = s_.joints[j];
     T rhs[3];
+    const bool released = b_.IsReleased(j);
     if constexpr (!Builder::kKeepsJoints) {
+      if (released) return;
       for (int k = 0; k < 2 && joint.IsCoupling(); ++k) {
         b_.Begin();
         JointRows<T> share;
@@ -119,8 +122,10 @@ class Equations {
     JointRows<T>& rows = b_.RowsOf(j);
     JointRates<T>& rates = b_.RatesOf(j);
     EvaluateRows(joint, &rows, &rates);
+    if (released) rows.rows = 0;
     RightHandSide(rows, rates, rhs);
     b_.Joint(j, rows, rhs);
+    if (released) return;
     Drive(joint, rows.coordinate_a, rows.coordinate_b);
   }
 
@@ -128,7 +133,7 @@ class Equations {
   /// joint it would read more variables than a local Jet has.
   void JointSpring(int j) {
     const JointIndex& joint = s_.joints[j];
-    if (joint.stiffness < 0 || Weight() == 0.0) {
+    if (joint.stiffness < 0 || Weight() == 0.0 || b_.IsReleased(j)) {
       return;
     }
     b_.Begin();
@@ -146,6 +151,7 @@ class Equations {
     if constexpr (kLevel != Level::kCorrection) {
       if (Weight() == 0.0) return;
       const ServoIndex& servo = s_.servos[k];
+      if (servo.joint >= 0 && b_.IsReleased(servo.joint)) return;
       ServoTime<T> time;
       time.h = kLevel == Level::kVelocity ? at_.h : 0.0;
       time.time = kLevel == Level::kVelocity ? T(at_.t) : T(ValueOf(at_.time));
@@ -178,7 +184,7 @@ class Equations {
   void JointFrictionDecay(int j) {
     if constexpr (kLevel == Level::kAcceleration) {
       const JointIndex& joint = s_.joints[j];
-      if (!joint.has_decay) {
+      if (!joint.has_decay || b_.IsReleased(j)) {
         return;
       }
       b_.Begin();

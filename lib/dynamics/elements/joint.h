@@ -14,11 +14,11 @@
 //   kRope, kLimitedCoupling  none                               (0 rows)
 //
 // p: the anchors of each body; x_1 and x_2 are coordinates. The coordinate of a revolute joint is
-// θ_a − θ_b − θ0, of a prismatic one u·(p_a − p_b), of a rope |p_a − p_b|, of a coupling with limits
-// C; efforts, damping, friction, motors and limits act along its row. One file a type:
+// θ_a − θ_b − θ0, of a prismatic one u·(p_a − p_b), of a rope |p_a − p_b|, of a coupling with
+// limits C; efforts, damping, friction, motors and limits act along its row. One file a type:
 // joint_*_inl.h.
 
-#include "tangible/dynamics/model/model.h"
+#include "tangible/dynamics/model/model_releases.h"
 #include "tangible/lcp/system/contact_problem.h"
 
 namespace tangible {
@@ -50,7 +50,7 @@ template <typename T>
 void EvaluateJoint(JointType type, const Pose<T>& pose_a, const Pose<T>& pose_b, const T* numbers,
                    JointRows<T>* out);
 
-/// Evaluates any joint of a model at a state.
+/// Evaluates any joint of a model at a state; one that has been released has no rows.
 template <typename T>
 void EvaluateJoint(const Model<T>& model, const State<T>& state, const JointIndex& joint,
                    JointRows<T>* out);

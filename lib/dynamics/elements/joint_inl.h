@@ -58,13 +58,13 @@ void EvaluateJoint(const Model<T>& model, const State<T>& state, const JointInde
   if (!joint.IsCoupling()) {
     EvaluateJoint(joint.type, state.PoseOf(joint.a), state.PoseOf(joint.b),
                   &model.parameters[joint.geometry], out);
-    return;
   }
-  for (int k = 0; k < 2; ++k) {
+  for (int k = 0; k < 2 && joint.IsCoupling(); ++k) {
     JointRows<T> share;
     EvaluateShare(model, state, joint, k, &share);
     AddShare(joint, model.structure->joints[joint.coupled[k]], k, share, out);
   }
+  if (IsReleased(*model.structure, state, joint)) out->rows = 0;
 }
 
 }  // namespace tangible

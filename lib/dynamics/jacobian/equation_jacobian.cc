@@ -53,6 +53,7 @@ class EntryBuilder : private internal::LocalEntries<Sink> {
       }
     }
     for (int j = 0; j < static_cast<int>(s_.joints.size()); ++j) {
+      if (IsReleased(j)) continue;
       const JointType type = s_.joints[j].type;
       const bool by_hand =
           by_hand_ && !this->FollowsPath(s_.joints[j].a) && !this->FollowsPath(s_.joints[j].b);
@@ -109,6 +110,7 @@ class EntryBuilder : private internal::LocalEntries<Sink> {
   ShapeView<LocalJet> ShapeOfB(const ActiveContact& contact) {
     return LocalShapeOfB(contact, &locals_);
   }
+  bool IsReleased(int j) const { return tangible::IsReleased(state_, j); }
   JointRows<LocalJet>& RowsOf(int) { return joint_rows_; }
   JointRates<LocalJet>& RatesOf(int) { return joint_rates_; }
   ContactRateScratch<LocalJet>* RateScratch() { return &scratch_.rates; }

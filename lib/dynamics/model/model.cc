@@ -200,6 +200,10 @@ void AddJoints(const BasicScene<T>& scene, Places* places, ModelStructure* struc
             static_cast<int>(structure->joints.size());
       }
     }
+    if (joint.until) {
+      index.until = places->Take(1);
+      structure->has_releases = true;
+    }
     if (joint.limits) {
       index.low = Limits(joint.limits->first) ? places->Take(1) : -1;
       index.high = Limits(joint.limits->second) ? places->Take(1) : -1;
@@ -387,6 +391,7 @@ void FillJoints(const BasicScene<T>& scene, const State<T>& drawn, int world,
       }
       FillServo(joint.effort_servo, numbers);
     }
+    if (joint.until) numbers->push_back(*joint.until);
     if (joint.limits) {
       if (Limits(joint.limits->first)) numbers->push_back(joint.limits->first);
       if (Limits(joint.limits->second)) numbers->push_back(joint.limits->second);

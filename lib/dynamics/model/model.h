@@ -81,6 +81,7 @@ struct JointIndex {
   int damping = -1, effort = -1;  ///< −1: none of this type
   int low = -1, high = -1;        ///< −1: not limited on that side
   int limit_restitution = -1;     ///< −1: 0
+  int until = -1;                 ///< the time from which it does nothing; −1: none
   int motor = -1;                 ///< its speed, then its limit; −1: none
   int stiffness = -1;             ///< then the coordinate at rest; −1: no spring
   /// The force or torque at which it slides; −1: none. With Stribeck's decay the kinetic friction
@@ -157,6 +158,7 @@ struct ModelStructure {
   std::vector<std::pair<int, int>> joined;  ///< bodies with a joint without contact, ascending
   std::vector<int> moving;                  ///< body of each block
   bool joint_loops = false;
+  bool has_releases = false;     ///< whether joints end at a time
   bool friction_decays = false;  ///< whether the friction of some contact may (contact.h)
   int num_parameters = 0;
 

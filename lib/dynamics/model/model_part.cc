@@ -111,6 +111,8 @@ class PartTaker {
       TakeOne(&index.low);
       TakeOne(&index.high);
       TakeOne(&index.limit_restitution);
+      TakeOne(&index.until);
+      to_->has_releases = to_->has_releases || index.until >= 0;
       TakeSignal(&index.effort_signal);
       TakeServos(&ServoIndex::joint, j, to_->joints.size() - 1);
     }

@@ -82,6 +82,7 @@ void JointProjection::Visit(const Model<double>& model, const Sink& sink) {
   }
   for (size_t j = 0; j < s.joints.size(); ++j) {
     const JointIndex& joint = s.joints[j];
+    if (IsReleased(at, static_cast<int>(j))) continue;
     for (int k = 0; k < (joint.IsCoupling() ? 2 : 1); ++k) {
       VisitShare(model, static_cast<int>(j), k, sink);
     }

@@ -251,6 +251,7 @@ template <typename T>
 void TryStep(const Model<T>& model, double fraction, ProjectionIterate<T>* p) {
   const ModelStructure& s = *model.structure;
   p->trial.pose = p->at.pose;
+  p->trial.released = p->at.released;
   for (int k = 0; k < s.num_blocks(); ++k) {
     for (int i = 0; i < 3; ++i) {
       p->trial.pose[3 * s.moving[k] + i] += fraction * p->rhs[3 * k + i];
