@@ -288,9 +288,9 @@ std::vector<SmoothedSeries> SmoothAt(const RolloutResiduals& residuals, double t
   }
   std::vector<SmoothedSeries> all;
   for (size_t i = 0; i < samples.size(); ++i) {
-    // Events and accelerations say nothing about a state alone.
+    // Events, accelerations and forces say nothing about a state alone.
     const Observation& one = observations[index.first[i]];
-    if (one.event >= 0 || IsAcceleration(one.coordinate)) continue;
+    if (one.event >= 0 || IsAcceleration(one.coordinate) || IsForce(one.coordinate)) continue;
     all.push_back(Smooth(std::move(samples[i])));
     all.back().observation = index.first[i];
   }
