@@ -16,8 +16,8 @@ namespace tangible {
 namespace {
 
 constexpr GradientMethod kForceMethods[] = {GradientMethod::kTangent, GradientMethod::kAdjoint,
-                                           GradientMethod::kJetImplicit, GradientMethod::kJet,
-                                           GradientMethod::kFiniteDifference};
+                                            GradientMethod::kJetImplicit, GradientMethod::kJet,
+                                            GradientMethod::kFiniteDifference};
 
 std::string Settings(const char* stepping) {
   return std::string(R"(, "simulation": {"dt": 0.01, "duration": 1, "stepping": ")") + stepping +
